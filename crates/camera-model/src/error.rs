@@ -1,0 +1,23 @@
+use thiserror::Error;
+
+/// What can be wrong with a camera, or with a point or pixel given to it.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// A parameter of the camera lies outside its domain.
+    #[error("{name} = {value}: {expected}")]
+    OutOfDomain {
+        /// Name of the parameter.
+        name: &'static str,
+        /// Value given.
+        value: f64,
+        /// What would be right.
+        expected: &'static str,
+    },
+    /// A frame or format error.
+    #[error(transparent)]
+    Image(#[from] range_image::Error),
+}
+
+/// Result with this crate's [`Error`].
+pub type Result<T> = std::result::Result<T, Error>;

@@ -1,0 +1,201 @@
+//! The frame at its levels: raw samples, complex images, ranges.
+
+use std::f64::consts::TAU;
+
+use crate::{Error, Flags, Modulation, Raster, Result};
+
+/// Raw correlation samples as the sensor delivers them, one contiguous block in `[F, N, H, W]` order.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Samples {
+    /// Floating point (also signed differences of two taps).
+    F32(Vec<f32>),
+    /// Unsigned counts.
+    U16(Vec<u16>),
+    /// Signed differences of two taps.
+    I16(Vec<i16>),
+}
+
+impl Samples {
+    /// Number of samples.
+    pub fn len(&self) -> usize {
+        match self {
+            Self::F32(values) => values.len(),
+            Self::U16(values) => values.len(),
+            Self::I16(values) => values.len(),
+        }
+    }
+
+    /// Whether there is no sample.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+}
+
+/// One frame at level `samples`: F frequencies with N phase steps `theta_n = 2 pi n / N` each.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RawFrame {
+    width: usize,
+    height: usize,
+    phase_steps: usize,
+    modulations: Vec<Modulation>,
+    samples: Samples,
+}
+
+impl RawFrame {
+    /// Takes samples in `[F, N, H, W]` order, `F` being the number of `modulations`.
+    pub fn new(
+        width: usize,
+        height: usize,
+        phase_steps: usize,
+        modulations: Vec<Modulation>,
+        samples: Samples,
+    ) -> Result<Self> {
+        if phase_steps < 3 {
+            return Err(Error::OutOfDomain {
+                name: "phase_steps",
+                value: phase_steps as f64,
+                expected: "offset, amplitude and phase need at least 3 phase steps",
+            });
+        }
+        if modulations.is_empty() {
+            return Err(Error::OutOfDomain {
+                name: "modulations",
+                value: 0.0,
+                expected: "a raw frame has at least one modulation frequency",
+            });
+        }
+        let planes = modulations.len() * phase_steps;
+        let expected = width.saturating_mul(height).saturating_mul(planes);
+        if samples.len() != expected {
+            return Err(Error::RasterLength { width, height: height * planes, expected, found: samples.len() });
+        }
+        Ok(Self { width, height, phase_steps, modulations, samples })
+    }
+
+    /// Columns.
+    pub fn width(&self) -> usize {
+        self.width
+    }
+
+    /// Rows.
+    pub fn height(&self) -> usize {
+        self.height
+    }
+
+    /// Number N of equidistant phase steps.
+    pub fn phase_steps(&self) -> usize {
+        self.phase_steps
+    }
+
+    /// The modulation of each of the F frequencies.
+    pub fn modulations(&self) -> &[Modulation] {
+        &self.modulations
+    }
+
+    /// All samples in `[F, N, H, W]` order.
+    pub fn samples(&self) -> &Samples {
+        &self.samples
+    }
+}
+
+/// The complex image `z = A exp(i phi)` of one frequency, as separate planes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ComplexChannel {
+    /// Modulation this image was taken at.
+    pub modulation: Modulation,
+    /// Real part `A cos phi`, in the samples' unit.
+    pub real: Raster<f32>,
+    /// Imaginary part `A sin phi`, in the samples' unit.
+    pub imaginary: Raster<f32>,
+    /// Mean sample `B`, where samples were demodulated.
+    pub offset: Option<Raster<f32>>,
+    /// Standard deviation of each part of `z`, in the samples' unit; NaN where it is not known.
+    pub sigma: Raster<f32>,
+}
+
+impl ComplexChannel {
+    /// Amplitude `A = |z|`.
+    pub fn amplitude(&self) -> Raster<f32> {
+        self.combine(f32::hypot)
+    }
+
+    /// Phase in `[0, 2 pi)`.
+    pub fn phase(&self) -> Raster<f32> {
+        self.combine(|re, im| {
+            let phase = im.atan2(re);
+            let positive = if phase < 0.0 { phase + TAU as f32 } else { phase };
+            // A tiny negative phase rounds up to 2 pi itself, which is the same direction as zero.
+            if positive >= TAU as f32 { 0.0 } else { positive }
+        })
+    }
+
+    /// Standard deviation of the phase in radians, `sigma_z / A` (Lange; valid where `A` is well above `sigma_z`).
+    pub fn sigma_phase(&self) -> Raster<f32> {
+        let mut sigma = self.amplitude();
+        for (value, sigma_z) in sigma.as_mut_slice().iter_mut().zip(self.sigma.as_slice()) {
+            *value = sigma_z / *value;
+        }
+        sigma
+    }
+
+    fn combine(&self, f: impl Fn(f32, f32) -> f32) -> Raster<f32> {
+        let mut out = self.real.clone();
+        for (value, im) in out.as_mut_slice().iter_mut().zip(self.imaginary.as_slice()) {
+            *value = f(*value, *im);
+        }
+        out
+    }
+}
+
+/// One frame at level `phase`: complex images of all frequencies and one flag plane.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ComplexFrame {
+    /// One channel a frequency, all of one size.
+    pub channels: Vec<ComplexChannel>,
+    /// Reasons to distrust a pixel.
+    pub flags: Raster<Flags>,
+}
+
+impl ComplexFrame {
+    /// Columns.
+    pub fn width(&self) -> usize {
+        self.flags.width()
+    }
+
+    /// Rows.
+    pub fn height(&self) -> usize {
+        self.flags.height()
+    }
+}
+
+/// One frame at level `range`: radial ranges with sigma, amplitude and flags.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RangeFrame {
+    /// Euclidean distance from the perspective centre in metres; NaN where there is no value.
+    pub range: Raster<f32>,
+    /// Standard deviation of the range in metres; NaN where it is not known.
+    pub sigma: Raster<f32>,
+    /// Amplitude in the camera's unit; NaN where the camera gives none.
+    pub amplitude: Raster<f32>,
+    /// Reasons to distrust a pixel.
+    pub flags: Raster<Flags>,
+}
+
+impl RangeFrame {
+    /// Columns.
+    pub fn width(&self) -> usize {
+        self.range.width()
+    }
+
+    /// Rows.
+    pub fn height(&self) -> usize {
+        self.range.height()
+    }
+
+    /// Fails unless all planes have the size of the range plane.
+    pub fn validate(&self) -> Result<()> {
+        self.range.require_same_size(&self.sigma, "sigma")?;
+        self.range.require_same_size(&self.amplitude, "amplitude")?;
+        self.range.require_same_size(&self.flags, "flags")
+    }
+}

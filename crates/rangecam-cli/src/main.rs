@@ -1,0 +1,2 @@
+//! rangecam
+fn main() {}

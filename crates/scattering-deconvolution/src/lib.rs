@@ -1,0 +1,5 @@
+#![doc = include_str!("../README.md")]
+
+mod psf;
+
+pub use psf::{GaussianTerm, Psf};

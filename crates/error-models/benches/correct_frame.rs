@@ -24,29 +24,24 @@ fn frame(width: usize, height: usize) -> RangeFrame {
 }
 
 fn frames(criterion: &mut Criterion) {
-    let single = |work: &mut (dyn FnMut() + Send)| {
-        rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap().install(work);
-    };
+    let one_thread = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
     for (width, height) in [(176, 144), (640, 480), (1024, 1024)] {
         let format = ImageFormat::new(width, height, [0.01; 2]).unwrap();
         let pattern = FixedPattern { width, height, offset_m: vec![1e-3; width * height] };
-        let frame = frame(width, height);
-        let model = model();
-        single(&mut || {
-            criterion.bench_function(&format!("correct_frame/{width}x{height}/1 thread"), |bencher| {
-                bencher.iter_batched_ref(
-                    || frame.clone(),
-                    |frame| correct_frame(frame, &model, &format, [0.0; 2], Some(&pattern)),
-                    BatchSize::LargeInput,
-                );
-            });
-            criterion.bench_function(&format!("distort_frame/{width}x{height}/1 thread"), |bencher| {
-                bencher.iter_batched_ref(
-                    || frame.clone(),
-                    |frame| distort_frame(frame, &model, &format, [0.0; 2], Some(&pattern)),
-                    BatchSize::LargeInput,
-                );
-            });
+        let (frame, model) = (frame(width, height), model());
+        criterion.bench_function(&format!("correct_frame/{width}x{height}/1 thread"), |bencher| {
+            bencher.iter_batched_ref(
+                || frame.clone(),
+                |frame| one_thread.install(|| correct_frame(frame, &model, &format, [0.0; 2], Some(&pattern))),
+                BatchSize::LargeInput,
+            );
+        });
+        criterion.bench_function(&format!("distort_frame/{width}x{height}/1 thread"), |bencher| {
+            bencher.iter_batched_ref(
+                || frame.clone(),
+                |frame| one_thread.install(|| distort_frame(frame, &model, &format, [0.0; 2], Some(&pattern))),
+                BatchSize::LargeInput,
+            );
         });
     }
 }

@@ -77,12 +77,19 @@ impl RangeErrorModel {
     /// Refuses arguments that are not finite and terms that are not monotone in the span.
     pub fn observed_range(&self, true_range_m: f64, x_mm: f64, y_mm: f64, amplitude: f64) -> Result<f64> {
         self.terms.require_monotone(self.ambiguity_interval_m, self.range_span_m)?;
-        self.observed_range_monotone(true_range_m, x_mm, y_mm, amplitude)
+        let observed = self.solve_observed_range(true_range_m, x_mm, y_mm, amplitude)?;
+        Ok(observed.unwrap_or(true_range_m))
     }
 
-    /// [`Self::observed_range`] of a model already known to be monotone.
-    pub(crate) fn observed_range_monotone(&self, true_range_m: f64, x_mm: f64, y_mm: f64, a: f64) -> Result<f64> {
-        let constant = self.terms.d0 + self.terms.delay(x_mm, y_mm) + self.amplitude_correction(a).0;
+    /// [`Self::observed_range`] of a model already known to be monotone; `None` if it is outside the span.
+    pub(crate) fn solve_observed_range(
+        &self,
+        true_range_m: f64,
+        x_mm: f64,
+        y_mm: f64,
+        amplitude: f64,
+    ) -> Result<Option<f64>> {
+        let constant = self.terms.d0 + self.terms.delay(x_mm, y_mm) + self.amplitude_correction(amplitude).0;
         let target = true_range_m + constant;
         if !target.is_finite() {
             return Err(Error::OutOfDomain {
@@ -92,7 +99,7 @@ impl RangeErrorModel {
             });
         }
         let observed = self.invert_periodic(target)?;
-        Ok(if self.range_in_span(observed) { observed } else { true_range_m })
+        Ok(Some(observed).filter(|range_m| self.range_in_span(*range_m)))
     }
 
     /// Solves `ρ - periodic(ρ) = target` by Newton's method inside a bracket that always holds the solution.

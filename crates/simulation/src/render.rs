@@ -155,8 +155,8 @@ impl Renderer<'_> {
     fn image(&self, width: usize, height: usize, pixels: &[Pixel]) -> Result<Image> {
         let plane = |value: &dyn Fn(&Pixel) -> f32| pixels.iter().map(value).collect::<Vec<f32>>();
         let count = self.channels.len();
-        let amplitude = |i| Raster::from_vec(width, height, plane(&|p: &Pixel| p.signals[i].amplitude));
-        let wraps = |i| Raster::from_vec(width, height, pixels.iter().map(|p: &Pixel| p.signals[i].wraps).collect());
+        let amplitude = |i: usize| Raster::from_vec(width, height, plane(&|p: &Pixel| p.signals[i].amplitude));
+        let wraps = |i: usize| Raster::from_vec(width, height, pixels.iter().map(|p: &Pixel| p.signals[i].wraps).collect());
         Ok(Image {
             channels: (0..count).map(|i| [plane(&|p| p.signals[i].real), plane(&|p| p.signals[i].imaginary)]).collect(),
             offset: plane(&|p| p.offset),

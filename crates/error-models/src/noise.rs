@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use range_image::{Modulation, NoiseModel};
 
-/// Standard deviation of one range in metre: `σ_ρ = U / 2π · σ_z / A` ([Lange2000]), valid where the amplitude
+/// Standard deviation of one range in metre: `σ_ρ = U / 2π · σ_z / A` (`[Lange2000]`), valid where the amplitude
 /// is well above `σ_z`.
 ///
 /// `offset` (mean sample B, which carries the shot noise) and `amplitude` are in the unit of the samples that

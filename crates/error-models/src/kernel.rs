@@ -11,6 +11,7 @@ use crate::summary::{AMPLITUDE, DELAY, GROUPS, PATTERN, PERIODIC, TOTAL, Tally};
 pub(crate) const LANES: usize = 32;
 
 type Lanes = [f32; LANES];
+type Mask = [bool; LANES];
 
 /// Adding and taking off 1.5 * 2^23 rounds a single-precision number below 2^22 to an integer.
 const ROUND: f32 = 12_582_912.0;
@@ -86,35 +87,35 @@ impl Kernel {
     pub(crate) fn correct(&self, block: &mut Block, column: usize, row: usize, tally: &mut LaneTally) {
         let (periodic, derivative) = self.periodic(&block.range);
         let (amplitude, known) = self.amplitude(&block.amplitude);
-        let first = self.delay_of_first + row as f64 * self.delay_per_row;
-        let first = (first + column as f64 * f64::from(self.delay_per_column)) as f32;
+        let delay = self.delay(column, row);
+        let finite = block.range.map(|range| range.abs() <= f32::MAX);
+        let inside = block.range.map(|range| within(range, self.range_span));
+        #[allow(clippy::needless_bitwise_bool)] // a branch would keep the loop scalar
+        let outside: Mask = std::array::from_fn(|lane| finite[lane] & !(inside[lane] & known[lane]));
+        let total: Lanes =
+            std::array::from_fn(|lane| self.d0 + periodic[lane] + delay[lane] + amplitude[lane] + block.pattern[lane]);
         for lane in 0..LANES {
-            let range = block.range[lane];
-            let inside = within(range, self.range_span);
-            let finite = range.abs() < f32::INFINITY;
-            let outside = finite && !(inside && known[lane]);
-            let delay = first + lane as f32 * self.delay_per_column;
-            let total = self.d0 + periodic[lane] + delay + amplitude[lane] + block.pattern[lane];
-            if inside {
-                block.range[lane] = range - total;
-                block.sigma[lane] *= (1.0 - derivative[lane]).abs();
-            }
-            block.flags[lane] |= if outside { Flags::OUTSIDE_SPAN.bits() } else { 0 };
-            tally.finite[lane] += u32::from(finite);
-            tally.corrected[lane] += u32::from(inside);
-            tally.outside_span[lane] += u32::from(outside);
-            let mut count = |group: usize, value: f32| {
-                let value = if inside { value } else { 0.0 };
-                tally.sum[group][lane] += value;
-                let largest = &mut tally.largest[group][lane];
-                *largest = if value.abs() > *largest { value.abs() } else { *largest };
-            };
-            count(TOTAL, total);
-            count(PERIODIC, periodic[lane]);
-            count(DELAY, delay);
-            count(AMPLITUDE, amplitude[lane]);
-            count(PATTERN, block.pattern[lane]);
+            let corrected = block.range[lane] - total[lane];
+            block.range[lane] = if inside[lane] { corrected } else { block.range[lane] };
+            let transported = block.sigma[lane] * (1.0 - derivative[lane]).abs();
+            block.sigma[lane] = if inside[lane] { transported } else { block.sigma[lane] };
         }
+        for (flags, outside) in block.flags.iter_mut().zip(outside) {
+            *flags |= u16::from(outside) * Flags::OUTSIDE_SPAN.bits();
+        }
+        tally.count(&finite, &inside, &outside);
+        tally.add(TOTAL, &total, &inside);
+        tally.add(PERIODIC, &periodic, &inside);
+        tally.add(DELAY, &delay, &inside);
+        tally.add(AMPLITUDE, &amplitude, &inside);
+        tally.add(PATTERN, &block.pattern, &inside);
+    }
+
+    /// The signal propagation delay of the block that begins at `(column, row)`.
+    fn delay(&self, column: usize, row: usize) -> Lanes {
+        let of_row = self.delay_of_first + row as f64 * self.delay_per_row;
+        let first = (of_row + column as f64 * f64::from(self.delay_per_column)) as f32;
+        std::array::from_fn(|lane| first + lane as f32 * self.delay_per_column)
     }
 
     /// The periodic terms and their derivative: one sine and cosine at half the longest wave's angle, doubled
@@ -139,7 +140,7 @@ impl Kernel {
     }
 
     /// Eq. 15, zero where it does not hold, and whether it holds; without a hyperbola it holds everywhere.
-    fn amplitude(&self, amplitude: &Lanes) -> (Lanes, [bool; LANES]) {
+    fn amplitude(&self, amplitude: &Lanes) -> (Lanes, Mask) {
         let (mut value, mut known) = ([0.0; LANES], [true; LANES]);
         let Some(ratios) = &self.hyperbola else { return (value, known) };
         for lane in 0..LANES {
@@ -148,8 +149,10 @@ impl Kernel {
             let rest = ratios.constant + ratios.slope * a;
             let radicand = linear * linear + rest;
             let root = radicand.sqrt();
-            let branch = if linear > 0.0 { rest / (linear + root) } else { root - linear };
-            known[lane] = within(a, ratios.span) && within(radicand, [0.0, f32::MAX]);
+            // Either way the two parts that are added have one sign.
+            let stable = rest / (linear.abs() + root);
+            let branch = if linear > 0.0 { stable } else { root - linear };
+            known[lane] = within(a, ratios.span) & within(radicand, [0.0, f32::MAX]);
             value[lane] = if known[lane] { branch } else { 0.0 };
         }
         (value, known)
@@ -175,8 +178,9 @@ fn octave((sin, cos): (f32, f32)) -> (f32, f32) {
 }
 
 /// Whether a value lies in a span, bounds included; NaN lies in none.
+#[allow(clippy::needless_bitwise_bool)] // a branch would keep the loop around it scalar
 fn within(value: f32, [low, high]: [f32; 2]) -> bool {
-    value >= low && value <= high
+    (value >= low) & (value <= high)
 }
 
 /// The smallest single-precision number that is not below `bound`.
@@ -208,6 +212,24 @@ impl LaneTally {
             outside_span: [0; LANES],
             sum: [[0.0; LANES]; GROUPS],
             largest: [[0.0; LANES]; GROUPS],
+        }
+    }
+
+    fn count(&mut self, finite: &Mask, corrected: &Mask, outside_span: &Mask) {
+        for lane in 0..LANES {
+            self.finite[lane] += u32::from(finite[lane]);
+            self.corrected[lane] += u32::from(corrected[lane]);
+            self.outside_span[lane] += u32::from(outside_span[lane]);
+        }
+    }
+
+    /// Adds one group of `Δρ` of the pixels that were corrected.
+    fn add(&mut self, group: usize, correction: &Lanes, corrected: &Mask) {
+        let (sum, largest) = (&mut self.sum[group], &mut self.largest[group]);
+        for lane in 0..LANES {
+            let value = if corrected[lane] { correction[lane] } else { 0.0 };
+            sum[lane] += value;
+            largest[lane] = if value.abs() > largest[lane] { value.abs() } else { largest[lane] };
         }
     }
 

@@ -52,12 +52,13 @@ impl RangeErrorModel {
             return RangeCorrection { outside_span: true, ..RangeCorrection::default() };
         }
         let (amplitude_m, outside_span) = self.amplitude_correction(amplitude);
+        let (periodic_m, range_derivative) = self.terms.periodic_with_derivative(self.ambiguity_interval_m, range_m);
         RangeCorrection {
             offset_m: self.terms.d0,
-            periodic_m: self.terms.periodic_correction(self.ambiguity_interval_m, range_m),
+            periodic_m,
             delay_m: self.terms.delay(x_mm, y_mm),
             amplitude_m,
-            range_derivative: self.terms.range_derivative(self.ambiguity_interval_m, range_m),
+            range_derivative,
             outside_span,
         }
     }
@@ -110,9 +111,10 @@ impl RangeErrorModel {
         let mut observed = target + self.terms.periodic_correction(interval, target);
         let mut misclosure = f64::INFINITY;
         for _ in 0..MOST_ITERATIONS {
-            misclosure = observed - self.terms.periodic_correction(interval, observed) - target;
+            let (periodic, derivative) = self.terms.periodic_with_derivative(interval, observed);
+            misclosure = observed - periodic - target;
             bracket[usize::from(misclosure > 0.0)] = observed;
-            let newton = observed - misclosure / (1.0 - self.terms.range_derivative(interval, observed));
+            let newton = observed - misclosure / (1.0 - derivative);
             let inside = newton > bracket[0] && newton < bracket[1];
             let next = if inside { newton } else { f64::midpoint(bracket[0], bracket[1]) };
             // Four units in the last place of the largest number met: what rounding leaves of the misclosure.

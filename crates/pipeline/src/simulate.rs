@@ -167,7 +167,8 @@ fn survey(spec: &SimulationSpec, frames: Vec<FrameEntry>) -> Result<Survey> {
             height: geometry.format.height,
             pixel_pitch_mm: geometry.format.pixel_pitch_mm,
             principal_distance_mm: geometry.interior.principal_distance_mm,
-            principal_point_mm: geometry.interior.principal_point_mm,
+            // Nominal, as a data sheet would have it: the calibration brings the true one.
+            principal_point_mm: [0.0, 0.0],
             modulation_hz: spec.camera.modulation_hz.clone(),
             phase_steps: Some(spec.camera.phase_steps),
             phase_sense: demodulation.phase_sense,

@@ -1,8 +1,24 @@
 #![doc = include_str!("../README.md")]
 
+mod back_projection;
 mod camera;
+mod covariance;
 mod error;
+mod lens;
+mod lens_inverse;
+mod observation;
+mod pose;
+mod projection;
+mod ray_table;
 
+pub use back_projection::OrganisedCloud;
 pub use camera::{Camera, InteriorOrientation, LensDistortion};
+pub use covariance::point_covariance;
 pub use error::{Error, Result};
+pub use observation::{Observation, ObservationJacobians};
+pub use pose::{
+    computer_vision_from_photogrammetric, euler_from_pose, euler_from_rotation, pose_from_euler, rotation_from_euler,
+    step_pose, with_computer_vision_axes,
+};
 pub use range_image::ImageFormat;
+pub use ray_table::RayTable;

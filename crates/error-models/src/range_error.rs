@@ -52,12 +52,13 @@ impl RangeErrorModel {
             return RangeCorrection { outside_span: true, ..RangeCorrection::default() };
         }
         let (amplitude_m, outside_span) = self.amplitude_correction(amplitude);
+        let (periodic_m, range_derivative) = self.terms.periodic_with_derivative(self.ambiguity_interval_m, range_m);
         RangeCorrection {
             offset_m: self.terms.d0,
-            periodic_m: self.terms.periodic_correction(self.ambiguity_interval_m, range_m),
+            periodic_m,
             delay_m: self.terms.delay(x_mm, y_mm),
             amplitude_m,
-            range_derivative: self.terms.range_derivative(self.ambiguity_interval_m, range_m),
+            range_derivative,
             outside_span,
         }
     }
@@ -77,12 +78,19 @@ impl RangeErrorModel {
     /// Refuses arguments that are not finite and terms that are not monotone in the span.
     pub fn observed_range(&self, true_range_m: f64, x_mm: f64, y_mm: f64, amplitude: f64) -> Result<f64> {
         self.terms.require_monotone(self.ambiguity_interval_m, self.range_span_m)?;
-        self.observed_range_monotone(true_range_m, x_mm, y_mm, amplitude)
+        let observed = self.solve_observed_range(true_range_m, x_mm, y_mm, amplitude)?;
+        Ok(observed.unwrap_or(true_range_m))
     }
 
-    /// [`Self::observed_range`] of a model already known to be monotone.
-    pub(crate) fn observed_range_monotone(&self, true_range_m: f64, x_mm: f64, y_mm: f64, a: f64) -> Result<f64> {
-        let constant = self.terms.d0 + self.terms.delay(x_mm, y_mm) + self.amplitude_correction(a).0;
+    /// [`Self::observed_range`] of a model already known to be monotone; `None` if it is outside the span.
+    pub(crate) fn solve_observed_range(
+        &self,
+        true_range_m: f64,
+        x_mm: f64,
+        y_mm: f64,
+        amplitude: f64,
+    ) -> Result<Option<f64>> {
+        let constant = self.terms.d0 + self.terms.delay(x_mm, y_mm) + self.amplitude_correction(amplitude).0;
         let target = true_range_m + constant;
         if !target.is_finite() {
             return Err(Error::OutOfDomain {
@@ -92,7 +100,7 @@ impl RangeErrorModel {
             });
         }
         let observed = self.invert_periodic(target)?;
-        Ok(if self.range_in_span(observed) { observed } else { true_range_m })
+        Ok(Some(observed).filter(|range_m| self.range_in_span(*range_m)))
     }
 
     /// Solves `ρ - periodic(ρ) = target` by Newton's method inside a bracket that always holds the solution.
@@ -103,9 +111,10 @@ impl RangeErrorModel {
         let mut observed = target + self.terms.periodic_correction(interval, target);
         let mut misclosure = f64::INFINITY;
         for _ in 0..MOST_ITERATIONS {
-            misclosure = observed - self.terms.periodic_correction(interval, observed) - target;
+            let (periodic, derivative) = self.terms.periodic_with_derivative(interval, observed);
+            misclosure = observed - periodic - target;
             bracket[usize::from(misclosure > 0.0)] = observed;
-            let newton = observed - misclosure / (1.0 - self.terms.range_derivative(interval, observed));
+            let newton = observed - misclosure / (1.0 - derivative);
             let inside = newton > bracket[0] && newton < bracket[1];
             let next = if inside { newton } else { f64::midpoint(bracket[0], bracket[1]) };
             // Four units in the last place of the largest number met: what rounding leaves of the misclosure.

@@ -33,22 +33,26 @@ impl RangeTerms {
 
     /// The six periodic terms alone, metre.
     pub fn periodic_correction(&self, ambiguity_interval_m: f64, range_m: f64) -> f64 {
-        let waves = waves(ambiguity_interval_m, range_m);
-        pairs(&self.periodic).zip(waves).map(|([d_sin, d_cos], wave)| d_sin * wave.sin + d_cos * wave.cos).sum()
+        self.periodic_with_derivative(ambiguity_interval_m, range_m).0
+    }
+
+    /// `∂Δρ/∂ρ`, metre per metre. The derivatives with respect to x and y are `e1` and `e2`.
+    pub fn range_derivative(&self, ambiguity_interval_m: f64, range_m: f64) -> f64 {
+        self.periodic_with_derivative(ambiguity_interval_m, range_m).1
+    }
+
+    /// The periodic terms and their derivative from one sine and cosine.
+    pub(crate) fn periodic_with_derivative(&self, ambiguity_interval_m: f64, range_m: f64) -> (f64, f64) {
+        let pairs = pairs(&self.periodic).zip(waves(ambiguity_interval_m, range_m));
+        pairs.fold((0.0, 0.0), |(value, derivative), ([d_sin, d_cos], wave)| {
+            let change = wave.number_rad_per_m * (d_sin * wave.cos - d_cos * wave.sin);
+            (value + (d_sin * wave.sin + d_cos * wave.cos), derivative + change)
+        })
     }
 
     /// The signal propagation delay alone, metre: `e1 x + e2 y`.
     pub fn delay(&self, x_mm: f64, y_mm: f64) -> f64 {
         self.e1 * x_mm + self.e2 * y_mm
-    }
-
-    /// `∂Δρ/∂ρ`, metre per metre. The derivatives with respect to x and y are `e1` and `e2`.
-    pub fn range_derivative(&self, ambiguity_interval_m: f64, range_m: f64) -> f64 {
-        let waves = waves(ambiguity_interval_m, range_m);
-        pairs(&self.periodic)
-            .zip(waves)
-            .map(|([d_sin, d_cos], wave)| wave.number_rad_per_m * (d_sin * wave.cos - d_cos * wave.sin))
-            .sum()
     }
 
     /// `∂Δρ/∂(d0, d2..d7, e1, e2)`; as Eq. 14 is linear, `Δρ` is its product with [`Self::to_array`].

@@ -53,7 +53,7 @@ impl ComplexChannel {
         self.evaluate(|re, im, _| angle(re, im))
     }
 
-    /// Standard deviation of the phase in radians, `sigma_z / A` ([Lange2000]).
+    /// Standard deviation of the phase in radians, `sigma_z / A` (`[Lange2000]`).
     ///
     /// This holds where `A` is well above `sigma_z` (by 10 % at `A = 3 sigma_z`). It is never more than `pi / sqrt(3)`,
     /// that of a phase of which nothing is known. NaN where sigma is.

@@ -3,74 +3,12 @@
 use rayon::prelude::*;
 
 use crate::weights::StepWeight;
-use crate::{
-    ComplexChannel, ComplexFrame, Error, Flags, NoiseModel, PhaseConvention, Raster, RawFrame, Result, Samples,
-};
+use crate::{ComplexChannel, ComplexFrame, DemodulationOptions, Flags, NoiseModel, Raster, RawFrame, Result, Samples};
 
 /// Pixels worked on at a time: their sums stay in the first-level cache while the planes of samples pass by.
 const BLOCK: usize = 1024;
 /// Blocks that one task takes at least; smaller tasks cost more to hand out than to do.
 const BLOCKS_PER_TASK: usize = 16;
-
-/// What the camera means by its samples, and what is known of their noise.
-#[derive(Debug, Clone, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
-pub struct DemodulationOptions {
-    /// Whether the samples step forward or backward in phase.
-    pub phase_sense: crate::PhaseSense,
-    /// Added to the phase after the sense is applied, radian.
-    pub phase_offset_rad: f64,
-    /// Samples are multiplied by it; amplitude, offset and sigma come out in the scaled unit.
-    pub raw_scale: f64,
-    /// A sample at or above it (in absolute value) flags its pixel as saturated; raw units, before the scale.
-    pub saturation: Option<f64>,
-    /// Noise of a sample in the scaled unit.
-    pub noise: NoiseModel,
-    /// Pixels with a smaller amplitude at any frequency are flagged; scaled unit.
-    pub low_amplitude: Option<f64>,
-}
-
-impl Default for DemodulationOptions {
-    /// The samples of the conventions, unscaled, nothing known of saturation and noise.
-    fn default() -> Self {
-        Self {
-            phase_sense: crate::PhaseSense::Positive,
-            phase_offset_rad: 0.0,
-            raw_scale: 1.0,
-            saturation: None,
-            noise: NoiseModel::default(),
-            low_amplitude: None,
-        }
-    }
-}
-
-impl DemodulationOptions {
-    /// The phase convention among the options.
-    pub fn phase_convention(&self) -> PhaseConvention {
-        PhaseConvention { phase_sense: self.phase_sense, phase_offset_rad: self.phase_offset_rad }
-    }
-
-    /// Fails on a value that no camera can have.
-    pub fn validate(&self) -> Result<()> {
-        self.phase_convention().validate()?;
-        self.noise.validate()?;
-        require_positive("raw_scale", self.raw_scale)?;
-        for (name, value) in [("saturation", self.saturation), ("low_amplitude", self.low_amplitude)] {
-            value.map_or(Ok(()), |value| require_positive(name, value))?;
-        }
-        Ok(())
-    }
-}
-
-fn require_positive(name: &'static str, value: f64) -> Result<()> {
-    // Planes are f32: what underflows or overflows there is no scale.
-    let single = value as f32;
-    if single.is_normal() && single > 0.0 {
-        return Ok(());
-    }
-    Err(Error::OutOfDomain { name, value, expected: "must be positive and within the range of f32" })
-}
 
 /// Demodulates one frame; see [`Demodulator`] for streams of frames.
 pub fn demodulate(frame: &RawFrame, options: &DemodulationOptions) -> Result<ComplexFrame> {
@@ -113,13 +51,14 @@ impl Demodulator {
         }
         let ComplexFrame { channels, flags } = out;
         let steps = frame.phase_steps();
+        let job = ChannelJob { options: &self.options, noise: self.noise_of(frame.samples()), steps };
+        let length = flags.len() * steps;
         for (index, channel) in channels.iter_mut().enumerate() {
-            let noise = self.noise_of(frame.samples());
-            let job = ChannelJob { options: &self.options, noise, steps };
+            let own = index * length..(index + 1) * length;
             match frame.samples() {
-                Samples::F32(samples) => job.run(of_channel(samples, index, channels_len(frame)), channel, flags),
-                Samples::U16(samples) => job.run(of_channel(samples, index, channels_len(frame)), channel, flags),
-                Samples::I16(samples) => job.run(of_channel(samples, index, channels_len(frame)), channel, flags),
+                Samples::F32(samples) => job.run(&samples[own], channel, flags),
+                Samples::U16(samples) => job.run(&samples[own], channel, flags),
+                Samples::I16(samples) => job.run(&samples[own], channel, flags),
             }
         }
         Ok(())
@@ -131,15 +70,6 @@ impl Demodulator {
             Samples::F32(_) | Samples::U16(_) => self.options.noise,
         }
     }
-}
-
-fn channels_len(frame: &RawFrame) -> usize {
-    frame.modulations().len()
-}
-
-fn of_channel<S>(samples: &[S], index: usize, channels: usize) -> &[S] {
-    let length = samples.len() / channels;
-    &samples[index * length..(index + 1) * length]
 }
 
 /// A sample of any of the types that sensors deliver; all are exact in f32.

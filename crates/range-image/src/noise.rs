@@ -3,7 +3,7 @@ use crate::{ComplexChannel, Error, Result};
 /// Random noise of a raw sample: shot noise in proportion to the light, and dark noise that is always there.
 ///
 /// `var(S) = shot_variance_per_unit * max(S, 0) + dark_sigma^2`, in the (scaled) unit of the samples. With N equidistant
-/// phase steps each part of `z` then has the variance `2/N * mean(var(S))` ([Lange2000]), the mean sample being the
+/// phase steps each part of `z` then has the variance `2/N * mean(var(S))` (`[Lange2000]`), the mean sample being the
 /// offset `B`; for N = 3 this is the mean of the two parts (see the crate's documentation).
 ///
 /// Samples that are differences of two taps carry no offset, so that their shot noise cannot be told from them:

@@ -1,0 +1,139 @@
+//! What the amplitudes of a segment say about its offset: the inverse square law as a cost for each label.
+
+use std::f32::consts::TAU;
+
+use crate::forest::{Forest, NO_LABEL};
+use crate::surface::Surface;
+use crate::AlbedoPrior;
+
+/// Quantiles kept of each segment's log albedos.
+const QUANTILES: usize = 5;
+/// Pixels sampled of a segment.
+const SAMPLES: u32 = 64;
+/// Cost, in nats, of a pixel whose range would be negative or beyond the largest count.
+const OUT_OF_SPAN: f32 = 8.0;
+/// Cost, in nats, of going against a known wrap count.
+const AGAINST_SEED: f32 = 40.0;
+
+/// Per segment and label: quantiles of `ln(amplitude * range^2)`, range in ambiguity intervals.
+#[derive(Debug, Default)]
+pub(crate) struct Brightness {
+    pub labels: usize,
+    /// `[segment][label][quantile]`; NaN where no pixel of the segment allows the label or has an amplitude.
+    quantiles: Vec<f32>,
+    /// `[segment][label]`: costs that do not depend on the constant.
+    fixed: Vec<f32>,
+    weight: Vec<f32>,
+    pixel: Vec<Vec<u32>>,
+    scratch: Vec<f32>,
+}
+
+impl Brightness {
+    /// Samples every segment and sorts its log albedos for every label.
+    pub fn measure(&mut self, surface: &Surface, forest: &Forest, pixels: &[u32], maximum_wraps: u16) {
+        self.labels = usize::from(maximum_wraps) + 1;
+        self.sample(forest, pixels);
+        self.weight.clear();
+        self.weight.extend(pixels.iter().map(|&n| segment_weight(n as f32)));
+        self.quantiles.clear();
+        self.fixed.clear();
+        for segment in 0..pixels.len() {
+            for label in 0..self.labels {
+                self.measure_label(surface, forest, segment, label as i32, i32::from(maximum_wraps));
+            }
+        }
+    }
+
+    fn sample(&mut self, forest: &Forest, pixels: &[u32]) {
+        self.pixel.iter_mut().for_each(Vec::clear);
+        self.pixel.resize(pixels.len(), Vec::new());
+        let mut seen = vec![0_u32; pixels.len()];
+        for (pixel, &label) in forest.label.iter().enumerate() {
+            if label == NO_LABEL {
+                continue;
+            }
+            let segment = label as usize;
+            if seen[segment] % pixels[segment].div_ceil(SAMPLES) == 0 {
+                self.pixel[segment].push(pixel as u32);
+            }
+            seen[segment] += 1;
+        }
+    }
+
+    fn measure_label(&mut self, surface: &Surface, forest: &Forest, segment: usize, label: i32, maximum: i32) {
+        self.scratch.clear();
+        let mut outside = 0.0;
+        for &pixel in &self.pixel[segment] {
+            let pixel = pixel as usize;
+            let count = forest.wraps[pixel] + label;
+            if !(0..=maximum).contains(&count) {
+                outside += 1.0;
+                continue;
+            }
+            let range = (surface.phase[pixel] / TAU + count as f32).max(0.01);
+            let log_albedo = surface.log_amplitude[pixel] + 2.0 * range.ln();
+            if !log_albedo.is_nan() {
+                self.scratch.push(log_albedo);
+            }
+        }
+        self.scratch.sort_unstable_by(f32::total_cmp);
+        let n = self.scratch.len();
+        for q in 0..QUANTILES {
+            // The middle of each fifth.
+            let at = (2 * q + 1) * n / (2 * QUANTILES);
+            self.quantiles.push(self.scratch.get(at).copied().unwrap_or(f32::NAN));
+        }
+        let sampled = self.pixel[segment].len().max(1) as f32;
+        self.fixed.push(self.weight[segment].max(1.0) * OUT_OF_SPAN * outside / sampled);
+    }
+
+    /// Adds what seeds say: `(padded index, wrap count)`.
+    pub fn add_known(&mut self, forest: &Forest, known: &[(usize, i32)]) {
+        let segments = self.weight.len();
+        let mut votes = vec![0_u32; segments * self.labels];
+        let mut total = vec![0_u32; segments];
+        for &(pixel, wraps) in known {
+            let segment = forest.label[pixel] as usize;
+            total[segment] += 1;
+            if let Ok(label) = usize::try_from(wraps - forest.wraps[pixel])
+                && label < self.labels
+            {
+                votes[segment * self.labels + label] += 1;
+            }
+        }
+        for (index, cost) in self.fixed.iter_mut().enumerate() {
+            let total = total[index / self.labels];
+            if total > 0 {
+                *cost += AGAINST_SEED * (1.0 - votes[index] as f32 / total as f32);
+            }
+        }
+    }
+
+    /// The cost of each label of each segment, nats, for a logarithm of the constant.
+    pub fn costs(&self, log_constant: f32, albedo: &AlbedoPrior, costs: &mut Vec<f32>) {
+        costs.clear();
+        for (index, quantiles) in self.quantiles.chunks_exact(QUANTILES).enumerate() {
+            let weight = self.weight[index / self.labels];
+            let mean = quantiles.iter().map(|q| deviation_cost(q - log_constant, albedo)).sum::<f32>();
+            let mean = if mean.is_nan() { 0.0 } else { mean / QUANTILES as f32 };
+            costs.push(weight * mean + self.fixed[index]);
+        }
+    }
+
+    /// Smallest and largest log albedo of any label, `None` where there is no amplitude.
+    pub fn span(&self) -> Option<(f32, f32)> {
+        let known = self.quantiles.iter().filter(|q| !q.is_nan());
+        let span = known.fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), &q| (low.min(q), high.max(q)));
+        (span.0 <= span.1).then_some(span)
+    }
+}
+
+/// How many independent draws from the albedo prior a segment of n pixels is worth: its pixels share a material.
+fn segment_weight(n: f32) -> f32 {
+    n / (n + 12.0) * (1.0 + 0.5 * (1.0 + n / 200.0).ln())
+}
+
+/// Minus the logarithm of the prior density of a log albedo `x` off its typical value, up to a constant.
+fn deviation_cost(x: f32, albedo: &AlbedoPrior) -> f32 {
+    if x < 0.0 { -x / albedo.dark_scale } else { x / albedo.bright_scale }
+}

@@ -1,0 +1,34 @@
+//! Absolute wrap counts at one frequency on rendered rooms.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod common;
+
+use common::{HEIGHT, Scene, WIDTH};
+use phase_unwrap::{SpatialOptions, unwrap_spatial};
+
+#[test]
+fn rooms() {
+    let options = SpatialOptions::default();
+    for seed in 0..24 {
+        let view = Scene::random(seed).view(1000 + seed, 0.015);
+        let t = std::time::Instant::now();
+        let found = unwrap_spatial(&view.phase, Some(&view.amplitude), None, &options).unwrap();
+        let ms = t.elapsed().as_secs_f64() * 1e3;
+        let (mut sure, mut right, mut all_right, mut unsure_clean) = (0, 0, 0, 0);
+        let mut kinds = [0; 3];
+        for i in 0..WIDTH * HEIGHT {
+            let ok = found.wraps.as_slice()[i] == view.wraps.as_slice()[i];
+            let s = found.confidence.as_slice()[i] >= options.minimum_confidence;
+            sure += s as usize;
+            right += (s && ok) as usize;
+            all_right += ok as usize;
+            unsure_clean += (!s && !view.mixed.as_slice()[i]) as usize;
+            if s && !ok { kinds[if view.mixed.as_slice()[i] {0} else if view.cycles.as_slice()[i] < 0.35 {1} else {2}] += 1; }
+        }
+        let n = (WIDTH * HEIGHT) as f64;
+        let mixed = view.mixed.as_slice().iter().filter(|m| **m).count() as f64 / n;
+        let maxr = view.cycles.as_slice().iter().fold(0.0_f64, |a, b| a.max(*b));
+        println!("{seed}: sure right {:.4} unsure {:.4} (clean {:.4}) all right {:.4} mixed {mixed:.3} wrong m/n/f {kinds:?} segs {} far {:.1} C {:?} {ms:.1} ms",
+            right as f64 / sure as f64, 1.0 - sure as f64 / n, unsure_clean as f64 / n, all_right as f64 / n, found.islands[0].segments, maxr*5.0, found.typical_amplitude_at_interval);
+    }
+}

@@ -2,9 +2,9 @@
 
 use std::f32::consts::TAU;
 
+use crate::AlbedoPrior;
 use crate::forest::{Forest, NO_LABEL};
 use crate::surface::Surface;
-use crate::AlbedoPrior;
 
 /// Quantiles kept of each segment's log albedos.
 const QUANTILES: usize = 5;

@@ -24,11 +24,11 @@ pub struct SpatialOptions {
 impl Default for SpatialOptions {
     fn default() -> Self {
         Self {
-            maximum_wraps: 2,
+            maximum_wraps: 1,
             minimum_confidence: 0.6,
             amplitude_noise: None,
-            phase_jump_rad: 0.5,
-            amplitude_jump: 0.7,
+            phase_jump_rad: 0.25,
+            amplitude_jump: 0.35,
             albedo: AlbedoPrior::default(),
         }
     }

@@ -140,7 +140,8 @@ impl Unwrapper {
         }
         let confidence = self.cost.iter().map(|&cost| reliability(cost)).collect::<Vec<_>>();
         let known: Vec<bool> = fixed.iter().map(|fix| fix.1).collect();
-        self.collect(grid, &confidence, &known, None)
+        let segment = grid.crop(&self.forest.label, |&label| label.wrapping_add(1))?;
+        self.collect(grid, &confidence, &known, None, segment)
     }
 
     /// Offset of each tree, and whether something known fixed it: the median of what is known, else lowest count 0.
@@ -173,11 +174,12 @@ impl Unwrapper {
         self.brightness.measure(&self.surface, &self.forest, pixels, options.maximum_wraps);
         self.brightness.add_known(&self.forest, known);
         self.offsets.find(&self.brightness, &self.borders.ties, pixels.len(), &options);
+        let segment = grid.crop(&self.forest.label, |&label| label.wrapping_add(1))?;
         let mut confidence = std::mem::take(&mut self.segments.hold);
         self.apply_offsets(&mut confidence);
         let islands = vec![true; self.borders.islands];
         let constant = self.offsets.log_constant.map(f32::exp);
-        let result = self.collect(grid, &confidence, &islands, constant);
+        let result = self.collect(grid, &confidence, &islands, constant, segment);
         self.segments.hold = confidence;
         result
     }
@@ -200,7 +202,14 @@ impl Unwrapper {
         }
     }
 
-    fn collect(&self, grid: &Grid, confidence: &[f32], known: &[bool], constant: Option<f32>) -> Result<Unwrapped> {
+    fn collect(
+        &self,
+        grid: &Grid,
+        confidence: &[f32],
+        known: &[bool],
+        constant: Option<f32>,
+        segment: Raster<u32>,
+    ) -> Result<Unwrapped> {
         let island = grid.crop(&self.forest.label, |&label| label.wrapping_add(1))?;
         let wraps = grid.crop(&self.forest.wraps, |&wraps| wraps)?;
         let mut confidence = grid.crop(confidence, |&confidence| confidence)?;
@@ -217,6 +226,6 @@ impl Unwrapper {
         for (island, known) in islands.iter_mut().zip(known) {
             island.offset_known = *known && 2 * island.sure_pixels > island.pixels;
         }
-        Ok(Unwrapped { wraps, confidence, island, islands, typical_amplitude_at_interval: constant })
+        Ok(Unwrapped { wraps, confidence, island, segment, islands, typical_amplitude_at_interval: constant })
     }
 }

@@ -23,12 +23,43 @@ fn rooms() {
             right += (s && ok) as usize;
             all_right += ok as usize;
             unsure_clean += (!s && !view.mixed.as_slice()[i]) as usize;
-            if s && !ok { kinds[if view.mixed.as_slice()[i] {0} else if view.cycles.as_slice()[i] < 0.35 {1} else {2}] += 1; }
+            if s && !ok {
+                kinds[if view.mixed.as_slice()[i] {
+                    0
+                } else if view.cycles.as_slice()[i] < 0.35 {
+                    1
+                } else {
+                    2
+                }] += 1;
+            }
         }
         let n = (WIDTH * HEIGHT) as f64;
+        if std::env::var("DUMP").is_ok_and(|d| d == seed.to_string()) {
+            let f = |name: &str, v: Vec<f64>| {
+                std::fs::write(
+                    format!("/tmp/pu_{name}.txt"),
+                    v.iter().map(|x| x.to_string()).collect::<Vec<_>>().join(" "),
+                )
+                .unwrap();
+            };
+            f("truth", view.wraps.as_slice().iter().map(|x| *x as f64).collect());
+            f("found", found.wraps.as_slice().iter().map(|x| *x as f64).collect());
+            f("conf", found.confidence.as_slice().iter().map(|x| *x as f64).collect());
+            f("amp", view.amplitude.as_slice().iter().map(|x| (*x as f64).ln()).collect());
+            f("phase", view.phase.as_slice().iter().map(|x| *x as f64).collect());
+            f("seg", found.segment.as_slice().iter().map(|x| ((*x as u64 * 2654435761) % 251) as f64).collect());
+        }
         let mixed = view.mixed.as_slice().iter().filter(|m| **m).count() as f64 / n;
         let maxr = view.cycles.as_slice().iter().fold(0.0_f64, |a, b| a.max(*b));
-        println!("{seed}: sure right {:.4} unsure {:.4} (clean {:.4}) all right {:.4} mixed {mixed:.3} wrong m/n/f {kinds:?} segs {} far {:.1} C {:?} {ms:.1} ms",
-            right as f64 / sure as f64, 1.0 - sure as f64 / n, unsure_clean as f64 / n, all_right as f64 / n, found.islands[0].segments, maxr*5.0, found.typical_amplitude_at_interval);
+        println!(
+            "{seed}: sure right {:.4} unsure {:.4} (clean {:.4}) all right {:.4} mixed {mixed:.3} wrong m/n/f {kinds:?} segs {} far {:.1} C {:?} {ms:.1} ms",
+            right as f64 / sure as f64,
+            1.0 - sure as f64 / n,
+            unsure_clean as f64 / n,
+            all_right as f64 / n,
+            found.islands[0].segments,
+            maxr * 5.0,
+            found.typical_amplitude_at_interval
+        );
     }
 }

@@ -8,7 +8,7 @@ use range_image::{Flags, Modulation, RangeFrame, Raster};
 use range_io::calibration::Calibration;
 use range_io::npz::NpzReader;
 use range_io::survey::{InputFrame, Survey, read_frame, read_truth};
-use range_io::tables::{StationRow, read_stations};
+use range_io::tables::{Station, read_stations};
 
 use crate::outcome::Outcome;
 use crate::progress::Progress;
@@ -107,11 +107,11 @@ fn calibrated(calibration: &Calibration, nominal: &Camera) -> Result<Camera> {
     )))
 }
 
-fn read_poses(file: &Path) -> Result<Vec<StationRow>> {
+fn read_poses(file: &Path) -> Result<Vec<Station>> {
     if file.is_file() { Ok(read_stations(file)?) } else { Ok(Vec::new()) }
 }
 
-fn pose_of(poses: &[StationRow], station: &str) -> Option<Isometry3<f64>> {
+fn pose_of(poses: &[Station], station: &str) -> Option<Isometry3<f64>> {
     poses.iter().find(|row| row.station == station).map(|row| row.world_from_camera)
 }
 

@@ -14,7 +14,7 @@ use range_io::calibration::{Calibration, Provenance};
 use range_io::survey::{
     FrameEntry, InputFrame, Level, Survey, SurveyCamera, TruthFiles, TruthFrame, write_frame, write_truth,
 };
-use range_io::tables::{StationRow, write_stations};
+use range_io::tables::{Station, write_stations};
 use serde::Serialize;
 use simulation::{SimulationSpec, Simulator};
 
@@ -102,12 +102,12 @@ fn write_frames(
 }
 
 fn write_tables(spec: &SimulationSpec, source: &SimulateSource, folder: &OutputFolder) -> Result<()> {
-    let row = |name: &str, world_from_camera| StationRow { station: name.to_owned(), world_from_camera, sigma: None };
-    let truth: Vec<StationRow> = spec.stations.iter().map(|s| row(&s.name, s.world_from_camera())).collect();
+    let row = |name: &str, world_from_camera| Station { station: name.to_owned(), world_from_camera, sigma_position_m: None, sigma_attitude_rad: None };
+    let truth: Vec<Station> = spec.stations.iter().map(|s| row(&s.name, s.world_from_camera())).collect();
     write_stations(folder.file("truth/stations.csv")?, &truth)?;
     // A stream of its own, so that the sketch does not change with the number of frames.
     let mut generator = Pcg64::new(u128::from(source.seed), STATION_STREAM);
-    let sketch: Vec<StationRow> = truth
+    let sketch: Vec<Station> = truth
         .iter()
         .enumerate()
         .map(|(index, known)| match index {

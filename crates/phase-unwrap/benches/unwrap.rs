@@ -4,7 +4,7 @@
 use std::f64::consts::TAU;
 use std::hint::black_box;
 
-use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
+use criterion::{Criterion, criterion_group, criterion_main};
 use phase_unwrap::{KnownWraps, MultiFrequencyOptions, SpatialOptions, Unwrapper, unwrap_multi_frequency};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
@@ -40,10 +40,10 @@ fn spatial(c: &mut Criterion) {
         let (phase, amplitude) = wrapped(&range(width, height), &modulation, 1);
         let size = format!("{width}x{height}");
         let mut unwrapper = Unwrapper::new(SpatialOptions::default()).unwrap();
-        c.bench_function(&BenchmarkId::new("tree", &size).to_string(), |b| {
+        c.bench_function(&format!("tree/{size}"), |b| {
             b.iter(|| unwrapper.unwrap(black_box(&phase), None, None, KnownWraps::Nothing).unwrap());
         });
-        c.bench_function(&BenchmarkId::new("absolute", &size).to_string(), |b| {
+        c.bench_function(&format!("absolute/{size}"), |b| {
             b.iter(|| unwrapper.unwrap(black_box(&phase), Some(&amplitude), None, KnownWraps::Nothing).unwrap());
         });
     }
@@ -55,7 +55,7 @@ fn multi_frequency(c: &mut Criterion) {
         let range = range(width, height);
         let phases = modulations.map(|m| wrapped(&range, &m, 2).0);
         let options = MultiFrequencyOptions::default();
-        let name = BenchmarkId::new("two_frequencies", format!("{width}x{height}")).to_string();
+        let name = format!("two_frequencies/{width}x{height}");
         c.bench_function(&name, |b| {
             b.iter(|| unwrap_multi_frequency(black_box(&phases), &modulations, None, None, &options).unwrap());
         });

@@ -5,10 +5,11 @@ use std::f32::consts::TAU;
 use range_image::Raster;
 
 use crate::borders::Borders;
-use crate::brightness::Brightness;
+use crate::brightness::{Brightness, Incidence};
 use crate::forest::{Forest, NO_LABEL};
 use crate::grid::Grid;
 use crate::offsets::Offsets;
+use crate::planes::Planes;
 use crate::reliability::{pixel_cost, reliability};
 use crate::segments::Segments;
 use crate::surface::Surface;
@@ -35,6 +36,7 @@ pub struct Unwrapper {
     forest: Forest,
     segments: Segments,
     borders: Borders,
+    planes: Planes,
     brightness: Brightness,
     offsets: Offsets,
 }
@@ -171,7 +173,15 @@ impl Unwrapper {
         self.segments.build(grid, &self.surface, &mut self.cost, &mut self.forest, &options);
         self.borders.collect(grid, &self.surface, &self.forest);
         let pixels = &self.segments.pixels;
-        self.brightness.measure(&self.surface, &self.forest, pixels, options.maximum_wraps);
+        let labels = usize::from(options.maximum_wraps) + 1;
+        let incidence = options.geometry.as_ref().map(|geometry| {
+            self.planes.measure(grid, &self.surface, &self.forest, geometry, labels);
+            Incidence { grid, geometry, slope: &self.planes.slope }
+        });
+        self.brightness.measure(&self.surface, &self.forest, pixels, incidence, options.maximum_wraps);
+        if incidence.is_some() {
+            self.brightness.add_costs(&self.planes.costs);
+        }
         self.brightness.add_known(&self.forest, known);
         self.offsets.find(&self.brightness, &self.borders.ties, pixels.len(), &options);
         let segment = grid.crop(&self.forest.label, |&label| label.wrapping_add(1))?;

@@ -9,7 +9,7 @@ use std::error::Error;
 use camera_model::Camera;
 use nalgebra::{Isometry3, Point3};
 use range_image::{ComplexFrame, Flags, average, demodulate};
-use simulation::{FrameTruth, SimulationSpec, SimulatedFrame, Simulator};
+use simulation::{FrameTruth, SimulatedFrame, SimulationSpec, Simulator};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let path = std::env::args().nth(1).unwrap_or_else(|| "fixtures/scenes/room_small.ron".into());
@@ -49,7 +49,8 @@ fn print_station(name: &str, frame: &ComplexFrame, truth: &FrameTruth) {
         1e3 * off.min(interval - off)
     };
     let errors = sorted(seen.iter().map(|i| error(*i)));
-    let sigmas = sorted(seen.iter().map(|i| 1e3 * channel.modulation.range_from_phase(f64::from(sigma.as_slice()[*i]))));
+    let sigmas =
+        sorted(seen.iter().map(|i| 1e3 * channel.modulation.range_from_phase(f64::from(sigma.as_slice()[*i]))));
     let amplitudes = sorted(seen.iter().map(|i| f64::from(truth.amplitude[0].as_slice()[*i])));
     let share = |count: usize| count as f64 / truth.range.len() as f64;
     let beyond = seen.iter().filter(|i| f64::from(truth.range.as_slice()[**i]) > interval).count();

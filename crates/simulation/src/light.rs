@@ -74,7 +74,14 @@ impl Lighting {
     }
 
     /// Adds the light of one ray and where it ends; it counts for `share` of its pixel.
-    pub fn gather(&self, scene: &Scene, source: &Source, ray: (&Vector3<f64>, &Hit), share: f64, light: &mut PixelLight) {
+    pub fn gather(
+        &self,
+        scene: &Scene,
+        source: &Source,
+        ray: (&Vector3<f64>, &Hit),
+        share: f64,
+        light: &mut PixelLight,
+    ) {
         let (direction, hit) = ray;
         light.offset += self.ambient * diffuse(hit.albedo) * share;
         let amplitude = self.source * hit.albedo * irradiance(hit, direction) * share;
@@ -155,8 +162,12 @@ mod tests {
     }
 
     fn lighting(directions: usize) -> Lighting {
-        let illumination =
-            IlluminationSpec { source_power: 3.0, modulation_contrast: 0.5, ambient_power: 0.0, vignetting_exponent: 0.0 };
+        let illumination = IlluminationSpec {
+            source_power: 3.0,
+            modulation_contrast: 0.5,
+            ambient_power: 0.0,
+            vignetting_exponent: 0.0,
+        };
         let exposure =
             ExposureSpec { frames_per_station: 1, integration_time_s: 2.0, frame_interval_s: 0.0, start_s: 0.0 };
         Lighting::new(&illumination, &exposure, Some(&MultipathSpec { directions, seed: 3 }))

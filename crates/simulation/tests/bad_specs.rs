@@ -4,7 +4,7 @@
 mod common;
 
 use common::plain;
-use error_models::RangeErrorModel;
+use error_models::{RangeErrorModel, RangeTerms};
 use range_image::NoiseModel;
 use simulation::{
     AttitudeSpec, DigitisationSpec, Error, FixedPatternSpec, MixedPixelsSpec, MultipathSpec, SampleType, ShapeSpec,
@@ -95,7 +95,7 @@ const WRONG: &[(&str, Change)] = &[
 ];
 
 fn model(ambiguity_interval_m: f64) -> RangeErrorModel {
-    RangeErrorModel { ambiguity_interval_m, terms: Default::default(), hyperbola: None, range_span_m: None }
+    RangeErrorModel { ambiguity_interval_m, terms: RangeTerms::default(), hyperbola: None, range_span_m: None }
 }
 
 fn digitisation(raw_scale: f64, saturation: Option<f64>) -> DigitisationSpec {
@@ -123,6 +123,9 @@ fn what_other_crates_check_comes_through() {
     let mut spec = plain();
     spec.camera.geometry.interior.principal_distance_mm = -1.0;
     assert!(matches!(simulate(&spec, 1, &|_, _| {}), Err(Error::Camera(_))));
+    let mut folded = plain();
+    folded.camera.geometry.lens.k1 = 0.1;
+    assert!(matches!(simulate(&folded, 1, &|_, _| {}), Err(Error::Camera(_))));
     let mut spec = plain();
     spec.errors.noise = Some(NoiseModel { shot_variance_per_unit: -1.0, dark_sigma: 0.0 });
     assert!(matches!(simulate(&spec, 1, &|_, _| {}), Err(Error::Image(_))));

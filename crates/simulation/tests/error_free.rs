@@ -40,7 +40,10 @@ fn any_phase_sense_offset_step_count_and_frequency_comes_back() {
         // Rounding grows with the interval (20 m at 7.5 MHz), and with weights that are not zero and one.
         for channel in 0..3 {
             let error = largest(&range_error(&complex, channel, &frame.truth.range));
-            assert!(error < 10.0 * ROUNDING_M, "{steps} steps, {sense:?}, {offset}: channel {channel} off by {error} m");
+            assert!(
+                error < 10.0 * ROUNDING_M,
+                "{steps} steps, {sense:?}, {offset}: channel {channel} off by {error} m"
+            );
         }
     }
 }
@@ -82,7 +85,8 @@ fn nothing_in_view_is_no_range_and_no_light() {
     let mut spec = plain();
     spec.scene.objects.remove(0);
     let (frame, complex) = first(&spec);
-    let empty: Vec<usize> = (0..frame.truth.range.len()).filter(|i| frame.truth.object.as_slice()[*i].is_none()).collect();
+    let empty: Vec<usize> =
+        (0..frame.truth.range.len()).filter(|i| frame.truth.object.as_slice()[*i].is_none()).collect();
     assert!(!empty.is_empty() && empty.len() < frame.truth.range.len());
     for i in empty {
         assert!(frame.truth.range.as_slice()[i].is_nan());
@@ -100,7 +104,11 @@ fn look_at_and_euler_angles_mean_the_same_pose() {
     assert_relative_eq!(target.y, 0.0, epsilon = 1e-12);
     assert!(target.z < 0.0);
     // Rolled clockwise, the camera's x axis points below the horizon.
-    assert_relative_eq!((pose * nalgebra::Vector3::x()).z, -(3.0_f64.to_radians().sin()) * upward(&pose), epsilon = 1e-12);
+    assert_relative_eq!(
+        (pose * nalgebra::Vector3::x()).z,
+        -(3.0_f64.to_radians().sin()) * upward(&pose),
+        epsilon = 1e-12
+    );
     let [omega, phi, kappa] = euler_from_pose(&pose).map(f64::to_degrees);
     let mut by_angles = spec.clone();
     by_angles.stations[0].attitude = AttitudeSpec::Euler { omega_deg: omega, phi_deg: phi, kappa_deg: kappa };

@@ -6,10 +6,7 @@ mod common;
 use common::{INTERVAL_M, first, largest, plain, quantile, range_error, wrapped};
 use error_models::{AmplitudeHyperbola, RangeErrorModel, RangeTerms};
 use range_image::{Flags, Samples};
-use scattering_deconvolution::{GaussianTerm, Psf, RestorationOptions, restore};
-use simulation::{
-    DigitisationSpec, FixedPatternSpec, MixedPixelsSpec, SampleType, SimulationSpec, TextureSpec,
-};
+use simulation::{DigitisationSpec, FixedPatternSpec, MixedPixelsSpec, SampleType, SimulationSpec, TextureSpec};
 
 /// f32 rounding of samples, phase and truth; see `error_free.rs`.
 const ROUNDING_M: f64 = 2e-6;
@@ -70,28 +67,6 @@ fn a_fixed_pattern_is_the_same_in_all_frames_and_seeds() {
 }
 
 #[test]
-fn scattering_pulls_ranges_towards_bright_light_and_restoration_puts_them_back() {
-    let mut spec = plain();
-    spec.scene.objects[1].albedo = 8.0;
-    let psf = Psf::Gaussians(vec![
-        GaussianTerm { weight: 0.03, sigma_px: [2.0, 2.0] },
-        GaussianTerm { weight: 0.05, sigma_px: [12.0, 12.0] },
-    ]);
-    let (_, clean) = first(&spec);
-    spec.errors.scattering = Some(psf.clone());
-    let (frame, mut complex) = first(&spec);
-    let off = range_error(&complex, 0, &frame.truth.range);
-    assert!(quantile(&off, 0.5) > 0.05, "the scattering must matter: {}", quantile(&off, 0.5));
-    // The mean sample is light too, and grows as the amplitude does where all light is near.
-    let grown = |plane: fn(&range_image::ComplexFrame) -> f64| plane(&complex) / plane(&clean);
-    let mean = |f: &range_image::ComplexFrame| f.channels[0].offset.as_ref().unwrap().as_slice().iter().sum::<f32>() as f64;
-    assert!(grown(mean) > 1.03 && grown(mean) < 1.08, "{}", grown(mean));
-    restore(&mut complex, &psf, &RestorationOptions { regularisation: 0.0, ..RestorationOptions::default() }).unwrap();
-    let left = range_error(&complex, 0, &frame.truth.range);
-    assert!(largest(&left) < 1e-3 && quantile(&left, 0.5) < 1e-4, "{} {}", largest(&left), quantile(&left, 0.5));
-}
-
-#[test]
 fn counts_are_whole_and_end_at_saturation() {
     let mut spec = plain();
     spec.scene.objects[1].albedo = 8.0;
@@ -134,25 +109,28 @@ fn mixed_pixels_lie_at_edges_and_between_their_ranges() {
     let (frame, complex) = first(&spec);
     let truth = &frame.truth;
     let error = range_error(&complex, 0, &truth.range);
-    let (mut worst_elsewhere, mut mixed) = (0.0_f64, Vec::new());
+    let (mut elsewhere, mut mixed) = (Vec::new(), Vec::new());
     for row in 1..35 {
         for col in 1..47 {
             let off = error[row * 48 + col];
             if truth.mixed[(col, row)] {
                 mixed.push(off);
-                let around = [(col - 1, row), (col + 1, row), (col, row - 1), (col, row + 1), (col - 1, row - 1), (col + 1, row + 1), (col + 1, row - 1), (col - 1, row + 1)];
-                let ranges = around.map(|place| truth.range[place]);
-                let spread = ranges.iter().copied().fold(0.0, f32::max) - ranges.iter().copied().fold(f32::MAX, f32::min);
-                assert!(spread > 0.05, "pixel {col}, {row} is called mixed in the middle of a surface");
+                let around = (0..9).map(|k| f64::from(truth.range[(col + k % 3 - 1, row + k / 3 - 1)]));
+                let (near, far) = around.fold((f64::MAX, 0.0), |(near, far), r| (r.min(near), r.max(far)));
+                assert!(far - near > 0.05, "pixel {col}, {row} is called mixed in the middle of a surface");
+                let shown = f64::from(truth.range[(col, row)]) + off;
+                // The sum of phasors less than half a turn apart lies between them.
+                let between = shown > near - 0.02 && shown < far + 0.02;
+                assert!(between || far - near > 0.5 * INTERVAL_M, "{shown} m is not between {near} and {far} m");
             } else {
-                worst_elsewhere = worst_elsewhere.max(off.abs());
+                elsewhere.push(off);
             }
         }
     }
     assert!(mixed.len() > 20 && mixed.len() < 300, "{} mixed pixels", mixed.len());
-    assert!(quantile(&mixed, 0.5) > 0.05, "mixtures are far off: {}", quantile(&mixed, 0.5));
-    // Elsewhere: rays up to the threshold off their plane, and the curvature of range over a pixel.
-    assert!(worst_elsewhere < 0.05, "{worst_elsewhere}");
+    assert!(quantile(&mixed, 0.9) > 0.1, "mixtures are far off: {}", quantile(&mixed, 0.9));
+    // Elsewhere: what range curves over a pixel of 30 mrad, which is most on the floor at a grazing angle.
+    assert!(quantile(&elsewhere, 0.95) < 0.01, "{}", quantile(&elsewhere, 0.95));
 }
 
 #[test]

@@ -7,7 +7,11 @@ use common::{fixture, quantile, range_error};
 use range_image::{ComplexFrame, Flags, average, demodulate};
 use simulation::{SimulationSpec, Simulator, StationImage, simulate};
 
-fn averaged(simulator: &Simulator, image: &StationImage, frames: usize) -> (ComplexFrame, std::sync::Arc<simulation::FrameTruth>) {
+fn averaged(
+    simulator: &Simulator,
+    image: &StationImage,
+    frames: usize,
+) -> (ComplexFrame, std::sync::Arc<simulation::FrameTruth>) {
     let options = simulator.spec().demodulation_options();
     let frames: Vec<_> = (0..frames).map(|frame| simulator.frame(image, frame, 7).unwrap()).collect();
     let complex: Vec<_> = frames.iter().map(|frame| demodulate(&frame.raw, &options).unwrap()).collect();

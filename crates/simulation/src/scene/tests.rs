@@ -1,4 +1,5 @@
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+// Texture factors are copied, not computed: they compare exactly.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::float_cmp)]
 
 use approx::assert_relative_eq;
 use nalgebra::{Point3, UnitQuaternion, Vector3};
@@ -34,8 +35,7 @@ fn box_mesh(half: Vector3<f64>) -> Mesh {
     let corner = |i: usize| [sign(i & 1) * half.x, sign(i >> 1 & 1) * half.y, sign(i >> 2 & 1) * half.z];
     let vertices: Vec<[f64; 3]> = (0..8).map(corner).collect();
     let faces = [[0, 2, 6, 4], [1, 3, 7, 5], [0, 1, 5, 4], [2, 3, 7, 6], [0, 1, 3, 2], [4, 5, 7, 6]];
-    let triangles: Vec<[u32; 3]> =
-        faces.iter().flat_map(|f| [[f[0], f[1], f[2]], [f[0], f[2], f[3]]]).collect();
+    let triangles: Vec<[u32; 3]> = faces.iter().flat_map(|f| [[f[0], f[1], f[2]], [f[0], f[2], f[3]]]).collect();
     Mesh::new(&vertices, &triangles).unwrap()
 }
 
@@ -180,7 +180,10 @@ fn a_checker_alternates_and_discs_lie_on_their_grid() {
     assert_eq!([on_floor(0.25, 0.25), on_floor(0.25, 0.75)], [1.0, 0.25]);
     let discs = TextureSpec::Discs { spacing_m: 0.5, radius_m: 0.1, factor: 0.25 };
     let on_wall = |y: f64, z: f64| texture::factor(&discs, &Vector3::new(9.0, y, z), &Vector3::x());
-    assert_eq!([on_wall(0.5, -1.0), on_wall(0.59, -1.0), on_wall(0.61, -1.0), on_wall(0.25, 0.25)], [1.0, 1.0, 0.25, 0.25]);
+    assert_eq!(
+        [on_wall(0.5, -1.0), on_wall(0.59, -1.0), on_wall(0.61, -1.0), on_wall(0.25, 0.25)],
+        [1.0, 1.0, 0.25, 0.25]
+    );
 }
 
 #[test]

@@ -49,7 +49,8 @@ pub fn first(spec: &SimulationSpec) -> (SimulatedFrame, ComplexFrame) {
 pub fn range_error(complex: &ComplexFrame, channel: usize, reference: &Raster<f32>) -> Vec<f64> {
     let channel = &complex.channels[channel];
     let interval = channel.modulation.ambiguity_interval_m();
-    let shown = channel.phase().into_vec().into_iter().map(|phase| channel.modulation.range_from_phase(f64::from(phase)));
+    let shown =
+        channel.phase().into_vec().into_iter().map(|phase| channel.modulation.range_from_phase(f64::from(phase)));
     shown.zip(reference.as_slice()).map(|(shown, truth)| wrapped(shown - f64::from(*truth), interval)).collect()
 }
 

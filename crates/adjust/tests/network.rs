@@ -13,7 +13,7 @@ use nalgebra::{DMatrix, DVector, Isometry3, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
-const PLAN: Plan = Plan { seed: 7, stations: 4, points: 9, ranges: true, disturbance: 0.02 };
+const PLAN: Plan = Plan { seed: 7, stations: 4, points: 9, seen: 9, ranges: true, disturbance: 0.02 };
 
 fn solve(a: &Adjustment<'_>) -> Result<Solution, Error> {
     a.solve(&SolveOptions::default())
@@ -49,8 +49,12 @@ fn inner_constraints_on_all_points_of_a_distance_network_give_the_pseudo_inverse
         for j in 0..i {
             let between = truth[j] - truth[i];
             let observed = between.norm();
-            a.add_observation(group, Distance { blocks: [points[i], points[j]], observed }, &Covariance::from_sigma(0.01))
-                .unwrap();
+            a.add_observation(
+                group,
+                Distance { blocks: [points[i], points[j]], observed },
+                &Covariance::from_sigma(0.01),
+            )
+            .unwrap();
             let mut row = DVector::zeros(n);
             row.fixed_rows_mut::<3>(3 * i).copy_from(&(-between / observed / 0.01));
             row.fixed_rows_mut::<3>(3 * j).copy_from(&(between / observed / 0.01));
@@ -190,7 +194,7 @@ fn a_datum_that_would_bend_the_network_is_refused() {
 #[test]
 fn a_larger_network_is_decided_on_its_normal_equations() {
     // 7 · 6 + 40 · 3 = 162 unknowns, 840 rows: too large to be factorised orthogonally as a matter of course.
-    let plan = Plan { stations: 7, points: 40, ..PLAN };
+    let plan = Plan { stations: 7, points: 40, seen: 40, ..PLAN };
     let mut free = network(&plan);
     assert!(matches!(solve(&free.adjustment).unwrap_err(), Error::RankDeficient { defect: 6, .. }));
     let points = free.points.clone();
@@ -212,7 +216,8 @@ fn covariances_agree_with_repeated_simulation() {
     let count = 200;
     let rank = 4 * 6 + 8 * 3 - 6;
     for seed in 0..count {
-        let mut n = network(&Plan { seed: 1000 + seed, stations: 4, points: 8, ranges: true, disturbance: 0.0 });
+        let mut n =
+            network(&Plan { seed: 1000 + seed, stations: 4, points: 8, seen: 8, ranges: true, disturbance: 0.0 });
         let points = n.points.clone();
         n.adjustment.add_inner_constraints(&points, DatumDefect::Six).unwrap();
         let solution = solve(&n.adjustment).unwrap();

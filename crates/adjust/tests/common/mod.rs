@@ -83,9 +83,15 @@ impl<const N: usize> Observation for Sight<N> {
             let rotation = world_from_camera.rotation.to_rotation_matrix().into_inner().transpose();
             let range = p.norm();
             let local = Matrix3::new(
-                -1.0 / p.z, 0.0, p.x / (p.z * p.z), //
-                0.0, -1.0 / p.z, p.y / (p.z * p.z), //
-                p.x / range, p.y / range, p.z / range,
+                -1.0 / p.z,
+                0.0,
+                p.x / (p.z * p.z), //
+                0.0,
+                -1.0 / p.z,
+                p.y / (p.z * p.z), //
+                p.x / range,
+                p.y / range,
+                p.z / range,
             );
             let local: SMatrix<f64, N, 3> = local.fixed_rows::<N>(0).into_owned();
             // p = Rᵀ (X − t): dp/dt = −Rᵀ, dp/dθ = [p]×, dp/dX = Rᵀ.
@@ -104,6 +110,8 @@ pub struct Plan {
     pub seed: u64,
     pub stations: usize,
     pub points: usize,
+    /// Points that each station sees.
+    pub seen: usize,
     pub ranges: bool,
     /// Size of the disturbance of the start values, metre and radian.
     pub disturbance: f64,
@@ -144,8 +152,7 @@ fn station(index: usize, count: usize) -> Isometry3<f64> {
 pub fn network(plan: &Plan) -> Network {
     let mut rng = Pcg64::seed_from_u64(plan.seed);
     let true_stations: Vec<_> = (0..plan.stations).map(|i| station(i, plan.stations)).collect();
-    let true_points: Vec<_> =
-        (0..plan.points).map(|_| Vector3::from_fn(|_, _| rng.random_range(-1.0..1.0))).collect();
+    let true_points: Vec<_> = (0..plan.points).map(|_| Vector3::from_fn(|_, _| rng.random_range(-1.0..1.0))).collect();
     let mut adjustment = Adjustment::new();
     let mut disturb = |scale: f64| random_vector(&mut rng) * scale;
     let stations: Vec<_> = true_stations
@@ -168,8 +175,8 @@ pub fn network(plan: &Plan) -> Network {
         .collect();
     let group = adjustment.add_group("sights");
     let mut observations = Vec::new();
-    for (pose, station) in true_stations.iter().zip(&stations) {
-        for (truth, point) in true_points.iter().zip(&points) {
+    for (index, (pose, station)) in true_stations.iter().zip(&stations).enumerate() {
+        for (truth, point) in true_points.iter().zip(&points).cycle().skip(index * 31).take(plan.seen) {
             let seen = sight(&pose.inverse_transform_point(&Point3::from(*truth)).coords);
             let observed: [f64; 3] = std::array::from_fn(|i| seen[i] + SIGMA[i] * normal(&mut rng));
             let blocks = [*station, *point];

@@ -275,7 +275,7 @@ impl<'p, 'a> Iteration<'p, 'a> {
         Error::NotConverged {
             iterations: self.trace.len(),
             reason,
-            vtpv: self.current.vtpv,
+            objective: self.current.objective,
             step: last.map_or(f64::NAN, |entry| entry.step),
             damping: last.map_or(0.0, |entry| entry.damping),
         }

@@ -1,8 +1,11 @@
-//! Correction of whole frames, and its inverse.
+//! Correction of whole frames, its inverse, and flags of gross errors.
 #![allow(missing_docs, clippy::unwrap_used)]
 
 use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
-use error_models::{AmplitudeHyperbola, FixedPattern, RangeErrorModel, RangeTerms, correct_frame, distort_frame};
+use error_models::{
+    AmplitudeHyperbola, FixedPattern, GrossErrorOptions, RangeErrorModel, RangeTerms, correct_frame, distort_frame,
+    flag_gross_errors,
+};
 use range_image::{Flags, ImageFormat, RangeFrame, Raster};
 
 fn model() -> RangeErrorModel {
@@ -43,7 +46,18 @@ fn frames(criterion: &mut Criterion) {
                 BatchSize::LargeInput,
             );
         });
+        criterion.bench_function(&format!("flag_gross_errors/{width}x{height}/1 thread"), |bencher| {
+            let (mut frame, options) = (stepped_wall(width, height), GrossErrorOptions::default());
+            bencher.iter(|| one_thread.install(|| flag_gross_errors(&mut frame, &options)));
+        });
     }
+}
+
+/// An oblique wall with a box in front of it every 40 columns.
+fn stepped_wall(width: usize, height: usize) -> RangeFrame {
+    let range =
+        Raster::from_fn(width, height, |col, row| 3.0 + 0.002 * row as f32 - if col % 40 < 20 { 0.0 } else { 1.0 });
+    RangeFrame { range, ..frame(width, height) }
 }
 
 criterion_group!(benches, frames);

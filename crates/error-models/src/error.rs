@@ -72,7 +72,7 @@ pub enum Error {
     Image(#[from] range_image::Error),
 }
 
-/// Result with this crate's [`Error`].
+/// Result with this crate's [`enum@Error`].
 pub type Result<T> = std::result::Result<T, Error>;
 
 /// Refuses a value that is not finite.

@@ -94,12 +94,12 @@ impl Kernel {
         let outside: Mask = std::array::from_fn(|lane| finite[lane] & !(inside[lane] & known[lane]));
         let total: Lanes =
             std::array::from_fn(|lane| self.d0 + periodic[lane] + delay[lane] + amplitude[lane] + block.pattern[lane]);
-        for lane in 0..LANES {
-            let corrected = block.range[lane] - total[lane];
-            block.range[lane] = if inside[lane] { corrected } else { block.range[lane] };
-            let transported = block.sigma[lane] * (1.0 - derivative[lane]).abs();
-            block.sigma[lane] = if inside[lane] { transported } else { block.sigma[lane] };
-        }
+        let (range, sigma) = (block.range, block.sigma);
+        block.range = std::array::from_fn(|lane| if inside[lane] { range[lane] - total[lane] } else { range[lane] });
+        block.sigma = std::array::from_fn(|lane| {
+            let transported = sigma[lane] * (1.0 - derivative[lane]).abs();
+            if inside[lane] { transported } else { sigma[lane] }
+        });
         for (flags, outside) in block.flags.iter_mut().zip(outside) {
             *flags |= u16::from(outside) * Flags::OUTSIDE_SPAN.bits();
         }

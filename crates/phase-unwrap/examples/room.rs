@@ -44,9 +44,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 
     println!("wrap counts; '?' where not sure:");
     for row in (0..HEIGHT).step_by(4) {
-        let line = (0..WIDTH).step_by(2).map(|col| match found.confidence[(col, row)] >= options.minimum_confidence {
-            true => found.wraps[(col, row)].to_string(),
-            false => "?".to_owned(),
+        let line = (0..WIDTH).step_by(2).map(|col| {
+            let sure = found.confidence[(col, row)] >= options.minimum_confidence;
+            if sure { found.wraps[(col, row)].to_string() } else { "?".to_owned() }
         });
         println!("{}", line.collect::<String>());
     }

@@ -1,4 +1,4 @@
-//! Minimum spanning forest of the pixel grid by contraction \[Boruvka1926\].
+//! Minimum spanning forest of the pixel grid by contraction `[Boruvka1926]`.
 //!
 //! Every component picks its cheapest edge, the picked edges join components, and the graph of the joined components
 //! takes the place of the grid. No global sort, no random walks over the image: the components are numbered in scan

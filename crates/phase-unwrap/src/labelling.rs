@@ -1,4 +1,4 @@
-//! The offsets of all segments together: sequential tree-reweighted message passing \[Kolmogorov2006\] over the graph
+//! The offsets of all segments together: sequential tree-reweighted message passing `[Kolmogorov2006]` over the graph
 //! of segments, once for each candidate of the brightness constant.
 
 use crate::borders::Tie;

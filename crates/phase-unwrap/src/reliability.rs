@@ -5,7 +5,7 @@ use crate::grid::{Grid, wrapped};
 /// Cost of a pixel none of whose neighbours allow a second difference: more than any pixel that has one.
 const UNKNOWN: f32 = 256.0;
 
-/// Second-difference cost of each pixel \[Herraez2002\], rad^2; infinite where masked.
+/// Second-difference cost of each pixel `[Herraez2002]`, rad^2; infinite where masked.
 ///
 /// The four second differences (horizontal, vertical, two diagonals) of white noise of variance s^2 have an expected
 /// sum of squares of 24 s^2. `noise_variance`, where given, adds that expectation, so that pixels whose second

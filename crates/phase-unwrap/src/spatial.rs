@@ -57,7 +57,7 @@ impl Unwrapper {
     ///
     /// With amplitudes the image is cut at possible jumps, and each segment's absolute count is found from the inverse
     /// square law, continuity and what is `known`. Without, every island gets one minimum spanning tree
-    /// \[Herraez2002\]; its counts are relative, the lowest 0, unless something is known.
+    /// `[Herraez2002]`; its counts are relative, the lowest 0, unless something is known.
     pub fn unwrap(
         &mut self,
         phase: &Raster<f32>,

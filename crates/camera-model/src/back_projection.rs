@@ -30,6 +30,15 @@ impl OrganisedCloud {
         self.points.iter().filter(|point| point[0].is_finite()).count()
     }
 
+    fn resize(&mut self, width: usize, height: usize) {
+        (self.width, self.height) = (width, height);
+        let count = width * height;
+        self.points.resize(count, [f64::NAN; 3]);
+        self.sigma.resize(count, f32::NAN);
+        self.amplitude.resize(count, f32::NAN);
+        self.flags.resize(count, Flags::empty());
+    }
+
     /// Writes the points in another frame into `out` (camera frame to `target`, same order, NaN stays NaN).
     pub fn points_into(&self, target_from_camera: &Isometry3<f64>, out: &mut Vec<[f64; 3]>) {
         out.clear();
@@ -58,26 +67,31 @@ impl RayTable {
     pub fn back_project_into(&self, frame: &RangeFrame, cloud: &mut OrganisedCloud) -> Result<()> {
         frame.validate()?;
         self.require_size(&frame.range, "range frame")?;
-        (cloud.width, cloud.height) = (frame.width(), frame.height());
-        copy_into(frame.sigma.as_slice(), &mut cloud.sigma);
-        copy_into(frame.amplitude.as_slice(), &mut cloud.amplitude);
-        copy_into(frame.flags.as_slice(), &mut cloud.flags);
-        cloud.points.resize(frame.range.len(), [f64::NAN; 3]);
-        let points = cloud.points.par_chunks_mut(CHUNK).zip(cloud.flags.par_chunks_mut(CHUNK));
-        let rays = self.directions().par_chunks(CHUNK).zip(frame.range.as_slice().par_chunks(CHUNK));
-        points.zip(rays).for_each(|((points, flags), (rays, ranges))| {
-            for (((point, flags), ray), &range) in points.iter_mut().zip(flags).zip(rays).zip(ranges) {
-                let is_distance = range > 0.0 && range < f32::INFINITY;
-                let range = if is_distance { f64::from(range) } else { f64::NAN };
+        cloud.resize(frame.width(), frame.height());
+        let per_point = cloud.points.par_chunks_mut(CHUNK).zip(cloud.flags.par_chunks_mut(CHUNK));
+        let per_pixel = self.directions().par_chunks(CHUNK).zip(frame.range.as_slice().par_chunks(CHUNK));
+        let flags = frame.flags.as_slice().par_chunks(CHUNK);
+        per_point.zip(per_pixel.zip(flags)).for_each(|((points, flags), ((rays, ranges), reasons))| {
+            for ((point, ray), &range) in points.iter_mut().zip(rays).zip(ranges) {
+                let range = if is_distance(range) { f64::from(range) } else { f64::NAN };
                 *point = [ray[0] * range, ray[1] * range, ray[2] * range];
-                flags.set(Flags::NO_DATA, flags.contains(Flags::NO_DATA) || !is_distance);
+            }
+            for ((flag, &reason), &range) in flags.iter_mut().zip(reasons).zip(ranges) {
+                *flag = if is_distance(range) { reason } else { reason | Flags::NO_DATA };
             }
         });
+        copy(frame.sigma.as_slice(), &mut cloud.sigma);
+        copy(frame.amplitude.as_slice(), &mut cloud.amplitude);
         Ok(())
     }
 }
 
-fn copy_into<T: Copy>(from: &[T], to: &mut Vec<T>) {
-    to.clear();
-    to.extend_from_slice(from);
+/// Whether a value can be a distance in front of the camera.
+fn is_distance(range: f32) -> bool {
+    range > 0.0 && range < f32::INFINITY
+}
+
+fn copy(from: &[f32], to: &mut [f32]) {
+    let chunks = to.par_chunks_mut(CHUNK).zip(from.par_chunks(CHUNK));
+    chunks.for_each(|(to, from)| to.copy_from_slice(from));
 }

@@ -1,7 +1,7 @@
 //! Borders between segments: how well a wrap difference would make the surface continuous across them.
 
 use crate::forest::{Forest, NO_LABEL};
-use crate::grid::{Grid, RIGHT, DOWN, wrap_step};
+use crate::grid::{DOWN, Grid, RIGHT, wrap_step};
 use crate::surface::{Step, Surface};
 
 /// Evidence, in nats, for `offset(to) - offset(from) == step`.
@@ -47,8 +47,8 @@ impl Borders {
                     continue;
                 }
                 let other = pixel + ahead;
-                let step = wrap_step(surface.phase[pixel], surface.phase[other]) + forest.wraps[pixel]
-                    - forest.wraps[other];
+                let step =
+                    wrap_step(surface.phase[pixel], surface.phase[other]) + forest.wraps[pixel] - forest.wraps[other];
                 let evidence = continuity(surface.step(pixel, ahead));
                 self.crossings.push(directed(from, forest.label[other], step, evidence));
             }
@@ -96,7 +96,11 @@ fn root(parent: &mut [u32], mut node: u32) -> u32 {
 }
 
 fn directed(from: u32, to: u32, step: i32, evidence: f32) -> Crossing {
-    if from < to { Crossing { from, to, step, evidence } } else { Crossing { from: to, to: from, step: -step, evidence } }
+    if from < to {
+        Crossing { from, to, step, evidence }
+    } else {
+        Crossing { from: to, to: from, step: -step, evidence }
+    }
 }
 
 /// Logarithm of the likelihood ratio of "one surface" to "a jump" for one pixel edge.

@@ -3,8 +3,10 @@
 use std::f32::consts::TAU;
 
 use crate::forest::{Forest, NO_LABEL};
+use crate::grid::Grid;
+use crate::planes::log_cosine;
 use crate::surface::Surface;
-use crate::AlbedoPrior;
+use crate::{AlbedoPrior, ImageGeometry};
 
 /// Quantiles kept of each segment's log albedos.
 const QUANTILES: usize = 5;
@@ -14,6 +16,32 @@ const SAMPLES: u32 = 64;
 const OUT_OF_SPAN: f32 = 8.0;
 /// Cost, in nats, of going against a known wrap count.
 const AGAINST_SEED: f32 = 40.0;
+
+/// Logarithm of a typical cosine of incidence, where the slope is not known.
+const TYPICAL_LOG_COSINE: f32 = -0.35;
+/// Logarithm of the smallest cosine that is taken off: beyond 84 degrees slopes and albedo laws fail.
+const LOWEST_LOG_COSINE: f32 = -2.3;
+
+/// The angle of incidence of every pixel as slope and camera give it.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Incidence<'a> {
+    pub grid: &'a Grid,
+    pub geometry: &'a ImageGeometry,
+    pub slope: &'a [[f32; 2]],
+}
+
+impl Incidence<'_> {
+    fn log_cosine(&self, pixel: usize, range: f32) -> f32 {
+        let slope = self.slope[pixel];
+        if slope[0].is_nan() {
+            return TYPICAL_LOG_COSINE;
+        }
+        let (col, row) = (pixel % self.grid.stride, pixel / self.grid.stride);
+        let image = |padded: usize, point: f32| (padded as f32 - 1.0 - point) / self.geometry.principal_distance_px;
+        let [x, y] = [image(col, self.geometry.principal_point_px[0]), image(row, self.geometry.principal_point_px[1])];
+        log_cosine(x, y, range, slope).max(LOWEST_LOG_COSINE)
+    }
+}
 
 /// Per segment and label: quantiles of `ln(amplitude * range^2)`, range in ambiguity intervals.
 #[derive(Debug, Default)]
@@ -30,7 +58,14 @@ pub(crate) struct Brightness {
 
 impl Brightness {
     /// Samples every segment and sorts its log albedos for every label.
-    pub fn measure(&mut self, surface: &Surface, forest: &Forest, pixels: &[u32], maximum_wraps: u16) {
+    pub fn measure(
+        &mut self,
+        surface: &Surface,
+        forest: &Forest,
+        pixels: &[u32],
+        incidence: Option<Incidence<'_>>,
+        maximum_wraps: u16,
+    ) {
         self.labels = usize::from(maximum_wraps) + 1;
         self.sample(forest, pixels);
         self.weight.clear();
@@ -39,7 +74,7 @@ impl Brightness {
         self.fixed.clear();
         for segment in 0..pixels.len() {
             for label in 0..self.labels {
-                self.measure_label(surface, forest, segment, label as i32, i32::from(maximum_wraps));
+                self.measure_label(surface, forest, segment, label as i32, incidence, i32::from(maximum_wraps));
             }
         }
     }
@@ -60,7 +95,7 @@ impl Brightness {
         }
     }
 
-    fn measure_label(&mut self, surface: &Surface, forest: &Forest, segment: usize, label: i32, maximum: i32) {
+    fn measure_label(&mut self, surface: &Surface, forest: &Forest, segment: usize, label: i32, incidence: Option<Incidence<'_>>, maximum: i32) {
         self.scratch.clear();
         let mut outside = 0.0;
         for &pixel in &self.pixel[segment] {
@@ -71,7 +106,8 @@ impl Brightness {
                 continue;
             }
             let range = (surface.phase[pixel] / TAU + count as f32).max(0.01);
-            let log_albedo = surface.log_amplitude[pixel] + 2.0 * range.ln();
+            let cosine = incidence.map_or(0.0, |incidence| incidence.log_cosine(pixel, range));
+            let log_albedo = surface.log_amplitude[pixel] + 2.0 * range.ln() - cosine;
             if !log_albedo.is_nan() {
                 self.scratch.push(log_albedo);
             }
@@ -85,6 +121,13 @@ impl Brightness {
         }
         let sampled = self.pixel[segment].len().max(1) as f32;
         self.fixed.push(self.weight[segment].max(1.0) * OUT_OF_SPAN * outside / sampled);
+    }
+
+    /// Adds costs that do not depend on the constant, `[segment][label]`.
+    pub fn add_costs(&mut self, costs: &[f32]) {
+        for (sum, cost) in self.fixed.iter_mut().zip(costs) {
+            *sum += cost;
+        }
     }
 
     /// Adds what seeds say: `(padded index, wrap count)`.

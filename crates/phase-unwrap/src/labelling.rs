@@ -132,7 +132,7 @@ impl Labelling {
         for segment in 0..self.offset.len() {
             self.belief.copy_from_slice(&costs[segment * labels..][..labels]);
             for slot in self.slots_into(segment) {
-            let tie = self.into[slot] as usize;
+                let tie = self.into[slot] as usize;
                 let Tie { from, step, bonus, .. } = self.ties[tie];
                 reward(&mut self.belief, i32::from(self.offset[from as usize]) + step, bonus);
             }

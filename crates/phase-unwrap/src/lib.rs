@@ -2,19 +2,26 @@
 
 mod borders;
 mod brightness;
+mod combine;
 mod error;
 mod forest;
 mod grid;
+mod intervals;
 mod labelling;
+mod multi_frequency;
 mod offsets;
 mod options;
+mod planes;
 mod reliability;
 mod segments;
 mod spatial;
 mod surface;
 mod unwrapped;
 
+pub use combine::{Combined, combine_frequencies};
 pub use error::{Error, Result};
-pub use options::{AlbedoPrior, KnownWraps, Seed, SpatialOptions};
+pub use intervals::combined_interval_m;
+pub use multi_frequency::{MultiFrequencyOptions, MultiUnwrapped, unwrap_multi_frequency};
+pub use options::{AlbedoPrior, ImageGeometry, KnownWraps, Seed, SpatialOptions};
 pub use spatial::{Unwrapper, unwrap_spatial};
 pub use unwrapped::{Island, Unwrapped};

@@ -19,17 +19,30 @@ pub struct SpatialOptions {
     pub amplitude_jump: f32,
     /// What is known about amplitude as a function of range.
     pub albedo: AlbedoPrior,
+    /// Where the rays go. With it, the angle of incidence is taken out of the amplitudes, and walls and floors count as
+    /// evidence by being plane; without it only amplitude and continuity decide.
+    pub geometry: Option<ImageGeometry>,
+}
+
+/// The camera as a central projection, good to a few pixels; lens distortion does not matter here.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ImageGeometry {
+    /// Principal distance in pixels (principal distance over pixel pitch).
+    pub principal_distance_px: f32,
+    /// Column and row of the principal point.
+    pub principal_point_px: [f32; 2],
 }
 
 impl Default for SpatialOptions {
     fn default() -> Self {
         Self {
-            maximum_wraps: 2,
+            maximum_wraps: 1,
             minimum_confidence: 0.6,
             amplitude_noise: None,
-            phase_jump_rad: 0.5,
-            amplitude_jump: 0.7,
+            phase_jump_rad: 0.25,
+            amplitude_jump: 0.35,
             albedo: AlbedoPrior::default(),
+            geometry: None,
         }
     }
 }
@@ -98,6 +111,9 @@ impl SpatialOptions {
                 return Err(Error::OutOfDomain { name, value: value.into(), expected: "positive and finite" });
             }
         }
+        if let Some(geometry) = self.geometry {
+            geometry.validate()?;
+        }
         if !(0.0..1.0).contains(&self.minimum_confidence) {
             let value = self.minimum_confidence.into();
             return Err(Error::OutOfDomain { name: "minimum_confidence", value, expected: "in [0, 1)" });
@@ -105,6 +121,22 @@ impl SpatialOptions {
         if self.maximum_wraps > WRAPS_LIMIT {
             let value = self.maximum_wraps.into();
             return Err(Error::OutOfDomain { name: "maximum_wraps", value, expected: "at most 64" });
+        }
+        Ok(())
+    }
+}
+
+impl ImageGeometry {
+    fn validate(&self) -> Result<()> {
+        let [col, row] = self.principal_point_px;
+        let distance = self.principal_distance_px;
+        if !(distance.is_finite() && distance > 0.0) {
+            let value = distance.into();
+            return Err(Error::OutOfDomain { name: "principal_distance_px", value, expected: "positive and finite" });
+        }
+        if !(col.is_finite() && row.is_finite()) {
+            let value = if col.is_finite() { row } else { col }.into();
+            return Err(Error::OutOfDomain { name: "principal_point_px", value, expected: "finite" });
         }
         Ok(())
     }

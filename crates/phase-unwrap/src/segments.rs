@@ -6,13 +6,17 @@ use crate::grid::{DOWN, Grid, RIGHT, wrap_step};
 use crate::reliability::reliability;
 use crate::surface::{Step, Surface};
 
-/// A pixel none of whose edges is cut.
+/// A pixel far from every cut.
 const CORE: u8 = 1;
 /// A pixel at a cut that hangs on a core.
 const RIM: u8 = 2;
 /// A pixel at a cut without a core beside it: wires, noise, mixed pixels.
 const ORPHAN: u8 = 3;
 
+/// Layers of rim around a core: two pixels are lost to each cut, one more holds mixed pixels.
+const RIM_LAYERS: usize = 3;
+/// Shift of a link bit that makes it a hook of a rim pixel, which the forest does not see.
+const HOOK: u8 = 2;
 /// Phase variance, rad^2, above which a pixel does not conduct: a step of pi is then within reach of the noise.
 const CONDUCTING_VARIANCE: f32 = 0.5;
 
@@ -26,6 +30,9 @@ pub(crate) struct Segments {
     /// Links that are not cut; later those inside segments only.
     links: Vec<u8>,
     class: Vec<u8>,
+    /// Rim pixels, one layer after the other.
+    rim: Vec<u32>,
+    layers: Vec<usize>,
 }
 
 impl Segments {
@@ -79,11 +86,32 @@ impl Segments {
         }
     }
 
-    /// Orphans with an uncut link to a core are its rim.
+    /// Every pixel whose 3 x 3 surroundings hold a cut is no core, so that a gap of three edges in a cut border does not
+    /// join two objects. Pixels that uncut links lead to from a core are its rim, layer by layer.
     fn classify(&mut self, grid: &Grid) {
-        for pixel in grid.inner() {
-            if self.class[pixel] == ORPHAN && self.neighbours(grid, pixel).any(|n| self.class[n] == CORE) {
-                self.class[pixel] = RIM;
+        let stride = grid.stride;
+        let around = [0, 1, 2, stride, stride + 2, 2 * stride, 2 * stride + 1, 2 * stride + 2];
+        let cut: Vec<u32> = grid.inner().filter(|&p| self.class[p] == ORPHAN).map(|p| p as u32).collect();
+        for &pixel in &cut {
+            let corner = pixel as usize - stride - 1;
+            for neighbour in around.map(|offset| corner + offset) {
+                if self.class[neighbour] == CORE {
+                    self.class[neighbour] = ORPHAN;
+                }
+            }
+        }
+        self.rim.clear();
+        self.layers.clear();
+        for layer in 0..RIM_LAYERS {
+            self.layers.push(self.rim.len());
+            for pixel in grid.inner() {
+                let conducts = |n: usize| self.class[n] == CORE || (self.class[n] == RIM && layer > 0);
+                if self.class[pixel] == ORPHAN && self.neighbours(grid, pixel).any(conducts) {
+                    self.rim.push(pixel as u32);
+                }
+            }
+            for &pixel in &self.rim[self.layers[layer]..] {
+                self.class[pixel as usize] = RIM;
             }
         }
     }
@@ -97,15 +125,13 @@ impl Segments {
         [up, left, right, down].into_iter().flatten()
     }
 
-    /// Cores conduct to cores and orphans to orphans; a rim pixel keeps a hook to each core for `attach_rim`.
+    /// Cores conduct to cores and orphans to orphans; what leads to a rim pixel becomes a hook for `attach_rim`.
     fn keep_links_of_one_class(&mut self, grid: &Grid) {
         for pixel in grid.inner() {
             for (bit, other) in [(RIGHT, pixel + 1), (DOWN, pixel + grid.stride)] {
-                let (one, two) = (self.class[pixel], self.class[other]);
-                let kept = match (one, two) {
+                let kept = match (self.class[pixel], self.class[other]) {
                     (CORE, CORE) | (ORPHAN, ORPHAN) => bit,
-                    // Two bits up: a hook of a rim pixel, no link for the forest.
-                    (CORE, RIM) | (RIM, CORE) => bit << 2,
+                    (RIM, CORE | RIM) | (CORE, RIM) => bit << HOOK,
                     _ => 0,
                 };
                 if self.links[pixel] & bit != 0 {
@@ -115,19 +141,19 @@ impl Segments {
         }
     }
 
+    /// Hangs each rim pixel on the labelled neighbour that its phase and amplitude are nearest to, layer by layer.
     fn attach_rim(&self, grid: &Grid, surface: &Surface, forest: &mut Forest) {
-        for pixel in grid.inner() {
-            if self.class[pixel] != RIM {
-                continue;
-            }
+        for &pixel in &self.rim {
+            let pixel = pixel as usize;
             let mut best = (f32::INFINITY, pixel);
-            for (hooks, bit, from, ahead, other) in [
-                (pixel - grid.stride, DOWN, pixel - grid.stride, grid.stride, pixel - grid.stride),
-                (pixel - 1, RIGHT, pixel - 1, 1, pixel - 1),
-                (pixel, RIGHT, pixel, 1, pixel + 1),
-                (pixel, DOWN, pixel, grid.stride, pixel + grid.stride),
+            for (from, bit, ahead) in [
+                (pixel - grid.stride, DOWN, grid.stride),
+                (pixel - 1, RIGHT, 1),
+                (pixel, RIGHT, 1),
+                (pixel, DOWN, grid.stride),
             ] {
-                if self.links[hooks] & (bit << 2) == 0 {
+                let other = if from == pixel { pixel + ahead } else { from };
+                if self.links[from] & (bit << HOOK) == 0 || forest.label[other] == NO_LABEL {
                     continue;
                 }
                 let step = surface.step(from, ahead);
@@ -137,9 +163,9 @@ impl Segments {
                     best = (distance, other);
                 }
             }
-            let core = best.1;
-            forest.label[pixel] = forest.label[core];
-            forest.wraps[pixel] = forest.wraps[core] + wrap_step(surface.phase[core], surface.phase[pixel]);
+            let base = best.1;
+            forest.label[pixel] = forest.label[base];
+            forest.wraps[pixel] = forest.wraps[base] + wrap_step(surface.phase[base], surface.phase[pixel]);
         }
     }
 

@@ -5,10 +5,11 @@ use std::f32::consts::TAU;
 use range_image::Raster;
 
 use crate::borders::Borders;
-use crate::brightness::Brightness;
+use crate::brightness::{Brightness, Incidence};
 use crate::forest::{Forest, NO_LABEL};
 use crate::grid::Grid;
 use crate::offsets::Offsets;
+use crate::planes::Planes;
 use crate::reliability::{pixel_cost, reliability};
 use crate::segments::Segments;
 use crate::surface::Surface;
@@ -35,6 +36,7 @@ pub struct Unwrapper {
     forest: Forest,
     segments: Segments,
     borders: Borders,
+    planes: Planes,
     brightness: Brightness,
     offsets: Offsets,
 }
@@ -140,7 +142,8 @@ impl Unwrapper {
         }
         let confidence = self.cost.iter().map(|&cost| reliability(cost)).collect::<Vec<_>>();
         let known: Vec<bool> = fixed.iter().map(|fix| fix.1).collect();
-        self.collect(grid, &confidence, &known, None)
+        let segment = grid.crop(&self.forest.label, |&label| label.wrapping_add(1))?;
+        self.collect(grid, &confidence, &known, None, segment)
     }
 
     /// Offset of each tree, and whether something known fixed it: the median of what is known, else lowest count 0.
@@ -170,14 +173,23 @@ impl Unwrapper {
         self.segments.build(grid, &self.surface, &mut self.cost, &mut self.forest, &options);
         self.borders.collect(grid, &self.surface, &self.forest);
         let pixels = &self.segments.pixels;
-        self.brightness.measure(&self.surface, &self.forest, pixels, options.maximum_wraps);
+        let labels = usize::from(options.maximum_wraps) + 1;
+        let incidence = options.geometry.as_ref().map(|geometry| {
+            self.planes.measure(grid, &self.surface, &self.forest, geometry, labels);
+            Incidence { grid, geometry, slope: &self.planes.slope }
+        });
+        self.brightness.measure(&self.surface, &self.forest, pixels, incidence, options.maximum_wraps);
+        if incidence.is_some() {
+            self.brightness.add_costs(&self.planes.costs);
+        }
         self.brightness.add_known(&self.forest, known);
         self.offsets.find(&self.brightness, &self.borders.ties, pixels.len(), &options);
+        let segment = grid.crop(&self.forest.label, |&label| label.wrapping_add(1))?;
         let mut confidence = std::mem::take(&mut self.segments.hold);
         self.apply_offsets(&mut confidence);
         let islands = vec![true; self.borders.islands];
         let constant = self.offsets.log_constant.map(f32::exp);
-        let result = self.collect(grid, &confidence, &islands, constant);
+        let result = self.collect(grid, &confidence, &islands, constant, segment);
         self.segments.hold = confidence;
         result
     }
@@ -200,7 +212,14 @@ impl Unwrapper {
         }
     }
 
-    fn collect(&self, grid: &Grid, confidence: &[f32], known: &[bool], constant: Option<f32>) -> Result<Unwrapped> {
+    fn collect(
+        &self,
+        grid: &Grid,
+        confidence: &[f32],
+        known: &[bool],
+        constant: Option<f32>,
+        segment: Raster<u32>,
+    ) -> Result<Unwrapped> {
         let island = grid.crop(&self.forest.label, |&label| label.wrapping_add(1))?;
         let wraps = grid.crop(&self.forest.wraps, |&wraps| wraps)?;
         let mut confidence = grid.crop(confidence, |&confidence| confidence)?;
@@ -217,6 +236,6 @@ impl Unwrapper {
         for (island, known) in islands.iter_mut().zip(known) {
             island.offset_known = *known && 2 * island.sure_pixels > island.pixels;
         }
-        Ok(Unwrapped { wraps, confidence, island, islands, typical_amplitude_at_interval: constant })
+        Ok(Unwrapped { wraps, confidence, island, segment, islands, typical_amplitude_at_interval: constant })
     }
 }

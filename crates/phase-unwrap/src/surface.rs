@@ -37,7 +37,13 @@ impl Surface {
         self.variance.extend(amplitude.iter().map(|&a| {
             let sigma = noise / a;
             // An amplitude that is not known leaves the noise to the second differences alone.
-            if a.is_nan() { 0.0 } else if a > 0.0 { (sigma * sigma).min(MAXIMUM_VARIANCE) } else { MAXIMUM_VARIANCE }
+            if a.is_nan() {
+                0.0
+            } else if a > 0.0 {
+                (sigma * sigma).min(MAXIMUM_VARIANCE)
+            } else {
+                MAXIMUM_VARIANCE
+            }
         }));
     }
 

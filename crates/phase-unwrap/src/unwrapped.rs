@@ -10,6 +10,8 @@ pub struct Unwrapped {
     /// Island of each pixel: 0 where masked, else 1 + index into `islands`. Pixels of one island hang together by
     /// their sides.
     pub island: Raster<u32>,
+    /// Segment of each pixel as the island was cut at possible jumps: 0 where masked, else from 1.
+    pub segment: Raster<u32>,
     /// The islands in scan order of their first pixels.
     pub islands: Vec<Island>,
     /// Amplitude of a typical surface at a range of one ambiguity interval, where amplitudes decided the counts.

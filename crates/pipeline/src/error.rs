@@ -78,9 +78,14 @@ pub enum Error {
         /// Why.
         source: Box<dyn std::error::Error + Send + Sync>,
     },
-    /// A simulation that could not be made.
-    #[error("simulation: {0}")]
-    Simulation(#[from] simulation::Error),
+    /// A scene that can't be simulated.
+    #[error("{}: {source}", path.display())]
+    Scene {
+        /// The scene's file.
+        path: PathBuf,
+        /// Why.
+        source: simulation::Error,
+    },
     /// A figure that could not be drawn.
     #[error("report: figure {figure}: {message}")]
     Figure {

@@ -102,7 +102,7 @@ fn inspect_calibration(path: &Path, found: &mut Inspection) -> Result<()> {
     found.add("size", format!("{} x {} pixels", calibration.camera.width, calibration.camera.height));
     let ranges = calibration.range_models.iter().flat_map(|model| &model.parameters);
     for parameter in calibration.parameters.iter().chain(ranges) {
-        let sigma = parameter.sigma.map_or_else(String::new, |sigma| format!(" +- {sigma:.3e}"));
+        let sigma = if parameter.sigma > 0.0 { format!(" +- {:.3e}", parameter.sigma) } else { String::new() };
         found.add("parameter", format!("{:<4} {:>13.6e}{sigma} {} ({:?})", parameter.name, parameter.value, parameter.unit, parameter.status));
     }
     let scattering = calibration.scattering.as_ref();

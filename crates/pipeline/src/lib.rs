@@ -26,7 +26,7 @@ pub use inspect::{Inspection, inspect};
 pub use outcome::{AdjustmentFigures, AlignedPair, Outcome, StationPose};
 pub use plan::{
     AdjustOptions, AverageOptions, CorrectImagePointOptions, CorrectRangeOptions, DeconvolveOptions,
-    DemodulateOptions, FlagOptions, NoiseOptions, Plan, PointCloudOptions, RegisterOptions, SimulateSource, Source,
+    DemodulateOptions, FlagOptions, MixedPixels, NoiseOptions, Plan, PointCloudOptions, RegisterOptions, SimulateSource, Source,
     Stage, UnwrapOptions,
 };
 pub use progress::{Progress, Silent};

@@ -8,7 +8,7 @@ use range_image::{Flags, Modulation, RangeFrame, Raster};
 use range_io::calibration::Calibration;
 use range_io::npz::NpzReader;
 use range_io::survey::{InputFrame, Survey, read_frame, read_truth};
-use range_io::tables::{StationRow, read_stations};
+use range_io::tables::{Station, read_stations};
 
 use crate::outcome::Outcome;
 use crate::progress::Progress;
@@ -107,11 +107,11 @@ fn calibrated(calibration: &Calibration, nominal: &Camera) -> Result<Camera> {
     )))
 }
 
-fn read_poses(file: &Path) -> Result<Vec<StationRow>> {
+fn read_poses(file: &Path) -> Result<Vec<Station>> {
     if file.is_file() { Ok(read_stations(file)?) } else { Ok(Vec::new()) }
 }
 
-fn pose_of(poses: &[StationRow], station: &str) -> Option<Isometry3<f64>> {
+fn pose_of(poses: &[Station], station: &str) -> Option<Isometry3<f64>> {
     poses.iter().find(|row| row.station == station).map(|row| row.world_from_camera)
 }
 
@@ -132,7 +132,15 @@ fn read_reference(survey: &Survey, root: &Path) -> Result<Option<Raster<f32>>> {
     let mut arrays = NpzReader::open(&path)?;
     let (name, scale) = if arrays.contains("range") { ("range", 1.0) } else { ("range_mm", 1e-3) };
     let (width, height) = (survey.camera.width, survey.camera.height);
-    let array = arrays.read_any(name)?;
+    let array = arrays.read(name, |header| match header.shape.as_slice() {
+        [rows, cols] if (*rows, *cols) == (height, width) => Ok(()),
+        found => Err(range_io::Error::ArrayShape {
+            file: path.clone(),
+            array: name.to_owned(),
+            found: found.to_vec(),
+            expected: format!("[{height}, {width}]"),
+        }),
+    })?;
     let values: Vec<f32> = array.values.into_f32().into_iter().map(|value| value * scale).collect();
     let plane = Raster::from_vec(width, height, values);
     let plane = plane.map_err(|error| Error::Survey { path, message: format!("array `{name}`: {error}") })?;
@@ -147,7 +155,7 @@ fn view_data(frame: InputFrame, rays: &RayTable) -> Result<ViewData> {
         InputFrame::Phase(frame) => Ok(ViewData::Phase(frame)),
         InputFrame::Range { range, amplitude, .. } => Ok(ViewData::Range(range_frame(range, amplitude))),
         InputFrame::Depth { depth, amplitude, .. } => {
-            let range = rays.range_from_depth(&depth).map_err(camera)?;
+            let range = rays.depth_to_range(&depth).map_err(camera)?;
             Ok(ViewData::Range(range_frame(range, amplitude)))
         }
         other => Err(Error::Camera(format!("frames at level `{}` can't be processed", other.level().name()))),

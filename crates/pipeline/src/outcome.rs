@@ -1,8 +1,8 @@
 //! What a run holds in its hands: views, clouds, poses, and the record of the stages.
 
-use camera_model::{Camera, OrganisedCloud};
+use camera_model::{Camera, OrganisedCloud, euler_from_pose, step_pose};
 use icp_registration::IcpResult;
-use nalgebra::{Isometry3, Matrix6, Point3};
+use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, Vector3};
 use range_io::survey::Survey;
 
 use crate::summary::StageSummary;
@@ -63,6 +63,24 @@ pub struct AdjustmentFigures {
 }
 
 impl StationPose {
+    /// Standard deviations of the position along the world's axes, metre, and of omega, phi, kappa, radian; `None`
+    /// where the pose was not estimated or is the datum.
+    pub fn sigmas(&self) -> Option<([f64; 3], [f64; 3])> {
+        let covariance = self.covariance.filter(|covariance| covariance.trace() > 0.0)?;
+        let angles = |axis: usize, step: f64| {
+            let mut tangent = [0.0; 6];
+            tangent[3 + axis] = step;
+            Vector3::from(euler_from_pose(&step_pose(&self.world_from_camera, &tangent)))
+        };
+        // A step small against the angles and large against their rounding.
+        let step = 1e-6;
+        let columns = [0, 1, 2].map(|axis| (angles(axis, step) - angles(axis, -step)) / (2.0 * step));
+        let jacobian = Matrix3::from_columns(&columns);
+        let attitude = jacobian * covariance.fixed_view::<3, 3>(3, 3) * jacobian.transpose();
+        let position = [0, 1, 2].map(|axis| covariance[(axis, axis)].sqrt());
+        Some((position, [0, 1, 2].map(|axis| attitude[(axis, axis)].sqrt())))
+    }
+
     /// Standard deviation of the position in space, metre.
     pub fn position_sigma_m(&self) -> Option<f64> {
         self.covariance.map(|covariance| (covariance[(0, 0)] + covariance[(1, 1)] + covariance[(2, 2)]).sqrt())

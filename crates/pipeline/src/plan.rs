@@ -193,6 +193,24 @@ pub struct FlagOptions {
     pub low_amplitude: Option<f64>,
     /// Standard deviation of the range above which a pixel is flagged as of low amplitude, metre.
     pub maximum_sigma_m: Option<f64>,
+    /// How spikes at edges are told from surfaces.
+    pub mixed_pixels: MixedPixels,
+}
+
+/// How far a pixel must lie off the surfaces at both sides to count as mixed.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct MixedPixels {
+    /// Distance in standard deviations.
+    pub sigmas: f64,
+    /// Smallest distance, metre.
+    pub floor_m: f64,
+}
+
+impl Default for MixedPixels {
+    fn default() -> Self {
+        Self { sigmas: 4.0, floor_m: 0.02 }
+    }
 }
 
 /// Options of [`Stage::Register`].

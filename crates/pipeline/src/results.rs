@@ -4,7 +4,7 @@ use std::path::Path;
 
 use range_io::atomic::OutputFolder;
 use range_io::ply::{CloudFile, write_ply};
-use range_io::tables::{StationRow, write_stations};
+use range_io::tables::{Station, write_stations};
 use range_io::trajectory::{TimedPose, write_tum};
 
 use crate::outcome::{Outcome, StationPose, usable, world_points};
@@ -71,12 +71,13 @@ pub(crate) fn poses_or_identity(outcome: &Outcome) -> Vec<StationPose> {
     known.map(|world_from_camera| StationPose { world_from_camera, covariance: None }).collect()
 }
 
-fn station_rows(outcome: &Outcome) -> Vec<StationRow> {
+fn station_rows(outcome: &Outcome) -> Vec<Station> {
     let rows = outcome.views.iter().zip(poses_or_identity(outcome));
-    rows.map(|(view, pose)| StationRow {
+    rows.map(|(view, pose)| Station {
         station: view.station.clone(),
         world_from_camera: pose.world_from_camera,
-        sigma: pose.sigmas(),
+        sigma_position_m: pose.sigmas().map(|sigmas| sigmas.0),
+        sigma_attitude_rad: pose.sigmas().map(|sigmas| sigmas.1),
     })
     .collect()
 }

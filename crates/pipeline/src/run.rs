@@ -9,7 +9,6 @@ use crate::plan::Source;
 use crate::progress::Progress;
 use crate::summary::{StageSummary, Summary};
 use crate::view::Snapshot;
-use crate::work::Work;
 use crate::{Error, Plan, Result, measure, results, simulate, stages};
 
 /// What to run on what.

@@ -4,17 +4,17 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 
 use camera_model::step_pose;
-use error_models::{ModelSet, RangeErrorModel};
+use error_models::{ModelSet, RangeErrorModel, RangeTerms};
 use nalgebra::Isometry3;
-use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
+use range_image::Modulation;
 use range_io::atomic::OutputFolder;
 use range_io::calibration::{Calibration, Provenance};
 use range_io::survey::{
     FrameEntry, InputFrame, Level, Survey, SurveyCamera, TruthFiles, TruthFrame, write_frame, write_truth,
 };
-use range_io::tables::{StationRow, write_stations};
+use range_io::tables::{Station, write_stations};
 use serde::Serialize;
 use simulation::{SimulationSpec, Simulator};
 
@@ -102,12 +102,12 @@ fn write_frames(
 }
 
 fn write_tables(spec: &SimulationSpec, source: &SimulateSource, folder: &OutputFolder) -> Result<()> {
-    let row = |name: &str, world_from_camera| StationRow { station: name.to_owned(), world_from_camera, sigma: None };
-    let truth: Vec<StationRow> = spec.stations.iter().map(|s| row(&s.name, s.world_from_camera())).collect();
+    let row = |name: &str, world_from_camera| Station { station: name.to_owned(), world_from_camera, sigma_position_m: None, sigma_attitude_rad: None };
+    let truth: Vec<Station> = spec.stations.iter().map(|s| row(&s.name, s.world_from_camera())).collect();
     write_stations(folder.file("truth/stations.csv")?, &truth)?;
     // A stream of its own, so that the sketch does not change with the number of frames.
     let mut generator = Pcg64::new(u128::from(source.seed), STATION_STREAM);
-    let sketch: Vec<StationRow> = truth
+    let sketch: Vec<Station> = truth
         .iter()
         .enumerate()
         .map(|(index, known)| match index {
@@ -146,15 +146,24 @@ fn disturbed(pose: &Isometry3<f64>, source: &SimulateSource, generator: &mut Pcg
 fn true_calibration(spec: &SimulationSpec, simulator: &Simulator, scene: &str) -> Result<Calibration> {
     let models = match &spec.errors.range {
         Some(models) => models.clone(),
-        None => spec.camera.modulations()?.iter().map(|m| RangeErrorModel::none(m.ambiguity_interval_m())).collect(),
+        None => modulations(spec)?.iter().map(|m| error_free(m.ambiguity_interval_m())).collect(),
     };
     let set = ModelSet { entries: vec![(spec.exposure.integration_time_s, models)] };
-    let provenance = Provenance { survey: scene.to_owned(), method: "truth of a simulation".to_owned(), ..Provenance::default() };
-    let mut calibration = Calibration::held(&spec.camera.geometry, &set, &spec.camera.modulation_hz, provenance)?;
+    let scattering = spec.errors.scattering.as_ref();
+    let mut calibration = Calibration::from_models(&spec.camera.geometry, &set, scattering)?;
+    let method = "truth of a simulation".to_owned();
+    calibration.provenance = Provenance { survey: scene.to_owned(), method, ..Provenance::default() };
     calibration.noise = spec.errors.noise;
-    calibration.scattering = spec.errors.scattering.clone();
     calibration.fixed_pattern = simulator.fixed_pattern().cloned();
     Ok(calibration)
+}
+
+fn modulations(spec: &SimulationSpec) -> Result<Vec<Modulation>> {
+    spec.camera.modulations().map_err(|error| Error::Camera(error.to_string()))
+}
+
+fn error_free(ambiguity_interval_m: f64) -> RangeErrorModel {
+    RangeErrorModel { ambiguity_interval_m, terms: RangeTerms::default(), hyperbola: None, range_span_m: None }
 }
 
 fn survey(spec: &SimulationSpec, frames: Vec<FrameEntry>) -> Result<Survey> {
@@ -167,7 +176,8 @@ fn survey(spec: &SimulationSpec, frames: Vec<FrameEntry>) -> Result<Survey> {
             height: geometry.format.height,
             pixel_pitch_mm: geometry.format.pixel_pitch_mm,
             principal_distance_mm: geometry.interior.principal_distance_mm,
-            principal_point_mm: geometry.interior.principal_point_mm,
+            // Nominal, as a data sheet would have it: the calibration brings the true one.
+            principal_point_mm: [0.0, 0.0],
             modulation_hz: spec.camera.modulation_hz.clone(),
             phase_steps: Some(spec.camera.phase_steps),
             phase_sense: demodulation.phase_sense,

@@ -5,7 +5,7 @@ use range_image::{Flags, Modulation, Raster};
 use serde::Serialize;
 
 use crate::statistics::{median, quantile};
-use crate::view::{View, ViewData};
+use crate::view::View;
 
 /// What is true of one view.
 #[derive(Debug, Clone)]

@@ -102,14 +102,19 @@ impl View {
         let Some(first) = self.channels.first() else { return Ok(()) };
         let ranges: Vec<_> = self.channels.iter().map(|channel| channel.range.clone()).collect();
         let sigmas: Vec<_> = self.channels.iter().map(|channel| channel.sigma.clone()).collect();
-        let (range, sigma) = combine_frequencies(&ranges, &sigmas).map_err(Error::stage("Unwrap", &self.name()))?;
+        let combined = combine_frequencies(&ranges, &sigmas).map_err(Error::stage("Unwrap", &self.name()))?;
         let mut flags = first.flags.clone();
         for channel in &self.channels[1..] {
             for (flags, more) in flags.as_mut_slice().iter_mut().zip(channel.flags.as_slice()) {
                 flags.insert(*more);
             }
         }
-        self.data = ViewData::Range(RangeFrame { range, sigma, amplitude: first.amplitude.clone(), flags });
+        self.data = ViewData::Range(RangeFrame {
+            range: combined.range,
+            sigma: combined.sigma,
+            amplitude: first.amplitude.clone(),
+            flags,
+        });
         Ok(())
     }
 

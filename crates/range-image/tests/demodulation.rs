@@ -246,7 +246,7 @@ fn only_harmonics_next_to_a_multiple_of_the_steps_disturb_the_phase() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(64))]
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(64) })]
 
     #[test]
     fn turning_the_scene_turns_the_phase(

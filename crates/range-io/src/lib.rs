@@ -1,6 +1,8 @@
 #![doc = include_str!("../README.md")]
 
 pub mod atomic;
+#[cfg(feature = "calibration")]
+pub mod calibration;
 mod error;
 
 #[cfg(feature = "npz")]
@@ -10,6 +12,6 @@ pub mod ron_text;
 #[cfg(feature = "survey")]
 pub mod survey;
 
-pub use error::{Error, Result};
 #[cfg(any(feature = "survey", feature = "calibration"))]
 pub(crate) use error::InvalidField;
+pub use error::{Error, Result};

@@ -36,3 +36,8 @@ pub use range_io;
 #[cfg(feature = "pipeline")]
 #[doc(inline)]
 pub use pipeline;
+
+// The example of the repository's README is compiled here.
+#[cfg(all(doctest, feature = "range-image"))]
+#[doc = include_str!("../../../README.md")]
+struct ReadmeOfTheRepository;

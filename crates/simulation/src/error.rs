@@ -48,5 +48,5 @@ pub enum Error {
     Image(#[from] range_image::Error),
 }
 
-/// Result with this crate's [`Error`].
+/// Result with this crate's [`Error`](enum@Error).
 pub type Result<T> = std::result::Result<T, Error>;

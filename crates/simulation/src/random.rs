@@ -3,7 +3,7 @@
 use rand::SeedableRng;
 use rand_pcg::Pcg64;
 
-/// Mixes a further number into a key (the finaliser of SplitMix64, a bijection of 64 bits).
+/// Mixes a further number into a key (the finaliser of `SplitMix64`, a bijection of 64 bits).
 pub(crate) fn mix(key: u64, number: u64) -> u64 {
     let mut z = key.rotate_left(17).wrapping_add(number).wrapping_add(0x9e37_79b9_7f4a_7c15);
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);

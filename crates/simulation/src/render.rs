@@ -105,7 +105,8 @@ impl Renderer<'_> {
     fn gather(&self, center: [f64; 2], seen: Option<&Hit>, light: &mut PixelLight) -> bool {
         light.clear();
         let source = Source { position: self.origin(), axis: self.world_from_camera * -Vector3::z() };
-        let (side, threshold_m) = self.mixed_pixels.map_or((1, f64::INFINITY), |m| (m.rays_per_pixel_side, m.threshold_m));
+        let (side, threshold_m) =
+            self.mixed_pixels.map_or((1, f64::INFINITY), |m| (m.rays_per_pixel_side, m.threshold_m));
         let share = self.lighting.vignetting(self.camera, center) / (side * side) as f64;
         let step = |index: usize| (index as f64 + 0.5) / side as f64 - 0.5;
         let mut mixed = false;
@@ -155,8 +156,9 @@ impl Renderer<'_> {
     fn image(&self, width: usize, height: usize, pixels: &[Pixel]) -> Result<Image> {
         let plane = |value: &dyn Fn(&Pixel) -> f32| pixels.iter().map(value).collect::<Vec<f32>>();
         let count = self.channels.len();
-        let amplitude = |i| Raster::from_vec(width, height, plane(&|p: &Pixel| p.signals[i].amplitude));
-        let wraps = |i| Raster::from_vec(width, height, pixels.iter().map(|p: &Pixel| p.signals[i].wraps).collect());
+        let amplitude = |i: usize| Raster::from_vec(width, height, plane(&|p: &Pixel| p.signals[i].amplitude));
+        let wraps =
+            |i: usize| Raster::from_vec(width, height, pixels.iter().map(|p: &Pixel| p.signals[i].wraps).collect());
         Ok(Image {
             channels: (0..count).map(|i| [plane(&|p| p.signals[i].real), plane(&|p| p.signals[i].imaginary)]).collect(),
             offset: plane(&|p| p.offset),

@@ -6,11 +6,11 @@ use rand_distr::{Distribution, StandardNormal};
 use range_image::{NoiseModel, PhaseSense, RawFrame, Samples};
 use rayon::prelude::*;
 
+use crate::Result;
 use crate::random::row_generator;
 use crate::render::Image;
 use crate::spec::SimulationSpec;
 use crate::spec::errors::SampleType;
-use crate::Result;
 
 /// Takes one frame of the image. Its noise depends on the seed, the frame and the place in the frame only.
 pub(crate) fn sample_frame(spec: &SimulationSpec, image: &Image, seed: u64, frame: usize) -> Result<RawFrame> {
@@ -92,8 +92,7 @@ impl<'a> Sampler<'a> {
         let mut generator = row_generator(self.seed, self.frame, index);
         for (col, sample) in samples.iter_mut().enumerate() {
             let pixel = row * self.width + col;
-            let modulated =
-                weights.real * f64::from(real[pixel]) + weights.imaginary * f64::from(imaginary[pixel]);
+            let modulated = weights.real * f64::from(real[pixel]) + weights.imaginary * f64::from(imaginary[pixel]);
             let clean = f64::from(self.image.offset[pixel]) + modulated;
             let noisy = self.noise.map_or(clean, |noise| {
                 let unit: f64 = StandardNormal.sample(&mut generator);

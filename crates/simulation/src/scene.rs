@@ -87,7 +87,10 @@ impl Object {
         let (shape, bound) = match &spec.shape {
             ShapeSpec::Room { min_m, max_m, face_albedo } => {
                 let (low, high) = (Point3::from(*min_m), Point3::from(*max_m));
-                (Shape::Room(Room { center: nalgebra::center(&low, &high), half: (high - low) / 2.0 }, *face_albedo), None)
+                (
+                    Shape::Room(Room { center: nalgebra::center(&low, &high), half: (high - low) / 2.0 }, *face_albedo),
+                    None,
+                )
             }
             ShapeSpec::Rectangle { corner_m, edge_u_m, edge_v_m } => {
                 let rectangle = Rectangle::new((*corner_m).into(), (*edge_u_m).into(), (*edge_v_m).into());
@@ -104,7 +107,9 @@ impl Object {
                 let bound = Some((center, half.norm_squared()));
                 (Shape::Cuboid(Cuboid { center, half, world_from_local }), bound)
             }
-            ShapeSpec::Mesh { vertices_m, triangles } => (Shape::Mesh(Box::new(Mesh::new(vertices_m, triangles)?)), None),
+            ShapeSpec::Mesh { vertices_m, triangles } => {
+                (Shape::Mesh(Box::new(Mesh::new(vertices_m, triangles)?)), None)
+            }
         };
         Ok(Self { shape, bound, albedo: spec.albedo, texture: spec.texture })
     }

@@ -1,5 +1,6 @@
 use std::sync::Arc;
 
+use camera_model::RayTable;
 use error_models::FixedPattern;
 use nalgebra::Point3;
 use range_image::RawFrame;
@@ -63,11 +64,7 @@ pub struct StationImage {
 ///
 /// # Errors
 /// What [`SimulationSpec::validate`] finds, or an observed range that the range errors do not determine.
-pub fn simulate(
-    spec: &SimulationSpec,
-    seed: u64,
-    progress: &(dyn Fn(usize, usize) + Sync),
-) -> Result<SimulatedSurvey> {
+pub fn simulate(spec: &SimulationSpec, seed: u64, progress: &(dyn Fn(usize, usize) + Sync)) -> Result<SimulatedSurvey> {
     let simulator = Simulator::new(spec)?;
     let total = spec.stations.len() * spec.exposure.frames_per_station;
     let mut frames = Vec::with_capacity(total);
@@ -92,15 +89,9 @@ impl Simulator {
     pub fn new(spec: &SimulationSpec) -> Result<Self> {
         spec.validate()?;
         let scene = Scene::new(&spec.scene)?;
-        for (index, station) in spec.stations.iter().enumerate() {
-            if let Some(object) = scene.solid_around(&Point3::from(station.position_m)) {
-                return Err(Error::Field {
-                    field: format!("stations[{index}].position_m"),
-                    value: format!("{:?} (inside scene.objects[{object}])", station.position_m),
-                    expected: "a place outside all solid objects",
-                });
-            }
-        }
+        require_free_stations(spec, &scene)?;
+        // Refuses a lens whose rays are not unique inside the image.
+        RayTable::new(&spec.camera.geometry)?;
         let format = spec.camera.geometry.format;
         Ok(Self {
             scene,
@@ -180,4 +171,17 @@ fn channels(spec: &SimulationSpec) -> Result<Vec<Channel>> {
         model: models.get(index).cloned(),
     };
     Ok(spec.camera.modulations()?.into_iter().enumerate().map(channel).collect())
+}
+
+fn require_free_stations(spec: &SimulationSpec, scene: &Scene) -> Result<()> {
+    for (index, station) in spec.stations.iter().enumerate() {
+        if let Some(object) = scene.solid_around(&Point3::from(station.position_m)) {
+            return Err(Error::Field {
+                field: format!("stations[{index}].position_m"),
+                value: format!("{:?} (inside scene.objects[{object}])", station.position_m),
+                expected: "a place outside all solid objects",
+            });
+        }
+    }
+    Ok(())
 }

@@ -5,6 +5,7 @@ mod motion;
 mod options;
 mod quality;
 mod selection;
+mod sensitivity;
 mod system;
 mod target;
 
@@ -19,7 +20,7 @@ use crate::error::{Error, Result};
 use crate::normals::{UnorganisedNormalOptions, unorganised_normals};
 use crate::pose::{is_finite, move_about};
 use matching::{Matcher, Pair};
-use quality::Quality;
+use quality::Verdict;
 use system::System;
 
 /// Source points that the coarse levels work with.
@@ -192,7 +193,7 @@ impl Run<'_> {
         let system = System::new(&self.matcher, pairs);
         let held = match self.matcher.options.degeneracy {
             DegeneracyPolicy::Report => Vec::new(),
-            DegeneracyPolicy::HoldAtGuess => Quality::new(&system, &self.pose, max_sigma_m)?.held,
+            DegeneracyPolicy::HoldAtGuess => Verdict::new(&system, &self.pose, max_sigma_m)?.held(),
         };
         let mut step = system.step(&held)?;
         // Pairs at most `limit` apart give no reason to move farther than a few times that.
@@ -227,19 +228,22 @@ impl Run<'_> {
     fn result(&self, limit: f64, stop: StopReason) -> Result<IcpResult> {
         let pairs = self.pairs(&self.selected, limit)?;
         let system = System::new(&self.matcher, &pairs);
-        let quality = Quality::new(&system, &self.pose, self.max_motion_sigma_m())?;
+        let verdict = Verdict::new(&system, &self.pose, self.max_motion_sigma_m())?;
+        let sample = selection::thinned(&self.selected, COARSE_POINTS);
+        let step = (0.5 * system.rms_m()).max(0.01 * limit);
+        let response = sensitivity::sensitivity(&system, &self.pose, &sample, limit, step)?;
         let all: Vec<usize> = selection::thinned(&(0..self.matcher.source.len()).collect::<Vec<_>>(), 20_000);
         let partners = self.matcher.pairs(&self.pose, &all, limit)?.len();
         Ok(IcpResult {
             target_from_source: self.pose,
-            covariance: quality.covariance,
+            covariance: verdict.covariance(&system, &self.pose, &response),
             overlap: partners as f64 / all.len() as f64,
             rms_m: system.rms_m(),
             iterations: self.iterations,
             stop,
             correspondences: pairs.len(),
             max_correspondence_distance_m: limit,
-            degenerate: quality.undetermined,
+            degenerate: verdict.undetermined(&system),
         })
     }
 }

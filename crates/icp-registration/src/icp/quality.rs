@@ -9,7 +9,7 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::{Isometry3, Matrix6, Vector6};
+use nalgebra::{DMatrix, DVector, Isometry3, Matrix6, Vector6};
 
 use super::motion::{UndeterminedMotion, name_motions};
 use super::system::System;
@@ -23,17 +23,12 @@ const CELLS_PER_RADIUS: f64 = 8.0;
 const SIGNIFICANCE: f64 = 2.5;
 /// Cells below which their scatter is no estimate.
 const FEWEST_CELLS: usize = 20;
+/// Response over information outside which the differences are noise (matching can only weaken the response, to about
+/// a half).
+const SMALLEST_RESPONSE: f64 = 0.25;
+const LARGEST_RESPONSE: f64 = 2.0;
 /// Share of the largest information that rounding can imitate.
 const ROUNDING: f64 = 1e-9;
-
-/// Quality of a pose.
-pub(crate) struct Quality {
-    /// Tangent `[dt target axes, dtheta source axes]`.
-    pub covariance: Matrix6<f64>,
-    pub undetermined: Vec<UndeterminedMotion>,
-    /// Orthonormal undetermined motions `[dt, rho w]`.
-    pub held: Vec<Vector6<f64>>,
-}
 
 /// What one cell of space contributes.
 #[derive(Default)]
@@ -51,26 +46,70 @@ struct Direction {
     determined: bool,
 }
 
-impl Quality {
+/// Directions of the information, worst first, with the covariance of the score and the frame they are in.
+pub(crate) struct Verdict {
+    directions: Vec<Direction>,
+    score: Matrix6<f64>,
+}
+
+impl Verdict {
     /// Judges the pairs of `system` at `pose`; motions with a predicted sigma above `max_sigma_m` are undetermined.
     pub(crate) fn new(system: &System<'_>, pose: &Isometry3<f64>, max_sigma_m: f64) -> Result<Self> {
         let cells = cells(system, pose);
         let information = cells.iter().fold(Matrix6::zeros(), |sum, c| sum + c.information);
         let (values, vectors) = eigen6(&symmetrised(&information), "the information of the pairs")?;
         let score = score_covariance(system, &cells);
-        let directions: Vec<Direction> = (0..6)
+        let directions = (0..6)
             .map(|k| direction(&cells, &score, values[5], values[k], vectors.column(k).into(), max_sigma_m))
             .collect();
-        let space: Vec<(Vector6<f64>, f64)> =
-            directions.iter().filter(|d| !d.determined).map(|d| (d.vector, d.sigma_m)).collect();
-        let centred = centred_covariance(&directions, &score, system.radius_m);
-        let to_tangent = tangent_from_centred(pose, &system.centre, system.radius_m);
-        Ok(Self {
-            covariance: symmetrised(&(to_tangent * centred * to_tangent.transpose())),
-            undetermined: name_motions(&space, &system.centre, system.radius_m),
-            held: space.into_iter().map(|(v, _)| v).collect(),
-        })
+        Ok(Self { directions, score })
     }
+
+    /// Orthonormal undetermined motions `[dt, rho w]`.
+    pub(crate) fn held(&self) -> Vec<Vector6<f64>> {
+        self.directions.iter().filter(|d| !d.determined).map(|d| d.vector).collect()
+    }
+
+    /// The undetermined motions, sorted into translations and rotations.
+    pub(crate) fn undetermined(&self, system: &System<'_>) -> Vec<UndeterminedMotion> {
+        let space: Vec<(Vector6<f64>, f64)> =
+            self.directions.iter().filter(|d| !d.determined).map(|d| (d.vector, d.sigma_m)).collect();
+        name_motions(&space, &system.centre, system.radius_m)
+    }
+
+    /// Covariance in the tangent `[dt target axes, dtheta source axes]`: the sandwich `A⁻¹ M A⁻ᵀ` with the response A of
+    /// the score. What is not known at all gets the radius of the pairs as sigma.
+    pub(crate) fn covariance(
+        &self,
+        system: &System<'_>,
+        pose: &Isometry3<f64>,
+        response: &Matrix6<f64>,
+    ) -> Matrix6<f64> {
+        let (known, unknown): (Vec<&Direction>, Vec<&Direction>) =
+            self.directions.iter().partition(|d| d.sigma_m.is_finite());
+        let basis = DMatrix::from_fn(6, known.len(), |r, c| known[c].vector[r]);
+        let inverse = inverse_response(&known, &basis, response);
+        let score = basis.transpose() * self.score * &basis;
+        let inside = &basis * (&inverse * score * inverse.transpose()) * basis.transpose();
+        let mut centred = Matrix6::from_fn(|r, c| inside[(r, c)]);
+        for direction in unknown {
+            centred += direction.vector * direction.vector.transpose() * system.radius_m.powi(2);
+        }
+        let to_tangent = tangent_from_centred(pose, &system.centre, system.radius_m);
+        symmetrised(&(to_tangent * centred * to_tangent.transpose()))
+    }
+}
+
+/// Inverse of the response among the known directions; that of their information where the differences drown in noise.
+fn inverse_response(known: &[&Direction], basis: &DMatrix<f64>, response: &Matrix6<f64>) -> DMatrix<f64> {
+    let reduced = basis.transpose() * response * basis;
+    let plausible = known.iter().enumerate().all(|(k, d)| {
+        let ratio = reduced[(k, k)] / d.information;
+        (SMALLEST_RESPONSE..LARGEST_RESPONSE).contains(&ratio)
+    });
+    let from_information =
+        || DMatrix::from_diagonal(&DVector::from_iterator(known.len(), known.iter().map(|d| 1.0 / d.information)));
+    if plausible { reduced.try_inverse().unwrap_or_else(from_information) } else { from_information() }
 }
 
 fn direction(
@@ -86,22 +125,6 @@ fn direction(
     let sigma_m =
         if significant { vector.dot(&(score * vector)).max(0.0).sqrt() / information } else { f64::INFINITY };
     Direction { vector, information, sigma_m, determined: sigma_m <= max_sigma_m }
-}
-
-/// Sandwich `A⁻¹ M A⁻¹` in motions about the centroid. What is not known at all gets the radius of the pairs as sigma.
-fn centred_covariance(directions: &[Direction], score: &Matrix6<f64>, radius_m: f64) -> Matrix6<f64> {
-    let mut covariance = Matrix6::zeros();
-    for a in directions {
-        if a.sigma_m.is_infinite() {
-            covariance += a.vector * a.vector.transpose() * (radius_m * radius_m);
-            continue;
-        }
-        for b in directions.iter().filter(|b| b.sigma_m.is_finite()) {
-            let shared = a.vector.dot(&(score * b.vector)) / (a.information * b.information);
-            covariance += a.vector * b.vector.transpose() * shared;
-        }
-    }
-    covariance
 }
 
 /// Covariance of the summed score.
@@ -160,3 +183,4 @@ fn pair_information(system: &System<'_>, pose: &Isometry3<f64>, i: usize) -> Mat
     let (a, b) = (system.row(pair, &along_target).jacobian, system.row(pair, &along_source).jacobian);
     (a * b.transpose() + b * a.transpose()) * 0.5
 }
+

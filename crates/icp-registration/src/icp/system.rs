@@ -55,6 +55,13 @@ impl<'a> System<'a> {
         system
     }
 
+    /// The same frame and scale with other pairs: what the score would be had the pose been a little different.
+    pub(crate) fn with_pairs(&self, pairs: &'a [Pair]) -> Self {
+        let sigma = pair_sigma(self.matcher, pairs);
+        let (centre, radius_m, scale) = (self.centre, self.radius_m, self.scale);
+        Self { matcher: self.matcher, pairs, centre, radius_m, scale, sigma }
+    }
+
     /// Length that the kernel looks at.
     fn residual_length(&self, pair: &Pair) -> f64 {
         match self.matcher.options.metric {

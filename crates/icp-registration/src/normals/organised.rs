@@ -9,19 +9,21 @@ use crate::error::{Error, Result};
 /// How the neighbourhood of a pixel is chosen.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OrganisedNormalOptions {
-    /// Half width of the window: `2 h + 1` pixels squared. Default 3.
+    /// Half width of the window: `2 h + 1` pixels squared. Default 2.
     pub half_width_px: usize,
     /// A neighbour belongs to the surface while its range differs from the centre's by at most this fraction of the
     /// centre's range for each pixel between them. Default 0.03: with pixels of 0.25 degree a surface seen under 8
     /// degrees passes, a step of 9 cm at 3 m beside the pixel does not.
     pub max_relative_jump: f64,
-    /// Fewest points (with the centre) that a normal is taken from. Default 8.
-    pub min_neighbours: usize,
+    /// Smallest fraction of the window that must lie on the surface. Default 0.9. Points at edges, corners of the frame
+    /// and holes thus get no normal: planes fitted to one-sided windows there lean, and pairs with partners beyond the
+    /// edge of what was seen pull a registration aside by a millimetre.
+    pub min_fill: f64,
 }
 
 impl Default for OrganisedNormalOptions {
     fn default() -> Self {
-        Self { half_width_px: 3, max_relative_jump: 0.03, min_neighbours: 8 }
+        Self { half_width_px: 2, max_relative_jump: 0.03, min_fill: 0.9 }
     }
 }
 
@@ -29,8 +31,8 @@ impl Default for OrganisedNormalOptions {
 ///
 /// `points`: `width · height` points in the camera frame (perspective centre at the origin), row by row, metre, NaN
 /// where there is no range. A plane is fitted to the pixels of the window that lie on the same surface as its centre:
-/// windows do not reach over a jump of the range. No normal is given where fewer than `min_neighbours` remain, or where
-/// they form a line or a blob.
+/// windows do not reach over a jump of the range. No normal is given where less than `min_fill` of the window
+/// remains, or where its points form a line or a blob.
 ///
 /// # Errors
 /// [`Error::LengthMismatch`] where the points do not fill the frame, [`Error::InvalidOption`].
@@ -48,11 +50,17 @@ pub fn organised_normals(
         let value = options.max_relative_jump;
         return Err(Error::InvalidOption { name: "max_relative_jump", value, domain: "positive" });
     }
-    if options.half_width_px == 0 {
-        return Err(Error::InvalidOption { name: "half_width_px", value: 0.0, domain: "1 or more" });
+    if !(1..=100).contains(&options.half_width_px) {
+        let value = options.half_width_px as f64;
+        return Err(Error::InvalidOption { name: "half_width_px", value, domain: "1 to 100" });
+    }
+    if !(options.min_fill >= 0.0 && options.min_fill <= 1.0) {
+        return Err(Error::InvalidOption { name: "min_fill", value: options.min_fill, domain: "0 to 1" });
     }
     let ranges: Vec<f64> = points.iter().map(|p| Vector3::from(*p).norm()).collect();
-    let frame = Frame { points, ranges: &ranges, width, height, options };
+    let window = (2 * options.half_width_px + 1).pow(2) as f64;
+    let min_count = (options.min_fill * window).ceil() as usize;
+    let frame = Frame { points, ranges: &ranges, width, height, options, min_count };
     let mut normals = vec![no_normal(); expected];
     normals.par_chunks_mut(width.max(1)).enumerate().for_each(|(row, line)| {
         for (col, normal) in line.iter_mut().enumerate() {
@@ -68,6 +76,7 @@ struct Frame<'a> {
     width: usize,
     height: usize,
     options: &'a OrganisedNormalOptions,
+    min_count: usize,
 }
 
 impl Frame<'_> {
@@ -93,7 +102,7 @@ impl Frame<'_> {
                 }
             }
         }
-        let normal = neighbourhood.normal(self.options.min_neighbours)?;
+        let normal = neighbourhood.normal(self.min_count)?;
         Some(facing(normal, &-centre))
     }
 }

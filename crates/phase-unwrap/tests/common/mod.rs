@@ -22,14 +22,23 @@ type Vec3 = [f64; 3];
 #[derive(Clone, Copy)]
 enum Shape {
     /// Axis-aligned box seen from outside.
-    Block { low: Vec3, high: Vec3 },
-    Sphere { centre: Vec3, radius: f64 },
+    Block {
+        low: Vec3,
+        high: Vec3,
+    },
+    Sphere {
+        centre: Vec3,
+        radius: f64,
+    },
 }
 
 #[derive(Clone, Copy)]
 enum Albedo {
     /// Patches of `cell` metres with values 0.3 to 0.9.
-    Patches { cell: f64, seed: u64 },
+    Patches {
+        cell: f64,
+        seed: u64,
+    },
     Plain(f64),
 }
 
@@ -119,20 +128,20 @@ impl Shape {
 }
 
 impl Scene {
-    /// A room of 7 x 9 x 3 m (x, z, y) with furniture on the floor and near objects before the camera, some of them
+    /// A room of 6 x 8.5 x 3 m (x, z, y) with furniture on the floor and near objects before the camera, some of them
     /// retro-reflective. Everything follows from the seed.
     pub fn random(seed: u64) -> Self {
         let mut rng = Pcg64::seed_from_u64(seed);
-        let room = [7.0, 3.0, 9.0];
+        let room = [6.0, 3.0, 8.5];
         let mut between = |low: f64, high: f64| low + (high - low) * rng.random::<f64>();
         // From a place near a wall across the room, so that walls lie at 2 to 9 m.
-        let position = [between(1.0, 6.0), between(1.2, 1.8), between(7.6, 8.6)];
+        let position = [between(1.0, 5.0), between(1.2, 1.8), between(7.2, 8.2)];
         let yaw = between(-0.45, 0.45);
         let pitch = between(-0.25, 0.05);
         let wall = Albedo::Patches { cell: between(0.4, 1.5), seed: seed.wrapping_mul(77) };
         let mut objects = Vec::new();
         for n in 0..6 {
-            let low = [between(0.0, 6.0), 0.0, between(0.3, 5.5)];
+            let low = [between(0.0, 5.0), 0.0, between(0.3, 5.5)];
             let high = [low[0] + between(0.3, 1.2), between(0.4, 1.6), low[2] + between(0.3, 1.0)];
             objects.push((Shape::Block { low, high }, Albedo::Patches { cell: 0.7, seed: seed * 31 + n }));
         }

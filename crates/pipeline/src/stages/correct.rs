@@ -16,11 +16,14 @@ pub(super) fn run(work: &mut Work, progress: &dyn Progress) -> Result<Findings> 
     let mut outside = 0_usize;
     for (index, view) in work.outcome.views.iter_mut().enumerate() {
         let name = view.name();
-        let models = match view.integration_time_s {
-            Some(time) => models.select(time),
-            None => models.single(),
+        let models = match (view.integration_time_s, models.entries.as_slice()) {
+            (Some(time), _) => models.select(time).map_err(Error::stage("CorrectRange", &name))?,
+            (None, [(_, models)]) => models,
+            (None, _) => {
+                let message = "the survey states no integration time, which the calibration's models are chosen by";
+                return Err(Error::stage("CorrectRange", &name)(message));
+            }
         };
-        let models = models.map_err(Error::stage("CorrectRange", &name))?;
         for (frame, model) in frames_with_models(view, models)? {
             let summary = correct_frame(
                 frame,

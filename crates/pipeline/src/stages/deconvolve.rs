@@ -29,7 +29,7 @@ pub(super) fn run(work: &mut Work, options: &DeconvolveOptions, progress: &dyn P
         }
         if let Some((_, _, restorer)) = &mut restorer {
             for channel in &mut frame.channels {
-                restorer.restore(channel).map_err(Error::stage("Deconvolve", &name))?;
+                restorer.restore_flagged(channel, &frame.flags).map_err(Error::stage("Deconvolve", &name))?;
             }
         }
         progress.advance(index + 1);

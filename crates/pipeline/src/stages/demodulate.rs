@@ -30,10 +30,14 @@ fn demodulation_options(work: &Work, options: &DemodulateOptions) -> Demodulatio
         shot_variance_per_unit: noise.shot_variance_per_unit,
         dark_sigma: noise.dark_sigma,
     });
+    let camera = &work.outcome.survey.camera;
     let calibrated = work.calibration.as_ref().and_then(|calibration| calibration.noise);
     DemodulationOptions {
         noise: stated.or(calibrated).unwrap_or_default(),
         low_amplitude: options.low_amplitude,
-        ..work.survey.demodulation_options()
+        phase_sense: camera.phase_sense,
+        phase_offset_rad: camera.phase_offset_rad,
+        raw_scale: camera.raw_scale,
+        saturation: camera.saturation,
     }
 }

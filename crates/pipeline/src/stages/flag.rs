@@ -1,4 +1,5 @@
-use error_models::{GrossErrorOptions, flag_gross_errors};
+use error_models::{GrossErrorOptions, MixedPixelOptions, flag_gross_errors};
+use range_image::Flags;
 
 use super::Findings;
 use crate::plan::FlagOptions;
@@ -9,11 +10,13 @@ use crate::{Error, Result};
 
 /// Gross errors get a flag with their reason; no value is changed.
 pub(super) fn run(work: &mut Work, options: &FlagOptions, progress: &dyn Progress) -> Result<Findings> {
-    let options = GrossErrorOptions {
-        low_amplitude: options.low_amplitude,
-        maximum_sigma_m: options.maximum_sigma_m,
-        ..GrossErrorOptions::default()
+    let maximum_sigma_m = options.maximum_sigma_m.unwrap_or(f64::INFINITY);
+    let mixed_pixels = MixedPixelOptions {
+        sigmas: options.mixed_pixels.sigmas,
+        floor_m: options.mixed_pixels.floor_m,
+        ..MixedPixelOptions::default()
     };
+    let options = GrossErrorOptions { mixed_pixels: Some(mixed_pixels), low_amplitude: options.low_amplitude };
     let mut mixed = 0_usize;
     for (index, view) in work.outcome.views.iter_mut().enumerate() {
         let name = view.name();
@@ -22,6 +25,11 @@ pub(super) fn run(work: &mut Work, options: &FlagOptions, progress: &dyn Progres
         };
         let counts = flag_gross_errors(frame, &options).map_err(Error::stage("Flag", &name))?;
         mixed += counts.mixed_pixel;
+        for (sigma, flags) in frame.sigma.as_slice().iter().zip(frame.flags.as_mut_slice()) {
+            if f64::from(*sigma) > maximum_sigma_m {
+                flags.insert(Flags::LOW_AMPLITUDE);
+            }
+        }
         if let Some(cloud) = work.outcome.clouds.get_mut(index) {
             cloud.flags.copy_from_slice(frame.flags.as_slice());
         }

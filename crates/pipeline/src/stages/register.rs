@@ -21,7 +21,7 @@ pub(super) fn run(work: &mut Work, options: &RegisterOptions, progress: &dyn Pro
         let guess = approximate[target].inverse() * approximate[source];
         // A pair that can't be aligned is no failure of the survey as long as others connect its stations.
         match targets[target].align(targets[source].cloud(), &guess, &icp) {
-            Ok(result) if result.is_reliable() => pairs.push(AlignedPair { target, source, result }),
+            Ok(result) if result.is_trustworthy() => pairs.push(AlignedPair { target, source, result }),
             Ok(_) | Err(_) => refused += 1,
         }
         progress.advance(done + 1);
@@ -41,7 +41,8 @@ fn station_clouds(work: &Work) -> Result<Vec<IcpTarget>> {
         return Err(Error::Needs { stage: "Register", needs: "PointCloud" });
     }
     let prepared = clouds.map(|(cloud, view)| {
-        let fail = || Error::stage::<icp_registration::Error>("Register", &view.name());
+        let name = view.name();
+        let fail = || Error::stage::<icp_registration::Error>("Register", &name);
         let mut points = cloud.points.clone();
         for (point, flags) in points.iter_mut().zip(&cloud.flags) {
             if !flags.is_empty() {

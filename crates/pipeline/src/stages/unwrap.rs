@@ -4,6 +4,7 @@ use range_image::{ComplexChannel, ComplexFrame, Flags, RangeFrame, Raster};
 use super::Findings;
 use crate::plan::UnwrapOptions;
 use crate::progress::Progress;
+use crate::statistics::median;
 use crate::view::{View, ViewData};
 use crate::work::Work;
 use crate::{Error, Result};
@@ -42,8 +43,10 @@ fn wrap_counts(frame: &ComplexFrame, options: &UnwrapOptions, name: &str) -> Res
     let mask = frame.flags.map(|flags| !flags.contains(Flags::NO_DATA));
     if let [channel] = frame.channels.as_slice() {
         let interval = channel.modulation.ambiguity_interval_m();
-        let maximum_wraps = (options.maximum_range_m / interval).floor().max(0.0) as u32;
-        let spatial = SpatialOptions { maximum_wraps, ..SpatialOptions::default() };
+        let maximum_wraps = (options.maximum_range_m / interval).floor().max(0.0) as u16;
+        let mut sigmas: Vec<f64> = channel.sigma.as_slice().iter().map(|sigma| f64::from(*sigma)).collect();
+        let noise = Some(median(&mut sigmas) as f32).filter(|noise| noise.is_finite());
+        let spatial = SpatialOptions { maximum_wraps, amplitude_noise: noise, ..SpatialOptions::default() };
         let unwrapped = unwrap_spatial(&channel.phase(), Some(&channel.amplitude()), Some(&mask), &spatial);
         let unwrapped = unwrapped.map_err(Error::stage("Unwrap", name))?;
         return Ok((vec![unwrapped.wraps], unwrapped.confidence));

@@ -23,8 +23,7 @@ pub enum DataType {
 }
 
 impl DataType {
-    const ALL: [Self; 8] =
-        [Self::F32, Self::F64, Self::U8, Self::U16, Self::I16, Self::I32, Self::I64, Self::Bool];
+    const ALL: [Self; 8] = [Self::F32, Self::F64, Self::U8, Self::U16, Self::I16, Self::I32, Self::I64, Self::Bool];
 
     /// The type as numpy writes it, such as `<f4`.
     pub fn name(self) -> &'static str {
@@ -75,23 +74,23 @@ impl ArrayHeader {
         self.elements()?.checked_mul(self.data_type.size())
     }
 
-    /// Reads the header up to the first byte of the data; the error says what was expected.
-    pub(super) fn read(reader: &mut impl Read) -> Result<Self, String> {
+    /// Reads the header up to the first byte of the data, and counts its bytes; the error says what was expected.
+    pub(super) fn read(reader: &mut impl Read) -> Result<(Self, usize), String> {
         let mut start = [0_u8; 8];
         read_exact(reader, &mut start)?;
         if start[..6] != *MAGIC {
             return Err("does not begin as an .npy file does".into());
         }
-        let length = match start[6] {
+        let (length, prefix) = match start[6] {
             1 => {
                 let mut bytes = [0_u8; 2];
                 read_exact(reader, &mut bytes)?;
-                usize::from(u16::from_le_bytes(bytes))
+                (usize::from(u16::from_le_bytes(bytes)), 10)
             }
             2 | 3 => {
                 let mut bytes = [0_u8; 4];
                 read_exact(reader, &mut bytes)?;
-                u32::from_le_bytes(bytes) as usize
+                (u32::from_le_bytes(bytes) as usize, 12)
             }
             other => return Err(format!("is of .npy version {other}, expected 1, 2 or 3")),
         };
@@ -101,17 +100,17 @@ impl ArrayHeader {
         let mut text = vec![0_u8; length];
         read_exact(reader, &mut text)?;
         let text = std::str::from_utf8(&text).map_err(|_| "has a header that is no text".to_owned())?;
-        Dictionary::new(text).header().map_err(|reason| format!("has a header that is not understood: {reason}"))
+        let header = Dictionary::new(text).header();
+        let header = header.map_err(|reason| format!("has a header that is not understood: {reason}"))?;
+        Ok((header, prefix + length))
     }
 
     /// The header as numpy writes it: version 1, the data aligned to 64 bytes.
     pub(super) fn to_bytes(&self) -> Vec<u8> {
-        let mut shape = String::new();
-        for n in &self.shape {
-            shape += &format!("{n}, ");
-        }
+        let axes: Vec<_> = self.shape.iter().map(usize::to_string).collect();
         // Python writes a tuple of one with a trailing comma and longer ones without.
-        let shape = if self.shape.len() == 1 { shape.trim_end() } else { shape.trim_end_matches(", ") };
+        let comma = if axes.len() == 1 { "," } else { "" };
+        let shape = axes.join(", ") + comma;
         let descr = self.data_type.name();
         let mut text = format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': ({shape}), }}");
         let unpadded = MAGIC.len() + 4 + text.len() + 1;
@@ -158,10 +157,7 @@ impl<'a> Dictionary<'a> {
             }
         }
         c_order.ok_or("`fortran_order` is missing")?;
-        Ok(ArrayHeader {
-            data_type: data_type.ok_or("`descr` is missing")?,
-            shape: shape.ok_or("`shape` is missing")?,
-        })
+        Ok(ArrayHeader { data_type: data_type.ok_or("`descr` is missing")?, shape: shape.ok_or("`shape` is missing")? })
     }
 
     fn data_type(&mut self) -> Result<DataType, String> {

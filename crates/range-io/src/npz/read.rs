@@ -54,7 +54,8 @@ impl<R: Read + Seek> NpzReader<R> {
             return Err(self.missing(array));
         };
         let source = Source { file: &self.file, array };
-        let mut member = self.archive.by_index(index).map_err(|error| source.error(format!("cannot be read: {error}")))?;
+        let mut member =
+            self.archive.by_index(index).map_err(|error| source.error(format!("cannot be read: {error}")))?;
         let bound = member.size().min(member.compressed_size().saturating_mul(LARGEST_EXPANSION));
         source.read(&mut member, bound, accept)
     }
@@ -67,11 +68,7 @@ impl<R: Read + Seek> NpzReader<R> {
 }
 
 /// Reads a bare `.npy` file; `array` names it in messages, `accept` as in [`NpzReader::read`].
-pub fn read_npy(
-    path: impl AsRef<Path>,
-    array: &str,
-    accept: impl FnOnce(&ArrayHeader) -> Result<()>,
-) -> Result<Array> {
+pub fn read_npy(path: impl AsRef<Path>, array: &str, accept: impl FnOnce(&ArrayHeader) -> Result<()>) -> Result<Array> {
     let path = path.as_ref();
     let file = File::open(path).map_err(Error::io(path, "open"))?;
     let length = file.metadata().map_err(Error::io(path, "find the size of"))?.len();
@@ -96,12 +93,15 @@ impl Source<'_> {
         bound: u64,
         accept: impl FnOnce(&ArrayHeader) -> Result<()>,
     ) -> Result<Array> {
-        let header = ArrayHeader::read(reader).map_err(|reason| self.error(reason))?;
+        let (header, header_bytes) = ArrayHeader::read(reader).map_err(|reason| self.error(reason))?;
+        let bound = bound.saturating_sub(header_bytes as u64);
         match header.bytes() {
             Some(bytes) if bytes as u64 <= bound => {}
             _ => {
                 let shape = &header.shape;
-                return Err(self.error(format!("promises shape {shape:?}, but the file holds at most {bound} bytes of it")));
+                return Err(
+                    self.error(format!("promises shape {shape:?}, but the file holds at most {bound} bytes of it"))
+                );
             }
         }
         accept(&header)?;

@@ -1,29 +1,47 @@
 //! Where in a RON text a field stands, and which field stands at a place.
 
-/// Path of the field whose value begins last at or before a place, such as `camera.modulation_hz[1]`.
-pub(super) fn field_at(text: &str, line: usize, column: usize) -> String {
-    let before = values(text).into_iter().rfind(|value| value.place <= (line, column));
-    before.map(|value| value.path).unwrap_or_default()
+/// Place and path of the field that a parser was at between two places: the value that begins there (behind blanks), or
+/// the last one before.
+pub(super) fn field_between(text: &str, start: Place, end: Place) -> (Place, String) {
+    let values = values(text);
+    if let Some(value) = values.iter().find(|value| (start..=end).contains(&value.start)) {
+        return (value.start, value.path.clone());
+    }
+    let before = values.iter().rfind(|value| value.start < start);
+    (start, before.map(|value| value.path.clone()).unwrap_or_default())
+}
+
+/// Path of a field of the innermost group around a place, whether it is there or not.
+pub(super) fn field_of_group(text: &str, place: Place, field: &str) -> String {
+    let around = |value: &&Value| value.end.is_some_and(|end| (value.start..=end).contains(&place));
+    let values = values(text);
+    let group = values.iter().rfind(around).map(|value| value.path.as_str()).unwrap_or_default();
+    if group.is_empty() { field.to_owned() } else { format!("{group}.{field}") }
 }
 
 /// Line and column of a field's value; of the longest part of its path that there is, if it is missing.
-pub(super) fn place_of(text: &str, path: &str) -> (usize, usize) {
+pub(super) fn place_of(text: &str, path: &str) -> Place {
     let values = values(text);
     let mut path = path;
     loop {
         if let Some(value) = values.iter().find(|value| value.path == path) {
-            return value.place;
+            return value.start;
         }
         match path.rfind(['.', '[']) {
             Some(end) => path = &path[..end],
-            None => return values.first().map_or((1, 1), |value| value.place),
+            None => return values.first().map_or((1, 1), |value| value.start),
         }
     }
 }
 
+/// Line and column, from 1.
+pub(super) type Place = (usize, usize);
+
 struct Value {
     path: String,
-    place: (usize, usize),
+    start: Place,
+    /// Place of the closing bracket; `None` for what is no group, or not closed.
+    end: Option<Place>,
 }
 
 /// An open bracket.
@@ -31,6 +49,8 @@ struct Group {
     path: String,
     index: usize,
     key: Option<String>,
+    /// Position of its value in the list of all.
+    value: Option<usize>,
     /// `Some(` adds nothing to the path.
     transparent: bool,
 }
@@ -48,7 +68,7 @@ impl Group {
 
 struct Cursor<'a> {
     characters: std::iter::Peekable<std::str::Chars<'a>>,
-    place: (usize, usize),
+    place: Place,
 }
 
 impl Cursor<'_> {
@@ -115,7 +135,7 @@ impl Cursor<'_> {
 fn values(text: &str) -> Vec<Value> {
     let mut cursor = Cursor { characters: text.chars().peekable(), place: (1, 1) };
     let mut values = Vec::new();
-    let mut groups = vec![Group { path: String::new(), index: 0, key: None, transparent: true }];
+    let mut groups = vec![Group { path: String::new(), index: 0, key: None, value: None, transparent: true }];
     // The word before a bracket: the name of a variant or structure, whose value has been noted already.
     let mut name: Option<String> = None;
     loop {
@@ -130,12 +150,14 @@ fn values(text: &str) -> Vec<Value> {
                 let path = group.path_of_value();
                 let transparent = name.as_deref() == Some("Some") || (character == '(' && path.is_empty());
                 if name.is_none() {
-                    values.push(Value { path: path.clone(), place });
+                    values.push(Value { path: path.clone(), start: place, end: None });
                 }
-                groups.push(Group { path, index: 0, key: None, transparent });
+                groups.push(Group { path, index: 0, key: None, value: values.len().checked_sub(1), transparent });
             }
             ')' | ']' | '}' => {
-                groups.pop();
+                if let Some(value) = groups.pop().and_then(|group| values.get_mut(group.value?)) {
+                    value.end = Some(place);
+                }
             }
             ',' => {
                 group.index += 1;
@@ -147,7 +169,7 @@ fn values(text: &str) -> Vec<Value> {
                 if cursor.is_key() {
                     group.key = Some(word);
                 } else {
-                    values.push(Value { path: group.path_of_value(), place });
+                    values.push(Value { path: group.path_of_value(), start: place, end: None });
                     name = Some(word);
                     continue;
                 }
@@ -177,9 +199,14 @@ mod tests {
 
     #[test]
     fn places_tell_their_fields() {
-        assert_eq!(field_at(TEXT, 3, 6), "a");
-        assert_eq!(field_at(TEXT, 7, 7), "list[1].c[1]");
-        assert_eq!(field_at(TEXT, 6, 13), "list[0].c[1]");
-        assert_eq!(field_at(TEXT, 1, 1), "");
+        let field_at = |place| field_between(TEXT, place, place).1;
+        assert_eq!(field_at((3, 6)), "a");
+        assert_eq!(field_at((7, 7)), "list[1].c[1]");
+        assert_eq!(field_at((6, 13)), "list[0].c[1]");
+        assert_eq!(field_at((1, 1)), "");
+        // The blanks before a value belong to it.
+        assert_eq!(field_between(TEXT, (3, 5), (3, 6)), ((3, 6), "a".into()));
+        assert_eq!(field_of_group(TEXT, (6, 15), "d"), "list[0].d");
+        assert_eq!(field_of_group(TEXT, (9, 1), "d"), "d");
     }
 }

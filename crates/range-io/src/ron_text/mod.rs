@@ -27,8 +27,15 @@ pub fn read<T: DeserializeOwned>(path: impl AsRef<Path>) -> Result<T> {
 /// Reads RON text into a value; `file` stands for it in messages.
 pub fn parse<T: DeserializeOwned>(file: &Path, text: &str) -> Result<T> {
     options().from_str(text).map_err(|error| {
-        let (line, column) = (error.span.start.line, error.span.start.col);
-        let field = locate::field_at(text, line, column);
+        let start = (error.span.start.line, error.span.start.col);
+        let end = (error.span.end.line, error.span.end.col);
+        let ((line, column), field) = match &error.code {
+            ron::Error::NoSuchStructField { found, .. } => (start, locate::field_of_group(text, start, found)),
+            ron::Error::MissingStructField { field, .. } | ron::Error::DuplicateStructField { field, .. } => {
+                (start, locate::field_of_group(text, start, field))
+            }
+            _ => locate::field_between(text, start, end),
+        };
         Error::Text { file: file.to_path_buf(), line, column, field, reason: error.code.to_string() }
     })
 }

@@ -61,7 +61,13 @@ impl<R: Read + Seek> ArrayFile<R> {
     }
 
     /// A plane `[H, W]` in single precision; at least one pixel must be finite.
-    pub fn plane(&mut self, file: &Path, name: &'static str, types: &[DataType], size: [usize; 2]) -> Result<Raster<f32>> {
+    pub fn plane(
+        &mut self,
+        file: &Path,
+        name: &'static str,
+        types: &[DataType],
+        size: [usize; 2],
+    ) -> Result<Raster<f32>> {
         let [width, height] = size;
         let expected = Expected { name, types, axes: "H W", shape: &[height, width] };
         let values = self.array(file, &expected)?.values;

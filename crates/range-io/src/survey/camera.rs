@@ -1,5 +1,5 @@
 use camera_model::{Camera, InteriorOrientation, LensDistortion};
-use range_image::{ImageFormat, Modulation};
+use range_image::{ImageFormat, Modulation, PhaseSense};
 use serde::{Deserialize, Serialize};
 
 use crate::{Error, Result};
@@ -25,7 +25,7 @@ pub struct SurveyCamera {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub phase_steps: Option<usize>,
     /// Sense of the camera's phase, `Positive` where it grows with range.
-    #[serde(default)]
+    #[serde(default, with = "PhaseSenseInFile")]
     pub phase_sense: PhaseSense,
     /// Added to the phase after its sense is applied.
     #[serde(default)]
@@ -38,13 +38,13 @@ pub struct SurveyCamera {
     pub raw_scale: f64,
 }
 
-/// Sense in which a camera's phase runs.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-pub enum PhaseSense {
-    /// The phase grows with range.
-    #[default]
+/// The sense in files, in either case of its first letter.
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "PhaseSense")]
+enum PhaseSenseInFile {
+    #[serde(alias = "positive")]
     Positive,
-    /// The phase falls with range.
+    #[serde(alias = "negative")]
     Negative,
 }
 

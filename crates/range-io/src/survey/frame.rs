@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
-use range_image::{ComplexFrame, Flags, Modulation, PhaseConvention, Raster, RawFrame, Samples};
+use range_image::{ComplexFrame, PhaseConvention, Raster, RawFrame, Samples};
 
 use super::arrays::{ArrayFile, COUNT, Expected, REAL, array_error, raster, require_finite};
 use super::{Level, StoredDepth, Survey, SurveyCamera};
@@ -141,8 +141,7 @@ fn read_phase<R: std::io::Read + std::io::Seek>(
     phase.iter().try_for_each(|plane| require_wrapped(file, plane))?;
     let amplitude = read_planes(camera, frequencies, file, arrays, "amplitude")?;
     let intensity = arrays.optional_plane(file, "intensity", COUNT, size)?;
-    let convention =
-        PhaseConvention { phase_sense: camera.phase_sense, phase_offset_rad: camera.phase_offset_rad };
+    let convention = PhaseConvention { phase_sense: camera.phase_sense, phase_offset_rad: camera.phase_offset_rad };
     let mut frame = ComplexFrame::from_phase(modulations, phase, amplitude, &convention)
         .map_err(|error| array_error(file, "phase", error.to_string()))?;
     for channel in &mut frame.channels {
@@ -185,8 +184,7 @@ fn read_depth<R: std::io::Read + std::io::Seek>(
 ) -> Result<Raster<f32>> {
     let size = [survey.camera.width, survey.camera.height];
     // Integers have no unit of their own: they need the survey's word for it.
-    let types: &[DataType] =
-        if survey.depth.is_some() { &[DataType::F32, DataType::F64, DataType::U16] } else { REAL };
+    let types: &[DataType] = if survey.depth.is_some() { &[DataType::F32, DataType::F64, DataType::U16] } else { REAL };
     let expected = Expected { name: "depth", types, axes: "H W", shape: &[size[1], size[0]] };
     let values = arrays.array(file, &expected)?.values;
     match (values, &survey.depth) {
@@ -200,9 +198,12 @@ fn read_depth<R: std::io::Read + std::io::Seek>(
 
 /// Stored integers in metres, NaN where they say invalid; at least one must be valid.
 fn depth_from_stored(file: &Path, scale: &StoredDepth, stored: &Raster<u16>) -> Result<Raster<f32>> {
-    let depth = stored.map(|&value| {
-        if scale.invalid.contains(&value) { f32::NAN } else { (f64::from(value) * scale.scale_m) as f32 }
-    });
+    let depth =
+        stored.map(
+            |&value| {
+                if scale.invalid.contains(&value) { f32::NAN } else { (f64::from(value) * scale.scale_m) as f32 }
+            },
+        );
     if depth.as_slice().iter().all(|value| value.is_nan()) {
         return Err(array_error(file, "depth", format!("holds only values that mean no depth: {:?}", scale.invalid)));
     }
@@ -276,10 +277,16 @@ pub fn write_frame(path: impl AsRef<Path>, frame: &InputFrame) -> Result<()> {
         }
         InputFrame::Phase(frame) => write_phase(&mut writer, frame)?,
         InputFrame::Range { range, amplitude, confidence } => {
-            write_planes(&mut writer, [("range", Some(range)), ("amplitude", amplitude.as_ref()), ("confidence", confidence.as_ref())])?;
+            write_planes(
+                &mut writer,
+                [("range", Some(range)), ("amplitude", amplitude.as_ref()), ("confidence", confidence.as_ref())],
+            )?;
         }
         InputFrame::Depth { depth, amplitude, confidence } => {
-            write_planes(&mut writer, [("depth", Some(depth)), ("amplitude", amplitude.as_ref()), ("confidence", confidence.as_ref())])?;
+            write_planes(
+                &mut writer,
+                [("depth", Some(depth)), ("amplitude", amplitude.as_ref()), ("confidence", confidence.as_ref())],
+            )?;
         }
     }
     writer.commit()

@@ -11,8 +11,9 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-pub use camera::{PhaseSense, SurveyCamera};
+pub use camera::SurveyCamera;
 pub use frame::{InputFrame, read_frame, write_frame};
+pub use range_image::PhaseSense;
 pub use truth::{TruthFrame, read_truth, write_truth};
 
 use crate::{Result, atomic, ron_text};

@@ -1,9 +1,7 @@
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use super::check::{
-    finite, finite_triple, not_negative, positive, positive_triple, require,
-};
+use super::check::{finite, finite_triple, not_negative, positive, positive_triple, require};
 use crate::Result;
 
 /// What stands in front of the camera. World coordinates in metre, z up.

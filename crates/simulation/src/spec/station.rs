@@ -1,5 +1,5 @@
 use camera_model::pose_from_euler;
-use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
 use super::check::{finite, finite_triple, require};
@@ -65,7 +65,7 @@ impl StationSpec {
         match self.attitude {
             AttitudeSpec::Euler { omega_deg, phi_deg, kappa_deg } => {
                 let angles = [omega_deg, phi_deg, kappa_deg].map(f64::to_radians);
-                pose_from_euler(&Point3::from(self.position_m), angles)
+                pose_from_euler(self.position_m, angles)
             }
             AttitudeSpec::LookAt { target_m, roll_deg } => {
                 look_at(self.position_m.into(), target_m.into(), roll_deg.to_radians())

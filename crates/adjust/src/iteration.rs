@@ -229,8 +229,11 @@ impl<'p, 'a> Iteration<'p, 'a> {
     /// penalty so far that the step is a descent ([Nocedal2006], Eq. 18.36).
     fn expect(&mut self, step: &[f64]) -> (f64, f64) {
         self.current.apply(self.layout, step, &mut self.moved);
-        let length = self.moved.iter().map(|m| m * m).sum::<f64>();
-        let gain: f64 = self.moved.iter().zip(&self.current.whitened).map(|(m, v)| m * (2.0 * v - m)).sum();
+        let (mut length, mut gain) = (0.0, 0.0);
+        for ((m, v), w) in self.moved.iter().zip(&self.current.whitened).zip(&self.current.weights) {
+            length += w * m * m;
+            gain += w * m * (2.0 * v - m);
+        }
         let miss: f64 = self.current.constraint.iter().map(|c| c.abs()).sum();
         if gain < 0.0 && gain + 0.5 * self.penalty * miss < 0.0 && miss > 0.0 {
             self.penalty = -2.0 * gain / miss;
@@ -239,7 +242,7 @@ impl<'p, 'a> Iteration<'p, 'a> {
     }
 
     fn merit(&self, at: &Linearisation) -> f64 {
-        at.vtpv + self.penalty * at.constraint.iter().map(|c| c.abs()).sum::<f64>()
+        at.objective + self.penalty * at.constraint.iter().map(|c| c.abs()).sum::<f64>()
     }
 
     /// Merit at `values ⊞ share · step`; `None` where the model has no finite value.
@@ -257,7 +260,7 @@ impl<'p, 'a> Iteration<'p, 'a> {
     }
 
     fn record(&mut self, kind: StepKind, step: f64, damping: f64, share: f64) {
-        self.trace.push(TraceEntry { kind, vtpv: self.current.vtpv, step, damping, share });
+        self.trace.push(TraceEntry { kind, objective: self.current.objective, step, damping, share });
     }
 
     fn check_budget(&self) -> Result<()> {
@@ -272,7 +275,7 @@ impl<'p, 'a> Iteration<'p, 'a> {
         Error::NotConverged {
             iterations: self.trace.len(),
             reason,
-            vtpv: self.current.vtpv,
+            objective: self.current.objective,
             step: last.map_or(f64::NAN, |entry| entry.step),
             damping: last.map_or(0.0, |entry| entry.damping),
         }

@@ -25,16 +25,17 @@ impl NormalEquations {
             let active = layout.active(place);
             let jacobian = &linearisation.jacobian[place.jacobian_range()];
             for (row, entries) in place.rows().zip(jacobian.chunks_exact(active.len().max(1))) {
-                self.add_row(active, entries, linearisation.whitened[row]);
+                self.add_row(active, entries, linearisation.whitened[row], linearisation.weights[row]);
             }
         }
     }
 
-    fn add_row(&mut self, active: &[(usize, usize)], entries: &[f64], residual: f64) {
+    fn add_row(&mut self, active: &[(usize, usize)], entries: &[f64], residual: f64, weight: f64) {
         for (first, (&(_, column), &a)) in active.iter().zip(entries).enumerate() {
+            let a = weight * a;
             self.gradient[column] += a * residual;
             let target = &mut self.matrix[column * self.unknowns..(column + 1) * self.unknowns];
-            target[column] += a * a;
+            target[column] += a * entries[first];
             for (&(_, row), &b) in active[first + 1..].iter().zip(&entries[first + 1..]) {
                 // Active columns ascend; a block named twice in one observation meets itself off the diagonal twice.
                 target[row] += if row == column { 2.0 * a * b } else { a * b };

@@ -7,7 +7,7 @@ use range_io::ply::{CloudFile, Precision, write_cloud};
 use range_io::tables::{Station, write_stations};
 use range_io::trajectory::{StampedPose, write_tum};
 
-use crate::outcome::{Outcome, StationPose, usable, world_points};
+use crate::outcome::{Outcome, StationPose};
 use crate::progress::Progress;
 use crate::summary::Summary;
 use crate::{Error, Result, report};
@@ -87,15 +87,4 @@ fn trajectory(outcome: &Outcome) -> Vec<StampedPose> {
     poses
         .map(|(view, pose)| StampedPose { timestamp_s: view.timestamp_s, world_from_camera: pose.world_from_camera })
         .collect()
-}
-
-/// The unflagged points of each view in the world's frame.
-pub(crate) fn unflagged_points(outcome: &Outcome) -> Vec<Vec<[f64; 3]>> {
-    let clouds = outcome.clouds.iter().zip(poses_or_identity(outcome));
-    clouds.map(|(cloud, pose)| world_points(cloud, &pose.world_from_camera)).collect()
-}
-
-/// Number of unflagged points of all views.
-pub(crate) fn point_count(outcome: &Outcome) -> usize {
-    outcome.clouds.iter().map(|cloud| usable(cloud).count()).sum()
 }

@@ -37,6 +37,19 @@ pub enum Error {
         /// Row of the first pixel found beyond the fold.
         row: usize,
     },
+    /// A `plumb_bob` model folds over inside its image: no ray belongs to a pixel position.
+    #[cfg(feature = "convert")]
+    #[error("the plumb_bob model folds over inside its image: no ray belongs to pixel ({col}, {row})")]
+    PlumbBobFold {
+        /// Column.
+        col: f64,
+        /// Row.
+        row: f64,
+    },
+    /// The fit of one lens model to another failed.
+    #[cfg(feature = "convert")]
+    #[error("fitting one lens model to another: {0}")]
+    Fit(#[from] adjust::Error),
     /// A frame or format error.
     #[error(transparent)]
     Image(#[from] range_image::Error),

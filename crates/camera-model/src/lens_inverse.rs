@@ -15,8 +15,14 @@ const MAX_STEPS: usize = 100;
 /// Halvings of one step: less than 2^-50 of it is lost in rounding.
 const MAX_HALVINGS: usize = 50;
 
+/// A step that shortens the misfit by less than this share is held up by the fold: the point lies beyond it.
+const LEAST_GAIN: f64 = 1e-6;
+
 /// Points looked at between the principal point and a point that the quick test leaves open.
 const SAMPLES_TO_FOLD: usize = 64;
+
+/// Points looked at along one step, for the same purpose.
+const SAMPLES_OF_STEP: usize = 4;
 
 impl LensDistortion {
     /// Whether the model is one to one from the principal point out to `reduced`.
@@ -24,13 +30,21 @@ impl LensDistortion {
     /// First a sufficient bound on the whole disc: the eigenvalues of `D'` are at most
     /// `3 |k1| r^2 + 5 |k2| r^4 + 7 |k3| r^6 + 6 |p| r`. Where that reaches 1, `J` is looked at along the segment.
     pub(crate) fn one_to_one_to(&self, reduced: Vector2<f64>) -> bool {
+        self.is_mild_within(reduced) || self.is_definite_along(Vector2::zeros(), reduced, SAMPLES_TO_FOLD)
+    }
+
+    /// The sufficient bound, on the disc out to a point.
+    fn is_mild_within(&self, reduced: Vector2<f64>) -> bool {
         let r2 = reduced.norm_squared();
         let radial = r2 * (3.0 * self.k1.abs() + r2 * (5.0 * self.k2.abs() + r2 * 7.0 * self.k3.abs()));
-        if radial + 6.0 * self.p1.hypot(self.p2) * r2.sqrt() < 1.0 {
-            return true;
-        }
-        (1..=SAMPLES_TO_FOLD).all(|i| {
-            let derivative = self.derivative(reduced * (i as f64 / SAMPLES_TO_FOLD as f64));
+        radial + 6.0 * self.p1.hypot(self.p2) * r2.sqrt() < 1.0
+    }
+
+    /// Whether `J` is positive definite at samples along a segment, its end among them.
+    fn is_definite_along(&self, from: Vector2<f64>, to: Vector2<f64>, samples: usize) -> bool {
+        // From the end: there a step meets the fold first.
+        (1..=samples).rev().all(|i| {
+            let derivative = self.derivative(from + (to - from) * (i as f64 / samples as f64));
             derivative.determinant() > 0.0 && derivative.trace() > 0.0
         })
     }
@@ -42,10 +56,14 @@ impl LensDistortion {
         let mut misfit = corrected;
         for _ in 0..MAX_STEPS {
             if misfit.norm() <= self.rounding_at(observed, corrected) {
-                return Some(observed);
+                return self.one_to_one_to(observed).then_some(observed);
             }
             let step = self.derivative(observed).try_inverse()? * misfit;
-            (observed, misfit) = self.approach(observed, step, corrected, misfit.norm())?;
+            let before = misfit.norm();
+            (observed, misfit) = self.approach(observed, step, corrected, before)?;
+            if misfit.norm() > (1.0 - LEAST_GAIN) * before {
+                break;
+            }
         }
         None
     }
@@ -61,7 +79,8 @@ impl LensDistortion {
         for _ in 0..MAX_HALVINGS {
             let trial = from + step;
             let misfit = corrected - (trial - self.at(trial));
-            if misfit.norm() < misfit_before && self.one_to_one_to(trial) {
+            let is_inside = || self.is_mild_within(trial) || self.is_definite_along(from, trial, SAMPLES_OF_STEP);
+            if misfit.norm() < misfit_before && is_inside() {
                 return Some((trial, misfit));
             }
             step *= 0.5;

@@ -108,7 +108,7 @@ impl RayTable {
 }
 
 /// Fails where the lens model is not one to one between the principal point and every pixel.
-fn require_no_fold(camera: &Camera) -> Result<()> {
+pub(crate) fn require_no_fold(camera: &Camera) -> Result<()> {
     let ImageFormat { width, height, .. } = camera.format;
     let reduced = |col: usize, row: usize| -> Vector2<f64> {
         camera.interior.reduced(camera.format.image_from_pixel([col as f64, row as f64]))

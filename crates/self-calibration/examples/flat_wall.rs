@@ -25,7 +25,7 @@ fn main() -> Result<()> {
     let options = DifferenceOptions { step: 4, ..DifferenceOptions::default() };
     let mut differences = Vec::new();
     for step in 0..20 {
-        let wall = Plane::facing_camera(0.6 + 0.25 * f64::from(step))?;
+        let wall = Plane::facing_camera(0.6 + 0.25 * step as f64)?;
         let frame = shown(&camera, &wall, &truth, step)?;
         differences.extend(differences_to_plane(&frame, &camera, &Isometry3::identity(), &wall, &options)?);
     }

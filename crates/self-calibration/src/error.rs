@@ -39,7 +39,7 @@ pub enum Error {
     NothingToEstimate,
     /// The distances and amplitudes observed cannot tell some parameters apart.
     #[error(
-        "the observed ranges ({} m to {} m) cannot tell these parameters apart: {combination} (inflation {inflation}); \
+        "the observed ranges ({:.3} m to {:.3} m) cannot tell these parameters apart: {combination} (inflation {inflation:.0}); \
          observe more distances, over a whole ambiguity interval, and more amplitudes if there is a hyperbola, \
          or hold one of them", .range_span_m[0], .range_span_m[1]
     )]

@@ -149,7 +149,7 @@ impl<'a> Problem<'a> {
                 ambiguity_interval_m: self.ambiguity_interval_m,
                 amplitude_span: self.amplitude_span,
             };
-            adjustment.add_observation(group, observation, Covariance::from_sigma(difference.sigma_m))?;
+            adjustment.add_observation(group, observation, &Covariance::from_sigma(difference.sigma_m))?;
         }
         match adjustment.solve(&SolveOptions::default()) {
             Ok(solution) => Ok((solution, blocks)),

@@ -111,7 +111,8 @@ fn the_same_input_gives_the_same_bits() {
     // Buffers that held another image, in the other mode too, leave no trace.
     unwrapper.unwrap(&other.phase, Some(&other.amplitude), None, KnownWraps::Nothing).unwrap();
     unwrapper.unwrap(&other.phase, None, None, KnownWraps::Nothing).unwrap();
-    let again = unwrapper.unwrap(&one.phase, Some(&one.amplitude), None, KnownWraps::Nothing).unwrap();
+    let mut again = unwrapper.unwrap(&Raster::filled(9, 7, 1.0), None, None, KnownWraps::Nothing).unwrap();
+    unwrapper.unwrap_into(&one.phase, Some(&one.amplitude), None, KnownWraps::Nothing, &mut again).unwrap();
     assert_eq!(fresh, again);
 }
 

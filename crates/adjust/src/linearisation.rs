@@ -90,6 +90,19 @@ impl Linearisation {
             }
         }
     }
+
+    /// `Aᵀ P rows` for whitened rows.
+    pub(crate) fn transpose_apply(&self, layout: &Layout, rows: &[f64]) -> Vec<f64> {
+        let mut out = vec![0.0; layout.unknowns];
+        for place in &layout.observations {
+            let (active, jacobian) = (layout.active(place), &self.jacobian[place.jacobian_range()]);
+            for (row, entries) in place.rows().zip(jacobian.chunks_exact(active.len().max(1))) {
+                let weighted = self.weights[row] * rows[row];
+                entries.iter().zip(active).for_each(|(a, &(_, column))| out[column] += a * weighted);
+            }
+        }
+        out
+    }
 }
 
 /// `W · matrix` in place for a lower triangular W stored row by row; the matrix is row-major with `width` columns.

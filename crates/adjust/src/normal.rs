@@ -99,15 +99,15 @@ impl NormalFactor {
         Ok(Self { scale, factor, constraints, influence, complement, complement_factor })
     }
 
-    /// The step.
-    pub(crate) fn solve(&self, gradient: &[f64]) -> Vec<f64> {
+    /// The step that follows `gradient` and takes away `share` of what the constraints miss.
+    pub(crate) fn solve(&self, gradient: &[f64], share: f64) -> Vec<f64> {
         let (n, k) = (self.scale.len(), self.constraints.count);
         let mut step: Vec<f64> = gradient.iter().zip(&self.scale).map(|(g, s)| g * s).collect();
         for (row, d) in self.constraint_rows().zip(&self.constraints.right) {
-            step.iter_mut().zip(row).for_each(|(y, b)| *y += b * d);
+            step.iter_mut().zip(row).for_each(|(y, b)| *y += b * d * share);
         }
         dense::solve_cholesky(&self.factor, n, &mut step, 1);
-        let miss = |(row, d): (&[f64], &f64)| row.iter().zip(&step).map(|(b, y)| b * y).sum::<f64>() - d;
+        let miss = |(row, d): (&[f64], &f64)| row.iter().zip(&step).map(|(b, y)| b * y).sum::<f64>() - d * share;
         let mut multipliers: Vec<f64> = self.constraint_rows().zip(&self.constraints.right).map(miss).collect();
         dense::solve_cholesky(&self.complement_factor, k, &mut multipliers, 1);
         for (column, multiplier) in self.influence.chunks_exact(n.max(1)).zip(&multipliers) {

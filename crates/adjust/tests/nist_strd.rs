@@ -262,5 +262,8 @@ fn certified_values_are_reached_from_both_starts() {
     let (parameters, deviations) = (parameter_digits / f64::from(count), deviation_digits / f64::from(count));
     println!("{solved} of {count} solved; mean digits: parameters {parameters:.2}, deviations {deviations:.2}");
     assert_eq!(solved, count as usize);
-    assert!(parameters > 10.4);
+    // With the sets that are always here alone, MGH09 (large residuals, ten observations) weighs more in the mean.
+    let all = count == 54;
+    assert!(parameters > if all { 10.4 } else { 10.2 }, "{parameters}");
+    assert!(deviations > if all { 10.1 } else { 9.9 }, "{deviations}");
 }

@@ -25,7 +25,7 @@ impl RayTable {
         camera.validate()?;
         let format = camera.format;
         require_no_fold(camera)?;
-        let mut directions = vec![[0.0; 3]; format.width * format.height];
+        let mut directions = reserve(&format)?;
         directions.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, rays)| {
             for (i, ray) in rays.iter_mut().enumerate() {
                 let pixel = chunk * CHUNK + i;
@@ -107,6 +107,26 @@ impl RayTable {
     }
 }
 
+/// Memory for one direction a pixel; a size from a damaged file is refused instead of ending the program.
+fn reserve(format: &ImageFormat) -> Result<Vec<[f64; 3]>> {
+    let mut directions = Vec::new();
+    let count = format.width.checked_mul(format.height);
+    match count.map(|count| directions.try_reserve_exact(count)) {
+        Some(Ok(())) => directions.resize(format.width * format.height, [0.0; 3]),
+        _ => {
+            return Err(Error::OutOfDomain {
+                name: "width * height",
+                value: format.width as f64 * format.height as f64,
+                expected: "the ray table of an image fits into memory",
+            });
+        }
+    }
+    Ok(directions)
+}
+
+/// Positions looked at along each side of the image, at least; of smaller images all.
+const BORDER_POSITIONS: usize = 1024;
+
 /// Fails where the lens model is not one to one between the principal point and every pixel.
 pub(crate) fn require_no_fold(camera: &Camera) -> Result<()> {
     let ImageFormat { width, height, .. } = camera.format;
@@ -114,8 +134,9 @@ pub(crate) fn require_no_fold(camera: &Camera) -> Result<()> {
         camera.interior.reduced(camera.format.image_from_pixel([col as f64, row as f64]))
     };
     // The model is looked at along the segments to the pixels, so the border has all of it.
-    let top_and_bottom = (0..width).flat_map(|col| [(col, 0), (col, height - 1)]);
-    let sides = (0..height).flat_map(|row| [(0, row), (width - 1, row)]);
+    let along = |size: usize| (0..size).step_by((size / BORDER_POSITIONS).max(1)).chain([size - 1]);
+    let top_and_bottom = along(width).flat_map(|col| [(col, 0), (col, height - 1)]);
+    let sides = along(height).flat_map(|row| [(0, row), (width - 1, row)]);
     match top_and_bottom.chain(sides).find(|&(col, row)| !camera.lens.one_to_one_to(reduced(col, row))) {
         Some((col, row)) => Err(Error::FoldInsideImage { col, row }),
         None => Ok(()),

@@ -146,3 +146,12 @@ fn a_fold_inside_the_image_is_refused() {
     let lens = LensDistortion { k1: 0.2, k3: -1e-3, ..LensDistortion::default() };
     assert!(matches!(RayTable::new(&Camera { lens, ..plain_camera() }), Err(Error::FoldInsideImage { .. })));
 }
+
+#[test]
+fn impossible_sizes_are_refused() {
+    for (width, height) in [(usize::MAX, 2), (usize::MAX, 1), (1 << 40, 1 << 20)] {
+        let format = ImageFormat { width, height, pixel_pitch_mm: [1e-18, 1e-18] };
+        let answer = RayTable::new(&Camera { format, lens: LensDistortion::default(), ..plain_camera() });
+        assert!(matches!(answer, Err(Error::OutOfDomain { .. })), "{answer:?}");
+    }
+}

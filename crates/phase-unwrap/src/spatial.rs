@@ -65,20 +65,35 @@ impl Unwrapper {
         mask: Option<&Raster<bool>>,
         known: KnownWraps<'_>,
     ) -> Result<Unwrapped> {
+        let mut out = Unwrapped::default();
+        self.unwrap_into(phase, amplitude, mask, known, &mut out)?;
+        Ok(out)
+    }
+
+    /// As [`Unwrapper::unwrap`], into an existing result of any size, which an error leaves as it was.
+    pub fn unwrap_into(
+        &mut self,
+        phase: &Raster<f32>,
+        amplitude: Option<&Raster<f32>>,
+        mask: Option<&Raster<bool>>,
+        known: KnownWraps<'_>,
+        out: &mut Unwrapped,
+    ) -> Result<()> {
         let grid = Grid::new(phase.width(), phase.height())?;
         self.load_phase(&grid, phase, mask)?;
         let known = resolve_known(&grid, phase, &self.surface, known)?;
         let Some(amplitude) = amplitude else {
-            return self.unwrap_relative(&grid, &known);
+            self.unwrap_relative(&grid, &known, out);
+            return Ok(());
         };
         phase.require_same_size(amplitude, "amplitude")?;
         grid.pad(amplitude, f32::NAN, &mut self.amplitude);
         self.surface.set_amplitude(&grid, &self.amplitude, self.options.amplitude_noise);
         if self.surface.has_amplitude() {
-            self.unwrap_absolute(&grid, &known)
-        } else {
-            self.unwrap_relative(&grid, &known)
+            return self.unwrap_absolute(&grid, &known, out);
         }
+        self.unwrap_relative(&grid, &known, out);
+        Ok(())
     }
 
     fn load_phase(&mut self, grid: &Grid, phase: &Raster<f32>, mask: Option<&Raster<bool>>) -> Result<()> {
@@ -102,7 +117,7 @@ impl Unwrapper {
         if used == 0 { Err(Error::AllMasked { pixels: phase.len() }) } else { Ok(()) }
     }
 
-    fn unwrap_relative(&mut self, grid: &Grid, known: &[(usize, i32)]) -> Result<Unwrapped> {
+    fn unwrap_relative(&mut self, grid: &Grid, known: &[(usize, i32)], out: &mut Unwrapped) {
         pixel_cost(grid, &self.surface.phase, None, &mut self.cost);
         self.links.clear();
         self.links.resize(grid.len(), 0);
@@ -116,17 +131,15 @@ impl Unwrapper {
                 *wraps = wraps.saturating_add(fixed[*label as usize].0);
             }
         }
-        let confidence: Vec<f32> = self.cost.iter().map(|&cost| reliability(cost)).collect();
+        labels_from_one(grid, &self.forest, &mut out.segment);
+        labels_from_one(grid, &self.forest, &mut out.island);
+        grid.crop(&self.forest.wraps, &mut out.wraps, |&wraps| wraps);
+        grid.crop(&self.cost, &mut out.confidence, |&cost| reliability(cost));
         let islands = fixed.iter().map(|&(_, known)| Island { offset_known: known, segments: 1, ..Island::default() });
-        let result = Unwrapped {
-            segment: labels_from_one(grid, &self.forest)?,
-            island: labels_from_one(grid, &self.forest)?,
-            wraps: grid.crop(&self.forest.wraps, |&wraps| wraps)?,
-            confidence: grid.crop(&confidence, |&confidence| confidence)?,
-            islands: islands.collect(),
-            typical_amplitude_at_interval: None,
-        };
-        Ok(result.count_pixels(self.options.minimum_confidence))
+        out.islands.clear();
+        out.islands.extend(islands);
+        out.typical_amplitude_at_interval = None;
+        out.count_pixels(self.options.minimum_confidence);
     }
 
     /// Offset of each tree, and whether something known fixed it: the median of what is known, else lowest count 0.
@@ -149,7 +162,7 @@ impl Unwrapper {
         offsets.into_iter().zip(lowest).map(fix).collect()
     }
 
-    fn unwrap_absolute(&mut self, grid: &Grid, known: &[(usize, i32)]) -> Result<Unwrapped> {
+    fn unwrap_absolute(&mut self, grid: &Grid, known: &[(usize, i32)], out: &mut Unwrapped) -> Result<()> {
         let options = self.options;
         check_span(grid, known, options.maximum_wraps)?;
         pixel_cost(grid, &self.surface.phase, Some(&self.surface.variance), &mut self.cost);
@@ -167,21 +180,19 @@ impl Unwrapper {
         }
         self.brightness.add_known(&self.forest, known);
         self.offsets.find(&self.brightness, &self.borders.ties, pixels, &options);
-        let segment = labels_from_one(grid, &self.forest)?;
+        labels_from_one(grid, &self.forest, &mut out.segment);
         self.apply_offsets();
-        let mut islands = vec![Island { offset_known: true, ..Island::default() }; self.borders.islands];
+        labels_from_one(grid, &self.forest, &mut out.island);
+        grid.crop(&self.forest.wraps, &mut out.wraps, |&wraps| wraps);
+        grid.crop(&self.segments.hold, &mut out.confidence, |&hold| hold);
+        out.islands.clear();
+        out.islands.resize(self.borders.islands, Island { offset_known: true, ..Island::default() });
         for &island in &self.borders.island {
-            islands[island as usize].segments += 1;
+            out.islands[island as usize].segments += 1;
         }
-        let result = Unwrapped {
-            segment,
-            island: labels_from_one(grid, &self.forest)?,
-            wraps: grid.crop(&self.forest.wraps, |&wraps| wraps)?,
-            confidence: grid.crop(&self.segments.hold, |&hold| hold)?,
-            islands,
-            typical_amplitude_at_interval: self.offsets.log_constant.map(f32::exp),
-        };
-        Ok(result.count_pixels(options.minimum_confidence))
+        out.typical_amplitude_at_interval = self.offsets.log_constant.map(f32::exp);
+        out.count_pixels(options.minimum_confidence);
+        Ok(())
     }
 
     /// Shifts each segment; labels become those of the islands, the hold of a pixel its confidence.

@@ -1,11 +1,10 @@
 use range_image::Raster;
 
-use crate::Result;
 use crate::forest::Forest;
 use crate::grid::Grid;
 
 /// Wrap counts of one image.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Unwrapped {
     /// Whole cycles to add to the phase, `unwrapped = phase + 2 pi wraps`; 0 where masked.
     pub wraps: Raster<i32>,
@@ -38,7 +37,7 @@ pub struct Island {
 
 impl Unwrapped {
     /// Counts each island's pixels and takes the word `known` back where most are not sure.
-    pub(crate) fn count_pixels(mut self, minimum_confidence: f32) -> Self {
+    pub(crate) fn count_pixels(&mut self, minimum_confidence: f32) {
         for (&label, confidence) in self.island.as_slice().iter().zip(self.confidence.as_mut_slice()) {
             match self.islands.get_mut((label as usize).wrapping_sub(1)) {
                 None => *confidence = 0.0,
@@ -51,7 +50,6 @@ impl Unwrapped {
         for island in &mut self.islands {
             island.offset_known &= 2 * island.sure_pixels > island.pixels;
         }
-        self
     }
 
     /// Pixels that are masked or whose confidence is below `minimum_confidence`.
@@ -64,8 +62,8 @@ impl Unwrapped {
     }
 }
 
-/// Labels of the forest as a raster: 0 where there is none, else from 1.
-pub(crate) fn labels_from_one(grid: &Grid, forest: &Forest) -> Result<Raster<u32>> {
+/// Writes the labels of the forest into a raster: 0 where there is none, else from 1.
+pub(crate) fn labels_from_one(grid: &Grid, forest: &Forest, raster: &mut Raster<u32>) {
     // No label is the largest number, which wraps to zero.
-    grid.crop(&forest.label, |&label| label.wrapping_add(1))
+    grid.crop(&forest.label, raster, |&label| label.wrapping_add(1));
 }

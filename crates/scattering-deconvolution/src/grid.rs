@@ -11,8 +11,6 @@ use rustfft::num_complex::Complex;
 
 use crate::spectrum::Spectrum;
 
-/// Sums kept in registers at a time.
-const LANES: usize = 32;
 /// Rows of pixels that one task takes at least; smaller tasks cost more to hand out than to do.
 const ROWS_PER_TASK: usize = 16;
 
@@ -159,8 +157,8 @@ impl Grid {
             halfway.par_chunks_mut(across.pixels).enumerate().for_each(|(node, sums)| {
                 let pixels = down.pixels_of(node);
                 let rows = &plane[pixels.start * across.pixels..pixels.end * across.pixels];
-                let weights = pixels.map(|pixel| scale * down.weight(pixel, node).unwrap_or(0.0));
-                sum_rows(rows, &weights, sums);
+                let weight = |row: usize| scale * down.weight(pixels.start + row, node).unwrap_or(0.0);
+                sum_rows(rows, weight, sums);
             });
         }
         let [re, im] = &self.halfway;
@@ -246,25 +244,26 @@ impl Grid {
     }
 }
 
-/// Weighted sum of rows that lie one after the other, each as long as `sums`.
-fn sum_rows(rows: &[f32], weights: &(impl Iterator<Item = f32> + Clone), sums: &mut [f32]) {
+/// Weighted sum of rows that lie one after the other, each as long as `sums`; four at a time, to write the sums less
+/// often.
+fn sum_rows(rows: &[f32], weight: impl Fn(usize) -> f32, sums: &mut [f32]) {
+    sums.fill(0.0);
     let width = sums.len();
-    for (block, sums) in sums.chunks_mut(LANES).enumerate() {
-        // A fixed number of sums stays in registers while the rows pass by.
-        let mut registers = [0.0; LANES];
-        for (row, weight) in rows.chunks_exact(width).zip(weights.clone()) {
-            let values = &row[block * LANES..][..sums.len()];
-            match <&[f32; LANES]>::try_from(values) {
-                Ok(values) => add_scaled(&mut registers, weight, values),
-                Err(_) => add_scaled(&mut registers, weight, values),
+    for (group, rows) in rows.chunks(4 * width).enumerate() {
+        let weight = |row: usize| weight(4 * group + row);
+        if rows.len() == 4 * width {
+            let [a, b, c, d] = [weight(0), weight(1), weight(2), weight(3)];
+            let (upper, lower) = rows.split_at(2 * width);
+            let ((first, second), (third, fourth)) = (upper.split_at(width), lower.split_at(width));
+            let values = first.iter().zip(second).zip(third).zip(fourth);
+            for (sum, (((first, second), third), fourth)) in sums.iter_mut().zip(values) {
+                *sum += a * first + b * second + c * third + d * fourth;
+            }
+        } else {
+            for (index, row) in rows.chunks_exact(width).enumerate() {
+                let weight = weight(index);
+                sums.iter_mut().zip(row).for_each(|(sum, value)| *sum += weight * value);
             }
         }
-        sums.copy_from_slice(&registers[..sums.len()]);
-    }
-}
-
-fn add_scaled(sums: &mut [f32], weight: f32, values: &[f32]) {
-    for (sum, value) in sums.iter_mut().zip(values) {
-        *sum += weight * value;
     }
 }

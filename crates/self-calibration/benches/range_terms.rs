@@ -3,6 +3,7 @@
 
 use camera_model::{Camera, InteriorOrientation, LensDistortion};
 use criterion::{Criterion, criterion_group, criterion_main};
+use error_models::{AmplitudeHyperbola, RangeErrorModel, RangeTerms};
 use nalgebra::Isometry3;
 use range_image::{Flags, ImageFormat, RangeFrame, Raster};
 use self_calibration::{
@@ -45,19 +46,23 @@ fn estimation(criterion: &mut Criterion) {
     }
 }
 
-/// Ranges over one ambiguity interval, image points and amplitudes over their domains by irrational steps.
+/// Ranges over one ambiguity interval, image points, amplitudes and errors over their domains by irrational steps.
 fn difference(index: usize) -> RangeDifference {
     let spread = |factor: f64| (index as f64 * factor).fract();
     let observed_range_m = 0.5 + 5.0 * spread(0.618_033_988_75);
-    let amplitude = 10.0 + 990.0 * spread(0.414_213_562_37);
-    let error = 0.02 + 1e-4 * amplitude.recip().mul_add(2e4, (observed_range_m * 7.0).sin());
-    RangeDifference {
-        observed_range_m,
-        reference_range_m: observed_range_m - error,
-        x_mm: 7.0 * spread(0.732_050_807_57) - 3.5,
-        y_mm: 7.0 * spread(0.236_067_977_5) - 3.5,
-        amplitude,
-        sigma_m: 0.005,
+    let amplitude = 10.0 * 100.0_f64.powf(spread(0.414_213_562_37));
+    let [x_mm, y_mm] = [0.732_050_807_57, 0.236_067_977_5].map(|factor| 7.0 * spread(factor) - 3.5);
+    let corrected = model().corrected_range(observed_range_m, x_mm, y_mm, amplitude);
+    let reference_range_m = corrected + 0.01 * (spread(0.645_751_311_06) - 0.5);
+    RangeDifference { observed_range_m, reference_range_m, x_mm, y_mm, amplitude, sigma_m: 0.003 }
+}
+
+fn model() -> RangeErrorModel {
+    RangeErrorModel {
+        ambiguity_interval_m: 5.0,
+        terms: RangeTerms { d0: 0.02, periodic: [0.006, -0.004, 0.003, 0.005, -0.009, 0.004], e1: 2e-3, e2: -1e-3 },
+        hyperbola: Some(AmplitudeHyperbola { h1: 0.002, h2: 0.05, h3: 25.0, amplitude_span: [10.0, 1000.0] }),
+        range_span_m: None,
     }
 }
 

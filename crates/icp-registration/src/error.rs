@@ -28,6 +28,17 @@ pub enum Error {
         /// Its value.
         value: f64,
     },
+    /// A pair names a station that is not there.
+    #[error("a pair names station {station}, but there are {count} (from 0)")]
+    NoSuchStation {
+        /// The index.
+        station: usize,
+        /// Number of stations.
+        count: usize,
+    },
+    /// The simultaneous adjustment of the stations failed.
+    #[error("adjustment of the stations: {0}")]
+    Adjustment(String),
     /// Two inputs that belong together differ in length.
     #[error("{what} has {found} entries, {expected} were expected")]
     LengthMismatch {

@@ -6,6 +6,8 @@ mod eigen;
 mod error;
 mod icp;
 mod kernel;
+#[cfg(feature = "multiview")]
+mod multiview;
 mod neighbours;
 mod normals;
 mod pose;
@@ -18,6 +20,12 @@ pub use icp::{
     align,
 };
 pub use kernel::RobustKernel;
+#[cfg(feature = "multiview")]
+pub use multiview::{
+    Datum, Overlap, PairAlignment, PairConstraint, PairResidual, RefusedPair, StationAdjustment,
+    StationAdjustmentOptions, SurfaceAdjustment, SurfaceAdjustmentOptions, adjust_stations, adjust_surfaces, align_pairs,
+    find_overlaps,
+};
 pub use neighbours::{Neighbour, NeighbourTree};
 pub use normals::{OrganisedNormalOptions, UnorganisedNormalOptions, organised_normals, unorganised_normals};
 pub use pose::{inverse_covariance_transport, pose_difference, step_pose};

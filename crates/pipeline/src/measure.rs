@@ -117,7 +117,7 @@ fn registration(outcome: &Outcome) -> Option<RegistrationSummary> {
     let sigmas = outcome.poses.iter().filter_map(crate::outcome::StationPose::position_sigma_m);
     Some(RegistrationSummary {
         pairs: pairs.collect(),
-        sigma0: outcome.adjustment.map(|figures| figures.sigma0),
+        sigma0: outcome.adjustment.and_then(|figures| figures.sigma0),
         redundancy: outcome.adjustment.map(|figures| figures.redundancy),
         position_sigma_max_m: sigmas.reduce(f64::max),
     })

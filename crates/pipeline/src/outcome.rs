@@ -1,7 +1,7 @@
 //! What a run holds in its hands: views, clouds, poses, and the record of the stages.
 
 use camera_model::{Camera, OrganisedCloud, euler_from_pose, step_pose};
-use icp_registration::IcpResult;
+use icp_registration::{PairAlignment, RefusedPair};
 use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, Vector3};
 use range_io::survey::Survey;
 
@@ -24,7 +24,7 @@ pub struct Outcome {
     /// One pose a view, once it is known.
     pub poses: Vec<StationPose>,
     /// Aligned pairs.
-    pub pairs: Vec<AlignedPair>,
+    pub pairs: Vec<PairAlignment>,
     /// Pairs that overlap but could not be aligned reliably.
     pub refused: Vec<RefusedPair>,
     /// The simultaneous adjustment, where it ran.
@@ -44,35 +44,13 @@ pub struct StationPose {
     pub covariance: Option<Matrix6<f64>>,
 }
 
-/// Two views brought together by ICP.
-#[derive(Debug, Clone)]
-pub struct AlignedPair {
-    /// Index of the view that was held.
-    pub target: usize,
-    /// Index of the view that was moved.
-    pub source: usize,
-    /// The alignment.
-    pub result: IcpResult,
-}
-
-/// Two views whose alignment is not used.
-#[derive(Debug, Clone)]
-pub struct RefusedPair {
-    /// Index of the view that was held.
-    pub target: usize,
-    /// Index of the view that was moved.
-    pub source: usize,
-    /// Why.
-    pub reason: String,
-}
-
 /// Quality of the simultaneous adjustment.
 #[derive(Debug, Clone, Copy)]
 pub struct AdjustmentFigures {
-    /// A-posteriori standard deviation of unit weight.
-    pub sigma0: f64,
+    /// A-posteriori standard deviation of unit weight; `None` without redundancy.
+    pub sigma0: Option<f64>,
     /// Redundancy.
-    pub redundancy: usize,
+    pub redundancy: i64,
 }
 
 impl StationPose {

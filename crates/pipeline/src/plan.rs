@@ -221,21 +221,29 @@ pub struct RegisterOptions {
     pub maximum_distance_m: f64,
     /// Smallest part of a view that must overlap another for the two to be aligned.
     pub minimum_overlap: f64,
-    /// A pair is refused when its geometry leaves a motion of the points known to less than this, metre. Weakly known
-    /// motions below it are no harm: the adjustment weighs them by their covariance.
-    pub maximum_motion_sigma_m: f64,
 }
 
 impl Default for RegisterOptions {
     fn default() -> Self {
-        Self { maximum_distance_m: 0.5, minimum_overlap: 0.3, maximum_motion_sigma_m: 0.05 }
+        Self { maximum_distance_m: 0.5, minimum_overlap: 0.3 }
     }
 }
 
 /// Options of [`Stage::Adjust`].
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub struct AdjustOptions {}
+pub struct AdjustOptions {
+    /// Farthest correspondence of the first round, metre: about the error of the poses that `Register` found.
+    pub maximum_distance_m: f64,
+    /// Smallest part of a view that must overlap another for the two to be held together.
+    pub minimum_overlap: f64,
+}
+
+impl Default for AdjustOptions {
+    fn default() -> Self {
+        Self { maximum_distance_m: 0.2, minimum_overlap: 0.3 }
+    }
+}
 
 /// Whether frames of a level are past what a stage needs. A depth becomes a range as it is read.
 pub(crate) fn is_past(level: Level, needs: Level) -> bool {

@@ -69,7 +69,7 @@ pub struct RegistrationSummary {
     /// A-posteriori standard deviation of unit weight of the simultaneous adjustment.
     pub sigma0: Option<f64>,
     /// Redundancy of the simultaneous adjustment.
-    pub redundancy: Option<usize>,
+    pub redundancy: Option<i64>,
     /// Largest standard deviation of a station's position, metre, prior-scaled.
     pub position_sigma_max_m: Option<f64>,
 }

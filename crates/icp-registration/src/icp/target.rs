@@ -48,6 +48,11 @@ impl IcpTarget {
         &self.cloud
     }
 
+    /// The points' tree.
+    pub fn tree(&self) -> &NeighbourTree {
+        &self.tree
+    }
+
     /// The normals in use, NaN where a point has none.
     pub fn normals(&self) -> &[Vector3<f64>] {
         &self.normals

@@ -1,38 +1,48 @@
-use icp_registration::{Datum, PairConstraint, StationAdjustmentOptions, adjust_stations};
+use icp_registration::{Datum, SurfaceAdjustmentOptions, adjust_surfaces};
 use nalgebra::Isometry3;
 
 use super::Findings;
 use crate::outcome::{AdjustmentFigures, StationPose};
+use crate::plan::AdjustOptions;
 use crate::progress::Progress;
 use crate::work::Work;
 use crate::{Error, Result};
 
-/// All stations are adjusted at once, the first one being the datum.
-pub(super) fn run(work: &mut Work, progress: &dyn Progress) -> Result<Findings> {
-    if work.outcome.pairs.is_empty() {
+/// All stations are adjusted at once from their surfaces, the first one being the datum.
+pub(super) fn run(work: &mut Work, options: &AdjustOptions, progress: &dyn Progress) -> Result<Findings> {
+    if work.station_clouds.is_empty() {
         return Err(Error::Needs { stage: "Adjust", needs: "Register" });
     }
-    let constraints: Vec<PairConstraint> = work
-        .outcome
-        .pairs
-        .iter()
-        .map(|pair| PairConstraint {
-            target: pair.target,
-            source: pair.source,
-            target_from_source: pair.result.target_from_source,
-            covariance: pair.result.covariance,
-        })
-        .collect();
     let initial: Vec<Isometry3<f64>> = work.outcome.poses.iter().map(|pose| pose.world_from_camera).collect();
-    let options = StationAdjustmentOptions::default();
-    let adjusted = adjust_stations(&constraints, &initial, Datum::Station(0), &options);
+    let options = SurfaceAdjustmentOptions {
+        minimum_overlap: options.minimum_overlap,
+        ..SurfaceAdjustmentOptions::with_initial_error(options.maximum_distance_m)
+    };
+    let tell = |done: usize, total: usize| {
+        if done == 1 {
+            progress.begin("Adjust", total);
+        }
+        progress.advance(done);
+    };
+    let adjusted = adjust_surfaces(&work.station_clouds, &initial, Datum::Station(0), &options, &tell);
     let adjusted = adjusted.map_err(Error::stage("Adjust", "all stations"))?;
-    progress.advance(1);
-    let poses = adjusted.world_from_station.into_iter().zip(adjusted.covariance);
-    work.outcome.poses = poses
+    let stations = adjusted.stations;
+    work.outcome.poses = stations
+        .world_from_station
+        .into_iter()
+        .zip(stations.covariance)
         .map(|(world_from_camera, covariance)| StationPose { world_from_camera, covariance: Some(covariance) })
         .collect();
+    work.outcome.pairs = adjusted.pairs;
+    work.outcome.refused = adjusted.refused;
     work.outcome.adjustment =
-        Some(AdjustmentFigures { sigma0: adjusted.sigma0, redundancy: adjusted.redundancy });
-    Ok(Findings::from([("sigma0".to_owned(), adjusted.sigma0), ("redundancy".to_owned(), adjusted.redundancy as f64)]))
+        Some(AdjustmentFigures { sigma0: stations.sigma0, redundancy: stations.redundancy });
+    let mut findings = Findings::from([
+        ("pairs".to_owned(), work.outcome.pairs.len() as f64),
+        ("rounds".to_owned(), adjusted.rounds as f64),
+    ]);
+    if let Some(sigma0) = stations.sigma0 {
+        findings.insert("sigma0".to_owned(), sigma0);
+    }
+    Ok(findings)
 }

@@ -31,6 +31,6 @@ pub(crate) fn apply(stage: &Stage, work: &mut Work, progress: &dyn Progress) -> 
         Stage::PointCloud(_) => cloud::run(work, progress),
         Stage::Flag(options) => flag::run(work, options, progress),
         Stage::Register(options) => register::run(work, options, progress),
-        Stage::Adjust(_) => adjust::run(work, progress),
+        Stage::Adjust(options) => adjust::run(work, options, progress),
     }
 }

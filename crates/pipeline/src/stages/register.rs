@@ -1,8 +1,11 @@
-use icp_registration::{Cloud, IcpOptions, IcpResult, IcpTarget, OrganisedNormalOptions, organised_normals};
+use icp_registration::{
+    Cloud, IcpOptions, IcpTarget, OrganisedNormalOptions, PairAlignment, RefusedPair, align_pairs, find_overlaps,
+    organised_normals,
+};
 use nalgebra::Isometry3;
 
 use super::Findings;
-use crate::outcome::{AlignedPair, RefusedPair, StationPose};
+use crate::outcome::StationPose;
 use crate::plan::RegisterOptions;
 use crate::progress::Progress;
 use crate::work::Work;
@@ -14,23 +17,9 @@ pub(super) fn run(work: &mut Work, options: &RegisterOptions, progress: &dyn Pro
     let approximate = approximate_poses(work);
     let candidates = candidate_pairs(&targets, &approximate, options)?;
     progress.begin("Register", candidates.len());
-    let icp = IcpOptions {
-        initial_correspondence_distance_m: Some(options.maximum_distance_m),
-        max_motion_sigma_m: Some(options.maximum_motion_sigma_m),
-        ..IcpOptions::default()
-    };
-    let mut refused = Vec::new();
-    let mut pairs = Vec::new();
-    for (done, (target, source)) in candidates.into_iter().enumerate() {
-        let guess = approximate[target].inverse() * approximate[source];
-        // A pair that can't be aligned is no failure of the survey as long as others connect its stations.
-        match targets[target].align(targets[source].cloud(), &guess, &icp) {
-            Ok(result) if result.is_trustworthy() => pairs.push(AlignedPair { target, source, result }),
-            Ok(result) => refused.push(RefusedPair { target, source, reason: distrust(&result) }),
-            Err(error) => refused.push(RefusedPair { target, source, reason: error.to_string() }),
-        }
-        progress.advance(done + 1);
-    }
+    let icp = IcpOptions { initial_correspondence_distance_m: Some(options.maximum_distance_m), ..IcpOptions::default() };
+    let (pairs, refused) =
+        align_pairs(&targets, &approximate, &candidates, &icp, &|done, _| progress.advance(done));
     let poses = spanning_poses(work, &pairs, &refused, &approximate)?;
     work.outcome.poses = poses;
     let findings = [("pairs", pairs.len()), ("pairs_refused", refused.len())];
@@ -38,17 +27,6 @@ pub(super) fn run(work: &mut Work, options: &RegisterOptions, progress: &dyn Pro
     work.outcome.refused = refused;
     work.station_clouds = targets;
     Ok(findings.map(|(name, count)| (name.to_owned(), count as f64)).into())
-}
-
-/// Why an alignment that came to an end is not used.
-fn distrust(result: &IcpResult) -> String {
-    match result.degenerate.as_slice() {
-        [] => format!("not settled after {} iterations", result.iterations),
-        motions => {
-            let named = motions.iter().map(|motion| format!("{:?} known to {:.3} m", motion.kind, motion.sigma_m));
-            format!("the geometry leaves undetermined: {}", named.collect::<Vec<_>>().join(", "))
-        }
-    }
 }
 
 /// The unflagged points of each view with normals from its grid, as targets with their trees.
@@ -87,8 +65,7 @@ fn candidate_pairs(
     if approximate.iter().all(|pose| *pose == Isometry3::identity()) {
         return Ok((1..targets.len()).map(|source| (source - 1, source)).collect());
     }
-    let clouds: Vec<&Cloud> = targets.iter().map(IcpTarget::cloud).collect();
-    let overlaps = icp_registration::find_overlaps(&clouds, approximate, options.maximum_distance_m);
+    let overlaps = find_overlaps(targets, approximate, options.maximum_distance_m);
     let overlaps = overlaps.map_err(Error::stage("Register", "overlaps"))?;
     let enough = overlaps.into_iter().filter(|overlap| overlap.fraction >= options.minimum_overlap);
     Ok(enough.map(|overlap| (overlap.target, overlap.source)).collect())
@@ -97,7 +74,7 @@ fn candidate_pairs(
 /// Poses along the tree of pairs with the most overlap, from the first station on.
 fn spanning_poses(
     work: &Work,
-    pairs: &[AlignedPair],
+    pairs: &[PairAlignment],
     refused: &[RefusedPair],
     approximate: &[Isometry3<f64>],
 ) -> Result<Vec<StationPose>> {
@@ -105,8 +82,12 @@ fn spanning_poses(
     if let (Some(first), Some(pose)) = (poses.first_mut(), approximate.first()) {
         *first = Some(StationPose { world_from_camera: *pose, covariance: None });
     }
-    let mut order: Vec<&AlignedPair> = pairs.iter().collect();
-    order.sort_by(|a, b| b.result.overlap.total_cmp(&a.result.overlap));
+    let mut order: Vec<&PairAlignment> = pairs.iter().collect();
+    // Pairs that determine all six unknowns first, then those with the most overlap.
+    order.sort_by(|a, b| {
+        let sound = |pair: &PairAlignment| pair.result.degenerate.is_empty();
+        sound(b).cmp(&sound(a)).then(b.result.overlap.total_cmp(&a.result.overlap))
+    });
     // Each round adds the best pair that leads from a known station to an unknown one.
     while let Some(pair) = order.iter().find(|pair| poses[pair.target].is_some() != poses[pair.source].is_some()) {
         let target_from_source = pair.result.target_from_source;

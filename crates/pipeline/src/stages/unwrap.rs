@@ -1,4 +1,5 @@
-use phase_unwrap::{MultiFrequencyOptions, SpatialOptions, unwrap_multi_frequency, unwrap_spatial};
+use camera_model::Camera;
+use phase_unwrap::{ImageGeometry, MultiFrequencyOptions, SpatialOptions, unwrap_multi_frequency, unwrap_spatial};
 use range_image::{ComplexChannel, ComplexFrame, Flags, RangeFrame, Raster};
 
 use super::Findings;
@@ -12,19 +13,20 @@ use crate::{Error, Result};
 /// Phases to ranges: by hypotheses where there are several frequencies, spatially and by amplitude where there is one.
 pub(super) fn run(work: &mut Work, options: &UnwrapOptions, progress: &dyn Progress) -> Result<Findings> {
     let total = work.outcome.views.len();
+    let geometry = image_geometry(&work.calibrated_camera.unwrap_or(work.outcome.camera));
     for (index, view) in work.outcome.views.iter_mut().enumerate() {
-        unwrap_view(view, options)?;
+        unwrap_view(view, geometry, options)?;
         progress.advance(index + 1);
     }
     Ok(Findings::from([("views".to_owned(), total as f64)]))
 }
 
-fn unwrap_view(view: &mut View, options: &UnwrapOptions) -> Result<()> {
+fn unwrap_view(view: &mut View, geometry: ImageGeometry, options: &UnwrapOptions) -> Result<()> {
     let name = view.name();
     let ViewData::Phase(frame) = &view.data else {
         return Err(Error::Needs { stage: "Unwrap", needs: "Demodulate" });
     };
-    let (wraps, confidence) = wrap_counts(frame, options, &name)?;
+    let (wraps, confidence) = wrap_counts(frame, geometry, options, &name)?;
     let mut channels: Vec<RangeFrame> =
         frame.channels.iter().zip(&wraps).map(|(channel, wraps)| channel_range(channel, wraps, &frame.flags)).collect();
     for channel in &mut channels {
@@ -39,14 +41,19 @@ fn unwrap_view(view: &mut View, options: &UnwrapOptions) -> Result<()> {
 }
 
 /// Whole ambiguity intervals of each frequency, and the confidence in them.
-fn wrap_counts(frame: &ComplexFrame, options: &UnwrapOptions, name: &str) -> Result<(Vec<Raster<i32>>, Raster<f32>)> {
+fn wrap_counts(
+    frame: &ComplexFrame,
+    geometry: ImageGeometry,
+    options: &UnwrapOptions,
+    name: &str,
+) -> Result<(Vec<Raster<i32>>, Raster<f32>)> {
     let mask = frame.flags.map(|flags| !flags.contains(Flags::NO_DATA));
     if let [channel] = frame.channels.as_slice() {
         let interval = channel.modulation.ambiguity_interval_m();
         let maximum_wraps = (options.maximum_range_m / interval).floor().max(0.0) as u16;
         let mut sigmas: Vec<f64> = channel.sigma.as_slice().iter().map(|sigma| f64::from(*sigma)).collect();
         let noise = Some(median(&mut sigmas) as f32).filter(|noise| noise.is_finite());
-        let spatial = SpatialOptions { maximum_wraps, amplitude_noise: noise, ..SpatialOptions::default() };
+        let spatial = SpatialOptions { maximum_wraps, amplitude_noise: noise, geometry: Some(geometry), ..SpatialOptions::default() };
         let unwrapped = unwrap_spatial(&channel.phase(), Some(&channel.amplitude()), Some(&mask), &spatial);
         let unwrapped = unwrapped.map_err(Error::stage("Unwrap", name))?;
         return Ok((vec![unwrapped.wraps], unwrapped.confidence));
@@ -58,6 +65,18 @@ fn wrap_counts(frame: &ComplexFrame, options: &UnwrapOptions, name: &str) -> Res
     let unwrapped = unwrap_multi_frequency(&phases, &modulations, Some(&sigmas), Some(&mask), &multi);
     let unwrapped = unwrapped.map_err(Error::stage("Unwrap", name))?;
     Ok((unwrapped.wraps, unwrapped.confidence))
+}
+
+/// What unwrapping needs to know of the camera, in pixels.
+fn image_geometry(camera: &Camera) -> ImageGeometry {
+    let format = camera.format;
+    let [column, row] = format.pixel_from_image(camera.interior.principal_point_mm);
+    // One principal distance serves both directions: pitches differ by less than what the evidence resolves.
+    let pitch = f64::midpoint(format.pixel_pitch_mm[0], format.pixel_pitch_mm[1]);
+    ImageGeometry {
+        principal_distance_px: (camera.interior.principal_distance_mm / pitch) as f32,
+        principal_point_px: [column as f32, row as f32],
+    }
 }
 
 /// The range of one frequency with its wrap counts.

@@ -1,0 +1,168 @@
+//! All stations at once from their surfaces: pairs aligned anew from the adjusted poses until nothing moves.
+
+use nalgebra::Isometry3;
+
+use super::overlap::find_overlaps;
+use super::pose_graph::{Datum, PairConstraint, StationAdjustment, StationAdjustmentOptions, adjust_stations};
+use crate::error::{Error, Result};
+use crate::icp::{IcpOptions, IcpResult, IcpTarget, StopReason};
+
+/// Options of [`adjust_surfaces`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct SurfaceAdjustmentOptions {
+    /// How each pair is aligned.
+    pub icp: IcpOptions,
+    /// Distance within which points count as overlapping, metre: about the error of the initial poses.
+    pub overlap_distance_m: f64,
+    /// Pairs with less overlap are left out. Default 0.3.
+    pub minimum_overlap: f64,
+    /// Rounds of alignment and adjustment. Default 4.
+    pub max_rounds: usize,
+    /// The rounds end when no station moves by more than this, metre. Default 0.1 mm.
+    pub tolerance_m: f64,
+    /// How the relative poses are adjusted.
+    pub adjustment: StationAdjustmentOptions,
+}
+
+impl SurfaceAdjustmentOptions {
+    /// Options for initial poses that are right to about this distance, metre.
+    pub fn with_initial_error(distance_m: f64) -> Self {
+        let icp = IcpOptions { initial_correspondence_distance_m: Some(distance_m), ..IcpOptions::default() };
+        Self {
+            icp,
+            overlap_distance_m: distance_m,
+            minimum_overlap: 0.3,
+            max_rounds: 4,
+            tolerance_m: 1e-4,
+            adjustment: StationAdjustmentOptions::default(),
+        }
+    }
+}
+
+/// Two stations brought together.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PairAlignment {
+    /// Index of the target station.
+    pub target: usize,
+    /// Index of the source station.
+    pub source: usize,
+    /// The alignment of the last round.
+    pub result: IcpResult,
+}
+
+/// Two stations that overlap and could not be aligned.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct RefusedPair {
+    /// Index of the target station.
+    pub target: usize,
+    /// Index of the source station.
+    pub source: usize,
+    /// Why.
+    pub reason: String,
+}
+
+/// All stations, with the pairs that carried them.
+#[derive(Debug, Clone)]
+pub struct SurfaceAdjustment {
+    /// Poses, covariances and residuals of the pairs.
+    pub stations: StationAdjustment,
+    /// The pairs, in the order of `stations.residuals`.
+    pub pairs: Vec<PairAlignment>,
+    /// Pairs that were left out in the last round.
+    pub refused: Vec<RefusedPair>,
+    /// Rounds that were needed.
+    pub rounds: usize,
+}
+
+/// Aligns all overlapping pairs, adjusts all stations, and repeats from the adjusted poses until no station moves.
+///
+/// Each pair enters as a relative pose with the full covariance that its surfaces give: a direction in which two
+/// stations slide on each other has no weight there and takes its value from other pairs. `progress(done, total)` is
+/// told the pairs done in each round.
+///
+/// # Errors
+/// Those of [`find_overlaps`] and [`adjust_stations`].
+pub fn adjust_surfaces(
+    stations: &[IcpTarget],
+    initial_world_from_station: &[Isometry3<f64>],
+    datum: Datum,
+    options: &SurfaceAdjustmentOptions,
+    progress: &dyn Fn(usize, usize),
+) -> Result<SurfaceAdjustment> {
+    let mut poses = initial_world_from_station.to_vec();
+    let mut icp = options.icp.clone();
+    let mut overlap_distance_m = options.overlap_distance_m;
+    let mut round = 1;
+    loop {
+        let overlaps = find_overlaps(stations, &poses, overlap_distance_m)?;
+        let candidates: Vec<(usize, usize)> = overlaps
+            .iter()
+            .filter(|overlap| overlap.fraction >= options.minimum_overlap)
+            .map(|overlap| (overlap.target, overlap.source))
+            .collect();
+        let (pairs, refused) = align_pairs(stations, &poses, &candidates, &icp, progress);
+        let adjusted = adjust_stations(&constraints(&pairs), &poses, datum, &options.adjustment)?;
+        let moved = poses.iter().zip(&adjusted.world_from_station);
+        let largest = moved.map(|(a, b)| (a.translation.vector - b.translation.vector).norm()).fold(0.0, f64::max);
+        if largest <= options.tolerance_m || round >= options.max_rounds {
+            return Ok(SurfaceAdjustment { stations: adjusted, pairs, refused, rounds: round });
+        }
+        poses = adjusted.world_from_station;
+        // The poses are much better now: near partners suffice, and far ones could only mislead.
+        let near = options.overlap_distance_m / 4.0;
+        overlap_distance_m = near;
+        icp.initial_correspondence_distance_m = Some(near);
+        round += 1;
+    }
+}
+
+fn constraints(pairs: &[PairAlignment]) -> Vec<PairConstraint> {
+    let constraint = |pair: &PairAlignment| PairConstraint {
+        target: pair.target,
+        source: pair.source,
+        target_from_source: pair.result.target_from_source,
+        covariance: pair.result.covariance,
+    };
+    pairs.iter().map(constraint).collect()
+}
+
+/// Aligns pairs of stations, `candidates` being indices of target and source, from the given poses.
+///
+/// A pair that can't be aligned, or does not settle, is listed with its reason: it is no failure as long as others
+/// connect its stations. Indices out of range are refused the same way.
+pub fn align_pairs(
+    stations: &[IcpTarget],
+    world_from_station: &[Isometry3<f64>],
+    candidates: &[(usize, usize)],
+    icp: &IcpOptions,
+    progress: &dyn Fn(usize, usize),
+) -> (Vec<PairAlignment>, Vec<RefusedPair>) {
+    let (mut pairs, mut refused) = (Vec::new(), Vec::new());
+    for (done, &(target, source)) in candidates.iter().enumerate() {
+        match align_pair(stations, world_from_station, target, source, icp) {
+            Ok(result) if result.stop == StopReason::MaxIterations => {
+                let reason = format!("not settled after {} iterations", result.iterations);
+                refused.push(RefusedPair { target, source, reason });
+            }
+            Ok(result) => pairs.push(PairAlignment { target, source, result }),
+            Err(error) => refused.push(RefusedPair { target, source, reason: error.to_string() }),
+        }
+        progress(done + 1, candidates.len());
+    }
+    (pairs, refused)
+}
+
+fn align_pair(
+    stations: &[IcpTarget],
+    world_from_station: &[Isometry3<f64>],
+    target: usize,
+    source: usize,
+    icp: &IcpOptions,
+) -> Result<IcpResult> {
+    let count = stations.len().min(world_from_station.len());
+    if let Some(station) = [target, source].into_iter().find(|station| *station >= count) {
+        return Err(Error::NoSuchStation { station, count });
+    }
+    let guess = world_from_station[target].inverse() * world_from_station[source];
+    stations[target].align(stations[source].cloud(), &guess, icp)
+}

@@ -1,7 +1,9 @@
 use std::sync::Arc;
 
 use crate::prior::PriorObservation;
-use crate::{BlockId, Covariance, DatumDefect, Error, GroupId, Observation, ObservationId, ParameterBlock, Result};
+use crate::{
+    BlockId, Covariance, DatumDefect, Error, GroupId, Kernel, Observation, ObservationId, ParameterBlock, Result,
+};
 
 /// A Gauss-Markov model being put together: blocks, observations, constraints and datum.
 ///
@@ -9,7 +11,7 @@ use crate::{BlockId, Covariance, DatumDefect, Error, GroupId, Observation, Obser
 #[derive(Default)]
 pub struct Adjustment<'a> {
     pub(crate) blocks: Vec<ParameterBlock>,
-    pub(crate) groups: Vec<String>,
+    pub(crate) groups: Vec<Group>,
     pub(crate) observations: Vec<StoredObservation<'a>>,
     /// Whitening matrices of all observations, see [`Covariance::whitening`].
     pub(crate) whitening: Vec<f64>,
@@ -24,6 +26,13 @@ pub(crate) struct StoredObservation<'a> {
     pub(crate) group: GroupId,
     /// Start of its whitening matrix.
     pub(crate) whitening: usize,
+}
+
+/// Observations of one kind.
+#[derive(Debug, Clone)]
+pub(crate) struct Group {
+    pub(crate) name: String,
+    pub(crate) kernel: Kernel,
 }
 
 /// Inner constraints on chosen points.
@@ -91,8 +100,17 @@ impl<'a> Adjustment<'a> {
 
     /// Adds a group: observations of one kind, reported together.
     pub fn add_group(&mut self, name: impl Into<String>) -> GroupId {
-        self.groups.push(name.into());
+        self.groups.push(Group { name: name.into(), kernel: Kernel::default() });
         GroupId(self.groups.len() - 1)
+    }
+
+    /// Makes the observations of a group robust against gross errors.
+    pub fn set_kernel(&mut self, group: GroupId, kernel: Kernel) -> Result<()> {
+        kernel.check()?;
+        let count = self.groups.len();
+        let unknown = Error::UnknownId { what: "group", index: group.0, count };
+        self.groups.get_mut(group.0).ok_or(unknown)?.kernel = kernel;
+        Ok(())
     }
 
     /// Adds an observation with its covariance matrix (a priori).
@@ -107,7 +125,8 @@ impl<'a> Adjustment<'a> {
         covariance: &Covariance,
     ) -> Result<ObservationId> {
         let count = self.groups.len();
-        let name = self.groups.get(group.0).ok_or(Error::UnknownId { what: "group", index: group.0, count })?.clone();
+        let unknown = Error::UnknownId { what: "group", index: group.0, count };
+        let name = self.groups.get(group.0).ok_or(unknown)?.name.clone();
         self.check_observation(&observation, &name)?;
         let (dimension, whitening) = (observation.dimension(), self.whitening.len());
         covariance.whitening(&name, dimension, &mut self.whitening)?;

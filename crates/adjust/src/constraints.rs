@@ -1,7 +1,7 @@
 use crate::datum::inner_constraints;
 use crate::layout::Layout;
 use crate::linearisation::Linearisation;
-use crate::{Adjustment, Result};
+use crate::{Adjustment, Result, dense};
 
 /// Linearised constraints `B dx = d` over all unknowns: those of the user first, inner constraints last.
 #[derive(Debug, Clone, Default)]
@@ -74,6 +74,29 @@ impl Constraints {
             lengths[index] = length;
         }
         ScaledConstraints { count: self.count, first_inner: self.first_inner, rows, right, lengths }
+    }
+
+    /// Lagrange multipliers λ of the user's constraints that balance `force = Bᵀλ` in the least-squares sense.
+    pub(crate) fn multipliers(&self, scale: &[f64], force: &[f64]) -> Vec<f64> {
+        let scaled = self.scaled(scale);
+        let (n, k) = (scale.len(), self.count);
+        let row = |index: usize| &scaled.rows[index * n..(index + 1) * n];
+        let mut gram = vec![0.0; k * k];
+        for column in 0..k {
+            for other in column..k {
+                gram[column * k + other] = row(column).iter().zip(row(other)).map(|(a, b)| a * b).sum();
+            }
+        }
+        let project = |index: usize| row(index).iter().zip(scale).zip(force).map(|((b, s), f)| b * s * f).sum();
+        let mut out: Vec<f64> = (0..k).map(project).collect();
+        if !dense::cholesky(&mut gram, k) {
+            // Dependent constraints: the factorisation says so with their names.
+            return Vec::new();
+        }
+        dense::solve_cholesky(&gram, k, &mut out, 1);
+        out.iter_mut().zip(&scaled.lengths).for_each(|(multiplier, length)| *multiplier /= length);
+        out.truncate(self.first_inner);
+        out
     }
 }
 

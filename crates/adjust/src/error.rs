@@ -47,6 +47,14 @@ pub enum Error {
     /// There is nothing to adjust.
     #[error("the adjustment has no observations")]
     NoObservations,
+    /// More unknowns than dense normal equations can hold.
+    #[error("{unknowns} unknowns: dense normal equations are limited to {limit}")]
+    TooLarge {
+        /// Number of unknowns.
+        unknowns: usize,
+        /// Largest number.
+        limit: usize,
+    },
     /// The model of an observation could not be computed at the current parameters.
     #[error("group `{group}`, observation {observation}: {reason}")]
     Evaluation {
@@ -106,7 +114,7 @@ pub enum Error {
     },
     /// The iteration did not reach its end.
     #[error(
-        "not converged after {iterations} iterations ({reason}): last v'Pv {vtpv:.9e}, last undamped step {step:.3e} \
+        "not converged after {iterations} iterations ({reason}): last objective {objective:.9e}, last undamped step {step:.3e} \
          standard deviations, damping {damping:.1e}"
     )]
     NotConverged {
@@ -114,8 +122,8 @@ pub enum Error {
         iterations: usize,
         /// What ended the iteration.
         reason: &'static str,
-        /// Last objective.
-        vtpv: f64,
+        /// Last objective (v'Pv where no kernel is robust).
+        objective: f64,
         /// Length of the last step in standard deviations (norm of `A·dx`, whitened).
         step: f64,
         /// Last damping factor.

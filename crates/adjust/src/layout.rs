@@ -3,6 +3,9 @@ use crate::{Adjustment, Error, Observation, Result};
 /// Column of a held parameter.
 pub(crate) const HELD: usize = usize::MAX;
 
+/// Unknowns of a dense normal matrix of 1.8 GB.
+const LARGEST: usize = 15_000;
+
 /// Where everything lies in flat memory: values, columns, rows and Jacobian entries.
 #[derive(Debug, Clone)]
 pub(crate) struct Layout {
@@ -86,6 +89,9 @@ impl Layout {
                 columns.push(if held { HELD } else { unknowns });
                 unknowns += usize::from(!held);
             }
+        }
+        if unknowns > LARGEST {
+            return Err(Error::TooLarge { unknowns, limit: LARGEST });
         }
         Ok(Self {
             values,

@@ -12,8 +12,12 @@ pub(crate) struct Linearisation {
     pub(crate) jacobian: Vec<f64>,
     /// Residuals of the constraints.
     pub(crate) constraint: Vec<f64>,
-    /// vᵀPv.
+    /// Robust weight of each row, 1 for least squares. Not contained in `whitened` and `jacobian`.
+    pub(crate) weights: Vec<f64>,
+    /// vᵀPv with robust weights.
     pub(crate) vtpv: f64,
+    /// What is minimised: the sum of ρ(s²); vᵀPv for least squares.
+    pub(crate) objective: f64,
 }
 
 /// Whether derivatives are wanted.
@@ -30,7 +34,9 @@ impl Linearisation {
             whitened: vec![0.0; layout.rows],
             jacobian: vec![0.0; layout.jacobian],
             constraint: vec![0.0; layout.constraint_rows],
+            weights: vec![1.0; layout.rows],
             vtpv: 0.0,
+            objective: 0.0,
         }
     }
 
@@ -43,16 +49,24 @@ impl Linearisation {
         want: Want,
     ) -> Result<()> {
         let mut scratch = Scratch::new(layout, values, want);
+        (self.vtpv, self.objective) = (0.0, 0.0);
         for (index, (stored, place)) in adjustment.observations.iter().zip(&layout.observations).enumerate() {
-            let name = |failure: Failure| failure.name(&adjustment.groups[stored.group.0], index);
+            let group = &adjustment.groups[stored.group.0];
+            let name = |failure: Failure| failure.name(&group.name, index);
+
             let (rows, entries) = (place.rows(), place.jacobian_range());
             let residual = &mut self.residual[rows.clone()];
             let jacobian = &mut self.jacobian[entries];
             scratch.evaluate(stored.observation.as_ref(), layout, place, residual, jacobian).map_err(name)?;
             let whitening = &adjustment.whitening[stored.whitening..];
-            let whitened = &mut self.whitened[rows];
+            let whitened = &mut self.whitened[rows.clone()];
             whitened.copy_from_slice(residual);
             whiten(whitening, whitened, 1);
+            let square: f64 = whitened.iter().map(|v| v * v).sum();
+            let (objective, weight) = group.kernel.evaluate(square);
+            self.weights[rows].fill(weight);
+            self.vtpv += weight * square;
+            self.objective += objective;
             if want == Want::Jacobians {
                 whiten(whitening, jacobian, place.width());
             }
@@ -63,11 +77,10 @@ impl Linearisation {
             let name = |failure: Failure| failure.name("constraint", index);
             scratch.evaluate(constraint.as_ref(), layout, place, residual, jacobian).map_err(name)?;
         }
-        self.vtpv = self.whitened.iter().map(|v| v * v).sum();
         Ok(())
     }
 
-    /// `A·dx`, whitened, in `out` (one value a row).
+    /// `A·dx`, whitened but without robust weights, in `out` (one value a row).
     pub(crate) fn apply(&self, layout: &Layout, step: &[f64], out: &mut [f64]) {
         for place in &layout.observations {
             let (active, jacobian) = (layout.active(place), &self.jacobian[place.jacobian_range()]);
@@ -76,6 +89,19 @@ impl Linearisation {
                 out[row] = entries.iter().zip(active).map(|(a, &(_, column))| a * step[column]).sum();
             }
         }
+    }
+
+    /// `Aᵀ P rows` for whitened rows.
+    pub(crate) fn transpose_apply(&self, layout: &Layout, rows: &[f64]) -> Vec<f64> {
+        let mut out = vec![0.0; layout.unknowns];
+        for place in &layout.observations {
+            let (active, jacobian) = (layout.active(place), &self.jacobian[place.jacobian_range()]);
+            for (row, entries) in place.rows().zip(jacobian.chunks_exact(active.len().max(1))) {
+                let weighted = self.weights[row] * rows[row];
+                entries.iter().zip(active).for_each(|(a, &(_, column))| out[column] += a * weighted);
+            }
+        }
+        out
     }
 }
 

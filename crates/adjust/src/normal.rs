@@ -25,16 +25,17 @@ impl NormalEquations {
             let active = layout.active(place);
             let jacobian = &linearisation.jacobian[place.jacobian_range()];
             for (row, entries) in place.rows().zip(jacobian.chunks_exact(active.len().max(1))) {
-                self.add_row(active, entries, linearisation.whitened[row]);
+                self.add_row(active, entries, linearisation.whitened[row], linearisation.weights[row]);
             }
         }
     }
 
-    fn add_row(&mut self, active: &[(usize, usize)], entries: &[f64], residual: f64) {
+    fn add_row(&mut self, active: &[(usize, usize)], entries: &[f64], residual: f64, weight: f64) {
         for (first, (&(_, column), &a)) in active.iter().zip(entries).enumerate() {
+            let a = weight * a;
             self.gradient[column] += a * residual;
             let target = &mut self.matrix[column * self.unknowns..(column + 1) * self.unknowns];
-            target[column] += a * a;
+            target[column] += a * entries[first];
             for (&(_, row), &b) in active[first + 1..].iter().zip(&entries[first + 1..]) {
                 // Active columns ascend; a block named twice in one observation meets itself off the diagonal twice.
                 target[row] += if row == column { 2.0 * a * b } else { a * b };
@@ -98,15 +99,15 @@ impl NormalFactor {
         Ok(Self { scale, factor, constraints, influence, complement, complement_factor })
     }
 
-    /// The step.
-    pub(crate) fn solve(&self, gradient: &[f64]) -> Vec<f64> {
+    /// The step that follows `gradient` and takes away `share` of what the constraints miss.
+    pub(crate) fn solve(&self, gradient: &[f64], share: f64) -> Vec<f64> {
         let (n, k) = (self.scale.len(), self.constraints.count);
         let mut step: Vec<f64> = gradient.iter().zip(&self.scale).map(|(g, s)| g * s).collect();
         for (row, d) in self.constraint_rows().zip(&self.constraints.right) {
-            step.iter_mut().zip(row).for_each(|(y, b)| *y += b * d);
+            step.iter_mut().zip(row).for_each(|(y, b)| *y += b * d * share);
         }
         dense::solve_cholesky(&self.factor, n, &mut step, 1);
-        let miss = |(row, d): (&[f64], &f64)| row.iter().zip(&step).map(|(b, y)| b * y).sum::<f64>() - d;
+        let miss = |(row, d): (&[f64], &f64)| row.iter().zip(&step).map(|(b, y)| b * y).sum::<f64>() - d * share;
         let mut multipliers: Vec<f64> = self.constraint_rows().zip(&self.constraints.right).map(miss).collect();
         dense::solve_cholesky(&self.complement_factor, k, &mut multipliers, 1);
         for (column, multiplier) in self.influence.chunks_exact(n.max(1)).zip(&multipliers) {

@@ -45,8 +45,9 @@ impl OrthogonalFactor {
             let (active, jacobian) = (layout.active(place), &linearisation.jacobian[place.jacobian_range()]);
             for (index, target) in place.rows().enumerate() {
                 row.fill(0.0);
+                let weight = linearisation.weights[target].sqrt();
                 for (a, &(_, column)) in jacobian[index * active.len()..].iter().zip(active) {
-                    row[column] += a * scale[column];
+                    row[column] += weight * a * scale[column];
                 }
                 for reflector in &reflectors {
                     reflect(reflector, &mut row);
@@ -55,7 +56,7 @@ impl OrthogonalFactor {
                 for (column, a) in row[k..].iter().enumerate() {
                     matrix[column * height + target] = *a;
                 }
-                matrix[free * height + target] = linearisation.whitened[target] - known;
+                matrix[free * height + target] = weight * linearisation.whitened[target] - known;
             }
         }
         let upper = dense::upper_factor(&mut matrix, height, free + 1);
@@ -134,8 +135,10 @@ fn column_scale(layout: &Layout, linearisation: &Linearisation) -> Vec<f64> {
     let mut squares = vec![0.0; layout.unknowns];
     for place in &layout.observations {
         let active = layout.active(place);
-        for row in linearisation.jacobian[place.jacobian_range()].chunks_exact(active.len().max(1)) {
-            row.iter().zip(active).for_each(|(a, &(_, column))| squares[column] += a * a);
+        let rows = linearisation.jacobian[place.jacobian_range()].chunks_exact(active.len().max(1));
+        for (row, target) in rows.zip(place.rows()) {
+            let weight = linearisation.weights[target];
+            row.iter().zip(active).for_each(|(a, &(_, column))| squares[column] += weight * a * a);
         }
     }
     squares.into_iter().map(|s: f64| if s > 0.0 { 1.0 / s.sqrt() } else { 1.0 }).collect()

@@ -29,41 +29,44 @@ impl GroupSummary {
 }
 
 impl Solution {
-    /// Redundancy numbers `(Q_vv P)ᵢᵢ` of all observed values, in the order of [`Self::residuals`]: the share of an
-    /// error that shows in its residual, 0 (not controlled) to 1. Their sum is the redundancy.
+    /// Redundancy numbers `(I − A Q Aᵀ P)ᵢᵢ` of all observed values, in the order of [`Self::residuals`]: the share of an
+    /// error that shows in its residual, 0 (not controlled) to 1. Their sum is the redundancy. P contains the robust
+    /// weights.
     pub fn redundancy_numbers(&self) -> Vec<f64> {
         let mut out = vec![0.0; self.observations()];
         self.for_each_observation(|place, local| {
             for (index, row) in place.rows().enumerate() {
-                // (L R L⁻¹)ᵢᵢ with R the projector of the whitened residuals, C = L Lᵀ.
+                // With C = L Lᵀ and the whitened J: A Q AᵀP = L (w J Q Jᵀ) L⁻¹.
                 let d = place.dimension;
-                let mut sum = 0.0;
+                let mut used = 0.0;
                 for first in 0..=index {
                     for second in index..d {
-                        sum += local.factor[index * d + first]
-                            * local.projector[first * d + second]
+                        used += local.factor[index * d + first]
+                            * local.image[first * d + second]
                             * local.whitening(second, index);
                     }
                 }
-                out[row] = sum;
+                out[row] = 1.0 - self.weights()[row] * used;
             }
         });
         out
     }
 
-    /// Standard deviations of the residuals, from `C − A Q Aᵀ`, prior- or posterior-scaled.
+    /// Standard deviations of the residuals, from `C − A Q Aᵀ`, prior- or posterior-scaled. An observation with the robust
+    /// weight w has `C + (1 − 2w) A Q Aᵀ`: with weight zero its residual is that of a prediction.
     pub fn residual_deviations(&self, scale: Scale) -> Result<Vec<f64>> {
         let factor = self.variance_factor(scale)?.sqrt();
         let mut out = vec![0.0; self.observations()];
         self.for_each_observation(|place, local| {
             for (index, row) in place.rows().enumerate() {
                 let d = place.dimension;
+                let share = 1.0 - 2.0 * self.weights()[row];
                 let mut variance = 0.0;
                 for first in 0..=index {
+                    let own = local.factor[index * d + first];
+                    variance += own * own;
                     for second in 0..=index {
-                        variance += local.factor[index * d + first]
-                            * local.projector[first * d + second]
-                            * local.factor[index * d + second];
+                        variance += share * own * local.image[first * d + second] * local.factor[index * d + second];
                     }
                 }
                 out[row] = factor * variance.max(0.0).sqrt();
@@ -92,7 +95,7 @@ impl Solution {
         for (place, _) in self.layout.observations.iter().zip(&self.group_of).filter(|(_, of)| **of == group) {
             for row in place.rows() {
                 observations += 1;
-                vtpv += self.linearisation.whitened[row].powi(2);
+                vtpv += self.weights()[row] * self.linearisation.whitened[row].powi(2);
                 redundancy += numbers[row];
                 squares += self.linearisation.residual[row].powi(2);
             }
@@ -103,17 +106,17 @@ impl Solution {
 
     fn for_each_observation(&self, mut visit: impl FnMut(&Place, &Local<'_>)) {
         let mut product = Vec::new();
-        let mut local = Local { projector: Vec::new(), factor: Vec::new(), whitening: &[] };
+        let mut local = Local { image: Vec::new(), factor: Vec::new(), whitening: &[] };
         for (place, &start) in self.layout.observations.iter().zip(&self.whitening_start) {
             local.whitening = &self.whitening[start..];
-            self.project(place, &mut product, &mut local.projector);
+            self.image(place, &mut product, &mut local.image);
             invert_lower(local.whitening, place.dimension, &mut local.factor);
             visit(place, &local);
         }
     }
 
-    /// `I − J Q Jᵀ` of one observation, row-major; J is the whitened Jacobian.
-    fn project(&self, place: &Place, product: &mut Vec<f64>, out: &mut Vec<f64>) {
+    /// `J Q Jᵀ` of one observation, row-major; J is the whitened Jacobian.
+    fn image(&self, place: &Place, product: &mut Vec<f64>, out: &mut Vec<f64>) {
         let (active, d) = (self.layout.active(place), place.dimension);
         let jacobian = &self.linearisation.jacobian[place.jacobian_range()];
         out.clear();
@@ -129,7 +132,7 @@ impl Solution {
             for first in 0..d {
                 let other = &jacobian[first * active.len()..(first + 1) * active.len()];
                 let share: f64 = other.iter().zip(product.iter()).map(|(a, b)| a * b).sum();
-                out[first * d + second] = if first == second { 1.0 - share } else { -share };
+                out[first * d + second] = share;
             }
         }
     }
@@ -137,8 +140,8 @@ impl Solution {
 
 /// Small matrices of one observation.
 struct Local<'s> {
-    /// `I − J Q Jᵀ`, row-major.
-    projector: Vec<f64>,
+    /// `J Q Jᵀ`, row-major.
+    image: Vec<f64>,
     /// L of `C = L Lᵀ`, row-major, full.
     factor: Vec<f64>,
     whitening: &'s [f64],

@@ -59,25 +59,32 @@ impl Problem<'_> {
         if self.layout.unknowns == 0 {
             return Ok(Cofactor { matrix: Vec::new(), scale: Vec::new(), condition: 1.0 });
         }
-        let factor = self.factorise()?.ok_or(()).or_else(|()| Err(self.defect(names)?))?;
-        if self.constraints.count > self.constraints.first_inner {
-            match NormalFactor::new(self.normal, self.constraints, None) {
-                Ok(factor) => factor.check_datum()?,
-                Err(Singular::Constraints(error)) => return Err(error),
-                Err(Singular::Normal) => return Err(self.defect(names)?),
-            }
-        }
+        let Some(factor) = self.factorise()? else { return Err(self.defect(names)?) };
         let (matrix, scale, trace) = match factor {
             Factor::Normal(factor) => {
+                factor.check_datum()?;
                 let (matrix, trace) = factor.cofactor();
                 (matrix, factor.scale, trace)
             }
             Factor::Orthogonal(factor) => {
+                self.check_datum(names)?;
                 let Some((matrix, trace)) = factor.cofactor() else { return Err(self.defect(names)?) };
                 (matrix, factor.scale, trace)
             }
         };
         Ok(Cofactor { matrix, scale, condition: (trace * self.layout.unknowns as f64).sqrt() })
+    }
+
+    /// Inner constraints are checked on the normal equations in any case.
+    fn check_datum(&self, names: &[String]) -> Result<()> {
+        if self.constraints.count == self.constraints.first_inner {
+            return Ok(());
+        }
+        match NormalFactor::new(self.normal, self.constraints, None) {
+            Ok(factor) => factor.check_datum(),
+            Err(Singular::Constraints(error)) => Err(error),
+            Err(Singular::Normal) => Err(self.defect(names)?),
+        }
     }
 
     /// Names what is not determined. Called only where [`Self::factorise`] found a defect.

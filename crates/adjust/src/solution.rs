@@ -81,7 +81,7 @@ impl Adjustment<'_> {
         }
         Solution {
             blocks: self.blocks.clone(),
-            groups: self.groups.clone(),
+            groups: self.groups.iter().map(|group| group.name.clone()).collect(),
             group_of: self.observations.iter().map(|stored| stored.group).collect(),
             whitening: self.whitening.clone(),
             whitening_start: self.observations.iter().map(|stored| stored.whitening).collect(),
@@ -194,7 +194,7 @@ impl Solution {
         self.redundancy
     }
 
-    /// Weighted sum of squared residuals.
+    /// Weighted sum of squared residuals; robust weights are part of it.
     pub fn vtpv(&self) -> f64 {
         self.linearisation.vtpv
     }
@@ -217,6 +217,12 @@ impl Solution {
     /// All residuals v = observed − model, in the order of adding.
     pub fn residuals(&self) -> &[f64] {
         &self.linearisation.residual
+    }
+
+    /// Robust weights of all observed values, in the same order: 1 for least squares, towards 0 for what a [`crate::Kernel`]
+    /// takes for a gross error.
+    pub fn weights(&self) -> &[f64] {
+        &self.linearisation.weights
     }
 
     /// Residuals of one observation.

@@ -16,8 +16,8 @@ pub enum StepKind {
 pub struct TraceEntry {
     /// What was done.
     pub kind: StepKind,
-    /// vᵀPv after the step (before it where it was rejected).
-    pub vtpv: f64,
+    /// Objective after the step (before it where it was rejected): vᵀPv, or the sum of ρ where kernels are robust.
+    pub objective: f64,
     /// Length of the step in prior standard deviations, `√(dxᵀ AᵀPA dx)`: no parameter moved by more of its own
     /// standard deviations.
     pub step: f64,

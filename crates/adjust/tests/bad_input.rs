@@ -186,3 +186,15 @@ fn options_out_of_domain() {
     let options = SolveOptions { max_iterations: 0, ..SolveOptions::default() };
     assert!(matches!(a.solve(&options).unwrap_err(), Error::NotConverged { iterations: 0, .. }));
 }
+
+#[test]
+fn more_unknowns_than_memory_are_refused() {
+    let mut a = Adjustment::new();
+    let x = a.add_block(ParameterBlock::euclidean(vec![0.0; 20_000]));
+    let y = a.add_block(ParameterBlock::euclidean([0.0]));
+    let g = a.add_group("g");
+    a.add_observation(g, LinearObservation::new(0.0, [(y, [1.0])]), &Covariance::from_sigma(1.0)).unwrap();
+    assert!(matches!(solve(&a).unwrap_err(), Error::TooLarge { unknowns: 20_001, .. }));
+    a.hold(x).unwrap();
+    solve(&a).unwrap();
+}

@@ -47,7 +47,7 @@ fn parse(path: &Path) -> Problem {
         }
     }
     if name == "Roszman1" {
-        // The file's b1 was altered; NIST certifies this one.
+        // The file at hand carries an altered b1; NIST certifies this one.
         certified[0] = 0.201_968_663_96;
     }
     Problem { name, starts, certified, deviations, sum_of_squares, data }
@@ -67,6 +67,9 @@ impl Dual {
     fn exp(self) -> Self {
         let value = self.value.exp();
         self.map(value, value)
+    }
+    fn ln(self) -> Self {
+        self.map(self.value.ln(), 1.0 / self.value)
     }
     fn cos(self) -> Self {
         self.map(self.value.cos(), -self.value.sin())
@@ -170,7 +173,13 @@ fn model(name: &str, b: &[Dual], x: &[f64]) -> Dual {
         "Misra1d" => b[0] * b[1] * t / (1.0 + b[1] * t),
         "Nelson" => b[0] - b[1] * t * (-b[2] * x[1]).exp(),
         "Rat42" => b[0] / (1.0 + (b[1] - b[2] * t).exp()),
-        "Rat43" => b[0] / (1.0 + (b[1] - b[2] * t).exp()).powf(1.0),
+        // (…)^(1/b4) by way of the logarithm, because the exponent is a parameter.
+        "Rat43" => b[0] / ((1.0 + (b[1] - b[2] * t).exp()).ln() / b[3]).exp(),
+        "Bennett5" => b[0] * ((b[1] + t).ln() * (-1.0 / b[2])).exp(),
+        "Eckerle4" => {
+            let z = (t - b[2]) / b[1];
+            b[0] / b[1] * (-0.5 * (z * z)).exp()
+        }
         "Roszman1" => b[0] - b[1] * t - (b[2] / (t - b[3])).atan() / PI,
         other => panic!("no model for {other}"),
     }
@@ -219,13 +228,17 @@ fn solve(problem: &Problem, start: &[f64]) -> Result<(f64, f64, f64, usize), adj
 
 #[test]
 fn certified_values_are_reached_from_both_starts() {
-    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/real/nist_strd");
-    let Ok(entries) = fs::read_dir(folder) else {
-        println!("skipped: {folder} is not there");
-        return;
-    };
-    let mut paths: Vec<_> =
-        entries.map(|entry| entry.unwrap().path()).filter(|p| p.extension().is_some_and(|e| e == "dat")).collect();
+    let own = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/nist_strd");
+    let shared = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/real/nist_strd");
+    let mut paths = Vec::new();
+    for folder in [own, shared] {
+        let Ok(entries) = fs::read_dir(folder) else {
+            println!("skipped: {folder} is not there");
+            continue;
+        };
+        let files = entries.map(|entry| entry.unwrap().path());
+        paths.extend(files.filter(|path| path.extension().is_some_and(|extension| extension == "dat")));
+    }
     paths.sort();
     let (mut count, mut solved, mut parameter_digits, mut deviation_digits) = (0, 0, 0.0, 0.0);
     for path in &paths {
@@ -249,5 +262,8 @@ fn certified_values_are_reached_from_both_starts() {
     let (parameters, deviations) = (parameter_digits / f64::from(count), deviation_digits / f64::from(count));
     println!("{solved} of {count} solved; mean digits: parameters {parameters:.2}, deviations {deviations:.2}");
     assert_eq!(solved, count as usize);
-    assert!(parameters > 10.4);
+    // With the sets that are always here alone, MGH09 (large residuals, ten observations) weighs more in the mean.
+    let all = count == 54;
+    assert!(parameters > if all { 10.4 } else { 10.2 }, "{parameters}");
+    assert!(deviations > if all { 10.1 } else { 9.9 }, "{deviations}");
 }

@@ -19,7 +19,8 @@ use crate::{CorrectionSummary, FixedPattern, RangeErrorModel, Result};
 ///
 /// Pixels without a finite range stay as they are. Single precision: the result differs from
 /// [`RangeErrorModel::corrected_range`] by a unit in the last place of the range and about a millionth of the
-/// coefficients. Same bits for any number of threads; nothing is allocated.
+/// coefficients. Same bits for any number of threads; no memory is allocated but
+/// what rayon needs for its own bookkeeping.
 ///
 /// Refuses a model that [`RangeErrorModel::validate`] refuses, a bad pattern, and sizes that differ; the frame
 /// is untouched then.

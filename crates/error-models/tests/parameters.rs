@@ -57,7 +57,7 @@ fn what_is_wrong_with_a_parameter_list_is_said() {
 #[cfg(feature = "serde")]
 mod ron_round_trip {
     use super::*;
-    use error_models::{FixedPattern, ModelSet};
+    use error_models::{FixedPattern, GrossErrorOptions, ModelSet};
     use proptest::prelude::*;
     use serde::{Serialize, de::DeserializeOwned};
 
@@ -88,6 +88,9 @@ mod ron_round_trip {
         assert_eq!(through_ron(&set), set);
         let parameters = model().to_parameters();
         assert_eq!(through_ron(&parameters), parameters);
+        let options = GrossErrorOptions { low_amplitude: Some(0.1), ..GrossErrorOptions::default() };
+        assert_eq!(through_ron(&options), options);
+        assert_eq!(ron::from_str::<GrossErrorOptions>("()").unwrap(), GrossErrorOptions::default());
         let unknown_sigma = NamedParameter::estimated("d0", 0.1, f64::NAN).unwrap();
         assert!(through_ron(&unknown_sigma).sigma.is_nan());
     }
@@ -105,6 +108,7 @@ mod ron_round_trip {
         assert!(refused(&model().hyperbola.unwrap()));
         assert!(refused(&FixedPattern { width: 1, height: 1, offset_m: vec![0.0] }));
         assert!(refused(&ModelSet::default()));
+        assert!(refused(&GrossErrorOptions::default()));
         assert!(refused(&NamedParameter::held("d0", 0.0).unwrap()));
     }
 }

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use phase_unwrap::{KnownWraps, MultiFrequencyOptions, SpatialOptions, Unwrapper, unwrap_multi_frequency};
+use phase_unwrap::{KnownWraps, MultiFrequencyOptions, SpatialOptions, Unwrapped, Unwrapper, unwrap_multi_frequency};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
@@ -39,12 +39,16 @@ fn spatial(c: &mut Criterion) {
     for (width, height) in SIZES {
         let (phase, amplitude) = wrapped(&range(width, height), &modulation, 1);
         let size = format!("{width}x{height}");
+        let mut out = Unwrapped::default();
         let mut unwrapper = Unwrapper::new(SpatialOptions::default()).unwrap();
         c.bench_function(&format!("tree/{size}"), |b| {
-            b.iter(|| unwrapper.unwrap(black_box(&phase), None, None, KnownWraps::Nothing).unwrap());
+            b.iter(|| unwrapper.unwrap_into(black_box(&phase), None, None, KnownWraps::Nothing, &mut out).unwrap());
         });
         c.bench_function(&format!("absolute/{size}"), |b| {
-            b.iter(|| unwrapper.unwrap(black_box(&phase), Some(&amplitude), None, KnownWraps::Nothing).unwrap());
+            b.iter(|| {
+                let amplitude = Some(&amplitude);
+                unwrapper.unwrap_into(black_box(&phase), amplitude, None, KnownWraps::Nothing, &mut out).unwrap();
+            });
         });
     }
 }

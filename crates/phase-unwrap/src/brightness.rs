@@ -22,6 +22,12 @@ const TYPICAL_LOG_COSINE: f32 = -0.35;
 /// Logarithm of the smallest cosine that is taken off: beyond 84 degrees slopes and albedo laws fail.
 const LOWEST_LOG_COSINE: f32 = -2.3;
 
+/// Log albedo above the typical one from which a surface counts as retro-reflective, and the scale beyond.
+const RETRO: f32 = 1.0;
+const RETRO_SCALE: f32 = 1.5;
+/// Weak prior for short ranges, nats a wrap: light falls off, so what is seen at all is rather near.
+const NEARNESS: f32 = 0.5;
+
 /// The angle of incidence of every pixel as slope and camera give it.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Incidence<'a> {
@@ -33,7 +39,7 @@ pub(crate) struct Incidence<'a> {
 impl Incidence<'_> {
     fn log_cosine(&self, pixel: usize, range: f32) -> f32 {
         let slope = self.slope[pixel];
-        if slope[0].is_nan() {
+        if slope[0].is_nan() || slope[1].is_nan() {
             return TYPICAL_LOG_COSINE;
         }
         let (col, row) = (pixel % self.grid.stride, pixel / self.grid.stride);
@@ -88,14 +94,22 @@ impl Brightness {
                 continue;
             }
             let segment = label as usize;
-            if seen[segment] % pixels[segment].div_ceil(SAMPLES) == 0 {
+            if seen[segment].is_multiple_of(pixels[segment].div_ceil(SAMPLES)) {
                 self.pixel[segment].push(pixel as u32);
             }
             seen[segment] += 1;
         }
     }
 
-    fn measure_label(&mut self, surface: &Surface, forest: &Forest, segment: usize, label: i32, incidence: Option<Incidence<'_>>, maximum: i32) {
+    fn measure_label(
+        &mut self,
+        surface: &Surface,
+        forest: &Forest,
+        segment: usize,
+        label: i32,
+        incidence: Option<Incidence<'_>>,
+        maximum: i32,
+    ) {
         self.scratch.clear();
         let mut outside = 0.0;
         for &pixel in &self.pixel[segment] {
@@ -158,7 +172,9 @@ impl Brightness {
         for (index, quantiles) in self.quantiles.chunks_exact(QUANTILES).enumerate() {
             let weight = self.weight[index / self.labels];
             let mean = quantiles.iter().map(|q| deviation_cost(q - log_constant, albedo)).sum::<f32>();
-            let mean = if mean.is_nan() { 0.0 } else { mean / QUANTILES as f32 };
+            let nearness = NEARNESS * (index % self.labels) as f32;
+            // Without amplitudes there is no opinion.
+            let mean = if mean.is_nan() { 0.0 } else { mean / QUANTILES as f32 + nearness };
             costs.push(weight * mean + self.fixed[index]);
         }
     }
@@ -178,5 +194,9 @@ fn segment_weight(n: f32) -> f32 {
 
 /// Minus the logarithm of the prior density of a log albedo `x` off its typical value, up to a constant.
 fn deviation_cost(x: f32, albedo: &AlbedoPrior) -> f32 {
-    if x < 0.0 { -x / albedo.dark_scale } else { x / albedo.bright_scale }
+    if x < 0.0 {
+        -x / albedo.dark_scale
+    } else {
+        x.min(RETRO) / albedo.bright_scale + (x - RETRO).max(0.0) / RETRO_SCALE
+    }
 }

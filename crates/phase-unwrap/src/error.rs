@@ -45,12 +45,14 @@ pub enum Error {
         expected: &'static str,
     },
     /// A seed lies outside the image or on a pixel that is not used.
-    #[error("the known wrap count at column {col}, row {row} {why}")]
+    #[error("the known wrap count {wraps} at column {col}, row {row} {why}")]
     UnusableSeed {
         /// Column.
         col: usize,
         /// Row.
         row: usize,
+        /// Count given.
+        wraps: i32,
         /// Why it cannot be used.
         why: &'static str,
     },
@@ -103,5 +105,5 @@ pub enum Error {
     Raster(#[from] range_image::Error),
 }
 
-/// Result with this crate's [`Error`].
+/// Result with this crate's [`enum@Error`].
 pub type Result<T> = std::result::Result<T, Error>;

@@ -61,13 +61,16 @@ impl Grid {
         }
     }
 
-    /// Maps the image part of a padded plane to a raster.
-    pub fn crop<T, U>(&self, padded: &[T], mut value: impl FnMut(&T) -> U) -> Result<Raster<U>> {
-        let mut data = Vec::with_capacity(self.width * self.height);
-        for start in self.row_starts() {
-            data.extend(padded[start..start + self.width].iter().map(&mut value));
+    /// Maps the image part of a padded plane into a raster, which gets the image's size if it has another.
+    pub fn crop<T, U: Copy + Default>(&self, padded: &[T], raster: &mut Raster<U>, value: impl Fn(&T) -> U) {
+        if (raster.width(), raster.height()) != (self.width, self.height) {
+            *raster = Raster::filled(self.width, self.height, U::default());
         }
-        Ok(Raster::from_vec(self.width, self.height, data)?)
+        for (start, row) in self.row_starts().zip(raster.as_mut_slice().chunks_exact_mut(self.width)) {
+            for (out, padded) in row.iter_mut().zip(&padded[start..start + self.width]) {
+                *out = value(padded);
+            }
+        }
     }
 }
 

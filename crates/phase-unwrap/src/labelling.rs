@@ -1,4 +1,4 @@
-//! The offsets of all segments together: sequential tree-reweighted message passing [Kolmogorov2006] over the graph
+//! The offsets of all segments together: sequential tree-reweighted message passing `[Kolmogorov2006]` over the graph
 //! of segments, once for each candidate of the brightness constant.
 
 use crate::borders::Tie;
@@ -192,7 +192,8 @@ fn add(sum: &mut [f32], term: &[f32]) {
     }
 }
 
-fn reward(belief: &mut [f32], label: i32, bonus: f32) {
+/// Takes a bonus off the cost of a label, where there is that label.
+pub(crate) fn reward(belief: &mut [f32], label: i32, bonus: f32) {
     if let Some(cost) = usize::try_from(label).ok().and_then(|label| belief.get_mut(label)) {
         *cost -= bonus;
     }

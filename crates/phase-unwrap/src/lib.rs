@@ -7,6 +7,7 @@ mod error;
 mod forest;
 mod grid;
 mod intervals;
+mod known;
 mod labelling;
 mod multi_frequency;
 mod offsets;

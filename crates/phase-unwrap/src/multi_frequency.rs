@@ -73,7 +73,7 @@ pub fn unwrap_multi_frequency(
         let Some(best) = pixel.search(&search) else {
             continue;
         };
-        for (member, &wraps) in pixel.members.iter().zip(&pixel.best) {
+        for (member, &wraps) in pixel.members.iter().zip(&pixel.counts) {
             out.wraps[member.frequency].as_mut_slice()[index] = wraps;
         }
         out.range.as_mut_slice()[index] = best.range_m as f32;
@@ -121,8 +121,8 @@ fn check_planes<'a>(
 
 /// What does not depend on the pixel.
 struct Search {
-    /// Intervals in metres.
-    intervals: Vec<f64>,
+    /// Position and interval in metres of each frequency, highest frequency first.
+    intervals: Vec<(usize, f64)>,
     maximum_range_m: f64,
     assumed_sigma: f64,
     acceptable_misfit: f64,
@@ -146,9 +146,10 @@ impl Search {
         if maximum_range_m > combined * (1.0 + 1e-6) {
             return Err(Error::BeyondCombinedInterval { maximum_range_m, combined_interval_m: combined });
         }
-        let intervals: Vec<f64> = modulations.iter().map(Modulation::ambiguity_interval_m).collect();
-        let shortest = intervals.iter().copied().fold(f64::INFINITY, f64::min);
-        let hypotheses = (maximum_range_m / shortest).ceil();
+        let mut intervals: Vec<(usize, f64)> =
+            modulations.iter().map(Modulation::ambiguity_interval_m).enumerate().collect();
+        intervals.sort_by(|a, b| a.1.total_cmp(&b.1));
+        let hypotheses = (maximum_range_m / intervals[0].1).ceil();
         if hypotheses > options.maximum_hypotheses as f64 {
             let limit = options.maximum_hypotheses;
             return Err(Error::SearchTooLarge { hypotheses, maximum_range_m, limit });
@@ -167,10 +168,20 @@ impl Search {
 struct Member {
     frequency: usize,
     interval_m: f64,
+    /// Its inverse, 1/m.
+    rate: f64,
     /// Phase in cycles.
     cycles: f64,
     /// Inverse variance of the range, 1/m^2.
     weight: f64,
+}
+
+impl Member {
+    /// The count, from 0, that brings this phase nearest to a range.
+    fn nearest_count(&self, range_m: f64) -> f64 {
+        // Truncation after adding a half rounds what is not negative, without a call into the mathematical library.
+        f64::from(((range_m * self.rate - self.cycles).max(0.0) + 0.5) as i32)
+    }
 }
 
 struct Best {
@@ -184,16 +195,16 @@ struct Best {
 struct PixelSearch {
     members: Vec<Member>,
     sigma_known: bool,
+    /// Counts of the best hypothesis, in the order of the members.
     counts: Vec<i32>,
-    best: Vec<i32>,
 }
 
 impl PixelSearch {
     fn load(&mut self, search: &Search, phases: &[Raster<f32>], sigmas: Option<&[Raster<f32>]>, index: usize) {
         self.members.clear();
         self.sigma_known = true;
-        for (frequency, (phase, &interval_m)) in phases.iter().zip(&search.intervals).enumerate() {
-            let phase = f64::from(phase.as_slice()[index]);
+        for &(frequency, interval_m) in &search.intervals {
+            let phase = f64::from(phases[frequency].as_slice()[index]);
             if !phase.is_finite() {
                 continue;
             }
@@ -201,10 +212,14 @@ impl PixelSearch {
             let known = given.filter(|sigma| sigma.is_finite() && *sigma > 0.0);
             self.sigma_known &= known.is_some();
             let sigma_m = known.unwrap_or(search.assumed_sigma) * interval_m / TAU;
-            let member = Member { frequency, interval_m, cycles: phase / TAU, weight: 1.0 / (sigma_m * sigma_m) };
-            self.members.push(member);
+            self.members.push(Member {
+                frequency,
+                interval_m,
+                rate: 1.0 / interval_m,
+                cycles: phase / TAU,
+                weight: 1.0 / (sigma_m * sigma_m),
+            });
         }
-        self.members.sort_by(|a, b| a.interval_m.total_cmp(&b.interval_m));
     }
 
     fn search(&mut self, search: &Search) -> Option<Best> {
@@ -213,19 +228,15 @@ impl PixelSearch {
             return None;
         }
         let weight: f64 = self.members.iter().map(|m| m.weight).sum();
-        let (mut best, mut second, mut range_m) = (f64::INFINITY, f64::INFINITY, f64::NAN);
+        let (mut best, mut second, mut range_m, mut best_count) = (f64::INFINITY, f64::INFINITY, f64::NAN, 0);
         let hypotheses = (search.maximum_range_m / first.interval_m).ceil() as i32;
         for count in 0..hypotheses {
             let reference = first.interval_m * (first.cycles + f64::from(count));
-            self.counts.clear();
-            self.counts.push(count);
             let (mut sum, mut squares) = (0.0, 0.0);
             for other in others {
-                let wraps = (reference / other.interval_m - other.cycles).round().max(0.0);
-                let residual = other.interval_m * (other.cycles + wraps) - reference;
+                let residual = other.interval_m * (other.cycles + other.nearest_count(reference)) - reference;
                 sum += other.weight * residual;
                 squares += other.weight * residual * residual;
-                self.counts.push(wraps as i32);
             }
             let range = reference + sum / weight;
             let misfit = squares - sum * sum / weight;
@@ -233,12 +244,15 @@ impl PixelSearch {
                 continue;
             }
             if misfit < best {
-                (best, second, range_m) = (misfit, best, range);
-                std::mem::swap(&mut self.best, &mut self.counts);
+                (best, second, range_m, best_count) = (misfit, best, range, count);
             } else if misfit < second {
                 second = misfit;
             }
         }
+        let reference = first.interval_m * (first.cycles + f64::from(best_count));
+        self.counts.clear();
+        self.counts.push(best_count);
+        self.counts.extend(others.iter().map(|other| other.nearest_count(reference) as i32));
         range_m.is_finite().then(|| {
             let freedom = others.len() as f64;
             let acceptable = (search.acceptable_misfit * freedom / best.max(f64::MIN_POSITIVE)).min(1.0);

@@ -36,10 +36,10 @@ pub struct ImageGeometry {
 impl Default for SpatialOptions {
     fn default() -> Self {
         Self {
-            maximum_wraps: 1,
+            maximum_wraps: 2,
             minimum_confidence: 0.6,
             amplitude_noise: None,
-            phase_jump_rad: 0.25,
+            phase_jump_rad: 0.1,
             amplitude_jump: 0.35,
             albedo: AlbedoPrior::default(),
             geometry: None,

@@ -24,6 +24,12 @@ const OVERLAP: f64 = 4.0;
 /// Largest total, nats, that curvature may say about one segment: systematic errors are common to its blocks.
 const LIMIT: f32 = 12.0;
 
+/// Solid angle, sr, of a segment at which half of the limit holds: a ball can curve like a far plane, a wall cannot.
+const HALF_LIMIT_SOLID_ANGLE: f32 = 0.05;
+
+/// Steps along an axis whose mean is taken as a slope.
+const MEAN_SLOPE_STEPS: u32 = 8;
+
 /// Evidence from curvature, and slopes for the angle of incidence.
 #[derive(Debug, Default)]
 pub(crate) struct Planes {
@@ -51,12 +57,12 @@ impl Planes {
         surface: &Surface,
         forest: &Forest,
         geometry: &ImageGeometry,
+        pixels: &[u32],
         labels: usize,
     ) {
         self.sums.clear();
         self.sums.resize(forest.components * labels, 0.0);
-        self.slope.clear();
-        self.slope.resize(grid.len(), [f32::NAN; 2]);
+        self.set_mean_slopes(grid, surface, forest, geometry);
         let mut finest = 0;
         for angle in BLOCK_ANGLES {
             // Each sample stands for `spacing` pixels a side.
@@ -68,10 +74,34 @@ impl Planes {
             self.measure_scale(grid, surface, forest, geometry, labels, spacing);
         }
         self.costs.clear();
-        for sums in self.sums.chunks_exact(labels) {
+        for (sums, &pixels) in self.sums.chunks_exact(labels).zip(pixels) {
             let best = sums.iter().copied().fold(f64::INFINITY, f64::min);
-            self.costs.extend(sums.iter().map(|sum| LIMIT * ((sum - best) as f32 / LIMIT).tanh()));
+            let solid_angle = pixels as f32 / geometry.principal_distance_px.powi(2);
+            let limit = LIMIT * solid_angle / (solid_angle + HALF_LIMIT_SOLID_ANGLE);
+            self.costs.extend(sums.iter().map(|sum| limit * ((sum - best) as f32 / limit.max(1e-6)).tanh()));
         }
+    }
+
+    /// The mean slope of each segment, which serves where no block fits: small and slender segments.
+    fn set_mean_slopes(&mut self, grid: &Grid, surface: &Surface, forest: &Forest, geometry: &ImageGeometry) {
+        let mut means = vec![[(0.0_f32, 0_u32); 2]; forest.components];
+        for pixel in grid.inner().filter(|&pixel| forest.label[pixel] != NO_LABEL) {
+            let mean = &mut means[forest.label[pixel] as usize];
+            for (axis, other) in [(0, pixel + 1), (1, pixel + grid.stride)] {
+                if forest.label[other] == forest.label[pixel] {
+                    let step = (surface.phase[other] - surface.phase[pixel]) / TAU
+                        + (forest.wraps[other] - forest.wraps[pixel]) as f32;
+                    mean[axis] = (mean[axis].0 + step, mean[axis].1 + 1);
+                }
+            }
+        }
+        let slope = |(sum, n): (f32, u32)| {
+            if n < MEAN_SLOPE_STEPS { f32::NAN } else { sum / n as f32 * geometry.principal_distance_px }
+        };
+        let slopes: Vec<[f32; 2]> = means.iter().map(|&axes| axes.map(slope)).collect();
+        self.slope.clear();
+        let known = |&label: &u32| slopes.get(label as usize).copied().unwrap_or([f32::NAN; 2]);
+        self.slope.extend(forest.label.iter().map(known));
     }
 
     fn measure_scale(
@@ -211,9 +241,9 @@ pub(crate) fn log_cosine(x: f32, y: f32, range: f32, slope: [f32; 2]) -> f32 {
 fn curvature_cost(patch: &Patch, predicted: [f64; 3]) -> f64 {
     let mut exponent = 0.0;
     let mut density = PLANE_SHARE * std::f64::consts::TAU.powf(-1.5);
-    for component in 0..3 {
-        let variance = patch.variance[component] + CURVATURE_ERROR * CURVATURE_ERROR;
-        let off = patch.curvature[component] - predicted[component];
+    for ((measured, variance), predicted) in patch.curvature.iter().zip(patch.variance).zip(predicted) {
+        let variance = variance + CURVATURE_ERROR * CURVATURE_ERROR;
+        let off = measured - predicted;
         exponent -= 0.5 * off * off / variance;
         density /= variance.sqrt();
     }

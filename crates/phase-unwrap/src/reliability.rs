@@ -5,7 +5,7 @@ use crate::grid::{Grid, wrapped};
 /// Cost of a pixel none of whose neighbours allow a second difference: more than any pixel that has one.
 const UNKNOWN: f32 = 256.0;
 
-/// Second-difference cost of each pixel [Herraez2002], rad^2; infinite where masked.
+/// Second-difference cost of each pixel `[Herraez2002]`, rad^2; infinite where masked.
 ///
 /// The four second differences (horizontal, vertical, two diagonals) of white noise of variance s^2 have an expected
 /// sum of squares of 24 s^2. `noise_variance`, where given, adds that expectation, so that pixels whose second
@@ -38,12 +38,12 @@ fn second_differences(above: &[f32], here: &[f32], below: &[f32]) -> f32 {
     for (one, other) in [(here[0], here[2]), (above[1], below[1]), (above[0], below[2]), (above[2], below[0])] {
         let second = wrapped(one - centre) + wrapped(other - centre);
         // NaN marks a masked neighbour: this direction says nothing.
-        let known = second == second;
+        let known = !second.is_nan();
         sum += if known { second * second } else { 0.0 };
         count += if known { 1.0 } else { 0.0 };
     }
     let cost = if count > 0.0 { sum * (4.0 / count) } else { UNKNOWN };
-    if centre == centre { cost } else { f32::INFINITY }
+    if centre.is_nan() { f32::INFINITY } else { cost }
 }
 
 /// Reliability in (0, 1] that belongs to a cost: one on a smooth surface, half where the second differences reach pi.

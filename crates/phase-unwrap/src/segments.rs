@@ -86,7 +86,7 @@ impl Segments {
         }
     }
 
-    /// Every pixel whose 3 x 3 surroundings hold a cut is no core, so that a gap of three edges in a cut border does not
+    /// A pixel whose 3 x 3 surroundings hold a cut is no core, so that a gap of three edges in a cut border does not
     /// join two objects. Pixels that uncut links lead to from a core are its rim, layer by layer.
     fn classify(&mut self, grid: &Grid) {
         let stride = grid.stride;

@@ -8,11 +8,13 @@ use crate::borders::Borders;
 use crate::brightness::{Brightness, Incidence};
 use crate::forest::{Forest, NO_LABEL};
 use crate::grid::Grid;
+use crate::known::{check_span, resolve_known};
 use crate::offsets::Offsets;
 use crate::planes::Planes;
 use crate::reliability::{pixel_cost, reliability};
 use crate::segments::Segments;
 use crate::surface::Surface;
+use crate::unwrapped::labels_from_one;
 use crate::{Error, Island, KnownWraps, Result, SpatialOptions, Unwrapped};
 
 /// Unwraps one image; see [`Unwrapper::unwrap`]. Allocates its buffers anew.
@@ -55,7 +57,7 @@ impl Unwrapper {
     ///
     /// With amplitudes the image is cut at possible jumps, and each segment's absolute count is found from the inverse
     /// square law, continuity and what is `known`. Without, every island gets one minimum spanning tree
-    /// [Herraez2002]; its counts are relative, the lowest 0, unless something is known.
+    /// `[Herraez2002]`; its counts are relative, the lowest 0, unless something is known.
     pub fn unwrap(
         &mut self,
         phase: &Raster<f32>,
@@ -63,17 +65,35 @@ impl Unwrapper {
         mask: Option<&Raster<bool>>,
         known: KnownWraps<'_>,
     ) -> Result<Unwrapped> {
+        let mut out = Unwrapped::default();
+        self.unwrap_into(phase, amplitude, mask, known, &mut out)?;
+        Ok(out)
+    }
+
+    /// As [`Unwrapper::unwrap`], into an existing result of any size, which an error leaves as it was.
+    pub fn unwrap_into(
+        &mut self,
+        phase: &Raster<f32>,
+        amplitude: Option<&Raster<f32>>,
+        mask: Option<&Raster<bool>>,
+        known: KnownWraps<'_>,
+        out: &mut Unwrapped,
+    ) -> Result<()> {
         let grid = Grid::new(phase.width(), phase.height())?;
         self.load_phase(&grid, phase, mask)?;
-        let known = self.known(&grid, phase, known)?;
-        match amplitude {
-            Some(amplitude) => {
-                phase.require_same_size(amplitude, "amplitude")?;
-                grid.pad(amplitude, f32::NAN, &mut self.amplitude);
-                self.unwrap_absolute(&grid, &known)
-            }
-            None => self.unwrap_relative(&grid, &known),
+        let known = resolve_known(&grid, phase, &self.surface, known)?;
+        let Some(amplitude) = amplitude else {
+            self.unwrap_relative(&grid, &known, out);
+            return Ok(());
+        };
+        phase.require_same_size(amplitude, "amplitude")?;
+        grid.pad(amplitude, f32::NAN, &mut self.amplitude);
+        self.surface.set_amplitude(&grid, &self.amplitude, self.options.amplitude_noise);
+        if self.surface.has_amplitude() {
+            return self.unwrap_absolute(&grid, &known, out);
         }
+        self.unwrap_relative(&grid, &known, out);
+        Ok(())
     }
 
     fn load_phase(&mut self, grid: &Grid, phase: &Raster<f32>, mask: Option<&Raster<bool>>) -> Result<()> {
@@ -97,36 +117,7 @@ impl Unwrapper {
         if used == 0 { Err(Error::AllMasked { pixels: phase.len() }) } else { Ok(()) }
     }
 
-    /// Known counts as padded index and count; seeds must lie on used pixels, the rest of a raster is passed over.
-    fn known(&self, grid: &Grid, phase: &Raster<f32>, known: KnownWraps<'_>) -> Result<Vec<(usize, i32)>> {
-        let mut found = Vec::new();
-        match known {
-            KnownWraps::Nothing => {}
-            KnownWraps::Seeds(seeds) => {
-                for seed in seeds {
-                    let unusable = |why| Error::UnusableSeed { col: seed.col, row: seed.row, why };
-                    if seed.col >= grid.width || seed.row >= grid.height {
-                        return Err(unusable("lies outside the image"));
-                    }
-                    let pixel = grid.index(seed.col, seed.row);
-                    if !self.surface.used(pixel) {
-                        return Err(unusable("lies on a pixel that is masked out"));
-                    }
-                    found.push((pixel, seed.wraps));
-                }
-            }
-            KnownWraps::Raster(raster) => {
-                phase.require_same_size(raster, "known wrap counts")?;
-                for (start, row) in grid.row_starts().zip(raster.rows()) {
-                    let counts = row.iter().enumerate().filter_map(|(col, count)| Some((start + col, (*count)?)));
-                    found.extend(counts.filter(|&(pixel, _)| self.surface.used(pixel)));
-                }
-            }
-        }
-        Ok(found)
-    }
-
-    fn unwrap_relative(&mut self, grid: &Grid, known: &[(usize, i32)]) -> Result<Unwrapped> {
+    fn unwrap_relative(&mut self, grid: &Grid, known: &[(usize, i32)], out: &mut Unwrapped) {
         pixel_cost(grid, &self.surface.phase, None, &mut self.cost);
         self.links.clear();
         self.links.resize(grid.len(), 0);
@@ -137,13 +128,18 @@ impl Unwrapper {
         let fixed = self.fix_islands(known);
         for (label, wraps) in self.forest.label.iter().zip(&mut self.forest.wraps) {
             if *label != NO_LABEL {
-                *wraps += fixed[*label as usize].0;
+                *wraps = wraps.saturating_add(fixed[*label as usize].0);
             }
         }
-        let confidence = self.cost.iter().map(|&cost| reliability(cost)).collect::<Vec<_>>();
-        let known: Vec<bool> = fixed.iter().map(|fix| fix.1).collect();
-        let segment = grid.crop(&self.forest.label, |&label| label.wrapping_add(1))?;
-        self.collect(grid, &confidence, &known, None, segment)
+        labels_from_one(grid, &self.forest, &mut out.segment);
+        labels_from_one(grid, &self.forest, &mut out.island);
+        grid.crop(&self.forest.wraps, &mut out.wraps, |&wraps| wraps);
+        grid.crop(&self.cost, &mut out.confidence, |&cost| reliability(cost));
+        let islands = fixed.iter().map(|&(_, known)| Island { offset_known: known, segments: 1, ..Island::default() });
+        out.islands.clear();
+        out.islands.extend(islands);
+        out.typical_amplitude_at_interval = None;
+        out.count_pixels(self.options.minimum_confidence);
     }
 
     /// Offset of each tree, and whether something known fixed it: the median of what is known, else lowest count 0.
@@ -166,16 +162,16 @@ impl Unwrapper {
         offsets.into_iter().zip(lowest).map(fix).collect()
     }
 
-    fn unwrap_absolute(&mut self, grid: &Grid, known: &[(usize, i32)]) -> Result<Unwrapped> {
+    fn unwrap_absolute(&mut self, grid: &Grid, known: &[(usize, i32)], out: &mut Unwrapped) -> Result<()> {
         let options = self.options;
-        self.surface.set_amplitude(grid, &self.amplitude, options.amplitude_noise);
+        check_span(grid, known, options.maximum_wraps)?;
         pixel_cost(grid, &self.surface.phase, Some(&self.surface.variance), &mut self.cost);
         self.segments.build(grid, &self.surface, &mut self.cost, &mut self.forest, &options);
         self.borders.collect(grid, &self.surface, &self.forest);
         let pixels = &self.segments.pixels;
         let labels = usize::from(options.maximum_wraps) + 1;
         let incidence = options.geometry.as_ref().map(|geometry| {
-            self.planes.measure(grid, &self.surface, &self.forest, geometry, labels);
+            self.planes.measure(grid, &self.surface, &self.forest, geometry, pixels, labels);
             Incidence { grid, geometry, slope: &self.planes.slope }
         });
         self.brightness.measure(&self.surface, &self.forest, pixels, incidence, options.maximum_wraps);
@@ -183,21 +179,26 @@ impl Unwrapper {
             self.brightness.add_costs(&self.planes.costs);
         }
         self.brightness.add_known(&self.forest, known);
-        self.offsets.find(&self.brightness, &self.borders.ties, pixels.len(), &options);
-        let segment = grid.crop(&self.forest.label, |&label| label.wrapping_add(1))?;
-        let mut confidence = std::mem::take(&mut self.segments.hold);
-        self.apply_offsets(&mut confidence);
-        let islands = vec![true; self.borders.islands];
-        let constant = self.offsets.log_constant.map(f32::exp);
-        let result = self.collect(grid, &confidence, &islands, constant, segment);
-        self.segments.hold = confidence;
-        result
+        self.offsets.find(&self.brightness, &self.borders.ties, pixels, &options);
+        labels_from_one(grid, &self.forest, &mut out.segment);
+        self.apply_offsets();
+        labels_from_one(grid, &self.forest, &mut out.island);
+        grid.crop(&self.forest.wraps, &mut out.wraps, |&wraps| wraps);
+        grid.crop(&self.segments.hold, &mut out.confidence, |&hold| hold);
+        out.islands.clear();
+        out.islands.resize(self.borders.islands, Island { offset_known: true, ..Island::default() });
+        for &island in &self.borders.island {
+            out.islands[island as usize].segments += 1;
+        }
+        out.typical_amplitude_at_interval = self.offsets.log_constant.map(f32::exp);
+        out.count_pixels(options.minimum_confidence);
+        Ok(())
     }
 
-    /// Shifts each segment; labels become those of the islands.
-    fn apply_offsets(&mut self, confidence: &mut [f32]) {
+    /// Shifts each segment; labels become those of the islands, the hold of a pixel its confidence.
+    fn apply_offsets(&mut self) {
         let maximum = i32::from(self.options.maximum_wraps);
-        let pixels = self.forest.label.iter_mut().zip(&mut self.forest.wraps).zip(confidence);
+        let pixels = self.forest.label.iter_mut().zip(&mut self.forest.wraps).zip(&mut self.segments.hold);
         for ((label, wraps), confidence) in pixels {
             if *label == NO_LABEL {
                 continue;
@@ -210,32 +211,5 @@ impl Unwrapper {
             *confidence *= agreed;
             *label = self.borders.island[segment];
         }
-    }
-
-    fn collect(
-        &self,
-        grid: &Grid,
-        confidence: &[f32],
-        known: &[bool],
-        constant: Option<f32>,
-        segment: Raster<u32>,
-    ) -> Result<Unwrapped> {
-        let island = grid.crop(&self.forest.label, |&label| label.wrapping_add(1))?;
-        let wraps = grid.crop(&self.forest.wraps, |&wraps| wraps)?;
-        let mut confidence = grid.crop(confidence, |&confidence| confidence)?;
-        let mut islands = vec![Island { pixels: 0, sure_pixels: 0, offset_known: false, segments: 1 }; known.len()];
-        for (&label, confidence) in island.as_slice().iter().zip(confidence.as_mut_slice()) {
-            match islands.get_mut((label as usize).wrapping_sub(1)) {
-                None => *confidence = 0.0,
-                Some(island) => {
-                    island.pixels += 1;
-                    island.sure_pixels += usize::from(*confidence >= self.options.minimum_confidence);
-                }
-            }
-        }
-        for (island, known) in islands.iter_mut().zip(known) {
-            island.offset_known = *known && 2 * island.sure_pixels > island.pixels;
-        }
-        Ok(Unwrapped { wraps, confidence, island, segment, islands, typical_amplitude_at_interval: constant })
     }
 }

@@ -47,6 +47,11 @@ impl Surface {
         }));
     }
 
+    /// Whether any used pixel has an amplitude.
+    pub fn has_amplitude(&self) -> bool {
+        self.phase.iter().zip(&self.log_amplitude).any(|(phase, log)| !phase.is_nan() && !log.is_nan())
+    }
+
     /// Noise of each part of the complex image: the median of |second difference| * amplitude over the rows.
     ///
     /// Jumps and creases are few, so the median is that of the noise; 0.6745 sqrt(6) is its value at unit variance.

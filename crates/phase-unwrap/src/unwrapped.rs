@@ -1,7 +1,10 @@
 use range_image::Raster;
 
+use crate::forest::Forest;
+use crate::grid::Grid;
+
 /// Wrap counts of one image.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Unwrapped {
     /// Whole cycles to add to the phase, `unwrapped = phase + 2 pi wraps`; 0 where masked.
     pub wraps: Raster<i32>,
@@ -12,14 +15,14 @@ pub struct Unwrapped {
     pub island: Raster<u32>,
     /// Segment of each pixel as the island was cut at possible jumps: 0 where masked, else from 1.
     pub segment: Raster<u32>,
-    /// The islands in scan order of their first pixels.
+    /// The islands.
     pub islands: Vec<Island>,
     /// Amplitude of a typical surface at a range of one ambiguity interval, where amplitudes decided the counts.
     pub typical_amplitude_at_interval: Option<f32>,
 }
 
 /// A connected part of the mask.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Island {
     /// Number of pixels.
     pub pixels: usize,
@@ -33,6 +36,22 @@ pub struct Island {
 }
 
 impl Unwrapped {
+    /// Counts each island's pixels and takes the word `known` back where most are not sure.
+    pub(crate) fn count_pixels(&mut self, minimum_confidence: f32) {
+        for (&label, confidence) in self.island.as_slice().iter().zip(self.confidence.as_mut_slice()) {
+            match self.islands.get_mut((label as usize).wrapping_sub(1)) {
+                None => *confidence = 0.0,
+                Some(island) => {
+                    island.pixels += 1;
+                    island.sure_pixels += usize::from(*confidence >= minimum_confidence);
+                }
+            }
+        }
+        for island in &mut self.islands {
+            island.offset_known &= 2 * island.sure_pixels > island.pixels;
+        }
+    }
+
     /// Pixels that are masked or whose confidence is below `minimum_confidence`.
     pub fn unsure(&self, minimum_confidence: f32) -> Raster<bool> {
         let mut unsure = self.confidence.map(|&confidence| confidence < minimum_confidence);
@@ -41,4 +60,10 @@ impl Unwrapped {
         }
         unsure
     }
+}
+
+/// Writes the labels of the forest into a raster: 0 where there is none, else from 1.
+pub(crate) fn labels_from_one(grid: &Grid, forest: &Forest, raster: &mut Raster<u32>) {
+    // No label is the largest number, which wraps to zero.
+    grid.crop(&forest.label, raster, |&label| label.wrapping_add(1));
 }

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use icp_registration::NeighbourTree;
 use nalgebra::Isometry3;
 use nalgebra::Point3;
-use range_io::ply::read_ply;
+use range_io::ply::read_cloud;
 use range_io::tables::read_stations;
 use range_io::trajectory::read_tum;
 use serde::Serialize;
@@ -118,7 +118,7 @@ fn compare_clouds(first: &Path, second: &Path) -> Result<CloudComparison> {
 }
 
 fn unflagged(path: &Path) -> Result<Vec<Point3<f64>>> {
-    let cloud = read_ply(path)?;
+    let cloud = read_cloud(path)?;
     let keep = |index: usize| cloud.flags.as_ref().is_none_or(|flags| flags[index] == 0);
     Ok(cloud.points.iter().enumerate().filter(|(index, _)| keep(*index)).map(|(_, p)| Point3::from(*p)).collect())
 }

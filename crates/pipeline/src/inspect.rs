@@ -5,7 +5,7 @@ use std::fmt;
 use std::path::Path;
 
 use range_io::calibration::Calibration;
-use range_io::ply::read_ply;
+use range_io::ply::read_cloud;
 use range_io::survey::{Survey, read_frame};
 use serde::Serialize;
 
@@ -111,7 +111,7 @@ fn inspect_calibration(path: &Path, found: &mut Inspection) -> Result<()> {
 }
 
 fn inspect_cloud(path: &Path, found: &mut Inspection) -> Result<()> {
-    let cloud = read_ply(path)?;
+    let cloud = read_cloud(path)?;
     found.add("cloud", path.display());
     found.add("points", cloud.points.len());
     for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {

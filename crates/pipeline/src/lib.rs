@@ -23,7 +23,7 @@ mod work;
 pub use compare::{CloudComparison, Comparison, PoseComparison, compare};
 pub use error::{Error, Result};
 pub use inspect::{Inspection, inspect};
-pub use outcome::{AdjustmentFigures, AlignedPair, Outcome, StationPose};
+pub use outcome::{AdjustmentFigures, AlignedPair, Outcome, RefusedPair, StationPose};
 pub use plan::{
     AdjustOptions, AverageOptions, CorrectImagePointOptions, CorrectRangeOptions, DeconvolveOptions,
     DemodulateOptions, FlagOptions, MixedPixels, NoiseOptions, Plan, PointCloudOptions, RegisterOptions, SimulateSource, Source,

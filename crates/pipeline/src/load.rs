@@ -69,6 +69,7 @@ pub(crate) fn load(folder: &Path, calibration: Option<&Path>, plan: &Plan, progr
         clouds: Vec::new(),
         poses: Vec::new(),
         pairs: Vec::new(),
+        refused: Vec::new(),
         adjustment: None,
         stages: Vec::new(),
         vertical_axis,

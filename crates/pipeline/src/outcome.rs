@@ -25,6 +25,8 @@ pub struct Outcome {
     pub poses: Vec<StationPose>,
     /// Aligned pairs.
     pub pairs: Vec<AlignedPair>,
+    /// Pairs that overlap but could not be aligned reliably.
+    pub refused: Vec<RefusedPair>,
     /// The simultaneous adjustment, where it ran.
     pub adjustment: Option<AdjustmentFigures>,
     /// What each stage did.
@@ -51,6 +53,17 @@ pub struct AlignedPair {
     pub source: usize,
     /// The alignment.
     pub result: IcpResult,
+}
+
+/// Two views whose alignment is not used.
+#[derive(Debug, Clone)]
+pub struct RefusedPair {
+    /// Index of the view that was held.
+    pub target: usize,
+    /// Index of the view that was moved.
+    pub source: usize,
+    /// Why.
+    pub reason: String,
 }
 
 /// Quality of the simultaneous adjustment.

@@ -221,11 +221,14 @@ pub struct RegisterOptions {
     pub maximum_distance_m: f64,
     /// Smallest part of a view that must overlap another for the two to be aligned.
     pub minimum_overlap: f64,
+    /// A pair is refused when its geometry leaves a motion of the points known to less than this, metre. Weakly known
+    /// motions below it are no harm: the adjustment weighs them by their covariance.
+    pub maximum_motion_sigma_m: f64,
 }
 
 impl Default for RegisterOptions {
     fn default() -> Self {
-        Self { maximum_distance_m: 0.5, minimum_overlap: 0.3 }
+        Self { maximum_distance_m: 0.5, minimum_overlap: 0.3, maximum_motion_sigma_m: 0.05 }
     }
 }
 

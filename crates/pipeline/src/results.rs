@@ -3,11 +3,11 @@
 use std::path::Path;
 
 use range_io::atomic::OutputFolder;
-use range_io::ply::{CloudFile, write_ply};
+use range_io::ply::{CloudFile, Precision, write_cloud};
 use range_io::tables::{Station, write_stations};
-use range_io::trajectory::{TimedPose, write_tum};
+use range_io::trajectory::{StampedPose, write_tum};
 
-use crate::outcome::{Outcome, StationPose, usable, world_points};
+use crate::outcome::{Outcome, StationPose};
 use crate::progress::Progress;
 use crate::summary::Summary;
 use crate::{Error, Result, report};
@@ -17,7 +17,7 @@ pub(crate) fn write(out: &Path, outcome: &Outcome, summary: &Summary, progress: 
     progress.begin("write results", 5);
     let folder = OutputFolder::create(out)?;
     if !outcome.clouds.is_empty() {
-        write_ply(folder.file("cloud.ply")?, &cloud_file(outcome))?;
+        write_cloud(folder.file("cloud.ply")?, &cloud_file(outcome), Precision::Single)?;
     }
     progress.advance(1);
     write_stations(folder.file("stations.csv")?, &station_rows(outcome))?;
@@ -82,20 +82,9 @@ fn station_rows(outcome: &Outcome) -> Vec<Station> {
     .collect()
 }
 
-fn trajectory(outcome: &Outcome) -> Vec<TimedPose> {
+fn trajectory(outcome: &Outcome) -> Vec<StampedPose> {
     let poses = outcome.views.iter().zip(poses_or_identity(outcome));
     poses
-        .map(|(view, pose)| TimedPose { timestamp_s: view.timestamp_s, world_from_camera: pose.world_from_camera })
+        .map(|(view, pose)| StampedPose { timestamp_s: view.timestamp_s, world_from_camera: pose.world_from_camera })
         .collect()
-}
-
-/// The unflagged points of each view in the world's frame.
-pub(crate) fn unflagged_points(outcome: &Outcome) -> Vec<Vec<[f64; 3]>> {
-    let clouds = outcome.clouds.iter().zip(poses_or_identity(outcome));
-    clouds.map(|(cloud, pose)| world_points(cloud, &pose.world_from_camera)).collect()
-}
-
-/// Number of unflagged points of all views.
-pub(crate) fn point_count(outcome: &Outcome) -> usize {
-    outcome.clouds.iter().map(|cloud| usable(cloud).count()).sum()
 }

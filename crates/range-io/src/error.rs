@@ -16,14 +16,14 @@ pub enum Error {
         /// The system's answer.
         source: std::io::Error,
     },
-    /// A text file (RON, CSV, JSON, trajectory) does not say what it should at a position.
+    /// A text file (RON, CSV, trajectory) does not say what it should at a position.
     #[error("{}:{line}:{column}: {}{reason}", .file.display(), prefix(.field))]
     Text {
         /// The file.
         file: PathBuf,
         /// Line, from 1.
         line: usize,
-        /// Column in characters, from 1.
+        /// Column from 1: of the character, in a table of the field.
         column: usize,
         /// Path of the field or name of the table's column; empty where none is concerned.
         field: String,
@@ -115,14 +115,14 @@ impl Error {
 
 /// A field of a value in memory that does not hold; becomes [`Error::Value`], or [`Error::Text`] once its place in a
 /// file is known.
-#[cfg(any(feature = "survey", feature = "calibration"))]
+#[cfg(feature = "ron_text")]
 #[derive(Debug)]
 pub(crate) struct InvalidField {
     pub field: String,
     pub reason: String,
 }
 
-#[cfg(any(feature = "survey", feature = "calibration"))]
+#[cfg(feature = "ron_text")]
 impl InvalidField {
     pub fn new(field: impl Into<String>, reason: impl Into<String>) -> Self {
         Self { field: field.into(), reason: reason.into() }

@@ -11,6 +11,9 @@ use rustfft::num_complex::Complex;
 
 use crate::spectrum::Spectrum;
 
+/// Rows of pixels that one task takes at least; smaller tasks cost more to hand out than to do.
+const ROWS_PER_TASK: usize = 16;
+
 /// One image axis: its pixels and its nodes.
 pub(crate) struct Axis {
     pixels: usize,
@@ -60,6 +63,35 @@ impl Axis {
     fn weight(&self, pixel: usize, node: usize) -> Option<f32> {
         let taps = self.taps[pixel];
         (taps.first..taps.first + self.tap_count()).contains(&node).then(|| taps.weights[node - taps.first])
+    }
+
+    /// Sums a row of pixels into its nodes.
+    fn collect(&self, re: &[f32], im: &[f32], nodes: &mut [Complex<f32>]) {
+        nodes.fill(Complex::new(0.0, 0.0));
+        for (cell, (re, im)) in re.chunks(self.spacing).zip(im.chunks(self.spacing)).enumerate() {
+            let mut sums = [Complex::new(0.0, 0.0); 3];
+            for (taps, (re, im)) in self.taps.iter().zip(re.iter().zip(im)) {
+                for (sum, weight) in sums.iter_mut().zip(taps.weights) {
+                    *sum += Complex::new(weight * re, weight * im);
+                }
+            }
+            for (node, sum) in nodes[cell..].iter_mut().zip(&sums[..self.tap_count()]) {
+                *node += sum;
+            }
+        }
+    }
+
+    /// Interpolates a row of nodes at its pixels, times `factor`.
+    fn spread(&self, nodes: &[Complex<f32>], factor: f32, re: &mut [f32], im: &mut [f32]) {
+        for (cell, (re, im)) in re.chunks_mut(self.spacing).zip(im.chunks_mut(self.spacing)).enumerate() {
+            let node = |index: usize| nodes.get(cell + index).map_or(Complex::new(0.0, 0.0), |node| node * factor);
+            let [first, second, third] = [node(0), node(1), node(2)];
+            for (taps, (re, im)) in self.taps.iter().zip(re.iter_mut().zip(im)) {
+                let [a, b, c] = taps.weights;
+                *re = a * first.re + b * second.re + c * third.re;
+                *im = a * first.im + b * second.im + c * third.im;
+            }
+        }
     }
 
     /// Pixels that belong to a node.
@@ -120,26 +152,18 @@ impl Grid {
             return;
         }
         let [across, down] = &self.axes;
+        let scale = 1.0 / (across.spacing * down.spacing) as f32;
         for (plane, halfway) in [real, imaginary].into_iter().zip(&mut self.halfway) {
             halfway.par_chunks_mut(across.pixels).enumerate().for_each(|(node, sums)| {
-                sums.fill(0.0);
-                for pixel in down.pixels_of(node) {
-                    let weight = down.weight(pixel, node).unwrap_or(0.0);
-                    add_scaled(sums, weight, &plane[pixel * across.pixels..][..across.pixels]);
-                }
+                let pixels = down.pixels_of(node);
+                let rows = &plane[pixels.start * across.pixels..pixels.end * across.pixels];
+                let weight = |row: usize| scale * down.weight(pixels.start + row, node).unwrap_or(0.0);
+                sum_rows(rows, weight, sums);
             });
         }
-        let scale = 1.0 / (across.spacing * down.spacing) as f32;
         let [re, im] = &self.halfway;
         let lines = re.par_chunks(across.pixels).zip(im.par_chunks(across.pixels));
-        nodes.par_chunks_mut(across.nodes).zip(lines).for_each(|(nodes, (re, im))| {
-            nodes.fill(Complex::new(0.0, 0.0));
-            for (taps, (re, im)) in across.taps.iter().zip(re.iter().zip(im)) {
-                for (node, weight) in nodes[taps.first..].iter_mut().zip(&taps.weights[..across.tap_count()]) {
-                    *node += Complex::new(re * weight * scale, im * weight * scale);
-                }
-            }
-        });
+        nodes.par_chunks_mut(across.nodes).zip(lines).for_each(|(nodes, (re, im))| across.collect(re, im, nodes));
     }
 
     /// Adds `factor` times what lies on the nodes to planes of pixels: quadratic spline.
@@ -160,17 +184,18 @@ impl Grid {
         let [across, down] = &self.axes;
         let [halfway_re, halfway_im] = &mut self.halfway;
         let lines = halfway_re.par_chunks_mut(across.pixels).zip(halfway_im.par_chunks_mut(across.pixels));
-        lines.zip(nodes.par_chunks(across.nodes)).for_each(|((re, im), nodes)| {
-            for (taps, (re, im)) in across.taps.iter().zip(re.iter_mut().zip(im)) {
-                let weighted = nodes[taps.first..].iter().zip(&taps.weights[..across.tap_count()]);
-                let sum: Complex<f32> = weighted.map(|(node, weight)| node * weight).sum();
-                (*re, *im) = (factor * sum.re, factor * sum.im);
-            }
-        });
+        lines.zip(nodes.par_chunks(across.nodes)).for_each(|((re, im), nodes)| across.spread(nodes, factor, re, im));
         for (plane, halfway) in [real, imaginary].into_iter().zip(&self.halfway) {
-            plane.par_chunks_mut(across.pixels).zip(&down.taps).for_each(|(row, taps)| {
-                for (offset, weight) in taps.weights[..down.tap_count()].iter().enumerate() {
-                    add_scaled(row, *weight, &halfway[(taps.first + offset) * across.pixels..][..across.pixels]);
+            let line = |node: usize| &halfway[node * across.pixels..][..across.pixels];
+            plane.par_chunks_mut(across.pixels).with_min_len(ROWS_PER_TASK).zip(&down.taps).for_each(|(row, taps)| {
+                match (down.tap_count(), taps.weights) {
+                    (1, _) => row.iter_mut().zip(line(taps.first)).for_each(|(pixel, value)| *pixel += value),
+                    (_, [a, b, c]) => {
+                        let lines = line(taps.first).iter().zip(line(taps.first + 1)).zip(line(taps.first + 2));
+                        for (pixel, ((first, second), third)) in row.iter_mut().zip(lines) {
+                            *pixel += a * first + b * second + c * third;
+                        }
+                    }
                 }
             });
         }
@@ -219,8 +244,26 @@ impl Grid {
     }
 }
 
-fn add_scaled(sums: &mut [f32], weight: f32, values: &[f32]) {
-    for (sum, value) in sums.iter_mut().zip(values) {
-        *sum += weight * value;
+/// Weighted sum of rows that lie one after the other, each as long as `sums`; four at a time, to write the sums less
+/// often.
+fn sum_rows(rows: &[f32], weight: impl Fn(usize) -> f32, sums: &mut [f32]) {
+    sums.fill(0.0);
+    let width = sums.len();
+    for (group, rows) in rows.chunks(4 * width).enumerate() {
+        let weight = |row: usize| weight(4 * group + row);
+        if rows.len() == 4 * width {
+            let [a, b, c, d] = [weight(0), weight(1), weight(2), weight(3)];
+            let (upper, lower) = rows.split_at(2 * width);
+            let ((first, second), (third, fourth)) = (upper.split_at(width), lower.split_at(width));
+            let values = first.iter().zip(second).zip(third).zip(fourth);
+            for (sum, (((first, second), third), fourth)) in sums.iter_mut().zip(values) {
+                *sum += a * first + b * second + c * third + d * fourth;
+            }
+        } else {
+            for (index, row) in rows.chunks_exact(width).enumerate() {
+                let weight = weight(index);
+                sums.iter_mut().zip(row).for_each(|(sum, value)| *sum += weight * value);
+            }
+        }
     }
 }

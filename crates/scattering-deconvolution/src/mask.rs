@@ -13,15 +13,16 @@ impl Mask {
     pub(crate) fn put_aside(&mut self, width: usize, re: &mut [f32], im: &mut [f32], keep: impl Fn(usize) -> bool) {
         self.kept.clear();
         self.filled = 0;
-        for (pixel, (re, im)) in re.iter().zip(im.iter()).enumerate() {
-            let missing = !(re.is_finite() && im.is_finite());
-            if missing || keep(pixel) {
-                self.kept.push((pixel, *re, *im));
-                self.filled += usize::from(missing);
+        for (row, (re, im)) in re.chunks_exact_mut(width).zip(im.chunks_exact_mut(width)).enumerate() {
+            let complete = largest_part(re).is_finite() && largest_part(im).is_finite();
+            for col in 0..width {
+                let missing = !(complete || re[col].is_finite() && im[col].is_finite());
+                if missing || keep(row * width + col) {
+                    self.kept.push((row * width + col, re[col], im[col]));
+                    self.filled += usize::from(missing);
+                }
             }
-        }
-        if self.filled > 0 {
-            for (re, im) in re.chunks_exact_mut(width).zip(im.chunks_exact_mut(width)) {
+            if !complete {
                 fill_row(re, im);
             }
         }
@@ -48,6 +49,15 @@ impl Mask {
     }
 }
 
+/// Largest absolute value; not finite as soon as one value is not.
+///
+/// Without its sign the pattern of bits of a float grows with its value, infinity and NaN being largest of all, and the
+/// largest of many integers is found in wide registers, which IEEE comparisons do not allow.
+pub(crate) fn largest_part(values: &[f32]) -> f32 {
+    let magnitude = |value: &f32| (value.to_bits() & 0x7fff_ffff) as i32;
+    f32::from_bits(values.iter().map(magnitude).max().unwrap_or(0) as u32)
+}
+
 fn fill_row(re: &mut [f32], im: &mut [f32]) {
     let mut col = 0;
     while col < re.len() {
@@ -71,6 +81,14 @@ fn fill_row(re: &mut [f32], im: &mut [f32]) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_largest_part_is_found() {
+        assert_eq!(largest_part(&[-3.0, 2.0, -0.0]).to_bits(), 3.0_f32.to_bits());
+        assert_eq!(largest_part(&[]).to_bits(), 0);
+        assert!(largest_part(&[1.0, f32::NEG_INFINITY]).is_infinite());
+        assert!(!largest_part(&[1.0, -f32::NAN, 3e38]).is_finite());
+    }
 
     #[test]
     fn gaps_are_filled_from_both_sides_and_given_back() {

@@ -21,7 +21,8 @@ pub struct RestorationOptions {
     /// Weight `lambda` of the wish that the image stays as it was observed: `|F z - y|^2 + lambda |z - y|^2` becomes
     /// smallest, with `F = 1 + H`. Zero, the default, is the plain inverse.
     pub regularisation: f64,
-    /// Largest residual `|y - (z + psf * z)|` allowed, relative to the largest `|y|`. Without regularisation.
+    /// Largest residual `|y - (z + psf * z)|` allowed, relative to the largest real or imaginary part of `y`.
+    /// Not asked for with a regularisation.
     pub tolerance: f64,
     /// Iterations after which an image that has not come below the tolerance is refused.
     pub max_iterations: usize,

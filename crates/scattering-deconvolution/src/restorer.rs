@@ -5,7 +5,7 @@ use rustfft::num_complex::Complex;
 
 use crate::convolution::{Convolver, check_size};
 use crate::grid::Grid;
-use crate::mask::Mask;
+use crate::mask::{Mask, largest_part};
 use crate::model::Model;
 use crate::{Error, Psf, RestorationOptions, Result};
 
@@ -18,7 +18,7 @@ const PLAIN_ITERATION: f64 = 0.5;
 pub struct RestorationSummary {
     /// Iterations after the first estimate.
     pub iterations: usize,
-    /// Bound of the residual `|y - (z + psf * z)|` that remains, over the largest `|y|`.
+    /// Bound of the residual `|y - (z + psf * z)|` that remains, over the largest real or imaginary part of `y`.
     pub residual: f64,
     /// Factor by which the standard deviation of noise that is the same everywhere changes.
     pub noise_gain: f64,
@@ -159,7 +159,7 @@ impl Work {
         self.grid.restrict(real, imaginary, &mut self.observed);
         self.scattered.copy_from_slice(&self.observed);
         self.convolver.apply(&mut self.scattered, &self.model.estimate);
-        let largest = largest_modulus(real.iter().zip(imaginary).map(|(re, im)| Complex::new(*re, *im)));
+        let largest = f64::from(largest_part(real).max(largest_part(imaginary)));
         let tolerance = options.tolerance;
         let mut residual = f64::INFINITY;
         for iterations in 0..=options.max_iterations {

@@ -5,6 +5,7 @@ mod common;
 
 use common::{gaussians, rough_kernel, scattered_directly};
 use proptest::prelude::*;
+use proptest::test_runner::RngSeed;
 use scattering_deconvolution::{Error, Psf, Scatterer};
 
 fn plane(pixels: usize, seed: usize) -> Vec<f32> {
@@ -88,7 +89,7 @@ fn what_is_wrong_is_named() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(24) })]
+    #![proptest_config(ProptestConfig { failure_persistence: None, rng_seed: RngSeed::Fixed(1), ..ProptestConfig::with_cases(24) })]
 
     #[test]
     fn scattering_follows_its_definition_for_any_size(

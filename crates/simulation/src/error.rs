@@ -34,6 +34,9 @@ pub enum Error {
         /// How many there are.
         count: usize,
     },
+    /// A frame was asked for of a station that another simulator rendered.
+    #[error("the station's image was rendered by another simulator")]
+    ForeignImage,
     /// The camera is not valid.
     #[error("camera: {0}")]
     Camera(#[from] camera_model::Error),

@@ -26,7 +26,6 @@ pub(crate) struct Image {
     pub channels: Vec<[Vec<f32>; 2]>,
     /// Mean sample.
     pub offset: Vec<f32>,
-    pub truth: FrameTruth,
 }
 
 /// All that a row needs, the same for all rows.
@@ -60,14 +59,14 @@ struct Signal {
 
 impl Renderer<'_> {
     /// Renders all rows; which thread takes which makes no difference.
-    pub fn render(&self) -> Result<Image> {
+    pub fn render(&self) -> Result<(Image, FrameTruth)> {
         let ImageFormat { width, height, .. } = self.camera.format;
         let rows: Vec<Result<Vec<Pixel>>> = (0..height).into_par_iter().map(|row| self.row(row, width)).collect();
         let mut pixels = Vec::with_capacity(width * height);
         for row in rows {
             pixels.extend(row?);
         }
-        self.image(width, height, &pixels)
+        Ok((self.image(&pixels), self.truth(&pixels)?))
     }
 
     fn row(&self, row: usize, width: usize) -> Result<Vec<Pixel>> {
@@ -153,25 +152,30 @@ impl Renderer<'_> {
         Ok(model.observed_range(true_m, x - xp, y - yp, amplitude)?)
     }
 
-    fn image(&self, width: usize, height: usize, pixels: &[Pixel]) -> Result<Image> {
+    fn image(&self, pixels: &[Pixel]) -> Image {
         let plane = |value: &dyn Fn(&Pixel) -> f32| pixels.iter().map(value).collect::<Vec<f32>>();
-        let count = self.channels.len();
-        let amplitude = |i: usize| Raster::from_vec(width, height, plane(&|p: &Pixel| p.signals[i].amplitude));
-        let wraps =
-            |i: usize| Raster::from_vec(width, height, pixels.iter().map(|p: &Pixel| p.signals[i].wraps).collect());
-        Ok(Image {
-            channels: (0..count).map(|i| [plane(&|p| p.signals[i].real), plane(&|p| p.signals[i].imaginary)]).collect(),
-            offset: plane(&|p| p.offset),
-            truth: FrameTruth {
-                range: Raster::from_vec(width, height, plane(&|p| p.range))?,
-                wraps: (0..count).map(wraps).collect::<std::result::Result<_, _>>()?,
-                amplitude: (0..count).map(amplitude).collect::<std::result::Result<_, _>>()?,
-                mixed: Raster::from_vec(width, height, pixels.iter().map(|p| p.mixed).collect())?,
-                object: Raster::from_vec(width, height, pixels.iter().map(|p| p.object).collect())?,
-                world_from_camera: self.world_from_camera,
-            },
+        let parts = |i: usize| [plane(&|p| p.signals[i].real), plane(&|p| p.signals[i].imaginary)];
+        Image { channels: (0..self.channels.len()).map(parts).collect(), offset: plane(&|p| p.offset) }
+    }
+
+    fn truth(&self, pixels: &[Pixel]) -> Result<FrameTruth> {
+        let ImageFormat { width, height, .. } = self.camera.format;
+        let channels = 0..self.channels.len();
+        let wraps = |i: usize| raster(width, height, pixels, |p| p.signals[i].wraps);
+        let amplitude = |i: usize| raster(width, height, pixels, |p| p.signals[i].amplitude);
+        Ok(FrameTruth {
+            range: raster(width, height, pixels, |p| p.range)?,
+            wraps: channels.clone().map(wraps).collect::<Result<_>>()?,
+            amplitude: channels.map(amplitude).collect::<Result<_>>()?,
+            mixed: raster(width, height, pixels, |p| p.mixed)?,
+            object: raster(width, height, pixels, |p| p.object)?,
+            world_from_camera: self.world_from_camera,
         })
     }
+}
+
+fn raster<T>(width: usize, height: usize, pixels: &[Pixel], value: impl Fn(&Pixel) -> T) -> Result<Raster<T>> {
+    Ok(Raster::from_vec(width, height, pixels.iter().map(value).collect())?)
 }
 
 /// Whether a ray ends further than a threshold from the plane that touches the surface seen at the pixel's centre.

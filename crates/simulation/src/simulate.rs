@@ -43,7 +43,7 @@ pub struct SimulatedSurvey {
 
 /// A simulation that is ready to run, station by station, for those who do not want all frames in memory.
 pub struct Simulator {
-    spec: SimulationSpec,
+    spec: Arc<SimulationSpec>,
     scene: Scene,
     lighting: Lighting,
     channels: Vec<Channel>,
@@ -53,6 +53,7 @@ pub struct Simulator {
 /// What one station sees, before noise: as many frames as wanted can be taken of it.
 #[derive(Debug, Clone)]
 pub struct StationImage {
+    spec: Arc<SimulationSpec>,
     station: usize,
     image: Image,
     truth: Arc<FrameTruth>,
@@ -67,7 +68,7 @@ pub struct StationImage {
 pub fn simulate(spec: &SimulationSpec, seed: u64, progress: &(dyn Fn(usize, usize) + Sync)) -> Result<SimulatedSurvey> {
     let simulator = Simulator::new(spec)?;
     let total = spec.stations.len() * spec.exposure.frames_per_station;
-    let mut frames = Vec::with_capacity(total);
+    let mut frames = Vec::new();
     for station in 0..spec.stations.len() {
         let image = simulator.station(station)?;
         for frame in 0..spec.exposure.frames_per_station {
@@ -98,7 +99,7 @@ impl Simulator {
             lighting: Lighting::new(&spec.illumination, &spec.exposure, spec.errors.multipath.as_ref()),
             channels: channels(spec)?,
             pattern: spec.errors.fixed_pattern.map(|pattern| pattern.pattern(format.width, format.height)),
-            spec: spec.clone(),
+            spec: Arc::new(spec.clone()),
         })
     }
 
@@ -125,22 +126,27 @@ impl Simulator {
             mixed_pixels: self.spec.errors.mixed_pixels,
             world_from_camera: place.world_from_camera(),
         };
-        let mut image = renderer.render()?;
+        let (mut image, truth) = renderer.render()?;
         self.scatter(&mut image)?;
-        let truth = Arc::new(image.truth.clone());
-        Ok(StationImage { station, image, truth })
+        Ok(StationImage { spec: Arc::clone(&self.spec), station, image, truth: Arc::new(truth) })
     }
 
     /// Takes one frame of a station, with noise of its own.
+    ///
+    /// # Errors
+    /// A frame that the description does not have; an image of another simulator.
     pub fn frame(&self, image: &StationImage, frame: usize, seed: u64) -> Result<SimulatedFrame> {
-        let exposure = self.spec.exposure;
+        if !Arc::ptr_eq(&self.spec, &image.spec) {
+            return Err(Error::ForeignImage);
+        }
+        let (exposure, stations) = (self.spec.exposure, &self.spec.stations);
         let count = exposure.frames_per_station;
         if frame >= count {
             return Err(Error::NoSuch { what: "frame", index: frame, count });
         }
         let number = image.station * count + frame;
         Ok(SimulatedFrame {
-            station: self.spec.stations[image.station].name.clone(),
+            station: stations[image.station].name.clone(),
             station_index: image.station,
             frame_index: frame,
             timestamp_s: exposure.start_s + number as f64 * exposure.frame_interval_s,

@@ -65,6 +65,11 @@ const WRONG: &[(&str, Change)] = &[
     }),
     ("camera.modulation_hz", |s| s.camera.modulation_hz.clear()),
     ("camera.modulation_hz[0]", |s| s.camera.modulation_hz[0] = -1.0),
+    ("scene.objects[1].shape.center_m", |s| {
+        s.scene.objects[1].shape = ShapeSpec::Sphere { center_m: [0.0, 1e300, 0.0], radius_m: 1.0 };
+    }),
+    ("camera.geometry.format", |s| s.camera.geometry.format.width = usize::MAX),
+    ("exposure.frames_per_station", |s| s.exposure.frames_per_station = usize::MAX),
     ("camera.phase_steps", |s| s.camera.phase_steps = 2),
     ("camera.phase_offset_rad", |s| s.camera.phase_offset_rad = f64::NAN),
     ("illumination.source_power", |s| s.illumination.source_power = 0.0),
@@ -150,6 +155,14 @@ fn stations_and_frames_that_are_not_there_are_refused() {
     let spec = plain();
     assert!(matches!(simulate_frame(&spec, 1, 1, 0), Err(Error::NoSuch { what: "station", index: 1, count: 1 })));
     assert!(matches!(simulate_frame(&spec, 1, 0, 2), Err(Error::NoSuch { what: "frame", index: 2, count: 2 })));
+}
+
+#[test]
+fn an_image_belongs_to_its_simulator() {
+    let (one, other) = (Simulator::new(&plain()).unwrap(), Simulator::new(&plain()).unwrap());
+    let image = one.station(0).unwrap();
+    assert!(one.frame(&image, 0, 1).is_ok());
+    assert_eq!(other.frame(&image, 0, 1).unwrap_err(), Error::ForeignImage);
 }
 
 #[test]

@@ -5,6 +5,7 @@ mod common;
 
 use common::plain;
 use range_image::{NoiseModel, Samples, demodulate, sigma_from_repeats};
+use scattering_deconvolution::{GaussianTerm, Psf};
 use simulation::{MixedPixelsSpec, MultipathSpec, SampleType, SimulationSpec, simulate, simulate_frame};
 
 fn noisy() -> SimulationSpec {
@@ -59,6 +60,7 @@ fn bits_do_not_depend_on_the_number_of_threads() {
     let mut spec = noisy();
     spec.errors.mixed_pixels = Some(MixedPixelsSpec { rays_per_pixel_side: 2, threshold_m: 0.05 });
     spec.errors.multipath = Some(MultipathSpec { directions: 8, seed: 1 });
+    spec.errors.scattering = Some(Psf::Gaussians(vec![GaussianTerm { weight: 0.05, sigma_px: [8.0, 8.0] }]));
     let run = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| simulate(&spec, 42, &|_, _| {}).unwrap())

@@ -13,7 +13,7 @@ pub const HEIGHT: usize = 144;
 /// Ambiguity interval at 30 MHz, metres (rounded; only ratios matter here).
 pub const INTERVAL_M: f64 = 5.0;
 /// Principal distance in pixels: 8 mm at a pitch of 0.04 mm.
-const FOCAL_PX: f64 = 200.0;
+pub const FOCAL_PX: f64 = 200.0;
 /// Subrays a side of a pixel, averaged as complex numbers: mixed pixels at edges.
 const SUBRAYS: usize = 3;
 

@@ -157,11 +157,12 @@ fn registration(page: &mut Page, outcome: &Outcome, summary: &Summary) -> Result
         return Ok(());
     }
     page.section("The cloud");
+    let poses = crate::results::poses_or_identity(outcome);
     let clouds: Vec<StationCloud<'_>> = outcome
         .clouds
         .iter()
         .zip(&outcome.views)
-        .zip(&outcome.poses)
+        .zip(&poses)
         .map(|((cloud, view), pose)| StationCloud {
             name: &view.station,
             points: crate::outcome::world_points(cloud, &pose.world_from_camera),

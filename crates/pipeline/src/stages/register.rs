@@ -1,8 +1,8 @@
-use icp_registration::{Cloud, IcpOptions, IcpTarget, OrganisedNormalOptions, organised_normals};
+use icp_registration::{Cloud, IcpOptions, IcpResult, IcpTarget, OrganisedNormalOptions, organised_normals};
 use nalgebra::Isometry3;
 
 use super::Findings;
-use crate::outcome::{AlignedPair, StationPose};
+use crate::outcome::{AlignedPair, RefusedPair, StationPose};
 use crate::plan::RegisterOptions;
 use crate::progress::Progress;
 use crate::work::Work;
@@ -14,24 +14,41 @@ pub(super) fn run(work: &mut Work, options: &RegisterOptions, progress: &dyn Pro
     let approximate = approximate_poses(work);
     let candidates = candidate_pairs(&targets, &approximate, options)?;
     progress.begin("Register", candidates.len());
-    let icp = IcpOptions { initial_correspondence_distance_m: Some(options.maximum_distance_m), ..IcpOptions::default() };
-    let mut refused = 0_usize;
+    let icp = IcpOptions {
+        initial_correspondence_distance_m: Some(options.maximum_distance_m),
+        max_motion_sigma_m: Some(options.maximum_motion_sigma_m),
+        ..IcpOptions::default()
+    };
+    let mut refused = Vec::new();
     let mut pairs = Vec::new();
     for (done, (target, source)) in candidates.into_iter().enumerate() {
         let guess = approximate[target].inverse() * approximate[source];
         // A pair that can't be aligned is no failure of the survey as long as others connect its stations.
         match targets[target].align(targets[source].cloud(), &guess, &icp) {
             Ok(result) if result.is_trustworthy() => pairs.push(AlignedPair { target, source, result }),
-            Ok(_) | Err(_) => refused += 1,
+            Ok(result) => refused.push(RefusedPair { target, source, reason: distrust(&result) }),
+            Err(error) => refused.push(RefusedPair { target, source, reason: error.to_string() }),
         }
         progress.advance(done + 1);
     }
-    let poses = spanning_poses(work, &pairs, &approximate)?;
+    let poses = spanning_poses(work, &pairs, &refused, &approximate)?;
     work.outcome.poses = poses;
-    let found = pairs.len() as f64;
+    let findings = [("pairs", pairs.len()), ("pairs_refused", refused.len())];
     work.outcome.pairs = pairs;
+    work.outcome.refused = refused;
     work.station_clouds = targets;
-    Ok(Findings::from([("pairs".to_owned(), found), ("pairs_refused".to_owned(), refused as f64)]))
+    Ok(findings.map(|(name, count)| (name.to_owned(), count as f64)).into())
+}
+
+/// Why an alignment that came to an end is not used.
+fn distrust(result: &IcpResult) -> String {
+    match result.degenerate.as_slice() {
+        [] => format!("not settled after {} iterations", result.iterations),
+        motions => {
+            let named = motions.iter().map(|motion| format!("{:?} known to {:.3} m", motion.kind, motion.sigma_m));
+            format!("the geometry leaves undetermined: {}", named.collect::<Vec<_>>().join(", "))
+        }
+    }
 }
 
 /// The unflagged points of each view with normals from its grid, as targets with their trees.
@@ -78,7 +95,12 @@ fn candidate_pairs(
 }
 
 /// Poses along the tree of pairs with the most overlap, from the first station on.
-fn spanning_poses(work: &Work, pairs: &[AlignedPair], approximate: &[Isometry3<f64>]) -> Result<Vec<StationPose>> {
+fn spanning_poses(
+    work: &Work,
+    pairs: &[AlignedPair],
+    refused: &[RefusedPair],
+    approximate: &[Isometry3<f64>],
+) -> Result<Vec<StationPose>> {
     let mut poses: Vec<Option<StationPose>> = vec![None; approximate.len()];
     if let (Some(first), Some(pose)) = (poses.first_mut(), approximate.first()) {
         *first = Some(StationPose { world_from_camera: *pose, covariance: None });
@@ -101,7 +123,12 @@ fn spanning_poses(work: &Work, pairs: &[AlignedPair], approximate: &[Isometry3<f
     if lost.is_empty() {
         return Ok(poses.into_iter().flatten().collect());
     }
-    Err(Error::stage("Register", &format!("stations {}", lost.join(", ")))(
-        "no reliable alignment connects them to the first station: more overlap or better approximate poses are needed",
-    ))
+    let station = |index: usize| work.outcome.views[index].station.as_str();
+    let reasons = refused.iter().map(|pair| format!("{} to {}: {}", station(pair.source), station(pair.target), pair.reason));
+    let reasons: Vec<String> = reasons.collect();
+    Err(Error::stage("Register", &format!("stations {}", lost.join(", ")))(format!(
+        "no reliable alignment connects them to the first station; more overlap or better approximate poses are needed \
+         ({})",
+        reasons.join("; ")
+    )))
 }

@@ -9,10 +9,8 @@ use ron::extensions::Extensions;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
+use crate::text::read_text;
 use crate::{Error, InvalidField, Result};
-
-/// Longest file that is read as text.
-const LONGEST_FILE: u64 = 1 << 30;
 
 fn options() -> ron::Options {
     ron::Options::default().with_default_extension(Extensions::IMPLICIT_SOME)
@@ -48,15 +46,6 @@ pub fn to_text<T: Serialize>(value: &T) -> Result<String> {
         reason: error.to_string(),
     })?;
     Ok(format!("#![enable(implicit_some)]\n{}", layout::in_lines(&compact)))
-}
-
-/// Reads a text file, refusing what is not UTF-8.
-pub(crate) fn read_text(path: &Path) -> Result<String> {
-    let length = std::fs::metadata(path).map_err(Error::io(path, "open"))?.len();
-    if length > LONGEST_FILE {
-        return Err(Error::format(path, format!("is {length} bytes long, expected at most {LONGEST_FILE}")));
-    }
-    std::fs::read_to_string(path).map_err(Error::io(path, "read"))
 }
 
 /// The error for a field that was read but does not hold, at its place in the text.

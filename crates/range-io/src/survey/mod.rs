@@ -2,9 +2,11 @@
 
 mod arrays;
 mod camera;
+mod depth;
 mod frame;
 mod truth;
 mod validate;
+mod write;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -12,10 +14,12 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 pub use camera::SurveyCamera;
-pub use frame::{InputFrame, read_frame, write_frame};
+pub use frame::{InputFrame, read_frame};
 pub use range_image::PhaseSense;
 pub use truth::{TruthFrame, read_truth, write_truth};
+pub use write::write_frame;
 
+use crate::text::read_text;
 use crate::{Result, atomic, ron_text};
 
 /// What was captured: `survey.ron`. Angles in radian, lengths of the camera in millimetre, times in second.
@@ -119,7 +123,7 @@ impl Survey {
     pub fn read(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
         let file = if path.is_dir() { path.join(Self::FILE_NAME) } else { path.to_path_buf() };
-        Self::parse(&file, &ron_text::read_text(&file)?)
+        Self::parse(&file, &read_text(&file)?)
     }
 
     /// Reads and checks the text of a `survey.ron`; `file` stands for it in messages.

@@ -6,11 +6,10 @@ use serde::ser::Serializer;
 
 use super::{FrameEntry, Level, StoredDepth, Survey, SurveyCamera, TruthFiles};
 use crate::InvalidField;
+use crate::limits::MOST_PIXELS;
 
 type Check = Result<(), InvalidField>;
 
-/// Larger images than any sensor of this kind; guards what is allocated on a header's word.
-const MOST_PIXELS: usize = 1 << 26;
 const MOST_FREQUENCIES: usize = 64;
 const MOST_PHASE_STEPS: usize = 1024;
 

@@ -39,7 +39,7 @@ fn value_noise(point: &Vector3<f64>, seed: u64) -> f64 {
         for axis in 0..3 {
             let high = corner >> axis & 1;
             share *= if high == 1 { weight[axis] } else { 1.0 - weight[axis] };
-            node[axis] = base[axis] as i64 + i64::from(high);
+            node[axis] = (base[axis] as i64).wrapping_add(i64::from(high));
         }
         sum += share * node_value(node, seed);
     }

@@ -78,6 +78,11 @@ impl CameraSpec {
         }
         let n = self.phase_steps;
         require((3..=64).contains(&n), "camera.phase_steps", &n, "from 3 to 64 phase steps")?;
+        let format = self.geometry.format;
+        let planes = n.saturating_mul(self.modulation_hz.len());
+        let samples = format.width.saturating_mul(format.height).saturating_mul(planes);
+        let expected = "a format with at most 2^30 samples a frame";
+        require(samples <= 1 << 30, "camera.geometry.format", &format, expected)?;
         finite("camera.phase_offset_rad", self.phase_offset_rad)
     }
 
@@ -101,9 +106,10 @@ impl IlluminationSpec {
 impl ExposureSpec {
     pub(crate) fn validate(&self) -> Result<()> {
         let n = self.frames_per_station;
-        require(n > 0, "exposure.frames_per_station", &n, "at least one frame")?;
+        require((1..=1_000_000).contains(&n), "exposure.frames_per_station", &n, "from 1 to 1000000 frames")?;
         positive("exposure.integration_time_s", self.integration_time_s)?;
-        not_negative("exposure.frame_interval_s", self.frame_interval_s)?;
+        let interval = self.frame_interval_s;
+        require((0.0..=1e9).contains(&interval), "exposure.frame_interval_s", &interval, "from 0 to 1e9 seconds")?;
         finite("exposure.start_s", self.start_s)
     }
 }

@@ -24,12 +24,28 @@ pub(crate) fn not_negative(field: impl Into<String>, value: f64) -> Result<()> {
     require(value.is_finite() && value >= 0.0, field, &value, "a finite number, zero or above")
 }
 
-/// Finite coordinates.
+/// Three finite numbers.
 pub(crate) fn finite_triple(field: impl Into<String>, value: &[f64; 3]) -> Result<()> {
     require(value.iter().all(|v| v.is_finite()), field, value, "three finite numbers")
 }
 
-/// Extents above zero.
-pub(crate) fn positive_triple(field: impl Into<String>, value: &[f64; 3]) -> Result<()> {
-    require(value.iter().all(|v| v.is_finite() && *v > 0.0), field, value, "three finite numbers above zero")
+/// Furthest coordinate and largest extent: within it, f64 tells a nanometre, and no square overflows.
+const FURTHEST_M: f64 = 1e6;
+/// Smallest extent.
+const SMALLEST_M: f64 = 1e-6;
+
+/// Coordinates in metre.
+pub(crate) fn coordinates(field: impl Into<String>, value: &[f64; 3]) -> Result<()> {
+    require(value.iter().all(|v| v.abs() <= FURTHEST_M), field, value, "coordinates within 1e6 m")
+}
+
+/// A length in metre.
+pub(crate) fn extent(field: impl Into<String>, value: f64) -> Result<()> {
+    require((SMALLEST_M..=FURTHEST_M).contains(&value), field, &value, "a length from 1e-6 to 1e6 m")
+}
+
+/// Lengths in metre.
+pub(crate) fn extents(field: impl Into<String>, value: &[f64; 3]) -> Result<()> {
+    let holds = value.iter().all(|v| (SMALLEST_M..=FURTHEST_M).contains(v));
+    require(holds, field, value, "three lengths from 1e-6 to 1e6 m")
 }

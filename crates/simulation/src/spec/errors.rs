@@ -104,7 +104,7 @@ impl DigitisationSpec {
 
 impl FixedPatternSpec {
     /// The offsets of all pixels, row by row.
-    pub fn pattern(&self, width: usize, height: usize) -> FixedPattern {
+    pub(crate) fn pattern(&self, width: usize, height: usize) -> FixedPattern {
         let mut generator = Pcg64::seed_from_u64(self.seed);
         let offset = |_| {
             let unit: f64 = StandardNormal.sample(&mut generator);

@@ -1,7 +1,7 @@
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use super::check::{finite, finite_triple, not_negative, positive, positive_triple, require};
+use super::check::{coordinates, extent, extents, finite, finite_triple, not_negative, require};
 use crate::Result;
 
 /// What stands in front of the camera. World coordinates in metre, z up.
@@ -141,8 +141,8 @@ impl ShapeSpec {
     fn validate(&self, path: &str) -> Result<()> {
         match self {
             Self::Room { min_m, max_m, face_albedo } => {
-                finite_triple(format!("{path}.min_m"), min_m)?;
-                finite_triple(format!("{path}.max_m"), max_m)?;
+                coordinates(format!("{path}.min_m"), min_m)?;
+                coordinates(format!("{path}.max_m"), max_m)?;
                 let ordered = min_m.iter().zip(max_m).all(|(low, high)| low < high);
                 require(ordered, format!("{path}.max_m"), max_m, "above min_m in each coordinate")?;
                 for value in face_albedo.iter().flatten() {
@@ -151,16 +151,16 @@ impl ShapeSpec {
                 Ok(())
             }
             Self::Rectangle { corner_m, edge_u_m, edge_v_m } => {
-                finite_triple(format!("{path}.corner_m"), corner_m)?;
+                coordinates(format!("{path}.corner_m"), corner_m)?;
                 validate_edges(path, edge_u_m, edge_v_m)
             }
             Self::Sphere { center_m, radius_m } => {
-                finite_triple(format!("{path}.center_m"), center_m)?;
-                positive(format!("{path}.radius_m"), *radius_m)
+                coordinates(format!("{path}.center_m"), center_m)?;
+                extent(format!("{path}.radius_m"), *radius_m)
             }
             Self::Cuboid { center_m, size_m, rotation_deg } => {
-                finite_triple(format!("{path}.center_m"), center_m)?;
-                positive_triple(format!("{path}.size_m"), size_m)?;
+                coordinates(format!("{path}.center_m"), center_m)?;
+                extents(format!("{path}.size_m"), size_m)?;
                 finite_triple(format!("{path}.rotation_deg"), rotation_deg)
             }
             Self::Mesh { vertices_m, triangles } => validate_mesh(path, vertices_m, triangles),
@@ -170,9 +170,8 @@ impl ShapeSpec {
 
 fn validate_edges(path: &str, edge_u_m: &[f64; 3], edge_v_m: &[f64; 3]) -> Result<()> {
     for (name, edge) in [("edge_u_m", edge_u_m), ("edge_v_m", edge_v_m)] {
-        finite_triple(format!("{path}.{name}"), edge)?;
-        let long = Vector3::from(*edge).norm() > 0.0;
-        require(long, format!("{path}.{name}"), edge, "an edge longer than zero")?;
+        coordinates(format!("{path}.{name}"), edge)?;
+        extent(format!("{path}.{name}"), Vector3::from(*edge).norm())?;
     }
     let (u, v) = (Vector3::from(*edge_u_m), Vector3::from(*edge_v_m));
     // Edges written with six decimals are perpendicular to about 1e-6.
@@ -183,7 +182,7 @@ fn validate_edges(path: &str, edge_u_m: &[f64; 3], edge_v_m: &[f64; 3]) -> Resul
 fn validate_mesh(path: &str, vertices: &[[f64; 3]], triangles: &[[u32; 3]]) -> Result<()> {
     require(!triangles.is_empty(), format!("{path}.triangles"), &0, "at least one triangle")?;
     for (index, vertex) in vertices.iter().enumerate() {
-        finite_triple(format!("{path}.vertices_m[{index}]"), vertex)?;
+        coordinates(format!("{path}.vertices_m[{index}]"), vertex)?;
     }
     for (index, triangle) in triangles.iter().enumerate() {
         let field = format!("{path}.triangles[{index}]");
@@ -191,8 +190,8 @@ fn validate_mesh(path: &str, vertices: &[[f64; 3]], triangles: &[[u32; 3]]) -> R
         let (Some(a), Some(b), Some(c)) = (corner(0), corner(1), corner(2)) else {
             return require(false, field, triangle, "indices of vertices_m");
         };
-        let area = (b - a).cross(&(c - a)).norm();
-        require(area.is_finite() && area > 0.0, field, triangle, "three corners that span an area")?;
+        let area = (b - a).cross(&(c - a)).norm() / 2.0;
+        require(area > 1e-12, field, triangle, "corners that span more than 1e-12 square metres")?;
     }
     Ok(())
 }
@@ -201,16 +200,16 @@ impl TextureSpec {
     fn validate(&self, path: &str) -> Result<()> {
         match *self {
             Self::Checker { size_m, factor } => {
-                positive(format!("{path}.size_m"), size_m)?;
+                extent(format!("{path}.size_m"), size_m)?;
                 not_negative(format!("{path}.factor"), factor)
             }
             Self::Discs { spacing_m, radius_m, factor } => {
-                positive(format!("{path}.spacing_m"), spacing_m)?;
-                positive(format!("{path}.radius_m"), radius_m)?;
+                extent(format!("{path}.spacing_m"), spacing_m)?;
+                extent(format!("{path}.radius_m"), radius_m)?;
                 not_negative(format!("{path}.factor"), factor)
             }
             Self::Noise { size_m, contrast, .. } => {
-                positive(format!("{path}.size_m"), size_m)?;
+                extent(format!("{path}.size_m"), size_m)?;
                 finite(format!("{path}.contrast"), contrast)?;
                 let holds = (0.0..1.0).contains(&contrast);
                 require(holds, format!("{path}.contrast"), &contrast, "a contrast from 0 to below 1")

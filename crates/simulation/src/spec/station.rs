@@ -2,7 +2,7 @@ use camera_model::pose_from_euler;
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
-use super::check::{finite, finite_triple, require};
+use super::check::{coordinates, finite, require};
 use crate::Result;
 
 /// One place from which frames are taken.
@@ -42,7 +42,7 @@ pub enum AttitudeSpec {
 
 impl StationSpec {
     pub(crate) fn validate(&self, path: &str) -> Result<()> {
-        finite_triple(format!("{path}.position_m"), &self.position_m)?;
+        coordinates(format!("{path}.position_m"), &self.position_m)?;
         match self.attitude {
             AttitudeSpec::Euler { omega_deg, phi_deg, kappa_deg } => {
                 finite(format!("{path}.attitude.omega_deg"), omega_deg)?;
@@ -50,7 +50,7 @@ impl StationSpec {
                 finite(format!("{path}.attitude.kappa_deg"), kappa_deg)
             }
             AttitudeSpec::LookAt { target_m, roll_deg } => {
-                finite_triple(format!("{path}.attitude.target_m"), &target_m)?;
+                coordinates(format!("{path}.attitude.target_m"), &target_m)?;
                 finite(format!("{path}.attitude.roll_deg"), roll_deg)?;
                 let view = Vector3::from(target_m) - Vector3::from(self.position_m);
                 let level = view.norm() > 0.0 && view.cross(&Vector3::z()).norm() > 1e-9 * view.norm();

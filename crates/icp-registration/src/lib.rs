@@ -1,1 +1,23 @@
 #![doc = include_str!("../README.md")]
+
+mod absolute_orientation;
+mod cloud;
+mod eigen;
+mod error;
+mod icp;
+mod kernel;
+mod neighbours;
+mod normals;
+mod pose;
+
+pub use absolute_orientation::{Orientation, Similarity, absolute_orientation, absolute_orientation_with_scale};
+pub use cloud::Cloud;
+pub use error::{Error, Result};
+pub use icp::{
+    DegeneracyPolicy, IcpOptions, IcpResult, IcpTarget, Metric, MotionKind, Selection, StopReason, UndeterminedMotion,
+    align,
+};
+pub use kernel::RobustKernel;
+pub use neighbours::{Neighbour, NeighbourTree};
+pub use normals::{OrganisedNormalOptions, UnorganisedNormalOptions, organised_normals, unorganised_normals};
+pub use pose::{inverse_covariance_transport, pose_difference, step_pose};

@@ -1,1 +1,12 @@
 #![doc = include_str!("../README.md")]
+
+mod approximation;
+mod error;
+mod model;
+mod resection;
+mod target;
+mod three_points;
+
+pub use error::{Error, Result};
+pub use resection::{Resection, ResectionOptions, Start, TargetResidual, resect};
+pub use target::{ObservedRange, TargetObservation};

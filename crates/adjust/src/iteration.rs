@@ -1,0 +1,172 @@
+use crate::constraints::Constraints;
+use crate::layout::Layout;
+use crate::linearisation::{Linearisation, Want};
+use crate::normal::NormalEquations;
+use crate::rank::Problem;
+use crate::{Adjustment, Error, Method, Result, SolveOptions, StepKind, TraceEntry};
+
+/// A damped step that is expected to reduce the objective by less than this share ends the descent.
+const SMALL_GAIN: f64 = 1e-3;
+
+/// Share by which the metric of the damping forgets earlier, longer columns in an iteration. Never forgetting [More1978]
+/// crawls where the start was steep; forgetting at once lets parameters run away on plateaus.
+const FORGETTING: f64 = 2.0;
+
+/// The state of one run.
+pub(crate) struct Iteration<'p, 'a> {
+    pub(crate) adjustment: &'p Adjustment<'a>,
+    pub(crate) layout: &'p Layout,
+    pub(crate) options: &'p SolveOptions,
+    pub(crate) values: Vec<f64>,
+    pub(crate) current: Linearisation,
+    pub(crate) constraints: Constraints,
+    pub(crate) normal: NormalEquations,
+    pub(crate) trace: Vec<TraceEntry>,
+    pub(crate) trial: Linearisation,
+    pub(crate) trial_values: Vec<f64>,
+    pub(crate) moved: Vec<f64>,
+    /// Weight of the constraints in the merit function (exact penalty: above the largest multiplier).
+    pub(crate) penalty: f64,
+    pub(crate) damping: f64,
+    pub(crate) growth: f64,
+    /// Ratio of found to expected reduction in the last damped step.
+    pub(crate) last_gain: f64,
+    /// Column norms, as scale factors, with a memory of longer ones: the metric of the damping.
+    pub(crate) metric: Vec<f64>,
+}
+
+impl<'p, 'a> Iteration<'p, 'a> {
+    pub(crate) fn new(adjustment: &'p Adjustment<'a>, layout: &'p Layout, options: &'p SolveOptions) -> Result<Self> {
+        let values: Vec<f64> = adjustment.blocks.iter().flat_map(|block| block.values.iter().copied()).collect();
+        let mut this = Self {
+            adjustment,
+            layout,
+            options,
+            trial_values: values.clone(),
+            values,
+            current: Linearisation::new(layout),
+            constraints: Constraints::default(),
+            normal: NormalEquations::new(layout.unknowns),
+            trace: Vec::new(),
+            trial: Linearisation::new(layout),
+            moved: vec![0.0; layout.rows],
+            penalty: 0.0,
+            damping: options.initial_damping,
+            growth: 2.0,
+            last_gain: 0.0,
+            metric: vec![f64::INFINITY; layout.unknowns],
+        };
+        this.linearise()?;
+        Ok(this)
+    }
+
+    fn linearise(&mut self) -> Result<()> {
+        self.current.evaluate(self.adjustment, self.layout, &self.values, Want::Jacobians)?;
+        self.constraints = Constraints::new(self.adjustment, self.layout, &self.current, &self.values)?;
+        self.normal.accumulate(self.layout, &self.current);
+        let scale = self.normal.scale();
+        self.metric.iter_mut().zip(scale).for_each(|(metric, scale)| *metric = (FORGETTING * *metric).min(scale));
+        Ok(())
+    }
+
+    /// Runs to the end; the state is then linearised at the solution.
+    pub(crate) fn run(&mut self) -> Result<()> {
+        if self.layout.unknowns == 0 {
+            return Ok(());
+        }
+        let mut small_gain = SMALL_GAIN;
+        let mut damped = self.options.method == Method::LevenbergMarquardt;
+        loop {
+            let descended = !damped || self.descend(small_gain)?;
+            if self.polish(damped && descended)? {
+                return Ok(());
+            }
+            // Undamped steps led nowhere: descend further before they are tried again.
+            damped = true;
+            small_gain *= 1e-2;
+            if !descended || small_gain < 1e-30 || self.options.method == Method::GaussNewton {
+                return Err(self.not_converged("neither damped nor undamped steps lead on"));
+            }
+        }
+    }
+
+    /// The linearised problem as it stands.
+    pub(crate) fn problem(&self) -> Problem<'_> {
+        Problem {
+            layout: self.layout,
+            linearisation: &self.current,
+            constraints: &self.constraints,
+            normal: &self.normal,
+        }
+    }
+
+    /// Expected reduction of the merit function, and the length of the step in standard deviations; the distance to the
+    /// constraints is part of it.
+    pub(crate) fn expect(&mut self, step: &[f64]) -> (f64, f64) {
+        self.current.apply(self.layout, step, &mut self.moved);
+        let (mut square, mut gain) = (0.0, 0.0);
+        for ((m, v), w) in self.moved.iter().zip(&self.current.whitened).zip(&self.current.weights) {
+            square += w * m * m;
+            gain += w * m * (2.0 * v - m);
+        }
+        if self.constraints.first_inner > 0 {
+            let scale = self.normal.scale();
+            square += self.constraints.scaled(&scale).right.iter().map(|d| d * d).sum::<f64>();
+            self.raise_penalty(&scale);
+        }
+        let miss: f64 = self.current.constraint.iter().map(|c| c.abs()).sum();
+        (gain + self.penalty * miss, square.sqrt())
+    }
+
+    /// Keeps the penalty at twice the largest Lagrange multiplier: then the merit function is smallest at the solution
+    /// ([Nocedal2006], Theorem 17.3). `moved` holds `A·dx`.
+    fn raise_penalty(&mut self, scale: &[f64]) {
+        let rest: Vec<f64> = self.current.whitened.iter().zip(&self.moved).map(|(v, m)| v - m).collect();
+        let force = self.current.transpose_apply(self.layout, &rest);
+        // The multipliers belong to vᵀPv / 2, the merit to vᵀPv.
+        let largest = self.constraints.multipliers(scale, &force).iter().fold(0.0, |a: f64, m| a.max(2.0 * m.abs()));
+        if largest.is_finite() {
+            self.penalty = self.penalty.max(2.0 * largest);
+        }
+    }
+
+    pub(crate) fn merit(&self, at: &Linearisation) -> f64 {
+        at.objective + self.penalty * at.constraint.iter().map(|c| c.abs()).sum::<f64>()
+    }
+
+    /// Merit at `values ⊞ share · step`; `None` where the model has no finite value.
+    pub(crate) fn try_step(&mut self, step: &[f64], share: f64) -> Option<f64> {
+        let step: Vec<f64> = step.iter().map(|dx| share * dx).collect();
+        self.layout.step(self.adjustment, &self.values, &step, &mut self.trial_values);
+        let done = self.trial.evaluate(self.adjustment, self.layout, &self.trial_values, Want::Residuals);
+        let merit = self.merit(&self.trial);
+        (done.is_ok() && merit.is_finite()).then_some(merit)
+    }
+
+    pub(crate) fn accept(&mut self) -> Result<()> {
+        std::mem::swap(&mut self.values, &mut self.trial_values);
+        self.linearise()
+    }
+
+    pub(crate) fn record(&mut self, kind: StepKind, step: f64, damping: f64, share: f64) {
+        self.trace.push(TraceEntry { kind, objective: self.current.objective, step, damping, share });
+    }
+
+    pub(crate) fn check_budget(&self) -> Result<()> {
+        if self.trace.len() < self.options.max_iterations {
+            return Ok(());
+        }
+        Err(self.not_converged("the largest number of iterations is reached"))
+    }
+
+    fn not_converged(&self, reason: &'static str) -> Error {
+        let last = self.trace.last();
+        Error::NotConverged {
+            iterations: self.trace.len(),
+            reason,
+            objective: self.current.objective,
+            step: last.map_or(f64::NAN, |entry| entry.step),
+            damping: last.map_or(0.0, |entry| entry.damping),
+        }
+    }
+}

@@ -1,0 +1,145 @@
+//! Ends of the iteration: convergence, its trace, and honest failure.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::float_cmp)]
+
+use adjust::{
+    Adjustment, BlockId, Covariance, Error, EvaluationFailure, FunctionObservation, LinearObservation, Method,
+    ParameterBlock, Scale, SolveOptions, StepKind, check_jacobian,
+};
+use approx::assert_relative_eq;
+
+/// y = b0 exp(−b1 t), exact data for b = (2, 0.5), sigma 0.01.
+fn decay(start: [f64; 2]) -> (Adjustment<'static>, BlockId) {
+    let mut a = Adjustment::new();
+    let b = a.add_block(ParameterBlock::euclidean(start).named("b"));
+    let group = a.add_group("decay");
+    for i in 0..20 {
+        let t = 0.3 * f64::from(i);
+        let observed = 2.0 * (-0.5 * t).exp() + 0.01 * (5.0 * t).sin();
+        let observation = FunctionObservation::new([b], 1, move |parameters, residual, jacobians| {
+            let e = (-parameters[0][1] * t).exp();
+            residual[0] = observed - parameters[0][0] * e;
+            if let Some(jacobians) = jacobians {
+                jacobians.row(0, 0).copy_from_slice(&[e, -parameters[0][0] * t * e]);
+            }
+            Ok(())
+        });
+        a.add_observation(group, observation, &Covariance::from_sigma(0.01)).unwrap();
+    }
+    (a, b)
+}
+
+#[test]
+fn the_trace_ends_undamped_below_the_tolerance() {
+    let mut found = Vec::new();
+    for method in [Method::GaussNewton, Method::LevenbergMarquardt] {
+        let (a, b) = decay([1.0, 1.0]);
+        let solution = a.solve(&SolveOptions { method, ..SolveOptions::default() }).unwrap();
+        let trace = solution.trace();
+        let last = trace.last().unwrap();
+        assert_eq!(last.kind, StepKind::Undamped);
+        assert_eq!(last.damping, 0.0);
+        assert!(last.step <= 1e-8 * solution.sigma0().unwrap().min(1.0));
+        assert_eq!(trace.len(), solution.iterations());
+        let damped = trace.iter().any(|entry| entry.kind == StepKind::Damped);
+        assert_eq!(damped, method == Method::LevenbergMarquardt);
+        assert_relative_eq!(last.objective, solution.vtpv(), max_relative = 1e-12);
+        found.push((solution.values(b).unwrap().to_vec(), solution.covariance(b, Scale::Prior).unwrap()));
+    }
+    // Both ways end at the same place, within 1e-8 standard deviations, and at the same, undamped covariance.
+    assert_relative_eq!(found[0].0[1], found[1].0[1], epsilon = 1e-10);
+    assert_relative_eq!(found[0].1, found[1].1, max_relative = 1e-7);
+}
+
+#[test]
+fn too_few_iterations_are_an_error_with_the_last_figures() {
+    let (a, _) = decay([1.0, 1.0]);
+    let error = a.solve(&SolveOptions { max_iterations: 2, ..SolveOptions::default() }).unwrap_err();
+    let Error::NotConverged { iterations, objective, step, .. } = error else { panic!("{error}") };
+    assert_eq!(iterations, 2);
+    assert!(objective.is_finite() && step > 1e-8);
+}
+
+#[test]
+fn a_wrong_jacobian_does_not_pass() {
+    let mut a = Adjustment::new();
+    let x = a.add_block(ParameterBlock::euclidean([1.0]));
+    let group = a.add_group("g");
+    let wrong = || {
+        FunctionObservation::new([x], 1, |parameters, residual, jacobians| {
+            residual[0] = 5.0 - parameters[0][0].powi(2);
+            if let Some(jacobians) = jacobians {
+                jacobians.row(0, 0)[0] = -2.0 * parameters[0][0];
+            }
+            Ok(())
+        })
+    };
+    let check = check_jacobian(&wrong(), &[ParameterBlock::euclidean([1.0])]).unwrap();
+    assert_relative_eq!(check.worst, 2.0, epsilon = 1e-9);
+    assert_eq!(check.place, (0, 0, 0));
+    assert_relative_eq!(check.numeric, 2.0, epsilon = 1e-9);
+    a.add_observation(group, wrong(), &Covariance::from_sigma(1.0)).unwrap();
+    let error = a.solve(&SolveOptions::default()).unwrap_err();
+    assert!(matches!(error, Error::NotConverged { .. }), "{error}");
+}
+
+#[test]
+fn a_model_without_value_shortens_the_step() {
+    // The full step from 4 goes to −1.5, where the root has no value.
+    for method in [Method::GaussNewton, Method::LevenbergMarquardt] {
+        let mut a = Adjustment::new();
+        let x = a.add_block(ParameterBlock::euclidean([4.0]));
+        let group = a.add_group("root");
+        let root = FunctionObservation::new([x], 1, |parameters, residual, jacobians| {
+            if parameters[0][0] <= 0.0 {
+                return Err(EvaluationFailure::new("no root of a negative number"));
+            }
+            residual[0] = 0.625 - parameters[0][0].sqrt();
+            if let Some(jacobians) = jacobians {
+                jacobians.row(0, 0)[0] = 0.5 / parameters[0][0].sqrt();
+            }
+            Ok(())
+        });
+        a.add_observation(group, root, &Covariance::from_sigma(0.1)).unwrap();
+        let solution = a.solve(&SolveOptions { method, ..SolveOptions::default() }).unwrap();
+        assert_relative_eq!(solution.values(x).unwrap()[0], 0.625 * 0.625, epsilon = 1e-12);
+    }
+}
+
+#[test]
+fn nonlinear_constraints_hold_at_the_end() {
+    // The point of the unit circle that is nearest to (3, 4), from a start that is not on it.
+    for method in [Method::GaussNewton, Method::LevenbergMarquardt] {
+        let mut a = Adjustment::new();
+        let p = a.add_block(ParameterBlock::euclidean([2.0, 0.1]));
+        a.add_prior(p, &[3.0, 4.0], &Covariance::from_sigmas(&[1.0, 1.0])).unwrap();
+        let circle = FunctionObservation::new([p], 1, |parameters, residual, jacobians| {
+            let (x, y) = (parameters[0][0], parameters[0][1]);
+            residual[0] = 1.0 - x * x - y * y;
+            if let Some(jacobians) = jacobians {
+                jacobians.row(0, 0).copy_from_slice(&[2.0 * x, 2.0 * y]);
+            }
+            Ok(())
+        });
+        a.add_constraint(circle).unwrap();
+        let solution = a.solve(&SolveOptions { method, ..SolveOptions::default() }).unwrap();
+        let values = solution.values(p).unwrap();
+        assert_relative_eq!(values[0], 0.6, epsilon = 1e-8);
+        assert_relative_eq!(values[1], 0.8, epsilon = 1e-8);
+        // Across the circle nothing is uncertain.
+        let q = solution.covariance(p, Scale::Prior).unwrap();
+        let across = 0.36 * q[(0, 0)] + 0.96 * q[(0, 1)] + 0.64 * q[(1, 1)];
+        assert!(across.abs() < 1e-12);
+        assert_eq!(solution.redundancy(), 1);
+    }
+}
+
+#[test]
+fn contradicting_constraints_are_refused() {
+    let mut a = Adjustment::new();
+    let x = a.add_block(ParameterBlock::euclidean([0.0]));
+    a.add_prior(x, &[0.0], &Covariance::from_sigma(1.0)).unwrap();
+    a.add_constraint(LinearObservation::new(1.0, [(x, [1.0])])).unwrap();
+    assert_eq!(a.solve(&SolveOptions::default()).unwrap().values(x).unwrap(), [1.0]);
+    a.add_constraint(LinearObservation::new(2.0, [(x, [1.0])])).unwrap();
+    assert!(matches!(a.solve(&SolveOptions::default()).unwrap_err(), Error::DependentConstraint { index: 1 }));
+}

@@ -1,0 +1,219 @@
+//! Closed-form absolute orientation from point pairs: Horn's unit quaternion (method 2 of `[Eggert1998]`).
+
+use nalgebra::{Isometry3, Matrix3, Matrix4, Matrix6, Point3, Quaternion, SymmetricEigen, UnitQuaternion, Vector3};
+
+use crate::error::{Error, Result};
+use crate::neighbours::check_points;
+use crate::pose::symmetrised;
+
+/// Second principal extent over the first below which points count as collinear: the rotation about the line would be
+/// known to no better than rounding over this ratio.
+const COLLINEAR_RATIO: f64 = 1e-7;
+/// Relative eigenvalue gap below which two rotations fit equally well to within rounding.
+const AMBIGUOUS_GAP: f64 = 1e-12;
+
+/// Rigid motion that carries source points onto target points, with its quality.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Orientation {
+    /// Pose: `target = target_from_source * source`.
+    pub target_from_source: Isometry3<f64>,
+    /// Weighted root mean square distance left between the pairs, metre.
+    pub rms_m: f64,
+    /// A posteriori standard deviation of one coordinate of unit weight, metre; NaN without redundancy.
+    pub sigma0_m: f64,
+    /// Redundancy `3n - 6` (`3n - 7` with scale), n = pairs of positive weight.
+    pub redundancy: usize,
+    /// Inverse of the normal matrix for unit sigma0, tangent `[dt target axes, dtheta source axes]`.
+    pub cofactor: Matrix6<f64>,
+    /// `sigma0² · cofactor`: metre² and radian²; NaN without redundancy.
+    pub covariance: Matrix6<f64>,
+}
+
+/// A similarity: scale besides the rigid motion.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Similarity {
+    /// `target = target_from_source * (scale * source)`; the orientation's covariance is that at this fixed scale.
+    pub orientation: Orientation,
+    /// Scale factor.
+    pub scale: f64,
+    /// Standard deviation of the scale (from the posterior sigma0); NaN without redundancy.
+    pub scale_sigma: f64,
+}
+
+/// Rigid motion that minimises `Σ w |target − (R source + t)|²`.
+///
+/// `source` and `target`: n ≥ 3 pairs, metre; `weights`: n values ≥ 0 (1/σ² of a pair, up to a factor), `None` = 1.
+/// Closed form after `[Horn1987]`; the covariance is that of the least-squares problem at the solution.
+///
+/// # Errors
+/// [`Error::LengthMismatch`], [`Error::NonFinite`], [`Error::NotPositive`], [`Error::TooFewPoints`] below three pairs
+/// of positive weight, [`Error::Collinear`] naming the side, [`Error::AmbiguousRotation`].
+pub fn absolute_orientation(
+    source: &[Point3<f64>],
+    target: &[Point3<f64>],
+    weights: Option<&[f64]>,
+) -> Result<Orientation> {
+    let moments = Moments::new(source, target, weights)?;
+    let rotation = moments.rotation()?;
+    Ok(moments.orientation(source, target, weights, rotation, 1.0, 6))
+}
+
+/// Similarity that minimises `Σ w |target − (s R source + t)|²`.
+///
+/// Arguments and errors as [`absolute_orientation`]. The scale is the least-squares one of `[Umeyama1991]`, which takes
+/// the target as measured and the source as given.
+pub fn absolute_orientation_with_scale(
+    source: &[Point3<f64>],
+    target: &[Point3<f64>],
+    weights: Option<&[f64]>,
+) -> Result<Similarity> {
+    let moments = Moments::new(source, target, weights)?;
+    let rotation = moments.rotation()?;
+    let spread = moments.source_scatter.trace();
+    let r = rotation.to_rotation_matrix();
+    // Σ w q'·(R p') / Σ w |p'|²
+    let scale = (r.matrix().transpose().component_mul(&moments.cross)).sum() / spread;
+    let orientation = moments.orientation(source, target, weights, rotation, scale, 7);
+    let scale_sigma = orientation.sigma0_m / spread.sqrt();
+    Ok(Similarity { orientation, scale, scale_sigma })
+}
+
+/// Weighted first and second moments of both point sets.
+struct Moments {
+    count: usize,
+    weight: f64,
+    source_mean: Vector3<f64>,
+    target_mean: Vector3<f64>,
+    source_scatter: Matrix3<f64>,
+    /// `Σ w p' q'^T` about the means.
+    cross: Matrix3<f64>,
+}
+
+impl Moments {
+    fn new(source: &[Point3<f64>], target: &[Point3<f64>], weights: Option<&[f64]>) -> Result<Self> {
+        check_input(source, target, weights)?;
+        let weight_of = |i: usize| weights.map_or(1.0, |w| w[i]);
+        let count = (0..source.len()).filter(|&i| weight_of(i) > 0.0).count();
+        if count < 3 {
+            return Err(Error::TooFewPoints { what: "absolute orientation", found: count, needed: 3 });
+        }
+        let weight: f64 = (0..source.len()).map(weight_of).sum();
+        let mean = |points: &[Point3<f64>]| {
+            points.iter().enumerate().fold(Vector3::zeros(), |sum, (i, p)| sum + p.coords * (weight_of(i) / weight))
+        };
+        let (source_mean, target_mean) = (mean(source), mean(target));
+        let (mut source_scatter, mut target_scatter, mut cross) = (Matrix3::zeros(), Matrix3::zeros(), Matrix3::zeros());
+        for (i, (p, q)) in source.iter().zip(target).enumerate() {
+            let (p, q, w) = (p.coords - source_mean, q.coords - target_mean, weight_of(i));
+            source_scatter += p * p.transpose() * w;
+            target_scatter += q * q.transpose() * w;
+            cross += p * q.transpose() * w;
+        }
+        check_spread("source points", &source_scatter)?;
+        check_spread("target points", &target_scatter)?;
+        Ok(Self { count, weight, source_mean, target_mean, source_scatter, cross })
+    }
+
+    /// Eigenvector of the largest eigenvalue of Horn's symmetric 4x4 matrix.
+    fn rotation(&self) -> Result<UnitQuaternion<f64>> {
+        let s = self.cross / self.cross.norm().max(f64::MIN_POSITIVE);
+        let (xx, xy, xz) = (s[(0, 0)], s[(0, 1)], s[(0, 2)]);
+        let (yx, yy, yz) = (s[(1, 0)], s[(1, 1)], s[(1, 2)]);
+        let (zx, zy, zz) = (s[(2, 0)], s[(2, 1)], s[(2, 2)]);
+        #[rustfmt::skip]
+        let horn = Matrix4::new(
+            xx + yy + zz, yz - zy,      zx - xz,       xy - yx,
+            yz - zy,      xx - yy - zz, xy + yx,       zx + xz,
+            zx - xz,      xy + yx,      -xx + yy - zz, yz + zy,
+            xy - yx,      zx + xz,      yz + zy,       -xx - yy + zz,
+        );
+        let eigen = SymmetricEigen::try_new(horn, 1e-16, 1000)
+            .ok_or(Error::Numerical { what: "Horn's eigenvalue problem", why: "the iteration did not converge" })?;
+        let mut order = [0, 1, 2, 3];
+        order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
+        let gap = eigen.eigenvalues[order[0]] - eigen.eigenvalues[order[1]];
+        if !(gap > AMBIGUOUS_GAP) {
+            return Err(Error::AmbiguousRotation { gap });
+        }
+        let v = eigen.eigenvectors.column(order[0]);
+        Ok(UnitQuaternion::from_quaternion(Quaternion::new(v[0], v[1], v[2], v[3])))
+    }
+
+    fn orientation(
+        &self,
+        source: &[Point3<f64>],
+        target: &[Point3<f64>],
+        weights: Option<&[f64]>,
+        rotation: UnitQuaternion<f64>,
+        scale: f64,
+        unknowns: usize,
+    ) -> Orientation {
+        let translation = self.target_mean - rotation * (self.source_mean * scale);
+        let target_from_source = Isometry3::from_parts(translation.into(), rotation);
+        let squares: f64 = (0..source.len())
+            .map(|i| {
+                let left = target[i] - target_from_source * (source[i] * scale);
+                weights.map_or(1.0, |w| w[i]) * left.norm_squared()
+            })
+            .sum();
+        let redundancy = 3 * self.count - unknowns;
+        let sigma0_m = if redundancy > 0 { (squares / redundancy as f64).sqrt() } else { f64::NAN };
+        let cofactor = self.cofactor(&rotation, scale);
+        Orientation {
+            target_from_source,
+            rms_m: (squares / self.weight).sqrt(),
+            sigma0_m,
+            redundancy,
+            cofactor,
+            covariance: cofactor * (sigma0_m * sigma0_m),
+        }
+    }
+
+    /// Inverse normal matrix in closed form: about the centroid, rotation and translation do not mix.
+    fn cofactor(&self, rotation: &UnitQuaternion<f64>, scale: f64) -> Matrix6<f64> {
+        // d(R s p')/dtheta = -R [s p']x; the normal block is Σ w s² (|p'|² I − p' p'^T) in source axes.
+        let inertia = (Matrix3::identity() * self.source_scatter.trace() - self.source_scatter) * (scale * scale);
+        let q_rotation = inertia.try_inverse().unwrap_or_else(|| Matrix3::from_element(f64::INFINITY));
+        // t = mean_q − R s mean_p, so dt picks up R [s mean_p]x dtheta.
+        let lever = rotation.to_rotation_matrix() * (self.source_mean * scale).cross_matrix();
+        let mut cofactor = Matrix6::zeros();
+        let q_translation = Matrix3::identity() / self.weight + lever * q_rotation * lever.transpose();
+        cofactor.fixed_view_mut::<3, 3>(0, 0).copy_from(&q_translation);
+        cofactor.fixed_view_mut::<3, 3>(0, 3).copy_from(&(lever * q_rotation));
+        cofactor.fixed_view_mut::<3, 3>(3, 0).copy_from(&(lever * q_rotation).transpose());
+        cofactor.fixed_view_mut::<3, 3>(3, 3).copy_from(&q_rotation);
+        symmetrised(&cofactor)
+    }
+}
+
+fn check_input(source: &[Point3<f64>], target: &[Point3<f64>], weights: Option<&[f64]>) -> Result<()> {
+    if target.len() != source.len() {
+        let (expected, found) = (source.len(), target.len());
+        return Err(Error::LengthMismatch { what: "target points", expected, found });
+    }
+    check_points("source points", source)?;
+    check_points("target points", target)?;
+    let Some(weights) = weights else { return Ok(()) };
+    if weights.len() != source.len() {
+        return Err(Error::LengthMismatch { what: "weights", expected: source.len(), found: weights.len() });
+    }
+    for (index, &value) in weights.iter().enumerate() {
+        if !value.is_finite() {
+            return Err(Error::NonFinite { what: "weights", index });
+        }
+        if value < 0.0 {
+            return Err(Error::NotPositive { what: "weights", index, value });
+        }
+    }
+    Ok(())
+}
+
+fn check_spread(what: &'static str, scatter: &Matrix3<f64>) -> Result<()> {
+    // From the invariants: trace ≈ largest, sum of principal minors ≈ largest · (middle + smallest). Unlike the roots
+    // of the cubic this keeps all digits where the two smaller eigenvalues coincide.
+    let minor = |i: usize, j: usize| scatter[(i, i)] * scatter[(j, j)] - scatter[(i, j)].powi(2);
+    let minors = minor(0, 1) + minor(0, 2) + minor(1, 2);
+    let largest = scatter.trace();
+    let ratio = if largest > 0.0 { (minors.max(0.0)).sqrt() / largest } else { 0.0 };
+    if ratio < COLLINEAR_RATIO { Err(Error::Collinear { what, ratio }) } else { Ok(()) }
+}

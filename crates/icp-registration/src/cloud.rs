@@ -1,0 +1,83 @@
+//! A cloud of points with what is known of each.
+
+use nalgebra::{Isometry3, Point3, Vector3};
+
+use crate::error::{Error, Result};
+use crate::neighbours::{check_points, is_usable};
+
+/// Points in one frame, metre.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Cloud {
+    /// The points; all finite.
+    pub points: Vec<Point3<f64>>,
+    /// Unit normals, one a point; NaN in all components where a point has none.
+    pub normals: Option<Vec<Vector3<f64>>>,
+    /// Standard deviation of each point, metre; NaN where unknown.
+    pub sigma: Option<Vec<f64>>,
+}
+
+impl Cloud {
+    /// A cloud of bare points.
+    pub fn new(points: Vec<Point3<f64>>) -> Self {
+        Self { points, normals: None, sigma: None }
+    }
+
+    /// A cloud from the pixels of a frame: those whose point is not finite are left out, together with their normal
+    /// and sigma.
+    ///
+    /// # Errors
+    /// [`Error::LengthMismatch`] where the planes differ in length.
+    pub fn from_frame(points: &[[f64; 3]], normals: Option<&[Vector3<f64>]>, sigma: Option<&[f32]>) -> Result<Self> {
+        check_length("normals", points.len(), normals.map(<[_]>::len))?;
+        check_length("sigma", points.len(), sigma.map(<[_]>::len))?;
+        let keep: Vec<usize> = (0..points.len()).filter(|&i| is_usable(&Point3::from(points[i]))).collect();
+        Ok(Self {
+            points: keep.iter().map(|&i| Point3::from(points[i])).collect(),
+            normals: normals.map(|n| keep.iter().map(|&i| n[i]).collect()),
+            sigma: sigma.map(|s| keep.iter().map(|&i| f64::from(s[i])).collect()),
+        })
+    }
+
+    /// Number of points.
+    pub fn len(&self) -> usize {
+        self.points.len()
+    }
+
+    /// Whether there is no point.
+    pub fn is_empty(&self) -> bool {
+        self.points.is_empty()
+    }
+
+    /// The cloud in another frame.
+    #[must_use]
+    pub fn transformed(&self, a_from_b: &Isometry3<f64>) -> Self {
+        Self {
+            points: self.points.iter().map(|p| a_from_b * p).collect(),
+            normals: self.normals.as_ref().map(|n| n.iter().map(|v| a_from_b * v).collect()),
+            sigma: self.sigma.clone(),
+        }
+    }
+
+    /// Refuses an empty cloud, points that are not finite, planes of another length and sigmas that are not positive
+    /// (NaN passes: unknown).
+    pub(crate) fn validate(&self, what: &'static str) -> Result<()> {
+        if self.is_empty() {
+            return Err(Error::Empty { what });
+        }
+        check_points(what, &self.points)?;
+        check_length("normals", self.len(), self.normals.as_ref().map(Vec::len))?;
+        check_length("sigma", self.len(), self.sigma.as_ref().map(Vec::len))?;
+        let Some(sigma) = &self.sigma else { return Ok(()) };
+        match sigma.iter().position(|s| !(s.is_nan() || (*s > 0.0 && *s < 1e100))) {
+            Some(index) => Err(Error::NotPositive { what: "sigma", index, value: sigma[index] }),
+            None => Ok(()),
+        }
+    }
+}
+
+fn check_length(what: &'static str, expected: usize, found: Option<usize>) -> Result<()> {
+    match found {
+        Some(found) if found != expected => Err(Error::LengthMismatch { what, expected, found }),
+        _ => Ok(()),
+    }
+}

@@ -1,0 +1,255 @@
+//! The iterative closest point algorithm.
+
+mod matching;
+mod motion;
+mod options;
+mod quality;
+mod selection;
+mod sensitivity;
+mod system;
+mod target;
+
+pub use motion::{MotionKind, UndeterminedMotion};
+pub use options::{DegeneracyPolicy, IcpOptions, Metric, Selection};
+pub use target::IcpTarget;
+
+use nalgebra::{Isometry3, Matrix6, Vector3, Vector6};
+
+use crate::cloud::Cloud;
+use crate::error::{Error, Result};
+use crate::normals::{UnorganisedNormalOptions, unorganised_normals};
+use crate::pose::{is_finite, move_about};
+use matching::{Matcher, Pair};
+use quality::Verdict;
+use system::System;
+
+/// Source points that the coarse levels work with.
+const COARSE_POINTS: usize = 4000;
+/// Iterations that a coarse level may take.
+const COARSE_ITERATIONS: usize = 8;
+/// A coarse level ends when a step is below this fraction of its distance limit.
+const COARSE_STEP: f64 = 0.02;
+
+/// Why the iterations ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum StopReason {
+    /// The last step was below the tolerance.
+    Converged,
+    /// The pose wanders by less than a tenth of its standard deviation, as pairs change back and forth.
+    WithinNoise,
+    /// The iterations were used up: do not trust the pose.
+    MaxIterations,
+}
+
+/// Result of a registration.
+#[derive(Debug, Clone, PartialEq)]
+pub struct IcpResult {
+    /// Pose: `target = target_from_source * source`.
+    pub target_from_source: Isometry3<f64>,
+    /// Covariance in the tangent `[dt target axes (m), dtheta source axes (rad)]`. Motions that the pairs say nothing
+    /// about carry the radius of the pairs as standard deviation.
+    pub covariance: Matrix6<f64>,
+    /// Fraction of the source points that have a partner at the final pose.
+    pub overlap: f64,
+    /// Root mean square residual of the metric, weighted by the kernel, metre.
+    pub rms_m: f64,
+    /// Iterations in all levels together.
+    pub iterations: usize,
+    /// Why they ended.
+    pub stop: StopReason,
+    /// Pairs in the last iteration.
+    pub correspondences: usize,
+    /// Distance limit of the last level, metre.
+    pub max_correspondence_distance_m: f64,
+    /// Motions that the geometry does not determine; empty for a sound pose.
+    pub degenerate: Vec<UndeterminedMotion>,
+}
+
+impl IcpResult {
+    /// Whether the iterations settled and the geometry determines all six unknowns.
+    pub fn is_trustworthy(&self) -> bool {
+        self.stop != StopReason::MaxIterations && self.degenerate.is_empty()
+    }
+}
+
+/// Aligns `source` with `target`, starting at `guess` (both poses `target_from_source`).
+///
+/// Clouds without normals get them from their nearest neighbours where the metric needs them. For several sources
+/// against one target, build an [`IcpTarget`] once.
+///
+/// # Errors
+/// [`Error::TooFewCorrespondences`] where the clouds do not overlap at the guess; [`Error::Empty`],
+/// [`Error::NonFinite`], [`Error::LengthMismatch`], [`Error::NotPositive`], [`Error::InvalidOption`] for the input.
+pub fn align(source: &Cloud, target: &Cloud, guess: &Isometry3<f64>, options: &IcpOptions) -> Result<IcpResult> {
+    IcpTarget::new(target.clone())?.align(source, guess, options)
+}
+
+pub(crate) fn run(
+    source: &Cloud,
+    target: &IcpTarget,
+    guess: &Isometry3<f64>,
+    options: &IcpOptions,
+) -> Result<IcpResult> {
+    options.validate()?;
+    source.validate("the source cloud")?;
+    if !is_finite(guess) {
+        return Err(Error::NonFinite { what: "the guess", index: 0 });
+    }
+    let estimated;
+    let source_normals: Option<&[Vector3<f64>]> = match (&source.normals, options.metric) {
+        (Some(normals), Metric::PointToPlane) => Some(normals),
+        (Some(normals), _) => target.normals_given.then_some(normals.as_slice()),
+        (None, Metric::PointToPlane) => {
+            estimated = unorganised_normals(&source.points, &UnorganisedNormalOptions::default())?;
+            Some(&estimated)
+        }
+        (None, _) => None,
+    };
+    let matcher = Matcher { source, source_normals, target, options };
+    let selected = selection::select(options.selection, source.len(), source_normals.unwrap_or(&[]));
+    Run { matcher, selected, pose: *guess, iterations: 0 }.finish()
+}
+
+struct Run<'a> {
+    matcher: Matcher<'a>,
+    selected: Vec<usize>,
+    pose: Isometry3<f64>,
+    iterations: usize,
+}
+
+impl Run<'_> {
+    fn finish(mut self) -> Result<IcpResult> {
+        let limits = self.limits()?;
+        let coarse = selection::thinned(&self.selected, COARSE_POINTS);
+        for limit in &limits[..limits.len() - 1] {
+            self.coarse_level(&coarse, *limit)?;
+        }
+        let limit = limits[limits.len() - 1];
+        let stop = self.final_level(limit)?;
+        self.result(limit, stop)
+    }
+
+    /// Distance limits from the first level to the last, each half of the one before.
+    fn limits(&self) -> Result<Vec<f64>> {
+        let (options, target) = (self.matcher.options, self.matcher.target);
+        let last = options.max_correspondence_distance_m.unwrap_or(if target.spacing_m > 0.0 {
+            3.0 * target.spacing_m
+        } else {
+            target.radius_m.max(f64::MIN_POSITIVE)
+        });
+        let first = match options.initial_correspondence_distance_m {
+            Some(first) => first,
+            None => {
+                let sample = selection::thinned(&self.selected, 1000);
+                let median = self.matcher.median_distance(&self.pose, &sample)?;
+                (2.5 * median).max(target.radius_m / 4.0).min(target.radius_m)
+            }
+        };
+        let mut limits = vec![last];
+        while let Some(&limit) = limits.last()
+            && limit * 2.0 <= first
+        {
+            limits.push(limit * 2.0);
+        }
+        if limits.last().is_some_and(|&limit| limit < first) {
+            limits.push(first);
+        }
+        limits.reverse();
+        Ok(limits)
+    }
+
+    fn coarse_level(&mut self, selected: &[usize], limit: f64) -> Result<()> {
+        for _ in 0..COARSE_ITERATIONS {
+            if self.iterations + 1 >= self.matcher.options.max_iterations {
+                return Ok(());
+            }
+            let pairs = self.pairs(selected, limit)?;
+            if self.iterate(&pairs, limit, f64::INFINITY)? < COARSE_STEP * limit {
+                return Ok(());
+            }
+        }
+        Ok(())
+    }
+
+    fn final_level(&mut self, limit: f64) -> Result<StopReason> {
+        let selected = std::mem::take(&mut self.selected);
+        let mut stop = StopReason::MaxIterations;
+        while self.iterations < self.matcher.options.max_iterations {
+            let pairs = self.pairs(&selected, limit)?;
+            let tolerance = self.matcher.options.step_tolerance_m.unwrap_or(1e-5 * self.matcher.target.radius_m);
+            let max_sigma_m = self.max_motion_sigma_m();
+            if self.iterate(&pairs, limit, max_sigma_m)? <= tolerance {
+                stop = StopReason::Converged;
+                break;
+            }
+        }
+        self.selected = selected;
+        Ok(stop)
+    }
+
+    /// One Gauss-Newton step; returns how far it moves points at the radius, metre.
+    fn iterate(&mut self, pairs: &[Pair], limit: f64, max_sigma_m: f64) -> Result<f64> {
+        let system = System::new(&self.matcher, pairs);
+        let held = match self.matcher.options.degeneracy {
+            DegeneracyPolicy::Report => Vec::new(),
+            DegeneracyPolicy::HoldAtGuess => Verdict::new(&system, &self.pose, max_sigma_m)?.held(),
+        };
+        let mut step = system.step(&held)?;
+        // Pairs at most `limit` apart give no reason to move farther than a few times that.
+        let length = length(&step);
+        if length > 2.0 * limit {
+            step *= 2.0 * limit / length;
+        }
+        self.pose = move_about(&self.pose, &system.centre, system.radius_m, &step);
+        self.iterations += 1;
+        Ok(length)
+    }
+
+    fn pairs(&self, selected: &[usize], limit: f64) -> Result<Vec<Pair>> {
+        let pairs = self.matcher.trimmed(self.matcher.pairs(&self.pose, selected, limit)?);
+        let needed = self.matcher.options.min_correspondences;
+        if pairs.len() < needed {
+            return Err(Error::TooFewCorrespondences {
+                found: pairs.len(),
+                of: selected.len(),
+                needed,
+                max_distance_m: limit,
+                iteration: self.iterations,
+            });
+        }
+        Ok(pairs)
+    }
+
+    fn max_motion_sigma_m(&self) -> f64 {
+        self.matcher.options.max_motion_sigma_m.unwrap_or(self.matcher.target.radius_m / 300.0)
+    }
+
+    fn result(&self, limit: f64, stop: StopReason) -> Result<IcpResult> {
+        let pairs = self.pairs(&self.selected, limit)?;
+        let system = System::new(&self.matcher, &pairs);
+        let verdict = Verdict::new(&system, &self.pose, self.max_motion_sigma_m())?;
+        let sample = selection::thinned(&self.selected, COARSE_POINTS);
+        let step = (0.5 * system.rms_m()).max(0.01 * limit);
+        let response = sensitivity::sensitivity(&system, &self.pose, &sample, limit, step)?;
+        let all: Vec<usize> = selection::thinned(&(0..self.matcher.source.len()).collect::<Vec<_>>(), 20_000);
+        let partners = self.matcher.pairs(&self.pose, &all, limit)?.len();
+        Ok(IcpResult {
+            target_from_source: self.pose,
+            covariance: verdict.covariance(&system, &self.pose, &response),
+            overlap: partners as f64 / all.len() as f64,
+            rms_m: system.rms_m(),
+            iterations: self.iterations,
+            stop,
+            correspondences: pairs.len(),
+            max_correspondence_distance_m: limit,
+            degenerate: verdict.undetermined(&system),
+        })
+    }
+}
+
+/// Larger of the two parts of a motion.
+fn length(motion: &Vector6<f64>) -> f64 {
+    let part = |k: usize| Vector3::new(motion[k], motion[k + 1], motion[k + 2]).norm();
+    part(0).max(part(3))
+}

@@ -1,0 +1,80 @@
+//! Which source points take part.
+
+use nalgebra::Vector3;
+
+use super::Selection;
+
+/// Indices of the selected points, ascending.
+pub(crate) fn select(selection: Selection, count: usize, normals: &[Vector3<f64>]) -> Vec<usize> {
+    match selection {
+        Selection::All => (0..count).collect(),
+        Selection::EveryNth(n) => (0..count).step_by(n.max(1)).collect(),
+        Selection::NormalSpace(wanted) => normal_space(normals, wanted),
+    }
+}
+
+/// Every k-th of the selected such that about `wanted` remain.
+pub(crate) fn thinned(selected: &[usize], wanted: usize) -> Vec<usize> {
+    selected.iter().copied().step_by(selected.len().div_ceil(wanted.max(1)).max(1)).collect()
+}
+
+/// Fills every direction's quota: small buckets give all they have, large ones every k-th point.
+fn normal_space(normals: &[Vector3<f64>], wanted: usize) -> Vec<usize> {
+    let mut buckets = vec![Vec::new(); BUCKETS];
+    for (i, normal) in normals.iter().enumerate() {
+        if let Some(bucket) = bucket(normal) {
+            buckets[bucket].push(i);
+        }
+    }
+    buckets.retain(|b| !b.is_empty());
+    buckets.sort_by_key(Vec::len);
+    let (mut left, mut chosen) = (wanted, Vec::with_capacity(wanted));
+    let count = buckets.len();
+    for (k, bucket) in buckets.iter().enumerate() {
+        let take = bucket.len().min(left / (count - k));
+        // Evenly through the bucket.
+        chosen.extend((0..take).map(|j| bucket[j * bucket.len() / take]));
+        left -= take;
+    }
+    chosen.sort_unstable();
+    chosen
+}
+
+const CELLS: usize = 6;
+const BUCKETS: usize = 6 * CELLS * CELLS;
+
+/// Cell of the cube that the normal points to.
+fn bucket(normal: &Vector3<f64>) -> Option<usize> {
+    let axis = normal.iamax();
+    let largest = normal[axis];
+    if !(largest.abs() > 0.0) {
+        return None;
+    }
+    let cell = |v: f64| (((v / largest.abs() + 1.0) / 2.0 * CELLS as f64) as usize).min(CELLS - 1);
+    let face = 2 * axis + usize::from(largest < 0.0);
+    Some((face * CELLS + cell(normal[(axis + 1) % 3])) * CELLS + cell(normal[(axis + 2) % 3]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn normal_space_keeps_the_rare_direction() {
+        let mut normals = vec![Vector3::z(); 990];
+        normals.extend(vec![Vector3::x(); 10]);
+        normals.push(Vector3::repeat(f64::NAN));
+        let chosen = select(Selection::NormalSpace(100), normals.len(), &normals);
+        assert_eq!(chosen.len(), 100);
+        assert_eq!(chosen.iter().filter(|&&i| i >= 990).count(), 10);
+        assert!(chosen.windows(2).all(|w| w[0] < w[1]));
+    }
+
+    #[test]
+    fn thinning_keeps_about_the_wanted_number() {
+        let all: Vec<usize> = (0..1000).collect();
+        assert_eq!(thinned(&all, 300).len(), 250);
+        assert_eq!(thinned(&all, 5000).len(), 1000);
+        assert!(thinned(&[], 10).is_empty());
+    }
+}

@@ -1,0 +1,41 @@
+//! How the estimating equations respond to the pose, pairs found anew.
+//!
+//! The normal matrix takes the pairs as fixed. In truth they change with the pose, and the nearest of several noisy
+//! points is one whose error resembles that of the source point: the residual follows a displacement only in part
+//! (three quarters where the noise is a third of the spacing). The covariance needs the true response, so the score is
+//! evaluated at displaced poses.
+
+use nalgebra::{Isometry3, Matrix6, Vector6};
+
+use super::System;
+use crate::error::Result;
+use crate::pose::move_about;
+
+/// Response `d(Σ w J r)/d[dt, rho w]` of a sample of the pairs, scaled up to all of them.
+///
+/// `sample`: source points; `step_m`: displacement, of the order of the residuals.
+pub(crate) fn sensitivity(
+    system: &System<'_>,
+    pose: &Isometry3<f64>,
+    sample: &[usize],
+    limit_m: f64,
+    step_m: f64,
+) -> Result<Matrix6<f64>> {
+    let matcher = system.matcher;
+    let score = |motion: &Vector6<f64>| -> Result<(Vector6<f64>, usize)> {
+        let moved = move_about(pose, &system.centre, system.radius_m, motion);
+        let pairs = matcher.trimmed(matcher.pairs(&moved, sample, limit_m)?);
+        Ok((system.with_pairs(&pairs).normal_equations().1, pairs.len()))
+    };
+    let mut response = Matrix6::zeros();
+    let mut count = 0;
+    for k in 0..6 {
+        let mut motion = Vector6::zeros();
+        motion[k] = step_m;
+        let ((plus, a), (minus, b)) = (score(&motion)?, score(&-motion)?);
+        response.set_column(k, &((plus - minus) / (2.0 * step_m)));
+        count += a + b;
+    }
+    let average = (count as f64 / 12.0).max(1.0);
+    Ok(response * (system.pairs.len() as f64 / average))
+}

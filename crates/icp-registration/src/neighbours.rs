@@ -1,0 +1,147 @@
+//! Nearest neighbours: the one place that speaks to the k-d tree.
+//!
+//! The tree answers an empty set or a NaN query with item 0 at infinity, takes squared radii, and breaks ties by its
+//! own layout. This wrapper refuses the first, hides the second and gives ties to the lowest index.
+
+use std::num::NonZeroUsize;
+
+use kiddo::{ImmutableKdTree, SquaredEuclidean};
+use nalgebra::Point3;
+
+use crate::error::{Error, Result};
+
+/// Coordinates beyond this would overflow when squared and summed.
+const LARGEST_COORDINATE: f64 = 1e100;
+
+/// One answer: a point of the tree and how far it is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Neighbour {
+    /// Index into the points that the tree was built from.
+    pub index: usize,
+    /// Euclidean distance, metre.
+    pub distance_m: f64,
+}
+
+/// A k-d tree over points in space, built once and asked often.
+#[derive(Debug)]
+pub struct NeighbourTree {
+    tree: ImmutableKdTree<f64, 3>,
+    len: usize,
+}
+
+impl NeighbourTree {
+    /// Builds the tree over `points` (metre).
+    ///
+    /// # Errors
+    /// [`Error::Empty`] without points, [`Error::NonFinite`] naming the first point that is not finite.
+    pub fn new(points: &[Point3<f64>]) -> Result<Self> {
+        if points.is_empty() {
+            return Err(Error::Empty { what: "the point set of the search tree" });
+        }
+        check_points("point of the search tree", points)?;
+        let coordinates: Vec<[f64; 3]> = points.iter().map(|p| [p.x, p.y, p.z]).collect();
+        let tree = ImmutableKdTree::new_from_slice(&coordinates).map_err(|e| Error::Tree(e.to_string()))?;
+        Ok(Self { tree, len: points.len() })
+    }
+
+    /// Number of points.
+    pub fn len(&self) -> usize {
+        self.len
+    }
+
+    /// Always false: an empty tree cannot be built.
+    pub fn is_empty(&self) -> bool {
+        self.len == 0
+    }
+
+    /// The nearest point; of several at the same distance the one with the lowest index.
+    ///
+    /// # Errors
+    /// [`Error::NonFinite`] for a query that is not finite.
+    pub fn nearest(&self, query: &Point3<f64>) -> Result<Neighbour> {
+        let query = checked(query)?;
+        Ok(self.nearest_unchecked(&query))
+    }
+
+    /// The nearest point not farther than `radius_m`, if there is one.
+    ///
+    /// # Errors
+    /// [`Error::NonFinite`] for a query that is not finite.
+    pub fn nearest_within(&self, query: &Point3<f64>, radius_m: f64) -> Result<Option<Neighbour>> {
+        let nearest = self.nearest(query)?;
+        Ok((nearest.distance_m <= radius_m).then_some(nearest))
+    }
+
+    /// The `count` nearest points in the order of distance, then index (fewer where the tree holds fewer).
+    ///
+    /// # Errors
+    /// [`Error::NonFinite`] for a query that is not finite.
+    pub fn k_nearest(&self, query: &Point3<f64>, count: usize) -> Result<Vec<Neighbour>> {
+        let query = checked(query)?;
+        let Some(count) = NonZeroUsize::new(count.min(self.len)) else { return Ok(Vec::new()) };
+        let mut found: Vec<Neighbour> = self
+            .tree
+            .query(&query)
+            .nearest_n::<SquaredEuclidean<f64>>(count)
+            .execute()
+            .iter()
+            .map(|item| Neighbour { index: item.item as usize, distance_m: item.distance.sqrt() })
+            .collect();
+        sort(&mut found);
+        Ok(found)
+    }
+
+    /// All points not farther than `radius_m` in the order of distance, then index.
+    ///
+    /// # Errors
+    /// [`Error::NonFinite`] for a query that is not finite, [`Error::InvalidOption`] for a negative or NaN radius.
+    pub fn within(&self, query: &Point3<f64>, radius_m: f64) -> Result<Vec<Neighbour>> {
+        let query = checked(query)?;
+        if !(0.0..LARGEST_COORDINATE).contains(&radius_m) {
+            return Err(Error::InvalidOption { name: "radius_m", value: radius_m, domain: "0 or more and finite" });
+        }
+        let mut found: Vec<Neighbour> = self
+            .tree
+            .query(&query)
+            .within::<SquaredEuclidean<f64>>(radius_m * radius_m)
+            .execute()
+            .iter()
+            .map(|item| Neighbour { index: item.item as usize, distance_m: item.distance.sqrt() })
+            .collect();
+        sort(&mut found);
+        Ok(found)
+    }
+
+    /// Nearest of a query that is known to be finite.
+    pub(crate) fn nearest_unchecked(&self, query: &[f64; 3]) -> Neighbour {
+        let best = self.tree.query(query).nearest_one::<SquaredEuclidean<f64>>().execute();
+        // A second, tiny query: whatever lies on the sphere through the best point.
+        let mut index = best.item;
+        let on_sphere = self.tree.query(query).within::<SquaredEuclidean<f64>>(best.distance).unsorted();
+        on_sphere.visit(|item| index = index.min(item.item));
+        Neighbour { index: index as usize, distance_m: best.distance.sqrt() }
+    }
+}
+
+fn sort(found: &mut [Neighbour]) {
+    found.sort_by(|a, b| a.distance_m.total_cmp(&b.distance_m).then(a.index.cmp(&b.index)));
+}
+
+fn checked(query: &Point3<f64>) -> Result<[f64; 3]> {
+    check_points("query point", std::slice::from_ref(query))?;
+    Ok([query.x, query.y, query.z])
+}
+
+/// Refuses coordinates that are not finite (or too large to be squared).
+pub(crate) fn check_points(what: &'static str, points: &[Point3<f64>]) -> Result<()> {
+    match points.iter().position(|p| !is_usable(p)) {
+        Some(index) => Err(Error::NonFinite { what, index }),
+        None => Ok(()),
+    }
+}
+
+/// Whether all three coordinates are finite and small enough to be squared.
+pub(crate) fn is_usable(point: &Point3<f64>) -> bool {
+    // NaN fails the comparison.
+    point.iter().all(|c| c.abs() < LARGEST_COORDINATE)
+}

@@ -49,14 +49,17 @@ pub enum Error {
     },
     /// The pose is determined so weakly that its covariance, which comes from a linearisation, means nothing.
     #[error(
-        "the geometry is too weak: standard deviations of {sigma_attitude_rad:.2} rad in attitude and \
-         {sigma_position_m:.3} m in position"
+        "the geometry is too weak: with standard deviations of {sigma_attitude_rad:.3} rad and {sigma_position_m:.3} m \
+         the linearisation misses {curvature:.1} times the change that it describes; \
+         targets further apart, off one plane, or with ranges help"
     )]
     WeakGeometry {
         /// Largest standard deviation of the attitude, radian.
         sigma_attitude_rad: f64,
         /// Largest standard deviation of the position, metre.
         sigma_position_m: f64,
+        /// See [`crate::Resection::curvature`].
+        curvature: f64,
     },
     /// The camera's parameters are not valid.
     #[error(transparent)]

@@ -2,6 +2,7 @@
 
 mod approximation;
 mod error;
+mod linearity;
 mod model;
 mod resection;
 mod target;

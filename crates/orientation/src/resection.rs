@@ -5,6 +5,7 @@ use camera_model::Camera;
 use nalgebra::{Isometry3, Matrix6};
 
 use crate::approximation::approximations;
+use crate::linearity::curvature;
 use crate::model::{TargetEquations, sigmas};
 use crate::target::check;
 use crate::{Error, Result, TargetObservation};
@@ -17,9 +18,9 @@ const SAME_POSE: f64 = 1e-4;
 /// freedom exceeds it once in a thousand.
 const DECISIVE: f64 = 10.83;
 
-/// Largest standard deviation of the attitude (radian), and of the position relative to the distance of the targets,
-/// for which the linearised covariance still describes the error: there the sine differs from its angle by under 1 %.
-const LINEAR_RAD: f64 = 0.2;
+/// Curvature beyond which a pose is refused: the errors of simulated stations there are several times what their
+/// covariances say, and up to half of it they are what they say.
+const TOO_CURVED: f64 = 1.0;
 
 /// How to orient a station.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -50,6 +51,9 @@ pub struct Resection {
     /// Covariance of the tangent step `[dt (world axes, metre), dtheta (camera axes, radian)]`, prior-scaled: the
     /// standard deviations of the observations are taken as they were given.
     pub covariance: Matrix6<f64>,
+    /// Share of the observations' change that the linearisation misses two standard deviations along the weakest
+    /// direction. Up to 0.5 the errors are distributed as the covariance says; over 1 the pose is refused.
+    pub curvature: f64,
     /// Observations minus unknowns.
     pub redundancy: i64,
     /// Posterior standard deviation of unit weight; `None` without redundancy. Far from 1, the given standard
@@ -96,7 +100,7 @@ pub fn resect(camera: &Camera, targets: &[TargetObservation], options: &Resectio
         return Err(Error::NoApproximation { targets: targets.len() });
     };
     require_decision(best, others)?;
-    require_strength(targets, &best.resection)?;
+    require_strength(&best.resection)?;
     Ok(best.resection.clone())
 }
 
@@ -150,17 +154,13 @@ fn require_decision(best: &Minimum, others: &[Minimum]) -> Result<()> {
 }
 
 /// Fails where the pose is so uncertain that its covariance cannot be believed.
-fn require_strength(targets: &[TargetObservation], resection: &Resection) -> Result<()> {
-    let largest = |start: usize| {
-        let block = resection.covariance.fixed_view::<3, 3>(start, start).into_owned();
-        block.symmetric_eigenvalues().max().max(0.0).sqrt()
-    };
-    let [sigma_position_m, sigma_attitude_rad] = [largest(0), largest(3)];
-    let distance = mean_distance(targets, &resection.world_from_camera);
-    if sigma_attitude_rad < LINEAR_RAD && sigma_position_m < LINEAR_RAD * distance {
+fn require_strength(resection: &Resection) -> Result<()> {
+    if resection.curvature <= TOO_CURVED {
         return Ok(());
     }
-    Err(Error::WeakGeometry { sigma_attitude_rad, sigma_position_m })
+    let largest = |start: usize| resection.covariance.diagonal().fixed_rows::<3>(start).max().sqrt();
+    let [sigma_position_m, sigma_attitude_rad] = [largest(0), largest(3)];
+    Err(Error::WeakGeometry { sigma_position_m, sigma_attitude_rad, curvature: resection.curvature })
 }
 
 /// Improves an approximate pose by least squares.
@@ -183,9 +183,13 @@ fn adjusted(
     }
     let solution = adjustment.solve(options)?;
     let covariance = solution.covariance(pose, Scale::Prior)?;
+    let covariance = Matrix6::from_fn(|row, column| covariance[(row, column)]);
+    let world_from_camera = solution.pose(pose)?;
+    let distance = mean_distance(targets, &world_from_camera);
     let resection = Resection {
-        world_from_camera: solution.pose(pose)?,
-        covariance: Matrix6::from_fn(|row, column| covariance[(row, column)]),
+        world_from_camera,
+        covariance,
+        curvature: curvature(camera, targets, &world_from_camera, &covariance, distance),
         redundancy: solution.redundancy(),
         sigma0: solution.sigma0(),
         residuals: residuals(camera, &solution, &observations)?,

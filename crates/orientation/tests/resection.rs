@@ -208,6 +208,36 @@ fn the_covariance_is_that_of_repeated_resections() {
     }
 }
 
+/// Four targets at random on a plate of 1.3 m, image points only: many such stations are weak. Where the curvature is at
+/// most 0.5, the normalised square must still average to 6 (it scatters by sqrt(12 / n), 0.2 here; 0.8 is four times).
+#[test]
+fn the_curvature_tells_when_to_believe_the_covariance() {
+    let mut generator = Pcg64::seed_from_u64(3);
+    let mut normal = move || -> f64 { StandardNormal.sample(&mut generator) };
+    let (mut squares, mut believed, mut refused) = (0.0, 0, 0);
+    for _ in 0..400 {
+        let truth = looking_at_origin(Vector3::new(normal(), normal(), normal().abs() + 0.5), 3.0, normal());
+        let points: Vec<_> =
+            (0..4).map(|_| 0.5 * Point3::new(normal().clamp(-1.3, 1.3), normal().clamp(-1.3, 1.3), 0.0)).collect();
+        let mut targets = without_ranges(&station(&truth, &points));
+        for target in &mut targets {
+            target.pixel = target.pixel.map(|position| position + SIGMA_PIXEL * normal());
+        }
+        match solve(&targets) {
+            Ok(found) if found.curvature <= 0.5 => {
+                let error = error(&truth, &found.world_from_camera);
+                squares += error.dot(&(found.covariance.try_inverse().unwrap() * error));
+                believed += 1;
+            }
+            Ok(_) => {}
+            Err(_) => refused += 1,
+        }
+    }
+    let square = squares / f64::from(believed);
+    assert!(believed > 250 && refused > 20, "{believed} {refused}");
+    assert!((square - 6.0).abs() < 0.8, "normalised square {square} over {believed}");
+}
+
 #[test]
 fn ranges_and_control_matter() {
     let truth = looking_at_origin(Vector3::new(-0.5, 0.4, 1.0), 3.0, 0.3);
@@ -249,7 +279,7 @@ fn too_few_and_collinear_targets_are_refused() {
     assert!(matches!(solve(&station(&truth, &line)), Err(Error::CollinearTargets { .. })));
     let same = [Point3::new(0.1, 0.1, 0.1); 4];
     assert!(matches!(solve(&station(&truth, &same)), Err(Error::CollinearTargets { .. })));
-    // Half a millimetre off the line is an angle of 0.1 rad a tenth of a pixel wide: too weak to state.
+    // Half a millimetre off the line is 0.03 pixel, less than the noise: no turn about the line can be told.
     let mut almost = line.clone();
     almost[2].y += 5e-4;
     let answer = solve(&station(&truth, &almost));

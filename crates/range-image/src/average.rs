@@ -1,34 +1,36 @@
 //! Averaging of repeated frames of a scene that stands still.
 
+use rayon::prelude::*;
+
 use crate::{ComplexChannel, ComplexFrame, Error, Flags, RangeFrame, Raster, Result};
 
-/// Sums over repeated values of one pixel, by Welford's recursion: steady where the mean is large against the scatter.
-#[derive(Debug, Clone, Copy, Default)]
-struct Repeats {
+/// Pixels that one task takes at least; smaller tasks cost more to hand out than to do.
+const PIXELS_PER_TASK: usize = 4096;
+
+/// Pixels whose sums are kept at a time, within the first-level cache.
+const BLOCK: usize = 512;
+
+/// Number and mean of the values that a pixel had in repeated frames.
+#[derive(Clone, Copy)]
+struct Mean {
     count: f64,
-    mean: [f64; 2],
-    squares: f64,
+    value: [f64; 2],
 }
 
-impl Repeats {
-    fn add(&mut self, value: [f64; 2]) {
-        self.count += 1.0;
-        for (mean, value) in self.mean.iter_mut().zip(value) {
-            let before = value - *mean;
-            *mean += before / self.count;
-            self.squares += before * (value - *mean);
-        }
-    }
+/// The mean is NaN if there are no values.
+fn mean_of(values: impl Iterator<Item = [f64; 2]>) -> Mean {
+    let (count, [first, second]) =
+        values.fold((0.0, [0.0; 2]), |(count, [a, b]), [x, y]| (count + 1.0, [a + x, b + y]));
+    Mean { count, value: [first / count, second / count] }
+}
 
-    /// Mean, NaN without values.
-    fn mean(&self) -> [f64; 2] {
-        if self.count > 0.0 { self.mean } else { [f64::NAN; 2] }
+/// Standard deviation of a single value in each of `parts` parts that share it; NaN below two values.
+fn scatter_of(values: impl Iterator<Item = [f64; 2]>, mean: Mean, parts: f64) -> f64 {
+    if mean.count < 2.0 {
+        return f64::NAN;
     }
-
-    /// Standard deviation of a single value per part, from `parts` parts that share it; NaN below two values.
-    fn sigma(&self, parts: f64) -> f64 {
-        if self.count < 2.0 { f64::NAN } else { (self.squares / (parts * (self.count - 1.0))).sqrt() }
-    }
+    let squares: f64 = values.map(|[x, y]| (x - mean.value[0]).powi(2) + (y - mean.value[1]).powi(2)).sum();
+    (squares / (parts * (mean.count - 1.0))).sqrt()
 }
 
 /// Averages frames of a scene and a camera at rest: the mean of `z`, never of the phase.
@@ -53,53 +55,80 @@ pub fn average(frames: &[ComplexFrame]) -> Result<ComplexFrame> {
 
 fn average_channels(channels: &[&ComplexChannel], first: &ComplexChannel) -> ComplexChannel {
     let mut out = first.clone();
-    let mut offsets: Option<Vec<&[f32]>> = channels.iter().map(|c| c.offset.as_ref().map(Raster::as_slice)).collect();
-    if offsets.is_none() {
-        out.offset = None;
-    }
-    for pixel in 0..first.real.len() {
-        let repeats = repeats_of(channels, pixel);
-        let [re, im] = repeats.mean();
-        out.real.as_mut_slice()[pixel] = re as f32;
-        out.imaginary.as_mut_slice()[pixel] = im as f32;
-        out.sigma.as_mut_slice()[pixel] = sigma_of_mean(channels, pixel, &repeats) as f32;
-        if let (Some(planes), Some(offset)) = (&mut offsets, &mut out.offset) {
-            let mut values = Repeats::default();
-            planes
-                .iter()
-                .map(|plane| plane[pixel])
-                .filter(|b| b.is_finite())
-                .for_each(|b| values.add([f64::from(b), 0.0]));
-            offset.as_mut_slice()[pixel] = values.mean()[0] as f32;
+    let planes = out.real.as_mut_slice().par_chunks_mut(BLOCK).zip(out.imaginary.as_mut_slice().par_chunks_mut(BLOCK));
+    let planes = planes.zip(out.sigma.as_mut_slice().par_chunks_mut(BLOCK));
+    planes.enumerate().for_each(|(block, ((re, im), sigma))| {
+        let start = block * BLOCK;
+        let mut sums = Sums::default();
+        for channel in channels {
+            sums.add(channel, start, re.len());
         }
-    }
+        for (index, ((re, im), sigma)) in re.iter_mut().zip(im).zip(sigma).enumerate() {
+            let count = sums.count[index];
+            let value = [sums.real[index] / count, sums.imaginary[index] / count];
+            (*re, *im) = (value[0] as f32, value[1] as f32);
+            // A mean over nothing has no sigma: 0 / 0.
+            let predicted = sums.variance[index].sqrt() / count;
+            *sigma = predicted as f32;
+            if predicted.is_nan() {
+                let scatter = scatter_of(values_at(channels, start + index), Mean { count, value }, 2.0);
+                *sigma = (scatter / count.sqrt()) as f32;
+            }
+        }
+    });
+    out.offset = average_offsets(channels);
     out
 }
 
-fn repeats_of(channels: &[&ComplexChannel], pixel: usize) -> Repeats {
-    let mut repeats = Repeats::default();
-    for channel in channels {
-        if let Some(value) = value_at(channel, pixel) {
-            repeats.add(value);
+/// Sums over the frames for a block of pixels, plane by plane so that the compiler can vectorise them.
+struct Sums {
+    count: [f64; BLOCK],
+    real: [f64; BLOCK],
+    imaginary: [f64; BLOCK],
+    variance: [f64; BLOCK],
+}
+
+impl Default for Sums {
+    fn default() -> Self {
+        Self { count: [0.0; BLOCK], real: [0.0; BLOCK], imaginary: [0.0; BLOCK], variance: [0.0; BLOCK] }
+    }
+}
+
+impl Sums {
+    /// Adds the pixels of a channel that have a value.
+    fn add(&mut self, channel: &ComplexChannel, start: usize, length: usize) {
+        let [re, im, sigma] =
+            [&channel.real, &channel.imaginary, &channel.sigma].map(|plane| &plane.as_slice()[start..start + length]);
+        let sums = self.count.iter_mut().zip(&mut self.real).zip(&mut self.imaginary).zip(&mut self.variance);
+        for ((((count, real), imaginary), variance), ((re, im), sigma)) in sums.zip(re.iter().zip(im).zip(sigma)) {
+            let finite = re.is_finite() & im.is_finite();
+            *count += if finite { 1.0 } else { 0.0 };
+            *real += if finite { f64::from(*re) } else { 0.0 };
+            *imaginary += if finite { f64::from(*im) } else { 0.0 };
+            *variance += if finite { f64::from(*sigma) * f64::from(*sigma) } else { 0.0 };
         }
     }
-    repeats
+}
+
+fn average_offsets(channels: &[&ComplexChannel]) -> Option<Raster<f32>> {
+    let planes: Vec<&Raster<f32>> = channels.iter().map(|channel| channel.offset.as_ref()).collect::<Option<_>>()?;
+    let mut out = (*planes.first()?).clone();
+    let pixels = out.as_mut_slice().par_iter_mut().with_min_len(PIXELS_PER_TASK);
+    pixels.enumerate().for_each(|(pixel, offset)| {
+        let values = planes.iter().map(|plane| plane.as_slice()[pixel]).filter(|value| value.is_finite());
+        *offset = mean_of(values.map(|value| [f64::from(value), 0.0])).value[0] as f32;
+    });
+    Some(out)
+}
+
+/// The finite values of a pixel.
+fn values_at(channels: &[&ComplexChannel], pixel: usize) -> impl Iterator<Item = [f64; 2]> {
+    channels.iter().filter_map(move |channel| value_at(channel, pixel))
 }
 
 fn value_at(channel: &ComplexChannel, pixel: usize) -> Option<[f64; 2]> {
     let (re, im) = (channel.real.as_slice()[pixel], channel.imaginary.as_slice()[pixel]);
     (re.is_finite() && im.is_finite()).then(|| [f64::from(re), f64::from(im)])
-}
-
-fn sigma_of_mean(channels: &[&ComplexChannel], pixel: usize, repeats: &Repeats) -> f64 {
-    let variance: f64 = channels
-        .iter()
-        .filter(|channel| value_at(channel, pixel).is_some())
-        .map(|channel| f64::from(channel.sigma.as_slice()[pixel]).powi(2))
-        .sum();
-    // A mean over nothing has no sigma: 0 / 0.
-    let predicted = variance.sqrt() / repeats.count;
-    if predicted.is_nan() { repeats.sigma(2.0) / repeats.count.sqrt() } else { predicted }
 }
 
 /// Standard deviation of each part of `z` of a single frame, from the scatter of repeated frames, pixel by pixel.
@@ -119,8 +148,12 @@ pub fn sigma_from_repeats(frames: &[ComplexFrame], channel: usize) -> Result<Ras
         let expected = "a channel that the frames have, counted from 0";
         return Err(Error::OutOfDomain { name: "channel", value: channel as f64, expected });
     };
-    let values = (0..frames[0].flags.len()).map(|pixel| repeats_of(&channels, pixel).sigma(2.0) as f32);
-    Raster::from_vec(frames[0].width(), frames[0].height(), values.collect())
+    let mut out = channels.first().map(|channel| channel.sigma.clone()).unwrap_or_default();
+    let pixels = out.as_mut_slice().par_iter_mut().with_min_len(PIXELS_PER_TASK);
+    pixels.enumerate().for_each(|(pixel, sigma)| {
+        *sigma = scatter_of(values_at(&channels, pixel), mean_of(values_at(&channels, pixel)), 2.0) as f32;
+    });
+    Ok(out)
 }
 
 /// Averages range frames of a scene and a camera at rest, for cameras that give no phase.
@@ -138,21 +171,20 @@ pub fn average_ranges(frames: &[RangeFrame]) -> Result<RangeFrame> {
     }
     let planes: Vec<_> = frames.iter().map(|frame| &frame.flags).collect();
     let mut out = RangeFrame { flags: union(&planes), ..first.clone() };
-    for pixel in 0..first.range.len() {
-        let (mut range, mut amplitude, mut sigma) = (Repeats::default(), Repeats::default(), f32::NAN);
-        for frame in frames.iter().filter(|frame| frame.range.as_slice()[pixel].is_finite()) {
-            range.add([f64::from(frame.range.as_slice()[pixel]), 0.0]);
-            sigma = frame.sigma.as_slice()[pixel];
-            let value = frame.amplitude.as_slice()[pixel];
-            if value.is_finite() {
-                amplitude.add([f64::from(value), 0.0]);
-            }
-        }
-        out.range.as_mut_slice()[pixel] = range.mean()[0] as f32;
-        out.amplitude.as_mut_slice()[pixel] = amplitude.mean()[0] as f32;
-        let scatter = (range.sigma(1.0) / range.count.sqrt()) as f32;
-        out.sigma.as_mut_slice()[pixel] = if range.count < 2.0 { sigma } else { scatter };
-    }
+    let planes = out.range.as_mut_slice().par_iter_mut().zip(out.sigma.as_mut_slice());
+    let planes = planes.zip(out.amplitude.as_mut_slice()).with_min_len(PIXELS_PER_TASK);
+    planes.enumerate().for_each(|(pixel, ((range, sigma), amplitude))| {
+        let with_value = || frames.iter().filter(move |frame| frame.range.as_slice()[pixel].is_finite());
+        let ranges = || with_value().map(move |frame| [f64::from(frame.range.as_slice()[pixel]), 0.0]);
+        let amplitudes = with_value().map(|frame| frame.amplitude.as_slice()[pixel]).filter(|value| value.is_finite());
+        let mean = mean_of(ranges());
+        *range = mean.value[0] as f32;
+        *amplitude = mean_of(amplitudes.map(|value| [f64::from(value), 0.0])).value[0] as f32;
+        *sigma = match with_value().next() {
+            Some(only) if mean.count < 2.0 => only.sigma.as_slice()[pixel],
+            _ => (scatter_of(ranges(), mean, 1.0) / mean.count.sqrt()) as f32,
+        };
+    });
     flag_missing(&mut out.flags, &out.range);
     Ok(out)
 }
@@ -174,7 +206,7 @@ fn require_alike(frames: &[ComplexFrame]) -> Result<()> {
 
 /// All flags that any plane carries, but `NO_DATA`, which the result decides anew.
 fn union(planes: &[&Raster<Flags>]) -> Raster<Flags> {
-    let mut out = planes[0].clone();
+    let mut out = planes.first().map(|&plane| plane.clone()).unwrap_or_default();
     for plane in planes {
         for (all, flags) in out.as_mut_slice().iter_mut().zip(plane.as_slice()) {
             *all |= *flags;

@@ -1,9 +1,7 @@
 use std::path::{Path, PathBuf};
 
-use thiserror::Error;
-
 /// What can be wrong with a file. Every message names the file first.
-#[derive(Debug, Error)]
+#[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
     /// The operating system refused.
@@ -115,14 +113,14 @@ impl Error {
 
 /// A field of a value in memory that does not hold; becomes [`Error::Value`], or [`Error::Text`] once its place in a
 /// file is known.
-#[cfg(feature = "ron_text")]
+#[cfg(any(feature = "survey", feature = "calibration"))]
 #[derive(Debug)]
 pub(crate) struct InvalidField {
     pub field: String,
     pub reason: String,
 }
 
-#[cfg(feature = "ron_text")]
+#[cfg(any(feature = "survey", feature = "calibration"))]
 impl InvalidField {
     pub fn new(field: impl Into<String>, reason: impl Into<String>) -> Self {
         Self { field: field.into(), reason: reason.into() }

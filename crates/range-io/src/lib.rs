@@ -27,6 +27,6 @@ mod text;
 #[cfg(feature = "trajectory")]
 pub mod trajectory;
 
-#[cfg(feature = "ron_text")]
+#[cfg(any(feature = "survey", feature = "calibration"))]
 pub(crate) use error::InvalidField;
 pub use error::{Error, Result};

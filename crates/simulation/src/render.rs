@@ -76,8 +76,9 @@ impl Renderer<'_> {
 
     fn pixel(&self, col: usize, row: usize, light: &mut PixelLight) -> Result<Pixel> {
         let center = [col as f64, row as f64];
-        let (_, seen) = self.cast(center);
-        let mixed = self.gather(center, seen.as_ref(), light);
+        let axis = self.cast(center);
+        let (_, seen) = axis;
+        let mixed = self.gather(center, &axis, light);
         let mut signals = Vec::with_capacity(self.channels.len());
         for channel in self.channels {
             signals.push(self.signal(channel, [col, row], seen.map(|hit| hit.distance_m), light)?);
@@ -101,7 +102,7 @@ impl Renderer<'_> {
     }
 
     /// Collects the light of all rays of a pixel; answers whether they leave the surface seen at its centre.
-    fn gather(&self, center: [f64; 2], seen: Option<&Hit>, light: &mut PixelLight) -> bool {
+    fn gather(&self, center: [f64; 2], axis: &(Vector3<f64>, Option<Hit>), light: &mut PixelLight) -> bool {
         light.clear();
         let source = Source { position: self.origin(), axis: self.world_from_camera * -Vector3::z() };
         let (side, threshold_m) =
@@ -110,11 +111,12 @@ impl Renderer<'_> {
         let step = |index: usize| (index as f64 + 0.5) / side as f64 - 0.5;
         let mut mixed = false;
         for index in 0..side * side {
-            let (direction, hit) = self.cast([center[0] + step(index % side), center[1] + step(index / side)]);
+            let place = [center[0] + step(index % side), center[1] + step(index / side)];
+            let (direction, hit) = if side == 1 { *axis } else { self.cast(place) };
             if let Some(hit) = &hit {
                 self.lighting.gather(self.scene, &source, (&direction, hit), share, light);
             }
-            mixed |= side > 1 && leaves_surface(&self.origin(), &direction, seen, hit.as_ref(), threshold_m);
+            mixed |= side > 1 && leaves_surface(&self.origin(), &direction, axis.1.as_ref(), hit.as_ref(), threshold_m);
         }
         mixed
     }

@@ -20,6 +20,7 @@ pub(super) fn field_of_group(text: &str, place: Place, field: &str) -> String {
 }
 
 /// Line and column of a field's value; of the longest part of its path that there is, if it is missing.
+#[cfg(any(feature = "survey", feature = "calibration"))]
 pub(super) fn place_of(text: &str, path: &str) -> Place {
     let values = values(text);
     let mut path = path;
@@ -187,6 +188,7 @@ mod tests {
     const TEXT: &str = "#![enable(implicit_some)]\n(\n  a: 1, // b: 2\n  \"k\": Some(\"x(:\"),\n  list: [\n    (c: (1, 2)), (c: Some((3,\n      4))),\n  ],\n)\n";
 
     #[test]
+    #[cfg(any(feature = "survey", feature = "calibration"))]
     fn fields_are_found_at_their_places() {
         assert_eq!(place_of(TEXT, "a"), (3, 6));
         assert_eq!(place_of(TEXT, "k"), (4, 8));

@@ -10,7 +10,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use crate::text::read_text;
-use crate::{Error, InvalidField, Result};
+use crate::{Error, Result};
 
 fn options() -> ron::Options {
     ron::Options::default().with_default_extension(Extensions::IMPLICIT_SOME)
@@ -49,7 +49,8 @@ pub fn to_text<T: Serialize>(value: &T) -> Result<String> {
 }
 
 /// The error for a field that was read but does not hold, at its place in the text.
-pub(crate) fn at_field(file: &Path, text: &str, invalid: InvalidField) -> Error {
+#[cfg(any(feature = "survey", feature = "calibration"))]
+pub(crate) fn at_field(file: &Path, text: &str, invalid: crate::InvalidField) -> Error {
     let (line, column) = locate::place_of(text, &invalid.field);
     Error::Text { file: file.to_path_buf(), line, column, field: invalid.field, reason: invalid.reason }
 }

@@ -4,8 +4,10 @@ use std::path::Path;
 
 use range_image::Raster;
 
+#[cfg(any(feature = "png16", feature = "mkv"))]
+use super::Level;
 use super::arrays::{ArrayFile, Expected, REAL, array_error, raster, require_finite};
-use super::{InputFrame, Level, StoredDepth, Survey};
+use super::{InputFrame, StoredDepth, Survey};
 use crate::npz::{DataType, Values};
 use crate::{Error, Result};
 

@@ -1,11 +1,14 @@
 //! All stations at once from their surfaces: pairs aligned anew from the adjusted poses until nothing moves.
 
+use std::sync::atomic::{AtomicUsize, Ordering};
+
 use nalgebra::Isometry3;
+use rayon::prelude::*;
 
 use super::overlap::find_overlaps;
 use super::pose_graph::{Datum, PairConstraint, StationAdjustment, StationAdjustmentOptions, adjust_stations};
 use crate::error::{Error, Result};
-use crate::icp::{IcpOptions, IcpResult, IcpTarget, StopReason};
+use crate::icp::{IcpOptions, IcpResult, IcpTarget, Selection, StopReason};
 
 /// Options of [`adjust_surfaces`].
 #[derive(Debug, Clone, PartialEq)]
@@ -16,7 +19,7 @@ pub struct SurfaceAdjustmentOptions {
     pub overlap_distance_m: f64,
     /// Pairs with less overlap are left out. Default 0.3.
     pub minimum_overlap: f64,
-    /// Rounds of alignment and adjustment. Default 4.
+    /// Rounds of alignment and adjustment. Default 3.
     pub max_rounds: usize,
     /// The rounds end when no station moves by more than this, metre. Default 0.1 mm.
     pub tolerance_m: f64,
@@ -27,12 +30,18 @@ pub struct SurfaceAdjustmentOptions {
 impl SurfaceAdjustmentOptions {
     /// Options for initial poses that are right to about this distance, metre.
     pub fn with_initial_error(distance_m: f64) -> Self {
-        let icp = IcpOptions { initial_correspondence_distance_m: Some(distance_m), ..IcpOptions::default() };
+        // A third of the points carries nearly all that a frame says about a pose, since neighbours share their errors.
+        let icp = IcpOptions {
+            initial_correspondence_distance_m: Some(distance_m),
+            selection: Selection::EveryNth(3),
+            step_tolerance_m: Some(5e-5),
+            ..IcpOptions::default()
+        };
         Self {
             icp,
             overlap_distance_m: distance_m,
             minimum_overlap: 0.3,
-            max_rounds: 4,
+            max_rounds: 3,
             tolerance_m: 1e-4,
             adjustment: StationAdjustmentOptions::default(),
         }
@@ -87,7 +96,7 @@ pub fn adjust_surfaces(
     initial_world_from_station: &[Isometry3<f64>],
     datum: Datum,
     options: &SurfaceAdjustmentOptions,
-    progress: &dyn Fn(usize, usize),
+    progress: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<SurfaceAdjustment> {
     let mut poses = initial_world_from_station.to_vec();
     let mut icp = options.icp.clone();
@@ -135,11 +144,19 @@ pub fn align_pairs(
     world_from_station: &[Isometry3<f64>],
     candidates: &[(usize, usize)],
     icp: &IcpOptions,
-    progress: &dyn Fn(usize, usize),
+    progress: &(dyn Fn(usize, usize) + Sync),
 ) -> (Vec<PairAlignment>, Vec<RefusedPair>) {
+    let finished = AtomicUsize::new(0);
+    let align = |&(target, source): &(usize, usize)| {
+        let result = align_pair(stations, world_from_station, target, source, icp);
+        progress(finished.fetch_add(1, Ordering::Relaxed) + 1, candidates.len());
+        result
+    };
+    // Collected in the order of the candidates, so that the number of threads does not matter.
+    let results: Vec<Result<IcpResult>> = candidates.par_iter().map(align).collect();
     let (mut pairs, mut refused) = (Vec::new(), Vec::new());
-    for (done, &(target, source)) in candidates.iter().enumerate() {
-        match align_pair(stations, world_from_station, target, source, icp) {
+    for (&(target, source), result) in candidates.iter().zip(results) {
+        match result {
             Ok(result) if result.stop == StopReason::MaxIterations => {
                 let reason = format!("not settled after {} iterations", result.iterations);
                 refused.push(RefusedPair { target, source, reason });
@@ -147,7 +164,6 @@ pub fn align_pairs(
             Ok(result) => pairs.push(PairAlignment { target, source, result }),
             Err(error) => refused.push(RefusedPair { target, source, reason: error.to_string() }),
         }
-        progress(done + 1, candidates.len());
     }
     (pairs, refused)
 }

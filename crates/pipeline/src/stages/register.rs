@@ -1,5 +1,5 @@
 use icp_registration::{
-    Cloud, IcpOptions, IcpTarget, OrganisedNormalOptions, PairAlignment, RefusedPair, align_pairs, find_overlaps,
+    Cloud, IcpTarget, OrganisedNormalOptions, PairAlignment, RefusedPair, SurfaceAdjustmentOptions, align_pairs, find_overlaps,
     organised_normals,
 };
 use nalgebra::Isometry3;
@@ -17,7 +17,7 @@ pub(super) fn run(work: &mut Work, options: &RegisterOptions, progress: &dyn Pro
     let approximate = approximate_poses(work);
     let candidates = candidate_pairs(&targets, &approximate, options)?;
     progress.begin("Register", candidates.len());
-    let icp = IcpOptions { initial_correspondence_distance_m: Some(options.maximum_distance_m), ..IcpOptions::default() };
+    let icp = SurfaceAdjustmentOptions::with_initial_error(options.maximum_distance_m).icp;
     let (pairs, refused) =
         align_pairs(&targets, &approximate, &candidates, &icp, &|done, _| progress.advance(done));
     let poses = spanning_poses(work, &pairs, &refused, &approximate)?;

@@ -1,2 +1,43 @@
-//! Tasks of the repository.
-fn main() {}
+//! The repository's own tasks: `cargo xtask TASK`.
+
+#![allow(clippy::print_stdout, clippy::print_stderr)]
+
+mod bench;
+mod pipeline_task;
+mod shell;
+mod test;
+mod tidy;
+
+use std::process::ExitCode;
+
+use clap::Parser;
+
+/// Tasks of the repository.
+#[derive(Debug, Parser)]
+#[command(name = "cargo xtask")]
+enum Task {
+    /// Run a pipeline of fixtures/pipelines by its name: `cargo xtask pipeline room`.
+    Pipeline(pipeline_task::Arguments),
+    /// Everything that must be green: format, lints, documentation, tests, the small room.
+    Test,
+    /// Check the repository itself: READMEs, citations, lengths of files.
+    Tidy,
+    /// Run the benchmarks of all crates, or of those named.
+    Bench(bench::Arguments),
+}
+
+fn main() -> ExitCode {
+    let outcome = match Task::parse() {
+        Task::Pipeline(arguments) => return pipeline_task::run(&arguments),
+        Task::Test => test::run(),
+        Task::Tidy => tidy::run(),
+        Task::Bench(arguments) => bench::run(&arguments),
+    };
+    match outcome {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(message) => {
+            eprintln!("{message}");
+            ExitCode::FAILURE
+        }
+    }
+}

@@ -14,10 +14,81 @@ pub enum Error {
         /// What would be right.
         expected: &'static str,
     },
+    /// A list of parameters names one that no range-error model has.
+    #[error("'{name}' is no range-error parameter; known are {known}")]
+    UnknownParameter {
+        /// Name given.
+        name: String,
+        /// The canonical names.
+        known: String,
+    },
+    /// A list of parameters names one twice.
+    #[error("parameter {name} is given twice")]
+    DuplicateParameter {
+        /// The parameter.
+        name: String,
+    },
+    /// A parameter comes in a unit other than its own.
+    #[error("parameter {name} is given in '{found}', expected '{expected}'")]
+    WrongUnit {
+        /// The parameter.
+        name: String,
+        /// Unit given.
+        found: String,
+        /// Unit of the parameter.
+        expected: &'static str,
+    },
+    /// Coefficients of the amplitude hyperbola were given without the amplitudes they were fitted in.
+    #[error("h1, h2, h3 are given without the amplitude span they were fitted in")]
+    MissingAmplitudeSpan,
+    /// Two ranges would be observed as one: the range terms are no invertible map.
+    #[error("the periodic terms change by {slope} m per metre at a range of {range_m} m; below 1 they can be inverted")]
+    NotMonotone {
+        /// Largest derivative of the correction with respect to the range.
+        slope: f64,
+        /// Range where it occurs, metre.
+        range_m: f64,
+    },
+    /// The observed range that belongs to a true range was not found.
+    #[error("no observed range found for a true range of {true_range_m} m: {misclosure_m} m are left over")]
+    NotConverged {
+        /// True range asked for, metre.
+        true_range_m: f64,
+        /// What the last iterate misses, metre.
+        misclosure_m: f64,
+    },
+    /// No model was made for this integration time.
+    #[error(
+        "no range-error model for an integration time of {integration_time_s} s; there are models for {available_s:?} s"
+    )]
+    NoModelForIntegrationTime {
+        /// Integration time asked for, second.
+        integration_time_s: f64,
+        /// Integration times there are, second.
+        available_s: Vec<f64>,
+    },
     /// A frame error.
     #[error(transparent)]
     Image(#[from] range_image::Error),
 }
 
-/// Result with this crate's [`Error`].
+/// Result with this crate's [`enum@Error`].
 pub type Result<T> = std::result::Result<T, Error>;
+
+/// Refuses a value that is not finite.
+pub(crate) fn require_finite(name: &'static str, value: f64) -> Result<()> {
+    if value.is_finite() {
+        return Ok(());
+    }
+    Err(Error::OutOfDomain { name, value, expected: "a coefficient is finite" })
+}
+
+/// Refuses a span whose bounds are not finite or not ascending.
+pub(crate) fn require_span(name: &'static str, [low, high]: [f64; 2]) -> Result<()> {
+    require_finite(name, low)?;
+    require_finite(name, high)?;
+    if low < high {
+        return Ok(());
+    }
+    Err(Error::OutOfDomain { name, value: high, expected: "the upper bound of a span lies above the lower one" })
+}

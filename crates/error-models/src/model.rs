@@ -62,6 +62,7 @@ pub struct FixedPattern {
 /// Models keyed by integration time (Sect. 4.6), ascending.
 #[derive(Debug, Clone, PartialEq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct ModelSet {
     /// `(integration_time_s, models of all frequencies)`.
     pub entries: Vec<(f64, Vec<RangeErrorModel>)>,

@@ -1,2 +1,66 @@
-//! Benchmarks.
-fn main() {}
+//! Times of the spatial tree, the absolute counts and two frequencies at three frame sizes.
+#![allow(clippy::unwrap_used, missing_docs)]
+
+use std::f64::consts::TAU;
+use std::hint::black_box;
+
+use criterion::{Criterion, criterion_group, criterion_main};
+use phase_unwrap::{KnownWraps, MultiFrequencyOptions, SpatialOptions, Unwrapper, unwrap_multi_frequency};
+use rand::SeedableRng;
+use rand_distr::{Distribution, StandardNormal};
+use rand_pcg::Pcg64;
+use range_image::{Modulation, Raster};
+
+const SIZES: [(usize, usize); 3] = [(176, 144), (640, 480), (1024, 1024)];
+
+/// Range in metres: a tilted floor before a wall, and boxes that stand off.
+fn range(width: usize, height: usize) -> Raster<f64> {
+    Raster::from_fn(width, height, |col, row| {
+        let (x, y) = (col as f64 / width as f64, row as f64 / height as f64);
+        let background = (7.0 + x).min(2.0 / (y - 0.45).max(0.01));
+        let near = (x - 0.3).abs() < 0.1 && (y - 0.5).abs() < 0.15;
+        if near { 1.2 + 0.3 * x } else { background }
+    })
+}
+
+fn wrapped(range: &Raster<f64>, modulation: &Modulation, seed: u64) -> (Raster<f32>, Raster<f32>) {
+    let mut rng = Pcg64::seed_from_u64(seed);
+    let amplitude = range.map(|r| (2000.0 / (r * r)) as f32);
+    let phase = range.map(|r| {
+        let noise: f64 = StandardNormal.sample(&mut rng);
+        let sigma = 0.02 * (r / 5.0).powi(2);
+        ((modulation.phase_from_range(*r) + sigma * noise).rem_euclid(TAU) as f32).min(std::f32::consts::TAU)
+    });
+    (phase, amplitude)
+}
+
+fn spatial(c: &mut Criterion) {
+    let modulation = Modulation::new(30e6).unwrap();
+    for (width, height) in SIZES {
+        let (phase, amplitude) = wrapped(&range(width, height), &modulation, 1);
+        let size = format!("{width}x{height}");
+        let mut unwrapper = Unwrapper::new(SpatialOptions::default()).unwrap();
+        c.bench_function(&format!("tree/{size}"), |b| {
+            b.iter(|| unwrapper.unwrap(black_box(&phase), None, None, KnownWraps::Nothing).unwrap());
+        });
+        c.bench_function(&format!("absolute/{size}"), |b| {
+            b.iter(|| unwrapper.unwrap(black_box(&phase), Some(&amplitude), None, KnownWraps::Nothing).unwrap());
+        });
+    }
+}
+
+fn multi_frequency(c: &mut Criterion) {
+    let modulations = [Modulation::new(80e6).unwrap(), Modulation::new(60e6).unwrap()];
+    for (width, height) in SIZES {
+        let range = range(width, height);
+        let phases = modulations.map(|m| wrapped(&range, &m, 2).0);
+        let options = MultiFrequencyOptions::default();
+        let name = format!("two_frequencies/{width}x{height}");
+        c.bench_function(&name, |b| {
+            b.iter(|| unwrap_multi_frequency(black_box(&phases), &modulations, None, None, &options).unwrap());
+        });
+    }
+}
+
+criterion_group!(benches, spatial, multi_frequency);
+criterion_main!(benches);

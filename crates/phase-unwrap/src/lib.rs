@@ -1,1 +1,28 @@
 #![doc = include_str!("../README.md")]
+
+mod borders;
+mod brightness;
+mod combine;
+mod error;
+mod forest;
+mod grid;
+mod intervals;
+mod known;
+mod labelling;
+mod multi_frequency;
+mod offsets;
+mod options;
+mod planes;
+mod reliability;
+mod segments;
+mod spatial;
+mod surface;
+mod unwrapped;
+
+pub use combine::{Combined, combine_frequencies};
+pub use error::{Error, Result};
+pub use intervals::combined_interval_m;
+pub use multi_frequency::{MultiFrequencyOptions, MultiUnwrapped, unwrap_multi_frequency};
+pub use options::{AlbedoPrior, ImageGeometry, KnownWraps, Seed, SpatialOptions};
+pub use spatial::{Unwrapper, unwrap_spatial};
+pub use unwrapped::{Island, Unwrapped};

@@ -1,1 +1,39 @@
 #![doc = include_str!("../README.md")]
+
+mod compare;
+mod error;
+mod inspect;
+mod load;
+mod measure;
+mod outcome;
+mod plan;
+mod progress;
+mod report;
+mod results;
+mod ron_text;
+mod run;
+mod simulate;
+mod stages;
+mod statistics;
+mod summary;
+mod truth;
+mod view;
+mod work;
+
+pub use compare::{CloudComparison, Comparison, PoseComparison, compare};
+pub use error::{Error, Result};
+pub use inspect::{Inspection, inspect};
+pub use outcome::{AdjustmentFigures, AlignedPair, Outcome, StationPose};
+pub use plan::{
+    AdjustOptions, AverageOptions, CorrectImagePointOptions, CorrectRangeOptions, DeconvolveOptions,
+    DemodulateOptions, FlagOptions, MixedPixels, NoiseOptions, Plan, PointCloudOptions, RegisterOptions, SimulateSource, Source,
+    Stage, UnwrapOptions,
+};
+pub use progress::{Progress, Silent};
+pub use run::{RunRequest, process, run};
+pub use simulate::{Simulated, simulate};
+pub use summary::{
+    PairSummary, ReferenceSummary, RegistrationSummary, StageSummary, StationTruth, Summary, TruthSummary,
+};
+pub use truth::{RangeTruth, ViewTruth};
+pub use view::{Snapshot, View, ViewData};

@@ -1,7 +1,5 @@
-use thiserror::Error;
-
 /// What can be wrong with a frame or with the options of a stage that works on it.
-#[derive(Debug, Clone, PartialEq, Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
     /// A plane's data does not have `width * height` elements.

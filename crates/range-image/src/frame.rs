@@ -1,8 +1,6 @@
 //! The frame at its levels: raw samples, complex images, ranges.
 
-use std::f64::consts::TAU;
-
-use crate::{Error, Flags, Modulation, Raster, Result};
+use crate::{ComplexChannel, Error, Flags, Modulation, Raster, Result};
 
 /// Raw correlation samples as the sensor delivers them, one contiguous block in `[F, N, H, W]` order.
 #[derive(Debug, Clone, PartialEq)]
@@ -67,7 +65,8 @@ impl RawFrame {
         let planes = modulations.len() * phase_steps;
         let expected = width.saturating_mul(height).saturating_mul(planes);
         if samples.len() != expected {
-            return Err(Error::RasterLength { width, height: height * planes, expected, found: samples.len() });
+            let height = height.saturating_mul(planes);
+            return Err(Error::RasterLength { width, height, expected, found: samples.len() });
         }
         Ok(Self { width, height, phase_steps, modulations, samples })
     }
@@ -98,55 +97,6 @@ impl RawFrame {
     }
 }
 
-/// The complex image `z = A exp(i phi)` of one frequency, as separate planes.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ComplexChannel {
-    /// Modulation this image was taken at.
-    pub modulation: Modulation,
-    /// Real part `A cos phi`, in the samples' unit.
-    pub real: Raster<f32>,
-    /// Imaginary part `A sin phi`, in the samples' unit.
-    pub imaginary: Raster<f32>,
-    /// Mean sample `B`, where samples were demodulated.
-    pub offset: Option<Raster<f32>>,
-    /// Standard deviation of each part of `z`, in the samples' unit; NaN where it is not known.
-    pub sigma: Raster<f32>,
-}
-
-impl ComplexChannel {
-    /// Amplitude `A = |z|`.
-    pub fn amplitude(&self) -> Raster<f32> {
-        self.combine(f32::hypot)
-    }
-
-    /// Phase in `[0, 2 pi)`.
-    pub fn phase(&self) -> Raster<f32> {
-        self.combine(|re, im| {
-            let phase = im.atan2(re);
-            let positive = if phase < 0.0 { phase + TAU as f32 } else { phase };
-            // A tiny negative phase rounds up to 2 pi itself, which is the same direction as zero.
-            if positive >= TAU as f32 { 0.0 } else { positive }
-        })
-    }
-
-    /// Standard deviation of the phase in radians, `sigma_z / A` (Lange; valid where `A` is well above `sigma_z`).
-    pub fn sigma_phase(&self) -> Raster<f32> {
-        let mut sigma = self.amplitude();
-        for (value, sigma_z) in sigma.as_mut_slice().iter_mut().zip(self.sigma.as_slice()) {
-            *value = sigma_z / *value;
-        }
-        sigma
-    }
-
-    fn combine(&self, f: impl Fn(f32, f32) -> f32) -> Raster<f32> {
-        let mut out = self.real.clone();
-        for (value, im) in out.as_mut_slice().iter_mut().zip(self.imaginary.as_slice()) {
-            *value = f(*value, *im);
-        }
-        out
-    }
-}
-
 /// One frame at level `phase`: complex images of all frequencies and one flag plane.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ComplexFrame {
@@ -157,6 +107,35 @@ pub struct ComplexFrame {
 }
 
 impl ComplexFrame {
+    /// A frame without channels and pixels, to be filled by [`Demodulator::demodulate_into`](crate::Demodulator).
+    pub fn empty() -> Self {
+        Self { channels: Vec::new(), flags: Raster::default() }
+    }
+
+    /// Gives the frame the size and the modulations of `raw`, keeping the planes that fit.
+    pub(crate) fn reshape(&mut self, raw: &RawFrame) {
+        let (width, height) = (raw.width(), raw.height());
+        if (self.width(), self.height()) != (width, height) {
+            self.flags = Raster::filled(width, height, Flags::empty());
+        }
+        self.channels.truncate(raw.modulations().len());
+        for (index, &modulation) in raw.modulations().iter().enumerate() {
+            match self.channels.get_mut(index) {
+                None => self.channels.push(ComplexChannel::without_data(modulation, width, height)),
+                Some(channel) => channel.reshape(modulation, width, height),
+            }
+        }
+    }
+
+    /// Fails unless all planes of all channels have the size of the flag plane.
+    pub fn validate(&self) -> Result<()> {
+        for channel in &self.channels {
+            self.flags.require_same_size(&channel.real, "real part")?;
+            channel.validate()?;
+        }
+        Ok(())
+    }
+
     /// Columns.
     pub fn width(&self) -> usize {
         self.flags.width()

@@ -1,15 +1,29 @@
 #![doc = include_str!("../README.md")]
 
+mod average;
+mod channel;
+mod demodulate;
 mod error;
 mod flags;
 mod frame;
 mod image_format;
 mod modulation;
+mod noise;
+mod options;
+mod phase_level;
+mod polar;
 mod raster;
+mod weights;
 
+pub use average::{average, average_ranges, sigma_from_repeats};
+pub use channel::ComplexChannel;
+pub use demodulate::{Demodulator, demodulate};
 pub use error::{Error, Result};
 pub use flags::Flags;
-pub use frame::{ComplexChannel, ComplexFrame, RangeFrame, RawFrame, Samples};
+pub use frame::{ComplexFrame, RangeFrame, RawFrame, Samples};
 pub use image_format::ImageFormat;
 pub use modulation::{Modulation, SPEED_OF_LIGHT};
+pub use noise::NoiseModel;
+pub use options::DemodulationOptions;
+pub use phase_level::{PhaseConvention, PhaseSense};
 pub use raster::Raster;

@@ -46,7 +46,7 @@ impl<T> Raster<T> {
 
     /// The value at a pixel, `None` outside the raster.
     pub fn get(&self, col: usize, row: usize) -> Option<&T> {
-        if col < self.width { self.data.get(row * self.width + col) } else { None }
+        if col < self.width && row < self.height { self.data.get(row * self.width + col) } else { None }
     }
 
     /// All values, row by row.

@@ -1,1 +1,35 @@
 #![doc = include_str!("../README.md")]
+
+mod arguments;
+mod bar;
+mod commands;
+mod output;
+
+use std::ffi::OsString;
+use std::process::ExitCode;
+
+use clap::Parser;
+
+use crate::arguments::Arguments;
+use crate::output::Output;
+
+/// Runs the command with the given arguments, the program's name first, and returns what the shell should see:
+/// 0 done, 1 the work failed, 2 the arguments are wrong.
+pub fn main(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
+    let arguments = match Arguments::try_parse_from(arguments) {
+        Ok(arguments) => arguments,
+        Err(error) => {
+            // Help and version come this way too; clap knows which stream and which code each wants.
+            let _ = error.print();
+            return ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(2));
+        }
+    };
+    let output = Output::new(&arguments);
+    match commands::dispatch(arguments.command, &output) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            output.error(error.as_ref());
+            ExitCode::FAILURE
+        }
+    }
+}

@@ -1,1 +1,20 @@
 #![doc = include_str!("../README.md")]
+
+mod error;
+mod light;
+mod random;
+mod render;
+mod samples;
+mod scene;
+mod simulate;
+mod spec;
+mod truth;
+
+pub use error::{Error, Result};
+pub use simulate::{SimulatedFrame, SimulatedSurvey, Simulator, StationImage, simulate, simulate_frame};
+pub use spec::SimulationSpec;
+pub use spec::camera::{CameraSpec, ExposureSpec, IlluminationSpec};
+pub use spec::errors::{DigitisationSpec, ErrorsSpec, FixedPatternSpec, MixedPixelsSpec, MultipathSpec, SampleType};
+pub use spec::scene::{ObjectSpec, SceneSpec, ShapeSpec, TextureSpec};
+pub use spec::station::{AttitudeSpec, StationSpec};
+pub use truth::FrameTruth;

@@ -1,0 +1,175 @@
+use thiserror::Error;
+
+use crate::Combination;
+
+/// Why an adjustment could not be set up or gave no trustworthy result.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// An identifier does not belong to this adjustment.
+    #[error("{what} number {index} does not exist: there are {count}")]
+    UnknownId {
+        /// Block, group, observation or parameter.
+        what: &'static str,
+        /// Number asked for.
+        index: usize,
+        /// How many there are.
+        count: usize,
+    },
+    /// A list of values does not have the length that its use asks for.
+    #[error("{what} has {found} values, {expected} are needed")]
+    Length {
+        /// What was given.
+        what: String,
+        /// Length needed.
+        expected: usize,
+        /// Length found.
+        found: usize,
+    },
+    /// Values of a parameter block that its manifold does not hold, or that are not finite.
+    #[error("parameter block `{block}`: the values {values:?} are not valid ({reason})")]
+    InvalidBlock {
+        /// Name of the block.
+        block: String,
+        /// Values given.
+        values: Vec<f64>,
+        /// What is wrong with them.
+        reason: &'static str,
+    },
+    /// A covariance matrix that is not symmetric and positive definite.
+    #[error("covariance of an observation in group `{group}` is not symmetric and positive definite: {matrix:?}")]
+    Covariance {
+        /// Group of the observation.
+        group: String,
+        /// The matrix, row by row.
+        matrix: Vec<f64>,
+    },
+    /// There is nothing to adjust.
+    #[error("the adjustment has no observations")]
+    NoObservations,
+    /// More unknowns than dense normal equations can hold.
+    #[error("{unknowns} unknowns: dense normal equations are limited to {limit}")]
+    TooLarge {
+        /// Number of unknowns.
+        unknowns: usize,
+        /// Largest number.
+        limit: usize,
+    },
+    /// The model of an observation could not be computed at the current parameters.
+    #[error("group `{group}`, observation {observation}: {reason}")]
+    Evaluation {
+        /// Group of the observation.
+        group: String,
+        /// Number of the observation, in the order of adding.
+        observation: usize,
+        /// What the observation said.
+        reason: String,
+    },
+    /// A residual or a derivative is NaN or infinite.
+    #[error("group `{group}`, observation {observation}, component {component}: {what} is {value}")]
+    NotFinite {
+        /// Group of the observation.
+        group: String,
+        /// Number of the observation, in the order of adding.
+        observation: usize,
+        /// Component of the observation.
+        component: usize,
+        /// Residual or derivative.
+        what: &'static str,
+        /// The value.
+        value: f64,
+    },
+    /// Observations, priors, constraints and datum together do not determine all unknowns.
+    #[error("rank defect {defect}: not determined is {}", Combination::list(.combinations))]
+    RankDeficient {
+        /// Number of directions in the space of the unknowns that nothing determines.
+        defect: usize,
+        /// Those directions: one combination of parameters each.
+        combinations: Vec<Combination>,
+    },
+    /// The points chosen for the datum cannot carry it.
+    #[error("datum: {reason}")]
+    Datum {
+        /// What is wrong.
+        reason: String,
+    },
+    /// The inner constraints remove more than the defect: the observations already determine part of the datum.
+    #[error(
+        "the inner constraints hold {held} directions, but the observations determine {determined} of them \
+         (largest share {share:.3e}): the datum would bend the network"
+    )]
+    DatumOverdetermined {
+        /// Directions held by the inner constraints.
+        held: usize,
+        /// How many of them the observations, priors or held parameters already determine.
+        determined: usize,
+        /// Largest share of a direction that is already determined, 0 to 1.
+        share: f64,
+    },
+    /// Constraints that repeat or contradict each other, or touch only held parameters.
+    #[error("constraint {index} depends on the other constraints and the datum, or touches no free parameter")]
+    DependentConstraint {
+        /// Number of the constraint, in the order of adding; inner constraints come last.
+        index: usize,
+    },
+    /// The iteration did not reach its end.
+    #[error(
+        "not converged after {iterations} iterations ({reason}): last objective {objective:.9e}, last undamped step {step:.3e} \
+         standard deviations, damping {damping:.1e}"
+    )]
+    NotConverged {
+        /// Iterations done.
+        iterations: usize,
+        /// What ended the iteration.
+        reason: &'static str,
+        /// Last objective (v'Pv where no kernel is robust).
+        objective: f64,
+        /// Length of the last step in standard deviations (norm of `A·dx`, whitened).
+        step: f64,
+        /// Last damping factor.
+        damping: f64,
+    },
+    /// A posterior scale was asked for where there is no redundancy.
+    #[error("redundancy {redundancy}: there is no posterior variance factor")]
+    NoRedundancy {
+        /// Redundancy of the adjustment.
+        redundancy: i64,
+    },
+    /// An option lies outside its domain.
+    #[error("option {name} = {value}: {expected}")]
+    Option {
+        /// Name of the option.
+        name: &'static str,
+        /// Value given.
+        value: f64,
+        /// What would be right.
+        expected: &'static str,
+    },
+    /// A matrix decomposition failed to converge.
+    #[error("the {what} did not converge")]
+    Decomposition {
+        /// Which decomposition.
+        what: &'static str,
+    },
+}
+
+/// Result with this crate's [`enum@Error`].
+pub type Result<T> = std::result::Result<T, Error>;
+
+/// Why a model could not be evaluated at given parameters, said by an [`crate::Observation`]
+/// (for example "the point lies behind the camera").
+///
+/// During the descent such a trial step is shortened; at the start values it ends the adjustment with
+/// [`Error::Evaluation`].
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[error("{reason}")]
+pub struct EvaluationFailure {
+    reason: std::borrow::Cow<'static, str>,
+}
+
+impl EvaluationFailure {
+    /// A failure with its reason.
+    pub fn new(reason: impl Into<std::borrow::Cow<'static, str>>) -> Self {
+        Self { reason: reason.into() }
+    }
+}

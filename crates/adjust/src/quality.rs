@@ -1,0 +1,169 @@
+use crate::layout::Place;
+use crate::{Error, GroupId, Result, Scale, Solution};
+
+/// Redundancy number below which a residual says nothing about its observation's error.
+const UNCONTROLLED: f64 = 1e-9;
+
+/// Figures of one observation group.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct GroupSummary {
+    /// Name of the group.
+    pub name: String,
+    /// Number of observed values.
+    pub observations: usize,
+    /// Its part of vᵀPv.
+    pub vtpv: f64,
+    /// Its part of the redundancy: the sum of its redundancy numbers.
+    pub redundancy: f64,
+    /// Root mean square of its residuals, in the unit of its observations. NaN for an empty group.
+    pub rms: f64,
+}
+
+impl GroupSummary {
+    /// `√(vᵀPv / redundancy)` of the group: how much larger (or smaller) its standard deviations seem to be than they
+    /// were given. `None` where the group has no redundancy of its own.
+    pub fn sigma0(&self) -> Option<f64> {
+        (self.redundancy > UNCONTROLLED * self.observations.max(1) as f64).then(|| (self.vtpv / self.redundancy).sqrt())
+    }
+}
+
+impl Solution {
+    /// Redundancy numbers `(I − A Q Aᵀ P)ᵢᵢ` of all observed values, in the order of [`Self::residuals`]: the share of an
+    /// error that shows in its residual, 0 (not controlled) to 1. Their sum is the redundancy. P contains the robust
+    /// weights.
+    pub fn redundancy_numbers(&self) -> Vec<f64> {
+        let mut out = vec![0.0; self.observations()];
+        self.for_each_observation(|place, local| {
+            for (index, row) in place.rows().enumerate() {
+                // With C = L Lᵀ and the whitened J: A Q AᵀP = L (w J Q Jᵀ) L⁻¹.
+                let d = place.dimension;
+                let mut used = 0.0;
+                for first in 0..=index {
+                    for second in index..d {
+                        used += local.factor[index * d + first]
+                            * local.image[first * d + second]
+                            * local.whitening(second, index);
+                    }
+                }
+                out[row] = 1.0 - self.weights()[row] * used;
+            }
+        });
+        out
+    }
+
+    /// Standard deviations of the residuals, from `C − A Q Aᵀ`, prior- or posterior-scaled. An observation with the robust
+    /// weight w has `C + (1 − 2w) A Q Aᵀ`: with weight zero its residual is that of a prediction.
+    pub fn residual_deviations(&self, scale: Scale) -> Result<Vec<f64>> {
+        let factor = self.variance_factor(scale)?.sqrt();
+        let mut out = vec![0.0; self.observations()];
+        self.for_each_observation(|place, local| {
+            for (index, row) in place.rows().enumerate() {
+                let d = place.dimension;
+                let share = 1.0 - 2.0 * self.weights()[row];
+                let mut variance = 0.0;
+                for first in 0..=index {
+                    let own = local.factor[index * d + first];
+                    variance += own * own;
+                    for second in 0..=index {
+                        variance += share * own * local.image[first * d + second] * local.factor[index * d + second];
+                    }
+                }
+                out[row] = factor * variance.max(0.0).sqrt();
+            }
+        });
+        Ok(out)
+    }
+
+    /// Standardised residuals `v / σ_v`, prior-scaled ([`Scale::Prior`], Baarda's w) or posterior-scaled (Pope's τ).
+    /// NaN where the redundancy number is below 1e-9: the residual is zero whatever the error.
+    pub fn standardised_residuals(&self, scale: Scale) -> Result<Vec<f64>> {
+        let deviations = self.residual_deviations(scale)?;
+        let numbers = self.redundancy_numbers();
+        let residuals = self.residuals().iter().zip(deviations).zip(numbers);
+        Ok(residuals
+            .map(|((v, sigma), r)| if r > UNCONTROLLED && sigma > 0.0 { v / sigma } else { f64::NAN })
+            .collect())
+    }
+
+    /// Figures of one group.
+    pub fn group(&self, group: GroupId) -> Result<GroupSummary> {
+        let count = self.groups.len();
+        let name = self.groups.get(group.0).ok_or(Error::UnknownId { what: "group", index: group.0, count })?.clone();
+        let numbers = self.redundancy_numbers();
+        let (mut observations, mut vtpv, mut redundancy, mut squares) = (0, 0.0, 0.0, 0.0);
+        for (place, _) in self.layout.observations.iter().zip(&self.group_of).filter(|(_, of)| **of == group) {
+            for row in place.rows() {
+                observations += 1;
+                vtpv += self.weights()[row] * self.linearisation.whitened[row].powi(2);
+                redundancy += numbers[row];
+                squares += self.linearisation.residual[row].powi(2);
+            }
+        }
+        let rms = if observations > 0 { (squares / f64::from(observations)).sqrt() } else { f64::NAN };
+        Ok(GroupSummary { name, observations: observations as usize, vtpv, redundancy, rms })
+    }
+
+    fn for_each_observation(&self, mut visit: impl FnMut(&Place, &Local<'_>)) {
+        let mut product = Vec::new();
+        let mut local = Local { image: Vec::new(), factor: Vec::new(), whitening: &[] };
+        for (place, &start) in self.layout.observations.iter().zip(&self.whitening_start) {
+            local.whitening = &self.whitening[start..];
+            self.image(place, &mut product, &mut local.image);
+            invert_lower(local.whitening, place.dimension, &mut local.factor);
+            visit(place, &local);
+        }
+    }
+
+    /// `J Q Jᵀ` of one observation, row-major; J is the whitened Jacobian.
+    fn image(&self, place: &Place, product: &mut Vec<f64>, out: &mut Vec<f64>) {
+        let (active, d) = (self.layout.active(place), place.dimension);
+        let jacobian = &self.linearisation.jacobian[place.jacobian_range()];
+        out.clear();
+        out.resize(d * d, 0.0);
+        product.resize(active.len(), 0.0);
+        for second in 0..d {
+            let own = &jacobian[second * active.len()..(second + 1) * active.len()];
+            for (value, &(_, row)) in product.iter_mut().zip(active) {
+                // Q is symmetric: its row is a column, contiguous in memory.
+                let column = &self.cofactor[row * self.layout.unknowns..(row + 1) * self.layout.unknowns];
+                *value = own.iter().zip(active).map(|(a, &(_, other))| a * column[other]).sum();
+            }
+            for first in 0..d {
+                let other = &jacobian[first * active.len()..(first + 1) * active.len()];
+                let share: f64 = other.iter().zip(product.iter()).map(|(a, b)| a * b).sum();
+                out[first * d + second] = share;
+            }
+        }
+    }
+}
+
+/// Small matrices of one observation.
+struct Local<'s> {
+    /// `J Q Jᵀ`, row-major.
+    image: Vec<f64>,
+    /// L of `C = L Lᵀ`, row-major, full.
+    factor: Vec<f64>,
+    whitening: &'s [f64],
+}
+
+impl Local<'_> {
+    /// Element of `L⁻¹`, row >= column.
+    fn whitening(&self, row: usize, column: usize) -> f64 {
+        self.whitening[row * (row + 1) / 2 + column]
+    }
+}
+
+/// Inverse of a lower triangle stored row by row, as a full row-major matrix.
+fn invert_lower(packed: &[f64], n: usize, out: &mut Vec<f64>) {
+    out.clear();
+    out.resize(n * n, 0.0);
+    for row in 0..n {
+        let weights = &packed[row * (row + 1) / 2..(row + 1) * (row + 2) / 2];
+        for column in 0..=row {
+            let known: f64 = (column..row).map(|i| weights[i] * out[i * n + column]).sum();
+            let target = if row == column { 1.0 } else { 0.0 };
+            out[row * n + column] = (target - known) / weights[row];
+        }
+    }
+}

@@ -1,0 +1,269 @@
+use std::ops::Range;
+
+use nalgebra::{DMatrix, Isometry3};
+
+use crate::iteration::Iteration;
+use crate::layout::{HELD, Layout};
+use crate::linearisation::Linearisation;
+use crate::rank::Cofactor;
+use crate::{
+    Adjustment, BlockId, Error, GroupId, ObservationId, ParameterBlock, Result, RigidPose, SolveOptions, TraceEntry,
+};
+
+/// Which variance factor a covariance or standard deviation is scaled by.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Scale {
+    /// One: the covariances of the observations are taken as they were given.
+    Prior,
+    /// σ̂₀² = vᵀPv / redundancy, estimated from the residuals.
+    Posterior,
+}
+
+/// The adjusted parameters and how well they are known. A solution exists only where the iteration converged undamped
+/// and all unknowns are determined.
+#[derive(Debug, Clone)]
+pub struct Solution {
+    blocks: Vec<ParameterBlock>,
+    pub(crate) groups: Vec<String>,
+    pub(crate) group_of: Vec<GroupId>,
+    pub(crate) whitening: Vec<f64>,
+    pub(crate) whitening_start: Vec<usize>,
+    pub(crate) layout: Layout,
+    values: Vec<f64>,
+    pub(crate) linearisation: Linearisation,
+    pub(crate) names: Vec<String>,
+    /// Cofactor matrix of the unknowns, full, column-major.
+    pub(crate) cofactor: Vec<f64>,
+    pub(crate) scale: Vec<f64>,
+    pub(crate) condition: f64,
+    redundancy: i64,
+    trace: Vec<TraceEntry>,
+}
+
+impl Adjustment<'_> {
+    /// Estimates the parameters by least squares, `vᵀPv → min`.
+    ///
+    /// # Errors
+    /// [`Error::RankDeficient`] names what is not determined; [`Error::NotConverged`] where the iteration found no end;
+    /// [`Error::Evaluation`] and [`Error::NotFinite`] name an observation whose model has no value at the start;
+    /// [`Error::DatumOverdetermined`], [`Error::Datum`] and [`Error::DependentConstraint`] speak of the constraints.
+    pub fn solve(&self, options: &SolveOptions) -> Result<Solution> {
+        options.check()?;
+        let layout = Layout::new(self)?;
+        let names = self.unknown_names(&layout);
+        let mut iteration = Iteration::new(self, &layout, options)?;
+        if let Err(error) = iteration.run() {
+            // A descent that finds no end often has none: an undetermined direction is then the better answer.
+            let undetermined =
+                matches!(error, Error::NotConverged { .. }) && iteration.problem().factorise()?.is_none();
+            return Err(if undetermined { iteration.problem().defect(&names)? } else { error });
+        }
+        let cofactor = iteration.problem().cofactor(&names)?;
+        let (values, linearisation, trace) = (iteration.values, iteration.current, iteration.trace);
+        let constraints = iteration.constraints.count;
+        Ok(self.solution(layout, names, values, linearisation, cofactor, constraints, trace))
+    }
+
+    #[allow(clippy::too_many_arguments)] // the parts of one struct
+    fn solution(
+        &self,
+        layout: Layout,
+        names: Vec<String>,
+        values: Vec<f64>,
+        linearisation: Linearisation,
+        cofactor: Cofactor,
+        constraints: usize,
+        trace: Vec<TraceEntry>,
+    ) -> Solution {
+        let Cofactor { mut matrix, scale, condition } = cofactor;
+        for (column, own) in matrix.chunks_exact_mut(scale.len().max(1)).zip(&scale) {
+            column.iter_mut().zip(&scale).for_each(|(q, other)| *q *= own * other);
+        }
+        Solution {
+            blocks: self.blocks.clone(),
+            groups: self.groups.iter().map(|group| group.name.clone()).collect(),
+            group_of: self.observations.iter().map(|stored| stored.group).collect(),
+            whitening: self.whitening.clone(),
+            whitening_start: self.observations.iter().map(|stored| stored.whitening).collect(),
+            redundancy: (layout.rows + constraints) as i64 - layout.unknowns as i64,
+            layout,
+            values,
+            linearisation,
+            names,
+            cofactor: matrix,
+            scale,
+            condition,
+            trace,
+        }
+    }
+
+    fn unknown_names(&self, layout: &Layout) -> Vec<String> {
+        let mut names = Vec::with_capacity(layout.unknowns);
+        for (index, block) in self.blocks.iter().enumerate() {
+            for (component, &column) in layout.block_columns(index).iter().enumerate() {
+                if column != HELD {
+                    names.push(block.parameter_name(index, component));
+                }
+            }
+        }
+        names
+    }
+}
+
+impl Solution {
+    /// Adjusted (or held) values of a block, ambient.
+    pub fn values(&self, block: BlockId) -> Result<&[f64]> {
+        self.check_block(block)?;
+        Ok(&self.values[self.layout.block_values(block.0)])
+    }
+
+    /// Adjusted pose of a [`RigidPose`] block.
+    pub fn pose(&self, block: BlockId) -> Result<Isometry3<f64>> {
+        let values = self.values(block)?;
+        let what = format!("block `{}`, taken as a pose,", self.blocks[block.0].label(block.0));
+        RigidPose::isometry(values).map_err(|_| Error::Length { what, expected: 7, found: values.len() })
+    }
+
+    /// Covariance matrix of a block's tangent step; zero where a parameter was held.
+    pub fn covariance(&self, block: BlockId, scale: Scale) -> Result<DMatrix<f64>> {
+        self.covariance_between(block, block, scale)
+    }
+
+    /// Covariance matrix between the tangent steps of two blocks (rows: `first`).
+    pub fn covariance_between(&self, first: BlockId, second: BlockId, scale: Scale) -> Result<DMatrix<f64>> {
+        self.check_block(first)?;
+        self.check_block(second)?;
+        let factor = self.variance_factor(scale)?;
+        let (rows, columns) = (self.layout.block_columns(first.0), self.layout.block_columns(second.0));
+        Ok(DMatrix::from_fn(rows.len(), columns.len(), |i, j| match (rows[i], columns[j]) {
+            (HELD, _) | (_, HELD) => 0.0,
+            (row, column) => factor * self.cofactor(row, column),
+        }))
+    }
+
+    /// Standard deviations of a block's parameters (tangent step); zero where a parameter was held.
+    pub fn standard_deviations(&self, block: BlockId, scale: Scale) -> Result<Vec<f64>> {
+        Ok(self.covariance(block, scale)?.diagonal().iter().map(|variance| variance.max(0.0).sqrt()).collect())
+    }
+
+    /// Covariance matrix of all unknowns, in the order of [`Self::unknown_names`].
+    pub fn covariance_matrix(&self, scale: Scale) -> Result<DMatrix<f64>> {
+        let factor = self.variance_factor(scale)?;
+        let n = self.layout.unknowns;
+        Ok(DMatrix::from_fn(n, n, |row, column| factor * self.cofactor(row, column)))
+    }
+
+    /// Correlation matrix of all unknowns.
+    pub fn correlation_matrix(&self) -> DMatrix<f64> {
+        let n = self.layout.unknowns;
+        DMatrix::from_fn(n, n, |row, column| self.correlation_of(row, column))
+    }
+
+    /// Correlation between two single parameters, each a block and a component of its tangent step.
+    /// NaN where one of them is held or fixed by constraints.
+    pub fn correlation(&self, first: (BlockId, usize), second: (BlockId, usize)) -> Result<f64> {
+        match (self.column(first)?, self.column(second)?) {
+            (HELD, _) | (_, HELD) => Ok(f64::NAN),
+            (row, column) => Ok(self.correlation_of(row, column)),
+        }
+    }
+
+    /// Names of the unknowns, in the order of their columns: block by block in the order of adding, held parameters
+    /// left out.
+    pub fn unknown_names(&self) -> &[String] {
+        &self.names
+    }
+
+    /// Column of a parameter among the unknowns; `None` where it is held.
+    pub fn unknown_index(&self, block: BlockId, component: usize) -> Result<Option<usize>> {
+        Ok(Some(self.column((block, component))?).filter(|&column| column != HELD))
+    }
+
+    /// Number of unknowns.
+    pub fn unknowns(&self) -> usize {
+        self.layout.unknowns
+    }
+
+    /// Number of observed values, components of priors included.
+    pub fn observations(&self) -> usize {
+        self.layout.rows
+    }
+
+    /// Observations + constraints (datum included) − unknowns.
+    pub fn redundancy(&self) -> i64 {
+        self.redundancy
+    }
+
+    /// Weighted sum of squared residuals; robust weights are part of it.
+    pub fn vtpv(&self) -> f64 {
+        self.linearisation.vtpv
+    }
+
+    /// Posterior standard deviation of unit weight, `√(vᵀPv / redundancy)`; `None` without redundancy.
+    pub fn sigma0(&self) -> Option<f64> {
+        (self.redundancy > 0).then(|| (self.vtpv() / self.redundancy as f64).sqrt())
+    }
+
+    /// Iterations taken.
+    pub fn iterations(&self) -> usize {
+        self.trace.len()
+    }
+
+    /// What each iteration did.
+    pub fn trace(&self) -> &[TraceEntry] {
+        &self.trace
+    }
+
+    /// All residuals v = observed − model, in the order of adding.
+    pub fn residuals(&self) -> &[f64] {
+        &self.linearisation.residual
+    }
+
+    /// Robust weights of all observed values, in the same order: 1 for least squares, towards 0 for what a [`crate::Kernel`]
+    /// takes for a gross error.
+    pub fn weights(&self) -> &[f64] {
+        &self.linearisation.weights
+    }
+
+    /// Residuals of one observation.
+    pub fn residual(&self, observation: ObservationId) -> Result<&[f64]> {
+        Ok(&self.linearisation.residual[self.rows(observation)?])
+    }
+
+    /// Where the components of an observation lie in [`Self::residuals`] and the other lists over all observations.
+    pub fn rows(&self, observation: ObservationId) -> Result<Range<usize>> {
+        let count = self.layout.observations.len();
+        let place = self.layout.observations.get(observation.0);
+        Ok(place.ok_or(Error::UnknownId { what: "observation", index: observation.0, count })?.rows())
+    }
+
+    pub(crate) fn cofactor(&self, row: usize, column: usize) -> f64 {
+        self.cofactor[column * self.layout.unknowns + row]
+    }
+
+    pub(crate) fn correlation_of(&self, row: usize, column: usize) -> f64 {
+        self.cofactor(row, column) / (self.cofactor(row, row) * self.cofactor(column, column)).sqrt()
+    }
+
+    pub(crate) fn variance_factor(&self, scale: Scale) -> Result<f64> {
+        match scale {
+            Scale::Prior => Ok(1.0),
+            Scale::Posterior => {
+                let sigma0 = self.sigma0().ok_or(Error::NoRedundancy { redundancy: self.redundancy })?;
+                Ok(sigma0 * sigma0)
+            }
+        }
+    }
+
+    fn column(&self, (block, component): (BlockId, usize)) -> Result<usize> {
+        self.check_block(block)?;
+        let columns = self.layout.block_columns(block.0);
+        let count = columns.len();
+        columns.get(component).copied().ok_or(Error::UnknownId { what: "parameter", index: component, count })
+    }
+
+    fn check_block(&self, block: BlockId) -> Result<()> {
+        let count = self.blocks.len();
+        if block.0 < count { Ok(()) } else { Err(Error::UnknownId { what: "block", index: block.0, count }) }
+    }
+}

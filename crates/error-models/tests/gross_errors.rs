@@ -1,0 +1,195 @@
+//! Mixed pixels and low amplitudes on scenes whose truth is known.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use error_models::{GrossErrorOptions, MixedPixelOptions, flag_gross_errors};
+use rand::SeedableRng;
+use rand_distr::{Distribution, Normal};
+use rand_pcg::Pcg64;
+use range_image::{Flags, RangeFrame, Raster};
+
+const WIDTH: usize = 176;
+const HEIGHT: usize = 144;
+/// Field of view of about 47 degrees across 176 pixels.
+const PIXELS_PER_UNIT: f64 = 200.0;
+
+/// Unit viewing ray of a pixel position, z forward.
+fn ray(col: f64, row: f64) -> [f64; 3] {
+    let x = (col - (WIDTH as f64 - 1.0) / 2.0) / PIXELS_PER_UNIT;
+    let y = (row - (HEIGHT as f64 - 1.0) / 2.0) / PIXELS_PER_UNIT;
+    let norm = (x * x + y * y + 1.0).sqrt();
+    [x / norm, y / norm, 1.0 / norm]
+}
+
+/// A frame of ranges along the rays with seeded noise.
+fn frame(sigma: f64, range: impl Fn(f64, f64) -> f64) -> RangeFrame {
+    let mut random = Pcg64::seed_from_u64(7);
+    let noise = Normal::new(0.0, sigma).unwrap();
+    RangeFrame {
+        range: Raster::from_fn(WIDTH, HEIGHT, |col, row| {
+            (range(col as f64, row as f64) + noise.sample(&mut random)) as f32
+        }),
+        sigma: Raster::filled(WIDTH, HEIGHT, sigma as f32),
+        amplitude: Raster::filled(WIDTH, HEIGHT, 100.0),
+        flags: Raster::filled(WIDTH, HEIGHT, Flags::empty()),
+    }
+}
+
+/// Range to the plane that meets the optical axis at `depth` and is turned by `angle` about the y axis.
+fn plane(col: f64, row: f64, depth: f64, angle: f64) -> f64 {
+    let [x, _, z] = ray(col, row);
+    let distance = depth * angle.cos() / (x * angle.sin() + z * angle.cos());
+    if distance > 0.0 && distance < 50.0 { distance } else { f64::NAN }
+}
+
+fn mixed(frame: &mut RangeFrame) -> Raster<bool> {
+    let counts = flag_gross_errors(frame, &GrossErrorOptions::default()).unwrap();
+    let mixed = frame.flags.map(|flags| flags.contains(Flags::MIXED_PIXEL));
+    assert_eq!(counts.mixed_pixel, mixed.as_slice().iter().filter(|mixed| **mixed).count());
+    mixed
+}
+
+#[test]
+fn pixels_mixed_at_a_step_edge_are_flagged_and_no_others() {
+    // A wall at 3 m behind an edge that runs obliquely through the pixels; its pixels see both in their share.
+    let edge = |row: f64| 60.3 + 0.37 * row;
+    let near_share = |col: f64, row: f64| (edge(row) - col + 0.5).clamp(0.0, 1.0);
+    for near in [2.5, 1.0] {
+        let mut frame = frame(0.002, |col, row| {
+            let share = near_share(col, row);
+            share * plane(col, row, near, 0.0) + (1.0 - share) * plane(col, row, 3.0, 0.3)
+        });
+        let found = mixed(&mut frame);
+        let (mut expected, mut missed) = (0, 0);
+        for row in 0..HEIGHT {
+            for col in 0..WIDTH {
+                let share = near_share(col as f64, row as f64);
+                // Pixels within a tenth of one of the surfaces are about as close to it as the threshold.
+                if (0.1..0.9).contains(&share) {
+                    expected += 1;
+                    missed += usize::from(!found[(col, row)]);
+                } else if share.fract().abs() < f64::EPSILON {
+                    assert!(!found[(col, row)], "pure pixel {col} {row} flagged, near surface at {near} m");
+                }
+            }
+        }
+        assert!(expected > 100);
+        assert_eq!(missed, 0, "of {expected}, near surface at {near} m");
+    }
+}
+
+#[test]
+fn an_edge_blurred_over_two_pixels_is_flagged() {
+    let share = |col: f64| ((80.0 - col) / 3.0 + 0.5).clamp(0.0, 1.0);
+    let mut frame = frame(0.003, |col, row| {
+        share(col) * plane(col, row, 1.5, 0.0) + (1.0 - share(col)) * plane(col, row, 2.5, 0.0)
+    });
+    let found = mixed(&mut frame);
+    for row in 0..HEIGHT {
+        let of_row: Vec<usize> = (0..WIDTH).filter(|col| found[(*col, row)]).collect();
+        let expected: Vec<usize> = (0..WIDTH).filter(|col| (0.1..0.9).contains(&share(*col as f64))).collect();
+        assert_eq!(of_row, expected, "row {row}");
+    }
+}
+
+#[test]
+fn a_sharp_edge_without_mixing_is_not_flagged() {
+    let mut frame = frame(0.005, |col, row| plane(col, row, if col < 70.2 { 1.0 } else { 3.0 }, 0.0));
+    assert!(!mixed(&mut frame).as_slice().contains(&true));
+}
+
+#[test]
+fn tilted_planes_are_not_flagged() {
+    for degrees in [0.0_f64, 45.0, 70.0, 80.0] {
+        for sigma in [1e-4, 0.005, 0.03] {
+            let mut frame = frame(sigma, |col, row| plane(col, row, 2.0, degrees.to_radians()));
+            assert!(!mixed(&mut frame).as_slice().contains(&true), "{degrees} degrees, sigma {sigma} m");
+        }
+    }
+}
+
+#[test]
+fn the_interior_of_a_sphere_is_not_flagged() {
+    let (depth, radius) = (1.5, 0.3);
+    let inside = |col: f64, row: f64| {
+        let along = ray(col, row)[2] * depth;
+        radius * radius - (depth * depth - along * along)
+    };
+    let mut frame = frame(0.003, |col, row| match inside(col, row) {
+        square if square > 0.0 => ray(col, row)[2] * depth - square.sqrt(),
+        _ => plane(col, row, 2.5, 0.0),
+    });
+    let found = mixed(&mut frame);
+    let mut interior = 0;
+    for row in 0..HEIGHT {
+        for col in 0..WIDTH {
+            // Up to 75 degrees of incidence: there the sphere bends by w² / (R cos³θ) = 1 cm from one pixel of
+            // w = 7.5 mm to the next, by 2 cm along a diagonal, which is the floor.
+            if inside(col as f64, row as f64).max(0.0).sqrt() > radius * 75.0_f64.to_radians().cos() {
+                interior += 1;
+                assert!(!found[(col, row)], "{col} {row}");
+            }
+        }
+    }
+    assert!(interior > 2000);
+}
+
+#[test]
+fn a_room_corner_and_a_roof_are_not_flagged() {
+    for side in [1.0, -1.0] {
+        let mut frame = frame(0.003, |col, row| {
+            let faces = [plane(col, row, 2.0, 0.8), plane(col, row, 2.0, -0.8)];
+            if side > 0.0 { faces[0].min(faces[1]) } else { faces[0].max(faces[1]) }
+        });
+        assert!(!mixed(&mut frame).as_slice().contains(&true));
+    }
+}
+
+#[test]
+fn low_amplitudes_are_flagged_and_unknown_ones_are_not() {
+    let mut frame = frame(0.01, |_, _| 2.0);
+    frame.amplitude[(3, 4)] = 9.0;
+    frame.amplitude[(5, 6)] = f32::NAN;
+    frame.range[(7, 8)] = f32::NAN;
+    let options = GrossErrorOptions { mixed_pixels: None, low_amplitude: Some(10.0) };
+    let counts = flag_gross_errors(&mut frame, &options).unwrap();
+    assert_eq!((counts.low_amplitude, counts.mixed_pixel), (1, 0));
+    assert_eq!(frame.flags[(3, 4)], Flags::LOW_AMPLITUDE);
+    assert_eq!(frame.flags[(5, 6)], Flags::empty());
+}
+
+#[test]
+fn an_unknown_sigma_is_replaced_by_that_of_the_options() {
+    // Noise of 3 cm that the frame says nothing about: with the true figure given, nothing is flagged.
+    let mut silent = frame(0.03, |col, row| plane(col, row, 2.0, 0.0));
+    silent.sigma = Raster::filled(WIDTH, HEIGHT, f32::NAN);
+    let told = MixedPixelOptions { unknown_sigma_m: 0.03, ..MixedPixelOptions::default() };
+    let options = GrossErrorOptions { mixed_pixels: Some(told), ..GrossErrorOptions::default() };
+    assert_eq!(flag_gross_errors(&mut silent, &options).unwrap().mixed_pixel, 0);
+}
+
+#[test]
+fn small_frames_and_bad_options_are_answered() {
+    for (width, height) in [(0, 0), (1, 1), (1, 40), (40, 1), (3, 3)] {
+        let mut frame = RangeFrame {
+            range: Raster::from_fn(width, height, |col, row| 1.0 + (col + row) as f32 * 0.5),
+            sigma: Raster::filled(width, height, f32::NAN),
+            amplitude: Raster::filled(width, height, f32::NAN),
+            flags: Raster::filled(width, height, Flags::empty()),
+        };
+        assert!(flag_gross_errors(&mut frame, &GrossErrorOptions::default()).is_ok());
+    }
+    let mut ragged = frame(0.01, |_, _| 2.0);
+    ragged.sigma = Raster::filled(1, 1, 0.0);
+    assert!(flag_gross_errors(&mut ragged, &GrossErrorOptions::default()).is_err());
+    let default = MixedPixelOptions::default();
+    for mixed_pixels in [
+        MixedPixelOptions { sigmas: f64::NAN, ..default },
+        MixedPixelOptions { floor_m: -1.0, ..default },
+        MixedPixelOptions { unknown_sigma_m: f64::INFINITY, ..default },
+        MixedPixelOptions { floor_m: 0.0, sigmas: 0.0, ..default },
+    ] {
+        let options = GrossErrorOptions { mixed_pixels: Some(mixed_pixels), low_amplitude: None };
+        assert!(options.validate().is_err());
+    }
+    assert!(GrossErrorOptions { low_amplitude: Some(f64::NAN), ..GrossErrorOptions::default() }.validate().is_err());
+}

@@ -1,0 +1,128 @@
+//! Borders between segments: how well a wrap difference would make the surface continuous across them.
+
+use crate::forest::{Forest, NO_LABEL};
+use crate::grid::{DOWN, Grid, RIGHT, wrap_step};
+use crate::surface::{Step, Surface};
+
+/// Evidence, in nats, for `offset(to) - offset(from) == step`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Tie {
+    pub from: u32,
+    pub to: u32,
+    pub step: i32,
+    pub bonus: f32,
+}
+
+/// One crossing of a border by a pixel edge.
+#[derive(Debug, Clone, Copy)]
+struct Crossing {
+    from: u32,
+    to: u32,
+    step: i32,
+    evidence: f32,
+}
+
+/// All borders of an image.
+#[derive(Debug, Default)]
+pub(crate) struct Borders {
+    pub ties: Vec<Tie>,
+    /// Label of the island of each segment, from 0.
+    pub island: Vec<u32>,
+    /// Number of islands.
+    pub islands: usize,
+    crossings: Vec<Crossing>,
+}
+
+impl Borders {
+    pub fn collect(&mut self, grid: &Grid, surface: &Surface, forest: &Forest) {
+        self.crossings.clear();
+        for pixel in grid.inner() {
+            let from = forest.label[pixel];
+            if from == NO_LABEL {
+                continue;
+            }
+            let open = surface.open_links(grid, pixel);
+            for (bit, ahead) in [(RIGHT, 1), (DOWN, grid.stride)] {
+                if open & bit == 0 || forest.label[pixel + ahead] == from {
+                    continue;
+                }
+                let other = pixel + ahead;
+                let step =
+                    wrap_step(surface.phase[pixel], surface.phase[other]) + forest.wraps[pixel] - forest.wraps[other];
+                let evidence = continuity(surface.step(pixel, ahead));
+                self.crossings.push(directed(from, forest.label[other], step, evidence));
+            }
+        }
+        self.crossings.sort_by_key(|c| (c.from, c.to, c.step));
+        self.ties.clear();
+        for border in self.crossings.chunk_by(|a, b| (a.from, a.to) == (b.from, b.to)) {
+            let length = border.len();
+            for side in border.chunk_by(|a, b| a.step == b.step) {
+                self.ties.extend(tie(side, length));
+            }
+        }
+        self.find_islands(forest.components);
+    }
+
+    /// Segments that touch are one island, whatever lies between them.
+    fn find_islands(&mut self, segments: usize) {
+        let mut parent: Vec<u32> = (0..segments as u32).collect();
+        for crossing in &self.crossings {
+            let (a, b) = (root(&mut parent, crossing.from), root(&mut parent, crossing.to));
+            // The lower label wins, so islands are numbered in scan order.
+            parent[a.max(b) as usize] = a.min(b);
+        }
+        self.islands = 0;
+        self.island.clear();
+        for segment in 0..segments as u32 {
+            let first = root(&mut parent, segment);
+            let label = if first == segment {
+                self.islands += 1;
+                self.islands as u32 - 1
+            } else {
+                self.island[first as usize]
+            };
+            self.island.push(label);
+        }
+    }
+}
+
+fn root(parent: &mut [u32], mut node: u32) -> u32 {
+    while parent[node as usize] != node {
+        parent[node as usize] = parent[parent[node as usize] as usize];
+        node = parent[node as usize];
+    }
+    node
+}
+
+fn directed(from: u32, to: u32, step: i32, evidence: f32) -> Crossing {
+    if from < to {
+        Crossing { from, to, step, evidence }
+    } else {
+        Crossing { from: to, to: from, step: -step, evidence }
+    }
+}
+
+/// Logarithm of the likelihood ratio of "one surface" to "a jump" for one pixel edge.
+///
+/// Phase: two-sided exponential against uniform on (-pi, pi). Logarithm of the amplitude ratio: two-sided exponential
+/// of scale 0.5 (texture) against one of scale 2 (another object at another range).
+fn continuity(step: Step) -> f32 {
+    let scale = 0.15_f32.max(1.5 * step.sigma);
+    let phase = (std::f32::consts::PI / scale).ln() - step.phase / scale;
+    let amplitude = if step.amplitude.is_nan() { 0.0 } else { 4.0_f32.ln() - 1.5 * step.amplitude };
+    phase.max(-2.0) + amplitude.max(-4.0)
+}
+
+/// What the crossings that agree on one step say together, given the length of the whole border.
+///
+/// Crossings of one border are no independent witnesses: the mean counts, not the sum; short borders count less,
+/// long ones a little more.
+fn tie(side: &[Crossing], length: usize) -> Option<Tie> {
+    let first = side.first()?;
+    let count = side.len() as f32;
+    let mean = side.iter().map(|c| c.evidence).sum::<f32>() / count;
+    let weight = (count / 6.0).tanh() * (1.0 + 0.5 * (1.0 + count / 20.0).ln());
+    let bonus = mean * weight * count / length as f32;
+    (bonus > 0.0).then_some(Tie { from: first.from, to: first.to, step: first.step, bonus })
+}

@@ -1,0 +1,111 @@
+//! What a pair of neighbouring pixels says about the surface between them.
+
+use crate::grid::{DOWN, Grid, RIGHT, wrapped};
+
+/// Largest phase variance used, rad^2: beyond it a phase says nothing anyway.
+const MAXIMUM_VARIANCE: f32 = 10.0;
+
+/// Padded planes of phase and amplitude. Masked pixels have a NaN phase.
+#[derive(Debug, Default)]
+pub(crate) struct Surface {
+    pub phase: Vec<f32>,
+    /// Natural logarithm of the amplitude; NaN where unknown.
+    pub log_amplitude: Vec<f32>,
+    /// Variance of the phase, rad^2.
+    pub variance: Vec<f32>,
+    sample: Vec<f32>,
+}
+
+/// The step between two neighbours.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Step {
+    /// Wrapped phase step beyond the slope around it, rad, not negative.
+    pub phase: f32,
+    /// Logarithm of the amplitude ratio, not negative; NaN where an amplitude is unknown.
+    pub amplitude: f32,
+    /// Standard deviation of the phase step, rad.
+    pub sigma: f32,
+}
+
+impl Surface {
+    /// Fills logarithm and variance from the padded amplitude; `noise` is the standard deviation in amplitude units.
+    pub fn set_amplitude(&mut self, grid: &Grid, amplitude: &[f32], noise: Option<f32>) {
+        let noise = noise.unwrap_or_else(|| self.estimate_noise(grid, amplitude));
+        self.log_amplitude.clear();
+        self.log_amplitude.extend(amplitude.iter().map(|&a| if a > 0.0 && a.is_finite() { a.ln() } else { f32::NAN }));
+        self.variance.clear();
+        self.variance.extend(amplitude.iter().map(|&a| {
+            let sigma = noise / a;
+            // An amplitude that is not known leaves the noise to the second differences alone.
+            if a.is_nan() {
+                0.0
+            } else if a > 0.0 {
+                (sigma * sigma).min(MAXIMUM_VARIANCE)
+            } else {
+                MAXIMUM_VARIANCE
+            }
+        }));
+    }
+
+    /// Whether any used pixel has an amplitude.
+    pub fn has_amplitude(&self) -> bool {
+        self.phase.iter().zip(&self.log_amplitude).any(|(phase, log)| !phase.is_nan() && !log.is_nan())
+    }
+
+    /// Noise of each part of the complex image: the median of |second difference| * amplitude over the rows.
+    ///
+    /// Jumps and creases are few, so the median is that of the noise; 0.6745 sqrt(6) is its value at unit variance.
+    fn estimate_noise(&mut self, grid: &Grid, amplitude: &[f32]) -> f32 {
+        const SAMPLES: usize = 4096;
+        let inner = grid.inner();
+        let stride = (inner.len() / SAMPLES).max(1);
+        self.sample.clear();
+        for pixel in inner.step_by(stride) {
+            let [left, centre, right] = [self.phase[pixel - 1], self.phase[pixel], self.phase[pixel + 1]];
+            let scatter = (wrapped(left - centre) + wrapped(right - centre)).abs() * amplitude[pixel];
+            if scatter.is_finite() {
+                self.sample.push(scatter);
+            }
+        }
+        if self.sample.is_empty() {
+            return 0.0;
+        }
+        let middle = self.sample.len() / 2;
+        let (_, median, _) = self.sample.select_nth_unstable_by(middle, f32::total_cmp);
+        *median / (0.6745 * 6.0_f32.sqrt())
+    }
+
+    /// The step from `pixel` to `pixel + ahead`, which must both be inside the image.
+    pub fn step(&self, pixel: usize, ahead: usize) -> Step {
+        let other = pixel + ahead;
+        let along = |from: usize| wrapped(self.phase[from + ahead] - self.phase[from]);
+        let here = along(pixel);
+        let slope = gentler(along(pixel - ahead), along(other));
+        Step {
+            phase: (here - slope).abs(),
+            amplitude: (self.log_amplitude[other] - self.log_amplitude[pixel]).abs(),
+            sigma: (self.variance[pixel] + self.variance[other]).sqrt(),
+        }
+    }
+
+    /// Whether a padded pixel takes part.
+    pub fn used(&self, pixel: usize) -> bool {
+        !self.phase[pixel].is_nan()
+    }
+
+    /// The links of a pixel: to the right and below, where both ends take part.
+    pub fn open_links(&self, grid: &Grid, pixel: usize) -> u8 {
+        if !self.used(pixel) {
+            return 0;
+        }
+        let right = if self.used(pixel + 1) { RIGHT } else { 0 };
+        let down = if self.used(pixel + grid.stride) { DOWN } else { 0 };
+        right | down
+    }
+}
+
+/// The slope that both sides share: the gentler of two of one sign, else zero. A steep floor keeps its slope, while
+/// an edge smeared over two pixels does not pass as one, since beyond it the surface is flat.
+fn gentler(before: f32, after: f32) -> f32 {
+    if before * after > 0.0 { before.abs().min(after.abs()).copysign(before) } else { 0.0 }
+}

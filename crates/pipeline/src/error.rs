@@ -1,0 +1,113 @@
+use std::path::PathBuf;
+
+use thiserror::Error;
+
+/// Why a pipeline could not be read, started or finished.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// A survey, calibration or result file.
+    #[error(transparent)]
+    File(#[from] range_io::Error),
+    /// A RON text that is not what it should be.
+    #[error("{}:{line}:{column}: {message}", path.display())]
+    Ron {
+        /// The file.
+        path: PathBuf,
+        /// Line, from 1.
+        line: usize,
+        /// Column, from 1.
+        column: usize,
+        /// What is wrong there.
+        message: String,
+    },
+    /// A file that can't be read or written.
+    #[error("{}: {source}", path.display())]
+    Access {
+        /// The file.
+        path: PathBuf,
+        /// The system's reason.
+        source: std::io::Error,
+    },
+    /// The survey has nothing to work on.
+    #[error("{}: {message}", path.display())]
+    Survey {
+        /// The survey's file or folder.
+        path: PathBuf,
+        /// What is missing.
+        message: String,
+    },
+    /// The camera or calibration can't be used for this survey.
+    #[error("camera: {0}")]
+    Camera(String),
+    /// A stage that needs what the input level does not have.
+    #[error("stage {stage} is ruled out: it needs level `{needs}`, but the survey's frames are at level `{level}`")]
+    RuledOut {
+        /// The stage.
+        stage: &'static str,
+        /// The level it needs.
+        needs: &'static str,
+        /// The level at hand.
+        level: &'static str,
+    },
+    /// A stage listed too early or too late.
+    #[error("stage {stage} can't come after stage {after}: the order is {order}")]
+    Order {
+        /// The stage.
+        stage: &'static str,
+        /// The stage before it.
+        after: &'static str,
+        /// The order of all stages.
+        order: String,
+    },
+    /// A stage whose input another stage should have made.
+    #[error("stage {stage} needs stage {needs} before it")]
+    Needs {
+        /// The stage.
+        stage: &'static str,
+        /// The stage it needs.
+        needs: &'static str,
+    },
+    /// A stage that failed on one view.
+    #[error("stage {stage}, {view}: {source}")]
+    Stage {
+        /// The stage.
+        stage: &'static str,
+        /// Station or frame.
+        view: String,
+        /// Why.
+        source: Box<dyn std::error::Error + Send + Sync>,
+    },
+    /// A scene that can't be simulated.
+    #[error("{}: {source}", path.display())]
+    Scene {
+        /// The scene's file.
+        path: PathBuf,
+        /// Why.
+        source: simulation::Error,
+    },
+    /// A figure that could not be drawn.
+    #[error("report: figure {figure}: {message}")]
+    Figure {
+        /// Which figure.
+        figure: String,
+        /// Why.
+        message: String,
+    },
+    /// Two things to be compared do not belong together.
+    #[error("compare: {0}")]
+    Compare(String),
+}
+
+/// Result with this crate's [`Error`].
+pub type Result<T> = std::result::Result<T, Error>;
+
+impl Error {
+    /// Wraps what a stage says of one view.
+    pub(crate) fn stage<E>(stage: &'static str, view: &str) -> impl FnOnce(E) -> Self
+    where
+        E: Into<Box<dyn std::error::Error + Send + Sync>>,
+    {
+        move |source| Self::Stage { stage, view: view.to_owned(), source: source.into() }
+    }
+}

@@ -1,0 +1,182 @@
+//! A survey's folder to views that the stages can work on.
+
+use std::path::{Path, PathBuf};
+
+use camera_model::{Camera, RayTable};
+use nalgebra::Isometry3;
+use range_image::{Flags, Modulation, RangeFrame, Raster};
+use range_io::calibration::Calibration;
+use range_io::npz::NpzReader;
+use range_io::survey::{InputFrame, Survey, read_frame, read_truth};
+use range_io::tables::{Station, read_stations};
+
+use crate::outcome::Outcome;
+use crate::progress::Progress;
+use crate::truth::ViewTruth;
+use crate::view::{View, ViewData};
+use crate::work::Work;
+use crate::{Error, Plan, Result};
+
+/// Reads survey, calibration, poses, truth and all frames; refuses a plan that the survey's level rules out.
+pub(crate) fn load(folder: &Path, calibration: Option<&Path>, plan: &Plan, progress: &dyn Progress) -> Result<Work> {
+    let survey = Survey::read(folder)?;
+    plan.check_level(survey.level)?;
+    if survey.frames.is_empty() {
+        return Err(Error::Survey { path: folder.join(Survey::FILE_NAME), message: "it lists no frames".to_owned() });
+    }
+    let root = root_of(folder);
+    let (calibration, calibration_words) = read_calibration(&root, calibration)?;
+    let camera = survey.camera.nominal_camera()?;
+    let calibrated_camera = calibration.as_ref().map(|calibration| calibrated(calibration, &camera)).transpose()?;
+    let rays = RayTable::new(&camera).map_err(|error| Error::Camera(error.to_string()))?;
+    let depth_rays = match &calibrated_camera {
+        Some(camera) => RayTable::new(camera).map_err(|error| Error::Camera(error.to_string()))?,
+        None => rays.clone(),
+    };
+    let poses = read_poses(&root.join("stations.csv"))?;
+    let true_poses = match survey.truth.as_ref().and_then(|truth| truth.stations.as_ref()) {
+        Some(file) => read_stations(&root.join(file))?,
+        None => Vec::new(),
+    };
+    let reference = read_reference(&survey, &root)?;
+    let modulation = survey.camera.modulations()?.first().copied();
+    progress.begin("read frames", survey.frames.len());
+    let mut views = Vec::with_capacity(survey.frames.len());
+    for (index, entry) in survey.frames.iter().enumerate() {
+        let mut view = View {
+            station: entry.station.clone(),
+            frames: vec![index],
+            timestamp_s: entry.timestamp_s.unwrap_or(0.0),
+            integration_time_s: entry.integration_time_s,
+            data: view_data(read_frame(&survey, &root, index)?, &depth_rays)?,
+            before: None,
+            approximate_world_from_camera: pose_of(&poses, &entry.station),
+            truth: read_view_truth(&survey, &root, index, pose_of(&true_poses, &entry.station))?,
+            reference_range: reference.clone(),
+            modulation,
+            channels: Vec::new(),
+        };
+        view.before = view.snapshot();
+        views.push(view);
+        progress.advance(index + 1);
+    }
+    let vertical_axis = if poses.is_empty() { 1 } else { 2 };
+    let outcome = Outcome {
+        survey,
+        calibration: calibration_words,
+        camera,
+        views,
+        clouds: Vec::new(),
+        poses: Vec::new(),
+        pairs: Vec::new(),
+        adjustment: None,
+        stages: Vec::new(),
+        vertical_axis,
+    };
+    Ok(Work { calibration, calibrated_camera, rays, station_clouds: Vec::new(), outcome })
+}
+
+/// The folder that a survey's paths are relative to, whether the folder or its `survey.ron` was named.
+pub(crate) fn root_of(survey: &Path) -> PathBuf {
+    if survey.is_dir() { survey.to_owned() } else { survey.parent().unwrap_or(Path::new("")).to_owned() }
+}
+
+/// The named calibration, or the one beside the survey, and what to call it.
+fn read_calibration(root: &Path, named: Option<&Path>) -> Result<(Option<Calibration>, String)> {
+    let beside = root.join("calibration.ron");
+    let path = match named {
+        Some(path) => path.to_owned(),
+        None if beside.is_file() => beside,
+        None => return Ok((None, "none: nominal camera".to_owned())),
+    };
+    let calibration = Calibration::read(&path)?;
+    let words = format!("{} ({})", path.display(), calibration.provenance.method);
+    Ok((Some(calibration), words))
+}
+
+/// The calibrated camera, which must have the survey's format.
+fn calibrated(calibration: &Calibration, nominal: &Camera) -> Result<Camera> {
+    let camera = calibration.camera()?;
+    let (have, want) = (camera.format, nominal.format);
+    if (have.width, have.height) == (want.width, want.height) {
+        return Ok(camera);
+    }
+    Err(Error::Camera(format!(
+        "the calibration is for {} x {} pixels, the survey has {} x {}",
+        have.width, have.height, want.width, want.height
+    )))
+}
+
+fn read_poses(file: &Path) -> Result<Vec<Station>> {
+    if file.is_file() { Ok(read_stations(file)?) } else { Ok(Vec::new()) }
+}
+
+fn pose_of(poses: &[Station], station: &str) -> Option<Isometry3<f64>> {
+    poses.iter().find(|row| row.station == station).map(|row| row.world_from_camera)
+}
+
+fn read_view_truth(
+    survey: &Survey,
+    root: &Path,
+    index: usize,
+    pose: Option<Isometry3<f64>>,
+) -> Result<Option<ViewTruth>> {
+    let truth = read_truth(survey, root, index)?;
+    Ok(truth.map(|truth| ViewTruth { range: truth.range, world_from_camera: pose }))
+}
+
+/// The plane of `extras: {"reference_range": ...}`, the same for all frames.
+fn read_reference(survey: &Survey, root: &Path) -> Result<Option<Raster<f32>>> {
+    let Some(file) = survey.extras.get("reference_range") else { return Ok(None) };
+    let path = root.join(file);
+    let mut arrays = NpzReader::open(&path)?;
+    let (name, scale) = if arrays.contains("range") { ("range", 1.0) } else { ("range_mm", 1e-3) };
+    let (width, height) = (survey.camera.width, survey.camera.height);
+    let array = arrays.read(name, |header| match header.shape.as_slice() {
+        [rows, cols] if (*rows, *cols) == (height, width) => Ok(()),
+        found => Err(range_io::Error::ArrayShape {
+            file: path.clone(),
+            array: name.to_owned(),
+            found: found.to_vec(),
+            expected: format!("[{height}, {width}]"),
+        }),
+    })?;
+    let values: Vec<f32> = array.values.into_f32().into_iter().map(|value| value * scale).collect();
+    let plane = Raster::from_vec(width, height, values);
+    let plane = plane.map_err(|error| Error::Survey { path, message: format!("array `{name}`: {error}") })?;
+    Ok(Some(plane))
+}
+
+/// Depths become ranges here, where the rays are known.
+fn view_data(frame: InputFrame, rays: &RayTable) -> Result<ViewData> {
+    let camera = |error: camera_model::Error| Error::Camera(error.to_string());
+    match frame {
+        InputFrame::Samples(raw) => Ok(ViewData::Samples(raw)),
+        InputFrame::Phase(frame) => Ok(ViewData::Phase(frame)),
+        InputFrame::Range { range, amplitude, .. } => Ok(ViewData::Range(range_frame(range, amplitude))),
+        InputFrame::Depth { depth, amplitude, .. } => {
+            let range = rays.depth_to_range(&depth).map_err(camera)?;
+            Ok(ViewData::Range(range_frame(range, amplitude)))
+        }
+        other => Err(Error::Camera(format!("frames at level `{}` can't be processed", other.level().name()))),
+    }
+}
+
+/// A range frame whose pixels without a positive range are flagged and NaN.
+fn range_frame(mut range: Raster<f32>, amplitude: Option<Raster<f32>>) -> RangeFrame {
+    let (width, height) = (range.width(), range.height());
+    let mut flags = Raster::filled(width, height, Flags::empty());
+    for (range, flags) in range.as_mut_slice().iter_mut().zip(flags.as_mut_slice()) {
+        if !(range.is_finite() && *range > 0.0) {
+            *range = f32::NAN;
+            flags.insert(Flags::NO_DATA);
+        }
+    }
+    let unknown = || Raster::filled(width, height, f32::NAN);
+    RangeFrame { range, sigma: unknown(), amplitude: amplitude.unwrap_or_else(unknown), flags }
+}
+
+/// Modulation of the first frequency.
+pub(crate) fn first_modulation(outcome: &Outcome) -> Option<Modulation> {
+    outcome.views.first().and_then(|view| view.modulation)
+}

@@ -1,0 +1,99 @@
+//! What a run holds in its hands: views, clouds, poses, and the record of the stages.
+
+use camera_model::{Camera, OrganisedCloud, euler_from_pose, step_pose};
+use icp_registration::IcpResult;
+use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, Vector3};
+use range_io::survey::Survey;
+
+use crate::summary::StageSummary;
+use crate::view::View;
+
+/// Everything that a run has made.
+#[derive(Debug)]
+pub struct Outcome {
+    /// What was captured.
+    pub survey: Survey,
+    /// The calibration in use, in words.
+    pub calibration: String,
+    /// The camera whose rays made the clouds.
+    pub camera: Camera,
+    /// One view a station, or a frame where frames were not averaged.
+    pub views: Vec<View>,
+    /// One cloud a view, in the camera's frame, once [`crate::Stage::PointCloud`] ran.
+    pub clouds: Vec<OrganisedCloud>,
+    /// One pose a view, once it is known.
+    pub poses: Vec<StationPose>,
+    /// Aligned pairs.
+    pub pairs: Vec<AlignedPair>,
+    /// The simultaneous adjustment, where it ran.
+    pub adjustment: Option<AdjustmentFigures>,
+    /// What each stage did.
+    pub stages: Vec<StageSummary>,
+    /// Index of the world's axis that points up: z where poses came with the survey, y in a camera's own frame.
+    pub vertical_axis: usize,
+}
+
+/// Pose of one view and how well it is known.
+#[derive(Debug, Clone)]
+pub struct StationPose {
+    /// The pose.
+    pub world_from_camera: Isometry3<f64>,
+    /// Covariance of its tangent `[dt world, dtheta camera]`, metre and radian; `None` where it was not estimated.
+    pub covariance: Option<Matrix6<f64>>,
+}
+
+/// Two views brought together by ICP.
+#[derive(Debug, Clone)]
+pub struct AlignedPair {
+    /// Index of the view that was held.
+    pub target: usize,
+    /// Index of the view that was moved.
+    pub source: usize,
+    /// The alignment.
+    pub result: IcpResult,
+}
+
+/// Quality of the simultaneous adjustment.
+#[derive(Debug, Clone, Copy)]
+pub struct AdjustmentFigures {
+    /// A-posteriori standard deviation of unit weight.
+    pub sigma0: f64,
+    /// Redundancy.
+    pub redundancy: usize,
+}
+
+impl StationPose {
+    /// Standard deviations of the position along the world's axes, metre, and of omega, phi, kappa, radian; `None`
+    /// where the pose was not estimated or is the datum.
+    pub fn sigmas(&self) -> Option<([f64; 3], [f64; 3])> {
+        let covariance = self.covariance.filter(|covariance| covariance.trace() > 0.0)?;
+        let angles = |axis: usize, step: f64| {
+            let mut tangent = [0.0; 6];
+            tangent[3 + axis] = step;
+            Vector3::from(euler_from_pose(&step_pose(&self.world_from_camera, &tangent)))
+        };
+        // A step small against the angles and large against their rounding.
+        let step = 1e-6;
+        let columns = [0, 1, 2].map(|axis| (angles(axis, step) - angles(axis, -step)) / (2.0 * step));
+        let jacobian = Matrix3::from_columns(&columns);
+        let attitude = jacobian * covariance.fixed_view::<3, 3>(3, 3) * jacobian.transpose();
+        let position = [0, 1, 2].map(|axis| covariance[(axis, axis)].sqrt());
+        Some((position, [0, 1, 2].map(|axis| attitude[(axis, axis)].sqrt())))
+    }
+
+    /// Standard deviation of the position in space, metre.
+    pub fn position_sigma_m(&self) -> Option<f64> {
+        self.covariance.map(|covariance| (covariance[(0, 0)] + covariance[(1, 1)] + covariance[(2, 2)]).sqrt())
+    }
+}
+
+/// The unflagged points of a view in the world's frame, metre.
+pub(crate) fn world_points(cloud: &OrganisedCloud, world_from_camera: &Isometry3<f64>) -> Vec<[f64; 3]> {
+    usable(cloud).map(|index| (world_from_camera * Point3::from(cloud.points[index])).coords.into()).collect()
+}
+
+/// Indices of the points that are finite and carry no flag.
+pub(crate) fn usable(cloud: &OrganisedCloud) -> impl Iterator<Item = usize> + '_ {
+    (0..cloud.points.len())
+        .filter(|&index| cloud.flags[index].is_empty() && cloud.points[index].iter().all(|x| x.is_finite()))
+}

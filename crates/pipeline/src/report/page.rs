@@ -1,0 +1,99 @@
+//! The page around the figures: one file, no network.
+
+use std::fmt::Write;
+
+use super::picture::escape;
+
+const STYLE: &str = "
+body{font:15px/1.5 system-ui,sans-serif;color:#1c2430;background:#f6f7f9;margin:0}
+main{max-width:1240px;margin:0 auto;padding:24px}
+h1{font-size:26px;margin:0 0 4px}h2{font-size:19px;margin:32px 0 8px;border-bottom:1px solid #d5dae1;padding-bottom:4px}
+h3{font-size:15px;margin:18px 0 6px}
+p.lead{margin:0 0 12px;color:#55606e}
+.figures{display:flex;flex-wrap:wrap;gap:14px}
+figure{margin:0;background:#fff;border:1px solid #dde2e8;border-radius:6px;padding:10px}
+figcaption{font-size:12px;color:#55606e;max-width:440px}
+svg{max-width:100%;height:auto;display:block}
+svg .title{font:600 13px system-ui,sans-serif;fill:#1c2430}svg .tick{font:10px system-ui,sans-serif;fill:#444}
+table{border-collapse:collapse;background:#fff;border:1px solid #dde2e8;font-variant-numeric:tabular-nums}
+td,th{padding:4px 12px;text-align:right;border-bottom:1px solid #eceff3}th{font-weight:600;background:#f0f2f5}
+td:first-child,th:first-child{text-align:left}
+.cards{display:flex;flex-wrap:wrap;gap:12px;margin:12px 0}
+.card{background:#fff;border:1px solid #dde2e8;border-radius:6px;padding:10px 16px;min-width:120px}
+.card b{display:block;font-size:21px}.card span{font-size:12px;color:#55606e}
+.bar{display:inline-block;height:10px;background:#3b6ea5;border-radius:2px;vertical-align:middle}
+";
+
+/// A page that grows section by section.
+pub(crate) struct Page {
+    html: String,
+}
+
+impl Page {
+    pub(crate) fn new(title: &str, lead: &str) -> Self {
+        let title = escape(title);
+        let html = format!(
+            "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\
+             <meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">\
+             <title>{title}</title><style>{STYLE}</style></head><body><main><h1>{title}</h1><p class=\"lead\">{}</p>\n",
+            escape(lead)
+        );
+        Self { html }
+    }
+
+    pub(crate) fn section(&mut self, title: &str) {
+        let _ = writeln!(self.html, "<h2>{}</h2>", escape(title));
+    }
+
+    pub(crate) fn subsection(&mut self, title: &str) {
+        let _ = writeln!(self.html, "<h3>{}</h3>", escape(title));
+    }
+
+    pub(crate) fn paragraph(&mut self, text: &str) {
+        let _ = writeln!(self.html, "<p>{}</p>", escape(text));
+    }
+
+    /// Figures side by side, each with a caption.
+    pub(crate) fn figures(&mut self, figures: &[(String, String)]) {
+        self.html.push_str("<div class=\"figures\">");
+        for (svg, caption) in figures {
+            let caption = if caption.is_empty() {
+                String::new()
+            } else {
+                format!("<figcaption>{}</figcaption>", escape(caption))
+            };
+            let _ = writeln!(self.html, "<figure>{svg}{caption}</figure>");
+        }
+        self.html.push_str("</div>\n");
+    }
+
+    /// Figures of merit, large.
+    pub(crate) fn cards(&mut self, cards: &[(String, String)]) {
+        self.html.push_str("<div class=\"cards\">");
+        for (value, name) in cards {
+            let _ = write!(self.html, "<div class=\"card\"><b>{}</b><span>{}</span></div>", escape(value), escape(name));
+        }
+        self.html.push_str("</div>\n");
+    }
+
+    pub(crate) fn table(&mut self, head: &[&str], rows: &[Vec<String>]) {
+        self.html.push_str("<table><tr>");
+        for cell in head {
+            let _ = write!(self.html, "<th>{}</th>", escape(cell));
+        }
+        self.html.push_str("</tr>\n");
+        for row in rows {
+            self.html.push_str("<tr>");
+            for cell in row {
+                let _ = write!(self.html, "<td>{}</td>", escape(cell));
+            }
+            self.html.push_str("</tr>\n");
+        }
+        self.html.push_str("</table>\n");
+    }
+
+    pub(crate) fn finish(mut self) -> String {
+        self.html.push_str("</main></body></html>\n");
+        self.html
+    }
+}

@@ -1,0 +1,86 @@
+//! One run: survey in, stages in order, results out.
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use crate::load::load;
+use crate::outcome::Outcome;
+use crate::plan::Source;
+use crate::progress::Progress;
+use crate::summary::{StageSummary, Summary};
+use crate::view::Snapshot;
+use crate::{Error, Plan, Result, measure, results, simulate, stages};
+
+/// What to run on what.
+#[derive(Debug, Clone)]
+pub struct RunRequest {
+    /// The stages.
+    pub plan: Plan,
+    /// Where the plan was read from; its source's paths are relative to it.
+    pub plan_path: PathBuf,
+    /// Survey folder; `None`: the plan's own source.
+    pub survey: Option<PathBuf>,
+    /// Calibration file; `None`: `calibration.ron` beside the survey, where there is one.
+    pub calibration: Option<PathBuf>,
+    /// Output folder; written beside and renamed when everything is done.
+    pub out: PathBuf,
+}
+
+/// Runs a pipeline and writes its results into the request's output folder.
+pub fn run(request: &RunRequest, progress: &dyn Progress) -> Result<Summary> {
+    let start = Instant::now();
+    let survey = find_survey(request, progress)?;
+    let outcome = process(&request.plan, &survey, request.calibration.as_deref(), progress)?;
+    let mut summary = measure::summarise(&request.plan, &survey, &outcome);
+    summary.out = request.out.display().to_string();
+    summary.seconds = start.elapsed().as_secs_f64();
+    results::write(&request.out, &outcome, &summary, progress)?;
+    progress.finish();
+    Ok(summary)
+}
+
+/// The survey's folder; simulated first where the plan says so.
+fn find_survey(request: &RunRequest, progress: &dyn Progress) -> Result<PathBuf> {
+    let base = request.plan_path.parent().unwrap_or(Path::new(""));
+    match (&request.survey, &request.plan.source) {
+        (Some(folder), _) => Ok(folder.clone()),
+        (None, Some(Source::Survey { folder })) => Ok(base.join(folder)),
+        (None, Some(Source::Simulate(source))) => {
+            let mut name = request.out.file_name().unwrap_or_default().to_owned();
+            name.push("-survey");
+            let folder = request.out.with_file_name(name);
+            simulate::simulate(source, base, &folder, progress)?;
+            Ok(folder)
+        }
+        (None, None) => Err(Error::Survey {
+            path: request.plan_path.clone(),
+            message: "the pipeline names no source: name a survey's folder".to_owned(),
+        }),
+    }
+}
+
+/// Loads a survey and applies a plan's stages, without writing anything.
+pub fn process(
+    plan: &Plan,
+    survey: &Path,
+    calibration: Option<&Path>,
+    progress: &dyn Progress,
+) -> Result<Outcome> {
+    let mut work = load(survey, calibration, plan, progress)?;
+    for stage in &plan.stages {
+        progress.begin(stage.name(), work.outcome.views.len());
+        let before: Vec<Option<Snapshot>> = work.outcome.views.iter().map(crate::view::View::snapshot).collect();
+        let start = Instant::now();
+        let findings = stages::apply(stage, &mut work, progress)?;
+        let seconds = start.elapsed().as_secs_f64();
+        let record = StageSummary {
+            name: stage.name(),
+            seconds,
+            findings,
+            change_median_m: measure::median_change(&before, &work.outcome.views),
+            truth: measure::evaluate_all(&work.outcome.views),
+        };
+        work.outcome.stages.push(record);
+    }
+    Ok(work.outcome)
+}

@@ -1,0 +1,36 @@
+//! The stages, one file each, and what they share.
+
+mod adjust;
+mod average;
+mod cloud;
+mod correct;
+mod deconvolve;
+mod demodulate;
+mod flag;
+mod register;
+mod unwrap;
+
+use std::collections::BTreeMap;
+
+use crate::progress::Progress;
+use crate::work::Work;
+use crate::{Result, Stage};
+
+/// Figures that a stage reports, with units in their names.
+pub(crate) type Findings = BTreeMap<String, f64>;
+
+/// Runs one stage on all views.
+pub(crate) fn apply(stage: &Stage, work: &mut Work, progress: &dyn Progress) -> Result<Findings> {
+    match stage {
+        Stage::Demodulate(options) => demodulate::run(work, options, progress),
+        Stage::Average(_) => average::run(work, progress),
+        Stage::Deconvolve(options) => deconvolve::run(work, options, progress),
+        Stage::Unwrap(options) => unwrap::run(work, options, progress),
+        Stage::CorrectRange(_) => correct::run(work, progress),
+        Stage::CorrectImagePoint(_) => cloud::correct_image_point(work),
+        Stage::PointCloud(_) => cloud::run(work, progress),
+        Stage::Flag(options) => flag::run(work, options, progress),
+        Stage::Register(options) => register::run(work, options, progress),
+        Stage::Adjust(_) => adjust::run(work, progress),
+    }
+}

@@ -1,0 +1,72 @@
+use phase_unwrap::{MultiFrequencyOptions, SpatialOptions, unwrap_multi_frequency, unwrap_spatial};
+use range_image::{ComplexChannel, ComplexFrame, Flags, RangeFrame, Raster};
+
+use super::Findings;
+use crate::plan::UnwrapOptions;
+use crate::progress::Progress;
+use crate::statistics::median;
+use crate::view::{View, ViewData};
+use crate::work::Work;
+use crate::{Error, Result};
+
+/// Phases to ranges: by hypotheses where there are several frequencies, spatially and by amplitude where there is one.
+pub(super) fn run(work: &mut Work, options: &UnwrapOptions, progress: &dyn Progress) -> Result<Findings> {
+    let total = work.outcome.views.len();
+    for (index, view) in work.outcome.views.iter_mut().enumerate() {
+        unwrap_view(view, options)?;
+        progress.advance(index + 1);
+    }
+    Ok(Findings::from([("views".to_owned(), total as f64)]))
+}
+
+fn unwrap_view(view: &mut View, options: &UnwrapOptions) -> Result<()> {
+    let name = view.name();
+    let ViewData::Phase(frame) = &view.data else {
+        return Err(Error::Needs { stage: "Unwrap", needs: "Demodulate" });
+    };
+    let (wraps, confidence) = wrap_counts(frame, options, &name)?;
+    let mut channels: Vec<RangeFrame> =
+        frame.channels.iter().zip(&wraps).map(|(channel, wraps)| channel_range(channel, wraps, &frame.flags)).collect();
+    for channel in &mut channels {
+        for (flags, confidence) in channel.flags.as_mut_slice().iter_mut().zip(confidence.as_slice()) {
+            // Written so that a confidence that is not a number counts as none.
+            if !(f64::from(*confidence) >= options.minimum_confidence) {
+                flags.insert(Flags::UNWRAP_UNSURE);
+            }
+        }
+    }
+    view.set_channels(channels)
+}
+
+/// Whole ambiguity intervals of each frequency, and the confidence in them.
+fn wrap_counts(frame: &ComplexFrame, options: &UnwrapOptions, name: &str) -> Result<(Vec<Raster<i32>>, Raster<f32>)> {
+    let mask = frame.flags.map(|flags| !flags.contains(Flags::NO_DATA));
+    if let [channel] = frame.channels.as_slice() {
+        let interval = channel.modulation.ambiguity_interval_m();
+        let maximum_wraps = (options.maximum_range_m / interval).floor().max(0.0) as u16;
+        let mut sigmas: Vec<f64> = channel.sigma.as_slice().iter().map(|sigma| f64::from(*sigma)).collect();
+        let noise = Some(median(&mut sigmas) as f32).filter(|noise| noise.is_finite());
+        let spatial = SpatialOptions { maximum_wraps, amplitude_noise: noise, ..SpatialOptions::default() };
+        let unwrapped = unwrap_spatial(&channel.phase(), Some(&channel.amplitude()), Some(&mask), &spatial);
+        let unwrapped = unwrapped.map_err(Error::stage("Unwrap", name))?;
+        return Ok((vec![unwrapped.wraps], unwrapped.confidence));
+    }
+    let phases: Vec<_> = frame.channels.iter().map(ComplexChannel::phase).collect();
+    let sigmas: Vec<_> = frame.channels.iter().map(ComplexChannel::sigma_phase).collect();
+    let modulations: Vec<_> = frame.channels.iter().map(|channel| channel.modulation).collect();
+    let multi = MultiFrequencyOptions { maximum_range_m: Some(options.maximum_range_m), ..Default::default() };
+    let unwrapped = unwrap_multi_frequency(&phases, &modulations, Some(&sigmas), Some(&mask), &multi);
+    let unwrapped = unwrapped.map_err(Error::stage("Unwrap", name))?;
+    Ok((unwrapped.wraps, unwrapped.confidence))
+}
+
+/// The range of one frequency with its wrap counts.
+fn channel_range(channel: &ComplexChannel, wraps: &Raster<i32>, flags: &Raster<Flags>) -> RangeFrame {
+    let interval = channel.modulation.ambiguity_interval_m();
+    let mut range = channel.phase();
+    for (value, wraps) in range.as_mut_slice().iter_mut().zip(wraps.as_slice()) {
+        let wrapped = channel.modulation.range_from_phase(f64::from(*value));
+        *value = (wrapped + f64::from(*wraps) * interval) as f32;
+    }
+    RangeFrame { range, sigma: channel.sigma_range(), amplitude: channel.amplitude(), flags: flags.clone() }
+}

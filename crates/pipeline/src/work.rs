@@ -1,0 +1,18 @@
+//! The state that stages pass on.
+
+use camera_model::{Camera, RayTable};
+use icp_registration::IcpTarget;
+use range_io::calibration::Calibration;
+
+use crate::outcome::Outcome;
+
+/// A survey on its way through a pipeline.
+pub(crate) struct Work {
+    pub(crate) calibration: Option<Calibration>,
+    /// The calibrated camera, where there is one; `outcome.camera` is the one in use.
+    pub(crate) calibrated_camera: Option<Camera>,
+    pub(crate) rays: RayTable,
+    /// Clouds with normals and trees, from `Register` on.
+    pub(crate) station_clouds: Vec<IcpTarget>,
+    pub(crate) outcome: Outcome,
+}

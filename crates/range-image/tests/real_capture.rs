@@ -1,0 +1,57 @@
+//! A real four-phase capture at 60 MHz against the distances that the camera computed itself.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stderr)]
+
+mod common;
+
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+
+use common::angle_between;
+use range_image::{DemodulationOptions, Modulation, PhaseSense, RawFrame, Samples, demodulate};
+
+/// The f32 values of one array of an .npz file (little-endian, version 1 header).
+fn array(file: &Path, name: &str) -> Vec<f32> {
+    let mut archive = zip::ZipArchive::new(File::open(file).unwrap()).unwrap();
+    let mut bytes = Vec::new();
+    archive.by_name(&format!("{name}.npy")).unwrap().read_to_end(&mut bytes).unwrap();
+    let start = 10 + usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));
+    bytes[start..].chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect()
+}
+
+#[test]
+fn distances_of_a_real_camera_come_back() {
+    let folder = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/real/mlx75027_scene"));
+    if !folder.is_dir() {
+        eprintln!("skipped: no capture at {}", folder.display());
+        return;
+    }
+    let modulation = Modulation::new(60e6).unwrap();
+    let samples = Samples::F32(array(&folder.join("000_0.npz"), "samples"));
+    let raw = RawFrame::new(640, 385, 4, vec![modulation], samples).unwrap();
+    // Opposite sense and 2.780 rad: known of this camera.
+    let options = DemodulationOptions {
+        phase_sense: PhaseSense::Negative,
+        phase_offset_rad: 2.780,
+        ..DemodulationOptions::default()
+    };
+    let channel = demodulate(&raw, &options).unwrap().channels.remove(0);
+    let (phase, amplitude) = (channel.phase(), channel.amplitude());
+    let output = folder.join("camera_output.npz");
+    let (distances, amplitudes) = (array(&output, "range_mm"), array(&output, "amplitude"));
+
+    let count = distances.len() as f64;
+    let differences = phase.as_slice().iter().zip(&distances).map(|(phase, millimetres)| {
+        let truth = modulation.phase_from_range(f64::from(*millimetres) / 1000.0);
+        modulation.range_from_phase(angle_between(f64::from(*phase), truth))
+    });
+    let mean = differences.clone().sum::<f64>() / count;
+    let deviation = (differences.map(|d| (d - mean).powi(2)).sum::<f64>() / count).sqrt();
+    // The camera applies corrections of its own, which leave a structure of 11 mm.
+    assert!(mean.abs() < 0.003 && deviation < 0.012, "mean {mean} m, standard deviation {deviation} m");
+    let ratios = amplitude.as_slice().iter().zip(&amplitudes).map(|(own, theirs)| f64::from(own / theirs));
+    let mean_ratio = ratios.clone().sum::<f64>() / count;
+    let scatter = (ratios.map(|r| (r - mean_ratio).powi(2)).sum::<f64>() / count).sqrt() / mean_ratio;
+    // The camera may average amplitudes where these samples are averages: half a percent between dim and bright.
+    assert!(scatter < 0.01, "amplitudes are not in proportion: {mean_ratio}, scatter {scatter}");
+}

@@ -1,0 +1,154 @@
+use error_models::{FixedPattern, NamedParameter};
+use range_image::Modulation;
+use scattering_deconvolution::Psf;
+
+use super::{Calibration, RangeCalibration, ValidSpan};
+use crate::InvalidField;
+
+type Check = Result<(), InvalidField>;
+
+impl Calibration {
+    pub(super) fn check(&self) -> Check {
+        let (version, known) = (self.format_version, Self::FORMAT_VERSION);
+        require(version == known, "format_version", || format!("is {version}, expected {known}"))?;
+        self.camera.validate().map_err(|error| InvalidField::new("camera", error.to_string()))?;
+        self.check_camera_parameters()?;
+        for (index, model) in self.range_models.iter().enumerate() {
+            model.check(&format!("range_models[{index}]"))?;
+        }
+        self.group_range_models().map_err(|reason| InvalidField::new("range_models", reason))?;
+        if let Some(noise) = &self.noise {
+            noise.validate().map_err(|error| InvalidField::new("noise", error.to_string()))?;
+        }
+        self.scattering.iter().try_for_each(check_psf)?;
+        self.fixed_pattern.iter().try_for_each(|pattern| self.check_pattern(pattern))?;
+        if let Some(correlation) = &self.correlation {
+            correlation.check(&self.parameter_names())?;
+        }
+        self.span.check()?;
+        match self.provenance.sigma0 {
+            Some(value) => require(value.is_finite() && value >= 0.0, "provenance.sigma0", || {
+                format!("is {value}, expected a finite number that is not negative")
+            }),
+            None => Ok(()),
+        }
+    }
+
+    fn check_camera_parameters(&self) -> Check {
+        check_parameters("parameters", &self.parameters, &Self::CAMERA_PARAMETERS)?;
+        for needed in ["xp", "yp", "c"] {
+            let there = self.parameters.iter().any(|parameter| parameter.name == needed);
+            require(there, "parameters", || format!("`{needed}` is missing"))?;
+        }
+        let distance = self.parameters.iter().enumerate().find(|(_, parameter)| parameter.name == "c");
+        distance.map_or(Ok(()), |(index, c)| {
+            require(c.value > 0.0, format!("parameters[{index}].value"), || {
+                format!("`c` is {}, expected a positive principal distance", c.value)
+            })
+        })
+    }
+
+    fn check_pattern(&self, pattern: &FixedPattern) -> Check {
+        let (width, height) = (self.camera.width, self.camera.height);
+        require((pattern.width, pattern.height) == (width, height), "fixed_pattern", || {
+            format!("is {} x {} pixels, expected {width} x {height}", pattern.width, pattern.height)
+        })?;
+        let (found, expected) = (pattern.offset_m.len(), width.saturating_mul(height));
+        require(found == expected, "fixed_pattern.offset_m", || format!("has {found} values, expected {expected}"))?;
+        // A pixel without a known offset is NaN; an infinite one is a slip.
+        let infinite = pattern.offset_m.iter().position(|value| value.is_infinite());
+        infinite.map_or(Ok(()), |index| {
+            Err(InvalidField::new(format!("fixed_pattern.offset_m[{index}]"), "is infinite, expected metres"))
+        })
+    }
+}
+
+impl RangeCalibration {
+    fn check(&self, path: &str) -> Check {
+        let time = self.integration_time_s;
+        require(time.is_finite() && time > 0.0, format!("{path}.integration_time_s"), || {
+            format!("is {time}, expected a positive time")
+        })?;
+        Modulation::new(self.modulation_hz)
+            .map_err(|error| InvalidField::new(format!("{path}.modulation_hz"), error.to_string()))?;
+        check_parameters(&format!("{path}.parameters"), &self.parameters, &error_models::PARAMETERS)?;
+        check_span(format!("{path}.range_span_m"), self.range_span_m)?;
+        check_span(format!("{path}.amplitude_span"), self.amplitude_span)?;
+        self.to_model().map(drop).map_err(|error| InvalidField::new(path, error.to_string()))
+    }
+}
+
+impl ValidSpan {
+    fn check(&self) -> Check {
+        check_span("span.range_m", self.range_m)?;
+        check_span("span.amplitude", self.amplitude)?;
+        check_span("span.integration_time_s", self.integration_time_s)?;
+        check_span("span.temperature_c", self.temperature_c)
+    }
+}
+
+fn check_span(field: impl Into<String>, span: Option<[f64; 2]>) -> Check {
+    let Some([low, high]) = span else { return Ok(()) };
+    require(low.is_finite() && high.is_finite() && low <= high, field, || {
+        format!("is ({low}, {high}), expected the smaller and the larger end")
+    })
+}
+
+/// Names known and given once, the units of the table, finite values, standard deviations that may be.
+fn check_parameters(path: &str, parameters: &[NamedParameter], known: &[(&str, &str)]) -> Check {
+    for (index, parameter) in parameters.iter().enumerate() {
+        let NamedParameter { name, value, sigma, unit, .. } = parameter;
+        let path = format!("{path}[{index}]");
+        let Some((_, expected)) = known.iter().find(|(known, _)| known == name) else {
+            let names: Vec<_> = known.iter().map(|(name, _)| *name).collect();
+            return Err(InvalidField::new(
+                format!("{path}.name"),
+                format!("`{name}` is no parameter, expected one of {}", names.join(", ")),
+            ));
+        };
+        let twice = parameters[..index].iter().any(|earlier| earlier.name == *name);
+        require(!twice, format!("{path}.name"), || format!("`{name}` is given twice"))?;
+        require(unit == expected, format!("{path}.unit"), || {
+            format!("`{name}` is in `{unit}`, expected `{expected}`")
+        })?;
+        require(value.is_finite(), format!("{path}.value"), || format!("`{name}` is {value}, expected a number"))?;
+        // NaN says that the standard deviation is not known.
+        require(!(*sigma < 0.0 || sigma.is_infinite()), format!("{path}.sigma"), || {
+            format!("standard deviation of `{name}` is {sigma}, expected a finite number that is not negative")
+        })?;
+    }
+    Ok(())
+}
+
+fn check_psf(psf: &Psf) -> Check {
+    match psf {
+        Psf::Gaussians(terms) => {
+            for (index, term) in terms.iter().enumerate() {
+                let widths = term.sigma_px.iter().all(|sigma| sigma.is_finite() && *sigma > 0.0);
+                require(term.weight.is_finite() && widths, format!("scattering[{index}]"), || {
+                    let (weight, [along_row, along_column]) = (term.weight, term.sigma_px);
+                    format!(
+                        "has weight {weight} and widths ({along_row}, {along_column}), \
+                         expected a finite weight and positive widths"
+                    )
+                })?;
+            }
+            Ok(())
+        }
+        Psf::Kernel { width, height, values } => {
+            let odd = width % 2 == 1 && height % 2 == 1;
+            require(odd && width.checked_mul(*height) == Some(values.len()), "scattering", || {
+                format!(
+                    "is a kernel of {width} x {height} with {} values, expected odd sizes and their product",
+                    values.len()
+                )
+            })?;
+            let finite = values.iter().all(|value| value.is_finite());
+            require(finite, "scattering", || "has a kernel with values that are not finite".into())
+        }
+    }
+}
+
+pub(super) fn require(holds: bool, field: impl Into<String>, reason: impl FnOnce() -> String) -> Check {
+    if holds { Ok(()) } else { Err(InvalidField::new(field, reason())) }
+}

@@ -1,0 +1,157 @@
+//! A calibration: `calibration.ron`, all that a later correction needs.
+
+mod check;
+mod correlation;
+mod models;
+
+use std::path::Path;
+
+use error_models::{FixedPattern, NamedParameter};
+use range_image::{ImageFormat, NoiseModel};
+use scattering_deconvolution::Psf;
+use serde::{Deserialize, Serialize};
+
+pub use correlation::Correlation;
+
+use crate::text::read_text;
+use crate::{Result, atomic, ron_text};
+
+/// A camera's calibration with the quality of every parameter.
+///
+/// Parameters keep the units of [`Calibration::CAMERA_PARAMETERS`] and [`error_models::PARAMETERS`].
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Calibration {
+    /// [`Calibration::FORMAT_VERSION`].
+    pub format_version: u32,
+    /// Size of the image and its pixels.
+    pub camera: ImageFormat,
+    /// Interior orientation and lens: `xp`, `yp`, `c`, and any of `k1`, `k2`, `k3`, `p1`, `p2`; a missing one is zero.
+    pub parameters: Vec<NamedParameter>,
+    /// Range terms for each integration time and modulation frequency.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub range_models: Vec<RangeCalibration>,
+    /// Random error of the raw samples.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub noise: Option<NoiseModel>,
+    /// Point spread function of internal scattering.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub scattering: Option<Psf>,
+    /// Offset of each pixel in range.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub fixed_pattern: Option<FixedPattern>,
+    /// Correlations of the estimated parameters; without it they count as uncorrelated.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub correlation: Option<Correlation>,
+    /// Where the calibration holds.
+    #[serde(default)]
+    pub span: ValidSpan,
+    /// Where it comes from.
+    #[serde(default)]
+    pub provenance: Provenance,
+}
+
+/// Range terms of one modulation frequency at one integration time.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RangeCalibration {
+    /// Integration time the terms belong to.
+    pub integration_time_s: f64,
+    /// Modulation frequency the terms belong to.
+    pub modulation_hz: f64,
+    /// Any of `d0`, `d2` to `d7`, `e1`, `e2`, and `h1`, `h2`, `h3`; a missing one is zero.
+    pub parameters: Vec<NamedParameter>,
+    /// Smallest and largest range of the fit.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub range_span_m: Option<[f64; 2]>,
+    /// Smallest and largest amplitude of the fit; needed with `h1`, `h2`, `h3`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub amplitude_span: Option<[f64; 2]>,
+}
+
+/// Smallest and largest value a calibration holds for; `None` where it is not known.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct ValidSpan {
+    /// Range in metres.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub range_m: Option<[f64; 2]>,
+    /// Amplitude in the camera's unit.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub amplitude: Option<[f64; 2]>,
+    /// Integration time in seconds.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub integration_time_s: Option<[f64; 2]>,
+    /// Temperature in degrees Celsius.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub temperature_c: Option<[f64; 2]>,
+}
+
+/// Where a calibration comes from.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Provenance {
+    /// Name or folder of the survey.
+    pub survey: String,
+    /// Method it was estimated by.
+    pub method: String,
+    /// Redundancy of the adjustment.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub redundancy: Option<usize>,
+    /// Standard deviation of unit weight of the adjustment.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sigma0: Option<f64>,
+    /// Date, as ISO 8601, where one was given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub created: Option<String>,
+}
+
+impl Calibration {
+    /// The version of the format that is read and written.
+    pub const FORMAT_VERSION: u32 = 1;
+
+    /// Name of the file in a folder of results.
+    pub const FILE_NAME: &str = "calibration.ron";
+
+    /// Names and units of the parameters of interior orientation and lens, in this order everywhere.
+    pub const CAMERA_PARAMETERS: [(&str, &str); 8] = [
+        ("xp", "mm"),
+        ("yp", "mm"),
+        ("c", "mm"),
+        ("k1", "1/mm^2"),
+        ("k2", "1/mm^4"),
+        ("k3", "1/mm^6"),
+        ("p1", "1/mm"),
+        ("p2", "1/mm"),
+    ];
+
+    /// Reads and checks a `calibration.ron`, given by its own path or by its folder's.
+    pub fn read(path: impl AsRef<Path>) -> Result<Self> {
+        let path = path.as_ref();
+        let file = if path.is_dir() { path.join(Self::FILE_NAME) } else { path.to_path_buf() };
+        Self::parse(&file, &read_text(&file)?)
+    }
+
+    /// Reads and checks the text of a `calibration.ron`; `file` stands for it in messages.
+    pub fn parse(file: &Path, text: &str) -> Result<Self> {
+        let calibration: Self = ron_text::parse(file, text)?;
+        calibration.check().map_err(|invalid| ron_text::at_field(file, text, invalid))?;
+        Ok(calibration)
+    }
+
+    /// Checks names, units, values, spans, table sizes and correlations.
+    pub fn validate(&self) -> Result<()> {
+        self.check().map_err(|invalid| invalid.in_memory("calibration"))
+    }
+
+    /// Checks and writes a `calibration.ron`.
+    pub fn write(&self, path: impl AsRef<Path>) -> Result<()> {
+        atomic::write_text(path, &self.to_text()?)
+    }
+
+    /// Checks a calibration and gives the text of its file.
+    pub fn to_text(&self) -> Result<String> {
+        self.validate()?;
+        ron_text::to_text(self)
+    }
+}

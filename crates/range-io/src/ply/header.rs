@@ -1,0 +1,148 @@
+use std::io::BufRead;
+
+/// How the numbers of a file are written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Encoding {
+    Ascii,
+    LittleEndian,
+    BigEndian,
+}
+
+/// Type of a property.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Scalar {
+    I8,
+    U8,
+    I16,
+    U16,
+    I32,
+    U32,
+    F32,
+    F64,
+}
+
+impl Scalar {
+    fn from_name(name: &str) -> Option<Self> {
+        Some(match name {
+            "char" | "int8" => Self::I8,
+            "uchar" | "uint8" => Self::U8,
+            "short" | "int16" => Self::I16,
+            "ushort" | "uint16" => Self::U16,
+            "int" | "int32" => Self::I32,
+            "uint" | "uint32" => Self::U32,
+            "float" | "float32" => Self::F32,
+            "double" | "float64" => Self::F64,
+            _ => return None,
+        })
+    }
+
+    pub fn size(self) -> usize {
+        match self {
+            Self::I8 | Self::U8 => 1,
+            Self::I16 | Self::U16 => 2,
+            Self::I32 | Self::U32 | Self::F32 => 4,
+            Self::F64 => 8,
+        }
+    }
+}
+
+/// The vertices of a file and what stands before them.
+#[derive(Debug)]
+pub(super) struct Header {
+    pub encoding: Encoding,
+    /// Number of vertices.
+    pub vertices: u64,
+    /// Name and type of each property of a vertex.
+    pub properties: Vec<(String, Scalar)>,
+    /// Elements before the vertices: their number and the bytes of one.
+    pub before: Vec<(u64, usize)>,
+}
+
+/// One `element` of a header.
+struct Element {
+    name: String,
+    count: u64,
+    properties: Vec<(String, Scalar)>,
+    has_list: bool,
+}
+
+/// Longer headers belong to other files.
+const MOST_LINES: usize = 10_000;
+const LONGEST_LINE: u64 = 4096;
+
+impl Header {
+    /// Reads up to the line `end_header`; the error says what was expected.
+    pub fn read(reader: &mut impl BufRead) -> Result<Self, String> {
+        if line(reader)? != "ply" {
+            return Err("does not begin with the line `ply`".into());
+        }
+        let mut encoding = None;
+        let mut elements: Vec<Element> = Vec::new();
+        for _ in 0..MOST_LINES {
+            let line = line(reader)?;
+            let words: Vec<_> = line.split_whitespace().collect();
+            match words.as_slice() {
+                ["end_header"] => {
+                    let encoding = encoding.ok_or("says no `format` in its header")?;
+                    return Self::of_elements(encoding, elements);
+                }
+                ["format", format, "1.0"] => encoding = Some(encoding_of(format)?),
+                ["element", name, count] => {
+                    let count =
+                        count.parse().map_err(|_| format!("has `{count}` of element `{name}`, expected a number"))?;
+                    elements.push(Element { name: (*name).into(), count, properties: Vec::new(), has_list: false });
+                }
+                ["property", "list", ..] => {
+                    elements.last_mut().ok_or("has a property before any element")?.has_list = true;
+                }
+                ["property", kind, name] => {
+                    let scalar = Scalar::from_name(kind)
+                        .ok_or_else(|| format!("has property `{name}` of unknown type `{kind}`"))?;
+                    let element = elements.last_mut().ok_or("has a property before any element")?;
+                    element.properties.push(((*name).into(), scalar));
+                }
+                [] | ["comment" | "obj_info", ..] => {}
+                _ => return Err(format!("has the line `{line}` in its header, which is not understood")),
+            }
+        }
+        Err(format!("has no line `end_header` among its first {MOST_LINES}"))
+    }
+
+    fn of_elements(encoding: Encoding, mut elements: Vec<Element>) -> Result<Self, String> {
+        let position = elements.iter().position(|element| element.name == "vertex");
+        let position = position.ok_or("has no element `vertex`")?;
+        // Lists have no fixed length, so what lies behind them can only be found by reading them all.
+        if let Some(element) = elements[..=position].iter().find(|element| element.has_list) {
+            return Err(format!("has lists in element `{}`, expected none before or in the vertices", element.name));
+        }
+        let size = |element: &Element| element.properties.iter().map(|(_, scalar)| scalar.size()).sum();
+        let before = elements[..position].iter().map(|element| (element.count, size(element))).collect();
+        let vertex = elements.swap_remove(position);
+        Ok(Self { encoding, vertices: vertex.count, properties: vertex.properties, before })
+    }
+
+    /// Bytes of one vertex in a binary file.
+    pub fn vertex_size(&self) -> usize {
+        self.properties.iter().map(|(_, scalar)| scalar.size()).sum()
+    }
+}
+
+fn encoding_of(name: &str) -> Result<Encoding, String> {
+    match name {
+        "ascii" => Ok(Encoding::Ascii),
+        "binary_little_endian" => Ok(Encoding::LittleEndian),
+        "binary_big_endian" => Ok(Encoding::BigEndian),
+        other => Err(format!("has the format `{other}`, expected ascii, binary_little_endian or binary_big_endian")),
+    }
+}
+
+fn line(reader: &mut impl BufRead) -> Result<String, String> {
+    let mut bytes = Vec::new();
+    let read = std::io::Read::take(reader, LONGEST_LINE).read_until(b'\n', &mut bytes);
+    read.map_err(|error| format!("cannot be read: {error}"))?;
+    if bytes.last() != Some(&b'\n') {
+        return Err("ends within its header".into());
+    }
+    let text = String::from_utf8(bytes).map_err(|_| "has a header that is no text".to_owned())?;
+    Ok(text.trim_end().to_owned())
+}

@@ -1,0 +1,146 @@
+//! A survey: the folder of one capture, described by its `survey.ron`.
+
+mod arrays;
+mod camera;
+mod depth;
+mod frame;
+mod truth;
+mod validate;
+mod write;
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+pub use camera::SurveyCamera;
+pub use frame::{InputFrame, read_frame};
+pub use range_image::PhaseSense;
+pub use truth::{TruthFrame, read_truth, write_truth};
+pub use write::write_frame;
+
+use crate::text::read_text;
+use crate::{Result, atomic, ron_text};
+
+/// What was captured: `survey.ron`. Angles in radian, lengths of the camera in millimetre, times in second.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Survey {
+    /// The camera, nominal; a calibration replaces what it has estimated.
+    pub camera: SurveyCamera,
+    /// What the frames hold.
+    pub level: Level,
+    /// The frames in the order of capture; empty where only tables are given.
+    pub frames: Vec<FrameEntry>,
+    /// How depths stored as integers are to be read; needed for PNG and Matroska.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub depth: Option<StoredDepth>,
+    /// Files with the truth of a simulation.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub truth: Option<TruthFiles>,
+    /// Further files by name, such as `observations` or `mesh`.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub extras: BTreeMap<String, PathBuf>,
+}
+
+/// What the frames of a survey hold, from the rawest to the most processed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Level {
+    /// Raw correlation samples.
+    Samples,
+    /// Phase and amplitude.
+    Phase,
+    /// Radial range.
+    Range,
+    /// Depth along the viewing axis.
+    Depth,
+}
+
+impl Level {
+    /// The level's name in files, which is also the name of its principal array.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Samples => "samples",
+            Self::Phase => "phase",
+            Self::Range => "range",
+            Self::Depth => "depth",
+        }
+    }
+}
+
+/// One frame of a survey.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FrameEntry {
+    /// File relative to the survey's folder: `.npz`, `.npy`, `.png`, or `.mkv` where `#3` at the end picks the frame
+    /// after the first three.
+    pub file: PathBuf,
+    /// Station the frame was taken from.
+    pub station: String,
+    /// Time of capture.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub timestamp_s: Option<f64>,
+    /// Integration time.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub integration_time_s: Option<f64>,
+    /// Temperature of the camera in degrees Celsius.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub temperature_c: Option<f64>,
+}
+
+/// How depths stored as integers are read: `depth_m = scale_m * stored`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct StoredDepth {
+    /// Metres of one stored unit.
+    pub scale_m: f64,
+    /// Stored value or values that mean "no depth": `0` or `[0, 65535]`.
+    #[serde(deserialize_with = "validate::one_or_more", serialize_with = "validate::one_or_list")]
+    pub invalid: Vec<u16>,
+}
+
+/// Files that hold the truth of a simulated survey.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct TruthFiles {
+    /// True poses, as `stations.csv`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub stations: Option<PathBuf>,
+    /// True parameters, as `calibration.ron`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub calibration: Option<PathBuf>,
+    /// `.npz` with `range`, `wraps`, `mixed` for each frame, in the order of the frames; or none.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub frames: Vec<PathBuf>,
+}
+
+impl Survey {
+    /// Name of the file in a survey's folder.
+    pub const FILE_NAME: &str = "survey.ron";
+
+    /// Reads and checks a `survey.ron`, given by its own path or by its folder's.
+    pub fn read(path: impl AsRef<Path>) -> Result<Self> {
+        let path = path.as_ref();
+        let file = if path.is_dir() { path.join(Self::FILE_NAME) } else { path.to_path_buf() };
+        Self::parse(&file, &read_text(&file)?)
+    }
+
+    /// Reads and checks the text of a `survey.ron`; `file` stands for it in messages.
+    pub fn parse(file: &Path, text: &str) -> Result<Self> {
+        let survey: Self = ron_text::parse(file, text)?;
+        survey.check().map_err(|invalid| ron_text::at_field(file, text, invalid))?;
+        Ok(survey)
+    }
+
+    /// Checks what the types do not: sizes, signs, and that the level has what it needs.
+    pub fn validate(&self) -> Result<()> {
+        self.check().map_err(|invalid| invalid.in_memory("survey"))
+    }
+
+    /// Checks and writes a `survey.ron`.
+    pub fn write(&self, path: impl AsRef<Path>) -> Result<()> {
+        self.validate()?;
+        atomic::write_text(path, &ron_text::to_text(self)?)
+    }
+}

@@ -1,0 +1,169 @@
+use std::fmt;
+use std::path::Path;
+
+use serde::de::{Deserializer, SeqAccess, Visitor};
+use serde::ser::Serializer;
+
+use super::{FrameEntry, Level, StoredDepth, Survey, SurveyCamera, TruthFiles};
+use crate::InvalidField;
+use crate::limits::MOST_PIXELS;
+
+type Check = Result<(), InvalidField>;
+
+const MOST_FREQUENCIES: usize = 64;
+const MOST_PHASE_STEPS: usize = 1024;
+
+impl Survey {
+    pub(super) fn check(&self) -> Check {
+        self.camera.check(self.level)?;
+        for (index, frame) in self.frames.iter().enumerate() {
+            frame.check(&format!("frames[{index}]"))?;
+        }
+        if let Some(depth) = &self.depth {
+            depth.check(self.level)?;
+        }
+        if let Some(truth) = &self.truth {
+            truth.check(self.frames.len())?;
+        }
+        self.extras.iter().try_for_each(|(name, file)| check_path(format!("extras.{name}"), file))
+    }
+}
+
+impl SurveyCamera {
+    fn check(&self, level: Level) -> Check {
+        require(self.width > 0, "camera.width", "is 0, expected at least one column")?;
+        require(self.height > 0, "camera.height", "is 0, expected at least one row")?;
+        require(
+            self.width.checked_mul(self.height).is_some_and(|pixels| pixels <= MOST_PIXELS),
+            "camera.width",
+            format!("{} x {} pixels, expected at most {MOST_PIXELS} in all", self.width, self.height),
+        )?;
+        for (index, &pitch) in self.pixel_pitch_mm.iter().enumerate() {
+            check_positive(format!("camera.pixel_pitch_mm[{index}]"), pitch)?;
+        }
+        check_positive("camera.principal_distance_mm", self.principal_distance_mm)?;
+        for (index, &coordinate) in self.principal_point_mm.iter().enumerate() {
+            check_finite(format!("camera.principal_point_mm[{index}]"), coordinate)?;
+        }
+        self.check_modulation(level)?;
+        check_finite("camera.phase_offset_rad", self.phase_offset_rad)?;
+        check_positive("camera.raw_scale", self.raw_scale)?;
+        self.saturation.map_or(Ok(()), |value| check_positive("camera.saturation", value))
+    }
+
+    fn check_modulation(&self, level: Level) -> Check {
+        for (index, &hz) in self.modulation_hz.iter().enumerate() {
+            check_positive(format!("camera.modulation_hz[{index}]"), hz)?;
+        }
+        let frequencies = self.modulation_hz.len();
+        let needed = matches!(level, Level::Samples | Level::Phase);
+        require(
+            frequencies > 0 || !needed,
+            "camera.modulation_hz",
+            format!("is missing or empty, expected at least one frequency for level `{}`", level.name()),
+        )?;
+        require(
+            frequencies <= MOST_FREQUENCIES,
+            "camera.modulation_hz",
+            format!("{frequencies} frequencies, expected at most {MOST_FREQUENCIES}"),
+        )?;
+        match self.phase_steps {
+            Some(steps) => require(
+                (3..=MOST_PHASE_STEPS).contains(&steps),
+                "camera.phase_steps",
+                format!("is {steps}, expected 3 to {MOST_PHASE_STEPS}"),
+            ),
+            None => require(level != Level::Samples, "camera.phase_steps", "is missing, level `samples` needs it"),
+        }
+    }
+}
+
+impl FrameEntry {
+    fn check(&self, path: &str) -> Check {
+        check_path(format!("{path}.file"), &self.file)?;
+        require(!self.station.trim().is_empty(), format!("{path}.station"), "is empty, expected a name")?;
+        for (name, value) in [("timestamp_s", self.timestamp_s), ("temperature_c", self.temperature_c)] {
+            value.map_or(Ok(()), |value| check_finite(format!("{path}.{name}"), value))?;
+        }
+        self.integration_time_s.map_or(Ok(()), |value| check_positive(format!("{path}.integration_time_s"), value))
+    }
+}
+
+impl StoredDepth {
+    fn check(&self, level: Level) -> Check {
+        require(level == Level::Depth, "depth", format!("belongs to level `depth`, not to `{}`", level.name()))?;
+        check_positive("depth.scale_m", self.scale_m)
+    }
+}
+
+impl TruthFiles {
+    fn check(&self, frames: usize) -> Check {
+        let files = self.frames.len();
+        require(
+            files == 0 || files == frames,
+            "truth.frames",
+            format!("lists {files} files for {frames} frames, expected one each or none"),
+        )?;
+        for (index, file) in self.frames.iter().enumerate() {
+            check_path(format!("truth.frames[{index}]"), file)?;
+        }
+        self.stations.iter().try_for_each(|file| check_path("truth.stations", file))?;
+        self.calibration.iter().try_for_each(|file| check_path("truth.calibration", file))
+    }
+}
+
+fn require(holds: bool, field: impl Into<String>, reason: impl Into<String>) -> Check {
+    if holds { Ok(()) } else { Err(InvalidField::new(field, reason)) }
+}
+
+fn check_positive(field: impl Into<String>, value: f64) -> Check {
+    require(value.is_finite() && value > 0.0, field, format!("is {value}, expected a positive number"))
+}
+
+fn check_finite(field: impl Into<String>, value: f64) -> Check {
+    require(value.is_finite(), field, format!("is {value}, expected a finite number"))
+}
+
+fn check_path(field: impl Into<String>, path: &Path) -> Check {
+    let relative = !path.as_os_str().is_empty() && !path.has_root();
+    require(relative, field, format!("is `{}`, expected a path relative to the survey's folder", path.display()))
+}
+
+/// Reads `0` as well as `[0, 65535]`.
+pub(super) fn one_or_more<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<u16>, D::Error> {
+    struct OneOrMore;
+
+    impl<'de> Visitor<'de> for OneOrMore {
+        type Value = Vec<u16>;
+
+        fn expecting(&self, formatter: &mut fmt::Formatter) -> fmt::Result {
+            formatter.write_str("a value from 0 to 65535 or a list of such")
+        }
+
+        fn visit_u64<E: serde::de::Error>(self, value: u64) -> Result<Self::Value, E> {
+            let value = u16::try_from(value);
+            value.map(|v| vec![v]).map_err(|_| E::custom("expected a value from 0 to 65535"))
+        }
+
+        fn visit_i64<E: serde::de::Error>(self, value: i64) -> Result<Self::Value, E> {
+            self.visit_u64(u64::try_from(value).unwrap_or(u64::MAX))
+        }
+
+        fn visit_seq<A: SeqAccess<'de>>(self, mut sequence: A) -> Result<Self::Value, A::Error> {
+            let mut values = Vec::new();
+            while let Some(value) = sequence.next_element()? {
+                values.push(value);
+            }
+            Ok(values)
+        }
+    }
+
+    deserializer.deserialize_any(OneOrMore)
+}
+
+pub(super) fn one_or_list<S: Serializer>(values: &[u16], serializer: S) -> Result<S::Ok, S::Error> {
+    match values {
+        [value] => serializer.serialize_u16(*value),
+        list => serializer.collect_seq(list),
+    }
+}

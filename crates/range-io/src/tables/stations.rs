@@ -1,0 +1,66 @@
+use std::path::Path;
+
+use camera_model::{euler_from_pose, pose_from_euler};
+use nalgebra::{Isometry3, Vector3};
+
+use super::csv_table::{Columns, Row, Table, texts, write};
+use crate::Result;
+
+/// The pose of one station: `stations.csv`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Station {
+    /// Name.
+    pub station: String,
+    /// Perspective centre and attitude (Eq. 2), photogrammetric axes.
+    pub world_from_camera: Isometry3<f64>,
+    /// Standard deviations of the perspective centre in metres.
+    pub sigma_position_m: Option<[f64; 3]>,
+    /// Standard deviations of omega, phi, kappa in radian.
+    pub sigma_attitude_rad: Option<[f64; 3]>,
+}
+
+const POSITION: [&str; 3] = ["x", "y", "z"];
+const ATTITUDE: [&str; 3] = ["omega", "phi", "kappa"];
+const SIGMA_POSITION: [&str; 3] = ["sigma_x", "sigma_y", "sigma_z"];
+const SIGMA_ATTITUDE: [&str; 3] = ["sigma_omega", "sigma_phi", "sigma_kappa"];
+const COLUMNS: Columns = Columns {
+    required: &["station", "x", "y", "z", "omega", "phi", "kappa"],
+    optional: &["sigma_x", "sigma_y", "sigma_z", "sigma_omega", "sigma_phi", "sigma_kappa"],
+};
+
+/// Reads `stations.csv`, angles in degrees. A station may stand in one row only.
+pub fn read_stations(path: impl AsRef<Path>) -> Result<Vec<Station>> {
+    let table = Table::read(path.as_ref(), &COLUMNS)?;
+    table.require_unique("station")?;
+    let station = |row: Row| {
+        let position = Vector3::from(row.all(POSITION)?);
+        let sigma_attitude_deg = row.all_or_none(SIGMA_ATTITUDE, Row::positive)?;
+        Ok(Station {
+            station: row.text("station")?,
+            world_from_camera: pose_from_euler(position, row.all(ATTITUDE)?.map(f64::to_radians)),
+            sigma_position_m: row.all_or_none(SIGMA_POSITION, Row::positive)?,
+            sigma_attitude_rad: sigma_attitude_deg.map(|sigma| sigma.map(f64::to_radians)),
+        })
+    };
+    table.rows().map(station).collect()
+}
+
+/// Writes `stations.csv`, angles in degrees; the columns of standard deviations where any station has some.
+pub fn write_stations(path: impl AsRef<Path>, stations: &[Station]) -> Result<()> {
+    let with_sigma = stations.iter().any(|s| s.sigma_position_m.is_some() || s.sigma_attitude_rad.is_some());
+    let optional = if with_sigma { COLUMNS.optional } else { &[] };
+    let header = [COLUMNS.required, optional].concat();
+    let rows = stations.iter().map(|station| {
+        let pose = &station.world_from_camera;
+        let attitude_deg = euler_from_pose(pose).map(f64::to_degrees);
+        let sigma_attitude_deg = station.sigma_attitude_rad.map(|sigma| sigma.map(f64::to_degrees));
+        let mut row = vec![station.station.clone()];
+        row.extend(texts(Some(<[f64; 3]>::from(pose.translation.vector))));
+        row.extend(texts(Some(attitude_deg)));
+        row.extend(texts(station.sigma_position_m));
+        row.extend(texts(sigma_attitude_deg));
+        row.truncate(header.len());
+        row
+    });
+    write(path.as_ref(), &header, rows)
+}

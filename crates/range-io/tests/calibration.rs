@@ -1,0 +1,203 @@
+//! `calibration.ron`: bit-exact round trips, models in and out, and what is refused.
+#![cfg(feature = "calibration")]
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+// What goes through a file comes back to the last bit.
+#![allow(clippy::float_cmp)]
+
+use std::path::Path;
+
+use camera_model::{Camera, ImageFormat, InteriorOrientation, LensDistortion};
+use error_models::{
+    AmplitudeHyperbola, FixedPattern, ModelSet, NamedParameter, ParameterStatus, RangeErrorModel, RangeTerms,
+};
+use proptest::prelude::*;
+use range_image::{Modulation, NoiseModel};
+use range_io::Error;
+use range_io::calibration::{Calibration, Correlation, Provenance, ValidSpan};
+use scattering_deconvolution::{GaussianTerm, Psf};
+
+mod common;
+
+fn camera() -> Camera {
+    let format = ImageFormat::new(4, 3, [0.04, 0.041]).unwrap();
+    let interior = InteriorOrientation { principal_point_mm: [0.1, -0.2], principal_distance_mm: 8.1 };
+    let lens = LensDistortion { k1: 1e-3, k2: -2e-5, k3: 0.0, p1: 1e-5, p2: -3e-5 };
+    Camera::new(format, interior, lens).unwrap()
+}
+
+fn model(hz: f64) -> RangeErrorModel {
+    RangeErrorModel {
+        ambiguity_interval_m: Modulation::new(hz).unwrap().ambiguity_interval_m(),
+        terms: RangeTerms { d0: 0.024, periodic: [0.01, -0.02, 0.003, 0.0, 0.005, 0.006], e1: 1e-3, e2: -2e-4 },
+        hyperbola: Some(AmplitudeHyperbola { h1: -1e-4, h2: 2e-2, h3: 90.0, amplitude_span: [20.0, 3000.0] }),
+        range_span_m: Some([0.5, 7.0]),
+    }
+}
+
+fn models() -> ModelSet {
+    ModelSet { entries: vec![(0.001, vec![model(20e6), model(30e6)]), (0.004, vec![model(20e6), model(30e6)])] }
+}
+
+fn psf() -> Psf {
+    Psf::Gaussians(vec![GaussianTerm { weight: 0.05, sigma_px: [20.0, 15.0] }])
+}
+
+fn full() -> Calibration {
+    let mut calibration = Calibration::from_models(&camera(), &models(), Some(&psf())).unwrap();
+    calibration.parameters[2].status = ParameterStatus::Estimated;
+    calibration.parameters[2].sigma = 0.004;
+    calibration.range_models[1].parameters[0].status = ParameterStatus::Estimated;
+    calibration.range_models[1].parameters[0].sigma = 0.002;
+    calibration.noise = Some(NoiseModel { shot_variance_per_unit: 0.3, dark_sigma: 5.0 });
+    calibration.fixed_pattern =
+        Some(FixedPattern { width: 4, height: 3, offset_m: (0..12).map(|i| i as f32 * 1e-4).collect() });
+    calibration.correlation =
+        Some(Correlation { names: vec!["c".into(), "d0[1]".into()], matrix: vec![vec![1.0, 0.9], vec![0.9, 1.0]] });
+    calibration.span = ValidSpan { range_m: Some([0.5, 7.0]), temperature_c: Some([20.0, 40.0]), ..Default::default() };
+    calibration.provenance = Provenance {
+        survey: "surveys/wall \"north\"".into(),
+        method: "one step".into(),
+        redundancy: Some(1317),
+        sigma0: Some(0.98),
+        created: Some("2026-11-21".into()),
+    };
+    calibration
+}
+
+fn back(calibration: &Calibration) -> Calibration {
+    Calibration::parse(Path::new("calibration.ron"), &calibration.to_text().unwrap()).unwrap()
+}
+
+#[test]
+fn models_come_back_from_a_calibration() {
+    let calibration = full();
+    assert_eq!(back(&calibration), calibration);
+    assert_eq!(calibration.camera().unwrap(), camera());
+    assert_eq!(calibration.scattering, Some(psf()));
+    let set = calibration.model_set().unwrap();
+    assert_eq!(set.entries.len(), 2);
+    set.validate().unwrap();
+    for ((time, found), (expected_time, expected)) in set.entries.iter().zip(&models().entries) {
+        assert_eq!(time, expected_time);
+        for (found, expected) in found.iter().zip(expected) {
+            assert_eq!(found, expected);
+        }
+    }
+    let frequencies: Vec<_> = calibration.modulations().unwrap().iter().map(Modulation::frequency_hz).collect();
+    assert_eq!(frequencies, [20e6, 30e6]);
+}
+
+#[test]
+fn a_file_is_written_and_read() {
+    let folder = tempfile::tempdir().unwrap();
+    full().write(folder.path().join(Calibration::FILE_NAME)).unwrap();
+    assert_eq!(Calibration::read(folder.path()).unwrap(), full());
+}
+
+#[test]
+fn covariances_follow_from_deviations_and_correlations() {
+    let calibration = full();
+    let names = calibration.parameter_names();
+    assert_eq!((names[0].as_str(), names[8].as_str(), names.len()), ("xp", "d0[0]", 8 + 4 * 12));
+    let covariance = calibration.covariance(&["c", "d0[1]", "k1"]).unwrap();
+    // Products of two decimal numbers in double precision.
+    assert!((covariance[(0, 1)] - 0.9 * 0.004 * 0.002).abs() < 1e-18);
+    assert!((covariance[(0, 0)] - 0.004 * 0.004).abs() < 1e-18);
+    assert_eq!(covariance[(2, 2)], 0.0);
+    let camera = calibration.camera_covariance().unwrap();
+    assert_eq!(camera[(2, 2)], covariance[(0, 0)]);
+    let mut unknown = calibration;
+    unknown.parameters[0].sigma = f64::NAN;
+    assert!(matches!(unknown.camera_covariance(), Err(Error::Value { field, .. }) if field == "xp"));
+}
+
+proptest! {
+    #![proptest_config(common::cases(32))]
+
+    #[test]
+    fn every_bit_comes_back(
+        values in prop::collection::vec(prop::num::f64::NORMAL, 8),
+        sigma in prop::num::f64::POSITIVE | prop::num::f64::ZERO,
+        pattern in prop::collection::vec(prop::num::f32::NORMAL | prop::num::f32::SUBNORMAL | prop::num::f32::ZERO, 12),
+        r in -1.0..1.0_f64,
+    ) {
+        let mut calibration = full();
+        for (parameter, value) in calibration.parameters.iter_mut().zip(&values) {
+            parameter.value = if parameter.name == "c" { value.abs() } else { *value };
+            parameter.sigma = sigma;
+        }
+        calibration.fixed_pattern.as_mut().unwrap().offset_m = pattern;
+        let matrix = &mut calibration.correlation.as_mut().unwrap().matrix;
+        (matrix[0][1], matrix[1][0]) = (r, r);
+        let again = back(&calibration);
+        let bits = |calibration: &Calibration| {
+            let parameters = calibration.parameters.iter().flat_map(|p| [p.value.to_bits(), p.sigma.to_bits()]);
+            let pattern = calibration.fixed_pattern.iter().flat_map(|p| p.offset_m.iter().map(|v| u64::from(v.to_bits())));
+            parameters.chain(pattern).collect::<Vec<_>>()
+        };
+        prop_assert_eq!(bits(&again), bits(&calibration));
+        prop_assert_eq!(again, calibration);
+    }
+}
+
+fn refusal(change: impl FnOnce(&mut Calibration)) -> String {
+    let mut calibration = full();
+    change(&mut calibration);
+    // The same answer in memory and, with its place, from a file.
+    let in_memory = calibration.validate().unwrap_err().to_string();
+    assert!(in_memory.starts_with("calibration: "), "{in_memory}");
+    assert!(calibration.to_text().is_err());
+    let text = range_io::ron_text::to_text(&calibration).unwrap();
+    let error = Calibration::parse(Path::new("c.ron"), &text).unwrap_err();
+    assert!(matches!(error, Error::Text { line: 2.., .. }), "{error}");
+    assert_eq!(error.to_string().split_once(": ").unwrap().1, in_memory.split_once(": ").unwrap().1);
+    in_memory
+}
+
+#[test]
+fn invalid_calibrations_are_refused_by_name() {
+    let said = |message: String, expected: &str| assert!(message.contains(expected), "{message}\nexpected: {expected}");
+    said(refusal(|c| c.parameters[2].value = 0.0), "`parameters[2].value`: `c` is 0, expected a positive");
+    said(refusal(|c| c.parameters[3].value = f64::NAN), "`k1` is NaN");
+    said(refusal(|c| c.parameters[1] = c.parameters[0].clone()), "`parameters[1].name`: `xp` is given twice");
+    said(refusal(|c| c.parameters.retain(|p| p.name != "c")), "`c` is missing");
+    said(refusal(|c| c.parameters[0].name = "cx".into()), "`cx` is no parameter, expected one of xp, yp, c, k1");
+    said(refusal(|c| c.parameters[0].unit = "px".into()), "`xp` is in `px`, expected `mm`");
+    said(refusal(|c| c.parameters[0].sigma = -1.0), "standard deviation of `xp` is -1");
+    said(refusal(|c| c.format_version = 2), "`format_version`: is 2, expected 1");
+    said(refusal(|c| c.camera.width = 0), "`camera`: ");
+    said(refusal(|c| c.fixed_pattern.as_mut().unwrap().width = 5), "`fixed_pattern`: is 5 x 3 pixels, expected 4 x 3");
+    said(refusal(|c| c.fixed_pattern.as_mut().unwrap().offset_m.truncate(11)), "has 11 values, expected 12");
+    said(refusal(|c| c.span.range_m = Some([7.0, 0.5])), "`span.range_m`: is (7, 0.5)");
+    said(
+        refusal(|c| c.scattering = Some(Psf::Kernel { width: 2, height: 1, values: vec![0.0; 2] })),
+        "kernel of 2 x 1",
+    );
+    said(refusal(|c| c.noise.as_mut().unwrap().dark_sigma = -1.0), "dark_sigma");
+    said(refusal(|c| c.range_models[3].integration_time_s = 0.001), "range_models");
+    said(refusal(|c| c.range_models[0].modulation_hz = 0.0), "`range_models[0].modulation_hz`: ");
+    said(refusal(|c| c.range_models[2].amplitude_span = None), "`range_models[2]`: ");
+    said(
+        refusal(|c| {
+            c.range_models[2].parameters[1] =
+                NamedParameter { name: "d1".into(), ..c.range_models[2].parameters[1].clone() }
+        }),
+        "`range_models[2].parameters[1].name`: `d1` is no parameter, expected one of d0, d2",
+    );
+    let correlation = |change: fn(&mut Correlation)| refusal(|c| change(c.correlation.as_mut().unwrap()));
+    said(correlation(|r| r.matrix[0][1] = 0.8), "correlation of `c` and `d0[1]` is 0.8, but 0.9 the other way round");
+    said(correlation(|r| r.matrix[1][1] = 0.9), "correlation of `d0[1]` and `d0[1]` is 0.9, expected 1");
+    said(correlation(|r| r.matrix[0][1] = 1.5), "is 1.5, expected -1 to 1");
+    said(correlation(|r| r.matrix[0][1] = f64::NAN), "is NaN, expected -1 to 1");
+    said(correlation(|r| r.matrix.truncate(1)), "has 1 rows for 2 names");
+    said(correlation(|r| r.matrix[1].truncate(1)), "`correlation.matrix[1]`: has 1 values for 2 names");
+    said(correlation(|r| r.names[0] = "d0".into()), "`d0` is no parameter of this calibration");
+    said(correlation(|r| r.names[1] = "c".into()), "`c` is given twice");
+}
+
+#[test]
+fn unknown_fields_are_refused_with_their_place() {
+    let text = full().to_text().unwrap().replace("provenance: (", "provenance: (operator: \"x\", ");
+    let error = Calibration::parse(Path::new("c.ron"), &text).unwrap_err().to_string();
+    assert!(error.contains("operator"), "{error}");
+}

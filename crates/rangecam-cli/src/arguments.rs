@@ -1,0 +1,66 @@
+//! What can be typed.
+
+use std::path::PathBuf;
+
+use clap::{Parser, Subcommand};
+
+/// Raw frames of a range camera in, one corrected and registered cloud out.
+#[derive(Debug, Parser)]
+#[command(name = "rangecam", version, about)]
+pub(crate) struct Arguments {
+    /// No progress, no summary: only errors.
+    #[arg(long, short, global = true)]
+    pub(crate) quiet: bool,
+    /// The result as JSON on standard output, nothing else there.
+    #[arg(long, global = true)]
+    pub(crate) json: bool,
+    #[command(subcommand)]
+    pub(crate) command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// Run a pipeline on a survey and write cloud, poses, summary and report.
+    Run {
+        /// Folder with survey.ron; may be left out where the pipeline names its own source.
+        survey: Option<PathBuf>,
+        /// The pipeline's RON file.
+        #[arg(long, short)]
+        pipeline: PathBuf,
+        /// calibration.ron; default: the one beside survey.ron, if there is one.
+        #[arg(long, short)]
+        calibration: Option<PathBuf>,
+        /// Output folder; default: out/<name of the pipeline>.
+        #[arg(long, short)]
+        out: Option<PathBuf>,
+    },
+    /// Simulate a scene and write it as a survey with its truth.
+    Simulate {
+        /// The scene's RON file.
+        scene: PathBuf,
+        /// Seed of all random numbers.
+        #[arg(long, default_value_t = 1)]
+        seed: u64,
+        /// Standard deviation of the approximate station positions written to stations.csv, metre.
+        #[arg(long, default_value_t = 0.05)]
+        position_sigma: f64,
+        /// Standard deviation of the approximate attitudes written to stations.csv, degree.
+        #[arg(long, default_value_t = 2.0)]
+        attitude_sigma: f64,
+        /// Output folder; default: out/<name of the scene's file>.
+        #[arg(long, short)]
+        out: Option<PathBuf>,
+    },
+    /// Tell what a survey, a calibration or a cloud holds, and which stages it leaves room for.
+    Inspect {
+        /// Survey folder, calibration.ron or cloud.ply.
+        path: PathBuf,
+    },
+    /// Compare two results: output folders, clouds (.ply) or poses (stations.csv, trajectory.txt).
+    Compare {
+        /// The one.
+        first: PathBuf,
+        /// The other, taken as the reference.
+        second: PathBuf,
+    },
+}

@@ -1,0 +1,48 @@
+//! Each command: arguments to one call of `pipeline`.
+
+use std::error::Error;
+use std::path::{Path, PathBuf};
+
+use pipeline::{Plan, RunRequest, SimulateSource};
+
+use crate::arguments::Command;
+use crate::output::Output;
+
+type Outcome = Result<(), Box<dyn Error>>;
+
+pub(crate) fn dispatch(command: Command, output: &Output) -> Outcome {
+    match command {
+        Command::Run { survey, pipeline, calibration, out } => run(survey, &pipeline, calibration, out, output),
+        Command::Simulate { scene, seed, position_sigma, attitude_sigma, out } => {
+            let source = SimulateSource {
+                scene: scene.display().to_string(),
+                seed,
+                approximate_position_sigma_m: position_sigma,
+                approximate_attitude_sigma_deg: attitude_sigma,
+            };
+            let out = out.unwrap_or_else(|| default_out(scene.file_stem().unwrap_or_default().as_ref()));
+            let simulated = pipeline::simulate(&source, Path::new(""), &out, output.progress().as_ref())?;
+            output.result(&simulated)
+        }
+        Command::Inspect { path } => output.result(&pipeline::inspect(&path)?),
+        Command::Compare { first, second } => output.result(&pipeline::compare(&first, &second)?),
+    }
+}
+
+fn run(
+    survey: Option<PathBuf>,
+    pipeline: &Path,
+    calibration: Option<PathBuf>,
+    out: Option<PathBuf>,
+    output: &Output,
+) -> Outcome {
+    let plan = Plan::read(pipeline)?;
+    let out = out.unwrap_or_else(|| default_out(plan.name.as_ref()));
+    let request = RunRequest { plan, plan_path: pipeline.to_owned(), survey, calibration, out };
+    let summary = pipeline::run(&request, output.progress().as_ref())?;
+    output.result(&summary)
+}
+
+fn default_out(name: &Path) -> PathBuf {
+    Path::new("out").join(name)
+}

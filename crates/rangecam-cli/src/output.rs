@@ -1,0 +1,64 @@
+//! Where words go: results to standard output, everything else to standard error.
+
+#![allow(clippy::print_stdout, clippy::print_stderr)]
+
+use std::error::Error;
+use std::fmt::Display;
+use std::io::IsTerminal;
+
+use pipeline::{Progress, Silent};
+use serde::Serialize;
+
+use crate::arguments::Arguments;
+use crate::bar::Bar;
+
+/// How the user wants to be spoken to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Voice {
+    Words,
+    Json,
+    Quiet,
+}
+
+/// The command's voice.
+#[derive(Debug)]
+pub(crate) struct Output {
+    voice: Voice,
+    colour: bool,
+}
+
+impl Output {
+    pub(crate) fn new(arguments: &Arguments) -> Self {
+        let voice = match (arguments.json, arguments.quiet) {
+            (true, _) => Voice::Json,
+            (false, true) => Voice::Quiet,
+            (false, false) => Voice::Words,
+        };
+        let colour = std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none();
+        Self { voice, colour }
+    }
+
+    /// The progress to show while work runs.
+    pub(crate) fn progress(&self) -> Box<dyn Progress> {
+        match self.voice {
+            Voice::Words => Box::new(Bar::new()),
+            Voice::Json | Voice::Quiet => Box::new(Silent),
+        }
+    }
+
+    /// A result: JSON where that was asked for, words otherwise.
+    pub(crate) fn result<T: Serialize + Display>(&self, result: &T) -> Result<(), Box<dyn Error>> {
+        match self.voice {
+            Voice::Words => println!("{result}"),
+            Voice::Json => println!("{}", serde_json::to_string_pretty(result)?),
+            Voice::Quiet => {}
+        }
+        Ok(())
+    }
+
+    /// Why the command failed.
+    pub(crate) fn error(&self, error: &dyn Error) {
+        let head = if self.colour { "\u{1b}[31merror:\u{1b}[0m" } else { "error:" };
+        eprintln!("{head} {error}");
+    }
+}

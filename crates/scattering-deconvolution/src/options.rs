@@ -1,0 +1,52 @@
+use crate::{Error, Result};
+
+/// Where scattered light is computed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
+pub enum GridSpacing {
+    /// As wide as the narrowest Gaussian allows, at most 8 pixels: scattered light is smooth. Sampled kernels are taken
+    /// at every pixel.
+    #[default]
+    Automatic,
+    /// At every pixel.
+    EveryPixel,
+}
+
+/// How scattering is undone.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
+pub struct RestorationOptions {
+    /// Weight `lambda` of the wish that the image stays as it was observed: `|F z - y|^2 + lambda |z - y|^2` becomes
+    /// smallest, with `F = 1 + H`. Zero, the default, is the plain inverse.
+    pub regularisation: f64,
+    /// Largest residual `|y - (z + psf * z)|` allowed, relative to the largest real or imaginary part of `y`.
+    /// Not asked for with a regularisation.
+    pub tolerance: f64,
+    /// Iterations after which an image that has not come below the tolerance is refused.
+    pub max_iterations: usize,
+    /// Where scattered light is computed.
+    pub grid_spacing: GridSpacing,
+}
+
+impl Default for RestorationOptions {
+    fn default() -> Self {
+        Self { regularisation: 0.0, tolerance: 1e-5, max_iterations: 30, grid_spacing: GridSpacing::Automatic }
+    }
+}
+
+impl RestorationOptions {
+    /// Fails on values without meaning.
+    pub fn validate(&self) -> Result<()> {
+        if !(self.regularisation.is_finite() && self.regularisation >= 0.0) {
+            let expected = "a regularisation is finite and not negative";
+            return Err(Error::OutOfDomain { name: "regularisation", value: self.regularisation, expected });
+        }
+        if !(self.tolerance.is_finite() && self.tolerance > 0.0) {
+            let expected = "a tolerance is finite and positive";
+            return Err(Error::OutOfDomain { name: "tolerance", value: self.tolerance, expected });
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,84 @@
+use thiserror::Error;
+
+/// Why a calibration gave no trustworthy result.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// An argument or option lies outside its domain.
+    #[error("{name} = {value}: {expected}")]
+    OutOfDomain {
+        /// Name of the argument.
+        name: &'static str,
+        /// Value given.
+        value: f64,
+        /// What would be right.
+        expected: &'static str,
+    },
+    /// A range difference that cannot be used.
+    #[error("range difference {index}: {name} = {value}, expected {expected}")]
+    BadDifference {
+        /// Position in the list.
+        index: usize,
+        /// Which of its numbers.
+        name: &'static str,
+        /// The number.
+        value: f64,
+        /// What would be right.
+        expected: &'static str,
+    },
+    /// There are no more range differences than unknowns, so that nothing checks them.
+    #[error("{differences} range differences for {unknowns} unknown parameters: too few")]
+    TooFewDifferences {
+        /// Number of differences.
+        differences: usize,
+        /// Number of unknowns.
+        unknowns: usize,
+    },
+    /// Every parameter is held.
+    #[error("every range term is held and no hyperbola is estimated: there is nothing to estimate")]
+    NothingToEstimate,
+    /// The distances and amplitudes observed cannot tell some parameters apart.
+    #[error(
+        "the observed ranges ({:.3} m to {:.3} m) cannot tell these parameters apart: {combination} (inflation {inflation:.0}); \
+         observe more distances, over a whole ambiguity interval, and more amplitudes if there is a hyperbola, \
+         or hold one of them", .range_span_m[0], .range_span_m[1]
+    )]
+    NotDetermined {
+        /// The combinations of parameters that are not, or hardly, determined, with their weights.
+        combination: String,
+        /// How many times larger the deviation of the worst combination is than if its parameters did not share
+        /// their effect; infinite where nothing determines it.
+        inflation: f64,
+        /// Smallest and largest range observed, metre.
+        range_span_m: [f64; 2],
+    },
+    /// No hyperbola runs anywhere near the residuals.
+    #[error("no start values for h1, h2, h3: {reason}")]
+    NoHyperbola {
+        /// What is missing.
+        reason: &'static str,
+    },
+    /// The plane is not in front of the camera at this pixel.
+    #[error("the ray of pixel ({col}, {row}) does not meet the plane in front of the camera")]
+    PlaneNotSeen {
+        /// Column.
+        col: f64,
+        /// Row.
+        row: f64,
+    },
+    /// The adjustment failed.
+    #[error(transparent)]
+    Adjust(#[from] adjust::Error),
+    /// The camera is not valid.
+    #[error(transparent)]
+    Camera(#[from] camera_model::Error),
+    /// The estimated model is not usable, or a parameter name is unknown.
+    #[error(transparent)]
+    Model(#[from] error_models::Error),
+    /// The frame is not valid.
+    #[error(transparent)]
+    Image(#[from] range_image::Error),
+}
+
+/// Result with this crate's [`enum@Error`].
+pub type Result<T> = std::result::Result<T, Error>;

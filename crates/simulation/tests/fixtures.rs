@@ -1,0 +1,109 @@
+//! The scenes of `fixtures/scenes` are what their users count on.
+#![allow(clippy::unwrap_used)]
+
+mod common;
+
+use common::{fixture, quantile, range_error};
+use range_image::{ComplexFrame, Flags, average, demodulate};
+use simulation::{SimulationSpec, Simulator, StationImage, simulate};
+
+fn averaged(
+    simulator: &Simulator,
+    image: &StationImage,
+    frames: usize,
+) -> (ComplexFrame, std::sync::Arc<simulation::FrameTruth>) {
+    let options = simulator.spec().demodulation_options();
+    let frames: Vec<_> = (0..frames).map(|frame| simulator.frame(image, frame, 7).unwrap()).collect();
+    let complex: Vec<_> = frames.iter().map(|frame| demodulate(&frame.raw, &options).unwrap()).collect();
+    (average(&complex).unwrap(), frames[0].truth.clone())
+}
+
+#[test]
+fn the_small_room_is_the_room_with_fewer_pixels() {
+    let (room, small) = (fixture("room"), fixture("room_small"));
+    assert_eq!(room.scene, small.scene);
+    assert_eq!(room.stations, small.stations);
+    assert_eq!(room.errors.range, small.errors.range);
+    assert_eq!(room.camera.geometry.lens, small.camera.geometry.lens);
+    let size = |spec: &SimulationSpec| {
+        let format = spec.camera.geometry.format;
+        (format.width as f64 * format.pixel_pitch_mm[0], format.height as f64 * format.pixel_pitch_mm[1])
+    };
+    assert_eq!(size(&room), size(&small));
+    assert!(room.errors.multipath.is_none());
+    assert_eq!(room.camera.geometry, fixture("wall").camera.geometry);
+    assert_eq!(room.errors, fixture("wall").errors);
+}
+
+#[test]
+fn raw_ranges_of_the_small_room_are_off_by_five_to_ten_centimetres() {
+    let spec = fixture("room_small");
+    let simulator = Simulator::new(&spec).unwrap();
+    let (mut errors, mut beyond, mut mixed, mut pixels) = (Vec::new(), 0, 0, 0);
+    for station in 0..spec.stations.len() {
+        let image = simulator.station(station).unwrap();
+        let (complex, truth) = averaged(&simulator, &image, spec.exposure.frames_per_station);
+        errors.extend(range_error(&complex, 0, &truth.range));
+        let interval = common::INTERVAL_M as f32;
+        let here = truth.range.as_slice().iter().filter(|range| **range > interval).count();
+        assert!(here > 0, "station {station} sees nothing beyond the ambiguity interval");
+        assert!(truth.range.as_slice().iter().all(|range| *range > 0.7), "the room is closed and nothing is too near");
+        assert!(complex.flags.as_slice().iter().all(|flags| !flags.contains(Flags::SATURATED)));
+        beyond += here;
+        mixed += truth.mixed.as_slice().iter().filter(|mixed| **mixed).count();
+        pixels += truth.range.len();
+    }
+    let median = quantile(&errors, 0.5);
+    assert!((0.05..0.10).contains(&median), "median raw error {median} m");
+    let share = |count: usize| count as f64 / pixels as f64;
+    assert!((0.1..0.5).contains(&share(beyond)), "{}", share(beyond));
+    // Pixels twice as large as the room's are mixed twice as often.
+    assert!((0.02..0.12).contains(&share(mixed)), "{}", share(mixed));
+}
+
+#[test]
+fn noise_of_the_small_room_is_as_its_model_predicts() {
+    let spec = fixture("room_small");
+    let mut silent = spec.clone();
+    silent.errors.noise = None;
+    silent.errors.digitisation = None;
+    silent.stations.truncate(1);
+    let survey = simulate(&silent, 7, &|_, _| {}).unwrap();
+    let clean = demodulate(&survey.frames[0].raw, &silent.demodulation_options()).unwrap();
+    let simulator = Simulator::new(&spec).unwrap();
+    let (complex, _) = averaged(&simulator, &simulator.station(0).unwrap(), 2);
+    let (noisy, clean) = (&complex.channels[0], &clean.channels[0]);
+    let square = |i: usize| {
+        let off = noisy.real.as_slice()[i] - clean.real.as_slice()[i];
+        f64::from(off / noisy.sigma.as_slice()[i]).powi(2)
+    };
+    let mean = (0..noisy.real.len()).map(square).sum::<f64>() / noisy.real.len() as f64;
+    // 6336 squares: known to sqrt(2 / 6336) = 1.8 %; four of these. Rounding to counts of 2.5 units adds 0.52 to
+    // variances of 15 and more.
+    assert!((mean - 1.0).abs() < 0.10, "{mean}");
+}
+
+#[test]
+fn neighbouring_stations_share_half_their_view_or_more() {
+    let spec = fixture("room_small");
+    let simulator = Simulator::new(&spec).unwrap();
+    let truths: Vec<_> = (0..spec.stations.len())
+        .map(|station| simulator.frame(&simulator.station(station).unwrap(), 0, 1).unwrap().truth)
+        .collect();
+    let camera = spec.camera.geometry;
+    for (index, from) in truths.iter().enumerate() {
+        let to = &truths[(index + 1) % truths.len()];
+        let shared = |i: usize| {
+            let (col, row) = (i % 88, i / 88);
+            let range = f64::from(from.range[(col, row)]);
+            let point = from.world_from_camera * camera.point([col as f64, row as f64], range);
+            let Ok([c, r]) = camera.project(&(to.world_from_camera.inverse() * point)) else { return false };
+            let there = if c > -0.5 && r > -0.5 { to.range.get(c.round() as usize, r.round() as usize) } else { None };
+            let distance = (point.coords - to.world_from_camera.translation.vector).norm();
+            // Within a pixel's slope and 5 cm: the same surface, not one in front of it.
+            there.is_some_and(|there| (f64::from(*there) - distance).abs() < 0.05 + 0.02 * distance)
+        };
+        let overlap = (0..88 * 72).filter(|i| shared(*i)).count() as f64 / (88.0 * 72.0);
+        assert!((0.5..0.8).contains(&overlap), "stations {index} and next: {overlap}");
+    }
+}

@@ -1,0 +1,16 @@
+//! `cargo xtask test`: what must be green.
+
+use crate::shell::{Outcome, cargo};
+use crate::tidy;
+
+pub(crate) fn run() -> Outcome {
+    cargo(&["fmt", "--all", "--check"], &[])?;
+    tidy::run()?;
+    cargo(&["clippy", "--workspace", "--all-targets", "--all-features", "--", "--deny", "warnings"], &[])?;
+    cargo(
+        &["doc", "--workspace", "--all-features", "--no-deps"],
+        &[("RUSTDOCFLAGS", "--deny warnings")],
+    )?;
+    // The tests of `pipeline` hold the small room and the real captures against their bars.
+    cargo(&["test", "--workspace", "--all-features"], &[])
+}

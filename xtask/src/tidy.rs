@@ -1,0 +1,110 @@
+//! `cargo xtask tidy`: checks of the repository itself.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+use crate::shell::{Outcome, root};
+
+/// A file of source code holds one idea; beyond this it holds several.
+const LONGEST_FILE: usize = 400;
+
+pub(crate) fn run() -> Outcome {
+    println!("── tidy");
+    let root = root();
+    let crates = folders(&root.join("crates"))?;
+    let mut complaints = Vec::new();
+    for folder in &crates {
+        complaints.extend(missing_parts(folder));
+    }
+    let sources = files_below(&root, &["rs", "md"])?;
+    let keys = bibliography_keys(&read(&root.join("docs/bibliography.md"))?);
+    for path in &sources {
+        let text = read(path)?;
+        let shown = path.strip_prefix(&root).unwrap_or(path).display();
+        complaints.extend(unknown_keys(&text, &keys).into_iter().map(|key| format!("{shown}: [{key}] is not in docs/bibliography.md")));
+        let lines = text.lines().count();
+        if path.extension().is_some_and(|ending| ending == "rs") && lines > LONGEST_FILE {
+            complaints.push(format!("{shown}: {lines} lines, at most {LONGEST_FILE}"));
+        }
+    }
+    if complaints.is_empty() { Ok(()) } else { Err(complaints.join("\n")) }
+}
+
+/// What a crate must have and this one lacks.
+fn missing_parts(folder: &Path) -> Vec<String> {
+    let name = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let mut parts = vec!["README.md", "Cargo.toml"];
+    // The facade and the command have no numerics of their own to show or measure.
+    if !name.starts_with("rangecam") {
+        parts.extend(["src/lib.rs", "examples", "benches"]);
+    }
+    parts.retain(|part| !folder.join(part).exists());
+    parts.into_iter().map(|part| format!("crates/{name}: {part} is missing")).collect()
+}
+
+/// Keys in bold brackets at the beginning of a list entry.
+fn bibliography_keys(text: &str) -> BTreeSet<String> {
+    let entries = text.lines().filter_map(|line| line.strip_prefix("- **["));
+    entries.filter_map(|rest| rest.split_once(']').map(|(key, _)| key.to_owned())).collect()
+}
+
+/// Citations such as `[Lange2000]`: letters, then a year, that the bibliography lacks.
+fn unknown_keys(text: &str, known: &BTreeSet<String>) -> BTreeSet<String> {
+    let brackets = text.split('[').skip(1).filter_map(|rest| rest.split_once(']').map(|(key, _)| key));
+    brackets.filter(|key| is_key(key) && !known.contains(*key)).map(str::to_owned).collect()
+}
+
+fn is_key(text: &str) -> bool {
+    let letters = text.chars().take_while(|c| c.is_alphabetic()).count();
+    let rest: Vec<char> = text.chars().skip(letters).collect();
+    let year = rest.iter().take(4).filter(|c| c.is_ascii_digit()).count() == 4;
+    let suffix = rest.iter().skip(4).all(char::is_ascii_lowercase) && rest.len() <= 5;
+    letters >= 2 && text.starts_with(char::is_uppercase) && year && suffix
+}
+
+fn folders(parent: &Path) -> Result<Vec<PathBuf>, String> {
+    let mut found: Vec<PathBuf> = entries(parent)?.into_iter().filter(|path| path.is_dir()).collect();
+    found.sort();
+    Ok(found)
+}
+
+/// Files with one of the endings, leaving out what is built or hidden.
+fn files_below(folder: &Path, endings: &[&str]) -> Result<Vec<PathBuf>, String> {
+    let mut found = Vec::new();
+    for path in entries(folder)? {
+        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        if path.is_dir() && !name.starts_with('.') && name != "target" && name != "out" {
+            found.extend(files_below(&path, endings)?);
+        } else if path.extension().is_some_and(|ending| endings.iter().any(|known| ending == *known)) {
+            found.push(path);
+        }
+    }
+    found.sort();
+    Ok(found)
+}
+
+fn entries(folder: &Path) -> Result<Vec<PathBuf>, String> {
+    let list = std::fs::read_dir(folder).map_err(|error| format!("{}: {error}", folder.display()))?;
+    Ok(list.flatten().map(|entry| entry.path()).collect())
+}
+
+fn read(path: &Path) -> Result<String, String> {
+    std::fs::read_to_string(path).map_err(|error| format!("{}: {error}", path.display()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_citation_is_letters_and_a_year() {
+        assert!(is_key("Lange2000") && is_key("Lichti2011b"));
+        assert!(!is_key("Error") && !is_key("0; 3") && !is_key("f64; 3") && !is_key("Vec2000x9"));
+    }
+
+    #[test]
+    fn an_unknown_citation_is_found() {
+        let known = bibliography_keys("- **[Lange2000]** R. Lange\n");
+        assert_eq!(unknown_keys("see [Lange2000] and [Nobody1999]", &known), ["Nobody1999".to_owned()].into());
+    }
+}

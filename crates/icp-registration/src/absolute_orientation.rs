@@ -102,7 +102,8 @@ impl Moments {
             points.iter().enumerate().fold(Vector3::zeros(), |sum, (i, p)| sum + p.coords * (weight_of(i) / weight))
         };
         let (source_mean, target_mean) = (mean(source), mean(target));
-        let (mut source_scatter, mut target_scatter, mut cross) = (Matrix3::zeros(), Matrix3::zeros(), Matrix3::zeros());
+        let (mut source_scatter, mut target_scatter, mut cross) =
+            (Matrix3::zeros(), Matrix3::zeros(), Matrix3::zeros());
         for (i, (p, q)) in source.iter().zip(target).enumerate() {
             let (p, q, w) = (p.coords - source_mean, q.coords - target_mean, weight_of(i));
             source_scatter += p * p.transpose() * w;
@@ -132,7 +133,7 @@ impl Moments {
         let mut order = [0, 1, 2, 3];
         order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
         let gap = eigen.eigenvalues[order[0]] - eigen.eigenvalues[order[1]];
-        if !(gap > AMBIGUOUS_GAP) {
+        if gap.is_nan() || gap <= AMBIGUOUS_GAP {
             return Err(Error::AmbiguousRotation { gap });
         }
         let v = eigen.eigenvectors.column(order[0]);

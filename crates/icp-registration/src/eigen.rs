@@ -11,8 +11,8 @@ pub(crate) fn eigenvalues3(m: &Matrix3<f64>) -> [f64; 3] {
     let deviation = m - Matrix3::identity() * mean;
     let p2 = deviation.diagonal().norm_squared() + 2.0 * off;
     let p = (p2 / 6.0).sqrt();
-    // Also catches NaN and a multiple of the identity.
-    if !(p > f64::MIN_POSITIVE) {
+    // A multiple of the identity, or no matrix at all.
+    if p.is_nan() || p <= f64::MIN_POSITIVE {
         return [mean; 3];
     }
     let half_det = ((deviation / p).determinant() / 2.0).clamp(-1.0, 1.0);

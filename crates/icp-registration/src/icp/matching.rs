@@ -57,8 +57,7 @@ impl Matcher<'_> {
             return Err(Error::NonFinite { what: "source points in the target frame", index: source });
         }
         let nearest = self.target.tree.nearest_unchecked(&[moved.x, moved.y, moved.z]);
-        let pair =
-            Pair { source, target: nearest.index, moved: moved.coords, distance_m: nearest.distance_m };
+        let pair = Pair { source, target: nearest.index, moved: moved.coords, distance_m: nearest.distance_m };
         Ok((nearest.distance_m <= limit_m && self.normals_agree(pose, &pair)).then_some(pair))
     }
 
@@ -68,10 +67,10 @@ impl Matcher<'_> {
             return false;
         }
         match (self.options.max_normal_angle_rad, self.source_normals) {
-            // Where one of them has no normal there is nothing to compare; NaN fails the comparison, so it passes.
+            // Where one of them has no normal there is nothing to compare.
             (Some(angle), Some(normals)) => {
                 let cosine = (pose.rotation * normals[pair.source]).dot(normal).abs();
-                !(cosine < angle.cos())
+                cosine.is_nan() || cosine >= angle.cos()
             }
             _ => true,
         }

@@ -20,13 +20,15 @@ use crate::error::{Error, Result};
 use crate::normals::{UnorganisedNormalOptions, unorganised_normals};
 use crate::pose::{is_finite, move_about};
 use matching::{Matcher, Pair};
-use quality::Verdict;
+use quality::{Residuals, Verdict};
 use system::System;
 
 /// Source points that the coarse levels work with.
 const COARSE_POINTS: usize = 4000;
 /// Iterations that a coarse level may take.
 const COARSE_ITERATIONS: usize = 8;
+/// Steps of the last level after which it is asked whether they still shrink.
+const WANDERING: usize = 10;
 /// A coarse level ends when a step is below this fraction of its distance limit.
 const COARSE_STEP: f64 = 0.02;
 
@@ -138,13 +140,12 @@ impl Run<'_> {
         } else {
             target.radius_m.max(f64::MIN_POSITIVE)
         });
-        let first = match options.initial_correspondence_distance_m {
-            Some(first) => first,
-            None => {
-                let sample = selection::thinned(&self.selected, 1000);
-                let median = self.matcher.median_distance(&self.pose, &sample)?;
-                (2.5 * median).max(target.radius_m / 4.0).min(target.radius_m)
-            }
+        let first = if let Some(first) = options.initial_correspondence_distance_m {
+            first
+        } else {
+            let sample = selection::thinned(&self.selected, 1000);
+            let median = self.matcher.median_distance(&self.pose, &sample)?;
+            (2.5 * median).max(target.radius_m / 4.0).min(target.radius_m)
         };
         let mut limits = vec![last];
         while let Some(&limit) = limits.last()
@@ -165,7 +166,7 @@ impl Run<'_> {
                 return Ok(());
             }
             let pairs = self.pairs(selected, limit)?;
-            if self.iterate(&pairs, limit, f64::INFINITY)? < COARSE_STEP * limit {
+            if length(&self.iterate(&pairs, limit)?) < COARSE_STEP * limit {
                 return Ok(());
             }
         }
@@ -173,37 +174,48 @@ impl Run<'_> {
     }
 
     fn final_level(&mut self, limit: f64) -> Result<StopReason> {
-        let selected = std::mem::take(&mut self.selected);
-        let mut stop = StopReason::MaxIterations;
+        let tolerance = self.matcher.options.step_tolerance_m.unwrap_or(1e-5 * self.matcher.target.radius_m);
+        let mut lengths = Vec::new();
         while self.iterations < self.matcher.options.max_iterations {
-            let pairs = self.pairs(&selected, limit)?;
-            let tolerance = self.matcher.options.step_tolerance_m.unwrap_or(1e-5 * self.matcher.target.radius_m);
-            let max_sigma_m = self.max_motion_sigma_m();
-            if self.iterate(&pairs, limit, max_sigma_m)? <= tolerance {
-                stop = StopReason::Converged;
-                break;
+            let pairs = self.pairs(&self.selected, limit)?;
+            let step = self.iterate(&pairs, limit)?;
+            lengths.push(length(&step));
+            if length(&step) <= tolerance {
+                return Ok(StopReason::Converged);
+            }
+            if lengths.len() % WANDERING == 0 && self.wanders(&pairs, &step, &lengths)? {
+                return Ok(StopReason::WithinNoise);
             }
         }
-        self.selected = selected;
-        Ok(stop)
+        Ok(StopReason::MaxIterations)
     }
 
-    /// One Gauss-Newton step; returns how far it moves points at the radius, metre.
-    fn iterate(&mut self, pairs: &[Pair], limit: f64, max_sigma_m: f64) -> Result<f64> {
+    /// Whether the steps have stopped shrinking, far below the standard deviation of the pose.
+    fn wanders(&self, pairs: &[Pair], step: &Vector6<f64>, lengths: &[f64]) -> Result<bool> {
+        let shrinking = lengths[lengths.len() - 1] < 0.5 * lengths[lengths.len() - WANDERING];
+        let system = System::new(&self.matcher, pairs);
+        let verdict = Verdict::new(&system, &self.pose, self.max_motion_sigma_m(), Residuals::Settled)?;
+        Ok(!shrinking && verdict.is_within_noise(step, 0.1))
+    }
+
+    /// One Gauss-Newton step: `[dt, rho w]` in metre as taken.
+    fn iterate(&mut self, pairs: &[Pair], limit: f64) -> Result<Vector6<f64>> {
         let system = System::new(&self.matcher, pairs);
         let held = match self.matcher.options.degeneracy {
             DegeneracyPolicy::Report => Vec::new(),
-            DegeneracyPolicy::HoldAtGuess => Verdict::new(&system, &self.pose, max_sigma_m)?.held(),
+            DegeneracyPolicy::HoldAtGuess => {
+                Verdict::new(&system, &self.pose, self.max_motion_sigma_m(), Residuals::Misaligned)?.held()
+            }
         };
         let mut step = system.step(&held)?;
         // Pairs at most `limit` apart give no reason to move farther than a few times that.
-        let length = length(&step);
-        if length > 2.0 * limit {
-            step *= 2.0 * limit / length;
+        let excess = length(&step) / (2.0 * limit);
+        if excess > 1.0 {
+            step /= excess;
         }
         self.pose = move_about(&self.pose, &system.centre, system.radius_m, &step);
         self.iterations += 1;
-        Ok(length)
+        Ok(step)
     }
 
     fn pairs(&self, selected: &[usize], limit: f64) -> Result<Vec<Pair>> {
@@ -228,7 +240,7 @@ impl Run<'_> {
     fn result(&self, limit: f64, stop: StopReason) -> Result<IcpResult> {
         let pairs = self.pairs(&self.selected, limit)?;
         let system = System::new(&self.matcher, &pairs);
-        let verdict = Verdict::new(&system, &self.pose, self.max_motion_sigma_m())?;
+        let verdict = Verdict::new(&system, &self.pose, self.max_motion_sigma_m(), Residuals::Settled)?;
         let sample = selection::thinned(&self.selected, COARSE_POINTS);
         let step = (0.5 * system.rms_m()).max(0.01 * limit);
         let response = sensitivity::sensitivity(&system, &self.pose, &sample, limit, step)?;

@@ -33,7 +33,6 @@ const ROUNDING: f64 = 1e-9;
 /// What one cell of space contributes.
 #[derive(Default)]
 struct Cell {
-    pairs: usize,
     score: Vector6<f64>,
     information: Matrix6<f64>,
 }
@@ -46,6 +45,15 @@ struct Direction {
     determined: bool,
 }
 
+/// What the residuals consist of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Residuals {
+    /// The clouds are still apart: what neighbouring residuals share is no error, and would hold what can be solved.
+    Misaligned,
+    /// Errors: what neighbouring residuals share counts.
+    Settled,
+}
+
 /// Directions of the information, worst first, with the covariance of the score and the frame they are in.
 pub(crate) struct Verdict {
     directions: Vec<Direction>,
@@ -54,11 +62,19 @@ pub(crate) struct Verdict {
 
 impl Verdict {
     /// Judges the pairs of `system` at `pose`; motions with a predicted sigma above `max_sigma_m` are undetermined.
-    pub(crate) fn new(system: &System<'_>, pose: &Isometry3<f64>, max_sigma_m: f64) -> Result<Self> {
+    pub(crate) fn new(
+        system: &System<'_>,
+        pose: &Isometry3<f64>,
+        max_sigma_m: f64,
+        residuals: Residuals,
+    ) -> Result<Self> {
         let cells = cells(system, pose);
         let information = cells.iter().fold(Matrix6::zeros(), |sum, c| sum + c.information);
         let (values, vectors) = eigen6(&symmetrised(&information), "the information of the pairs")?;
-        let score = score_covariance(system, &cells);
+        let score = match residuals {
+            Residuals::Misaligned => independent_scores(system),
+            Residuals::Settled => clustered_scores(system, &cells),
+        };
         let directions = (0..6)
             .map(|k| direction(&cells, &score, values[5], values[k], vectors.column(k).into(), max_sigma_m))
             .collect();
@@ -68,6 +84,11 @@ impl Verdict {
     /// Orthonormal undetermined motions `[dt, rho w]`.
     pub(crate) fn held(&self) -> Vec<Vector6<f64>> {
         self.directions.iter().filter(|d| !d.determined).map(|d| d.vector).collect()
+    }
+
+    /// Whether a step `[dt, rho w]` stays within `fraction` of the standard deviation along every determined motion.
+    pub(crate) fn is_within_noise(&self, step: &Vector6<f64>, fraction: f64) -> bool {
+        self.directions.iter().filter(|d| d.determined).all(|d| d.vector.dot(step).abs() <= fraction * d.sigma_m)
     }
 
     /// The undetermined motions, sorted into translations and rotations.
@@ -122,29 +143,33 @@ fn direction(
 ) -> Direction {
     let scatter = cells.iter().map(|c| vector.dot(&(c.information * vector)).powi(2)).sum::<f64>().sqrt();
     let significant = information > SIGNIFICANCE * scatter && information > ROUNDING * largest;
-    let sigma_m =
-        if significant { vector.dot(&(score * vector)).max(0.0).sqrt() / information } else { f64::INFINITY };
+    let sigma_m = if significant { vector.dot(&(score * vector)).max(0.0).sqrt() / information } else { f64::INFINITY };
     Direction { vector, information, sigma_m, determined: sigma_m <= max_sigma_m }
 }
 
-/// Covariance of the summed score.
-fn score_covariance(system: &System<'_>, cells: &[Cell]) -> Matrix6<f64> {
+/// Covariance of the summed score from the scatter of its sums over cells.
+fn clustered_scores(system: &System<'_>, cells: &[Cell]) -> Matrix6<f64> {
     let count = cells.len() as f64;
     if cells.len() >= FEWEST_CELLS {
         let sum = cells.iter().fold(Matrix6::zeros(), |sum, c| sum + c.score * c.score.transpose());
         return sum * (count / (count - 6.0));
     }
-    // Too few cells to estimate from: every pair like every other, and a cell's pairs fully dependent.
+    // Too few cells to estimate from: the pairs of a cell taken as fully dependent.
+    independent_scores(system) * (system.pairs.len() as f64 / count.max(1.0))
+}
+
+/// Covariance of the summed score of pairs that share nothing.
+fn independent_scores(system: &System<'_>) -> Matrix6<f64> {
     let pairs = system.pairs.len() as f64;
     let mut sum = Matrix6::zeros();
     for (i, pair) in system.pairs.iter().enumerate() {
         let (weight, _) = system.weights(i);
-        let (rows, rows_count) = system.rows(pair);
-        for row in &rows[..rows_count] {
+        let (rows, count) = system.rows(pair);
+        for row in &rows[..count] {
             sum += row.jacobian * row.jacobian.transpose() * (weight * row.residual).powi(2);
         }
     }
-    sum * (pairs / count.max(1.0)) * (pairs / (pairs - 6.0).max(1.0))
+    sum * (pairs / (pairs - 6.0).max(1.0))
 }
 
 fn cells(system: &System<'_>, pose: &Isometry3<f64>) -> Vec<Cell> {
@@ -155,7 +180,6 @@ fn cells(system: &System<'_>, pose: &Isometry3<f64>) -> Vec<Cell> {
         let cell = cells.entry([place.x.floor() as i64, place.y.floor() as i64, place.z.floor() as i64]).or_default();
         let (weight, slope) = system.weights(i);
         let (rows, count) = system.rows(pair);
-        cell.pairs += 1;
         for row in &rows[..count] {
             cell.score += row.jacobian * (weight * row.residual);
         }
@@ -183,4 +207,3 @@ fn pair_information(system: &System<'_>, pose: &Isometry3<f64>, i: usize) -> Mat
     let (a, b) = (system.row(pair, &along_target).jacobian, system.row(pair, &along_source).jacobian);
     (a * b.transpose() + b * a.transpose()) * 0.5
 }
-

@@ -47,10 +47,10 @@ const BUCKETS: usize = 6 * CELLS * CELLS;
 fn bucket(normal: &Vector3<f64>) -> Option<usize> {
     let axis = normal.iamax();
     let largest = normal[axis];
-    if !(largest.abs() > 0.0) {
+    if largest.is_nan() || largest.abs() <= 0.0 {
         return None;
     }
-    let cell = |v: f64| (((v / largest.abs() + 1.0) / 2.0 * CELLS as f64) as usize).min(CELLS - 1);
+    let cell = |v: f64| (((v / largest.abs() + 1.0) * 0.5 * CELLS as f64) as usize).min(CELLS - 1);
     let face = 2 * axis + usize::from(largest < 0.0);
     Some((face * CELLS + cell(normal[(axis + 1) % 3])) * CELLS + cell(normal[(axis + 2) % 3]))
 }

@@ -6,8 +6,8 @@
 use nalgebra::{Matrix6, Vector3, Vector6};
 use rayon::prelude::*;
 
-use super::matching::{CHUNK, Matcher, Pair};
 use super::Metric;
+use super::matching::{CHUNK, Matcher, Pair};
 use crate::eigen::eigen6;
 use crate::error::Result;
 use crate::kernel::mad_scale;
@@ -83,9 +83,7 @@ impl<'a> System<'a> {
     pub(crate) fn rows(&self, pair: &Pair) -> ([Row; 3], usize) {
         match self.matcher.options.metric {
             Metric::PointToPlane => ([self.row(pair, &self.matcher.target.normals[pair.target]); 3], 1),
-            Metric::PointToPoint => {
-                ([Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| self.row(pair, &axis)), 3)
-            }
+            Metric::PointToPoint => ([Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| self.row(pair, &axis)), 3),
         }
     }
 
@@ -93,7 +91,7 @@ impl<'a> System<'a> {
     pub(crate) fn weights(&self, i: usize) -> (f64, f64) {
         let precision = self.sigma[i].powi(-2);
         // Without any scatter every residual is exact (or the kernel would reject all but the zeros).
-        if !(self.scale > 1e-12 * self.radius_m) {
+        if self.scale <= 1e-12 * self.radius_m {
             return (precision, precision);
         }
         let u = self.residual_length(&self.pairs[i]) / (self.sigma[i] * self.scale);
@@ -160,12 +158,11 @@ fn pair_sigma(matcher: &Matcher<'_>, pairs: &[Pair]) -> Vec<f64> {
     if source.is_none() && target.is_none() {
         return vec![1.0; pairs.len()];
     }
-    let mut sigma: Vec<f64> =
-        pairs.iter().map(|p| (of(source, p.source) + of(target, p.target)).sqrt()).collect();
+    let mut sigma: Vec<f64> = pairs.iter().map(|p| (of(source, p.source) + of(target, p.target)).sqrt()).collect();
     let mut known: Vec<f64> = sigma.iter().copied().filter(|s| *s > 0.0).collect();
     let median = if known.is_empty() { 1.0 } else { crate::kernel::quantile(&mut known, 0.5) };
     for value in &mut sigma {
-        if !(*value > 0.0) {
+        if value.is_nan() || *value <= 0.0 {
             *value = median;
         }
     }

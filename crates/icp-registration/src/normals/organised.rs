@@ -46,7 +46,7 @@ pub fn organised_normals(
     if points.len() != expected {
         return Err(Error::LengthMismatch { what: "points of the frame", expected, found: points.len() });
     }
-    if !(options.max_relative_jump > 0.0) {
+    if options.max_relative_jump.is_nan() || options.max_relative_jump <= 0.0 {
         let value = options.max_relative_jump;
         return Err(Error::InvalidOption { name: "max_relative_jump", value, domain: "positive" });
     }

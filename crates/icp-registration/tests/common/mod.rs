@@ -126,16 +126,9 @@ pub fn frame(
 }
 
 /// A cloud with normals and sigma from a simulated frame.
-pub fn cloud(
-    scene: &Scene,
-    camera: &Pinhole,
-    world_from_camera: &Isometry3<f64>,
-    noise: f64,
-    seed: u64,
-) -> Cloud {
+pub fn cloud(scene: &Scene, camera: &Pinhole, world_from_camera: &Isometry3<f64>, noise: f64, seed: u64) -> Cloud {
     let (points, sigmas) = frame(scene, camera, world_from_camera, noise, seed);
-    let normals =
-        organised_normals(&points, camera.width, camera.height, &OrganisedNormalOptions::default()).unwrap();
+    let normals = organised_normals(&points, camera.width, camera.height, &OrganisedNormalOptions::default()).unwrap();
     Cloud::from_frame(&points, Some(&normals), Some(&sigmas)).unwrap()
 }
 

@@ -7,10 +7,7 @@ pub(crate) fn run() -> Outcome {
     cargo(&["fmt", "--all", "--check"], &[])?;
     tidy::run()?;
     cargo(&["clippy", "--workspace", "--all-targets", "--all-features", "--", "--deny", "warnings"], &[])?;
-    cargo(
-        &["doc", "--workspace", "--all-features", "--no-deps"],
-        &[("RUSTDOCFLAGS", "--deny warnings")],
-    )?;
+    cargo(&["doc", "--workspace", "--all-features", "--no-deps"], &[("RUSTDOCFLAGS", "--deny warnings")])?;
     // The tests of `pipeline` hold the small room and the real captures against their bars.
     cargo(&["test", "--workspace", "--all-features"], &[])
 }

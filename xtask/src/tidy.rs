@@ -21,7 +21,11 @@ pub(crate) fn run() -> Outcome {
     for path in &sources {
         let text = read(path)?;
         let shown = path.strip_prefix(&root).unwrap_or(path).display();
-        complaints.extend(unknown_keys(&text, &keys).into_iter().map(|key| format!("{shown}: [{key}] is not in docs/bibliography.md")));
+        complaints.extend(
+            unknown_keys(&text, &keys)
+                .into_iter()
+                .map(|key| format!("{shown}: [{key}] is not in docs/bibliography.md")),
+        );
         let lines = text.lines().count();
         if path.extension().is_some_and(|ending| ending == "rs") && lines > LONGEST_FILE {
             complaints.push(format!("{shown}: {lines} lines, at most {LONGEST_FILE}"));

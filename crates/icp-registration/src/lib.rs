@@ -23,8 +23,8 @@ pub use kernel::RobustKernel;
 #[cfg(feature = "multiview")]
 pub use multiview::{
     Datum, Overlap, PairAlignment, PairConstraint, PairResidual, RefusedPair, StationAdjustment,
-    StationAdjustmentOptions, SurfaceAdjustment, SurfaceAdjustmentOptions, adjust_stations, adjust_surfaces, align_pairs,
-    find_overlaps,
+    StationAdjustmentOptions, SurfaceAdjustment, SurfaceAdjustmentOptions, adjust_stations, adjust_surfaces,
+    align_pairs, find_overlaps,
 };
 pub use neighbours::{Neighbour, NeighbourTree};
 pub use normals::{OrganisedNormalOptions, UnorganisedNormalOptions, organised_normals, unorganised_normals};

@@ -112,8 +112,14 @@ impl NeighbourTree {
         Ok(found)
     }
 
-    /// Nearest of a query that is known to be finite.
-    pub(crate) fn nearest_unchecked(&self, query: &[f64; 3]) -> Neighbour {
+    /// A nearest point of a query that is known to be finite: of several at the same distance always the same one, as
+    /// the tree's layout has it. For hot loops, where looking for the lowest index would double the time.
+    pub(crate) fn any_nearest(&self, query: &[f64; 3]) -> Neighbour {
+        let best = self.tree.query(query).nearest_one::<SquaredEuclidean<f64>>().execute();
+        Neighbour { index: best.item as usize, distance_m: best.distance.sqrt() }
+    }
+
+    fn nearest_unchecked(&self, query: &[f64; 3]) -> Neighbour {
         let best = self.tree.query(query).nearest_one::<SquaredEuclidean<f64>>().execute();
         // A second, tiny query: whatever lies on the sphere through the best point.
         let mut index = best.item;

@@ -1,2 +1,28 @@
-//! Benchmarks.
-fn main() {}
+//! Time of the whole way from raw samples to a registered cloud, without files: the small room.
+
+use std::path::{Path, PathBuf};
+
+use criterion::{Criterion, criterion_group, criterion_main};
+use pipeline::{Plan, Silent, SimulateSource, Source};
+
+fn fixtures() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fixtures/pipelines")
+}
+
+fn room(criterion: &mut Criterion) {
+    let file = fixtures().join("room_small.ron");
+    let (Ok(plan), Ok(folder)) = (Plan::read(&file), tempfile::tempdir()) else { return };
+    let Some(Source::Simulate(source)) = &plan.source else { return };
+    let source: &SimulateSource = source;
+    let survey = folder.path().join("survey");
+    if pipeline::simulate(source, &fixtures(), &survey, &Silent).is_err() {
+        return;
+    }
+    let mut group = criterion.benchmark_group("room_small");
+    group.sample_size(10);
+    group.bench_function("process", |bencher| bencher.iter(|| pipeline::process(&plan, &survey, None, &Silent)));
+    group.finish();
+}
+
+criterion_group!(all, room);
+criterion_main!(all);

@@ -85,9 +85,7 @@ pub fn compare(first: &Path, second: &Path) -> Result<Comparison> {
     }
     let kind = |path: &Path| path.extension().map(|ending| ending.to_string_lossy().to_lowercase());
     match (kind(first).as_deref(), kind(second).as_deref()) {
-        (Some("ply"), Some("ply")) => {
-            Ok(Comparison { clouds: Some(compare_clouds(first, second)?), poses: None })
-        }
+        (Some("ply"), Some("ply")) => Ok(Comparison { clouds: Some(compare_clouds(first, second)?), poses: None }),
         (Some("csv" | "txt"), Some("csv" | "txt")) => {
             Ok(Comparison { clouds: None, poses: Some(compare_poses(first, second)?) })
         }
@@ -129,7 +127,10 @@ type Named = (String, Isometry3<f64>);
 fn read_poses(path: &Path) -> Result<Vec<Named>> {
     if path.extension().is_some_and(|ending| ending == "txt") {
         let poses = read_tum(path)?;
-        return Ok(poses.into_iter().map(|pose| (format!("{:.6}", pose.timestamp_s), pose.world_from_camera)).collect());
+        return Ok(poses
+            .into_iter()
+            .map(|pose| (format!("{:.6}", pose.timestamp_s), pose.world_from_camera))
+            .collect());
     }
     Ok(read_stations(path)?.into_iter().map(|row| (row.station, row.world_from_camera)).collect())
 }
@@ -146,7 +147,11 @@ fn compare_poses(first: &Path, second: &Path) -> Result<PoseComparison> {
     }
     if positions.is_empty() {
         let paths: [PathBuf; 2] = [first.to_owned(), second.to_owned()];
-        return Err(Error::Compare(format!("{} and {} have no pose in common", paths[0].display(), paths[1].display())));
+        return Err(Error::Compare(format!(
+            "{} and {} have no pose in common",
+            paths[0].display(),
+            paths[1].display()
+        )));
     }
     let mean_square = positions.iter().map(|d| d * d).sum::<f64>() / positions.len() as f64;
     Ok(PoseComparison {

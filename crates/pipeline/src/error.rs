@@ -9,18 +9,6 @@ pub enum Error {
     /// A survey, calibration or result file.
     #[error(transparent)]
     File(#[from] range_io::Error),
-    /// A RON text that is not what it should be.
-    #[error("{}:{line}:{column}: {message}", path.display())]
-    Ron {
-        /// The file.
-        path: PathBuf,
-        /// Line, from 1.
-        line: usize,
-        /// Column, from 1.
-        column: usize,
-        /// What is wrong there.
-        message: String,
-    },
     /// A file that can't be read or written.
     #[error("{}: {source}", path.display())]
     Access {

@@ -77,7 +77,10 @@ fn inspect_survey(path: &Path, found: &mut Inspection) -> Result<()> {
     found.add("principal distance", format!("{} mm (nominal)", camera.principal_distance_mm));
     for modulation in camera.modulations()? {
         let megahertz = modulation.frequency_hz() / 1e6;
-        found.add("frequency", format!("{megahertz} MHz, ambiguity interval {:.4} m", modulation.ambiguity_interval_m()));
+        found.add(
+            "frequency",
+            format!("{megahertz} MHz, ambiguity interval {:.4} m", modulation.ambiguity_interval_m()),
+        );
     }
     found.add("frames", survey.frames.len());
     let stations: Vec<String> = stations.iter().map(|(name, frames)| format!("{name} ({frames})")).collect();
@@ -103,10 +106,19 @@ fn inspect_calibration(path: &Path, found: &mut Inspection) -> Result<()> {
     let ranges = calibration.range_models.iter().flat_map(|model| &model.parameters);
     for parameter in calibration.parameters.iter().chain(ranges) {
         let sigma = if parameter.sigma > 0.0 { format!(" +- {:.3e}", parameter.sigma) } else { String::new() };
-        found.add("parameter", format!("{:<4} {:>13.6e}{sigma} {} ({:?})", parameter.name, parameter.value, parameter.unit, parameter.status));
+        found.add(
+            "parameter",
+            format!(
+                "{:<4} {:>13.6e}{sigma} {} ({:?})",
+                parameter.name, parameter.value, parameter.unit, parameter.status
+            ),
+        );
     }
     let scattering = calibration.scattering.as_ref();
-    found.add("scattering", scattering.map_or_else(|| "none".to_owned(), |psf| format!("{:.2} % of the light", 100.0 * psf.total_weight())));
+    found.add(
+        "scattering",
+        scattering.map_or_else(|| "none".to_owned(), |psf| format!("{:.2} % of the light", 100.0 * psf.total_weight())),
+    );
     Ok(())
 }
 

@@ -10,7 +10,6 @@ mod plan;
 mod progress;
 mod report;
 mod results;
-mod ron_text;
 mod run;
 mod simulate;
 mod stages;
@@ -25,9 +24,9 @@ pub use error::{Error, Result};
 pub use inspect::{Inspection, inspect};
 pub use outcome::{AdjustmentFigures, Outcome, StationPose};
 pub use plan::{
-    AdjustOptions, AverageOptions, CorrectImagePointOptions, CorrectRangeOptions, DeconvolveOptions,
-    DemodulateOptions, FlagOptions, MixedPixels, NoiseOptions, Plan, PointCloudOptions, RegisterOptions, SimulateSource, Source,
-    Stage, UnwrapOptions,
+    AdjustOptions, AverageOptions, CorrectImagePointOptions, CorrectRangeOptions, DeconvolveOptions, DemodulateOptions,
+    FlagOptions, MixedPixels, NoiseOptions, Plan, PointCloudOptions, RegisterOptions, SimulateSource, Source, Stage,
+    UnwrapOptions,
 };
 pub use progress::{Progress, Silent};
 pub use run::{RunRequest, process, run};

@@ -11,9 +11,7 @@ use crate::load::first_modulation;
 use crate::outcome::{Outcome, usable};
 use crate::plan::{Plan, Stage};
 use crate::statistics::{median, robust_standard_deviation};
-use crate::summary::{
-    PairSummary, ReferenceSummary, RegistrationSummary, StationTruth, Summary, TruthSummary,
-};
+use crate::summary::{PairSummary, ReferenceSummary, RegistrationSummary, StationTruth, Summary, TruthSummary};
 use crate::truth::{RangeTruth, evaluate, wrap};
 use crate::view::{Snapshot, View, ViewData};
 
@@ -76,7 +74,8 @@ pub(crate) fn ruled_out(level: Level) -> BTreeMap<String, String> {
 }
 
 fn flag_fractions(views: &[View]) -> BTreeMap<String, f64> {
-    let all: Vec<Flags> = views.iter().filter_map(View::flags).flat_map(|flags| flags.as_slice().iter().copied()).collect();
+    let all: Vec<Flags> =
+        views.iter().filter_map(View::flags).flat_map(|flags| flags.as_slice().iter().copied()).collect();
     let fraction = |count: usize| count as f64 / all.len().max(1) as f64;
     let mut fractions: BTreeMap<String, f64> = Flags::NAMED
         .iter()

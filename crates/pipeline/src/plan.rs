@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
+use range_io::ron_text;
 use range_io::survey::Level;
 use serde::{Deserialize, Serialize};
 
-use crate::ron_text::read_ron;
 use crate::{Error, Result};
 
 /// What a pipeline does, read from a RON file.
@@ -253,15 +253,14 @@ pub(crate) fn is_past(level: Level, needs: Level) -> bool {
 impl Plan {
     /// Reads a plan; `path` names it in errors.
     pub fn from_ron(text: &str, path: &Path) -> Result<Self> {
-        let plan: Self = read_ron(text, path)?;
+        let plan: Self = ron_text::parse(path, text)?;
         plan.check_order()?;
         Ok(plan)
     }
 
     /// Reads a plan's file.
     pub fn read(path: &Path) -> Result<Self> {
-        let text =
-            std::fs::read_to_string(path).map_err(|source| Error::Access { path: path.to_owned(), source })?;
+        let text = std::fs::read_to_string(path).map_err(|source| Error::Access { path: path.to_owned(), source })?;
         Self::from_ron(&text, path)
     }
 
@@ -279,11 +278,9 @@ impl Plan {
         let position = |stage: &Stage| Stage::NAMES.iter().position(|name| *name == stage.name());
         match self.stages.windows(2).find(|pair| position(&pair[1]) <= position(&pair[0])) {
             None => Ok(()),
-            Some(pair) => Err(Error::Order {
-                stage: pair[1].name(),
-                after: pair[0].name(),
-                order: Stage::NAMES.join(", "),
-            }),
+            Some(pair) => {
+                Err(Error::Order { stage: pair[1].name(), after: pair[0].name(), order: Stage::NAMES.join(", ") })
+            }
         }
     }
 }

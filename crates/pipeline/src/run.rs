@@ -60,12 +60,7 @@ fn find_survey(request: &RunRequest, progress: &dyn Progress) -> Result<PathBuf>
 }
 
 /// Loads a survey and applies a plan's stages, without writing anything.
-pub fn process(
-    plan: &Plan,
-    survey: &Path,
-    calibration: Option<&Path>,
-    progress: &dyn Progress,
-) -> Result<Outcome> {
+pub fn process(plan: &Plan, survey: &Path, calibration: Option<&Path>, progress: &dyn Progress) -> Result<Outcome> {
     let mut work = load(survey, calibration, plan, progress)?;
     for stage in &plan.stages {
         progress.begin(stage.name(), work.outcome.views.len());

@@ -102,7 +102,12 @@ fn write_frames(
 }
 
 fn write_tables(spec: &SimulationSpec, source: &SimulateSource, folder: &OutputFolder) -> Result<()> {
-    let row = |name: &str, world_from_camera| Station { station: name.to_owned(), world_from_camera, sigma_position_m: None, sigma_attitude_rad: None };
+    let row = |name: &str, world_from_camera| Station {
+        station: name.to_owned(),
+        world_from_camera,
+        sigma_position_m: None,
+        sigma_attitude_rad: None,
+    };
     let truth: Vec<Station> = spec.stations.iter().map(|s| row(&s.name, s.world_from_camera())).collect();
     write_stations(folder.file("truth/stations.csv")?, &truth)?;
     // A stream of its own, so that the sketch does not change with the number of frames.
@@ -131,14 +136,7 @@ fn disturbed(pose: &Isometry3<f64>, source: &SimulateSource, generator: &mut Pcg
     let attitude = source.approximate_attitude_sigma_deg.to_radians();
     step_pose(
         pose,
-        &[
-            normal(position),
-            normal(position),
-            normal(position),
-            normal(attitude),
-            normal(attitude),
-            normal(attitude),
-        ],
+        &[normal(position), normal(position), normal(position), normal(attitude), normal(attitude), normal(attitude)],
     )
 }
 

@@ -185,7 +185,11 @@ impl Summary {
                 100.0 * truth.ranges.flagged_fraction
             )?;
             if let (Some(position), Some(attitude)) = (truth.position_error_max_m, truth.attitude_error_max_deg) {
-                writeln!(f, "poses: position within {}, attitude within {attitude:.3} degrees", millimetres(Some(position)))?;
+                writeln!(
+                    f,
+                    "poses: position within {}, attitude within {attitude:.3} degrees",
+                    millimetres(Some(position))
+                )?;
             }
         }
         Ok(())

@@ -80,9 +80,7 @@ impl View {
                 range: channel.phase().map(|phase| channel.modulation.range_from_phase(f64::from(*phase)) as f32),
                 amplitude: channel.amplitude(),
             }),
-            ViewData::Range(frame) => {
-                Some(Snapshot { range: frame.range.clone(), amplitude: frame.amplitude.clone() })
-            }
+            ViewData::Range(frame) => Some(Snapshot { range: frame.range.clone(), amplitude: frame.amplitude.clone() }),
         }
     }
 

@@ -1,41 +1,41 @@
 #![doc = include_str!("../README.md")]
 
-#[cfg(feature = "range-image")]
+#[cfg(feature = "adjust")]
 #[doc(inline)]
-pub use range_image;
+pub use adjust;
 #[cfg(feature = "camera-model")]
 #[doc(inline)]
 pub use camera_model;
 #[cfg(feature = "error-models")]
 #[doc(inline)]
 pub use error_models;
-#[cfg(feature = "scattering-deconvolution")]
-#[doc(inline)]
-pub use scattering_deconvolution;
-#[cfg(feature = "phase-unwrap")]
-#[doc(inline)]
-pub use phase_unwrap;
 #[cfg(feature = "icp-registration")]
 #[doc(inline)]
 pub use icp_registration;
-#[cfg(feature = "adjust")]
-#[doc(inline)]
-pub use adjust;
 #[cfg(feature = "orientation")]
 #[doc(inline)]
 pub use orientation;
+#[cfg(feature = "phase-unwrap")]
+#[doc(inline)]
+pub use phase_unwrap;
+#[cfg(feature = "pipeline")]
+#[doc(inline)]
+pub use pipeline;
+#[cfg(feature = "range-image")]
+#[doc(inline)]
+pub use range_image;
+#[cfg(feature = "range-io")]
+#[doc(inline)]
+pub use range_io;
+#[cfg(feature = "scattering-deconvolution")]
+#[doc(inline)]
+pub use scattering_deconvolution;
 #[cfg(feature = "self-calibration")]
 #[doc(inline)]
 pub use self_calibration;
 #[cfg(feature = "simulation")]
 #[doc(inline)]
 pub use simulation;
-#[cfg(feature = "range-io")]
-#[doc(inline)]
-pub use range_io;
-#[cfg(feature = "pipeline")]
-#[doc(inline)]
-pub use pipeline;
 
 // The example of the repository's README is compiled here.
 #[cfg(all(doctest, feature = "range-image"))]

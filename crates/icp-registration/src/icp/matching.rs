@@ -56,7 +56,7 @@ impl Matcher<'_> {
         if !is_usable(&moved) {
             return Err(Error::NonFinite { what: "source points in the target frame", index: source });
         }
-        let nearest = self.target.tree.nearest_unchecked(&[moved.x, moved.y, moved.z]);
+        let nearest = self.target.tree.any_nearest(&[moved.x, moved.y, moved.z]);
         let pair = Pair { source, target: nearest.index, moved: moved.coords, distance_m: nearest.distance_m };
         Ok((nearest.distance_m <= limit_m && self.normals_agree(pose, &pair)).then_some(pair))
     }

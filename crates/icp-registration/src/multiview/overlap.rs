@@ -35,8 +35,9 @@ pub fn find_overlaps(
     if !(distance_m > 0.0) {
         return Err(Error::NotPositive { what: "distance_m", index: 0, value: distance_m });
     }
-    let pairs: Vec<(usize, usize)> =
-        (0..stations.len()).flat_map(|target| (target + 1..stations.len()).map(move |source| (target, source))).collect();
+    let pairs: Vec<(usize, usize)> = (0..stations.len())
+        .flat_map(|target| (target + 1..stations.len()).map(move |source| (target, source)))
+        .collect();
     let overlap = |&(target, source): &(usize, usize)| {
         let target_from_source = world_from_station[target].inverse() * world_from_station[source];
         let points = &stations[source].cloud().points;
@@ -44,7 +45,9 @@ pub fn find_overlaps(
         let (mut seen, mut asked) = (0_usize, 0_usize);
         for point in sampled {
             asked += 1;
-            seen += usize::from(stations[target].tree().nearest_within(&(target_from_source * point), distance_m)?.is_some());
+            seen += usize::from(
+                stations[target].tree().nearest_within(&(target_from_source * point), distance_m)?.is_some(),
+            );
         }
         Ok(Overlap { source, target, fraction: seen as f64 / asked.max(1) as f64 })
     };

@@ -103,14 +103,18 @@ pub fn adjust_stations(
     }
     for pair in pairs {
         let observed = pair.target_from_source;
-        let observation =
-            FunctionObservation::new([blocks[pair.target], blocks[pair.source]], 6, move |poses, residual, jacobians| {
-                relative_pose(&observed, poses, residual, jacobians)
-            });
+        let observation = FunctionObservation::new(
+            [blocks[pair.target], blocks[pair.source]],
+            6,
+            move |poses, residual, jacobians| relative_pose(&observed, poses, residual, jacobians),
+        );
         network.add_observation(group, observation, &Covariance::from_matrix(&pair.covariance)).map_err(adjustment)?;
     }
-    let solution = network.solve(&SolveOptions::default()).map_err(adjustment)?;
-    let poses = blocks.iter().map(|block| solution.pose(*block)).collect::<adjust::Result<Vec<_>>>().map_err(adjustment)?;
+    // Covariances of weakly determined pairs reach over eight decades: below this the steps are rounding.
+    let options = SolveOptions { step_tolerance: 1e-3, ..SolveOptions::default() };
+    let solution = network.solve(&options).map_err(adjustment)?;
+    let poses =
+        blocks.iter().map(|block| solution.pose(*block)).collect::<adjust::Result<Vec<_>>>().map_err(adjustment)?;
     let covariance = blocks.iter().enumerate().map(|(station, block)| match station {
         held if held == fixed => Ok(Matrix6::zeros()),
         _ => solution.covariance(*block, Scale::Prior).map(|c| Matrix6::from_fn(|row, column| c[(row, column)])),
@@ -157,11 +161,7 @@ fn pair_residual(pair: &PairConstraint, world_from_station: &[Isometry3<f64>]) -
     let v = pose_difference(&model, &pair.target_from_source);
     // The covariance was accepted by the adjustment, so it has an inverse; without one the residual has no scale.
     let mahalanobis = pair.covariance.cholesky().map_or(f64::NAN, |factor| v.dot(&factor.solve(&v)).max(0.0).sqrt());
-    PairResidual {
-        translation_m: v.fixed_rows::<3>(0).norm(),
-        rotation_rad: v.fixed_rows::<3>(3).norm(),
-        mahalanobis,
-    }
+    PairResidual { translation_m: v.fixed_rows::<3>(0).norm(), rotation_rad: v.fixed_rows::<3>(3).norm(), mahalanobis }
 }
 
 pub(super) fn require_poses(stations: usize, poses: &[Isometry3<f64>]) -> Result<()> {

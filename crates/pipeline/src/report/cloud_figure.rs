@@ -62,15 +62,12 @@ pub(crate) fn cloud_figure(title: &str, clouds: &[StationCloud<'_>], direction: 
     for (station, cloud) in clouds.iter().enumerate() {
         let colour = hex(CATEGORIES[station % CATEGORIES.len()]);
         if let Some([x, y]) = view.pixel(cloud.position) {
-            let _ = write!(
-                svg,
-                r##"<circle cx="{x}" cy="{}" r="4" fill="{colour}" stroke="#000"/>"##,
-                y + 22
-            );
+            let _ = write!(svg, r##"<circle cx="{x}" cy="{}" r="4" fill="{colour}" stroke="#000"/>"##, y + 22);
         }
         let (x, y) = ((station % 8) * 70, view.height + 38 + 18 * (station / 8));
         let _ = write!(svg, r#"<rect x="{x}" y="{}" width="10" height="10" fill="{colour}"/>"#, y - 9);
-        let _ = write!(svg, r#"<text x="{}" y="{y}" class="tick">{}</text>"#, x + 14, super::picture::escape(cloud.name));
+        let _ =
+            write!(svg, r#"<text x="{}" y="{y}" class="tick">{}</text>"#, x + 14, super::picture::escape(cloud.name));
     }
     svg.push_str("</svg>");
     Ok(svg)
@@ -99,17 +96,9 @@ impl Frame {
             }
         }
         let span = |axis: usize| high[axis] - low[axis];
-        let metres_per_pixel =
-            (span(direction.right) / WIDTH as f64).max(span(direction.up) / TALLEST as f64);
+        let metres_per_pixel = (span(direction.right) / WIDTH as f64).max(span(direction.up) / TALLEST as f64);
         let pixels = |axis: usize| ((span(axis) / metres_per_pixel) as usize).max(1);
-        Self {
-            direction,
-            low,
-            high,
-            metres_per_pixel,
-            width: pixels(direction.right),
-            height: pixels(direction.up),
-        }
+        Self { direction, low, high, metres_per_pixel, width: pixels(direction.right), height: pixels(direction.up) }
     }
 
     /// Whether the point lies in the middle half along the direction of view.

@@ -71,7 +71,8 @@ impl Page {
     pub(crate) fn cards(&mut self, cards: &[(String, String)]) {
         self.html.push_str("<div class=\"cards\">");
         for (value, name) in cards {
-            let _ = write!(self.html, "<div class=\"card\"><b>{}</b><span>{}</span></div>", escape(value), escape(name));
+            let _ =
+                write!(self.html, "<div class=\"card\"><b>{}</b><span>{}</span></div>", escape(value), escape(name));
         }
         self.html.push_str("</div>\n");
     }

@@ -63,7 +63,8 @@ fn stages(page: &mut Page, summary: &Summary) -> Result<()> {
         .stages
         .iter()
         .map(|stage| {
-            let findings: Vec<String> = stage.findings.iter().map(|(name, value)| format!("{name} {value:.4}")).collect();
+            let findings: Vec<String> =
+                stage.findings.iter().map(|(name, value)| format!("{name} {value:.4}")).collect();
             vec![
                 stage.name.to_owned(),
                 format!("{:.0} ms ({:.0} %)", 1e3 * stage.seconds, 100.0 * stage.seconds / longest),
@@ -74,7 +75,8 @@ fn stages(page: &mut Page, summary: &Summary) -> Result<()> {
             ]
         })
         .collect();
-    let head = ["stage", "time (share of the longest)", "median change", "median error after", "95 % below", "findings"];
+    let head =
+        ["stage", "time (share of the longest)", "median change", "median error after", "95 % below", "findings"];
     page.table(&head, &rows);
     if !summary.ruled_out.is_empty() {
         page.subsection("What the input level rules out");
@@ -94,7 +96,11 @@ fn stages(page: &mut Page, summary: &Summary) -> Result<()> {
             .enumerate()
             .filter_map(|(k, stage)| stage.truth.as_ref().map(|truth| (k as f64, 1e3 * truth.range_error_p95_m)))
             .collect();
-        let axes = Axes { title: "Range error after each stage", x: "stage, in the order of the table (0 is the first)", y: "mm" };
+        let axes = Axes {
+            title: "Range error after each stage",
+            x: "stage, in the order of the table (0 is the first)",
+            y: "mm",
+        };
         let sets = [
             Series { name: "median", colour: CATEGORIES[0], values: gain },
             Series { name: "95 % below", colour: CATEGORIES[1], values: upper },
@@ -177,7 +183,10 @@ fn registration(page: &mut Page, outcome: &Outcome, summary: &Summary) -> Result
     ]);
     let Some(registration) = &summary.registration else { return Ok(()) };
     page.subsection("Stations");
-    page.table(&["station", "x m", "y m", "z m", "sigma of position", "position error", "attitude error"], &station_rows(outcome, summary));
+    page.table(
+        &["station", "x m", "y m", "z m", "sigma of position", "position error", "attitude error"],
+        &station_rows(outcome, summary),
+    );
     page.subsection("Pairs");
     let rows: Vec<Vec<String>> = registration
         .pairs
@@ -296,7 +305,11 @@ fn view_figures(view: &View, scales: &Scales) -> Result<Vec<(String, String)>> {
         let change = before.range.as_slice().iter().zip(after.range.as_slice());
         let change: Vec<f64> = change.map(|(b, a)| 1e3 * f64::from(a - b)).collect();
         let limit = quantile(&mut change.iter().map(|c| c.abs()).collect::<Vec<_>>(), 0.95).max(1.0);
-        add("Range, after minus before", &change, &Scale { map: ColourMap::Diverging, low: -limit, high: limit, unit: "mm" })?;
+        add(
+            "Range, after minus before",
+            &change,
+            &Scale { map: ColourMap::Diverging, low: -limit, high: limit, unit: "mm" },
+        )?;
     }
     figures.push((flag_picture(view)?, "Grey: no flag. Colours as in the table of flags.".to_owned()));
     Ok(figures)
@@ -325,10 +338,17 @@ fn flags(page: &mut Page, outcome: &Outcome, summary: &Summary) -> Result<()> {
         })
         .collect();
     page.table(&["reason", "colour in the pictures", "pixels"], &rows);
-    let sigma: Vec<f64> = outcome.views.iter().filter_map(|view| match &view.data {
-        ViewData::Range(frame) => Some(frame.sigma.as_slice().iter().zip(frame.flags.as_slice())),
-        _ => None,
-    }).flatten().filter(|(sigma, flags)| flags.is_empty() && sigma.is_finite()).map(|(sigma, _)| 1e3 * f64::from(*sigma)).collect();
+    let sigma: Vec<f64> = outcome
+        .views
+        .iter()
+        .filter_map(|view| match &view.data {
+            ViewData::Range(frame) => Some(frame.sigma.as_slice().iter().zip(frame.flags.as_slice())),
+            _ => None,
+        })
+        .flatten()
+        .filter(|(sigma, flags)| flags.is_empty() && sigma.is_finite())
+        .map(|(sigma, _)| 1e3 * f64::from(*sigma))
+        .collect();
     if !sigma.is_empty() {
         let high = quantile(&mut sigma.clone(), 0.99);
         let axes = Axes { title: "Standard deviation of the ranges", x: "sigma, mm", y: "% of pixels" };

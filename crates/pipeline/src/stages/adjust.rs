@@ -35,8 +35,7 @@ pub(super) fn run(work: &mut Work, options: &AdjustOptions, progress: &dyn Progr
         .collect();
     work.outcome.pairs = adjusted.pairs;
     work.outcome.refused = adjusted.refused;
-    work.outcome.adjustment =
-        Some(AdjustmentFigures { sigma0: stations.sigma0, redundancy: stations.redundancy });
+    work.outcome.adjustment = Some(AdjustmentFigures { sigma0: stations.sigma0, redundancy: stations.redundancy });
     let mut findings = Findings::from([
         ("pairs".to_owned(), work.outcome.pairs.len() as f64),
         ("rounds".to_owned(), adjusted.rounds as f64),

@@ -9,7 +9,9 @@ use crate::{Error, Result};
 /// From here on the calibrated camera gives the rays.
 pub(super) fn correct_image_point(work: &mut Work) -> Result<Findings> {
     let Some(camera) = work.calibrated_camera else {
-        return Err(Error::Camera("stage CorrectImagePoint needs a calibration; name one with --calibration".to_owned()));
+        return Err(Error::Camera(
+            "stage CorrectImagePoint needs a calibration; name one with --calibration".to_owned(),
+        ));
     };
     let shift = largest_shift_px(work, &camera)?;
     work.rays = RayTable::new(&camera).map_err(Error::stage("CorrectImagePoint", "calibration"))?;

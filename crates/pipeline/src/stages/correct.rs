@@ -48,7 +48,8 @@ fn frames_with_models<'a>(
     let name = view.name();
     if !view.channels.is_empty() {
         if view.channels.len() != models.len() {
-            let message = format!("{} frequencies, but the calibration has models for {}", view.channels.len(), models.len());
+            let message =
+                format!("{} frequencies, but the calibration has models for {}", view.channels.len(), models.len());
             return Err(Error::stage("CorrectRange", &name)(message));
         }
         return Ok(view.channels.iter_mut().zip(models).collect());

@@ -26,10 +26,9 @@ pub(super) fn run(work: &mut Work, options: &DemodulateOptions, progress: &dyn P
 }
 
 fn demodulation_options(work: &Work, options: &DemodulateOptions) -> DemodulationOptions {
-    let stated = options.noise.map(|noise| NoiseModel {
-        shot_variance_per_unit: noise.shot_variance_per_unit,
-        dark_sigma: noise.dark_sigma,
-    });
+    let stated = options
+        .noise
+        .map(|noise| NoiseModel { shot_variance_per_unit: noise.shot_variance_per_unit, dark_sigma: noise.dark_sigma });
     let camera = &work.outcome.survey.camera;
     let calibrated = work.calibration.as_ref().and_then(|calibration| calibration.noise);
     DemodulationOptions {

@@ -1,6 +1,6 @@
 use icp_registration::{
-    Cloud, IcpTarget, OrganisedNormalOptions, PairAlignment, RefusedPair, SurfaceAdjustmentOptions, align_pairs, find_overlaps,
-    organised_normals,
+    Cloud, IcpTarget, OrganisedNormalOptions, PairAlignment, RefusedPair, SurfaceAdjustmentOptions, align_pairs,
+    find_overlaps, organised_normals,
 };
 use nalgebra::Isometry3;
 
@@ -18,8 +18,7 @@ pub(super) fn run(work: &mut Work, options: &RegisterOptions, progress: &dyn Pro
     let candidates = candidate_pairs(&targets, &approximate, options)?;
     progress.begin("Register", candidates.len());
     let icp = SurfaceAdjustmentOptions::with_initial_error(options.maximum_distance_m).icp;
-    let (pairs, refused) =
-        align_pairs(&targets, &approximate, &candidates, &icp, &|done, _| progress.advance(done));
+    let (pairs, refused) = align_pairs(&targets, &approximate, &candidates, &icp, &|done, _| progress.advance(done));
     let poses = spanning_poses(work, &pairs, &refused, &approximate)?;
     work.outcome.poses = poses;
     let findings = [("pairs", pairs.len()), ("pairs_refused", refused.len())];
@@ -99,13 +98,18 @@ fn spanning_poses(
             poses[pair.target] = Some(StationPose { world_from_camera, covariance: None });
         }
     }
-    let lost: Vec<String> =
-        poses.iter().zip(&work.outcome.views).filter(|(pose, _)| pose.is_none()).map(|(_, v)| v.station.clone()).collect();
+    let lost: Vec<String> = poses
+        .iter()
+        .zip(&work.outcome.views)
+        .filter(|(pose, _)| pose.is_none())
+        .map(|(_, v)| v.station.clone())
+        .collect();
     if lost.is_empty() {
         return Ok(poses.into_iter().flatten().collect());
     }
     let station = |index: usize| work.outcome.views[index].station.as_str();
-    let reasons = refused.iter().map(|pair| format!("{} to {}: {}", station(pair.source), station(pair.target), pair.reason));
+    let reasons =
+        refused.iter().map(|pair| format!("{} to {}: {}", station(pair.source), station(pair.target), pair.reason));
     let reasons: Vec<String> = reasons.collect();
     Err(Error::stage("Register", &format!("stations {}", lost.join(", ")))(format!(
         "no reliable alignment connects them to the first station; more overlap or better approximate poses are needed \

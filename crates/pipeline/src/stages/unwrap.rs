@@ -53,7 +53,12 @@ fn wrap_counts(
         let maximum_wraps = (options.maximum_range_m / interval).floor().max(0.0) as u16;
         let mut sigmas: Vec<f64> = channel.sigma.as_slice().iter().map(|sigma| f64::from(*sigma)).collect();
         let noise = Some(median(&mut sigmas) as f32).filter(|noise| noise.is_finite());
-        let spatial = SpatialOptions { maximum_wraps, amplitude_noise: noise, geometry: Some(geometry), ..SpatialOptions::default() };
+        let spatial = SpatialOptions {
+            maximum_wraps,
+            amplitude_noise: noise,
+            geometry: Some(geometry),
+            ..SpatialOptions::default()
+        };
         let unwrapped = unwrap_spatial(&channel.phase(), Some(&channel.amplitude()), Some(&mask), &spatial);
         let unwrapped = unwrapped.map_err(Error::stage("Unwrap", name))?;
         return Ok((vec![unwrapped.wraps], unwrapped.confidence));

@@ -27,7 +27,7 @@ pub(crate) struct Matcher<'a> {
     pub source: &'a Cloud,
     pub source_normals: Option<&'a [Vector3<f64>]>,
     pub target: &'a IcpTarget,
-    pub options: &'a IcpOptions,
+    pub options: IcpOptions,
 }
 
 impl Matcher<'_> {
@@ -39,6 +39,22 @@ impl Matcher<'_> {
             .map(|chunk| chunk.iter().filter_map(|&i| self.pair(pose, i, limit_m).transpose()).collect())
             .collect();
         Ok(chunks?.concat())
+    }
+
+    /// Pairs after trimming, or the error that there are too few.
+    pub(crate) fn enough_pairs(
+        &self,
+        pose: &Isometry3<f64>,
+        selected: &[usize],
+        limit_m: f64,
+        iteration: usize,
+    ) -> Result<Vec<Pair>> {
+        let pairs = self.trimmed(self.pairs(pose, selected, limit_m)?);
+        let (found, of, needed) = (pairs.len(), selected.len(), self.options.min_correspondences);
+        if found < needed {
+            return Err(Error::TooFewCorrespondences { found, of, needed, max_distance_m: limit_m, iteration });
+        }
+        Ok(pairs)
     }
 
     /// The pairs that are left after trimming to the fraction `trim` with the smallest distances.
@@ -74,6 +90,11 @@ impl Matcher<'_> {
             }
             _ => true,
         }
+    }
+
+    /// The same clouds with other options.
+    pub(crate) fn with_options(&self, options: IcpOptions) -> Self {
+        Self { source: self.source, source_normals: self.source_normals, target: self.target, options }
     }
 
     /// Median distance to the target of (a sample of) the source points at a pose, metre.

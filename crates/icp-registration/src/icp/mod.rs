@@ -1,5 +1,6 @@
 //! The iterative closest point algorithm.
 
+mod coarse;
 mod matching;
 mod motion;
 mod options;
@@ -18,19 +19,14 @@ use nalgebra::{Isometry3, Matrix6, Vector3, Vector6};
 use crate::cloud::Cloud;
 use crate::error::{Error, Result};
 use crate::normals::{UnorganisedNormalOptions, unorganised_normals};
-use crate::pose::{is_finite, move_about};
+use crate::pose::is_finite;
+use coarse::{COARSE_POINTS, Track, descend, length};
 use matching::{Matcher, Pair};
 use quality::{Residuals, Verdict};
 use system::System;
 
-/// Source points that the coarse levels work with.
-const COARSE_POINTS: usize = 4000;
-/// Iterations that a coarse level may take.
-const COARSE_ITERATIONS: usize = 8;
 /// Steps of the last level after which it is asked whether they still shrink.
 const WANDERING: usize = 10;
-/// A coarse level ends when a step is below this fraction of its distance limit.
-const COARSE_STEP: f64 = 0.02;
 
 /// Why the iterations ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -108,33 +104,29 @@ pub(crate) fn run(
         }
         (None, _) => None,
     };
-    let matcher = Matcher { source, source_normals, target, options };
+    let matcher = Matcher { source, source_normals, target, options: options.clone() };
     let selected = selection::select(options.selection, source.len(), source_normals.unwrap_or(&[]));
-    Run { matcher, selected, pose: *guess, iterations: 0 }.finish()
+    Run { matcher, selected, track: Track { pose: *guess, iterations: 0 } }.finish()
 }
 
 struct Run<'a> {
     matcher: Matcher<'a>,
     selected: Vec<usize>,
-    pose: Isometry3<f64>,
-    iterations: usize,
+    track: Track,
 }
 
 impl Run<'_> {
     fn finish(mut self) -> Result<IcpResult> {
         let limits = self.limits()?;
-        let coarse = selection::thinned(&self.selected, COARSE_POINTS);
-        for limit in &limits[..limits.len() - 1] {
-            self.coarse_level(&coarse, *limit)?;
-        }
         let limit = limits[limits.len() - 1];
-        let stop = self.final_level(limit)?;
+        self.track = descend(&self.matcher, &self.selected, &self.track.pose, &limits, self.max_motion_sigma_m())?;
+        let stop = self.settle(limit)?;
         self.result(limit, stop)
     }
 
     /// Distance limits from the first level to the last, each half of the one before.
     fn limits(&self) -> Result<Vec<f64>> {
-        let (options, target) = (self.matcher.options, self.matcher.target);
+        let (options, target) = (&self.matcher.options, self.matcher.target);
         let last = options.max_correspondence_distance_m.unwrap_or(if target.spacing_m > 0.0 {
             3.0 * target.spacing_m
         } else {
@@ -144,7 +136,7 @@ impl Run<'_> {
             first
         } else {
             let sample = selection::thinned(&self.selected, 1000);
-            let median = self.matcher.median_distance(&self.pose, &sample)?;
+            let median = self.matcher.median_distance(&self.track.pose, &sample)?;
             (2.5 * median).max(target.radius_m / 4.0).min(target.radius_m)
         };
         let mut limits = vec![last];
@@ -160,30 +152,17 @@ impl Run<'_> {
         Ok(limits)
     }
 
-    fn coarse_level(&mut self, selected: &[usize], limit: f64) -> Result<()> {
-        for _ in 0..COARSE_ITERATIONS {
-            if self.iterations + 1 >= self.matcher.options.max_iterations {
-                return Ok(());
-            }
-            let pairs = self.pairs(selected, limit)?;
-            if length(&self.iterate(&pairs, limit)?) < COARSE_STEP * limit {
-                return Ok(());
-            }
-        }
-        Ok(())
-    }
-
-    fn final_level(&mut self, limit: f64) -> Result<StopReason> {
+    /// Iterates on all selected points at the last limit.
+    fn settle(&mut self, limit: f64) -> Result<StopReason> {
         let tolerance = self.matcher.options.step_tolerance_m.unwrap_or(1e-5 * self.matcher.target.radius_m);
         let mut lengths = Vec::new();
-        while self.iterations < self.matcher.options.max_iterations {
-            let pairs = self.pairs(&self.selected, limit)?;
-            let step = self.iterate(&pairs, limit)?;
+        while self.track.iterations < self.matcher.options.max_iterations {
+            let step = self.track.step(&self.matcher, &self.selected, limit, self.max_motion_sigma_m())?;
             lengths.push(length(&step));
             if length(&step) <= tolerance {
                 return Ok(StopReason::Converged);
             }
-            if lengths.len() % WANDERING == 0 && self.wanders(&pairs, &step, &lengths)? {
+            if lengths.len() % WANDERING == 0 && self.wanders(limit, &step, &lengths)? {
                 return Ok(StopReason::WithinNoise);
             }
         }
@@ -191,46 +170,16 @@ impl Run<'_> {
     }
 
     /// Whether the steps have stopped shrinking, far below the standard deviation of the pose.
-    fn wanders(&self, pairs: &[Pair], step: &Vector6<f64>, lengths: &[f64]) -> Result<bool> {
+    fn wanders(&self, limit: f64, step: &Vector6<f64>, lengths: &[f64]) -> Result<bool> {
         let shrinking = lengths[lengths.len() - 1] < 0.5 * lengths[lengths.len() - WANDERING];
-        let system = System::new(&self.matcher, pairs);
-        let verdict = Verdict::new(&system, &self.pose, self.max_motion_sigma_m(), Residuals::Settled)?;
+        let pairs = self.pairs(limit)?;
+        let system = System::new(&self.matcher, &pairs);
+        let verdict = Verdict::new(&system, &self.track.pose, self.max_motion_sigma_m(), Residuals::Settled)?;
         Ok(!shrinking && verdict.is_within_noise(step, 0.1))
     }
 
-    /// One Gauss-Newton step: `[dt, rho w]` in metre as taken.
-    fn iterate(&mut self, pairs: &[Pair], limit: f64) -> Result<Vector6<f64>> {
-        let system = System::new(&self.matcher, pairs);
-        let held = match self.matcher.options.degeneracy {
-            DegeneracyPolicy::Report => Vec::new(),
-            DegeneracyPolicy::HoldAtGuess => {
-                Verdict::new(&system, &self.pose, self.max_motion_sigma_m(), Residuals::Misaligned)?.held()
-            }
-        };
-        let mut step = system.step(&held)?;
-        // Pairs at most `limit` apart give no reason to move farther than a few times that.
-        let excess = length(&step) / (2.0 * limit);
-        if excess > 1.0 {
-            step /= excess;
-        }
-        self.pose = move_about(&self.pose, &system.centre, system.radius_m, &step);
-        self.iterations += 1;
-        Ok(step)
-    }
-
-    fn pairs(&self, selected: &[usize], limit: f64) -> Result<Vec<Pair>> {
-        let pairs = self.matcher.trimmed(self.matcher.pairs(&self.pose, selected, limit)?);
-        let needed = self.matcher.options.min_correspondences;
-        if pairs.len() < needed {
-            return Err(Error::TooFewCorrespondences {
-                found: pairs.len(),
-                of: selected.len(),
-                needed,
-                max_distance_m: limit,
-                iteration: self.iterations,
-            });
-        }
-        Ok(pairs)
+    fn pairs(&self, limit: f64) -> Result<Vec<Pair>> {
+        self.matcher.enough_pairs(&self.track.pose, &self.selected, limit, self.track.iterations)
     }
 
     fn max_motion_sigma_m(&self) -> f64 {
@@ -238,30 +187,25 @@ impl Run<'_> {
     }
 
     fn result(&self, limit: f64, stop: StopReason) -> Result<IcpResult> {
-        let pairs = self.pairs(&self.selected, limit)?;
+        let pose = self.track.pose;
+        let pairs = self.pairs(limit)?;
         let system = System::new(&self.matcher, &pairs);
-        let verdict = Verdict::new(&system, &self.pose, self.max_motion_sigma_m(), Residuals::Settled)?;
+        let verdict = Verdict::new(&system, &pose, self.max_motion_sigma_m(), Residuals::Settled)?;
         let sample = selection::thinned(&self.selected, COARSE_POINTS);
         let step = (0.5 * system.rms_m()).max(0.01 * limit);
-        let response = sensitivity::sensitivity(&system, &self.pose, &sample, limit, step)?;
+        let response = sensitivity::sensitivity(&system, &pose, &sample, limit, step)?;
         let all: Vec<usize> = selection::thinned(&(0..self.matcher.source.len()).collect::<Vec<_>>(), 20_000);
-        let partners = self.matcher.pairs(&self.pose, &all, limit)?.len();
+        let partners = self.matcher.pairs(&pose, &all, limit)?.len();
         Ok(IcpResult {
-            target_from_source: self.pose,
-            covariance: verdict.covariance(&system, &self.pose, &response),
+            target_from_source: pose,
+            covariance: verdict.covariance(&system, &pose, &response),
             overlap: partners as f64 / all.len() as f64,
             rms_m: system.rms_m(),
-            iterations: self.iterations,
+            iterations: self.track.iterations,
             stop,
             correspondences: pairs.len(),
             max_correspondence_distance_m: limit,
             degenerate: verdict.undetermined(&system),
         })
     }
-}
-
-/// Larger of the two parts of a motion.
-fn length(motion: &Vector6<f64>) -> f64 {
-    let part = |k: usize| Vector3::new(motion[k], motion[k + 1], motion[k + 2]).norm();
-    part(0).max(part(3))
 }

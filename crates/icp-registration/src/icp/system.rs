@@ -63,7 +63,7 @@ impl<'a> System<'a> {
     }
 
     /// Length that the kernel looks at.
-    fn residual_length(&self, pair: &Pair) -> f64 {
+    pub(crate) fn residual_length(&self, pair: &Pair) -> f64 {
         match self.matcher.options.metric {
             Metric::PointToPlane => self.row(pair, &self.matcher.target.normals[pair.target]).residual.abs(),
             Metric::PointToPoint => pair.distance_m,

@@ -1,5 +1,7 @@
 //! Time of one alignment and of the normals of a frame, for a wavy wall seen twice.
 
+#![allow(missing_docs)] // criterion_group! makes a public function
+
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use icp_registration::{Cloud, IcpOptions, IcpTarget, OrganisedNormalOptions, Selection, organised_normals};
 use nalgebra::{Isometry3, Vector3};

@@ -1,5 +1,7 @@
 //! Time of the whole way from raw samples to a registered cloud, without files: the small room.
 
+#![allow(missing_docs)] // criterion_group! makes a public function
+
 use std::path::{Path, PathBuf};
 
 use criterion::{Criterion, criterion_group, criterion_main};

@@ -35,7 +35,7 @@ pub(crate) fn load(folder: &Path, calibration: Option<&Path>, plan: &Plan, progr
     };
     let poses = read_poses(&root.join("stations.csv"))?;
     let true_poses = match survey.truth.as_ref().and_then(|truth| truth.stations.as_ref()) {
-        Some(file) => read_stations(&root.join(file))?,
+        Some(file) => read_stations(root.join(file))?,
         None => Vec::new(),
     };
     let reference = read_reference(&survey, &root)?;

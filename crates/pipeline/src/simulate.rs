@@ -56,7 +56,7 @@ pub fn simulate(source: &SimulateSource, base: &Path, out: &Path, progress: &dyn
     for file in ["calibration.ron", "truth/calibration.ron"] {
         calibration.write(folder.file(file)?)?;
     }
-    let survey = survey(&spec, frames)?;
+    let survey = survey(&spec, frames);
     survey.write(folder.file(Survey::FILE_NAME)?)?;
     folder.commit()?;
     progress.finish();
@@ -164,11 +164,11 @@ fn error_free(ambiguity_interval_m: f64) -> RangeErrorModel {
     RangeErrorModel { ambiguity_interval_m, terms: RangeTerms::default(), hyperbola: None, range_span_m: None }
 }
 
-fn survey(spec: &SimulationSpec, frames: Vec<FrameEntry>) -> Result<Survey> {
+fn survey(spec: &SimulationSpec, frames: Vec<FrameEntry>) -> Survey {
     let geometry = spec.camera.geometry;
     let demodulation = spec.demodulation_options();
     let truth_frames = frames.iter().map(|frame| Path::new("truth").join(&frame.file)).collect();
-    Ok(Survey {
+    Survey {
         camera: SurveyCamera {
             width: geometry.format.width,
             height: geometry.format.height,
@@ -192,5 +192,5 @@ fn survey(spec: &SimulationSpec, frames: Vec<FrameEntry>) -> Result<Survey> {
             frames: truth_frames,
         }),
         extras: std::collections::BTreeMap::new(),
-    })
+    }
 }

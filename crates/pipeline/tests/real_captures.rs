@@ -1,6 +1,6 @@
 //! Real captures of three cameras at three input levels, where they lie beside the project.
 
-#![allow(clippy::unwrap_used)]
+#![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 mod common;
 

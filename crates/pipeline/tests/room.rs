@@ -1,6 +1,6 @@
 //! The small room, from raw samples to one registered cloud, against its truth.
 
-#![allow(clippy::unwrap_used)]
+#![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 mod common;
 

@@ -32,7 +32,7 @@ pub fn find_overlaps(
     distance_m: f64,
 ) -> Result<Vec<Overlap>> {
     super::pose_graph::require_poses(stations.len(), world_from_station)?;
-    if !(distance_m > 0.0) {
+    if distance_m.is_nan() || distance_m <= 0.0 {
         return Err(Error::NotPositive { what: "distance_m", index: 0, value: distance_m });
     }
     let pairs: Vec<(usize, usize)> = (0..stations.len())

@@ -174,6 +174,7 @@ pub(super) fn require_poses(stations: usize, poses: &[Isometry3<f64>]) -> Result
     Ok(())
 }
 
+#[allow(clippy::needless_pass_by_value)] // the form that map_err takes
 fn adjustment(error: adjust::Error) -> Error {
     Error::Adjustment(error.to_string())
 }

@@ -23,6 +23,9 @@ pub struct SurfaceAdjustmentOptions {
     pub max_rounds: usize,
     /// The rounds end when no station moves by more than this, metre. Default 0.1 mm.
     pub tolerance_m: f64,
+    /// Distance of a relative pose from the adjusted ones, in its own standard deviations (Mahalanobis, six components),
+    /// beyond which the pair is left out. Default 8: no right pair is that far, errors in common included.
+    pub rejection_distance: f64,
     /// How the relative poses are adjusted.
     pub adjustment: StationAdjustmentOptions,
 }
@@ -43,6 +46,7 @@ impl SurfaceAdjustmentOptions {
             minimum_overlap: 0.3,
             max_rounds: 3,
             tolerance_m: 1e-4,
+            rejection_distance: 8.0,
             adjustment: StationAdjustmentOptions::default(),
         }
     }
@@ -109,8 +113,8 @@ pub fn adjust_surfaces(
             .filter(|overlap| overlap.fraction >= options.minimum_overlap)
             .map(|overlap| (overlap.target, overlap.source))
             .collect();
-        let (pairs, refused) = align_pairs(stations, &poses, &candidates, &icp, progress);
-        let adjusted = adjust_stations(&constraints(&pairs), &poses, datum, &options.adjustment)?;
+        let (mut pairs, mut refused) = align_pairs(stations, &poses, &candidates, &icp, progress);
+        let adjusted = adjust_without_gross_errors(&mut pairs, &mut refused, &poses, datum, options)?;
         let moved = poses.iter().zip(&adjusted.world_from_station);
         let largest = moved.map(|(a, b)| (a.translation.vector - b.translation.vector).norm()).fold(0.0, f64::max);
         if largest <= options.tolerance_m || round >= options.max_rounds {
@@ -122,6 +126,36 @@ pub fn adjust_surfaces(
         overlap_distance_m = near;
         icp.initial_correspondence_distance_m = Some(near);
         round += 1;
+    }
+}
+
+/// Adjusts, leaves out the pair that contradicts the others most, and adjusts again until none does.
+///
+/// One at a time, since one wrong pair makes its neighbours look wrong as well. A pair that alone connects stations
+/// stays: nothing contradicts it.
+fn adjust_without_gross_errors(
+    pairs: &mut Vec<PairAlignment>,
+    refused: &mut Vec<RefusedPair>,
+    poses: &[Isometry3<f64>],
+    datum: Datum,
+    options: &SurfaceAdjustmentOptions,
+) -> Result<StationAdjustment> {
+    let mut adjusted = adjust_stations(&constraints(pairs), poses, datum, &options.adjustment)?;
+    loop {
+        let residuals = adjusted.residuals.iter().map(|residual| residual.mahalanobis);
+        let worst = residuals.enumerate().max_by(|a, b| a.1.total_cmp(&b.1));
+        let Some((index, distance)) = worst.filter(|(_, distance)| *distance > options.rejection_distance) else {
+            return Ok(adjusted);
+        };
+        let pair = pairs.remove(index);
+        if let Ok(without) = adjust_stations(&constraints(pairs), poses, datum, &options.adjustment) {
+            adjusted = without
+        } else {
+            pairs.insert(index, pair);
+            return Ok(adjusted);
+        }
+        let reason = format!("contradicts the other pairs by {distance:.1} standard deviations");
+        refused.push(RefusedPair { target: pair.target, source: pair.source, reason });
     }
 }
 

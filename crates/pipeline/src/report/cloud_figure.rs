@@ -50,7 +50,7 @@ pub(crate) fn cloud_figure(title: &str, clouds: &[StationCloud<'_>], direction: 
             let at = 3 * (y * view.width + x);
             // Colours of several stations on one pixel darken each other instead of hiding.
             for k in 0..3 {
-                rgb[at + k] = ((u16::from(rgb[at + k]) + u16::from(colour[k])) / 2) as u8;
+                rgb[at + k] = u16::midpoint(u16::from(rgb[at + k]), u16::from(colour[k])) as u8;
             }
         }
     }

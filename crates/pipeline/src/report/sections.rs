@@ -248,7 +248,7 @@ impl Scales {
         let gather = |pick: &dyn Fn(&View) -> Vec<f64>, share: f64| {
             quantile(&mut outcome.views.iter().flat_map(pick).collect::<Vec<_>>(), share)
         };
-        let amplitude = |view: &View| view.before.iter().flat_map(|s| log_amplitude(s)).collect::<Vec<_>>();
+        let amplitude = |view: &View| view.before.iter().flat_map(log_amplitude).collect::<Vec<_>>();
         let range = |view: &View| {
             let snapshot = view.snapshot();
             snapshot.iter().flat_map(|s| values(s.range.as_slice())).collect::<Vec<_>>()
@@ -317,7 +317,7 @@ fn view_figures(view: &View, scales: &Scales) -> Result<Vec<(String, String)>> {
 
 fn flag_picture(view: &View) -> Result<String> {
     let (width, _) = view.size();
-    let flags = view.flags().map(|flags| flags.as_slice()).unwrap_or_default();
+    let flags = view.flags().map(range_image::Raster::as_slice).unwrap_or_default();
     let colour = |flags: &Flags| {
         let first = Flags::NAMED.iter().position(|(flag, _)| flags.contains(*flag));
         first.map_or(NO_VALUE, |k| CATEGORIES[k])

@@ -31,8 +31,7 @@ fn unwrap_view(view: &mut View, geometry: ImageGeometry, options: &UnwrapOptions
         frame.channels.iter().zip(&wraps).map(|(channel, wraps)| channel_range(channel, wraps, &frame.flags)).collect();
     for channel in &mut channels {
         for (flags, confidence) in channel.flags.as_mut_slice().iter_mut().zip(confidence.as_slice()) {
-            // Written so that a confidence that is not a number counts as none.
-            if !(f64::from(*confidence) >= options.minimum_confidence) {
+            if confidence.is_nan() || f64::from(*confidence) < options.minimum_confidence {
                 flags.insert(Flags::UNWRAP_UNSURE);
             }
         }

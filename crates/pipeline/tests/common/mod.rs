@@ -1,6 +1,6 @@
 //! What the tests share: where fixtures and real captures are, and how a pipeline of the repository is run.
 
-#![allow(dead_code, clippy::unwrap_used)]
+#![allow(dead_code, clippy::unwrap_used, clippy::print_stdout)]
 
 use std::path::{Path, PathBuf};
 

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use icp_registration::RefusedPair;
 use nalgebra::Isometry3;
 use range_image::Flags;
 use range_io::survey::Level;
@@ -116,10 +117,16 @@ fn registration(outcome: &Outcome) -> Option<RegistrationSummary> {
     let sigmas = outcome.poses.iter().filter_map(crate::outcome::StationPose::position_sigma_m);
     Some(RegistrationSummary {
         pairs: pairs.collect(),
+        refused: outcome.refused.iter().map(|pair| refusal(outcome, pair)).collect(),
         sigma0: outcome.adjustment.and_then(|figures| figures.sigma0),
         redundancy: outcome.adjustment.map(|figures| figures.redundancy),
         position_sigma_max_m: sigmas.reduce(f64::max),
     })
+}
+
+fn refusal(outcome: &Outcome, pair: &RefusedPair) -> String {
+    let station = |index: usize| &outcome.views[index].station;
+    format!("{} to {}: {}", station(pair.source), station(pair.target), pair.reason)
 }
 
 /// Unflagged ranges against the reference, up to a constant, modulo the ambiguity interval.

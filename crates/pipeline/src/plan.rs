@@ -221,11 +221,13 @@ pub struct RegisterOptions {
     pub maximum_distance_m: f64,
     /// Smallest part of a view that must overlap another for the two to be aligned.
     pub minimum_overlap: f64,
+    /// Normals come from windows of twice this and one pixel a side; small images want small windows.
+    pub normal_half_width_px: usize,
 }
 
 impl Default for RegisterOptions {
     fn default() -> Self {
-        Self { maximum_distance_m: 0.5, minimum_overlap: 0.3 }
+        Self { maximum_distance_m: 0.5, minimum_overlap: 0.3, normal_half_width_px: 3 }
     }
 }
 

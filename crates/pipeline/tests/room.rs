@@ -19,14 +19,14 @@ fn the_small_room_reaches_its_bars() {
     // Scattering and range terms together put the raw ranges off by 50 to 100 mm, which is what the stages take off.
     let raw = summary.stages[0].truth.as_ref().unwrap();
     assert!((0.050..0.100).contains(&raw.range_error_median_m), "raw: {}", raw.range_error_median_m);
-    // A quarter of the pixels and of the frames: sigma is about 1.5 times that of the full room, whose bars are 4 and
-    // 15 mm, and edges are twice as dense.
+    // Half the pixels and half the frames: sigma is about 1.4 times that of the full room, whose bars are 4 and 15 mm,
+    // and edges are denser.
     assert!(truth.ranges.range_error_median_m < 0.006, "median {}", truth.ranges.range_error_median_m);
     assert!(truth.ranges.range_error_p95_m < 0.025, "95 % {}", truth.ranges.range_error_p95_m);
     assert!(truth.ranges.wrap_count_right_fraction > 0.995, "wraps {}", truth.ranges.wrap_count_right_fraction);
     assert!(truth.ranges.flagged_fraction < 0.25, "flagged {}", truth.ranges.flagged_fraction);
-    // The bars of the full room hold for the poses of the small one as well.
-    assert!(truth.position_error_max_m.unwrap() < 0.005, "position {:?}", truth.position_error_max_m);
+    // The full room's bar of 5 mm, with half the points and 1.4 times their sigma.
+    assert!(truth.position_error_max_m.unwrap() < 0.010, "position {:?}", truth.position_error_max_m);
     assert!(truth.attitude_error_max_deg.unwrap() < 0.1, "attitude {:?}", truth.attitude_error_max_deg);
 
     check_files(&out, summary.points);

@@ -129,7 +129,7 @@ fn neighbouring_stations_share_half_their_view_or_more() {
     for (index, from) in truths.iter().enumerate() {
         let to = &truths[(index + 1) % truths.len()];
         let shared = |i: usize| {
-            let (col, row) = (i % 88, i / 88);
+            let (col, row) = (i % 132, i / 132);
             let range = f64::from(from.range[(col, row)]);
             let point = from.world_from_camera * camera.point([col as f64, row as f64], range);
             let Ok([c, r]) = camera.project(&(to.world_from_camera.inverse() * point)) else { return false };
@@ -138,7 +138,7 @@ fn neighbouring_stations_share_half_their_view_or_more() {
             // Within a pixel's slope and 5 cm: the same surface, not one in front of it.
             there.is_some_and(|there| (f64::from(*there) - distance).abs() < 0.05 + 0.02 * distance)
         };
-        let overlap = (0..88 * 72).filter(|i| shared(*i)).count() as f64 / (88.0 * 72.0);
+        let overlap = (0..132 * 108).filter(|i| shared(*i)).count() as f64 / (132.0 * 108.0);
         assert!((0.5..0.8).contains(&overlap), "stations {index} and next: {overlap}");
     }
 }

@@ -1,11 +1,12 @@
 //! All stations at once from their surfaces: pairs aligned anew from the adjusted poses until nothing moves.
 
+use std::collections::BTreeSet;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use nalgebra::Isometry3;
+use nalgebra::{Isometry3, Matrix6, Vector6};
 use rayon::prelude::*;
 
-use super::overlap::find_overlaps;
+use super::overlap::{Overlap, find_overlaps};
 use super::pose_graph::{Datum, PairConstraint, StationAdjustment, StationAdjustmentOptions, adjust_stations};
 use crate::error::{Error, Result};
 use crate::icp::{IcpOptions, IcpResult, IcpTarget, Selection, StopReason};
@@ -19,6 +20,12 @@ pub struct SurfaceAdjustmentOptions {
     pub overlap_distance_m: f64,
     /// Pairs with less overlap are left out. Default 0.3.
     pub minimum_overlap: f64,
+    /// Partners that each station is held to, those with the most overlap. Default 2: a round or a strip of stations. Thin
+    /// overlaps at the rim of the views are biased by more than their covariance tells, so more pairs are not better.
+    pub partners_per_station: usize,
+    /// Pairs of which a smaller fraction of the points has a partner after the alignment are left out: what few points
+    /// at the rim of a view say is biased by more than their covariance tells. Default 0.1.
+    pub minimum_partners: f64,
     /// Rounds of alignment and adjustment. Default 3.
     pub max_rounds: usize,
     /// The rounds end when no station moves by more than this, metre. Default 0.1 mm.
@@ -44,6 +51,8 @@ impl SurfaceAdjustmentOptions {
             icp,
             overlap_distance_m: distance_m,
             minimum_overlap: 0.3,
+            partners_per_station: 2,
+            minimum_partners: 0.1,
             max_rounds: 3,
             tolerance_m: 1e-4,
             rejection_distance: 8.0,
@@ -103,18 +112,20 @@ pub fn adjust_surfaces(
     progress: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<SurfaceAdjustment> {
     let mut poses = initial_world_from_station.to_vec();
+    let spacing_m = stations.iter().map(IcpTarget::spacing_m).fold(0.0, f64::max);
     let mut icp = options.icp.clone();
     let mut overlap_distance_m = options.overlap_distance_m;
     let mut round = 1;
     loop {
         let overlaps = find_overlaps(stations, &poses, overlap_distance_m)?;
-        let candidates: Vec<(usize, usize)> = overlaps
-            .iter()
-            .filter(|overlap| overlap.fraction >= options.minimum_overlap)
-            .map(|overlap| (overlap.target, overlap.source))
-            .collect();
-        let (mut pairs, mut refused) = align_pairs(stations, &poses, &candidates, &icp, progress);
-        let adjusted = adjust_without_gross_errors(&mut pairs, &mut refused, &poses, datum, options)?;
+        let candidates = best_partners(&overlaps, stations.len(), options);
+        let (aligned, mut refused) = align_pairs(stations, &poses, &candidates, &icp, progress);
+        let enough = |pair: &PairAlignment| pair.result.overlap >= options.minimum_partners;
+        let (mut pairs, thin): (Vec<_>, Vec<_>) = aligned.into_iter().partition(enough);
+        refused.extend(thin.into_iter().map(without_partners));
+        // Poses that bring partners within the distance are themselves good to a fraction of it.
+        let started = |pairs: &[PairAlignment]| constraints(stations, pairs, overlap_distance_m / 5.0);
+        let adjusted = adjust_without_gross_errors(&mut pairs, &mut refused, &poses, datum, options, &started)?;
         let moved = poses.iter().zip(&adjusted.world_from_station);
         let largest = moved.map(|(a, b)| (a.translation.vector - b.translation.vector).norm()).fold(0.0, f64::max);
         if largest <= options.tolerance_m || round >= options.max_rounds {
@@ -122,11 +133,16 @@ pub fn adjust_surfaces(
         }
         poses = adjusted.world_from_station;
         // The poses are much better now: near partners suffice, and far ones could only mislead.
-        let near = options.overlap_distance_m / 4.0;
+        let near = (options.overlap_distance_m / 4.0).max(2.0 * spacing_m);
         overlap_distance_m = near;
         icp.initial_correspondence_distance_m = Some(near);
         round += 1;
     }
+}
+
+fn without_partners(pair: PairAlignment) -> RefusedPair {
+    let reason = format!("only {:.0} % of the points have a partner", 100.0 * pair.result.overlap);
+    RefusedPair { target: pair.target, source: pair.source, reason }
 }
 
 /// Adjusts, leaves out the pair that contradicts the others most, and adjusts again until none does.
@@ -139,6 +155,7 @@ fn adjust_without_gross_errors(
     poses: &[Isometry3<f64>],
     datum: Datum,
     options: &SurfaceAdjustmentOptions,
+    constraints: &dyn Fn(&[PairAlignment]) -> Vec<PairConstraint>,
 ) -> Result<StationAdjustment> {
     let mut adjusted = adjust_stations(&constraints(pairs), poses, datum, &options.adjustment)?;
     loop {
@@ -159,14 +176,36 @@ fn adjust_without_gross_errors(
     }
 }
 
-fn constraints(pairs: &[PairAlignment]) -> Vec<PairConstraint> {
-    let constraint = |pair: &PairAlignment| PairConstraint {
-        target: pair.target,
-        source: pair.source,
-        target_from_source: pair.result.target_from_source,
-        covariance: pair.result.covariance,
+/// The pairs as observations. What a pair leaves undetermined is known at least as well as the poses it started from:
+/// information of `started_within_m` is added, for rotations at the radius of the target.
+fn constraints(stations: &[IcpTarget], pairs: &[PairAlignment], started_within_m: f64) -> Vec<PairConstraint> {
+    let constraint = |pair: &PairAlignment| {
+        let lever_m = stations[pair.target].radius_m.max(f64::MIN_POSITIVE);
+        let prior = Vector6::from_fn(|row, _| (if row < 3 { 1.0 } else { lever_m } / started_within_m).powi(2));
+        let information = pair.result.covariance.try_inverse().unwrap_or_else(Matrix6::zeros);
+        let with_prior = information + Matrix6::from_diagonal(&prior);
+        PairConstraint {
+            target: pair.target,
+            source: pair.source,
+            target_from_source: pair.result.target_from_source,
+            covariance: with_prior.try_inverse().map_or(pair.result.covariance, |c| 0.5 * (c + c.transpose())),
+        }
     };
     pairs.iter().map(constraint).collect()
+}
+
+/// Pairs of target and source that are among the best partners of either, in ascending order.
+fn best_partners(overlaps: &[Overlap], stations: usize, options: &SurfaceAdjustmentOptions) -> Vec<(usize, usize)> {
+    let enough: Vec<&Overlap> = overlaps.iter().filter(|o| o.fraction >= options.minimum_overlap).collect();
+    let mut chosen = BTreeSet::new();
+    for station in 0..stations {
+        let mut partners: Vec<&&Overlap> =
+            enough.iter().filter(|o| o.target == station || o.source == station).collect();
+        // Stable: equal overlaps stay in the order of the stations.
+        partners.sort_by(|a, b| b.fraction.total_cmp(&a.fraction));
+        chosen.extend(partners.iter().take(options.partners_per_station).map(|o| (o.target, o.source)));
+    }
+    chosen.into_iter().collect()
 }
 
 /// Aligns pairs of stations, `candidates` being indices of target and source, from the given poses.

@@ -13,7 +13,7 @@ use crate::{Error, Result};
 
 /// Overlapping stations are aligned pair by pair, and the best pairs carry the poses from the first station on.
 pub(super) fn run(work: &mut Work, options: &RegisterOptions, progress: &dyn Progress) -> Result<Findings> {
-    let targets = station_clouds(work)?;
+    let targets = station_clouds(work, options)?;
     let approximate = approximate_poses(work);
     let candidates = candidate_pairs(&targets, &approximate, options)?;
     progress.begin("Register", candidates.len());
@@ -29,11 +29,13 @@ pub(super) fn run(work: &mut Work, options: &RegisterOptions, progress: &dyn Pro
 }
 
 /// The unflagged points of each view with normals from its grid, as targets with their trees.
-fn station_clouds(work: &Work) -> Result<Vec<IcpTarget>> {
+fn station_clouds(work: &Work, options: &RegisterOptions) -> Result<Vec<IcpTarget>> {
     let clouds = work.outcome.clouds.iter().zip(&work.outcome.views);
     if work.outcome.clouds.is_empty() {
         return Err(Error::Needs { stage: "Register", needs: "PointCloud" });
     }
+    let normal_options =
+        OrganisedNormalOptions { half_width_px: options.normal_half_width_px, ..OrganisedNormalOptions::default() };
     let prepared = clouds.map(|(cloud, view)| {
         let name = view.name();
         let fail = || Error::stage::<icp_registration::Error>("Register", &name);
@@ -43,7 +45,7 @@ fn station_clouds(work: &Work) -> Result<Vec<IcpTarget>> {
                 *point = [f64::NAN; 3];
             }
         }
-        let normals = organised_normals(&points, cloud.width, cloud.height, &OrganisedNormalOptions::default());
+        let normals = organised_normals(&points, cloud.width, cloud.height, &normal_options);
         let normals = normals.map_err(fail())?;
         let cloud = Cloud::from_frame(&points, Some(&normals), Some(&cloud.sigma)).map_err(fail())?;
         IcpTarget::new(cloud).map_err(fail())

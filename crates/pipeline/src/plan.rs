@@ -255,7 +255,9 @@ pub(crate) fn is_past(level: Level, needs: Level) -> bool {
 impl Plan {
     /// Reads a plan; `path` names it in errors.
     pub fn from_ron(text: &str, path: &Path) -> Result<Self> {
-        let plan: Self = ron_text::parse(path, text)?;
+        // Stages are written `Flag(low_amplitude: 100)`, without a second pair of parentheses. On the text's own first
+        // line, so that the lines of errors stay right.
+        let plan: Self = ron_text::parse(path, &format!("#![enable(unwrap_variant_newtypes)]{text}"))?;
         plan.check_order()?;
         Ok(plan)
     }

@@ -216,8 +216,9 @@ mod tests {
             relative_pose(&observed, poses, residual, jacobians)
         });
         let worst = check_jacobian(&observation, &[ParameterBlock::pose(&target), ParameterBlock::pose(&source)]);
-        // Central differences of order-one values are good to about 1e-9.
+        // Rotations far from the model are curved: differences are good to a few 1e-6 there. Without the inverse left
+        // Jacobian the two would differ by 0.3.
         let worst = worst.unwrap().worst;
-        assert!(worst < 1e-7, "{worst}");
+        assert!(worst < 1e-5, "{worst}");
     }
 }

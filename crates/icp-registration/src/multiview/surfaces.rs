@@ -122,7 +122,7 @@ pub fn adjust_surfaces(
         let (aligned, mut refused) = align_pairs(stations, &poses, &candidates, &icp, progress);
         let enough = |pair: &PairAlignment| pair.result.overlap >= options.minimum_partners;
         let (mut pairs, thin): (Vec<_>, Vec<_>) = aligned.into_iter().partition(enough);
-        refused.extend(thin.into_iter().map(without_partners));
+        refused.extend(thin.iter().map(without_partners));
         // Poses that bring partners within the distance are themselves good to a fraction of it.
         let started = |pairs: &[PairAlignment]| constraints(stations, pairs, overlap_distance_m / 5.0);
         let adjusted = adjust_without_gross_errors(&mut pairs, &mut refused, &poses, datum, options, &started)?;
@@ -140,7 +140,7 @@ pub fn adjust_surfaces(
     }
 }
 
-fn without_partners(pair: PairAlignment) -> RefusedPair {
+fn without_partners(pair: &PairAlignment) -> RefusedPair {
     let reason = format!("only {:.0} % of the points have a partner", 100.0 * pair.result.overlap);
     RefusedPair { target: pair.target, source: pair.source, reason }
 }
@@ -166,7 +166,7 @@ fn adjust_without_gross_errors(
         };
         let pair = pairs.remove(index);
         if let Ok(without) = adjust_stations(&constraints(pairs), poses, datum, &options.adjustment) {
-            adjusted = without
+            adjusted = without;
         } else {
             pairs.insert(index, pair);
             return Ok(adjusted);

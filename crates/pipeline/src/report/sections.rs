@@ -261,7 +261,7 @@ impl Scales {
                 map: ColourMap::Grey,
                 low: gather(&amplitude, 0.01),
                 high: gather(&amplitude, 0.99),
-                unit: "log10",
+                unit: "lg",
             },
             range: Scale { map: ColourMap::Sequential, low: 0.0, high: gather(&range, 0.995), unit: "m" },
             error_before: symmetric(wide),

@@ -13,11 +13,10 @@ use crate::text::read_text;
 use crate::{Error, Result};
 
 fn options() -> ron::Options {
-    ron::Options::default().with_default_extension(Extensions::IMPLICIT_SOME | Extensions::UNWRAP_VARIANT_NEWTYPES)
+    ron::Options::default().with_default_extension(Extensions::IMPLICIT_SOME)
 }
 
-/// Reads a RON file into a value. `#![enable(implicit_some, unwrap_variant_newtypes)]` is always in force, whether
-/// written or not.
+/// Reads a RON file into a value. `#![enable(implicit_some)]` is always in force, whether written or not.
 pub fn read<T: DeserializeOwned>(path: impl AsRef<Path>) -> Result<T> {
     let path = path.as_ref();
     parse(path, &read_text(path)?)

@@ -144,7 +144,7 @@ impl Setup<'_> {
         builder.add_control()?;
         builder.hold_geometry()?;
         let datum_defect = builder.add_datum()?;
-        let solution = builder.adjustment.solve(&SolveOptions::default())?;
+        let solution = builder.adjustment.solve(&solve_options())?;
         Ok(Solved { solution, blocks: builder.blocks, rows: builder.rows, datum_defect })
     }
 
@@ -208,6 +208,11 @@ impl EquationParts {
     pub(crate) fn on(self, camera: &Camera, blocks: Vec<BlockId>) -> SightingEquation {
         SightingEquation { blocks, camera: *camera, pixel: self.pixel, uses_pixel: self.uses_pixel, range: self.range }
     }
+}
+
+/// A network that is determined takes 10 to 30 steps; one that is not creeps on for thousands.
+fn solve_options() -> SolveOptions {
+    SolveOptions { max_iterations: 100, ..SolveOptions::default() }
 }
 
 struct Builder<'s> {

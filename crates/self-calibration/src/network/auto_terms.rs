@@ -208,6 +208,12 @@ impl Wald {
 
     /// The group that speaks least for itself.
     fn weakest_group(&self, terms: &BTreeSet<String>) -> Option<(&'static [&'static str], Test)> {
+        // Over a part of its length this wave imitates shorter ones: these are judged without it if it can be spared.
+        if let Some(long_wave) = GROUPS.into_iter().find(|group| group[0] == "d2" && terms.contains("d2"))
+            && let Some(test) = self.test(long_wave).filter(|test| !test.stays(long_wave))
+        {
+            return Some((long_wave, test));
+        }
         let present = GROUPS.into_iter().filter(|group| terms.contains(group[0]));
         let tested = present.filter_map(|group| Some((group, self.test(group)?)));
         // The radial terms leave from the highest on.

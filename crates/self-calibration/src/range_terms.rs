@@ -173,10 +173,10 @@ impl<'a> Problem<'a> {
             _ => None,
         };
         let model = RangeErrorModel {
-            ambiguity_interval_m: self.ambiguity_interval_m,
             terms: RangeTerms::from_array(terms),
             hyperbola,
             range_span_m: Some(self.range_span_m),
+            ..RangeErrorModel::error_free(self.ambiguity_interval_m)
         };
         model.validate()?;
         Ok(model)

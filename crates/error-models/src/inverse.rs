@@ -1,7 +1,7 @@
 //! From the true range to the observed one, and whether there is only one.
 
 use crate::steepest::steepest;
-use crate::{Error, RangeErrorModel, Result};
+use crate::{Error, PeriodicSpline, RangeErrorModel, RangePolynomial, Result};
 
 /// Newton steps, or bisections where Newton leaves the bracket, until the inverse is given up. Bisection
 /// alone needs about 60 for all digits.
@@ -106,8 +106,7 @@ impl RangeErrorModel {
 
     /// No sum of terms that depend on the range is larger, metre.
     fn bound_by_range(&self) -> f64 {
-        let periodic =
-            self.further.spline.as_ref().map_or_else(|| self.terms.periodic_bound(), |spline| spline.bound());
-        periodic + self.further.polynomial.as_ref().map_or(0.0, |polynomial| polynomial.bound())
+        let periodic = self.further.spline.as_ref().map_or_else(|| self.terms.periodic_bound(), PeriodicSpline::bound);
+        periodic + self.further.polynomial.as_ref().map_or(0.0, RangePolynomial::bound)
     }
 }

@@ -85,9 +85,10 @@ impl RangeErrorModel {
             Some(spline) => spline.coefficients.copy_from_slice(periodic),
             None => self.terms.periodic.copy_from_slice(periodic),
         }
-        match &mut self.further.surface {
-            Some(surface) => surface.coefficients.copy_from_slice(position),
-            None => (self.terms.e1, self.terms.e2) = (position[0], position[1]),
+        if let Some(surface) = &mut self.further.surface {
+            surface.coefficients.copy_from_slice(position);
+        } else {
+            (self.terms.e1, self.terms.e2) = (position[0], position[1]);
         }
         if let Some(terms) = &mut self.further.polynomial {
             terms.coefficients.copy_from_slice(polynomial);
@@ -109,9 +110,7 @@ impl RangeErrorModel {
         let (position, polynomial) = rest.split_at_mut(position);
         match &self.further.spline {
             Some(spline) => spline.design_row(self.ambiguity_interval_m, range_m, periodic),
-            None => {
-                periodic.copy_from_slice(&RangeTerms::design_row(self.ambiguity_interval_m, range_m, 0.0, 0.0)[1..7])
-            }
+            None => periodic.copy_from_slice(&sines(self.ambiguity_interval_m, range_m)),
         }
         match &self.further.surface {
             Some(surface) => surface.design_row(x_mm, y_mm, position),
@@ -146,4 +145,10 @@ impl RangeErrorModel {
             polynomial.as_ref().map_or(0, |polynomial| polynomial.coefficients.len()),
         ]
     }
+}
+
+/// Columns of d2..d7.
+fn sines(ambiguity_interval_m: f64, range_m: f64) -> [f64; 6] {
+    let [_, sines @ .., _, _] = RangeTerms::design_row(ambiguity_interval_m, range_m, 0.0, 0.0);
+    sines
 }

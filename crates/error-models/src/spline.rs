@@ -68,7 +68,7 @@ impl PeriodicSpline {
         let knots = self.knots();
         (0..knots).map(move |knot| {
             let [p, q, r, s] = neighbours(knot, knots).map(|knot| self.at_knot(knot));
-            [(p + 4.0 * q + r) / 6.0, (r - p) / 2.0, (p - 2.0 * q + r) / 2.0, (s - p + 3.0 * (q - r)) / 6.0]
+            [(p + 4.0 * q + r) / 6.0, (r - p) / 2.0, f64::midpoint(p, r) - q, (s - p + 3.0 * (q - r)) / 6.0]
         })
     }
 

@@ -1,5 +1,7 @@
 //! A surface over the image, instead of the plane `e1 x + e2 y` of Eq. 14.
 
+use range_image::ImageFormat;
+
 use crate::error::{require_count, require_finite, require_span};
 use crate::legendre::{Legendre, reduced};
 use crate::{Error, ImageSurface, Result, SurfaceShape};
@@ -79,6 +81,17 @@ impl ImageSurface {
 
     fn bases(&self, x_mm: f64, y_mm: f64) -> (Legendre, Legendre) {
         (Legendre::on_span(self.x_span_mm, x_mm), Legendre::on_span(self.y_span_mm, y_mm))
+    }
+}
+
+impl SurfaceShape {
+    /// A surface over all pixels of an image, `principal_point_mm` being (xp, yp).
+    pub fn over_image(order: usize, format: &ImageFormat, principal_point_mm: [f64; 2]) -> Self {
+        let last = [format.width.saturating_sub(1) as f64, format.height.saturating_sub(1) as f64];
+        let [left, top] = format.image_from_pixel([0.0, 0.0]);
+        let [right, bottom] = format.image_from_pixel(last);
+        let [xp, yp] = principal_point_mm;
+        Self { order, x_span_mm: [left - xp, right - xp], y_span_mm: [bottom - yp, top - yp] }
     }
 }
 

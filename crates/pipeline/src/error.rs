@@ -2,6 +2,8 @@ use std::path::PathBuf;
 
 use thiserror::Error;
 
+use crate::calibrate::CalibrationSummary;
+
 /// Why a pipeline could not be read, started or finished.
 #[derive(Debug, Error)]
 #[non_exhaustive]
@@ -81,6 +83,17 @@ pub enum Error {
         figure: String,
         /// Why.
         message: String,
+    },
+    /// A calibration that cannot be done as it was asked for.
+    #[error("calibrate: {0}")]
+    Calibrate(#[source] self_calibration::Error),
+    /// A survey that does not determine the calibration; its summary was written.
+    #[error("calibration refused: {source}")]
+    Refused {
+        /// The summary, with the diagnosis and without parameters.
+        summary: Box<CalibrationSummary>,
+        /// Why.
+        source: self_calibration::Error,
     },
     /// Two things to be compared do not belong together.
     #[error("compare: {0}")]

@@ -1,10 +1,12 @@
 #![doc = include_str!("../README.md")]
 
+mod calibrate;
 mod compare;
 mod error;
 mod inspect;
 mod load;
 mod measure;
+mod network_scene;
 mod outcome;
 mod plan;
 mod progress;
@@ -19,9 +21,17 @@ mod truth;
 mod view;
 mod work;
 
+pub use calibrate::{
+    CalibrateMethod, CalibrateRequest, CalibrationSummary, CorrelationSummary, DecisionSummary, GroupSummary,
+    ParameterMap, ParameterSummary, RejectedObservation, TableDefaults, calibrate,
+};
+pub use self_calibration::{CalibrationOptions, Method, NetworkDatum, TermSelection};
 pub use compare::{CloudComparison, Comparison, PoseComparison, compare};
 pub use error::{Error, Result};
 pub use inspect::{Inspection, inspect};
+pub use network_scene::{
+    FieldSpec, NetworkScene, PassiveSpec, SceneStation, SceneTarget, SightingSpec, simulate_network,
+};
 pub use outcome::{AdjustmentFigures, Outcome, StationPose};
 pub use plan::{
     AdjustOptions, AverageOptions, CorrectImagePointOptions, CorrectRangeOptions, DeconvolveOptions, DemodulateOptions,

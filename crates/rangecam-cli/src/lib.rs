@@ -2,6 +2,7 @@
 
 mod arguments;
 mod bar;
+mod calibrate_arguments;
 mod commands;
 mod output;
 
@@ -28,6 +29,7 @@ pub fn main(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     match commands::dispatch(arguments.command, &output) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
+            output.refusal(error.as_ref());
             output.error(error.as_ref());
             ExitCode::FAILURE
         }

@@ -6,7 +6,7 @@ use self_calibration::{CalibratedParameter, CalibrationOutcome, Component, Verdi
 
 use super::start::Start;
 use super::summary::CorrelationSummary;
-use crate::{Error, Result};
+use crate::Result;
 
 /// Integration time written where neither tables nor frames state one. A correction chooses the only model there is,
 /// whatever its time, for frames that state none either.
@@ -123,9 +123,4 @@ fn extent(values: impl Iterator<Item = f64>) -> Option<[f64; 2]> {
         let [low, high] = span.unwrap_or([value; 2]);
         Some([low.min(value), high.max(value)])
     })
-}
-
-/// For messages of the adjustment: an error that is none of the input.
-pub(crate) fn refused(error: &self_calibration::Error) -> Error {
-    Error::Calibrate(error.to_string())
 }

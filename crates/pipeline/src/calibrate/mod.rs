@@ -22,5 +22,4 @@ pub use summary::{
     RejectedObservation,
 };
 
-pub(crate) use names::{component_name, group_unit, verdict_name};
 pub(crate) use words::readable;

@@ -1,19 +1,6 @@
 //! Names of what was observed, as files and reports write them.
 
-use self_calibration::{Component, Verdict};
-
-/// Name of a component in tables.
-pub(crate) fn component_name(component: Component) -> &'static str {
-    match component {
-        Component::Col => "col",
-        Component::Row => "row",
-        Component::Range => "range",
-        Component::PassiveCol => "passive_col",
-        Component::PassiveRow => "passive_row",
-        Component::Distance => "distance",
-        Component::Control => "control",
-    }
-}
+use self_calibration::Verdict;
 
 /// Unit of a component or of the group of its name; control has metres and radians.
 pub(crate) fn group_unit(name: &str) -> &'static str {

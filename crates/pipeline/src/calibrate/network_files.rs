@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
+use nalgebra::{Matrix3, Point3, Vector3};
 use range_io::survey::Survey;
 use range_io::tables::{
     PlacedRows, Station as StationRow, Target as TargetRow, TargetObservation, read_placed_observations,
@@ -112,11 +112,6 @@ impl Tables {
             covariance: row.and_then(|row| row.sigma_m).map(variances),
         });
         self.targets.len() - 1
-    }
-
-    /// Adds a station of `stations.csv` that no row of `observations.csv` names; `None` where it is in neither.
-    pub(super) fn known_pose(&self, name: &str) -> Option<Isometry3<f64>> {
-        self.station_rows.rows.iter().find(|row| row.station == name).map(|row| row.world_from_camera)
     }
 
     fn sightings(

@@ -1,22 +1,22 @@
 //! Range terms from frames of known planes.
 
-use std::path::Path;
-
-use adjust::Scale;
-use error_models::RangeTerms;
-use nalgebra::{DMatrix, Point3, Vector3};
+use camera_model::Camera;
+use error_models::{AmplitudeHyperbola, ParameterStatus, RangeTerms};
+use nalgebra::{DMatrix, DVector, Point3, Vector3};
 use range_image::Modulation;
 use range_io::survey::{Level, Survey};
 use range_io::tables::{ObservedPlane, PlacedRows, read_placed_planes};
+use self_calibration::Error as Cause;
 use self_calibration::{
     CalibratedParameter, CalibrationOutcome, Component, DifferenceOptions, GroupQuality, Method, ObservationQuality,
-    Plane, RangeCalibration, RangeDifference, RangeTermOptions, TermSelection, Verdict, differences_to_plane,
-    estimate_range_terms,
+    Plane, RangeCalibration, RangeDifference, RangeTermOptions, Scale, TermSelection, TermUse, Verdict,
+    differences_to_plane, estimate_range_terms,
 };
 
 use super::request::CalibrateRequest;
 use super::run::Attempt;
 use super::start::Start;
+use super::summary::PARAMETERS;
 use crate::load::root_of;
 use crate::outcome::Outcome;
 use crate::progress::Progress;
@@ -28,6 +28,9 @@ use crate::{
 /// Differences used of all frames together. More pixels of the same planes would not tell more, as they share the
 /// errors of the reference, and would make the report heavy.
 const MOST_DIFFERENCES: usize = 20_000;
+
+/// Gross error in standard deviations of its residual that a test with a level of 0.1 % finds with a power of 80 %.
+const NONCENTRALITY: f64 = 4.13;
 
 /// A range difference and where it was seen.
 struct Sample {
@@ -86,12 +89,12 @@ fn term_options(terms: &TermSelection, largest_inflation: f64, start: &Start) ->
                 options = options.with_hyperbola();
                 continue;
             }
-            return Err(Error::Calibrate(format!(
-                "--terms: `{name}` can't be found from planes; these can: {}, h1, h2, h3",
-                RangeTerms::NAMES.join(", ")
-            )));
+            let known = format!("{}, h1, h2, h3", RangeTerms::NAMES.join(", "));
+            let what = "the list of terms for planes".to_owned();
+            let kind = "term";
+            return Err(Error::Calibrate(Cause::UnknownName { what, kind, name: name.clone(), known }));
         };
-        options.terms[index] = self_calibration::TermUse::Estimate;
+        options.terms[index] = TermUse::Estimate;
     }
     Ok(options)
 }
@@ -170,7 +173,8 @@ fn outcome(
     time: Option<f64>,
     estimate: &RangeCalibration,
 ) -> self_calibration::Result<CalibrationOutcome> {
-    let parameters = parameters(estimate)?;
+    let covariance = estimate.covariance(Scale::Prior)?;
+    let quality = |(sample, v): (&Sample, &f64)| quality(sample, *v, estimate, &covariance);
     let residuals = estimate.residuals_m();
     let used = samples.len();
     let unknowns = estimate.estimated_names().len();
@@ -180,12 +184,12 @@ fn outcome(
         method: Method::Laboratory,
         camera: start.camera,
         range_models: vec![(time, estimate.model().clone())],
-        parameters,
+        parameters: parameters(start, estimate)?,
         estimated: estimate.estimated_names().to_vec(),
-        covariance: estimate.covariance(Scale::Prior)?,
+        covariance: covariance.clone(),
         stations: Vec::new(),
         targets: Vec::new(),
-        residuals: samples.iter().zip(residuals).map(|(sample, v)| quality(sample, *v, estimate)).collect(),
+        residuals: samples.iter().zip(residuals).map(quality).collect(),
         groups: vec![GroupQuality {
             name: "range".to_owned(),
             observations: used,
@@ -205,4 +209,73 @@ fn outcome(
         bic: vtpv + k * n.ln(),
         trace: Vec::new(),
     })
+}
+
+/// Camera parameters are held, range terms as the estimate has them.
+fn parameters(start: &Start, estimate: &RangeCalibration) -> self_calibration::Result<Vec<CalibratedParameter>> {
+    let posterior = estimate.parameters(Scale::Posterior)?;
+    let prior = estimate.parameters(Scale::Prior)?;
+    let ranges = prior.into_iter().zip(posterior).map(|(prior, posterior)| CalibratedParameter {
+        name: prior.name,
+        value: prior.value,
+        sigma_prior: prior.sigma,
+        sigma_posterior: posterior.sigma,
+        unit: prior.unit,
+        status: prior.status,
+        significance_p: f64::NAN,
+    });
+    let camera = camera_values(&start.camera).into_iter().zip(PARAMETERS);
+    let held = camera.map(|(value, (name, unit))| CalibratedParameter {
+        name: name.to_owned(),
+        value,
+        sigma_prior: 0.0,
+        sigma_posterior: 0.0,
+        unit: unit.to_owned(),
+        status: ParameterStatus::Held,
+        significance_p: f64::NAN,
+    });
+    Ok(held.chain(ranges).collect())
+}
+
+/// Interior orientation and lens in the order of the summary.
+fn camera_values(camera: &Camera) -> Vec<f64> {
+    let [xp, yp] = camera.interior.principal_point_mm;
+    [xp, yp, camera.interior.principal_distance_mm].into_iter().chain(camera.lens.coefficients()).collect()
+}
+
+/// A sample after the estimation. Its redundancy number is `1 - a Q aᵀ / σ²` with its design row a.
+fn quality(sample: &Sample, residual: f64, estimate: &RangeCalibration, covariance: &DMatrix<f64>) -> ObservationQuality {
+    let difference = &sample.difference;
+    let row = design_row(estimate, difference);
+    let redundancy = 1.0 - row.dot(&(covariance * &row)) / difference.sigma_m.powi(2);
+    let scale = estimate.sigma0().unwrap_or(f64::NAN);
+    ObservationQuality {
+        station: sample.station.clone(),
+        target: sample.plane.clone(),
+        component: Component::Range,
+        observed: difference.observed_range_m,
+        sigma: difference.sigma_m,
+        residual,
+        redundancy_number: redundancy,
+        standardised: residual / (scale * difference.sigma_m * redundancy.sqrt()),
+        smallest_detectable: NONCENTRALITY * difference.sigma_m / redundancy.sqrt(),
+        verdict: Verdict::Used,
+        pixel: sample.pixel,
+        range_m: difference.observed_range_m,
+        amplitude: difference.amplitude,
+        uncorrected_m: difference.observed_range_m - difference.reference_range_m,
+    }
+}
+
+/// Derivatives of the correction by the estimated parameters.
+fn design_row(estimate: &RangeCalibration, difference: &RangeDifference) -> DVector<f64> {
+    let model = estimate.model();
+    let interval = model.ambiguity_interval_m;
+    let terms = RangeTerms::design_row(interval, difference.observed_range_m, difference.x_mm, difference.y_mm);
+    let hyperbola = model.hyperbola.and_then(|hyperbola| hyperbola.jacobian(difference.amplitude));
+    let hyperbola = hyperbola.map_or([0.0; 3], |jacobian| jacobian.coefficients);
+    let named = RangeTerms::NAMES.into_iter().zip(terms).chain(AmplitudeHyperbola::NAMES.into_iter().zip(hyperbola));
+    let named: Vec<(&str, f64)> = named.collect();
+    let value = |name: &String| named.iter().find(|(known, _)| known == name).map_or(0.0, |(_, value)| *value);
+    DVector::from_iterator(estimate.estimated_names().len(), estimate.estimated_names().iter().map(value))
 }

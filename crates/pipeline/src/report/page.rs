@@ -53,6 +53,18 @@ impl Page {
         let _ = writeln!(self.html, "<p>{}</p>", escape(text));
     }
 
+    /// Sentences one below the other.
+    pub(crate) fn list(&mut self, sentences: &[String]) {
+        if sentences.is_empty() {
+            return;
+        }
+        self.html.push_str("<ul>");
+        for sentence in sentences {
+            let _ = write!(self.html, "<li>{}</li>", escape(sentence));
+        }
+        self.html.push_str("</ul>\n");
+    }
+
     /// Figures side by side, each with a caption.
     pub(crate) fn figures(&mut self, figures: &[(String, String)]) {
         self.html.push_str("<div class=\"figures\">");

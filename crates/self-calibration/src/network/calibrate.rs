@@ -13,6 +13,10 @@ use crate::{Error, Result};
 pub fn calibrate(network: &Network, options: &CalibrationOptions) -> Result<CalibrationOutcome> {
     network.validate()?;
     options.check(network)?;
+    if options.method != Method::OneStep {
+        let needs = "only the one-step method works on this network".to_owned();
+        return Err(Error::MethodNeeds { method: format!("{:?}", options.method), needs });
+    }
     let ranged = ranged_stations(network, options);
     network.check_coverage(&ranged, false)?;
     let calibration = start_calibration(network);
@@ -25,6 +29,7 @@ pub fn calibrate(network: &Network, options: &CalibrationOptions) -> Result<Cali
         ranged,
         passive: false,
         datum: datum(network, options)?,
+        geometry_held: false,
         camera_prior: None,
         excluded: Excluded::default(),
     };
@@ -33,13 +38,13 @@ pub fn calibrate(network: &Network, options: &CalibrationOptions) -> Result<Cali
 }
 
 /// Stations whose ranges take part.
-fn ranged_stations(network: &Network, options: &CalibrationOptions) -> Vec<bool> {
+pub(crate) fn ranged_stations(network: &Network, options: &CalibrationOptions) -> Vec<bool> {
     network.stations.iter().map(|station| !options.without_ranges.contains(&station.name)).collect()
 }
 
 /// The calibration to start from: one set of range terms for each integration time, in the order in which the stations
 /// name them.
-fn start_calibration(network: &Network) -> Calibration {
+pub(crate) fn start_calibration(network: &Network) -> Calibration {
     let mut sets: Vec<RangeSet> = Vec::new();
     for station in &network.stations {
         let time = station.integration_time_s;
@@ -69,7 +74,7 @@ fn selected(options: &CalibrationOptions) -> BTreeSet<String> {
 }
 
 /// The datum asked for, where the network agrees.
-fn datum(network: &Network, options: &CalibrationOptions) -> Result<Datum> {
+pub(crate) fn datum(network: &Network, options: &CalibrationOptions) -> Result<Datum> {
     let targets = network.targets.iter().filter(|target| target.covariance.is_some()).map(|target| &target.name);
     let stations = network.stations.iter().filter(|station| station.covariance.is_some()).map(|station| &station.name);
     let control: Vec<&str> = targets.chain(stations).map(String::as_str).collect();
@@ -98,7 +103,7 @@ impl Default for CalibrationOptions {
             datum: NetworkDatum::Free,
             without_ranges: Vec::new(),
             rejection_level: Some(0.001),
-            largest_inflation: 1000.0,
+            largest_inflation: 500.0,
         }
     }
 }

@@ -69,7 +69,12 @@ impl Network {
                 positive(what, "sigma of the range", seen.sigma_range_m)?;
                 if seen.pixel.is_none() {
                     let expected = "an image point with each range: range corrections depend on it";
-                    return Err(Error::BadNetworkValue { what: what(), name: "image point", value: f64::NAN, expected });
+                    return Err(Error::BadNetworkValue {
+                        what: what(),
+                        name: "image point",
+                        value: f64::NAN,
+                        expected,
+                    });
                 }
             }
             if let Some(amplitude) = seen.amplitude {
@@ -94,7 +99,12 @@ impl Network {
             positive(what, "sigma", known.sigma_m)?;
             if known.from == known.to {
                 let expected = "two different ends";
-                return Err(Error::BadNetworkValue { what: what(), name: "distance", value: known.distance_m, expected });
+                return Err(Error::BadNetworkValue {
+                    what: what(),
+                    name: "distance",
+                    value: known.distance_m,
+                    expected,
+                });
             }
         }
         Ok(())
@@ -116,7 +126,8 @@ impl Network {
     }
 
     fn check_ends(&self, what: &str, station: usize, target: usize) -> Result<()> {
-        for (kind, index, count) in [("station", station, self.stations.len()), ("target", target, self.targets.len())] {
+        for (kind, index, count) in [("station", station, self.stations.len()), ("target", target, self.targets.len())]
+        {
             if index >= count {
                 let (what, name, known) = (what.to_owned(), format!("number {index}"), format!("{count} of them"));
                 return Err(Error::UnknownName { what, kind, name, known });
@@ -142,7 +153,8 @@ impl Network {
     /// `ranged` says of each station whether its ranges take part.
     pub(crate) fn check_coverage(&self, ranged: &[bool], passive: bool) -> Result<()> {
         let images = |station: usize| {
-            let own = self.sightings.iter().filter(move |s| s.station == station && s.pixel.is_some()).map(|s| s.target);
+            let own =
+                self.sightings.iter().filter(move |s| s.station == station && s.pixel.is_some()).map(|s| s.target);
             own.collect::<BTreeSet<_>>().len()
         };
         let partner = |station: usize| {

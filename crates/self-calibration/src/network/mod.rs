@@ -7,11 +7,13 @@ mod equations;
 mod model;
 mod options;
 mod outcome;
+mod plan;
 mod problem;
 mod quality;
 mod report;
 mod simulate;
 mod start;
+mod strength;
 mod terms;
 
 pub use calibrate::calibrate;
@@ -23,4 +25,5 @@ pub use outcome::{
     AdjustedStation, AdjustedTarget, CalibratedParameter, CalibrationOutcome, Component, GroupQuality,
     ObservationQuality, TermDecision, Verdict,
 };
+pub use plan::{Candidate, CandidateGrid, PlanOptions, PlanOutcome, plan};
 pub use simulate::{SightingOptions, SimulatedStart, simulate_sightings};

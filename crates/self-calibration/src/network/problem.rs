@@ -77,6 +77,8 @@ pub(crate) struct Setup<'n> {
     /// Whether the passive camera takes part.
     pub(crate) passive: bool,
     pub(crate) datum: Datum,
+    /// Poses and coordinates are held at their start values.
+    pub(crate) geometry_held: bool,
     pub(crate) camera_prior: Option<CameraPrior>,
     pub(crate) excluded: Excluded,
 }
@@ -140,6 +142,7 @@ impl Setup<'_> {
         builder.add_passive()?;
         builder.add_distances()?;
         builder.add_control()?;
+        builder.hold_geometry()?;
         let datum_defect = builder.add_datum()?;
         let solution = builder.adjustment.solve(&SolveOptions::default())?;
         Ok(Solved { solution, blocks: builder.blocks, rows: builder.rows, datum_defect })
@@ -208,7 +211,8 @@ impl<'s> Builder<'s> {
         let mut adjustment = Adjustment::new();
         let network = setup.network;
         let stations = network.stations.iter().zip(&setup.start.stations);
-        let stations = stations.map(|(station, pose)| adjustment.add_block(ParameterBlock::pose(pose).named(&station.name)));
+        let stations =
+            stations.map(|(station, pose)| adjustment.add_block(ParameterBlock::pose(pose).named(&station.name)));
         let stations: Vec<BlockId> = stations.collect();
         let mut targets = Vec::with_capacity(network.targets.len());
         for (target, start) in network.targets.iter().zip(&setup.start.targets) {
@@ -354,7 +358,8 @@ impl<'s> Builder<'s> {
                 DistanceEnd::Station(station) => Ok(self.blocks.stations[station]),
                 DistanceEnd::Target(target) => self.target(target),
             };
-            let equation = DistanceEquation { blocks: [end(known.from)?, end(known.to)?], distance_m: known.distance_m };
+            let equation =
+                DistanceEquation { blocks: [end(known.from)?, end(known.to)?], distance_m: known.distance_m };
             self.adjustment.add_observation(group, equation, &Covariance::from_sigma(known.sigma_m))?;
             self.row(Source::Distance(index), Component::Distance, known.distance_m, known.sigma_m);
         }
@@ -392,14 +397,28 @@ impl<'s> Builder<'s> {
             self.adjustment.add_prior(block, &RigidPose::values(&pose), &Covariance::from_matrix(&covariance))?;
             for component in 0..6 {
                 let observed = if component < 3 { pose.translation.vector[component] } else { 0.0 };
-                self.row(Source::Station(index), Component::Control, observed, covariance[(component, component)].sqrt());
+                self.row(
+                    Source::Station(index),
+                    Component::Control,
+                    observed,
+                    covariance[(component, component)].sqrt(),
+                );
             }
         }
         Ok(())
     }
 
+    fn hold_geometry(&mut self) -> Result<()> {
+        if !self.setup.geometry_held {
+            return Ok(());
+        }
+        let relative = self.blocks.passive.map(|[relative, _]| relative);
+        let geometry = self.blocks.stations.iter().chain(self.blocks.targets.iter().flatten()).copied();
+        geometry.chain(relative).try_for_each(|block| Ok(self.adjustment.hold(block)?))
+    }
+
     fn add_datum(&mut self) -> Result<usize> {
-        if self.setup.datum != Datum::Inner {
+        if self.setup.datum != Datum::Inner || self.setup.geometry_held {
             return Ok(0);
         }
         let points: Vec<BlockId> = self.blocks.targets.iter().copied().flatten().collect();

@@ -106,13 +106,7 @@ impl Setup<'_> {
     }
 
     /// One entry of the list.
-    pub(crate) fn quality(
-        &self,
-        row: &Row,
-        figures: Figures,
-        level: f64,
-        geometry: &Geometry,
-    ) -> ObservationQuality {
+    pub(crate) fn quality(&self, row: &Row, figures: Figures, level: f64, geometry: &Geometry) -> ObservationQuality {
         let seen = match row.source {
             Source::Sighting(index) => Some(&self.network.sightings[index]),
             _ => None,
@@ -188,7 +182,10 @@ impl Setup<'_> {
             let verdict = if self.passive { Verdict::Rejected } else { Verdict::LeftOut };
             for (axis, component) in [Component::PassiveCol, Component::PassiveRow].into_iter().enumerate() {
                 let source = Source::Passive(index);
-                out.push((Row { source, component, observed: seen.pixel[axis], sigma: seen.sigma_pixel[axis] }, verdict));
+                out.push((
+                    Row { source, component, observed: seen.pixel[axis], sigma: seen.sigma_pixel[axis] },
+                    verdict,
+                ));
             }
         }
         out
@@ -229,7 +226,8 @@ impl Setup<'_> {
             }
             _ => return Ok(f64::NAN),
         };
-        let parameters = equation.blocks().iter().map(|&block| Ok(solution.values(block)?)).collect::<Result<Vec<_>>>()?;
+        let parameters =
+            equation.blocks().iter().map(|&block| Ok(solution.values(block)?)).collect::<Result<Vec<_>>>()?;
         let mut residual = vec![0.0; equation.dimension()];
         // A model without a value there predicts nothing.
         let known = equation.evaluate(&parameters, &mut residual, None).is_ok();

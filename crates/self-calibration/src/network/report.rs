@@ -26,7 +26,8 @@ impl Setup<'_> {
     /// Blocks and components of the estimated calibration parameters, with their names.
     pub(crate) fn estimated_parameters(&self, solved: &Solved) -> Vec<(String, BlockId, usize)> {
         let names = camera_names().into_iter().map(str::to_owned);
-        let mut out: Vec<_> = names.enumerate().map(|(i, name)| (name.clone(), name, solved.blocks.camera, i)).collect();
+        let mut out: Vec<_> =
+            names.enumerate().map(|(i, name)| (name.clone(), name, solved.blocks.camera, i)).collect();
         for (set, &block) in self.calibration.sets.iter().zip(&solved.blocks.sets) {
             let names = range_names(&set.model).into_iter().enumerate();
             out.extend(names.map(|(i, name)| (format!("{name}{}", set.suffix), name, block, i)));
@@ -187,7 +188,8 @@ pub(crate) fn parameters(calibration: &Calibration, estimate: &Estimate, fit: &F
         let (sigma_prior, status) = sigma.map_or((0.0, ParameterStatus::Held), |s| (s, ParameterStatus::Estimated));
         let sigma_posterior = if sigma.is_some() { scale * sigma_prior } else { 0.0 };
         let statistic = (value / sigma_posterior).powi(2);
-        let significance_p = if sigma.is_some() { fisher_tail(1.0, fit.redundancy as f64, statistic) } else { f64::NAN };
+        let significance_p =
+            if sigma.is_some() { fisher_tail(1.0, fit.redundancy as f64, statistic) } else { f64::NAN };
         let unit = unit(&name).to_owned();
         CalibratedParameter { name: full, value, sigma_prior, sigma_posterior, unit, status, significance_p }
     };

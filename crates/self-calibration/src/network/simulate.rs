@@ -72,7 +72,20 @@ impl Default for SightingOptions {
 pub fn simulate_sightings(network: &Network, options: &SightingOptions) -> Result<Network> {
     options.check()?;
     network.validate()?;
-    let mut simulator = Simulator { truth: network, options, random: Pcg64::seed_from_u64(options.seed) };
+    simulated(network, options, 1.0)
+}
+
+/// What a network would observe without any errors. Standard deviations of image points and ranges are those of the
+/// options.
+pub(crate) fn exact_sightings(network: &Network, options: &SightingOptions) -> Result<Network> {
+    options.check()?;
+    let quiet = SightingOptions { gross_error_share: 0.0, start: SimulatedStart::Truth, ..options.clone() };
+    simulated(network, &quiet, 0.0)
+}
+
+fn simulated(network: &Network, options: &SightingOptions, noise: f64) -> Result<Network> {
+    let random = Pcg64::seed_from_u64(options.seed);
+    let mut simulator = Simulator { truth: network, options, random, noise };
     let mut observed = network.clone();
     observed.sightings = simulator.sightings()?;
     if let Some(passive) = observed.passive.as_mut() {
@@ -110,11 +123,14 @@ struct Simulator<'n> {
     truth: &'n Network,
     options: &'n SightingOptions,
     random: Pcg64,
+    /// Factor of all noise: 1, or 0 for exact observations.
+    noise: f64,
 }
 
 impl Simulator<'_> {
     fn normal(&mut self) -> f64 {
-        StandardNormal.sample(&mut self.random)
+        let drawn: f64 = StandardNormal.sample(&mut self.random);
+        self.noise * drawn
     }
 
     fn vector(&mut self) -> Vector3<f64> {
@@ -143,9 +159,10 @@ impl Simulator<'_> {
     fn distance(&self, from: DistanceEnd, to: DistanceEnd) -> Result<f64> {
         let end = |end| -> Result<Vector3<f64>> {
             match end {
-            DistanceEnd::Station(station) => Ok(self.pose(station)?.translation.vector),
-            DistanceEnd::Target(target) => Ok(self.point(target)?.coords),
-        }};
+                DistanceEnd::Station(station) => Ok(self.pose(station)?.translation.vector),
+                DistanceEnd::Target(target) => Ok(self.point(target)?.coords),
+            }
+        };
         Ok((end(to)? - end(from)?).norm())
     }
 

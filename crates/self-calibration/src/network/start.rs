@@ -210,7 +210,8 @@ impl<'n> Finder<'n> {
         best.copied().ok_or_else(|| Error::NotReachable {
             kind: "camera",
             name: "passive".to_owned(),
-            reason: "no station gives its relative orientation: four targets in one of its images are needed".to_owned(),
+            reason: "no station gives its relative orientation: four targets in one of its images are needed"
+                .to_owned(),
         })
     }
 }
@@ -224,8 +225,7 @@ fn robust_orientation(pairs: &[(Point3<f64>, Point3<f64>)]) -> Option<Isometry3<
         let target: Vec<_> = chosen.iter().map(|&i| pairs[i].1).collect();
         absolute_orientation(&source, &target, None).ok().map(|orientation| orientation.target_from_source)
     };
-    let residuals =
-        |pose: &Isometry3<f64>| pairs.iter().map(|(a, b)| (pose * a - b).norm()).collect::<Vec<f64>>();
+    let residuals = |pose: &Isometry3<f64>| pairs.iter().map(|(a, b)| (pose * a - b).norm()).collect::<Vec<f64>>();
     let strides = [(n / 3, 2 * n / 3), (n / 4, n / 2), (1, n / 2)];
     let triples = strides.iter().flat_map(|&(a, b)| (0..n).map(move |i| [i, (i + a) % n, (i + b) % n]));
     let distinct = triples.filter(|[a, b, c]| a != b && b != c && a != c);

@@ -93,7 +93,8 @@ pub(crate) const RANGE_FAMILIES: [RangeFamily; 2] = [
             let hyperbola = AmplitudeHyperbola { h1, h2, h3, ..hyperbola };
             let value = hyperbola.correction(seen.amplitude);
             let value = value.ok_or("the amplitude hyperbola has no value at this amplitude")?;
-            let jacobian = hyperbola.jacobian(seen.amplitude).ok_or("the slope of the amplitude hyperbola is infinite")?;
+            let jacobian =
+                hyperbola.jacobian(seen.amplitude).ok_or("the slope of the amplitude hyperbola is infinite")?;
             row.copy_from_slice(&jacobian.coefficients);
             Ok(RangePart { value, by_x: 0.0, by_y: 0.0 })
         },

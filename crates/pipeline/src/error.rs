@@ -2,8 +2,6 @@ use std::path::PathBuf;
 
 use thiserror::Error;
 
-use crate::calibrate::CalibrationSummary;
-
 /// Why a pipeline could not be read, started or finished.
 #[derive(Debug, Error)]
 #[non_exhaustive]
@@ -87,11 +85,11 @@ pub enum Error {
     /// A calibration that cannot be done as it was asked for.
     #[error("calibrate: {0}")]
     Calibrate(#[source] self_calibration::Error),
-    /// A survey that does not determine the calibration; its summary was written.
-    #[error("calibration refused: {source}")]
+    /// A survey, measured or planned, that does not determine the calibration; its summary was written.
+    #[error("refused: {source}")]
     Refused {
-        /// The summary, with the diagnosis and without parameters.
-        summary: Box<CalibrationSummary>,
+        /// The text of `summary.json`, with the diagnosis and without parameters.
+        summary: String,
         /// Why.
         source: self_calibration::Error,
     },

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::{Parser, Subcommand};
 
 use crate::calibrate_arguments::CalibrateArguments;
+use crate::plan_arguments::PlanArguments;
 
 /// Raw frames of a range camera in, one corrected and registered cloud out.
 #[derive(Debug, Parser)]
@@ -66,6 +67,8 @@ pub(crate) enum Command {
     },
     /// Calibrate lens and range terms from a survey of targets or planes, with the quality of every parameter.
     Calibrate(Box<CalibrateArguments>),
+    /// Tell how well planned stations and targets would determine a calibration, and which station to add.
+    Plan(Box<PlanArguments>),
     /// Tell what a survey, a calibration or a cloud holds, and which stages it leaves room for.
     Inspect {
         /// Survey folder, calibration.ron or cloud.ply.

@@ -1,6 +1,6 @@
 //! What can be typed behind `rangecam calibrate`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use pipeline::{
@@ -77,11 +77,20 @@ enum JointName {
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
-enum DatumName {
+pub(crate) enum DatumName {
     /// Inner constraints on the targets.
     Free,
     /// Targets or stations with standard deviations.
     Control,
+}
+
+impl DatumName {
+    pub(crate) fn datum(self) -> NetworkDatum {
+        match self {
+            Self::Free => NetworkDatum::Free,
+            Self::Control => NetworkDatum::Control,
+        }
+    }
 }
 
 /// Level of a test, or that there is none.
@@ -98,7 +107,7 @@ fn level(text: &str) -> Result<Level, String> {
     }
 }
 
-fn positive(text: &str) -> Result<f64, String> {
+pub(crate) fn positive(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(value) if value > 0.0 && value.is_finite() => Ok(value),
         _ => Err("expected a positive number".to_owned()),
@@ -117,21 +126,16 @@ impl CalibrateArguments {
             (MethodName::Laboratory, _) => CalibrateMethod::Network(Method::Laboratory),
             (MethodName::Planes, _) => CalibrateMethod::Planes,
         };
-        let datum = match self.datum {
-            DatumName::Free => NetworkDatum::Free,
-            DatumName::Control => NetworkDatum::Control,
-        };
+        let out = default_out(&self.survey, "-calibration");
         let standard = CalibrationOptions::default();
         let options = CalibrationOptions {
             terms: terms(&self.terms),
-            datum,
+            datum: self.datum.datum(),
             without_ranges: self.without_ranges,
             rejection_level: self.reject.0,
             largest_inflation: self.largest_inflation.unwrap_or(standard.largest_inflation),
             ..standard
         };
-        let mut name = self.survey.file_name().unwrap_or_default().to_owned();
-        name.push("-calibration");
         CalibrateRequest {
             survey: self.survey,
             lens_survey: self.lens_survey,
@@ -139,7 +143,7 @@ impl CalibrateArguments {
             method,
             options,
             defaults: TableDefaults { sigma_pixel: self.sigma_pixel, sigma_range_m: self.sigma_range },
-            out: self.out.unwrap_or_else(|| PathBuf::from("out").join(name)),
+            out: self.out.unwrap_or(out),
         }
     }
 }
@@ -151,4 +155,11 @@ pub(crate) fn terms(text: &str) -> TermSelection {
     }
     let names = text.split([',', ' ']).map(str::trim).filter(|name| !name.is_empty());
     TermSelection::List(names.map(str::to_owned).collect())
+}
+
+/// `out/<name of the survey><ending>`.
+pub(crate) fn default_out(survey: &Path, ending: &str) -> PathBuf {
+    let mut name = survey.file_name().unwrap_or_default().to_owned();
+    name.push(ending);
+    Path::new("out").join(name)
 }

@@ -32,6 +32,9 @@ pub(crate) fn dispatch(command: Command, output: &Output) -> Outcome {
             let request = arguments.request();
             output.result(&pipeline::calibrate(&request, output.progress().as_ref())?)
         }
+        Command::Plan(arguments) => {
+            output.result(&pipeline::plan_network(&arguments.request(), output.progress().as_ref())?)
+        }
         Command::Inspect { path } => output.result(&pipeline::inspect(&path)?),
         Command::Compare { first, second } => output.result(&pipeline::compare(&first, &second)?),
     }

@@ -5,6 +5,7 @@ mod bar;
 mod calibrate_arguments;
 mod commands;
 mod output;
+mod plan_arguments;
 
 use std::ffi::OsString;
 use std::process::ExitCode;

@@ -58,10 +58,8 @@ impl Output {
 
     /// The summary of a refused calibration: as JSON where that was asked for, in words it is the error alone.
     pub(crate) fn refusal(&self, error: &(dyn Error + 'static)) {
-        if let (Voice::Json, Some(pipeline::Error::Refused { summary, .. })) = (self.voice, error.downcast_ref())
-            && let Ok(json) = serde_json::to_string_pretty(summary)
-        {
-            println!("{json}");
+        if let (Voice::Json, Some(pipeline::Error::Refused { summary, .. })) = (self.voice, error.downcast_ref()) {
+            println!("{summary}");
         }
     }
 

@@ -22,4 +22,9 @@ pub use summary::{
     RejectedObservation,
 };
 
+pub(crate) use control::pose_covariance;
+pub(crate) use distances::named_distances;
+pub(crate) use run::{is_refusal, json};
+pub(crate) use start::Start;
+pub(crate) use summary::unit_of;
 pub(crate) use words::readable;

@@ -12,7 +12,7 @@ use range_io::tables::{
 use self_calibration::{Network, NetworkTarget, Sighting, Station};
 
 use super::control::pose_covariance;
-use super::distances::read_distances;
+use super::distances::named_distances;
 use super::passive::read_passive;
 use super::request::TableDefaults;
 use super::start::Start;
@@ -48,7 +48,7 @@ pub(crate) fn read_network(
     let mut tables = Tables::new(&survey, stations, targets);
     let sightings = tables.sightings(&observations, defaults)?;
     let passive = read_passive(&root.join("passive"), &mut tables, defaults)?;
-    let distances = read_distances(&root.join("distances.csv"), &tables)?;
+    let distances = named_distances(&root.join("distances.csv"), &tables.stations, &tables.targets)?;
     let network = Network {
         camera: start.camera,
         range_model: start.range_model.clone(),
@@ -61,10 +61,7 @@ pub(crate) fn read_network(
     Ok(NetworkFiles { network, start, folder: root, observations })
 }
 
-pub(super) fn optional<T>(
-    path: &Path,
-    read: fn(PathBuf) -> range_io::Result<PlacedRows<T>>,
-) -> Result<PlacedRows<T>> {
+pub(super) fn optional<T>(path: &Path, read: fn(PathBuf) -> range_io::Result<PlacedRows<T>>) -> Result<PlacedRows<T>> {
     if path.is_file() { Ok(read(path.to_owned())?) } else { Ok(PlacedRows::none(path)) }
 }
 
@@ -114,11 +111,7 @@ impl Tables {
         self.targets.len() - 1
     }
 
-    fn sightings(
-        &mut self,
-        rows: &PlacedRows<TargetObservation>,
-        defaults: &TableDefaults,
-    ) -> Result<Vec<Sighting>> {
+    fn sightings(&mut self, rows: &PlacedRows<TargetObservation>, defaults: &TableDefaults) -> Result<Vec<Sighting>> {
         refuse_repeats(rows)?;
         let mut sightings = Vec::with_capacity(rows.rows.len());
         for (index, row) in rows.rows.iter().enumerate() {

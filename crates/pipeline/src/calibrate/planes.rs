@@ -21,9 +21,7 @@ use crate::load::root_of;
 use crate::outcome::Outcome;
 use crate::progress::Progress;
 use crate::view::{View, ViewData};
-use crate::{
-    AverageOptions, DeconvolveOptions, DemodulateOptions, Error, Plan, Result, Stage, UnwrapOptions, process,
-};
+use crate::{AverageOptions, DeconvolveOptions, DemodulateOptions, Error, Plan, Result, Stage, UnwrapOptions, process};
 
 /// Differences used of all frames together. More pixels of the same planes would not tell more, as they share the
 /// errors of the reference, and would make the report heavy.
@@ -244,7 +242,12 @@ fn camera_values(camera: &Camera) -> Vec<f64> {
 }
 
 /// A sample after the estimation. Its redundancy number is `1 - a Q aᵀ / σ²` with its design row a.
-fn quality(sample: &Sample, residual: f64, estimate: &RangeCalibration, covariance: &DMatrix<f64>) -> ObservationQuality {
+fn quality(
+    sample: &Sample,
+    residual: f64,
+    estimate: &RangeCalibration,
+    covariance: &DMatrix<f64>,
+) -> ObservationQuality {
     let difference = &sample.difference;
     let row = design_row(estimate, difference);
     let redundancy = 1.0 - row.dot(&(covariance * &row)) / difference.sigma_m.powi(2);

@@ -7,6 +7,7 @@ use range_io::atomic::{OutputFolder, write_text};
 use range_io::calibration::Calibration;
 use range_io::tables::{write_residuals, write_stations, write_targets};
 use self_calibration::{CalibrationOptions, CalibrationOutcome, Method};
+use serde::Serialize;
 
 use super::network_check::check;
 use super::network_files::{NetworkFiles, read_network};
@@ -45,15 +46,18 @@ pub fn calibrate(request: &CalibrateRequest, progress: &dyn Progress) -> Result<
         Err(source) => {
             let reason = source.to_string();
             let summary = finish(CalibrationSummary::refused(survey, request.method, start.words, reason));
-            write_refused(&request.out, &summary)?;
+            let text = json(&summary)?;
+            let folder = OutputFolder::create(&request.out)?;
+            write_text(folder.file("summary.json")?, &text)?;
+            folder.commit()?;
             progress.finish();
-            Err(Error::Refused { summary: Box::new(summary), source })
+            Err(Error::Refused { summary: text, source })
         }
     }
 }
 
 /// Whether the survey is in order but does not determine what was asked for, which is a finding and not a slip.
-fn is_refusal(error: &self_calibration::Error) -> bool {
+pub(crate) fn is_refusal(error: &self_calibration::Error) -> bool {
     use self_calibration::Error as Cause;
     matches!(
         error,
@@ -86,7 +90,10 @@ fn calibrate_networks(request: &CalibrateRequest, method: Method, progress: &dyn
         let lens = read_network(folder, request.calibration.as_deref(), &request.defaults)?;
         check(&lens, Method::TwoStepDependent, options.datum)?;
         progress.begin("adjust networks", 2);
-        {let _=&lens; self_calibration::calibrate(&files.network, &options)}
+        {
+            let _ = &lens;
+            self_calibration::calibrate(&files.network, &options)
+        }
     } else {
         check(&files, method, options.datum)?;
         progress.begin("adjust network", 2);
@@ -127,21 +134,15 @@ fn write(
     progress.advance(3);
     write_residuals(folder.file("residuals.csv")?, &tables::residuals(outcome))?;
     progress.advance(4);
-    write_summary(&folder, summary)?;
+    write_text(folder.file("summary.json")?, &json(summary)?)?;
     progress.advance(5);
     write_text(folder.file("report.html")?, &report::render_calibration(outcome, summary)?)?;
     progress.advance(6);
     Ok(folder.commit()?)
 }
 
-fn write_refused(out: &Path, summary: &CalibrationSummary) -> Result<()> {
-    let folder = OutputFolder::create(out)?;
-    write_summary(&folder, summary)?;
-    Ok(folder.commit()?)
-}
-
-fn write_summary(folder: &OutputFolder, summary: &CalibrationSummary) -> Result<()> {
-    let json = serde_json::to_string_pretty(summary)
-        .map_err(|error| Error::Figure { figure: "summary.json".to_owned(), message: error.to_string() })?;
-    Ok(write_text(folder.file("summary.json")?, &json)?)
+/// A summary as the text of its file.
+pub(crate) fn json<T: Serialize>(summary: &T) -> Result<String> {
+    serde_json::to_string_pretty(summary)
+        .map_err(|error| Error::Figure { figure: "summary.json".to_owned(), message: error.to_string() })
 }

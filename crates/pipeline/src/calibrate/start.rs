@@ -28,6 +28,7 @@ impl Start {
         let modulation = only_modulation(survey, root)?;
         let nominal = survey.camera.nominal_camera()?;
         let (calibration, words) = read_calibration(root, named)?;
+        let words = if calibration.is_some() { words } else { "the survey's nominal camera".to_owned() };
         let camera = match &calibration {
             Some(calibration) => calibrated(calibration, &nominal)?,
             None => nominal,

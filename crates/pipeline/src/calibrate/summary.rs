@@ -35,6 +35,12 @@ pub(crate) const PARAMETERS: [(&str, &str); 20] = [
     ("h3", "1/m^2"),
 ];
 
+/// The unit of a parameter as `calibration.ron` writes it, whatever spelling an outcome has.
+pub(crate) fn unit_of<'a>(name: &str, otherwise: &'a str) -> &'a str {
+    let name = name.split('@').next().unwrap_or(name);
+    PARAMETERS.iter().find(|(known, _)| *known == name).map_or(otherwise, |(_, unit)| unit)
+}
+
 /// What a calibration found and how good it is.
 #[derive(Debug, Clone, Serialize)]
 pub struct CalibrationSummary {
@@ -112,7 +118,7 @@ impl ParameterMap {
                 value: parameter.value,
                 sigma_prior: parameter.sigma_prior,
                 sigma_posterior: parameter.sigma_posterior,
-                unit: parameter.unit.clone(),
+                unit: unit_of(&parameter.name, &parameter.unit).to_owned(),
                 status: status_name(parameter.status),
             };
             (parameter.name.clone(), summary)

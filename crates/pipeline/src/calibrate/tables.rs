@@ -10,8 +10,7 @@ use crate::outcome::StationPose;
 /// Rows of `adjusted_stations.csv`.
 pub(super) fn stations(outcome: &CalibrationOutcome) -> Vec<Station> {
     let row = |station: &AdjustedStation| {
-        let pose =
-            StationPose { world_from_camera: station.world_from_camera, covariance: Some(station.covariance) };
+        let pose = StationPose { world_from_camera: station.world_from_camera, covariance: Some(station.covariance) };
         let sigmas = pose.sigmas().filter(|(p, a)| p.iter().chain(a).all(|sigma| sigma.is_finite() && *sigma > 0.0));
         Station {
             station: station.name.clone(),

@@ -58,7 +58,11 @@ impl CalibrationSummary {
         if self.parameters.0.is_empty() {
             return Ok(());
         }
-        writeln!(f, "{:<10} {:>13} {:>12} {:>12}  {:<16} status", "parameter", "value", "+- (prior)", "(posterior)", "unit")?;
+        writeln!(
+            f,
+            "{:<10} {:>13} {:>12} {:>12}  {:<16} status",
+            "parameter", "value", "+- (prior)", "(posterior)", "unit"
+        )?;
         for (name, parameter) in &self.parameters.0 {
             let sigma = |value: f64| match parameter.status {
                 "estimated" if value.is_finite() => format!("{value:.2e}"),

@@ -6,8 +6,8 @@ use range_io::atomic::OutputFolder;
 use range_io::calibration::{Calibration, Provenance};
 use range_io::survey::{Survey, TruthFiles};
 use range_io::tables::{
-    Station as StationRow, Target as TargetRow, TargetObservation, write_distances, write_observations,
-    write_stations, write_targets,
+    Station as StationRow, Target as TargetRow, TargetObservation, write_distances, write_observations, write_stations,
+    write_targets,
 };
 use self_calibration::{Network, PassiveCamera, simulate_sightings};
 

@@ -216,7 +216,9 @@ impl NetworkScene {
             })
         };
         let place = |end: DistanceEnd| match end {
-            DistanceEnd::Station(index) => network.stations[index].world_from_camera.map(|pose| pose.translation.vector),
+            DistanceEnd::Station(index) => {
+                network.stations[index].world_from_camera.map(|pose| pose.translation.vector)
+            }
             DistanceEnd::Target(index) => network.targets[index].point.map(|point| point.coords),
         };
         let distance = |(from, to, sigma_m): &(String, String, f64)| {
@@ -312,19 +314,17 @@ pub(super) fn true_calibration(
         hyperbola: None,
         range_span_m: None,
     };
-    let mut calibration = Calibration::from_models(
-        &camera,
-        &ModelSet { entries: vec![(1.0, vec![error_free])] },
-        None,
-    )?;
+    let mut calibration =
+        Calibration::from_models(&camera, &ModelSet { entries: vec![(1.0, vec![error_free])] }, None)?;
     for (name, value) in truth.iter().filter(|(name, _)| !is_camera_parameter(name)) {
         let model = &mut calibration.range_models[0];
         model.amplitude_span = amplitude_span;
         match model.parameters.iter_mut().find(|parameter| parameter.name == *name) {
             Some(parameter) => parameter.value = *value,
-            None => model.parameters.push(error_models::NamedParameter::held(name, *value).map_err(|error| {
-                Error::Survey { path: path.to_owned(), message: format!("`truth`: {error}") }
-            })?),
+            None => model.parameters.push(
+                error_models::NamedParameter::held(name, *value)
+                    .map_err(|error| Error::Survey { path: path.to_owned(), message: format!("`truth`: {error}") })?,
+            ),
         }
     }
     calibration.validate()?;

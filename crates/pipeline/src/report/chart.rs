@@ -34,16 +34,6 @@ pub(crate) fn curves(axes: &Axes<'_>, sets: &[Series<'_, (f64, f64)>]) -> String
     canvas.finish()
 }
 
-/// Dots.
-pub(crate) fn scatter(axes: &Axes<'_>, sets: &[Series<'_, (f64, f64)>]) -> String {
-    let mut canvas = canvas_around(axes, sets);
-    for set in sets {
-        canvas.points(&set.values, set.colour, 0.45);
-        canvas.name(set.colour, set.name);
-    }
-    canvas.finish()
-}
-
 fn canvas_around(axes: &Axes<'_>, sets: &[Series<'_, (f64, f64)>]) -> Canvas {
     let all = || sets.iter().flat_map(|set| set.values.iter());
     Canvas::new(axes, SIZE, span(all().map(|point| point.0)), span(all().map(|point| point.1)))

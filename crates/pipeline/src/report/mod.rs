@@ -9,5 +9,5 @@ mod page;
 mod picture;
 mod sections;
 
-pub(crate) use network::render_calibration;
+pub(crate) use network::{render_calibration, render_plan};
 pub(crate) use sections::render;

@@ -8,17 +8,13 @@ use crate::report::canvas::{Axes, Canvas, span};
 use crate::report::colour::{CATEGORIES, ColourMap, hex};
 use crate::report::picture::open_svg;
 
-const WIDTH: f64 = 460.0;
+const WIDTH: f64 = 560.0;
 /// Cells along the longer side of the image.
 const CELLS: usize = 8;
-const RANGE_BINS: usize = 32;
+const RANGE_BINS: usize = 60;
 
-pub(super) fn figures(outcome: &CalibrationOutcome) -> Vec<(String, String)> {
-    let used: Vec<&ObservationQuality> =
-        outcome.residuals.iter().filter(|q| matches!(q.verdict, Verdict::Used | Verdict::Uncontrolled)).collect();
-    let mut figures = vec![image(outcome, &used)];
-    figures.extend(range(outcome, &used));
-    figures
+fn used(outcome: &CalibrationOutcome) -> Vec<&ObservationQuality> {
+    outcome.residuals.iter().filter(|q| matches!(q.verdict, Verdict::Used | Verdict::Uncontrolled)).collect()
 }
 
 /// Sightings with an image point or a range, counted once.
@@ -26,25 +22,26 @@ fn is_sighting(quality: &ObservationQuality, has_columns: bool) -> bool {
     quality.component == if has_columns { Component::Col } else { Component::Range }
 }
 
-fn image(outcome: &CalibrationOutcome, used: &[&ObservationQuality]) -> (String, String) {
+/// Targets over the image.
+pub(super) fn image_figure(outcome: &CalibrationOutcome) -> Option<(String, String)> {
+    let used = used(outcome);
     let format = outcome.camera.format;
     let scale = WIDTH / format.width as f64;
-    let size = scale * format.width.max(format.height) as f64 / CELLS as f64;
+    let height = scale * format.height as f64;
     let (columns, rows) = cells(format.width, format.height);
+    let (wide, tall) = (WIDTH / columns as f64, height / rows as f64);
     let has_columns = used.iter().any(|quality| quality.component == Component::Col);
     let points: Vec<[f64; 2]> =
         used.iter().filter(|quality| is_sighting(quality, has_columns)).map(|quality| quality.pixel).collect();
     let mut counts = vec![0_usize; columns * rows];
     for [col, row] in points.iter().filter(|pixel| pixel.iter().all(|p| p.is_finite())) {
-        let cell = |pixel: f64, count: usize| ((scale * (pixel + 0.5) / size) as usize).min(count - 1);
-        counts[cell(*row, rows) * columns + cell(*col, columns)] += 1;
+        let cell = |pixel: f64, size: f64, count: usize| ((scale * (pixel + 0.5) / size) as usize).min(count - 1);
+        counts[cell(*row, tall, rows) * columns + cell(*col, wide, columns)] += 1;
     }
-    let height = scale * format.height as f64;
     let mut svg = open_svg("Targets over the image", WIDTH, height + 26.0);
     let most = counts.iter().copied().max().unwrap_or(0).max(1) as f64;
     for (index, count) in counts.iter().enumerate() {
-        let (x, y) = (size * (index % columns) as f64, 22.0 + size * (index / columns) as f64);
-        let (wide, tall) = (size.min(WIDTH - x), size.min(22.0 + height - y));
+        let (x, y) = (wide * (index % columns) as f64, 22.0 + tall * (index / columns) as f64);
         // The lighter half of the map, so that dots and numbers stay readable.
         let fill = match count {
             0 => "#ffffff".to_owned(),
@@ -66,25 +63,29 @@ fn image(outcome: &CalibrationOutcome, used: &[&ObservationQuality]) -> (String,
         svg,
         r##"<path d="{dots}" stroke="#1c2430" stroke-opacity="0.55" stroke-width="2" stroke-linecap="round" fill="none"/></svg>"##
     );
+    let nothing_seen = counts.iter().all(|count| *count == 0);
     let empty = counts.iter().filter(|count| **count == 0).count();
     let caption = format!(
         "Targets in each of {} cells; {empty} cells are empty. Lens terms are extrapolated where there is no target.",
         counts.len()
     );
-    (svg, caption)
+    (!nothing_seen).then_some((svg, caption))
 }
 
-/// Square cells along both sides of the image.
+/// Cells, about square, along both sides of the image.
 fn cells(width: usize, height: usize) -> (usize, usize) {
     let longer = width.max(height).max(1);
-    ((CELLS * width).div_ceil(longer).max(1), (CELLS * height).div_ceil(longer).max(1))
+    let along = |side: usize| ((CELLS as f64 * side as f64 / longer as f64).round() as usize).max(1);
+    (along(width), along(height))
 }
 
-fn range(outcome: &CalibrationOutcome, used: &[&ObservationQuality]) -> Option<(String, String)> {
+/// Histogram of the ranges; empty where there are none.
+pub(super) fn range_figure(outcome: &CalibrationOutcome) -> Vec<(String, String)> {
+    let used = used(outcome);
     let ranges: Vec<f64> =
         used.iter().filter(|q| q.component == Component::Range).map(|q| q.range_m).filter(|r| r.is_finite()).collect();
     if ranges.is_empty() {
-        return None;
+        return Vec::new();
     }
     let interval = outcome.range_models.first().map(|(_, model)| model.ambiguity_interval_m);
     let [_, high] = span(ranges.iter().copied());
@@ -96,7 +97,7 @@ fn range(outcome: &CalibrationOutcome, used: &[&ObservationQuality]) -> Option<(
     }
     let most = counts.iter().copied().max().unwrap_or(0) as f64;
     let axes = Axes { title: "Ranges observed", x: "observed range, m", y: "ranges" };
-    let mut canvas = Canvas::new(&axes, [460.0, 300.0], x, [0.0, 1.1 * most]);
+    let mut canvas = Canvas::new(&axes, [1206.0, 220.0], x, [0.0, 1.1 * most]);
     let bar = |(bin, count): (usize, &usize)| (bin as f64 * width, (bin + 1) as f64 * width, *count as f64);
     canvas.bars(&counts.iter().enumerate().map(bar).collect::<Vec<_>>(), CATEGORIES[0]);
     let (low, high) = ranges.iter().fold((f64::INFINITY, 0.0_f64), |(l, h), r| (l.min(*r), h.max(*r)));
@@ -107,5 +108,5 @@ fn range(outcome: &CalibrationOutcome, used: &[&ObservationQuality]) -> Option<(
             100.0 * (high - low) / interval
         )
     });
-    Some((canvas.finish(), format!("{low:.3} m to {high:.3} m{share}.")))
+    vec![(canvas.finish(), format!("{low:.3} m to {high:.3} m{share}."))]
 }

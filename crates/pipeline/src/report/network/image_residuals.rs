@@ -52,9 +52,11 @@ fn arrows(residuals: &[ObservationQuality]) -> Vec<Arrow> {
         if !quality.residual.is_finite() || quality.verdict == Verdict::LeftOut {
             continue;
         }
-        let pair = pairs
-            .entry((&quality.station, &quality.target))
-            .or_insert(Arrow { pixel: quality.pixel, residual: [0.0; 2], rejected: false });
+        let pair = pairs.entry((&quality.station, &quality.target)).or_insert(Arrow {
+            pixel: quality.pixel,
+            residual: [0.0; 2],
+            rejected: false,
+        });
         pair.residual[axis] = quality.residual;
         pair.rejected |= quality.verdict == Verdict::Rejected;
     }
@@ -67,7 +69,7 @@ fn picture(arrows: &[Arrow], format: &ImageFormat, scale: f64, exaggeration: f64
     // Writing to a string can't fail.
     let _ = write!(
         svg,
-        r##"<defs><marker id="head" viewBox="0 0 6 6" refX="5" refY="3" markerWidth="5" markerHeight="5" orient="auto"><path d="M0 0L6 3L0 6z" fill="#33506e"/></marker></defs><rect x="0.5" y="22" width="{}" height="{height:.1}" fill="#fbfcfd" stroke="#c5ccd6"/>"##,
+        r##"<defs><marker id="head" viewBox="0 0 6 6" refX="5" refY="3" markerWidth="5" markerHeight="5" orient="auto"><path d="M0 0L6 3L0 6z" fill="#33506e"/></marker></defs><clipPath id="frame"><rect x="0" y="22" width="{WIDTH}" height="{height:.1}"/></clipPath><rect x="0.5" y="22" width="{}" height="{height:.1}" fill="#fbfcfd" stroke="#c5ccd6"/>"##,
         WIDTH - 1.0
     );
     let (mut lines, mut used, mut gross) = (String::new(), String::new(), String::new());
@@ -82,7 +84,10 @@ fn picture(arrows: &[Arrow], format: &ImageFormat, scale: f64, exaggeration: f64
             let _ = write!(lines, r#"<path d="M{x:.1} {y:.1}l{dx:.1} {dy:.1}" marker-end="url(#head)"/>"#);
         }
     }
-    let _ = write!(svg, r##"<g stroke="#33506e" stroke-width="0.9" stroke-opacity="0.75" fill="none">{lines}</g>"##);
+    let _ = write!(
+        svg,
+        r##"<g clip-path="url(#frame)" stroke="#33506e" stroke-width="0.9" stroke-opacity="0.75" fill="none">{lines}</g>"##
+    );
     for (dots, colour, width) in [(used, CATEGORIES[0], 2.2), (gross, CATEGORIES[3], 6.0)] {
         let _ = write!(
             svg,

@@ -62,10 +62,10 @@ pub(crate) fn figures(
 
 fn caption(exaggeration: Option<f64>, proposed: bool) -> String {
     let ellipses = exaggeration.map_or_else(String::new, |factor| {
-        format!(" Ellipses: 95 % of the adjusted position, {factor} times exaggerated.")
+        format!(" Ellipses: 95 % of the adjusted position, {factor} times exaggerated.")
     });
     let new = if proposed { " Orange and dashed: proposed stations." } else { "" };
-    format!("Wedges: stations with the width of their view; dots: targets.{ellipses}{new}")
+    format!("Pyramids: stations with what they see; green dots: targets.{ellipses}{new}")
 }
 
 fn position(station: &AdjustedStation) -> Matrix3<f64> {
@@ -133,7 +133,9 @@ impl View {
             width - 1.0,
             self.size[1] - 0.5
         );
-        let span = |from: f64, pixels: f64| [from - EDGE * self.metres_per_pixel, from + (pixels - EDGE) * self.metres_per_pixel];
+        let span = |from: f64, pixels: f64| {
+            [from - EDGE * self.metres_per_pixel, from + (pixels - EDGE) * self.metres_per_pixel]
+        };
         let (values, decimals) = ticks(span(self.low[0], width), 7);
         for value in values {
             let x = EDGE + (value - self.low[0]) / self.metres_per_pixel;
@@ -213,24 +215,32 @@ impl View {
         }
     }
 
-    /// A wedge from the perspective centre along the rays of the left and the right edge of the image.
+    /// The pyramid from the perspective centre through the corners of the image.
     fn station(&self, svg: &mut String, camera: &Camera, pose: &Isometry3<f64>, colour: [u8; 3], dashes: &str) {
-        let middle = (camera.format.height as f64 - 1.0) / 2.0;
-        let length = 38.0 * self.metres_per_pixel;
-        let corner = |col: f64| self.at(&(pose.translation.vector + pose.rotation * camera.ray([col, middle]) * length));
-        let ([x, y], [ax, ay], [bx, by]) =
-            (self.at(&pose.translation.vector), corner(0.0), corner(camera.format.width as f64 - 1.0));
+        let (right, bottom) = (camera.format.width as f64 - 0.5, camera.format.height as f64 - 0.5);
+        let length = 36.0 * self.metres_per_pixel;
+        let [x, y] = self.at(&pose.translation.vector);
+        let (mut edges, mut base) = (String::new(), String::new());
+        for pixel in [[-0.5, -0.5], [right, -0.5], [right, bottom], [-0.5, bottom]] {
+            let ray = camera.ray(pixel);
+            // All corners in one plane across the viewing axis.
+            let corner = pose.translation.vector + pose.rotation * ray * (length / -ray.z);
+            let [cx, cy] = self.at(&corner);
+            let _ = write!(edges, "M{x:.1} {y:.1}L{cx:.1} {cy:.1}");
+            let _ = write!(base, "{}{cx:.1} {cy:.1}", if base.is_empty() { 'M' } else { 'L' });
+        }
         let colour = hex(colour);
         let _ = write!(
             svg,
-            r#"<path d="M{x:.1} {y:.1}L{ax:.1} {ay:.1}L{bx:.1} {by:.1}Z" fill="{colour}" fill-opacity="0.1" stroke="{colour}" stroke-width="1.1" stroke-dasharray="{dashes}"/><circle cx="{x:.1}" cy="{y:.1}" r="2.6" fill="{colour}"/>"#
+            r#"<path d="{base}Z{edges}" fill="{colour}" fill-opacity="0.1" stroke="{colour}" stroke-width="1" stroke-opacity="0.8" stroke-dasharray="{dashes}"/><circle cx="{x:.1}" cy="{y:.1}" r="2.6" fill="{colour}"/>"#
         );
     }
 
     /// Names around the stations in turn, so that neighbours do not write over each other.
     fn label(&self, svg: &mut String, pose: &Isometry3<f64>, name: &str, index: usize) {
         let [x, y] = self.at(&pose.translation.vector);
-        let (dx, dy, anchor) = [(6.0, 12.0, "start"), (-6.0, 12.0, "end"), (6.0, -5.0, "start"), (-6.0, -5.0, "end")][index % 4];
+        let (dx, dy, anchor) =
+            [(6.0, 12.0, "start"), (-6.0, 12.0, "end"), (6.0, -5.0, "start"), (-6.0, -5.0, "end")][index % 4];
         let _ = write!(
             svg,
             r#"<text x="{:.1}" y="{:.1}" class="tick" text-anchor="{anchor}">{}</text>"#,

@@ -26,7 +26,6 @@ pub(crate) fn render_calibration(outcome: &CalibrationOutcome, summary: &Calibra
     correlations(&mut page, &summary.correlation.names, &summary.correlation.matrix);
     residual_figures(&mut page, outcome);
     network(&mut page, outcome);
-    covered(&mut page, outcome);
     tables::groups(&mut page, summary);
     tables::rejected(&mut page, summary);
     tables::decisions(&mut page, outcome);
@@ -36,8 +35,9 @@ pub(crate) fn render_calibration(outcome: &CalibrationOutcome, summary: &Calibra
 fn range_errors(page: &mut Page, outcome: &CalibrationOutcome) {
     let figures = range_error::figures(outcome);
     if !figures.is_empty() {
-        page.section("Range error against range, before and after");
+        page.section("Range error against range, before and after, and coverage of the range");
         page.figures(&figures);
+        page.figures(&coverage::range_figure(outcome));
     }
 }
 
@@ -63,7 +63,8 @@ pub(super) fn correlations(page: &mut Page, names: &[String], matrix: &[Vec<f64>
         return;
     }
     page.section("Correlations");
-    let caption = "Outlined: pairs that are known to be hard to separate. Numbers where the correlation is 0.5 or more.";
+    let caption =
+        "Outlined: pairs that are known to be hard to separate. Numbers where the correlation is 0.5 or more.";
     page.figures(&[(heat_map::heat_map(names, matrix), caption.to_owned())]);
     let pairs = heat_map::notorious_pairs(names, matrix);
     if !pairs.is_empty() {
@@ -72,10 +73,11 @@ pub(super) fn correlations(page: &mut Page, names: &[String], matrix: &[Vec<f64>
 }
 
 fn residual_figures(page: &mut Page, outcome: &CalibrationOutcome) {
-    page.section("Residuals");
+    page.section("Residuals, and coverage of the image");
     let mut figures = image_residuals::figures(outcome);
-    figures.extend(residuals::figures(outcome));
+    figures.extend(coverage::image_figure(outcome));
     page.figures(&figures);
+    page.figures(&residuals::figures(outcome));
 }
 
 fn network(page: &mut Page, outcome: &CalibrationOutcome) {
@@ -84,9 +86,4 @@ fn network(page: &mut Page, outcome: &CalibrationOutcome) {
     }
     page.section("Network");
     page.figures(&map::figures(&outcome.camera, &outcome.stations, &outcome.targets, &[]));
-}
-
-fn covered(page: &mut Page, outcome: &CalibrationOutcome) {
-    page.section("Coverage of the image and of the range");
-    page.figures(&coverage::figures(outcome));
 }

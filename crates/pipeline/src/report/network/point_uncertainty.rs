@@ -37,9 +37,8 @@ impl PointUncertainty<'_> {
     ) -> Result<Vec<(String, String)>> {
         let format = self.camera.format;
         let rows = (COLUMNS * format.height).div_ceil(format.width.max(1)).max(1);
-        let centre = |index: usize, count: usize, pixels: usize| {
-            (index as f64 + 0.5) * pixels as f64 / count as f64 - 0.5
-        };
+        let centre =
+            |index: usize, count: usize, pixels: usize| (index as f64 + 0.5) * pixels as f64 / count as f64 - 0.5;
         let (moved, correlation) = self.moved(names, covariance);
         if moved.is_empty() {
             return Ok(Vec::new());
@@ -70,8 +69,8 @@ impl PointUncertainty<'_> {
         let (moved, correlation) = self.moved(names, covariance);
         let sigma = |range_m: &f64| {
             let half = |pair: &Moved| {
-                let [up, down] = [&pair[0].1, &pair[1].1]
-                    .map(|model| model.correction(*range_m, 0.0, 0.0, amplitude).total_m());
+                let [up, down] =
+                    [&pair[0].1, &pair[1].1].map(|model| model.correction(*range_m, 0.0, 0.0, amplitude).total_m());
                 (up - down) / 2.0
             };
             let effects = DVector::from_iterator(moved.len(), moved.iter().map(half));
@@ -119,13 +118,7 @@ impl PointUncertainty<'_> {
 
 /// Standard deviation of a point in space, metre: half the difference of the moved points stands for derivative times
 /// standard deviation.
-fn point_sigma(
-    moved: &[Moved],
-    correlation: &DMatrix<f64>,
-    pixel: [f64; 2],
-    range_m: f64,
-    amplitude: f64,
-) -> f64 {
+fn point_sigma(moved: &[Moved], correlation: &DMatrix<f64>, pixel: [f64; 2], range_m: f64, amplitude: f64) -> f64 {
     let point = |(camera, model): &(Camera, RangeErrorModel)| -> Point3<f64> {
         let [x, y] = camera.format.image_from_pixel(pixel);
         let [xp, yp] = camera.interior.principal_point_mm;

@@ -5,7 +5,7 @@ use self_calibration::{CalibrationOutcome, Component, ObservationQuality, Verdic
 
 use super::point_uncertainty::{PointUncertainty, amplitude_of};
 use super::residuals::thinned;
-use crate::report::canvas::{Axes, Canvas, span};
+use crate::report::canvas::{Axes, Canvas, robust_span, span};
 use crate::report::colour::CATEGORIES;
 use crate::statistics::quantile;
 
@@ -36,7 +36,7 @@ fn before(
 ) -> (String, String) {
     let points: Vec<(f64, f64)> = ranges.iter().map(|quality| (quality.range_m, 1e3 * quality.uncorrected_m)).collect();
     let curve = curve(outcome, model, x);
-    let y = span(points.iter().map(|point| point.1).chain(curve.iter().flat_map(|(_, v, s)| [v - s, v + s])));
+    let y = robust_span(points.iter().map(|point| point.1).chain(curve.iter().flat_map(|(_, v, s)| [v - s, v + s])));
     let axes = Axes { title: "Before: errors and the model", x: "observed range, m", y: "range error, mm" };
     let mut canvas = Canvas::new(&axes, SIZE, x, y);
     let band: Vec<_> = curve.iter().map(|(x, v, s)| (*x, v - NORMAL_95 * s, v + NORMAL_95 * s)).collect();
@@ -56,7 +56,7 @@ fn before(
 fn after(ranges: &[&ObservationQuality], x: [f64; 2]) -> (String, String) {
     let points: Vec<(f64, f64)> = ranges.iter().map(|quality| (quality.range_m, 1e3 * quality.residual)).collect();
     let band = expected(ranges, x);
-    let y = span(points.iter().map(|point| point.1).chain(band.iter().flat_map(|(_, low, high)| [*low, *high])));
+    let y = robust_span(points.iter().map(|point| point.1).chain(band.iter().flat_map(|(_, low, high)| [*low, *high])));
     let axes = Axes { title: "After: residuals", x: "observed range, m", y: "range residual, mm" };
     let mut canvas = Canvas::new(&axes, SIZE, x, y);
     canvas.band(&band, CATEGORIES[7], 0.2);

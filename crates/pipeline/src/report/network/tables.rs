@@ -3,7 +3,7 @@
 use error_models::ParameterStatus;
 use self_calibration::{CalibratedParameter, CalibrationOutcome};
 
-use crate::calibrate::{CalibrationSummary, readable};
+use crate::calibrate::{CalibrationSummary, readable, unit_of};
 use crate::report::page::Page;
 
 pub(super) fn figures_of_merit(page: &mut Page, summary: &CalibrationSummary) {
@@ -48,13 +48,14 @@ fn parameter_row(parameter: &CalibratedParameter) -> Vec<String> {
     let dash = || "–".to_owned();
     let sigma = |value: f64| if estimated && value.is_finite() { format!("{value:.2e}") } else { dash() };
     let ratio = parameter.value.abs() / parameter.sigma_prior;
-    let p = parameter.significance_p;
+    // A principal distance of zero is no hypothesis worth a test.
+    let (ratio, p) = if parameter.name == "c" { (f64::NAN, f64::NAN) } else { (ratio, parameter.significance_p) };
     vec![
         parameter.name.clone(),
         value_text(parameter),
         sigma(parameter.sigma_prior),
         sigma(parameter.sigma_posterior),
-        parameter.unit.clone(),
+        unit_of(&parameter.name, &parameter.unit).to_owned(),
         if estimated && ratio.is_finite() { format!("{ratio:.1}") } else { dash() },
         if p.is_finite() { probability(p) } else { dash() },
         match p {

@@ -146,13 +146,7 @@ impl Linearisation {
 
 impl Piece<'_> {
     /// Contributions to vᵀPv and to the objective.
-    fn evaluate(
-        self,
-        adjustment: &Adjustment<'_>,
-        layout: &Layout,
-        values: &[f64],
-        want: Want,
-    ) -> Result<(f64, f64)> {
+    fn evaluate(self, adjustment: &Adjustment<'_>, layout: &Layout, values: &[f64], want: Want) -> Result<(f64, f64)> {
         let mut scratch = Scratch::new(layout, values, want);
         let (mut vtpv, mut objective) = (0.0, 0.0);
         let Some((row, entry)) = self.places.first().map(|place| (place.row, place.jacobian)) else {

@@ -62,9 +62,14 @@ impl Linearisation {
             let whitened = &mut self.whitened[rows.clone()];
             whitened.copy_from_slice(residual);
             whiten(whitening, whitened, 1);
-            let square: f64 = whitened.iter().map(|v| v * v).sum();
+            let excluded = adjustment.exclusions.get(&index);
+            let is_used = |component: usize| excluded.is_none_or(|excluded| !excluded.mask[component]);
+            let used = whitened.iter().enumerate().filter(|&(component, _)| is_used(component));
+            let square: f64 = used.map(|(_, v)| v * v).sum();
             let (objective, weight) = group.kernel.evaluate(square);
-            self.weights[rows].fill(weight);
+            for (component, row) in rows.enumerate() {
+                self.weights[row] = if is_used(component) { weight } else { 0.0 };
+            }
             self.vtpv += weight * square;
             self.objective += objective;
             if want == Want::Jacobians {

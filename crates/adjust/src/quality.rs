@@ -10,7 +10,7 @@ const UNCONTROLLED: f64 = 1e-9;
 pub struct GroupSummary {
     /// Name of the group.
     pub name: String,
-    /// Number of observed values.
+    /// Number of observed values that are not excluded.
     pub observations: usize,
     /// Its part of vᵀPv.
     pub vtpv: f64,
@@ -31,7 +31,7 @@ impl GroupSummary {
 impl Solution {
     /// Redundancy numbers `(I − A Q Aᵀ P)ᵢᵢ` of all observed values, in the order of [`Self::residuals`]: the share of an
     /// error that shows in its residual, 0 (not controlled) to 1. Their sum is the redundancy. P contains the robust
-    /// weights.
+    /// weights. Zero for what is excluded.
     pub fn redundancy_numbers(&self) -> Vec<f64> {
         let mut out = vec![0.0; self.observations()];
         self.for_each_observation(|place, local| {
@@ -46,7 +46,7 @@ impl Solution {
                             * local.whitening(second, index);
                     }
                 }
-                out[row] = 1.0 - self.weights()[row] * used;
+                out[row] = if self.is_excluded(row) { 0.0 } else { 1.0 - self.weights()[row] * used };
             }
         });
         out
@@ -80,10 +80,11 @@ impl Solution {
     pub fn standardised_residuals(&self, scale: Scale) -> Result<Vec<f64>> {
         let deviations = self.residual_deviations(scale)?;
         let numbers = self.redundancy_numbers();
-        let residuals = self.residuals().iter().zip(deviations).zip(numbers);
-        Ok(residuals
-            .map(|((v, sigma), r)| if r > UNCONTROLLED && sigma > 0.0 { v / sigma } else { f64::NAN })
-            .collect())
+        let standardised = |row: usize, v: f64| {
+            let controlled = numbers[row] > UNCONTROLLED || self.is_excluded(row);
+            if controlled && deviations[row] > 0.0 { v / deviations[row] } else { f64::NAN }
+        };
+        Ok(self.residuals().iter().enumerate().map(|(row, &v)| standardised(row, v)).collect())
     }
 
     /// Figures of one group.
@@ -93,7 +94,7 @@ impl Solution {
         let numbers = self.redundancy_numbers();
         let (mut observations, mut vtpv, mut redundancy, mut squares) = (0, 0.0, 0.0, 0.0);
         for (place, _) in self.layout.observations.iter().zip(&self.group_of).filter(|(_, of)| **of == group) {
-            for row in place.rows() {
+            for row in place.rows().filter(|&row| !self.is_excluded(row)) {
                 observations += 1;
                 vtpv += self.weights()[row] * self.linearisation.whitened[row].powi(2);
                 redundancy += numbers[row];
@@ -104,7 +105,7 @@ impl Solution {
         Ok(GroupSummary { name, observations: observations as usize, vtpv, redundancy, rms })
     }
 
-    fn for_each_observation(&self, mut visit: impl FnMut(&Place, &Local<'_>)) {
+    pub(crate) fn for_each_observation(&self, mut visit: impl FnMut(&Place, &Local<'_>)) {
         let mut product = Vec::new();
         let mut local = Local { image: Vec::new(), factor: Vec::new(), whitening: &[] };
         for (place, &start) in self.layout.observations.iter().zip(&self.whitening_start) {
@@ -139,17 +140,22 @@ impl Solution {
 }
 
 /// Small matrices of one observation.
-struct Local<'s> {
+pub(crate) struct Local<'s> {
     /// `J Q Jᵀ`, row-major.
-    image: Vec<f64>,
+    pub(crate) image: Vec<f64>,
     /// L of `C = L Lᵀ`, row-major, full.
     factor: Vec<f64>,
     whitening: &'s [f64],
 }
 
 impl Local<'_> {
+    /// L of `C = L Lᵀ`, row-major, full.
+    pub(crate) fn factor(&self) -> &[f64] {
+        &self.factor
+    }
+
     /// Element of `L⁻¹`, row >= column.
-    fn whitening(&self, row: usize, column: usize) -> f64 {
+    pub(crate) fn whitening(&self, row: usize, column: usize) -> f64 {
         self.whitening[row * (row + 1) / 2 + column]
     }
 }

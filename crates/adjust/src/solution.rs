@@ -28,6 +28,8 @@ pub struct Solution {
     pub(crate) group_of: Vec<GroupId>,
     pub(crate) whitening: Vec<f64>,
     pub(crate) whitening_start: Vec<usize>,
+    /// Whether each row is excluded; empty where none is.
+    excluded: Vec<bool>,
     pub(crate) layout: Layout,
     values: Vec<f64>,
     pub(crate) linearisation: Linearisation,
@@ -85,7 +87,8 @@ impl Adjustment<'_> {
             group_of: self.observations.iter().map(|stored| stored.group).collect(),
             whitening: self.whitening.clone(),
             whitening_start: self.observations.iter().map(|stored| stored.whitening).collect(),
-            redundancy: (layout.rows + constraints) as i64 - layout.unknowns as i64,
+            excluded: self.excluded_rows(&layout),
+            redundancy: (layout.rows + constraints) as i64 - (layout.unknowns + self.excluded_components()) as i64,
             layout,
             values,
             linearisation,
@@ -95,6 +98,14 @@ impl Adjustment<'_> {
             condition,
             trace,
         }
+    }
+
+    fn excluded_rows(&self, layout: &Layout) -> Vec<bool> {
+        let mut rows = vec![false; if self.exclusions.is_empty() { 0 } else { layout.rows }];
+        for (&index, exclusion) in &self.exclusions {
+            rows[layout.observations[index].rows()].copy_from_slice(&exclusion.mask);
+        }
+        rows
     }
 
     fn unknown_names(&self, layout: &Layout) -> Vec<String> {
@@ -184,12 +195,17 @@ impl Solution {
         self.layout.unknowns
     }
 
-    /// Number of observed values, components of priors included.
+    /// Whether an observed value (by its place in [`Self::residuals`]) was left out, see [`Adjustment::exclude`].
+    pub fn is_excluded(&self, row: usize) -> bool {
+        self.excluded.get(row).copied().unwrap_or(false)
+    }
+
+    /// Number of observed values, components of priors and excluded ones included.
     pub fn observations(&self) -> usize {
         self.layout.rows
     }
 
-    /// Observations + constraints (datum included) − unknowns.
+    /// Observations that are not excluded + constraints (datum included) − unknowns.
     pub fn redundancy(&self) -> i64 {
         self.redundancy
     }
@@ -220,7 +236,7 @@ impl Solution {
     }
 
     /// Robust weights of all observed values, in the same order: 1 for least squares, towards 0 for what a [`crate::Kernel`]
-    /// takes for a gross error.
+    /// takes for a gross error and for what is excluded.
     pub fn weights(&self) -> &[f64] {
         &self.linearisation.weights
     }
@@ -235,6 +251,19 @@ impl Solution {
         let count = self.layout.observations.len();
         let place = self.layout.observations.get(observation.0);
         Ok(place.ok_or(Error::UnknownId { what: "observation", index: observation.0, count })?.rows())
+    }
+
+    /// Row of one component of an observation.
+    pub(crate) fn row(&self, observation: ObservationId, component: usize) -> Result<usize> {
+        let rows = self.rows(observation)?;
+        let unknown = Error::UnknownId { what: "component", index: component, count: rows.len() };
+        if component < rows.len() { Ok(rows.start + component) } else { Err(unknown) }
+    }
+
+    /// Number of components of a block's tangent step, held ones included.
+    pub(crate) fn tangent_dimension(&self, block: BlockId) -> Result<usize> {
+        self.check_block(block)?;
+        Ok(self.layout.block_columns(block.0).len())
     }
 
     pub(crate) fn cofactor(&self, row: usize, column: usize) -> f64 {

@@ -1,6 +1,6 @@
 use nalgebra::{DMatrix, DVector};
 
-use crate::layout::HELD;
+use crate::layout::{HELD, Place};
 use crate::{BlockId, Error, Result, Scale, Solution};
 
 impl Solution {
@@ -41,15 +41,20 @@ impl Solution {
     pub(crate) fn weighted_design(&self, row: usize, owners: &[(BlockId, usize)]) -> WeightedDesign {
         let Some(observation) = self.observation_of(row) else { return WeightedDesign::default() };
         let place = &self.layout.observations[observation];
-        let (active, component) = (self.layout.active(place), row - place.row);
+        let (columns, component) = (self.columns_of(place), row - place.row);
         let whitening = &self.whitening[self.whitening_start[observation]..];
         let jacobian = &self.linearisation.jacobian[place.jacobian_range()];
-        let mut terms = Vec::with_capacity(active.len());
-        for (entry, &(_, column)) in active.iter().enumerate() {
-            let weighted = |i: usize| whitening[i * (i + 1) / 2 + component] * jacobian[i * active.len() + entry];
+        let mut terms = Vec::with_capacity(columns.len());
+        for (entry, &column) in columns.iter().enumerate() {
+            let weighted = |i: usize| whitening[i * (i + 1) / 2 + component] * jacobian[i * columns.len() + entry];
             terms.push((owners[column], (component..place.dimension).map(weighted).sum()));
         }
         WeightedDesign { terms }
+    }
+
+    /// Unknowns that the entries in a row of an observation's Jacobian belong to.
+    pub(crate) fn columns_of(&self, place: &Place) -> Vec<usize> {
+        self.layout.active(place).iter().map(|&(_, column)| column).collect()
     }
 
     /// The observation that a row belongs to.
@@ -61,7 +66,7 @@ impl Solution {
     /// Block and component of each unknown.
     pub(crate) fn owners(&self) -> Vec<(BlockId, usize)> {
         let mut owners = vec![(BlockId(0), 0); self.layout.unknowns];
-        for block in 0..self.layout.tangent.len() - 1 {
+        for block in 0..self.blocks.len() {
             for (component, &column) in self.layout.block_columns(block).iter().enumerate() {
                 if column != HELD {
                     owners[column] = (BlockId(block), component);

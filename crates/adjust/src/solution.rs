@@ -23,7 +23,7 @@ pub enum Scale {
 /// and all unknowns are determined.
 #[derive(Debug, Clone)]
 pub struct Solution {
-    blocks: Vec<ParameterBlock>,
+    pub(crate) blocks: Vec<ParameterBlock>,
     pub(crate) groups: Vec<String>,
     pub(crate) group_of: Vec<GroupId>,
     pub(crate) whitening: Vec<f64>,
@@ -258,6 +258,25 @@ impl Solution {
         let rows = self.rows(observation)?;
         let unknown = Error::UnknownId { what: "component", index: component, count: rows.len() };
         if component < rows.len() { Ok(rows.start + component) } else { Err(unknown) }
+    }
+
+    pub(crate) fn block_label(&self, block: BlockId) -> String {
+        self.blocks.get(block.0).map_or_else(|| format!("block {}", block.0), |known| known.label(block.0))
+    }
+
+    pub(crate) fn parameter_name(&self, (block, component): (BlockId, usize)) -> String {
+        let known = self.blocks.get(block.0).map(|known| known.parameter_name(block.0, component));
+        known.unwrap_or_else(|| format!("block {}", block.0))
+    }
+
+    /// The tangent step from `reference` (ambient) to the adjusted values of a block.
+    pub(crate) fn difference(&self, block: BlockId, reference: &[f64]) -> Result<Vec<f64>> {
+        let values = self.values(block)?;
+        let known = &self.blocks[block.0];
+        known.check(block.0, reference)?;
+        let mut out = vec![0.0; known.tangent_dimension()];
+        known.manifold.minus(values, reference, &mut out);
+        Ok(out)
     }
 
     /// Number of components of a block's tangent step, held ones included.

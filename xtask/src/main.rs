@@ -3,6 +3,7 @@
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
 mod bench;
+mod peers;
 mod pipeline_task;
 mod shell;
 mod test;
@@ -22,6 +23,8 @@ enum Task {
     Test,
     /// Check the repository itself: READMEs, citations, lengths of files.
     Tidy,
+    /// Other programs beside ours on the same work: `cargo xtask peers adjust`.
+    Peers(peers::Arguments),
     /// Run the benchmarks of all crates, or of those named.
     Bench(bench::Arguments),
 }
@@ -31,6 +34,7 @@ fn main() -> ExitCode {
         Task::Pipeline(arguments) => return pipeline_task::run(&arguments),
         Task::Test => test::run(),
         Task::Tidy => tidy::run(),
+        Task::Peers(arguments) => peers::run(&arguments),
         Task::Bench(arguments) => bench::run(&arguments),
     };
     match outcome {

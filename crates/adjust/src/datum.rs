@@ -2,6 +2,7 @@ use nalgebra::Vector3;
 
 use crate::adjustment::Datum;
 use crate::layout::{HELD, Layout};
+use crate::structure::Structure;
 use crate::{Adjustment, Error, Result};
 
 /// How many directions the network leaves undetermined.
@@ -50,6 +51,34 @@ pub(crate) fn inner_constraints(
         }
     }
     Ok(rows)
+}
+
+/// How points move in the directions of the datum, row-major, `count × unknowns`: the points of the datum, and all
+/// eliminated blocks of three coordinates, which are points of the same network. What else there is stays zero.
+pub(crate) fn point_motions(
+    datum: &Datum,
+    adjustment: &Adjustment<'_>,
+    layout: &Layout,
+    values: &[f64],
+    structure: &Structure,
+) -> Vec<f64> {
+    let coordinates = |block: usize| Vector3::from_column_slice(&values[layout.block_values(block)]);
+    let count = datum.defect.count();
+    let middle =
+        datum.points.iter().map(|id| coordinates(id.0)).sum::<Vector3<f64>>() / datum.points.len().max(1) as f64;
+    let mut rows = vec![0.0; count * layout.unknowns];
+    let others = structure.eliminated.iter().map(|eliminated| eliminated.block);
+    for block in others.chain(datum.points.iter().map(|id| id.0)) {
+        let (free, ambient) = (layout.free(block), adjustment.blocks[block].manifold.ambient_dimension());
+        if free.len() == 3 && ambient == 3 {
+            let arm = coordinates(block) - middle;
+            for row in 0..count {
+                let target = &mut rows[row * layout.unknowns..][free.clone()];
+                target.copy_from_slice(displacement(row, &arm).as_slice());
+            }
+        }
+    }
+    rows
 }
 
 /// How a point at `arm` from the centroid moves under the direction: three translations, three rotations, scale.

@@ -1,8 +1,9 @@
 use crate::constraints::Constraints;
+use crate::evaluation::Want;
 use crate::layout::Layout;
-use crate::linearisation::{Linearisation, Want};
-use crate::normal::NormalEquations;
+use crate::linearisation::Linearisation;
 use crate::rank::Problem;
+use crate::system::System;
 use crate::{Adjustment, Error, Method, Result, SolveOptions, StepKind, TraceEntry};
 
 /// A damped step that is expected to reduce the objective by less than this share ends the descent.
@@ -20,9 +21,11 @@ pub(crate) struct Iteration<'p, 'a> {
     pub(crate) values: Vec<f64>,
     pub(crate) current: Linearisation,
     pub(crate) constraints: Constraints,
-    pub(crate) normal: NormalEquations,
+    pub(crate) system: System,
     pub(crate) trace: Vec<TraceEntry>,
     pub(crate) trial: Linearisation,
+    /// Whether the trial has derivatives, so that it need not be evaluated again when it is accepted.
+    trial_is_linearised: bool,
     pub(crate) trial_values: Vec<f64>,
     pub(crate) moved: Vec<f64>,
     /// Weight of the constraints in the merit function (exact penalty: above the largest multiplier).
@@ -46,9 +49,10 @@ impl<'p, 'a> Iteration<'p, 'a> {
             values,
             current: Linearisation::new(layout),
             constraints: Constraints::default(),
-            normal: NormalEquations::new(layout.unknowns),
+            system: System::new(adjustment, layout)?,
             trace: Vec::new(),
             trial: Linearisation::new(layout),
+            trial_is_linearised: false,
             moved: vec![0.0; layout.rows],
             penalty: 0.0,
             damping: options.initial_damping,
@@ -56,15 +60,17 @@ impl<'p, 'a> Iteration<'p, 'a> {
             last_gain: 0.0,
             metric: vec![f64::INFINITY; layout.unknowns],
         };
+        this.current.evaluate(adjustment, layout, &this.values, Want::Jacobians)?;
         this.linearise()?;
         Ok(this)
     }
 
+    /// Everything that follows from the derivatives in `current`.
     fn linearise(&mut self) -> Result<()> {
-        self.current.evaluate(self.adjustment, self.layout, &self.values, Want::Jacobians)?;
-        self.constraints = Constraints::new(self.adjustment, self.layout, &self.current, &self.values)?;
-        self.normal.accumulate(self.layout, &self.current);
-        let scale = self.normal.scale();
+        let structure = self.system.structure();
+        self.constraints = Constraints::new(self.adjustment, self.layout, &self.current, &self.values, structure)?;
+        self.system.accumulate(self.layout, &self.current);
+        let scale = self.system.scale();
         self.metric.iter_mut().zip(scale).for_each(|(metric, scale)| *metric = (FORGETTING * *metric).min(scale));
         Ok(())
     }
@@ -96,7 +102,7 @@ impl<'p, 'a> Iteration<'p, 'a> {
             layout: self.layout,
             linearisation: &self.current,
             constraints: &self.constraints,
-            normal: &self.normal,
+            system: &self.system,
         }
     }
 
@@ -110,7 +116,7 @@ impl<'p, 'a> Iteration<'p, 'a> {
             gain += w * m * (2.0 * v - m);
         }
         if self.constraints.first_inner > 0 {
-            let scale = self.normal.scale();
+            let scale = self.system.scale();
             square += self.constraints.scaled(&scale).right.iter().map(|d| d * d).sum::<f64>();
             self.raise_penalty(&scale);
         }
@@ -134,17 +140,24 @@ impl<'p, 'a> Iteration<'p, 'a> {
         at.objective + self.penalty * at.constraint.iter().map(|c| c.abs()).sum::<f64>()
     }
 
-    /// Merit at `values ⊞ share · step`; `None` where the model has no finite value.
-    pub(crate) fn try_step(&mut self, step: &[f64], share: f64) -> Option<f64> {
+    /// Merit at `values ⊞ share · step`; `None` where the model has no finite value. Derivatives are wanted where the
+    /// step is likely to be accepted: then nothing is evaluated twice.
+    pub(crate) fn try_step(&mut self, step: &[f64], share: f64, want: Want) -> Option<f64> {
         let step: Vec<f64> = step.iter().map(|dx| share * dx).collect();
         self.layout.step(self.adjustment, &self.values, &step, &mut self.trial_values);
-        let done = self.trial.evaluate(self.adjustment, self.layout, &self.trial_values, Want::Residuals);
+        let done = self.trial.evaluate(self.adjustment, self.layout, &self.trial_values, want);
+        self.trial_is_linearised = want == Want::Jacobians && done.is_ok();
         let merit = self.merit(&self.trial);
         (done.is_ok() && merit.is_finite()).then_some(merit)
     }
 
     pub(crate) fn accept(&mut self) -> Result<()> {
         std::mem::swap(&mut self.values, &mut self.trial_values);
+        if self.trial_is_linearised {
+            std::mem::swap(&mut self.current, &mut self.trial);
+        } else {
+            self.current.evaluate(self.adjustment, self.layout, &self.values, Want::Jacobians)?;
+        }
         self.linearise()
     }
 

@@ -54,7 +54,7 @@ impl Solution {
 
     /// Unknowns that the entries in a row of an observation's Jacobian belong to.
     pub(crate) fn columns_of(&self, place: &Place) -> Vec<usize> {
-        self.layout.active(place).iter().map(|&(_, column)| column).collect()
+        self.layout.columns(place).collect()
     }
 
     /// The observation that a row belongs to.

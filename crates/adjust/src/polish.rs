@@ -1,5 +1,5 @@
+use crate::evaluation::Want;
 use crate::iteration::Iteration;
-use crate::rank::Factor;
 use crate::{Result, StepKind};
 
 /// Undamped steps in a row that may fail to become shorter before they count as stagnant.
@@ -47,10 +47,7 @@ impl Iteration<'_, '_> {
     /// The undamped step; `None` where the unknowns are not determined at these values.
     fn undamped_step(&self) -> Result<Option<Vec<f64>>> {
         let factor = self.problem().factorise()?;
-        Ok(factor.map(|factor| match factor {
-            Factor::Normal(factor) => factor.solve(&self.normal.gradient, 1.0),
-            Factor::Orthogonal(factor) => factor.solve(),
-        }))
+        Ok(factor.map(|factor| factor.step(self.system.gradient())))
     }
 
     /// Takes the step as far as it is good. Where the model is so curved that only `last` of the last step was, no more
@@ -65,7 +62,7 @@ impl Iteration<'_, '_> {
         // Below 1e-10 of the objective its rounding hides whether a step is good.
         let hidden = expected.abs() <= 1e-10 * merit || negligible;
         let mut share = if hidden { last } else { (2.0 * last).min(1.0) };
-        while !self.try_step(step, share).is_some_and(|trial| hidden || trial <= merit) {
+        while !self.try_step(step, share, Want::Jacobians).is_some_and(|trial| hidden || trial <= merit) {
             share *= 0.5;
             let ended = negligible || settled || share < 1e-6 && harmless;
             if ended || share < 1e-6 {

@@ -1,3 +1,4 @@
+use crate::images::Images;
 use crate::layout::Place;
 use crate::{Error, GroupId, Result, Scale, Solution};
 
@@ -106,35 +107,12 @@ impl Solution {
     }
 
     pub(crate) fn for_each_observation(&self, mut visit: impl FnMut(&Place, &Local<'_>)) {
-        let mut product = Vec::new();
-        let mut local = Local { image: Vec::new(), factor: Vec::new(), whitening: &[] };
-        for (place, &start) in self.layout.observations.iter().zip(&self.whitening_start) {
-            local.whitening = &self.whitening[start..];
-            self.image(place, &mut product, &mut local.image);
-            invert_lower(local.whitening, place.dimension, &mut local.factor);
-            visit(place, &local);
-        }
-    }
-
-    /// `J Q Jᵀ` of one observation, row-major; J is the whitened Jacobian.
-    fn image(&self, place: &Place, product: &mut Vec<f64>, out: &mut Vec<f64>) {
-        let (active, d) = (self.layout.active(place), place.dimension);
-        let jacobian = &self.linearisation.jacobian[place.jacobian_range()];
-        out.clear();
-        out.resize(d * d, 0.0);
-        product.resize(active.len(), 0.0);
-        for second in 0..d {
-            let own = &jacobian[second * active.len()..(second + 1) * active.len()];
-            for (value, &(_, row)) in product.iter_mut().zip(active) {
-                // Q is symmetric: its row is a column, contiguous in memory.
-                let column = &self.cofactor[row * self.layout.unknowns..(row + 1) * self.layout.unknowns];
-                *value = own.iter().zip(active).map(|(a, &(_, other))| a * column[other]).sum();
-            }
-            for first in 0..d {
-                let other = &jacobian[first * active.len()..(first + 1) * active.len()];
-                let share: f64 = other.iter().zip(product.iter()).map(|(a, b)| a * b).sum();
-                out[first * d + second] = share;
-            }
+        let images = self.images.get_or_init(|| Images::new(&self.layout, &self.linearisation, &self.cofactor));
+        let mut factor = Vec::new();
+        for (index, (place, &start)) in self.layout.observations.iter().zip(&self.whitening_start).enumerate() {
+            let whitening = &self.whitening[start..];
+            invert_lower(whitening, place.dimension, &mut factor);
+            visit(place, &Local { image: images.image(index), factor: &factor, whitening });
         }
     }
 }
@@ -142,16 +120,16 @@ impl Solution {
 /// Small matrices of one observation.
 pub(crate) struct Local<'s> {
     /// `J Q Jᵀ`, row-major.
-    pub(crate) image: Vec<f64>,
+    pub(crate) image: &'s [f64],
     /// L of `C = L Lᵀ`, row-major, full.
-    factor: Vec<f64>,
+    factor: &'s [f64],
     whitening: &'s [f64],
 }
 
 impl Local<'_> {
     /// L of `C = L Lᵀ`, row-major, full.
     pub(crate) fn factor(&self) -> &[f64] {
-        &self.factor
+        self.factor
     }
 
     /// Element of `L⁻¹`, row >= column.

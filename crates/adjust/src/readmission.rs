@@ -89,7 +89,7 @@ impl Solution {
                 if self.layout.observations[observation.0].row == place.row {
                     let d = place.dimension;
                     let factor = DMatrix::from_row_slice(d, d, local.factor());
-                    *image = &factor * DMatrix::from_row_slice(d, d, &local.image) * factor.transpose();
+                    *image = &factor * DMatrix::from_row_slice(d, d, local.image) * factor.transpose();
                 }
             }
         });

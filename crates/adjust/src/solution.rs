@@ -1,11 +1,14 @@
 use std::ops::Range;
+use std::sync::OnceLock;
 
 use nalgebra::{DMatrix, Isometry3};
 
+use crate::cofactor::Cofactor;
+use crate::images::Images;
 use crate::iteration::Iteration;
 use crate::layout::{HELD, Layout};
 use crate::linearisation::Linearisation;
-use crate::rank::Cofactor;
+use crate::system::LARGEST;
 use crate::{
     Adjustment, BlockId, Error, GroupId, ObservationId, ParameterBlock, Result, RigidPose, SolveOptions, TraceEntry,
 };
@@ -34,10 +37,9 @@ pub struct Solution {
     values: Vec<f64>,
     pub(crate) linearisation: Linearisation,
     pub(crate) names: Vec<String>,
-    /// Cofactor matrix of the unknowns, full, column-major.
-    pub(crate) cofactor: Vec<f64>,
-    pub(crate) scale: Vec<f64>,
-    pub(crate) condition: f64,
+    pub(crate) cofactor: Cofactor,
+    /// Made when it is first asked for.
+    pub(crate) images: OnceLock<Images>,
     redundancy: i64,
     trace: Vec<TraceEntry>,
 }
@@ -77,10 +79,6 @@ impl Adjustment<'_> {
         constraints: usize,
         trace: Vec<TraceEntry>,
     ) -> Solution {
-        let Cofactor { mut matrix, scale, condition } = cofactor;
-        for (column, own) in matrix.chunks_exact_mut(scale.len().max(1)).zip(&scale) {
-            column.iter_mut().zip(&scale).for_each(|(q, other)| *q *= own * other);
-        }
         Solution {
             blocks: self.blocks.clone(),
             groups: self.groups.iter().map(|group| group.name.clone()).collect(),
@@ -93,9 +91,8 @@ impl Adjustment<'_> {
             values,
             linearisation,
             names,
-            cofactor: matrix,
-            scale,
-            condition,
+            cofactor,
+            images: OnceLock::new(),
             trace,
         }
     }
@@ -145,10 +142,15 @@ impl Solution {
         self.check_block(first)?;
         self.check_block(second)?;
         let factor = self.variance_factor(scale)?;
+        let free = self.cofactor.block(&self.layout, first.0, second.0) * factor;
         let (rows, columns) = (self.layout.block_columns(first.0), self.layout.block_columns(second.0));
+        if free.shape() == (rows.len(), columns.len()) {
+            return Ok(free);
+        }
+        let (top, left) = (self.layout.free(first.0).start, self.layout.free(second.0).start);
         Ok(DMatrix::from_fn(rows.len(), columns.len(), |i, j| match (rows[i], columns[j]) {
             (HELD, _) | (_, HELD) => 0.0,
-            (row, column) => factor * self.cofactor(row, column),
+            (row, column) => free[(row - top, column - left)],
         }))
     }
 
@@ -158,16 +160,36 @@ impl Solution {
     }
 
     /// Covariance matrix of all unknowns, in the order of [`Self::unknown_names`].
+    ///
+    /// # Errors
+    /// [`Error::TooLarge`] beyond 15,000 unknowns, where it would take more than 1.8 GB: ask for
+    /// [`Self::covariance`] and [`Self::covariance_between`]. [`Error::NoRedundancy`] for the posterior scale.
     pub fn covariance_matrix(&self, scale: Scale) -> Result<DMatrix<f64>> {
         let factor = self.variance_factor(scale)?;
         let n = self.layout.unknowns;
-        Ok(DMatrix::from_fn(n, n, |row, column| factor * self.cofactor(row, column)))
+        if n > LARGEST {
+            return Err(Error::TooLarge { unknowns: n, limit: LARGEST });
+        }
+        let mut out = DMatrix::zeros(n, n);
+        for second in 0..self.layout.blocks() {
+            for first in second..self.layout.blocks() {
+                let block = self.cofactor.block(&self.layout, first, second) * factor;
+                let place = (self.layout.free(first).start, self.layout.free(second).start);
+                out.view_mut(place, block.shape()).copy_from(&block);
+                out.view_mut((place.1, place.0), (block.ncols(), block.nrows())).copy_from(&block.transpose());
+            }
+        }
+        Ok(out)
     }
 
-    /// Correlation matrix of all unknowns.
+    /// Correlation matrix of all unknowns; empty beyond 15,000 unknowns, where [`Self::covariance_matrix`] is an error.
     pub fn correlation_matrix(&self) -> DMatrix<f64> {
-        let n = self.layout.unknowns;
-        DMatrix::from_fn(n, n, |row, column| self.correlation_of(row, column))
+        let Ok(mut out) = self.covariance_matrix(Scale::Prior) else { return DMatrix::zeros(0, 0) };
+        let deviations: Vec<f64> = out.diagonal().iter().map(|variance| variance.sqrt()).collect();
+        for (mut column, own) in out.column_iter_mut().zip(&deviations) {
+            column.iter_mut().zip(&deviations).for_each(|(q, other)| *q /= own * other);
+        }
+        out
     }
 
     /// Correlation between two single parameters, each a block and a component of its tangent step.
@@ -286,7 +308,7 @@ impl Solution {
     }
 
     pub(crate) fn cofactor(&self, row: usize, column: usize) -> f64 {
-        self.cofactor[column * self.layout.unknowns + row]
+        self.cofactor.element(&self.layout, row, column)
     }
 
     pub(crate) fn correlation_of(&self, row: usize, column: usize) -> f64 {

@@ -1,9 +1,22 @@
 //! A calibration network: stations, targets and what was observed between them.
 
+mod calibrate;
+mod check;
+mod distribution;
+mod equations;
 mod model;
 mod options;
 mod outcome;
+mod plan;
+mod problem;
+mod quality;
+mod report;
+mod simulate;
+mod start;
+mod strength;
+mod terms;
 
+pub use calibrate::calibrate;
 pub use model::{
     DistanceEnd, KnownDistance, Network, NetworkTarget, PassiveCamera, PassiveImagePoint, Sighting, Station,
 };
@@ -12,3 +25,5 @@ pub use outcome::{
     AdjustedStation, AdjustedTarget, CalibratedParameter, CalibrationOutcome, Component, GroupQuality,
     ObservationQuality, TermDecision, Verdict,
 };
+pub use plan::{Candidate, CandidateGrid, PlanOptions, PlanOutcome, plan};
+pub use simulate::{SightingOptions, SimulatedStart, simulate_sightings};

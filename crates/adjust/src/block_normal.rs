@@ -5,7 +5,7 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use crate::layout::Layout;
-use crate::linearisation::{Linearisation, take};
+use crate::linearisation::{Linearisation, Run, take};
 use crate::product::{Left, Right, add_product};
 use crate::structure::{Eliminated, Reduced, Role, Structure};
 
@@ -146,25 +146,22 @@ impl Source<'_> {
         for &observation in list {
             let place = &self.layout.observations[observation as usize];
             let parts = self.layout.parts(place);
-            let jacobian = &self.linearisation.jacobian[place.jacobian_range()];
             let Some(own) = parts.iter().find(|part| part.block as usize == block.block) else { continue };
-            let weight = self.linearisation.weights[place.row];
-            let data = &jacobian[own.offset as usize..];
-            for (row, entries) in place.rows().zip(jacobian.chunks_exact(place.width)) {
-                let residual = weight * self.linearisation.whitened[row];
-                gradient.iter_mut().zip(&entries[own.entries()]).for_each(|(g, a)| *g += a * residual);
-            }
-            let right = Right { data, inner: place.width, column: 1, columns: block.width };
-            for part in parts {
-                let Role::Reduced(other) = self.structure.roles[part.block as usize] else { continue };
-                let start = self.structure.reduced[other as usize].start;
-                if start >= block.start {
-                    let left = Left {
-                        data: &jacobian[part.offset as usize..],
-                        stride: place.width,
-                        rows: part.width as usize,
-                    };
-                    add_product(&mut out[start..], order, left, right, place.dimension, weight);
+            for Run { jacobian, whitened, weight } in self.linearisation.runs(place) {
+                let data = &jacobian[own.offset as usize..];
+                for (residual, entries) in whitened.iter().zip(jacobian.chunks_exact(place.width)) {
+                    let residual = weight * residual;
+                    gradient.iter_mut().zip(&entries[own.entries()]).for_each(|(g, a)| *g += a * residual);
+                }
+                let right = Right { data, inner: place.width, column: 1, columns: block.width };
+                for part in parts {
+                    let Role::Reduced(other) = self.structure.roles[part.block as usize] else { continue };
+                    let start = self.structure.reduced[other as usize].start;
+                    if start >= block.start {
+                        let data = &jacobian[part.offset as usize..];
+                        let left = Left { data, stride: place.width, rows: part.width as usize };
+                        add_product(&mut out[start..], order, left, right, whitened.len(), weight);
+                    }
                 }
             }
         }
@@ -197,22 +194,24 @@ impl Source<'_> {
         let Role::Eliminated(index) = self.structure.roles[block.block] else { return };
         for &observation in self.structure.eliminated_observations.list(index as usize) {
             let place = &self.layout.observations[observation as usize];
-            let jacobian = &self.linearisation.jacobian[place.jacobian_range()];
             let Some((_, part)) = self.structure.eliminated_part(self.layout.parts(place)) else { continue };
-            let weight = self.linearisation.weights[place.row];
-            for (row, entries) in place.rows().zip(jacobian.chunks_exact(place.width)) {
-                let residual = weight * self.linearisation.whitened[row];
-                gradient.iter_mut().zip(&entries[part.entries()]).for_each(|(g, a)| *g += a * residual);
-            }
-            let data = &jacobian[part.offset as usize..];
-            let right = Right { data, inner: place.width, column: 1, columns: block.width };
-            let left = Left { data, stride: place.width, rows: block.width };
-            add_product(own, block.width, left, right, place.dimension, weight);
-            for (other, at) in self.layout.parts(place).iter().zip(place.part_range()) {
-                let Some(slot) = self.structure.slots.get(self.structure.slot_of_part[at] as usize) else { continue };
-                let data = &jacobian[other.offset as usize..];
-                let left = Left { data, stride: place.width, rows: slot.width() };
-                add_product(&mut coupling[slot.offset - first..], slot.width(), left, right, place.dimension, weight);
+            for Run { jacobian, whitened, weight } in self.linearisation.runs(place) {
+                for (residual, entries) in whitened.iter().zip(jacobian.chunks_exact(place.width)) {
+                    let residual = weight * residual;
+                    gradient.iter_mut().zip(&entries[part.entries()]).for_each(|(g, a)| *g += a * residual);
+                }
+                let data = &jacobian[part.offset as usize..];
+                let right = Right { data, inner: place.width, column: 1, columns: block.width };
+                let left = Left { data, stride: place.width, rows: block.width };
+                add_product(own, block.width, left, right, whitened.len(), weight);
+                for (other, at) in self.layout.parts(place).iter().zip(place.part_range()) {
+                    let slot = self.structure.slots.get(self.structure.slot_of_part[at] as usize);
+                    let Some(slot) = slot else { continue };
+                    let left =
+                        Left { data: &jacobian[other.offset as usize..], stride: place.width, rows: slot.width() };
+                    let target = &mut coupling[slot.offset - first..];
+                    add_product(target, slot.width(), left, right, whitened.len(), weight);
+                }
             }
         }
     }

@@ -27,6 +27,14 @@ pub(crate) struct Linearisation {
     pub(crate) objective: f64,
 }
 
+/// Consecutive rows of an observation with one weight.
+pub(crate) struct Run<'s> {
+    /// Compact Jacobian of the rows.
+    pub(crate) jacobian: &'s [f64],
+    pub(crate) whitened: &'s [f64],
+    pub(crate) weight: f64,
+}
+
 /// Some observations and their share of the memory.
 struct Piece<'s> {
     /// Number of the first one.
@@ -127,6 +135,19 @@ impl Linearisation {
         }
     }
 
+    /// The rows of an observation in runs of equal weight: one, unless some of its components are excluded.
+    pub(crate) fn runs<'s>(&'s self, place: &Place) -> impl Iterator<Item = Run<'s>> + use<'s> {
+        let mut jacobian = &self.jacobian[place.jacobian_range()];
+        let mut whitened = &self.whitened[place.rows()];
+        let width = place.width;
+        self.weights[place.rows()].chunk_by(|a, b| a.to_bits() == b.to_bits()).map(move |weights| {
+            let (residuals, rest) = whitened.split_at(weights.len());
+            let (entries, below) = jacobian.split_at(weights.len() * width);
+            (whitened, jacobian) = (rest, below);
+            Run { jacobian: entries, whitened: residuals, weight: weights[0] }
+        })
+    }
+
     /// `Aᵀ P rows` for whitened rows.
     pub(crate) fn transpose_apply(&self, layout: &Layout, rows: &[f64]) -> Vec<f64> {
         let mut out = vec![0.0; layout.unknowns];
@@ -165,9 +186,14 @@ impl Piece<'_> {
             let whitened = &mut self.whitened[rows.clone()];
             whitened.copy_from_slice(residual);
             whiten(whitening, whitened, 1);
-            let square: f64 = whitened.iter().map(|v| v * v).sum();
+            let excluded = adjustment.exclusions.get(&(self.first + index));
+            let is_used = |component: usize| excluded.is_none_or(|excluded| !excluded.mask[component]);
+            let used = whitened.iter().enumerate().filter(|&(component, _)| is_used(component));
+            let square: f64 = used.map(|(_, v)| v * v).sum();
             let (rho, weight) = group.kernel.evaluate(square);
-            self.weights[rows].fill(weight);
+            for (component, row) in rows.enumerate() {
+                self.weights[row] = if is_used(component) { weight } else { 0.0 };
+            }
             vtpv += weight * square;
             objective += rho;
             if want == Want::Jacobians {

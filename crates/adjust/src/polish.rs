@@ -77,7 +77,8 @@ impl Iteration<'_, '_> {
 
     /// Posterior standard deviation of unit weight at the current values; 1 without redundancy.
     fn sigma0(&self) -> f64 {
-        let redundancy = (self.layout.rows + self.constraints.count).saturating_sub(self.layout.unknowns);
+        let redundancy = (self.layout.rows + self.constraints.count)
+            .saturating_sub(self.layout.unknowns + self.adjustment.excluded_components());
         if redundancy > 0 { (self.current.vtpv / redundancy as f64).sqrt() } else { 1.0 }
     }
 }

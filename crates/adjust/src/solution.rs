@@ -26,11 +26,13 @@ pub enum Scale {
 /// and all unknowns are determined.
 #[derive(Debug, Clone)]
 pub struct Solution {
-    blocks: Vec<ParameterBlock>,
+    pub(crate) blocks: Vec<ParameterBlock>,
     pub(crate) groups: Vec<String>,
     pub(crate) group_of: Vec<GroupId>,
     pub(crate) whitening: Vec<f64>,
     pub(crate) whitening_start: Vec<usize>,
+    /// Whether each row is excluded; empty where none is.
+    excluded: Vec<bool>,
     pub(crate) layout: Layout,
     values: Vec<f64>,
     pub(crate) linearisation: Linearisation,
@@ -83,7 +85,8 @@ impl Adjustment<'_> {
             group_of: self.observations.iter().map(|stored| stored.group).collect(),
             whitening: self.whitening.clone(),
             whitening_start: self.observations.iter().map(|stored| stored.whitening).collect(),
-            redundancy: (layout.rows + constraints) as i64 - layout.unknowns as i64,
+            excluded: self.excluded_rows(&layout),
+            redundancy: (layout.rows + constraints) as i64 - (layout.unknowns + self.excluded_components()) as i64,
             layout,
             values,
             linearisation,
@@ -92,6 +95,14 @@ impl Adjustment<'_> {
             images: OnceLock::new(),
             trace,
         }
+    }
+
+    fn excluded_rows(&self, layout: &Layout) -> Vec<bool> {
+        let mut rows = vec![false; if self.exclusions.is_empty() { 0 } else { layout.rows }];
+        for (&index, exclusion) in &self.exclusions {
+            rows[layout.observations[index].rows()].copy_from_slice(&exclusion.mask);
+        }
+        rows
     }
 
     fn unknown_names(&self, layout: &Layout) -> Vec<String> {
@@ -206,12 +217,17 @@ impl Solution {
         self.layout.unknowns
     }
 
-    /// Number of observed values, components of priors included.
+    /// Whether an observed value (by its place in [`Self::residuals`]) was left out, see [`Adjustment::exclude`].
+    pub fn is_excluded(&self, row: usize) -> bool {
+        self.excluded.get(row).copied().unwrap_or(false)
+    }
+
+    /// Number of observed values, components of priors and excluded ones included.
     pub fn observations(&self) -> usize {
         self.layout.rows
     }
 
-    /// Observations + constraints (datum included) − unknowns.
+    /// Observations that are not excluded + constraints (datum included) − unknowns.
     pub fn redundancy(&self) -> i64 {
         self.redundancy
     }
@@ -242,7 +258,7 @@ impl Solution {
     }
 
     /// Robust weights of all observed values, in the same order: 1 for least squares, towards 0 for what a [`crate::Kernel`]
-    /// takes for a gross error.
+    /// takes for a gross error and for what is excluded.
     pub fn weights(&self) -> &[f64] {
         &self.linearisation.weights
     }
@@ -257,6 +273,38 @@ impl Solution {
         let count = self.layout.observations.len();
         let place = self.layout.observations.get(observation.0);
         Ok(place.ok_or(Error::UnknownId { what: "observation", index: observation.0, count })?.rows())
+    }
+
+    /// Row of one component of an observation.
+    pub(crate) fn row(&self, observation: ObservationId, component: usize) -> Result<usize> {
+        let rows = self.rows(observation)?;
+        let unknown = Error::UnknownId { what: "component", index: component, count: rows.len() };
+        if component < rows.len() { Ok(rows.start + component) } else { Err(unknown) }
+    }
+
+    pub(crate) fn block_label(&self, block: BlockId) -> String {
+        self.blocks.get(block.0).map_or_else(|| format!("block {}", block.0), |known| known.label(block.0))
+    }
+
+    pub(crate) fn parameter_name(&self, (block, component): (BlockId, usize)) -> String {
+        let known = self.blocks.get(block.0).map(|known| known.parameter_name(block.0, component));
+        known.unwrap_or_else(|| format!("block {}", block.0))
+    }
+
+    /// The tangent step from `reference` (ambient) to the adjusted values of a block.
+    pub(crate) fn difference(&self, block: BlockId, reference: &[f64]) -> Result<Vec<f64>> {
+        let values = self.values(block)?;
+        let known = &self.blocks[block.0];
+        known.check(block.0, reference)?;
+        let mut out = vec![0.0; known.tangent_dimension()];
+        known.manifold.minus(values, reference, &mut out);
+        Ok(out)
+    }
+
+    /// Number of components of a block's tangent step, held ones included.
+    pub(crate) fn tangent_dimension(&self, block: BlockId) -> Result<usize> {
+        self.check_block(block)?;
+        Ok(self.layout.block_columns(block.0).len())
     }
 
     pub(crate) fn cofactor(&self, row: usize, column: usize) -> f64 {

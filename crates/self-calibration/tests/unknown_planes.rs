@@ -107,14 +107,9 @@ fn without_noise_a_common_unknown_plane_gives_the_terms_back() {
     let camera = camera(4.0);
     let poses = poses(12);
     let frames = frames(&camera, &poses, 0.0, 1);
-    let calibration = calibrate_planes(
-        &captures(&frames, |i| Some(poses[i]), None),
-        &[None],
-        &camera,
-        INTERVAL,
-        &options(2),
-    )
-    .unwrap();
+    let calibration =
+        calibrate_planes(&captures(&frames, |i| Some(poses[i]), None), &[None], &camera, INTERVAL, &options(2))
+            .unwrap();
     println!("{:?}", calibration.diagnosis(0.9));
     for (found, expected) in calibration.model().parameter_values().iter().zip(truth().parameter_values()) {
         // Single-precision ranges of up to 9 m are off by 3e-7 m; d0 shares its effect with the plane, which inflates

@@ -3,6 +3,7 @@
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
 mod bench;
+mod fixtures;
 mod pipeline_task;
 mod shell;
 mod test;
@@ -18,6 +19,8 @@ use clap::Parser;
 enum Task {
     /// Run a pipeline of fixtures/pipelines by its name: `cargo xtask pipeline room`.
     Pipeline(pipeline_task::Arguments),
+    /// Write the surveys of fixtures/surveys that are simulated from fixtures/networks.
+    Fixtures,
     /// Everything that must be green: format, lints, documentation, tests, the small room.
     Test,
     /// Check the repository itself: READMEs, citations, lengths of files.
@@ -29,6 +32,7 @@ enum Task {
 fn main() -> ExitCode {
     let outcome = match Task::parse() {
         Task::Pipeline(arguments) => return pipeline_task::run(&arguments),
+        Task::Fixtures => fixtures::run(),
         Task::Test => test::run(),
         Task::Tidy => tidy::run(),
         Task::Bench(arguments) => bench::run(&arguments),

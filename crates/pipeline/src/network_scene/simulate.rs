@@ -22,7 +22,8 @@ use crate::{Error, Result, Simulated};
 pub fn simulate_network(scene: &Path, seed: Option<u64>, out: &Path) -> Result<Simulated> {
     let spec = NetworkScene::read(scene)?;
     let truth = spec.network(scene)?;
-    let observed = simulate_sightings(&truth, &spec.sightings.options(seed.unwrap_or(spec.seed))).map_err(Error::Calibrate)?;
+    let observed =
+        simulate_sightings(&truth, &spec.sightings.options(seed.unwrap_or(spec.seed))).map_err(Error::Calibrate)?;
     let folder = OutputFolder::create(out)?;
     write_observations(folder.file("observations.csv")?, &observations(&observed))?;
     write_stations(folder.file("stations.csv")?, &stations(&observed))?;

@@ -21,6 +21,8 @@ use crate::{Error, Result};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct NetworkScene {
+    /// Seed of all random numbers, unless the caller names another.
+    pub seed: u64,
     /// The nominal camera, as it will stand in `survey.ron`.
     pub camera: SurveyCamera,
     /// True parameters by name (`xp` ... `p2`, `d0` ... `h3`); others are as in the nominal camera, or zero.

@@ -11,9 +11,10 @@ use crate::{Error, Result};
 
 /// Terms that are decided on together, in the order in which they are given up where a network cannot tell them apart.
 /// The wave of length U comes first: it correlates with d0 and makes that many times less certain.
-const GROUPS: [&[&str]; 9] = [
+const GROUPS: [&[&str]; 10] = [
     &["d2", "d3"],
     &["h1", "h2", "h3"],
+    &["b1", "b2"],
     &["k3"],
     &["k2"],
     &["p1", "p2"],

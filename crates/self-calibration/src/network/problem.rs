@@ -212,7 +212,7 @@ impl EquationParts {
 
 /// A network that is determined takes 10 to 30 steps; one that is not creeps on for thousands.
 fn solve_options() -> SolveOptions {
-    SolveOptions { max_iterations: 100, ..SolveOptions::default() }
+    SolveOptions { max_iterations: 50, ..SolveOptions::default() }
 }
 
 struct Builder<'s> {
@@ -276,7 +276,7 @@ impl<'s> Builder<'s> {
         self.blocks.targets[index].ok_or_else(|| Error::NotReachable {
             kind: "target",
             name: name(),
-            reason: "it has no coordinates to start from".to_owned(),
+            reason: "no station sees it, or nothing places it".to_owned(),
         })
     }
 

@@ -219,6 +219,7 @@ pub(crate) fn unit(name: &str) -> &'static str {
         "k2" => "mm^-4",
         "k3" => "mm^-6",
         "p1" | "p2" => "mm^-1",
+        "b1" | "b2" => "1",
         _ => PARAMETERS.iter().find(|(known, _)| *known == name).map_or("", |(_, unit)| unit),
     }
 }

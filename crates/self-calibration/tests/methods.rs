@@ -3,83 +3,12 @@
 
 mod support;
 
-use nalgebra::DVector;
 use self_calibration::{
-    CalibrationOptions, CalibrationOutcome, Method, Network, NetworkDatum, SightingOptions, SimulatedStart,
-    TermSelection, calibrate, calibrate_two_networks, simulate_sightings,
+    CalibrationOptions, Method, NetworkDatum, SightingOptions, SimulatedStart, TermSelection, calibrate,
+    simulate_sightings,
 };
-use support::networks::{
-    all_but_long_wave, nominal, small, track_network, with_control, with_passive, with_scale_bars,
-};
-
-struct Case {
-    name: &'static str,
-    method: Method,
-    datum: NetworkDatum,
-    truth: Network,
-    /// The network of the lens, where there are two.
-    lens: Option<Network>,
-}
-
-fn cases() -> Vec<Case> {
-    let case = |name, method, datum, truth| Case { name, method, datum, truth, lens: None };
-    vec![
-        case("one step, free", Method::OneStep, NetworkDatum::Free, small()),
-        case("one step, scale bars", Method::OneStep, NetworkDatum::Free, with_scale_bars(small())),
-        case("one step, control", Method::OneStep, NetworkDatum::Control, with_control(small())),
-        case("dependent, scale from ranges", Method::TwoStepDependent, NetworkDatum::Free, small()),
-        case("dependent, scale bars", Method::TwoStepDependent, NetworkDatum::Free, with_scale_bars(small())),
-        case("dependent, control", Method::TwoStepDependent, NetworkDatum::Control, with_control(small())),
-        case("joint integrated", Method::JointIntegrated, NetworkDatum::Free, with_passive(small())),
-        case("joint two steps", Method::JointTwoStep, NetworkDatum::Control, with_passive(with_control(small()))),
-        case("laboratory", Method::Laboratory, NetworkDatum::Free, track_network()),
-        Case {
-            lens: Some(with_scale_bars(small())),
-            ..case("independent", Method::TwoStepIndependent, NetworkDatum::Free, with_control(small()))
-        },
-    ]
-}
-
-fn calibrated(case: &Case, sightings: &SightingOptions, options: &CalibrationOptions) -> CalibrationOutcome {
-    let options = CalibrationOptions { method: case.method, datum: case.datum, ..options.clone() };
-    let observe = |truth: &Network, sightings: &SightingOptions| {
-        let mut observed = simulate_sightings(truth, sightings).unwrap();
-        if case.method != Method::Laboratory {
-            nominal(&mut observed);
-        }
-        observed
-    };
-    let observed = observe(&case.truth, sightings);
-    let found = match &case.lens {
-        None => calibrate(&observed, &options),
-        Some(lens) => {
-            let other = SightingOptions { seed: sightings.seed + 1_000_000, ..sightings.clone() };
-            calibrate_two_networks(&observe(lens, &other), &observed, &options)
-        }
-    };
-    found.unwrap_or_else(|error| panic!("{}: {error}", case.name))
-}
-
-/// Differences of the estimated parameters from the truth.
-fn errors(case: &Case, outcome: &CalibrationOutcome) -> DVector<f64> {
-    let camera = &case.truth.camera;
-    let [xp, yp] = camera.interior.principal_point_mm;
-    let lens = camera.lens;
-    let terms = case.truth.range_model.terms.to_array();
-    let true_value = |name: &str| match name {
-        "xp" => xp,
-        "yp" => yp,
-        "c" => camera.interior.principal_distance_mm,
-        "k1" => lens.k1,
-        "k2" => lens.k2,
-        "k3" => lens.k3,
-        "p1" => lens.p1,
-        "p2" => lens.p2,
-        name => terms[error_models::RangeTerms::NAMES.iter().position(|known| *known == name).unwrap()],
-    };
-    let difference = |name: &String| outcome.parameter(name).unwrap().value - true_value(name);
-    DVector::from_iterator(outcome.estimated.len(), outcome.estimated.iter().map(difference))
-}
+use support::cases::{calibrated, cases, errors};
+use support::networks::{all_but_long_wave, nominal, small, with_control};
 
 fn options() -> CalibrationOptions {
     CalibrationOptions {
@@ -137,7 +66,9 @@ fn deviations_are_honest() {
 fn two_steps_with_the_full_covariance_agree_with_one() {
     let mut observed = simulate_sightings(&with_control(small()), &SightingOptions::default()).unwrap();
     nominal(&mut observed);
-    let of = |method| calibrate(&observed, &CalibrationOptions { method, datum: NetworkDatum::Control, ..options() }).unwrap();
+    let of = |method| {
+        calibrate(&observed, &CalibrationOptions { method, datum: NetworkDatum::Control, ..options() }).unwrap()
+    };
     let (one, two) = (of(Method::OneStep), of(Method::TwoStepDependent));
     for name in ["d0", "d4", "d7", "e1"] {
         let [a, b] = [&one, &two].map(|outcome| outcome.parameter(name).unwrap());

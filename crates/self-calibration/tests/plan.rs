@@ -22,7 +22,8 @@ fn the_plan_promises_what_the_calibration_gives() {
     let promised = plan(&small(), &options(no_candidates())).unwrap();
     let observed = simulate_sightings(&small(), &SightingOptions::default()).unwrap();
     let terms = TermSelection::List(all_but_long_wave());
-    let given = calibrate(&observed, &CalibrationOptions { terms, rejection_level: None, ..Default::default() }).unwrap();
+    let given =
+        calibrate(&observed, &CalibrationOptions { terms, rejection_level: None, ..Default::default() }).unwrap();
     assert_eq!(promised.estimated, given.estimated);
     assert_eq!((promised.observations, promised.redundancy), (given.observations, given.redundancy));
     for name in &promised.estimated {
@@ -33,7 +34,11 @@ fn the_plan_promises_what_the_calibration_gives() {
     }
     assert!(promised.diagnosis[0].contains("accept"));
     assert_eq!(promised.point_sigma_m.len(), 3);
-    assert!(promised.point_sigma_m.iter().all(|(_, sigma)| *sigma > 0.0005 && *sigma < 0.02), "{:?}", promised.point_sigma_m);
+    assert!(
+        promised.point_sigma_m.iter().all(|(_, sigma)| *sigma > 0.0005 && *sigma < 0.02),
+        "{:?}",
+        promised.point_sigma_m
+    );
 }
 
 #[test]

@@ -3,6 +3,7 @@
 
 mod support;
 
+use error_models::{PeriodicSpline, RangeTerms};
 use self_calibration::{
     CalibrationOptions, Method, NetworkDatum, SightingOptions, SimulatedStart, TermSelection, calibrate,
     simulate_sightings,
@@ -97,4 +98,28 @@ fn sets_of_integration_times_have_their_own_terms() {
     assert!((second.value - first.value - 0.05).abs() < 0.005, "{} {}", first.value, second.value);
     assert_eq!(outcome.range_models.len(), 2);
     assert!(outcome.range_models.iter().all(|(time, model)| time.is_some() && model.range_span_m.is_some()));
+}
+
+#[test]
+fn a_spline_stands_instead_of_the_sines() {
+    let mut truth = small();
+    let sines = truth.range_model.terms;
+    truth.range_model.terms = RangeTerms { d0: sines.d0, e1: sines.e1, e2: sines.e2, ..RangeTerms::default() };
+    let knots = vec![0.004, -0.006, 0.003, 0.005, -0.004, 0.002, -0.003];
+    truth.range_model.further.spline = Some(PeriodicSpline { coefficients: knots });
+    let mut observed = simulate_sightings(&truth, &SightingOptions::default()).unwrap();
+    nominal(&mut observed);
+    observed.range_model.further.spline = Some(PeriodicSpline::zero(8).unwrap());
+    // The ranges span 1.2 m to 4.5 m of 5 m: the knots from 1.2 m (s2) to 4.4 m (s6) are seen, the others held.
+    observed.range_model.further.spline.as_mut().unwrap().coefficients[..2].copy_from_slice(&[0.004, -0.006]);
+    let names = ["xp", "yp", "c", "k1", "k2", "p1", "p2", "d0", "s3", "s4", "s5", "e1", "e2"];
+    observed.range_model.further.spline.as_mut().unwrap().coefficients[2] = 0.003;
+    observed.range_model.further.spline.as_mut().unwrap().coefficients[6] = -0.003;
+    let terms = TermSelection::List(names.map(str::to_owned).to_vec());
+    let outcome = calibrate(&observed, &CalibrationOptions { terms, ..options() }).unwrap();
+    for (name, value) in [("s3", 0.005), ("s4", -0.004), ("s5", 0.002)] {
+        let found = outcome.parameter(name).unwrap();
+        assert!((found.value - value).abs() < 4.0 * found.sigma_prior, "{name}: {} {}", found.value, found.sigma_prior);
+        assert_eq!(found.unit, "m");
+    }
 }

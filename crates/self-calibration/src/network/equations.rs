@@ -332,7 +332,7 @@ mod tests {
     fn model() -> RangeErrorModel {
         let terms = RangeTerms { d0: 0.03, periodic: [0.02, -0.01, 0.01, 0.02, -0.02, 0.01], e1: 2e-3, e2: -1e-3 };
         let hyperbola = AmplitudeHyperbola { h1: -1e-3, h2: 0.5, h3: 4.0, amplitude_span: [0.0, 1e4] };
-        RangeErrorModel { ambiguity_interval_m: 5.0, terms, hyperbola: Some(hyperbola), range_span_m: None }
+        RangeErrorModel { terms, hyperbola: Some(hyperbola), ..RangeErrorModel::error_free(5.0) }
     }
 
     /// Pose, target 2 m in front of it, camera, range set.

@@ -54,8 +54,11 @@ pub(crate) struct RangeFamily {
     /// Puts values back.
     pub(crate) write: fn(&mut RangeErrorModel, &[f64]),
     /// The correction and its derivatives with respect to the values; fails with a reason where it has no value.
-    pub(crate) evaluate: fn(&RangeErrorModel, &Seen, &[f64], &mut [f64]) -> Result<RangePart, &'static str>,
+    pub(crate) evaluate: Evaluate,
 }
+
+/// A correction as a function of model, observed values, terms; the last argument takes the derivatives.
+type Evaluate = fn(&RangeErrorModel, &Seen, &[f64], &mut [f64]) -> Result<RangePart, &'static str>;
 
 /// All families. A further term is a further row.
 pub(crate) const RANGE_FAMILIES: [RangeFamily; 2] = [
@@ -173,7 +176,9 @@ pub(crate) fn modelled_range(
         let step = (distance + part.value - seen.range_m) * growth;
         seen.range_m += step;
         if step.abs() <= 1e-14 * (1.0 + seen.range_m.abs()) {
-            row.iter_mut().for_each(|derivative| *derivative *= growth);
+            for derivative in row {
+                *derivative *= growth;
+            }
             let (by_x, by_y) = (part.by_x * growth, part.by_y * growth);
             return Ok(ModelledRange { range_m: seen.range_m, by_distance: growth, by_x, by_y });
         }

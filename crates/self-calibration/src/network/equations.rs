@@ -362,8 +362,9 @@ mod tests {
             let ids = ids(blocks.len());
             let equation = SightingEquation { blocks: ids, camera: camera(), pixel: [120.3, 31.8], uses_pixel, range };
             let check = check_jacobian(&equation, &blocks).unwrap();
-            // Smooth functions of parameters of order one: extrapolated differences agree to 1e-7.
-            assert!(check.worst < 1e-6, "{check:?}");
+            // Steps follow the largest value of a block (h3 = 4), for which the short waves are far from linear: the
+            // differences agree among themselves to some 1e-6. A wrong factor would show as 1e-2.
+            assert!(check.worst < 1e-5, "{check:?}");
         }
     }
 

@@ -358,3 +358,27 @@ fn one_percent_of_a_network_is_found() {
     // The rejected tails make v'Pv a little small; a remaining gross error would make it large.
     assert!(expected.survival(found.solution.vtpv()) > 0.001);
 }
+
+#[test]
+fn excluded_ranges_are_as_if_they_had_not_been_measured_in_a_large_network() {
+    // Large enough for the points to be eliminated from the normal equations.
+    let plan = Plan { seed: 5, stations: 20, points: 90, seen: 60, ranges: true, disturbance: 0.0 };
+    let mut with = network(&plan);
+    let mut without = network(&Plan { ranges: false, ..plan });
+    let points = with.points.clone();
+    with.adjustment.add_inner_constraints(&points, DatumDefect::Six).unwrap();
+    without.adjustment.add_inner_constraints(&points, DatumDefect::Seven).unwrap();
+    // All ranges out but one, that of the first sight, which then gives the scale and is not controlled.
+    for &observation in &with.observations[1..] {
+        with.adjustment.exclude(observation, 2).unwrap();
+    }
+    let (with, without) = (solve(&with.adjustment), solve(&without.adjustment));
+    assert_eq!(with.redundancy(), without.redundancy());
+    assert_relative_eq!(with.vtpv(), without.vtpv(), max_relative = 1e-9);
+    let (used, numbers) = (with.redundancy_numbers(), without.redundancy_numbers());
+    for (index, pair) in numbers.chunks(2).enumerate() {
+        assert_relative_eq!(used[3 * index..3 * index + 2], *pair, epsilon = 1e-6);
+    }
+    assert_relative_eq!(used[2], 0.0, epsilon = 1e-6);
+    assert!(with.snoop(SnoopingTest::Baarda, 0.001).unwrap().statistics[2].is_nan());
+}

@@ -1,5 +1,5 @@
 use crate::evaluation::Want;
-use crate::iteration::Iteration;
+use crate::iteration::{Ending, Iteration};
 use crate::normal::Singular;
 use crate::system::SystemFactor;
 use crate::{Result, StepKind};
@@ -11,12 +11,9 @@ const LONGEST_BEND: f64 = 0.375;
 /// Where the model is probed for its curvature, as a share of the step.
 const PROBE: f64 = 0.1;
 
-/// Squared residual, in variances, below which an observation fits exactly.
-const EXACT: f64 = 1e-16;
-
 impl Iteration<'_, '_> {
-    /// Damped steps until they promise little. False where no step reduces the objective any more.
-    pub(crate) fn descend(&mut self, small_gain: f64) -> Result<bool> {
+    /// Damped steps until the ending. False where no step reduces the objective any more.
+    pub(crate) fn descend_damped(&mut self, ending: &Ending) -> Result<bool> {
         loop {
             self.check_budget()?;
             let reference = (self.damping, self.metric.as_slice());
@@ -30,7 +27,7 @@ impl Iteration<'_, '_> {
             let mut gain = f64::NEG_INFINITY;
             let merit = self.merit(&self.current);
             if let Some(factor) = factor {
-                let step = factor.solve(self.system.gradient(), 1.0);
+                let step = factor.solve(&self.gradient, 1.0);
                 (expected, length) = self.expect(&step);
                 if expected <= 1e-15 * merit {
                     return Ok(true);
@@ -43,11 +40,10 @@ impl Iteration<'_, '_> {
                 }
                 continue;
             }
-            self.accept()?;
+            self.accept(false)?;
             self.record(StepKind::Damped, length, self.damping, 1.0);
             self.lower_damping(gain);
-            let exact = merit <= EXACT * self.layout.rows as f64;
-            if gain > 0.25 && (expected <= small_gain * merit || exact) {
+            if ending.is_reached(merit, expected, gain, self.layout.rows) {
                 return Ok(true);
             }
         }

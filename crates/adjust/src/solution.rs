@@ -57,6 +57,7 @@ impl Adjustment<'_> {
         let names = self.unknown_names(&layout);
         let mut iteration = Iteration::new(self, &layout, options)?;
         if let Err(error) = iteration.run() {
+            iteration.renew()?;
             // A descent that finds no end often has none: an undetermined direction is then the better answer.
             let undetermined =
                 matches!(error, Error::NotConverged { .. }) && iteration.problem().factorise()?.is_none();

@@ -58,9 +58,9 @@ pub(crate) enum Command {
     SimulateNetwork {
         /// The network's RON file.
         scene: PathBuf,
-        /// Seed of all random numbers.
-        #[arg(long, default_value_t = 1)]
-        seed: u64,
+        /// Seed of all random numbers; default: the network's own.
+        #[arg(long)]
+        seed: Option<u64>,
         /// Output folder; default: out/<name of the network's file>.
         #[arg(long, short)]
         out: Option<PathBuf>,

@@ -90,10 +90,7 @@ fn calibrate_networks(request: &CalibrateRequest, method: Method, progress: &dyn
         let lens = read_network(folder, request.calibration.as_deref(), &request.defaults)?;
         check(&lens, Method::TwoStepDependent, options.datum)?;
         progress.begin("adjust networks", 2);
-        {
-            let _ = &lens;
-            self_calibration::calibrate(&files.network, &options)
-        }
+        self_calibration::calibrate_two_networks(&lens.network, &files.network, &options)
     } else {
         check(&files, method, options.datum)?;
         progress.begin("adjust network", 2);

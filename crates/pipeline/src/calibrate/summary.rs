@@ -196,8 +196,10 @@ pub struct RejectedObservation {
     pub observed: f64,
     /// Observed minus predicted, same unit.
     pub residual: f64,
-    /// Residual over its standard deviation.
+    /// Residual over its standard deviation; NaN (null in the file) where the test states none for what it rejected.
     pub standardised_residual: f64,
+    /// Residual over the a-priori standard deviation of the observation.
+    pub residual_in_sigmas: f64,
     /// Unit of the component.
     pub unit: &'static str,
 }
@@ -298,6 +300,7 @@ fn rejected(outcome: &CalibrationOutcome) -> Vec<RejectedObservation> {
             observed: quality.observed,
             residual: quality.residual,
             standardised_residual: quality.standardised,
+            residual_in_sigmas: quality.residual / quality.sigma,
             unit: group_unit(quality.component.name()),
         })
         .collect()

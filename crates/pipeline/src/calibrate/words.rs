@@ -87,8 +87,8 @@ impl CalibrationSummary {
             let (residual, unit) = readable(gross.residual, gross.unit);
             writeln!(
                 f,
-                "rejected: {} of {} from {}: residual {residual:.3} {unit}, {:.1} of its standard deviations",
-                gross.component, gross.target, gross.station, gross.standardised_residual
+                "rejected: {} of {} from {}: residual {residual:.3} {unit}, {:.1} of its sigma",
+                gross.component, gross.target, gross.station, gross.residual_in_sigmas
             )?;
         }
         if self.rejected.len() > NAMED_REJECTIONS {

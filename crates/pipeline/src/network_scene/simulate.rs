@@ -14,14 +14,16 @@ use self_calibration::{Network, PassiveCamera, simulate_sightings};
 use super::spec::{NetworkScene, distance_rows, survey_of_tables, true_calibration};
 use crate::{Error, Result, Simulated};
 
-/// Simulates a network's scene into a survey folder `out`, which is complete or not there.
+/// Simulates a network's scene into a survey folder `out`, which is complete or not there. A `seed` wins over the
+/// scene's own.
 ///
 /// The folder holds `observations.csv`, disturbed start values in `stations.csv` and `targets.csv`, known distances,
 /// the passive camera's folder, and the truth below `truth`.
-pub fn simulate_network(scene: &Path, seed: u64, out: &Path) -> Result<Simulated> {
+pub fn simulate_network(scene: &Path, seed: Option<u64>, out: &Path) -> Result<Simulated> {
     let spec = NetworkScene::read(scene)?;
     let truth = spec.network(scene)?;
-    let observed = simulate_sightings(&truth, &spec.sightings.options(seed)).map_err(Error::Calibrate)?;
+    let observed =
+        simulate_sightings(&truth, &spec.sightings.options(seed.unwrap_or(spec.seed))).map_err(Error::Calibrate)?;
     let folder = OutputFolder::create(out)?;
     write_observations(folder.file("observations.csv")?, &observations(&observed))?;
     write_stations(folder.file("stations.csv")?, &stations(&observed))?;

@@ -171,15 +171,16 @@ impl Canvas {
 
     /// The figure, its legend in the upper right corner of the title's line.
     pub(crate) fn finish(mut self) -> String {
-        let mut x = self.size[0] - MARGIN.right;
-        for (colour, name) in self.legend.iter().rev() {
-            let _ =
-                write!(self.svg, r#"<text x="{x:.0}" y="18" class="tick" text-anchor="end">{}</text>"#, escape(name));
-            // Letters of the tick font are about 5.6 pixels wide on the mean, in short words up to 6.5.
-            x -= 5.6 * name.chars().count() as f64 + 11.0;
-            let _ = write!(self.svg, r#"<circle cx="{x:.0}" cy="14.5" r="4" fill="{colour}"/>"#);
-            x -= 10.0;
-        }
+        let entry = |(colour, name): &(String, String)| {
+            format!(r#"<tspan fill="{colour}" font-size="13">●</tspan> {}"#, escape(name))
+        };
+        let entries: Vec<String> = self.legend.iter().map(entry).collect();
+        let _ = write!(
+            self.svg,
+            r#"<text x="{}" y="17" class="tick" text-anchor="end" xml:space="preserve">{}</text>"#,
+            self.size[0] - MARGIN.right,
+            entries.join("   ")
+        );
         self.svg.push_str("</svg>");
         self.svg
     }

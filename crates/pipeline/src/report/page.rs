@@ -114,7 +114,11 @@ impl Page {
     }
 }
 
-/// Whether a cell begins with a letter.
+/// Whether a cell is words rather than a number with its unit.
 fn is_word(cell: Option<&String>) -> bool {
-    cell.is_some_and(|cell| cell.chars().next().is_some_and(char::is_alphabetic))
+    cell.is_some_and(|cell| {
+        let letters = cell.chars().filter(|c| c.is_alphabetic()).count();
+        let digits = cell.chars().filter(char::is_ascii_digit).count();
+        cell.chars().next().is_some_and(char::is_alphabetic) || letters > digits
+    })
 }

@@ -15,7 +15,7 @@ pub(crate) fn normal_quantile(probability: f64) -> f64 {
     let mut bracket = [0.0, 40.0];
     for _ in 0..80 {
         let middle = f64::midpoint(bracket[0], bracket[1]);
-        bracket[usize::from(0.5 * fisher_tail(1.0, f64::INFINITY, middle * middle) < tail)] = middle;
+        bracket[usize::from(0.5 * gamma_tail(0.5, 0.5 * middle * middle) < tail)] = middle;
     }
     bracket[0]
 }
@@ -29,10 +29,42 @@ pub(crate) fn fisher_tail(numerator: f64, denominator: f64, value: f64) -> f64 {
     if value <= 0.0 {
         return 1.0;
     }
-    // Beyond this the two distributions agree to ten digits.
-    let denominator = denominator.min(1e12);
+    // Beyond this the two distributions agree to seven digits, and the continued fraction begins to lose them.
+    if denominator > 1e7 {
+        return gamma_tail(0.5 * numerator, 0.5 * numerator * value);
+    }
     let x = denominator / (denominator + numerator * value);
     incomplete_beta(0.5 * denominator, 0.5 * numerator, x, numerator * value / (denominator + numerator * value))
+}
+
+/// Regularised upper incomplete gamma function `Q(a, x)`: series for small x, continued fraction for large.
+fn gamma_tail(a: f64, x: f64) -> f64 {
+    let front = (a * x.ln() - x - ln_gamma(a)).exp();
+    if x < a + 1.0 {
+        let (mut term, mut sum, mut n) = (1.0 / a, 1.0 / a, a);
+        while term > 1e-17 * sum {
+            n += 1.0;
+            term *= x / n;
+            sum += term;
+        }
+        return 1.0 - front * sum;
+    }
+    let mut b = x + 1.0 - a;
+    let mut c = f64::INFINITY;
+    let mut d = 1.0 / b;
+    let mut product = d;
+    for index in 1..10_000 {
+        let n = f64::from(index);
+        let share = -n * (n - a);
+        b += 2.0;
+        d = 1.0 / (share * d + b);
+        c = b + share / c;
+        product *= c * d;
+        if (c * d - 1.0).abs() < 1e-15 {
+            break;
+        }
+    }
+    front * product
 }
 
 /// Regularised incomplete beta function `I_x(a, b)` with `y = 1 − x`, by its continued fraction.

@@ -1,7 +1,9 @@
 //! A calibration network: stations, targets and what was observed between them.
 
+mod auto_terms;
 mod calibrate;
 mod check;
+mod combine;
 mod distribution;
 mod equations;
 mod model;
@@ -10,13 +12,16 @@ mod outcome;
 mod plan;
 mod problem;
 mod quality;
+mod range_step;
+mod reference;
+mod rejection;
 mod report;
 mod simulate;
 mod start;
 mod strength;
 mod terms;
 
-pub use calibrate::calibrate;
+pub use calibrate::{calibrate, calibrate_two_networks};
 pub use model::{
     DistanceEnd, KnownDistance, Network, NetworkTarget, PassiveCamera, PassiveImagePoint, Sighting, Station,
 };

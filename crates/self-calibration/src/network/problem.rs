@@ -166,9 +166,20 @@ impl Setup<'_> {
     }
 
     /// Whether anything observed carries the scale.
-    fn has_scale(&self) -> bool {
+    pub(crate) fn has_scale(&self) -> bool {
         (0..self.network.sightings.len()).any(|index| self.uses_range(index))
             || (0..self.network.distances.len()).any(|index| !self.excluded.distances.contains(&index))
+    }
+
+    /// Sentences about targets that nothing checks.
+    pub(crate) fn seen_once(&self) -> Vec<String> {
+        let passive = self.network.passive.iter().filter(|_| self.passive).flat_map(|passive| &passive.image_points);
+        let mut counts = vec![0_usize; self.network.targets.len()];
+        let own = self.network.sightings.iter().map(|seen| seen.target);
+        own.chain(passive.map(|seen| seen.target)).for_each(|target| counts[target] += 1);
+        let once = self.network.targets.iter().zip(counts).filter(|(target, n)| *n == 1 && target.covariance.is_none());
+        once.map(|(target, _)| format!("target `{}` is seen once: nothing checks it, and it adds nothing", target.name))
+            .collect()
     }
 
     /// The equation of a sighting with chosen components.

@@ -56,7 +56,7 @@ impl Figures {
 }
 
 /// Adjusted poses and coordinates.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(crate) struct Geometry {
     pub(crate) stations: Vec<Isometry3<f64>>,
     pub(crate) targets: Vec<Option<Point3<f64>>>,
@@ -65,8 +65,10 @@ pub(crate) struct Geometry {
 impl Geometry {
     /// Distance of a station and a target; NaN where the target has no coordinates.
     pub(crate) fn distance(&self, station: usize, target: usize) -> f64 {
-        let centre = self.stations[station].translation.vector;
-        self.targets[target].map_or(f64::NAN, |point| (point.coords - centre).norm())
+        let (Some(pose), Some(Some(point))) = (self.stations.get(station), self.targets.get(target)) else {
+            return f64::NAN;
+        };
+        (point.coords - pose.translation.vector).norm()
     }
 }
 
@@ -156,7 +158,7 @@ impl Setup<'_> {
     }
 
     /// Observed values that take no part, and why.
-    fn unused_rows(&self) -> Vec<(Row, Verdict)> {
+    pub(crate) fn unused_rows(&self) -> Vec<(Row, Verdict)> {
         let mut out = Vec::new();
         for (index, seen) in self.network.sightings.iter().enumerate() {
             let source = Source::Sighting(index);

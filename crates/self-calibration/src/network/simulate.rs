@@ -1,12 +1,13 @@
 //! Observed networks with known truth.
 
-use nalgebra::{Isometry3, Point3, Vector3};
+use nalgebra::{Isometry3, Point3, SMatrix, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
 
 use super::equations::world_from_passive;
-use super::{DistanceEnd, Network, PassiveImagePoint, Sighting};
+use super::terms::{camera_from, camera_values};
+use super::{DistanceEnd, Network, PassiveCamera, PassiveImagePoint, Sighting};
 use crate::{Error, Result};
 
 /// What happens to the start values of poses and coordinates that are no control.
@@ -63,7 +64,8 @@ impl Default for SightingOptions {
 ///
 /// Sightings of the network say which target is seen from where and whether with a range, their observed values are
 /// replaced; without any sighting each station sees all targets that fall into its image, with a range. The same goes for
-/// the passive camera. Known distances and control are observed as well, with their own deviations. In the answer the
+/// the passive camera. Known distances, control and the calibration of a passive camera are observed as
+/// well, with their own deviations. In the answer the
 /// observations carry noise, the camera and the range terms are still the truth, and start values are as the options say.
 ///
 /// # Errors
@@ -90,6 +92,7 @@ fn simulated(network: &Network, options: &SightingOptions, noise: f64) -> Result
     observed.sightings = simulator.sightings()?;
     if let Some(passive) = observed.passive.as_mut() {
         passive.image_points = simulator.passive_points()?;
+        simulator.passive_calibration(passive);
     }
     for known in &mut observed.distances {
         known.distance_m = simulator.distance(known.from, known.to)? + known.sigma_m * simulator.normal();
@@ -215,6 +218,25 @@ impl Simulator<'_> {
             out.push(PassiveImagePoint { station, target, pixel, sigma_pixel: [sigma; 2] });
         }
         Ok(out)
+    }
+
+    /// The calibration of the passive camera is drawn from its covariance around the truth. Parameters of zero variance
+    /// stay as they are.
+    fn passive_calibration(&mut self, passive: &mut PassiveCamera) {
+        let Some(covariance) = passive.covariance else { return };
+        // The root by eigenvalues allows for parameters without variance.
+        let scale = covariance.diagonal().map(|variance| if variance > 0.0 { variance.sqrt() } else { 1.0 });
+        let scaled =
+            SMatrix::<f64, 8, 8>::from_fn(|row, column| covariance[(row, column)] / (scale[row] * scale[column]));
+        let eigen = scaled.symmetric_eigen();
+        let drawn = eigen.eigenvalues.map(|value| value.max(0.0).sqrt() * self.normal());
+        let error = (eigen.eigenvectors * drawn).component_mul(&scale);
+        let moved: Vec<f64> = camera_values(&passive.camera)
+            .into_iter()
+            .enumerate()
+            .map(|(i, v)| v + error.get(i).unwrap_or(&0.0))
+            .collect();
+        passive.camera = camera_from(&passive.camera, &moved).unwrap_or(passive.camera);
     }
 
     /// Control is observed: its values are drawn from their covariance around the truth.

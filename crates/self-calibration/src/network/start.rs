@@ -21,10 +21,11 @@ const SMALLEST_ANGLE: f64 = 0.0175;
 /// it has ranges, by absolute orientation of the points that image points and ranges make; else by resection. Targets
 /// follow from oriented stations as the median of their points, or as the intersection of rays. Where nothing at all
 /// is given, the station with the most ranges becomes the origin.
-pub(crate) fn find_start(network: &Network, calibration: &Calibration) -> Result<Start> {
+pub(crate) fn find_start(network: &Network, calibration: &Calibration, passive: bool) -> Result<Start> {
     let mut finder = Finder::new(network, calibration);
     finder.run()?;
-    let relative = network.passive.as_ref().map(|passive| finder.relative_orientation(passive)).transpose()?;
+    let relative =
+        network.passive.as_ref().filter(|_| passive).map(|passive| finder.relative_orientation(passive)).transpose()?;
     let stations = finder.stations.iter().copied().flatten().collect();
     Ok(Start { stations, targets: finder.targets, relative })
 }

@@ -121,7 +121,7 @@ impl Setup<'_> {
     }
 
     /// What to add to the network, in the words of who observes it.
-    fn advice(&self, combination: &Combination, motions: &Motions) -> String {
+    pub(crate) fn advice(&self, combination: &Combination, motions: &Motions) -> String {
         let leading = |names: &[&str]| {
             let takes_part = |(name, weight): &(String, f64)| {
                 let base = name.split('@').next().unwrap_or(name);
@@ -191,9 +191,9 @@ impl Setup<'_> {
         }
     }
 
-    fn undetermined(&self, combinations: &[Combination]) -> Error {
+    pub(crate) fn undetermined(&self, combinations: &[Combination]) -> Error {
         let list: Vec<String> = combinations.iter().take(3).map(ToString::to_string).collect();
-        let motions = Motions { sideways: 0.0, distance: 1.0, tilt: 0.0, roll: 0.0 };
+        let motions = Motions { distance: 1.0, ..Motions::default() };
         let advice = combinations.first().map_or_else(String::new, |first| self.advice(first, &motions));
         let correlation = "nothing determines it".to_owned();
         Error::WeakNetwork { combination: list.join("; "), inflation: f64::INFINITY, correlation, advice }
@@ -234,11 +234,12 @@ impl Setup<'_> {
 }
 
 /// Correlations of a combination with the stations' motions, means over all stations.
-struct Motions {
-    sideways: f64,
-    distance: f64,
-    tilt: f64,
-    roll: f64,
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Motions {
+    pub(crate) sideways: f64,
+    pub(crate) distance: f64,
+    pub(crate) tilt: f64,
+    pub(crate) roll: f64,
 }
 
 impl Motions {
@@ -262,7 +263,16 @@ impl Motions {
     }
 }
 
-fn combination(direction: &DVector<f64>, names: &[String]) -> Combination {
+/// Direction, in units of the deviations alone, whose deviation is larger than these by the largest factor, and the factor.
+pub(crate) fn weakest(covariance: &DMatrix<f64>, alone: &[f64]) -> (DVector<f64>, f64) {
+    let n = alone.len();
+    let scaled = DMatrix::from_fn(n, n, |row, column| covariance[(row, column)] / (alone[row] * alone[column]));
+    let eigen = scaled.symmetric_eigen();
+    let worst = eigen.eigenvalues.imax();
+    (eigen.eigenvectors.column(worst).into_owned(), eigen.eigenvalues[worst].max(0.0).sqrt())
+}
+
+pub(crate) fn combination(direction: &DVector<f64>, names: &[String]) -> Combination {
     let largest = direction[direction.icamax()];
     let scaled = names.iter().zip(direction.iter()).map(|(name, weight)| (name.clone(), weight / largest));
     let mut terms: Vec<_> = scaled.filter(|(_, weight)| weight.abs() >= SMALLEST_WEIGHT).collect();

@@ -2,8 +2,8 @@
 
 use camera_model::{Camera, ImageFormat, InteriorOrientation, LensDistortion, pose_from_euler};
 use error_models::{RangeErrorModel, RangeTerms};
-use nalgebra::{Isometry3, Point3, Vector3};
-use self_calibration::{Network, NetworkTarget, Station};
+use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
+use self_calibration::{DistanceEnd, KnownDistance, Network, NetworkTarget, PassiveCamera, Station};
 
 use super::INTERVAL;
 
@@ -12,7 +12,7 @@ pub fn camera() -> Camera {
     Camera::new(
         ImageFormat::new(176, 144, [0.04, 0.04]).unwrap(),
         InteriorOrientation { principal_point_mm: [0.06, -0.04], principal_distance_mm: 8.02 },
-        LensDistortion { k1: -1.5e-3, k2: 2e-5, k3: 0.0, p1: 1e-4, p2: -8e-5 },
+        LensDistortion { k1: -1.5e-3, k2: 2e-5, k3: 0.0, p1: 1e-4, p2: -8e-5, ..LensDistortion::default() },
     )
     .unwrap()
 }
@@ -20,7 +20,7 @@ pub fn camera() -> Camera {
 /// Offset, short waves and delay; no wave of length U, which a network can hardly tell from the offset.
 pub fn range_model() -> RangeErrorModel {
     let terms = RangeTerms { d0: 0.024, periodic: [0.0, 0.0, 0.003, 0.005, -0.009, 0.004], e1: 1.5e-3, e2: -1e-3 };
-    RangeErrorModel { ambiguity_interval_m: INTERVAL, terms, hyperbola: None, range_span_m: None }
+    RangeErrorModel { terms, ..RangeErrorModel::error_free(INTERVAL) }
 }
 
 /// A pose at a distance (m) from the middle of the field, off its normal by two angles, and rolled (degrees).
@@ -111,4 +111,55 @@ pub fn nominal(observed: &mut Network) {
     observed.camera.interior = InteriorOrientation { principal_point_mm: [0.0, 0.0], principal_distance_mm: 8.0 };
     observed.camera.lens = LensDistortion::default();
     observed.range_model.terms = RangeTerms::default();
+}
+
+/// The network with a passive camera of 1600 x 1200 pixels beside the range camera; 40 degrees of field.
+pub fn with_passive(mut network: Network) -> Network {
+    let format = ImageFormat::new(1600, 1200, [0.005, 0.005]).unwrap();
+    let interior = InteriorOrientation { principal_point_mm: [0.02, 0.01], principal_distance_mm: 9.0 };
+    let camera = Camera::new(format, interior, LensDistortion { k1: 2e-4, ..LensDistortion::default() }).unwrap();
+    let sigmas = [2e-3, 2e-3, 2e-3, 2e-6, 2e-7, 2e-9, 1e-6, 1e-6_f64];
+    let covariance = nalgebra::SMatrix::<f64, 8, 8>::from_diagonal(&sigmas.map(|sigma| sigma * sigma).into());
+    let relative = Isometry3::new(Vector3::new(0.08, 0.01, -0.02), Vector3::new(0.01, -0.03, 0.02));
+    network.passive = Some(PassiveCamera {
+        camera,
+        covariance: Some(covariance),
+        range_camera_from_passive: Some(relative),
+        image_points: Vec::new(),
+    });
+    network
+}
+
+/// The network with its targets known to half a millimetre.
+pub fn with_control(mut network: Network) -> Network {
+    for target in &mut network.targets {
+        target.covariance = Some(Matrix3::identity() * 0.0005_f64.powi(2));
+    }
+    network
+}
+
+/// The network with two scale bars of 0.5 mm.
+pub fn with_scale_bars(mut network: Network) -> Network {
+    let last = network.targets.len() - 1;
+    for (from, to) in [(0, last), (7, last - 7)] {
+        let (from, to) = (DistanceEnd::Target(from), DistanceEnd::Target(to));
+        network.distances.push(KnownDistance { from, to, distance_m: 1.0, sigma_m: 0.0005 });
+    }
+    network
+}
+
+/// A track: one target seen at 40 distances over an ambiguity interval, each known to a millimetre, over the whole image.
+pub fn track_network() -> Network {
+    let mut poses = Vec::new();
+    let mut distances = Vec::new();
+    for station in 0..60 {
+        let distance = 0.6 + 0.085 * f64::from(station);
+        let aside = [0.0, 0.3, -0.3][station as usize % 3] * distance;
+        let above = [0.0, 0.25, -0.25, 0.1][station as usize % 4] * distance;
+        poses.push(Isometry3::translation(aside, above, distance));
+        let ends = [DistanceEnd::Station(station as usize), DistanceEnd::Target(0)];
+        distances.push(KnownDistance { from: ends[0], to: ends[1], distance_m: 1.0, sigma_m: 0.001 });
+    }
+    let target = NetworkTarget { name: "T00".to_owned(), point: Some(Point3::origin()), covariance: None };
+    Network { distances, ..network(poses, vec![target]) }
 }

@@ -118,11 +118,11 @@ pub(super) fn rejected(page: &mut Page, summary: &CalibrationSummary) {
             gross.component.to_owned(),
             format!("{:.4}", gross.observed),
             format!("{residual:.3} {unit}"),
-            format!("{:.1}", gross.standardised_residual),
+            format!("{:.1}", gross.residual_in_sigmas),
         ]
     };
     let rows: Vec<_> = summary.rejected.iter().map(row).collect();
-    page.table(&["station", "target", "component", "observed", "residual (prediction)", "standardised"], &rows);
+    page.table(&["station", "target", "component", "observed", "observed minus predicted", "in sigmas"], &rows);
 }
 
 pub(super) fn decisions(page: &mut Page, outcome: &CalibrationOutcome) {

@@ -84,13 +84,15 @@ impl Solution {
         if components.is_empty() {
             return out;
         }
+        let mut wanted: Vec<(usize, usize)> =
+            components.iter().enumerate().map(|(index, one)| (self.layout.observations[one.0.0].row, index)).collect();
+        wanted.sort_unstable();
         self.for_each_observation(|place, local| {
-            for (image, (observation, _)) in out.iter_mut().zip(components) {
-                if self.layout.observations[observation.0].row == place.row {
-                    let d = place.dimension;
-                    let factor = DMatrix::from_row_slice(d, d, local.factor());
-                    *image = &factor * DMatrix::from_row_slice(d, d, local.image) * factor.transpose();
-                }
+            let first = wanted.partition_point(|&(row, _)| row < place.row);
+            for &(_, index) in wanted[first..].iter().take_while(|&&(row, _)| row == place.row) {
+                let d = place.dimension;
+                let factor = DMatrix::from_row_slice(d, d, local.factor());
+                out[index] = &factor * DMatrix::from_row_slice(d, d, local.image) * factor.transpose();
             }
         });
         out

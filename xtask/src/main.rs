@@ -3,6 +3,7 @@
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
 mod bench;
+mod fixtures;
 mod peers;
 mod pipeline_task;
 mod shell;
@@ -19,6 +20,8 @@ use clap::Parser;
 enum Task {
     /// Run a pipeline of fixtures/pipelines by its name: `cargo xtask pipeline room`.
     Pipeline(pipeline_task::Arguments),
+    /// Write the surveys of fixtures/surveys that are simulated from fixtures/networks.
+    Fixtures,
     /// Everything that must be green: format, lints, documentation, tests, the small room.
     Test,
     /// Check the repository itself: READMEs, citations, lengths of files.
@@ -32,6 +35,7 @@ enum Task {
 fn main() -> ExitCode {
     let outcome = match Task::parse() {
         Task::Pipeline(arguments) => return pipeline_task::run(&arguments),
+        Task::Fixtures => fixtures::run(),
         Task::Test => test::run(),
         Task::Tidy => tidy::run(),
         Task::Peers(arguments) => peers::run(&arguments),

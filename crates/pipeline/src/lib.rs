@@ -1,10 +1,13 @@
 #![doc = include_str!("../README.md")]
 
+mod calibrate;
 mod compare;
 mod error;
 mod inspect;
 mod load;
 mod measure;
+mod network_plan;
+mod network_scene;
 mod outcome;
 mod plan;
 mod progress;
@@ -19,9 +22,17 @@ mod truth;
 mod view;
 mod work;
 
+pub use calibrate::{
+    CalibrateMethod, CalibrateRequest, CalibrationSummary, CorrelationSummary, DecisionSummary, GroupSummary,
+    ParameterMap, ParameterSummary, RejectedObservation, TableDefaults, calibrate,
+};
 pub use compare::{CloudComparison, Comparison, PoseComparison, compare};
 pub use error::{Error, Result};
 pub use inspect::{Inspection, inspect};
+pub use network_plan::{CandidateSummary, NetworkPlanRequest, PlanSummary, PointSigma, plan_network};
+pub use network_scene::{
+    FieldSpec, NetworkScene, PassiveSpec, SceneStation, SceneTarget, SightingSpec, simulate_network,
+};
 pub use outcome::{AdjustmentFigures, Outcome, StationPose};
 pub use plan::{
     AdjustOptions, AverageOptions, CorrectImagePointOptions, CorrectRangeOptions, DeconvolveOptions, DemodulateOptions,
@@ -30,6 +41,7 @@ pub use plan::{
 };
 pub use progress::{Progress, Silent};
 pub use run::{RunRequest, process, run};
+pub use self_calibration::{CalibrationOptions, CandidateGrid, Method, NetworkDatum, PlanOptions, TermSelection};
 pub use simulate::{Simulated, simulate};
 pub use summary::{
     PairSummary, ReferenceSummary, RegistrationSummary, StageSummary, StationTruth, Summary, TruthSummary,

@@ -83,7 +83,7 @@ pub(crate) fn root_of(survey: &Path) -> PathBuf {
 }
 
 /// The named calibration, or the one beside the survey, and what to call it.
-fn read_calibration(root: &Path, named: Option<&Path>) -> Result<(Option<Calibration>, String)> {
+pub(crate) fn read_calibration(root: &Path, named: Option<&Path>) -> Result<(Option<Calibration>, String)> {
     let beside = root.join("calibration.ron");
     let path = match named {
         Some(path) => path.to_owned(),
@@ -96,7 +96,7 @@ fn read_calibration(root: &Path, named: Option<&Path>) -> Result<(Option<Calibra
 }
 
 /// The calibrated camera, which must have the survey's format.
-fn calibrated(calibration: &Calibration, nominal: &Camera) -> Result<Camera> {
+pub(crate) fn calibrated(calibration: &Calibration, nominal: &Camera) -> Result<Camera> {
     let camera = calibration.camera()?;
     let (have, want) = (camera.format, nominal.format);
     if (have.width, have.height) == (want.width, want.height) {

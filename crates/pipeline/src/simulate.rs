@@ -4,7 +4,7 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 
 use camera_model::step_pose;
-use error_models::{ModelSet, RangeErrorModel, RangeTerms};
+use error_models::{ModelSet, RangeErrorModel};
 use nalgebra::Isometry3;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;

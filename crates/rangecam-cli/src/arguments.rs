@@ -4,6 +4,9 @@ use std::path::PathBuf;
 
 use clap::{Parser, Subcommand};
 
+use crate::calibrate_arguments::CalibrateArguments;
+use crate::plan_arguments::PlanArguments;
+
 /// Raw frames of a range camera in, one corrected and registered cloud out.
 #[derive(Debug, Parser)]
 #[command(name = "rangecam", version, about)]
@@ -51,6 +54,21 @@ pub(crate) enum Command {
         #[arg(long, short)]
         out: Option<PathBuf>,
     },
+    /// Simulate a calibration network (targets seen from stations) and write it as a survey with its truth.
+    SimulateNetwork {
+        /// The network's RON file.
+        scene: PathBuf,
+        /// Seed of all random numbers; default: the network's own.
+        #[arg(long)]
+        seed: Option<u64>,
+        /// Output folder; default: out/<name of the network's file>.
+        #[arg(long, short)]
+        out: Option<PathBuf>,
+    },
+    /// Calibrate lens and range terms from a survey of targets or planes, with the quality of every parameter.
+    Calibrate(Box<CalibrateArguments>),
+    /// Tell how well planned stations and targets would determine a calibration, and which station to add.
+    Plan(Box<PlanArguments>),
     /// Tell what a survey, a calibration or a cloud holds, and which stages it leaves room for.
     Inspect {
         /// Survey folder, calibration.ron or cloud.ply.

@@ -24,6 +24,17 @@ pub(crate) fn dispatch(command: Command, output: &Output) -> Outcome {
             let simulated = pipeline::simulate(&source, Path::new(""), &out, output.progress().as_ref())?;
             output.result(&simulated)
         }
+        Command::SimulateNetwork { scene, seed, out } => {
+            let out = out.unwrap_or_else(|| default_out(scene.file_stem().unwrap_or_default().as_ref()));
+            output.result(&pipeline::simulate_network(&scene, seed, &out)?)
+        }
+        Command::Calibrate(arguments) => {
+            let request = arguments.request();
+            output.result(&pipeline::calibrate(&request, output.progress().as_ref())?)
+        }
+        Command::Plan(arguments) => {
+            output.result(&pipeline::plan_network(&arguments.request(), output.progress().as_ref())?)
+        }
         Command::Inspect { path } => output.result(&pipeline::inspect(&path)?),
         Command::Compare { first, second } => output.result(&pipeline::compare(&first, &second)?),
     }

@@ -2,8 +2,10 @@
 
 mod arguments;
 mod bar;
+mod calibrate_arguments;
 mod commands;
 mod output;
+mod plan_arguments;
 
 use std::ffi::OsString;
 use std::process::ExitCode;
@@ -28,6 +30,7 @@ pub fn main(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     match commands::dispatch(arguments.command, &output) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
+            output.refusal(error.as_ref());
             output.error(error.as_ref());
             ExitCode::FAILURE
         }

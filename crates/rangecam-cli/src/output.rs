@@ -56,6 +56,13 @@ impl Output {
         Ok(())
     }
 
+    /// The summary of a refused calibration: as JSON where that was asked for, in words it is the error alone.
+    pub(crate) fn refusal(&self, error: &(dyn Error + 'static)) {
+        if let (Voice::Json, Some(pipeline::Error::Refused { summary, .. })) = (self.voice, error.downcast_ref()) {
+            println!("{summary}");
+        }
+    }
+
     /// Why the command failed.
     pub(crate) fn error(&self, error: &dyn Error) {
         let head = if self.colour { "\u{1b}[31merror:\u{1b}[0m" } else { "error:" };

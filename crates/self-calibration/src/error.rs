@@ -99,6 +99,93 @@ pub enum Error {
         /// Row.
         row: f64,
     },
+    /// Two stations or two targets have one name.
+    #[error("two {kind}s are called `{name}`")]
+    DuplicateName {
+        /// Station or target.
+        kind: &'static str,
+        /// Name.
+        name: String,
+    },
+    /// A number of the network that cannot be used.
+    #[error("{what}: {name} = {value}, expected {expected}")]
+    BadNetworkValue {
+        /// Which sighting, station, target or distance, by name.
+        what: String,
+        /// Which of its numbers.
+        name: &'static str,
+        /// The number.
+        value: f64,
+        /// What would be right.
+        expected: &'static str,
+    },
+    /// Something names a station, target or term that does not exist.
+    #[error("{what} names {kind} `{name}`, which does not exist; there are {known}")]
+    UnknownName {
+        /// What names it.
+        what: String,
+        /// Station, target or term.
+        kind: &'static str,
+        /// Name, or number in the list.
+        name: String,
+        /// What there is.
+        known: String,
+    },
+    /// A station or target is observed too little to be determined.
+    #[error("{kind} `{name}` has {found}, but needs {needed}")]
+    TooFewSightings {
+        /// Station or target.
+        kind: &'static str,
+        /// Name.
+        name: String,
+        /// What it has.
+        found: String,
+        /// What it needs.
+        needed: &'static str,
+    },
+    /// No approximate pose or position was found.
+    #[error("no start values for {kind} `{name}`: {reason}")]
+    NotReachable {
+        /// Station, target or camera.
+        kind: &'static str,
+        /// Name.
+        name: String,
+        /// Why.
+        reason: String,
+    },
+    /// The datum asked for and the network contradict each other.
+    #[error("datum: {reason}")]
+    Datum {
+        /// What contradicts, with names.
+        reason: String,
+    },
+    /// The method asks for something that the network does not have.
+    #[error("method {method}: {needs}")]
+    MethodNeeds {
+        /// Method.
+        method: String,
+        /// What is missing.
+        needs: String,
+    },
+    /// The network cannot tell some calibration parameters apart, or from the stations.
+    #[error(
+        "the network does not determine {combination} (known {inflation:.0} times worse than each alone; {correlation}); \
+         {advice}"
+    )]
+    WeakNetwork {
+        /// The combination of parameters, with weights.
+        combination: String,
+        /// How many times larger its deviation is than if its parameters did not share their effect; infinite where
+        /// nothing determines it.
+        inflation: f64,
+        /// With what it is correlated.
+        correlation: String,
+        /// What to add to the network.
+        advice: String,
+    },
+    /// Finding start values failed.
+    #[error(transparent)]
+    Orientation(#[from] orientation::Error),
     /// The adjustment failed.
     #[error(transparent)]
     Adjust(#[from] adjust::Error),

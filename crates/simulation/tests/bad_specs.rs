@@ -4,7 +4,7 @@
 mod common;
 
 use common::plain;
-use error_models::{RangeErrorModel, RangeTerms};
+use error_models::RangeErrorModel;
 use range_image::NoiseModel;
 use simulation::{
     AttitudeSpec, DigitisationSpec, Error, FixedPatternSpec, MixedPixelsSpec, MultipathSpec, SampleType, ShapeSpec,

@@ -1,10 +1,13 @@
 //! The report: one page with the pictures that a person wants to see.
 
+mod canvas;
 mod chart;
 mod cloud_figure;
 mod colour;
+mod network;
 mod page;
 mod picture;
 mod sections;
 
+pub(crate) use network::{render_calibration, render_plan};
 pub(crate) use sections::render;

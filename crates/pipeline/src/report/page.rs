@@ -6,18 +6,18 @@ use super::picture::escape;
 
 const STYLE: &str = "
 body{font:15px/1.5 system-ui,sans-serif;color:#1c2430;background:#f6f7f9;margin:0}
-main{max-width:1240px;margin:0 auto;padding:24px}
+main{max-width:1256px;margin:0 auto;padding:24px}
 h1{font-size:26px;margin:0 0 4px}h2{font-size:19px;margin:32px 0 8px;border-bottom:1px solid #d5dae1;padding-bottom:4px}
 h3{font-size:15px;margin:18px 0 6px}
 p.lead{margin:0 0 12px;color:#55606e}
-.figures{display:flex;flex-wrap:wrap;gap:14px}
+.figures{display:flex;flex-wrap:wrap;gap:14px;margin-bottom:14px;align-items:flex-start}
 figure{margin:0;background:#fff;border:1px solid #dde2e8;border-radius:6px;padding:10px}
-figcaption{font-size:12px;color:#55606e;max-width:440px}
+figcaption{font-size:12px;color:#55606e;width:0;min-width:100%;margin-top:4px}
 svg{max-width:100%;height:auto;display:block}
 svg .title{font:600 13px system-ui,sans-serif;fill:#1c2430}svg .tick{font:10px system-ui,sans-serif;fill:#444}
 table{border-collapse:collapse;background:#fff;border:1px solid #dde2e8;font-variant-numeric:tabular-nums}
 td,th{padding:4px 12px;text-align:right;border-bottom:1px solid #eceff3}th{font-weight:600;background:#f0f2f5}
-td:first-child,th:first-child{text-align:left}
+td:first-child,th:first-child,td.w,th.w{text-align:left}
 .cards{display:flex;flex-wrap:wrap;gap:12px;margin:12px 0}
 .card{background:#fff;border:1px solid #dde2e8;border-radius:6px;padding:10px 16px;min-width:120px}
 .card b{display:block;font-size:21px}.card span{font-size:12px;color:#55606e}
@@ -53,6 +53,18 @@ impl Page {
         let _ = writeln!(self.html, "<p>{}</p>", escape(text));
     }
 
+    /// Sentences one below the other.
+    pub(crate) fn list(&mut self, sentences: &[String]) {
+        if sentences.is_empty() {
+            return;
+        }
+        self.html.push_str("<ul>");
+        for sentence in sentences {
+            let _ = write!(self.html, "<li>{}</li>", escape(sentence));
+        }
+        self.html.push_str("</ul>\n");
+    }
+
     /// Figures side by side, each with a caption.
     pub(crate) fn figures(&mut self, figures: &[(String, String)]) {
         self.html.push_str("<div class=\"figures\">");
@@ -77,16 +89,19 @@ impl Page {
         self.html.push_str("</div>\n");
     }
 
+    /// A table; columns of words are set to the left, those of numbers to the right.
     pub(crate) fn table(&mut self, head: &[&str], rows: &[Vec<String>]) {
+        let words: Vec<bool> = (0..head.len()).map(|column| rows.iter().any(|row| is_word(row.get(column)))).collect();
+        let class = |column: usize| if words.get(column) == Some(&true) { " class=\"w\"" } else { "" };
         self.html.push_str("<table><tr>");
-        for cell in head {
-            let _ = write!(self.html, "<th>{}</th>", escape(cell));
+        for (column, cell) in head.iter().enumerate() {
+            let _ = write!(self.html, "<th{}>{}</th>", class(column), escape(cell));
         }
         self.html.push_str("</tr>\n");
         for row in rows {
             self.html.push_str("<tr>");
-            for cell in row {
-                let _ = write!(self.html, "<td>{}</td>", escape(cell));
+            for (column, cell) in row.iter().enumerate() {
+                let _ = write!(self.html, "<td{}>{}</td>", class(column), escape(cell));
             }
             self.html.push_str("</tr>\n");
         }
@@ -97,4 +112,13 @@ impl Page {
         self.html.push_str("</main></body></html>\n");
         self.html
     }
+}
+
+/// Whether a cell is words rather than a number with its unit.
+fn is_word(cell: Option<&String>) -> bool {
+    cell.is_some_and(|cell| {
+        let letters = cell.chars().filter(|c| c.is_alphabetic()).count();
+        let digits = cell.chars().filter(char::is_ascii_digit).count();
+        cell.chars().next().is_some_and(char::is_alphabetic) || letters > digits
+    })
 }

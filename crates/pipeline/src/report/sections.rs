@@ -105,7 +105,7 @@ fn stages(page: &mut Page, summary: &Summary) -> Result<()> {
             Series { name: "median", colour: CATEGORIES[0], values: gain },
             Series { name: "95 % below", colour: CATEGORIES[1], values: upper },
         ];
-        page.figures(&[(curves(&axes, &sets)?, "On the pixels that no flag excludes at that stage.".to_owned())]);
+        page.figures(&[(curves(&axes, &sets), "On the pixels that no flag excludes at that stage.".to_owned())]);
     }
     Ok(())
 }
@@ -134,12 +134,12 @@ fn errors(page: &mut Page, outcome: &Outcome) -> Result<()> {
     let only = [Series { name: "after, unflagged", colour: CATEGORIES[0], values: after }];
     page.figures(&[
         (
-            histogram(&axes("Before and after"), [-wide, wide], &both)?,
+            histogram(&axes("Before and after"), [-wide, wide], &both),
             "Before: as the camera alone would give it, modulo the ambiguity interval. What lies outside the span is \
              counted in the outermost bins."
                 .to_owned(),
         ),
-        (histogram(&axes("After"), [-narrow, narrow], &only)?, "The same, enlarged.".to_owned()),
+        (histogram(&axes("After"), [-narrow, narrow], &only), "The same, enlarged.".to_owned()),
     ]);
     Ok(())
 }
@@ -353,7 +353,7 @@ fn flags(page: &mut Page, outcome: &Outcome, summary: &Summary) -> Result<()> {
         let high = quantile(&mut sigma.clone(), 0.99);
         let axes = Axes { title: "Standard deviation of the ranges", x: "sigma, mm", y: "% of pixels" };
         let sets = [Series { name: "unflagged", colour: CATEGORIES[2], values: sigma }];
-        page.figures(&[(histogram(&axes, [0.0, high], &sets)?, String::new())]);
+        page.figures(&[(histogram(&axes, [0.0, high], &sets), String::new())]);
     }
     Ok(())
 }

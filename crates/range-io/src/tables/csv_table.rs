@@ -64,6 +64,13 @@ impl Table {
         }
     }
 
+    /// All rows, each read by `read`, with their places.
+    pub fn placed<T>(self, read: impl Fn(&Row) -> Result<T>) -> Result<PlacedRows<T>> {
+        let rows = self.rows().map(|row| read(&row)).collect::<Result<Vec<T>>>()?;
+        let lines = self.records.iter().map(|(line, _)| *line).collect();
+        Ok(PlacedRows { rows, file: self.file, header: self.header, lines })
+    }
+
     pub fn rows(&self) -> impl Iterator<Item = Row<'_>> {
         self.records.iter().map(|(line, record)| Row { table: self, line: *line, record })
     }
@@ -82,6 +89,45 @@ impl Table {
     fn error(&self, line: usize, index: usize, name: &str, reason: impl Into<String>) -> Error {
         let file = self.file.clone();
         Error::Text { file, line, column: index + 1, field: name.to_owned(), reason: reason.into() }
+    }
+}
+
+/// The rows of a table with their places, so that a fault found later can still be named by file, line and column.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PlacedRows<T> {
+    /// The rows in the order of the file.
+    pub rows: Vec<T>,
+    file: PathBuf,
+    header: Vec<String>,
+    lines: Vec<usize>,
+}
+
+impl<T> PlacedRows<T> {
+    /// No rows of a file that is not there.
+    pub fn none(file: impl Into<PathBuf>) -> Self {
+        Self { rows: Vec::new(), file: file.into(), header: Vec::new(), lines: Vec::new() }
+    }
+
+    /// The file.
+    pub fn file(&self) -> &Path {
+        &self.file
+    }
+
+    /// Line of a row, from 1; 0 where there is no such row.
+    pub fn line(&self, row: usize) -> usize {
+        self.lines.get(row).copied().unwrap_or(0)
+    }
+
+    /// What is wrong with a column of a row.
+    pub fn error(&self, row: usize, column: &str, reason: impl Into<String>) -> Error {
+        let index = self.header.iter().position(|name| name == column).unwrap_or(0);
+        Error::Text {
+            file: self.file.clone(),
+            line: self.line(row),
+            column: index + 1,
+            field: column.to_owned(),
+            reason: reason.into(),
+        }
     }
 }
 

@@ -1,6 +1,6 @@
 use std::path::Path;
 
-use super::csv_table::{Columns, Row, Table, text, texts, write};
+use super::csv_table::{Columns, PlacedRows, Row, Table, text, texts, write};
 use crate::{Error, Result};
 
 /// One target seen from one station: `observations.csv`.
@@ -31,7 +31,12 @@ const COLUMNS: Columns = Columns {
 
 /// Reads `observations.csv`. A row must observe an image point or a range.
 pub fn read_observations(path: impl AsRef<Path>) -> Result<Vec<TargetObservation>> {
-    Table::read(path.as_ref(), &COLUMNS)?.rows().map(|row| observation(&row)).collect()
+    Ok(read_placed_observations(path)?.rows)
+}
+
+/// Reads `observations.csv` and keeps the place of each row.
+pub fn read_placed_observations(path: impl AsRef<Path>) -> Result<PlacedRows<TargetObservation>> {
+    Table::read(path.as_ref(), &COLUMNS)?.placed(observation)
 }
 
 fn observation(row: &Row) -> Result<TargetObservation> {

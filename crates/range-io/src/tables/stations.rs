@@ -3,7 +3,7 @@ use std::path::Path;
 use camera_model::{euler_from_pose, pose_from_euler};
 use nalgebra::{Isometry3, Vector3};
 
-use super::csv_table::{Columns, Row, Table, texts, write};
+use super::csv_table::{Columns, PlacedRows, Row, Table, texts, write};
 use crate::Result;
 
 /// The pose of one station: `stations.csv`.
@@ -30,9 +30,14 @@ const COLUMNS: Columns = Columns {
 
 /// Reads `stations.csv`, angles in degrees. A station may stand in one row only.
 pub fn read_stations(path: impl AsRef<Path>) -> Result<Vec<Station>> {
+    Ok(read_placed_stations(path)?.rows)
+}
+
+/// Reads `stations.csv` and keeps the place of each row.
+pub fn read_placed_stations(path: impl AsRef<Path>) -> Result<PlacedRows<Station>> {
     let table = Table::read(path.as_ref(), &COLUMNS)?;
     table.require_unique("station")?;
-    let station = |row: Row| {
+    table.placed(|row| {
         let position = Vector3::from(row.all(POSITION)?);
         let sigma_attitude_deg = row.all_or_none(SIGMA_ATTITUDE, Row::positive)?;
         Ok(Station {
@@ -41,8 +46,7 @@ pub fn read_stations(path: impl AsRef<Path>) -> Result<Vec<Station>> {
             sigma_position_m: row.all_or_none(SIGMA_POSITION, Row::positive)?,
             sigma_attitude_rad: sigma_attitude_deg.map(|sigma| sigma.map(f64::to_radians)),
         })
-    };
-    table.rows().map(station).collect()
+    })
 }
 
 /// Writes `stations.csv`, angles in degrees; the columns of standard deviations where any station has some.

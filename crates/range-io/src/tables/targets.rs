@@ -1,6 +1,6 @@
 use std::path::Path;
 
-use super::csv_table::{Columns, Row, Table, texts, write};
+use super::csv_table::{Columns, PlacedRows, Row, Table, texts, write};
 use crate::Result;
 
 /// One target: `targets.csv`.
@@ -21,16 +21,20 @@ const COLUMNS: Columns =
 
 /// Reads `targets.csv`. A target may stand in one row only.
 pub fn read_targets(path: impl AsRef<Path>) -> Result<Vec<Target>> {
+    Ok(read_placed_targets(path)?.rows)
+}
+
+/// Reads `targets.csv` and keeps the place of each row.
+pub fn read_placed_targets(path: impl AsRef<Path>) -> Result<PlacedRows<Target>> {
     let table = Table::read(path.as_ref(), &COLUMNS)?;
     table.require_unique("target")?;
-    let target = |row: Row| {
+    table.placed(|row| {
         Ok(Target {
             target: row.text("target")?,
             position_m: row.all(POSITION)?,
             sigma_m: row.all_or_none(SIGMA, Row::positive)?,
         })
-    };
-    table.rows().map(target).collect()
+    })
 }
 
 /// Writes `targets.csv`.

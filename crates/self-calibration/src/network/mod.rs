@@ -1,9 +1,27 @@
 //! A calibration network: stations, targets and what was observed between them.
 
+mod auto_terms;
+mod calibrate;
+mod check;
+mod combine;
+mod distribution;
+mod equations;
 mod model;
 mod options;
 mod outcome;
+mod plan;
+mod problem;
+mod quality;
+mod range_step;
+mod reference;
+mod rejection;
+mod report;
+mod simulate;
+mod start;
+mod strength;
+mod terms;
 
+pub use calibrate::{calibrate, calibrate_two_networks};
 pub use model::{
     DistanceEnd, KnownDistance, Network, NetworkTarget, PassiveCamera, PassiveImagePoint, Sighting, Station,
 };
@@ -12,3 +30,5 @@ pub use outcome::{
     AdjustedStation, AdjustedTarget, CalibratedParameter, CalibrationOutcome, Component, GroupQuality,
     ObservationQuality, TermDecision, Verdict,
 };
+pub use plan::{Candidate, CandidateGrid, PlanOptions, PlanOutcome, plan};
+pub use simulate::{SightingOptions, SimulatedStart, simulate_sightings};

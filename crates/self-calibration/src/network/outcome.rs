@@ -97,7 +97,7 @@ pub struct AdjustedTarget {
 }
 
 /// What was observed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Component {
     /// Column of an image point, pixel.
     Col,

@@ -1,0 +1,30 @@
+//! Calibration of a survey: tables or frames in, calibration, tables, summary and report out.
+
+mod calibration_file;
+mod control;
+mod distances;
+mod names;
+mod network_check;
+mod network_files;
+mod passive;
+mod planes;
+mod request;
+mod run;
+mod start;
+mod summary;
+mod tables;
+mod words;
+
+pub use request::{CalibrateMethod, CalibrateRequest, TableDefaults};
+pub use run::calibrate;
+pub use summary::{
+    CalibrationSummary, CorrelationSummary, DecisionSummary, GroupSummary, ParameterMap, ParameterSummary,
+    RejectedObservation,
+};
+
+pub(crate) use control::pose_covariance;
+pub(crate) use distances::named_distances;
+pub(crate) use run::{is_refusal, json};
+pub(crate) use start::Start;
+pub(crate) use summary::unit_of;
+pub(crate) use words::readable;

@@ -1,0 +1,145 @@
+//! One calibration: survey in, results out.
+
+use std::path::Path;
+use std::time::Instant;
+
+use range_io::atomic::{OutputFolder, write_text};
+use range_io::calibration::Calibration;
+use range_io::tables::{write_residuals, write_stations, write_targets};
+use self_calibration::{CalibrationOptions, CalibrationOutcome, Method};
+use serde::Serialize;
+
+use super::network_check::check;
+use super::network_files::{NetworkFiles, read_network};
+use super::request::{CalibrateMethod, CalibrateRequest};
+use super::start::Start;
+use super::summary::CalibrationSummary;
+use super::{calibration_file, planes, tables};
+use crate::progress::Progress;
+use crate::{Error, Result, report};
+
+/// Calibrates a survey and writes the results into the request's output folder.
+///
+/// # Errors
+/// [`Error::Refused`] where the survey does not determine what was asked for: then the output folder holds a
+/// `summary.json` with the diagnosis and nothing else. Every other error leaves no output.
+pub fn calibrate(request: &CalibrateRequest, progress: &dyn Progress) -> Result<CalibrationSummary> {
+    let clock = Instant::now();
+    let survey = request.survey.display().to_string();
+    let (start, outcome) = match request.method {
+        CalibrateMethod::Network(network_method) => calibrate_networks(request, network_method, progress)?,
+        CalibrateMethod::Planes => planes::calibrate_planes(request, progress)?,
+    };
+    let finish = |mut summary: CalibrationSummary| {
+        summary.seconds = clock.elapsed().as_secs_f64();
+        summary.out.clone_from(&request.out);
+        summary
+    };
+    match outcome {
+        Err(source) if !is_refusal(&source) => Err(Error::Calibrate(source)),
+        Ok(outcome) => {
+            let summary = finish(CalibrationSummary::new(survey, request.method, start.words.clone(), &outcome));
+            write(&request.out, &start, &outcome, &summary, progress)?;
+            progress.finish();
+            Ok(summary)
+        }
+        Err(source) => {
+            let reason = source.to_string();
+            let summary = finish(CalibrationSummary::refused(survey, request.method, start.words, reason));
+            let text = json(&summary)?;
+            let folder = OutputFolder::create(&request.out)?;
+            write_text(folder.file("summary.json")?, &text)?;
+            folder.commit()?;
+            progress.finish();
+            Err(Error::Refused { summary: text, source })
+        }
+    }
+}
+
+/// Whether the survey is in order but does not determine what was asked for, which is a finding and not a slip.
+pub(crate) fn is_refusal(error: &self_calibration::Error) -> bool {
+    use self_calibration::Error as Cause;
+    matches!(
+        error,
+        Cause::WeakNetwork { .. }
+            | Cause::NotDetermined { .. }
+            | Cause::TooFewDifferences { .. }
+            | Cause::NoHyperbola { .. }
+            | Cause::NotReachable { .. }
+            | Cause::Orientation(_)
+            | Cause::Adjust(_)
+            | Cause::Model(_)
+    )
+}
+
+/// Start values and what the adjustment said of them.
+pub(super) type Attempt = (Start, std::result::Result<CalibrationOutcome, self_calibration::Error>);
+
+fn calibrate_networks(request: &CalibrateRequest, method: Method, progress: &dyn Progress) -> Result<Attempt> {
+    progress.begin("read survey", 1);
+    let files = read_network(&request.survey, request.calibration.as_deref(), &request.defaults)?;
+    let options = CalibrationOptions { method, ..request.options.clone() };
+    check_station_names(&files, &options)?;
+    let outcome = if method == Method::TwoStepIndependent {
+        let Some(folder) = &request.lens_survey else {
+            let message = "the two-step independent method calibrates the lens from another survey: name it with \
+                           --lens-survey"
+                .to_owned();
+            return Err(Error::Survey { path: request.survey.clone(), message });
+        };
+        let lens = read_network(folder, request.calibration.as_deref(), &request.defaults)?;
+        check(&lens, Method::TwoStepDependent, options.datum)?;
+        progress.begin("adjust networks", 2);
+        self_calibration::calibrate_two_networks(&lens.network, &files.network, &options)
+    } else {
+        check(&files, method, options.datum)?;
+        progress.begin("adjust network", 2);
+        self_calibration::calibrate(&files.network, &options)
+    };
+    progress.advance(2);
+    Ok((files.start, outcome))
+}
+
+/// A name that no station has would silently leave nothing out.
+fn check_station_names(files: &NetworkFiles, options: &CalibrationOptions) -> Result<()> {
+    let stations = &files.network.stations;
+    match options.without_ranges.iter().find(|name| !stations.iter().any(|station| station.name == **name)) {
+        None => Ok(()),
+        Some(unknown) => {
+            let names: Vec<&str> = stations.iter().map(|station| station.name.as_str()).collect();
+            let message = format!("--without-ranges: there is no station `{unknown}`, only {}", names.join(", "));
+            Err(Error::Survey { path: files.observations.file().to_owned(), message })
+        }
+    }
+}
+
+fn write(
+    out: &Path,
+    start: &Start,
+    outcome: &CalibrationOutcome,
+    summary: &CalibrationSummary,
+    progress: &dyn Progress,
+) -> Result<()> {
+    progress.begin("write results", 6);
+    let folder = OutputFolder::create(out)?;
+    let calibration = calibration_file::calibration(outcome, start, &summary.survey, summary.method)?;
+    calibration.write(folder.file(Calibration::FILE_NAME)?)?;
+    progress.advance(1);
+    write_stations(folder.file("adjusted_stations.csv")?, &tables::stations(outcome))?;
+    progress.advance(2);
+    write_targets(folder.file("adjusted_targets.csv")?, &tables::targets(outcome))?;
+    progress.advance(3);
+    write_residuals(folder.file("residuals.csv")?, &tables::residuals(outcome))?;
+    progress.advance(4);
+    write_text(folder.file("summary.json")?, &json(summary)?)?;
+    progress.advance(5);
+    write_text(folder.file("report.html")?, &report::render_calibration(outcome, summary)?)?;
+    progress.advance(6);
+    Ok(folder.commit()?)
+}
+
+/// A summary as the text of its file.
+pub(crate) fn json<T: Serialize>(summary: &T) -> Result<String> {
+    serde_json::to_string_pretty(summary)
+        .map_err(|error| Error::Figure { figure: "summary.json".to_owned(), message: error.to_string() })
+}

@@ -1,0 +1,70 @@
+//! Start values: the survey's nominal camera, or a calibration.
+
+use std::path::Path;
+
+use camera_model::Camera;
+use error_models::RangeErrorModel;
+use range_image::Modulation;
+use range_io::calibration::Calibration;
+use range_io::survey::Survey;
+
+use crate::load::{calibrated, read_calibration};
+use crate::{Error, Result};
+
+/// What a calibration starts from and what it came from.
+#[derive(Debug, Clone)]
+pub(crate) struct Start {
+    pub(crate) camera: Camera,
+    pub(crate) range_model: RangeErrorModel,
+    pub(crate) modulation: Modulation,
+    /// The calibration that gave the values, in full: what is not estimated (noise, scattering) is handed on.
+    pub(crate) calibration: Option<Calibration>,
+    pub(crate) words: String,
+}
+
+impl Start {
+    /// Start values of a survey; `named` wins over the `calibration.ron` beside it.
+    pub(crate) fn read(survey: &Survey, root: &Path, named: Option<&Path>) -> Result<Self> {
+        let modulation = only_modulation(survey, root)?;
+        let nominal = survey.camera.nominal_camera()?;
+        let (calibration, words) = read_calibration(root, named)?;
+        let words = if calibration.is_some() { words } else { "the survey's nominal camera".to_owned() };
+        let camera = match &calibration {
+            Some(calibration) => calibrated(calibration, &nominal)?,
+            None => nominal,
+        };
+        let range_model = match &calibration {
+            Some(calibration) => range_model_of(calibration, modulation)?,
+            None => error_free(modulation),
+        };
+        Ok(Self { camera, range_model, modulation, calibration, words })
+    }
+}
+
+/// The ranges of a table belong to one frequency: with several it would not be known to which.
+fn only_modulation(survey: &Survey, root: &Path) -> Result<Modulation> {
+    match survey.camera.modulations()?.as_slice() {
+        [modulation] => Ok(*modulation),
+        several => Err(Error::Survey {
+            path: root.join(Survey::FILE_NAME),
+            message: format!(
+                "`camera.modulation_hz` has {} frequencies, expected one: \
+                 each has range terms of its own and is calibrated by itself",
+                several.len()
+            ),
+        }),
+    }
+}
+
+fn error_free(modulation: Modulation) -> RangeErrorModel {
+    RangeErrorModel::error_free(modulation.ambiguity_interval_m())
+}
+
+/// The first model of the frequency; without one, no range error is known.
+fn range_model_of(calibration: &Calibration, modulation: Modulation) -> Result<RangeErrorModel> {
+    let interval = modulation.ambiguity_interval_m();
+    let models = calibration.model_set()?;
+    let mut all = models.entries.into_iter().flat_map(|(_, models)| models);
+    let same = |model: &RangeErrorModel| (model.ambiguity_interval_m / interval - 1.0).abs() < 1e-9;
+    Ok(all.find(same).unwrap_or_else(|| error_free(modulation)))
+}

@@ -1,0 +1,330 @@
+//! Every figure of a calibration, by name: `summary.json`.
+
+use std::path::PathBuf;
+
+use error_models::ParameterStatus;
+use nalgebra::DMatrix;
+use self_calibration::{CalibratedParameter, CalibrationOutcome, Verdict};
+use serde::Serialize;
+use serde::ser::{SerializeMap, Serializer};
+
+use super::names::group_unit;
+use super::request::CalibrateMethod;
+
+/// Names and units of the parameters that a summary always has, in its order.
+pub(crate) const PARAMETERS: [(&str, &str); 20] = [
+    ("xp", "mm"),
+    ("yp", "mm"),
+    ("c", "mm"),
+    ("k1", "1/mm^2"),
+    ("k2", "1/mm^4"),
+    ("k3", "1/mm^6"),
+    ("p1", "1/mm"),
+    ("p2", "1/mm"),
+    ("d0", "m"),
+    ("d2", "m"),
+    ("d3", "m"),
+    ("d4", "m"),
+    ("d5", "m"),
+    ("d6", "m"),
+    ("d7", "m"),
+    ("e1", "m/mm"),
+    ("e2", "m/mm"),
+    ("h1", "1/amplitude"),
+    ("h2", "1/(m*amplitude)"),
+    ("h3", "1/m^2"),
+];
+
+/// The unit of a parameter as `calibration.ron` writes it, whatever spelling an outcome has.
+pub(crate) fn unit_of<'a>(name: &str, otherwise: &'a str) -> &'a str {
+    let name = name.split('@').next().unwrap_or(name);
+    PARAMETERS.iter().find(|(known, _)| *known == name).map_or(otherwise, |(_, unit)| unit)
+}
+
+/// What a calibration found and how good it is.
+#[derive(Debug, Clone, Serialize)]
+pub struct CalibrationSummary {
+    /// The survey's folder.
+    pub survey: String,
+    /// Method.
+    pub method: &'static str,
+    /// What the method does.
+    #[serde(skip)]
+    pub describe: &'static str,
+    /// Where the start values came from.
+    pub start: String,
+    /// Observed values used.
+    pub observations: usize,
+    /// Unknowns.
+    pub unknowns: usize,
+    /// Inner constraints.
+    pub datum_defect: usize,
+    /// Observed values and inner constraints minus unknowns.
+    pub redundancy: i64,
+    /// vᵀPv; `None` where the calibration was refused.
+    pub vtpv: Option<f64>,
+    /// Posterior standard deviation of unit weight; `None` without redundancy or where the calibration was refused.
+    pub sigma0: Option<f64>,
+    /// Iterations of the final adjustment.
+    pub iterations: usize,
+    /// Whether there is a result to trust; without one there are no parameters either.
+    pub converged: bool,
+    /// All parameters, estimated and held, by name; empty where the calibration was refused.
+    pub parameters: ParameterMap,
+    /// Correlations of the estimated parameters.
+    pub correlation: CorrelationSummary,
+    /// Observed values rejected as gross errors.
+    pub rejected: Vec<RejectedObservation>,
+    /// What is weakly determined and what would cure it; why the calibration was refused.
+    pub diagnosis: Vec<String>,
+    /// Observation groups.
+    pub groups: Vec<GroupSummary>,
+    /// Decisions of the automatic choice of terms.
+    pub decisions: Vec<DecisionSummary>,
+    /// Wall-clock time of the whole run, second.
+    pub seconds: f64,
+    /// The output folder.
+    pub out: PathBuf,
+}
+
+/// One parameter.
+#[derive(Debug, Clone, Serialize)]
+pub struct ParameterSummary {
+    /// Value in [`Self::unit`].
+    pub value: f64,
+    /// Standard deviation from the a-priori deviations of the observations; 0 where held.
+    pub sigma_prior: f64,
+    /// The same scaled with sigma0; NaN (null in the file) without redundancy.
+    pub sigma_posterior: f64,
+    /// Unit.
+    pub unit: String,
+    /// `estimated` or `held`.
+    pub status: &'static str,
+}
+
+/// Parameters by name, in the order of the model and not of the alphabet.
+#[derive(Debug, Clone, Default)]
+pub struct ParameterMap(pub Vec<(String, ParameterSummary)>);
+
+impl ParameterMap {
+    /// A parameter by its name.
+    pub fn get(&self, name: &str) -> Option<&ParameterSummary> {
+        self.0.iter().find(|(known, _)| known == name).map(|(_, parameter)| parameter)
+    }
+
+    pub(crate) fn new(parameters: &[CalibratedParameter]) -> Self {
+        let entry = |parameter: &CalibratedParameter| {
+            let summary = ParameterSummary {
+                value: parameter.value,
+                sigma_prior: parameter.sigma_prior,
+                sigma_posterior: parameter.sigma_posterior,
+                unit: unit_of(&parameter.name, &parameter.unit).to_owned(),
+                status: status_name(parameter.status),
+            };
+            (parameter.name.clone(), summary)
+        };
+        let find = |name: &str| parameters.iter().find(|parameter| parameter.name == name);
+        let absent = |unit: &str| ParameterSummary {
+            value: 0.0,
+            sigma_prior: 0.0,
+            sigma_posterior: 0.0,
+            unit: unit.to_owned(),
+            status: status_name(ParameterStatus::Held),
+        };
+        let always = PARAMETERS.iter().map(|(name, unit)| match find(name) {
+            Some(parameter) => entry(parameter),
+            None => ((*name).to_owned(), absent(unit)),
+        });
+        let further = parameters.iter().filter(|p| !PARAMETERS.iter().any(|(name, _)| *name == p.name)).map(entry);
+        Self(always.chain(further).collect())
+    }
+}
+
+impl Serialize for ParameterMap {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut map = serializer.serialize_map(Some(self.0.len()))?;
+        for (name, parameter) in &self.0 {
+            map.serialize_entry(name, parameter)?;
+        }
+        map.end()
+    }
+}
+
+/// `estimated` or `held`.
+pub(crate) fn status_name(status: ParameterStatus) -> &'static str {
+    match status {
+        ParameterStatus::Estimated => "estimated",
+        ParameterStatus::Held => "held",
+    }
+}
+
+/// Names and the matrix row by row.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct CorrelationSummary {
+    /// Estimated parameters.
+    pub names: Vec<String>,
+    /// Rows in the order of the names.
+    pub matrix: Vec<Vec<f64>>,
+}
+
+impl CorrelationSummary {
+    pub(crate) fn new(names: &[String], covariance: &DMatrix<f64>) -> Self {
+        let n = names.len().min(covariance.nrows()).min(covariance.ncols());
+        let element = |i: usize, j: usize| {
+            if i == j {
+                return 1.0;
+            }
+            // Rounding must not carry a correlation beyond 1, nor make the matrix asymmetric.
+            let mean = f64::midpoint(covariance[(i, j)], covariance[(j, i)]);
+            (mean / (covariance[(i, i)] * covariance[(j, j)]).sqrt()).clamp(-1.0, 1.0)
+        };
+        let matrix = (0..n).map(|i| (0..n).map(|j| element(i, j)).collect()).collect();
+        Self { names: names[..n].to_vec(), matrix }
+    }
+}
+
+/// An observed value that was rejected.
+#[derive(Debug, Clone, Serialize)]
+pub struct RejectedObservation {
+    /// Station.
+    pub station: String,
+    /// Target.
+    pub target: String,
+    /// Component.
+    pub component: &'static str,
+    /// Observed value in [`Self::unit`].
+    pub observed: f64,
+    /// Observed minus predicted, same unit.
+    pub residual: f64,
+    /// Residual over its standard deviation; NaN (null in the file) where the test states none for what it rejected.
+    pub standardised_residual: f64,
+    /// Residual over the a-priori standard deviation of the observation.
+    pub residual_in_sigmas: f64,
+    /// Unit of the component.
+    pub unit: &'static str,
+}
+
+/// An observation group.
+#[derive(Debug, Clone, Serialize)]
+pub struct GroupSummary {
+    /// Name.
+    pub name: String,
+    /// Observed values.
+    pub observations: usize,
+    /// Part of the redundancy.
+    pub redundancy: f64,
+    /// Root mean square of the residuals, in [`Self::unit`].
+    pub rms: f64,
+    /// Unit.
+    pub unit: &'static str,
+    /// How much larger its standard deviations are than they were given.
+    pub sigma0: Option<f64>,
+}
+
+/// A decision of the automatic choice of terms.
+#[derive(Debug, Clone, Serialize)]
+pub struct DecisionSummary {
+    /// Terms decided on together.
+    pub terms: Vec<String>,
+    /// Whether they are estimated.
+    pub taken: bool,
+    /// p-value of their joint significance.
+    pub significance_p: f64,
+    /// Change of Schwarz's criterion; negative speaks for them.
+    pub delta_bic: f64,
+    /// The reason.
+    pub reason: String,
+}
+
+impl CalibrationSummary {
+    /// The figures of an outcome.
+    pub(crate) fn new(survey: String, method: CalibrateMethod, start: String, outcome: &CalibrationOutcome) -> Self {
+        Self {
+            survey,
+            method: method.name(),
+            describe: method.describe(),
+            start,
+            observations: outcome.observations,
+            unknowns: outcome.unknowns,
+            datum_defect: outcome.datum_defect,
+            redundancy: outcome.redundancy,
+            vtpv: Some(outcome.vtpv),
+            sigma0: outcome.sigma0,
+            iterations: outcome.trace.len(),
+            converged: true,
+            parameters: ParameterMap::new(&outcome.parameters),
+            correlation: CorrelationSummary::new(&outcome.estimated, &outcome.covariance),
+            rejected: rejected(outcome),
+            diagnosis: outcome.diagnosis.clone(),
+            groups: groups(outcome),
+            decisions: decisions(outcome),
+            seconds: 0.0,
+            out: PathBuf::new(),
+        }
+    }
+
+    /// What is left to say where a calibration was refused: why, and no parameter.
+    pub(crate) fn refused(survey: String, method: CalibrateMethod, start: String, reason: String) -> Self {
+        Self {
+            survey,
+            method: method.name(),
+            describe: method.describe(),
+            start,
+            observations: 0,
+            unknowns: 0,
+            datum_defect: 0,
+            redundancy: 0,
+            vtpv: None,
+            sigma0: None,
+            iterations: 0,
+            converged: false,
+            parameters: ParameterMap::default(),
+            correlation: CorrelationSummary::default(),
+            rejected: Vec::new(),
+            diagnosis: vec![reason],
+            groups: Vec::new(),
+            decisions: Vec::new(),
+            seconds: 0.0,
+            out: PathBuf::new(),
+        }
+    }
+}
+
+fn rejected(outcome: &CalibrationOutcome) -> Vec<RejectedObservation> {
+    let gross = outcome.residuals.iter().filter(|quality| quality.verdict == Verdict::Rejected);
+    gross
+        .map(|quality| RejectedObservation {
+            station: quality.station.clone(),
+            target: quality.target.clone(),
+            component: quality.component.name(),
+            observed: quality.observed,
+            residual: quality.residual,
+            standardised_residual: quality.standardised,
+            residual_in_sigmas: quality.residual / quality.sigma,
+            unit: group_unit(quality.component.name()),
+        })
+        .collect()
+}
+
+fn groups(outcome: &CalibrationOutcome) -> Vec<GroupSummary> {
+    let group = |group: &self_calibration::GroupQuality| GroupSummary {
+        name: group.name.clone(),
+        observations: group.observations,
+        redundancy: group.redundancy,
+        rms: group.rms,
+        unit: group_unit(&group.name),
+        sigma0: group.sigma0,
+    };
+    outcome.groups.iter().map(group).collect()
+}
+
+fn decisions(outcome: &CalibrationOutcome) -> Vec<DecisionSummary> {
+    let decision = |decision: &self_calibration::TermDecision| DecisionSummary {
+        terms: decision.terms.clone(),
+        taken: decision.taken,
+        significance_p: decision.significance_p,
+        delta_bic: decision.delta_bic,
+        reason: decision.reason.clone(),
+    };
+    outcome.decisions.iter().map(decision).collect()
+}

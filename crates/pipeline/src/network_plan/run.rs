@@ -1,0 +1,58 @@
+//! One plan: tables in, expected quality out.
+
+use std::path::PathBuf;
+
+use range_io::atomic::{OutputFolder, write_text};
+use self_calibration::PlanOptions;
+
+use super::files::read_plan;
+use super::summary::PlanSummary;
+use crate::calibrate::{is_refusal, json};
+use crate::progress::Progress;
+use crate::{Error, Result, report};
+
+/// What to plan.
+#[derive(Debug, Clone)]
+pub struct NetworkPlanRequest {
+    /// Folder with `survey.ron`, `stations.csv` and `targets.csv`.
+    pub survey: PathBuf,
+    /// Calibration that stands for the camera; `None`: `calibration.ron` beside the survey, or the nominal camera.
+    pub calibration: Option<PathBuf>,
+    /// Noise, terms, datum, candidates.
+    pub options: PlanOptions,
+    /// Output folder; written beside and renamed when everything is done.
+    pub out: PathBuf,
+}
+
+/// Plans a network and writes `summary.json` and `report.html`.
+///
+/// # Errors
+/// [`Error::Refused`] where the network does not determine the calibration at all: then the output folder holds a
+/// `summary.json` with the diagnosis and nothing else. Every other error leaves no output.
+pub fn plan_network(request: &NetworkPlanRequest, progress: &dyn Progress) -> Result<PlanSummary> {
+    progress.begin("plan network", 2);
+    let (network, start) = read_plan(&request.survey, request.calibration.as_deref())?;
+    let survey = request.survey.display().to_string();
+    let planned = self_calibration::plan(&network, &request.options);
+    progress.advance(1);
+    let folder = OutputFolder::create(&request.out)?;
+    let outcome = match planned {
+        Ok(outcome) => outcome,
+        Err(source) if is_refusal(&source) => {
+            let summary = PlanSummary::refused(survey, start.words, source.to_string(), &request.out);
+            let text = json(&summary)?;
+            write_text(folder.file("summary.json")?, &text)?;
+            folder.commit()?;
+            progress.finish();
+            return Err(Error::Refused { summary: text, source });
+        }
+        Err(source) => return Err(Error::Calibrate(source)),
+    };
+    let summary = PlanSummary::new(survey, start.words, &outcome, request);
+    write_text(folder.file("summary.json")?, &json(&summary)?)?;
+    write_text(folder.file("report.html")?, &report::render_plan(&network, &outcome, &summary)?)?;
+    folder.commit()?;
+    progress.advance(2);
+    progress.finish();
+    Ok(summary)
+}

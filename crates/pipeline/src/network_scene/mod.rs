@@ -1,0 +1,7 @@
+//! Calibration networks as RON data: where targets and stations stand, what is true, how it is observed.
+
+mod simulate;
+mod spec;
+
+pub use simulate::simulate_network;
+pub use spec::{FieldSpec, NetworkScene, PassiveSpec, SceneStation, SceneTarget, SightingSpec};

@@ -1,0 +1,165 @@
+//! What can be typed behind `rangecam calibrate`.
+
+use std::path::{Path, PathBuf};
+
+use clap::{Args, ValueEnum};
+use pipeline::{
+    CalibrateMethod, CalibrateRequest, CalibrationOptions, Method, NetworkDatum, TableDefaults, TermSelection,
+};
+
+/// Arguments of a calibration.
+#[derive(Debug, Args)]
+pub(crate) struct CalibrateArguments {
+    /// Folder with survey.ron and observations.csv (for planes: frames, stations.csv and planes.csv).
+    survey: PathBuf,
+    /// How to calibrate.
+    #[arg(long, short, value_enum, default_value_t = MethodName::OneStep)]
+    method: MethodName,
+    /// Terms to estimate, separated by commas (xp,yp,c,k1,k2,k3,p1,p2,d0,d2,...,d7,e1,e2,h1,h2,h3), all others being
+    /// held at their start values; or `auto`: chosen by significance and information criterion.
+    #[arg(long, default_value = "auto", value_name = "LIST|auto")]
+    terms: String,
+    /// What carries the datum: inner constraints on the targets, or the standard deviations in targets.csv and
+    /// stations.csv.
+    #[arg(long, value_enum, default_value_t = DatumName::Free)]
+    datum: DatumName,
+    /// Output folder; default: out/<name of the survey>-calibration.
+    #[arg(long, short)]
+    out: Option<PathBuf>,
+    /// calibration.ron with start values; default: the one beside survey.ron, or else the nominal camera.
+    #[arg(long, short, value_name = "FILE")]
+    calibration: Option<PathBuf>,
+    /// Survey that the lens is calibrated from, for two-step-independent.
+    #[arg(long, value_name = "DIR")]
+    lens_survey: Option<PathBuf>,
+    /// How the passive camera of a joint setup takes part.
+    #[arg(long, value_enum, default_value_t = JointName::Integrated)]
+    joint: JointName,
+    /// Stations whose ranges are left out, such as convergent ones whose ranges scattering would bias: S03,S04.
+    #[arg(long, value_delimiter = ',', value_name = "STATIONS")]
+    without_ranges: Vec<String>,
+    /// Significance level of the outlier test, or `none`: nothing is rejected.
+    #[arg(long, default_value = "0.001", value_name = "LEVEL|none", value_parser = level)]
+    reject: Level,
+    /// Largest growth of a standard deviation by correlations before the network is refused as too weak.
+    #[arg(long, value_name = "FACTOR")]
+    largest_inflation: Option<f64>,
+    /// Standard deviation of a column or row where observations.csv gives none, pixel.
+    #[arg(long, value_name = "PIXEL", value_parser = positive)]
+    sigma_pixel: Option<f64>,
+    /// Standard deviation of a range where observations.csv gives none, metre.
+    #[arg(long, value_name = "METRE", value_parser = positive)]
+    sigma_range: Option<f64>,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum MethodName {
+    /// Lens, range terms, poses and targets in one adjustment.
+    OneStep,
+    /// Lens from the image points of --lens-survey, range terms from the ranges of SURVEY.
+    TwoStepIndependent,
+    /// Lens and poses from the image points, then range terms from the ranges of the same survey.
+    TwoStepDependent,
+    /// With a passive camera mounted beside the range camera (folder passive); see --joint.
+    Joint,
+    /// Range terms from known distances (distances.csv).
+    Laboratory,
+    /// Range terms from frames of known planes (planes.csv).
+    Planes,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum JointName {
+    /// Poses from the passive camera first, then lens and range terms.
+    TwoStep,
+    /// Both cameras in one adjustment.
+    Integrated,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub(crate) enum DatumName {
+    /// Inner constraints on the targets.
+    Free,
+    /// Targets or stations with standard deviations.
+    Control,
+}
+
+impl DatumName {
+    pub(crate) fn datum(self) -> NetworkDatum {
+        match self {
+            Self::Free => NetworkDatum::Free,
+            Self::Control => NetworkDatum::Control,
+        }
+    }
+}
+
+/// Level of a test, or that there is none.
+#[derive(Debug, Clone, Copy)]
+struct Level(Option<f64>);
+
+fn level(text: &str) -> Result<Level, String> {
+    if text == "none" {
+        return Ok(Level(None));
+    }
+    match text.parse::<f64>() {
+        Ok(level) if level > 0.0 && level < 1.0 => Ok(Level(Some(level))),
+        _ => Err("expected a probability between 0 and 1, or `none`".to_owned()),
+    }
+}
+
+pub(crate) fn positive(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value > 0.0 && value.is_finite() => Ok(value),
+        _ => Err("expected a positive number".to_owned()),
+    }
+}
+
+impl CalibrateArguments {
+    /// The request behind the arguments.
+    pub(crate) fn request(self) -> CalibrateRequest {
+        let method = match (self.method, self.joint) {
+            (MethodName::OneStep, _) => CalibrateMethod::Network(Method::OneStep),
+            (MethodName::TwoStepIndependent, _) => CalibrateMethod::Network(Method::TwoStepIndependent),
+            (MethodName::TwoStepDependent, _) => CalibrateMethod::Network(Method::TwoStepDependent),
+            (MethodName::Joint, JointName::TwoStep) => CalibrateMethod::Network(Method::JointTwoStep),
+            (MethodName::Joint, JointName::Integrated) => CalibrateMethod::Network(Method::JointIntegrated),
+            (MethodName::Laboratory, _) => CalibrateMethod::Network(Method::Laboratory),
+            (MethodName::Planes, _) => CalibrateMethod::Planes,
+        };
+        let out = default_out(&self.survey, "-calibration");
+        let standard = CalibrationOptions::default();
+        let options = CalibrationOptions {
+            terms: terms(&self.terms),
+            datum: self.datum.datum(),
+            without_ranges: self.without_ranges,
+            rejection_level: self.reject.0,
+            largest_inflation: self.largest_inflation.unwrap_or(standard.largest_inflation),
+            ..standard
+        };
+        CalibrateRequest {
+            survey: self.survey,
+            lens_survey: self.lens_survey,
+            calibration: self.calibration,
+            method,
+            options,
+            defaults: TableDefaults { sigma_pixel: self.sigma_pixel, sigma_range_m: self.sigma_range },
+            out: self.out.unwrap_or(out),
+        }
+    }
+}
+
+/// `auto`, or names between commas or blanks.
+pub(crate) fn terms(text: &str) -> TermSelection {
+    if text.trim() == "auto" {
+        return TermSelection::Auto;
+    }
+    let names = text.split([',', ' ']).map(str::trim).filter(|name| !name.is_empty());
+    TermSelection::List(names.map(str::to_owned).collect())
+}
+
+/// `out/<name of the survey><ending>`.
+pub(crate) fn default_out(survey: &Path, ending: &str) -> PathBuf {
+    let mut name = survey.file_name().unwrap_or_default().to_owned();
+    name.push(ending);
+    Path::new("out").join(name)
+}

@@ -1,0 +1,263 @@
+//! The automatic choice of terms.
+
+use std::collections::BTreeSet;
+
+use nalgebra::{DMatrix, DVector};
+
+use super::calibrate::{Problem, all_terms};
+use super::distribution::fisher_tail;
+use super::{CalibrationOutcome, TermDecision};
+use crate::{Error, Result};
+
+/// Terms that are decided on together, in the order in which they are given up where a network cannot tell them apart.
+/// The wave of length U comes first: it correlates with d0 and makes that many times less certain.
+const GROUPS: [&[&str]; 9] = [
+    &["d2", "d3"],
+    &["h1", "h2", "h3"],
+    &["k3"],
+    &["k2"],
+    &["p1", "p2"],
+    &["d4", "d5"],
+    &["d6", "d7"],
+    &["e1", "e2"],
+    &["k1"],
+];
+/// Probability of error at which a group is significant.
+const LEVEL: f64 = 0.01;
+/// The same for the wave of length U.
+const LEVEL_OF_LONG_WAVE: f64 = 0.001;
+
+/// Calibrates with the terms that the observations speak for.
+///
+/// All are estimated first; what the network cannot tell apart is given up. Then the group that speaks least for itself
+/// leaves, one after the other: with the estimate x of the group and its covariance, `xᵀ Q⁻¹ x` is what vᵀPv would grow
+/// by. A group stays if that is significant (F test) and lowers Schwarz's criterion. At last each that left is tried once
+/// more with those that stayed. Principal point, principal distance and d0 are always estimated.
+pub(crate) fn choose(problem: &Problem<'_>) -> Result<CalibrationOutcome> {
+    let mut terms = all_terms(problem.network, problem.options.method);
+    let mut decisions = Vec::new();
+    let mut outcome = determined(problem, &mut terms, &mut decisions)?;
+    let mut left: Vec<(&[&str], TermDecision)> = Vec::new();
+    let mut current = Wald::new(&outcome);
+    while let Some((group, test)) = current.weakest_group(&terms) {
+        if test.stays(group) {
+            break;
+        }
+        left.push((group, decision(group, false, &test, &current.offset_gain(group))));
+        current = current.without(group);
+        group.iter().for_each(|name| {
+            terms.remove(*name);
+        });
+    }
+    if !left.is_empty() {
+        outcome = problem.run(&terms)?;
+        outcome = readmitted(problem, &mut terms, &mut left, outcome)?;
+    }
+    let current = Wald::new(&outcome);
+    for group in GROUPS.iter().filter(|group| terms.contains(group[0])) {
+        if let Some(test) = current.test(group) {
+            decisions.push(decision(group, true, &test, &current.offset_gain(group)));
+        }
+    }
+    decisions.extend(left.into_iter().map(|(_, decision)| decision));
+    outcome.decisions = decisions;
+    Ok(outcome)
+}
+
+/// Calibrates with as many terms as the network can tell apart.
+fn determined(
+    problem: &Problem<'_>,
+    terms: &mut BTreeSet<String>,
+    decisions: &mut Vec<TermDecision>,
+) -> Result<CalibrationOutcome> {
+    loop {
+        let error = match problem.run(terms) {
+            Ok(outcome) => return Ok(outcome),
+            Err(error) => error,
+        };
+        let Error::WeakNetwork { combination, inflation, .. } = &error else { return Err(error) };
+        // The first group that takes part in the combination; the wave of length U whenever d0 does.
+        let takes_part = |group: &&&[&str]| {
+            terms.contains(group[0])
+                && (group.iter().any(|name| names(combination, name)) || group[0] == "d2" && names(combination, "d0"))
+        };
+        let Some(group) = GROUPS.iter().find(takes_part) else { return Err(error) };
+        decisions.push(TermDecision {
+            terms: group.iter().map(ToString::to_string).collect(),
+            taken: false,
+            significance_p: f64::NAN,
+            delta_bic: f64::NAN,
+            reason: format!(
+                "the network cannot tell {} from other parameters ({combination}; inflation {inflation:.0})",
+                group.join(", ")
+            ),
+        });
+        group.iter().for_each(|name| {
+            terms.remove(*name);
+        });
+    }
+}
+
+/// Whether a combination in words names a parameter.
+fn names(combination: &str, name: &str) -> bool {
+    combination.split([' ', ';']).any(|word| word.split('@').next() == Some(name))
+}
+
+/// Tries the groups that left once more.
+fn readmitted(
+    problem: &Problem<'_>,
+    terms: &mut BTreeSet<String>,
+    left: &mut Vec<(&'static [&'static str], TermDecision)>,
+    mut outcome: CalibrationOutcome,
+) -> Result<CalibrationOutcome> {
+    let mut still = Vec::new();
+    for (group, mut decided) in std::mem::take(left) {
+        let mut more = terms.clone();
+        more.extend(group.iter().map(ToString::to_string));
+        match problem.run(&more) {
+            Ok(found) => {
+                let wald = Wald::new(&found);
+                let Some(test) = wald.test(group) else { continue };
+                if test.stays(group) {
+                    (*terms, outcome) = (more, found);
+                    continue;
+                }
+                decided = decision(group, false, &test, &wald.offset_gain(group));
+            }
+            Err(Error::WeakNetwork { .. }) => {}
+            Err(error) => return Err(error),
+        }
+        still.push((group, decided));
+    }
+    *left = still;
+    Ok(outcome)
+}
+
+/// Test of a group.
+struct Test {
+    p: f64,
+    delta_bic: f64,
+}
+
+impl Test {
+    fn stays(&self, group: &[&str]) -> bool {
+        let level = if group[0] == "d2" { LEVEL_OF_LONG_WAVE } else { LEVEL };
+        self.p < level && self.delta_bic < 0.0
+    }
+}
+
+fn decision(group: &[&str], taken: bool, test: &Test, offset_gain: &str) -> TermDecision {
+    let verdict = if taken { "significant" } else { "not significant enough" };
+    let criterion = if test.delta_bic < 0.0 { "for" } else { "against" };
+    TermDecision {
+        terms: group.iter().map(ToString::to_string).collect(),
+        taken,
+        significance_p: test.p,
+        delta_bic: test.delta_bic,
+        reason: format!(
+            "{verdict}: p = {:.2e}, and Schwarz's criterion speaks {criterion} it ({:+.1}){offset_gain}",
+            test.p, test.delta_bic
+        ),
+    }
+}
+
+/// Estimates with their covariance, from which parameters can be taken away as if they had been held at zero.
+struct Wald {
+    names: Vec<String>,
+    values: DVector<f64>,
+    covariance: DMatrix<f64>,
+    observations: f64,
+    redundancy: f64,
+    vtpv: f64,
+}
+
+impl Wald {
+    fn new(outcome: &CalibrationOutcome) -> Self {
+        let value = |name: &String| outcome.parameter(name).map_or(f64::NAN, |parameter| parameter.value);
+        Self {
+            names: outcome.estimated.clone(),
+            values: DVector::from_iterator(outcome.estimated.len(), outcome.estimated.iter().map(value)),
+            covariance: outcome.covariance.clone(),
+            observations: outcome.observations as f64,
+            redundancy: outcome.redundancy as f64,
+            vtpv: outcome.vtpv,
+        }
+    }
+
+    /// Places of a group, those of all integration times.
+    fn places(&self, group: &[&str]) -> Vec<usize> {
+        let base = |name: &String| name.split('@').next().unwrap_or_default().to_owned();
+        (0..self.names.len()).filter(|&i| group.contains(&base(&self.names[i]).as_str())).collect()
+    }
+
+    fn part(&self, rows: &[usize], columns: &[usize]) -> DMatrix<f64> {
+        self.covariance.select_rows(rows).select_columns(columns)
+    }
+
+    fn test(&self, group: &[&str]) -> Option<Test> {
+        let places = self.places(group);
+        let factor = self.part(&places, &places).cholesky().filter(|_| !places.is_empty())?;
+        let values = self.values.select_rows(&places);
+        let growth = values.dot(&factor.solve(&values));
+        let k = places.len() as f64;
+        let unit = (self.vtpv / self.redundancy.max(1.0)).max(f64::MIN_POSITIVE);
+        let p = fisher_tail(k, self.redundancy.max(1.0), growth / (k * unit));
+        let ratio = growth / self.vtpv.max(f64::MIN_POSITIVE);
+        Some(Test { p, delta_bic: k * self.observations.ln() - self.observations * ratio.ln_1p() })
+    }
+
+    /// The group that speaks least for itself.
+    fn weakest_group(&self, terms: &BTreeSet<String>) -> Option<(&'static [&'static str], Test)> {
+        let present = GROUPS.into_iter().filter(|group| terms.contains(group[0]));
+        let tested = present.filter_map(|group| Some((group, self.test(group)?)));
+        // The radial terms leave from the highest on.
+        let radial = |group: &[&str]| match group[0] {
+            "k1" => terms.contains("k2") || terms.contains("k3"),
+            "k2" => terms.contains("k3"),
+            _ => false,
+        };
+        let tested = tested.filter(|(group, _)| !radial(group));
+        tested.max_by(|a, b| {
+            let badness = |(group, test): &(&[&str], Test)| (!test.stays(group), test.delta_bic);
+            let (a, b) = (badness(a), badness(b));
+            a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))
+        })
+    }
+
+    /// The estimate with a group held at zero.
+    fn without(&self, group: &[&str]) -> Self {
+        let gone = self.places(group);
+        let kept: Vec<usize> = (0..self.names.len()).filter(|i| !gone.contains(i)).collect();
+        let (cross, own) = (self.part(&kept, &gone), self.part(&gone, &gone));
+        let values = self.values.select_rows(&gone);
+        let gain = own.cholesky().map_or_else(
+            || DMatrix::zeros(kept.len(), gone.len()),
+            |factor| factor.solve(&cross.transpose()).transpose(),
+        );
+        let growth = self.test_growth(&gone);
+        Self {
+            names: kept.iter().map(|&i| self.names[i].clone()).collect(),
+            values: self.values.select_rows(&kept) - &gain * values,
+            covariance: self.part(&kept, &kept) - &gain * cross.transpose(),
+            observations: self.observations,
+            redundancy: self.redundancy + gone.len() as f64,
+            vtpv: self.vtpv + growth,
+        }
+    }
+
+    fn test_growth(&self, places: &[usize]) -> f64 {
+        let values = self.values.select_rows(places);
+        self.part(places, places).cholesky().map_or(0.0, |factor| values.dot(&factor.solve(&values)))
+    }
+
+    /// How much more certain d0 is without the group, where that matters.
+    fn offset_gain(&self, group: &[&str]) -> String {
+        let deviation = |wald: &Self| wald.places(&["d0"]).first().map(|&i| wald.covariance[(i, i)].max(0.0).sqrt());
+        match (deviation(self), deviation(&self.without(group))) {
+            (Some(with), Some(without)) if with > 1.5 * without => {
+                format!("; d0 is {:.1} times less certain with it", with / without)
+            }
+            _ => String::new(),
+        }
+    }
+}

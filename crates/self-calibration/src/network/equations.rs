@@ -1,0 +1,312 @@
+//! Observation equations of the network: `v = observed − (model + correction(observed))`, Eqs. 4-15.
+
+use std::sync::Arc;
+
+use adjust::{BlockId, EvaluationFailure, Jacobians, Observation, RigidPose};
+use camera_model::{Camera, LensDistortion};
+use error_models::RangeErrorModel;
+use nalgebra::{Isometry3, Matrix2x3, Matrix3, Point3, RowVector3, SMatrix, Vector3};
+
+use super::terms::{Seen, camera_from, range_correction};
+
+/// A target in the frame of a camera, with the derivatives of its coordinates.
+struct InCamera {
+    point: Vector3<f64>,
+    by_pose: SMatrix<f64, 3, 6>,
+    by_point: Matrix3<f64>,
+}
+
+impl InCamera {
+    fn new(pose: &[f64], point: &[f64]) -> Result<Self, EvaluationFailure> {
+        let world_from_camera = RigidPose::isometry(pose)?;
+        let &[x, y, z] = point else { return Err(EvaluationFailure::new("a target has three coordinates")) };
+        let point = world_from_camera.inverse_transform_point(&Point3::new(x, y, z)).coords;
+        let by_point = *world_from_camera.rotation.inverse().to_rotation_matrix().matrix();
+        let mut by_pose = SMatrix::<f64, 3, 6>::zeros();
+        by_pose.fixed_view_mut::<3, 3>(0, 0).copy_from(&-by_point);
+        by_pose.fixed_view_mut::<3, 3>(0, 3).copy_from(&point.cross_matrix());
+        Ok(Self { point, by_pose, by_point })
+    }
+}
+
+/// An image point in pixel, modelled from a point of the camera frame and the camera's block.
+struct ImageModel {
+    pixel: [f64; 2],
+    by_camera_point: Matrix2x3<f64>,
+    /// Derivatives with respect to the camera's block, a row each for column and row.
+    by_camera: [Vec<f64>; 2],
+}
+
+/// `x = xp − c·U/W + dx(x_obs, y_obs)`, in pixels.
+fn image_model(
+    template: &Camera,
+    values: &[f64],
+    observed_mm: [f64; 2],
+    point: &Vector3<f64>,
+    derivatives: bool,
+) -> Result<ImageModel, EvaluationFailure> {
+    let camera = camera_from(template, values).ok_or_else(|| EvaluationFailure::new("a camera of the wrong length"))?;
+    if point.z.is_nan() || point.z >= 0.0 {
+        return Err(EvaluationFailure::new("the target lies behind the camera"));
+    }
+    let [xp, yp] = camera.interior.principal_point_mm;
+    let scale = -camera.interior.principal_distance_mm / point.z;
+    let [dx, dy] = camera.lens.correction(&camera.interior, observed_mm);
+    let image = [xp + scale * point.x + dx, yp + scale * point.y + dy];
+    let pixel = camera.format.pixel_from_image(image);
+    let [pitch_x, pitch_y] = camera.format.pixel_pitch_mm;
+    let per_pixel = [1.0 / pitch_x, -1.0 / pitch_y];
+    let mut model = ImageModel { pixel, by_camera_point: Matrix2x3::zeros(), by_camera: [Vec::new(), Vec::new()] };
+    if !derivatives {
+        return Ok(model);
+    }
+    let [u, v] = [point.x / point.z, point.y / point.z];
+    let by_point = Matrix2x3::new(scale, 0.0, -scale * u, 0.0, scale, -scale * v);
+    let slope = camera.lens.correction_slope(&camera.interior, observed_mm);
+    let design = LensDistortion::correction_design(&camera.interior, observed_mm);
+    for axis in 0..2 {
+        let along = |other: usize| if axis == other { 1.0 } else { 0.0 };
+        let by_distance = if axis == 0 { -u } else { -v };
+        let interior = [along(0) - slope[(axis, 0)], along(1) - slope[(axis, 1)], by_distance];
+        let lens = (0..design.ncols()).map(|column| design[(axis, column)]);
+        let row = interior.into_iter().chain(lens);
+        model.by_camera[axis] = row.map(|derivative| derivative * per_pixel[axis]).collect();
+        model.by_camera_point.set_row(axis, &(by_point.row(axis) * per_pixel[axis]));
+    }
+    Ok(model)
+}
+
+/// An image point, a range, or both, of one target from one station.
+/// Blocks: pose, target, camera, and the range set where there is a range.
+#[derive(Debug, Clone)]
+pub(crate) struct SightingEquation {
+    pub(crate) blocks: Vec<BlockId>,
+    pub(crate) camera: Camera,
+    /// Observed image point, pixel; the corrections are taken there whether it is used or not.
+    pub(crate) pixel: [f64; 2],
+    pub(crate) uses_pixel: bool,
+    pub(crate) range: Option<RangeEquation>,
+}
+
+/// The range of a sighting.
+#[derive(Debug, Clone)]
+pub(crate) struct RangeEquation {
+    pub(crate) range_m: f64,
+    pub(crate) amplitude: f64,
+    pub(crate) model: Arc<RangeErrorModel>,
+    pub(crate) widths: Arc<[usize]>,
+}
+
+impl SightingEquation {
+    fn image(
+        &self,
+        parameters: &[&[f64]],
+        target: &InCamera,
+        residual: &mut [f64],
+        jacobians: Option<&mut Jacobians<'_>>,
+    ) -> Result<(), EvaluationFailure> {
+        let observed_mm = self.camera.format.image_from_pixel(self.pixel);
+        let model = image_model(&self.camera, parameters[2], observed_mm, &target.point, jacobians.is_some())?;
+        residual[0] = self.pixel[0] - model.pixel[0];
+        residual[1] = self.pixel[1] - model.pixel[1];
+        if let Some(jacobians) = jacobians {
+            let (by_pose, by_point) = (model.by_camera_point * target.by_pose, model.by_camera_point * target.by_point);
+            for axis in 0..2 {
+                copy(jacobians.row(0, axis), by_pose.row(axis).iter());
+                copy(jacobians.row(1, axis), by_point.row(axis).iter());
+                copy(jacobians.row(2, axis), model.by_camera[axis].iter());
+            }
+        }
+        Ok(())
+    }
+
+    fn range(
+        &self,
+        range: &RangeEquation,
+        parameters: &[&[f64]],
+        target: &InCamera,
+        row: usize,
+        residual: &mut [f64],
+        jacobians: Option<&mut Jacobians<'_>>,
+    ) -> Result<(), EvaluationFailure> {
+        let [x, y] = self.camera.format.image_from_pixel(self.pixel);
+        let seen = Seen {
+            range_m: range.range_m,
+            x_mm: x - parameters[2][0],
+            y_mm: y - parameters[2][1],
+            amplitude: range.amplitude,
+        };
+        let distance = target.point.norm();
+        let mut by_terms = vec![0.0; parameters[3].len()];
+        let correction = range_correction(&range.model, &range.widths, &seen, parameters[3], &mut by_terms);
+        let correction = correction.map_err(EvaluationFailure::new)?;
+        residual[row] = range.range_m - distance - correction.value;
+        if let Some(jacobians) = jacobians {
+            let direction: RowVector3<f64> = (target.point / distance).transpose();
+            copy(jacobians.row(0, row), (direction * target.by_pose).iter());
+            copy(jacobians.row(1, row), (direction * target.by_point).iter());
+            copy(jacobians.row(2, row), [-correction.by_x, -correction.by_y].iter());
+            copy(jacobians.row(3, row), by_terms.iter());
+        }
+        Ok(())
+    }
+}
+
+fn copy<'d>(out: &mut [f64], values: impl Iterator<Item = &'d f64>) {
+    out.iter_mut().zip(values).for_each(|(out, value)| *out = *value);
+}
+
+impl Observation for SightingEquation {
+    fn dimension(&self) -> usize {
+        2 * usize::from(self.uses_pixel) + usize::from(self.range.is_some())
+    }
+
+    fn blocks(&self) -> &[BlockId] {
+        &self.blocks
+    }
+
+    fn evaluate(
+        &self,
+        parameters: &[&[f64]],
+        residual: &mut [f64],
+        mut jacobians: Option<&mut Jacobians<'_>>,
+    ) -> Result<(), EvaluationFailure> {
+        let target = InCamera::new(parameters[0], parameters[1])?;
+        if self.uses_pixel {
+            self.image(parameters, &target, residual, jacobians.as_deref_mut())?;
+        }
+        if let Some(range) = &self.range {
+            self.range(range, parameters, &target, 2 * usize::from(self.uses_pixel), residual, jacobians)?;
+        }
+        Ok(())
+    }
+}
+
+/// An image point of the passive camera. Blocks: pose of the range camera, target, `range_camera_from_passive`, passive
+/// camera.
+#[derive(Debug, Clone)]
+pub(crate) struct PassiveEquation {
+    pub(crate) blocks: [BlockId; 4],
+    pub(crate) camera: Camera,
+    pub(crate) pixel: [f64; 2],
+}
+
+impl Observation for PassiveEquation {
+    fn dimension(&self) -> usize {
+        2
+    }
+
+    fn blocks(&self) -> &[BlockId] {
+        &self.blocks
+    }
+
+    fn evaluate(
+        &self,
+        parameters: &[&[f64]],
+        residual: &mut [f64],
+        jacobians: Option<&mut Jacobians<'_>>,
+    ) -> Result<(), EvaluationFailure> {
+        let in_range_camera = InCamera::new(parameters[0], parameters[1])?;
+        let coordinates: [f64; 3] = in_range_camera.point.into();
+        let in_passive = InCamera::new(parameters[2], &coordinates)?;
+        let observed_mm = self.camera.format.image_from_pixel(self.pixel);
+        let model = image_model(&self.camera, parameters[3], observed_mm, &in_passive.point, jacobians.is_some())?;
+        residual[0] = self.pixel[0] - model.pixel[0];
+        residual[1] = self.pixel[1] - model.pixel[1];
+        if let Some(jacobians) = jacobians {
+            let by_range_camera_point = model.by_camera_point * in_passive.by_point;
+            jacobians.set(0, &(by_range_camera_point * in_range_camera.by_pose));
+            jacobians.set(1, &(by_range_camera_point * in_range_camera.by_point));
+            jacobians.set(2, &(model.by_camera_point * in_passive.by_pose));
+            for axis in 0..2 {
+                copy(jacobians.row(3, axis), model.by_camera[axis].iter());
+            }
+        }
+        Ok(())
+    }
+}
+
+/// A distance known from outside, between perspective centres or targets.
+#[derive(Debug, Clone)]
+pub(crate) struct DistanceEquation {
+    pub(crate) blocks: [BlockId; 2],
+    pub(crate) distance_m: f64,
+}
+
+impl Observation for DistanceEquation {
+    fn dimension(&self) -> usize {
+        1
+    }
+
+    fn blocks(&self) -> &[BlockId] {
+        &self.blocks
+    }
+
+    fn evaluate(
+        &self,
+        parameters: &[&[f64]],
+        residual: &mut [f64],
+        jacobians: Option<&mut Jacobians<'_>>,
+    ) -> Result<(), EvaluationFailure> {
+        // Both kinds of block begin with the coordinates, and so do their steps.
+        let end = |values: &[f64]| values.first_chunk::<3>().map(|xyz| Vector3::from(*xyz));
+        let (Some(from), Some(to)) = (end(parameters[0]), end(parameters[1])) else {
+            return Err(EvaluationFailure::new("an end of a distance has three coordinates"));
+        };
+        let length = (to - from).norm();
+        if length <= 0.0 {
+            return Err(EvaluationFailure::new("both ends of a known distance are one point"));
+        }
+        residual[0] = self.distance_m - length;
+        if let Some(jacobians) = jacobians {
+            let direction = (to - from) / length;
+            copy(jacobians.row(0, 0), (-direction).iter());
+            copy(jacobians.row(1, 0), direction.iter());
+        }
+        Ok(())
+    }
+}
+
+/// Some parameters of a block, known before with a covariance.
+#[derive(Debug, Clone)]
+pub(crate) struct PartialPrior {
+    pub(crate) block: [BlockId; 1],
+    /// Which components, and their values.
+    pub(crate) known: Vec<(usize, f64)>,
+}
+
+impl Observation for PartialPrior {
+    fn dimension(&self) -> usize {
+        self.known.len()
+    }
+
+    fn blocks(&self) -> &[BlockId] {
+        &self.block
+    }
+
+    fn evaluate(
+        &self,
+        parameters: &[&[f64]],
+        residual: &mut [f64],
+        mut jacobians: Option<&mut Jacobians<'_>>,
+    ) -> Result<(), EvaluationFailure> {
+        for (row, (component, value)) in self.known.iter().enumerate() {
+            let current = parameters[0].get(*component).copied();
+            residual[row] = value - current.ok_or_else(|| EvaluationFailure::new("a prior beyond its block"))?;
+            if let Some(jacobians) = jacobians.as_deref_mut()
+                && let Some(entry) = jacobians.row(0, row).get_mut(*component)
+            {
+                *entry = 1.0;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The pose of a passive camera in the world.
+pub(crate) fn world_from_passive(
+    world_from_camera: &Isometry3<f64>,
+    range_camera_from_passive: &Isometry3<f64>,
+) -> Isometry3<f64> {
+    world_from_camera * range_camera_from_passive
+}

@@ -1,0 +1,187 @@
+//! Gross errors: standardised residuals are tested, the worst rejected, and what was rejected is tested again.
+
+use std::collections::BTreeSet;
+
+use adjust::{Scale, Solution};
+
+use super::Component;
+use super::distribution::normal_quantile;
+use super::problem::{Row, Setup, Solved, Source};
+use crate::{Error, Result};
+
+/// Values with a smaller redundancy number are not tested: their residual shows too little of an error.
+const TESTABLE: f64 = 0.01;
+/// Groups of fewer values take their scale from all values together.
+const SMALLEST_GROUP: usize = 30;
+/// Rounds of rejection, a bound that only contradictory observations reach.
+const MOST_ROUNDS: usize = 100;
+
+/// A value that the test suspects.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Suspect {
+    /// Position among the rows.
+    pub(crate) row: usize,
+    /// |v| / σ_v over the scale of its group.
+    statistic: f64,
+}
+
+/// Standardised residuals over the robust scale of their group, where they exceed the critical value; largest first.
+///
+/// The scale, 1.4826 times the median of |v| / σ_v, stands for sigma0 of the group and is not drawn up by gross errors.
+pub(crate) fn suspects(solution: &Solution, components: &[Component], level: f64) -> Result<Vec<Suspect>> {
+    let standardised = solution.standardised_residuals(Scale::Prior)?;
+    let redundancy = solution.redundancy_numbers();
+    let testable = |row: usize| standardised[row].is_finite() && redundancy[row] > TESTABLE;
+    let rows: Vec<usize> = (0..components.len()).filter(|&row| testable(row)).collect();
+    let overall = scale(rows.iter().map(|&row| standardised[row].abs()).collect());
+    let critical = normal_quantile(1.0 - 0.5 * level);
+    let mut out = Vec::new();
+    let kinds: BTreeSet<Component> = components.iter().copied().collect();
+    for kind in kinds {
+        let own: Vec<usize> = rows.iter().copied().filter(|&row| components[row] == kind).collect();
+        let sizes: Vec<f64> = own.iter().map(|&row| standardised[row].abs()).collect();
+        let scale = if own.len() < SMALLEST_GROUP { overall } else { scale(sizes) };
+        let statistic = |row: usize| Suspect { row, statistic: standardised[row].abs() / scale };
+        out.extend(own.into_iter().map(statistic).filter(|suspect| suspect.statistic > critical));
+    }
+    out.sort_by(|a, b| b.statistic.total_cmp(&a.statistic).then(a.row.cmp(&b.row)));
+    Ok(out)
+}
+
+fn scale(mut sizes: Vec<f64>) -> f64 {
+    if sizes.is_empty() {
+        return f64::INFINITY;
+    }
+    let middle = sizes.len() / 2;
+    let median = *sizes.select_nth_unstable_by(middle, f64::total_cmp).1;
+    // Residuals that rounding alone makes are no reason to reject anything.
+    (1.4826 * median).max(1e-6)
+}
+
+impl Setup<'_> {
+    /// Solves, and rejects gross errors where a level is given.
+    ///
+    /// Of the suspects of a round the worst of each station and of each target is rejected: the residuals of one gross
+    /// error spread over its own station and target, so that these do not disturb each other. In the end what was
+    /// rejected is looked at again, and taken back once if it fits.
+    pub(crate) fn solve_rejecting(&mut self, level: Option<f64>) -> Result<Solved> {
+        let mut solved = self.solve()?;
+        let Some(level) = level else { return Ok(solved) };
+        let mut readmitted = BTreeSet::new();
+        for _ in 0..MOST_ROUNDS {
+            let before = self.excluded.clone();
+            self.reject(&solved, level, &readmitted)?;
+            if self.excluded == before {
+                self.readmit(&solved, level, &mut readmitted)?;
+            }
+            if self.excluded == before {
+                break;
+            }
+            self.restart(&solved)?;
+            match self.solve() {
+                Ok(better) => solved = better,
+                Err(Error::Adjust(adjust::Error::RankDeficient { .. })) => {
+                    // What is left would not determine the network: the suspects are needed.
+                    self.excluded = before;
+                    break;
+                }
+                Err(error) => return Err(error),
+            }
+        }
+        Ok(solved)
+    }
+
+    fn reject(&mut self, solved: &Solved, level: f64, readmitted: &BTreeSet<(Source, Component)>) -> Result<()> {
+        let components: Vec<Component> = solved.rows.iter().map(|row| row.component).collect();
+        let (mut stations, mut targets) = (BTreeSet::new(), BTreeSet::new());
+        for suspect in suspects(&solved.solution, &components, level)? {
+            let row = &solved.rows[suspect.row];
+            let Some((station, target)) = self.ends(row.source) else { continue };
+            let free = stations.insert(station) & targets.insert(target);
+            if free && !readmitted.contains(&key(row)) {
+                self.set_excluded(row, true);
+            }
+        }
+        Ok(())
+    }
+
+    /// Takes back what fits the solution that it did not take part in. Its residual has at least its own deviation, so the
+    /// test against that alone is on the safe side.
+    fn readmit(&mut self, solved: &Solved, level: f64, done: &mut BTreeSet<(Source, Component)>) -> Result<()> {
+        let critical = normal_quantile(1.0 - 0.5 * level);
+        let sigma0 = solved.solution.sigma0().unwrap_or(1.0);
+        let mut conspicuous: BTreeSet<(Source, Component)> = BTreeSet::new();
+        let rejected = self.rejected_rows();
+        for row in &rejected {
+            let residual = self.predicted(solved, row)?;
+            if !(residual.abs() <= critical * sigma0 * row.sigma) {
+                conspicuous.insert(key(row));
+            }
+        }
+        for row in &rejected {
+            if !conspicuous.contains(&key(row)) && done.insert(key(row)) {
+                self.set_excluded(row, false);
+            }
+        }
+        Ok(())
+    }
+
+    /// Values that were rejected.
+    fn rejected_rows(&self) -> Vec<Row> {
+        let rejected = self.unused_rows().into_iter().filter(|(_, verdict)| *verdict == super::Verdict::Rejected);
+        rejected.map(|(row, _)| row).collect()
+    }
+
+    /// Starts the next solution from this one.
+    pub(crate) fn restart(&mut self, solved: &Solved) -> Result<()> {
+        let geometry = solved.geometry()?;
+        self.start.stations = geometry.stations;
+        self.start.targets = geometry.targets;
+        if let Some([relative, _]) = solved.blocks.passive {
+            self.start.relative = Some(solved.solution.pose(relative)?);
+        }
+        Ok(())
+    }
+
+    /// Station and target of an observation, or the two ends of a distance; control is not tested here.
+    fn ends(&self, source: Source) -> Option<(usize, usize)> {
+        match source {
+            Source::Sighting(index) => {
+                let seen = &self.network.sightings[index];
+                Some((seen.station, seen.target))
+            }
+            Source::Passive(index) => {
+                let seen = self.network.passive.as_ref()?.image_points[index];
+                Some((seen.station, seen.target))
+            }
+            // Distances have no rivals but themselves.
+            Source::Distance(index) => Some((usize::MAX - index, usize::MAX - index)),
+            _ => None,
+        }
+    }
+
+    fn set_excluded(&mut self, row: &Row, excluded: bool) {
+        let (list, index) = match row.source {
+            Source::Sighting(index) if row.component == Component::Range => (&mut self.excluded.ranges, index),
+            Source::Sighting(index) => (&mut self.excluded.image_points, index),
+            Source::Passive(index) => (&mut self.excluded.passive, index),
+            Source::Distance(index) => (&mut self.excluded.distances, index),
+            _ => return,
+        };
+        if excluded {
+            list.insert(index);
+        } else {
+            list.remove(&index);
+        }
+    }
+}
+
+/// Both coordinates of an image point stand and fall together.
+fn key(row: &Row) -> (Source, Component) {
+    let component = match row.component {
+        Component::Row => Component::Col,
+        Component::PassiveRow => Component::PassiveCol,
+        other => other,
+    };
+    (row.source, component)
+}

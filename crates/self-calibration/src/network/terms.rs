@@ -1,0 +1,170 @@
+//! The calibration parameters as lists of named values: one row of a table for each family of terms.
+
+use std::borrow::Cow;
+
+use camera_model::{Camera, InteriorOrientation, LensDistortion};
+use error_models::{AmplitudeHyperbola, PARAMETERS, RangeErrorModel, RangeTerms};
+
+/// Names of the interior orientation, which comes before the lens in the camera's block.
+pub(crate) const INTERIOR: [&str; 3] = ["xp", "yp", "c"];
+
+/// Names of the camera's block.
+pub(crate) fn camera_names() -> Vec<&'static str> {
+    INTERIOR.into_iter().chain(LensDistortion::NAMES).collect()
+}
+
+/// Values of the camera's block.
+pub(crate) fn camera_values(camera: &Camera) -> Vec<f64> {
+    let [xp, yp] = camera.interior.principal_point_mm;
+    [xp, yp, camera.interior.principal_distance_mm].into_iter().chain(camera.lens.coefficients()).collect()
+}
+
+/// The camera with the values of its block; `None` where their number is wrong.
+pub(crate) fn camera_from(camera: &Camera, values: &[f64]) -> Option<Camera> {
+    let (&[xp, yp, c], coefficients) = values.split_first_chunk::<3>()?;
+    let interior = InteriorOrientation { principal_point_mm: [xp, yp], principal_distance_mm: c };
+    let lens = LensDistortion::from_coefficients(coefficients.try_into().ok()?);
+    Some(Camera { interior, lens, ..*camera })
+}
+
+/// What a range correction is a function of: observed values, the image point in millimetre from the principal point.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Seen {
+    pub(crate) range_m: f64,
+    pub(crate) x_mm: f64,
+    pub(crate) y_mm: f64,
+    pub(crate) amplitude: f64,
+}
+
+/// Value of a family of range terms and its derivatives with respect to the image point.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct RangePart {
+    pub(crate) value: f64,
+    pub(crate) by_x: f64,
+    pub(crate) by_y: f64,
+}
+
+/// A family of range terms.
+pub(crate) struct RangeFamily {
+    /// Names in the order of the values; empty where the model has none of them.
+    pub(crate) names: fn(&RangeErrorModel) -> Vec<Cow<'static, str>>,
+    /// Values in a model.
+    pub(crate) read: fn(&RangeErrorModel, &mut Vec<f64>),
+    /// Puts values back.
+    pub(crate) write: fn(&mut RangeErrorModel, &[f64]),
+    /// The correction and its derivatives with respect to the values; fails with a reason where it has no value.
+    pub(crate) evaluate: fn(&RangeErrorModel, &Seen, &[f64], &mut [f64]) -> Result<RangePart, &'static str>,
+}
+
+/// All families. A further term is a further row.
+pub(crate) const RANGE_FAMILIES: [RangeFamily; 2] = [
+    // Eq. 14, linear in its nine terms.
+    RangeFamily {
+        names: |_| RangeTerms::NAMES.into_iter().map(Cow::Borrowed).collect(),
+        read: |model, out| out.extend(model.terms.to_array()),
+        write: |model, values| {
+            if let Ok(values) = values.try_into() {
+                model.terms = RangeTerms::from_array(values);
+            }
+        },
+        evaluate: |model, seen, values, row| {
+            let design = RangeTerms::design_row(model.ambiguity_interval_m, seen.range_m, seen.x_mm, seen.y_mm);
+            row.copy_from_slice(&design);
+            let value = design.iter().zip(values).map(|(a, x)| a * x).sum();
+            Ok(RangePart { value, by_x: values[7], by_y: values[8] })
+        },
+    },
+    // Eq. 15.
+    RangeFamily {
+        names: |model| {
+            let names = model.hyperbola.map_or(&[][..], |_| &AmplitudeHyperbola::NAMES);
+            names.iter().copied().map(Cow::Borrowed).collect()
+        },
+        read: |model, out| out.extend(model.hyperbola.iter().flat_map(|h| [h.h1, h.h2, h.h3])),
+        write: |model, values| {
+            if let (Some(hyperbola), &[h1, h2, h3]) = (model.hyperbola.as_mut(), values) {
+                *hyperbola = AmplitudeHyperbola { h1, h2, h3, ..*hyperbola };
+            }
+        },
+        evaluate: |model, seen, values, row| {
+            let (Some(hyperbola), &[h1, h2, h3]) = (model.hyperbola, values) else {
+                return Ok(RangePart::default());
+            };
+            let hyperbola = AmplitudeHyperbola { h1, h2, h3, ..hyperbola };
+            let value = hyperbola.correction(seen.amplitude);
+            let value = value.ok_or("the amplitude hyperbola has no value at this amplitude")?;
+            let jacobian =
+                hyperbola.jacobian(seen.amplitude).ok_or("the slope of the amplitude hyperbola is infinite")?;
+            row.copy_from_slice(&jacobian.coefficients);
+            Ok(RangePart { value, by_x: 0.0, by_y: 0.0 })
+        },
+    },
+];
+
+/// Names of a range set's block.
+pub(crate) fn range_names(model: &RangeErrorModel) -> Vec<String> {
+    RANGE_FAMILIES.iter().flat_map(|family| (family.names)(model)).map(Cow::into_owned).collect()
+}
+
+/// Values of a range set's block.
+pub(crate) fn range_values(model: &RangeErrorModel) -> Vec<f64> {
+    let mut out = Vec::new();
+    for family in &RANGE_FAMILIES {
+        (family.read)(model, &mut out);
+    }
+    out
+}
+
+/// The model with the values of its block.
+pub(crate) fn range_model_from(model: &RangeErrorModel, values: &[f64]) -> RangeErrorModel {
+    let mut out = model.clone();
+    let mut start = 0;
+    for family in &RANGE_FAMILIES {
+        let end = (start + (family.names)(model).len()).min(values.len());
+        (family.write)(&mut out, &values[start..end]);
+        start = end;
+    }
+    out
+}
+
+/// Correction of a whole set and its derivatives with respect to its values.
+pub(crate) fn range_correction(
+    model: &RangeErrorModel,
+    widths: &[usize],
+    seen: &Seen,
+    values: &[f64],
+    row: &mut [f64],
+) -> Result<RangePart, &'static str> {
+    let mut sum = RangePart::default();
+    let mut start = 0;
+    for (family, width) in RANGE_FAMILIES.iter().zip(widths) {
+        let part = start..start + width;
+        if part.is_empty() {
+            continue;
+        }
+        if part.end > values.len() || part.end > row.len() {
+            return Err("a range set of the wrong length");
+        }
+        let one = (family.evaluate)(model, seen, &values[part.clone()], &mut row[part.clone()])?;
+        sum = RangePart { value: sum.value + one.value, by_x: sum.by_x + one.by_x, by_y: sum.by_y + one.by_y };
+        start = part.end;
+    }
+    Ok(sum)
+}
+
+/// Number of values of each family.
+pub(crate) fn family_widths(model: &RangeErrorModel) -> Vec<usize> {
+    RANGE_FAMILIES.iter().map(|family| (family.names)(model).len()).collect()
+}
+
+/// Unit of a parameter by its canonical name.
+pub(crate) fn unit(name: &str) -> &'static str {
+    match name {
+        "xp" | "yp" | "c" => "mm",
+        "k1" => "mm^-2",
+        "k2" => "mm^-4",
+        "k3" => "mm^-6",
+        "p1" | "p2" => "mm^-1",
+        _ => PARAMETERS.iter().find(|(known, _)| *known == name).map_or("", |(_, unit)| unit),
+    }
+}

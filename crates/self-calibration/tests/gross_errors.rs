@@ -1,0 +1,76 @@
+//! Gross errors are found, and little else is taken for one.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod support;
+
+use self_calibration::{
+    CalibrationOptions, Component, Method, Network, SightingOptions, TermSelection, Verdict, calibrate,
+    simulate_sightings,
+};
+use support::networks::{all_but_long_wave, nominal, normal, small};
+
+/// Observed networks with and without gross errors, the noise being the same.
+fn observed(truth: &Network, seed: u64, share: f64) -> [Network; 2] {
+    [share, 0.0].map(|gross_error_share| {
+        let mut observed =
+            simulate_sightings(truth, &SightingOptions { seed, gross_error_share, ..SightingOptions::default() })
+                .unwrap();
+        nominal(&mut observed);
+        observed
+    })
+}
+
+/// How many were planted, found, and wrongly suspected, and of how many values.
+fn found(truth: &Network, method: Method, level: f64, seed: u64) -> [usize; 4] {
+    let [with, without] = observed(truth, seed, 0.01);
+    let options = CalibrationOptions {
+        method,
+        terms: TermSelection::List(all_but_long_wave()),
+        rejection_level: Some(level),
+        ..CalibrationOptions::default()
+    };
+    let outcome = calibrate(&with, &options).unwrap();
+    let mut counts = [0; 4];
+    for (index, (seen, clean)) in with.sightings.iter().zip(&without.sightings).enumerate() {
+        let names = (&with.stations[seen.station].name, &with.targets[seen.target].name);
+        let rejected = |component| {
+            let own = outcome.residuals.iter().find(|q| (&q.station, &q.target) == names && q.component == component);
+            own.unwrap().verdict == Verdict::Rejected
+        };
+        let [pixel, other] = [seen.pixel.unwrap(), clean.pixel.unwrap()];
+        let shift = (pixel[0] - other[0]).hypot(pixel[1] - other[1]);
+        let range_shift = (seen.range_m.unwrap() - clean.range_m.unwrap()).abs();
+        for (planted, rejected) in
+            [(shift > 1e-9, rejected(Component::Col)), (range_shift > 1e-9, rejected(Component::Range))]
+        {
+            counts[0] += usize::from(planted);
+            counts[1] += usize::from(planted && rejected);
+            counts[2] += usize::from(!planted && rejected);
+            counts[3] += 1;
+            assert!(!planted || rejected, "sighting {index} of {names:?} is gross and was not found");
+        }
+    }
+    counts
+}
+
+#[test]
+fn one_in_a_hundred() {
+    let started = std::time::Instant::now();
+    let mut sum = [0; 4];
+    for seed in 0..4 {
+        let counts = found(&normal(), Method::OneStep, 1e-4, seed);
+        println!("{counts:?} {:?}", started.elapsed());
+        sum.iter_mut().zip(counts).for_each(|(sum, count)| *sum += count);
+    }
+    let [planted, found, wrong, all] = sum;
+    println!("{planted} planted, {found} found, {wrong} wrong of {all}");
+    let counts = found_at_usual(&small());
+    println!("{counts:?} {:?}", started.elapsed());
+}
+
+fn found_at_usual(truth: &Network) -> [usize; 4] {
+    let a = found(truth, Method::OneStep, 1e-3, 11);
+    let b = found(truth, Method::TwoStepDependent, 1e-3, 12);
+    println!("{a:?} {b:?}");
+    a
+}

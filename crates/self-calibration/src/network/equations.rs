@@ -1,4 +1,5 @@
-//! Observation equations of the network: `v = observed − (model + correction(observed))`, Eqs. 4-15.
+//! Observation equations of the network, Eqs. 4-15: image corrections are taken at the observed image point, range
+//! corrections at the modelled range.
 
 use std::sync::Arc;
 
@@ -7,7 +8,7 @@ use camera_model::{Camera, LensDistortion};
 use error_models::RangeErrorModel;
 use nalgebra::{Isometry3, Matrix2x3, Matrix3, Point3, RowVector3, SMatrix, Vector3};
 
-use super::terms::{Seen, camera_from, range_correction};
+use super::terms::{Seen, camera_from, modelled_range};
 
 /// A target in the frame of a camera, with the derivatives of its coordinates.
 struct InCamera {
@@ -138,14 +139,14 @@ impl SightingEquation {
         };
         let distance = target.point.norm();
         let mut by_terms = vec![0.0; parameters[3].len()];
-        let correction = range_correction(&range.model, &range.widths, &seen, parameters[3], &mut by_terms);
-        let correction = correction.map_err(EvaluationFailure::new)?;
-        residual[row] = range.range_m - distance - correction.value;
+        let modelled = modelled_range(&range.model, &range.widths, &seen, parameters[3], distance, &mut by_terms);
+        let modelled = modelled.map_err(EvaluationFailure::new)?;
+        residual[row] = range.range_m - modelled.range_m;
         if let Some(jacobians) = jacobians {
-            let direction: RowVector3<f64> = (target.point / distance).transpose();
+            let direction: RowVector3<f64> = (target.point * (modelled.by_distance / distance)).transpose();
             copy(jacobians.row(0, row), (direction * target.by_pose).iter());
             copy(jacobians.row(1, row), (direction * target.by_point).iter());
-            copy(jacobians.row(2, row), [-correction.by_x, -correction.by_y].iter());
+            copy(jacobians.row(2, row), [-modelled.by_x, -modelled.by_y].iter());
             copy(jacobians.row(3, row), by_terms.iter());
         }
         Ok(())

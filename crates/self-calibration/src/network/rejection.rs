@@ -59,13 +59,13 @@ fn scale(mut sizes: Vec<f64>) -> f64 {
 }
 
 impl Setup<'_> {
-    /// Solves, and rejects gross errors where a level is given.
+    /// Rejects gross errors from a first solution on, where a level is given.
     ///
     /// Of the suspects of a round the worst of each station and of each target is rejected: the residuals of one gross
     /// error spread over its own station and target, so that these do not disturb each other. In the end what was
     /// rejected is looked at again, and taken back once if it fits.
-    pub(crate) fn solve_rejecting(&mut self, level: Option<f64>) -> Result<Solved> {
-        let mut solved = self.solve()?;
+    pub(crate) fn solve_rejecting(&mut self, first: Solved, level: Option<f64>) -> Result<Solved> {
+        let mut solved = first;
         let Some(level) = level else { return Ok(solved) };
         let mut readmitted = BTreeSet::new();
         for _ in 0..MOST_ROUNDS {

@@ -159,11 +159,9 @@ impl Simulator<'_> {
 
     /// A gross error in standard deviations, or none.
     fn gross(&mut self) -> f64 {
-        if self.random.random::<f64>() >= self.options.gross_error_share {
-            return 0.0;
-        }
-        let size = 20.0 + 30.0 * self.random.random::<f64>();
-        if self.random.random::<bool>() { size } else { -size }
+        let [chance, size, side] = [0; 3].map(|_| self.random.random::<f64>());
+        let size = (20.0 + 30.0 * size).copysign(side - 0.5);
+        if chance < self.options.gross_error_share { size } else { 0.0 }
     }
 
     fn pose(&self, station: usize) -> Result<Isometry3<f64>> {

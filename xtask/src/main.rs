@@ -4,6 +4,7 @@
 
 mod bench;
 mod fixtures;
+mod peers;
 mod pipeline_task;
 mod shell;
 mod test;
@@ -25,6 +26,8 @@ enum Task {
     Test,
     /// Check the repository itself: READMEs, citations, lengths of files.
     Tidy,
+    /// Other programs beside ours on the same work: `cargo xtask peers adjust`.
+    Peers(peers::Arguments),
     /// Run the benchmarks of all crates, or of those named.
     Bench(bench::Arguments),
 }
@@ -35,6 +38,7 @@ fn main() -> ExitCode {
         Task::Fixtures => fixtures::run(),
         Task::Test => test::run(),
         Task::Tidy => tidy::run(),
+        Task::Peers(arguments) => peers::run(&arguments),
         Task::Bench(arguments) => bench::run(&arguments),
     };
     match outcome {

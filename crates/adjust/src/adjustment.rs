@@ -1,5 +1,7 @@
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use crate::exclusion::Exclusion;
 use crate::prior::PriorObservation;
 use crate::{
     BlockId, Covariance, DatumDefect, Error, GroupId, Kernel, Observation, ObservationId, ParameterBlock, Result,
@@ -13,10 +15,12 @@ pub struct Adjustment<'a> {
     pub(crate) blocks: Vec<ParameterBlock>,
     pub(crate) groups: Vec<Group>,
     pub(crate) observations: Vec<StoredObservation<'a>>,
-    /// Whitening matrices of all observations, see [`Covariance::whitening`].
+    /// Whitening matrices of all observations, see [`Covariance::whitening`]; excluded components are not correlated.
     pub(crate) whitening: Vec<f64>,
     pub(crate) constraints: Vec<Box<dyn Observation + 'a>>,
     pub(crate) datum: Option<Datum>,
+    /// Excluded components, by number of the observation.
+    pub(crate) exclusions: BTreeMap<usize, Exclusion>,
     prior_group: Option<GroupId>,
 }
 
@@ -153,6 +157,11 @@ impl<'a> Adjustment<'a> {
         let group = self.add_group("prior");
         self.prior_group = Some(group);
         group
+    }
+
+    /// The group that priors belong to, where there are any.
+    pub(crate) fn existing_prior_group(&self) -> Option<GroupId> {
+        self.prior_group
     }
 
     /// Adds constraints that hold exactly: each component of the observation's residual becomes zero.

@@ -1,3 +1,4 @@
+use crate::layout::Named;
 use crate::{Error, EvaluationFailure, Jacobians, Observation, ParameterBlock, Result};
 
 /// Comparison of a Jacobian with differences of its model.
@@ -84,13 +85,16 @@ fn fail(failure: &EvaluationFailure) -> Error {
 
 fn analytic(observation: &dyn Observation, blocks: &[ParameterBlock]) -> Result<Vec<f64>> {
     let parameters: Vec<&[f64]> = blocks.iter().map(|block| block.values.as_slice()).collect();
-    let mut offsets = vec![0];
-    for block in blocks {
-        offsets.push(offsets[offsets.len() - 1] + block.tangent_dimension());
+    let mut width = 0;
+    let mut named = Vec::with_capacity(blocks.len());
+    for (place, block) in blocks.iter().enumerate() {
+        let own = block.tangent_dimension();
+        named.push(Named { block: place as u32, start: width as u32, width: own as u32 });
+        width += own;
     }
     let dimension = observation.dimension();
-    let mut data = vec![0.0; dimension * offsets[offsets.len() - 1]];
-    let mut jacobians = Jacobians { data: &mut data, offsets: &offsets, dimension, misused: false };
+    let mut data = vec![0.0; dimension * width];
+    let mut jacobians = Jacobians { data: &mut data, named: &named, width, dimension, misused: false };
     let mut residual = vec![0.0; dimension];
     observation.evaluate(&parameters, &mut residual, Some(&mut jacobians)).map_err(|failure| fail(&failure))?;
     if jacobians.misused {

@@ -1,6 +1,7 @@
-use crate::datum::inner_constraints;
+use crate::datum::{inner_constraints, point_motions};
 use crate::layout::Layout;
 use crate::linearisation::Linearisation;
+use crate::structure::Structure;
 use crate::{Adjustment, Result, dense};
 
 /// Linearised constraints `B dx = d` over all unknowns: those of the user first, inner constraints last.
@@ -14,6 +15,9 @@ pub(crate) struct Constraints {
     pub(crate) rows: Vec<f64>,
     /// d.
     pub(crate) right: Vec<f64>,
+    /// How the points move in the directions that the inner constraints hold, row-major, `inner × unknowns`. Only for
+    /// the eliminated form, see [`crate::datum::point_motions`].
+    pub(crate) motions: Vec<f64>,
 }
 
 impl Constraints {
@@ -23,24 +27,38 @@ impl Constraints {
         layout: &Layout,
         linearisation: &Linearisation,
         values: &[f64],
+        structure: Option<&Structure>,
     ) -> Result<Self> {
         let unknowns = layout.unknowns;
         let mut rows = vec![0.0; layout.constraint_rows * unknowns];
         for place in &layout.constraints {
-            let (active, jacobian) = (layout.active(place), &linearisation.jacobian[place.jacobian_range()]);
-            for (index, row) in place.rows().enumerate() {
-                for (entry, &(_, column)) in active.iter().enumerate() {
-                    rows[row * unknowns + column] += jacobian[index * active.len() + entry];
+            let jacobian = &linearisation.jacobian[place.jacobian_range()];
+            // Parts of an observation do not repeat a column.
+            for (row, entries) in place.rows().zip(jacobian.chunks_exact(place.width.max(1))) {
+                for (a, column) in entries.iter().zip(layout.columns(place)) {
+                    rows[row * unknowns + column] = *a;
                 }
             }
         }
         let mut right = linearisation.constraint.clone();
         let first_inner = layout.constraint_rows;
+        let mut motions = Vec::new();
         if let Some(datum) = &adjustment.datum {
             rows.extend(inner_constraints(datum, adjustment, layout, values)?);
             right.resize(first_inner + datum.defect.count(), 0.0);
+            if let Some(structure) = structure {
+                motions = point_motions(datum, adjustment, layout, values, structure);
+            }
         }
-        Ok(Self { count: right.len(), first_inner, rows, right })
+        Ok(Self { count: right.len(), first_inner, rows, right, motions })
+    }
+
+    /// Those of the user alone.
+    pub(crate) fn of_user(&self) -> Self {
+        let count = self.first_inner;
+        let unknowns = self.rows.len() / self.count.max(1);
+        let (rows, right) = (self.rows[..count * unknowns].to_vec(), self.right[..count].to_vec());
+        Self { count, first_inner: count, rows, right, motions: Vec::new() }
     }
 
     /// The rows for unknowns in units of `scale` (`dx = scale · y`), each divided by its length, and `d` with them.

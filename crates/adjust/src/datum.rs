@@ -2,6 +2,7 @@ use nalgebra::Vector3;
 
 use crate::adjustment::Datum;
 use crate::layout::{HELD, Layout};
+use crate::structure::Structure;
 use crate::{Adjustment, Error, Result};
 
 /// How many directions the network leaves undetermined.
@@ -33,7 +34,7 @@ pub(crate) fn inner_constraints(
 ) -> Result<Vec<f64>> {
     let points = points(datum, adjustment, layout, values)?;
     let centroid = points.iter().map(|(point, _)| point).sum::<Vector3<f64>>() / points.len() as f64;
-    check_spread(&points, &centroid)?;
+    check_spread(points.iter().map(|(point, _)| point), &centroid)?;
     let count = datum.defect.count();
     let mut rows = vec![0.0; count * layout.unknowns];
     for (point, columns) in &points {
@@ -52,8 +53,36 @@ pub(crate) fn inner_constraints(
     Ok(rows)
 }
 
+/// How points move in the directions of the datum, row-major, `count × unknowns`: the points of the datum, and all
+/// eliminated blocks of three coordinates, which are points of the same network. What else there is stays zero.
+pub(crate) fn point_motions(
+    datum: &Datum,
+    adjustment: &Adjustment<'_>,
+    layout: &Layout,
+    values: &[f64],
+    structure: &Structure,
+) -> Vec<f64> {
+    let coordinates = |block: usize| Vector3::from_column_slice(&values[layout.block_values(block)]);
+    let count = datum.defect.count();
+    let middle =
+        datum.points.iter().map(|id| coordinates(id.0)).sum::<Vector3<f64>>() / datum.points.len().max(1) as f64;
+    let mut rows = vec![0.0; count * layout.unknowns];
+    let others = structure.eliminated.iter().map(|eliminated| eliminated.block);
+    for block in others.chain(datum.points.iter().map(|id| id.0)) {
+        let (free, ambient) = (layout.free(block), adjustment.blocks[block].manifold.ambient_dimension());
+        if free.len() == 3 && ambient == 3 {
+            let arm = coordinates(block) - middle;
+            for row in 0..count {
+                let target = &mut rows[row * layout.unknowns..][free.clone()];
+                target.copy_from_slice(displacement(row, &arm).as_slice());
+            }
+        }
+    }
+    rows
+}
+
 /// How a point at `arm` from the centroid moves under the direction: three translations, three rotations, scale.
-fn displacement(direction: usize, arm: &Vector3<f64>) -> Vector3<f64> {
+pub(crate) fn displacement(direction: usize, arm: &Vector3<f64>) -> Vector3<f64> {
     let axis = |index| Vector3::from_fn(|row, _| if row == index { 1.0 } else { 0.0 });
     match direction {
         0..3 => axis(direction),
@@ -81,9 +110,13 @@ fn points(datum: &Datum, adjustment: &Adjustment<'_>, layout: &Layout, values: &
 }
 
 /// Points in one line leave the rotation about it open.
-fn check_spread(points: &[DatumPoint], centroid: &Vector3<f64>) -> Result<()> {
+pub(crate) fn check_spread<'p>(
+    points: impl ExactSizeIterator<Item = &'p Vector3<f64>>,
+    centroid: &Vector3<f64>,
+) -> Result<()> {
+    let count = points.len();
     let mut scatter = nalgebra::Matrix3::zeros();
-    for (point, _) in points {
+    for point in points {
         let arm = point - centroid;
         scatter += arm * arm.transpose();
     }
@@ -93,5 +126,5 @@ fn check_spread(points: &[DatumPoint], centroid: &Vector3<f64>) -> Result<()> {
     if spread[1] > 1e-12 * spread[2] && spread[2] > 0.0 {
         return Ok(());
     }
-    Err(Error::Datum { reason: format!("its {} points lie in one line", points.len()) })
+    Err(Error::Datum { reason: format!("its {count} points lie in one line") })
 }

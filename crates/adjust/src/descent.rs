@@ -1,5 +1,7 @@
-use crate::iteration::Iteration;
-use crate::normal::{NormalFactor, Singular};
+use crate::evaluation::Want;
+use crate::iteration::{Ending, Iteration};
+use crate::normal::Singular;
+use crate::system::SystemFactor;
 use crate::{Result, StepKind};
 
 /// Damping beyond which a damped step is no step any more.
@@ -9,16 +11,13 @@ const LONGEST_BEND: f64 = 0.375;
 /// Where the model is probed for its curvature, as a share of the step.
 const PROBE: f64 = 0.1;
 
-/// Squared residual, in variances, below which an observation fits exactly.
-const EXACT: f64 = 1e-16;
-
 impl Iteration<'_, '_> {
-    /// Damped steps until they promise little. False where no step reduces the objective any more.
-    pub(crate) fn descend(&mut self, small_gain: f64) -> Result<bool> {
+    /// Damped steps until the ending. False where no step reduces the objective any more.
+    pub(crate) fn descend_damped(&mut self, ending: &Ending) -> Result<bool> {
         loop {
             self.check_budget()?;
             let reference = (self.damping, self.metric.as_slice());
-            let factor = match NormalFactor::new(&self.normal, &self.constraints, Some(reference)) {
+            let factor = match self.system.factor(&self.constraints, Some(reference)) {
                 Ok(factor) => Some(factor),
                 Err(Singular::Constraints(error)) => return Err(error),
                 Err(Singular::Normal) => None,
@@ -28,7 +27,7 @@ impl Iteration<'_, '_> {
             let mut gain = f64::NEG_INFINITY;
             let merit = self.merit(&self.current);
             if let Some(factor) = factor {
-                let step = factor.solve(&self.normal.gradient, 1.0);
+                let step = factor.solve(&self.gradient, 1.0);
                 (expected, length) = self.expect(&step);
                 if expected <= 1e-15 * merit {
                     return Ok(true);
@@ -41,11 +40,10 @@ impl Iteration<'_, '_> {
                 }
                 continue;
             }
-            self.accept()?;
+            self.accept(false)?;
             self.record(StepKind::Damped, length, self.damping, 1.0);
             self.lower_damping(gain);
-            let exact = merit <= EXACT * self.layout.rows as f64;
-            if gain > 0.25 && (expected <= small_gain * merit || exact) {
+            if ending.is_reached(merit, expected, gain, self.layout.rows) {
                 return Ok(true);
             }
         }
@@ -54,9 +52,9 @@ impl Iteration<'_, '_> {
     /// Follows the curvature of the model (geodesic acceleration) and gives the merit at the end of the step. `None`
     /// where the model has no value there, or bends so much that the step means nothing. A model that the last step
     /// found as expected is not probed.
-    fn bend(&mut self, factor: &NormalFactor, mut step: Vec<f64>) -> Option<f64> {
+    fn bend(&mut self, factor: &SystemFactor, mut step: Vec<f64>) -> Option<f64> {
         if (self.last_gain - 1.0).abs() > 0.1 {
-            self.try_step(&step, PROBE)?;
+            self.try_step(&step, PROBE, Want::Residuals)?;
             let second = self.second_derivative();
             let bend = factor.solve(&self.current.transpose_apply(self.layout, &second), 0.0);
             let metric = &self.metric;
@@ -67,7 +65,7 @@ impl Iteration<'_, '_> {
             }
             step.iter_mut().zip(&bend).for_each(|(dx, b)| *dx += b);
         }
-        self.try_step(&step, 1.0)
+        self.try_step(&step, 1.0, Want::Jacobians)
     }
 
     /// Half the second derivative of the residuals along the step, from the probe in `trial` and `A·dx` in `moved`.

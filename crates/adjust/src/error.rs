@@ -145,6 +145,14 @@ pub enum Error {
         /// What would be right.
         expected: &'static str,
     },
+    /// A question about the solution that has no answer.
+    #[error("{what}: {reason}")]
+    Untestable {
+        /// What was asked about.
+        what: String,
+        /// Why there is no answer.
+        reason: &'static str,
+    },
     /// A matrix decomposition failed to converge.
     #[error("the {what} did not converge")]
     Decomposition {

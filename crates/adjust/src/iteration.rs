@@ -1,16 +1,36 @@
 use crate::constraints::Constraints;
+use crate::evaluation::Want;
 use crate::layout::Layout;
-use crate::linearisation::{Linearisation, Want};
-use crate::normal::NormalEquations;
+use crate::linearisation::Linearisation;
 use crate::rank::Problem;
+use crate::system::System;
 use crate::{Adjustment, Error, Method, Result, SolveOptions, StepKind, TraceEntry};
 
 /// A damped step that is expected to reduce the objective by less than this share ends the descent.
 const SMALL_GAIN: f64 = 1e-3;
 
+/// Squared residual, in variances, below which an observation fits exactly.
+const EXACT: f64 = 1e-16;
+
 /// Share by which the metric of the damping forgets earlier, longer columns in an iteration. Never forgetting [More1978]
 /// crawls where the start was steep; forgetting at once lets parameters run away on plateaus.
 const FORGETTING: f64 = 2.0;
+
+/// When a descent has done its work.
+pub(crate) struct Ending {
+    /// A step was taken that promised less than this share of the objective.
+    pub(crate) gain: f64,
+    /// A step was taken that reduced the objective by no more than this share.
+    pub(crate) decrease: f64,
+}
+
+impl Ending {
+    /// Whether a step taken from `merit` ended the descent; `gain` is found over expected reduction.
+    pub(crate) fn is_reached(&self, merit: f64, expected: f64, gain: f64, rows: usize) -> bool {
+        let exact = merit <= EXACT * rows as f64;
+        gain > 0.25 && (expected <= self.gain * merit || exact) || gain * expected <= self.decrease * merit
+    }
+}
 
 /// The state of one run.
 pub(crate) struct Iteration<'p, 'a> {
@@ -20,9 +40,15 @@ pub(crate) struct Iteration<'p, 'a> {
     pub(crate) values: Vec<f64>,
     pub(crate) current: Linearisation,
     pub(crate) constraints: Constraints,
-    pub(crate) normal: NormalEquations,
+    pub(crate) system: System,
+    /// `AᵀPv` at the current values.
+    pub(crate) gradient: Vec<f64>,
+    /// Whether the normal equations are those of the current values.
+    is_renewed: bool,
     pub(crate) trace: Vec<TraceEntry>,
     pub(crate) trial: Linearisation,
+    /// Whether the trial has derivatives, so that it need not be evaluated again when it is accepted.
+    trial_is_linearised: bool,
     pub(crate) trial_values: Vec<f64>,
     pub(crate) moved: Vec<f64>,
     /// Weight of the constraints in the merit function (exact penalty: above the largest multiplier).
@@ -33,6 +59,8 @@ pub(crate) struct Iteration<'p, 'a> {
     pub(crate) last_gain: f64,
     /// Column norms, as scale factors, with a memory of longer ones: the metric of the damping.
     pub(crate) metric: Vec<f64>,
+    /// Radius of the region that the dog-leg trusts, in units of the metric.
+    pub(crate) radius: f64,
 }
 
 impl<'p, 'a> Iteration<'p, 'a> {
@@ -46,27 +74,40 @@ impl<'p, 'a> Iteration<'p, 'a> {
             values,
             current: Linearisation::new(layout),
             constraints: Constraints::default(),
-            normal: NormalEquations::new(layout.unknowns),
+            system: System::new(adjustment, layout)?,
+            gradient: Vec::new(),
+            is_renewed: false,
             trace: Vec::new(),
             trial: Linearisation::new(layout),
+            trial_is_linearised: false,
             moved: vec![0.0; layout.rows],
             penalty: 0.0,
             damping: options.initial_damping,
             growth: 2.0,
             last_gain: 0.0,
             metric: vec![f64::INFINITY; layout.unknowns],
+            radius: f64::INFINITY,
         };
+        this.current.evaluate(adjustment, layout, &this.values, Want::Jacobians)?;
         this.linearise()?;
         Ok(this)
     }
 
+    /// Everything that follows from the derivatives in `current`.
     fn linearise(&mut self) -> Result<()> {
-        self.current.evaluate(self.adjustment, self.layout, &self.values, Want::Jacobians)?;
-        self.constraints = Constraints::new(self.adjustment, self.layout, &self.current, &self.values)?;
-        self.normal.accumulate(self.layout, &self.current);
-        let scale = self.normal.scale();
+        self.is_renewed = true;
+        let structure = self.system.structure();
+        self.constraints = Constraints::new(self.adjustment, self.layout, &self.current, &self.values, structure)?;
+        self.system.accumulate(self.layout, &self.current);
+        self.system.gradient().clone_into(&mut self.gradient);
+        let scale = self.system.scale();
         self.metric.iter_mut().zip(scale).for_each(|(metric, scale)| *metric = (FORGETTING * *metric).min(scale));
         Ok(())
+    }
+
+    /// Forms the normal equations where [`Self::accept`] left the old ones.
+    pub(crate) fn renew(&mut self) -> Result<()> {
+        if self.is_renewed { Ok(()) } else { self.linearise() }
     }
 
     /// Runs to the end; the state is then linearised at the solution.
@@ -75,9 +116,9 @@ impl<'p, 'a> Iteration<'p, 'a> {
             return Ok(());
         }
         let mut small_gain = SMALL_GAIN;
-        let mut damped = self.options.method == Method::LevenbergMarquardt;
+        let mut damped = self.options.method != Method::GaussNewton;
         loop {
-            let descended = !damped || self.descend(small_gain)?;
+            let descended = !damped || self.descend(&Ending { gain: small_gain, decrease: 0.0 })?;
             if self.polish(damped && descended)? {
                 return Ok(());
             }
@@ -90,13 +131,21 @@ impl<'p, 'a> Iteration<'p, 'a> {
         }
     }
 
+    /// Steps of the chosen kind until the ending. False where no step reduces the objective any more.
+    pub(crate) fn descend(&mut self, ending: &Ending) -> Result<bool> {
+        match self.options.method {
+            Method::DogLeg => self.follow_dog_leg(ending),
+            _ => self.descend_damped(ending),
+        }
+    }
+
     /// The linearised problem as it stands.
     pub(crate) fn problem(&self) -> Problem<'_> {
         Problem {
             layout: self.layout,
             linearisation: &self.current,
             constraints: &self.constraints,
-            normal: &self.normal,
+            system: &self.system,
         }
     }
 
@@ -110,7 +159,7 @@ impl<'p, 'a> Iteration<'p, 'a> {
             gain += w * m * (2.0 * v - m);
         }
         if self.constraints.first_inner > 0 {
-            let scale = self.normal.scale();
+            let scale = self.system.scale();
             square += self.constraints.scaled(&scale).right.iter().map(|d| d * d).sum::<f64>();
             self.raise_penalty(&scale);
         }
@@ -134,17 +183,30 @@ impl<'p, 'a> Iteration<'p, 'a> {
         at.objective + self.penalty * at.constraint.iter().map(|c| c.abs()).sum::<f64>()
     }
 
-    /// Merit at `values ⊞ share · step`; `None` where the model has no finite value.
-    pub(crate) fn try_step(&mut self, step: &[f64], share: f64) -> Option<f64> {
+    /// Merit at `values ⊞ share · step`; `None` where the model has no finite value. Derivatives are wanted where the
+    /// step is likely to be accepted: then nothing is evaluated twice.
+    pub(crate) fn try_step(&mut self, step: &[f64], share: f64, want: Want) -> Option<f64> {
         let step: Vec<f64> = step.iter().map(|dx| share * dx).collect();
         self.layout.step(self.adjustment, &self.values, &step, &mut self.trial_values);
-        let done = self.trial.evaluate(self.adjustment, self.layout, &self.trial_values, Want::Residuals);
+        let done = self.trial.evaluate(self.adjustment, self.layout, &self.trial_values, want);
+        self.trial_is_linearised = want == Want::Jacobians && done.is_ok();
         let merit = self.merit(&self.trial);
         (done.is_ok() && merit.is_finite()).then_some(merit)
     }
 
-    pub(crate) fn accept(&mut self) -> Result<()> {
+    /// Moves to the trial values. With `keep` the normal equations stay those of before, but for the gradient.
+    pub(crate) fn accept(&mut self, keep: bool) -> Result<()> {
         std::mem::swap(&mut self.values, &mut self.trial_values);
+        if self.trial_is_linearised {
+            std::mem::swap(&mut self.current, &mut self.trial);
+        } else {
+            self.current.evaluate(self.adjustment, self.layout, &self.values, Want::Jacobians)?;
+        }
+        if keep {
+            self.gradient = self.current.transpose_apply(self.layout, &self.current.whitened);
+            self.is_renewed = false;
+            return Ok(());
+        }
         self.linearise()
     }
 
@@ -159,7 +221,7 @@ impl<'p, 'a> Iteration<'p, 'a> {
         Err(self.not_converged("the largest number of iterations is reached"))
     }
 
-    fn not_converged(&self, reason: &'static str) -> Error {
+    pub(crate) fn not_converged(&self, reason: &'static str) -> Error {
         let last = self.trace.last();
         Error::NotConverged {
             iterations: self.trace.len(),

@@ -1,20 +1,21 @@
+use std::ops::Range;
+
 use crate::{Adjustment, Error, Observation, Result};
 
 /// Column of a held parameter.
 pub(crate) const HELD: usize = usize::MAX;
 
-/// Unknowns of a dense normal matrix of 1.8 GB.
-const LARGEST: usize = 15_000;
-
 /// Where everything lies in flat memory: values, columns, rows and Jacobian entries.
 #[derive(Debug, Clone)]
 pub(crate) struct Layout {
     /// Per block, and at the end the total.
-    pub(crate) values: Vec<usize>,
+    values: Vec<usize>,
     /// Start of each block's tangent components in `columns`, and at the end the total.
-    pub(crate) tangent: Vec<usize>,
-    /// Column of each tangent component, or [`HELD`].
-    pub(crate) columns: Vec<usize>,
+    tangent: Vec<usize>,
+    /// Column of each tangent component, or [`HELD`]. The free components of a block follow each other.
+    columns: Vec<usize>,
+    /// First column of each block's free components, and at the end the number of unknowns.
+    first: Vec<usize>,
     /// Number of unknowns.
     pub(crate) unknowns: usize,
     /// Number of rows (components of all observations).
@@ -25,11 +26,13 @@ pub(crate) struct Layout {
     pub(crate) constraints: Vec<Place>,
     /// Number of rows of the constraints.
     pub(crate) constraint_rows: usize,
-    /// For the free parameters of each observation: place in its full Jacobian row, and column. Sorted by column.
-    pub(crate) active: Vec<(usize, usize)>,
-    /// Length of the compact Jacobians of all observations.
+    /// Blocks as the observations name them.
+    named: Vec<Named>,
+    /// Blocks with free parameters, of each observation sorted by column and without repetition.
+    parts: Vec<Part>,
+    /// Length of the compact Jacobians of all observations and constraints.
     pub(crate) jacobian: usize,
-    /// Widest full Jacobian (elements) and largest dimension of any observation.
+    /// Widest full Jacobian (elements) of any observation.
     pub(crate) widest: usize,
 }
 
@@ -38,23 +41,60 @@ pub(crate) struct Layout {
 pub(crate) struct Place {
     pub(crate) row: usize,
     pub(crate) dimension: usize,
-    /// Range in [`Layout::active`].
-    pub(crate) active: (usize, usize),
-    /// Start of its compact Jacobian, `dimension × active`, row-major.
+    /// Free parameters: width of its compact Jacobian.
+    pub(crate) width: usize,
+    /// Start of its compact Jacobian, `dimension × width`, row-major.
     pub(crate) jacobian: usize,
+    /// Columns of its full Jacobian, as the model writes it.
+    pub(crate) full: usize,
+    /// Whether full and compact Jacobian are the same but for the order of blocks.
+    pub(crate) direct: bool,
+    named: (usize, usize),
+    parts: (usize, usize),
+}
+
+/// A block as an observation names it, and where its columns lie in a row of the Jacobian that the model writes.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Named {
+    pub(crate) block: u32,
+    pub(crate) start: u32,
+    pub(crate) width: u32,
+}
+
+/// A block in the compact Jacobian of an observation.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Part {
+    pub(crate) block: u32,
+    /// First column of the block.
+    pub(crate) column: u32,
+    /// Number of columns.
+    pub(crate) width: u32,
+    /// Where they begin in a compact row.
+    pub(crate) offset: u32,
+}
+
+impl Part {
+    pub(crate) fn columns(&self) -> Range<usize> {
+        self.column as usize..(self.column + self.width) as usize
+    }
+
+    pub(crate) fn entries(&self) -> Range<usize> {
+        self.offset as usize..(self.offset + self.width) as usize
+    }
 }
 
 impl Place {
-    pub(crate) fn width(&self) -> usize {
-        self.active.1 - self.active.0
-    }
-
-    pub(crate) fn rows(&self) -> std::ops::Range<usize> {
+    pub(crate) fn rows(&self) -> Range<usize> {
         self.row..self.row + self.dimension
     }
 
-    pub(crate) fn jacobian_range(&self) -> std::ops::Range<usize> {
-        self.jacobian..self.jacobian + self.dimension * self.width()
+    pub(crate) fn jacobian_range(&self) -> Range<usize> {
+        self.jacobian..self.jacobian + self.dimension * self.width
+    }
+
+    /// Where its parts lie among those of all observations.
+    pub(crate) fn part_range(&self) -> Range<usize> {
+        self.parts.0..self.parts.1
     }
 }
 
@@ -79,7 +119,7 @@ impl Layout {
         if adjustment.observations.is_empty() {
             return Err(Error::NoObservations);
         }
-        let (mut values, mut tangent, mut columns) = (vec![0], vec![0], Vec::new());
+        let (mut values, mut tangent, mut columns, mut first) = (vec![0], vec![0], Vec::new(), vec![0]);
         let mut unknowns = 0;
         for (index, block) in adjustment.blocks.iter().enumerate() {
             block.check(index, &block.values)?;
@@ -89,71 +129,134 @@ impl Layout {
                 columns.push(if held { HELD } else { unknowns });
                 unknowns += usize::from(!held);
             }
-        }
-        if unknowns > LARGEST {
-            return Err(Error::TooLarge { unknowns, limit: LARGEST });
+            first.push(unknowns);
         }
         Ok(Self {
             values,
             tangent,
             columns,
+            first,
             unknowns,
             rows: 0,
             observations: Vec::with_capacity(adjustment.observations.len()),
             constraints: Vec::new(),
             constraint_rows: 0,
-            active: Vec::new(),
+            named: Vec::new(),
+            parts: Vec::new(),
             jacobian: 0,
             widest: 0,
         })
     }
 
     fn place(&mut self, observation: &dyn Observation, row: usize) -> Place {
-        let (start, dimension) = (self.active.len(), observation.dimension());
-        let mut width = 0;
+        let (first_named, first_part) = (self.named.len(), self.parts.len());
+        let (mut full, mut direct) = (0, true);
         for block in observation.blocks() {
-            for index in self.tangent[block.0]..self.tangent[block.0 + 1] {
-                let column = self.columns[index];
-                if column != HELD {
-                    self.active.push((width, column));
-                }
-                width += 1;
+            let tangent = self.tangent[block.0 + 1] - self.tangent[block.0];
+            let free = self.free(block.0);
+            direct &= free.len() == tangent;
+            self.named.push(Named { block: block.0 as u32, start: full as u32, width: tangent as u32 });
+            full += tangent;
+            if !free.is_empty() {
+                let (column, width) = (free.start as u32, free.len() as u32);
+                self.parts.push(Part { block: block.0 as u32, column, width, offset: 0 });
             }
         }
-        self.active[start..].sort_by_key(|&(_, column)| column);
-        let place = Place { row, dimension, active: (start, self.active.len()), jacobian: self.jacobian };
-        self.jacobian += dimension * place.width();
-        self.widest = self.widest.max(dimension * width.max(1));
+        self.parts[first_part..].sort_by_key(|part| part.column);
+        let count = self.parts.len();
+        remove_repeated(&mut self.parts, first_part);
+        direct &= count == self.parts.len();
+        let mut width = 0;
+        for part in &mut self.parts[first_part..] {
+            part.offset = width;
+            width += part.width;
+        }
+        if direct {
+            // The model writes where the compact Jacobian wants it.
+            for named in &mut self.named[first_named..] {
+                let part = self.parts[first_part..].iter().find(|part| part.block == named.block);
+                named.start = part.map_or(0, |part| part.offset);
+            }
+        }
+        let (named, parts) = ((first_named, self.named.len()), (first_part, self.parts.len()));
+        let (dimension, width) = (observation.dimension(), width as usize);
+        let place = Place { row, dimension, width, jacobian: self.jacobian, full, direct, named, parts };
+        self.jacobian += dimension * width;
+        self.widest = self.widest.max(dimension * full.max(1));
         place
     }
 
-    /// Columns of the tangent components of a block.
+    /// Columns of the tangent components of a block, [`HELD`] where they have none.
     pub(crate) fn block_columns(&self, block: usize) -> &[usize] {
         &self.columns[self.tangent[block]..self.tangent[block + 1]]
     }
 
+    /// Columns of the free components of a block.
+    pub(crate) fn free(&self, block: usize) -> Range<usize> {
+        self.first[block]..self.first[block + 1]
+    }
+
+    /// The block that a column belongs to.
+    pub(crate) fn block_of(&self, column: usize) -> usize {
+        self.first.partition_point(|&first| first <= column) - 1
+    }
+
+    /// Number of blocks.
+    pub(crate) fn blocks(&self) -> usize {
+        self.first.len() - 1
+    }
+
     /// Where the values of a block lie.
-    pub(crate) fn block_values(&self, block: usize) -> std::ops::Range<usize> {
+    pub(crate) fn block_values(&self, block: usize) -> Range<usize> {
         self.values[block]..self.values[block + 1]
     }
 
-    /// Free parameters of an observation: place in its full Jacobian row, and column.
-    pub(crate) fn active(&self, place: &Place) -> &[(usize, usize)] {
-        &self.active[place.active.0..place.active.1]
+    /// The blocks of an observation as it names them.
+    pub(crate) fn named(&self, place: &Place) -> &[Named] {
+        &self.named[place.named.0..place.named.1]
+    }
+
+    /// The blocks in the compact Jacobian of an observation.
+    pub(crate) fn parts(&self, place: &Place) -> &[Part] {
+        &self.parts[place.part_range()]
+    }
+
+    /// The parts of all observations and constraints.
+    pub(crate) fn all_parts(&self) -> &[Part] {
+        &self.parts
+    }
+
+    /// Columns of the entries of a compact row.
+    pub(crate) fn columns(&self, place: &Place) -> impl Iterator<Item = usize> + Clone {
+        self.parts(place).iter().flat_map(Part::columns)
     }
 
     /// `out = values ⊞ step` for all blocks; `step` is in columns.
     pub(crate) fn step(&self, adjustment: &Adjustment<'_>, values: &[f64], step: &[f64], out: &mut [f64]) {
         let mut tangent = Vec::new();
         for (index, block) in adjustment.blocks.iter().enumerate() {
-            let (range, columns) = (self.block_values(index), self.block_columns(index));
-            if columns.iter().all(|&column| column == HELD) {
+            let (range, columns, free) = (self.block_values(index), self.block_columns(index), self.free(index));
+            if free.is_empty() {
                 out[range.clone()].copy_from_slice(&values[range]);
-                continue;
+            } else if free.len() == columns.len() {
+                block.manifold.plus(&values[range.clone()], &step[free], &mut out[range]);
+            } else {
+                tangent.clear();
+                tangent.extend(columns.iter().map(|&column| if column == HELD { 0.0 } else { step[column] }));
+                block.manifold.plus(&values[range.clone()], &tangent, &mut out[range]);
             }
-            tangent.clear();
-            tangent.extend(columns.iter().map(|&column| if column == HELD { 0.0 } else { step[column] }));
-            block.manifold.plus(&values[range.clone()], &tangent, &mut out[range]);
         }
     }
+}
+
+/// Keeps one of the parts of a block that an observation names twice: its Jacobians add up.
+fn remove_repeated(parts: &mut Vec<Part>, first: usize) {
+    let mut kept = first;
+    for index in first..parts.len() {
+        if kept == first || parts[kept - 1].block != parts[index].block {
+            parts[kept] = parts[index];
+            kept += 1;
+        }
+    }
+    parts.truncate(kept);
 }

@@ -1,5 +1,12 @@
+use rayon::prelude::*;
+
+use crate::evaluation::{Scratch, Want};
 use crate::layout::{Layout, Place};
-use crate::{Adjustment, Error, Jacobians, Observation, Result};
+use crate::{Adjustment, Result};
+
+/// Observations in one piece of work. Sums are formed piece by piece and added in order, so that they do not depend on
+/// the number of threads.
+const PIECE: usize = 256;
 
 /// Residuals and Jacobians at one set of values, in flat memory that is reused from iteration to iteration.
 #[derive(Debug, Clone)]
@@ -20,11 +27,23 @@ pub(crate) struct Linearisation {
     pub(crate) objective: f64,
 }
 
-/// Whether derivatives are wanted.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Want {
-    Residuals,
-    Jacobians,
+/// Consecutive rows of an observation with one weight.
+pub(crate) struct Run<'s> {
+    /// Compact Jacobian of the rows.
+    pub(crate) jacobian: &'s [f64],
+    pub(crate) whitened: &'s [f64],
+    pub(crate) weight: f64,
+}
+
+/// Some observations and their share of the memory.
+struct Piece<'s> {
+    /// Number of the first one.
+    first: usize,
+    places: &'s [Place],
+    residual: &'s mut [f64],
+    whitened: &'s mut [f64],
+    weights: &'s mut [f64],
+    jacobian: &'s mut [f64],
 }
 
 impl Linearisation {
@@ -48,61 +67,148 @@ impl Linearisation {
         values: &[f64],
         want: Want,
     ) -> Result<()> {
-        let mut scratch = Scratch::new(layout, values, want);
+        let pieces = self.pieces(layout);
+        let sums: Vec<Result<(f64, f64)>> = if pieces.len() > 1 {
+            pieces.into_par_iter().map(|piece| piece.evaluate(adjustment, layout, values, want)).collect()
+        } else {
+            pieces.into_iter().map(|piece| piece.evaluate(adjustment, layout, values, want)).collect()
+        };
         (self.vtpv, self.objective) = (0.0, 0.0);
-        for (index, (stored, place)) in adjustment.observations.iter().zip(&layout.observations).enumerate() {
-            let group = &adjustment.groups[stored.group.0];
-            let name = |failure: Failure| failure.name(&group.name, index);
-
-            let (rows, entries) = (place.rows(), place.jacobian_range());
-            let residual = &mut self.residual[rows.clone()];
-            let jacobian = &mut self.jacobian[entries];
-            scratch.evaluate(stored.observation.as_ref(), layout, place, residual, jacobian).map_err(name)?;
-            let whitening = &adjustment.whitening[stored.whitening..];
-            let whitened = &mut self.whitened[rows.clone()];
-            whitened.copy_from_slice(residual);
-            whiten(whitening, whitened, 1);
-            let square: f64 = whitened.iter().map(|v| v * v).sum();
-            let (objective, weight) = group.kernel.evaluate(square);
-            self.weights[rows].fill(weight);
-            self.vtpv += weight * square;
+        for sum in sums {
+            let (vtpv, objective) = sum?;
+            self.vtpv += vtpv;
             self.objective += objective;
-            if want == Want::Jacobians {
-                whiten(whitening, jacobian, place.width());
-            }
         }
+        let mut scratch = Scratch::new(layout, values, want);
         for (index, (constraint, place)) in adjustment.constraints.iter().zip(&layout.constraints).enumerate() {
-            let (rows, entries) = (place.rows(), place.jacobian_range());
-            let (residual, jacobian) = (&mut self.constraint[rows], &mut self.jacobian[entries]);
-            let name = |failure: Failure| failure.name("constraint", index);
-            scratch.evaluate(constraint.as_ref(), layout, place, residual, jacobian).map_err(name)?;
+            let (residual, jacobian) = (&mut self.constraint[place.rows()], &mut self.jacobian[place.jacobian_range()]);
+            let done = scratch.evaluate(constraint.as_ref(), place, residual, jacobian);
+            done.map_err(|failure| failure.name("constraint", index))?;
         }
         Ok(())
     }
 
+    fn pieces<'s>(&'s mut self, layout: &'s Layout) -> Vec<Piece<'s>> {
+        let (mut residual, mut whitened) = (self.residual.as_mut_slice(), self.whitened.as_mut_slice());
+        let (mut weights, mut jacobian) = (self.weights.as_mut_slice(), self.jacobian.as_mut_slice());
+        let chunks = layout.observations.chunks(PIECE).enumerate();
+        let piece = |(index, places): (usize, &'s [Place])| {
+            let rows = places.iter().map(|place| place.dimension).sum();
+            let entries = places.iter().map(|place| place.dimension * place.width).sum();
+            Piece {
+                first: index * PIECE,
+                places,
+                residual: take(&mut residual, rows),
+                whitened: take(&mut whitened, rows),
+                weights: take(&mut weights, rows),
+                jacobian: take(&mut jacobian, entries),
+            }
+        };
+        chunks.map(piece).collect()
+    }
+
     /// `A·dx`, whitened but without robust weights, in `out` (one value a row).
     pub(crate) fn apply(&self, layout: &Layout, step: &[f64], out: &mut [f64]) {
-        for place in &layout.observations {
-            let (active, jacobian) = (layout.active(place), &self.jacobian[place.jacobian_range()]);
-            for (index, row) in place.rows().enumerate() {
-                let entries = &jacobian[index * active.len()..(index + 1) * active.len()];
-                out[row] = entries.iter().zip(active).map(|(a, &(_, column))| a * step[column]).sum();
+        let mut rest = out;
+        let pieces: Vec<_> = layout
+            .observations
+            .chunks(PIECE)
+            .map(|places| (places, take(&mut rest, places.iter().map(|place| place.dimension).sum())))
+            .collect();
+        pieces.into_par_iter().with_min_len(4).for_each(|(places, out)| {
+            let first = places[0].row;
+            for place in places {
+                let out = &mut out[place.row - first..place.row - first + place.dimension];
+                self.apply_one(layout, place, step, out);
+            }
+        });
+    }
+
+    fn apply_one(&self, layout: &Layout, place: &Place, step: &[f64], out: &mut [f64]) {
+        out.fill(0.0);
+        let jacobian = &self.jacobian[place.jacobian_range()];
+        for part in layout.parts(place) {
+            let step = &step[part.columns()];
+            for (out, row) in out.iter_mut().zip(jacobian.chunks_exact(place.width)) {
+                *out += row[part.entries()].iter().zip(step).map(|(a, dx)| a * dx).sum::<f64>();
             }
         }
+    }
+
+    /// The rows of an observation in runs of equal weight: one, unless some of its components are excluded.
+    pub(crate) fn runs<'s>(&'s self, place: &Place) -> impl Iterator<Item = Run<'s>> + use<'s> {
+        let mut jacobian = &self.jacobian[place.jacobian_range()];
+        let mut whitened = &self.whitened[place.rows()];
+        let width = place.width;
+        self.weights[place.rows()].chunk_by(|a, b| a.to_bits() == b.to_bits()).map(move |weights| {
+            let (residuals, rest) = whitened.split_at(weights.len());
+            let (entries, below) = jacobian.split_at(weights.len() * width);
+            (whitened, jacobian) = (rest, below);
+            Run { jacobian: entries, whitened: residuals, weight: weights[0] }
+        })
     }
 
     /// `Aᵀ P rows` for whitened rows.
     pub(crate) fn transpose_apply(&self, layout: &Layout, rows: &[f64]) -> Vec<f64> {
         let mut out = vec![0.0; layout.unknowns];
         for place in &layout.observations {
-            let (active, jacobian) = (layout.active(place), &self.jacobian[place.jacobian_range()]);
-            for (row, entries) in place.rows().zip(jacobian.chunks_exact(active.len().max(1))) {
-                let weighted = self.weights[row] * rows[row];
-                entries.iter().zip(active).for_each(|(a, &(_, column))| out[column] += a * weighted);
+            let jacobian = &self.jacobian[place.jacobian_range()];
+            for part in layout.parts(place) {
+                let out = &mut out[part.columns()];
+                for (row, entries) in place.rows().zip(jacobian.chunks_exact(place.width)) {
+                    let weighted = self.weights[row] * rows[row];
+                    out.iter_mut().zip(&entries[part.entries()]).for_each(|(out, a)| *out += a * weighted);
+                }
             }
         }
         out
     }
+}
+
+impl Piece<'_> {
+    /// Contributions to vᵀPv and to the objective.
+    fn evaluate(self, adjustment: &Adjustment<'_>, layout: &Layout, values: &[f64], want: Want) -> Result<(f64, f64)> {
+        let mut scratch = Scratch::new(layout, values, want);
+        let (mut vtpv, mut objective) = (0.0, 0.0);
+        let Some((row, entry)) = self.places.first().map(|place| (place.row, place.jacobian)) else {
+            return Ok((vtpv, objective));
+        };
+        for (index, place) in self.places.iter().enumerate() {
+            let stored = &adjustment.observations[self.first + index];
+            let group = &adjustment.groups[stored.group.0];
+            let rows = place.row - row..place.row - row + place.dimension;
+            let residual = &mut self.residual[rows.clone()];
+            let start = place.jacobian - entry;
+            let jacobian = &mut self.jacobian[start..start + place.dimension * place.width];
+            let done = scratch.evaluate(stored.observation.as_ref(), place, residual, jacobian);
+            done.map_err(|failure| failure.name(&group.name, self.first + index))?;
+            let whitening = &adjustment.whitening[stored.whitening..];
+            let whitened = &mut self.whitened[rows.clone()];
+            whitened.copy_from_slice(residual);
+            whiten(whitening, whitened, 1);
+            let excluded = adjustment.exclusions.get(&(self.first + index));
+            let is_used = |component: usize| excluded.is_none_or(|excluded| !excluded.mask[component]);
+            let used = whitened.iter().enumerate().filter(|&(component, _)| is_used(component));
+            let square: f64 = used.map(|(_, v)| v * v).sum();
+            let (rho, weight) = group.kernel.evaluate(square);
+            for (component, row) in rows.enumerate() {
+                self.weights[row] = if is_used(component) { weight } else { 0.0 };
+            }
+            vtpv += weight * square;
+            objective += rho;
+            if want == Want::Jacobians {
+                whiten(whitening, jacobian, place.width);
+            }
+        }
+        Ok((vtpv, objective))
+    }
+}
+
+/// Cuts the first `count` elements off a slice.
+pub(crate) fn take<'s>(rest: &mut &'s mut [f64], count: usize) -> &'s mut [f64] {
+    let (head, tail) = std::mem::take(rest).split_at_mut(count);
+    *rest = tail;
+    head
 }
 
 /// `W · matrix` in place for a lower triangular W stored row by row; the matrix is row-major with `width` columns.
@@ -114,105 +220,12 @@ fn whiten(whitening: &[f64], matrix: &mut [f64], width: usize) {
     for row in (0..dimension).rev() {
         let weights = &whitening[row * (row + 1) / 2..(row + 1) * (row + 2) / 2];
         let (above, below) = matrix.split_at_mut(row * width);
-        for (column, out) in below[..width].iter_mut().enumerate() {
-            *out *= weights[row];
-            for (index, weight) in weights[..row].iter().enumerate() {
-                *out += weight * above[index * width + column];
-            }
-        }
-    }
-}
-
-/// What went wrong in one observation, before its name is known.
-struct Failure {
-    component: usize,
-    kind: FailureKind,
-}
-
-enum FailureKind {
-    Model(String),
-    NotFinite(&'static str, f64),
-}
-
-impl Failure {
-    fn model(reason: String) -> Self {
-        Self { component: 0, kind: FailureKind::Model(reason) }
-    }
-
-    fn name(self, group: &str, observation: usize) -> Error {
-        let (group, component) = (group.to_owned(), self.component);
-        match self.kind {
-            FailureKind::Model(reason) => Error::Evaluation { group, observation, reason },
-            FailureKind::NotFinite(what, value) => Error::NotFinite { group, observation, component, what, value },
-        }
-    }
-
-    fn check(values: &[f64], width: usize, what: &'static str) -> std::result::Result<(), Self> {
-        match values.iter().position(|value| !value.is_finite()) {
-            None => Ok(()),
-            Some(index) => Err(Self { component: index / width, kind: FailureKind::NotFinite(what, values[index]) }),
-        }
-    }
-}
-
-/// Memory for one observation at a time, allocated once a pass.
-struct Scratch<'v> {
-    values: &'v [f64],
-    want: Want,
-    parameters: Vec<&'v [f64]>,
-    offsets: Vec<usize>,
-    full: Vec<f64>,
-}
-
-impl<'v> Scratch<'v> {
-    fn new(layout: &Layout, values: &'v [f64], want: Want) -> Self {
-        Self { values, want, parameters: Vec::new(), offsets: Vec::new(), full: vec![0.0; layout.widest] }
-    }
-
-    fn evaluate(
-        &mut self,
-        observation: &dyn Observation,
-        layout: &Layout,
-        place: &Place,
-        residual: &mut [f64],
-        compact: &mut [f64],
-    ) -> std::result::Result<(), Failure> {
-        self.parameters.clear();
-        self.offsets.clear();
-        self.offsets.push(0);
-        let mut width = 0;
-        for block in observation.blocks() {
-            self.parameters.push(&self.values[layout.block_values(block.0)]);
-            width += layout.block_columns(block.0).len();
-            self.offsets.push(width);
-        }
-        if self.want == Want::Residuals {
-            let done = observation.evaluate(&self.parameters, residual, None);
-            done.map_err(|failure| Failure::model(failure.to_string()))?;
-            return Failure::check(residual, 1, "the residual");
-        }
-        let data = &mut self.full[..place.dimension * width];
-        data.fill(0.0);
-        let mut jacobians = Jacobians { data, offsets: &self.offsets, dimension: place.dimension, misused: false };
-        let done = observation.evaluate(&self.parameters, residual, Some(&mut jacobians));
-        done.map_err(|failure| Failure::model(failure.to_string()))?;
-        if jacobians.misused {
-            return Err(Failure::model("a Jacobian of the wrong shape was written".to_owned()));
-        }
-        Failure::check(residual, 1, "the residual")?;
-        Failure::check(jacobians.data, width.max(1), "a derivative")?;
-        self.compress(layout.active(place), width, compact);
-        Ok(())
-    }
-
-    /// Keeps the free parameters' columns.
-    fn compress(&self, active: &[(usize, usize)], width: usize, compact: &mut [f64]) {
-        if active.is_empty() {
-            return;
-        }
-        for (row, out) in compact.chunks_exact_mut(active.len()).enumerate() {
-            for (out, &(place, _)) in out.iter_mut().zip(active) {
-                *out = self.full[row * width + place];
+        let below = &mut below[..width];
+        below.iter_mut().for_each(|out| *out *= weights[row]);
+        for (above, &weight) in above.chunks_exact(width).zip(weights) {
+            // Components are uncorrelated more often than not.
+            if weight != 0.0 {
+                below.iter_mut().zip(above).for_each(|(out, a)| *out += weight * a);
             }
         }
     }

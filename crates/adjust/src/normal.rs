@@ -1,5 +1,5 @@
 use crate::constraints::{Constraints, ScaledConstraints};
-use crate::layout::Layout;
+use crate::layout::{Layout, Place};
 use crate::linearisation::Linearisation;
 use crate::{Error, Result, dense};
 
@@ -22,32 +22,44 @@ impl NormalEquations {
         self.matrix.fill(0.0);
         self.gradient.fill(0.0);
         for place in &layout.observations {
-            let active = layout.active(place);
             let jacobian = &linearisation.jacobian[place.jacobian_range()];
-            for (row, entries) in place.rows().zip(jacobian.chunks_exact(active.len().max(1))) {
-                self.add_row(active, entries, linearisation.whitened[row], linearisation.weights[row]);
+            for (row, entries) in place.rows().zip(jacobian.chunks_exact(place.width.max(1))) {
+                let (residual, weight) = (linearisation.whitened[row], linearisation.weights[row]);
+                self.add_row(layout, place, entries, residual, weight);
             }
         }
     }
 
-    fn add_row(&mut self, active: &[(usize, usize)], entries: &[f64], residual: f64, weight: f64) {
-        for (first, (&(_, column), &a)) in active.iter().zip(entries).enumerate() {
-            let a = weight * a;
-            self.gradient[column] += a * residual;
-            let target = &mut self.matrix[column * self.unknowns..(column + 1) * self.unknowns];
-            target[column] += a * entries[first];
-            for (&(_, row), &b) in active[first + 1..].iter().zip(&entries[first + 1..]) {
-                // Active columns ascend; a block named twice in one observation meets itself off the diagonal twice.
-                target[row] += if row == column { 2.0 * a * b } else { a * b };
+    fn add_row(&mut self, layout: &Layout, place: &Place, entries: &[f64], residual: f64, weight: f64) {
+        let parts = layout.parts(place);
+        for (index, part) in parts.iter().enumerate() {
+            for (entry, column) in part.entries().zip(part.columns()) {
+                let a = weight * entries[entry];
+                self.gradient[column] += a * residual;
+                let target = &mut self.matrix[column * self.unknowns..(column + 1) * self.unknowns];
+                // Columns ascend: only the lower triangle is touched.
+                let own = target[column..part.columns().end].iter_mut().zip(&entries[entry..]);
+                own.for_each(|(sum, b)| *sum += a * b);
+                for other in &parts[index + 1..] {
+                    let target = target[other.columns()].iter_mut().zip(&entries[other.entries()]);
+                    target.for_each(|(sum, b)| *sum += a * b);
+                }
             }
         }
     }
 
-    /// What makes the diagonal one: `dx = scale · y`. An unknown without observations keeps its unit.
+    pub(crate) fn diagonal(&self) -> Vec<f64> {
+        (0..self.unknowns).map(|i| self.matrix[i * self.unknowns + i]).collect()
+    }
+
     pub(crate) fn scale(&self) -> Vec<f64> {
-        let diagonal = (0..self.unknowns).map(|i| self.matrix[i * self.unknowns + i]);
-        diagonal.map(|n| if n > 0.0 { 1.0 / n.sqrt() } else { 1.0 }).collect()
+        unit_scale(&self.diagonal())
     }
+}
+
+/// What makes a diagonal one: `dx = scale · y`. An unknown without observations keeps its unit.
+pub(crate) fn unit_scale(diagonal: &[f64]) -> Vec<f64> {
+    diagonal.iter().map(|&n| if n > 0.0 { 1.0 / n.sqrt() } else { 1.0 }).collect()
 }
 
 /// Factor of `S(N + λD)S + BᵀB` with unit columns, and of the constraints' Schur complement.
@@ -56,9 +68,9 @@ pub(crate) struct NormalFactor {
     pub(crate) scale: Vec<f64>,
     /// Cholesky factor L, column-major, lower.
     factor: Vec<f64>,
-    constraints: ScaledConstraints,
+    pub(crate) constraints: ScaledConstraints,
     /// `N'⁻¹ Bᵀ`, column-major.
-    influence: Vec<f64>,
+    pub(crate) influence: Vec<f64>,
     /// `K = B N'⁻¹ Bᵀ`, full, and its Cholesky factor.
     complement: Vec<f64>,
     complement_factor: Vec<f64>,
@@ -80,15 +92,25 @@ impl NormalFactor {
         constraints: &Constraints,
         damping: Option<(f64, &[f64])>,
     ) -> std::result::Result<Self, Singular> {
-        let n = normal.unknowns;
-        let scale = normal.scale();
-        let constraints = constraints.scaled(&scale);
-        let mut factor = equilibrated(normal, &scale, &constraints);
+        let (n, scale) = (normal.unknowns, normal.scale());
+        let mut matrix = normal.matrix.clone();
         if let Some((lambda, reference)) = damping {
             for (i, (own, reference)) in scale.iter().zip(reference).enumerate() {
-                factor[i * n + i] += lambda * (own / reference).powi(2).max(1.0);
+                matrix[i * n + i] += damping_of(lambda, *own, *reference);
             }
         }
+        Self::of_matrix(matrix, scale, constraints)
+    }
+
+    /// From the lower triangle of a matrix that is used up, and the scale of its unknowns.
+    pub(crate) fn of_matrix(
+        mut factor: Vec<f64>,
+        scale: Vec<f64>,
+        constraints: &Constraints,
+    ) -> std::result::Result<Self, Singular> {
+        let n = scale.len();
+        let constraints = constraints.scaled(&scale);
+        equilibrate(&mut factor, &scale, &constraints);
         if !dense::cholesky(&mut factor, n) {
             return Err(Singular::Normal);
         }
@@ -119,13 +141,15 @@ impl NormalFactor {
 
     /// Solves with the equilibrated matrix alone, in scaled unknowns.
     pub(crate) fn solve_scaled(&self, right: &mut [f64]) {
-        dense::solve_cholesky(&self.factor, self.scale.len(), right, 1);
+        let n = self.scale.len();
+        dense::solve_cholesky(&self.factor, n, right, right.len() / n.max(1));
     }
 
     /// 1-norm of the equilibrated matrix.
     pub(crate) fn norm(&self, normal: &NormalEquations) -> f64 {
         let n = self.scale.len();
-        let mut matrix = equilibrated(normal, &self.scale, &self.constraints);
+        let mut matrix = normal.matrix.clone();
+        equilibrate(&mut matrix, &self.scale, &self.constraints);
         dense::mirror_lower(&mut matrix, n);
         let sums = matrix.chunks_exact(n.max(1)).map(|column| column.iter().map(|v| v.abs()).sum::<f64>());
         sums.fold(0.0, f64::max)
@@ -184,20 +208,23 @@ impl NormalFactor {
     }
 }
 
-/// `S N S + BᵀB`, lower triangle.
-pub(crate) fn equilibrated(normal: &NormalEquations, scale: &[f64], constraints: &ScaledConstraints) -> Vec<f64> {
-    let n = normal.unknowns;
-    let mut out = normal.matrix.clone();
+/// What damping adds to the diagonal of N, for scales of the unknown at present and in the damping's memory.
+pub(crate) fn damping_of(lambda: f64, own: f64, reference: f64) -> f64 {
+    lambda * (own / reference).powi(2).max(1.0) / (own * own)
+}
+
+/// `S N S + BᵀB` in place, lower triangle.
+pub(crate) fn equilibrate(matrix: &mut [f64], scale: &[f64], constraints: &ScaledConstraints) {
+    let n = scale.len();
     for (column, &own) in scale.iter().enumerate() {
-        let target = &mut out[column * n..(column + 1) * n];
-        target[column..].iter_mut().zip(&scale[column..]).for_each(|(value, other)| *value *= own * other);
+        let target = &mut matrix[column * n + column..(column + 1) * n];
+        target.iter_mut().zip(&scale[column..]).for_each(|(value, other)| *value *= own * other);
         for row in constraints.rows.chunks_exact(n) {
             if row[column] != 0.0 {
-                target[column..].iter_mut().zip(&row[column..]).for_each(|(value, b)| *value += row[column] * b);
+                target.iter_mut().zip(&row[column..]).for_each(|(value, b)| *value += row[column] * b);
             }
         }
     }
-    out
 }
 
 fn complement(constraints: &ScaledConstraints, influence: &[f64], n: usize) -> Vec<f64> {

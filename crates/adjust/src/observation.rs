@@ -1,5 +1,6 @@
 use nalgebra::{Dim, Matrix, RawStorage};
 
+use crate::layout::Named;
 use crate::{BlockId, EvaluationFailure};
 
 /// One observation: some numbers that belong together (an image point, a range, a prior) and their model.
@@ -31,8 +32,10 @@ pub trait Observation: Send + Sync {
 #[derive(Debug)]
 pub struct Jacobians<'a> {
     pub(crate) data: &'a mut [f64],
-    /// Where each block begins in a row, and at the end the width of a row.
-    pub(crate) offsets: &'a [usize],
+    /// Where each block begins in a row.
+    pub(crate) named: &'a [Named],
+    /// Length of a row.
+    pub(crate) width: usize,
     pub(crate) dimension: usize,
     pub(crate) misused: bool,
 }
@@ -41,12 +44,16 @@ impl Jacobians<'_> {
     /// Row `row` of the matrix of block `block` (its place in `blocks()`). Where there is no such row or block the
     /// slice is empty, and the adjustment ends with an error that names the observation.
     pub fn row(&mut self, block: usize, row: usize) -> &mut [f64] {
-        if block + 1 >= self.offsets.len() || row >= self.dimension {
-            self.misused = true;
-            return &mut [];
+        match self.named.get(block) {
+            Some(named) if row < self.dimension => {
+                let start = row * self.width + named.start as usize;
+                &mut self.data[start..start + named.width as usize]
+            }
+            _ => {
+                self.misused = true;
+                &mut []
+            }
         }
-        let width = self.offsets[self.offsets.len() - 1];
-        &mut self.data[row * width + self.offsets[block]..row * width + self.offsets[block + 1]]
     }
 
     /// Copies a whole matrix of `dimension × tangent dimension`. A matrix of another shape ends the adjustment with an
@@ -62,9 +69,7 @@ impl Jacobians<'_> {
                 self.misused = true;
                 return;
             }
-            for (out, column) in row.iter_mut().zip(0..) {
-                *out = matrix[(index, column)];
-            }
+            row.iter_mut().zip(matrix.row(index).iter()).for_each(|(out, value)| *out = *value);
         }
     }
 }

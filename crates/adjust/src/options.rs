@@ -8,6 +8,9 @@ pub enum Method {
     /// Damped steps (Levenberg, Marquardt; damping after Nielsen) until they become small, then as Gauss-Newton.
     #[default]
     LevenbergMarquardt,
+    /// Steps within a region of trust, on the way from the steepest descent to the Gauss-Newton step (Powell's dog-leg
+    /// \[Powell1970\]). A step that is not taken costs one evaluation of the model and no factorisation.
+    DogLeg,
 }
 
 /// How to solve.

@@ -42,12 +42,12 @@ impl OrthogonalFactor {
         let mut matrix = vec![0.0; height * (free + 1)];
         let mut row = vec![0.0; n];
         for place in &layout.observations {
-            let (active, jacobian) = (layout.active(place), &linearisation.jacobian[place.jacobian_range()]);
+            let jacobian = &linearisation.jacobian[place.jacobian_range()];
             for (index, target) in place.rows().enumerate() {
                 row.fill(0.0);
                 let weight = linearisation.weights[target].sqrt();
-                for (a, &(_, column)) in jacobian[index * active.len()..].iter().zip(active) {
-                    row[column] += weight * a * scale[column];
+                for (a, column) in jacobian[index * place.width..].iter().zip(layout.columns(place)) {
+                    row[column] = weight * a * scale[column];
                 }
                 for reflector in &reflectors {
                     reflect(reflector, &mut row);
@@ -134,11 +134,10 @@ impl OrthogonalFactor {
 fn column_scale(layout: &Layout, linearisation: &Linearisation) -> Vec<f64> {
     let mut squares = vec![0.0; layout.unknowns];
     for place in &layout.observations {
-        let active = layout.active(place);
-        let rows = linearisation.jacobian[place.jacobian_range()].chunks_exact(active.len().max(1));
+        let rows = linearisation.jacobian[place.jacobian_range()].chunks_exact(place.width.max(1));
         for (row, target) in rows.zip(place.rows()) {
             let weight = linearisation.weights[target];
-            row.iter().zip(active).for_each(|(a, &(_, column))| squares[column] += weight * a * a);
+            row.iter().zip(layout.columns(place)).for_each(|(a, column)| squares[column] += weight * a * a);
         }
     }
     squares.into_iter().map(|s: f64| if s > 0.0 { 1.0 / s.sqrt() } else { 1.0 }).collect()

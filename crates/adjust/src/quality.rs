@@ -1,3 +1,4 @@
+use crate::images::Images;
 use crate::layout::Place;
 use crate::{Error, GroupId, Result, Scale, Solution};
 
@@ -10,7 +11,7 @@ const UNCONTROLLED: f64 = 1e-9;
 pub struct GroupSummary {
     /// Name of the group.
     pub name: String,
-    /// Number of observed values.
+    /// Number of observed values that are not excluded.
     pub observations: usize,
     /// Its part of vᵀPv.
     pub vtpv: f64,
@@ -31,7 +32,7 @@ impl GroupSummary {
 impl Solution {
     /// Redundancy numbers `(I − A Q Aᵀ P)ᵢᵢ` of all observed values, in the order of [`Self::residuals`]: the share of an
     /// error that shows in its residual, 0 (not controlled) to 1. Their sum is the redundancy. P contains the robust
-    /// weights.
+    /// weights. Zero for what is excluded.
     pub fn redundancy_numbers(&self) -> Vec<f64> {
         let mut out = vec![0.0; self.observations()];
         self.for_each_observation(|place, local| {
@@ -46,7 +47,7 @@ impl Solution {
                             * local.whitening(second, index);
                     }
                 }
-                out[row] = 1.0 - self.weights()[row] * used;
+                out[row] = if self.is_excluded(row) { 0.0 } else { 1.0 - self.weights()[row] * used };
             }
         });
         out
@@ -80,10 +81,11 @@ impl Solution {
     pub fn standardised_residuals(&self, scale: Scale) -> Result<Vec<f64>> {
         let deviations = self.residual_deviations(scale)?;
         let numbers = self.redundancy_numbers();
-        let residuals = self.residuals().iter().zip(deviations).zip(numbers);
-        Ok(residuals
-            .map(|((v, sigma), r)| if r > UNCONTROLLED && sigma > 0.0 { v / sigma } else { f64::NAN })
-            .collect())
+        let standardised = |row: usize, v: f64| {
+            let controlled = numbers[row] > UNCONTROLLED || self.is_excluded(row);
+            if controlled && deviations[row] > 0.0 { v / deviations[row] } else { f64::NAN }
+        };
+        Ok(self.residuals().iter().enumerate().map(|(row, &v)| standardised(row, v)).collect())
     }
 
     /// Figures of one group.
@@ -93,7 +95,7 @@ impl Solution {
         let numbers = self.redundancy_numbers();
         let (mut observations, mut vtpv, mut redundancy, mut squares) = (0, 0.0, 0.0, 0.0);
         for (place, _) in self.layout.observations.iter().zip(&self.group_of).filter(|(_, of)| **of == group) {
-            for row in place.rows() {
+            for row in place.rows().filter(|&row| !self.is_excluded(row)) {
                 observations += 1;
                 vtpv += self.weights()[row] * self.linearisation.whitened[row].powi(2);
                 redundancy += numbers[row];
@@ -104,52 +106,34 @@ impl Solution {
         Ok(GroupSummary { name, observations: observations as usize, vtpv, redundancy, rms })
     }
 
-    fn for_each_observation(&self, mut visit: impl FnMut(&Place, &Local<'_>)) {
-        let mut product = Vec::new();
-        let mut local = Local { image: Vec::new(), factor: Vec::new(), whitening: &[] };
-        for (place, &start) in self.layout.observations.iter().zip(&self.whitening_start) {
-            local.whitening = &self.whitening[start..];
-            self.image(place, &mut product, &mut local.image);
-            invert_lower(local.whitening, place.dimension, &mut local.factor);
-            visit(place, &local);
-        }
-    }
-
-    /// `J Q Jᵀ` of one observation, row-major; J is the whitened Jacobian.
-    fn image(&self, place: &Place, product: &mut Vec<f64>, out: &mut Vec<f64>) {
-        let (active, d) = (self.layout.active(place), place.dimension);
-        let jacobian = &self.linearisation.jacobian[place.jacobian_range()];
-        out.clear();
-        out.resize(d * d, 0.0);
-        product.resize(active.len(), 0.0);
-        for second in 0..d {
-            let own = &jacobian[second * active.len()..(second + 1) * active.len()];
-            for (value, &(_, row)) in product.iter_mut().zip(active) {
-                // Q is symmetric: its row is a column, contiguous in memory.
-                let column = &self.cofactor[row * self.layout.unknowns..(row + 1) * self.layout.unknowns];
-                *value = own.iter().zip(active).map(|(a, &(_, other))| a * column[other]).sum();
-            }
-            for first in 0..d {
-                let other = &jacobian[first * active.len()..(first + 1) * active.len()];
-                let share: f64 = other.iter().zip(product.iter()).map(|(a, b)| a * b).sum();
-                out[first * d + second] = share;
-            }
+    pub(crate) fn for_each_observation(&self, mut visit: impl FnMut(&Place, &Local<'_>)) {
+        let images = self.images.get_or_init(|| Images::new(&self.layout, &self.linearisation, &self.cofactor));
+        let mut factor = Vec::new();
+        for (index, (place, &start)) in self.layout.observations.iter().zip(&self.whitening_start).enumerate() {
+            let whitening = &self.whitening[start..];
+            invert_lower(whitening, place.dimension, &mut factor);
+            visit(place, &Local { image: images.image(index), factor: &factor, whitening });
         }
     }
 }
 
 /// Small matrices of one observation.
-struct Local<'s> {
+pub(crate) struct Local<'s> {
     /// `J Q Jᵀ`, row-major.
-    image: Vec<f64>,
+    pub(crate) image: &'s [f64],
     /// L of `C = L Lᵀ`, row-major, full.
-    factor: Vec<f64>,
+    factor: &'s [f64],
     whitening: &'s [f64],
 }
 
 impl Local<'_> {
+    /// L of `C = L Lᵀ`, row-major, full.
+    pub(crate) fn factor(&self) -> &[f64] {
+        self.factor
+    }
+
     /// Element of `L⁻¹`, row >= column.
-    fn whitening(&self, row: usize, column: usize) -> f64 {
+    pub(crate) fn whitening(&self, row: usize, column: usize) -> f64 {
         self.whitening[row * (row + 1) / 2 + column]
     }
 }

@@ -1,11 +1,14 @@
 use std::ops::Range;
+use std::sync::OnceLock;
 
 use nalgebra::{DMatrix, Isometry3};
 
+use crate::cofactor::Cofactor;
+use crate::images::Images;
 use crate::iteration::Iteration;
 use crate::layout::{HELD, Layout};
 use crate::linearisation::Linearisation;
-use crate::rank::Cofactor;
+use crate::system::LARGEST;
 use crate::{
     Adjustment, BlockId, Error, GroupId, ObservationId, ParameterBlock, Result, RigidPose, SolveOptions, TraceEntry,
 };
@@ -23,19 +26,20 @@ pub enum Scale {
 /// and all unknowns are determined.
 #[derive(Debug, Clone)]
 pub struct Solution {
-    blocks: Vec<ParameterBlock>,
+    pub(crate) blocks: Vec<ParameterBlock>,
     pub(crate) groups: Vec<String>,
     pub(crate) group_of: Vec<GroupId>,
     pub(crate) whitening: Vec<f64>,
     pub(crate) whitening_start: Vec<usize>,
+    /// Whether each row is excluded; empty where none is.
+    excluded: Vec<bool>,
     pub(crate) layout: Layout,
     values: Vec<f64>,
     pub(crate) linearisation: Linearisation,
     pub(crate) names: Vec<String>,
-    /// Cofactor matrix of the unknowns, full, column-major.
-    pub(crate) cofactor: Vec<f64>,
-    pub(crate) scale: Vec<f64>,
-    pub(crate) condition: f64,
+    pub(crate) cofactor: Cofactor,
+    /// Made when it is first asked for.
+    pub(crate) images: OnceLock<Images>,
     redundancy: i64,
     trace: Vec<TraceEntry>,
 }
@@ -53,6 +57,7 @@ impl Adjustment<'_> {
         let names = self.unknown_names(&layout);
         let mut iteration = Iteration::new(self, &layout, options)?;
         if let Err(error) = iteration.run() {
+            iteration.renew()?;
             // A descent that finds no end often has none: an undetermined direction is then the better answer.
             let undetermined =
                 matches!(error, Error::NotConverged { .. }) && iteration.problem().factorise()?.is_none();
@@ -75,26 +80,30 @@ impl Adjustment<'_> {
         constraints: usize,
         trace: Vec<TraceEntry>,
     ) -> Solution {
-        let Cofactor { mut matrix, scale, condition } = cofactor;
-        for (column, own) in matrix.chunks_exact_mut(scale.len().max(1)).zip(&scale) {
-            column.iter_mut().zip(&scale).for_each(|(q, other)| *q *= own * other);
-        }
         Solution {
             blocks: self.blocks.clone(),
             groups: self.groups.iter().map(|group| group.name.clone()).collect(),
             group_of: self.observations.iter().map(|stored| stored.group).collect(),
             whitening: self.whitening.clone(),
             whitening_start: self.observations.iter().map(|stored| stored.whitening).collect(),
-            redundancy: (layout.rows + constraints) as i64 - layout.unknowns as i64,
+            excluded: self.excluded_rows(&layout),
+            redundancy: (layout.rows + constraints) as i64 - (layout.unknowns + self.excluded_components()) as i64,
             layout,
             values,
             linearisation,
             names,
-            cofactor: matrix,
-            scale,
-            condition,
+            cofactor,
+            images: OnceLock::new(),
             trace,
         }
+    }
+
+    fn excluded_rows(&self, layout: &Layout) -> Vec<bool> {
+        let mut rows = vec![false; if self.exclusions.is_empty() { 0 } else { layout.rows }];
+        for (&index, exclusion) in &self.exclusions {
+            rows[layout.observations[index].rows()].copy_from_slice(&exclusion.mask);
+        }
+        rows
     }
 
     fn unknown_names(&self, layout: &Layout) -> Vec<String> {
@@ -134,10 +143,15 @@ impl Solution {
         self.check_block(first)?;
         self.check_block(second)?;
         let factor = self.variance_factor(scale)?;
+        let free = self.cofactor.block(&self.layout, first.0, second.0) * factor;
         let (rows, columns) = (self.layout.block_columns(first.0), self.layout.block_columns(second.0));
+        if free.shape() == (rows.len(), columns.len()) {
+            return Ok(free);
+        }
+        let (top, left) = (self.layout.free(first.0).start, self.layout.free(second.0).start);
         Ok(DMatrix::from_fn(rows.len(), columns.len(), |i, j| match (rows[i], columns[j]) {
             (HELD, _) | (_, HELD) => 0.0,
-            (row, column) => factor * self.cofactor(row, column),
+            (row, column) => free[(row - top, column - left)],
         }))
     }
 
@@ -147,16 +161,36 @@ impl Solution {
     }
 
     /// Covariance matrix of all unknowns, in the order of [`Self::unknown_names`].
+    ///
+    /// # Errors
+    /// [`Error::TooLarge`] beyond 15,000 unknowns, where it would take more than 1.8 GB: ask for
+    /// [`Self::covariance`] and [`Self::covariance_between`]. [`Error::NoRedundancy`] for the posterior scale.
     pub fn covariance_matrix(&self, scale: Scale) -> Result<DMatrix<f64>> {
         let factor = self.variance_factor(scale)?;
         let n = self.layout.unknowns;
-        Ok(DMatrix::from_fn(n, n, |row, column| factor * self.cofactor(row, column)))
+        if n > LARGEST {
+            return Err(Error::TooLarge { unknowns: n, limit: LARGEST });
+        }
+        let mut out = DMatrix::zeros(n, n);
+        for second in 0..self.layout.blocks() {
+            for first in second..self.layout.blocks() {
+                let block = self.cofactor.block(&self.layout, first, second) * factor;
+                let place = (self.layout.free(first).start, self.layout.free(second).start);
+                out.view_mut(place, block.shape()).copy_from(&block);
+                out.view_mut((place.1, place.0), (block.ncols(), block.nrows())).copy_from(&block.transpose());
+            }
+        }
+        Ok(out)
     }
 
-    /// Correlation matrix of all unknowns.
+    /// Correlation matrix of all unknowns; empty beyond 15,000 unknowns, where [`Self::covariance_matrix`] is an error.
     pub fn correlation_matrix(&self) -> DMatrix<f64> {
-        let n = self.layout.unknowns;
-        DMatrix::from_fn(n, n, |row, column| self.correlation_of(row, column))
+        let Ok(mut out) = self.covariance_matrix(Scale::Prior) else { return DMatrix::zeros(0, 0) };
+        let deviations: Vec<f64> = out.diagonal().iter().map(|variance| variance.sqrt()).collect();
+        for (mut column, own) in out.column_iter_mut().zip(&deviations) {
+            column.iter_mut().zip(&deviations).for_each(|(q, other)| *q /= own * other);
+        }
+        out
     }
 
     /// Correlation between two single parameters, each a block and a component of its tangent step.
@@ -184,12 +218,17 @@ impl Solution {
         self.layout.unknowns
     }
 
-    /// Number of observed values, components of priors included.
+    /// Whether an observed value (by its place in [`Self::residuals`]) was left out, see [`Adjustment::exclude`].
+    pub fn is_excluded(&self, row: usize) -> bool {
+        self.excluded.get(row).copied().unwrap_or(false)
+    }
+
+    /// Number of observed values, components of priors and excluded ones included.
     pub fn observations(&self) -> usize {
         self.layout.rows
     }
 
-    /// Observations + constraints (datum included) − unknowns.
+    /// Observations that are not excluded + constraints (datum included) − unknowns.
     pub fn redundancy(&self) -> i64 {
         self.redundancy
     }
@@ -220,7 +259,7 @@ impl Solution {
     }
 
     /// Robust weights of all observed values, in the same order: 1 for least squares, towards 0 for what a [`crate::Kernel`]
-    /// takes for a gross error.
+    /// takes for a gross error and for what is excluded.
     pub fn weights(&self) -> &[f64] {
         &self.linearisation.weights
     }
@@ -237,8 +276,40 @@ impl Solution {
         Ok(place.ok_or(Error::UnknownId { what: "observation", index: observation.0, count })?.rows())
     }
 
+    /// Row of one component of an observation.
+    pub(crate) fn row(&self, observation: ObservationId, component: usize) -> Result<usize> {
+        let rows = self.rows(observation)?;
+        let unknown = Error::UnknownId { what: "component", index: component, count: rows.len() };
+        if component < rows.len() { Ok(rows.start + component) } else { Err(unknown) }
+    }
+
+    pub(crate) fn block_label(&self, block: BlockId) -> String {
+        self.blocks.get(block.0).map_or_else(|| format!("block {}", block.0), |known| known.label(block.0))
+    }
+
+    pub(crate) fn parameter_name(&self, (block, component): (BlockId, usize)) -> String {
+        let known = self.blocks.get(block.0).map(|known| known.parameter_name(block.0, component));
+        known.unwrap_or_else(|| format!("block {}", block.0))
+    }
+
+    /// The tangent step from `reference` (ambient) to the adjusted values of a block.
+    pub(crate) fn difference(&self, block: BlockId, reference: &[f64]) -> Result<Vec<f64>> {
+        let values = self.values(block)?;
+        let known = &self.blocks[block.0];
+        known.check(block.0, reference)?;
+        let mut out = vec![0.0; known.tangent_dimension()];
+        known.manifold.minus(values, reference, &mut out);
+        Ok(out)
+    }
+
+    /// Number of components of a block's tangent step, held ones included.
+    pub(crate) fn tangent_dimension(&self, block: BlockId) -> Result<usize> {
+        self.check_block(block)?;
+        Ok(self.layout.block_columns(block.0).len())
+    }
+
     pub(crate) fn cofactor(&self, row: usize, column: usize) -> f64 {
-        self.cofactor[column * self.layout.unknowns + row]
+        self.cofactor.element(&self.layout, row, column)
     }
 
     pub(crate) fn correlation_of(&self, row: usize, column: usize) -> f64 {

@@ -4,8 +4,10 @@
 pub enum StepKind {
     /// Levenberg-Marquardt step that was taken.
     Damped,
-    /// Levenberg-Marquardt step that was not taken: the objective grew, or the model had no value there.
+    /// Damped or trusted step that was not taken: the objective grew, or the model had no value there.
     Rejected,
+    /// Step within the region that the dog-leg trusts.
+    Trusted,
     /// Gauss-Newton step, perhaps shortened.
     Undamped,
 }

@@ -18,7 +18,8 @@ const SIZES: [(usize, usize); 3] = [(176, 144), (640, 480), (1024, 1024)];
 fn camera(width: usize, height: usize) -> Result<Camera> {
     let pitch = 7.04 / width as f64;
     let interior = InteriorOrientation { principal_point_mm: [0.11, -0.07], principal_distance_mm: 8.0 };
-    let lens = LensDistortion { k1: -2.1e-3, k2: 3.0e-5, k3: -4.0e-7, p1: 1.2e-4, p2: -0.8e-4 };
+    let lens =
+        LensDistortion { k1: -2.1e-3, k2: 3.0e-5, k3: -4.0e-7, p1: 1.2e-4, p2: -0.8e-4, ..LensDistortion::default() };
     Camera::new(ImageFormat::new(width, height, [pitch, pitch])?, interior, lens)
 }
 

@@ -12,7 +12,7 @@ fn main() -> Result<()> {
     let camera = Camera::new(
         ImageFormat::new(176, 144, [0.04, 0.04])?,
         InteriorOrientation { principal_point_mm: [0.11, -0.07], principal_distance_mm: 8.0 },
-        LensDistortion { k1: -2.1e-3, k2: 3.0e-5, k3: -4.0e-7, p1: 1.2e-4, p2: -0.8e-4 },
+        LensDistortion { k1: -2.1e-3, k2: 3.0e-5, k3: -4.0e-7, p1: 1.2e-4, p2: -0.8e-4, ..LensDistortion::default() },
     )?;
     let rays = RayTable::new(&camera)?;
 

@@ -13,7 +13,8 @@ pub struct InteriorOrientation {
     pub principal_distance_mm: f64,
 }
 
-/// Radial and decentring lens distortion (Eqs. 8-13), functions of the **observed** image point.
+/// Radial and decentring lens distortion (Eqs. 8-13), affinity and shear `[Fraser1997]`, all functions of the
+/// **observed** image point.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields, default))]
@@ -28,6 +29,10 @@ pub struct LensDistortion {
     pub p1: f64,
     /// Decentring, mm^-1.
     pub p2: f64,
+    /// Affinity, no unit: `dx = b1 xb`, a scale along x that differs from that along y.
+    pub b1: f64,
+    /// Shear, no unit: `dx = b2 yb`, axes that are not at right angles.
+    pub b2: f64,
 }
 
 /// The geometric model of one camera: image format, interior orientation, lens.
@@ -73,6 +78,8 @@ impl Camera {
             ("k3", lens.k3),
             ("p1", lens.p1),
             ("p2", lens.p2),
+            ("b1", lens.b1),
+            ("b2", lens.b2),
         ] {
             if !value.is_finite() {
                 return Err(Error::OutOfDomain { name, value, expected: "a camera parameter is finite" });

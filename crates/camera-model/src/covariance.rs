@@ -8,7 +8,8 @@ use crate::{Camera, LensDistortion};
 ///
 /// - `sigma_range_m`: standard deviation of the range, metre;
 /// - `sigma_pixel`: standard deviations of the observed image point in pixels (column, row); zero for a pixel's own ray;
-/// - `calibration`: covariance of `[xp, yp, c, k1, k2, k3, p1, p2]` in the units of the camera (mm, `mm^-2`, ...).
+/// - `calibration`: covariance of `[xp, yp, c, k1, k2, k3, p1, p2, b1, b2]` in the units of the camera (mm, `mm^-2`,
+///   ...); one of the first eight alone goes in through [`with_affinity_held`].
 ///
 /// NaN where an input is NaN or a standard deviation is negative.
 pub fn point_covariance(
@@ -17,7 +18,7 @@ pub fn point_covariance(
     range_m: f64,
     sigma_range_m: f64,
     sigma_pixel: [f64; 2],
-    calibration: Option<&SMatrix<f64, 8, 8>>,
+    calibration: Option<&SMatrix<f64, 10, 10>>,
 ) -> Matrix3<f64> {
     if [sigma_range_m, sigma_pixel[0], sigma_pixel[1]].iter().any(|sigma| sigma.is_nan() || *sigma < 0.0) {
         return Matrix3::from_element(f64::NAN);
@@ -38,14 +39,22 @@ pub fn point_covariance(
     }
 }
 
+/// The covariance of `[xp, yp, c, k1, k2, k3, p1, p2, b1, b2]` where affinity and shear are known without error: that of
+/// the first eight with zeros beside it.
+pub fn with_affinity_held(covariance: &SMatrix<f64, 8, 8>) -> SMatrix<f64, 10, 10> {
+    let mut padded = SMatrix::<f64, 10, 10>::zeros();
+    padded.fixed_view_mut::<8, 8>(0, 0).copy_from(covariance);
+    padded
+}
+
 /// Derivatives of a back-projected point.
 struct PointDerivatives {
     /// By the range: the unit ray.
     ray: Vector3<f64>,
     /// By the observed image point, metre per millimetre.
     image: Matrix3x2<f64>,
-    /// By `[xp, yp, c, k1, k2, k3, p1, p2]`.
-    calibration: SMatrix<f64, 3, 8>,
+    /// By `[xp, yp, c, k1, k2, k3, p1, p2, b1, b2]`.
+    calibration: SMatrix<f64, 3, 10>,
 }
 
 impl PointDerivatives {
@@ -58,11 +67,11 @@ impl PointDerivatives {
         let by_p = (Matrix3::identity() - ray * ray.transpose()) * (range_m / p.norm());
         let by_corrected: Matrix3x2<f64> = by_p.fixed_columns::<2>(0).into_owned();
         let image = by_corrected * camera.lens.derivative(reduced);
-        let mut calibration = SMatrix::<f64, 3, 8>::zeros();
+        let mut calibration = SMatrix::<f64, 3, 10>::zeros();
         // The observed point stays where it is: the principal point moves all that is counted from it.
         calibration.fixed_columns_mut::<2>(0).copy_from(&-image);
         calibration.fixed_columns_mut::<1>(2).copy_from(&-by_p.column(2));
-        calibration.fixed_columns_mut::<5>(3).copy_from(&(-by_corrected * LensDistortion::design(reduced)));
+        calibration.fixed_columns_mut::<7>(3).copy_from(&(-by_corrected * LensDistortion::design(reduced)));
         Self { ray, image, calibration }
     }
 }

@@ -1,4 +1,4 @@
-//! The lens that leads best from given points to given points.
+//! The radial and decentring lens that leads best from given points to given points.
 
 use adjust::{Adjustment, Covariance, FunctionObservation, Jacobians, ParameterBlock, SolveOptions};
 use nalgebra::{Matrix2, Vector2};
@@ -11,6 +11,9 @@ const ROUNDS: usize = 4;
 
 /// Pixels below which misfits are rounding and no reason for new weights.
 const NEGLIGIBLE_PX: f64 = 1e-9;
+
+/// Coefficients fitted, the first of `LensDistortion::NAMES`: k1 to p2. Affinity belongs to the camera matrix.
+const TERMS: usize = 5;
 
 /// Least weight of a point relative to the largest, so that none is lost.
 const LEAST_WEIGHT: f64 = 1e-6;
@@ -30,7 +33,7 @@ impl Pair {
     }
 }
 
-/// The lens with `from - D(from) = to` for all pairs, the largest misfit being small: least squares in pixels, with
+/// The lens without affinity and shear with `from - D(from) = to` for all pairs, the largest misfit being small: least squares in pixels, with
 /// weights multiplied by each point's misfit from round to round `[Lawson1961]`.
 pub(crate) fn fit_lens(pairs: &[Pair]) -> Result<LensDistortion> {
     let mut weights = vec![1.0; pairs.len()];
@@ -65,11 +68,12 @@ fn largest_misfit(pairs: &[Pair], lens: &LensDistortion) -> f64 {
 /// Weighted least squares of the misfits in pixels; linear in the coefficients.
 fn least_squares(pairs: &[Pair], weights: &[f64]) -> Result<LensDistortion> {
     let mut fit = Adjustment::new();
-    let block = ParameterBlock::euclidean(vec![0.0; 5]).with_parameter_names(LensDistortion::NAMES);
+    let block =
+        ParameterBlock::euclidean(vec![0.0; TERMS]).with_parameter_names(LensDistortion::NAMES.into_iter().take(TERMS));
     let lens = fit.add_block(block);
     let group = fit.add_group("lens correction");
     for (&Pair { from, to, pixel_by_misfit }, weight) in pairs.iter().zip(weights) {
-        let design = pixel_by_misfit * LensDistortion::design(from);
+        let design = pixel_by_misfit * LensDistortion::design(from).fixed_columns::<TERMS>(0);
         let wanted = pixel_by_misfit * (from - to);
         let evaluate = move |parameters: &[&[f64]], residual: &mut [f64], jacobians: Option<&mut Jacobians<'_>>| {
             for (row, residual) in residual.iter_mut().enumerate() {
@@ -86,7 +90,7 @@ fn least_squares(pairs: &[Pair], weights: &[f64]) -> Result<LensDistortion> {
         fit.add_observation(group, observation, &Covariance::from_sigmas(&[sigma, sigma]))?;
     }
     let solution = fit.solve(&SolveOptions::default())?;
-    let mut coefficients = [0.0; 5];
-    coefficients.copy_from_slice(solution.values(lens)?);
+    let mut coefficients = [0.0; 7];
+    coefficients[..TERMS].copy_from_slice(solution.values(lens)?);
     Ok(LensDistortion::from_coefficients(coefficients))
 }

@@ -1,9 +1,9 @@
 //! From the corrected image point back to the observed one, and where that has no answer.
 //!
-//! With `g(u) = u - D(u)` for an observed point `u` counted from the principal point, `D` the correction, the
-//! derivative `J = I - D'` is symmetric: `g` is the gradient of a potential. Around the principal point `J = I`;
-//! as long as `J` stays positive definite the potential is convex and `g` one to one. Where `J` first becomes
-//! singular the model folds over, and beyond it the same corrected points come again.
+//! Let `g(u) = u - D(u)` for an observed point `u` counted from the principal point, `D` the correction, and
+//! `J = I - D'` its derivative. As long as the symmetric part of `J` stays positive definite, `g` is one to one: on any
+//! segment `(g(b) - g(a))ᵀ (b - a) > 0`. Without shear `J` is symmetric itself; where it first becomes singular the
+//! model folds over, and beyond it the same corrected points come again.
 
 use nalgebra::{Matrix2, Vector2};
 
@@ -27,8 +27,8 @@ const SAMPLES_OF_STEP: usize = 4;
 impl LensDistortion {
     /// Whether the model is one to one from the principal point out to `reduced`.
     ///
-    /// First a sufficient bound on the whole disc: the eigenvalues of `D'` are at most
-    /// `3 |k1| r^2 + 5 |k2| r^4 + 7 |k3| r^6 + 6 |p| r`. Where that reaches 1, `J` is looked at along the segment.
+    /// First a sufficient bound on the whole disc: the norm of `D'` is at most
+    /// `3 |k1| r^2 + 5 |k2| r^4 + 7 |k3| r^6 + 6 |p| r + |b|`. Where that reaches 1, `J` is looked at along the segment.
     pub(crate) fn one_to_one_to(&self, reduced: Vector2<f64>) -> bool {
         self.is_mild_within(reduced) || self.is_definite_along(Vector2::zeros(), reduced, SAMPLES_TO_FOLD)
     }
@@ -37,15 +37,17 @@ impl LensDistortion {
     fn is_mild_within(&self, reduced: Vector2<f64>) -> bool {
         let r2 = reduced.norm_squared();
         let radial = r2 * (3.0 * self.k1.abs() + r2 * (5.0 * self.k2.abs() + r2 * 7.0 * self.k3.abs()));
-        radial + 6.0 * self.p1.hypot(self.p2) * r2.sqrt() < 1.0
+        radial + 6.0 * self.p1.hypot(self.p2) * r2.sqrt() + self.b1.hypot(self.b2) < 1.0
     }
 
-    /// Whether `J` is positive definite at samples along a segment, its end among them.
+    /// Whether the symmetric part of `J` is positive definite at samples along a segment, its end among them.
     fn is_definite_along(&self, from: Vector2<f64>, to: Vector2<f64>, samples: usize) -> bool {
         // From the end: there a step meets the fold first.
         (1..=samples).rev().all(|i| {
             let derivative = self.derivative(from + (to - from) * (i as f64 / samples as f64));
-            derivative.determinant() > 0.0 && derivative.trace() > 0.0
+            let skew = 0.5 * (derivative.m12 - derivative.m21);
+            // The determinant of the symmetric part is smaller by the square of the other part.
+            derivative.determinant() > skew * skew && derivative.trace() > 0.0
         })
     }
 
@@ -97,7 +99,7 @@ impl LensDistortion {
     fn rounding_at(&self, observed: Vector2<f64>, corrected: Vector2<f64>) -> f64 {
         let r2 = observed.norm_squared();
         let radial = r2 * (self.k1.abs() + r2 * (self.k2.abs() + r2 * self.k3.abs()));
-        let relative = 1.0 + radial + 3.0 * self.p1.hypot(self.p2) * r2.sqrt();
+        let relative = 1.0 + radial + 3.0 * self.p1.hypot(self.p2) * r2.sqrt() + self.b1.hypot(self.b2);
         8.0 * f64::EPSILON * (relative * r2.sqrt() + corrected.norm())
     }
 }

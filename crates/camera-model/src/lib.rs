@@ -17,7 +17,7 @@ mod ray_table;
 
 pub use back_projection::OrganisedCloud;
 pub use camera::{Camera, InteriorOrientation, LensDistortion};
-pub use covariance::point_covariance;
+pub use covariance::{point_covariance, with_affinity_held};
 pub use error::{Error, Result};
 pub use observation::{Observation, ObservationJacobians};
 #[cfg(feature = "convert")]

@@ -21,8 +21,8 @@ pub struct ObservationJacobians {
     pub pose: SMatrix<f64, 3, 6>,
     /// With respect to the interior orientation `[xp, yp, c]`, millimetre.
     pub interior: Matrix3<f64>,
-    /// With respect to the lens `[k1, k2, k3, p1, p2]`.
-    pub lens: SMatrix<f64, 3, 5>,
+    /// With respect to the lens `[k1, k2, k3, p1, p2, b1, b2]`.
+    pub lens: SMatrix<f64, 3, 7>,
     /// With respect to the object point in world axes, metre.
     pub point: Matrix3<f64>,
 }
@@ -71,8 +71,8 @@ impl Camera {
         pose.fixed_view_mut::<3, 3>(0, 3).copy_from(&(by_camera_point * in_camera.cross_matrix()));
         let by_distance = observed_from_corrected * corrected / self.interior.principal_distance_mm;
         let interior = Matrix3::new(1.0, 0.0, by_distance.x, 0.0, 1.0, by_distance.y, 0.0, 0.0, 0.0);
-        let mut lens = SMatrix::<f64, 3, 5>::zeros();
-        lens.fixed_view_mut::<2, 5>(0, 0).copy_from(&(observed_from_corrected * LensDistortion::design(observed)));
+        let mut lens = SMatrix::<f64, 3, 7>::zeros();
+        lens.fixed_view_mut::<2, 7>(0, 0).copy_from(&(observed_from_corrected * LensDistortion::design(observed)));
         Ok(ObservationJacobians { pose, interior, lens, point })
     }
 

@@ -50,7 +50,8 @@ impl PlumbBob {
     /// coordinates with y **up**. With the names of Eqs. 12, 13 its `p1` is their `p2` and turning y over changes the
     /// sign of the other.
     fn as_correction_of_ideal(&self) -> LensDistortion {
-        LensDistortion { k1: -self.k1, k2: -self.k2, k3: -self.k3, p1: -self.p2, p2: self.p1 }
+        let (k1, k2, k3) = (-self.k1, -self.k2, -self.k3);
+        LensDistortion { k1, k2, k3, p1: -self.p2, p2: self.p1, ..LensDistortion::default() }
     }
 
     /// The ideal point (normalised, y up) that the model shows at a pixel; fails beyond its fold.
@@ -94,20 +95,27 @@ impl Camera {
     /// The `plumb_bob` model that agrees best, over the image, with this camera, and the largest residual in pixels:
     /// how far `plumb_bob` puts a point from where this camera sees it.
     ///
+    /// Affinity becomes `fx / fy`, as `fx = c / (pitch (1 - b1))`. Shear has no counterpart: what it moves is in the
+    /// residual.
+    ///
     /// Fails with [`Error::FoldInsideImage`] where the lens model folds over inside the image.
     pub fn to_plumb_bob(&self) -> Result<(PlumbBob, f64)> {
         self.validate()?;
         crate::ray_table::require_no_fold(self)?;
         let c = self.interior.principal_distance_mm;
-        let pixel_by_misfit = pixels_per_mm(&self.format) * c;
+        let scale = Matrix2::new(1.0 - self.lens.b1, 0.0, 0.0, 1.0) / c;
+        // An affinity of 1 or more has been refused as a fold.
+        let mm_by_misfit = Matrix2::new(c / (1.0 - self.lens.b1), 0.0, 0.0, c);
+        let pixel_by_misfit = pixels_per_mm(&self.format) * mm_by_misfit;
         let pair = |pixel| {
             let observed = self.interior.reduced(self.format.image_from_pixel(pixel));
-            Pair { from: (observed - self.lens.at(observed)) / c, to: observed / c, pixel_by_misfit }
+            Pair { from: (observed - self.lens.at(observed)) / c, to: scale * observed, pixel_by_misfit }
         };
         let pairs: Vec<_> = nodes(&self.format, FIT_NODES).map(pair).collect();
         let lens = fit_lens(&pairs)?;
         let largest = nodes(&self.format, CHECK_NODES).map(|pixel| pair(pixel).misfit(&lens)).fold(0.0, f64::max);
-        let [fx, fy] = self.format.pixel_pitch_mm.map(|pitch| c / pitch);
+        let [pitch_x, pitch_y] = self.format.pixel_pitch_mm;
+        let (fx, fy) = (c / (pitch_x * (1.0 - self.lens.b1)), c / pitch_y);
         let [cx, cy] = self.format.pixel_from_image(self.interior.principal_point_mm);
         let ImageFormat { width, height, .. } = self.format;
         let (k1, k2, k3) = (-lens.k1, -lens.k2, -lens.k3);

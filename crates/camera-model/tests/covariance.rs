@@ -3,7 +3,7 @@
 
 mod common;
 
-use camera_model::{Camera, LensDistortion, point_covariance};
+use camera_model::{Camera, LensDistortion, point_covariance, with_affinity_held};
 use common::plain_camera;
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 use rand::SeedableRng;
@@ -51,9 +51,9 @@ fn range_and_image_point() {
 #[test]
 fn calibration_with_its_correlations() {
     let camera = plain_camera();
-    // Deviations as a self-calibration gives them, and a lower triangle that correlates all eight.
-    let deviations = [0.01, 0.012, 0.02, 1e-4, 1e-5, 4e-7, 5e-5, 6e-5];
-    let lower = SMatrix::<f64, 8, 8>::from_fn(|i, j| match i.cmp(&j) {
+    // Deviations as a self-calibration gives them, and a lower triangle that correlates all ten.
+    let deviations = [0.01, 0.012, 0.02, 1e-4, 1e-5, 4e-7, 5e-5, 6e-5, 3e-4, 2e-4];
+    let lower = SMatrix::<f64, 10, 10>::from_fn(|i, j| match i.cmp(&j) {
         std::cmp::Ordering::Less => 0.0,
         std::cmp::Ordering::Equal => deviations[i],
         std::cmp::Ordering::Greater => 0.4 * deviations[i] * if (i + j) % 2 == 0 { 1.0 } else { -1.0 },
@@ -62,7 +62,7 @@ fn calibration_with_its_correlations() {
     let pixel = [165.0, 12.0];
     let found = point_covariance(&camera, pixel, 4.0, 0.005, [0.0, 0.0], Some(&covariance));
     let expected = sampled(|generator| {
-        let step = lower * SVector::<f64, 8>::from_fn(|_, _| normal(generator));
+        let step = lower * SVector::<f64, 10>::from_fn(|_, _| normal(generator));
         let mut varied: Camera = camera;
         varied.interior.principal_point_mm[0] += step[0];
         varied.interior.principal_point_mm[1] += step[1];
@@ -73,6 +73,18 @@ fn calibration_with_its_correlations() {
     });
     require_agreement(&found, &expected);
     assert!((found - found.transpose()).norm() == 0.0);
+}
+
+#[test]
+fn affinity_that_is_held_adds_nothing() {
+    let camera = plain_camera();
+    let eight = SMatrix::<f64, 8, 8>::identity() * 1e-10;
+    let mut ten = with_affinity_held(&eight);
+    let held = point_covariance(&camera, [3.0, 9.0], 2.0, 0.0, [0.0, 0.0], Some(&ten));
+    assert!(held.trace() > 0.0);
+    ten[(8, 8)] = 1e-10;
+    let more = point_covariance(&camera, [3.0, 9.0], 2.0, 0.0, [0.0, 0.0], Some(&ten));
+    assert!(more[(0, 0)] > held[(0, 0)]);
 }
 
 #[test]

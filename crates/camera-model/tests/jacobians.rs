@@ -77,11 +77,11 @@ proptest! {
         require_close(jacobians.interior.column(0).into(), xp, 1.0, "xp");
         require_close(jacobians.interior.column(1).into(), yp, 1.0, "yp");
         require_close(jacobians.interior.column(2).into(), distance, 10.0, "c");
-        for i in 0..5 {
+        for i in 0..7 {
             // A unit of each coefficient that moves the corner of the image by its own distance.
             let corner = camera.format.image_from_pixel([-0.5, -0.5]);
             let corner = corner[0].hypot(corner[1]);
-            let unit = [corner.powi(-2), corner.powi(-4), corner.powi(-6), corner.recip(), corner.recip()][i];
+            let unit = [corner.powi(-2), corner.powi(-4), corner.powi(-6), corner.recip(), corner.recip(), 1.0, 1.0][i];
             let moved = difference(1e-5, |h| {
                 case.with_camera(|camera| {
                     let mut coefficients = camera.lens.coefficients();
@@ -111,7 +111,7 @@ proptest! {
         prop_assert!((found - slope).norm() < 1e-8, "{found} {slope}");
         // Linear in the coefficients: the design matrix gives the correction itself, to rounding.
         let design = LensDistortion::correction_design(&interior, observed);
-        let linear = design * nalgebra::SVector::<f64, 5>::from(camera.lens.coefficients());
+        let linear = design * nalgebra::SVector::<f64, 7>::from(camera.lens.coefficients());
         prop_assert!((linear - at(0.0, 0.0)).norm() < 1e-14 * interior.principal_distance_mm);
     }
 }

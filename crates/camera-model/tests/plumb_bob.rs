@@ -4,7 +4,7 @@
 
 mod common;
 
-use camera_model::{Camera, Error, PlumbBob};
+use camera_model::{Camera, Error, LensDistortion, PlumbBob};
 use common::plain_camera;
 use nalgebra::Point3;
 use proptest::prelude::*;
@@ -100,13 +100,36 @@ fn tangential_terms_keep_their_meaning() {
 
 #[test]
 fn our_camera_as_plumb_bob() {
-    let camera = plain_camera();
+    let mut camera = plain_camera();
+    camera.lens.b2 = 0.0;
     let (model, residual) = camera.to_plumb_bob().unwrap();
     // Distortion of six pixels in the corner, inverted by as many terms.
     assert!(residual < 0.01, "{residual}");
     let point = Point3::new(0.3, -0.2, -1.0);
     let [ours, theirs] = [camera.project(&point).unwrap(), project(&model, [0.3, 0.2, 1.0])];
     assert!((ours[0] - theirs[0]).hypot(ours[1] - theirs[1]) < 1.1 * residual);
+}
+
+#[test]
+fn affinity_becomes_the_ratio_of_focal_lengths() {
+    let lens = LensDistortion { b1: 0.02, ..LensDistortion::default() };
+    let camera = Camera { lens, ..plain_camera() };
+    let (model, residual) = camera.to_plumb_bob().unwrap();
+    assert!((model.fx * 0.98 - model.fy).abs() < 1e-10, "{model:?}");
+    // Exact but for rounding: both are linear.
+    assert!(residual < 1e-9, "{residual}");
+    assert!(largest_difference(&camera, &model, 3) < 1e-9);
+}
+
+#[test]
+fn shear_has_no_counterpart_and_is_stated() {
+    let lens = LensDistortion { b2: 0.01, ..LensDistortion::default() };
+    let camera = Camera { lens, ..plain_camera() };
+    let (model, residual) = camera.to_plumb_bob().unwrap();
+    let found = largest_difference(&camera, &model, 1);
+    // b2 moves the uppermost row by 0.01 * 72 rows = 0.7 columns; the fit of other terms can hide some of it.
+    assert!(residual > 0.4 && residual < 0.8, "{residual}");
+    assert!((found - residual).abs() < 0.05 * residual, "stated {residual}, found {found}");
 }
 
 #[test]

@@ -44,7 +44,7 @@ proptest! {
     }
 
     #[test]
-    fn nothing_panics(camera in cameras(), numbers in prop::array::uniform5(any::<f64>())) {
+    fn nothing_panics(camera in cameras(), numbers in prop::array::uniform7(any::<f64>())) {
         let wild = Camera { lens: LensDistortion::from_coefficients(numbers), ..camera };
         let point = Point3::new(numbers[0], numbers[1], -numbers[2].abs());
         let _ = wild.observed_image_point([numbers[3], numbers[4]]);
@@ -72,7 +72,7 @@ fn correction_is_that_of_the_equations() {
     let [x, y] = [1.3 - 0.11, -0.9 + 0.07];
     let r2: f64 = x * x + y * y;
     let radial = -2.1e-3 * r2 + 3.0e-5 * r2 * r2 - 4.0e-7 * r2 * r2 * r2;
-    let dx = x * radial + 1.2e-4 * (r2 + 2.0 * x * x) + 2.0 * -0.8e-4 * x * y;
+    let dx = x * radial + 1.2e-4 * (r2 + 2.0 * x * x) + 2.0 * -0.8e-4 * x * y + 7.0e-4 * x - 4.0e-4 * y;
     let dy = y * radial + -0.8e-4 * (r2 + 2.0 * y * y) + 2.0 * 1.2e-4 * x * y;
     let found = camera.lens.correction(&camera.interior, [1.3, -0.9]);
     assert!((found[0] - dx).abs() < 1e-16 && (found[1] - dy).abs() < 1e-16);
@@ -119,6 +119,21 @@ fn strong_barrel_distortion_is_inverted_far_out() {
 }
 
 #[test]
+fn affinity_and_shear_alone_are_a_linear_map() {
+    let lens = LensDistortion { b1: 0.1, b2: -0.3, ..LensDistortion::default() };
+    let camera = Camera { lens, ..plain_camera() };
+    let [x, y] = camera.corrected_image_point([2.11, 0.93]);
+    // From the principal point (0.11, -0.07): x = 2 - 0.1 * 2 + 0.3 * 1, y = 1.
+    assert!((x - (0.11 + 2.1)).abs() < 1e-15 && (y - (-0.07 + 1.0)).abs() < 1e-15, "{x} {y}");
+    let observed = camera.observed_image_point([x, y]).unwrap();
+    assert!((observed[0] - 2.11).abs() < 1e-14 && (observed[1] - 0.93).abs() < 1e-14, "{observed:?}");
+    // An affinity of 1 presses the image flat: nothing can be told of a point.
+    let flat = Camera { lens: LensDistortion { b1: 1.0, ..lens }, ..camera };
+    assert!(flat.observed_image_point([x, y]).is_err());
+    assert!(matches!(camera_model::RayTable::new(&flat), Err(Error::FoldInsideImage { .. })));
+}
+
+#[test]
 fn invalid_cameras_are_refused() {
     let good = plain_camera();
     let mut bad = good;
@@ -127,6 +142,9 @@ fn invalid_cameras_are_refused() {
     bad = good;
     bad.lens.k2 = f64::NAN;
     assert!(bad.validate().is_err());
+    bad = good;
+    bad.lens.b2 = f64::INFINITY;
+    assert!(matches!(bad.validate(), Err(Error::OutOfDomain { name: "b2", .. })));
     bad = good;
     bad.format.width = 0;
     assert!(matches!(bad.validate(), Err(Error::Image(_))));

@@ -3,8 +3,8 @@
 
 use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
 use error_models::{
-    AmplitudeHyperbola, FixedPattern, GrossErrorOptions, RangeErrorModel, RangeTerms, correct_frame, distort_frame,
-    flag_gross_errors,
+    AmplitudeHyperbola, FixedPattern, FurtherTerms, GrossErrorOptions, RangeErrorModel, RangeTerms, correct_frame,
+    distort_frame, flag_gross_errors,
 };
 use range_image::{Flags, ImageFormat, RangeFrame, Raster};
 
@@ -14,6 +14,7 @@ fn model() -> RangeErrorModel {
         terms: RangeTerms { d0: 0.024, periodic: [0.01, -0.02, 0.003, 0.01, -0.005, 0.006], e1: 1e-3, e2: -2e-4 },
         hyperbola: Some(AmplitudeHyperbola { h1: 1e-3, h2: 2e-2, h3: 90.0, amplitude_span: [20.0, 3000.0] }),
         range_span_m: Some([0.2, 20.0]),
+        further: FurtherTerms::default(),
     }
 }
 

@@ -7,10 +7,10 @@ use range_image::{Flags, ImageFormat, Modulation, RangeFrame, Raster};
 fn main() -> Result<(), error_models::Error> {
     let format = ImageFormat::new(64, 48, [0.04, 0.04])?;
     let model = RangeErrorModel {
-        ambiguity_interval_m: Modulation::new(30e6)?.ambiguity_interval_m(),
         terms: RangeTerms { d0: 0.024, periodic: [0.004, 0.0, 0.0, 0.003, 0.008, -0.004], e1: 1e-3, e2: 0.0 },
         hyperbola: Some(AmplitudeHyperbola { h1: 0.002, h2: 0.09, h3: 90.0, amplitude_span: [20.0, 5000.0] }),
         range_span_m: Some([0.3, 8.7]),
+        ..RangeErrorModel::error_free(Modulation::new(30e6)?.ambiguity_interval_m())
     };
     model.validate()?;
     println!("range m   shown error mm   left over mm   of which the amplitude did mm   flagged");

@@ -3,7 +3,7 @@
 use range_image::{Flags, ImageFormat, RangeFrame};
 
 use crate::chunks::{Chunk, Planes};
-use crate::summary::GROUPS;
+use crate::summary::{AMPLITUDE, DELAY, GROUPS, PATTERN, PERIODIC, POLYNOMIAL, TOTAL};
 use crate::{CorrectionSummary, FixedPattern, RangeErrorModel, Result};
 
 /// Turns true ranges into those that the camera would show, in place: the inverse of
@@ -68,8 +68,13 @@ fn distort_pixel(chunk: &mut Chunk<'_>, index: usize, model: &RangeErrorModel, [
     if let Some(sigma) = &mut chunk.sigma {
         sigma[index] = (f64::from(sigma[index]) / (1.0 - correction.range_derivative).abs()) as f32;
     }
-    let groups: [f64; GROUPS] =
-        [correction.total_m() + pattern, correction.periodic_m, correction.delay_m, correction.amplitude_m, pattern];
+    let mut groups = [0.0; GROUPS];
+    groups[TOTAL] = correction.total_m() + pattern;
+    groups[PERIODIC] = correction.periodic_m;
+    groups[DELAY] = correction.delay_m;
+    groups[AMPLITUDE] = correction.amplitude_m;
+    groups[PATTERN] = pattern;
+    groups[POLYNOMIAL] = correction.polynomial_m;
     chunk.tally.count_corrected(groups);
     Ok(())
 }

@@ -38,11 +38,35 @@ pub enum Error {
         /// Unit of the parameter.
         expected: &'static str,
     },
+    /// A number of knots or an order is not one that a model can have.
+    #[error("{name} = {count}: expected {least} to {most}")]
+    OutOfBounds {
+        /// Name of the number.
+        name: &'static str,
+        /// Number given.
+        count: usize,
+        /// Least that is possible.
+        least: usize,
+        /// Most that is possible.
+        most: usize,
+    },
+    /// A list of numbers does not have one for each parameter of the model.
+    #[error("{found} {name} for a model with {expected} parameters")]
+    WrongLength {
+        /// What the numbers are.
+        name: &'static str,
+        /// How many there are.
+        found: usize,
+        /// How many there should be.
+        expected: usize,
+    },
     /// Coefficients of the amplitude hyperbola were given without the amplitudes they were fitted in.
     #[error("h1, h2, h3 are given without the amplitude span they were fitted in")]
     MissingAmplitudeSpan,
     /// Two ranges would be observed as one: the range terms are no invertible map.
-    #[error("the periodic terms change by {slope} m per metre at a range of {range_m} m; below 1 they can be inverted")]
+    #[error(
+        "the range-dependent terms change by {slope} m per metre at a range of {range_m} m; below 1 they can be inverted"
+    )]
     NotMonotone {
         /// Largest derivative of the correction with respect to the range.
         slope: f64,
@@ -91,4 +115,9 @@ pub(crate) fn require_span(name: &'static str, [low, high]: [f64; 2]) -> Result<
         return Ok(());
     }
     Err(Error::OutOfDomain { name, value: high, expected: "the upper bound of a span lies above the lower one" })
+}
+
+/// Refuses a number of knots or an order outside its bounds.
+pub(crate) fn require_count(name: &'static str, count: usize, [least, most]: [usize; 2]) -> Result<()> {
+    if (least..=most).contains(&count) { Ok(()) } else { Err(Error::OutOfBounds { name, count, least, most }) }
 }

@@ -5,16 +5,17 @@ use std::f32::consts::PI;
 use range_image::{Flags, ImageFormat};
 
 use crate::RangeErrorModel;
-use crate::summary::{AMPLITUDE, DELAY, GROUPS, PATTERN, PERIODIC, TOTAL, Tally};
+use crate::kernel_further::{PolynomialLanes, SplineLanes, SurfaceLanes};
+use crate::summary::{AMPLITUDE, DELAY, GROUPS, PATTERN, PERIODIC, POLYNOMIAL, TOTAL, Tally};
 
 /// Pixels of a block.
 pub(crate) const LANES: usize = 32;
 
-type Lanes = [f32; LANES];
-type Mask = [bool; LANES];
+pub(crate) type Lanes = [f32; LANES];
+pub(crate) type Mask = [bool; LANES];
 
 /// Adding and taking off 1.5 * 2^23 rounds a single-precision number below 2^22 to an integer.
-const ROUND: f32 = 12_582_912.0;
+pub(crate) const ROUND: f32 = 12_582_912.0;
 
 /// A model with its coefficients in single precision, for one image format.
 pub(crate) struct Kernel {
@@ -27,6 +28,9 @@ pub(crate) struct Kernel {
     delay_of_first: f64,
     range_span: [f32; 2],
     hyperbola: Option<HyperbolaRatios>,
+    spline: Option<SplineLanes>,
+    polynomial: Option<PolynomialLanes>,
+    surface: Option<SurfaceLanes>,
 }
 
 /// The quotients that Eq. 15 consists of.
@@ -65,14 +69,17 @@ impl Kernel {
         let [low, high] = model.effective_range_span_m();
         let terms = &model.terms;
         let [x, y] = format.image_from_pixel([0.0, 0.0]);
+        let first_mm = [x - principal_point_mm[0], y - principal_point_mm[1]];
+        let step_mm = [format.pixel_pitch_mm[0], -format.pixel_pitch_mm[1]];
+        let further = &model.further;
         Self {
             inverse_interval: (1.0 / interval) as f32,
             wave_number: [base, 2.0 * base, 4.0 * base],
             d0: terms.d0 as f32,
             periodic: terms.periodic.map(|d| d as f32),
-            delay_per_column: (terms.e1 * format.pixel_pitch_mm[0]) as f32,
-            delay_per_row: -terms.e2 * format.pixel_pitch_mm[1],
-            delay_of_first: terms.delay(x - principal_point_mm[0], y - principal_point_mm[1]),
+            delay_per_column: (terms.e1 * step_mm[0]) as f32,
+            delay_per_row: terms.e2 * step_mm[1],
+            delay_of_first: terms.delay(first_mm[0], first_mm[1]),
             range_span: [not_below(low), not_above(high)],
             hyperbola: model.hyperbola.map(|h| HyperbolaRatios {
                 linear: (h.h2 / h.h3) as f32,
@@ -80,20 +87,39 @@ impl Kernel {
                 constant: (1.0 / h.h3) as f32,
                 span: [not_below(h.amplitude_span[0]), not_above(h.amplitude_span[1])],
             }),
+            spline: further.spline.as_ref().map(|spline| SplineLanes::new(spline, interval)),
+            polynomial: further.polynomial.as_ref().map(PolynomialLanes::new),
+            surface: further.surface.as_ref().map(|surface| SurfaceLanes::new(surface, first_mm, step_mm)),
         }
     }
 
     /// Corrects the pixels of `block`, the first of which is `(column, row)`.
     pub(crate) fn correct(&self, block: &mut Block, column: usize, row: usize, tally: &mut LaneTally) {
-        let (periodic, derivative) = self.periodic(&block.range);
-        let (amplitude, known) = self.amplitude(&block.amplitude);
-        let delay = self.delay(column, row);
+        let (periodic, mut derivative) = match &self.spline {
+            Some(spline) => spline.at(&block.range),
+            None => self.periodic(&block.range),
+        };
+        let (amplitude, mut known) = self.amplitude(&block.amplitude);
+        let delay = match &self.surface {
+            Some(surface) => {
+                let (value, in_span) = surface.at(column, row);
+                known = std::array::from_fn(|lane| known[lane] & in_span[lane]);
+                value
+            }
+            None => self.delay(column, row),
+        };
+        // What a polynomial adds goes with the amplitude's part as long as all of it is added up.
+        let mut others: Lanes = std::array::from_fn(|lane| amplitude[lane] + block.pattern[lane]);
+        let polynomial = self.polynomial.as_ref().map(|polynomial| polynomial.at(&block.range));
+        if let Some((value, slope)) = &polynomial {
+            others = std::array::from_fn(|lane| others[lane] + value[lane]);
+            derivative = std::array::from_fn(|lane| derivative[lane] + slope[lane]);
+        }
         let finite = block.range.map(|range| range.abs() <= f32::MAX);
         let inside = block.range.map(|range| within(range, self.range_span));
         #[allow(clippy::needless_bitwise_bool)] // a branch would keep the loop scalar
         let outside: Mask = std::array::from_fn(|lane| finite[lane] & !(inside[lane] & known[lane]));
-        let total: Lanes =
-            std::array::from_fn(|lane| self.d0 + periodic[lane] + delay[lane] + amplitude[lane] + block.pattern[lane]);
+        let total: Lanes = std::array::from_fn(|lane| self.d0 + periodic[lane] + delay[lane] + others[lane]);
         let (range, sigma) = (block.range, block.sigma);
         block.range = std::array::from_fn(|lane| if inside[lane] { range[lane] - total[lane] } else { range[lane] });
         block.sigma = std::array::from_fn(|lane| {
@@ -109,6 +135,9 @@ impl Kernel {
         tally.add(DELAY, &delay, &inside);
         tally.add(AMPLITUDE, &amplitude, &inside);
         tally.add(PATTERN, &block.pattern, &inside);
+        if let Some((value, _)) = &polynomial {
+            tally.add(POLYNOMIAL, value, &inside);
+        }
     }
 
     /// The signal propagation delay of the block that begins at `(column, row)`.

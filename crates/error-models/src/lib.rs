@@ -4,16 +4,25 @@ mod chunks;
 mod correct;
 mod distort;
 mod error;
+mod further;
 mod gross_errors;
 mod hyperbola;
+mod inverse;
 mod kernel;
+mod kernel_further;
+mod legendre;
+mod linear;
 mod mixed_pixels;
 mod model;
 mod model_set;
 mod noise;
 mod parameters;
+mod polynomial;
 mod range_error;
+mod spline;
+mod steepest;
 mod summary;
+mod surface;
 mod terms;
 
 pub use correct::{correct_frame, correct_raster};
@@ -21,9 +30,12 @@ pub use distort::distort_frame;
 pub use error::{Error, Result};
 pub use gross_errors::{FlagCounts, GrossErrorOptions, MixedPixelOptions, flag_gross_errors};
 pub use hyperbola::HyperbolaJacobian;
-pub use model::{AmplitudeHyperbola, FixedPattern, ModelSet, RangeErrorModel, RangeTerms};
+pub use model::{
+    AmplitudeHyperbola, FixedPattern, FurtherShape, FurtherTerms, ImageSurface, ModelSet, PeriodicSpline,
+    PolynomialShape, RangeErrorModel, RangePolynomial, RangeTerms, SurfaceShape,
+};
 pub use noise::{lowest_amplitude, range_sigma_m};
-pub use parameters::{NamedParameter, PARAMETERS, ParameterStatus};
+pub use parameters::{ModelShape, NamedParameter, PARAMETERS, ParameterStatus, parameter_unit};
 pub use range_error::RangeCorrection;
 pub use range_image::NoiseModel;
 pub use summary::{CorrectionSummary, GroupChange};

@@ -7,19 +7,17 @@ use crate::{Error, RangeErrorModel, Result};
 /// of a turn; such a pixel is treated as outside the span.
 pub(crate) const MOST_INTERVALS: f64 = 4096.0;
 
-/// Newton steps, or bisections where Newton leaves the bracket, until the inverse is given up. Bisection
-/// alone needs about 60 for all digits.
-const MOST_ITERATIONS: usize = 100;
-
 /// The correction of one range, by group of terms. It is what is **subtracted** from the observed range.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct RangeCorrection {
     /// d0, metre.
     pub offset_m: f64,
-    /// d2..d7, metre.
+    /// d2..d7 or the spline, metre.
     pub periodic_m: f64,
-    /// e1, e2, metre.
+    /// e1, e2 or the surface, metre.
     pub delay_m: f64,
+    /// Polynomial in range, metre.
+    pub polynomial_m: f64,
     /// Hyperbola (Eq. 15), metre.
     pub amplitude_m: f64,
     /// Derivative of the whole correction with respect to the observed range, metre per metre.
@@ -32,7 +30,7 @@ pub struct RangeCorrection {
 impl RangeCorrection {
     /// Sum of all groups, metre.
     pub fn total_m(&self) -> f64 {
-        self.offset_m + self.periodic_m + self.delay_m + self.amplitude_m
+        self.offset_m + self.periodic_m + self.delay_m + self.polynomial_m + self.amplitude_m
     }
 }
 
@@ -41,25 +39,28 @@ impl RangeErrorModel {
     /// (mm) and amplitude (camera's unit). The amplitude does not matter where there is no hyperbola.
     ///
     /// Nothing is extrapolated:
-    /// - Outside `range_span_m` every group is zero: the pixel keeps its observed range.
+    /// - Outside `range_span_m`, or the span of the polynomial, every group is zero: the pixel keeps its observed range.
     /// - Outside the amplitude span, or where the radicand of Eq. 15 is negative or the amplitude NaN, the
     ///   hyperbola alone is left out: the pixel keeps its range corrected by Eq. 14. (The hyperbola is
     ///   fitted to what Eq. 14 leaves over, so Eq. 14 holds without it, but not the other way round.)
+    /// - Outside the spans of a surface its value at the nearest edge is taken.
     ///
-    /// Both say so in [`RangeCorrection::outside_span`].
+    /// All say so in [`RangeCorrection::outside_span`].
     pub fn correction(&self, range_m: f64, x_mm: f64, y_mm: f64, amplitude: f64) -> RangeCorrection {
         if !self.range_in_span(range_m) {
             return RangeCorrection { outside_span: true, ..RangeCorrection::default() };
         }
-        let (amplitude_m, outside_span) = self.amplitude_correction(amplitude);
-        let (periodic_m, range_derivative) = self.terms.periodic_with_derivative(self.ambiguity_interval_m, range_m);
+        let (amplitude_m, no_amplitude) = self.amplitude_correction(amplitude);
+        let off_surface = self.further.surface.as_ref().is_some_and(|surface| !surface.in_span(x_mm, y_mm));
+        let [(periodic_m, of_periodic), (polynomial_m, of_polynomial)] = self.by_range(range_m);
         RangeCorrection {
             offset_m: self.terms.d0,
             periodic_m,
-            delay_m: self.terms.delay(x_mm, y_mm),
+            delay_m: self.by_position(x_mm, y_mm),
+            polynomial_m,
             amplitude_m,
-            range_derivative,
-            outside_span,
+            range_derivative: of_periodic + of_polynomial,
+            outside_span: no_amplitude || off_surface,
         }
     }
 
@@ -68,67 +69,27 @@ impl RangeErrorModel {
         range_m - self.correction(range_m, x_mm, y_mm, amplitude).total_m()
     }
 
-    /// The range that the camera shows for a true range: the solution `ρ` of `ρ - Δρ(ρ, x, y, a) = r`, to
-    /// machine precision. Arguments as for [`Self::correction`], the amplitude being the observed one.
-    ///
-    /// Groups that do not hold at the pixel are left out in the same way: a solution outside
-    /// `range_span_m` gives the true range back. So the round trip is exact except within one correction of
-    /// the edges of the span.
-    ///
-    /// Refuses arguments that are not finite and terms that are not monotone in the span.
-    pub fn observed_range(&self, true_range_m: f64, x_mm: f64, y_mm: f64, amplitude: f64) -> Result<f64> {
-        self.terms.require_monotone(self.ambiguity_interval_m, self.range_span_m)?;
-        let observed = self.solve_observed_range(true_range_m, x_mm, y_mm, amplitude)?;
-        Ok(observed.unwrap_or(true_range_m))
-    }
-
-    /// [`Self::observed_range`] of a model already known to be monotone; `None` if it is outside the span.
-    pub(crate) fn solve_observed_range(
-        &self,
-        true_range_m: f64,
-        x_mm: f64,
-        y_mm: f64,
-        amplitude: f64,
-    ) -> Result<Option<f64>> {
-        let constant = self.terms.d0 + self.terms.delay(x_mm, y_mm) + self.amplitude_correction(amplitude).0;
-        let target = true_range_m + constant;
-        if !target.is_finite() {
-            return Err(Error::OutOfDomain {
-                name: "true range with its constant correction",
-                value: target,
-                expected: "a finite range at a finite image point",
-            });
-        }
-        let observed = self.invert_periodic(target)?;
-        Ok(Some(observed).filter(|range_m| self.range_in_span(*range_m)))
-    }
-
-    /// Solves `ρ - periodic(ρ) = target` by Newton's method inside a bracket that always holds the solution.
-    fn invert_periodic(&self, target: f64) -> Result<f64> {
+    /// Periodic terms and polynomial, each with its derivative with respect to the range.
+    pub(crate) fn by_range(&self, range_m: f64) -> [(f64, f64); 2] {
         let interval = self.ambiguity_interval_m;
-        let bound = self.terms.periodic_bound();
-        let mut bracket = [target - bound, target + bound];
-        let mut observed = target + self.terms.periodic_correction(interval, target);
-        let mut misclosure = f64::INFINITY;
-        for _ in 0..MOST_ITERATIONS {
-            let (periodic, derivative) = self.terms.periodic_with_derivative(interval, observed);
-            misclosure = observed - periodic - target;
-            bracket[usize::from(misclosure > 0.0)] = observed;
-            let newton = observed - misclosure / (1.0 - derivative);
-            let inside = newton > bracket[0] && newton < bracket[1];
-            let next = if inside { newton } else { f64::midpoint(bracket[0], bracket[1]) };
-            // Four units in the last place of the largest number met: what rounding leaves of the misclosure.
-            let resolution = 4.0 * f64::EPSILON * target.abs().max(bound).max(observed.abs());
-            if misclosure.abs() <= resolution || bracket[1] - bracket[0] <= resolution {
-                return Ok(observed);
-            }
-            observed = next;
+        let periodic = match &self.further.spline {
+            Some(spline) => spline.with_derivative(interval, range_m),
+            None => self.terms.periodic_with_derivative(interval, range_m),
+        };
+        let polynomial = self.further.polynomial.as_ref().map_or((0.0, 0.0), |terms| terms.with_derivative(range_m));
+        [periodic, polynomial]
+    }
+
+    /// Signal propagation delay or surface, metre.
+    pub(crate) fn by_position(&self, x_mm: f64, y_mm: f64) -> f64 {
+        match &self.further.surface {
+            Some(surface) => surface.value(x_mm, y_mm),
+            None => self.terms.delay(x_mm, y_mm),
         }
-        Err(Error::NotConverged { true_range_m: target, misclosure_m: misclosure })
     }
 
     /// Eq. 15 in metre, and whether it had to be left out.
-    fn amplitude_correction(&self, amplitude: f64) -> (f64, bool) {
+    pub(crate) fn amplitude_correction(&self, amplitude: f64) -> (f64, bool) {
         match self.hyperbola.map(|hyperbola| hyperbola.correction(amplitude)) {
             None => (0.0, false),
             Some(None) => (0.0, true),
@@ -142,15 +103,16 @@ impl RangeErrorModel {
         range_m >= low && range_m <= high
     }
 
-    /// The range span, cut to the intervals whose phase a single-precision range can tell.
+    /// The range span, also that of a polynomial, cut to the intervals whose phase a single-precision range can tell.
     pub(crate) fn effective_range_span_m(&self) -> [f64; 2] {
         let furthest = MOST_INTERVALS * self.ambiguity_interval_m;
-        let [low, high] = self.range_span_m.unwrap_or([-furthest, furthest]);
-        [low.max(-furthest), high.min(furthest)]
+        let polynomial = self.further.polynomial.as_ref().map(|terms| terms.range_span_m);
+        let spans = [self.range_span_m, polynomial].into_iter().flatten();
+        spans.fold([-furthest, furthest], |[low, high], span| [low.max(span[0]), high.min(span[1])])
     }
 
     /// Refuses an ambiguity interval that is not positive and finite, coefficients that are not finite,
-    /// bad spans, a hyperbola with `h3 = 0`, and periodic terms so large that the observed range no longer
+    /// bad spans, a hyperbola with `h3 = 0`, sines beside a spline, e1 or e2 beside a surface, and terms so large that the observed range no longer
     /// grows with the true one.
     pub fn validate(&self) -> Result<()> {
         if !(self.ambiguity_interval_m.is_finite() && self.ambiguity_interval_m > 0.0) {
@@ -163,6 +125,7 @@ impl RangeErrorModel {
         self.terms.validate()?;
         self.range_span_m.map_or(Ok(()), |span| require_span("range_span_m", span))?;
         self.hyperbola.map_or(Ok(()), |hyperbola| hyperbola.validate())?;
-        self.terms.require_monotone(self.ambiguity_interval_m, self.range_span_m)
+        self.further.validate_beside(&self.terms)?;
+        self.require_monotone()
     }
 }

@@ -27,10 +27,12 @@ pub struct CorrectionSummary {
     pub total: GroupChange,
     /// Offset d0.
     pub offset: GroupChange,
-    /// Periodic terms d2..d7.
+    /// Periodic terms d2..d7, or the spline.
     pub periodic: GroupChange,
-    /// Signal propagation delay e1, e2.
+    /// Signal propagation delay e1, e2, or the surface.
     pub delay: GroupChange,
+    /// Polynomial in range.
+    pub polynomial: GroupChange,
     /// Amplitude hyperbola.
     pub amplitude: GroupChange,
     /// Fixed pattern.
@@ -43,8 +45,9 @@ pub(crate) const PERIODIC: usize = 1;
 pub(crate) const DELAY: usize = 2;
 pub(crate) const AMPLITUDE: usize = 3;
 pub(crate) const PATTERN: usize = 4;
+pub(crate) const POLYNOMIAL: usize = 5;
 /// Number of groups that differ from pixel to pixel, the total among them.
-pub(crate) const GROUPS: usize = 5;
+pub(crate) const GROUPS: usize = 6;
 
 /// Running counts and sums of `Δρ`; of one chunk of rows, or of several chunks added in their order.
 #[derive(Debug, Clone, Copy, Default)]
@@ -92,6 +95,7 @@ impl Tally {
             offset: GroupChange { mean_m: sign * offset, largest_m: offset.abs() },
             periodic: change(PERIODIC),
             delay: change(DELAY),
+            polynomial: change(POLYNOMIAL),
             amplitude: change(AMPLITUDE),
             pattern: change(PATTERN),
         }

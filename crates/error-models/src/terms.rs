@@ -3,10 +3,8 @@
 use std::f64::consts::PI;
 
 use crate::error::require_finite;
+use crate::steepest::steepest;
 use crate::{Error, RangeTerms, Result};
-
-/// Samples of one period in the search for the steepest place; the shortest wavelength gets a quarter of them.
-const SLOPE_SAMPLES: u32 = 512;
 
 impl RangeTerms {
     /// Names of the nine parameters in the order of [`Self::design_row`] and [`Self::to_array`].
@@ -75,43 +73,20 @@ impl RangeTerms {
     ///
     /// `range_span_m` is where it matters; `None` stands for everywhere.
     pub fn require_monotone(&self, ambiguity_interval_m: f64, range_span_m: Option<[f64; 2]>) -> Result<()> {
-        let bound: f64 = pairs(&self.periodic)
-            .zip(waves(ambiguity_interval_m, 0.0))
-            .map(|([d_sin, d_cos], wave)| wave.number_rad_per_m * d_sin.hypot(d_cos))
-            .sum();
-        if bound < 1.0 {
+        if self.slope_bound(ambiguity_interval_m) < 1.0 {
             return Ok(());
         }
-        let (slope, range_m) = self.steepest(ambiguity_interval_m, range_span_m);
+        let span = range_span_m.filter(|[low, high]| high - low < ambiguity_interval_m);
+        let (slope, range_m) = steepest(span.unwrap_or([0.0, ambiguity_interval_m]), ambiguity_interval_m, |range_m| {
+            self.range_derivative(ambiguity_interval_m, range_m)
+        });
         if slope < 1.0 { Ok(()) } else { Err(Error::NotMonotone { slope, range_m }) }
     }
 
-    /// Largest `∂Δρ/∂ρ` and where it is: the best of dense samples, then golden-section search around it.
-    fn steepest(&self, ambiguity_interval_m: f64, range_span_m: Option<[f64; 2]>) -> (f64, f64) {
-        let [low, high] = match range_span_m {
-            Some([low, high]) if high - low < ambiguity_interval_m => [low, high],
-            _ => [0.0, ambiguity_interval_m],
-        };
-        let slope = |range_m: f64| self.range_derivative(ambiguity_interval_m, range_m);
-        let step = (high - low) / f64::from(SLOPE_SAMPLES);
-        let samples = (0..=SLOPE_SAMPLES).map(|i| low + f64::from(i) * step);
-        let best = samples.max_by(|a, b| slope(*a).total_cmp(&slope(*b))).unwrap_or(low);
-        let mut bracket = [(best - step).max(low), (best + step).min(high)];
-        let golden = (5.0_f64.sqrt() - 1.0) / 2.0;
-        for _ in 0..50 {
-            let width = golden * (bracket[1] - bracket[0]);
-            let inner = [bracket[1] - width, bracket[0] + width];
-            if slope(inner[0]) > slope(inner[1]) {
-                bracket[1] = inner[1];
-            } else {
-                bracket[0] = inner[0];
-            }
-        }
-        let refined = f64::midpoint(bracket[0], bracket[1]);
-        [best, refined].map(|range_m| (slope(range_m), range_m)).into_iter().fold(
-            (f64::NEG_INFINITY, best),
-            |largest, candidate| if candidate.0 > largest.0 { candidate } else { largest },
-        )
+    /// No derivative of the periodic terms with respect to the range is larger.
+    pub(crate) fn slope_bound(&self, ambiguity_interval_m: f64) -> f64 {
+        let steepest = pairs(&self.periodic).zip(waves(ambiguity_interval_m, 0.0));
+        steepest.map(|([d_sin, d_cos], wave)| wave.number_rad_per_m * d_sin.hypot(d_cos)).sum()
     }
 }
 

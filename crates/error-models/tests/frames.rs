@@ -3,7 +3,8 @@
 
 use approx::assert_relative_eq;
 use error_models::{
-    AmplitudeHyperbola, Error, FixedPattern, RangeErrorModel, RangeTerms, correct_frame, correct_raster, distort_frame,
+    AmplitudeHyperbola, Error, FixedPattern, FurtherTerms, RangeErrorModel, RangeTerms, correct_frame, correct_raster,
+    distort_frame,
 };
 use range_image::{Flags, ImageFormat, RangeFrame, Raster};
 
@@ -17,6 +18,7 @@ fn model() -> RangeErrorModel {
         terms: RangeTerms { d0: 0.024, periodic: [0.01, -0.02, 0.03, 0.01, -0.005, 0.006], e1: 3e-3, e2: -2e-3 },
         hyperbola: Some(AmplitudeHyperbola { h1: 1e-3, h2: 2e-2, h3: 90.0, amplitude_span: [20.0, 900.0] }),
         range_span_m: Some([0.3, 30.0]),
+        further: FurtherTerms::default(),
     }
 }
 

@@ -18,7 +18,12 @@ fn hyperbola() -> AmplitudeHyperbola {
 }
 
 fn model() -> RangeErrorModel {
-    RangeErrorModel { ambiguity_interval_m: INTERVAL, terms: terms(), hyperbola: Some(hyperbola()), range_span_m: None }
+    RangeErrorModel {
+        ambiguity_interval_m: INTERVAL,
+        terms: terms(),
+        hyperbola: Some(hyperbola()),
+        ..RangeErrorModel::error_free(INTERVAL)
+    }
 }
 
 #[test]

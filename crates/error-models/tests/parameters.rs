@@ -1,7 +1,7 @@
 //! Models as lists of named parameters, and the way through RON.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-use error_models::{AmplitudeHyperbola, Error, NamedParameter, PARAMETERS, RangeErrorModel, RangeTerms};
+use error_models::{AmplitudeHyperbola, Error, FurtherTerms, NamedParameter, PARAMETERS, RangeErrorModel, RangeTerms};
 
 fn model() -> RangeErrorModel {
     RangeErrorModel {
@@ -9,6 +9,7 @@ fn model() -> RangeErrorModel {
         terms: RangeTerms { d0: 0.024, periodic: [0.01, -0.02, 0.003, 0.1 / 3.0, -0.005, 0.006], e1: 1e-3, e2: -2e-4 },
         hyperbola: Some(AmplitudeHyperbola { h1: 1e-3, h2: 2e-2, h3: 90.0, amplitude_span: [20.0, 3000.0] }),
         range_span_m: Some([0.5, 7.0]),
+        further: FurtherTerms::default(),
     }
 }
 

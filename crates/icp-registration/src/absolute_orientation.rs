@@ -1,4 +1,4 @@
-//! Closed-form absolute orientation from point pairs: Horn's unit quaternion (method 2 of `[Eggert1998]`).
+//! Closed-form absolute orientation from point pairs: Horn's unit quaternion (method 2 of `[Eggert1997]`).
 
 use nalgebra::{Isometry3, Matrix3, Matrix4, Matrix6, Point3, Quaternion, SymmetricEigen, UnitQuaternion, Vector3};
 

@@ -4,7 +4,7 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 
 use camera_model::step_pose;
-use error_models::{ModelSet, RangeErrorModel, RangeTerms};
+use error_models::{ModelSet, RangeErrorModel};
 use nalgebra::Isometry3;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
@@ -144,7 +144,7 @@ fn disturbed(pose: &Isometry3<f64>, source: &SimulateSource, generator: &mut Pcg
 fn true_calibration(spec: &SimulationSpec, simulator: &Simulator, scene: &str) -> Result<Calibration> {
     let models = match &spec.errors.range {
         Some(models) => models.clone(),
-        None => modulations(spec)?.iter().map(|m| error_free(m.ambiguity_interval_m())).collect(),
+        None => modulations(spec)?.iter().map(|m| RangeErrorModel::error_free(m.ambiguity_interval_m())).collect(),
     };
     let set = ModelSet { entries: vec![(spec.exposure.integration_time_s, models)] };
     let scattering = spec.errors.scattering.as_ref();
@@ -158,10 +158,6 @@ fn true_calibration(spec: &SimulationSpec, simulator: &Simulator, scene: &str) -
 
 fn modulations(spec: &SimulationSpec) -> Result<Vec<Modulation>> {
     spec.camera.modulations().map_err(|error| Error::Camera(error.to_string()))
-}
-
-fn error_free(ambiguity_interval_m: f64) -> RangeErrorModel {
-    RangeErrorModel { ambiguity_interval_m, terms: RangeTerms::default(), hyperbola: None, range_span_m: None }
 }
 
 fn survey(spec: &SimulationSpec, frames: Vec<FrameEntry>) -> Survey {

@@ -8,7 +8,8 @@ use std::path::Path;
 
 use camera_model::{Camera, ImageFormat, InteriorOrientation, LensDistortion};
 use error_models::{
-    AmplitudeHyperbola, FixedPattern, ModelSet, NamedParameter, ParameterStatus, RangeErrorModel, RangeTerms,
+    AmplitudeHyperbola, FixedPattern, FurtherShape, ModelSet, NamedParameter, ParameterStatus, PolynomialShape,
+    RangeErrorModel, RangeTerms, SurfaceShape,
 };
 use proptest::prelude::*;
 use range_image::{Modulation, NoiseModel};
@@ -21,16 +22,16 @@ mod common;
 fn camera() -> Camera {
     let format = ImageFormat::new(4, 3, [0.04, 0.041]).unwrap();
     let interior = InteriorOrientation { principal_point_mm: [0.1, -0.2], principal_distance_mm: 8.1 };
-    let lens = LensDistortion { k1: 1e-3, k2: -2e-5, k3: 0.0, p1: 1e-5, p2: -3e-5 };
+    let lens = LensDistortion { k1: 1e-3, k2: -2e-5, k3: 0.0, p1: 1e-5, p2: -3e-5, b1: 2e-4, b2: -1e-4 };
     Camera::new(format, interior, lens).unwrap()
 }
 
 fn model(hz: f64) -> RangeErrorModel {
     RangeErrorModel {
-        ambiguity_interval_m: Modulation::new(hz).unwrap().ambiguity_interval_m(),
         terms: RangeTerms { d0: 0.024, periodic: [0.01, -0.02, 0.003, 0.0, 0.005, 0.006], e1: 1e-3, e2: -2e-4 },
         hyperbola: Some(AmplitudeHyperbola { h1: -1e-4, h2: 2e-2, h3: 90.0, amplitude_span: [20.0, 3000.0] }),
         range_span_m: Some([0.5, 7.0]),
+        ..RangeErrorModel::error_free(Modulation::new(hz).unwrap().ambiguity_interval_m())
     }
 }
 
@@ -88,6 +89,38 @@ fn models_come_back_from_a_calibration() {
 }
 
 #[test]
+fn further_range_terms_come_back() {
+    let further = FurtherShape {
+        spline_knots: Some(8),
+        polynomial: Some(PolynomialShape { order: 2, range_span_m: [0.5, 7.0] }),
+        surface: Some(SurfaceShape { order: 2, x_span_mm: [-0.08, 0.06], y_span_mm: [-0.04, 0.05] }),
+    };
+    let mut wavy = model(20e6).with_further(&further).unwrap();
+    let values: Vec<f64> = (0..wavy.parameter_count()).map(|i| 1e-3 / (i as f64 + 3.0)).collect();
+    wavy.set_parameter_values(&values).unwrap();
+    let set = ModelSet { entries: vec![(0.001, vec![wavy])] };
+    let calibration = Calibration::from_models(&camera(), &set, None).unwrap();
+    let text = calibration.to_text().unwrap();
+    for part in ["spline_knots: 8", "order: 2", "x_span_mm: (-0.08, 0.06)", "\"s6\"", "\"q2\"", "\"g02\""] {
+        assert!(text.contains(part), "{part} is not in {text}");
+    }
+    assert_eq!(back(&calibration).model_set().unwrap(), set);
+    // Without its shape a coefficient has no meaning.
+    let shapeless = Calibration::parse(Path::new("c.ron"), &text.replace("spline_knots: 8", "spline_knots: 7"));
+    assert!(shapeless.unwrap_err().to_string().contains("'s6' is no range-error parameter"));
+}
+
+#[test]
+fn a_file_of_before_affinity_reads_as_without() {
+    let mut older = full();
+    older.parameters.truncate(8);
+    assert!(!older.to_text().unwrap().contains("b1") && !older.to_text().unwrap().contains("further"));
+    let lens = LensDistortion { b1: 0.0, b2: 0.0, ..camera().lens };
+    assert_eq!(back(&older).camera().unwrap(), Camera { lens, ..camera() });
+    assert_eq!(older.camera_covariance().unwrap()[(9, 9)], 0.0);
+}
+
+#[test]
 fn a_file_is_written_and_read() {
     let folder = tempfile::tempdir().unwrap();
     full().write(folder.path().join(Calibration::FILE_NAME)).unwrap();
@@ -98,7 +131,7 @@ fn a_file_is_written_and_read() {
 fn covariances_follow_from_deviations_and_correlations() {
     let calibration = full();
     let names = calibration.parameter_names();
-    assert_eq!((names[0].as_str(), names[8].as_str(), names.len()), ("xp", "d0[0]", 8 + 4 * 12));
+    assert_eq!((names[0].as_str(), names[10].as_str(), names.len()), ("xp", "d0[0]", 10 + 4 * 12));
     let covariance = calibration.covariance(&["c", "d0[1]", "k1"]).unwrap();
     // Products of two decimal numbers in double precision.
     assert!((covariance[(0, 1)] - 0.9 * 0.004 * 0.002).abs() < 1e-18);
@@ -116,7 +149,7 @@ proptest! {
 
     #[test]
     fn every_bit_comes_back(
-        values in prop::collection::vec(prop::num::f64::NORMAL, 8),
+        values in prop::collection::vec(prop::num::f64::NORMAL, 10),
         sigma in prop::num::f64::POSITIVE | prop::num::f64::ZERO,
         pattern in prop::collection::vec(prop::num::f32::NORMAL | prop::num::f32::SUBNORMAL | prop::num::f32::ZERO, 12),
         r in -1.0..1.0_f64,

@@ -59,10 +59,9 @@ fn difference(index: usize) -> RangeDifference {
 
 fn model() -> RangeErrorModel {
     RangeErrorModel {
-        ambiguity_interval_m: 5.0,
         terms: RangeTerms { d0: 0.02, periodic: [0.006, -0.004, 0.003, 0.005, -0.009, 0.004], e1: 2e-3, e2: -1e-3 },
         hyperbola: Some(AmplitudeHyperbola { h1: 0.002, h2: 0.05, h3: 25.0, amplitude_span: [10.0, 1000.0] }),
-        range_span_m: None,
+        ..RangeErrorModel::error_free(5.0)
     }
 }
 

@@ -20,7 +20,7 @@ fn main() -> Result<()> {
     let camera = Camera::new(format, interior, LensDistortion::default())?;
     let interval = Modulation::new(30e6)?.ambiguity_interval_m();
     let terms = RangeTerms { d0: 0.024, periodic: [0.004, 0.0, 0.0, 0.003, 0.008, -0.004], e1: 1e-3, e2: 0.0 };
-    let truth = RangeErrorModel { ambiguity_interval_m: interval, terms, hyperbola: None, range_span_m: None };
+    let truth = RangeErrorModel { terms, ..RangeErrorModel::error_free(interval) };
 
     let options = DifferenceOptions { step: 4, ..DifferenceOptions::default() };
     let mut differences = Vec::new();

@@ -1,7 +1,7 @@
 //! The result of a range calibration.
 
 use adjust::{Diagnosis, Scale, Solution};
-use error_models::{NamedParameter, PARAMETERS, RangeErrorModel};
+use error_models::{NamedParameter, RangeErrorModel, parameter_unit};
 use nalgebra::DMatrix;
 
 use crate::Result;
@@ -43,8 +43,7 @@ impl RangeCalibration {
 
     /// Units of the estimated parameters, in the order of the matrices.
     pub fn estimated_units(&self) -> Vec<&'static str> {
-        let unit = |name: &String| PARAMETERS.iter().find(|(known, _)| known == name).map_or("", |(_, unit)| *unit);
-        self.estimated_names().iter().map(unit).collect()
+        self.estimated_names().iter().map(|name| parameter_unit(name).unwrap_or_default()).collect()
     }
 
     /// Covariance matrix of the estimated parameters. [`Scale::Prior`] takes the standard deviations of the
@@ -64,6 +63,14 @@ impl RangeCalibration {
     /// the deviations of the parameters are too small even when scaled with it.
     pub fn sigma0(&self) -> Option<f64> {
         self.solution.sigma0()
+    }
+
+    /// Schwarz's information criterion `n ln(vᵀPv / n) + u ln n` of n differences and u unknowns `[Schwarz1978]`: of two
+    /// calibrations from the same differences, the one with the smaller is to be preferred. `-∞` where nothing is left
+    /// over.
+    pub fn schwarz_criterion(&self) -> f64 {
+        let n = self.solution.observations() as f64;
+        n * (self.solution.vtpv() / n).ln() + self.solution.unknowns() as f64 * n.ln()
     }
 
     /// Differences minus unknowns.

@@ -74,19 +74,15 @@ pub fn differences_to_plane(
         let mismatch = range_image::Error::SizeMismatch { what: "frame", width, height, found_width, found_height };
         return Err(Error::Image(mismatch));
     }
-    let [cols, rows] = options.window.unwrap_or([[0, width - 1], [0, height - 1]]);
     let smallest_cosine = options.largest_incidence_rad.cos();
     let mut differences = Vec::new();
-    for row in (rows[0]..=rows[1].min(height - 1)).step_by(options.step) {
-        for col in (cols[0]..=cols[1].min(width - 1)).step_by(options.step) {
-            let usable = frame.range[(col, row)].is_finite() && !frame.flags[(col, row)].intersects(options.exclude);
-            let pixel = [col as f64, row as f64];
-            let seen = plane.reference_range(camera, world_from_camera, pixel).ok();
-            let Some((reference, _)) = seen.filter(|(_, cosine)| usable && *cosine >= smallest_cosine) else {
-                continue;
-            };
-            differences.push(difference(frame, camera, [col, row], reference, options.unknown_sigma_m));
-        }
+    for [col, row] in options.positions(width, height) {
+        let usable = frame.range[(col, row)].is_finite() && !frame.flags[(col, row)].intersects(options.exclude);
+        let seen = plane.reference_range(camera, world_from_camera, [col as f64, row as f64]).ok();
+        let Some((reference, _)) = seen.filter(|(_, cosine)| usable && *cosine >= smallest_cosine) else {
+            continue;
+        };
+        differences.push(difference(frame, camera, [col, row], reference, options.unknown_sigma_m));
     }
     Ok(differences)
 }
@@ -112,7 +108,15 @@ fn difference(
 }
 
 impl DifferenceOptions {
-    fn validate(&self) -> Result<()> {
+    /// Columns and rows of the pixels that window and step choose, row by row.
+    pub(crate) fn positions(&self, width: usize, height: usize) -> impl Iterator<Item = [usize; 2]> + use<> {
+        let step = self.step.max(1);
+        let [cols, rows] = self.window.unwrap_or([[0, width - 1], [0, height - 1]]);
+        let along = move |span: [usize; 2], size: usize| (span[0]..=span[1].min(size - 1)).step_by(step);
+        along(rows, height).flat_map(move |row| along(cols, width).map(move |col| [col, row]))
+    }
+
+    pub(crate) fn validate(&self) -> Result<()> {
         let refuse = |name, value, expected| Err(Error::OutOfDomain { name, value, expected });
         if self.step == 0 {
             return refuse("step", 0.0, "every n-th pixel, n at least 1");

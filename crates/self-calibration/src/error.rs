@@ -52,6 +52,39 @@ pub enum Error {
         /// Smallest and largest range observed, metre.
         range_span_m: [f64; 2],
     },
+    /// The captures of planes cannot tell some parameters apart.
+    #[error(
+        "the captures of planes cannot tell these parameters apart: {combination} (inflation {inflation:.0}); \
+         give some planes together with poses, or a wider field of view and more distances, or hold one of them"
+    )]
+    PlanesNotDetermined {
+        /// The combinations of parameters that are not, or hardly, determined, with their weights.
+        combination: String,
+        /// How many times larger the deviation of the worst combination is than if its parameters did not share
+        /// their effect; infinite where nothing determines it.
+        inflation: f64,
+    },
+    /// A frame shows no plane: fewer than three usable pixels, or points on a line.
+    #[error("the usable pixels of `{station}` do not span a plane")]
+    NoPlane {
+        /// Name of the capture.
+        station: String,
+    },
+    /// A capture names a plane that is not in the list.
+    #[error("`{station}` shows plane {plane}, but there are {planes}")]
+    UnknownPlane {
+        /// Name of the capture.
+        station: String,
+        /// Position named.
+        plane: usize,
+        /// Number of planes.
+        planes: usize,
+    },
+    /// A hyperbola is to be estimated together with planes.
+    #[error(
+        "with unknown planes a hyperbola is held, not estimated: estimate it from the differences to adjusted planes"
+    )]
+    HyperbolaNotHeld,
     /// No hyperbola runs anywhere near the residuals.
     #[error("no start values for h1, h2, h3: {reason}")]
     NoHyperbola {

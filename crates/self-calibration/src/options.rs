@@ -1,6 +1,9 @@
 //! What is estimated and what is held.
 
-use error_models::{AmplitudeHyperbola, RangeTerms};
+use adjust::{Adjustment, BlockId, ParameterBlock};
+use error_models::{
+    AmplitudeHyperbola, FurtherShape, FurtherTerms, PolynomialShape, RangeErrorModel, RangeTerms, SurfaceShape,
+};
 
 use crate::{Error, Result};
 
@@ -27,13 +30,16 @@ pub enum HyperbolaUse {
 }
 
 /// Options of [`estimate_range_terms`](crate::estimate_range_terms). Default: d0, d2..d7, e1, e2 estimated, no
-/// hyperbola.
+/// hyperbola, no further terms.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RangeTermOptions {
-    /// In the order of [`RangeTerms::NAMES`]: d0, d2..d7, e1, e2.
+    /// In the order of [`RangeTerms::NAMES`]: d0, d2..d7, e1, e2. Those that a spline or a surface stands instead of
+    /// are not there, whatever they say, but must not be held at a value.
     pub terms: [TermUse; 9],
     /// Eq. 15.
     pub hyperbola: HyperbolaUse,
+    /// Spline, polynomial and surface; all their coefficients are estimated.
+    pub further: FurtherShape,
     /// A combination of parameters is refused as not determined if sharing its effect makes its deviation so many
     /// times larger: what is not in the model grows by that factor as well. Default 100.
     pub largest_inflation: f64,
@@ -41,7 +47,12 @@ pub struct RangeTermOptions {
 
 impl Default for RangeTermOptions {
     fn default() -> Self {
-        Self { terms: [TermUse::Estimate; 9], hyperbola: HyperbolaUse::None, largest_inflation: 100.0 }
+        Self {
+            terms: [TermUse::Estimate; 9],
+            hyperbola: HyperbolaUse::None,
+            further: FurtherShape::default(),
+            largest_inflation: 100.0,
+        }
     }
 }
 
@@ -71,24 +82,30 @@ impl RangeTermOptions {
         self
     }
 
-    /// Number of unknowns.
-    pub(crate) fn unknowns(&self) -> usize {
-        let terms = self.terms.iter().filter(|term| **term == TermUse::Estimate).count();
-        terms + if self.hyperbola == HyperbolaUse::Estimate { 3 } else { 0 }
+    /// A periodic spline with this number of knots, instead of the sines.
+    #[must_use]
+    pub fn with_spline(mut self, knots: usize) -> Self {
+        self.further.spline_knots = Some(knots);
+        self
     }
 
-    /// Held values; zero, the start value, where a term is estimated.
-    pub(crate) fn start(&self) -> [f64; 9] {
-        self.terms.map(|term| if let TermUse::Hold(value) = term { value } else { 0.0 })
+    /// A polynomial in range.
+    #[must_use]
+    pub fn with_polynomial(mut self, shape: PolynomialShape) -> Self {
+        self.further.polynomial = Some(shape);
+        self
+    }
+
+    /// A surface over the image, instead of e1 and e2.
+    #[must_use]
+    pub fn with_surface(mut self, shape: SurfaceShape) -> Self {
+        self.further.surface = Some(shape);
+        self
     }
 
     pub(crate) fn validate(&self) -> Result<()> {
-        RangeTerms::from_array(self.start()).validate()?;
         if let HyperbolaUse::Hold(hyperbola) = self.hyperbola {
             hyperbola.validate()?;
-        }
-        if self.unknowns() == 0 {
-            return Err(Error::NothingToEstimate);
         }
         if self.largest_inflation >= 1.0 {
             return Ok(());
@@ -98,5 +115,50 @@ impl RangeTermOptions {
             value: self.largest_inflation,
             expected: "an inflation is at least 1",
         })
+    }
+}
+
+/// The terms that `Δρ` is linear in, as options ask for them.
+#[derive(Debug, Clone)]
+pub(crate) struct LinearTerms {
+    /// Held values; zero, the start value, where a term is estimated.
+    pub(crate) model: RangeErrorModel,
+    /// For each parameter of the model, whether it is held.
+    pub(crate) held: Vec<bool>,
+}
+
+impl LinearTerms {
+    pub(crate) fn new(options: &RangeTermOptions, ambiguity_interval_m: f64) -> Result<Self> {
+        let start = options.terms.map(|term| if let TermUse::Hold(value) = term { value } else { 0.0 });
+        let model = RangeErrorModel {
+            terms: RangeTerms::from_array(start),
+            further: FurtherTerms::zero(&options.further)?,
+            ..RangeErrorModel::error_free(ambiguity_interval_m)
+        };
+        // A value held of what is not there is found here.
+        model.validate()?;
+        let uses = RangeTerms::NAMES.into_iter().zip(options.terms);
+        let held_names: Vec<_> = uses.filter(|(_, term)| *term != TermUse::Estimate).map(|(name, _)| name).collect();
+        let held = model.parameter_names().iter().map(|name| held_names.contains(&&**name)).collect();
+        Ok(Self { model, held })
+    }
+
+    /// Number of unknowns.
+    pub(crate) fn unknowns(&self) -> usize {
+        self.held.iter().filter(|held| !**held).count()
+    }
+
+    /// The parameters as a block of the adjustment, named.
+    pub(crate) fn block(&self) -> ParameterBlock {
+        let block = ParameterBlock::euclidean(self.model.parameter_values()).named("terms");
+        block.with_parameter_names(self.model.parameter_names())
+    }
+
+    /// Holds what is held.
+    pub(crate) fn hold(&self, adjustment: &mut Adjustment<'_>, block: BlockId) -> Result<()> {
+        for (component, _) in self.held.iter().enumerate().filter(|(_, held)| **held) {
+            adjustment.hold_parameter(block, component)?;
+        }
+        Ok(())
     }
 }

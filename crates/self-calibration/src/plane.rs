@@ -40,6 +40,12 @@ impl Plane {
         Self::new(&-Vector3::z(), &Point3::new(0.0, 0.0, -distance_m))
     }
 
+    /// The same plane seen from another frame.
+    pub(crate) fn moved(&self, to_from_here: &Isometry3<f64>) -> Result<Self> {
+        let foot = Point3::from(self.normal() * self.distance_m);
+        Self::new(&(to_from_here * self.normal()), &(to_from_here * foot))
+    }
+
     /// Unit normal n.
     pub fn normal(&self) -> Vector3<f64> {
         self.normal.into_inner()

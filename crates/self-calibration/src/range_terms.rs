@@ -1,11 +1,11 @@
 //! Estimation of Eqs. 14 and 15 from range differences.
 
 use adjust::{Adjustment, BlockId, Covariance, ParameterBlock, Solution, SolveOptions};
-use error_models::{AmplitudeHyperbola, RangeErrorModel, RangeTerms};
+use error_models::{AmplitudeHyperbola, RangeErrorModel};
 
 use crate::hyperbola_start::hyperbola_start;
 use crate::observation::DifferenceObservation;
-use crate::options::{HyperbolaUse, TermUse};
+use crate::options::{HyperbolaUse, LinearTerms};
 use crate::{Error, RangeCalibration, RangeDifference, RangeTermOptions, Result};
 
 /// Estimates the range terms of one modulation frequency from range differences by least squares
@@ -40,8 +40,10 @@ pub fn estimate_range_terms(
 /// The checked input of an estimation.
 struct Problem<'a> {
     differences: &'a [RangeDifference],
-    ambiguity_interval_m: f64,
     options: &'a RangeTermOptions,
+    terms: LinearTerms,
+    /// Design rows of all differences, one behind the other.
+    rows: Vec<f64>,
     range_span_m: [f64; 2],
     amplitude_span: [f64; 2],
 }
@@ -61,7 +63,11 @@ impl<'a> Problem<'a> {
             });
         }
         differences.iter().enumerate().try_for_each(|(index, difference)| difference.validate(index))?;
-        let unknowns = options.unknowns();
+        let terms = LinearTerms::new(options, ambiguity_interval_m)?;
+        let unknowns = terms.unknowns() + if options.hyperbola == HyperbolaUse::Estimate { 3 } else { 0 };
+        if unknowns == 0 {
+            return Err(Error::NothingToEstimate);
+        }
         if differences.len() <= unknowns {
             return Err(Error::TooFewDifferences { differences: differences.len(), unknowns });
         }
@@ -70,7 +76,8 @@ impl<'a> Problem<'a> {
             HyperbolaUse::Hold(hyperbola) => hyperbola.amplitude_span,
             _ => span(differences.iter().map(|d| d.amplitude)),
         };
-        let problem = Self { differences, ambiguity_interval_m, options, range_span_m, amplitude_span };
+        let rows = design_rows(differences, &terms.model)?;
+        let problem = Self { differences, options, terms, rows, range_span_m, amplitude_span };
         problem.require_amplitudes()?;
         Ok(problem)
     }
@@ -108,32 +115,31 @@ impl<'a> Problem<'a> {
     /// What the terms leave over without any hyperbola. The offset's share is added again: it is told from the
     /// level of the hyperbola only together with it.
     fn residuals_of_terms_alone(&self) -> Result<Vec<f64>> {
-        let terms_alone = RangeTermOptions { hyperbola: HyperbolaUse::None, ..*self.options };
-        let alone = Problem { options: &terms_alone, ..*self };
-        if terms_alone.unknowns() == 0 {
-            let start = RangeTerms::from_array(self.options.start());
-            let left = |d: &RangeDifference| {
-                let modelled = start.correction(self.ambiguity_interval_m, d.observed_range_m, d.x_mm, d.y_mm);
-                d.observed_range_m - d.reference_range_m - modelled
-            };
-            return Ok(self.differences.iter().map(left).collect());
+        if self.terms.unknowns() == 0 {
+            let held = self.terms.model.parameter_values();
+            let modelled = self.rows().map(|row| row.iter().zip(&held).map(|(d, value)| d * value).sum::<f64>());
+            return Ok(self.observed().zip(modelled).map(|(observed, modelled)| observed - modelled).collect());
         }
-        let (solution, blocks) = alone.solve(None)?;
+        let (solution, blocks) = self.solve(None)?;
         let offset = solution.values(blocks[0])?[0];
-        let free = if self.options.terms[0] == TermUse::Estimate { offset } else { 0.0 };
+        let free = if self.terms.held[0] { 0.0 } else { offset };
         Ok(solution.residuals().iter().map(|v| v + free).collect())
+    }
+
+    fn rows(&self) -> impl Iterator<Item = &[f64]> {
+        self.rows.chunks_exact(self.terms.model.parameter_count())
+    }
+
+    /// Observed minus reference ranges, metre.
+    fn observed(&self) -> impl Iterator<Item = f64> + '_ {
+        self.differences.iter().map(|d| d.observed_range_m - d.reference_range_m)
     }
 
     /// Adjusts the terms, and the hyperbola where there is one. The first block holds the terms.
     fn solve(&self, hyperbola: Option<[f64; 3]>) -> Result<(Solution, Vec<BlockId>)> {
         let mut adjustment = Adjustment::new();
-        let terms = ParameterBlock::euclidean(self.options.start()).named("terms");
-        let mut blocks = vec![adjustment.add_block(terms.with_parameter_names(RangeTerms::NAMES))];
-        for (component, term) in self.options.terms.iter().enumerate() {
-            if matches!(term, TermUse::Hold(_)) {
-                adjustment.hold_parameter(blocks[0], component)?;
-            }
-        }
+        let mut blocks = vec![adjustment.add_block(self.terms.block())];
+        self.terms.hold(&mut adjustment, blocks[0])?;
         if let Some(start) = hyperbola {
             let block = ParameterBlock::euclidean(start).named("hyperbola");
             blocks.push(adjustment.add_block(block.with_parameter_names(AmplitudeHyperbola::NAMES)));
@@ -142,13 +148,10 @@ impl<'a> Problem<'a> {
             }
         }
         let group = adjustment.add_group("range differences");
-        for difference in self.differences {
-            let observation = DifferenceObservation {
-                blocks: blocks.clone(),
-                difference: *difference,
-                ambiguity_interval_m: self.ambiguity_interval_m,
-                amplitude_span: self.amplitude_span,
-            };
+        for ((difference, difference_m), row) in self.differences.iter().zip(self.observed()).zip(self.rows()) {
+            let (blocks, amplitude) = (blocks.clone(), difference.amplitude);
+            let amplitude_span = self.amplitude_span;
+            let observation = DifferenceObservation { blocks, difference_m, amplitude, row, amplitude_span };
             adjustment.add_observation(group, observation, &Covariance::from_sigma(difference.sigma_m))?;
         }
         match adjustment.solve(&SolveOptions::default()) {
@@ -166,21 +169,33 @@ impl<'a> Problem<'a> {
     }
 
     fn model(&self, solution: &Solution, blocks: &[BlockId]) -> Result<RangeErrorModel> {
-        let mut terms = [0.0; 9];
-        terms.copy_from_slice(solution.values(blocks[0])?);
-        let hyperbola = match blocks.get(1).map(|block| solution.values(*block)).transpose()? {
+        let mut model = self.terms.model.clone();
+        model.set_parameter_values(solution.values(blocks[0])?)?;
+        model.hyperbola = match blocks.get(1).map(|block| solution.values(*block)).transpose()? {
             Some(&[h1, h2, h3]) => Some(AmplitudeHyperbola { h1, h2, h3, amplitude_span: self.amplitude_span }),
             _ => None,
         };
-        let model = RangeErrorModel {
-            ambiguity_interval_m: self.ambiguity_interval_m,
-            terms: RangeTerms::from_array(terms),
-            hyperbola,
-            range_span_m: Some(self.range_span_m),
-        };
+        model.range_span_m = Some(self.range_span_m);
         model.validate()?;
         Ok(model)
     }
+}
+
+/// Design rows of all differences, one behind the other; refuses a difference that a polynomial or a surface does not
+/// reach.
+fn design_rows(differences: &[RangeDifference], model: &RangeErrorModel) -> Result<Vec<f64>> {
+    let mut rows = vec![0.0; differences.len() * model.parameter_count()];
+    for ((index, d), row) in differences.iter().enumerate().zip(rows.chunks_exact_mut(model.parameter_count())) {
+        let bad = |name, value, expected| Err(Error::BadDifference { index, name, value, expected });
+        if !model.range_in_span(d.observed_range_m) {
+            return bad("observed_range_m", d.observed_range_m, "a range in the span of the polynomial");
+        }
+        if model.further.surface.as_ref().is_some_and(|surface| !surface.in_span(d.x_mm, d.y_mm)) {
+            return bad("x_mm", d.x_mm, "an image point in the spans of the surface, y as well");
+        }
+        model.design_row_into(d.observed_range_m, d.x_mm, d.y_mm, row)?;
+    }
+    Ok(rows)
 }
 
 /// Smallest and largest of some values; NaN is passed over.

@@ -13,7 +13,8 @@ use support::networks::{all_but_long_wave, nominal, normal, small};
 fn observed(truth: &Network, seed: u64, share: f64) -> [Network; 2] {
     [share, 0.0].map(|gross_error_share| {
         let mut observed =
-            simulate_sightings(truth, &SightingOptions { seed, gross_error_share, ..SightingOptions::default() }).unwrap();
+            simulate_sightings(truth, &SightingOptions { seed, gross_error_share, ..SightingOptions::default() })
+                .unwrap();
         nominal(&mut observed);
         observed
     })
@@ -39,7 +40,8 @@ fn found(truth: &Network, method: Method, level: f64, seed: u64) -> [usize; 4] {
         let [pixel, other] = [seen.pixel.unwrap(), clean.pixel.unwrap()];
         let shift = (pixel[0] - other[0]).hypot(pixel[1] - other[1]);
         let range_shift = (seen.range_m.unwrap() - clean.range_m.unwrap()).abs();
-        for (planted, rejected) in [(shift > 1e-9, rejected(Component::Col)), (range_shift > 1e-9, rejected(Component::Range))]
+        for (planted, rejected) in
+            [(shift > 1e-9, rejected(Component::Col)), (range_shift > 1e-9, rejected(Component::Range))]
         {
             counts[0] += usize::from(planted);
             counts[1] += usize::from(planted && rejected);

@@ -93,7 +93,8 @@ fn options() -> CalibrationOptions {
 fn without_noise_every_method_finds_the_truth() {
     for case in cases() {
         // A thousandth of the usual noise, and control without any to speak of.
-        let quiet = SightingOptions { sigma_pixel: 5e-5, sigma_range_m: 1e-5, sigma_passive_pixel: 2e-4, ..Default::default() };
+        let quiet =
+            SightingOptions { sigma_pixel: 5e-5, sigma_range_m: 1e-5, sigma_passive_pixel: 2e-4, ..Default::default() };
         let start = SimulatedStart::Absent;
         let mut case = case;
         case.truth.targets.iter_mut().filter_map(|t| t.covariance.as_mut()).for_each(|c| *c *= 1e-6);

@@ -108,7 +108,7 @@ fn frames_of_a_wall_calibrate_a_camera_that_then_shows_it_flat() {
     let camera = camera();
     let principal_point = camera.interior.principal_point_mm;
     let terms = RangeTerms { d0: -0.02, periodic: [0.0, 0.005, -0.004, 0.0, 0.01, 0.006], e1: 1e-3, e2: 2e-3 };
-    let truth = RangeErrorModel { ambiguity_interval_m: 5.0, terms, hyperbola: None, range_span_m: None };
+    let truth = RangeErrorModel { terms, ..RangeErrorModel::error_free(5.0) };
     let plane = Plane::new(&Vector3::new(0.1, 0.05, 1.0), &Point3::new(0.0, 0.0, -5.5)).unwrap();
     let mut random = Pcg64::seed_from_u64(11);
     let noise = Normal::new(0.0, 0.004).unwrap();

@@ -16,7 +16,8 @@ fn calibrated(truth: &Network, terms: &[&str], method: Method) -> Result<String,
     } else {
         TermSelection::List(terms.iter().map(ToString::to_string).collect())
     };
-    calibrate(&observed, &CalibrationOptions { terms, method, ..CalibrationOptions::default() }).map(|o| format!("{:?}", o.diagnosis))
+    calibrate(&observed, &CalibrationOptions { terms, method, ..CalibrationOptions::default() })
+        .map(|o| format!("{:?}", o.diagnosis))
 }
 
 #[test]
@@ -46,7 +47,9 @@ fn auto() {
         match calibrate(&observed, &CalibrationOptions::default()) {
             Ok(o) => {
                 println!("{name} {:?} {:?}", o.estimated, started.elapsed());
-                for d in o.decisions { println!("   {:?} {} {}", d.terms, d.taken, d.reason); }
+                for d in o.decisions {
+                    println!("   {:?} {} {}", d.terms, d.taken, d.reason);
+                }
             }
             Err(error) => println!("{name} {error}"),
         }

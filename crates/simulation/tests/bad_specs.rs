@@ -4,7 +4,7 @@
 mod common;
 
 use common::plain;
-use error_models::{RangeErrorModel, RangeTerms};
+use error_models::RangeErrorModel;
 use range_image::NoiseModel;
 use simulation::{
     AttitudeSpec, DigitisationSpec, Error, FixedPatternSpec, MixedPixelsSpec, MultipathSpec, SampleType, ShapeSpec,
@@ -100,7 +100,7 @@ const WRONG: &[(&str, Change)] = &[
 ];
 
 fn model(ambiguity_interval_m: f64) -> RangeErrorModel {
-    RangeErrorModel { ambiguity_interval_m, terms: RangeTerms::default(), hyperbola: None, range_span_m: None }
+    RangeErrorModel::error_free(ambiguity_interval_m)
 }
 
 fn digitisation(raw_scale: f64, saturation: Option<f64>) -> DigitisationSpec {

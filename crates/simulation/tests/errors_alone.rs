@@ -13,10 +13,9 @@ const ROUNDING_M: f64 = 2e-6;
 
 fn model() -> RangeErrorModel {
     RangeErrorModel {
-        ambiguity_interval_m: INTERVAL_M,
         terms: RangeTerms { d0: 0.03, periodic: [0.01, -0.006, 0.004, 0.003, 0.008, -0.005], e1: 2e-3, e2: -1e-3 },
         hyperbola: Some(AmplitudeHyperbola { h1: 2.3e-4, h2: 0.0572, h3: 156.0, amplitude_span: [1.0, 1e5] }),
-        range_span_m: None,
+        ..RangeErrorModel::error_free(INTERVAL_M)
     }
 }
 

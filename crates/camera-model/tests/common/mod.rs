@@ -10,7 +10,7 @@ pub fn plain_camera() -> Camera {
     Camera::new(
         ImageFormat::new(176, 144, [0.04, 0.04]).unwrap(),
         InteriorOrientation { principal_point_mm: [0.11, -0.07], principal_distance_mm: 8.0 },
-        LensDistortion { k1: -2.1e-3, k2: 3.0e-5, k3: -4.0e-7, p1: 1.2e-4, p2: -0.8e-4 },
+        LensDistortion { k1: -2.1e-3, k2: 3.0e-5, k3: -4.0e-7, p1: 1.2e-4, p2: -0.8e-4, b1: 7.0e-4, b2: -4.0e-4 },
     )
     .unwrap()
 }
@@ -20,7 +20,7 @@ pub fn plain_camera() -> Camera {
 pub fn cameras() -> impl Strategy<Value = Camera> {
     let size = (8_usize..400, 8_usize..400, 0.006..0.05_f64, 0.9..1.1_f64);
     let interior = (-0.04..0.04_f64, -0.04..0.04_f64, 0.6..3.0_f64);
-    (size, interior, prop::array::uniform5(-1.0..1.0_f64)).prop_map(|(size, interior, lens)| {
+    (size, interior, prop::array::uniform7(-1.0..1.0_f64)).prop_map(|(size, interior, lens)| {
         let (width, height, pitch, aspect) = size;
         let [half_width, half_height] = [width as f64 * pitch / 2.0, height as f64 * pitch * aspect / 2.0];
         let corner = half_width.hypot(half_height) * 1.05;
@@ -32,7 +32,15 @@ pub fn cameras() -> impl Strategy<Value = Camera> {
                 principal_point_mm: [interior.0 * half_width, interior.1 * half_height],
                 principal_distance_mm: interior.2 * corner,
             },
-            LensDistortion { k1: radial(0), k2: radial(1), k3: radial(2), p1: decentring(3), p2: decentring(4) },
+            LensDistortion {
+                k1: radial(0),
+                k2: radial(1),
+                k3: radial(2),
+                p1: decentring(3),
+                p2: decentring(4),
+                b1: 0.01 * lens[5],
+                b2: 0.01 * lens[6],
+            },
         )
         .unwrap()
     })

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use camera_model::Camera;
-use error_models::{RangeErrorModel, RangeTerms};
+use error_models::RangeErrorModel;
 use range_image::Modulation;
 use range_io::calibration::Calibration;
 use range_io::survey::Survey;
@@ -57,12 +57,7 @@ fn only_modulation(survey: &Survey, root: &Path) -> Result<Modulation> {
 }
 
 fn error_free(modulation: Modulation) -> RangeErrorModel {
-    RangeErrorModel {
-        ambiguity_interval_m: modulation.ambiguity_interval_m(),
-        terms: RangeTerms::default(),
-        hyperbola: None,
-        range_span_m: None,
-    }
+    RangeErrorModel::error_free(modulation.ambiguity_interval_m())
 }
 
 /// The first model of the frequency; without one, no range error is known.

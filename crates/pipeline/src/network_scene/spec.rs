@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use camera_model::{Camera, pose_from_euler};
-use error_models::{ModelSet, RangeErrorModel, RangeTerms};
+use error_models::{ModelSet, RangeErrorModel};
 use nalgebra::{Isometry3, Point3, Vector3};
 use range_io::calibration::Calibration;
 use range_io::ron_text;
@@ -310,12 +310,7 @@ pub(super) fn true_calibration(
         let message = format!("`camera.modulation_hz` has {} frequencies, expected one", modulations.len());
         return Err(Error::Survey { path: path.to_owned(), message });
     };
-    let error_free = RangeErrorModel {
-        ambiguity_interval_m: modulation.ambiguity_interval_m(),
-        terms: RangeTerms::default(),
-        hyperbola: None,
-        range_span_m: None,
-    };
+    let error_free = RangeErrorModel::error_free(modulation.ambiguity_interval_m());
     let mut calibration =
         Calibration::from_models(&camera, &ModelSet { entries: vec![(1.0, vec![error_free])] }, None)?;
     for (name, value) in truth.iter().filter(|(name, _)| !is_camera_parameter(name)) {

@@ -35,7 +35,9 @@ impl Calibration {
     }
 
     fn check_camera_parameters(&self) -> Check {
-        check_parameters("parameters", &self.parameters, &Self::CAMERA_PARAMETERS)?;
+        let names = Self::CAMERA_PARAMETERS.map(|(name, _)| name).join(", ");
+        let unit = |name: &str| Self::CAMERA_PARAMETERS.iter().find(|(known, _)| *known == name).map(|(_, unit)| *unit);
+        check_parameters("parameters", &self.parameters, unit, &names)?;
         for needed in ["xp", "yp", "c"] {
             let there = self.parameters.iter().any(|parameter| parameter.name == needed);
             require(there, "parameters", || format!("`{needed}` is missing"))?;
@@ -71,7 +73,9 @@ impl RangeCalibration {
         })?;
         Modulation::new(self.modulation_hz)
             .map_err(|error| InvalidField::new(format!("{path}.modulation_hz"), error.to_string()))?;
-        check_parameters(&format!("{path}.parameters"), &self.parameters, &error_models::PARAMETERS)?;
+        let names = error_models::PARAMETERS.map(|(name, _)| name).join(", ");
+        let names = format!("{names}, or s0.., q1.., g10.. of further terms");
+        check_parameters(&format!("{path}.parameters"), &self.parameters, error_models::parameter_unit, &names)?;
         check_span(format!("{path}.range_span_m"), self.range_span_m)?;
         check_span(format!("{path}.amplitude_span"), self.amplitude_span)?;
         self.to_model().map(drop).map_err(|error| InvalidField::new(path, error.to_string()))
@@ -95,15 +99,19 @@ fn check_span(field: impl Into<String>, span: Option<[f64; 2]>) -> Check {
 }
 
 /// Names known and given once, the units of the table, finite values, standard deviations that may be.
-fn check_parameters(path: &str, parameters: &[NamedParameter], known: &[(&str, &str)]) -> Check {
+fn check_parameters(
+    path: &str,
+    parameters: &[NamedParameter],
+    known: impl Fn(&str) -> Option<&'static str>,
+    names: &str,
+) -> Check {
     for (index, parameter) in parameters.iter().enumerate() {
         let NamedParameter { name, value, sigma, unit, .. } = parameter;
         let path = format!("{path}[{index}]");
-        let Some((_, expected)) = known.iter().find(|(known, _)| known == name) else {
-            let names: Vec<_> = known.iter().map(|(name, _)| *name).collect();
+        let Some(expected) = known(name) else {
             return Err(InvalidField::new(
                 format!("{path}.name"),
-                format!("`{name}` is no parameter, expected one of {}", names.join(", ")),
+                format!("`{name}` is no parameter, expected one of {names}"),
             ));
         };
         let twice = parameters[..index].iter().any(|earlier| earlier.name == *name);

@@ -106,7 +106,7 @@ impl Calibration {
     }
 
     /// Covariance matrix of interior orientation and lens in the order of [`Calibration::CAMERA_PARAMETERS`].
-    pub fn camera_covariance(&self) -> Result<SMatrix<f64, 8, 8>> {
+    pub fn camera_covariance(&self) -> Result<SMatrix<f64, 10, 10>> {
         let covariance = self.covariance(&Self::CAMERA_PARAMETERS.map(|(name, _)| name))?;
         Ok(SMatrix::from_fn(|i, j| covariance[(i, j)]))
     }

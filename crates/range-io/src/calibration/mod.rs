@@ -6,7 +6,7 @@ mod models;
 
 use std::path::Path;
 
-use error_models::{FixedPattern, NamedParameter};
+use error_models::{FixedPattern, FurtherShape, NamedParameter};
 use range_image::{ImageFormat, NoiseModel};
 use scattering_deconvolution::Psf;
 use serde::{Deserialize, Serialize};
@@ -18,7 +18,7 @@ use crate::{Result, atomic, ron_text};
 
 /// A camera's calibration with the quality of every parameter.
 ///
-/// Parameters keep the units of [`Calibration::CAMERA_PARAMETERS`] and [`error_models::PARAMETERS`].
+/// Parameters keep the units of [`Calibration::CAMERA_PARAMETERS`] and [`error_models::parameter_unit`].
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Calibration {
@@ -26,7 +26,7 @@ pub struct Calibration {
     pub format_version: u32,
     /// Size of the image and its pixels.
     pub camera: ImageFormat,
-    /// Interior orientation and lens: `xp`, `yp`, `c`, and any of `k1`, `k2`, `k3`, `p1`, `p2`; a missing one is zero.
+    /// Interior orientation and lens: `xp`, `yp`, `c`, and any of `k1`, `k2`, `k3`, `p1`, `p2`, `b1`, `b2`; a missing one is zero.
     pub parameters: Vec<NamedParameter>,
     /// Range terms for each integration time and modulation frequency.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -59,7 +59,8 @@ pub struct RangeCalibration {
     pub integration_time_s: f64,
     /// Modulation frequency the terms belong to.
     pub modulation_hz: f64,
-    /// Any of `d0`, `d2` to `d7`, `e1`, `e2`, and `h1`, `h2`, `h3`; a missing one is zero.
+    /// Any of `d0`, `d2` to `d7`, `e1`, `e2`, and `h1`, `h2`, `h3`; those of [`Self::further`] terms: `s0` on, `q1` on,
+    /// `g10` on. A missing one is zero.
     pub parameters: Vec<NamedParameter>,
     /// Smallest and largest range of the fit.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -67,6 +68,9 @@ pub struct RangeCalibration {
     /// Smallest and largest amplitude of the fit; needed with `h1`, `h2`, `h3`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub amplitude_span: Option<[f64; 2]>,
+    /// Knots, orders and spans of a spline, a polynomial and a surface.
+    #[serde(default, skip_serializing_if = "FurtherShape::is_empty")]
+    pub further: FurtherShape,
 }
 
 /// Smallest and largest value a calibration holds for; `None` where it is not known.
@@ -114,7 +118,7 @@ impl Calibration {
     pub const FILE_NAME: &str = "calibration.ron";
 
     /// Names and units of the parameters of interior orientation and lens, in this order everywhere.
-    pub const CAMERA_PARAMETERS: [(&str, &str); 8] = [
+    pub const CAMERA_PARAMETERS: [(&str, &str); 10] = [
         ("xp", "mm"),
         ("yp", "mm"),
         ("c", "mm"),
@@ -123,6 +127,8 @@ impl Calibration {
         ("k3", "1/mm^6"),
         ("p1", "1/mm"),
         ("p2", "1/mm"),
+        ("b1", "1"),
+        ("b2", "1"),
     ];
 
     /// Reads and checks a `calibration.ron`, given by its own path or by its folder's.

@@ -1,7 +1,7 @@
 //! Between the lists of a calibration's file and the models that stages work with.
 
 use camera_model::{Camera, InteriorOrientation, LensDistortion};
-use error_models::{ModelSet, NamedParameter, ParameterStatus, RangeErrorModel};
+use error_models::{ModelSet, ModelShape, NamedParameter, ParameterStatus, RangeErrorModel};
 use range_image::{Modulation, SPEED_OF_LIGHT};
 use scattering_deconvolution::Psf;
 
@@ -44,8 +44,7 @@ impl Calibration {
         let value = |name: &str| self.parameter(name).map_or(0.0, |parameter| parameter.value);
         let interior =
             InteriorOrientation { principal_point_mm: [value("xp"), value("yp")], principal_distance_mm: value("c") };
-        let lens =
-            LensDistortion { k1: value("k1"), k2: value("k2"), k3: value("k3"), p1: value("p1"), p2: value("p2") };
+        let lens = LensDistortion::from_coefficients(LensDistortion::NAMES.map(value));
         Camera::new(self.camera, interior, lens).map_err(|error| value_error("camera", &error))
     }
 
@@ -110,13 +109,16 @@ impl RangeCalibration {
             parameters: model.to_parameters(),
             range_span_m: model.range_span_m,
             amplitude_span: model.hyperbola.map(|hyperbola| hyperbola.amplitude_span),
+            further: model.further.shape(),
         }
     }
 
     /// The model of these terms.
     pub fn to_model(&self) -> error_models::Result<RangeErrorModel> {
         let interval_m = Modulation::new(self.modulation_hz)?.ambiguity_interval_m();
-        RangeErrorModel::from_parameters(interval_m, &self.parameters, self.amplitude_span, self.range_span_m)
+        let (amplitude_span, range_span_m, further) = (self.amplitude_span, self.range_span_m, self.further);
+        let shape = ModelShape { amplitude_span, range_span_m, further };
+        RangeErrorModel::from_shape(interval_m, &self.parameters, &shape)
     }
 }
 
@@ -135,8 +137,8 @@ fn frequency_of(interval_m: f64) -> f64 {
 /// Values in the order of [`Calibration::CAMERA_PARAMETERS`], with their names and units.
 fn camera_values(camera: &Camera) -> Vec<(&'static str, &'static str, f64)> {
     let [xp, yp] = camera.interior.principal_point_mm;
-    let LensDistortion { k1, k2, k3, p1, p2 } = camera.lens;
-    let values = [xp, yp, camera.interior.principal_distance_mm, k1, k2, k3, p1, p2];
+    let interior = [xp, yp, camera.interior.principal_distance_mm];
+    let values = interior.into_iter().chain(camera.lens.coefficients());
     Calibration::CAMERA_PARAMETERS.into_iter().zip(values).map(|((name, unit), value)| (name, unit, value)).collect()
 }
 

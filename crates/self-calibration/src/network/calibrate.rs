@@ -165,7 +165,8 @@ impl Problem<'_> {
         let step = self.range_step(&second, &reference, scale, &mut diagnosis)?;
         let first = setup.outcome(solved, self.options)?;
         let first_names = setup.estimate(solved)?.names;
-        let parts = Combined { setup: &second, first, first_names, step, reference, geometry: solved.geometry()?, before };
+        let parts =
+            Combined { setup: &second, first, first_names, step, reference, geometry: solved.geometry()?, before };
         let mut outcome = combine(parts, self.options)?;
         outcome.diagnosis = diagnosis;
         Ok(outcome)
@@ -250,7 +251,18 @@ impl Problem<'_> {
         let estimated = terms.clone();
         let (excluded, camera_prior) = (Excluded::default(), None);
         let geometry_held = false;
-        Ok(Setup { network, start, calibration, estimated, ranged, passive, datum, geometry_held, camera_prior, excluded })
+        Ok(Setup {
+            network,
+            start,
+            calibration,
+            estimated,
+            ranged,
+            passive,
+            datum,
+            geometry_held,
+            camera_prior,
+            excluded,
+        })
     }
 
     /// Sightings whose ranges take part in a second step.
@@ -272,7 +284,8 @@ impl Problem<'_> {
         if unknown.is_empty() {
             return Ok(());
         }
-        Err(self.needs(&format!("known coordinates of the targets of the range network; {} have none", unknown.join(", "))))
+        Err(self
+            .needs(&format!("known coordinates of the targets of the range network; {} have none", unknown.join(", "))))
     }
 
     fn require_amplitudes(&self) -> Result<()> {

@@ -161,7 +161,8 @@ impl Combined<'_, '_> {
         for (index, seen) in self.setup.network.sightings.iter().enumerate() {
             let Some(observed) = seen.range_m else { continue };
             let place = self.reference.sightings.binary_search(&index);
-            let known = place.map_or_else(|_| self.geometry.distance(seen.station, seen.target), |row| self.reference.values[row]);
+            let known = place
+                .map_or_else(|_| self.geometry.distance(seen.station, seen.target), |row| self.reference.values[row]);
             let reference = factor * known;
             let figures = match self.step.reference.sightings.binary_search(&index) {
                 Ok(row) => {
@@ -174,7 +175,12 @@ impl Combined<'_, '_> {
                     Figures::unused(observed - reference - self.correction(index), verdict)
                 }
             };
-            let row = Row { source: Source::Sighting(index), component: Component::Range, observed, sigma: seen.sigma_range_m };
+            let row = Row {
+                source: Source::Sighting(index),
+                component: Component::Range,
+                observed,
+                sigma: seen.sigma_range_m,
+            };
             let quality = self.setup.quality(&row, figures, level, &self.geometry);
             out.push(ObservationQuality { uncorrected_m: observed - reference, ..quality });
         }

@@ -109,7 +109,8 @@ impl RangeStep {
     ) -> Result<Self> {
         if reference.values.len() * reference.root.ncols() > LARGEST {
             let (ranges, behind) = (reference.values.len(), reference.root.ncols());
-            let needs = format!("{ranges} ranges with {behind} uncertain coordinates are too many for its dense second step");
+            let needs =
+                format!("{ranges} ranges with {behind} uncertain coordinates are too many for its dense second step");
             return Err(Error::MethodNeeds { method: format!("{:?}", options.method), needs });
         }
         let mut rejected = BTreeSet::new();
@@ -180,8 +181,12 @@ fn adjusted(setup: &Setup<'_>, reference: &Reference, scale: ScaleUse) -> Result
     let mut adjustment = Adjustment::new();
     let terms = add_blocks(setup, reference, scale, &mut adjustment)?;
     let group = adjustment.add_group("ranges");
-    let models: Vec<(Arc<RangeErrorModel>, Arc<[usize]>)> =
-        setup.calibration.sets.iter().map(|set| (Arc::new(set.model.clone()), family_widths(&set.model).into())).collect();
+    let models: Vec<(Arc<RangeErrorModel>, Arc<[usize]>)> = setup
+        .calibration
+        .sets
+        .iter()
+        .map(|set| (Arc::new(set.model.clone()), family_widths(&set.model).into()))
+        .collect();
     for (row, (&index, &reference_m)) in reference.sightings.iter().zip(&reference.values).enumerate() {
         let seen = &setup.network.sightings[index];
         let (Some(observed_m), Some(values)) = (seen.range_m, observed(setup, index)) else { continue };

@@ -226,12 +226,16 @@ impl Simulator<'_> {
         let Some(covariance) = passive.covariance else { return };
         // The root by eigenvalues allows for parameters without variance.
         let scale = covariance.diagonal().map(|variance| if variance > 0.0 { variance.sqrt() } else { 1.0 });
-        let scaled = SMatrix::<f64, 8, 8>::from_fn(|row, column| covariance[(row, column)] / (scale[row] * scale[column]));
+        let scaled =
+            SMatrix::<f64, 8, 8>::from_fn(|row, column| covariance[(row, column)] / (scale[row] * scale[column]));
         let eigen = scaled.symmetric_eigen();
         let drawn = eigen.eigenvalues.map(|value| value.max(0.0).sqrt() * self.normal());
         let error = (eigen.eigenvectors * drawn).component_mul(&scale);
-        let moved: Vec<f64> =
-            camera_values(&passive.camera).into_iter().enumerate().map(|(i, v)| v + error.get(i).unwrap_or(&0.0)).collect();
+        let moved: Vec<f64> = camera_values(&passive.camera)
+            .into_iter()
+            .enumerate()
+            .map(|(i, v)| v + error.get(i).unwrap_or(&0.0))
+            .collect();
         passive.camera = camera_from(&passive.camera, &moved).unwrap_or(passive.camera);
     }
 

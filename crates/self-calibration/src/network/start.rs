@@ -24,7 +24,8 @@ const SMALLEST_ANGLE: f64 = 0.0175;
 pub(crate) fn find_start(network: &Network, calibration: &Calibration, passive: bool) -> Result<Start> {
     let mut finder = Finder::new(network, calibration);
     finder.run()?;
-    let relative = network.passive.as_ref().filter(|_| passive).map(|passive| finder.relative_orientation(passive)).transpose()?;
+    let relative =
+        network.passive.as_ref().filter(|_| passive).map(|passive| finder.relative_orientation(passive)).transpose()?;
     let stations = finder.stations.iter().copied().flatten().collect();
     Ok(Start { stations, targets: finder.targets, relative })
 }

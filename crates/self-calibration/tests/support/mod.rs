@@ -17,7 +17,7 @@ pub fn terms() -> RangeTerms {
 }
 
 pub fn model(hyperbola: Option<AmplitudeHyperbola>) -> RangeErrorModel {
-    RangeErrorModel { ambiguity_interval_m: INTERVAL, terms: terms(), hyperbola, range_span_m: None }
+    RangeErrorModel { terms: terms(), hyperbola, ..RangeErrorModel::error_free(INTERVAL) }
 }
 
 /// What a camera with a field of view of 45 degrees shows of a wall straight in front of it at these distances, on

@@ -12,7 +12,7 @@ pub fn camera() -> Camera {
     Camera::new(
         ImageFormat::new(176, 144, [0.04, 0.04]).unwrap(),
         InteriorOrientation { principal_point_mm: [0.06, -0.04], principal_distance_mm: 8.02 },
-        LensDistortion { k1: -1.5e-3, k2: 2e-5, k3: 0.0, p1: 1e-4, p2: -8e-5 },
+        LensDistortion { k1: -1.5e-3, k2: 2e-5, k3: 0.0, p1: 1e-4, p2: -8e-5, ..LensDistortion::default() },
     )
     .unwrap()
 }
@@ -20,7 +20,7 @@ pub fn camera() -> Camera {
 /// Offset, short waves and delay; no wave of length U, which a network can hardly tell from the offset.
 pub fn range_model() -> RangeErrorModel {
     let terms = RangeTerms { d0: 0.024, periodic: [0.0, 0.0, 0.003, 0.005, -0.009, 0.004], e1: 1.5e-3, e2: -1e-3 };
-    RangeErrorModel { ambiguity_interval_m: INTERVAL, terms, hyperbola: None, range_span_m: None }
+    RangeErrorModel { terms, ..RangeErrorModel::error_free(INTERVAL) }
 }
 
 /// A pose at a distance (m) from the middle of the field, off its normal by two angles, and rolled (degrees).

@@ -1,0 +1,208 @@
+//! Cofactors in the eliminated form: computed block by block from the reduced inverse, when they are asked for.
+
+use std::sync::OnceLock;
+
+use nalgebra::DMatrix;
+
+use crate::elimination::EliminatedFactor;
+use crate::layout::Layout;
+use crate::product::{Left, Right, add_product};
+use crate::structure::{Eliminated, Role, Slot};
+
+/// With `V = L Lᵀ`, `H = L⁻¹ Wᵀ` and the reduced inverse `Q_cc`:
+///
+/// ```text
+/// Q_oo = L⁻ᵀ (I + H Q_cc Hᵀ) L⁻¹,   Q_oc = −L⁻ᵀ H Q_cc
+/// ```
+#[derive(Debug, Clone)]
+pub(crate) struct EliminatedCofactor {
+    pub(crate) factor: EliminatedFactor,
+    reduced: OnceLock<Vec<f64>>,
+    datum: OnceLock<Option<Transformation>>,
+}
+
+/// S-transformation `T Q Tᵀ`, `T = I − M Gᵀ`, from the datum of the reduced unknowns to that of the points:
+/// `T Q Tᵀ = Q − M Fᵀ − F Mᵀ` with `F = Q G − ½ M (GᵀQ G)`.
+#[derive(Debug, Clone)]
+struct Transformation {
+    /// M: motions of the network with `GᵀM = I`, one after another.
+    motions: Vec<f64>,
+    /// F, likewise.
+    shares: Vec<f64>,
+}
+
+impl EliminatedCofactor {
+    pub(crate) fn new(factor: EliminatedFactor) -> Self {
+        Self { factor, reduced: OnceLock::new(), datum: OnceLock::new() }
+    }
+
+    pub(crate) fn scale(&self) -> &[f64] {
+        &self.factor.scale
+    }
+
+    /// `Q_cc` in the datum of the reduced unknowns, full; residuals do not depend on the datum.
+    pub(crate) fn reduced(&self) -> &[f64] {
+        self.reduced.get_or_init(|| {
+            let (mut matrix, _) = self.factor.reduced.cofactor();
+            let scale = &self.factor.reduced.scale;
+            for (column, own) in matrix.chunks_exact_mut(scale.len().max(1)).zip(scale) {
+                column.iter_mut().zip(scale).for_each(|(q, other)| *q *= own * other);
+            }
+            matrix
+        })
+    }
+
+    /// Between the free parameters of two blocks.
+    pub(crate) fn block(&self, layout: &Layout, first: usize, second: usize) -> DMatrix<f64> {
+        let mut out = self.in_reduced_datum(first, second, layout);
+        if let Some(datum) = self.datum() {
+            let n = self.factor.scale.len();
+            let (rows, columns) = (layout.free(first), layout.free(second));
+            for (motion, share) in datum.motions.chunks_exact(n).zip(datum.shares.chunks_exact(n)) {
+                for (j, column) in columns.clone().enumerate() {
+                    for (i, row) in rows.clone().enumerate() {
+                        out[(i, j)] -= motion[row] * share[column] + share[row] * motion[column];
+                    }
+                }
+            }
+        }
+        out
+    }
+
+    fn in_reduced_datum(&self, first: usize, second: usize, layout: &Layout) -> DMatrix<f64> {
+        let structure = &self.factor.structure;
+        let order = structure.order;
+        match (structure.roles[first], structure.roles[second]) {
+            (Role::Reduced(row), Role::Reduced(column)) => {
+                let (row, column) = (structure.reduced[row as usize], structure.reduced[column as usize]);
+                let q = self.reduced();
+                DMatrix::from_fn(row.width, column.width, |i, j| q[(column.start + j) * order + row.start + i])
+            }
+            (Role::Eliminated(row), Role::Reduced(column)) => {
+                let (row, column) = (&structure.eliminated[row as usize], structure.reduced[column as usize]);
+                let mut out = self.image(row, column.start, column.width);
+                self.finish(row, &mut out);
+                -out
+            }
+            (Role::Reduced(_), Role::Eliminated(_)) => self.in_reduced_datum(second, first, layout).transpose(),
+            (Role::Eliminated(row), Role::Eliminated(column)) => {
+                let (row, column) = (&structure.eliminated[row as usize], &structure.eliminated[column as usize]);
+                let mut out = DMatrix::zeros(row.width, column.width);
+                let mut products = Vec::new();
+                for slot in &structure.slots[row.slots()] {
+                    self.product(column, slot, &mut products);
+                    self.add_half(slot, &products, &mut out);
+                }
+                if first == second {
+                    (0..out.nrows()).for_each(|i| out[(i, i)] += 1.0);
+                }
+                self.finish(row, &mut out);
+                let mut out = out.transpose();
+                self.finish(column, &mut out);
+                out.transpose()
+            }
+            _ => DMatrix::zeros(layout.free(first).len(), layout.free(second).len()),
+        }
+    }
+
+    /// `H Q_cc` for some reduced columns.
+    fn image(&self, row: &Eliminated, start: usize, width: usize) -> DMatrix<f64> {
+        let (structure, q) = (&self.factor.structure, self.reduced());
+        let mut out = DMatrix::zeros(row.width, width);
+        for slot in &structure.slots[row.slots()] {
+            for (k, half) in self.factor.half[slot.offset..].chunks_exact(slot.width()).take(row.width).enumerate() {
+                for j in 0..width {
+                    let column = &q[(start + j) * structure.order..][slot.reduced_columns()];
+                    out[(k, j)] += half.iter().zip(column).map(|(h, q)| h * q).sum::<f64>();
+                }
+            }
+        }
+        out
+    }
+
+    /// `H Q_cc` of an eliminated block for the columns of a slot, which may be another block's: row by row.
+    pub(crate) fn product(&self, block: &Eliminated, slot: &Slot, out: &mut Vec<f64>) {
+        let (structure, q) = (&self.factor.structure, self.reduced());
+        out.clear();
+        out.resize(block.width * slot.width(), 0.0);
+        for other in &structure.slots[block.slots()] {
+            let data = &q[other.start as usize * structure.order + slot.start as usize..];
+            let left = Left { data, stride: structure.order, rows: slot.width() };
+            let data = &self.factor.half[other.offset..];
+            let right = Right { data, inner: 1, column: other.width(), columns: block.width };
+            add_product(out, slot.width(), left, right, other.width(), 1.0);
+        }
+    }
+
+    /// Adds `H · productsᵀ` of one slot.
+    pub(crate) fn add_half(&self, slot: &Slot, products: &[f64], out: &mut DMatrix<f64>) {
+        for i in 0..out.nrows() {
+            let half = &self.factor.half[slot.offset + i * slot.width()..][..slot.width()];
+            for (j, product) in products.chunks_exact(slot.width()).enumerate() {
+                out[(i, j)] += half.iter().zip(product).map(|(h, p)| h * p).sum::<f64>();
+            }
+        }
+    }
+
+    /// `L⁻ᵀ` times a matrix.
+    fn finish(&self, block: &Eliminated, matrix: &mut DMatrix<f64>) {
+        for mut column in matrix.column_iter_mut() {
+            self.factor.multiply_inverse_transposed(block, column.as_mut_slice());
+        }
+    }
+
+    /// `Q x`.
+    pub(crate) fn multiply(&self, x: &[f64]) -> Vec<f64> {
+        let mut out = self.multiply_in_reduced_datum(x);
+        if let Some(datum) = self.datum() {
+            let n = x.len();
+            for (motion, share) in datum.motions.chunks_exact(n).zip(datum.shares.chunks_exact(n)) {
+                let (along, across) = (dot(share, x), dot(motion, x));
+                for ((out, m), f) in out.iter_mut().zip(motion).zip(share) {
+                    *out -= m * along + f * across;
+                }
+            }
+        }
+        out
+    }
+
+    fn multiply_in_reduced_datum(&self, x: &[f64]) -> Vec<f64> {
+        let (order, q) = (self.factor.structure.order, self.reduced());
+        let (mut out, mut reduced) = (x.to_vec(), self.factor.structure.gather(x));
+        self.factor.forward(&mut out, &mut reduced);
+        let product: Vec<f64> = q.chunks_exact(order.max(1)).map(|column| dot(column, &reduced)).collect();
+        self.factor.backward(&mut out, &product);
+        out
+    }
+
+    fn datum(&self) -> Option<&Transformation> {
+        self.datum.get_or_init(|| self.transformation()).as_ref()
+    }
+
+    fn transformation(&self) -> Option<Transformation> {
+        let n = self.factor.scale.len();
+        let border = self.factor.border.as_ref()?;
+        let (datum, motions) = (border.datum(n), border.motions(n));
+        let count = datum.len() / n;
+        let row = |list: &[f64], index: usize| list[index * n..(index + 1) * n].to_vec();
+        let gauge = DMatrix::from_fn(count, count, |i, j| dot(&row(datum, i), &row(&motions, j)));
+        let inverse = gauge.try_inverse()?;
+        let motions = DMatrix::from_vec(n, count, motions) * inverse;
+        let images: Vec<f64> =
+            datum.chunks_exact(n).flat_map(|direction| self.multiply_in_reduced_datum(direction)).collect();
+        let images = DMatrix::from_vec(n, count, images);
+        let inner = DMatrix::from_column_slice(n, count, datum).transpose() * &images;
+        let shares = images - &motions * inner * 0.5;
+        (count > 0).then(|| Transformation { motions: motions.data.into(), shares: shares.data.into() })
+    }
+
+    /// What the datum adds to the trace of the regularised, scaled inverse.
+    pub(crate) fn datum_trace(&self) -> f64 {
+        let motions = self.datum().map_or(&[][..], |datum| &datum.motions);
+        motions.iter().zip(self.factor.scale.iter().cycle()).map(|(m, s)| (m / s).powi(2)).sum()
+    }
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}

@@ -1,0 +1,86 @@
+//! All pixels of one capture as one observation.
+
+use adjust::{BlockId, EvaluationFailure, Jacobians, Observation, RigidPose};
+use nalgebra::Isometry3;
+
+use crate::planes_geometry::PlaneChart;
+use crate::planes_gram::Gram;
+use crate::planes_pixels::PlanePixels;
+
+/// Standard deviations up to which a residual has its full weight in the first, robust stage `[Huber1981]`.
+const HUBER: f64 = 1.345;
+
+/// How residuals are weighted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Weighting {
+    /// All alike.
+    LeastSquares,
+    /// Large ones as their absolute values.
+    Huber,
+}
+
+impl Weighting {
+    /// Weight of a residual in standard deviations, and its share of what is to become least.
+    fn of(self, residual: f64) -> (f64, f64) {
+        let size = residual.abs();
+        match self {
+            Self::Huber if size > HUBER => (HUBER / size, HUBER * (2.0 * size - HUBER)),
+            _ => (1.0, size * size),
+        }
+    }
+}
+
+/// Eq. 17 with the range terms: `ρ = ρ_ref + Δρ(ρ, x, y)` at each pixel, reduced by [`Gram`] to one component for each
+/// unknown and one for the rest. Blocks: plane, terms, and the pose if it is unknown.
+pub(crate) struct PlaneObservation<'a> {
+    pub(crate) blocks: Vec<BlockId>,
+    /// Number of unknowns of each block.
+    pub(crate) sizes: Vec<usize>,
+    pub(crate) chart: &'a PlaneChart,
+    pub(crate) pixels: &'a PlanePixels,
+    /// Pose where that is no block.
+    pub(crate) world_from_camera: Isometry3<f64>,
+    pub(crate) weighting: Weighting,
+}
+
+impl PlaneObservation<'_> {
+    /// The pose among the parameters, or that which is held.
+    fn pose(&self, parameters: &[&[f64]]) -> Result<Isometry3<f64>, EvaluationFailure> {
+        parameters.get(2).map_or(Ok(self.world_from_camera), |values| RigidPose::isometry(values))
+    }
+}
+
+impl Observation for PlaneObservation<'_> {
+    fn dimension(&self) -> usize {
+        self.sizes.iter().sum::<usize>() + 1
+    }
+
+    fn blocks(&self) -> &[BlockId] {
+        &self.blocks
+    }
+
+    fn evaluate(
+        &self,
+        parameters: &[&[f64]],
+        residual: &mut [f64],
+        jacobians: Option<&mut Jacobians<'_>>,
+    ) -> Result<(), EvaluationFailure> {
+        let (plane, terms) = (parameters[0], parameters[1]);
+        let seen = self.chart.seen_from(plane, &self.pose(parameters)?);
+        let columns = self.dimension() - 1;
+        let mut gram = Gram::new(columns);
+        let mut row = vec![0.0; columns + 1];
+        for pixel in (0..self.pixels.len()).filter(|pixel| self.pixels.used[*pixel]) {
+            let reference = seen(&self.pixels.rays[pixel]);
+            let reference = reference.ok_or_else(|| EvaluationFailure::new("a pixel does not see the plane"))?;
+            let root = self.pixels.roots_of_weight[pixel];
+            let model = reference.by_plane.iter().chain(self.pixels.row(pixel)).chain(&reference.by_pose);
+            row[..columns].iter_mut().zip(model).for_each(|(place, derivative)| *place = derivative * root);
+            row[columns] = root * self.pixels.left_over(pixel, reference.range_m, terms);
+            let (weight, objective) = self.weighting.of(row[columns]);
+            gram.add(&row, weight, objective);
+        }
+        gram.reduce(&self.sizes, residual, jacobians);
+        Ok(())
+    }
+}

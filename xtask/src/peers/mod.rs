@@ -1,0 +1,36 @@
+//! `cargo xtask peers STAGE ...`: other programs beside ours on the same work, in turn, in one run.
+//!
+//! The peers come from the Python Package Index into a virtual environment below `target/peers`; nothing of it is kept
+//! elsewhere. The tables are printed as they stand in docs/benchmarks.md.
+
+mod adjust;
+mod environment;
+
+use crate::shell::Outcome;
+
+/// What is compared.
+#[derive(Debug, Clone, Copy, clap::ValueEnum)]
+enum Stage {
+    /// Ceres and OpenCV beside `adjust`.
+    Adjust,
+}
+
+/// Which stages, and how often.
+#[derive(Debug, clap::Args)]
+pub(crate) struct Arguments {
+    /// Stages.
+    #[arg(required = true)]
+    stages: Vec<Stage>,
+    /// Runs of each program, in turn; the fastest counts.
+    #[arg(long, default_value_t = 3)]
+    runs: usize,
+}
+
+pub(crate) fn run(arguments: &Arguments) -> Outcome {
+    for stage in &arguments.stages {
+        match stage {
+            Stage::Adjust => adjust::run(arguments.runs.max(1))?,
+        }
+    }
+    Ok(())
+}

@@ -1,6 +1,6 @@
 //! Range terms from frames of known planes, and what a pipeline does with a calibration that was estimated.
 
-#![allow(clippy::unwrap_used)]
+#![allow(clippy::unwrap_used, clippy::panic)]
 
 mod common;
 
@@ -8,10 +8,11 @@ use std::path::Path;
 
 use camera_model::{Camera, ImageFormat, InteriorOrientation, LensDistortion, pose_from_euler};
 use common::calibration::{calibrate, request, target_field, terms};
-use error_models::{RangeErrorModel, RangeTerms};
+use error_models::{ModelSet, RangeErrorModel, RangeTerms};
 use nalgebra::Vector3;
 use pipeline::{CalibrateMethod, CalibrateRequest, Plan, Silent, ViewData, process};
 use range_image::Modulation;
+use range_io::calibration::Calibration;
 use range_io::npz::NpzWriter;
 use range_io::tables::{ObservedPlane, Station, write_planes, write_stations};
 
@@ -33,7 +34,7 @@ fn camera() -> Camera {
 fn truth() -> RangeErrorModel {
     let terms = RangeTerms { d0: 0.024, periodic: [0.01, -0.005, 0.003, 0.005, -0.009, 0.004], e1: 1.5e-3, e2: -1e-3 };
     let ambiguity_interval_m = Modulation::new(20e6).unwrap().ambiguity_interval_m();
-    RangeErrorModel { ambiguity_interval_m, terms, hyperbola: None, range_span_m: None }
+    RangeErrorModel { terms, ..RangeErrorModel::error_free(ambiguity_interval_m) }
 }
 
 /// Seven stations, one to seven metres before the wall z = 0, turned a little; noise of 3 mm from a fixed pattern.
@@ -44,7 +45,7 @@ fn write_survey(folder: &Path) {
     for index in 0..7_u32 {
         let distance = 1.0 + f64::from(index);
         let pose = pose_from_euler(Vector3::new(0.1, -0.2, distance), [0.05, -0.08 + 0.02 * f64::from(index), 0.3]);
-        let wall = self_calibration_plane(&camera, &pose);
+        let wall = ranges_to_wall(&camera, &pose);
         let ranges: Vec<f32> = wall
             .iter()
             .enumerate()
@@ -73,7 +74,7 @@ fn write_survey(folder: &Path) {
 }
 
 /// True ranges to the plane z = 0, row by row.
-fn self_calibration_plane(camera: &Camera, pose: &nalgebra::Isometry3<f64>) -> Vec<f64> {
+fn ranges_to_wall(camera: &Camera, pose: &nalgebra::Isometry3<f64>) -> Vec<f64> {
     let pixels = (0..88 * 72).map(|pixel| [f64::from(pixel % 88), f64::from(pixel / 88)]);
     pixels.map(|pixel| -pose.translation.z / (pose.rotation * camera.ray(pixel)).z).collect()
 }
@@ -94,10 +95,43 @@ fn known_planes_give_the_range_terms() {
         let deviation = (found.value - value) / found.sigma_posterior;
         assert!(deviation.abs() < 4.0, "{name}: {deviation:.1} sigmas off");
         assert!(found.sigma_posterior < 1e-3, "{name}: {}", found.sigma_posterior);
+        let entries = summary.parameters.0.iter().filter(|(known, _)| known == name).count();
+        assert_eq!(entries, 1, "{name} stands once");
     }
     assert!((summary.groups[0].rms - 0.003).abs() < 2e-4, "{:?}", summary.groups);
     let report = std::fs::read_to_string(folder.path().join("out/report.html")).unwrap();
     assert!(report.contains("After: residuals") && !report.contains("NaN"));
+}
+
+/// The offset and the distance of an unknown plane are nearly one thing: the offset is held at a known value.
+#[test]
+fn a_plane_that_is_not_known_is_found_with_the_terms() {
+    let folder = tempfile::tempdir().unwrap();
+    let survey = folder.path().join("survey");
+    write_survey(&survey);
+    let table = survey.join("planes.csv");
+    let text = std::fs::read_to_string(&table).unwrap().replace(",0,0,2,0", ",,,,");
+    std::fs::write(&table, text).unwrap();
+    let offset = RangeErrorModel { terms: RangeTerms { d0: 0.024, ..RangeTerms::default() }, ..truth() };
+    let models = ModelSet { entries: vec![(0.002, vec![offset])] };
+    let start = Calibration::from_models(&camera(), &models, None).unwrap();
+    start.write(survey.join("calibration.ron")).unwrap();
+    let ask = |request: &mut CalibrateRequest| {
+        planes(request);
+        request.options.terms = terms("d2 d3 d4 d5 d6 d7 e1 e2");
+    };
+    let summary = calibrate(folder.path(), ask).unwrap();
+    for (name, value) in RangeTerms::NAMES.iter().zip(truth().terms.to_array()).skip(1) {
+        let found = summary.parameters.get(name).unwrap();
+        let deviation = (found.value - value) / found.sigma_posterior;
+        assert!(deviation.abs() < 4.0, "{name}: {deviation:.1} sigmas off");
+    }
+    assert!((summary.parameters.get("d0").unwrap().value - 0.024).abs() < 1e-12, "held");
+    assert!(summary.diagnosis.iter().any(|words| words.contains("plane") && words.contains("mm")), "{summary}");
+    // Without stations.csv each capture has a plane of its own in the camera's frame.
+    std::fs::remove_file(survey.join("stations.csv")).unwrap();
+    let alone = calibrate(folder.path(), ask).unwrap();
+    assert!(alone.unknowns > summary.unknowns, "{} and {}", alone.unknowns, summary.unknowns);
 }
 
 #[test]
@@ -136,7 +170,7 @@ fn a_pipeline_takes_an_estimated_calibration() {
     for view in &outcome.views {
         let ViewData::Range(frame) = &view.data else { panic!("ranges are ranges") };
         let pose = view.approximate_world_from_camera.unwrap();
-        let errors: Vec<f64> = self_calibration_plane(&camera(), &pose)
+        let errors: Vec<f64> = ranges_to_wall(&camera(), &pose)
             .iter()
             .zip(frame.range.as_slice())
             .map(|(truth, range)| f64::from(*range) - truth)
@@ -166,7 +200,7 @@ fn a_calibrated_lens_and_range_go_together() {
     let stages = "(name: \"x\", stages: [CorrectRange(), CorrectImagePoint(), PointCloud()])";
     let plan = Plan::from_ron(stages, "x.ron".as_ref()).unwrap();
     let outcome = process(&plan, &survey, Some(&out), &Silent).unwrap();
-    let calibration = range_io::calibration::Calibration::read(&out).unwrap();
+    let calibration = Calibration::read(&out).unwrap();
     let model = &calibration.model_set().unwrap().entries[0].1[0];
     let camera = calibration.camera().unwrap();
     let pixel = [130.0, 20.0];

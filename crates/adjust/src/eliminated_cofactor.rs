@@ -6,7 +6,7 @@ use nalgebra::DMatrix;
 
 use crate::elimination::EliminatedFactor;
 use crate::layout::Layout;
-use crate::product::{Left, Right, add_product};
+use crate::product::{Left, Right, add_product, with_wide_registers};
 use crate::structure::{Eliminated, Role, Slot};
 
 /// With `V = L Lᵀ`, `H = L⁻¹ Wᵀ` and the reduced inverse `Q_cc`:
@@ -125,13 +125,15 @@ impl EliminatedCofactor {
         let (structure, q) = (&self.factor.structure, self.reduced());
         out.clear();
         out.resize(block.width * slot.width(), 0.0);
-        for other in &structure.slots[block.slots()] {
-            let data = &q[other.start as usize * structure.order + slot.start as usize..];
-            let left = Left { data, stride: structure.order, rows: slot.width() };
-            let data = &self.factor.half[other.offset..];
-            let right = Right { data, inner: 1, column: other.width(), columns: block.width };
-            add_product(out, slot.width(), left, right, other.width(), 1.0);
-        }
+        with_wide_registers(|| {
+            for other in &structure.slots[block.slots()] {
+                let data = &q[other.start as usize * structure.order + slot.start as usize..];
+                let left = Left { data, stride: structure.order, rows: slot.width() };
+                let data = &self.factor.half[other.offset..];
+                let right = Right { data, inner: 1, column: other.width(), columns: block.width };
+                add_product(out, slot.width(), left, right, other.width(), 1.0);
+            }
+        });
     }
 
     /// Adds `H · productsᵀ` of one slot.

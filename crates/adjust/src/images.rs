@@ -1,4 +1,6 @@
 //! `J Q Jᵀ` of single observations, from which redundancy numbers and the deviations of residuals follow.
+// Only what is inlined is compiled for wide registers.
+#![allow(clippy::inline_always)]
 
 use nalgebra::DMatrix;
 use rayon::prelude::*;
@@ -8,7 +10,7 @@ use crate::cofactor::Cofactor;
 use crate::eliminated_cofactor::EliminatedCofactor;
 use crate::layout::{Layout, Place};
 use crate::linearisation::Linearisation;
-use crate::product::{Left, Right, add_product};
+use crate::product::{Left, Right, add_product, with_wide_registers};
 use crate::structure::{Eliminated, Role};
 
 /// Observations in one piece of work.
@@ -145,11 +147,13 @@ impl Source<'_> {
             }
         }
         let mut image = vec![0.0; place.dimension * place.dimension];
-        self.add_square(place, cofactor.reduced(), structure.order, memory, &mut image);
+        let q = cofactor.reduced();
+        with_wide_registers(|| self.add_square(place, q, structure.order, memory, &mut image));
         image
     }
 
     /// Adds `J Q Jᵀ` over the columns in memory.
+    #[inline(always)]
     fn add_square(self, place: &Place, q: &[f64], order: usize, memory: &mut Memory, image: &mut [f64]) {
         let jacobian = &self.linearisation.jacobian[place.jacobian_range()];
         let d = place.dimension;

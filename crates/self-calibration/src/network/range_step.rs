@@ -61,7 +61,11 @@ impl Observation for DifferenceEquation {
             jacobians.row(0, 0).copy_from_slice(&[reference * modelled.by_distance]);
             jacobians.row(1, 0).copy_from_slice(&by_terms);
             if parameters.len() > 2 {
-                jacobians.row(2, 0).iter_mut().zip(&self.root).for_each(|(out, r)| *out = scale * modelled.by_distance * r);
+                jacobians
+                    .row(2, 0)
+                    .iter_mut()
+                    .zip(&self.root)
+                    .for_each(|(out, r)| *out = scale * modelled.by_distance * r);
             }
         }
         Ok(())

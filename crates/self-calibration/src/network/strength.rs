@@ -191,7 +191,9 @@ impl Setup<'_> {
         }
         match (self.design_strength(), failure) {
             (Ok(Some(strength)), _) if strength.inflation > largest_inflation => strength.error(),
-            (Err(Error::Adjust(adjust::Error::RankDeficient { combinations, .. })), _) => self.undetermined(&combinations),
+            (Err(Error::Adjust(adjust::Error::RankDeficient { combinations, .. })), _) => {
+                self.undetermined(&combinations)
+            }
             (_, adjust::Error::RankDeficient { combinations, .. }) => self.undetermined(combinations),
             _ => error,
         }

@@ -1,7 +1,6 @@
 use std::collections::BTreeSet;
 
 use crate::outlier::check_probability;
-use crate::readmission::Fit;
 use crate::{Adjustment, Error, GroupId, Kernel, Method, ObservationId, Result, SnoopingTest, Solution, SolveOptions};
 
 /// How gross errors are sought and rejected.
@@ -11,7 +10,7 @@ pub struct SnoopingOptions {
     pub test: SnoopingTest,
     /// Significance level of a single test.
     pub level: f64,
-    /// Most components that may be rejected; `None`: a tenth of those tested.
+    /// Most components that may be rejected; `None`: a tenth of those tested, at least one.
     pub max_rejections: Option<usize>,
     /// Most components rejected from one solution before it is computed anew. Within a batch all is as if they were
     /// rejected one at a time in the linearised model; 1 solves after each.
@@ -123,7 +122,7 @@ impl Adjustment<'_> {
         search: &mut Search,
     ) -> Result<(Solution, SnoopingEnd)> {
         let tested = self.tested_rows(snooping);
-        let limit = snooping.max_rejections.unwrap_or(tested.iter().filter(|&&tested| tested).count() / 10);
+        let limit = snooping.max_rejections.unwrap_or((tested.iter().filter(|&&tested| tested).count() / 10).max(1));
         let mut solution = self.solve(options)?;
         search.solutions = 1;
         loop {
@@ -158,12 +157,12 @@ impl Adjustment<'_> {
     /// Takes back what fits, each component once. True where there was any.
     fn take_back(&mut self, solution: &Solution, snooping: &SnoopingOptions, search: &mut Search) -> Result<bool> {
         let out: Vec<_> = search.out.iter().copied().filter(|one| !search.returned.contains(one)).collect();
-        let fitting: Vec<Fit> = self
+        let fitting: Vec<Rejection> = self
             .predictions(solution, &out, snooping)?
             .into_iter()
-            .filter(|fit| fit.record.statistic.abs() <= fit.record.critical)
+            .filter(|fit| fit.statistic.abs() <= fit.critical)
             .collect();
-        for Fit { record } in &fitting {
+        for record in &fitting {
             let component = (record.observation, record.component);
             self.readmit(record.observation, record.component)?;
             search.out.remove(&component);

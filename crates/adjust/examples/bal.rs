@@ -43,7 +43,13 @@ fn run() {
         println!("descent: {:.3} s CPU, {:.3} s wall with reading", cpu() - start, wall.elapsed().as_secs_f64());
         println!("cost {:.6e} after {} iterations", 0.5 * descent.objective(), descent.iterations());
         for entry in descent.trace() {
-            println!("  {:?} {:.8e} step {:.2e} damping {:.1e}", entry.kind, 0.5 * entry.objective, entry.step, entry.damping);
+            println!(
+                "  {:?} {:.8e} step {:.2e} damping {:.1e}",
+                entry.kind,
+                0.5 * entry.objective,
+                entry.step,
+                entry.damping
+            );
         }
         return;
     }

@@ -38,11 +38,18 @@ fn run() {
         let covariances = cpu();
         sum = solution.redundancy_numbers().iter().sum();
         let numbers = cpu();
-        for (time, (end, start)) in times.iter_mut().zip([(solved, start), (covariances, solved), (numbers, covariances)]) {
+        for (time, (end, start)) in
+            times.iter_mut().zip([(solved, start), (covariances, solved), (numbers, covariances)])
+        {
             *time += 1e3 * (end - start) / f64::from(repetitions);
         }
     }
-    println!("{} observed values, {} unknowns, redundancy {}", solution.observations(), solution.unknowns(), solution.redundancy());
+    println!(
+        "{} observed values, {} unknowns, redundancy {}",
+        solution.observations(),
+        solution.unknowns(),
+        solution.redundancy()
+    );
     for entry in solution.trace() {
         println!("  {entry:?}");
     }

@@ -45,9 +45,10 @@ struct Source<'s> {
 impl BlockNormal {
     pub(crate) fn new(layout: &Layout, structure: Structure) -> Self {
         let own = structure.eliminated.iter().map(|e| e.width * e.width).sum();
-        let coupling = structure.slots.last().map_or(0, |last| {
-            last.offset + last.width() * structure.eliminated[last.eliminated as usize].width
-        });
+        let coupling = structure
+            .slots
+            .last()
+            .map_or(0, |last| last.offset + last.width() * structure.eliminated[last.eliminated as usize].width);
         Self {
             reduced: vec![0.0; structure.order * structure.order],
             own: vec![0.0; own],
@@ -125,9 +126,8 @@ impl Structure {
     /// Memory of consecutive eliminated blocks: their own matrices, and their couplings.
     pub(crate) fn extent(&self, blocks: &[Eliminated]) -> (usize, usize) {
         let own = blocks.iter().map(|block| block.width * block.width).sum();
-        let coupling = |block: &Eliminated| {
-            self.slots[block.slots()].iter().map(|slot| slot.width() * block.width).sum::<usize>()
-        };
+        let coupling =
+            |block: &Eliminated| self.slots[block.slots()].iter().map(|slot| slot.width() * block.width).sum::<usize>();
         (own, blocks.iter().map(coupling).sum())
     }
 }

@@ -85,7 +85,8 @@ impl Border {
             step.iter_mut().zip(row).for_each(|(g, b)| *g += b * d * share);
         }
         factor.solve_columns(step);
-        let mut miss = DVector::from_iterator(self.user + 2 * self.inner, self.rows.chunks_exact(n).map(|row| dot(row, step)));
+        let mut miss =
+            DVector::from_iterator(self.user + 2 * self.inner, self.rows.chunks_exact(n).map(|row| dot(row, step)));
         (0..self.user).for_each(|i| miss[i] -= self.right[i] * share);
         if self.multipliers.solve_mut(&mut miss) {
             for (column, multiplier) in self.columns.chunks_exact(n).zip(miss.iter()) {

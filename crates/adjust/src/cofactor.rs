@@ -11,7 +11,11 @@ use crate::structure::Role;
 #[derive(Debug, Clone)]
 pub(crate) enum Cofactor {
     /// Full, column-major; what makes the diagonal of N one; and the trace of the scaled inverse.
-    Dense { matrix: Vec<f64>, scale: Vec<f64>, trace: f64 },
+    Dense {
+        matrix: Vec<f64>,
+        scale: Vec<f64>,
+        trace: f64,
+    },
     Eliminated(Box<EliminatedCofactor>),
 }
 
@@ -69,7 +73,9 @@ impl Cofactor {
 
     /// Variances of all unknowns.
     pub(crate) fn diagonal(&self, layout: &Layout) -> Vec<f64> {
-        (0..layout.blocks()).flat_map(|block| self.block(layout, block, block).diagonal().data.as_vec().clone()).collect()
+        (0..layout.blocks())
+            .flat_map(|block| self.block(layout, block, block).diagonal().data.as_vec().clone())
+            .collect()
     }
 
     /// `Q x`.

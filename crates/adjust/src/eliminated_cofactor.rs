@@ -125,12 +125,14 @@ impl EliminatedCofactor {
         let (structure, q) = (&self.factor.structure, self.reduced());
         out.clear();
         out.resize(block.width * slot.width(), 0.0);
-        with_wide_registers(|| for other in &structure.slots[block.slots()] {
-            let data = &q[other.start as usize * structure.order + slot.start as usize..];
-            let left = Left { data, stride: structure.order, rows: slot.width() };
-            let data = &self.factor.half[other.offset..];
-            let right = Right { data, inner: 1, column: other.width(), columns: block.width };
-            add_product(out, slot.width(), left, right, other.width(), 1.0);
+        with_wide_registers(|| {
+            for other in &structure.slots[block.slots()] {
+                let data = &q[other.start as usize * structure.order + slot.start as usize..];
+                let left = Left { data, stride: structure.order, rows: slot.width() };
+                let data = &self.factor.half[other.offset..];
+                let right = Right { data, inner: 1, column: other.width(), columns: block.width };
+                add_product(out, slot.width(), left, right, other.width(), 1.0);
+            }
         });
     }
 

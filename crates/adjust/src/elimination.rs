@@ -160,7 +160,8 @@ impl EliminatedFactor {
             for index in 0..block.width {
                 let unit = self.scale[block.column + index];
                 let own = &normal.own[block.own + index * block.width..][..block.width];
-                let mut sum: f64 = own.iter().zip(&self.scale[block.columns()]).map(|(v, s)| (v * s * unit).abs()).sum();
+                let mut sum: f64 =
+                    own.iter().zip(&self.scale[block.columns()]).map(|(v, s)| (v * s * unit).abs()).sum();
                 for slot in &self.structure.slots[block.slots()] {
                     let row = &normal.coupling[slot.offset + index * slot.width()..][..slot.width()];
                     for (place, value) in slot.reduced_columns().zip(row) {
@@ -208,11 +209,14 @@ fn eliminate(normal: &BlockNormal, extra: &[f64]) -> Option<(Vec<f64>, Vec<f64>)
             inverse.copy_from_slice(&normal.own[block.own()]);
             (0..block.width).for_each(|i| inverse[i * block.width + i] += extra[block.column + i]);
             let good = inverse_factor(inverse, block.width);
-            with_wide_registers(|| for slot in &structure.slots[block.slots()] {
-                let (count, width) = (block.width * slot.width(), slot.width());
-                let left = Left { data: &normal.coupling[slot.offset..slot.offset + count], stride: width, rows: width };
-                let right = Right { data: inverse, inner: 1, column: block.width, columns: block.width };
-                add_product(take(&mut halves, count), width, left, right, block.width, 1.0);
+            with_wide_registers(|| {
+                for slot in &structure.slots[block.slots()] {
+                    let (count, width) = (block.width * slot.width(), slot.width());
+                    let left =
+                        Left { data: &normal.coupling[slot.offset..slot.offset + count], stride: width, rows: width };
+                    let right = Right { data: inverse, inner: 1, column: block.width, columns: block.width };
+                    add_product(take(&mut halves, count), width, left, right, block.width, 1.0);
+                }
             });
             good
         })

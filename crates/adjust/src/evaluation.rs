@@ -84,8 +84,7 @@ impl<'v> Scratch<'v> {
             &mut self.full[..place.dimension * place.full]
         };
         data.fill(0.0);
-        let mut jacobians =
-            Jacobians { data, named, width: place.full, dimension: place.dimension, misused: false };
+        let mut jacobians = Jacobians { data, named, width: place.full, dimension: place.dimension, misused: false };
         let done = observation.evaluate(&self.parameters, residual, Some(&mut jacobians));
         done.map_err(|failure| Failure::model(failure.to_string()))?;
         if jacobians.misused {
@@ -107,7 +106,8 @@ impl<'v> Scratch<'v> {
             let Some(part) = layout.parts(place).iter().find(|part| part.block == named.block) else { continue };
             let columns = layout.block_columns(named.block as usize).iter().enumerate();
             for (component, &column) in columns.filter(|(_, column)| **column != HELD) {
-                let (from, to) = (named.start as usize + component, part.offset as usize + column - part.column as usize);
+                let (from, to) =
+                    (named.start as usize + component, part.offset as usize + column - part.column as usize);
                 for row in 0..place.dimension {
                     compact[row * place.width + to] += self.full[row * place.full + from];
                 }

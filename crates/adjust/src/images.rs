@@ -170,7 +170,8 @@ impl Source<'_> {
         }
     }
 
-    /// Adds what the eliminated block contributes: with `J' = J_o L⁻ᵀ` and B = J' (H Q_cc) J_cᵀ it is `J' K J'ᵀ − B − Bᵀ`.
+    /// Adds what the eliminated block contributes: with `J' = J_o L⁻ᵀ` and
+    /// `B = J' (H Q_cc) J_cᵀ` it is `J' K J'ᵀ − B − Bᵀ`.
     fn add_eliminated_part(
         self,
         place: &Place,

@@ -146,13 +146,7 @@ impl Linearisation {
 
 impl Piece<'_> {
     /// Contributions to vᵀPv and to the objective.
-    fn evaluate(
-        self,
-        adjustment: &Adjustment<'_>,
-        layout: &Layout,
-        values: &[f64],
-        want: Want,
-    ) -> Result<(f64, f64)> {
+    fn evaluate(self, adjustment: &Adjustment<'_>, layout: &Layout, values: &[f64], want: Want) -> Result<(f64, f64)> {
         let mut scratch = Scratch::new(layout, values, want);
         let (mut vtpv, mut objective) = (0.0, 0.0);
         let Some((row, entry)) = self.places.first().map(|place| (place.row, place.jacobian)) else {
@@ -185,6 +179,7 @@ impl Piece<'_> {
 }
 
 /// Cuts the first `count` elements off a slice.
+#[allow(clippy::mut_mut)] // the slice itself becomes shorter
 pub(crate) fn take<'s>(rest: &mut &'s mut [f64], count: usize) -> &'s mut [f64] {
     let (head, tail) = std::mem::take(rest).split_at_mut(count);
     *rest = tail;
@@ -201,7 +196,9 @@ fn whiten(whitening: &[f64], matrix: &mut [f64], width: usize) {
         let weights = &whitening[row * (row + 1) / 2..(row + 1) * (row + 2) / 2];
         let (above, below) = matrix.split_at_mut(row * width);
         let below = &mut below[..width];
-        below.iter_mut().for_each(|out| *out *= weights[row]);
+        for out in &mut *below {
+            *out *= weights[row];
+        }
         for (above, &weight) in above.chunks_exact(width).zip(weights) {
             // Components are uncorrelated more often than not.
             if weight != 0.0 {

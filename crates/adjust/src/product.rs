@@ -87,7 +87,8 @@ mod tests {
                 add_product(&mut out, 21, left, factors, inner, -0.5);
                 for j in 0..columns {
                     for i in 0..21 {
-                        let sum: f64 = (0..inner).map(|k| data[(k * 20 + i).min(data.len() - 1)] * right[k * 5 + j]).sum();
+                        let sum: f64 =
+                            (0..inner).map(|k| data[(k * 20 + i).min(data.len() - 1)] * right[k * 5 + j]).sum();
                         let expected = if i < rows { 1.0 - 0.5 * sum } else { 1.0 };
                         // Nine products of numbers below one.
                         assert!((out[j * 21 + i] - expected).abs() < 1e-14);

@@ -9,12 +9,19 @@ use crate::dense;
 pub(crate) fn new(normal: &BlockNormal, constraints: &Constraints, scale: &[f64]) -> Constraints {
     let (structure, n) = (&normal.structure, normal.diagonal.len());
     let user = constraints.first_inner;
-    let mut rows: Vec<f64> = constraints.rows.chunks_exact(n.max(1)).take(user).flat_map(|row| structure.gather(row)).collect();
+    let mut rows: Vec<f64> =
+        constraints.rows.chunks_exact(n.max(1)).take(user).flat_map(|row| structure.gather(row)).collect();
     for motion in constraints.motions.chunks_exact(n.max(1)) {
         // A motion h of unknowns in units of `scale` is h / scale; rows are multiplied by the scale again.
         rows.extend(matching_motion(normal, motion).iter().zip(scale).map(|(h, s)| h / (s * s)));
     }
-    Constraints { count: constraints.count, first_inner: user, rows, right: constraints.right.clone(), motions: Vec::new() }
+    Constraints {
+        count: constraints.count,
+        first_inner: user,
+        rows,
+        right: constraints.right.clone(),
+        motions: Vec::new(),
+    }
 }
 
 /// Motion of the reduced unknowns that goes with one of the points: the solution of `U h_c = −W h_o`, by one sweep of

@@ -3,11 +3,11 @@ use std::sync::OnceLock;
 
 use nalgebra::{DMatrix, Isometry3};
 
+use crate::cofactor::Cofactor;
+use crate::images::Images;
 use crate::iteration::Iteration;
 use crate::layout::{HELD, Layout};
 use crate::linearisation::Linearisation;
-use crate::images::Images;
-use crate::cofactor::Cofactor;
 use crate::system::LARGEST;
 use crate::{
     Adjustment, BlockId, Error, GroupId, ObservationId, ParameterBlock, Result, RigidPose, SolveOptions, TraceEntry,

@@ -44,7 +44,8 @@ impl Observation for ImagePoint {
         let &[wx, wy, wz, tx, ty, tz, f, k1, k2] = parameters[0] else {
             return Err(EvaluationFailure::new("a camera has nine parameters"));
         };
-        let (turned, by_angle, rotation) = rotate(&Vector3::new(wx, wy, wz), &Vector3::from_column_slice(parameters[1]));
+        let (turned, by_angle, rotation) =
+            rotate(&Vector3::new(wx, wy, wz), &Vector3::from_column_slice(parameters[1]));
         let p = turned + Vector3::new(tx, ty, tz);
         if p.z == 0.0 {
             return Err(EvaluationFailure::new("the point lies in the plane of the camera"));
@@ -56,7 +57,10 @@ impl Observation for ImagePoint {
         residual[1] = self.observed[1] - f * distortion * v;
         let Some(jacobians) = jacobians else { return Ok(()) };
         let slope = 2.0 * (k1 + 2.0 * k2 * r2);
-        let by_uv = [[f * (distortion + slope * u * u), f * slope * u * v], [f * slope * u * v, f * (distortion + slope * v * v)]];
+        let by_uv = [
+            [f * (distortion + slope * u * u), f * slope * u * v],
+            [f * slope * u * v, f * (distortion + slope * v * v)],
+        ];
         for (row, [du, dv]) in by_uv.into_iter().enumerate() {
             let own = if row == 0 { u } else { v };
             let by_point = Vector3::new(-du / p.z, -dv / p.z, -(du * u + dv * v) / p.z);

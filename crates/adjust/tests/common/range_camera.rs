@@ -13,9 +13,8 @@ use rand_pcg::Pcg64;
 pub const PARAMETERS: usize = 17;
 pub const NAMES: [&str; PARAMETERS] =
     ["xp", "yp", "c", "k1", "k2", "k3", "p1", "p2", "d0", "d2", "d3", "d4", "d5", "d6", "d7", "e1", "e2"];
-pub const TRUTH: [f64; PARAMETERS] = [
-    0.05, -0.03, 8.0, -4e-3, 8e-5, -1e-6, 1e-4, -2e-4, 0.02, 0.01, -0.005, 0.004, 0.003, -0.002, 0.001, 0.002, -0.001,
-];
+pub const TRUTH: [f64; PARAMETERS] =
+    [0.05, -0.03, 8.0, -4e-3, 8e-5, -1e-6, 1e-4, -2e-4, 0.02, 0.01, -0.005, 0.004, 0.003, -0.002, 0.001, 0.002, -0.001];
 /// Standard deviations of image coordinates (mm) and ranges (m).
 pub const SIGMAS: [f64; 3] = [0.002, 0.002, 0.005];
 /// Half the sensor, mm.
@@ -128,7 +127,10 @@ impl Observation for Sighting {
 /// What a network is made of.
 #[derive(Clone, Copy)]
 pub struct RangeCameraPlan {
+    /// Of stations and targets.
     pub seed: u64,
+    /// Of errors and disturbances.
+    pub noise: u64,
     pub stations: usize,
     pub targets: usize,
     pub sightings: usize,
@@ -139,11 +141,25 @@ pub struct RangeCameraPlan {
 }
 
 /// 24 stations, 103 targets: 3,078 observed values, 470 unknowns.
-pub const LABORATORY: RangeCameraPlan =
-    RangeCameraPlan { seed: 11, stations: 24, targets: 103, sightings: 1026, without_range: 0, disturbance: 0.01 };
+pub const LABORATORY: RangeCameraPlan = RangeCameraPlan {
+    seed: 11,
+    noise: 0,
+    stations: 24,
+    targets: 103,
+    sightings: 1026,
+    without_range: 0,
+    disturbance: 0.01,
+};
 /// 245 stations, 2000 targets: 234,534 observed values, 7,487 unknowns.
-pub const HALL: RangeCameraPlan =
-    RangeCameraPlan { seed: 12, stations: 245, targets: 2000, sightings: 78_178, without_range: 0, disturbance: 0.01 };
+pub const HALL: RangeCameraPlan = RangeCameraPlan {
+    seed: 12,
+    noise: 0,
+    stations: 245,
+    targets: 2000,
+    sightings: 78_178,
+    without_range: 0,
+    disturbance: 0.01,
+};
 
 /// The model and its truth.
 pub struct RangeCameraNetwork {
@@ -202,6 +218,7 @@ pub fn range_camera_network(plan: &RangeCameraPlan) -> RangeCameraNetwork {
         .map(|_| Vector3::new(rng.random_range(-1.6..1.6), rng.random_range(-1.1..1.1), rng.random_range(-0.4..0.4)))
         .collect();
     let true_stations: Vec<_> = (0..plan.stations).map(|i| station(i, &mut rng)).collect();
+    let mut rng = Pcg64::seed_from_u64(plan.seed + 1000 * plan.noise + 1);
     let mut adjustment = Adjustment::new();
     let size = plan.disturbance;
     let parameters = adjustment.add_block(
@@ -246,11 +263,7 @@ pub fn range_camera_network(plan: &RangeCameraPlan) -> RangeCameraNetwork {
 }
 
 /// As many sightings as wanted: stations that see many targets give some up.
-fn visible(
-    plan: &RangeCameraPlan,
-    stations: &[Isometry3<f64>],
-    targets: &[Vector3<f64>],
-) -> Vec<(usize, usize)> {
+fn visible(plan: &RangeCameraPlan, stations: &[Isometry3<f64>], targets: &[Vector3<f64>]) -> Vec<(usize, usize)> {
     let mut seen: Vec<Vec<(usize, usize)>> = stations
         .iter()
         .enumerate()

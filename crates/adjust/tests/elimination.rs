@@ -193,6 +193,7 @@ fn defects_of_large_networks_are_named() {
     let sighting = range_camera::Sighting {
         blocks: [lonely.stations[0], target, lonely.parameters],
         observed: [0.05, -0.03, first.observed[2]],
+        at: [0.05, -0.03, first.observed[2]],
         dimension: 2,
     };
     let group = lonely.adjustment.add_group("single");

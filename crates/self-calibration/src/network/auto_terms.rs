@@ -46,9 +46,9 @@ pub(crate) fn choose(problem: &Problem<'_>) -> Result<CalibrationOutcome> {
         }
         left.push((group, decision(group, false, &test, &current.offset_gain(group))));
         current = current.without(group);
-        group.iter().for_each(|name| {
+        for name in group {
             terms.remove(*name);
-        });
+        }
     }
     if !left.is_empty() {
         outcome = problem.run(&terms)?;
@@ -93,9 +93,9 @@ fn determined(
                 group.join(", ")
             ),
         });
-        group.iter().for_each(|name| {
+        for name in *group {
             terms.remove(*name);
-        });
+        }
     }
 }
 

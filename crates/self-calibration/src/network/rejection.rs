@@ -21,13 +21,13 @@ const MOST_ROUNDS: usize = 100;
 pub(crate) struct Suspect {
     /// Position among the rows.
     pub(crate) row: usize,
-    /// |v| / σ_v over the scale of its group.
+    /// `|v| / σ_v` over the scale of its group.
     statistic: f64,
 }
 
 /// Standardised residuals over the robust scale of their group, where they exceed the critical value; largest first.
 ///
-/// The scale, 1.4826 times the median of |v| / σ_v, stands for sigma0 of the group and is not drawn up by gross errors.
+/// The scale, 1.4826 times the median of `|v| / σ_v`, stands for sigma0 of the group and is not drawn up by gross errors.
 pub(crate) fn suspects(solution: &Solution, components: &[Component], level: f64) -> Result<Vec<Suspect>> {
     let standardised = solution.standardised_residuals(Scale::Prior)?;
     let redundancy = solution.redundancy_numbers();
@@ -114,7 +114,8 @@ impl Setup<'_> {
         let rejected = self.rejected_rows();
         for row in &rejected {
             let residual = self.predicted(solved, row)?;
-            if !(residual.abs() <= critical * sigma0 * row.sigma) {
+            // NaN: nothing is known of it.
+            if residual.is_nan() || residual.abs() > critical * sigma0 * row.sigma {
                 conspicuous.insert(key(row));
             }
         }

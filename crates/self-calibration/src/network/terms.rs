@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 
 use camera_model::{Camera, InteriorOrientation, LensDistortion};
-use error_models::{AmplitudeHyperbola, PARAMETERS, RangeErrorModel, RangeTerms};
+use error_models::{AmplitudeHyperbola, RangeErrorModel, RangeTerms, parameter_unit};
 
 /// Names of the interior orientation, which comes before the lens in the camera's block.
 pub(crate) const INTERIOR: [&str; 3] = ["xp", "yp", "c"];
@@ -54,28 +54,27 @@ pub(crate) struct RangeFamily {
     /// Puts values back.
     pub(crate) write: fn(&mut RangeErrorModel, &[f64]),
     /// The correction and its derivatives with respect to the values; fails with a reason where it has no value.
-    pub(crate) evaluate: fn(&RangeErrorModel, &Seen, &[f64], &mut [f64]) -> Result<RangePart, &'static str>,
+    pub(crate) evaluate: Evaluate,
 }
+
+/// A correction as a function of model, observed values, terms; the last argument takes the derivatives.
+type Evaluate = fn(&RangeErrorModel, &Seen, &[f64], &mut [f64]) -> Result<RangePart, &'static str>;
 
 /// All families. A further term is a further row.
 pub(crate) const RANGE_FAMILIES: [RangeFamily; 2] = [
-    // Eq. 14, linear in its nine terms.
+    // Eq. 14 and the further terms that stand instead of or beside parts of it: all linear.
     RangeFamily {
-        names: |_| RangeTerms::NAMES.into_iter().map(Cow::Borrowed).collect(),
-        read: |model, out| out.extend(model.terms.to_array()),
+        names: |model| model.parameter_names().into_iter().map(Cow::Owned).collect(),
+        read: |model, out| out.extend(model.parameter_values()),
         write: |model, values| {
-            if let Ok(values) = values.try_into() {
-                model.terms = RangeTerms::from_array(values);
-            }
+            // Values come in the number of the names, and finite: nothing is refused.
+            let _ = model.set_parameter_values(values);
         },
         evaluate: |model, seen, values, row| {
-            let design = RangeTerms::design_row(model.ambiguity_interval_m, seen.range_m, seen.x_mm, seen.y_mm);
-            row.copy_from_slice(&design);
-            let value = design.iter().zip(values).map(|(a, x)| a * x).sum();
-            let &[d0, d2, d3, d4, d5, d6, d7, by_x, by_y] = values else { return Err("Eq. 14 has nine terms") };
-            let terms = RangeTerms::from_array([d0, d2, d3, d4, d5, d6, d7, by_x, by_y]);
-            let by_range = terms.range_derivative(model.ambiguity_interval_m, seen.range_m);
-            Ok(RangePart { value, by_range, by_x, by_y })
+            let known = model.design_row_into(seen.range_m, seen.x_mm, seen.y_mm, row);
+            known.map_err(|_| "range terms of the wrong number")?;
+            let value = row.iter().zip(values).map(|(a, x)| a * x).sum();
+            Ok(RangePart { value, ..linear_slopes(model, seen, values) })
         },
     },
     // Eq. 15.
@@ -104,6 +103,22 @@ pub(crate) const RANGE_FAMILIES: [RangeFamily; 2] = [
         },
     },
 ];
+
+/// Derivatives of the linear terms with respect to range and image point.
+fn linear_slopes(model: &RangeErrorModel, seen: &Seen, values: &[f64]) -> RangePart {
+    if let (true, &[d0, d2, d3, d4, d5, d6, d7, by_x, by_y]) = (model.further.is_empty(), values) {
+        let terms = RangeTerms::from_array([d0, d2, d3, d4, d5, d6, d7, by_x, by_y]);
+        let by_range = terms.range_derivative(model.ambiguity_interval_m, seen.range_m);
+        return RangePart { by_range, by_x, by_y, ..RangePart::default() };
+    }
+    let mut own = RangeErrorModel { hyperbola: None, ..model.clone() };
+    // A number of values that does not fit was refused with the design row.
+    let _ = own.set_parameter_values(values);
+    let by_range = own.correction(seen.range_m, seen.x_mm, seen.y_mm, f64::NAN).range_derivative;
+    let gradient = own.further.surface.as_ref().map(|surface| surface.gradient(seen.x_mm, seen.y_mm));
+    let [by_x, by_y] = gradient.unwrap_or([own.terms.e1, own.terms.e2]);
+    RangePart { by_range, by_x, by_y, ..RangePart::default() }
+}
 
 /// Names of a range set's block.
 pub(crate) fn range_names(model: &RangeErrorModel) -> Vec<String> {
@@ -161,7 +176,9 @@ pub(crate) fn modelled_range(
         let step = (distance + part.value - seen.range_m) * growth;
         seen.range_m += step;
         if step.abs() <= 1e-14 * (1.0 + seen.range_m.abs()) {
-            row.iter_mut().for_each(|derivative| *derivative *= growth);
+            for derivative in row {
+                *derivative *= growth;
+            }
             let (by_x, by_y) = (part.by_x * growth, part.by_y * growth);
             return Ok(ModelledRange { range_m: seen.range_m, by_distance: growth, by_x, by_y });
         }
@@ -220,6 +237,6 @@ pub(crate) fn unit(name: &str) -> &'static str {
         "k3" => "mm^-6",
         "p1" | "p2" => "mm^-1",
         "b1" | "b2" => "1",
-        _ => PARAMETERS.iter().find(|(known, _)| *known == name).map_or("", |(_, unit)| unit),
+        _ => parameter_unit(name).unwrap_or_default(),
     }
 }

@@ -64,7 +64,7 @@ enum MethodName {
     Joint,
     /// Range terms from known distances (distances.csv).
     Laboratory,
-    /// Range terms from frames of known planes (planes.csv).
+    /// Range terms from frames of planes, known or not (planes.csv).
     Planes,
 }
 

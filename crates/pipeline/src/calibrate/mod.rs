@@ -8,6 +8,7 @@ mod network_check;
 mod network_files;
 mod passive;
 mod planes;
+mod planes_outcome;
 mod request;
 mod run;
 mod start;

@@ -9,7 +9,7 @@ use self_calibration::{CalibrationOptions, Method};
 pub enum CalibrateMethod {
     /// From targets, by one of the network methods.
     Network(Method),
-    /// Range terms from frames of known planes.
+    /// Range terms from frames of planes, known or not.
     Planes,
 }
 
@@ -42,7 +42,7 @@ impl CalibrateMethod {
             }
             Self::Network(Method::JointIntegrated) => "range camera and passive camera in one adjustment",
             Self::Network(Method::Laboratory) => "range terms from distances known from outside",
-            Self::Planes => "range terms from frames of known planes",
+            Self::Planes => "range terms from frames of planes",
         }
     }
 }

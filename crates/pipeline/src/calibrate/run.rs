@@ -63,6 +63,8 @@ pub(crate) fn is_refusal(error: &self_calibration::Error) -> bool {
         error,
         Cause::WeakNetwork { .. }
             | Cause::NotDetermined { .. }
+            | Cause::PlanesNotDetermined { .. }
+            | Cause::NoPlane { .. }
             | Cause::TooFewDifferences { .. }
             | Cause::NoHyperbola { .. }
             | Cause::NotReachable { .. }

@@ -2,6 +2,8 @@
 
 #![allow(dead_code, clippy::unwrap_used, clippy::print_stdout)]
 
+pub mod calibration;
+
 use std::path::{Path, PathBuf};
 
 use pipeline::{Plan, Result, RunRequest, Silent, Summary};

@@ -1,29 +1,44 @@
-//! A calibration-sized free network: 24 stations, 103 points, 1026 sights of three values, 453 unknowns; and a
-//! regression.
+//! Self-calibrations of a range camera in free networks, one of a laboratory and one of a hall; and a regression.
 #![allow(missing_docs, clippy::unwrap_used)]
 
-#[path = "../tests/common/mod.rs"]
-mod common;
+#[path = "../tests/common/range_camera.rs"]
+#[allow(dead_code)]
+mod range_camera;
 
-use adjust::{Adjustment, Covariance, DatumDefect, LinearObservation, ParameterBlock, Scale, SolveOptions};
-use common::{Plan, network};
-use criterion::{Criterion, criterion_group, criterion_main};
+use adjust::{Adjustment, Covariance, LinearObservation, ParameterBlock, Scale, Solution, SolveOptions};
+use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
+use range_camera::{HALL, LABORATORY, RangeCameraPlan, range_camera_network};
 
-fn free_network(criterion: &mut Criterion) {
-    let plan = Plan { seed: 1, stations: 24, points: 103, seen: 43, ranges: true, disturbance: 0.01 };
-    let mut network = network(&plan);
-    let points = network.points.clone();
-    network.adjustment.add_inner_constraints(&points, DatumDefect::Six).unwrap();
+fn calibration(criterion: &mut Criterion, name: &str, plan: &RangeCameraPlan) {
+    // One thread: wall time is CPU time.
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    let network = range_camera_network(plan).free();
     let options = SolveOptions::default();
-    let mut group = criterion.benchmark_group("network of 453 unknowns, 3096 observations");
+    let solve = || network.adjustment.solve(&options).unwrap();
+    let blocks = || network.stations.iter().chain(&network.targets).chain([&network.parameters]);
+    let mut group = criterion.benchmark_group(name);
     group.sample_size(10);
-    group.bench_function("solve with covariance", |b| b.iter(|| network.adjustment.solve(&options).unwrap()));
-    let solution = network.adjustment.solve(&options).unwrap();
-    group.bench_function("redundancy numbers", |b| b.iter(|| solution.redundancy_numbers()));
-    group.bench_function("standardised residuals", |b| {
-        b.iter(|| solution.standardised_residuals(Scale::Prior).unwrap());
+    group.bench_function("solve", |b| b.iter(|| pool.install(solve)));
+    // A clone of a fresh solution has computed nothing yet.
+    let fresh = solve();
+    let trace = |solution: &Solution| -> f64 {
+        blocks().map(|&block| solution.covariance(block, Scale::Prior).unwrap().trace()).sum()
+    };
+    group.bench_function("covariances of all blocks", |b| {
+        b.iter_batched(|| fresh.clone(), |solution| pool.install(|| trace(&solution)), BatchSize::PerIteration);
+    });
+    let known = fresh.clone();
+    known.covariance(network.parameters, Scale::Prior).unwrap();
+    group.bench_function("redundancy numbers", |b| {
+        let numbers = |solution: Solution| pool.install(|| solution.redundancy_numbers());
+        b.iter_batched(|| known.clone(), numbers, BatchSize::PerIteration);
     });
     group.finish();
+}
+
+fn networks(criterion: &mut Criterion) {
+    calibration(criterion, "network of 470 unknowns, 3078 values", &LABORATORY);
+    calibration(criterion, "network of 7487 unknowns, 234534 values", &HALL);
 }
 
 fn line(criterion: &mut Criterion) {
@@ -39,5 +54,5 @@ fn line(criterion: &mut Criterion) {
     criterion.bench_function("line through 100 points", |b| b.iter(|| a.solve(&options).unwrap()));
 }
 
-criterion_group!(benches, free_network, line);
+criterion_group!(benches, networks, line);
 criterion_main!(benches);

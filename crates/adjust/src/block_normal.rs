@@ -1,16 +1,20 @@
 //! Normal equations in blocks: eliminated, reduced, and what couples them.
+// Only what is inlined is compiled for wide registers.
+#![allow(clippy::inline_always)]
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use rayon::prelude::*;
 
 use crate::layout::Layout;
 use crate::linearisation::{Linearisation, Run, take};
-use crate::product::{Left, Right, add_product};
-use crate::structure::{Eliminated, Reduced, Role, Structure};
+use crate::product::{Left, Right, add_product, with_wide_registers};
+use crate::structure::{Eliminated, Role, Structure};
 
-/// Observations of one reduced block that are summed in one piece.
+/// Fewest observations, and most pieces, into which the sum over observations is divided.
 const PIECE: usize = 4096;
+const PIECES: usize = 16;
 /// Eliminated blocks in one piece of work.
 pub(crate) const BATCH: usize = 64;
 
@@ -59,15 +63,8 @@ impl BlockNormal {
     pub(crate) fn accumulate(&mut self, layout: &Layout, linearisation: &Linearisation) {
         let structure = Arc::clone(&self.structure);
         let source = Source { structure: &structure, layout, linearisation };
-        let reduced = self.accumulate_reduced(source);
+        self.accumulate_reduced(source);
         let eliminated = self.accumulate_eliminated(source);
-        for (block, gradient) in structure.reduced.iter().zip(reduced) {
-            self.gradient[block.columns()].copy_from_slice(&gradient);
-            for index in 0..block.width {
-                let place = block.start + index;
-                self.diagonal[block.column + index] = self.reduced[place * structure.order + place];
-            }
-        }
         for (blocks, gradient) in structure.eliminated.chunks(BATCH).zip(eliminated) {
             let mut rest = gradient.as_slice();
             for block in blocks {
@@ -81,13 +78,32 @@ impl BlockNormal {
         }
     }
 
-    /// U, by columns of blocks; the gradient of each block is the answer.
-    fn accumulate_reduced(&mut self, source: Source<'_>) -> Vec<Vec<f64>> {
-        let order = source.structure.order;
-        let mut rest = self.reduced.as_mut_slice();
-        let columns: Vec<_> =
-            source.structure.reduced.iter().map(|block| (block, take(&mut rest, block.width * order))).collect();
-        columns.into_par_iter().map(|(block, out)| source.reduced_columns(block, out)).collect()
+    /// U and its part of the gradient, by pieces of the observations.
+    fn accumulate_reduced(&mut self, source: Source<'_>) {
+        let (structure, count) = (source.structure, source.layout.observations.len());
+        let length = PIECE.max(count.div_ceil(PIECES));
+        let pieces: Vec<_> = (0..count).step_by(length).map(|first| first..(first + length).min(count)).collect();
+        let sums: Vec<_> = pieces.into_par_iter().map(|piece| source.piece(piece)).collect();
+        let mut sums = sums.into_iter();
+        let Some((mut entries, mut gradient)) = sums.next() else { return };
+        for (more, share) in sums {
+            entries.iter_mut().zip(more).for_each(|(sum, value)| *sum += value);
+            gradient.iter_mut().zip(share).for_each(|(sum, value)| *sum += value);
+        }
+        for pair in &structure.pairs {
+            let columns = entries[pair.offset..].chunks_exact(pair.rows).take(pair.columns);
+            for (column, values) in columns.enumerate() {
+                let start = (pair.column + column) * structure.order + pair.row;
+                self.reduced[start..start + pair.rows].copy_from_slice(values);
+            }
+        }
+        structure.scatter(&gradient, &mut self.gradient);
+        for block in &structure.reduced {
+            for index in 0..block.width {
+                let place = block.start + index;
+                self.diagonal[block.column + index] = self.reduced[place * structure.order + place];
+            }
+        }
     }
 
     /// V and W; the gradients of each batch are the answer.
@@ -117,50 +133,33 @@ impl Structure {
 }
 
 impl Source<'_> {
-    fn reduced_columns(self, block: &Reduced, out: &mut [f64]) -> Vec<f64> {
-        out.fill(0.0);
-        let Role::Reduced(index) = self.structure.roles[block.block] else { return Vec::new() };
-        let list = self.structure.reduced_observations.list(index as usize);
-        let mut gradient = vec![0.0; block.width];
-        if list.len() <= PIECE {
-            self.add_observations(block, list, out, &mut gradient);
-            return gradient;
-        }
-        let pieces: Vec<_> = list
-            .par_chunks(PIECE)
-            .map(|piece| {
-                let (mut part, mut gradient) = (vec![0.0; out.len()], vec![0.0; block.width]);
-                self.add_observations(block, piece, &mut part, &mut gradient);
-                (part, gradient)
-            })
-            .collect();
-        for (part, share) in pieces {
-            out.iter_mut().zip(part).for_each(|(sum, value)| *sum += value);
-            gradient.iter_mut().zip(share).for_each(|(sum, value)| *sum += value);
-        }
-        gradient
+    /// The pairs' blocks and the reduced gradient of some observations.
+    fn piece(self, observations: Range<usize>) -> (Vec<f64>, Vec<f64>) {
+        let mut sums = (vec![0.0; self.structure.pair_entries], vec![0.0; self.structure.order]);
+        with_wide_registers(|| self.add_observations(observations, &mut sums.0, &mut sums.1));
+        sums
     }
 
-    fn add_observations(self, block: &Reduced, list: &[u32], out: &mut [f64], gradient: &mut [f64]) {
-        let order = self.structure.order;
-        for &observation in list {
-            let place = &self.layout.observations[observation as usize];
-            let parts = self.layout.parts(place);
-            let Some(own) = parts.iter().find(|part| part.block as usize == block.block) else { continue };
+    #[inline(always)]
+    fn add_observations(self, observations: Range<usize>, entries: &mut [f64], gradient: &mut [f64]) {
+        let mut parts = Vec::new();
+        for index in observations {
+            let place = &self.layout.observations[index];
+            self.structure.reduced_parts(self.layout.parts(place), &mut parts);
             for Run { jacobian, whitened, weight } in self.linearisation.runs(place) {
-                let data = &jacobian[own.offset as usize..];
-                for (residual, entries) in whitened.iter().zip(jacobian.chunks_exact(place.width)) {
-                    let residual = weight * residual;
-                    gradient.iter_mut().zip(&entries[own.entries()]).for_each(|(g, a)| *g += a * residual);
-                }
-                let right = Right { data, inner: place.width, column: 1, columns: block.width };
-                for part in parts {
-                    let Role::Reduced(other) = self.structure.roles[part.block as usize] else { continue };
-                    let start = self.structure.reduced[other as usize].start;
-                    if start >= block.start {
-                        let data = &jacobian[part.offset as usize..];
-                        let left = Left { data, stride: place.width, rows: part.width as usize };
-                        add_product(&mut out[start..], order, left, right, whitened.len(), weight);
+                let mut pairs = self.structure.pair_of[self.structure.pair_starts[index] as usize..].iter();
+                for (at, (block, offset)) in parts.iter().enumerate() {
+                    let gradient = &mut gradient[block.reduced_columns()];
+                    for (residual, entries) in whitened.iter().zip(jacobian.chunks_exact(place.width)) {
+                        let residual = weight * residual;
+                        gradient.iter_mut().zip(&entries[*offset..]).for_each(|(g, a)| *g += a * residual);
+                    }
+                    let data = &jacobian[*offset..];
+                    let right = Right { data, inner: place.width, column: 1, columns: block.width };
+                    for ((other, offset), &pair) in parts[at..].iter().zip(&mut pairs) {
+                        let out = &mut entries[self.structure.pairs[pair as usize].offset..];
+                        let left = Left { data: &jacobian[*offset..], stride: place.width, rows: other.width };
+                        add_product(out, other.width, left, right, whitened.len(), weight);
                     }
                 }
             }
@@ -178,11 +177,12 @@ impl Source<'_> {
         for block in blocks {
             let gradient = take(&mut rest, block.width);
             let own = &mut own[block.own - first_own..block.own - first_own + block.width * block.width];
-            self.add_eliminated(block, own, coupling, first_coupling, gradient);
+            with_wide_registers(|| self.add_eliminated(block, own, coupling, first_coupling, gradient));
         }
         gradients
     }
 
+    #[inline(always)]
     fn add_eliminated(
         self,
         block: &Eliminated,
@@ -207,10 +207,16 @@ impl Source<'_> {
                 for (other, at) in self.layout.parts(place).iter().zip(place.part_range()) {
                     let slot = self.structure.slots.get(self.structure.slot_of_part[at] as usize);
                     let Some(slot) = slot else { continue };
-                    let left =
-                        Left { data: &jacobian[other.offset as usize..], stride: place.width, rows: slot.width() };
-                    let target = &mut coupling[slot.offset - first..];
-                    add_product(target, slot.width(), left, right, whitened.len(), weight);
+                    let data = &jacobian[other.offset as usize..];
+                    let left = Left { data, stride: place.width, rows: slot.width() };
+                    add_product(
+                        &mut coupling[slot.offset - first..],
+                        slot.width(),
+                        left,
+                        right,
+                        whitened.len(),
+                        weight,
+                    );
                 }
             }
         }

@@ -8,6 +8,12 @@ use crate::{Result, StepKind};
 const LARGEST_DAMPING: f64 = 1e20;
 /// Longest second-order part of a step, relative to the first-order part [Transtrum2012].
 const LONGEST_BEND: f64 = 0.375;
+/// Difference of found and expected reduction, relative, up to which the model did what was expected.
+const EXPECTED: f64 = 0.1;
+/// The same, up to which it needs hardly any damping.
+const AS_EXPECTED: f64 = 0.02;
+/// Share of the objective that a step near the end promises to take away.
+const NEAR: f64 = 0.2;
 /// Where the model is probed for its curvature, as a share of the step.
 const PROBE: f64 = 0.1;
 
@@ -42,7 +48,7 @@ impl Iteration<'_, '_> {
             }
             self.accept(false)?;
             self.record(StepKind::Damped, length, self.damping, 1.0);
-            self.lower_damping(gain);
+            self.lower_damping(gain, expected <= NEAR * merit);
             if ending.is_reached(merit, expected, gain, self.layout.rows) {
                 return Ok(true);
             }
@@ -53,7 +59,7 @@ impl Iteration<'_, '_> {
     /// where the model has no value there, or bends so much that the step means nothing. A model that the last step
     /// found as expected is not probed.
     fn bend(&mut self, factor: &SystemFactor, mut step: Vec<f64>) -> Option<f64> {
-        if (self.last_gain - 1.0).abs() > 0.1 {
+        if (self.last_gain - 1.0).abs() > EXPECTED {
             self.try_step(&step, PROBE, Want::Residuals)?;
             let second = self.second_derivative();
             let bend = factor.solve(&self.current.transpose_apply(self.layout, &second), 0.0);
@@ -74,9 +80,12 @@ impl Iteration<'_, '_> {
         rows.map(|((probe, v), moved)| ((probe - v) / PROBE + moved) / PROBE).collect()
     }
 
-    fn lower_damping(&mut self, gain: f64) {
-        // Nielsen's rule [Nielsen1999].
-        self.damping = (self.damping * (1.0 - (2.0 * gain - 1.0).powi(3)).max(1.0 / 3.0)).max(1e-30);
+    fn lower_damping(&mut self, gain: f64, near: bool) {
+        // Nielsen's rule [Nielsen1999]; near the end a model that twice did what was expected needs
+        // hardly any damping.
+        let expected = (gain - 1.0).abs().max((self.last_gain - 1.0).abs()) <= AS_EXPECTED;
+        let least = if near && expected { 0.03 } else { 1.0 / 3.0 };
+        self.damping = (self.damping * (1.0 - (2.0 * gain - 1.0).powi(3)).max(least)).max(1e-30);
         (self.growth, self.last_gain) = (2.0, gain);
     }
 

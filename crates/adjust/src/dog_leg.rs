@@ -99,7 +99,9 @@ impl Iteration<'_, '_> {
         self.current.apply(self.layout, &down, &mut self.moved);
         let curvature: f64 = self.moved.iter().zip(&self.current.weights).map(|(m, w)| w * m * m).sum();
         let share = if curvature > 0.0 { slope / curvature } else { 0.0 };
-        down.iter_mut().for_each(|dx| *dx *= share);
+        for dx in &mut down {
+            *dx *= share;
+        }
         down
     }
 

@@ -3,10 +3,13 @@
 use std::sync::OnceLock;
 
 use nalgebra::DMatrix;
+use rayon::prelude::*;
 
+use crate::block_normal::BATCH;
 use crate::elimination::EliminatedFactor;
 use crate::layout::Layout;
-use crate::product::{Left, Right, add_product};
+use crate::linearisation::take;
+use crate::product::{Left, Right, add_product, with_wide_registers};
 use crate::structure::{Eliminated, Role, Slot};
 
 /// With `V = L Lᵀ`, `H = L⁻¹ Wᵀ` and the reduced inverse `Q_cc`:
@@ -18,6 +21,7 @@ use crate::structure::{Eliminated, Role, Slot};
 pub(crate) struct EliminatedCofactor {
     pub(crate) factor: EliminatedFactor,
     reduced: OnceLock<Vec<f64>>,
+    products: OnceLock<Vec<f64>>,
     datum: OnceLock<Option<Transformation>>,
 }
 
@@ -33,7 +37,7 @@ struct Transformation {
 
 impl EliminatedCofactor {
     pub(crate) fn new(factor: EliminatedFactor) -> Self {
-        Self { factor, reduced: OnceLock::new(), datum: OnceLock::new() }
+        Self { factor, reduced: OnceLock::new(), products: OnceLock::new(), datum: OnceLock::new() }
     }
 
     pub(crate) fn scale(&self) -> &[f64] {
@@ -49,6 +53,29 @@ impl EliminatedCofactor {
                 column.iter_mut().zip(scale).for_each(|(q, other)| *q *= own * other);
             }
             matrix
+        })
+    }
+
+    /// `H Q_cc` for the neighbours of each eliminated block, laid out like H.
+    pub(crate) fn products(&self) -> &[f64] {
+        // Made before the threads divide the work.
+        self.reduced();
+        self.products.get_or_init(|| {
+            let structure = &self.factor.structure;
+            let mut out = vec![0.0; self.factor.half.len()];
+            let mut rest = out.as_mut_slice();
+            let batches: Vec<_> =
+                structure.eliminated.chunks(BATCH).map(|b| (b, take(&mut rest, structure.extent(b).1))).collect();
+            batches.into_par_iter().for_each(|(blocks, mut out)| {
+                let mut product = Vec::new();
+                for block in blocks {
+                    for slot in &structure.slots[block.slots()] {
+                        self.product(block, slot, &mut product);
+                        take(&mut out, product.len()).copy_from_slice(&product);
+                    }
+                }
+            });
+            out
         })
     }
 
@@ -90,8 +117,13 @@ impl EliminatedCofactor {
                 let mut out = DMatrix::zeros(row.width, column.width);
                 let mut products = Vec::new();
                 for slot in &structure.slots[row.slots()] {
-                    self.product(column, slot, &mut products);
-                    self.add_half(slot, &products, &mut out);
+                    if first == second {
+                        let count = row.width * slot.width();
+                        self.add_half(slot, &self.products()[slot.offset..slot.offset + count], &mut out);
+                    } else {
+                        self.product(column, slot, &mut products);
+                        self.add_half(slot, &products, &mut out);
+                    }
                 }
                 if first == second {
                     (0..out.nrows()).for_each(|i| out[(i, i)] += 1.0);
@@ -121,17 +153,19 @@ impl EliminatedCofactor {
     }
 
     /// `H Q_cc` of an eliminated block for the columns of a slot, which may be another block's: row by row.
-    pub(crate) fn product(&self, block: &Eliminated, slot: &Slot, out: &mut Vec<f64>) {
+    fn product(&self, block: &Eliminated, slot: &Slot, out: &mut Vec<f64>) {
         let (structure, q) = (&self.factor.structure, self.reduced());
         out.clear();
         out.resize(block.width * slot.width(), 0.0);
-        for other in &structure.slots[block.slots()] {
-            let data = &q[other.start as usize * structure.order + slot.start as usize..];
-            let left = Left { data, stride: structure.order, rows: slot.width() };
-            let data = &self.factor.half[other.offset..];
-            let right = Right { data, inner: 1, column: other.width(), columns: block.width };
-            add_product(out, slot.width(), left, right, other.width(), 1.0);
-        }
+        with_wide_registers(|| {
+            for other in &structure.slots[block.slots()] {
+                let data = &q[other.start as usize * structure.order + slot.start as usize..];
+                let left = Left { data, stride: structure.order, rows: slot.width() };
+                let data = &self.factor.half[other.offset..];
+                let right = Right { data, inner: 1, column: other.width(), columns: block.width };
+                add_product(out, slot.width(), left, right, other.width(), 1.0);
+            }
+        });
     }
 
     /// Adds `H · productsᵀ` of one slot.

@@ -1,4 +1,6 @@
 //! Factorisation of block normal equations: eliminated blocks by small Cholesky factors, the rest densely.
+// Only what is inlined is compiled for wide registers.
+#![allow(clippy::inline_always)]
 
 use std::sync::Arc;
 
@@ -9,7 +11,7 @@ use crate::border::Border;
 use crate::constraints::Constraints;
 use crate::linearisation::take;
 use crate::normal::{NormalFactor, Singular, damping_of, unit_scale};
-use crate::product::{Left, Right, add_product};
+use crate::product::{Left, Right, add_product, with_wide_registers};
 use crate::structure::{Eliminated, Reduced, Role, Structure};
 use crate::{Result, reduced_constraints};
 
@@ -207,13 +209,15 @@ fn eliminate(normal: &BlockNormal, extra: &[f64]) -> Option<(Vec<f64>, Vec<f64>)
             inverse.copy_from_slice(&normal.own[block.own()]);
             (0..block.width).for_each(|i| inverse[i * block.width + i] += extra[block.column + i]);
             let good = inverse_factor(inverse, block.width);
-            for slot in &structure.slots[block.slots()] {
-                let (count, width) = (block.width * slot.width(), slot.width());
-                let left =
-                    Left { data: &normal.coupling[slot.offset..slot.offset + count], stride: width, rows: width };
-                let right = Right { data: inverse, inner: 1, column: block.width, columns: block.width };
-                add_product(take(&mut halves, count), width, left, right, block.width, 1.0);
-            }
+            with_wide_registers(|| {
+                for slot in &structure.slots[block.slots()] {
+                    let (count, width) = (block.width * slot.width(), slot.width());
+                    let left =
+                        Left { data: &normal.coupling[slot.offset..slot.offset + count], stride: width, rows: width };
+                    let right = Right { data: inverse, inner: 1, column: block.width, columns: block.width };
+                    add_product(take(&mut halves, count), width, left, right, block.width, 1.0);
+                }
+            });
             good
         })
     });
@@ -260,11 +264,12 @@ fn reduce(normal: &BlockNormal, half: &[f64], extra: &[f64]) -> Vec<f64> {
         for index in 0..block.width {
             out[index * structure.order + block.start + index] += extra[block.column + index];
         }
-        subtract(structure, block, half, out);
+        with_wide_registers(|| subtract(structure, block, half, out));
     });
     out
 }
 
+#[inline(always)]
 fn subtract(structure: &Structure, block: &Reduced, half: &[f64], out: &mut [f64]) {
     let Role::Reduced(index) = structure.roles[block.block] else { return };
     for &at in structure.reduced_slots.list(index as usize) {

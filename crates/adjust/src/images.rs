@@ -1,4 +1,6 @@
 //! `J Q Jᵀ` of single observations, from which redundancy numbers and the deviations of residuals follow.
+// Only what is inlined is compiled for wide registers.
+#![allow(clippy::inline_always)]
 
 use nalgebra::DMatrix;
 use rayon::prelude::*;
@@ -8,7 +10,7 @@ use crate::cofactor::Cofactor;
 use crate::eliminated_cofactor::EliminatedCofactor;
 use crate::layout::{Layout, Place};
 use crate::linearisation::Linearisation;
-use crate::product::{Left, Right, add_product};
+use crate::product::{Left, Right, add_product, with_wide_registers};
 use crate::structure::{Eliminated, Role};
 
 /// Observations in one piece of work.
@@ -42,8 +44,6 @@ struct Source<'s> {
 struct Memory {
     columns: Vec<Columns>,
     row: Vec<f64>,
-    slots: Vec<f64>,
-    product: Vec<f64>,
 }
 
 type Image = (usize, Vec<f64>);
@@ -95,7 +95,7 @@ impl Source<'_> {
     fn eliminated(self, cofactor: &EliminatedCofactor) -> Vec<Vec<Image>> {
         let structure = &cofactor.factor.structure;
         // Made here, once, and not by whichever thread comes first.
-        cofactor.reduced();
+        cofactor.products();
         let batches = structure.eliminated.par_chunks(BATCH);
         let mut images: Vec<Vec<Image>> = batches
             .map(|blocks| {
@@ -115,21 +115,18 @@ impl Source<'_> {
     fn around(self, block: &Eliminated, cofactor: &EliminatedCofactor, memory: &mut Memory) -> Vec<Image> {
         let structure = &cofactor.factor.structure;
         let Role::Eliminated(index) = structure.roles[block.block] else { return Vec::new() };
-        // H Q_cc for the columns of all slots, laid out like H; and K = I + H Q_cc Hᵀ.
+        // K = I + H Q_cc Hᵀ.
         let mut inner = DMatrix::identity(block.width, block.width);
-        memory.slots.clear();
-        let mut product = std::mem::take(&mut memory.product);
+        let products = cofactor.products();
         for slot in &structure.slots[block.slots()] {
-            cofactor.product(block, slot, &mut product);
-            cofactor.add_half(slot, &product, &mut inner);
-            memory.slots.extend_from_slice(&product);
+            let count = block.width * slot.width();
+            cofactor.add_half(slot, &products[slot.offset..slot.offset + count], &mut inner);
         }
-        memory.product = product;
         let observations = structure.eliminated_observations.list(index as usize);
         let image = |&observation: &u32| {
             let place = &self.layout.observations[observation as usize];
             let mut image = self.reduced_part(place, cofactor, memory);
-            self.add_eliminated_part(place, block, cofactor, &inner, &memory.slots, &mut image);
+            self.add_eliminated_part(place, block, cofactor, &inner, &mut image);
             (observation as usize, image)
         };
         observations.iter().map(image).collect()
@@ -145,11 +142,13 @@ impl Source<'_> {
             }
         }
         let mut image = vec![0.0; place.dimension * place.dimension];
-        self.add_square(place, cofactor.reduced(), structure.order, memory, &mut image);
+        let q = cofactor.reduced();
+        with_wide_registers(|| self.add_square(place, q, structure.order, memory, &mut image));
         image
     }
 
     /// Adds `J Q Jᵀ` over the columns in memory.
+    #[inline(always)]
     fn add_square(self, place: &Place, q: &[f64], order: usize, memory: &mut Memory, image: &mut [f64]) {
         let jacobian = &self.linearisation.jacobian[place.jacobian_range()];
         let d = place.dimension;
@@ -166,14 +165,14 @@ impl Source<'_> {
         }
     }
 
-    /// Adds what the eliminated block contributes: with `J' = J_o L⁻ᵀ` and B = J' (H Q_cc) J_cᵀ it is `J' K J'ᵀ − B − Bᵀ`.
+    /// Adds what the eliminated block contributes: with `J' = J_o L⁻ᵀ` and
+    /// `B = J' (H Q_cc) J_cᵀ` it is `J' K J'ᵀ − B − Bᵀ`.
     fn add_eliminated_part(
         self,
         place: &Place,
         block: &Eliminated,
         cofactor: &EliminatedCofactor,
         inner: &DMatrix<f64>,
-        products: &[f64],
         image: &mut [f64],
     ) {
         let (structure, d) = (&cofactor.factor.structure, place.dimension);
@@ -188,7 +187,7 @@ impl Source<'_> {
         let mut crossed = DMatrix::zeros(block.width, d);
         for (other, at) in self.layout.parts(place).iter().zip(place.part_range()) {
             let Some(slot) = structure.slots.get(structure.slot_of_part[at] as usize) else { continue };
-            let products = products[slot.offset - block.coupling..].chunks_exact(slot.width()).take(block.width);
+            let products = cofactor.products()[slot.offset..].chunks_exact(slot.width()).take(block.width);
             for (k, product) in products.enumerate() {
                 for row in 0..d {
                     let entries = &jacobian[row * place.width..][other.entries()];

@@ -1,6 +1,6 @@
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 
-use crate::layout::{HELD, Place};
+use crate::layout::Place;
 use crate::{BlockId, Error, Result, Scale, Solution};
 
 impl Solution {
@@ -37,19 +37,27 @@ impl Solution {
         Ok(offsets)
     }
 
-    /// `pᵀA` of one observed value: p is its row of the weight matrix, A the Jacobian.
-    pub(crate) fn weighted_design(&self, row: usize, owners: &[(BlockId, usize)]) -> WeightedDesign {
-        let Some(observation) = self.observation_of(row) else { return WeightedDesign::default() };
+    /// `pᵀA` of one observed value, as unknowns and factors: p is its row of the weight matrix, A the Jacobian.
+    pub(crate) fn weighted_design(&self, row: usize) -> Vec<(usize, f64)> {
+        let Some(observation) = self.observation_of(row) else { return Vec::new() };
         let place = &self.layout.observations[observation];
         let (columns, component) = (self.columns_of(place), row - place.row);
         let whitening = &self.whitening[self.whitening_start[observation]..];
         let jacobian = &self.linearisation.jacobian[place.jacobian_range()];
-        let mut terms = Vec::with_capacity(columns.len());
-        for (entry, &column) in columns.iter().enumerate() {
+        let term = |(entry, &column): (usize, &usize)| {
             let weighted = |i: usize| whitening[i * (i + 1) / 2 + component] * jacobian[i * columns.len() + entry];
-            terms.push((owners[column], (component..place.dimension).map(weighted).sum()));
+            (column, (component..place.dimension).map(weighted).sum())
+        };
+        columns.iter().enumerate().map(term).collect()
+    }
+
+    /// `Q x` for a row x over the unknowns.
+    pub(crate) fn spread(&self, row: &[(usize, f64)]) -> Vec<f64> {
+        let mut x = vec![0.0; self.unknowns()];
+        for &(column, factor) in row {
+            x[column] += factor;
         }
-        WeightedDesign { terms }
+        self.cofactor.multiply(&x)
     }
 
     /// Unknowns that the entries in a row of an observation's Jacobian belong to.
@@ -61,45 +69,5 @@ impl Solution {
     pub(crate) fn observation_of(&self, row: usize) -> Option<usize> {
         let after = self.layout.observations.partition_point(|place| place.row <= row);
         (row < self.observations()).then(|| after.saturating_sub(1))
-    }
-
-    /// Block and component of each unknown.
-    pub(crate) fn owners(&self) -> Vec<(BlockId, usize)> {
-        let mut owners = vec![(BlockId(0), 0); self.layout.unknowns];
-        for block in 0..self.blocks.len() {
-            for (component, &column) in self.layout.block_columns(block).iter().enumerate() {
-                if column != HELD {
-                    owners[column] = (BlockId(block), component);
-                }
-            }
-        }
-        owners
-    }
-}
-
-/// A row over the unknowns: parameters with their factors. A parameter may occur twice.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct WeightedDesign {
-    terms: Vec<((BlockId, usize), f64)>,
-}
-
-impl WeightedDesign {
-    /// The blocks touched, sorted.
-    pub(crate) fn blocks(&self) -> Vec<BlockId> {
-        let mut blocks: Vec<_> = self.terms.iter().map(|((block, _), _)| *block).collect();
-        blocks.sort_unstable();
-        blocks.dedup();
-        blocks
-    }
-
-    /// The row over `blocks`, put one after the other at `offsets`; `blocks` are sorted.
-    pub(crate) fn over(&self, blocks: &[BlockId], offsets: &[usize]) -> DVector<f64> {
-        let mut out = DVector::zeros(offsets[blocks.len()]);
-        for &((block, component), factor) in &self.terms {
-            if let Ok(index) = blocks.binary_search(&block) {
-                out[offsets[index] + component] += factor;
-            }
-        }
-        out
     }
 }

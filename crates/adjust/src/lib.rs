@@ -51,6 +51,7 @@ mod significance;
 mod snooping;
 mod solution;
 mod structure;
+mod sweep;
 mod system;
 mod trace;
 mod transformation;

@@ -205,6 +205,7 @@ impl Piece<'_> {
 }
 
 /// Cuts the first `count` elements off a slice.
+#[allow(clippy::mut_mut)] // the slice itself becomes shorter
 pub(crate) fn take<'s>(rest: &mut &'s mut [f64], count: usize) -> &'s mut [f64] {
     let (head, tail) = std::mem::take(rest).split_at_mut(count);
     *rest = tail;
@@ -221,7 +222,9 @@ fn whiten(whitening: &[f64], matrix: &mut [f64], width: usize) {
         let weights = &whitening[row * (row + 1) / 2..(row + 1) * (row + 2) / 2];
         let (above, below) = matrix.split_at_mut(row * width);
         let below = &mut below[..width];
-        below.iter_mut().for_each(|out| *out *= weights[row]);
+        for out in &mut *below {
+            *out *= weights[row];
+        }
         for (above, &weight) in above.chunks_exact(width).zip(weights) {
             // Components are uncorrelated more often than not.
             if weight != 0.0 {

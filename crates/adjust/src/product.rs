@@ -1,4 +1,6 @@
 //! Products of small blocks: the inner loops of all sums over observations and eliminated blocks.
+// Only what is inlined is compiled for wide registers.
+#![allow(clippy::inline_always)]
 
 /// Left factor: `inner` rows of `rows` consecutive elements, `stride` apart; it enters transposed.
 #[derive(Clone, Copy)]
@@ -17,39 +19,40 @@ pub(crate) struct Right<'m> {
     pub(crate) columns: usize,
 }
 
-/// `out[j · stride + i] += factor · Σ_k left[k][i] · right[k][j]` with k below `inner`.
-#[inline]
+/// `out[j · stride + i] += factor · Σ_k left[k][i] · right[k][j]` with k below `inner`. Sums run over k in order, so that
+/// the width of the machine's registers has no influence on the bits.
+#[inline(always)]
 pub(crate) fn add_product(out: &mut [f64], stride: usize, left: Left<'_>, right: Right<'_>, inner: usize, factor: f64) {
-    match (left.rows, inner) {
-        (3, 2) => fixed::<3, 2>(out, stride, left, right, factor),
-        (3, 3) => fixed::<3, 3>(out, stride, left, right, factor),
-        (6, 2) => fixed::<6, 2>(out, stride, left, right, factor),
-        (6, 3) => fixed::<6, 3>(out, stride, left, right, factor),
-        (6, 6) => fixed::<6, 6>(out, stride, left, right, factor),
-        (9, 2) => fixed::<9, 2>(out, stride, left, right, factor),
-        (9, 3) => fixed::<9, 3>(out, stride, left, right, factor),
-        (9, 9) => fixed::<9, 9>(out, stride, left, right, factor),
-        _ => general(out, stride, left, right, inner, factor),
+    let mut row = 0;
+    while left.rows > row {
+        let (out, left) = (&mut out[row..], Left { data: &left.data[row..], ..left });
+        row += match left.rows - row {
+            1 => strip::<1>(out, stride, left, right, inner, factor),
+            2 => strip::<2>(out, stride, left, right, inner, factor),
+            3 => strip::<3>(out, stride, left, right, inner, factor),
+            4 | 5 => strip::<4>(out, stride, left, right, inner, factor),
+            6 | 7 => strip::<6>(out, stride, left, right, inner, factor),
+            9 => strip::<9>(out, stride, left, right, inner, factor),
+            _ => strip::<8>(out, stride, left, right, inner, factor),
+        };
     }
 }
 
-#[inline]
-fn fixed<const R: usize, const K: usize>(
+/// `R` rows of the product; gives their number.
+#[inline(always)]
+fn strip<const R: usize>(
     out: &mut [f64],
     stride: usize,
     left: Left<'_>,
     right: Right<'_>,
+    inner: usize,
     factor: f64,
-) {
-    let mut rows = [[0.0; R]; K];
-    for (k, row) in rows.iter_mut().enumerate() {
-        let Some(values) = left.data[k * left.stride..].first_chunk::<R>() else { return };
-        *row = *values;
-    }
+) -> usize {
     for j in 0..right.columns {
-        let Some(target) = out[j * stride..].first_chunk_mut::<R>() else { return };
+        let Some(target) = out[j * stride..].first_chunk_mut::<R>() else { return R };
         let mut sum = *target;
-        for (k, row) in rows.iter().enumerate() {
+        for k in 0..inner {
+            let Some(row) = left.data[k * left.stride..].first_chunk::<R>() else { return R };
             let share = factor * right.data[k * right.inner + j * right.column];
             for i in 0..R {
                 sum[i] += share * row[i];
@@ -57,28 +60,13 @@ fn fixed<const R: usize, const K: usize>(
         }
         *target = sum;
     }
+    R
 }
 
-fn general(out: &mut [f64], stride: usize, left: Left<'_>, right: Right<'_>, inner: usize, factor: f64) {
-    let n = left.rows;
-    for j in 0..right.columns {
-        let target = &mut out[j * stride..j * stride + n];
-        let share = |k: usize| factor * right.data[k * right.inner + j * right.column];
-        let row = |k: usize| &left.data[k * left.stride..k * left.stride + n];
-        let mut k = 0;
-        // Three at a time: the target is loaded and stored once for them.
-        while k + 3 <= inner {
-            let (a, b, c) = (share(k), share(k + 1), share(k + 2));
-            let rows = row(k).iter().zip(row(k + 1)).zip(row(k + 2));
-            target.iter_mut().zip(rows).for_each(|(t, ((x, y), z))| *t += a * x + b * y + c * z);
-            k += 3;
-        }
-        while k < inner {
-            let a = share(k);
-            target.iter_mut().zip(row(k)).for_each(|(t, x)| *t += a * x);
-            k += 1;
-        }
-    }
+/// Runs a piece of work, with everything in it that is inlined, compiled for the widest registers that the machine has.
+/// Products and sums stay separate operations, so that all machines give the same bits.
+pub(crate) fn with_wide_registers<R>(work: impl FnOnce() -> R) -> R {
+    pulp::Arch::new().dispatch(work)
 }
 
 #[cfg(test)]

@@ -1,5 +1,3 @@
-use nalgebra::DVector;
-
 use crate::outlier::{SMALLEST_CONTROL, check_probability};
 use crate::{BlockId, Distribution, ObservationId, Result, Scale, Solution};
 
@@ -91,18 +89,16 @@ impl Solution {
     ) -> Result<ExternalReliability> {
         let row = self.row(observation, component)?;
         let internal = self.reliability(options)?[row];
-        let design = self.weighted_design(row, &self.owners());
-        let touched = design.blocks();
-        let offsets = self.offsets(&touched)?;
-        let design = design.over(&touched, &offsets);
+        let used = if self.is_excluded(row) { 0.0 } else { self.weights()[row] };
+        let moved = self.spread(&self.weighted_design(row));
         let (mut effects, mut largest_ratio, mut largest) = (Vec::new(), 0.0, None);
         for &block in blocks {
-            let mut effect = DVector::zeros(self.tangent_dimension(block)?);
-            for (index, &other) in touched.iter().enumerate() {
-                let part = design.rows(offsets[index], offsets[index + 1] - offsets[index]);
-                effect += self.covariance_between(block, other, Scale::Prior)? * part;
+            let mut effect = vec![0.0; self.tangent_dimension(block)?];
+            for (component, effect) in effect.iter_mut().enumerate() {
+                if let Some(column) = self.unknown_index(block, component)? {
+                    *effect = moved[column] * internal.smallest_detectable * used;
+                }
             }
-            effect *= internal.smallest_detectable * if self.is_excluded(row) { 0.0 } else { self.weights()[row] };
             for (component, (sigma, moved)) in
                 self.standard_deviations(block, Scale::Prior)?.into_iter().zip(&effect).enumerate()
             {
@@ -111,7 +107,7 @@ impl Solution {
                     (largest_ratio, largest) = (ratio, Some((block, component)));
                 }
             }
-            effects.push((block, effect.as_slice().to_vec()));
+            effects.push((block, effect));
         }
         Ok(ExternalReliability { internal, effects, largest_ratio, largest })
     }

@@ -1,13 +1,7 @@
 use std::collections::BTreeSet;
 
-use nalgebra::DMatrix;
-
-use crate::outlier::{Control, check_probability};
-use crate::readmission::Fit;
-use crate::{
-    Adjustment, BlockId, Error, GroupId, Kernel, Method, ObservationId, Result, Scale, SnoopingTest, Solution,
-    SolveOptions,
-};
+use crate::outlier::check_probability;
+use crate::{Adjustment, Error, GroupId, Kernel, Method, ObservationId, Result, SnoopingTest, Solution, SolveOptions};
 
 /// How gross errors are sought and rejected.
 #[derive(Debug, Clone, PartialEq)]
@@ -16,7 +10,7 @@ pub struct SnoopingOptions {
     pub test: SnoopingTest,
     /// Significance level of a single test.
     pub level: f64,
-    /// Most components that may be rejected; `None`: a tenth of those tested.
+    /// Most components that may be rejected; `None`: a tenth of those tested, at least one.
     pub max_rejections: Option<usize>,
     /// Most components rejected from one solution before it is computed anew. Within a batch all is as if they were
     /// rejected one at a time in the linearised model; 1 solves after each.
@@ -34,7 +28,7 @@ impl Default for SnoopingOptions {
             test: SnoopingTest::default(),
             level: 0.001,
             max_rejections: None,
-            batch: 64,
+            batch: 256,
             smallest_control: 0.01,
             groups: None,
         }
@@ -128,12 +122,12 @@ impl Adjustment<'_> {
         search: &mut Search,
     ) -> Result<(Solution, SnoopingEnd)> {
         let tested = self.tested_rows(snooping);
-        let limit = snooping.max_rejections.unwrap_or(tested.iter().filter(|&&tested| tested).count() / 10);
+        let limit = snooping.max_rejections.unwrap_or((tested.iter().filter(|&&tested| tested).count() / 10).max(1));
         let mut solution = self.solve(options)?;
         search.solutions = 1;
         loop {
             let room = limit.saturating_sub(search.out.len()).min(snooping.batch);
-            let batch = solution.batch(&tested, snooping, room.max(1), search.solutions - 1)?;
+            let batch = solution.batch(&tested, snooping, room.max(1), search.solutions - 1);
             if !batch.is_empty() && room == 0 {
                 return Ok((solution, SnoopingEnd::LimitReached));
             }
@@ -163,12 +157,12 @@ impl Adjustment<'_> {
     /// Takes back what fits, each component once. True where there was any.
     fn take_back(&mut self, solution: &Solution, snooping: &SnoopingOptions, search: &mut Search) -> Result<bool> {
         let out: Vec<_> = search.out.iter().copied().filter(|one| !search.returned.contains(one)).collect();
-        let fitting: Vec<Fit> = self
+        let fitting: Vec<Rejection> = self
             .predictions(solution, &out, snooping)?
             .into_iter()
-            .filter(|fit| fit.record.statistic.abs() <= fit.record.critical)
+            .filter(|fit| fit.statistic.abs() <= fit.critical)
             .collect();
-        for Fit { record } in &fitting {
+        for record in &fitting {
             let component = (record.observation, record.component);
             self.readmit(record.observation, record.component)?;
             search.out.remove(&component);
@@ -229,138 +223,5 @@ impl SnoopingOptions {
             Some(group) => Err(Error::UnknownId { what: "group", index: group.0, count }),
             None => Ok(()),
         }
-    }
-}
-
-impl Solution {
-    /// The components to be rejected from this solution, at most `room`.
-    fn batch(&self, tested: &[bool], snooping: &SnoopingOptions, room: usize, step: usize) -> Result<Vec<Rejection>> {
-        let controls = self.controls();
-        let testable =
-            |&row: &usize| tested[row] && !self.is_excluded(row) && controls[row].share() > snooping.smallest_control;
-        let size = |row: usize| controls[row].statistic().abs();
-        let mut rows: Vec<usize> = (0..controls.len()).filter(testable).collect();
-        rows.sort_by(|&a, &b| size(b).total_cmp(&size(a)));
-        // Twice as many as may be rejected: the largest need not be the guilty.
-        rows.truncate(2 * room);
-        let critical = snooping.test.critical(snooping.level, self.vtpv(), self.redundancy() as f64);
-        let conspicuous = rows.first().is_some_and(|&row| size(row) > critical.value * critical.sigma0);
-        if !conspicuous {
-            return Ok(Vec::new());
-        }
-        if snooping.batch == 1 {
-            rows.truncate(1);
-        }
-        let mut sweep = Sweep::new(self, &rows, &controls)?;
-        let mut batch = Vec::new();
-        while batch.len() < room {
-            let critical = snooping.test.critical(snooping.level, sweep.vtpv, sweep.redundancy);
-            let Some((index, w)) = sweep.largest(&rows, &controls, snooping.smallest_control) else { break };
-            let statistic = w / critical.sigma0;
-            if statistic.is_nan() || critical.value.is_nan() || statistic.abs() <= critical.value {
-                break;
-            }
-            let row = rows[index];
-            let observation = self.observation_of(row).unwrap_or_default();
-            batch.push(Rejection {
-                observation: ObservationId(observation),
-                component: row - self.layout.observations[observation].row,
-                statistic,
-                critical: critical.value,
-                residual: self.residuals()[row],
-                redundancy_number: controls[row].share(),
-                step,
-            });
-            sweep.remove(index);
-        }
-        Ok(batch)
-    }
-
-    /// `P Q_vv P` among some rows.
-    fn mutual_information(&self, rows: &[usize], controls: &[Control]) -> Result<DMatrix<f64>> {
-        let owners = self.owners();
-        let designs: Vec<_> = rows.iter().map(|&row| self.weighted_design(row, &owners)).collect();
-        let mut blocks: Vec<BlockId> = designs.iter().flat_map(crate::joint::WeightedDesign::blocks).collect();
-        blocks.sort_unstable();
-        blocks.dedup();
-        let offsets = self.offsets(&blocks)?;
-        let columns: Vec<_> = designs.iter().map(|design| design.over(&blocks, &offsets)).collect();
-        let size = offsets[blocks.len()];
-        let design = DMatrix::from_fn(size, rows.len(), |row, column| columns[column][row]);
-        let mut out = -(design.transpose() * self.covariance_of(&blocks, Scale::Prior)? * design);
-        for (i, &first) in rows.iter().enumerate() {
-            for (j, &second) in rows.iter().enumerate() {
-                out[(i, j)] += self.weight_between(first, second);
-            }
-            // The same number as in the test itself, to the last bit.
-            out[(i, i)] = controls[first].information;
-        }
-        Ok(out)
-    }
-
-    /// Element of P.
-    fn weight_between(&self, first: usize, second: usize) -> f64 {
-        let (Some(observation), Some(other)) = (self.observation_of(first), self.observation_of(second)) else {
-            return 0.0;
-        };
-        if observation != other {
-            return 0.0;
-        }
-        let place = &self.layout.observations[observation];
-        let whitening = &self.whitening[self.whitening_start[observation]..];
-        let element = |row: usize, column: usize| whitening[row * (row + 1) / 2 + column];
-        let (a, b) = (first - place.row, second - place.row);
-        (a.max(b)..place.dimension).map(|i| element(i, a) * element(i, b)).sum()
-    }
-}
-
-/// Pulls and information of some components, while one after the other is removed.
-struct Sweep {
-    pulls: Vec<f64>,
-    information: DMatrix<f64>,
-    removed: Vec<bool>,
-    vtpv: f64,
-    redundancy: f64,
-}
-
-impl Sweep {
-    fn new(solution: &Solution, rows: &[usize], controls: &[Control]) -> Result<Self> {
-        Ok(Self {
-            pulls: rows.iter().map(|&row| controls[row].pull).collect(),
-            information: solution.mutual_information(rows, controls)?,
-            removed: vec![false; rows.len()],
-            vtpv: solution.vtpv(),
-            redundancy: solution.redundancy() as f64,
-        })
-    }
-
-    /// The component with the largest w among those that are still controlled, and its w.
-    fn largest(&self, rows: &[usize], controls: &[Control], smallest: f64) -> Option<(usize, f64)> {
-        let mut best: Option<(usize, f64)> = None;
-        for (index, &row) in rows.iter().enumerate() {
-            let information = self.information[(index, index)];
-            if self.removed[index] || information <= smallest * controls[row].weight {
-                continue;
-            }
-            let w = self.pulls[index] / information.sqrt();
-            if best.is_none_or(|(_, largest)| w.abs() > largest.abs()) {
-                best = Some((index, w));
-            }
-        }
-        best
-    }
-
-    /// Gives the component an unknown error of its own, which is the same as removing it.
-    fn remove(&mut self, index: usize) {
-        self.removed[index] = true;
-        let own = self.information[(index, index)];
-        let column = self.information.column(index).into_owned();
-        let pull = self.pulls[index];
-        for (pull_of, shared) in self.pulls.iter_mut().zip(column.iter()) {
-            *pull_of -= shared * pull / own;
-        }
-        self.information -= &column * column.transpose() / own;
-        self.vtpv -= pull * pull / own;
-        self.redundancy -= 1.0;
     }
 }

@@ -1,9 +1,10 @@
 //! Which blocks are eliminated, and who is whose neighbour.
 
+use std::collections::HashMap;
 use std::ops::Range;
 
 use crate::Adjustment;
-use crate::layout::Layout;
+use crate::layout::{Layout, Part};
 use crate::orthogonal::OrthogonalFactor;
 
 /// Unknowns of the largest block that is eliminated.
@@ -24,8 +25,14 @@ pub(crate) struct Structure {
     pub(crate) roles: Vec<Role>,
     /// Slot of each part of each observation that stands beside an eliminated block.
     pub(crate) slot_of_part: Vec<u32>,
-    /// Observations of each reduced block.
-    pub(crate) reduced_observations: Lists,
+    /// Blocks of U that observations touch.
+    pub(crate) pairs: Vec<Pair>,
+    /// Memory of all pairs.
+    pub(crate) pair_entries: usize,
+    /// Where the pairs of each observation begin in `pair_of`, and at the end their number.
+    pub(crate) pair_starts: Vec<u32>,
+    /// Pairs of each observation: its reduced parts in the order of their columns, each with itself and all after it.
+    pub(crate) pair_of: Vec<u32>,
     /// Observations of each eliminated block.
     pub(crate) eliminated_observations: Lists,
     /// Slots of each reduced block.
@@ -66,6 +73,18 @@ pub(crate) struct Slot {
     pub(crate) start: u32,
     pub(crate) width: u32,
     /// Where the coupling begins.
+    pub(crate) offset: usize,
+}
+
+/// Two reduced blocks that share observations, perhaps a block and itself: a block of U, column-major.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Pair {
+    /// First reduced row; the rows' block comes after the columns' or is the same.
+    pub(crate) row: usize,
+    pub(crate) column: usize,
+    pub(crate) rows: usize,
+    pub(crate) columns: usize,
+    /// Where it begins.
     pub(crate) offset: usize,
 }
 
@@ -163,14 +182,55 @@ impl Structure {
             order: 0,
             roles: vec![Role::Held; layout.blocks()],
             slot_of_part: vec![u32::MAX; layout.all_parts().len()],
-            reduced_observations: Lists::default(),
+            pairs: Vec::new(),
+            pair_entries: 0,
+            pair_starts: vec![0],
+            pair_of: Vec::new(),
             eliminated_observations: Lists::default(),
             reduced_slots: Lists::default(),
         };
         this.place_reduced(layout, graph, chosen);
         this.place_eliminated(layout, graph, chosen);
         this.list(layout);
+        this.list_pairs(layout);
         this
+    }
+
+    /// The reduced parts of an observation, in the order of reduced columns: block and where it lies in a row.
+    pub(crate) fn reduced_parts(&self, parts: &[Part], out: &mut Vec<(Reduced, usize)>) {
+        out.clear();
+        for part in parts {
+            if let Role::Reduced(index) = self.roles[part.block as usize] {
+                out.push((self.reduced[index as usize], part.offset as usize));
+            }
+        }
+        out.sort_unstable_by_key(|(block, _)| block.start);
+    }
+
+    fn list_pairs(&mut self, layout: &Layout) {
+        let mut numbers = HashMap::new();
+        let mut parts = Vec::new();
+        let mut last = ((usize::MAX, usize::MAX), 0);
+        for place in &layout.observations {
+            self.reduced_parts(layout.parts(place), &mut parts);
+            for (index, (column, _)) in parts.iter().enumerate() {
+                for (row, _) in &parts[index..] {
+                    let key = (row.start, column.start);
+                    if last.0 != key {
+                        let next = self.pairs.len() as u32;
+                        last = (key, *numbers.entry(key).or_insert(next));
+                    }
+                    if last.1 as usize == self.pairs.len() {
+                        let (rows, columns) = (row.width, column.width);
+                        let offset = self.pair_entries;
+                        self.pairs.push(Pair { row: row.start, column: column.start, rows, columns, offset });
+                        self.pair_entries += rows * columns;
+                    }
+                    self.pair_of.push(last.1);
+                }
+            }
+            self.pair_starts.push(self.pair_of.len() as u32);
+        }
     }
 
     fn place_reduced(&mut self, layout: &Layout, graph: &Graph, chosen: &[bool]) {
@@ -221,7 +281,7 @@ impl Structure {
     }
 
     /// The eliminated block among the parts of an observation.
-    pub(crate) fn eliminated_part(&self, parts: &[crate::layout::Part]) -> Option<(usize, crate::layout::Part)> {
+    pub(crate) fn eliminated_part(&self, parts: &[Part]) -> Option<(usize, Part)> {
         parts.iter().find_map(|part| match self.roles[part.block as usize] {
             Role::Eliminated(index) => Some((index as usize, *part)),
             _ => None,
@@ -229,13 +289,12 @@ impl Structure {
     }
 
     fn list(&mut self, layout: &Layout) {
-        let (mut reduced, mut eliminated) = (Vec::new(), Vec::new());
+        let mut eliminated = Vec::new();
         for (index, place) in layout.observations.iter().enumerate() {
             let own = self.eliminated_part(layout.parts(place)).map(|(own, _)| own);
             for (part, at) in layout.parts(place).iter().zip(place.part_range()) {
                 match self.roles[part.block as usize] {
                     Role::Reduced(block) => {
-                        reduced.push((block as usize, index as u32));
                         if let Some(own) = own {
                             let slots = self.eliminated[own].slots();
                             let found = self.slots[slots.clone()].binary_search_by_key(&block, |slot| slot.reduced);
@@ -247,7 +306,6 @@ impl Structure {
                 }
             }
         }
-        self.reduced_observations = Lists::new(self.reduced.len(), reduced.into_iter());
         self.eliminated_observations = Lists::new(self.eliminated.len(), eliminated.into_iter());
         let slots = self.slots.iter().enumerate().map(|(index, slot)| (slot.reduced as usize, index as u32));
         self.reduced_slots = Lists::new(self.reduced.len(), slots);

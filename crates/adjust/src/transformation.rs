@@ -31,12 +31,13 @@ impl Moving {
 #[derive(Debug)]
 pub struct DatumTransformation<'s> {
     solution: &'s Solution,
-    datum: Vec<BlockId>,
     /// How each moving block moves, `tangent dimension × defect`; sorted by block.
     motions: Vec<(BlockId, DMatrix<f64>)>,
     /// `(GᵀH)⁻¹`.
     inverse: DMatrix<f64>,
-    /// Covariance of `Gᵀδ` over the datum points, prior-scaled.
+    /// `Q G`, prior-scaled covariance of all unknowns with `Gᵀδ` over the datum points.
+    shares: DMatrix<f64>,
+    /// `GᵀQG`.
     shift: DMatrix<f64>,
 }
 
@@ -70,15 +71,24 @@ impl Solution {
         let mut motions = self.motions(datum, moving, &motion)?;
         motions.sort_by_key(|(block, _)| *block);
         self.check_motion(&motions, motion.count)?;
-        let mut out = DatumTransformation {
-            solution: self,
-            datum: datum.to_vec(),
-            motions,
-            inverse: DMatrix::zeros(0, 0),
-            shift: DMatrix::zeros(0, 0),
-        };
-        out.prepare(motion.count)?;
-        Ok(out)
+        let mut directions = DMatrix::zeros(self.unknowns(), motion.count);
+        let mut gram = DMatrix::zeros(motion.count, motion.count);
+        for (block, matrix) in motions.iter().filter(|(block, _)| datum.contains(block)) {
+            gram += matrix.transpose() * matrix;
+            for component in 0..matrix.nrows() {
+                if let Some(column) = self.unknown_index(*block, component)? {
+                    directions.row_mut(column).copy_from(&matrix.row(component));
+                }
+            }
+        }
+        let failed = Error::Decomposition { what: "inversion of the datum's normal equations" };
+        let inverse = gram.try_inverse().ok_or(failed)?;
+        let mut shares = DMatrix::zeros(self.unknowns(), motion.count);
+        for (mut share, direction) in shares.column_iter_mut().zip(directions.column_iter()) {
+            share.copy_from_slice(&self.cofactor.multiply(direction.into_owned().as_slice()));
+        }
+        let shift = directions.transpose() * &shares;
+        Ok(DatumTransformation { solution: self, motions, inverse, shares, shift })
     }
 
     fn motions(&self, datum: &[BlockId], moving: &[Moving], motion: &Motion) -> Result<Vec<(BlockId, DMatrix<f64>)>> {
@@ -222,28 +232,11 @@ impl DatumTransformation<'_> {
     /// Covariance between a block and D.
     fn covariance_with_shift(&self, block: BlockId) -> Result<DMatrix<f64>> {
         let mut out = DMatrix::zeros(self.solution.tangent_dimension(block)?, self.inverse.nrows());
-        for &point in &self.datum {
-            if let Some(motion) = self.motion(point) {
-                out += self.solution.covariance_between(block, point, Scale::Prior)? * motion;
+        for component in 0..out.nrows() {
+            if let Some(column) = self.solution.unknown_index(block, component)? {
+                out.row_mut(component).copy_from(&self.shares.row(column));
             }
         }
         Ok(out)
-    }
-
-    fn prepare(&mut self, count: usize) -> Result<()> {
-        let mut gram = DMatrix::zeros(count, count);
-        for motion in self.datum.iter().filter_map(|&point| self.motion(point)) {
-            gram += motion.transpose() * motion;
-        }
-        let failed = Error::Decomposition { what: "inversion of the datum's normal equations" };
-        self.inverse = gram.try_inverse().ok_or(failed)?;
-        let mut shift = DMatrix::zeros(count, count);
-        for &point in &self.datum {
-            if let Some(motion) = self.motion(point) {
-                shift += motion.transpose() * self.covariance_with_shift(point)?;
-            }
-        }
-        self.shift = shift;
-        Ok(())
     }
 }

@@ -31,7 +31,7 @@ fn decay(start: [f64; 2]) -> (Adjustment<'static>, BlockId) {
 #[test]
 fn the_trace_ends_undamped_below_the_tolerance() {
     let mut found = Vec::new();
-    for method in [Method::GaussNewton, Method::LevenbergMarquardt] {
+    for method in [Method::GaussNewton, Method::LevenbergMarquardt, Method::DogLeg] {
         let (a, b) = decay([1.0, 1.0]);
         let solution = a.solve(&SolveOptions { method, ..SolveOptions::default() }).unwrap();
         let trace = solution.trace();
@@ -40,8 +40,9 @@ fn the_trace_ends_undamped_below_the_tolerance() {
         assert_eq!(last.damping, 0.0);
         assert!(last.step <= 1e-8 * solution.sigma0().unwrap().min(1.0));
         assert_eq!(trace.len(), solution.iterations());
-        let damped = trace.iter().any(|entry| entry.kind == StepKind::Damped);
-        assert_eq!(damped, method == Method::LevenbergMarquardt);
+        let has = |kind| trace.iter().any(|entry| entry.kind == kind);
+        assert_eq!(has(StepKind::Damped), method == Method::LevenbergMarquardt);
+        assert_eq!(has(StepKind::Trusted), method == Method::DogLeg);
         assert_relative_eq!(last.objective, solution.vtpv(), max_relative = 1e-12);
         found.push((solution.values(b).unwrap().to_vec(), solution.covariance(b, Scale::Prior).unwrap()));
     }
@@ -85,7 +86,7 @@ fn a_wrong_jacobian_does_not_pass() {
 #[test]
 fn a_model_without_value_shortens_the_step() {
     // The full step from 4 goes to −1.5, where the root has no value.
-    for method in [Method::GaussNewton, Method::LevenbergMarquardt] {
+    for method in [Method::GaussNewton, Method::LevenbergMarquardt, Method::DogLeg] {
         let mut a = Adjustment::new();
         let x = a.add_block(ParameterBlock::euclidean([4.0]));
         let group = a.add_group("root");
@@ -108,7 +109,7 @@ fn a_model_without_value_shortens_the_step() {
 #[test]
 fn nonlinear_constraints_hold_at_the_end() {
     // The point of the unit circle that is nearest to (3, 4), from a start that is not on it.
-    for method in [Method::GaussNewton, Method::LevenbergMarquardt] {
+    for method in [Method::GaussNewton, Method::LevenbergMarquardt, Method::DogLeg] {
         let mut a = Adjustment::new();
         let p = a.add_block(ParameterBlock::euclidean([2.0, 0.1]));
         a.add_prior(p, &[3.0, 4.0], &Covariance::from_sigmas(&[1.0, 1.0])).unwrap();

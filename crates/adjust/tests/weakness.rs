@@ -104,6 +104,14 @@ fn a_network_is_examined_as_the_diagnosis_does() {
     let points = n.points.clone();
     n.adjustment.add_inner_constraints(&points, DatumDefect::Six).unwrap();
     let solution = n.adjustment.solve(&SolveOptions::default()).unwrap();
+    // All blocks together are the whole matrix, in any order.
+    let mut blocks = n.stations.clone();
+    blocks.extend(&n.points);
+    let joint = solution.covariance_of(&blocks, adjust::Scale::Posterior).unwrap();
+    assert_relative_eq!(joint, solution.covariance_matrix(adjust::Scale::Posterior).unwrap(), max_relative = 1e-12);
+    let swapped = solution.covariance_of(&[n.points[1], n.stations[0]], adjust::Scale::Posterior).unwrap();
+    assert_relative_eq!(swapped[(0, 4)], joint[(24 + 3, 1)], max_relative = 1e-9);
+    assert!(solution.covariance_of(&[n.points[1], n.points[1]], adjust::Scale::Prior).is_err());
     let all = WeaknessOptions { inflation: 1.0, max_count: 1, ..WeaknessOptions::default() };
     let found = solution.near_defects(&all).unwrap();
     let diagnosis = solution.diagnosis(0.9);

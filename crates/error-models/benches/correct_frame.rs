@@ -3,8 +3,8 @@
 
 use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
 use error_models::{
-    AmplitudeHyperbola, FixedPattern, FurtherTerms, GrossErrorOptions, RangeErrorModel, RangeTerms, correct_frame,
-    distort_frame, flag_gross_errors,
+    AmplitudeHyperbola, FixedPattern, FurtherShape, FurtherTerms, GrossErrorOptions, PolynomialShape, RangeErrorModel,
+    RangeTerms, SurfaceShape, correct_frame, distort_frame, flag_gross_errors,
 };
 use range_image::{Flags, ImageFormat, RangeFrame, Raster};
 
@@ -16,6 +16,19 @@ fn model() -> RangeErrorModel {
         range_span_m: Some([0.2, 20.0]),
         further: FurtherTerms::default(),
     }
+}
+
+/// The same hyperbola with a spline of 24 knots, a cubic in range and a surface of order 3.
+fn with_further_terms(format: &ImageFormat) -> RangeErrorModel {
+    let shape = FurtherShape {
+        spline_knots: Some(24),
+        polynomial: Some(PolynomialShape { order: 3, range_span_m: [0.2, 20.0] }),
+        surface: Some(SurfaceShape::over_image(3, format, [0.0; 2])),
+    };
+    let mut model = model().with_further(&shape).unwrap();
+    let values: Vec<f64> = (0..model.parameter_count()).map(|i| 2e-3 * (i as f64).sin()).collect();
+    model.set_parameter_values(&values).unwrap();
+    model
 }
 
 fn frame(width: usize, height: usize) -> RangeFrame {
@@ -40,6 +53,17 @@ fn frames(criterion: &mut Criterion) {
                 BatchSize::LargeInput,
             );
         });
+        let further = with_further_terms(&format);
+        criterion.bench_function(
+            &format!("correct_frame with spline, polynomial, surface/{width}x{height}/1 thread"),
+            |bencher| {
+                bencher.iter_batched_ref(
+                    || frame.clone(),
+                    |frame| one_thread.install(|| correct_frame(frame, &further, &format, [0.0; 2], Some(&pattern))),
+                    BatchSize::LargeInput,
+                );
+            },
+        );
         criterion.bench_function(&format!("distort_frame/{width}x{height}/1 thread"), |bencher| {
             bencher.iter_batched_ref(
                 || frame.clone(),

@@ -36,8 +36,8 @@ pub use network_scene::{
 pub use outcome::{AdjustmentFigures, Outcome, StationPose};
 pub use plan::{
     AdjustOptions, AverageOptions, CorrectImagePointOptions, CorrectRangeOptions, DeconvolveOptions, DemodulateOptions,
-    FlagOptions, MixedPixels, NoiseOptions, Plan, PointCloudOptions, RegisterOptions, SimulateSource, Source, Stage,
-    UnwrapOptions,
+    FlagOptions, MixedPixels, NetworkCalibration, NoiseOptions, Plan, PointCloudOptions, RegisterOptions,
+    SimulateSource, Source, Stage, UnwrapOptions,
 };
 pub use progress::{Progress, Silent};
 pub use run::{RunRequest, process, run};

@@ -25,8 +25,21 @@ pub struct Plan {
     /// Where the frames come from, unless the caller names a survey.
     #[serde(default)]
     pub source: Option<Source>,
+    /// A calibration to be estimated first, from a simulated network of targets, and used instead of the survey's.
+    #[serde(default)]
+    pub calibrate: Option<NetworkCalibration>,
     /// The stages, in order.
     pub stages: Vec<Stage>,
+}
+
+/// A network of targets to simulate, and what to estimate from it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct NetworkCalibration {
+    /// The network's RON file, relative to the pipeline's.
+    pub network: String,
+    /// Names of the terms to estimate; all others are held at their nominal values.
+    pub terms: Vec<String>,
 }
 
 /// Where a pipeline's frames come from; paths are relative to the pipeline's file.

@@ -3,9 +3,16 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use error_models::ModelSet;
+use range_io::calibration::Calibration;
+use range_io::survey::Survey;
+use self_calibration::{CalibrationOptions, TermSelection};
+
+use crate::calibrate::{CalibrateMethod, CalibrateRequest, TableDefaults, calibrate};
 use crate::load::load;
+use crate::network_scene::simulate_network;
 use crate::outcome::Outcome;
-use crate::plan::Source;
+use crate::plan::{NetworkCalibration, Source};
 use crate::progress::Progress;
 use crate::summary::{StageSummary, Summary};
 use crate::view::Snapshot;
@@ -30,7 +37,11 @@ pub struct RunRequest {
 pub fn run(request: &RunRequest, progress: &dyn Progress) -> Result<Summary> {
     let start = Instant::now();
     let survey = find_survey(request, progress)?;
-    let outcome = process(&request.plan, &survey, request.calibration.as_deref(), progress)?;
+    let calibration = match (&request.calibration, &request.plan.calibrate) {
+        (None, Some(network)) => Some(estimate_calibration(request, network, &survey, progress)?),
+        (named, _) => named.clone(),
+    };
+    let outcome = process(&request.plan, &survey, calibration.as_deref(), progress)?;
     let mut summary = measure::summarise(&request.plan, &survey, &outcome);
     summary.out = request.out.display().to_string();
     summary.seconds = start.elapsed().as_secs_f64();
@@ -46,9 +57,7 @@ fn find_survey(request: &RunRequest, progress: &dyn Progress) -> Result<PathBuf>
         (Some(folder), _) => Ok(folder.clone()),
         (None, Some(Source::Survey { folder })) => Ok(base.join(folder)),
         (None, Some(Source::Simulate(source))) => {
-            let mut name = request.out.file_name().unwrap_or_default().to_owned();
-            name.push("-survey");
-            let folder = request.out.with_file_name(name);
+            let folder = beside(&request.out, "-survey");
             simulate::simulate(source, base, &folder, progress)?;
             Ok(folder)
         }
@@ -57,6 +66,50 @@ fn find_survey(request: &RunRequest, progress: &dyn Progress) -> Result<PathBuf>
             message: "the pipeline names no source: name a survey's folder".to_owned(),
         }),
     }
+}
+
+/// A folder beside the output folder, named after it.
+fn beside(out: &Path, ending: &str) -> PathBuf {
+    let mut name = out.file_name().unwrap_or_default().to_owned();
+    name.push(ending);
+    out.with_file_name(name)
+}
+
+/// Simulates the network, calibrates it and gives the calibration's file. It starts from the nominal camera; noise,
+/// scattering and fixed pattern, which targets do not show, are those of the survey's calibration.
+fn estimate_calibration(
+    request: &RunRequest,
+    network: &NetworkCalibration,
+    survey: &Path,
+    progress: &dyn Progress,
+) -> Result<PathBuf> {
+    let base = request.plan_path.parent().unwrap_or(Path::new(""));
+    let (folder, out) = (beside(&request.out, "-network"), beside(&request.out, "-calibration"));
+    simulate_network(&base.join(&network.network), None, &folder)?;
+    let start = folder.join("start.ron");
+    nominal_start(&folder, survey)?.write(&start)?;
+    let options = CalibrationOptions { terms: TermSelection::List(network.terms.clone()), ..Default::default() };
+    calibrate(
+        &CalibrateRequest {
+            survey: folder,
+            lens_survey: None,
+            calibration: Some(start),
+            method: CalibrateMethod::Network(options.method),
+            options,
+            defaults: TableDefaults::default(),
+            out: out.clone(),
+        },
+        progress,
+    )?;
+    Ok(out.join(Calibration::FILE_NAME))
+}
+
+fn nominal_start(network: &Path, survey: &Path) -> Result<Calibration> {
+    let camera = Survey::read(network)?.camera.nominal_camera()?;
+    let known = Calibration::read(survey)?;
+    let mut start = Calibration::from_models(&camera, &ModelSet::default(), known.scattering.as_ref())?;
+    (start.noise, start.fixed_pattern) = (known.noise, known.fixed_pattern);
+    Ok(start)
 }
 
 /// Loads a survey and applies a plan's stages, without writing anything.

@@ -3,11 +3,12 @@
 
 use camera_model::{Camera, InteriorOrientation, LensDistortion};
 use criterion::{Criterion, criterion_group, criterion_main};
-use error_models::{AmplitudeHyperbola, RangeErrorModel, RangeTerms};
-use nalgebra::Isometry3;
+use error_models::{AmplitudeHyperbola, RangeErrorModel, RangeTerms, distort_frame};
+use nalgebra::{Isometry3, Point3, Vector3};
 use range_image::{Flags, ImageFormat, RangeFrame, Raster};
 use self_calibration::{
-    DifferenceOptions, Plane, RangeDifference, RangeTermOptions, differences_to_plane, estimate_range_terms,
+    DifferenceOptions, Plane, PlaneCalibrationOptions, PlaneCapture, RangeDifference, RangeTermOptions,
+    calibrate_planes, differences_to_plane, estimate_range_terms,
 };
 
 fn camera(width: usize, height: usize) -> Camera {
@@ -30,6 +31,49 @@ fn frames(criterion: &mut Criterion) {
             bencher.iter(|| differences_to_plane(&frame, &camera, &pose, &plane, &options).unwrap());
         });
     }
+}
+
+/// Twelve captures of a wall at known distances, the wall itself and a common set of terms unknown.
+fn unknown_plane(criterion: &mut Criterion) {
+    for (width, height) in [(176, 144), (640, 480), (1024, 1024)] {
+        let camera = camera(width, height);
+        let poses: Vec<_> = (0..12).map(|i| Isometry3::translation(0.0, 0.0, -0.4 * f64::from(i))).collect();
+        let frames: Vec<_> = poses.iter().map(|pose| wavy_wall(&camera, pose)).collect();
+        let capture = |(index, frame)| PlaneCapture {
+            name: format!("S{index}"),
+            frame,
+            world_from_camera: Some(poses[index]),
+            covariance: None,
+            plane: 0,
+        };
+        let captures: Vec<_> = frames.iter().enumerate().map(capture).collect();
+        let options = PlaneCalibrationOptions::default();
+        criterion.bench_function(
+            &format!("calibrate_planes/12 captures {width}x{height}, every 4th pixel"),
+            |bencher| {
+                bencher.iter(|| calibrate_planes(&captures, &[None], &camera, 5.0, &options).unwrap());
+            },
+        );
+    }
+}
+
+/// An oblique wall with the range errors of the model but the hyperbola's and some scatter.
+fn wavy_wall(camera: &Camera, pose: &Isometry3<f64>) -> RangeFrame {
+    let wall = Plane::new(&Vector3::new(0.2, 0.1, 1.0), &Point3::new(0.0, 0.0, -5.5)).unwrap();
+    let (width, height) = (camera.format.width, camera.format.height);
+    let range = |col: usize, row: usize| {
+        let scatter = 0.01 * (((col * 37 + row * 101) % 997) as f64 / 997.0 - 0.5);
+        wall.reference_range(camera, pose, [col as f64, row as f64]).unwrap().0 + scatter
+    };
+    let mut frame = RangeFrame {
+        range: Raster::from_fn(width, height, |col, row| range(col, row) as f32),
+        sigma: Raster::filled(width, height, 0.003),
+        amplitude: Raster::filled(width, height, 100.0),
+        flags: Raster::filled(width, height, Flags::empty()),
+    };
+    let model = RangeErrorModel { hyperbola: None, ..model() };
+    distort_frame(&mut frame, &model, &camera.format, [0.0; 2], None).unwrap();
+    frame
 }
 
 fn estimation(criterion: &mut Criterion) {
@@ -68,6 +112,6 @@ fn model() -> RangeErrorModel {
 criterion_group! {
     name = benches;
     config = Criterion::default().sample_size(10);
-    targets = frames, estimation
+    targets = frames, estimation, unknown_plane
 }
 criterion_main!(benches);

@@ -10,11 +10,11 @@ mod options;
 mod plane;
 mod planes;
 mod planes_geometry;
-mod planes_gram;
 mod planes_observation;
 mod planes_outcome;
 mod planes_pixels;
 mod planes_problem;
+mod planes_reduction;
 mod planes_start;
 mod range_terms;
 

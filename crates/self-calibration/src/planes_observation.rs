@@ -4,8 +4,8 @@ use adjust::{BlockId, EvaluationFailure, Jacobians, Observation, RigidPose};
 use nalgebra::Isometry3;
 
 use crate::planes_geometry::PlaneChart;
-use crate::planes_gram::Gram;
 use crate::planes_pixels::PlanePixels;
+use crate::planes_reduction::Reduction;
 
 /// Standard deviations up to which a residual has its full weight in the first, robust stage `[Huber1981]`.
 const HUBER: f64 = 1.345;
@@ -30,7 +30,7 @@ impl Weighting {
     }
 }
 
-/// Eq. 17 with the range terms: `ρ = ρ_ref + Δρ(ρ, x, y)` at each pixel, reduced by [`Gram`] to one component for each
+/// Eq. 17 with the range terms: `ρ = ρ_ref + Δρ(ρ, x, y)` at each pixel, reduced by [`Reduction`] to one component for each
 /// unknown and one for the rest. Blocks: plane, terms, and the pose if it is unknown.
 pub(crate) struct PlaneObservation<'a> {
     pub(crate) blocks: Vec<BlockId>,
@@ -47,6 +47,26 @@ impl PlaneObservation<'_> {
     /// The pose among the parameters, or that which is held.
     fn pose(&self, parameters: &[&[f64]]) -> Result<Isometry3<f64>, EvaluationFailure> {
         parameters.get(2).map_or(Ok(self.world_from_camera), |values| RigidPose::isometry(values))
+    }
+
+    /// All pixels that take part, reduced at these parameters.
+    pub(crate) fn reduction(&self, parameters: &[&[f64]]) -> Result<Reduction, EvaluationFailure> {
+        let (plane, terms) = (parameters[0], parameters[1]);
+        let seen = self.chart.seen_from(plane, &self.pose(parameters)?);
+        let columns = self.dimension() - 1;
+        let mut reduction = Reduction::new(columns);
+        let mut row = vec![0.0; columns + 1];
+        for pixel in (0..self.pixels.len()).filter(|pixel| self.pixels.used[*pixel]) {
+            let reference = seen(&self.pixels.rays[pixel]);
+            let reference = reference.ok_or_else(|| EvaluationFailure::new("a pixel does not see the plane"))?;
+            let root = self.pixels.roots_of_weight[pixel];
+            let model = reference.by_plane.iter().chain(self.pixels.row(pixel)).chain(&reference.by_pose);
+            row[..columns].iter_mut().zip(model).for_each(|(place, derivative)| *place = derivative * root);
+            row[columns] = root * self.pixels.left_over(pixel, reference.range_m, terms);
+            let (weight, objective) = self.weighting.of(row[columns]);
+            reduction.add(&row, weight, objective);
+        }
+        Ok(reduction)
     }
 }
 
@@ -65,22 +85,7 @@ impl Observation for PlaneObservation<'_> {
         residual: &mut [f64],
         jacobians: Option<&mut Jacobians<'_>>,
     ) -> Result<(), EvaluationFailure> {
-        let (plane, terms) = (parameters[0], parameters[1]);
-        let seen = self.chart.seen_from(plane, &self.pose(parameters)?);
-        let columns = self.dimension() - 1;
-        let mut gram = Gram::new(columns);
-        let mut row = vec![0.0; columns + 1];
-        for pixel in (0..self.pixels.len()).filter(|pixel| self.pixels.used[*pixel]) {
-            let reference = seen(&self.pixels.rays[pixel]);
-            let reference = reference.ok_or_else(|| EvaluationFailure::new("a pixel does not see the plane"))?;
-            let root = self.pixels.roots_of_weight[pixel];
-            let model = reference.by_plane.iter().chain(self.pixels.row(pixel)).chain(&reference.by_pose);
-            row[..columns].iter_mut().zip(model).for_each(|(place, derivative)| *place = derivative * root);
-            row[columns] = root * self.pixels.left_over(pixel, reference.range_m, terms);
-            let (weight, objective) = self.weighting.of(row[columns]);
-            gram.add(&row, weight, objective);
-        }
-        gram.reduce(&self.sizes, residual, jacobians);
+        self.reduction(parameters)?.write(&self.sizes, residual, jacobians);
         Ok(())
     }
 }

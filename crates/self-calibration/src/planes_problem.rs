@@ -1,6 +1,8 @@
 //! Captures of planes as one adjustment.
 
-use adjust::{Adjustment, BlockId, Covariance, ParameterBlock, RigidPose, Solution, SolveOptions};
+use adjust::{
+    Adjustment, BlockId, Covariance, LinearObservation, Observation, ParameterBlock, RigidPose, Solution, SolveOptions,
+};
 use camera_model::Camera;
 use error_models::AmplitudeHyperbola;
 use nalgebra::{Isometry3, Point3, Vector3};
@@ -15,6 +17,12 @@ use crate::{Error, Plane, PlaneCalibrationOptions, PlaneCapture, Result};
 /// Rounds in which pixels are left out and taken in again. A few at the limit may go to and fro for ever; it does not
 /// matter which of them the last round had.
 const ROUNDS: usize = 20;
+
+/// Multiple of the largest inflation from which the start values are enough to refuse.
+const HOPELESS: f64 = 10.0;
+
+/// The robust stage only chooses pixels: it ends at steps of this share of a standard deviation.
+const ROUGHLY: f64 = 1e-2;
 
 /// Median of the absolute values of a normal distribution, in standard deviations.
 const MEDIAN_OF_NORMAL: f64 = 0.674_489_75;
@@ -125,6 +133,11 @@ impl<'a> Problem<'a> {
 
     /// Least squares, without the pixels that a robust adjustment finds far off.
     pub(crate) fn solve_without_gross_errors(&mut self) -> Result<Solved> {
+        self.require_redundancy()?;
+        // Far beyond the limit no descent is worth while; near it the solution tells better than the start.
+        if let Some(error) = self.undetermined_at_start(HOPELESS * self.options.terms.largest_inflation)? {
+            return Err(error);
+        }
         let Some(limit) = self.options.rejection else { return self.solve(Weighting::LeastSquares, None) };
         let mut solved = self.solve(Weighting::Huber, None)?;
         let limit = limit * scatter(self.residuals(&solved)?.concat());
@@ -133,6 +146,7 @@ impl<'a> Problem<'a> {
             if !changed && round > 0 {
                 break;
             }
+            self.require_redundancy()?;
             solved = self.solve(Weighting::LeastSquares, Some(&solved))?;
         }
         Ok(solved)
@@ -166,39 +180,87 @@ impl<'a> Problem<'a> {
 
     /// One adjustment of the pixels that take part, from an earlier one where there is one.
     fn solve(&self, weighting: Weighting, from: Option<&Solved>) -> Result<Solved> {
-        self.require_redundancy()?;
         let mut adjustment = Adjustment::new();
         let terms = adjustment.add_block(self.terms.block());
         self.terms.hold(&mut adjustment, terms)?;
         let planes = self.charts.iter().map(|chart| chart.add_to(&mut adjustment)).collect::<Result<Vec<_>>>()?;
-        let mut poses = Vec::with_capacity(self.captures.len());
+        let poses = self.captures.iter().map(|capture| add_pose(&mut adjustment, capture));
+        let poses = poses.collect::<Result<Vec<_>>>()?;
         let group = adjustment.add_group("ranges to planes");
-        for (index, capture) in self.captures.iter().enumerate() {
-            let pose = add_pose(&mut adjustment, capture)?;
-            let chart = self.chart_of[index];
-            let blocks: Vec<_> = [planes[chart], terms].into_iter().chain(pose).collect();
-            let sizes = [3, self.terms.held.len(), 6][..blocks.len()].to_vec();
-            let (chart, pixels, world_from_camera) = (&self.charts[chart].chart, &self.pixels[index], pose_of(capture));
-            let observation = PlaneObservation { blocks, sizes, chart, pixels, world_from_camera, weighting };
-            let covariance = Covariance::from_sigmas(&vec![1.0; adjust::Observation::dimension(&observation)]);
+        for (index, pose) in poses.iter().enumerate() {
+            let blocks: Vec<_> = [planes[self.chart_of[index]], terms].into_iter().chain(*pose).collect();
+            let observation = self.observation(index, blocks, weighting);
+            let covariance = Covariance::from_sigmas(&vec![1.0; observation.dimension()]);
             adjustment.add_observation(group, observation, &covariance)?;
-            poses.push(pose);
         }
         if let Some(earlier) = from {
-            let all = [(terms, earlier.terms)].into_iter().chain(planes.iter().copied().zip(earlier.planes.clone()));
-            for (block, earlier_block) in
-                all.chain(poses.iter().copied().flatten().zip(earlier.poses.iter().copied().flatten()))
-            {
-                adjustment.set_values(block, earlier.solution.values(earlier_block)?)?;
+            let of_planes = planes.iter().zip(&earlier.planes);
+            let of_poses = poses.iter().flatten().zip(earlier.poses.iter().flatten());
+            for (block, before) in [(&terms, &earlier.terms)].into_iter().chain(of_planes).chain(of_poses) {
+                adjustment.set_values(*block, earlier.solution.values(*before)?)?;
+            }
+        }
+        let mut options = SolveOptions::default();
+        if weighting == Weighting::Huber {
+            options.step_tolerance = ROUGHLY;
+        }
+        match adjustment.solve(&options) {
+            Ok(solution) => Ok(Solved { solution, terms, planes, poses }),
+            // What is not determined often has no end either: then that is the better answer.
+            Err(error @ adjust::Error::NotConverged { .. }) => {
+                Err(self.undetermined_at_start(self.options.terms.largest_inflation)?.unwrap_or(error.into()))
+            }
+            Err(error) => Err(not_determined(error)),
+        }
+    }
+
+    fn observation(&self, index: usize, blocks: Vec<BlockId>, weighting: Weighting) -> PlaneObservation<'_> {
+        PlaneObservation {
+            sizes: [3, self.terms.held.len(), 6][..blocks.len()].to_vec(),
+            blocks,
+            chart: &self.charts[self.chart_of[index]].chart,
+            pixels: &self.pixels[index],
+            world_from_camera: pose_of(&self.captures[index]),
+            weighting,
+        }
+    }
+
+    /// What is not determined, if anything, as far as the derivatives at the start values tell: the same adjustment
+    /// made linear, which always ends.
+    fn undetermined_at_start(&self, largest_inflation: f64) -> Result<Option<Error>> {
+        let mut adjustment = Adjustment::new();
+        let terms = adjustment.add_block(self.terms.block());
+        self.terms.hold(&mut adjustment, terms)?;
+        let planes = self.charts.iter().map(|chart| chart.add_to(&mut adjustment)).collect::<Result<Vec<_>>>()?;
+        let group = adjustment.add_group("derivatives at the start");
+        let start = self.terms.model.parameter_values();
+        for (index, capture) in self.captures.iter().enumerate() {
+            let mut blocks = vec![planes[self.chart_of[index]], terms];
+            let pose = capture.world_from_camera.map(|pose| RigidPose::values(&pose));
+            let mut parameters: Vec<&[f64]> = vec![&[0.0; 3], &start];
+            if let (Some((_, covariance)), Some(values)) = (weighted(capture), &pose) {
+                let step = ParameterBlock::euclidean([0.0; 6]).named(format!("pose of {}", capture.name));
+                blocks.push(adjustment.add_block(step));
+                adjustment.add_prior(blocks[2], &[0.0; 6], &Covariance::from_matrix(covariance))?;
+                parameters.push(values);
+            }
+            let observation = self.observation(index, blocks.clone(), Weighting::LeastSquares);
+            let mut reduction =
+                observation.reduction(&parameters).map_err(|_| Error::NoPlane { station: capture.name.clone() })?;
+            for row in reduction.rows() {
+                let [plane, own_terms, pose] = parts(row, self.terms.held.len());
+                let parts = blocks.iter().copied().zip([plane, own_terms, pose]);
+                adjustment.add_observation(group, LinearObservation::new(0.0, parts), &Covariance::from_sigma(1.0))?;
             }
         }
         match adjustment.solve(&SolveOptions::default()) {
-            Ok(solution) => Ok(Solved { solution, terms, planes, poses }),
-            Err(adjust::Error::RankDeficient { combinations, .. }) => {
-                let names: Vec<String> = combinations.iter().map(ToString::to_string).collect();
-                Err(Error::PlanesNotDetermined { combination: names.join("; "), inflation: f64::INFINITY })
+            Ok(solution) => {
+                let diagnosis = solution.diagnosis(1.0);
+                let (combination, inflation) = (diagnosis.weakest.to_string(), diagnosis.weakest_inflation);
+                let weak = inflation > largest_inflation;
+                Ok(weak.then_some(Error::PlanesNotDetermined { combination, inflation }))
             }
-            Err(error) => Err(error.into()),
+            Err(error) => Ok(Some(not_determined(error))),
         }
     }
 
@@ -233,6 +295,20 @@ impl ChartedPlane {
         }
         Ok(block)
     }
+}
+
+/// The error of an adjustment, a defect in the words of planes.
+fn not_determined(error: adjust::Error) -> Error {
+    let adjust::Error::RankDeficient { combinations, .. } = error else { return error.into() };
+    let names: Vec<String> = combinations.iter().map(ToString::to_string).collect();
+    Error::PlanesNotDetermined { combination: names.join("; "), inflation: f64::INFINITY }
+}
+
+/// The parts of a row that belong to plane, terms and pose.
+fn parts(row: &[f64], terms: usize) -> [&[f64]; 3] {
+    let (plane, rest) = row.split_at(3);
+    let (terms, rest) = rest.split_at(terms);
+    [plane, terms, &rest[..rest.len() - 1]]
 }
 
 /// The pose of a capture as given; without one its plane is in the camera frame.

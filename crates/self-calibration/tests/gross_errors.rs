@@ -4,7 +4,7 @@
 mod support;
 
 use self_calibration::{
-    CalibrationOptions, Component, Method, Network, SightingOptions, TermSelection, Verdict, calibrate,
+    CalibrationOptions, Component, Method, Network, SightingOptions, SimulatedStart, TermSelection, Verdict, calibrate,
     simulate_sightings,
 };
 use support::networks::{all_but_long_wave, nominal, normal, small};
@@ -54,23 +54,37 @@ fn found(truth: &Network, method: Method, level: f64, seed: u64) -> [usize; 4] {
 }
 
 #[test]
-fn one_in_a_hundred() {
-    let started = std::time::Instant::now();
+fn one_in_a_hundred_is_found() {
     let mut sum = [0; 4];
-    for seed in 0..4 {
+    for seed in 0..3 {
         let counts = found(&normal(), Method::OneStep, 1e-4, seed);
-        println!("{counts:?} {:?}", started.elapsed());
         sum.iter_mut().zip(counts).for_each(|(sum, count)| *sum += count);
     }
-    let [planted, found, wrong, all] = sum;
-    println!("{planted} planted, {found} found, {wrong} wrong of {all}");
-    let counts = found_at_usual(&small());
-    println!("{counts:?} {:?}", started.elapsed());
+    let [planted, found, wrong, _] = sum;
+    assert!(planted > 60 && found == planted, "{found} of {planted}");
+    // At a level of 1e-4 and some 5,000 values a network, one in two networks has a false one.
+    assert!(wrong as f64 <= 0.05 * found as f64, "{wrong} false beside {found}");
 }
 
-fn found_at_usual(truth: &Network) -> [usize; 4] {
-    let a = found(truth, Method::OneStep, 1e-3, 11);
-    let b = found(truth, Method::TwoStepDependent, 1e-3, 12);
-    println!("{a:?} {b:?}");
-    a
+#[test]
+fn at_the_usual_level_few_good_values_are_lost() {
+    for method in [Method::OneStep, Method::TwoStepDependent] {
+        let [.., wrong, all] = found(&small(), method, 1e-3, 12);
+        // One in a thousand values, two of three to an image point; 784 image points and ranges.
+        assert!(wrong as f64 <= 0.01 * all as f64, "{method:?}: {wrong} of {all}");
+    }
+}
+
+#[test]
+fn start_values_are_found_in_spite_of_gross_errors() {
+    let truth = small();
+    let start = SimulatedStart::Absent;
+    let options = SightingOptions { gross_error_share: 0.03, start, sigma_range_m: 0.02, ..SightingOptions::default() };
+    let mut observed = simulate_sightings(&truth, &options).unwrap();
+    nominal(&mut observed);
+    let terms = TermSelection::List(all_but_long_wave());
+    let outcome = calibrate(&observed, &CalibrationOptions { terms, ..CalibrationOptions::default() }).unwrap();
+    let d0 = outcome.parameter("d0").unwrap();
+    assert!((d0.value - truth.range_model.terms.d0).abs() < 4.0 * d0.sigma_prior, "{} {}", d0.value, d0.sigma_prior);
+    assert!(outcome.rejected() > 0);
 }

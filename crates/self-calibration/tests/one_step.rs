@@ -40,8 +40,16 @@ fn the_normal_network_is_solved() {
     let mut observed = simulate_sightings(&normal(), &SightingOptions::default()).unwrap();
     nominal(&mut observed);
     let outcome = calibrate(&observed, &options()).unwrap();
-    for p in &outcome.parameters {
-        println!("{} {} +- {} p={}", p.name, p.value, p.sigma_prior, p.significance_p);
-    }
-    println!("{} {} {:?} it {}", outcome.observations, outcome.unknowns, outcome.sigma0, outcome.trace.len());
+    // Prior deviations are those of the simulation: sigma0 is 1 within four of its deviations, 1 / √(2 · 4500).
+    assert!((outcome.sigma0.unwrap() - 1.0).abs() < 0.045, "{:?}", outcome.sigma0);
+    assert_eq!(outcome.redundancy, outcome.observations as i64 + 6 - outcome.unknowns as i64);
+    let d0 = outcome.parameter("d0").unwrap();
+    assert!(
+        (d0.value - 0.024).abs() < 4.0 * d0.sigma_prior && d0.sigma_prior < 0.004,
+        "{} {}",
+        d0.value,
+        d0.sigma_prior
+    );
+    let sum: f64 = outcome.groups.iter().map(|group| group.redundancy).sum();
+    assert!((sum - outcome.redundancy as f64).abs() < 1e-6, "{sum}");
 }

@@ -68,13 +68,13 @@ fn frames(camera: &Camera, poses: &[Isometry3<f64>], sigma_m: f64, seed: u64) ->
 fn captures<'a>(
     frames: &'a [RangeFrame],
     pose: impl Fn(usize) -> Option<Isometry3<f64>>,
-    covariance: Option<Matrix6<f64>>,
+    covariance: Option<&Matrix6<f64>>,
 ) -> Vec<PlaneCapture<'a>> {
     let capture = |(index, frame)| PlaneCapture {
         name: format!("S{index}"),
         frame,
         world_from_camera: pose(index),
-        covariance,
+        covariance: covariance.copied(),
         plane: 0,
     };
     frames.iter().enumerate().map(capture).collect()
@@ -110,7 +110,6 @@ fn without_noise_a_common_unknown_plane_gives_the_terms_back() {
     let calibration =
         calibrate_planes(&captures(&frames, |i| Some(poses[i]), None), &[None], &camera, INTERVAL, &options(2))
             .unwrap();
-    println!("{:?}", calibration.diagnosis(0.9));
     for (found, expected) in calibration.model().parameter_values().iter().zip(truth().parameter_values()) {
         // Single-precision ranges of up to 9 m are off by 3e-7 m; d0 shares its effect with the plane, which inflates
         // the mean of thousands of them.
@@ -119,4 +118,192 @@ fn without_noise_a_common_unknown_plane_gives_the_terms_back() {
     let plane = calibration.planes()[0].plane;
     assert!((plane.normal() - wall().normal()).norm() < 1e-6 || (plane.normal() + wall().normal()).norm() < 1e-6);
     assert!((plane.distance_m().abs() - wall().distance_m().abs()).abs() < 1e-5);
+}
+
+#[test]
+fn without_noise_each_station_may_have_a_plane_of_its_own() {
+    let camera = camera(4.0);
+    let poses = poses(12);
+    let frames = frames(&camera, &poses, 0.0, 1);
+    let mut options = PlaneCalibrationOptions { rejection: None, ..options(1) };
+    // A plane of its own at each station takes most of what e1 and e2 do to it.
+    options.terms = options.terms.hold("e1", 1e-3).unwrap().hold("e2", 2e-3).unwrap();
+    let calibration = calibrate_planes(&captures(&frames, |_| None, None), &[], &camera, INTERVAL, &options).unwrap();
+    for (found, expected) in calibration.model().parameter_values().iter().zip(truth().parameter_values()) {
+        // As above, with weaker ties.
+        assert!((found - expected).abs() < 1e-5, "{found} {expected}");
+    }
+    assert_eq!(calibration.planes().len(), 12);
+    for (index, (adjusted, pose)) in calibration.planes().iter().zip(&poses).enumerate() {
+        let distance = (wall().distance_m() - wall().normal().dot(&pose.translation.vector)).abs();
+        let normal = pose.rotation.inverse() * wall().normal();
+        assert_eq!(adjusted.name, format!("plane of S{index}"));
+        assert!((adjusted.plane.distance_m().abs() - distance).abs() < 3e-5, "{adjusted:?} {distance}");
+        assert!(adjusted.plane.normal().dot(&normal).abs() > 1.0 - 1e-9);
+    }
+    let first = &calibration.captures()[0];
+    assert_eq!((first.used, first.rejected, first.world_from_camera), (44 * 36, 0, None));
+}
+
+/// Mean of normalised errors over seeded surveys.
+fn mean_over_surveys(surveys: u64, calibrate: impl Fn(u64) -> PlaneCalibration) -> f64 {
+    (0..surveys).map(|seed| normalised_error(&calibrate(seed))).sum::<f64>() / surveys as f64
+}
+
+#[test]
+fn deviations_are_those_of_the_scatter() {
+    let camera = camera(8.0);
+    let poses = poses(10);
+    let deviations = Vector6::new(3e-3, 3e-3, 3e-3, 1e-3, 1e-3, 1e-3);
+    let covariance = Matrix6::from_diagonal(&deviations.component_mul(&deviations));
+    let with_weighted_poses = |seed: u64| {
+        let mut random = Pcg64::seed_from_u64(1000 + seed);
+        let disturbed: Vec<_> = poses
+            .iter()
+            .map(|pose| {
+                let step: [f64; 6] = std::array::from_fn(|i| {
+                    let normal: f64 = StandardNormal.sample(&mut random);
+                    deviations[i] * normal
+                });
+                camera_model::step_pose(pose, &step)
+            })
+            .collect();
+        let frames = frames(&camera, &poses, SIGMA_M, seed);
+        let captures = captures(&frames, |i| Some(disturbed[i]), Some(&covariance));
+        calibrate_planes(&captures, &[Some(wall())], &camera, INTERVAL, &options(4)).unwrap()
+    };
+    // Chi squared of 16 surveys with 9 unknowns over their number scatters by sqrt(2 / 144) = 0.12; leaving out beyond
+    // four deviations and the noise in the argument of the correction (at most 0.05) are much less.
+    let weighted = mean_over_surveys(16, with_weighted_poses);
+    assert!((weighted - 1.0).abs() < 0.36, "{weighted}");
+    let wide = self::camera(4.0);
+    let mut hold = options(2);
+    hold.terms = hold.terms.hold("e1", 1e-3).unwrap().hold("e2", 2e-3).unwrap();
+    let own_planes = mean_over_surveys(16, |seed| {
+        let frames = frames(&wide, &poses, SIGMA_M, seed);
+        calibrate_planes(&captures(&frames, |_| None, None), &[], &wide, INTERVAL, &hold).unwrap()
+    });
+    // Seven unknowns: sqrt(2 / 112) = 0.13.
+    assert!((own_planes - 1.0).abs() < 0.4, "{own_planes}");
+    let calibration = with_weighted_poses(7);
+    assert!((calibration.sigma0() - 1.0).abs() < 0.05, "{}", calibration.sigma0());
+    let (prior, posterior) =
+        (calibration.covariance(Scale::Prior).unwrap(), calibration.covariance(Scale::Posterior).unwrap());
+    assert!((posterior[(0, 0)] / prior[(0, 0)] - calibration.sigma0().powi(2)).abs() < 1e-12);
+}
+
+#[test]
+fn frontal_captures_with_a_narrow_field_do_not_tell_d0_from_the_distance() {
+    let camera = camera(30.0);
+    let poses: Vec<_> = (0..10).map(|i| Isometry3::translation(0.0, 0.0, -0.4 * f64::from(i))).collect();
+    let frames = frames(&camera, &poses, SIGMA_M, 2);
+    let refused =
+        |pose: &dyn Fn(usize) -> Option<Isometry3<f64>>, planes: &[Option<Plane>], given: &PlaneCalibrationOptions| {
+            match calibrate_planes(&captures(&frames, pose, None), planes, &camera, INTERVAL, given) {
+                Err(Error::PlanesNotDetermined { combination, inflation }) => (combination, inflation),
+                other => panic!("{other:?}"),
+            }
+        };
+    let mut offset_alone = options(2);
+    for name in ["d2", "d3", "d4", "d5", "d6", "d7", "e1", "e2"] {
+        offset_alone.terms = offset_alone.terms.hold(name, 0.0).unwrap();
+    }
+    let (combination, inflation) = refused(&|i| Some(poses[i]), &[None], &offset_alone);
+    assert!(combination.contains("d0") && combination.contains("plane 0 distance"), "{combination}");
+    assert!(inflation > 100.0, "{inflation}");
+    let (combination, _) = refused(&|_| None, &[], &options(2));
+    assert!(combination.contains("plane of S"), "{combination}");
+    // A plane that is known, or one distance of it, is the cure.
+    let known = captures(&frames, |i| Some(poses[i]), None);
+    assert!(calibrate_planes(&known, &[Some(wall())], &camera, INTERVAL, &options(2)).is_ok());
+}
+
+#[test]
+fn things_in_front_of_the_wall_are_left_out() {
+    let camera = camera(8.0);
+    let poses = poses(10);
+    let mut frames = frames(&camera, &poses, SIGMA_M, 3);
+    let mut random = Pcg64::seed_from_u64(77);
+    let mut spoilt = 0;
+    for frame in &mut frames {
+        // A box in front, with mixed pixels along its edge, and single pixels anywhere.
+        for (col, row) in (5..18).flat_map(|col| (10..30).map(move |row| (col, row))) {
+            frame.range[(col, row)] -= if col == 17 { 0.3 * random.random::<f32>() } else { 0.3 };
+            spoilt += 1;
+        }
+        for _ in 0..60 {
+            frame.range[(20 + random.random_range(0..24), random.random_range(0..36))] += 0.2 + random.random::<f32>();
+            spoilt += 1;
+        }
+    }
+    let given = captures(&frames, |i| Some(poses[i]), None);
+    let robust = calibrate_planes(&given, &[Some(wall())], &camera, INTERVAL, &options(1)).unwrap();
+    let rejected: usize = robust.captures().iter().map(|capture| capture.rejected).sum();
+    // Some single pixels were hit twice, some mixed ones lie within four deviations; of the 15,840 others the normal
+    // distribution has one beyond.
+    assert!(rejected > spoilt * 9 / 10 && rejected < spoilt + 20, "{rejected} {spoilt}");
+    // What is left of the mixed pixels pulls a little: twice the normalised error of clean surveys is seldom exceeded.
+    assert!(normalised_error(&robust) < 2.5, "{}", normalised_error(&robust));
+    let plain = PlaneCalibrationOptions { rejection: None, ..options(1) };
+    let spoiled = calibrate_planes(&given, &[Some(wall())], &camera, INTERVAL, &plain).unwrap();
+    assert!(normalised_error(&spoiled) > 100.0 && spoiled.sigma0() > 5.0);
+}
+
+#[test]
+fn a_spline_is_estimated_as_well_as_sines() {
+    let camera = camera(8.0);
+    let poses = poses(16);
+    let frames = frames(&camera, &poses, SIGMA_M, 4);
+    let mut options = options(2);
+    options.terms = options.terms.with_spline(16);
+    let given = captures(&frames, |i| Some(poses[i]), None);
+    let calibration = calibrate_planes(&given, &[Some(wall())], &camera, INTERVAL, &options).unwrap();
+    assert_eq!(calibration.estimated_names().len(), 1 + 15 + 2);
+    let mut largest = 0.0_f64;
+    for step in 0..50 {
+        let range = 1.2 + 0.1 * f64::from(step);
+        let found = calibration.model().correction(range, 0.0, 0.0, 1.0).total_m();
+        largest = largest.max((found - truth().correction(range, 0.0, 0.0, 1.0).total_m()).abs());
+    }
+    // Sixteen knots follow a wave of four intervals to 1 % of its 12 mm; the noise leaves 4 mm / sqrt(6336 / 18).
+    assert!(largest < 1.2e-3, "{largest}");
+}
+
+#[test]
+fn bad_input_is_refused_by_name() {
+    let camera = camera(8.0);
+    let poses = poses(4);
+    let mut frames = frames(&camera, &poses, SIGMA_M, 5);
+    let given = captures(&frames, |i| Some(poses[i]), None);
+    let calibrate = |captures: &[PlaneCapture<'_>], options: &PlaneCalibrationOptions| {
+        calibrate_planes(captures, &[Some(wall())], &camera, INTERVAL, options).map(|_| ()).unwrap_err()
+    };
+    assert!(matches!(calibrate(&[], &options(1)), Error::TooFewDifferences { differences: 0, .. }));
+    let mut elsewhere = given.clone();
+    elsewhere[2].plane = 1;
+    let answer = calibrate(&elsewhere, &options(1));
+    assert!(matches!(answer, Error::UnknownPlane { plane: 1, planes: 1, .. }), "{answer}");
+    let mut with_hyperbola = options(1);
+    with_hyperbola.terms.hyperbola = HyperbolaUse::Estimate;
+    assert!(matches!(calibrate(&given, &with_hyperbola), Error::HyperbolaNotHeld));
+    let mut all_held = options(1);
+    all_held.terms = all_held.terms.hold_terms(&RangeTerms::default());
+    assert!(matches!(calibrate(&given, &all_held), Error::NothingToEstimate));
+    for rejection in [f64::NAN, 0.0, 1.0, f64::INFINITY] {
+        let bad = PlaneCalibrationOptions { rejection: Some(rejection), ..options(1) };
+        assert!(matches!(calibrate(&given, &bad), Error::OutOfDomain { name: "rejection", .. }));
+    }
+    let mut bad_pose = given.clone();
+    bad_pose[0].covariance = Some(-Matrix6::identity());
+    assert!(matches!(calibrate(&bad_pose, &options(1)), Error::Adjust(_)));
+    bad_pose[0].covariance = None;
+    bad_pose[0].world_from_camera = Some(Isometry3::translation(f64::NAN, 0.0, 0.0));
+    let _ = calibrate(&bad_pose, &options(1));
+    assert!(calibrate_planes(&given, &[Some(wall())], &camera, -1.0, &options(1)).is_err());
+    frames[1].range = Raster::filled(44, 36, f32::NAN);
+    let given = captures(&frames, |i| Some(poses[i]), None);
+    assert!(matches!(calibrate(&given, &options(1)), Error::NoPlane { station } if station == "S1"));
+    frames[1].range = Raster::filled(3, 3, 1.0);
+    let given = captures(&frames, |_| None, None);
+    assert!(matches!(calibrate(&given, &options(1)), Error::Image(_)));
 }

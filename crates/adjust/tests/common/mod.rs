@@ -2,8 +2,8 @@
 #![allow(clippy::unwrap_used, dead_code)]
 
 use adjust::{
-    Adjustment, BlockId, Covariance, EvaluationFailure, Jacobians, Observation, ObservationId, ParameterBlock,
-    RigidPose,
+    Adjustment, BlockId, Covariance, DatumDefect, EvaluationFailure, Jacobians, Observation, ObservationId,
+    ParameterBlock, RigidPose,
 };
 use nalgebra::{Isometry3, Matrix1x3, Matrix3, Matrix3x6, Point3, SMatrix, Translation3, UnitQuaternion, Vector3};
 use rand::{Rng, RngExt, SeedableRng};
@@ -190,4 +190,34 @@ pub fn network(plan: &Plan) -> Network {
         }
     }
     Network { adjustment, stations, points, observations, true_stations, true_points }
+}
+
+/// A network at its true values of which every thirty-third sight has one component that is 15 to 35 standard deviations
+/// off; and those components, by number of the sight and of the component. The datum is on all points.
+pub fn network_with_gross_errors(plan: &Plan, seed: u64) -> (Network, Vec<(usize, usize)>) {
+    let Network { true_stations, true_points, .. } = network(plan);
+    let mut rng = Pcg64::seed_from_u64(seed);
+    let mut adjustment = Adjustment::new();
+    let stations: Vec<_> = true_stations.iter().map(|pose| adjustment.add_block(ParameterBlock::pose(pose))).collect();
+    let points: Vec<_> =
+        true_points.iter().map(|point| adjustment.add_block(ParameterBlock::euclidean(point.as_slice()))).collect();
+    let group = adjustment.add_group("sights");
+    let (mut observations, mut wrong) = (Vec::new(), Vec::new());
+    for (index, (pose, station)) in true_stations.iter().zip(&stations).enumerate() {
+        for shift in 0..plan.seen {
+            let point = (index * 31 + shift) % plan.points;
+            let seen = sight(&pose.inverse_transform_point(&Point3::from(true_points[point])).coords);
+            let mut observed: [f64; 3] = std::array::from_fn(|i| seen[i] + SIGMA[i] * normal(&mut rng));
+            let number = observations.len();
+            if number % 33 == 5 {
+                let component = number % 3;
+                observed[component] += SIGMA[component] * (15.0 + 20.0 * rng.random::<f64>());
+                wrong.push((number, component));
+            }
+            let sight = Sight { blocks: [*station, points[point]], observed };
+            observations.push(adjustment.add_observation(group, sight, &Covariance::from_sigmas(&SIGMA)).unwrap());
+        }
+    }
+    adjustment.add_inner_constraints(&points, DatumDefect::Six).unwrap();
+    (Network { adjustment, stations, points, observations, true_stations, true_points }, wrong)
 }

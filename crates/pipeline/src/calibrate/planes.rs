@@ -211,7 +211,7 @@ fn preparation(survey: &Survey, start: &Start) -> Plan {
         }
         stages.push(Stage::Unwrap(UnwrapOptions::default()));
     }
-    Plan { name: "planes".to_owned(), source: None, stages }
+    Plan { name: "planes".to_owned(), source: None, calibrate: None, stages }
 }
 
 /// The named terms are estimated, all others held at the start values.

@@ -132,6 +132,8 @@ pub struct SightingSpec {
     pub gross_error_share: f64,
     /// Amplitude of a target at 1 m; `None`: no amplitudes.
     pub amplitude_at_1_m: Option<f64>,
+    /// Darkest and brightest target relative to it.
+    pub reflectance_span: [f64; 2],
     /// Standard deviation of the start values of positions, metre.
     pub start_position_m: f64,
     /// Standard deviation of the start values of attitudes, degree.
@@ -146,6 +148,7 @@ impl Default for SightingSpec {
             sigma_passive_pixel: 0.2,
             gross_error_share: 0.0,
             amplitude_at_1_m: None,
+            reflectance_span: [1.0; 2],
             start_position_m: 0.05,
             start_attitude_deg: 2.0,
         }
@@ -165,6 +168,7 @@ impl SightingSpec {
                 attitude_rad: self.start_attitude_deg.to_radians(),
             },
             amplitude_at_1_m: self.amplitude_at_1_m,
+            reflectance_span: self.reflectance_span,
         }
     }
 }

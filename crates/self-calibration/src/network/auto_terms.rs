@@ -11,9 +11,10 @@ use crate::{Error, Result};
 
 /// Terms that are decided on together, in the order in which they are given up where a network cannot tell them apart.
 /// The wave of length U comes first: it correlates with d0 and makes that many times less certain.
-const GROUPS: [&[&str]; 9] = [
+const GROUPS: [&[&str]; 10] = [
     &["d2", "d3"],
     &["h1", "h2", "h3"],
+    &["b1", "b2"],
     &["k3"],
     &["k2"],
     &["p1", "p2"],
@@ -45,9 +46,9 @@ pub(crate) fn choose(problem: &Problem<'_>) -> Result<CalibrationOutcome> {
         }
         left.push((group, decision(group, false, &test, &current.offset_gain(group))));
         current = current.without(group);
-        group.iter().for_each(|name| {
+        for name in group {
             terms.remove(*name);
-        });
+        }
     }
     if !left.is_empty() {
         outcome = problem.run(&terms)?;
@@ -92,9 +93,9 @@ fn determined(
                 group.join(", ")
             ),
         });
-        group.iter().for_each(|name| {
+        for name in *group {
             terms.remove(*name);
-        });
+        }
     }
 }
 
@@ -208,6 +209,12 @@ impl Wald {
 
     /// The group that speaks least for itself.
     fn weakest_group(&self, terms: &BTreeSet<String>) -> Option<(&'static [&'static str], Test)> {
+        // Over a part of its length this wave imitates shorter ones: these are judged without it if it can be spared.
+        if let Some(long_wave) = GROUPS.into_iter().find(|group| group[0] == "d2" && terms.contains("d2"))
+            && let Some(test) = self.test(long_wave).filter(|test| !test.stays(long_wave))
+        {
+            return Some((long_wave, test));
+        }
         let present = GROUPS.into_iter().filter(|group| terms.contains(group[0]));
         let tested = present.filter_map(|group| Some((group, self.test(group)?)));
         // The radial terms leave from the highest on.

@@ -11,6 +11,7 @@ use super::quality::Geometry;
 use super::range_step::{RangeStep, ScaleUse};
 use super::reference::Reference;
 use super::start::find_start;
+use super::strength::Strength;
 use super::terms::{camera_names, camera_values};
 use super::{CalibrationOptions, CalibrationOutcome, Method, Network, NetworkDatum, TermSelection};
 use crate::{Error, Result};
@@ -219,19 +220,27 @@ impl Problem<'_> {
     /// Solves one adjustment and refuses what it does not determine.
     fn solve(&self, setup: &mut Setup<'_>) -> Result<(Solved, Vec<String>)> {
         let limit = self.options.largest_inflation;
-        let solved = setup.solve_rejecting(self.options.rejection_level);
+        let first = setup.solve().map_err(|error| setup.explain(error, limit))?;
+        // Gross errors are looked for only where the network is strong enough for an answer.
+        let mut strength = self.strong(setup, &first)?;
+        let kept = setup.excluded.clone();
+        let solved = setup.solve_rejecting(first, self.options.rejection_level);
         let solved = solved.map_err(|error| setup.explain(error, limit))?;
-        let mut diagnosis = Vec::new();
-        if let Some(strength) = setup.strength(&solved)? {
-            if strength.inflation > limit {
-                return Err(strength.error());
-            }
-            if strength.inflation > WORTH_TELLING {
-                diagnosis.push(strength.sentence());
-            }
+        if setup.excluded != kept {
+            strength = self.strong(setup, &solved)?;
         }
+        let worth_telling = strength.filter(|strength| strength.inflation > WORTH_TELLING);
+        let mut diagnosis: Vec<String> = worth_telling.iter().map(Strength::sentence).collect();
         diagnosis.extend(setup.seen_once());
         Ok((solved, diagnosis))
+    }
+
+    /// The weakest combination, where it is strong enough.
+    fn strong(&self, setup: &Setup<'_>, solved: &Solved) -> Result<Option<Strength>> {
+        match setup.strength(solved)? {
+            Some(strength) if strength.inflation > self.options.largest_inflation => Err(strength.error()),
+            strength => Ok(strength),
+        }
     }
 
     fn setup<'n>(

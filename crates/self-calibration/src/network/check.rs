@@ -212,16 +212,19 @@ impl CalibrationOptions {
             }
         }
         if let TermSelection::List(names) = &self.terms {
-            names.iter().try_for_each(|name| check_term(name))?;
+            names.iter().try_for_each(|name| check_term(network, name))?;
         }
         Ok(())
     }
 }
 
-fn check_term(name: &str) -> Result<()> {
-    let known: Vec<&str> =
-        camera_names().into_iter().chain(RangeTerms::NAMES).chain(AmplitudeHyperbola::NAMES).collect();
-    if known.contains(&name) {
+/// A term is one of the camera's, of Eqs. 14 and 15, or of the further terms that the range model of the network has.
+fn check_term(network: &Network, name: &str) -> Result<()> {
+    let fixed = camera_names().into_iter().chain(RangeTerms::NAMES).chain(AmplitudeHyperbola::NAMES).map(str::to_owned);
+    let mut known: Vec<String> = fixed.collect();
+    let further = network.range_model.parameter_names();
+    known.extend(further.into_iter().filter(|name| !RangeTerms::NAMES.contains(&name.as_str())));
+    if known.iter().any(|known| known == name) {
         return Ok(());
     }
     let what = "the list of terms".to_owned();

@@ -164,16 +164,13 @@ impl Combined<'_, '_> {
             let known = place
                 .map_or_else(|_| self.geometry.distance(seen.station, seen.target), |row| self.reference.values[row]);
             let reference = factor * known;
-            let figures = match self.step.reference.sightings.binary_search(&index) {
-                Ok(row) => {
-                    let row = behind + row;
-                    Figures::used(solution.residuals()[row], redundancy[row], standardised[row])
-                }
-                Err(_) => {
-                    let rejected = self.step.rejected.contains(&index);
-                    let verdict = if rejected { Verdict::Rejected } else { Verdict::LeftOut };
-                    Figures::unused(observed - reference - self.correction(index), verdict)
-                }
+            let figures = if let Ok(row) = self.step.reference.sightings.binary_search(&index) {
+                let row = behind + row;
+                Figures::used(solution.residuals()[row], redundancy[row], standardised[row])
+            } else {
+                let rejected = self.step.rejected.contains(&index);
+                let verdict = if rejected { Verdict::Rejected } else { Verdict::LeftOut };
+                Figures::unused(observed - reference - self.correction(index), verdict)
             };
             let row = Row {
                 source: Source::Sighting(index),

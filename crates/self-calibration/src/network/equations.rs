@@ -1,4 +1,5 @@
-//! Observation equations of the network: `v = observed − (model + correction(observed))`, Eqs. 4-15.
+//! Observation equations of the network, Eqs. 4-15: image corrections are taken at the observed image point, range
+//! corrections at the modelled range.
 
 use std::sync::Arc;
 
@@ -7,7 +8,7 @@ use camera_model::{Camera, LensDistortion};
 use error_models::RangeErrorModel;
 use nalgebra::{Isometry3, Matrix2x3, Matrix3, Point3, RowVector3, SMatrix, Vector3};
 
-use super::terms::{Seen, camera_from, range_correction};
+use super::terms::{Seen, camera_from, modelled_range};
 
 /// A target in the frame of a camera, with the derivatives of its coordinates.
 struct InCamera {
@@ -138,14 +139,14 @@ impl SightingEquation {
         };
         let distance = target.point.norm();
         let mut by_terms = vec![0.0; parameters[3].len()];
-        let correction = range_correction(&range.model, &range.widths, &seen, parameters[3], &mut by_terms);
-        let correction = correction.map_err(EvaluationFailure::new)?;
-        residual[row] = range.range_m - distance - correction.value;
+        let modelled = modelled_range(&range.model, &range.widths, &seen, parameters[3], distance, &mut by_terms);
+        let modelled = modelled.map_err(EvaluationFailure::new)?;
+        residual[row] = range.range_m - modelled.range_m;
         if let Some(jacobians) = jacobians {
-            let direction: RowVector3<f64> = (target.point / distance).transpose();
+            let direction: RowVector3<f64> = (target.point * (modelled.by_distance / distance)).transpose();
             copy(jacobians.row(0, row), (direction * target.by_pose).iter());
             copy(jacobians.row(1, row), (direction * target.by_point).iter());
-            copy(jacobians.row(2, row), [-correction.by_x, -correction.by_y].iter());
+            copy(jacobians.row(2, row), [-modelled.by_x, -modelled.by_y].iter());
             copy(jacobians.row(3, row), by_terms.iter());
         }
         Ok(())
@@ -309,4 +310,74 @@ pub(crate) fn world_from_passive(
     range_camera_from_passive: &Isometry3<f64>,
 ) -> Isometry3<f64> {
     world_from_camera * range_camera_from_passive
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use adjust::{Adjustment, ParameterBlock, check_jacobian};
+    use camera_model::{ImageFormat, InteriorOrientation, LensDistortion};
+    use error_models::{AmplitudeHyperbola, RangeTerms};
+
+    use super::super::terms::{camera_values, family_widths, range_values};
+    use super::*;
+
+    fn camera() -> Camera {
+        let interior = InteriorOrientation { principal_point_mm: [0.06, -0.04], principal_distance_mm: 8.0 };
+        let lens = LensDistortion { k1: -2e-3, k2: 4e-5, k3: -3e-7, p1: 3e-4, p2: -2e-4, ..LensDistortion::default() };
+        Camera::new(ImageFormat::new(176, 144, [0.04, 0.035]).unwrap(), interior, lens).unwrap()
+    }
+
+    fn model() -> RangeErrorModel {
+        let terms = RangeTerms { d0: 0.03, periodic: [0.02, -0.01, 0.01, 0.02, -0.02, 0.01], e1: 2e-3, e2: -1e-3 };
+        let hyperbola = AmplitudeHyperbola { h1: -1e-3, h2: 0.5, h3: 4.0, amplitude_span: [0.0, 1e4] };
+        RangeErrorModel { terms, hyperbola: Some(hyperbola), ..RangeErrorModel::error_free(5.0) }
+    }
+
+    /// Pose, target 2 m in front of it, camera, range set.
+    fn blocks() -> Vec<ParameterBlock> {
+        let pose = Isometry3::new(Vector3::new(0.4, -0.3, 1.9), Vector3::new(0.1, -0.2, 0.7));
+        let target: [f64; 3] = (pose * Point3::new(0.5, 0.3, -2.0)).into();
+        vec![
+            ParameterBlock::pose(&pose),
+            ParameterBlock::euclidean(target),
+            ParameterBlock::euclidean(camera_values(&camera())),
+            ParameterBlock::euclidean(range_values(&model())),
+        ]
+    }
+
+    fn ids(count: usize) -> Vec<BlockId> {
+        let mut adjustment = Adjustment::new();
+        (0..count).map(|_| adjustment.add_block(ParameterBlock::euclidean([0.0]))).collect()
+    }
+
+    #[test]
+    fn derivatives_of_a_sighting() {
+        let model = Arc::new(model());
+        let widths = family_widths(&model).into();
+        let range = RangeEquation { range_m: 2.15, amplitude: 300.0, model, widths };
+        for (uses_pixel, range) in [(true, Some(range.clone())), (true, None), (false, Some(range))] {
+            let blocks = if range.is_some() { blocks() } else { blocks()[..3].to_vec() };
+            let ids = ids(blocks.len());
+            let equation = SightingEquation { blocks: ids, camera: camera(), pixel: [120.3, 31.8], uses_pixel, range };
+            let check = check_jacobian(&equation, &blocks).unwrap();
+            // Smooth functions of parameters of order one: extrapolated differences agree to 1e-7.
+            assert!(check.worst < 1e-6, "{check:?}");
+        }
+    }
+
+    #[test]
+    fn derivatives_of_a_passive_image_point_and_a_distance() {
+        let relative = Isometry3::new(Vector3::new(0.1, 0.02, -0.03), Vector3::new(0.02, -0.03, 0.1));
+        let [pose, target, camera_block, _] = <[ParameterBlock; 4]>::try_from(blocks()).unwrap();
+        let all = [pose.clone(), target.clone(), ParameterBlock::pose(&relative), camera_block];
+        let own = <[BlockId; 4]>::try_from(ids(4)).unwrap();
+        let equation = PassiveEquation { blocks: own, camera: camera(), pixel: [120.3, 31.8] };
+        let check = check_jacobian(&equation, &all).unwrap();
+        assert!(check.worst < 1e-6, "{check:?}");
+        let equation = DistanceEquation { blocks: [own[0], own[1]], distance_m: 2.0 };
+        let check = check_jacobian(&equation, &[pose, target]).unwrap();
+        assert!(check.worst < 1e-6, "{check:?}");
+    }
 }

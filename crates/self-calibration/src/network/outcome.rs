@@ -145,7 +145,7 @@ pub struct ObservationQuality {
     pub residual: f64,
     /// Redundancy number 0..1; NaN where the observation is not used.
     pub redundancy_number: f64,
-    /// v / σ_v, posterior-scaled where there is redundancy; NaN where not controlled.
+    /// `v / σ_v`, posterior-scaled where there is redundancy; NaN where not controlled.
     pub standardised: f64,
     /// Smallest gross error that the test would find (internal reliability), same unit; infinite where uncontrolled.
     pub smallest_detectable: f64,

@@ -15,7 +15,7 @@ use super::reference::Reference;
 use super::rejection::suspects;
 use super::report::covariance_of;
 use super::strength::{Motions, Strength, combination, weakest};
-use super::terms::{Seen, family_widths, range_correction, range_model_from, range_names, range_values};
+use super::terms::{Seen, family_widths, modelled_range, range_model_from, range_names, range_values};
 use super::{CalibrationOptions, Component};
 use crate::{Error, Result};
 
@@ -23,7 +23,7 @@ use crate::{Error, Result};
 /// million numbers.
 const LARGEST: usize = 100_000_000;
 
-/// `ρ_obs − λ (ρ_ref + root · z) = Δρ(ρ_obs, x, y, a)`. Blocks: scale λ, range set, and z where the reference is uncertain.
+/// `ρ − λ (ρ_ref + root · z) = Δρ(ρ, x, y, a)` for the modelled range ρ. Blocks: scale λ, range set, and z where the reference is uncertain.
 struct DifferenceEquation {
     blocks: Vec<BlockId>,
     observed_m: f64,
@@ -53,13 +53,19 @@ impl Observation for DifferenceEquation {
         let moved: f64 = parameters.get(2).map_or(0.0, |z| z.iter().zip(&self.root).map(|(z, r)| z * r).sum());
         let reference = self.reference_m + moved;
         let mut by_terms = vec![0.0; terms.len()];
-        let correction = range_correction(&self.model, &self.widths, &self.seen, terms, &mut by_terms);
-        residual[0] = self.observed_m - scale * reference - correction.map_err(EvaluationFailure::new)?.value;
+        let distance = scale * reference;
+        let modelled = modelled_range(&self.model, &self.widths, &self.seen, terms, distance, &mut by_terms);
+        let modelled = modelled.map_err(EvaluationFailure::new)?;
+        residual[0] = self.observed_m - modelled.range_m;
         if let Some(jacobians) = jacobians {
-            jacobians.row(0, 0).copy_from_slice(&[reference]);
+            jacobians.row(0, 0).copy_from_slice(&[reference * modelled.by_distance]);
             jacobians.row(1, 0).copy_from_slice(&by_terms);
             if parameters.len() > 2 {
-                jacobians.row(2, 0).iter_mut().zip(&self.root).for_each(|(out, r)| *out = scale * r);
+                jacobians
+                    .row(2, 0)
+                    .iter_mut()
+                    .zip(&self.root)
+                    .for_each(|(out, r)| *out = scale * modelled.by_distance * r);
             }
         }
         Ok(())

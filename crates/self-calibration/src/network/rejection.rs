@@ -21,13 +21,13 @@ const MOST_ROUNDS: usize = 100;
 pub(crate) struct Suspect {
     /// Position among the rows.
     pub(crate) row: usize,
-    /// |v| / σ_v over the scale of its group.
+    /// `|v| / σ_v` over the scale of its group.
     statistic: f64,
 }
 
 /// Standardised residuals over the robust scale of their group, where they exceed the critical value; largest first.
 ///
-/// The scale, 1.4826 times the median of |v| / σ_v, stands for sigma0 of the group and is not drawn up by gross errors.
+/// The scale, 1.4826 times the median of `|v| / σ_v`, stands for sigma0 of the group and is not drawn up by gross errors.
 pub(crate) fn suspects(solution: &Solution, components: &[Component], level: f64) -> Result<Vec<Suspect>> {
     let standardised = solution.standardised_residuals(Scale::Prior)?;
     let redundancy = solution.redundancy_numbers();
@@ -59,13 +59,13 @@ fn scale(mut sizes: Vec<f64>) -> f64 {
 }
 
 impl Setup<'_> {
-    /// Solves, and rejects gross errors where a level is given.
+    /// Rejects gross errors from a first solution on, where a level is given.
     ///
     /// Of the suspects of a round the worst of each station and of each target is rejected: the residuals of one gross
     /// error spread over its own station and target, so that these do not disturb each other. In the end what was
     /// rejected is looked at again, and taken back once if it fits.
-    pub(crate) fn solve_rejecting(&mut self, level: Option<f64>) -> Result<Solved> {
-        let mut solved = self.solve()?;
+    pub(crate) fn solve_rejecting(&mut self, first: Solved, level: Option<f64>) -> Result<Solved> {
+        let mut solved = first;
         let Some(level) = level else { return Ok(solved) };
         let mut readmitted = BTreeSet::new();
         for _ in 0..MOST_ROUNDS {
@@ -114,7 +114,8 @@ impl Setup<'_> {
         let rejected = self.rejected_rows();
         for row in &rejected {
             let residual = self.predicted(solved, row)?;
-            if !(residual.abs() <= critical * sigma0 * row.sigma) {
+            // NaN: nothing is known of it.
+            if residual.is_nan() || residual.abs() > critical * sigma0 * row.sigma {
                 conspicuous.insert(key(row));
             }
         }

@@ -43,6 +43,9 @@ pub struct SightingOptions {
     pub start: SimulatedStart,
     /// Amplitude of a target at 1 m, falling with the square of the distance; `None`: no amplitudes.
     pub amplitude_at_1_m: Option<f64>,
+    /// Darkest and brightest target relative to that amplitude; the others lie between, evenly in their logarithm and
+    /// in no order. Without a spread, amplitude and range are one, and a hyperbola can't be told from range terms.
+    pub reflectance_span: [f64; 2],
 }
 
 impl Default for SightingOptions {
@@ -56,6 +59,7 @@ impl Default for SightingOptions {
             gross_error_share: 0.0,
             start: SimulatedStart::Disturbed { position_m: 0.02, attitude_rad: 0.01 },
             amplitude_at_1_m: None,
+            reflectance_span: [1.0; 2],
         }
     }
 }
@@ -114,11 +118,24 @@ impl SightingOptions {
                 return Err(Error::OutOfDomain { name, value, expected: "a standard deviation is positive" });
             }
         }
+        if let Some(&value) = self.reflectance_span.iter().find(|value| !(**value > 0.0 && value.is_finite())) {
+            return Err(Error::OutOfDomain { name: "reflectance_span", value, expected: "a reflectance is positive" });
+        }
         let value = self.gross_error_share;
         if (0.0..=1.0).contains(&value) {
             return Ok(());
         }
         Err(Error::OutOfDomain { name: "gross_error_share", value, expected: "a share is between 0 and 1" })
+    }
+}
+
+impl SightingOptions {
+    /// Relative reflectance of a target.
+    fn reflectance(&self, target: usize) -> f64 {
+        let [darkest, brightest] = self.reflectance_span;
+        // Multiples of the golden section fill the unit interval evenly however many there are.
+        let share = (target as f64 * 0.618_033_988_749_895).fract();
+        darkest * (brightest / darkest).powf(share)
     }
 }
 
@@ -142,11 +159,9 @@ impl Simulator<'_> {
 
     /// A gross error in standard deviations, or none.
     fn gross(&mut self) -> f64 {
-        if self.random.random::<f64>() >= self.options.gross_error_share {
-            return 0.0;
-        }
-        let size = 20.0 + 30.0 * self.random.random::<f64>();
-        if self.random.random::<bool>() { size } else { -size }
+        let [chance, size, side] = [0; 3].map(|_| self.random.random::<f64>());
+        let size = (20.0 + 30.0 * size).copysign(side - 0.5);
+        if chance < self.options.gross_error_share { size } else { 0.0 }
     }
 
     fn pose(&self, station: usize) -> Result<Isometry3<f64>> {
@@ -182,7 +197,8 @@ impl Simulator<'_> {
         let (truth, options) = (self.truth, self.options);
         let (pose, point) = (self.pose(planned.station)?, self.point(planned.target)?);
         let seen = truth.camera.observe(&pose, &point)?;
-        let amplitude = options.amplitude_at_1_m.map(|at_1_m| at_1_m / (seen.range_m * seen.range_m));
+        let reflectance = options.reflectance(planned.target);
+        let amplitude = options.amplitude_at_1_m.map(|at_1_m| at_1_m * reflectance / (seen.range_m * seen.range_m));
         let amplitude = amplitude.or(planned.amplitude);
         let [xp, yp] = truth.camera.interior.principal_point_mm;
         let [x, y] = seen.image_mm;

@@ -24,6 +24,7 @@ const SMALLEST_ANGLE: f64 = 0.0175;
 pub(crate) fn find_start(network: &Network, calibration: &Calibration, passive: bool) -> Result<Start> {
     let mut finder = Finder::new(network, calibration);
     finder.run()?;
+    finder.drop_unseen(passive);
     let relative =
         network.passive.as_ref().filter(|_| passive).map(|passive| finder.relative_orientation(passive)).transpose()?;
     let stations = finder.stations.iter().copied().flatten().collect();
@@ -127,6 +128,17 @@ impl<'n> Finder<'n> {
             }
         }
         Ok(())
+    }
+
+    /// A target that nothing sees is no unknown.
+    fn drop_unseen(&mut self, passive: bool) {
+        let partner = self.network.passive.iter().filter(|_| passive).flat_map(|passive| &passive.image_points);
+        let partner: std::collections::BTreeSet<usize> = partner.map(|seen| seen.target).collect();
+        for (target, place) in self.targets.iter_mut().enumerate() {
+            if self.of_target[target].is_empty() && !partner.contains(&target) {
+                *place = None;
+            }
+        }
     }
 
     fn known_targets(&self, station: usize) -> usize {

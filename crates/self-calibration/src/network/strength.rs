@@ -175,18 +175,26 @@ impl Setup<'_> {
         )
     }
 
-    /// Where a network could not be solved: whether it would be determined at all, seen from its start values.
-    /// Answers with the weak combination, or with the error as it was.
+    /// Where a network could not be solved: whether it would be determined at all, seen from its start values with exact
+    /// observations. Answers with the weak combination, or with the error as it was.
+    ///
+    /// An adjustment that creeps along a weak direction ends somewhere far away, without convergence or without rank; what
+    /// is undetermined there says nothing about the network.
     pub(crate) fn explain(&self, error: Error, largest_inflation: f64) -> Error {
-        if let Error::Adjust(adjust::Error::RankDeficient { combinations, .. }) = &error {
-            return self.undetermined(combinations);
-        }
-        if !matches!(error, Error::Adjust(adjust::Error::NotConverged { .. } | adjust::Error::Evaluation { .. })) {
+        let Error::Adjust(failure) = &error else { return error };
+        let creeping = matches!(
+            failure,
+            adjust::Error::NotConverged { .. } | adjust::Error::Evaluation { .. } | adjust::Error::RankDeficient { .. }
+        );
+        if !creeping {
             return error;
         }
-        match self.design_strength() {
-            Ok(Some(strength)) if strength.inflation > largest_inflation => strength.error(),
-            Err(Error::Adjust(adjust::Error::RankDeficient { combinations, .. })) => self.undetermined(&combinations),
+        match (self.design_strength(), failure) {
+            (Ok(Some(strength)), _) if strength.inflation > largest_inflation => strength.error(),
+            (Err(Error::Adjust(adjust::Error::RankDeficient { combinations, .. })), _) => {
+                self.undetermined(&combinations)
+            }
+            (_, adjust::Error::RankDeficient { combinations, .. }) => self.undetermined(combinations),
             _ => error,
         }
     }

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 
 use camera_model::{Camera, InteriorOrientation, LensDistortion};
-use error_models::{AmplitudeHyperbola, PARAMETERS, RangeErrorModel, RangeTerms};
+use error_models::{AmplitudeHyperbola, RangeErrorModel, RangeTerms, parameter_unit};
 
 /// Names of the interior orientation, which comes before the lens in the camera's block.
 pub(crate) const INTERIOR: [&str; 3] = ["xp", "yp", "c"];
@@ -36,10 +36,11 @@ pub(crate) struct Seen {
     pub(crate) amplitude: f64,
 }
 
-/// Value of a family of range terms and its derivatives with respect to the image point.
+/// Value of a family of range terms and its derivatives with respect to range and image point.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct RangePart {
     pub(crate) value: f64,
+    pub(crate) by_range: f64,
     pub(crate) by_x: f64,
     pub(crate) by_y: f64,
 }
@@ -53,25 +54,27 @@ pub(crate) struct RangeFamily {
     /// Puts values back.
     pub(crate) write: fn(&mut RangeErrorModel, &[f64]),
     /// The correction and its derivatives with respect to the values; fails with a reason where it has no value.
-    pub(crate) evaluate: fn(&RangeErrorModel, &Seen, &[f64], &mut [f64]) -> Result<RangePart, &'static str>,
+    pub(crate) evaluate: Evaluate,
 }
+
+/// A correction as a function of model, observed values, terms; the last argument takes the derivatives.
+type Evaluate = fn(&RangeErrorModel, &Seen, &[f64], &mut [f64]) -> Result<RangePart, &'static str>;
 
 /// All families. A further term is a further row.
 pub(crate) const RANGE_FAMILIES: [RangeFamily; 2] = [
-    // Eq. 14, linear in its nine terms.
+    // Eq. 14 and the further terms that stand instead of or beside parts of it: all linear.
     RangeFamily {
-        names: |_| RangeTerms::NAMES.into_iter().map(Cow::Borrowed).collect(),
-        read: |model, out| out.extend(model.terms.to_array()),
+        names: |model| model.parameter_names().into_iter().map(Cow::Owned).collect(),
+        read: |model, out| out.extend(model.parameter_values()),
         write: |model, values| {
-            if let Ok(values) = values.try_into() {
-                model.terms = RangeTerms::from_array(values);
-            }
+            // Values come in the number of the names, and finite: nothing is refused.
+            let _ = model.set_parameter_values(values);
         },
         evaluate: |model, seen, values, row| {
-            let design = RangeTerms::design_row(model.ambiguity_interval_m, seen.range_m, seen.x_mm, seen.y_mm);
-            row.copy_from_slice(&design);
-            let value = design.iter().zip(values).map(|(a, x)| a * x).sum();
-            Ok(RangePart { value, by_x: values[7], by_y: values[8] })
+            let known = model.design_row_into(seen.range_m, seen.x_mm, seen.y_mm, row);
+            known.map_err(|_| "range terms of the wrong number")?;
+            let value = row.iter().zip(values).map(|(a, x)| a * x).sum();
+            Ok(RangePart { value, ..linear_slopes(model, seen, values) })
         },
     },
     // Eq. 15.
@@ -96,10 +99,26 @@ pub(crate) const RANGE_FAMILIES: [RangeFamily; 2] = [
             let jacobian =
                 hyperbola.jacobian(seen.amplitude).ok_or("the slope of the amplitude hyperbola is infinite")?;
             row.copy_from_slice(&jacobian.coefficients);
-            Ok(RangePart { value, by_x: 0.0, by_y: 0.0 })
+            Ok(RangePart { value, ..RangePart::default() })
         },
     },
 ];
+
+/// Derivatives of the linear terms with respect to range and image point.
+fn linear_slopes(model: &RangeErrorModel, seen: &Seen, values: &[f64]) -> RangePart {
+    if let (true, &[d0, d2, d3, d4, d5, d6, d7, by_x, by_y]) = (model.further.is_empty(), values) {
+        let terms = RangeTerms::from_array([d0, d2, d3, d4, d5, d6, d7, by_x, by_y]);
+        let by_range = terms.range_derivative(model.ambiguity_interval_m, seen.range_m);
+        return RangePart { by_range, by_x, by_y, ..RangePart::default() };
+    }
+    let mut own = RangeErrorModel { hyperbola: None, ..model.clone() };
+    // A number of values that does not fit was refused with the design row.
+    let _ = own.set_parameter_values(values);
+    let by_range = own.correction(seen.range_m, seen.x_mm, seen.y_mm, f64::NAN).range_derivative;
+    let gradient = own.further.surface.as_ref().map(|surface| surface.gradient(seen.x_mm, seen.y_mm));
+    let [by_x, by_y] = gradient.unwrap_or([own.terms.e1, own.terms.e2]);
+    RangePart { by_range, by_x, by_y, ..RangePart::default() }
+}
 
 /// Names of a range set's block.
 pub(crate) fn range_names(model: &RangeErrorModel) -> Vec<String> {
@@ -127,8 +146,57 @@ pub(crate) fn range_model_from(model: &RangeErrorModel, values: &[f64]) -> Range
     out
 }
 
+/// Slopes of the correction beyond which an observed range hardly grows with the true one any more.
+const STEEPEST: f64 = 0.9;
+
+/// The range that a camera would observe of a distance without noise, the solution of `ρ − Δρ(ρ) = distance`, and its
+/// derivatives: with respect to the distance, the image point, and (in `row`) the terms.
+///
+/// The correction is a function of the observed range. Taken at the *measured* range it would carry its noise, and
+/// periodic terms could make the noise smaller by their slope: least squares would take that for a better fit. (With the
+/// wave of length U, which hardly anything else holds, d0 then comes out ten deviations wrong.) At the modelled range
+/// there is no noise to be made smaller.
+pub(crate) fn modelled_range(
+    model: &RangeErrorModel,
+    widths: &[usize],
+    measured: &Seen,
+    values: &[f64],
+    distance: f64,
+    row: &mut [f64],
+) -> Result<ModelledRange, &'static str> {
+    let mut seen = *measured;
+    // Newton's method; from the measured range two or three steps reach the last digit.
+    for _ in 0..50 {
+        let part = range_correction(model, widths, &seen, values, row)?;
+        let slope = part.by_range;
+        if slope.is_nan() || slope.abs() > STEEPEST {
+            return Err("the range terms are so large that the observed range no longer grows with the true one");
+        }
+        let growth = 1.0 / (1.0 - slope);
+        let step = (distance + part.value - seen.range_m) * growth;
+        seen.range_m += step;
+        if step.abs() <= 1e-14 * (1.0 + seen.range_m.abs()) {
+            for derivative in row {
+                *derivative *= growth;
+            }
+            let (by_x, by_y) = (part.by_x * growth, part.by_y * growth);
+            return Ok(ModelledRange { range_m: seen.range_m, by_distance: growth, by_x, by_y });
+        }
+    }
+    Err("the modelled range does not settle")
+}
+
+/// A modelled range with its derivatives.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct ModelledRange {
+    pub(crate) range_m: f64,
+    pub(crate) by_distance: f64,
+    pub(crate) by_x: f64,
+    pub(crate) by_y: f64,
+}
+
 /// Correction of a whole set and its derivatives with respect to its values.
-pub(crate) fn range_correction(
+fn range_correction(
     model: &RangeErrorModel,
     widths: &[usize],
     seen: &Seen,
@@ -146,7 +214,10 @@ pub(crate) fn range_correction(
             return Err("a range set of the wrong length");
         }
         let one = (family.evaluate)(model, seen, &values[part.clone()], &mut row[part.clone()])?;
-        sum = RangePart { value: sum.value + one.value, by_x: sum.by_x + one.by_x, by_y: sum.by_y + one.by_y };
+        sum.value += one.value;
+        sum.by_range += one.by_range;
+        sum.by_x += one.by_x;
+        sum.by_y += one.by_y;
         start = part.end;
     }
     Ok(sum)
@@ -165,6 +236,7 @@ pub(crate) fn unit(name: &str) -> &'static str {
         "k2" => "mm^-4",
         "k3" => "mm^-6",
         "p1" | "p2" => "mm^-1",
-        _ => PARAMETERS.iter().find(|(known, _)| *known == name).map_or("", |(_, unit)| unit),
+        "b1" | "b2" => "1",
+        _ => parameter_unit(name).unwrap_or_default(),
     }
 }

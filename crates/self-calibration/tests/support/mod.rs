@@ -1,6 +1,7 @@
 //! Synthetic range differences whose truth is known.
 #![allow(dead_code)]
 
+pub mod cases;
 pub mod networks;
 
 use error_models::{AmplitudeHyperbola, RangeErrorModel, RangeTerms};

@@ -97,7 +97,9 @@ pub fn weak() -> Network {
         }
     }
     let mut targets = field(13, 8, 0.25);
-    targets.iter_mut().for_each(|target| target.point.as_mut().unwrap().z = 0.0);
+    for target in &mut targets {
+        target.point.as_mut().unwrap().z = 0.0;
+    }
     network(poses, targets)
 }
 

@@ -128,13 +128,13 @@ fn a_wall_at_one_distance_is_refused_with_a_reason_and_without_parameters() {
     let text = std::fs::read_to_string(fixtures().join("networks/target_field.ron")).unwrap();
     // One frontal distance, no roll, a flat wall, no bar.
     let (head, _) = text.split_once("    stations: [").unwrap();
-    let stations: String = ["-0.2", "-0.1", "0", "0.1", "0.2"]
+    let stations: Vec<String> = ["-0.2", "-0.1", "0", "0.1", "0.2"]
         .iter()
         .enumerate()
-        .map(|(k, x)| format!("(name: \"S{k}\", distance_m: 3.2, at_m: ({x}, {x}, 0)),"))
+        .map(|(k, x)| format!("(name: \"S{k}\", distance_m: 3.2, at_m: ({x}, {x}, 0))"))
         .collect();
     let head = head.replace("relief_m: 0.25", "relief_m: 0");
-    std::fs::write(&scene, format!("{head}    stations: [{stations}],\n)")).unwrap();
+    std::fs::write(&scene, format!("{head}    stations: [{}],\n)", stations.join(","))).unwrap();
     pipeline::simulate_network(&scene, None, &folder.path().join("survey")).unwrap();
     let error = calibrate(folder.path(), |_| {}).unwrap_err();
     assert!(matches!(error, pipeline::Error::Refused { .. }), "{error}");

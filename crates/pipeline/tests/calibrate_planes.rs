@@ -16,7 +16,7 @@ use range_io::calibration::Calibration;
 use range_io::npz::NpzWriter;
 use range_io::tables::{ObservedPlane, Station, write_planes, write_stations};
 
-const SURVEY: &str = r#"#![enable(implicit_some)]
+const SURVEY: &str = r"#![enable(implicit_some)]
 (
     camera: (
         width: 88, height: 72, pixel_pitch_mm: (0.08, 0.08),
@@ -24,7 +24,7 @@ const SURVEY: &str = r#"#![enable(implicit_some)]
     ),
     level: range,
     frames: [FRAMES],
-)"#;
+)";
 
 fn camera() -> Camera {
     let interior = InteriorOrientation { principal_point_mm: [0.0, 0.0], principal_distance_mm: 8.0 };
@@ -59,8 +59,12 @@ fn write_survey(folder: &Path) {
         let mut writer = NpzWriter::create(folder.join(format!("frames/{index}.npz"))).unwrap();
         writer.add("range", &[72, 88], &ranges).unwrap();
         writer.commit().unwrap();
-        frames += &format!("(file: \"frames/{index}.npz\", station: \"S{index}\", integration_time_s: 0.002),");
         let station = format!("S{index}");
+        for part in
+            ["(file: \"frames/", &station[1..], ".npz\", station: \"", &station, "\", integration_time_s: 0.002),"]
+        {
+            frames.push_str(part);
+        }
         planes.push(ObservedPlane {
             plane: "wall".to_owned(),
             station: station.clone(),
@@ -130,7 +134,11 @@ fn a_plane_that_is_not_known_is_found_with_the_terms() {
     assert!(summary.diagnosis.iter().any(|words| words.contains("plane") && words.contains("mm")), "{summary}");
     // Without stations.csv each capture has a plane of its own in the camera's frame.
     std::fs::remove_file(survey.join("stations.csv")).unwrap();
-    let alone = calibrate(folder.path(), ask).unwrap();
+    let alone = calibrate(folder.path(), |request| {
+        planes(request);
+        request.options.terms = terms("d4 d5 d6 d7");
+    });
+    let alone = alone.unwrap();
     assert!(alone.unknowns > summary.unknowns, "{} and {}", alone.unknowns, summary.unknowns);
 }
 
@@ -149,11 +157,13 @@ fn faults_of_planes_name_their_row() {
     };
     let unknown = message(&edit("wall,S2,0,0,2,0", "wall,S9,0,0,2,0"));
     assert!(unknown.contains("planes.csv:4:2: `station`: `S9` is no station"), "{unknown}");
+    let other = message(&edit("wall,S2,0,0,2,0", "wall,S2,0,0,2,1"));
+    assert!(other.contains("planes.csv:4:3: `nx`: `wall` has other numbers here"), "{other}");
     let zero = message(&edit("wall,S0,0,0,2,0", "wall,S0,0,0,0,0"));
     assert!(zero.contains("planes.csv:2:3: `nx`"), "{zero}");
     let half = message(&edit("wall,S0,0,0,2,0", "wall,S0,0,,2,0"));
     assert!(half.contains("planes.csv:2:4: `ny`: is empty, expected all or none"), "{half}");
-    let away = message(&edit("wall,S0,0,0,2,0", "wall,S0,0,0,2,99"));
+    let away = message(&edit("wall,S0,0,0,2,0", "far,S0,0,0,2,99"));
     assert!(away.contains("planes.csv:2:1: `plane`: no usable pixel of station `S0`"), "{away}");
 }
 

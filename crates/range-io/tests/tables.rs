@@ -10,8 +10,9 @@ use camera_model::pose_from_euler;
 use nalgebra::Vector3;
 use proptest::prelude::*;
 use range_io::tables::{
-    ImuSample, Station, Target, TargetObservation, read_imu, read_observations, read_stations, read_targets, write_imu,
-    write_observations, write_stations, write_targets,
+    Distance, ImuSample, ObservedPlane, Residual, Station, Target, TargetObservation, read_distances, read_imu,
+    read_observations, read_placed_targets, read_planes, read_residuals, read_stations, read_targets, write_distances,
+    write_imu, write_observations, write_planes, write_residuals, write_stations, write_targets,
 };
 
 mod common;
@@ -186,4 +187,56 @@ fn euroc_folders_are_read_as_they_are() {
     assert_eq!(fault, "imu.csv:3:1: `timestamp_s`: is 1 s, expected more than the 2 s before it");
     let twice = [ImuSample::default(); 2];
     assert!(write_imu(scratch.file("imu.csv"), &twice).is_err());
+}
+
+#[test]
+fn distances_planes_and_residuals_come_back() {
+    let scratch = Scratch::new();
+    let distances = [Distance { from: "T1".into(), to: "S1".into(), distance_m: 1.234_567_89, sigma_m: 5e-4 }];
+    write_distances(scratch.file("distances.csv"), &distances).unwrap();
+    assert_eq!(read_distances(scratch.file("distances.csv")).unwrap(), distances);
+    let plane = |known| ObservedPlane { plane: "wall".into(), station: "S1".into(), known };
+    let planes = [plane(Some(([0.1, -0.2, 0.3], -1.5))), plane(None)];
+    write_planes(scratch.file("planes.csv"), &planes).unwrap();
+    assert_eq!(read_planes(scratch.file("planes.csv")).unwrap(), planes);
+    let residual = Residual {
+        station: "S1".into(),
+        target: "T1".into(),
+        component: "range".into(),
+        observed: Some(2.5),
+        sigma: Some(0.01),
+        residual: Some(-0.003),
+        redundancy_number: Some(f64::NAN),
+        standardised_residual: None,
+        smallest_detectable: Some(f64::INFINITY),
+        verdict: "uncontrolled".into(),
+    };
+    write_residuals(scratch.file("residuals.csv"), std::slice::from_ref(&residual)).unwrap();
+    // What is no number is an empty field.
+    let expected = Residual { redundancy_number: None, smallest_detectable: None, ..residual };
+    assert_eq!(read_residuals(scratch.file("residuals.csv")).unwrap(), [expected]);
+}
+
+#[test]
+fn faults_of_distances_and_planes_are_named() {
+    let scratch = Scratch::new();
+    let distance = |row: &str| {
+        let text = format!("from,to,distance,sigma_distance\n{row}\n");
+        message(read_distances(scratch.with("distances.csv", &text)))
+    };
+    assert_eq!(distance("A,A,1,0.001"), "distances.csv:2:2: `to`: is `A` like `from`, expected another end");
+    assert_eq!(distance("A,B,1,"), "distances.csv:2:4: `sigma_distance`: is empty, expected a positive number");
+    assert_eq!(distance("A,B,-1,1"), "distances.csv:2:3: `distance`: is -1, expected a positive number");
+    let plane = scratch.with("planes.csv", "plane,station,nx,ny,nz,d\nP,S,0,0,0,1\n");
+    assert_eq!(message(read_planes(plane)), "planes.csv:2:3: `nx`: is 0 like `ny` and `nz`, expected a direction");
+}
+
+#[test]
+fn rows_keep_their_places() {
+    let scratch = Scratch::new();
+    let file = scratch.with("targets.csv", "target,z,y,x,sigma_x,sigma_y,sigma_z\n\nA,1,2,3,,,\nB,1,2,3,,,\n");
+    let rows = read_placed_targets(&file).unwrap();
+    assert_eq!((rows.rows.len(), rows.line(0), rows.line(1), rows.line(2)), (2, 3, 4, 0));
+    let error: range_io::Result<()> = Err(rows.error(1, "x", "is far away"));
+    assert_eq!(message(error), "targets.csv:4:4: `x`: is far away", "the column is that of the file");
 }

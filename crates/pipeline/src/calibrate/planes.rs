@@ -47,10 +47,10 @@ pub(super) fn calibrate_planes(request: &CalibrateRequest, progress: &dyn Progre
     progress.begin("estimate range terms", 1);
     let time = frames.views.first().and_then(|view| view.integration_time_s);
     let outcome = if scene.is_known() {
-        known(&rows, &scene, &start, &options, survey.level)?.and_then(|found| found.outcome(&start, time))
+        known(&rows, &scene, &start, &options, survey.level)?.map(|found| found.outcome(&start, time))
     } else {
         let rejection = request.options.rejection_level.and(PlaneCalibrationOptions::default().rejection);
-        unknown(&scene, &start, &options, rejection).and_then(|found| found.outcome(&start, time))
+        unknown(&scene, &start, &options, rejection).map(|found| found.outcome(&start, time))
     };
     progress.advance(1);
     Ok((start, outcome))
@@ -141,7 +141,9 @@ fn known(
         let mut more = samples_of(capture, &scene.names[capture.plane], plane, pose, start, &scene.pixels())
             .map_err(Error::stage("planes", &capture.name))?;
         if level <= Level::Phase {
-            more.iter_mut().for_each(|sample| rewrap(&mut sample.difference, start.modulation));
+            for sample in &mut more {
+                rewrap(&mut sample.difference, start.modulation);
+            }
         }
         if more.is_empty() {
             let reason = format!("no usable pixel of station `{}` sees the plane", capture.name);

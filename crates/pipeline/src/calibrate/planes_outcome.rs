@@ -108,7 +108,7 @@ impl Found {
     }
 
     /// In the form that tables, summary and report are made from.
-    pub(super) fn outcome(self, start: &Start, time: Option<f64>) -> Result<CalibrationOutcome> {
+    pub(super) fn outcome(self, start: &Start, time: Option<f64>) -> CalibrationOutcome {
         let unknowns = usize::try_from(self.observations as i64 - self.redundancy).unwrap_or(0);
         let used: Vec<&ObservationQuality> = self.residuals.iter().filter(|q| q.verdict == Verdict::Used).collect();
         let squares: f64 = used.iter().map(|quality| quality.residual.powi(2)).sum();
@@ -120,7 +120,7 @@ impl Found {
             sigma0: self.sigma0,
         };
         let (n, k) = (self.observations as f64, unknowns as f64);
-        Ok(CalibrationOutcome {
+        CalibrationOutcome {
             method: Method::Laboratory,
             camera: start.camera,
             range_models: vec![(time, self.model)],
@@ -142,7 +142,7 @@ impl Found {
             aic: self.vtpv + 2.0 * k,
             bic: self.vtpv + k * n.ln(),
             trace: Vec::new(),
-        })
+        }
     }
 }
 

@@ -99,7 +99,7 @@ impl CalibrationSummary {
 }
 
 /// Metres as millimetres; other units as they are.
-pub(crate) fn readable<'a>(value: f64, unit: &'a str) -> (f64, &'a str) {
+pub(crate) fn readable(value: f64, unit: &str) -> (f64, &str) {
     if unit == "m" { (1e3 * value, "mm") } else { (value, unit) }
 }
 

@@ -236,6 +236,9 @@ fn fingerprint(title: &str, spans: &[[f64; 2]]) -> u64 {
 
 #[cfg(test)]
 mod tests {
+    // Halves are exact.
+    #![allow(clippy::float_cmp)]
+
     use super::*;
 
     #[test]

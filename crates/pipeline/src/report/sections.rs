@@ -25,11 +25,11 @@ pub(crate) fn render(outcome: &Outcome, summary: &Summary) -> Result<String> {
     );
     let mut page = Page::new(&format!("rangecam: {}", summary.pipeline), &lead);
     figures_of_merit(&mut page, summary);
-    stages(&mut page, summary)?;
-    errors(&mut page, outcome)?;
+    stages(&mut page, summary);
+    errors(&mut page, outcome);
     registration(&mut page, outcome, summary)?;
     pictures(&mut page, outcome)?;
-    flags(&mut page, outcome, summary)?;
+    flags(&mut page, outcome, summary);
     Ok(page.finish())
 }
 
@@ -56,7 +56,7 @@ fn figures_of_merit(page: &mut Page, summary: &Summary) {
     page.cards(&cards);
 }
 
-fn stages(page: &mut Page, summary: &Summary) -> Result<()> {
+fn stages(page: &mut Page, summary: &Summary) {
     page.section("What each stage did");
     let longest = summary.stages.iter().map(|stage| stage.seconds).fold(f64::MIN_POSITIVE, f64::max);
     let rows: Vec<Vec<String>> = summary
@@ -107,10 +107,9 @@ fn stages(page: &mut Page, summary: &Summary) -> Result<()> {
         ];
         page.figures(&[(curves(&axes, &sets), "On the pixels that no flag excludes at that stage.".to_owned())]);
     }
-    Ok(())
 }
 
-fn errors(page: &mut Page, outcome: &Outcome) -> Result<()> {
+fn errors(page: &mut Page, outcome: &Outcome) {
     let (mut before, mut after) = (Vec::new(), Vec::new());
     for view in &outcome.views {
         let (Some(first), Some(last), Some(flags)) = (errors_before(view), range_errors(view), view.flags()) else {
@@ -121,7 +120,7 @@ fn errors(page: &mut Page, outcome: &Outcome) -> Result<()> {
         after.extend(kept.map(|(error, _)| 1e3 * error));
     }
     if after.is_empty() {
-        return Ok(());
+        return;
     }
     page.section("Errors against the truth");
     let wide = quantile(&mut before.iter().map(|error| error.abs()).collect::<Vec<_>>(), 0.98);
@@ -141,7 +140,6 @@ fn errors(page: &mut Page, outcome: &Outcome) -> Result<()> {
         ),
         (histogram(&axes("After"), [-narrow, narrow], &only), "The same, enlarged.".to_owned()),
     ]);
-    Ok(())
 }
 
 /// Errors of the ranges as the camera alone gives them, modulo the ambiguity interval, metre.
@@ -326,7 +324,7 @@ fn flag_picture(view: &View) -> Result<String> {
     rgb_figure("Flags", width, &rgb)
 }
 
-fn flags(page: &mut Page, outcome: &Outcome, summary: &Summary) -> Result<()> {
+fn flags(page: &mut Page, outcome: &Outcome, summary: &Summary) {
     page.section("Flags by reason");
     page.paragraph("A flagged pixel keeps its value; the cloud's figures and pictures leave it out.");
     let rows: Vec<Vec<String>> = Flags::NAMED
@@ -355,7 +353,6 @@ fn flags(page: &mut Page, outcome: &Outcome, summary: &Summary) -> Result<()> {
         let sets = [Series { name: "unflagged", colour: CATEGORIES[2], values: sigma }];
         page.figures(&[(histogram(&axes, [0.0, high], &sets), String::new())]);
     }
-    Ok(())
 }
 
 /// Names of the first colours of [`CATEGORIES`], in the order of [`Flags::NAMED`].

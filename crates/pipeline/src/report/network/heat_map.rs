@@ -53,7 +53,7 @@ pub(super) fn heat_map(names: &[String], matrix: &[Vec<f64>]) -> String {
 
 fn cell(svg: &mut String, [column, row]: [usize; 2], value: f64, marked: bool) {
     let (x, y) = (LEFT + CELL * column as f64, TOP + CELL * row as f64);
-    let fill = hex(ColourMap::Diverging.colour((value + 1.0) / 2.0));
+    let fill = hex(ColourMap::Diverging.colour(f64::midpoint(value, 1.0)));
     let _ = write!(svg, r#"<rect x="{x}" y="{y}" width="{}" height="{}" fill="{fill}"/>"#, CELL - 1.0, CELL - 1.0);
     if value.abs() >= 0.5 && column != row {
         let ink = if value.abs() > 0.75 { "#fff" } else { "#222" };

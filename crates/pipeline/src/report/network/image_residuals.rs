@@ -26,7 +26,7 @@ pub(super) fn figures(outcome: &CalibrationOutcome) -> Vec<(String, String)> {
     let mut lengths: Vec<f64> =
         arrows.iter().filter(|arrow| !arrow.rejected).map(|arrow| arrow.residual[0].hypot(arrow.residual[1])).collect();
     let typical = quantile(&mut lengths, 0.9);
-    if !(typical > 0.0) {
+    if typical.is_nan() || typical <= 0.0 {
         return Vec::new();
     }
     let format = outcome.camera.format;

@@ -49,9 +49,7 @@ fn figure(
     let sets: Vec<_> =
         sets.iter().map(|(name, colour, c)| (name, *colour, points(used, *c, abscissa, factor))).collect();
     let all = || sets.iter().flat_map(|(_, _, values)| values);
-    if all().next().is_none() {
-        return None;
-    }
+    all().next()?;
     let spans = [robust_span(all().map(|point| point.0)), robust_span(all().map(|point| point.1))];
     let mut canvas = Canvas::new(&Axes { title, x, y }, SIZE, spans[0], spans[1]);
     for (name, colour, values) in &sets {

@@ -6,6 +6,7 @@ mod check;
 mod combine;
 mod distribution;
 mod equations;
+mod hyperbola;
 mod model;
 mod options;
 mod outcome;

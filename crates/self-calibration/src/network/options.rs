@@ -48,7 +48,7 @@ pub struct CalibrationOptions {
     pub datum: NetworkDatum,
     /// Stations whose ranges are left out, by name (convergent ones, whose ranges scattering would bias).
     pub without_ranges: Vec<String>,
-    /// Significance level of the outlier test (data snooping, one at a time); `None`: nothing is rejected. Default 0.001.
+    /// Significance level of the outlier test (data snooping, one at a time); `None`: nothing is rejected. Default 0.0001.
     pub rejection_level: Option<f64>,
     /// A combination of parameters that is known so many times worse than its parameters would be alone is refused as
     /// not determined.

@@ -55,10 +55,10 @@ fn calibrate(width: usize, height: usize, step: usize) -> Result<()> {
     let found = &calibration.planes()[0];
     let (distance, truth) = (found.plane.distance_m().abs(), wall.distance_m().abs());
     println!("{}: {distance:.5} ± {:.5} m from the origin (truth {truth:.5})", found.name, found.distance_sigma_m);
-    let pair = calibration.diagnosis(0.5);
-    println!("weakest combination: {} (deviation {:.1} times larger)", pair.weakest, pair.weakest_inflation);
+    let diagnosis = calibration.diagnosis(0.5);
+    println!("weakest combination: {} (deviation {:.1} times larger)", diagnosis.weakest, diagnosis.weakest_inflation);
 
-    // Without poses each picture has a wall of its own, and the picture of a distant wall hardly tells tilts apart.
+    // Without poses each capture has a wall of its own: three unknowns for each instead of three in all.
     let lonely: Vec<_> = (0..STATIONS).map(|index| capture(index, &frames[index], None)).collect();
     match calibrate_planes(&lonely, &[], &camera, interval, &options) {
         Err(refusal @ Error::PlanesNotDetermined { .. }) => println!("without poses: {refusal}"),

@@ -35,7 +35,7 @@ fn frames(criterion: &mut Criterion) {
 
 /// Twelve captures of a wall at known distances, the wall itself and a common set of terms unknown.
 fn unknown_plane(criterion: &mut Criterion) {
-    for (width, height) in [(176, 144), (640, 480), (1024, 1024)] {
+    for (width, height, step) in [(176, 144, 4), (640, 480, 4), (640, 480, 1), (1024, 1024, 4)] {
         let camera = camera(width, height);
         let poses: Vec<_> = (0..12).map(|i| Isometry3::translation(0.0, 0.0, -0.4 * f64::from(i))).collect();
         let frames: Vec<_> = poses.iter().map(|pose| wavy_wall(&camera, pose)).collect();
@@ -47,9 +47,10 @@ fn unknown_plane(criterion: &mut Criterion) {
             plane: 0,
         };
         let captures: Vec<_> = frames.iter().enumerate().map(capture).collect();
-        let options = PlaneCalibrationOptions::default();
+        let mut options = PlaneCalibrationOptions::default();
+        options.pixels.step = step;
         criterion.bench_function(
-            &format!("calibrate_planes/12 captures {width}x{height}, every 4th pixel"),
+            &format!("calibrate_planes/12 captures {width}x{height}, pixel step {step}"),
             |bencher| {
                 bencher.iter(|| calibrate_planes(&captures, &[None], &camera, 5.0, &options).unwrap());
             },

@@ -15,6 +15,7 @@ mod planes_outcome;
 mod planes_pixels;
 mod planes_problem;
 mod planes_reduction;
+mod planes_selection;
 mod planes_start;
 mod range_terms;
 

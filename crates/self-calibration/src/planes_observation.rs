@@ -1,11 +1,17 @@
 //! All pixels of one capture as one observation.
 
-use adjust::{BlockId, EvaluationFailure, Jacobians, Observation, RigidPose};
-use nalgebra::Isometry3;
+use std::ops::Range;
 
-use crate::planes_geometry::PlaneChart;
+use adjust::{BlockId, EvaluationFailure, Jacobians, Observation, RigidPose};
+use nalgebra::{Isometry3, Vector3};
+use rayon::prelude::*;
+
+use crate::planes_geometry::{PlaneChart, RangeToPlane};
 use crate::planes_pixels::PlanePixels;
-use crate::planes_reduction::Reduction;
+use crate::planes_reduction::{NormalEquations, Reduction};
+
+/// Pixels summed by one thread; always the same, so that the sums are.
+const RUN: usize = 16_384;
 
 /// Standard deviations up to which a residual has its full weight in the first, robust stage `[Huber1981]`.
 const HUBER: f64 = 1.345;
@@ -49,30 +55,50 @@ impl PlaneObservation<'_> {
         parameters.get(2).map_or(Ok(self.world_from_camera), |values| RigidPose::isometry(values))
     }
 
-    /// All pixels that take part, reduced at these parameters.
+    /// All pixels that take part, reduced at these parameters: run by run, summed in the order of the runs.
     pub(crate) fn reduction(&self, parameters: &[&[f64]]) -> Result<Reduction, EvaluationFailure> {
         let (plane, terms) = (parameters[0], parameters[1]);
         let seen = self.chart.seen_from(plane, &self.pose(parameters)?);
-        let columns = self.dimension() - 1;
-        let mut reduction = Reduction::new(columns);
-        let mut row = vec![0.0; columns + 1];
-        for pixel in (0..self.pixels.len()).filter(|pixel| self.pixels.used[*pixel]) {
+        let count = self.pixels.len();
+        let runs = (0..count.div_ceil(RUN)).into_par_iter();
+        let parts = runs.map(|run| self.normal_equations(run * RUN..count.min((run + 1) * RUN), &seen, terms));
+        let mut normal = NormalEquations::new(self.columns());
+        for part in parts.collect::<Vec<_>>() {
+            normal.add_all(part?);
+        }
+        Ok(normal.reduce())
+    }
+
+    /// Normal equations of a run of pixels.
+    fn normal_equations(
+        &self,
+        run: Range<usize>,
+        seen: impl Fn(&Vector3<f64>) -> Option<RangeToPlane>,
+        terms: &[f64],
+    ) -> Result<NormalEquations, EvaluationFailure> {
+        let mut normal = NormalEquations::new(self.columns());
+        let of_pose = self.sizes.get(2).copied().unwrap_or_default();
+        for pixel in run.filter(|pixel| self.pixels.used[*pixel]) {
             let reference = seen(&self.pixels.rays[pixel]);
             let reference = reference.ok_or_else(|| EvaluationFailure::new("a pixel does not see the plane"))?;
             let root = self.pixels.roots_of_weight[pixel];
-            let model = reference.by_plane.iter().chain(self.pixels.row(pixel)).chain(&reference.by_pose);
-            row[..columns].iter_mut().zip(model).for_each(|(place, derivative)| *place = derivative * root);
-            row[columns] = root * self.pixels.left_over(pixel, reference.range_m, terms);
-            let (weight, objective) = self.weighting.of(row[columns]);
-            reduction.add(&row, weight, objective);
+            let by_pose = reference.by_pose.into_iter().take(of_pose);
+            let derivatives = reference.by_plane.into_iter().chain(self.pixels.row(pixel)).chain(by_pose);
+            let residual = self.pixels.left_over(pixel, reference.range_m, terms);
+            let (weight, objective) = self.weighting.of(root * residual);
+            normal.add(derivatives, residual, root * weight.sqrt(), objective);
         }
-        Ok(reduction)
+        Ok(normal)
+    }
+
+    fn columns(&self) -> usize {
+        self.sizes.iter().sum()
     }
 }
 
 impl Observation for PlaneObservation<'_> {
     fn dimension(&self) -> usize {
-        self.sizes.iter().sum::<usize>() + 1
+        self.columns() + 1
     }
 
     fn blocks(&self) -> &[BlockId] {

@@ -4,7 +4,7 @@ use adjust::{Diagnosis, Scale, Solution};
 use error_models::{NamedParameter, RangeErrorModel, parameter_unit};
 use nalgebra::{DMatrix, Isometry3};
 
-use crate::planes_problem::{Problem, Solved, pose_of};
+use crate::planes_problem::{Problem, Solved};
 use crate::{Plane, Result};
 
 /// Range terms estimated together with planes, with their quality.
@@ -128,7 +128,7 @@ impl Problem<'_> {
         model.validate()?;
         let planes = (0..self.charts.len()).map(|chart| self.adjusted_plane(&solved, chart)).collect::<Result<_>>()?;
         let captures = self.capture_qualities(&solved)?;
-        let (observations, unknowns) = (self.observations(), self.unknowns());
+        let (observations, unknowns) = (self.observations(&self.pixels), self.unknowns());
         Ok(PlaneCalibration { model, planes, captures, observations, unknowns, solution: solved.solution })
     }
 
@@ -144,11 +144,11 @@ impl Problem<'_> {
     }
 
     fn capture_qualities(&self, solved: &Solved) -> Result<Vec<CaptureQuality>> {
-        let residuals = self.residuals(solved)?;
+        let residuals = self.residuals(&self.pixels, solved)?;
         let mut qualities = Vec::with_capacity(self.captures.len());
         for (index, capture) in self.captures.iter().enumerate() {
             let pixels = &self.pixels[index];
-            let pose = solved.poses[index].map_or(Ok(pose_of(capture)), |block| solved.solution.pose(block))?;
+            let pose = solved.pose(index, capture)?;
             let squares = residuals[index].iter().zip(&pixels.used).filter(|(_, used)| **used);
             let sum: f64 = squares.map(|(residual, _)| residual * residual).sum();
             qualities.push(CaptureQuality {
@@ -166,7 +166,7 @@ impl Problem<'_> {
     /// Smallest and largest observed range used, metre.
     fn range_span_m(&self) -> [f64; 2] {
         let used = self.pixels.iter().flat_map(|pixels| pixels.observed_m.iter().zip(&pixels.used));
-        used.filter(|(_, used)| **used)
-            .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], (range, _)| [low.min(*range), high.max(*range)])
+        let used = used.filter(|(_, used)| **used).map(|(range, _)| f64::from(*range));
+        used.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], range| [low.min(range), high.max(range)])
     }
 }

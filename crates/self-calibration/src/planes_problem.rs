@@ -1,34 +1,29 @@
 //! Captures of planes as one adjustment.
 
 use adjust::{
-    Adjustment, BlockId, Covariance, LinearObservation, Observation, ParameterBlock, RigidPose, Solution, SolveOptions,
+    Adjustment, BlockId, Covariance, LinearObservation, Method, Observation, ParameterBlock, RigidPose, Scale,
+    Solution, SolveOptions,
 };
 use camera_model::Camera;
 use error_models::AmplitudeHyperbola;
 use nalgebra::{Isometry3, Point3, Vector3};
+use rayon::prelude::*;
 
 use crate::options::{HyperbolaUse, LinearTerms};
 use crate::planes_geometry::PlaneChart;
 use crate::planes_observation::{PlaneObservation, Weighting};
-use crate::planes_pixels::PlanePixels;
+use crate::planes_pixels::{PlanePixels, chosen_pixels};
 use crate::planes_start::plane_through;
 use crate::{Error, Plane, PlaneCalibrationOptions, PlaneCapture, Result};
 
-/// Rounds in which pixels are left out and taken in again. A few at the limit may go to and fro for ever; it does not
-/// matter which of them the last round had.
-const ROUNDS: usize = 20;
+/// An adjustment of the planes ends at steps of this share of a standard deviation.
+const NEGLIGIBLE: f64 = 1e-4;
 
-/// Multiple of the largest inflation from which the start values are enough to refuse.
-const HOPELESS: f64 = 10.0;
+/// Full steps that are tried before damped ones.
+const FULL_STEPS: usize = 50;
 
 /// The robust stage only chooses pixels: it ends at steps of this share of a standard deviation.
 const ROUGHLY: f64 = 1e-2;
-
-/// Median of the absolute values of a normal distribution, in standard deviations.
-const MEDIAN_OF_NORMAL: f64 = 0.674_489_75;
-
-/// Scatter, in standard deviations as given, below which it is rounding.
-const SMALLEST_SCATTER: f64 = 1e-6;
 
 /// The checked input, with a chart for each plane.
 pub(crate) struct Problem<'a> {
@@ -78,10 +73,11 @@ impl<'a> Problem<'a> {
         if terms.unknowns() == 0 {
             return Err(Error::NothingToEstimate);
         }
-        let pixels = captures
-            .iter()
-            .map(|capture| PlanePixels::new(capture.frame, camera, &terms.model, hyperbola.as_ref(), &options.pixels));
-        let pixels = pixels.collect::<Result<Vec<_>>>()?;
+        let chosen = chosen_pixels(camera, &terms.model, &options.pixels);
+        let usable = |capture: &PlaneCapture<'_>| {
+            PlanePixels::new(capture.frame, camera, &chosen, &terms.model, hyperbola.as_ref(), &options.pixels)
+        };
+        let pixels = captures.par_iter().map(usable).collect::<Result<Vec<_>>>()?;
         let (charts, chart_of) = (Vec::new(), Vec::new());
         let mut problem = Self { captures, options, terms, hyperbola, pixels, charts, chart_of };
         problem.chart_planes(planes)?;
@@ -131,55 +127,20 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// Least squares, without the pixels that a robust adjustment finds far off.
-    pub(crate) fn solve_without_gross_errors(&mut self) -> Result<Solved> {
-        self.require_redundancy()?;
-        // Far beyond the limit no descent is worth while; near it the solution tells better than the start.
-        if let Some(error) = self.undetermined_at_start(HOPELESS * self.options.terms.largest_inflation)? {
-            return Err(error);
-        }
-        let Some(limit) = self.options.rejection else { return self.solve(Weighting::LeastSquares, None) };
-        let mut solved = self.solve(Weighting::Huber, None)?;
-        let limit = limit * scatter(self.residuals(&solved)?.concat());
-        for round in 0..ROUNDS {
-            let changed = self.select(&self.residuals(&solved)?, limit);
-            if !changed && round > 0 {
-                break;
-            }
-            self.require_redundancy()?;
-            solved = self.solve(Weighting::LeastSquares, Some(&solved))?;
-        }
-        Ok(solved)
-    }
-
-    /// Lets the pixels take part whose residual is within the limit. Whether that is a change.
-    fn select(&mut self, residuals: &[Vec<f64>], limit: f64) -> bool {
-        let mut changed = false;
-        for (pixels, residuals) in self.pixels.iter_mut().zip(residuals) {
-            for (used, residual) in pixels.used.iter_mut().zip(residuals) {
-                let within = residual.abs() <= limit;
-                changed |= *used != within;
-                *used = within;
-            }
-        }
-        changed
-    }
-
-    /// Residuals of all pixels, capture by capture, in standard deviations.
-    pub(crate) fn residuals(&self, solved: &Solved) -> Result<Vec<Vec<f64>>> {
+    /// Residuals of these pixels, capture by capture, in standard deviations.
+    pub(crate) fn residuals(&self, pixels: &[PlanePixels], solved: &Solved) -> Result<Vec<Vec<f64>>> {
         let terms = solved.solution.values(solved.terms)?;
-        let mut residuals = Vec::with_capacity(self.captures.len());
-        for (index, capture) in self.captures.iter().enumerate() {
+        let of_capture = |index: usize| {
             let chart = self.chart_of[index];
             let plane = solved.solution.values(solved.planes[chart])?;
-            let pose = solved.poses[index].map_or(Ok(pose_of(capture)), |pose| solved.solution.pose(pose))?;
-            residuals.push(self.pixels[index].residuals(&self.charts[chart].chart, plane, terms, &pose));
-        }
-        Ok(residuals)
+            let pose = solved.pose(index, &self.captures[index])?;
+            Ok(pixels[index].residuals(&self.charts[chart].chart, plane, terms, &pose))
+        };
+        (0..self.captures.len()).into_par_iter().map(of_capture).collect()
     }
 
     /// One adjustment of the pixels that take part, from an earlier one where there is one.
-    fn solve(&self, weighting: Weighting, from: Option<&Solved>) -> Result<Solved> {
+    pub(crate) fn solve(&self, pixels: &[PlanePixels], weighting: Weighting, from: Option<&Solved>) -> Result<Solved> {
         let mut adjustment = Adjustment::new();
         let terms = adjustment.add_block(self.terms.block());
         self.terms.hold(&mut adjustment, terms)?;
@@ -189,7 +150,7 @@ impl<'a> Problem<'a> {
         let group = adjustment.add_group("ranges to planes");
         for (index, pose) in poses.iter().enumerate() {
             let blocks: Vec<_> = [planes[self.chart_of[index]], terms].into_iter().chain(*pose).collect();
-            let observation = self.observation(index, blocks, weighting);
+            let observation = self.observation(index, &pixels[index], blocks, weighting);
             let covariance = Covariance::from_sigmas(&vec![1.0; observation.dimension()]);
             adjustment.add_observation(group, observation, &covariance)?;
         }
@@ -200,26 +161,29 @@ impl<'a> Problem<'a> {
                 adjustment.set_values(*block, earlier.solution.values(*before)?)?;
             }
         }
-        let mut options = SolveOptions::default();
-        if weighting == Weighting::Huber {
-            options.step_tolerance = ROUGHLY;
-        }
-        match adjustment.solve(&options) {
+        match descend(&adjustment, weighting) {
             Ok(solution) => Ok(Solved { solution, terms, planes, poses }),
             // What is not determined often has no end either: then that is the better answer.
             Err(error @ adjust::Error::NotConverged { .. }) => {
-                Err(self.undetermined_at_start(self.options.terms.largest_inflation)?.unwrap_or(error.into()))
+                let undetermined = self.undetermined_at_start(pixels, self.options.terms.largest_inflation)?;
+                Err(undetermined.unwrap_or(error.into()))
             }
             Err(error) => Err(not_determined(error)),
         }
     }
 
-    fn observation(&self, index: usize, blocks: Vec<BlockId>, weighting: Weighting) -> PlaneObservation<'_> {
+    fn observation<'p>(
+        &'p self,
+        index: usize,
+        pixels: &'p PlanePixels,
+        blocks: Vec<BlockId>,
+        weighting: Weighting,
+    ) -> PlaneObservation<'p> {
         PlaneObservation {
             sizes: [3, self.terms.held.len(), 6][..blocks.len()].to_vec(),
             blocks,
             chart: &self.charts[self.chart_of[index]].chart,
-            pixels: &self.pixels[index],
+            pixels,
             world_from_camera: pose_of(&self.captures[index]),
             weighting,
         }
@@ -227,7 +191,11 @@ impl<'a> Problem<'a> {
 
     /// What is not determined, if anything, as far as the derivatives at the start values tell: the same adjustment
     /// made linear, which always ends.
-    fn undetermined_at_start(&self, largest_inflation: f64) -> Result<Option<Error>> {
+    pub(crate) fn undetermined_at_start(
+        &self,
+        pixels: &[PlanePixels],
+        largest_inflation: f64,
+    ) -> Result<Option<Error>> {
         let mut adjustment = Adjustment::new();
         let terms = adjustment.add_block(self.terms.block());
         self.terms.hold(&mut adjustment, terms)?;
@@ -244,8 +212,8 @@ impl<'a> Problem<'a> {
                 adjustment.add_prior(blocks[2], &[0.0; 6], &Covariance::from_matrix(covariance))?;
                 parameters.push(values);
             }
-            let observation = self.observation(index, blocks.clone(), Weighting::LeastSquares);
-            let mut reduction =
+            let observation = self.observation(index, &pixels[index], blocks.clone(), Weighting::LeastSquares);
+            let reduction =
                 observation.reduction(&parameters).map_err(|_| Error::NoPlane { station: capture.name.clone() })?;
             for row in reduction.rows() {
                 let [plane, own_terms, pose] = parts(row, self.terms.held.len());
@@ -272,17 +240,48 @@ impl<'a> Problem<'a> {
     }
 
     /// Pixels that take part and weighted components of poses.
-    pub(crate) fn observations(&self) -> usize {
+    pub(crate) fn observations(&self, pixels: &[PlanePixels]) -> usize {
         let poses = self.captures.iter().filter(|capture| weighted(capture).is_some()).count();
-        self.pixels.iter().map(PlanePixels::used_count).sum::<usize>() + 6 * poses
+        pixels.iter().map(PlanePixels::used_count).sum::<usize>() + 6 * poses
     }
 
-    fn require_redundancy(&self) -> Result<()> {
-        if let Some(index) = self.pixels.iter().position(|pixels| pixels.used_count() < 3) {
+    pub(crate) fn require_redundancy(&self, pixels: &[PlanePixels]) -> Result<()> {
+        if let Some(index) = pixels.iter().position(|pixels| pixels.used_count() < 3) {
             return Err(Error::NoPlane { station: self.captures[index].name.clone() });
         }
-        let (differences, unknowns) = (self.observations(), self.unknowns());
+        let (differences, unknowns) = (self.observations(pixels), self.unknowns());
         if differences > unknowns { Ok(()) } else { Err(Error::TooFewDifferences { differences, unknowns }) }
+    }
+}
+
+impl Solved {
+    /// The pose of a capture, adjusted or as given.
+    pub(crate) fn pose(&self, index: usize, capture: &PlaneCapture<'_>) -> Result<Isometry3<f64>> {
+        Ok(self.poses[index].map_or(Ok(pose_of(capture)), |pose| self.solution.pose(pose))?)
+    }
+
+    /// The largest change of a term or of a plane since an earlier solution, in standard deviations.
+    pub(crate) fn moved_from(&self, earlier: &Self) -> Result<f64> {
+        let mut largest = 0.0_f64;
+        let pairs = self.planes.iter().zip(&earlier.planes);
+        for (block, before) in [(&self.terms, &earlier.terms)].into_iter().chain(pairs) {
+            let deviations = self.solution.standard_deviations(*block, Scale::Prior)?;
+            let values = self.solution.values(*block)?.iter().zip(earlier.solution.values(*before)?);
+            let moves = values.zip(deviations).filter(|(_, deviation)| *deviation > 0.0);
+            largest = moves.fold(largest, |largest, ((a, b), deviation)| largest.max((a - b).abs() / deviation));
+        }
+        Ok(largest)
+    }
+}
+
+/// Full steps first, as the problem is nearly linear; damped ones where these do not end.
+fn descend(adjustment: &Adjustment<'_>, weighting: Weighting) -> adjust::Result<Solution> {
+    let step_tolerance = if weighting == Weighting::Huber { ROUGHLY } else { NEGLIGIBLE };
+    let options = |method| SolveOptions { method, step_tolerance, ..SolveOptions::default() };
+    let full = SolveOptions { max_iterations: FULL_STEPS, ..options(Method::GaussNewton) };
+    match adjustment.solve(&full) {
+        Err(adjust::Error::NotConverged { .. }) => adjustment.solve(&options(Method::LevenbergMarquardt)),
+        answer => answer,
     }
 }
 
@@ -326,17 +325,4 @@ fn add_pose(adjustment: &mut Adjustment<'_>, capture: &PlaneCapture<'_>) -> Resu
     let block = adjustment.add_block(ParameterBlock::pose(pose).named(format!("pose of {}", capture.name)));
     adjustment.add_prior(block, &RigidPose::values(pose), &Covariance::from_matrix(covariance))?;
     Ok(Some(block))
-}
-
-/// Standard deviation of the bulk of some residuals.
-fn scatter(mut residuals: Vec<f64>) -> f64 {
-    if residuals.is_empty() {
-        return SMALLEST_SCATTER;
-    }
-    let middle = residuals.len() / 2;
-    for residual in &mut residuals {
-        *residual = residual.abs();
-    }
-    let (_, median, _) = residuals.select_nth_unstable_by(middle, f64::total_cmp);
-    (*median / MEDIAN_OF_NORMAL).max(SMALLEST_SCATTER)
 }

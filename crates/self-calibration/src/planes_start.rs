@@ -8,6 +8,9 @@ use crate::{Plane, Result};
 /// Rounds of new weights; least absolute values settle in some ten.
 const ROUNDS: usize = 20;
 
+/// Points that are enough for a start.
+const FEW: usize = 4000;
+
 /// Misfits below this share of the distance get no larger weight.
 const SMALLEST_MISFIT: f64 = 1e-4;
 
@@ -17,7 +20,7 @@ const ON_A_LINE: f64 = 1e-9;
 /// The plane of least absolute misfit, in the camera frame: `mᵀ P = 1` with `m = n / d`, linear in m. No plane that a
 /// camera sees goes through its perspective centre, so d is not zero. `None` where the points do not span one.
 pub(crate) fn plane_through(pixels: &PlanePixels) -> Result<Option<Plane>> {
-    let points: Vec<_> = pixels.points().collect();
+    let points: Vec<_> = pixels.thinned(FEW).points().collect();
     let mut weights = vec![1.0; points.len()];
     let mut direction = Vector3::zeros();
     for _ in 0..ROUNDS {

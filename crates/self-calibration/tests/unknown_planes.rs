@@ -249,6 +249,60 @@ fn things_in_front_of_the_wall_are_left_out() {
     assert!(normalised_error(&spoiled) > 100.0 && spoiled.sigma0() > 5.0);
 }
 
+/// Captures of more pixels than are chosen by, a box before the wall, flagged or not.
+fn frames_with_a_box(camera: &Camera, poses: &[Isometry3<f64>], flags: Flags) -> Vec<RangeFrame> {
+    let mut frames = frames(camera, poses, SIGMA_M, 8);
+    for frame in &mut frames {
+        for (col, row) in (20..70).flat_map(|col| (80..140).map(move |row| (col, row))) {
+            frame.range[(col, row)] -= 0.3;
+            frame.flags[(col, row)] = flags;
+        }
+    }
+    frames
+}
+
+#[test]
+fn large_captures_chosen_by_few_pixels_give_what_all_good_pixels_give() {
+    let format = ImageFormat::new(176, 144, [0.04, 0.04]).unwrap();
+    let camera = Camera { format, ..camera(4.0) };
+    let poses = poses(8);
+    let calibrate = |flags: Flags, rejection: Option<f64>| {
+        let frames = frames_with_a_box(&camera, &poses, flags);
+        let given = captures(&frames, |i| Some(poses[i]), None);
+        let options = PlaneCalibrationOptions { rejection, ..options(1) };
+        calibrate_planes(&given, &[None], &camera, INTERVAL, &options).unwrap()
+    };
+    let robust = calibrate(Flags::empty(), Some(4.0));
+    let flagged = calibrate(Flags::MIXED_PIXEL, None);
+    assert!(robust.observations() > 150_000 && robust.observations() <= flagged.observations());
+    let (found, expected) = (robust.parameters(Scale::Prior).unwrap(), flagged.parameters(Scale::Prior).unwrap());
+    for (found, expected) in found.iter().zip(&expected) {
+        // Of 180,000 good pixels the normal distribution has a dozen beyond four deviations; without them a parameter
+        // moves by about 4 sqrt(12 / 180,000) = 0.03 of its deviation.
+        let miss = (found.value - expected.value).abs() / expected.sigma;
+        assert!(miss < 0.12, "{} {miss}", found.name);
+        assert!((found.sigma / expected.sigma - 1.0).abs() < 1e-3);
+    }
+}
+
+#[test]
+fn the_number_of_threads_changes_no_bit() {
+    let format = ImageFormat::new(176, 144, [0.04, 0.04]).unwrap();
+    let camera = Camera { format, ..camera(4.0) };
+    let poses = poses(6);
+    let frames = frames_with_a_box(&camera, &poses, Flags::empty());
+    let given = captures(&frames, |i| Some(poses[i]), None);
+    let calibrate = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let calibration = pool.install(|| calibrate_planes(&given, &[None], &camera, INTERVAL, &options(1)).unwrap());
+        let bits = |value: &f64| value.to_bits();
+        let values: Vec<u64> = calibration.model().parameter_values().iter().map(bits).collect();
+        let covariance: Vec<u64> = calibration.covariance(Scale::Posterior).unwrap().iter().map(bits).collect();
+        (values, covariance, calibration.captures().to_vec())
+    };
+    assert_eq!(calibrate(1), calibrate(5));
+}
+
 #[test]
 fn a_spline_is_estimated_as_well_as_sines() {
     let camera = camera(8.0);

@@ -1,10 +1,10 @@
 //! A calibration network: stations, targets and what was observed between them.
 
 mod auto_terms;
+mod builder;
 mod calibrate;
 mod check;
 mod combine;
-mod distribution;
 mod equations;
 mod hyperbola;
 mod model;

@@ -120,8 +120,8 @@ pub fn with_passive(mut network: Network) -> Network {
     let format = ImageFormat::new(1600, 1200, [0.005, 0.005]).unwrap();
     let interior = InteriorOrientation { principal_point_mm: [0.02, 0.01], principal_distance_mm: 9.0 };
     let camera = Camera::new(format, interior, LensDistortion { k1: 2e-4, ..LensDistortion::default() }).unwrap();
-    let sigmas = [2e-3, 2e-3, 2e-3, 2e-6, 2e-7, 2e-9, 1e-6, 1e-6_f64];
-    let covariance = nalgebra::SMatrix::<f64, 8, 8>::from_diagonal(&sigmas.map(|sigma| sigma * sigma).into());
+    let sigmas = [2e-3, 2e-3, 2e-3, 2e-6, 2e-7, 2e-9, 1e-6, 1e-6, 3e-4, 3e-4_f64];
+    let covariance = nalgebra::SMatrix::<f64, 10, 10>::from_diagonal(&sigmas.map(|sigma| sigma * sigma).into());
     let relative = Isometry3::new(Vector3::new(0.08, 0.01, -0.02), Vector3::new(0.01, -0.03, 0.02));
     network.passive = Some(PassiveCamera {
         camera,

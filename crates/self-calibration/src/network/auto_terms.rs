@@ -5,7 +5,8 @@ use std::collections::BTreeSet;
 use adjust::Distribution;
 use nalgebra::{DMatrix, DVector};
 
-use super::calibrate::{Problem, all_terms};
+use super::calibrate::Problem;
+use super::selection::all_terms;
 use super::{CalibrationOutcome, TermDecision};
 use crate::{Error, Result};
 

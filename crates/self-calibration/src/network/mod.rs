@@ -11,15 +11,18 @@ mod model;
 mod options;
 mod outcome;
 mod plan;
+mod point_sigma;
 mod problem;
 mod quality;
 mod range_step;
 mod reference;
 mod rejection;
 mod report;
+mod selection;
 mod simulate;
 mod start;
 mod strength;
+mod term_words;
 mod terms;
 
 pub use calibrate::{calibrate, calibrate_two_networks};

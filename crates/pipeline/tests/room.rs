@@ -6,7 +6,8 @@ mod common;
 
 use std::path::Path;
 
-use common::run;
+use common::{request, run};
+use pipeline::{NetworkCalibration, Silent, Stage};
 
 #[test]
 fn the_small_room_reaches_its_bars() {
@@ -53,4 +54,25 @@ fn check_files(out: &Path, points: usize) {
     let report = std::fs::read_to_string(out.join("report.html")).unwrap();
     assert!(report.contains("<svg") && report.contains("From above") && report.contains("Range error after"));
     assert!(!report.contains("src=\"http") && !report.contains("href=\"http"), "the page needs no network");
+}
+
+#[test]
+fn a_calibration_estimated_from_targets_serves_as_well_as_the_true_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let terms = "xp yp c k1 k2 p1 p2 d0 d2 d3 d4 d5 d6 d7 e1 e2 h1 h2 h3";
+    let estimated = NetworkCalibration {
+        network: "../networks/room_small.ron".to_owned(),
+        terms: terms.split(' ').map(str::to_owned).collect(),
+    };
+    let median = |calibrate: Option<NetworkCalibration>, name: &str| {
+        let mut request = request("room_small", &folder.path().join(name));
+        // Ranges are final before the stations are aligned.
+        request.plan.stages.retain(|stage| !matches!(stage, Stage::Register(_) | Stage::Adjust(_)));
+        request.plan.calibrate = calibrate;
+        let summary = pipeline::run(&request, &Silent).unwrap();
+        summary.truth.unwrap().ranges.range_error_median_m
+    };
+    let (with_truth, with_estimate) = (median(None, "true"), median(Some(estimated), "estimated"));
+    println!("median {with_truth} m with the true calibration, {with_estimate} m with the estimated one");
+    assert!(with_estimate < with_truth + 0.002);
 }

@@ -41,7 +41,7 @@ pub(crate) struct CalibrateArguments {
     #[arg(long, value_delimiter = ',', value_name = "STATIONS")]
     without_ranges: Vec<String>,
     /// Significance level of the outlier test, or `none`: nothing is rejected.
-    #[arg(long, default_value = "0.001", value_name = "LEVEL|none", value_parser = level)]
+    #[arg(long, default_value = "0.0001", value_name = "LEVEL|none", value_parser = level)]
     reject: Level,
     /// Largest growth of a standard deviation by correlations before the network is refused as too weak.
     #[arg(long, value_name = "FACTOR")]

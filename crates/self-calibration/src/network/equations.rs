@@ -1,14 +1,16 @@
-//! Observation equations of the network, Eqs. 4-15: image corrections are taken at the observed image point, range
-//! corrections at the modelled range.
+//! Observation equations of the network, Eqs. 4-15. Corrections are functions of what is observed; they are taken at the
+//! modelled image point and range, the fixed point of the equations. At the measured ones they would carry the noise,
+//! which a steep correction makes smaller: least squares takes that for a better fit.
 
 use std::sync::Arc;
 
 use adjust::{BlockId, EvaluationFailure, Jacobians, Observation, RigidPose};
-use camera_model::{Camera, LensDistortion};
+use camera_model::Camera;
 use error_models::RangeErrorModel;
-use nalgebra::{Isometry3, Matrix2x3, Matrix3, Point3, RowVector3, SMatrix, Vector3};
+use nalgebra::{Isometry3, Matrix3, Point3, RowVector3, SMatrix, Vector3};
 
-use super::terms::{Seen, camera_from, modelled_range};
+use super::image_model::image_model;
+use super::terms::{Seen, modelled_range};
 
 /// A target in the frame of a camera, with the derivatives of its coordinates.
 struct InCamera {
@@ -30,60 +32,13 @@ impl InCamera {
     }
 }
 
-/// An image point in pixel, modelled from a point of the camera frame and the camera's block.
-struct ImageModel {
-    pixel: [f64; 2],
-    by_camera_point: Matrix2x3<f64>,
-    /// Derivatives with respect to the camera's block, a row each for column and row.
-    by_camera: [Vec<f64>; 2],
-}
-
-/// `x = xp − c·U/W + dx(x_obs, y_obs)`, in pixels.
-fn image_model(
-    template: &Camera,
-    values: &[f64],
-    observed_mm: [f64; 2],
-    point: &Vector3<f64>,
-    derivatives: bool,
-) -> Result<ImageModel, EvaluationFailure> {
-    let camera = camera_from(template, values).ok_or_else(|| EvaluationFailure::new("a camera of the wrong length"))?;
-    if point.z.is_nan() || point.z >= 0.0 {
-        return Err(EvaluationFailure::new("the target lies behind the camera"));
-    }
-    let [xp, yp] = camera.interior.principal_point_mm;
-    let scale = -camera.interior.principal_distance_mm / point.z;
-    let [dx, dy] = camera.lens.correction(&camera.interior, observed_mm);
-    let image = [xp + scale * point.x + dx, yp + scale * point.y + dy];
-    let pixel = camera.format.pixel_from_image(image);
-    let [pitch_x, pitch_y] = camera.format.pixel_pitch_mm;
-    let per_pixel = [1.0 / pitch_x, -1.0 / pitch_y];
-    let mut model = ImageModel { pixel, by_camera_point: Matrix2x3::zeros(), by_camera: [Vec::new(), Vec::new()] };
-    if !derivatives {
-        return Ok(model);
-    }
-    let [u, v] = [point.x / point.z, point.y / point.z];
-    let by_point = Matrix2x3::new(scale, 0.0, -scale * u, 0.0, scale, -scale * v);
-    let slope = camera.lens.correction_slope(&camera.interior, observed_mm);
-    let design = LensDistortion::correction_design(&camera.interior, observed_mm);
-    for axis in 0..2 {
-        let along = |other: usize| if axis == other { 1.0 } else { 0.0 };
-        let by_distance = if axis == 0 { -u } else { -v };
-        let interior = [along(0) - slope[(axis, 0)], along(1) - slope[(axis, 1)], by_distance];
-        let lens = (0..design.ncols()).map(|column| design[(axis, column)]);
-        let row = interior.into_iter().chain(lens);
-        model.by_camera[axis] = row.map(|derivative| derivative * per_pixel[axis]).collect();
-        model.by_camera_point.set_row(axis, &(by_point.row(axis) * per_pixel[axis]));
-    }
-    Ok(model)
-}
-
 /// An image point, a range, or both, of one target from one station.
 /// Blocks: pose, target, camera, and the range set where there is a range.
 #[derive(Debug, Clone)]
 pub(crate) struct SightingEquation {
     pub(crate) blocks: Vec<BlockId>,
     pub(crate) camera: Camera,
-    /// Observed image point, pixel; the corrections are taken there whether it is used or not.
+    /// Observed image point, pixel; range corrections are taken there whether it is used or not.
     pub(crate) pixel: [f64; 2],
     pub(crate) uses_pixel: bool,
     pub(crate) range: Option<RangeEquation>,
@@ -106,8 +61,7 @@ impl SightingEquation {
         residual: &mut [f64],
         jacobians: Option<&mut Jacobians<'_>>,
     ) -> Result<(), EvaluationFailure> {
-        let observed_mm = self.camera.format.image_from_pixel(self.pixel);
-        let model = image_model(&self.camera, parameters[2], observed_mm, &target.point, jacobians.is_some())?;
+        let model = image_model(&self.camera, parameters[2], &target.point, jacobians.is_some())?;
         residual[0] = self.pixel[0] - model.pixel[0];
         residual[1] = self.pixel[1] - model.pixel[1];
         if let Some(jacobians) = jacobians {
@@ -210,8 +164,7 @@ impl Observation for PassiveEquation {
         let in_range_camera = InCamera::new(parameters[0], parameters[1])?;
         let coordinates: [f64; 3] = in_range_camera.point.into();
         let in_passive = InCamera::new(parameters[2], &coordinates)?;
-        let observed_mm = self.camera.format.image_from_pixel(self.pixel);
-        let model = image_model(&self.camera, parameters[3], observed_mm, &in_passive.point, jacobians.is_some())?;
+        let model = image_model(&self.camera, parameters[3], &in_passive.point, jacobians.is_some())?;
         residual[0] = self.pixel[0] - model.pixel[0];
         residual[1] = self.pixel[1] - model.pixel[1];
         if let Some(jacobians) = jacobians {

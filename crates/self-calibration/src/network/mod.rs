@@ -7,6 +7,7 @@ mod check;
 mod combine;
 mod equations;
 mod hyperbola;
+mod image_model;
 mod model;
 mod options;
 mod outcome;

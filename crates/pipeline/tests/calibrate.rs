@@ -8,6 +8,7 @@ use std::path::Path;
 
 use common::calibration::{calibrate, changed, request, target_field, terms};
 use common::fixtures;
+use error_models::ParameterStatus;
 use pipeline::{CalibrateMethod, CalibrationSummary, Method, NetworkPlanRequest, PlanOptions, Silent, TermSelection};
 use range_io::calibration::Calibration;
 use range_io::tables::{read_residuals, read_stations, read_targets};
@@ -176,4 +177,52 @@ fn a_plan_promises_what_the_calibration_then_states() {
     let median = report.split("At 2 m").last().unwrap().split("Median ").nth(1).unwrap();
     let median: f64 = median.split(' ').next().unwrap().parse().unwrap();
     assert!((1e3 * mean / median - 1.0).abs() < 0.1, "mean {mean} m, median {median} mm");
+}
+
+#[test]
+fn a_spline_by_its_word_goes_into_the_file_and_comes_back() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = folder.path().join("short_interval.ron");
+    let text = std::fs::read_to_string(fixtures().join("networks/target_field.ron")).unwrap();
+    // An ambiguity interval of 3.3 m, which ranges from 1.2 m to 4.5 m cover.
+    std::fs::write(&scene, text.replace("20e6", "45e6")).unwrap();
+    let survey = folder.path().join("survey");
+    pipeline::simulate_network(&scene, None, &survey).unwrap();
+    let names = terms("xp yp c k1 k2 p1 p2 d0 spline12 e1 e2");
+    let summary = calibrate(folder.path(), |request| request.options.terms = names).unwrap();
+
+    let out = folder.path().join("out");
+    let written = Calibration::read(&out).unwrap();
+    let model = written.range_models[0].to_model().unwrap();
+    assert_eq!(model.further.shape().spline_knots, Some(12));
+    let json = summary_of(&out);
+    for knot in 0..11 {
+        let name = format!("s{knot}");
+        let parameter = written.range_models[0].parameters.iter().find(|parameter| parameter.name == name).unwrap();
+        let stated = summary.parameters.get(&name).unwrap();
+        assert_eq!(parameter.status, ParameterStatus::Estimated, "{name}");
+        assert_eq!(parameter.value.to_bits(), stated.value.to_bits(), "{name}");
+        assert_eq!(parameter.sigma.to_bits(), stated.sigma_posterior.to_bits(), "{name}");
+        assert!(parameter.sigma > 0.0 && json["parameters"][&name]["status"] == "estimated", "{name}");
+        assert_eq!(json["parameters"][&name]["unit"], "m");
+        assert!(written.correlation.as_ref().unwrap().between("d0", &name).is_some(), "{name}");
+    }
+    let again = folder.path().join("again");
+    std::fs::create_dir(&again).unwrap();
+    written.write(again.join(Calibration::FILE_NAME)).unwrap();
+    assert_eq!(Calibration::read(&again).unwrap(), written);
+
+    // The spline of the file is the periodic error of the truth.
+    let truth = Calibration::read(survey.join("truth/calibration.ron")).unwrap().range_models[0].to_model().unwrap();
+    let d0 = summary.parameters.get("d0").unwrap();
+    for step in 0..=30 {
+        let range_m = 1.3 + 0.1 * f64::from(step);
+        let [found, expected] = [&model, &truth].map(|model| model.correction(range_m, 0.0, 0.0, f64::NAN).total_m());
+        // Four deviations of the offset, which all corrections share, and 2 mm of a spline of noise 10 mm in 50 ranges a knot.
+        assert!((found - expected).abs() < 4.0 * d0.sigma_prior + 0.002, "at {range_m} m: {found} {expected}");
+        assert!(d0.sigma_prior < 0.003, "{}", d0.sigma_prior);
+    }
+    let refused = calibrate(folder.path(), |request| request.options.terms = terms("xp yp c d0 spline12 d6 d7"));
+    let error = refused.unwrap_err().to_string();
+    assert!(error.contains("`spline12`") && error.contains("`d6`"), "{error}");
 }

@@ -131,6 +131,16 @@ pub enum Error {
         /// What there is.
         known: String,
     },
+    /// A list of terms names two that stand for the same.
+    #[error("the list of terms names `{first}` and `{second}`: {reason}; keep one of them")]
+    ConflictingTerms {
+        /// One of them.
+        first: String,
+        /// The other.
+        second: String,
+        /// Why they exclude each other.
+        reason: &'static str,
+    },
     /// A station or target is observed too little to be determined.
     #[error("{kind} `{name}` has {found}, but needs {needed}")]
     TooFewSightings {

@@ -3,8 +3,50 @@
 
 mod support;
 
-use self_calibration::{CalibrationOptions, Method, SightingOptions, calibrate, simulate_sightings};
-use support::networks::{nominal, small, track_network};
+use error_models::{PeriodicSpline, RangeErrorModel, RangeTerms};
+use self_calibration::{
+    CalibrationOptions, CalibrationOutcome, Method, Network, SightingOptions, TermDecision, calibrate,
+    simulate_sightings,
+};
+use support::networks::{nominal, range_model, small, track_network};
+
+fn spline_decision(outcome: &CalibrationOutcome) -> &TermDecision {
+    outcome.decisions.iter().find(|decision| decision.terms[0] == "spline12").unwrap()
+}
+
+/// A track over the whole interval, calibrated with whatever terms speak for themselves.
+fn of_a_track(model: RangeErrorModel) -> CalibrationOutcome {
+    let truth = Network { range_model: model, ..track_network() };
+    let mut observed =
+        simulate_sightings(&truth, &SightingOptions { sigma_range_m: 0.002, ..Default::default() }).unwrap();
+    observed.range_model = RangeErrorModel::error_free(truth.range_model.ambiguity_interval_m);
+    let options = CalibrationOptions { method: Method::Laboratory, ..CalibrationOptions::default() };
+    calibrate(&observed, &options).unwrap()
+}
+
+#[test]
+fn sines_stay_where_they_are_the_truth() {
+    let outcome = of_a_track(range_model());
+    let decision = spline_decision(&outcome);
+    assert!(!decision.taken && decision.delta_bic > 0.0 && decision.reason.contains("sines stay"), "{decision:?}");
+    assert!(outcome.estimated.iter().any(|name| name == "d6") && outcome.range_models[0].1.further.is_empty());
+}
+
+#[test]
+fn a_spline_replaces_sines_that_cannot_follow() {
+    let mut model = range_model();
+    model.terms = RangeTerms { periodic: [0.0; 6], ..model.terms };
+    let coefficients = vec![0.0, 0.0, 0.03, -0.03, 0.0, 0.0, 0.0, 0.02, 0.0, -0.02, 0.0];
+    model.further.spline = Some(PeriodicSpline { coefficients });
+    let outcome = of_a_track(model);
+    let decision = spline_decision(&outcome);
+    assert!(decision.taken && decision.delta_bic < -10.0, "{decision:?}");
+    assert!(outcome.estimated.iter().any(|name| name == "s3"), "{:?}", outcome.estimated);
+    let s3 = outcome.parameter("s3").unwrap();
+    assert!((s3.value + 0.03).abs() < 4.0 * s3.sigma_prior, "{s3:?}");
+    let sines = outcome.decisions.iter().filter(|decision| decision.terms[0] == "d4" || decision.terms[0] == "d6");
+    assert!(sines.into_iter().all(|decision| !decision.taken), "{:?}", outcome.decisions);
+}
 
 #[test]
 fn what_acts_is_taken_and_the_long_wave_has_to_earn_its_place() {
@@ -21,6 +63,9 @@ fn what_acts_is_taken_and_the_long_wave_has_to_earn_its_place() {
     }
     let long_wave = outcome.decisions.iter().find(|decision| decision.terms[0] == "d2").unwrap();
     assert!(long_wave.reason.contains("d0 is"), "{}", long_wave.reason);
+    // Ranges from 1.2 m to 4.5 m.
+    let spline = spline_decision(&outcome);
+    assert!(!spline.taken && spline.reason.contains("ambiguity interval of 5.00 m"), "{spline:?}");
 }
 
 #[test]

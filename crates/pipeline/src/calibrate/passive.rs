@@ -29,8 +29,7 @@ pub(super) fn read_passive(
     }
     let calibration = Calibration::read(&path)?;
     let camera = calibrated(&calibration, &survey.camera.nominal_camera()?)?;
-    let covariance = calibration.camera_covariance()?.fixed_view::<8, 8>(0, 0).into_owned();
-    let covariance = Some(covariance).filter(|covariance| covariance.amax() > 0.0);
+    let covariance = Some(calibration.camera_covariance()?).filter(|covariance| covariance.amax() > 0.0);
     let image_points = image_points(folder, tables, defaults)?;
     Ok(Some(PassiveCamera { camera, covariance, range_camera_from_passive: None, image_points }))
 }

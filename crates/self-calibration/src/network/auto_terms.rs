@@ -2,10 +2,11 @@
 
 use std::collections::BTreeSet;
 
+use adjust::Distribution;
 use nalgebra::{DMatrix, DVector};
 
-use super::calibrate::{Problem, all_terms};
-use super::distribution::fisher_tail;
+use super::calibrate::Problem;
+use super::selection::all_terms;
 use super::{CalibrationOutcome, TermDecision};
 use crate::{Error, Result};
 
@@ -202,7 +203,8 @@ impl Wald {
         let growth = values.dot(&factor.solve(&values));
         let k = places.len() as f64;
         let unit = (self.vtpv / self.redundancy.max(1.0)).max(f64::MIN_POSITIVE);
-        let p = fisher_tail(k, self.redundancy.max(1.0), growth / (k * unit));
+        let fisher = Distribution::Fisher { numerator: k, denominator: self.redundancy.max(1.0) };
+        let p = fisher.p_value(growth / (k * unit));
         let ratio = growth / self.vtpv.max(f64::MIN_POSITIVE);
         Some(Test { p, delta_bic: k * self.observations.ln() - self.observations * ratio.ln_1p() })
     }

@@ -2,11 +2,9 @@
 
 use std::collections::BTreeSet;
 
-use error_models::{AmplitudeHyperbola, RangeErrorModel, RangeTerms};
+use error_models::{AmplitudeHyperbola, RangeErrorModel};
 
-use super::auto_terms;
 use super::combine::{Combined, combine};
-use super::hyperbola::with_hyperbola;
 use super::problem::{Calibration, CameraPrior, Datum, Excluded, RangeSet, Setup, Solved};
 use super::quality::Geometry;
 use super::range_step::{RangeStep, ScaleUse};
@@ -22,7 +20,15 @@ const WORTH_TELLING: f64 = 100.0;
 
 /// Calibrates a range camera from a network of targets.
 ///
-/// Start values are found where there are none. The methods:
+/// Start values are found where there are none. Terms of a list may be words for several:
+///
+/// | word | terms | instead of |
+/// |---|---|---|
+/// | `splineN` | periodic spline with N knots over the ambiguity interval, s0 on | d2 to d7 |
+/// | `polynomialN` | polynomial of order N over the observed ranges, q1 on | |
+/// | `surfaceN` | surface of order N over the image, g10 on | e1, e2 |
+///
+/// The methods:
 ///
 /// | method | unknown together | then |
 /// |---|---|---|
@@ -86,49 +92,11 @@ impl Method {
 /// What is to be calibrated, with whatever terms.
 pub(crate) struct Problem<'n> {
     pub(crate) network: &'n Network,
-    lens: Option<&'n Network>,
+    pub(crate) lens: Option<&'n Network>,
     pub(crate) options: &'n CalibrationOptions,
 }
 
 impl Problem<'_> {
-    fn calibrate(&self) -> Result<CalibrationOutcome> {
-        match &self.options.terms {
-            TermSelection::List(names) => self.listed(&names.iter().cloned().collect()),
-            TermSelection::Auto => self.automatic(),
-        }
-    }
-
-    /// Estimates the terms of a list. A hyperbola without start values takes them from a calibration without it.
-    fn listed(&self, terms: &BTreeSet<String>) -> Result<CalibrationOutcome> {
-        let is_hyperbola = |name: &String| AmplitudeHyperbola::NAMES.contains(&name.as_str());
-        if !terms.iter().any(is_hyperbola) {
-            return self.run(terms);
-        }
-        self.require_amplitudes()?;
-        if self.network.range_model.hyperbola.is_some() {
-            return self.run(terms);
-        }
-        let (hyperbola, others): (BTreeSet<String>, _) = terms.iter().cloned().partition(is_hyperbola);
-        if hyperbola.len() < AmplitudeHyperbola::NAMES.len() {
-            return Err(self.needs("start values of h1, h2, h3 in the range model, to hold one and estimate another"));
-        }
-        let network = with_hyperbola(self.network, &self.run(&others)?)?;
-        Problem { network: &network, ..*self }.run(terms)
-    }
-
-    /// Chooses the terms; a hyperbola is among them where all ranges have amplitudes, and is taken if it is the better
-    /// model.
-    fn automatic(&self) -> Result<CalibrationOutcome> {
-        let without = auto_terms::choose(self)?;
-        if self.network.range_model.hyperbola.is_some() || self.require_amplitudes().is_err() {
-            return Ok(without);
-        }
-        // Residuals that show no hyperbola, or one that the adjustment can't hold on to, speak for the plain model.
-        let with = with_hyperbola(self.network, &without)
-            .and_then(|network| auto_terms::choose(&Problem { network: &network, ..*self }));
-        Ok(with.ok().filter(|with| with.bic < without.bic).unwrap_or(without))
-    }
-
     /// Calibrates with these terms estimated.
     pub(crate) fn run(&self, terms: &BTreeSet<String>) -> Result<CalibrationOutcome> {
         match self.options.method {
@@ -325,20 +293,6 @@ impl Problem<'_> {
         Err(self
             .needs(&format!("known coordinates of the targets of the range network; {} have none", unknown.join(", "))))
     }
-
-    fn require_amplitudes(&self) -> Result<()> {
-        match self.network.sightings.iter().find(|seen| seen.range_m.is_some() && seen.amplitude.is_none()) {
-            None => Ok(()),
-            Some(seen) => {
-                let pair = self.network.pair(seen.station, seen.target);
-                Err(self.needs(&format!("amplitudes to estimate h1, h2, h3: {pair} has none")))
-            }
-        }
-    }
-
-    fn needs(&self, needs: &str) -> Error {
-        Error::MethodNeeds { method: self.options.method.name().to_owned(), needs: format!("it needs {needs}") }
-    }
 }
 
 /// The estimated camera parameters of an adjustment as a prior of the next one.
@@ -382,13 +336,6 @@ pub(crate) fn start_calibration(network: &Network) -> Calibration {
 fn open(model: &RangeErrorModel) -> RangeErrorModel {
     let hyperbola = model.hyperbola.map(|h| AmplitudeHyperbola { amplitude_span: [0.0, f64::MAX], ..h });
     RangeErrorModel { range_span_m: None, hyperbola, ..model.clone() }
-}
-
-/// All terms that a network might determine.
-pub(crate) fn all_terms(network: &Network, method: Method) -> BTreeSet<String> {
-    let camera = camera_names().into_iter().filter(|_| method != Method::Laboratory);
-    let hyperbola = network.range_model.hyperbola.map_or(&[][..], |_| &AmplitudeHyperbola::NAMES);
-    camera.chain(RangeTerms::NAMES).chain(hyperbola.iter().copied()).map(str::to_owned).collect()
 }
 
 /// The datum asked for, where the network agrees.

@@ -2,11 +2,9 @@
 
 use std::collections::BTreeSet;
 
-use error_models::{AmplitudeHyperbola, RangeTerms};
 use nalgebra::DMatrix;
 
-use super::terms::camera_names;
-use super::{CalibrationOptions, DistanceEnd, Network, TermSelection};
+use super::{CalibrationOptions, DistanceEnd, Network};
 use crate::{Error, Result};
 
 /// Targets that orient a station.
@@ -192,7 +190,7 @@ impl Network {
 }
 
 impl CalibrationOptions {
-    /// Checks numbers and names against the network.
+    /// Checks numbers, and names of stations against the network; those of terms are checked where they are looked up.
     pub(crate) fn check(&self, network: &Network) -> Result<()> {
         if let Some(value) = self.rejection_level
             && !(value > 0.0 && value < 1.0)
@@ -211,24 +209,8 @@ impl CalibrationOptions {
                 return Err(Error::UnknownName { what, kind: "station", name: name.clone(), known });
             }
         }
-        if let TermSelection::List(names) = &self.terms {
-            names.iter().try_for_each(|name| check_term(network, name))?;
-        }
         Ok(())
     }
-}
-
-/// A term is one of the camera's, of Eqs. 14 and 15, or of the further terms that the range model of the network has.
-fn check_term(network: &Network, name: &str) -> Result<()> {
-    let fixed = camera_names().into_iter().chain(RangeTerms::NAMES).chain(AmplitudeHyperbola::NAMES).map(str::to_owned);
-    let mut known: Vec<String> = fixed.collect();
-    let further = network.range_model.parameter_names();
-    known.extend(further.into_iter().filter(|name| !RangeTerms::NAMES.contains(&name.as_str())));
-    if known.iter().any(|known| known == name) {
-        return Ok(());
-    }
-    let what = "the list of terms".to_owned();
-    Err(Error::UnknownName { what, kind: "term", name: name.to_owned(), known: known.join(" ") })
 }
 
 fn unique<'n>(kind: &'static str, names: impl Iterator<Item = &'n str>) -> Result<()> {

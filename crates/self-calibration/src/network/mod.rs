@@ -1,10 +1,10 @@
 //! A calibration network: stations, targets and what was observed between them.
 
 mod auto_terms;
+mod builder;
 mod calibrate;
 mod check;
 mod combine;
-mod distribution;
 mod equations;
 mod hyperbola;
 mod image_model;
@@ -12,15 +12,18 @@ mod model;
 mod options;
 mod outcome;
 mod plan;
+mod point_sigma;
 mod problem;
 mod quality;
 mod range_step;
 mod reference;
 mod rejection;
 mod report;
+mod selection;
 mod simulate;
 mod start;
 mod strength;
+mod term_words;
 mod terms;
 
 pub use calibrate::{calibrate, calibrate_two_networks};

@@ -95,8 +95,9 @@ pub enum DistanceEnd {
 pub struct PassiveCamera {
     /// Its calibration.
     pub camera: Camera,
-    /// Covariance of `[xp, yp, c, k1, k2, k3, p1, p2]`, in their units; `None`: held without error.
-    pub covariance: Option<SMatrix<f64, 8, 8>>,
+    /// Covariance of `[xp, yp, c, k1, k2, k3, p1, p2, b1, b2]`, in their units; `None`: held without error, as is each
+    /// parameter whose variance is zero.
+    pub covariance: Option<SMatrix<f64, 10, 10>>,
     /// Approximate relative orientation `range_camera_from_passive`; `None` where it is to be found.
     pub range_camera_from_passive: Option<Isometry3<f64>>,
     /// Its image points; it exposes at the stations of the range camera.

@@ -23,7 +23,8 @@ pub enum TermSelection {
     /// Chosen by significance and information criterion.
     Auto,
     /// These, by their canonical names (`xp yp c k1 k2 k3 p1 p2 b1 b2 d0 d2..d7 e1 e2 h1 h2 h3`, and those of further
-    /// models such as `spline8` or `polynomial3`); all others are held.
+    /// terms that the range model has); all others are held. `splineN`, `polynomialN` and `surfaceN` stand for all terms
+    /// of such a model, which the calibration then has: see [`calibrate`](super::calibrate()).
     List(Vec<String>),
 }
 

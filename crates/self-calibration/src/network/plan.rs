@@ -1,15 +1,18 @@
 //! Network design: how well a planned network would determine the calibration, and which further station helps most.
 
+use std::borrow::Cow;
 use std::collections::BTreeSet;
 
 use camera_model::pose_from_euler;
 use nalgebra::{DMatrix, Isometry3, Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};
 
 use super::calibrate::{datum, ranged_stations, start_calibration};
-use super::problem::{Calibration, Excluded, Setup, Solved, Start};
+use super::point_sigma::point_sigma;
+use super::problem::{Excluded, Setup, Solved, Start};
 use super::report::{Estimate, Fit, parameters};
 use super::simulate::{exact_sightings, planned_sightings};
-use super::terms::{camera_from, camera_names, camera_values, range_model_from, range_names, range_values};
+use super::term_words::expand;
+use super::terms::camera_names;
 use super::{CalibratedParameter, CalibrationOptions, Network, NetworkDatum, SightingOptions, Station, TermSelection};
 use crate::{Error, Result};
 
@@ -131,6 +134,8 @@ pub struct Candidate {
 pub fn plan(network: &Network, options: &PlanOptions) -> Result<PlanOutcome> {
     network.validate()?;
     let design = Design::new(network, options)?;
+    let (network, terms) = design.terms(network)?;
+    let (network, design) = (&*network, Design { terms, ..design });
     let (observed, setup_start) = design.observe(network)?;
     let setup = design.setup(&observed, setup_start)?;
     let solved = setup.solve().map_err(|error| setup.explain(error, options.largest_inflation))?;
@@ -181,6 +186,7 @@ struct Design<'o> {
     options: &'o PlanOptions,
     calibration_options: CalibrationOptions,
     sightings: SightingOptions,
+    terms: BTreeSet<String>,
 }
 
 impl<'o> Design<'o> {
@@ -204,7 +210,22 @@ impl<'o> Design<'o> {
         if let Some(&value) = numbers.into_iter().find(|value| !value.is_finite()) {
             return Err(Error::OutOfDomain { name: "candidates", value, expected: "distances and angles are finite" });
         }
-        Ok(Self { options, calibration_options, sightings })
+        Ok(Self { options, calibration_options, sightings, terms: BTreeSet::new() })
+    }
+
+    /// The network with the range terms that are asked for, and their names.
+    fn terms<'n>(&self, network: &'n Network) -> Result<(Cow<'n, Network>, BTreeSet<String>)> {
+        let TermSelection::List(names) = &self.options.terms else {
+            let range = ["d0", "d4", "d5", "d6", "d7", "e1", "e2"];
+            let names = camera_names().into_iter().chain(range).map(str::to_owned);
+            return Ok((Cow::Borrowed(network), names.collect()));
+        };
+        // A polynomial lies over the ranges that will be observed.
+        let (observed, _) = self.observe(network)?;
+        let (observed, terms) = expand(&observed, names, &self.calibration_options)?;
+        let mut network = network.clone();
+        network.range_model = observed.range_model.clone();
+        Ok((Cow::Owned(network), terms))
     }
 
     /// Exact observations of a network, and its truth as start.
@@ -232,18 +253,11 @@ impl<'o> Design<'o> {
         let ranged = ranged_stations(observed, &self.calibration_options);
         let passive = observed.passive.is_some();
         observed.check_coverage(&ranged, passive)?;
-        let estimated = match &self.options.terms {
-            TermSelection::List(names) => names.iter().cloned().collect(),
-            TermSelection::Auto => {
-                let range = ["d0", "d4", "d5", "d6", "d7", "e1", "e2"];
-                camera_names().into_iter().chain(range).map(str::to_owned).collect()
-            }
-        };
         Ok(Setup {
             network: observed,
             start,
             calibration: start_calibration(observed),
-            estimated,
+            estimated: self.terms.clone(),
             ranged,
             passive,
             datum: datum(observed, &self.calibration_options)?,
@@ -348,50 +362,4 @@ impl Field {
         let rotation = self.world_from_field * turn * rolled;
         Isometry3::from_parts((self.middle + rotation * Vector3::new(0.0, 0.0, distance)).into(), rotation)
     }
-}
-
-/// What the covariance of the calibration means for a point at a range: differences of the points that the calibration
-/// makes of one observation, over a grid of image points.
-fn point_sigma(calibration: &Calibration, estimate: &Estimate, range_m: f64) -> f64 {
-    const GRID: usize = 5;
-    let format = calibration.camera.format;
-    let at = |index: usize, size: usize| (index as f64 + 0.5) / GRID as f64 * size as f64 - 0.5;
-    let mut sum = 0.0;
-    for index in 0..GRID * GRID {
-        let pixel = [at(index % GRID, format.width), at(index / GRID, format.height)];
-        let columns: Vec<Vector3<f64>> =
-            estimate.names.iter().map(|name| derivative(calibration, name, pixel, range_m)).collect();
-        let jacobian = DMatrix::from_fn(3, columns.len(), |row, column| columns[column][row]);
-        sum += (&jacobian * &estimate.covariance * jacobian.transpose()).trace();
-    }
-    (sum / (GRID * GRID) as f64).sqrt()
-}
-
-/// Derivative of a corrected point with respect to a calibration parameter, by central differences. Terms of another
-/// integration time than the first do not act on it.
-fn derivative(calibration: &Calibration, name: &str, pixel: [f64; 2], range_m: f64) -> Vector3<f64> {
-    let Some(set) = calibration.sets.first() else { return Vector3::zeros() };
-    let point = |camera: &camera_model::Camera, model: &error_models::RangeErrorModel| {
-        let [x, y] = camera.format.image_from_pixel(pixel);
-        let [xp, yp] = camera.interior.principal_point_mm;
-        let amplitude = model.hyperbola.map_or(f64::NAN, |h| f64::midpoint(h.amplitude_span[0], h.amplitude_span[1]));
-        camera.point(pixel, model.corrected_range(range_m, x - xp, y - yp, amplitude)).coords
-    };
-    // Small against every parameter's own size, large against rounding.
-    let step = 1e-6;
-    let moved = |mut values: Vec<f64>, component: usize, step: f64| {
-        values[component] += step;
-        values
-    };
-    if let Some(component) = camera_names().iter().position(|known| *known == name) {
-        let camera =
-            |step| camera_from(&calibration.camera, &moved(camera_values(&calibration.camera), component, step));
-        let (Some(ahead), Some(behind)) = (camera(step), camera(-step)) else { return Vector3::zeros() };
-        return (point(&ahead, &set.model) - point(&behind, &set.model)) / (2.0 * step);
-    }
-    let Some(component) = range_names(&set.model).iter().position(|known| known == name) else {
-        return Vector3::zeros();
-    };
-    let model = |step| range_model_from(&set.model, &moved(range_values(&set.model), component, step));
-    (point(&calibration.camera, &model(step)) - point(&calibration.camera, &model(-step))) / (2.0 * step)
 }

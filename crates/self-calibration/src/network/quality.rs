@@ -2,10 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use adjust::{BlockId, Observation, Scale};
+use adjust::{BlockId, Distribution, Observation, Scale};
 use nalgebra::{Isometry3, Point3};
 
-use super::distribution::normal_quantile;
 use super::equations::{DistanceEquation, PassiveEquation};
 use super::problem::{Row, Setup, Solved, Source};
 use super::{Component, GroupQuality, ObservationQuality, Verdict};
@@ -20,7 +19,7 @@ const UNCONTROLLED: f64 = 1e-6;
 
 /// Baarda's non-centrality: an error of so many standard deviations of the residual is found with a probability of 80 %.
 pub(crate) fn non_centrality(level: f64) -> f64 {
-    normal_quantile(1.0 - 0.5 * level) + normal_quantile(POWER)
+    Distribution::Normal.critical(level) + Distribution::Normal.quantile(POWER)
 }
 
 /// Figures of one value, whatever adjustment it took part in.

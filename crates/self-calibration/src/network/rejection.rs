@@ -2,10 +2,9 @@
 
 use std::collections::BTreeSet;
 
-use adjust::{Scale, Solution};
+use adjust::{Distribution, Scale, Solution};
 
 use super::Component;
-use super::distribution::normal_quantile;
 use super::problem::{Row, Setup, Solved, Source};
 use crate::{Error, Result};
 
@@ -34,7 +33,7 @@ pub(crate) fn suspects(solution: &Solution, components: &[Component], level: f64
     let testable = |row: usize| standardised[row].is_finite() && redundancy[row] > TESTABLE;
     let rows: Vec<usize> = (0..components.len()).filter(|&row| testable(row)).collect();
     let overall = scale(rows.iter().map(|&row| standardised[row].abs()).collect());
-    let critical = normal_quantile(1.0 - 0.5 * level);
+    let critical = Distribution::Normal.critical(level);
     let mut out = Vec::new();
     let kinds: BTreeSet<Component> = components.iter().copied().collect();
     for kind in kinds {
@@ -108,7 +107,7 @@ impl Setup<'_> {
     /// Takes back what fits the solution that it did not take part in. Its residual has at least its own deviation, so the
     /// test against that alone is on the safe side.
     fn readmit(&mut self, solved: &Solved, level: f64, done: &mut BTreeSet<(Source, Component)>) -> Result<()> {
-        let critical = normal_quantile(1.0 - 0.5 * level);
+        let critical = Distribution::Normal.critical(level);
         let sigma0 = solved.solution.sigma0().unwrap_or(1.0);
         let mut conspicuous: BTreeSet<(Source, Component)> = BTreeSet::new();
         let rejected = self.rejected_rows();

@@ -2,11 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use adjust::{BlockId, Scale, Solution};
+use adjust::{BlockId, Distribution, Scale, Solution};
 use error_models::{ParameterStatus, RangeErrorModel};
 use nalgebra::{DMatrix, Matrix3, Matrix6};
 
-use super::distribution::fisher_tail;
 use super::problem::{Calibration, RangeSet, Setup, Solved};
 use super::quality::{USUAL_LEVEL, groups};
 use super::terms::{camera_from, camera_names, camera_values, range_model_from, range_names, range_values, unit};
@@ -187,9 +186,8 @@ pub(crate) fn parameters(calibration: &Calibration, estimate: &Estimate, fit: &F
         let sigma = column.map(|column| estimate.covariance[(column, column)].max(0.0).sqrt());
         let (sigma_prior, status) = sigma.map_or((0.0, ParameterStatus::Held), |s| (s, ParameterStatus::Estimated));
         let sigma_posterior = if sigma.is_some() { scale * sigma_prior } else { 0.0 };
-        let statistic = (value / sigma_posterior).powi(2);
-        let significance_p =
-            if sigma.is_some() { fisher_tail(1.0, fit.redundancy as f64, statistic) } else { f64::NAN };
+        let student = Distribution::StudentT { dof: fit.redundancy as f64 };
+        let significance_p = sigma.map_or(f64::NAN, |_| student.p_value(value / sigma_posterior));
         let unit = unit(&name).to_owned();
         CalibratedParameter { name: full, value, sigma_prior, sigma_posterior, unit, status, significance_p }
     };

@@ -243,7 +243,7 @@ impl Simulator<'_> {
         // The root by eigenvalues allows for parameters without variance.
         let scale = covariance.diagonal().map(|variance| if variance > 0.0 { variance.sqrt() } else { 1.0 });
         let scaled =
-            SMatrix::<f64, 8, 8>::from_fn(|row, column| covariance[(row, column)] / (scale[row] * scale[column]));
+            SMatrix::<f64, 10, 10>::from_fn(|row, column| covariance[(row, column)] / (scale[row] * scale[column]));
         let eigen = scaled.symmetric_eigen();
         let drawn = eigen.eigenvalues.map(|value| value.max(0.0).sqrt() * self.normal());
         let error = (eigen.eigenvectors * drawn).component_mul(&scale);

@@ -120,8 +120,8 @@ pub fn with_passive(mut network: Network) -> Network {
     let format = ImageFormat::new(1600, 1200, [0.005, 0.005]).unwrap();
     let interior = InteriorOrientation { principal_point_mm: [0.02, 0.01], principal_distance_mm: 9.0 };
     let camera = Camera::new(format, interior, LensDistortion { k1: 2e-4, ..LensDistortion::default() }).unwrap();
-    let sigmas = [2e-3, 2e-3, 2e-3, 2e-6, 2e-7, 2e-9, 1e-6, 1e-6_f64];
-    let covariance = nalgebra::SMatrix::<f64, 8, 8>::from_diagonal(&sigmas.map(|sigma| sigma * sigma).into());
+    let sigmas = [2e-3, 2e-3, 2e-3, 2e-6, 2e-7, 2e-9, 1e-6, 1e-6, 3e-4, 3e-4_f64];
+    let covariance = nalgebra::SMatrix::<f64, 10, 10>::from_diagonal(&sigmas.map(|sigma| sigma * sigma).into());
     let relative = Isometry3::new(Vector3::new(0.08, 0.01, -0.02), Vector3::new(0.01, -0.03, 0.02));
     network.passive = Some(PassiveCamera {
         camera,
@@ -164,4 +164,18 @@ pub fn track_network() -> Network {
     }
     let target = NetworkTarget { name: "T00".to_owned(), point: Some(Point3::origin()), covariance: None };
     Network { distances, ..network(poses, vec![target]) }
+}
+
+/// Frontal stations from 1 m to 8 m, beyond the ambiguity interval, so that offset, periodic terms and scale are told
+/// apart; eight convergent ones for the lens.
+pub fn deep() -> Network {
+    let distances = [1.0, 1.3, 1.7, 2.1, 2.6, 3.1, 3.7, 4.3, 5.0, 5.7, 6.4, 7.1, 7.8];
+    let mut poses: Vec<_> =
+        distances.iter().zip(0..).map(|(d, i)| looking(*d, 0.0, 0.0, f64::from(i % 4) * 90.0)).collect();
+    for index in 0..8 {
+        let around = f64::from(index) * 45.0_f64.to_radians();
+        let (aside, above) = (35.0 * around.cos(), 35.0 * around.sin());
+        poses.push(looking(2.4 + 0.2 * f64::from(index), aside, above, 90.0 * f64::from(index % 4)));
+    }
+    network(poses, field(6, 5, 0.35))
 }

@@ -45,7 +45,7 @@ impl Iteration<'_, '_> {
             self.accept(false)?;
             self.record(StepKind::Damped, length, self.damping, 1.0);
             self.lower_damping(gain, merit, expected);
-            if ending.is_reached(merit, expected, gain, self.layout.rows) {
+            if self.damping <= ending.damping || ending.is_reached(merit, expected, gain, self.layout.rows) {
                 return Ok(true);
             }
         }

@@ -7,14 +7,16 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use crate::layout::Layout;
+use crate::layout::{Layout, Place};
 use crate::linearisation::{Linearisation, Run, take};
 use crate::product::{Left, Right, add_product, with_wide_registers};
-use crate::structure::{Eliminated, Role, Structure};
+use crate::structure::{Eliminated, Reduced, Role, Structure};
 
 /// Fewest observations, and most pieces, into which the sum over observations is divided.
 const PIECE: usize = 4096;
 const PIECES: usize = 16;
+/// Most observations that are added as one: their Jacobians stay in the nearest cache.
+const TOGETHER: usize = 32;
 /// Eliminated blocks in one piece of work.
 pub(crate) const BATCH: usize = 64;
 
@@ -97,7 +99,7 @@ impl BlockNormal {
                 self.reduced[start..start + pair.rows].copy_from_slice(values);
             }
         }
-        structure.scatter(&gradient, &mut self.gradient);
+        structure.scatter(&gradient, &mut self.gradient, 1);
         for block in &structure.reduced {
             for index in 0..block.width {
                 let place = block.start + index;
@@ -141,27 +143,60 @@ impl Source<'_> {
     }
 
     #[inline(always)]
-    fn add_observations(self, observations: Range<usize>, entries: &mut [f64], gradient: &mut [f64]) {
-        let mut parts = Vec::new();
-        for index in observations {
-            let place = &self.layout.observations[index];
-            self.structure.reduced_parts(self.layout.parts(place), &mut parts);
-            for Run { jacobian, whitened, weight } in self.linearisation.runs(place) {
-                let mut pairs = self.structure.pair_of[self.structure.pair_starts[index] as usize..].iter();
-                for (at, (block, offset)) in parts.iter().enumerate() {
-                    let gradient = &mut gradient[block.reduced_columns()];
-                    for (residual, entries) in whitened.iter().zip(jacobian.chunks_exact(place.width)) {
-                        let residual = weight * residual;
-                        gradient.iter_mut().zip(&entries[*offset..]).for_each(|(g, a)| *g += a * residual);
-                    }
-                    let data = &jacobian[*offset..];
-                    let right = Right { data, inner: place.width, column: 1, columns: block.width };
-                    for ((other, offset), &pair) in parts[at..].iter().zip(&mut pairs) {
-                        let out = &mut entries[self.structure.pairs[pair as usize].offset..];
-                        let left = Left { data: &jacobian[*offset..], stride: place.width, rows: other.width };
-                        add_product(out, other.width, left, right, whitened.len(), weight);
-                    }
-                }
+    fn add_observations(self, mut observations: Range<usize>, entries: &mut [f64], gradient: &mut [f64]) {
+        let (mut parts, mut others) = (Vec::new(), Vec::new());
+        while !observations.is_empty() {
+            let first = observations.start;
+            let alike = self.alike(observations.clone(), &mut parts, &mut others);
+            observations.start += alike;
+            let pairs = &self.structure.pair_of[self.structure.pair_starts[first] as usize..];
+            for run in self.linearisation.runs(&self.layout.observations[first..first + alike]) {
+                self.add_run(&run, &parts, pairs, entries, gradient);
+            }
+        }
+    }
+
+    /// Reduced parts of the first of some observations, and how many at the start have the same ones in the same places.
+    /// They are added as one: their Jacobians follow each other in memory.
+    #[inline(always)]
+    fn alike(
+        self,
+        observations: Range<usize>,
+        parts: &mut Vec<(Reduced, usize)>,
+        others: &mut Vec<(Reduced, usize)>,
+    ) -> usize {
+        let places = &self.layout.observations[observations];
+        self.structure.reduced_parts(self.layout.parts(&places[0]), parts);
+        let is_alike = |place: &&Place| {
+            self.structure.reduced_parts(self.layout.parts(place), others);
+            place.width == places[0].width && others == parts
+        };
+        1 + places[1..].iter().take(TOGETHER - 1).take_while(is_alike).count()
+    }
+
+    #[inline(always)]
+    fn add_run(
+        self,
+        run: &Run<'_>,
+        parts: &[(Reduced, usize)],
+        pairs: &[u32],
+        entries: &mut [f64],
+        gradient: &mut [f64],
+    ) {
+        let &Run { jacobian, whitened, weight, width } = run;
+        let mut pairs = pairs.iter();
+        for (at, (block, offset)) in parts.iter().enumerate() {
+            let gradient = &mut gradient[block.reduced_columns()];
+            for (residual, entries) in whitened.iter().zip(jacobian.chunks_exact(width)) {
+                let residual = weight * residual;
+                gradient.iter_mut().zip(&entries[*offset..]).for_each(|(g, a)| *g += a * residual);
+            }
+            let data = &jacobian[*offset..];
+            let right = Right { data, inner: width, column: 1, columns: block.width };
+            for ((other, offset), &pair) in parts[at..].iter().zip(&mut pairs) {
+                let out = &mut entries[self.structure.pairs[pair as usize].offset..];
+                let left = Left { data: &jacobian[*offset..], stride: width, rows: other.width };
+                add_product(out, other.width, left, right, whitened.len(), weight);
             }
         }
     }
@@ -195,7 +230,7 @@ impl Source<'_> {
         for &observation in self.structure.eliminated_observations.list(index as usize) {
             let place = &self.layout.observations[observation as usize];
             let Some((_, part)) = self.structure.eliminated_part(self.layout.parts(place)) else { continue };
-            for Run { jacobian, whitened, weight } in self.linearisation.runs(place) {
+            for Run { jacobian, whitened, weight, .. } in self.linearisation.runs(std::slice::from_ref(place)) {
                 for (residual, entries) in whitened.iter().zip(jacobian.chunks_exact(place.width)) {
                     let residual = weight * residual;
                     gradient.iter_mut().zip(&entries[part.entries()]).for_each(|(g, a)| *g += a * residual);

@@ -5,6 +5,7 @@ use nalgebra::{DMatrix, DVector, Dyn, LU};
 use crate::constraints::Constraints;
 use crate::elimination::EliminatedFactor;
 use crate::normal::Singular;
+use crate::panel;
 
 /// The factorised `N' = N + BᵀB + E Eᵀ` differs from N by the user's constraints B, which does no harm, and by the motions
 /// E of the reduced unknowns, which stand for the datum. The step x is the one with
@@ -42,7 +43,7 @@ impl Border {
             let unscaled: Vec<f64> = row.iter().zip(&own.scale).map(|(e, s)| e / s).collect();
             let start = rows.len();
             rows.resize(start + n, 0.0);
-            factor.structure.scatter(&unscaled, &mut rows[start..]);
+            factor.structure.scatter(&unscaled, &mut rows[start..], 1);
         }
         let columns = Self::influence(factor, &rows, user, inner);
         let count = user + 2 * inner;
@@ -64,17 +65,17 @@ impl Border {
         columns[points.clone()].copy_from_slice(&rows[points.clone()]);
         factor.solve_columns(&mut columns[points]);
         // What acts on reduced unknowns alone has been solved for there already.
-        let from_reduced = |index: usize, sign: f64| -> Vec<f64> {
-            let scaled = &own.influence[index * order..(index + 1) * order];
-            scaled.iter().zip(&own.scale).map(|(y, s)| sign * y * s).collect()
-        };
-        for index in 0..user {
-            factor.backward(&mut columns[index * n..(index + 1) * n], &from_reduced(index, 1.0));
+        let mut reduced = own.influence.clone();
+        for (index, column) in reduced.chunks_exact_mut(order.max(1)).enumerate() {
+            let sign = if index < user { 1.0 } else { -1.0 };
+            column.iter_mut().zip(&own.scale).for_each(|(y, s)| *y *= sign * s);
         }
-        for index in user..user + inner {
-            let start = (index + inner) * n;
-            factor.backward(&mut columns[start..start + n], &from_reduced(index, -1.0));
-        }
+        let count = user + inner;
+        let mut panel = vec![0.0; count * n];
+        factor.backward(&mut panel, &panel::transposed(&reduced, order), count);
+        let whole = panel::transposed(&panel, count);
+        columns[..user * n].copy_from_slice(&whole[..user * n]);
+        columns[(user + inner) * n..].copy_from_slice(&whole[user * n..]);
         columns
     }
 

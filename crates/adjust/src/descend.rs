@@ -36,7 +36,9 @@ impl Adjustment<'_> {
         }
         let layout = Layout::new(self)?;
         let mut iteration = Iteration::new(self, &layout, options)?;
-        if layout.unknowns > 0 && !iteration.descend(&Ending { gain: 0.0, decrease: objective_tolerance })? {
+        if layout.unknowns > 0
+            && !iteration.descend(&Ending { gain: 0.0, decrease: objective_tolerance, damping: 0.0 })?
+        {
             return Err(iteration.not_converged("no step reduces the objective"));
         }
         let (values, objective, trace) = (iteration.values, iteration.current.objective, iteration.trace);

@@ -10,10 +10,6 @@ const LARGEST_DAMPING: f64 = 1e20;
 const LONGEST_BEND: f64 = 0.375;
 /// Difference of found and expected reduction, relative, up to which the model did what was expected.
 const EXPECTED: f64 = 0.1;
-/// The same, up to which it needs hardly any damping.
-const AS_EXPECTED: f64 = 0.02;
-/// Share of the objective that a step near the end promises to take away.
-const NEAR: f64 = 0.2;
 /// Where the model is probed for its curvature, as a share of the step.
 const PROBE: f64 = 0.1;
 
@@ -48,8 +44,8 @@ impl Iteration<'_, '_> {
             }
             self.accept(false)?;
             self.record(StepKind::Damped, length, self.damping, 1.0);
-            self.lower_damping(gain, expected <= NEAR * merit);
-            if ending.is_reached(merit, expected, gain, self.layout.rows) {
+            self.lower_damping(gain, merit, expected);
+            if self.damping <= ending.damping || ending.is_reached(merit, expected, gain, self.layout.rows) {
                 return Ok(true);
             }
         }
@@ -80,11 +76,11 @@ impl Iteration<'_, '_> {
         rows.map(|((probe, v), moved)| ((probe - v) / PROBE + moved) / PROBE).collect()
     }
 
-    fn lower_damping(&mut self, gain: f64, near: bool) {
-        // Nielsen's rule [Nielsen1999]; near the end a model that twice did what was expected needs
-        // hardly any damping.
-        let expected = (gain - 1.0).abs().max((self.last_gain - 1.0).abs()) <= AS_EXPECTED;
-        let least = if near && expected { 0.03 } else { 1.0 / 3.0 };
+    fn lower_damping(&mut self, gain: f64, merit: f64, expected: f64) {
+        // Nielsen's rule [Nielsen1999]. A model that did what was expected, measured by what is left of the objective
+        // as well (far from the solution nearly all of it goes, whatever the step), needs hardly any damping.
+        let miss = (gain - 1.0).abs() * expected;
+        let least = if miss <= EXPECTED * expected.min(merit - expected) { 0.01 } else { 1.0 / 3.0 };
         self.damping = (self.damping * (1.0 - (2.0 * gain - 1.0).powi(3)).max(least)).max(1e-30);
         (self.growth, self.last_gain) = (2.0, gain);
     }

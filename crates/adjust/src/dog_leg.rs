@@ -9,8 +9,8 @@ const SMALLEST_RADIUS: f64 = 1e-20;
 
 /// The two ends of the dog-leg, and their lengths in units of the metric.
 struct Legs {
-    /// The lowest point along the steepest descent; with the user's constraints the step that fulfils them at the least
-    /// cost.
+    /// The lowest point along the steepest descent; with the user's constraints along what they leave of it, from the step
+    /// that fulfils them at the least cost.
     first: Vec<f64>,
     /// The Gauss-Newton step.
     last: Vec<f64>,
@@ -84,25 +84,26 @@ impl Iteration<'_, '_> {
     }
 
     fn first_leg(&mut self, factor: &SystemFactor) -> Vec<f64> {
+        let mut leg = vec![0.0; self.gradient.len()];
+        let mut down = self.gradient.clone();
         if self.constraints.first_inner > 0 {
-            return factor.solve(&vec![0.0; self.gradient.len()], 1.0);
+            leg = factor.solve(&leg, 1.0);
+            self.current.apply(self.layout, &leg, &mut self.moved);
+            let followed = self.current.transpose_apply(self.layout, &self.moved);
+            down.iter_mut().zip(followed).for_each(|(g, followed)| *g -= followed);
         }
-        // Steepest descent in units of the metric, without what the datum holds.
-        let metric = self.metric.clone();
-        let mut down: Vec<f64> = self.gradient.iter().zip(&metric).map(|(g, m)| g * m).collect();
-        for row in self.constraints.scaled(&metric).rows.chunks_exact(metric.len()) {
-            let held: f64 = row.iter().zip(&down).map(|(b, y)| b * y).sum();
-            down.iter_mut().zip(row).for_each(|(y, b)| *y -= held * b);
+        // Steepest descent in units of the metric, without what constraints and datum hold.
+        down.iter_mut().zip(&self.metric).for_each(|(g, m)| *g *= m);
+        for row in orthonormal(&self.constraints.scaled(&self.metric).rows, self.metric.len()) {
+            subtract_shared(&mut down, &row);
         }
-        let slope: f64 = down.iter().map(|y| y * y).sum();
-        down.iter_mut().zip(&metric).for_each(|(y, m)| *y *= m);
+        let slope = dot(&down, &down);
+        down.iter_mut().zip(&self.metric).for_each(|(y, m)| *y *= m);
         self.current.apply(self.layout, &down, &mut self.moved);
         let curvature: f64 = self.moved.iter().zip(&self.current.weights).map(|(m, w)| w * m * m).sum();
         let share = if curvature > 0.0 { slope / curvature } else { 0.0 };
-        for dx in &mut down {
-            *dx *= share;
-        }
-        down
+        leg.iter_mut().zip(&down).for_each(|(dx, y)| *dx += share * y);
+        leg
     }
 
     /// The last point of the path within the radius.
@@ -127,4 +128,35 @@ impl Iteration<'_, '_> {
     fn metric_length(&self, step: &[f64]) -> f64 {
         step.iter().zip(&self.metric).map(|(dx, m)| (dx / m).powi(2)).sum::<f64>().sqrt()
     }
+}
+
+/// Orthonormal directions that span the rows. A row that depends on those before it gives none.
+fn orthonormal(rows: &[f64], length: usize) -> Vec<Vec<f64>> {
+    let mut out: Vec<Vec<f64>> = Vec::new();
+    for row in rows.chunks_exact(length.max(1)) {
+        let mut row = row.to_vec();
+        // Twice is enough (Kahan, Parlett).
+        for other in out.iter().chain(&out) {
+            subtract_shared(&mut row, other);
+        }
+        let norm = dot(&row, &row).sqrt();
+        // Rows are of unit length: below this angle to the rows before, nothing new is held (as for the normal equations).
+        if norm > 1e-5 {
+            for b in &mut row {
+                *b /= norm;
+            }
+            out.push(row);
+        }
+    }
+    out
+}
+
+/// Takes away what a vector shares with one of unit length.
+fn subtract_shared(vector: &mut [f64], unit: &[f64]) {
+    let shared = dot(vector, unit);
+    vector.iter_mut().zip(unit).for_each(|(x, u)| *x -= shared * u);
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }

@@ -1,4 +1,6 @@
 //! Cofactors in the eliminated form: computed block by block from the reduced inverse, when they are asked for.
+// Only what is inlined is compiled for wide registers.
+#![allow(clippy::inline_always)]
 
 use std::sync::OnceLock;
 
@@ -9,6 +11,7 @@ use crate::block_normal::BATCH;
 use crate::elimination::EliminatedFactor;
 use crate::layout::Layout;
 use crate::linearisation::take;
+use crate::panel;
 use crate::product::{Left, Right, add_product, with_wide_registers};
 use crate::structure::{Eliminated, Role, Slot};
 
@@ -67,12 +70,9 @@ impl EliminatedCofactor {
             let batches: Vec<_> =
                 structure.eliminated.chunks(BATCH).map(|b| (b, take(&mut rest, structure.extent(b).1))).collect();
             batches.into_par_iter().for_each(|(blocks, mut out)| {
-                let mut product = Vec::new();
                 for block in blocks {
-                    for slot in &structure.slots[block.slots()] {
-                        self.product(block, slot, &mut product);
-                        take(&mut out, product.len()).copy_from_slice(&product);
-                    }
+                    let count = structure.extent(std::slice::from_ref(block)).1;
+                    with_wide_registers(|| self.own_products(block, take(&mut out, count)));
                 }
             });
             out
@@ -152,6 +152,23 @@ impl EliminatedCofactor {
         out
     }
 
+    /// `H Q_cc` of an eliminated block for its own neighbours. The columns of Q are read one after another, from top to
+    /// bottom.
+    #[inline(always)]
+    fn own_products(&self, block: &Eliminated, out: &mut [f64]) {
+        let (structure, q) = (&self.factor.structure, self.reduced());
+        let slots = &structure.slots[block.slots()];
+        for other in slots {
+            let data = &self.factor.half[other.offset..];
+            let right = Right { data, inner: 1, column: other.width(), columns: block.width };
+            for slot in slots {
+                let data = &q[other.start as usize * structure.order + slot.start as usize..];
+                let left = Left { data, stride: structure.order, rows: slot.width() };
+                add_product(&mut out[slot.offset - block.coupling..], slot.width(), left, right, other.width(), 1.0);
+            }
+        }
+    }
+
     /// `H Q_cc` of an eliminated block for the columns of a slot, which may be another block's: row by row.
     fn product(&self, block: &Eliminated, slot: &Slot, out: &mut Vec<f64>) {
         let (structure, q) = (&self.factor.structure, self.reduced());
@@ -181,7 +198,7 @@ impl EliminatedCofactor {
     /// `L⁻ᵀ` times a matrix.
     fn finish(&self, block: &Eliminated, matrix: &mut DMatrix<f64>) {
         for mut column in matrix.column_iter_mut() {
-            self.factor.multiply_inverse_transposed(block, column.as_mut_slice());
+            self.factor.multiply_inverse_transposed(block, column.as_mut_slice(), 1);
         }
     }
 
@@ -200,13 +217,21 @@ impl EliminatedCofactor {
         out
     }
 
+    /// `Q X` for any number of vectors, one after another.
     fn multiply_in_reduced_datum(&self, x: &[f64]) -> Vec<f64> {
-        let (order, q) = (self.factor.structure.order, self.reduced());
-        let (mut out, mut reduced) = (x.to_vec(), self.factor.structure.gather(x));
-        self.factor.forward(&mut out, &mut reduced);
-        let product: Vec<f64> = q.chunks_exact(order.max(1)).map(|column| dot(column, &reduced)).collect();
-        self.factor.backward(&mut out, &product);
-        out
+        let (n, order, q) = (self.factor.scale.len(), self.factor.structure.order, self.reduced());
+        let count = x.len() / n.max(1);
+        let mut panel = panel::transposed(x, n);
+        let mut reduced = self.factor.structure.gather(&panel, count);
+        self.factor.forward(&mut panel, &mut reduced, count);
+        let mut product = vec![0.0; order * count];
+        with_wide_registers(|| {
+            let left = Left { data: &reduced, stride: count, rows: count };
+            let right = Right { data: q, inner: 1, column: order, columns: order };
+            add_product(&mut product, count, left, right, order, 1.0);
+        });
+        self.factor.backward(&mut panel, &product, count);
+        panel::transposed(&panel, count)
     }
 
     fn datum(&self) -> Option<&Transformation> {
@@ -222,9 +247,7 @@ impl EliminatedCofactor {
         let gauge = DMatrix::from_fn(count, count, |i, j| dot(&row(datum, i), &row(&motions, j)));
         let inverse = gauge.try_inverse()?;
         let motions = DMatrix::from_vec(n, count, motions) * inverse;
-        let images: Vec<f64> =
-            datum.chunks_exact(n).flat_map(|direction| self.multiply_in_reduced_datum(direction)).collect();
-        let images = DMatrix::from_vec(n, count, images);
+        let images = DMatrix::from_vec(n, count, self.multiply_in_reduced_datum(datum));
         let inner = DMatrix::from_column_slice(n, count, datum).transpose() * &images;
         let shares = images - &motions * inner * 0.5;
         (count > 0).then(|| Transformation { motions: motions.data.into(), shares: shares.data.into() })

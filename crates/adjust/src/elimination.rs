@@ -13,7 +13,7 @@ use crate::linearisation::take;
 use crate::normal::{NormalFactor, Singular, damping_of, unit_scale};
 use crate::product::{Left, Right, add_product, with_wide_registers};
 use crate::structure::{Eliminated, Reduced, Role, Structure};
-use crate::{Result, reduced_constraints};
+use crate::{Result, panel, reduced_constraints};
 
 /// With `V = L Lᵀ` and `H = L⁻¹ Wᵀ` (both block by block) the reduced matrix is `S = U − HᵀH`.
 #[derive(Debug, Clone)]
@@ -46,7 +46,7 @@ impl EliminatedFactor {
         }
         let (inverse, half) = eliminate(normal, &extra).ok_or(Singular::Normal)?;
         let matrix = reduce(normal, &half, &extra);
-        let reduced_scale = structure.gather(&scale);
+        let reduced_scale = structure.gather(&scale, 1);
         let rows = reduced_constraints::new(normal, constraints, &reduced_scale);
         let reduced = NormalFactor::of_matrix(matrix, reduced_scale, &rows)?;
         let mut factor = Self { structure, inverse, half, reduced, scale, border: None };
@@ -77,70 +77,87 @@ impl EliminatedFactor {
         if n == 0 {
             return;
         }
-        let mut reduced: Vec<f64> = right.chunks_exact(n).flat_map(|column| self.structure.gather(column)).collect();
-        self.forward(right, &mut reduced);
+        let count = right.len() / n;
+        let mut panel = panel::transposed(right, n);
+        let mut reduced = self.structure.gather(&panel, count);
+        self.forward(&mut panel, &mut reduced, count);
+        let mut columns = panel::transposed(&reduced, count);
         let scale = &self.reduced.scale;
         let rescale = |values: &mut [f64]| {
             for column in values.chunks_exact_mut(order.max(1)) {
                 column.iter_mut().zip(scale).for_each(|(value, s)| *value *= s);
             }
         };
-        rescale(&mut reduced);
-        self.reduced.solve_scaled(&mut reduced);
-        rescale(&mut reduced);
-        self.backward(right, &reduced);
+        rescale(&mut columns);
+        self.reduced.solve_scaled(&mut columns);
+        rescale(&mut columns);
+        self.backward(&mut panel, &panel::transposed(&columns, order), count);
+        right.copy_from_slice(&panel::transposed(&panel, count));
     }
 
-    /// Replaces the eliminated part of the columns by `L⁻¹ b` and takes its share off the reduced part.
-    pub(crate) fn forward(&self, right: &mut [f64], reduced: &mut [f64]) {
-        let (n, order) = (self.scale.len(), self.structure.order);
-        for block in &self.structure.eliminated {
-            for (column, reduced) in right.chunks_exact_mut(n).zip(reduced.chunks_exact_mut(order.max(1))) {
-                let own = &mut column[block.columns()];
-                self.multiply_inverse(block, own);
+    /// Replaces the eliminated part of `count` vectors by `L⁻¹ b` and takes its share off the reduced part. The vectors
+    /// stand side by side: an unknown's elements of all of them follow each other.
+    pub(crate) fn forward(&self, right: &mut [f64], reduced: &mut [f64], count: usize) {
+        with_wide_registers(|| {
+            for block in &self.structure.eliminated {
+                let own = &mut right[block.column * count..][..block.width * count];
+                self.multiply_inverse(block, own, count);
                 for slot in &self.structure.slots[block.slots()] {
-                    let target = &mut reduced[slot.reduced_columns()];
-                    for (row, share) in self.half[slot.offset..].chunks_exact(slot.width()).zip(own.iter()) {
-                        target.iter_mut().zip(row).for_each(|(sum, h)| *sum -= h * share);
+                    let (out, width) = (&mut reduced[slot.start as usize * count..], slot.width());
+                    let half = &self.half[slot.offset..];
+                    if count == 1 {
+                        let left = Left { data: half, stride: width, rows: width };
+                        let right = Right { data: own, inner: 1, column: 0, columns: 1 };
+                        add_product(out, width, left, right, block.width, -1.0);
+                    } else {
+                        let left = Left { data: own, stride: count, rows: count };
+                        let right = Right { data: half, inner: width, column: 1, columns: width };
+                        add_product(out, count, left, right, block.width, -1.0);
                     }
                 }
             }
-        }
+        });
     }
 
-    /// From `L⁻¹ b` and the reduced solution to the whole one.
-    pub(crate) fn backward(&self, right: &mut [f64], reduced: &[f64]) {
-        let (n, order) = (self.scale.len(), self.structure.order);
-        for (column, reduced) in right.chunks_exact_mut(n).zip(reduced.chunks_exact(order.max(1))) {
-            self.structure.scatter(reduced, column);
-        }
-        for block in &self.structure.eliminated {
-            for (column, reduced) in right.chunks_exact_mut(n).zip(reduced.chunks_exact(order.max(1))) {
-                let own = &mut column[block.columns()];
+    /// From `L⁻¹ b` and the reduced solution to the whole one, for vectors side by side.
+    pub(crate) fn backward(&self, right: &mut [f64], reduced: &[f64], count: usize) {
+        self.structure.scatter(reduced, right, count);
+        with_wide_registers(|| {
+            for block in &self.structure.eliminated {
+                let own = &mut right[block.column * count..][..block.width * count];
                 for slot in &self.structure.slots[block.slots()] {
-                    let x = &reduced[slot.reduced_columns()];
-                    for (row, own) in self.half[slot.offset..].chunks_exact(slot.width()).zip(own.iter_mut()) {
-                        *own -= row.iter().zip(x).map(|(h, x)| h * x).sum::<f64>();
-                    }
+                    let data = &reduced[slot.start as usize * count..];
+                    let left = Left { data, stride: count, rows: count };
+                    let data = &self.half[slot.offset..];
+                    let right = Right { data, inner: 1, column: slot.width(), columns: block.width };
+                    add_product(own, count, left, right, slot.width(), -1.0);
                 }
-                self.multiply_inverse_transposed(block, own);
+                self.multiply_inverse_transposed(block, own, count);
             }
-        }
+        });
     }
 
-    /// `x ← L⁻¹ x`.
-    fn multiply_inverse(&self, block: &Eliminated, x: &mut [f64]) {
+    /// `x ← L⁻¹ x` for vectors side by side.
+    #[inline(always)]
+    fn multiply_inverse(&self, block: &Eliminated, x: &mut [f64], count: usize) {
         let inverse = &self.inverse[block.own()];
         for row in (0..block.width).rev() {
-            x[row] = (0..=row).map(|i| inverse[row * block.width + i] * x[i]).sum();
+            for vector in 0..count {
+                let sum = (0..=row).map(|i| inverse[row * block.width + i] * x[i * count + vector]).sum();
+                x[row * count + vector] = sum;
+            }
         }
     }
 
-    /// `x ← L⁻ᵀ x`.
-    pub(crate) fn multiply_inverse_transposed(&self, block: &Eliminated, x: &mut [f64]) {
+    /// `x ← L⁻ᵀ x` for vectors side by side.
+    #[inline(always)]
+    pub(crate) fn multiply_inverse_transposed(&self, block: &Eliminated, x: &mut [f64], count: usize) {
         let inverse = &self.inverse[block.own()];
         for row in 0..block.width {
-            x[row] = (row..block.width).map(|i| inverse[i * block.width + row] * x[i]).sum();
+            for vector in 0..count {
+                let sum = (row..block.width).map(|i| inverse[i * block.width + row] * x[i * count + vector]).sum();
+                x[row * count + vector] = sum;
+            }
         }
     }
 
@@ -178,14 +195,19 @@ impl EliminatedFactor {
 }
 
 impl Structure {
-    /// The reduced unknowns of a vector over all.
-    pub(crate) fn gather(&self, all: &[f64]) -> Vec<f64> {
-        self.reduced.iter().flat_map(|block| all[block.columns()].iter().copied()).collect()
+    /// The reduced unknowns of `count` vectors over all, side by side.
+    pub(crate) fn gather(&self, all: &[f64], count: usize) -> Vec<f64> {
+        let mut out = Vec::with_capacity(self.order * count);
+        for block in &self.reduced {
+            out.extend_from_slice(&all[block.column * count..][..block.width * count]);
+        }
+        out
     }
 
-    pub(crate) fn scatter(&self, reduced: &[f64], all: &mut [f64]) {
+    pub(crate) fn scatter(&self, reduced: &[f64], all: &mut [f64], count: usize) {
         for block in &self.reduced {
-            all[block.columns()].copy_from_slice(&reduced[block.reduced_columns()]);
+            let length = block.width * count;
+            all[block.column * count..][..length].copy_from_slice(&reduced[block.start * count..][..length]);
         }
     }
 }

@@ -9,6 +9,9 @@ use crate::{Adjustment, Error, Method, Result, SolveOptions, StepKind, TraceEntr
 /// A damped step that is expected to reduce the objective by less than this share ends the descent.
 const SMALL_GAIN: f64 = 1e-3;
 
+/// Damping that is none any more: undamped steps go on from there, which need fewer factorisations.
+const SMALL_DAMPING: f64 = 2e-6;
+
 /// Squared residual, in variances, below which an observation fits exactly.
 const EXACT: f64 = 1e-16;
 
@@ -22,6 +25,8 @@ pub(crate) struct Ending {
     pub(crate) gain: f64,
     /// A step was taken that reduced the objective by no more than this share.
     pub(crate) decrease: f64,
+    /// The model did so well what was expected that the damping fell below this.
+    pub(crate) damping: f64,
 }
 
 impl Ending {
@@ -115,17 +120,17 @@ impl<'p, 'a> Iteration<'p, 'a> {
         if self.layout.unknowns == 0 {
             return Ok(());
         }
-        let mut small_gain = SMALL_GAIN;
+        let mut ending = Ending { gain: SMALL_GAIN, decrease: 0.0, damping: SMALL_DAMPING };
         let mut damped = self.options.method != Method::GaussNewton;
         loop {
-            let descended = !damped || self.descend(&Ending { gain: small_gain, decrease: 0.0 })?;
+            let descended = !damped || self.descend(&ending)?;
             if self.polish(damped && descended)? {
                 return Ok(());
             }
             // Undamped steps led nowhere: descend further before they are tried again.
             damped = true;
-            small_gain *= 1e-2;
-            if !descended || small_gain < 1e-30 || self.options.method == Method::GaussNewton {
+            (ending.gain, ending.damping) = (1e-2 * ending.gain, 0.0);
+            if !descended || ending.gain < 1e-30 || self.options.method == Method::GaussNewton {
                 return Err(self.not_converged("neither damped nor undamped steps lead on"));
             }
         }
@@ -163,8 +168,17 @@ impl<'p, 'a> Iteration<'p, 'a> {
             square += self.constraints.scaled(&scale).right.iter().map(|d| d * d).sum::<f64>();
             self.raise_penalty(&scale);
         }
-        let miss: f64 = self.current.constraint.iter().map(|c| c.abs()).sum();
-        (gain + self.penalty * miss, square.sqrt())
+        (gain + self.penalty * self.restored(step), square.sqrt())
+    }
+
+    /// What the step takes off the sum of the absolute misses of the user's constraints, as far as they are linear.
+    fn restored(&self, step: &[f64]) -> f64 {
+        let rows = self.constraints.rows.chunks_exact(step.len().max(1)).zip(&self.current.constraint);
+        let restored = rows.map(|(row, miss)| {
+            let moved: f64 = row.iter().zip(step).map(|(b, dx)| b * dx).sum();
+            miss.abs() - (miss - moved).abs()
+        });
+        restored.sum()
     }
 
     /// Keeps the penalty at twice the largest Lagrange multiplier: then the merit function is smallest at the solution

@@ -38,6 +38,7 @@ mod observation;
 mod options;
 mod orthogonal;
 mod outlier;
+mod panel;
 mod polish;
 mod prior;
 mod product;

@@ -27,12 +27,14 @@ pub(crate) struct Linearisation {
     pub(crate) objective: f64,
 }
 
-/// Consecutive rows of an observation with one weight.
+/// Consecutive rows of alike observations with one weight.
 pub(crate) struct Run<'s> {
     /// Compact Jacobian of the rows.
     pub(crate) jacobian: &'s [f64],
     pub(crate) whitened: &'s [f64],
     pub(crate) weight: f64,
+    /// Length of a row of the Jacobian.
+    pub(crate) width: usize,
 }
 
 /// Some observations and their share of the memory.
@@ -135,16 +137,19 @@ impl Linearisation {
         }
     }
 
-    /// The rows of an observation in runs of equal weight: one, unless some of its components are excluded.
-    pub(crate) fn runs<'s>(&'s self, place: &Place) -> impl Iterator<Item = Run<'s>> + use<'s> {
-        let mut jacobian = &self.jacobian[place.jacobian_range()];
-        let mut whitened = &self.whitened[place.rows()];
-        let width = place.width;
-        self.weights[place.rows()].chunk_by(|a, b| a.to_bits() == b.to_bits()).map(move |weights| {
+    /// The rows of consecutive observations of one width in runs of equal weight: one, unless kernels are robust or some
+    /// components are excluded.
+    pub(crate) fn runs<'s>(&'s self, places: &[Place]) -> impl Iterator<Item = Run<'s>> + use<'s> {
+        let bounds = places.first().zip(places.last());
+        let (rows, entries, width) = bounds.map_or((0..0, 0..0, 0), |(first, last)| {
+            (first.row..last.rows().end, first.jacobian..last.jacobian_range().end, first.width)
+        });
+        let (mut jacobian, mut whitened) = (&self.jacobian[entries], &self.whitened[rows.clone()]);
+        self.weights[rows].chunk_by(|a, b| a.to_bits() == b.to_bits()).map(move |weights| {
             let (residuals, rest) = whitened.split_at(weights.len());
             let (entries, below) = jacobian.split_at(weights.len() * width);
             (whitened, jacobian) = (rest, below);
-            Run { jacobian: entries, whitened: residuals, weight: weights[0] }
+            Run { jacobian: entries, whitened: residuals, weight: weights[0], width }
         })
     }
 

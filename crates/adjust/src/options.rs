@@ -29,7 +29,7 @@ pub struct SolveOptions {
 
 impl Default for SolveOptions {
     fn default() -> Self {
-        Self { method: Method::default(), max_iterations: 1000, step_tolerance: 1e-8, initial_damping: 1e-3 }
+        Self { method: Method::default(), max_iterations: 1000, step_tolerance: 1e-8, initial_damping: 1e-4 }
     }
 }
 

@@ -23,6 +23,9 @@ pub(crate) struct Right<'m> {
 /// the width of the machine's registers has no influence on the bits.
 #[inline(always)]
 pub(crate) fn add_product(out: &mut [f64], stride: usize, left: Left<'_>, right: Right<'_>, inner: usize, factor: f64) {
+    if right.columns == 0 || inner == 0 {
+        return;
+    }
     let mut row = 0;
     while left.rows > row {
         let (out, left) = (&mut out[row..], Left { data: &left.data[row..], ..left });

@@ -2,7 +2,9 @@
 
 use crate::block_normal::BlockNormal;
 use crate::constraints::Constraints;
-use crate::dense;
+use crate::product::{Left, Right, add_product, with_wide_registers};
+use crate::structure::Reduced;
+use crate::{dense, panel};
 
 /// The user's constraints touch no eliminated block. In place of the inner constraints, which live on points, stand the
 /// motions of the reduced unknowns that match those of the points: they make S regular as `G Gᵀ` does with N.
@@ -10,10 +12,12 @@ pub(crate) fn new(normal: &BlockNormal, constraints: &Constraints, scale: &[f64]
     let (structure, n) = (&normal.structure, normal.diagonal.len());
     let user = constraints.first_inner;
     let mut rows: Vec<f64> =
-        constraints.rows.chunks_exact(n.max(1)).take(user).flat_map(|row| structure.gather(row)).collect();
-    for motion in constraints.motions.chunks_exact(n.max(1)) {
+        constraints.rows.chunks_exact(n.max(1)).take(user).flat_map(|row| structure.gather(row, 1)).collect();
+    let count = constraints.motions.len() / n.max(1);
+    let motions = matching_motions(normal, &panel::transposed(&constraints.motions, n), count);
+    for motion in panel::transposed(&motions, count).chunks_exact(structure.order.max(1)) {
         // A motion h of unknowns in units of `scale` is h / scale; rows are multiplied by the scale again.
-        rows.extend(matching_motion(normal, motion).iter().zip(scale).map(|(h, s)| h / (s * s)));
+        rows.extend(motion.iter().zip(scale).map(|(h, s)| h / (s * s)));
     }
     Constraints {
         count: constraints.count,
@@ -24,41 +28,54 @@ pub(crate) fn new(normal: &BlockNormal, constraints: &Constraints, scale: &[f64]
     }
 }
 
-/// Motion of the reduced unknowns that goes with one of the points: the solution of `U h_c = −W h_o`, by one sweep of
-/// substitution through its blocks. It is exact where stations are tied to each other only by a border that does not
-/// move; elsewhere it is a start that the factorisation of S makes exact.
-fn matching_motion(normal: &BlockNormal, motion: &[f64]) -> Vec<f64> {
+/// Motions of the reduced unknowns that go with `count` motions of the points, all side by side: the solutions of
+/// `U h_c = −W h_o`, by one sweep of substitution through its blocks. They are exact where stations are tied to each other
+/// only by a border that does not move; elsewhere they are a start that the factorisation of S makes exact.
+fn matching_motions(normal: &BlockNormal, motions: &[f64], count: usize) -> Vec<f64> {
     let structure = &normal.structure;
     let order = structure.order;
-    let (mut force, mut out) = (vec![0.0; order], vec![0.0; order]);
-    for block in &structure.eliminated {
-        let own = &motion[block.columns()];
-        for slot in &structure.slots[block.slots()] {
-            let target = &mut force[slot.reduced_columns()];
-            for (row, share) in normal.coupling[slot.offset..].chunks_exact(slot.width()).zip(own) {
-                target.iter_mut().zip(row).for_each(|(sum, w)| *sum -= w * share);
+    let (mut force, mut out) = (vec![0.0; order * count], vec![0.0; order * count]);
+    if count == 0 {
+        return out;
+    }
+    with_wide_registers(|| {
+        for block in &structure.eliminated {
+            let left = Left { data: &motions[block.column * count..], stride: count, rows: count };
+            for slot in &structure.slots[block.slots()] {
+                let data = &normal.coupling[slot.offset..];
+                let right = Right { data, inner: slot.width(), column: 1, columns: slot.width() };
+                add_product(&mut force[slot.start as usize * count..], count, left, right, block.width, -1.0);
             }
         }
-    }
+    });
     for block in &structure.reduced {
-        let (own, given) = (block.reduced_columns(), &motion[block.columns()]);
+        let own = block.start * count..(block.start + block.width) * count;
+        let given = &motions[block.column * count..][..block.width * count];
         if given.iter().any(|&h| h != 0.0) {
             // A point of the datum that is not eliminated moves as the others.
             out[own.clone()].copy_from_slice(given);
-        } else {
-            let mut factor: Vec<f64> =
-                own.clone().flat_map(|column| &normal.reduced[column * order..][own.clone()]).copied().collect();
-            let solution = &mut out[own.clone()];
-            if dense::cholesky(&mut factor, block.width) {
-                solution.copy_from_slice(&force[own.clone()]);
-                dense::solve_cholesky(&factor, block.width, solution, 1);
-            }
+        } else if let Some(solution) = solve_block(normal, block, &force[own.clone()], count) {
+            out[own.clone()].copy_from_slice(&solution);
         }
-        for column in own.clone() {
-            let share = out[column];
-            let values = &normal.reduced[column * order + own.end..(column + 1) * order];
-            force[own.end..].iter_mut().zip(values).for_each(|(sum, u)| *sum -= u * share);
-        }
+        let end = block.start + block.width;
+        with_wide_registers(|| {
+            let left = Left { data: &out[own], stride: count, rows: count };
+            let data = &normal.reduced[block.start * order + end..];
+            let right = Right { data, inner: order, column: 1, columns: order - end };
+            add_product(&mut force[end * count..], count, left, right, block.width, -1.0);
+        });
     }
     out
+}
+
+/// Solution with a block on the diagonal of U, for vectors side by side; `None` where it is singular.
+fn solve_block(normal: &BlockNormal, block: &Reduced, force: &[f64], count: usize) -> Option<Vec<f64>> {
+    let (own, order) = (block.reduced_columns(), normal.structure.order);
+    let mut factor: Vec<f64> =
+        own.clone().flat_map(|column| &normal.reduced[column * order..][own.clone()]).copied().collect();
+    let mut columns = panel::transposed(force, count);
+    dense::cholesky(&mut factor, block.width).then(|| {
+        dense::solve_cholesky(&factor, block.width, &mut columns, count);
+        panel::transposed(&columns, block.width)
+    })
 }

@@ -40,7 +40,7 @@ pub(crate) struct Structure {
 }
 
 /// A block that stays.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Reduced {
     pub(crate) block: usize,
     /// First column among all unknowns.
@@ -142,10 +142,6 @@ impl Eliminated {
 }
 
 impl Reduced {
-    pub(crate) fn columns(&self) -> Range<usize> {
-        self.column..self.column + self.width
-    }
-
     pub(crate) fn reduced_columns(&self) -> Range<usize> {
         self.start..self.start + self.width
     }

@@ -134,6 +134,46 @@ fn nonlinear_constraints_hold_at_the_end() {
     }
 }
 
+/// Rosenbrock's valley with its floor beyond a circle: the way along the circle bends all the time, so that the region of
+/// trust binds and steps between the two legs are taken.
+#[test]
+fn a_curved_valley_is_followed_along_a_constraint() {
+    let mut found = Vec::new();
+    for method in [Method::LevenbergMarquardt, Method::DogLeg] {
+        let mut a = Adjustment::new();
+        let x = a.add_block(ParameterBlock::euclidean([-1.2, 1.0]));
+        let group = a.add_group("valley");
+        let valley = FunctionObservation::new([x], 2, |parameters, residual, jacobians| {
+            let &[x, y] = parameters[0] else { return Err(EvaluationFailure::new("a point of the plane")) };
+            residual.copy_from_slice(&[-10.0 * (y - x * x), 2.0 - x]);
+            if let Some(jacobians) = jacobians {
+                jacobians.row(0, 0).copy_from_slice(&[-20.0 * x, 10.0]);
+                jacobians.row(0, 1)[0] = 1.0;
+            }
+            Ok(())
+        });
+        a.add_observation(group, valley, &Covariance::from_sigmas(&[1.0; 2])).unwrap();
+        let circle = FunctionObservation::new([x], 1, |parameters, residual, jacobians| {
+            let &[x, y] = parameters[0] else { return Err(EvaluationFailure::new("a point of the plane")) };
+            residual[0] = 9.0 - x * x - y * y;
+            if let Some(jacobians) = jacobians {
+                jacobians.row(0, 0).copy_from_slice(&[2.0 * x, 2.0 * y]);
+            }
+            Ok(())
+        });
+        a.add_constraint(circle).unwrap();
+        let solution = a.solve(&SolveOptions { method, ..SolveOptions::default() }).unwrap();
+        let &[x, y] = solution.values(x).unwrap() else { panic!("two values") };
+        assert_relative_eq!(x * x + y * y, 9.0, max_relative = 1e-14);
+        // On the circle the objective is stationary: its gradient has no part along the tangent (−y, x). The gradient's
+        // parts are of the order of 100, the step ended at 1e-8 standard deviations.
+        let gradient = [-200.0 * x * (y - x * x) - (2.0 - x), 100.0 * (y - x * x)];
+        assert!((gradient[1] * x - gradient[0] * y).abs() < 1e-5);
+        found.push([x, y]);
+    }
+    assert_relative_eq!(found[0][0], found[1][0], epsilon = 1e-9);
+}
+
 #[test]
 fn contradicting_constraints_are_refused() {
     let mut a = Adjustment::new();

@@ -6,7 +6,7 @@ mod support;
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use self_calibration::{
-    CalibrationOptions, Method, SightingOptions, SimulatedStart, TermSelection, calibrate, simulate_sightings,
+    CalibrationOptions, SightingOptions, SimulatedStart, TermSelection, calibrate, simulate_sightings,
 };
 use support::networks::{all_but_long_wave, nominal, normal};
 
@@ -17,13 +17,12 @@ fn networks(criterion: &mut Criterion) {
     let listed = TermSelection::List(all_but_long_wave());
     let mut group = criterion.benchmark_group("network of 24 stations, 103 targets");
     group.sample_size(10);
-    for (name, method, rejection_level) in [
-        ("one step", Method::OneStep, None),
-        ("one step, gross errors looked for", Method::OneStep, Some(1e-4)),
-        ("two steps, dependent", Method::TwoStepDependent, None),
+    for (name, terms, rejection_level) in [
+        ("one step", listed.clone(), None),
+        ("one step, gross errors looked for", listed, Some(1e-4)),
+        ("one step, gross errors looked for, terms chosen", TermSelection::Auto, Some(1e-4)),
     ] {
-        let options =
-            CalibrationOptions { method, terms: listed.clone(), rejection_level, ..CalibrationOptions::default() };
+        let options = CalibrationOptions { terms, rejection_level, ..CalibrationOptions::default() };
         group.bench_function(name, |bencher| bencher.iter(|| calibrate(&observed, &options).unwrap()));
     }
     group.finish();

@@ -25,9 +25,9 @@ fn observed(hyperbola: Option<AmplitudeHyperbola>) -> Network {
     observed
 }
 
-fn hyperbola() -> Option<AmplitudeHyperbola> {
+fn hyperbola() -> AmplitudeHyperbola {
     let [h1, h2, h3] = TRUE;
-    Some(AmplitudeHyperbola { h1, h2, h3, amplitude_span: [15.0, 90_000.0] })
+    AmplitudeHyperbola { h1, h2, h3, amplitude_span: [15.0, 90_000.0] }
 }
 
 #[test]
@@ -35,7 +35,7 @@ fn a_listed_hyperbola_finds_its_start() {
     let mut names = all_but_long_wave();
     names.extend(AmplitudeHyperbola::NAMES.map(str::to_owned));
     let options = CalibrationOptions { terms: TermSelection::List(names), ..CalibrationOptions::default() };
-    let outcome = calibrate(&observed(hyperbola()), &options).unwrap();
+    let outcome = calibrate(&observed(Some(hyperbola())), &options).unwrap();
     let d = [("d0", 0.024), ("d6", -0.009), ("d7", 0.004)];
     for (name, value) in AmplitudeHyperbola::NAMES.into_iter().zip(TRUE).chain(d) {
         let found = outcome.parameter(name).unwrap();
@@ -59,6 +59,6 @@ fn auto_takes_a_hyperbola_where_there_is_one_and_only_there() {
         let outcome = calibrate(&observed(hyperbola), &CalibrationOptions::default()).unwrap();
         AmplitudeHyperbola::NAMES.map(|name| outcome.estimated.iter().any(|known| known == name))
     };
-    assert_eq!(taken(hyperbola()), [true; 3]);
+    assert_eq!(taken(Some(hyperbola())), [true; 3]);
     assert_eq!(taken(None), [false; 3]);
 }

@@ -15,7 +15,8 @@ use crate::{Error, Result};
 /// Knots of the spline that is tried instead of the sines: three to the shortest wave of Eq. 14, so that it can follow all
 /// that the sines can, and more.
 const KNOTS: usize = 12;
-/// By how much Schwarz's criterion has to be lower for a model of another kind: "very strong" evidence \[KassRaftery1995\].
+/// By how much Schwarz's criterion has to be lower for a model of another kind: "very strong" evidence
+/// `[KassRaftery1995]`.
 const CLEAR_MARGIN: f64 = 10.0;
 
 impl Problem<'_> {

@@ -29,9 +29,10 @@ enum Word {
 impl Word {
     /// The word, or `None` for every other name.
     fn parse(name: &str) -> Option<Self> {
-        let words: [(&str, fn(usize) -> Self); 3] =
-            [("spline", Self::Spline), ("polynomial", Self::Polynomial), ("surface", Self::Surface)];
-        words.into_iter().find_map(|(word, of)| name.strip_prefix(word)?.parse().ok().map(of))
+        let number = |word: &str| name.strip_prefix(word)?.parse().ok();
+        let spline = number("spline").map(Self::Spline);
+        let spline_or_polynomial = spline.or_else(|| number("polynomial").map(Self::Polynomial));
+        spline_or_polynomial.or_else(|| number("surface").map(Self::Surface))
     }
 
     /// Whether a name belongs to the coefficients of the word.
@@ -74,12 +75,11 @@ pub(crate) fn expand<'n>(
     let known = network.range_model.parameter_names();
     let mut terms = BTreeSet::new();
     for name in names {
-        match Word::parse(name) {
-            Some(word) => terms.extend(known.iter().filter(|known| word.owns(known)).cloned()),
-            None => {
-                check_term(&network, name)?;
-                terms.insert(name.clone());
-            }
+        if let Some(word) = Word::parse(name) {
+            terms.extend(known.iter().filter(|known| word.owns(known)).cloned());
+        } else {
+            check_term(&network, name)?;
+            terms.insert(name.clone());
         }
     }
     Ok((network, terms))

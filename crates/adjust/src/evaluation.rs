@@ -35,8 +35,14 @@ impl Failure {
     }
 
     fn check(values: &[f64], width: usize, what: &'static str) -> Result<(), Self> {
-        // Zero times anything that is not finite is NaN: one sum without branches.
-        if values.iter().map(|value| value * 0.0).sum::<f64>() == 0.0 {
+        // Zero times anything that is not finite is NaN: eight sums without branches, that do not wait for each other.
+        let (eights, rest) = values.as_chunks::<8>();
+        let mut sums = [0.0; 8];
+        for eight in eights {
+            sums.iter_mut().zip(eight).for_each(|(sum, value)| *sum += value * 0.0);
+        }
+        sums.iter_mut().zip(rest).for_each(|(sum, value)| *sum += value * 0.0);
+        if sums.iter().sum::<f64>() == 0.0 {
             return Ok(());
         }
         match values.iter().position(|value| !value.is_finite()) {

@@ -10,9 +10,9 @@ const STAGNANT: usize = 4;
 const HARMLESS: f64 = 1e-6;
 
 /// Standard deviations of a step that leaves its factor good for the next one, if that shortens as it should.
-const REUSABLE: f64 = 10.0;
+const REUSABLE: f64 = 1.0;
 /// Share of the last step that the next one with the same factor may have.
-const SHORTENING: f64 = 0.2;
+const SHORTENING: f64 = 0.1;
 
 /// Observations that fit better than this share of their standard deviation fit exactly.
 const SMALLEST_SIGMA0: f64 = 1e-8;

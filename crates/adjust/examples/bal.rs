@@ -40,8 +40,10 @@ fn run() {
     let start = cpu();
     if !has("full") {
         let descent = bundle.adjustment.descend(&options, 1e-6).unwrap();
-        println!("descent: {:.3} s CPU, {:.3} s wall with reading", cpu() - start, wall.elapsed().as_secs_f64());
-        println!("cost {:.6e} after {} iterations", 0.5 * descent.objective(), descent.iterations());
+        println!("cpu_seconds {:.3}", cpu() - start);
+        println!("wall_seconds_with_reading {:.3}", wall.elapsed().as_secs_f64());
+        println!("cost {:.6e}", 0.5 * descent.objective());
+        println!("iterations {}", descent.iterations());
         for entry in descent.trace() {
             println!(
                 "  {:?} {:.8e} step {:.2e} damping {:.1e}",

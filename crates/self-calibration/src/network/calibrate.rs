@@ -52,10 +52,10 @@ pub fn calibrate(network: &Network, options: &CalibrationOptions) -> Result<Cali
 }
 
 /// Calibrates in two independent steps: the lens from the image points of one network, the range terms from another,
-/// whose stations are oriented by resection from independently known targets.
+/// whose stations are oriented by resection from independently known targets: coordinates with their deviations.
 ///
 /// Lens and covariance of the first network are handed on to the resection, and the covariance of lens and poses to the
-/// range terms. Targets of the second network need coordinates; without a covariance they are free of error. The datum
+/// range terms. Targets of the second network need coordinates with a covariance. The datum
 /// of the options is that of the first network. The image points of the second improve the lens as well.
 ///
 /// # Errors
@@ -284,14 +284,19 @@ impl Problem<'_> {
         let seen: BTreeSet<usize> = self.network.sightings.iter().map(|seen| seen.target).collect();
         let unknown: Vec<&str> = seen
             .into_iter()
-            .filter(|&target| self.network.targets[target].point.is_none())
+            .filter(|&target| {
+                let target = &self.network.targets[target];
+                target.point.is_none() || target.covariance.is_none()
+            })
             .map(|target| self.network.targets[target].name.as_str())
             .collect();
         if unknown.is_empty() {
             return Ok(());
         }
-        Err(self
-            .needs(&format!("known coordinates of the targets of the range network; {} have none", unknown.join(", "))))
+        Err(self.needs(&format!(
+            "known coordinates, with standard deviations, of the targets of the range network; {} have none",
+            unknown.join(", ")
+        )))
     }
 }
 

@@ -129,9 +129,14 @@ fn from_coordinates(
     columns: &mut Columns,
 ) -> Result<f64> {
     let (from, to) = (&network.stations[station], &network.targets[target]);
-    let (Some(pose), Some(point)) = (from.world_from_camera, to.point) else {
+    // Without standard deviations a pose or coordinates are an approximation, which is no reference.
+    let known_pose = from.world_from_camera.zip(from.covariance);
+    let (Some((pose, of_pose)), Some((point, of_point))) = (known_pose, to.point.zip(to.covariance)) else {
         let pair = network.pair(station, target);
-        let needs = format!("{pair} has a range, but neither a known distance nor a known pose and known coordinates");
+        let needs = format!(
+            "{pair} has a range, but neither a known distance nor a known pose and known coordinates, each with its \
+             standard deviations"
+        );
         return Err(Error::MethodNeeds { method: "laboratory".to_owned(), needs });
     };
     let arm = point.coords - pose.translation.vector;
@@ -141,9 +146,9 @@ fn from_coordinates(
         return Err(Error::MethodNeeds { method: "laboratory".to_owned(), needs });
     }
     let direction = arm / length;
-    let position = from.covariance.map(|covariance| covariance.fixed_view::<3, 3>(0, 0).into_owned());
-    for (origin, covariance) in [(Origin::Station(station), position), (Origin::Target(target), to.covariance)] {
-        if let Some(factor) = covariance.and_then(nalgebra::Matrix3::cholesky) {
+    let position = of_pose.fixed_view::<3, 3>(0, 0).into_owned();
+    for (origin, covariance) in [(Origin::Station(station), position), (Origin::Target(target), of_point)] {
+        if let Some(factor) = covariance.cholesky() {
             let sign = if matches!(origin, Origin::Station(_)) { -1.0 } else { 1.0 };
             let part = (direction.transpose() * factor.l()) * sign;
             columns.add(row, origin, part.as_slice());

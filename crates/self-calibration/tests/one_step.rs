@@ -53,3 +53,25 @@ fn the_normal_network_is_solved() {
     let sum: f64 = outcome.groups.iter().map(|group| group.redundancy).sum();
     assert!((sum - outcome.redundancy as f64).abs() < 1e-6, "{sum}");
 }
+
+#[test]
+fn classes_of_amplitude_show_where_the_stated_deviations_are_wrong() {
+    let sightings =
+        SightingOptions { amplitude_at_1_m: Some(2000.0), reflectance_span: [0.1, 10.0], ..SightingOptions::default() };
+    let mut observed = simulate_sightings(&normal(), &sightings).unwrap();
+    nominal(&mut observed);
+    let mut amplitudes: Vec<f64> = observed.sightings.iter().map(|seen| seen.amplitude.unwrap()).collect();
+    amplitudes.sort_by(f64::total_cmp);
+    let quarter = amplitudes[amplitudes.len() / 4];
+    for seen in observed.sightings.iter_mut().filter(|seen| seen.amplitude.unwrap() < quarter) {
+        seen.sigma_range_m *= 0.5;
+    }
+    let outcome = calibrate(&observed, &CalibrationOptions { rejection_level: None, ..options() }).unwrap();
+    let classes = outcome.amplitude_classes();
+    let range = outcome.groups.iter().find(|group| group.name == "range").unwrap();
+    assert_eq!(classes.iter().map(|class| class.observations).sum::<usize>(), range.observations);
+    // Some 400 ranges a class: sigma0 scatters by 1 / √800 = 0.035 of itself.
+    let [dark, others @ ..] = classes.as_slice() else { panic!("no classes") };
+    assert!((dark.sigma0.unwrap() - 2.0).abs() < 0.3, "{classes:?}");
+    assert!(others.len() == 3 && others.iter().all(|class| (class.sigma0.unwrap() - 1.0).abs() < 0.15), "{classes:?}");
+}

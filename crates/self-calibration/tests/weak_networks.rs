@@ -1,5 +1,5 @@
 //! Networks that do not determine their parameters are refused with what to add.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout)]
 
 mod support;
 
@@ -20,6 +20,7 @@ fn refused(truth: &Network, terms: &[&str], method: Method) -> (String, f64, Str
     match calibrated(truth, terms, method) {
         Err(Error::WeakNetwork { combination, inflation, advice, correlation }) => {
             assert!(correlation.contains("correlation") || correlation.contains("reference"), "{correlation}");
+            println!("refused: {combination}, inflation {inflation:.0}; {advice}");
             (combination, inflation, advice)
         }
         other => panic!("{other:?}"),
@@ -57,6 +58,7 @@ fn the_normal_network_passes_and_the_long_wave_is_told() {
     assert!(!said.iter().any(|sentence| sentence.contains("weakest")), "{said:?}");
     all.extend(["d2", "d3"]);
     let said = calibrated(&normal(), &all, Method::OneStep).unwrap().join(" ");
+    println!("accepted: {said}");
     assert!(said.contains("d0") && said.contains("d2") && said.contains("distance"), "{said}");
 }
 

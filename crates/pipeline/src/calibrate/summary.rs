@@ -79,6 +79,8 @@ pub struct CalibrationSummary {
     pub diagnosis: Vec<String>,
     /// Observation groups.
     pub groups: Vec<GroupSummary>,
+    /// The ranges by amplitude, the darkest first.
+    pub amplitude_classes: Vec<GroupSummary>,
     /// Decisions of the automatic choice of terms.
     pub decisions: Vec<DecisionSummary>,
     /// Wall-clock time of the whole run, second.
@@ -256,7 +258,8 @@ impl CalibrationSummary {
             correlation: CorrelationSummary::new(&outcome.estimated, &outcome.covariance),
             rejected: rejected(outcome),
             diagnosis: outcome.diagnosis.clone(),
-            groups: groups(outcome),
+            groups: outcome.groups.iter().map(|group| group_summary(group, &group.name)).collect(),
+            amplitude_classes: outcome.amplitude_classes().iter().map(|class| group_summary(class, "range")).collect(),
             decisions: decisions(outcome),
             seconds: 0.0,
             out: PathBuf::new(),
@@ -283,6 +286,7 @@ impl CalibrationSummary {
             rejected: Vec::new(),
             diagnosis: vec![reason],
             groups: Vec::new(),
+            amplitude_classes: Vec::new(),
             decisions: Vec::new(),
             seconds: 0.0,
             out: PathBuf::new(),
@@ -306,16 +310,16 @@ fn rejected(outcome: &CalibrationOutcome) -> Vec<RejectedObservation> {
         .collect()
 }
 
-fn groups(outcome: &CalibrationOutcome) -> Vec<GroupSummary> {
-    let group = |group: &self_calibration::GroupQuality| GroupSummary {
+/// `kind` is the group that the unit belongs to.
+fn group_summary(group: &self_calibration::GroupQuality, kind: &str) -> GroupSummary {
+    GroupSummary {
         name: group.name.clone(),
         observations: group.observations,
         redundancy: group.redundancy,
         rms: group.rms,
-        unit: group_unit(&group.name),
+        unit: group_unit(kind),
         sigma0: group.sigma0,
-    };
-    outcome.groups.iter().map(group).collect()
+    }
 }
 
 fn decisions(outcome: &CalibrationOutcome) -> Vec<DecisionSummary> {

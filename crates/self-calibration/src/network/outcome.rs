@@ -173,7 +173,8 @@ pub struct GroupQuality {
     pub redundancy: f64,
     /// Root mean square of the residuals, unit of the group.
     pub rms: f64,
-    /// √ of its variance component: how much larger its standard deviations are than they were given.
+    /// `√(vᵀPv / redundancy)` of the group, the first estimate of its variance component: how much larger its standard
+    /// deviations seem to be than they were given.
     pub sigma0: Option<f64>,
 }
 

@@ -7,7 +7,7 @@ use nalgebra::{Isometry3, Point3};
 
 use super::equations::{DistanceEquation, PassiveEquation};
 use super::problem::{Row, Setup, Solved, Source};
-use super::{Component, GroupQuality, ObservationQuality, Verdict};
+use super::{CalibrationOutcome, Component, GroupQuality, ObservationQuality, Verdict};
 use crate::Result;
 
 /// Level of the outlier test where none is asked for.
@@ -236,23 +236,49 @@ impl Setup<'_> {
     }
 }
 
+/// Classes of equal size that ranges are divided into by their amplitude.
+const AMPLITUDE_CLASSES: usize = 4;
+
 /// Figures of the groups of values of one kind.
 pub(crate) fn groups(qualities: &[ObservationQuality]) -> Vec<GroupQuality> {
-    let mut sums: BTreeMap<Component, [f64; 4]> = BTreeMap::new();
-    for quality in qualities.iter().filter(|q| matches!(q.verdict, Verdict::Used | Verdict::Uncontrolled)) {
-        let sum = sums.entry(quality.component).or_default();
-        let scaled = quality.residual / quality.sigma;
-        let parts = [1.0, quality.redundancy_number, quality.residual * quality.residual, scaled * scaled];
-        sum.iter_mut().zip(parts).for_each(|(sum, part)| *sum += part);
+    let mut kinds: BTreeMap<Component, Vec<&ObservationQuality>> = BTreeMap::new();
+    for quality in used(qualities) {
+        kinds.entry(quality.component).or_default().push(quality);
     }
-    let group = |(component, [count, redundancy, squares, vtpv]): (Component, [f64; 4])| GroupQuality {
-        name: component.name().to_owned(),
-        observations: count as usize,
+    kinds.into_iter().map(|(component, group)| figures(component.name().to_owned(), &group)).collect()
+}
+
+impl CalibrationOutcome {
+    /// Figures of the ranges by amplitude, in four classes of equal size, the darkest first: whether the standard
+    /// deviations that were stated hold for dark and for bright targets. Empty where no range has an amplitude.
+    pub fn amplitude_classes(&self) -> Vec<GroupQuality> {
+        let with_amplitude = |q: &&ObservationQuality| q.component == Component::Range && q.amplitude.is_finite();
+        let mut ranges: Vec<_> = used(&self.residuals).filter(with_amplitude).collect();
+        ranges.sort_by(|a, b| a.amplitude.total_cmp(&b.amplitude));
+        let class = |class: &[&ObservationQuality]| {
+            let [darkest, brightest] = [class[0], class[class.len() - 1]].map(|quality| quality.amplitude);
+            figures(format!("range, amplitude {darkest:.0} to {brightest:.0}"), class)
+        };
+        ranges.chunks(ranges.len().div_ceil(AMPLITUDE_CLASSES).max(1)).map(class).collect()
+    }
+}
+
+fn used(qualities: &[ObservationQuality]) -> impl Iterator<Item = &ObservationQuality> {
+    qualities.iter().filter(|quality| matches!(quality.verdict, Verdict::Used | Verdict::Uncontrolled))
+}
+
+fn figures(name: String, group: &[&ObservationQuality]) -> GroupQuality {
+    let sum = |part: fn(&ObservationQuality) -> f64| group.iter().map(|quality| part(quality)).sum::<f64>();
+    let count = group.len() as f64;
+    let redundancy = sum(|quality| quality.redundancy_number);
+    let vtpv = sum(|quality| (quality.residual / quality.sigma).powi(2));
+    GroupQuality {
+        name,
+        observations: group.len(),
         redundancy,
-        rms: (squares / count).sqrt(),
+        rms: (sum(|quality| quality.residual.powi(2)) / count).sqrt(),
         sigma0: (redundancy > UNCONTROLLED * count).then(|| (vtpv / redundancy).sqrt()),
-    };
-    sums.into_iter().map(group).collect()
+    }
 }
 
 impl Component {

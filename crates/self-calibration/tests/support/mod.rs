@@ -3,6 +3,7 @@
 
 pub mod cases;
 pub mod networks;
+pub mod unknown_walls;
 
 use error_models::{AmplitudeHyperbola, RangeErrorModel, RangeTerms};
 use rand::{RngExt, SeedableRng};

@@ -100,7 +100,7 @@ pub(super) fn groups(page: &mut Page, summary: &CalibrationSummary) {
             group.sigma0.map_or("–".to_owned(), |sigma0| format!("{sigma0:.3}")),
         ]
     };
-    let rows: Vec<_> = summary.groups.iter().map(row).collect();
+    let rows: Vec<_> = summary.groups.iter().chain(&summary.amplitude_classes).map(row).collect();
     page.table(&["group", "observed values", "redundancy", "rms of the residuals", "sigma0"], &rows);
 }
 

@@ -27,5 +27,4 @@ pub(crate) use control::pose_covariance;
 pub(crate) use distances::named_distances;
 pub(crate) use run::{is_refusal, json};
 pub(crate) use start::Start;
-pub(crate) use summary::unit_of;
 pub(crate) use words::readable;

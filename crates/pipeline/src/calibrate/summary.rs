@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use error_models::ParameterStatus;
 use nalgebra::DMatrix;
+use range_io::calibration::Calibration;
 use self_calibration::{CalibratedParameter, CalibrationOutcome, Verdict};
 use serde::Serialize;
 use serde::ser::{SerializeMap, Serializer};
@@ -11,34 +12,9 @@ use serde::ser::{SerializeMap, Serializer};
 use super::names::group_unit;
 use super::request::CalibrateMethod;
 
-/// Names and units of the parameters that a summary always has, in its order.
-pub(crate) const PARAMETERS: [(&str, &str); 20] = [
-    ("xp", "mm"),
-    ("yp", "mm"),
-    ("c", "mm"),
-    ("k1", "1/mm^2"),
-    ("k2", "1/mm^4"),
-    ("k3", "1/mm^6"),
-    ("p1", "1/mm"),
-    ("p2", "1/mm"),
-    ("d0", "m"),
-    ("d2", "m"),
-    ("d3", "m"),
-    ("d4", "m"),
-    ("d5", "m"),
-    ("d6", "m"),
-    ("d7", "m"),
-    ("e1", "m/mm"),
-    ("e2", "m/mm"),
-    ("h1", "1/amplitude"),
-    ("h2", "1/(m*amplitude)"),
-    ("h3", "1/m^2"),
-];
-
-/// The unit of a parameter as `calibration.ron` writes it, whatever spelling an outcome has.
-pub(crate) fn unit_of<'a>(name: &str, otherwise: &'a str) -> &'a str {
-    let name = name.split('@').next().unwrap_or(name);
-    PARAMETERS.iter().find(|(known, _)| *known == name).map_or(otherwise, |(_, unit)| unit)
+/// Names and units of the parameters that a summary always has, in its order: those of camera and range terms.
+fn always_listed() -> impl Iterator<Item = (&'static str, &'static str)> {
+    Calibration::CAMERA_PARAMETERS.into_iter().chain(error_models::PARAMETERS)
 }
 
 /// What a calibration found and how good it is.
@@ -120,7 +96,7 @@ impl ParameterMap {
                 value: parameter.value,
                 sigma_prior: parameter.sigma_prior,
                 sigma_posterior: parameter.sigma_posterior,
-                unit: unit_of(&parameter.name, &parameter.unit).to_owned(),
+                unit: parameter.unit.clone(),
                 status: status_name(parameter.status),
             };
             (parameter.name.clone(), summary)
@@ -133,11 +109,11 @@ impl ParameterMap {
             unit: unit.to_owned(),
             status: status_name(ParameterStatus::Held),
         };
-        let always = PARAMETERS.iter().map(|(name, unit)| match find(name) {
+        let always = always_listed().map(|(name, unit)| match find(name) {
             Some(parameter) => entry(parameter),
-            None => ((*name).to_owned(), absent(unit)),
+            None => (name.to_owned(), absent(unit)),
         });
-        let further = parameters.iter().filter(|p| !PARAMETERS.iter().any(|(name, _)| *name == p.name)).map(entry);
+        let further = parameters.iter().filter(|p| !always_listed().any(|(name, _)| name == p.name)).map(entry);
         Self(always.chain(further).collect())
     }
 }

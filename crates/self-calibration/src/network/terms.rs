@@ -232,10 +232,10 @@ pub(crate) fn family_widths(model: &RangeErrorModel) -> Vec<usize> {
 pub(crate) fn unit(name: &str) -> &'static str {
     match name {
         "xp" | "yp" | "c" => "mm",
-        "k1" => "mm^-2",
-        "k2" => "mm^-4",
-        "k3" => "mm^-6",
-        "p1" | "p2" => "mm^-1",
+        "k1" => "1/mm^2",
+        "k2" => "1/mm^4",
+        "k3" => "1/mm^6",
+        "p1" | "p2" => "1/mm",
         "b1" | "b2" => "1",
         _ => parameter_unit(name).unwrap_or_default(),
     }

@@ -61,7 +61,7 @@ fn expected(page: &mut Page, outcome: &PlanOutcome) {
             vec![
                 parameter.name.clone(),
                 format!("{:.2e}", parameter.sigma_prior),
-                crate::calibrate::unit_of(&parameter.name, &parameter.unit).to_owned(),
+                parameter.unit.clone(),
                 gain.map_or("–".to_owned(), |(_, gain)| format!("{:.2e}", parameter.sigma_prior * gain)),
             ]
         })

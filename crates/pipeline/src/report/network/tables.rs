@@ -3,7 +3,7 @@
 use error_models::ParameterStatus;
 use self_calibration::{CalibratedParameter, CalibrationOutcome};
 
-use crate::calibrate::{CalibrationSummary, readable, unit_of};
+use crate::calibrate::{CalibrationSummary, readable};
 use crate::report::page::Page;
 
 pub(super) fn figures_of_merit(page: &mut Page, summary: &CalibrationSummary) {
@@ -55,7 +55,7 @@ fn parameter_row(parameter: &CalibratedParameter) -> Vec<String> {
         value_text(parameter),
         sigma(parameter.sigma_prior),
         sigma(parameter.sigma_posterior),
-        unit_of(&parameter.name, &parameter.unit).to_owned(),
+        parameter.unit.clone(),
         if estimated && ratio.is_finite() { format!("{ratio:.1}") } else { dash() },
         if p.is_finite() { probability(p) } else { dash() },
         match p {

@@ -250,10 +250,13 @@ pub(crate) fn groups(qualities: &[ObservationQuality]) -> Vec<GroupQuality> {
 
 impl CalibrationOutcome {
     /// Figures of the ranges by amplitude, in four classes of equal size, the darkest first: whether the standard
-    /// deviations that were stated hold for dark and for bright targets. Empty where no range has an amplitude.
+    /// deviations that were stated hold for dark and for bright targets. Empty where no range has an amplitude, or a
+    /// redundancy number.
     pub fn amplitude_classes(&self) -> Vec<GroupQuality> {
-        let with_amplitude = |q: &&ObservationQuality| q.component == Component::Range && q.amplitude.is_finite();
-        let mut ranges: Vec<_> = used(&self.residuals).filter(with_amplitude).collect();
+        let telling = |q: &&ObservationQuality| {
+            q.component == Component::Range && q.amplitude.is_finite() && q.redundancy_number.is_finite()
+        };
+        let mut ranges: Vec<_> = used(&self.residuals).filter(telling).collect();
         ranges.sort_by(|a, b| a.amplitude.total_cmp(&b.amplitude));
         let class = |class: &[&ObservationQuality]| {
             let [darkest, brightest] = [class[0], class[class.len() - 1]].map(|quality| quality.amplitude);

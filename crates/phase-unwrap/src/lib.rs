@@ -2,7 +2,9 @@
 
 mod borders;
 mod brightness;
+mod candidates;
 mod combine;
+mod contraction;
 mod error;
 mod forest;
 mod grid;

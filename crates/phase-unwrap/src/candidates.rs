@@ -5,8 +5,11 @@
 //! a pixel to think about.
 // Only what is inlined is compiled for wide registers.
 #![allow(clippy::inline_always)]
+// No short cuts: comparing is cheaper than a branch, and only without branches go many pixels at once.
+#![allow(clippy::needless_bitwise_bool)]
 
 use crate::grid::{DOWN, Grid, RIGHT};
+use crate::wide::with_wide_registers;
 
 /// A pixel without any link.
 pub(crate) const ALONE: u8 = 0;
@@ -60,7 +63,7 @@ impl Candidates {
     pub fn choose(&mut self, grid: &Grid, cost: &[f32], links: Option<&[u8]>) {
         self.choice.clear();
         self.choice.resize(grid.len(), OUTSIDE);
-        pulp::Arch::new().dispatch(
+        with_wide_registers(
             #[inline(always)]
             || self.choose_rows(grid, cost, links),
         );
@@ -83,7 +86,7 @@ impl Candidates {
     pub fn open(&mut self, grid: &Grid, cost: &[f32], links: Option<&[u8]>) {
         self.open.clear();
         self.open.resize(grid.len(), 0);
-        pulp::Arch::new().dispatch(
+        with_wide_registers(
             #[inline(always)]
             || self.open_rows(grid, cost, links),
         );
@@ -141,10 +144,10 @@ fn open_row(above: &LinkCosts, here: &LinkCosts, below: &LinkCosts, out: &mut [u
     let (below_right, below_left) = (&below.right[1..][..n], &below.right[..n]);
     for col in 0..n {
         let (across, along) = (right[col], down[col]);
-        let top = across > along && across > right_down[col] && across > below_right[col];
-        let bottom = across >= up_right[col] && across >= up_down[col] && across >= up_right_down[col];
-        let west = along >= across && along > right_down[col] && along > below_right[col];
-        let east = along >= left[col] && along >= left_down[col] && along > below_left[col];
+        let top = (across > along) & (across > right_down[col]) & (across > below_right[col]);
+        let bottom = (across >= up_right[col]) & (across >= up_down[col]) & (across >= up_right_down[col]);
+        let west = (along >= across) & (along > right_down[col]) & (along > below_right[col]);
+        let east = (along >= left[col]) & (along >= left_down[col]) & (along > below_left[col]);
         let keep_across = !(top | bottom) & (across < f32::INFINITY);
         let keep_along = !(west | east) & (along < f32::INFINITY);
         out[col] = u8::from(keep_across) * RIGHT + u8::from(keep_along) * DOWN;

@@ -134,7 +134,10 @@ impl Contraction {
     /// Bytes held by the buffers.
     pub fn bytes(&self) -> usize {
         let levels: usize = self.levels.iter().map(Vec::capacity).sum();
-        levels * size_of::<Member>() + self.edges.capacity() * size_of::<Edge>() + self.best.capacity() * 8 + self.number.capacity() * 4
+        levels * size_of::<Member>()
+            + self.edges.capacity() * size_of::<Edge>()
+            + self.best.capacity() * 8
+            + self.number.capacity() * 4
     }
 }
 

@@ -71,18 +71,14 @@ impl Forest {
         let (above, here) = self.wraps.split_at_mut(start);
         let (up_wraps, wraps) = (&above[start - grid.stride..][..n], &mut here[..n]);
         let choice = &self.candidates.choice[start..][..n];
-        let (up, left, centre) =
-            (&phase[start - grid.stride..][..n], &phase[start - 1..][..n], &phase[start..][..n]);
+        let (up, left, centre) = (&phase[start - grid.stride..][..n], &phase[start - 1..][..n], &phase[start..][..n]);
         let first = &mut self.first[before..][..n];
         let (mut runs, mut left_label, mut left_wraps) = (0, NO_LABEL, 0);
         for col in 0..n {
             let hangs_up = choice[col] == UP;
-            let (parent, label_of, wraps_of) = if hangs_up {
-                (up[col], up_label[col], up_wraps[col])
-            } else {
-                (left[col], left_label, left_wraps)
-            };
-            let hangs = hangs_up | (choice[col] == LEFT);
+            let (parent, label_of, wraps_of) =
+                if hangs_up { (up[col], up_label[col], up_wraps[col]) } else { (left[col], left_label, left_wraps) };
+            let hangs = hangs_up || choice[col] == LEFT;
             let outside = choice[col] == OUTSIDE;
             first[runs.min(n - 1)] = (start + col) as u32;
             let own = if outside { NO_LABEL } else { (before + runs) as u32 };
@@ -90,7 +86,7 @@ impl Forest {
             left_wraps = if hangs { wraps_of + wrap_step(parent, centre[col]) } else { 0 };
             label[col] = left_label;
             wraps[col] = left_wraps;
-            runs += usize::from(!(hangs | outside));
+            runs += usize::from(!(hangs || outside));
         }
         runs
     }
@@ -130,7 +126,7 @@ impl Forest {
                     let bit = word.trailing_zeros() as usize;
                     word &= word - 1;
                     let pixel = start + 8 * block + bit / 8;
-                    let other = pixel + if bit % 8 == 0 { 1 } else { grid.stride };
+                    let other = pixel + if bit.is_multiple_of(8) { 1 } else { grid.stride };
                     let ((from, here), (to, there)) = (place(pixel), place(other));
                     if from != to {
                         let step = wrap_step(phase[pixel], phase[other]) + here - there;

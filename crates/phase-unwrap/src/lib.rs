@@ -20,6 +20,7 @@ mod segments;
 mod spatial;
 mod surface;
 mod unwrapped;
+mod wide;
 
 pub use combine::{Combined, combine_frequencies};
 pub use error::{Error, Result};

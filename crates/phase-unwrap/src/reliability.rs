@@ -5,6 +5,7 @@
 use std::f32::consts::{PI, TAU};
 
 use crate::grid::Grid;
+use crate::wide::with_wide_registers;
 
 /// Cost of a pixel none of whose neighbours allow a second difference: more than any pixel that has one.
 const UNKNOWN: f32 = 256.0;
@@ -34,7 +35,7 @@ impl Smoothness {
     pub fn measure(&mut self, grid: &Grid, phase: &[f32], noise_variance: Option<&[f32]>, cost: &mut Vec<f32>) {
         cost.clear();
         cost.resize(grid.len(), f32::INFINITY);
-        pulp::Arch::new().dispatch(
+        with_wide_registers(
             #[inline(always)]
             || self.measure_rows(grid, phase, cost),
         );

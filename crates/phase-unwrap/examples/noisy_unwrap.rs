@@ -26,10 +26,11 @@ fn smooth(col: f64, row: f64) -> f64 {
 fn boxes(col: f64, row: f64) -> f64 {
     let background = 6.0 + 0.004 * col + 0.02 * row.min(300.0) - 0.03 * (row - 300.0).max(0.0);
     let inside = |left: f64, top: f64| (left..left + 90.0).contains(&col) && (top..top + 110.0).contains(&row);
-    let standoff: f64 = [(60.0, 80.0, 1.5), (250.0, 60.0, 2.6), (430.0, 90.0, 4.0), (130.0, 300.0, 5.0), (400.0, 320.0, 2.0)]
-        .iter()
-        .map(|&(left, top, depth)| if inside(left, top) { depth } else { 0.0 })
-        .sum();
+    let standoff: f64 =
+        [(60.0, 80.0, 1.5), (250.0, 60.0, 2.6), (430.0, 90.0, 4.0), (130.0, 300.0, 5.0), (400.0, 320.0, 2.0)]
+            .iter()
+            .map(|&(left, top, depth)| if inside(left, top) { depth } else { 0.0 })
+            .sum();
     background - standoff
 }
 
@@ -80,7 +81,13 @@ fn timed<T>(mut run: impl FnMut() -> T) -> (f64, T) {
     }
 }
 
-fn report(name: &str, milliseconds: f64, wraps: &Raster<i32>, scene: &Scene, path: Option<&Path>) -> Result<(), Box<dyn Error>> {
+fn report(
+    name: &str,
+    milliseconds: f64,
+    wraps: &Raster<i32>,
+    scene: &Scene,
+    path: Option<&Path>,
+) -> Result<(), Box<dyn Error>> {
     let share = scene.wraps.as_ref().map_or(f64::NAN, |truth| fraction(wraps, truth));
     println!("{name} {milliseconds:.2} {share:.5}");
     if let Some(path) = path {
@@ -107,7 +114,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     report("tree", time, &tree?.wraps, &scene, path)?;
     let mut unwrapper = NoisyUnwrapper::new(NoisyOptions::default())?;
     let mut out = NoisyUnwrapped::default();
-    for (name, noise) in [("noisy", sigma.map_or(PhaseNoise::Unknown, PhaseNoise::Uniform)), ("noisy_estimated", PhaseNoise::Unknown)] {
+    for (name, noise) in
+        [("noisy", sigma.map_or(PhaseNoise::Unknown, PhaseNoise::Uniform)), ("noisy_estimated", PhaseNoise::Unknown)]
+    {
         let (time, done) = timed(|| unwrapper.unwrap_into(&scene.phase, noise, None, &mut out));
         done?;
         report(name, time, &out.unwrapped.wraps, &scene, path)?;

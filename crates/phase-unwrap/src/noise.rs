@@ -65,9 +65,10 @@ pub(crate) struct Weight {
 }
 
 /// The weight that belongs to a standard deviation.
+// `clamp` would keep NaN, which `min` and `max` replace.
+#[allow(clippy::manual_clamp)]
 #[inline]
 pub(crate) fn weight(sigma_rad: f32) -> Weight {
-    // `min` and `max` also replace NaN.
     let sigma = sigma_rad.min(LARGEST_SIGMA_RAD).max(SMALLEST_SIGMA_RAD);
     // exp(s^2 / 2) as the eighth power of a short series: good to 0.2 %, and no library call.
     let part = sigma * sigma / 16.0;
@@ -84,7 +85,12 @@ pub(crate) fn weight(sigma_rad: f32) -> Weight {
 ///
 /// On a plane of any slope the products of neighbouring phasors share one direction, and their mean has the length
 /// `exp(-sigma^2)`. The middle of all blocks is taken: jumps and curved surfaces spoil some.
-pub(crate) fn estimate(width: usize, planes: [&[f32]; 2], amplitude: Option<&[f32]>, found: &mut Vec<f32>) -> Option<f32> {
+pub(crate) fn estimate(
+    width: usize,
+    planes: [&[f32]; 2],
+    amplitude: Option<&[f32]>,
+    found: &mut Vec<f32>,
+) -> Option<f32> {
     let height = planes[0].len() / width;
     found.clear();
     for row in (0..height).step_by(BLOCK) {
@@ -106,7 +112,13 @@ pub(crate) fn estimate(width: usize, planes: [&[f32]; 2], amplitude: Option<&[f3
 
 /// Squared length of the expected product of neighbours, free of the bias that the noise of the sum gives to its
 /// square.
-fn block_coherence(width: usize, [re, im]: [&[f32]; 2], first: [usize; 2], size: [usize; 2], step: usize) -> Option<f32> {
+fn block_coherence(
+    width: usize,
+    [re, im]: [&[f32]; 2],
+    first: [usize; 2],
+    size: [usize; 2],
+    step: usize,
+) -> Option<f32> {
     let (mut sum, mut pairs) = ([0.0_f32; 2], 0.0_f32);
     for row in first[1]..first[1] + size[1] {
         let start = row * width + first[0];

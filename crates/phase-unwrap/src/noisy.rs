@@ -74,7 +74,7 @@ impl NoisyUnwrapper {
         self.tree.unwrap_into(&filtered.phase, None, None, KnownWraps::Nothing, unwrapped)?;
         congruent_into(phase, &filtered.phase, &mut unwrapped.wraps)?;
         self.start_islands_at_zero(unwrapped);
-        self.doubt(phase, filtered, noise, unwrapped);
+        doubt(phase, filtered, noise, unwrapped);
         for island in &mut unwrapped.islands {
             (island.pixels, island.sure_pixels) = (0, 0);
         }
@@ -96,27 +96,29 @@ impl NoisyUnwrapper {
             *wraps -= self.lowest[island as usize];
         }
     }
+}
 
-    /// Lowers the confidence of pixels that lie far from the filtered surface: with a distance d and a normal
-    /// distribution, the odds against the next count give `2p - 1 = tanh(pi (pi - |d|) / sigma^2)`.
-    fn doubt(&self, phase: &Raster<f32>, filtered: &Filtered, noise: PhaseNoise<'_>, unwrapped: &mut Unwrapped) {
-        let sigma = |index: usize| match noise {
-            PhaseNoise::Sigma(sigma) => sigma.as_slice()[index],
-            PhaseNoise::Amplitude(amplitude) => {
-                filtered.noise_rad.unwrap_or(0.0) / amplitude.as_slice()[index].max(f32::MIN_POSITIVE)
-            }
-            PhaseNoise::Uniform(_) | PhaseNoise::Unknown => filtered.noise_rad.unwrap_or(0.0),
-        };
-        let planes = phase.as_slice().iter().zip(filtered.phase.as_slice());
-        for (index, (confidence, (phase, filtered))) in unwrapped.confidence.as_mut_slice().iter_mut().zip(planes).enumerate() {
-            let distance = (phase - filtered).abs();
-            // Most pixels, and all that the filter left alone, are sure: spare them the function.
-            if distance > 0.0 {
-                let distance = distance.min(TAU - distance);
-                let sigma = sigma(index).min(LARGEST_SIGMA_RAD);
-                let odds = PI * (PI - distance) / (sigma * sigma);
-                *confidence *= if odds < 8.0 { odds.tanh() } else { 1.0 };
-            }
+/// Lowers the confidence of pixels that lie far from the filtered surface: with a distance d and a normal
+/// distribution, the odds against the next count give `2p - 1 = tanh(pi (pi - |d|) / sigma^2)`.
+fn doubt(phase: &Raster<f32>, filtered: &Filtered, noise: PhaseNoise<'_>, unwrapped: &mut Unwrapped) {
+    let sigma = |index: usize| match noise {
+        PhaseNoise::Sigma(sigma) => sigma.as_slice()[index],
+        PhaseNoise::Amplitude(amplitude) => {
+            filtered.noise_rad.unwrap_or(0.0) / amplitude.as_slice()[index].max(f32::MIN_POSITIVE)
+        }
+        PhaseNoise::Uniform(_) | PhaseNoise::Unknown => filtered.noise_rad.unwrap_or(0.0),
+    };
+    let planes = phase.as_slice().iter().zip(filtered.phase.as_slice());
+    for (index, (confidence, (phase, filtered))) in
+        unwrapped.confidence.as_mut_slice().iter_mut().zip(planes).enumerate()
+    {
+        let distance = (phase - filtered).abs();
+        // Most pixels, and all that the filter left alone, are sure: spare them the function.
+        if distance > 0.0 {
+            let distance = distance.min(TAU - distance);
+            let sigma = sigma(index).min(LARGEST_SIGMA_RAD);
+            let odds = PI * (PI - distance) / (sigma * sigma);
+            *confidence *= if odds < 4.0 { odds.tanh() } else { 1.0 };
         }
     }
 }

@@ -5,8 +5,8 @@ use std::f32::consts::TAU;
 use range_image::Raster;
 
 use crate::noise::{PhaseNoise, estimate, weight};
-use crate::phasor::{angle, unit};
-use crate::window::{Centre, Planes, Windows};
+use crate::phasor::unit;
+use crate::window::{Limits, Planes, RowOut, Windows};
 use crate::{Error, Result};
 
 /// How phases are filtered before they are unwrapped.
@@ -31,8 +31,8 @@ impl Default for PrefilterOptions {
             quiet_sigma_rad: 0.3,
             target_sigma_rad: 0.16,
             largest_radius_px: 5,
-            least_coherence: 0.6,
-            deviations: 3.0,
+            least_coherence: 0.8,
+            deviations: 4.0,
         }
     }
 }
@@ -131,9 +131,13 @@ impl Prefilter {
         resize(&mut out.phase, phase);
         resize(&mut out.sigma, phase);
         resize(&mut out.radius, phase);
-        let known = out.noise_rad.is_some() || matches!(noise, PhaseNoise::Sigma(_));
-        self.windows.run(&self.planes, phase.width(), &self.options, known);
-        self.write(phase, out, known);
+        let limits = Limits::new(&self.options);
+        if out.noise_rad.is_some() || matches!(noise, PhaseNoise::Sigma(_)) {
+            self.run(phase, &limits, out);
+        } else {
+            self.run(phase, &limits.without_windows(), out);
+            out.sigma.as_mut_slice().fill(f32::NAN);
+        }
         Ok(())
     }
 
@@ -177,22 +181,36 @@ impl Prefilter {
         figure
     }
 
-    fn write(&self, phase: &Raster<f32>, out: &mut Filtered, known: bool) {
-        let rasters = out.phase.as_mut_slice().iter_mut().zip(out.sigma.as_mut_slice()).zip(out.radius.as_mut_slice());
-        let centres = phase.as_slice().iter().zip(&self.windows.centres);
-        pulp::Arch::new().dispatch(
-            #[inline(always)]
-            || {
-                for (((filtered, sigma), radius), (&measured, centre)) in rasters.zip(centres) {
-                    let Centre { re, im, information, radius: half } = *centre;
-                    *filtered = if half > 0.0 { angle(re, im) } else { measured };
-                    let used = information > 0.0;
-                    *filtered = if used { *filtered } else { f32::NAN };
-                    *sigma = if used && known { 1.0 / information.sqrt() } else { f32::NAN };
-                    *radius = half as u8;
-                }
-            },
-        );
+    fn run(&mut self, phase: &Raster<f32>, limits: &Limits, out: &mut Filtered) {
+        let (planes, windows) = (&self.planes, &mut self.windows);
+        pulp::Arch::new().dispatch(FilterRows { phase, planes, limits, windows, out });
+    }
+}
+
+/// The search for all rows: a type of its own, because what closures hold is not always compiled for wide registers.
+struct FilterRows<'a> {
+    phase: &'a Raster<f32>,
+    planes: &'a Planes,
+    limits: &'a Limits,
+    windows: &'a mut Windows,
+    out: &'a mut Filtered,
+}
+
+impl pulp::WithSimd for FilterRows<'_> {
+    type Output = ();
+
+    // Only what is inlined is compiled for wide registers.
+    #[allow(clippy::inline_always)]
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) {
+        let width = self.phase.width();
+        let rows = self.phase.rows().zip(self.out.phase.as_mut_slice().chunks_exact_mut(width));
+        let rows = rows.zip(self.out.sigma.as_mut_slice().chunks_exact_mut(width));
+        let rows = rows.zip(self.out.radius.as_mut_slice().chunks_exact_mut(width));
+        for (row, (((measured, phase), sigma), radius)) in rows.enumerate() {
+            let mut out = RowOut { phase, sigma, radius };
+            self.windows.filter_row(self.planes, row, measured, self.limits, &mut out);
+        }
     }
 }
 

@@ -1,6 +1,14 @@
 //! Sums over square windows of growing size, and the choice of the largest one that hangs together.
+//!
+//! Rows are worked on in groups of eight pixels, which the compiler keeps in wide registers.
+// Only what is inlined is compiled for wide registers.
+#![allow(clippy::inline_always)]
 
 use crate::PrefilterOptions;
+use crate::noise::weight;
+use crate::phasor::angle;
+
+const LANES: usize = 8;
 
 /// Weighted phasors and information of each pixel, row by row; zero where masked.
 #[derive(Debug, Default)]
@@ -18,103 +26,105 @@ impl Planes {
     }
 }
 
-/// What a pixel has after the search: sum of phasors and information of its window, and the window's half width.
+/// Sum of phasors and information of the chosen windows of eight pixels.
 #[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Centre {
-    pub re: f32,
-    pub im: f32,
-    pub information: f32,
-    pub radius: f32,
-}
-
-/// Column sums and choices of one row, and the choices of the image.
-#[derive(Debug, Default)]
-pub(crate) struct Windows {
-    pub centres: Vec<Centre>,
-    /// Sums over the rows of the window, with a rim of `radius` zeros on either side.
-    columns: Planes,
-    /// Sums over the window.
-    sums: Planes,
-    /// Choices of the row: sums, information, radius, scatter of the length, and whether the window may still grow.
-    best: Planes,
-    radius: Vec<f32>,
-    scatter: Vec<f32>,
-    open: Vec<f32>,
+struct Group {
+    re: [f32; LANES],
+    im: [f32; LANES],
+    information: [f32; LANES],
+    /// Half width of the window.
+    radius: [f32; LANES],
+    /// Variance of the mean's length over that of its angle, as far as noise goes.
+    scatter: [f32; LANES],
+    /// Information from which no larger window is needed; 0 where the search has ended.
+    wanted: [f32; LANES],
 }
 
 /// Limits of the tests, in the form in which they are used.
-#[derive(Clone, Copy)]
-struct Limits {
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Limits {
     quiet_information: f32,
     target_information: f32,
     coherence: f32,
     deviations: f32,
+    largest_radius: usize,
 }
 
-impl Windows {
-    /// Searches each pixel's window; without `known` noise, none grows.
-    pub fn run(&mut self, planes: &Planes, width: usize, options: &PrefilterOptions, known: bool) {
-        let limits = Limits {
-            quiet_information: crate::noise::weight(options.quiet_sigma_rad).information,
+impl Limits {
+    pub fn new(options: &PrefilterOptions) -> Self {
+        Self {
+            quiet_information: weight(options.quiet_sigma_rad).information,
             target_information: options.target_sigma_rad.powi(-2),
             coherence: options.least_coherence,
             deviations: options.deviations,
-        };
-        let largest = if known { usize::from(options.largest_radius_px) } else { 0 };
-        self.centres.resize(planes.re.len(), Centre::default());
-        self.columns.resize(width + 2 * largest);
-        self.sums.resize(width);
-        self.best.resize(width);
-        for plane in [&mut self.radius, &mut self.scatter, &mut self.open] {
-            plane.resize(width, 0.0);
-        }
-        let arch = pulp::Arch::new();
-        for row in 0..planes.re.len() / width {
-            arch.dispatch(
-                #[inline(always)]
-                || self.search_row(planes, width, row, largest, limits),
-            );
+            largest_radius: options.largest_radius_px.into(),
         }
     }
 
+    /// Where the noise is unknown.
+    pub fn without_windows(self) -> Self {
+        Self { largest_radius: 0, ..self }
+    }
+}
+
+/// A row of the result.
+pub(crate) struct RowOut<'a> {
+    pub phase: &'a mut [f32],
+    pub sigma: &'a mut [f32],
+    pub radius: &'a mut [u8],
+}
+
+/// Buffers of one row.
+#[derive(Debug, Default)]
+pub(crate) struct Windows {
+    /// Sums over the rows of the window, with a rim of zeros on either side.
+    columns: Planes,
+    groups: Vec<Group>,
+}
+
+impl Windows {
+    /// Searches the windows of one row's pixels and writes what they give; `measured` is the phase of the row.
     #[inline(always)]
-    fn search_row(&mut self, planes: &Planes, width: usize, row: usize, largest: usize, limits: Limits) {
+    pub fn filter_row(&mut self, planes: &Planes, row: usize, measured: &[f32], limits: &Limits, out: &mut RowOut<'_>) {
+        let width = measured.len();
         let height = planes.re.len() / width;
-        self.start_row(planes, width, row, largest, limits);
-        for radius in 1..=largest {
-            if self.open.iter().all(|open| *open <= 0.0) {
+        self.start(planes, width, row, limits);
+        for radius in 1..=limits.largest_radius {
+            if !self.groups.iter().any(Group::is_open) {
                 break;
             }
             for other in [row.wrapping_sub(radius), row + radius] {
                 if other < height {
-                    self.add_row(planes, width, other, largest);
+                    self.add_row(planes, width, other, limits.largest_radius);
                 }
             }
-            self.sum_columns(width, largest, radius);
-            self.choose(radius, limits);
+            let first = limits.largest_radius - radius;
+            for (at, group) in self.groups.iter_mut().enumerate() {
+                if group.is_open() {
+                    let sums = window_sums(&self.columns, first + at * LANES, radius);
+                    group.choose(&sums, radius, limits);
+                }
+            }
         }
-        let out = &mut self.centres[row * width..][..width];
-        for (col, out) in out.iter_mut().enumerate() {
-            let (re, im, information) = (self.best.re[col], self.best.im[col], self.best.information[col]);
-            *out = Centre { re, im, information, radius: self.radius[col] };
+        for (at, group) in self.groups.iter().enumerate() {
+            group.write(measured, at * LANES, out);
         }
     }
 
     #[inline(always)]
-    fn start_row(&mut self, planes: &Planes, width: usize, row: usize, rim: usize, limits: Limits) {
-        let start = row * width;
-        for ((columns, best), source) in self.columns.each().into_iter().zip(self.best.each()).zip(planes.all()) {
-            columns[rim..rim + width].copy_from_slice(&source[start..start + width]);
-            best.copy_from_slice(&source[start..start + width]);
+    fn start(&mut self, planes: &Planes, width: usize, row: usize, limits: &Limits) {
+        let groups = width.div_ceil(LANES);
+        let rim = limits.largest_radius;
+        self.groups.resize(groups, Group::default());
+        for (columns, source) in self.columns.each().into_iter().zip(planes.all()) {
+            columns.clear();
+            columns.resize(groups * LANES + 2 * rim, 0.0);
+            columns[rim..rim + width].copy_from_slice(&source[row * width..][..width]);
         }
-        self.radius.fill(0.0);
-        let rows = self.best.information.iter().zip(&mut self.scatter).zip(&mut self.open);
-        for ((&information, scatter), open) in rows {
-            // With q = rho^2 the information is 2 q / (1 - q^2); the length scatters (1 - q) / (1 + q) times as the angle.
-            let q = information / (1.0 + (1.0 + information * information).sqrt());
-            *scatter = (1.0 - q) / (1.0 + q);
-            let noisy = information > 0.0 && information < limits.quiet_information;
-            *open = if noisy { 1.0 } else { 0.0 };
+        for (at, group) in self.groups.iter_mut().enumerate() {
+            let [re, im, information] = self.columns.all().map(|plane| lanes(plane, rim + at * LANES));
+            *group = Group { re, im, information, ..Group::default() };
+            group.start(limits);
         }
     }
 
@@ -126,44 +136,89 @@ impl Windows {
             }
         }
     }
+}
 
-    /// Sums of `2 radius + 1` columns around each pixel.
+impl Group {
     #[inline(always)]
-    fn sum_columns(&mut self, width: usize, rim: usize, radius: usize) {
-        for (sums, columns) in self.sums.each().into_iter().zip(self.columns.all()) {
-            let columns = &columns[rim - radius..rim + radius + width];
-            sums.copy_from_slice(&columns[..width]);
-            for tap in 1..=2 * radius {
-                for (sum, value) in sums.iter_mut().zip(&columns[tap..tap + width]) {
-                    *sum += value;
-                }
+    fn is_open(&self) -> bool {
+        self.wanted.iter().fold(0.0, |sum, wanted| sum + wanted) > 0.0
+    }
+
+    #[inline(always)]
+    fn start(&mut self, limits: &Limits) {
+        for lane in 0..LANES {
+            let own = self.information[lane];
+            // With q = rho^2 the information is 2 q / (1 - q^2), and the variances relate as (1 - q) / (1 + q).
+            let q = own / (1.0 + (1.0 + own * own).sqrt());
+            self.scatter[lane] = (1.0 - q) / (1.0 + q);
+            let noisy = own > 0.0 && own < limits.quiet_information.min(limits.target_information);
+            self.wanted[lane] = if noisy { limits.target_information } else { 0.0 };
+        }
+    }
+
+    /// Takes the larger windows where they hang together with the smaller ones.
+    #[inline(always)]
+    fn choose(&mut self, [re, im, information]: &[[f32; LANES]; 3], radius: usize, limits: &Limits) {
+        let squared = limits.deviations * limits.deviations;
+        for lane in 0..LANES {
+            let (a, b, i) = (re[lane], im[lane], information[lane]);
+            let (old_a, old_b, old_i) = (self.re[lane], self.im[lane], self.information[lane]);
+            let square = a * a + b * b;
+            let shortest = limits.coherence * i - limits.deviations * (self.scatter[lane] * i).sqrt();
+            let shortest = shortest.max(0.0);
+            // The smaller window is part of the larger: the variance of the turn is the difference of the variances.
+            let variance = 1.0 / old_i.max(f32::MIN_POSITIVE) - 1.0 / i.max(f32::MIN_POSITIVE);
+            let least_cosine = 1.0 - 0.5 * squared * variance;
+            let length = (square * (old_a * old_a + old_b * old_b)).sqrt();
+            let together = square >= shortest * shortest;
+            let same = a * old_a + b * old_b >= least_cosine * length;
+            let wanted = self.wanted[lane];
+            let accepted = (wanted > 0.0) & together & same;
+            self.re[lane] = if accepted { a } else { old_a };
+            self.im[lane] = if accepted { b } else { old_b };
+            self.information[lane] = if accepted { i } else { old_i };
+            self.radius[lane] = if accepted { radius as f32 } else { self.radius[lane] };
+            self.wanted[lane] = if accepted && i < wanted { wanted } else { 0.0 };
+        }
+    }
+
+    #[inline(always)]
+    fn write(&self, measured: &[f32], at: usize, out: &mut RowOut<'_>) {
+        let (mut phase, mut sigma, mut radius) = ([0.0; LANES], [0.0; LANES], [0; LANES]);
+        let used = LANES.min(measured.len() - at);
+        phase[..used].copy_from_slice(&measured[at..at + used]);
+        for lane in 0..LANES {
+            let mean = angle(self.re[lane], self.im[lane]);
+            let filtered = if self.radius[lane] > 0.0 { mean } else { phase[lane] };
+            let masked = self.information[lane] <= 0.0;
+            phase[lane] = if masked { f32::NAN } else { filtered };
+            sigma[lane] = if masked { f32::NAN } else { 1.0 / self.information[lane].sqrt() };
+            radius[lane] = self.radius[lane] as u8;
+        }
+        out.phase[at..at + used].copy_from_slice(&phase[..used]);
+        out.sigma[at..at + used].copy_from_slice(&sigma[..used]);
+        out.radius[at..at + used].copy_from_slice(&radius[..used]);
+    }
+}
+
+/// Sums of `2 radius + 1` columns for eight pixels, the first of them starting at `first`.
+#[inline(always)]
+fn window_sums(columns: &Planes, first: usize, radius: usize) -> [[f32; LANES]; 3] {
+    let mut sums = [[0.0; LANES]; 3];
+    for (sum, plane) in sums.iter_mut().zip(columns.all()) {
+        for column in first..=first + 2 * radius {
+            let values = lanes(plane, column);
+            for lane in 0..LANES {
+                sum[lane] += values[lane];
             }
         }
     }
+    sums
+}
 
-    /// Takes the larger window where it hangs together with the smaller one.
-    #[inline(always)]
-    fn choose(&mut self, radius: usize, limits: Limits) {
-        let sums = self.sums.re.iter().zip(&self.sums.im).zip(&self.sums.information);
-        let best = self.best.re.iter_mut().zip(&mut self.best.im).zip(&mut self.best.information);
-        let state = self.radius.iter_mut().zip(&self.scatter).zip(&mut self.open);
-        for ((((&a, &b), &i), ((re, im), information)), ((chosen, &scatter), open)) in sums.zip(best).zip(state) {
-            let square = a * a + b * b;
-            let shortest = (limits.coherence * i - limits.deviations * (scatter * i).sqrt()).max(0.0);
-            let together = square >= shortest * shortest;
-            // The smaller window is part of the larger: the variance of the turn is the difference of the variances.
-            let variance = 1.0 / information.max(f32::MIN_POSITIVE) - 1.0 / i.max(f32::MIN_POSITIVE);
-            let least_cosine = 1.0 - 0.5 * limits.deviations * limits.deviations * variance;
-            let length = (square * (*re * *re + *im * *im)).sqrt();
-            let same = a * *re + b * *im >= least_cosine * length;
-            let accepted = (*open > 0.0) & together & same;
-            *re = if accepted { a } else { *re };
-            *im = if accepted { b } else { *im };
-            *information = if accepted { i } else { *information };
-            *chosen = if accepted { radius as f32 } else { *chosen };
-            *open = if accepted & (i < limits.target_information) { 1.0 } else { 0.0 };
-        }
-    }
+#[inline(always)]
+fn lanes(plane: &[f32], first: usize) -> [f32; LANES] {
+    plane[first..].first_chunk().copied().unwrap_or_default()
 }
 
 impl Planes {
@@ -171,7 +226,7 @@ impl Planes {
         [&self.re, &self.im, &self.information]
     }
 
-    fn each(&mut self) -> [&mut [f32]; 3] {
+    fn each(&mut self) -> [&mut Vec<f32>; 3] {
         [&mut self.re, &mut self.im, &mut self.information]
     }
 }

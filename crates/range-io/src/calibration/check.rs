@@ -154,6 +154,7 @@ fn check_psf(psf: &Psf) -> Check {
             let finite = values.iter().all(|value| value.is_finite());
             require(finite, "scattering", || "has a kernel with values that are not finite".into())
         }
+        Psf::Composite(_) => psf.validate().map_err(|error| InvalidField::new("scattering", error.to_string())),
     }
 }
 

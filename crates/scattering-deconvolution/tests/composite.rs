@@ -273,6 +273,7 @@ fn scattering_that_outgrows_the_light_is_refused_or_undone() {
     }
 }
 
+#[cfg(feature = "serde")]
 #[test]
 fn ghosts_and_fields_survive_a_file() {
     let psf = Psf::Composite(all_kinds(0.1, [32, 24], 2.0));

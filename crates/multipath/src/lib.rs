@@ -6,6 +6,7 @@ mod detect;
 mod error;
 mod model;
 mod pixel;
+mod profile;
 mod refine;
 mod response;
 mod search;

@@ -28,39 +28,45 @@ const MOST_STEPS: usize = 60;
 /// The decrease of chi-squared that a further step would bring, below which the minimum is reached: a thousandth of a
 /// standard deviation.
 const NEGLIGIBLE: f64 = 1e-6;
+/// The same relative to the weighted squares of the measurements: below it, chi-squared is rounding.
+const ROUNDING: f64 = 1e-14;
 
 /// Follows the weighted squares from a start to their minimum with both amplitudes positive and `r1 < r2`.
 ///
-/// `None` where there is none: the way leads to the border of what is allowed, or the minimum is flat.
-pub(crate) fn refine(pixel: &Pixel, start: Parameters, priors: &[Prior; 2]) -> Option<Fit> {
+/// Where there is none - the way leads to the border of what is allowed, or the squares are flat - it gives the least
+/// squares that it came to.
+pub(crate) fn refine(pixel: &Pixel, start: Parameters, priors: &[Prior; 2]) -> Result<Fit, f64> {
     let mut parameters = start;
     let mut normal = normal_equations(pixel, &parameters, priors);
+    let squares: f64 = pixel.terms().iter().map(|term| term.weight * (term.re * term.re + term.im * term.im)).sum();
+    let negligible = NEGLIGIBLE + ROUNDING * squares;
     let mut damping = 1e-3;
     for _ in 0..MOST_STEPS {
-        if let Some(fit) = at_minimum(&parameters, &normal) {
-            return Some(fit);
+        if let Some(fit) = at_minimum(&parameters, &normal, negligible) {
+            return Ok(fit);
         }
-        let step = Cholesky::new(&damped(&normal.matrix, damping))?.solve(&normal.right);
+        let Some(factor) = Cholesky::new(&damped(&normal.matrix, damping)) else { break };
+        let step = factor.solve(&normal.right);
         let trial: Parameters = std::array::from_fn(|i| parameters[i] + step[i]);
         if is_allowed(&trial) && chi_squared(pixel, &trial, priors) < normal.chi_squared {
             parameters = trial;
             normal = normal_equations(pixel, &parameters, priors);
             damping = (damping * 0.1).max(1e-9);
         } else if damping > 1e8 {
-            return None;
+            break;
         } else {
             damping *= 10.0;
         }
     }
-    None
+    Err(normal.chi_squared)
 }
 
 /// The fit, if the undamped step from here would change next to nothing.
-fn at_minimum(parameters: &Parameters, normal: &NormalEquations) -> Option<Fit> {
+fn at_minimum(parameters: &Parameters, normal: &NormalEquations, negligible: f64) -> Option<Fit> {
     let factor = Cholesky::new(&normal.matrix)?;
     let step = factor.solve(&normal.right);
     let decrease: f64 = step.iter().zip(&normal.right).map(|(step, right)| step * right).sum();
-    (decrease < NEGLIGIBLE).then(|| Fit {
+    (decrease < negligible).then(|| Fit {
         parameters: *parameters,
         covariance: factor.inverse(),
         chi_squared: normal.chi_squared,

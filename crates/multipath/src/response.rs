@@ -66,7 +66,9 @@ pub fn estimate_response(frame: &ComplexFrame, least_snr: f64) -> Result<Respons
     for frequency in 0..frequencies {
         let mut ratios: Vec<f64> = usable.chunks_exact(frequencies).map(|pixel| pixel[frequency] / pixel[0]).collect();
         let middle = median(&mut ratios);
-        ratios.iter_mut().for_each(|ratio| *ratio = (*ratio / middle - 1.0).abs());
+        for ratio in &mut ratios {
+            *ratio = (*ratio / middle - 1.0).abs();
+        }
         contrast.push(middle);
         spread.push(1.4826 * median(&mut ratios));
     }

@@ -4,6 +4,7 @@ use crate::TwoPathOptions;
 use crate::chi_squared::quantile;
 use crate::model::{Parameters, Prior};
 use crate::pixel::{MAXIMUM_FREQUENCIES, Pixel};
+use crate::profile::is_sigma_reliable;
 use crate::refine::{Fit, refine};
 use crate::search::{Grid, Scratch};
 use crate::single::{SingleFit, refine_single};
@@ -25,6 +26,8 @@ pub(crate) struct Worker {
     singles: Vec<SingleFit>,
     pair_starts: Vec<Parameters>,
     pairs: Vec<Fit>,
+    /// Least squares on the way of the starts that came to no minimum.
+    lowest_without_minimum: f64,
     hypotheses: Vec<Hypothesis>,
 }
 
@@ -53,10 +56,12 @@ impl PixelSolver {
             return self.judge_single(&best, worker);
         }
         self.fit_pairs(pixel, worker);
+        let explained = self.thresholds[2 * frequencies - 4];
         let Some(best) = worker.pairs.first().copied() else {
-            return PixelPaths::without_numbers(Verdict::Inconsistent);
+            let open = worker.lowest_without_minimum <= explained;
+            return PixelPaths::without_numbers(if open { Verdict::Unresolved } else { Verdict::Inconsistent });
         };
-        let verdict = self.judge_pair(&best, frequencies, &worker.pairs);
+        let verdict = self.judge_pairs(pixel, &best, explained, worker);
         let chi_squared = best.chi_squared as f32;
         match verdict {
             Verdict::Two => two(&best),
@@ -106,10 +111,14 @@ impl PixelSolver {
         self.grid.pair_starts(pixel, &mut worker.scratch, &mut worker.pair_starts);
         let no_priors = [Prior::default(); 2];
         worker.pairs.clear();
+        worker.lowest_without_minimum = f64::INFINITY;
         for start in &worker.pair_starts {
-            let Some(fit) = refine(pixel, *start, &no_priors).filter(|fit| self.is_inside(fit)) else { continue };
-            if !worker.pairs.iter().any(|other| is_same(other, &fit)) {
-                worker.pairs.push(fit);
+            match refine(pixel, *start, &no_priors) {
+                Ok(fit) if self.is_inside(&fit) && !worker.pairs.iter().any(|other| is_same(other, &fit)) => {
+                    worker.pairs.push(fit);
+                }
+                Ok(_) => {}
+                Err(lowest) => worker.lowest_without_minimum = worker.lowest_without_minimum.min(lowest),
             }
         }
         worker.pairs.sort_by(|a, b| a.chi_squared.total_cmp(&b.chi_squared));
@@ -121,21 +130,25 @@ impl PixelSolver {
         (span.nearest_m..=span.farthest_m).contains(&direct) && indirect - direct <= span.longest_detour_m
     }
 
-    fn judge_pair(&self, best: &Fit, frequencies: usize, pairs: &[Fit]) -> Verdict {
-        if frequencies < 3 {
+    fn judge_pairs(&self, pixel: &Pixel, best: &Fit, explained: f64, worker: &Worker) -> Verdict {
+        let lowest = worker.lowest_without_minimum.min(best.chi_squared);
+        if pixel.terms().len() < 3 {
             return Verdict::Ambiguous;
         }
-        if best.chi_squared > self.thresholds[2 * frequencies - 4] {
+        if lowest > explained {
             return Verdict::Inconsistent;
         }
-        if pairs.get(1).is_some_and(|second| self.is_as_likely(second.chi_squared, best.chi_squared)) {
+        if best.chi_squared > explained || self.is_as_likely(worker.lowest_without_minimum, best.chi_squared) {
+            return Verdict::Unresolved;
+        }
+        if worker.pairs.get(1).is_some_and(|second| self.is_as_likely(second.chi_squared, best.chi_squared)) {
             return Verdict::Ambiguous;
         }
         let [a, b, direct, indirect] = best.parameters;
         let apart = (indirect - direct) / best.difference_variance(2, 3).sqrt();
         let weakest = apart.min(a / best.sigma(0)).min(b / best.sigma(1));
         let resolved = weakest >= self.options.resolution_sigmas && best.sigma(2) <= self.options.largest_sigma_m;
-        if resolved { Verdict::Two } else { Verdict::Unresolved }
+        if resolved && is_sigma_reliable(pixel, best) { Verdict::Two } else { Verdict::Unresolved }
     }
 }
 

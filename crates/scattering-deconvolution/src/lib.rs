@@ -2,6 +2,8 @@
 
 mod convolution;
 mod error;
+#[cfg(feature = "estimate")]
+mod estimate;
 mod frame;
 mod grid;
 mod kernel;
@@ -15,6 +17,11 @@ mod sigma;
 mod spectrum;
 
 pub use error::{Error, Result};
+#[cfg(feature = "estimate")]
+pub use estimate::{
+    Ambiguity, Candidate, Capture, CaptureReport, EstimationOptions, ForegroundCapture, Nuisance, NuisanceValues,
+    PsfEstimate, PsfParameter, TermCount, TermShape, TwoPlaneCapture, Verdict, estimate_psf, object_mask, true_phases,
+};
 pub use frame::restore;
 pub use kernel::{GAUSSIAN_CUT_SIGMAS, SampledKernel};
 pub use options::{GridSpacing, RestorationOptions};

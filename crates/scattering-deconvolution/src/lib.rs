@@ -19,8 +19,9 @@ mod spectrum;
 pub use error::{Error, Result};
 #[cfg(feature = "estimate")]
 pub use estimate::{
-    Ambiguity, Candidate, Capture, CaptureReport, EstimationOptions, ForegroundCapture, Nuisance, NuisanceValues,
-    PsfEstimate, PsfParameter, TermCount, TermShape, TwoPlaneCapture, Verdict, estimate_psf, object_mask, true_phases,
+    Ambiguity, Candidate, Capture, CaptureReport, Estimated, EstimationOptions, ForegroundCapture, Nuisance,
+    NuisanceValues, PsfEstimate, PsfParameter, TermCount, TermShape, TwoPlaneCapture, Verdict, estimate_psf,
+    object_mask, true_phases,
 };
 pub use frame::restore;
 pub use kernel::{GAUSSIAN_CUT_SIGMAS, SampledKernel};

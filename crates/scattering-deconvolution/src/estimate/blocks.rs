@@ -4,7 +4,7 @@ use std::ops::Range;
 
 /// Blocks along the longer side of the image unless told otherwise: scattered light is smooth.
 const BLOCKS: f64 = 44.0;
-const WIDEST: f64 = 8.0;
+const EDGES: [f64; 2] = [2.0, 8.0];
 
 /// An image cut into blocks; those at the right and lower border may be smaller.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -17,7 +17,7 @@ pub(super) struct Blocks {
 impl Blocks {
     pub(super) fn new(pixels: [usize; 2], edge: Option<usize>) -> Self {
         let longer = pixels[0].max(pixels[1]);
-        let automatic = (longer as f64 / BLOCKS).round().clamp(1.0, WIDEST) as usize;
+        let automatic = (longer as f64 / BLOCKS).round().clamp(EDGES[0], EDGES[1]) as usize;
         Self { pixels, edge: edge.unwrap_or(automatic).clamp(1, longer.max(1)) }
     }
 

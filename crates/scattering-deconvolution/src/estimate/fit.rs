@@ -5,6 +5,7 @@ use nalgebra::DMatrix;
 
 use super::observation::{BlockObservation, SharedResponse, term_from};
 use super::response::{Source, Term};
+use super::result::Estimated;
 use super::scene::{Row, Scene};
 use super::{EstimationOptions, Nuisance, TermShape};
 
@@ -57,7 +58,7 @@ pub(super) struct Fit {
     pub(super) sigma0: f64,
     pub(super) agreements: Vec<Agreement>,
     /// Drift and constant of each scene, as far as they were asked for.
-    pub(super) nuisances: Vec<Vec<[f64; 2]>>,
+    pub(super) nuisances: Vec<Vec<[Estimated; 2]>>,
 }
 
 /// Scenes with light and observations, and how they are adjusted.
@@ -66,12 +67,15 @@ pub(super) struct Problem<'s> {
     pub(super) options: &'s EstimationOptions,
     /// Longer side of the image, pixels.
     pub(super) longer_side: f64,
+    /// How many times larger than noise says the residuals of any sum of Gaussians are, at least one: what is an outlier
+    /// is measured by it.
+    pub(super) scale: f64,
 }
 
 impl Fit {
     /// Factor of the standard deviations where residuals are larger than noise says.
     pub(super) fn inflation(&self) -> f64 {
-        if self.sigma0 > 1.0 { self.sigma0 } else { 1.0 }
+        inflation(self.sigma0)
     }
 
     /// Schwarz's criterion with an unknown variance factor: noise is never known so well that thousands of residuals do
@@ -101,6 +105,20 @@ impl Problem<'_> {
 
     /// Adjusts the terms from these starts.
     pub(super) fn fit(&self, starts: &[StartTerm]) -> adjust::Result<Fit> {
+        self.fit_with(self.huber_limit().map_or(Kernel::LeastSquares, Kernel::Huber), starts)
+    }
+
+    /// Adjusts the nuisances alone. Where scattering is all that there is to see, most observations are outliers, and
+    /// where a robust adjustment finds no end, least squares does: it is only compared with others.
+    pub(super) fn fit_nothing(&self) -> adjust::Result<Fit> {
+        self.fit(&[]).or_else(|_| self.fit_with(Kernel::LeastSquares, &[]))
+    }
+
+    fn huber_limit(&self) -> Option<f64> {
+        self.options.huber_limit.map(|limit| limit * self.scale)
+    }
+
+    fn fit_with(&self, kernel: Kernel, starts: &[StartTerm]) -> adjust::Result<Fit> {
         let largest = LARGEST_WIDTH * self.longer_side;
         let sources: Vec<(usize, &Source)> =
             self.scenes.iter().enumerate().filter_map(|(i, scene)| Some((i, scene.source.as_ref().ok()?))).collect();
@@ -115,7 +133,7 @@ impl Problem<'_> {
         }
         for (((index, _), shared), ids) in sources.iter().zip(&shared).zip(&ids) {
             let group = network.add_group(format!("scene {index}"));
-            network.set_kernel(group, self.options.huber_limit.map_or(Kernel::LeastSquares, Kernel::Huber))?;
+            network.set_kernel(group, kernel)?;
             for mean in &self.scenes[*index].means {
                 let (rows, block) = (mean.rows.as_slice(), mean.block);
                 let observation =
@@ -183,15 +201,22 @@ impl Problem<'_> {
         ids: &[Vec<BlockId>],
     ) -> adjust::Result<Fit> {
         let (adjusted, covariance) = natural_parameters(solution, terms)?;
+        let sigma0 = solution.sigma0().unwrap_or(f64::NAN);
+        let inflation = inflation(sigma0);
         let mut nuisances = vec![Vec::new(); self.scenes.len()];
         for (scene, ids) in used.iter().zip(ids) {
             for &id in &ids[terms.len()..] {
-                let values = solution.values(id)?;
-                nuisances[*scene].push([values[0], values[1]]);
+                let sigma = solution.standard_deviations(id, Scale::Prior)?;
+                let mut pairs = solution.values(id)?.iter().zip(sigma);
+                let mut next = || {
+                    let (value, sigma) = pairs.next().unwrap_or((&f64::NAN, f64::NAN));
+                    Estimated { value: *value, sigma: sigma * inflation }
+                };
+                nuisances[*scene].push([next(), next()]);
             }
         }
         let agreements = self.agreements(solution.residuals(), used);
-        let limit = self.options.huber_limit.unwrap_or(f64::INFINITY);
+        let limit = self.huber_limit().unwrap_or(f64::INFINITY);
         let huber = |s: f64| if s <= limit { s * s } else { limit * (2.0 * s - limit) };
         Ok(Fit {
             terms: adjusted,
@@ -200,7 +225,7 @@ impl Problem<'_> {
             numbers: solution.observations(),
             unknowns: solution.unknowns(),
             redundancy: solution.redundancy(),
-            sigma0: solution.sigma0().unwrap_or(f64::NAN),
+            sigma0,
             agreements,
             nuisances,
         })
@@ -224,6 +249,11 @@ impl Problem<'_> {
         }
         out
     }
+}
+
+/// Standard deviations are as noise says, or as residuals say where these are larger.
+fn inflation(sigma0: f64) -> f64 {
+    if sigma0 > 1.0 { sigma0 } else { 1.0 }
 }
 
 /// Terms and their covariance, widths in pixels instead of their logarithms.

@@ -39,7 +39,7 @@ pub(super) fn find_object(with: &ComplexFrame, without: &ComplexFrame, options: 
         for (inside, change) in core.as_mut_slice().iter_mut().zip(change.as_slice()) {
             *inside |= largest > 0.0 && *change >= limit;
         }
-        let noise = [&with_channel.sigma, &without_channel.sigma].map(|sigma| sigma.as_slice());
+        let noise = [&with_channel.sigma, &without_channel.sigma].map(Raster::as_slice);
         let amplitudes = [with_channel, without_channel].map(|channel| median_of_nine(&channel.amplitude()));
         for (pixel, inside) in core.as_mut_slice().iter_mut().enumerate() {
             let [now, before] = [0, 1].map(|i| amplitudes[i].as_slice()[pixel]);
@@ -79,9 +79,8 @@ fn median_of_nine(plane: &Raster<f32>) -> Raster<f32> {
 pub(super) fn dilated(mask: &Raster<bool>, reach: usize) -> Raster<bool> {
     let (width, height) = (mask.width(), mask.height());
     let near = |index: usize, length: usize| index.saturating_sub(reach)..(index.saturating_add(reach + 1)).min(length);
-    let along_rows = Raster::from_fn(width, height, |col, row| {
-        near(col, width).any(|c| mask.get(c, row).copied().unwrap_or(false))
-    });
+    let along_rows =
+        Raster::from_fn(width, height, |col, row| near(col, width).any(|c| mask.get(c, row).copied().unwrap_or(false)));
     Raster::from_fn(width, height, |col, row| {
         near(row, height).any(|r| along_rows.get(col, r).copied().unwrap_or(false))
     })

@@ -19,7 +19,7 @@ mod start;
 pub use capture::{Capture, ForegroundCapture, TwoPlaneCapture, true_phases};
 pub use mask::object_mask;
 pub use options::{EstimationOptions, Nuisance, TermCount, TermShape};
-pub use result::{Ambiguity, Candidate, CaptureReport, NuisanceValues, PsfEstimate, PsfParameter, Verdict};
+pub use result::{Ambiguity, Candidate, CaptureReport, Estimated, NuisanceValues, PsfEstimate, PsfParameter, Verdict};
 
 use range_image::Raster;
 
@@ -61,8 +61,9 @@ where
             return Ok(report::blind(&current, what));
         }
         let longer_side = blocks.pixels[0].max(blocks.pixels[1]) as f64;
-        let problem = Problem { scenes: current.iter().collect(), options, longer_side };
+        let mut problem = Problem { scenes: current.iter().collect(), options, longer_side, scale: 1.0 };
         let dictionary = Dictionary::new(&problem);
+        problem.scale = dictionary.scale();
         let choice = choose(&problem, &dictionary)?;
         round += 1;
         let found = !choice.fit.terms.is_empty();
@@ -70,7 +71,9 @@ where
             current = all_scenes(&captures, blocks, &changed);
             continue;
         }
-        let limit = options.significance * dictionary.weight_sigma() * choice.fit.inflation();
+        // What is narrower than the rim about the object is hidden by it.
+        let narrowest = (options.rim_px + blocks.edge) as f64;
+        let limit = options.significance * dictionary.weight_sigma(narrowest) * choice.fit.inflation();
         return Ok(report::estimate(&problem, choice, &first_scenes, limit));
     }
 }

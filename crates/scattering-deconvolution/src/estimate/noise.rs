@@ -3,7 +3,7 @@
 use range_image::Raster;
 
 /// Median of the modulus of a normal variable with standard deviation one.
-const NORMAL_MEDIAN: f64 = 0.674_489_750_196_081_7;
+pub(super) const NORMAL_MEDIAN: f64 = 0.674_489_750_196_081_7;
 /// Noise below this share of the largest light is rounding of single precision.
 const ROUNDING: f64 = 6e-8;
 
@@ -26,7 +26,7 @@ impl<'a> Deviations<'a> {
     }
 
     /// Smallest standard deviation that a mean may have: images without noise are rounded.
-    pub(super) fn floor(&self, real: &[f64], imaginary: &[f64], usable: &[bool]) -> f64 {
+    pub(super) fn floor(real: &[f64], imaginary: &[f64], usable: &[bool]) -> f64 {
         let parts = real.iter().zip(imaginary).zip(usable).filter(|(_, usable)| **usable);
         let largest = parts.map(|((re, im), _)| re.abs().max(im.abs())).fold(0.0, f64::max);
         (ROUNDING * largest).max(f64::MIN_POSITIVE.sqrt())
@@ -40,10 +40,14 @@ pub(super) fn noise_of_differences(values: &[f64], quiet: &[bool], width: usize)
     let pairs = rows.flat_map(|(values, quiet)| values.windows(2).zip(quiet.windows(2)));
     let quiet_pairs = pairs.filter(|(_, quiet)| quiet[0] && quiet[1]);
     let mut differences: Vec<f64> = quiet_pairs.map(|(values, _)| (values[1] - values[0]).abs()).collect();
-    if differences.is_empty() {
+    median(&mut differences) / NORMAL_MEDIAN / std::f64::consts::SQRT_2
+}
+
+/// The upper median; NaN of nothing.
+pub(super) fn median(values: &mut [f64]) -> f64 {
+    if values.is_empty() {
         return f64::NAN;
     }
-    let middle = differences.len() / 2;
-    let (_, median, _) = differences.select_nth_unstable_by(middle, f64::total_cmp);
-    *median / NORMAL_MEDIAN / std::f64::consts::SQRT_2
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }

@@ -47,7 +47,7 @@ pub struct EstimationOptions {
     /// What else may have changed.
     pub nuisances: Vec<Nuisance>,
     /// Edge of the square blocks of pixels whose means are observed. Unless given, a 44th of the longer side of the
-    /// image, 1 to 8 pixels.
+    /// image, 2 to 8 pixels.
     pub block_px: Option<usize>,
     /// Pixels about the object that are left out: edges are mixed of object and background.
     pub rim_px: usize,

@@ -4,9 +4,10 @@ use nalgebra::DMatrix;
 use range_image::Raster;
 
 use super::fit::{Agreement, Fit, Problem, StartTerm, Unknown};
+use super::noise::{NORMAL_MEDIAN, median};
 use super::observation::SMALLEST_SIGMA;
 use super::response::Term;
-use super::result::{Ambiguity, CaptureReport, NuisanceValues, PsfEstimate, PsfParameter, Verdict};
+use super::result::{Ambiguity, CaptureReport, Estimated, NuisanceValues, PsfEstimate, PsfParameter, Verdict};
 use super::scene::{Blind, Scene};
 use super::selection::Choice;
 use super::{EstimationOptions, Nuisance, TermShape};
@@ -47,7 +48,7 @@ pub(super) fn estimate(
     let captures = reports(problem, &fit, first_scenes);
     let observed: usize = captures.iter().map(|report| report.blocks + report.rejected_blocks).sum();
     let rejected: usize = captures.iter().map(|report| report.rejected_blocks).sum();
-    let limit = HALF_WEIGHT * problem.options.huber_limit.unwrap_or(f64::INFINITY);
+    let limit = HALF_WEIGHT * problem.scale * problem.options.huber_limit.unwrap_or(f64::INFINITY);
     let light = fit.agreements.iter().filter(|one| one.size > limit).count();
     PsfEstimate {
         psf: known.then(|| Psf::Gaussians(fit.terms.iter().map(term).collect())),
@@ -120,7 +121,7 @@ fn reports(problem: &Problem<'_>, fit: &Fit, first_scenes: &[Scene]) -> Vec<Capt
     problem.scenes.iter().zip(first_scenes).enumerate().map(report).collect()
 }
 
-fn nuisance_values(values: &[[f64; 2]], options: &EstimationOptions) -> NuisanceValues {
+fn nuisance_values(values: &[[Estimated; 2]], options: &EstimationOptions) -> NuisanceValues {
     let mut values = values.iter().copied();
     NuisanceValues {
         drift: if options.has(Nuisance::Drift) { values.next() } else { None },
@@ -215,13 +216,8 @@ pub(super) fn reject(problem: &Problem<'_>, fit: &Fit, changed: &mut [Raster<boo
 /// How much larger than stated the residuals are, at least one; from their median.
 fn robust_scale(agreements: &[&Agreement]) -> f64 {
     /// Median of the modulus of two, and of one, normal variables.
-    const MEDIANS: [f64; 2] = [1.177_410_022_515_474_7, 0.674_489_750_196_081_7];
+    const MEDIANS: [f64; 2] = [1.177_410_022_515_474_7, NORMAL_MEDIAN];
     let mut sizes: Vec<f64> = agreements.iter().map(|one| one.size).collect();
-    if sizes.is_empty() {
-        return 1.0;
-    }
-    let middle = sizes.len() / 2;
-    let (_, median, _) = sizes.select_nth_unstable_by(middle, f64::total_cmp);
     let expected = MEDIANS[usize::from(agreements.iter().all(|one| one.numbers == 1))];
-    (*median / expected).max(1.0)
+    (median(&mut sizes) / expected).max(1.0)
 }

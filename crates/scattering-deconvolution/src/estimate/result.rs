@@ -55,13 +55,23 @@ pub struct PsfParameter {
     pub sigma: f64,
 }
 
+/// A number and its standard deviation.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Estimated {
+    /// The number.
+    pub value: f64,
+    /// Its standard deviation, prior-scaled or, where residuals are larger than noise says, posterior-scaled; zero where it
+    /// was held.
+    pub sigma: f64,
+}
+
 /// Estimated change between the two frames of a capture that is no scattering.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct NuisanceValues {
     /// Relative change of the background's light: amplitude, and phase in radians.
-    pub drift: Option<[f64; 2]>,
+    pub drift: Option<[Estimated; 2]>,
     /// Constant light, real and imaginary part.
-    pub constant: Option<[f64; 2]>,
+    pub constant: Option<[Estimated; 2]>,
 }
 
 /// How one frequency of one capture took part.
@@ -122,8 +132,8 @@ pub struct PsfEstimate {
     pub redundancy: i64,
     /// Share of the observed blocks that were rejected or have less than half of their weight.
     pub outlier_share: f64,
-    /// Smallest weight of a single Gaussian that would have been found, whatever its width (two pixels to 0.6 of the
-    /// image).
+    /// Smallest weight of a single Gaussian that would have been found, whatever its width, from that of rim and block
+    /// (what is narrower is hidden) to 0.6 of the image. Infinite where nothing would have been.
     pub detection_limit: f64,
     /// Numbers of Gaussians that were tried.
     pub candidates: Vec<Candidate>,
@@ -147,7 +157,9 @@ impl Ambiguity {
             Self::NoObjectLight => {
                 "put a bright object (white board, reflective foil) close to the camera, and check the order of the frames"
             }
-            Self::ObjectLightLost => "shorten the integration time or move the object away, until no pixel is saturated",
+            Self::ObjectLightLost => {
+                "shorten the integration time or move the object away, until no pixel is saturated"
+            }
             Self::NoBackground => "use a smaller object, so that at least half of the image shows the background",
             Self::SignalBelowNoise => {
                 "use a brighter, closer or larger object, a dimmer background, and average more frames"

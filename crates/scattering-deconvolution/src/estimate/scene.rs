@@ -89,8 +89,18 @@ fn foreground(index: usize, capture: &ForegroundCapture<'_>, blocks: Blocks, cha
             let reference = [&without.real, &without.imaginary].map(|p| mean_of_raster(p, blocks.pixels_of(block)));
             let parts = [mean(&image.real), mean(&image.imaginary)];
             vec![
-                Row { observed: parts[0], light: [1.0, 0.0], drift: [reference[0], -reference[1]], constant: [1.0, 0.0] },
-                Row { observed: parts[1], light: [0.0, 1.0], drift: [reference[1], reference[0]], constant: [0.0, 1.0] },
+                Row {
+                    observed: parts[0],
+                    light: [1.0, 0.0],
+                    drift: [reference[0], -reference[1]],
+                    constant: [1.0, 0.0],
+                },
+                Row {
+                    observed: parts[1],
+                    light: [0.0, 1.0],
+                    drift: [reference[1], reference[0]],
+                    constant: [0.0, 1.0],
+                },
             ]
         };
         let means = image.means(&quiet, &deviations, observed);
@@ -161,7 +171,7 @@ impl Image {
         deviations: &Deviations<'_>,
         rows: impl Fn([usize; 2]) -> Vec<Row>,
     ) -> Vec<BlockMean> {
-        let floor = deviations.floor(&self.real, &self.imaginary, &self.usable);
+        let floor = Deviations::floor(&self.real, &self.imaginary, &self.usable);
         let whole = self.blocks.all().filter(|&block| self.blocks.pixels_of(block).all(|pixel| quiet[pixel]));
         let mean = |block| {
             let pixels = self.blocks.pixels_of(block);
@@ -182,7 +192,8 @@ impl Image {
         let mut planes = [vec![0.0; own.len()], vec![0.0; own.len()]];
         let (mut light, mut noise) = (0.0, 0.0);
         for pixel in (0..own.len()).filter(|&pixel| own[pixel]) {
-            let value = if self.usable[pixel] { [self.real[pixel], self.imaginary[pixel]] } else { self.filled(pixel, own) };
+            let value =
+                if self.usable[pixel] { [self.real[pixel], self.imaginary[pixel]] } else { self.filled(pixel, own) };
             light += value[0].hypot(value[1]);
             noise += deviations.variance(pixel).sqrt();
             planes.iter_mut().zip(value).for_each(|(plane, value)| plane[pixel] = value);

@@ -24,7 +24,7 @@ pub(super) struct Choice {
 
 /// Tries the numbers of Gaussians asked for and takes the best that is determined.
 pub(super) fn choose(problem: &Problem<'_>, dictionary: &Dictionary) -> adjust::Result<Choice> {
-    let empty = problem.fit(&[])?;
+    let empty = problem.fit_nothing()?;
     let mut candidates = vec![candidate(0, Ok(&empty), None)];
     let counts = match problem.options.terms {
         TermCount::AtMost(most) => 1..=most,
@@ -33,6 +33,7 @@ pub(super) fn choose(problem: &Problem<'_>, dictionary: &Dictionary) -> adjust::
     let mut best: Option<Choice> = None;
     let mut missed: Option<(f64, Ambiguity)> = None;
     for count in counts {
+        let known = best.as_ref().map(|best| best.fit.bic());
         for (fit, reduced) in attempts(problem, dictionary, count) {
             let refused = match &fit {
                 Ok(fit) => refusal(fit, problem),
@@ -44,10 +45,16 @@ pub(super) fn choose(problem: &Problem<'_>, dictionary: &Dictionary) -> adjust::
                     let ambiguity = reduced.then_some(Ambiguity::WidthBeyondImage);
                     best = Some(Choice { fit, reduced, ambiguity, candidates: Vec::new() });
                 }
-                (Ok(fit), Some(why)) if missed.is_none_or(|(bic, _)| fit.bic() < bic) => missed = Some((fit.bic(), why)),
+                (Ok(fit), Some(why)) if missed.is_none_or(|(bic, _)| fit.bic() < bic) => {
+                    missed = Some((fit.bic(), why));
+                }
                 (Err(why), _) if missed.is_none() => missed = Some((f64::INFINITY, why)),
                 _ => {}
             }
+        }
+        // Where one Gaussian more is not determined or does not pay, two more are not and do not.
+        if best.as_ref().map(|best| best.fit.bic()) == known {
+            break;
         }
     }
     let exact = matches!(problem.options.terms, TermCount::Exactly(_));
@@ -62,11 +69,7 @@ pub(super) fn choose(problem: &Problem<'_>, dictionary: &Dictionary) -> adjust::
 }
 
 /// The adjustment with free widths and, where the image is too small for the widest, the one with that width held.
-fn attempts(
-    problem: &Problem<'_>,
-    dictionary: &Dictionary,
-    count: usize,
-) -> Vec<(Result<Fit, Ambiguity>, bool)> {
+fn attempts(problem: &Problem<'_>, dictionary: &Dictionary, count: usize) -> Vec<(Result<Fit, Ambiguity>, bool)> {
     let Some(start) = dictionary.start(count) else { return vec![(Err(Ambiguity::NoFit), false)] };
     let free = problem.fit(&start).map_err(|error| match error {
         adjust::Error::RankDeficient { .. } => Ambiguity::TermsIndistinguishable,

@@ -4,6 +4,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::fit::{Problem, StartTerm, Unknown};
+use super::noise::{NORMAL_MEDIAN, median};
 use super::response::Term;
 use super::scene::Scene;
 
@@ -20,21 +21,44 @@ pub(super) struct Dictionary {
     widths: Vec<f64>,
     normal: DMatrix<f64>,
     right: DVector<f64>,
+    /// See [`Dictionary::scale`].
+    scale: f64,
 }
 
 impl Dictionary {
     pub(super) fn new(problem: &Problem<'_>) -> Self {
         let widths = widths(problem);
         let count = widths.len();
-        let mut out = Self { normal: DMatrix::zeros(count, count), right: DVector::zeros(count), widths };
-        for scene in &problem.scenes {
-            if let Some(design) = design(problem, scene, &out.widths) {
-                let (matrix, observed) = without_nuisances(design, count);
-                out.normal += matrix.tr_mul(&matrix);
-                out.right += matrix.tr_mul(&observed);
-            }
+        let (normal, right) = (DMatrix::zeros(count, count), DVector::zeros(count));
+        let mut out = Self { normal, right, widths, scale: 1.0 };
+        let designs = problem.scenes.iter().filter_map(|scene| design(problem, scene, &out.widths));
+        let parts: Vec<_> = designs.map(|design| without_nuisances(design, count)).collect();
+        for (matrix, observed) in &parts {
+            out.normal += matrix.tr_mul(matrix);
+            out.right += matrix.tr_mul(observed);
         }
+        out.scale = out.residual_scale(&parts);
         out
+    }
+
+    /// How many times larger than noise says the residuals of the best sum of all Gaussians are, whatever the signs of
+    /// their weights; at least one. From the median: outliers do not count.
+    pub(super) fn scale(&self) -> f64 {
+        self.scale
+    }
+
+    fn residual_scale(&self, parts: &[(DMatrix<f64>, DVector<f64>)]) -> f64 {
+        /// Neighbouring widths differ little; without a ridge their sum would not be determined.
+        const RIDGE: f64 = 1.0 + 1e-9;
+        let mut matrix = self.normal.clone();
+        (0..matrix.nrows()).for_each(|index| matrix[(index, index)] *= RIDGE);
+        let Some(weights) = matrix.cholesky().map(|factor| factor.solve(&self.right)) else { return 1.0 };
+        let mut sizes = Vec::new();
+        for (matrix, observed) in parts {
+            sizes.extend((observed - matrix * &weights).iter().map(|residual| residual.abs()));
+        }
+        let scale = median(&mut sizes) / NORMAL_MEDIAN;
+        if scale > 1.0 && scale.is_finite() { scale } else { 1.0 }
     }
 
     /// The best combination of `count` widths whose weights are all positive.
@@ -54,10 +78,13 @@ impl Dictionary {
         best.map(|(_, start)| start)
     }
 
-    /// Largest standard deviation that the weight of a single Gaussian would have, over all widths of the dictionary.
-    pub(super) fn weight_sigma(&self) -> f64 {
-        let variances = (0..self.widths.len()).map(|index| 1.0 / self.normal[(index, index)]);
-        variances.fold(0.0, |largest: f64, value| if value <= largest { largest } else { value }).sqrt()
+    /// Largest standard deviation that the weight of a single Gaussian would have, over all widths of the dictionary from
+    /// `narrowest` on; infinite where there is none.
+    pub(super) fn weight_sigma(&self, narrowest: f64) -> f64 {
+        let wide = (0..self.widths.len()).filter(|&index| self.widths[index] >= narrowest);
+        let variances = wide.map(|index| 1.0 / self.normal[(index, index)]);
+        let larger = |largest: f64, value: f64| if value <= largest { largest } else { value };
+        variances.reduce(larger).map_or(f64::INFINITY, f64::sqrt)
     }
 
     /// Weights, and by how much they reduce the sum of squares.

@@ -5,7 +5,7 @@ use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;
 use range_image::{ComplexChannel, ComplexFrame, Flags, Modulation, Raster};
-use scattering_deconvolution::{Psf, Scatterer};
+use scattering_deconvolution::{EstimationOptions, GaussianTerm, Psf, PsfEstimate, Scatterer, estimate_psf};
 
 /// A bright rectangle in front of a dim, textured background.
 #[derive(Debug, Clone, Copy)]
@@ -73,10 +73,9 @@ impl Scene {
         let mut scatterer = Scatterer::new(psf, width, height).unwrap();
         scatterer.apply(real.as_mut_slice(), imaginary.as_mut_slice()).unwrap();
         let variance = |amplitude: f64| (self.noise.powi(2) * (1.0 + amplitude / self.wall_amplitude)) / 2.0;
-        let sigma =
-            Raster::from_fn(width, height, |c, r| {
-                variance(f64::from(real[(c, r)].hypot(imaginary[(c, r)]))).sqrt() as f32
-            });
+        let sigma = Raster::from_fn(width, height, |c, r| {
+            variance(f64::from(real[(c, r)].hypot(imaginary[(c, r)]))).sqrt() as f32
+        });
         let mut generator = Pcg64Mcg::seed_from_u64(seed);
         for (pixel, sigma) in sigma.as_slice().iter().enumerate() {
             for plane in [&mut real, &mut imaginary] {
@@ -92,4 +91,17 @@ impl Scene {
     pub fn pair(&self, object: &Object, psf: &Psf, seed: u64) -> (ComplexFrame, ComplexFrame) {
         (self.frame(Some(object), psf, 2 * seed), self.frame(None, psf, 2 * seed + 1))
     }
+}
+
+pub fn round(terms: &[(f64, f64)]) -> Psf {
+    Psf::Gaussians(terms.iter().map(|&(weight, s)| GaussianTerm { weight, sigma_px: [s, s] }).collect())
+}
+
+pub fn elliptic(weight: f64, sigma_px: [f64; 2]) -> Psf {
+    Psf::Gaussians(vec![GaussianTerm { weight, sigma_px }])
+}
+
+pub fn estimate(pairs: &[(ComplexFrame, ComplexFrame)], options: &EstimationOptions) -> PsfEstimate {
+    let captures: Vec<_> = pairs.iter().map(|(with, without)| (with, without)).collect();
+    estimate_psf(&captures, options).unwrap()
 }

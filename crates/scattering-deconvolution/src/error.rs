@@ -76,6 +76,17 @@ pub enum Error {
         /// What was asked for.
         what: &'static str,
     },
+    /// A capture from which a point spread function is to be estimated does not fit together.
+    #[cfg(feature = "estimate")]
+    #[error("capture: {reason}")]
+    Capture {
+        /// What is wrong.
+        reason: String,
+    },
+    /// The adjustment of a point spread function failed in a way that says nothing about the captures.
+    #[cfg(feature = "estimate")]
+    #[error(transparent)]
+    Adjustment(#[from] adjust::Error),
     /// The frame itself is inconsistent.
     #[error(transparent)]
     Frame(#[from] range_image::Error),

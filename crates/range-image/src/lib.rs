@@ -12,8 +12,11 @@ mod noise;
 mod options;
 mod phase_level;
 mod polar;
+mod polar_level;
 mod raster;
+mod samples;
 mod weights;
+mod wide;
 
 pub use average::{average, average_ranges, sigma_from_repeats};
 pub use channel::ComplexChannel;
@@ -26,4 +29,5 @@ pub use modulation::{Modulation, SPEED_OF_LIGHT};
 pub use noise::NoiseModel;
 pub use options::DemodulationOptions;
 pub use phase_level::{PhaseConvention, PhaseSense};
+pub use polar_level::PolarChannel;
 pub use raster::Raster;

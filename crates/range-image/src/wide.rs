@@ -42,9 +42,10 @@ pub(crate) trait PixelLoop {
     fn pixels<A: Arithmetic, const L: usize>(&mut self, start: usize);
 }
 
-/// Runs a loop over `length` pixels, [`LANES`] at a time and the rest one by one. A pixel's bits do not depend on which.
-pub(crate) fn run_wide(length: usize, work: impl PixelLoop) {
-    pulp::Arch::new().dispatch(Wide { length, work });
+/// Runs a loop over `length` pixels, [`LANES`] at a time and the rest one by one, and gives it back. A pixel's bits do
+/// not depend on which.
+pub(crate) fn run_wide<W: PixelLoop>(length: usize, work: W) -> W {
+    pulp::Arch::new().dispatch(Wide { length, work })
 }
 
 struct Wide<W> {
@@ -54,7 +55,7 @@ struct Wide<W> {
 
 impl<W: PixelLoop> Wide<W> {
     #[inline(always)]
-    fn run<A: Arithmetic>(mut self) {
+    fn run<A: Arithmetic>(mut self) -> W {
         let whole = self.length / LANES * LANES;
         for start in (0..whole).step_by(LANES) {
             self.work.pixels::<A, LANES>(start);
@@ -62,19 +63,20 @@ impl<W: PixelLoop> Wide<W> {
         for start in whole..self.length {
             self.work.pixels::<A, 1>(start);
         }
+        self.work
     }
 }
 
 impl<W: PixelLoop> pulp::WithSimd for Wide<W> {
-    type Output = ();
+    type Output = W;
 
     #[inline(always)]
-    fn with_simd<S: pulp::Simd>(self, _: S) {
+    fn with_simd<S: pulp::Simd>(self, _: S) -> W {
         // Of the processors with registers of their own for this, these have the fused operation.
         if !S::IS_SCALAR && cfg!(any(target_arch = "x86", target_arch = "x86_64", target_arch = "aarch64")) {
-            self.run::<Fused>();
+            self.run::<Fused>()
         } else {
-            self.run::<Separate>();
+            self.run::<Separate>()
         }
     }
 }

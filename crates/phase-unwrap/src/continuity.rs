@@ -1,4 +1,5 @@
-//! Relative counts from continuity alone, careful enough for values that nobody can check: only gentle steps conduct.
+//! Relative counts from continuity alone, careful enough for values that nobody can check: only steps conduct that are
+//! gentle, or that go on as the slope beside them does.
 
 use std::collections::VecDeque;
 use std::f32::consts::{PI, TAU};
@@ -9,6 +10,8 @@ use crate::{Error, Island, Result, SpatialOptions, Unwrapped};
 
 /// Share of a surface's steps that may contradict its counts: more than that is a jump that looked gentle somewhere.
 const CONTRADICTIONS: f64 = 2e-3;
+/// The steepest step in radians that may conduct as part of a slope.
+const STEEPEST: f32 = 0.5;
 /// Surfaces smaller than this are specks.
 const SMALLEST_PIXELS: usize = 64;
 
@@ -88,11 +91,29 @@ impl Surface<'_> {
         sides.into_iter().flatten()
     }
 
-    /// Change of the count from one pixel to the next; `None` where the step is not gentle.
+    /// Change of the count from one pixel to the next; `None` where the step may be a jump.
     fn carry(&self, from: usize, to: usize) -> Option<i32> {
+        let (step, carry) = self.step(from, to);
+        let continues = |slope: f32| (step - slope).abs() <= self.jump;
+        let before = || self.beyond(to, from).is_some_and(|before| continues(self.step(before, from).0));
+        let after = || self.beyond(from, to).is_some_and(|after| continues(self.step(to, after).0));
+        let conducts = step.abs() <= self.jump || (step.abs() <= STEEPEST && (before() || after()));
+        conducts.then_some(carry)
+    }
+
+    /// The smaller step between two pixels, and the cycle that it takes.
+    fn step(&self, from: usize, to: usize) -> (f32, i32) {
         let step = self.phase.as_slice()[to] - self.phase.as_slice()[from];
         let carry = i32::from(step < -PI) - i32::from(step > PI);
-        ((step + TAU * carry as f32).abs() <= self.jump).then_some(carry)
+        (step + TAU * carry as f32, carry)
+    }
+
+    /// The pixel one step further in the same direction.
+    fn beyond(&self, from: usize, to: usize) -> Option<usize> {
+        let (width, height) = (self.phase.width(), self.phase.height());
+        let col = (2 * (to % width)).checked_sub(from % width)?;
+        let row = (2 * (to / width)).checked_sub(from / width)?;
+        (col < width && row < height).then_some(row * width + col)
     }
 
     /// Shifts the lowest count to 0 and says whether the surface is sure; takes its counts back if not.

@@ -1,10 +1,17 @@
 //! Repair of wrapped ranges and depths where the camera gave no phases.
 
+use std::f32::consts::TAU;
+
 use range_image::Raster;
 
 use crate::continuity::relative_counts;
 use crate::fold::{Fold, locate, phase_from_folded};
 use crate::{Error, Result, SpatialOptions, Unwrapped, unwrap_spatial};
+
+/// Brightness of the first interval, its median times this, beyond which nothing is pushed away: albedos differ by ten.
+const GLARE: f32 = 10.0;
+/// Fewer pixels than this in the first interval tell nothing about it.
+const GLARE_PIXELS: usize = 64;
 
 /// How wrapped ranges are repaired.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -130,12 +137,36 @@ pub fn repair_ranges(
         return Ok(apply(range_m, interval_m, found, options, RepairVerdict::Relative { fold_m }));
     };
     let received = received_amplitude(amplitude, &phase, options.amplitude_kind);
-    let found = unwrap_spatial(&phase, Some(&received), mask, &options.spatial)?;
+    let mut found = unwrap_spatial(&phase, Some(&received), mask, &options.spatial)?;
     if found.typical_amplitude_at_interval.is_none() {
         let found = relative_counts(&phase, mask, &options.spatial)?;
         return Ok(apply(range_m, interval_m, found, options, RepairVerdict::Relative { fold_m }));
     }
+    doubt_glare(&phase, &received, options.spatial.minimum_confidence, &mut found);
     Ok(apply(range_m, interval_m, found, options, RepairVerdict::Absolute { fold_m }))
+}
+
+/// Takes the confidence from added counts that would make a surface far brighter than what lies in the first interval:
+/// a bright surface is no reason to push anything away, and amplitudes may not be what they were said to be.
+fn doubt_glare(phase: &Raster<f32>, amplitude: &Raster<f32>, minimum_confidence: f32, found: &mut Unwrapped) {
+    let brightness = |index: usize| {
+        let cycles = phase.as_slice()[index] / TAU + found.wraps.as_slice()[index] as f32;
+        amplitude.as_slice()[index] * cycles * cycles
+    };
+    let sure = |index: usize| found.confidence.as_slice()[index] >= minimum_confidence;
+    let near = (0..phase.len()).filter(|&index| sure(index) && found.wraps.as_slice()[index] == 0);
+    let mut near: Vec<f32> = near.map(brightness).filter(|brightness| *brightness > 0.0).collect();
+    if near.len() < GLARE_PIXELS {
+        return;
+    }
+    let middle = near.len() / 2;
+    let limit = GLARE * *near.select_nth_unstable_by(middle, f32::total_cmp).1;
+    let glaring: Vec<bool> = (0..phase.len()).map(|i| found.wraps.as_slice()[i] > 0 && brightness(i) > limit).collect();
+    for (confidence, glaring) in found.confidence.as_mut_slice().iter_mut().zip(glaring) {
+        if glaring {
+            *confidence = 0.0;
+        }
+    }
 }
 
 /// As [`repair_ranges`] for depths along the viewing axis. `cosine` is that of the angle between each pixel's ray and

@@ -5,8 +5,10 @@ mod brightness;
 mod candidates;
 mod combine;
 mod congruent;
+mod continuity;
 mod contraction;
 mod error;
+mod fold;
 mod forest;
 mod grid;
 mod hypotheses;
@@ -25,6 +27,7 @@ mod phasor;
 mod planes;
 mod prefilter;
 mod reliability;
+mod repair;
 mod segments;
 mod spatial;
 mod surface;
@@ -35,6 +38,7 @@ mod window;
 pub use combine::{Combined, combine_frequencies};
 pub use congruent::{congruent, congruent_into};
 pub use error::{Error, Result};
+pub use fold::Fold;
 pub use hypotheses::{Hypotheses, Hypothesis, RankedHypotheses, hypotheses};
 pub use intervals::combined_interval_m;
 pub use kernel_density::KernelDensityOptions;
@@ -43,5 +47,9 @@ pub use noise::{LARGEST_SIGMA_RAD, PhaseNoise};
 pub use noisy::{NoisyOptions, NoisyUnwrapped, NoisyUnwrapper, unwrap_noisy};
 pub use options::{AlbedoPrior, ImageGeometry, KnownWraps, Seed, SpatialOptions};
 pub use prefilter::{Filtered, Prefilter, PrefilterOptions, prefilter};
+pub use repair::{
+    AmplitudeKind, RepairOptions, RepairVerdict, RepairedDepths, RepairedIsland, RepairedRanges, repair_depths,
+    repair_ranges,
+};
 pub use spatial::{Unwrapper, unwrap_spatial};
 pub use unwrapped::{Island, Unwrapped};

@@ -5,17 +5,31 @@ use std::f32::consts::{PI, TAU};
 use range_image::Raster;
 
 use crate::congruent::congruent_into;
+use crate::exact::{ExactOptions, ExactUnwrapped, LeastCuts};
 use crate::noise::{LARGEST_SIGMA_RAD, PhaseNoise};
 use crate::prefilter::{Filtered, Prefilter, PrefilterOptions};
-use crate::{KnownWraps, Result, SpatialOptions, Unwrapped, Unwrapper};
+use crate::{Error, KnownWraps, Result, SpatialOptions, Unwrapped, Unwrapper};
 
 /// How noisy phases are unwrapped.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct NoisyOptions {
     /// The filter.
     pub prefilter: PrefilterOptions,
-    /// The spanning tree.
+    /// The spanning tree, which is always grown: it tells islands and confidence.
     pub spatial: SpatialOptions,
+    /// What the counts of the filtered phase come from.
+    pub method: NoisyMethod,
+}
+
+/// What the counts of the filtered phase come from.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub enum NoisyMethod {
+    /// The spanning tree.
+    #[default]
+    Tree,
+    /// The cheapest cuts, weighted by the inverse variance of the filtered phase where it is known; the tree where
+    /// there are more residues than the options allow, and [`NoisyUnwrapped::method`] says so.
+    LeastCuts(ExactOptions),
 }
 
 /// Wrap counts of a noisy image.
@@ -26,6 +40,8 @@ pub struct NoisyUnwrapped {
     pub unwrapped: Unwrapped,
     /// The filtered phase that was unwrapped.
     pub filtered: Filtered,
+    /// What the counts came from.
+    pub method: NoisyMethod,
 }
 
 /// Unwraps one noisy image; see [`NoisyUnwrapper::unwrap_into`]. Allocates its buffers anew.
@@ -46,6 +62,9 @@ pub struct NoisyUnwrapper {
     options: NoisyOptions,
     prefilter: Prefilter,
     tree: Unwrapper,
+    cuts: LeastCuts,
+    exact: ExactUnwrapped,
+    weights: Raster<f32>,
     lowest: Vec<i32>,
 }
 
@@ -54,12 +73,16 @@ impl NoisyUnwrapper {
     pub fn new(options: NoisyOptions) -> Result<Self> {
         let prefilter = Prefilter::new(options.prefilter)?;
         let tree = Unwrapper::new(options.spatial)?;
-        Ok(Self { options, prefilter, tree, ..Self::default() })
+        let cuts = match options.method {
+            NoisyMethod::Tree => LeastCuts::default(),
+            NoisyMethod::LeastCuts(options) => LeastCuts::new(options),
+        };
+        Ok(Self { options, prefilter, tree, cuts, ..Self::default() })
     }
 
     /// Wrap counts of `phase`, in radians in `[0, 2 pi]`; what is not finite is masked. In `mask`, true means use.
     ///
-    /// The phase is filtered as [`Prefilter::filter_into`] does, unwrapped along the spanning tree, and its counts are
+    /// The phase is filtered as [`Prefilter::filter_into`] does, unwrapped by the method of the options, and its counts are
     /// carried back to the measured phase as [`congruent`](crate::congruent) does. After an error `out` holds nothing
     /// of use.
     pub fn unwrap_into(
@@ -69,9 +92,10 @@ impl NoisyUnwrapper {
         mask: Option<&Raster<bool>>,
         out: &mut NoisyUnwrapped,
     ) -> Result<()> {
-        let NoisyUnwrapped { unwrapped, filtered } = out;
+        let NoisyUnwrapped { unwrapped, filtered, method } = out;
         self.prefilter.filter_into(phase, noise, mask, filtered)?;
         self.tree.unwrap_into(&filtered.phase, None, None, KnownWraps::Nothing, unwrapped)?;
+        *method = self.cut(filtered, &mut unwrapped.wraps)?;
         congruent_into(phase, &filtered.phase, &mut unwrapped.wraps)?;
         self.start_islands_at_zero(unwrapped);
         doubt(phase, filtered, noise, unwrapped);
@@ -80,6 +104,28 @@ impl NoisyUnwrapper {
         }
         unwrapped.count_pixels(self.options.spatial.minimum_confidence);
         Ok(())
+    }
+
+    /// Replaces the tree's counts by those of the cheapest cuts, where this is asked for and allowed.
+    fn cut(&mut self, filtered: &Filtered, wraps: &mut Raster<i32>) -> Result<NoisyMethod> {
+        if self.options.method == NoisyMethod::Tree {
+            return Ok(NoisyMethod::Tree);
+        }
+        self.weights.clone_from(&filtered.sigma);
+        let mut known = false;
+        for weight in self.weights.as_mut_slice() {
+            known |= *weight > 0.0;
+            *weight = 1.0 / (*weight * *weight);
+        }
+        let weights = if known { Some(&self.weights) } else { None };
+        match self.cuts.unwrap_into(&filtered.phase, weights, None, &mut self.exact) {
+            Ok(()) => {
+                wraps.clone_from(&self.exact.wraps);
+                Ok(self.options.method)
+            }
+            Err(Error::TooManyResidues { .. }) => Ok(NoisyMethod::Tree),
+            Err(error) => Err(error),
+        }
     }
 
     /// Counts of noise may lie below those of the filtered surface.

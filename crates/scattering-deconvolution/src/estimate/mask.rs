@@ -78,7 +78,9 @@ fn median_of_nine(plane: &Raster<f32>) -> Raster<f32> {
 /// Every pixel within a square of `reach` about one that is set.
 pub(super) fn dilated(mask: &Raster<bool>, reach: usize) -> Raster<bool> {
     let (width, height) = (mask.width(), mask.height());
-    let near = |index: usize, length: usize| index.saturating_sub(reach)..(index.saturating_add(reach + 1)).min(length);
+    let near = |index: usize, length: usize| {
+        index.saturating_sub(reach)..(index.saturating_add(reach).saturating_add(1)).min(length)
+    };
     let along_rows =
         Raster::from_fn(width, height, |col, row| near(col, width).any(|c| mask.get(c, row).copied().unwrap_or(false)));
     Raster::from_fn(width, height, |col, row| {

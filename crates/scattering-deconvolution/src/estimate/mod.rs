@@ -66,13 +66,12 @@ where
         problem.scale = dictionary.scale();
         let choice = choose(&problem, &dictionary)?;
         round += 1;
-        let found = !choice.fit.terms.is_empty();
-        if round < ROUNDS && found && report::reject(&problem, &choice.fit, &mut changed) {
+        if round < ROUNDS && report::reject(&problem, &choice.fit, &mut changed) {
             current = all_scenes(&captures, blocks, &changed);
             continue;
         }
         // What is narrower than the rim about the object is hidden by it.
-        let narrowest = (options.rim_px + blocks.edge) as f64;
+        let narrowest = options.rim_px.saturating_add(blocks.edge) as f64;
         let limit = options.significance * dictionary.weight_sigma(narrowest) * choice.fit.inflation();
         return Ok(report::estimate(&problem, choice, &first_scenes, limit));
     }

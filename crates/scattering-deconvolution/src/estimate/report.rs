@@ -194,12 +194,18 @@ pub(super) fn reject(problem: &Problem<'_>, fit: &Fit, changed: &mut [Raster<boo
     const FAR: f64 = 5.0;
     /// As a share of the scattered light: a point spread function that is no sum of Gaussians misses less than that.
     const MISFIT: f64 = 0.3;
+    /// Where so large a share of the blocks changed, what is seen is scattering that no Gaussians describe.
+    const MOST: f64 = 0.15;
     let mut any = false;
     for (index, scene) in problem.scenes.iter().enumerate() {
         let own: Vec<&Agreement> = fit.agreements.iter().filter(|one| one.scene == index).collect();
         let scale = robust_scale(&own);
         let Ok(source) = &scene.source else { continue };
-        for one in own.iter().filter(|one| one.size > FAR * scale && one.residual > MISFIT * one.modelled) {
+        let is_far = |one: &&&Agreement| one.size > FAR * scale && one.residual > MISFIT * one.modelled;
+        if own.iter().filter(is_far).count() as f64 > MOST * own.len() as f64 {
+            continue;
+        }
+        for one in own.iter().filter(is_far) {
             let plane = changed[scene.capture].as_mut_slice();
             // Its neighbours are touched by the same thing.
             for row in one.block[1].saturating_sub(1)..=one.block[1] + 1 {

@@ -9,6 +9,9 @@
 //!
 //! is what scattering makes of the light observed inside O, and outside of O it is observed by itself. The first part is
 //! taken pixel by pixel; c in the second, small one as its mean over blocks, times the share of the block that is in O.
+//!
+//! Where the phase of the light is known, P is the projection on its phasor: what is perpendicular to it is scattered
+//! light and noise, and noise that were scattered would pass for scattering.
 
 use std::f64::consts::TAU;
 
@@ -39,8 +42,8 @@ pub(super) struct Source {
     light: Planes,
     /// First column and row of the crop.
     origin: [usize; 2],
-    /// Share of each block that is in O; cropped to the blocks of O.
-    coverage: DMatrix<f64>,
+    /// Means of P over the blocks, cropped to the blocks of O.
+    coverage: [DMatrix<f64>; 3],
     block_origin: [usize; 2],
 }
 
@@ -52,26 +55,44 @@ pub(super) struct Response {
     pub(super) derivatives: Vec<Planes>,
 }
 
+/// A symmetric matrix on (real, imaginary): diagonal, off-diagonal, diagonal.
+pub(super) type Share = [f64; 3];
+
+/// Light that does not belong to the source.
+pub(super) const OUTSIDE: Share = [0.0, 0.0, 0.0];
+/// Light of the source of which nothing is known.
+pub(super) const INSIDE: Share = [1.0, 0.0, 1.0];
+
+/// Light of the source whose phase is known.
+pub(super) fn along(phase: f64) -> Share {
+    let (sin, cos) = phase.sin_cos();
+    [cos * cos, cos * sin, sin * sin]
+}
+
 impl Source {
-    /// From whole planes (row by row), zero outside of `inside`. `None` where nothing is inside.
-    pub(super) fn new(blocks: Blocks, real: &[f64], imaginary: &[f64], inside: &[bool]) -> Option<Self> {
+    /// From observed light and P at each pixel, row by row. `None` where nothing is inside.
+    pub(super) fn new(blocks: Blocks, real: &[f64], imaginary: &[f64], shares: &[Share]) -> Option<Self> {
         let [width, height] = blocks.pixels;
-        let is_inside = |col: usize, row: usize| inside[row * width + col];
+        let is_inside = |col: usize, row: usize| shares[row * width + col] != OUTSIDE;
         let columns = extent(width, |col| (0..height).any(|row| is_inside(col, row)))?;
         let rows = extent(height, |row| (0..width).any(|col| is_inside(col, row)))?;
-        let crop = |plane: &[f64]| {
+        let crop = |part: [usize; 2]| {
             DMatrix::from_fn(columns.1 - columns.0, rows.1 - rows.0, |col, row| {
-                plane[(row + rows.0) * width + col + columns.0]
+                let pixel = (row + rows.0) * width + col + columns.0;
+                let share = |place: usize| shares[pixel][place];
+                share(part[0]) * real[pixel] + share(part[1]) * imaginary[pixel]
             })
         };
         let block_origin = [columns.0 / blocks.edge, rows.0 / blocks.edge];
         let size = [columns.1.div_ceil(blocks.edge), rows.1.div_ceil(blocks.edge)];
-        let coverage = DMatrix::from_fn(size[0] - block_origin[0], size[1] - block_origin[1], |col, row| {
-            let pixels = blocks.pixels_of([col + block_origin[0], row + block_origin[1]]);
-            let (number, set) = pixels.fold((0_u32, 0_u32), |(n, set), pixel| (n + 1, set + u32::from(inside[pixel])));
-            f64::from(set) / f64::from(number)
+        let coverage = [0, 1, 2].map(|place| {
+            DMatrix::from_fn(size[0] - block_origin[0], size[1] - block_origin[1], |col, row| {
+                let pixels = blocks.pixels_of([col + block_origin[0], row + block_origin[1]]);
+                let (sum, count) = pixels.fold((0.0, 0.0), |(sum, n), pixel| (sum + shares[pixel][place], n + 1.0));
+                sum / count
+            })
         });
-        let light = Planes { real: crop(real), imaginary: crop(imaginary) };
+        let light = Planes { real: crop([0, 1]), imaginary: crop([1, 2]) };
         Some(Self { blocks, light, origin: [columns.0, rows.0], coverage, block_origin })
     }
 
@@ -93,15 +114,18 @@ impl Source {
         out
     }
 
-    /// `G (coverage · c)` on all blocks, by given matrices of the two axes.
+    /// `G (P c)` on all blocks, by given matrices of the two axes.
     fn again(&self, [x, y]: [&DMatrix<f64>; 2], scattered: &Planes) -> Planes {
-        let [columns, rows] = [self.coverage.nrows(), self.coverage.ncols()];
+        let [across, mixed, down] = &self.coverage;
+        let (columns, rows) = mixed.shape();
         let start = (self.block_origin[0], self.block_origin[1]);
         let (x, y) = (x.columns(start.0, columns), y.columns(start.1, rows));
-        scattered.map(|plane| {
-            let lit = plane.view(start, (columns, rows)).component_mul(&self.coverage);
-            x * (lit * y.transpose())
-        })
+        let [re, im] = [&scattered.real, &scattered.imaginary].map(|plane| plane.view(start, (columns, rows)));
+        let lit = Planes {
+            real: re.component_mul(across) + im.component_mul(mixed),
+            imaginary: re.component_mul(mixed) + im.component_mul(down),
+        };
+        lit.map(|plane| x * (plane * y.transpose()))
     }
 
     /// Solves `c = first − h * (P c)` by scattering again and again.
@@ -196,11 +220,9 @@ mod tests {
 
     fn source(edge: usize) -> (Source, Vec<bool>, Vec<f64>) {
         let (inside, re, im) = scattered();
-        let only = |plane: &[f64]| -> Vec<f64> {
-            plane.iter().zip(&inside).map(|(value, inside)| if *inside { *value } else { 0.0 }).collect()
-        };
+        let shares: Vec<Share> = inside.iter().map(|inside| if *inside { INSIDE } else { OUTSIDE }).collect();
         let blocks = Blocks::new(SIZE, Some(edge));
-        (Source::new(blocks, &only(&re), &only(&im), &inside).unwrap(), inside, re)
+        (Source::new(blocks, &re, &im, &shares).unwrap(), inside, re)
     }
 
     #[test]
@@ -253,6 +275,6 @@ mod tests {
         for weight in [3.0, f64::NAN] {
             assert!(source.response(&[Term { weight, sigma_px: [3.0, 3.0] }], false).is_none());
         }
-        assert!(Source::new(Blocks::new([3, 2], None), &[0.0; 6], &[0.0; 6], &[false; 6]).is_none());
+        assert!(Source::new(Blocks::new([3, 2], None), &[0.0; 6], &[0.0; 6], &[OUTSIDE; 6]).is_none());
     }
 }

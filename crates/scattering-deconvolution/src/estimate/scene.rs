@@ -4,7 +4,7 @@ use range_image::{ComplexChannel, ComplexFrame, Flags, Raster};
 
 use super::blocks::Blocks;
 use super::noise::{Deviations, noise_of_differences};
-use super::response::Source;
+use super::response::{INSIDE, OUTSIDE, Share, Source, along};
 use super::{Capture, ForegroundCapture, TwoPlaneCapture};
 
 /// Values of which nothing may be concluded.
@@ -104,7 +104,8 @@ fn foreground(index: usize, capture: &ForegroundCapture<'_>, blocks: Blocks, cha
             ]
         };
         let means = image.means(&quiet, &deviations, observed);
-        let (source, source_pixels) = image.source(own, &deviations);
+        let shares: Vec<Share> = own.iter().map(|changed| if *changed { INSIDE } else { OUTSIDE }).collect();
+        let (source, source_pixels) = image.source(&shares, &deviations);
         Scene { capture: index, channel, source, source_pixels, means, sees_amplitude: true }
     };
     pairs.map(scene).collect()
@@ -132,7 +133,9 @@ fn two_plane(index: usize, capture: &TwoPlaneCapture<'_>, blocks: Blocks, change
             vec![Row { observed: mean(&turned.1), light: direction, drift, constant: direction }]
         };
         let means = image.means(&quiet, &deviations, row);
-        let (source, source_pixels) = image.source(&vec![true; quiet.len()], &deviations);
+        let share = |phase: &f32| if phase.is_finite() { along(f64::from(*phase)) } else { INSIDE };
+        let shares: Vec<Share> = truth.as_slice().iter().map(share).collect();
+        let (source, source_pixels) = image.source(&shares, &deviations);
         Scene { capture: index, channel, source, source_pixels, means, sees_amplitude: false }
     };
     frame.channels.iter().zip(capture.true_phase).enumerate().map(scene).collect()
@@ -182,8 +185,9 @@ impl Image {
         whole.map(mean).filter(finite).collect()
     }
 
-    /// The light inside `own`, and the number of its pixels. Those without a value are filled from their neighbours.
-    fn source(&self, own: &[bool], deviations: &Deviations<'_>) -> (Result<Source, Blind>, usize) {
+    /// The light of the source, and the number of its pixels. Those without a value are filled from their neighbours.
+    fn source(&self, shares: &[Share], deviations: &Deviations<'_>) -> (Result<Source, Blind>, usize) {
+        let own: Vec<bool> = shares.iter().map(|share| *share != OUTSIDE).collect();
         let count = own.iter().filter(|own| **own).count();
         let lost = own.iter().zip(&self.usable).filter(|(own, usable)| **own && !**usable).count();
         if lost as f64 > LARGEST_LOSS * count as f64 {
@@ -193,13 +197,13 @@ impl Image {
         let (mut light, mut noise) = (0.0, 0.0);
         for pixel in (0..own.len()).filter(|&pixel| own[pixel]) {
             let value =
-                if self.usable[pixel] { [self.real[pixel], self.imaginary[pixel]] } else { self.filled(pixel, own) };
+                if self.usable[pixel] { [self.real[pixel], self.imaginary[pixel]] } else { self.filled(pixel, &own) };
             light += value[0].hypot(value[1]);
             noise += deviations.variance(pixel).sqrt();
             planes.iter_mut().zip(value).for_each(|(plane, value)| plane[pixel] = value);
         }
         let bright = light > 0.0 && (light > DIMMEST_SOURCE * noise || noise.is_nan());
-        let source = Source::new(self.blocks, &planes[0], &planes[1], own).filter(|_| bright);
+        let source = Source::new(self.blocks, &planes[0], &planes[1], shares).filter(|_| bright);
         (source.ok_or(Blind::NoLight), count)
     }
 

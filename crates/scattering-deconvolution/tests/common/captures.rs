@@ -105,3 +105,21 @@ pub fn estimate(pairs: &[(ComplexFrame, ComplexFrame)], options: &EstimationOpti
     let captures: Vec<_> = pairs.iter().map(|(with, without)| (with, without)).collect();
     estimate_psf(&captures, options).unwrap()
 }
+
+/// Mean absolute difference of the range to that of a frame without scattering, outside of the object, metres.
+pub fn mean_wall_error(frame: &ComplexFrame, truth: &ComplexFrame, object: &Object) -> f64 {
+    let (channel, truth) = (&frame.channels[0], truth.channels[0].phase());
+    let phase = channel.phase();
+    let is_wall = |col: usize, row: usize| {
+        !((object.columns[0]..object.columns[1]).contains(&col) && (object.rows[0]..object.rows[1]).contains(&row))
+    };
+    let (mut sum, mut count) = (0.0, 0.0);
+    for row in 0..phase.height() {
+        for col in (0..phase.width()).filter(|&col| is_wall(col, row)) {
+            let turn = (f64::from(phase[(col, row)]) - f64::from(truth[(col, row)])).rem_euclid(std::f64::consts::TAU);
+            sum += channel.modulation.range_from_phase(turn.min(std::f64::consts::TAU - turn));
+            count += 1.0;
+        }
+    }
+    sum / count
+}

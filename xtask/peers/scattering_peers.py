@@ -24,7 +24,7 @@ INTERVAL_M = 299792458 / 2 / 20e6
 # Where sampled Gaussians end, standard deviations; beyond is 1.3e-4 of their weight.
 CUT = 4.0
 # Repetitions end after so many seconds.
-SECONDS = 1.0
+SECONDS = 0.5
 
 
 def measured(work):

@@ -45,7 +45,7 @@ fn run() -> Outcome {
     Ok(())
 }
 
-/// Restores fresh copies again and again, until a second is over.
+/// Restores fresh copies again and again, until half a second is over.
 fn measure(
     name: &str,
     restorer: &mut Restorer,
@@ -53,7 +53,7 @@ fn measure(
 ) -> Result<[Plane; 2], Box<dyn Error + Send + Sync>> {
     let [mut real, mut imaginary] = observed.clone();
     let (mut least, mut spent) = (f64::INFINITY, 0.0);
-    while spent < 1.0 {
+    while spent < 0.5 {
         real.copy_from_slice(&observed[0]);
         imaginary.copy_from_slice(&observed[1]);
         let start = cpu_seconds()?;

@@ -14,21 +14,21 @@ use crate::room::{Patches, Room};
 use crate::{Outcome, Size, files};
 
 /// Part of the combined interval that the room fills: noise must not carry the farthest wall past the end.
-const FILLED: f64 = 0.95;
+const FILLED: f64 = 0.85;
 
 fn modulations(hz: &[&str]) -> Result<Vec<Modulation>, Box<dyn Error>> {
     hz.iter().map(|hz| Ok(Modulation::new(hz.parse()?)?)).collect()
 }
 
 /// The room, stretched to the combined interval. Sigma of the phase grows with the square of the range, to `far_sigma` at
-/// the farthest point, and is the same at all frequencies.
+/// the end of the interval, and is the same at all frequencies.
 pub fn write(size: Size, folder: &str, far_sigma: f64, hz: &[&str]) -> Outcome {
     let modulations = modulations(hz)?;
     let room = Room::new(1, Patches::Plain, size);
     let range = Raster::from_fn(size[0], size[1], |col, row| room.look(col, row).0);
     let far = range.as_slice().iter().copied().fold(0.0, f64::max);
     let stretch = FILLED * combined_interval_m(&modulations)? / far;
-    let sigma = range.map(|range| far_sigma * (range / far).powi(2));
+    let sigma = range.map(|range| far_sigma * (FILLED * range / far).powi(2));
     let mut rng = Pcg64::seed_from_u64(3);
     for (index, modulation) in modulations.iter().enumerate() {
         let truth = range.map(|range| modulation.phase_from_range(stretch * range));

@@ -31,12 +31,12 @@ impl Captures {
         let (calibration, calibration_words) = start(request)?;
         let with_object = frames(&request.with_object, request.calibration.as_deref(), progress)?;
         let mut others = frames(&request.without_object, request.calibration.as_deref(), progress)?;
+        let known: Vec<String> = others.views.iter().map(|other| other.station.clone()).collect();
         let mut stations = Vec::new();
         let mut without_object = Vec::new();
         for view in &with_object.views {
             complex(view)?;
             let Some(place) = others.views.iter().position(|other| other.station == view.station) else {
-                let known: Vec<&str> = others.views.iter().map(|other| other.station.as_str()).collect();
                 let message = format!(
                     "it has no station `{}`, which {} has: {}",
                     view.station,

@@ -24,7 +24,7 @@ INTERVAL_M = 299792458 / 2 / 20e6
 # Where sampled Gaussians end, standard deviations; beyond is 1.3e-4 of their weight.
 CUT = 4.0
 # Repetitions end after so many seconds.
-SECONDS = 1.0
+SECONDS = 0.5
 
 
 def measured(work):
@@ -188,7 +188,7 @@ def restore(folder, shape, terms):
     for name, way in ways.items():
         found, least = way()
         answer[name] = {"ms": least, "cm": error(found)}
-    for name in ("ours_every_pixel", "ours_automatic"):
+    for name in ("ours_every_pixel", "ours_automatic", "ours_coarse"):
         if os.path.exists(os.path.join(folder, f"{name}_real.f32")):
             found = plane(f"{name}_real.f32") + 1j * plane(f"{name}_imaginary.f32")
             answer[name] = {"cm": error(found)}

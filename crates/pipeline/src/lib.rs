@@ -43,7 +43,8 @@ pub use plan::{
 pub use progress::{Progress, Silent};
 pub use run::{RunRequest, process, run};
 pub use scattering::{
-    CandidateGaussians, ScatteringCapture, ScatteringParameter, ScatteringRequest, ScatteringSummary, estimate_scattering,
+    CandidateGaussians, ScatteringCapture, ScatteringParameter, ScatteringRequest, ScatteringSummary,
+    estimate_scattering,
 };
 pub use scattering_deconvolution::{EstimationOptions, TermCount, TermShape};
 pub use self_calibration::{CalibrationOptions, CandidateGrid, Method, NetworkDatum, PlanOptions, TermSelection};

@@ -36,7 +36,8 @@ fn request(with_object: &Path, without_object: &Path, out: PathBuf) -> Scatterin
 
 /// Median range error of the small room after its range terms were taken off, metre.
 fn room_error(survey: &Path, calibration: Option<&Path>, deconvolve: &str) -> f64 {
-    let stages = format!("[Demodulate(low_amplitude: 20), Average(), {deconvolve} Unwrap(maximum_range_m: 12), CorrectRange()]");
+    let stages =
+        format!("[Demodulate(low_amplitude: 20), Average(), {deconvolve} Unwrap(maximum_range_m: 12), CorrectRange()]");
     let plan = Plan::from_ron(&format!("(name: \"room\", stages: {stages})"), "room.ron".as_ref()).unwrap();
     let outcome = process(&plan, survey, calibration, &Silent).unwrap();
     outcome.stages.last().unwrap().truth.as_ref().unwrap().range_error_median_m

@@ -46,11 +46,14 @@ fn measure(kind: &str, samples: Samples, [width, height]: [usize; 2], folder: &P
     println!("{kind} {}", least(|| demodulator.demodulate_into(&raw, &mut frame))?);
     let channel = &frame.channels[0];
     let (mut phase, mut amplitude) = (Raster::filled(width, height, 0.0), Raster::filled(width, height, 0.0));
-    let polar = || {
-        channel.phase_into(&mut phase)?;
-        channel.amplitude_into(&mut amplitude)
+    println!("polar {}", least(|| channel.phase_and_amplitude_into(&mut phase, &mut amplitude))?);
+    let mut planes = Vec::new();
+    let straight = || {
+        demodulator.phase_and_amplitude_into(&raw, &mut planes);
+        Ok::<_, range_image::Error>(())
     };
-    println!("polar {}", least(polar)?);
+    println!("straight_{kind} {}", least(straight)?);
+    let phase = &planes[0].phase;
     let bytes: Vec<u8> = phase.as_slice().iter().flat_map(|value| value.to_ne_bytes()).collect();
     Ok(std::fs::write(folder.join(format!("phase_{kind}.f32")), bytes)?)
 }

@@ -5,9 +5,9 @@ mod composite;
 mod convolution;
 mod dependence;
 mod error;
-mod field;
 #[cfg(feature = "estimate")]
 mod estimate;
+mod field;
 mod frame;
 mod grid;
 mod kernel;
@@ -26,13 +26,13 @@ mod work;
 
 pub use composite::{CompositePsf, FieldTerm, Ghost, GhostDelay, GhostPlace};
 pub use error::{Error, Result};
-pub use field::FieldPolynomial;
 #[cfg(feature = "estimate")]
 pub use estimate::{
     Ambiguity, Candidate, Capture, CaptureReport, Estimated, EstimationOptions, ForegroundCapture, Nuisance,
     NuisanceValues, PsfEstimate, PsfParameter, TermCount, TermShape, TwoPlaneCapture, Verdict, estimate_psf,
     object_mask, true_phases,
 };
+pub use field::FieldPolynomial;
 pub use frame::restore;
 pub use kernel::{GAUSSIAN_CUT_SIGMAS, SampledKernel};
 pub use options::{GridSpacing, RestorationOptions, SaturatedLight};

@@ -20,7 +20,7 @@ fn save(folder: &str, name: &str, bytes: Vec<u8>) -> Outcome {
     Ok(std::fs::write(Path::new(folder).join(name), bytes)?)
 }
 
-pub fn read(folder: &str, name: &str, [width, height]: Size) -> Result<Raster<f32>, Box<dyn Error>> {
+pub fn read(folder: &str, name: &str, [width, height]: Size) -> Result<Raster<f32>, Box<dyn Error + Send + Sync>> {
     let path = Path::new(folder).join(name);
     let bytes = std::fs::read(&path).map_err(|error| format!("{}: {error}", path.display()))?;
     let values = bytes.as_chunks::<4>().0.iter().map(|&bytes| f32::from_ne_bytes(bytes)).collect();

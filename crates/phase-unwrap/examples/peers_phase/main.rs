@@ -23,12 +23,17 @@ mod spatial;
 use std::error::Error;
 
 /// What a command answers.
-type Outcome = Result<(), Box<dyn Error>>;
+type Outcome = Result<(), Box<dyn Error + Send + Sync>>;
 
 /// Width and height of an image, pixels.
 type Size = [usize; 2];
 
 fn main() -> Outcome {
+    // One thread, as for everyone else.
+    rayon::ThreadPoolBuilder::new().num_threads(1).build()?.install(run)
+}
+
+fn run() -> Outcome {
     let words: Vec<String> = std::env::args().skip(1).collect();
     let words: Vec<&str> = words.iter().map(String::as_str).collect();
     match words.as_slice() {
@@ -51,6 +56,6 @@ fn main() -> Outcome {
     }
 }
 
-fn size(width: &str, height: &str) -> Result<Size, Box<dyn Error>> {
+fn size(width: &str, height: &str) -> Result<Size, Box<dyn Error + Send + Sync>> {
     Ok([width.parse()?, height.parse()?])
 }

@@ -66,7 +66,10 @@ fn parameters(page: &mut Page, summary: &ScatteringSummary) {
     head.extend(summary.parameters.iter().map(|parameter| parameter.name.as_str()));
     page.table(&head, &rows);
     page.paragraph("The columns behind the unit are correlations.");
-    page.figures(&[(profile(summary), "Light beside a single bright pixel, on a row, in parts of its own.".to_owned())]);
+    page.figures(&[(
+        profile(summary),
+        "Light beside a single bright pixel, on a row, in parts of its own.".to_owned(),
+    )]);
     let tried: Vec<Vec<String>> = summary
         .candidates
         .iter()
@@ -81,7 +84,8 @@ fn parameters(page: &mut Page, summary: &ScatteringSummary) {
 
 /// Decadic logarithm of the point spread function along a row.
 fn profile(summary: &ScatteringSummary) -> String {
-    let value = |name: &str| summary.parameters.iter().find(|parameter| parameter.name == name).map(|found| found.value);
+    let value =
+        |name: &str| summary.parameters.iter().find(|parameter| parameter.name == name).map(|found| found.value);
     let terms: Vec<(f64, [f64; 2])> = (1..)
         .map_while(|term| {
             let weight = value(&format!("weight {term}"))?;
@@ -148,8 +152,16 @@ fn captures(page: &mut Page, summary: &ScatteringSummary) {
         })
         .collect();
     let head = [
-        "station", "frequency", "object, pixels", "blocks", "rms", "rms left", "rms left by the others' model",
-        "ranges moved", "restored", "not used because",
+        "station",
+        "frequency",
+        "object, pixels",
+        "blocks",
+        "rms",
+        "rms left",
+        "rms left by the others' model",
+        "ranges moved",
+        "restored",
+        "not used because",
     ];
     page.table(&head, &rows);
 }

@@ -1,9 +1,7 @@
 //! What scattering does to the ranges of a background, and what is left of it after restoration.
 
 use range_image::{ComplexFrame, Flags, Modulation};
-use scattering_deconvolution::{
-    EstimationOptions, ForegroundCapture, Psf, RestorationOptions, object_mask, restore,
-};
+use scattering_deconvolution::{EstimationOptions, ForegroundCapture, Psf, RestorationOptions, object_mask, restore};
 
 use crate::{Error, Result};
 
@@ -43,8 +41,10 @@ fn differences(with_object: &ComplexFrame, without_object: &ComplexFrame, object
     let (Some(a), Some(b)) = (with_object.channels.first(), without_object.channels.first()) else {
         return Vec::new();
     };
-    let (re, im) = (a.real.as_slice().iter().zip(a.imaginary.as_slice()), b.real.as_slice().iter().zip(b.imaginary.as_slice()));
-    let mut out: Vec<f64> = re.zip(im).map(|((ar, ai), (br, bi))| range_mm(a.modulation, [*ar, *ai], [*br, *bi])).collect();
+    let (re, im) =
+        (a.real.as_slice().iter().zip(a.imaginary.as_slice()), b.real.as_slice().iter().zip(b.imaginary.as_slice()));
+    let mut out: Vec<f64> =
+        re.zip(im).map(|((ar, ai), (br, bi))| range_mm(a.modulation, [*ar, *ai], [*br, *bi])).collect();
     let flags = with_object.flags.as_slice().iter().zip(without_object.flags.as_slice());
     let untrusted = Flags::NO_DATA | Flags::SATURATED;
     for (index, (value, (one, other))) in out.iter_mut().zip(flags).enumerate() {

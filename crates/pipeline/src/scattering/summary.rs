@@ -110,7 +110,8 @@ impl ScatteringSummary {
         shifts: &[Shift],
     ) -> Self {
         let correlation = estimate.correlation();
-        let all = |pick: fn(&Shift) -> &[f64]| median_absolute_m(shifts.iter().flat_map(|shift| pick(shift).iter().copied()));
+        let all =
+            |pick: fn(&Shift) -> &[f64]| median_absolute_m(shifts.iter().flat_map(|shift| pick(shift).iter().copied()));
         Self {
             with_object: request.with_object.display().to_string(),
             without_object: request.without_object.display().to_string(),

@@ -21,7 +21,12 @@ impl Calibration {
             noise.validate().map_err(|error| InvalidField::new("noise", error.to_string()))?;
         }
         self.scattering.iter().try_for_each(check_psf)?;
-        check_parameters("scattering_parameters", &self.scattering_parameters, scattering_unit, "weight 1, sigma_px 1, ...")?;
+        check_parameters(
+            "scattering_parameters",
+            &self.scattering_parameters,
+            scattering_unit,
+            "weight 1, sigma_px 1, ...",
+        )?;
         self.fixed_pattern.iter().try_for_each(|pattern| self.check_pattern(pattern))?;
         if let Some(correlation) = &self.correlation {
             correlation.check(&self.parameter_names())?;

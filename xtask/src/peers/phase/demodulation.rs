@@ -14,7 +14,7 @@ pub(super) fn run(stage: &Stage, bars: &mut Bars) -> Outcome {
     stage.script("samples", &image, &[])?;
     for _ in 0..stage.runs {
         let printed = ours.call(&["640", "480", image.folder])?;
-        for figure in ["u16", "f32", "polar"] {
+        for figure in ["u16", "f32", "polar", "straight_u16", "straight_f32"] {
             least.note(&image.case, "ours", figure, printed.get(figure, 0));
         }
         least.note_all(&image.case, &stage.script("demodulate", &image, &[])?);
@@ -27,15 +27,34 @@ pub(super) fn run(stage: &Stage, bars: &mut Bars) -> Outcome {
         "complex image, u16",
         "complex image, f32",
         "phase and amplitude of it",
+        "both, u16",
+        "both, f32",
         "greatest error of the phase, rad",
     ]);
-    for (who, name) in [("numpy", "NumPy `arctan2`, `hypot`"), ("opencv", "OpenCV `cartToPolar`")] {
-        row(name, &["u16", "f32", "polar", "error"].map(|figure| get(who, figure)));
+    for (who, name, error) in [
+        ("numpy", "NumPy `arctan2`, `hypot`", get("numpy", "error")),
+        ("opencv", "OpenCV `cartToPolar`", get("opencv", "error")),
+        ("ours", "`range-image`, with offset, sigma and flags", error),
+    ] {
+        let [u16, f32, polar] = ["u16", "f32", "polar"].map(|figure| get(who, figure));
+        row(name, &[u16, f32, polar, u16 + polar, f32 + polar, error]);
     }
-    let name = "`range-image`, with offset, sigma and flags";
-    row(name, &[get("ours", "u16"), get("ours", "f32"), get("ours", "polar"), error]);
+    let straight = ["straight_u16", "straight_f32"].map(|figure| get("ours", figure));
+    row(
+        "`range-image`, straight to phase and amplitude",
+        &[f64::NAN, f64::NAN, f64::NAN, straight[0], straight[1], error],
+    );
+    for (kind, straight) in [("u16", straight[0]), ("f32", straight[1])] {
+        let best = ["numpy", "opencv"].map(|who| get(who, kind) + get(who, "polar"));
+        let ratio = straight / best[0].min(best[1]);
+        bars.at_most(&format!("samples {kind} to phase and amplitude, time over the fastest peer's"), 1.0, ratio);
+    }
     let best = get("numpy", "polar").min(get("opencv", "polar"));
-    bars.at_most("phase and amplitude, time over the fastest peer's", 1.0, get("ours", "polar") / best);
+    bars.at_most(
+        "complex image to phase and amplitude, time over the fastest peer's",
+        1.0,
+        get("ours", "polar") / best,
+    );
     bars.at_most("phase, greatest error, rad", 2e-6, error);
     Ok(())
 }

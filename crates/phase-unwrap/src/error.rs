@@ -100,6 +100,16 @@ pub enum Error {
         /// Combined ambiguity interval in metres.
         combined_interval_m: f64,
     },
+    /// A standard deviation is negative.
+    #[error("sigma = {value} rad at column {col}, row {row}: a standard deviation is not negative")]
+    NegativeSigma {
+        /// Column.
+        col: usize,
+        /// Row.
+        row: usize,
+        /// Value found.
+        value: f32,
+    },
     /// Rasters that belong together differ, or another fault of a raster.
     #[error(transparent)]
     Raster(#[from] range_image::Error),

@@ -34,10 +34,10 @@ pub use network_plan::{CandidateSummary, NetworkPlanRequest, PlanSummary, PointS
 pub use network_scene::{
     FieldSpec, NetworkScene, PassiveSpec, SceneStation, SceneTarget, SightingSpec, simulate_network,
 };
-pub use outcome::{AdjustmentFigures, Outcome, StationPose};
+pub use outcome::{AdjustmentFigures, FurtherPoint, Outcome, StationPose};
 pub use plan::{
     AdjustOptions, AverageOptions, CorrectImagePointOptions, CorrectRangeOptions, DeconvolveOptions, DemodulateOptions,
-    FlagOptions, MixedPixels, NetworkCalibration, NoiseOptions, Plan, PointCloudOptions, RegisterOptions,
+    FlagOptions, MixedPixels, MultipathOptions, MultipathTreatment, NetworkCalibration, NoiseOptions, Plan, PointCloudOptions, RegisterOptions, RepairWrapsOptions,
     SimulateSource, Source, Stage, UnwrapOptions,
 };
 pub use progress::{Progress, Silent};

@@ -13,6 +13,7 @@ mod report;
 mod response;
 mod result;
 mod scene;
+mod score;
 mod selection;
 mod start;
 

@@ -30,10 +30,14 @@ pub(super) fn choose(problem: &Problem<'_>, dictionary: &Dictionary) -> adjust::
         TermCount::AtMost(most) => 1..=most,
         TermCount::Exactly(count) => count..=count,
     };
+    let exact = matches!(problem.options.terms, TermCount::Exactly(_));
     let mut best: Option<Choice> = None;
     let mut missed: Option<(f64, Ambiguity)> = None;
     for count in counts {
         let known = best.as_ref().map(|best| best.fit.bic());
+        if !exact && !dictionary.promises_more(problem, best.as_ref().map_or(&empty, |best| &best.fit)) {
+            break;
+        }
         for (fit, reduced) in attempts(problem, dictionary, count) {
             let refused = match &fit {
                 Ok(fit) => refusal(fit, problem),
@@ -57,7 +61,6 @@ pub(super) fn choose(problem: &Problem<'_>, dictionary: &Dictionary) -> adjust::
             break;
         }
     }
-    let exact = matches!(problem.options.terms, TermCount::Exactly(_));
     let none = || {
         // Where a number is asked for, its failure is the answer; otherwise only one that would have explained much.
         let explains = |bic: f64| bic < empty.bic() - MISSED;

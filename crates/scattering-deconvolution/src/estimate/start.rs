@@ -5,8 +5,9 @@ use nalgebra::{DMatrix, DVector};
 
 use super::fit::{Problem, StartTerm, Unknown};
 use super::noise::{NORMAL_MEDIAN, median};
+use super::planes::Planes;
 use super::response::Term;
-use super::scene::Scene;
+use super::scene::{BlockMean, Row, Scene};
 
 /// Widths of the dictionary.
 const WIDTHS: usize = 9;
@@ -21,6 +22,8 @@ pub(super) struct Dictionary {
     widths: Vec<f64>,
     normal: DMatrix<f64>,
     right: DVector<f64>,
+    /// For each scene what each width scatters; nothing where there is no light.
+    pub(super) lights: Vec<Vec<Planes>>,
     /// See [`Dictionary::scale`].
     scale: f64,
 }
@@ -30,9 +33,16 @@ impl Dictionary {
         let widths = widths(problem);
         let count = widths.len();
         let (normal, right) = (DMatrix::zeros(count, count), DVector::zeros(count));
-        let mut out = Self { normal, right, widths, scale: 1.0 };
-        let designs = problem.scenes.iter().filter_map(|scene| design(problem, scene, &out.widths));
-        let parts: Vec<_> = designs.map(|design| without_nuisances(design, count)).collect();
+        let of_scene = |scene: &&Scene| -> Vec<Planes> {
+            let source = scene.source.as_ref().ok();
+            source
+                .map_or_else(Vec::new, |source| widths.iter().filter_map(|&width| source.first_order(width)).collect())
+        };
+        let lights: Vec<Vec<Planes>> = problem.scenes.iter().map(of_scene).collect();
+        let lit = problem.scenes.iter().zip(&lights).filter(|(_, lights)| lights.len() == count);
+        let design_of = |(scene, lights): (&&Scene, &Vec<Planes>)| design(problem, scene, lights, None);
+        let parts: Vec<_> = lit.map(|part| without_nuisances(design_of(part), count)).collect();
+        let mut out = Self { normal, right, widths, lights, scale: 1.0 };
         for (matrix, observed) in &parts {
             out.normal += matrix.tr_mul(matrix);
             out.right += matrix.tr_mul(observed);
@@ -111,30 +121,43 @@ fn widths(problem: &Problem<'_>) -> Vec<f64> {
     (0..WIDTHS).map(|index| narrowest * ratio.powi(index as i32)).collect()
 }
 
-/// Whitened columns: widths, nuisances, observed values.
-fn design(problem: &Problem<'_>, scene: &Scene, widths: &[f64]) -> Option<Vec<DVector<f64>>> {
-    let source = scene.source.as_ref().ok()?;
-    let rows = || scene.means.iter().flat_map(|mean| mean.rows.iter().map(move |row| (mean, row)));
-    let mut columns = Vec::new();
-    for &width in widths {
-        let light = source.first_order(width)?;
-        let value = rows().map(|(mean, row)| {
-            let at = (mean.block[0], mean.block[1]);
-            (row.light[0] * light.real[at] + row.light[1] * light.imaginary[at]) / mean.sigma
-        });
-        columns.push(DVector::from_vec(value.collect()));
-    }
+/// What is known already of a scene: scattered light, and the weight of each block mean.
+pub(super) struct Known<'k> {
+    pub(super) scattered: &'k Planes,
+    pub(super) weights: &'k [f64],
+}
+
+/// Whitened columns: scattered lights, nuisances, and what is observed beyond that which is known.
+pub(super) fn design(
+    problem: &Problem<'_>,
+    scene: &Scene,
+    lights: &[Planes],
+    known: Option<&Known<'_>>,
+) -> Vec<DVector<f64>> {
+    let weights = known.map_or(&[][..], |known| known.weights).iter().copied().chain(std::iter::repeat(1.0));
+    let means = scene.means.iter().zip(weights);
+    let rows: Vec<(&BlockMean, &Row, f64)> =
+        means.flat_map(|(mean, w)| mean.rows.iter().map(move |row| (mean, row, w.sqrt() / mean.sigma))).collect();
+    let seen = |mean: &BlockMean, row: &Row, light: &Planes| {
+        let at = (mean.block[0], mean.block[1]);
+        row.light[0] * light.real[at] + row.light[1] * light.imaginary[at]
+    };
+    let column = |value: &dyn Fn(&BlockMean, &Row) -> f64| {
+        DVector::from_iterator(rows.len(), rows.iter().map(|(mean, row, factor)| value(mean, row) * factor))
+    };
+    let mut columns: Vec<_> = lights.iter().map(|light| column(&|mean, row| seen(mean, row, light))).collect();
     for of in problem.nuisance_rows() {
         for part in 0..2 {
-            columns.push(DVector::from_vec(rows().map(|(mean, row)| of(row)[part] / mean.sigma).collect()));
+            columns.push(column(&|_, row| of(row)[part]));
         }
     }
-    columns.push(DVector::from_vec(rows().map(|(mean, row)| row.observed / mean.sigma).collect()));
-    Some(columns)
+    let explained = |mean: &BlockMean, row: &Row| known.map_or(0.0, |known| seen(mean, row, known.scattered));
+    columns.push(column(&|mean, row| row.observed - explained(mean, row)));
+    columns
 }
 
 /// Takes the nuisances off the columns of the widths and the observed values, one after the other.
-fn without_nuisances(mut columns: Vec<DVector<f64>>, widths: usize) -> (DMatrix<f64>, DVector<f64>) {
+pub(super) fn without_nuisances(mut columns: Vec<DVector<f64>>, widths: usize) -> (DMatrix<f64>, DVector<f64>) {
     let observed = columns.pop().unwrap_or_else(|| DVector::zeros(0));
     let mut nuisances = columns.split_off(widths.min(columns.len()));
     let mut kept = columns;

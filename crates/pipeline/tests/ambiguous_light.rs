@@ -34,6 +34,13 @@ fn finding(outcome: &Outcome, stage: &str, name: &str) -> f64 {
     outcome.stages.iter().find(|done| done.name == stage).unwrap().findings[name]
 }
 
+fn correlation(a: &[f64], b: &[f64]) -> f64 {
+    let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+    let (ma, mb) = (mean(a), mean(b));
+    let moment = |f: &dyn Fn(f64, f64) -> f64| a.iter().zip(b).map(|(x, y)| f(x - ma, y - mb)).sum::<f64>();
+    moment(&|x, y| x * y) / (moment(&|x, _| x * x) * moment(&|_, y| y * y)).sqrt()
+}
+
 #[test]
 fn a_corner_is_at_risk_where_its_ranges_are_too_long() {
     let folder = tempfile::tempdir().unwrap();
@@ -55,12 +62,13 @@ fn a_corner_is_at_risk_where_its_ranges_are_too_long() {
         sorted.sort_by(f64::total_cmp);
         sorted[sorted.len() / 2]
     };
-    let left: Vec<f64> = expected.iter().zip(&found).map(|(expected, found)| found - expected).collect();
-    println!("error {} m, expected {} m, difference {} m", median(&found), median(&expected), median(&left));
-    // The simulation has albedos of 0.35 and 0.6, the estimate reads them from the amplitudes and takes the brightest
-    // tenth for 0.7: it is right within a third.
+    let share = median(&expected) / median(&found);
+    let correlation = correlation(&expected, &found);
+    println!("error {} m, expected {} m, correlation {correlation}", median(&found), median(&expected));
     assert!(median(&found) > 0.01, "light that bounced makes ranges too long");
-    assert!(median(&left).abs() < 0.35 * median(&found), "{}", median(&left));
+    // The floor and the walls beside the camera are nearest to the source and out of view: about half comes from there.
+    assert!((0.4..1.1).contains(&share), "{share}");
+    assert!(correlation > 0.5, "{correlation}");
     let flagged = frame.flags.as_slice().iter().filter(|flags| flags.contains(Flags::MULTIPATH)).count();
     assert_eq!(finding(&outcome, "Multipath", "at_risk_px"), flagged as f64);
     assert!(flagged > 0);

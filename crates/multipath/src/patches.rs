@@ -133,9 +133,9 @@ impl<'a> Surfaces<'a> {
         let mean_range = sums.count / sums.inverse_range;
         let hold = (misfit_m * misfit_m + sigma_m * sigma_m) / (mean_range * mean_range);
         let facing = scaled(&sums.direction, 1.0 / (sums.count * mean_range));
-        for axis in 0..3 {
+        for (axis, facing) in facing.iter().enumerate() {
             sums.matrix[axis][axis] += hold;
-            sums.right[axis] += hold * facing[axis];
+            sums.right[axis] += hold * facing;
         }
         let normal = Cholesky::new(&sums.matrix)?.solve(&sums.right);
         Some(Plane { normal, misfit_m, sigma_m })

@@ -59,7 +59,7 @@ fn corner(width: usize, height: usize) -> (RangeFrame, Vec<[f64; 3]>) {
 fn frames(criterion: &mut Criterion) {
     let one_thread = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
     let response = FrequencyResponse::flat(3);
-    let detector = Detector::new(&modulations(), &response, &DetectionOptions::default()).unwrap();
+    let mut detector = Detector::new(&modulations(), &response, &DetectionOptions::default()).unwrap();
     let solver = TwoPathSolver::new(&modulations(), &response, &TwoPathOptions::default()).unwrap();
     for (width, height) in SIZES {
         let mut complex = frame(width, height, 10);
@@ -73,7 +73,7 @@ fn frames(criterion: &mut Criterion) {
             bencher.iter(|| one_thread.install(|| solver.solve_into(&complex, &mut image)));
         });
         let (mut scene, directions) = corner(width, height);
-        let options = RiskOptions { modulation_hz: Some(30e6), ..RiskOptions::default() };
+        let options = RiskOptions { modulation_hz: Some(30e6), ..RiskOptions::for_width(width) };
         criterion.bench_function(&format!("risk/{width}x{height}/1 thread"), |bencher| {
             bencher.iter(|| one_thread.install(|| assess_risk(&mut scene, &directions, &options)));
         });

@@ -1,13 +1,12 @@
 //! Multipath by the contradiction between frequencies.
 
-use std::f64::consts::{PI, TAU};
-
-use range_image::{ComplexFrame, Flags, Modulation, Raster};
+use range_image::{ComplexChannel, ComplexFrame, Flags, Modulation, Raster};
 use rayon::prelude::*;
 
 use crate::chi_squared::quantile;
+use crate::contradiction::{BLOCK, Contradiction, Frequency, Samples};
 use crate::error::{require_not_negative, require_probability};
-use crate::pixel::{MAXIMUM_FREQUENCIES, Pixel, System, USELESS};
+use crate::pixel::{MAXIMUM_FREQUENCIES, System, USELESS};
 use crate::{FrequencyResponse, Result, Systematics};
 
 /// What of the frequencies is compared.
@@ -34,7 +33,7 @@ pub struct DetectionOptions {
     /// What calibration leaves over.
     pub systematics: Systematics,
     /// A frequency whose amplitude is smaller, in standard deviations of the complex value, does not take part: the
-    /// errors of phase and logarithmic amplitude are normal only well above the noise.
+    /// errors of phase and amplitude are normal only well above the noise.
     pub least_snr: f64,
 }
 
@@ -63,9 +62,12 @@ pub struct Detection {
 #[derive(Debug, Clone)]
 pub struct Detector {
     system: System,
-    options: DetectionOptions,
+    frequencies: Vec<Frequency>,
+    evidence: Evidence,
     /// Largest statistic of one path for each number of degrees of freedom.
     thresholds: [f64; 2 * MAXIMUM_FREQUENCIES],
+    /// Phase and amplitude of each frequency, kept from frame to frame.
+    polar: Vec<[Raster<f32>; 2]>,
 }
 
 impl Detector {
@@ -74,8 +76,21 @@ impl Detector {
         require_probability("false_alarm", options.false_alarm)?;
         require_not_negative("least_snr", options.least_snr)?;
         let system = System::new(modulations, response, &options.systematics, 2)?;
-        let thresholds = std::array::from_fn(|freedom| quantile(options.false_alarm, freedom));
-        Ok(Self { system, options: *options, thresholds })
+        let frequency = |(modulation, contrast): (&Modulation, &f64)| Frequency {
+            interval_m: modulation.ambiguity_interval_m() as f32,
+            inverse_contrast: (1.0 / contrast) as f32,
+            floor_m: options.systematics.floor_m as f32,
+            floor_contrast: options.systematics.floor_contrast as f32,
+            least_snr: options.least_snr as f32,
+        };
+        let frequencies: Vec<Frequency> = modulations.iter().zip(&response.contrast).map(frequency).collect();
+        Ok(Self {
+            system,
+            evidence: options.evidence,
+            thresholds: std::array::from_fn(|freedom| quantile(options.false_alarm, freedom)),
+            polar: vec![Default::default(); frequencies.len()],
+            frequencies,
+        })
     }
 
     /// The largest statistic, for a number of degrees of freedom, that one path explains; infinite where there is none.
@@ -84,98 +99,102 @@ impl Detector {
     }
 
     /// Tests a frame and sets [`Flags::MULTIPATH`]; see [`detect`]. Planes of the right size are used again.
-    pub fn detect_into(&self, frame: &mut ComplexFrame, range_m: &Raster<f32>, out: &mut Detection) -> Result<()> {
+    pub fn detect_into(&mut self, frame: &mut ComplexFrame, range_m: &Raster<f32>, out: &mut Detection) -> Result<()> {
         self.system.require_frame(frame)?;
         frame.flags.require_same_size(range_m, "range")?;
+        self.prepare(frame, out)?;
+        let ComplexFrame { channels, flags } = frame;
+        // Whole blocks in each task; what a task does not fill is the frame's end alone.
+        let task = BLOCK * 64;
+        let statistics = out.statistic.as_mut_slice().par_chunks_mut(task);
+        let freedoms = out.freedom.as_mut_slice().par_chunks_mut(task);
+        let tasks = flags.as_mut_slice().par_chunks_mut(task).zip(statistics).zip(freedoms).enumerate();
+        let counts = tasks.map(|(index, ((flags, statistics), freedoms))| {
+            let mut counts = [0, 0];
+            let blocks = flags.chunks_mut(BLOCK).zip(statistics.chunks_mut(BLOCK)).zip(freedoms.chunks_mut(BLOCK));
+            for (block, ((flags, statistics), freedoms)) in blocks.enumerate() {
+                let start = index * task + block * BLOCK;
+                let contradiction = self.contradiction(channels, range_m, start..start + flags.len());
+                let found = self.judge(&contradiction, flags, statistics, freedoms);
+                counts = [counts[0] + found[0], counts[1] + found[1]];
+            }
+            counts
+        });
+        [out.tested, out.flagged] = counts.reduce(|| [0, 0], |a, b| [a[0] + b[0], a[1] + b[1]]);
+        Ok(())
+    }
+
+    /// Phases, amplitudes, and planes of the right size for the result.
+    fn prepare(&mut self, frame: &ComplexFrame, out: &mut Detection) -> Result<()> {
         let (width, height) = (frame.width(), frame.height());
         if frame.flags.require_same_size(&out.statistic, "").is_err() || out.freedom.len() != out.statistic.len() {
             out.statistic = Raster::filled(width, height, f32::NAN);
             out.freedom = Raster::filled(width, height, 0);
         }
-        // The flag plane is written while the channels are read.
-        let mut flags = std::mem::take(&mut frame.flags);
-        let statistics = out.statistic.as_mut_slice().par_chunks_mut(width);
-        let freedoms = out.freedom.as_mut_slice().par_chunks_mut(width);
-        let rows = flags.as_mut_slice().par_chunks_mut(width).zip(statistics).zip(freedoms).enumerate();
-        let counts = rows.map(|(row, ((flags, statistics), freedoms))| {
-            let mut counts = [0, 0];
-            for (col, ((flags, statistic), freedom)) in flags.iter_mut().zip(statistics).zip(freedoms).enumerate() {
-                let index = row * width + col;
-                let range = f64::from(range_m.as_slice()[index]);
-                (*statistic, *freedom) = self.test(frame, *flags, index, range);
-                counts[0] += usize::from(*freedom > 0);
-                if f64::from(*statistic) > self.threshold(usize::from(*freedom)) {
-                    *flags |= Flags::MULTIPATH;
-                    counts[1] += 1;
+        for ([phase, amplitude], channel) in self.polar.iter_mut().zip(&frame.channels) {
+            for plane in [&mut *phase, &mut *amplitude] {
+                if frame.flags.require_same_size(plane, "").is_err() {
+                    *plane = Raster::filled(width, height, f32::NAN);
                 }
             }
-            counts
-        });
-        [out.tested, out.flagged] = counts.reduce(|| [0, 0], |a, b| [a[0] + b[0], a[1] + b[1]]);
-        frame.flags = flags;
+            channel.phase_and_amplitude_into(phase, amplitude)?;
+        }
         Ok(())
     }
 
-    /// Statistic and degrees of freedom of a pixel.
-    fn test(&self, frame: &ComplexFrame, flags: Flags, index: usize, range_m: f64) -> (f32, u8) {
-        if flags.intersects(USELESS | Flags::MIXED_PIXEL) || !range_m.is_finite() {
-            return (f32::NAN, 0);
+    fn contradiction(
+        &self,
+        channels: &[ComplexChannel],
+        range_m: &Raster<f32>,
+        pixels: std::ops::Range<usize>,
+    ) -> Contradiction {
+        let mut contradiction = Contradiction::new();
+        for ((frequency, [phase, amplitude]), channel) in self.frequencies.iter().zip(&self.polar).zip(channels) {
+            let samples = Samples {
+                phase: &phase.as_slice()[pixels.clone()],
+                amplitude: &amplitude.as_slice()[pixels.clone()],
+                sigma: &channel.sigma.as_slice()[pixels.clone()],
+            };
+            contradiction.add(frequency, samples, &range_m.as_slice()[pixels.clone()]);
         }
-        let pixel = self.system.load(frame, index, self.options.least_snr);
-        let differences = pixel.terms().len().saturating_sub(1);
-        if differences == 0 {
-            return (f32::NAN, 0);
+        contradiction
+    }
+
+    /// Writes the results of a block; gives the numbers of pixels tested and flagged.
+    fn judge(
+        &self,
+        found: &Contradiction,
+        flags: &mut [Flags],
+        statistics: &mut [f32],
+        freedoms: &mut [u8],
+    ) -> [usize; 2] {
+        let mut counts = [0, 0];
+        for (pixel, ((flags, statistic), freedom)) in flags.iter_mut().zip(statistics).zip(freedoms).enumerate() {
+            let differences = (found.count[pixel] as usize).saturating_sub(1);
+            let (value, degrees) = match self.evidence {
+                Evidence::Ranges => (found.ranges.squares[pixel], differences),
+                Evidence::RangesAndAmplitudes => {
+                    (found.ranges.squares[pixel] + found.amplitudes.squares[pixel], 2 * differences)
+                }
+            };
+            // Without noise and floor there is no scale to judge differences by.
+            let tested = degrees > 0 && value.is_finite() && !flags.intersects(USELESS | Flags::MIXED_PIXEL);
+            (*statistic, *freedom) = if tested { (value, degrees as u8) } else { (f32::NAN, 0) };
+            counts[0] += usize::from(tested);
+            if tested && f64::from(value) > self.threshold(degrees) {
+                *flags |= Flags::MULTIPATH;
+                counts[1] += 1;
+            }
         }
-        let systematics = self.system.systematics();
-        let ranges = range_differences(&pixel, range_m, systematics);
-        let (statistic, freedom) = match self.options.evidence {
-            Evidence::Ranges => (ranges, differences),
-            Evidence::RangesAndAmplitudes => (ranges + amplitude_differences(&pixel, systematics), 2 * differences),
-        };
-        // Without noise and floor there is no scale to judge differences by.
-        if statistic.is_finite() { (statistic as f32, freedom as u8) } else { (f32::NAN, 0) }
+        counts
     }
-}
-
-/// Weighted squares of the frequencies' ranges about their mean; each range is the one nearest to `range_m`.
-fn range_differences(pixel: &Pixel, range_m: f64, systematics: &Systematics) -> f64 {
-    scatter(pixel.terms().iter().map(|term| {
-        let phase = term.im.atan2(term.re) - term.wavenumber * range_m;
-        let wrapped = phase - TAU * ((phase + PI) / TAU).floor();
-        let sigma = term.sigma / (term.amplitude() * term.wavenumber);
-        (wrapped / term.wavenumber, sigma * sigma + systematics.floor_m * systematics.floor_m)
-    }))
-}
-
-/// Weighted squares of the logarithms of the amplitudes, contrast taken off, about their mean.
-fn amplitude_differences(pixel: &Pixel, systematics: &Systematics) -> f64 {
-    scatter(pixel.terms().iter().map(|term| {
-        let (amplitude, floor) = (term.amplitude(), systematics.floor_contrast);
-        let sigma = term.sigma / amplitude;
-        (amplitude.ln(), sigma * sigma + floor * floor)
-    }))
-}
-
-/// Sum of squared deviations from the weighted mean, of pairs of value and variance.
-fn scatter(values: impl Iterator<Item = (f64, f64)>) -> f64 {
-    let (mut weights, mut mean, mut squares) = (0.0, 0.0, 0.0);
-    for (value, variance) in values {
-        // The mean is updated value by value: no difference of large sums.
-        let weight = 1.0 / variance;
-        let deviation = value - mean;
-        let share = weight / (weights + weight);
-        squares += weights * share * deviation * deviation;
-        mean += share * deviation;
-        weights += weight;
-    }
-    squares
 }
 
 /// Tests for each pixel whether one path explains all frequencies, and sets [`Flags::MULTIPATH`] where it does not.
 ///
 /// One path at range `r` gives every frequency that range and amplitudes in the ratio of the `response`; with a second
 /// path both differ from frequency to frequency. The statistic is the weighted sum of squared deviations of the ranges,
-/// and of the logarithmic amplitudes, from their weighted means. With one path, it is chi-squared with `F - 1` degrees of
+/// and of the amplitudes over the response, from their weighted means. With one path, it is chi-squared with `F - 1` degrees of
 /// freedom for either, `F` being the number of usable frequencies.
 ///
 /// - `range_m`: unwrapped range; each frequency's range is the one nearest to it.

@@ -2,6 +2,7 @@
 
 mod chi_squared;
 mod cholesky;
+mod contradiction;
 mod detect;
 mod error;
 mod mixed;

@@ -99,7 +99,7 @@ mod tests {
         let mut pixel = Pixel::default();
         for (index, wavenumber) in [0.8, 2.1, 3.3].into_iter().enumerate() {
             let re = 10.0 - 7.0 * index as f64;
-            pixel.push(Term { wavenumber, re, im: 4.0, sigma: 1.0, weight: 0.5 + wavenumber });
+            pixel.push(Term { wavenumber, re, im: 4.0, weight: 0.5 + wavenumber });
         }
         let (parameters, priors) = ([9.0, 4.0, 1.1, 1.9], [Prior { range_m: 1.3, weight: 7.0 }, Prior::default()]);
         let normal = normal_equations(&pixel, &parameters, &priors);

@@ -122,31 +122,51 @@ impl<'a> Surfaces<'a> {
     }
 
     /// The plane through the pixels of a square.
+    ///
+    /// Its slope is held to that of a surface facing the camera with a standard deviation of 45 degrees: on few or
+    /// noisy pixels, ranges alone would make it anything.
     fn fit(&self, square: Square) -> Option<Plane> {
-        let (mut matrix, mut right, mut count) = ([[0.0; 3]; 3], [0.0; 3], 0_usize);
-        let (mut sigma, mut with_sigma) = (0.0, 0.0);
+        let mut sums = self.sums(square)?;
+        let free = Cholesky::new(&sums.matrix)?.solve(&sums.right);
+        let misfit_m = self.misfit(square, &free, sums.count);
+        let sigma_m = sums.sigma / sums.with_sigma.max(1.0);
+        let mean_range = sums.count / sums.inverse_range;
+        let hold = (misfit_m * misfit_m + sigma_m * sigma_m) / (mean_range * mean_range);
+        let facing = scaled(&sums.direction, 1.0 / (sums.count * mean_range));
+        for (axis, facing) in facing.iter().enumerate() {
+            sums.matrix[axis][axis] += hold;
+            sums.right[axis] += hold * facing;
+        }
+        let normal = Cholesky::new(&sums.matrix)?.solve(&sums.right);
+        Some(Plane { normal, misfit_m, sigma_m })
+    }
+
+    /// Normal equations of the plane, and means; `None` for fewer than four pixels.
+    fn sums(&self, square: Square) -> Option<Sums> {
+        let mut sums = Sums::default();
         for (index, range) in self.pixels(square) {
             let u = &self.directions[index];
-            for (i, row) in matrix.iter_mut().enumerate() {
-                right[i] += u[i] / range;
+            for (i, row) in sums.matrix.iter_mut().enumerate() {
+                sums.right[i] += u[i] / range;
+                sums.direction[i] += u[i];
                 row.iter_mut().zip(u).for_each(|(entry, other)| *entry += u[i] * other);
             }
             let own = f64::from(self.frame.sigma.as_slice()[index]);
             if own.is_finite() {
-                (sigma, with_sigma) = (sigma + own, with_sigma + 1.0);
+                (sums.sigma, sums.with_sigma) = (sums.sigma + own, sums.with_sigma + 1.0);
             }
-            count += 1;
+            sums.inverse_range += 1.0 / range;
+            sums.count += 1.0;
         }
-        if count < 4 {
-            return None;
-        }
-        let normal = Cholesky::new(&matrix)?.solve(&right);
-        let squares: f64 = self
-            .pixels(square)
-            .map(|(index, range)| ((1.0 / range - dot(&normal, &self.directions[index])) * range * range).powi(2))
-            .sum();
-        let sigma_m = if with_sigma > 0.0 { sigma / with_sigma } else { 0.0 };
-        Some(Plane { normal, misfit_m: (squares / (count - 3) as f64).sqrt(), sigma_m })
+        (sums.count >= 4.0).then_some(sums)
+    }
+
+    /// Root mean square distance of the ranges from a plane, metre.
+    fn misfit(&self, square: Square, plane: &Vec3, count: f64) -> f64 {
+        let distance =
+            |(index, range): (usize, f64)| (1.0 / range - dot(plane, &self.directions[index])) * range * range;
+        let squares: f64 = self.pixels(square).map(|pixel| distance(pixel).powi(2)).sum();
+        (squares / (count - 3.0)).sqrt()
     }
 
     /// The part of a plane that a square of pixels sees.
@@ -175,6 +195,19 @@ impl<'a> Surfaces<'a> {
         let amplitude = amplitude / with_amplitude;
         whole.then(|| Facet { centre: scaled(&mean, range_m), normal, range_m, area_m2, amplitude })
     }
+}
+
+/// Sums over the pixels of a square.
+#[derive(Default)]
+struct Sums {
+    matrix: [[f64; 3]; 3],
+    right: Vec3,
+    direction: Vec3,
+    inverse_range: f64,
+    count: f64,
+    /// Of the standard deviations that are known, metre.
+    sigma: f64,
+    with_sigma: f64,
 }
 
 struct Plane {

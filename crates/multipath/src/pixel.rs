@@ -46,15 +46,14 @@ pub(crate) struct Term {
     pub re: f64,
     /// Imaginary part over the contrast.
     pub im: f64,
-    /// Standard deviation of either part over the contrast, of noise alone.
-    pub sigma: f64,
     /// Inverse variance of either part, with the systematic errors.
     pub weight: f64,
 }
 
 impl Term {
-    pub fn amplitude(&self) -> f64 {
-        self.re.hypot(self.im)
+    /// Square of the amplitude over the contrast.
+    pub fn square(&self) -> f64 {
+        self.re * self.re + self.im * self.im
     }
 }
 
@@ -118,10 +117,6 @@ impl System {
         &self.wavenumber
     }
 
-    pub fn systematics(&self) -> &Systematics {
-        &self.systematics
-    }
-
     /// Fails unless the frame is whole, not empty, and modulated as the system is.
     pub fn require_frame(&self, frame: &ComplexFrame) -> Result<()> {
         frame.validate()?;
@@ -148,7 +143,7 @@ impl System {
             let at = |plane: &range_image::Raster<f32>| f64::from(plane.as_slice()[index]) / contrast;
             let (re, im, sigma) = (at(&channel.real), at(&channel.imaginary), at(&channel.sigma));
             if let Some(term) = self.term(*wavenumber, [re, im], sigma)
-                && term.amplitude() > least_snr * sigma
+                && term.square() > (least_snr * sigma).powi(2)
             {
                 pixel.push(term);
             }
@@ -162,7 +157,7 @@ impl System {
         let variance = sigma * sigma + floor * floor * (re * re + im * im);
         let weight = 1.0 / variance;
         let usable = re.is_finite() && im.is_finite() && sigma >= 0.0 && variance > 0.0 && weight.is_normal();
-        usable.then_some(Term { wavenumber, re, im, sigma, weight })
+        usable.then_some(Term { wavenumber, re, im, weight })
     }
 }
 

@@ -38,7 +38,7 @@ const ROUNDING: f64 = 1e-14;
 pub(crate) fn refine(pixel: &Pixel, start: Parameters, priors: &[Prior; 2]) -> Result<Fit, f64> {
     let mut parameters = start;
     let mut normal = normal_equations(pixel, &parameters, priors);
-    let squares: f64 = pixel.terms().iter().map(|term| term.weight * (term.re * term.re + term.im * term.im)).sum();
+    let squares: f64 = pixel.terms().iter().map(|term| term.weight * term.square()).sum();
     let negligible = NEGLIGIBLE + ROUNDING * squares;
     let mut damping = 1e-3;
     for _ in 0..MOST_STEPS {

@@ -44,7 +44,8 @@ pub struct RiskOptions {
 }
 
 impl Default for RiskOptions {
-    /// Low frequency; walls of albedo 0.7; patches of 16 and cells of 4 pixels, flat to 1 cm; flags from 5 mm and one standard deviation.
+    /// Low frequency; walls of albedo 0.7; patches of 16 and cells of 4 pixels, flat to 1 cm; flags from 5 mm and one
+    /// standard deviation. The work grows with the square of the number of pixels: see [`Self::for_width`].
     fn default() -> Self {
         Self {
             modulation_hz: None,
@@ -59,6 +60,13 @@ impl Default for RiskOptions {
 }
 
 impl RiskOptions {
+    /// The default with cells of a 32nd to a 64th of the width, and patches of four cells: as much work for any frame.
+    pub fn for_width(width: usize) -> Self {
+        let cell_px = (width / 32).max(2);
+        let cell_px = if cell_px.is_power_of_two() { cell_px } else { cell_px.next_power_of_two() / 2 };
+        Self { patch_px: 4 * cell_px, cell_px, ..Self::default() }
+    }
+
     fn validate(&self) -> Result<()> {
         let albedo = match self.albedo {
             AlbedoScale::BrightestTenth(value) => ("BrightestTenth", value),

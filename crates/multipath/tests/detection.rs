@@ -159,7 +159,7 @@ fn bad_input_is_refused_by_name() {
     ));
     let mut empty = ComplexFrame { flags: Raster::default(), channels: good(&[2e7, 5e7]).channels };
     assert!(detect(&mut empty, &range, &FrequencyResponse::flat(2), &default).is_err());
-    let detector = Detector::new(&modulations(&[2e7, 5e7]), &FrequencyResponse::flat(2), &default).unwrap();
+    let mut detector = Detector::new(&modulations(&[2e7, 5e7]), &FrequencyResponse::flat(2), &default).unwrap();
     let mut other = good(&[2e7, 6e7]);
     let error = detector.detect_into(&mut other, &range, &mut multipath::Detection::default()).unwrap_err();
     assert!(matches!(error, Error::OtherFrequency { channel: 1, .. }));

@@ -210,6 +210,23 @@ fn flat_and_convex_scenes_have_no_risk() {
 }
 
 #[test]
+fn coarser_cells_tell_the_same() {
+    let walls = corner(0.6, 0.6);
+    let run = |options: RiskOptions| {
+        let options =
+            RiskOptions { modulation_hz: Some(FREQUENCY), albedo: AlbedoScale::WhiteAtOneMetre(WHITE), ..options };
+        let risk = assess_risk(&mut frame(&walls, false, 0.0), &directions(), &options).unwrap();
+        compare(&walls, &risk)
+    };
+    assert_eq!(RiskOptions::for_width(WIDTH), RiskOptions::default());
+    assert_eq!(RiskOptions::for_width(640).cell_px, 16);
+    assert_eq!((RiskOptions::for_width(1).cell_px, RiskOptions::for_width(1024).patch_px), (2, 128));
+    let (ratios, errors) = run(RiskOptions { patch_px: 32, cell_px: 8, ..RiskOptions::default() });
+    // Twice the cell: twice the difference within it.
+    assert!(median(ratios) < 0.06 && median(errors) < 0.04);
+}
+
+#[test]
 fn low_frequencies_give_the_limit() {
     let walls = corner(0.6, 0.6);
     let run = |modulation_hz| {

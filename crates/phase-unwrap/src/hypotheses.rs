@@ -3,8 +3,9 @@
 use range_image::{Modulation, Raster};
 use rayon::prelude::*;
 
+use crate::frame::Planes;
 use crate::lanes::{LANES, with_wide_registers};
-use crate::lattice::{Lattice, Planes};
+use crate::lattice::Lattice;
 use crate::{Error, MultiFrequencyOptions, Result};
 
 /// Largest number of hypotheses kept of each pixel.

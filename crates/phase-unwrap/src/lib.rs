@@ -7,6 +7,7 @@ mod continuity;
 mod error;
 mod fold;
 mod forest;
+mod frame;
 mod grid;
 mod hypotheses;
 mod intervals;

@@ -108,6 +108,32 @@ pub enum Error {
         /// Combined ambiguity interval in metres.
         combined_interval_m: f64,
     },
+    /// More residues than the options allow for the cheapest cuts.
+    #[error("{residues} residues exceed the limit of {limit} for the cheapest cuts: filter first, or raise the limit")]
+    TooManyResidues {
+        /// Residues found.
+        residues: usize,
+        /// Limit of the options.
+        limit: usize,
+    },
+    /// The cost of the cuts differs from the bound that proves the optimum.
+    #[error("cuts of cost {cost} are not proven optimal: the bound is {lower_bound}")]
+    NotOptimal {
+        /// Cost found.
+        cost: u64,
+        /// Bound of the dual problem.
+        lower_bound: u64,
+    },
+    /// A standard deviation is negative.
+    #[error("sigma = {value} rad at column {col}, row {row}: a standard deviation is not negative")]
+    NegativeSigma {
+        /// Column.
+        col: usize,
+        /// Row.
+        row: usize,
+        /// Value found.
+        value: f32,
+    },
     /// Rasters that belong together differ, or another fault of a raster.
     #[error(transparent)]
     Raster(#[from] range_image::Error),

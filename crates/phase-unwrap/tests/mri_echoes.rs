@@ -1,10 +1,16 @@
 //! Measured phases of three MRI echoes, in the ratio 1 : 2 : 3: unwrapped alone, they must agree.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout, clippy::float_cmp)]
 
+use std::collections::BTreeMap;
 use std::f32::consts::{PI, TAU};
 use std::path::Path;
 
-use phase_unwrap::{SpatialOptions, unwrap_spatial};
+use phase_unwrap::{
+    ExactOptions, NoisyOptions, PhaseNoise, SpatialOptions, unwrap_least_cuts, unwrap_noisy, unwrap_spatial,
+};
+use rand::SeedableRng;
+use rand_distr::{Distribution, StandardNormal};
+use rand_pcg::Pcg64;
 use range_image::Raster;
 
 const FOLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/real/mri_romeo/small");
@@ -22,13 +28,30 @@ fn read_nifti(path: &Path) -> ([usize; 4], Vec<f32>) {
     (size, values)
 }
 
-#[test]
-fn echoes_two_and_three_are_multiples_of_the_first() {
+type Method = fn(&Raster<f32>, &Raster<f32>, &Raster<bool>) -> Raster<i32>;
+
+const METHODS: [(&str, Method); 3] = [("tree", tree), ("noisy", noisy), ("exact", exact)];
+
+fn tree(phase: &Raster<f32>, _: &Raster<f32>, mask: &Raster<bool>) -> Raster<i32> {
+    unwrap_spatial(phase, None, Some(mask), &SpatialOptions::default()).unwrap().wraps
+}
+
+fn noisy(phase: &Raster<f32>, magnitude: &Raster<f32>, mask: &Raster<bool>) -> Raster<i32> {
+    let noise = PhaseNoise::Amplitude(magnitude);
+    unwrap_noisy(phase, noise, Some(mask), &NoisyOptions::default()).unwrap().unwrapped.wraps
+}
+
+/// The variance of a phase goes as the inverse square of the magnitude.
+fn exact(phase: &Raster<f32>, magnitude: &Raster<f32>, mask: &Raster<bool>) -> Raster<i32> {
+    let weights = magnitude.map(|magnitude| magnitude * magnitude);
+    let found = unwrap_least_cuts(phase, Some(&weights), Some(mask), &ExactOptions::default()).unwrap();
+    assert_eq!(found.cost, found.lower_bound);
+    found.wraps
+}
+
+/// Voxels, and shares on which echo 2 agrees with twice, echo 3 with three times the first one.
+fn agreement(method: Method) -> (f64, [f64; 2]) {
     let folder = Path::new(FOLDER);
-    if !folder.exists() {
-        println!("skipped: no captures at {FOLDER}");
-        return;
-    }
     let ([width, height, slices, _], phase) = read_nifti(&folder.join("Phase.nii"));
     let (_, magnitude) = read_nifti(&folder.join("Mag.nii"));
     let (mut agree, mut pixels) = ([0.0; 2], 0.0);
@@ -44,15 +67,16 @@ fn echoes_two_and_three_are_multiples_of_the_first() {
         if mask.as_slice().iter().filter(|used| **used).count() < 200 {
             continue;
         }
+        // Only the largest island is compared: counts of different islands are free of each other.
+        let islands = unwrap_spatial(&bright.map(|_| 0.0), None, Some(&mask), &SpatialOptions::default()).unwrap();
+        let largest = (0..islands.islands.len()).max_by_key(|&i| islands.islands[i].pixels).unwrap() as u32 + 1;
         let unwrapped: Vec<Raster<f32>> = (0..3)
             .map(|echo| {
                 let wrapped = plane(&phase, echo).map(|&value| value.rem_euclid(TAU).min(TAU));
-                let found = unwrap_spatial(&wrapped, None, Some(&mask), &SpatialOptions::default()).unwrap();
-                // Only the largest island is compared: counts of different islands are free of each other.
-                let largest = (0..found.islands.len()).max_by_key(|&i| found.islands[i].pixels).unwrap() as u32 + 1;
+                let wraps = method(&wrapped, &plane(&magnitude, echo), &mask);
                 Raster::from_fn(width, height, |col, row| {
-                    let value = wrapped[(col, row)] + TAU * found.wraps[(col, row)] as f32;
-                    if found.island[(col, row)] == largest { value } else { f32::NAN }
+                    let value = wrapped[(col, row)] + TAU * wraps[(col, row)] as f32;
+                    if islands.island[(col, row)] == largest { value } else { f32::NAN }
                 })
             })
             .collect();
@@ -68,8 +92,65 @@ fn echoes_two_and_three_are_multiples_of_the_first() {
             pixels += if echo == 2 { known.len() as f64 } else { 0.0 };
         }
     }
-    let share = agree.map(|agree| agree / pixels);
-    println!("{pixels} voxels; echo 2 agrees on {:.4}, echo 3 on {:.4}", share[0], share[1]);
-    assert!(pixels > 10_000.0);
-    assert!(share[0] > 0.99 && share[1] > 0.98, "{share:?}");
+    (pixels, agree.map(|agree| agree / pixels))
+}
+
+#[test]
+fn echoes_two_and_three_are_multiples_of_the_first() {
+    if !Path::new(FOLDER).exists() {
+        println!("skipped: no captures at {FOLDER}");
+        return;
+    }
+    for (name, method) in METHODS {
+        let (pixels, share) = agreement(method);
+        println!("{pixels} voxels; {name}: echo 2 agrees on {:.5}, echo 3 on {:.5}", share[0], share[1]);
+        assert!(pixels > 100_000.0);
+        // Measured: 0.99999 and 0.9995 to 0.9997; the rest is noise of echo 1, which counts threefold in echo 3.
+        assert!(share[0] > 0.9999 && share[1] > 0.9993, "{name}: {share:?}");
+    }
+}
+
+/// Echo 3 with noise added: the count of the quiet phase plus noise is right. This tells the methods apart.
+#[test]
+fn echoes_with_noise_need_the_filter() {
+    let folder = Path::new(FOLDER);
+    if !folder.exists() {
+        println!("skipped: no captures at {FOLDER}");
+        return;
+    }
+    let ([width, height, slices, _], phase) = read_nifti(&folder.join("Phase.nii"));
+    let mut rng = Pcg64::seed_from_u64(1);
+    let magnitude = Raster::filled(width, height, 1.0);
+    let mask = Raster::filled(width, height, true);
+    let (mut right, mut pixels) = ([0.0; 3], 0.0);
+    for slice in (4..slices).step_by(6) {
+        let first = (2 * slices + slice) * width * height;
+        let quiet =
+            Raster::from_fn(width, height, |col, row| phase[first + row * width + col].rem_euclid(TAU).min(TAU));
+        let counts = tree(&quiet, &magnitude, &mask);
+        let noisy: Vec<f32> = quiet
+            .as_slice()
+            .iter()
+            .zip(counts.as_slice())
+            .map(|(phase, count)| {
+                let noise: f32 = StandardNormal.sample(&mut rng);
+                phase + TAU * *count as f32 + 0.9 * noise
+            })
+            .collect();
+        let noisy = Raster::from_vec(width, height, noisy).unwrap();
+        let wrapped = noisy.map(|&value| value.rem_euclid(TAU).min(TAU));
+        for (right, (_, method)) in right.iter_mut().zip(METHODS) {
+            let found = method(&wrapped, &magnitude, &mask);
+            let mut offsets = BTreeMap::new();
+            for (found, truth) in found.as_slice().iter().zip(noisy.as_slice()) {
+                *offsets.entry(found - truth.div_euclid(TAU) as i32).or_insert(0_u32) += 1;
+            }
+            *right += f64::from(*offsets.values().max().unwrap());
+        }
+        pixels += (width * height) as f64;
+    }
+    let [tree, noisy, exact] = right.map(|right| right / pixels);
+    println!("noise 0.9 rad: tree {tree:.4}, noisy {noisy:.4}, exact {exact:.4} right");
+    // Noise beyond half a cycle, 0.0005, cannot be told.
+    assert!(noisy > 0.99 && noisy > exact && exact > tree, "{tree} {noisy} {exact}");
 }

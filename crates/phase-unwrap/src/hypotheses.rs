@@ -4,8 +4,9 @@ use range_image::{Modulation, Raster};
 use rayon::prelude::*;
 
 use crate::frame::Planes;
-use crate::lanes::{LANES, with_wide_registers};
+use crate::lanes::LANES;
 use crate::lattice::Lattice;
+use crate::wide::with_wide_registers;
 use crate::{Error, MultiFrequencyOptions, Result};
 
 /// Largest number of hypotheses kept of each pixel.

@@ -58,12 +58,6 @@ pub(crate) fn scatter(plane: &mut [f32], start: usize, count: usize, lanes: &Lan
     }
 }
 
-/// Runs a piece of work, with everything in it that is inlined, compiled for the widest registers that the machine has.
-/// Products and sums stay separate operations, so that all machines give the same bits.
-pub(crate) fn with_wide_registers<R>(work: impl FnOnce() -> R) -> R {
-    pulp::Arch::new().dispatch(work)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -3,8 +3,10 @@
 use range_image::{Modulation, Raster};
 use rayon::prelude::*;
 
-use crate::lanes::{LANES, with_wide_registers};
-use crate::lattice::{Lattice, Planes};
+use crate::frame::Planes;
+use crate::lanes::LANES;
+use crate::lattice::Lattice;
+use crate::wide::with_wide_registers;
 use crate::{Error, MultiFrequencyOptions, Result};
 
 /// Largest number of hypotheses kept of each pixel.

@@ -2,7 +2,7 @@
 // Only what is inlined is compiled for wide registers; loops over lanes read as their formulas, without branches.
 #![allow(clippy::inline_always, clippy::needless_range_loop, clippy::needless_bitwise_bool)]
 
-use crate::lanes::{LANES, Lanes};
+use crate::lanes::{LANES, Lanes, select};
 use crate::lattice::Found;
 use crate::{Error, Result};
 
@@ -255,15 +255,16 @@ impl Layout {
 #[inline(always)]
 pub(crate) fn pick<const K: usize>(range_m: &[Lanes; K], weight: &[Lanes; K], acceptable: &Lanes) -> Chosen {
     let mut chosen = Chosen { range_m: [f32::NAN; LANES], confidence: [0.0; LANES] };
-    for lane in 0..LANES {
-        let (mut best, mut total) = (0.0, 0.0);
-        for rank in 0..K {
-            let better = weight[rank][lane] > best;
-            best = if better { weight[rank][lane] } else { best };
-            chosen.range_m[lane] = if better { range_m[rank][lane] } else { chosen.range_m[lane] };
-            total += weight[rank][lane];
+    let (mut best, mut total) = ([0.0; LANES], [0.0; LANES]);
+    for (weight, range_m) in weight.iter().zip(range_m) {
+        for lane in 0..LANES {
+            chosen.range_m[lane] = select(weight[lane] > best[lane], range_m[lane], chosen.range_m[lane]);
+            best[lane] = select(weight[lane] > best[lane], weight[lane], best[lane]);
+            total[lane] += weight[lane];
         }
-        let share = if total > 0.0 { best / total } else { 0.0 };
+    }
+    for lane in 0..LANES {
+        let share = best[lane] / total[lane].max(f32::MIN_POSITIVE);
         chosen.confidence[lane] = (2.0 * share - 1.0).max(0.0) * acceptable[lane];
     }
     chosen

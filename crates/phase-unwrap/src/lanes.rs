@@ -36,10 +36,26 @@ pub(crate) fn exp_negative(x: f32) -> f32 {
     if x < -80.0 { 0.0 } else { value }
 }
 
-/// Runs a piece of work, with everything in it that is inlined, compiled for the widest registers that the machine has.
-/// Products and sums stay separate operations, so that all machines give the same bits.
-pub(crate) fn with_wide_registers<R>(work: impl FnOnce() -> R) -> R {
-    pulp::Arch::new().dispatch(work)
+/// The values of a plane from `start`, as many as `count` says; NaN in the other lanes.
+#[inline(always)]
+pub(crate) fn gather(plane: &[f32], start: usize, count: usize) -> Lanes {
+    let values = &plane[start..][..count];
+    if let Some(whole) = values.first_chunk() {
+        return *whole;
+    }
+    let mut lanes = [f32::NAN; LANES];
+    lanes[..count].copy_from_slice(values);
+    lanes
+}
+
+/// Writes the first `count` lanes into a plane from `start`.
+#[inline(always)]
+pub(crate) fn scatter(plane: &mut [f32], start: usize, count: usize, lanes: &Lanes) {
+    let values = &mut plane[start..][..count];
+    match values.first_chunk_mut() {
+        Some(whole) => *whole = *lanes,
+        None => values.copy_from_slice(&lanes[..count]),
+    }
 }
 
 #[cfg(test)]

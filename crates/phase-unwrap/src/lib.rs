@@ -11,6 +11,7 @@ mod error;
 mod exact;
 mod fold;
 mod forest;
+mod frame;
 mod grid;
 mod hypotheses;
 mod intervals;

@@ -5,9 +5,11 @@ use std::f32::consts::TAU;
 use range_image::{Modulation, Raster};
 use rayon::prelude::*;
 
+use crate::frame::Planes;
 use crate::kernel_density::{KernelDensityOptions, RANKS, Ranked, pick};
-use crate::lanes::{LANES, nearest, with_wide_registers};
-use crate::lattice::{Lattice, Planes};
+use crate::lanes::{LANES, nearest, scatter};
+use crate::lattice::Lattice;
+use crate::wide::with_wide_registers;
 use crate::{Error, Result};
 
 /// Pixels that one thread takes at a time where rows do not matter: a multiple of the block.
@@ -159,9 +161,9 @@ impl MultiUnwrapper {
                         let count = LANES.min(range.len() - start);
                         let found = self.lattice.search::<RANKS>(planes, chunk * CHUNK + start, count);
                         let chosen = pick(&found.range_m, &found.probability, &found.acceptable);
-                        range[start..][..count].copy_from_slice(&chosen.range_m[..count]);
-                        sigma[start..][..count].copy_from_slice(&found.known_sigma_m[..count]);
-                        confidence[start..][..count].copy_from_slice(&chosen.confidence[..count]);
+                        scatter(range, start, count, &chosen.range_m);
+                        scatter(sigma, start, count, &found.known_sigma_m);
+                        scatter(confidence, start, count, &chosen.confidence);
                     }
                 },
             );
@@ -182,7 +184,7 @@ impl MultiUnwrapper {
                         let count = LANES.min(width - col);
                         let found = lattice.search::<RANKS>(planes, row * width + col, count);
                         layout.store(lines, col, &found);
-                        sigma[col..][..count].copy_from_slice(&found.known_sigma_m[..count]);
+                        scatter(sigma, col, count, &found.known_sigma_m);
                     }
                 },
             );
@@ -197,8 +199,8 @@ impl MultiUnwrapper {
                     for col in (0..width).step_by(LANES) {
                         let count = LANES.min(width - col);
                         let chosen = ranked.choose(row, col);
-                        range[col..][..count].copy_from_slice(&chosen.range_m[..count]);
-                        confidence[col..][..count].copy_from_slice(&chosen.confidence[..count]);
+                        scatter(range, col, count, &chosen.range_m);
+                        scatter(confidence, col, count, &chosen.confidence);
                     }
                 },
             );

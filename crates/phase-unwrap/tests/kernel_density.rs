@@ -262,3 +262,37 @@ fn bad_options_get_a_typed_answer() {
     let error = MultiUnwrapper::new(&frequencies::modulations(&nine), MultiFrequencyOptions::default()).unwrap_err();
     assert_eq!(error, Error::TooManyFrequencies { found: 9, limit: 8 });
 }
+
+#[test]
+fn any_ratio_and_any_number_of_frequencies_works() {
+    // Ratios that are no fractions, within a span that they can tell apart; four frequencies, and five.
+    let sets: [(&[f64], f64); 4] = [
+        (&[75.31e6, 58.07e6], 8.0),
+        (&[100e6, 61.803_398e6, 23.1e6], 12.0),
+        (&[20e6, 50e6, 80e6, 100e6], 14.0),
+        (&[100e6, 90e6, 70e6, 50e6, 20e6], 14.0),
+    ];
+    for (hz, maximum_range_m) in sets {
+        let modulations = modulations(hz);
+        let truth =
+            Raster::from_fn(40, 30, |col, row| maximum_range_m * (0.05 + 0.02 * (col / 4) as f64 + 0.023 * row as f64));
+        let phases: Vec<_> = modulations
+            .iter()
+            .map(|m| {
+                truth.map(|&r| {
+                    (m.phase_from_range(r).rem_euclid(std::f64::consts::TAU) as f32).min(std::f32::consts::TAU)
+                })
+            })
+            .collect();
+        let options = MultiFrequencyOptions { maximum_range_m: Some(maximum_range_m), ..Default::default() };
+        let found = unwrap_multi_frequency(&phases, &modulations, None, None, &options).unwrap();
+        for (index, (&range, &truth)) in found.range.as_slice().iter().zip(truth.as_slice()).enumerate() {
+            // Phases are rounded to 2e-7 rad, ranges to 1e-6 m.
+            assert!((f64::from(range) - truth).abs() < 2e-5, "{hz:?}: {range} {truth}");
+            for (wraps, modulation) in found.wraps.iter().zip(&modulations) {
+                let expected = (truth / modulation.ambiguity_interval_m()).floor() as i32;
+                assert_eq!(wraps.as_slice()[index], expected, "{hz:?} {truth}");
+            }
+        }
+    }
+}

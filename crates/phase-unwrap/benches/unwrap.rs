@@ -8,6 +8,8 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use phase_unwrap::{
     KernelDensityOptions, KnownWraps, MultiFrequencyOptions, MultiUnwrapped, MultiUnwrapper, SpatialOptions, Unwrapped,
     Unwrapper,
+    ExactOptions, ExactUnwrapped, KnownWraps, LeastCuts, MultiFrequencyOptions, NoisyOptions, NoisyUnwrapped,
+    NoisyUnwrapper, PhaseNoise, SpatialOptions, Unwrapped, Unwrapper, unwrap_multi_frequency,
 };
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
@@ -73,5 +75,28 @@ fn multi_frequency(c: &mut Criterion) {
     }
 }
 
-criterion_group!(benches, spatial, multi_frequency);
+/// One radian of noise on the same scene: filter, tree and cuts.
+fn noisy(c: &mut Criterion) {
+    let modulation = Modulation::new(30e6).unwrap();
+    for (width, height) in SIZES {
+        let mut rng = Pcg64::seed_from_u64(3);
+        let phase = range(width, height).map(|r| {
+            let noise: f64 = StandardNormal.sample(&mut rng);
+            ((modulation.phase_from_range(*r) + noise).rem_euclid(TAU) as f32).min(std::f32::consts::TAU)
+        });
+        let size = format!("{width}x{height}");
+        let mut out = NoisyUnwrapped::default();
+        let mut unwrapper = NoisyUnwrapper::new(NoisyOptions::default()).unwrap();
+        c.bench_function(&format!("noisy/{size}"), |b| {
+            b.iter(|| unwrapper.unwrap_into(black_box(&phase), PhaseNoise::Uniform(1.0), None, &mut out).unwrap());
+        });
+        let mut out = ExactUnwrapped::default();
+        let mut cuts = LeastCuts::new(ExactOptions::default());
+        c.bench_function(&format!("cuts/{size}"), |b| {
+            b.iter(|| cuts.unwrap_into(black_box(&phase), None, None, &mut out).unwrap());
+        });
+    }
+}
+
+criterion_group!(benches, spatial, multi_frequency, noisy);
 criterion_main!(benches);

@@ -90,7 +90,7 @@ fn timed<T>(mut run: impl FnMut() -> T) -> (f64, T) {
     let mut least = f64::INFINITY;
     loop {
         let mut result = None;
-        for _ in 0..5 {
+        for _ in 0..9 {
             let start = Instant::now();
             result = Some(run());
             least = least.min(1e3 * start.elapsed().as_secs_f64());

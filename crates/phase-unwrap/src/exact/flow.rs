@@ -1,6 +1,6 @@
 //! Successive shortest paths between residues, with potentials that prove the optimum.
 
-use super::network::{LARGEST_PRICE, Network};
+use super::network::{LARGEST_PRICE, Network, UNPRICED};
 use super::regions::{NONE, OUTSIDE, Regions};
 use crate::grid::Grid;
 
@@ -29,6 +29,14 @@ pub(super) struct Flow {
     settled: Vec<u32>,
     buckets: Vec<Vec<u32>>,
     sources: Vec<u32>,
+}
+
+/// What does not change during the search.
+#[derive(Clone, Copy)]
+struct Image<'a> {
+    grid: &'a Grid,
+    phase: &'a [f32],
+    regions: &'a Regions,
 }
 
 /// A side of a loop: the step to the loop beyond, and the edge that is crossed.
@@ -78,21 +86,22 @@ impl Flow {
     }
 
     /// Adds cycles to the steps until all loops close; after [`Flow::start`].
-    pub fn solve(&mut self, grid: &Grid, network: &mut Network, regions: &Regions) {
+    pub fn solve(&mut self, grid: &Grid, phase: &[f32], network: &mut Network, regions: &Regions) {
+        let image = Image { grid, phase, regions };
         let mut radius = FIRST_RADIUS;
         while !self.sources.is_empty() {
             let mut sources = std::mem::take(&mut self.sources);
-            sources.retain(|&source| !self.discharge(grid, network, regions, source as usize, radius));
+            sources.retain(|&source| !self.discharge(image, network, source as usize, radius));
             self.sources = sources;
             radius = radius.saturating_mul(4);
         }
     }
 
     /// Moves the residue of a loop to residues of the other sign or outside; false if none lies within the radius.
-    fn discharge(&mut self, grid: &Grid, network: &mut Network, regions: &Regions, source: usize, radius: u32) -> bool {
+    fn discharge(&mut self, image: Image<'_>, network: &mut Network, source: usize, radius: u32) -> bool {
         while self.excess[source] != 0 {
             let sign = self.excess[source].signum();
-            let Some(target) = self.find(grid, network, regions, source, sign, radius) else {
+            let Some(target) = self.find(image, network, source, sign, radius) else {
                 return false;
             };
             let reached = self.distance[target];
@@ -100,10 +109,10 @@ impl Flow {
                 // At most the reach of the search, a few times the image's side in prices.
                 self.potential[f as usize] += sign * (self.distance[f as usize] as i32 - reached as i32);
             }
-            self.carry(grid, network, regions, source, target, sign);
+            self.carry(image, network, [source, target], sign);
             self.excess[source] -= sign;
-            if regions.region[target] != OUTSIDE {
-                self.excess[regions.representative(target)] += sign;
+            if image.regions.region[target] != OUTSIDE {
+                self.excess[image.regions.representative(target)] += sign;
             }
         }
         true
@@ -112,14 +121,13 @@ impl Flow {
     /// The nearest loop that takes a residue of this sign, by reduced cost.
     fn find(
         &mut self,
-        grid: &Grid,
-        network: &Network,
-        regions: &Regions,
+        image: Image<'_>,
+        network: &mut Network,
         source: usize,
         sign: i32,
         radius: u32,
     ) -> Option<usize> {
-        let sides = sides(grid);
+        let regions = image.regions;
         self.search += 1;
         self.settled.clear();
         let mut waiting = 0;
@@ -146,25 +154,33 @@ impl Flow {
             if region != NONE {
                 self.enter(regions, f, distance, &mut waiting);
             }
-            for (direction, side) in sides.iter().enumerate() {
-                let edge = f + side.edge;
-                let price = i32::from(network.price[side.axis][edge]);
-                if price == 0 {
-                    continue;
-                }
-                let other = f.wrapping_add(side.step);
-                let added = network.added[side.axis][edge] * side.change * sign;
-                let cost = if added >= 0 { price } else { -price };
-                // Never negative: that is what the potentials are for.
-                let reduced = cost + sign * (self.potential[f] - self.potential[other]);
-                self.reach(other, distance + reduced.unsigned_abs(), direction as u8, &mut waiting);
-            }
+            self.expand(image, network, f, sign, &mut waiting);
         }
         // A search that found its target leaves entries behind.
         if waiting > 0 {
             self.buckets.iter_mut().for_each(Vec::clear);
         }
         found
+    }
+
+    /// Reaches the four loops beside a final one.
+    #[inline]
+    fn expand(&mut self, image: Image<'_>, network: &mut Network, f: usize, sign: i32, waiting: &mut usize) {
+        let Image { grid, phase, .. } = image;
+        let distance = self.distance[f];
+        for (direction, side) in sides(grid).iter().enumerate() {
+            let edge = f + side.edge;
+            let price = i32::from(network.price(phase, side.axis, edge, [1, grid.stride][side.axis]));
+            if price == 0 {
+                continue;
+            }
+            let other = f.wrapping_add(side.step);
+            let added = network.added[side.axis][edge] * side.change * sign;
+            let cost = if added >= 0 { price } else { -price };
+            // Never negative: that is what the potentials are for.
+            let reduced = cost + sign * (self.potential[f] - self.potential[other]);
+            self.reach(other, distance + reduced.unsigned_abs(), direction as u8, waiting);
+        }
     }
 
     #[inline]
@@ -193,12 +209,12 @@ impl Flow {
     }
 
     /// Adds the cycles along the path that the search found.
-    fn carry(&self, grid: &Grid, network: &mut Network, regions: &Regions, source: usize, target: usize, sign: i32) {
-        let sides = sides(grid);
+    fn carry(&self, image: Image<'_>, network: &mut Network, [source, target]: [usize; 2], sign: i32) {
+        let sides = sides(image.grid);
         let mut f = target;
         while f != source {
             if self.from[f] == WITHIN {
-                f = self.entry[regions.region[f] as usize].1 as usize;
+                f = self.entry[image.regions.region[f] as usize].1 as usize;
             } else {
                 let side = sides[usize::from(self.from[f])];
                 f = f.wrapping_sub(side.step);
@@ -215,10 +231,12 @@ impl Flow {
         let (mut cost, mut feasible) = (0, true);
         for (axis, step) in [grid.stride, 1].into_iter().enumerate() {
             for (edge, (&price, &added)) in network.price[axis].iter().zip(&network.added[axis]).enumerate() {
+                // What no search came by has no cycles added and no potential on either side.
                 if price > 0 {
                     cost += u64::from(price) * u64::from(added.unsigned_abs());
                     let difference = self.potential[edge] - self.potential[edge - step];
-                    feasible &= difference.unsigned_abs() <= u32::from(price);
+                    let allowed = if price == UNPRICED { 0 } else { price };
+                    feasible &= difference.unsigned_abs() <= u32::from(allowed);
                 }
             }
         }

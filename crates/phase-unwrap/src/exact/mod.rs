@@ -111,14 +111,17 @@ impl LeastCuts {
         if let Some(weights) = weights {
             phase.require_same_size(weights, "weights")?;
         }
-        self.network.build(&grid, &self.phase, self.options.price, weights);
+        self.network.build(&grid, &self.phase);
         self.regions.find(&grid, &self.network);
         let residues = self.flow.start(&grid, &self.network, &self.regions);
         let limit = self.options.maximum_residues;
         if residues > limit {
             return Err(Error::TooManyResidues { residues, limit });
         }
-        self.flow.solve(&grid, &mut self.network, &self.regions);
+        if residues > 0 {
+            self.network.set_prices(&grid, self.options.price, weights);
+            self.flow.solve(&grid, &self.phase, &mut self.network, &self.regions);
+        }
         let (cost, lower_bound) = self.flow.certificate(&grid, &self.network, &self.regions);
         if lower_bound != Some(cost) {
             return Err(Error::NotOptimal { cost, lower_bound: lower_bound.unwrap_or(0) });

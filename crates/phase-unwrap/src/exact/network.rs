@@ -12,47 +12,67 @@ use crate::grid::{Grid, wrap_step, wrapped};
 
 /// Largest price of an edge; the smallest is 1, and 0 marks a step that a masked pixel takes away.
 pub(super) const LARGEST_PRICE: u8 = 100;
+/// Mark of a step whose price was never asked for.
+pub(super) const UNPRICED: u8 = u8::MAX;
 /// Share of the weights that lie below the one that gets the full price.
 const WEIGHT_QUANTILE: f32 = 0.95;
 
 /// Steps to the right neighbour and to the neighbour below, for each padded pixel.
 #[derive(Debug, Default)]
 pub(super) struct Network {
-    /// Prices: \[right, down\].
+    /// Prices: \[right, down\]; 0 where there is no step, `UNPRICED` where no search came by.
     pub price: [Vec<u8>; 2],
     /// Cycles added to the smaller steps: \[right, down\].
     pub added: [Vec<i32>; 2],
     /// Whole cycles by which the smaller steps miss around each loop, as they were and as they are.
     pub residue: Vec<i8>,
+    rule: CutPrice,
+    weighted: bool,
     quality: Vec<f32>,
     sorted: Vec<f32>,
 }
 
 impl Network {
-    pub fn build(&mut self, grid: &Grid, phase: &[f32], price: CutPrice, weights: Option<&Raster<f32>>) {
-        self.load_quality(grid, weights);
+    /// Finds the steps that there are, and the residues.
+    pub fn build(&mut self, grid: &Grid, phase: &[f32]) {
         for (axis, step) in [1, grid.stride].into_iter().enumerate() {
             self.added[axis].clear();
             self.added[axis].resize(grid.len(), 0);
             let prices = &mut self.price[axis];
             prices.clear();
             prices.resize(grid.len(), 0);
-            let end = grid.len() - grid.stride - 1;
-            for pixel in grid.stride..end {
-                let steepness = phase[pixel + step] - phase[pixel];
-                if !steepness.is_nan() {
-                    let share = match price {
-                        CutPrice::Uniform => 1.0,
-                        CutPrice::Smoothness => smoothness(phase, pixel, step),
-                    };
-                    let quality =
-                        if weights.is_some() { self.quality[pixel].min(self.quality[pixel + step]) } else { 1.0 };
-                    // At least 1: a free edge would leave the choice of the path to chance.
-                    prices[pixel] = 1 + (f32::from(LARGEST_PRICE - 1) * share * quality).round() as u8;
-                }
+            let steps = phase.iter().zip(&phase[step..]);
+            for (price, (from, to)) in prices.iter_mut().zip(steps) {
+                *price = if (to - from).is_nan() { 0 } else { UNPRICED };
             }
         }
         self.load_residues(grid, phase);
+    }
+
+    /// How steps are to be priced when a search comes by.
+    pub fn set_prices(&mut self, grid: &Grid, price: CutPrice, weights: Option<&Raster<f32>>) {
+        self.rule = price;
+        self.weighted = weights.is_some();
+        self.load_quality(grid, weights);
+    }
+
+    /// Price of a step, computed when it is asked for the first time; 0 where there is none.
+    #[inline]
+    pub fn price(&mut self, phase: &[f32], axis: usize, pixel: usize, step: usize) -> u8 {
+        match self.price[axis][pixel] {
+            UNPRICED => {
+                let share = match self.rule {
+                    CutPrice::Uniform => 1.0,
+                    CutPrice::Smoothness => smoothness(phase, pixel, step),
+                };
+                let quality = if self.weighted { self.quality[pixel].min(self.quality[pixel + step]) } else { 1.0 };
+                // At least 1: a free edge would leave the choice of the path to chance.
+                let price = 1 + (f32::from(LARGEST_PRICE - 1) * share * quality).round() as u8;
+                self.price[axis][pixel] = price;
+                price
+            }
+            price => price,
+        }
     }
 
     /// Weights over their quantile, at most 1.

@@ -9,6 +9,7 @@ mod field;
 mod frame;
 mod grid;
 mod kernel;
+mod lanes;
 mod mask;
 mod model;
 mod noise;

@@ -22,7 +22,13 @@ impl Work {
         let limit = (limit * limit) as f32;
         // Interpolated light is nowhere more than that of the nodes.
         let brightest = self.spare.iter().fold(0.0_f32, |brightest, light| brightest.max(light.re));
-        if brightest * brightest <= limit * wide(|| smallest_square(real, imaginary)) {
+        if brightest * brightest
+            <= limit
+                * wide(
+                    #[inline(always)]
+                    || smallest_square(real, imaginary),
+                )
+        {
             return;
         }
         let [plane, zeros] = &mut self.variance;
@@ -34,7 +40,10 @@ impl Work {
         let width = self.grid.width();
         let rows = plane.chunks_exact(width).zip(real.chunks_exact(width)).zip(imaginary.chunks_exact(width));
         for (row, ((light, re), im)) in rows.enumerate() {
-            if wide(|| any_exceeds(light, re, im, limit)) {
+            if wide(
+                #[inline(always)]
+                || any_exceeds(light, re, im, limit),
+            ) {
                 let start = row * width;
                 mask.note_dependent(start..start + width, |pixel| {
                     let col = pixel - start;

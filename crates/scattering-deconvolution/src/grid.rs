@@ -104,7 +104,10 @@ impl Axis {
             let pixels = lines[0].iter().zip(lines[1]);
             nodes.iter_mut().zip(pixels).for_each(|(node, (re, im))| *node = Complex::new(*re, *im));
         } else {
-            wide(|| lanes::collect(lines, &self.lanes, self.spacing, nodes));
+            wide(
+                #[inline(always)]
+                || lanes::collect(lines, &self.lanes, self.spacing, nodes),
+            );
         }
     }
 
@@ -114,7 +117,10 @@ impl Axis {
             let pixels = re.iter_mut().zip(im);
             nodes.iter().zip(pixels).for_each(|(node, (re, im))| (*re, *im) = (factor * node.re, factor * node.im));
         } else {
-            wide(|| lanes::spread(nodes, factor, &self.lanes, self.spacing, [re, im]));
+            wide(
+                #[inline(always)]
+                || lanes::spread(nodes, factor, &self.lanes, self.spacing, [re, im]),
+            );
         }
     }
 
@@ -124,22 +130,22 @@ impl Axis {
         (cells.start * self.spacing).min(self.pixels)..(cells.end * self.spacing).min(self.pixels)
     }
 
-    /// Nodes to pixels and back to nodes: the band matrix of five diagonals, row by row.
-    fn round_trip(&self) -> Vec<[f32; 5]> {
+    /// Nodes to pixels and back to nodes: the five diagonals of a band matrix.
+    fn round_trip(&self) -> [Vec<f32>; 5] {
         let entry = |row: usize, diagonal: usize| {
             let Some(column) = (row + diagonal).checked_sub(2) else { return 0.0 };
             let pixels = self.pixels_of(row);
             let products = pixels.filter_map(|p| Some(self.weight(p, row)? * self.weight(p, column)?));
             products.sum::<f32>() / self.spacing as f32
         };
-        (0..self.nodes).map(|row| std::array::from_fn(|diagonal| entry(row, diagonal))).collect()
+        std::array::from_fn(|diagonal| (0..self.nodes).map(|row| entry(row, diagonal)).collect())
     }
 }
 
 /// Both axes, with the buffers between them.
 pub(crate) struct Grid {
     axes: [Axis; 2],
-    bands: [Vec<[f32; 5]>; 2],
+    bands: [[Vec<f32>; 5]; 2],
     /// Weights of the rows of a cell in its three rows of nodes, with the scale of both axes.
     row_weights: Vec<[f32; 3]>,
     /// Real and imaginary part of three sums over the rows of each cell.
@@ -202,7 +208,12 @@ impl Grid {
             let cells = sums.par_chunks_mut(3 * width).zip(plane.par_chunks(down.spacing * width));
             let weights = &self.row_weights;
             let cells = cells.with_min_len(ROWS_PER_TASK.div_ceil(down.spacing));
-            cells.for_each(|(sums, rows)| wide(|| lanes::sum_rows(rows, weights, width, sums)));
+            cells.for_each(|(sums, rows)| {
+                wide(
+                    #[inline(always)]
+                    || lanes::sum_rows(rows, weights, width, sums),
+                )
+            });
         }
         let [sums_re, sums_im] = &self.sums;
         let [re, im] = &mut self.halfway;
@@ -215,7 +226,10 @@ impl Grid {
                     sums.get((3 * cell + tap) * width..)?.get(..width)
                 };
                 let lines = [0, 1, 2].map(of_cell);
-                wide(|| lanes::add_lines(lines, &mut line[..width]));
+                wide(
+                    #[inline(always)]
+                    || lanes::add_lines(lines, &mut line[..width]),
+                );
             }
             // Beyond the image the last interpolation has left its values.
             re[width..].fill(0.0);
@@ -270,7 +284,10 @@ impl Grid {
                     row.iter_mut().zip(line(taps.first)).for_each(|(pixel, value)| *pixel += value);
                 } else {
                     let lines = [0, 1, 2].map(|tap| line(taps.first + tap));
-                    wide(|| lanes::add_weighted(row, taps.weights, lines));
+                    wide(
+                        #[inline(always)]
+                        || lanes::add_weighted(row, taps.weights, lines),
+                    );
                 }
             });
         }
@@ -279,12 +296,12 @@ impl Grid {
     /// The spectrum of [`Self::round_trip`] away from the borders, on a torus of `size` nodes.
     pub(crate) fn round_trip_spectrum(&self, size: [usize; 2]) -> Spectrum {
         let along = |axis: usize| -> Vec<f64> {
-            let middle = &self.bands[axis][self.axes[axis].nodes / 2];
+            let middle = |diagonal: usize| f64::from(self.bands[axis][diagonal][self.axes[axis].nodes / 2]);
+            let [centre, beside, second] = [middle(2), middle(3), middle(4)];
             let value = |index: usize| {
                 let angle = TAU * index as f64 / size[axis] as f64;
                 // The band is symmetric.
-                f64::from(middle[2])
-                    + 2.0 * (f64::from(middle[3]) * angle.cos() + f64::from(middle[4]) * (2.0 * angle).cos())
+                centre + 2.0 * (beside * angle.cos() + second * (2.0 * angle).cos())
             };
             (0..size[axis]).map(value).collect()
         };
@@ -298,24 +315,17 @@ impl Grid {
         if self.is_fine() {
             return;
         }
-        let [columns, rows] = self.size();
+        let columns = self.axes[0].nodes;
         let [across, down] = &self.bands;
-        let band = |band: &[f32; 5], value: &dyn Fn(usize) -> Option<Complex<f32>>, at: usize| -> Complex<f32> {
-            let inside =
-                band.iter().enumerate().filter_map(|(d, weight)| Some(value((at + d).checked_sub(2)?)? * weight));
-            inside.sum()
-        };
-        for (target, line) in self.spare.chunks_exact_mut(columns).zip(nodes.chunks_exact(columns)) {
-            for (col, target) in target.iter_mut().enumerate() {
-                *target = band(&across[col], &|at| line.get(at).copied(), col);
-            }
-        }
-        for row in 0..rows {
-            for col in 0..columns {
-                let value = |at: usize| (at < rows).then(|| self.spare[at * columns + col]);
-                nodes[row * columns + col] = band(&down[row], &value, row);
-            }
-        }
+        let spare = &mut self.spare;
+        wide(
+            #[inline(always)]
+            || lanes::band_along(nodes, across, spare),
+        );
+        wide(
+            #[inline(always)]
+            || lanes::band_across(spare, down, columns, nodes),
+        );
     }
 }
 

@@ -7,35 +7,42 @@ use rustfft::num_complex::Complex;
 
 /// Values that are worked side by side.
 pub(crate) const LANES: usize = 8;
-/// Columns whose sums are kept in registers.
-const BLOCK: usize = 2 * LANES;
 
 /// Runs a piece of work with everything in it that is inlined.
 pub(crate) fn wide<R>(work: impl FnOnce() -> R) -> R {
     pulp::Arch::new().dispatch(work)
 }
 
-/// Three weighted sums of rows that lie one after the other, each `width` long; one after the other in `sums`.
+/// Three weighted sums of rows that lie one after the other, each `width` long; one after the other in `sums`. Four rows
+/// are taken at a time, to write the sums less often.
 #[inline(always)]
 pub(crate) fn sum_rows(rows: &[f32], weights: &[[f32; 3]], width: usize, sums: &mut [f32]) {
-    for first in (0..width).step_by(BLOCK) {
-        let mut blocks = [[0.0_f32; BLOCK]; 3];
-        for (row, weights) in rows.chunks_exact(width).zip(weights) {
-            let mut values = [0.0_f32; BLOCK];
-            match row[first..].first_chunk::<BLOCK>() {
-                Some(whole) => values = *whole,
-                None => values[..width - first].copy_from_slice(&row[first..]),
-            }
-            for (block, weight) in blocks.iter_mut().zip(weights) {
-                for i in 0..BLOCK {
-                    block[i] += weight * values[i];
+    sums.fill(0.0);
+    for (rows, weights) in rows.chunks(4 * width).zip(weights.chunks(4)) {
+        for (tap, sums) in sums.chunks_exact_mut(width).enumerate() {
+            if let (&[a, b, c, d], true) = (weights, rows.len() == 4 * width) {
+                add_four(rows, [a[tap], b[tap], c[tap], d[tap]], sums);
+            } else {
+                for (row, weights) in rows.chunks_exact(width).zip(weights) {
+                    for (sum, value) in sums.iter_mut().zip(row) {
+                        *sum += weights[tap] * value;
+                    }
                 }
             }
         }
-        for (sums, block) in sums.chunks_exact_mut(width).zip(&blocks) {
-            let count = BLOCK.min(width - first);
-            sums[first..first + count].copy_from_slice(&block[..count]);
-        }
+    }
+}
+
+/// Adds four weighted rows to a line.
+#[inline(always)]
+fn add_four(rows: &[f32], [a, b, c, d]: [f32; 4], sums: &mut [f32]) {
+    let width = sums.len();
+    let (upper, lower) = rows.split_at(2 * width);
+    let ((first, second), (third, fourth)) = (upper.split_at(width), lower.split_at(width));
+    for (sum, (((first, second), third), fourth)) in
+        sums.iter_mut().zip(first.iter().zip(second).zip(third).zip(fourth))
+    {
+        *sum += (a * first + b * second) + (c * third + d * fourth);
     }
 }
 
@@ -102,6 +109,37 @@ pub(crate) fn add_weighted(row: &mut [f32], [a, b, c]: [f32; 3], lines: [&[f32];
     let [first, second, third] = lines.map(|line| &line[..width]);
     for col in 0..width {
         row[col] += a * first[col] + b * second[col] + c * third[col];
+    }
+}
+
+/// Multiplies each row of a matrix, as many values as a diagonal has, by a band matrix of five diagonals.
+#[inline(always)]
+pub(crate) fn band_along(matrix: &[Complex<f32>], band: &[Vec<f32>; 5], out: &mut [Complex<f32>]) {
+    let columns = band[0].len();
+    out.fill(Complex::new(0.0, 0.0));
+    for (out, row) in out.chunks_exact_mut(columns).zip(matrix.chunks_exact(columns)) {
+        for (diagonal, weights) in band.iter().enumerate() {
+            let skipped = 2_usize.saturating_sub(diagonal).min(columns);
+            let values = row.iter().skip(diagonal.saturating_sub(2));
+            for ((out, weight), value) in out[skipped..].iter_mut().zip(&weights[skipped..]).zip(values) {
+                *out += value * weight;
+            }
+        }
+    }
+}
+
+/// The same for the columns of a matrix.
+#[inline(always)]
+pub(crate) fn band_across(matrix: &[Complex<f32>], band: &[Vec<f32>; 5], columns: usize, out: &mut [Complex<f32>]) {
+    out.fill(Complex::new(0.0, 0.0));
+    for (row, out) in out.chunks_exact_mut(columns).enumerate() {
+        for (diagonal, weights) in band.iter().enumerate() {
+            let source = (row + diagonal).checked_sub(2).map(|source| source * columns);
+            let Some(source) = source.and_then(|start| matrix.get(start..start + columns)) else { continue };
+            for (out, value) in out.iter_mut().zip(source) {
+                *out += value * weights[row];
+            }
+        }
     }
 }
 

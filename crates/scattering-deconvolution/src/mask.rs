@@ -41,7 +41,10 @@ impl Mask {
         let mut largest = 0.0_f32;
         for (row, (re, im)) in re.chunks_exact_mut(width).zip(im.chunks_exact_mut(width)).enumerate() {
             let flags = flags.map(|flags| &flags[row * width..][..width]);
-            let mut parts = wide(|| [largest_part(re), largest_part(im)]);
+            let mut parts = wide(
+                #[inline(always)]
+                || [largest_part(re), largest_part(im)],
+            );
             if !parts.iter().all(|part| part.is_finite())
                 || flags.is_some_and(|flags| union(flags).intersects(UNTOUCHED))
             {

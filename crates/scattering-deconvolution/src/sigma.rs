@@ -14,7 +14,11 @@ impl Work {
     /// The noise of pixels is independent before and correlated afterwards; sigma is that of each pixel by itself.
     /// Pixels put aside keep their sigma and, as filled or clipped values, bring no noise to others. NaN stays NaN.
     pub(crate) fn propagate_sigma(&mut self, sigma: &mut [f32], mask: &Mask) {
-        let [least, most] = wide(|| finite_extremes(sigma)).map(|value| f64::from(value).powi(2));
+        let [least, most] = wide(
+            #[inline(always)]
+            || finite_extremes(sigma),
+        )
+        .map(|value| f64::from(value).powi(2));
         if most <= 0.0 {
             return;
         }

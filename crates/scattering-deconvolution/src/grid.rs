@@ -212,7 +212,7 @@ impl Grid {
                 wide(
                     #[inline(always)]
                     || lanes::sum_rows(rows, weights, width, sums),
-                )
+                );
             });
         }
         let [sums_re, sums_im] = &self.sums;

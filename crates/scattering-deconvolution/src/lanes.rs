@@ -179,7 +179,7 @@ pub(crate) fn finite_extremes(values: &[f32]) -> [f32; 2] {
 #[inline(always)]
 pub(crate) fn any_exceeds(light: &[f32], re: &[f32], im: &[f32], limit: f32) -> bool {
     let pixels = light.iter().zip(re).zip(im);
-    pixels.fold(false, |any, ((light, re), im)| any | (light * light > limit * (re * re + im * im)))
+    pixels.fold(0, |any, ((light, re), im)| any | u32::from(light * light > limit * (re * re + im * im))) != 0
 }
 
 /// Smallest squared modulus of the pixels.

@@ -10,7 +10,7 @@ use std::f64::consts::{PI, TAU};
 use std::time::Instant;
 
 use range_image::{ComplexChannel, Flags, Modulation, Raster};
-use scattering_deconvolution::{GaussianTerm, GridSpacing, Psf, RestorationOptions, Restorer, Scatterer};
+use scattering_deconvolution::{GaussianTerm, GridSpacing, Psf, Refinement, RestorationOptions, Restorer, Scatterer};
 
 type Failure = Box<dyn std::error::Error + Send + Sync>;
 
@@ -48,14 +48,14 @@ fn main() -> Result<(), Failure> {
 fn measure(image: &Image, out: Option<&str>) -> Result<(), Failure> {
     let decimated = RestorationOptions::default();
     let exact = RestorationOptions { grid_spacing: GridSpacing::EveryPixel, ..decimated };
-    // With next to no regularisation the padded inverse filter is taken as it is: one convolution.
-    let filter = RestorationOptions { regularisation: 1e-9, ..exact };
+    let filter_only = |options| RestorationOptions { refinement: Refinement::FilterOnly, ..options };
     for (method, options, extent) in [
         ("decimated", decimated, Extent::Planes),
         ("decimated+sigma", decimated, Extent::Sigma),
         ("decimated+sigma+mask", decimated, Extent::SigmaAndFlags),
-        ("padded_exact", filter, Extent::Planes),
-        ("padded_exact_iterated", exact, Extent::Planes),
+        ("decimated_filter", filter_only(decimated), Extent::Planes),
+        ("padded_filter", filter_only(exact), Extent::Planes),
+        ("padded", exact, Extent::Planes),
     ] {
         let (milliseconds, restored) = time(image, &options, extent)?;
         let [width, height] = image.size;

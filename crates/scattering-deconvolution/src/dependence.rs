@@ -31,25 +31,20 @@ impl Work {
         {
             return;
         }
-        let [plane, zeros] = &mut self.variance;
-        for plane in [&mut *plane, &mut *zeros] {
-            plane.clear();
-            plane.resize(real.len(), 0.0);
-        }
-        self.grid.add_interpolated(&self.spare, 1.0, plane, zeros);
         let width = self.grid.width();
-        let rows = plane.chunks_exact(width).zip(real.chunks_exact(width)).zip(imaginary.chunks_exact(width));
-        for (row, ((light, re), im)) in rows.enumerate() {
-            if wide(
+        self.grid.visit_interpolated(&self.spare, |row, light| {
+            let start = row * width;
+            let [re, im] = [real, imaginary].map(|plane| &plane[start..start + width]);
+            let any = wide(
                 #[inline(always)]
                 || any_exceeds(light, re, im, limit),
-            ) {
-                let start = row * width;
+            );
+            if any {
                 mask.note_dependent(start..start + width, |pixel| {
                     let col = pixel - start;
                     light[col] * light[col] > limit * (re[col] * re[col] + im[col] * im[col])
                 });
             }
-        }
+        });
     }
 }

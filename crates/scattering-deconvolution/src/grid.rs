@@ -153,6 +153,8 @@ pub(crate) struct Grid {
     /// Real and imaginary part with the pixels' columns and the nodes' rows, in lines that go on for some zeros.
     halfway: [Vec<f32>; 2],
     spare: Vec<Complex<f32>>,
+    /// A row of pixels.
+    row: Vec<f32>,
 }
 
 impl Grid {
@@ -166,7 +168,8 @@ impl Grid {
         let sums = [(); 2].map(|()| vec![0.0; 3 * cells * axes[0].pixels]);
         let halfway = [(); 2].map(|()| vec![0.0; axes[0].line_length() * axes[1].nodes]);
         let spare = vec![Complex::new(0.0, 0.0); axes[0].nodes * axes[1].nodes];
-        Self { axes, bands, row_weights, sums, halfway, spare }
+        let row = vec![0.0; axes[0].pixels];
+        Self { axes, bands, row_weights, sums, halfway, spare, row }
     }
 
     pub(crate) fn axes(&self) -> &[Axis; 2] {
@@ -290,6 +293,29 @@ impl Grid {
                     );
                 }
             });
+        }
+    }
+
+    /// Shows the real part of what lies on the nodes, interpolated, row by row of pixels.
+    pub(crate) fn visit_interpolated(&mut self, nodes: &[Complex<f32>], mut visit: impl FnMut(usize, &[f32])) {
+        let [across, down] = &self.axes;
+        let (width, length) = (across.pixels, across.line_length());
+        let [re, im] = &mut self.halfway;
+        let lines = re.chunks_exact_mut(length).zip(im.chunks_exact_mut(length)).zip(nodes.chunks_exact(across.nodes));
+        lines.for_each(|((re, im), nodes)| across.spread(nodes, 1.0, [re, im]));
+        for (index, taps) in down.taps.iter().enumerate() {
+            let line = |node: usize| &re[node * length..][..width];
+            if down.spacing == 1 {
+                visit(index, line(taps.first));
+                continue;
+            }
+            let (lines, row) = ([0, 1, 2].map(|tap| line(taps.first + tap)), &mut self.row);
+            row.fill(0.0);
+            wide(
+                #[inline(always)]
+                || lanes::add_weighted(row, taps.weights, lines),
+            );
+            visit(index, row);
         }
     }
 

@@ -29,7 +29,7 @@ pub use error::{Error, Result};
 pub use field::FieldPolynomial;
 pub use frame::restore;
 pub use kernel::{GAUSSIAN_CUT_SIGMAS, SampledKernel};
-pub use options::{GridSpacing, RestorationOptions, SaturatedLight};
+pub use options::{GridSpacing, Refinement, RestorationOptions, SaturatedLight};
 pub use outside::{DarkPixels, OutsideLight, OutsideLightDetector, OutsideLightOptions, OutsideLightVerdict, Side};
 pub use psf::{GaussianTerm, Psf};
 pub use restorer::{RestorationSummary, Restorer};

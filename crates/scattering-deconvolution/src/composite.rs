@@ -121,6 +121,12 @@ impl CompositePsf {
         stationary.chain(self.field_terms.iter().map(FieldTerm::mean_weight)).chain(ghosts).sum()
     }
 
+    /// The light that is not in ghosts, averaged over the field.
+    pub(crate) fn mean_terms(&self) -> impl Iterator<Item = GaussianTerm> {
+        let mean = |term: &FieldTerm| GaussianTerm { weight: term.mean_weight(), ..term.gaussian };
+        self.stationary.iter().copied().chain(self.field_terms.iter().map(mean))
+    }
+
     /// Gaussians of all kinds, by their weights and widths.
     pub(crate) fn widths(&self) -> impl Iterator<Item = GaussianTerm> {
         let ghosts = self.ghosts.iter().map(|ghost| GaussianTerm { weight: ghost.weight, sigma_px: ghost.sigma_px });

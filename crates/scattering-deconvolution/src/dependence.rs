@@ -2,6 +2,7 @@
 
 use rustfft::num_complex::Complex;
 
+use crate::lanes::{any_exceeds, smallest_square, wide};
 use crate::mask::Mask;
 use crate::work::Work;
 
@@ -18,16 +19,32 @@ impl Work {
         }
         self.model.scatter.apply(&mut self.convolver, &mut self.spare);
         self.spare.iter_mut().for_each(|light| *light = Complex::new(light.norm(), 0.0));
-        let [plane, zeros] = &mut self.variance;
-        for plane in [&mut *plane, &mut *zeros] {
-            plane.clear();
-            plane.resize(real.len(), 0.0);
-        }
-        self.grid.add_interpolated(&self.spare, 1.0, plane, zeros);
         let limit = (limit * limit) as f32;
-        mask.note_dependent(real.len(), |pixel| {
-            let own = real[pixel] * real[pixel] + imaginary[pixel] * imaginary[pixel];
-            plane[pixel] * plane[pixel] > limit * own
+        // Interpolated light is nowhere more than that of the nodes.
+        let brightest = self.spare.iter().fold(0.0_f32, |brightest, light| brightest.max(light.re));
+        if brightest * brightest
+            <= limit
+                * wide(
+                    #[inline(always)]
+                    || smallest_square(real, imaginary),
+                )
+        {
+            return;
+        }
+        let width = self.grid.width();
+        self.grid.visit_interpolated(&self.spare, |row, light| {
+            let start = row * width;
+            let [re, im] = [real, imaginary].map(|plane| &plane[start..start + width]);
+            let any = wide(
+                #[inline(always)]
+                || any_exceeds(light, re, im, limit),
+            );
+            if any {
+                mask.note_dependent(start..start + width, |pixel| {
+                    let col = pixel - start;
+                    light[col] * light[col] > limit * (re[col] * re[col] + im[col] * im[col])
+                });
+            }
         });
     }
 }

@@ -9,6 +9,7 @@ use std::f64::consts::TAU;
 use rayon::prelude::*;
 use rustfft::num_complex::Complex;
 
+use crate::lanes::{self, LANES, wide};
 use crate::spectrum::Spectrum;
 
 /// Rows of pixels that one task takes at least; smaller tasks cost more to hand out than to do.
@@ -20,6 +21,8 @@ pub(crate) struct Axis {
     nodes: usize,
     spacing: usize,
     taps: Vec<Taps>,
+    /// Weights of the pixels of a cell in its three nodes; zero beyond the cell.
+    lanes: [[f32; LANES]; 3],
 }
 
 /// The nodes that a pixel belongs to: the first of `Axis::tap_count` in a row, and the weight of each.
@@ -30,11 +33,12 @@ struct Taps {
 }
 
 impl Axis {
-    /// Nodes `spacing` pixels apart, with one node more beyond each end; the pixels themselves for spacing 1.
+    /// Nodes `spacing` pixels (at most [`LANES`]) apart, with one node more beyond each end; the pixels themselves for spacing 1.
     pub(crate) fn new(pixels: usize, spacing: usize) -> Self {
+        let spacing = spacing.min(LANES);
         if spacing <= 1 {
             let taps = (0..pixels).map(|first| Taps { first, weights: [1.0, 0.0, 0.0] }).collect();
-            return Self { pixels, nodes: pixels, spacing: 1, taps };
+            return Self { pixels, nodes: pixels, spacing: 1, taps, lanes: [[0.0; LANES]; 3] };
         }
         let taps = (0..pixels).map(|pixel| {
             let (cell, within) = (pixel / spacing, pixel % spacing);
@@ -42,7 +46,12 @@ impl Axis {
             let weights = [0.5 * (0.5 - u).powi(2), 0.75 - u * u, 0.5 * (0.5 + u).powi(2)];
             Taps { first: cell, weights: weights.map(|weight| weight as f32) }
         });
-        Self { pixels, nodes: pixels.div_ceil(spacing) + 2, spacing, taps: taps.collect() }
+        let taps: Vec<Taps> = taps.collect();
+        let mut lanes = [[0.0; LANES]; 3];
+        for (lane, taps) in taps.iter().take(spacing).enumerate() {
+            lanes.iter_mut().zip(taps.weights).for_each(|(lanes, weight)| lanes[lane] = weight);
+        }
+        Self { pixels, nodes: pixels.div_ceil(spacing) + 2, spacing, taps, lanes }
     }
 
     pub(crate) fn spacing(&self) -> usize {
@@ -84,32 +93,34 @@ impl Axis {
         (taps.first..taps.first + self.tap_count()).contains(&node).then(|| taps.weights[node - taps.first])
     }
 
+    /// Length of a line of pixels that [`lanes::collect`] and [`lanes::spread`] can work on.
+    fn line_length(&self) -> usize {
+        self.pixels.next_multiple_of(self.spacing) + LANES
+    }
+
     /// Sums a row of pixels into its nodes.
-    fn collect(&self, re: &[f32], im: &[f32], nodes: &mut [Complex<f32>]) {
-        nodes.fill(Complex::new(0.0, 0.0));
-        for (cell, (re, im)) in re.chunks(self.spacing).zip(im.chunks(self.spacing)).enumerate() {
-            let mut sums = [Complex::new(0.0, 0.0); 3];
-            for (taps, (re, im)) in self.taps.iter().zip(re.iter().zip(im)) {
-                for (sum, weight) in sums.iter_mut().zip(taps.weights) {
-                    *sum += Complex::new(weight * re, weight * im);
-                }
-            }
-            for (node, sum) in nodes[cell..].iter_mut().zip(&sums[..self.tap_count()]) {
-                *node += sum;
-            }
+    fn collect(&self, lines: [&[f32]; 2], nodes: &mut [Complex<f32>]) {
+        if self.spacing == 1 {
+            let pixels = lines[0].iter().zip(lines[1]);
+            nodes.iter_mut().zip(pixels).for_each(|(node, (re, im))| *node = Complex::new(*re, *im));
+        } else {
+            wide(
+                #[inline(always)]
+                || lanes::collect(lines, &self.lanes, self.spacing, nodes),
+            );
         }
     }
 
     /// Interpolates a row of nodes at its pixels, times `factor`.
-    fn spread(&self, nodes: &[Complex<f32>], factor: f32, re: &mut [f32], im: &mut [f32]) {
-        for (cell, (re, im)) in re.chunks_mut(self.spacing).zip(im.chunks_mut(self.spacing)).enumerate() {
-            let node = |index: usize| nodes.get(cell + index).map_or(Complex::new(0.0, 0.0), |node| node * factor);
-            let [first, second, third] = [node(0), node(1), node(2)];
-            for (taps, (re, im)) in self.taps.iter().zip(re.iter_mut().zip(im)) {
-                let [a, b, c] = taps.weights;
-                *re = a * first.re + b * second.re + c * third.re;
-                *im = a * first.im + b * second.im + c * third.im;
-            }
+    fn spread(&self, nodes: &[Complex<f32>], factor: f32, [re, im]: [&mut [f32]; 2]) {
+        if self.spacing == 1 {
+            let pixels = re.iter_mut().zip(im);
+            nodes.iter().zip(pixels).for_each(|(node, (re, im))| (*re, *im) = (factor * node.re, factor * node.im));
+        } else {
+            wide(
+                #[inline(always)]
+                || lanes::spread(nodes, factor, &self.lanes, self.spacing, [re, im]),
+            );
         }
     }
 
@@ -119,38 +130,55 @@ impl Axis {
         (cells.start * self.spacing).min(self.pixels)..(cells.end * self.spacing).min(self.pixels)
     }
 
-    /// Nodes to pixels and back to nodes: the band matrix of five diagonals, row by row.
-    fn round_trip(&self) -> Vec<[f32; 5]> {
+    /// Nodes to pixels and back to nodes: the five diagonals of a band matrix.
+    fn round_trip(&self) -> [Vec<f32>; 5] {
         let entry = |row: usize, diagonal: usize| {
             let Some(column) = (row + diagonal).checked_sub(2) else { return 0.0 };
             let pixels = self.pixels_of(row);
             let products = pixels.filter_map(|p| Some(self.weight(p, row)? * self.weight(p, column)?));
             products.sum::<f32>() / self.spacing as f32
         };
-        (0..self.nodes).map(|row| std::array::from_fn(|diagonal| entry(row, diagonal))).collect()
+        std::array::from_fn(|diagonal| (0..self.nodes).map(|row| entry(row, diagonal)).collect())
     }
 }
 
 /// Both axes, with the buffers between them.
 pub(crate) struct Grid {
     axes: [Axis; 2],
-    bands: [Vec<[f32; 5]>; 2],
-    /// Real and imaginary part with the pixels' columns and the nodes' rows.
+    bands: [[Vec<f32>; 5]; 2],
+    /// Weights of the rows of a cell in its three rows of nodes, with the scale of both axes.
+    row_weights: Vec<[f32; 3]>,
+    /// Real and imaginary part of three sums over the rows of each cell.
+    sums: [Vec<f32>; 2],
+    /// Real and imaginary part with the pixels' columns and the nodes' rows, in lines that go on for some zeros.
     halfway: [Vec<f32>; 2],
     spare: Vec<Complex<f32>>,
+    /// A row of pixels.
+    row: Vec<f32>,
 }
 
 impl Grid {
     pub(crate) fn new(size: [usize; 2], spacing: [usize; 2]) -> Self {
         let axes = [0, 1].map(|axis| Axis::new(size[axis], spacing[axis]));
         let bands = [axes[0].round_trip(), axes[1].round_trip()];
-        let halfway = [(); 2].map(|()| vec![0.0; axes[0].pixels * axes[1].nodes]);
+        let scale = 1.0 / (axes[0].spacing * axes[1].spacing) as f32;
+        let tap_rows = axes[1].taps.iter().take(axes[1].spacing);
+        let row_weights = tap_rows.map(|taps| taps.weights.map(|weight| scale * weight)).collect();
+        let cells = axes[1].pixels.div_ceil(axes[1].spacing);
+        let sums = [(); 2].map(|()| vec![0.0; 3 * cells * axes[0].pixels]);
+        let halfway = [(); 2].map(|()| vec![0.0; axes[0].line_length() * axes[1].nodes]);
         let spare = vec![Complex::new(0.0, 0.0); axes[0].nodes * axes[1].nodes];
-        Self { axes, bands, halfway, spare }
+        let row = vec![0.0; axes[0].pixels];
+        Self { axes, bands, row_weights, sums, halfway, spare, row }
     }
 
     pub(crate) fn axes(&self) -> &[Axis; 2] {
         &self.axes
+    }
+
+    /// Columns of pixels.
+    pub(crate) fn width(&self) -> usize {
+        self.axes[0].pixels
     }
 
     /// Columns and rows of nodes.
@@ -178,18 +206,39 @@ impl Grid {
             return;
         }
         let [across, down] = &self.axes;
-        let scale = 1.0 / (across.spacing * down.spacing) as f32;
-        for (plane, halfway) in [real, imaginary].into_iter().zip(&mut self.halfway) {
-            halfway.par_chunks_mut(across.pixels).enumerate().for_each(|(node, sums)| {
-                let pixels = down.pixels_of(node);
-                let rows = &plane[pixels.start * across.pixels..pixels.end * across.pixels];
-                let weight = |row: usize| scale * down.weight(pixels.start + row, node).unwrap_or(0.0);
-                sum_rows(rows, weight, sums);
+        let (width, line) = (across.pixels, across.line_length());
+        for (plane, sums) in [real, imaginary].into_iter().zip(&mut self.sums) {
+            let cells = sums.par_chunks_mut(3 * width).zip(plane.par_chunks(down.spacing * width));
+            let weights = &self.row_weights;
+            let cells = cells.with_min_len(ROWS_PER_TASK.div_ceil(down.spacing));
+            cells.for_each(|(sums, rows)| {
+                wide(
+                    #[inline(always)]
+                    || lanes::sum_rows(rows, weights, width, sums),
+                );
             });
         }
-        let [re, im] = &self.halfway;
-        let lines = re.par_chunks(across.pixels).zip(im.par_chunks(across.pixels));
-        nodes.par_chunks_mut(across.nodes).zip(lines).for_each(|(nodes, (re, im))| across.collect(re, im, nodes));
+        let [sums_re, sums_im] = &self.sums;
+        let [re, im] = &mut self.halfway;
+        let lines = re.par_chunks_mut(line).zip(im.par_chunks_mut(line));
+        let rows = nodes.par_chunks_mut(across.nodes).zip(lines).with_min_len(ROWS_PER_TASK).enumerate();
+        rows.for_each(|(node, (nodes, (re, im)))| {
+            for (line, sums) in [&mut *re, &mut *im].into_iter().zip([sums_re, sums_im]) {
+                let of_cell = |tap: usize| {
+                    let cell = node.checked_sub(tap).filter(|_| tap < down.tap_count())?;
+                    sums.get((3 * cell + tap) * width..)?.get(..width)
+                };
+                let lines = [0, 1, 2].map(of_cell);
+                wide(
+                    #[inline(always)]
+                    || lanes::add_lines(lines, &mut line[..width]),
+                );
+            }
+            // Beyond the image the last interpolation has left its values.
+            re[width..].fill(0.0);
+            im[width..].fill(0.0);
+            across.collect([re, im], nodes);
+        });
     }
 
     /// Adds the light of one pixel to its nodes, as [`Self::restrict`] would.
@@ -226,34 +275,59 @@ impl Grid {
             return;
         }
         let [across, down] = &self.axes;
-        let [halfway_re, halfway_im] = &mut self.halfway;
-        let lines = halfway_re.par_chunks_mut(across.pixels).zip(halfway_im.par_chunks_mut(across.pixels));
-        lines.zip(nodes.par_chunks(across.nodes)).for_each(|((re, im), nodes)| across.spread(nodes, factor, re, im));
+        let (width, length) = (across.pixels, across.line_length());
+        let [re, im] = &mut self.halfway;
+        let lines = re.par_chunks_mut(length).zip(im.par_chunks_mut(length));
+        let lines = lines.zip(nodes.par_chunks(across.nodes)).with_min_len(ROWS_PER_TASK);
+        lines.for_each(|((re, im), nodes)| across.spread(nodes, factor, [re, im]));
         for (plane, halfway) in [real, imaginary].into_iter().zip(&self.halfway) {
-            let line = |node: usize| &halfway[node * across.pixels..][..across.pixels];
-            plane.par_chunks_mut(across.pixels).with_min_len(ROWS_PER_TASK).zip(&down.taps).for_each(|(row, taps)| {
-                match (down.tap_count(), taps.weights) {
-                    (1, _) => row.iter_mut().zip(line(taps.first)).for_each(|(pixel, value)| *pixel += value),
-                    (_, [a, b, c]) => {
-                        let lines = line(taps.first).iter().zip(line(taps.first + 1)).zip(line(taps.first + 2));
-                        for (pixel, ((first, second), third)) in row.iter_mut().zip(lines) {
-                            *pixel += a * first + b * second + c * third;
-                        }
-                    }
+            let line = |node: usize| &halfway[node * length..][..width];
+            plane.par_chunks_mut(width).with_min_len(ROWS_PER_TASK).zip(&down.taps).for_each(|(row, taps)| {
+                if down.spacing == 1 {
+                    row.iter_mut().zip(line(taps.first)).for_each(|(pixel, value)| *pixel += value);
+                } else {
+                    let lines = [0, 1, 2].map(|tap| line(taps.first + tap));
+                    wide(
+                        #[inline(always)]
+                        || lanes::add_weighted(row, taps.weights, lines),
+                    );
                 }
             });
+        }
+    }
+
+    /// Shows the real part of what lies on the nodes, interpolated, row by row of pixels.
+    pub(crate) fn visit_interpolated(&mut self, nodes: &[Complex<f32>], mut visit: impl FnMut(usize, &[f32])) {
+        let [across, down] = &self.axes;
+        let (width, length) = (across.pixels, across.line_length());
+        let [re, im] = &mut self.halfway;
+        let lines = re.chunks_exact_mut(length).zip(im.chunks_exact_mut(length)).zip(nodes.chunks_exact(across.nodes));
+        lines.for_each(|((re, im), nodes)| across.spread(nodes, 1.0, [re, im]));
+        for (index, taps) in down.taps.iter().enumerate() {
+            let line = |node: usize| &re[node * length..][..width];
+            if down.spacing == 1 {
+                visit(index, line(taps.first));
+                continue;
+            }
+            let (lines, row) = ([0, 1, 2].map(|tap| line(taps.first + tap)), &mut self.row);
+            row.fill(0.0);
+            wide(
+                #[inline(always)]
+                || lanes::add_weighted(row, taps.weights, lines),
+            );
+            visit(index, row);
         }
     }
 
     /// The spectrum of [`Self::round_trip`] away from the borders, on a torus of `size` nodes.
     pub(crate) fn round_trip_spectrum(&self, size: [usize; 2]) -> Spectrum {
         let along = |axis: usize| -> Vec<f64> {
-            let middle = &self.bands[axis][self.axes[axis].nodes / 2];
+            let middle = |diagonal: usize| f64::from(self.bands[axis][diagonal][self.axes[axis].nodes / 2]);
+            let [centre, beside, second] = [middle(2), middle(3), middle(4)];
             let value = |index: usize| {
                 let angle = TAU * index as f64 / size[axis] as f64;
                 // The band is symmetric.
-                f64::from(middle[2])
-                    + 2.0 * (f64::from(middle[3]) * angle.cos() + f64::from(middle[4]) * (2.0 * angle).cos())
+                centre + 2.0 * (beside * angle.cos() + second * (2.0 * angle).cos())
             };
             (0..size[axis]).map(value).collect()
         };
@@ -267,48 +341,17 @@ impl Grid {
         if self.is_fine() {
             return;
         }
-        let [columns, rows] = self.size();
+        let columns = self.axes[0].nodes;
         let [across, down] = &self.bands;
-        let band = |band: &[f32; 5], value: &dyn Fn(usize) -> Option<Complex<f32>>, at: usize| -> Complex<f32> {
-            let inside =
-                band.iter().enumerate().filter_map(|(d, weight)| Some(value((at + d).checked_sub(2)?)? * weight));
-            inside.sum()
-        };
-        for (target, line) in self.spare.chunks_exact_mut(columns).zip(nodes.chunks_exact(columns)) {
-            for (col, target) in target.iter_mut().enumerate() {
-                *target = band(&across[col], &|at| line.get(at).copied(), col);
-            }
-        }
-        for row in 0..rows {
-            for col in 0..columns {
-                let value = |at: usize| (at < rows).then(|| self.spare[at * columns + col]);
-                nodes[row * columns + col] = band(&down[row], &value, row);
-            }
-        }
-    }
-}
-
-/// Weighted sum of rows that lie one after the other, each as long as `sums`; four at a time, to write the sums less
-/// often.
-fn sum_rows(rows: &[f32], weight: impl Fn(usize) -> f32, sums: &mut [f32]) {
-    sums.fill(0.0);
-    let width = sums.len();
-    for (group, rows) in rows.chunks(4 * width).enumerate() {
-        let weight = |row: usize| weight(4 * group + row);
-        if rows.len() == 4 * width {
-            let [a, b, c, d] = [weight(0), weight(1), weight(2), weight(3)];
-            let (upper, lower) = rows.split_at(2 * width);
-            let ((first, second), (third, fourth)) = (upper.split_at(width), lower.split_at(width));
-            let values = first.iter().zip(second).zip(third).zip(fourth);
-            for (sum, (((first, second), third), fourth)) in sums.iter_mut().zip(values) {
-                *sum += a * first + b * second + c * third + d * fourth;
-            }
-        } else {
-            for (index, row) in rows.chunks_exact(width).enumerate() {
-                let weight = weight(index);
-                sums.iter_mut().zip(row).for_each(|(sum, value)| *sum += weight * value);
-            }
-        }
+        let spare = &mut self.spare;
+        wide(
+            #[inline(always)]
+            || lanes::band_along(nodes, across, spare),
+        );
+        wide(
+            #[inline(always)]
+            || lanes::band_across(spare, down, columns, nodes),
+        );
     }
 }
 

@@ -3,6 +3,7 @@
 use range_image::Flags;
 
 use crate::SaturatedLight;
+use crate::lanes::{largest_part, wide};
 
 /// Pixels put aside while the image is restored, with their values.
 #[derive(Default)]
@@ -40,7 +41,10 @@ impl Mask {
         let mut largest = 0.0_f32;
         for (row, (re, im)) in re.chunks_exact_mut(width).zip(im.chunks_exact_mut(width)).enumerate() {
             let flags = flags.map(|flags| &flags[row * width..][..width]);
-            let mut parts = [largest_part(re), largest_part(im)];
+            let mut parts = wide(
+                #[inline(always)]
+                || [largest_part(re), largest_part(im)],
+            );
             if !parts.iter().all(|part| part.is_finite())
                 || flags.is_some_and(|flags| union(flags).intersects(UNTOUCHED))
             {
@@ -108,10 +112,11 @@ impl Mask {
         &self.dependent
     }
 
-    /// Notes those, in order, of so many pixels for which `depends` says so; pixels put aside are none of them.
-    pub(crate) fn note_dependent(&mut self, pixels: usize, depends: impl Fn(usize) -> bool) {
-        let mut kept = self.kept.iter().map(|kept| kept.pixel).peekable();
-        self.dependent.extend((0..pixels).filter(|&pixel| kept.next_if_eq(&pixel).is_none() && depends(pixel)));
+    /// Notes those of a row of pixels, in order, for which `depends` says so; pixels put aside are none of them.
+    pub(crate) fn note_dependent(&mut self, row: std::ops::Range<usize>, depends: impl Fn(usize) -> bool) {
+        let first = self.kept.partition_point(|kept| kept.pixel < row.start);
+        let mut kept = self.kept[first..].iter().map(|kept| kept.pixel).peekable();
+        self.dependent.extend(row.filter(|&pixel| kept.next_if_eq(&pixel).is_none() && depends(pixel)));
     }
 }
 
@@ -120,15 +125,6 @@ const UNTOUCHED: Flags = Flags::SATURATED.union(Flags::NO_DATA);
 
 fn union(flags: &[Flags]) -> Flags {
     Flags::from_bits_retain(flags.iter().fold(0, |all, flags| all | flags.bits()))
-}
-
-/// Largest absolute value; not finite as soon as one value is not.
-///
-/// Without its sign the pattern of bits of a float grows with its value, infinity and NaN being largest of all, and the
-/// largest of many integers is found in wide registers, which IEEE comparisons do not allow.
-pub(crate) fn largest_part(values: &[f32]) -> f32 {
-    let magnitude = |value: &f32| (value.to_bits() & 0x7fff_ffff) as i32;
-    f32::from_bits(values.iter().map(magnitude).max().unwrap_or(0) as u32)
 }
 
 fn fill_row(re: &mut [f32], im: &mut [f32], unknown: &[bool]) {
@@ -154,14 +150,6 @@ fn fill_row(re: &mut [f32], im: &mut [f32], unknown: &[bool]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn the_largest_part_is_found() {
-        assert_eq!(largest_part(&[-3.0, 2.0, -0.0]).to_bits(), 3.0_f32.to_bits());
-        assert_eq!(largest_part(&[]).to_bits(), 0);
-        assert!(largest_part(&[1.0, f32::NEG_INFINITY]).is_infinite());
-        assert!(!largest_part(&[1.0, -f32::NAN, 3e38]).is_finite());
-    }
 
     #[test]
     fn gaps_are_filled_from_both_sides_and_given_back() {

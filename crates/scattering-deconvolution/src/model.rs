@@ -11,7 +11,7 @@ use crate::noise::Noise;
 use crate::operator::{Operator, Term};
 use crate::parts::{Orientation, Part, parts};
 use crate::spectrum::Spectrum;
-use crate::{Error, GaussianTerm, GridSpacing, Psf, RestorationOptions, Result};
+use crate::{Error, GaussianTerm, GridSpacing, Psf, Refinement, RestorationOptions, Result};
 
 /// Smallest `|1 + H|` that is inverted without regularisation: noise grows by its reciprocal.
 const SMALLEST_RESPONSE: f64 = 0.01;
@@ -47,6 +47,9 @@ impl Model {
         let lambda = options.regularisation;
         if lambda > 0.0 && !stationary {
             return Err(Error::NotStationary { what: "a regularisation" });
+        }
+        if options.refinement == Refinement::FilterOnly && !stationary {
+            return Err(Error::NotStationary { what: "a filter without refinement" });
         }
         let mean = mean_spectrum(&parts, &spectra, convolver.padded());
         let seen = mean.times(&grid.round_trip_spectrum(convolver.padded()));

@@ -13,6 +13,20 @@ pub enum GridSpacing {
     EveryPixel,
 }
 
+/// Whether the inverse filter is all that is done.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
+pub enum Refinement {
+    /// Iterations follow until the residual is below the tolerance.
+    #[default]
+    ToTolerance,
+    /// None: one convolution, the residual of which is not measured. What light that was lost over the border leaves
+    /// wrong is of second order in the share of scattered light, and nothing tells how much it is. For point spread
+    /// functions that are the same for all pixels.
+    FilterOnly,
+}
+
 /// What the light of saturated pixels counts for while scattered light is computed. They keep their own value either way.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -41,6 +55,8 @@ pub struct RestorationOptions {
     pub max_iterations: usize,
     /// Where scattered light is computed.
     pub grid_spacing: GridSpacing,
+    /// Whether the inverse filter is all that is done.
+    pub refinement: Refinement,
     /// What the light of saturated pixels counts for.
     pub saturated_light: SaturatedLight,
     /// Share of a restored pixel's amplitude beyond which light scattered from pixels of unknown light (saturated, without
@@ -56,6 +72,7 @@ impl Default for RestorationOptions {
             tolerance: 1e-5,
             max_iterations: 30,
             grid_spacing: GridSpacing::Automatic,
+            refinement: Refinement::ToTolerance,
             saturated_light: SaturatedLight::Clipped,
             dependence_limit: 0.1,
         }

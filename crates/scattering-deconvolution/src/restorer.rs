@@ -16,7 +16,8 @@ const MODULATIONS: usize = 8;
 pub struct RestorationSummary {
     /// Iterations after the first estimate.
     pub iterations: usize,
-    /// Bound of the residual `|y - (z + psf * z)|` that remains, over the largest real or imaginary part of `y`.
+    /// Bound of the residual `|y - (z + psf * z)|` that remains, over the largest real or imaginary part of `y`; NaN where
+    /// it was not measured ([`Refinement::FilterOnly`](crate::Refinement)).
     pub residual: f64,
     /// Factor by which the standard deviation of noise that is the same everywhere changes.
     pub noise_gain: f64,

@@ -1,5 +1,6 @@
 //! Propagation of noise through a restoration.
 
+use crate::lanes::{finite_extremes, wide};
 use crate::mask::Mask;
 use crate::noise::Centre;
 use crate::work::Work;
@@ -13,7 +14,11 @@ impl Work {
     /// The noise of pixels is independent before and correlated afterwards; sigma is that of each pixel by itself.
     /// Pixels put aside keep their sigma and, as filled or clipped values, bring no noise to others. NaN stays NaN.
     pub(crate) fn propagate_sigma(&mut self, sigma: &mut [f32], mask: &Mask) {
-        let [least, most] = finite_extremes(sigma).map(|value| f64::from(value).powi(2));
+        let [least, most] = wide(
+            #[inline(always)]
+            || finite_extremes(sigma),
+        )
+        .map(|value| f64::from(value).powi(2));
         if most <= 0.0 {
             return;
         }
@@ -75,11 +80,4 @@ fn add(sigma: &mut [f32], centre: &Centre, added: &[f32]) {
             values.zip(centres).for_each(|((value, added), centre)| *value = total(*value, f64::from(*centre), *added));
         }
     }
-}
-
-/// Smallest and largest of the finite values; infinity and zero where there is none.
-fn finite_extremes(values: &[f32]) -> [f32; 2] {
-    values.iter().fold([f32::INFINITY, 0.0], |[least, most], &value| {
-        [if value < least { value } else { least }, if value > most && value < f32::INFINITY { value } else { most }]
-    })
 }

@@ -5,7 +5,7 @@ use rustfft::num_complex::Complex;
 use crate::convolution::Convolver;
 use crate::grid::Grid;
 use crate::model::Model;
-use crate::{Error, Psf, RestorationOptions, Result};
+use crate::{Error, Psf, Refinement, RestorationOptions, Result};
 
 /// Contraction up to which light is simply scattered again; beyond it each step is divided by `1 + H` as well.
 const PLAIN_ITERATION: f64 = 0.5;
@@ -49,6 +49,11 @@ impl Work {
             None => self.model.scatter.apply(&mut self.convolver, &mut self.scattered),
         }
         let tolerance = options.tolerance;
+        if options.refinement == Refinement::FilterOnly {
+            let finite = largest_modulus(self.scattered.iter().copied()).is_finite();
+            let failure = Error::NotConverged { iterations: 0, residual: f64::INFINITY, tolerance };
+            return if finite { Ok((0, f64::NAN)) } else { Err(failure) };
+        }
         let mut residual = f64::INFINITY;
         for iterations in 0..=options.max_iterations {
             residual = relative(self.find_residual(), largest);

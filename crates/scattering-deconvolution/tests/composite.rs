@@ -11,7 +11,7 @@ use proptest::test_runner::RngSeed;
 use range_image::Modulation;
 use scattering_deconvolution::{
     CompositePsf, Error, FieldPolynomial, FieldTerm, GaussianTerm, Ghost, GhostDelay, GhostPlace, GridSpacing, Psf,
-    RestorationOptions, Restorer, Scatterer, restore,
+    Refinement, RestorationOptions, Restorer, Scatterer, restore,
 };
 
 fn gaussian(weight: f64, across: f64, down: f64) -> GaussianTerm {
@@ -253,6 +253,9 @@ fn what_is_wrong_is_named() {
     assert_eq!(named(&|psf| psf.ghosts[0].delay = GhostDelay::ExtraPath(-0.1)), "ExtraPath");
     assert_eq!(named(&|psf| psf.ghosts[1].delay = GhostDelay::Phase(f64::INFINITY)), "Phase");
     let options = RestorationOptions { regularisation: 0.1, ..RestorationOptions::default() };
+    let error = Restorer::new(&Psf::Composite(good.clone()), 32, 24, &options).map(|_| ()).unwrap_err();
+    assert!(matches!(error, Error::NotStationary { .. }), "{error}");
+    let options = RestorationOptions { refinement: Refinement::FilterOnly, ..RestorationOptions::default() };
     let error = Restorer::new(&Psf::Composite(good.clone()), 32, 24, &options).map(|_| ()).unwrap_err();
     assert!(matches!(error, Error::NotStationary { .. }), "{error}");
     assert!(matches!(Psf::Composite(good).sample([3, 3]), Err(Error::NotStationary { .. })));

@@ -22,7 +22,7 @@ fn small() -> Scene {
 }
 
 /// Root mean square of errors over standard deviations of each parameter, and the mean sigma0, of seeded captures.
-fn normalised_errors(truth: &[f64], trials: u64, find: impl Fn(u64) -> PsfEstimate + Sync) -> (Vec<f64>, f64) {
+fn normalised_errors(truth: &[f64], trials: u64, find: impl Fn(u64) -> PsfEstimate + Sync + Send) -> (Vec<f64>, f64) {
     let found: Vec<PsfEstimate> = (0..trials).into_par_iter().map(find).collect();
     let (mut squares, mut sigma0) = (vec![0.0; truth.len()], 0.0);
     for found in &found {

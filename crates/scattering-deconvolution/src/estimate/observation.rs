@@ -118,3 +118,54 @@ impl Observation for BlockObservation<'_> {
 fn dot(coefficients: [f64; 2], values: &[f64]) -> f64 {
     coefficients.iter().zip(values).map(|(a, x)| a * x).sum()
 }
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use adjust::{Adjustment, ParameterBlock, check_jacobian};
+
+    use super::*;
+    use crate::estimate::blocks::Blocks;
+    use crate::estimate::response::{INSIDE, OUTSIDE};
+
+    #[test]
+    fn the_jacobian_is_that_of_differences() {
+        let size = [30, 24];
+        let shares: Vec<_> = (0..720).map(|i| if i % 30 < 9 && i / 30 > 12 { INSIDE } else { OUTSIDE }).collect();
+        let light: Vec<f64> = (0..720).map(|i| 500.0 + f64::from(i * 31 % 67)).collect();
+        let source = Source::new(Blocks::new(size, Some(3)), &light, &light, &shares).unwrap();
+        let shared = SharedResponse::new(&source, 60.0);
+        let row = |light| Row { observed: 3.0, light, drift: [40.0, -7.0], constant: [0.3, 0.8] };
+        let rows = [row([1.0, 0.2]), row([-0.4, 0.7])];
+        let nuisances: [fn(&Row) -> [f64; 2]; 2] = [|row| row.drift, |row| row.constant];
+        let widths = [2.0_f64.ln(), 9.0_f64.ln(), 6.0_f64.ln()];
+        for terms in [vec![vec![0.06, widths[0]], vec![0.03, widths[1]]], vec![vec![0.06, widths[1], widths[2]]]] {
+            let values = terms.iter().cloned().chain([vec![0.01, 0.02], vec![0.5, 0.1]]);
+            let blocks: Vec<ParameterBlock> = values.map(ParameterBlock::euclidean).collect();
+            let mut network = Adjustment::new();
+            let ids: Vec<BlockId> = blocks.iter().map(|block| network.add_block(block.clone())).collect();
+            let observation = BlockObservation {
+                shared: &shared,
+                rows: &rows,
+                block: [4, 5],
+                ids: &ids,
+                terms: terms.len(),
+                nuisances: &nuisances,
+            };
+            // Differences of smooth functions of some tens, with steps of 1e-5 or so.
+            let check = check_jacobian(&observation, &blocks).unwrap();
+            assert!(check.worst < 1e-6, "{check:?}");
+        }
+    }
+
+    #[test]
+    fn widths_out_of_bounds_have_no_value() {
+        let source = Source::new(Blocks::new([6, 4], Some(2)), &[1.0; 24], &[1.0; 24], &[INSIDE; 24]).unwrap();
+        let shared = SharedResponse::new(&source, 12.0);
+        for width in [0.5_f64, 13.0, f64::NAN] {
+            assert!(shared.at(&[&[0.1, width.ln()]], false).is_err());
+        }
+        assert!(shared.at(&[&[0.1, 3.0_f64.ln()]], true).is_ok());
+        assert!(shared.at(&[&[0.1]], false).is_err());
+    }
+}

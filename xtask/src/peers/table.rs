@@ -28,7 +28,7 @@ impl Least {
 
     /// Notes figures that an example printed as `<name>_<figure>`.
     pub(crate) fn note_own(&mut self, case: &str, who: &str, name: &str, printed: &Figures) {
-        for figure in ["ms", "bytes"] {
+        for figure in ["ms", "bytes", "buffers"] {
             self.note(case, who, figure, printed.get(&format!("{name}_{figure}"), 0));
         }
     }

@@ -2,9 +2,10 @@
 // Only what is inlined is compiled for wide registers.
 #![allow(clippy::inline_always)]
 
-use std::f32::consts::{PI, TAU};
+use std::f32::consts::PI;
 
 use crate::grid::Grid;
+use crate::steps::wrapped_steps;
 use crate::wide::with_wide_registers;
 
 /// Cost of a pixel none of whose neighbours allow a second difference: more than any pixel that has one.
@@ -63,23 +64,11 @@ impl Steps {
     /// Steps from one padded row to the next; each serves the two pixels at its ends, which halves the work.
     #[inline(always)]
     fn measure(&mut self, here: &[f32], below: &[f32]) {
-        steps(here, &here[1..], &mut self.right);
-        steps(here, below, &mut self.down);
-        steps(here, &below[1..], &mut self.falling);
+        wrapped_steps(here, &here[1..], &mut self.right);
+        wrapped_steps(here, below, &mut self.down);
+        wrapped_steps(here, &below[1..], &mut self.falling);
         // Stored under the column of the lower end.
-        steps(&here[1..], below, &mut self.rising);
-    }
-}
-
-#[inline(always)]
-fn steps(from: &[f32], to: &[f32], out: &mut Vec<f32>) {
-    let count = from.len().min(to.len());
-    out.resize(count, 0.0);
-    for ((out, from), to) in out.iter_mut().zip(from).zip(to) {
-        let step = to - from;
-        // A step of exactly pi stays, whichever way it goes: ties have no side.
-        let cycle = if step.abs() > PI { TAU } else { 0.0 };
-        *out = step - cycle.copysign(step);
+        wrapped_steps(&here[1..], below, &mut self.rising);
     }
 }
 

@@ -198,6 +198,8 @@ impl Unwrapper {
     /// Shifts each segment; labels become those of the islands, the hold of a pixel its confidence.
     fn apply_offsets(&mut self) {
         let maximum = i32::from(self.options.maximum_wraps);
+        // From log odds to a confidence once a segment, not once a pixel.
+        let sure: Vec<f32> = self.offsets.margin.iter().map(|margin| (0.5 * margin).tanh()).collect();
         let pixels = self.forest.label.iter_mut().zip(&mut self.forest.wraps).zip(&mut self.segments.hold);
         for ((label, wraps), confidence) in pixels {
             if *label == NO_LABEL {
@@ -207,7 +209,7 @@ impl Unwrapper {
             let count = *wraps + i32::from(self.offsets.offset[segment]);
             *wraps = count.clamp(0, maximum);
             // A count out of span was no solution: the pixel keeps the nearest, and says that it is a guess.
-            let agreed = if *wraps == count { (0.5 * self.offsets.margin[segment]).tanh() } else { 0.0 };
+            let agreed = if *wraps == count { sure[segment] } else { 0.0 };
             *confidence *= agreed;
             *label = self.borders.island[segment];
         }

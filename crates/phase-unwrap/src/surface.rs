@@ -1,5 +1,6 @@
 //! What a pair of neighbouring pixels says about the surface between them.
 
+use crate::cuts::gentler;
 use crate::grid::{DOWN, Grid, RIGHT, wrapped};
 
 /// Largest phase variance used, rad^2: beyond it a phase says nothing anyway.
@@ -102,10 +103,4 @@ impl Surface {
         let down = if self.used(pixel + grid.stride) { DOWN } else { 0 };
         right | down
     }
-}
-
-/// The slope that both sides share: the gentler of two of one sign, else zero. A steep floor keeps its slope, while
-/// an edge smeared over two pixels does not pass as one, since beyond it the surface is flat.
-fn gentler(before: f32, after: f32) -> f32 {
-    if before * after > 0.0 { before.abs().min(after.abs()).copysign(before) } else { 0.0 }
 }

@@ -2,7 +2,7 @@
 
 use std::f32::consts::TAU;
 
-use crate::forest::{Forest, NO_LABEL};
+use crate::forest::Forest;
 use crate::grid::Grid;
 use crate::planes::log_cosine;
 use crate::surface::Surface;
@@ -88,16 +88,16 @@ impl Brightness {
     fn sample(&mut self, forest: &Forest, pixels: &[u32]) {
         self.pixel.iter_mut().for_each(Vec::clear);
         self.pixel.resize(pixels.len(), Vec::new());
-        let mut seen = vec![0_u32; pixels.len()];
+        // Pixels to pass over until the next sample.
+        let mut wait = vec![0_u32; pixels.len()];
         for (pixel, &label) in forest.label.iter().enumerate() {
-            if label == NO_LABEL {
-                continue;
-            }
-            let segment = label as usize;
-            if seen[segment].is_multiple_of(pixels[segment].div_ceil(SAMPLES)) {
+            let Some(wait) = wait.get_mut(label as usize) else { continue };
+            if *wait == 0 {
+                let segment = label as usize;
                 self.pixel[segment].push(pixel as u32);
+                *wait = pixels[segment].div_ceil(SAMPLES);
             }
-            seen[segment] += 1;
+            *wait -= 1;
         }
     }
 

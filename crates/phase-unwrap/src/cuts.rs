@@ -5,7 +5,7 @@
 #![allow(clippy::needless_bitwise_bool)]
 
 use crate::SpatialOptions;
-use crate::grid::{DOWN, Grid, RIGHT};
+use crate::grid::{DOWN, Grid, RIGHT, set_bits};
 use crate::steps::wrapped_steps;
 use crate::surface::Surface;
 use crate::wide::with_wide_registers;
@@ -158,13 +158,7 @@ impl Cuts {
         );
         for start in grid.row_starts() {
             for (block, flags) in self.flags[start..start + grid.width].chunks(8).enumerate() {
-                let mut bytes = [0; 8];
-                bytes[..flags.len()].copy_from_slice(flags);
-                let mut word = u64::from_le_bytes(bytes);
-                while word != 0 {
-                    self.rim.push((start + 8 * block + word.trailing_zeros() as usize / 8) as u32);
-                    word &= word - 1;
-                }
+                self.rim.extend(set_bits(flags).map(|bit| (start + 8 * block + bit / 8) as u32));
             }
         }
         for &pixel in &self.rim[begin..] {

@@ -7,7 +7,7 @@
 
 use crate::candidates::{Candidates, LEFT, OUTSIDE, TO_BELOW, TO_RIGHT, UP};
 use crate::contraction::{Contraction, Edge, Member};
-use crate::grid::{Grid, wrap_step};
+use crate::grid::{Grid, set_bits, wrap_step};
 
 /// Label of a pixel that belongs to no component.
 pub(crate) const NO_LABEL: u32 = u32::MAX;
@@ -119,12 +119,7 @@ impl Forest {
         edges.clear();
         for start in grid.row_starts() {
             for (block, open) in self.candidates.open[start..start + grid.width].chunks(8).enumerate() {
-                let mut bytes = [0; 8];
-                bytes[..open.len()].copy_from_slice(open);
-                let mut word = u64::from_le_bytes(bytes);
-                while word != 0 {
-                    let bit = word.trailing_zeros() as usize;
-                    word &= word - 1;
+                for bit in set_bits(open) {
                     let pixel = start + 8 * block + bit / 8;
                     let other = pixel + if bit.is_multiple_of(8) { 1 } else { grid.stride };
                     let ((from, here), (to, there)) = (place(pixel), place(other));

@@ -12,6 +12,7 @@ mod grid;
 mod intervals;
 mod known;
 mod labelling;
+mod logarithm;
 mod multi_frequency;
 mod offsets;
 mod options;

@@ -72,19 +72,22 @@ impl Segments {
     /// Shifts each segment so that zero is its mean count, rounded: the offset to find is then its typical count.
     fn centre(&mut self, forest: &mut Forest) {
         let mut sums = vec![(0_i64, 0_u32); forest.components];
-        for (&label, &wraps) in forest.label.iter().zip(&forest.wraps) {
-            if label != NO_LABEL {
-                let sum = &mut sums[label as usize];
-                *sum = (sum.0 + i64::from(wraps), sum.1 + 1);
+        let labels = forest.label.chunk_by(|a, b| a == b);
+        let mut wraps = forest.wraps.as_slice();
+        // A segment's pixels come in runs: one addition a run.
+        for run in labels {
+            let (here, rest) = wraps.split_at(run.len());
+            wraps = rest;
+            if let Some(sum) = run.first().and_then(|&label| sums.get_mut(label as usize)) {
+                let total: i64 = here.iter().map(|&wraps| i64::from(wraps)).sum();
+                *sum = (sum.0 + total, sum.1 + run.len() as u32);
             }
         }
         self.pixels.clear();
         self.pixels.extend(sums.iter().map(|sum| sum.1));
         let means: Vec<i32> = sums.iter().map(|&(sum, n)| (sum as f64 / f64::from(n.max(1))).round() as i32).collect();
         for (&label, wraps) in forest.label.iter().zip(&mut forest.wraps) {
-            if label != NO_LABEL {
-                *wraps -= means[label as usize];
-            }
+            *wraps -= means.get(label as usize).copied().unwrap_or(0);
         }
     }
 }

@@ -1,9 +1,12 @@
 //! Borders between segments: how well a wrap difference would make the surface continuous across them.
 // Only what is inlined is compiled for wide registers.
 #![allow(clippy::inline_always)]
+// No short cuts, so that many pixels go at once.
+#![allow(clippy::needless_bitwise_bool)]
 
 use crate::forest::{Forest, NO_LABEL};
 use crate::grid::{DOWN, Grid, RIGHT, set_bits, wrap_step};
+use crate::seams::Seam;
 use crate::surface::{Step, Surface};
 use crate::wide::with_wide_registers;
 
@@ -38,7 +41,7 @@ pub(crate) struct Borders {
 }
 
 impl Borders {
-    pub fn collect(&mut self, grid: &Grid, surface: &Surface, forest: &Forest) {
+    pub fn collect(&mut self, grid: &Grid, surface: &Surface, forest: &Forest, seams: &[Seam]) {
         self.crossings.clear();
         for start in grid.row_starts() {
             flag_row(grid, forest, start, &mut self.flags);
@@ -46,8 +49,15 @@ impl Borders {
                 for bit in set_bits(flags) {
                     let pixel = start + 8 * block + bit / 8;
                     let ahead = if bit.is_multiple_of(8) { 1 } else { grid.stride };
-                    self.crossings.push(crossing(surface, forest, pixel, ahead));
+                    self.crossings.push(crossing(surface, forest, [pixel, pixel + ahead], ahead));
                 }
+            }
+        }
+        for seam in seams {
+            let ends = [seam.from as usize, seam.to as usize];
+            let [from, to] = ends.map(|pixel| forest.label[pixel]);
+            if from != to && from != NO_LABEL && to != NO_LABEL {
+                self.crossings.push(crossing(surface, forest, ends, seam.ahead(grid)));
             }
         }
         self.crossings.sort_by_key(|c| (c.from, c.to, c.step));
@@ -110,15 +120,10 @@ fn flag_row(grid: &Grid, forest: &Forest, start: usize, flags: &mut Vec<u8>) {
     );
 }
 
-fn crossing(surface: &Surface, forest: &Forest, pixel: usize, ahead: usize) -> Crossing {
-    let other = pixel + ahead;
+fn crossing(surface: &Surface, forest: &Forest, [pixel, other]: [usize; 2], ahead: usize) -> Crossing {
     let step = wrap_step(surface.phase[pixel], surface.phase[other]) + forest.wraps[pixel] - forest.wraps[other];
-    directed(
-        forest.label[pixel],
-        forest.label[other],
-        step,
-        continuity(surface.step(pixel, ahead), surface.sigma(pixel, other)),
-    )
+    let evidence = continuity(surface.step(pixel, other, ahead), surface.sigma(pixel, other));
+    directed(forest.label[pixel], forest.label[other], step, evidence)
 }
 
 fn directed(from: u32, to: u32, step: i32, evidence: f32) -> Crossing {

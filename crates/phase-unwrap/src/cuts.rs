@@ -103,8 +103,13 @@ impl Cuts {
             let end = End::new(surface, start, n);
             let steps = [&along[..n], &along[1..][..n], &along[2..][..n]];
             cut_row(steps, [end, End::new(surface, start + 1, n)], limits, RIGHT, links, cut);
-            let steps = [&above[1..][..n], &here[1..][..n], &below[1..][..n]];
-            cut_row(steps, [end, End::new(surface, start + stride, n)], limits, DOWN, links, cut);
+            if index < grid.height {
+                let steps = [&above[1..][..n], &here[1..][..n], &below[1..][..n]];
+                cut_row(steps, [end, End::new(surface, start + stride, n)], limits, DOWN, links, cut);
+            }
+            // The rim may show the other side of a cyclic axis; links end before it.
+            links[n - 1] &= !RIGHT;
+            cut[n - 1] &= !RIGHT;
             std::mem::swap(above, here);
             std::mem::swap(here, below);
         }

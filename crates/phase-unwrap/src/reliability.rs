@@ -11,6 +11,9 @@ use crate::wide::with_wide_registers;
 /// Cost of a pixel none of whose neighbours allow a second difference: more than any pixel that has one.
 const UNKNOWN: f32 = 256.0;
 
+/// Expected sum of squares of the four second differences of white noise of variance 1.
+const EXPECTED: f32 = 24.0;
+
 /// Wrapped steps of one padded row: along it, and to the row below (straight, and the two diagonals).
 #[derive(Debug, Default)]
 struct Steps {
@@ -42,7 +45,7 @@ impl Smoothness {
         );
         if let Some(variance) = noise_variance {
             for (cost, variance) in cost.iter_mut().zip(variance) {
-                *cost += 24.0 * variance;
+                *cost += EXPECTED * variance;
             }
         }
     }
@@ -96,6 +99,19 @@ fn second_differences(centre: &[f32], above: &Steps, here: &Steps, out: &mut [f3
         }
         let cost = if count > 0.0 { sum * (4.0 / count) } else { UNKNOWN };
         out[col] = if centre[col].is_nan() { f32::INFINITY } else { cost };
+    }
+}
+
+/// Cost of each pixel by its noise alone, in the scale of second differences; infinite where masked.
+pub(crate) fn noise_cost(grid: &Grid, phase: &[f32], variance: &[f32], cost: &mut Vec<f32>) {
+    cost.clear();
+    cost.resize(grid.len(), f32::INFINITY);
+    for start in grid.row_starts() {
+        let inside = start..start + grid.width;
+        let pixels = phase[inside.clone()].iter().zip(&variance[inside.clone()]);
+        for (cost, (phase, variance)) in cost[inside].iter_mut().zip(pixels) {
+            *cost = if phase.is_nan() { f32::INFINITY } else { EXPECTED * variance };
+        }
     }
 }
 

@@ -36,7 +36,7 @@ impl Segments {
         for (cost, class) in cost.iter_mut().zip(&self.cuts.class) {
             *cost = if *class == RIM { f32::INFINITY } else { *cost };
         }
-        forest.grow(grid, &surface.phase, cost, Some(&self.cuts.links));
+        forest.grow(grid, &surface.phase, cost, Some(&self.cuts.links), &[]);
         self.attach_rim(grid, surface, forest);
         self.centre(forest);
     }
@@ -56,7 +56,7 @@ impl Segments {
                 if self.cuts.links[from] & (bit << HOOK) == 0 || forest.label[other] == NO_LABEL {
                     continue;
                 }
-                let step = surface.step(from, ahead);
+                let step = surface.step(from, from + ahead, ahead);
                 // Amplitude varies on a surface (texture) more than the slope does: half its weight.
                 let distance = step.phase + 0.5 * if step.amplitude.is_nan() { 0.0 } else { step.amplitude };
                 if distance < best.0 {

@@ -31,6 +31,16 @@ pub(crate) struct Step {
 }
 
 impl Surface {
+    /// Takes the user's standard deviations of the phase, rad, as a padded plane; what is not finite or negative says
+    /// nothing about the phase.
+    pub fn set_sigma(&mut self, sigma: &[f32]) {
+        self.variance.clear();
+        self.variance.extend(sigma.iter().map(|&sigma| {
+            let known = sigma >= 0.0 && sigma.is_finite();
+            if known { (sigma * sigma).min(MAXIMUM_VARIANCE) } else { MAXIMUM_VARIANCE }
+        }));
+    }
+
     /// Fills logarithm and variance from the padded amplitude; `noise` is the standard deviation in amplitude units.
     pub fn set_amplitude(&mut self, grid: &Grid, amplitude: &[f32], noise: Option<f32>) {
         let noise = noise.unwrap_or_else(|| self.estimate_noise(grid, amplitude));
@@ -80,12 +90,11 @@ impl Surface {
         *median / (0.6745 * 6.0_f32.sqrt())
     }
 
-    /// The step from `pixel` to `pixel + ahead`, which must both be inside the image.
+    /// The step from `pixel` to its neighbour `other`, both inside the image, along the axis of index step `ahead`.
     #[inline(always)]
-    pub fn step(&self, pixel: usize, ahead: usize) -> Step {
-        let other = pixel + ahead;
+    pub fn step(&self, pixel: usize, other: usize, ahead: usize) -> Step {
         let along = |from: usize| wrapped(self.phase[from + ahead] - self.phase[from]);
-        let here = along(pixel);
+        let here = wrapped(self.phase[other] - self.phase[pixel]);
         let slope = gentler(along(pixel - ahead), along(other));
         Step { phase: (here - slope).abs(), amplitude: (self.log_amplitude[other] - self.log_amplitude[pixel]).abs() }
     }

@@ -196,15 +196,17 @@ fn a_previous_frame_gives_way_where_the_image_is_clear() {
     assert!((sure_wrong as f64) < 0.05 * phase.len() as f64);
 }
 
+/// Images with noise of their own.
+const RUNS: usize = 12;
+
 #[test]
 fn sigma_leads_the_tree_around_what_is_noisy() {
     let mut rng = Pcg64::seed_from_u64(3);
     // A ramp with stripes of strong noise and quiet bridges between them.
-    let noisy = |col: usize, row: usize| col % 16 >= 11 && !(row % 20 < 3);
+    let noisy = |col: usize, row: usize| col % 16 >= 11 && row % 20 >= 3;
     let sigma = Raster::from_fn(96, 80, |col, row| if noisy(col, row) { 1.6_f32 } else { 0.25 });
     let surface = Raster::from_fn(96, 80, |col, row| 20.0 + 0.5 * col as f32 + 0.2 * row as f32);
     let mut right = [0.0; 3];
-    const RUNS: usize = 12;
     for _ in 0..RUNS {
         let measured = Raster::from_fn(96, 80, |col, row| {
             let noise: f32 = StandardNormal.sample(&mut rng);
@@ -238,7 +240,7 @@ fn weights_by_noise_need_a_noise() {
     let phase = Raster::filled(5, 4, 1.0);
     let options = SpatialOptions { edge_weight: EdgeWeight::Noise, ..SpatialOptions::default() };
     assert_eq!(unwrap_spatial(&phase, None, None, &options).unwrap_err(), Error::NoiseUnknown);
-    assert_eq!(unwrap_sequence(&[phase.clone()], None, &options).unwrap_err(), Error::NoiseUnknown);
+    assert_eq!(unwrap_sequence(std::slice::from_ref(&phase), None, &options).unwrap_err(), Error::NoiseUnknown);
     let mut unwrapper = Unwrapper::new(options).unwrap();
     // What no sigma can be stands for a phase that says nothing.
     let mut sigma = Raster::filled(5, 4, 0.1);

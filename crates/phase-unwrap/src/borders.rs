@@ -1,8 +1,14 @@
 //! Borders between segments: how well a wrap difference would make the surface continuous across them.
+// Only what is inlined is compiled for wide registers.
+#![allow(clippy::inline_always)]
+// No short cuts, so that many pixels go at once.
+#![allow(clippy::needless_bitwise_bool)]
 
 use crate::forest::{Forest, NO_LABEL};
-use crate::grid::{DOWN, Grid, RIGHT, wrap_step};
+use crate::grid::{DOWN, Grid, RIGHT, set_bits, wrap_step};
+use crate::seams::Seam;
 use crate::surface::{Step, Surface};
+use crate::wide::with_wide_registers;
 
 /// Evidence, in nats, for `offset(to) - offset(from) == step`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -31,26 +37,27 @@ pub(crate) struct Borders {
     /// Number of islands.
     pub islands: usize,
     crossings: Vec<Crossing>,
+    flags: Vec<u8>,
 }
 
 impl Borders {
-    pub fn collect(&mut self, grid: &Grid, surface: &Surface, forest: &Forest) {
+    pub fn collect(&mut self, grid: &Grid, surface: &Surface, forest: &Forest, seams: &[Seam]) {
         self.crossings.clear();
-        for pixel in grid.inner() {
-            let from = forest.label[pixel];
-            if from == NO_LABEL {
-                continue;
-            }
-            let open = surface.open_links(grid, pixel);
-            for (bit, ahead) in [(RIGHT, 1), (DOWN, grid.stride)] {
-                if open & bit == 0 || forest.label[pixel + ahead] == from {
-                    continue;
+        for start in grid.row_starts() {
+            flag_row(grid, forest, start, &mut self.flags);
+            for (block, flags) in self.flags.chunks(8).enumerate() {
+                for bit in set_bits(flags) {
+                    let pixel = start + 8 * block + bit / 8;
+                    let ahead = if bit.is_multiple_of(8) { 1 } else { grid.stride };
+                    self.crossings.push(crossing(surface, forest, [pixel, pixel + ahead], ahead));
                 }
-                let other = pixel + ahead;
-                let step =
-                    wrap_step(surface.phase[pixel], surface.phase[other]) + forest.wraps[pixel] - forest.wraps[other];
-                let evidence = continuity(surface.step(pixel, ahead));
-                self.crossings.push(directed(from, forest.label[other], step, evidence));
+            }
+        }
+        for seam in seams {
+            let ends = [seam.from as usize, seam.to as usize];
+            let [from, to] = ends.map(|pixel| forest.label[pixel]);
+            if from != to && from != NO_LABEL && to != NO_LABEL {
+                self.crossings.push(crossing(surface, forest, ends, seam.ahead(grid)));
             }
         }
         self.crossings.sort_by_key(|c| (c.from, c.to, c.step));
@@ -95,6 +102,30 @@ fn root(parent: &mut [u32], mut node: u32) -> u32 {
     node
 }
 
+/// Flags the links of a row, `RIGHT` and `DOWN`, whose ends lie in two segments.
+fn flag_row(grid: &Grid, forest: &Forest, start: usize, flags: &mut Vec<u8>) {
+    let n = grid.width;
+    let (here, right) = (&forest.label[start..][..n], &forest.label[start + 1..][..n]);
+    let down = &forest.label[start + grid.stride..][..n];
+    flags.resize(n, 0);
+    let flags = &mut flags[..n];
+    with_wide_registers(
+        #[inline(always)]
+        || {
+            for col in 0..n {
+                let crosses = |other: u32| (other != here[col]) & (other != NO_LABEL) & (here[col] != NO_LABEL);
+                flags[col] = u8::from(crosses(right[col])) * RIGHT + u8::from(crosses(down[col])) * DOWN;
+            }
+        },
+    );
+}
+
+fn crossing(surface: &Surface, forest: &Forest, [pixel, other]: [usize; 2], ahead: usize) -> Crossing {
+    let step = wrap_step(surface.phase[pixel], surface.phase[other]) + forest.wraps[pixel] - forest.wraps[other];
+    let evidence = continuity(surface.step(pixel, other, ahead), surface.sigma(pixel, other));
+    directed(forest.label[pixel], forest.label[other], step, evidence)
+}
+
 fn directed(from: u32, to: u32, step: i32, evidence: f32) -> Crossing {
     if from < to {
         Crossing { from, to, step, evidence }
@@ -107,8 +138,8 @@ fn directed(from: u32, to: u32, step: i32, evidence: f32) -> Crossing {
 ///
 /// Phase: two-sided exponential against uniform on (-pi, pi). Logarithm of the amplitude ratio: two-sided exponential
 /// of scale 0.5 (texture) against one of scale 2 (another object at another range).
-fn continuity(step: Step) -> f32 {
-    let scale = 0.15_f32.max(1.5 * step.sigma);
+fn continuity(step: Step, sigma: f32) -> f32 {
+    let scale = 0.15_f32.max(1.5 * sigma);
     let phase = (std::f32::consts::PI / scale).ln() - step.phase / scale;
     let amplitude = if step.amplitude.is_nan() { 0.0 } else { 4.0_f32.ln() - 1.5 * step.amplitude };
     phase.max(-2.0) + amplitude.max(-4.0)

@@ -2,8 +2,9 @@
 
 use std::f32::consts::TAU;
 
-use crate::forest::{Forest, NO_LABEL};
+use crate::forest::Forest;
 use crate::grid::Grid;
+use crate::known::Known;
 use crate::planes::log_cosine;
 use crate::surface::Surface;
 use crate::{AlbedoPrior, ImageGeometry};
@@ -14,8 +15,6 @@ const QUANTILES: usize = 5;
 const SAMPLES: u32 = 64;
 /// Cost, in nats, of a pixel whose range would be negative or beyond the largest count.
 const OUT_OF_SPAN: f32 = 8.0;
-/// Cost, in nats, of going against a known wrap count.
-const AGAINST_SEED: f32 = 40.0;
 
 /// Logarithm of a typical cosine of incidence, where the slope is not known.
 const TYPICAL_LOG_COSINE: f32 = -0.35;
@@ -88,16 +87,16 @@ impl Brightness {
     fn sample(&mut self, forest: &Forest, pixels: &[u32]) {
         self.pixel.iter_mut().for_each(Vec::clear);
         self.pixel.resize(pixels.len(), Vec::new());
-        let mut seen = vec![0_u32; pixels.len()];
+        // Pixels to pass over until the next sample.
+        let mut wait = vec![0_u32; pixels.len()];
         for (pixel, &label) in forest.label.iter().enumerate() {
-            if label == NO_LABEL {
-                continue;
-            }
-            let segment = label as usize;
-            if seen[segment].is_multiple_of(pixels[segment].div_ceil(SAMPLES)) {
+            let Some(wait) = wait.get_mut(label as usize) else { continue };
+            if *wait == 0 {
+                let segment = label as usize;
                 self.pixel[segment].push(pixel as u32);
+                *wait = pixels[segment].div_ceil(SAMPLES);
             }
-            seen[segment] += 1;
+            *wait -= 1;
         }
     }
 
@@ -144,12 +143,12 @@ impl Brightness {
         }
     }
 
-    /// Adds what seeds say: `(padded index, wrap count)`.
-    pub fn add_known(&mut self, forest: &Forest, known: &[(usize, i32)]) {
+    /// Adds what known counts say.
+    pub fn add_known(&mut self, forest: &Forest, known: &Known) {
         let segments = self.weight.len();
         let mut votes = vec![0_u32; segments * self.labels];
         let mut total = vec![0_u32; segments];
-        for &(pixel, wraps) in known {
+        for &(pixel, wraps) in &known.pixels {
             let segment = forest.label[pixel] as usize;
             total[segment] += 1;
             if let Ok(label) = usize::try_from(wraps - forest.wraps[pixel])
@@ -161,7 +160,7 @@ impl Brightness {
         for (index, cost) in self.fixed.iter_mut().enumerate() {
             let total = total[index / self.labels];
             if total > 0 {
-                *cost += AGAINST_SEED * (1.0 - votes[index] as f32 / total as f32);
+                *cost += known.nats * (1.0 - votes[index] as f32 / total as f32);
             }
         }
     }

@@ -9,6 +9,7 @@
 #![allow(clippy::needless_bitwise_bool)]
 
 use crate::grid::{DOWN, Grid, RIGHT};
+use crate::seams::Seam;
 use crate::wide::with_wide_registers;
 
 /// A pixel without any link.
@@ -79,6 +80,23 @@ impl Candidates {
             let inside = start..start + grid.width;
             choose_row(&above.down[1..], &here.right, &here.down[1..], &cost[inside.clone()], &mut choice[inside]);
             std::mem::swap(above, here);
+        }
+    }
+
+    /// Withdraws the choices of pixels that a seam joins more cheaply than their cheapest link: these wait for the rounds
+    /// over the list of edges.
+    pub fn withdraw(&mut self, grid: &Grid, cost: &[f32], seams: &[Seam]) {
+        let ahead = [0, grid.stride.wrapping_neg(), usize::MAX, 1, grid.stride, 0, 0, 0];
+        for seam in seams {
+            let ends = [seam.from as usize, seam.to as usize];
+            let joined = ends.iter().map(|&end| cost[end]).sum::<f32>() + seam.surcharge;
+            for end in ends {
+                let choice = self.choice[end];
+                if (UP..=TO_BELOW).contains(&choice) {
+                    let chosen = cost[end] + cost[end.wrapping_add(ahead[usize::from(choice)])];
+                    self.choice[end] = if joined < chosen { ALONE } else { choice };
+                }
+            }
         }
     }
 

@@ -34,6 +34,12 @@ pub enum Error {
         /// Phase found.
         value: f32,
     },
+    /// Links are to be weighted by noise that nothing tells.
+    #[error("edge weights by noise need a plane of standard deviations or of amplitudes; neither is given")]
+    NoiseUnknown,
+    /// A sequence has no frame.
+    #[error("a sequence of no frames was given")]
+    NoFrames,
     /// An option lies outside its domain.
     #[error("{name} = {value}: {expected}")]
     OutOfDomain {

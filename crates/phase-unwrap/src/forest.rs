@@ -7,7 +7,8 @@
 
 use crate::candidates::{Candidates, LEFT, OUTSIDE, TO_BELOW, TO_RIGHT, UP};
 use crate::contraction::{Contraction, Edge, Member};
-use crate::grid::{Grid, wrap_step};
+use crate::grid::{Grid, set_bits, wrap_step};
+use crate::seams::Seam;
 
 /// Label of a pixel that belongs to no component.
 pub(crate) const NO_LABEL: u32 = u32::MAX;
@@ -30,13 +31,14 @@ pub(crate) struct Forest {
 
 impl Forest {
     /// Grows the forest over the linked neighbours, all neighbours where no `links` are given; an edge costs the sum of
-    /// its pixels' costs, ties go to the lower edge index. Pixels of infinite cost stay out.
-    pub fn grow(&mut self, grid: &Grid, phase: &[f32], cost: &[f32], links: Option<&[u8]>) {
+    /// its pixels' costs, ties go to the lower edge index. Pixels of infinite cost stay out. `seams` are further links.
+    pub fn grow(&mut self, grid: &Grid, phase: &[f32], cost: &[f32], links: Option<&[u8]>, seams: &[Seam]) {
         self.candidates.choose(grid, cost, links);
+        self.candidates.withdraw(grid, cost, seams);
         self.candidates.open(grid, cost, links);
         self.join_runs(grid, phase);
         self.hang_runs(grid, phase);
-        let components = self.collect_edges(grid, phase, cost);
+        let components = self.collect_edges(grid, phase, cost, seams);
         self.components = self.contraction.run(components);
         self.resolve();
     }
@@ -109,30 +111,32 @@ impl Forest {
     }
 
     /// The open links between different components, in scan order.
-    fn collect_edges(&mut self, grid: &Grid, phase: &[f32], cost: &[f32]) -> usize {
+    fn collect_edges(&mut self, grid: &Grid, phase: &[f32], cost: &[f32], seams: &[Seam]) -> usize {
         let (label, wraps) = (&self.label, &self.wraps);
         let (components, edges, level) = self.contraction.join_first();
         let place = |pixel: usize| {
             let member = level[label[pixel] as usize];
             (member.root, wraps[pixel] + member.offset)
         };
+        let edge = |pixel: usize, other: usize, surcharge: f32| {
+            let ((from, here), (to, there)) = (place(pixel), place(other));
+            let step = wrap_step(phase[pixel], phase[other]) + here - there;
+            (from != to).then_some(Edge { from, to, cost: cost[pixel] + cost[other] + surcharge, step })
+        };
         edges.clear();
         for start in grid.row_starts() {
             for (block, open) in self.candidates.open[start..start + grid.width].chunks(8).enumerate() {
-                let mut bytes = [0; 8];
-                bytes[..open.len()].copy_from_slice(open);
-                let mut word = u64::from_le_bytes(bytes);
-                while word != 0 {
-                    let bit = word.trailing_zeros() as usize;
-                    word &= word - 1;
+                for bit in set_bits(open) {
                     let pixel = start + 8 * block + bit / 8;
-                    let other = pixel + if bit.is_multiple_of(8) { 1 } else { grid.stride };
-                    let ((from, here), (to, there)) = (place(pixel), place(other));
-                    if from != to {
-                        let step = wrap_step(phase[pixel], phase[other]) + here - there;
-                        edges.push(Edge { from, to, cost: cost[pixel] + cost[other], step });
-                    }
+                    let ahead = if bit.is_multiple_of(8) { 1 } else { grid.stride };
+                    edges.extend(edge(pixel, pixel + ahead, 0.0));
                 }
+            }
+        }
+        for seam in seams {
+            let (from, to) = (seam.from as usize, seam.to as usize);
+            if cost[from] < f32::INFINITY && cost[to] < f32::INFINITY {
+                edges.extend(edge(from, to, seam.surcharge));
             }
         }
         components
@@ -185,7 +189,7 @@ mod tests {
             .map(|i| if open(i, i + 1) { RIGHT } else { 0 } | if open(i, i + grid.stride) { DOWN } else { 0 })
             .collect();
         let mut forest = Forest::default();
-        forest.grow(&grid, &phase, &cost, Some(&links));
+        forest.grow(&grid, &phase, &cost, Some(&links), &[]);
         assert_eq!(forest.components, 1);
         let total = forest.bytes() + bytes(&phase) + bytes(&cost) + bytes(&links);
         assert!(total <= 40 * 300 * 200, "{} bytes a pixel", total as f64 / 60_000.0);

@@ -74,6 +74,19 @@ impl Grid {
     }
 }
 
+/// Positions of the bits set in up to eight bytes, lowest first: bit `b` of byte `i` is at `8 i + b`.
+pub(crate) fn set_bits(bytes: &[u8]) -> impl Iterator<Item = usize> {
+    let mut word = match bytes.first_chunk() {
+        Some(whole) => u64::from_le_bytes(*whole),
+        None => bytes.iter().rev().fold(0, |word, &byte| word << 8 | u64::from(byte)),
+    };
+    std::iter::from_fn(move || {
+        let bit = word.trailing_zeros() as usize;
+        word &= word.wrapping_sub(1);
+        (bit < 64).then_some(bit)
+    })
+}
+
 /// A difference of two wrapped phases brought into `[-pi, pi]`; odd in its argument, so that a tie at pi has no side.
 #[inline]
 pub(crate) fn wrapped(difference: f32) -> f32 {

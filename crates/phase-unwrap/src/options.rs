@@ -1,6 +1,6 @@
 use range_image::Raster;
 
-use crate::{Error, Result};
+use crate::{Error, Result, Unwrapped};
 
 /// How one frequency is unwrapped in space.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -19,6 +19,10 @@ pub struct SpatialOptions {
     pub amplitude_jump: f32,
     /// What is known about amplitude as a function of range.
     pub albedo: AlbedoPrior,
+    /// What makes a link dear.
+    pub edge_weight: EdgeWeight,
+    /// How columns and rows end: `[left and right, top and bottom]`.
+    pub boundaries: [Boundary; 2],
     /// Where the rays go. With it, the angle of incidence is taken out of the amplitudes, and walls and floors count as
     /// evidence by being plane; without it only amplitude and continuity decide.
     pub geometry: Option<ImageGeometry>,
@@ -42,9 +46,33 @@ impl Default for SpatialOptions {
             phase_jump_rad: 0.1,
             amplitude_jump: 0.35,
             albedo: AlbedoPrior::default(),
+            edge_weight: EdgeWeight::default(),
+            boundaries: [Boundary::Open; 2],
             geometry: None,
         }
     }
+}
+
+/// What makes a link of the spanning tree dear; the cost of a link is the sum of its two pixels' costs.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum EdgeWeight {
+    /// Second differences of the phase around the pixel, rad^2, plus their expectation of `24 sigma^2` where the
+    /// standard deviation is given or follows from the amplitude: for scenes with jumps.
+    #[default]
+    SecondDifferences,
+    /// `24 sigma^2` alone: the variance of the step between two pixels, in the same scale. For smooth scenes whose noise
+    /// differs from place to place; needs a standard deviation or an amplitude.
+    Noise,
+}
+
+/// How an axis of the image ends.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Boundary {
+    /// The image has a border.
+    #[default]
+    Open,
+    /// The last pixel is the first one's neighbour, as the columns of a full panorama are.
+    Cyclic,
 }
 
 /// The inverse square law: `amplitude * range^2 = constant * albedo * cos(incidence)`.
@@ -76,8 +104,18 @@ pub enum KnownWraps<'a> {
     Nothing,
     /// At single pixels.
     Seeds(&'a [Seed]),
-    /// A raster of the image's size, for example the previous frame's; `None` where unknown.
+    /// A raster of the image's size; `None` where unknown.
     Raster(&'a Raster<Option<i32>>),
+    /// The frame before. Its counts hold where the range changed by less than half an ambiguity interval; where the
+    /// phase passed zero meanwhile the count moves with it.
+    Previous {
+        /// Wrapped phase of the frame before, radians.
+        phase: &'a Raster<f32>,
+        /// Its counts.
+        unwrapped: &'a Unwrapped,
+        /// Only pixels of at least this confidence are taken as known.
+        minimum_confidence: f32,
+    },
 }
 
 /// A pixel whose wrap count is known.

@@ -2,13 +2,17 @@
 // Only what is inlined is compiled for wide registers.
 #![allow(clippy::inline_always)]
 
-use std::f32::consts::{PI, TAU};
+use std::f32::consts::PI;
 
 use crate::grid::Grid;
+use crate::steps::wrapped_steps;
 use crate::wide::with_wide_registers;
 
 /// Cost of a pixel none of whose neighbours allow a second difference: more than any pixel that has one.
 const UNKNOWN: f32 = 256.0;
+
+/// Expected sum of squares of the four second differences of white noise of variance 1.
+const EXPECTED: f32 = 24.0;
 
 /// Wrapped steps of one padded row: along it, and to the row below (straight, and the two diagonals).
 #[derive(Debug, Default)]
@@ -41,7 +45,7 @@ impl Smoothness {
         );
         if let Some(variance) = noise_variance {
             for (cost, variance) in cost.iter_mut().zip(variance) {
-                *cost += 24.0 * variance;
+                *cost += EXPECTED * variance;
             }
         }
     }
@@ -63,23 +67,11 @@ impl Steps {
     /// Steps from one padded row to the next; each serves the two pixels at its ends, which halves the work.
     #[inline(always)]
     fn measure(&mut self, here: &[f32], below: &[f32]) {
-        steps(here, &here[1..], &mut self.right);
-        steps(here, below, &mut self.down);
-        steps(here, &below[1..], &mut self.falling);
+        wrapped_steps(here, &here[1..], &mut self.right);
+        wrapped_steps(here, below, &mut self.down);
+        wrapped_steps(here, &below[1..], &mut self.falling);
         // Stored under the column of the lower end.
-        steps(&here[1..], below, &mut self.rising);
-    }
-}
-
-#[inline(always)]
-fn steps(from: &[f32], to: &[f32], out: &mut Vec<f32>) {
-    let count = from.len().min(to.len());
-    out.resize(count, 0.0);
-    for ((out, from), to) in out.iter_mut().zip(from).zip(to) {
-        let step = to - from;
-        // A step of exactly pi stays, whichever way it goes: ties have no side.
-        let cycle = if step.abs() > PI { TAU } else { 0.0 };
-        *out = step - cycle.copysign(step);
+        wrapped_steps(&here[1..], below, &mut self.rising);
     }
 }
 
@@ -107,6 +99,19 @@ fn second_differences(centre: &[f32], above: &Steps, here: &Steps, out: &mut [f3
         }
         let cost = if count > 0.0 { sum * (4.0 / count) } else { UNKNOWN };
         out[col] = if centre[col].is_nan() { f32::INFINITY } else { cost };
+    }
+}
+
+/// Cost of each pixel by its noise alone, in the scale of second differences; infinite where masked.
+pub(crate) fn noise_cost(grid: &Grid, phase: &[f32], variance: &[f32], cost: &mut Vec<f32>) {
+    cost.clear();
+    cost.resize(grid.len(), f32::INFINITY);
+    for start in grid.row_starts() {
+        let inside = start..start + grid.width;
+        let pixels = phase[inside.clone()].iter().zip(&variance[inside.clone()]);
+        for (cost, (phase, variance)) in cost[inside].iter_mut().zip(pixels) {
+            *cost = if phase.is_nan() { f32::INFINITY } else { EXPECTED * variance };
+        }
     }
 }
 

@@ -8,14 +8,16 @@ use crate::borders::Borders;
 use crate::brightness::{Brightness, Incidence};
 use crate::forest::{Forest, NO_LABEL};
 use crate::grid::Grid;
-use crate::known::{check_span, resolve_known};
+use crate::known::{Known, check_span, resolve_known};
 use crate::offsets::Offsets;
 use crate::planes::Planes;
-use crate::reliability::{Smoothness, reliability};
+use crate::reliability::{Smoothness, noise_cost, reliability};
+use crate::seams::{Seam, cyclic_seams, wrap_rim};
 use crate::segments::Segments;
 use crate::surface::Surface;
+use crate::temporal::Block;
 use crate::unwrapped::labels_from_one;
-use crate::{Error, Island, KnownWraps, Result, SpatialOptions, Unwrapped};
+use crate::{Boundary, EdgeWeight, Error, Island, KnownWraps, Result, SpatialOptions, Unwrapped};
 
 /// Unwraps one image; see [`Unwrapper::unwrap`]. Allocates its buffers anew.
 pub fn unwrap_spatial(
@@ -27,14 +29,39 @@ pub fn unwrap_spatial(
     Unwrapper::new(*options)?.unwrap(phase, amplitude, mask, KnownWraps::Nothing)
 }
 
+/// One image and what comes with it; all rasters of one size.
+#[derive(Debug, Clone, Copy)]
+pub struct PhaseInput<'a> {
+    /// Wrapped phase, radians in `[0, 2 pi]`; what is not finite is masked.
+    pub phase: &'a Raster<f32>,
+    /// Amplitude in any unit. With it counts are absolute.
+    pub amplitude: Option<&'a Raster<f32>>,
+    /// Standard deviation of the phase, radians. It weights the links of the tree, see [`EdgeWeight`], and goes before
+    /// what follows from the amplitude. What is not finite or negative stands for a phase that says nothing.
+    pub sigma: Option<&'a Raster<f32>>,
+    /// True means use.
+    pub mask: Option<&'a Raster<bool>>,
+    /// Counts known beforehand.
+    pub known: KnownWraps<'a>,
+}
+
+impl<'a> PhaseInput<'a> {
+    /// A phase and nothing else.
+    pub fn new(phase: &'a Raster<f32>) -> Self {
+        Self { phase, amplitude: None, sigma: None, mask: None, known: KnownWraps::Nothing }
+    }
+}
+
 /// Unwraps images of one frequency one after the other and keeps its buffers.
 #[derive(Debug, Default)]
 pub struct Unwrapper {
     options: SpatialOptions,
     surface: Surface,
-    amplitude: Vec<f32>,
+    /// The padded amplitude or sigma while it is taken in.
+    plane: Vec<f32>,
     cost: Vec<f32>,
     smoothness: Smoothness,
+    seams: Vec<Seam>,
     forest: Forest,
     segments: Segments,
     borders: Borders,
@@ -79,26 +106,55 @@ impl Unwrapper {
         known: KnownWraps<'_>,
         out: &mut Unwrapped,
     ) -> Result<()> {
+        self.unwrap_input_into(&PhaseInput { phase, amplitude, sigma: None, mask, known }, out)
+    }
+
+    /// As [`Unwrapper::unwrap_into`], with all that an image can bring along.
+    pub fn unwrap_input_into(&mut self, input: &PhaseInput<'_>, out: &mut Unwrapped) -> Result<()> {
+        let phase = input.phase;
         let grid = Grid::new(phase.width(), phase.height())?;
-        self.load_phase(&grid, phase, mask)?;
-        let known = resolve_known(&grid, phase, &self.surface, known)?;
-        let Some(amplitude) = amplitude else {
-            self.unwrap_relative(&grid, &known, out);
-            return Ok(());
-        };
-        phase.require_same_size(amplitude, "amplitude")?;
-        grid.pad(amplitude, f32::NAN, &mut self.amplitude);
-        self.surface.set_amplitude(&grid, &self.amplitude, self.options.amplitude_noise);
-        if self.surface.has_amplitude() {
+        self.load_phase(&grid, phase, input.mask)?;
+        wrap_rim(&grid, self.options.boundaries, &mut self.surface.phase);
+        let absolute = self.load_noise(&grid, input)?;
+        let span = absolute.then_some(self.options.maximum_wraps);
+        let known = resolve_known(&grid, phase, &self.surface, input.known, span)?;
+        self.measure_cost(&grid, absolute || input.sigma.is_some())?;
+        cyclic_seams(&grid, [1, grid.height, grid.height], self.options.boundaries, &mut self.seams);
+        if absolute {
             return self.unwrap_absolute(&grid, &known, out);
         }
         self.unwrap_relative(&grid, &known, out);
         Ok(())
     }
 
+    /// One tree over the frames of a block, relative counts.
+    pub(crate) fn unwrap_block(&mut self, block: &Block, stack: &Raster<f32>, out: &mut Unwrapped) -> Result<()> {
+        let grid = &block.grid;
+        self.load_phase(grid, stack, None)?;
+        wrap_rim(grid, [self.options.boundaries[0], Boundary::Open], &mut self.surface.phase);
+        self.measure_cost(grid, false)?;
+        block.add_time(&self.surface.phase, &mut self.cost);
+        block.seams(&self.surface.phase, &self.options, &mut self.seams);
+        self.unwrap_relative(grid, &Known::default(), out);
+        Ok(())
+    }
+
     /// Bytes that the buffers of the relative tree hold, without the result.
     pub fn bytes(&self) -> usize {
-        (self.surface.phase.capacity() + self.cost.capacity()) * size_of::<f32>() + self.forest.bytes()
+        let planes = (self.surface.phase.capacity() + self.cost.capacity()) * size_of::<f32>();
+        planes + self.seams.capacity() * size_of::<Seam>() + self.forest.bytes()
+    }
+
+    /// Phases are in `[0, 2 pi]` or not finite.
+    pub(crate) fn check_phase(phase: &Raster<f32>) -> Result<()> {
+        let outside = |value: &&f32| value.is_finite() && !(0.0..=TAU).contains(*value);
+        match phase.as_slice().iter().enumerate().find(|(_, value)| outside(value)) {
+            None => Ok(()),
+            Some((index, &value)) => {
+                let (col, row) = (index % phase.width(), index / phase.width());
+                Err(Error::PhaseOutsideCycle { col, row, value })
+            }
+        }
     }
 
     fn load_phase(&mut self, grid: &Grid, phase: &Raster<f32>, mask: Option<&Raster<bool>>) -> Result<()> {
@@ -106,33 +162,75 @@ impl Unwrapper {
             phase.require_same_size(mask, "mask")?;
         }
         grid.pad(phase, f32::NAN, &mut self.surface.phase);
-        let mut used = 0_usize;
+        let (mut used, mut outside) = (0_usize, 0_usize);
         for (row, start) in grid.row_starts().enumerate() {
-            let masked = mask.map(|mask| &mask.as_slice()[row * grid.width..][..grid.width]);
-            for (col, value) in self.surface.phase[start..start + grid.width].iter_mut().enumerate() {
-                if !value.is_finite() || masked.is_some_and(|mask| !mask[col]) {
-                    *value = f32::NAN;
-                } else if !(0.0..=TAU).contains(value) {
-                    return Err(Error::PhaseOutsideCycle { col, row, value: *value });
-                } else {
-                    used += 1;
+            let values = &mut self.surface.phase[start..start + grid.width];
+            if let Some(mask) = mask {
+                for (value, &use_it) in values.iter_mut().zip(&mask.as_slice()[row * grid.width..]) {
+                    *value = if use_it { *value } else { f32::NAN };
                 }
             }
+            for value in values {
+                *value = if value.is_finite() { *value } else { f32::NAN };
+                used += usize::from(!value.is_nan());
+                outside += usize::from(!((0.0..=TAU).contains(value) || value.is_nan()));
+            }
+        }
+        if outside > 0 {
+            return self.first_outside(grid);
         }
         if used == 0 { Err(Error::AllMasked { pixels: phase.len() }) } else { Ok(()) }
     }
 
-    fn unwrap_relative(&mut self, grid: &Grid, known: &[(usize, i32)], out: &mut Unwrapped) {
-        self.smoothness.measure(grid, &self.surface.phase, None, &mut self.cost);
-        self.forest.grow(grid, &self.surface.phase, &self.cost, None);
+    /// The error of the first used phase outside `[0, 2 pi]`.
+    fn first_outside(&self, grid: &Grid) -> Result<()> {
+        for (row, start) in grid.row_starts().enumerate() {
+            let values = &self.surface.phase[start..start + grid.width];
+            if let Some(col) = values.iter().position(|value| !(value.is_nan() || (0.0..=TAU).contains(value))) {
+                return Err(Error::PhaseOutsideCycle { col, row, value: values[col] });
+            }
+        }
+        Ok(())
+    }
+
+    /// Variance of the phase from the amplitude or the user's sigma; says whether any amplitude is known.
+    fn load_noise(&mut self, grid: &Grid, input: &PhaseInput<'_>) -> Result<bool> {
+        let mut known = false;
+        if let Some(amplitude) = input.amplitude {
+            input.phase.require_same_size(amplitude, "amplitude")?;
+            grid.pad(amplitude, f32::NAN, &mut self.plane);
+            self.surface.set_amplitude(grid, &self.plane, self.options.amplitude_noise);
+            known = self.surface.has_amplitude();
+        }
+        if let Some(sigma) = input.sigma {
+            input.phase.require_same_size(sigma, "sigma")?;
+            grid.pad(sigma, f32::NAN, &mut self.plane);
+            self.surface.set_sigma(&self.plane);
+        }
+        Ok(known)
+    }
+
+    fn measure_cost(&mut self, grid: &Grid, with_noise: bool) -> Result<()> {
+        let Self { surface, cost, smoothness, .. } = self;
+        let variance = with_noise.then_some(surface.variance.as_slice());
+        match (self.options.edge_weight, variance) {
+            (EdgeWeight::SecondDifferences, variance) => smoothness.measure(grid, &surface.phase, variance, cost),
+            (EdgeWeight::Noise, Some(variance)) => noise_cost(grid, &surface.phase, variance, cost),
+            (EdgeWeight::Noise, None) => return Err(Error::NoiseUnknown),
+        }
+        Ok(())
+    }
+
+    fn unwrap_relative(&mut self, grid: &Grid, known: &Known, out: &mut Unwrapped) {
+        self.forest.grow(grid, &self.surface.phase, &self.cost, None, &self.seams);
         let fixed = self.fix_islands(known);
         for (label, wraps) in self.forest.label.iter().zip(&mut self.forest.wraps) {
-            if *label != NO_LABEL {
-                *wraps = wraps.saturating_add(fixed[*label as usize].0);
+            if let Some((offset, _)) = fixed.get(*label as usize) {
+                *wraps = wraps.saturating_add(*offset);
             }
         }
         labels_from_one(grid, &self.forest, &mut out.segment);
-        labels_from_one(grid, &self.forest, &mut out.island);
+        out.island.clone_from(&out.segment);
         grid.crop(&self.forest.wraps, &mut out.wraps, |&wraps| wraps);
         grid.crop(&self.cost, &mut out.confidence, |&cost| reliability(cost));
         let islands = fixed.iter().map(|&(_, known)| Island { offset_known: known, segments: 1, ..Island::default() });
@@ -143,7 +241,7 @@ impl Unwrapper {
     }
 
     /// Offset of each tree, and whether something known fixed it: the median of what is known, else lowest count 0.
-    fn fix_islands(&self, known: &[(usize, i32)]) -> Vec<(i32, bool)> {
+    fn fix_islands(&self, known: &Known) -> Vec<(i32, bool)> {
         let mut lowest = vec![i32::MAX; self.forest.components];
         for (&label, &wraps) in self.forest.label.iter().zip(&self.forest.wraps) {
             if label != NO_LABEL {
@@ -152,22 +250,21 @@ impl Unwrapper {
             }
         }
         let mut offsets = vec![Vec::new(); self.forest.components];
-        for &(pixel, wraps) in known {
+        for &(pixel, wraps) in &known.pixels {
             offsets[self.forest.label[pixel] as usize].push(wraps.saturating_sub(self.forest.wraps[pixel]));
         }
         let fix = |(mut offsets, lowest): (Vec<i32>, i32)| {
             let middle = offsets.len() / 2;
-            if offsets.is_empty() { (-lowest, false) } else { (*offsets.select_nth_unstable(middle).1, true) }
+            if offsets.is_empty() { (-lowest, false) } else { (*offsets.select_nth_unstable(middle).1, known.absolute) }
         };
         offsets.into_iter().zip(lowest).map(fix).collect()
     }
 
-    fn unwrap_absolute(&mut self, grid: &Grid, known: &[(usize, i32)], out: &mut Unwrapped) -> Result<()> {
+    fn unwrap_absolute(&mut self, grid: &Grid, known: &Known, out: &mut Unwrapped) -> Result<()> {
         let options = self.options;
         check_span(grid, known, options.maximum_wraps)?;
-        self.smoothness.measure(grid, &self.surface.phase, Some(&self.surface.variance), &mut self.cost);
         self.segments.build(grid, &self.surface, &mut self.cost, &mut self.forest, &options);
-        self.borders.collect(grid, &self.surface, &self.forest);
+        self.borders.collect(grid, &self.surface, &self.forest, &self.seams);
         let pixels = &self.segments.pixels;
         let labels = usize::from(options.maximum_wraps) + 1;
         let incidence = options.geometry.as_ref().map(|geometry| {
@@ -198,6 +295,8 @@ impl Unwrapper {
     /// Shifts each segment; labels become those of the islands, the hold of a pixel its confidence.
     fn apply_offsets(&mut self) {
         let maximum = i32::from(self.options.maximum_wraps);
+        // From log odds to a confidence once a segment, not once a pixel.
+        let sure: Vec<f32> = self.offsets.margin.iter().map(|margin| (0.5 * margin).tanh()).collect();
         let pixels = self.forest.label.iter_mut().zip(&mut self.forest.wraps).zip(&mut self.segments.hold);
         for ((label, wraps), confidence) in pixels {
             if *label == NO_LABEL {
@@ -207,7 +306,7 @@ impl Unwrapper {
             let count = *wraps + i32::from(self.offsets.offset[segment]);
             *wraps = count.clamp(0, maximum);
             // A count out of span was no solution: the pixel keeps the nearest, and says that it is a guess.
-            let agreed = if *wraps == count { (0.5 * self.offsets.margin[segment]).tanh() } else { 0.0 };
+            let agreed = if *wraps == count { sure[segment] } else { 0.0 };
             *confidence *= agreed;
             *label = self.borders.island[segment];
         }

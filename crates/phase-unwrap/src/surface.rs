@@ -1,6 +1,11 @@
 //! What a pair of neighbouring pixels says about the surface between them.
+// Only what is inlined is compiled for wide registers.
+#![allow(clippy::inline_always)]
 
-use crate::grid::{DOWN, Grid, RIGHT, wrapped};
+use crate::cuts::gentler;
+use crate::grid::{Grid, wrapped};
+use crate::logarithm::logarithm;
+use crate::wide::with_wide_registers;
 
 /// Largest phase variance used, rad^2: beyond it a phase says nothing anyway.
 const MAXIMUM_VARIANCE: f32 = 10.0;
@@ -23,28 +28,38 @@ pub(crate) struct Step {
     pub phase: f32,
     /// Logarithm of the amplitude ratio, not negative; NaN where an amplitude is unknown.
     pub amplitude: f32,
-    /// Standard deviation of the phase step, rad.
-    pub sigma: f32,
 }
 
 impl Surface {
+    /// Takes the user's standard deviations of the phase, rad, as a padded plane; what is not finite or negative says
+    /// nothing about the phase.
+    pub fn set_sigma(&mut self, sigma: &[f32]) {
+        self.variance.clear();
+        self.variance.extend(sigma.iter().map(|&sigma| {
+            let known = sigma >= 0.0 && sigma.is_finite();
+            if known { (sigma * sigma).min(MAXIMUM_VARIANCE) } else { MAXIMUM_VARIANCE }
+        }));
+    }
+
     /// Fills logarithm and variance from the padded amplitude; `noise` is the standard deviation in amplitude units.
     pub fn set_amplitude(&mut self, grid: &Grid, amplitude: &[f32], noise: Option<f32>) {
         let noise = noise.unwrap_or_else(|| self.estimate_noise(grid, amplitude));
-        self.log_amplitude.clear();
-        self.log_amplitude.extend(amplitude.iter().map(|&a| if a > 0.0 && a.is_finite() { a.ln() } else { f32::NAN }));
-        self.variance.clear();
-        self.variance.extend(amplitude.iter().map(|&a| {
-            let sigma = noise / a;
-            // An amplitude that is not known leaves the noise to the second differences alone.
-            if a.is_nan() {
-                0.0
-            } else if a > 0.0 {
-                (sigma * sigma).min(MAXIMUM_VARIANCE)
-            } else {
-                MAXIMUM_VARIANCE
-            }
-        }));
+        self.log_amplitude.resize(amplitude.len(), 0.0);
+        self.variance.resize(amplitude.len(), 0.0);
+        let (logs, variances) = (&mut self.log_amplitude, &mut self.variance);
+        with_wide_registers(
+            #[inline(always)]
+            || {
+                for ((log, variance), &a) in logs.iter_mut().zip(variances.iter_mut()).zip(amplitude) {
+                    let value = logarithm(a);
+                    *log = if a > 0.0 && a < f32::INFINITY { value } else { f32::NAN };
+                    let sigma = noise / a;
+                    let known = if a > 0.0 { (sigma * sigma).min(MAXIMUM_VARIANCE) } else { MAXIMUM_VARIANCE };
+                    // An amplitude that is not known leaves the noise to the second differences alone.
+                    *variance = if a.is_nan() { 0.0 } else { known };
+                }
+            },
+        );
     }
 
     /// Whether any used pixel has an amplitude.
@@ -75,37 +90,22 @@ impl Surface {
         *median / (0.6745 * 6.0_f32.sqrt())
     }
 
-    /// The step from `pixel` to `pixel + ahead`, which must both be inside the image.
-    pub fn step(&self, pixel: usize, ahead: usize) -> Step {
-        let other = pixel + ahead;
+    /// The step from `pixel` to its neighbour `other`, both inside the image, along the axis of index step `ahead`.
+    #[inline(always)]
+    pub fn step(&self, pixel: usize, other: usize, ahead: usize) -> Step {
         let along = |from: usize| wrapped(self.phase[from + ahead] - self.phase[from]);
-        let here = along(pixel);
+        let here = wrapped(self.phase[other] - self.phase[pixel]);
         let slope = gentler(along(pixel - ahead), along(other));
-        Step {
-            phase: (here - slope).abs(),
-            amplitude: (self.log_amplitude[other] - self.log_amplitude[pixel]).abs(),
-            sigma: (self.variance[pixel] + self.variance[other]).sqrt(),
-        }
+        Step { phase: (here - slope).abs(), amplitude: (self.log_amplitude[other] - self.log_amplitude[pixel]).abs() }
+    }
+
+    /// Standard deviation of the phase step from `pixel` to `other`, rad.
+    pub fn sigma(&self, pixel: usize, other: usize) -> f32 {
+        (self.variance[pixel] + self.variance[other]).sqrt()
     }
 
     /// Whether a padded pixel takes part.
     pub fn used(&self, pixel: usize) -> bool {
         !self.phase[pixel].is_nan()
     }
-
-    /// The links of a pixel: to the right and below, where both ends take part.
-    pub fn open_links(&self, grid: &Grid, pixel: usize) -> u8 {
-        if !self.used(pixel) {
-            return 0;
-        }
-        let right = if self.used(pixel + 1) { RIGHT } else { 0 };
-        let down = if self.used(pixel + grid.stride) { DOWN } else { 0 };
-        right | down
-    }
-}
-
-/// The slope that both sides share: the gentler of two of one sign, else zero. A steep floor keeps its slope, while
-/// an edge smeared over two pixels does not pass as one, since beyond it the surface is flat.
-fn gentler(before: f32, after: f32) -> f32 {
-    if before * after > 0.0 { before.abs().min(after.abs()).copysign(before) } else { 0.0 }
 }

@@ -3,16 +3,22 @@
 
 use std::f32::consts::{PI, TAU};
 
-use phase_unwrap::{SpatialOptions, unwrap_spatial};
+use phase_unwrap::{Boundary, SpatialOptions, unwrap_spatial};
 use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use range_image::Raster;
 
+const OPEN: [Boundary; 2] = [Boundary::Open; 2];
+
 /// Second-difference cost written out plainly; NaN is masked.
-fn plain_cost(phase: &Raster<f32>) -> Vec<f32> {
+fn plain_cost(phase: &Raster<f32>, boundaries: [Boundary; 2]) -> Vec<f32> {
     let wrapped = |d: f32| d - if d > PI { TAU } else { 0.0 } + if d < -PI { TAU } else { 0.0 };
     let at = |col: i64, row: i64| {
+        let around = |at: i64, size: usize, boundary| {
+            if boundary == Boundary::Cyclic { at.rem_euclid(size as i64) } else { at }
+        };
+        let (col, row) = (around(col, phase.width(), boundaries[0]), around(row, phase.height(), boundaries[1]));
         let inside = col >= 0 && row >= 0;
         let value = inside.then(|| phase.get(col as usize, row as usize).copied()).flatten();
         value.filter(|value| !value.is_nan())
@@ -34,20 +40,24 @@ fn plain_cost(phase: &Raster<f32>) -> Vec<f32> {
     costs
 }
 
-/// Edges in the order of the tie rule: scan order of the first pixel, to the right before down.
-fn edges(phase: &Raster<f32>, cost: &[f32]) -> Vec<(f32, usize, usize)> {
+/// Edges in the order of the tie rule: scan order of the first pixel, to the right before down, then the seams.
+fn edges(phase: &Raster<f32>, cost: &[f32], boundaries: [Boundary; 2]) -> Vec<(f32, usize, usize)> {
     let (width, height) = (phase.width(), phase.height());
-    let mut edges = Vec::new();
+    let mut pairs = Vec::new();
     for pixel in 0..width * height {
         let right = (pixel % width + 1 < width).then_some(pixel + 1);
         let down = (pixel / width + 1 < height).then_some(pixel + width);
-        for other in right.into_iter().chain(down) {
-            if !(phase.as_slice()[pixel].is_nan() || phase.as_slice()[other].is_nan()) {
-                edges.push((cost[pixel] + cost[other], pixel, other));
-            }
-        }
+        pairs.extend(right.into_iter().chain(down).map(|other| (pixel, other)));
     }
-    edges
+    if boundaries[0] == Boundary::Cyclic {
+        pairs.extend((0..height).map(|row| ((row + 1) * width - 1, row * width)));
+    }
+    if boundaries[1] == Boundary::Cyclic {
+        pairs.extend((0..width).map(|col| ((height - 1) * width + col, col)));
+    }
+    let used = |pixel: usize| !phase.as_slice()[pixel].is_nan();
+    let used = pairs.into_iter().filter(|&(a, b)| used(a) && used(b));
+    used.map(|(a, b)| (cost[a] + cost[b], a, b)).collect()
 }
 
 /// Root of a pixel and its wrap count relative to the root.
@@ -61,8 +71,8 @@ fn root(parent: &[(usize, i32)], mut pixel: usize) -> (usize, i32) {
 }
 
 /// Wrap counts, the lowest of each tree 0, and number of trees. Masked pixels get 0.
-fn kruskal(phase: &Raster<f32>) -> (Vec<i32>, usize) {
-    let mut edges = edges(phase, &plain_cost(phase));
+fn kruskal(phase: &Raster<f32>, boundaries: [Boundary; 2]) -> (Vec<i32>, usize) {
+    let mut edges = edges(phase, &plain_cost(phase, boundaries), boundaries);
     // A stable sort keeps the order of equals.
     edges.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut parent: Vec<(usize, i32)> = (0..phase.len()).map(|pixel| (pixel, 0)).collect();
@@ -102,15 +112,16 @@ fn scene(size: (usize, usize), seed: u64, noise: f32, masked: f32, quantum: f32)
     })
 }
 
-fn compare(phase: &Raster<f32>) {
-    let (wraps, trees) = kruskal(phase);
-    let found = unwrap_spatial(phase, None, None, &SpatialOptions::default()).unwrap();
+fn compare(phase: &Raster<f32>, boundaries: [Boundary; 2]) {
+    let (wraps, trees) = kruskal(phase, boundaries);
+    let options = SpatialOptions { boundaries, ..SpatialOptions::default() };
+    let found = unwrap_spatial(phase, None, None, &options).unwrap();
     assert_eq!(found.wraps.as_slice(), wraps);
     assert_eq!(found.islands.len(), trees);
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 48, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 96, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
     fn the_contraction_is_the_minimum_spanning_tree(
@@ -122,16 +133,22 @@ proptest! {
         quantum in prop_oneof![Just(0.0_f32), Just(PI / 4.0), Just(0.5)],
         width in 1_usize..40,
         height in 1_usize..40,
+        boundaries in prop_oneof![
+            Just(OPEN),
+            Just([Boundary::Cyclic, Boundary::Open]),
+            Just([Boundary::Open, Boundary::Cyclic]),
+            Just([Boundary::Cyclic; 2]),
+        ],
     ) {
         let phase = scene((width, height), seed, noise, masked, quantum);
         prop_assume!(phase.as_slice().iter().any(|value| !value.is_nan()));
-        compare(&phase);
+        compare(&phase, boundaries);
     }
 }
 
 #[test]
 fn large_images_of_odd_sizes_agree_too() {
     for (size, noise, masked) in [((211, 197), 4.0, 0.0), ((389, 101), 7.0, 0.1), ((97, 383), 0.3, 0.3)] {
-        compare(&scene(size, 5, noise, masked, 0.0));
+        compare(&scene(size, 5, noise, masked, 0.0), OPEN);
     }
 }

@@ -95,6 +95,19 @@ fn frequencies_that_contradict_each_other_are_flagged_or_resolved() {
     };
     let (before, after) = (median_error(&resolved, "Unwrap"), median_error(&resolved, "Multipath"));
     println!("{count} of them are resolved: median error {before} m before, {after} m after");
+    let view = &resolved.views[0];
+    let ViewData::Range(frame) = &view.data else { unreachable!() };
+    let ViewData::Range(before_f) = &flagged.views[0].data else { unreachable!() };
+    let tr = &view.truth.as_ref().unwrap().range;
+    let (mut e0, mut e1, mut n) = (vec![], vec![], vec![]);
+    for i in 0..tr.len() {
+        if frame.flags.as_slice()[i].is_empty() && before_f.flags.as_slice()[i].contains(Flags::MULTIPATH) {
+            e0.push(before_f.range.as_slice()[i] - tr.as_slice()[i]);
+            e1.push(frame.range.as_slice()[i] - tr.as_slice()[i]);
+            n.push((frame.range.as_slice()[i] - tr.as_slice()[i]) / frame.sigma.as_slice()[i]);
+        }
+    }
+    for v in [&mut e0, &mut e1, &mut n] { v.sort_by(f32::total_cmp); println!("{:?}", [0.05,0.25,0.5,0.75,0.95].map(|q| v[(q * v.len() as f64) as usize])); }
     assert!(count <= contradictions && count > 0.0);
     // A corner is no single second path but a wall of them: two paths take most of the error off, not all.
     assert!(after < 0.5 * before);

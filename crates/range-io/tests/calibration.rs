@@ -15,7 +15,9 @@ use proptest::prelude::*;
 use range_image::{Modulation, NoiseModel};
 use range_io::Error;
 use range_io::calibration::{Calibration, Correlation, Provenance, ValidSpan};
-use scattering_deconvolution::{GaussianTerm, Psf};
+use scattering_deconvolution::{
+    CompositePsf, FieldPolynomial, FieldTerm, GaussianTerm, Ghost, GhostDelay, GhostPlace, Psf,
+};
 
 mod common;
 
@@ -41,6 +43,18 @@ fn models() -> ModelSet {
 
 fn psf() -> Psf {
     Psf::Gaussians(vec![GaussianTerm { weight: 0.05, sigma_px: [20.0, 15.0] }])
+}
+
+/// Scattering that changes over the field, and a late ghost of `weight`.
+fn composite(weight: f64) -> Psf {
+    let gaussian = GaussianTerm { weight: 0.02, sigma_px: [2.0, 1.5] };
+    let received = FieldPolynomial { linear: [0.3, -0.1], ..FieldPolynomial::default() };
+    let place = GhostPlace::Mirrored([1.6, 1.1]);
+    Psf::Composite(CompositePsf {
+        stationary: vec![gaussian],
+        field_terms: vec![FieldTerm { gaussian, received, sent: FieldPolynomial::default() }],
+        ghosts: vec![Ghost { weight, place, sigma_px: [3.0, 3.0], delay: GhostDelay::ExtraPath(0.043) }],
+    })
 }
 
 fn full() -> Calibration {
@@ -173,6 +187,12 @@ proptest! {
     }
 }
 
+#[test]
+fn composite_scattering_goes_through_a_file() {
+    let calibration = Calibration { scattering: Some(composite(0.01)), ..full() };
+    assert_eq!(back(&calibration), calibration);
+}
+
 fn refusal(change: impl FnOnce(&mut Calibration)) -> String {
     let mut calibration = full();
     change(&mut calibration);
@@ -206,6 +226,7 @@ fn invalid_calibrations_are_refused_by_name() {
         refusal(|c| c.scattering = Some(Psf::Kernel { width: 2, height: 1, values: vec![0.0; 2] })),
         "kernel of 2 x 1",
     );
+    said(refusal(|c| c.scattering = Some(composite(-0.1))), "`scattering`: weight = -0.1");
     said(refusal(|c| c.noise.as_mut().unwrap().dark_sigma = -1.0), "dark_sigma");
     said(refusal(|c| c.range_models[3].integration_time_s = 0.001), "range_models");
     said(refusal(|c| c.range_models[0].modulation_hz = 0.0), "`range_models[0].modulation_hz`: ");

@@ -45,15 +45,30 @@ impl Mask {
                 #[inline(always)]
                 || [largest_part(re), largest_part(im)],
             );
-            if !parts.iter().all(|part| part.is_finite())
-                || flags.is_some_and(|flags| union(flags).intersects(UNTOUCHED))
-            {
-                self.put_aside_row(row * width, re, im, flags, saturated);
-                parts = [largest_part(re), largest_part(im)];
+            let complete = parts.iter().all(|part| part.is_finite());
+            match flags.filter(|flags| union(flags).intersects(UNTOUCHED)) {
+                None if complete => {}
+                Some(flags) if complete && saturated == SaturatedLight::Clipped => {
+                    self.put_aside_flagged(row * width, re, im, flags);
+                }
+                flags => {
+                    self.put_aside_row(row * width, re, im, flags, saturated);
+                    parts = [largest_part(re), largest_part(im)];
+                }
             }
             largest = largest.max(parts[0]).max(parts[1]);
         }
         largest
+    }
+
+    /// Puts aside the flagged pixels of a row in which nothing is filled.
+    fn put_aside_flagged(&mut self, start: usize, re: &[f32], im: &[f32], flags: &[Flags]) {
+        for (index, chunk) in flags.chunks(FLAGS).enumerate().filter(|(_, chunk)| union(chunk).intersects(UNTOUCHED)) {
+            for (col, _) in (index * FLAGS..).zip(chunk).filter(|(_, flags)| flags.intersects(UNTOUCHED)) {
+                let own = [re[col], im[col]];
+                self.kept.push(Kept { pixel: start + col, own, light: own });
+            }
+        }
     }
 
     fn put_aside_row(
@@ -120,6 +135,8 @@ impl Mask {
     }
 }
 
+/// Flags that are looked at together.
+const FLAGS: usize = 16;
 /// Flags of pixels that keep their value.
 const UNTOUCHED: Flags = Flags::SATURATED.union(Flags::NO_DATA);
 

@@ -6,10 +6,9 @@ use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use phase_unwrap::{
-    KernelDensityOptions, KnownWraps, MultiFrequencyOptions, MultiUnwrapped, MultiUnwrapper, SpatialOptions, Unwrapped,
-    Unwrapper,
-    ExactOptions, ExactUnwrapped, KnownWraps, LeastCuts, MultiFrequencyOptions, NoisyOptions, NoisyUnwrapped,
-    NoisyUnwrapper, PhaseNoise, SpatialOptions, Unwrapped, Unwrapper, unwrap_multi_frequency,
+    ExactOptions, ExactUnwrapped, KernelDensityOptions, KnownWraps, LeastCuts, MultiFrequencyOptions, MultiUnwrapped,
+    MultiUnwrapper, NoisyOptions, NoisyUnwrapped, NoisyUnwrapper, PhaseNoise, SpatialOptions, Unwrapped, Unwrapper,
+    unwrap_multi_frequency,
 };
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};

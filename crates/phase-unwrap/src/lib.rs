@@ -53,15 +53,12 @@ pub use kernel_density::KernelDensityOptions;
 pub use multi_frequency::{MultiFrequencyOptions, MultiUnwrapped, MultiUnwrapper, unwrap_multi_frequency};
 pub use noise::{LARGEST_SIGMA_RAD, PhaseNoise};
 pub use noisy::{NoisyMethod, NoisyOptions, NoisyUnwrapped, NoisyUnwrapper, unwrap_noisy};
-pub use options::{AlbedoPrior, ImageGeometry, KnownWraps, Seed, SpatialOptions};
+pub use options::{AlbedoPrior, Boundary, EdgeWeight, ImageGeometry, KnownWraps, Seed, SpatialOptions};
 pub use prefilter::{Filtered, Prefilter, PrefilterOptions, prefilter};
 pub use repair::{
     AmplitudeKind, RepairOptions, RepairVerdict, RepairedDepths, RepairedIsland, RepairedRanges, repair_depths,
     repair_ranges,
 };
-pub use spatial::{Unwrapper, unwrap_spatial};
-pub use multi_frequency::{MultiFrequencyOptions, MultiUnwrapped, unwrap_multi_frequency};
-pub use options::{AlbedoPrior, Boundary, EdgeWeight, ImageGeometry, KnownWraps, Seed, SpatialOptions};
 pub use spatial::{PhaseInput, Unwrapper, unwrap_spatial};
 pub use temporal::{StreamUnwrapper, unwrap_sequence};
 pub use unwrapped::{Island, Unwrapped};

@@ -37,8 +37,8 @@ pub use network_scene::{
 pub use outcome::{AdjustmentFigures, FurtherPoint, Outcome, StationPose};
 pub use plan::{
     AdjustOptions, AverageOptions, CorrectImagePointOptions, CorrectRangeOptions, DeconvolveOptions, DemodulateOptions,
-    FlagOptions, MixedPixels, MultipathOptions, MultipathTreatment, NetworkCalibration, NoiseOptions, Plan, PointCloudOptions, RegisterOptions, RepairWrapsOptions,
-    SimulateSource, Source, Stage, UnwrapOptions,
+    FlagOptions, MixedPixels, MultipathOptions, MultipathTreatment, NetworkCalibration, NoiseOptions, Plan,
+    PointCloudOptions, RegisterOptions, RepairWrapsOptions, SimulateSource, Source, Stage, UnwrapOptions,
 };
 pub use progress::{Progress, Silent};
 pub use run::{RunRequest, process, run};

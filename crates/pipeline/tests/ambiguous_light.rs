@@ -45,7 +45,8 @@ fn correlation(a: &[f64], b: &[f64]) -> f64 {
 fn a_corner_is_at_risk_where_its_ranges_are_too_long() {
     let folder = tempfile::tempdir().unwrap();
     let survey = simulated("corner_multipath", "30.0e6", "30.0e6", folder.path());
-    let outcome = run(&survey, "Demodulate(), Average(), Unwrap(), Multipath(flag_risk_above_m: 0.02), PointCloud(), Flag()");
+    let outcome =
+        run(&survey, "Demodulate(), Average(), Unwrap(), Multipath(flag_risk_above_m: 0.02), PointCloud(), Flag()");
     let view = &outcome.views[0];
     let (ViewData::Range(frame), Some(risk)) = (&view.data, &view.multipath_risk_m) else { unreachable!() };
     let truth = &view.truth.as_ref().unwrap().range;
@@ -107,7 +108,10 @@ fn frequencies_that_contradict_each_other_are_flagged_or_resolved() {
             n.push((frame.range.as_slice()[i] - tr.as_slice()[i]) / frame.sigma.as_slice()[i]);
         }
     }
-    for v in [&mut e0, &mut e1, &mut n] { v.sort_by(f32::total_cmp); println!("{:?}", [0.05,0.25,0.5,0.75,0.95].map(|q| v[(q * v.len() as f64) as usize])); }
+    for v in [&mut e0, &mut e1, &mut n] {
+        v.sort_by(f32::total_cmp);
+        println!("{:?}", [0.05, 0.25, 0.5, 0.75, 0.95].map(|q| v[(q * v.len() as f64) as usize]));
+    }
     assert!(count <= contradictions && count > 0.0);
     // A corner is no single second path but a wall of them: two paths take most of the error off, not all.
     assert!(after < 0.5 * before);

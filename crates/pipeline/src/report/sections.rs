@@ -314,7 +314,8 @@ fn view_figures(view: &View, scales: &Scales) -> Result<Vec<(String, String)>> {
         let high = quantile(&mut risk.clone(), 0.99);
         let high = if high.is_finite() { high.max(1.0) } else { 1.0 };
         let scale = Scale { map: ColourMap::Sequential, low: 0.0, high, unit: "mm" };
-        let note = "What light that bounced once in the scene is expected to add to the ranges. Grey: part of no flat patch.";
+        let note =
+            "What light that bounced once in the scene is expected to add to the ranges. Grey: part of no flat patch.";
         figures.push((raster_figure("Expected multipath error", width, &risk, &scale)?, note.to_owned()));
     }
     figures.push((flag_picture(view)?, "Grey: no flag. Colours as in the table of flags.".to_owned()));

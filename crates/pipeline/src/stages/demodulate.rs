@@ -1,5 +1,6 @@
 use range_image::{
-    ComplexFrame, ConsistencyOptions, DemodulationOptions, Demodulator, NoiseModel, RawFrame, RulesVerdict, check_samples,
+    ComplexFrame, ConsistencyOptions, DemodulationOptions, Demodulator, NoiseModel, RawFrame, RulesVerdict,
+    check_samples,
 };
 
 use super::Findings;
@@ -24,8 +25,8 @@ pub(super) fn run(work: &mut Work, options: &DemodulateOptions, progress: &dyn P
             let demodulated = demodulator.demodulate_into(raw, &mut frame);
             demodulated.map_err(Error::stage("Demodulate", &view.name()))?;
             if let Some(check) = &consistency {
-                inconsistent += check_frame(raw, &options, check, &mut frame)
-                    .map_err(Error::stage("Demodulate", &view.name()))?;
+                inconsistent +=
+                    check_frame(raw, &options, check, &mut frame).map_err(Error::stage("Demodulate", &view.name()))?;
             }
             view.data = ViewData::Phase(frame);
             view.before = view.snapshot();

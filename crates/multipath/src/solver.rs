@@ -64,7 +64,7 @@ impl PixelSolver {
         let verdict = self.judge_pairs(pixel, &best, explained, worker);
         let chi_squared = best.chi_squared as f32;
         match verdict {
-            Verdict::Two => two(&best),
+            Verdict::Two => two(&best, self.options.diffuse_share),
             Verdict::Inconsistent => PixelPaths { chi_squared, ..PixelPaths::without_numbers(verdict) },
             _ => {
                 let pairs = worker.pairs.iter().take_while(|fit| self.is_as_likely(fit.chi_squared, best.chi_squared));
@@ -157,12 +157,13 @@ fn is_same(a: &Fit, b: &Fit) -> bool {
     [2, 3].into_iter().all(|i| (a.parameters[i] - b.parameters[i]).abs() < 1e-6 + 0.1 * a.sigma(i))
 }
 
-fn two(fit: &Fit) -> PixelPaths {
+fn two(fit: &Fit, diffuse_share: f64) -> PixelPaths {
     let hypothesis = Hypothesis::from(fit);
+    let model_m = diffuse_share * hypothesis.ratio * (hypothesis.indirect_m - hypothesis.direct_m);
     PixelPaths {
         verdict: Verdict::Two,
         direct_m: hypothesis.direct_m as f32,
-        sigma_direct_m: hypothesis.sigma_direct_m as f32,
+        sigma_direct_m: hypothesis.sigma_direct_m.hypot(model_m) as f32,
         indirect_m: hypothesis.indirect_m as f32,
         sigma_indirect_m: hypothesis.sigma_indirect_m as f32,
         amplitude: fit.parameters[0] as f32,

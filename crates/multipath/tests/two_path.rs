@@ -15,7 +15,7 @@ const SIZE: [usize; 2] = [60, 50];
 const SIGMA: f64 = 1.0;
 
 fn options() -> TwoPathOptions {
-    TwoPathOptions { systematics: NO_SYSTEMATICS, ..TwoPathOptions::default() }
+    TwoPathOptions { systematics: NO_SYSTEMATICS, diffuse_share: 0.0, ..TwoPathOptions::default() }
 }
 
 /// Direct light of 150 to 450 standard deviations at 1 to 5.5 m; the second path brings 0.15 to 0.6 of it, 0.5 to 2.5 m later.

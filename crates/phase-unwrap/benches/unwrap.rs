@@ -8,7 +8,6 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use phase_unwrap::{
     ExactOptions, ExactUnwrapped, KernelDensityOptions, KnownWraps, LeastCuts, MultiFrequencyOptions, MultiUnwrapped,
     MultiUnwrapper, NoisyOptions, NoisyUnwrapped, NoisyUnwrapper, PhaseNoise, SpatialOptions, Unwrapped, Unwrapper,
-    unwrap_multi_frequency,
 };
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use common::fixtures;
 use pipeline::{Outcome, Plan, Silent, SimulateSource, ViewData, process, simulate};
-use range_image::Flags;
+use range_image::{Flags, RangeFrame};
 
 /// A fixture's scene with a piece of its text replaced, simulated.
 fn simulated(scene: &str, from: &str, to: &str, folder: &Path) -> PathBuf {
@@ -32,6 +32,12 @@ fn run(survey: &Path, stages: &str) -> Outcome {
 
 fn finding(outcome: &Outcome, stage: &str, name: &str) -> f64 {
     outcome.stages.iter().find(|done| done.name == stage).unwrap().findings[name]
+}
+
+fn median(values: &[f64]) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    sorted[sorted.len() / 2]
 }
 
 fn correlation(a: &[f64], b: &[f64]) -> f64 {
@@ -58,11 +64,6 @@ fn a_corner_is_at_risk_where_its_ranges_are_too_long() {
             found.push(error);
         }
     }
-    let median = |values: &[f64]| {
-        let mut sorted = values.to_vec();
-        sorted.sort_by(f64::total_cmp);
-        sorted[sorted.len() / 2]
-    };
     let share = median(&expected) / median(&found);
     let correlation = correlation(&expected, &found);
     println!("error {} m, expected {} m, correlation {correlation}", median(&found), median(&expected));
@@ -90,31 +91,25 @@ fn frequencies_that_contradict_each_other_are_flagged_or_resolved() {
     assert!(contradictions > 60.0);
     let resolved = until("floor_m: 0.002, flag_risk_above_m: None, treatment: resolve");
     let count = finding(&resolved, "Multipath", "resolved_px");
-    let median_error = |outcome: &Outcome, stage: &str| {
-        let done = outcome.stages.iter().find(|done| done.name == stage).unwrap();
-        done.truth.as_ref().unwrap().range_error_median_m
+    let (ViewData::Range(before), ViewData::Range(after)) = (&flagged.views[0].data, &resolved.views[0].data) else {
+        unreachable!()
     };
-    let (before, after) = (median_error(&resolved, "Unwrap"), median_error(&resolved, "Multipath"));
-    println!("{count} of them are resolved: median error {before} m before, {after} m after");
-    let view = &resolved.views[0];
-    let ViewData::Range(frame) = &view.data else { unreachable!() };
-    let ViewData::Range(before_f) = &flagged.views[0].data else { unreachable!() };
-    let tr = &view.truth.as_ref().unwrap().range;
-    let (mut e0, mut e1, mut n) = (vec![], vec![], vec![]);
-    for i in 0..tr.len() {
-        if frame.flags.as_slice()[i].is_empty() && before_f.flags.as_slice()[i].contains(Flags::MULTIPATH) {
-            e0.push(before_f.range.as_slice()[i] - tr.as_slice()[i]);
-            e1.push(frame.range.as_slice()[i] - tr.as_slice()[i]);
-            n.push((frame.range.as_slice()[i] - tr.as_slice()[i]) / frame.sigma.as_slice()[i]);
-        }
-    }
-    for v in [&mut e0, &mut e1, &mut n] {
-        v.sort_by(f32::total_cmp);
-        println!("{:?}", [0.05, 0.25, 0.5, 0.75, 0.95].map(|q| v[(q * v.len() as f64) as usize]));
-    }
-    assert!(count <= contradictions && count > 0.0);
-    // A corner is no single second path but a wall of them: two paths take most of the error off, not all.
-    assert!(after < 0.5 * before);
+    let truth = resolved.views[0].truth.as_ref().unwrap().range.as_slice();
+    let is_resolved = |index: &usize| {
+        let [before, after] = [before, after].map(|frame| frame.flags.as_slice()[*index].contains(Flags::MULTIPATH));
+        before && !after
+    };
+    let pixels: Vec<usize> = (0..truth.len()).filter(is_resolved).collect();
+    let error = |frame: &RangeFrame, index: usize| f64::from(frame.range.as_slice()[index] - truth[index]);
+    let median_error = |frame| median(&pixels.iter().map(|&index| error(frame, index).abs()).collect::<Vec<_>>());
+    let squares = pixels.iter().map(|&index| (error(after, index) / f64::from(after.sigma.as_slice()[index])).powi(2));
+    let normalised = (squares.sum::<f64>() / pixels.len() as f64).sqrt();
+    let (before_m, after_m) = (median_error(before), median_error(after));
+    println!("{count} are resolved: {before_m} m before, {after_m} m after, {normalised} of their sigmas");
+    assert_eq!(count, pixels.len() as f64);
+    // A corner is no single second path but a wall of them: two paths take a part of the error off, and sigma knows it.
+    assert!(after_m < 0.8 * before_m);
+    assert!((0.6..1.5).contains(&normalised), "{normalised}");
 }
 
 #[test]

@@ -72,6 +72,14 @@ pub enum Error {
         /// Number of frequencies given.
         found: usize,
     },
+    /// More frequencies than are searched together.
+    #[error("{found} modulation frequencies given: at most {limit} are searched together")]
+    TooManyFrequencies {
+        /// Number of frequencies given.
+        found: usize,
+        /// Largest number.
+        limit: usize,
+    },
     /// Two frequencies have the same ambiguity interval.
     #[error("frequencies {first} and {second} have the same ambiguity interval of {interval_m} m")]
     EqualFrequencies {

@@ -2,15 +2,23 @@
 
 mod borders;
 mod brightness;
+mod candidates;
 mod combine;
 mod congruent;
+mod continuity;
+mod contraction;
 mod error;
 mod exact;
+mod fold;
 mod forest;
 mod grid;
+mod hypotheses;
 mod intervals;
+mod kernel_density;
 mod known;
 mod labelling;
+mod lanes;
+mod lattice;
 mod multi_frequency;
 mod noise;
 mod noisy;
@@ -20,21 +28,30 @@ mod phasor;
 mod planes;
 mod prefilter;
 mod reliability;
+mod repair;
 mod segments;
 mod spatial;
 mod surface;
 mod unwrapped;
+mod wide;
 mod window;
 
 pub use combine::{Combined, combine_frequencies};
 pub use congruent::{congruent, congruent_into};
 pub use error::{Error, Result};
 pub use exact::{CutPrice, ExactOptions, ExactUnwrapped, LeastCuts, unwrap_least_cuts};
+pub use fold::Fold;
+pub use hypotheses::{Hypotheses, Hypothesis, RankedHypotheses, hypotheses};
 pub use intervals::combined_interval_m;
-pub use multi_frequency::{MultiFrequencyOptions, MultiUnwrapped, unwrap_multi_frequency};
+pub use kernel_density::KernelDensityOptions;
+pub use multi_frequency::{MultiFrequencyOptions, MultiUnwrapped, MultiUnwrapper, unwrap_multi_frequency};
 pub use noise::{LARGEST_SIGMA_RAD, PhaseNoise};
 pub use noisy::{NoisyMethod, NoisyOptions, NoisyUnwrapped, NoisyUnwrapper, unwrap_noisy};
 pub use options::{AlbedoPrior, ImageGeometry, KnownWraps, Seed, SpatialOptions};
 pub use prefilter::{Filtered, Prefilter, PrefilterOptions, prefilter};
+pub use repair::{
+    AmplitudeKind, RepairOptions, RepairVerdict, RepairedDepths, RepairedIsland, RepairedRanges, repair_depths,
+    repair_ranges,
+};
 pub use spatial::{Unwrapper, unwrap_spatial};
 pub use unwrapped::{Island, Unwrapped};

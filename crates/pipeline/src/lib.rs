@@ -14,6 +14,7 @@ mod progress;
 mod report;
 mod results;
 mod run;
+mod scattering;
 mod simulate;
 mod stages;
 mod statistics;
@@ -33,14 +34,19 @@ pub use network_plan::{CandidateSummary, NetworkPlanRequest, PlanSummary, PointS
 pub use network_scene::{
     FieldSpec, NetworkScene, PassiveSpec, SceneStation, SceneTarget, SightingSpec, simulate_network,
 };
-pub use outcome::{AdjustmentFigures, Outcome, StationPose};
+pub use outcome::{AdjustmentFigures, FurtherPoint, Outcome, StationPose};
 pub use plan::{
     AdjustOptions, AverageOptions, CorrectImagePointOptions, CorrectRangeOptions, DeconvolveOptions, DemodulateOptions,
-    FlagOptions, MixedPixels, NetworkCalibration, NoiseOptions, Plan, PointCloudOptions, RegisterOptions,
+    FlagOptions, MixedPixels, MultipathOptions, MultipathTreatment, NetworkCalibration, NoiseOptions, Plan, PointCloudOptions, RegisterOptions, RepairWrapsOptions,
     SimulateSource, Source, Stage, UnwrapOptions,
 };
 pub use progress::{Progress, Silent};
 pub use run::{RunRequest, process, run};
+pub use scattering::{
+    CandidateGaussians, ScatteringCapture, ScatteringParameter, ScatteringRequest, ScatteringSummary,
+    estimate_scattering,
+};
+pub use scattering_deconvolution::{EstimationOptions, TermCount, TermShape};
 pub use self_calibration::{CalibrationOptions, CandidateGrid, Method, NetworkDatum, PlanOptions, TermSelection};
 pub use simulate::{Simulated, simulate};
 pub use summary::{

@@ -39,7 +39,7 @@ pub(crate) fn load(folder: &Path, calibration: Option<&Path>, plan: &Plan, progr
         None => Vec::new(),
     };
     let reference = read_reference(&survey, &root)?;
-    let modulation = survey.camera.modulations()?.first().copied();
+    let modulations = survey.camera.modulations()?;
     progress.begin("read frames", survey.frames.len());
     let mut views = Vec::with_capacity(survey.frames.len());
     for (index, entry) in survey.frames.iter().enumerate() {
@@ -53,8 +53,10 @@ pub(crate) fn load(folder: &Path, calibration: Option<&Path>, plan: &Plan, progr
             approximate_world_from_camera: pose_of(&poses, &entry.station),
             truth: read_view_truth(&survey, &root, index, pose_of(&true_poses, &entry.station))?,
             reference_range: reference.clone(),
-            modulation,
+            modulation: modulations.first().copied(),
             channels: Vec::new(),
+            modulations: modulations.clone(),
+            multipath_risk_m: None,
         };
         view.before = view.snapshot();
         views.push(view);
@@ -67,6 +69,7 @@ pub(crate) fn load(folder: &Path, calibration: Option<&Path>, plan: &Plan, progr
         camera,
         views,
         clouds: Vec::new(),
+        further_points: Vec::new(),
         poses: Vec::new(),
         pairs: Vec::new(),
         refused: Vec::new(),

@@ -21,6 +21,8 @@ pub struct Outcome {
     pub views: Vec<View>,
     /// One cloud a view, in the camera's frame, once [`crate::Stage::PointCloud`] ran.
     pub clouds: Vec<OrganisedCloud>,
+    /// Points on the two surfaces of split mixed pixels.
+    pub further_points: Vec<FurtherPoint>,
     /// One pose a view, once it is known.
     pub poses: Vec<StationPose>,
     /// Aligned pairs.
@@ -33,6 +35,19 @@ pub struct Outcome {
     pub stages: Vec<StageSummary>,
     /// Index of the world's axis that points up: z where poses came with the survey, y in a camera's own frame.
     pub vertical_axis: usize,
+}
+
+/// A point that belongs to no single pixel of an organised cloud.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FurtherPoint {
+    /// Index of the view.
+    pub view: usize,
+    /// Position in the camera's frame, metre.
+    pub point: [f64; 3],
+    /// Standard deviation along the ray, metre.
+    pub sigma_m: f32,
+    /// Amplitude in the camera's unit.
+    pub amplitude: f32,
 }
 
 /// Pose of one view and how well it is known.

@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use multipath::MixedPixelTreatment;
+use range_image::ConsistencyOptions;
 use range_io::ron_text;
 use range_io::survey::Level;
 use serde::{Deserialize, Serialize};
@@ -117,10 +119,14 @@ stages! {
     Deconvolve(DeconvolveOptions) from Phase,
     /// Phases to ranges with their whole ambiguity intervals.
     Unwrap(UnwrapOptions) from Phase,
+    /// Intervals that ranges or depths have lost are added, where the camera gives no phases.
+    RepairWraps(RepairWrapsOptions) from Range,
     /// Systematic range errors are taken off.
     CorrectRange(CorrectRangeOptions) from Range,
     /// Image points are corrected for lens distortion and the calibrated interior orientation.
     CorrectImagePoint(CorrectImagePointOptions) from Range,
+    /// Light that came by more than one way is flagged, and taken off where three frequencies or more allow it.
+    Multipath(MultipathOptions) from Range,
     /// Ranges to points in the camera's frame.
     PointCloud(PointCloudOptions) from Range,
     /// Gross errors are flagged.
@@ -132,13 +138,22 @@ stages! {
 }
 
 /// Options of [`Stage::Demodulate`]; phase sense, offset, scale and saturation are the survey's.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct DemodulateOptions {
     /// Amplitude below which a pixel is flagged, in the samples' unit.
     pub low_amplitude: Option<f64>,
     /// Noise of one sample where no calibration states it.
     pub noise: Option<NoiseOptions>,
+    /// How the samples of a pixel are checked against each other, which tells motion and saturation; `None`: not at all.
+    /// Nothing is checked either where neither the noise nor a tolerance is known.
+    pub consistency: Option<ConsistencyOptions>,
+}
+
+impl Default for DemodulateOptions {
+    fn default() -> Self {
+        Self { low_amplitude: None, noise: None, consistency: Some(ConsistencyOptions::default()) }
+    }
 }
 
 /// Noise of one raw sample: variance = `shot_variance_per_unit * sample + dark_sigma^2`.
@@ -180,6 +195,61 @@ impl Default for UnwrapOptions {
     }
 }
 
+/// Options of [`Stage::RepairWraps`].
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct RepairWrapsOptions {
+    /// Ambiguity interval, metre, where the survey states no modulation frequency.
+    pub interval_m: Option<f64>,
+    /// No range is longer than this, metre; bounds the intervals that are tried.
+    pub maximum_range_m: f64,
+    /// Below this confidence (0 to 1) a pixel keeps its value and is flagged as unsure.
+    pub minimum_confidence: f64,
+}
+
+impl Default for RepairWrapsOptions {
+    fn default() -> Self {
+        Self { interval_m: None, maximum_range_m: 15.0, minimum_confidence: 0.8 }
+    }
+}
+
+/// Options of [`Stage::Multipath`].
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct MultipathOptions {
+    /// Probability that a pixel with one path is flagged where frequencies are compared.
+    pub false_alarm_probability: f64,
+    /// Standard deviation of what calibration leaves of the range errors of one frequency, metre.
+    pub floor_m: f64,
+    /// Pixels are flagged where the light that the scene bounces once is expected to move them by more than this, metre;
+    /// `None`: the expected error is pictured in the report and flags nothing.
+    pub flag_risk_above_m: Option<f64>,
+    /// What is done where frequencies contradict each other.
+    pub treatment: MultipathTreatment,
+}
+
+/// What is done with pixels whose frequencies contradict each other.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum MultipathTreatment {
+    /// They are flagged.
+    #[default]
+    Flag,
+    /// They get the range of the direct path where at least three frequencies determine it, and are flagged elsewhere.
+    Resolve,
+}
+
+impl Default for MultipathOptions {
+    fn default() -> Self {
+        Self {
+            false_alarm_probability: 1e-4,
+            floor_m: 0.005,
+            flag_risk_above_m: Some(0.02),
+            treatment: MultipathTreatment::default(),
+        }
+    }
+}
+
 /// Options of [`Stage::CorrectRange`].
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -218,11 +288,13 @@ pub struct MixedPixels {
     pub sigmas: f64,
     /// Smallest distance, metre.
     pub floor_m: f64,
+    /// What is done with them: `flag`, `drop` (no value any more), or `split` (a point on each of the two surfaces besides).
+    pub treatment: MixedPixelTreatment,
 }
 
 impl Default for MixedPixels {
     fn default() -> Self {
-        Self { sigmas: 4.0, floor_m: 0.02 }
+        Self { sigmas: 4.0, floor_m: 0.02, treatment: MixedPixelTreatment::Flag }
     }
 }
 

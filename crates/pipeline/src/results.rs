@@ -38,11 +38,12 @@ fn write_text(path: &Path, text: &str) -> Result<()> {
     std::fs::write(path, text).map_err(|source| Error::Access { path: path.to_owned(), source })
 }
 
-/// All finite points of all views in the world's frame, flagged ones with their flags.
+/// All finite points of all views in the world's frame, flagged ones with their flags, and those of split pixels.
 fn cloud_file(outcome: &Outcome) -> CloudFile {
     let mut file = CloudFile::default();
     let (mut intensity, mut sigma, mut flags, mut frame) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-    for (number, (cloud, pose)) in outcome.clouds.iter().zip(poses_or_identity(outcome)).enumerate() {
+    let poses = poses_or_identity(outcome);
+    for (number, (cloud, pose)) in outcome.clouds.iter().zip(&poses).enumerate() {
         for index in 0..cloud.points.len() {
             if !cloud.points[index].iter().all(|x| x.is_finite()) {
                 continue;
@@ -54,6 +55,15 @@ fn cloud_file(outcome: &Outcome) -> CloudFile {
             flags.push(cloud.flags[index].bits());
             frame.push(number as u32);
         }
+    }
+    for further in &outcome.further_points {
+        let Some(pose) = poses.get(further.view) else { continue };
+        let point = pose.world_from_camera * nalgebra::Point3::from(further.point);
+        file.points.push(point.coords.into());
+        intensity.push(further.amplitude);
+        sigma.push(further.sigma_m);
+        flags.push(0);
+        frame.push(further.view as u32);
     }
     file.intensity = Some(intensity);
     file.sigma = Some(sigma);

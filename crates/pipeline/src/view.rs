@@ -2,7 +2,7 @@
 
 use nalgebra::Isometry3;
 use phase_unwrap::combine_frequencies;
-use range_image::{ComplexFrame, Flags, Modulation, RangeFrame, Raster, RawFrame};
+use range_image::{ComplexChannel, ComplexFrame, Flags, Modulation, RangeFrame, Raster, RawFrame};
 
 use crate::truth::ViewTruth;
 use crate::{Error, Result};
@@ -32,6 +32,10 @@ pub struct View {
     pub modulation: Option<Modulation>,
     /// Ranges of each frequency once they are unwrapped; empty where there is only one.
     pub channels: Vec<RangeFrame>,
+    /// Modulations of all frequencies, where the survey states them.
+    pub modulations: Vec<Modulation>,
+    /// Error that light bounced once in the scene is expected to make, metre; once it was assessed.
+    pub multipath_risk_m: Option<Raster<f32>>,
 }
 
 /// The frame at its level.
@@ -114,6 +118,28 @@ impl View {
             flags,
         });
         Ok(())
+    }
+
+    /// The complex image that belongs to the corrected ranges of several frequencies; `None` where there is one.
+    pub(crate) fn complex_channels(&self) -> Option<ComplexFrame> {
+        let first = self.channels.first()?;
+        let channels = self.channels.iter().zip(&self.modulations).map(|(channel, modulation)| {
+            let radians_per_metre = modulation.phase_from_range(1.0) as f32;
+            let plane = |value: fn(f32, f32) -> f32| {
+                let mut out = channel.range.clone();
+                for (out, amplitude) in out.as_mut_slice().iter_mut().zip(channel.amplitude.as_slice()) {
+                    *out = value(*amplitude, radians_per_metre * *out);
+                }
+                out
+            };
+            let mut sigma = channel.sigma.clone();
+            for (sigma, amplitude) in sigma.as_mut_slice().iter_mut().zip(channel.amplitude.as_slice()) {
+                *sigma *= radians_per_metre * amplitude;
+            }
+            let (real, imaginary) = (plane(|a, phase| a * phase.cos()), plane(|a, phase| a * phase.sin()));
+            ComplexChannel { modulation: *modulation, real, imaginary, offset: None, sigma }
+        });
+        Some(ComplexFrame { channels: channels.collect(), flags: first.flags.clone() })
     }
 
     /// The modulation to which ranges are still wrapped, `None` once they are not.

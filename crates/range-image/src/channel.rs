@@ -1,6 +1,11 @@
 //! The complex image of one frequency.
+// Only what is inlined is compiled for wide registers.
+#![allow(clippy::inline_always)]
+
+use rayon::prelude::*;
 
 use crate::polar::{angle, modulus};
+use crate::wide::{Arithmetic, PixelLoop, run_wide, task_length};
 use crate::{Modulation, Raster, Result};
 
 /// The complex image `z = A exp(i phi)` of one frequency, as separate planes.
@@ -45,12 +50,12 @@ impl ComplexChannel {
 
     /// Amplitude `A = |z|`.
     pub fn amplitude(&self) -> Raster<f32> {
-        self.evaluate(|re, im, _| modulus(re, im))
+        self.evaluate(Amplitude)
     }
 
     /// Phase in `[0, 2 pi)`, to 6e-7 rad.
     pub fn phase(&self) -> Raster<f32> {
-        self.evaluate(|re, im, _| angle(re, im))
+        self.evaluate(Phase)
     }
 
     /// Standard deviation of the phase in radians, `sigma_z / A` (`[Lange2000]`).
@@ -58,55 +63,166 @@ impl ComplexChannel {
     /// This holds where `A` is well above `sigma_z` (by 10 % at `A = 3 sigma_z`). It is never more than `pi / sqrt(3)`,
     /// that of a phase of which nothing is known. NaN where sigma is.
     pub fn sigma_phase(&self) -> Raster<f32> {
-        self.evaluate(sigma_phase)
+        self.evaluate(SigmaPhase { unit: 1.0 })
     }
 
     /// Standard deviation of the range in metres, `U / 2 pi * sigma_phase`; see [`Self::sigma_phase`].
     pub fn sigma_range(&self) -> Raster<f32> {
-        let metres_per_radian = self.modulation.range_from_phase(1.0) as f32;
-        self.evaluate(|re, im, sigma| metres_per_radian * sigma_phase(re, im, sigma))
+        self.evaluate(SigmaPhase { unit: self.modulation.range_from_phase(1.0) as f32 })
     }
 
     /// Writes [`Self::amplitude`] into a plane that is there already.
     pub fn amplitude_into(&self, out: &mut Raster<f32>) -> Result<()> {
-        self.evaluate_into(out, |re, im, _| modulus(re, im))
+        self.evaluate_into(Amplitude, out)
     }
 
     /// Writes [`Self::phase`] into a plane that is there already.
     pub fn phase_into(&self, out: &mut Raster<f32>) -> Result<()> {
-        self.evaluate_into(out, |re, im, _| angle(re, im))
+        self.evaluate_into(Phase, out)
     }
 
     /// Writes [`Self::sigma_phase`] into a plane that is there already.
     pub fn sigma_phase_into(&self, out: &mut Raster<f32>) -> Result<()> {
-        self.evaluate_into(out, sigma_phase)
+        self.evaluate_into(SigmaPhase { unit: 1.0 }, out)
     }
 
-    fn evaluate(&self, value: impl Fn(f32, f32, f32) -> f32) -> Raster<f32> {
-        let mut out = self.sigma.clone();
-        self.fill(&mut out, value);
-        out
+    /// Writes [`Self::sigma_range`] into a plane that is there already.
+    pub fn sigma_range_into(&self, out: &mut Raster<f32>) -> Result<()> {
+        self.evaluate_into(SigmaPhase { unit: self.modulation.range_from_phase(1.0) as f32 }, out)
     }
 
-    fn evaluate_into(&self, out: &mut Raster<f32>, value: impl Fn(f32, f32, f32) -> f32) -> Result<()> {
+    /// Writes [`Self::phase`] and [`Self::amplitude`] into planes that are there already, with one look at `z`.
+    ///
+    /// See [`Demodulator::phase_and_amplitude_into`](crate::Demodulator::phase_and_amplitude_into) for the way that
+    /// does without `z`.
+    pub fn phase_and_amplitude_into(&self, phase: &mut Raster<f32>, amplitude: &mut Raster<f32>) -> Result<()> {
         self.validate()?;
-        self.real.require_same_size(out, "output plane")?;
-        self.fill(out, value);
+        self.real.require_same_size(phase, "phase plane")?;
+        self.real.require_same_size(amplitude, "amplitude plane")?;
+        let (phase, amplitude) = (phase.as_mut_slice(), amplitude.as_mut_slice());
+        let length = task_length(phase.len());
+        let parts = self.real.as_slice().par_chunks(length).zip(self.imaginary.as_slice().par_chunks(length));
+        let planes = phase.par_chunks_mut(length).zip(amplitude.par_chunks_mut(length));
+        planes.zip(parts).for_each(|((phase, amplitude), (re, im))| {
+            run_wide(re.len(), PolarLoop { re, im, phase, amplitude });
+        });
         Ok(())
     }
 
-    fn fill(&self, out: &mut Raster<f32>, value: impl Fn(f32, f32, f32) -> f32) {
-        let parts = self.real.as_slice().iter().zip(self.imaginary.as_slice()).zip(self.sigma.as_slice());
-        for (out, ((re, im), sigma)) in out.as_mut_slice().iter_mut().zip(parts) {
-            *out = value(*re, *im, *sigma);
+    fn evaluate(&self, value: impl PixelValue) -> Raster<f32> {
+        let mut out = self.sigma.clone();
+        self.fill(value, &mut out);
+        out
+    }
+
+    fn evaluate_into(&self, value: impl PixelValue, out: &mut Raster<f32>) -> Result<()> {
+        self.validate()?;
+        self.real.require_same_size(out, "output plane")?;
+        self.fill(value, out);
+        Ok(())
+    }
+
+    fn fill(&self, value: impl PixelValue, out: &mut Raster<f32>) {
+        let out = out.as_mut_slice();
+        let length = task_length(out.len());
+        let parts = self.real.as_slice().par_chunks(length).zip(self.imaginary.as_slice().par_chunks(length));
+        let parts = parts.zip(self.sigma.as_slice().par_chunks(length));
+        out.par_chunks_mut(length).zip(parts).for_each(|(out, ((re, im), sigma))| {
+            run_wide(re.len(), PlaneLoop { value, re, im, sigma, out });
+        });
+    }
+}
+
+/// What one pixel of a derived plane is.
+trait PixelValue: Copy + Sync {
+    fn of<A: Arithmetic>(self, re: f32, im: f32, sigma: f32) -> f32;
+}
+
+#[derive(Clone, Copy)]
+struct Amplitude;
+
+#[derive(Clone, Copy)]
+struct Phase;
+
+/// Deviation of the phase in units of `1 / unit` radian.
+#[derive(Clone, Copy)]
+struct SigmaPhase {
+    unit: f32,
+}
+
+impl PixelValue for Amplitude {
+    #[inline(always)]
+    fn of<A: Arithmetic>(self, re: f32, im: f32, _: f32) -> f32 {
+        modulus::<A>(re, im)
+    }
+}
+
+impl PixelValue for Phase {
+    #[inline(always)]
+    fn of<A: Arithmetic>(self, re: f32, im: f32, _: f32) -> f32 {
+        angle::<A>(re, im)
+    }
+}
+
+impl PixelValue for SigmaPhase {
+    #[inline(always)]
+    fn of<A: Arithmetic>(self, re: f32, im: f32, sigma_z: f32) -> f32 {
+        /// `pi / sqrt(3)`: the standard deviation of an angle that is uniform over the circle.
+        const UNIFORM: f32 = 1.813_799_4;
+        let sigma = sigma_z / modulus::<A>(re, im);
+        // Not `min`, which would turn NaN into the bound.
+        self.unit * if sigma > UNIFORM { UNIFORM } else { sigma }
+    }
+}
+
+/// One derived plane.
+struct PlaneLoop<'a, V> {
+    value: V,
+    re: &'a [f32],
+    im: &'a [f32],
+    sigma: &'a [f32],
+    out: &'a mut [f32],
+}
+
+impl<V: PixelValue> PixelLoop for PlaneLoop<'_, V> {
+    #[inline(always)]
+    fn pixels<A: Arithmetic, const L: usize>(&mut self, start: usize) {
+        let (Some(re), Some(im)) = (self.re[start..].first_chunk::<L>(), self.im[start..].first_chunk::<L>()) else {
+            return;
+        };
+        let (Some(sigma), Some(out)) =
+            (self.sigma[start..].first_chunk::<L>(), self.out[start..].first_chunk_mut::<L>())
+        else {
+            return;
+        };
+        for lane in 0..L {
+            out[lane] = self.value.of::<A>(re[lane], im[lane], sigma[lane]);
         }
     }
 }
 
-fn sigma_phase(re: f32, im: f32, sigma_z: f32) -> f32 {
-    /// `pi / sqrt(3)`: the standard deviation of an angle that is uniform over the circle.
-    const UNIFORM: f32 = 1.813_799_4;
-    let sigma = sigma_z / modulus(re, im);
-    // Not `min`, which would turn NaN into the bound.
-    if sigma > UNIFORM { UNIFORM } else { sigma }
+/// Phase and amplitude together.
+struct PolarLoop<'a> {
+    re: &'a [f32],
+    im: &'a [f32],
+    phase: &'a mut [f32],
+    amplitude: &'a mut [f32],
+}
+
+impl PixelLoop for PolarLoop<'_> {
+    #[inline(always)]
+    fn pixels<A: Arithmetic, const L: usize>(&mut self, start: usize) {
+        let (Some(re), Some(im)) = (self.re[start..].first_chunk::<L>(), self.im[start..].first_chunk::<L>()) else {
+            return;
+        };
+        let (Some(phase), Some(amplitude)) =
+            (self.phase[start..].first_chunk_mut::<L>(), self.amplitude[start..].first_chunk_mut::<L>())
+        else {
+            return;
+        };
+        for lane in 0..L {
+            phase[lane] = angle::<A>(re[lane], im[lane]);
+            amplitude[lane] = modulus::<A>(re[lane], im[lane]);
+        }
+    }
 }

@@ -1,14 +1,13 @@
 //! From raw samples to the complex image.
+// Only what is inlined is compiled for wide registers.
+#![allow(clippy::inline_always)]
 
 use rayon::prelude::*;
 
-use crate::weights::StepWeight;
+use crate::samples::{Sample, SampleBlock, Sums, peaks};
+use crate::weights::{GROUP, StepWeight, StepWeights};
+use crate::wide::{Arithmetic, PixelLoop, run_wide, task_length};
 use crate::{ComplexChannel, ComplexFrame, DemodulationOptions, Flags, NoiseModel, Raster, RawFrame, Result, Samples};
-
-/// Pixels worked on at a time: their sums stay in the first-level cache while the planes of samples pass by.
-const BLOCK: usize = 1024;
-/// Blocks that one task takes at least; smaller tasks cost more to hand out than to do.
-const BLOCKS_PER_TASK: usize = 16;
 
 /// Demodulates one frame; see [`Demodulator`] for streams of frames.
 pub fn demodulate(frame: &RawFrame, options: &DemodulationOptions) -> Result<ComplexFrame> {
@@ -45,23 +44,35 @@ impl Demodulator {
     /// The result does not depend on the number of threads, and everything that `out` held before is overwritten.
     pub fn demodulate_into(&self, frame: &RawFrame, out: &mut ComplexFrame) -> Result<()> {
         out.reshape(frame);
-        out.flags.as_mut_slice().fill(Flags::empty());
-        if out.flags.is_empty() {
-            return Ok(());
-        }
         let ComplexFrame { channels, flags } = out;
-        let steps = frame.phase_steps();
-        let job = ChannelJob { options: &self.options, noise: self.noise_of(frame.samples()), steps };
-        let length = flags.len() * steps;
+        let weights = StepWeights::new(frame.phase_steps(), &self.options);
+        let job = ChannelJob { weights: weights.groups(), limits: self.limits(frame) };
+        let length = flags.len() * frame.phase_steps();
+        let mut kept = 0;
         for (index, channel) in channels.iter_mut().enumerate() {
             let own = index * length..(index + 1) * length;
             match frame.samples() {
-                Samples::F32(samples) => job.run(&samples[own], channel, flags),
-                Samples::U16(samples) => job.run(&samples[own], channel, flags),
-                Samples::I16(samples) => job.run(&samples[own], channel, flags),
+                Samples::F32(samples) => job.run(&samples[own], channel, flags, kept),
+                Samples::U16(samples) => job.run(&samples[own], channel, flags, kept),
+                Samples::I16(samples) => job.run(&samples[own], channel, flags, kept),
             }
+            kept = u16::MAX;
         }
         Ok(())
+    }
+
+    fn limits(&self, frame: &RawFrame) -> Limits {
+        let noise = self.noise_of(frame.samples());
+        let scale = 2.0 / frame.phase_steps() as f64;
+        let unknown = if noise.is_known() { 0.0 } else { f32::NAN };
+        Limits {
+            shot: (scale * noise.shot_variance_per_unit) as f32,
+            dark: (scale * noise.dark_sigma * noise.dark_sigma) as f32 + unknown,
+            // No number is at or above NaN.
+            saturation: self.options.saturation.map_or(f32::NAN, |saturation| saturation as f32),
+            inverse_low: self.options.low_amplitude.map_or(0.0, |low| (1.0 / low) as f32),
+            low: if self.options.low_amplitude.is_some() { 1.0 } else { 0.0 },
+        }
     }
 
     fn noise_of(&self, samples: &Samples) -> NoiseModel {
@@ -72,38 +83,54 @@ impl Demodulator {
     }
 }
 
-/// A sample of any of the types that sensors deliver; all are exact in f32.
-trait Sample: Copy + Sync {
-    fn value(self) -> f32;
-}
-
-impl Sample for f32 {
-    fn value(self) -> f32 {
-        self
-    }
-}
-
-impl Sample for u16 {
-    fn value(self) -> f32 {
-        f32::from(self)
-    }
-}
-
-impl Sample for i16 {
-    fn value(self) -> f32 {
-        f32::from(self)
-    }
+/// What sums of samples are judged by.
+#[derive(Clone, Copy)]
+struct Limits {
+    /// Variance of each part of `z` for each unit of the offset.
+    shot: f32,
+    /// Variance of each part of `z` without light; NaN where nothing is known.
+    dark: f32,
+    saturation: f32,
+    /// Amplitudes are compared in its unit, and squared: that needs no root.
+    inverse_low: f32,
+    low: f32,
 }
 
 /// The demodulation of one frequency.
 struct ChannelJob<'a> {
-    options: &'a DemodulationOptions,
-    noise: NoiseModel,
-    steps: usize,
+    weights: &'a [[StepWeight; GROUP]],
+    limits: Limits,
 }
 
-/// The planes of one block of pixels.
-struct Block<'a> {
+impl ChannelJob<'_> {
+    /// Of the flags that the pixels have, those in `kept` stay.
+    fn run<S: Sample>(&self, samples: &[S], channel: &mut ComplexChannel, flags: &mut Raster<Flags>, kept: u16) {
+        let Some(offset) = channel.offset.as_mut() else { return };
+        let pixels = flags.len();
+        let length = task_length(pixels);
+        channel
+            .real
+            .as_mut_slice()
+            .par_chunks_mut(length)
+            .zip(channel.imaginary.as_mut_slice().par_chunks_mut(length))
+            .zip(offset.as_mut_slice().par_chunks_mut(length))
+            .zip(channel.sigma.as_mut_slice().par_chunks_mut(length))
+            .zip(flags.as_mut_slice().par_chunks_mut(length))
+            .enumerate()
+            .for_each(|(index, ((((re, im), mean), sigma), flags))| {
+                let block = SampleBlock { samples, steps: samples.len() / pixels, pixels, first: index * length };
+                let (weights, limits) = (self.weights, self.limits);
+                run_wide(re.len(), DemodulationLoop { block, weights, limits, kept, re, im, mean, sigma, flags });
+            });
+    }
+}
+
+/// The demodulation of one block of pixels.
+struct DemodulationLoop<'a, S> {
+    block: SampleBlock<'a, S>,
+    weights: &'a [[StepWeight; GROUP]],
+    limits: Limits,
+    kept: u16,
     re: &'a mut [f32],
     im: &'a mut [f32],
     mean: &'a mut [f32],
@@ -111,82 +138,42 @@ struct Block<'a> {
     flags: &'a mut [Flags],
 }
 
-impl ChannelJob<'_> {
-    fn run<S: Sample>(&self, samples: &[S], channel: &mut ComplexChannel, flags: &mut Raster<Flags>) {
-        let Some(offset) = channel.offset.as_mut() else { return };
-        let pixels = flags.len();
-        channel
-            .real
-            .as_mut_slice()
-            .par_chunks_mut(BLOCK)
-            .zip(channel.imaginary.as_mut_slice().par_chunks_mut(BLOCK))
-            .zip(offset.as_mut_slice().par_chunks_mut(BLOCK))
-            .zip(channel.sigma.as_mut_slice().par_chunks_mut(BLOCK))
-            .zip(flags.as_mut_slice().par_chunks_mut(BLOCK))
-            .with_min_len(BLOCKS_PER_TASK)
-            .enumerate()
-            .for_each(|(index, ((((re, im), mean), sigma), flags))| {
-                let mut block = Block { re, im, mean, sigma, flags };
-                let start = index * BLOCK;
-                let plane = |step: usize| &samples[step * pixels + start..][..block_len(start, pixels)];
-                self.accumulate(plane, &mut block);
-                self.flag_saturation(plane, &mut block);
-                self.finish(&mut block);
-            });
-    }
-
-    /// Adds up real part, imaginary part and mean, plane by plane.
-    fn accumulate<'s, S: Sample + 's>(&self, plane: impl Fn(usize) -> &'s [S], block: &mut Block) {
-        block.re.fill(0.0);
-        block.im.fill(0.0);
-        block.mean.fill(0.0);
-        for step in 0..self.steps {
-            let weight = StepWeight::new(step, self.steps, self.options);
-            let sums = block.re.iter_mut().zip(block.im.iter_mut()).zip(block.mean.iter_mut());
-            for (sample, ((re, im), mean)) in plane(step).iter().zip(sums) {
-                let value = sample.value();
-                *re += weight.re * value;
-                *im += weight.im * value;
-                *mean += weight.mean * value;
-            }
+impl<S: Sample> PixelLoop for DemodulationLoop<'_, S> {
+    #[inline(always)]
+    fn pixels<A: Arithmetic, const L: usize>(&mut self, start: usize) {
+        let Some(sums) = Sums::<L>::of::<A, S>(&self.block, self.weights, start) else { return };
+        let mut peak = [0.0; L];
+        for group in 0..self.weights.len() {
+            let Some(planes) = self.block.group(group, start) else { return };
+            peak = peaks(planes, peak);
         }
-    }
-
-    fn flag_saturation<'s, S: Sample + 's>(&self, plane: impl Fn(usize) -> &'s [S], block: &mut Block) {
-        let Some(saturation) = self.options.saturation else { return };
-        let limit = saturation as f32;
-        for step in 0..self.steps {
-            for (sample, flags) in plane(step).iter().zip(block.flags.iter_mut()) {
-                let reached = if sample.value().abs() >= limit { Flags::SATURATED.bits() } else { 0 };
-                *flags = Flags::from_bits_retain(flags.bits() | reached);
-            }
-        }
-    }
-
-    /// Sigma, low amplitude and pixels without data, from the sums.
-    fn finish(&self, block: &mut Block) {
-        let scale = 2.0 / self.steps as f64;
-        let unknown = if self.noise.is_known() { 0.0 } else { f32::NAN };
-        let shot = (scale * self.noise.shot_variance_per_unit) as f32;
-        let dark = (scale * self.noise.dark_sigma * self.noise.dark_sigma) as f32 + unknown;
-        let low = self.options.low_amplitude.unwrap_or(0.0) as f32;
-        let parts = block.re.iter_mut().zip(block.im.iter_mut()).zip(block.mean.iter_mut());
-        let rest = block.sigma.iter_mut().zip(block.flags.iter_mut());
-        for (((re, im), mean), (sigma, flags)) in parts.zip(rest) {
-            let finite = re.is_finite() & im.is_finite() & mean.is_finite();
+        let (Some(re), Some(im)) = (self.re[start..].first_chunk_mut::<L>(), self.im[start..].first_chunk_mut::<L>())
+        else {
+            return;
+        };
+        let (Some(mean), Some(sigma)) =
+            (self.mean[start..].first_chunk_mut::<L>(), self.sigma[start..].first_chunk_mut::<L>())
+        else {
+            return;
+        };
+        let Some(flags) = self.flags[start..].first_chunk_mut::<L>() else { return };
+        let Limits { shot, dark, saturation, inverse_low, low } = self.limits;
+        let mut found = [0_u32; L];
+        for lane in 0..L {
+            let finite = sums.re[lane].is_finite() & sums.im[lane].is_finite() & sums.mean[lane].is_finite();
             let keep = if finite { 0.0 } else { f32::NAN };
-            *sigma = (shot * mean.max(0.0) + dark + keep).sqrt();
-            let dim = crate::polar::modulus(*re, *im) < low;
-            *re += keep;
-            *im += keep;
-            *mean += keep;
-            let bits = if finite { 0 } else { Flags::NO_DATA.bits() }
-                | if dim & finite { Flags::LOW_AMPLITUDE.bits() } else { 0 };
-            *flags = Flags::from_bits_retain(flags.bits() | bits);
+            let [x, y] = [sums.re[lane] * inverse_low, sums.im[lane] * inverse_low];
+            let dim = A::multiply_add(x, x, y * y) < low;
+            re[lane] = sums.re[lane] + keep;
+            im[lane] = sums.im[lane] + keep;
+            mean[lane] = sums.mean[lane] + keep;
+            sigma[lane] = (A::multiply_add(shot, sums.mean[lane].max(0.0), dark) + keep).sqrt();
+            found[lane] = if finite { 0 } else { u32::from(Flags::NO_DATA.bits()) }
+                | if dim & finite { u32::from(Flags::LOW_AMPLITUDE.bits()) } else { 0 }
+                | if peak[lane] >= saturation { u32::from(Flags::SATURATED.bits()) } else { 0 };
+        }
+        for lane in 0..L {
+            flags[lane] = Flags::from_bits_retain((flags[lane].bits() & self.kept) | found[lane] as u16);
         }
     }
-}
-
-fn block_len(start: usize, pixels: usize) -> usize {
-    BLOCK.min(pixels - start)
 }

@@ -2,6 +2,8 @@
 
 mod average;
 mod channel;
+mod chi_squared;
+mod consistency;
 mod demodulate;
 mod error;
 mod flags;
@@ -11,12 +13,22 @@ mod modulation;
 mod noise;
 mod options;
 mod phase_level;
+mod plateau;
 mod polar;
+mod polar_level;
 mod raster;
+mod rules_loop;
+mod sample_rules;
+mod samples;
 mod weights;
+mod wide;
 
 pub use average::{average, average_ranges, sigma_from_repeats};
 pub use channel::ComplexChannel;
+pub use consistency::{
+    ConsistencyOptions, ConsistencySummary, OffsetRule, PlateauOptions, RulesVerdict, SampleCheck, SaturationVerdict,
+    check_samples,
+};
 pub use demodulate::{Demodulator, demodulate};
 pub use error::{Error, Result};
 pub use flags::Flags;
@@ -26,4 +38,5 @@ pub use modulation::{Modulation, SPEED_OF_LIGHT};
 pub use noise::NoiseModel;
 pub use options::DemodulationOptions;
 pub use phase_level::{PhaseConvention, PhaseSense};
+pub use polar_level::PolarChannel;
 pub use raster::Raster;

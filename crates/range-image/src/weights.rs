@@ -4,8 +4,37 @@ use std::f64::consts::TAU;
 
 use crate::{DemodulationOptions, PhaseSense};
 
+/// Steps whose samples are added in one go.
+pub(crate) const GROUP: usize = 4;
+
+/// Groups whose weights need no memory of their own.
+const FEW_GROUPS: usize = 4;
+
+/// The weights of all steps in groups; the last group is filled up with zeros.
+pub(crate) struct StepWeights {
+    few: [[StepWeight; GROUP]; FEW_GROUPS],
+    many: Vec<[StepWeight; GROUP]>,
+    count: usize,
+}
+
+impl StepWeights {
+    /// Allocates only for more than 16 steps.
+    pub(crate) fn new(steps: usize, options: &DemodulationOptions) -> Self {
+        let weight = |step| if step < steps { StepWeight::new(step, steps, options) } else { StepWeight::default() };
+        let group = |index: usize| std::array::from_fn(|place| weight(index * GROUP + place));
+        let count = steps.div_ceil(GROUP);
+        let many = if count > FEW_GROUPS { (0..count).map(group).collect() } else { Vec::new() };
+        Self { few: std::array::from_fn(group), many, count }
+    }
+
+    /// The groups in the order of their steps; there is at least one.
+    pub(crate) fn groups(&self) -> &[[StepWeight; GROUP]] {
+        if self.many.is_empty() { &self.few[..self.count] } else { &self.many }
+    }
+}
+
 /// What one phase step contributes, per unit of its sample, to the real part, the imaginary part and the mean.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct StepWeight {
     pub re: f32,
     pub im: f32,

@@ -309,6 +309,14 @@ fn view_figures(view: &View, scales: &Scales) -> Result<Vec<(String, String)>> {
             &Scale { map: ColourMap::Diverging, low: -limit, high: limit, unit: "mm" },
         )?;
     }
+    if let Some(risk) = &view.multipath_risk_m {
+        let risk: Vec<f64> = risk.as_slice().iter().map(|risk| 1e3 * f64::from(*risk)).collect();
+        let high = quantile(&mut risk.clone(), 0.99);
+        let high = if high.is_finite() { high.max(1.0) } else { 1.0 };
+        let scale = Scale { map: ColourMap::Sequential, low: 0.0, high, unit: "mm" };
+        let note = "What light that bounced once in the scene is expected to add to the ranges. Grey: part of no flat patch.";
+        figures.push((raster_figure("Expected multipath error", width, &risk, &scale)?, note.to_owned()));
+    }
     figures.push((flag_picture(view)?, "Grey: no flag. Colours as in the table of flags.".to_owned()));
     Ok(figures)
 }

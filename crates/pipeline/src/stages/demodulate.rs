@@ -1,4 +1,6 @@
-use range_image::{ComplexFrame, DemodulationOptions, Demodulator, NoiseModel};
+use range_image::{
+    ComplexFrame, ConsistencyOptions, DemodulationOptions, Demodulator, NoiseModel, RawFrame, RulesVerdict, check_samples,
+};
 
 use super::Findings;
 use crate::plan::DemodulateOptions;
@@ -9,20 +11,45 @@ use crate::{Error, Result};
 
 /// Raw samples to complex images, with the conventions that the survey states.
 pub(super) fn run(work: &mut Work, options: &DemodulateOptions, progress: &dyn Progress) -> Result<Findings> {
+    let consistency = options.consistency.clone();
     let options = demodulation_options(work, options);
+    // What breaks a rule cannot be told without a measure.
+    let consistency = consistency.filter(|check| options.noise.is_known() || check.tolerance > 0.0);
     let demodulator = Demodulator::new(&options).map_err(Error::stage("Demodulate", "options"))?;
     let total = work.outcome.views.len();
+    let mut inconsistent = 0;
     for (index, view) in work.outcome.views.iter_mut().enumerate() {
         if let ViewData::Samples(raw) = &view.data {
             let mut frame = ComplexFrame::empty();
             let demodulated = demodulator.demodulate_into(raw, &mut frame);
             demodulated.map_err(Error::stage("Demodulate", &view.name()))?;
+            if let Some(check) = &consistency {
+                inconsistent += check_frame(raw, &options, check, &mut frame)
+                    .map_err(Error::stage("Demodulate", &view.name()))?;
+            }
             view.data = ViewData::Phase(frame);
             view.before = view.snapshot();
         }
         progress.advance(index + 1);
     }
-    Ok(Findings::from([("frames".to_owned(), total as f64)]))
+    let mut findings = Findings::from([("frames".to_owned(), total as f64)]);
+    if consistency.is_some() {
+        findings.insert("inconsistent_px".to_owned(), inconsistent as f64);
+    }
+    Ok(findings)
+}
+
+/// Flags pixels whose samples contradict each other; their number.
+fn check_frame(
+    raw: &RawFrame,
+    options: &DemodulationOptions,
+    check: &ConsistencyOptions,
+    frame: &mut ComplexFrame,
+) -> range_image::Result<usize> {
+    match check_samples(raw, options, check, &mut frame.flags)?.rules {
+        RulesVerdict::NothingToCheck => Ok(0),
+        RulesVerdict::Checked { inconsistent, .. } => Ok(inconsistent),
+    }
 }
 
 fn demodulation_options(work: &Work, options: &DemodulateOptions) -> DemodulationOptions {

@@ -7,7 +7,9 @@ mod correct;
 mod deconvolve;
 mod demodulate;
 mod flag;
+mod multipath;
 mod register;
+mod repair;
 mod unwrap;
 
 use std::collections::BTreeMap;
@@ -26,8 +28,10 @@ pub(crate) fn apply(stage: &Stage, work: &mut Work, progress: &dyn Progress) -> 
         Stage::Average(_) => average::run(work, progress),
         Stage::Deconvolve(options) => deconvolve::run(work, options, progress),
         Stage::Unwrap(options) => unwrap::run(work, options, progress),
+        Stage::RepairWraps(options) => repair::run(work, options, progress),
         Stage::CorrectRange(_) => correct::run(work, progress),
         Stage::CorrectImagePoint(_) => cloud::correct_image_point(work),
+        Stage::Multipath(options) => multipath::run(work, options, progress),
         Stage::PointCloud(_) => cloud::run(work, progress),
         Stage::Flag(options) => flag::run(work, options, progress),
         Stage::Register(options) => register::run(work, options, progress),

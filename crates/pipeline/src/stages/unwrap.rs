@@ -72,7 +72,7 @@ fn wrap_counts(
 }
 
 /// What unwrapping needs to know of the camera, in pixels.
-fn image_geometry(camera: &Camera) -> ImageGeometry {
+pub(super) fn image_geometry(camera: &Camera) -> ImageGeometry {
     let format = camera.format;
     let [column, row] = format.pixel_from_image(camera.interior.principal_point_mm);
     // One principal distance serves both directions: pitches differ by less than what the evidence resolves.

@@ -1,0 +1,99 @@
+use multipath::{
+    DetectionOptions, RiskOptions, Systematics, TwoPathOptions, Verdict, assess_risk, detect, estimate_response,
+    solve_two_paths,
+};
+use range_image::Flags;
+
+use super::Findings;
+use crate::plan::{MultipathOptions, MultipathTreatment};
+use crate::progress::Progress;
+use crate::view::{View, ViewData};
+use crate::work::Work;
+use crate::{Error, Result};
+
+/// Pixels of smaller amplitude, in standard deviations, do not tell the response of the frequencies.
+pub(super) const RESPONSE_SNR: f64 = 20.0;
+
+/// Light that came by more than one way: found by contradiction between frequencies where there are several, and
+/// estimated from the scene's own shape everywhere.
+pub(super) fn run(work: &mut Work, options: &MultipathOptions, progress: &dyn Progress) -> Result<Findings> {
+    let mut findings = Findings::new();
+    let mut add = |name: &str, count: usize| *findings.entry(name.to_owned()).or_default() += count as f64;
+    for (index, view) in work.outcome.views.iter_mut().enumerate() {
+        if !matches!(view.data, ViewData::Range(_)) {
+            return Err(Error::Needs { stage: "Multipath", needs: "Unwrap" });
+        }
+        if view.channels.len() > 1 {
+            add("contradictions_px", flag_contradictions(view, options)?);
+        }
+        if view.channels.len() > 2 && options.treatment == MultipathTreatment::Resolve {
+            add("resolved_px", resolve(view, options)?);
+        }
+        add("at_risk_px", assess(view, work.rays.directions(), options)?);
+        progress.advance(index + 1);
+    }
+    Ok(findings)
+}
+
+fn systematics(options: &MultipathOptions) -> Systematics {
+    Systematics { floor_m: options.floor_m, ..Systematics::default() }
+}
+
+/// Flags pixels whose frequencies contradict each other.
+fn flag_contradictions(view: &mut View, options: &MultipathOptions) -> Result<usize> {
+    let name = view.name();
+    let fail = |error| Error::stage("Multipath", &name)(error);
+    let Some(mut frame) = view.complex_channels() else { return Ok(0) };
+    let ViewData::Range(range) = &mut view.data else { return Ok(0) };
+    let response = estimate_response(&frame, RESPONSE_SNR).map_err(fail)?.response;
+    let options = DetectionOptions {
+        false_alarm: options.false_alarm_probability,
+        systematics: systematics(options),
+        ..DetectionOptions::default()
+    };
+    frame.flags.clone_from(&range.flags);
+    let found = detect(&mut frame, &range.range, &response, &options).map_err(fail)?;
+    range.flags = frame.flags;
+    Ok(found.flagged)
+}
+
+/// Replaces the ranges of flagged pixels by those of the direct path, where the frequencies tell it.
+fn resolve(view: &mut View, options: &MultipathOptions) -> Result<usize> {
+    let name = view.name();
+    let fail = |error| Error::stage("Multipath", &name)(error);
+    let Some(mut frame) = view.complex_channels() else { return Ok(0) };
+    let ViewData::Range(range) = &mut view.data else { return Ok(0) };
+    let response = estimate_response(&frame, RESPONSE_SNR).map_err(fail)?.response;
+    // Only flagged pixels are solved for; to all others one range serves well.
+    for (flags, known) in frame.flags.as_mut_slice().iter_mut().zip(range.flags.as_slice()) {
+        *flags = if known.contains(Flags::MULTIPATH) { *known } else { *known | Flags::NO_DATA };
+    }
+    let options = TwoPathOptions { systematics: systematics(options), ..TwoPathOptions::default() };
+    let image = solve_two_paths(&frame, &response, &options).map_err(fail)?;
+    let mut resolved = 0;
+    let pixels = range.range.as_mut_slice().iter_mut().zip(range.sigma.as_mut_slice());
+    let pixels = pixels.zip(range.flags.as_mut_slice()).zip(image.paths.as_slice());
+    for (((value, sigma), flags), paths) in pixels {
+        if flags.contains(Flags::MULTIPATH) && paths.verdict == Verdict::Two {
+            (*value, *sigma) = (paths.direct_m, paths.sigma_direct_m);
+            flags.remove(Flags::MULTIPATH);
+            resolved += 1;
+        }
+    }
+    Ok(resolved)
+}
+
+/// What the scene in view does to its own ranges.
+fn assess(view: &mut View, directions: &[[f64; 3]], options: &MultipathOptions) -> Result<usize> {
+    let name = view.name();
+    let modulation = view.modulation;
+    let ViewData::Range(frame) = &mut view.data else { return Ok(0) };
+    let options = RiskOptions {
+        modulation_hz: modulation.map(|modulation| modulation.frequency_hz()),
+        floor_m: options.flag_risk_above_m.unwrap_or(f64::MAX),
+        ..RiskOptions::default()
+    };
+    let risk = assess_risk(frame, directions, &options).map_err(Error::stage("Multipath", &name))?;
+    view.multipath_risk_m = Some(risk.risk_m);
+    Ok(risk.flagged)
+}

@@ -1,0 +1,89 @@
+//! How good estimated point spread functions are: covariance by simulation, and the range errors of another scene.
+#![cfg(feature = "estimate")]
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+#[path = "common/captures.rs"]
+mod captures;
+
+use captures::{Object, Scene, estimate, mean_wall_error, round};
+use range_image::ComplexFrame;
+use scattering_deconvolution::{EstimationOptions, Psf, RestorationOptions, TermCount, Verdict, restore};
+
+/// Squared normalised errors of each parameter, averaged over seeded captures.
+fn normalised_errors(psf: &Psf, truth: &[f64], trials: u64) -> (Vec<f64>, f64) {
+    let scene = Scene { size: [40, 32], noise: 0.25, ..Scene::small() };
+    let objects = [
+        Object { columns: [0, 12], rows: [18, 32], range_m: 0.8, amplitude: 2000.0 },
+        Object { columns: [24, 34], rows: [6, 16], range_m: 0.9, amplitude: 2200.0 },
+    ];
+    let options = EstimationOptions { terms: TermCount::Exactly(truth.len() / 2), ..EstimationOptions::default() };
+    let (mut squares, mut sigma0) = (vec![0.0; truth.len()], 0.0);
+    for trial in 0..trials {
+        let pairs: Vec<_> = objects.iter().zip(2 * trial..).map(|(o, seed)| scene.pair(o, psf, seed)).collect();
+        let found = estimate(&pairs, &options);
+        assert_eq!(found.verdict, Verdict::Determined, "{found:#?}");
+        sigma0 += found.sigma0 / trials as f64;
+        // Prior-scaled: the simulated noise is what the frames say.
+        let inflation = found.sigma0.max(1.0);
+        for ((square, parameter), truth) in squares.iter_mut().zip(&found.parameters).zip(truth) {
+            *square += ((parameter.value - truth) / parameter.sigma * inflation).powi(2) / trials as f64;
+        }
+    }
+    (squares.into_iter().map(f64::sqrt).collect(), sigma0)
+}
+
+#[test]
+fn standard_deviations_are_those_of_repeated_captures() {
+    for (psf, truth) in
+        [(round(&[(0.04, 7.0)]), vec![0.04, 7.0]), (round(&[(0.03, 3.0), (0.05, 11.0)]), vec![0.03, 3.0, 0.05, 11.0])]
+    {
+        let trials = 150;
+        let (errors, sigma0) = normalised_errors(&psf, &truth, trials);
+        println!("normalised errors {errors:.3?}, sigma0 {sigma0:.4}");
+        for error in errors {
+            // The root mean square of 150 normal errors has a standard deviation of 1 / sqrt(300) = 0.058: bounds of
+            // 2.6 of these.
+            assert!((error - 1.0).abs() < 0.15, "{error}");
+        }
+        assert!((sigma0 - 1.0).abs() < 0.01, "{sigma0}");
+    }
+}
+
+/// Mean range error of a wall behind a hand, none of which was in the captures.
+fn other_scene(scene: &Scene, psf: &Psf) -> (Object, ComplexFrame) {
+    let hand = Object {
+        columns: [scene.size[0] / 3, scene.size[0] * 3 / 5],
+        rows: [scene.size[1] / 2, scene.size[1]],
+        range_m: 0.5,
+        amplitude: 3000.0,
+    };
+    let view = Scene { wall_m: 2.7, wall_amplitude: 100.0, noise: 1e-3, ..*scene };
+    (hand, view.frame(Some(&hand), psf, 77))
+}
+
+#[test]
+fn another_scene_is_restored() {
+    let scene = Scene::small();
+    let objects = [
+        Object { columns: [0, 18], rows: [26, 48], range_m: 0.8, amplitude: 2000.0 },
+        Object { columns: [25, 40], rows: [12, 30], range_m: 1.0, amplitude: 1500.0 },
+        Object { columns: [48, 64], rows: [0, 20], range_m: 0.6, amplitude: 2500.0 },
+    ];
+    for share in [0.0, 0.01, 0.05, 0.15] {
+        let psf = round(&[(0.35 * share, 4.0), (0.65 * share, 16.0)]);
+        let pairs: Vec<_> = objects.iter().zip(0..).map(|(o, seed)| scene.pair(o, &psf, seed)).collect();
+        let found = estimate(&pairs, &EstimationOptions::default());
+        let (hand, mut frame) = other_scene(&scene, &psf);
+        let truth = other_scene(&scene, &round(&[])).1;
+        let before = mean_wall_error(&frame, &truth, &hand);
+        restore(&mut frame, found.psf.as_ref().unwrap(), &RestorationOptions::default()).unwrap();
+        let after = mean_wall_error(&frame, &truth, &hand);
+        println!("share {share}: {before:.5} m before, {after:.5} m after, {}", found.verdict);
+        if share > 0.0 {
+            assert!(after < 0.1 * before, "{share}: {after} m of {before} m, {found:#?}");
+        } else {
+            // Nothing made worse: the empty point spread function leaves every bit.
+            assert!((after - before).abs() < f64::EPSILON);
+        }
+    }
+}

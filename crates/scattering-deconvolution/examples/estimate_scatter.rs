@@ -9,7 +9,6 @@ use captures::{Object, Scene, elliptic, estimate, mean_wall_error, round};
 use range_image::ComplexFrame;
 use scattering_deconvolution::{EstimationOptions, Psf, RestorationOptions, TermCount, TermShape, Verdict, restore};
 
-#[allow(dead_code)]
 #[path = "../tests/common/captures.rs"]
 mod captures;
 

@@ -1,6 +1,6 @@
 //! How good estimated point spread functions are: covariance by simulation, and the range errors of another scene.
 #![cfg(feature = "estimate")]
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout)]
 
 #[path = "common/captures.rs"]
 mod captures;

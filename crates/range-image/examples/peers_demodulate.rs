@@ -71,8 +71,19 @@ fn least<E>(mut work: impl FnMut() -> Result<(), E>) -> Result<f64, E> {
 
 /// CPU seconds of this thread; NaN where the system does not tell.
 fn cpu_seconds() -> f64 {
-    // The system counts up to the last change of threads: going to sleep is one.
-    std::thread::sleep(Duration::from_micros(200));
-    let text = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap_or_default();
-    text.split(' ').next().and_then(|ns| ns.parse::<f64>().ok()).map_or(f64::NAN, |ns| ns * 1e-9)
+    let figures = || {
+        let text = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
+        let mut words = text.split_whitespace().map(str::parse::<f64>);
+        Some((words.next()?.ok()?, words.nth(1)?.ok()?))
+    };
+    let Some((_, turns)) = figures() else { return f64::NAN };
+    // The system counts up to the last change of threads: sleep until there was one.
+    loop {
+        std::thread::sleep(Duration::from_micros(50));
+        match figures() {
+            Some((nanoseconds, now)) if now > turns => return 1e-9 * nanoseconds,
+            Some(_) => {}
+            None => return f64::NAN,
+        }
+    }
 }

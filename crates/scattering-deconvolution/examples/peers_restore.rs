@@ -55,13 +55,13 @@ fn measure(
     observed: &[Plane; 2],
 ) -> Result<[Plane; 2], Box<dyn Error + Send + Sync>> {
     let [mut real, mut imaginary] = observed.clone();
-    let (mut least, mut spent) = (f64::INFINITY, 0.0);
+    let (mut least, mut spent) = (f64::NAN, 0.0);
     while spent < 0.5 {
         real.copy_from_slice(&observed[0]);
         imaginary.copy_from_slice(&observed[1]);
-        let start = cpu_seconds()?;
+        let start = cpu_seconds();
         restorer.restore_planes(&mut real, &mut imaginary)?;
-        let seconds = cpu_seconds()? - start;
+        let seconds = cpu_seconds() - start;
         least = f64::min(least, seconds);
         spent += seconds.max(1e-3);
     }
@@ -78,12 +78,21 @@ fn write(path: &Path, plane: &[f32]) -> std::io::Result<()> {
     std::fs::write(path, plane.iter().flat_map(|value| value.to_ne_bytes()).collect::<Vec<u8>>())
 }
 
-/// CPU seconds of this thread.
-fn cpu_seconds() -> Result<f64, String> {
-    // The system counts up to the last change of threads: going to sleep is one.
-    std::thread::sleep(Duration::from_micros(200));
-    let path = "/proc/thread-self/schedstat";
-    let text = std::fs::read_to_string(path).map_err(|error| format!("{path}: {error}"))?;
-    let nanoseconds = text.split(' ').next().and_then(|word| word.parse::<f64>().ok());
-    nanoseconds.map(|nanoseconds| 1e-9 * nanoseconds).ok_or_else(|| format!("{path}: {text}"))
+/// CPU seconds of this thread; NaN where the system does not tell.
+fn cpu_seconds() -> f64 {
+    let figures = || {
+        let text = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
+        let mut words = text.split_whitespace().map(str::parse::<f64>);
+        Some((words.next()?.ok()?, words.nth(1)?.ok()?))
+    };
+    let Some((_, turns)) = figures() else { return f64::NAN };
+    // The system counts up to the last change of threads: sleep until there was one.
+    loop {
+        std::thread::sleep(Duration::from_micros(50));
+        match figures() {
+            Some((nanoseconds, now)) if now > turns => return 1e-9 * nanoseconds,
+            Some(_) => {}
+            None => return f64::NAN,
+        }
+    }
 }

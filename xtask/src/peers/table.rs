@@ -55,7 +55,7 @@ impl Bars {
     }
 
     fn row(&mut self, what: &str, bar: &str, reached: f64, met: bool) {
-        let met = if met { "yes" } else { "**no**" };
+        let met = if met && reached.is_finite() { "yes" } else { "**no**" };
         self.0.push(format!("| {what} | {bar} | {} | {met} |", number(reached)));
     }
 

@@ -9,7 +9,7 @@
 //! ```
 //!
 //! Planes are rows of numbers in the machine's own order, `f32`, counts `i32`. What is measured is printed as
-//! `name figure`; times are CPU time of this process (Linux).
+//! `name figure`; times are CPU time of the one thread that works (Linux).
 #![allow(clippy::print_stdout)]
 
 mod absolute;

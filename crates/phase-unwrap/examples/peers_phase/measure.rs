@@ -3,16 +3,23 @@
 use std::fs;
 use std::time::Duration;
 
-/// CPU seconds of all threads of this process; NaN where the system does not tell.
+/// CPU seconds of this thread; NaN where the system does not tell.
 pub fn cpu_seconds() -> f64 {
-    // The system counts up to the last change of threads: going to sleep is one.
-    std::thread::sleep(Duration::from_micros(200));
-    let Ok(threads) = fs::read_dir("/proc/self/task") else { return f64::NAN };
-    let nanoseconds = |folder: fs::DirEntry| {
-        let text = fs::read_to_string(folder.path().join("schedstat")).ok()?;
-        text.split(' ').next()?.parse::<f64>().ok()
+    let figures = || {
+        let text = fs::read_to_string("/proc/thread-self/schedstat").ok()?;
+        let mut words = text.split_whitespace().map(str::parse::<f64>);
+        Some((words.next()?.ok()?, words.nth(1)?.ok()?))
     };
-    1e-9 * threads.flatten().filter_map(nanoseconds).sum::<f64>()
+    let Some((_, turns)) = figures() else { return f64::NAN };
+    // The system counts up to the last change of threads: sleep until there was one.
+    loop {
+        std::thread::sleep(Duration::from_micros(50));
+        match figures() {
+            Some((nanoseconds, now)) if now > turns => return 1e-9 * nanoseconds,
+            Some(_) => {}
+            None => return f64::NAN,
+        }
+    }
 }
 
 /// The result of `work`, its CPU time in milliseconds, and by how many bytes it raised the peak of this process'

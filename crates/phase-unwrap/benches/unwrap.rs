@@ -5,7 +5,10 @@ use std::f64::consts::TAU;
 use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use phase_unwrap::{KnownWraps, MultiFrequencyOptions, SpatialOptions, Unwrapped, Unwrapper, unwrap_multi_frequency};
+use phase_unwrap::{
+    KernelDensityOptions, KnownWraps, MultiFrequencyOptions, MultiUnwrapped, MultiUnwrapper, SpatialOptions, Unwrapped,
+    Unwrapper,
+};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
@@ -54,15 +57,19 @@ fn spatial(c: &mut Criterion) {
 }
 
 fn multi_frequency(c: &mut Criterion) {
-    let modulations = [Modulation::new(80e6).unwrap(), Modulation::new(60e6).unwrap()];
-    for (width, height) in SIZES {
+    let sets: [(&str, &[f64]); 2] = [("two", &[80e6, 60e6]), ("three", &[80e6, 16e6, 120e6])];
+    for ((number, hz), (width, height)) in sets.iter().flat_map(|set| SIZES.map(|size| (*set, size))) {
+        let modulations: Vec<_> = hz.iter().map(|&hz| Modulation::new(hz).unwrap()).collect();
         let range = range(width, height);
-        let phases = modulations.map(|m| wrapped(&range, &m, 2).0);
-        let options = MultiFrequencyOptions::default();
-        let name = format!("two_frequencies/{width}x{height}");
-        c.bench_function(&name, |b| {
-            b.iter(|| unwrap_multi_frequency(black_box(&phases), &modulations, None, None, &options).unwrap());
-        });
+        let phases: Vec<_> = modulations.iter().map(|m| wrapped(&range, m, 2).0).collect();
+        for (how, kernel) in [("alone", None), ("neighbours", Some(KernelDensityOptions::default()))] {
+            let options = MultiFrequencyOptions { kernel, ..MultiFrequencyOptions::default() };
+            let mut unwrapper = MultiUnwrapper::new(&modulations, options).unwrap();
+            let mut out = MultiUnwrapped::default();
+            c.bench_function(&format!("{number}_frequencies_{how}/{width}x{height}"), |b| {
+                b.iter(|| unwrapper.unwrap_into(black_box(&phases), None, None, &mut out).unwrap());
+            });
+        }
     }
 }
 

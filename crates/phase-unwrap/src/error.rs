@@ -72,6 +72,14 @@ pub enum Error {
         /// Number of frequencies given.
         found: usize,
     },
+    /// More frequencies than are searched together.
+    #[error("{found} modulation frequencies given: at most {limit} are searched together")]
+    TooManyFrequencies {
+        /// Number of frequencies given.
+        found: usize,
+        /// Largest number.
+        limit: usize,
+    },
     /// Two frequencies have the same ambiguity interval.
     #[error("frequencies {first} and {second} have the same ambiguity interval of {interval_m} m")]
     EqualFrequencies {
@@ -99,6 +107,16 @@ pub enum Error {
         maximum_range_m: f64,
         /// Combined ambiguity interval in metres.
         combined_interval_m: f64,
+    },
+    /// A standard deviation is negative.
+    #[error("sigma = {value} rad at column {col}, row {row}: a standard deviation is not negative")]
+    NegativeSigma {
+        /// Column.
+        col: usize,
+        /// Row.
+        row: usize,
+        /// Value found.
+        value: f32,
     },
     /// Rasters that belong together differ, or another fault of a raster.
     #[error(transparent)]

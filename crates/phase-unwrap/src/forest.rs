@@ -1,35 +1,16 @@
 //! Minimum spanning forest of the pixel grid by contraction `[Boruvka1926]`.
 //!
-//! Every component picks its cheapest edge, the picked edges join components, and the graph of the joined components
-//! takes the place of the grid. No global sort, no random walks over the image: the components are numbered in scan
-//! order, so neighbours in the image stay neighbours in memory.
+//! Every pixel picks its cheapest link, and the picked links join pixels to components. Of the other links those that
+//! no tree can hold are dropped, and the rest goes, as a list of edges, into further rounds. No global sort, no random
+//! walks over the image: the components are numbered in scan order, so neighbours in the image stay neighbours in
+//! memory.
 
-use crate::grid::{DOWN, Grid, RIGHT, wrap_step};
+use crate::candidates::{Candidates, LEFT, OUTSIDE, TO_BELOW, TO_RIGHT, UP};
+use crate::contraction::{Contraction, Edge, Member};
+use crate::grid::{Grid, wrap_step};
 
 /// Label of a pixel that belongs to no component.
 pub(crate) const NO_LABEL: u32 = u32::MAX;
-const NO_EDGE: u64 = u64::MAX;
-
-/// Order of edges: cost first, then position in the list. The bits of costs that are not negative sort as the costs do.
-fn key(cost: f32, index: usize) -> u64 {
-    u64::from(cost.to_bits()) << 32 | index as u64
-}
-
-/// Edge between two components; `step` is the wrap offset of `to` minus that of `from`.
-#[derive(Debug, Clone, Copy, Default)]
-struct Edge {
-    from: u32,
-    to: u32,
-    cost: f32,
-    step: i32,
-}
-
-/// What became of the components of one level: the component of the next level, and the wrap offset in it.
-#[derive(Debug, Default)]
-struct Level {
-    root: Vec<u32>,
-    offset: Vec<i32>,
-}
 
 /// A spanning forest: component and relative wrap count of every pixel. Buffers are kept for the next image.
 #[derive(Debug, Default)]
@@ -40,220 +21,143 @@ pub(crate) struct Forest {
     pub wraps: Vec<i32>,
     /// Number of components.
     pub components: usize,
-    choice: Vec<u8>,
-    edges: Vec<Edge>,
-    /// Cheapest edge of each component as a sortable key, see `key`.
-    best: Vec<u64>,
-    row: Vec<Edge>,
-    levels: Vec<Level>,
-    path: Vec<u32>,
+    candidates: Candidates,
+    contraction: Contraction,
+    /// First pixel of each run of pixels that hang together by links up and to the left.
+    first: Vec<u32>,
+    number: Vec<u32>,
 }
 
 impl Forest {
-    /// Grows the forest over the linked neighbours; an edge costs the sum of its pixels' costs, ties go to the lower
-    /// edge index. Pixels of infinite cost stay out; links must join pixels of finite cost only.
-    pub fn grow(&mut self, grid: &Grid, phase: &[f32], cost: &[f32], links: &[u8]) {
-        self.choose(grid, cost, links);
-        let mut components = self.join_pixels(grid, phase, cost);
-        self.collect_edges(grid, phase, cost, links);
-        let mut depth = 0;
-        while !self.edges.is_empty() {
-            if self.levels.len() == depth {
-                self.levels.push(Level::default());
-            }
-            self.pick_edges(components);
-            components = self.join_components(depth, components);
-            self.contract_edges(depth);
-            depth += 1;
-        }
-        self.components = components;
-        self.resolve(depth);
+    /// Grows the forest over the linked neighbours, all neighbours where no `links` are given; an edge costs the sum of
+    /// its pixels' costs, ties go to the lower edge index. Pixels of infinite cost stay out.
+    pub fn grow(&mut self, grid: &Grid, phase: &[f32], cost: &[f32], links: Option<&[u8]>) {
+        self.candidates.choose(grid, cost, links);
+        self.candidates.open(grid, cost, links);
+        self.join_runs(grid, phase);
+        self.hang_runs(grid, phase);
+        let components = self.collect_edges(grid, phase, cost);
+        self.components = self.contraction.run(components);
+        self.resolve();
     }
 
-    /// The cheapest link of each pixel: 0 none, else 1 + position in [up, left, right, down].
-    fn choose(&mut self, grid: &Grid, cost: &[f32], links: &[u8]) {
-        self.choice.clear();
-        self.choice.resize(grid.len(), 0);
-        let stride = grid.stride;
-        for start in grid.row_starts() {
-            let width = grid.width;
-            let shifted = |plane: usize| plane..plane + width;
-            let out = &mut self.choice[shifted(start)];
-            let (up, down) = (&cost[shifted(start - stride)], &cost[shifted(start + stride)]);
-            let (left, right) = (&cost[shifted(start - 1)], &cost[shifted(start + 1)]);
-            let (up_link, left_link) = (&links[shifted(start - stride)], &links[shifted(start - 1)]);
-            let link = &links[shifted(start)];
-            for col in 0..width {
-                // The order up, left, right, down is that of the edge indices, and `<` keeps the first of equals.
-                let mut best = f32::INFINITY;
-                let mut choice = 0;
-                let mut offer = |open: bool, cost: f32, direction: u8| {
-                    // No short cut: both tests are cheaper than a branch that is wrong half of the time.
-                    let better = u8::from(open) & u8::from(cost < best) != 0;
-                    best = if better { cost } else { best };
-                    choice = if better { direction } else { choice };
-                };
-                offer(up_link[col] & DOWN != 0, up[col], 1);
-                offer(left_link[col] & RIGHT != 0, left[col], 2);
-                offer(link[col] & RIGHT != 0, right[col], 3);
-                offer(link[col] & DOWN != 0, down[col], 4);
-                out[col] = choice;
-            }
-        }
+    /// Bytes held by the buffers.
+    pub fn bytes(&self) -> usize {
+        let words = [self.label.capacity(), self.wraps.capacity(), self.first.capacity(), self.number.capacity()];
+        let candidates = self.candidates.choice.capacity() + self.candidates.open.capacity();
+        4 * words.iter().sum::<usize>() + candidates + self.contraction.bytes()
     }
 
-    fn join_pixels(&mut self, grid: &Grid, phase: &[f32], cost: &[f32]) -> usize {
+    /// Pixels that picked the one above or to the left take its label; all others begin a run of their own.
+    fn join_runs(&mut self, grid: &Grid, phase: &[f32]) {
         self.label.clear();
         self.label.resize(grid.len(), NO_LABEL);
         self.wraps.clear();
         self.wraps.resize(grid.len(), 0);
-        let stride = grid.stride;
-        let choice = &self.choice;
-        // Steps of the choices; a table of eight needs no branch and no check.
-        let steps = [0, 0_usize.wrapping_sub(stride), usize::MAX, 1, stride, 0, 0, 0];
-        let target = |pixel: usize| pixel.wrapping_add(steps[usize::from(choice[pixel] & 7)]);
-        let mut components = 0;
-        for first in grid.inner() {
-            if cost[first] == f32::INFINITY || self.label[first] != NO_LABEL {
-                continue;
-            }
-            let parent = target(first);
-            if self.label[parent] != NO_LABEL {
-                // Most pixels: what they picked was met before.
-                self.label[first] = self.label[parent];
-                self.wraps[first] = self.wraps[parent] + wrap_step(phase[parent], phase[first]);
-                continue;
-            }
-            let mut pixel = first;
-            while self.label[pixel] == NO_LABEL {
-                let next = target(pixel);
-                // Two pixels that picked each other: the first of them is the root.
-                if next == pixel || (target(next) == pixel && pixel < next) {
-                    self.label[pixel] = components;
-                    components += 1;
-                    break;
-                }
-                self.path.push(pixel as u32);
-                pixel = next;
-            }
-            while let Some(child) = self.path.pop() {
-                let child = child as usize;
-                self.label[child] = self.label[pixel];
-                self.wraps[child] = self.wraps[pixel] + wrap_step(phase[pixel], phase[child]);
-                pixel = child;
-            }
-        }
-        components as usize
-    }
-
-    /// The links between different components, in scan order.
-    fn collect_edges(&mut self, grid: &Grid, phase: &[f32], cost: &[f32], links: &[u8]) {
-        self.edges.clear();
-        // Smooth and noisy images alike leave about 0.8 edges a pixel; doubling on the way there would waste memory.
-        self.edges.reserve_exact(grid.len());
-        self.row.clear();
-        self.row.resize(2 * grid.width, Edge::default());
+        self.first.clear();
+        let mut runs = 0;
         for start in grid.row_starts() {
-            let mut count = 0;
-            for pixel in start..start + grid.width {
-                for (bit, other) in [(RIGHT, pixel + 1), (DOWN, pixel + grid.stride)] {
-                    let (from, to) = (self.label[pixel], self.label[other]);
-                    let step = wrap_step(phase[pixel], phase[other]) + self.wraps[pixel] - self.wraps[other];
-                    // Written always, kept by the count: the condition is a coin toss no processor predicts.
-                    self.row[count] = Edge { from, to, cost: cost[pixel] + cost[other], step };
-                    count += usize::from(links[pixel] & bit != 0) & usize::from(from != to);
+            self.first.resize(runs + grid.width, 0);
+            runs += self.join_row(grid, phase, start, runs);
+        }
+        self.first.truncate(runs);
+    }
+
+    /// No branch: which way a pixel hangs is a coin toss that no processor predicts.
+    fn join_row(&mut self, grid: &Grid, phase: &[f32], start: usize, before: usize) -> usize {
+        let n = grid.width;
+        let (above, here) = self.label.split_at_mut(start);
+        let (up_label, label) = (&above[start - grid.stride..][..n], &mut here[..n]);
+        let (above, here) = self.wraps.split_at_mut(start);
+        let (up_wraps, wraps) = (&above[start - grid.stride..][..n], &mut here[..n]);
+        let choice = &self.candidates.choice[start..][..n];
+        let (up, left, centre) = (&phase[start - grid.stride..][..n], &phase[start - 1..][..n], &phase[start..][..n]);
+        let first = &mut self.first[before..][..n];
+        let (mut runs, mut left_label, mut left_wraps) = (0, NO_LABEL, 0);
+        for col in 0..n {
+            let hangs_up = choice[col] == UP;
+            let (parent, label_of, wraps_of) =
+                if hangs_up { (up[col], up_label[col], up_wraps[col]) } else { (left[col], left_label, left_wraps) };
+            let hangs = hangs_up || choice[col] == LEFT;
+            let outside = choice[col] == OUTSIDE;
+            first[runs.min(n - 1)] = (start + col) as u32;
+            let own = if outside { NO_LABEL } else { (before + runs) as u32 };
+            left_label = if hangs { label_of } else { own };
+            left_wraps = if hangs { wraps_of + wrap_step(parent, centre[col]) } else { 0 };
+            label[col] = left_label;
+            wraps[col] = left_wraps;
+            runs += usize::from(!(hangs || outside));
+        }
+        runs
+    }
+
+    /// Each run hangs on the run that the choice of its first pixel leads to; of two pixels that chose each other the
+    /// later is in the run of the earlier, so that this run hangs on itself.
+    fn hang_runs(&mut self, grid: &Grid, phase: &[f32]) {
+        let mut ahead = [0; 8];
+        ahead[usize::from(TO_RIGHT)] = 1;
+        ahead[usize::from(TO_BELOW)] = grid.stride;
+        let level = self.contraction.first_level();
+        level.reserve_exact(self.first.len());
+        for (run, &first) in self.first.iter().enumerate() {
+            let first = first as usize;
+            let target = first + ahead[usize::from(self.candidates.choice[first] & 7)];
+            let root = self.label[target];
+            let offset = self.wraps[target] + wrap_step(phase[target], phase[first]);
+            level.push(Member { root, offset: if root as usize == run { 0 } else { offset } });
+        }
+    }
+
+    /// The open links between different components, in scan order.
+    fn collect_edges(&mut self, grid: &Grid, phase: &[f32], cost: &[f32]) -> usize {
+        let (label, wraps) = (&self.label, &self.wraps);
+        let (components, edges, level) = self.contraction.join_first();
+        let place = |pixel: usize| {
+            let member = level[label[pixel] as usize];
+            (member.root, wraps[pixel] + member.offset)
+        };
+        edges.clear();
+        for start in grid.row_starts() {
+            for (block, open) in self.candidates.open[start..start + grid.width].chunks(8).enumerate() {
+                let mut bytes = [0; 8];
+                bytes[..open.len()].copy_from_slice(open);
+                let mut word = u64::from_le_bytes(bytes);
+                while word != 0 {
+                    let bit = word.trailing_zeros() as usize;
+                    word &= word - 1;
+                    let pixel = start + 8 * block + bit / 8;
+                    let other = pixel + if bit.is_multiple_of(8) { 1 } else { grid.stride };
+                    let ((from, here), (to, there)) = (place(pixel), place(other));
+                    if from != to {
+                        let step = wrap_step(phase[pixel], phase[other]) + here - there;
+                        edges.push(Edge { from, to, cost: cost[pixel] + cost[other], step });
+                    }
                 }
             }
-            self.edges.extend_from_slice(&self.row[..count]);
         }
+        components
     }
 
-    /// The cheapest edge of each component; among equals the first in the list, which keeps scan order.
-    fn pick_edges(&mut self, components: usize) {
-        self.best.clear();
-        self.best.resize(components, NO_EDGE);
-        for (index, edge) in self.edges.iter().enumerate() {
-            let key = key(edge.cost, index);
-            for end in [edge.from as usize, edge.to as usize] {
-                self.best[end] = self.best[end].min(key);
+    /// Carries roots and offsets back to the pixels.
+    fn resolve(&mut self) {
+        let members = self.contraction.resolve();
+        // Runs are in scan order; the number of a component is to be that of its first.
+        self.number.clear();
+        self.number.resize(self.components, NO_LABEL);
+        let mut next = 0;
+        for member in members.iter_mut() {
+            let number = &mut self.number[member.root as usize];
+            if *number == NO_LABEL {
+                *number = next;
+                next += 1;
             }
+            member.root = *number;
         }
-    }
-
-    fn join_components(&mut self, depth: usize, components: usize) -> usize {
-        let Level { root, offset } = &mut self.levels[depth];
-        root.clear();
-        root.resize(components, NO_LABEL);
-        offset.clear();
-        offset.resize(components, 0);
-        let (best, edges) = (&self.best, &self.edges);
-        let mut joined = 0;
-        for first in 0..components as u32 {
-            let mut node = first;
-            while root[node as usize] == NO_LABEL {
-                let next = best_target(best, edges, node);
-                if next == node || (best[next as usize] == best[node as usize] && node < next) {
-                    root[node as usize] = joined;
-                    joined += 1;
-                    break;
-                }
-                self.path.push(node);
-                node = next;
-            }
-            while let Some(child) = self.path.pop() {
-                let edge = &edges[best[child as usize] as u32 as usize];
-                let step = if edge.to == child { edge.step } else { -edge.step };
-                root[child as usize] = root[node as usize];
-                offset[child as usize] = offset[node as usize] + step;
-                node = child;
-            }
-        }
-        joined as usize
-    }
-
-    fn contract_edges(&mut self, depth: usize) {
-        let Level { root, offset } = &self.levels[depth];
-        let mut kept = 0;
-        for index in 0..self.edges.len() {
-            let mut edge = self.edges[index];
-            let (from, to) = (edge.from as usize, edge.to as usize);
-            edge.step += offset[from] - offset[to];
-            (edge.from, edge.to) = (root[from], root[to]);
-            self.edges[kept] = edge;
-            kept += usize::from(edge.from != edge.to);
-        }
-        self.edges.truncate(kept);
-    }
-
-    /// Carries roots and offsets of the last level back to the pixels.
-    fn resolve(&mut self, depth: usize) {
-        for level in (1..depth).rev() {
-            let (lower, upper) = self.levels.split_at_mut(level);
-            let (lower, upper) = (&mut lower[level - 1], &upper[0]);
-            for (root, offset) in lower.root.iter_mut().zip(&mut lower.offset) {
-                *offset += upper.offset[*root as usize];
-                *root = upper.root[*root as usize];
-            }
-        }
-        if depth == 0 {
-            return;
-        }
-        let level = &self.levels[0];
         for (label, wraps) in self.label.iter_mut().zip(&mut self.wraps) {
-            if *label != NO_LABEL {
-                *wraps += level.offset[*label as usize];
-                *label = level.root[*label as usize];
+            if let Some(member) = members.get(*label as usize) {
+                *wraps += member.offset;
+                *label = member.root;
             }
-        }
-    }
-}
-
-fn best_target(best: &[u64], edges: &[Edge], node: u32) -> u32 {
-    match best[node as usize] {
-        NO_EDGE => node,
-        key => {
-            let edge = &edges[key as u32 as usize];
-            if edge.from == node { edge.to } else { edge.from }
         }
     }
 }
@@ -261,6 +165,7 @@ fn best_target(best: &[u64], edges: &[Edge], node: u32) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::grid::{DOWN, RIGHT};
 
     fn bytes<T>(buffer: &Vec<T>) -> usize {
         buffer.capacity() * size_of::<T>()
@@ -280,12 +185,9 @@ mod tests {
             .map(|i| if open(i, i + 1) { RIGHT } else { 0 } | if open(i, i + grid.stride) { DOWN } else { 0 })
             .collect();
         let mut forest = Forest::default();
-        forest.grow(&grid, &phase, &cost, &links);
+        forest.grow(&grid, &phase, &cost, Some(&links));
         assert_eq!(forest.components, 1);
-        let levels: usize = forest.levels.iter().map(|l| bytes(&l.root) + bytes(&l.offset)).sum();
-        let own = bytes(&forest.label) + bytes(&forest.wraps) + bytes(&forest.choice) + bytes(&forest.edges);
-        let total = own + levels + bytes(&forest.best) + bytes(&forest.row) + bytes(&forest.path);
-        let total = total + bytes(&phase) + bytes(&cost) + bytes(&links);
+        let total = forest.bytes() + bytes(&phase) + bytes(&cost) + bytes(&links);
         assert!(total <= 40 * 300 * 200, "{} bytes a pixel", total as f64 / 60_000.0);
         Ok(())
     }

@@ -1,52 +1,89 @@
-//! Unwrapping with several frequencies: a search over all wrap counts in the combined ambiguity interval.
+//! Unwrapping with several frequencies: hypotheses for each pixel, and a choice among them.
 
-use std::f32::consts::TAU as TAU_F32;
-use std::f64::consts::TAU;
+use std::f32::consts::TAU;
 
 use range_image::{Modulation, Raster};
+use rayon::prelude::*;
 
-use crate::intervals::combined_interval_m;
+use crate::kernel_density::{KernelDensityOptions, RANKS, Ranked, pick};
+use crate::lanes::{LANES, nearest, with_wide_registers};
+use crate::lattice::{Lattice, Planes};
 use crate::{Error, Result};
+
+/// Pixels that one thread takes at a time where rows do not matter: a multiple of the block.
+const CHUNK: usize = 256 * LANES;
 
 /// How several frequencies are unwrapped.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MultiFrequencyOptions {
     /// Largest range searched, metres. `None`: the combined ambiguity interval.
     pub maximum_range_m: Option<f64>,
-    /// Standard deviation of the phase, radians, where none is given.
+    /// Standard deviation of the phase, radians, where none is given. Confidences are as good as it is.
     pub assumed_sigma_phase_rad: f32,
     /// Largest number of hypotheses a pixel: a search beyond it is refused.
     pub maximum_hypotheses: usize,
     /// Misfit per degree of freedom, as a ratio of variances, above which the confidence is lowered: phases that no
     /// range explains come from mixed pixels, multipath or motion.
     pub acceptable_misfit: f32,
+    /// How neighbours take part in the choice. `None`: each pixel decides alone.
+    pub kernel: Option<KernelDensityOptions>,
 }
 
 impl Default for MultiFrequencyOptions {
     fn default() -> Self {
-        Self { maximum_range_m: None, assumed_sigma_phase_rad: 0.1, maximum_hypotheses: 4096, acceptable_misfit: 9.0 }
+        Self {
+            maximum_range_m: None,
+            assumed_sigma_phase_rad: 0.1,
+            maximum_hypotheses: 4096,
+            acceptable_misfit: 9.0,
+            kernel: Some(KernelDensityOptions::default()),
+        }
+    }
+}
+
+impl MultiFrequencyOptions {
+    pub(crate) fn validate(&self, maximum_range_m: f64) -> Result<()> {
+        let positive = [
+            ("maximum_range_m", maximum_range_m),
+            ("assumed_sigma_phase_rad", self.assumed_sigma_phase_rad.into()),
+            ("acceptable_misfit", self.acceptable_misfit.into()),
+        ];
+        for (name, value) in positive {
+            if !(value.is_finite() && value > 0.0) {
+                return Err(Error::OutOfDomain { name, value, expected: "positive and finite" });
+            }
+        }
+        self.kernel.map_or(Ok(()), |kernel| kernel.validate())
     }
 }
 
 /// Wrap counts and combined ranges of several frequencies.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct MultiUnwrapped {
-    /// Whole cycles of each frequency; 0 where there is no answer.
+    /// Whole cycles of each frequency: those that bring its phase nearest to `range`; 0 where there is no answer. A
+    /// phase just below a full cycle at a range near zero has -1.
     pub wraps: Vec<Raster<i32>>,
     /// Inverse-variance mean of the ranges, metres; NaN where fewer than two phases are usable.
     pub range: Raster<f32>,
     /// Standard deviation of `range` in metres as the phases' sigmas propagate; NaN where these are not given.
     pub sigma: Raster<f32>,
-    /// 0 (a guess, or no answer) to 1: from the gap to the second-best hypothesis and the misfit of the best.
+    /// 0 (a guess, or no answer) to 1: `2p - 1` for the probability p of the range chosen among the hypotheses, lowered
+    /// where it does not explain the phases.
     pub confidence: Raster<f32>,
 }
 
-/// Finds the wrap counts of each pixel that make the ranges of all frequencies agree best.
-///
-/// `phases` are in radians in `[0, 2 pi]`, one raster a frequency, `sigma_phase` their standard deviations; where that
-/// is NaN or not positive the assumed one stands in. For each count of the highest frequency the others take the
-/// counts nearest to its range; the hypothesis with the smallest sum of squared, normalised residuals wins. A phase
-/// that is not finite is left out; two at least are needed.
+impl MultiUnwrapped {
+    /// Pixels without an answer, or whose confidence is below `minimum_confidence`: their range is a guess.
+    pub fn unsure(&self, minimum_confidence: f32) -> Raster<bool> {
+        let mut unsure = self.confidence.map(|&confidence| confidence < minimum_confidence);
+        for (unsure, range) in unsure.as_mut_slice().iter_mut().zip(self.range.as_slice()) {
+            *unsure |= range.is_nan();
+        }
+        unsure
+    }
+}
+
+/// Finds the wrap counts of each pixel; see [`MultiUnwrapper::unwrap`]. Allocates its buffers anew.
 pub fn unwrap_multi_frequency(
     phases: &[Raster<f32>],
     modulations: &[Modulation],
@@ -54,211 +91,157 @@ pub fn unwrap_multi_frequency(
     mask: Option<&Raster<bool>>,
     options: &MultiFrequencyOptions,
 ) -> Result<MultiUnwrapped> {
-    let search = Search::new(modulations, options)?;
-    let first = check_planes(phases, modulations.len(), sigma_phase, mask)?;
-    let (width, height) = (first.width(), first.height());
-    let plane = |value| Raster::filled(width, height, value);
-    let mut out = MultiUnwrapped {
-        wraps: vec![Raster::filled(width, height, 0); phases.len()],
-        range: plane(f32::NAN),
-        sigma: plane(f32::NAN),
-        confidence: plane(0.0),
-    };
-    let mut pixel = PixelSearch::default();
-    for index in 0..first.len() {
-        if mask.is_some_and(|mask| !mask.as_slice()[index]) {
-            continue;
-        }
-        pixel.load(&search, phases, sigma_phase, index);
-        let Some(best) = pixel.search(&search) else {
-            continue;
-        };
-        for (member, &wraps) in pixel.members.iter().zip(&pixel.counts) {
-            out.wraps[member.frequency].as_mut_slice()[index] = wraps;
-        }
-        out.range.as_mut_slice()[index] = best.range_m as f32;
-        out.confidence.as_mut_slice()[index] = best.confidence;
-        if pixel.sigma_known {
-            out.sigma.as_mut_slice()[index] = best.sigma_m as f32;
-        }
+    MultiUnwrapper::new(modulations, *options)?.unwrap(phases, sigma_phase, mask)
+}
+
+/// Unwraps frames of the same frequencies one after the other and keeps its buffers.
+#[derive(Debug, Clone)]
+pub struct MultiUnwrapper {
+    lattice: Lattice,
+    kernel: Option<KernelDensityOptions>,
+    ranked: Ranked,
+}
+
+impl MultiUnwrapper {
+    /// Fails where frequencies or options lie outside their domain.
+    pub fn new(modulations: &[Modulation], options: MultiFrequencyOptions) -> Result<Self> {
+        let lattice = Lattice::new(modulations, &options)?;
+        Ok(Self { lattice, kernel: options.kernel, ranked: Ranked::default() })
     }
-    Ok(out)
-}
 
-fn check_planes<'a>(
-    phases: &'a [Raster<f32>],
-    frequencies: usize,
-    sigma_phase: Option<&[Raster<f32>]>,
-    mask: Option<&Raster<bool>>,
-) -> Result<&'a Raster<f32>> {
-    let count = |what, planes: &[Raster<f32>]| {
-        let found = planes.len();
-        if found == frequencies { Ok(()) } else { Err(Error::PlaneCount { what, expected: frequencies, found }) }
-    };
-    count("phase", phases)?;
-    let Some(first) = phases.first().filter(|first| !first.is_empty()) else {
-        return Err(Error::Empty { width: 0, height: 0 });
-    };
-    for plane in phases {
-        first.require_same_size(plane, "phase")?;
-        let outside = |&value: &f32| value.is_finite() && !(0.0..=TAU_F32).contains(&value);
-        if let Some(index) = plane.as_slice().iter().position(outside) {
-            let (col, row) = (index % first.width(), index / first.width());
-            return Err(Error::PhaseOutsideCycle { col, row, value: plane.as_slice()[index] });
-        }
+    /// Wrap counts and ranges of a frame.
+    ///
+    /// `phases` are in radians in `[0, 2 pi]`, one raster a frequency in the order of the modulations; `sigma_phase`
+    /// their standard deviations, and where that is NaN or not positive the assumed one stands in. In `mask`, true means
+    /// use. A phase that is not finite is left out; two at least are needed.
+    ///
+    /// For each count of the highest frequency the others take the counts nearest to its range. The misfit of such a
+    /// hypothesis is the sum of squared, normalised residuals. The hypotheses with the smallest misfits are weighed
+    /// against each other, with the neighbours' `[JaremoLawin2016]` unless switched off.
+    pub fn unwrap(
+        &mut self,
+        phases: &[Raster<f32>],
+        sigma_phase: Option<&[Raster<f32>]>,
+        mask: Option<&Raster<bool>>,
+    ) -> Result<MultiUnwrapped> {
+        let mut out = MultiUnwrapped::default();
+        self.unwrap_into(phases, sigma_phase, mask, &mut out)?;
+        Ok(out)
     }
-    if let Some(sigmas) = sigma_phase {
-        count("sigma of the phase", sigmas)?;
-        for plane in sigmas {
-            first.require_same_size(plane, "sigma of the phase")?;
+
+    /// As [`MultiUnwrapper::unwrap`], into an existing result of any size, which an error leaves as it was.
+    pub fn unwrap_into(
+        &mut self,
+        phases: &[Raster<f32>],
+        sigma_phase: Option<&[Raster<f32>]>,
+        mask: Option<&Raster<bool>>,
+        out: &mut MultiUnwrapped,
+    ) -> Result<()> {
+        let planes = Planes::new(phases, self.lattice.order.len(), sigma_phase, mask)?;
+        out.resize(planes.size(), phases.len());
+        match self.kernel {
+            Some(kernel) => self.choose_with_neighbours(&planes, &kernel, out),
+            None => self.choose_alone(&planes, out),
         }
+        self.count_wraps(&planes, out);
+        Ok(())
     }
-    if let Some(mask) = mask {
-        first.require_same_size(mask, "mask")?;
+
+    fn choose_alone(&self, planes: &Planes<'_>, out: &mut MultiUnwrapped) {
+        let ranges = out.range.as_mut_slice().par_chunks_mut(CHUNK);
+        let qualities =
+            out.sigma.as_mut_slice().par_chunks_mut(CHUNK).zip(out.confidence.as_mut_slice().par_chunks_mut(CHUNK));
+        ranges.zip(qualities).enumerate().for_each(|(chunk, (range, (sigma, confidence)))| {
+            with_wide_registers(
+                #[inline(always)]
+                || {
+                    for start in (0..range.len()).step_by(LANES) {
+                        let count = LANES.min(range.len() - start);
+                        let found = self.lattice.search::<RANKS>(planes, chunk * CHUNK + start, count);
+                        let chosen = pick(&found.range_m, &found.probability, &found.acceptable);
+                        range[start..][..count].copy_from_slice(&chosen.range_m[..count]);
+                        sigma[start..][..count].copy_from_slice(&found.known_sigma_m[..count]);
+                        confidence[start..][..count].copy_from_slice(&chosen.confidence[..count]);
+                    }
+                },
+            );
+        });
     }
-    Ok(first)
-}
 
-/// What does not depend on the pixel.
-struct Search {
-    /// Position and interval in metres of each frequency, highest frequency first.
-    intervals: Vec<(usize, f64)>,
-    maximum_range_m: f64,
-    assumed_sigma: f64,
-    acceptable_misfit: f64,
-}
-
-impl Search {
-    fn new(modulations: &[Modulation], options: &MultiFrequencyOptions) -> Result<Self> {
-        let combined = combined_interval_m(modulations)?;
-        let maximum_range_m = options.maximum_range_m.unwrap_or(combined);
-        let positive = [
-            ("maximum_range_m", maximum_range_m),
-            ("assumed_sigma_phase_rad", options.assumed_sigma_phase_rad.into()),
-            ("acceptable_misfit", options.acceptable_misfit.into()),
-        ];
-        for (name, value) in positive {
-            if !(value.is_finite() && value > 0.0) {
-                return Err(Error::OutOfDomain { name, value, expected: "positive and finite" });
-            }
-        }
-        // A millionth of slack lets the caller state the combined interval itself, rounded.
-        if maximum_range_m > combined * (1.0 + 1e-6) {
-            return Err(Error::BeyondCombinedInterval { maximum_range_m, combined_interval_m: combined });
-        }
-        let mut intervals: Vec<(usize, f64)> =
-            modulations.iter().map(Modulation::ambiguity_interval_m).enumerate().collect();
-        intervals.sort_by(|a, b| a.1.total_cmp(&b.1));
-        let hypotheses = (maximum_range_m / intervals[0].1).ceil();
-        if hypotheses > options.maximum_hypotheses as f64 {
-            let limit = options.maximum_hypotheses;
-            return Err(Error::SearchTooLarge { hypotheses, maximum_range_m, limit });
-        }
-        Ok(Self {
-            intervals,
-            maximum_range_m,
-            assumed_sigma: options.assumed_sigma_phase_rad.into(),
-            acceptable_misfit: options.acceptable_misfit.into(),
-        })
+    fn choose_with_neighbours(&mut self, planes: &Planes<'_>, kernel: &KernelDensityOptions, out: &mut MultiUnwrapped) {
+        let (width, height) = planes.size();
+        self.ranked.resize(width, height, self.lattice.intervals_m[0] as f32, kernel);
+        let (layout, lines) = self.ranked.rows_mut();
+        let lattice = &self.lattice;
+        let rows = lines.par_chunks_mut(layout.row_length()).zip(out.sigma.as_mut_slice().par_chunks_mut(width));
+        rows.enumerate().for_each(|(row, (lines, sigma))| {
+            with_wide_registers(
+                #[inline(always)]
+                || {
+                    for col in (0..width).step_by(LANES) {
+                        let count = LANES.min(width - col);
+                        let found = lattice.search::<RANKS>(planes, row * width + col, count);
+                        layout.store(lines, col, &found);
+                        sigma[col..][..count].copy_from_slice(&found.known_sigma_m[..count]);
+                    }
+                },
+            );
+        });
+        let ranked = &self.ranked;
+        let ranges = out.range.as_mut_slice().par_chunks_mut(width);
+        let rows = ranges.zip(out.confidence.as_mut_slice().par_chunks_mut(width));
+        rows.enumerate().for_each(|(row, (range, confidence))| {
+            with_wide_registers(
+                #[inline(always)]
+                || {
+                    for col in (0..width).step_by(LANES) {
+                        let count = LANES.min(width - col);
+                        let chosen = ranked.choose(row, col);
+                        range[col..][..count].copy_from_slice(&chosen.range_m[..count]);
+                        confidence[col..][..count].copy_from_slice(&chosen.confidence[..count]);
+                    }
+                },
+            );
+        });
     }
-}
 
-/// One usable phase of a pixel.
-#[derive(Debug, Clone, Copy)]
-struct Member {
-    frequency: usize,
-    interval_m: f64,
-    /// Its inverse, 1/m.
-    rate: f64,
-    /// Phase in cycles.
-    cycles: f64,
-    /// Inverse variance of the range, 1/m^2.
-    weight: f64,
-}
-
-impl Member {
-    /// The count, from 0, that brings this phase nearest to a range.
-    fn nearest_count(&self, range_m: f64) -> f64 {
-        // Truncation after adding a half rounds what is not negative, without a call into the mathematical library.
-        f64::from(((range_m * self.rate - self.cycles).max(0.0) + 0.5) as i32)
-    }
-}
-
-struct Best {
-    range_m: f64,
-    sigma_m: f64,
-    confidence: f32,
-}
-
-/// The search of one pixel; members are sorted by frequency, highest first.
-#[derive(Debug, Default)]
-struct PixelSearch {
-    members: Vec<Member>,
-    sigma_known: bool,
-    /// Counts of the best hypothesis, in the order of the members.
-    counts: Vec<i32>,
-}
-
-impl PixelSearch {
-    fn load(&mut self, search: &Search, phases: &[Raster<f32>], sigmas: Option<&[Raster<f32>]>, index: usize) {
-        self.members.clear();
-        self.sigma_known = true;
-        for &(frequency, interval_m) in &search.intervals {
-            let phase = f64::from(phases[frequency].as_slice()[index]);
-            if !phase.is_finite() {
-                continue;
-            }
-            let given = sigmas.map(|planes| f64::from(planes[frequency].as_slice()[index]));
-            let known = given.filter(|sigma| sigma.is_finite() && *sigma > 0.0);
-            self.sigma_known &= known.is_some();
-            let sigma_m = known.unwrap_or(search.assumed_sigma) * interval_m / TAU;
-            self.members.push(Member {
-                frequency,
-                interval_m,
-                rate: 1.0 / interval_m,
-                cycles: phase / TAU,
-                weight: 1.0 / (sigma_m * sigma_m),
+    /// The counts that bring each phase nearest to the range chosen.
+    fn count_wraps(&self, planes: &Planes<'_>, out: &mut MultiUnwrapped) {
+        for (&frequency, interval_m) in self.lattice.order.iter().zip(&self.lattice.intervals_m) {
+            let rate = (1.0 / interval_m) as f32;
+            let wraps = out.wraps[frequency].as_mut_slice().par_chunks_mut(CHUNK);
+            let ranges = out.range.as_slice().par_chunks(CHUNK).zip(planes.phase(frequency).par_chunks(CHUNK));
+            wraps.zip(ranges).for_each(|(wraps, (ranges, phases))| {
+                with_wide_registers(
+                    #[inline(always)]
+                    || {
+                        for ((wraps, range), phase) in wraps.iter_mut().zip(ranges).zip(phases) {
+                            let cycles = range * rate - phase * (1.0 / TAU);
+                            *wraps = if cycles.is_finite() { nearest(cycles) as i32 } else { 0 };
+                        }
+                    },
+                );
             });
         }
     }
+}
 
-    fn search(&mut self, search: &Search) -> Option<Best> {
-        let (first, others) = self.members.split_first()?;
-        if others.is_empty() {
-            return None;
+impl MultiUnwrapped {
+    fn resize(&mut self, (width, height): (usize, usize), frequencies: usize) {
+        self.wraps.truncate(frequencies);
+        self.wraps.resize_with(frequencies, Raster::default);
+        for wraps in &mut self.wraps {
+            resize(wraps, width, height, 0);
         }
-        let weight: f64 = self.members.iter().map(|m| m.weight).sum();
-        let (mut best, mut second, mut range_m, mut best_count) = (f64::INFINITY, f64::INFINITY, f64::NAN, 0);
-        let hypotheses = (search.maximum_range_m / first.interval_m).ceil() as i32;
-        for count in 0..hypotheses {
-            let reference = first.interval_m * (first.cycles + f64::from(count));
-            let (mut sum, mut squares) = (0.0, 0.0);
-            for other in others {
-                let residual = other.interval_m * (other.cycles + other.nearest_count(reference)) - reference;
-                sum += other.weight * residual;
-                squares += other.weight * residual * residual;
-            }
-            let range = reference + sum / weight;
-            let misfit = squares - sum * sum / weight;
-            if range >= search.maximum_range_m {
-                continue;
-            }
-            if misfit < best {
-                (best, second, range_m, best_count) = (misfit, best, range, count);
-            } else if misfit < second {
-                second = misfit;
-            }
+        for plane in [&mut self.range, &mut self.sigma, &mut self.confidence] {
+            resize(plane, width, height, f32::NAN);
         }
-        let reference = first.interval_m * (first.cycles + f64::from(best_count));
-        self.counts.clear();
-        self.counts.push(best_count);
-        self.counts.extend(others.iter().map(|other| other.nearest_count(reference) as i32));
-        range_m.is_finite().then(|| {
-            let freedom = others.len() as f64;
-            let acceptable = (search.acceptable_misfit * freedom / best.max(f64::MIN_POSITIVE)).min(1.0);
-            // Half the difference of chi-squared is a log likelihood ratio, and tanh of its half is 2 p - 1.
-            let confidence = ((second - best) / 4.0).tanh() * acceptable;
-            Best { range_m, sigma_m: 1.0 / weight.sqrt(), confidence: confidence as f32 }
-        })
+    }
+}
+
+/// A raster of this size; values are kept where the size is right already.
+fn resize<T: Clone>(raster: &mut Raster<T>, width: usize, height: usize, value: T) {
+    if (raster.width(), raster.height()) != (width, height) {
+        *raster = Raster::filled(width, height, value);
     }
 }

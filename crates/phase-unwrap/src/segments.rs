@@ -56,7 +56,7 @@ impl Segments {
         for (cost, _) in cost.iter_mut().zip(&self.class).filter(|(_, class)| **class == RIM) {
             *cost = f32::INFINITY;
         }
-        forest.grow(grid, &surface.phase, cost, &self.links);
+        forest.grow(grid, &surface.phase, cost, Some(&self.links));
         self.attach_rim(grid, surface, forest);
         self.centre(forest);
     }

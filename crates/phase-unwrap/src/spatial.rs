@@ -11,7 +11,7 @@ use crate::grid::Grid;
 use crate::known::{check_span, resolve_known};
 use crate::offsets::Offsets;
 use crate::planes::Planes;
-use crate::reliability::{pixel_cost, reliability};
+use crate::reliability::{Smoothness, reliability};
 use crate::segments::Segments;
 use crate::surface::Surface;
 use crate::unwrapped::labels_from_one;
@@ -34,7 +34,7 @@ pub struct Unwrapper {
     surface: Surface,
     amplitude: Vec<f32>,
     cost: Vec<f32>,
-    links: Vec<u8>,
+    smoothness: Smoothness,
     forest: Forest,
     segments: Segments,
     borders: Borders,
@@ -96,6 +96,11 @@ impl Unwrapper {
         Ok(())
     }
 
+    /// Bytes that the buffers of the relative tree hold, without the result.
+    pub fn bytes(&self) -> usize {
+        (self.surface.phase.capacity() + self.cost.capacity()) * size_of::<f32>() + self.forest.bytes()
+    }
+
     fn load_phase(&mut self, grid: &Grid, phase: &Raster<f32>, mask: Option<&Raster<bool>>) -> Result<()> {
         if let Some(mask) = mask {
             phase.require_same_size(mask, "mask")?;
@@ -118,13 +123,8 @@ impl Unwrapper {
     }
 
     fn unwrap_relative(&mut self, grid: &Grid, known: &[(usize, i32)], out: &mut Unwrapped) {
-        pixel_cost(grid, &self.surface.phase, None, &mut self.cost);
-        self.links.clear();
-        self.links.resize(grid.len(), 0);
-        for pixel in grid.inner() {
-            self.links[pixel] = self.surface.open_links(grid, pixel);
-        }
-        self.forest.grow(grid, &self.surface.phase, &self.cost, &self.links);
+        self.smoothness.measure(grid, &self.surface.phase, None, &mut self.cost);
+        self.forest.grow(grid, &self.surface.phase, &self.cost, None);
         let fixed = self.fix_islands(known);
         for (label, wraps) in self.forest.label.iter().zip(&mut self.forest.wraps) {
             if *label != NO_LABEL {
@@ -165,7 +165,7 @@ impl Unwrapper {
     fn unwrap_absolute(&mut self, grid: &Grid, known: &[(usize, i32)], out: &mut Unwrapped) -> Result<()> {
         let options = self.options;
         check_span(grid, known, options.maximum_wraps)?;
-        pixel_cost(grid, &self.surface.phase, Some(&self.surface.variance), &mut self.cost);
+        self.smoothness.measure(grid, &self.surface.phase, Some(&self.surface.variance), &mut self.cost);
         self.segments.build(grid, &self.surface, &mut self.cost, &mut self.forest, &options);
         self.borders.collect(grid, &self.surface, &self.forest);
         let pixels = &self.segments.pixels;

@@ -85,13 +85,13 @@ pub enum Error {
     /// A calibration that cannot be done as it was asked for.
     #[error("calibrate: {0}")]
     Calibrate(#[source] self_calibration::Error),
-    /// A survey, measured or planned, that does not determine the calibration; its summary was written.
+    /// A survey, measured or planned, that does not determine what was asked for; its summary was written.
     #[error("refused: {source}")]
     Refused {
         /// The text of `summary.json`, with the diagnosis and without parameters.
         summary: String,
         /// Why.
-        source: self_calibration::Error,
+        source: Box<dyn std::error::Error + Send + Sync>,
     },
     /// Two things to be compared do not belong together.
     #[error("compare: {0}")]

@@ -14,6 +14,7 @@ mod progress;
 mod report;
 mod results;
 mod run;
+mod scattering;
 mod simulate;
 mod stages;
 mod statistics;
@@ -41,6 +42,10 @@ pub use plan::{
 };
 pub use progress::{Progress, Silent};
 pub use run::{RunRequest, process, run};
+pub use scattering::{
+    CandidateGaussians, ScatteringCapture, ScatteringParameter, ScatteringRequest, ScatteringSummary, estimate_scattering,
+};
+pub use scattering_deconvolution::{EstimationOptions, TermCount, TermShape};
 pub use self_calibration::{CalibrationOptions, CandidateGrid, Method, NetworkDatum, PlanOptions, TermSelection};
 pub use simulate::{Simulated, simulate};
 pub use summary::{

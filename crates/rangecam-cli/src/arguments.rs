@@ -6,6 +6,7 @@ use clap::{Parser, Subcommand};
 
 use crate::calibrate_arguments::CalibrateArguments;
 use crate::plan_arguments::PlanArguments;
+use crate::scattering_arguments::ScatteringArguments;
 
 /// Raw frames of a range camera in, one corrected and registered cloud out.
 #[derive(Debug, Parser)]
@@ -69,6 +70,8 @@ pub(crate) enum Command {
     Calibrate(Box<CalibrateArguments>),
     /// Tell how well planned stations and targets would determine a calibration, and which station to add.
     Plan(Box<PlanArguments>),
+    /// Estimate internal scattering (stray light in the camera) from a scene with and without bright objects.
+    Scattering(Box<ScatteringArguments>),
     /// Tell what a survey, a calibration or a cloud holds, and which stages it leaves room for.
     Inspect {
         /// Survey folder, calibration.ron or cloud.ply.

@@ -35,6 +35,9 @@ pub(crate) fn dispatch(command: Command, output: &Output) -> Outcome {
         Command::Plan(arguments) => {
             output.result(&pipeline::plan_network(&arguments.request(), output.progress().as_ref())?)
         }
+        Command::Scattering(arguments) => {
+            output.result(&pipeline::estimate_scattering(&arguments.request(), output.progress().as_ref())?)
+        }
         Command::Inspect { path } => output.result(&pipeline::inspect(&path)?),
         Command::Compare { first, second } => output.result(&pipeline::compare(&first, &second)?),
     }

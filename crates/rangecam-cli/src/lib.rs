@@ -6,6 +6,7 @@ mod calibrate_arguments;
 mod commands;
 mod output;
 mod plan_arguments;
+mod scattering_arguments;
 
 use std::ffi::OsString;
 use std::process::ExitCode;

@@ -12,6 +12,9 @@ pub use error_models;
 #[cfg(feature = "icp-registration")]
 #[doc(inline)]
 pub use icp_registration;
+#[cfg(feature = "multipath")]
+#[doc(inline)]
+pub use multipath;
 #[cfg(feature = "orientation")]
 #[doc(inline)]
 pub use orientation;

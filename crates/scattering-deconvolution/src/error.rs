@@ -62,6 +62,31 @@ pub enum Error {
         /// What was asked for.
         tolerance: f64,
     },
+    /// A ghost is late by a way in metres, which is a phase only at a modulation frequency.
+    #[error(
+        "a ghost with an extra path of {extra_path_m} m has no phase without a modulation: give the point spread function at one"
+    )]
+    ModulationNeeded {
+        /// The extra way.
+        extra_path_m: f64,
+    },
+    /// What was asked for exists only where all pixels scatter alike.
+    #[error("{what} needs a point spread function that is the same for all pixels and without ghosts")]
+    NotStationary {
+        /// What was asked for.
+        what: &'static str,
+    },
+    /// A capture from which a point spread function is to be estimated does not fit together.
+    #[cfg(feature = "estimate")]
+    #[error("capture: {reason}")]
+    Capture {
+        /// What is wrong.
+        reason: String,
+    },
+    /// The adjustment of a point spread function failed in a way that says nothing about the captures.
+    #[cfg(feature = "estimate")]
+    #[error(transparent)]
+    Adjustment(#[from] adjust::Error),
     /// The frame itself is inconsistent.
     #[error(transparent)]
     Frame(#[from] range_image::Error),

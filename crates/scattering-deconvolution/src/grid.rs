@@ -55,6 +55,25 @@ impl Axis {
         if self.spacing == 1 { 0.0 } else { self.spacing.pow(2) as f64 / 2.0 }
     }
 
+    /// Position of a node in pixels.
+    fn position(&self, node: usize) -> f64 {
+        if self.spacing == 1 {
+            return node as f64;
+        }
+        (node as f64 - 1.0) * self.spacing as f64 + (self.spacing as f64 - 1.0) / 2.0
+    }
+
+    /// Position of a node as a normalised coordinate, -1 and 1 at the ends of the image.
+    pub(crate) fn normalised(&self, node: usize) -> f64 {
+        let pixels = self.pixels as f64;
+        (2.0 * self.position(node) + 1.0 - pixels) / pixels
+    }
+
+    /// Sum of the positions of a node and of that which takes its place in reverse order, in pixels.
+    pub(crate) fn reversal_px(&self) -> f64 {
+        self.position(0) + self.position(self.nodes - 1)
+    }
+
     fn tap_count(&self) -> usize {
         if self.spacing == 1 { 1 } else { 3 }
     }
@@ -139,6 +158,13 @@ impl Grid {
         [self.axes[0].nodes, self.axes[1].nodes]
     }
 
+    /// Normalised coordinates of the pixels, row by row.
+    pub(crate) fn pixel_places(&self) -> impl Iterator<Item = [f64; 2]> {
+        let [columns, rows] = [0, 1].map(|axis| self.axes[axis].pixels);
+        let place = |pixel: usize, pixels: usize| (2.0 * pixel as f64 + 1.0) / pixels as f64 - 1.0;
+        (0..rows).flat_map(move |row| (0..columns).map(move |col| [place(col, columns), -place(row, rows)]))
+    }
+
     pub(crate) fn is_fine(&self) -> bool {
         self.axes.iter().all(|axis| axis.spacing == 1)
     }
@@ -164,6 +190,24 @@ impl Grid {
         let [re, im] = &self.halfway;
         let lines = re.par_chunks(across.pixels).zip(im.par_chunks(across.pixels));
         nodes.par_chunks_mut(across.nodes).zip(lines).for_each(|(nodes, (re, im))| across.collect(re, im, nodes));
+    }
+
+    /// Adds the light of one pixel to its nodes, as [`Self::restrict`] would.
+    pub(crate) fn deposit(&self, pixel: usize, light: f32, nodes: &mut [Complex<f32>]) {
+        let [across, down] = &self.axes;
+        let [columns, rows] = [&across.taps[pixel % across.pixels], &down.taps[pixel / across.pixels]];
+        let light = light / (across.spacing * down.spacing) as f32;
+        for (row, vertical) in rows.weights[..down.tap_count()].iter().enumerate() {
+            let start = (rows.first + row) * across.nodes + columns.first;
+            for (node, horizontal) in nodes[start..].iter_mut().zip(&columns.weights[..across.tap_count()]) {
+                *node += light * vertical * horizontal;
+            }
+        }
+    }
+
+    /// Distance of the nodes along a row and along a column.
+    pub(crate) fn spacing(&self) -> [usize; 2] {
+        self.axes.each_ref().map(Axis::spacing)
     }
 
     /// Adds `factor` times what lies on the nodes to planes of pixels: quadratic spline.

@@ -1,8 +1,7 @@
 //! Sampled point spread functions.
 
-use std::f64::consts::TAU;
-
-use crate::{GaussianTerm, Psf, Result};
+use crate::blobs::{Blob, Kernel};
+use crate::{Error, GaussianTerm, Psf, Result};
 
 /// Half width, in standard deviations, at which sampled Gaussians end. What lies beyond, on either side of either
 /// axis, is 1.3e-4 of the term's weight.
@@ -32,41 +31,27 @@ impl Psf {
     ///
     /// A Gaussian term is `exp(-(dc^2 / 2 sc^2 + dr^2 / 2 sr^2))` at whole offsets, normalised so that its samples over
     /// the infinite plane sum to its weight, and ends at [`GAUSSIAN_CUT_SIGMAS`].
+    ///
+    /// # Errors
+    /// A point spread function that changes over the field or has ghosts has no such kernel.
     pub fn sample(&self, max_half_width: [usize; 2]) -> Result<SampledKernel> {
         self.validate()?;
         Ok(match self {
             Self::Gaussians(terms) => sample_gaussians(terms, max_half_width),
             Self::Kernel { width, height, values } => crop([*width, *height], values, max_half_width),
+            Self::Composite(composite) if composite.is_sum_of_gaussians() => {
+                sample_gaussians(&composite.stationary, max_half_width)
+            }
+            Self::Composite(_) => return Err(Error::NotStationary { what: "a sampled kernel" }),
         })
     }
 }
 
 fn sample_gaussians(terms: &[GaussianTerm], max_half_width: [usize; 2]) -> SampledKernel {
-    let reach = |sigma: f64, axis: usize| ((GAUSSIAN_CUT_SIGMAS * sigma).ceil() as usize).min(max_half_width[axis]);
-    let widest = |axis: usize| terms.iter().map(|term| reach(term.sigma_px[axis], axis)).max().unwrap_or(0);
-    let half_width = [widest(0), widest(1)];
-    let columns = 2 * half_width[0] + 1;
-    let mut values = vec![0.0; columns * (2 * half_width[1] + 1)];
-    for term in terms {
-        let profile =
-            |axis: usize| gaussian_profile(term.sigma_px[axis], reach(term.sigma_px[axis], axis), half_width[axis]);
-        let (along_row, along_column) = (profile(0), profile(1));
-        for (row, vertical) in values.chunks_exact_mut(columns).zip(&along_column) {
-            for (value, horizontal) in row.iter_mut().zip(&along_row) {
-                *value += term.weight * vertical * horizontal;
-            }
-        }
-    }
-    SampledKernel { half_width, values }
-}
-
-/// A normalised one-dimensional Gaussian at offsets `-half_width..=half_width`, zero beyond `reach`.
-fn gaussian_profile(sigma: f64, reach: usize, half_width: usize) -> Vec<f64> {
-    let value = |offset: f64| (-0.5 * (offset / sigma).powi(2)).exp();
-    // By Poisson's sum formula the samples sum to sigma sqrt(2 pi) up to 2 exp(-2 pi^2 sigma^2): 1e-34 at sigma 2.
-    let sum = if sigma >= 2.0 { sigma * TAU.sqrt() } else { (-40..=40).map(|offset| value(f64::from(offset))).sum() };
-    let (half_width, reach) = (half_width as isize, reach as isize);
-    (-half_width..=half_width).map(|i| if i.abs() > reach { 0.0 } else { value(i as f64) / sum }).collect()
+    let blobs: Vec<Blob> = terms.iter().map(Blob::from).collect();
+    let kernel = Kernel::of_blobs(&blobs, max_half_width);
+    let half_width = kernel.first.map(isize::unsigned_abs);
+    SampledKernel { half_width, values: kernel.values.iter().map(|value| value.re).collect() }
 }
 
 /// The middle of a kernel.

@@ -1,43 +1,98 @@
 //! Pixels that have no value, or one that must not be touched.
 
+use range_image::Flags;
+
+use crate::SaturatedLight;
+
 /// Pixels put aside while the image is restored, with their values.
 #[derive(Default)]
 pub(crate) struct Mask {
-    kept: Vec<(usize, f32, f32)>,
+    kept: Vec<Kept>,
     filled: usize,
+    dependent: Vec<usize>,
+    /// Pixels of a row that are filled.
+    unknown: Vec<bool>,
+}
+
+/// A pixel put aside: its own value, and the one that counts as light meanwhile.
+#[derive(Clone, Copy)]
+struct Kept {
+    pixel: usize,
+    own: [f32; 2],
+    light: [f32; 2],
 }
 
 impl Mask {
-    /// Puts aside pixels that are not finite and those for which `keep` says so. Pixels that are not finite are filled
-    /// with the mean of the nearest values to the left and to the right in their row (zero if the row has none).
-    pub(crate) fn put_aside(&mut self, width: usize, re: &mut [f32], im: &mut [f32], keep: impl Fn(usize) -> bool) {
+    /// Puts aside pixels that are not finite and those flagged as saturated or without data; gives the largest absolute
+    /// value of those that stay. Pixels that are not finite, and saturated ones if so wished, are filled with the mean of
+    /// the nearest values to the left and to the right in their row (zero if the row has none).
+    pub(crate) fn put_aside(
+        &mut self,
+        width: usize,
+        re: &mut [f32],
+        im: &mut [f32],
+        flags: Option<&[Flags]>,
+        saturated: SaturatedLight,
+    ) -> f32 {
         self.kept.clear();
+        self.dependent.clear();
         self.filled = 0;
+        let mut largest = 0.0_f32;
         for (row, (re, im)) in re.chunks_exact_mut(width).zip(im.chunks_exact_mut(width)).enumerate() {
-            let complete = largest_part(re).is_finite() && largest_part(im).is_finite();
-            for col in 0..width {
-                let missing = !(complete || re[col].is_finite() && im[col].is_finite());
-                if missing || keep(row * width + col) {
-                    self.kept.push((row * width + col, re[col], im[col]));
-                    self.filled += usize::from(missing);
-                }
+            let flags = flags.map(|flags| &flags[row * width..][..width]);
+            let mut parts = [largest_part(re), largest_part(im)];
+            if !parts.iter().all(|part| part.is_finite())
+                || flags.is_some_and(|flags| union(flags).intersects(UNTOUCHED))
+            {
+                self.put_aside_row(row * width, re, im, flags, saturated);
+                parts = [largest_part(re), largest_part(im)];
             }
-            if !complete {
-                fill_row(re, im);
+            largest = largest.max(parts[0]).max(parts[1]);
+        }
+        largest
+    }
+
+    fn put_aside_row(
+        &mut self,
+        start: usize,
+        re: &mut [f32],
+        im: &mut [f32],
+        flags: Option<&[Flags]>,
+        saturated: SaturatedLight,
+    ) {
+        self.unknown.clear();
+        let first = self.kept.len();
+        for (col, (&re, &im)) in re.iter().zip(&*im).enumerate() {
+            let flags = flags.map_or(Flags::empty(), |flags| flags[col]);
+            let missing = !(re.is_finite() && im.is_finite());
+            let unknown = missing || saturated == SaturatedLight::Filled && flags.intersects(Flags::SATURATED);
+            if missing || flags.intersects(UNTOUCHED) {
+                self.kept.push(Kept { pixel: start + col, own: [re, im], light: [re, im] });
             }
+            self.filled += usize::from(unknown);
+            self.unknown.push(unknown);
+        }
+        fill_row(re, im, &self.unknown);
+        for kept in &mut self.kept[first..] {
+            kept.light = [re[kept.pixel - start], im[kept.pixel - start]];
         }
     }
 
     /// Gives the pixels their values back.
     pub(crate) fn put_back(&self, re: &mut [f32], im: &mut [f32]) {
-        for &(pixel, real, imaginary) in &self.kept {
-            (re[pixel], im[pixel]) = (real, imaginary);
+        for kept in &self.kept {
+            [re[kept.pixel], im[kept.pixel]] = kept.own;
         }
     }
 
     /// The pixels put aside.
     pub(crate) fn pixels(&self) -> impl Iterator<Item = usize> {
-        self.kept.iter().map(|&(pixel, ..)| pixel)
+        self.kept.iter().map(|kept| kept.pixel)
+    }
+
+    /// The pixels put aside with the amplitude that counted as light.
+    pub(crate) fn lights(&self) -> impl Iterator<Item = (usize, f32)> {
+        self.kept.iter().map(|kept| (kept.pixel, kept.light[0].hypot(kept.light[1])))
     }
 
     pub(crate) fn kept(&self) -> usize {
@@ -47,6 +102,24 @@ impl Mask {
     pub(crate) fn filled(&self) -> usize {
         self.filled
     }
+
+    /// Pixels whose correction depends on those put aside.
+    pub(crate) fn dependent(&self) -> &[usize] {
+        &self.dependent
+    }
+
+    /// Notes those, in order, of so many pixels for which `depends` says so; pixels put aside are none of them.
+    pub(crate) fn note_dependent(&mut self, pixels: usize, depends: impl Fn(usize) -> bool) {
+        let mut kept = self.kept.iter().map(|kept| kept.pixel).peekable();
+        self.dependent.extend((0..pixels).filter(|&pixel| kept.next_if_eq(&pixel).is_none() && depends(pixel)));
+    }
+}
+
+/// Flags of pixels that keep their value.
+const UNTOUCHED: Flags = Flags::SATURATED.union(Flags::NO_DATA);
+
+fn union(flags: &[Flags]) -> Flags {
+    Flags::from_bits_retain(flags.iter().fold(0, |all, flags| all | flags.bits()))
 }
 
 /// Largest absolute value; not finite as soon as one value is not.
@@ -58,14 +131,14 @@ pub(crate) fn largest_part(values: &[f32]) -> f32 {
     f32::from_bits(values.iter().map(magnitude).max().unwrap_or(0) as u32)
 }
 
-fn fill_row(re: &mut [f32], im: &mut [f32]) {
+fn fill_row(re: &mut [f32], im: &mut [f32], unknown: &[bool]) {
     let mut col = 0;
     while col < re.len() {
-        if re[col].is_finite() && im[col].is_finite() {
+        if !unknown[col] {
             col += 1;
             continue;
         }
-        let gap = (col..re.len()).take_while(|&i| !(re[i].is_finite() && im[i].is_finite())).count();
+        let gap = unknown[col..].iter().take_while(|&&unknown| unknown).count();
         let value = |i: usize| re.get(i).copied().zip(im.get(i).copied());
         let estimate = match (col.checked_sub(1).and_then(value), value(col + gap)) {
             (Some(left), Some(right)) => (f32::midpoint(left.0, right.0), f32::midpoint(left.1, right.1)),
@@ -96,14 +169,20 @@ mod tests {
         let mut re = vec![nan, 1.0, nan, nan, 3.0, f32::INFINITY, nan, nan, nan, nan, nan, nan];
         let mut im = vec![0.0; 12];
         im[4] = 8.0;
+        let mut flags = vec![Flags::MOTION; 12];
+        flags[1] |= Flags::SATURATED;
         let mut mask = Mask::default();
-        mask.put_aside(6, &mut re, &mut im, |pixel| pixel == 1);
+        let largest = mask.put_aside(6, &mut re, &mut im, Some(&flags), SaturatedLight::Clipped);
         assert_eq!(re, [1.0, 1.0, 2.0, 2.0, 3.0, 3.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
         assert_eq!(im[2..6], [4.0, 4.0, 8.0, 8.0]);
-        assert_eq!((mask.kept(), mask.filled()), (11, 10));
+        assert_eq!((mask.kept(), mask.filled(), largest.to_bits()), (11, 10, 8.0_f32.to_bits()));
         re[1] = 99.0;
         mask.put_back(&mut re, &mut im);
         assert!(re[0].is_nan() && re[5].is_infinite() && re[11].is_nan());
         assert_eq!(re[1].to_bits(), 1.0_f32.to_bits());
+        mask.put_aside(6, &mut re, &mut im, Some(&flags), SaturatedLight::Filled);
+        // Nothing but gaps to the left of the only value.
+        assert_eq!(re[..6], [3.0; 6]);
+        assert_eq!((mask.kept(), mask.filled()), (11, 11));
     }
 }

@@ -2,10 +2,14 @@
 
 use std::f64::consts::TAU;
 
-use rustfft::{FftDirection, num_complex::Complex};
+use rustfft::num_complex::Complex;
 
+use crate::blobs::Kernel;
 use crate::convolution::{Convolver, Transfer};
 use crate::grid::Grid;
+use crate::noise::Noise;
+use crate::operator::{Operator, Term};
+use crate::parts::{Orientation, Part, parts};
 use crate::spectrum::Spectrum;
 use crate::{Error, GaussianTerm, GridSpacing, Psf, RestorationOptions, Result};
 
@@ -22,115 +26,112 @@ const MIN_CELLS: usize = 8;
 /// The operators of a restoration on its grid.
 pub(crate) struct Model {
     /// Scatters light on the nodes.
-    pub(crate) scatter: Transfer,
-    /// First estimate of the scattered light, from the observed image.
-    pub(crate) estimate: Transfer,
+    pub(crate) scatter: Operator,
+    /// First estimate of the scattered light, from the observed image; none where pixels do not all scatter alike.
+    pub(crate) estimate: Option<Transfer>,
     /// Inverse of `1 + H`, for point spread functions whose plain iteration would not converge.
     pub(crate) inverse: Transfer,
-    /// Sum of the kernel's absolute values: the factor by which a plain iteration shrinks the largest residual.
+    /// Bound of the factor by which a plain iteration shrinks the largest residual: the sum of the kernels' moduli, times
+    /// the largest factors over the field.
     pub(crate) contraction: f64,
     pub(crate) noise: Noise,
-}
-
-/// What restoring does to noise: `var_out = (1 - 2 q(0)) var + q^2 * var` with `q` the kernel that is subtracted.
-pub(crate) struct Noise {
-    pub(crate) squared_kernel: Transfer,
-    /// `q(0)`: what a pixel loses of itself.
-    pub(crate) centre: f64,
-    /// Sum of `q^2` over all other pixels.
-    pub(crate) surroundings: f64,
 }
 
 impl Model {
     /// The model of `psf` for images of `size` pixels, with the grid and the convolution that belong to it.
     pub(crate) fn new(psf: &Psf, size: [usize; 2], options: &RestorationOptions) -> Result<(Self, Grid, Convolver)> {
+        let parts = parts(psf, size)?;
         let grid = Grid::new(size, spacing(psf, size, options.grid_spacing));
-        let nodes = grid.size();
-        let kernel = on_grid(psf, &grid).sample([nodes[0] - 1, nodes[1] - 1])?;
-        let convolver = Convolver::new(nodes, kernel.half_width)?;
-        let scatter = Spectrum::of_kernel(&kernel, convolver.padded());
-        let seen = scatter.times(&grid.round_trip_spectrum(convolver.padded()));
+        let Scattering { convolver, spectra, contraction } = Scattering::new(&parts, &grid)?;
+        let stationary = matches!(&parts[..], [part] if part.is_plain());
         let lambda = options.regularisation;
+        if lambda > 0.0 && !stationary {
+            return Err(Error::NotStationary { what: "a regularisation" });
+        }
+        let mean = mean_spectrum(&parts, &spectra, convolver.padded());
+        let seen = mean.times(&grid.round_trip_spectrum(convolver.padded()));
         require_invertible(&seen, lambda)?;
         let weight = |h: Complex<f64>| (1.0 + h).conj() / ((1.0 + h).norm_sqr() + lambda);
         let model = Self {
-            estimate: scatter.times(&seen.map(weight)).transfer(),
+            estimate: stationary.then(|| mean.times(&seen.map(weight)).transfer()),
             inverse: seen.map(weight).transfer(),
-            contraction: kernel.values.iter().map(|value| value.abs()).sum(),
-            noise: Noise::new(&response(psf, &grid, &scatter), &grid, weight),
-            scatter: scatter.transfer(),
+            contraction,
+            noise: Noise::new(&parts, &responses(&parts, &grid, &spectra), &grid, weight),
+            scatter: operator(&parts, &spectra, &grid),
         };
         Ok((model, grid, convolver))
     }
 }
 
-impl Noise {
-    fn new(response: &Spectrum, grid: &Grid, weight: impl Fn(Complex<f64>) -> Complex<f64>) -> Self {
-        let subtracted = response.map(|h| h * weight(h)).transformed(FftDirection::Inverse);
-        let numbers = subtracted.values.len() as f64;
-        let pixels_per_node: f64 = grid.axes().iter().map(|axis| axis.spacing() as f64).product();
-        let squares = subtracted.map(|q| Complex::new((q.re / numbers).powi(2) / pixels_per_node, 0.0));
-        let centre = subtracted.values.first().map_or(0.0, |q| q.re / numbers / pixels_per_node);
-        let energy: f64 = squares.values.iter().map(|value| value.re).sum();
-        // The way to the nodes and back would make the narrow squared kernel wider: it is taken out beforehand.
-        let grid_response = grid.round_trip_spectrum(squares.size).map(|value| 1.0 / value);
-        Self {
-            squared_kernel: squares.transformed(FftDirection::Forward).times(&grid_response).transfer(),
-            centre,
-            surroundings: (energy - centre * centre).max(0.0),
-        }
-    }
+/// The convolutions of all parts.
+pub(crate) struct Scattering {
+    pub(crate) convolver: Convolver,
+    pub(crate) spectra: Vec<Spectrum>,
+    pub(crate) contraction: f64,
+}
 
-    /// Factor of the standard deviation of noise that is the same everywhere.
-    pub(crate) fn gain(&self) -> f64 {
-        ((1.0 - self.centre).powi(2) + self.surroundings).sqrt()
+impl Scattering {
+    pub(crate) fn new(parts: &[Part], grid: &Grid) -> Result<Self> {
+        let kernels: Vec<Kernel> = parts.iter().map(|part| part.kernel(grid)).collect();
+        let farthest = |axis: usize| kernels.iter().map(|kernel| kernel.reach()[axis]).max().unwrap_or(0);
+        let convolver = Convolver::new(grid.size(), [farthest(0), farthest(1)])?;
+        let spectra = kernels.iter().map(|kernel| Spectrum::of_kernel(kernel, convolver.padded())).collect();
+        let largest = |part: &Part| part.field.map_or(1.0, |field| field.largest(grid));
+        let contraction = parts.iter().zip(&kernels).map(|(part, kernel)| largest(part) * kernel.absolute_sum()).sum();
+        Ok(Self { convolver, spectra, contraction })
     }
+}
+
+/// What scatters light on the nodes.
+pub(crate) fn operator(parts: &[Part], spectra: &[Spectrum], grid: &Grid) -> Operator {
+    let term = |(part, spectrum): (&Part, &Spectrum)| Term {
+        transfer: spectrum.transfer(),
+        orientation: part.orientation,
+        factors: part.field.map(|field| field.factors(grid)),
+    };
+    Operator::new(parts.iter().zip(spectra).map(term).collect(), grid.size().iter().product())
+}
+
+/// The spectrum that direct parts have together on the average over the field.
+pub(crate) fn mean_spectrum(parts: &[Part], spectra: &[Spectrum], size: [usize; 2]) -> Spectrum {
+    let mut mean = Spectrum { size, values: vec![Complex::new(0.0, 0.0); size[0] * size[1]] };
+    for (part, spectrum) in parts.iter().zip(spectra).filter(|(part, _)| part.orientation == Orientation::Direct) {
+        let share = part.field.map_or(1.0, |field| field.mean());
+        mean.values.iter_mut().zip(&spectrum.values).for_each(|(mean, value)| *mean += value * share);
+    }
+    mean
 }
 
 /// Nodes as wide apart as the narrowest Gaussian that matters allows.
 fn spacing(psf: &Psf, size: [usize; 2], choice: GridSpacing) -> [usize; 2] {
-    let (Psf::Gaussians(terms), GridSpacing::Automatic) = (psf, choice) else { return [1, 1] };
+    let widths: Vec<GaussianTerm> = match (psf, choice) {
+        (_, GridSpacing::EveryPixel) | (Psf::Kernel { .. }, _) => return [1, 1],
+        (Psf::Gaussians(terms), GridSpacing::Automatic) => terms.clone(),
+        (Psf::Composite(composite), GridSpacing::Automatic) => composite.widths().collect(),
+    };
     [0, 1].map(|axis| {
-        let lit = terms.iter().filter(|term| term.weight > 0.0);
+        let lit = widths.iter().filter(|term| term.weight > 0.0);
         let narrowest = lit.map(|term| term.sigma_px[axis]).fold(f64::INFINITY, f64::min);
         ((SPACING_PER_SIGMA * narrowest) as usize).min(MAX_SPACING).min(size[axis] / MIN_CELLS).max(1)
     })
 }
 
-/// The point spread function in units of nodes, narrower by what passing to the nodes and back adds.
-fn on_grid(psf: &Psf, grid: &Grid) -> Psf {
-    let Psf::Gaussians(terms) = psf else { return psf.clone() };
-    let on_axis = |sigma: f64, axis: usize| {
-        let axis = &grid.axes()[axis];
-        (sigma * sigma - axis.added_variance()).sqrt() / axis.spacing() as f64
-    };
-    let term = |term: &GaussianTerm| {
-        let [across, down] = term.sigma_px;
-        GaussianTerm { weight: term.weight, sigma_px: [on_axis(across, 0), on_axis(down, 1)] }
-    };
-    Psf::Gaussians(terms.iter().filter(|term| term.weight > 0.0).map(term).collect())
-}
-
-/// The transform `H` of the point spread function between pixels, at the frequencies of the grid.
-fn response(psf: &Psf, grid: &Grid, scatter: &Spectrum) -> Spectrum {
-    let Psf::Gaussians(terms) = psf else { return scatter.clone() };
+/// The transforms of the parts between pixels, at the frequencies of the grid.
+fn responses(parts: &[Part], grid: &Grid, spectra: &[Spectrum]) -> Vec<Spectrum> {
     if grid.is_fine() {
-        return scatter.clone();
+        return spectra.to_vec();
     }
-    let [columns, rows] = scatter.size;
-    let squared_frequency = |index: usize, count: usize, axis: usize| {
-        let signed = if 2 * index > count { index as f64 - count as f64 } else { index as f64 };
-        (TAU * signed / (count * grid.axes()[axis].spacing()) as f64).powi(2)
-    };
-    let value = |index: usize| {
-        let across = squared_frequency(index / rows, columns, 0);
-        let down = squared_frequency(index % rows, rows, 1);
-        let gaussian = |t: &GaussianTerm| {
-            t.weight * (-0.5 * (t.sigma_px[0].powi(2) * across + t.sigma_px[1].powi(2) * down)).exp()
+    let response = |(part, spectrum): (&Part, &Spectrum)| {
+        let [columns, rows] = spectrum.size;
+        let frequency = |index: usize, count: usize, axis: usize| {
+            let signed = if 2 * index > count { index as f64 - count as f64 } else { index as f64 };
+            TAU * signed / (count * grid.axes()[axis].spacing()) as f64
         };
-        Complex::new(terms.iter().map(gaussian).sum(), 0.0)
+        let place = |index: usize| [frequency(index / rows, columns, 0), frequency(index % rows, rows, 1)];
+        let value = |index: usize| part.transform(grid, place(index)).unwrap_or(spectrum.values[index]);
+        Spectrum { size: spectrum.size, values: (0..columns * rows).map(value).collect() }
     };
-    Spectrum { size: scatter.size, values: (0..columns * rows).map(value).collect() }
+    parts.iter().zip(spectra).map(response).collect()
 }
 
 fn require_invertible(scatter: &Spectrum, lambda: f64) -> Result<()> {

@@ -13,6 +13,19 @@ pub enum GridSpacing {
     EveryPixel,
 }
 
+/// What the light of saturated pixels counts for while scattered light is computed. They keep their own value either way.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
+pub enum SaturatedLight {
+    /// The clipped value: less than there was, so that some of what it scattered stays in the image.
+    #[default]
+    Clipped,
+    /// The mean of the nearest values to the left and to the right, as for pixels without a value: for sensors whose
+    /// saturated pixels have phases and amplitudes without meaning.
+    Filled,
+}
+
 /// How scattering is undone.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -28,11 +41,24 @@ pub struct RestorationOptions {
     pub max_iterations: usize,
     /// Where scattered light is computed.
     pub grid_spacing: GridSpacing,
+    /// What the light of saturated pixels counts for.
+    pub saturated_light: SaturatedLight,
+    /// Share of a restored pixel's amplitude beyond which light scattered from pixels of unknown light (saturated, without
+    /// a value) makes it one of [`Restorer::dependent_pixels`](crate::Restorer::dependent_pixels). Were the unknown light
+    /// wrong by its own amount, the phase would be wrong by as many radians. Infinite: not looked for.
+    pub dependence_limit: f64,
 }
 
 impl Default for RestorationOptions {
     fn default() -> Self {
-        Self { regularisation: 0.0, tolerance: 1e-5, max_iterations: 30, grid_spacing: GridSpacing::Automatic }
+        Self {
+            regularisation: 0.0,
+            tolerance: 1e-5,
+            max_iterations: 30,
+            grid_spacing: GridSpacing::Automatic,
+            saturated_light: SaturatedLight::Clipped,
+            dependence_limit: 0.1,
+        }
     }
 }
 
@@ -46,6 +72,10 @@ impl RestorationOptions {
         if !(self.tolerance.is_finite() && self.tolerance > 0.0) {
             let expected = "a tolerance is finite and positive";
             return Err(Error::OutOfDomain { name: "tolerance", value: self.tolerance, expected });
+        }
+        if self.dependence_limit.is_nan() || self.dependence_limit <= 0.0 {
+            let expected = "a limit of dependence is positive";
+            return Err(Error::OutOfDomain { name: "dependence_limit", value: self.dependence_limit, expected });
         }
         Ok(())
     }

@@ -1,16 +1,14 @@
 //! Restoration of complex images.
 
-use range_image::{ComplexChannel, Flags, Raster};
-use rustfft::num_complex::Complex;
+use range_image::{ComplexChannel, Flags, Modulation, Raster};
 
-use crate::convolution::{Convolver, check_size};
-use crate::grid::Grid;
-use crate::mask::{Mask, largest_part};
-use crate::model::Model;
+use crate::convolution::check_size;
+use crate::mask::Mask;
+use crate::work::Work;
 use crate::{Error, Psf, RestorationOptions, Result};
 
-/// Contraction up to which light is simply scattered again; beyond it each step is divided by `1 + H` as well.
-const PLAIN_ITERATION: f64 = 0.5;
+/// Modulations for which operators are kept.
+const MODULATIONS: usize = 8;
 
 /// What a restoration did, and how well.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -26,6 +24,9 @@ pub struct RestorationSummary {
     pub kept_pixels: usize,
     /// Those of them that had no finite value and were filled from their neighbours while light was computed.
     pub filled_pixels: usize,
+    /// Pixels whose correction depends strongly on light that is not known, as
+    /// [`dependence_limit`](RestorationOptions::dependence_limit) says.
+    pub dependent_pixels: usize,
     /// Distance of the nodes on which scattered light was computed, along a row and along a column, in pixels.
     pub grid_spacing: [usize; 2],
 }
@@ -34,68 +35,73 @@ pub struct RestorationSummary {
 ///
 /// Solves `z + psf * z = y` for the light `z` that each pixel would have had, nothing being outside the image: first
 /// by the inverse filter, which is right but for the light that was lost over the image border, then by iteration until
-/// the residual is below the tolerance. Made once for a size of image; all buffers are its own, so that restoring
+/// the residual is below the tolerance. Where the point spread function changes over the field or mirrors the image there
+/// is no such filter, and the iteration begins with the light that the observed image would scatter. Made once for a size of image; all buffers are its own, so that restoring
 /// allocates nothing after the first image.
 pub struct Restorer {
-    pub(crate) size: [usize; 2],
+    psf: Psf,
+    size: [usize; 2],
     options: RestorationOptions,
-    pub(crate) work: Option<Work>,
+    /// One for all modulations, or one for each.
+    works: Vec<(Option<Modulation>, Work)>,
     mask: Mask,
-}
-
-/// Buffers and operators of a point spread function that scatters something.
-pub(crate) struct Work {
-    pub(crate) model: Model,
-    pub(crate) grid: Grid,
-    pub(crate) convolver: Convolver,
-    /// Observed light on the nodes.
-    observed: Vec<Complex<f32>>,
-    /// Scattered light on the nodes.
-    scattered: Vec<Complex<f32>>,
-    pub(crate) spare: Vec<Complex<f32>>,
-    pub(crate) variance: [Vec<f32>; 2],
 }
 
 impl Restorer {
     /// For images of `width` x `height` pixels.
+    ///
+    /// Where a ghost is late by a way in metres, plans and buffers are made for each modulation when it first comes.
+    ///
+    /// # Errors
+    /// What [`Psf::validate`] and [`RestorationOptions::validate`] find; images that are too large; a point spread
+    /// function that cannot be undone.
     pub fn new(psf: &Psf, width: usize, height: usize, options: &RestorationOptions) -> Result<Self> {
         psf.validate()?;
         options.validate()?;
         let size = [width, height];
         check_size(size)?;
-        let work = if psf.is_empty() { None } else { Some(Work::new(psf, size, options)?) };
-        Ok(Self { size, options: *options, work, mask: Mask::default() })
+        let works = if psf.is_empty() || psf.depends_on_modulation() {
+            Vec::new()
+        } else {
+            vec![(None, Work::new(psf, size, options)?)]
+        };
+        Ok(Self { psf: psf.clone(), size, options: *options, works, mask: Mask::default() })
     }
 
     /// Restores one complex image in place and propagates its sigma. Where it fails, the image stays as it was.
     ///
     /// Pixels that are not finite keep their value and disturb no other.
     pub fn restore(&mut self, channel: &mut ComplexChannel) -> Result<RestorationSummary> {
-        self.restore_channel(channel, |_| false)
+        self.restore_channel(channel, None)
     }
 
-    /// As [`Self::restore`]; pixels that are flagged as saturated or without data keep their value as well. The clipped
-    /// light of saturated pixels counts as scattering.
+    /// As [`Self::restore`]; pixels that are flagged as saturated or without data keep their value as well. What the light
+    /// of saturated pixels counts for is [`RestorationOptions::saturated_light`].
     pub fn restore_flagged(
         &mut self,
         channel: &mut ComplexChannel,
         flags: &Raster<Flags>,
     ) -> Result<RestorationSummary> {
         channel.real.require_same_size(flags, "flags")?;
-        let untouched = Flags::SATURATED | Flags::NO_DATA;
-        self.restore_channel(channel, |pixel| flags.as_slice()[pixel].intersects(untouched))
+        self.restore_channel(channel, Some(flags.as_slice()))
     }
 
     /// Restores the two planes (row by row) of an image without sigma.
+    ///
+    /// # Errors
+    /// As [`Self::restore`]; a ghost that is late by a way in metres needs a modulation, so give
+    /// [`Psf::at_modulation`] to [`Self::new`].
     pub fn restore_planes(&mut self, real: &mut [f32], imaginary: &mut [f32]) -> Result<RestorationSummary> {
-        self.restore_kept(real, imaginary, |_| false)
+        self.restore_kept(None, real, imaginary, None).map(|(summary, _)| summary)
     }
 
-    fn restore_channel(
-        &mut self,
-        channel: &mut ComplexChannel,
-        keep: impl Fn(usize) -> bool,
-    ) -> Result<RestorationSummary> {
+    /// Pixels of the last restored image whose correction depends strongly on light that is not known, in order: that of
+    /// saturated pixels and of those without a value.
+    pub fn dependent_pixels(&self) -> &[usize] {
+        self.mask.dependent()
+    }
+
+    fn restore_channel(&mut self, channel: &mut ComplexChannel, flags: Option<&[Flags]>) -> Result<RestorationSummary> {
         channel.validate()?;
         let size = [channel.real.width(), channel.real.height()];
         if size != self.size {
@@ -104,118 +110,65 @@ impl Restorer {
             let what = "the image";
             return Err(range_image::Error::SizeMismatch { what, width, height, found_width, found_height }.into());
         }
-        let (real, imaginary) = (&mut channel.real, &mut channel.imaginary);
-        let summary = self.restore_kept(real.as_mut_slice(), imaginary.as_mut_slice(), keep)?;
-        if let Some(work) = &mut self.work {
+        let (real, imaginary) = (channel.real.as_mut_slice(), channel.imaginary.as_mut_slice());
+        let (summary, index) = self.restore_kept(Some(&channel.modulation), real, imaginary, flags)?;
+        if let Some((_, work)) = index.and_then(|index| self.works.get_mut(index)) {
             work.propagate_sigma(channel.sigma.as_mut_slice(), &self.mask);
         }
         Ok(summary)
     }
 
+    /// The summary and which operators were used.
     fn restore_kept(
         &mut self,
+        modulation: Option<&Modulation>,
         real: &mut [f32],
         imaginary: &mut [f32],
-        keep: impl Fn(usize) -> bool,
-    ) -> Result<RestorationSummary> {
+        flags: Option<&[Flags]>,
+    ) -> Result<(RestorationSummary, Option<usize>)> {
         let expected = self.size[0] * self.size[1];
         for (what, plane) in [("real part", &*real), ("imaginary part", &*imaginary)] {
             if plane.len() != expected {
                 return Err(Error::PlaneLength { what, expected, found: plane.len() });
             }
         }
-        self.mask.put_aside(self.size[0], real, imaginary, keep);
-        let outcome = match &mut self.work {
-            Some(work) => work.solve(real, imaginary, &self.options),
-            None => Ok((0, 0.0)),
-        };
-        if let (Some(work), Ok(_)) = (&mut self.work, &outcome) {
-            work.grid.add_interpolated(&work.scattered, -1.0, real, imaginary);
-        }
-        self.mask.put_back(real, imaginary);
+        let index = self.work_index(modulation)?;
+        let Self { mask, works, options, size, .. } = self;
+        let largest = mask.put_aside(size[0], real, imaginary, flags, options.saturated_light);
+        let mut work = index.and_then(|index| works.get_mut(index)).map(|(_, work)| work);
+        let outcome = work.as_mut().map_or(Ok((0, 0.0)), |work| {
+            let found = work.solve(real, imaginary, f64::from(largest), options)?;
+            work.take_off(real, imaginary);
+            work.find_dependent(real, imaginary, mask, options.dependence_limit);
+            Ok::<_, Error>(found)
+        });
+        mask.put_back(real, imaginary);
         let (iterations, residual) = outcome?;
-        Ok(RestorationSummary {
+        let summary = RestorationSummary {
             iterations,
             residual,
-            noise_gain: self.work.as_ref().map_or(1.0, |work| work.model.noise.gain()),
-            kept_pixels: self.mask.kept(),
-            filled_pixels: self.mask.filled(),
-            grid_spacing: self.work.as_ref().map_or([1, 1], |work| [0, 1].map(|i| work.grid.axes()[i].spacing())),
-        })
-    }
-}
-
-impl Work {
-    fn new(psf: &Psf, size: [usize; 2], options: &RestorationOptions) -> Result<Self> {
-        let (model, grid, convolver) = Model::new(psf, size, options)?;
-        let [columns, rows] = grid.size();
-        let zeros = vec![Complex::new(0.0, 0.0); columns * rows];
-        let (observed, scattered, spare) = (zeros.clone(), zeros.clone(), zeros);
-        Ok(Self { model, grid, convolver, observed, scattered, spare, variance: [Vec::new(), Vec::new()] })
+            noise_gain: work.as_ref().map_or(1.0, |work| work.model.noise.gain()),
+            kept_pixels: mask.kept(),
+            filled_pixels: mask.filled(),
+            dependent_pixels: mask.dependent().len(),
+            grid_spacing: work.as_ref().map_or([1, 1], |work| work.grid.spacing()),
+        };
+        Ok((summary, index))
     }
 
-    /// Finds the scattered light; iterations made and bound of the relative residual.
-    fn solve(&mut self, real: &[f32], imaginary: &[f32], options: &RestorationOptions) -> Result<(usize, f64)> {
-        self.grid.restrict(real, imaginary, &mut self.observed);
-        self.scattered.copy_from_slice(&self.observed);
-        self.convolver.apply(&mut self.scattered, &self.model.estimate);
-        let largest = f64::from(largest_part(real).max(largest_part(imaginary)));
-        let tolerance = options.tolerance;
-        let mut residual = f64::INFINITY;
-        for iterations in 0..=options.max_iterations {
-            residual = relative(self.find_residual(), largest);
-            let bound = self.model.contraction * residual;
-            if residual <= tolerance || options.regularisation > 0.0 && residual.is_finite() {
-                return Ok((iterations, residual));
-            }
-            if self.is_plain() && bound <= tolerance {
-                self.step();
-                return Ok((iterations + 1, bound));
-            }
-            if !residual.is_finite() {
-                break;
-            }
-            self.step();
+    /// Which operators are for images of a modulation; none where nothing is scattered.
+    fn work_index(&mut self, modulation: Option<&Modulation>) -> Result<Option<usize>> {
+        if self.psf.is_empty() {
+            return Ok(None);
         }
-        Err(Error::NotConverged { iterations: options.max_iterations, residual, tolerance })
-    }
-
-    fn is_plain(&self) -> bool {
-        self.model.contraction <= PLAIN_ITERATION
-    }
-
-    /// Puts `psf * (y - c) - c` into the spare image, `c` being the scattered light, and returns its largest modulus.
-    fn find_residual(&mut self) -> f64 {
-        self.spare.copy_from_slice(&self.scattered);
-        self.grid.round_trip(&mut self.spare);
-        for (light, observed) in self.spare.iter_mut().zip(&self.observed) {
-            *light = observed - *light;
+        let key = modulation.copied().filter(|_| self.psf.depends_on_modulation());
+        if let Some(index) = self.works.iter().position(|(known, _)| *known == key) {
+            return Ok(Some(index));
         }
-        self.convolver.apply(&mut self.spare, &self.model.scatter);
-        for (residual, scattered) in self.spare.iter_mut().zip(&self.scattered) {
-            *residual -= scattered;
-        }
-        largest_modulus(self.spare.iter().copied())
+        let psf = key.map_or_else(|| self.psf.clone(), |modulation| self.psf.at_modulation(&modulation));
+        let work = Work::new(&psf, self.size, &self.options)?;
+        self.works.truncate(MODULATIONS - 1);
+        self.works.push((key, work));
+        Ok(Some(self.works.len() - 1))
     }
-
-    /// Adds the residual to the scattered light, divided by `1 + H` where the plain step would not converge.
-    fn step(&mut self) {
-        if !self.is_plain() {
-            self.convolver.apply(&mut self.spare, &self.model.inverse);
-        }
-        for (scattered, residual) in self.scattered.iter_mut().zip(&self.spare) {
-            *scattered += residual;
-        }
-    }
-}
-
-/// Infinite as soon as one value is not finite.
-fn largest_modulus(values: impl Iterator<Item = Complex<f32>>) -> f64 {
-    let larger = |largest: f32, value: f32| if value.is_finite() { largest.max(value) } else { f32::INFINITY };
-    f64::from(values.map(|value| value.norm_sqr()).fold(0.0, larger)).sqrt()
-}
-
-/// Zero for an image without any light.
-fn relative(residual: f64, largest: f64) -> f64 {
-    if residual > 0.0 { residual / largest } else { residual }
 }

@@ -1,29 +1,38 @@
 use rustfft::num_complex::Complex;
 
-use crate::convolution::{Convolver, Transfer, check_size};
-use crate::spectrum::Spectrum;
+use crate::convolution::{Convolver, check_size};
+use crate::grid::Grid;
+use crate::model::{Scattering, operator};
+use crate::operator::Operator;
+use crate::parts::parts;
 use crate::{Error, Psf, Result};
 
 /// Scatters light as a camera does: `z + psf * z`, linear convolution with nothing outside the image.
 ///
-/// Made once for a size of image; all buffers are its own, so that applying it allocates nothing.
+/// Made once for a size of image; all buffers are its own, so that applying it allocates nothing. Ghosts that are late by
+/// a way in metres have a phase only at one modulation: give `psf.at_modulation(..)`, and `psf.without_phases()` for the
+/// mean of the samples.
 pub struct Scatterer {
-    work: Option<(Convolver, Transfer)>,
+    work: Option<(Convolver, Operator)>,
     image: Vec<Complex<f32>>,
 }
 
 impl Scatterer {
     /// For images of `width` x `height` pixels.
+    ///
+    /// # Errors
+    /// What [`Psf::validate`] finds, images that are too large, ghosts without a phase.
     pub fn new(psf: &Psf, width: usize, height: usize) -> Result<Self> {
-        check_size([width, height])?;
-        let kernel = psf.sample([width - 1, height - 1])?;
-        let convolver = Convolver::new([width, height], kernel.half_width)?;
+        let size = [width, height];
+        check_size(size)?;
+        let parts = parts(psf, size)?;
         let image = vec![Complex::new(0.0, 0.0); width * height];
-        if psf.is_empty() {
+        if parts.is_empty() {
             return Ok(Self { work: None, image });
         }
-        let transfer = Spectrum::of_kernel(&kernel, convolver.padded()).transfer();
-        Ok(Self { work: Some((convolver, transfer)), image })
+        let grid = Grid::new(size, [1, 1]);
+        let Scattering { convolver, spectra, .. } = Scattering::new(&parts, &grid)?;
+        Ok(Self { work: Some((convolver, operator(&parts, &spectra, &grid))), image })
     }
 
     /// Adds the scattered light to the planes (row by row). A pixel that is not finite stays as it is and scatters nothing.
@@ -33,12 +42,12 @@ impl Scatterer {
                 return Err(Error::PlaneLength { what, expected: self.image.len(), found: plane.len() });
             }
         }
-        let Some((convolver, transfer)) = &mut self.work else { return Ok(()) };
+        let Some((convolver, operator)) = &mut self.work else { return Ok(()) };
         for (value, (re, im)) in self.image.iter_mut().zip(real.iter().zip(imaginary.iter())) {
             let finite = re.is_finite() && im.is_finite();
             *value = if finite { Complex::new(*re, *im) } else { Complex::new(0.0, 0.0) };
         }
-        convolver.apply(&mut self.image, transfer);
+        operator.apply(convolver, &mut self.image);
         for (scattered, (re, im)) in self.image.iter().zip(real.iter_mut().zip(imaginary.iter_mut())) {
             if re.is_finite() && im.is_finite() {
                 *re += scattered.re;

@@ -1,7 +1,8 @@
 //! Propagation of noise through a restoration.
 
 use crate::mask::Mask;
-use crate::restorer::Work;
+use crate::noise::Centre;
+use crate::work::Work;
 
 /// Share of a variance below which what other pixels add is left out: 0.05 % of sigma.
 const NEGLIGIBLE: f64 = 1e-3;
@@ -12,29 +13,21 @@ impl Work {
     /// The noise of pixels is independent before and correlated afterwards; sigma is that of each pixel by itself.
     /// Pixels put aside keep their sigma and, as filled or clipped values, bring no noise to others. NaN stays NaN.
     pub(crate) fn propagate_sigma(&mut self, sigma: &mut [f32], mask: &Mask) {
-        let noise = &self.model.noise;
-        let own = (1.0 - noise.centre).powi(2);
-        let finite = || sigma.iter().copied().filter(|value| value.is_finite());
-        let (least, most) = finite().fold((f32::INFINITY, 0.0_f32), |(a, b), value| (a.min(value), b.max(value)));
-        let [least, most] = [least, most].map(|value| f64::from(value).powi(2));
+        let [least, most] = finite_extremes(sigma).map(|value| f64::from(value).powi(2));
         if most <= 0.0 {
             return;
         }
-        let gain = if noise.surroundings * most <= NEGLIGIBLE * own * least {
-            self.variance.iter_mut().for_each(Vec::clear);
-            own.sqrt()
+        self.kept_sigma.clear();
+        self.kept_sigma.extend(mask.pixels().map(|pixel| sigma[pixel]));
+        let noise = &self.model.noise;
+        let own = (1.0 - noise.largest_centre()).powi(2);
+        if noise.surroundings * most <= NEGLIGIBLE * own * least {
+            scale(sigma, &noise.centre);
         } else {
             self.scatter_variance(sigma, mask);
-            (1.0 - 2.0 * self.model.noise.centre).max(0.0).sqrt()
-        };
-        let surroundings = self.variance[0].iter().copied().chain(std::iter::repeat(0.0));
-        let mut kept = mask.pixels().peekable();
-        for (pixel, (value, added)) in sigma.iter_mut().zip(surroundings).enumerate() {
-            if kept.next_if_eq(&pixel).is_none() {
-                let variance = (f64::from(*value) * gain).powi(2) + f64::from(added.max(0.0));
-                *value = variance.sqrt() as f32;
-            }
+            add(sigma, &self.model.noise.centre, &self.variance[0]);
         }
+        mask.pixels().zip(&self.kept_sigma).for_each(|(pixel, value)| sigma[pixel] = *value);
     }
 
     /// Puts `q^2 * var` into the first variance plane.
@@ -48,8 +41,45 @@ impl Work {
             plane[pixel] = 0.0;
         }
         self.grid.restrict(plane, zeros, &mut self.spare);
-        self.convolver.apply(&mut self.spare, &self.model.noise.squared_kernel);
+        self.model.noise.squared.apply(&mut self.convolver, &mut self.spare);
         plane.fill(0.0);
         self.grid.add_interpolated(&self.spare, 1.0, plane, zeros);
     }
+}
+
+/// What each pixel keeps of its own noise, where that of the others does not count.
+fn scale(sigma: &mut [f32], centre: &Centre) {
+    match centre {
+        Centre::Same(centre) => {
+            let gain = (1.0 - centre).abs() as f32;
+            for value in sigma {
+                *value *= gain;
+            }
+        }
+        Centre::Pixels(centres) => {
+            sigma.iter_mut().zip(centres).for_each(|(value, centre)| *value *= (1.0 - centre).abs());
+        }
+    }
+}
+
+/// Variances of the own noise and of that of all pixels, which the own is among.
+fn add(sigma: &mut [f32], centre: &Centre, added: &[f32]) {
+    let total = |value: f32, centre: f64, added: f32| {
+        let own = (1.0 - 2.0 * centre).max(0.0) * f64::from(value).powi(2);
+        (own + f64::from(added.max(0.0))).sqrt() as f32
+    };
+    let values = sigma.iter_mut().zip(added);
+    match centre {
+        Centre::Same(centre) => values.for_each(|(value, added)| *value = total(*value, *centre, *added)),
+        Centre::Pixels(centres) => {
+            values.zip(centres).for_each(|((value, added), centre)| *value = total(*value, f64::from(*centre), *added));
+        }
+    }
+}
+
+/// Smallest and largest of the finite values; infinity and zero where there is none.
+fn finite_extremes(values: &[f32]) -> [f32; 2] {
+    values.iter().fold([f32::INFINITY, 0.0], |[least, most], &value| {
+        [if value < least { value } else { least }, if value > most && value < f32::INFINITY { value } else { most }]
+    })
 }

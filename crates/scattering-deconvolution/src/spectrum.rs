@@ -2,7 +2,7 @@
 
 use rustfft::{FftDirection, FftPlanner, num_complex::Complex};
 
-use crate::SampledKernel;
+use crate::blobs::Kernel;
 use crate::convolution::Transfer;
 
 /// A spectrum (or an image on the torus) of `size` (columns, rows), column by column.
@@ -14,7 +14,7 @@ pub(crate) struct Spectrum {
 
 impl Spectrum {
     /// The spectrum of a kernel on a torus that is large enough for it.
-    pub(crate) fn of_kernel(kernel: &SampledKernel, size: [usize; 2]) -> Self {
+    pub(crate) fn of_kernel(kernel: &Kernel, size: [usize; 2]) -> Self {
         let mut image = Self { size, values: vec![Complex::new(0.0, 0.0); size[0] * size[1]] };
         for ([col, row], value) in kernel.entries() {
             let wrapped = |offset: isize, axis: usize| offset.rem_euclid(size[axis] as isize) as usize;

@@ -160,12 +160,18 @@ impl Simulator {
     fn scatter(&self, image: &mut Image) -> Result<()> {
         let Some(psf) = &self.spec.errors.scattering else { return Ok(()) };
         let format = self.spec.camera.geometry.format;
-        let mut scatterer = Scatterer::new(psf, format.width, format.height)?;
-        for [real, imaginary] in &mut image.channels {
-            scatterer.apply(real, imaginary)?;
-        }
+        let mut seen_by = psf.without_phases();
+        let mut scatterer = Scatterer::new(&seen_by, format.width, format.height)?;
         let mut nothing = vec![0.0; image.offset.len()];
         scatterer.apply(&mut image.offset, &mut nothing)?;
+        for ([real, imaginary], modulation) in image.channels.iter_mut().zip(self.spec.camera.modulations()?) {
+            let modulated = psf.at_modulation(&modulation);
+            if modulated != seen_by {
+                scatterer = Scatterer::new(&modulated, format.width, format.height)?;
+                seen_by = modulated;
+            }
+            scatterer.apply(real, imaginary)?;
+        }
         Ok(())
     }
 }

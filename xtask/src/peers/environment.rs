@@ -13,6 +13,17 @@ pub(crate) struct Environment {
 }
 
 impl Environment {
+    /// As [`Self::new`]; where Python, its `venv` or the package index is missing, says so and answers nothing.
+    pub(crate) fn if_possible(name: &str) -> Option<Self> {
+        match Self::new(name) {
+            Ok(environment) => Some(environment),
+            Err(message) => {
+                println!("── peers of {name}: not to be had, skipped\n{message}");
+                None
+            }
+        }
+    }
+
     /// Makes the environment, or finds it made from the same list.
     pub(crate) fn new(name: &str) -> Result<Self, String> {
         let scripts = root().join("xtask/peers");

@@ -5,6 +5,9 @@
 
 mod adjust;
 mod environment;
+mod phase;
+mod scattering;
+mod table;
 
 use crate::shell::Outcome;
 
@@ -13,6 +16,10 @@ use crate::shell::Outcome;
 enum Stage {
     /// Ceres and OpenCV beside `adjust`.
     Adjust,
+    /// scikit-image, OpenCV, SNAPHU, kamui and NumPy beside `phase-unwrap` and `range-image`.
+    Phase,
+    /// `scipy`, FFTW and OpenCV beside `scattering-deconvolution`.
+    Scattering,
 }
 
 /// Which stages, and how often.
@@ -30,6 +37,8 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome {
     for stage in &arguments.stages {
         match stage {
             Stage::Adjust => adjust::run(arguments.runs.max(1))?,
+            Stage::Phase => phase::run(arguments.runs.max(1))?,
+            Stage::Scattering => scattering::run(arguments.runs.max(1))?,
         }
     }
     Ok(())

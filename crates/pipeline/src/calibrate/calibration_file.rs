@@ -39,6 +39,7 @@ pub(crate) fn calibration(
         range_models,
         noise: known.and_then(|known| known.noise),
         scattering: known.and_then(|known| known.scattering.clone()),
+        scattering_parameters: known.map(|known| known.scattering_parameters.clone()).unwrap_or_default(),
         fixed_pattern: known.and_then(|known| known.fixed_pattern.clone()),
         correlation: None,
         span: span(outcome),

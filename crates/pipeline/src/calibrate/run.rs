@@ -51,7 +51,7 @@ pub fn calibrate(request: &CalibrateRequest, progress: &dyn Progress) -> Result<
             write_text(folder.file("summary.json")?, &text)?;
             folder.commit()?;
             progress.finish();
-            Err(Error::Refused { summary: text, source })
+            Err(Error::Refused { summary: text, source: source.into() })
         }
     }
 }

@@ -44,7 +44,7 @@ pub fn plan_network(request: &NetworkPlanRequest, progress: &dyn Progress) -> Re
             write_text(folder.file("summary.json")?, &text)?;
             folder.commit()?;
             progress.finish();
-            return Err(Error::Refused { summary: text, source });
+            return Err(Error::Refused { summary: text, source: source.into() });
         }
         Err(source) => return Err(Error::Calibrate(source)),
     };

@@ -7,7 +7,9 @@ mod colour;
 mod network;
 mod page;
 mod picture;
+mod scattering;
 mod sections;
 
 pub(crate) use network::{render_calibration, render_plan};
+pub(crate) use scattering::render_scattering;
 pub(crate) use sections::render;

@@ -21,6 +21,7 @@ impl Calibration {
             noise.validate().map_err(|error| InvalidField::new("noise", error.to_string()))?;
         }
         self.scattering.iter().try_for_each(check_psf)?;
+        check_parameters("scattering_parameters", &self.scattering_parameters, scattering_unit, "weight 1, sigma_px 1, ...")?;
         self.fixed_pattern.iter().try_for_each(|pattern| self.check_pattern(pattern))?;
         if let Some(correlation) = &self.correlation {
             correlation.check(&self.parameter_names())?;
@@ -128,6 +129,17 @@ fn check_parameters(
     Ok(())
 }
 
+/// Weights are shares of the light, widths are in pixels; both are numbered by their Gaussian.
+fn scattering_unit(name: &str) -> Option<&'static str> {
+    let (quantity, term) = name.rsplit_once(' ')?;
+    term.parse::<usize>().ok()?;
+    match quantity {
+        "weight" => Some("1"),
+        "sigma_px" | "sigma_px across" | "sigma_px down" => Some("px"),
+        _ => None,
+    }
+}
+
 fn check_psf(psf: &Psf) -> Check {
     match psf {
         Psf::Gaussians(terms) => {
@@ -154,6 +166,7 @@ fn check_psf(psf: &Psf) -> Check {
             let finite = values.iter().all(|value| value.is_finite());
             require(finite, "scattering", || "has a kernel with values that are not finite".into())
         }
+        Psf::Composite(_) => psf.validate().map_err(|error| InvalidField::new("scattering", error.to_string())),
     }
 }
 

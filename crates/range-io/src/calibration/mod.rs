@@ -37,6 +37,9 @@ pub struct Calibration {
     /// Point spread function of internal scattering.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scattering: Option<Psf>,
+    /// Quality of the point spread function's weights and widths (`weight 1`, `sigma_px 1`, ...), where it was estimated.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub scattering_parameters: Vec<NamedParameter>,
     /// Offset of each pixel in range.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fixed_pattern: Option<FixedPattern>,

@@ -25,6 +25,7 @@ impl Calibration {
             range_models: models.map(|(time, model)| RangeCalibration::from_model(time, model)).collect(),
             noise: None,
             scattering: scattering.cloned(),
+            scattering_parameters: Vec::new(),
             fixed_pattern: None,
             correlation: None,
             span: ValidSpan::default(),

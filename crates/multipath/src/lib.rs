@@ -1,0 +1,29 @@
+#![doc = include_str!("../README.md")]
+
+mod chi_squared;
+mod cholesky;
+mod detect;
+mod error;
+mod model;
+mod patches;
+mod pixel;
+mod profile;
+mod radiosity;
+mod refine;
+mod response;
+mod risk;
+mod search;
+mod single;
+mod solver;
+mod two_path;
+mod vector;
+
+pub use detect::{Detection, DetectionOptions, Detector, Evidence, detect};
+pub use error::{Error, Result};
+pub use pixel::{MAXIMUM_FREQUENCIES, Systematics};
+pub use response::{FrequencyResponse, ResponseEstimate, estimate_response};
+pub use risk::{AlbedoScale, Risk, RiskOptions, assess_risk, ranges_from_depths};
+pub use search::SearchSpan;
+pub use two_path::{
+    Hypothesis, PixelHypotheses, PixelPaths, TwoPathImage, TwoPathOptions, TwoPathSolver, Verdict, solve_two_paths,
+};

@@ -1,0 +1,108 @@
+//! Two surveys as pairs of averaged complex images.
+
+use std::path::Path;
+
+use range_image::ComplexFrame;
+use range_io::calibration::Calibration;
+use range_io::survey::{Level, Survey};
+use scattering_deconvolution::{EstimationOptions, ForegroundCapture, Psf};
+
+use super::shifts::{Shift, shifts_of};
+use super::{ScatteringRequest, nominal};
+use crate::load::{calibrated, read_calibration, root_of};
+use crate::outcome::Outcome;
+use crate::progress::Progress;
+use crate::view::ViewData;
+use crate::{AverageOptions, DemodulateOptions, Error, Plan, Result, Stage, process};
+
+/// One scene from all stations, with and without objects.
+pub(super) struct Captures {
+    pub(super) stations: Vec<String>,
+    pub(super) calibration: Calibration,
+    pub(super) calibration_words: String,
+    with_object: Outcome,
+    /// For each view with an object the one of the same station without.
+    without_object: Vec<ComplexFrame>,
+}
+
+impl Captures {
+    /// Demodulates and averages both surveys and pairs their stations by name.
+    pub(super) fn read(request: &ScatteringRequest, progress: &dyn Progress) -> Result<Self> {
+        let (calibration, calibration_words) = start(request)?;
+        let with_object = frames(&request.with_object, request.calibration.as_deref(), progress)?;
+        let mut others = frames(&request.without_object, request.calibration.as_deref(), progress)?;
+        let known: Vec<String> = others.views.iter().map(|other| other.station.clone()).collect();
+        let mut stations = Vec::new();
+        let mut without_object = Vec::new();
+        for view in &with_object.views {
+            complex(view)?;
+            let Some(place) = others.views.iter().position(|other| other.station == view.station) else {
+                let message = format!(
+                    "it has no station `{}`, which {} has: {}",
+                    view.station,
+                    request.with_object.display(),
+                    known.join(", ")
+                );
+                return Err(Error::Survey { path: request.without_object.clone(), message });
+            };
+            let other = others.views.swap_remove(place);
+            complex(&other)?;
+            let ViewData::Phase(frame) = other.data else { continue };
+            without_object.push(frame);
+            stations.push(view.station.clone());
+        }
+        Ok(Self { stations, calibration, calibration_words, with_object, without_object })
+    }
+
+    /// What the estimation takes.
+    pub(super) fn pairs(&self) -> Vec<ForegroundCapture<'_>> {
+        let with_object = self.with_object.views.iter().filter_map(|view| match &view.data {
+            ViewData::Phase(frame) => Some(frame),
+            _ => None,
+        });
+        let pair = |(with_object, without_object)| ForegroundCapture { with_object, without_object, object: None };
+        with_object.zip(&self.without_object).map(pair).collect()
+    }
+
+    /// How far the object's scattered light moves the background's ranges, as observed and as restored.
+    pub(super) fn shifts(&self, psf: &Psf, options: &EstimationOptions) -> Result<Vec<Shift>> {
+        let pairs = self.pairs();
+        self.stations.iter().zip(&pairs).map(|(station, pair)| shifts_of(station, pair, psf, options)).collect()
+    }
+}
+
+/// The calibration that the point spread function is added to.
+fn start(request: &ScatteringRequest) -> Result<(Calibration, String)> {
+    let camera = Survey::read(&request.without_object)?.camera.nominal_camera()?;
+    let root = root_of(&request.without_object);
+    match read_calibration(&root, request.calibration.as_deref())? {
+        (Some(calibration), words) => {
+            calibrated(&calibration, &camera)?;
+            Ok((calibration, words))
+        }
+        (None, _) => Ok((nominal(&camera)?, "the survey's nominal camera".to_owned())),
+    }
+}
+
+/// A survey's frames, one complex image a station.
+fn frames(survey: &Path, calibration: Option<&Path>, progress: &dyn Progress) -> Result<Outcome> {
+    let level = Survey::read(survey)?.level;
+    if level > Level::Phase {
+        let (stage, needs) = ("scattering", Level::Phase.name());
+        return Err(Error::RuledOut { stage, needs, level: level.name() });
+    }
+    let mut stages = Vec::new();
+    if level == Level::Samples {
+        stages.push(Stage::Demodulate(DemodulateOptions::default()));
+    }
+    stages.push(Stage::Average(AverageOptions::default()));
+    let plan = Plan { name: "scattering".to_owned(), source: None, calibrate: None, stages };
+    process(&plan, survey, calibration, progress)
+}
+
+fn complex(view: &crate::View) -> Result<()> {
+    match view.data {
+        ViewData::Phase(_) => Ok(()),
+        _ => Err(Error::Needs { stage: "scattering", needs: "Demodulate" }),
+    }
+}

@@ -1,0 +1,110 @@
+//! Estimation of internal scattering from two surveys of one scene, with and without bright objects in the foreground.
+
+mod captures;
+mod shifts;
+mod summary;
+
+use std::path::PathBuf;
+use std::time::Instant;
+
+use error_models::{ModelSet, NamedParameter, ParameterStatus};
+use range_io::atomic::{OutputFolder, write_text};
+use range_io::calibration::{Calibration, Provenance};
+use scattering_deconvolution::{EstimationOptions, PsfEstimate, estimate_psf};
+
+pub use summary::{CandidateGaussians, ScatteringCapture, ScatteringParameter, ScatteringSummary};
+
+use crate::progress::Progress;
+use crate::{Error, Result, report};
+use captures::Captures;
+pub(crate) use shifts::Shift;
+
+/// What to estimate scattering from.
+#[derive(Debug, Clone)]
+pub struct ScatteringRequest {
+    /// Survey with the objects in the foreground.
+    pub with_object: PathBuf,
+    /// Survey without them, from the same stations.
+    pub without_object: PathBuf,
+    /// Calibration that the point spread function is added to; `None`: the one beside the survey without objects, or
+    /// else the nominal camera.
+    pub calibration: Option<PathBuf>,
+    /// How the point spread function is estimated.
+    pub options: EstimationOptions,
+    /// Output folder; written beside and renamed when everything is done.
+    pub out: PathBuf,
+}
+
+/// Estimates the point spread function and writes calibration, summary and report into the request's output folder.
+///
+/// # Errors
+/// [`Error::Refused`] where the captures do not determine it: then the output folder holds a `summary.json` with the
+/// verdict and nothing else. Every other error leaves no output.
+pub fn estimate_scattering(request: &ScatteringRequest, progress: &dyn Progress) -> Result<ScatteringSummary> {
+    let clock = Instant::now();
+    let captures = Captures::read(request, progress)?;
+    progress.begin("estimate scattering", 2);
+    let estimate = estimate_psf(&captures.pairs(), &request.options).map_err(stage)?;
+    progress.advance(1);
+    let shifts = match &estimate.psf {
+        Some(psf) => captures.shifts(psf, &request.options)?,
+        None => Vec::new(),
+    };
+    let mut summary = ScatteringSummary::new(request, &captures, &estimate, &shifts);
+    summary.seconds = clock.elapsed().as_secs_f64();
+    progress.advance(2);
+    let text = serde_json::to_string_pretty(&summary)
+        .map_err(|error| Error::Figure { figure: "summary.json".to_owned(), message: error.to_string() })?;
+    let folder = OutputFolder::create(&request.out)?;
+    write_text(folder.file("summary.json")?, &text)?;
+    let Some(psf) = &estimate.psf else {
+        folder.commit()?;
+        progress.finish();
+        return Err(Error::Refused { summary: text, source: estimate.verdict.to_string().into() });
+    };
+    let mut calibration = captures.calibration;
+    calibration.scattering = Some(psf.clone());
+    calibration.scattering_parameters = estimate.parameters.iter().map(named).collect();
+    calibration.provenance = provenance(request, &calibration.provenance, &estimate);
+    calibration.write(folder.file(Calibration::FILE_NAME)?)?;
+    write_text(folder.file("report.html")?, &report::render_scattering(&summary, &shifts)?)?;
+    folder.commit()?;
+    progress.finish();
+    Ok(summary)
+}
+
+fn stage(error: scattering_deconvolution::Error) -> Error {
+    Error::stage("scattering", "all captures")(error)
+}
+
+fn named(parameter: &scattering_deconvolution::PsfParameter) -> NamedParameter {
+    NamedParameter {
+        name: parameter.name.clone(),
+        value: parameter.value,
+        sigma: parameter.sigma,
+        unit: summary::unit_of(&parameter.name).to_owned(),
+        status: if parameter.sigma > 0.0 { ParameterStatus::Estimated } else { ParameterStatus::Held },
+    }
+}
+
+/// The calibration's own history, if it has one, with the scattering behind it.
+fn provenance(request: &ScatteringRequest, known: &Provenance, estimate: &PsfEstimate) -> Provenance {
+    let own = format!("scattering from {}", request.with_object.display());
+    if known.method.is_empty() {
+        return Provenance {
+            survey: request.with_object.display().to_string(),
+            method: own,
+            redundancy: usize::try_from(estimate.redundancy).ok(),
+            sigma0: Some(estimate.sigma0).filter(|sigma0| sigma0.is_finite()),
+            created: None,
+        };
+    }
+    Provenance { method: format!("{}; {own}", known.method), ..known.clone() }
+}
+
+/// A calibration of which nothing but the nominal camera is known.
+fn nominal(camera: &camera_model::Camera) -> Result<Calibration> {
+    let mut calibration = Calibration::from_models(camera, &ModelSet::default(), None)?;
+    calibration.provenance = Provenance::default();
+    Ok(calibration)
+}

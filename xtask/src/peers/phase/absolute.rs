@@ -1,0 +1,42 @@
+//! Absolute counts at one frequency. No other program gives them.
+
+use super::Stage;
+use crate::peers::table::{Bars, head, row};
+use crate::shell::Outcome;
+
+const SEEDS: usize = 6;
+const WAYS: [(&str, &str); 3] = [
+    ("amplitude_1", "amplitude alone, one wrap at most"),
+    ("amplitude_2", "amplitude alone, two wraps at most"),
+    ("geometry_2", "amplitude and rays, two wraps at most"),
+];
+
+pub(super) fn run(stage: &Stage, bars: &mut Bars) -> Outcome {
+    println!("── absolute counts");
+    for (albedo, name) in [("plain", "albedo 0.3 to 0.9"), ("dark", "the same, a tenth of the patches at 0.05")] {
+        let mut sums = [[0.0; 5]; WAYS.len()];
+        for seed in 1..=SEEDS {
+            let figures = stage.ours.call(&["absolute", albedo, "640", "480", &seed.to_string()])?;
+            for (sums, (way, _)) in sums.iter_mut().zip(WAYS) {
+                let wrong = figures.get(way, 2);
+                let own =
+                    [figures.get(way, 0), figures.get(way, 1), wrong, figures.get(way, 3)].map(|x| x / SEEDS as f64);
+                (0..4).for_each(|place| sums[place] += own[place]);
+                sums[4] = wrong.max(sums[4]);
+            }
+        }
+        head(&[
+            &format!("absolute counts, {SEEDS} rooms of 640x480, {name}"),
+            "right",
+            "unknown",
+            "wrong among the sure",
+            "CPU ms",
+            "wrong among the sure, worst room",
+        ]);
+        for (sums, (_, way)) in sums.iter().zip(WAYS) {
+            row(way, sums);
+        }
+        bars.at_least(&format!("absolute counts with rays, right, {name}"), 0.92, sums[2][0]);
+    }
+    Ok(())
+}

@@ -1,6 +1,7 @@
 //! From a range frame to its points.
-// Only what is inlined is compiled for wide registers.
-#![allow(clippy::inline_always)]
+// Only what is inlined is compiled for wide registers; branches would keep loops scalar, and lanes are counted in several
+// planes at once.
+#![allow(clippy::inline_always, clippy::needless_bitwise_bool, clippy::needless_range_loop)]
 
 use nalgebra::{Isometry3, Point3};
 use range_image::{Flags, RangeFrame};

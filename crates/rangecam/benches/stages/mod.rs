@@ -14,6 +14,9 @@ use rangecam::scattering_deconvolution::{RestorationOptions, Restorer};
 
 pub type Failure = Box<dyn std::error::Error + Send + Sync>;
 
+/// A stage of a frame.
+pub type Stage = fn(&mut Frame) -> Result<(), Failure>;
+
 /// How the missing whole cycles are found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Unwrapping {
@@ -109,7 +112,7 @@ impl Frame {
     }
 
     /// The stages in their order.
-    pub const STAGES: [(&'static str, fn(&mut Self) -> Result<(), Failure>); 6] = [
+    pub const STAGES: [(&'static str, Stage); 6] = [
         ("demodulate", Self::demodulate),
         ("deconvolve", Self::deconvolve),
         ("phase, amplitude, sigma", Self::derive),

@@ -39,7 +39,7 @@ impl Unwrapping {
     ];
 
     fn modulations(self) -> Result<Vec<Modulation>, Failure> {
-        let frequencies: &[f64] = if self == Self::TwoFrequencies { &[80e6, 60e6] } else { &[30e6] };
+        let frequencies: &[f64] = if self == Self::TwoFrequencies { &[70e6, 60e6] } else { &[30e6] };
         Ok(frequencies.iter().map(|&frequency| Modulation::new(frequency)).collect::<Result<_, _>>()?)
     }
 }

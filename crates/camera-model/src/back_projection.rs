@@ -1,4 +1,7 @@
 //! From a range frame to its points.
+// Only what is inlined is compiled for wide registers; branches would keep loops scalar, and lanes are counted in several
+// planes at once.
+#![allow(clippy::inline_always, clippy::needless_bitwise_bool, clippy::needless_range_loop)]
 
 use nalgebra::{Isometry3, Point3};
 use range_image::{Flags, RangeFrame};
@@ -68,30 +71,65 @@ impl RayTable {
         frame.validate()?;
         self.require_size(&frame.range, "range frame")?;
         cloud.resize(frame.width(), frame.height());
-        let per_point = cloud.points.par_chunks_mut(CHUNK).zip(cloud.flags.par_chunks_mut(CHUNK));
-        let per_pixel = self.directions().par_chunks(CHUNK).zip(frame.range.as_slice().par_chunks(CHUNK));
-        let flags = frame.flags.as_slice().par_chunks(CHUNK);
-        per_point.zip(per_pixel.zip(flags)).for_each(|((points, flags), ((rays, ranges), reasons))| {
-            for ((point, ray), &range) in points.iter_mut().zip(rays).zip(ranges) {
-                let range = if is_distance(range) { f64::from(range) } else { f64::NAN };
-                *point = [ray[0] * range, ray[1] * range, ray[2] * range];
-            }
-            for ((flag, &reason), &range) in flags.iter_mut().zip(reasons).zip(ranges) {
-                *flag = if is_distance(range) { reason } else { reason | Flags::NO_DATA };
-            }
-        });
-        copy(frame.sigma.as_slice(), &mut cloud.sigma);
-        copy(frame.amplitude.as_slice(), &mut cloud.amplitude);
+        let found = cloud.points.par_chunks_mut(CHUNK).zip(cloud.flags.par_chunks_mut(CHUNK));
+        let found = found.zip(cloud.sigma.par_chunks_mut(CHUNK)).zip(cloud.amplitude.par_chunks_mut(CHUNK));
+        let given = self.directions().par_chunks(CHUNK).zip(frame.range.as_slice().par_chunks(CHUNK));
+        let given = given.zip(frame.flags.as_slice().par_chunks(CHUNK));
+        let given =
+            given.zip(frame.sigma.as_slice().par_chunks(CHUNK)).zip(frame.amplitude.as_slice().par_chunks(CHUNK));
+        found.zip(given).for_each(
+            |((((points, flags), sigmas), amplitudes), ((((rays, ranges), reasons), sigma), amplitude))| {
+                pulp::Arch::new().dispatch(
+                    #[inline(always)]
+                    || {
+                        scale_rays(rays, ranges, points);
+                        flag_missing(ranges, reasons, flags);
+                    },
+                );
+                sigmas.copy_from_slice(sigma);
+                amplitudes.copy_from_slice(amplitude);
+            },
+        );
         Ok(())
     }
 }
 
-/// Whether a value can be a distance in front of the camera.
-fn is_distance(range: f32) -> bool {
-    range > 0.0 && range < f32::INFINITY
+/// Pixels taken at a time, so that the compiler can vectorise.
+const LANES: usize = 8;
+
+#[inline(always)]
+fn scale_rays(rays: &[[f64; 3]], ranges: &[f32], points: &mut [[f64; 3]]) {
+    let (points, last_points) = points.as_chunks_mut::<LANES>();
+    let (rays, last_rays) = rays.as_chunks::<LANES>();
+    let (ranges, last_ranges) = ranges.as_chunks::<LANES>();
+    for ((points, rays), ranges) in points.iter_mut().zip(rays).zip(ranges) {
+        scale::<LANES>(rays, ranges, points);
+    }
+    for ((point, ray), range) in last_points.iter_mut().zip(last_rays).zip(last_ranges) {
+        scale::<1>(&[*ray], &[*range], std::array::from_mut(point));
+    }
 }
 
-fn copy(from: &[f32], to: &mut [f32]) {
-    let chunks = to.par_chunks_mut(CHUNK).zip(from.par_chunks(CHUNK));
-    chunks.for_each(|(to, from)| to.copy_from_slice(from));
+#[inline(always)]
+fn scale<const L: usize>(rays: &[[f64; 3]; L], ranges: &[f32; L], points: &mut [[f64; 3]; L]) {
+    for lane in 0..L {
+        let range = if is_distance(ranges[lane]) { f64::from(ranges[lane]) } else { f64::NAN };
+        for axis in 0..3 {
+            points[lane][axis] = rays[lane][axis] * range;
+        }
+    }
+}
+
+#[inline(always)]
+fn flag_missing(ranges: &[f32], reasons: &[Flags], flags: &mut [Flags]) {
+    for ((flag, &reason), &range) in flags.iter_mut().zip(reasons).zip(ranges) {
+        let missing = if is_distance(range) { 0 } else { Flags::NO_DATA.bits() };
+        *flag = Flags::from_bits_retain(reason.bits() | missing);
+    }
+}
+
+/// Whether a value can be a distance in front of the camera.
+#[inline(always)]
+fn is_distance(range: f32) -> bool {
+    (range > 0.0) & (range < f32::INFINITY)
 }

@@ -1,4 +1,6 @@
 //! Taking the range errors off a frame.
+// Only what is inlined is compiled for wide registers.
+#![allow(clippy::inline_always)]
 
 use range_image::{Flags, ImageFormat, RangeFrame, Raster};
 
@@ -64,12 +66,17 @@ fn correct_planes(
     planes.validate(model, format, principal_point_mm)?;
     let kernel = Kernel::new(model, format, principal_point_mm);
     let tally = planes.for_each_chunk(|chunk| {
-        correct_chunk(chunk, &kernel, format.width);
+        // Products and sums stay separate operations, so that all machines give the same bits.
+        pulp::Arch::new().dispatch(
+            #[inline(always)]
+            || correct_chunk(chunk, &kernel, format.width),
+        );
         Ok(())
     })?;
     Ok(tally.summary(format.width * format.height, model.terms.d0, -1.0))
 }
 
+#[inline(always)]
 fn correct_chunk(chunk: &mut Chunk<'_>, kernel: &Kernel, width: usize) {
     for row in 0..chunk.range.len() / width {
         let mut tally = LaneTally::new();
@@ -84,30 +91,38 @@ fn correct_chunk(chunk: &mut Chunk<'_>, kernel: &Kernel, width: usize) {
     }
 }
 
+#[inline(always)]
 fn load(chunk: &Chunk<'_>, start: usize, length: usize) -> Block {
     let mut block = Block::empty();
     let pixels = start..start + length;
-    block.range[..length].copy_from_slice(&chunk.range[pixels.clone()]);
-    block.amplitude[..length].copy_from_slice(&chunk.amplitude[pixels.clone()]);
+    copy(&chunk.range[pixels.clone()], &mut block.range);
+    copy(&chunk.amplitude[pixels.clone()], &mut block.amplitude);
     if let Some(sigma) = &chunk.sigma {
-        block.sigma[..length].copy_from_slice(&sigma[pixels.clone()]);
+        copy(&sigma[pixels.clone()], &mut block.sigma);
     }
     if let Some(pattern) = chunk.pattern {
-        block.pattern[..length].copy_from_slice(&pattern[pixels.clone()]);
+        copy(&pattern[pixels.clone()], &mut block.pattern);
     }
-    for (bits, flags) in block.flags.iter_mut().zip(&chunk.flags[pixels]) {
-        *bits = flags.bits();
-    }
+    copy(&chunk.flags[pixels], &mut block.flags);
     block
 }
 
+#[inline(always)]
 fn store(chunk: &mut Chunk<'_>, start: usize, length: usize, block: &Block) {
     let pixels = start..start + length;
-    chunk.range[pixels.clone()].copy_from_slice(&block.range[..length]);
+    copy(&block.range[..length], &mut chunk.range[pixels.clone()]);
     if let Some(sigma) = &mut chunk.sigma {
-        sigma[pixels.clone()].copy_from_slice(&block.sigma[..length]);
+        copy(&block.sigma[..length], &mut sigma[pixels.clone()]);
     }
-    for (flags, bits) in chunk.flags[pixels].iter_mut().zip(block.flags) {
-        *flags = Flags::from_bits_retain(bits);
+    copy(&block.flags[..length], &mut chunk.flags[pixels]);
+}
+
+/// Copies all of `from`; of a whole block without a call of a library.
+#[inline(always)]
+fn copy<T: Copy>(from: &[T], to: &mut [T]) {
+    if let (Some(from), Some(to)) = (from.first_chunk::<LANES>(), to.first_chunk_mut::<LANES>()) {
+        *to = *from;
+    } else {
+        to[..from.len()].copy_from_slice(from);
     }
 }

@@ -1,4 +1,6 @@
 //! Eqs. 14 and 15 in single precision on blocks of pixels, written so that the compiler can vectorise them.
+// Only what is inlined is compiled for wide registers.
+#![allow(clippy::inline_always)]
 
 use std::f32::consts::PI;
 
@@ -47,17 +49,18 @@ pub(crate) struct Block {
     pub(crate) sigma: Lanes,
     pub(crate) amplitude: Lanes,
     pub(crate) pattern: Lanes,
-    pub(crate) flags: [u16; LANES],
+    pub(crate) flags: [Flags; LANES],
 }
 
 impl Block {
+    #[inline(always)]
     pub(crate) fn empty() -> Self {
         Self {
             range: [f32::NAN; LANES],
             sigma: [f32::NAN; LANES],
             amplitude: [f32::NAN; LANES],
             pattern: [0.0; LANES],
-            flags: [0; LANES],
+            flags: [Flags::empty(); LANES],
         }
     }
 }
@@ -94,6 +97,7 @@ impl Kernel {
     }
 
     /// Corrects the pixels of `block`, the first of which is `(column, row)`.
+    #[inline(always)]
     pub(crate) fn correct(&self, block: &mut Block, column: usize, row: usize, tally: &mut LaneTally) {
         let (periodic, mut derivative) = match &self.spline {
             Some(spline) => spline.at(&block.range),
@@ -127,7 +131,7 @@ impl Kernel {
             if inside[lane] { transported } else { sigma[lane] }
         });
         for (flags, outside) in block.flags.iter_mut().zip(outside) {
-            *flags |= u16::from(outside) * Flags::OUTSIDE_SPAN.bits();
+            *flags = Flags::from_bits_retain(flags.bits() | (u16::from(outside) * Flags::OUTSIDE_SPAN.bits()));
         }
         tally.count(&finite, &inside, &outside);
         tally.add(TOTAL, &total, &inside);
@@ -141,6 +145,7 @@ impl Kernel {
     }
 
     /// The signal propagation delay of the block that begins at `(column, row)`.
+    #[inline(always)]
     fn delay(&self, column: usize, row: usize) -> Lanes {
         let of_row = self.delay_of_first + row as f64 * self.delay_per_row;
         let first = (of_row + column as f64 * f64::from(self.delay_per_column)) as f32;
@@ -149,6 +154,7 @@ impl Kernel {
 
     /// The periodic terms and their derivative: one sine and cosine at half the longest wave's angle, doubled
     /// three times.
+    #[inline(always)]
     fn periodic(&self, range: &Lanes) -> (Lanes, Lanes) {
         let [d2, d3, d4, d5, d6, d7] = self.periodic;
         let [k1, k2, k3] = self.wave_number;
@@ -169,6 +175,7 @@ impl Kernel {
     }
 
     /// Eq. 15, zero where it does not hold, and whether it holds; without a hyperbola it holds everywhere.
+    #[inline(always)]
     fn amplitude(&self, amplitude: &Lanes) -> (Lanes, Mask) {
         let (mut value, mut known) = ([0.0; LANES], [true; LANES]);
         let Some(ratios) = &self.hyperbola else { return (value, known) };
@@ -190,6 +197,7 @@ impl Kernel {
 
 /// Sine and cosine of an angle in [-pi/2, pi/2] by their Taylor series; the next terms are below 6e-8, the
 /// resolution of single precision.
+#[inline(always)]
 fn sin_cos_of_right_angles(angle: f32) -> (f32, f32) {
     let square = angle * angle;
     let sin = 1.0 / 362_880.0 - square * (1.0 / 39_916_800.0);
@@ -202,12 +210,14 @@ fn sin_cos_of_right_angles(angle: f32) -> (f32, f32) {
 }
 
 /// Sine and cosine of the doubled angle.
+#[inline(always)]
 fn octave((sin, cos): (f32, f32)) -> (f32, f32) {
     (2.0 * sin * cos, (cos - sin) * (cos + sin))
 }
 
 /// Whether a value lies in a span, bounds included; NaN lies in none.
 #[allow(clippy::needless_bitwise_bool)] // a branch would keep the loop around it scalar
+#[inline(always)]
 fn within(value: f32, [low, high]: [f32; 2]) -> bool {
     (value >= low) & (value <= high)
 }
@@ -244,6 +254,7 @@ impl LaneTally {
         }
     }
 
+    #[inline(always)]
     fn count(&mut self, finite: &Mask, corrected: &Mask, outside_span: &Mask) {
         for lane in 0..LANES {
             self.finite[lane] += u32::from(finite[lane]);
@@ -253,6 +264,7 @@ impl LaneTally {
     }
 
     /// Adds one group of `Δρ` of the pixels that were corrected.
+    #[inline(always)]
     fn add(&mut self, group: usize, correction: &Lanes, corrected: &Mask) {
         let (sum, largest) = (&mut self.sum[group], &mut self.largest[group]);
         for lane in 0..LANES {

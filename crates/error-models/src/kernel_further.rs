@@ -1,4 +1,6 @@
 //! Spline, polynomial and surface in single precision on blocks of pixels.
+// Only what is inlined is compiled for wide registers.
+#![allow(clippy::inline_always)]
 
 use crate::kernel::{LANES, Lanes, Mask, ROUND};
 use crate::legendre::Legendre;
@@ -32,6 +34,7 @@ impl SplineLanes {
     }
 
     /// Values and derivatives with respect to the range.
+    #[inline(always)]
     pub(crate) fn at(&self, range: &Lanes) -> (Lanes, Lanes) {
         let (mut index, mut within) = ([0_u8; LANES], [0.0; LANES]);
         for lane in 0..LANES {
@@ -73,6 +76,7 @@ impl PolynomialLanes {
     }
 
     /// Values and derivatives with respect to the range; both without meaning outside the span.
+    #[inline(always)]
     pub(crate) fn at(&self, range: &Lanes) -> (Lanes, Lanes) {
         let t = range.map(|range| ((range - self.middle) * self.inverse_half).clamp(-1.0, 1.0));
         let (value, derivative) = self.series.at(&t);
@@ -109,6 +113,7 @@ impl SurfaceLanes {
     }
 
     /// Values of the block that begins at `(column, row)`, and which of them are in the spans.
+    #[inline(always)]
     pub(crate) fn at(&self, column: usize, row: usize) -> (Lanes, Mask) {
         let down = self.rows[0] + row as f64 * self.rows[1];
         let across = |lane: usize| self.columns[0] + (column + lane) as f64 * self.columns[1];
@@ -139,6 +144,7 @@ struct Series {
 
 impl Series {
     /// Values and derivatives by Bonnet's recursion.
+    #[inline(always)]
     fn at(&self, t: &Lanes) -> (Lanes, Lanes) {
         let [constant, linear, ..] = self.coefficients;
         let mut value = t.map(|t| constant + linear * t);

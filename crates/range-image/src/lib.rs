@@ -1,5 +1,6 @@
 #![doc = include_str!("../README.md")]
 
+mod alias;
 mod average;
 mod channel;
 mod chi_squared;
@@ -8,6 +9,7 @@ mod demodulate;
 mod error;
 mod flags;
 mod frame;
+mod harmonics;
 mod image_format;
 mod modulation;
 mod noise;
@@ -23,6 +25,7 @@ mod samples;
 mod weights;
 mod wide;
 
+pub use alias::AliasCorrection;
 pub use average::{average, average_ranges, sigma_from_repeats};
 pub use channel::ComplexChannel;
 pub use consistency::{
@@ -33,6 +36,7 @@ pub use demodulate::{Demodulator, demodulate};
 pub use error::{Error, Result};
 pub use flags::Flags;
 pub use frame::{ComplexFrame, RangeFrame, RawFrame, Samples};
+pub use harmonics::{HarmonicImage, HarmonicRatio, harmonic_ratio, harmonics};
 pub use image_format::ImageFormat;
 pub use modulation::{Modulation, SPEED_OF_LIGHT};
 pub use noise::NoiseModel;

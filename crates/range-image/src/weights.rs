@@ -18,9 +18,16 @@ pub(crate) struct StepWeights {
 }
 
 impl StepWeights {
-    /// Allocates only for more than 16 steps.
+    /// Those of the fundamental. Allocates only for more than 16 steps.
     pub(crate) fn new(steps: usize, options: &DemodulationOptions) -> Self {
-        let weight = |step| if step < steps { StepWeight::new(step, steps, options) } else { StepWeight::default() };
+        Self::of_harmonic(1, steps, options)
+    }
+
+    /// Those of a harmonic of any order.
+    pub(crate) fn of_harmonic(order: usize, steps: usize, options: &DemodulationOptions) -> Self {
+        let weight = |step| {
+            if step < steps { StepWeight::new(step, steps, order, options) } else { StepWeight::default() }
+        };
         let group = |index: usize| std::array::from_fn(|place| weight(index * GROUP + place));
         let count = steps.div_ceil(GROUP);
         let many = if count > FEW_GROUPS { (0..count).map(group).collect() } else { Vec::new() };
@@ -42,14 +49,14 @@ pub(crate) struct StepWeight {
 }
 
 impl StepWeight {
-    /// `2/N scale exp(-i theta_n)`, conjugated for the negative sense, then turned by the phase offset.
-    pub(crate) fn new(step: usize, steps: usize, options: &DemodulationOptions) -> Self {
-        let (sin, cos) = step_angle_sin_cos(step, steps);
+    /// `2/N scale exp(-i m theta_n)`, conjugated for the negative sense, then turned by m times the phase offset.
+    pub(crate) fn new(step: usize, steps: usize, order: usize, options: &DemodulationOptions) -> Self {
+        let (sin, cos) = step_angle_sin_cos(step * order % steps, steps);
         let sin = match options.phase_sense {
             PhaseSense::Positive => -sin,
             PhaseSense::Negative => sin,
         };
-        let (turn_sin, turn_cos) = options.phase_offset_rad.sin_cos();
+        let (turn_sin, turn_cos) = (order as f64 * options.phase_offset_rad).sin_cos();
         let scale = options.raw_scale / steps as f64;
         Self {
             re: (2.0 * scale * (cos * turn_cos - sin * turn_sin)) as f32,
@@ -77,7 +84,7 @@ mod tests {
 
     #[test]
     fn four_steps_are_plain_differences() {
-        let weights: Vec<_> = (0..4).map(|n| StepWeight::new(n, 4, &DemodulationOptions::default())).collect();
+        let weights: Vec<_> = (0..4).map(|n| StepWeight::new(n, 4, 1, &DemodulationOptions::default())).collect();
         let parts: Vec<_> = weights.iter().map(|w| [w.re, w.im, w.mean]).collect();
         let expected = [[0.5, 0.0, 0.25], [0.0, -0.5, 0.25], [-0.5, 0.0, 0.25], [0.0, 0.5, 0.25]];
         for (found, expected) in parts.iter().flatten().zip(expected.iter().flatten()) {
@@ -90,7 +97,7 @@ mod tests {
     fn weights_of_a_full_turn_leave_no_offset() {
         for steps in 3..17 {
             let weights: Vec<_> =
-                (0..steps).map(|n| StepWeight::new(n, steps, &DemodulationOptions::default())).collect();
+                (0..steps).map(|n| StepWeight::new(n, steps, 1, &DemodulationOptions::default())).collect();
             let sum: f64 = weights.iter().map(|w| f64::from(w.re)).sum();
             // Each weight is at most 2/3 and rounded to f32: half a unit in the last place is 3e-8.
             assert!(sum.abs() < 3e-8 * steps as f64, "{steps} steps: {sum:e}");

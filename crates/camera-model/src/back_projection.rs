@@ -4,7 +4,7 @@
 #![allow(clippy::inline_always, clippy::needless_bitwise_bool, clippy::needless_range_loop)]
 
 use nalgebra::{Isometry3, Point3};
-use range_image::{Flags, RangeFrame};
+use range_image::{Flags, RangeFrame, with_wide_registers};
 use rayon::prelude::*;
 
 use crate::ray_table::CHUNK;
@@ -79,7 +79,7 @@ impl RayTable {
             given.zip(frame.sigma.as_slice().par_chunks(CHUNK)).zip(frame.amplitude.as_slice().par_chunks(CHUNK));
         found.zip(given).for_each(
             |((((points, flags), sigmas), amplitudes), ((((rays, ranges), reasons), sigma), amplitude))| {
-                pulp::Arch::new().dispatch(
+                with_wide_registers(
                     #[inline(always)]
                     || {
                         scale_rays(rays, ranges, points);

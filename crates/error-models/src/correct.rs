@@ -2,10 +2,10 @@
 // Only what is inlined is compiled for wide registers.
 #![allow(clippy::inline_always)]
 
-use range_image::{Flags, ImageFormat, RangeFrame, Raster};
+use range_image::{Flags, ImageFormat, RangeFrame, Raster, with_wide_registers};
 
 use crate::chunks::{Chunk, Planes};
-use crate::kernel::{Block, Kernel, LANES, LaneTally};
+use crate::kernel::{Block, Kernel, LANES, LaneTally, Parts};
 use crate::{CorrectionSummary, FixedPattern, RangeErrorModel, Result};
 
 /// Takes the range errors of `model`, and then those of `pattern`, off a frame, in place.
@@ -67,7 +67,7 @@ fn correct_planes(
     let kernel = Kernel::new(model, format, principal_point_mm);
     let tally = planes.for_each_chunk(|chunk| {
         // Products and sums stay separate operations, so that all machines give the same bits.
-        pulp::Arch::new().dispatch(
+        with_wide_registers(
             #[inline(always)]
             || correct_chunk(chunk, &kernel, format.width),
         );
@@ -78,13 +78,14 @@ fn correct_planes(
 
 #[inline(always)]
 fn correct_chunk(chunk: &mut Chunk<'_>, kernel: &Kernel, width: usize) {
+    let (mut block, mut parts) = (Block::empty(), Parts::default());
     for row in 0..chunk.range.len() / width {
         let mut tally = LaneTally::new();
         for column in (0..width).step_by(LANES) {
             let start = row * width + column;
             let length = LANES.min(width - column);
-            let mut block = load(chunk, start, length);
-            kernel.correct(&mut block, column, chunk.first_row + row, &mut tally);
+            load(chunk, start, length, &mut block);
+            kernel.correct(&mut block, [column, chunk.first_row + row], &mut parts, &mut tally);
             store(chunk, start, length, &block);
         }
         chunk.tally.add(&tally.total());
@@ -92,8 +93,10 @@ fn correct_chunk(chunk: &mut Chunk<'_>, kernel: &Kernel, width: usize) {
 }
 
 #[inline(always)]
-fn load(chunk: &Chunk<'_>, start: usize, length: usize) -> Block {
-    let mut block = Block::empty();
+fn load(chunk: &Chunk<'_>, start: usize, length: usize, block: &mut Block) {
+    if length < LANES {
+        *block = Block::empty();
+    }
     let pixels = start..start + length;
     copy(&chunk.range[pixels.clone()], &mut block.range);
     copy(&chunk.amplitude[pixels.clone()], &mut block.amplitude);
@@ -102,9 +105,9 @@ fn load(chunk: &Chunk<'_>, start: usize, length: usize) -> Block {
     }
     if let Some(pattern) = chunk.pattern {
         copy(&pattern[pixels.clone()], &mut block.pattern);
+        block.has_pattern = true;
     }
     copy(&chunk.flags[pixels], &mut block.flags);
-    block
 }
 
 #[inline(always)]

@@ -14,7 +14,8 @@ use crate::summary::{AMPLITUDE, DELAY, GROUPS, PATTERN, PERIODIC, POLYNOMIAL, TO
 pub(crate) const LANES: usize = 32;
 
 pub(crate) type Lanes = [f32; LANES];
-pub(crate) type Mask = [bool; LANES];
+/// All bits where something holds, none elsewhere: as wide as the values that it is laid over.
+pub(crate) type Mask = [u32; LANES];
 
 /// Adding and taking off 1.5 * 2^23 rounds a single-precision number below 2^22 to an integer.
 pub(crate) const ROUND: f32 = 12_582_912.0;
@@ -50,6 +51,7 @@ pub(crate) struct Block {
     pub(crate) amplitude: Lanes,
     pub(crate) pattern: Lanes,
     pub(crate) flags: [Flags; LANES],
+    pub(crate) has_pattern: bool,
 }
 
 impl Block {
@@ -61,6 +63,7 @@ impl Block {
             amplitude: [f32::NAN; LANES],
             pattern: [0.0; LANES],
             flags: [Flags::empty(); LANES],
+            has_pattern: false,
         }
     }
 }
@@ -98,67 +101,90 @@ impl Kernel {
 
     /// Corrects the pixels of `block`, the first of which is `(column, row)`.
     #[inline(always)]
-    pub(crate) fn correct(&self, block: &mut Block, column: usize, row: usize, tally: &mut LaneTally) {
-        let (periodic, mut derivative) = match &self.spline {
-            Some(spline) => spline.at(&block.range),
-            None => self.periodic(&block.range),
-        };
-        let (amplitude, mut known) = self.amplitude(&block.amplitude);
-        let delay = match &self.surface {
-            Some(surface) => {
-                let (value, in_span) = surface.at(column, row);
-                known = std::array::from_fn(|lane| known[lane] & in_span[lane]);
-                value
-            }
-            None => self.delay(column, row),
-        };
+    pub(crate) fn correct(
+        &self,
+        block: &mut Block,
+        [column, row]: [usize; 2],
+        parts: &mut Parts,
+        tally: &mut LaneTally,
+    ) {
+        match &self.spline {
+            Some(spline) => spline.put(&block.range, &mut parts.periodic, &mut parts.derivative),
+            None => self.put_periodic(&block.range, &mut parts.periodic, &mut parts.derivative),
+        }
+        self.put_amplitude(&block.amplitude, &mut parts.amplitude, &mut parts.known);
+        match &self.surface {
+            Some(surface) => surface.put(column, row, &mut parts.delay, &mut parts.known),
+            None => self.put_delay(column, row, &mut parts.delay),
+        }
         // What a polynomial adds goes with the amplitude's part as long as all of it is added up.
-        let mut others: Lanes = std::array::from_fn(|lane| amplitude[lane] + block.pattern[lane]);
-        let polynomial = self.polynomial.as_ref().map(|polynomial| polynomial.at(&block.range));
-        if let Some((value, slope)) = &polynomial {
-            others = std::array::from_fn(|lane| others[lane] + value[lane]);
-            derivative = std::array::from_fn(|lane| derivative[lane] + slope[lane]);
+        for lane in 0..LANES {
+            parts.others[lane] = parts.amplitude[lane] + block.pattern[lane];
         }
-        let finite = block.range.map(|range| range.abs() <= f32::MAX);
-        let inside = block.range.map(|range| within(range, self.range_span));
-        #[allow(clippy::needless_bitwise_bool)] // a branch would keep the loop scalar
-        let outside: Mask = std::array::from_fn(|lane| finite[lane] & !(inside[lane] & known[lane]));
-        let total: Lanes = std::array::from_fn(|lane| self.d0 + periodic[lane] + delay[lane] + others[lane]);
-        let (range, sigma) = (block.range, block.sigma);
-        block.range = std::array::from_fn(|lane| if inside[lane] { range[lane] - total[lane] } else { range[lane] });
-        block.sigma = std::array::from_fn(|lane| {
-            let transported = sigma[lane] * (1.0 - derivative[lane]).abs();
-            if inside[lane] { transported } else { sigma[lane] }
-        });
-        for (flags, outside) in block.flags.iter_mut().zip(outside) {
-            *flags = Flags::from_bits_retain(flags.bits() | (u16::from(outside) * Flags::OUTSIDE_SPAN.bits()));
+        if let Some(polynomial) = &self.polynomial {
+            let mut slope = [0.0; LANES];
+            polynomial.put(&block.range, &mut parts.polynomial, &mut slope);
+            for (lane, slope) in slope.into_iter().enumerate() {
+                parts.others[lane] += parts.polynomial[lane];
+                parts.derivative[lane] += slope;
+            }
         }
-        tally.count(&finite, &inside, &outside);
-        tally.add(TOTAL, &total, &inside);
-        tally.add(PERIODIC, &periodic, &inside);
-        tally.add(DELAY, &delay, &inside);
-        tally.add(AMPLITUDE, &amplitude, &inside);
-        tally.add(PATTERN, &block.pattern, &inside);
-        if let Some((value, _)) = &polynomial {
-            tally.add(POLYNOMIAL, value, &inside);
+        self.apply(block, parts, tally);
+        tally.add(PERIODIC, &parts.periodic, &parts.inside);
+        tally.add(DELAY, &parts.delay, &parts.inside);
+        if self.hyperbola.is_some() {
+            tally.add(AMPLITUDE, &parts.amplitude, &parts.inside);
         }
+        if block.has_pattern {
+            tally.add(PATTERN, &block.pattern, &parts.inside);
+        }
+        if self.polynomial.is_some() {
+            tally.add(POLYNOMIAL, &parts.polynomial, &parts.inside);
+        }
+    }
+
+    /// Takes the sum of the parts off, transports sigma, flags what the model does not cover, and counts.
+    #[inline(always)]
+    #[allow(clippy::needless_bitwise_bool)] // a branch would keep the loop scalar
+    fn apply(&self, block: &mut Block, parts: &mut Parts, tally: &mut LaneTally) {
+        let mut total = [0.0; LANES];
+        for (lane, total) in total.iter_mut().enumerate() {
+            let (range, sigma) = (block.range[lane], block.sigma[lane]);
+            let inside = within(range, self.range_span);
+            let finite = range.abs() <= f32::MAX;
+            let (inside_mask, finite_mask) = (mask(inside), mask(finite));
+            let outside_mask = finite_mask & !(inside_mask & parts.known[lane]);
+            *total = self.d0 + parts.periodic[lane] + parts.delay[lane] + parts.others[lane];
+            let transported = sigma * (1.0 - parts.derivative[lane]).abs();
+            block.range[lane] = if inside { range - *total } else { range };
+            block.sigma[lane] = if inside { transported } else { sigma };
+            parts.inside[lane] = inside_mask;
+            parts.outside[lane] = outside_mask;
+            parts.finite[lane] = finite_mask;
+        }
+        for (flags, outside) in block.flags.iter_mut().zip(&parts.outside) {
+            *flags = Flags::from_bits_retain(flags.bits() | (*outside as u16 & Flags::OUTSIDE_SPAN.bits()));
+        }
+        tally.count(&parts.finite, &parts.inside, &parts.outside);
+        tally.add(TOTAL, &total, &parts.inside);
     }
 
     /// The signal propagation delay of the block that begins at `(column, row)`.
     #[inline(always)]
-    fn delay(&self, column: usize, row: usize) -> Lanes {
+    fn put_delay(&self, column: usize, row: usize, delay: &mut Lanes) {
         let of_row = self.delay_of_first + row as f64 * self.delay_per_row;
         let first = (of_row + column as f64 * f64::from(self.delay_per_column)) as f32;
-        std::array::from_fn(|lane| first + lane as f32 * self.delay_per_column)
+        for (lane, delay) in delay.iter_mut().enumerate() {
+            *delay = first + lane as f32 * self.delay_per_column;
+        }
     }
 
     /// The periodic terms and their derivative: one sine and cosine at half the longest wave's angle, doubled
     /// three times.
     #[inline(always)]
-    fn periodic(&self, range: &Lanes) -> (Lanes, Lanes) {
+    fn put_periodic(&self, range: &Lanes, value: &mut Lanes, derivative: &mut Lanes) {
         let [d2, d3, d4, d5, d6, d7] = self.periodic;
         let [k1, k2, k3] = self.wave_number;
-        let (mut value, mut derivative) = ([0.0; LANES], [0.0; LANES]);
         for lane in 0..LANES {
             let intervals = range[lane] * self.inverse_interval;
             let half_angle = PI * (intervals - ((intervals + ROUND) - ROUND));
@@ -171,14 +197,14 @@ impl Kernel {
                 + k2 * (d4 * second.1 - d5 * second.0)
                 + k3 * (d6 * third.1 - d7 * third.0);
         }
-        (value, derivative)
     }
 
     /// Eq. 15, zero where it does not hold, and whether it holds; without a hyperbola it holds everywhere.
     #[inline(always)]
-    fn amplitude(&self, amplitude: &Lanes) -> (Lanes, Mask) {
-        let (mut value, mut known) = ([0.0; LANES], [true; LANES]);
-        let Some(ratios) = &self.hyperbola else { return (value, known) };
+    #[allow(clippy::needless_bitwise_bool)] // a branch would keep the loop scalar
+    fn put_amplitude(&self, amplitude: &Lanes, value: &mut Lanes, known: &mut Mask) {
+        known.fill(u32::MAX);
+        let Some(ratios) = &self.hyperbola else { return };
         for lane in 0..LANES {
             let a = amplitude[lane];
             let linear = ratios.linear * a;
@@ -188,10 +214,43 @@ impl Kernel {
             // Either way the two parts that are added have one sign.
             let stable = rest / (linear.abs() + root);
             let branch = if linear > 0.0 { stable } else { root - linear };
-            known[lane] = within(a, ratios.span) & within(radicand, [0.0, f32::MAX]);
-            value[lane] = if known[lane] { branch } else { 0.0 };
+            let holds = within(a, ratios.span) & within(radicand, [0.0, f32::MAX]);
+            known[lane] = mask(holds);
+            value[lane] = if holds { branch } else { 0.0 };
         }
-        (value, known)
+    }
+}
+
+/// The parts of a correction, metre, and where they apply. Parts that a model does not have stay zero, from block to block.
+pub(crate) struct Parts {
+    periodic: Lanes,
+    derivative: Lanes,
+    amplitude: Lanes,
+    delay: Lanes,
+    polynomial: Lanes,
+    others: Lanes,
+    known: Mask,
+    finite: Mask,
+    inside: Mask,
+    outside: Mask,
+}
+
+impl Default for Parts {
+    #[inline(always)]
+    fn default() -> Self {
+        let (zeros, nowhere) = ([0.0; LANES], [0; LANES]);
+        Self {
+            periodic: zeros,
+            derivative: zeros,
+            amplitude: zeros,
+            delay: zeros,
+            polynomial: zeros,
+            others: zeros,
+            known: nowhere,
+            finite: nowhere,
+            inside: nowhere,
+            outside: nowhere,
+        }
     }
 }
 
@@ -234,32 +293,46 @@ fn not_above(bound: f64) -> f32 {
     if f64::from(nearest) > bound { nearest.next_down() } else { nearest }
 }
 
-/// Counts and sums of a row, lane by lane.
+/// All bits or none.
+#[inline(always)]
+fn mask(holds: bool) -> u32 {
+    u32::from(holds).wrapping_neg()
+}
+
+/// Sums that are kept beside each other: so few stay in registers.
+const SUMS: usize = 8;
+
+/// Counts and sums of a row.
 pub(crate) struct LaneTally {
-    finite: [u32; LANES],
-    corrected: [u32; LANES],
-    outside_span: [u32; LANES],
-    sum: [Lanes; GROUPS],
-    largest: [Lanes; GROUPS],
+    /// Minus the number of pixels: what the sum of their masks is.
+    finite: [u32; SUMS],
+    corrected: [u32; SUMS],
+    outside_span: [u32; SUMS],
+    sum: [[f32; SUMS]; GROUPS],
+    /// Bits of the largest absolute value, which grow with it.
+    largest: [[u32; SUMS]; GROUPS],
 }
 
 impl LaneTally {
     pub(crate) fn new() -> Self {
         Self {
-            finite: [0; LANES],
-            corrected: [0; LANES],
-            outside_span: [0; LANES],
-            sum: [[0.0; LANES]; GROUPS],
-            largest: [[0.0; LANES]; GROUPS],
+            finite: [0; SUMS],
+            corrected: [0; SUMS],
+            outside_span: [0; SUMS],
+            sum: [[0.0; SUMS]; GROUPS],
+            largest: [[0; SUMS]; GROUPS],
         }
     }
 
     #[inline(always)]
     fn count(&mut self, finite: &Mask, corrected: &Mask, outside_span: &Mask) {
-        for lane in 0..LANES {
-            self.finite[lane] += u32::from(finite[lane]);
-            self.corrected[lane] += u32::from(corrected[lane]);
-            self.outside_span[lane] += u32::from(outside_span[lane]);
+        let counts = [&mut self.finite, &mut self.corrected, &mut self.outside_span];
+        for (count, masks) in counts.into_iter().zip([finite, corrected, outside_span]) {
+            for masks in masks.as_chunks::<SUMS>().0 {
+                for lane in 0..SUMS {
+                    count[lane] = count[lane].wrapping_add(masks[lane]);
+                }
+            }
         }
     }
 
@@ -267,22 +340,25 @@ impl LaneTally {
     #[inline(always)]
     fn add(&mut self, group: usize, correction: &Lanes, corrected: &Mask) {
         let (sum, largest) = (&mut self.sum[group], &mut self.largest[group]);
-        for lane in 0..LANES {
-            let value = if corrected[lane] { correction[lane] } else { 0.0 };
-            sum[lane] += value;
-            largest[lane] = if value.abs() > largest[lane] { value.abs() } else { largest[lane] };
+        for (values, masks) in correction.as_chunks::<SUMS>().0.iter().zip(corrected.as_chunks::<SUMS>().0) {
+            for lane in 0..SUMS {
+                let bits = values[lane].to_bits() & masks[lane];
+                sum[lane] += f32::from_bits(bits);
+                largest[lane] = largest[lane].max(bits & (u32::MAX >> 1));
+            }
         }
     }
 
     /// Adds the lanes up in their order.
     pub(crate) fn total(&self) -> Tally {
-        let count = |lanes: &[u32; LANES]| lanes.iter().map(|lane| *lane as usize).sum();
+        let count = |lanes: &[u32; SUMS]| lanes.iter().map(|lane| lane.wrapping_neg() as usize).sum();
+        let largest = |lanes: [u32; SUMS]| f64::from(f32::from_bits(lanes.into_iter().max().unwrap_or(0)));
         Tally {
             finite: count(&self.finite),
             corrected: count(&self.corrected),
             outside_span: count(&self.outside_span),
             sum: self.sum.map(|lanes| lanes.iter().map(|lane| f64::from(*lane)).sum()),
-            largest: self.largest.map(|lanes| f64::from(lanes.iter().copied().fold(0.0, f32::max))),
+            largest: self.largest.map(largest),
         }
     }
 }

@@ -35,7 +35,7 @@ impl SplineLanes {
 
     /// Values and derivatives with respect to the range.
     #[inline(always)]
-    pub(crate) fn at(&self, range: &Lanes) -> (Lanes, Lanes) {
+    pub(crate) fn put(&self, range: &Lanes, value: &mut Lanes, derivative: &mut Lanes) {
         let (mut index, mut within) = ([0_u8; LANES], [0.0; LANES]);
         for lane in 0..LANES {
             let intervals = range[lane] * self.inverse_interval;
@@ -46,14 +46,12 @@ impl SplineLanes {
             index[lane] = knot;
             within[lane] = position - f32::from(knot);
         }
-        let (mut value, mut derivative) = ([0.0; LANES], [0.0; LANES]);
         for lane in 0..LANES {
             let [a, b, c, d] = self.pieces[usize::from(index[lane])];
             let u = within[lane];
             value[lane] = a + u * (b + u * (c + u * d));
             derivative[lane] = (b + u * (2.0 * c + u * 3.0 * d)) * self.knots_per_m;
         }
-        (value, derivative)
     }
 }
 
@@ -77,10 +75,15 @@ impl PolynomialLanes {
 
     /// Values and derivatives with respect to the range; both without meaning outside the span.
     #[inline(always)]
-    pub(crate) fn at(&self, range: &Lanes) -> (Lanes, Lanes) {
-        let t = range.map(|range| ((range - self.middle) * self.inverse_half).clamp(-1.0, 1.0));
-        let (value, derivative) = self.series.at(&t);
-        (value, derivative.map(|derivative| derivative * self.inverse_half))
+    pub(crate) fn put(&self, range: &Lanes, value: &mut Lanes, derivative: &mut Lanes) {
+        let mut t = [0.0; LANES];
+        for (t, range) in t.iter_mut().zip(range) {
+            *t = ((range - self.middle) * self.inverse_half).clamp(-1.0, 1.0);
+        }
+        self.series.put(&t, value, derivative);
+        for derivative in derivative {
+            *derivative *= self.inverse_half;
+        }
     }
 }
 
@@ -112,15 +115,18 @@ impl SurfaceLanes {
         }
     }
 
-    /// Values of the block that begins at `(column, row)`, and which of them are in the spans.
+    /// Values of the block that begins at `(column, row)`; pixels outside the spans are no longer `known`.
     #[inline(always)]
-    pub(crate) fn at(&self, column: usize, row: usize) -> (Lanes, Mask) {
+    pub(crate) fn put(&self, column: usize, row: usize, value: &mut Lanes, known: &mut Mask) {
         let down = self.rows[0] + row as f64 * self.rows[1];
-        let across = |lane: usize| self.columns[0] + (column + lane) as f64 * self.columns[1];
-        let t: [f64; LANES] = std::array::from_fn(across);
-        let (value, _) = self.of_row(down).at(&t.map(|t| t.clamp(-1.0, 1.0) as f32));
         let row_in_span = down.abs() <= 1.0 + EDGE;
-        (value, t.map(|t| (t.abs() <= 1.0 + EDGE) & row_in_span))
+        let mut reduced = [0.0; LANES];
+        for lane in 0..LANES {
+            let t = self.columns[0] + (column + lane) as f64 * self.columns[1];
+            reduced[lane] = t.clamp(-1.0, 1.0) as f32;
+            known[lane] &= u32::from((t.abs() <= 1.0 + EDGE) & row_in_span).wrapping_neg();
+        }
+        self.of_row(down).put(&reduced, value, &mut [0.0; LANES]);
     }
 
     /// What is left of the surface in one row: a series in x.
@@ -145,10 +151,12 @@ struct Series {
 impl Series {
     /// Values and derivatives by Bonnet's recursion.
     #[inline(always)]
-    fn at(&self, t: &Lanes) -> (Lanes, Lanes) {
+    fn put(&self, t: &Lanes, value: &mut Lanes, slope: &mut Lanes) {
         let [constant, linear, ..] = self.coefficients;
-        let mut value = t.map(|t| constant + linear * t);
-        let mut slope = [linear; LANES];
+        for lane in 0..LANES {
+            value[lane] = constant + linear * t[lane];
+            slope[lane] = linear;
+        }
         let (mut before, mut last) = ([1.0; LANES], *t);
         let (mut slope_before, mut slope_last) = ([0.0; LANES], [1.0; LANES]);
         for order in 2..=self.order.min(ORDERS - 1) {
@@ -163,6 +171,5 @@ impl Series {
                 slope[lane] += coefficient * slope_next;
             }
         }
-        (value, slope)
     }
 }

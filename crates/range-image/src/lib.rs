@@ -24,6 +24,7 @@ mod sample_rules;
 mod samples;
 mod weights;
 mod wide;
+mod wide_registers;
 
 pub use alias::AliasCorrection;
 pub use average::{average, average_ranges, sigma_from_repeats};
@@ -44,3 +45,4 @@ pub use options::DemodulationOptions;
 pub use phase_level::{PhaseConvention, PhaseSense};
 pub use polar_level::PolarChannel;
 pub use raster::Raster;
+pub use wide_registers::with_wide_registers;

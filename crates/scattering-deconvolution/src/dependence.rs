@@ -1,8 +1,9 @@
 //! Pixels whose correction depends strongly on light that is not known.
 
+use range_image::with_wide_registers;
 use rustfft::num_complex::Complex;
 
-use crate::lanes::{any_exceeds, smallest_square, wide};
+use crate::lanes::{any_exceeds, smallest_square};
 use crate::mask::Mask;
 use crate::work::Work;
 
@@ -24,7 +25,7 @@ impl Work {
         let brightest = self.spare.iter().fold(0.0_f32, |brightest, light| brightest.max(light.re));
         if brightest * brightest
             <= limit
-                * wide(
+                * with_wide_registers(
                     #[inline(always)]
                     || smallest_square(real, imaginary),
                 )
@@ -35,7 +36,7 @@ impl Work {
         self.grid.visit_interpolated(&self.spare, |row, light| {
             let start = row * width;
             let [re, im] = [real, imaginary].map(|plane| &plane[start..start + width]);
-            let any = wide(
+            let any = with_wide_registers(
                 #[inline(always)]
                 || any_exceeds(light, re, im, limit),
             );

@@ -6,10 +6,11 @@
 
 use std::f64::consts::TAU;
 
+use range_image::with_wide_registers;
 use rayon::prelude::*;
 use rustfft::num_complex::Complex;
 
-use crate::lanes::{self, LANES, wide};
+use crate::lanes::{self, LANES};
 use crate::spectrum::Spectrum;
 
 /// Rows of pixels that one task takes at least; smaller tasks cost more to hand out than to do.
@@ -104,7 +105,7 @@ impl Axis {
             let pixels = lines[0].iter().zip(lines[1]);
             nodes.iter_mut().zip(pixels).for_each(|(node, (re, im))| *node = Complex::new(*re, *im));
         } else {
-            wide(
+            with_wide_registers(
                 #[inline(always)]
                 || lanes::collect(lines, &self.lanes, self.spacing, nodes),
             );
@@ -117,7 +118,7 @@ impl Axis {
             let pixels = re.iter_mut().zip(im);
             nodes.iter().zip(pixels).for_each(|(node, (re, im))| (*re, *im) = (factor * node.re, factor * node.im));
         } else {
-            wide(
+            with_wide_registers(
                 #[inline(always)]
                 || lanes::spread(nodes, factor, &self.lanes, self.spacing, [re, im]),
             );
@@ -212,7 +213,7 @@ impl Grid {
             let weights = &self.row_weights;
             let cells = cells.with_min_len(ROWS_PER_TASK.div_ceil(down.spacing));
             cells.for_each(|(sums, rows)| {
-                wide(
+                with_wide_registers(
                     #[inline(always)]
                     || lanes::sum_rows(rows, weights, width, sums),
                 );
@@ -229,7 +230,7 @@ impl Grid {
                     sums.get((3 * cell + tap) * width..)?.get(..width)
                 };
                 let lines = [0, 1, 2].map(of_cell);
-                wide(
+                with_wide_registers(
                     #[inline(always)]
                     || lanes::add_lines(lines, &mut line[..width]),
                 );
@@ -287,7 +288,7 @@ impl Grid {
                     row.iter_mut().zip(line(taps.first)).for_each(|(pixel, value)| *pixel += value);
                 } else {
                     let lines = [0, 1, 2].map(|tap| line(taps.first + tap));
-                    wide(
+                    with_wide_registers(
                         #[inline(always)]
                         || lanes::add_weighted(row, taps.weights, lines),
                     );
@@ -311,7 +312,7 @@ impl Grid {
             }
             let (lines, row) = ([0, 1, 2].map(|tap| line(taps.first + tap)), &mut self.row);
             row.fill(0.0);
-            wide(
+            with_wide_registers(
                 #[inline(always)]
                 || lanes::add_weighted(row, taps.weights, lines),
             );
@@ -344,11 +345,11 @@ impl Grid {
         let columns = self.axes[0].nodes;
         let [across, down] = &self.bands;
         let spare = &mut self.spare;
-        wide(
+        with_wide_registers(
             #[inline(always)]
             || lanes::band_along(nodes, across, spare),
         );
-        wide(
+        with_wide_registers(
             #[inline(always)]
             || lanes::band_across(spare, down, columns, nodes),
         );

@@ -8,11 +8,6 @@ use rustfft::num_complex::Complex;
 /// Values that are worked side by side.
 pub(crate) const LANES: usize = 8;
 
-/// Runs a piece of work with everything in it that is inlined.
-pub(crate) fn wide<R>(work: impl FnOnce() -> R) -> R {
-    pulp::Arch::new().dispatch(work)
-}
-
 /// Three weighted sums of rows that lie one after the other, each `width` long; one after the other in `sums`. Four rows
 /// are taken at a time, to write the sums less often.
 #[inline(always)]
@@ -191,6 +186,8 @@ pub(crate) fn smallest_square(re: &[f32], im: &[f32]) -> f32 {
 
 #[cfg(test)]
 mod tests {
+    use range_image::with_wide_registers;
+
     use super::*;
 
     #[test]
@@ -205,7 +202,10 @@ mod tests {
     fn extremes_leave_out_what_is_not_finite() {
         let mut values = vec![5.0; 21];
         (values[3], values[9], values[20], values[14]) = (f32::NAN, f32::INFINITY, 0.5, 7.0);
-        assert_eq!(wide(|| finite_extremes(&values)).map(f32::to_bits), [0.5_f32, 7.0].map(f32::to_bits));
+        assert_eq!(
+            with_wide_registers(|| finite_extremes(&values)).map(f32::to_bits),
+            [0.5_f32, 7.0].map(f32::to_bits)
+        );
         assert_eq!(finite_extremes(&[f32::NAN]).map(f32::to_bits), [f32::INFINITY, 0.0].map(f32::to_bits));
     }
 

@@ -1,9 +1,9 @@
 //! Pixels that have no value, or one that must not be touched.
 
-use range_image::Flags;
+use range_image::{Flags, with_wide_registers};
 
 use crate::SaturatedLight;
-use crate::lanes::{largest_part, wide};
+use crate::lanes::largest_part;
 
 /// Pixels put aside while the image is restored, with their values.
 #[derive(Default)]
@@ -41,7 +41,7 @@ impl Mask {
         let mut largest = 0.0_f32;
         for (row, (re, im)) in re.chunks_exact_mut(width).zip(im.chunks_exact_mut(width)).enumerate() {
             let flags = flags.map(|flags| &flags[row * width..][..width]);
-            let mut parts = wide(
+            let mut parts = with_wide_registers(
                 #[inline(always)]
                 || [largest_part(re), largest_part(im)],
             );

@@ -1,6 +1,8 @@
 //! Propagation of noise through a restoration.
 
-use crate::lanes::{finite_extremes, wide};
+use range_image::with_wide_registers;
+
+use crate::lanes::finite_extremes;
 use crate::mask::Mask;
 use crate::noise::Centre;
 use crate::work::Work;
@@ -14,7 +16,7 @@ impl Work {
     /// The noise of pixels is independent before and correlated afterwards; sigma is that of each pixel by itself.
     /// Pixels put aside keep their sigma and, as filled or clipped values, bring no noise to others. NaN stays NaN.
     pub(crate) fn propagate_sigma(&mut self, sigma: &mut [f32], mask: &Mask) {
-        let [least, most] = wide(
+        let [least, most] = with_wide_registers(
             #[inline(always)]
             || finite_extremes(sigma),
         )

@@ -24,17 +24,14 @@ pub enum Unwrapping {
     Relative,
     /// One frequency with amplitudes: absolute counts.
     Absolute,
-    /// One frequency, the tree with the counts of the previous frame: absolute counts.
-    PreviousFrame,
     /// Two frequencies.
     TwoFrequencies,
 }
 
 impl Unwrapping {
-    pub const ALL: [(Self, &'static str); 4] = [
+    pub const ALL: [(Self, &'static str); 3] = [
         (Self::Relative, "spatial, relative"),
         (Self::Absolute, "spatial, absolute by amplitude"),
-        (Self::PreviousFrame, "spatial, previous frame known"),
         (Self::TwoFrequencies, "two frequencies"),
     ];
 
@@ -55,9 +52,7 @@ pub struct Frame {
     restorer: Restorer,
     phases: Vec<Raster<f32>>,
     sigmas: Vec<Raster<f32>>,
-    amplitude: Raster<f32>,
     unwrapper: Unwrapper,
-    previous: Raster<Option<i32>>,
     unwrapped: Unwrapped,
     multi_unwrapper: Option<MultiUnwrapper>,
     multi: MultiUnwrapped,
@@ -76,7 +71,6 @@ impl Frame {
         let lens = LensDistortion { k1: -2e-3, k2: 2e-5, p1: 1e-4, p2: -5e-5, ..LensDistortion::default() };
         let plane = Raster::filled(width, height, 0.0);
         let interval = modulations.first().map_or(1.0, Modulation::ambiguity_interval_m);
-        let true_wraps = |col, row| Some((scene::true_range(&format, col, row) / interval) as i32);
         let options = DemodulationOptions {
             noise: scene::NOISE,
             saturation: Some(65_535.0),
@@ -93,9 +87,7 @@ impl Frame {
             restorer: Restorer::new(&scene::psf(), width, height, &RestorationOptions::default())?,
             phases: vec![plane.clone(); modulations.len()],
             sigmas: vec![plane.clone(); modulations.len()],
-            amplitude: plane.clone(),
             unwrapper: Unwrapper::new(SpatialOptions::default())?,
-            previous: Raster::from_fn(width, height, true_wraps),
             unwrapped: Unwrapped::default(),
             multi_unwrapper: multi_unwrapper(&modulations)?,
             multi: MultiUnwrapped::default(),
@@ -135,21 +127,20 @@ impl Frame {
     fn derive(&mut self) -> Result<(), Failure> {
         let planes = self.phases.iter_mut().zip(&mut self.sigmas);
         for (channel, (phase, sigma)) in self.complex.channels.iter().zip(planes) {
-            channel.phase_and_amplitude_into(phase, &mut self.amplitude)?;
-            channel.sigma_phase_into(sigma)?;
+            channel.phase_and_amplitude_into(phase, &mut self.ranges.amplitude)?;
+            if self.multi_unwrapper.is_some() {
+                channel.sigma_phase_into(sigma)?;
+            } else {
+                channel.sigma_range_into(&mut self.ranges.sigma)?;
+            }
         }
         Ok(())
     }
 
     fn unwrap(&mut self) -> Result<(), Failure> {
         let RangeFrame { range, sigma, amplitude, flags } = &mut self.ranges;
-        amplitude.as_mut_slice().copy_from_slice(self.amplitude.as_slice());
         flags.as_mut_slice().copy_from_slice(self.complex.flags.as_slice());
-        let known = match self.unwrapping {
-            Unwrapping::PreviousFrame => KnownWraps::Raster(&self.previous),
-            _ => KnownWraps::Nothing,
-        };
-        let guide = (self.unwrapping == Unwrapping::Absolute).then_some(&self.amplitude);
+        let guide = (self.unwrapping == Unwrapping::Absolute).then_some(&*amplitude);
         if let Some(unwrapper) = &mut self.multi_unwrapper {
             unwrapper.unwrap_into(&self.phases, Some(&self.sigmas), None, &mut self.multi)?;
             std::mem::swap(range, &mut self.multi.range);
@@ -157,15 +148,12 @@ impl Frame {
             return Ok(());
         }
         let phase = self.phases.first().ok_or("no frequency")?;
-        self.unwrapper.unwrap_into(phase, guide, None, known, &mut self.unwrapped)?;
+        self.unwrapper.unwrap_into(phase, guide, None, KnownWraps::Nothing, &mut self.unwrapped)?;
         let metres =
             self.complex.channels.first().map_or(1.0, |channel| channel.modulation.range_from_phase(1.0)) as f32;
-        let sigma_phase = self.sigmas.first().ok_or("no frequency")?;
-        let found = range.as_mut_slice().iter_mut().zip(sigma.as_mut_slice());
-        let given = phase.as_slice().iter().zip(self.unwrapped.wraps.as_slice()).zip(sigma_phase.as_slice());
-        for ((range, sigma), ((phase, wraps), sigma_phase)) in found.zip(given) {
+        let given = phase.as_slice().iter().zip(self.unwrapped.wraps.as_slice());
+        for (range, (phase, wraps)) in range.as_mut_slice().iter_mut().zip(given) {
             *range = metres * (phase + std::f32::consts::TAU * *wraps as f32);
-            *sigma = metres * sigma_phase;
         }
         Ok(())
     }

@@ -42,7 +42,7 @@ impl Demodulator {
     /// Writes phase and amplitude of each frequency into `out`, whose planes are reused if they have the right size.
     ///
     /// The way for viewers and for cameras without calibration: the same bits as [`Self::demodulate_into`] and then
-    /// [`ComplexChannel::phase_and_amplitude_into`](crate::ComplexChannel::phase_and_amplitude_into) in about a quarter
+    /// [`ComplexChannel::phase_and_amplitude_into`](crate::ComplexChannel::phase_and_amplitude_into) in about half
     /// of the time, because nothing in between is written to memory. There is neither offset nor sigma nor flag, and no
     /// `z` on which scattering could be undone; a pixel with a sample that is not finite is NaN.
     pub fn phase_and_amplitude_into(&self, frame: &RawFrame, out: &mut Vec<PolarChannel>) {

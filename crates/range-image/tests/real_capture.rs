@@ -8,7 +8,10 @@ use std::io::Read;
 use std::path::Path;
 
 use common::angle_between;
-use range_image::{DemodulationOptions, Modulation, PhaseSense, RawFrame, Samples, demodulate};
+use range_image::{
+    ConsistencyOptions, DemodulationOptions, Flags, Modulation, PhaseSense, Raster, RawFrame, RulesVerdict, Samples,
+    check_samples, demodulate,
+};
 
 /// The f32 values of one array of an .npz file (little-endian, version 1 header).
 fn array(file: &Path, name: &str) -> Vec<f32> {
@@ -19,16 +22,36 @@ fn array(file: &Path, name: &str) -> Vec<f32> {
     bytes[start..].chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect()
 }
 
-#[test]
-fn distances_of_a_real_camera_come_back() {
+/// The capture's folder and its frame; `None`, with a word, where it is not there.
+fn capture() -> Option<(&'static Path, RawFrame)> {
     let folder = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/real/mlx75027_scene"));
     if !folder.is_dir() {
         eprintln!("skipped: no capture at {}", folder.display());
-        return;
+        return None;
     }
-    let modulation = Modulation::new(60e6).unwrap();
     let samples = Samples::F32(array(&folder.join("000_0.npz"), "samples"));
-    let raw = RawFrame::new(640, 385, 4, vec![modulation], samples).unwrap();
+    Some((folder, RawFrame::new(640, 385, 4, vec![Modulation::new(60e6).unwrap()], samples).unwrap()))
+}
+
+#[test]
+fn samples_of_a_camera_at_rest_agree_to_one_percent() {
+    let Some((_, raw)) = capture() else { return };
+    let flagged = |tolerance: f64| {
+        let mut flags = Raster::filled(640, 385, Flags::empty());
+        let check = ConsistencyOptions { tolerance, ..ConsistencyOptions::default() };
+        let summary = check_samples(&raw, &DemodulationOptions::default(), &check, &mut flags).unwrap();
+        assert!(matches!(summary.rules, RulesVerdict::Checked { degrees_of_freedom: 1, .. }));
+        let moved = flags.as_slice().iter().filter(|flags| flags.contains(Flags::MOTION)).count();
+        moved as f64 / flags.len() as f64
+    };
+    // Nothing moved; the taps are unequal by one percent of the amplitude, and not by a tenth of that.
+    assert!(flagged(0.012) < 0.002 && flagged(0.001) > 0.1, "{} {}", flagged(0.012), flagged(0.001));
+}
+
+#[test]
+fn distances_of_a_real_camera_come_back() {
+    let Some((folder, raw)) = capture() else { return };
+    let modulation = raw.modulations()[0];
     // Opposite sense and 2.780 rad: known of this camera.
     let options = DemodulationOptions {
         phase_sense: PhaseSense::Negative,

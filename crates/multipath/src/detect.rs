@@ -1,9 +1,8 @@
 //! Multipath by the contradiction between frequencies.
 
-use range_image::{ComplexChannel, ComplexFrame, Flags, Modulation, Raster};
+use range_image::{ComplexChannel, ComplexFrame, Flags, Modulation, Raster, chi_squared_upper_quantile};
 use rayon::prelude::*;
 
-use crate::chi_squared::quantile;
 use crate::contradiction::{BLOCK, Contradiction, Frequency, Samples};
 use crate::error::{require_not_negative, require_probability};
 use crate::pixel::{MAXIMUM_FREQUENCIES, System, USELESS};
@@ -87,7 +86,7 @@ impl Detector {
         Ok(Self {
             system,
             evidence: options.evidence,
-            thresholds: std::array::from_fn(|freedom| quantile(options.false_alarm, freedom)),
+            thresholds: std::array::from_fn(|freedom| chi_squared_upper_quantile(freedom as f64, options.false_alarm)),
             polar: vec![Default::default(); frequencies.len()],
             frequencies,
         })

@@ -1,6 +1,5 @@
 #![doc = include_str!("../README.md")]
 
-mod chi_squared;
 mod cholesky;
 mod contradiction;
 mod detect;

@@ -1,9 +1,8 @@
 //! What becomes of mixed pixels: dropped, flagged, or split into the two surfaces that they see.
 
-use range_image::{ComplexFrame, Flags, Modulation, RangeFrame, Raster};
+use range_image::{ComplexFrame, Flags, Modulation, RangeFrame, Raster, chi_squared_upper_quantile};
 use rayon::prelude::*;
 
-use crate::chi_squared::quantile;
 use crate::error::{require_not_negative, require_positive, require_probability};
 use crate::pixel::{MAXIMUM_FREQUENCIES, System, USELESS};
 use crate::split::{split_complex, split_range};
@@ -205,7 +204,7 @@ fn split(
         complex,
         wavenumber: modulation.map_or(0.0, |modulation| modulation.phase_from_range(1.0)),
         least_share_sigmas,
-        thresholds: std::array::from_fn(|freedom| quantile(false_alarm, freedom)),
+        thresholds: std::array::from_fn(|freedom| chi_squared_upper_quantile(freedom as f64, false_alarm)),
     };
     let width = frame.width().max(1);
     let rows = mixed.as_slice().par_chunks(width).enumerate();

@@ -1,7 +1,8 @@
 //! The paths of one pixel and the verdict on them.
 
+use range_image::chi_squared_upper_quantile;
+
 use crate::TwoPathOptions;
-use crate::chi_squared::quantile;
 use crate::model::{Parameters, Prior};
 use crate::pixel::{MAXIMUM_FREQUENCIES, Pixel};
 use crate::profile::is_sigma_reliable;
@@ -40,7 +41,7 @@ impl Worker {
 
 impl PixelSolver {
     pub fn new(grid: Grid, options: &TwoPathOptions) -> Self {
-        let thresholds = std::array::from_fn(|freedom| quantile(options.false_alarm, freedom));
+        let thresholds = std::array::from_fn(|freedom| chi_squared_upper_quantile(freedom as f64, options.false_alarm));
         Self { grid, options: *options, thresholds }
     }
 

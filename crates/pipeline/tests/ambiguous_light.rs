@@ -1,6 +1,6 @@
 //! Light that came by more than one way, pixels of two surfaces, samples that contradict each other, wraps that are lost.
 
-#![allow(clippy::unwrap_used, clippy::print_stdout)]
+#![allow(clippy::unwrap_used, clippy::print_stdout, clippy::float_cmp)]
 
 mod common;
 

@@ -1,7 +1,11 @@
 //! Quantiles of the chi-squared distribution, with degrees of freedom that need not be whole numbers.
 
-/// The value that a chi-squared variable of `degrees` of freedom exceeds with the given probability (0 to 1, exclusive).
-pub(crate) fn upper_quantile(degrees: f64, probability: f64) -> f64 {
+/// The value that a chi-squared variable of `degrees` of freedom exceeds with the given probability (0 to 1, exclusive);
+/// infinite without freedom: the threshold of a test that nothing can fail.
+pub fn chi_squared_upper_quantile(degrees: f64, probability: f64) -> f64 {
+    if degrees <= 0.0 {
+        return f64::INFINITY;
+    }
     let shape = degrees / 2.0;
     let (mut low, mut high) = (0.0, 1.0);
     while upper_tail(shape, high) > probability && high < 1e6 {
@@ -88,7 +92,7 @@ mod tests {
             (9.0, 0.001, 27.877_164_871_256_57),
             (100.0, 0.05, 124.342_113_404_004_1),
         ] {
-            let found = upper_quantile(degrees, probability);
+            let found = chi_squared_upper_quantile(degrees, probability);
             // Functions and quantiles are good to some 1e-12.
             assert!((found / expected - 1.0).abs() < 1e-10, "{degrees}, {probability}: {found}");
         }
@@ -96,7 +100,7 @@ mod tests {
 
     #[test]
     fn degrees_between_whole_numbers_lie_between() {
-        let [four, between, five] = [4.0, 4.3, 5.0].map(|degrees| upper_quantile(degrees, 1e-3));
+        let [four, between, five] = [4.0, 4.3, 5.0].map(|degrees| chi_squared_upper_quantile(degrees, 1e-3));
         assert!(four < between && between < five);
     }
 }

@@ -29,6 +29,7 @@ mod wide_registers;
 pub use alias::AliasCorrection;
 pub use average::{average, average_ranges, sigma_from_repeats};
 pub use channel::ComplexChannel;
+pub use chi_squared::chi_squared_upper_quantile;
 pub use consistency::{
     ConsistencyOptions, ConsistencySummary, OffsetRule, PlateauOptions, RulesVerdict, SampleCheck, SaturationVerdict,
     check_samples,

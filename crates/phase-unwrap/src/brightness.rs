@@ -13,19 +13,31 @@ use crate::{AlbedoPrior, ImageGeometry};
 const QUANTILES: usize = 5;
 /// Pixels sampled of a segment.
 const SAMPLES: u32 = 64;
-/// Cost, in nats, of a pixel whose range would be negative or beyond the largest count.
+/// Cost, in nats, of a segment with ranges that would be negative or beyond the largest count.
 const OUT_OF_SPAN: f32 = 8.0;
+/// Share of such pixels at which the cost is full: fewer can be wrong steps inside the segment.
+const OUT_OF_SPAN_SHARE: f32 = 0.2;
 
 /// Logarithm of a typical cosine of incidence, where the slope is not known.
 const TYPICAL_LOG_COSINE: f32 = -0.35;
 /// Logarithm of the smallest cosine that is taken off: beyond 84 degrees slopes and albedo laws fail.
 const LOWEST_LOG_COSINE: f32 = -2.3;
 
-/// Log albedo above the typical one from which a surface counts as retro-reflective, and the scale beyond.
-const RETRO: f32 = 1.0;
-const RETRO_SCALE: f32 = 1.5;
-/// Weak prior for short ranges, nats a wrap: light falls off, so what is seen at all is rather near.
-const NEARNESS: f32 = 0.5;
+/// Share of dark materials among surfaces, and the scale of their log albedos below the typical one: black cloth has
+/// -2.5.
+const DARK_SHARE: f32 = 0.12;
+const DARK_SCALE: f32 = 2.0;
+/// Share of what obeys no albedo (retro-reflectors, glints, mixed pixels), spread evenly over this many nats: however many
+/// surfaces are off, each costs no more than that, so the constant that fits most of them wins.
+const OUTLIER_SHARE: f32 = 0.08;
+const OUTLIER_SPAN: f32 = 6.0;
+/// Prior for short ranges, nats a wrap: light falls off, so what is seen at all is rather near.
+const NEARNESS: f32 = 0.85;
+/// Log albedos of one segment that differ by more say nothing more: it holds several materials.
+const LARGEST_SPREAD: f32 = 2.0;
+/// Pixels of the image for which the sizes in [`segment_weight`] hold; they grow with the image, as noise shatters a dark
+/// surface into more pieces where it has more pixels.
+const REFERENCE_PIXELS: f32 = 176.0 * 144.0;
 
 /// The angle of incidence of every pixel as slope and camera give it.
 #[derive(Debug, Clone, Copy)]
@@ -74,7 +86,8 @@ impl Brightness {
         self.labels = usize::from(maximum_wraps) + 1;
         self.sample(forest, pixels);
         self.weight.clear();
-        self.weight.extend(pixels.iter().map(|&n| segment_weight(n as f32)));
+        let scale = (pixels.iter().sum::<u32>() as f32 / REFERENCE_PIXELS).max(1.0);
+        self.weight.extend(pixels.iter().map(|&n| segment_weight(n as f32 / scale)));
         self.quantiles.clear();
         self.fixed.clear();
         for segment in 0..pixels.len() {
@@ -132,8 +145,8 @@ impl Brightness {
             let at = (2 * q + 1) * n / (2 * QUANTILES);
             self.quantiles.push(self.scratch.get(at).copied().unwrap_or(f32::NAN));
         }
-        let sampled = self.pixel[segment].len().max(1) as f32;
-        self.fixed.push(self.weight[segment].max(1.0) * OUT_OF_SPAN * outside / sampled);
+        let share = outside / self.pixel[segment].len().max(1) as f32;
+        self.fixed.push(self.weight[segment].max(1.0) * OUT_OF_SPAN * (share / OUT_OF_SPAN_SHARE).min(1.0));
     }
 
     /// Adds costs that do not depend on the constant, `[segment][label]`.
@@ -172,10 +185,22 @@ impl Brightness {
             let weight = self.weight[index / self.labels];
             let mean = quantiles.iter().map(|q| deviation_cost(q - log_constant, albedo)).sum::<f32>();
             let nearness = NEARNESS * (index % self.labels) as f32;
+            // A wrong count bends the brightness of a slanted surface, whatever its albedo.
+            let spread = (quantiles[QUANTILES - 1] - quantiles[0]).min(LARGEST_SPREAD);
             // Without amplitudes there is no opinion.
-            let mean = if mean.is_nan() { 0.0 } else { mean / QUANTILES as f32 + nearness };
+            let mean = if mean.is_nan() { 0.0 } else { mean / QUANTILES as f32 + nearness + spread };
             costs.push(weight * mean + self.fixed[index]);
         }
+    }
+
+    /// How many independent draws from the albedo prior a segment is counted for.
+    pub fn weight(&self, segment: usize) -> f32 {
+        self.weight[segment]
+    }
+
+    /// The part of a cost, as [`Brightness::costs`] gives it, that comes from the albedo.
+    pub fn albedo_part(&self, segment: usize, label: usize, cost: f32) -> f32 {
+        cost - self.fixed[segment * self.labels + label]
     }
 
     /// Smallest and largest log albedo of any label, `None` where there is no amplitude.
@@ -191,11 +216,15 @@ fn segment_weight(n: f32) -> f32 {
     n / (n + 12.0) * (1.0 + 0.5 * (1.0 + n / 200.0).ln())
 }
 
-/// Minus the logarithm of the prior density of a log albedo `x` off its typical value, up to a constant.
+/// Minus the logarithm of the prior density of a log albedo `x` off its typical value, up to a constant: common surfaces,
+/// dark materials, and what obeys no albedo.
 fn deviation_cost(x: f32, albedo: &AlbedoPrior) -> f32 {
-    if x < 0.0 {
-        -x / albedo.dark_scale
+    let common = (1.0 - DARK_SHARE - OUTLIER_SHARE) / (albedo.dark_scale + albedo.bright_scale);
+    let anything = OUTLIER_SHARE / OUTLIER_SPAN;
+    let density = if x < 0.0 {
+        common * (x / albedo.dark_scale).exp() + DARK_SHARE / DARK_SCALE * (x / DARK_SCALE).exp()
     } else {
-        x.min(RETRO) / albedo.bright_scale + (x - RETRO).max(0.0) / RETRO_SCALE
-    }
+        common * (-x / albedo.bright_scale).exp()
+    };
+    -((density + anything) / common).ln()
 }

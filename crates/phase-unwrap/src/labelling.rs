@@ -215,7 +215,8 @@ fn message(outgoing: &[f32], step: i32, bonus: f32, message: &mut [f32]) {
     }
 }
 
-fn lowest(costs: &[f32]) -> usize {
+/// The label of lowest cost.
+pub(crate) fn lowest(costs: &[f32]) -> usize {
     let better = |best: usize, index: usize| if costs[index] < costs[best] { index } else { best };
     (0..costs.len()).fold(0, better)
 }

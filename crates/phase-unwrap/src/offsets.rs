@@ -3,21 +3,26 @@
 use crate::SpatialOptions;
 use crate::borders::Tie;
 use crate::brightness::Brightness;
-use crate::labelling::{Labelling, reward};
+use crate::labelling::{Labelling, lowest, reward};
 
 /// Spacing of the candidates of the logarithm of the constant: half the sharper default scale.
 const SPACING: f32 = 0.2;
-/// Candidates whose energy is further than this from the best cannot change a confidence that matters.
-const RELEVANT: f32 = 12.0;
+/// Candidates whose energy is further than this from the best, in nats, cannot change a confidence that matters.
+const RELEVANT: f32 = 36.0;
 /// Largest margin in nats, that of a segment that has only one possible label.
 const CERTAIN: f32 = 30.0;
-/// Pixels that make a segment a witness. Smaller ones are noise and the mixed pixels around an object: each alone says
-/// little, but dozens of them would together tie an object to its background. They follow.
+/// Least share of the image's pixels that makes a segment a witness, and least pixels. Smaller ones are noise and the
+/// mixed pixels around an object: each alone says little, but hundreds of them (a dark patch shattered by noise) would
+/// together shift the scene. They follow.
+const WITNESS_SHARE: u32 = 1600;
 const WITNESS_PIXELS: u32 = 16;
-/// Factor on all margins where neither rays nor brightness are given and several wraps can be chosen from: a whole scene
-/// can then be shifted, with incidence and brightness making up for it, and the pieces of evidence are less independent
-/// than they are counted. Measured on rendered rooms.
-const DOUBT: f32 = 0.7;
+/// Independent draws that a whole scene is worth when two constants are weighed against each other, however many segments
+/// it has: patches share materials, and incidence and light are wrong for many of them in the same way. Measured on
+/// rendered rooms with and without dark materials; where the angle of incidence is taken out, less is common.
+const SCENE_DRAWS: f32 = 6.0;
+const SCENE_DRAWS_WITH_RAYS: f32 = 12.0;
+/// Independent draws that the brightness of one segment is worth to its own count: it is one material.
+const SEGMENT_DRAWS: f32 = 2.0;
 const FOLLOWER: u32 = u32::MAX;
 
 /// Offsets of the segments with their margins.
@@ -25,7 +30,8 @@ const FOLLOWER: u32 = u32::MAX;
 pub(crate) struct Offsets {
     /// Wrap offset of each segment.
     pub offset: Vec<u16>,
-    /// Extra cost, in nats, of the best solution in which the segment has another offset.
+    /// Extra cost, in nats, of the best solution in which the segment has another offset, the evidence counted for what it
+    /// is worth.
     pub margin: Vec<f32>,
     /// Logarithm of the constant found or given; `None` without any amplitude.
     pub log_constant: Option<f32>,
@@ -37,6 +43,9 @@ pub(crate) struct Offsets {
     costs: Vec<f32>,
     witness_costs: Vec<f32>,
     marginals: Vec<f32>,
+    /// For each candidate, witness and label: extra cost within the candidate.
+    excess: Vec<f32>,
+    energies: Vec<f32>,
 }
 
 impl Offsets {
@@ -47,12 +56,13 @@ impl Offsets {
         self.offset.resize(pixels.len(), 0);
         self.margin.clear();
         self.margin.resize(pixels.len(), 0.0);
-        self.marginals.clear();
-        self.marginals.resize(self.witnesses.len() * brightness.labels, f32::INFINITY);
+        self.excess.clear();
+        self.energies.clear();
         let mut best = (f32::INFINITY, 0.0);
         for (log_constant, sweeps) in self.candidates(brightness, options) {
             let energy = self.solve(brightness, log_constant, options, sweeps);
-            self.collect_marginals(energy);
+            self.energies.push(energy);
+            self.collect_excess(brightness);
             if energy < best.0 {
                 best = (energy, log_constant);
                 for (&segment, &offset) in self.witnesses.iter().zip(&self.labelling.offset) {
@@ -61,17 +71,16 @@ impl Offsets {
             }
         }
         self.log_constant = brightness.span().map(|_| best.1);
-        self.measure_margins(best.0, brightness.labels);
+        let draws = if options.geometry.is_some() { SCENE_DRAWS_WITH_RAYS } else { SCENE_DRAWS };
+        self.weigh_candidates(brightness, best.0, draws);
+        self.measure_margins(brightness.labels);
         brightness.costs(best.1, &options.albedo, &mut self.costs);
         self.lead_followers(ties, brightness.labels);
-        let unsettled = options.geometry.is_none() && options.albedo.typical_amplitude_at_interval.is_none();
-        if unsettled && options.maximum_wraps > 1 {
-            self.margin.iter_mut().for_each(|margin| *margin *= DOUBT);
-        }
     }
 
     fn choose_witnesses(&mut self, ties: &[Tie], pixels: &[u32]) {
-        let least = WITNESS_PIXELS.min(pixels.iter().copied().max().unwrap_or(0));
+        let least = WITNESS_PIXELS.max(pixels.iter().sum::<u32>() / WITNESS_SHARE);
+        let least = least.min(pixels.iter().copied().max().unwrap_or(0));
         self.witnesses.clear();
         self.place.clear();
         for (segment, &pixels) in pixels.iter().enumerate() {
@@ -118,21 +127,42 @@ impl Offsets {
         coarse.iter().filter(|c| c.1 <= best + RELEVANT).map(|c| (c.0, SWEEPS)).collect()
     }
 
-    fn collect_marginals(&mut self, energy: f32) {
-        let labels = self.marginals.len() / self.witnesses.len().max(1);
-        for (witness, marginals) in self.marginals.chunks_exact_mut(labels).enumerate() {
+    /// Appends the extra cost of each label of each witness over its best at this constant. Where the segment's own
+    /// brightness speaks for its best label, it does so only as one material.
+    fn collect_excess(&mut self, brightness: &Brightness) {
+        let labels = brightness.labels;
+        for (witness, &segment) in self.witnesses.iter().enumerate() {
+            let segment = segment as usize;
+            let surplus = 1.0 - (SEGMENT_DRAWS / brightness.weight(segment)).min(1.0);
+            let costs = &self.witness_costs[witness * labels..][..labels];
             let belief = self.labelling.belief(witness, &self.witness_costs);
-            let lowest = belief.iter().copied().fold(f32::INFINITY, f32::min);
-            for (marginal, belief) in marginals.iter_mut().zip(belief) {
-                *marginal = marginal.min(energy + belief - lowest);
+            let best = lowest(belief);
+            let own = |label: usize| brightness.albedo_part(segment, label, costs[label]);
+            let excess = |(label, cost): (usize, &f32)| {
+                (cost - belief[best] - surplus * (own(label) - own(best)).max(0.0)).max(0.0)
+            };
+            self.excess.extend(belief.iter().enumerate().map(excess));
+        }
+    }
+
+    /// The least extra cost of each label of each witness over all constants, against the best constant.
+    fn weigh_candidates(&mut self, brightness: &Brightness, best: f32, scene_draws: f32) {
+        let draws: f32 = self.witnesses.iter().map(|&segment| brightness.weight(segment as usize)).sum();
+        let tempering = scene_draws / (scene_draws + draws);
+        let count = self.witnesses.len() * brightness.labels;
+        self.marginals.clear();
+        self.marginals.resize(count, f32::INFINITY);
+        for (energy, excess) in self.energies.iter().zip(self.excess.chunks_exact(count.max(1))) {
+            for (marginal, excess) in self.marginals.iter_mut().zip(excess) {
+                *marginal = marginal.min(tempering * (energy - best) + excess);
             }
         }
     }
 
-    fn measure_margins(&mut self, best: f32, labels: usize) {
+    fn measure_margins(&mut self, labels: usize) {
         for (marginals, &segment) in self.marginals.chunks_exact(labels).zip(&self.witnesses) {
             let own = usize::from(self.offset[segment as usize]);
-            self.margin[segment as usize] = (second_best(marginals, own) - best).clamp(0.0, CERTAIN);
+            self.margin[segment as usize] = second_best(marginals, own).clamp(0.0, CERTAIN);
         }
     }
 

@@ -77,8 +77,9 @@ pub enum Boundary {
 
 /// The inverse square law: `amplitude * range^2 = constant * albedo * cos(incidence)`.
 ///
-/// The logarithm of the right side scatters around that of its typical value. The cost is linear in the logarithm
-/// (a two-sided exponential density), so a retro-reflector or a grazing floor is unlikely but not excluded.
+/// The logarithm of the right side scatters around that of its typical value: most surfaces by a two-sided exponential
+/// density of the scales below, some are dark materials far below, and some (retro-reflectors, glints) obey no albedo. So
+/// a surface that is off is unlikely but not excluded, and costs a bounded amount.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AlbedoPrior {
     /// Amplitude of a typical surface (albedo about 0.6, seen straight on) at a range of one ambiguity interval.

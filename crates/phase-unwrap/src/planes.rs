@@ -25,7 +25,7 @@ const OVERLAP: f64 = 4.0;
 const LIMIT: f32 = 12.0;
 
 /// Solid angle, sr, of a segment at which half of the limit holds: a ball can curve like a far plane, a wall cannot.
-const HALF_LIMIT_SOLID_ANGLE: f32 = 0.05;
+const HALF_LIMIT_SOLID_ANGLE: f32 = 0.2;
 
 /// Steps along an axis whose mean is taken as a slope.
 const MEAN_SLOPE_STEPS: u32 = 8;

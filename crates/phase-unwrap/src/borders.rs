@@ -4,11 +4,12 @@
 // No short cuts, so that many pixels go at once.
 #![allow(clippy::needless_bitwise_bool)]
 
+use range_image::with_wide_registers;
+
 use crate::forest::{Forest, NO_LABEL};
 use crate::grid::{DOWN, Grid, RIGHT, set_bits, wrap_step};
 use crate::seams::Seam;
 use crate::surface::{Step, Surface};
-use crate::wide::with_wide_registers;
 
 /// Evidence, in nats, for `offset(to) - offset(from) == step`.
 #[derive(Debug, Clone, Copy, PartialEq)]

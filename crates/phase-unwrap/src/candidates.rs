@@ -8,9 +8,10 @@
 // No short cuts: comparing is cheaper than a branch, and only without branches go many pixels at once.
 #![allow(clippy::needless_bitwise_bool)]
 
+use range_image::with_wide_registers;
+
 use crate::grid::{DOWN, Grid, RIGHT};
 use crate::seams::Seam;
-use crate::wide::with_wide_registers;
 
 /// A pixel without any link.
 pub(crate) const ALONE: u8 = 0;

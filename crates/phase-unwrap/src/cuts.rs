@@ -4,11 +4,12 @@
 // No short cuts: comparing is cheaper than a branch, and only without branches go many pixels at once.
 #![allow(clippy::needless_bitwise_bool)]
 
+use range_image::with_wide_registers;
+
 use crate::SpatialOptions;
 use crate::grid::{DOWN, Grid, RIGHT, set_bits};
 use crate::steps::wrapped_steps;
 use crate::surface::Surface;
-use crate::wide::with_wide_registers;
 
 /// A pixel far from every cut.
 pub(crate) const CORE: u8 = 1;

@@ -1,12 +1,11 @@
 //! A pixel's ranges that its phases allow, for those who choose among them by knowledge of their own.
 
-use range_image::{Modulation, Raster};
+use range_image::{Modulation, Raster, with_wide_registers};
 use rayon::prelude::*;
 
 use crate::frame::Planes;
 use crate::lanes::LANES;
 use crate::lattice::Lattice;
-use crate::wide::with_wide_registers;
 use crate::{Error, MultiFrequencyOptions, Result};
 
 /// Largest number of hypotheses kept of each pixel.

@@ -39,7 +39,6 @@ mod steps;
 mod surface;
 mod temporal;
 mod unwrapped;
-mod wide;
 mod window;
 
 pub use combine::{Combined, combine_frequencies};

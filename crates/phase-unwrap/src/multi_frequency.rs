@@ -2,14 +2,13 @@
 
 use std::f32::consts::TAU;
 
-use range_image::{Modulation, Raster};
+use range_image::{Modulation, Raster, with_wide_registers};
 use rayon::prelude::*;
 
 use crate::frame::Planes;
 use crate::kernel_density::{KernelDensityOptions, RANKS, Ranked, pick};
 use crate::lanes::{LANES, nearest, scatter};
 use crate::lattice::Lattice;
-use crate::wide::with_wide_registers;
 use crate::{Error, Result};
 
 /// Pixels that one thread takes at a time where rows do not matter: a multiple of the block.

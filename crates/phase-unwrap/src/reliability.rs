@@ -4,9 +4,10 @@
 
 use std::f32::consts::PI;
 
+use range_image::with_wide_registers;
+
 use crate::grid::Grid;
 use crate::steps::wrapped_steps;
-use crate::wide::with_wide_registers;
 
 /// Cost of a pixel none of whose neighbours allow a second difference: more than any pixel that has one.
 const UNKNOWN: f32 = 256.0;

@@ -2,10 +2,11 @@
 // Only what is inlined is compiled for wide registers.
 #![allow(clippy::inline_always)]
 
+use range_image::with_wide_registers;
+
 use crate::cuts::gentler;
 use crate::grid::{Grid, wrapped};
 use crate::logarithm::logarithm;
-use crate::wide::with_wide_registers;
 
 /// Largest phase variance used, rad^2: beyond it a phase says nothing anyway.
 const MAXIMUM_VARIANCE: f32 = 10.0;

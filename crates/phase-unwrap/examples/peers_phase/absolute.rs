@@ -9,8 +9,8 @@ use crate::measure::measured;
 use crate::room::{Patches, Room, View};
 use crate::{Outcome, Size};
 
-/// Prints `name right unknown wrong milliseconds`: shares of right counts and of unknown ones among all pixels, of wrong
-/// ones among the sure, the least time of three.
+/// Prints `name right sure_and_right unknown wrong milliseconds`: shares of right counts, sure or not, of those that are
+/// sure as well, and of unknown ones among all pixels, of wrong ones among the sure, the least time of three.
 pub fn run(patches: Patches, size: Size, seed: u64) -> Outcome {
     let room = Room::new(seed, patches, size);
     let view = room.view(1000 + seed);
@@ -28,25 +28,26 @@ pub fn run(patches: Patches, size: Size, seed: u64) -> Outcome {
                 measured(|| unwrapper.unwrap(&view.phase, Some(&view.amplitude), None, KnownWraps::Nothing));
             (found, least) = (answer?, least.min(milliseconds));
         }
-        let [right, unknown, wrong] = shares(&found.wraps, &found.unsure(options.minimum_confidence), &view);
-        println!("{name} {right} {unknown} {wrong} {least}");
+        let [right, sure, unknown, wrong] = shares(&found.wraps, &found.unsure(options.minimum_confidence), &view);
+        println!("{name} {right} {sure} {unknown} {wrong} {least}");
     }
     Ok(())
 }
 
-/// Right among all, unknown among all, wrong among the sure. Right is the count that brings the phase next to the truth.
-fn shares(wraps: &Raster<i32>, unsure: &Raster<bool>, view: &View) -> [f64; 3] {
-    let (mut right, mut unknown, mut wrong) = (0.0, 0.0, 0.0);
+/// Right among all, right and sure among all, unknown among all, wrong among the sure. Right is the count that brings the phase next to the truth.
+fn shares(wraps: &Raster<i32>, unsure: &Raster<bool>, view: &View) -> [f64; 4] {
+    let (mut right, mut sure, mut unknown, mut wrong) = (0.0, 0.0, 0.0, 0.0);
     for (index, &found) in wraps.as_slice().iter().enumerate() {
         let truth = ((view.truth.as_slice()[index] - view.phase.as_slice()[index]) / TAU).round() as i32;
+        right += f64::from(found == truth);
         if unsure.as_slice()[index] {
             unknown += 1.0;
         } else if found == truth {
-            right += 1.0;
+            sure += 1.0;
         } else {
             wrong += 1.0;
         }
     }
     let all = wraps.len() as f64;
-    [right / all, unknown / all, wrong / f64::max(right + wrong, 1.0)]
+    [right / all, sure / all, unknown / all, wrong / f64::max(sure + wrong, 1.0)]
 }

@@ -14,12 +14,16 @@ pub struct Cloud {
     pub normals: Option<Vec<Vector3<f64>>>,
     /// Standard deviation of each point, metre; NaN where unknown.
     pub sigma: Option<Vec<f64>>,
+    /// Amplitude or intensity of each point in any unit; NaN where unknown.
+    pub intensity: Option<Vec<f64>>,
+    /// Whether a point lies at the rim of what was seen or is suspected to mix two surfaces; partners there mislead.
+    pub rim: Option<Vec<bool>>,
 }
 
 impl Cloud {
     /// A cloud of bare points.
     pub fn new(points: Vec<Point3<f64>>) -> Self {
-        Self { points, normals: None, sigma: None }
+        Self { points, ..Self::default() }
     }
 
     /// A cloud from the pixels of a frame: those whose point is not finite are left out, together with their normal
@@ -35,6 +39,7 @@ impl Cloud {
             points: keep.iter().map(|&i| Point3::from(points[i])).collect(),
             normals: normals.map(|n| keep.iter().map(|&i| n[i]).collect()),
             sigma: sigma.map(|s| keep.iter().map(|&i| f64::from(s[i])).collect()),
+            ..Self::default()
         })
     }
 
@@ -54,7 +59,7 @@ impl Cloud {
         Self {
             points: self.points.iter().map(|p| a_from_b * p).collect(),
             normals: self.normals.as_ref().map(|n| n.iter().map(|v| a_from_b * v).collect()),
-            sigma: self.sigma.clone(),
+            ..self.clone()
         }
     }
 
@@ -67,6 +72,8 @@ impl Cloud {
         check_points(what, &self.points)?;
         check_length("normals", self.len(), self.normals.as_ref().map(Vec::len))?;
         check_length("sigma", self.len(), self.sigma.as_ref().map(Vec::len))?;
+        check_length("intensity", self.len(), self.intensity.as_ref().map(Vec::len))?;
+        check_length("rim", self.len(), self.rim.as_ref().map(Vec::len))?;
         let Some(sigma) = &self.sigma else { return Ok(()) };
         match sigma.iter().position(|s| !(s.is_nan() || (*s > 0.0 && *s < 1e100))) {
             Some(index) => Err(Error::NotPositive { what: "sigma", index, value: sigma[index] }),

@@ -3,7 +3,7 @@
 
 use icp_registration::{Cloud, OrganisedNormalOptions, organised_normals};
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
-use rand::SeedableRng;
+use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
 
@@ -76,9 +76,25 @@ impl Pinhole {
         Self { width: 176, height: 144, focal_px: 152.0 }
     }
 
+    /// 224 x 172 with 62 x 45 degrees.
+    pub fn medium() -> Self {
+        Self { width: 224, height: 172, focal_px: 186.0 }
+    }
+
+    /// 640 x 480 with about 62 x 49 degrees.
+    pub fn large() -> Self {
+        Self { width: 640, height: 480, focal_px: 530.0 }
+    }
+
+    /// Unit vector through the centre of a pixel.
     pub fn ray(&self, col: usize, row: usize) -> Vector3<f64> {
-        let x = col as f64 - (self.width as f64 - 1.0) / 2.0;
-        let y = (self.height as f64 - 1.0) / 2.0 - row as f64;
+        self.ray_at(col as f64, row as f64)
+    }
+
+    /// Unit vector through a point of the image, pixels.
+    pub fn ray_at(&self, col: f64, row: f64) -> Vector3<f64> {
+        let x = col - (self.width as f64 - 1.0) / 2.0;
+        let y = (self.height as f64 - 1.0) / 2.0 - row;
         Vector3::new(x, y, -self.focal_px).normalize()
     }
 }
@@ -130,6 +146,73 @@ pub fn cloud(scene: &Scene, camera: &Pinhole, world_from_camera: &Isometry3<f64>
     let (points, sigmas) = frame(scene, camera, world_from_camera, noise, seed);
     let normals = organised_normals(&points, camera.width, camera.height, &OrganisedNormalOptions::default()).unwrap();
     Cloud::from_frame(&points, Some(&normals), Some(&sigmas)).unwrap()
+}
+
+/// Size of the pixels' footprint that is sampled for mixed pixels: rays a side.
+const RAYS: usize = 3;
+
+/// As [`frame`], but each pixel sees the average over its footprint: at jumps of the range lie mixed pixels.
+pub fn frame_with_mixed_pixels(
+    scene: &Scene,
+    camera: &Pinhole,
+    world_from_camera: &Isometry3<f64>,
+    seed: u64,
+) -> (Vec<[f64; 3]>, Vec<f32>) {
+    let mut random = Pcg64::seed_from_u64(seed);
+    let mut points = Vec::new();
+    let mut sigmas = Vec::new();
+    let origin = world_from_camera.translation.vector;
+    for row in 0..camera.height {
+        for col in 0..camera.width {
+            let mean = (0..RAYS * RAYS)
+                .map(|k| {
+                    let offset = |i: usize| (i as f64 + 0.5) / RAYS as f64 - 0.5;
+                    let ray = camera.ray_at(col as f64 + offset(k % RAYS), row as f64 + offset(k / RAYS));
+                    scene.range(&origin, &(world_from_camera.rotation * ray))
+                })
+                .sum::<f64>()
+                / (RAYS * RAYS) as f64;
+            let ray = camera.ray(col, row);
+            // On one surface the range along the central ray is exact; the average would curve walls.
+            let central = scene.range(&origin, &(world_from_camera.rotation * ray));
+            let range = if (mean - central).abs() > 0.01 { mean } else { central };
+            let sigma = sigma_of(range);
+            let normal: f64 = StandardNormal.sample(&mut random);
+            let point = ray * (range + sigma * normal);
+            points.push([point.x, point.y, point.z]);
+            sigmas.push(sigma as f32);
+        }
+    }
+    (points, sigmas)
+}
+
+/// Two frames of the furnished room with noise and mixed pixels.
+pub struct FramePair {
+    pub target: (Vec<[f64; 3]>, Vec<f32>),
+    pub source: (Vec<[f64; 3]>, Vec<f32>),
+    pub target_from_source: Isometry3<f64>,
+}
+
+/// Pair `k` of the set that methods are compared on: the camera has moved by 5 to 20 cm and 2 to 8 degrees.
+pub fn frame_pair(camera: &Pinhole, k: u64) -> FramePair {
+    let scene = Scene::furnished();
+    let mut random = Pcg64::seed_from_u64(7_000 + k);
+    let mut between = |low: f64, high: f64| low + (high - low) * random.random::<f64>();
+    let angle = between(0.0, std::f64::consts::TAU);
+    let position = [0.9 * angle.cos(), 0.6 * angle.sin(), between(1.1, 1.7)];
+    // Across the room, so that furniture is in view.
+    let turned = angle + std::f64::consts::PI + between(-0.6, 0.6);
+    let at = [2.2 * turned.cos(), 1.8 * turned.sin(), between(0.3, 0.9)];
+    let metre = between(0.05, 0.2);
+    let degrees = between(2.0, 8.0);
+    let world_from_target = look_at(position, at);
+    let target_from_source = disturbance(metre, degrees, 9_000 + k);
+    let world_from_source = world_from_target * target_from_source;
+    FramePair {
+        target: frame_with_mixed_pixels(&scene, camera, &world_from_target, 20_000 + 2 * k),
+        source: frame_with_mixed_pixels(&scene, camera, &world_from_source, 20_001 + 2 * k),
+        target_from_source,
+    }
 }
 
 /// A random pose error: `metre` in a random direction, `degrees` about a random axis.

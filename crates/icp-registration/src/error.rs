@@ -111,6 +111,14 @@ pub enum Error {
     /// The search tree refused its points.
     #[error("the search tree could not be built: {0}")]
     Tree(String),
+    /// Voxels of this size cannot be numbered in this cloud.
+    #[error("voxels of {voxel_m} m in a cloud of {extent_m} m: the size must be positive, and above 1/2 000 000 of it")]
+    VoxelSize {
+        /// Edge of a voxel, metre.
+        voxel_m: f64,
+        /// Largest extent of the cloud along an axis, metre.
+        extent_m: f64,
+    },
 }
 
 /// Result of this crate.

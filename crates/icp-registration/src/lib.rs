@@ -12,6 +12,7 @@ mod neighbours;
 mod normals;
 mod pose;
 mod voxels;
+mod trajectory;
 
 pub use absolute_orientation::{Orientation, Similarity, absolute_orientation, absolute_orientation_with_scale};
 pub use cloud::Cloud;
@@ -31,3 +32,7 @@ pub use neighbours::{Neighbour, NeighbourTree};
 pub use normals::{OrganisedNormalOptions, UnorganisedNormalOptions, organised_normals, unorganised_normals};
 pub use pose::{inverse_covariance_transport, pose_difference, step_pose};
 pub use voxels::downsample;
+pub use trajectory::{
+    AbsoluteTrajectoryError, ErrorStatistics, MatchedPose, RelativeError, RelativePoseError, RelativeStep,
+    TrajectoryAlignment, TrajectoryErrorOptions, absolute_trajectory_error, relative_pose_error,
+};

@@ -111,6 +111,14 @@ pub enum Error {
     /// The search tree refused its points.
     #[error("the search tree could not be built: {0}")]
     Tree(String),
+    /// Two parts of a registration do not work together.
+    #[error("{what} does not work with {with}")]
+    Incompatible {
+        /// The part.
+        what: &'static str,
+        /// What it was combined with.
+        with: &'static str,
+    },
 }
 
 /// Result of this crate.

@@ -119,6 +119,14 @@ pub enum Error {
         /// What it was combined with.
         with: &'static str,
     },
+    /// A triangle names a vertex that is not there.
+    #[error("a triangle names vertex {vertex}, but there are {count} (from 0)")]
+    NoSuchVertex {
+        /// The index.
+        vertex: usize,
+        /// Number of vertices.
+        count: usize,
+    },
 }
 
 /// Result of this crate.

@@ -9,6 +9,9 @@ use crate::parts::require_count;
 use crate::parts::scene::Scene;
 use crate::pose::symmetrised;
 
+/// Share of the best held motion below which a motion is held by rounding only.
+const UNHELD: f64 = 1e-9;
+
 /// About this many points, chosen such that all six motions are held as evenly as the surface allows
 /// `[Gelfand2003]`: the next point is always one that holds the motion held least so far. Points without a normal are
 /// left out.
@@ -63,10 +66,15 @@ fn greedy(holds: &[[f64; 6]], wanted: usize) -> Vec<usize> {
         queue.sort_by(|&a, &b| holds[b][motion].total_cmp(&holds[a][motion]));
         queue
     });
+    let total: [f64; 6] = std::array::from_fn(|motion| holds.iter().map(|hold| hold[motion]).sum());
+    let largest = total.iter().copied().fold(0.0, f64::max);
+    // Motions that no point holds would take all that are asked for.
+    let holdable: Vec<usize> = (0..6).filter(|&motion| total[motion] > UNHELD * largest).collect();
     let (mut next, mut held, mut taken) = ([0; 6], [0.0; 6], vec![false; holds.len()]);
     let mut chosen = Vec::with_capacity(wanted);
     while chosen.len() < wanted {
-        let weakest = (0..6).min_by(|&a, &b| f64::total_cmp(&held[a], &held[b])).unwrap_or(0);
+        let weakest = holdable.iter().copied().min_by(|&a, &b| f64::total_cmp(&held[a], &held[b]));
+        let Some(weakest) = weakest else { break };
         while next[weakest] < holds.len() && taken[queues[weakest][next[weakest]]] {
             next[weakest] += 1;
         }

@@ -22,8 +22,8 @@ pub use absolute_orientation::{
 pub use cloud::Cloud;
 pub use error::{Error, Result};
 pub use icp::{
-    Alternative, DegeneracyPolicy, IcpOptions, IcpResult, IcpTarget, Levels, Metric, MotionKind, Registration, Selection,
-    StopReason, System, UndeterminedMotion, align,
+    Alternative, DegeneracyPolicy, IcpOptions, IcpResult, IcpTarget, Levels, Metric, MotionKind, Registration,
+    Selection, Starts, StopReason, System, UndeterminedMotion, align,
 };
 pub use kernel::RobustKernel;
 #[cfg(feature = "multiview")]

@@ -23,7 +23,8 @@ fn nasty(kind: usize, scale: f64, jitter: &[f64]) -> Cloud {
             4 => [t.cos(), t.sin(), (i % 5) as f64 / 5.0],
             5 => [jitter(i), jitter(i + 3), jitter(i + 7)],
             6 => [if i % 2 == 0 { 0.0 } else { 1e5 }, jitter(i), jitter(2 * i)],
-            _ => [[t % 1.0, jitter(i).abs(), 0.0], [0.0, t % 1.0, jitter(i).abs()], [t % 1.0, 0.0, jitter(i).abs()]][i % 3],
+            _ => [[t % 1.0, jitter(i).abs(), 0.0], [0.0, t % 1.0, jitter(i).abs()], [t % 1.0, 0.0, jitter(i).abs()]]
+                [i % 3],
         }
     };
     let n = if kind == 0 { 1 } else { 120 };
@@ -122,7 +123,9 @@ fn empty_and_nan_clouds_are_named() {
 
 #[test]
 fn parts_outside_their_domain_are_refused() {
-    use icp_registration::parts::{EveryNth, MaxDistance, MaxNormalAngle, NormalSpace, NormalWeight, RandomPoints, Trimmed};
+    use icp_registration::parts::{
+        EveryNth, MaxDistance, MaxNormalAngle, NormalSpace, NormalWeight, RandomPoints, Trimmed,
+    };
     let good = nasty(7, 1.0, &[0.1, 0.5, 0.9, 0.3]);
     let target = IcpTarget::new(good.clone()).unwrap();
     let with = |change: &dyn Fn(&mut Registration<'_>)| {

@@ -87,7 +87,7 @@ fn rounding_tells_them_apart() {
     let usual = worst([1.0; 3], 0.0);
     let thin = worst([1.0, 1e-4, 1e-4], 0.0);
     let far = worst([1.0; 3], 1e4);
-    println!("worst angles: usual {usual:.1e?}, nearly a line {thin:.1e?}, 10 km away {far:.1e?}");
+    println!("worst angles: usual {usual:?}, nearly a line {thin:?}, 10 km away {far:?}");
     // Fully determined sets: all to rounding of sums of ten.
     assert!(usual.iter().all(|angle| *angle < 1e-7));
     // The turn about a line of width 1e-4 hangs on moments of 1e-8: eigenvalues keep half of the 16 digits of these.

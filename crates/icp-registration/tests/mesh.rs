@@ -70,7 +70,8 @@ fn a_plate_leaves_three_motions_open_without_normals_of_the_points() {
 
 #[test]
 fn meshes_that_are_none_are_refused() {
-    let corners = [Point3::origin(), Point3::new(1.0, 0.0, 0.0), Point3::new(2.0, 0.0, 0.0), Point3::new(0.0, 1.0, 0.0)];
+    let corners =
+        [Point3::origin(), Point3::new(1.0, 0.0, 0.0), Point3::new(2.0, 0.0, 0.0), Point3::new(0.0, 1.0, 0.0)];
     assert!(matches!(TriangleMesh::new(&corners, &[]), Err(Error::Empty { .. })));
     assert!(matches!(TriangleMesh::new(&corners, &[[0, 1, 2]]), Err(Error::Empty { .. })));
     assert!(matches!(TriangleMesh::new(&corners, &[[0, 1, 4]]), Err(Error::NoSuchVertex { vertex: 4, count: 4 })));

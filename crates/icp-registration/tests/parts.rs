@@ -98,7 +98,12 @@ fn projection_in_place_of_a_search() {
     };
     let matching = Projective::new(&target, &pair.target.0, camera.width, camera.height, pixel).unwrap();
     let truth = pair.target_from_source;
-    let s = Setting { guess: Isometry3::identity(), source: prepared(&pair.source), truth, target: IcpTarget::new(prepared(&pair.target)).unwrap() };
+    let s = Setting {
+        guess: Isometry3::identity(),
+        source: prepared(&pair.source),
+        truth,
+        target: IcpTarget::new(prepared(&pair.target)).unwrap(),
+    };
     let mut registration = Registration::new(matching);
     registration.levels.last_limit_m = Some(0.15);
     check("projective", &s, &registration, 6.0);
@@ -298,7 +303,8 @@ fn what_is_open_takes_the_prior() {
     assert!((sigma_along / 0.02 - 1.0).abs() < 0.1, "{sigma_along}");
     assert!((normal.transpose() * covariance * normal)[0].sqrt() < 3e-3);
     let none = IcpOptions { prior_covariance: None, ..options };
-    let refused = icp_registration::align(&IcpTarget::new(target.clone()).unwrap().cloud().clone(), &target, &guess, &none);
+    let refused =
+        icp_registration::align(&IcpTarget::new(target.clone()).unwrap().cloud().clone(), &target, &guess, &none);
     assert!(matches!(refused, Err(Error::Incompatible { .. })));
 }
 

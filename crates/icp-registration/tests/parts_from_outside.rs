@@ -131,7 +131,7 @@ impl StoppingRule for SmallSteps<'_> {
         80
     }
 
-    fn decide(&self, progress: &Progress<'_>) -> Result<Option<StopReason>> {
+    fn decide(&self, progress: &mut Progress<'_>) -> Result<Option<StopReason>> {
         self.0.count(7);
         let small = progress.step_lengths_m.last().is_some_and(|step| *step < 2e-5);
         let done = small && progress.step_over_sigma()? < 0.2;

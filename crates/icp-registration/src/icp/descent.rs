@@ -4,7 +4,7 @@
 //! overlap well, compatible normals where they overlap little, and either can slide along a wall into a wrong pose. All
 //! are tried, and the pose at which most of the sample fits goes on.
 
-use nalgebra::Isometry3;
+use nalgebra::{Isometry3, Vector3};
 use rayon::prelude::*;
 
 use super::matching::Points;
@@ -45,12 +45,7 @@ impl Default for Levels {
 
 impl Levels {
     /// The limits in falling order, metre.
-    pub(super) fn limits(
-        &self,
-        engine: &Engine<'_>,
-        selected: &[usize],
-        guess: &Isometry3<f64>,
-    ) -> Result<Vec<f64>> {
+    pub(super) fn limits(&self, engine: &Engine<'_>, selected: &[usize], guess: &Isometry3<f64>) -> Result<Vec<f64>> {
         let target = engine.scene.target;
         let last = self.last_limit_m.unwrap_or_else(|| target.default_limit_m());
         let first = match self.first_limit_m {
@@ -122,36 +117,61 @@ impl<'a> Alternative<'a> {
 /// Fraction of the distance limit at which a residual counts half in the comparison of tracks.
 const FIT_RESIDUAL: f64 = 1.0 / 12.0;
 
+/// The first track with the best fit, or the first error.
+fn best_of(tracks: Vec<Result<(f64, Track)>>) -> Result<(f64, Track)> {
+    let mut best: Option<Result<(f64, Track)>> = None;
+    for track in tracks {
+        best = match (best, track) {
+            (None, track) => Some(track),
+            (Some(Ok(before)), Ok(track)) if track.0 > before.0 => Some(Ok(track)),
+            (Some(Err(_)), Ok(track)) => Some(Ok(track)),
+            (before, _) => before,
+        };
+    }
+    best.unwrap_or(Err(Error::Numerical { what: "the coarse registration", why: "there was nothing to try" }))
+}
+
 impl<'p> Engine<'p> {
-    /// Runs the levels with each alternative and returns the track at whose end most of the sample fits.
+    /// Runs the levels with each alternative, from the guess and if need be from around it, and returns the track at
+    /// whose end most of the sample fits.
     pub(super) fn descend(&self, selected: &[usize], guess: &Isometry3<f64>, limits: &[f64]) -> Result<Track> {
         let sample = thinned(selected, self.parts.levels.points);
+        let from_guess = best_of(self.tracks(&sample, &[*guess], limits));
+        let Some(starts) = self.parts.starts.filter(|_| self.parts.levels.first_limit_m.is_none()) else {
+            return from_guess.map(|(_, track)| track);
+        };
+        let fit = from_guess.as_ref().map_or(0.0, |(fit, _)| *fit);
+        if fit >= starts.convincing * sample.len() as f64 {
+            return from_guess.map(|(_, track)| track);
+        }
+        let scouts = thinned(&sample, starts.points);
+        let sum = |sum: Vector3<f64>, &i: &usize| sum + (guess * self.scene.source.points[i]).coords;
+        let centre = scouts.iter().fold(Vector3::zeros(), sum) / scouts.len().max(1) as f64;
+        let mut tracks: Vec<(f64, Track)> =
+            self.tracks(&scouts, &starts.around(guess, &centre, limits[0]), limits).into_iter().flatten().collect();
+        // Stable: equal tracks stay in the order of the starts.
+        tracks.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let poses: Vec<Isometry3<f64>> = tracks.iter().take(starts.refined).map(|(_, track)| track.pose).collect();
+        let fine = &limits[limits.len().saturating_sub(2)..];
+        let mut refined = vec![from_guess];
+        refined.extend(self.tracks(&sample, &poses, fine));
+        best_of(refined).map(|(_, track)| track)
+    }
+
+    /// The tracks from all starts by all alternatives with their fit on the sample, in that order whatever thread was
+    /// first.
+    fn tracks(&self, sample: &[usize], starts: &[Isometry3<f64>], limits: &[f64]) -> Vec<Result<(f64, Track)>> {
         let alternatives: Vec<Engine<'_>> = match self.parts.alternatives.as_slice() {
             [] => vec![self.with(None)],
             some => some.iter().map(|alternative| self.with(Some(alternative))).collect(),
         };
-        // In the order of the alternatives, whatever thread was first.
-        let tracks: Vec<Result<(f64, Track)>> = alternatives
-            .par_iter()
-            .map(|engine| {
-                let track = engine.down(&sample, guess, limits)?;
-                Ok((self.fit(&sample, &track, limits)?, track))
-            })
-            .collect();
-        let mut best: Result<(f64, Track)> =
-            Err(Error::Numerical { what: "the coarse registration", why: "there was nothing to try" });
-        let mut failure = None;
-        for track in tracks {
-            match (track, &best) {
-                (Ok(track), Ok(before)) if track.0 <= before.0 => {}
-                (Ok(track), _) => best = Ok(track),
-                (Err(error), _) => failure = failure.or(Some(error)),
-            }
-        }
-        match (best, failure) {
-            (Ok((_, track)), _) => Ok(track),
-            (Err(error), failure) => Err(failure.unwrap_or(error)),
-        }
+        let ways: Vec<(&Isometry3<f64>, &Engine<'_>)> =
+            starts.iter().flat_map(|start| alternatives.iter().map(move |engine| (start, engine))).collect();
+        let run = |&(start, engine): &(&Isometry3<f64>, &Engine<'_>)| {
+            let track = engine.down(sample, start, limits)?;
+            Ok((self.fit(sample, &track, limits)?, track))
+        };
+        ways.par_iter().map(run).collect()
     }
 
     fn with(&self, alternative: Option<&'p Alternative<'p>>) -> Engine<'p> {

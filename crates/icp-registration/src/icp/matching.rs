@@ -64,10 +64,22 @@ impl Engine<'_> {
     /// Pairs at a moment, weighted, or the error that there are too few.
     pub(crate) fn pairs(&self, moment: &Moment, points: &mut Points, iterations: usize) -> Result<Vec<Pair>> {
         let scene = self.scene.at(*moment);
-        let pairs = self.judged(&scene, self.gated_pairs(&scene, points)?);
+        let gated = self.gated_pairs(&scene, points)?;
+        self.enough(&scene, gated, points, iterations)
+    }
+
+    /// Gated pairs judged and weighted, or the error that too few are left.
+    pub(crate) fn enough(
+        &self,
+        scene: &Scene<'_>,
+        gated: Vec<Pair>,
+        points: &Points,
+        iterations: usize,
+    ) -> Result<Vec<Pair>> {
+        let pairs = self.judged(scene, gated);
         let (found, of, needed) = (pairs.len(), points.indices.len(), self.parts.min_correspondences);
         if found < needed {
-            let (max_distance_m, iteration) = (moment.limit_m, iterations);
+            let (max_distance_m, iteration) = (scene.moment.limit_m, iterations);
             return Err(Error::TooFewCorrespondences { found, of, needed, max_distance_m, iteration });
         }
         Ok(pairs)

@@ -9,6 +9,7 @@ mod quality;
 mod registration;
 mod result;
 mod sensitivity;
+mod starts;
 mod system;
 mod target;
 mod validation;
@@ -18,6 +19,7 @@ pub use motion::{MotionKind, UndeterminedMotion};
 pub use options::{DegeneracyPolicy, IcpOptions, Metric, Selection};
 pub use registration::Registration;
 pub use result::{IcpResult, StopReason};
+pub use starts::Starts;
 pub use system::System;
 pub use target::IcpTarget;
 

@@ -206,13 +206,7 @@ fn cells(system: &System<'_>) -> Vec<Cell> {
 }
 
 /// Information of a pair: the symmetric products of its derivatives from independent measurements.
-fn add_information(
-    system: &System<'_>,
-    i: usize,
-    weight: f64,
-    [a, b]: &mut [Rows; 2],
-    information: &mut Matrix6<f64>,
-) {
+fn add_information(system: &System<'_>, i: usize, weight: f64, [a, b]: &mut [Rows; 2], information: &mut Matrix6<f64>) {
     let pair = &system.pairs()[i];
     system.twins(pair, a, b);
     for (row, twin) in a.as_slice().iter().zip(b.as_slice()) {

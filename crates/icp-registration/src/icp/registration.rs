@@ -7,6 +7,7 @@ use super::matching::Points;
 use super::options::DegeneracyPolicy;
 use super::quality::{Residuals, Verdict};
 use super::result::{IcpResult, StopReason};
+use super::starts::Starts;
 use super::system::System;
 use super::{IcpOptions, IcpTarget};
 use crate::cloud::Cloud;
@@ -42,6 +43,8 @@ pub struct Registration<'a> {
     pub kernel: Box<dyn KernelSchedule + 'a>,
     /// Distance limits from coarse to fine.
     pub levels: Levels,
+    /// More starts where the guess alone does not convince.
+    pub starts: Option<Starts>,
     /// Other kernels and rejections for the way down the levels; where there are any, they replace those above until the
     /// last level, and the pose at which most of a sample fits goes on.
     pub alternatives: Vec<Alternative<'a>>,
@@ -73,6 +76,7 @@ impl<'a> Registration<'a> {
             acceleration: None,
             kernel: Box::new(RobustKernel::Welsch),
             levels: Levels::default(),
+            starts: Some(Starts::default()),
             alternatives: Alternative::usual(RobustKernel::Huber, Some(angle), None),
             stopping: Box::new(Settled::default()),
             degeneracy: DegeneracyPolicy::Report,
@@ -109,8 +113,9 @@ impl<'a> Registration<'a> {
         let selected = self.selection.select(&engine.scene)?;
         let limits = self.levels.limits(&engine, &selected, guess)?;
         let mut track = engine.descend(&selected, guess, &limits)?;
-        let stop = engine.settle(&mut track, &selected, &limits)?;
-        engine.result(track, &selected, &limits, guess, stop)
+        let mut points = Points::new(selected);
+        let stop = engine.settle(&mut track, &mut points, &limits)?;
+        engine.result(&track, &mut points, &limits, guess, stop)
     }
 }
 
@@ -141,8 +146,7 @@ impl<'p> Engine<'p> {
             return Err(Error::NonFinite { what: "the guess", index: 0 });
         }
         let target = parts.matching.target();
-        let moment =
-            Moment { pose: *guess, limit_m: f64::INFINITY, level: 0, levels: 1, iteration: 0, ended: false };
+        let moment = Moment { pose: *guess, limit_m: f64::INFINITY, level: 0, levels: 1, iteration: 0, ended: false };
         let with_normal = source_normals.iter().filter(|n| !n.x.is_nan()).count();
         let is_surface = 2 * with_normal >= source.len();
         let scene = Scene { source, source_normals, is_surface, target, moment };
@@ -151,22 +155,21 @@ impl<'p> Engine<'p> {
     }
 
     /// Iterates on all selected points at the last limit.
-    fn settle(&self, track: &mut Track, selected: &[usize], limits: &[f64]) -> Result<StopReason> {
-        let mut points = Points::new(selected.to_vec());
+    fn settle(&self, track: &mut Track, points: &mut Points, limits: &[f64]) -> Result<StopReason> {
         let mut lengths = Vec::new();
         let mut accelerator = None;
         while track.iterations < self.parts.stopping.max_iterations() {
             let moment = self.moment(track, limits, limits.len() - 1, lengths.len());
-            let step = self.step(track, &moment, &mut points, &mut accelerator)?;
+            let step = self.step(track, &moment, points, &mut accelerator)?;
             lengths.push(length(&step));
             // While the kernel narrows, small steps mean nothing.
             if self.kernel.at(&moment).1 > 1.0 {
                 continue;
             }
             let radius_m = self.scene.target.radius_m;
-            let step_over_sigma = || self.step_over_sigma(track, limits, selected, &step);
-            let progress = Progress { step_lengths_m: &lengths, radius_m, step_over_sigma: &step_over_sigma };
-            if let Some(reason) = self.parts.stopping.decide(&progress)? {
+            let mut step_over_sigma = || self.step_over_sigma(track, limits, points, &step);
+            let mut progress = Progress { step_lengths_m: &lengths, radius_m, step_over_sigma: &mut step_over_sigma };
+            if let Some(reason) = self.parts.stopping.decide(&mut progress)? {
                 return Ok(reason);
             }
         }
@@ -219,15 +222,9 @@ impl<'p> Engine<'p> {
         }
     }
 
-    fn step_over_sigma(
-        &self,
-        track: &Track,
-        limits: &[f64],
-        selected: &[usize],
-        step: &Vector6<f64>,
-    ) -> Result<f64> {
+    fn step_over_sigma(&self, track: &Track, limits: &[f64], points: &mut Points, step: &Vector6<f64>) -> Result<f64> {
         let moment = self.moment(track, limits, limits.len() - 1, 0);
-        let pairs = self.pairs(&moment, &mut Points::new(selected.to_vec()), track.iterations)?;
+        let pairs = self.pairs(&moment, points, track.iterations)?;
         let scene = self.scene.at(moment);
         let system = System::new(&scene, self.metric, &pairs, self.kernel.at(&Moment { ended: true, ..moment }));
         Ok(Verdict::new(&system, self.max_motion_sigma_m(), Residuals::Settled)?.over_sigma(step))

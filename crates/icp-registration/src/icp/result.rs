@@ -11,7 +11,7 @@ use super::registration::{Engine, Track};
 use super::sensitivity::sensitivity;
 use super::system::System;
 use crate::error::Result;
-use crate::parts::{Moment, thinned};
+use crate::parts::{Moment, Scene, thinned};
 
 /// Source points from which the response of the score and the overlap are taken.
 const RESPONSE_POINTS: usize = 4000;
@@ -64,24 +64,30 @@ impl Engine<'_> {
     /// Judges the pose at the end of a track.
     pub(super) fn result(
         &self,
-        track: Track,
-        selected: &[usize],
+        track: &Track,
+        points: &mut Points,
         limits: &[f64],
         guess: &Isometry3<f64>,
         stop: StopReason,
     ) -> Result<IcpResult> {
-        let moment = Moment { ended: true, ..self.moment(&track, limits, limits.len() - 1, 0) };
+        let moment = Moment { ended: true, ..self.moment(track, limits, limits.len() - 1, 0) };
         let scene = self.scene.at(moment);
-        let pairs = self.pairs(&moment, &mut Points::new(selected.to_vec()), track.iterations)?;
+        let gated = self.gated_pairs(&scene, points)?;
+        let overlap = if points.indices.len() == scene.source.len() {
+            gated.len() as f64 / points.indices.len() as f64
+        } else {
+            self.overlap(&scene)?
+        };
+        let pairs = self.enough(&scene, gated, points, track.iterations)?;
         let system = System::new(&scene, self.metric, &pairs, self.kernel.at(&moment));
         let verdict = Verdict::new(&system, self.max_motion_sigma_m(), Residuals::Settled)?;
-        let sample = thinned(selected, RESPONSE_POINTS);
+        let sample = thinned(&points.indices, RESPONSE_POINTS);
         let step_m = (0.5 * system.rms_m()).max(0.01 * moment.limit_m);
         let response = sensitivity(self, &system, &sample, step_m)?;
         let mut result = IcpResult {
             target_from_source: track.pose,
             covariance: verdict.covariance(&system, &response),
-            overlap: self.overlap(&moment)?,
+            overlap,
             rms_m: system.rms_m(),
             iterations: track.iterations,
             stop,
@@ -97,9 +103,9 @@ impl Engine<'_> {
     }
 
     /// Fraction of the source points with a partner that every part keeps.
-    fn overlap(&self, moment: &Moment) -> Result<f64> {
-        let all = thinned(&(0..self.scene.source.len()).collect::<Vec<_>>(), OVERLAP_POINTS);
+    fn overlap(&self, scene: &Scene<'_>) -> Result<f64> {
+        let all = thinned(&(0..scene.source.len()).collect::<Vec<_>>(), OVERLAP_POINTS);
         let of = all.len();
-        Ok(self.gated_pairs(&self.scene.at(*moment), &mut Points::new(all))?.len() as f64 / of as f64)
+        Ok(self.gated_pairs(scene, &mut Points::new(all))?.len() as f64 / of as f64)
     }
 }

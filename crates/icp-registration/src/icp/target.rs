@@ -7,8 +7,8 @@ use crate::cloud::Cloud;
 use crate::error::Result;
 use crate::kernel::quantile;
 use crate::neighbours::NeighbourTree;
-use crate::parts::TargetSurface;
 use crate::normals::{UnorganisedNormalOptions, normals_with_tree};
+use crate::parts::TargetSurface;
 
 /// Points whose distance to their neighbour is looked at for the spacing.
 const SPACING_SAMPLES: usize = 2000;

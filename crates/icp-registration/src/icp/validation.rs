@@ -13,6 +13,7 @@ impl Registration<'_> {
         self.kernel.validate()?;
         self.stopping.validate()?;
         self.levels.validate()?;
+        self.starts.map_or(Ok(()), |starts| starts.validate())?;
         for alternative in &self.alternatives {
             alternative.kernel.validate()?;
             if let Some(metric) = &alternative.metric {

@@ -89,7 +89,14 @@ fn radius(vertices: &[Point3<f64>], triangles: &[[u32; 3]], areas: &[f64]) -> f6
     let centre = weighted().fold(Vector3::zeros(), |sum, (p, w)| sum + p * w);
     // Corners, unlike middles, tell the size of a mesh of few triangles.
     let square = |t: &[u32; 3]| t.iter().map(|&v| (vertices[v as usize].coords - centre).norm_squared() / 3.0).sum();
-    let squares: f64 = triangles.iter().zip(areas).map(|(t, a)| -> f64 { let s: f64 = square(t); s * a / total }).sum();
+    let squares: f64 = triangles
+        .iter()
+        .zip(areas)
+        .map(|(t, a)| -> f64 {
+            let s: f64 = square(t);
+            s * a / total
+        })
+        .sum();
     squares.sqrt()
 }
 

@@ -26,8 +26,8 @@ pub use crate::mesh::{ClosestOnMesh, TriangleMesh};
 pub use kernel::{Graduated, KernelSchedule};
 pub use matching::{CompatibleNearest, NearestPoint, Partner, PointMatching, Projective, Query};
 pub use metric::{Coloured, ErrorMetric, PlaneToPlane, PointToPlane, PointToPoint, Row, Rows, SymmetricPlanes};
-pub use minimisation::{AndersonAcceleration, ClosedForm, GaussNewton, LevenbergMarquardt, Minimiser};
 pub(crate) use minimisation::Accelerator;
+pub use minimisation::{AndersonAcceleration, ClosedForm, GaussNewton, LevenbergMarquardt, Minimiser};
 pub use rejection::{
     MaxDistance, MaxNormalAngle, MedianDistance, MutualNearest, PairRejection, SourceRim, TargetRim, Trimmed,
 };

@@ -10,7 +10,7 @@ pub trait StoppingRule: Sync {
     fn max_iterations(&self) -> usize;
 
     /// Asked after each step of the last level.
-    fn decide(&self, progress: &Progress<'_>) -> Result<Option<StopReason>>;
+    fn decide(&self, progress: &mut Progress<'_>) -> Result<Option<StopReason>>;
 
     /// Refuses parameters outside their domain.
     fn validate(&self) -> Result<()> {
@@ -24,13 +24,13 @@ pub struct Progress<'a> {
     pub step_lengths_m: &'a [f64],
     /// Radius of the target, metre.
     pub radius_m: f64,
-    pub(crate) step_over_sigma: &'a dyn Fn() -> Result<f64>,
+    pub(crate) step_over_sigma: &'a mut dyn FnMut() -> Result<f64>,
 }
 
 impl Progress<'_> {
     /// The last step over the standard deviation of the pose, along the determined motion where it is largest. Costs as
     /// much as a step.
-    pub fn step_over_sigma(&self) -> Result<f64> {
+    pub fn step_over_sigma(&mut self) -> Result<f64> {
         (self.step_over_sigma)()
     }
 }
@@ -59,7 +59,7 @@ impl StoppingRule for Settled {
         self.max_iterations
     }
 
-    fn decide(&self, progress: &Progress<'_>) -> Result<Option<StopReason>> {
+    fn decide(&self, progress: &mut Progress<'_>) -> Result<Option<StopReason>> {
         let lengths = progress.step_lengths_m;
         let Some(&last) = lengths.last() else { return Ok(None) };
         if last <= self.step_tolerance_m.unwrap_or(1e-5 * progress.radius_m) {

@@ -12,7 +12,7 @@ const BEYOND: f64 = 1.25;
 /// The nearest point of the target by its k-d tree `[BeslMcKay1992]`.
 ///
 /// The distance of the second nearest tells how far the source point may move before its partner can change; most points
-/// are thus searched for only in the first few iterations of a level `[Nuchter2007]`.
+/// are thus searched for only in the first few iterations of a level `[GreenspanGodin2001]`.
 #[derive(Debug, Clone, Copy)]
 pub struct NearestPoint<'a> {
     target: &'a IcpTarget,

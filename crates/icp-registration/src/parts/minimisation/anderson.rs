@@ -94,8 +94,8 @@ impl Accelerator {
 
     fn coordinates(&self, pose: &Isometry3<f64>) -> Vector6<f64> {
         let turn = (pose.rotation * self.origin.rotation.inverse()).scaled_axis();
-        let rotated = self.centre + pose.rotation * self.origin.rotation.inverse()
-            * (self.origin.translation.vector - self.centre);
+        let rotated = self.centre
+            + pose.rotation * self.origin.rotation.inverse() * (self.origin.translation.vector - self.centre);
         let dt = pose.translation.vector - rotated;
         let w = turn * self.radius_m;
         Vector6::new(dt.x, dt.y, dt.z, w.x, w.y, w.z)

@@ -55,9 +55,9 @@ impl MutualNearest {
 impl PairRejection for MutualNearest {
     fn keeps(&self, scene: &Scene<'_>, pair: &Pair) -> bool {
         let back = scene.moment.pose.inverse_transform_point(&Point3::from(pair.point));
-        self.tree.nearest(&back).is_ok_and(|nearest| {
-            (self.points[nearest.index] - self.points[pair.source]).norm() <= self.tolerance_m
-        })
+        self.tree
+            .nearest(&back)
+            .is_ok_and(|nearest| (self.points[nearest.index] - self.points[pair.source]).norm() <= self.tolerance_m)
     }
 
     fn validate(&self, scene: &Scene<'_>) -> Result<()> {

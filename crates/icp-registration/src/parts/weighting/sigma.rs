@@ -20,8 +20,7 @@ impl PairWeighting for SigmaWeight {
         if source.is_none() && target.is_none() {
             return;
         }
-        let mut variances: Vec<f64> =
-            pairs.iter().map(|p| of(source, Some(p.source)) + of(target, p.target)).collect();
+        let mut variances: Vec<f64> = pairs.iter().map(|p| of(source, Some(p.source)) + of(target, p.target)).collect();
         let mut known: Vec<f64> = variances.iter().copied().filter(|v| *v > 0.0).collect();
         let median = if known.is_empty() { 1.0 } else { quantile(&mut known, 0.5) };
         for (pair, variance) in pairs.iter_mut().zip(&mut variances) {

@@ -127,6 +127,16 @@ pub enum Error {
         /// Number of vertices.
         count: usize,
     },
+    /// A part of a registration names a point that is not there.
+    #[error("{part} names point {point}, but there are {count} (from 0)")]
+    NoSuchPoint {
+        /// The part.
+        part: &'static str,
+        /// The index.
+        point: usize,
+        /// Number of points.
+        count: usize,
+    },
 }
 
 /// Result of this crate.

@@ -78,7 +78,7 @@ fn median_distance(engine: &Engine<'_>, selected: &[usize], guess: &Isometry3<f6
             return Err(Error::NonFinite { what: "source points in the target frame", index: source });
         }
         let normal = guess.rotation * scene.source_normals[source];
-        let query = Query { source, moved: moved.coords, normal, pose: *guess, limit_m: NO_LIMIT_M };
+        let query = Query { source, moved: moved.coords, normal, pose: *guess, limit_m: NO_LIMIT_M, remember: false };
         let partner = engine.parts.matching.partner(&query);
         Ok(partner.found.then(|| (partner.point - query.moved).norm()))
     };

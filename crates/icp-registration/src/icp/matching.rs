@@ -1,6 +1,6 @@
 //! Pairs at a given moment: partners found in parallel, and remembered while they cannot change.
 
-use nalgebra::Vector3;
+use nalgebra::{Isometry3, Vector3};
 use rayon::prelude::*;
 
 use super::registration::Engine;
@@ -12,10 +12,15 @@ use crate::parts::{Moment, Pair, Partner, Query, Scene};
 /// Points handled together by one thread; fixed, so that sums do not depend on the number of threads.
 pub(crate) const CHUNK: usize = 1024;
 
-/// Source points that are matched again and again, with the last answers.
+/// Displacement since the last matching, in spacings of the target, below which answers are worth remembering.
+const SETTLING: f64 = 0.1;
+
+/// Source points that are matched again and again.
 pub(crate) struct Points {
     pub indices: Vec<usize>,
+    /// The last answers, from the moment on at which the poses settle; empty before.
     memory: Vec<Memory>,
+    last_pose: Option<Isometry3<f64>>,
 }
 
 /// An answer, and for which place and limit it was given.
@@ -28,24 +33,47 @@ struct Memory {
 
 impl Points {
     pub(crate) fn new(indices: Vec<usize>) -> Self {
-        let nothing = Memory { partner: Partner::none(0.0), asked_at: Vector3::zeros(), limit_m: f64::NAN };
-        let memory = vec![nothing; indices.len()];
-        Self { indices, memory }
+        Self { indices, memory: Vec::new(), last_pose: None }
+    }
+
+    /// Remembers answers from now on: the poses to come are near each other.
+    pub(crate) fn remember(&mut self) {
+        if self.memory.is_empty() {
+            let nothing = Memory { partner: Partner::none(0.0), asked_at: Vector3::zeros(), limit_m: f64::NAN };
+            self.memory = vec![nothing; self.indices.len()];
+        }
+    }
+
+    /// Remembers answers once the poses have come near each other.
+    fn remember_when_settling(&mut self, scene: &Scene<'_>) {
+        let pose = scene.moment.pose;
+        if let Some(last) = self.last_pose.replace(pose) {
+            let n = self.indices.len();
+            let some = [0, n / 3, 2 * n / 3, n.saturating_sub(1)].into_iter().filter_map(|k| self.indices.get(k));
+            let moved = some.map(|&i| (pose * scene.source.points[i] - last * scene.source.points[i]).norm());
+            if moved.fold(0.0, f64::max) <= SETTLING * scene.target.spacing_m {
+                self.remember();
+            }
+        }
     }
 }
 
 impl Engine<'_> {
     /// Pairs of the points in their order that every part keeps one by one.
     pub(crate) fn gated_pairs(&self, scene: &Scene<'_>, points: &mut Points) -> Result<Vec<Pair>> {
-        let Points { indices, memory } = points;
-        let chunks: Result<Vec<Vec<Pair>>> = indices
-            .par_chunks(CHUNK)
-            .zip(memory.par_chunks_mut(CHUNK))
-            .map(|(indices, memory)| {
-                let pairs = indices.iter().zip(memory).map(|(&i, memory)| self.pair(scene, i, memory));
+        points.remember_when_settling(scene);
+        let Points { indices, memory, .. } = points;
+        let chunks: Result<Vec<Vec<Pair>>> = if memory.is_empty() {
+            let pairs =
+                |indices: &[usize]| indices.iter().filter_map(|&i| self.pair(scene, i, None).transpose()).collect();
+            indices.par_chunks(CHUNK).map(pairs).collect()
+        } else {
+            let pairs = |(indices, memory): (&[usize], &mut [Memory])| {
+                let pairs = indices.iter().zip(memory).map(|(&i, memory)| self.pair(scene, i, Some(memory)));
                 pairs.filter_map(Result::transpose).collect()
-            })
-            .collect();
+            };
+            indices.par_chunks(CHUNK).zip(memory.par_chunks_mut(CHUNK)).map(pairs).collect()
+        };
         Ok(chunks?.concat())
     }
 
@@ -86,7 +114,7 @@ impl Engine<'_> {
         Ok(pairs)
     }
 
-    fn pair(&self, scene: &Scene<'_>, source: usize, memory: &mut Memory) -> Result<Option<Pair>> {
+    fn pair(&self, scene: &Scene<'_>, source: usize, memory: Option<&mut Memory>) -> Result<Option<Pair>> {
         let pose = scene.moment.pose;
         let moved = pose * scene.source.points[source];
         if !is_usable(&moved) {
@@ -94,8 +122,9 @@ impl Engine<'_> {
         }
         let moved = moved.coords;
         let turned = pose.rotation * scene.source_normals[source];
-        self.ask(scene, source, &moved, &turned, memory);
-        let partner = memory.partner;
+        let limit_m = scene.moment.limit_m;
+        let query = Query { source, moved, normal: turned, pose, limit_m, remember: memory.is_some() };
+        let partner = self.ask(&query, memory);
         if !partner.found {
             return Ok(None);
         }
@@ -124,14 +153,14 @@ impl Engine<'_> {
     }
 
     /// Asks for the partner, unless the point has moved too little since the last answer for it to change.
-    fn ask(&self, scene: &Scene<'_>, source: usize, moved: &Vector3<f64>, normal: &Vector3<f64>, memory: &mut Memory) {
-        let limit_m = scene.moment.limit_m;
+    fn ask(&self, query: &Query, memory: Option<&mut Memory>) -> Partner {
+        let Some(memory) = memory else { return self.parts.matching.partner(query) };
         // A partner found stays the nearest whatever the limit; that there is none holds for its limit.
-        let same_question = memory.partner.found || (memory.limit_m - limit_m).abs() <= 0.0;
-        if same_question && (moved - memory.asked_at).norm() < memory.partner.margin_m {
-            return;
+        let same_question = memory.partner.found || (memory.limit_m - query.limit_m).abs() <= 0.0;
+        if !(same_question && (query.moved - memory.asked_at).norm() < memory.partner.margin_m) {
+            let partner = self.parts.matching.partner(query);
+            *memory = Memory { partner, asked_at: query.moved, limit_m: query.limit_m };
         }
-        let query = Query { source, moved: *moved, normal: *normal, pose: scene.moment.pose, limit_m };
-        *memory = Memory { partner: self.parts.matching.partner(&query), asked_at: *moved, limit_m };
+        memory.partner
     }
 }

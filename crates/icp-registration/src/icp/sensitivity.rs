@@ -24,6 +24,7 @@ pub(crate) fn sensitivity(
 ) -> Result<Matrix6<f64>> {
     let moment = system.scene().moment;
     let mut points = Points::new(sample.to_vec());
+    points.remember();
     let mut score = |motion: &Vector6<f64>| -> Result<(Vector6<f64>, usize)> {
         let scene = engine.scene.at(Moment { pose: system.moved(motion), ..moment });
         let pairs = engine.judged(&scene, engine.gated_pairs(&scene, &mut points)?);

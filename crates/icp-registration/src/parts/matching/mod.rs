@@ -40,6 +40,8 @@ pub struct Query {
     pub pose: Isometry3<f64>,
     /// Partners farther away are of no use, metre.
     pub limit_m: f64,
+    /// Whether the point will be asked about again nearby, so that [`Partner::margin_m`] is worth some effort.
+    pub remember: bool,
 }
 
 /// The answer to a [`Query`].

@@ -31,6 +31,14 @@ impl PointMatching for NearestPoint<'_> {
     }
 
     fn partner(&self, query: &Query) -> Partner {
+        if !query.remember {
+            let nearest = self.target.tree.any_nearest(&query.moved.into());
+            return if nearest.distance_m <= query.limit_m {
+                partner_at(self.target, nearest.index, 0.0)
+            } else {
+                Partner::none(0.0)
+            };
+        }
         let reach = BEYOND * query.limit_m;
         match self.target.tree.two_nearest(&query.moved.into(), reach) {
             None => Partner::none(reach - query.limit_m),

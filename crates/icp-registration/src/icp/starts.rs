@@ -24,13 +24,13 @@ pub struct Starts {
     pub points: usize,
     /// Starts that are brought down with more points. Default 4.
     pub refined: usize,
-    /// Share of the points that must have a partner for the guess to convince. Default 0.6.
+    /// Share of the points that must have a partner for the guess to convince. Default 0.45.
     pub convincing: f64,
 }
 
 impl Default for Starts {
     fn default() -> Self {
-        Self { count: 24, translation: 0.8, rotation_rad: 0.35, points: 500, refined: 4, convincing: 0.6 }
+        Self { count: 24, translation: 0.8, rotation_rad: 0.35, points: 500, refined: 4, convincing: 0.45 }
     }
 }
 

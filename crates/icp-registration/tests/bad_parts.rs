@@ -58,7 +58,7 @@ fn check(registration: &Registration<'_>, source: &Cloud, guess: &Isometry3<f64>
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(150))]
+    #![proptest_config(ProptestConfig::with_cases(80))]
     #[test]
     fn there_is_always_an_answer(
         kinds in (0usize..8, 0usize..8, 0usize..5, 0usize..4, 0usize..3),

@@ -20,7 +20,7 @@ fn a_frame_finds_its_place_in_the_model() {
     let registration = Registration::new(ClosestOnMesh::new(&mesh));
     let (room, camera) = (Room::furnished(), Pinhole { width: 88, height: 72, focal_px: 76.0 });
     let (mut sum, mut count) = (0.0, 0.0);
-    for seed in 0..8 {
+    for seed in 0..5 {
         let camera_pose = look_at([-1.5, -1.0, 1.4], [2.0, 0.8, 0.8]) * disturbance(0.3, 10.0, 50 + seed);
         let source = cloud(&room, &camera, &camera_pose, 1.0, seed);
         let guess = disturbance(0.1, 5.0, 70 + seed) * camera_pose;
@@ -34,8 +34,8 @@ fn a_frame_finds_its_place_in_the_model() {
         assert!(result.is_trustworthy());
         (sum, count) = (sum + square, count + 1.0);
     }
-    // Six expected; the mean of 8 scatters by 6 * sqrt(2 / 6 / 8) = 1.2.
-    assert!((2.5..11.0).contains(&(sum / count)), "{}", sum / count);
+    // Six expected; the mean of 5 scatters by 6 * sqrt(2 / 6 / 5) = 1.5.
+    assert!((1.5..13.0).contains(&(sum / count)), "{}", sum / count);
 }
 
 #[test]

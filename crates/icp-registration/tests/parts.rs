@@ -174,7 +174,11 @@ fn metrics() {
 #[test]
 fn texture_closes_what_a_plane_leaves_open() {
     let grid = |offset: f64| {
-        (0..3600).map(move |k| Point3::new(f64::from(k % 60) * 0.02 + offset, f64::from(k / 60) * 0.02 + offset, 0.0))
+        (0..3600).map(move |k| {
+            // Unevenness of a millimetre without a pattern.
+            let z = 1e-3 * (f64::from(k) * 12.9898 + 1e3 * offset).sin();
+            Point3::new(f64::from(k % 60) * 0.02 + offset, f64::from(k / 60) * 0.02 + offset, z)
+        })
     };
     let shade = |p: &Point3<f64>| 100.0 * ((7.0 * p.x).sin() + (9.0 * p.y + 2.0 * p.x).cos());
     let painted = |points: Vec<Point3<f64>>| {
@@ -235,13 +239,13 @@ fn minimisers_find_the_same_minimum() {
 #[test]
 fn acceleration_saves_iterations_where_they_creep() {
     let (mut plain, mut fast) = (0, 0);
-    for seed in 0..3 {
+    for seed in 0..2 {
         let s = setting(10 + seed);
         let run = |acceleration| {
             let mut registration = Registration::new(NearestPoint::new(&s.target));
             registration.metric = Box::new(PointToPoint);
             registration.acceleration = acceleration;
-            registration.stopping = Box::new(Settled { max_iterations: 300, ..Settled::default() });
+            registration.stopping = Box::new(Settled { max_iterations: 200, ..Settled::default() });
             // All the way on the last level.
             registration.levels.first_limit_m = Some(0.3);
             registration.levels.last_limit_m = Some(0.3);

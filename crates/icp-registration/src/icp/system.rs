@@ -14,6 +14,9 @@ use crate::pose::move_about;
 /// Median of the root of the sum of squares of 1 to 4 standard normal numbers.
 const MEDIAN_CHI: [f64; 4] = [0.674_49, 1.177_41, 1.538_17, 1.832_13];
 
+/// Scale of lengths, in radii, below which they count as exact beside another channel.
+const SMALLEST_LENGTH: f64 = 1e-4;
+
 /// The pairs of one iteration with their residuals and weights, ready to be summed.
 pub struct System<'a> {
     scene: &'a Scene<'a>,
@@ -204,7 +207,7 @@ impl<'a> System<'a> {
         }
         let [length, other] = channels.map(|mut residuals| mad_scale(&mut residuals));
         // Exact lengths must not silence the other channel.
-        if other > 0.0 { length.max(1e-9 * self.radius_m) / other } else { 0.0 }
+        if other > 0.0 { length.max(SMALLEST_LENGTH * self.radius_m) / other } else { 0.0 }
     }
 
     /// A pair after a motion about the centre, partner unchanged.

@@ -132,6 +132,32 @@ pub enum Error {
         /// First and last time of the truth.
         truth_s: [f64; 2],
     },
+    /// Two parts of a registration do not work together.
+    #[error("{what} does not work with {with}")]
+    Incompatible {
+        /// The part.
+        what: &'static str,
+        /// What it was combined with.
+        with: &'static str,
+    },
+    /// A triangle names a vertex that is not there.
+    #[error("a triangle names vertex {vertex}, but there are {count} (from 0)")]
+    NoSuchVertex {
+        /// The index.
+        vertex: usize,
+        /// Number of vertices.
+        count: usize,
+    },
+    /// A part of a registration names a point that is not there.
+    #[error("{part} names point {point}, but there are {count} (from 0)")]
+    NoSuchPoint {
+        /// The part.
+        part: &'static str,
+        /// The index.
+        point: usize,
+        /// Number of points.
+        count: usize,
+    },
 }
 
 /// Result of this crate.

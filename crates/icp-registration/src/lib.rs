@@ -10,6 +10,7 @@ mod kernel;
 mod multiview;
 mod neighbours;
 mod normals;
+mod organised;
 mod pose;
 
 pub use absolute_orientation::{Orientation, Similarity, absolute_orientation, absolute_orientation_with_scale};
@@ -28,4 +29,5 @@ pub use multiview::{
 };
 pub use neighbours::{Neighbour, NeighbourTree};
 pub use normals::{OrganisedNormalOptions, UnorganisedNormalOptions, organised_normals, unorganised_normals};
+pub use organised::{FrameAligner, FrameAlignmentOptions, OrganisedFrame, Projection, align_frames};
 pub use pose::{inverse_covariance_transport, pose_difference, step_pose};

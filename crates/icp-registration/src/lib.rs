@@ -11,6 +11,7 @@ mod multiview;
 mod neighbours;
 mod normals;
 mod pose;
+mod quality;
 mod voxels;
 
 pub use absolute_orientation::{Orientation, Similarity, absolute_orientation, absolute_orientation_with_scale};
@@ -30,4 +31,4 @@ pub use multiview::{
 pub use neighbours::{Neighbour, NeighbourTree};
 pub use normals::{OrganisedNormalOptions, UnorganisedNormalOptions, organised_normals, unorganised_normals};
 pub use pose::{inverse_covariance_transport, pose_difference, step_pose};
-pub use voxels::downsample;
+pub use voxels::{VoxelAlignmentOptions, VoxelCloud, VoxelOptions, downsample};

@@ -25,7 +25,8 @@ fn benches(criterion: &mut Criterion) {
     for (width, height) in SIZES {
         let name = format!("{width}x{height}");
         let target = wall(width, height);
-        let source = target.transformed(&Isometry3::new(Vector3::new(0.03, -0.02, 0.01), Vector3::new(0.01, 0.02, -0.01)));
+        let source =
+            target.transformed(&Isometry3::new(Vector3::new(0.03, -0.02, 0.01), Vector3::new(0.01, 0.02, -0.01)));
         group.bench_function(BenchmarkId::new("downsample", &name), |b| b.iter(|| downsample(&target, 0.05)));
         group.bench_function(BenchmarkId::new("prepare", &name), |b| {
             b.iter(|| VoxelCloud::new(&target, &VoxelOptions::default()));

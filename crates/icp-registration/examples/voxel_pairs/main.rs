@@ -30,7 +30,7 @@ fn main() {
         capture();
     }
     if wanted("covariance") {
-        covariance("one place", |camera, seed| repeated(camera, seed));
+        covariance("one place", repeated);
         covariance("many places", |camera, seed| {
             let pair = frame_pair(camera, 1000 + seed);
             let target_from_source = pair.target_from_source;
@@ -108,10 +108,9 @@ fn frames(name: &str, camera: &Pinhole, count: u64, write: Option<&str>) {
             let (result, least) = timed(3, || register(&views, &Isometry3::identity(), &options));
             let result = result.unwrap();
             let (a, b) = pose_error(&result.target_from_source, &target_from_source);
-            if std::env::var("VERBOSE").is_ok() {
-                println!("   {k}: {least:.1} ms {a:.2} mm {b:.4} deg, {} iterations, {:?}, {} pairs, limit {:.3}, rms {:.5}, overlap {:.2} {:?}", result.iterations, result.stop, result.correspondences, result.max_correspondence_distance_m, result.rms_m, result.overlap, result.degenerate.len());
-            }
-            (ms.push(least), mm.push(a), degrees.push(b));
+            ms.push(least);
+            mm.push(a);
+            degrees.push(b);
             good += usize::from(a < 30.0 && b < 1.0);
         }
         println!(
@@ -124,8 +123,11 @@ fn frames(name: &str, camera: &Pinhole, count: u64, write: Option<&str>) {
     }
 }
 
+/// Files that other programs can be run on: points and pose as 64 bit floats.
 fn save(stem: &str, views: &Views) {
-    let bytes = |cloud: &Cloud| cloud.points.iter().flat_map(|p| p.coords.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<u8>>()).collect::<Vec<u8>>();
+    let bytes = |cloud: &Cloud| -> Vec<u8> {
+        cloud.points.iter().flat_map(|p| [p.x, p.y, p.z]).flat_map(f64::to_le_bytes).collect()
+    };
     std::fs::write(format!("{stem}_t.bin"), bytes(&views.target)).unwrap();
     std::fs::write(format!("{stem}_s.bin"), bytes(&views.source)).unwrap();
     let pose = views.target_from_source.to_homogeneous().transpose();
@@ -167,7 +169,9 @@ fn covariance(name: &str, views: impl Fn(&Pinhole, u64) -> Views) {
     let mut all = vec![];
     for seed in 0..200 {
         let views = views(&camera, seed);
-        let Ok(result) = register(&views, &views.target_from_source, &VoxelAlignmentOptions::default()) else { continue };
+        let Ok(result) = register(&views, &views.target_from_source, &VoxelAlignmentOptions::default()) else {
+            continue;
+        };
         if !result.is_trustworthy() {
             continue;
         }
@@ -201,13 +205,13 @@ fn verdicts() {
         let mut right = 0;
         for seed in 0..50 {
             let views = views(&camera, seed);
-            let found = register(&views, &views.target_from_source, &VoxelAlignmentOptions::default()).map(|r| {
-                [MotionKind::Translation, MotionKind::Rotation]
-                    .map(|kind| r.degenerate.iter().filter(|m| m.kind == kind).count())
-            });
-            right += usize::from(found == Ok(expected));
-            if found != Ok(expected) {
-                println!("  {seed} {found:?}");
+            let motions = register(&views, &views.target_from_source, &VoxelAlignmentOptions::default())
+                .map_or_else(|_| vec![], |result| result.degenerate);
+            let found = [MotionKind::Translation, MotionKind::Rotation]
+                .map(|kind| motions.iter().filter(|m| m.kind == kind).count());
+            right += usize::from(found == expected);
+            if found != expected {
+                println!("  {seed} {motions:?}");
             }
         }
         println!("verdict, {name}: {right} of 50 right");
@@ -250,7 +254,16 @@ fn lidar(target: &str, source: &str) {
         });
         println!("lidar, voxels {:.3} m ({}): {ms:.1} ms", result.1, result.2);
         match result.0 {
-            Ok(r) => println!("  {:?}\n  sigma {:.5}, {:?}, {} iterations, {} pairs, overlap {:.2}, {:?}", r.target_from_source, r.covariance.diagonal().map(f64::sqrt).transpose(), r.stop, r.iterations, r.correspondences, r.overlap, r.degenerate),
+            Ok(found) => {
+                let (place, turn) = (found.target_from_source.translation, found.target_from_source.rotation);
+                let sigma = found.covariance.diagonal().map(f64::sqrt);
+                println!("  {:.4?} m, {:.5?} rad, sigma {:.5?}", place.vector, turn.scaled_axis(), sigma.as_slice());
+                let verdict: Vec<_> = found.degenerate.iter().map(|m| m.kind).collect();
+                println!(
+                    "  {} pairs, {} iterations, {:?}, {verdict:?}",
+                    found.correspondences, found.iterations, found.stop
+                );
+            }
             Err(error) => println!("  {error}"),
         }
     }

@@ -15,8 +15,6 @@ use crate::icp::UndeterminedMotion;
 use crate::icp::motion::name_motions;
 use crate::pose::{symmetrised, tangent_from_centred};
 
-/// Cells across the rms radius of the pairs.
-const CELLS_PER_RADIUS: f64 = 8.0;
 /// Information below this multiple of its own scatter between cells counts as none.
 const SIGNIFICANCE: f64 = 2.5;
 /// Cells below which their scatter is no estimate.
@@ -51,15 +49,6 @@ pub(crate) struct Contribution {
     pub information: Matrix6<f64>,
 }
 
-/// What the residuals consist of.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Residuals {
-    /// The clouds are still apart: what neighbouring residuals share is no error, and would hold what can be solved.
-    Misaligned,
-    /// Errors: what neighbouring residuals share counts.
-    Settled,
-}
-
 #[derive(Default)]
 struct Cell {
     score: Vector6<f64>,
@@ -82,18 +71,18 @@ pub(crate) struct Verdict {
 }
 
 impl Verdict {
-    /// Judges the pairs; motions with a predicted sigma above `max_sigma_m` are undetermined.
+    /// Judges the pairs, those in a cube of `cell_m` as one observation; motions with a predicted sigma above
+    /// `max_sigma_m` are undetermined.
     pub fn new(
         contributions: impl Iterator<Item = Contribution>,
         frame: Centred,
+        cell_m: f64,
         max_sigma_m: f64,
-        residuals: Residuals,
     ) -> Result<Self> {
-        let size = frame.radius_m / CELLS_PER_RADIUS;
         let mut cells: BTreeMap<[i64; 3], Cell> = BTreeMap::new();
         let (mut pairs, mut independent) = (0.0, Matrix6::zeros());
         for one in contributions {
-            let cell: [f64; 3] = ((one.place - frame.centre) / size).into();
+            let cell: [f64; 3] = ((one.place - frame.centre) / cell_m).into();
             let cell = cells.entry(cell.map(|v| v.floor() as i64)).or_default();
             cell.score += one.score;
             cell.information += one.information;
@@ -105,14 +94,11 @@ impl Verdict {
         let (values, vectors) = eigen6(&symmetrised(&information), "the information of the pairs")?;
         let independent = independent * (pairs / (pairs - 6.0_f64).max(1.0));
         let count = cells.len() as f64;
-        let score = match residuals {
-            Residuals::Misaligned => independent,
-            Residuals::Settled if cells.len() >= FEWEST_CELLS => {
-                cells.iter().fold(Matrix6::zeros(), |sum, c| sum + c.score * c.score.transpose())
-                    * (count / (count - 6.0))
-            }
+        let score = if cells.len() >= FEWEST_CELLS {
+            cells.iter().fold(Matrix6::zeros(), |sum, c| sum + c.score * c.score.transpose()) * (count / (count - 6.0))
+        } else {
             // Too few cells to estimate from: the pairs of a cell taken as fully dependent.
-            Residuals::Settled => independent * (pairs / count.max(1.0)),
+            independent * (pairs / count.max(1.0))
         };
         let directions = (0..6)
             .map(|k| direction(&cells, &score, values[5], values[k], vectors.column(k).into(), max_sigma_m))
@@ -123,11 +109,6 @@ impl Verdict {
     /// Orthonormal undetermined motions `[dt, rho w]`.
     pub fn held(&self) -> Vec<Vector6<f64>> {
         self.directions.iter().filter(|d| !d.determined).map(|d| d.vector).collect()
-    }
-
-    /// Whether a step `[dt, rho w]` stays within `fraction` of the standard deviation along every determined motion.
-    pub fn is_within_noise(&self, step: &Vector6<f64>, fraction: f64) -> bool {
-        self.directions.iter().filter(|d| d.determined).all(|d| d.vector.dot(step).abs() <= fraction * d.sigma_m)
     }
 
     /// The undetermined motions, sorted into translations and rotations.

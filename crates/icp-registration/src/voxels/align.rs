@@ -1,6 +1,6 @@
 //! The registration of two clouds of voxels.
 
-use nalgebra::{Isometry3, Vector6};
+use nalgebra::{Isometry3, Point3, Vector6};
 
 use super::cloud::VoxelCloud;
 use super::options::VoxelAlignmentOptions;
@@ -10,7 +10,7 @@ use crate::error::{Error, Result};
 use crate::icp::{DegeneracyPolicy, IcpResult, StopReason};
 use crate::kernel::RobustKernel;
 use crate::pose::{is_finite, move_about};
-use crate::quality::{Residuals, Verdict};
+use crate::quality::{Centred, Verdict};
 
 /// Iterations that a coarse level may take.
 const LEVEL_ITERATIONS: usize = 8;
@@ -22,6 +22,10 @@ const SETTLED_STEP: f64 = 0.02;
 const MOST_SEARCHES: usize = 15;
 /// Planes of a level below which it is passed over.
 const FEWEST_PLANES: usize = 100;
+/// Cells across the rms radius of the pairs, for the scatter of what they say.
+const CELLS_PER_RADIUS: f64 = 8.0;
+/// Least size of those cells: planes of voxels nearer than three share points.
+const VOXELS_PER_CELL: f64 = 6.0;
 
 impl VoxelCloud {
     /// Aligns `source` with this cloud, starting at `guess` (both poses `target_from_source`).
@@ -42,9 +46,9 @@ impl VoxelCloud {
         if !is_finite(guess) {
             return Err(Error::NonFinite { what: "the guess", index: 0 });
         }
-        let run =
-            Run { target: self, source, options, pose: *guess, iterations: 0, pairs: Vec::new(), scratch: Vec::new() };
-        run.finish()
+        let (pairs, scratch) = (Vec::new(), Vec::new());
+        let run = Run { target: self, source, options, pose: *guess, iterations: 0, held: None, pairs, scratch };
+        run.finish(guess)
     }
 }
 
@@ -54,19 +58,24 @@ struct Run<'a> {
     options: &'a VoxelAlignmentOptions,
     pose: Isometry3<f64>,
     iterations: usize,
+    /// Motions that stay as they are, in a frame that stays too.
+    held: Option<(Centred, Vec<Vector6<f64>>)>,
     pairs: Vec<Pair>,
     scratch: Vec<f64>,
 }
 
 impl<'a> Run<'a> {
-    fn finish(mut self) -> Result<IcpResult> {
+    fn finish(mut self, guess: &Isometry3<f64>) -> Result<IcpResult> {
         let mut matchers = self.matchers();
         self.approach(&mut matchers)?;
         for matcher in &matchers[..matchers.len() - 1] {
             self.level(*matcher)?;
         }
         let last = matchers[matchers.len() - 1];
-        let stop = self.settle(last)?;
+        let mut stop = self.settle(last)?;
+        if self.options.degeneracy == DegeneracyPolicy::HoldAtGuess && self.return_to(guess, last)? {
+            stop = self.settle(last)?;
+        }
         self.result(last, stop)
     }
 
@@ -159,21 +168,34 @@ impl<'a> Run<'a> {
         Ok(StopReason::MaxIterations)
     }
 
-    fn step(&mut self, matcher: Matcher<'_>, partners: Partners, kernel: RobustKernel) -> Result<Vector6<f64>> {
-        let (pose, iteration, options) = (self.pose, self.iterations, self.options);
+    /// Takes back what happened along undetermined motions, and holds them from now on; whether there are any.
+    ///
+    /// What a motion is worth shows at the answer only: far off, and between large voxels, everything seems to matter.
+    fn return_to(&mut self, guess: &Isometry3<f64>, matcher: Matcher<'_>) -> Result<bool> {
+        let (pose, iteration, kernel) = (self.pose, self.iterations, self.options.kernel);
         let max_sigma_m = self.max_motion_sigma_m();
-        let system = self.enough(matcher, &pose, partners, kernel, iteration)?;
-        let held = match options.degeneracy {
-            DegeneracyPolicy::Report => Vec::new(),
-            DegeneracyPolicy::HoldAtGuess => {
-                let contributions = system.contributions(matcher.target);
-                Verdict::new(contributions, system.frame, max_sigma_m, Residuals::Misaligned)?.held()
-            }
-        };
-        let mut step = system.step(&held)?;
+        let system = self.enough(matcher, &pose, Partners::Anew, kernel, iteration)?;
+        let (frame, contributions) = (system.frame, system.contributions(matcher.target));
+        let held = Verdict::new(contributions, frame, cell(&system, matcher), max_sigma_m)?.held();
+        let slide = (guess * pose.inverse() * Point3::from(frame.centre)).coords - frame.centre;
+        let turn = (guess.rotation * pose.rotation.inverse()).scaled_axis() * frame.radius_m;
+        let back = Vector6::new(slide.x, slide.y, slide.z, turn.x, turn.y, turn.z);
+        let back = held.iter().fold(Vector6::zeros(), |sum, motion| sum + motion * motion.dot(&back));
+        self.pose = move_about(&pose, &frame.centre, frame.radius_m, &back);
+        let any = !held.is_empty();
+        self.held = Some((frame, held));
+        Ok(any)
+    }
+
+    fn step(&mut self, matcher: Matcher<'_>, partners: Partners, kernel: RobustKernel) -> Result<Vector6<f64>> {
+        let (pose, iteration, held) = (self.pose, self.iterations, self.held.clone());
+        let mut system = self.enough(matcher, &pose, partners, kernel, iteration)?;
+        system.frame = held.as_ref().map_or(system.frame, |(frame, _)| *frame);
+        let mut step = system.step(held.as_ref().map_or(&[], |(_, motions)| motions))?;
         // Partners give no reason to move farther than they can be apart.
         step /= (length(&step) / (2.0 * matcher.target.size_m)).max(1.0);
-        self.pose = move_about(&pose, &system.frame.centre, system.frame.radius_m, &step);
+        let frame = system.frame;
+        self.pose = move_about(&pose, &frame.centre, frame.radius_m, &step);
         self.iterations += 1;
         Ok(step)
     }
@@ -205,7 +227,7 @@ impl<'a> Run<'a> {
         let (kernel, points) = (self.options.kernel, self.source.points as f64);
         let system = self.enough(matcher, &pose, Partners::Anew, kernel, iterations)?;
         let verdict =
-            Verdict::new(system.contributions(matcher.target), system.frame, max_sigma_m, Residuals::Settled)?;
+            Verdict::new(system.contributions(matcher.target), system.frame, cell(&system, matcher), max_sigma_m)?;
         let (rms_m, correspondences, degenerate) = (system.rms_m(), system.count, verdict.undetermined());
         let covariance = verdict.covariance(&pose);
         let seen: f64 = matched(&self.pairs).map(|p| p.count).sum();
@@ -225,6 +247,11 @@ impl<'a> Run<'a> {
 
 fn limit(matcher: Matcher<'_>) -> f64 {
     super::pairs::REACH * matcher.target.size_m.max(matcher.source.size_m)
+}
+
+/// Size of the cubes whose pairs count as one observation, metre.
+fn cell(system: &System<'_>, matcher: Matcher<'_>) -> f64 {
+    (system.frame.radius_m / CELLS_PER_RADIUS).max(VOXELS_PER_CELL * matcher.target.size_m)
 }
 
 /// Larger of the two parts of a motion.

@@ -71,15 +71,17 @@ impl Blocks {
     #[inline]
     pub fn visit<const N: usize>(&self, cells: [[u32; N]; 3], mut visit: impl FnMut(usize, usize)) {
         let [x, y, z] = [0, 1, 2].map(|axis| cells[axis].map(|c| key([c, 0, 0]) << axis));
-        let mut last = (u64::MAX, None);
+        // Consecutive cells lie in at most two blocks an axis: each block is looked up once.
+        let mut known: [(u64, Option<&Block>); 8] = [(u64::MAX, None); 8];
         for (k, z) in z.iter().enumerate() {
             for (j, y) in y.iter().enumerate() {
                 for (i, x) in x.iter().enumerate() {
                     let key = x | y | z;
-                    if last.0 != key >> 6 {
-                        last = (key >> 6, self.block(key >> 6));
+                    let place = &mut known[(key >> 6 & 7) as usize];
+                    if place.0 != key >> 6 {
+                        *place = (key >> 6, self.block(key >> 6));
                     }
-                    if let Some(block) = last.1 {
+                    if let Some(block) = place.1 {
                         let bit = 1_u64 << (key & 63);
                         if block.occupied & bit != 0 {
                             let before = (block.occupied & (bit - 1)).count_ones();

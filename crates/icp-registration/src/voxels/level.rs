@@ -19,8 +19,9 @@ const LARGEST_FLATNESS_RATIO: f64 = 0.15;
 const SMALLEST_WIDTH: f64 = 0.02;
 /// Share of the points' variance across the plane that does not average out: bends, steps, the edge of a surface.
 const COMMON_SHARE: f64 = 0.03;
-/// Standard deviation that no plane goes below, in voxels: the surface between the points is not known better.
-const FLOOR: f64 = 2e-3;
+/// Standard deviation that no plane goes below, in voxels: surfaces are not flatter, and a few voxels with many points
+/// would outweigh all others.
+const FLOOR: f64 = 0.02;
 /// Cosine of the angle beyond which normals of partners disagree.
 const SMALLEST_COSINE: f64 = 0.7;
 

@@ -21,9 +21,7 @@ impl Sum for Moments {
     #[inline]
     fn add(&mut self, _: usize, offset: [f64; 3], (): &()) {
         self.count += 1.0;
-        for k in 0..3 {
-            self.sum[k] += offset[k];
-        }
+        self.sum.iter_mut().zip(offset).for_each(|(sum, value)| *sum += value);
         for (product, (i, j)) in self.products.iter_mut().zip(PRODUCTS) {
             *product += offset[i] * offset[j];
         }
@@ -39,21 +37,15 @@ impl Moments {
     #[inline]
     pub fn include(&mut self, other: &Self) {
         self.count += other.count;
-        for k in 0..3 {
-            self.sum[k] += other.sum[k];
-        }
-        for k in 0..6 {
-            self.products[k] += other.products[k];
-        }
+        self.sum.iter_mut().zip(other.sum).for_each(|(sum, value)| *sum += value);
+        self.products.iter_mut().zip(other.products).for_each(|(sum, value)| *sum += value);
     }
 
     /// The same points, all offsets enlarged by `shift`: counted from a centre that lies at `-shift` of this one.
     #[inline]
     pub fn shifted(&self, shift: [f64; 3]) -> Self {
         let mut moved = *self;
-        for k in 0..3 {
-            moved.sum[k] += self.count * shift[k];
-        }
+        moved.sum.iter_mut().zip(shift).for_each(|(sum, value)| *sum += self.count * value);
         for (product, (i, j)) in moved.products.iter_mut().zip(PRODUCTS) {
             *product += self.sum[i] * shift[j] + self.sum[j] * shift[i] + self.count * shift[i] * shift[j];
         }

@@ -115,5 +115,6 @@ fn check(name: &str, target: &[Point3<f64>], source: &[Point3<f64>], reference: 
     );
     // The references of the library's own tests differ among each other by 4 cm and 0.6 degrees.
     assert!(metres < 0.08 && degrees < 1.0, "{name}: {metres} m {degrees} degrees");
-    assert!(medians[0] < 1.05 * medians[1]);
+    // The references bring nearest points together; planes through voxels of half a metre need not do so as well.
+    assert!(medians[0] < 1.2 * medians[1]);
 }

@@ -15,6 +15,7 @@ mod normals;
 pub mod parts;
 mod organised;
 mod pose;
+mod quality;
 mod voxels;
 mod trajectory;
 
@@ -44,3 +45,4 @@ pub use trajectory::{
     AbsoluteTrajectoryError, ErrorStatistics, MatchedPose, RelativeError, RelativePoseError, RelativeStep,
     TrajectoryAlignment, TrajectoryErrorOptions, absolute_trajectory_error, relative_pose_error,
 };
+pub use voxels::{VoxelAlignmentOptions, VoxelCloud, VoxelOptions, downsample};

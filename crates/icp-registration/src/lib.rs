@@ -16,8 +16,9 @@ mod pose;
 pub use absolute_orientation::{Orientation, Similarity, absolute_orientation, absolute_orientation_with_scale};
 pub use cloud::Cloud;
 pub use coarse::{
-    CoarseAlignment, CoarseOptions, Estimator, FeatureCloud, Features, Matching, SurfaceDescriptors, SurfaceRadii,
-    Viewpoint, align_without_guess,
+    AmplitudeFeatureOptions, CoarseAlignment, CoarseOptions, Estimator, FeatureCloud, Features, Matching,
+    SparseAlignment, SparseIcpOptions, SurfaceDescriptors, SurfaceRadii, Viewpoint, align_features,
+    align_without_guess, amplitude_features,
 };
 pub use error::{Error, Result};
 pub use icp::{

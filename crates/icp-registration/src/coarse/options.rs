@@ -83,17 +83,17 @@ pub struct CoarseOptions {
     pub tolerance_voxels: f64,
     /// Different poses that are refined and verified. Default 8.
     pub max_hypotheses: usize,
-    /// Fewest correspondences that agree with the pose. Default 20.
+    /// Fewest correspondences that agree with the pose. Default 25.
     pub min_inliers: usize,
     /// Smallest fraction of the smaller cloud that must have a partner. Default 0.2.
     pub min_overlap: f64,
-    /// Smallest fraction of the points in the other cloud's view that must lie on its surface. Default 0.9.
+    /// Smallest fraction of the points in the other cloud's view that must lie on its surface. Default 0.93.
     pub min_agreement: f64,
     /// Smallest eigenvalue of the normal matrix of partners (see [`super::CoarseAlignment::determined`]). Default 0.008: a
     /// wall and a floor have up to 0.006 from noise and rounded edges, three walls 0.05 and more. 0 lets features decide
     /// where surfaces cannot.
     pub min_determined: f64,
-    /// Largest score of the best different pose, as a fraction of the winner's. Default 0.95.
+    /// Largest score of the best different pose, as a fraction of the winner's. Default 0.92.
     pub max_rival: f64,
     /// Start of the random numbers.
     pub seed: u64,
@@ -112,11 +112,11 @@ impl Default for CoarseOptions {
             estimator: Estimator::ConsistencyGraph,
             tolerance_voxels: 1.5,
             max_hypotheses: 8,
-            min_inliers: 20,
+            min_inliers: 25,
             min_overlap: 0.2,
-            min_agreement: 0.9,
+            min_agreement: 0.93,
             min_determined: 0.008,
-            max_rival: 0.95,
+            max_rival: 0.92,
             seed: 1,
         }
     }

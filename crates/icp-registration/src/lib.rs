@@ -2,6 +2,7 @@
 
 mod absolute_orientation;
 mod cloud;
+mod coarse;
 mod eigen;
 mod error;
 mod icp;
@@ -24,6 +25,11 @@ pub use absolute_orientation::{
     absolute_orientation_with_scale,
 };
 pub use cloud::Cloud;
+pub use coarse::{
+    AmplitudeFeatureOptions, CoarseAlignment, CoarseOptions, Estimator, FeatureCloud, Features, Matching,
+    SparseAlignment, SparseIcpOptions, SurfaceDescriptors, SurfaceRadii, Viewpoint, align_features,
+    align_without_guess, amplitude_features,
+};
 pub use error::{Error, Result};
 pub use icp::{
     Alternative, DegeneracyPolicy, IcpOptions, IcpResult, IcpTarget, Levels, Metric, MotionKind, Registration,

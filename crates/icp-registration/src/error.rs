@@ -111,6 +111,16 @@ pub enum Error {
     /// The search tree refused its points.
     #[error("the search tree could not be built: {0}")]
     Tree(String),
+    /// No alignment that holds leads to some stations.
+    #[error("nothing connects stations {stations:?} to station {to} ({})", .reasons.join("; "))]
+    UnconnectedStations {
+        /// The stations that are left alone.
+        stations: Vec<usize>,
+        /// A station of the part that holds together.
+        to: usize,
+        /// Why pairs that touch them were refused: source to target, and the reason.
+        reasons: Vec<String>,
+    },
 }
 
 /// Result of this crate.

@@ -22,36 +22,56 @@ pub(super) struct Contact {
     pub share: f64,
 }
 
-/// The contacts of the patches of one station (`asking`) with those of another, `to_asked` being
+/// How partners are looked for.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Reach {
+    /// How far apart partners may be across their surface, metre.
+    pub across_m: f64,
+    /// Of how many nearest patches the first that fits is taken: one, once the stations are nearly in place.
+    pub candidates: usize,
+}
+
+/// The partners of the patches of one station (`asking`) among those of another, `to_asked` being
 /// `asked_from_asking`: pairs of indices.
 pub(super) fn partners(
     asking: &Surface,
     asked: &Surface,
     to_asked: &Isometry3<f64>,
-    across_m: f64,
-    stride: usize,
+    reach: Reach,
 ) -> Result<Vec<(u32, u32)>> {
     let rotation = to_asked.rotation.to_rotation_matrix().into_inner();
-    let beside = BESIDE * asking.size_m.max(asked.size_m);
+    let beside_m = BESIDE * asking.size_m.max(asked.size_m);
+    let farthest_m = reach.across_m.hypot(beside_m);
+    let signed = asking.oriented && asked.oriented;
     let mut found = Vec::new();
-    for (index, patch) in asking.patches.iter().enumerate().step_by(stride.max(1)) {
+    for (index, patch) in asking.patches.iter().enumerate() {
         let centre = rotation * patch.centre.coords + to_asked.translation.vector;
         if !crate::neighbours::is_usable(&centre.into()) {
             return Err(crate::Error::NonFinite { what: "points of a station in the frame of another", index });
         }
+        let normal = rotation * patch.normal;
+        let fits = |other: usize| {
+            let other = &asked.patches[other];
+            let apart = centre - other.centre.coords;
+            let across = other.normal.dot(&apart);
+            let cosine = normal.dot(&other.normal);
+            across.abs() <= reach.across_m
+                && apart.norm_squared() - across * across <= beside_m * beside_m
+                && if signed { cosine >= SAME_SIDE } else { cosine.abs() >= SAME_SIDE }
+        };
         let nearest = asked.tree.any_nearest(&[centre.x, centre.y, centre.z]);
-        if nearest.distance_m > across_m + beside {
+        if nearest.distance_m > farthest_m {
             continue;
         }
-        let other = &asked.patches[nearest.index];
-        let apart = centre - other.centre.coords;
-        let across = other.normal.dot(&apart);
-        let along = (apart.norm_squared() - across * across).max(0.0).sqrt();
-        // Normals of one station point to it; where they do not, their sign has no meaning. Thin boards seen from both
-        // sides are told apart by their thickness.
-        if across.abs() <= across_m && along <= beside && (rotation * patch.normal).dot(&other.normal).abs() >= SAME_SIDE {
-            found.push((index as u32, nearest.index as u32));
-        }
+        let partner = if fits(nearest.index) {
+            Some(nearest.index)
+        } else if reach.candidates > 1 {
+            let near = asked.tree.k_nearest(&centre.into(), reach.candidates)?;
+            near.iter().map(|neighbour| neighbour.index).find(|&other| fits(other))
+        } else {
+            None
+        };
+        found.extend(partner.map(|other| (index as u32, other as u32)));
     }
     Ok(found)
 }

@@ -7,6 +7,7 @@ mod grouping;
 mod loops;
 mod network;
 mod overlap;
+mod pairs;
 mod patches;
 mod plane_fit;
 mod point_model;

@@ -12,7 +12,6 @@ use super::grouping::group;
 use super::plane_fit::{Moments, Plane};
 use crate::cloud::Cloud;
 use crate::error::{Error, Result};
-use crate::icp::IcpTarget;
 use crate::kernel::quantile;
 use crate::neighbours::NeighbourTree;
 
@@ -26,8 +25,8 @@ const REACH: f64 = 1.8;
 const SAME_PLANE: f64 = 0.966;
 /// Points farther from their patch than this multiple of the median distance are left out of it.
 const GROSS: f64 = 5.0;
-/// Largest gap between the directions to the neighbours of an inner patch, radian; a straight rim leaves 180 degrees.
-const RIM_GAP: f64 = 2.6;
+/// Part of the patches whose normal must point to the station for signs to have a meaning.
+const ORIENTED: f64 = 0.99;
 /// Part of the size of a patch that its offset is not better known than: no surface is plane.
 const ROUGHNESS: f64 = 1e-3;
 
@@ -40,8 +39,6 @@ pub(super) struct Patch {
     pub variance: f64,
     /// Variance of the normal about any axis in the plane, radian².
     pub normal_variance: f64,
-    /// Whether the surface ends here, or the view of it.
-    pub rim: bool,
 }
 
 /// The patches of a station.
@@ -56,7 +53,8 @@ pub(super) struct Surface {
     pub size_m: f64,
     /// Root mean square distance of the patches from their centroid, metre.
     pub radius_m: f64,
-    pub centroid: Point3<f64>,
+    /// Whether the normals point to the station, so that their sign tells the two sides of a board apart.
+    pub oriented: bool,
 }
 
 impl Surface {
@@ -71,15 +69,26 @@ impl Surface {
                 starts.push(members.len() as u32);
             }
         }
-        Self::from_groups(&cloud.points, members, starts, size_m)
+        Self::from_groups(&cloud.points, Some(normals), members, starts, size_m)
     }
 
     /// The same groups with their points elsewhere.
     pub(super) fn refitted(&self, points: &[Point3<f64>]) -> Result<Self> {
-        Self::from_groups(points, self.members.clone(), self.starts.clone(), self.size_m)
+        let mut refitted = Self::from_groups(points, None, self.members.clone(), self.starts.clone(), self.size_m)?;
+        if self.oriented {
+            refitted.patches.iter_mut().filter(|p| p.normal.dot(&p.centre.coords) > 0.0).for_each(|p| p.normal.neg_mut());
+            refitted.oriented = true;
+        }
+        Ok(refitted)
     }
 
-    fn from_groups(points: &[Point3<f64>], members: Vec<u32>, starts: Vec<u32>, size_m: f64) -> Result<Self> {
+    fn from_groups(
+        points: &[Point3<f64>],
+        normals: Option<&[Vector3<f64>]>,
+        members: Vec<u32>,
+        starts: Vec<u32>,
+        size_m: f64,
+    ) -> Result<Self> {
         let origin = members.first().map_or(Vector3::zeros(), |&i| points[i as usize].coords);
         let mut fits = Vec::with_capacity(starts.len());
         let (mut kept, mut kept_starts) = (Vec::with_capacity(members.len()), vec![0]);
@@ -87,7 +96,10 @@ impl Surface {
             let own = &members[range[0] as usize..range[1] as usize];
             let mut moments = Moments::default();
             own.iter().for_each(|&i| moments.add(&(points[i as usize].coords - origin)));
-            if let Some(plane) = moments.plane() {
+            if let Some(mut plane) = moments.plane() {
+                if normals.is_some_and(|normals| normals[own[0] as usize].dot(&plane.normal) < 0.0) {
+                    plane.normal.neg_mut();
+                }
                 fits.push((moments, plane));
                 kept.extend_from_slice(own);
                 kept_starts.push(kept.len() as u32);
@@ -102,23 +114,14 @@ impl Surface {
         let n = centres.len() as f64;
         let centroid = Point3::from(centres.iter().fold(Vector3::zeros(), |sum, c| sum + c.coords / n));
         let radius_m = (centres.iter().map(|c| (c - centroid).norm_squared() / n).sum::<f64>()).sqrt().max(size_m);
-        Ok(Self { patches, tree, members: kept, starts: kept_starts, size_m, radius_m, centroid })
+        let facing = patches.iter().filter(|p| p.normal.dot(&p.centre.coords) < 0.0).count();
+        let oriented = facing as f64 >= ORIENTED * patches.len() as f64;
+        Ok(Self { patches, tree, members: kept, starts: kept_starts, size_m, radius_m, oriented })
     }
 
     /// Indices of the points of a patch.
     pub(super) fn points_of(&self, patch: usize) -> &[u32] {
         &self.members[self.starts[patch] as usize..self.starts[patch + 1] as usize]
-    }
-
-    /// The patches as a cloud, prepared for the alignment of pairs; those at the rim are no partners.
-    pub(super) fn to_target(&self) -> Result<IcpTarget> {
-        let normal = |p: &Patch| if p.rim { Vector3::repeat(f64::NAN) } else { p.normal };
-        IcpTarget::new(Cloud {
-            points: self.patches.iter().map(|p| p.centre).collect(),
-            normals: Some(self.patches.iter().map(normal).collect()),
-            sigma: Some(self.patches.iter().map(|p| p.variance.sqrt()).collect()),
-            ..Cloud::default()
-        })
     }
 }
 
@@ -153,8 +156,6 @@ fn patch(
 ) -> Result<Patch> {
     let (own, plane) = &fits[index];
     let mut union = *own;
-    let (right, up) = axes(&plane.normal);
-    let mut directions = Vec::with_capacity(NEIGHBOURS);
     for neighbour in tree.k_nearest(&centres[index], NEIGHBOURS)? {
         let (moments, other) = &fits[neighbour.index];
         let apart = centres[neighbour.index] - centres[index];
@@ -162,10 +163,6 @@ fn patch(
             continue;
         }
         let across = plane.normal.dot(&apart).abs();
-        // A folded surface goes on as well: the rim is where nothing goes on.
-        if across < 0.7 * neighbour.distance_m {
-            directions.push(up.dot(&apart).atan2(right.dot(&apart)));
-        }
         let tolerance = 3.0 * (plane.variance.max(other.variance)).sqrt();
         if plane.normal.dot(&other.normal).abs() >= SAME_PLANE && across <= tolerance {
             union.join(moments);
@@ -181,7 +178,6 @@ fn patch(
         normal,
         variance: joint.variance / own.count() + floor,
         normal_variance: (joint.variance / count + floor) / joint.spread,
-        rim: is_rim(&mut directions),
     })
 }
 
@@ -194,12 +190,4 @@ pub(super) fn axes(normal: &Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
     };
     let right = normal.cross(&axis).normalize();
     (right, normal.cross(&right))
-}
-
-/// Whether the directions to the neighbours leave a wide gap.
-fn is_rim(directions: &mut [f64]) -> bool {
-    directions.sort_by(f64::total_cmp);
-    let (Some(first), Some(last)) = (directions.first(), directions.last()) else { return true };
-    let across_the_seam = first + std::f64::consts::TAU - last;
-    directions.windows(2).map(|pair| pair[1] - pair[0]).fold(across_the_seam, f64::max) > RIM_GAP
 }

@@ -11,6 +11,7 @@ use nalgebra::{DMatrix, DVector, Isometry3, Matrix6, Point3, SymmetricEigen, Vec
 
 use super::network::{State, relative_jacobians};
 use super::reduction::{Meeting, Scene, Weighting};
+use super::rounds::Adjusted;
 use crate::eigen::eigen6;
 use crate::icp::{MotionKind, UndeterminedMotion};
 use crate::pose::symmetrised;
@@ -29,15 +30,13 @@ const NOTHING: f64 = 0.1;
 /// `variance_factor`: of the contacts, for networks too small to show a scatter.
 pub(super) fn covariance(
     scene: &Scene<'_>,
-    meetings: &[Meeting],
-    state: &State,
-    weighting: &Weighting,
-    cofactors: &DMatrix<f64>,
+    adjusted: &Adjusted,
     hold_m: f64,
     variance_factor: f64,
 ) -> DMatrix<f64> {
+    let Adjusted { state, cofactors, .. } = adjusted;
     let size = cofactors.nrows();
-    let cells = cells(scene, meetings, state, weighting, size);
+    let cells = cells(scene, &adjusted.meetings, state, &adjusted.weighting, size);
     let unknowns = size.saturating_sub(6);
     if cells.len() < FEWEST_CELLS_PER_UNKNOWN * unknowns.max(1) {
         return cofactors * variance_factor.max(1.0);
@@ -126,7 +125,7 @@ fn cells_of_pair(
     world_from_source: &Isometry3<f64>,
     weighting: &Weighting,
 ) -> BTreeMap<[i64; 3], DVector<f64>> {
-    let source = &scene.surfaces[meeting.source];
+    let source = scene.surfaces[meeting.source];
     let pose = world_from_target.inverse() * world_from_source;
     let mut cells: BTreeMap<[i64; 3], DVector<f64>> = BTreeMap::new();
     for contact in &meeting.contacts {

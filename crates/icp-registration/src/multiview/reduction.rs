@@ -27,9 +27,9 @@ pub(super) struct Meeting {
 
 /// Surfaces at the present values of the shared parameters, with the derivatives of the patches' centres (one entry a
 /// parameter for each patch, empty without parameters).
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub(super) struct Scene<'a> {
-    pub surfaces: &'a [Surface],
+    pub surfaces: Vec<&'a Surface>,
     pub derivatives: &'a [Vec<[f64; 3]>],
     pub parameters: usize,
 }
@@ -57,7 +57,7 @@ impl Scene<'_> {
         pose: &Isometry3<f64>,
         weighting: &Weighting,
     ) -> (Row, super::contacts::Observed) {
-        let (source, target) = (&self.surfaces[meeting.source], &self.surfaces[meeting.target]);
+        let (source, target) = (self.surfaces[meeting.source], self.surfaces[meeting.target]);
         let observed = observe(source, target, contact, pose);
         let sigma = observed.variance.sqrt();
         let mut jacobian = DVector::zeros(6 + self.parameters);
@@ -75,7 +75,7 @@ impl Scene<'_> {
     }
 
     pub(super) fn whitened_residual(&self, meeting: &Meeting, contact: &Contact, pose: &Isometry3<f64>) -> f64 {
-        let (source, target) = (&self.surfaces[meeting.source], &self.surfaces[meeting.target]);
+        let (source, target) = (self.surfaces[meeting.source], self.surfaces[meeting.target]);
         let observed = observe(source, target, contact, pose);
         observed.residual / observed.variance.sqrt()
     }
@@ -90,9 +90,8 @@ pub(super) struct Reduced {
     pub right: DVector<f64>,
     /// Where the contacts were linearised.
     pub pose: Isometry3<f64>,
-    /// Weighted sum of squares at that pose, and the weight in it.
+    /// Weighted sum of squares at that pose.
     pub squares: f64,
-    pub weight: f64,
 }
 
 /// Reduces the contacts of a pair at `pose`.
@@ -105,19 +104,18 @@ pub(super) fn reduce(
     let n = 6 + scene.parameters;
     let (mut information, mut gradient) = (DMatrix::zeros(n, n), DVector::zeros(n));
     let mut imitation = DMatrix::zeros(n, n);
-    let (mut squares, mut weight) = (0.0, 0.0);
+    let mut squares = 0.0;
     for contact in &meeting.contacts {
         let (row, observed) = scene.row(meeting, contact, pose, weighting);
         information.ger(row.weight, &row.jacobian, &row.jacobian, 1.0);
         gradient.axpy(row.weight * row.residual, &row.jacobian, 1.0);
-        let noise = imitated(&scene.surfaces[meeting.source], contact, &observed, pose) / observed.variance;
+        let noise = imitated(scene.surfaces[meeting.source], contact, &observed, pose) / observed.variance;
         let mut corner = imitation.fixed_view_mut::<6, 6>(0, 0);
         corner += noise * row.weight;
         squares += row.weight * row.residual * row.residual;
-        weight += row.weight;
     }
     let (rows, right) = observations(&information, &gradient, &imitation, scene.surfaces[meeting.source].radius_m)?;
-    Ok(Reduced { rows, right, pose: *pose, squares, weight })
+    Ok(Reduced { rows, right, pose: *pose, squares })
 }
 
 fn observations(

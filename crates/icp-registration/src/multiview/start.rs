@@ -1,17 +1,22 @@
 //! From what is known beforehand to poses that are right to some centimetres.
 
-use std::collections::BTreeSet;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use nalgebra::{Isometry3, Matrix6, Vector6};
-
-use super::loops::{LoopClosure, contradicting, skeleton};
-use super::overlap::find_overlaps;
-use super::pose_graph::{Datum, PairConstraint, StationAdjustmentOptions, adjust_stations};
-use super::registration::{Start, StationRegistrationOptions};
-use super::surfaces::{PairAlignment, RefusedPair, align_pair, best_partners, sorted_out};
-use crate::error::{Error, Result};
-use crate::icp::{IcpOptions, IcpResult, IcpTarget};
 use rayon::prelude::*;
+
+use super::contacts::Reach;
+use super::loops::{LoopClosure, Skeleton, contradicting, skeleton};
+use super::overlap::Overlap;
+use super::pairs;
+use super::patches::Surface;
+use super::pose_graph::{Datum, PairConstraint, StationAdjustmentOptions, adjust_stations};
+use super::reduction::Meeting;
+use super::registration::{Start, StationRegistrationOptions};
+use super::rounds::meet;
+use super::surfaces::{PairAlignment, RefusedPair, best_partners, sorted_out, without_partners};
+use crate::error::{Error, Result};
+use crate::icp::IcpResult;
 
 /// Default of the error of approximate poses, in radii of the clouds.
 const START_ERROR: f64 = 0.2;
@@ -32,8 +37,7 @@ pub(super) struct Started {
 
 /// The stations while their start values are looked for.
 pub(super) struct Starter<'a> {
-    /// Patches as clouds.
-    pub targets: &'a [IcpTarget],
+    pub surfaces: &'a [Surface],
     pub options: &'a StationRegistrationOptions<'a>,
     pub patch_m: f64,
     pub radius_m: f64,
@@ -45,51 +49,63 @@ pub(super) struct Starter<'a> {
 type Guess = (usize, usize, Isometry3<f64>);
 
 impl Starter<'_> {
-    pub(super) fn run(
+    /// How far start poses may be off, metre.
+    pub(super) fn reach_m(&self, start: Start<'_>) -> f64 {
+        match start {
+            Start::Poses(_) => self.options.start_error_m.unwrap_or(START_ERROR * self.radius_m),
+            _ => CHAIN_ERROR * self.patch_m,
+        }
+    }
+
+    /// Poses of stations of which at most the order is known, from pairs.
+    pub(super) fn without_poses(
         &self,
         start: Start<'_>,
         coarse: &dyn Fn(&[(usize, usize)]) -> Vec<Result<Isometry3<f64>>>,
     ) -> Result<Started> {
-        let count = self.targets.len();
-        let root = self.datum.held_station();
-        let (mut pairs, mut refused) = (Vec::new(), Vec::new());
-        let mut reach_m = self.options.start_error_m.unwrap_or(START_ERROR * self.radius_m);
-        let first = match start {
-            Start::Poses(poses) => {
-                let candidates = self.candidates(poses, reach_m)?;
-                self.align(&guesses(poses, &candidates), reach_m, &mut pairs, &mut refused);
-                poses[root]
-            }
-            Start::Order | Start::Nothing => {
-                let candidates = blind_candidates(start, count);
-                reach_m = CHAIN_ERROR * self.patch_m;
-                let guesses = self.coarse_guesses(&candidates, coarse, &mut refused);
-                self.align(&guesses, reach_m, &mut pairs, &mut refused);
-                Isometry3::identity()
-            }
-        };
-        let tolerance_m = self.options.loop_tolerance_m.unwrap_or(LOOP_TOLERANCE * self.radius_m);
-        let poses = self.connected(&pairs, &refused, (root, first), tolerance_m)?;
-        // Neighbours that nobody knew of: the ends of a round, and pairs that only better poses bring together.
-        let tried: BTreeSet<(usize, usize)> = pairs.iter().map(|p| (p.target, p.source)).collect();
-        let mut candidates = self.candidates(&poses, CHAIN_ERROR * self.patch_m)?;
-        candidates.retain(|pair| !tried.contains(pair));
-        refused.retain(|pair| !candidates.contains(&(pair.target, pair.source)));
-        self.align(&guesses(&poses, &candidates), CHAIN_ERROR * self.patch_m, &mut pairs, &mut refused);
-        pairs.sort_by_key(|pair| (pair.target, pair.source));
-        let skeleton = skeleton(&pairs, (root, first), count, tolerance_m, self.radius_m);
-        let poses = skeleton.poses.iter().zip(&poses).map(|(pose, before)| pose.unwrap_or(*before)).collect();
+        let candidates = blind_candidates(start, self.surfaces.len());
+        let mut refused = Vec::new();
+        let guesses = self.coarse_guesses(&candidates, coarse, &mut refused);
+        let pairs = self.align(&guesses, CHAIN_ERROR * self.patch_m, &mut refused);
+        let skeleton = self.skeleton(&pairs, Isometry3::identity());
+        let poses = self.connected(skeleton.poses, &refused)?;
         let (sound, wrong) = split(pairs, &skeleton.sound);
         refused.extend(wrong.iter().map(contradicting));
-        let poses = self.pose_graph(&sound, poses);
-        Ok(Started { poses, pairs: sound, refused, loops: skeleton.loops })
+        Ok(Started { poses: self.pose_graph(&sound, poses), pairs: sound, refused, loops: skeleton.loops })
+    }
+
+    /// Pairs aligned by themselves at poses that are right, which show how loops close.
+    pub(super) fn check(&self, poses: &[Isometry3<f64>]) -> Result<Started> {
+        let candidates = self.candidates(poses)?;
+        let mut refused = Vec::new();
+        let pairs = self.align(&guesses(poses, &candidates), self.patch_m, &mut refused);
+        let skeleton = self.skeleton(&pairs, poses[self.datum.held_station()]);
+        let (sound, wrong) = split(pairs, &skeleton.sound);
+        refused.extend(wrong.iter().map(contradicting));
+        Ok(Started { poses: poses.to_vec(), pairs: sound, refused, loops: skeleton.loops })
+    }
+
+    fn skeleton(&self, pairs: &[PairAlignment], first: Isometry3<f64>) -> Skeleton {
+        let tolerance_m = self.options.loop_tolerance_m.unwrap_or(LOOP_TOLERANCE * self.radius_m);
+        let root = (self.datum.held_station(), first);
+        skeleton(pairs, root, self.surfaces.len(), tolerance_m, self.radius_m)
     }
 
     /// Pairs among the best partners of either at these poses.
-    fn candidates(&self, poses: &[Isometry3<f64>], reach_m: f64) -> Result<Vec<(usize, usize)>> {
-        let overlaps = find_overlaps(self.targets, poses, reach_m.max(self.patch_m))?;
+    fn candidates(&self, poses: &[Isometry3<f64>]) -> Result<Vec<(usize, usize)>> {
+        let count = poses.len();
+        let all: Vec<(usize, usize)> = (0..count).flat_map(|t| (t + 1..count).map(move |s| (t, s))).collect();
+        let surfaces: Vec<&Surface> = self.surfaces.iter().collect();
+        let reach = Reach { across_m: self.patch_m, candidates: 1 };
+        let meetings = meet(&surfaces, poses, &all, reach, self.options.minimum_contacts)?;
+        let overlap = |meeting: &Meeting| {
+            let asked = meeting.contacts.iter().filter(|contact| contact.asked_by_source).count();
+            let fraction = asked as f64 / self.surfaces[meeting.source].patches.len() as f64;
+            Overlap { source: meeting.source, target: meeting.target, fraction }
+        };
+        let overlaps: Vec<Overlap> = meetings.iter().map(overlap).collect();
         let (least, partners) = (self.options.minimum_overlap, self.options.partners_per_station);
-        Ok(best_partners(&overlaps, self.targets.len(), least, partners))
+        Ok(best_partners(&overlaps, count, least, partners))
     }
 
     fn coarse_guesses(
@@ -108,54 +124,36 @@ impl Starter<'_> {
         guesses
     }
 
-    fn align(
-        &self,
-        guesses: &[Guess],
-        reach_m: f64,
-        pairs: &mut Vec<PairAlignment>,
-        refused: &mut Vec<RefusedPair>,
-    ) {
-        let icp = IcpOptions {
-            initial_correspondence_distance_m: Some(reach_m.max(2.0 * self.patch_m)),
-            max_correspondence_distance_m: Some(1.25 * self.patch_m),
-            step_tolerance_m: Some(1e-3 * self.patch_m),
-            ..IcpOptions::default()
-        };
-        let finished = std::sync::atomic::AtomicUsize::new(0);
+    fn align(&self, guesses: &[Guess], reach_m: f64, refused: &mut Vec<RefusedPair>) -> Vec<PairAlignment> {
+        let finished = AtomicUsize::new(0);
         let align = |(target, source, guess): &Guess| {
-            let result = align_pair(self.targets, *target, *source, guess, &icp);
-            (self.progress)(finished.fetch_add(1, std::sync::atomic::Ordering::Relaxed) + 1, guesses.len());
+            let (target, source) = (&self.surfaces[*target], &self.surfaces[*source]);
+            let result = pairs::align(source, target, guess, reach_m, self.options.minimum_contacts);
+            (self.progress)(finished.fetch_add(1, Ordering::Relaxed) + 1, guesses.len());
             result
         };
         let results: Vec<Result<IcpResult>> = guesses.par_iter().map(align).collect();
         let named: Vec<(usize, usize)> = guesses.iter().map(|(target, source, _)| (*target, *source)).collect();
         let (aligned, failed) = sorted_out(&named, results);
         refused.extend(failed);
-        for pair in aligned {
-            if pair.result.overlap >= FEWEST_PARTNERS {
-                pairs.push(pair);
-            } else {
-                refused.push(super::surfaces::without_partners(&pair));
-            }
-        }
+        let (enough, thin): (Vec<_>, Vec<_>) = aligned.into_iter().partition(|p| p.result.overlap >= FEWEST_PARTNERS);
+        refused.extend(thin.iter().map(without_partners));
+        enough
     }
 
-    /// Poses along the pairs that hold together, or the stations that none leads to.
+    /// All poses, or the stations that no pair leads to.
     fn connected(
         &self,
-        pairs: &[PairAlignment],
+        poses: Vec<Option<Isometry3<f64>>>,
         refused: &[RefusedPair],
-        root: (usize, Isometry3<f64>),
-        tolerance_m: f64,
     ) -> Result<Vec<Isometry3<f64>>> {
-        let poses = skeleton(pairs, root, self.targets.len(), tolerance_m, self.radius_m).poses;
         let stations: Vec<usize> = (0..poses.len()).filter(|&station| poses[station].is_none()).collect();
         if stations.is_empty() {
             return Ok(poses.into_iter().flatten().collect());
         }
         let touching = refused.iter().filter(|p| stations.contains(&p.target) || stations.contains(&p.source));
         let reasons = touching.map(|p| format!("{} to {}: {}", p.source, p.target, p.reason)).collect();
-        Err(Error::UnconnectedStations { stations, to: root.0, reasons })
+        Err(Error::UnconnectedStations { stations, to: self.datum.held_station(), reasons })
     }
 
     /// The pairs adjusted by themselves; where that fails, the tree is good enough.

@@ -15,11 +15,10 @@ use super::reduction::{Meeting, Scene, Weighting};
 use super::registration::{
     Start, StationRegistration, StationRegistrationOptions, SurfacePair, UndeterminedStation,
 };
-use super::rounds::{Adjusted, Surfaces, adjust};
+use super::rounds::{Adjusted, Course, Surfaces};
 use super::start::{Started, Starter};
 use crate::cloud::Cloud;
 use crate::error::{Error, Result};
-use crate::icp::IcpTarget;
 use crate::kernel::quantile;
 use crate::normals::{UnorganisedNormalOptions, unorganised_normals};
 use crate::pose::is_finite;
@@ -46,26 +45,67 @@ pub fn register_stations(
 ) -> Result<StationRegistration> {
     validate(stations, start, datum, options)?;
     let surfaces = prepare(stations, options)?;
-    let targets = surfaces.par_iter().map(Surface::to_target).collect::<Result<Vec<IcpTarget>>>()?;
     let patch_m = surfaces[0].size_m;
     let radius_m = surfaces.iter().map(|surface| surface.radius_m).fold(0.0, f64::max);
-    let starter = Starter { targets: &targets, options, patch_m, radius_m, datum, progress };
-    let started = starter.run(start, &|pairs| super::blind::poses(stations, pairs))?;
+    let starter = Starter { surfaces: &surfaces, options, patch_m, radius_m, datum, progress };
+    let blind = match start {
+        Start::Poses(_) => None,
+        _ => Some(starter.without_poses(start, &|pairs| super::blind::poses(stations, pairs))?),
+    };
+    let poses = match (start, &blind) {
+        (Start::Poses(poses), _) => poses.to_vec(),
+        (_, Some(started)) => started.poses.clone(),
+        _ => Vec::new(),
+    };
     let (prior, names) = match options.model {
         Some(model) => (checked_prior(model)?, model.names()),
         None => Default::default(),
     };
-    let network = Network { fixed: datum.held_station(), hold_m: radius_m, names: &names, prior: &prior };
-    let mut surfaces = Surfaces {
-        derivatives: vec![Vec::new(); surfaces.len()],
-        surfaces,
-        model: options.model,
-        points: stations.iter().map(Cloud::len).collect(),
+    let course = Course {
+        network: Network { fixed: datum.held_station(), hold_m: radius_m, names: &names, prior: &prior },
+        reach_m: starter.reach_m(start),
+        minimum_contacts: options.minimum_contacts,
+        kernel: options.kernel,
+        max_rounds: options.max_rounds,
+        tolerance_m: options.tolerance_m.unwrap_or(patch_m / 2000.0),
+        progress: &|done| progress(done, options.max_rounds),
     };
-    let state = State { poses: started.poses.clone(), parameters: prior.0.clone() };
-    let rounds = |done: usize| progress(done, options.max_rounds);
-    let adjusted = adjust(&mut surfaces, state, &network, options, &rounds)?;
-    Ok(finish(surfaces, started, adjusted, &network, datum))
+    let mut modelled = Surfaces::fixed(surfaces.iter().collect());
+    modelled.model = options.model.map(|model| (model, stations.iter().map(Cloud::len).collect()));
+    let adjusted = course.run(&mut modelled, State { poses: poses.clone(), parameters: prior.0.clone() })?;
+    require_connected(&adjusted, datum)?;
+    let started = match blind {
+        Some(started) => started,
+        None => Started { poses, ..starter.check(&adjusted.state.poses)? },
+    };
+    let result = finish(&modelled, started, adjusted, &course.network, datum);
+    let prepared = match modelled.modelled {
+        Some((modelled, _)) => modelled,
+        None => surfaces,
+    };
+    Ok(StationRegistration { prepared: Arc::new(prepared), ..result })
+}
+
+/// Every station meets, through others, the one that is held.
+fn require_connected(adjusted: &Adjusted, datum: Datum) -> Result<()> {
+    let mut reached = vec![false; adjusted.state.poses.len()];
+    reached[datum.held_station()] = true;
+    let mut grown = true;
+    while grown {
+        grown = false;
+        for meeting in &adjusted.meetings {
+            if reached[meeting.target] != reached[meeting.source] {
+                (reached[meeting.target], reached[meeting.source]) = (true, true);
+                grown = true;
+            }
+        }
+    }
+    let stations: Vec<usize> = (0..reached.len()).filter(|&station| !reached[station]).collect();
+    if stations.is_empty() {
+        return Ok(());
+    }
+    let reasons = vec!["no surfaces of theirs meet those of the others".to_owned()];
+    Err(Error::UnconnectedStations { stations, to: datum.held_station(), reasons })
 }
 
 fn validate(
@@ -132,7 +172,7 @@ fn prepare(stations: &[Cloud], options: &StationRegistrationOptions<'_>) -> Resu
 }
 
 fn finish(
-    surfaces: Surfaces<'_>,
+    surfaces: &Surfaces<'_>,
     started: Started,
     adjusted: Adjusted,
     network: &Network<'_>,
@@ -143,15 +183,7 @@ fn finish(
     let scene = surfaces.scene(parameters);
     let redundancy = adjusted.observations.round() as i64 - 6 * (count as i64 - 1) - parameters as i64;
     let sigma0 = (redundancy > 0).then(|| (adjusted.squares / redundancy as f64).sqrt());
-    let covariance = precision::covariance(
-        &scene,
-        &adjusted.meetings,
-        &adjusted.state,
-        &adjusted.weighting,
-        &adjusted.cofactors,
-        network.hold_m,
-        sigma0.unwrap_or(1.0).powi(2),
-    );
+    let covariance = precision::covariance(&scene, &adjusted, network.hold_m, sigma0.unwrap_or(1.0).powi(2));
     let undetermined = undetermined(&adjusted.state.poses, &covariance, network.hold_m);
     let pairs = adjusted.meetings.iter().map(|m| surface_pair(&scene, m, &adjusted.state.poses, &adjusted.weighting));
     let pairs = pairs.collect();
@@ -171,7 +203,7 @@ fn finish(
         settled: adjusted.settled,
         parameters: (parameters > 0).then(|| shared(network, &adjusted.state.parameters, &joint)),
         joint_covariance: joint,
-        prepared: Arc::new(surfaces.surfaces),
+        prepared: Arc::default(),
     }
 }
 

@@ -120,6 +120,7 @@ pub enum Error {
         to: usize,
         /// Why pairs that touch them were refused: source to target, and the reason.
         reasons: Vec<String>,
+    },
     /// No pose of two clouds passed the verification.
     #[error(
         "no alignment found: {what} {found:.3}, at least {needed:.3} is needed ({correspondences} correspondences)"

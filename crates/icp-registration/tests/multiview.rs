@@ -57,7 +57,9 @@ fn inner_constraints_move_nothing_but_the_frame() {
     let start = approximate(&truth);
     let held = registered(&clouds, Start::Poses(&start), Datum::Station(0));
     let free = registered(&clouds, Start::Poses(&start), Datum::InnerConstraints);
-    let trace = |found: &StationRegistration| -> f64 { found.covariance.iter().map(|c| c.fixed_view::<3, 3>(0, 0).trace()).sum() };
+    let trace = |found: &StationRegistration| -> f64 {
+        found.covariance.iter().map(|c| c.fixed_view::<3, 3>(0, 0).trace()).sum()
+    };
     for k in 1..truth.len() {
         let (a, b) = (held.relative_pose(0, k).unwrap(), free.relative_pose(0, k).unwrap());
         // The same solution in another frame: rounding.

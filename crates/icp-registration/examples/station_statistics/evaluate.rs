@@ -39,12 +39,13 @@ pub fn accuracy(name: &str, survey: &Survey, runs: u64) -> Outcome<()> {
     println!("{name}: largest error of a station, run by run");
     for run in 0..runs {
         let (clouds, truth) = survey.clouds(run);
-        let approximate: Vec<Isometry3<f64>> = truth
-            .iter()
-            .enumerate()
-            .map(|(k, pose)| pose * disturbance(0.1, 3.0, run * 100 + k as u64))
-            .collect();
-        for (label, start) in [("poses 0.1 m, 3 deg off", Start::Poses(&approximate)), ("truth", Start::Poses(&truth)), ("order", Start::Order)] {
+        let approximate: Vec<Isometry3<f64>> =
+            truth.iter().enumerate().map(|(k, pose)| pose * disturbance(0.1, 3.0, run * 100 + k as u64)).collect();
+        for (label, start) in [
+            ("poses 0.1 m, 3 deg off", Start::Poses(&approximate)),
+            ("truth", Start::Poses(&truth)),
+            ("order", Start::Order),
+        ] {
             match register(&clouds, start) {
                 Ok(found) => {
                     let (mm, degrees) = errors(&found, &truth);
@@ -69,11 +70,47 @@ pub fn accuracy(name: &str, survey: &Survey, runs: u64) -> Outcome<()> {
                             let s = |i: usize| 1e3 * c[(i, i)].sqrt();
                             println!(
                                 "      {k}: {:.2} {:.2} {:.2} mm ({:.2} {:.2} {:.2}) {:.3} {:.3} {:.3} mrad ({:.3} {:.3} {:.3})",
-                                d[0], d[1], d[2], s(0), s(1), s(2), d[3], d[4], d[5], s(3), s(4), s(5)
+                                d[0],
+                                d[1],
+                                d[2],
+                                s(0),
+                                s(1),
+                                s(2),
+                                d[3],
+                                d[4],
+                                d[5],
+                                s(3),
+                                s(4),
+                                s(5)
                             );
                         }
+                        for p in &found.pairs {
+                            let t = truth[p.target].inverse() * truth[p.source];
+                            let (mm, deg) = pose_error(&p.result.target_from_source, &t);
+                            println!(
+                                "      pair {}-{}: {mm:.1} mm {deg:.2} deg off, overlap {:.2} rms {:.2} mm, {:?}",
+                                p.target,
+                                p.source,
+                                p.result.overlap,
+                                1e3 * p.result.rms_m,
+                                p.result.degenerate.len()
+                            );
+                        }
+                        for p in &found.refused {
+                            println!("      refused {}-{}: {}", p.target, p.source, p.reason);
+                        }
                         for p in &found.surfaces {
-                            println!("      {}-{}: overlap {:.2}, {} contacts, mean {:.2} rms {:.2} mm, {:.2} sigma, out {:.2}", p.target, p.source, p.overlap, p.contacts, 1e3*p.mean_m, 1e3*p.rms_m, p.rms_sigma, p.outliers);
+                            println!(
+                                "      {}-{}: overlap {:.2}, {} contacts, mean {:.2} rms {:.2} mm, {:.2} sigma, out {:.2}",
+                                p.target,
+                                p.source,
+                                p.overlap,
+                                p.contacts,
+                                1e3 * p.mean_m,
+                                1e3 * p.rms_m,
+                                p.rms_sigma,
+                                p.outliers
+                            );
                         }
                     }
                 }

@@ -120,7 +120,11 @@ pub(super) fn observe(
 }
 
 /// Derivative of `direction · (R p + t)` by the tangent `[dt, dtheta]`.
-fn along_direction(point: &Vector3<f64>, target_from_source: &Isometry3<f64>, direction: &Vector3<f64>) -> Vector6<f64> {
+fn along_direction(
+    point: &Vector3<f64>,
+    target_from_source: &Isometry3<f64>,
+    direction: &Vector3<f64>,
+) -> Vector6<f64> {
     let turn = point.cross(&(target_from_source.rotation.inverse() * direction));
     Vector6::new(direction.x, direction.y, direction.z, turn.x, turn.y, turn.z)
 }

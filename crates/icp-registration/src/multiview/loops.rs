@@ -126,7 +126,8 @@ pub(super) fn skeleton(
     let mut poses = vec![None; stations];
     let mut reached_by = vec![None; stations];
     poses[root.0] = Some(root.1);
-    while let Some(&next) = order.iter().find(|&&k| poses[pairs[k].target].is_some() != poses[pairs[k].source].is_some())
+    while let Some(&next) =
+        order.iter().find(|&&k| poses[pairs[k].target].is_some() != poses[pairs[k].source].is_some())
     {
         let pair = &pairs[next];
         let from = if poses[pair.target].is_some() { pair.target } else { pair.source };

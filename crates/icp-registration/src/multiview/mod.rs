@@ -27,14 +27,8 @@ pub use point_model::{PointModel, SharedParameters};
 pub use pose_graph::{
     Datum, PairConstraint, PairResidual, StationAdjustment, StationAdjustmentOptions, adjust_stations,
 };
-pub use registration::{
-    Start, StationRegistration, StationRegistrationOptions, SurfacePair, UndeterminedStation,
-};
+pub use registration::{Start, StationRegistration, StationRegistrationOptions, SurfacePair, UndeterminedStation};
 pub use stations::register_stations;
 pub use surfaces::{
     PairAlignment, RefusedPair, SurfaceAdjustment, SurfaceAdjustmentOptions, adjust_surfaces, align_pairs,
 };
-
-pub(crate) fn knob(name: &str, default: f64) -> f64 {
-    std::env::var(name).ok().and_then(|v| v.parse().ok()).unwrap_or(default)
-}

@@ -81,11 +81,7 @@ impl Network<'_> {
 }
 
 /// The rows of a pair: `√λ vᵀ x` is observed as `−vᵀ g / √λ`.
-fn observation(
-    blocks: Vec<BlockId>,
-    reduced: &Reduced,
-    linearised_at: &[f64],
-) -> impl adjust::Observation + use<> {
+fn observation(blocks: Vec<BlockId>, reduced: &Reduced, linearised_at: &[f64]) -> impl adjust::Observation + use<> {
     let (rows, right, pose, start) =
         (reduced.rows.clone(), reduced.right.clone(), reduced.pose, linearised_at.to_vec());
     let count = rows.nrows();

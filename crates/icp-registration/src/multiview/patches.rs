@@ -16,7 +16,7 @@ use crate::kernel::quantile;
 use crate::neighbours::NeighbourTree;
 
 /// Fewest points of a patch.
-const FEWEST_POINTS: usize = 6;
+const FEWEST_POINTS: usize = 8;
 /// Neighbouring patches that may belong to the same plane: those around one in a grid, and some more.
 const NEIGHBOURS: usize = 13;
 /// Reach of the neighbourhood, in patches.
@@ -24,7 +24,12 @@ const REACH: f64 = 1.8;
 /// Cosine of the largest angle between neighbours on one plane (15 degrees).
 const SAME_PLANE: f64 = 0.966;
 /// Points farther from their patch than this multiple of the median distance are left out of it.
-const GROSS: f64 = 5.0;
+const GROSS: f64 = 4.0;
+/// The same for the angle (its sine) between the normals of point and patch, and an angle that is always allowed.
+const LEAN: f64 = 2.5;
+const SMALLEST_LEAN: f64 = 0.2;
+/// Variance of a patch, in those around it, beyond which it is no plane. Twenty points scatter by a factor of two.
+const ROUGHER: f64 = 3.0;
 /// Part of the patches whose normal must point to the station for signs to have a meaning.
 const ORIENTED: f64 = 0.99;
 /// Part of the size of a patch that its offset is not better known than: no surface is plane.
@@ -57,66 +62,92 @@ pub(super) struct Surface {
     pub oriented: bool,
 }
 
-impl Surface {
-    /// Groups the points of a cloud (with normals) into patches of `size_m`.
-    pub(super) fn new(cloud: &Cloud, normals: &[Vector3<f64>], size_m: f64) -> Result<Self> {
-        let grouped = group(cloud, normals, size_m);
-        let (mut members, mut starts) = (Vec::with_capacity(cloud.len()), vec![0]);
-        for points in grouped {
-            let kept = without_gross_errors(cloud, points, ROUGHNESS * size_m);
-            if kept.len() >= FEWEST_POINTS {
-                members.extend(kept);
+/// Groups of points, as in [`Surface`].
+struct Groups {
+    members: Vec<u32>,
+    starts: Vec<u32>,
+}
+
+impl Groups {
+    /// The groups that planes go through, with these.
+    fn fitted(&self, points: &[Point3<f64>], origin: &Vector3<f64>) -> (Self, Vec<(Moments, Plane)>) {
+        let mut fits = Vec::with_capacity(self.starts.len());
+        let kept = self.filtered(|_, own| {
+            let mut moments = Moments::default();
+            own.iter().for_each(|&i| moments.add(&(points[i as usize].coords - origin)));
+            let plane = moments.plane();
+            fits.extend(plane.map(|plane| (moments, plane)));
+            plane.is_some()
+        });
+        (kept, fits)
+    }
+
+    fn filtered(&self, mut keep: impl FnMut(usize, &[u32]) -> bool) -> Self {
+        let (mut members, mut starts) = (Vec::with_capacity(self.members.len()), vec![0]);
+        for (index, range) in self.starts.windows(2).enumerate() {
+            let own = &self.members[range[0] as usize..range[1] as usize];
+            if keep(index, own) {
+                members.extend_from_slice(own);
                 starts.push(members.len() as u32);
             }
         }
-        Self::from_groups(&cloud.points, Some(normals), members, starts, size_m)
+        Self { members, starts }
+    }
+}
+
+impl Surface {
+    /// Groups the points of a cloud (with normals) into patches of `size_m`.
+    pub(super) fn new(cloud: &Cloud, normals: &[Vector3<f64>], size_m: f64) -> Result<Self> {
+        let mut groups = Groups { members: Vec::with_capacity(cloud.len()), starts: vec![0] };
+        for points in group(cloud, normals, size_m) {
+            let kept = of_one_plane(cloud, normals, points, ROUGHNESS * size_m);
+            if kept.len() >= FEWEST_POINTS {
+                groups.members.extend(kept);
+                groups.starts.push(groups.members.len() as u32);
+            }
+        }
+        let origin = cloud.points[0].coords;
+        let (groups, mut fits) = groups.fitted(&cloud.points, &origin);
+        for (range, (_, plane)) in groups.starts.windows(2).zip(&mut fits) {
+            let first = groups.members[range[0] as usize];
+            if normals[first as usize].dot(&plane.normal) < 0.0 {
+                plane.normal.neg_mut();
+            }
+        }
+        let rough = rough(&fits, &origin)?;
+        let groups = groups.filtered(|index, _| !rough[index]);
+        let mut kept = rough.iter();
+        fits.retain(|_| kept.next() == Some(&false));
+        Self::from_fits(groups, &fits, &origin, size_m)
     }
 
     /// The same groups with their points elsewhere.
     pub(super) fn refitted(&self, points: &[Point3<f64>]) -> Result<Self> {
-        let mut refitted = Self::from_groups(points, None, self.members.clone(), self.starts.clone(), self.size_m)?;
-        if self.oriented {
-            refitted.patches.iter_mut().filter(|p| p.normal.dot(&p.centre.coords) > 0.0).for_each(|p| p.normal.neg_mut());
-            refitted.oriented = true;
-        }
-        Ok(refitted)
-    }
-
-    fn from_groups(
-        points: &[Point3<f64>],
-        normals: Option<&[Vector3<f64>]>,
-        members: Vec<u32>,
-        starts: Vec<u32>,
-        size_m: f64,
-    ) -> Result<Self> {
-        let origin = members.first().map_or(Vector3::zeros(), |&i| points[i as usize].coords);
-        let mut fits = Vec::with_capacity(starts.len());
-        let (mut kept, mut kept_starts) = (Vec::with_capacity(members.len()), vec![0]);
-        for range in starts.windows(2) {
-            let own = &members[range[0] as usize..range[1] as usize];
-            let mut moments = Moments::default();
-            own.iter().for_each(|&i| moments.add(&(points[i as usize].coords - origin)));
-            if let Some(mut plane) = moments.plane() {
-                if normals.is_some_and(|normals| normals[own[0] as usize].dot(&plane.normal) < 0.0) {
-                    plane.normal.neg_mut();
-                }
-                fits.push((moments, plane));
-                kept.extend_from_slice(own);
-                kept_starts.push(kept.len() as u32);
+        let groups = Groups { members: self.members.clone(), starts: self.starts.clone() };
+        let origin = self.patches[0].centre.coords;
+        let (groups, mut fits) = groups.fitted(points, &origin);
+        for (moments, plane) in fits.iter_mut().filter(|_| self.oriented) {
+            if plane.normal.dot(&(origin + moments.mean())) > 0.0 {
+                plane.normal.neg_mut();
             }
         }
+        Self::from_fits(groups, &fits, &origin, self.size_m)
+    }
+
+    fn from_fits(groups: Groups, fits: &[(Moments, Plane)], origin: &Vector3<f64>, size_m: f64) -> Result<Self> {
         if fits.is_empty() {
             return Err(Error::TooFewPoints { what: "surfaces of a station", found: 0, needed: FEWEST_POINTS });
         }
-        let centres: Vec<Point3<f64>> = fits.iter().map(|(moments, _)| Point3::from(origin + moments.mean())).collect();
+        let centres = centres(fits, origin);
         let tree = NeighbourTree::new(&centres)?;
-        let patches = (0..fits.len()).map(|i| patch(i, &fits, &centres, &tree, size_m)).collect::<Result<Vec<_>>>()?;
+        let patches = (0..fits.len()).map(|i| patch(i, fits, &centres, &tree, size_m)).collect::<Result<Vec<_>>>()?;
         let n = centres.len() as f64;
         let centroid = Point3::from(centres.iter().fold(Vector3::zeros(), |sum, c| sum + c.coords / n));
         let radius_m = (centres.iter().map(|c| (c - centroid).norm_squared() / n).sum::<f64>()).sqrt().max(size_m);
         let facing = patches.iter().filter(|p| p.normal.dot(&p.centre.coords) < 0.0).count();
         let oriented = facing as f64 >= ORIENTED * patches.len() as f64;
-        Ok(Self { patches, tree, members: kept, starts: kept_starts, size_m, radius_m, oriented })
+        let Groups { members, starts } = groups;
+        Ok(Self { patches, tree, members, starts, size_m, radius_m, oriented })
     }
 
     /// Indices of the points of a patch.
@@ -125,8 +156,29 @@ impl Surface {
     }
 }
 
-/// Points whose distance from the plane of their group is no more than a few times the median one.
-fn without_gross_errors(cloud: &Cloud, mut points: Vec<u32>, roughness_m: f64) -> Vec<u32> {
+fn centres(fits: &[(Moments, Plane)], origin: &Vector3<f64>) -> Vec<Point3<f64>> {
+    fits.iter().map(|(moments, _)| Point3::from(origin + moments.mean())).collect()
+}
+
+/// Which patches scatter far more than those around them: they lie across a crease, and what a station makes of a
+/// crease depends on how near it is.
+fn rough(fits: &[(Moments, Plane)], origin: &Vector3<f64>) -> Result<Vec<bool>> {
+    let centres = centres(fits, origin);
+    if centres.is_empty() {
+        return Ok(Vec::new());
+    }
+    let tree = NeighbourTree::new(&centres)?;
+    let is_rough = |(centre, (_, plane)): (&Point3<f64>, &(Moments, Plane))| {
+        let near = tree.k_nearest(centre, NEIGHBOURS)?;
+        let mut around: Vec<f64> = near.iter().map(|neighbour| fits[neighbour.index].1.variance).collect();
+        Ok(plane.variance > ROUGHER * quantile(&mut around, 0.5))
+    };
+    centres.iter().zip(fits).map(is_rough).collect()
+}
+
+/// Points of a group near its plane and with its normal: gross errors and points beside a crease, where smoothed normals
+/// pass from one surface to the next, are left out.
+fn of_one_plane(cloud: &Cloud, normals: &[Vector3<f64>], mut points: Vec<u32>, roughness_m: f64) -> Vec<u32> {
     for _ in 0..2 {
         let Some(&first) = points.first() else { return points };
         let origin = cloud.points[first as usize].coords;
@@ -135,9 +187,12 @@ fn without_gross_errors(cloud: &Cloud, mut points: Vec<u32>, roughness_m: f64) -
         let Some(plane) = moments.plane() else { return points };
         let mean = moments.mean();
         let distance = |i: u32| plane.normal.dot(&(cloud.points[i as usize].coords - origin - mean)).abs();
-        let median = quantile(&mut points.iter().map(|&i| distance(i)).collect::<Vec<f64>>(), 0.5);
+        let lean = |i: u32| plane.normal.cross(&normals[i as usize]).norm();
+        let median = |values: &mut dyn Iterator<Item = f64>| quantile(&mut values.collect::<Vec<f64>>(), 0.5);
+        let farthest_m = GROSS * median(&mut points.iter().map(|&i| distance(i))) + roughness_m;
+        let largest_lean = (LEAN * median(&mut points.iter().map(|&i| lean(i)))).max(SMALLEST_LEAN);
         let before = points.len();
-        points.retain(|&i| distance(i) <= GROSS * median + roughness_m);
+        points.retain(|&i| distance(i) <= farthest_m && lean(i) <= largest_lean);
         if points.len() == before {
             break;
         }

@@ -4,6 +4,9 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::eigen::{eigenvalues3, eigenvector3};
 
+/// Smallest ratio of the two variances within a plane: a third of the length in width.
+const NARROWEST: f64 = 0.1;
+
 /// Sums over the points of a group, about an origin near them.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Moments {
@@ -51,8 +54,9 @@ impl Moments {
         let mean = self.mean();
         let scatter = self.products / self.count - mean * mean.transpose();
         let [smallest, middle, largest] = eigenvalues3(&scatter);
-        // Points across a plane scatter less than a quarter as far as along it; the second test refuses lines.
-        if !(smallest <= 0.06 * middle && middle > 1e-2 * largest) {
+        // Points across a plane scatter less than a quarter as far as along it; the second test refuses strips, such as
+        // the bevels that smoothed normals make of creases.
+        if !(smallest <= 0.06 * middle && middle > NARROWEST * largest) {
             return None;
         }
         let normal = eigenvector3(&scatter, smallest)?;

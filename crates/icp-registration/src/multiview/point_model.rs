@@ -72,4 +72,3 @@ pub(super) fn checked_prior(model: &dyn PointModel) -> Result<(Vec<f64>, Vec<f64
     }
     Ok((values, sigma))
 }
-

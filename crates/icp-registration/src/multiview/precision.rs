@@ -28,12 +28,7 @@ const NOTHING: f64 = 0.1;
 ///
 /// `hold_m`: standard deviation at which poses are held where no contact says anything (rotations: one radian).
 /// `variance_factor`: of the contacts, for networks too small to show a scatter.
-pub(super) fn covariance(
-    scene: &Scene<'_>,
-    adjusted: &Adjusted,
-    hold_m: f64,
-    variance_factor: f64,
-) -> DMatrix<f64> {
+pub(super) fn covariance(scene: &Scene<'_>, adjusted: &Adjusted, hold_m: f64, variance_factor: f64) -> DMatrix<f64> {
     let Adjusted { state, cofactors, .. } = adjusted;
     let size = cofactors.nrows();
     let cells = cells(scene, &adjusted.meetings, state, &adjusted.weighting, size);
@@ -60,9 +55,8 @@ fn held(cofactors: &DMatrix<f64>, of_poses: usize, hold_m: f64) -> DMatrix<f64> 
     let Some(eigen) = SymmetricEigen::try_new(poses, 1e-15, 100_000) else { return DMatrix::zeros(size, size) };
     let mut held = DMatrix::zeros(size, size);
     for k in (0..of_poses).filter(|&k| eigen.eigenvalues[k] > NOTHING) {
-        let vector = DVector::from_fn(size, |r, _| {
-            if r < of_poses { eigen.eigenvectors[(r, k)] * unit(r) } else { 0.0 }
-        });
+        let vector =
+            DVector::from_fn(size, |r, _| if r < of_poses { eigen.eigenvectors[(r, k)] * unit(r) } else { 0.0 });
         held.ger(eigen.eigenvalues[k], &vector, &vector, 1.0);
     }
     held
@@ -127,12 +121,11 @@ fn cells_of_pair(
 ) -> BTreeMap<[i64; 3], DVector<f64>> {
     let source = scene.surfaces[meeting.source];
     let pose = world_from_target.inverse() * world_from_source;
-    let cell_size = super::knob("CELL", CELL);
     let mut cells: BTreeMap<[i64; 3], DVector<f64>> = BTreeMap::new();
     for contact in &meeting.contacts {
         let (row, _) = scene.row(meeting, contact, &pose, weighting);
         let place = world_from_source * source.patches[contact.source as usize].centre;
-        let cell = place.coords.map(|c| (c / (cell_size * source.size_m)).floor());
+        let cell = place.coords.map(|c| (c / (CELL * source.size_m)).floor());
         let score = cells
             .entry([cell.x as i64, cell.y as i64, cell.z as i64])
             .or_insert_with(|| DVector::zeros(6 + scene.parameters));

@@ -142,13 +142,11 @@ fn observations(
     }
     let eigen = SymmetricEigen::try_new(information, 1e-15, 10_000).ok_or(failed("no eigenvalues were found"))?;
     let largest = eigen.eigenvalues.max();
-    let limit = super::knob("IMIT", LARGEST_IMITATION);
-    let subtract = super::knob("SUB", 1.0);
     let known: Vec<(usize, f64)> = (0..n)
         .filter_map(|k| {
             let (value, vector) = (eigen.eigenvalues[k], eigen.eigenvectors.column(k));
             let share = vector.dot(&(&imitation * vector)) / value;
-            (value > ROUNDING * largest && share <= limit).then(|| (k, (value * (1.0 - subtract * share)).sqrt()))
+            (value > ROUNDING * largest && share <= LARGEST_IMITATION).then(|| (k, (value * (1.0 - share)).sqrt()))
         })
         .collect();
     let vector = |k: usize, c: usize| eigen.eigenvectors[(c, k)];

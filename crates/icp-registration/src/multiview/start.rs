@@ -142,11 +142,7 @@ impl Starter<'_> {
     }
 
     /// All poses, or the stations that no pair leads to.
-    fn connected(
-        &self,
-        poses: Vec<Option<Isometry3<f64>>>,
-        refused: &[RefusedPair],
-    ) -> Result<Vec<Isometry3<f64>>> {
+    fn connected(&self, poses: Vec<Option<Isometry3<f64>>>, refused: &[RefusedPair]) -> Result<Vec<Isometry3<f64>>> {
         let stations: Vec<usize> = (0..poses.len()).filter(|&station| poses[station].is_none()).collect();
         if stations.is_empty() {
             return Ok(poses.into_iter().flatten().collect());

@@ -12,9 +12,7 @@ use super::point_model::{SharedParameters, checked_prior};
 use super::pose_graph::Datum;
 use super::precision;
 use super::reduction::{Meeting, Scene, Weighting};
-use super::registration::{
-    Start, StationRegistration, StationRegistrationOptions, SurfacePair, UndeterminedStation,
-};
+use super::registration::{Start, StationRegistration, StationRegistrationOptions, SurfacePair, UndeterminedStation};
 use super::rounds::{Adjusted, Course, Surfaces};
 use super::start::{Started, Starter};
 use crate::cloud::Cloud;
@@ -142,11 +140,7 @@ fn validate(
         }
     }
     if !(options.minimum_overlap >= 0.0 && options.minimum_overlap <= 1.0) {
-        return Err(Error::InvalidOption {
-            name: "minimum_overlap",
-            value: options.minimum_overlap,
-            domain: "0 to 1",
-        });
+        return Err(Error::InvalidOption { name: "minimum_overlap", value: options.minimum_overlap, domain: "0 to 1" });
     }
     match (options.partners_per_station, options.max_rounds) {
         (0, _) => Err(Error::InvalidOption { name: "partners_per_station", value: 0.0, domain: "1 or more" }),
@@ -215,12 +209,7 @@ fn undetermined(poses: &[Isometry3<f64>], covariance: &DMatrix<f64>, hold_m: f64
     motions.filter(|station| !station.motions.is_empty()).collect()
 }
 
-fn surface_pair(
-    scene: &Scene<'_>,
-    meeting: &Meeting,
-    poses: &[Isometry3<f64>],
-    weighting: &Weighting,
-) -> SurfacePair {
+fn surface_pair(scene: &Scene<'_>, meeting: &Meeting, poses: &[Isometry3<f64>], weighting: &Weighting) -> SurfacePair {
     let pose = poses[meeting.target].inverse() * poses[meeting.source];
     let (mut weight, mut mean, mut square, mut whitened, mut outliers) = (0.0, 0.0, 0.0, 0.0, 0_usize);
     for contact in &meeting.contacts {

@@ -21,7 +21,7 @@ pub fn round_poses(count: usize) -> Vec<Isometry3<f64>> {
     let pose = |k: usize| {
         let angle = std::f64::consts::TAU * k as f64 / count as f64;
         let height = 1.45 + 0.15 * (2.0 * angle).sin();
-        look_at([1.5 * angle.cos(), 1.1 * angle.sin(), height], [-0.8 * angle.cos(), -0.6 * angle.sin(), 0.8])
+        look_at([1.7 * angle.cos(), 1.3 * angle.sin(), height], [-0.8 * angle.cos(), -0.6 * angle.sin(), 0.8])
     };
     (0..count).map(pose).collect()
 }

@@ -11,6 +11,9 @@ use icp_registration::{
     register_stations,
 };
 use nalgebra::{Isometry3, Point3, Vector3};
+use rand::SeedableRng;
+use rand_distr::{Distribution, StandardNormal};
+use rand_pcg::Pcg64;
 
 fn registered(clouds: &[Cloud], start: Start<'_>, datum: Datum) -> StationRegistration {
     register_stations(clouds, start, datum, &StationRegistrationOptions::default(), &|_, _| {}).unwrap()
@@ -34,8 +37,9 @@ fn eight_stations_come_together_from_approximate_poses() {
     let found = registered(&clouds, Start::Poses(&approximate(&truth)), Datum::Station(0));
     let (mm, degrees) = largest_errors(&found, &truth);
     println!("{mm:.2} mm {degrees:.4} deg, {} pairs, sigma0 {:?}", found.surfaces.len(), found.sigma0);
-    // The bar of the room: noise of 1 mm + 0.5 mm/m² range², a hundredth of the pixels wrong.
-    assert!(mm < 2.0 && degrees < 0.05, "{mm} mm {degrees} deg");
+    // Noise of 1 mm + 0.5 mm/m² range², a hundredth of the pixels wrong. Only furniture tells the stations that look along
+    // the room and those that look across it where they stand along it: known to about 1 mm there, four times that.
+    assert!(mm < 4.0 && degrees < 0.05, "{mm} mm {degrees} deg");
     assert!(found.undetermined.is_empty());
     // Patches scatter as their points say, but for normals that are no better known than that.
     let sigma0 = found.sigma0.unwrap();
@@ -87,26 +91,31 @@ fn the_number_of_threads_changes_no_bit() {
     assert_eq!(one.surfaces, three.surfaces);
 }
 
-/// Points of a plane patch in the station's frame, seen from the origin, with a waviness below a millimetre.
-fn wall(width: usize, origin: [f64; 3], along: [f64; 3], up: [f64; 3]) -> Vec<Point3<f64>> {
+/// Points of a plane in the station's frame with noise of half a millimetre along its normal.
+fn wall(width: usize, origin: [f64; 3], along: [f64; 3], up: [f64; 3], seed: u64) -> Vec<Point3<f64>> {
     let (origin, along, up) = (Vector3::from(origin), Vector3::from(along), Vector3::from(up));
     let normal = along.cross(&up).normalize();
-    let place = |i: usize| {
+    let mut random = Pcg64::seed_from_u64(seed);
+    let mut place = |i: usize| {
         let (a, b) = ((i % width) as f64 * 0.02, (i / width) as f64 * 0.02);
-        let noise = 5e-4 * ((i * 7919 % 1009) as f64 / 504.5 - 1.0);
-        Point3::from(origin + along * a + up * b + normal * noise)
+        let noise: f64 = StandardNormal.sample(&mut random);
+        Point3::from(origin + along * a + up * b + normal * (5e-4 * noise))
     };
-    (0..width * width).map(place).collect()
+    (0..width * width).map(&mut place).collect()
+}
+
+/// Three walls that meet.
+fn corner(seed: u64) -> Cloud {
+    let mut points = wall(80, [-0.8, -0.8, -2.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], seed);
+    points.extend(wall(60, [-0.8, -0.8, -2.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0], seed + 1));
+    points.extend(wall(60, [-0.8, -0.8, -2.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0], seed + 2));
+    Cloud::new(points)
 }
 
 #[test]
 fn a_station_that_sees_one_wall_is_named_with_the_motions_it_leaves_open() {
-    let mut corner = wall(80, [-0.8, -0.8, -2.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]);
-    let only_wall = Cloud::new(corner.clone());
-    corner.extend(wall(60, [-0.8, -0.8, -2.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]));
-    corner.extend(wall(60, [-0.8, -0.8, -2.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]));
-    let corner = Cloud::new(corner);
-    let clouds = [corner.clone(), corner, only_wall];
+    let only_wall = Cloud::new(wall(80, [-0.8, -0.8, -2.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], 30));
+    let clouds = [corner(10), corner(20), only_wall];
     let poses = [Isometry3::identity(); 3];
     let found = registered(&clouds, Start::Poses(&poses), Datum::Station(0));
     assert_eq!(found.undetermined.len(), 1, "{:?}", found.undetermined);
@@ -123,14 +132,14 @@ fn a_station_that_sees_one_wall_is_named_with_the_motions_it_leaves_open() {
             MotionKind::Rotation => assert!(along_normal > 0.9, "{motion:?}"),
         }
     }
-    // It kept its start along them.
-    assert!(found.world_from_station[2].translation.vector.norm() < 0.01);
+    // It kept its start along them, but for the noise of the wall.
+    assert!(found.world_from_station[2].translation.vector.norm() < 0.005);
 }
 
 #[test]
 fn stations_without_partner_are_named() {
     let (mut clouds, truth) = round(3, 0.0, 9);
-    clouds.push(Cloud::new(wall(60, [50.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0])));
+    clouds.push(Cloud::new(wall(60, [50.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], 40)));
     let mut start = approximate(&truth);
     start.push(Isometry3::identity());
     let options = StationRegistrationOptions::default();

@@ -1,6 +1,7 @@
 //! Correspondences with points and normals of both sides, and which two of them can hold at once.
 // Only what is inlined is compiled for wide registers.
-#![allow(clippy::inline_always)]
+// Lazy operators would branch lane by lane.
+#![allow(clippy::inline_always, clippy::needless_bitwise_bool)]
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 

@@ -1,6 +1,7 @@
 //! Correspondences: descriptors that are most alike.
 // Only what is inlined is compiled for wide registers.
-#![allow(clippy::inline_always)]
+// Lanes of several arrays run in step.
+#![allow(clippy::inline_always, clippy::needless_range_loop)]
 
 use rayon::prelude::*;
 

@@ -13,12 +13,12 @@ mod mesh;
 mod multiview;
 mod neighbours;
 mod normals;
-pub mod parts;
 mod organised;
+pub mod parts;
 mod pose;
 mod quality;
-mod voxels;
 mod trajectory;
+mod voxels;
 
 pub use absolute_orientation::{
     Orientation, RotationMethod, Similarity, absolute_orientation, absolute_orientation_by,
@@ -47,7 +47,6 @@ pub use neighbours::{Neighbour, NeighbourTree};
 pub use normals::{OrganisedNormalOptions, UnorganisedNormalOptions, organised_normals, unorganised_normals};
 pub use organised::{FrameAligner, FrameAlignmentOptions, OrganisedFrame, Projection, align_frames};
 pub use pose::{inverse_covariance_transport, pose_difference, step_pose};
-pub use voxels::downsample;
 pub use trajectory::{
     AbsoluteTrajectoryError, ErrorStatistics, MatchedPose, RelativeError, RelativePoseError, RelativeStep,
     TrajectoryAlignment, TrajectoryErrorOptions, absolute_trajectory_error, relative_pose_error,

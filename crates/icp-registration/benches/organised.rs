@@ -5,7 +5,7 @@
 use std::hint::black_box;
 use std::sync::Arc;
 
-use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
+use criterion::{Criterion, criterion_group, criterion_main};
 use icp_registration::{FrameAligner, FrameAlignmentOptions, OrganisedFrame, Projection};
 use nalgebra::{Isometry3, Point3, Vector3};
 
@@ -40,10 +40,10 @@ fn benches(criterion: &mut Criterion) {
         let Ok(mut source) = OrganisedFrame::new(&projection, &points, None) else { continue };
         let Ok(mut aligner) = FrameAligner::new(FrameAlignmentOptions::default()) else { continue };
         let size = format!("{width}x{height}");
-        criterion.bench_function(&BenchmarkId::new("organised_frame_update", &size).to_string(), |bencher| {
+        criterion.bench_function(&format!("organised_frame_update/{size}"), |bencher| {
             bencher.iter(|| source.update(black_box(&points), None));
         });
-        criterion.bench_function(&BenchmarkId::new("organised_frame_align", &size).to_string(), |bencher| {
+        criterion.bench_function(&format!("organised_frame_align/{size}"), |bencher| {
             bencher.iter(|| aligner.align(black_box(&source), &target, &Isometry3::identity()));
         });
     }

@@ -1,14 +1,16 @@
 //! The registration of two frames, level by level.
 
-use nalgebra::{Isometry3, Matrix6, UnitQuaternion, Vector3, Vector6};
+use nalgebra::{Isometry3, Matrix6};
 
 use super::blocks::Block;
 use super::frame::OrganisedFrame;
-use super::grid::{BLOCK, STRIDES};
+use super::grid::STRIDES;
 use super::options::FrameAlignmentOptions;
-use super::pairs::{Moved, Rules};
+use super::pairs::Rules;
 use super::quality::{Cell, Hold, Residuals, Verdict};
-use super::sums::{Normal, SUMS, agreement, normal_equations, residuals};
+use super::starts::{share_of_agreement, slid};
+use super::sums::{SUMS, normal_equations, residuals};
+use super::track::{Gauge, Track, blocks, moved, solve, turned};
 use crate::error::{Error, Result};
 use crate::icp::{DegeneracyPolicy, IcpResult, StopReason};
 use crate::kernel::quantile;
@@ -28,32 +30,6 @@ const WIDE_ITERATIONS: usize = 3;
 const COARSE_TOLERANCE: f64 = 1e-3;
 /// Fewest points of a level.
 const FEWEST_POINTS: usize = 200;
-
-/// Distance within which points agree with target planes after the first level, in units of the radius.
-const AGREEMENT_TOLERANCE: f64 = 0.03;
-/// Share of the points in sight that have to agree for the first start to be the last.
-const ENOUGH_AGREEMENT: f64 = 0.7;
-/// Share of all points that has to be in sight.
-const FEWEST_IN_SIGHT: f64 = 0.25;
-/// Angle of the other starts.
-const TURN_RAD: f64 = 0.26;
-/// Their axes in the source's frame.
-const TURNS: [[f64; 3]; 14] = [
-    [0.0, 1.0, 0.0],
-    [0.0, -1.0, 0.0],
-    [1.0, 0.0, 0.0],
-    [-1.0, 0.0, 0.0],
-    [0.0, 0.0, 1.0],
-    [0.0, 0.0, -1.0],
-    [1.0, 1.0, 0.0],
-    [-1.0, 1.0, 0.0],
-    [1.0, -1.0, 0.0],
-    [-1.0, -1.0, 0.0],
-    [0.0, 1.0, 1.0],
-    [0.0, 1.0, -1.0],
-    [0.0, -1.0, 1.0],
-    [0.0, -1.0, -1.0],
-];
 
 /// Aligns `source` with `target`, starting at `guess` (both poses `target_from_source`).
 ///
@@ -79,23 +55,6 @@ pub struct FrameAligner {
     chunks: Vec<[f64; SUMS]>,
     scratch: Vec<f64>,
     cells: Vec<Cell>,
-}
-
-/// A pose on its way.
-#[derive(Clone)]
-struct Track {
-    pose: Isometry3<f64>,
-    iterations: usize,
-    rules: Rules,
-    /// Projection on the motions that are held.
-    held: Matrix6<f64>,
-}
-
-/// About which point, and in which unit, motions are solved.
-#[derive(Clone, Copy)]
-struct Gauge {
-    centre: Vector3<f64>,
-    radius_m: f64,
 }
 
 impl FrameAligner {
@@ -139,64 +98,29 @@ impl FrameAligner {
         let coarsest = STRIDES.len() - self.options.levels;
         let mut levels = (coarsest..STRIDES.len() - 1).filter(|l| source.points.counts[*l] >= FEWEST_POINTS);
         match levels.next() {
-            Some(first) => track = self.start(track, source, target, blocks(source, first))?,
+            Some(first) => track = self.start(&track, source, target, blocks(source, first))?,
             None => self.open(&mut track, source, target, &source.points.blocks)?,
         }
         for level in levels {
             self.descend(&mut track, source, target, blocks(source, level))?;
         }
         let stop = self.settle(&mut track, source, target)?;
-        self.result(&track, source, target, guess, stop)
-    }
-
-    /// Passes the first level from the guess and, where the frames contradict each other after that, from starts turned
-    /// away from it; the best goes on.
-    fn start(
-        &mut self,
-        track: Track,
-        source: &OrganisedFrame,
-        target: &OrganisedFrame,
-        blocks: &[Block],
-    ) -> Result<Track> {
-        let guess = track.pose;
-        let mut best = self.attempt(track.clone(), source, target, blocks);
-        for turn in TURNS.iter().take(self.options.other_starts) {
-            if best.as_ref().is_ok_and(|(_, agreement)| *agreement >= ENOUGH_AGREEMENT) {
-                break;
-            }
-            let turn = UnitQuaternion::from_scaled_axis(Vector3::from(*turn) * TURN_RAD);
-            // About the source's camera: where it stands is better known than where it looks.
-            let pose = Isometry3::from_parts(guess.translation, guess.rotation * turn);
-            let other = self.attempt(Track { pose, ..track.clone() }, source, target, blocks);
-            let agreement = |attempt: &Result<(Track, f64)>| attempt.as_ref().map_or(-1.0, |(_, a)| *a);
-            if agreement(&other) > agreement(&best) {
-                best = other;
-            }
+        let result = self.result(&track, source, target, guess, stop)?;
+        if result.degenerate.is_empty() || self.hold() == Hold::Undetermined || self.options.other_starts == 0 {
+            return Ok(result);
         }
-        best.map(|(track, _)| track)
-    }
-
-    /// The track after the first level, and how far the frames agree there.
-    fn attempt(
-        &mut self,
-        mut track: Track,
-        source: &OrganisedFrame,
-        target: &OrganisedFrame,
-        blocks: &[Block],
-    ) -> Result<(Track, f64)> {
-        self.open(&mut track, source, target, blocks)?;
-        self.descend(&mut track, source, target, blocks)?;
-        let (moved, gauge) = moved(&track, source, target);
-        let tolerance = (AGREEMENT_TOLERANCE * gauge.radius_m) as f32;
-        let rules = Rules { extra_variance: tolerance * tolerance, reach: 1.0, ..track.rules };
-        let (met, accepted) = agreement(&moved, &rules, blocks);
-        // Few points in sight agree easily.
-        let needed = FEWEST_IN_SIGHT * (blocks.len() * BLOCK) as f64;
-        Ok((track, accepted as f64 / (met as f64).max(needed)))
+        let Some(mut other) = slid(&track, &result.degenerate, source, target, blocks(source, 1)) else {
+            return Ok(result);
+        };
+        let passed = self.descend(&mut other, source, target, blocks(source, 2));
+        let Ok(stop) = passed.and_then(|()| self.settle(&mut other, source, target)) else { return Ok(result) };
+        let all = &source.points.blocks[..];
+        let gained = [&other, &track].map(|track| share_of_agreement(track, source, target, all));
+        if gained[0] > gained[1] { self.result(&other, source, target, guess, stop) } else { Ok(result) }
     }
 
     /// Sets the variance of what is not aligned from the residuals at the guess.
-    fn open(
+    pub(super) fn open(
         &mut self,
         track: &mut Track,
         source: &OrganisedFrame,
@@ -215,7 +139,8 @@ impl FrameAligner {
         Ok(())
     }
 
-    fn descend(
+    /// Passes one level.
+    pub(super) fn descend(
         &mut self,
         track: &mut Track,
         source: &OrganisedFrame,
@@ -253,6 +178,7 @@ impl FrameAligner {
         track.rules.extra_variance *= square.clamp(0.05, 1.0);
     }
 
+    /// Iterates on all points until the pose stands.
     fn settle(&mut self, track: &mut Track, source: &OrganisedFrame, target: &OrganisedFrame) -> Result<StopReason> {
         let blocks = &source.points.blocks[..];
         if self.hold() == Hold::Undetermined {
@@ -367,36 +293,51 @@ impl FrameAligner {
     }
 }
 
-/// The blocks of a level.
-fn blocks(source: &OrganisedFrame, level: usize) -> &[Block] {
-    &source.points.blocks[..source.projection.grid.levels[level]]
-}
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use std::sync::Arc;
 
-fn moved<'a>(track: &Track, source: &'a OrganisedFrame, target: &'a OrganisedFrame) -> (Moved<'a>, Gauge) {
-    let centre = (track.pose * nalgebra::Point3::from(source.points.centre)).coords;
-    let gauge = Gauge { centre, radius_m: source.points.radius_m.max(f64::MIN_POSITIVE) };
-    (Moved::new(source, target, &track.pose, &gauge.centre, gauge.radius_m), gauge)
-}
+    use super::*;
+    use crate::organised::Projection;
 
-/// Step `[dt, rho w]` that lowers the residuals, without motions that are held. `ridge`: share of the largest
-/// information that is added to all, so that what hardly matters does not run away while the frames are still apart.
-fn solve(normal: &Normal, held: &Matrix6<f64>, ridge: f64) -> Result<Vector6<f64>> {
-    let free = Matrix6::identity() - held;
-    let largest = normal.matrix.diagonal().max();
-    let matrix = free * normal.matrix * free + held * largest + Matrix6::identity() * (ridge.max(1e-9) * largest);
-    let gradient = free * normal.gradient;
-    let cholesky = matrix
-        .cholesky()
-        .ok_or(Error::Numerical { what: "the normal equations", why: "they are not positive definite" })?;
-    Ok(free * -cholesky.solve(&gradient))
-}
+    /// A corner of three planes, seen from different places: `shift` along the axis.
+    fn corner(shift: f64) -> Vec<[f64; 3]> {
+        let ray = |k: usize| ((k % 160) as f64 / 160.0 - 0.5, 0.4 - (k / 160) as f64 / 160.0);
+        let depth = |(u, v): (f64, f64)| {
+            let planes = [(u + 1.0, 2.0), (1.2 - u, 2.2), (1.0 - v, 2.1)];
+            planes
+                .map(|(slope, distance)| (distance - shift) / slope.max(0.1))
+                .into_iter()
+                .fold(f64::INFINITY, f64::min)
+        };
+        (0..160 * 120).map(ray).map(|r| [r.0 * depth(r), r.1 * depth(r), -depth(r)]).collect()
+    }
 
-/// The pose after a motion `[dt, rho w]` about the centre, target axes.
-fn turned(pose: &Isometry3<f64>, step: &Vector6<f64>, gauge: &Gauge) -> Isometry3<f64> {
-    let shift = Vector3::new(step[0], step[1], step[2]);
-    let turn = UnitQuaternion::from_scaled_axis(Vector3::new(step[3], step[4], step[5]) / gauge.radius_m);
-    let mut rotation = turn * pose.rotation;
-    rotation.renormalize();
-    let translation = turn * (pose.translation.vector - gauge.centre) + gauge.centre + shift;
-    Isometry3::from_parts(translation.into(), rotation)
+    /// Where the lists begin and how much they hold: another place or size would mean that memory was asked for.
+    fn memory(aligner: &FrameAligner, frame: &OrganisedFrame) -> Vec<(usize, usize)> {
+        let mut memory = frame.memory();
+        memory.push((aligner.chunks.as_ptr() as usize, aligner.chunks.capacity()));
+        memory.push((aligner.scratch.as_ptr() as usize, aligner.scratch.capacity()));
+        memory.push((aligner.cells.as_ptr() as usize, aligner.cells.capacity()));
+        memory
+    }
+
+    #[test]
+    fn memory_is_used_again() {
+        let projection = Arc::new(Projection::pinhole(160, 120, [160.0; 2], [80.0, 64.0]).unwrap());
+        let mut aligner = FrameAligner::new(FrameAlignmentOptions::default()).unwrap();
+        let target = OrganisedFrame::new(&projection, &corner(0.0), None).unwrap();
+        let mut source = OrganisedFrame::new(&projection, &corner(0.02), None).unwrap();
+        let first = aligner.align(&source, &target, &Isometry3::identity()).unwrap();
+        let before = memory(&aligner, &source);
+        for shift in [0.01, 0.03, 0.02] {
+            source.update(&corner(shift), None).unwrap();
+            let again = aligner.align(&source, &target, &Isometry3::identity()).unwrap();
+            assert_eq!(memory(&aligner, &source), before);
+            if shift.to_bits() == 0.02_f64.to_bits() {
+                assert_eq!(again, first);
+            }
+        }
+    }
 }

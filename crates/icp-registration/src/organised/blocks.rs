@@ -1,4 +1,6 @@
 //! The nodes of a source frame in the order and arrangement in which they are worked on.
+// Lanes lie side by side: with an index, loops read as their formulas and have the same length everywhere.
+#![allow(clippy::needless_range_loop)]
 
 use nalgebra::Vector3;
 use rayon::prelude::*;

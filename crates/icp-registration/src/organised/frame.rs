@@ -127,6 +127,17 @@ impl OrganisedFrame {
         }
     }
 
+    /// Where the lists of the frame lie, and how much they hold.
+    #[cfg(test)]
+    pub(super) fn memory(&self) -> Vec<(usize, usize)> {
+        let singles = [&self.inverse_depth, &self.spread, &self.sigma, &self.misfit];
+        let mut memory: Vec<(usize, usize)> = singles.iter().map(|v| (v.as_ptr() as usize, v.capacity())).collect();
+        memory.push((self.planes.as_ptr() as usize, self.planes.capacity()));
+        memory.push((self.scratch.as_ptr() as usize, self.scratch.capacity()));
+        memory.push((self.points.blocks.as_ptr() as usize, self.points.blocks.capacity()));
+        memory
+    }
+
     fn reduce(&mut self, points: &[[f64; 3]], sigma: Option<&[f32]>) {
         let (grid, width) = (&self.projection.grid, self.projection.width());
         let rows = self.inverse_depth.par_chunks_mut(grid.cols).zip(self.spread.par_chunks_mut(grid.cols));

@@ -13,8 +13,10 @@ mod pairs;
 mod planes;
 mod projection;
 mod quality;
+mod starts;
 mod sums;
 mod table;
+mod track;
 
 pub use aligner::{FrameAligner, align_frames};
 pub use frame::OrganisedFrame;

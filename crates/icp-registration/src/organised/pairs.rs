@@ -1,6 +1,8 @@
 //! Pairs of source nodes and target planes, found by projection, some at a time.
 // Only what is inlined is compiled for wide registers.
 #![allow(clippy::inline_always)]
+// Lanes lie side by side: with an index, loops read as their formulas and have the same length everywhere.
+#![allow(clippy::needless_range_loop)]
 
 use nalgebra::{Isometry3, Vector3};
 

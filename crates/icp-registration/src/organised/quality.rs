@@ -7,6 +7,8 @@
 //! its scatter between the cells tells whether what is left differs from nothing.
 // Only what is inlined is compiled for wide registers.
 #![allow(clippy::inline_always)]
+// Lanes lie side by side: with an index, loops read as their formulas and have the same length everywhere.
+#![allow(clippy::needless_range_loop)]
 
 use nalgebra::{DMatrix, DVector, Matrix6, Vector3, Vector6};
 use rayon::prelude::*;

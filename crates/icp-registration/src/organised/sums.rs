@@ -1,6 +1,8 @@
 //! Sums over pairs: in single precision within a chunk, in double precision over chunks in a fixed order.
 // Only what is inlined is compiled for wide registers.
 #![allow(clippy::inline_always)]
+// Lanes lie side by side: with an index, loops read as their formulas and have the same length everywhere.
+#![allow(clippy::needless_range_loop)]
 
 use nalgebra::{Matrix6, Vector6};
 use rayon::prelude::*;
@@ -154,7 +156,7 @@ pub(super) fn residuals(moved: &Moved<'_>, rules: &Rules, blocks: &[Block], most
             }
         }
     };
-    with_locate(moved.target, Visit { moved, rules, blocks, step, visit });
+    with_locate(moved.target, Visit { moved, rules, blocks, step, work: visit });
 }
 
 /// Nodes that fall on target planes, and how many of them are accepted.
@@ -164,7 +166,7 @@ pub(super) fn agreement(moved: &Moved<'_>, rules: &Rules, blocks: &[Block]) -> (
         met += pairs.met.iter().filter(|m| **m).count();
         accepted += pairs.weight.iter().filter(|w| **w > 0.0).count();
     };
-    with_locate(moved.target, Visit { moved, rules, blocks, step: 1, visit });
+    with_locate(moved.target, Visit { moved, rules, blocks, step: 1, work: visit });
     (met, accepted)
 }
 
@@ -174,7 +176,7 @@ struct Visit<'a, 'b, F> {
     rules: &'a Rules,
     blocks: &'a [Block],
     step: usize,
-    visit: F,
+    work: F,
 }
 
 impl<F: FnMut(&Pairs)> WithLocate for Visit<'_, '_, F> {
@@ -197,7 +199,7 @@ impl<F: FnMut(&Pairs), L: Locate> pulp::WithSimd for LocatedVisit<'_, '_, F, L> 
     fn with_simd<S: pulp::Simd>(self, _: S) {
         let mut all = self.all;
         for block in all.blocks.iter().step_by(all.step) {
-            (all.visit)(&all.moved.pairs(self.locate, all.rules, block));
+            (all.work)(&all.moved.pairs(self.locate, all.rules, block));
         }
     }
 }

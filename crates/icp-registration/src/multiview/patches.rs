@@ -16,7 +16,7 @@ use crate::kernel::quantile;
 use crate::neighbours::NeighbourTree;
 
 /// Fewest points of a patch.
-const FEWEST_POINTS: usize = 8;
+const FEWEST_POINTS: usize = 6;
 /// Neighbouring patches that may belong to the same plane: those around one in a grid, and some more.
 const NEIGHBOURS: usize = 13;
 /// Reach of the neighbourhood, in patches.
@@ -24,10 +24,10 @@ const REACH: f64 = 1.8;
 /// Cosine of the largest angle between neighbours on one plane (15 degrees).
 const SAME_PLANE: f64 = 0.966;
 /// Points farther from their patch than this multiple of the median distance are left out of it.
-const GROSS: f64 = 4.0;
+const GROSS: f64 = 5.0;
 /// The same for the angle (its sine) between the normals of point and patch, and an angle that is always allowed.
 const LEAN: f64 = 2.5;
-const SMALLEST_LEAN: f64 = 0.2;
+const SMALLEST_LEAN: f64 = 0.6;
 /// Variance of a patch, in those around it, beyond which it is no plane. Twenty points scatter by a factor of two.
 const ROUGHER: f64 = 3.0;
 /// Part of the patches whose normal must point to the station for signs to have a meaning.

@@ -61,23 +61,7 @@ fn success(options: &IcpOptions, runs: u64) {
             continue;
         }
         let guess = disturbance(0.3, 20.0, 500 + k) * truth;
-        let mut registration = icp_registration::Registration::with_options(&target, options);
-        let knob = |name: &str, default: f64| std::env::var(name).ok().and_then(|v| v.parse().ok()).unwrap_or(default);
-        let d = icp_registration::Starts::default();
-        registration.starts = Some(icp_registration::Starts {
-            count: knob("COUNT", d.count as f64) as usize,
-            translation: knob("TRANS", d.translation),
-            rotation_rad: knob("ROT", d.rotation_rad),
-            points: knob("POINTS", d.points as f64) as usize,
-            refined: knob("REFINED", d.refined as f64) as usize,
-            convincing: knob("CONV", d.convincing),
-        });
-        registration.levels.points = knob("LPOINTS", 4000.0) as usize;
-        registration.levels.iterations = knob("LITER", 12.0) as usize;
-        if knob("ALT", 3.0) < 3.0 {
-            registration.alternatives.truncate(knob("ALT", 3.0) as usize);
-        }
-        match registration.align(&source, &guess) {
+        match target.align(&source, &guess, options) {
             Ok(result) => {
                 let (mm, degrees) = pose_error(&result.target_from_source, &truth);
                 iterations += result.iterations;

@@ -22,7 +22,7 @@ fn nasty(kind: usize, scale: f64, jitter: &[f64]) -> Cloud {
             3 => [t % 1.0, (i % 7) as f64 / 7.0, -1.0],
             4 => [t.cos(), t.sin(), (i % 5) as f64 / 5.0],
             5 => [jitter(i), jitter(i + 3), jitter(i + 7)],
-            6 => [if i % 2 == 0 { 0.0 } else { 1e5 }, jitter(i), jitter(2 * i)],
+            6 => [if i.is_multiple_of(2) { 0.0 } else { 1e5 }, jitter(i), jitter(2 * i)],
             _ => [[t % 1.0, jitter(i).abs(), 0.0], [0.0, t % 1.0, jitter(i).abs()], [t % 1.0, 0.0, jitter(i).abs()]]
                 [i % 3],
         }

@@ -193,9 +193,12 @@ fn covariance(name: &str, views: impl Fn(&Pinhole, u64) -> Views) {
     );
 }
 
+/// Draws the views of a scene.
+type MakeViews = fn(&Pinhole, u64) -> Views;
+
 fn verdicts() {
     let camera = Pinhole::medium();
-    let scenes: [(&str, fn(&Pinhole, u64) -> Views, [usize; 2]); 4] = [
+    let scenes: [(&str, MakeViews, [usize; 2]); 4] = [
         ("one wall", one_wall, [2, 1]),
         ("wall and floor", wall_and_floor, [1, 0]),
         ("corridor", corridor, [1, 0]),

@@ -48,12 +48,11 @@ impl Levels {
     pub(super) fn limits(&self, engine: &Engine<'_>, selected: &[usize], guess: &Isometry3<f64>) -> Result<Vec<f64>> {
         let target = engine.scene.target;
         let last = self.last_limit_m.unwrap_or_else(|| target.default_limit_m());
-        let first = match self.first_limit_m {
-            Some(first) => first,
-            None => {
-                let median = median_distance(engine, selected, guess)?;
-                (2.5 * median).max(target.radius_m / 4.0).min(target.radius_m)
-            }
+        let first = if let Some(first) = self.first_limit_m {
+            first
+        } else {
+            let median = median_distance(engine, selected, guess)?;
+            (2.5 * median).max(target.radius_m / 4.0).min(target.radius_m)
         };
         let mut limits = vec![last];
         while let Some(&limit) = limits.last()
@@ -194,7 +193,7 @@ impl<'p> Engine<'p> {
                 if track.iterations + 1 >= self.parts.stopping.max_iterations() {
                     return Ok(track);
                 }
-                let moment = self.moment(&track, limits, level, iteration);
+                let moment = track.moment(limits, level, iteration);
                 let step = self.step(&mut track, &moment, &mut points, &mut None)?;
                 if length(&step) < self.parts.levels.step_fraction * limits[level] {
                     break;
@@ -206,7 +205,7 @@ impl<'p> Engine<'p> {
 
     /// How well a sample fits at the end of a track: its number of pairs, each weighted by its residual.
     fn fit(&self, sample: &[usize], track: &Track, limits: &[f64]) -> Result<f64> {
-        let moment = self.moment(track, limits, limits.len() - 1, 0);
+        let moment = track.moment(limits, limits.len() - 1, 0);
         let scene = self.scene.at(moment);
         let pairs = self.gated_pairs(&scene, &mut Points::new(sample.to_vec()))?;
         let system = System::new(&scene, self.metric, &pairs, (RobustKernel::None, 1.0));

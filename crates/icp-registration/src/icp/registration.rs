@@ -135,6 +135,13 @@ pub(crate) struct Track {
     pub iterations: usize,
 }
 
+impl Track {
+    /// Where the run is at this pose.
+    pub(crate) fn moment(&self, limits: &[f64], level: usize, iteration: usize) -> Moment {
+        Moment { pose: self.pose, limit_m: limits[level], level, levels: limits.len(), iteration, ended: false }
+    }
+}
+
 impl<'p> Engine<'p> {
     fn new(
         parts: &'p Registration<'p>,
@@ -168,7 +175,7 @@ impl<'p> Engine<'p> {
         let mut lengths = Vec::new();
         let mut accelerator = None;
         while track.iterations < self.parts.stopping.max_iterations() {
-            let moment = self.moment(track, limits, limits.len() - 1, lengths.len());
+            let moment = track.moment(limits, limits.len() - 1, lengths.len());
             let step = self.step(track, &moment, points, &mut accelerator)?;
             lengths.push(length(&step));
             // While the kernel narrows, small steps mean nothing.
@@ -232,15 +239,11 @@ impl<'p> Engine<'p> {
     }
 
     fn step_over_sigma(&self, track: &Track, limits: &[f64], points: &mut Points, step: &Vector6<f64>) -> Result<f64> {
-        let moment = self.moment(track, limits, limits.len() - 1, 0);
+        let moment = track.moment(limits, limits.len() - 1, 0);
         let pairs = self.pairs(&moment, points, track.iterations)?;
         let scene = self.scene.at(moment);
         let system = System::new(&scene, self.metric, &pairs, self.kernel.at(&Moment { ended: true, ..moment }));
         Ok(Verdict::new(&system, self.max_motion_sigma_m(), Residuals::Settled)?.over_sigma(step))
-    }
-
-    pub(crate) fn moment(&self, track: &Track, limits: &[f64], level: usize, iteration: usize) -> Moment {
-        Moment { pose: track.pose, limit_m: limits[level], level, levels: limits.len(), iteration, ended: false }
     }
 
     pub(crate) fn max_motion_sigma_m(&self) -> f64 {

@@ -70,7 +70,7 @@ impl Engine<'_> {
         guess: &Isometry3<f64>,
         stop: StopReason,
     ) -> Result<IcpResult> {
-        let moment = Moment { ended: true, ..self.moment(track, limits, limits.len() - 1, 0) };
+        let moment = Moment { ended: true, ..track.moment(limits, limits.len() - 1, 0) };
         let scene = self.scene.at(moment);
         let gated = self.gated_pairs(&scene, points)?;
         let overlap = if points.indices.len() == scene.source.len() {

@@ -65,7 +65,7 @@ impl StoppingRule for Settled {
         if last <= self.step_tolerance_m.unwrap_or(1e-5 * progress.radius_m) {
             return Ok(Some(StopReason::Converged));
         }
-        if lengths.len() % self.patience != 0 || last < 0.5 * lengths[lengths.len() - self.patience] {
+        if !lengths.len().is_multiple_of(self.patience) || last < 0.5 * lengths[lengths.len() - self.patience] {
             return Ok(None);
         }
         Ok((progress.step_over_sigma()? <= self.noise_fraction).then_some(StopReason::WithinNoise))

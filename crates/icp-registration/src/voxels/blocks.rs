@@ -18,7 +18,7 @@ struct Block {
 #[derive(Debug, Clone)]
 pub(crate) struct Blocks {
     slots: Vec<u32>,
-    blocks: Vec<Block>,
+    all: Vec<Block>,
     shift: u32,
 }
 
@@ -34,9 +34,9 @@ impl Blocks {
             }
         }
         let size = (2 * blocks.len()).next_power_of_two().max(2);
-        let mut table = Self { slots: vec![FREE; size], blocks, shift: 64 - size.trailing_zeros() };
-        for index in 0..table.blocks.len() {
-            let mut slot = table.slot(table.blocks[index].key);
+        let mut table = Self { slots: vec![FREE; size], all: blocks, shift: 64 - size.trailing_zeros() };
+        for index in 0..table.all.len() {
+            let mut slot = table.slot(table.all[index].key);
             while table.slots[slot] != FREE {
                 slot = (slot + 1) & (size - 1);
             }
@@ -58,7 +58,7 @@ impl Blocks {
             if index == FREE {
                 return None;
             }
-            let block = &self.blocks[index as usize];
+            let block = &self.all[index as usize];
             if block.key == key {
                 return Some(block);
             }

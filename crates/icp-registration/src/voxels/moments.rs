@@ -87,7 +87,7 @@ mod tests {
         let shift = [0.5, -0.5, 0.5];
         for (index, offset) in offsets.into_iter().enumerate() {
             here.add(index, offset, &());
-            there.add(index, [0, 1, 2].map(|k| (offset[k] + shift[k]) / 2.0), &());
+            there.add(index, [0, 1, 2].map(|k| f64::midpoint(offset[k], shift[k])), &());
         }
         let moved = here.shifted(shift).in_doubled_units();
         // Rounding.

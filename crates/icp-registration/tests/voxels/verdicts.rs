@@ -7,9 +7,12 @@ use crate::common::Pinhole;
 use crate::register;
 use crate::scenes::{Views, corridor, one_wall, repeated, wall_and_floor};
 
+/// Draws the views of a scene.
+type MakeViews = fn(&Pinhole, u64) -> Views;
+
 #[test]
 fn undetermined_motions_are_named() {
-    let scenes: [(fn(&Pinhole, u64) -> Views, [usize; 2]); 4] =
+    let scenes: [(MakeViews, [usize; 2]); 4] =
         [(one_wall, [2, 1]), (wall_and_floor, [1, 0]), (corridor, [1, 0]), (repeated, [0, 0])];
     for (number, (views, expected)) in scenes.into_iter().enumerate() {
         for seed in 0..1 {

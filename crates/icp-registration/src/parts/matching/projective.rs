@@ -17,8 +17,11 @@ pub struct Projective<'a> {
     width: usize,
     height: usize,
     /// Position `(col, row)` in pixels of a point of the target frame, `None` outside the field of view.
-    pixel: Box<dyn Fn(&Point3<f64>) -> Option<[f64; 2]> + Sync + 'a>,
+    pixel: PixelOf<'a>,
 }
+
+/// Where a point falls in the image.
+type PixelOf<'a> = Box<dyn Fn(&Point3<f64>) -> Option<[f64; 2]> + Sync + 'a>;
 
 impl<'a> Projective<'a> {
     /// Matches with `target`, whose points are those pixels of the frame `points` (`width` · `height`, row by row, NaN

@@ -28,7 +28,7 @@ impl Default for PlaneToPlane {
 impl PlaneToPlane {
     /// Eigenvectors of the sum of covariances with the square root of 2ε over their eigenvalues; the first is that
     /// along the normals.
-    fn axes(&self, pair: &Pair) -> [(Vector3<f64>, f64); 3] {
+    fn axes(self, pair: &Pair) -> [(Vector3<f64>, f64); 3] {
         let (n, m) = (pair.normal, pair.source_normal);
         let thin = 1.0 - self.flatness;
         let cosine = n.dot(&m).clamp(-1.0, 1.0);

@@ -18,7 +18,7 @@ impl ErrorMetric for PointToPlane {
 }
 
 /// `((n_p + n_q)/2 · (m − q))²` `[Rusinkiewicz2019]`: zero wherever the two points lie on one circle that both normals
-/// belong to, so that curved surfaces match to second order. n_p turns with the source.
+/// belong to, so that curved surfaces match to second order. `n_p` turns with the source.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct SymmetricPlanes;
 

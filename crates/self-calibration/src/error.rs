@@ -85,6 +85,34 @@ pub enum Error {
         "with unknown planes a hyperbola is held, not estimated: estimate it from the differences to adjusted planes"
     )]
     HyperbolaNotHeld,
+    /// Surfaces seen from several stations leave a term open.
+    #[error(
+        "the surfaces do not determine `{term}`: its effect on the ranges is known to {:.1} mm only, {:.1} mm are asked \
+         for (correlation {correlation:.2} with the {motion} of station {station}); take more stations that see corners \
+         and furniture from different distances, give a prior deviation, or hold it", 1e3 * .sigma_m, 1e3 * .limit_m
+    )]
+    SurfacesNotDetermined {
+        /// The term.
+        term: String,
+        /// Standard deviation of its effect on the ranges, metre.
+        sigma_m: f64,
+        /// Largest that is accepted, metre.
+        limit_m: f64,
+        /// Station whose pose it is most correlated with, counted from 0.
+        station: usize,
+        /// Position or attitude of that station.
+        motion: &'static str,
+        /// The correlation.
+        correlation: f64,
+    },
+    /// The stations could not be registered.
+    #[error("registration, {station}: {reason}")]
+    Registration {
+        /// Which station, or all.
+        station: String,
+        /// Why.
+        reason: icp_registration::Error,
+    },
     /// No hyperbola runs anywhere near the residuals.
     #[error("no start values for h1, h2, h3: {reason}")]
     NoHyperbola {
@@ -208,6 +236,13 @@ pub enum Error {
     /// The frame is not valid.
     #[error(transparent)]
     Image(#[from] range_image::Error),
+}
+
+impl Error {
+    /// What the registration of this station, or all, failed with.
+    pub(crate) fn registration(station: &str, reason: icp_registration::Error) -> Self {
+        Self::Registration { station: station.to_owned(), reason }
+    }
 }
 
 /// Result with this crate's [`enum@Error`].

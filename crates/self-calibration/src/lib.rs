@@ -18,6 +18,7 @@ mod planes_reduction;
 mod planes_selection;
 mod planes_start;
 mod range_terms;
+mod surfaces;
 
 pub use adjust::Scale;
 pub use calibration::RangeCalibration;
@@ -29,3 +30,4 @@ pub use plane::Plane;
 pub use planes::{PlaneCalibrationOptions, PlaneCapture, calibrate_planes};
 pub use planes_outcome::{AdjustedPlane, CaptureQuality, PlaneCalibration};
 pub use range_terms::estimate_range_terms;
+pub use surfaces::{SurfaceCalibration, SurfaceCalibrationOptions, SurfaceCapture, SurfaceTerm, calibrate_surfaces};

@@ -1,0 +1,15 @@
+//! On-the-job calibration: range terms together with the poses, from surfaces that several stations see (Sect. 5.3).
+//!
+//! A wall seen from two stations is one wall only with the right range terms: an offset bends corners apart, a periodic
+//! term ripples. The registration of `icp-registration` adjusts the poses and asks a `PointModel` how points depend on
+//! shared parameters; the sensor model behind that question lives here.
+
+mod calibrate;
+mod options;
+mod outcome;
+mod pixels;
+mod point_model;
+
+pub use calibrate::calibrate_surfaces;
+pub use options::{SurfaceCalibrationOptions, SurfaceCapture, SurfaceTerm};
+pub use outcome::SurfaceCalibration;

@@ -8,7 +8,7 @@ use crate::error::{Error, Result};
 use crate::icp::IcpTarget;
 use crate::parts::scene::TargetSurface;
 
-/// Reverse calibration `[BlaisLevine1995]`: no search, the partner is what the target's camera saw at the pixel that the
+/// Reverse calibration `[Blais1995]`: no search, the partner is what the target's camera saw at the pixel that the
 /// source point projects to. Exact only close to the solution, and as fast as a look-up.
 pub struct Projective<'a> {
     target: &'a IcpTarget,

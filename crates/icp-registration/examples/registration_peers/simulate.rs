@@ -138,15 +138,16 @@ fn tracking(folder: &Path) -> Outcome {
     writer.finish(&[])
 }
 
-/// A ring of stations that look across the room; they are known to 3 cm and 2 degrees.
+/// A ring of stations that look down into the room; they are known to 3 cm and 2 degrees.
 fn stations(folder: &Path) -> Outcome {
     let (scene, camera) = (Scene::furnished(), Pinhole::medium());
     let mut writer = Writer::new(folder, &Camera::from(&camera))?;
     let mut starts = Vec::new();
     for k in 0..STATIONS {
         let angle = TAU * k as f64 / STATIONS as f64;
-        let position = [1.0 * angle.cos(), 0.7 * angle.sin(), 1.4];
-        let pose = look_at(position, [-2.0 * angle.cos(), -1.6 * angle.sin(), 0.7]);
+        // From above the edges towards the middle: no pair sees one wall only.
+        let position = [1.7 * angle.cos(), 1.4 * angle.sin(), 2.0];
+        let pose = look_at(position, [-0.4 * angle.cos(), -0.3 * angle.sin(), 0.2]);
         writer.frame(&frame_with_mixed_pixels(&scene, &camera, &pose, 80_000 + k as u64).0, &pose)?;
         let off = if k == 0 { Isometry3::identity() } else { disturbance(0.03, 2.0, 81_000 + k as u64) };
         starts.push(pose * off);

@@ -22,8 +22,8 @@ pub fn run(folder: &Path) -> Outcome {
     let found = register_stations(&stations, Start::Poses(&starts), Datum::Station(0), &options, &|_, _| {})?;
     let milliseconds = 1e3 * (cpu_seconds() - start);
     let relative = |poses: &[nalgebra::Isometry3<f64>], k: usize| (poses[0].inverse() * poses[k]).translation.vector;
-    let squares = (1..starts.len())
-        .map(|k| (relative(&found.world_from_station, k) - relative(&frames.poses, k)).norm_squared());
+    let squares =
+        (1..starts.len()).map(|k| (relative(&found.world_from_station, k) - relative(&frames.poses, k)).norm_squared());
     let off = 1e3 * (squares.sum::<f64>() / (starts.len() - 1) as f64).sqrt();
     println!("ours {off} NaN {milliseconds}");
     Ok(())

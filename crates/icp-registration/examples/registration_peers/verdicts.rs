@@ -21,7 +21,8 @@ pub fn covariance(folder: &Path, count: u64) -> Outcome {
     let (mut errors, mut covered) = (Vec::new(), 0);
     for k in 0..count {
         let pair = frame_pair(&Pinhole::medium(), 1_000 + k);
-        let prepare = |(points, sigma): &(Vec<[f64; 3]>, Vec<f32>)| OrganisedFrame::new(&projection, points, Some(sigma));
+        let prepare =
+            |(points, sigma): &(Vec<[f64; 3]>, Vec<f32>)| OrganisedFrame::new(&projection, points, Some(sigma));
         let [target, source] = [prepare(&pair.target)?, prepare(&pair.source)?];
         let result = align_frames(&source, &target, &Isometry3::identity(), &FrameAlignmentOptions::default())?;
         let off = pose_difference(&result.target_from_source, &pair.target_from_source);

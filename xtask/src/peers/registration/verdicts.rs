@@ -28,9 +28,8 @@ pub(super) fn run(stage: &Stage, least: &mut Least, bars: &mut Bars) -> Outcome 
     for (who, name) in
         [("GICP", "small_gicp GICP"), ("VGICP", "small_gicp VGICP"), ("PLANE_ICP", "small_gicp point to plane")]
     {
-        let figures = SCENES.map(|scene| {
-            ["converged", "mm"].map(|figure| least.get("degenerate", &format!("{who}_{scene}"), figure))
-        });
+        let figures = SCENES
+            .map(|scene| ["converged", "mm"].map(|figure| least.get("degenerate", &format!("{who}_{scene}"), figure)));
         row(name, figures.as_flattened());
     }
     let figures = SCENES.map(|scene| [0, 1].map(|place| printed.get(scene, place)));

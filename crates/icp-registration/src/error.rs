@@ -111,6 +111,52 @@ pub enum Error {
     /// The search tree refused its points.
     #[error("the search tree could not be built: {0}")]
     Tree(String),
+    /// A ray of a camera leads backwards, or coincides with or crosses its neighbour.
+    #[error("ray {index}: {why}")]
+    DegenerateRay {
+        /// Index of the pixel, row by row.
+        index: usize,
+        /// What is wrong.
+        why: &'static str,
+    },
+    /// Most points of a frame do not lie on the rays of their pixels.
+    #[error("most points lie beside the rays of their pixels, among them point {index}: another camera or frame?")]
+    PointsOffRays {
+        /// Index of such a point, row by row.
+        index: usize,
+    },
+    /// Voxels of this size cannot be numbered in this cloud.
+    #[error("voxels of {voxel_m} m in a cloud of {extent_m} m: the size must be positive, and above 1/2 000 000 of it")]
+    VoxelSize {
+        /// Edge of a voxel, metre.
+        voxel_m: f64,
+        /// Largest extent of the cloud along an axis, metre.
+        extent_m: f64,
+    },
+    /// No pose of two clouds passed the verification.
+    #[error(
+        "no alignment found: {what} {found:.3}, at least {needed:.3} is needed ({correspondences} correspondences)"
+    )]
+    NoAlignment {
+        /// What the best pose lacks.
+        what: &'static str,
+        /// What it has.
+        found: f64,
+        /// What it would need.
+        needed: f64,
+        /// Correspondences between the clouds.
+        correspondences: usize,
+    },
+    /// No alignment that holds leads to some stations.
+    #[error("nothing connects stations {stations:?} to station {to} ({})", .reasons.join("; "))]
+    UnconnectedStations {
+        /// The stations that are left alone.
+        stations: Vec<usize>,
+        /// A station of the part that holds together.
+        to: usize,
+        /// Why pairs that touch them were refused: source to target, and the reason.
+        reasons: Vec<String>,
+    },
 }
 
 /// Result of this crate.

@@ -94,6 +94,14 @@ def methods(frames):
     return every
 
 
+def found_by(work, target, source):
+    """Some methods give up where their equations are singular."""
+    try:
+        return work(target, source)
+    except RuntimeError:
+        return None
+
+
 def frames(folder, stride, first, count, *names):
     """Pairs `first` to `first + count`, by the methods whose names begin so, or all."""
     frames = Frames(folder)
@@ -104,6 +112,7 @@ def frames(folder, stride, first, count, *names):
     for target, source in pairs:
         images, points = [frames.image(k) for k in (target, source)], [frames.points(k) for k in (target, source)]
         for name, (work, wants_images) in chosen.items():
-            found, ms = timed(lambda: work(*(images if wants_images else points)))
-            runs[name].append((ms, *error(found, frames.truth(target, source))))
+            found, ms = timed(lambda: found_by(work, *(images if wants_images else points)))
+            off = (np.inf, np.inf) if found is None else error(found, frames.truth(target, source))
+            runs[name].append((ms, *off))
     return {name: summary(list_of) for name, list_of in runs.items()}

@@ -13,6 +13,7 @@ The last line printed is an object of JSON. Times are CPU time of one thread in 
 """
 
 import json
+import math
 import sys
 
 from registration_coarse import coarse
@@ -24,6 +25,13 @@ from registration_verdicts import covariance, degenerate
 
 COMMANDS = (real, scans, frames, covariance, degenerate, coarse, tracking, stations)
 
+
+def told(answer):
+    """JSON knows no infinity."""
+    return {who: {name: value if math.isfinite(value) else None for name, value in figures.items()}
+            for who, figures in answer.items()}  # fmt: skip
+
+
 if __name__ == "__main__":
     name, *words = sys.argv[1:]
-    print(json.dumps({command.__name__: command for command in COMMANDS}[name](*words)))
+    print(json.dumps(told({command.__name__: command for command in COMMANDS}[name](*words))))

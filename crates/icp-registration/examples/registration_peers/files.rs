@@ -1,14 +1,13 @@
 //! Folders of frames.
 
-use std::error::Error;
 use std::fmt::Write;
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion};
 
-use crate::Outcome;
 use crate::common::Pinhole;
+use crate::{Failure, Outcome};
 
 /// A camera without distortion.
 #[derive(Debug, Clone, Copy)]
@@ -40,7 +39,7 @@ pub struct Frames {
 }
 
 impl Frames {
-    pub fn open(folder: &Path) -> Result<Self, Box<dyn Error + Send + Sync>> {
+    pub fn open(folder: &Path) -> Result<Self, Failure> {
         let camera = numbers(&fs::read_to_string(folder.join("camera.txt"))?)?;
         let &[width, height, fx, fy, cx, cy] = camera.as_slice() else {
             return Err("camera.txt: six numbers are expected".into());
@@ -50,14 +49,14 @@ impl Frames {
     }
 
     /// Points of a frame.
-    pub fn points(&self, frame: usize) -> Result<Vec<[f64; 3]>, Box<dyn Error + Send + Sync>> {
+    pub fn points(&self, frame: usize) -> Result<Vec<[f64; 3]>, Failure> {
         let bytes = fs::read(self.folder.join(format!("{frame:03}.f32")))?;
         let values: Vec<f64> = bytes.as_chunks().0.iter().map(|&four| f64::from(f32::from_ne_bytes(four))).collect();
         Ok(values.as_chunks().0.to_vec())
     }
 
     /// Poses of another file, line by line as `poses.txt`.
-    pub fn other_poses(&self, name: &str) -> Result<Vec<Isometry3<f64>>, Box<dyn Error + Send + Sync>> {
+    pub fn other_poses(&self, name: &str) -> Result<Vec<Isometry3<f64>>, Failure> {
         poses(&self.folder.join(name))
     }
 
@@ -79,7 +78,7 @@ pub struct Writer {
 }
 
 impl Writer {
-    pub fn new(folder: &Path, camera: &Camera) -> Result<Self, Box<dyn Error + Send + Sync>> {
+    pub fn new(folder: &Path, camera: &Camera) -> Result<Self, Failure> {
         fs::create_dir_all(folder)?;
         let Camera { width, height, focal_px: [fx, fy], centre_px: [cx, cy] } = camera;
         fs::write(folder.join("camera.txt"), format!("{width} {height} {fx} {fy} {cx} {cy}\n"))?;
@@ -115,7 +114,7 @@ fn text(poses: &[Isometry3<f64>]) -> Result<String, std::fmt::Error> {
     Ok(text)
 }
 
-fn poses(path: &Path) -> Result<Vec<Isometry3<f64>>, Box<dyn Error + Send + Sync>> {
+fn poses(path: &Path) -> Result<Vec<Isometry3<f64>>, Failure> {
     let text = fs::read_to_string(path)?;
     text.lines()
         .map(|line| {

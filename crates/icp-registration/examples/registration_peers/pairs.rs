@@ -1,19 +1,17 @@
 //! What a method reaches over pairs of frames.
 
-use std::error::Error;
-
 use icp_registration::Cloud;
 use nalgebra::{Isometry3, Point3};
 
-use crate::Outcome;
 use crate::common::pose_error;
 use crate::cpu_clock::cpu_seconds;
 use crate::files::Frames;
+use crate::{Failure, Outcome};
 
 /// A frame's points, NaN where there is none.
 pub type Points = Vec<[f64; 3]>;
 /// A pose, or why there is none.
-pub type Found = Result<Isometry3<f64>, Box<dyn Error + Send + Sync>>;
+pub type Found = Result<Isometry3<f64>, Failure>;
 
 /// Aligns the pairs, from raw points to the pose of the source in the target, and prints medians of the CPU time in
 /// milliseconds, of degrees and millimetres off, and how many pairs are within `limits` of these two. A pair without an

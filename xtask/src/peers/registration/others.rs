@@ -9,12 +9,12 @@ pub(super) fn coarse(stage: &Stage, least: &mut Least, bars: &mut Bars) -> Outco
     least.note_all("coarse", &stage.peers("coarse", "coarse", &[])?);
     least.note_line("coarse", "coarse", &PAIRS, &stage.ours(&["coarse"], "coarse", &[])?);
     head(&["1 to 2 m, 20 to 60 degrees, half shared", "CPU ms", "median degrees", "median mm", "good of 14"]);
-    const PEERS: [(&str, &str); 3] = [
+    for (who, name) in [
         ("ransac", "Open3D FPFH and RANSAC, point to plane"),
         ("graph", "Open3D FPFH, KISS-Matcher's solver, point to plane"),
         ("kiss_matcher", "KISS-Matcher, point to plane"),
-    ];
-    for (who, name) in PEERS.into_iter().chain([("coarse", "`icp-registration`, without a guess")]) {
+        ("coarse", "`icp-registration`, without a guess"),
+    ] {
         row(name, &PAIRS.map(|figure| least.get("coarse", who, figure)));
     }
     let get = |who: &str, figure: &str| least.get("coarse", who, figure);
@@ -26,33 +26,20 @@ pub(super) fn coarse(stage: &Stage, least: &mut Least, bars: &mut Bars) -> Outco
     Ok(())
 }
 
-pub(super) fn tracking(stage: &Stage, least: &mut Least, bars: &mut Bars) -> Outcome {
+pub(super) fn tracking(stage: &Stage, least: &mut Least) -> Outcome {
     let mut streams = vec![("tracking", "300 simulated frames")];
     streams.extend(stage.kinect.then_some(("kinect", "60 Kinect frames")));
     for (folder, _) in &streams {
         println!("── stream: {folder}");
         least.note_all(folder, &stage.peers("tracking", folder, &[])?);
-        for _ in 0..stage.runs {
-            least.note_line(folder, "tracker", &["ms", "mm"], &stage.ours(&["tracking"], folder, &[])?);
-        }
     }
     let mut cells = vec!["streams".to_owned()];
     cells.extend(streams.iter().flat_map(|(_, name)| [format!("{name}, CPU ms a frame"), "off, mm".to_owned()]));
     head(&cells.iter().map(String::as_str).collect::<Vec<_>>());
     let get = |folder: &str, who: &str, figure: &str| least.get(folder, who, figure);
-    for (who, name) in [
-        ("kiss_icp", "KISS-ICP, 10 cm"),
-        ("gicp", "small_gicp GICP, frame to frame"),
-        ("tracker", "`icp-registration`, tracker"),
-    ] {
+    for (who, name) in [("kiss_icp", "KISS-ICP, 10 cm"), ("gicp", "small_gicp GICP, frame to frame")] {
         let figures = streams.iter().flat_map(|(folder, _)| ["ms", "mm"].map(|figure| get(folder, who, figure)));
         row(name, &figures.collect::<Vec<_>>());
-    }
-    for (folder, name) in streams {
-        let faster = get(folder, "kiss_icp", "ms") / get(folder, "tracker", "ms");
-        bars.at_least(&format!("{name}, times faster than KISS-ICP"), 15.0, faster);
-        let off = get(folder, "tracker", "mm") / get(folder, "kiss_icp", "mm");
-        bars.at_most(&format!("{name}, off over KISS-ICP's"), 1.0, off);
     }
     Ok(())
 }

@@ -4,10 +4,13 @@
 //! the phases `phase_u16.f32` and `phase_f32.f32`, and prints the least CPU time of this thread in milliseconds (Linux).
 #![allow(clippy::print_stdout)]
 
+#[path = "../../../xtask/peers/cpu_clock.rs"]
+mod cpu_clock;
+
 use std::error::Error;
 use std::path::Path;
-use std::time::Duration;
 
+use cpu_clock::cpu_seconds;
 use range_image::{ComplexFrame, DemodulationOptions, Demodulator, Modulation, NoiseModel, Raster, RawFrame, Samples};
 
 const RUNS: usize = 200;
@@ -67,23 +70,4 @@ fn least<E>(mut work: impl FnMut() -> Result<(), E>) -> Result<f64, E> {
         least = least.min(1e3 * (cpu_seconds() - start));
     }
     Ok(least)
-}
-
-/// CPU seconds of this thread; NaN where the system does not tell.
-fn cpu_seconds() -> f64 {
-    let figures = || {
-        let text = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
-        let mut words = text.split_whitespace().map(str::parse::<f64>);
-        Some((words.next()?.ok()?, words.nth(1)?.ok()?))
-    };
-    let Some((_, turns)) = figures() else { return f64::NAN };
-    // The system counts up to the last change of threads: sleep until there was one.
-    loop {
-        std::thread::sleep(Duration::from_micros(50));
-        match figures() {
-            Some((nanoseconds, now)) if now > turns => return 1e-9 * nanoseconds,
-            Some(_) => {}
-            None => return f64::NAN,
-        }
-    }
 }

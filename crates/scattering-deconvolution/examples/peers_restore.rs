@@ -7,10 +7,13 @@
 //! (Linux).
 #![allow(clippy::print_stdout)]
 
+#[path = "../../../xtask/peers/cpu_clock.rs"]
+mod cpu_clock;
+
 use std::error::Error;
 use std::path::Path;
-use std::time::Duration;
 
+use cpu_clock::cpu_seconds;
 use scattering_deconvolution::{GaussianTerm, GridSpacing, Psf, RestorationOptions, Restorer};
 
 type Outcome = Result<(), Box<dyn Error + Send + Sync>>;
@@ -76,23 +79,4 @@ fn read(path: &Path) -> Result<Plane, String> {
 
 fn write(path: &Path, plane: &[f32]) -> std::io::Result<()> {
     std::fs::write(path, plane.iter().flat_map(|value| value.to_ne_bytes()).collect::<Vec<u8>>())
-}
-
-/// CPU seconds of this thread; NaN where the system does not tell.
-fn cpu_seconds() -> f64 {
-    let figures = || {
-        let text = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
-        let mut words = text.split_whitespace().map(str::parse::<f64>);
-        Some((words.next()?.ok()?, words.nth(1)?.ok()?))
-    };
-    let Some((_, turns)) = figures() else { return f64::NAN };
-    // The system counts up to the last change of threads: sleep until there was one.
-    loop {
-        std::thread::sleep(Duration::from_micros(50));
-        match figures() {
-            Some((nanoseconds, now)) if now > turns => return 1e-9 * nanoseconds,
-            Some(_) => {}
-            None => return f64::NAN,
-        }
-    }
 }

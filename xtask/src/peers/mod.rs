@@ -6,6 +6,7 @@
 mod adjust;
 mod environment;
 mod phase;
+mod registration;
 mod scattering;
 mod table;
 
@@ -18,6 +19,8 @@ enum Stage {
     Adjust,
     /// scikit-image, OpenCV, SNAPHU, kamui and NumPy beside `phase-unwrap` and `range-image`.
     Phase,
+    /// `small_gicp`, Open3D, KISS-ICP and KISS-Matcher beside `icp-registration`.
+    Registration,
     /// `scipy`, FFTW and OpenCV beside `scattering-deconvolution`.
     Scattering,
 }
@@ -38,6 +41,7 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome {
         match stage {
             Stage::Adjust => adjust::run(arguments.runs.max(1))?,
             Stage::Phase => phase::run(arguments.runs.max(1))?,
+            Stage::Registration => registration::run(arguments.runs.max(1))?,
             Stage::Scattering => scattering::run(arguments.runs.max(1))?,
         }
     }

@@ -26,6 +26,13 @@ impl Least {
         }
     }
 
+    /// Notes figures that an example printed in one line.
+    pub(crate) fn note_line(&mut self, case: &str, name: &str, figures: &[&str], printed: &Figures) {
+        for (place, figure) in figures.iter().enumerate() {
+            self.note(case, name, figure, printed.get(name, place));
+        }
+    }
+
     /// Notes figures that an example printed as `<name>_<figure>`.
     pub(crate) fn note_own(&mut self, case: &str, who: &str, name: &str, printed: &Figures) {
         for figure in ["ms", "bytes", "buffers"] {

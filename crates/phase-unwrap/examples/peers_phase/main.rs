@@ -13,6 +13,8 @@
 #![allow(clippy::print_stdout)]
 
 mod absolute;
+#[path = "../../../../xtask/peers/cpu_clock.rs"]
+mod cpu_clock;
 mod files;
 mod frequencies;
 mod hills;

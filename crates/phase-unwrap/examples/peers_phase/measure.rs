@@ -1,26 +1,8 @@
 //! CPU time and memory, as Linux tells them.
 
 use std::fs;
-use std::time::Duration;
 
-/// CPU seconds of this thread; NaN where the system does not tell.
-pub fn cpu_seconds() -> f64 {
-    let figures = || {
-        let text = fs::read_to_string("/proc/thread-self/schedstat").ok()?;
-        let mut words = text.split_whitespace().map(str::parse::<f64>);
-        Some((words.next()?.ok()?, words.nth(1)?.ok()?))
-    };
-    let Some((_, turns)) = figures() else { return f64::NAN };
-    // The system counts up to the last change of threads: sleep until there was one.
-    loop {
-        std::thread::sleep(Duration::from_micros(50));
-        match figures() {
-            Some((nanoseconds, now)) if now > turns => return 1e-9 * nanoseconds,
-            Some(_) => {}
-            None => return f64::NAN,
-        }
-    }
-}
+use crate::cpu_clock::cpu_seconds;
 
 /// The result of `work`, its CPU time in milliseconds, and by how many bytes it raised the peak of this process'
 /// memory (its result included; NaN where the system does not tell).

@@ -182,14 +182,6 @@ pub enum Error {
         /// Why pairs that touch them were refused: source to target, and the reason.
         reasons: Vec<String>,
     },
-    /// Voxels of this size cannot be numbered in this cloud.
-    #[error("voxels of {voxel_m} m in a cloud of {extent_m} m: the size must be positive, and above 1/2 000 000 of it")]
-    VoxelSize {
-        /// Edge of a voxel, metre.
-        voxel_m: f64,
-        /// Largest extent of the cloud along an axis, metre.
-        extent_m: f64,
-    },
     /// No pose of two clouds passed the verification.
     #[error(
         "no alignment found: {what} {found:.3}, at least {needed:.3} is needed ({correspondences} correspondences)"
@@ -203,16 +195,6 @@ pub enum Error {
         needed: f64,
         /// Correspondences between the clouds.
         correspondences: usize,
-    },
-    /// No alignment that holds leads to some stations.
-    #[error("nothing connects stations {stations:?} to station {to} ({})", .reasons.join("; "))]
-    UnconnectedStations {
-        /// The stations that are left alone.
-        stations: Vec<usize>,
-        /// A station of the part that holds together.
-        to: usize,
-        /// Why pairs that touch them were refused: source to target, and the reason.
-        reasons: Vec<String>,
     },
 }
 

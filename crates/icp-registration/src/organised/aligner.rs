@@ -62,7 +62,7 @@ impl FrameAligner {
     /// [`Error::InvalidOption`].
     pub fn new(options: FrameAlignmentOptions) -> Result<Self> {
         options.validate()?;
-        Ok(Self { options, chunks: Vec::new(), scratch: Vec::new(), cells: Vec::new() })
+        Ok(Self { options, chunks: Vec::new(), scratch: Vec::with_capacity(2 * SAMPLE), cells: Vec::new() })
     }
 
     /// The options.

@@ -7,22 +7,33 @@ mod eigen;
 mod error;
 mod icp;
 mod kernel;
+#[cfg(feature = "mesh")]
+mod mesh;
 #[cfg(feature = "multiview")]
 mod multiview;
 mod neighbours;
 mod normals;
+mod organised;
+pub mod parts;
 mod pose;
+mod quality;
+mod trajectory;
+mod voxels;
 
-pub use absolute_orientation::{Orientation, Similarity, absolute_orientation, absolute_orientation_with_scale};
+pub use absolute_orientation::{
+    Orientation, RotationMethod, Similarity, absolute_orientation, absolute_orientation_by,
+    absolute_orientation_with_scale,
+};
 pub use cloud::Cloud;
 pub use coarse::{
-    CoarseAlignment, CoarseOptions, Estimator, FeatureCloud, Features, Matching, SurfaceDescriptors, SurfaceRadii,
-    Viewpoint, align_without_guess,
+    AmplitudeFeatureOptions, CoarseAlignment, CoarseOptions, Estimator, FeatureCloud, Features, Matching,
+    SparseAlignment, SparseIcpOptions, SurfaceDescriptors, SurfaceRadii, Viewpoint, align_features,
+    align_without_guess, amplitude_features,
 };
 pub use error::{Error, Result};
 pub use icp::{
-    DegeneracyPolicy, IcpOptions, IcpResult, IcpTarget, Metric, MotionKind, Selection, StopReason, UndeterminedMotion,
-    align,
+    Alternative, DegeneracyPolicy, IcpOptions, IcpResult, IcpTarget, Levels, Metric, MotionKind, Registration,
+    Selection, Starts, StopReason, System, UndeterminedMotion, align,
 };
 pub use kernel::RobustKernel;
 #[cfg(feature = "multiview")]
@@ -34,4 +45,10 @@ pub use multiview::{
 };
 pub use neighbours::{Neighbour, NeighbourTree};
 pub use normals::{OrganisedNormalOptions, UnorganisedNormalOptions, organised_normals, unorganised_normals};
+pub use organised::{FrameAligner, FrameAlignmentOptions, OrganisedFrame, Projection, align_frames};
 pub use pose::{inverse_covariance_transport, pose_difference, step_pose};
+pub use trajectory::{
+    AbsoluteTrajectoryError, ErrorStatistics, MatchedPose, RelativeError, RelativePoseError, RelativeStep,
+    TrajectoryAlignment, TrajectoryErrorOptions, absolute_trajectory_error, relative_pose_error,
+};
+pub use voxels::{VoxelAlignmentOptions, VoxelCloud, VoxelOptions, downsample};

@@ -1,0 +1,343 @@
+//! The registration of two frames, level by level.
+
+use nalgebra::{Isometry3, Matrix6};
+
+use super::blocks::Block;
+use super::frame::OrganisedFrame;
+use super::grid::STRIDES;
+use super::options::FrameAlignmentOptions;
+use super::pairs::Rules;
+use super::quality::{Cell, Hold, Residuals, Verdict};
+use super::starts::{share_of_agreement, slid};
+use super::sums::{SUMS, normal_equations, residuals};
+use super::track::{Gauge, Track, blocks, moved, solve, turned};
+use crate::error::{Error, Result};
+use crate::icp::{DegeneracyPolicy, IcpResult, StopReason};
+use crate::kernel::quantile;
+use crate::pose::{is_finite, pose_difference, step_pose, symmetrised, tangent_from_centred};
+
+/// Biweight with 95 % efficiency on normally distributed residuals.
+const BIWEIGHT: f32 = 4.685;
+/// Median absolute deviation to standard deviation.
+const MAD: f64 = 1.4826;
+/// Residuals from which scales are taken.
+const SAMPLE: usize = 2048;
+/// Iterations on each level but the last.
+const COARSE_ITERATIONS: usize = 8;
+/// First steps, which are least squares over all that is in reach.
+const WIDE_ITERATIONS: usize = 3;
+/// Coarse levels end when a step is below this, in units of the radius.
+const COARSE_TOLERANCE: f64 = 1e-3;
+/// Fewest points of a level.
+const FEWEST_POINTS: usize = 200;
+
+/// Aligns `source` with `target`, starting at `guess` (both poses `target_from_source`).
+///
+/// Partners are found by projecting source points into the target frame; minimised are distances from its planes. For
+/// streams, keep a [`FrameAligner`].
+///
+/// # Errors
+/// [`Error::TooFewPoints`] for frames without planes, [`Error::TooFewCorrespondences`] where frames do not overlap at
+/// the guess, [`Error::NonFinite`] for the guess, [`Error::InvalidOption`].
+pub fn align_frames(
+    source: &OrganisedFrame,
+    target: &OrganisedFrame,
+    guess: &Isometry3<f64>,
+    options: &FrameAlignmentOptions,
+) -> Result<IcpResult> {
+    FrameAligner::new(options.clone())?.align(source, target, guess)
+}
+
+/// Registration whose memory is used again.
+#[derive(Debug, Clone)]
+pub struct FrameAligner {
+    options: FrameAlignmentOptions,
+    chunks: Vec<[f64; SUMS]>,
+    scratch: Vec<f64>,
+    cells: Vec<Cell>,
+}
+
+impl FrameAligner {
+    /// # Errors
+    /// [`Error::InvalidOption`].
+    pub fn new(options: FrameAlignmentOptions) -> Result<Self> {
+        options.validate()?;
+        Ok(Self { options, chunks: Vec::new(), scratch: Vec::new(), cells: Vec::new() })
+    }
+
+    /// The options.
+    pub fn options(&self) -> &FrameAlignmentOptions {
+        &self.options
+    }
+
+    /// As [`align_frames`], without allocating memory once frames of this size have been aligned.
+    ///
+    /// # Errors
+    /// As [`align_frames`].
+    pub fn align(
+        &mut self,
+        source: &OrganisedFrame,
+        target: &OrganisedFrame,
+        guess: &Isometry3<f64>,
+    ) -> Result<IcpResult> {
+        if !is_finite(guess) {
+            return Err(Error::NonFinite { what: "the guess", index: 0 });
+        }
+        for (what, frame) in [("the source frame", source), ("the target frame", target)] {
+            if frame.len() < self.options.min_correspondences {
+                let needed = self.options.min_correspondences;
+                return Err(Error::TooFewPoints { what, found: frame.len(), needed });
+            }
+        }
+        let rules = Rules {
+            extra_variance: 0.0,
+            reach: BIWEIGHT,
+            least_cosine: self.options.max_normal_angle_rad.cos() as f32,
+        };
+        let mut track = Track { pose: *guess, iterations: 0, rules, held: Matrix6::zeros() };
+        let coarsest = STRIDES.len() - self.options.levels;
+        let mut levels = (coarsest..STRIDES.len() - 1).filter(|l| source.points.counts[*l] >= FEWEST_POINTS);
+        match levels.next() {
+            Some(first) => track = self.start(&track, source, target, blocks(source, first))?,
+            None => self.open(&mut track, source, target, &source.points.blocks)?,
+        }
+        for level in levels {
+            self.descend(&mut track, source, target, blocks(source, level))?;
+        }
+        let stop = self.settle(&mut track, source, target)?;
+        let result = self.result(&track, source, target, guess, stop)?;
+        if result.degenerate.is_empty() || self.hold() == Hold::Undetermined || self.options.other_starts == 0 {
+            return Ok(result);
+        }
+        let Some(mut other) = slid(&track, &result.degenerate, source, target, blocks(source, 1)) else {
+            return Ok(result);
+        };
+        let passed = self.descend(&mut other, source, target, blocks(source, 2));
+        let Ok(stop) = passed.and_then(|()| self.settle(&mut other, source, target)) else { return Ok(result) };
+        let all = &source.points.blocks[..];
+        let gained = [&other, &track].map(|track| share_of_agreement(track, source, target, all));
+        if gained[0] > gained[1] { self.result(&other, source, target, guess, stop) } else { Ok(result) }
+    }
+
+    /// Sets the variance of what is not aligned from the residuals at the guess.
+    pub(super) fn open(
+        &mut self,
+        track: &mut Track,
+        source: &OrganisedFrame,
+        target: &OrganisedFrame,
+        blocks: &[Block],
+    ) -> Result<()> {
+        let radius = target.points.radius_m.max(source.points.radius_m);
+        track.rules.extra_variance = (radius * radius) as f32;
+        let moved = moved(track, source, target);
+        residuals(&moved.0, &track.rules, blocks, SAMPLE, &mut self.scratch);
+        if self.scratch.is_empty() {
+            return Err(self.too_few(0, source.len(), track));
+        }
+        let scale = MAD * quantile(&mut self.scratch, 0.5) * radius;
+        track.rules.extra_variance = (scale * scale) as f32;
+        Ok(())
+    }
+
+    /// Passes one level.
+    pub(super) fn descend(
+        &mut self,
+        track: &mut Track,
+        source: &OrganisedFrame,
+        target: &OrganisedFrame,
+        blocks: &[Block],
+    ) -> Result<()> {
+        if self.hold() == Hold::Undetermined {
+            let (moved, gauge) = moved(track, source, target);
+            let limit = self.max_motion_sigma_m(&gauge);
+            let verdict = Verdict::new(&moved, &track.rules, blocks, limit, Residuals::Misaligned, &mut self.cells)?;
+            track.held = verdict.held();
+        }
+        for _ in 0..COARSE_ITERATIONS {
+            if track.iterations >= self.options.max_iterations {
+                break;
+            }
+            let wide = track.iterations < WIDE_ITERATIONS;
+            track.rules.reach = if wide { 3.0 * BIWEIGHT } else { BIWEIGHT };
+            let (step, gauge) = self.step(track, source, target, blocks, 1e-4)?;
+            if !wide {
+                self.narrow(track, source, target, blocks);
+            }
+            if step < COARSE_TOLERANCE * gauge.radius_m && !wide {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// Lowers the variance of what is not aligned to what the residuals show.
+    fn narrow(&mut self, track: &mut Track, source: &OrganisedFrame, target: &OrganisedFrame, blocks: &[Block]) {
+        let (moved, _) = moved(track, source, target);
+        residuals(&moved, &track.rules, blocks, SAMPLE, &mut self.scratch);
+        let square = (MAD * quantile(&mut self.scratch, 0.5)).powi(2) as f32;
+        track.rules.extra_variance *= square.clamp(0.05, 1.0);
+    }
+
+    /// Iterates on all points until the pose stands.
+    fn settle(&mut self, track: &mut Track, source: &OrganisedFrame, target: &OrganisedFrame) -> Result<StopReason> {
+        let blocks = &source.points.blocks[..];
+        if self.hold() == Hold::Undetermined {
+            let (moved, gauge) = moved(track, source, target);
+            let limit = self.max_motion_sigma_m(&gauge);
+            let verdict = Verdict::new(&moved, &track.rules, blocks, limit, Residuals::Settled, &mut self.cells)?;
+            track.held = verdict.held();
+        }
+        track.rules.extra_variance = 0.0;
+        let mut narrowed = 0;
+        while track.iterations < self.options.max_iterations {
+            if narrowed < 3 {
+                self.rescale(track, source, target, narrowed == 0);
+                narrowed += 1;
+            }
+            let (step, gauge) = self.step(track, source, target, blocks, 0.0)?;
+            if step <= self.options.step_tolerance_m.unwrap_or(1e-5 * gauge.radius_m) && narrowed >= 3 {
+                return Ok(StopReason::Converged);
+            }
+        }
+        Ok(StopReason::MaxIterations)
+    }
+
+    /// Sets the reach of the kernel from the residuals.
+    fn rescale(&mut self, track: &mut Track, source: &OrganisedFrame, target: &OrganisedFrame, first: bool) {
+        let (moved, _) = moved(track, source, target);
+        if first {
+            track.rules.reach = 10.0 * BIWEIGHT;
+        }
+        residuals(&moved, &track.rules, &source.points.blocks, SAMPLE, &mut self.scratch);
+        let scale = (MAD * quantile(&mut self.scratch, 0.5)).max(0.1) as f32;
+        track.rules.reach = BIWEIGHT * scale;
+    }
+
+    /// One step, and how far it moves points at the radius, metre.
+    fn step(
+        &mut self,
+        track: &mut Track,
+        source: &OrganisedFrame,
+        target: &OrganisedFrame,
+        blocks: &[Block],
+        ridge: f64,
+    ) -> Result<(f64, Gauge)> {
+        let (moved, gauge) = moved(track, source, target);
+        let normal = normal_equations(&moved, &track.rules, blocks, &mut self.chunks);
+        if normal.pairs < self.options.min_correspondences {
+            return Err(self.too_few(normal.pairs, source.len(), track));
+        }
+        let step = solve(&normal, &track.held, ridge)?;
+        track.pose = turned(&track.pose, &step, &gauge);
+        track.iterations += 1;
+        Ok((step.norm(), gauge))
+    }
+
+    fn result(
+        &mut self,
+        track: &Track,
+        source: &OrganisedFrame,
+        target: &OrganisedFrame,
+        guess: &Isometry3<f64>,
+        stop: StopReason,
+    ) -> Result<IcpResult> {
+        let (moved, gauge) = moved(track, source, target);
+        let normal = normal_equations(&moved, &track.rules, &source.points.blocks, &mut self.chunks);
+        let limit = self.max_motion_sigma_m(&gauge);
+        let verdict =
+            Verdict::new(&moved, &track.rules, &source.points.blocks, limit, Residuals::Settled, &mut self.cells)?;
+        let mut pose = track.pose;
+        let to_tangent = tangent_from_centred(&pose, &gauge.centre, gauge.radius_m);
+        let centred = if let Some(prior) = &self.options.prior {
+            let what = "the tangent of the pose";
+            let from_tangent = to_tangent.try_inverse().ok_or(Error::Numerical { what, why: "it is singular" })?;
+            let offset = from_tangent * pose_difference(&pose, guess);
+            let prior = symmetrised(&(from_tangent * prior * from_tangent.transpose()));
+            let (step, covariance) = verdict.fused(&offset, &prior)?;
+            pose = step_pose(&pose, &(to_tangent * step));
+            covariance
+        } else {
+            verdict.covariance(gauge.radius_m, self.hold())
+        };
+        Ok(IcpResult {
+            target_from_source: pose,
+            covariance: symmetrised(&(to_tangent * centred * to_tangent.transpose())),
+            overlap: normal.pairs as f64 / source.len() as f64,
+            rms_m: (normal.square / normal.weight).sqrt(),
+            iterations: track.iterations,
+            stop,
+            correspondences: normal.pairs,
+            max_correspondence_distance_m: f64::from(track.rules.reach) * (normal.pairs as f64 / normal.weight).sqrt(),
+            degenerate: verdict.undetermined(&gauge.centre, gauge.radius_m),
+        })
+    }
+
+    /// With a prior, what the frames do not determine comes from it, and must not slide before.
+    fn hold(&self) -> Hold {
+        let hold = self.options.degeneracy == DegeneracyPolicy::HoldAtGuess || self.options.prior.is_some();
+        if hold { Hold::Undetermined } else { Hold::Nothing }
+    }
+
+    fn max_motion_sigma_m(&self, gauge: &Gauge) -> f64 {
+        self.options.max_motion_sigma_m.unwrap_or(gauge.radius_m / 300.0)
+    }
+
+    fn too_few(&self, found: usize, of: usize, track: &Track) -> Error {
+        Error::TooFewCorrespondences {
+            found,
+            of,
+            needed: self.options.min_correspondences,
+            max_distance_m: f64::from(track.rules.reach * track.rules.extra_variance.sqrt()),
+            iteration: track.iterations,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::organised::Projection;
+
+    /// A corner of three planes, seen from different places: `shift` along the axis.
+    fn corner(shift: f64) -> Vec<[f64; 3]> {
+        let ray = |k: usize| ((k % 160) as f64 / 160.0 - 0.5, 0.4 - (k / 160) as f64 / 160.0);
+        let depth = |(u, v): (f64, f64)| {
+            let planes = [(u + 1.0, 2.0), (1.2 - u, 2.2), (1.0 - v, 2.1)];
+            planes
+                .map(|(slope, distance)| (distance - shift) / slope.max(0.1))
+                .into_iter()
+                .fold(f64::INFINITY, f64::min)
+        };
+        (0..160 * 120).map(ray).map(|r| [r.0 * depth(r), r.1 * depth(r), -depth(r)]).collect()
+    }
+
+    /// Where the lists begin and how much they hold: another place or size would mean that memory was asked for.
+    fn memory(aligner: &FrameAligner, frame: &OrganisedFrame) -> Vec<(usize, usize)> {
+        let mut memory = frame.memory();
+        memory.push((aligner.chunks.as_ptr() as usize, aligner.chunks.capacity()));
+        memory.push((aligner.scratch.as_ptr() as usize, aligner.scratch.capacity()));
+        memory.push((aligner.cells.as_ptr() as usize, aligner.cells.capacity()));
+        memory
+    }
+
+    #[test]
+    fn memory_is_used_again() {
+        let projection = Arc::new(Projection::pinhole(160, 120, [160.0; 2], [80.0, 64.0]).unwrap());
+        let mut aligner = FrameAligner::new(FrameAlignmentOptions::default()).unwrap();
+        let target = OrganisedFrame::new(&projection, &corner(0.0), None).unwrap();
+        let mut source = OrganisedFrame::new(&projection, &corner(0.02), None).unwrap();
+        let first = aligner.align(&source, &target, &Isometry3::identity()).unwrap();
+        let before = memory(&aligner, &source);
+        for shift in [0.01, 0.03, 0.02] {
+            source.update(&corner(shift), None).unwrap();
+            let again = aligner.align(&source, &target, &Isometry3::identity()).unwrap();
+            assert_eq!(memory(&aligner, &source), before);
+            if shift.to_bits() == 0.02_f64.to_bits() {
+                assert_eq!(again, first);
+            }
+        }
+    }
+}

@@ -62,57 +62,6 @@ pub fn accuracy(name: &str, survey: &Survey, runs: u64) -> Outcome<()> {
                         if found.settled { "" } else { " (not settled)" },
                         found.undetermined.len(),
                     );
-                    if std::env::var("DETAIL").is_ok() {
-                        for (k, pose) in found.world_from_station.iter().enumerate() {
-                            let world = truth[0] * found.world_from_station[0].inverse();
-                            let d = 1e3 * pose_difference(&truth[k], &(world * pose));
-                            let c = found.covariance[k];
-                            let s = |i: usize| 1e3 * c[(i, i)].sqrt();
-                            println!(
-                                "      {k}: {:.2} {:.2} {:.2} mm ({:.2} {:.2} {:.2}) {:.3} {:.3} {:.3} mrad ({:.3} {:.3} {:.3})",
-                                d[0],
-                                d[1],
-                                d[2],
-                                s(0),
-                                s(1),
-                                s(2),
-                                d[3],
-                                d[4],
-                                d[5],
-                                s(3),
-                                s(4),
-                                s(5)
-                            );
-                        }
-                        for p in &found.pairs {
-                            let t = truth[p.target].inverse() * truth[p.source];
-                            let (mm, deg) = pose_error(&p.result.target_from_source, &t);
-                            println!(
-                                "      pair {}-{}: {mm:.1} mm {deg:.2} deg off, overlap {:.2} rms {:.2} mm, {:?}",
-                                p.target,
-                                p.source,
-                                p.result.overlap,
-                                1e3 * p.result.rms_m,
-                                p.result.degenerate.len()
-                            );
-                        }
-                        for p in &found.refused {
-                            println!("      refused {}-{}: {}", p.target, p.source, p.reason);
-                        }
-                        for p in &found.surfaces {
-                            println!(
-                                "      {}-{}: overlap {:.2}, {} contacts, mean {:.2} rms {:.2} mm, {:.2} sigma, out {:.2}",
-                                p.target,
-                                p.source,
-                                p.overlap,
-                                p.contacts,
-                                1e3 * p.mean_m,
-                                1e3 * p.rms_m,
-                                p.rms_sigma,
-                                p.outliers
-                            );
-                        }
-                    }
                 }
                 Err(error) => println!("  {label:>22}: {error}"),
             }

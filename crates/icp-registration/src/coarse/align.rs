@@ -67,19 +67,9 @@ pub fn align_without_guess(
     options.validate()?;
     let (source, target) = with_common_voxels(source, target, options)?;
     let (source, target) = (source.as_ref(), target.as_ref());
-    let correspondences = correspondences(source, target, options);
     let voxel_m = target.voxel_m();
     let tolerance = Tolerance { distance: (options.tolerance_voxels * voxel_m) as f32, cosine: COSINE_TOLERANCE };
-    let candidates = candidates(&correspondences, tolerance, options);
-    let ranked = ranked(source, target, candidates, options.max_hypotheses);
-    let verified: Vec<Hypothesis> = ranked
-        .par_iter()
-        .map(|pose| {
-            let refined = refine(source, target, pose);
-            let verdict = Verdict::new(source, target, &refined.pose, 1);
-            Hypothesis { pose: refined.pose, verdict, determined: refined.determined, rms_m: refined.rms_m }
-        })
-        .collect();
+    let (correspondences, verified) = verified(source, target, tolerance, options);
     let (winner, rival) = best_two(&verified, voxel_m, source).ok_or(Error::NoAlignment {
         what: "consistent correspondences",
         found: 0.0,
@@ -98,6 +88,47 @@ pub fn align_without_guess(
         voxel_m,
     };
     check(alignment, options)
+}
+
+/// Poses `target_from_source` that the clouds allow, each different from the others, the best first, with their scores:
+/// for those who know more than two clouds and can choose. Nothing is refused here.
+#[cfg(feature = "multiview")]
+pub(crate) fn hypotheses(
+    source: &FeatureCloud,
+    target: &FeatureCloud,
+    options: &CoarseOptions,
+) -> Result<Vec<(Isometry3<f64>, f64)>> {
+    let (source, target) = with_common_voxels(source, target, options)?;
+    let (source, target) = (source.as_ref(), target.as_ref());
+    let voxel_m = target.voxel_m();
+    let tolerance = Tolerance { distance: (options.tolerance_voxels * voxel_m) as f32, cosine: COSINE_TOLERANCE };
+    let mut verified = verified(source, target, tolerance, options).1;
+    verified.sort_by(|a, b| b.verdict.score().total_cmp(&a.verdict.score()));
+    let mut kept: Vec<&Hypothesis> = Vec::new();
+    for hypothesis in &verified {
+        if !kept.iter().any(|other| is_same(&other.pose, &hypothesis.pose, voxel_m, source)) {
+            kept.push(hypothesis);
+        }
+    }
+    Ok(kept.iter().map(|h| (target.between_frames(source, &h.pose), h.verdict.score())).collect())
+}
+
+/// The correspondences, and the best poses of them, refined and judged.
+fn verified(
+    source: &FeatureCloud,
+    target: &FeatureCloud,
+    tolerance: Tolerance,
+    options: &CoarseOptions,
+) -> (Correspondences, Vec<Hypothesis>) {
+    let correspondences = correspondences(source, target, options);
+    let candidates = candidates(&correspondences, tolerance, options);
+    let ranked = ranked(source, target, candidates, options.max_hypotheses);
+    let verify = |pose: &Isometry3<f64>| {
+        let refined = refine(source, target, pose);
+        let verdict = Verdict::new(source, target, &refined.pose, 1);
+        Hypothesis { pose: refined.pose, verdict, determined: refined.determined, rms_m: refined.rms_m }
+    };
+    (correspondences, ranked.par_iter().map(verify).collect())
 }
 
 /// A refined pose between the clouds' middles.

@@ -38,7 +38,7 @@ pub struct FeatureCloud {
     surroundings: Surroundings,
     descriptor_radius: f32,
     /// Root mean square distance of the averaged points from their middle, metre.
-    pub(super) radius_m: f64,
+    pub(crate) radius_m: f64,
     viewpoint: Viewpoint,
     /// One set for each kind of descriptor, in the order of [`SurfaceDescriptors`], then what was added.
     pub(super) surface_features: Vec<FeatureSet>,

@@ -1,6 +1,8 @@
 //! Alignment of two clouds without a guess: descriptors, correspondences, consistent sets, verification.
 
 mod align;
+#[cfg(feature = "multiview")]
+mod among;
 mod cells;
 mod correspondences;
 mod descriptors;
@@ -22,7 +24,11 @@ mod surface;
 mod surroundings;
 mod view;
 
+#[cfg(feature = "multiview")]
+pub(crate) use align::hypotheses;
 pub use align::{CoarseAlignment, align_without_guess};
+#[cfg(feature = "multiview")]
+pub(crate) use among::{Placed, evidence, refined_among, with_one_voxel};
 pub use feature_cloud::FeatureCloud;
 pub use features::Features;
 pub use options::{CoarseOptions, Estimator, Matching, SurfaceDescriptors, Viewpoint};

@@ -30,18 +30,40 @@ pub(super) fn refine(source: &FeatureCloud, target: &FeatureCloud, pose: &Isomet
     let mut refined = Refined { pose: *pose, determined: 0.0, rms_m: f64::NAN };
     for level in [0, 1] {
         for _ in 0..STEPS[level] {
-            let system = System::new(source, target, &refined.pose, level);
+            let system = System::new(&pairs(source, target, &refined.pose, level), target.reduced.voxel_m, level);
             let Some(step) = system.step() else { return refined };
-            // The system stands about the mean of its pairs.
-            let turn = step.fixed_rows::<3>(3).into_owned() / system.radius;
-            let shift = step.fixed_rows::<3>(0) + system.centre
-                - moved(&Isometry3::identity(), Vector3::zeros(), turn).rotation * system.centre;
-            refined.pose = moved(&refined.pose, shift, turn);
+            refined.pose = system.moved(&refined.pose, &step);
             refined.rms_m = (system.squares / system.weight).sqrt();
             refined.determined = system.determined();
         }
     }
     refined
+}
+
+/// Brings a cloud onto all of those that have been placed: `world_from_middle` of each, and of the source.
+#[cfg(feature = "multiview")]
+pub(super) fn refine_among(
+    source: &FeatureCloud,
+    placed: &[(&FeatureCloud, Isometry3<f64>)],
+    pose: &Isometry3<f64>,
+    steps: usize,
+) -> Isometry3<f64> {
+    let mut pose = *pose;
+    for _ in 0..steps {
+        let mut all = Vec::new();
+        for (target, world_from_target) in placed {
+            let own = pairs(source, target, &(world_from_target.inverse() * pose), 1);
+            all.extend(own.into_iter().map(|pair| Pair {
+                point: world_from_target.rotation * pair.point + world_from_target.translation.vector,
+                normal: world_from_target.rotation * pair.normal,
+                residual: pair.residual,
+            }));
+        }
+        let system = System::new(&all, source.reduced.voxel_m, 1);
+        let Some(step) = system.step() else { return pose };
+        pose = system.moved(&pose, &step);
+    }
+    pose
 }
 
 struct System {
@@ -60,8 +82,7 @@ struct Pair {
 }
 
 impl System {
-    fn new(source: &FeatureCloud, target: &FeatureCloud, pose: &Isometry3<f64>, level: usize) -> Self {
-        let pairs = pairs(source, target, pose, level);
+    fn new(pairs: &[Pair], voxel_m: f64, level: usize) -> Self {
         let count = pairs.len().max(1) as f64;
         let centre = pairs.iter().fold(Vector3::zeros(), |sum, p| sum + p.point) / count;
         let spread: f64 = pairs.iter().map(|p| (p.point - centre).norm_squared()).sum();
@@ -71,10 +92,10 @@ impl System {
             weight: 0.0,
             squares: 0.0,
             centre,
-            radius: (spread / count).sqrt().max(target.reduced.voxel_m),
+            radius: (spread / count).sqrt().max(voxel_m),
         };
-        let scale = SCALES[1 - level] * target.reduced.voxel_m;
-        for pair in &pairs {
+        let scale = SCALES[1 - level] * voxel_m;
+        for pair in pairs {
             system.add(pair, scale);
         }
         system
@@ -97,6 +118,13 @@ impl System {
         }
         let damped = self.normal + Matrix6::identity() * (DAMPING * self.normal.trace() / 6.0);
         damped.cholesky().map(|factor| factor.solve(&self.right)).filter(|s| s.iter().all(|v| v.is_finite()))
+    }
+
+    /// The pose after a step; the system stands about the mean of its pairs.
+    fn moved(&self, pose: &Isometry3<f64>, step: &Vector6<f64>) -> Isometry3<f64> {
+        let turn = step.fixed_rows::<3>(3).into_owned() / self.radius;
+        let turned = moved(&Isometry3::identity(), Vector3::zeros(), turn).rotation * self.centre;
+        moved(pose, step.fixed_rows::<3>(0) + self.centre - turned, turn)
     }
 
     fn determined(&self) -> f64 {

@@ -1,21 +1,208 @@
-//! Alignment of pairs of which nothing is known.
+//! Poses of stations of which at most the order is known.
+//!
+//! Two clouds alone are often ambiguous: the opposite corner of a room resembles its counterpart, and a neighbour that
+//! overlaps little may fit better when turned by 180 degrees. So each pair gives several poses, and stations are placed
+//! one after the other with several arrangements kept, each judged by all its pairs of stations: a wrong turn puts walls
+//! into space that some station looked through.
 
 use nalgebra::Isometry3;
 use rayon::prelude::*;
 
+use super::registration::Start;
 use crate::cloud::Cloud;
-use crate::coarse::{CoarseOptions, FeatureCloud, align_without_guess};
-use crate::error::Result;
+use crate::coarse::{CoarseOptions, FeatureCloud, Placed, evidence, hypotheses, refined_among, with_one_voxel};
+use crate::error::{Error, Result};
 
-/// A pose `target_from_source` for each pair (target, source), or why there is none.
-pub(super) fn poses(stations: &[Cloud], pairs: &[(usize, usize)]) -> Vec<Result<Isometry3<f64>>> {
-    let options = CoarseOptions::default();
-    let features: Vec<Result<FeatureCloud>> =
+/// Poses of a pair that are verified, and those that are used.
+const VERIFIED: usize = 24;
+const HYPOTHESES: usize = 16;
+/// Arrangements that are kept.
+const ARRANGEMENTS: usize = 12;
+/// Of the sampled points, one in this many ranks the arrangements.
+const STRIDE: usize = 4;
+/// Steps of a station onto those placed before it, and sweeps over all at the end.
+const STEPS: usize = 4;
+const SWEEPS: usize = 4;
+/// Poses of a station nearer than this are one, voxels.
+const SAME_VOXELS: f64 = 3.0;
+
+/// Stations that may overlap, with the poses `target_from_source` that features allow, the best first.
+struct Candidate {
+    target: usize,
+    source: usize,
+    poses: Vec<(Isometry3<f64>, f64)>,
+}
+
+/// Poses of the stations placed so far.
+#[derive(Clone)]
+struct Arrangement {
+    poses: Vec<Option<Isometry3<f64>>>,
+    score: f64,
+}
+
+/// Poses of all stations, right to a part of a voxel, and the size of the voxels.
+pub(super) fn arranged(stations: &[Cloud], start: Start<'_>, held: usize) -> Result<(Vec<Isometry3<f64>>, f64)> {
+    let options = CoarseOptions { max_hypotheses: VERIFIED, ..CoarseOptions::default() };
+    let features: Result<Vec<FeatureCloud>> =
         stations.par_iter().map(|cloud| FeatureCloud::new(cloud, &options)).collect();
-    let align = |&(target, source): &(usize, usize)| {
-        let (target, source) = (features[target].as_ref(), features[source].as_ref());
-        let (target, source) = (target.map_err(Clone::clone)?, source.map_err(Clone::clone)?);
-        Ok(align_without_guess(source, target, &options)?.target_from_source)
+    let clouds = with_one_voxel(features?, &options)?;
+    let voxel_m = clouds[0].voxel_m();
+    let pairs = pairs(start, clouds.len());
+    let candidate = |&(target, source): &(usize, usize)| {
+        let mut poses = hypotheses(&clouds[source], &clouds[target], &options)?;
+        poses.truncate(HYPOTHESES);
+        Ok(Candidate { target, source, poses })
     };
-    pairs.par_iter().map(align).collect()
+    let candidates: Result<Vec<Candidate>> = pairs.par_iter().map(candidate).collect();
+    let search = Search { clouds: &clouds, candidates: &candidates? };
+    let best = search.best();
+    let missing: Vec<usize> = (0..clouds.len()).filter(|&station| best.poses[station].is_none()).collect();
+    if !missing.is_empty() {
+        let reasons = vec!["no pose of theirs fits what the others saw".to_owned()];
+        return Err(Error::UnconnectedStations { stations: missing, to: held, reasons });
+    }
+    let mut poses: Vec<Isometry3<f64>> = best.poses.into_iter().flatten().collect();
+    let to_held = poses[held].inverse();
+    poses.iter_mut().for_each(|pose| *pose = to_held * *pose);
+    search.swept(&mut poses, held);
+    Ok((poses, voxel_m))
+}
+
+/// Pairs that are aligned: the next two stations of each, the first ones with the last; or all.
+fn pairs(start: Start<'_>, count: usize) -> Vec<(usize, usize)> {
+    let near = |target: usize, source: usize| source - target <= 2 || target + count - source <= 2;
+    let wanted = |target: usize, source: usize| matches!(start, Start::Nothing) || near(target, source);
+    (0..count).flat_map(|t| (t + 1..count).map(move |s| (t, s))).filter(|&(t, s)| wanted(t, s)).collect()
+}
+
+struct Search<'a> {
+    clouds: &'a [FeatureCloud],
+    candidates: &'a [Candidate],
+}
+
+impl Search<'_> {
+    /// The arrangement that most speaks for and least against.
+    fn best(&self) -> Arrangement {
+        let count = self.clouds.len();
+        let (first, order) = self.order();
+        let mut poses = vec![None; count];
+        poses[first] = Some(Isometry3::identity());
+        let mut kept = vec![Arrangement { poses, score: 0.0 }];
+        // A station that nothing leads to yet is tried again among all others.
+        for _ in 0..2 {
+            for &station in &order {
+                if kept[0].poses[station].is_none() {
+                    kept = self.extended(&kept, station);
+                }
+            }
+        }
+        kept.swap_remove(0)
+    }
+
+    /// The first station and the others, each the one with the best pair among those placed before it.
+    fn order(&self) -> (usize, Vec<usize>) {
+        let score = |c: &Candidate| c.poses.first().map_or(f64::NEG_INFINITY, |pose| pose.1);
+        let best = |open: &dyn Fn(&Candidate) -> bool| {
+            let fits = self.candidates.iter().filter(|c| open(c));
+            fits.fold(
+                None,
+                |best: Option<&Candidate>, c| if best.is_some_and(|b| score(b) >= score(c)) { best } else { Some(c) },
+            )
+        };
+        let first = best(&|_| true).map_or(0, |c| c.target);
+        let mut placed = vec![false; self.clouds.len()];
+        placed[first] = true;
+        let mut order = Vec::new();
+        while let Some(next) = best(&|c| placed[c.target] != placed[c.source]) {
+            let station = if placed[next.target] { next.source } else { next.target };
+            placed[station] = true;
+            order.push(station);
+        }
+        (first, order)
+    }
+
+    /// The best arrangements with one station more; those as they are where it fits nowhere.
+    fn extended(&self, kept: &[Arrangement], station: usize) -> Vec<Arrangement> {
+        let extensions: Vec<(usize, Isometry3<f64>)> = kept
+            .iter()
+            .enumerate()
+            .flat_map(|(k, a)| self.proposals(a, station).into_iter().map(move |p| (k, p)))
+            .collect();
+        let rank = |(k, pose): &(usize, Isometry3<f64>), stride| {
+            kept[*k].score + self.evidence(&kept[*k], station, pose, stride)
+        };
+        let mut ranked: Vec<(f64, (usize, Isometry3<f64>))> =
+            extensions.par_iter().map(|extension| (rank(extension, STRIDE), *extension)).collect();
+        // Stable: equal ones stay in the order of the proposals.
+        ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
+        ranked.truncate(2 * ARRANGEMENTS);
+        let refined = |(_, (k, pose)): &(f64, (usize, Isometry3<f64>))| {
+            let pose = self.refined(&kept[*k].poses, station, pose, STEPS);
+            let mut next = kept[*k].clone();
+            next.poses[station] = Some(pose);
+            next.score = rank(&(*k, pose), 1);
+            (*k, next)
+        };
+        let mut next: Vec<(usize, Arrangement)> = ranked.par_iter().map(refined).collect();
+        next.retain(|(k, arrangement)| arrangement.score > kept[*k].score);
+        next.sort_by(|a, b| b.1.score.total_cmp(&a.1.score));
+        next.truncate(ARRANGEMENTS);
+        if next.is_empty() { kept.to_vec() } else { next.into_iter().map(|(_, arrangement)| arrangement).collect() }
+    }
+
+    /// Poses of a station by its pairs with those that have been placed, without repetitions.
+    fn proposals(&self, arrangement: &Arrangement, station: usize) -> Vec<Isometry3<f64>> {
+        let apart_m = SAME_VOXELS * self.clouds[station].voxel_m();
+        let radius_m = self.clouds[station].radius_m;
+        let mut found: Vec<Isometry3<f64>> = Vec::new();
+        for candidate in self.candidates {
+            let (other, inverted) = match station {
+                s if s == candidate.source => (candidate.target, false),
+                s if s == candidate.target => (candidate.source, true),
+                _ => continue,
+            };
+            let Some(placed) = arrangement.poses[other] else { continue };
+            for (pose, _) in &candidate.poses {
+                let pose = placed * if inverted { pose.inverse() } else { *pose };
+                let is_known = |other: &Isometry3<f64>| {
+                    let moved = (other.translation.vector - pose.translation.vector).norm();
+                    moved + radius_m * other.rotation.angle_to(&pose.rotation) < apart_m
+                };
+                if !found.iter().any(is_known) {
+                    found.push(pose);
+                }
+            }
+        }
+        found
+    }
+
+    fn evidence(&self, arrangement: &Arrangement, station: usize, pose: &Isometry3<f64>, stride: usize) -> f64 {
+        let own = (&self.clouds[station], *pose);
+        self.others(&arrangement.poses, station).iter().map(|other| evidence(other, &own, stride)).sum()
+    }
+
+    fn others(&self, poses: &[Option<Isometry3<f64>>], station: usize) -> Vec<Placed<'_>> {
+        let others = poses.iter().enumerate().filter(|(other, _)| *other != station);
+        others.filter_map(|(other, pose)| pose.map(|pose| (&self.clouds[other], pose))).collect()
+    }
+
+    fn refined(
+        &self,
+        poses: &[Option<Isometry3<f64>>],
+        station: usize,
+        pose: &Isometry3<f64>,
+        steps: usize,
+    ) -> Isometry3<f64> {
+        refined_among(&(&self.clouds[station], *pose), &self.others(poses, station), steps)
+    }
+
+    /// One station after the other onto all others, so that what has added up along the way is shared out.
+    fn swept(&self, poses: &mut [Isometry3<f64>], held: usize) {
+        for _ in 0..SWEEPS {
+            for station in (0..poses.len()).filter(|&station| station != held) {
+                let all: Vec<Option<Isometry3<f64>>> = poses.iter().copied().map(Some).collect();
+                poses[station] = self.refined(&all, station, &poses[station], 1);
+            }
+        }
+    }
 }

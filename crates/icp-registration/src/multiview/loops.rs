@@ -84,17 +84,15 @@ fn triangles(pairs: &[PairAlignment]) -> Vec<[usize; 3]> {
     found
 }
 
-/// Where poses come from before the adjustment.
+/// What the loops say about the pairs.
 pub(super) struct Skeleton {
-    /// Pose of each station; `None` where no pair leads to it.
-    pub poses: Vec<Option<Isometry3<f64>>>,
     /// For each pair whether the others agree with it.
     pub sound: Vec<bool>,
     /// Triangles, and each pair outside the tree with the tree's way between its stations.
     pub loops: Vec<LoopClosure>,
 }
 
-/// Poses along the tree of the pairs that most loops confirm, and the pairs that contradict it.
+/// Which pairs agree with the tree of those that most loops confirm, and how the loops close.
 ///
 /// `tolerance_m`: how far a loop may fail to close, rotations at `lever_m`; far above the error of a right pair and far
 /// below that of a wrong one.
@@ -144,7 +142,7 @@ pub(super) fn skeleton(
     });
     let sound = sound.collect();
     loops.extend(long_loops(pairs, &reached_by));
-    Skeleton { poses, sound, loops }
+    Skeleton { sound, loops }
 }
 
 /// The three pairs in the order in which they lead from `first` back to it.

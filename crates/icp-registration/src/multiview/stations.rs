@@ -21,6 +21,11 @@ use crate::kernel::quantile;
 use crate::normals::{UnorganisedNormalOptions, unorganised_normals};
 use crate::pose::is_finite;
 
+/// Default of the error of approximate poses, in radii of the clouds.
+const START_ERROR: f64 = 0.2;
+/// Error of poses found without any, voxels.
+const ARRANGED_ERROR: f64 = 2.0;
+
 /// Brings the clouds of many stations into one coordinate system.
 ///
 /// Pairs that overlap are aligned, pairs that contradict the loops of the others are left out, and then all stations are
@@ -46,14 +51,12 @@ pub fn register_stations(
     let patch_m = surfaces[0].size_m;
     let radius_m = surfaces.iter().map(|surface| surface.radius_m).fold(0.0, f64::max);
     let starter = Starter { surfaces: &surfaces, options, patch_m, radius_m, datum, progress };
-    let blind = match start {
-        Start::Poses(_) => None,
-        _ => Some(starter.without_poses(start, &|pairs| super::blind::poses(stations, pairs))?),
-    };
-    let poses = match (start, &blind) {
-        (Start::Poses(poses), _) => poses.to_vec(),
-        (_, Some(started)) => started.poses.clone(),
-        _ => Vec::new(),
+    let (poses, reach_m) = match start {
+        Start::Poses(poses) => (poses.to_vec(), options.start_error_m.unwrap_or(START_ERROR * radius_m)),
+        _ => {
+            let (poses, voxel_m) = super::blind::arranged(stations, start, datum.held_station())?;
+            (poses, (ARRANGED_ERROR * voxel_m).max(patch_m))
+        }
     };
     let (prior, names) = match options.model {
         Some(model) => (checked_prior(model)?, model.names()),
@@ -61,7 +64,7 @@ pub fn register_stations(
     };
     let course = Course {
         network: Network { fixed: datum.held_station(), hold_m: radius_m, names: &names, prior: &prior },
-        reach_m: starter.reach_m(start),
+        reach_m,
         minimum_contacts: options.minimum_contacts,
         kernel: options.kernel,
         max_rounds: options.max_rounds,
@@ -72,10 +75,7 @@ pub fn register_stations(
     modelled.model = options.model.map(|model| (model, stations.iter().map(Cloud::len).collect()));
     let adjusted = course.run(&mut modelled, State { poses: poses.clone(), parameters: prior.0.clone() })?;
     require_connected(&adjusted, datum)?;
-    let started = match blind {
-        Some(started) => started,
-        None => Started { poses, ..starter.check(&adjusted.state.poses)? },
-    };
+    let started = Started { poses, ..starter.check(&adjusted.state.poses)? };
     let result = finish(&modelled, started, adjusted, &course.network, datum);
     let prepared = match modelled.modelled {
         Some((modelled, _)) => modelled,

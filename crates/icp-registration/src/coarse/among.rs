@@ -1,0 +1,49 @@
+//! Judging a cloud among many: what speaks for its pose, and its refinement against all that have been placed.
+
+use nalgebra::{Isometry3, Translation3};
+
+use super::feature_cloud::FeatureCloud;
+use super::judge::{Count, Verdict};
+use super::options::CoarseOptions;
+use super::refine;
+use crate::error::Result;
+
+/// Points that miss the surface they should lie on, and points in space that the other camera looked through, each
+/// outweigh this many points with a partner: where two poses differ, both find partners on walls that are alike, and
+/// only the wrong one misses more than a few in a hundred.
+const WEIGHT_OF_MISSED: f64 = 4.0;
+const WEIGHT_OF_FREE: f64 = 8.0;
+
+/// The clouds in voxels of one size, that of the coarsest.
+pub(crate) fn with_one_voxel(clouds: Vec<FeatureCloud>, options: &CoarseOptions) -> Result<Vec<FeatureCloud>> {
+    let voxel_m = clouds.iter().map(FeatureCloud::voxel_m).fold(0.0, f64::max);
+    let coarse = |cloud: FeatureCloud| {
+        if cloud.voxel_m() < 0.999 * voxel_m { cloud.coarsened(voxel_m, options) } else { Ok(cloud) }
+    };
+    clouds.into_iter().map(coarse).collect()
+}
+
+/// A cloud and its pose `world_from_cloud`.
+pub(crate) type Placed<'a> = (&'a FeatureCloud, Isometry3<f64>);
+
+fn from_middle(placed: &Placed<'_>) -> Isometry3<f64> {
+    placed.1 * Translation3::from(placed.0.reduced.middle)
+}
+
+/// What speaks for two clouds lying like this, in sampled points: those with a partner less those that contradict.
+/// Every `stride`-th sampled point is looked at. Clouds that see nothing in common have none.
+pub(crate) fn evidence(a: &Placed<'_>, b: &Placed<'_>, stride: usize) -> f64 {
+    let pose = from_middle(a).inverse() * from_middle(b);
+    let verdict = Verdict::new(b.0, a.0, &pose, stride);
+    let of = |count: &Count| {
+        count.hits as f64 - WEIGHT_OF_MISSED * count.missed as f64 - WEIGHT_OF_FREE * count.in_free as f64
+    };
+    (of(&verdict.source) + of(&verdict.target)) * stride as f64
+}
+
+/// Brings a cloud that is nearly in place onto all those around it, point to plane.
+pub(crate) fn refined_among(source: &Placed<'_>, around: &[Placed<'_>], steps: usize) -> Isometry3<f64> {
+    let targets: Vec<(&FeatureCloud, Isometry3<f64>)> = around.iter().map(|t| (t.0, from_middle(t))).collect();
+    let pose = refine::refine_among(source.0, &targets, &from_middle(source), steps);
+    pose * Translation3::from(-source.0.reduced.middle)
+}

@@ -119,6 +119,22 @@ pub enum Error {
         /// Largest extent of the cloud along an axis, metre.
         extent_m: f64,
     },
+    /// Two parts of a registration do not work together.
+    #[error("{what} does not work with {with}")]
+    Incompatible {
+        /// The part.
+        what: &'static str,
+        /// What it was combined with.
+        with: &'static str,
+    },
+    /// A triangle names a vertex that is not there.
+    #[error("a triangle names vertex {vertex}, but there are {count} (from 0)")]
+    NoSuchVertex {
+        /// The index.
+        vertex: usize,
+        /// Number of vertices.
+        count: usize,
+    },
 }
 
 /// Result of this crate.

@@ -6,19 +6,25 @@ mod eigen;
 mod error;
 mod icp;
 mod kernel;
+#[cfg(feature = "mesh")]
+mod mesh;
 #[cfg(feature = "multiview")]
 mod multiview;
 mod neighbours;
 mod normals;
+pub mod parts;
 mod pose;
 mod voxels;
 
-pub use absolute_orientation::{Orientation, Similarity, absolute_orientation, absolute_orientation_with_scale};
+pub use absolute_orientation::{
+    Orientation, RotationMethod, Similarity, absolute_orientation, absolute_orientation_by,
+    absolute_orientation_with_scale,
+};
 pub use cloud::Cloud;
 pub use error::{Error, Result};
 pub use icp::{
-    DegeneracyPolicy, IcpOptions, IcpResult, IcpTarget, Metric, MotionKind, Selection, StopReason, UndeterminedMotion,
-    align,
+    Alternative, DegeneracyPolicy, IcpOptions, IcpResult, IcpTarget, Levels, Metric, MotionKind, Registration,
+    Selection, Starts, StopReason, System, UndeterminedMotion, align,
 };
 pub use kernel::RobustKernel;
 #[cfg(feature = "multiview")]

@@ -13,6 +13,7 @@ mod multiview;
 mod neighbours;
 mod normals;
 pub mod parts;
+mod organised;
 mod pose;
 mod voxels;
 
@@ -35,5 +36,6 @@ pub use multiview::{
 };
 pub use neighbours::{Neighbour, NeighbourTree};
 pub use normals::{OrganisedNormalOptions, UnorganisedNormalOptions, organised_normals, unorganised_normals};
+pub use organised::{FrameAligner, FrameAlignmentOptions, OrganisedFrame, Projection, align_frames};
 pub use pose::{inverse_covariance_transport, pose_difference, step_pose};
 pub use voxels::downsample;

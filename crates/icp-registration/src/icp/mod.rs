@@ -2,7 +2,7 @@
 
 mod descent;
 mod matching;
-mod motion;
+pub(crate) mod motion;
 mod options;
 mod prior;
 mod quality;

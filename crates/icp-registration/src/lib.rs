@@ -2,6 +2,7 @@
 
 mod absolute_orientation;
 mod cloud;
+mod coarse;
 mod eigen;
 mod error;
 mod icp;
@@ -22,6 +23,10 @@ pub use absolute_orientation::{
     absolute_orientation_with_scale,
 };
 pub use cloud::Cloud;
+pub use coarse::{
+    CoarseAlignment, CoarseOptions, Estimator, FeatureCloud, Features, Matching, SurfaceDescriptors, SurfaceRadii,
+    Viewpoint, align_without_guess,
+};
 pub use error::{Error, Result};
 pub use icp::{
     Alternative, DegeneracyPolicy, IcpOptions, IcpResult, IcpTarget, Levels, Metric, MotionKind, Registration,

@@ -163,6 +163,16 @@ pub enum Error {
         /// Correspondences between the clouds.
         correspondences: usize,
     },
+    /// No alignment that holds leads to some stations.
+    #[error("nothing connects stations {stations:?} to station {to} ({})", .reasons.join("; "))]
+    UnconnectedStations {
+        /// The stations that are left alone.
+        stations: Vec<usize>,
+        /// A station of the part that holds together.
+        to: usize,
+        /// Why pairs that touch them were refused: source to target, and the reason.
+        reasons: Vec<String>,
+    },
 }
 
 /// Result of this crate.

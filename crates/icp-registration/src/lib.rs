@@ -35,9 +35,10 @@ pub use icp::{
 pub use kernel::RobustKernel;
 #[cfg(feature = "multiview")]
 pub use multiview::{
-    Datum, Overlap, PairAlignment, PairConstraint, PairResidual, RefusedPair, StationAdjustment,
-    StationAdjustmentOptions, SurfaceAdjustment, SurfaceAdjustmentOptions, adjust_stations, adjust_surfaces,
-    align_pairs, find_overlaps,
+    Datum, LoopClosure, Overlap, PairAlignment, PairConstraint, PairResidual, PointModel, RefusedPair,
+    SharedParameters, Start, StationAdjustment, StationAdjustmentOptions, StationRegistration,
+    StationRegistrationOptions, SurfaceAdjustment, SurfaceAdjustmentOptions, SurfacePair, UndeterminedStation,
+    adjust_stations, adjust_surfaces, align_pairs, find_overlaps, register_stations,
 };
 pub use neighbours::{Neighbour, NeighbourTree};
 pub use normals::{OrganisedNormalOptions, UnorganisedNormalOptions, organised_normals, unorganised_normals};

@@ -2,6 +2,7 @@
 #![allow(dead_code, clippy::unwrap_used, clippy::expect_used, clippy::panic, missing_docs)]
 
 pub mod scenes;
+pub mod stations;
 
 use icp_registration::{Cloud, OrganisedNormalOptions, organised_normals};
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};

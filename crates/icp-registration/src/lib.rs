@@ -16,6 +16,7 @@ mod normals;
 pub mod parts;
 mod organised;
 mod pose;
+mod quality;
 mod voxels;
 
 pub use absolute_orientation::{
@@ -44,4 +45,4 @@ pub use neighbours::{Neighbour, NeighbourTree};
 pub use normals::{OrganisedNormalOptions, UnorganisedNormalOptions, organised_normals, unorganised_normals};
 pub use organised::{FrameAligner, FrameAlignmentOptions, OrganisedFrame, Projection, align_frames};
 pub use pose::{inverse_covariance_transport, pose_difference, step_pose};
-pub use voxels::downsample;
+pub use voxels::{VoxelAlignmentOptions, VoxelCloud, VoxelOptions, downsample};

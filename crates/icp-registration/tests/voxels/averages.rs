@@ -1,7 +1,4 @@
-//! Clouds in voxels: averages, and registration of unorganised clouds.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, missing_docs)]
-
-mod common;
+//! One averaged point for each cube.
 
 use std::collections::BTreeMap;
 

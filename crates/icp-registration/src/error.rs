@@ -173,6 +173,16 @@ pub enum Error {
         /// Why pairs that touch them were refused: source to target, and the reason.
         reasons: Vec<String>,
     },
+    /// A part of a registration names a point that is not there.
+    #[error("{part} names point {point}, but there are {count} (from 0)")]
+    NoSuchPoint {
+        /// The part.
+        part: &'static str,
+        /// The index.
+        point: usize,
+        /// Number of points.
+        count: usize,
+    },
 }
 
 /// Result of this crate.

@@ -168,3 +168,33 @@ fn every_part_can_come_from_outside() {
         assert!(count.load(Ordering::Relaxed) > 0, "part {part} was not asked");
     }
 }
+
+#[test]
+fn parts_that_name_missing_points_are_refused() {
+    struct Beyond;
+    impl PointSelection for Beyond {
+        fn select(&self, scene: &Scene<'_>) -> Result<Vec<usize>> {
+            Ok(vec![0, scene.source.len()])
+        }
+    }
+    struct Nowhere<'a>(&'a IcpTarget);
+    impl PointMatching for Nowhere<'_> {
+        fn target(&self) -> TargetSurface<'_> {
+            TargetSurface { cloud: Some(self.0.cloud()), radius_m: 1.0, spacing_m: 0.1, exact_normals: false }
+        }
+
+        fn partner(&self, query: &Query) -> Partner {
+            let (point, normal) = (query.moved, query.normal);
+            Partner { found: true, target: Some(usize::MAX), point, normal, margin_m: 0.0 }
+        }
+    }
+    let camera = Pinhole { width: 44, height: 36, focal_px: 38.0 };
+    let source = cloud(&Room::furnished(), &camera, &look_at([-1.5, -1.0, 1.4], [2.0, 0.8, 0.8]), 1.0, 1);
+    let target = IcpTarget::new(source.clone()).unwrap();
+    let identity = nalgebra::Isometry3::identity();
+    let mut registration = Registration::new(Nowhere(&target));
+    let missing = |result: Result<_>| matches!(result, Err(icp_registration::Error::NoSuchPoint { .. }));
+    assert!(missing(registration.align(&source, &identity).map(|_| ())));
+    registration.selection = Box::new(Beyond);
+    assert!(missing(registration.align(&source, &identity).map(|_| ())));
+}

@@ -114,16 +114,25 @@ impl<'a> Alternative<'a> {
     }
 }
 
+/// How well a sample fits at a pose.
+#[derive(Clone, Copy)]
+struct Fit {
+    /// Number of pairs, each weighted by its residual.
+    weight: f64,
+    /// Share of the sample that has a partner.
+    share: f64,
+}
+
 /// Fraction of the distance limit at which a residual counts half in the comparison of tracks.
 const FIT_RESIDUAL: f64 = 1.0 / 12.0;
 
 /// The first track with the best fit, or the first error.
-fn best_of(tracks: Vec<Result<(f64, Track)>>) -> Result<(f64, Track)> {
-    let mut best: Option<Result<(f64, Track)>> = None;
+fn best_of(tracks: Vec<Result<(Fit, Track)>>) -> Result<(Fit, Track)> {
+    let mut best: Option<Result<(Fit, Track)>> = None;
     for track in tracks {
         best = match (best, track) {
             (None, track) => Some(track),
-            (Some(Ok(before)), Ok(track)) if track.0 > before.0 => Some(Ok(track)),
+            (Some(Ok(before)), Ok(track)) if track.0.weight > before.0.weight => Some(Ok(track)),
             (Some(Err(_)), Ok(track)) => Some(Ok(track)),
             (before, _) => before,
         };
@@ -140,17 +149,16 @@ impl<'p> Engine<'p> {
         let Some(starts) = self.parts.starts.filter(|_| self.parts.levels.first_limit_m.is_none()) else {
             return from_guess.map(|(_, track)| track);
         };
-        let fit = from_guess.as_ref().map_or(0.0, |(fit, _)| *fit);
-        if fit >= starts.convincing * sample.len() as f64 {
+        if from_guess.as_ref().is_ok_and(|(fit, _)| fit.share >= starts.convincing) {
             return from_guess.map(|(_, track)| track);
         }
         let scouts = thinned(&sample, starts.points);
         let sum = |sum: Vector3<f64>, &i: &usize| sum + (guess * self.scene.source.points[i]).coords;
         let centre = scouts.iter().fold(Vector3::zeros(), sum) / scouts.len().max(1) as f64;
-        let mut tracks: Vec<(f64, Track)> =
+        let mut tracks: Vec<(Fit, Track)> =
             self.tracks(&scouts, &starts.around(guess, &centre, limits[0]), limits).into_iter().flatten().collect();
         // Stable: equal tracks stay in the order of the starts.
-        tracks.sort_by(|a, b| b.0.total_cmp(&a.0));
+        tracks.sort_by(|a, b| b.0.weight.total_cmp(&a.0.weight));
         let poses: Vec<Isometry3<f64>> = tracks.iter().take(starts.refined).map(|(_, track)| track.pose).collect();
         let fine = &limits[limits.len().saturating_sub(2)..];
         let mut refined = vec![from_guess];
@@ -160,7 +168,7 @@ impl<'p> Engine<'p> {
 
     /// The tracks from all starts by all alternatives with their fit on the sample, in that order whatever thread was
     /// first.
-    fn tracks(&self, sample: &[usize], starts: &[Isometry3<f64>], limits: &[f64]) -> Vec<Result<(f64, Track)>> {
+    fn tracks(&self, sample: &[usize], starts: &[Isometry3<f64>], limits: &[f64]) -> Vec<Result<(Fit, Track)>> {
         let alternatives: Vec<Engine<'_>> = match self.parts.alternatives.as_slice() {
             [] => vec![self.with(None)],
             some => some.iter().map(|alternative| self.with(Some(alternative))).collect(),
@@ -204,13 +212,15 @@ impl<'p> Engine<'p> {
         Ok(track)
     }
 
-    /// How well a sample fits at a pose: its number of pairs, each weighted by its residual.
-    fn fit(&self, sample: &[usize], track: &Track, limits: &[f64]) -> Result<f64> {
+    /// How well a sample fits at the end of a track.
+    fn fit(&self, sample: &[usize], track: &Track, limits: &[f64]) -> Result<Fit> {
         let moment = self.moment(track, limits, limits.len() - 1, 0);
         let scene = self.scene.at(moment);
         let pairs = self.gated_pairs(&scene, &mut Points::new(sample.to_vec()))?;
         let system = System::new(&scene, self.metric, &pairs, (RobustKernel::None, 1.0));
         let unit = FIT_RESIDUAL * moment.limit_m;
-        Ok((0..pairs.len()).map(|i| 1.0 / (1.0 + (system.residual_length(i) / unit).powi(2))).sum())
+        let half_at_unit = |i: usize| 1.0 / (1.0 + (system.residual_length(i) / unit).powi(2));
+        let share = pairs.len() as f64 / sample.len().max(1) as f64;
+        Ok(Fit { weight: (0..pairs.len()).map(half_at_unit).sum(), share })
     }
 }

@@ -4,6 +4,7 @@ use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use super::registration::Engine;
+use crate::cloud::Cloud;
 use crate::error::{Error, Result};
 use crate::neighbours::is_usable;
 use crate::parts::{Moment, Pair, Partner, Query, Scene};
@@ -97,6 +98,12 @@ impl Engine<'_> {
         let partner = memory.partner;
         if !partner.found {
             return Ok(None);
+        }
+        if let Some(point) = partner.target {
+            let count = scene.target.cloud.map_or(0, Cloud::len);
+            if point >= count {
+                return Err(Error::NoSuchPoint { part: "the matching", point, count });
+            }
         }
         // NaN stays NaN either way.
         let source_normal = if turned.dot(&partner.normal) < 0.0 { -turned } else { turned };

@@ -195,12 +195,13 @@ fn cells(system: &System<'_>) -> Vec<Cell> {
     let size = system.radius_m() / CELLS_PER_RADIUS;
     let mut cells: BTreeMap<[i64; 3], Cell> = BTreeMap::new();
     let mut buffers = [Rows::default(), Rows::default()];
+    let twin_weight = system.twin_weight();
     for (i, pair) in system.pairs().iter().enumerate() {
         let place = (pair.moved - system.centre()) / size;
         let cell = cells.entry([place.x.floor() as i64, place.y.floor() as i64, place.z.floor() as i64]).or_default();
         cell.score += system.score(i, &mut buffers[0]);
         let (_, slope) = system.weights(i);
-        add_information(system, i, slope, &mut buffers, &mut cell.information);
+        add_information(system, i, slope * twin_weight, &mut buffers, &mut cell.information);
     }
     cells.into_values().collect()
 }

@@ -110,7 +110,7 @@ impl<'a> Registration<'a> {
             &estimated
         };
         let engine = Engine::new(self, source, normals, guess)?;
-        let selected = self.selection.select(&engine.scene)?;
+        let selected = engine.selected()?;
         let limits = self.levels.limits(&engine, &selected, guess)?;
         let mut track = engine.descend(&selected, guess, &limits)?;
         let mut points = Points::new(selected);
@@ -152,6 +152,15 @@ impl<'p> Engine<'p> {
         let scene = Scene { source, source_normals, is_surface, target, moment };
         parts.validate(&scene)?;
         Ok(Self { parts, scene, metric: &*parts.metric, rejection: &parts.rejection, kernel: &*parts.kernel })
+    }
+
+    /// The selected points, all of which exist.
+    fn selected(&self) -> Result<Vec<usize>> {
+        let (selected, count) = (self.parts.selection.select(&self.scene)?, self.scene.source.len());
+        match selected.iter().find(|&&point| point >= count) {
+            Some(&point) => Err(Error::NoSuchPoint { part: "the selection", point, count }),
+            None => Ok(selected),
+        }
     }
 
     /// Iterates on all selected points at the last limit.

@@ -16,15 +16,15 @@ const ROOT_OF_SIX: f64 = 1.112_775_684_278_705_5;
 pub struct Starts {
     /// Number of starts besides the guess. Default 24.
     pub count: usize,
-    /// Farthest translation of a start along each axis, in units of the first distance limit.
+    /// Farthest translation of a start along each axis, in units of the first distance limit. Default 0.8.
     pub translation: f64,
-    /// Farthest rotation of a start about each axis, radian.
+    /// Farthest rotation of a start about each axis, radian. Default 0.35 (20 degrees).
     pub rotation_rad: f64,
-    /// Source points that a start goes down with.
+    /// Source points that a start goes down with. Default 500.
     pub points: usize,
-    /// Starts that are brought down with more points.
+    /// Starts that are brought down with more points. Default 4.
     pub refined: usize,
-    /// Share of the points that must fit for the guess to convince.
+    /// Share of the points that must have a partner for the guess to convince. Default 0.6.
     pub convincing: f64,
 }
 

@@ -146,6 +146,11 @@ impl<'a> System<'a> {
         terms.fold(Vector6::zeros(), |sum, (row, r)| sum + self.jacobian(pair, row) * (weight * r))
     }
 
+    /// Factor on the products of all twins.
+    pub(crate) fn twin_weight(&self) -> f64 {
+        self.metric.twin_weight(self.scene, self.pairs)
+    }
+
     /// What the metric's own derivatives say in two independent copies.
     pub(crate) fn twins(&self, pair: &Pair, a: &mut Rows, b: &mut Rows) {
         a.clear();

@@ -79,7 +79,7 @@ impl ErrorMetric for Coloured {
     }
 
     fn twins(&self, scene: &Scene<'_>, pair: &Pair, a: &mut Rows, b: &mut Rows) {
-        normal_twins(scene, pair, 1.0, a, b);
+        normal_twins(scene, pair, a, b);
         let source = self.source[pair.source];
         if let (Some((_, gradient)), false) = (self.gradient(pair), source.x.is_nan()) {
             let row = |gradient| Row { gradient, turn: Vector3::zeros(), residual: 0.0, channel: 1 };

@@ -99,7 +99,13 @@ pub trait ErrorMetric: Sync {
     /// says about the pose without what the noise of normals imitates. By default the directions of both normals; where
     /// the source has none and those of the target are exact, the target's twice.
     fn twins(&self, scene: &Scene<'_>, pair: &Pair, a: &mut Rows, b: &mut Rows) {
-        normal_twins(scene, pair, 1.0, a, b);
+        normal_twins(scene, pair, a, b);
+    }
+
+    /// Factor on the products of all twins. A weight that the noise of both normals decides pair by pair favours pairs in
+    /// which that noise agrees, and would give the products back the bias they are there to avoid.
+    fn twin_weight(&self, _scene: &Scene<'_>, _pairs: &[Pair]) -> f64 {
+        1.0
     }
 
     /// Whether the metric is the squared distance of points, as closed forms need.
@@ -113,14 +119,13 @@ pub trait ErrorMetric: Sync {
     }
 }
 
-/// The directions of both normals, scaled.
-fn normal_twins(scene: &Scene<'_>, pair: &Pair, scale: f64, a: &mut Rows, b: &mut Rows) {
-    let (target, source) = (pair.normal, pair.source_normal);
+/// The directions of both normals.
+fn normal_twins(scene: &Scene<'_>, pair: &Pair, a: &mut Rows, b: &mut Rows) {
     if pair.has_normals() {
-        a.push(Row::along(target * scale, 0.0));
-        b.push(Row::along(source * scale, 0.0));
-    } else if scene.target.exact_normals && !target.x.is_nan() {
-        a.push(Row::along(target * scale, 0.0));
-        b.push(Row::along(target * scale, 0.0));
+        a.push(Row::along(pair.normal, 0.0));
+        b.push(Row::along(pair.source_normal, 0.0));
+    } else if scene.target.exact_normals && !pair.normal.x.is_nan() {
+        a.push(Row::along(pair.normal, 0.0));
+        b.push(Row::along(pair.normal, 0.0));
     }
 }

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::{ErrorMetric, Row, Rows, normal_twins};
+use super::{ErrorMetric, Row, Rows};
 use crate::error::Result;
 use crate::parts::require_positive;
 use crate::parts::scene::{Pair, Scene};
@@ -65,9 +65,10 @@ impl ErrorMetric for PlaneToPlane {
         }
     }
 
-    fn twins(&self, scene: &Scene<'_>, pair: &Pair, a: &mut Rows, b: &mut Rows) {
-        let [(_, root), ..] = self.axes(pair);
-        normal_twins(scene, pair, root, a, b);
+    /// The mean weight along the normals.
+    fn twin_weight(&self, _: &Scene<'_>, pairs: &[Pair]) -> f64 {
+        let sum: f64 = pairs.iter().map(|pair| self.axes(pair)[0].1.powi(2)).sum();
+        sum / pairs.len().max(1) as f64
     }
 
     fn validate(&self, _: &Scene<'_>) -> Result<()> {

@@ -25,7 +25,7 @@ impl ErrorMetric for PointToPoint {
     /// points have no normal they are taken as marks that are known by themselves.
     fn twins(&self, scene: &Scene<'_>, pair: &Pair, a: &mut Rows, b: &mut Rows) {
         if scene.is_surface || scene.target.exact_normals {
-            normal_twins(scene, pair, 1.0, a, b);
+            normal_twins(scene, pair, a, b);
         } else {
             self.rows(scene, pair, a);
             self.rows(scene, pair, b);

@@ -44,7 +44,7 @@ pub fn accuracy(name: &str, survey: &Survey, runs: u64) -> Outcome<()> {
             .enumerate()
             .map(|(k, pose)| pose * disturbance(0.1, 3.0, run * 100 + k as u64))
             .collect();
-        for (label, start) in [("poses 0.1 m, 3 deg off", Start::Poses(&approximate)), ("order", Start::Order)] {
+        for (label, start) in [("poses 0.1 m, 3 deg off", Start::Poses(&approximate)), ("truth", Start::Poses(&truth)), ("order", Start::Order)] {
             match register(&clouds, start) {
                 Ok(found) => {
                     let (mm, degrees) = errors(&found, &truth);
@@ -61,6 +61,21 @@ pub fn accuracy(name: &str, survey: &Survey, runs: u64) -> Outcome<()> {
                         if found.settled { "" } else { " (not settled)" },
                         found.undetermined.len(),
                     );
+                    if std::env::var("DETAIL").is_ok() {
+                        for (k, pose) in found.world_from_station.iter().enumerate() {
+                            let world = truth[0] * found.world_from_station[0].inverse();
+                            let d = 1e3 * pose_difference(&truth[k], &(world * pose));
+                            let c = found.covariance[k];
+                            let s = |i: usize| 1e3 * c[(i, i)].sqrt();
+                            println!(
+                                "      {k}: {:.2} {:.2} {:.2} mm ({:.2} {:.2} {:.2}) {:.3} {:.3} {:.3} mrad ({:.3} {:.3} {:.3})",
+                                d[0], d[1], d[2], s(0), s(1), s(2), d[3], d[4], d[5], s(3), s(4), s(5)
+                            );
+                        }
+                        for p in &found.surfaces {
+                            println!("      {}-{}: overlap {:.2}, {} contacts, mean {:.2} rms {:.2} mm, {:.2} sigma, out {:.2}", p.target, p.source, p.overlap, p.contacts, 1e3*p.mean_m, 1e3*p.rms_m, p.rms_sigma, p.outliers);
+                        }
+                    }
                 }
                 Err(error) => println!("  {label:>22}: {error}"),
             }

@@ -11,6 +11,7 @@ mod pairs;
 mod patches;
 mod plane_fit;
 mod point_model;
+mod point_residuals;
 mod pose_graph;
 mod precision;
 mod reduction;
@@ -33,3 +34,7 @@ pub use stations::register_stations;
 pub use surfaces::{
     PairAlignment, RefusedPair, SurfaceAdjustment, SurfaceAdjustmentOptions, adjust_surfaces, align_pairs,
 };
+
+pub(crate) fn knob(name: &str, default: f64) -> f64 {
+    std::env::var(name).ok().and_then(|v| v.parse().ok()).unwrap_or(default)
+}

@@ -177,7 +177,7 @@ fn patch(
         centre: centres[index],
         normal,
         variance: joint.variance / own.count() + floor,
-        normal_variance: (joint.variance / count + floor) / joint.spread,
+        normal_variance: joint.variance / count / joint.spread,
     })
 }
 

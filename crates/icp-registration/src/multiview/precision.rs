@@ -127,11 +127,12 @@ fn cells_of_pair(
 ) -> BTreeMap<[i64; 3], DVector<f64>> {
     let source = scene.surfaces[meeting.source];
     let pose = world_from_target.inverse() * world_from_source;
+    let cell_size = super::knob("CELL", CELL);
     let mut cells: BTreeMap<[i64; 3], DVector<f64>> = BTreeMap::new();
     for contact in &meeting.contacts {
         let (row, _) = scene.row(meeting, contact, &pose, weighting);
         let place = world_from_source * source.patches[contact.source as usize].centre;
-        let cell = place.coords.map(|c| (c / (CELL * source.size_m)).floor());
+        let cell = place.coords.map(|c| (c / (cell_size * source.size_m)).floor());
         let score = cells
             .entry([cell.x as i64, cell.y as i64, cell.z as i64])
             .or_insert_with(|| DVector::zeros(6 + scene.parameters));

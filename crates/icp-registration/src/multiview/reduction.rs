@@ -14,8 +14,9 @@ use crate::kernel::RobustKernel;
 
 /// Information below this share of the largest is rounding.
 const ROUNDING: f64 = 1e-10;
-/// Share of a direction's information that noisy normals may have imitated; beyond, the direction is left open.
-const LARGEST_IMITATION: f64 = 0.25;
+/// Share of a direction's information that noisy normals may have imitated; beyond, the direction is left open. What
+/// they imitate below that is taken off: it would say that the stations are where they are.
+const LARGEST_IMITATION: f64 = 0.8;
 
 /// Two stations with the places where they meet.
 #[derive(Debug, Clone)]
@@ -141,17 +142,19 @@ fn observations(
     }
     let eigen = SymmetricEigen::try_new(information, 1e-15, 10_000).ok_or(failed("no eigenvalues were found"))?;
     let largest = eigen.eigenvalues.max();
-    let known: Vec<usize> = (0..n)
-        .filter(|&k| {
+    let limit = super::knob("IMIT", LARGEST_IMITATION);
+    let subtract = super::knob("SUB", 1.0);
+    let known: Vec<(usize, f64)> = (0..n)
+        .filter_map(|k| {
             let (value, vector) = (eigen.eigenvalues[k], eigen.eigenvectors.column(k));
-            value > ROUNDING * largest && vector.dot(&(&imitation * vector)) <= LARGEST_IMITATION * value
+            let share = vector.dot(&(&imitation * vector)) / value;
+            (value > ROUNDING * largest && share <= limit).then(|| (k, (value * (1.0 - subtract * share)).sqrt()))
         })
         .collect();
     let vector = |k: usize, c: usize| eigen.eigenvectors[(c, k)];
-    let root = |k: usize| eigen.eigenvalues[k].sqrt();
-    let rows = DMatrix::from_fn(known.len(), n, |r, c| root(known[r]) * vector(known[r], c) / scale[c]);
+    let rows = DMatrix::from_fn(known.len(), n, |r, c| known[r].1 * vector(known[r].0, c) / scale[c]);
     let right = DVector::from_fn(known.len(), |r, _| {
-        (0..n).map(|c| vector(known[r], c) * scale[c] * gradient[c]).sum::<f64>() / root(known[r])
+        (0..n).map(|c| vector(known[r].0, c) * scale[c] * gradient[c]).sum::<f64>() / known[r].1
     });
     Ok((rows, right))
 }

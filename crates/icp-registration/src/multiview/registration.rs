@@ -53,7 +53,7 @@ impl Default for StationRegistrationOptions<'_> {
     fn default() -> Self {
         Self {
             start_error_m: None,
-            patch_m: None,
+            patch_m: std::env::var("PATCH").ok().and_then(|v| v.parse().ok()),
             minimum_overlap: 0.3,
             partners_per_station: 3,
             minimum_contacts: 15,

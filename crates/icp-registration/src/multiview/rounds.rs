@@ -197,11 +197,11 @@ impl Course<'_> {
         let mut levels = Vec::new();
         let mut across_m = self.reach_m;
         while across_m > 1.2 * size_m {
-            levels.push(Level { reach: Reach { across_m, candidates: WIDE_CANDIDATES }, last: false });
+            levels.push(Level { reach: Reach { across_m, candidates: super::knob("WIDEK", 8.0) as usize }, last: false });
             across_m /= 2.0;
         }
-        levels.push(Level { reach: Reach { across_m: size_m, candidates: WIDE_CANDIDATES }, last: false });
-        levels.push(Level { reach: Reach { across_m: size_m / 2.0, candidates: 1 }, last: true });
+        levels.push(Level { reach: Reach { across_m: size_m, candidates: super::knob("WIDEK", 8.0) as usize }, last: false });
+        levels.push(Level { reach: Reach { across_m: size_m * super::knob("LASTREACH", 0.5), candidates: super::knob("LASTK", 1.0) as usize }, last: true });
         levels
     }
 
@@ -215,7 +215,7 @@ impl Course<'_> {
         let mut ended = None;
         for level in self.levels(size_m) {
             let mut pairs = all.clone();
-            for in_level in 0..if level.last { self.max_rounds } else { WIDE_ROUNDS } {
+            for in_level in 0..if level.last { self.max_rounds } else { super::knob("WROUNDS", 8.0) as usize } {
                 surfaces.update(&state.parameters)?;
                 let fewest = self.minimum_contacts;
                 let meetings = meet(&surfaces.scene(0).surfaces, &state.poses, &pairs, level.reach, fewest)?;
@@ -227,7 +227,7 @@ impl Course<'_> {
                 let adjusted = self.round(surfaces, &mut state, meetings, level, rounds)?;
                 rounds += 1;
                 (self.progress)(rounds);
-                let limit_m = if level.last { self.tolerance_m } else { level.reach.across_m / WIDE_STEP };
+                let limit_m = if level.last { self.tolerance_m } else { level.reach.across_m / super::knob("WSTEP", 100.0) };
                 let settled = largest_step(&before, &state, self.network.hold_m) <= limit_m;
                 ended = Some(Adjusted { settled, rounds, ..adjusted });
                 if settled {
@@ -250,7 +250,7 @@ impl Course<'_> {
         rounds: usize,
     ) -> Result<Adjusted> {
         let wide_kernel = if self.kernel == RobustKernel::None { RobustKernel::None } else { RobustKernel::Huber };
-        let kernel = if level.last { self.kernel } else { wide_kernel };
+        let kernel = if level.last { [self.kernel, RobustKernel::Huber, RobustKernel::Cauchy, RobustKernel::Welsch][super::knob("KERNEL", 0.0) as usize] } else { wide_kernel };
         let scene = surfaces.scene(state.parameters.len());
         // The residuals follow the parameters only when the points do.
         let steps = if level.last && scene.parameters == 0 { 2 } else { 1 };

@@ -60,7 +60,8 @@ fn half_overlap(camera: &Pinhole, k: u64) -> (Frame, Frame, Isometry3<f64>, f64)
         let turned = angle + std::f64::consts::PI + between(-0.6, 0.6);
         let at = [2.2 * turned.cos(), 1.8 * turned.sin(), between(0.3, 0.9)];
         let target = look_at(position, at);
-        let target_from_source = disturbance(between(0.1, 0.6), between(15.0, 35.0), 70_000 + (between(0.0, 1e6) as u64));
+        let target_from_source =
+            disturbance(between(0.1, 0.6), between(15.0, 35.0), 70_000 + (between(0.0, 1e6) as u64));
         let source = target * target_from_source;
         let inside = source.translation.vector;
         if inside.x.abs() > 1.2 || inside.y.abs() > 0.8 || !(0.8..2.2).contains(&inside.z) {

@@ -1,12 +1,14 @@
 //! The registration of two frames, level by level.
 
-use nalgebra::{Isometry3, Matrix6, Vector3, Vector6};
+use nalgebra::{Isometry3, Matrix6, UnitQuaternion, Vector3, Vector6};
 
-use super::frame::{OrganisedFrame, STRIDES};
+use super::blocks::Block;
+use super::frame::OrganisedFrame;
+use super::grid::{BLOCK, STRIDES};
 use super::options::FrameAlignmentOptions;
 use super::pairs::{Moved, Rules};
 use super::quality::{Cell, Hold, Residuals, Verdict};
-use super::sums::{Normal, SUMS, normal_equations, residuals};
+use super::sums::{Normal, SUMS, agreement, normal_equations, residuals};
 use crate::error::{Error, Result};
 use crate::icp::{DegeneracyPolicy, IcpResult, StopReason};
 use crate::kernel::quantile;
@@ -26,6 +28,32 @@ const WIDE_ITERATIONS: usize = 3;
 const COARSE_TOLERANCE: f64 = 1e-3;
 /// Fewest points of a level.
 const FEWEST_POINTS: usize = 200;
+
+/// Distance within which points agree with target planes after the first level, in units of the radius.
+const AGREEMENT_TOLERANCE: f64 = 0.03;
+/// Share of the points in sight that have to agree for the first start to be the last.
+const ENOUGH_AGREEMENT: f64 = 0.7;
+/// Share of all points that has to be in sight.
+const FEWEST_IN_SIGHT: f64 = 0.25;
+/// Angle of the other starts.
+const TURN_RAD: f64 = 0.26;
+/// Their axes in the source's frame.
+const TURNS: [[f64; 3]; 14] = [
+    [0.0, 1.0, 0.0],
+    [0.0, -1.0, 0.0],
+    [1.0, 0.0, 0.0],
+    [-1.0, 0.0, 0.0],
+    [0.0, 0.0, 1.0],
+    [0.0, 0.0, -1.0],
+    [1.0, 1.0, 0.0],
+    [-1.0, 1.0, 0.0],
+    [1.0, -1.0, 0.0],
+    [-1.0, -1.0, 0.0],
+    [0.0, 1.0, 1.0],
+    [0.0, 1.0, -1.0],
+    [0.0, -1.0, 1.0],
+    [0.0, -1.0, -1.0],
+];
 
 /// Aligns `source` with `target`, starting at `guess` (both poses `target_from_source`).
 ///
@@ -54,6 +82,7 @@ pub struct FrameAligner {
 }
 
 /// A pose on its way.
+#[derive(Clone)]
 struct Track {
     pose: Isometry3<f64>,
     iterations: usize,
@@ -107,14 +136,63 @@ impl FrameAligner {
             least_cosine: self.options.max_normal_angle_rad.cos() as f32,
         };
         let mut track = Track { pose: *guess, iterations: 0, rules, held: Matrix6::zeros() };
-        let counts = &source.points.counts[STRIDES.len() - self.options.levels..];
-        let coarse = counts[..counts.len() - 1].iter().filter(|c| **c >= FEWEST_POINTS);
-        self.open(&mut track, source, target, *coarse.clone().next().unwrap_or(&source.len()))?;
-        for &count in coarse {
-            self.descend(&mut track, source, target, count)?;
+        let coarsest = STRIDES.len() - self.options.levels;
+        let mut levels = (coarsest..STRIDES.len() - 1).filter(|l| source.points.counts[*l] >= FEWEST_POINTS);
+        match levels.next() {
+            Some(first) => track = self.start(track, source, target, blocks(source, first))?,
+            None => self.open(&mut track, source, target, &source.points.blocks)?,
+        }
+        for level in levels {
+            self.descend(&mut track, source, target, blocks(source, level))?;
         }
         let stop = self.settle(&mut track, source, target)?;
         self.result(&track, source, target, guess, stop)
+    }
+
+    /// Passes the first level from the guess and, where the frames contradict each other after that, from starts turned
+    /// away from it; the best goes on.
+    fn start(
+        &mut self,
+        track: Track,
+        source: &OrganisedFrame,
+        target: &OrganisedFrame,
+        blocks: &[Block],
+    ) -> Result<Track> {
+        let guess = track.pose;
+        let mut best = self.attempt(track.clone(), source, target, blocks);
+        for turn in TURNS.iter().take(self.options.other_starts) {
+            if best.as_ref().is_ok_and(|(_, agreement)| *agreement >= ENOUGH_AGREEMENT) {
+                break;
+            }
+            let turn = UnitQuaternion::from_scaled_axis(Vector3::from(*turn) * TURN_RAD);
+            // About the source's camera: where it stands is better known than where it looks.
+            let pose = Isometry3::from_parts(guess.translation, guess.rotation * turn);
+            let other = self.attempt(Track { pose, ..track.clone() }, source, target, blocks);
+            let agreement = |attempt: &Result<(Track, f64)>| attempt.as_ref().map_or(-1.0, |(_, a)| *a);
+            if agreement(&other) > agreement(&best) {
+                best = other;
+            }
+        }
+        best.map(|(track, _)| track)
+    }
+
+    /// The track after the first level, and how far the frames agree there.
+    fn attempt(
+        &mut self,
+        mut track: Track,
+        source: &OrganisedFrame,
+        target: &OrganisedFrame,
+        blocks: &[Block],
+    ) -> Result<(Track, f64)> {
+        self.open(&mut track, source, target, blocks)?;
+        self.descend(&mut track, source, target, blocks)?;
+        let (moved, gauge) = moved(&track, source, target);
+        let tolerance = (AGREEMENT_TOLERANCE * gauge.radius_m) as f32;
+        let rules = Rules { extra_variance: tolerance * tolerance, reach: 1.0, ..track.rules };
+        let (met, accepted) = agreement(&moved, &rules, blocks);
+        // Few points in sight agree easily.
+        let needed = FEWEST_IN_SIGHT * (blocks.len() * BLOCK) as f64;
+        Ok((track, accepted as f64 / (met as f64).max(needed)))
     }
 
     /// Sets the variance of what is not aligned from the residuals at the guess.
@@ -123,14 +201,14 @@ impl FrameAligner {
         track: &mut Track,
         source: &OrganisedFrame,
         target: &OrganisedFrame,
-        count: usize,
+        blocks: &[Block],
     ) -> Result<()> {
         let radius = target.points.radius_m.max(source.points.radius_m);
         track.rules.extra_variance = (radius * radius) as f32;
         let moved = moved(track, source, target);
-        residuals(&moved.0, &track.rules, count, SAMPLE, &mut self.scratch);
+        residuals(&moved.0, &track.rules, blocks, SAMPLE, &mut self.scratch);
         if self.scratch.is_empty() {
-            return Err(self.too_few(0, count, track));
+            return Err(self.too_few(0, source.len(), track));
         }
         let scale = MAD * quantile(&mut self.scratch, 0.5) * radius;
         track.rules.extra_variance = (scale * scale) as f32;
@@ -142,12 +220,12 @@ impl FrameAligner {
         track: &mut Track,
         source: &OrganisedFrame,
         target: &OrganisedFrame,
-        count: usize,
+        blocks: &[Block],
     ) -> Result<()> {
         if self.hold() == Hold::Undetermined {
             let (moved, gauge) = moved(track, source, target);
             let limit = self.max_motion_sigma_m(&gauge);
-            let verdict = Verdict::new(&moved, &track.rules, count, limit, Residuals::Misaligned, &mut self.cells)?;
+            let verdict = Verdict::new(&moved, &track.rules, blocks, limit, Residuals::Misaligned, &mut self.cells)?;
             track.held = verdict.held();
         }
         for _ in 0..COARSE_ITERATIONS {
@@ -156,9 +234,9 @@ impl FrameAligner {
             }
             let wide = track.iterations < WIDE_ITERATIONS;
             track.rules.reach = if wide { 3.0 * BIWEIGHT } else { BIWEIGHT };
-            let (step, gauge) = self.step(track, source, target, count, 1e-4)?;
+            let (step, gauge) = self.step(track, source, target, blocks, 1e-4)?;
             if !wide {
-                self.narrow(track, source, target, count);
+                self.narrow(track, source, target, blocks);
             }
             if step < COARSE_TOLERANCE * gauge.radius_m && !wide {
                 break;
@@ -168,19 +246,19 @@ impl FrameAligner {
     }
 
     /// Lowers the variance of what is not aligned to what the residuals show.
-    fn narrow(&mut self, track: &mut Track, source: &OrganisedFrame, target: &OrganisedFrame, count: usize) {
+    fn narrow(&mut self, track: &mut Track, source: &OrganisedFrame, target: &OrganisedFrame, blocks: &[Block]) {
         let (moved, _) = moved(track, source, target);
-        residuals(&moved, &track.rules, count, SAMPLE, &mut self.scratch);
+        residuals(&moved, &track.rules, blocks, SAMPLE, &mut self.scratch);
         let square = (MAD * quantile(&mut self.scratch, 0.5)).powi(2) as f32;
         track.rules.extra_variance *= square.clamp(0.05, 1.0);
     }
 
     fn settle(&mut self, track: &mut Track, source: &OrganisedFrame, target: &OrganisedFrame) -> Result<StopReason> {
-        let count = source.len();
+        let blocks = &source.points.blocks[..];
         if self.hold() == Hold::Undetermined {
             let (moved, gauge) = moved(track, source, target);
             let limit = self.max_motion_sigma_m(&gauge);
-            let verdict = Verdict::new(&moved, &track.rules, count, limit, Residuals::Settled, &mut self.cells)?;
+            let verdict = Verdict::new(&moved, &track.rules, blocks, limit, Residuals::Settled, &mut self.cells)?;
             track.held = verdict.held();
         }
         track.rules.extra_variance = 0.0;
@@ -190,7 +268,7 @@ impl FrameAligner {
                 self.rescale(track, source, target, narrowed == 0);
                 narrowed += 1;
             }
-            let (step, gauge) = self.step(track, source, target, count, 0.0)?;
+            let (step, gauge) = self.step(track, source, target, blocks, 0.0)?;
             if step <= self.options.step_tolerance_m.unwrap_or(1e-5 * gauge.radius_m) && narrowed >= 3 {
                 return Ok(StopReason::Converged);
             }
@@ -204,7 +282,7 @@ impl FrameAligner {
         if first {
             track.rules.reach = 10.0 * BIWEIGHT;
         }
-        residuals(&moved, &track.rules, source.len(), SAMPLE, &mut self.scratch);
+        residuals(&moved, &track.rules, &source.points.blocks, SAMPLE, &mut self.scratch);
         let scale = (MAD * quantile(&mut self.scratch, 0.5)).max(0.1) as f32;
         track.rules.reach = BIWEIGHT * scale;
     }
@@ -215,13 +293,13 @@ impl FrameAligner {
         track: &mut Track,
         source: &OrganisedFrame,
         target: &OrganisedFrame,
-        count: usize,
+        blocks: &[Block],
         ridge: f64,
     ) -> Result<(f64, Gauge)> {
         let (moved, gauge) = moved(track, source, target);
-        let normal = normal_equations(&moved, &track.rules, count, &mut self.chunks);
+        let normal = normal_equations(&moved, &track.rules, blocks, &mut self.chunks);
         if normal.pairs < self.options.min_correspondences {
-            return Err(self.too_few(normal.pairs, count, track));
+            return Err(self.too_few(normal.pairs, source.len(), track));
         }
         let step = solve(&normal, &track.held, ridge)?;
         track.pose = turned(&track.pose, &step, &gauge);
@@ -238,9 +316,10 @@ impl FrameAligner {
         stop: StopReason,
     ) -> Result<IcpResult> {
         let (moved, gauge) = moved(track, source, target);
-        let normal = normal_equations(&moved, &track.rules, source.len(), &mut self.chunks);
+        let normal = normal_equations(&moved, &track.rules, &source.points.blocks, &mut self.chunks);
         let limit = self.max_motion_sigma_m(&gauge);
-        let verdict = Verdict::new(&moved, &track.rules, source.len(), limit, Residuals::Settled, &mut self.cells)?;
+        let verdict =
+            Verdict::new(&moved, &track.rules, &source.points.blocks, limit, Residuals::Settled, &mut self.cells)?;
         let mut pose = track.pose;
         let to_tangent = tangent_from_centred(&pose, &gauge.centre, gauge.radius_m);
         let centred = if let Some(prior) = &self.options.prior {
@@ -288,6 +367,11 @@ impl FrameAligner {
     }
 }
 
+/// The blocks of a level.
+fn blocks(source: &OrganisedFrame, level: usize) -> &[Block] {
+    &source.points.blocks[..source.projection.grid.levels[level]]
+}
+
 fn moved<'a>(track: &Track, source: &'a OrganisedFrame, target: &'a OrganisedFrame) -> (Moved<'a>, Gauge) {
     let centre = (track.pose * nalgebra::Point3::from(source.points.centre)).coords;
     let gauge = Gauge { centre, radius_m: source.points.radius_m.max(f64::MIN_POSITIVE) };
@@ -310,7 +394,7 @@ fn solve(normal: &Normal, held: &Matrix6<f64>, ridge: f64) -> Result<Vector6<f64
 /// The pose after a motion `[dt, rho w]` about the centre, target axes.
 fn turned(pose: &Isometry3<f64>, step: &Vector6<f64>, gauge: &Gauge) -> Isometry3<f64> {
     let shift = Vector3::new(step[0], step[1], step[2]);
-    let turn = nalgebra::UnitQuaternion::from_scaled_axis(Vector3::new(step[3], step[4], step[5]) / gauge.radius_m);
+    let turn = UnitQuaternion::from_scaled_axis(Vector3::new(step[3], step[4], step[5]) / gauge.radius_m);
     let mut rotation = turn * pose.rotation;
     rotation.renormalize();
     let translation = turn * (pose.translation.vector - gauge.centre) + gauge.centre + shift;

@@ -193,6 +193,19 @@ pub enum Error {
         /// Number of points.
         count: usize,
     },
+    /// Two trajectories have no pose at the same time.
+    #[error(
+        "no pose of the estimate ({:.3} s to {:.3} s) has one of the truth ({:.3} s to {:.3} s) within {tolerance_s} s",
+        .estimate_s[0], .estimate_s[1], .truth_s[0], .truth_s[1]
+    )]
+    NoCommonTime {
+        /// Largest difference of the times, second.
+        tolerance_s: f64,
+        /// First and last time of the estimate.
+        estimate_s: [f64; 2],
+        /// First and last time of the truth.
+        truth_s: [f64; 2],
+    },
 }
 
 /// Result of this crate.

@@ -18,6 +18,7 @@ mod organised;
 mod pose;
 mod quality;
 mod voxels;
+mod trajectory;
 
 pub use absolute_orientation::{
     Orientation, RotationMethod, Similarity, absolute_orientation, absolute_orientation_by,
@@ -46,3 +47,7 @@ pub use normals::{OrganisedNormalOptions, UnorganisedNormalOptions, organised_no
 pub use organised::{FrameAligner, FrameAlignmentOptions, OrganisedFrame, Projection, align_frames};
 pub use pose::{inverse_covariance_transport, pose_difference, step_pose};
 pub use voxels::{VoxelAlignmentOptions, VoxelCloud, VoxelOptions, downsample};
+pub use trajectory::{
+    AbsoluteTrajectoryError, ErrorStatistics, MatchedPose, RelativeError, RelativePoseError, RelativeStep,
+    TrajectoryAlignment, TrajectoryErrorOptions, absolute_trajectory_error, relative_pose_error,
+};

@@ -148,7 +148,7 @@ fn a_pcd_is_read_in_all_encodings() {
         ..CloudFile::default()
     };
     let lines = points.iter().map(|([x, y, z], i)| format!("{x} 0 0 0 4.2e9 {z} {y} {i} 1 2\n"));
-    let ascii = header("ascii") + &lines.collect::<String>();
+    let ascii = header("ascii") + &lines.collect::<Vec<_>>().concat();
     assert_same(&scratch.read("a.pcd", ascii.as_bytes()).unwrap(), &expected);
     let binary = [header("binary").as_bytes(), &by_point].concat();
     assert_same(&scratch.read("a.pcd", &binary).unwrap(), &expected);
@@ -187,7 +187,7 @@ fn what_is_wrong_with_a_pcd_is_said() {
         ("WIDTH 1", "WIDTH 2\nPOINTS 2", "`POINTS` twice"),
         ("VIEWPOINT 0 0 0 1", "VIEWPOINT 0 0 0 2", "unit quaternion"),
         ("DATA ascii", "DATA zip", "`DATA zip`"),
-        ("DATA ascii\n1 2 3 4\n", "DATA ascii\n", "promises 1 points"),
+        ("DATA ascii\n1 2 3 4\n", "DATA ascii\n", "has 0 of 1"),
         ("1 2 3 4", "1 2 3", "no `flags` in point 0"),
         ("1 2 3 4", "1 2 3 4 5", "more than 4 values"),
         ("1 2 3 4", "1 b 3 4", "`y` = `b` in point 0"),
@@ -329,7 +329,7 @@ fn vtk_points_are_read_with_their_attributes() {
         ("ASCII", "TEXT", "`TEXT` in its third line"),
         ("VERTICES", "THINGS", "`THINGS 2 4`, which is not understood"),
         ("8\nFIELD", "FIELD", "expected a number"),
-        ("3 4\n", "3\n", "ends within other"),
+        ("3 4\n", "3\n", "promises 4 values of other"),
     ] {
         let message = scratch.fault("a.vtk", ascii.replacen(from, to, 1).as_bytes());
         assert!(message.contains(expected), "{message}\nexpected: {expected}");

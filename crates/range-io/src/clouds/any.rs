@@ -43,11 +43,14 @@ impl CloudFormat {
         let starts = |begin: &str| bytes.starts_with(begin.as_bytes());
         if starts("ply\n") || starts("ply\r") {
             return Ok(Self::Ply);
-        } else if starts("ASTM-E57") {
+        }
+        if starts("ASTM-E57") {
             return Ok(Self::E57);
-        } else if starts("# vtk DataFile") {
+        }
+        if starts("# vtk DataFile") {
             return Ok(Self::Vtk);
-        } else if starts("# .PCD") || starts("VERSION") || starts("# .pcd") {
+        }
+        if starts("# .PCD") || starts("# .pcd") || starts("VERSION") {
             return Ok(Self::Pcd);
         }
         let ending = path.extension().map(|ending| ending.to_string_lossy().to_lowercase()).unwrap_or_default();

@@ -60,7 +60,7 @@ fn read_scan<T: Read + Seek>(reader: &mut E57Reader<T>, header: &PointCloud, len
     }
     let mut scan = Scan::of_columns(header, columns)?;
     scan.cloud.world_from_cloud = pose;
-    scan.into_cloud()
+    Ok(scan.into_cloud())
 }
 
 impl Scan {
@@ -104,14 +104,14 @@ impl Scan {
         Ok(Self { positions, valid, cells, cloud })
     }
 
-    fn into_cloud(self) -> Reason<CloudFile> {
+    fn into_cloud(self) -> CloudFile {
         let Self { positions: [x, y, z], valid, cells, mut cloud } = self;
         let gap = |index: usize| valid.as_ref().is_some_and(|state| state[index] != 0.0);
         let point = |index: usize| if gap(index) { [f64::NAN; 3] } else { [x[index], y[index], z[index]] };
         cloud.points = (0..x.len()).map(point).collect();
         match cells {
-            [Some(columns), Some(rows)] => Ok(arranged(cloud, &columns, &rows)),
-            _ => Ok(without_gaps(cloud)),
+            [Some(columns), Some(rows)] => arranged(cloud, &columns, &rows),
+            _ => without_gaps(cloud),
         }
     }
 }
@@ -134,7 +134,8 @@ fn arranged(cloud: CloudFile, columns: &[f64], rows: &[f64]) -> CloudFile {
     let extent = |cells: &[f64]| cells.iter().copied().fold(-1.0, f64::max) + 1.0;
     let (width, height) = (extent(columns), extent(rows));
     let negative = columns.iter().chain(rows).any(|cell| *cell < 0.0);
-    if negative || !(width * height <= (EMPTIEST * cloud.len()) as f64) || cloud.is_empty() {
+    let filled = width * height <= (EMPTIEST * cloud.len()) as f64;
+    if negative || !filled || cloud.is_empty() {
         return without_gaps(cloud);
     }
     let (width, height) = (width as usize, height as usize);

@@ -37,7 +37,7 @@ pub fn write_e57(path: impl AsRef<Path>, scans: &[E57Scan], precision: Precision
         let mut target = writer.add_pointcloud(&guid, layout.prototype()).map_err(failed)?;
         describe(&mut target, scan)?;
         for point in 0..scan.cloud.len() {
-            target.add_point(layout.values(&scan.cloud, point)).map_err(failed)?;
+            target.add_point(layout.values(point)).map_err(failed)?;
         }
         target.finalize().map_err(failed)?;
     }
@@ -67,40 +67,24 @@ fn describe<T: std::io::Read + std::io::Write + std::io::Seek>(
 }
 
 /// Which values a point of a cloud has in the file.
-struct Layout {
+struct Layout<'a> {
+    cloud: &'a CloudFile,
     precision: Precision,
     /// Some points are no points.
     gaps: bool,
     /// Some intensities are none.
     dark: bool,
-    width: Option<usize>,
-    height: usize,
-    normals: bool,
-    intensity: bool,
-    sigma: bool,
-    flags: bool,
-    frame: bool,
-    covariance: bool,
 }
 
-impl Layout {
-    fn of(cloud: &CloudFile, precision: Precision) -> Self {
-        Self {
-            precision,
-            gaps: cloud.points.iter().any(|point| !is_point(point)),
-            dark: cloud.intensity.iter().flatten().any(|value| !value.is_finite()),
-            width: cloud.size.map(|[width, _]| width),
-            height: cloud.size.map_or(0, |[_, height]| height),
-            normals: cloud.normals.is_some(),
-            intensity: cloud.intensity.is_some(),
-            sigma: cloud.sigma.is_some(),
-            flags: cloud.flags.is_some(),
-            frame: cloud.frame.is_some(),
-            covariance: cloud.covariance.is_some(),
-        }
+impl<'a> Layout<'a> {
+    fn of(cloud: &'a CloudFile, precision: Precision) -> Self {
+        let gaps = cloud.points.iter().any(|point| !is_point(point));
+        let dark = cloud.intensity.iter().flatten().any(|value| !value.is_finite());
+        Self { cloud, precision, gaps, dark }
     }
 
     fn prototype(&self) -> Vec<Record> {
+        let cloud = self.cloud;
         let single = || RecordDataType::Single { min: None, max: None };
         let position = || match self.precision {
             Precision::Single => single(),
@@ -117,24 +101,26 @@ impl Layout {
         add(true, RecordName::CartesianY, position());
         add(true, RecordName::CartesianZ, position());
         add(self.gaps, RecordName::CartesianInvalidState, whole(2));
-        add(self.intensity, RecordName::Intensity, single());
-        add(self.intensity && self.dark, RecordName::IsIntensityInvalid, whole(1));
-        add(self.width.is_some(), RecordName::RowIndex, whole(self.height.saturating_sub(1)));
-        add(self.width.is_some(), RecordName::ColumnIndex, whole(self.width.unwrap_or(0).saturating_sub(1)));
+        add(cloud.intensity.is_some(), RecordName::Intensity, single());
+        add(self.dark, RecordName::IsIntensityInvalid, whole(1));
+        let [width, height] = cloud.size.unwrap_or_default();
+        add(cloud.size.is_some(), RecordName::RowIndex, whole(height.saturating_sub(1)));
+        add(cloud.size.is_some(), RecordName::ColumnIndex, whole(width.saturating_sub(1)));
         for axis in 0..3 {
-            add(self.normals, fields::normal(axis), single());
+            add(cloud.normals.is_some(), fields::normal(axis), single());
         }
-        add(self.sigma, fields::own("sigma"), single());
-        add(self.flags, fields::own("flags"), whole(usize::from(u16::MAX)));
-        add(self.frame, fields::own("frame"), whole(u32::MAX as usize));
+        add(cloud.sigma.is_some(), fields::own("sigma"), single());
+        add(cloud.flags.is_some(), fields::own("flags"), whole(usize::from(u16::MAX)));
+        add(cloud.frame.is_some(), fields::own("frame"), whole(u32::MAX as usize));
         for name in COVARIANCE {
-            add(self.covariance, fields::own(name), single());
+            add(cloud.covariance.is_some(), fields::own(name), single());
         }
         records
     }
 
     /// The values of a point in the order of the prototype.
-    fn values(&self, cloud: &CloudFile, index: usize) -> RawValues {
+    fn values(&self, index: usize) -> RawValues {
+        let cloud = self.cloud;
         let mut values = RawValues::new();
         let point = cloud.points[index];
         let valid = is_point(&point);
@@ -154,7 +140,7 @@ impl Layout {
                 values.push(RecordValue::Integer(i64::from(!value.is_finite())));
             }
         }
-        if let Some(width) = self.width {
+        if let Some([width, _]) = cloud.size {
             values.push(RecordValue::Integer((index / width.max(1)) as i64));
             values.push(RecordValue::Integer((index % width.max(1)) as i64));
         }

@@ -1,3 +1,4 @@
+use std::fmt::Write as _;
 use std::io::{Seek, SeekFrom, Write};
 use std::path::Path;
 
@@ -36,11 +37,12 @@ pub fn write_cloud(path: impl AsRef<Path>, cloud: &CloudFile, precision: Precisi
 fn remarks(cloud: &CloudFile) -> Result<String> {
     let mut text = String::new();
     if let Some([width, height]) = cloud.size {
-        text += &format!("obj_info num_cols {width}\nobj_info num_rows {height}\n");
+        // Writing to a string can't fail.
+        let _ = writeln!(text, "obj_info num_cols {width}\nobj_info num_rows {height}");
     }
     if let Some(pose) = &cloud.world_from_cloud {
         let numbers = numbers_of(pose).ok_or_else(|| value_error("world_from_cloud", "is not finite".into()))?;
-        text += &format!("obj_info world_from_cloud {}\n", numbers.map(|number| number.to_string()).join(" "));
+        let _ = writeln!(text, "obj_info world_from_cloud {}", numbers.map(|number| number.to_string()).join(" "));
     }
     Ok(text)
 }
@@ -89,11 +91,12 @@ impl PlyWriter {
         let count = self.points.to_string();
         let filling = "-".repeat(20_usize.saturating_sub(count.len()));
         let start = format!("ply\nformat binary_little_endian 1.0\ncomment metres {filling}\n");
-        let properties: String = properties(&self.attributes, self.precision)
+        let properties: Vec<_> = properties(&self.attributes, self.precision)
             .iter()
             .map(|(kind, name)| format!("property {} {name}\n", type_name(*kind)))
             .collect();
-        let text = start + &self.remarks + &format!("element vertex {count}\n") + &properties + "end_header\n";
+        let element = format!("element vertex {count}\n");
+        let text = start + &self.remarks + &element + &properties.concat() + "end_header\n";
         self.writer.write_all(text.as_bytes()).map_err(Error::io(self.writer.path(), "write"))
     }
 }

@@ -11,6 +11,8 @@ use crate::text::read_text;
 
 const NAMES: [&str; 8] = ["timestamp", "p_x", "p_y", "p_z", "q_w", "q_x", "q_y", "q_z"];
 
+const NANOSECONDS: i64 = 1_000_000_000;
+
 /// Reads an `EuRoC` pose file: nanoseconds, position, quaternion `w x y z`; further columns (velocity, biases of a ground
 /// truth) are left alone.
 ///
@@ -32,8 +34,10 @@ fn pose(line: Line<'_>) -> Result<StampedPose> {
         *value = line.number(index + 1, name, words.next())?;
     }
     let [_, tx, ty, tz, qw, qx, qy, qz] = values;
+    let (seconds, rest_ns) = (time_ns.div_euclid(NANOSECONDS), time_ns.rem_euclid(NANOSECONDS));
+    let timestamp_s = seconds as f64 + rest_ns as f64 / 1e9;
     let world_from_camera = line.pose([tx, ty, tz], [qx, qy, qz, qw], 5, "q_w q_x q_y q_z")?;
-    Ok(StampedPose { timestamp_s: time_ns as f64 / 1e9, world_from_camera })
+    Ok(StampedPose { timestamp_s, world_from_camera })
 }
 
 /// Writes an `EuRoC` pose file: nanoseconds, position, quaternion `w x y z`.
@@ -42,8 +46,11 @@ pub fn write_euroc(path: impl AsRef<Path>, poses: &[StampedPose]) -> Result<()> 
                           q_RS_w [],q_RS_x [],q_RS_y [],q_RS_z []\n";
     write_lines(path.as_ref(), HEADER, poses, |pose, line| {
         let Isometry3 { rotation: q, translation: t } = with_computer_vision_axes(&pose.world_from_camera);
-        // An i64 of nanoseconds reaches 292 years; the cast saturates beyond.
-        let time_ns = (pose.timestamp_s * 1e9).round() as i64;
+        // Whole seconds apart: their product with 1e9 has more digits than an f64. An i64 of nanoseconds reaches 292
+        // years; casts and sums saturate beyond.
+        let seconds = pose.timestamp_s.floor();
+        let rest_ns = ((pose.timestamp_s - seconds) * 1e9).round() as i64;
+        let time_ns = (seconds as i64).saturating_mul(NANOSECONDS).saturating_add(rest_ns);
         write!(line, "{time_ns},{},{},{},{},{},{},{}", t.x, t.y, t.z, q.w, q.i, q.j, q.k)
     })
 }

@@ -65,7 +65,6 @@ fn section(words: &[&str], line: &str, source: &mut Source<'_>, parts: &mut Part
             skip_cells(source, number(cells)?, number(size)?, &keyword)?;
         }
         ("CELL_TYPES", [count]) => drop(source.values(number(count)?, Scalar::I32, &keyword)?),
-        ("OFFSETS" | "CONNECTIVITY", [_]) => {}
         ("POINT_DATA", [count]) => (parts.tuples, parts.of_cells) = (Some(number(count)?), false),
         ("CELL_DATA", [count]) => (parts.tuples, parts.of_cells) = (Some(number(count)?), true),
         ("METADATA", _) => while source.line().is_some_and(|line| !line.is_empty()) {},

@@ -149,16 +149,6 @@ pub enum Error {
         /// Index of such a point, row by row.
         index: usize,
     },
-    },
-    /// No alignment that holds leads to some stations.
-    #[error("nothing connects stations {stations:?} to station {to} ({})", .reasons.join("; "))]
-    UnconnectedStations {
-        /// The stations that are left alone.
-        stations: Vec<usize>,
-        /// A station of the part that holds together.
-        to: usize,
-        /// Why pairs that touch them were refused: source to target, and the reason.
-        reasons: Vec<String>,
     /// No pose of two clouds passed the verification.
     #[error(
         "no alignment found: {what} {found:.3}, at least {needed:.3} is needed ({correspondences} correspondences)"

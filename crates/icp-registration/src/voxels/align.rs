@@ -165,7 +165,7 @@ impl<'a> Run<'a> {
         let system = self.enough(matcher, &pose, partners, kernel, iteration)?;
         let held = match options.degeneracy {
             DegeneracyPolicy::Report => Vec::new(),
-            DegeneracyPolicy::HoldAtGuess => {
+            DegeneracyPolicy::HoldAtGuess | DegeneracyPolicy::HoldAtPrior => {
                 let contributions = system.contributions(matcher.target);
                 Verdict::new(contributions, system.frame, max_sigma_m, Residuals::Misaligned)?.held()
             }

@@ -4,14 +4,13 @@ use std::path::PathBuf;
 
 /// How the inputs are brought together.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
 pub enum RegisterMethod {
     /// Each input onto the one before it, pair by pair.
     #[default]
     Pairs,
     /// All at once: overlaps found, pairs aligned, then one adjustment of all surfaces.
     Multi,
-    /// One after the other as a stream, each against keyframes.
-    Track,
 }
 
 impl RegisterMethod {
@@ -20,7 +19,6 @@ impl RegisterMethod {
         match self {
             Self::Pairs => "pairs",
             Self::Multi => "multi",
-            Self::Track => "track",
         }
     }
 }
@@ -37,10 +35,6 @@ pub struct RegisterRequest {
     pub method: RegisterMethod,
     /// Calibration for the frames of a survey; `None`: `calibration.ron` beside it, where there is one.
     pub calibration: Option<PathBuf>,
-    /// Inertial data for [`RegisterMethod::Track`]; `None`: `imu.csv` beside the survey, where there is one.
-    pub imu: Option<PathBuf>,
-    /// Names of range terms (`d0`, ...) to estimate together with the poses, for [`RegisterMethod::Multi`].
-    pub range_terms: Vec<String>,
     /// Output folder; written beside and renamed when everything is done.
     pub out: PathBuf,
 }

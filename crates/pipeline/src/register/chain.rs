@@ -28,10 +28,7 @@ fn onto(target: &StationPose, pair: &IcpResult) -> StationPose {
     by_pair.fixed_view_mut::<3, 3>(0, 0).copy_from(&turn);
     let known = target.covariance.unwrap_or_else(Matrix6::zeros);
     let covariance = by_target * known * by_target.transpose() + by_pair * pair.covariance * by_pair.transpose();
-    StationPose {
-        world_from_camera: world * relative,
-        covariance: Some((covariance + covariance.transpose()) * 0.5),
-    }
+    StationPose { world_from_camera: world * relative, covariance: Some((covariance + covariance.transpose()) * 0.5) }
 }
 
 #[cfg(test)]

@@ -57,9 +57,8 @@ pub(super) fn stations(
 
 /// Fills the largest figures from the rows of the stations.
 pub(super) fn extremes(summary: &mut RegisterSummary) {
-    let largest = |pick: fn(&RegisteredStation) -> Option<f64>| {
-        summary.stations.iter().filter_map(pick).max_by(f64::total_cmp)
-    };
+    let largest =
+        |pick: fn(&RegisteredStation) -> Option<f64>| summary.stations.iter().filter_map(pick).max_by(f64::total_cmp);
     let position_sigma = largest(|station| station.position_sigma_m);
     let position_error = largest(|station| station.position_error_m);
     let attitude_error = largest(|station| station.attitude_error_deg);

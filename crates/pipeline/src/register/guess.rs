@@ -56,6 +56,10 @@ fn set(path: &Path, stations: &mut [Station], pose: impl Fn(&Station) -> Option<
 
 /// A file of sixteen numbers, row by row; `None` where it is something else.
 fn matrix(path: &Path) -> Result<Option<Isometry3<f64>>> {
+    // Some trajectories are folders.
+    if path.is_dir() {
+        return Ok(None);
+    }
     let text = std::fs::read_to_string(path).map_err(|source| Error::Access { path: path.to_owned(), source })?;
     let words: Vec<&str> = text.split([' ', '\t', '\n', '\r', ',', ';']).filter(|word| !word.is_empty()).collect();
     let numbers: Vec<f64> = words.iter().filter_map(|word| word.parse().ok()).collect();

@@ -1,14 +1,15 @@
 //! Surveys and clouds as stations with points, normals and what is known of them.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
-use camera_model::OrganisedCloud;
-use icp_registration::{Cloud, OrganisedNormalOptions, organised_normals};
+use camera_model::{Camera, OrganisedCloud, RayTable};
+use icp_registration::{Cloud, OrganisedNormalOptions, Projection, organised_normals};
 use nalgebra::{Isometry3, Vector3};
 use range_io::clouds::{CloudFile, read_any_cloud};
 use range_io::survey::{Level, Survey};
 
-use super::{RegisterMethod, RegisterRequest};
+use super::RegisterRequest;
 use crate::load::root_of;
 use crate::outcome::Outcome;
 use crate::plan::{
@@ -17,7 +18,11 @@ use crate::plan::{
 };
 use crate::progress::Progress;
 use crate::run::process;
+use crate::statistics::quantile;
 use crate::{Error, Plan, Result, Stage};
+
+/// Below this number of points there is no surface to speak of.
+const FEWEST_POINTS: usize = 50;
 
 /// One cloud to register, in its own frame.
 pub(crate) struct Station {
@@ -25,26 +30,44 @@ pub(crate) struct Station {
     pub(crate) timestamp_s: f64,
     /// All points with what the input says of them; what is written in the end.
     pub(crate) file: CloudFile,
-    /// The frame's pixels, where it is one of a camera.
-    pub(crate) organised: Option<OrganisedCloud>,
+    /// How points fall on its pixels, where it is the frame of a camera; the same for all stations.
+    pub(crate) projection: Option<Arc<Projection>>,
     /// Where the input says it stands.
     pub(crate) approximate: Option<Isometry3<f64>>,
     /// Where it truly stands, of simulated surveys.
     pub(crate) truth: Option<Isometry3<f64>>,
 }
 
-/// Everything that is to be registered; at least two stations.
-pub(super) fn read(request: &RegisterRequest, progress: &dyn Progress) -> Result<Vec<Station>> {
-    let stations = match request.inputs.as_slice() {
-        [] => return Err(Error::Register("no input is named: name one survey folder, or two and more clouds".into())),
-        [survey] if is_survey(survey) => survey_stations(survey, request, progress)?,
-        clouds => cloud_stations(clouds, request.method, progress)?,
-    };
-    if stations.len() < 2 {
-        let name = request.inputs[0].display();
-        return Err(Error::Register(format!("{name} holds one station; at least two are needed")));
+/// Everything that is to be registered.
+pub(super) struct Input {
+    /// At least two.
+    pub(super) stations: Vec<Station>,
+    /// Index of the axis of the common frame that points up, as far as one can tell.
+    pub(super) vertical_axis: usize,
+}
+
+/// Reads what was named.
+pub(super) fn read(request: &RegisterRequest, progress: &dyn Progress) -> Result<Input> {
+    if let Some(missing) = request.inputs.iter().find(|path| !path.exists()) {
+        return Err(Error::Register(format!("{}: there is no such file or folder", missing.display())));
     }
-    Ok(stations)
+    match request.inputs.as_slice() {
+        [] => Err(Error::Register("no input is named: name one survey folder, or two and more clouds".into())),
+        [survey] if is_survey(survey) => survey_stations(survey, request, progress),
+        [cloud] => Err(Error::Register(format!(
+            "{} is one cloud: name a second one to be brought onto it, or a survey folder",
+            cloud.display()
+        ))),
+        several => {
+            if let Some(survey) = several.iter().find(|path| is_survey(path)) {
+                return Err(Error::Register(format!(
+                    "{} is a folder among several inputs: name one survey, or clouds only",
+                    survey.display()
+                )));
+            }
+            cloud_stations(several, progress)
+        }
+    }
 }
 
 /// Whether the path is a folder with `survey.ron`, or that file.
@@ -52,28 +75,30 @@ fn is_survey(path: &Path) -> bool {
     path.is_dir() || path.file_name().is_some_and(|name| name == Survey::FILE_NAME)
 }
 
-fn survey_stations(path: &Path, request: &RegisterRequest, progress: &dyn Progress) -> Result<Vec<Station>> {
+fn survey_stations(path: &Path, request: &RegisterRequest, progress: &dyn Progress) -> Result<Input> {
     let survey = Survey::read(path)?;
+    let first = survey.frames.first().map(|frame| &frame.station);
+    if survey.frames.iter().all(|frame| Some(&frame.station) == first) {
+        return Err(Error::Register(format!(
+            "{}: all {} frames belong to one station, whose frames are averaged; at least two stations are needed",
+            path.display(),
+            survey.frames.len()
+        )));
+    }
     let calibrated = request.calibration.is_some() || root_of(path).join("calibration.ron").is_file();
-    let plan = Plan {
-        name: "register".to_owned(),
-        source: None,
-        calibrate: None,
-        stages: stages(survey.level, calibrated, request.method),
-    };
-    let outcome = process(&plan, path, request.calibration.as_deref(), progress)?;
+    let plan =
+        Plan { name: "register".to_owned(), source: None, calibrate: None, stages: stages(survey.level, calibrated) };
+    let outcome = process(&plan, &root_of(path), request.calibration.as_deref(), progress)?;
     Ok(stations_of(outcome))
 }
 
-/// The way from the survey's level to flagged points. Frames of a stream stay single.
-fn stages(level: Level, calibrated: bool, method: RegisterMethod) -> Vec<Stage> {
+/// The way from the survey's level to flagged points.
+fn stages(level: Level, calibrated: bool) -> Vec<Stage> {
     let mut stages = Vec::new();
     if level == Level::Samples {
         stages.push(Stage::Demodulate(DemodulateOptions::default()));
     }
-    if method != RegisterMethod::Track {
-        stages.push(Stage::Average(AverageOptions::default()));
-    }
+    stages.push(Stage::Average(AverageOptions::default()));
     if matches!(level, Level::Samples | Level::Phase) {
         if calibrated {
             stages.push(Stage::Deconvolve(DeconvolveOptions::default()));
@@ -89,38 +114,35 @@ fn stages(level: Level, calibrated: bool, method: RegisterMethod) -> Vec<Stage> 
     stages
 }
 
-fn stations_of(outcome: Outcome) -> Vec<Station> {
-    let single = {
-        let mut names: Vec<&str> = outcome.views.iter().map(|view| view.station.as_str()).collect();
-        names.sort_unstable();
-        names.windows(2).all(|pair| pair[0] != pair[1])
-    };
-    let station = |(index, (view, cloud)): (usize, (&crate::View, &OrganisedCloud))| Station {
-        name: if single { view.station.clone() } else { format!("{}/{index}", view.station) },
+fn stations_of(outcome: Outcome) -> Input {
+    let projection = projection(&outcome.camera);
+    let station = |(view, cloud): (&crate::View, OrganisedCloud)| Station {
+        name: view.station.clone(),
         timestamp_s: view.timestamp_s,
         file: CloudFile {
-            points: cloud.points.clone(),
-            intensity: Some(cloud.amplitude.clone()),
-            sigma: Some(cloud.sigma.clone()),
+            points: cloud.points,
+            intensity: Some(cloud.amplitude),
+            sigma: Some(cloud.sigma),
             flags: Some(cloud.flags.iter().map(|flags| flags.bits()).collect()),
             size: Some([cloud.width, cloud.height]),
             ..CloudFile::default()
         },
-        organised: Some(cloud.clone()),
+        projection: projection.clone(),
         approximate: view.approximate_world_from_camera,
         truth: view.truth.as_ref().and_then(|truth| truth.world_from_camera),
     };
-    outcome.views.iter().zip(&outcome.clouds).enumerate().map(station).collect()
+    let stations = outcome.views.iter().zip(outcome.clouds).map(station).collect();
+    Input { stations, vertical_axis: outcome.vertical_axis }
 }
 
-fn cloud_stations(
-    paths: &[std::path::PathBuf],
-    method: RegisterMethod,
-    progress: &dyn Progress,
-) -> Result<Vec<Station>> {
-    if method == RegisterMethod::Track {
-        return Err(Error::Register("--track needs a survey of frames, clouds have no pixels".into()));
-    }
+/// The pixels of the camera; `None` for one too small to be registered by pixels.
+fn projection(camera: &Camera) -> Option<Arc<Projection>> {
+    let rays = RayTable::new(camera).ok()?;
+    let format = &camera.format;
+    Projection::from_directions(format.width, format.height, rays.directions()).ok().map(Arc::new)
+}
+
+fn cloud_stations(paths: &[PathBuf], progress: &dyn Progress) -> Result<Input> {
     progress.begin("read clouds", paths.len());
     let mut stations: Vec<Station> = Vec::with_capacity(paths.len());
     for (index, path) in paths.iter().enumerate() {
@@ -132,21 +154,41 @@ fn cloud_stations(
             timestamp_s: index as f64,
             approximate: file.world_from_cloud,
             file,
-            organised: None,
+            projection: None,
             truth: None,
         });
         progress.advance(index + 1);
     }
-    Ok(stations)
+    let vertical_axis = flattest(&stations[0].file.points);
+    Ok(Input { stations, vertical_axis })
+}
+
+/// The axis along which the cloud is thinnest: up, where the cloud is of a landscape or of rooms.
+fn flattest(points: &[[f64; 3]]) -> usize {
+    let extent = |axis: usize| {
+        let mut values: Vec<f64> = points.iter().map(|point| point[axis]).collect();
+        quantile(&mut values, 0.99) - quantile(&mut values, 0.01)
+    };
+    let extents = [extent(0), extent(1), extent(2)];
+    [2, 1, 0].into_iter().min_by(|&a, &b| extents[a].total_cmp(&extents[b])).unwrap_or(2)
 }
 
 impl Station {
-    /// The usable points with normals, sigma and intensity: those that are finite and carry no flag.
-    pub(super) fn cloud(&self) -> Result<Cloud> {
+    /// All points of the file; NaN where a flag excludes one.
+    pub(crate) fn usable_points(&self) -> Vec<[f64; 3]> {
         let usable = |index: usize| self.file.flags.as_ref().is_none_or(|flags| flags[index] == 0);
-        let points: Vec<[f64; 3]> = self.file.points.iter().enumerate().map(|(index, point)| {
-            if usable(index) { *point } else { [f64::NAN; 3] }
-        }).collect();
+        let points = self.file.points.iter().enumerate();
+        points.map(|(index, point)| if usable(index) { *point } else { [f64::NAN; 3] }).collect()
+    }
+
+    /// Whether the points were seen from the origin of their frame, as those of cameras and scanners are.
+    pub(super) fn is_seen_from_origin(&self) -> bool {
+        self.projection.is_some() || self.file.size.is_some()
+    }
+
+    /// The usable points with normals, sigma and intensity.
+    pub(super) fn cloud(&self) -> Result<Cloud> {
+        let points = self.usable_points();
         let fail = |error: icp_registration::Error| Error::Register(format!("{}: {error}", self.name));
         let normals = match (&self.file.normals, self.file.size) {
             (Some(normals), _) => Some(normals.iter().map(|n| Vector3::from(n.map(f64::from))).collect()),
@@ -156,14 +198,23 @@ impl Station {
             }
             (None, None) => None,
         };
-        let sigma = self.file.sigma.as_deref();
-        let mut cloud = Cloud::from_frame(&points, normals.as_deref(), sigma).map_err(fail)?;
+        // Zero means unknown to many a program that writes a column of sigmas.
+        let sigma = self.file.sigma.as_ref().map(|sigma| {
+            let known = |value: &f32| if *value > 0.0 && value.is_finite() { *value } else { f32::NAN };
+            sigma.iter().map(known).collect::<Vec<_>>()
+        });
+        let mut cloud = Cloud::from_frame(&points, normals.as_deref(), sigma.as_deref()).map_err(fail)?;
         if let Some(intensity) = &self.file.intensity {
             let finite = points.iter().zip(intensity).filter(|(point, _)| point.iter().all(|x| x.is_finite()));
-            cloud.intensity = Some(finite.map(|(_, value)| f64::from(*value)).collect());
+            let values: Vec<f64> = finite.map(|(_, value)| f64::from(*value)).collect();
+            cloud.intensity = (values.len() == cloud.len()).then_some(values);
         }
-        if cloud.is_empty() {
-            return Err(Error::Register(format!("{}: no usable point among {}", self.name, points.len())));
+        if cloud.len() < FEWEST_POINTS {
+            let (found, of) = (cloud.len(), points.len());
+            return Err(Error::Register(format!(
+                "{}: {found} usable points of {of}, at least {FEWEST_POINTS} are needed",
+                self.name
+            )));
         }
         Ok(cloud)
     }

@@ -17,7 +17,7 @@ pub(super) fn write(out: &std::path::Path, registered: &Registered, progress: &d
     let folder = OutputFolder::create(out)?;
     write_cloud(folder.file("cloud.ply")?, &merged(registered), Precision::Single)?;
     progress.advance(1);
-    let known = || registered.stations.iter().zip(&registered.poses).filter_map(|(s, pose)| Some((s, pose.as_ref()?)));
+    let known = || registered.stations.iter().zip(&registered.poses);
     let rows: Vec<StationRow> = known()
         .map(|(station, pose)| StationRow {
             station: station.name.clone(),
@@ -51,7 +51,6 @@ fn merged(registered: &Registered) -> CloudFile {
     let mut file = CloudFile::default();
     let (mut intensity, mut sigma, mut flags, mut frame) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     for (number, (station, pose)) in registered.stations.iter().zip(&registered.poses).enumerate() {
-        let Some(pose) = pose else { continue };
         let Station { file: own, .. } = station;
         for (index, point) in own.points.iter().enumerate() {
             if !point.iter().all(|x| x.is_finite()) {

@@ -83,7 +83,11 @@ fn summary(
     RegisterSummary {
         stations: describe::stations(stations, poses, &counts, undetermined.clone()),
         pairs: result.surfaces.iter().map(|pair| row(pair, result, stations)).collect(),
-        refused: result.refused.iter().map(|p| format!("{} onto {}: {}", name(p.source), name(p.target), p.reason)).collect(),
+        refused: result
+            .refused
+            .iter()
+            .map(|p| format!("{} onto {}: {}", name(p.source), name(p.target), p.reason))
+            .collect(),
         loops: closures.collect(),
         sigma0: result.sigma0,
         redundancy: Some(result.redundancy),

@@ -9,7 +9,7 @@ use crate::summary::millimetres;
 /// What was registered, and how well each pose is known.
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct RegisterSummary {
-    /// `pairs`, `multi` or `track`.
+    /// `pairs` or `multi`.
     pub method: &'static str,
     /// What was named.
     pub inputs: Vec<String>,
@@ -25,14 +25,10 @@ pub struct RegisterSummary {
     pub refused: Vec<String>,
     /// How loops of pairs fail to close.
     pub loops: Vec<RegisteredLoop>,
-    /// Parameters that were estimated together with the poses.
-    pub parameters: Vec<EstimatedParameter>,
     /// A-posteriori standard deviation of unit weight.
     pub sigma0: Option<f64>,
     /// Redundancy.
     pub redundancy: Option<i64>,
-    /// The stream, where one was tracked.
-    pub stream: Option<StreamSummary>,
     /// Largest standard deviation of a station's position, metre.
     pub position_sigma_max_m: Option<f64>,
     /// Largest error of a station's position, where the truth is known, metre.
@@ -98,40 +94,6 @@ pub struct RegisteredLoop {
     pub rotation_deg: f64,
 }
 
-/// A parameter with its quality.
-#[derive(Debug, Clone, Serialize)]
-pub struct EstimatedParameter {
-    /// Name.
-    pub name: String,
-    /// Value.
-    pub value: f64,
-    /// Standard deviation.
-    pub sigma: f64,
-    /// Whether it differs from its prior value by more than chance (5 %).
-    pub significant: bool,
-}
-
-/// A tracked stream.
-#[derive(Debug, Clone, Default, Serialize)]
-pub struct StreamSummary {
-    /// Frames given.
-    pub frames: usize,
-    /// Frames with a pose.
-    pub tracked: usize,
-    /// Frames lost.
-    pub lost: usize,
-    /// Times that the pose was found again.
-    pub relocalised: usize,
-    /// Keyframes made.
-    pub keyframes: usize,
-    /// Frames tracked in a second of work.
-    pub frames_per_second: f64,
-    /// Length of the path, metre.
-    pub path_m: f64,
-    /// Root mean square error of the positions after rigid alignment, where the truth is known, metre.
-    pub absolute_error_rms_m: Option<f64>,
-}
-
 impl fmt::Display for RegisterSummary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let points: usize = self.stations.iter().map(|station| station.points).sum();
@@ -145,26 +107,8 @@ impl fmt::Display for RegisterSummary {
             self.start,
             self.datum
         )?;
-        if let Some(stream) = &self.stream {
-            writeln!(
-                f,
-                "{} of {} frames tracked, {} lost, {} found again, {} keyframes, path {:.2} m, {:.0} frames a second",
-                stream.tracked,
-                stream.frames,
-                stream.lost,
-                stream.relocalised,
-                stream.keyframes,
-                stream.path_m,
-                stream.frames_per_second
-            )?;
-        } else {
-            self.write_stations(f)?;
-            self.write_pairs(f)?;
-        }
-        for parameter in &self.parameters {
-            let verdict = if parameter.significant { "significant" } else { "not significant" };
-            writeln!(f, "{} = {:.6} +- {:.6}, {verdict}", parameter.name, parameter.value, parameter.sigma)?;
-        }
+        self.write_stations(f)?;
+        self.write_pairs(f)?;
         if let (Some(sigma0), Some(redundancy)) = (self.sigma0, self.redundancy) {
             writeln!(f, "sigma0 {sigma0:.3}, redundancy {redundancy}")?;
         }
@@ -174,20 +118,31 @@ impl fmt::Display for RegisterSummary {
         for doubt in &self.doubts {
             writeln!(f, "doubt: {doubt}")?;
         }
-        write!(f, "results in {}", self.out)
+        write!(f, "written to {}: report.html, summary.json, cloud.ply, stations.csv, trajectory.txt", self.out)
     }
 }
 
 impl RegisterSummary {
+    /// Largest misclosure of a loop, metre and degree.
+    pub(crate) fn largest_misclosure(&self) -> Option<(f64, f64)> {
+        let worst = self.loops.iter().max_by(|a, b| a.translation_m.total_cmp(&b.translation_m))?;
+        Some((worst.translation_m, worst.rotation_deg))
+    }
+
     fn write_stations(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(f, "{:<16} {:>9}  {:>28}  {:>10}  {:>10}", "station", "points", "position, m", "sigma", "attitude")?;
+        let width = self.stations.iter().map(|station| station.name.chars().count()).max().unwrap_or(0).clamp(8, 40);
+        writeln!(
+            f,
+            "{:<width$} {:>9}  {:>29}  {:>10}  {:>10}",
+            "station", "points", "position, m", "sigma", "attitude"
+        )?;
         for station in &self.stations {
             let [x, y, z] = station.position_m;
             let attitude =
                 station.attitude_sigma_deg.map_or_else(|| "-".to_owned(), |degrees| format!("{degrees:.4}°"));
             writeln!(
                 f,
-                "{:<16} {:>9}  {x:>8.3}, {y:>8.3}, {z:>8.3}  {:>10}  {attitude:>10}",
+                "{:<width$} {:>9}  {x:>8.4}, {y:>8.4}, {z:>8.4}  {:>10}  {attitude:>10}",
                 station.name,
                 station.points,
                 millimetres(station.position_sigma_m)
@@ -200,16 +155,19 @@ impl RegisterSummary {
         for pair in &self.pairs {
             writeln!(
                 f,
-                "{} onto {}: overlap {:.0} %, rms {}{}",
+                "{} onto {}: overlap {:.0} %, rms {}",
                 pair.source,
                 pair.target,
                 100.0 * pair.overlap,
-                millimetres(Some(pair.rms_m)),
-                pair.undetermined.iter().map(|motion| format!("; undetermined: {motion}")).collect::<String>()
+                millimetres(Some(pair.rms_m))
             )?;
         }
         for refused in &self.refused {
             writeln!(f, "left out: {refused}")?;
+        }
+        if let Some((metres, degrees)) = self.largest_misclosure() {
+            let loops = self.loops.len();
+            writeln!(f, "{loops} loops of pairs close to {} and {degrees:.3}°", millimetres(Some(metres)))?;
         }
         Ok(())
     }

@@ -83,8 +83,7 @@ impl Surface {
                 return Ok(result);
             }
         }
-        let options =
-            IcpOptions { degeneracy, initial_correspondence_distance_m: error_m, ..IcpOptions::default() };
+        let options = IcpOptions { degeneracy, initial_correspondence_distance_m: error_m, ..IcpOptions::default() };
         self.target.align(source.target.cloud(), &guess, &options)
     }
 

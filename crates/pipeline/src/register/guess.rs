@@ -17,9 +17,9 @@ const ROTATION_TOLERANCE: f64 = 1e-3;
 /// Sets the approximate poses of all stations from `stations.csv`, a trajectory, or the matrix that leads from the second
 /// cloud's frame to the first's.
 pub(super) fn apply(path: &Path, stations: &mut [Station]) -> Result<()> {
-    if path.extension().is_some_and(|ending| ending == "csv")
-        && let Ok(rows) = read_stations(path)
-    {
+    let of_stations = || std::fs::read_to_string(path).is_ok_and(|text| text.trim_start().starts_with("station"));
+    if path.extension().is_some_and(|ending| ending == "csv") && of_stations() {
+        let rows = read_stations(path)?;
         return set(path, stations, |station| {
             rows.iter().find(|row| row.station == station.name).map(|row| row.world_from_camera)
         });

@@ -117,7 +117,7 @@ fn doubts(stations: &[Station], aligned: &[Aligned]) -> Vec<String> {
         let open: Vec<String> = result.degenerate.iter().map(describe::motion).collect();
         if !open.is_empty() {
             let open = open.join("; ");
-            doubts.push(format!("{names}: the surfaces leave open {open}; the start value was kept there"));
+            doubts.push(format!("{names}: the surfaces leave open {open}: the pose is a guess there"));
         }
     }
     doubts

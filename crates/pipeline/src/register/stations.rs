@@ -18,6 +18,9 @@ const MOST_TRIED: usize = 16;
 /// A difference between two stations' surfaces in expected standard deviations beyond which it is doubtful.
 const LARGEST_SIGMAS: f64 = 5.0;
 
+/// Loops of sound pairs close to within this many times the typical distance of common surfaces.
+const LOOSE_LOOP: f64 = 20.0;
+
 pub(super) fn run(input: Input, start: &str, progress: &dyn Progress) -> Result<Registered> {
     let Input { stations, vertical_axis } = input;
     let clouds = stations.par_iter().map(Station::cloud).collect::<Result<Vec<_>>>()?;
@@ -38,6 +41,9 @@ pub(super) fn run(input: Input, start: &str, progress: &dyn Progress) -> Result<
         .map(|(pose, covariance)| StationPose { world_from_camera: *pose, covariance: Some(*covariance) })
         .collect();
     let mut summary = summary(&result, &stations, &clouds, &poses);
+    if before.is_none() {
+        summary.doubts.extend(blind_doubt(&result));
+    }
     summary.start = words;
     summary.datum = describe::datum(&stations[0], before.is_some());
     describe::extremes(&mut summary);
@@ -128,6 +134,19 @@ fn doubts(result: &StationRegistration, stations: &[Station], undetermined: &[Ve
         ));
     }
     doubts
+}
+
+/// Without start poses, pairs that contradict each other are the sign of surfaces that fit in more than one way.
+fn blind_doubt(result: &StationRegistration) -> Option<String> {
+    let worst = result.loops.iter().map(|closure| closure.translation_m).fold(0.0, f64::max);
+    let apart = result.surfaces.iter().map(|pair| pair.rms_m).fold(0.0, f64::max);
+    (worst > LOOSE_LOOP * apart).then(|| {
+        format!(
+            "no start poses were given, and pairs found without them contradict each other (a loop fails to close by \
+             {worst:.2} m): the scene may fit in more than one way, and the poses may be wrong as a whole. Give start \
+             poses with --guess FILE"
+        )
+    })
 }
 
 fn residuals(result: &StationRegistration, stations: &[Station]) -> Result<Vec<Vec<f64>>> {

@@ -65,11 +65,11 @@ impl Surface {
 
     /// Fine alignment of `source` with this station.
     pub(super) fn align(&self, source: &Self, start: Start) -> icp_registration::Result<IcpResult> {
-        let (guess, error_m) = match start {
-            Start::Guess(guess) => (guess, None),
-            Start::Found(guess, error_m) => (guess, Some(error_m)),
+        // What somebody stated is worth keeping along open motions; what was found from the same surfaces is not.
+        let (guess, error_m, degeneracy) = match start {
+            Start::Guess(guess) => (guess, None, DegeneracyPolicy::HoldAtGuess),
+            Start::Found(guess, error_m) => (guess, Some(error_m), DegeneracyPolicy::Report),
         };
-        let degeneracy = DegeneracyPolicy::HoldAtGuess;
         if let (Some(target), Some(source)) = (&self.frame, &source.frame) {
             let options = FrameAlignmentOptions { degeneracy, ..FrameAlignmentOptions::default() };
             if let Ok(result) = align_frames(source, target, &guess, &options) {

@@ -96,6 +96,9 @@ pub enum Error {
     /// Two things to be compared do not belong together.
     #[error("compare: {0}")]
     Compare(String),
+    /// Inputs that cannot be registered, or that no alignment brings together.
+    #[error("register: {0}")]
+    Register(String),
 }
 
 /// Result with this crate's [`Error`](enum@Error).

@@ -11,6 +11,7 @@ mod network_scene;
 mod outcome;
 mod plan;
 mod progress;
+mod register;
 mod report;
 mod results;
 mod run;
@@ -45,6 +46,9 @@ pub use plan::{
     PointCloudOptions, RegisterOptions, RepairWrapsOptions, SimulateSource, Source, Stage, UnwrapOptions,
 };
 pub use progress::{Progress, Silent};
+pub use register::{
+    RegisterMethod, RegisterRequest, RegisterSummary, RegisteredLoop, RegisteredPair, RegisteredStation, register,
+};
 pub use run::{RunRequest, process, run};
 pub use scattering::{
     CandidateGaussians, ScatteringCapture, ScatteringParameter, ScatteringRequest, ScatteringSummary,

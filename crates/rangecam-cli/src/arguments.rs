@@ -7,6 +7,7 @@ use clap::{Parser, Subcommand};
 use crate::calibrate_arguments::CalibrateArguments;
 use crate::compare_arguments::CompareArguments;
 use crate::plan_arguments::PlanArguments;
+use crate::register_arguments::RegisterArguments;
 use crate::scattering_arguments::ScatteringArguments;
 
 /// Raw frames of a range camera in, one corrected and registered cloud out.
@@ -73,6 +74,8 @@ pub(crate) enum Command {
     Plan(Box<PlanArguments>),
     /// Estimate internal scattering (stray light in the camera) from a scene with and without bright objects.
     Scattering(Box<ScatteringArguments>),
+    /// Bring a survey's stations or clouds of any format into one frame, with the quality of every pose.
+    Register(RegisterArguments),
     /// Tell what a survey, a calibration or a cloud holds, and which stages it leaves room for.
     Inspect {
         /// Survey folder, calibration.ron or cloud.ply.

@@ -38,6 +38,9 @@ pub(crate) fn dispatch(command: Command, output: &Output) -> Outcome {
         Command::Scattering(arguments) => {
             output.result(&pipeline::estimate_scattering(&arguments.request(), output.progress().as_ref())?)
         }
+        Command::Register(arguments) => {
+            output.result(&pipeline::register(&arguments.request(), output.progress().as_ref())?)
+        }
         Command::Inspect { path } => output.result(&pipeline::inspect(&path)?),
         Command::Compare(arguments) => {
             output.result(&pipeline::compare(&arguments.request(), output.progress().as_ref())?)

@@ -7,6 +7,7 @@ mod commands;
 mod compare_arguments;
 mod output;
 mod plan_arguments;
+mod register_arguments;
 mod scattering_arguments;
 
 use std::ffi::OsString;

@@ -2,6 +2,7 @@
 
 use std::fmt::Write;
 
+use super::canvas::ticks;
 use super::colour::{CATEGORIES, hex};
 use super::picture::{data_uri, open_svg};
 use crate::Result;
@@ -27,11 +28,11 @@ pub(crate) struct Direction {
 impl Direction {
     /// From above and from the side, `vertical` being the index of the axis that points up.
     pub(crate) fn above_and_side(vertical: usize) -> [Self; 2] {
-        if vertical == 2 {
-            [Self { right: 0, up: 1, along: 2 }, Self { right: 0, up: 2, along: 1 }]
-        } else {
+        match vertical {
+            2 => [Self { right: 0, up: 1, along: 2 }, Self { right: 0, up: 2, along: 1 }],
             // In a camera's own frame y is up and the camera looks along -z.
-            [Self { right: 0, up: 2, along: 1 }, Self { right: 2, up: 1, along: 0 }]
+            1 => [Self { right: 0, up: 2, along: 1 }, Self { right: 2, up: 1, along: 0 }],
+            _ => [Self { right: 1, up: 2, along: 0 }, Self { right: 1, up: 0, along: 2 }],
         }
     }
 }
@@ -55,7 +56,11 @@ pub(crate) fn cloud_figure(title: &str, clouds: &[StationCloud<'_>], direction: 
         }
     }
     let image = data_uri(title, view.width, view.height, &rgb)?;
-    let legend_rows = clouds.len().div_ceil(8);
+    let longest = clouds.iter().map(|cloud| cloud.name.chars().count()).max().unwrap_or(0);
+    // About 5.5 pixels a letter, behind the coloured square.
+    let entry = (24.0 + 5.5 * longest as f64).max(70.0) as usize;
+    let columns = (view.width / entry).max(1);
+    let legend_rows = clouds.len().div_ceil(columns);
     let mut svg = open_svg(title, view.width as f64, view.height as f64 + 26.0 + 18.0 * legend_rows as f64);
     let _ = write!(svg, r#"<image href="{image}" x="0" y="22" width="{}" height="{}"/>"#, view.width, view.height);
     metre_grid(&mut svg, &view);
@@ -64,7 +69,7 @@ pub(crate) fn cloud_figure(title: &str, clouds: &[StationCloud<'_>], direction: 
         if let Some([x, y]) = view.pixel(cloud.position) {
             let _ = write!(svg, r##"<circle cx="{x}" cy="{}" r="4" fill="{colour}" stroke="#000"/>"##, y + 22);
         }
-        let (x, y) = ((station % 8) * 70, view.height + 38 + 18 * (station / 8));
+        let (x, y) = ((station % columns) * entry, view.height + 38 + 18 * (station / columns));
         let _ = write!(svg, r#"<rect x="{x}" y="{}" width="10" height="10" fill="{colour}"/>"#, y - 9);
         let _ =
             write!(svg, r#"<text x="{}" y="{y}" class="tick">{}</text>"#, x + 14, super::picture::escape(cloud.name));
@@ -119,14 +124,17 @@ impl Frame {
 fn metre_grid(svg: &mut String, view: &Frame) {
     let Direction { right, up, .. } = view.direction;
     let (bottom, end) = (view.height + 22, view.width);
-    for metre in (view.low[right].ceil() as i64)..=(view.high[right].floor() as i64) {
-        let x = (metre as f64 - view.low[right]) / view.metres_per_pixel;
+    // Lines at whole metres in a room, closer in a small object, farther in a landscape.
+    let (values, decimals) = ticks([view.low[right], view.high[right]], (view.width / 70).max(1));
+    for metre in values {
+        let x = (metre - view.low[right]) / view.metres_per_pixel;
         let _ = write!(svg, r##"<path d="M{x:.1} 22V{bottom}" stroke="#000" stroke-opacity=".12"/>"##);
-        let _ = write!(svg, r#"<text x="{:.1}" y="{}" class="tick">{metre} m</text>"#, x + 2.0, bottom - 3);
+        let _ = write!(svg, r#"<text x="{:.1}" y="{}" class="tick">{metre:.decimals$} m</text>"#, x + 2.0, bottom - 3);
     }
-    for metre in (view.low[up].ceil() as i64)..=(view.high[up].floor() as i64) {
-        let y = 22.0 + (view.high[up] - metre as f64) / view.metres_per_pixel;
+    let (values, decimals) = ticks([view.low[up], view.high[up]], (view.height / 70).max(1));
+    for metre in values {
+        let y = 22.0 + (view.high[up] - metre) / view.metres_per_pixel;
         let _ = write!(svg, r##"<path d="M0 {y:.1}H{end}" stroke="#000" stroke-opacity=".12"/>"##);
-        let _ = write!(svg, r#"<text x="2" y="{:.1}" class="tick">{metre} m</text>"#, y - 2.0);
+        let _ = write!(svg, r#"<text x="2" y="{:.1}" class="tick">{metre:.decimals$} m</text>"#, y - 2.0);
     }
 }

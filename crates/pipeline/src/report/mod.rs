@@ -9,10 +9,14 @@ mod deviation_figure;
 mod network;
 mod page;
 mod picture;
+mod registration;
+mod registration_residuals;
 mod scattering;
 mod sections;
+mod station_graph;
 
 pub(crate) use comparison::render_comparison;
 pub(crate) use network::{render_calibration, render_plan};
+pub(crate) use registration::render_registration;
 pub(crate) use scattering::render_scattering;
 pub(crate) use sections::render;

@@ -1,0 +1,86 @@
+//! Approximate poses from a file.
+
+use std::path::Path;
+
+use nalgebra::{Isometry3, Matrix3, Matrix4, Rotation3, UnitQuaternion};
+use range_io::tables::read_stations;
+use range_io::trajectory::read_any_trajectory;
+
+use super::input::Station;
+use crate::{Error, Result};
+
+/// Times of a trajectory and of frames belong together within this, second.
+const SAME_TIME_S: f64 = 5e-3;
+/// How far the rows of a rotation may be from unit length and right angles.
+const ROTATION_TOLERANCE: f64 = 1e-3;
+
+/// Sets the approximate poses of all stations from `stations.csv`, a trajectory, or the matrix that leads from the second
+/// cloud's frame to the first's.
+pub(super) fn apply(path: &Path, stations: &mut [Station]) -> Result<()> {
+    let of_stations = || std::fs::read_to_string(path).is_ok_and(|text| text.trim_start().starts_with("station"));
+    if path.extension().is_some_and(|ending| ending == "csv") && of_stations() {
+        let rows = read_stations(path)?;
+        return set(path, stations, |station| {
+            rows.iter().find(|row| row.station == station.name).map(|row| row.world_from_camera)
+        });
+    }
+    if let Some(second_to_first) = matrix(path)? {
+        let [first, second] = stations else {
+            let count = stations.len();
+            return Err(wrong(path, format!("holds one matrix, which is a guess for two clouds, not for {count}")));
+        };
+        first.approximate = Some(Isometry3::identity());
+        second.approximate = Some(second_to_first);
+        return Ok(());
+    }
+    let poses = read_any_trajectory(path)?;
+    set(path, stations, |station| {
+        poses
+            .iter()
+            .find(|pose| (pose.timestamp_s - station.timestamp_s).abs() < SAME_TIME_S)
+            .map(|pose| pose.world_from_camera)
+    })
+}
+
+fn set(path: &Path, stations: &mut [Station], pose: impl Fn(&Station) -> Option<Isometry3<f64>>) -> Result<()> {
+    for station in stations {
+        let found = pose(station);
+        if found.is_none() {
+            let (name, time) = (&station.name, station.timestamp_s);
+            return Err(wrong(path, format!("has no pose of station {name} (time {time} s)")));
+        }
+        station.approximate = found;
+    }
+    Ok(())
+}
+
+/// A file of sixteen numbers, row by row; `None` where it is something else.
+fn matrix(path: &Path) -> Result<Option<Isometry3<f64>>> {
+    // Some trajectories are folders.
+    if path.is_dir() {
+        return Ok(None);
+    }
+    let text = std::fs::read_to_string(path).map_err(|source| Error::Access { path: path.to_owned(), source })?;
+    let words: Vec<&str> = text.split([' ', '\t', '\n', '\r', ',', ';']).filter(|word| !word.is_empty()).collect();
+    let numbers: Vec<f64> = words.iter().filter_map(|word| word.parse().ok()).collect();
+    if words.len() != 16 || numbers.len() != 16 {
+        return Ok(None);
+    }
+    let matrix = Matrix4::from_row_slice(&numbers);
+    let turn: Matrix3<f64> = matrix.fixed_view::<3, 3>(0, 0).into_owned();
+    let last_row = [matrix[(3, 0)], matrix[(3, 1)], matrix[(3, 2)], matrix[(3, 3)]];
+    let is_rotation = (turn * turn.transpose() - Matrix3::identity()).norm() < ROTATION_TOLERANCE
+        && turn.determinant() > 0.0
+        && last_row == [0.0, 0.0, 0.0, 1.0]
+        && matrix.iter().all(|value| value.is_finite());
+    if !is_rotation {
+        return Err(wrong(path, "is no rigid motion: expected a rotation, a translation and 0 0 0 1".to_owned()));
+    }
+    let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix(&turn));
+    let translation = matrix.fixed_view::<3, 1>(0, 3).into_owned().into();
+    Ok(Some(Isometry3::from_parts(translation, rotation)))
+}
+
+fn wrong(path: &Path, message: String) -> Error {
+    Error::Register(format!("{}: {message}", path.display()))
+}

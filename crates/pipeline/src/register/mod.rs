@@ -1,0 +1,66 @@
+//! Registration as a command: a survey or clouds of any format in, poses, one cloud, figures and a report out.
+
+mod chain;
+mod describe;
+mod guess;
+mod input;
+mod pairs;
+mod request;
+mod results;
+mod stations;
+mod summary;
+mod surface;
+
+use std::time::Instant;
+
+pub use request::{RegisterMethod, RegisterRequest};
+pub use summary::{RegisterSummary, RegisteredLoop, RegisteredPair, RegisteredStation};
+
+use nalgebra::Isometry3;
+
+use crate::Result;
+use crate::outcome::StationPose;
+use crate::progress::Progress;
+pub(crate) use input::Station;
+
+/// Poses found, and what is known of them.
+pub(crate) struct Registered {
+    /// What was registered.
+    pub(crate) stations: Vec<Station>,
+    /// One a station.
+    pub(crate) poses: Vec<StationPose>,
+    /// Poses that the registration started from, where there were any.
+    pub(crate) before: Option<Vec<Isometry3<f64>>>,
+    /// Signed distances of each station's points from the surfaces of its partners at the end, metre; NaN where there is
+    /// no partner. In the order of the points of its file.
+    pub(crate) residuals_m: Vec<Vec<f64>>,
+    /// Index of the axis of the common frame that points up.
+    pub(crate) vertical_axis: usize,
+    /// Every figure.
+    pub(crate) summary: RegisterSummary,
+}
+
+/// Registers and writes stations, trajectory, cloud, summary and report into the request's output folder.
+pub fn register(request: &RegisterRequest, progress: &dyn Progress) -> Result<RegisterSummary> {
+    let clock = Instant::now();
+    let mut input = input::read(request, progress)?;
+    let start = match &request.guess {
+        Some(path) => {
+            guess::apply(path, &mut input.stations)?;
+            format!("poses of {}", path.display())
+        }
+        None => "approximate poses of the input".to_owned(),
+    };
+    let mut registered = match request.method {
+        RegisterMethod::Pairs => pairs::run(input, &start, progress)?,
+        RegisterMethod::Multi => stations::run(input, &start, progress)?,
+    };
+    let summary = &mut registered.summary;
+    summary.method = request.method.name();
+    summary.inputs = request.inputs.iter().map(|path| path.display().to_string()).collect();
+    summary.out = request.out.display().to_string();
+    summary.seconds = clock.elapsed().as_secs_f64();
+    results::write(&request.out, &registered, progress)?;
+    progress.finish();
+    Ok(registered.summary)
+}

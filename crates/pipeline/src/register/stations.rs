@@ -1,0 +1,165 @@
+//! All stations at once.
+
+use icp_registration::{
+    Cloud, Datum, Start, StationRegistration, StationRegistrationOptions, SurfacePair, register_stations,
+};
+use nalgebra::{Isometry3, Point3};
+use rayon::prelude::*;
+
+use super::input::{Input, Station};
+use super::summary::{RegisterSummary, RegisteredLoop, RegisteredPair};
+use super::{Registered, describe};
+use crate::outcome::StationPose;
+use crate::progress::Progress;
+use crate::{Error, Result};
+
+/// Up to this number of stations every pair is tried where no poses are known; beyond, only those that follow each other.
+const MOST_TRIED: usize = 16;
+/// A difference between two stations' surfaces in expected standard deviations beyond which it is doubtful.
+const LARGEST_SIGMAS: f64 = 5.0;
+
+/// Loops of sound pairs close to within this many times the typical distance of common surfaces.
+const LOOSE_LOOP: f64 = 20.0;
+
+pub(super) fn run(input: Input, start: &str, progress: &dyn Progress) -> Result<Registered> {
+    let Input { stations, vertical_axis } = input;
+    let clouds = stations.par_iter().map(Station::cloud).collect::<Result<Vec<_>>>()?;
+    let before: Option<Vec<Isometry3<f64>>> = stations.iter().map(|station| station.approximate).collect();
+    let (known, words) = match &before {
+        Some(poses) => (Start::Poses(poses), start.to_owned()),
+        None if stations.len() <= MOST_TRIED => (Start::Nothing, "none, all pairs tried".to_owned()),
+        None => (Start::Order, "none, stations that follow each other tried".to_owned()),
+    };
+    progress.begin("register stations", stations.len());
+    let told = |done: usize, _: usize| progress.advance(done);
+    let result = register_stations(&clouds, known, Datum::Station(0), &StationRegistrationOptions::default(), &told)
+        .map_err(|error| refused(&error, &stations))?;
+    let poses: Vec<StationPose> = result
+        .world_from_station
+        .iter()
+        .zip(&result.covariance)
+        .map(|(pose, covariance)| StationPose { world_from_camera: *pose, covariance: Some(*covariance) })
+        .collect();
+    let mut summary = summary(&result, &stations, &clouds, &poses);
+    if before.is_none() {
+        summary.doubts.extend(blind_doubt(&result));
+    }
+    summary.start = words;
+    summary.datum = describe::datum(&stations[0], before.is_some());
+    describe::extremes(&mut summary);
+    let residuals_m = residuals(&result, &stations)?;
+    Ok(Registered { stations, poses, before, residuals_m, vertical_axis, summary })
+}
+
+/// The error with names for numbers, and what to do.
+fn refused(error: &icp_registration::Error, stations: &[Station]) -> Error {
+    let name = |index: usize| stations.get(index).map_or_else(|| index.to_string(), |station| station.name.clone());
+    if let icp_registration::Error::UnconnectedStations { stations: alone, to, reasons } = error {
+        let alone: Vec<String> = alone.iter().map(|&index| name(index)).collect();
+        let order: Vec<String> = (0..stations.len()).map(|index| format!("{index} {}", name(index))).collect();
+        return Error::Register(format!(
+            "no alignment found that leads from {} to {}; start poses (--guess FILE) may help, or leave these out \
+             ({}; stations: {})",
+            name(*to),
+            alone.join(", "),
+            reasons.join("; "),
+            order.join(", ")
+        ));
+    }
+    Error::Register(error.to_string())
+}
+
+fn summary(
+    result: &StationRegistration,
+    stations: &[Station],
+    clouds: &[Cloud],
+    poses: &[StationPose],
+) -> RegisterSummary {
+    let name = |index: usize| stations[index].name.clone();
+    let counts: Vec<usize> = clouds.iter().map(Cloud::len).collect();
+    let mut undetermined = vec![Vec::new(); stations.len()];
+    for station in &result.undetermined {
+        undetermined[station.station] = station.motions.iter().map(describe::motion).collect();
+    }
+    let closures = result.loops.iter().map(|closure| RegisteredLoop {
+        stations: closure.stations.iter().map(|&station| name(station)).collect(),
+        translation_m: closure.translation_m,
+        rotation_deg: closure.rotation_rad.to_degrees(),
+    });
+    RegisterSummary {
+        stations: describe::stations(stations, poses, &counts, undetermined.clone()),
+        pairs: result.surfaces.iter().map(|pair| row(pair, result, stations)).collect(),
+        refused: result
+            .refused
+            .iter()
+            .map(|p| format!("{} onto {}: {}", name(p.source), name(p.target), p.reason))
+            .collect(),
+        loops: closures.collect(),
+        sigma0: result.sigma0,
+        redundancy: Some(result.redundancy),
+        doubts: doubts(result, stations, &undetermined),
+        ..RegisterSummary::default()
+    }
+}
+
+fn row(pair: &SurfacePair, result: &StationRegistration, stations: &[Station]) -> RegisteredPair {
+    let alone = result.pairs.iter().find(|aligned| aligned.target == pair.target && aligned.source == pair.source);
+    RegisteredPair {
+        target: stations[pair.target].name.clone(),
+        source: stations[pair.source].name.clone(),
+        overlap: pair.overlap,
+        rms_m: pair.rms_m,
+        mean_m: Some(pair.mean_m),
+        undetermined: alone.map_or_else(Vec::new, |pair| pair.result.degenerate.iter().map(describe::motion).collect()),
+    }
+}
+
+/// What a reader should know before the poses are used.
+fn doubts(result: &StationRegistration, stations: &[Station], undetermined: &[Vec<String>]) -> Vec<String> {
+    let mut doubts = Vec::new();
+    if !result.settled {
+        doubts.push(format!("after {} rounds the stations still moved: the poses may be off", result.rounds));
+    }
+    for (station, motions) in stations.iter().zip(undetermined).filter(|(_, motions)| !motions.is_empty()) {
+        let motions = motions.join("; ");
+        doubts.push(format!("{}: nothing determines {motions}; the start value was kept there", station.name));
+    }
+    for pair in result.surfaces.iter().filter(|pair| pair.rms_sigma > LARGEST_SIGMAS) {
+        doubts.push(format!(
+            "{} and {}: common surfaces are {:.1} mm apart (rms), {:.0} times what their points promise",
+            stations[pair.source].name,
+            stations[pair.target].name,
+            1e3 * pair.rms_m,
+            pair.rms_sigma
+        ));
+    }
+    doubts
+}
+
+/// Without start poses, pairs that contradict each other are the sign of surfaces that fit in more than one way.
+fn blind_doubt(result: &StationRegistration) -> Option<String> {
+    let worst = result.loops.iter().map(|closure| closure.translation_m).fold(0.0, f64::max);
+    let apart = result.surfaces.iter().map(|pair| pair.rms_m).fold(0.0, f64::max);
+    (worst > LOOSE_LOOP * apart).then(|| {
+        format!(
+            "no start poses were given, and pairs found without them contradict each other (a loop fails to close by \
+             {worst:.2} m): the scene may fit in more than one way, and the poses may be wrong as a whole. Give start \
+             poses with --guess FILE"
+        )
+    })
+}
+
+fn residuals(result: &StationRegistration, stations: &[Station]) -> Result<Vec<Vec<f64>>> {
+    let of = |(index, station): (usize, &Station)| {
+        let points = station.usable_points();
+        let finite: Vec<usize> = (0..points.len()).filter(|&k| points[k].iter().all(|x| x.is_finite())).collect();
+        let asked: Vec<Point3<f64>> = finite.iter().map(|&k| Point3::from(points[k])).collect();
+        let found = result.point_residuals(index, &asked).map_err(|error| Error::Register(error.to_string()))?;
+        let mut residuals = vec![f64::NAN; points.len()];
+        for (k, value) in finite.into_iter().zip(found) {
+            residuals[k] = value;
+        }
+        Ok(residuals)
+    };
+    stations.iter().enumerate().map(of).collect()
+}

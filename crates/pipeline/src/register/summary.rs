@@ -1,0 +1,174 @@
+//! Every figure of a registration by name; written as `summary.json` and shown as words.
+
+use std::fmt;
+
+use serde::Serialize;
+
+use crate::summary::millimetres;
+
+/// What was registered, and how well each pose is known.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct RegisterSummary {
+    /// `pairs` or `multi`.
+    pub method: &'static str,
+    /// What was named.
+    pub inputs: Vec<String>,
+    /// Where the start values came from.
+    pub start: String,
+    /// What fixes the common frame.
+    pub datum: String,
+    /// All stations with their poses.
+    pub stations: Vec<RegisteredStation>,
+    /// Pairs of stations that were held together.
+    pub pairs: Vec<RegisteredPair>,
+    /// Pairs that overlap and were left out, each with its reason.
+    pub refused: Vec<String>,
+    /// How loops of pairs fail to close.
+    pub loops: Vec<RegisteredLoop>,
+    /// A-posteriori standard deviation of unit weight.
+    pub sigma0: Option<f64>,
+    /// Redundancy.
+    pub redundancy: Option<i64>,
+    /// Largest standard deviation of a station's position, metre.
+    pub position_sigma_max_m: Option<f64>,
+    /// Largest error of a station's position, where the truth is known, metre.
+    pub position_error_max_m: Option<f64>,
+    /// Largest error of a station's attitude, where the truth is known, degree.
+    pub attitude_error_max_deg: Option<f64>,
+    /// What a reader should know before the poses are used.
+    pub doubts: Vec<String>,
+    /// Wall-clock time, second.
+    pub seconds: f64,
+    /// The output folder.
+    pub out: String,
+}
+
+/// One station or frame.
+#[derive(Debug, Clone, Serialize)]
+pub struct RegisteredStation {
+    /// Name.
+    pub name: String,
+    /// Usable points.
+    pub points: usize,
+    /// Position of the perspective centre (or origin) in the common frame, metre.
+    pub position_m: [f64; 3],
+    /// omega, phi, kappa, degree.
+    pub attitude_deg: [f64; 3],
+    /// Standard deviation of the position in space, metre; `None` for the datum or where it is not known.
+    pub position_sigma_m: Option<f64>,
+    /// Standard deviation of the attitude about all axes, degree.
+    pub attitude_sigma_deg: Option<f64>,
+    /// Error of the position where the truth is known, metre.
+    pub position_error_m: Option<f64>,
+    /// Error of the attitude where the truth is known, degree.
+    pub attitude_error_deg: Option<f64>,
+    /// Motions that the surfaces do not determine.
+    pub undetermined: Vec<String>,
+}
+
+/// Two stations that see the same surfaces.
+#[derive(Debug, Clone, Serialize)]
+pub struct RegisteredPair {
+    /// The station held.
+    pub target: String,
+    /// The station moved.
+    pub source: String,
+    /// Fraction of the source that has partners.
+    pub overlap: f64,
+    /// Root mean square distance of surfaces seen from both, metre.
+    pub rms_m: f64,
+    /// Mean signed distance of surfaces seen from both, metre, where it was measured.
+    pub mean_m: Option<f64>,
+    /// Motions that the pair by itself does not determine.
+    pub undetermined: Vec<String>,
+}
+
+/// A loop of pairs.
+#[derive(Debug, Clone, Serialize)]
+pub struct RegisteredLoop {
+    /// The stations, from the first back to it.
+    pub stations: Vec<String>,
+    /// Distance by which it fails to close, metre.
+    pub translation_m: f64,
+    /// Angle by which it fails to close, degree.
+    pub rotation_deg: f64,
+}
+
+impl fmt::Display for RegisterSummary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let points: usize = self.stations.iter().map(|station| station.points).sum();
+        writeln!(
+            f,
+            "{}: {} stations, {} points, in {:.1} s; start: {}; datum: {}",
+            self.method,
+            self.stations.len(),
+            points,
+            self.seconds,
+            self.start,
+            self.datum
+        )?;
+        self.write_stations(f)?;
+        self.write_pairs(f)?;
+        if let (Some(sigma0), Some(redundancy)) = (self.sigma0, self.redundancy) {
+            writeln!(f, "sigma0 {sigma0:.3}, redundancy {redundancy}")?;
+        }
+        if let (Some(position), Some(attitude)) = (self.position_error_max_m, self.attitude_error_max_deg) {
+            writeln!(f, "truth: position error at most {:.2} mm, attitude {attitude:.4} degrees", 1e3 * position)?;
+        }
+        for doubt in &self.doubts {
+            writeln!(f, "doubt: {doubt}")?;
+        }
+        write!(f, "written to {}: report.html, summary.json, cloud.ply, stations.csv, trajectory.txt", self.out)
+    }
+}
+
+impl RegisterSummary {
+    /// Largest misclosure of a loop, metre and degree.
+    pub(crate) fn largest_misclosure(&self) -> Option<(f64, f64)> {
+        let worst = self.loops.iter().max_by(|a, b| a.translation_m.total_cmp(&b.translation_m))?;
+        Some((worst.translation_m, worst.rotation_deg))
+    }
+
+    fn write_stations(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let width = self.stations.iter().map(|station| station.name.chars().count()).max().unwrap_or(0).clamp(8, 40);
+        writeln!(
+            f,
+            "{:<width$} {:>9}  {:>29}  {:>10}  {:>10}",
+            "station", "points", "position, m", "sigma", "attitude"
+        )?;
+        for station in &self.stations {
+            let [x, y, z] = station.position_m;
+            let attitude =
+                station.attitude_sigma_deg.map_or_else(|| "-".to_owned(), |degrees| format!("{degrees:.4}°"));
+            writeln!(
+                f,
+                "{:<width$} {:>9}  {x:>8.4}, {y:>8.4}, {z:>8.4}  {:>10}  {attitude:>10}",
+                station.name,
+                station.points,
+                millimetres(station.position_sigma_m)
+            )?;
+        }
+        Ok(())
+    }
+
+    fn write_pairs(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for pair in &self.pairs {
+            writeln!(
+                f,
+                "{} onto {}: overlap {:.0} %, rms {}",
+                pair.source,
+                pair.target,
+                100.0 * pair.overlap,
+                millimetres(Some(pair.rms_m))
+            )?;
+        }
+        for refused in &self.refused {
+            writeln!(f, "left out: {refused}")?;
+        }
+        if let Some((metres, degrees)) = self.largest_misclosure() {
+            let loops = self.loops.len();
+            writeln!(f, "{loops} loops of pairs close to {} and {degrees:.3}°", millimetres(Some(metres)))?;
+        }
+        Ok(())
+    }
+}

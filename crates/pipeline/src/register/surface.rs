@@ -1,0 +1,110 @@
+//! A station in the form that is registered fastest: pixels of a camera, or voxels.
+
+use std::sync::Arc;
+
+use icp_registration::{
+    Cloud, CoarseOptions, DegeneracyPolicy, FeatureCloud, FrameAlignmentOptions, IcpOptions, IcpResult, IcpTarget,
+    OrganisedFrame, Projection, Viewpoint, VoxelAlignmentOptions, VoxelCloud, VoxelOptions, align_frames,
+    align_without_guess,
+};
+use nalgebra::{Isometry3, Point3};
+
+use super::input::Station;
+use crate::{Error, Result};
+
+/// Distances beyond this many times the typical residual belong to something else.
+const RESIDUAL_REACH: f64 = 5.0;
+/// The same in spacings of the points of the surface.
+const SPACING_REACH: f64 = 2.0;
+
+/// One station, prepared.
+pub(super) struct Surface {
+    pub(super) target: IcpTarget,
+    frame: Option<OrganisedFrame>,
+    voxels: Option<VoxelCloud>,
+    viewpoint: Viewpoint,
+}
+
+/// Where an alignment starts.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Start {
+    /// A pose that somebody stated.
+    Guess(Isometry3<f64>),
+    /// Found from the clouds, right to this distance, metre.
+    Found(Isometry3<f64>, f64),
+}
+
+impl Surface {
+    pub(super) fn new(station: &Station) -> Result<Self> {
+        let fail = |error: icp_registration::Error| Error::Register(format!("{}: {error}", station.name));
+        let target = IcpTarget::new(station.cloud()?).map_err(fail)?;
+        let frame = station.projection.as_ref().and_then(|projection| frame(station, projection));
+        // Clouds too small to fill voxels are registered point by point.
+        let voxels = match frame {
+            Some(_) => None,
+            None => VoxelCloud::new(&with_normals(&target), &VoxelOptions::default()).ok(),
+        };
+        let viewpoint = if station.is_seen_from_origin() { Viewpoint::Origin } else { Viewpoint::Unknown };
+        Ok(Self { target, frame, voxels, viewpoint })
+    }
+
+    pub(super) fn points(&self) -> usize {
+        self.target.cloud().len()
+    }
+
+    /// Looks for `self_from_source` where nothing is known of it.
+    pub(super) fn search(&self, source: &Self) -> icp_registration::Result<Start> {
+        let options = CoarseOptions::default();
+        let features = |surface: &Self| {
+            let options = CoarseOptions { viewpoint: surface.viewpoint, ..options.clone() };
+            FeatureCloud::new(&with_normals(&surface.target), &options)
+        };
+        let found = align_without_guess(&features(source)?, &features(self)?, &options)?;
+        Ok(Start::Found(found.target_from_source, 2.0 * found.voxel_m))
+    }
+
+    /// Fine alignment of `source` with this station.
+    pub(super) fn align(&self, source: &Self, start: Start) -> icp_registration::Result<IcpResult> {
+        // What somebody stated is worth keeping along open motions; what was found from the same surfaces is not.
+        let (guess, error_m, degeneracy) = match start {
+            Start::Guess(guess) => (guess, None, DegeneracyPolicy::HoldAtGuess),
+            Start::Found(guess, error_m) => (guess, Some(error_m), DegeneracyPolicy::Report),
+        };
+        if let (Some(target), Some(source)) = (&self.frame, &source.frame) {
+            let options = FrameAlignmentOptions { degeneracy, ..FrameAlignmentOptions::default() };
+            if let Ok(result) = align_frames(source, target, &guess, &options) {
+                return Ok(result);
+            }
+        }
+        if let (Some(target), Some(source)) = (&self.voxels, &source.voxels) {
+            let options =
+                VoxelAlignmentOptions { degeneracy, max_start_error_m: error_m, ..VoxelAlignmentOptions::default() };
+            if let Ok(result) = target.align(source, &guess, &options) {
+                return Ok(result);
+            }
+        }
+        let options = IcpOptions { degeneracy, initial_correspondence_distance_m: error_m, ..IcpOptions::default() };
+        self.target.align(source.target.cloud(), &guess, &options)
+    }
+
+    /// Signed distance of a point (this station's frame, metre) from the surface; positive on the side that the station
+    /// looks at. `None` where there is no surface.
+    pub(super) fn distance(&self, point: &Point3<f64>, rms_m: f64) -> Option<f64> {
+        let reach = (RESIDUAL_REACH * rms_m).max(SPACING_REACH * self.target.spacing_m());
+        let nearest = self.target.tree().nearest_within(point, reach).ok()??;
+        let (at, normal) = (self.target.cloud().points[nearest.index], self.target.normals()[nearest.index]);
+        let across = normal.dot(&(point - at));
+        let side = if normal.dot(&at.coords) > 0.0 { -across } else { across };
+        side.is_finite().then_some(side)
+    }
+}
+
+fn frame(station: &Station, projection: &Arc<Projection>) -> Option<OrganisedFrame> {
+    let points = station.usable_points();
+    let sigma = station.file.sigma.as_deref().filter(|sigma| sigma.iter().any(|value| *value > 0.0));
+    OrganisedFrame::new(projection, &points, sigma).ok()
+}
+
+fn with_normals(target: &IcpTarget) -> Cloud {
+    Cloud { normals: Some(target.normals().to_vec()), ..target.cloud().clone() }
+}

@@ -136,14 +136,6 @@ impl NeighbourTree {
         Some((Neighbour { index: nearest.item as usize, distance_m: nearest.distance.sqrt() }, second_m))
     }
 
-    /// A nearest point of a query that is known to be finite: of several at the same distance always the same one, as
-    /// the tree's layout has it. For hot loops, where looking for the lowest index would double the time.
-    #[cfg(feature = "multiview")]
-    pub(crate) fn any_nearest(&self, query: &[f64; 3]) -> Neighbour {
-        let best = self.tree.query(query).nearest_one::<SquaredEuclidean<f64>>().execute();
-        Neighbour { index: best.item as usize, distance_m: best.distance.sqrt() }
-    }
-
     fn nearest_unchecked(&self, query: &[f64; 3]) -> Neighbour {
         let best = self.tree.query(query).nearest_one::<SquaredEuclidean<f64>>().execute();
         // A second, tiny query: whatever lies on the sphere through the best point.

@@ -51,9 +51,6 @@ impl Default for VoxelAlignmentOptions {
 
 impl VoxelAlignmentOptions {
     pub(crate) fn validate(&self) -> Result<()> {
-        if self.degeneracy == DegeneracyPolicy::HoldAtPrior {
-            return Err(Error::Incompatible { what: "holding at a prior", with: "the registration of voxels" });
-        }
         let lengths = [
             ("max_start_error_m", self.max_start_error_m),
             ("step_tolerance_m", self.step_tolerance_m),

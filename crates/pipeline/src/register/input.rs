@@ -6,11 +6,12 @@ use std::sync::Arc;
 use camera_model::{Camera, OrganisedCloud, RayTable};
 use icp_registration::{Cloud, OrganisedNormalOptions, Projection, organised_normals};
 use nalgebra::{Isometry3, Vector3};
+use range_io::calibration::Calibration;
 use range_io::clouds::{CloudFile, read_any_cloud};
 use range_io::survey::{Level, Survey};
 
 use super::RegisterRequest;
-use crate::load::root_of;
+use crate::load::{read_calibration, root_of};
 use crate::outcome::Outcome;
 use crate::plan::{
     AverageOptions, CorrectImagePointOptions, CorrectRangeOptions, DeconvolveOptions, DemodulateOptions, FlagOptions,
@@ -85,33 +86,37 @@ fn survey_stations(path: &Path, request: &RegisterRequest, progress: &dyn Progre
             survey.frames.len()
         )));
     }
-    let calibrated = request.calibration.is_some() || root_of(path).join("calibration.ron").is_file();
-    let plan =
-        Plan { name: "register".to_owned(), source: None, calibrate: None, stages: stages(survey.level, calibrated) };
+    let (calibration, _) = read_calibration(&root_of(path), request.calibration.as_deref())?;
+    let stages = stages(survey.level, calibration.as_ref())?;
+    let plan = Plan { name: "register".to_owned(), source: None, calibrate: None, stages };
     let outcome = process(&plan, &root_of(path), request.calibration.as_deref(), progress)?;
     Ok(stations_of(outcome))
 }
 
-/// The way from the survey's level to flagged points.
-fn stages(level: Level, calibrated: bool) -> Vec<Stage> {
+/// The way from the survey's level to flagged points, as far as the calibration has something to say.
+fn stages(level: Level, calibration: Option<&Calibration>) -> Result<Vec<Stage>> {
     let mut stages = Vec::new();
     if level == Level::Samples {
         stages.push(Stage::Demodulate(DemodulateOptions::default()));
     }
     stages.push(Stage::Average(AverageOptions::default()));
     if matches!(level, Level::Samples | Level::Phase) {
-        if calibrated {
+        if calibration.is_some_and(|calibration| calibration.scattering.is_some()) {
             stages.push(Stage::Deconvolve(DeconvolveOptions::default()));
         }
         stages.push(Stage::Unwrap(UnwrapOptions::default()));
     }
-    if calibrated {
-        stages.push(Stage::CorrectRange(CorrectRangeOptions::default()));
+    if let Some(calibration) = calibration {
+        // A camera that corrects its ranges itself has a calibration of its lens alone.
+        let models = calibration.model_set().map_err(Error::stage("CorrectRange", "calibration"))?;
+        if !models.entries.is_empty() {
+            stages.push(Stage::CorrectRange(CorrectRangeOptions::default()));
+        }
         stages.push(Stage::CorrectImagePoint(CorrectImagePointOptions::default()));
     }
     stages.push(Stage::PointCloud(PointCloudOptions::default()));
     stages.push(Stage::Flag(FlagOptions::default()));
-    stages
+    Ok(stages)
 }
 
 fn stations_of(outcome: Outcome) -> Input {

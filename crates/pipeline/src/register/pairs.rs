@@ -70,12 +70,19 @@ fn align(stations: &[Station], surfaces: &[Surface], source: usize) -> Result<Al
     let (onto, moved) = (&surfaces[target], &surfaces[source]);
     let names = format!("{} onto {}", stations[source].name, stations[target].name);
     let stated = stations[target].approximate.zip(stations[source].approximate);
-    if let Some((target, source)) = stated
-        && let Ok(result) = onto.align(moved, Start::Guess(target.inverse() * source))
+    let from_stated = stated.and_then(|(target, source)| {
+        let guess = Start::Guess(target.inverse() * source);
+        onto.align(moved, guess).ok()
+    });
+    if let Some(result) = from_stated.as_ref().filter(|result| result.is_trustworthy()) {
+        return Ok(Aligned { result: result.clone(), guess_failed: false });
+    }
+    let found = onto.search(moved).and_then(|start| onto.align(moved, start));
+    if let Some(result) = from_stated
+        && !found.as_ref().is_ok_and(|found| found.overlap > result.overlap)
     {
         return Ok(Aligned { result, guess_failed: false });
     }
-    let found = onto.search(moved).and_then(|start| onto.align(moved, start));
     let result = found.map_err(|error| {
         let stated = if stated.is_some() { ", neither from the start poses nor without" } else { "" };
         Error::Register(format!(
@@ -105,7 +112,8 @@ fn doubts(stations: &[Station], aligned: &[Aligned]) -> Vec<String> {
         let names = format!("{} onto {}", stations[index + 1].name, stations[index].name);
         let result = &pair.result;
         if pair.guess_failed {
-            doubts.push(format!("{names}: the start poses lead to no overlap, the pose was found without them"));
+            doubts
+                .push(format!("{names}: the start poses lead to no sound alignment, the pose was found without them"));
         }
         if result.stop == StopReason::MaxIterations {
             doubts.push(format!("{names}: the iterations did not settle, the pose may be wrong"));

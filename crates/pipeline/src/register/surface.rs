@@ -65,11 +65,12 @@ impl Surface {
 
     /// Fine alignment of `source` with this station.
     pub(super) fn align(&self, source: &Self, start: Start) -> icp_registration::Result<IcpResult> {
-        // What somebody stated is worth keeping along open motions; what was found from the same surfaces is not.
-        let (guess, error_m, degeneracy) = match start {
-            Start::Guess(guess) => (guess, None, DegeneracyPolicy::HoldAtGuess),
-            Start::Found(guess, error_m) => (guess, Some(error_m), DegeneracyPolicy::Report),
+        let (guess, error_m) = match start {
+            Start::Guess(guess) => (guess, None),
+            Start::Found(guess, error_m) => (guess, Some(error_m)),
         };
+        // Held at a guess that is far off, misaligned surfaces would never come together.
+        let degeneracy = DegeneracyPolicy::Report;
         if let (Some(target), Some(source)) = (&self.frame, &source.frame) {
             let options = FrameAlignmentOptions { degeneracy, ..FrameAlignmentOptions::default() };
             if let Ok(result) = align_frames(source, target, &guess, &options) {
@@ -79,7 +80,10 @@ impl Surface {
         if let (Some(target), Some(source)) = (&self.voxels, &source.voxels) {
             let options =
                 VoxelAlignmentOptions { degeneracy, max_start_error_m: error_m, ..VoxelAlignmentOptions::default() };
-            if let Ok(result) = target.align(source, &guess, &options) {
+            // Where voxels leave something open, single points have the last word.
+            if let Ok(result) = target.align(source, &guess, &options)
+                && result.is_trustworthy()
+            {
                 return Ok(result);
             }
         }

@@ -62,12 +62,11 @@ impl List<'_> {
         }
         for (index, field) in fields.iter().enumerate() {
             let Some(column) = self.columns.as_mut().and_then(|columns| columns.of_property(index)) else { continue };
-            match field.parse() {
-                Ok(value) => column.push(value),
-                Err(_) => {
-                    let name = self.names[index].clone();
-                    return Err(self.error(line, index + 1, &name, format!("is `{field}`, expected a number")));
-                }
+            if let Ok(value) = field.parse() {
+                column.push(value);
+            } else {
+                let name = self.names[index].clone();
+                return Err(self.error(line, index + 1, &name, format!("is `{field}`, expected a number")));
             }
         }
         self.points += 1;

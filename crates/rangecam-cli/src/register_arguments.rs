@@ -27,7 +27,7 @@ pub(crate) struct RegisterArguments {
 
 impl RegisterArguments {
     pub(crate) fn request(self) -> RegisterRequest {
-        let first = self.inputs.first().map(PathBuf::as_path).unwrap_or(Path::new(""));
+        let first = self.inputs.first().map_or(Path::new(""), PathBuf::as_path);
         let mut name = first.file_stem().unwrap_or_default().to_owned();
         name.push("-registered");
         RegisterRequest {

@@ -70,8 +70,10 @@ fn what_is_not_there_is_not_found() {
 #[test]
 fn one_wall_leaves_the_offset_open() {
     // Two stations beside each other that see one wall of the room.
-    let poses =
-        [round::look_at([-0.3, 0.2, 1.9], [-0.3, -2.0, 1.9]), round::look_at([0.2, 0.2, 1.9], [0.2, -2.0, 1.9])];
+    let poses = [
+        round::room::look_at([-0.3, 0.2, 1.9], [-0.3, -2.0, 1.9]),
+        round::room::look_at([0.2, 0.2, 1.9], [0.2, -2.0, 1.9]),
+    ];
     let frames = round::frames(&poses, &round::model(&[("d0", 0.024)]), 3);
     let captures: Vec<SurfaceCapture<'_>> = frames
         .iter()

@@ -27,7 +27,7 @@ pub(super) fn apply(path: &Path, stations: &mut [Station]) -> Result<()> {
     if let Some(second_to_first) = matrix(path)? {
         let [first, second] = stations else {
             let count = stations.len();
-            return Err(wrong(path, format!("holds one matrix, which is a guess for two clouds, not for {count}")));
+            return Err(wrong(path, &format!("holds one matrix, which is a guess for two clouds, not for {count}")));
         };
         first.approximate = Some(Isometry3::identity());
         second.approximate = Some(second_to_first);
@@ -47,7 +47,7 @@ fn set(path: &Path, stations: &mut [Station], pose: impl Fn(&Station) -> Option<
         let found = pose(station);
         if found.is_none() {
             let (name, time) = (&station.name, station.timestamp_s);
-            return Err(wrong(path, format!("has no pose of station {name} (time {time} s)")));
+            return Err(wrong(path, &format!("has no pose of station {name} (time {time} s)")));
         }
         station.approximate = found;
     }
@@ -71,16 +71,16 @@ fn matrix(path: &Path) -> Result<Option<Isometry3<f64>>> {
     let last_row = [matrix[(3, 0)], matrix[(3, 1)], matrix[(3, 2)], matrix[(3, 3)]];
     let is_rotation = (turn * turn.transpose() - Matrix3::identity()).norm() < ROTATION_TOLERANCE
         && turn.determinant() > 0.0
-        && last_row == [0.0, 0.0, 0.0, 1.0]
+        && last_row.map(f64::to_bits) == [0.0, 0.0, 0.0, 1.0].map(f64::to_bits)
         && matrix.iter().all(|value| value.is_finite());
     if !is_rotation {
-        return Err(wrong(path, "is no rigid motion: expected a rotation, a translation and 0 0 0 1".to_owned()));
+        return Err(wrong(path, "is no rigid motion: expected a rotation, a translation and 0 0 0 1"));
     }
     let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix(&turn));
     let translation = matrix.fixed_view::<3, 1>(0, 3).into_owned().into();
     Ok(Some(Isometry3::from_parts(translation, rotation)))
 }
 
-fn wrong(path: &Path, message: String) -> Error {
+fn wrong(path: &Path, message: &str) -> Error {
     Error::Register(format!("{}: {message}", path.display()))
 }

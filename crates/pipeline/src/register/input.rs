@@ -128,7 +128,7 @@ fn stations_of(outcome: Outcome) -> Input {
             points: cloud.points,
             intensity: Some(cloud.amplitude),
             sigma: Some(cloud.sigma),
-            flags: Some(cloud.flags.iter().map(|flags| flags.bits()).collect()),
+            flags: Some(cloud.flags.iter().map(range_image::Flags::bits).collect()),
             size: Some([cloud.width, cloud.height]),
             ..CloudFile::default()
         },

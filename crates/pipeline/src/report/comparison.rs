@@ -98,15 +98,12 @@ fn deviation_figures(clouds: &CloudComparison, deviations: &Deviations) -> Resul
     let every = deviations.points.len().div_ceil(MOST_DRAWN).max(1);
     let points: Vec<_> = deviations.points.iter().step_by(every).copied().collect();
     let signed = clouds.plane.as_ref().filter(|plane| plane.absolute_p95_m > 0.0);
-    let (values, low, high, map, what) = match signed {
-        Some(plane) => {
-            let reach = 1e3 * plane.absolute_p95_m;
-            (&deviations.signed_m, -reach, reach, ColourMap::Diverging, "Signed distance to the local plane")
-        }
-        None => {
-            let reach = (1e3 * clouds.distance_p95_m).max(1e-6);
-            (&deviations.nearest_m, 0.0, reach, ColourMap::Sequential, "Distance to the nearest point")
-        }
+    let (values, low, high, map, what) = if let Some(plane) = signed {
+        let reach = 1e3 * plane.absolute_p95_m;
+        (&deviations.signed_m, -reach, reach, ColourMap::Diverging, "Signed distance to the local plane")
+    } else {
+        let reach = (1e3 * clouds.distance_p95_m).max(1e-6);
+        (&deviations.nearest_m, 0.0, reach, ColourMap::Sequential, "Distance to the nearest point")
     };
     let values: Vec<f64> = values.iter().step_by(every).map(|value| 1e3 * value).collect();
     let scale = Scale { map, low, high, unit: "mm" };

@@ -20,7 +20,7 @@ const MOST_DRAWN: usize = 300_000;
 pub(super) fn residual_section(page: &mut Page, registered: &Registered) -> Result<()> {
     let all: Vec<f64> = registered.residuals_m.iter().flatten().copied().filter(|value| value.is_finite()).collect();
     let typical = robust_standard_deviation(&all);
-    if all.is_empty() || !(typical > 0.0) {
+    if all.is_empty() || typical.is_nan() || typical <= 0.0 {
         return Ok(());
     }
     page.section("Distances between surfaces");

@@ -106,12 +106,13 @@ fn attribute(
         ("NORMALS", [_, kind]) => ("normals", 3, *kind),
         ("VECTORS", [name, kind]) => (*name, 3, *kind),
         ("SCALARS", [name, kind]) => (*name, 1, *kind),
-        ("SCALARS", [name, kind, components]) => (*name, number(components)?, *kind),
         ("COLOR_SCALARS", [name, components]) => {
             (*name, number(components)?, if source.binary { "unsigned_char" } else { "float" })
         }
         ("TENSORS", [name, kind]) => (*name, 9, *kind),
-        ("TEXTURE_COORDINATES", [name, components, kind]) => (*name, number(components)?, *kind),
+        ("SCALARS", [name, kind, components]) | ("TEXTURE_COORDINATES", [name, components, kind]) => {
+            (*name, number(components)?, *kind)
+        }
         _ => return Err(format!("has the line `{line}`, which is not understood")),
     };
     if keyword == "SCALARS" {

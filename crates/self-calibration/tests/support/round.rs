@@ -2,13 +2,12 @@
 #![allow(dead_code, clippy::unwrap_used, clippy::expect_used, clippy::panic, missing_docs)]
 
 #[path = "../../../icp-registration/tests/common/mod.rs"]
-mod room;
+pub mod room;
 
 use camera_model::{Camera, InteriorOrientation, LensDistortion};
 use error_models::RangeErrorModel;
 use nalgebra::{Isometry3, Vector3};
 use range_image::{Flags, ImageFormat, RangeFrame, Raster};
-pub use room::look_at;
 use room::stations::round_poses;
 use room::{Pinhole, Scene};
 

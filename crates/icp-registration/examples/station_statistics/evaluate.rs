@@ -13,6 +13,8 @@ pub struct Survey {
     pub stations: usize,
     pub gross: f64,
     pub seed: u64,
+    /// Size of the patches, metre; `None`: the default.
+    pub patch_m: Option<f64>,
 }
 
 impl Survey {
@@ -23,8 +25,8 @@ impl Survey {
 
 type Outcome<T> = Result<T, icp_registration::Error>;
 
-fn register(clouds: &[Cloud], start: Start<'_>) -> Outcome<StationRegistration> {
-    let options = StationRegistrationOptions::default();
+fn register(clouds: &[Cloud], start: Start<'_>, patch_m: Option<f64>) -> Outcome<StationRegistration> {
+    let options = StationRegistrationOptions { patch_m, ..StationRegistrationOptions::default() };
     register_stations(clouds, start, Datum::Station(0), &options, &|_, _| {})
 }
 
@@ -33,6 +35,13 @@ fn errors(found: &StationRegistration, truth: &[Isometry3<f64>]) -> (f64, f64) {
     let world = truth[0] * found.world_from_station[0].inverse();
     let each = found.world_from_station.iter().zip(truth).map(|(pose, truth)| pose_error(&(world * pose), truth));
     each.fold((0.0, 0.0), |a, b| (f64::max(a.0, b.0), f64::max(a.1, b.1)))
+}
+
+/// The station whose position has the largest standard deviation, in millimetre.
+fn least_known(found: &StationRegistration) -> (usize, f64) {
+    let sigma = |c: &Matrix6<f64>| 1e3 * c.fixed_view::<3, 3>(0, 0).trace().sqrt();
+    let each = found.covariance.iter().map(sigma).enumerate();
+    each.fold((0, 0.0), |worst, next| if next.1 > worst.1 { next } else { worst })
 }
 
 pub fn accuracy(name: &str, survey: &Survey, runs: u64) -> Outcome<()> {
@@ -46,13 +55,14 @@ pub fn accuracy(name: &str, survey: &Survey, runs: u64) -> Outcome<()> {
             ("truth", Start::Poses(&truth)),
             ("order", Start::Order),
         ] {
-            match register(&clouds, start) {
+            match register(&clouds, start, survey.patch_m) {
                 Ok(found) => {
                     let (mm, degrees) = errors(&found, &truth);
+                    let (station, sigma_mm) = least_known(&found);
                     let worst = found.loops.iter().map(|l| l.translation_m * 1e3).fold(0.0, f64::max);
                     println!(
                         "  {label:>22}: {mm:6.2} mm {degrees:.4} deg; {} pairs, {} refused, {} in the adjustment, \
-                         {} loops (worst {worst:.1} mm), sigma0 {:.2}, {} rounds{}, undetermined {}",
+                         {} loops (worst {worst:.1} mm), sigma0 {:.2}, {} rounds{}, undetermined {}; station {station} known to {sigma_mm:.2} mm",
                         found.pairs.len(),
                         found.refused.len(),
                         found.surfaces.len(),
@@ -77,7 +87,7 @@ pub fn timing(survey: &Survey) -> Outcome<()> {
         let times = (0..3).map(|_| {
             pool.install(|| {
                 let before = cpu::seconds();
-                let result = register(&clouds, start).map(|found| found.rounds);
+                let result = register(&clouds, start, survey.patch_m).map(|found| found.rounds);
                 (cpu::seconds() - before, result.is_ok())
             })
         });
@@ -97,7 +107,7 @@ pub fn sampling(survey: &Survey, runs: u64) -> Outcome<()> {
     let (mut single, mut between, mut covered, mut count) = (Vec::new(), Vec::new(), 0, 0);
     for run in 0..runs {
         let (clouds, truth) = survey.clouds(run);
-        let found = register(&clouds, Start::Poses(&truth))?;
+        let found = register(&clouds, Start::Poses(&truth), survey.patch_m)?;
         let n = truth.len();
         for station in 1..n {
             let pose = found.relative_pose(0, station)?;

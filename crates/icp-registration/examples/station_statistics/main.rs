@@ -2,7 +2,7 @@
 //! takes.
 //!
 //! ```text
-//! cargo run --release -p icp-registration --features multiview --example station_statistics -- [runs] [first seed]
+//! cargo run --release -p icp-registration --features multiview --example station_statistics -- [runs] [first seed] [patch, metre]
 //! ```
 #![allow(clippy::print_stdout)]
 
@@ -10,6 +10,7 @@
 mod common;
 mod cpu;
 mod evaluate;
+mod limit;
 
 use std::error::Error;
 
@@ -18,9 +19,16 @@ use evaluate::{Survey, accuracy, sampling, timing};
 fn main() -> Result<(), Box<dyn Error>> {
     let runs = std::env::args().nth(1).map_or(Ok(50), |text| text.parse::<u64>())?;
     let seed = std::env::args().nth(2).map_or(Ok(1), |text| text.parse::<u64>())?;
-    let eight = Survey { stations: 8, gross: 0.01, seed };
+    let patch_m = std::env::args().nth(3).map(|text| text.parse::<f64>()).transpose()?;
+    for stations in [8, 16] {
+        let (mm, degrees) = limit::cramer_rao(stations);
+        println!(
+            "{stations} stations: the noise alone leaves {mm:.2} mm, {degrees:.4} deg (least known station, 1 sigma)"
+        );
+    }
+    let eight = Survey { stations: 8, gross: 0.01, seed, patch_m };
     accuracy("eight stations, 1 % gross errors", &eight, 10.min(runs))?;
-    let sixteen = Survey { stations: 16, gross: 0.0, seed };
+    let sixteen = Survey { stations: 16, gross: 0.0, seed, patch_m };
     accuracy("sixteen stations", &sixteen, 5.min(runs))?;
     timing(&eight)?;
     timing(&sixteen)?;

@@ -11,8 +11,8 @@ use crate::error::Result;
 /// Points that miss the surface they should lie on, and points in space that the other camera looked through, each
 /// outweigh this many points with a partner: where two poses differ, both find partners on walls that are alike, and
 /// only the wrong one misses more than a few in a hundred.
-const WEIGHT_OF_MISSED: f64 = 4.0;
-const WEIGHT_OF_FREE: f64 = 8.0;
+const WEIGHT_OF_MISSED: f64 = 8.0;
+const WEIGHT_OF_FREE: f64 = 16.0;
 
 /// The clouds in voxels of one size, that of the coarsest.
 pub(crate) fn with_one_voxel(clouds: Vec<FeatureCloud>, options: &CoarseOptions) -> Result<Vec<FeatureCloud>> {

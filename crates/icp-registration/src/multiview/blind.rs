@@ -23,6 +23,10 @@ const STRIDE: usize = 4;
 /// Steps of a station onto those placed before it, and sweeps over all at the end.
 const STEPS: usize = 4;
 const SWEEPS: usize = 4;
+/// Passes over all stations in which each may go where it fits better among all others, and poses refined for each.
+const REPLACEMENTS: usize = 3;
+const REPLACED_FROM: usize = 6;
+const MUCH_BETTER: f64 = 1.1;
 /// Poses of a station nearer than this are one, voxels.
 const SAME_VOXELS: f64 = 3.0;
 
@@ -55,7 +59,12 @@ pub(super) fn arranged(stations: &[Cloud], start: Start<'_>, held: usize) -> Res
     };
     let candidates: Result<Vec<Candidate>> = pairs.par_iter().map(candidate).collect();
     let search = Search { clouds: &clouds, candidates: &candidates? };
-    let best = search.best();
+    let mut best = search.best();
+    for _ in 0..REPLACEMENTS {
+        if !search.replaced(&mut best) {
+            break;
+        }
+    }
     let missing: Vec<usize> = (0..clouds.len()).filter(|&station| best.poses[station].is_none()).collect();
     if !missing.is_empty() {
         let reasons = vec!["no pose of theirs fits what the others saw".to_owned()];
@@ -148,6 +157,38 @@ impl Search<'_> {
         next.sort_by(|a, b| b.1.score.total_cmp(&a.1.score));
         next.truncate(ARRANGEMENTS);
         if next.is_empty() { kept.to_vec() } else { next.into_iter().map(|(_, arrangement)| arrangement).collect() }
+    }
+
+    /// Moves stations to where they fit better, now that all their neighbours are in place; whether any moved.
+    fn replaced(&self, arrangement: &mut Arrangement) -> bool {
+        let mut any = false;
+        for station in 0..self.clouds.len() {
+            let mut without = arrangement.clone();
+            let present = without.poses[station].take();
+            let proposals = self.proposals(&without, station);
+            let mut ranked: Vec<(f64, Isometry3<f64>)> =
+                proposals.into_par_iter().map(|pose| (self.evidence(&without, station, &pose, STRIDE), pose)).collect();
+            ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
+            ranked.truncate(REPLACED_FROM);
+            let refined = |(_, pose): &(f64, Isometry3<f64>)| {
+                let pose = self.refined(&without.poses, station, pose, STEPS);
+                (self.evidence(&without, station, &pose, 1), pose)
+            };
+            let refined: Vec<(f64, Isometry3<f64>)> = ranked.par_iter().map(refined).collect();
+            let now = present.map_or(0.0, |pose| self.evidence(&without, station, &pose, 1));
+            let better = refined.iter().fold(
+                None,
+                |best: Option<&(f64, Isometry3<f64>)>, next| {
+                    if next.0 > best.map_or(now, |b| b.0) { Some(next) } else { best }
+                },
+            );
+            if let Some((score, pose)) = better {
+                arrangement.poses[station] = Some(*pose);
+                // Less is the same place, a little better refined.
+                any |= *score > MUCH_BETTER * now;
+            }
+        }
+        any
     }
 
     /// Poses of a station by its pairs with those that have been placed, without repetitions.

@@ -27,7 +27,6 @@ impl Datum {
         if self != Self::InnerConstraints {
             return (poses, cofactors);
         }
-        let poses = centred(start, poses, lever_m);
         let size = cofactors.nrows();
         let motions = DMatrix::from_fn(size, 6, |r, c| match poses.get(r / 6) {
             Some(pose) => motion(pose)[(r % 6, c)],
@@ -36,8 +35,15 @@ impl Datum {
         let weighted = DMatrix::from_fn(size, 6, |r, c| motions[(r, c)] * weight(r % 6, lever_m));
         let Some(inverse) = (motions.transpose() * &weighted).try_inverse() else { return (poses, cofactors) };
         let change = DMatrix::identity(size, size) - &motions * inverse * weighted.transpose();
-        let cofactors = &change * cofactors * change.transpose();
-        (poses, cofactors)
+        let centred = centred(start, &poses, lever_m);
+        // Translations are along the axes of the world, which turns with the stations.
+        let mut turned = DMatrix::identity(size, size);
+        for (k, (before, after)) in poses.iter().zip(&centred).enumerate() {
+            let turn = (after.rotation * before.rotation.inverse()).to_rotation_matrix().into_inner();
+            turned.fixed_view_mut::<3, 3>(6 * k, 6 * k).copy_from(&turn);
+        }
+        let change = turned * change;
+        (centred, &change * cofactors * change.transpose())
     }
 }
 
@@ -55,7 +61,8 @@ fn motion(pose: &Isometry3<f64>) -> Matrix6<f64> {
 }
 
 /// Moves all poses together so that they are on average those at the start.
-fn centred(start: &[Isometry3<f64>], mut poses: Vec<Isometry3<f64>>, lever_m: f64) -> Vec<Isometry3<f64>> {
+fn centred(start: &[Isometry3<f64>], poses: &[Isometry3<f64>], lever_m: f64) -> Vec<Isometry3<f64>> {
+    let mut poses = poses.to_vec();
     // Differences are small: each pass squares the error.
     for _ in 0..5 {
         let (mut normal, mut right) = (Matrix6::zeros(), Vector6::zeros());

@@ -9,7 +9,7 @@ const SAME_DIRECTION: f64 = 0.866;
 /// Part of the cell that the points of a group may be off the plane of its first points.
 const THICKNESS: f64 = 0.35;
 /// Points per patch that the size of the patches is chosen for.
-const POINTS_PER_PATCH: f64 = 40.0;
+const POINTS_PER_PATCH: f64 = 25.0;
 
 /// A group on its way.
 struct Group {
@@ -59,7 +59,7 @@ fn groups_of_cell(cloud: &Cloud, normals: &[Vector3<f64>], run: &[([i64; 3], u32
     groups
 }
 
-/// Size of patches that hold about forty points on average, metre, from the area that the points cover.
+/// Size of patches that hold about 25 points on average, metre, from the area that the points cover.
 pub(super) fn patch_size(cloud: &Cloud) -> f64 {
     let n = cloud.len() as f64;
     let centre = cloud.points.iter().fold(Vector3::zeros(), |sum, p| sum + p.coords / n);

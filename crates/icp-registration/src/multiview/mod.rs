@@ -15,6 +15,7 @@ mod point_residuals;
 mod pose_graph;
 mod precision;
 mod reduction;
+mod regions;
 mod registration;
 mod rounds;
 mod start;

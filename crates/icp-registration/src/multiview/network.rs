@@ -29,6 +29,9 @@ impl Network<'_> {
     /// One linearised step for all unknowns: the new state, and the cofactors of `[stations · 6, parameters]` (zero for
     /// the station that is held).
     pub(super) fn solve(&self, state: &State, pairs: &[(&Meeting, Reduced)]) -> Result<(State, DMatrix<f64>)> {
+        if state.poses.len() == 1 && state.parameters.is_empty() {
+            return Ok((state.clone(), DMatrix::zeros(6, 6)));
+        }
         let mut network = Adjustment::new();
         let mut stations = Vec::with_capacity(state.poses.len());
         for (index, pose) in state.poses.iter().enumerate() {

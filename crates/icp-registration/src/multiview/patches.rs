@@ -10,6 +10,7 @@ use nalgebra::{Point3, Vector3};
 
 use super::grouping::group;
 use super::plane_fit::{Moments, Plane};
+use super::regions::Patches;
 use crate::cloud::Cloud;
 use crate::error::{Error, Result};
 use crate::kernel::quantile;
@@ -140,7 +141,14 @@ impl Surface {
         }
         let centres = centres(fits, origin);
         let tree = NeighbourTree::new(&centres)?;
-        let patches = (0..fits.len()).map(|i| patch(i, fits, &centres, &tree, size_m)).collect::<Result<Vec<_>>>()?;
+        let neighbours = neighbours(&centres, &tree, REACH * size_m)?;
+        let roughness_m = ROUGHNESS * size_m;
+        let regions = Patches { fits, centres: &centres, neighbours: &neighbours, roughness_m }.planes(origin);
+        let patch = |index: usize| {
+            let local = patch(index, fits, &centres, &neighbours[index], size_m);
+            regions[index].map_or(local, |region| in_region(local, &region))
+        };
+        let patches: Vec<Patch> = (0..fits.len()).map(patch).collect();
         let n = centres.len() as f64;
         let centroid = Point3::from(centres.iter().fold(Vector3::zeros(), |sum, c| sum + c.coords / n));
         let radius_m = (centres.iter().map(|c| (c - centroid).norm_squared() / n).sum::<f64>()).sqrt().max(size_m);
@@ -202,22 +210,12 @@ fn of_one_plane(cloud: &Cloud, normals: &[Vector3<f64>], mut points: Vec<u32>, r
 
 /// A patch with the normal of the plane that it shares with its neighbours: a plane three patches wide is known nine
 /// times better in attitude than each of them.
-fn patch(
-    index: usize,
-    fits: &[(Moments, Plane)],
-    centres: &[Point3<f64>],
-    tree: &NeighbourTree,
-    size_m: f64,
-) -> Result<Patch> {
+fn patch(index: usize, fits: &[(Moments, Plane)], centres: &[Point3<f64>], neighbours: &[usize], size_m: f64) -> Patch {
     let (own, plane) = &fits[index];
     let mut union = *own;
-    for neighbour in tree.k_nearest(&centres[index], NEIGHBOURS)? {
-        let (moments, other) = &fits[neighbour.index];
-        let apart = centres[neighbour.index] - centres[index];
-        if neighbour.index == index || neighbour.distance_m > REACH * size_m {
-            continue;
-        }
-        let across = plane.normal.dot(&apart).abs();
+    for &neighbour in neighbours {
+        let (moments, other) = &fits[neighbour];
+        let across = plane.normal.dot(&(centres[neighbour] - centres[index])).abs();
         let tolerance = 3.0 * (plane.variance.max(other.variance)).sqrt();
         if plane.normal.dot(&other.normal).abs() >= SAME_PLANE && across <= tolerance {
             union.join(moments);
@@ -228,12 +226,33 @@ fn patch(
     let count = if joint.variance <= 1.5 * plane.variance { union.count() } else { own.count() };
     let normal = if joint.normal.dot(&plane.normal) < 0.0 { -joint.normal } else { joint.normal };
     let floor = (ROUGHNESS * size_m).powi(2);
-    Ok(Patch {
+    Patch {
         centre: centres[index],
         normal,
         variance: joint.variance / own.count() + floor,
         normal_variance: joint.variance / count / joint.spread,
-    })
+    }
+}
+
+/// The patch with the normal of a region that it belongs to, where that is the better known one.
+fn in_region(local: Patch, region: &(Plane, f64)) -> Patch {
+    let (plane, count) = region;
+    let normal_variance = plane.variance / count / plane.spread;
+    if normal_variance >= local.normal_variance {
+        return local;
+    }
+    let normal = if plane.normal.dot(&local.normal) < 0.0 { -plane.normal } else { plane.normal };
+    Patch { normal, normal_variance, ..local }
+}
+
+/// Indices of the patches around each, itself left out.
+fn neighbours(centres: &[Point3<f64>], tree: &NeighbourTree, reach_m: f64) -> Result<Vec<Vec<usize>>> {
+    let of = |(index, centre): (usize, &Point3<f64>)| {
+        let near = tree.k_nearest(centre, NEIGHBOURS)?;
+        let others = near.iter().filter(|n| n.index != index && n.distance_m <= reach_m);
+        Ok(others.map(|n| n.index).collect())
+    };
+    centres.iter().enumerate().map(of).collect()
 }
 
 /// Two unit vectors across a third.

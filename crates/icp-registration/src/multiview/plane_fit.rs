@@ -46,17 +46,25 @@ impl Moments {
         self.sum / self.count
     }
 
-    /// `None` where the points form a line or a blob.
+    /// `None` where the points form a line or a blob, or a strip, such as the bevels that smoothed normals make of creases.
     pub(super) fn plane(&self) -> Option<Plane> {
+        self.fit(NARROWEST)
+    }
+
+    /// The plane of many groups, which may be long and narrow.
+    pub(super) fn region_plane(&self) -> Option<Plane> {
+        self.fit(0.0)
+    }
+
+    fn fit(&self, narrowest: f64) -> Option<Plane> {
         if self.count < 4.0 {
             return None;
         }
         let mean = self.mean();
         let scatter = self.products / self.count - mean * mean.transpose();
         let [smallest, middle, largest] = eigenvalues3(&scatter);
-        // Points across a plane scatter less than a quarter as far as along it; the second test refuses strips, such as
-        // the bevels that smoothed normals make of creases.
-        if !(smallest <= 0.06 * middle && middle > NARROWEST * largest) {
+        // Points across a plane scatter less than a quarter as far as along it.
+        if !(smallest <= 0.06 * middle && middle > narrowest * largest) {
             return None;
         }
         let normal = eigenvector3(&scatter, smallest)?;

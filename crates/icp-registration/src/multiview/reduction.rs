@@ -16,7 +16,7 @@ use crate::kernel::RobustKernel;
 const ROUNDING: f64 = 1e-10;
 /// Share of a direction's information that noisy normals may have imitated; beyond, the direction is left open. What
 /// they imitate below that is taken off: it would say that the stations are where they are.
-const LARGEST_IMITATION: f64 = 0.8;
+const LARGEST_IMITATION: f64 = 0.5;
 
 /// Two stations with the places where they meet.
 #[derive(Debug, Clone)]

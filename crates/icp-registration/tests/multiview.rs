@@ -1,6 +1,6 @@
 //! Stations around a room, brought into one system.
 #![cfg(feature = "multiview")]
-#![allow(clippy::unwrap_used)]
+#![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout)]
 
 mod common;
 
@@ -132,8 +132,9 @@ fn a_station_that_sees_one_wall_is_named_with_the_motions_it_leaves_open() {
             MotionKind::Rotation => assert!(along_normal > 0.9, "{motion:?}"),
         }
     }
-    // It kept its start along them, but for the noise of the wall.
-    assert!(found.world_from_station[2].translation.vector.norm() < 0.005);
+    // Across the wall it is known; along it the deviation says that nothing holds it.
+    let sigma = |axis: usize| found.covariance[2][(axis, axis)].sqrt();
+    assert!(sigma(2) < 0.01 && sigma(0) > 0.1 && sigma(1) > 0.1, "{} {} {}", sigma(0), sigma(1), sigma(2));
 }
 
 #[test]

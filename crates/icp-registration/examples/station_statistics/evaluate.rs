@@ -44,7 +44,7 @@ fn least_known(found: &StationRegistration) -> (usize, f64) {
     each.fold((0, 0.0), |worst, next| if next.1 > worst.1 { next } else { worst })
 }
 
-pub fn accuracy(name: &str, survey: &Survey, runs: u64) -> Outcome<()> {
+pub fn accuracy(name: &str, survey: &Survey, runs: u64) {
     println!("{name}: largest error of a station, run by run");
     for run in 0..runs {
         let (clouds, truth) = survey.clouds(run);
@@ -77,10 +77,9 @@ pub fn accuracy(name: &str, survey: &Survey, runs: u64) -> Outcome<()> {
             }
         }
     }
-    Ok(())
 }
 
-pub fn timing(survey: &Survey) -> Outcome<()> {
+pub fn timing(survey: &Survey) {
     let (clouds, truth) = survey.clouds(0);
     let pool = rayon_pool();
     for (label, start) in [("poses", Start::Poses(&truth)), ("order", Start::Order)] {
@@ -94,7 +93,6 @@ pub fn timing(survey: &Survey) -> Outcome<()> {
         let best = times.fold((f64::INFINITY, true), |a, b| (a.0.min(b.0), a.1 && b.1));
         println!("{} stations from {label}: {:.0} ms CPU, one thread (ok: {})", survey.stations, 1e3 * best.0, best.1);
     }
-    Ok(())
 }
 
 fn rayon_pool() -> rayon::ThreadPool {
@@ -128,7 +126,7 @@ pub fn sampling(survey: &Survey, runs: u64) -> Outcome<()> {
          ellipsoid {:.1} %",
         mean(&single),
         mean(&between),
-        100.0 * covered as f64 / count as f64,
+        100.0 * f64::from(covered) / count as f64,
     );
     Ok(())
 }

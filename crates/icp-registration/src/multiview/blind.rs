@@ -72,7 +72,9 @@ pub(super) fn arranged(stations: &[Cloud], start: Start<'_>, held: usize) -> Res
     }
     let mut poses: Vec<Isometry3<f64>> = best.poses.into_iter().flatten().collect();
     let to_held = poses[held].inverse();
-    poses.iter_mut().for_each(|pose| *pose = to_held * *pose);
+    for pose in &mut poses {
+        *pose = to_held * *pose;
+    }
     search.swept(&mut poses, held);
     Ok((poses, voxel_m))
 }

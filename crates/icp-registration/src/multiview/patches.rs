@@ -75,7 +75,9 @@ impl Groups {
         let mut fits = Vec::with_capacity(self.starts.len());
         let kept = self.filtered(|_, own| {
             let mut moments = Moments::default();
-            own.iter().for_each(|&i| moments.add(&(points[i as usize].coords - origin)));
+            for &i in own {
+                moments.add(&(points[i as usize].coords - origin));
+            }
             let plane = moments.plane();
             fits.extend(plane.map(|plane| (moments, plane)));
             plane.is_some()
@@ -191,7 +193,9 @@ fn of_one_plane(cloud: &Cloud, normals: &[Vector3<f64>], mut points: Vec<u32>, r
         let Some(&first) = points.first() else { return points };
         let origin = cloud.points[first as usize].coords;
         let mut moments = Moments::default();
-        points.iter().for_each(|&i| moments.add(&(cloud.points[i as usize].coords - origin)));
+        for &i in &points {
+            moments.add(&(cloud.points[i as usize].coords - origin));
+        }
         let Some(plane) = moments.plane() else { return points };
         let mean = moments.mean();
         let distance = |i: u32| plane.normal.dot(&(cloud.points[i as usize].coords - origin - mean)).abs();

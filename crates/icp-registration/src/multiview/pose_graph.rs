@@ -164,11 +164,14 @@ fn relative_pose(
     Ok(())
 }
 
+/// Residual, and Jacobians by target and source.
+type RelativeParts = (Vector6<f64>, Matrix6<f64>, Matrix6<f64>);
+
 /// The residual of a relative pose, and the Jacobians of the model by target and source.
 pub(super) fn relative_pose_parts(
     observed: &Isometry3<f64>,
     poses: &[&[f64]],
-) -> std::result::Result<(Vector6<f64>, Matrix6<f64>, Matrix6<f64>), EvaluationFailure> {
+) -> std::result::Result<RelativeParts, EvaluationFailure> {
     let world_from_target = RigidPose::isometry(poses[0])?;
     let world_from_source = RigidPose::isometry(poses[1])?;
     let model = world_from_target.inverse() * world_from_source;

@@ -41,7 +41,9 @@ impl Patches<'_> {
                 continue;
             }
             let plane = moments.region_plane().filter(|plane| plane.variance <= ROUGHER * self.scatter(&region));
-            region.iter().for_each(|&k| planes[k] = plane.map(|plane| (plane, moments.count())));
+            for &k in &region {
+                planes[k] = plane.map(|plane| (plane, moments.count()));
+            }
         }
         planes
     }

@@ -134,7 +134,8 @@ pub struct StationRegistration {
     pub redundancy: i64,
     /// Rounds of the adjustment.
     pub rounds: usize,
-    /// Whether the last round moved no station by more than the tolerance.
+    /// Whether the last round moved no station by more than the tolerance. Where it is not, stations still slide along a
+    /// weak direction and may be decimetres away: do not trust the poses.
     pub settled: bool,
     /// Parameters of the [`PointModel`].
     pub parameters: Option<SharedParameters>,

@@ -30,12 +30,15 @@ pub(super) struct Adjusted {
     pub settled: bool,
 }
 
+/// Derivatives of the patches of each station by all parameters, patch by patch.
+pub(super) type PatchDerivatives = Vec<Vec<[f64; 3]>>;
+
 /// The surfaces at the present parameters.
 pub(super) struct Surfaces<'a> {
     /// As they were given.
     pub given: Vec<&'a Surface>,
     /// At the present parameters, with the derivatives of their patches; `None` without parameters.
-    pub modelled: Option<(Vec<Surface>, Vec<Vec<[f64; 3]>>)>,
+    pub modelled: Option<(Vec<Surface>, PatchDerivatives)>,
     /// The model, with the number of points of each station.
     pub model: Option<(&'a dyn PointModel, Vec<usize>)>,
 }
@@ -143,9 +146,10 @@ fn share(surfaces: &[&Surface], meetings: &mut [Meeting]) {
     for meeting in meetings.iter_mut() {
         let ends = (meeting.target, meeting.source);
         for contact in &mut meeting.contacts {
-            let (station, patch) = match contact.asked_by_source {
-                true => (ends.1, contact.source as usize),
-                false => (ends.0, contact.target as usize),
+            let (station, patch) = if contact.asked_by_source {
+                (ends.1, contact.source as usize)
+            } else {
+                (ends.0, contact.target as usize)
             };
             contact.share = 1.0 / f64::from(seen[station][patch]);
         }
@@ -229,7 +233,7 @@ impl Course<'_> {
                 (self.progress)(rounds);
                 let limit_m = if level.last { self.tolerance_m } else { level.reach.across_m / WIDE_STEP };
                 let settled = largest_step(&before, &state, self.network.hold_m) <= limit_m;
-                ended = Some(Adjusted { settled, rounds, ..adjusted });
+                ended = Some(Adjusted { rounds, settled, ..adjusted });
                 if settled {
                     break;
                 }

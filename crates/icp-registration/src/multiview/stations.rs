@@ -51,12 +51,11 @@ pub fn register_stations(
     let patch_m = surfaces[0].size_m;
     let radius_m = surfaces.iter().map(|surface| surface.radius_m).fold(0.0, f64::max);
     let starter = Starter { surfaces: &surfaces, options, patch_m, radius_m, datum, progress };
-    let (poses, reach_m) = match start {
-        Start::Poses(poses) => (poses.to_vec(), options.start_error_m.unwrap_or(START_ERROR * radius_m)),
-        _ => {
-            let (poses, voxel_m) = super::blind::arranged(stations, start, datum.held_station())?;
-            (poses, (ARRANGED_ERROR * voxel_m).max(patch_m))
-        }
+    let (poses, reach_m) = if let Start::Poses(poses) = start {
+        (poses.to_vec(), options.start_error_m.unwrap_or(START_ERROR * radius_m))
+    } else {
+        let (poses, voxel_m) = super::blind::arranged(stations, start, datum.held_station())?;
+        (poses, (ARRANGED_ERROR * voxel_m).max(patch_m))
     };
     let (prior, names) = match options.model {
         Some(model) => (checked_prior(model)?, model.names()),
@@ -155,12 +154,12 @@ fn prepare(stations: &[Cloud], options: &StationRegistrationOptions<'_>) -> Resu
         let mut sizes: Vec<f64> = stations.par_iter().map(patch_size).collect();
         quantile(&mut sizes, 0.5)
     });
-    let prepare = |cloud: &Cloud| match &cloud.normals {
-        Some(normals) => Surface::new(cloud, normals, size_m),
-        None => {
-            let normals = unorganised_normals(&cloud.points, &UnorganisedNormalOptions::default())?;
-            Surface::new(cloud, &normals, size_m)
+    let prepare = |cloud: &Cloud| {
+        if let Some(normals) = &cloud.normals {
+            return Surface::new(cloud, normals, size_m);
         }
+        let normals = unorganised_normals(&cloud.points, &UnorganisedNormalOptions::default())?;
+        Surface::new(cloud, &normals, size_m)
     };
     stations.par_iter().map(prepare).collect()
 }

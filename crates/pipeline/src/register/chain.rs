@@ -41,10 +41,10 @@ mod tests {
 
     use super::*;
 
-    fn pair(pose: Isometry3<f64>, covariance: Matrix6<f64>) -> IcpResult {
+    fn pair(pose: Isometry3<f64>, covariance: &Matrix6<f64>) -> IcpResult {
         IcpResult {
             target_from_source: pose,
-            covariance,
+            covariance: *covariance,
             overlap: 1.0,
             rms_m: 0.0,
             iterations: 1,
@@ -65,7 +65,7 @@ mod tests {
             let root = Matrix6::from_fn(|r, c| ((1 + r + 2 * c) as f64 * (1.0 + k)).sin());
             1e-6 * root * root.transpose()
         };
-        let pairs = [pair(pose(0.0), covariance(0.0)), pair(pose(1.0), covariance(1.0))];
+        let pairs = [pair(pose(0.0), &covariance(0.0)), pair(pose(1.0), &covariance(1.0))];
         let first = pose(-0.7);
         let chain = along(first, &pairs);
 

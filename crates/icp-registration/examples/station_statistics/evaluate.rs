@@ -126,7 +126,7 @@ pub fn sampling(survey: &Survey, runs: u64) -> Outcome<()> {
          ellipsoid {:.1} %",
         mean(&single),
         mean(&between),
-        100.0 * f64::from(covered) / count as f64,
+        100.0 * covered as f64 / f64::from(count),
     );
     Ok(())
 }

@@ -34,8 +34,8 @@ use crate::error::Result;
 /// against one target, build an [`IcpTarget`] once.
 ///
 /// # Errors
-/// [`Error::TooFewCorrespondences`] where the clouds do not overlap at the guess; [`Error::Empty`],
-/// [`Error::NonFinite`], [`Error::LengthMismatch`], [`Error::NotPositive`], [`Error::InvalidOption`] for the input.
+/// [`crate::Error::TooFewCorrespondences`] where the clouds do not overlap at the guess; [`crate::Error::Empty`],
+/// [`crate::Error::NonFinite`], [`crate::Error::LengthMismatch`], [`crate::Error::NotPositive`], [`crate::Error::InvalidOption`] for the input.
 pub fn align(source: &Cloud, target: &Cloud, guess: &Isometry3<f64>, options: &IcpOptions) -> Result<IcpResult> {
     IcpTarget::new(target.clone())?.align(source, guess, options)
 }

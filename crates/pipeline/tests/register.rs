@@ -55,7 +55,15 @@ fn without_start_poses_no_wrong_pose_is_left_without_a_doubt() {
     copy(&small_room().join("survey"), &survey);
     std::fs::remove_file(survey.join("stations.csv")).unwrap();
     let out = folder.path().join("out");
-    let summary = register(&request(&[survey], RegisterMethod::Multi, &out), &Silent).unwrap();
+    let summary = match register(&request(&[survey], RegisterMethod::Multi, &out), &Silent) {
+        Ok(summary) => summary,
+        // A refusal that names the stations leaves no wrong pose either, and nothing on disk.
+        Err(error) => {
+            let words = error.to_string();
+            assert!(words.contains("no alignment found") && words.contains("--guess") && !out.exists(), "{words}");
+            return;
+        }
+    };
     println!("{summary}");
     assert!(summary.start.starts_with("none"), "{}", summary.start);
     // A room looks alike from opposite sides: right as from start poses, or said to be doubtful.

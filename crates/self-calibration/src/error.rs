@@ -105,6 +105,15 @@ pub enum Error {
         /// The correlation.
         correlation: f64,
     },
+    /// The stations still slide along their surfaces at the end of the adjustment.
+    #[error(
+        "the stations did not settle in {} rounds without and {} rounds with the terms: a direction is held by too few \
+         surfaces; give better approximate poses, or stations that see more furniture across it", .rounds[0], .rounds[1]
+    )]
+    SurfacesNotSettled {
+        /// Rounds with the known model, and with the terms as unknowns.
+        rounds: [usize; 2],
+    },
     /// The stations could not be registered.
     #[error("registration, {station}: {reason}")]
     Registration {

@@ -17,7 +17,7 @@ use crate::{Error, Result};
 ///
 /// # Errors
 /// [`Error::SurfacesNotDetermined`] where the surfaces leave a term open: the poses take its place, as with a single
-/// wall. [`Error::UnknownName`] for a term that `known` does not have; [`Error::Registration`] where the stations do not
+/// wall. [`Error::SurfacesNotSettled`] where the stations still slide at the end. [`Error::UnknownName`] for a term that `known` does not have; [`Error::Registration`] where the stations do not
 /// come together; [`Error::OutOfDomain`], [`Error::Image`] for the input; [`Error::Model`] if the estimated terms are no
 /// usable model.
 pub fn calibrate_surfaces(
@@ -48,6 +48,9 @@ pub fn calibrate_surfaces(
     let with = StationRegistrationOptions { model: Some(&model), ..options.registration.clone() };
     let poses = Start::Poses(&before.world_from_station);
     let after = register_stations(&clouds, poses, datum, &with, progress).map_err(all)?;
+    if !(before.settled && after.settled) {
+        return Err(Error::SurfacesNotSettled { rounds: [before.rounds, after.rounds] });
+    }
     let Some(shared) = &after.parameters else { return Err(Error::NothingToEstimate) };
     require_determined(shared, &model, options)?;
     let mut adjusted = known.clone();

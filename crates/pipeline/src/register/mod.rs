@@ -3,13 +3,13 @@
 mod chain;
 mod describe;
 mod guess;
-mod input;
+pub(crate) mod input;
 mod pairs;
 mod request;
 mod results;
 mod stations;
 mod summary;
-mod surface;
+pub(crate) mod surface;
 
 use std::time::Instant;
 

@@ -18,8 +18,8 @@ const RESIDUAL_REACH: f64 = 5.0;
 const SPACING_REACH: f64 = 2.0;
 
 /// One station, prepared.
-pub(super) struct Surface {
-    pub(super) target: IcpTarget,
+pub(crate) struct Surface {
+    pub(crate) target: IcpTarget,
     frame: Option<OrganisedFrame>,
     voxels: Option<VoxelCloud>,
     viewpoint: Viewpoint,
@@ -27,7 +27,7 @@ pub(super) struct Surface {
 
 /// Where an alignment starts.
 #[derive(Debug, Clone, Copy)]
-pub(super) enum Start {
+pub(crate) enum Start {
     /// A pose that somebody stated.
     Guess(Isometry3<f64>),
     /// Found from the clouds, right to this distance, metre.
@@ -35,9 +35,9 @@ pub(super) enum Start {
 }
 
 impl Surface {
-    pub(super) fn new(station: &Station) -> Result<Self> {
+    pub(crate) fn new(station: &Station, normal_half_width_px: usize) -> Result<Self> {
         let fail = |error: icp_registration::Error| Error::Register(format!("{}: {error}", station.name));
-        let target = IcpTarget::new(station.cloud()?).map_err(fail)?;
+        let target = IcpTarget::new(station.cloud(normal_half_width_px)?).map_err(fail)?;
         let frame = station.projection.as_ref().and_then(|projection| frame(station, projection));
         // Clouds too small to fill voxels are registered point by point.
         let voxels = match frame {
@@ -64,7 +64,7 @@ impl Surface {
     }
 
     /// Fine alignment of `source` with this station.
-    pub(super) fn align(&self, source: &Self, start: Start) -> icp_registration::Result<IcpResult> {
+    pub(crate) fn align(&self, source: &Self, start: Start) -> icp_registration::Result<IcpResult> {
         let (guess, error_m) = match start {
             Start::Guess(guess) => (guess, None),
             Start::Found(guess, error_m) => (guess, Some(error_m)),

@@ -1,75 +1,101 @@
+use std::sync::atomic::{AtomicUsize, Ordering};
+
 use icp_registration::{
-    Cloud, IcpTarget, OrganisedNormalOptions, PairAlignment, RefusedPair, SurfaceAdjustmentOptions, align_pairs,
-    find_overlaps, organised_normals,
+    Cloud, Datum, IcpTarget, PairAlignment, RefusedPair, Start, StationRegistrationOptions, find_overlaps,
+    register_stations,
 };
 use nalgebra::Isometry3;
+use rayon::prelude::*;
 
 use super::Findings;
 use crate::outcome::StationPose;
-use crate::plan::RegisterOptions;
+use crate::plan::{RegisterOptions, StartPoses};
 use crate::progress::Progress;
+use crate::register::Station;
+use crate::register::surface::{self, Surface};
 use crate::work::Work;
 use crate::{Error, Result};
 
+/// Pairs of which a smaller part of the points has a partner are no pairs.
+const FEWEST_PARTNERS: f64 = 0.1;
+
 /// Overlapping stations are aligned pair by pair, and the best pairs carry the poses from the first station on.
 pub(super) fn run(work: &mut Work, options: &RegisterOptions, progress: &dyn Progress) -> Result<Findings> {
-    let targets = station_clouds(work, options)?;
-    let approximate = approximate_poses(work);
-    let candidates = candidate_pairs(&targets, &approximate, options)?;
-    progress.begin("Register", candidates.len());
-    let icp = SurfaceAdjustmentOptions::with_initial_error(options.maximum_distance_m).icp;
-    let (pairs, refused) = align_pairs(&targets, &approximate, &candidates, &icp, &|done, _| progress.advance(done));
-    let poses = spanning_poses(work, &pairs, &refused, &approximate)?;
-    work.outcome.poses = poses;
-    let findings = [("pairs", pairs.len()), ("pairs_refused", refused.len())];
-    work.outcome.pairs = pairs;
-    work.outcome.refused = refused;
-    work.station_clouds = targets;
-    Ok(findings.map(|(name, count)| (name.to_owned(), count as f64)).into())
-}
-
-/// The unflagged points of each view with normals from its grid, as targets with their trees.
-fn station_clouds(work: &Work, options: &RegisterOptions) -> Result<Vec<IcpTarget>> {
-    let clouds = work.outcome.clouds.iter().zip(&work.outcome.views);
     if work.outcome.clouds.is_empty() {
         return Err(Error::Needs { stage: "Register", needs: "PointCloud" });
     }
-    let normal_options =
-        OrganisedNormalOptions { half_width_px: options.normal_half_width_px, ..OrganisedNormalOptions::default() };
-    let prepared = clouds.map(|(cloud, view)| {
-        let name = view.name();
-        let fail = || Error::stage::<icp_registration::Error>("Register", &name);
-        let mut points = cloud.points.clone();
-        for (point, flags) in points.iter_mut().zip(&cloud.flags) {
-            if !flags.is_empty() {
-                *point = [f64::NAN; 3];
-            }
-        }
-        let normals = organised_normals(&points, cloud.width, cloud.height, &normal_options);
-        let normals = normals.map_err(fail())?;
-        let cloud = Cloud::from_frame(&points, Some(&normals), Some(&cloud.sigma)).map_err(fail())?;
-        IcpTarget::new(cloud).map_err(fail())
-    });
-    prepared.collect()
+    let stations = Station::of_views(&work.outcome);
+    let approximate: Option<Vec<Isometry3<f64>>> = stations.iter().map(|station| station.approximate).collect();
+    match approximate.filter(|_| options.start == StartPoses::Approximate) {
+        Some(approximate) => from_poses(work, &stations, &approximate, options, progress)?,
+        None => from_order(work, &stations, options, progress)?,
+    }
+    let findings = [("pairs", work.outcome.pairs.len()), ("pairs_refused", work.outcome.refused.len())];
+    Ok(findings.map(|(name, count)| (name.to_owned(), count as f64)).into())
 }
 
-fn approximate_poses(work: &Work) -> Vec<Isometry3<f64>> {
-    work.outcome.views.iter().map(|view| view.approximate_world_from_camera.unwrap_or_default()).collect()
-}
-
-/// Pairs that the approximate poses say overlap; neighbours in time where nothing is known of the poses.
-fn candidate_pairs(
-    targets: &[IcpTarget],
+/// Pairs that the approximate poses say overlap, aligned from there.
+fn from_poses(
+    work: &mut Work,
+    stations: &[Station],
     approximate: &[Isometry3<f64>],
     options: &RegisterOptions,
-) -> Result<Vec<(usize, usize)>> {
-    if approximate.iter().all(|pose| *pose == Isometry3::identity()) {
-        return Ok((1..targets.len()).map(|source| (source - 1, source)).collect());
-    }
-    let overlaps = find_overlaps(targets, approximate, options.maximum_distance_m);
+    progress: &dyn Progress,
+) -> Result<()> {
+    progress.begin("Register", stations.len());
+    let done = AtomicUsize::new(0);
+    let prepare = |station: &Station| {
+        let surface = Surface::new(station, options.normal_half_width_px);
+        progress.advance(done.fetch_add(1, Ordering::Relaxed) + 1);
+        surface
+    };
+    let surfaces = stations.par_iter().map(prepare).collect::<Result<Vec<_>>>()?;
+    let targets: Vec<&IcpTarget> = surfaces.iter().map(|surface| &surface.target).collect();
+    let overlaps = find_overlaps(&targets, approximate, options.maximum_distance_m);
     let overlaps = overlaps.map_err(Error::stage("Register", "overlaps"))?;
     let enough = overlaps.into_iter().filter(|overlap| overlap.fraction >= options.minimum_overlap);
-    Ok(enough.map(|overlap| (overlap.target, overlap.source)).collect())
+    let candidates: Vec<(usize, usize)> = enough.map(|overlap| (overlap.target, overlap.source)).collect();
+    let align = |&(target, source): &(usize, usize)| {
+        let guess = surface::Start::Guess(approximate[target].inverse() * approximate[source]);
+        let refused = |reason| RefusedPair { target, source, reason };
+        let result = surfaces[target].align(&surfaces[source], guess).map_err(|error| refused(error.to_string()))?;
+        if result.overlap < FEWEST_PARTNERS {
+            return Err(refused(format!("only {:.0} % of the points have a partner", 100.0 * result.overlap)));
+        }
+        Ok(PairAlignment { target, source, result })
+    };
+    let (mut pairs, mut refused) = (Vec::new(), Vec::new());
+    for aligned in candidates.par_iter().map(align).collect::<Vec<_>>() {
+        match aligned {
+            Ok(pair) => pairs.push(pair),
+            Err(reason) => refused.push(reason),
+        }
+    }
+    work.outcome.poses = spanning_poses(work, &pairs, &refused, approximate)?;
+    (work.outcome.pairs, work.outcome.refused) = (pairs, refused);
+    work.station_clouds = surfaces.into_iter().map(|surface| surface.target.cloud().clone()).collect();
+    Ok(())
+}
+
+/// Nothing known but that stations which follow each other overlap.
+fn from_order(work: &mut Work, stations: &[Station], options: &RegisterOptions, progress: &dyn Progress) -> Result<()> {
+    let clouds = stations.par_iter().map(|station| station.cloud(options.normal_half_width_px));
+    let clouds = clouds.collect::<Result<Vec<Cloud>>>()?;
+    progress.begin("Register", stations.len());
+    let told = |done: usize, _: usize| progress.advance(done);
+    let choice = StationRegistrationOptions {
+        minimum_overlap: options.minimum_overlap,
+        ..StationRegistrationOptions::default()
+    };
+    let found = register_stations(&clouds, Start::Order, Datum::Station(0), &choice, &told);
+    let found = found.map_err(Error::stage("Register", "all stations"))?;
+    // The first station keeps the pose that the survey gives it.
+    let world = stations.first().and_then(|station| station.approximate).unwrap_or_default();
+    let pose = |pose: &Isometry3<f64>| StationPose { world_from_camera: world * pose, covariance: None };
+    work.outcome.poses = found.world_from_station.iter().map(pose).collect();
+    (work.outcome.pairs, work.outcome.refused) = (found.pairs, found.refused);
+    work.station_clouds = clouds;
+    Ok(())
 }
 
 /// Poses along the tree of pairs with the most overlap, from the first station on.

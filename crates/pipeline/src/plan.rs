@@ -310,9 +310,9 @@ pub(crate) const NORMAL_HALF_WIDTH_PX: usize = 3;
 pub struct RegisterOptions {
     /// What is known of the poses. Default: what the survey says of them, else the order of the stations.
     pub start: StartPoses,
-    /// Points this close at the approximate poses count as overlapping, metre: about the error of those poses.
+    /// How far approximate poses may be off, metre, their rotations at the distance of what is seen.
     pub maximum_distance_m: f64,
-    /// Smallest part of a view that must overlap another for the two to be aligned.
+    /// Smallest part of a view that must overlap another for the two to be aligned as a pair.
     pub minimum_overlap: f64,
     /// Normals come from windows of twice this and one pixel a side; small images want small windows.
     pub normal_half_width_px: usize,
@@ -327,6 +327,9 @@ pub enum StartPoses {
     Approximate,
     /// Without poses: stations that follow each other overlap.
     Order,
+    /// Each station stands near the one before and looks the same way: a camera that is moved a little. Each is aligned
+    /// onto the one before.
+    Neighbour,
 }
 
 impl Default for RegisterOptions {

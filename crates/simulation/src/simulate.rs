@@ -131,10 +131,11 @@ impl Simulator {
             world_from_camera: place.world_from_camera(),
         };
         let (mut image, truth) = renderer.render()?;
-        self.scatter(&mut image)?;
+        // Before the scattering, which does not ask where light comes from.
         if let Some(gross) = &self.spec.errors.gross_errors {
             spoil(&mut image, gross, station);
         }
+        self.scatter(&mut image)?;
         Ok(StationImage { spec: Arc::clone(&self.spec), station, image, truth: Arc::new(truth) })
     }
 

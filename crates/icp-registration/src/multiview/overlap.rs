@@ -1,7 +1,5 @@
 //! Which stations see the same surfaces.
 
-use std::borrow::Borrow;
-
 use nalgebra::Isometry3;
 use rayon::prelude::*;
 
@@ -28,8 +26,8 @@ pub struct Overlap {
 ///
 /// # Errors
 /// [`Error::LengthMismatch`] where poses and stations differ in number, [`Error::NotPositive`] for the distance.
-pub fn find_overlaps<T: Borrow<IcpTarget> + Sync>(
-    stations: &[T],
+pub fn find_overlaps(
+    stations: &[IcpTarget],
     world_from_station: &[Isometry3<f64>],
     distance_m: f64,
 ) -> Result<Vec<Overlap>> {
@@ -42,13 +40,13 @@ pub fn find_overlaps<T: Borrow<IcpTarget> + Sync>(
         .collect();
     let overlap = |&(target, source): &(usize, usize)| {
         let target_from_source = world_from_station[target].inverse() * world_from_station[source];
-        let points = &stations[source].borrow().cloud().points;
+        let points = &stations[source].cloud().points;
         let sampled = points.iter().step_by(points.len().div_ceil(SAMPLES).max(1));
         let (mut seen, mut asked) = (0_usize, 0_usize);
         for point in sampled {
             asked += 1;
             seen += usize::from(
-                stations[target].borrow().tree().nearest_within(&(target_from_source * point), distance_m)?.is_some(),
+                stations[target].tree().nearest_within(&(target_from_source * point), distance_m)?.is_some(),
             );
         }
         Ok(Overlap { source, target, fraction: seen as f64 / asked.max(1) as f64 })

@@ -3,7 +3,7 @@
 mod chain;
 mod describe;
 mod guess;
-pub(crate) mod input;
+mod input;
 mod pairs;
 mod request;
 mod results;

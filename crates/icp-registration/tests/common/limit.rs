@@ -4,7 +4,9 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::{DMatrix, Dyn, Isometry3, Matrix3, Matrix6, Matrix6x3, OMatrix, Point3, SymmetricEigen, U3, Vector3, Vector6};
+use nalgebra::{
+    DMatrix, Dyn, Isometry3, Matrix3, Matrix6, Matrix6x3, OMatrix, Point3, SymmetricEigen, U3, Vector3, Vector6,
+};
 
 use super::{Cuboid, Pinhole, Scene, sigma_of};
 

@@ -6,7 +6,7 @@ use icp_registration::{
 use nalgebra::{Isometry3, Matrix6};
 
 use crate::common::{disturbance, pose_error, stations};
-use crate::cpu;
+use crate::cpu_clock::cpu_seconds;
 
 /// A simulated survey.
 pub struct Survey {
@@ -85,9 +85,9 @@ pub fn timing(survey: &Survey) {
     for (label, start) in [("poses", Start::Poses(&truth)), ("order", Start::Order)] {
         let times = (0..3).map(|_| {
             pool.install(|| {
-                let before = cpu::seconds();
+                let before = cpu_seconds();
                 let result = register(&clouds, start, survey.patch_m).map(|found| found.rounds);
-                (cpu::seconds() - before, result.is_ok())
+                (cpu_seconds() - before, result.is_ok())
             })
         });
         let best = times.fold((f64::INFINITY, true), |a, b| (a.0.min(b.0), a.1 && b.1));

@@ -8,7 +8,8 @@
 
 #[path = "../../tests/common/mod.rs"]
 mod common;
-mod cpu;
+#[path = "../../../../xtask/peers/cpu_clock.rs"]
+mod cpu_clock;
 mod evaluate;
 mod limit;
 

@@ -5,6 +5,7 @@
 
 mod aligner;
 mod blocks;
+mod consistency;
 mod frame;
 mod grid;
 mod nodes;
@@ -19,6 +20,7 @@ mod table;
 mod track;
 
 pub use aligner::{FrameAligner, align_frames};
+pub use consistency::{FrameConsistency, frame_consistency};
 pub use frame::OrganisedFrame;
 pub use options::FrameAlignmentOptions;
 pub use projection::Projection;

@@ -70,7 +70,8 @@ fn each_onto_the_one_before(stations: &[Station], options: &RegisterOptions) -> 
     let surfaces = surfaces.collect::<Result<Vec<_>>>()?;
     let align = |source: usize| {
         let target = source - 1;
-        let result = surfaces[target].align(&surfaces[source], surface::Start::Guess(Isometry3::identity()));
+        let start = surface::Start::Found(Isometry3::identity(), options.maximum_distance_m);
+        let result = surfaces[target].align(&surfaces[source], start);
         let names = format!("{} onto {}", stations[source].name, stations[target].name);
         let result = result.map_err(Error::stage("Register", &names))?;
         Ok(PairAlignment { target, source, result })

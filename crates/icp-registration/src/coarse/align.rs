@@ -83,17 +83,18 @@ pub fn align_without_guess(
         correspondences: correspondences.len(),
     })?;
     let common = Common::new(source, target, &winner.pose);
+    let (pose, verdict, determined) = common.settled(source, target, &winner.pose);
     let alignment = CoarseAlignment {
-        target_from_source: target.between_frames(source, &winner.pose),
-        inliers: correspondences.inliers(&winner.pose, tolerance).len(),
+        target_from_source: target.between_frames(source, &pose),
+        inliers: correspondences.inliers(&pose, tolerance).len(),
         correspondences: correspondences.len(),
-        overlap: winner.verdict.overlap(),
-        agreement: winner.verdict.agreement(),
-        contradiction: winner.verdict.contradiction(),
+        overlap: verdict.overlap(),
+        agreement: verdict.agreement(),
+        contradiction: verdict.contradiction(),
         inside: common.inside,
         rival: rival / winner.evidence.max(f64::MIN_POSITIVE),
         rms_m: winner.rms_m,
-        determined: winner.verdict.share_lost(common.slid.map(|pose| Verdict::new(source, target, &pose, 1))),
+        determined,
         voxel_m,
     };
     check(alignment, options)
@@ -140,7 +141,7 @@ fn verified(
         let refined = refine(source, target, pose);
         let verdict = Verdict::new(source, target, &refined.pose, 1);
         let added = verdict.points() as f64 * correspondences.added_share(&refined.pose, tolerance);
-        Hypothesis { pose: refined.pose, verdict, evidence: verdict.evidence() + added, rms_m: refined.rms_m }
+        Hypothesis { pose: refined.pose, evidence: verdict.evidence() + added, rms_m: refined.rms_m }
     };
     let verified = ranked.par_iter().map(verify).collect();
     (correspondences, verified)
@@ -149,7 +150,6 @@ fn verified(
 /// A refined pose between the clouds' middles.
 struct Hypothesis {
     pose: Isometry3<f64>,
-    verdict: Verdict,
     /// Points that speak for it less those that contradict, and what added features say.
     evidence: f64,
     rms_m: f64,

@@ -9,7 +9,7 @@ use nalgebra::{Isometry3, Matrix6, Vector3, Vector6};
 use super::correspondences::{Motion, moved};
 use super::feature_cloud::FeatureCloud;
 use super::fpfh::{dot, subtract};
-use super::judge::partner;
+use super::judge::{Verdict, partner};
 
 /// Points that are looked for behind a tangent plane, the share that must lie there, and how far, voxels.
 const WITNESSES: usize = 256;
@@ -26,13 +26,17 @@ const MOST_PLANES: usize = 12;
 const LEAST_ON_PLANE: f64 = 0.012;
 /// How far a pose is moved to see what holds it, voxels: beyond the neighbourhoods that hits and free space allow for.
 const SLIDE_VOXELS: f64 = 6.0;
+/// Steps of a voxel to either side that are tried where planes leave a motion open, the share of the evidence that may be
+/// missing in the middle of them, and the smallest eigenvalue a point below which a motion is open.
+const SLIDES: i32 = 6;
+const HARDLY: f64 = 0.1;
+const OPEN: f64 = 1.5e-3;
 
 /// What a pose's partners tell about the place.
 pub(super) struct Common {
     /// Share of the sampled points that lie inside in both clouds, of the cloud with fewer.
     pub(super) inside: f64,
-    /// The pose moved to and fro along what the planes determine least.
-    pub(super) slid: [Isometry3<f64>; 2],
+    planes: Planes,
 }
 
 impl Common {
@@ -47,8 +51,40 @@ impl Common {
         };
         let inside = count(source, target, &forward).min(count(target, source, &backward));
         let on_target: Vec<usize> = forward.iter().map(|p| p[1]).chain(backward.iter().map(|p| p[0])).collect();
-        let planes = Planes::new(target, on_target);
-        Self { inside, slid: [-1.0, 1.0].map(|sign| planes.slid(pose, sign * SLIDE_VOXELS * target.voxel_m())) }
+        Self { inside, planes: Planes::new(target, on_target) }
+    }
+
+    /// The pose moved by this many voxels along what the planes determine least.
+    pub(super) fn slid(&self, target: &FeatureCloud, pose: &Isometry3<f64>, voxels: f64) -> Isometry3<f64> {
+        self.planes.slid(pose, voxels * target.voxel_m())
+    }
+
+    /// The pose with its verdict, and the share of the evidence that is lost where it slides. What planes leave open is put
+    /// in the middle of where hardly anything contradicts: edges hold it on either side.
+    pub(super) fn settled(
+        &self,
+        source: &FeatureCloud,
+        target: &FeatureCloud,
+        pose: &Isometry3<f64>,
+    ) -> (Isometry3<f64>, Verdict, f64) {
+        let at = |pose: &Isometry3<f64>, voxels: f64| {
+            let pose = self.slid(target, pose, voxels);
+            (pose, Verdict::new(source, target, &pose, 1))
+        };
+        let mut best = at(pose, 0.0);
+        if self.planes.are_open() {
+            let steps: Vec<f64> = (-SLIDES..=SLIDES).map(f64::from).collect();
+            let evidence: Vec<f64> = steps.iter().map(|&step| at(pose, step).1.evidence()).collect();
+            let floor = (1.0 - HARDLY) * evidence.iter().copied().fold(0.0, f64::max);
+            let weight: f64 = evidence.iter().map(|e| (e - floor).max(0.0)).sum();
+            let moment: f64 = evidence.iter().zip(&steps).map(|(e, step)| (e - floor).max(0.0) * step).sum();
+            let middle = at(pose, moment / weight.max(f64::MIN_POSITIVE));
+            if middle.1.evidence() > floor {
+                best = middle;
+            }
+        }
+        let lost = best.1.share_lost([-SLIDE_VOXELS, SLIDE_VOXELS].map(|voxels| at(&best.0, voxels).1));
+        (best.0, best.1, lost)
     }
 }
 
@@ -82,6 +118,7 @@ fn is_inside(cloud: &FeatureCloud, witnesses: &[[f32; 3]], i: usize) -> bool {
 /// a plane's one normal does not.
 struct Planes {
     matrix: Matrix6<f64>,
+    points: f64,
     centre: Vector3<f64>,
     radius: f64,
 }
@@ -95,7 +132,7 @@ impl Planes {
         let centre = on.iter().fold(Vector3::zeros(), |sum, &i| sum + place(i)) / count;
         let spread: f64 = on.iter().map(|&i| (place(i) - centre).norm_squared()).sum();
         let radius = (spread / count).sqrt().max(cloud.voxel_m());
-        let mut planes = Self { matrix: Matrix6::zeros(), centre, radius };
+        let mut planes = Self { matrix: Matrix6::zeros(), points: count, centre, radius };
         for _ in 0..MOST_PLANES {
             let size = |seed: usize| on.iter().filter(|&&i| is_on_plane(cloud, seed, i)).count();
             // The first of equally large planes.
@@ -119,6 +156,11 @@ impl Planes {
             let row = Vector6::new(normal.x, normal.y, normal.z, lever.x, lever.y, lever.z);
             self.matrix.ger(1.0, &row, &row, 1.0);
         }
+    }
+
+    /// Whether a motion is left open, but for slivers.
+    fn are_open(&self) -> bool {
+        crate::eigen::eigen6(&self.matrix, "planes in common").is_ok_and(|(values, _)| values[0] < OPEN * self.points)
     }
 
     /// The pose moved along the least determined motion, `distance` metre at the radius.

@@ -47,7 +47,7 @@ fn simple_histograms(points: &[[f32; 3]], normals: &Normals, surroundings: &Surr
             block[filled] = near.index;
             let j = near.index as usize;
             // Every second pair: some forty neighbours fill the histograms as well as eighty.
-            filled += usize::from(j > i && (i + j) % 2 == 0 && !normals.vectors[j][0].is_nan());
+            filled += usize::from(j > i && (i + j).is_multiple_of(2) && !normals.vectors[j][0].is_nan());
             if filled == LANES {
                 add_pairs(points, normals, i, &block, &mut counts);
                 filled = 0;

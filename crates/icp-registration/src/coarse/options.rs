@@ -97,9 +97,9 @@ pub struct CoarseOptions {
     /// normals have no side always pass.
     pub min_inside: f64,
     /// Smallest share of the evidence that is lost where the pose slides along what is determined least (see
-    /// [`super::CoarseAlignment::determined`]). Default 0.15. 0 lets features decide where surfaces cannot.
+    /// [`super::CoarseAlignment::determined`]). Default 0.3. 0 lets features decide where surfaces cannot.
     pub min_determined: f64,
-    /// Largest evidence for the best different pose, as a fraction of the winner's. Default 0.92.
+    /// Largest evidence for the best different pose, as a fraction of the winner's. Default 0.9.
     pub max_rival: f64,
     /// Start of the random numbers.
     pub seed: u64,
@@ -123,8 +123,8 @@ impl Default for CoarseOptions {
             min_agreement: 0.96,
             max_contradiction: 0.012,
             min_inside: 0.013,
-            min_determined: 0.15,
-            max_rival: 0.92,
+            min_determined: 0.3,
+            max_rival: 0.9,
             seed: 1,
         }
     }

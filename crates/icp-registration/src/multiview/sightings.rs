@@ -275,10 +275,13 @@ impl<'a> Sighting<'a> {
         self.phi[1..3].copy_from_slice(&hit.place);
         let parameters = self.gate.parameters;
         if parameters > 0 {
+            // Those of the points beside it: its own share the noise of its distance, and would shrink the scene.
             let normal = self.rotation.transpose() * self.facets[hit.facet].normal;
-            let derivatives = &self.points.derivatives[point * parameters..(point + 1) * parameters];
-            for (phi, derivative) in self.phi[3..].iter_mut().zip(derivatives) {
-                *phi = normal.dot(&Vector3::from(*derivative));
+            let last = self.points.points.len() - 1;
+            let of = |point: usize| &self.points.derivatives[point * parameters..(point + 1) * parameters];
+            let (before, after) = (of(if point == 0 { last.min(1) } else { point - 1 }), of((point + 1).min(last)));
+            for ((phi, before), after) in self.phi[3..].iter_mut().zip(before).zip(after) {
+                *phi = 0.5 * normal.dot(&(Vector3::from(*before) + Vector3::from(*after)));
             }
         }
         self.sums.add(hit.tile, &self.phi, rho, weight);

@@ -155,3 +155,21 @@ fn stations_without_partner_are_named() {
     }
     assert!(error.to_string().contains("station 0"));
 }
+
+#[test]
+fn halves_of_a_round_that_see_no_surface_from_both_sides_are_named() {
+    // Six stations: three look at one end of the room and three at the other, and what stands between shows each its own
+    // side. How far the halves are apart is known to no better than decimetres, and said so.
+    let (clouds, truth) = round(6, 0.0, 11);
+    let options = StationRegistrationOptions::default();
+    let found = register_stations(&clouds, Start::Poses(&truth), Datum::Station(0), &options, &|_, _| {}).unwrap();
+    assert!(found.settled);
+    let named: Vec<usize> = found.undetermined.iter().map(|station| station.station).collect();
+    assert_eq!(named, [2, 3, 4]);
+    for station in &found.undetermined {
+        let [motion] = station.motions.as_slice() else { panic!("{:?}", station.motions) };
+        assert_eq!(motion.kind, MotionKind::Translation);
+        // Along the axis that the halves look along.
+        assert!(motion.axis.x.abs() > 0.99 && motion.sigma_m > 0.1, "{motion:?}");
+    }
+}

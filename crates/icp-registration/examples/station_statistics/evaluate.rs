@@ -7,7 +7,6 @@ use nalgebra::{Isometry3, Matrix6};
 
 use crate::common::{disturbance, pose_error, stations};
 use crate::cpu_clock::cpu_seconds;
-use crate::cpu;
 use crate::limit::{Plane, cramer_rao};
 
 /// A simulated survey.

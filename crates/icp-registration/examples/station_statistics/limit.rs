@@ -1,26 +1,15 @@
-//! What the noise allows for stations on a round.
 //! What the noise allows: bounds of Cramér and Rao for surfaces of which nothing is known but that they are plane.
 
 use std::collections::BTreeMap;
 
 use nalgebra::{DMatrix, Isometry3, Matrix3, Matrix6, Matrix6x3, Point3, Vector3, Vector6};
 
-use crate::common::limit::information;
 use crate::common::stations::round_poses;
-use crate::common::{Pinhole, Scene};
-
-/// Standard deviations of the least known station against the first: position in millimetre and rotation in degree.
-pub fn cramer_rao(count: usize) -> (f64, f64) {
-    let information = information(&Scene::furnished(), &Pinhole::small(), &round_poses(count));
-    let free = information.view((6, 6), (6 * count - 6, 6 * count - 6)).into_owned();
-    let Some(covariance) = free.try_inverse() else { return (f64::INFINITY, f64::INFINITY) };
-    let sigma = |k: usize, part: usize| (0..3).map(|c| covariance[(6 * k + part + c, 6 * k + part + c)]).sum::<f64>();
-    let largest = |part: usize| (0..count - 1).map(|k| sigma(k, part).sqrt()).fold(0.0, f64::max);
-    (1e3 * largest(0), largest(3).to_degrees())
-}
 use crate::common::{Cuboid, Pinhole, Scene, sigma_of};
+
 /// Edge of the cells, metre.
 const CELL_M: f64 = 0.1;
+
 /// What is plane.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Plane {
@@ -28,24 +17,33 @@ pub enum Plane {
     Cells,
     /// Whole faces of room and furniture, offsets and slopes unknown.
     Faces,
+}
+
 /// Weighted sums over the points of a station on one plane: with their place `[1, u, v]` on it.
 #[derive(Clone, Default)]
 struct Seen {
     cross: Matrix6x3<f64>,
     square: Matrix6<f64>,
     plane: Matrix3<f64>,
+}
+
 /// Box, face, and cell indices.
 type Key = (usize, usize, [i64; 3]);
+
 /// Standard deviations of the stations against the first.
 pub struct Limit {
     /// Position of each but the first, millimetre.
     pub mm: Vec<f64>,
     /// Rotation, degree.
     pub degrees: Vec<f64>,
+}
+
 impl Limit {
     pub fn rms_mm(&self) -> f64 {
         (self.mm.iter().map(|mm| mm * mm).sum::<f64>() / self.mm.len() as f64).sqrt()
     }
+}
+
 pub fn cramer_rao(count: usize, plane: Plane) -> Option<Limit> {
     let (scene, poses) = (Scene::furnished(), round_poses(count));
     let mut planes: BTreeMap<Key, Vec<Seen>> = BTreeMap::new();
@@ -73,12 +71,16 @@ pub fn cramer_rao(count: usize, plane: Plane) -> Option<Limit> {
     };
     let (mm, degrees) = (sigma(0).iter().map(|s| 1e3 * s).collect(), sigma(3).iter().map(|s| s.to_degrees()).collect());
     Some(Limit { mm, degrees })
+}
+
 fn inverse(of_plane: &Matrix3<f64>, plane: Plane) -> Matrix3<f64> {
     let offset = || Matrix3::from_diagonal(&Vector3::new(1.0 / of_plane[(0, 0)], 0.0, 0.0));
     match plane {
         Plane::Cells => offset(),
         Plane::Faces => of_plane.try_inverse().unwrap_or_else(offset),
     }
+}
+
 fn add_station(
     scene: &Scene,
     pose: &Isometry3<f64>,
@@ -107,6 +109,8 @@ fn add_station(
         seen.square += row * row.transpose() * weight;
         seen.plane += place * place.transpose() * weight;
     }
+}
+
 /// The box (0: the room) and the face, two an axis, that a point lies on.
 fn face(scene: &Scene, point: &Point3<f64>) -> Option<(usize, usize)> {
     let on = |cuboid: &Cuboid| {
@@ -117,3 +121,4 @@ fn face(scene: &Scene, point: &Point3<f64>) -> Option<(usize, usize)> {
     };
     let mut boxes = scene.boxes.iter().enumerate();
     boxes.find_map(|(k, cuboid)| on(cuboid).map(|face| (k + 1, face))).or_else(|| on(&scene.room).map(|face| (0, face)))
+}

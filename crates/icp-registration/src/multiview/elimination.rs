@@ -8,7 +8,7 @@
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix3, Matrix6x3, Vector3};
 
 use super::facets::Facet;
-use super::sightings::{Sums, TileSums};
+use super::sums::{Sums, TileSums};
 
 /// How well the slopes of a facet are known from the patches that it was found by, radian.
 const SLOPE: f64 = 0.02;

@@ -27,6 +27,7 @@ mod scatter;
 mod sightings;
 mod simultaneous;
 mod stations;
+mod sums;
 mod surfaces;
 mod tiles;
 

@@ -8,6 +8,7 @@ use rayon::prelude::*;
 
 use super::facets::Facet;
 use super::points::{Block, StationPoints};
+use super::sums::{FARTHEST, Sums};
 use super::tiles::Tile;
 use crate::kernel::RobustKernel;
 
@@ -15,83 +16,8 @@ use crate::kernel::RobustKernel;
 const GRAZING: f64 = 0.03;
 /// Standard deviations between the ranges of two facets below which they are not told apart.
 const APART: f64 = 7.0;
-/// Standard deviations beyond which a point is not on a facet.
-const FARTHEST: f64 = 4.685;
 /// Cosine between the normals of facets that are one surface.
 const SAME_DIRECTION: f64 = 0.966;
-
-/// Sums over the points of a station in a tile. With `φ = [1, u, v, derivatives by the shared parameters]` and the
-/// distance ρ of a point from its facet: `Σ w φ φᵀ` (lower triangle, row by row) and `Σ w φ ρ`.
-#[derive(Debug, Clone)]
-pub(super) struct Sums {
-    pub order: usize,
-    /// Where the sums of each tile begin; `u32::MAX` for a tile that the station saw nothing of.
-    begins: Vec<u32>,
-    values: Vec<f64>,
-}
-
-impl Sums {
-    fn new(parameters: usize, tiles: usize) -> Self {
-        let order = 3 + parameters;
-        Self { order, begins: vec![u32::MAX; tiles], values: Vec::new() }
-    }
-
-    fn stride(order: usize) -> usize {
-        order * (order + 1) / 2 + order
-    }
-
-    fn add(&mut self, tile: usize, phi: &[f64], rho: f64, weight: f64) {
-        let stride = Self::stride(self.order);
-        if self.begins[tile] == u32::MAX {
-            self.begins[tile] = self.values.len() as u32;
-            self.values.resize(self.values.len() + stride, 0.0);
-        }
-        let begin = self.begins[tile] as usize;
-        let own = &mut self.values[begin..begin + stride];
-        let mut k = 0;
-        for (row, a) in phi.iter().enumerate() {
-            for b in &phi[..=row] {
-                own[k] += weight * a * b;
-                k += 1;
-            }
-        }
-        for (sum, a) in own[k..].iter_mut().zip(phi) {
-            *sum += weight * a * rho;
-        }
-    }
-
-    /// Products and right sides of a tile; `None` where the station saw nothing of it.
-    pub(super) fn of(&self, tile: usize) -> Option<TileSums<'_>> {
-        let stride = Self::stride(self.order);
-        let begin = self.begins[tile];
-        let own = self.values.get(begin as usize..begin as usize + stride)?;
-        let (products, right) = own.split_at(stride - self.order);
-        (own[0] > 0.0).then_some(TileSums { products, right })
-    }
-}
-
-/// [`Sums`] of one tile.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct TileSums<'a> {
-    products: &'a [f64],
-    right: &'a [f64],
-}
-
-impl TileSums<'_> {
-    pub(super) fn product(&self, row: usize, column: usize) -> f64 {
-        let (row, column) = (row.max(column), row.min(column));
-        self.products[row * (row + 1) / 2 + column]
-    }
-
-    pub(super) fn right(&self, row: usize) -> f64 {
-        self.right[row]
-    }
-
-    /// Sum of the weights.
-    pub(super) fn weight(&self) -> f64 {
-        self.products[0]
-    }
-}
 
 /// How points are given to facets.
 #[derive(Debug, Clone, Copy)]
@@ -170,6 +96,7 @@ impl<'a> Sighting<'a> {
                 self.add_member(self.points.slot_of[point as usize] as usize, index);
             }
         }
+        self.sums.free_derivatives_of_noise(self.gate.kernel);
         self.sums
     }
 
@@ -275,13 +202,10 @@ impl<'a> Sighting<'a> {
         self.phi[1..3].copy_from_slice(&hit.place);
         let parameters = self.gate.parameters;
         if parameters > 0 {
-            // Those of the points beside it: its own share the noise of its distance, and would shrink the scene.
             let normal = self.rotation.transpose() * self.facets[hit.facet].normal;
-            let last = self.points.points.len() - 1;
-            let of = |point: usize| &self.points.derivatives[point * parameters..(point + 1) * parameters];
-            let (before, after) = (of(if point == 0 { last.min(1) } else { point - 1 }), of((point + 1).min(last)));
-            for ((phi, before), after) in self.phi[3..].iter_mut().zip(before).zip(after) {
-                *phi = 0.5 * normal.dot(&(Vector3::from(*before) + Vector3::from(*after)));
+            let derivatives = &self.points.derivatives[point * parameters..(point + 1) * parameters];
+            for (phi, derivative) in self.phi[3..].iter_mut().zip(derivatives) {
+                *phi = normal.dot(&Vector3::from(*derivative));
             }
         }
         self.sums.add(hit.tile, &self.phi, rho, weight);

@@ -11,16 +11,20 @@ use super::network::{Network, State, largest_step};
 use super::points::StationPoints;
 use super::rounds::{Surfaces, meet};
 use super::scatter::{Scatter, TileMean, between, tile_means, variances};
-use super::sightings::{Gate, Sums, sightings};
+use super::sightings::{Gate, sightings};
+use super::sums::Sums;
 use crate::error::Result;
 use crate::kernel::RobustKernel;
-use crate::pose::step_pose;
+use crate::pose::{pose_difference, step_pose};
 
 /// What the poses may be off in the first rounds, patches: facets are joined anew from better poses.
 const OFF: [f64; 2] = [0.06, 0.01];
 
 /// Of so many points one is taken in the first round, which need not be better than the contacts of patches.
 const FIRST_STRIDE: usize = 3;
+
+/// Part of its standard deviation by which a station may still move.
+const FEW_SIGMAS: f64 = 0.05;
 
 /// What the last round leaves.
 pub(super) struct Adjusted {
@@ -101,12 +105,23 @@ impl Finish<'_> {
             let adjusted = self.step(&mut state, &mut known, sums)?;
             round += 1;
             (self.progress)(round);
-            let moved_m = largest_step(&before, &state, self.network.hold_m);
-            let settled = off_m.is_none() && moved_m <= self.tolerance_m;
+            let settled = off_m.is_none() && self.is_settled(&before, &state, &adjusted.cofactors);
             if settled || round >= self.max_rounds.max(OFF.len() + 1) {
                 return Ok(Adjusted { state, facets: known, rounds: round, settled, ..adjusted });
             }
         }
+    }
+
+    /// Whether every station moved by less than the tolerance, or by so little of its standard deviation that further
+    /// rounds tell nothing: along a direction that the surfaces leave open, poses drift with every change of weights.
+    fn is_settled(&self, before: &State, after: &State, cofactors: &DMatrix<f64>) -> bool {
+        largest_step(before, after, self.network.hold_m) <= self.tolerance_m
+            || before.poses.iter().zip(&after.poses).enumerate().all(|(k, (a, b))| {
+                let step = pose_difference(a, b);
+                let own = cofactors.fixed_view::<6, 6>(6 * k, 6 * k).into_owned();
+                let sigmas = own.cholesky().map_or(f64::INFINITY, |factor| step.dot(&factor.solve(&step)).sqrt());
+                k == self.network.fixed || sigmas <= FEW_SIGMAS
+            })
     }
 
     /// What the stations saw of each tile about the planes at the present poses, and how that scatters.

@@ -6,6 +6,9 @@ use nalgebra::{Matrix6, Vector3, Vector6};
 
 use super::directions::FEWEST_CELLS;
 
+/// Degrees of freedom that the mean of Hotelling's T² of six unknowns falls short of.
+const LOST_DEGREES: f64 = 7.0;
+
 /// Frame of motions `[dt, rho w]`: the rotation about `centre`, multiplied by the radius, so that all six are lengths.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Centred {
@@ -72,14 +75,34 @@ impl Cells {
         self.squares * (pairs / (pairs - 6.0).max(1.0))
     }
 
-    /// Covariance of the summed score from the scatter of its sums over cells.
-    pub(super) fn clustered_scores(&self) -> Matrix6<f64> {
-        let count = self.sums.len() as f64;
-        if self.sums.len() >= FEWEST_CELLS {
-            let sum = self.sums.values().fold(Matrix6::zeros(), |sum, c| sum + c.score * c.score.transpose());
-            return sum * (count / (count - 6.0));
+    /// Covariance of the summed score from the scatter of its sums over cells; `inverse`: of the information.
+    ///
+    /// The pose follows the errors of every cell in part, so that its residuals are too small by its leverage `H`; `(I −
+    /// H)^(-1/2)` gives that back `[BellMcCaffrey2002]`. And few near cells decide most of a pose: a covariance from the
+    /// scatter of so few is at times much too small. Enlarged by their degrees of freedom, the normalised square of an
+    /// error has the expectation that a known covariance would give it (Hotelling's T²).
+    pub(super) fn clustered_scores(&self, inverse: &Matrix6<f64>) -> Matrix6<f64> {
+        if self.sums.len() < FEWEST_CELLS {
+            // Too few cells to estimate from: the pairs of a cell taken as fully dependent.
+            return self.independent_scores() * (self.pairs as f64 / self.sums.len().max(1) as f64);
         }
-        // Too few cells to estimate from: the pairs of a cell taken as fully dependent.
-        self.independent_scores() * (self.pairs as f64 / count.max(1.0))
+        let (mut trace, mut squares) = (0.0, 0.0);
+        let sum = self.sums.values().fold(Matrix6::zeros(), |sum, cell| {
+            let leverage = cell.information * inverse;
+            trace += leverage.trace();
+            squares += (leverage * leverage).trace();
+            let score = freed(&leverage, &cell.score);
+            sum + score * score.transpose()
+        });
+        // As many equal cells would have these leverages. NaN (nothing is determined) gives the least.
+        let degrees = (trace / squares).max(LOST_DEGREES + 1.0);
+        sum * (degrees / (degrees - LOST_DEGREES))
     }
+}
+
+/// `(I − H)^(-1/2) s` as a series, which stays bounded where one cell decides alone.
+fn freed(leverage: &Matrix6<f64>, score: &Vector6<f64>) -> Vector6<f64> {
+    let third = leverage * score * (5.0 / 16.0);
+    let second = leverage * (score * (3.0 / 8.0) + third);
+    score + leverage * (score * 0.5 + second)
 }

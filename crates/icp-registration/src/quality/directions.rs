@@ -33,24 +33,30 @@ impl Directions {
     /// Judges the eigen-directions of `information`; motions with a predicted sigma above `max_sigma_m` are
     /// undetermined.
     ///
-    /// `scatter`: root of the sum of squares of what the cells say along a unit motion. `rounding`: share of the largest
+    /// `score`: covariance of the score, from the inverse of the information along significant directions. `scatter`: root of the sum of squares of what the cells say along a unit motion. `rounding`: share of the largest
     /// information that rounding can imitate.
     pub fn new(
         information: &Matrix6<f64>,
-        score: &Matrix6<f64>,
+        score: impl Fn(&Matrix6<f64>) -> Matrix6<f64>,
         scatter: impl Fn(&Vector6<f64>) -> f64,
         rounding: f64,
         max_sigma_m: f64,
     ) -> Result<Self> {
         let (values, vectors) = eigen6(&symmetrised(information), "the information of the pairs")?;
-        let judged = (0..6).map(|k| {
+        let directions: [(Vector6<f64>, f64, bool); 6] = std::array::from_fn(|k| {
             let (information, vector): (f64, Vector6<f64>) = (values[k], vectors.column(k).into());
             let significant = information > SIGNIFICANCE * scatter(&vector) && information > rounding * values[5];
+            (vector, information, significant)
+        });
+        let inverse = directions.iter().filter(|(_, _, significant)| *significant);
+        let inverse = inverse.fold(Matrix6::zeros(), |sum, (v, i, _)| sum + v * v.transpose() / *i);
+        let score = score(&inverse);
+        let judged = directions.into_iter().map(|(vector, information, significant)| {
             let sigma_m =
                 if significant { vector.dot(&(score * vector)).max(0.0).sqrt() / information } else { f64::INFINITY };
             Direction { vector, information, sigma_m, determined: sigma_m <= max_sigma_m }
         });
-        Ok(Self { all: judged.collect(), score: *score })
+        Ok(Self { all: judged.collect(), score })
     }
 
     /// All six, worst first.

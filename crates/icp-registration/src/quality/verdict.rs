@@ -25,12 +25,12 @@ pub(crate) struct Verdict {
 impl Verdict {
     /// Judges the pairs; motions with a predicted sigma above `max_sigma_m` are undetermined.
     pub fn new(cells: &Cells, max_sigma_m: f64, residuals: Residuals) -> Result<Self> {
-        let score = match residuals {
+        let score = |inverse: &Matrix6<f64>| match residuals {
             Residuals::Misaligned => cells.independent_scores(),
-            Residuals::Settled => cells.clustered_scores(),
+            Residuals::Settled => cells.clustered_scores(inverse),
         };
         let scatter = |motion: &Vector6<f64>| cells.scatter(motion);
-        let directions = Directions::new(&cells.information(), &score, scatter, ROUNDING, max_sigma_m)?;
+        let directions = Directions::new(&cells.information(), score, scatter, ROUNDING, max_sigma_m)?;
         Ok(Self { frame: cells.frame, directions })
     }
 

@@ -2,15 +2,13 @@
 //!
 //! What draws a pose in from afar differs with the scene: least squares and free normals reach farthest where the clouds
 //! overlap well, compatible normals where they overlap little, and either can slide along a wall into a wrong pose. All
-//! are tried, and the pose at which most of the sample fits goes on. Where many points are left without a partner, poses
-//! slid along walls are looked at, and then starts around the guess.
+//! are tried, and the pose at which most of the sample fits goes on.
 
-use nalgebra::{Isometry3, Matrix3, Vector3};
+use nalgebra::{Isometry3, Vector3};
 use rayon::prelude::*;
 
 use super::matching::Points;
 use super::registration::{Engine, Track, length};
-use super::starts::Starts;
 use super::system::System;
 use crate::error::{Error, Result};
 use crate::kernel::{RobustKernel, quantile};
@@ -19,12 +17,6 @@ use crate::parts::{ErrorMetric, KernelSchedule, MaxNormalAngle, PairRejection, Q
 
 /// Points whose distance at the guess is looked at.
 const GUESS_SAMPLES: usize = 1000;
-/// Share of the points with a partner from which on nothing else is tried than the way down from the guess.
-const SURE: f64 = 0.75;
-/// Rounds of slides from the best pose.
-const SLIDE_ROUNDS: usize = 3;
-/// How far poses are slid, in radii of the target.
-const SLIDE_REACH: f64 = 0.8;
 /// A limit that no distance reaches, and whose square is finite.
 const NO_LIMIT_M: f64 = 1e120;
 
@@ -147,22 +139,11 @@ impl<'p> Engine<'p> {
         let Some(starts) = self.parts.starts.filter(|_| self.parts.levels.first_limit_m.is_none()) else {
             return from_guess.map(|(_, track)| track);
         };
-        let fine = &limits[limits.len().saturating_sub(2)..];
+        let share = from_guess.as_ref().map(|(_, track)| self.share_with_partner(selected, track, limits));
+        if share.is_ok_and(|share| share >= starts.convincing) {
+            return from_guess.map(|(_, track)| track);
+        }
         let scouts = thinned(&sample, starts.points);
-        let mut best = from_guess;
-        if let Ok((_, track)) = &best {
-            let share = self.share_with_partner(selected, track, limits);
-            if share >= SURE {
-                return best.map(|(_, track)| track);
-            }
-            best = self.slid(&scouts, &sample, best, limits, starts.refined);
-        }
-        if let Ok((_, track)) = &best {
-            let share = self.share_with_partner(selected, track, limits);
-            if share >= starts.convincing {
-                return best.map(|(_, track)| track);
-            }
-        }
         let sum = |sum: Vector3<f64>, &i: &usize| sum + (guess * self.scene.source.points[i]).coords;
         let centre = scouts.iter().fold(Vector3::zeros(), sum) / scouts.len().max(1) as f64;
         let mut tracks: Vec<(f64, Track)> =
@@ -170,49 +151,10 @@ impl<'p> Engine<'p> {
         // Stable: equal tracks stay in the order of the starts.
         tracks.sort_by(|a, b| b.0.total_cmp(&a.0));
         let poses: Vec<Isometry3<f64>> = tracks.iter().take(starts.refined).map(|(_, track)| track.pose).collect();
-        let mut refined = vec![best];
-        refined.extend(self.tracks(&sample, &poses, fine));
-        self.slid(&scouts, &sample, best_of(refined), limits, starts.refined).map(|(_, track)| track)
-    }
-
-    /// The best of a track and of those from poses slid along what holds it least, again from there while that helps.
-    fn slid(
-        &self,
-        scouts: &[usize],
-        sample: &[usize],
-        best: Result<(f64, Track)>,
-        limits: &[f64],
-        wanted: usize,
-    ) -> Result<(f64, Track)> {
-        let mut best = best?;
         let fine = &limits[limits.len().saturating_sub(2)..];
-        for _ in 0..SLIDE_ROUNDS {
-            let before = best.0;
-            let slid = self.slides(scouts, &best.1, limits, wanted)?;
-            best = best_of(std::iter::once(Ok(best)).chain(self.tracks(sample, &slid, fine)).collect())?;
-            if best.0 <= before {
-                break;
-            }
-        }
-        Ok(best)
-    }
-
-    /// Of the poses slid along what holds `track` least, those at which most of the sample fits.
-    fn slides(&self, sample: &[usize], track: &Track, limits: &[f64], wanted: usize) -> Result<Vec<Isometry3<f64>>> {
-        let limit_m = limits[limits.len() - 1];
-        let scene = self.scene.at(track.moment(limits, limits.len() - 1, 0));
-        let pairs = self.gated_pairs(&scene, &mut Points::new(sample.to_vec()))?;
-        let with_normal = pairs.iter().filter(|pair| !pair.normal.x.is_nan());
-        let normals = with_normal.fold(Matrix3::zeros(), |sum, pair| sum + pair.normal * pair.normal.transpose());
-        let poses = Starts::slid(&track.pose, normals, limit_m, SLIDE_REACH * scene.target.radius_m);
-        let fit = |&pose: &Isometry3<f64>| {
-            let slid = Track { pose, iterations: track.iterations };
-            Ok((self.fit(sample, &slid, limits)?, pose))
-        };
-        let mut fits: Vec<(f64, Isometry3<f64>)> = poses.par_iter().map(fit).collect::<Result<_>>()?;
-        // Stable: equal fits stay in their order.
-        fits.sort_by(|a, b| b.0.total_cmp(&a.0));
-        Ok(fits.into_iter().take(wanted).map(|(_, pose)| pose).collect())
+        let mut refined = vec![from_guess];
+        refined.extend(self.tracks(&sample, &poses, fine));
+        best_of(refined).map(|(_, track)| track)
     }
 
     /// The tracks from all starts by all alternatives with their fit on the sample, in that order whatever thread was
@@ -226,7 +168,6 @@ impl<'p> Engine<'p> {
             starts.iter().flat_map(|start| alternatives.iter().map(move |engine| (start, engine))).collect();
         let run = |&(start, engine): &(&Isometry3<f64>, &Engine<'_>)| {
             let track = engine.down(sample, start, limits)?;
-            // One judge for all: without compatible normals more points find a partner.
             Ok((self.fit(sample, &track, limits)?, track))
         };
         ways.par_iter().map(run).collect()

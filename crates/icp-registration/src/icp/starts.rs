@@ -1,14 +1,11 @@
 //! More starts around the guess, for when the first does not convince.
 
-use nalgebra::{Isometry3, Matrix3, SymmetricEigen, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
 use crate::error::{Error, Result};
 
 /// The positive root of x⁷ = x + 1: its powers spread points evenly over six dimensions.
 const ROOT_OF_SIX: f64 = 1.112_775_684_278_705_5;
-
-/// Most slides to either side.
-const MOST_SLIDES: f64 = 40.0;
 
 /// Starts around the guess, tried when too few points fit after the way down from the guess itself, and nothing is said
 /// about how far off it is ([`super::Levels::first_limit_m`]).
@@ -27,13 +24,13 @@ pub struct Starts {
     pub points: usize,
     /// Starts that are brought down with more points. Default 4.
     pub refined: usize,
-    /// Share of the points that must have a partner for the guess to convince. Default 0.5.
+    /// Share of the points that must have a partner for the guess to convince. Default 0.45.
     pub convincing: f64,
 }
 
 impl Default for Starts {
     fn default() -> Self {
-        Self { count: 24, translation: 0.8, rotation_rad: 0.35, points: 500, refined: 4, convincing: 0.5 }
+        Self { count: 24, translation: 0.8, rotation_rad: 0.35, points: 500, refined: 4, convincing: 0.45 }
     }
 }
 
@@ -56,20 +53,6 @@ impl Starts {
             Isometry3::from_parts(translation.into(), turn * guess.rotation)
         };
         (0..self.count).map(start).collect()
-    }
-
-    /// Poses slid both ways along the two axes that the normals of the pairs hold least: walls and floors slide in
-    /// themselves, and a way down ends wherever an edge first meets another. `normals`: sum of `n nᵀ`.
-    pub(super) fn slid(pose: &Isometry3<f64>, normals: Matrix3<f64>, step_m: f64, reach_m: f64) -> Vec<Isometry3<f64>> {
-        let Some(eigen) = SymmetricEigen::try_new(normals, 1e-15, 1000) else { return Vec::new() };
-        let mut order = [0, 1, 2];
-        order.sort_by(|&a, &b| eigen.eigenvalues[a].total_cmp(&eigen.eigenvalues[b]));
-        let steps = if step_m > 0.0 { (reach_m / step_m).min(MOST_SLIDES).floor() as i32 } else { 0 };
-        let along = |axis: usize, k: i32| {
-            Translation3::from(eigen.eigenvectors.column(axis) * (reach_m * f64::from(k) / f64::from(steps))) * pose
-        };
-        let all = order[..2].iter().flat_map(|&axis| (-steps..=steps).map(move |k| (axis, k)));
-        all.filter(|(_, k)| *k != 0).map(|(axis, k)| along(axis, k)).collect()
     }
 
     pub(super) fn validate(&self) -> Result<()> {

@@ -71,7 +71,7 @@ impl Verdict {
             Residuals::Settled => independent * (count as f64 / used.max(1) as f64),
         };
         let scatter = |motion: &Vector6<f64>| cells.iter().map(|c| form(&c[6..], motion).powi(2)).sum::<f64>().sqrt();
-        Ok(Self { directions: Directions::new(&information, |_| score, scatter, ROUNDING, max_sigma_m)? })
+        Ok(Self { directions: Directions::new(&information, |_| (score, 1.0), scatter, ROUNDING, max_sigma_m)? })
     }
 
     /// Orthonormal undetermined motions `[dt, rho w]`.

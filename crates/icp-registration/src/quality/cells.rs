@@ -75,16 +75,17 @@ impl Cells {
         self.squares * (pairs / (pairs - 6.0).max(1.0))
     }
 
-    /// Covariance of the summed score from the scatter of its sums over cells; `inverse`: of the information.
+    /// Covariance of the summed score from the scatter of its sums over cells (`inverse`: of the information), and the
+    /// factor by which it is to be enlarged.
     ///
     /// The pose follows the errors of every cell in part, so that its residuals are too small by its leverage `H`; `(I −
     /// H)^(-1/2)` gives that back `[BellMcCaffrey2002]`. And few near cells decide most of a pose: a covariance from the
     /// scatter of so few is at times much too small. Enlarged by their degrees of freedom, the normalised square of an
     /// error has the expectation that a known covariance would give it (Hotelling's T²).
-    pub(super) fn clustered_scores(&self, inverse: &Matrix6<f64>) -> Matrix6<f64> {
+    pub(super) fn clustered_scores(&self, inverse: &Matrix6<f64>) -> (Matrix6<f64>, f64) {
         if self.sums.len() < FEWEST_CELLS {
             // Too few cells to estimate from: the pairs of a cell taken as fully dependent.
-            return self.independent_scores() * (self.pairs as f64 / self.sums.len().max(1) as f64);
+            return (self.independent_scores() * (self.pairs as f64 / self.sums.len().max(1) as f64), 1.0);
         }
         let (mut trace, mut squares) = (0.0, 0.0);
         let sum = self.sums.values().fold(Matrix6::zeros(), |sum, cell| {
@@ -96,7 +97,7 @@ impl Cells {
         });
         // As many equal cells would have these leverages. NaN (nothing is determined) gives the least.
         let degrees = (trace / squares).max(LOST_DEGREES + 1.0);
-        sum * (degrees / (degrees - LOST_DEGREES))
+        (sum, degrees / (degrees - LOST_DEGREES))
     }
 }
 

@@ -33,11 +33,12 @@ impl Directions {
     /// Judges the eigen-directions of `information`; motions with a predicted sigma above `max_sigma_m` are
     /// undetermined.
     ///
-    /// `score`: covariance of the score, from the inverse of the information along significant directions. `scatter`: root of the sum of squares of what the cells say along a unit motion. `rounding`: share of the largest
-    /// information that rounding can imitate.
+    /// `score`: covariance of the score from the inverse of the information along significant directions, and the factor
+    /// by which few degrees of freedom enlarge it. `scatter`: root of the sum of squares of what the cells say along a unit
+    /// motion. `rounding`: share of the largest information that rounding can imitate.
     pub fn new(
         information: &Matrix6<f64>,
-        score: impl Fn(&Matrix6<f64>) -> Matrix6<f64>,
+        score: impl Fn(&Matrix6<f64>) -> (Matrix6<f64>, f64),
         scatter: impl Fn(&Vector6<f64>) -> f64,
         rounding: f64,
         max_sigma_m: f64,
@@ -50,13 +51,15 @@ impl Directions {
         });
         let inverse = directions.iter().filter(|(_, _, significant)| *significant);
         let inverse = inverse.fold(Matrix6::zeros(), |sum, (v, i, _)| sum + v * v.transpose() / *i);
-        let score = score(&inverse);
+        let (score, enlarged) = score(&inverse);
         let judged = directions.into_iter().map(|(vector, information, significant)| {
             let sigma_m =
                 if significant { vector.dot(&(score * vector)).max(0.0).sqrt() / information } else { f64::INFINITY };
             Direction { vector, information, sigma_m, determined: sigma_m <= max_sigma_m }
         });
-        Ok(Self { all: judged.collect(), score })
+        // Whether a motion is determined does not hang on how well its deviation is known.
+        let all = judged.collect();
+        Ok(Self { all, score: score * enlarged })
     }
 
     /// All six, worst first.

@@ -26,7 +26,7 @@ impl Verdict {
     /// Judges the pairs; motions with a predicted sigma above `max_sigma_m` are undetermined.
     pub fn new(cells: &Cells, max_sigma_m: f64, residuals: Residuals) -> Result<Self> {
         let score = |inverse: &Matrix6<f64>| match residuals {
-            Residuals::Misaligned => cells.independent_scores(),
+            Residuals::Misaligned => (cells.independent_scores(), 1.0),
             Residuals::Settled => cells.clustered_scores(inverse),
         };
         let scatter = |motion: &Vector6<f64>| cells.scatter(motion);

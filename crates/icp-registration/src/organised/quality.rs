@@ -27,6 +27,11 @@ use crate::pose::symmetrised;
 const CELLS: usize = 24;
 /// Information below this multiple of its own scatter between cells counts as none.
 const SIGNIFICANCE: f64 = 2.5;
+/// The same beside cells that carry none, and the multiple of the middle cell above which a cell is not one of these.
+const CLEAR_SIGNIFICANCE: f64 = 5.0;
+const CLIP: f64 = 5.0;
+/// Cells of a square frame.
+const MOST_CELLS: usize = CELLS * CELLS;
 /// Cells below which their scatter is no estimate.
 const FEWEST_CELLS: usize = 20;
 /// Share of the largest information that rounding can imitate (single precision).
@@ -159,10 +164,33 @@ fn direction(
     vector: Vector6<f64>,
     max_sigma_m: f64,
 ) -> Direction {
-    let scatter = cells.iter().map(|c| form(&c[6..], &vector).powi(2)).sum::<f64>().sqrt();
-    let significant = information > SIGNIFICANCE * scatter && information > ROUNDING * largest;
+    let significant = information > ROUNDING * largest && is_significant(cells, information, &vector);
     let sigma_m = if significant { vector.dot(&(score * vector)).max(0.0).sqrt() / information } else { f64::INFINITY };
     Direction { vector, information, sigma_m, determined: sigma_m <= max_sigma_m }
+}
+
+/// Whether information stands out from what noise imitates.
+///
+/// Where all cells carry some, it does so from their scatter. Where few cells carry it all, as those of a small surface
+/// before walls, they make up most of the scatter: then it has to stand out, more clearly and without the largest cell, from the
+/// scatter of what most cells show.
+fn is_significant(cells: &[Cell], information: f64, vector: &Vector6<f64>) -> bool {
+    let mut each = [0.0; MOST_CELLS];
+    let mut count = 0;
+    for cell in cells.iter().filter(|cell| cell[6] + cell[12] + cell[17] != 0.0).take(MOST_CELLS) {
+        each[count] = form(&cell[6..], vector);
+        count += 1;
+    }
+    let each = &mut each[..count];
+    if information > SIGNIFICANCE * each.iter().map(|f| f * f).sum::<f64>().sqrt() {
+        return true;
+    }
+    each.sort_unstable_by(|a, b| a.abs().total_cmp(&b.abs()));
+    let Some(middle) = each.get(count / 2) else { return false };
+    let usual = CLIP * middle.abs();
+    let scatter = each.iter().map(|f| f.abs().min(usual).powi(2)).sum::<f64>().sqrt();
+    let top = each.iter().copied().fold(0.0, f64::max);
+    information - top > CLEAR_SIGNIFICANCE * scatter
 }
 
 /// Covariance of the summed score from the scatter of its sums over cells.

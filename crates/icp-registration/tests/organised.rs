@@ -5,12 +5,16 @@ mod common;
 
 use std::sync::Arc;
 
-use common::{Cuboid, Pinhole, Scene, disturbance, frame, frame_pair, look_at, pose_error};
+use common::scenes::half_overlapping_views;
+use common::{Cuboid, Pinhole, Scene, disturbance, frame, frame_pair, look_at, pose_error, sigma_of};
 use icp_registration::{
     DegeneracyPolicy, Error, FrameAligner, FrameAlignmentOptions, IcpResult, MotionKind, OrganisedFrame, Projection,
-    align_frames, pose_difference,
+    align_frames, frame_consistency, pose_difference,
 };
 use nalgebra::{Isometry3, Matrix6, Vector3};
+use rand::SeedableRng;
+use rand_distr::{Distribution, StandardNormal};
+use rand_pcg::Pcg64;
 
 fn pinhole(camera: &Pinhole) -> Arc<Projection> {
     let centre = [(camera.width as f64 - 1.0) / 2.0, (camera.height as f64 - 1.0) / 2.0];
@@ -162,6 +166,72 @@ fn undetermined_motions_are_named_every_time() {
     }
 }
 
+/// A frame of a ball or an endless upright column, 0.5 m in radius and 1.6 m before the camera; nothing behind it.
+fn revolved(ball: bool, pose: &Isometry3<f64>, seed: u64) -> (Vec<[f64; 3]>, Vec<f32>) {
+    let (camera, mut random) = (Pinhole::medium(), Pcg64::seed_from_u64(seed));
+    // What of a vector counts for the distance from the middle: all of it, or all but the part along the axis.
+    let across = |v: Vector3<f64>| if ball { v } else { Vector3::new(v.x, 0.0, v.z) };
+    let from = across(pose.translation.vector + Vector3::z() * 1.6);
+    let seen = |k: usize| {
+        let ray = camera.ray(k % camera.width, k / camera.width);
+        let direction = across(pose.rotation * ray);
+        let (half, rest) = (from.dot(&direction), from.norm_squared() - 0.25);
+        let range = (-half - (half * half - direction.norm_squared() * rest).sqrt()) / direction.norm_squared();
+        let noise: f64 = StandardNormal.sample(&mut random);
+        let point: [f64; 3] = (ray * (range + sigma_of(range) * noise)).into();
+        // Rays that miss have no range.
+        (point, sigma_of(range) as f32)
+    };
+    (0..camera.width * camera.height).map(seen).unzip()
+}
+
+#[test]
+fn a_ball_and_a_column_leave_their_turns() {
+    let projection = pinhole(&Pinhole::medium());
+    for seed in 0..8 {
+        for (ball, slides, turns) in [(true, 0, 3), (false, 1, 1)] {
+            let moved = disturbance(0.04, 2.0, 150 + seed);
+            let target = prepared(&projection, &revolved(ball, &Isometry3::identity(), 2 * seed));
+            let source = prepared(&projection, &revolved(ball, &moved, 2 * seed + 1));
+            let result = align(&source, &target);
+            let count = |kind| result.degenerate.iter().filter(|m| m.kind == kind).count();
+            let found = (count(MotionKind::Translation), count(MotionKind::Rotation));
+            assert_eq!(found, (slides, turns), "ball {ball}, seed {seed}: {:?}", result.degenerate);
+            assert!(!result.is_trustworthy());
+        }
+    }
+}
+
+#[test]
+fn a_start_far_off_at_half_overlap_is_found() {
+    let (camera, scene) = (Pinhole::small(), Scene::furnished());
+    let projection = pinhole(&camera);
+    let mut aligner = FrameAligner::new(FrameAlignmentOptions::default()).unwrap();
+    let mut good = 0;
+    for k in 0..6 {
+        let (a, b) = half_overlapping_views(&camera, k);
+        let target = prepared(&projection, &frame(&scene, &camera, &a, 1.0, 2 * k));
+        let source = prepared(&projection, &frame(&scene, &camera, &b, 1.0, 2 * k + 1));
+        let truth = a.inverse() * b;
+        let result = aligner.align(&source, &target, &(truth * disturbance(0.3, 20.0, 300 + k))).unwrap();
+        let (mm, degrees) = pose_error(&result.target_from_source, &truth);
+        let is_good = mm < 30.0 && degrees < 1.0;
+        // What is trusted is right.
+        assert!(is_good || !result.is_trustworthy(), "pair {k}: {mm} mm, {degrees} degrees");
+        good += u32::from(is_good);
+        // At the truth the frames hardly contradict each other.
+        let there = frame_consistency(&source, &target, &truth, 2, None);
+        assert!((there.contradicting + there.unclear) * 50 < there.compared(), "pair {k}: {there:?}");
+        assert!(there.agreeing * 3 > there.all(), "pair {k}: {there:?}");
+        // Half a metre towards what is seen, surfaces stand where the other camera saw through.
+        let wrong = truth * Isometry3::translation(0.0, 0.0, 0.5);
+        let there = frame_consistency(&source, &target, &wrong, 2, None);
+        assert!(there.contradicting * 5 > there.compared(), "pair {k}: {there:?}");
+    }
+    // Nine of ten over two hundred pairs.
+    assert!(good >= 4, "{good} of 6");
+}
+
 #[test]
 fn a_held_motion_keeps_the_guess_and_its_covariance() {
     let prior = Matrix6::from_diagonal(&nalgebra::Vector6::new(1e-4, 1e-4, 1e-4, 4e-4, 4e-4, 4e-4));
@@ -295,6 +365,14 @@ fn input_without_an_answer_gets_a_typed_error() {
     one[w * h / 2] = pair.target.0[w * h / 2];
     let one = OrganisedFrame::new(&projection, &one, None).unwrap();
     assert!(matches!(align_frames(&one, &good, &identity, &options), Err(Error::TooFewPoints { .. })));
+
+    // Collinear: one row of pixels; duplicates: all points at one place, on the ray of one pixel only.
+    let row = |k: usize| if k / w == h / 2 { pair.target.0[k] } else { [f64::NAN; 3] };
+    let line = OrganisedFrame::new(&projection, &(0..w * h).map(row).collect::<Vec<_>>(), None).unwrap();
+    assert!(matches!(align_frames(&line, &good, &identity, &options), Err(Error::TooFewPoints { .. })));
+    assert!(matches!(align_frames(&good, &line, &identity, &options), Err(Error::TooFewPoints { .. })));
+    let same = OrganisedFrame::new(&projection, &vec![pair.target.0[w * h / 2]; w * h], None);
+    assert!(matches!(same, Err(Error::PointsOffRays { .. })));
 
     let short = OrganisedFrame::new(&projection, &pair.target.0[1..], None);
     assert!(matches!(short, Err(Error::LengthMismatch { .. })));

@@ -1,5 +1,7 @@
 //! Accuracy and CPU time of one thread, from raw points to the pose.
 
+use std::time::Instant;
+
 use icp_registration::{FrameAligner, FrameAlignmentOptions, OrganisedFrame};
 use nalgebra::Isometry3;
 
@@ -54,5 +56,36 @@ pub fn print() {
             median(&mut times),
             median(&mut preparations)
         );
+        threads(name, &camera);
     }
+}
+
+/// Runs of which the fastest counts where the wall time is measured.
+const WALL_RUNS: usize = 60;
+
+/// Wall time of one pair with one and with two threads, from raw points to the pose.
+fn threads(name: &str, camera: &Pinhole) {
+    let (projection, pair) = (projection(camera), frame_pair(camera, 0));
+    let prepared = |(points, sigma): &(Vec<[f64; 3]>, Vec<f32>)| OrganisedFrame::new(&projection, points, Some(sigma));
+    let (mut target, mut source) = (prepared(&pair.target).unwrap(), prepared(&pair.source).unwrap());
+    let mut aligner = FrameAligner::new(FrameAlignmentOptions::default()).unwrap();
+    let pools = [1, 2].map(|count| rayon::ThreadPoolBuilder::new().num_threads(count).build().unwrap());
+    let mut least = [f64::INFINITY; 2];
+    for _ in 0..WALL_RUNS {
+        for (pool, least) in pools.iter().zip(&mut least) {
+            pool.install(|| {
+                let start = Instant::now();
+                target.update(&pair.target.0, Some(&pair.target.1)).unwrap();
+                source.update(&pair.source.0, Some(&pair.source.1)).unwrap();
+                aligner.align(&source, &target, &Isometry3::identity()).unwrap();
+                *least = least.min(1e3 * start.elapsed().as_secs_f64());
+            });
+        }
+    }
+    println!(
+        "{name}: wall time {:.2} ms, two threads {:.2} ms, {:.2} times as fast",
+        least[0],
+        least[1],
+        least[0] / least[1]
+    );
 }

@@ -1,6 +1,6 @@
 //! The registration of two frames, level by level.
 
-use nalgebra::{Isometry3, Matrix6};
+use nalgebra::{Isometry3, Matrix6, Vector6};
 
 use super::blocks::Block;
 use super::frame::OrganisedFrame;
@@ -8,7 +8,6 @@ use super::grid::STRIDES;
 use super::options::FrameAlignmentOptions;
 use super::pairs::Rules;
 use super::quality::{Cell, Hold, Verdict};
-use super::starts::{share_of_agreement, slid};
 use super::sums::{SUMS, normal_equations, residuals};
 use super::track::{Gauge, Track, blocks, moved, solve, turned};
 use crate::error::{Error, Result};
@@ -95,29 +94,49 @@ impl FrameAligner {
             reach: BIWEIGHT,
             least_cosine: self.options.max_normal_angle_rad.cos() as f32,
         };
-        let mut track = Track { pose: *guess, iterations: 0, rules, held: Matrix6::zeros() };
+        let track = Track { pose: *guess, iterations: 0, rules, held: Matrix6::zeros(), last_step: Vector6::zeros() };
+        let first = self.course(track.clone(), source, target, guess);
+        if self.hold() == Hold::Undetermined || self.options.other_starts == 0 {
+            return first.map(|(_, result)| result);
+        }
+        self.searched(first, &track, source, target)
+    }
+
+    /// The first level that is passed; none where all but the last have too few nodes.
+    pub(super) fn first_level(&self, source: &OrganisedFrame) -> Option<usize> {
         let coarsest = STRIDES.len() - self.options.levels;
-        let mut levels = (coarsest..STRIDES.len() - 1).filter(|l| source.points.counts[*l] >= FEWEST_POINTS);
-        match levels.next() {
+        (coarsest..STRIDES.len() - 1).find(|level| source.points.counts[*level] >= FEWEST_POINTS)
+    }
+
+    /// The whole way from the guess.
+    fn course(
+        &mut self,
+        mut track: Track,
+        source: &OrganisedFrame,
+        target: &OrganisedFrame,
+        guess: &Isometry3<f64>,
+    ) -> Result<(Track, IcpResult)> {
+        match self.first_level(source) {
             Some(first) => track = self.start(&track, source, target, blocks(source, first))?,
             None => self.open(&mut track, source, target, &source.points.blocks)?,
         }
-        for level in levels {
+        self.finish(track, source, target, guess)
+    }
+
+    /// The levels after the first one, and the result.
+    pub(super) fn finish(
+        &mut self,
+        mut track: Track,
+        source: &OrganisedFrame,
+        target: &OrganisedFrame,
+        guess: &Isometry3<f64>,
+    ) -> Result<(Track, IcpResult)> {
+        for level in self.first_level(source).map_or(STRIDES.len(), |l| l + 1)..STRIDES.len() - 1 {
             self.descend(&mut track, source, target, blocks(source, level))?;
         }
         let stop = self.settle(&mut track, source, target)?;
         let result = self.result(&track, source, target, guess, stop)?;
-        if result.degenerate.is_empty() || self.hold() == Hold::Undetermined || self.options.other_starts == 0 {
-            return Ok(result);
-        }
-        let Some(mut other) = slid(&track, &result.degenerate, source, target, blocks(source, 1)) else {
-            return Ok(result);
-        };
-        let passed = self.descend(&mut other, source, target, blocks(source, 2));
-        let Ok(stop) = passed.and_then(|()| self.settle(&mut other, source, target)) else { return Ok(result) };
-        let all = &source.points.blocks[..];
-        let gained = [&other, &track].map(|track| share_of_agreement(track, source, target, all));
-        if gained[0] > gained[1] { self.result(&other, source, target, guess, stop) } else { Ok(result) }
+        Ok((track, result))
     }
 
     /// Sets the variance of what is not aligned from the residuals at the guess.
@@ -148,13 +167,25 @@ impl FrameAligner {
         target: &OrganisedFrame,
         blocks: &[Block],
     ) -> Result<()> {
+        self.descend_by(track, source, target, blocks, COARSE_ITERATIONS)
+    }
+
+    /// Passes one level with at most so many iterations.
+    pub(super) fn descend_by(
+        &mut self,
+        track: &mut Track,
+        source: &OrganisedFrame,
+        target: &OrganisedFrame,
+        blocks: &[Block],
+        iterations: usize,
+    ) -> Result<()> {
         if self.hold() == Hold::Undetermined {
             let (moved, gauge) = moved(track, source, target);
             let limit = self.max_motion_sigma_m(&gauge);
             let verdict = Verdict::new(&moved, &track.rules, blocks, limit, Residuals::Misaligned, &mut self.cells)?;
             track.held = verdict.held();
         }
-        for _ in 0..COARSE_ITERATIONS {
+        for _ in 0..iterations {
             if track.iterations >= self.options.max_iterations {
                 break;
             }
@@ -231,6 +262,7 @@ impl FrameAligner {
         let step = solve(&normal, &track.held, ridge)?;
         track.pose = turned(&track.pose, &step, &gauge);
         track.iterations += 1;
+        track.last_step = step;
         Ok((step.norm(), gauge))
     }
 
@@ -259,6 +291,11 @@ impl FrameAligner {
             covariance
         } else {
             verdict.covariance(gauge.radius_m, self.hold())
+        };
+        let stop = if stop == StopReason::MaxIterations && is_within_noise(&track.last_step, &centred) {
+            StopReason::WithinNoise
+        } else {
+            stop
         };
         Ok(IcpResult {
             target_from_source: pose,
@@ -292,6 +329,11 @@ impl FrameAligner {
             iteration: track.iterations,
         }
     }
+}
+
+/// Whether a step is shorter than a tenth of its standard deviation: pairs that change back and forth.
+fn is_within_noise(step: &Vector6<f64>, covariance: &Matrix6<f64>) -> bool {
+    covariance.cholesky().is_some_and(|c| step.dot(&c.solve(step)) < 0.01)
 }
 
 #[cfg(test)]

@@ -14,6 +14,7 @@ mod pairs;
 mod planes;
 mod projection;
 mod quality;
+mod search;
 mod starts;
 mod sums;
 mod table;

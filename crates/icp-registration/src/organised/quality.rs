@@ -20,10 +20,16 @@ use super::sums::derivatives;
 use crate::error::{Error, Result};
 use crate::icp::UndeterminedMotion;
 use crate::pose::symmetrised;
-use crate::quality::{Direction, Directions, FEWEST_CELLS, Residuals, expanded};
+use crate::quality::{Direction, Directions, FEWEST_CELLS, Residuals, SIGNIFICANCE, expanded};
 
 /// Cells across the longer side of the frame.
 const CELLS: usize = 24;
+/// Information that stands out beside cells that carry none, over its scatter, and the multiple of the middle cell above
+/// which a cell is not one of these.
+const CLEAR_SIGNIFICANCE: f64 = 5.0;
+const CLIP: f64 = 5.0;
+/// Cells of a square frame.
+const MOST_CELLS: usize = CELLS * CELLS;
 /// Share of the largest information that rounding can imitate (single precision).
 const ROUNDING: f64 = 1e-7;
 /// Parts of the pairs, each with cells of its own, that threads may take.
@@ -70,8 +76,8 @@ impl Verdict {
             // Too few cells to estimate from: the pairs of a cell taken as fully dependent.
             Residuals::Settled => independent * (count as f64 / used.max(1) as f64),
         };
-        let scatter = |motion: &Vector6<f64>| cells.iter().map(|c| form(&c[6..], motion).powi(2)).sum::<f64>().sqrt();
-        Ok(Self { directions: Directions::new(&information, |_| (score, 1.0), scatter, ROUNDING, max_sigma_m)? })
+        let significant = |motion: &Vector6<f64>, information| is_significant(cells, information, motion);
+        Ok(Self { directions: Directions::new(&information, |_| (score, 1.0), significant, ROUNDING, max_sigma_m)? })
     }
 
     /// Orthonormal undetermined motions `[dt, rho w]`.
@@ -110,6 +116,30 @@ impl Verdict {
         let known: Vec<&Direction> = self.directions.all().iter().filter(is_known).collect();
         self.directions.sandwich(&known, |_| None)
     }
+}
+
+/// Whether information stands out from what noise imitates.
+///
+/// Where all cells carry some, it does so from their scatter. Where few cells carry it all, as those of a small surface
+/// before walls, they make up most of the scatter: then it has to stand out, more clearly and without the largest cell,
+/// from the scatter of what most cells show.
+fn is_significant(cells: &[Cell], information: f64, vector: &Vector6<f64>) -> bool {
+    let mut each = [0.0; MOST_CELLS];
+    let mut count = 0;
+    for cell in cells.iter().filter(|cell| cell[6] + cell[12] + cell[17] != 0.0).take(MOST_CELLS) {
+        each[count] = form(&cell[6..], vector);
+        count += 1;
+    }
+    let each = &mut each[..count];
+    if information > SIGNIFICANCE * each.iter().map(|f| f * f).sum::<f64>().sqrt() {
+        return true;
+    }
+    each.sort_unstable_by(|a, b| a.abs().total_cmp(&b.abs()));
+    let Some(middle) = each.get(count / 2) else { return false };
+    let usual = CLIP * middle.abs();
+    let scatter = each.iter().map(|f| f.abs().min(usual).powi(2)).sum::<f64>().sqrt();
+    let top = each.iter().copied().fold(0.0, f64::max);
+    information - top > CLEAR_SIGNIFICANCE * scatter
 }
 
 /// Covariance of the summed score from the scatter of its sums over cells.

@@ -16,6 +16,8 @@ pub(super) struct Track {
     pub rules: Rules,
     /// Projection on the motions that are held.
     pub held: Matrix6<f64>,
+    /// The step that led here, `[dt, rho w]`.
+    pub last_step: Vector6<f64>,
 }
 
 /// About which point, and in which unit, motions are solved.

@@ -9,7 +9,7 @@ use crate::icp::motion::name_motions;
 use crate::pose::symmetrised;
 
 /// Information below this multiple of its own scatter between cells counts as none.
-const SIGNIFICANCE: f64 = 2.5;
+pub(crate) const SIGNIFICANCE: f64 = 2.5;
 /// Cells below which their scatter is no estimate.
 pub(crate) const FEWEST_CELLS: usize = 20;
 
@@ -34,19 +34,19 @@ impl Directions {
     /// undetermined.
     ///
     /// `score`: covariance of the score from the inverse of the information along significant directions, and the factor
-    /// by which few degrees of freedom enlarge it. `scatter`: root of the sum of squares of what the cells say along a unit
-    /// motion. `rounding`: share of the largest information that rounding can imitate.
+    /// by which few degrees of freedom enlarge it. `significant`: whether what the cells say along a unit motion stands
+    /// out from its scatter between them. `rounding`: share of the largest information that rounding can imitate.
     pub fn new(
         information: &Matrix6<f64>,
         score: impl Fn(&Matrix6<f64>) -> (Matrix6<f64>, f64),
-        scatter: impl Fn(&Vector6<f64>) -> f64,
+        significant: impl Fn(&Vector6<f64>, f64) -> bool,
         rounding: f64,
         max_sigma_m: f64,
     ) -> Result<Self> {
         let (values, vectors) = eigen6(&symmetrised(information), "the information of the pairs")?;
         let directions: [(Vector6<f64>, f64, bool); 6] = std::array::from_fn(|k| {
             let (information, vector): (f64, Vector6<f64>) = (values[k], vectors.column(k).into());
-            let significant = information > SIGNIFICANCE * scatter(&vector) && information > rounding * values[5];
+            let significant = information > rounding * values[5] && significant(&vector, information);
             (vector, information, significant)
         });
         let inverse = directions.iter().filter(|(_, _, significant)| *significant);

@@ -12,7 +12,7 @@ mod directions;
 mod verdict;
 
 pub(crate) use cells::{Cells, Centred};
-pub(crate) use directions::{Direction, Directions, FEWEST_CELLS, expanded};
+pub(crate) use directions::{Direction, Directions, FEWEST_CELLS, SIGNIFICANCE, expanded};
 pub(crate) use verdict::Verdict;
 
 /// What the residuals consist of.

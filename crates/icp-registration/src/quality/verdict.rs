@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, Isometry3, Matrix6, Vector6};
 
 use super::Residuals;
 use super::cells::{Cells, Centred};
-use super::directions::{Direction, Directions, expanded};
+use super::directions::{Direction, Directions, SIGNIFICANCE, expanded};
 use crate::error::Result;
 use crate::icp::UndeterminedMotion;
 use crate::pose::{symmetrised, tangent_from_centred};
@@ -29,8 +29,8 @@ impl Verdict {
             Residuals::Misaligned => (cells.independent_scores(), 1.0),
             Residuals::Settled => cells.clustered_scores(inverse),
         };
-        let scatter = |motion: &Vector6<f64>| cells.scatter(motion);
-        let directions = Directions::new(&cells.information(), score, scatter, ROUNDING, max_sigma_m)?;
+        let significant = |motion: &Vector6<f64>, information| information > SIGNIFICANCE * cells.scatter(motion);
+        let directions = Directions::new(&cells.information(), score, significant, ROUNDING, max_sigma_m)?;
         Ok(Self { frame: cells.frame, directions })
     }
 

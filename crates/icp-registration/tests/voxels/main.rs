@@ -7,6 +7,8 @@ mod bad_input;
 mod common;
 mod poses;
 mod real;
+#[path = "../common/scans.rs"]
+mod scans;
 #[path = "../../examples/voxel_pairs/scenes.rs"]
 mod scenes;
 mod verdicts;

@@ -1,39 +1,9 @@
 //! Real scans, read where they lie; skipped with a word where they are missing.
 
-use std::path::PathBuf;
-
 use icp_registration::{Cloud, NeighbourTree, VoxelAlignmentOptions, VoxelCloud, VoxelOptions};
-use nalgebra::{Isometry3, Matrix3, Point3, Quaternion, Rotation3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
 
-fn real(path: &str) -> Option<PathBuf> {
-    let folder = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/real")).join(path);
-    if folder.exists() {
-        return Some(folder);
-    }
-    println!("skipped: {path} is not there");
-    None
-}
-
-/// Lines of three or more numbers; all others are left out.
-fn points(path: &PathBuf) -> Vec<Point3<f64>> {
-    let text = std::fs::read_to_string(path).unwrap();
-    let numbers = |line: &str| -> Vec<f64> {
-        line.split([',', ';', ' ', '\t']).filter_map(|word| word.trim().parse().ok()).collect()
-    };
-    text.lines().map(numbers).filter(|v| v.len() >= 3).map(|v| Point3::new(v[0], v[1], v[2])).collect()
-}
-
-fn pose_of_rows(v: &[f64]) -> Isometry3<f64> {
-    let matrix = Matrix3::new(v[0], v[1], v[2], v[4], v[5], v[6], v[8], v[9], v[10]);
-    let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix(&matrix));
-    Isometry3::from_parts(Translation3::new(v[3], v[7], v[11]), rotation)
-}
-
-fn median_distance(source: &[Point3<f64>], tree: &NeighbourTree, pose: &Isometry3<f64>) -> f64 {
-    let mut distances: Vec<f64> = source.iter().map(|p| tree.nearest(&(pose * p)).unwrap().distance_m).collect();
-    distances.sort_by(f64::total_cmp);
-    distances[distances.len() / 2]
-}
+use super::scans::{median_distance, points, pose_of_rows, real};
 
 fn prepared(points: &[Point3<f64>]) -> VoxelCloud {
     VoxelCloud::new(&Cloud::new(points.to_vec()), &VoxelOptions::default()).unwrap()

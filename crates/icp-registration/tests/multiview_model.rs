@@ -61,7 +61,6 @@ fn a_range_offset_is_found_with_the_poses() {
     assert!(sigma[0] > 0.0 && sigma[0] < 1e-3, "{sigma:?}");
     assert!(parameters.significance[0] > 10.0);
     assert!(parameters.values[1].abs() < 4.0 * sigma[1], "{:?} {sigma:?}", parameters.values);
-    println!("{:?} {sigma:?} settled {} after {}", parameters.values, found.settled, found.rounds);
     assert!(parameters.largest_pose_correlation.iter().all(|(station, _, r)| *station > 0 && r.abs() <= 1.0 + 1e-9));
     assert!(found.settled);
     let world = truth[0] * found.world_from_station[0].inverse();

@@ -11,6 +11,7 @@ mod multiview;
 mod neighbours;
 mod normals;
 mod pose;
+mod tracking;
 
 pub use absolute_orientation::{Orientation, Similarity, absolute_orientation, absolute_orientation_with_scale};
 pub use cloud::Cloud;
@@ -29,3 +30,4 @@ pub use multiview::{
 pub use neighbours::{Neighbour, NeighbourTree};
 pub use normals::{OrganisedNormalOptions, UnorganisedNormalOptions, organised_normals, unorganised_normals};
 pub use pose::{inverse_covariance_transport, pose_difference, step_pose};
+pub use tracking::{ImuIntegrator, ImuOptions, InertialSample, MotionPrior};

@@ -142,6 +142,20 @@ pub enum Error {
         /// The longest allowed, second.
         allowed_s: f64,
     },
+    /// A ray of a camera leads backwards, or coincides with or crosses its neighbour.
+    #[error("ray {index}: {why}")]
+    DegenerateRay {
+        /// Index of the pixel, row by row.
+        index: usize,
+        /// What is wrong.
+        why: &'static str,
+    },
+    /// Most points of a frame do not lie on the rays of their pixels.
+    #[error("most points lie beside the rays of their pixels, among them point {index}: another camera or frame?")]
+    PointsOffRays {
+        /// Index of such a point, row by row.
+        index: usize,
+    },
 }
 
 /// Result of this crate.

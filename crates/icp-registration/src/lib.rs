@@ -10,6 +10,7 @@ mod kernel;
 mod multiview;
 mod neighbours;
 mod normals;
+mod organised;
 mod pose;
 mod tracking;
 
@@ -29,5 +30,6 @@ pub use multiview::{
 };
 pub use neighbours::{Neighbour, NeighbourTree};
 pub use normals::{OrganisedNormalOptions, UnorganisedNormalOptions, organised_normals, unorganised_normals};
+pub use organised::{FrameAligner, FrameAlignmentOptions, OrganisedFrame, Projection, align_frames};
 pub use pose::{inverse_covariance_transport, pose_difference, step_pose};
 pub use tracking::{ImuIntegrator, ImuOptions, InertialSample, MotionPrior};

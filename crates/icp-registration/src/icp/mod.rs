@@ -2,7 +2,7 @@
 
 mod coarse;
 mod matching;
-mod motion;
+pub(crate) mod motion;
 mod options;
 mod quality;
 mod selection;

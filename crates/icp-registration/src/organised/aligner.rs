@@ -1,0 +1,318 @@
+//! The registration of two frames, level by level.
+
+use nalgebra::{Isometry3, Matrix6, Vector3, Vector6};
+
+use super::frame::{OrganisedFrame, STRIDES};
+use super::options::FrameAlignmentOptions;
+use super::pairs::{Moved, Rules};
+use super::quality::{Cell, Hold, Residuals, Verdict};
+use super::sums::{Normal, SUMS, normal_equations, residuals};
+use crate::error::{Error, Result};
+use crate::icp::{DegeneracyPolicy, IcpResult, StopReason};
+use crate::kernel::quantile;
+use crate::pose::{is_finite, pose_difference, step_pose, symmetrised, tangent_from_centred};
+
+/// Biweight with 95 % efficiency on normally distributed residuals.
+const BIWEIGHT: f32 = 4.685;
+/// Median absolute deviation to standard deviation.
+const MAD: f64 = 1.4826;
+/// Residuals from which scales are taken.
+const SAMPLE: usize = 2048;
+/// Iterations on each level but the last.
+const COARSE_ITERATIONS: usize = 8;
+/// First steps, which are least squares over all that is in reach.
+const WIDE_ITERATIONS: usize = 3;
+/// Coarse levels end when a step is below this, in units of the radius.
+const COARSE_TOLERANCE: f64 = 1e-3;
+/// Fewest points of a level.
+const FEWEST_POINTS: usize = 200;
+
+/// Aligns `source` with `target`, starting at `guess` (both poses `target_from_source`).
+///
+/// Partners are found by projecting source points into the target frame; minimised are distances from its planes. For
+/// streams, keep a [`FrameAligner`].
+///
+/// # Errors
+/// [`Error::TooFewPoints`] for frames without planes, [`Error::TooFewCorrespondences`] where frames do not overlap at
+/// the guess, [`Error::NonFinite`] for the guess, [`Error::InvalidOption`].
+pub fn align_frames(
+    source: &OrganisedFrame,
+    target: &OrganisedFrame,
+    guess: &Isometry3<f64>,
+    options: &FrameAlignmentOptions,
+) -> Result<IcpResult> {
+    FrameAligner::new(options.clone())?.align(source, target, guess)
+}
+
+/// Registration whose memory is used again.
+#[derive(Debug, Clone)]
+pub struct FrameAligner {
+    options: FrameAlignmentOptions,
+    chunks: Vec<[f64; SUMS]>,
+    scratch: Vec<f64>,
+    cells: Vec<Cell>,
+}
+
+/// A pose on its way.
+struct Track {
+    pose: Isometry3<f64>,
+    iterations: usize,
+    rules: Rules,
+    /// Projection on the motions that are held.
+    held: Matrix6<f64>,
+}
+
+/// About which point, and in which unit, motions are solved.
+#[derive(Clone, Copy)]
+struct Gauge {
+    centre: Vector3<f64>,
+    radius_m: f64,
+}
+
+impl FrameAligner {
+    /// # Errors
+    /// [`Error::InvalidOption`].
+    pub fn new(options: FrameAlignmentOptions) -> Result<Self> {
+        options.validate()?;
+        Ok(Self { options, chunks: Vec::new(), scratch: Vec::new(), cells: Vec::new() })
+    }
+
+    /// The options.
+    pub fn options(&self) -> &FrameAlignmentOptions {
+        &self.options
+    }
+
+    /// As [`align_frames`], without allocating memory once frames of this size have been aligned.
+    ///
+    /// # Errors
+    /// As [`align_frames`].
+    pub fn align(
+        &mut self,
+        source: &OrganisedFrame,
+        target: &OrganisedFrame,
+        guess: &Isometry3<f64>,
+    ) -> Result<IcpResult> {
+        if !is_finite(guess) {
+            return Err(Error::NonFinite { what: "the guess", index: 0 });
+        }
+        for (what, frame) in [("the source frame", source), ("the target frame", target)] {
+            if frame.len() < self.options.min_correspondences {
+                let needed = self.options.min_correspondences;
+                return Err(Error::TooFewPoints { what, found: frame.len(), needed });
+            }
+        }
+        let rules = Rules {
+            extra_variance: 0.0,
+            reach: BIWEIGHT,
+            least_cosine: self.options.max_normal_angle_rad.cos() as f32,
+        };
+        let mut track = Track { pose: *guess, iterations: 0, rules, held: Matrix6::zeros() };
+        let counts = &source.points.counts[STRIDES.len() - self.options.levels..];
+        let coarse = counts[..counts.len() - 1].iter().filter(|c| **c >= FEWEST_POINTS);
+        self.open(&mut track, source, target, *coarse.clone().next().unwrap_or(&source.len()))?;
+        for &count in coarse {
+            self.descend(&mut track, source, target, count)?;
+        }
+        let stop = self.settle(&mut track, source, target)?;
+        self.result(&track, source, target, guess, stop)
+    }
+
+    /// Sets the variance of what is not aligned from the residuals at the guess.
+    fn open(
+        &mut self,
+        track: &mut Track,
+        source: &OrganisedFrame,
+        target: &OrganisedFrame,
+        count: usize,
+    ) -> Result<()> {
+        let radius = target.points.radius_m.max(source.points.radius_m);
+        track.rules.extra_variance = (radius * radius) as f32;
+        let moved = moved(track, source, target);
+        residuals(&moved.0, &track.rules, count, SAMPLE, &mut self.scratch);
+        if self.scratch.is_empty() {
+            return Err(self.too_few(0, count, track));
+        }
+        let scale = MAD * quantile(&mut self.scratch, 0.5) * radius;
+        track.rules.extra_variance = (scale * scale) as f32;
+        Ok(())
+    }
+
+    fn descend(
+        &mut self,
+        track: &mut Track,
+        source: &OrganisedFrame,
+        target: &OrganisedFrame,
+        count: usize,
+    ) -> Result<()> {
+        if self.hold() == Hold::Undetermined {
+            let (moved, gauge) = moved(track, source, target);
+            let limit = self.max_motion_sigma_m(&gauge);
+            let verdict = Verdict::new(&moved, &track.rules, count, limit, Residuals::Misaligned, &mut self.cells)?;
+            track.held = verdict.held();
+        }
+        for _ in 0..COARSE_ITERATIONS {
+            if track.iterations >= self.options.max_iterations {
+                break;
+            }
+            let wide = track.iterations < WIDE_ITERATIONS;
+            track.rules.reach = if wide { 3.0 * BIWEIGHT } else { BIWEIGHT };
+            let (step, gauge) = self.step(track, source, target, count, 1e-4)?;
+            if !wide {
+                self.narrow(track, source, target, count);
+            }
+            if step < COARSE_TOLERANCE * gauge.radius_m && !wide {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// Lowers the variance of what is not aligned to what the residuals show.
+    fn narrow(&mut self, track: &mut Track, source: &OrganisedFrame, target: &OrganisedFrame, count: usize) {
+        let (moved, _) = moved(track, source, target);
+        residuals(&moved, &track.rules, count, SAMPLE, &mut self.scratch);
+        let square = (MAD * quantile(&mut self.scratch, 0.5)).powi(2) as f32;
+        track.rules.extra_variance *= square.clamp(0.05, 1.0);
+    }
+
+    fn settle(&mut self, track: &mut Track, source: &OrganisedFrame, target: &OrganisedFrame) -> Result<StopReason> {
+        let count = source.len();
+        if self.hold() == Hold::Undetermined {
+            let (moved, gauge) = moved(track, source, target);
+            let limit = self.max_motion_sigma_m(&gauge);
+            let verdict = Verdict::new(&moved, &track.rules, count, limit, Residuals::Settled, &mut self.cells)?;
+            track.held = verdict.held();
+        }
+        track.rules.extra_variance = 0.0;
+        let mut narrowed = 0;
+        while track.iterations < self.options.max_iterations {
+            if narrowed < 3 {
+                self.rescale(track, source, target, narrowed == 0);
+                narrowed += 1;
+            }
+            let (step, gauge) = self.step(track, source, target, count, 0.0)?;
+            if step <= self.options.step_tolerance_m.unwrap_or(1e-5 * gauge.radius_m) && narrowed >= 3 {
+                return Ok(StopReason::Converged);
+            }
+        }
+        Ok(StopReason::MaxIterations)
+    }
+
+    /// Sets the reach of the kernel from the residuals.
+    fn rescale(&mut self, track: &mut Track, source: &OrganisedFrame, target: &OrganisedFrame, first: bool) {
+        let (moved, _) = moved(track, source, target);
+        if first {
+            track.rules.reach = 10.0 * BIWEIGHT;
+        }
+        residuals(&moved, &track.rules, source.len(), SAMPLE, &mut self.scratch);
+        let scale = (MAD * quantile(&mut self.scratch, 0.5)).max(0.1) as f32;
+        track.rules.reach = BIWEIGHT * scale;
+    }
+
+    /// One step, and how far it moves points at the radius, metre.
+    fn step(
+        &mut self,
+        track: &mut Track,
+        source: &OrganisedFrame,
+        target: &OrganisedFrame,
+        count: usize,
+        ridge: f64,
+    ) -> Result<(f64, Gauge)> {
+        let (moved, gauge) = moved(track, source, target);
+        let normal = normal_equations(&moved, &track.rules, count, &mut self.chunks);
+        if normal.pairs < self.options.min_correspondences {
+            return Err(self.too_few(normal.pairs, count, track));
+        }
+        let step = solve(&normal, &track.held, ridge)?;
+        track.pose = turned(&track.pose, &step, &gauge);
+        track.iterations += 1;
+        Ok((step.norm(), gauge))
+    }
+
+    fn result(
+        &mut self,
+        track: &Track,
+        source: &OrganisedFrame,
+        target: &OrganisedFrame,
+        guess: &Isometry3<f64>,
+        stop: StopReason,
+    ) -> Result<IcpResult> {
+        let (moved, gauge) = moved(track, source, target);
+        let normal = normal_equations(&moved, &track.rules, source.len(), &mut self.chunks);
+        let limit = self.max_motion_sigma_m(&gauge);
+        let verdict = Verdict::new(&moved, &track.rules, source.len(), limit, Residuals::Settled, &mut self.cells)?;
+        let mut pose = track.pose;
+        let to_tangent = tangent_from_centred(&pose, &gauge.centre, gauge.radius_m);
+        let centred = if let Some(prior) = &self.options.prior {
+            let what = "the tangent of the pose";
+            let from_tangent = to_tangent.try_inverse().ok_or(Error::Numerical { what, why: "it is singular" })?;
+            let offset = from_tangent * pose_difference(&pose, guess);
+            let prior = symmetrised(&(from_tangent * prior * from_tangent.transpose()));
+            let (step, covariance) = verdict.fused(&offset, &prior)?;
+            pose = step_pose(&pose, &(to_tangent * step));
+            covariance
+        } else {
+            verdict.covariance(gauge.radius_m, self.hold())
+        };
+        Ok(IcpResult {
+            target_from_source: pose,
+            covariance: symmetrised(&(to_tangent * centred * to_tangent.transpose())),
+            overlap: normal.pairs as f64 / source.len() as f64,
+            rms_m: (normal.square / normal.weight).sqrt(),
+            iterations: track.iterations,
+            stop,
+            correspondences: normal.pairs,
+            max_correspondence_distance_m: f64::from(track.rules.reach) * (normal.pairs as f64 / normal.weight).sqrt(),
+            degenerate: verdict.undetermined(&gauge.centre, gauge.radius_m),
+        })
+    }
+
+    /// With a prior, what the frames do not determine comes from it, and must not slide before.
+    fn hold(&self) -> Hold {
+        let hold = self.options.degeneracy == DegeneracyPolicy::HoldAtGuess || self.options.prior.is_some();
+        if hold { Hold::Undetermined } else { Hold::Nothing }
+    }
+
+    fn max_motion_sigma_m(&self, gauge: &Gauge) -> f64 {
+        self.options.max_motion_sigma_m.unwrap_or(gauge.radius_m / 300.0)
+    }
+
+    fn too_few(&self, found: usize, of: usize, track: &Track) -> Error {
+        Error::TooFewCorrespondences {
+            found,
+            of,
+            needed: self.options.min_correspondences,
+            max_distance_m: f64::from(track.rules.reach * track.rules.extra_variance.sqrt()),
+            iteration: track.iterations,
+        }
+    }
+}
+
+fn moved<'a>(track: &Track, source: &'a OrganisedFrame, target: &'a OrganisedFrame) -> (Moved<'a>, Gauge) {
+    let centre = (track.pose * nalgebra::Point3::from(source.points.centre)).coords;
+    let gauge = Gauge { centre, radius_m: source.points.radius_m.max(f64::MIN_POSITIVE) };
+    (Moved::new(source, target, &track.pose, &gauge.centre, gauge.radius_m), gauge)
+}
+
+/// Step `[dt, rho w]` that lowers the residuals, without motions that are held. `ridge`: share of the largest
+/// information that is added to all, so that what hardly matters does not run away while the frames are still apart.
+fn solve(normal: &Normal, held: &Matrix6<f64>, ridge: f64) -> Result<Vector6<f64>> {
+    let free = Matrix6::identity() - held;
+    let largest = normal.matrix.diagonal().max();
+    let matrix = free * normal.matrix * free + held * largest + Matrix6::identity() * (ridge.max(1e-9) * largest);
+    let gradient = free * normal.gradient;
+    let cholesky = matrix
+        .cholesky()
+        .ok_or(Error::Numerical { what: "the normal equations", why: "they are not positive definite" })?;
+    Ok(free * -cholesky.solve(&gradient))
+}
+
+/// The pose after a motion `[dt, rho w]` about the centre, target axes.
+fn turned(pose: &Isometry3<f64>, step: &Vector6<f64>, gauge: &Gauge) -> Isometry3<f64> {
+    let shift = Vector3::new(step[0], step[1], step[2]);
+    let turn = nalgebra::UnitQuaternion::from_scaled_axis(Vector3::new(step[3], step[4], step[5]) / gauge.radius_m);
+    let mut rotation = turn * pose.rotation;
+    rotation.renormalize();
+    let translation = turn * (pose.translation.vector - gauge.centre) + gauge.centre + shift;
+    Isometry3::from_parts(translation.into(), rotation)
+}

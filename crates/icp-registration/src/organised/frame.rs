@@ -1,0 +1,260 @@
+//! A frame prepared for registration.
+
+use std::sync::Arc;
+
+use nalgebra::{Point3, Vector3};
+use rayon::prelude::*;
+
+use super::grid::Grid;
+use super::nodes::{LARGEST_DEPTH_M, LEAST_DEPTH_M, NodeRow};
+use super::planes::{FREEDOM, PlaneRow};
+use super::projection::Projection;
+use crate::cloud::Cloud;
+use crate::error::{Error, Result};
+use crate::kernel::quantile;
+
+/// Distances of the nodes of the levels, coarse to fine.
+pub(super) const STRIDES: [usize; 4] = [8, 4, 2, 1];
+/// Windows whose mean square deviation exceeds that of most by this factor hold no plane.
+const LARGEST_MISFIT: f32 = 3.0;
+/// Smallest cosine between a plane's normal and the ray: in windows across a jump lie steep planes that are none.
+const LEAST_INCIDENCE: f32 = 0.12;
+/// Deviation of inverse depth that is rounding, relative.
+const ROUNDING: f32 = 1e-6;
+/// Nodes from which the typical misfit is taken.
+const SAMPLE: usize = 4096;
+
+/// A frame prepared for registration: planes through its nodes, each the average of a square of pixels. Its memory is
+/// used again by [`OrganisedFrame::update`].
+#[derive(Debug, Clone)]
+pub struct OrganisedFrame {
+    pub(super) projection: Arc<Projection>,
+    inverse_depth: Vec<f32>,
+    spread: Vec<f32>,
+    /// Plane of each node: unit normal away from the camera, distance; NaN where there is none.
+    pub(super) planes: Vec<[f32; 4]>,
+    /// Standard deviation of the distance, metre.
+    pub(super) sigma: Vec<f32>,
+    misfit: Vec<f32>,
+    scratch: Vec<f64>,
+    pub(super) points: Points,
+    has_sigma: bool,
+}
+
+/// The nodes with a plane, level by level: the first `counts[l]` are those of level `l`.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Points {
+    pub position: [Vec<f32>; 3],
+    pub normal: [Vec<f32>; 3],
+    pub variance: Vec<f32>,
+    pub node: Vec<u32>,
+    pub counts: [usize; STRIDES.len()],
+    /// Centroid and rms radius of the first level that has points.
+    pub centre: Vector3<f64>,
+    pub radius_m: f64,
+}
+
+impl OrganisedFrame {
+    /// Prepares a frame: one point a pixel of `projection`, row by row, camera frame, metre; NaN where there is no
+    /// range. `sigma`: standard deviation of the ranges, metre; without it, inverse depth is taken as equally precise
+    /// all over the frame, and how precise is estimated. Pixels whose sigma is not positive take no part.
+    ///
+    /// # Errors
+    /// [`Error::LengthMismatch`] where points or sigma do not fill the frame; [`Error::PointsOffRays`] where points do
+    /// not lie on the rays of their pixels.
+    pub fn new(projection: &Arc<Projection>, points: &[[f64; 3]], sigma: Option<&[f32]>) -> Result<Self> {
+        let nodes = projection.grid.len();
+        let list = || Vec::with_capacity(nodes);
+        let mut frame = Self {
+            projection: Arc::clone(projection),
+            inverse_depth: vec![f32::NAN; nodes],
+            spread: vec![0.0; nodes],
+            planes: vec![[f32::NAN; 4]; nodes],
+            sigma: vec![0.0; nodes],
+            misfit: vec![f32::NAN; nodes],
+            scratch: Vec::with_capacity(SAMPLE),
+            points: Points {
+                position: [list(), list(), list()],
+                normal: [list(), list(), list()],
+                variance: list(),
+                node: Vec::with_capacity(nodes),
+                ..Points::default()
+            },
+            has_sigma: false,
+        };
+        frame.update(points, sigma)?;
+        Ok(frame)
+    }
+
+    /// Puts another frame of the same camera in place of this one, without allocating memory.
+    ///
+    /// # Errors
+    /// As [`OrganisedFrame::new`]; the frame then stays as it was.
+    pub fn update(&mut self, points: &[[f64; 3]], sigma: Option<&[f32]>) -> Result<()> {
+        let (width, height) = (self.projection.width(), self.projection.height());
+        let expected = width * height;
+        if points.len() != expected {
+            return Err(Error::LengthMismatch { what: "points of the frame", expected, found: points.len() });
+        }
+        if let Some(sigma) = sigma
+            && sigma.len() != expected
+        {
+            return Err(Error::LengthMismatch { what: "sigma", expected, found: sigma.len() });
+        }
+        check_rays(&self.projection, points)?;
+        self.has_sigma = sigma.is_some();
+        self.reduce(points, sigma);
+        self.fit_planes();
+        self.refuse_misfits();
+        self.points.gather(&self.projection.grid, &self.inverse_depth, &self.planes, &self.sigma);
+        Ok(())
+    }
+
+    /// The camera.
+    pub fn projection(&self) -> &Arc<Projection> {
+        &self.projection
+    }
+
+    /// Number of nodes that have a plane.
+    pub fn len(&self) -> usize {
+        self.points.node.len()
+    }
+
+    /// Whether no node has a plane.
+    pub fn is_empty(&self) -> bool {
+        self.points.node.is_empty()
+    }
+
+    /// The nodes as a cloud: points (averages over a square of pixels), normals towards the camera, and standard
+    /// deviations of the averages along the normals. Nodes without a plane, at edges and holes, are marked as rim.
+    pub fn to_cloud(&self) -> Cloud {
+        let grid = &self.projection.grid;
+        let seen: Vec<usize> = (0..grid.len()).filter(|&k| self.inverse_depth[k].is_finite()).collect();
+        let has_plane = |k: usize| self.planes[k][3].is_finite();
+        let vector = |v: [f32; 3]| Vector3::from(v.map(f64::from));
+        let point = |k: usize| {
+            let depth = 1.0 / f64::from(self.inverse_depth[k]);
+            Point3::new(f64::from(grid.u[k]) * depth, f64::from(grid.v[k]) * depth, -depth)
+        };
+        let normal = |k: usize| {
+            let n = vector([self.planes[k][0], self.planes[k][1], self.planes[k][2]]);
+            if has_plane(k) { -n.normalize() } else { Vector3::repeat(f64::NAN) }
+        };
+        Cloud {
+            points: seen.iter().map(|&k| point(k)).collect(),
+            normals: Some(seen.iter().map(|&k| normal(k)).collect()),
+            sigma: Some(seen.iter().map(|&k| if has_plane(k) { f64::from(self.sigma[k]) } else { f64::NAN }).collect()),
+            rim: Some(seen.iter().map(|&k| !has_plane(k)).collect()),
+            ..Cloud::default()
+        }
+    }
+
+    fn reduce(&mut self, points: &[[f64; 3]], sigma: Option<&[f32]>) {
+        let (grid, width) = (&self.projection.grid, self.projection.width());
+        let rows = self.inverse_depth.par_chunks_mut(grid.cols).zip(self.spread.par_chunks_mut(grid.cols));
+        rows.enumerate().with_min_len(8).for_each(|(row, (inverse_depth, spread))| {
+            pulp::Arch::new().dispatch(NodeRow { grid, row, width, points, sigma, inverse_depth, spread });
+        });
+    }
+
+    fn fit_planes(&mut self) {
+        let grid = &self.projection.grid;
+        let (inverse_depth, spread) = (&self.inverse_depth[..], &self.spread[..]);
+        let outputs = (self.planes.par_chunks_mut(grid.cols), self.sigma.par_chunks_mut(grid.cols));
+        let rows = outputs.0.zip(outputs.1).zip(self.misfit.par_chunks_mut(grid.cols));
+        rows.enumerate().with_min_len(8).for_each(|(row, ((planes, sigma), misfit))| {
+            pulp::Arch::new().dispatch(PlaneRow { grid, row, inverse_depth, spread, planes, sigma, misfit });
+        });
+    }
+
+    /// Takes the planes off windows that hold more than one, and scales the noise where its size was not given.
+    fn refuse_misfits(&mut self) {
+        let step = self.misfit.len().div_ceil(SAMPLE).max(1);
+        self.scratch.clear();
+        self.scratch.extend(self.misfit.iter().step_by(step).filter(|m| m.is_finite()).map(|m| f64::from(*m)));
+        let freedom = f64::from(FREEDOM);
+        // Median of a mean of squares (Wilson and Hilferty).
+        let median = (1.0 - 2.0 / (9.0 * freedom)).powi(3);
+        let typical = (quantile(&mut self.scratch, 0.5) / median) as f32;
+        let scale = if self.has_sigma { 1.0 } else { typical.sqrt() };
+        let limit = LARGEST_MISFIT * if self.has_sigma { typical.max(1.0) } else { typical };
+        let nodes = self.planes.iter_mut().zip(&mut self.sigma).zip(&self.misfit);
+        let seen = self.spread.iter().zip(&self.inverse_depth).zip(&self.projection.grid.cosine);
+        for (((plane, sigma), misfit), ((spread, w), cosine)) in nodes.zip(seen) {
+            let floor = (ROUNDING * w / spread).powi(2);
+            let incidence = plane[3] * w * cosine;
+            // NaN fails.
+            let holds = *misfit <= limit + floor && incidence >= LEAST_INCIDENCE;
+            if !holds {
+                *plane = [f32::NAN; 4];
+            }
+            *sigma *= scale.max(ROUNDING * w / spread);
+        }
+    }
+}
+
+impl Points {
+    fn gather(&mut self, grid: &Grid, inverse_depth: &[f32], planes: &[[f32; 4]], sigma: &[f32]) {
+        for list in self.position.iter_mut().chain(&mut self.normal) {
+            list.clear();
+        }
+        self.variance.clear();
+        self.node.clear();
+        for (level, &stride) in STRIDES.iter().enumerate() {
+            for row in (0..grid.rows).step_by(stride) {
+                // Nodes of the coarser levels are in the list already.
+                let done = level > 0 && row % STRIDES[level - 1] == 0;
+                let (first, step) = if done { (stride, 2 * stride) } else { (0, stride) };
+                for col in (first..grid.cols).step_by(step) {
+                    self.push(row * grid.cols + col, grid, inverse_depth, planes, sigma);
+                }
+            }
+            self.counts[level] = self.node.len();
+        }
+        self.measure();
+    }
+
+    fn push(&mut self, k: usize, grid: &Grid, inverse_depth: &[f32], planes: &[[f32; 4]], sigma: &[f32]) {
+        let plane = planes[k];
+        if !plane[3].is_finite() {
+            return;
+        }
+        let depth = 1.0 / inverse_depth[k];
+        let position = [grid.u[k] * depth, grid.v[k] * depth, -depth];
+        for i in 0..3 {
+            self.position[i].push(position[i]);
+            self.normal[i].push(plane[i]);
+        }
+        self.variance.push(sigma[k] * sigma[k]);
+        self.node.push(k as u32);
+    }
+
+    fn measure(&mut self) {
+        let count = self.counts.iter().copied().find(|c| *c > 0).unwrap_or(0);
+        let point = |k: usize| Vector3::from([0, 1, 2].map(|i| f64::from(self.position[i][k])));
+        let mean = (0..count).fold(Vector3::zeros(), |sum, k| sum + point(k)) / count.max(1) as f64;
+        let square: f64 = (0..count).map(|k| (point(k) - mean).norm_squared()).sum();
+        self.centre = mean;
+        self.radius_m = (square / count.max(1) as f64).sqrt();
+    }
+}
+
+/// Refuses frames most of whose points lie beside the rays of their pixels, by a sample of them.
+fn check_rays(projection: &Projection, points: &[[f64; 3]]) -> Result<()> {
+    let (mut off, mut tried, mut example) = (0, 0, 0);
+    let step = points.len() / 301 + 1;
+    for index in (0..points.len()).step_by(step) {
+        let p = points[index];
+        if !(p[2].abs() > LEAST_DEPTH_M && p[2].abs() < LARGEST_DEPTH_M && p[0].is_finite() && p[1].is_finite()) {
+            continue;
+        }
+        tried += 1;
+        let at = [(index % projection.width()) as f64, (index / projection.width()) as f64];
+        let found = projection.pixel(&Point3::from(p));
+        if !found.is_some_and(|f| (f[0] - at[0]).abs() <= 1.0 && (f[1] - at[1]).abs() <= 1.0) {
+            off += 1;
+            example = index;
+        }
+    }
+    if 2 * off > tried { Err(Error::PointsOffRays { index: example }) } else { Ok(()) }
+}

@@ -1,0 +1,87 @@
+//! What can be chosen in the registration of frames.
+
+use nalgebra::Matrix6;
+
+use crate::error::{Error, Result};
+use crate::icp::DegeneracyPolicy;
+
+/// Options of [`align_frames`](crate::align_frames). The defaults carry no scale: lengths come from the frames.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FrameAlignmentOptions {
+    /// What happens to motions that the geometry does not determine. Default: they are named.
+    pub degeneracy: DegeneracyPolicy,
+    /// Covariance of the guess, tangent `[dt target axes (m), dtheta source axes (rad)]`. With it, the result is the
+    /// most probable pose for guess and frames together, and motions that the geometry does not determine come from
+    /// the guess alone. `None`: the guess is but a start.
+    pub prior: Option<Matrix6<f64>>,
+    /// A motion counts as undetermined when the predicted standard deviation of points at the frame's radius exceeds
+    /// this, metre. `None`: 1/300 of the radius.
+    pub max_motion_sigma_m: Option<f64>,
+    /// Levels that are passed, coarse to fine, 1 to 4. Default 4.
+    pub levels: usize,
+    /// Iterations in all levels together. Default 60.
+    pub max_iterations: usize,
+    /// The run has converged when a step moves points at the frame's radius by less than this, metre. `None`: 1e-5 of
+    /// that radius.
+    pub step_tolerance_m: Option<f64>,
+    /// Pairs whose normals enclose a larger angle are refused, radian. Default 45 degrees.
+    pub max_normal_angle_rad: f64,
+    /// Fewest pairs. Default 20.
+    pub min_correspondences: usize,
+}
+
+impl Default for FrameAlignmentOptions {
+    fn default() -> Self {
+        Self {
+            degeneracy: DegeneracyPolicy::Report,
+            prior: None,
+            max_motion_sigma_m: None,
+            levels: 4,
+            max_iterations: 60,
+            step_tolerance_m: None,
+            max_normal_angle_rad: std::f64::consts::FRAC_PI_4,
+            min_correspondences: 20,
+        }
+    }
+}
+
+impl FrameAlignmentOptions {
+    pub(crate) fn validate(&self) -> Result<()> {
+        let lengths = [("max_motion_sigma_m", self.max_motion_sigma_m), ("step_tolerance_m", self.step_tolerance_m)];
+        for (name, value) in lengths {
+            if let Some(value) = value
+                && !(value > 0.0 && value.is_finite())
+            {
+                return Err(Error::InvalidOption { name, value, domain: "positive and finite" });
+            }
+        }
+        let angle = self.max_normal_angle_rad;
+        if !(angle > 0.0 && angle <= std::f64::consts::PI) {
+            return Err(Error::InvalidOption {
+                name: "max_normal_angle_rad",
+                value: angle,
+                domain: "above 0, at most pi",
+            });
+        }
+        let counts = [
+            ("levels", self.levels, 1, 4, "1 to 4"),
+            ("max_iterations", self.max_iterations, 1, usize::MAX, "1 or more"),
+            ("min_correspondences", self.min_correspondences, 6, usize::MAX, "6 or more"),
+        ];
+        for (name, value, least, most, domain) in counts {
+            if value < least || value > most {
+                return Err(Error::InvalidOption { name, value: value as f64, domain });
+            }
+        }
+        match &self.prior {
+            Some(prior) if prior.iter().any(|v| !v.is_finite()) => {
+                Err(Error::NonFinite { what: "the prior", index: 0 })
+            }
+            Some(prior) if prior.cholesky().is_none() => {
+                let value = prior.diagonal().min();
+                Err(Error::InvalidOption { name: "prior", value, domain: "positive definite" })
+            }
+            _ => Ok(()),
+        }
+    }
+}

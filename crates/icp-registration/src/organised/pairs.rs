@@ -1,0 +1,205 @@
+//! Pairs of source nodes and target planes, found by projection, some at a time.
+// Only what is inlined is compiled for wide registers.
+#![allow(clippy::inline_always)]
+
+use nalgebra::{Isometry3, Vector3};
+
+use super::frame::OrganisedFrame;
+use super::projection::Lens;
+use super::table::Table;
+
+/// Where a ray (u, v, -1) falls on the grid of nodes, in nodes; NaN or beyond the grid where it does not.
+pub(super) trait Locate: Copy + Sync {
+    fn node(&self, u: f32, v: f32) -> [f32; 2];
+}
+
+/// A pinhole camera, in nodes.
+#[derive(Clone, Copy)]
+pub(super) struct Pinhole {
+    focal: [f32; 2],
+    centre: [f32; 2],
+}
+
+impl Locate for Pinhole {
+    #[inline(always)]
+    fn node(&self, u: f32, v: f32) -> [f32; 2] {
+        [u * self.focal[0] + self.centre[0], self.centre[1] - v * self.focal[1]]
+    }
+}
+
+/// A table of pixels and the number of pixels a node.
+#[derive(Clone, Copy)]
+pub(super) struct Tabled<'a> {
+    table: &'a Table,
+    scale: f32,
+    shift: f32,
+}
+
+impl Locate for Tabled<'_> {
+    #[inline(always)]
+    fn node(&self, u: f32, v: f32) -> [f32; 2] {
+        self.table.read(u, v).map(|p| p * self.scale + self.shift)
+    }
+}
+
+/// Something to be done with whatever camera the target has.
+pub(super) trait WithLocate {
+    type Output;
+    fn run<L: Locate>(self, locate: L) -> Self::Output;
+}
+
+/// Calls `work` with the camera of a frame.
+pub(super) fn with_locate<W: WithLocate>(frame: &OrganisedFrame, work: W) -> W::Output {
+    let bin = frame.projection.grid.bin as f64;
+    // Pixel p lies at node (p - (bin - 1) / 2) / bin.
+    let shift = -(bin - 1.0) / 2.0;
+    match frame.projection.lens() {
+        Lens::Pinhole { focal_px, centre_px } => work.run(Pinhole {
+            focal: focal_px.map(|f| (f / bin) as f32),
+            centre: centre_px.map(|c| ((c + shift) / bin) as f32),
+        }),
+        Lens::Table(table) => work.run(Tabled { table, scale: (1.0 / bin) as f32, shift: (shift / bin) as f32 }),
+    }
+}
+
+/// What decides on pairs and their weights.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Rules {
+    /// Added to the variance of every pair, for what is not yet aligned, m².
+    pub extra_variance: f32,
+    /// Residuals beyond this multiple of their standard deviation have no weight (biweight).
+    pub reach: f32,
+    /// Smallest cosine between the normals of a pair.
+    pub least_cosine: f32,
+}
+
+/// The source frame on its way to the target.
+pub(super) struct Moved<'a> {
+    pub source: &'a OrganisedFrame,
+    pub target: &'a OrganisedFrame,
+    rotation: [[f32; 3]; 3],
+    translation: [f32; 3],
+    centre: [f32; 3],
+    per_radius: f32,
+}
+
+/// Pairs side by side. Those without weight are none.
+pub(super) struct Pairs<const N: usize> {
+    /// Target normal.
+    pub normal: [[f32; N]; 3],
+    /// Rotated source normal.
+    pub source_normal: [[f32; N]; 3],
+    /// Moved source point from the centre, in units of the radius.
+    pub lever: [[f32; N]; 3],
+    /// Distance of the moved point from the target plane, metre.
+    pub residual: [f32; N],
+    /// Variance of the residual, m².
+    pub variance: [f32; N],
+    /// Weight of the robust kernel, between 0 and 1, over the variance.
+    pub weight: [f32; N],
+    /// Slope of the kernel's influence over the variance.
+    pub slope: [f32; N],
+}
+
+impl<'a> Moved<'a> {
+    /// `centre` and `radius`: about which and in which units motions are solved, target frame.
+    pub(super) fn new(
+        source: &'a OrganisedFrame,
+        target: &'a OrganisedFrame,
+        pose: &Isometry3<f64>,
+        centre: &Vector3<f64>,
+        radius_m: f64,
+    ) -> Self {
+        let matrix = pose.rotation.to_rotation_matrix();
+        Self {
+            source,
+            target,
+            rotation: [0, 1, 2].map(|r| [0, 1, 2].map(|c| matrix[(r, c)] as f32)),
+            translation: [0, 1, 2].map(|i| pose.translation.vector[i] as f32),
+            centre: [0, 1, 2].map(|i| centre[i] as f32),
+            per_radius: (1.0 / radius_m) as f32,
+        }
+    }
+
+    /// The pairs of the source's points `start..start + N`.
+    #[inline(always)]
+    pub(super) fn pairs<L: Locate, const N: usize>(&self, locate: L, rules: &Rules, start: usize) -> Pairs<N> {
+        let points = &self.source.points;
+        let p = self.rotated::<N>(&points.position, start, self.translation);
+        let source_normal = self.rotated::<N>(&points.normal, start, [0.0; 3]);
+        let (planes, variances) = self.partners(locate, &p);
+        let source_variance = &points.variance[start..start + N];
+        let mut pairs = Pairs {
+            normal: [planes[0], planes[1], planes[2]],
+            source_normal,
+            lever: [[0.0; N]; 3],
+            residual: [0.0; N],
+            variance: [0.0; N],
+            weight: [0.0; N],
+            slope: [0.0; N],
+        };
+        for k in 0..N {
+            let [a, b, c, d] = [planes[0][k], planes[1][k], planes[2][k], planes[3][k]];
+            let residual = a * p[0][k] + b * p[1][k] + c * p[2][k] - d;
+            let cosine = a * source_normal[0][k] + b * source_normal[1][k] + c * source_normal[2][k];
+            let variance = variances[k] + source_variance[k] + rules.extra_variance;
+            let u2 = residual * residual / (variance * rules.reach * rules.reach);
+            // NaN fails: no partner.
+            let accepted = cosine >= rules.least_cosine && u2 < 1.0;
+            let rest = if accepted { 1.0 - u2 } else { 0.0 };
+            pairs.weight[k] = rest * rest / variance;
+            pairs.slope[k] = rest * (1.0 - 5.0 * u2) / variance;
+            if !accepted {
+                pairs.slope[k] = 0.0;
+                pairs.weight[k] = 0.0;
+            }
+            pairs.residual[k] = if accepted { residual } else { 0.0 };
+            pairs.variance[k] = variance;
+            for i in 0..3 {
+                pairs.lever[i][k] = (p[i][k] - self.centre[i]) * self.per_radius;
+            }
+        }
+        pairs
+    }
+
+    #[inline(always)]
+    fn rotated<const N: usize>(&self, lists: &[Vec<f32>; 3], start: usize, shift: [f32; 3]) -> [[f32; N]; 3] {
+        let [x, y, z] = [0, 1, 2].map(|i| &lists[i][start..start + N]);
+        let mut moved = [[0.0; N]; 3];
+        for i in 0..3 {
+            let r = self.rotation[i];
+            for k in 0..N {
+                moved[i][k] = r[0] * x[k] + r[1] * y[k] + r[2] * z[k] + shift[i];
+            }
+        }
+        moved
+    }
+
+    /// Planes and variances of the target nodes on which points fall; NaN where there are none.
+    #[inline(always)]
+    fn partners<L: Locate, const N: usize>(&self, locate: L, p: &[[f32; N]; 3]) -> ([[f32; N]; 4], [f32; N]) {
+        let grid = &self.target.projection.grid;
+        let (cols, rows) = (grid.cols as f32, grid.rows as f32);
+        let mut index = [u32::MAX; N];
+        for k in 0..N {
+            let per_depth = -1.0 / p[2][k];
+            let [col, row] = locate.node(p[0][k] * per_depth, p[1][k] * per_depth);
+            let (col, row) = (col + 0.5, row + 0.5);
+            // NaN fails.
+            let inside = p[2][k] < 0.0 && col >= 0.0 && row >= 0.0 && col < cols && row < rows;
+            let (col, row) = if inside { (col as i32, row as i32) } else { (0, 0) };
+            index[k] = if inside { (row * grid.cols as i32 + col) as u32 } else { u32::MAX };
+        }
+        let (mut planes, mut variances) = ([[f32::NAN; N]; 4], [f32::NAN; N]);
+        for k in 0..N {
+            let i = index[k] as usize;
+            if let (Some(plane), Some(sigma)) = (self.target.planes.get(i), self.target.sigma.get(i)) {
+                for j in 0..4 {
+                    planes[j][k] = plane[j];
+                }
+                variances[k] = sigma * sigma;
+            }
+        }
+        (planes, variances)
+    }
+}

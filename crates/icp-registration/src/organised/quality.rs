@@ -1,0 +1,283 @@
+//! What the pairs say about the pose: covariance, and a verdict on degeneracy.
+//!
+//! Neighbouring pairs share errors (directions of planes from overlapping windows, rounded creases), so scores are
+//! summed over cells of the frame before they are squared: a cell counts as one observation. And the noise of the
+//! normals imitates geometry: on one plane, n noisy normals say something about sliding that is not there. The errors
+//! of source and target normals are independent, so their cross products tell the information without that bias, and
+//! its scatter between the cells tells whether what is left differs from nothing.
+// Only what is inlined is compiled for wide registers.
+#![allow(clippy::inline_always)]
+
+use nalgebra::{DMatrix, DVector, Matrix6, Vector3, Vector6};
+
+use super::pairs::{Locate, Moved, Rules, WithLocate, with_locate};
+use super::sums::derivatives;
+use crate::eigen::eigen6;
+use crate::error::{Error, Result};
+use crate::icp::UndeterminedMotion;
+use crate::icp::motion::name_motions;
+use crate::pose::symmetrised;
+
+/// Cells across the longer side of the frame.
+const CELLS: usize = 24;
+/// Information below this multiple of its own scatter between cells counts as none.
+const SIGNIFICANCE: f64 = 2.5;
+/// Cells below which their scatter is no estimate.
+const FEWEST_CELLS: usize = 20;
+/// Share of the largest information that rounding can imitate (single precision).
+const ROUNDING: f64 = 1e-7;
+/// Pairs taken at a time.
+const BLOCK: usize = 8;
+/// 6 scores, 21 products, 21 products of the score of each pair.
+const SUMS: usize = 6 + 21;
+
+/// What the residuals consist of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Residuals {
+    /// The frames are still apart: what neighbouring residuals share is no error, and would hold what can be solved.
+    Misaligned,
+    /// Errors: what neighbouring residuals share counts.
+    Settled,
+}
+
+/// Motions that keep the guess.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Hold {
+    /// None.
+    Nothing,
+    /// Those that the geometry does not determine.
+    Undetermined,
+}
+
+/// Sums over the pairs of one cell.
+pub(super) type Cell = [f64; SUMS];
+
+/// One eigen-direction of the information.
+struct Direction {
+    vector: Vector6<f64>,
+    information: f64,
+    sigma_m: f64,
+    determined: bool,
+}
+
+/// Directions of the information, worst first, with the covariance of the score.
+pub(super) struct Verdict {
+    directions: Vec<Direction>,
+    score: Matrix6<f64>,
+}
+
+impl Verdict {
+    /// Judges the first `count` points; motions with a predicted sigma above `max_sigma_m` are undetermined.
+    pub(super) fn new(
+        moved: &Moved<'_>,
+        rules: &Rules,
+        count: usize,
+        max_sigma_m: f64,
+        residuals: Residuals,
+        cells: &mut Vec<Cell>,
+    ) -> Result<Self> {
+        let (cells, independent) = fill(moved, rules, count, cells);
+        let information = symmetric(&cells.iter().fold([0.0; 21], |mut sum, cell| {
+            sum.iter_mut().zip(&cell[6..]).for_each(|(s, c)| *s += c);
+            sum
+        }));
+        let (values, vectors) = eigen6(&information, "the information of the pairs")?;
+        let used = cells.iter().filter(|c| c[6] + c[12] + c[17] != 0.0).count();
+        let score = match residuals {
+            Residuals::Misaligned => independent,
+            Residuals::Settled if used >= FEWEST_CELLS => clustered(cells) * (used as f64 / (used as f64 - 6.0)),
+            // Too few cells to estimate from: the pairs of a cell taken as fully dependent.
+            Residuals::Settled => independent * (count as f64 / used.max(1) as f64),
+        };
+        let directions = (0..6)
+            .map(|k| direction(cells, &score, values[5], values[k], vectors.column(k).into(), max_sigma_m))
+            .collect();
+        Ok(Self { directions, score })
+    }
+
+    /// Orthonormal undetermined motions `[dt, rho w]`.
+    pub(super) fn held(&self) -> Matrix6<f64> {
+        self.directions
+            .iter()
+            .filter(|d| !d.determined)
+            .fold(Matrix6::zeros(), |sum, d| sum + d.vector * d.vector.transpose())
+    }
+
+    /// The undetermined motions, sorted into translations and rotations.
+    pub(super) fn undetermined(&self, centre: &Vector3<f64>, radius_m: f64) -> Vec<UndeterminedMotion> {
+        let space: Vec<(Vector6<f64>, f64)> =
+            self.directions.iter().filter(|d| !d.determined).map(|d| (d.vector, d.sigma_m)).collect();
+        name_motions(&space, centre, radius_m)
+    }
+
+    /// Covariance of motions `[dt, rho w]`; what is not known at all gets the radius as sigma.
+    pub(super) fn covariance(&self, radius_m: f64, held: Hold) -> Matrix6<f64> {
+        let (basis, inside) = self.known(held);
+        let unknown = Matrix6::identity() - fixed(&(&basis * basis.transpose()));
+        fixed(&(&basis * inside * basis.transpose())) + unknown * radius_m.powi(2)
+    }
+
+    /// The most probable motion and its covariance, where a guess lies `offset` away and has the covariance `prior`.
+    /// What the pairs do not determine comes from the guess alone.
+    pub(super) fn fused(&self, offset: &Vector6<f64>, prior: &Matrix6<f64>) -> Result<(Vector6<f64>, Matrix6<f64>)> {
+        let what = "the information of pairs and prior";
+        let error = Error::Numerical { what, why: "it is not positive definite" };
+        let (basis, inside) = self.known(Hold::Undetermined);
+        let from_pairs = inside.cholesky().ok_or(error.clone())?.inverse();
+        let from_guess = prior.cholesky().ok_or(error.clone())?.inverse();
+        let information = from_guess + fixed(&(&basis * from_pairs * basis.transpose()));
+        let covariance = symmetrised(&information).cholesky().ok_or(error)?.inverse();
+        Ok((covariance * (from_guess * offset), covariance))
+    }
+
+    /// Basis of the motions that are known, and their covariance in it.
+    fn known(&self, held: Hold) -> (DMatrix<f64>, DMatrix<f64>) {
+        let is_known = |d: &&Direction| d.sigma_m.is_finite() && (d.determined || held == Hold::Nothing);
+        let known: Vec<&Direction> = self.directions.iter().filter(is_known).collect();
+        let basis = DMatrix::from_fn(6, known.len(), |r, c| known[c].vector[r]);
+        let inverse =
+            DMatrix::from_diagonal(&DVector::from_iterator(known.len(), known.iter().map(|d| 1.0 / d.information)));
+        let score = basis.transpose() * self.score * &basis;
+        (basis, &inverse * score * &inverse)
+    }
+}
+
+fn fixed(m: &DMatrix<f64>) -> Matrix6<f64> {
+    Matrix6::from_fn(|r, c| m[(r, c)])
+}
+
+fn direction(
+    cells: &[Cell],
+    score: &Matrix6<f64>,
+    largest: f64,
+    information: f64,
+    vector: Vector6<f64>,
+    max_sigma_m: f64,
+) -> Direction {
+    let scatter = cells.iter().map(|c| form(&c[6..], &vector).powi(2)).sum::<f64>().sqrt();
+    let significant = information > SIGNIFICANCE * scatter && information > ROUNDING * largest;
+    let sigma_m = if significant { vector.dot(&(score * vector)).max(0.0).sqrt() / information } else { f64::INFINITY };
+    Direction { vector, information, sigma_m, determined: sigma_m <= max_sigma_m }
+}
+
+/// Covariance of the summed score from the scatter of its sums over cells.
+fn clustered(cells: &[Cell]) -> Matrix6<f64> {
+    cells.iter().fold(Matrix6::zeros(), |sum, cell| {
+        let score = Vector6::from_fn(|i, _| cell[i]);
+        sum + score * score.transpose()
+    })
+}
+
+/// `v' M v` of a matrix given by its upper triangle.
+fn form(upper: &[f64], v: &Vector6<f64>) -> f64 {
+    let (mut sum, mut k) = (0.0, 0);
+    for r in 0..6 {
+        for c in r..6 {
+            sum += upper[k] * v[r] * v[c] * if r == c { 1.0 } else { 2.0 };
+            k += 1;
+        }
+    }
+    sum
+}
+
+fn symmetric(upper: &[f64; 21]) -> Matrix6<f64> {
+    let (mut matrix, mut k) = (Matrix6::zeros(), 0);
+    for r in 0..6 {
+        for c in r..6 {
+            matrix[(r, c)] = upper[k];
+            matrix[(c, r)] = upper[k];
+            k += 1;
+        }
+    }
+    matrix
+}
+
+/// Sums over the cells, and the covariance of the score of pairs that share nothing.
+fn fill<'c>(moved: &Moved<'_>, rules: &Rules, count: usize, cells: &'c mut Vec<Cell>) -> (&'c [Cell], Matrix6<f64>) {
+    let grid = &moved.source.projection.grid;
+    let side = grid.cols.max(grid.rows).div_ceil(CELLS).max(1);
+    let across = grid.cols.div_ceil(side);
+    cells.clear();
+    cells.resize(across * grid.rows.div_ceil(side), [0.0; SUMS]);
+    let mut independent = [0.0; 21];
+    with_locate(moved.target, Fill { moved, rules, count, side, across, cells, independent: &mut independent });
+    (cells, symmetric(&independent))
+}
+
+struct Fill<'a, 'b> {
+    moved: &'a Moved<'b>,
+    rules: &'a Rules,
+    count: usize,
+    side: usize,
+    across: usize,
+    cells: &'a mut [Cell],
+    independent: &'a mut [f64; 21],
+}
+
+impl WithLocate for Fill<'_, '_> {
+    type Output = ();
+
+    fn run<L: Locate>(self, locate: L) {
+        pulp::Arch::new().dispatch(Located { fill: self, locate });
+    }
+}
+
+struct Located<'a, 'b, L> {
+    fill: Fill<'a, 'b>,
+    locate: L,
+}
+
+impl<L: Locate> pulp::WithSimd for Located<'_, '_, L> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(mut self, _: S) {
+        let whole = self.fill.count / BLOCK * BLOCK;
+        for start in (0..whole).step_by(BLOCK) {
+            self.fill.add::<L, BLOCK>(self.locate, start);
+        }
+        for start in whole..self.fill.count {
+            self.fill.add::<L, 1>(self.locate, start);
+        }
+    }
+}
+
+impl Fill<'_, '_> {
+    #[inline(always)]
+    fn add<L: Locate, const N: usize>(&mut self, locate: L, start: usize) {
+        let pairs = self.moved.pairs::<L, N>(locate, self.rules, start);
+        let along_target = derivatives(&pairs.lever, &pairs.normal);
+        let along_source = derivatives(&pairs.lever, &pairs.source_normal);
+        let mut lanes = [[0.0_f32; N]; SUMS];
+        let mut squares = [[0.0_f32; N]; 21];
+        let mut k = 0;
+        for r in 0..6 {
+            for l in 0..N {
+                lanes[r][l] = along_target[r][l] * pairs.weight[l] * pairs.residual[l];
+            }
+            for c in r..6 {
+                for l in 0..N {
+                    let cross = along_target[r][l] * along_source[c][l] + along_target[c][l] * along_source[r][l];
+                    lanes[6 + k][l] = 0.5 * pairs.slope[l] * cross;
+                    let score = pairs.weight[l] * pairs.residual[l];
+                    squares[k][l] = along_target[r][l] * along_target[c][l] * score * score;
+                }
+                k += 1;
+            }
+        }
+        for (sum, square) in self.independent.iter_mut().zip(&squares) {
+            *sum += f64::from(square.iter().sum::<f32>());
+        }
+        let cols = self.moved.source.projection.grid.cols;
+        let nodes = &self.moved.source.points.node[start..start + N];
+        for l in 0..N {
+            if pairs.weight[l] > 0.0 {
+                let (row, col) = (nodes[l] as usize / cols, nodes[l] as usize % cols);
+                let cell = &mut self.cells[row / self.side * self.across + col / self.side];
+                for (sum, lane) in cell.iter_mut().zip(&lanes) {
+                    *sum += f64::from(lane[l]);
+                }
+            }
+        }
+    }
+}

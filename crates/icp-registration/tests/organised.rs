@@ -1,0 +1,363 @@
+//! Registration of organised frames on simulated frames with exact truth.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout, missing_docs)]
+
+mod common;
+
+use std::sync::Arc;
+
+use common::{Cuboid, Pinhole, Scene, disturbance, frame, frame_pair, look_at, pose_error};
+use icp_registration::{
+    DegeneracyPolicy, Error, FrameAligner, FrameAlignmentOptions, IcpResult, MotionKind, OrganisedFrame, Projection,
+    align_frames, pose_difference,
+};
+use nalgebra::{Isometry3, Matrix6, Vector3};
+
+fn pinhole(camera: &Pinhole) -> Arc<Projection> {
+    let centre = [(camera.width as f64 - 1.0) / 2.0, (camera.height as f64 - 1.0) / 2.0];
+    Arc::new(Projection::pinhole(camera.width, camera.height, [camera.focal_px; 2], centre).unwrap())
+}
+
+fn prepared(projection: &Arc<Projection>, frame: &(Vec<[f64; 3]>, Vec<f32>)) -> OrganisedFrame {
+    OrganisedFrame::new(projection, &frame.0, Some(&frame.1)).unwrap()
+}
+
+fn align(source: &OrganisedFrame, target: &OrganisedFrame) -> IcpResult {
+    align_frames(source, target, &Isometry3::identity(), &FrameAlignmentOptions::default()).unwrap()
+}
+
+#[test]
+fn pairs_come_together_from_the_identity() {
+    let camera = Pinhole::medium();
+    let projection = pinhole(&camera);
+    for k in 0..4 {
+        let pair = frame_pair(&camera, k);
+        let (target, source) = (prepared(&projection, &pair.target), prepared(&projection, &pair.source));
+        let result = align(&source, &target);
+        let (mm, degrees) = pose_error(&result.target_from_source, &pair.target_from_source);
+        // Three times the median over twenty pairs (0.25 mm, 0.006 degrees).
+        assert!(mm < 0.75 && degrees < 0.018, "pair {k}: {mm} mm, {degrees} degrees");
+        assert!(result.is_trustworthy());
+        assert!(result.overlap > 0.6 && result.rms_m > 0.0);
+        let e = pose_difference(&result.target_from_source, &pair.target_from_source);
+        let squared = e.dot(&(result.covariance.try_inverse().unwrap() * e));
+        // Chi-squared with six degrees of freedom exceeds 25 once in three thousand.
+        assert!(squared < 25.0, "pair {k}: {squared}");
+    }
+}
+
+#[test]
+fn without_sigma_the_pose_is_as_good() {
+    let camera = Pinhole::medium();
+    let projection = pinhole(&camera);
+    let pair = frame_pair(&camera, 1);
+    let target = OrganisedFrame::new(&projection, &pair.target.0, None).unwrap();
+    let source = OrganisedFrame::new(&projection, &pair.source.0, None).unwrap();
+    let (mm, degrees) = pose_error(&align(&source, &target).target_from_source, &pair.target_from_source);
+    assert!(mm < 0.75 && degrees < 0.018, "{mm} mm, {degrees} degrees");
+}
+
+#[test]
+fn a_frame_on_itself_and_back_and_forth() {
+    let camera = Pinhole::small();
+    let projection = pinhole(&camera);
+    let pair = frame_pair(&camera, 2);
+    let (target, source) = (prepared(&projection, &pair.target), prepared(&projection, &pair.source));
+    let itself = align(&target, &target).target_from_source;
+    // Residuals are zero; what is left is rounding in single precision at 3 m.
+    assert!(itself.translation.vector.norm() < 1e-6 && itself.rotation.angle() < 1e-6, "{itself}");
+    let there = align(&source, &target);
+    let back = align(&target, &source).target_from_source;
+    let (mm, degrees) = pose_error(&there.target_from_source, &back.inverse());
+    // Both answers err by about the same; they share the noise.
+    assert!(mm < 1.0 && degrees < 0.02, "{mm} mm, {degrees} degrees");
+}
+
+#[test]
+fn the_bits_do_not_depend_on_the_number_of_threads() {
+    let camera = Pinhole::large();
+    let projection = pinhole(&camera);
+    let pair = frame_pair(&camera, 3);
+    let run = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| align(&prepared(&projection, &pair.source), &prepared(&projection, &pair.target)))
+    };
+    let one = run(1);
+    assert_eq!(one, run(2));
+    assert_eq!(one, run(5));
+    assert!(one.is_trustworthy());
+}
+
+#[test]
+fn a_frame_that_is_used_again_answers_as_a_new_one() {
+    let camera = Pinhole::small();
+    let projection = pinhole(&camera);
+    let mut aligner = FrameAligner::new(FrameAlignmentOptions::default()).unwrap();
+    let (first, second) = (frame_pair(&camera, 4), frame_pair(&camera, 5));
+    let mut target = prepared(&projection, &first.target);
+    let mut source = prepared(&projection, &first.source);
+    aligner.align(&source, &target, &Isometry3::identity()).unwrap();
+    target.update(&second.target.0, Some(&second.target.1)).unwrap();
+    source.update(&second.source.0, Some(&second.source.1)).unwrap();
+    let again = aligner.align(&source, &target, &Isometry3::identity()).unwrap();
+    assert_eq!(again, align(&prepared(&projection, &second.source), &prepared(&projection, &second.target)));
+}
+
+/// A frame of an otherwise empty world made of boxes.
+fn world(boxes: Vec<Cuboid>, pose: &Isometry3<f64>, seed: u64) -> (Vec<[f64; 3]>, Vec<f32>) {
+    let scene = Scene { room: Cuboid::new([-60.0; 3], [60.0; 3]), boxes };
+    let (mut points, sigma) = frame(&scene, &Pinhole::medium(), pose, 1.0, seed);
+    for p in &mut points {
+        // Out of reach.
+        if p[2] < -20.0 {
+            *p = [f64::NAN; 3];
+        }
+    }
+    (points, sigma)
+}
+
+fn degenerate(
+    boxes: fn() -> Vec<Cuboid>,
+    options: &FrameAlignmentOptions,
+    guess: &Isometry3<f64>,
+    seed: u64,
+) -> IcpResult {
+    let projection = pinhole(&Pinhole::medium());
+    let camera = look_at([0.0, 0.0, 1.3], [3.0, 0.4, 0.9]);
+    let moved = camera * disturbance(0.05, 2.0, 50 + seed);
+    let target = prepared(&projection, &world(boxes(), &camera, 2 * seed));
+    let source = prepared(&projection, &world(boxes(), &moved, 2 * seed + 1));
+    align_frames(&source, &target, guess, options).unwrap()
+}
+
+fn wall() -> Vec<Cuboid> {
+    vec![Cuboid::new([3.0, -50.0, -50.0], [4.0, 50.0, 50.0])]
+}
+
+fn wall_and_floor() -> Vec<Cuboid> {
+    vec![Cuboid::new([3.0, -50.0, -50.0], [4.0, 50.0, 50.0]), Cuboid::new([-50.0, -50.0, -1.0], [50.0, 50.0, 0.0])]
+}
+
+fn corridor() -> Vec<Cuboid> {
+    vec![
+        Cuboid::new([-50.0, 1.0, -50.0], [50.0, 2.0, 50.0]),
+        Cuboid::new([-50.0, -2.0, -50.0], [50.0, -1.0, 50.0]),
+        Cuboid::new([-50.0, -50.0, -1.0], [50.0, 50.0, 0.0]),
+    ]
+}
+
+#[test]
+fn undetermined_motions_are_named_every_time() {
+    for seed in 0..8 {
+        for (name, boxes, slides, turns) in [
+            ("wall", wall as fn() -> Vec<Cuboid>, 2, 1),
+            ("wall and floor", wall_and_floor, 1, 0),
+            ("corridor", corridor, 1, 0),
+        ] {
+            let result = degenerate(boxes, &FrameAlignmentOptions::default(), &Isometry3::identity(), seed);
+            let count = |kind| result.degenerate.iter().filter(|m| m.kind == kind).count();
+            let found = (count(MotionKind::Translation), count(MotionKind::Rotation));
+            assert_eq!(found, (slides, turns), "{name}, seed {seed}: {:?}", result.degenerate);
+            assert!(!result.is_trustworthy());
+        }
+    }
+}
+
+#[test]
+fn a_held_motion_keeps_the_guess_and_its_covariance() {
+    let prior = Matrix6::from_diagonal(&nalgebra::Vector6::new(1e-4, 1e-4, 1e-4, 4e-4, 4e-4, 4e-4));
+    let options = FrameAlignmentOptions {
+        degeneracy: DegeneracyPolicy::HoldAtGuess,
+        prior: Some(prior),
+        ..FrameAlignmentOptions::default()
+    };
+    let camera = look_at([0.0, 0.0, 1.3], [3.0, 0.4, 0.9]);
+    for seed in 0..4 {
+        let truth = disturbance(0.05, 2.0, 50 + seed);
+        // Two guesses that differ by 7 mm along the edge of wall and floor.
+        let along = camera.rotation.inverse() * Vector3::y();
+        let shifted =
+            |metre: f64| Isometry3::from_parts((truth.translation.vector + along * metre).into(), truth.rotation);
+        let [a, b] = [0.0, 0.007].map(|metre| degenerate(wall_and_floor, &options, &shifted(metre), seed));
+        let kept = (b.target_from_source.translation.vector - a.target_from_source.translation.vector).dot(&along);
+        // The direction of the edge is known to about a milliradian; it is held to first order.
+        assert!((kept - 0.007).abs() < 3e-4, "{kept}");
+        let (mm, _) = pose_error(&a.target_from_source, &truth);
+        assert!(mm < 3.0, "{mm} mm");
+        let block = a.covariance.fixed_view::<3, 3>(0, 0);
+        let sigma = along.dot(&(block * along)).sqrt();
+        // That of the prior: the frames say nothing.
+        assert!((0.008..0.0105).contains(&sigma), "{sigma}");
+    }
+}
+
+/// Directions of a camera with barrel distortion.
+fn distorted(camera: &Pinhole) -> Vec<[f64; 3]> {
+    (0..camera.width * camera.height)
+        .map(|k| {
+            let ray = camera.ray(k % camera.width, k / camera.width);
+            let (u, v) = (-ray.x / ray.z, -ray.y / ray.z);
+            let r2 = u * u + v * v;
+            let scale = 1.0 + 0.25 * r2 - 0.05 * r2 * r2;
+            [2.0 * u * scale, 2.0 * v * scale, -2.0]
+        })
+        .collect()
+}
+
+#[test]
+fn a_table_finds_the_pixels_of_a_distorted_camera() {
+    let camera = Pinhole::small();
+    let directions = distorted(&camera);
+    let projection = Projection::from_directions(camera.width, camera.height, &directions).unwrap();
+    for (k, d) in directions.iter().enumerate() {
+        let [col, row] = projection.pixel(&(nalgebra::Point3::from(*d) * 1.7)).unwrap();
+        let off = (col - (k % camera.width) as f64).hypot(row - (k / camera.width) as f64);
+        // Bilinear reading of a table with one entry a pixel.
+        assert!(off < 0.01, "pixel {k}: {off}");
+    }
+    assert!(projection.pixel(&nalgebra::Point3::new(0.0, 0.0, 1.0)).is_none());
+    assert!(projection.pixel(&nalgebra::Point3::new(5.0, 0.0, -1.0)).is_none());
+    assert!(projection.pixel(&nalgebra::Point3::new(f64::NAN, 0.0, -1.0)).is_none());
+}
+
+#[test]
+fn frames_of_a_distorted_camera_come_together() {
+    let camera = Pinhole::medium();
+    let directions = distorted(&camera);
+    let projection = Arc::new(Projection::from_directions(camera.width, camera.height, &directions).unwrap());
+    let scene = Scene::furnished();
+    let world_from_target = look_at([0.8, -0.5, 1.4], [-2.0, 1.4, 0.6]);
+    let truth = disturbance(0.1, 4.0, 77);
+    let seen = |pose: Isometry3<f64>| -> Vec<[f64; 3]> {
+        directions
+            .iter()
+            .map(|d| {
+                let ray = Vector3::from(*d).normalize();
+                (ray * scene.range(&pose.translation.vector, &(pose.rotation * ray))).into()
+            })
+            .collect()
+    };
+    let target = OrganisedFrame::new(&projection, &seen(world_from_target), None).unwrap();
+    let source = OrganisedFrame::new(&projection, &seen(world_from_target * truth), None).unwrap();
+    let (mm, degrees) = pose_error(&align(&source, &target).target_from_source, &truth);
+    // Without noise; creases are rounded by nodes of 2 x 2 pixels, 3 cm at 3 m.
+    assert!(mm < 0.5 && degrees < 0.01, "{mm} mm, {degrees} degrees");
+}
+
+#[test]
+fn the_rays_of_a_pinhole_are_recognised() {
+    let camera = Pinhole::small();
+    let directions: Vec<[f64; 3]> =
+        (0..camera.width * camera.height).map(|k| camera.ray(k % camera.width, k / camera.width).into()).collect();
+    let from_rays = Arc::new(Projection::from_directions(camera.width, camera.height, &directions).unwrap());
+    let pair = frame_pair(&camera, 6);
+    let result = align(&prepared(&from_rays, &pair.source), &prepared(&from_rays, &pair.target));
+    let exact = pinhole(&camera);
+    let expected = align(&prepared(&exact, &pair.source), &prepared(&exact, &pair.target));
+    let (mm, degrees) = pose_error(&result.target_from_source, &expected.target_from_source);
+    // Rounding of the rays.
+    assert!(mm < 1e-2 && degrees < 1e-3, "{mm} mm, {degrees} degrees");
+}
+
+#[test]
+fn the_scale_of_the_scene_does_not_matter() {
+    let camera = Pinhole::small();
+    let projection = pinhole(&camera);
+    let pair = frame_pair(&camera, 7);
+    let expected = align(&prepared(&projection, &pair.source), &prepared(&projection, &pair.target));
+    for scale in [1e-3, 1e6] {
+        let scaled = |f: &(Vec<[f64; 3]>, Vec<f32>)| {
+            let points = f.0.iter().map(|p| p.map(|v| v * scale)).collect();
+            prepared(&projection, &(points, f.1.iter().map(|s| s * scale as f32).collect()))
+        };
+        let found = align(&scaled(&pair.source), &scaled(&pair.target)).target_from_source;
+        let unscaled = Isometry3::from_parts((found.translation.vector / scale).into(), found.rotation);
+        let (mm, degrees) = pose_error(&unscaled, &expected.target_from_source);
+        // Single precision, and a last step below the tolerance.
+        assert!(mm < 0.02 && degrees < 1e-3, "{scale}: {mm} mm, {degrees} degrees");
+    }
+}
+
+#[test]
+fn input_without_an_answer_gets_a_typed_error() {
+    let camera = Pinhole::small();
+    let (w, h) = (camera.width, camera.height);
+    let projection = pinhole(&camera);
+    let pair = frame_pair(&camera, 0);
+    let good = prepared(&projection, &pair.target);
+    let options = FrameAlignmentOptions::default();
+    let identity = Isometry3::identity();
+
+    let nothing = OrganisedFrame::new(&projection, &vec![[f64::NAN; 3]; w * h], None).unwrap();
+    assert!(nothing.is_empty());
+    assert!(matches!(align_frames(&nothing, &good, &identity, &options), Err(Error::TooFewPoints { .. })));
+    assert!(matches!(align_frames(&good, &nothing, &identity, &options), Err(Error::TooFewPoints { .. })));
+    let mut one = vec![[f64::NAN; 3]; w * h];
+    one[w * h / 2] = pair.target.0[w * h / 2];
+    let one = OrganisedFrame::new(&projection, &one, None).unwrap();
+    assert!(matches!(align_frames(&one, &good, &identity, &options), Err(Error::TooFewPoints { .. })));
+
+    let short = OrganisedFrame::new(&projection, &pair.target.0[1..], None);
+    assert!(matches!(short, Err(Error::LengthMismatch { .. })));
+    let short = OrganisedFrame::new(&projection, &pair.target.0, Some(&pair.target.1[1..]));
+    assert!(matches!(short, Err(Error::LengthMismatch { .. })));
+    // The computer-vision frame: z forwards.
+    let forwards: Vec<[f64; 3]> = pair.target.0.iter().map(|p| [p[0], -p[1], -p[2]]).collect();
+    assert!(matches!(OrganisedFrame::new(&projection, &forwards, None), Err(Error::PointsOffRays { .. })));
+    let infinite = OrganisedFrame::new(&projection, &vec![[f64::INFINITY; 3]; w * h], None).unwrap();
+    assert!(infinite.is_empty());
+
+    let nan = Isometry3::translation(f64::NAN, 0.0, 0.0);
+    assert!(matches!(align_frames(&good, &good, &nan, &options), Err(Error::NonFinite { .. })));
+    for away in [Isometry3::translation(0.0, 0.0, 1e3), Isometry3::rotation(Vector3::y() * 3.0)] {
+        assert!(matches!(align_frames(&good, &good, &away, &options), Err(Error::TooFewCorrespondences { .. })));
+    }
+
+    assert!(Projection::pinhole(0, 10, [100.0; 2], [5.0; 2]).is_err());
+    assert!(Projection::pinhole(usize::MAX, 10, [100.0; 2], [5.0; 2]).is_err());
+    assert!(Projection::pinhole(10, 10, [f64::NAN, 100.0], [5.0; 2]).is_err());
+    assert!(Projection::pinhole(10, 10, [100.0; 2], [f64::INFINITY; 2]).is_err());
+    let rays = |ray: [f64; 3]| Projection::from_directions(10, 10, &[ray; 100]);
+    assert!(matches!(rays([0.0, 0.0, -1.0]), Err(Error::DegenerateRay { .. })));
+    assert!(matches!(rays([0.0, 0.0, 1.0]), Err(Error::DegenerateRay { .. })));
+    assert!(matches!(rays([0.0; 3]), Err(Error::DegenerateRay { .. })));
+    assert!(matches!(rays([f64::NAN; 3]), Err(Error::NonFinite { .. })));
+    assert!(matches!(Projection::from_directions(10, 10, &[]), Err(Error::LengthMismatch { .. })));
+    for options in [
+        FrameAlignmentOptions { levels: 0, ..options.clone() },
+        FrameAlignmentOptions { levels: 5, ..options.clone() },
+        FrameAlignmentOptions { max_iterations: 0, ..options.clone() },
+        FrameAlignmentOptions { min_correspondences: 0, ..options.clone() },
+        FrameAlignmentOptions { max_motion_sigma_m: Some(f64::NAN), ..options.clone() },
+        FrameAlignmentOptions { step_tolerance_m: Some(0.0), ..options.clone() },
+        FrameAlignmentOptions { max_normal_angle_rad: -1.0, ..options.clone() },
+        FrameAlignmentOptions { prior: Some(Matrix6::zeros()), ..options.clone() },
+        FrameAlignmentOptions { prior: Some(Matrix6::from_element(f64::NAN)), ..options.clone() },
+    ] {
+        assert!(FrameAligner::new(options).is_err());
+    }
+}
+
+#[test]
+fn the_cloud_of_a_frame_lies_on_its_surfaces() {
+    let camera = Pinhole::small();
+    let projection = pinhole(&camera);
+    let scene = Scene::furnished();
+    let pose = look_at([0.8, -0.5, 1.4], [-2.0, 1.4, 0.6]);
+    let cloud = prepared(&projection, &frame(&scene, &camera, &pose, 0.0, 1)).to_cloud();
+    let (normals, rim) = (cloud.normals.as_ref().unwrap(), cloud.rim.as_ref().unwrap());
+    let (mut kept, mut off) = (0, 0);
+    for (k, p) in cloud.points.iter().enumerate() {
+        if rim[k] {
+            assert!(normals[k].x.is_nan() && cloud.sigma.as_ref().unwrap()[k].is_nan());
+            continue;
+        }
+        kept += 1;
+        let range = scene.range(&pose.translation.vector, &(pose.rotation * p.coords.normalize()));
+        // Averages over squares of pixels round creases by a fraction of their size, 3 cm.
+        off += usize::from((p.coords.norm() - range).abs() > 0.01);
+        assert!(normals[k].dot(&p.coords) < 0.0 && (normals[k].norm() - 1.0).abs() < 1e-12);
+    }
+    // Squares across a jump can look like a steep plane.
+    assert!(off * 200 < kept, "{off} of {kept}");
+    assert!(kept > cloud.len() / 2);
+}

@@ -156,6 +156,20 @@ pub enum Error {
         /// Index of such a point, row by row.
         index: usize,
     },
+    /// No pose of two clouds passed the verification.
+    #[error(
+        "no alignment found: {what} {found:.3}, at least {needed:.3} is needed ({correspondences} correspondences)"
+    )]
+    NoAlignment {
+        /// What the best pose lacks.
+        what: &'static str,
+        /// What it has.
+        found: f64,
+        /// What it would need.
+        needed: f64,
+        /// Correspondences between the clouds.
+        correspondences: usize,
+    },
 }
 
 /// Result of this crate.

@@ -2,6 +2,7 @@
 
 mod absolute_orientation;
 mod cloud;
+mod coarse;
 mod eigen;
 mod error;
 mod icp;
@@ -16,6 +17,10 @@ mod tracking;
 
 pub use absolute_orientation::{Orientation, Similarity, absolute_orientation, absolute_orientation_with_scale};
 pub use cloud::Cloud;
+pub use coarse::{
+    CoarseAlignment, CoarseOptions, Estimator, FeatureCloud, Features, Matching, SurfaceDescriptors, SurfaceRadii,
+    Viewpoint, align_without_guess,
+};
 pub use error::{Error, Result};
 pub use icp::{
     DegeneracyPolicy, IcpOptions, IcpResult, IcpTarget, Metric, MotionKind, Selection, StopReason, UndeterminedMotion,

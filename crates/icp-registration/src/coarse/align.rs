@@ -1,0 +1,242 @@
+//! From correspondences to hypotheses to the pose that the clouds agree with.
+
+use std::borrow::Cow;
+
+use nalgebra::Isometry3;
+use rayon::prelude::*;
+
+use super::correspondences::{Correspondences, Tolerance};
+use super::feature_cloud::FeatureCloud;
+use super::features::Features;
+use super::graph::ConsistencyGraph;
+use super::judge::Verdict;
+use super::matching::{Match, matches};
+use super::options::{CoarseOptions, Estimator};
+use super::ransac::consistent_samples;
+use super::refine::refine;
+use crate::error::{Error, Result};
+
+/// Correspondences that enter the graph, those with the most alike descriptors.
+const MOST_CORRESPONDENCES: usize = 2500;
+/// Cliques or samples that poses are computed from.
+const MOST_CANDIDATES: usize = 200;
+/// Of the sampled points, one in this many ranks the candidates.
+const RANKING_STRIDE: usize = 3;
+/// Largest difference of the cosines of normals at which two correspondences agree.
+const COSINE_TOLERANCE: f32 = 0.25;
+/// Poses closer than this are one, voxels.
+const SAME_POSE_VOXELS: f64 = 4.0;
+/// Smallest eigenvalue of the refined normal matrix at which a pose counts as determined: one wall has about 0.001 from
+/// noise, a wall and a floor as much.
+const LEAST_DETERMINED: f64 = 0.004;
+
+/// An alignment without a guess that passed the verification.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CoarseAlignment {
+    /// Pose: `target = target_from_source * source`, good to a fraction of a voxel: a start for [`crate::align`].
+    pub target_from_source: Isometry3<f64>,
+    /// Correspondences that agree with the pose.
+    pub inliers: usize,
+    /// Correspondences that were found.
+    pub correspondences: usize,
+    /// Fraction of the cloud that overlaps more which has a partner in the other.
+    pub overlap: f64,
+    /// Fraction of the points that the other camera should have seen which lie on its surface.
+    pub agreement: f64,
+    /// Score of the best pose that differs, as a fraction of the winner's: near 1 the scene is ambiguous.
+    pub rival: f64,
+    /// Root mean square distance of partners across the surface, metre.
+    pub rms_m: f64,
+    /// Smallest eigenvalue of the normal matrix of partners a pair, rotations in units of their radius: how well the
+    /// surfaces determine the pose.
+    pub determined: f64,
+    /// Edge of the voxels in use, metre.
+    pub voxel_m: f64,
+}
+
+/// Aligns two clouds about which nothing is known.
+///
+/// Features that are each other's most alike give correspondences; sets of them that agree give poses, the best of which
+/// are refined on the averaged points and judged by partners on the surface and by points that lie in space which the
+/// other camera looked through. Clouds with different voxels are brought to the coarser one.
+///
+/// # Errors
+/// [`Error::NoAlignment`] where no pose passes: no overlap, too little structure, or two poses that fit equally well.
+/// [`Error::InvalidOption`].
+pub fn align_without_guess(
+    source: &FeatureCloud,
+    target: &FeatureCloud,
+    options: &CoarseOptions,
+) -> Result<CoarseAlignment> {
+    options.validate()?;
+    let (source, target) = with_common_voxels(source, target, options)?;
+    let (source, target) = (source.as_ref(), target.as_ref());
+    let correspondences = correspondences(source, target, options);
+    let voxel_m = target.voxel_m();
+    let tolerance = Tolerance { distance: (options.tolerance_voxels * voxel_m) as f32, cosine: COSINE_TOLERANCE };
+    let candidates = candidates(&correspondences, tolerance, options);
+    let ranked = ranked(source, target, candidates, options.max_hypotheses);
+    let verified: Vec<Hypothesis> = ranked
+        .par_iter()
+        .map(|pose| {
+            let refined = refine(source, target, pose);
+            let verdict = Verdict::new(source, target, &refined.pose, 1);
+            Hypothesis { pose: refined.pose, verdict, determined: refined.determined, rms_m: refined.rms_m }
+        })
+        .collect();
+    let (winner, rival) = best_two(&verified, voxel_m, source).ok_or(Error::NoAlignment {
+        what: "consistent correspondences",
+        found: 0.0,
+        needed: options.min_inliers as f64,
+        correspondences: correspondences.len(),
+    })?;
+    let alignment = CoarseAlignment {
+        target_from_source: target.between_frames(source, &winner.pose),
+        inliers: correspondences.inliers(&winner.pose, tolerance).len(),
+        correspondences: correspondences.len(),
+        overlap: winner.verdict.overlap(),
+        agreement: winner.verdict.agreement(),
+        rival: rival / winner.verdict.score().max(f64::MIN_POSITIVE),
+        rms_m: winner.rms_m,
+        determined: winner.determined,
+        voxel_m,
+    };
+    check(alignment, options)
+}
+
+/// A refined pose between the clouds' middles.
+struct Hypothesis {
+    pose: Isometry3<f64>,
+    verdict: Verdict,
+    determined: f64,
+    rms_m: f64,
+}
+
+fn with_common_voxels<'a>(
+    source: &'a FeatureCloud,
+    target: &'a FeatureCloud,
+    options: &CoarseOptions,
+) -> Result<(Cow<'a, FeatureCloud>, Cow<'a, FeatureCloud>)> {
+    let (a, b) = (source.voxel_m(), target.voxel_m());
+    if a < 0.999 * b {
+        Ok((Cow::Owned(source.coarsened(b, options)?), Cow::Borrowed(target)))
+    } else if b < 0.999 * a {
+        Ok((Cow::Borrowed(source), Cow::Owned(target.coarsened(a, options)?)))
+    } else {
+        Ok((Cow::Borrowed(source), Cow::Borrowed(target)))
+    }
+}
+
+/// Mutual matches of all kinds of descriptors, the most alike first of each kind.
+fn correspondences(source: &FeatureCloud, target: &FeatureCloud, options: &CoarseOptions) -> Correspondences {
+    let mut all = Correspondences::default();
+    let kinds = source.surface_features.len() + source.added.len();
+    let share = MOST_CORRESPONDENCES / kinds.max(1);
+    for (s, t) in source.surface_features.iter().zip(&target.surface_features) {
+        let mut found = matches(&s.descriptors, &t.descriptors, options.matching, options.max_ratio);
+        most_alike(&mut found, share);
+        for m in found {
+            let (i, j) = (m.source as usize, m.target as usize);
+            all.push((s.points[i], s.normals[i]), (t.points[j], t.normals[j]), m.likeness);
+        }
+    }
+    for (s, t) in source.added.iter().zip(&target.added) {
+        let mut found = matches(&s.table, &t.table, options.matching, options.max_ratio);
+        most_alike(&mut found, share);
+        for m in found {
+            let (from, to) = (placed(source, s, m.source), placed(target, t, m.target));
+            all.push(from, to, m.likeness);
+        }
+    }
+    all
+}
+
+fn most_alike(matches: &mut Vec<Match>, count: usize) {
+    matches.sort_by(|a, b| b.likeness.total_cmp(&a.likeness));
+    matches.truncate(count);
+}
+
+/// An added feature about the cloud's middle with the normal of the surface there.
+fn placed(cloud: &FeatureCloud, features: &Features, index: u32) -> ([f32; 3], [f32; 3]) {
+    let relative = features.points[index as usize].coords - cloud.reduced.middle;
+    let point = [relative.x as f32, relative.y as f32, relative.z as f32];
+    let normal = cloud.labels[0].near(point).map_or([f32::NAN; 3], |near| cloud.normals.vectors[near]);
+    (point, if cloud.normals.sided { normal } else { [f32::NAN; 3] })
+}
+
+/// Poses of sets of correspondences that agree, each fitted again to all that agree with it.
+fn candidates(correspondences: &Correspondences, tolerance: Tolerance, options: &CoarseOptions) -> Vec<Isometry3<f64>> {
+    let arm = 2.0 * tolerance.distance;
+    let sets = match options.estimator {
+        Estimator::ConsistencyGraph => ConsistencyGraph::new(correspondences, tolerance).cliques(MOST_CANDIDATES),
+        Estimator::Ransac { samples } => {
+            consistent_samples(correspondences, tolerance, arm, samples, MOST_CANDIDATES, options.seed)
+        }
+    };
+    sets.par_iter()
+        .filter_map(|set| {
+            let first = correspondences.solve(set, arm)?;
+            let inliers = correspondences.inliers(&first, tolerance);
+            let again = if inliers.len() < 3 { None } else { correspondences.solve(&inliers, arm) };
+            Some(again.unwrap_or(first))
+        })
+        .collect()
+}
+
+/// The poses with the best scores, each different from those before.
+fn ranked(
+    source: &FeatureCloud,
+    target: &FeatureCloud,
+    candidates: Vec<Isometry3<f64>>,
+    count: usize,
+) -> Vec<Isometry3<f64>> {
+    let mut scored: Vec<(f64, Isometry3<f64>)> = candidates
+        .into_par_iter()
+        .map(|pose| (Verdict::new(source, target, &pose, RANKING_STRIDE).score(), pose))
+        .collect();
+    scored.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let mut kept: Vec<Isometry3<f64>> = Vec::new();
+    for (_, pose) in scored {
+        if !kept.iter().any(|other| is_same(other, &pose, target.voxel_m(), source)) {
+            kept.push(pose);
+        }
+        if kept.len() == count {
+            break;
+        }
+    }
+    kept
+}
+
+/// Whether two poses move no part of the source by more than a few voxels against each other.
+fn is_same(a: &Isometry3<f64>, b: &Isometry3<f64>, voxel_m: f64, source: &FeatureCloud) -> bool {
+    let apart = (a.translation.vector - b.translation.vector).norm();
+    let turned = a.rotation.angle_to(&b.rotation) * source.radius_m;
+    apart + turned <= SAME_POSE_VOXELS * voxel_m
+}
+
+/// The hypothesis with the best score, and the best score among those that differ from it.
+fn best_two<'a>(verified: &'a [Hypothesis], voxel_m: f64, source: &FeatureCloud) -> Option<(&'a Hypothesis, f64)> {
+    let mut order: Vec<&Hypothesis> = verified.iter().collect();
+    order.sort_by(|a, b| b.verdict.score().total_cmp(&a.verdict.score()));
+    let winner = *order.first()?;
+    // Refined poses of one basin may end a little apart.
+    let rival = order.iter().find(|h| !is_same(&h.pose, &winner.pose, 2.0 * voxel_m, source));
+    Some((winner, rival.map_or(0.0, |h| h.verdict.score().max(0.0))))
+}
+
+fn check(found: CoarseAlignment, options: &CoarseOptions) -> Result<CoarseAlignment> {
+    let least = [
+        ("inliers", found.inliers as f64, options.min_inliers as f64),
+        ("overlap", found.overlap, options.min_overlap),
+        ("agreement", found.agreement, options.min_agreement),
+        ("geometry", found.determined, LEAST_DETERMINED),
+        // The largest ratio allowed, seen from the other side.
+        ("lead over the rival", 1.0 - found.rival, 1.0 - options.max_rival),
+    ];
+    for (what, value, needed) in least {
+        if value < needed {
+            return Err(Error::NoAlignment { what, found: value, needed, correspondences: found.correspondences });
+        }
+    }
+    Ok(found)
+}

@@ -1,0 +1,119 @@
+//! Graph of the correspondences that agree with each other, and poses from its cliques.
+//!
+//! True correspondences all agree with each other; false ones agree by chance. Each clique found by greedy growth from a
+//! seed stands for a pose `[Yang2021]`; many cliques, not the largest one alone, are kept `[Zhang2023]`, for in rooms the
+//! largest is often that of a wall slid along itself. Seeds and growth are ranked by the number of
+//! common neighbours of two correspondences.
+// Only what is inlined is compiled for wide registers.
+#![allow(clippy::inline_always)]
+
+use rayon::prelude::*;
+
+use super::correspondences::{Correspondences, Tolerance};
+
+/// Fewest members of a clique.
+const LEAST_MEMBERS: usize = 3;
+
+/// Rows of bits: bit j of row i is set where i and j agree.
+pub(super) struct ConsistencyGraph {
+    words: usize,
+    rows: Vec<u64>,
+}
+
+impl ConsistencyGraph {
+    pub(super) fn new(correspondences: &Correspondences, tolerance: Tolerance) -> Self {
+        let count = correspondences.len();
+        let words = count.div_ceil(64).max(1);
+        let mut rows = vec![0; count * words];
+        rows.par_chunks_mut(words).with_min_len(64).enumerate().for_each(|(i, row)| {
+            pulp::Arch::new().dispatch(Row { correspondences, tolerance, i, row });
+        });
+        Self { words, rows }
+    }
+
+    fn len(&self) -> usize {
+        self.rows.len() / self.words
+    }
+
+    fn row(&self, i: usize) -> &[u64] {
+        &self.rows[i * self.words..(i + 1) * self.words]
+    }
+
+    fn common(&self, i: usize, j: usize) -> u32 {
+        self.row(i).iter().zip(self.row(j)).map(|(a, b)| (a & b).count_ones()).sum()
+    }
+
+    /// Maximal cliques from at most `count` seeds, those with most support first; a member of one clique is no seed of
+    /// another.
+    pub(super) fn cliques(&self, count: usize) -> Vec<Vec<u32>> {
+        let mut seeds: Vec<(u64, u32)> = (0..self.len())
+            .into_par_iter()
+            .with_min_len(32)
+            .map(|i| (members(self.row(i)).map(|j| u64::from(self.common(i, j))).sum(), i as u32))
+            .collect();
+        seeds.sort_unstable_by(|a, b| b.0.cmp(&a.0).then(a.1.cmp(&b.1)));
+        let mut covered = vec![false; self.len()];
+        let mut cliques = Vec::new();
+        for (_, seed) in seeds.into_iter().take_while(|seed| seed.0 > 0) {
+            if covered[seed as usize] {
+                continue;
+            }
+            let clique = self.grow(seed as usize);
+            for &member in &clique {
+                covered[member as usize] = true;
+            }
+            if clique.len() >= LEAST_MEMBERS {
+                cliques.push(clique);
+            }
+            if cliques.len() == count {
+                break;
+            }
+        }
+        cliques
+    }
+
+    fn grow(&self, seed: usize) -> Vec<u32> {
+        let mut ranked: Vec<(u32, u32)> = members(self.row(seed)).map(|j| (self.common(seed, j), j as u32)).collect();
+        ranked.sort_unstable_by(|a, b| b.0.cmp(&a.0).then(a.1.cmp(&b.1)));
+        let mut allowed = self.row(seed).to_vec();
+        let mut clique = vec![seed as u32];
+        for (_, j) in ranked {
+            let j = j as usize;
+            if allowed[j / 64] >> (j % 64) & 1 == 1 {
+                clique.push(j as u32);
+                for (left, row) in allowed.iter_mut().zip(self.row(j)) {
+                    *left &= row;
+                }
+            }
+        }
+        clique
+    }
+}
+
+struct Row<'a> {
+    correspondences: &'a Correspondences,
+    tolerance: Tolerance,
+    i: usize,
+    row: &'a mut [u64],
+}
+
+impl pulp::NullaryFnOnce for Row<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let count = self.correspondences.len();
+        for (word, bits) in self.row.iter_mut().enumerate() {
+            for j in 64 * word..count.min(64 * word + 64) {
+                *bits |= u64::from(self.correspondences.agree(self.i, j, self.tolerance)) << (j % 64);
+            }
+        }
+    }
+}
+
+fn members(row: &[u64]) -> impl Iterator<Item = usize> + '_ {
+    row.iter().enumerate().flat_map(|(word, &bits)| {
+        std::iter::successors((bits != 0).then_some(bits), |b| Some(b & (b - 1)).filter(|b| *b != 0))
+            .map(move |b| 64 * word + b.trailing_zeros() as usize)
+    })
+}

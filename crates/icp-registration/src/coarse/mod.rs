@@ -1,0 +1,27 @@
+//! Alignment of two clouds without a guess: descriptors, correspondences, consistent sets, verification.
+
+mod align;
+mod cells;
+mod correspondences;
+mod descriptors;
+mod feature_cloud;
+mod features;
+mod fpfh;
+mod graph;
+mod judge;
+mod labels;
+mod matching;
+mod options;
+mod ransac;
+mod reduced;
+mod refine;
+mod rsd;
+mod surface;
+mod surroundings;
+mod view;
+
+pub use align::{CoarseAlignment, align_without_guess};
+pub use feature_cloud::FeatureCloud;
+pub use features::Features;
+pub use options::{CoarseOptions, Estimator, Matching, SurfaceDescriptors, Viewpoint};
+pub use rsd::SurfaceRadii;

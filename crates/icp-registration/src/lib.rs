@@ -37,4 +37,7 @@ pub use neighbours::{Neighbour, NeighbourTree};
 pub use normals::{OrganisedNormalOptions, UnorganisedNormalOptions, organised_normals, unorganised_normals};
 pub use organised::{FrameAligner, FrameAlignmentOptions, OrganisedFrame, Projection, align_frames};
 pub use pose::{inverse_covariance_transport, pose_difference, step_pose};
-pub use tracking::{ImuIntegrator, ImuOptions, InertialSample, MotionPrior};
+pub use tracking::{
+    Fusion, ImuIntegrator, ImuOptions, InertialSample, LossReason, MotionPrior, Relocalisation, TrackedPose, Tracker,
+    TrackerOptions, TrackingState,
+};

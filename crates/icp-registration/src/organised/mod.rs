@@ -3,6 +3,7 @@
 mod aligner;
 mod frame;
 mod grid;
+mod map;
 mod nodes;
 mod options;
 mod pairs;
@@ -14,5 +15,6 @@ mod table;
 
 pub use aligner::{FrameAligner, align_frames};
 pub use frame::OrganisedFrame;
+pub(crate) use map::{Agreement, thumbnail_difference};
 pub use options::FrameAlignmentOptions;
 pub use projection::Projection;

@@ -3,7 +3,7 @@
 //! `RAYON_NUM_THREADS=1 cargo run --release -p icp-registration --example track_sequence -- [option=value ..]`
 //!
 //! Options: `folder` (of the real sequence), `keyframe_overlap`, `loop_edges`, `max_keyframes`, `levels`,
-//! `fusion=off`, `step_tolerance_m`, `every=1` (a line a frame).
+//! `fusion=off`, `step_tolerance_m`, `max_motion_sigma_m`, `every=1` (a line a frame).
 #![allow(
     missing_docs,
     clippy::unwrap_used,
@@ -58,6 +58,7 @@ fn options() -> TrackerOptions {
     options.loop_edges = argument("loop_edges").unwrap_or(options.loop_edges);
     options.max_keyframes = argument("max_keyframes").unwrap_or(options.max_keyframes);
     options.alignment.levels = argument("levels").unwrap_or(options.alignment.levels);
+    options.alignment.max_motion_sigma_m = argument("max_motion_sigma_m").or(options.alignment.max_motion_sigma_m);
     options.alignment.step_tolerance_m = argument("step_tolerance_m").or(options.alignment.step_tolerance_m);
     if argument::<String>("fusion").is_some_and(|fusion| fusion == "off") {
         options.fusion = Fusion::Off;
@@ -82,7 +83,11 @@ fn track(
         if argument::<usize>("every").is_some() {
             println!(
                 "{k} {:?} keyframe {} overlap {:.3} rms {:.2} mm {:.2} ms",
-                pose.state, pose.keyframe, pose.overlap, 1e3 * pose.rms_m, times[k]
+                pose.state,
+                pose.keyframe,
+                pose.overlap,
+                1e3 * pose.rms_m,
+                times[k]
             );
         }
     }
@@ -98,11 +103,18 @@ fn report(name: &str, tracker: &Tracker, times: &mut [f64], truth: &[Isometry3<f
         let (metre, radian) = relative_error(estimate, truth, 1);
         format!(
             "ATE {:.2} mm (largest {:.2}), RPE {:.2} mm {:.3} deg a frame",
-            1e3 * rms, 1e3 * largest, 1e3 * metre, radian.to_degrees()
+            1e3 * rms,
+            1e3 * largest,
+            1e3 * metre,
+            radian.to_degrees()
         )
     };
-    println!("{name}: {} frames, {lost} lost, {} keyframes, {} registrations between them",
-        online.len(), tracker.keyframes(), tracker.registrations());
+    println!(
+        "{name}: {} frames, {lost} lost, {} keyframes, {} registrations between them",
+        online.len(),
+        tracker.keyframes(),
+        tracker.registrations()
+    );
     println!("  as tracked: {}", errors(&poses(online)));
     println!("  adjusted:   {}", errors(&adjusted));
     let in_world: Vec<TrackedPose> = online.to_vec();
@@ -112,7 +124,10 @@ fn report(name: &str, tracker: &Tracker, times: &mut [f64], truth: &[Isometry3<f
     times.sort_by(f64::total_cmp);
     println!(
         "  CPU a frame: mean {mean:.2} ms, median {:.2}, 95 % {:.2}, largest {:.2}; {:.0} frames/s",
-        times[times.len() / 2], times[times.len() * 95 / 100], times[times.len() - 1], 1e3 / mean
+        times[times.len() / 2],
+        times[times.len() * 95 / 100],
+        times[times.len() - 1],
+        1e3 / mean
     );
 }
 
@@ -176,8 +191,7 @@ fn real(folder: &Path) {
 
 fn main() {
     simulated(&Pinhole::small(), "simulated room 176x144");
-    let folder = argument::<String>("folder").unwrap_or_else(|| {
-        concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/real/sevenscenes_redkitchen").into()
-    });
+    let folder = argument::<String>("folder")
+        .unwrap_or_else(|| concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/real/sevenscenes_redkitchen").into());
     real(Path::new(&folder));
 }

@@ -59,7 +59,12 @@ impl OrganisedFrame {
     }
 
     /// Moves the planes of this frame to the weighted mean with the points of `source`, those within their noise.
-    pub(crate) fn absorb(&mut self, source: &Self, self_from_source: &Isometry3<f64>, scratch: &mut Vec<(u32, f32, f32)>) {
+    pub(crate) fn absorb(
+        &mut self,
+        source: &Self,
+        self_from_source: &Isometry3<f64>,
+        scratch: &mut Vec<(u32, f32, f32)>,
+    ) {
         scratch.clear();
         let each = |p: Option<Partner>| {
             let Some(p) = p else { return };

@@ -192,7 +192,10 @@ mod tests {
     fn ring(seed: u64) -> Graph {
         let mut random = Pcg64::seed_from_u64(seed);
         let mut edge = |a: usize, b: usize| {
-            let noise = Vector6::from_fn(|_, _| { let n: f64 = StandardNormal.sample(&mut random); SIGMA * n });
+            let noise = Vector6::from_fn(|_, _| {
+                let n: f64 = StandardNormal.sample(&mut random);
+                SIGMA * n
+            });
             let pose = step_pose(&(truth(a).inverse() * truth(b)), &noise);
             Edge { a, b, a_from_b: Uncertain { pose, covariance: Matrix6::identity() * SIGMA * SIGMA } }
         };

@@ -30,7 +30,10 @@ pub(super) struct Keyframe {
 enum Anchor {
     Kept,
     /// Taken out; its pose in the frame of another.
-    Joined { to: usize, to_from_this: Isometry3<f64> },
+    Joined {
+        to: usize,
+        to_from_this: Isometry3<f64>,
+    },
 }
 
 /// All keyframes and how they lie to each other.

@@ -45,8 +45,8 @@ impl Uncertain {
     /// `a_from_c` from this `a_from_b` and an independent `b_from_c`.
     pub(super) fn then(&self, b_from_c: &Self) -> Self {
         let (by_first, by_second) = product_jacobians(&self.pose, &b_from_c.pose);
-        let covariance = by_first * self.covariance * by_first.transpose()
-            + by_second * b_from_c.covariance * by_second.transpose();
+        let covariance =
+            by_first * self.covariance * by_first.transpose() + by_second * b_from_c.covariance * by_second.transpose();
         let mut pose = self.pose * b_from_c.pose;
         pose.rotation.renormalize();
         Self { pose, covariance: symmetrised(&covariance) }
@@ -58,8 +58,7 @@ impl Uncertain {
         let factor = symmetrised(&(self.covariance + other.covariance)).cholesky()?;
         let gain = factor.solve(&self.covariance).transpose();
         let kept = Matrix6::identity() - gain;
-        let covariance =
-            kept * self.covariance * kept.transpose() + gain * other.covariance * gain.transpose();
+        let covariance = kept * self.covariance * kept.transpose() + gain * other.covariance * gain.transpose();
         Some(Self { pose: step_pose(&self.pose, &(gain * difference)), covariance: symmetrised(&covariance) })
     }
 
@@ -94,7 +93,8 @@ pub(super) fn product_jacobians(a_from_b: &Isometry3<f64>, b_from_c: &Isometry3<
 pub(super) fn scaled(motion: &Isometry3<f64>, share: f64) -> Isometry3<f64> {
     // Along the screw: t = V(θ) ρ with ρ = V⁻¹ t, so that any number of shares lie on one path.
     let turn = motion.rotation.scaled_axis();
-    let straight = left_jacobian(&turn).try_inverse().map_or(motion.translation.vector, |v| v * motion.translation.vector);
+    let straight =
+        left_jacobian(&turn).try_inverse().map_or(motion.translation.vector, |v| v * motion.translation.vector);
     let rotation = nalgebra::UnitQuaternion::from_scaled_axis(turn * share);
     let translation = left_jacobian(&(turn * share)) * (straight * share);
     Isometry3::from_parts(translation.into(), rotation)

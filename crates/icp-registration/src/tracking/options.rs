@@ -33,7 +33,8 @@ pub enum Relocalisation {
 /// Options of a [`Tracker`](super::Tracker). The defaults carry no scale.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrackerOptions {
-    /// Registration of a frame with a keyframe. Undetermined motions are always held at the prediction.
+    /// Registration of a frame with a keyframe. Undetermined motions are always held at the prediction; where
+    /// `max_motion_sigma_m` is `None`, it is 1/50 of the radius of the first frame.
     pub alignment: FrameAlignmentOptions,
     /// Pose of the first frame: the datum, without error.
     pub world_from_first: Isometry3<f64>,

@@ -18,6 +18,9 @@ use crate::organised::{FrameAligner, OrganisedFrame, Projection};
 
 /// What another keyframe must see more of the frame than the reference to take its place.
 const ADVANTAGE: f64 = 0.05;
+/// Share of the first frame's radius beyond whose standard deviation motions count as undetermined. Registration alone
+/// asks for 1/300; in a stream, poses that are centimetres weak for a moment are still worth more than a loss.
+const WEAKEST_SHARE: f64 = 1.0 / 50.0;
 /// Least fraction of a new keyframe that must agree with another to be registered with it as well.
 const LOOP_OVERLAP: f64 = 0.35;
 
@@ -124,9 +127,9 @@ impl Tracker {
     fn start(&mut self, timestamp_s: f64) -> TrackedPose {
         let pose = Uncertain::exact(self.options.world_from_first);
         let blank = self.current.filled() < self.options.min_filled;
-        let state =
-            if blank { TrackingState::Lost(LossReason::TooFewPoints) } else { TrackingState::Started };
+        let state = if blank { TrackingState::Lost(LossReason::TooFewPoints) } else { TrackingState::Started };
         if !blank {
+            self.set_weakest_motion();
             self.keyframes.start(self.current.clone(), pose);
             self.last = Some(Last {
                 timestamp_s,
@@ -148,6 +151,17 @@ impl Tracker {
             overlap: if blank { 0.0 } else { 1.0 },
             rms_m: 0.0,
             measured_motion: None,
+        }
+    }
+
+    /// Sets from which standard deviation on motions are undetermined, where the options leave that to the frames.
+    fn set_weakest_motion(&mut self) {
+        let mut alignment = self.aligner.options().clone();
+        if self.options.alignment.max_motion_sigma_m.is_none() {
+            alignment.max_motion_sigma_m = Some(WEAKEST_SHARE * self.current.radius_m().max(f64::MIN_POSITIVE));
+        }
+        if let Ok(aligner) = FrameAligner::new(alignment) {
+            self.aligner = aligner;
         }
     }
 

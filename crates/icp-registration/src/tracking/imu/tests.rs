@@ -146,7 +146,12 @@ fn measured_motion_corrects_velocity_and_attitude() {
             let miss = pose_difference(&prior.current_from_previous, &truth).fixed_rows::<3>(0).norm();
             *error += if frame > 10 { miss / 10.0 } else { 0.0 };
         }
-        let noise = Vector6::from_fn(|k, _| sigma[k] * { let n: f64 = StandardNormal.sample(&mut random); n });
+        let noise = Vector6::from_fn(|k, _| {
+            sigma[k] * {
+                let n: f64 = StandardNormal.sample(&mut random);
+                n
+            }
+        });
         let measured = MotionPrior {
             current_from_previous: step_pose(&truth, &noise),
             covariance: Matrix6::from_diagonal(&sigma.component_mul(&sigma)),

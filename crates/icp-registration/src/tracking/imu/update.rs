@@ -26,10 +26,8 @@ pub(super) fn update(state: &mut State, start_from_body: &Isometry3<f64>, covari
 
     let part = |at: usize| Vector3::new(step[at], step[at + 1], step[at + 2]);
     let (dt, dtheta) = (part(DISPLACEMENT), part(ROTATION));
-    let moved = step_pose(
-        &state.start_from_body(),
-        &nalgebra::Vector6::new(dt.x, dt.y, dt.z, dtheta.x, dtheta.y, dtheta.z),
-    );
+    let moved =
+        step_pose(&state.start_from_body(), &nalgebra::Vector6::new(dt.x, dt.y, dt.z, dtheta.x, dtheta.y, dtheta.z));
     (state.displacement, state.rotation) = (moved.translation.vector, moved.rotation);
     state.velocity += part(VELOCITY);
     state.world_from_start *= UnitQuaternion::from_scaled_axis(part(ATTITUDE));

@@ -59,7 +59,7 @@ impl Table {
         self.milliseconds.push(taken);
         let outcome = outcome(&pair.target_from_source(), found);
         if each {
-            println!("{:4} overlap {:.2} {taken:6.1} ms {outcome:?}", pair.seed, pair.overlap);
+            println!("{:4} overlap {:.2} {taken:6.1} ms {}", pair.seed, pair.overlap, in_words(&outcome));
         }
         match outcome {
             Outcome::Right(millimetre, degree, _) => self.right.push((millimetre, degree)),
@@ -84,6 +84,18 @@ impl Table {
             median(self.milliseconds.clone()),
         );
     }
+}
+
+fn in_words(outcome: &Outcome) -> String {
+    let (word, millimetre, degree, found) = match outcome {
+        Outcome::None(error) => return error.to_string(),
+        Outcome::Right(millimetre, degree, found) => ("right", millimetre, degree, found),
+        Outcome::Wrong(millimetre, degree, found) => ("WRONG", millimetre, degree, found),
+    };
+    format!(
+        "{word} {millimetre:.1} mm {degree:.3} deg, inliers {} of {}, overlap {:.2} agreement {:.3} rival {:.2} determined {:.4}",
+        found.inliers, found.correspondences, found.overlap, found.agreement, found.rival, found.determined
+    )
 }
 
 /// CPU time of all threads, milliseconds; 0 where the system does not tell.

@@ -142,6 +142,53 @@ pub enum Error {
         /// The longest allowed, second.
         allowed_s: f64,
     },
+    /// Voxels of this size cannot be numbered in this cloud.
+    #[error("voxels of {voxel_m} m in a cloud of {extent_m} m: the size must be positive, and above 1/2 000 000 of it")]
+    VoxelSize {
+        /// Edge of a voxel, metre.
+        voxel_m: f64,
+        /// Largest extent of the cloud along an axis, metre.
+        extent_m: f64,
+    },
+    /// Two trajectories have no pose at the same time.
+    #[error(
+        "no pose of the estimate ({:.3} s to {:.3} s) has one of the truth ({:.3} s to {:.3} s) within {tolerance_s} s",
+        .estimate_s[0], .estimate_s[1], .truth_s[0], .truth_s[1]
+    )]
+    NoCommonTime {
+        /// Largest difference of the times, second.
+        tolerance_s: f64,
+        /// First and last time of the estimate.
+        estimate_s: [f64; 2],
+        /// First and last time of the truth.
+        truth_s: [f64; 2],
+    },
+    /// Two parts of a registration do not work together.
+    #[error("{what} does not work with {with}")]
+    Incompatible {
+        /// The part.
+        what: &'static str,
+        /// What it was combined with.
+        with: &'static str,
+    },
+    /// A triangle names a vertex that is not there.
+    #[error("a triangle names vertex {vertex}, but there are {count} (from 0)")]
+    NoSuchVertex {
+        /// The index.
+        vertex: usize,
+        /// Number of vertices.
+        count: usize,
+    },
+    /// A part of a registration names a point that is not there.
+    #[error("{part} names point {point}, but there are {count} (from 0)")]
+    NoSuchPoint {
+        /// The part.
+        part: &'static str,
+        /// The index.
+        point: usize,
+        /// Number of points.
+        count: usize,
+    },
     /// A ray of a camera leads backwards, or coincides with or crosses its neighbour.
     #[error("ray {index}: {why}")]
     DegenerateRay {
@@ -155,6 +202,16 @@ pub enum Error {
     PointsOffRays {
         /// Index of such a point, row by row.
         index: usize,
+    },
+    /// No alignment that holds leads to some stations.
+    #[error("nothing connects stations {stations:?} to station {to} ({})", .reasons.join("; "))]
+    UnconnectedStations {
+        /// The stations that are left alone.
+        stations: Vec<usize>,
+        /// A station of the part that holds together.
+        to: usize,
+        /// Why pairs that touch them were refused: source to target, and the reason.
+        reasons: Vec<String>,
     },
     /// No pose of two clouds passed the verification.
     #[error(

@@ -7,31 +7,42 @@ mod eigen;
 mod error;
 mod icp;
 mod kernel;
+#[cfg(feature = "mesh")]
+mod mesh;
 #[cfg(feature = "multiview")]
 mod multiview;
 mod neighbours;
 mod normals;
 mod organised;
+pub mod parts;
 mod pose;
 mod tracking;
+mod quality;
+mod trajectory;
+mod voxels;
 
-pub use absolute_orientation::{Orientation, Similarity, absolute_orientation, absolute_orientation_with_scale};
+pub use absolute_orientation::{
+    Orientation, RotationMethod, Similarity, absolute_orientation, absolute_orientation_by,
+    absolute_orientation_with_scale,
+};
 pub use cloud::Cloud;
 pub use coarse::{
-    CoarseAlignment, CoarseOptions, Estimator, FeatureCloud, Features, Matching, SurfaceDescriptors, SurfaceRadii,
-    Viewpoint, align_without_guess,
+    AmplitudeFeatureOptions, CoarseAlignment, CoarseOptions, Estimator, FeatureCloud, Features, Matching,
+    SparseAlignment, SparseIcpOptions, SurfaceDescriptors, SurfaceRadii, Viewpoint, align_features,
+    align_without_guess, amplitude_features,
 };
 pub use error::{Error, Result};
 pub use icp::{
-    DegeneracyPolicy, IcpOptions, IcpResult, IcpTarget, Metric, MotionKind, Selection, StopReason, UndeterminedMotion,
-    align,
+    Alternative, DegeneracyPolicy, IcpOptions, IcpResult, IcpTarget, Levels, Metric, MotionKind, Registration,
+    Selection, Starts, StopReason, System, UndeterminedMotion, align,
 };
 pub use kernel::RobustKernel;
 #[cfg(feature = "multiview")]
 pub use multiview::{
-    Datum, Overlap, PairAlignment, PairConstraint, PairResidual, RefusedPair, StationAdjustment,
-    StationAdjustmentOptions, SurfaceAdjustment, SurfaceAdjustmentOptions, adjust_stations, adjust_surfaces,
-    align_pairs, find_overlaps,
+    Datum, LoopClosure, Overlap, PairAlignment, PairConstraint, PairResidual, PointModel, RefusedPair,
+    SharedParameters, Start, StationAdjustment, StationAdjustmentOptions, StationRegistration,
+    StationRegistrationOptions, SurfaceAdjustment, SurfaceAdjustmentOptions, SurfacePair, UndeterminedStation,
+    adjust_stations, adjust_surfaces, align_pairs, find_overlaps, register_stations,
 };
 pub use neighbours::{Neighbour, NeighbourTree};
 pub use normals::{OrganisedNormalOptions, UnorganisedNormalOptions, organised_normals, unorganised_normals};
@@ -41,3 +52,7 @@ pub use tracking::{
     Fusion, ImuIntegrator, ImuOptions, InertialSample, LossReason, MotionPrior, Relocalisation, TrackedPose, Tracker,
     TrackerOptions, TrackingState,
 };
+pub use trajectory::{
+    AbsoluteTrajectoryError, ErrorStatistics, MatchedPose, RelativeError, RelativePoseError, RelativeStep,
+    TrajectoryAlignment, TrajectoryErrorOptions, absolute_trajectory_error, relative_pose_error,
+pub use voxels::{VoxelAlignmentOptions, VoxelCloud, VoxelOptions, downsample};

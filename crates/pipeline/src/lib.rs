@@ -27,7 +27,11 @@ pub use calibrate::{
     CalibrateMethod, CalibrateRequest, CalibrationSummary, CorrelationSummary, DecisionSummary, GroupSummary,
     ParameterMap, ParameterSummary, RejectedObservation, TableDefaults, calibrate,
 };
-pub use compare::{CloudComparison, Comparison, PoseComparison, compare};
+pub use compare::{
+    AbsoluteSummary, CloudAlignment, CloudComparison, CompareAlignment, CompareRequest, Comparison, DistanceHistogram,
+    PlaneDistances, PoseComparison, PoseDifference, RelativeSummary, TrajectoryComparison, TrajectoryStatistics,
+    compare,
+};
 pub use error::{Error, Result};
 pub use inspect::{Inspection, inspect};
 pub use network_plan::{CandidateSummary, NetworkPlanRequest, PlanSummary, PointSigma, plan_network};

@@ -4,7 +4,7 @@
 //! still cost what the operating system had not written to disk.)
 
 use std::fs::{self, File};
-use std::io::{BufWriter, Seek, SeekFrom, Write};
+use std::io::{BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -28,7 +28,12 @@ impl FileWriter {
             return Err(Error::format(&target, "is a folder, expected the name of a file to write"));
         }
         let temporary = sibling(&target, "partial")?;
-        let file = File::create_new(&temporary).map_err(Error::io(&target, "create a temporary file beside it"))?;
+        let file = File::options()
+            .read(true)
+            .write(true)
+            .create_new(true)
+            .open(&temporary)
+            .map_err(Error::io(&target, "create a temporary file beside it"))?;
         Ok(Self { target, temporary, writer: Some(BufWriter::with_capacity(1 << 16, file)) })
     }
 
@@ -57,6 +62,15 @@ impl Write for FileWriter {
 
     fn flush(&mut self) -> std::io::Result<()> {
         self.open()?.flush()
+    }
+}
+
+impl Read for FileWriter {
+    /// Reads back what was written, from the current position.
+    fn read(&mut self, bytes: &mut [u8]) -> std::io::Result<usize> {
+        let writer = self.open()?;
+        writer.flush()?;
+        writer.get_mut().read(bytes)
     }
 }
 

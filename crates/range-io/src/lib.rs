@@ -5,6 +5,10 @@ pub mod atomic;
 pub mod azure;
 #[cfg(feature = "calibration")]
 pub mod calibration;
+#[cfg(any(feature = "e57", feature = "pcd", feature = "ply", feature = "vtk", feature = "xyz"))]
+pub mod clouds;
+#[cfg(feature = "e57")]
+pub mod e57;
 mod error;
 #[cfg(any(feature = "mkv", feature = "png16", feature = "survey"))]
 mod limits;
@@ -12,20 +16,28 @@ mod limits;
 pub mod mkv;
 #[cfg(feature = "npz")]
 pub mod npz;
+#[cfg(feature = "pcd")]
+pub mod pcd;
 #[cfg(feature = "ply")]
 pub mod ply;
 #[cfg(feature = "png16")]
 pub mod png16;
+#[cfg(any(feature = "e57", feature = "pcd", feature = "ply", feature = "trajectory"))]
+mod pose;
 #[cfg(feature = "ron_text")]
 pub mod ron_text;
 #[cfg(feature = "survey")]
 pub mod survey;
 #[cfg(feature = "tables")]
 pub mod tables;
-#[cfg(any(feature = "azure", feature = "ron_text", feature = "tables", feature = "trajectory"))]
+#[cfg(any(feature = "azure", feature = "ron_text", feature = "tables", feature = "trajectory", feature = "vtk"))]
 mod text;
 #[cfg(feature = "trajectory")]
 pub mod trajectory;
+#[cfg(feature = "vtk")]
+pub mod vtk;
+#[cfg(feature = "xyz")]
+pub mod xyz;
 
 #[cfg(any(feature = "survey", feature = "calibration"))]
 pub(crate) use error::InvalidField;

@@ -38,6 +38,7 @@ fn cloud(points: usize) -> CloudFile {
         flags: Some((0..points).map(|i| i as u16).collect()),
         frame: Some((0..points).map(|i| u32::MAX - i as u32).collect()),
         covariance: Some((0..points).map(|i| std::array::from_fn(|term| value(i + term))).collect()),
+        ..CloudFile::default()
     }
 }
 

@@ -5,7 +5,10 @@
 use camera_model::pose_from_euler;
 use nalgebra::{Isometry3, Vector3};
 use proptest::prelude::*;
-use range_io::trajectory::{StampedPose, read_tum, write_euroc, write_kitti, write_tum};
+use range_io::trajectory::{
+    StampedPose, TrajectoryFormat, read_any_trajectory, read_kitti, read_tum, write_any_trajectory, write_euroc,
+    write_kitti, write_tum,
+};
 
 mod common;
 
@@ -80,4 +83,75 @@ fn faults_name_line_and_field() {
     assert_eq!(fault("0 0 0 0 0 0 0 1 5\n"), "t.txt:1:9: `5` is one field too many, expected 8");
     let lost = StampedPose { timestamp_s: f64::NAN, world_from_camera: Isometry3::identity() };
     assert!(write_tum(&file, &[lost]).unwrap_err().to_string().contains("is not finite"));
+}
+
+#[test]
+fn every_written_form_is_read_back() {
+    let folder = tempfile::tempdir().unwrap();
+    let poses =
+        [pose(1.25e9 + 0.25, [1.0, -2.0, 3.0], [0.3, -1.0, 2.0]), pose(1.25e9 + 0.5, [0.0; 3], [0.0, 0.1, 3.0])];
+    for format in [TrajectoryFormat::Tum, TrajectoryFormat::Kitti, TrajectoryFormat::Euroc] {
+        let file = folder.path().join("poses");
+        write_any_trajectory(&file, &poses, format).unwrap();
+        assert_eq!(TrajectoryFormat::of_file(&file).unwrap(), format);
+        let back = read_any_trajectory(&file).unwrap();
+        assert_eq!(back.len(), 2);
+        for (index, (found, expected)) in back.iter().zip(&poses).enumerate() {
+            let time = if format == TrajectoryFormat::Kitti { index as f64 } else { expected.timestamp_s };
+            assert!((found.timestamp_s - time).abs() < 1e-9, "{format:?}: the times are multiples of 1/4 s");
+            let difference = found.world_from_camera.to_homogeneous() - expected.world_from_camera.to_homogeneous();
+            assert!(difference.amax() < 1e-14, "{format:?}: rounding of a matrix");
+        }
+    }
+    let times = folder.path().join("times.txt");
+    write_kitti(folder.path().join("poses"), &poses).unwrap();
+    std::fs::write(&times, "0.5\n0.75\n").unwrap();
+    let back = read_any_trajectory(folder.path().join("poses")).unwrap();
+    assert_eq!(back.iter().map(|pose| pose.timestamp_s).collect::<Vec<_>>(), [0.5, 0.75]);
+    std::fs::write(&times, "0.5\n").unwrap();
+    let message = read_kitti(folder.path().join("poses"), Some(&times)).unwrap_err().to_string();
+    assert!(message.contains("times.txt: has 1 times, expected 2"), "{message}");
+}
+
+#[test]
+fn logs_and_folders_of_matrices_are_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let matrix = "1 0 0 4\n0 -1 0 5\n0 0 -1 6\n0 0 0 1\n";
+    let log = folder.path().join("t.log");
+    std::fs::write(&log, format!("3 3 4\n{matrix}7\t7\t8\n{matrix}")).unwrap();
+    let poses = read_any_trajectory(&log).unwrap();
+    assert_eq!(poses.len(), 2);
+    assert_eq!(poses[1], StampedPose { timestamp_s: 7.0, world_from_camera: Isometry3::translation(4.0, 5.0, 6.0) });
+    for (from, to, expected) in [
+        ("0 0 0 1", "0 0 1 1", "t.log:5:1: is the fourth row of a pose"),
+        ("1 0 0 4", "1.1 0 0 4", "t.log:2:1: `R`: is no rotation"),
+        ("0 0 -1 6", "0 0 1 6", "t.log:2:1: `R`: is a reflection"),
+        ("0 -1 0 5", "0 -1 0", "t.log:3:4: `column 4`: is missing"),
+        ("0 0 -1 6\n0 0 0 1\n", "", "is the last line, 2 of 4 rows"),
+    ] {
+        std::fs::write(&log, format!("3 3 4\n{matrix}").replace(from, to)).unwrap();
+        let message = read_any_trajectory(&log).unwrap_err().to_string();
+        assert!(message.contains(expected), "{message}\nexpected: {expected}");
+    }
+    let scenes = folder.path().join("seq");
+    std::fs::create_dir(&scenes).unwrap();
+    assert!(read_any_trajectory(&scenes).unwrap_err().to_string().contains("has no poses"));
+    for frame in [10, 5] {
+        std::fs::write(scenes.join(format!("frame-{frame:06}.pose.txt")), matrix).unwrap();
+    }
+    let poses = read_any_trajectory(&scenes).unwrap();
+    assert_eq!(poses.iter().map(|pose| pose.timestamp_s).collect::<Vec<_>>(), [5.0, 10.0]);
+}
+
+#[test]
+fn real_trajectories_are_read() {
+    for (path, poses) in [("redwood_rgbd5/trajectory.log", 5), ("redwood_rgbd5/odometry.log", 5)] {
+        let Some(path) = common::real(path) else { continue };
+        assert_eq!(read_any_trajectory(path).unwrap().len(), poses);
+    }
+    let Some(path) = common::real("sevenscenes_redkitchen") else { return };
+    let poses = read_any_trajectory(path).unwrap();
+    let frame = |time: f64| poses.iter().find(|pose| (pose.timestamp_s - time).abs() < 0.5).unwrap().world_from_camera;
+    let way = (frame(50.0).translation.vector - frame(0.0).translation.vector).norm();
+    assert!((way - 0.167).abs() < 5e-4, "the capture's own description: frame 50 is 167 mm away");
 }

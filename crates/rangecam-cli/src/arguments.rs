@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::{Parser, Subcommand};
 
 use crate::calibrate_arguments::CalibrateArguments;
+use crate::compare_arguments::CompareArguments;
 use crate::plan_arguments::PlanArguments;
 use crate::scattering_arguments::ScatteringArguments;
 
@@ -77,11 +78,7 @@ pub(crate) enum Command {
         /// Survey folder, calibration.ron or cloud.ply.
         path: PathBuf,
     },
-    /// Compare two results: output folders, clouds (.ply) or poses (stations.csv, trajectory.txt).
-    Compare {
-        /// The one.
-        first: PathBuf,
-        /// The other, taken as the reference.
-        second: PathBuf,
-    },
+    /// Compare two results: clouds (PLY, PCD, E57, VTK, xyz), trajectories (TUM, KITTI, EuRoC, Redwood log, 7-Scenes
+    /// folder), stations.csv, or output folders.
+    Compare(CompareArguments),
 }

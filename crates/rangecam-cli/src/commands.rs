@@ -39,7 +39,9 @@ pub(crate) fn dispatch(command: Command, output: &Output) -> Outcome {
             output.result(&pipeline::estimate_scattering(&arguments.request(), output.progress().as_ref())?)
         }
         Command::Inspect { path } => output.result(&pipeline::inspect(&path)?),
-        Command::Compare { first, second } => output.result(&pipeline::compare(&first, &second)?),
+        Command::Compare(arguments) => {
+            output.result(&pipeline::compare(&arguments.request(), output.progress().as_ref())?)
+        }
     }
 }
 

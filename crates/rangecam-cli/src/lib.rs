@@ -4,6 +4,7 @@ mod arguments;
 mod bar;
 mod calibrate_arguments;
 mod commands;
+mod compare_arguments;
 mod output;
 mod plan_arguments;
 mod scattering_arguments;

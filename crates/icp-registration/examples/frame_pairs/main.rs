@@ -19,6 +19,12 @@ use common::Pinhole;
 use icp_registration::Projection;
 
 fn main() {
+    // All work on the thread whose CPU time is measured.
+    let threads = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    threads.install(run);
+}
+
+fn run() {
     let wanted = std::env::args().nth(1);
     let is_wanted = |name: &str| wanted.as_deref().is_none_or(|w| w == name);
     if is_wanted("table") {

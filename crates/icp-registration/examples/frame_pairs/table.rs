@@ -26,8 +26,7 @@ pub fn print() {
                     target.update(&pair.target.0, Some(&pair.target.1)).unwrap();
                     source.update(&pair.source.0, Some(&pair.source.1)).unwrap();
                 });
-                let (r, time) =
-                    measure::measured(|| aligner.align(&source, &target, &Isometry3::identity()).unwrap());
+                let (r, time) = measure::measured(|| aligner.align(&source, &target, &Isometry3::identity()).unwrap());
                 least = least.min(time + preparation);
                 least_preparation = least_preparation.min(preparation);
                 result = Some(r);

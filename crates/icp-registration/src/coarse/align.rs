@@ -19,17 +19,13 @@ use crate::error::{Error, Result};
 /// Correspondences that enter the graph, those with the most alike descriptors.
 const MOST_CORRESPONDENCES: usize = 2500;
 /// Cliques or samples that poses are computed from.
-const MOST_CANDIDATES: usize = 200;
+const MOST_CANDIDATES: usize = 150;
 /// Of the sampled points, one in this many ranks the candidates.
-const RANKING_STRIDE: usize = 3;
+const RANKING_STRIDE: usize = 4;
 /// Largest difference of the cosines of normals at which two correspondences agree.
 const COSINE_TOLERANCE: f32 = 0.25;
 /// Poses closer than this are one, voxels.
 const SAME_POSE_VOXELS: f64 = 4.0;
-/// Smallest eigenvalue of the refined normal matrix at which a pose counts as determined: one wall has about 0.001 from
-/// noise, a wall and a floor as much.
-const LEAST_DETERMINED: f64 = 0.004;
-
 /// An alignment without a guess that passed the verification.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CoarseAlignment {
@@ -229,7 +225,7 @@ fn check(found: CoarseAlignment, options: &CoarseOptions) -> Result<CoarseAlignm
         ("inliers", found.inliers as f64, options.min_inliers as f64),
         ("overlap", found.overlap, options.min_overlap),
         ("agreement", found.agreement, options.min_agreement),
-        ("geometry", found.determined, LEAST_DETERMINED),
+        ("geometry", found.determined, options.min_determined),
         // The largest ratio allowed, seen from the other side.
         ("lead over the rival", 1.0 - found.rival, 1.0 - options.max_rival),
     ];

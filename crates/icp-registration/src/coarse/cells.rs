@@ -9,12 +9,16 @@ const MASK: u64 = (1 << BITS) - 1;
 /// The three indices of a cell in one number; `None` beyond a million cells from the origin (or for NaN).
 #[inline]
 pub(super) fn key_of(point: [f32; 3], per_cell: f32) -> Option<u64> {
-    let scaled = point.map(|c| (c * per_cell).floor());
+    let scaled = point.map(|c| c * per_cell);
     // NaN fails the comparison.
     if !scaled.iter().all(|c| c.abs() <= HALF_RANGE) {
         return None;
     }
-    let [x, y, z] = scaled.map(|c| (c as i32 + (1 << 20)) as u64);
+    // Rounding down without a call of the library, which machines without that instruction need.
+    let [x, y, z] = scaled.map(|c| {
+        let cut = c as i32;
+        (cut - i32::from(cut as f32 > c) + (1 << 20)) as u64
+    });
     Some(x | y << BITS | z << (2 * BITS))
 }
 

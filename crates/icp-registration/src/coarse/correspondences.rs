@@ -1,6 +1,7 @@
 //! Correspondences with points and normals of both sides, and which two of them can hold at once.
 // Only what is inlined is compiled for wide registers.
-#![allow(clippy::inline_always)]
+// Lazy operators would branch lane by lane.
+#![allow(clippy::inline_always, clippy::needless_bitwise_bool)]
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 
@@ -45,24 +46,13 @@ impl Correspondences {
         self.likeness.push(likeness);
     }
 
-    /// Whether one rigid motion can carry both sources onto their targets: distance, normals and their angles with the
-    /// connecting line stay. Two that nearly coincide say the same and count as no support.
-    #[inline(always)]
+    /// Whether two of them can hold at once: see [`agree`].
     pub(super) fn agree(&self, i: usize, j: usize, tolerance: Tolerance) -> bool {
-        let d = subtract(self.source.points[j], self.source.points[i]);
-        let e = subtract(self.target.points[j], self.target.points[i]);
-        let (dd, ee) = (dot(d, d).sqrt(), dot(e, e).sqrt());
-        let (n, m) = (self.source.normals[i], self.source.normals[j]);
-        let (u, v) = (self.target.normals[i], self.target.normals[j]);
-        let between = (dot(n, m) - dot(u, v)).abs();
-        let first = (dot(n, d) - dot(u, e)).abs();
-        let second = (dot(m, d) - dot(v, e)).abs();
-        // Errors of a normal turn the line by that angle, errors of the points move the projection itself.
-        let slack = tolerance.cosine * dd + tolerance.distance;
-        // An unknown normal is NaN and passes: only a proven contradiction refuses.
-        (dd - ee).abs() <= tolerance.distance
-            && dd > 2.0 * tolerance.distance
-            && !(between > tolerance.cosine || first > slack || second > slack)
+        let row = |i: usize| {
+            let groups = [self.source.points[i], self.source.normals[i], self.target.points[i], self.target.normals[i]];
+            std::array::from_fn(|k| groups[k / 3][k % 3])
+        };
+        agree(&row(i), &row(j), tolerance)
     }
 
     /// Pose that carries the chosen sources onto their targets best. Normals count as points at `arm` metre off the
@@ -91,11 +81,32 @@ impl Correspondences {
             .filter(|&i| {
                 let difference = subtract(motion.point(self.source.points[i]), self.target.points[i]);
                 let turned = dot(motion.vector(self.source.normals[i]), self.target.normals[i]);
-                dot(difference, difference) <= limit && !(turned < 0.7)
+                dot(difference, difference) <= limit && (turned >= 0.7 || turned.is_nan())
             })
             .map(|i| i as u32)
             .collect()
     }
+}
+
+/// Whether one rigid motion can carry the sources of two correspondences (source point and normal, target point and
+/// normal) onto their targets: distance, normals and their angles with the connecting line stay. Two that nearly coincide
+/// say the same and count as no support.
+#[inline(always)]
+pub(super) fn agree(first: &[f32; 12], second: &[f32; 12], tolerance: Tolerance) -> bool {
+    let three = |row: &[f32; 12], k: usize| [row[k], row[k + 1], row[k + 2]];
+    let d = subtract(three(second, 0), three(first, 0));
+    let e = subtract(three(second, 6), three(first, 6));
+    let (n, m) = (three(first, 3), three(second, 3));
+    let (u, v) = (three(first, 9), three(second, 9));
+    let (dd, ee) = (dot(d, d).sqrt(), dot(e, e).sqrt());
+    let between = (dot(n, m) - dot(u, v)).abs();
+    let at_first = (dot(n, d) - dot(u, e)).abs();
+    let at_second = (dot(m, d) - dot(v, e)).abs();
+    // Errors of a normal turn the line by that angle, errors of the points move the projection itself.
+    let slack = tolerance.cosine * dd + tolerance.distance;
+    // An unknown normal is NaN: only a proven contradiction refuses.
+    let contradicts = (between > tolerance.cosine) | (at_first > slack) | (at_second > slack);
+    ((dd - ee).abs() <= tolerance.distance) & (dd > 2.0 * tolerance.distance) & !contradicts
 }
 
 fn point(p: [f32; 3]) -> Point3<f64> {

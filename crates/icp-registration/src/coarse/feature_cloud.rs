@@ -88,11 +88,11 @@ impl FeatureCloud {
         let squares: f64 = reduced.points.iter().flatten().map(|c| f64::from(*c).powi(2)).sum();
         let radius_m = (squares / reduced.len() as f64).sqrt();
         Ok(Self {
-            radius_m,
             reduced,
             normals,
             surroundings,
             descriptor_radius,
+            radius_m,
             viewpoint,
             surface_features,
             added,

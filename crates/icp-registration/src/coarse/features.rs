@@ -29,7 +29,7 @@ impl Features {
             return Err(Error::LengthMismatch { what: "descriptors", expected, found: descriptors.len() });
         }
         // Beyond this the square of a value overflows.
-        if let Some(index) = descriptors.iter().position(|v| !(v.abs() < 1e15)) {
+        if let Some(index) = descriptors.iter().position(|v| v.is_nan() || v.abs() >= 1e15) {
             return Err(Error::NonFinite { what: "descriptors", index });
         }
         Ok(Self { points, table: DescriptorTable::of_vectors(descriptors.to_vec(), width) })

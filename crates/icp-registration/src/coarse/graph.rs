@@ -9,7 +9,7 @@
 
 use rayon::prelude::*;
 
-use super::correspondences::{Correspondences, Tolerance};
+use super::correspondences::{Correspondences, Tolerance, agree};
 
 /// Fewest members of a clique.
 const LEAST_MEMBERS: usize = 3;
@@ -25,8 +25,14 @@ impl ConsistencyGraph {
         let count = correspondences.len();
         let words = count.div_ceil(64).max(1);
         let mut rows = vec![0; count * words];
+        let blocks = blocks(correspondences);
         rows.par_chunks_mut(words).with_min_len(64).enumerate().for_each(|(i, row)| {
-            pulp::Arch::new().dispatch(Row { correspondences, tolerance, i, row });
+            let own = columns(correspondences, i);
+            pulp::Arch::new().dispatch(|| {
+                for (bits, block) in row.iter_mut().zip(&blocks) {
+                    *bits = agreeing(&own, block, tolerance);
+                }
+            });
         });
         Self { words, rows }
     }
@@ -90,25 +96,35 @@ impl ConsistencyGraph {
     }
 }
 
-struct Row<'a> {
-    correspondences: &'a Correspondences,
-    tolerance: Tolerance,
-    i: usize,
-    row: &'a mut [u64],
-}
+/// Correspondences of one word of bits, coordinate by coordinate: source points and normals, target points and normals.
+type Block = [[f32; 64]; 12];
 
-impl pulp::NullaryFnOnce for Row<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn call(self) {
-        let count = self.correspondences.len();
-        for (word, bits) in self.row.iter_mut().enumerate() {
-            for j in 64 * word..count.min(64 * word + 64) {
-                *bits |= u64::from(self.correspondences.agree(self.i, j, self.tolerance)) << (j % 64);
-            }
+fn blocks(correspondences: &Correspondences) -> Vec<Block> {
+    // What pads the last block agrees with nothing.
+    let mut blocks = vec![[[f32::NAN; 64]; 12]; correspondences.len().div_ceil(64)];
+    for i in 0..correspondences.len() {
+        for (column, value) in columns(correspondences, i).into_iter().enumerate() {
+            blocks[i / 64][column][i % 64] = value;
         }
     }
+    blocks
+}
+
+fn columns(correspondences: &Correspondences, i: usize) -> [f32; 12] {
+    let (s, t) = (&correspondences.source, &correspondences.target);
+    let groups = [s.points[i], s.normals[i], t.points[i], t.normals[i]];
+    std::array::from_fn(|k| groups[k / 3][k % 3])
+}
+
+/// The bits of one correspondence against 64 others.
+#[inline(always)]
+fn agreeing(own: &[f32; 12], block: &Block, tolerance: Tolerance) -> u64 {
+    let mut flags = [0_u32; 64];
+    for lane in 0..64 {
+        let other: [f32; 12] = std::array::from_fn(|k| block[k][lane]);
+        flags[lane] = u32::from(agree(own, &other, tolerance));
+    }
+    flags.iter().enumerate().fold(0, |bits, (lane, flag)| bits | u64::from(*flag) << lane)
 }
 
 fn members(row: &[u64]) -> impl Iterator<Item = usize> + '_ {

@@ -41,10 +41,12 @@ impl Verdict {
         Self { source: count(source, target, pose, stride), target: count(target, source, &pose.inverse(), stride) }
     }
 
-    /// Share of the points with a partner less those in free space, doubly counted: at most 1, possibly negative.
+    /// Share of the points with a partner less those in free space, doubly counted, times the square of the agreement:
+    /// at most 1, possibly negative. A wrong pose that slides walls along themselves has many partners, but misses more.
     pub(super) fn score(&self) -> f64 {
         let sum = |f: fn(&Count) -> usize| (f(&self.source) + f(&self.target)) as f64;
-        (sum(|c| c.hits) - WEIGHT_OF_FREE * sum(|c| c.in_free)) / sum(|c| c.points).max(1.0)
+        let share = (sum(|c| c.hits) - WEIGHT_OF_FREE * sum(|c| c.in_free)) / sum(|c| c.points).max(1.0);
+        share * self.agreement().powi(2)
     }
 
     /// Share of the points with a partner in the cloud that overlaps more.

@@ -1,6 +1,7 @@
 //! Correspondences: descriptors that are most alike.
 // Only what is inlined is compiled for wide registers.
-#![allow(clippy::inline_always)]
+// Lanes of several arrays run in step.
+#![allow(clippy::inline_always, clippy::needless_range_loop)]
 
 use rayon::prelude::*;
 
@@ -8,7 +9,7 @@ use super::descriptors::DescriptorTable;
 use super::options::Matching;
 
 /// Columns that are compared at a time.
-const LANES: usize = 32;
+const LANES: usize = 16;
 /// Rows that share the loaded columns.
 const ROWS: usize = 4;
 /// Rows of a task.
@@ -114,31 +115,55 @@ impl pulp::NullaryFnOnce for Search<'_> {
 #[inline(always)]
 fn best_of_block(rows: [&[f32]; ROWS], panels: &[[f32; LANES]]) -> [Best; ROWS] {
     let width = rows[0].len();
-    let mut best = [[f32::NEG_INFINITY; LANES]; ROWS];
-    let mut second = [[f32::NEG_INFINITY; LANES]; ROWS];
-    let mut place = [[0_u32; LANES]; ROWS];
+    let mut running = [Running::default(); ROWS];
     for (number, panel) in panels.chunks_exact(width).enumerate() {
-        let mut products = [[0.0_f32; LANES]; ROWS];
+        let [mut a, mut b, mut c, mut d] = [[0.0_f32; LANES]; ROWS];
         for (k, column) in panel.iter().enumerate() {
-            for r in 0..ROWS {
-                let value = rows[r][k];
-                for lane in 0..LANES {
-                    products[r][lane] += value * column[lane];
-                }
-            }
+            add_multiple(&mut a, rows[0][k], column);
+            add_multiple(&mut b, rows[1][k], column);
+            add_multiple(&mut c, rows[2][k], column);
+            add_multiple(&mut d, rows[3][k], column);
         }
-        for r in 0..ROWS {
-            for lane in 0..LANES {
-                let product = products[r][lane];
-                let better = product > best[r][lane];
-                let loser = if better { best[r][lane] } else { product };
-                second[r][lane] = if loser > second[r][lane] { loser } else { second[r][lane] };
-                place[r][lane] = if better { number as u32 } else { place[r][lane] };
-                best[r][lane] = if better { product } else { best[r][lane] };
-            }
+        for (running, products) in running.iter_mut().zip([a, b, c, d]) {
+            running.take(&products, number as u32);
         }
     }
-    std::array::from_fn(|r| over_lanes(&best[r], &second[r], &place[r]))
+    running.map(|r| over_lanes(&r.best, &r.second, &r.place))
+}
+
+#[inline(always)]
+fn add_multiple(sum: &mut [f32; LANES], factor: f32, column: &[f32; LANES]) {
+    for lane in 0..LANES {
+        sum[lane] += factor * column[lane];
+    }
+}
+
+/// Best and second best of the columns so far, lane by lane, and the panel of the best.
+#[derive(Clone, Copy)]
+struct Running {
+    best: [f32; LANES],
+    second: [f32; LANES],
+    place: [u32; LANES],
+}
+
+impl Default for Running {
+    fn default() -> Self {
+        Self { best: [f32::NEG_INFINITY; LANES], second: [f32::NEG_INFINITY; LANES], place: [0; LANES] }
+    }
+}
+
+impl Running {
+    #[inline(always)]
+    fn take(&mut self, products: &[f32; LANES], number: u32) {
+        for lane in 0..LANES {
+            let (product, best) = (products[lane], self.best[lane]);
+            let better = product > best;
+            let loser = if better { best } else { product };
+            self.second[lane] = if loser > self.second[lane] { loser } else { self.second[lane] };
+            self.place[lane] = if better { number } else { self.place[lane] };
+            self.best[lane] = if better { product } else { best };
+        }
+    }
 }
 
 /// The best lane, of equal ones that with the lowest index; the second best of all is the best of what lost.
@@ -147,7 +172,8 @@ fn over_lanes(best: &[f32; LANES], second: &[f32; LANES], place: &[u32; LANES]) 
     let index = |lane: usize| place[lane] * LANES as u32 + lane as u32;
     let mut winner = 0;
     for lane in 1..LANES {
-        if best[lane] > best[winner] || (best[lane] == best[winner] && index(lane) < index(winner)) {
+        let order = best[lane].total_cmp(&best[winner]).then(index(winner).cmp(&index(lane)));
+        if order == std::cmp::Ordering::Greater {
             winner = lane;
         }
     }

@@ -81,15 +81,19 @@ pub struct CoarseOptions {
     pub estimator: Estimator,
     /// Distance up to which a correspondence agrees with a pose, voxels. Default 1.5.
     pub tolerance_voxels: f64,
-    /// Different poses that are refined and verified. Default 12.
+    /// Different poses that are refined and verified. Default 8.
     pub max_hypotheses: usize,
-    /// Fewest correspondences that agree with the pose. Default 8.
+    /// Fewest correspondences that agree with the pose. Default 25.
     pub min_inliers: usize,
-    /// Smallest fraction of the smaller cloud that must have a partner. Default 0.15.
+    /// Smallest fraction of the smaller cloud that must have a partner. Default 0.2.
     pub min_overlap: f64,
-    /// Smallest fraction of the points in the other cloud's view that must lie on its surface. Default 0.7.
+    /// Smallest fraction of the points in the other cloud's view that must lie on its surface. Default 0.93.
     pub min_agreement: f64,
-    /// Largest score of the best different pose, as a fraction of the winner's. Default 0.95.
+    /// Smallest eigenvalue of the normal matrix of partners (see [`super::CoarseAlignment::determined`]). Default 0.008: a
+    /// wall and a floor have up to 0.006 from noise and rounded edges, three walls 0.05 and more. 0 lets features decide
+    /// where surfaces cannot.
+    pub min_determined: f64,
+    /// Largest score of the best different pose, as a fraction of the winner's. Default 0.92.
     pub max_rival: f64,
     /// Start of the random numbers.
     pub seed: u64,
@@ -107,11 +111,12 @@ impl Default for CoarseOptions {
             max_ratio: None,
             estimator: Estimator::ConsistencyGraph,
             tolerance_voxels: 1.5,
-            max_hypotheses: 12,
-            min_inliers: 8,
-            min_overlap: 0.15,
-            min_agreement: 0.7,
-            max_rival: 0.95,
+            max_hypotheses: 8,
+            min_inliers: 25,
+            min_overlap: 0.2,
+            min_agreement: 0.93,
+            min_determined: 0.008,
+            max_rival: 0.92,
             seed: 1,
         }
     }
@@ -131,7 +136,11 @@ impl CoarseOptions {
                 return Err(Error::InvalidOption { name, value, domain });
             }
         }
-        for (name, value) in [("min_overlap", self.min_overlap), ("min_agreement", self.min_agreement)] {
+        for (name, value) in [
+            ("min_overlap", self.min_overlap),
+            ("min_agreement", self.min_agreement),
+            ("min_determined", self.min_determined),
+        ] {
             if !(0.0..=1.0).contains(&value) {
                 return Err(Error::InvalidOption { name, value, domain: "between 0 and 1" });
             }

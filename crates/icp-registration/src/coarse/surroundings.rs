@@ -101,12 +101,16 @@ fn neighbouring_ranges(keys: &[u64], key: u64) -> Vec<std::ops::Range<usize>> {
 
 fn list(points: &[[f32; 3]], i: usize, ranges: &[std::ops::Range<usize>], limit: f32, items: &mut Vec<Near>) {
     let p = points[i];
+    let mut length = items.len();
+    let most: usize = ranges.iter().map(ExactSizeIterator::len).sum();
+    items.resize(length + most + 1, Near { index: 0, squared: 0.0 });
     for range in ranges {
         for (j, q) in range.clone().zip(&points[range.clone()]) {
             let squared = (p[0] - q[0]).powi(2) + (p[1] - q[1]).powi(2) + (p[2] - q[2]).powi(2);
-            if squared <= limit && j != i {
-                items.push(Near { index: j as u32, squared });
-            }
+            // Written always, kept only if near: no branch to be guessed.
+            items[length] = Near { index: j as u32, squared };
+            length += usize::from(squared <= limit && j != i);
         }
     }
+    items.truncate(length);
 }

@@ -1,7 +1,13 @@
 //! What can be chosen in an ICP run.
 
-use crate::error::{Error, Result};
+use nalgebra::Matrix6;
+
+use super::{Alternative, Registration};
 use crate::kernel::RobustKernel;
+use crate::parts::{
+    AllPoints, EveryNth, MaxNormalAngle, NormalSpace, PairRejection, PlaneToPlane, PointToPlane, PointToPoint,
+    RandomPoints, Settled, Stability, SymmetricPlanes, Trimmed,
+};
 
 /// What is minimised.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -12,6 +18,10 @@ pub enum Metric {
     /// Distance of the source point from the tangent plane of the target `[ChenMedioni1992]`.
     #[default]
     PointToPlane,
+    /// Distance along the mean of both normals `[Rusinkiewicz2019]`.
+    SymmetricPlanes,
+    /// Distance of small disks: generalised ICP `[Segal2009]`.
+    PlaneToPlane,
 }
 
 /// Which source points take part.
@@ -26,6 +36,15 @@ pub enum Selection {
     /// About this many, spread evenly over the directions of the normals `[RusinkiewiczLevoy2001]`: what few points
     /// say about a sliding direction is not drowned by a large wall.
     NormalSpace(usize),
+    /// A random sample.
+    Random {
+        /// Number of points.
+        count: usize,
+        /// Seed: the same points for the same seed.
+        seed: u64,
+    },
+    /// About this many, chosen such that all six motions are held as evenly as the surface allows `[Gelfand2003]`.
+    Stability(usize),
 }
 
 /// What happens to motions that the geometry does not determine.
@@ -37,6 +56,9 @@ pub enum DegeneracyPolicy {
     Report,
     /// They are named, and the pose keeps the guess along them (to first order).
     HoldAtGuess,
+    /// As [`DegeneracyPolicy::HoldAtGuess`], and at the end the guess enters as an observation with its
+    /// `prior_covariance`: what the geometry leaves open stays at the guess with the guess's standard deviation.
+    HoldAtPrior,
 }
 
 /// Options of an ICP run. The defaults carry no scale: distances left at `None` come from the clouds.
@@ -65,6 +87,9 @@ pub struct IcpOptions {
     pub step_tolerance_m: Option<f64>,
     /// What happens to undetermined motions.
     pub degeneracy: DegeneracyPolicy,
+    /// Covariance of the guess in the tangent `[dt target axes (m), dtheta source axes (rad)]`, needed and used only
+    /// for [`DegeneracyPolicy::HoldAtPrior`].
+    pub prior_covariance: Option<Matrix6<f64>>,
     /// A motion counts as undetermined when the predicted standard deviation of points at the cloud's radius exceeds
     /// this, metre. `None`: 1/300 of the radius.
     pub max_motion_sigma_m: Option<f64>,
@@ -85,6 +110,7 @@ impl Default for IcpOptions {
             max_iterations: 100,
             step_tolerance_m: None,
             degeneracy: DegeneracyPolicy::Report,
+            prior_covariance: None,
             max_motion_sigma_m: None,
             min_correspondences: 20,
         }
@@ -92,39 +118,43 @@ impl Default for IcpOptions {
 }
 
 impl IcpOptions {
-    pub(crate) fn validate(&self) -> Result<()> {
-        let lengths = [
-            ("max_correspondence_distance_m", self.max_correspondence_distance_m),
-            ("initial_correspondence_distance_m", self.initial_correspondence_distance_m),
-            ("step_tolerance_m", self.step_tolerance_m),
-            ("max_motion_sigma_m", self.max_motion_sigma_m),
-            ("max_normal_angle_rad", self.max_normal_angle_rad),
-        ];
-        for (name, value) in lengths {
-            if let Some(value) = value
-                && !(value > 0.0 && value.is_finite())
-            {
-                return Err(Error::InvalidOption { name, value, domain: "positive and finite" });
+    /// Puts the parts that stand for these options into a registration.
+    pub(super) fn apply(&self, registration: &mut Registration<'_>) {
+        let angle = self.max_normal_angle_rad;
+        let trim = if self.trim.to_bits() == 1.0_f64.to_bits() { None } else { Some(self.trim) };
+        let robust = if self.kernel == RobustKernel::None { RobustKernel::None } else { RobustKernel::Huber };
+        registration.selection = match self.selection {
+            Selection::All => Box::new(AllPoints),
+            Selection::EveryNth(n) => Box::new(EveryNth(n)),
+            Selection::NormalSpace(count) => Box::new(NormalSpace(count)),
+            Selection::Random { count, seed } => Box::new(RandomPoints { count, seed }),
+            Selection::Stability(count) => Box::new(Stability(count)),
+        };
+        registration.alternatives = Alternative::usual(robust, angle, trim);
+        registration.metric = match self.metric {
+            Metric::PointToPoint => Box::new(PointToPoint),
+            Metric::PointToPlane => Box::new(PointToPlane),
+            Metric::SymmetricPlanes => Box::new(SymmetricPlanes),
+            Metric::PlaneToPlane => Box::new(PlaneToPlane::default()),
+        };
+        if matches!(self.metric, Metric::SymmetricPlanes | Metric::PlaneToPlane) {
+            // From afar the target's planes alone draw in farther.
+            for alternative in &mut registration.alternatives {
+                alternative.metric = Some(Box::new(PointToPlane));
             }
         }
-        if !(self.trim > 0.0 && self.trim <= 1.0) {
-            return Err(Error::InvalidOption { name: "trim", value: self.trim, domain: "above 0 and at most 1" });
-        }
-        let counts = [("max_iterations", self.max_iterations, 1), ("min_correspondences", self.min_correspondences, 3)];
-        for (name, value, least) in counts {
-            if value < least {
-                let domain = if least == 1 { "1 or more" } else { "3 or more" };
-                return Err(Error::InvalidOption { name, value: value as f64, domain });
-            }
-        }
-        match self.selection {
-            Selection::EveryNth(0) => {
-                Err(Error::InvalidOption { name: "selection", value: 0.0, domain: "every 1st or more" })
-            }
-            Selection::NormalSpace(0) => {
-                Err(Error::InvalidOption { name: "selection", value: 0.0, domain: "1 point or more" })
-            }
-            _ => Ok(()),
-        }
+        let mut rejection: Vec<Box<dyn PairRejection>> = Vec::new();
+        rejection.extend(angle.map(|angle| Box::new(MaxNormalAngle(angle)) as Box<dyn PairRejection>));
+        rejection.extend(trim.map(|trim| Box::new(Trimmed(trim)) as Box<dyn PairRejection>));
+        registration.rejection = rejection;
+        registration.kernel = Box::new(self.kernel);
+        registration.levels.first_limit_m = self.initial_correspondence_distance_m;
+        registration.levels.last_limit_m = self.max_correspondence_distance_m;
+        let (max_iterations, step_tolerance_m) = (self.max_iterations, self.step_tolerance_m);
+        registration.stopping = Box::new(Settled { max_iterations, step_tolerance_m, ..Settled::default() });
+        registration.degeneracy = self.degeneracy;
+        registration.prior_covariance = self.prior_covariance;
+        registration.max_motion_sigma_m = self.max_motion_sigma_m;
+        registration.min_correspondences = self.min_correspondences;
     }
 }

@@ -9,12 +9,13 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::{DMatrix, DVector, Isometry3, Matrix6, Vector6};
+use nalgebra::{DMatrix, DVector, Matrix6, Vector6};
 
 use super::motion::{UndeterminedMotion, name_motions};
 use super::system::System;
 use crate::eigen::eigen6;
 use crate::error::Result;
+use crate::parts::Rows;
 use crate::pose::{symmetrised, tangent_from_centred};
 
 /// Cells across the rms radius of the pairs.
@@ -61,14 +62,9 @@ pub(crate) struct Verdict {
 }
 
 impl Verdict {
-    /// Judges the pairs of `system` at `pose`; motions with a predicted sigma above `max_sigma_m` are undetermined.
-    pub(crate) fn new(
-        system: &System<'_>,
-        pose: &Isometry3<f64>,
-        max_sigma_m: f64,
-        residuals: Residuals,
-    ) -> Result<Self> {
-        let cells = cells(system, pose);
+    /// Judges the pairs of `system`; motions with a predicted sigma above `max_sigma_m` are undetermined.
+    pub(crate) fn new(system: &System<'_>, max_sigma_m: f64, residuals: Residuals) -> Result<Self> {
+        let cells = cells(system);
         let information = cells.iter().fold(Matrix6::zeros(), |sum, c| sum + c.information);
         let (values, vectors) = eigen6(&symmetrised(&information), "the information of the pairs")?;
         let score = match residuals {
@@ -86,39 +82,64 @@ impl Verdict {
         self.directions.iter().filter(|d| !d.determined).map(|d| d.vector).collect()
     }
 
-    /// Whether a step `[dt, rho w]` stays within `fraction` of the standard deviation along every determined motion.
-    pub(crate) fn is_within_noise(&self, step: &Vector6<f64>, fraction: f64) -> bool {
-        self.directions.iter().filter(|d| d.determined).all(|d| d.vector.dot(step).abs() <= fraction * d.sigma_m)
+    /// A step `[dt, rho w]` over the standard deviation, along the determined motion where that is largest.
+    pub(crate) fn over_sigma(&self, step: &Vector6<f64>) -> f64 {
+        let determined = self.directions.iter().filter(|d| d.determined);
+        determined.map(|d| d.vector.dot(step).abs() / d.sigma_m.max(f64::MIN_POSITIVE)).fold(0.0, f64::max)
     }
 
     /// The undetermined motions, sorted into translations and rotations.
     pub(crate) fn undetermined(&self, system: &System<'_>) -> Vec<UndeterminedMotion> {
         let space: Vec<(Vector6<f64>, f64)> =
             self.directions.iter().filter(|d| !d.determined).map(|d| (d.vector, d.sigma_m)).collect();
-        name_motions(&space, &system.centre, system.radius_m)
+        name_motions(&space, &system.centre(), system.radius_m())
     }
 
     /// Covariance in the tangent `[dt target axes, dtheta source axes]`: the sandwich `A⁻¹ M A⁻ᵀ` with the response A of
     /// the score. What is not known at all gets the radius of the pairs as sigma.
-    pub(crate) fn covariance(
-        &self,
-        system: &System<'_>,
-        pose: &Isometry3<f64>,
-        response: &Matrix6<f64>,
-    ) -> Matrix6<f64> {
+    pub(crate) fn covariance(&self, system: &System<'_>, response: &Matrix6<f64>) -> Matrix6<f64> {
         let (known, unknown): (Vec<&Direction>, Vec<&Direction>) =
             self.directions.iter().partition(|d| d.sigma_m.is_finite());
-        let basis = DMatrix::from_fn(6, known.len(), |r, c| known[c].vector[r]);
-        let inverse = inverse_response(&known, &basis, response);
-        let score = basis.transpose() * self.score * &basis;
-        let inside = &basis * (&inverse * score * inverse.transpose()) * basis.transpose();
-        let mut centred = Matrix6::from_fn(|r, c| inside[(r, c)]);
+        let (basis, inside) = self.sandwich(&known, response);
+        let mut centred = expanded(&basis, &inside);
         for direction in unknown {
-            centred += direction.vector * direction.vector.transpose() * system.radius_m.powi(2);
+            centred += direction.vector * direction.vector.transpose() * system.radius_m().powi(2);
         }
-        let to_tangent = tangent_from_centred(pose, &system.centre, system.radius_m);
-        symmetrised(&(to_tangent * centred * to_tangent.transpose()))
+        in_tangent(system, &centred)
     }
+
+    /// Inverse of the covariance along the determined motions, zero along the others; in the tangent of
+    /// [`Verdict::covariance`].
+    pub(crate) fn information(&self, system: &System<'_>, response: &Matrix6<f64>) -> Matrix6<f64> {
+        let known: Vec<&Direction> = self.directions.iter().filter(|d| d.determined).collect();
+        let (basis, inside) = self.sandwich(&known, response);
+        let inverse = inside.try_inverse().unwrap_or_else(|| DMatrix::zeros(known.len(), known.len()));
+        let centred = expanded(&basis, &inverse);
+        let pose = system.scene().moment.pose;
+        let to_tangent = tangent_from_centred(&pose, &system.centre(), system.radius_m());
+        let from_tangent = to_tangent.try_inverse().unwrap_or_else(Matrix6::zeros);
+        symmetrised(&(from_tangent.transpose() * centred * from_tangent))
+    }
+
+    /// Columns of the known motions, and the covariance along them.
+    fn sandwich(&self, known: &[&Direction], response: &Matrix6<f64>) -> (DMatrix<f64>, DMatrix<f64>) {
+        let basis = DMatrix::from_fn(6, known.len(), |r, c| known[c].vector[r]);
+        let inverse = inverse_response(known, &basis, response);
+        let score = basis.transpose() * self.score * &basis;
+        let inside = &inverse * score * inverse.transpose();
+        (basis, inside)
+    }
+}
+
+fn expanded(basis: &DMatrix<f64>, inside: &DMatrix<f64>) -> Matrix6<f64> {
+    let full = basis * inside * basis.transpose();
+    Matrix6::from_fn(|r, c| full[(r, c)])
+}
+
+fn in_tangent(system: &System<'_>, centred: &Matrix6<f64>) -> Matrix6<f64> {
+    let pose = system.scene().moment.pose;
+    let to_tangent = tangent_from_centred(&pose, &system.centre(), system.radius_m());
+    symmetrised(&(to_tangent * centred * to_tangent.transpose()))
 }
 
 /// Inverse of the response among the known directions; that of their information where the differences drown in noise.
@@ -155,55 +176,43 @@ fn clustered_scores(system: &System<'_>, cells: &[Cell]) -> Matrix6<f64> {
         return sum * (count / (count - 6.0));
     }
     // Too few cells to estimate from: the pairs of a cell taken as fully dependent.
-    independent_scores(system) * (system.pairs.len() as f64 / count.max(1.0))
+    independent_scores(system) * (system.pairs().len() as f64 / count.max(1.0))
 }
 
 /// Covariance of the summed score of pairs that share nothing.
 fn independent_scores(system: &System<'_>) -> Matrix6<f64> {
-    let pairs = system.pairs.len() as f64;
+    let pairs = system.pairs().len() as f64;
+    let mut rows = Rows::default();
     let mut sum = Matrix6::zeros();
-    for (i, pair) in system.pairs.iter().enumerate() {
-        let (weight, _) = system.weights(i);
-        let (rows, count) = system.rows(pair);
-        for row in &rows[..count] {
-            sum += row.jacobian * row.jacobian.transpose() * (weight * row.residual).powi(2);
-        }
+    for i in 0..system.pairs().len() {
+        let score = system.score(i, &mut rows);
+        sum += score * score.transpose();
     }
     sum * (pairs / (pairs - 6.0).max(1.0))
 }
 
-fn cells(system: &System<'_>, pose: &Isometry3<f64>) -> Vec<Cell> {
-    let size = system.radius_m / CELLS_PER_RADIUS;
+fn cells(system: &System<'_>) -> Vec<Cell> {
+    let size = system.radius_m() / CELLS_PER_RADIUS;
     let mut cells: BTreeMap<[i64; 3], Cell> = BTreeMap::new();
-    for (i, pair) in system.pairs.iter().enumerate() {
-        let place = (pair.moved - system.centre) / size;
+    let mut buffers = [Rows::default(), Rows::default()];
+    let twin_weight = system.twin_weight();
+    for (i, pair) in system.pairs().iter().enumerate() {
+        let place = (pair.moved - system.centre()) / size;
         let cell = cells.entry([place.x.floor() as i64, place.y.floor() as i64, place.z.floor() as i64]).or_default();
-        let (weight, slope) = system.weights(i);
-        let (rows, count) = system.rows(pair);
-        for row in &rows[..count] {
-            cell.score += row.jacobian * (weight * row.residual);
-        }
-        cell.information += pair_information(system, pose, i) * slope;
+        cell.score += system.score(i, &mut buffers[0]);
+        let (_, slope) = system.weights(i);
+        add_information(system, i, slope * twin_weight, &mut buffers, &mut cell.information);
     }
     cells.into_values().collect()
 }
 
-/// Information of a pair for unit weight: the symmetric cross product of the derivatives along both normals, or, where
-/// normals are not used at all, the metric's own.
-fn pair_information(system: &System<'_>, pose: &Isometry3<f64>, i: usize) -> Matrix6<f64> {
-    let pair = &system.pairs[i];
-    let Some(normals) = system.matcher.source_normals else {
-        let (rows, count) = system.rows(pair);
-        return rows[..count].iter().fold(Matrix6::zeros(), |sum, r| sum + r.jacobian * r.jacobian.transpose());
-    };
-    let along_target = system.matcher.target.normals[pair.target];
-    let mut along_source = pose.rotation * normals[pair.source];
-    if along_source.dot(&along_target) < 0.0 {
-        along_source = -along_source;
+/// Information of a pair: the symmetric products of its derivatives from independent measurements.
+fn add_information(system: &System<'_>, i: usize, weight: f64, [a, b]: &mut [Rows; 2], information: &mut Matrix6<f64>) {
+    let pair = &system.pairs()[i];
+    system.twins(pair, a, b);
+    for (row, twin) in a.as_slice().iter().zip(b.as_slice()) {
+        let (row, twin) = (system.jacobian(pair, row), system.jacobian(pair, twin));
+        information.ger(0.5 * weight, &row, &twin, 1.0);
+        information.ger(0.5 * weight, &twin, &row, 1.0);
     }
-    if along_source.x.is_nan() || along_target.x.is_nan() {
-        return Matrix6::zeros();
-    }
-    let (a, b) = (system.row(pair, &along_target).jacobian, system.row(pair, &along_source).jacobian);
-    (a * b.transpose() + b * a.transpose()) * 0.5
 }

@@ -5,28 +5,35 @@
 //! (three quarters where the noise is a third of the spacing). The covariance needs the true response, so the score is
 //! evaluated at displaced poses.
 
-use nalgebra::{Isometry3, Matrix6, Vector6};
+use nalgebra::{Matrix6, Vector6};
 
-use super::System;
+use super::matching::Points;
+use super::registration::Engine;
+use super::system::System;
 use crate::error::Result;
-use crate::pose::move_about;
+use crate::parts::{Moment, Rows};
 
 /// Response `d(Σ w J r)/d[dt, rho w]` of a sample of the pairs, scaled up to all of them.
 ///
 /// `sample`: source points; `step_m`: displacement, of the order of the residuals.
 pub(crate) fn sensitivity(
+    engine: &Engine<'_>,
     system: &System<'_>,
-    pose: &Isometry3<f64>,
     sample: &[usize],
-    limit_m: f64,
     step_m: f64,
 ) -> Result<Matrix6<f64>> {
-    let matcher = system.matcher;
-    let score = |motion: &Vector6<f64>| -> Result<(Vector6<f64>, usize)> {
-        let moved = move_about(pose, &system.centre, system.radius_m, motion);
-        let pairs = matcher.trimmed(matcher.pairs(&moved, sample, limit_m)?);
-        Ok((system.with_pairs(&pairs).normal_equations().1, pairs.len()))
+    let moment = system.scene().moment;
+    let mut points = Points::new(sample.to_vec());
+    points.remember();
+    let mut score = |motion: &Vector6<f64>| -> Result<(Vector6<f64>, usize)> {
+        let scene = engine.scene.at(Moment { pose: system.moved(motion), ..moment });
+        let pairs = engine.judged(&scene, engine.gated_pairs(&scene, &mut points)?);
+        let displaced = system.with_pairs(&scene, &pairs);
+        let mut rows = Rows::default();
+        Ok(((0..pairs.len()).fold(Vector6::zeros(), |sum, i| sum + displaced.score(i, &mut rows)), pairs.len()))
     };
+    // The answers at the pose itself serve the small displacements.
+    score(&Vector6::zeros())?;
     let mut response = Matrix6::zeros();
     let mut count = 0;
     for k in 0..6 {
@@ -37,5 +44,5 @@ pub(crate) fn sensitivity(
         count += a + b;
     }
     let average = (count as f64 / 12.0).max(1.0);
-    Ok(response * (system.pairs.len() as f64 / average))
+    Ok(response * (system.pairs().len() as f64 / average))
 }

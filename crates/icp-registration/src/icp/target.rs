@@ -2,12 +2,13 @@
 
 use nalgebra::{Isometry3, Vector3};
 
-use super::{IcpOptions, IcpResult, run};
+use super::{IcpOptions, IcpResult, Registration};
 use crate::cloud::Cloud;
 use crate::error::Result;
 use crate::kernel::quantile;
 use crate::neighbours::NeighbourTree;
 use crate::normals::{UnorganisedNormalOptions, normals_with_tree};
+use crate::parts::TargetSurface;
 
 /// Points whose distance to their neighbour is looked at for the spacing.
 const SPACING_SAMPLES: usize = 2000;
@@ -19,7 +20,6 @@ pub struct IcpTarget {
     pub(crate) tree: NeighbourTree,
     /// Given normals, or those of the nearest neighbours.
     pub(crate) normals: Vec<Vector3<f64>>,
-    pub(crate) normals_given: bool,
     pub(crate) spacing_m: f64,
     pub(crate) radius_m: f64,
 }
@@ -33,14 +33,13 @@ impl IcpTarget {
     pub fn new(cloud: Cloud) -> Result<Self> {
         cloud.validate("the target cloud")?;
         let tree = NeighbourTree::new(&cloud.points)?;
-        let normals_given = cloud.normals.is_some();
         let normals = match &cloud.normals {
             Some(normals) => normals.clone(),
             None => normals_with_tree(&cloud.points, &tree, &UnorganisedNormalOptions::default())?,
         };
         let spacing_m = spacing(&cloud, &tree)?;
         let radius_m = radius(&cloud);
-        Ok(Self { cloud, tree, normals, normals_given, spacing_m, radius_m })
+        Ok(Self { cloud, tree, normals, spacing_m, radius_m })
     }
 
     /// The cloud itself.
@@ -65,7 +64,13 @@ impl IcpTarget {
 
     /// Aligns a source with this target: see [`crate::align`].
     pub fn align(&self, source: &Cloud, guess: &Isometry3<f64>, options: &IcpOptions) -> Result<IcpResult> {
-        run(source, self, guess, options)
+        Registration::with_options(self, options).align(source, guess)
+    }
+
+    /// What the parts are shown of it.
+    pub(crate) fn surface(&self) -> TargetSurface<'_> {
+        let (radius_m, spacing_m) = (self.radius_m, self.spacing_m);
+        TargetSurface { cloud: Some(&self.cloud), radius_m, spacing_m, exact_normals: false }
     }
 }
 

@@ -4,7 +4,7 @@ use adjust::{
     Adjustment, BlockId, Covariance, EvaluationFailure, FunctionObservation, Jacobians, Kernel, ParameterBlock,
     RigidPose, Scale, SolveOptions,
 };
-use nalgebra::{Isometry3, Matrix3, Matrix6, Vector3};
+use nalgebra::{DMatrix, Isometry3, Matrix3, Matrix6, Vector3, Vector6};
 
 use crate::error::{Error, Result};
 use crate::pose::pose_difference;
@@ -28,6 +28,9 @@ pub struct PairConstraint {
 pub enum Datum {
     /// One station keeps its pose.
     Station(usize),
+    /// None is preferred: positions and attitudes are on average those at the start, which makes the covariances as
+    /// small as they can be.
+    InnerConstraints,
 }
 
 /// Options of [`adjust_stations`].
@@ -86,7 +89,7 @@ pub fn adjust_stations(
 ) -> Result<StationAdjustment> {
     let count = initial_world_from_station.len();
     require_poses(count, initial_world_from_station)?;
-    let Datum::Station(fixed) = datum;
+    let fixed = datum.held_station();
     for station in pairs.iter().flat_map(|pair| [pair.target, pair.source]).chain([fixed]) {
         if station >= count {
             return Err(Error::NoSuchStation { station, count });
@@ -115,16 +118,34 @@ pub fn adjust_stations(
     let solution = network.solve(&options).map_err(adjustment)?;
     let poses =
         blocks.iter().map(|block| solution.pose(*block)).collect::<adjust::Result<Vec<_>>>().map_err(adjustment)?;
-    let covariance = blocks.iter().enumerate().map(|(station, block)| match station {
-        held if held == fixed => Ok(Matrix6::zeros()),
-        _ => solution.covariance(*block, Scale::Prior).map(|c| Matrix6::from_fn(|row, column| c[(row, column)])),
-    });
+    let free = solution.covariance_matrix(Scale::Prior).map_err(adjustment)?;
+    let cofactors = with_held_station(&free, 6 * fixed, 6 * count);
+    let (poses, cofactors) = datum.apply(initial_world_from_station, poses, cofactors, lever_m(pairs));
     Ok(StationAdjustment {
-        covariance: covariance.collect::<adjust::Result<Vec<_>>>().map_err(adjustment)?,
+        covariance: (0..count).map(|k| cofactors.fixed_view::<6, 6>(6 * k, 6 * k).into_owned()).collect(),
         sigma0: solution.sigma0(),
         redundancy: solution.redundancy(),
         residuals: pairs.iter().map(|pair| pair_residual(pair, &poses)).collect(),
         world_from_station: poses,
+    })
+}
+
+/// Root mean square distance of paired stations: where rotations count as lengths.
+fn lever_m(pairs: &[PairConstraint]) -> f64 {
+    let squares: f64 = pairs.iter().map(|pair| pair.target_from_source.translation.vector.norm_squared()).sum();
+    (squares / pairs.len().max(1) as f64).sqrt().max(f64::MIN_POSITIVE.sqrt())
+}
+
+/// Puts zeros in for the six unknowns from `first` on.
+pub(super) fn with_held_station(free: &DMatrix<f64>, first: usize, size: usize) -> DMatrix<f64> {
+    let place = |k: usize| match k {
+        _ if k < first => Some(k),
+        _ if k < first + 6 => None,
+        _ => Some(k - 6),
+    };
+    DMatrix::from_fn(size, size, |r, c| match (place(r), place(c)) {
+        (Some(r), Some(c)) => free[(r, c)],
+        _ => 0.0,
     })
 }
 
@@ -135,12 +156,23 @@ fn relative_pose(
     residual: &mut [f64],
     jacobians: Option<&mut Jacobians<'_>>,
 ) -> std::result::Result<(), EvaluationFailure> {
+    let (v, by_target, by_source) = relative_pose_parts(observed, poses)?;
+    residual.copy_from_slice(v.as_slice());
+    let Some(jacobians) = jacobians else { return Ok(()) };
+    jacobians.set(0, &by_target);
+    jacobians.set(1, &by_source);
+    Ok(())
+}
+
+/// The residual of a relative pose, and the Jacobians of the model by target and source.
+pub(super) fn relative_pose_parts(
+    observed: &Isometry3<f64>,
+    poses: &[&[f64]],
+) -> std::result::Result<(Vector6<f64>, Matrix6<f64>, Matrix6<f64>), EvaluationFailure> {
     let world_from_target = RigidPose::isometry(poses[0])?;
     let world_from_source = RigidPose::isometry(poses[1])?;
     let model = world_from_target.inverse() * world_from_source;
     let v = pose_difference(&model, observed);
-    residual.copy_from_slice(v.as_slice());
-    let Some(jacobians) = jacobians else { return Ok(()) };
     // Steps [dt world, dtheta own axes] move the relative pose R = Rt^T Rs, t = Rt^T (ts - tt) by
     //   source: dt = Rt^T dts,                 dtheta = dthetas
     //   target: dt = -Rt^T dtt + [t]x dthetat, dtheta = -R^T dthetat
@@ -155,9 +187,7 @@ fn relative_pose(
     let mut by_source = Matrix6::zeros();
     by_source.fixed_view_mut::<3, 3>(0, 0).copy_from(&target_from_world);
     by_source.fixed_view_mut::<3, 3>(3, 3).copy_from(&turned);
-    jacobians.set(0, &by_target);
-    jacobians.set(1, &by_source);
-    Ok(())
+    Ok((v, by_target, by_source))
 }
 
 /// `J⁻¹` with `log(exp(-d) exp(v)) = v - J⁻¹(v) d` to first order in d.
@@ -192,7 +222,7 @@ pub(super) fn require_poses(stations: usize, poses: &[Isometry3<f64>]) -> Result
 }
 
 #[allow(clippy::needless_pass_by_value)] // the form that map_err takes
-fn adjustment(error: adjust::Error) -> Error {
+pub(super) fn adjustment(error: adjust::Error) -> Error {
     Error::Adjustment(error.to_string())
 }
 

@@ -118,7 +118,8 @@ pub fn adjust_surfaces(
     let mut round = 1;
     loop {
         let overlaps = find_overlaps(stations, &poses, overlap_distance_m)?;
-        let candidates = best_partners(&overlaps, stations.len(), options);
+        let (least, partners) = (options.minimum_overlap, options.partners_per_station);
+        let candidates = best_partners(&overlaps, stations.len(), least, partners);
         let (aligned, mut refused) = align_pairs(stations, &poses, &candidates, &icp, progress);
         let enough = |pair: &PairAlignment| pair.result.overlap >= options.minimum_partners;
         let (mut pairs, thin): (Vec<_>, Vec<_>) = aligned.into_iter().partition(enough);
@@ -140,7 +141,7 @@ pub fn adjust_surfaces(
     }
 }
 
-fn without_partners(pair: &PairAlignment) -> RefusedPair {
+pub(super) fn without_partners(pair: &PairAlignment) -> RefusedPair {
     let reason = format!("only {:.0} % of the points have a partner", 100.0 * pair.result.overlap);
     RefusedPair { target: pair.target, source: pair.source, reason }
 }
@@ -195,15 +196,20 @@ fn constraints(stations: &[IcpTarget], pairs: &[PairAlignment], started_within_m
 }
 
 /// Pairs of target and source that are among the best partners of either, in ascending order.
-fn best_partners(overlaps: &[Overlap], stations: usize, options: &SurfaceAdjustmentOptions) -> Vec<(usize, usize)> {
-    let enough: Vec<&Overlap> = overlaps.iter().filter(|o| o.fraction >= options.minimum_overlap).collect();
+pub(super) fn best_partners(
+    overlaps: &[Overlap],
+    stations: usize,
+    minimum_overlap: f64,
+    partners_per_station: usize,
+) -> Vec<(usize, usize)> {
+    let enough: Vec<&Overlap> = overlaps.iter().filter(|o| o.fraction >= minimum_overlap).collect();
     let mut chosen = BTreeSet::new();
     for station in 0..stations {
         let mut partners: Vec<&&Overlap> =
             enough.iter().filter(|o| o.target == station || o.source == station).collect();
         // Stable: equal overlaps stay in the order of the stations.
         partners.sort_by(|a, b| b.fraction.total_cmp(&a.fraction));
-        chosen.extend(partners.iter().take(options.partners_per_station).map(|o| (o.target, o.source)));
+        chosen.extend(partners.iter().take(partners_per_station).map(|o| (o.target, o.source)));
     }
     chosen.into_iter().collect()
 }
@@ -221,12 +227,20 @@ pub fn align_pairs(
 ) -> (Vec<PairAlignment>, Vec<RefusedPair>) {
     let finished = AtomicUsize::new(0);
     let align = |&(target, source): &(usize, usize)| {
-        let result = align_pair(stations, world_from_station, target, source, icp);
+        let result = guess(stations, world_from_station, target, source)
+            .and_then(|guess| align_pair(stations, target, source, &guess, icp));
         progress(finished.fetch_add(1, Ordering::Relaxed) + 1, candidates.len());
         result
     };
     // Collected in the order of the candidates, so that the number of threads does not matter.
-    let results: Vec<Result<IcpResult>> = candidates.par_iter().map(align).collect();
+    sorted_out(candidates, candidates.par_iter().map(align).collect())
+}
+
+/// Alignments that settled, and those that did not, with the reason.
+pub(super) fn sorted_out(
+    candidates: &[(usize, usize)],
+    results: Vec<Result<IcpResult>>,
+) -> (Vec<PairAlignment>, Vec<RefusedPair>) {
     let (mut pairs, mut refused) = (Vec::new(), Vec::new());
     for (&(target, source), result) in candidates.iter().zip(results) {
         match result {
@@ -241,17 +255,25 @@ pub fn align_pairs(
     (pairs, refused)
 }
 
-fn align_pair(
+fn guess(
     stations: &[IcpTarget],
     world_from_station: &[Isometry3<f64>],
     target: usize,
     source: usize,
+) -> Result<Isometry3<f64>> {
+    let count = stations.len().min(world_from_station.len());
+    match [target, source].into_iter().find(|station| *station >= count) {
+        Some(station) => Err(Error::NoSuchStation { station, count }),
+        None => Ok(world_from_station[target].inverse() * world_from_station[source]),
+    }
+}
+
+pub(super) fn align_pair(
+    stations: &[IcpTarget],
+    target: usize,
+    source: usize,
+    guess: &Isometry3<f64>,
     icp: &IcpOptions,
 ) -> Result<IcpResult> {
-    let count = stations.len().min(world_from_station.len());
-    if let Some(station) = [target, source].into_iter().find(|station| *station >= count) {
-        return Err(Error::NoSuchStation { station, count });
-    }
-    let guess = world_from_station[target].inverse() * world_from_station[source];
-    stations[target].align(stations[source].cloud(), &guess, icp)
+    stations[target].align(stations[source].cloud(), guess, icp)
 }

@@ -1,12 +1,16 @@
 //! The registration of two frames, level by level.
 
-use nalgebra::{Isometry3, Matrix6, Vector3, Vector6};
+use nalgebra::{Isometry3, Matrix6};
 
-use super::frame::{OrganisedFrame, STRIDES};
+use super::blocks::Block;
+use super::frame::OrganisedFrame;
+use super::grid::STRIDES;
 use super::options::FrameAlignmentOptions;
-use super::pairs::{Moved, Rules};
+use super::pairs::Rules;
 use super::quality::{Cell, Hold, Residuals, Verdict};
-use super::sums::{Normal, SUMS, normal_equations, residuals};
+use super::starts::{share_of_agreement, slid};
+use super::sums::{SUMS, normal_equations, residuals};
+use super::track::{Gauge, Track, blocks, moved, solve, turned};
 use crate::error::{Error, Result};
 use crate::icp::{DegeneracyPolicy, IcpResult, StopReason};
 use crate::kernel::quantile;
@@ -53,22 +57,6 @@ pub struct FrameAligner {
     cells: Vec<Cell>,
 }
 
-/// A pose on its way.
-struct Track {
-    pose: Isometry3<f64>,
-    iterations: usize,
-    rules: Rules,
-    /// Projection on the motions that are held.
-    held: Matrix6<f64>,
-}
-
-/// About which point, and in which unit, motions are solved.
-#[derive(Clone, Copy)]
-struct Gauge {
-    centre: Vector3<f64>,
-    radius_m: f64,
-}
-
 impl FrameAligner {
     /// # Errors
     /// [`Error::InvalidOption`].
@@ -107,47 +95,62 @@ impl FrameAligner {
             least_cosine: self.options.max_normal_angle_rad.cos() as f32,
         };
         let mut track = Track { pose: *guess, iterations: 0, rules, held: Matrix6::zeros() };
-        let counts = &source.points.counts[STRIDES.len() - self.options.levels..];
-        let coarse = counts[..counts.len() - 1].iter().filter(|c| **c >= FEWEST_POINTS);
-        self.open(&mut track, source, target, *coarse.clone().next().unwrap_or(&source.len()))?;
-        for &count in coarse {
-            self.descend(&mut track, source, target, count)?;
+        let coarsest = STRIDES.len() - self.options.levels;
+        let mut levels = (coarsest..STRIDES.len() - 1).filter(|l| source.points.counts[*l] >= FEWEST_POINTS);
+        match levels.next() {
+            Some(first) => track = self.start(&track, source, target, blocks(source, first))?,
+            None => self.open(&mut track, source, target, &source.points.blocks)?,
+        }
+        for level in levels {
+            self.descend(&mut track, source, target, blocks(source, level))?;
         }
         let stop = self.settle(&mut track, source, target)?;
-        self.result(&track, source, target, guess, stop)
+        let result = self.result(&track, source, target, guess, stop)?;
+        if result.degenerate.is_empty() || self.hold() == Hold::Undetermined || self.options.other_starts == 0 {
+            return Ok(result);
+        }
+        let Some(mut other) = slid(&track, &result.degenerate, source, target, blocks(source, 1)) else {
+            return Ok(result);
+        };
+        let passed = self.descend(&mut other, source, target, blocks(source, 2));
+        let Ok(stop) = passed.and_then(|()| self.settle(&mut other, source, target)) else { return Ok(result) };
+        let all = &source.points.blocks[..];
+        let gained = [&other, &track].map(|track| share_of_agreement(track, source, target, all));
+        if gained[0] > gained[1] { self.result(&other, source, target, guess, stop) } else { Ok(result) }
     }
 
     /// Sets the variance of what is not aligned from the residuals at the guess.
-    fn open(
+    pub(super) fn open(
         &mut self,
         track: &mut Track,
         source: &OrganisedFrame,
         target: &OrganisedFrame,
-        count: usize,
+        blocks: &[Block],
     ) -> Result<()> {
         let radius = target.points.radius_m.max(source.points.radius_m);
         track.rules.extra_variance = (radius * radius) as f32;
         let moved = moved(track, source, target);
-        residuals(&moved.0, &track.rules, count, SAMPLE, &mut self.scratch);
+        residuals(&moved.0, &track.rules, blocks, SAMPLE, &mut self.scratch);
         if self.scratch.is_empty() {
-            return Err(self.too_few(0, count, track));
+            return Err(self.too_few(0, source.len(), track));
         }
         let scale = MAD * quantile(&mut self.scratch, 0.5) * radius;
         track.rules.extra_variance = (scale * scale) as f32;
         Ok(())
     }
 
-    fn descend(
+    /// Passes one level.
+    pub(super) fn descend(
         &mut self,
         track: &mut Track,
         source: &OrganisedFrame,
         target: &OrganisedFrame,
-        count: usize,
+        blocks: &[Block],
     ) -> Result<()> {
         if self.hold() == Hold::Undetermined {
             let (moved, gauge) = moved(track, source, target);
             let limit = self.max_motion_sigma_m(&gauge);
-            let verdict = Verdict::new(&moved, &track.rules, count, limit, Residuals::Misaligned, &mut self.cells)?;
+            let verdict = Verdict::new(&moved, &track.rules, blocks, limit, Residuals::Misaligned, &mut self.cells)?;
             track.held = verdict.held();
         }
         for _ in 0..COARSE_ITERATIONS {
@@ -156,9 +159,9 @@ impl FrameAligner {
             }
             let wide = track.iterations < WIDE_ITERATIONS;
             track.rules.reach = if wide { 3.0 * BIWEIGHT } else { BIWEIGHT };
-            let (step, gauge) = self.step(track, source, target, count, 1e-4)?;
+            let (step, gauge) = self.step(track, source, target, blocks, 1e-4)?;
             if !wide {
-                self.narrow(track, source, target, count);
+                self.narrow(track, source, target, blocks);
             }
             if step < COARSE_TOLERANCE * gauge.radius_m && !wide {
                 break;
@@ -168,19 +171,20 @@ impl FrameAligner {
     }
 
     /// Lowers the variance of what is not aligned to what the residuals show.
-    fn narrow(&mut self, track: &mut Track, source: &OrganisedFrame, target: &OrganisedFrame, count: usize) {
+    fn narrow(&mut self, track: &mut Track, source: &OrganisedFrame, target: &OrganisedFrame, blocks: &[Block]) {
         let (moved, _) = moved(track, source, target);
-        residuals(&moved, &track.rules, count, SAMPLE, &mut self.scratch);
+        residuals(&moved, &track.rules, blocks, SAMPLE, &mut self.scratch);
         let square = (MAD * quantile(&mut self.scratch, 0.5)).powi(2) as f32;
         track.rules.extra_variance *= square.clamp(0.05, 1.0);
     }
 
+    /// Iterates on all points until the pose stands.
     fn settle(&mut self, track: &mut Track, source: &OrganisedFrame, target: &OrganisedFrame) -> Result<StopReason> {
-        let count = source.len();
+        let blocks = &source.points.blocks[..];
         if self.hold() == Hold::Undetermined {
             let (moved, gauge) = moved(track, source, target);
             let limit = self.max_motion_sigma_m(&gauge);
-            let verdict = Verdict::new(&moved, &track.rules, count, limit, Residuals::Settled, &mut self.cells)?;
+            let verdict = Verdict::new(&moved, &track.rules, blocks, limit, Residuals::Settled, &mut self.cells)?;
             track.held = verdict.held();
         }
         track.rules.extra_variance = 0.0;
@@ -190,7 +194,7 @@ impl FrameAligner {
                 self.rescale(track, source, target, narrowed == 0);
                 narrowed += 1;
             }
-            let (step, gauge) = self.step(track, source, target, count, 0.0)?;
+            let (step, gauge) = self.step(track, source, target, blocks, 0.0)?;
             if step <= self.options.step_tolerance_m.unwrap_or(1e-5 * gauge.radius_m) && narrowed >= 3 {
                 return Ok(StopReason::Converged);
             }
@@ -204,7 +208,7 @@ impl FrameAligner {
         if first {
             track.rules.reach = 10.0 * BIWEIGHT;
         }
-        residuals(&moved, &track.rules, source.len(), SAMPLE, &mut self.scratch);
+        residuals(&moved, &track.rules, &source.points.blocks, SAMPLE, &mut self.scratch);
         let scale = (MAD * quantile(&mut self.scratch, 0.5)).max(0.1) as f32;
         track.rules.reach = BIWEIGHT * scale;
     }
@@ -215,13 +219,13 @@ impl FrameAligner {
         track: &mut Track,
         source: &OrganisedFrame,
         target: &OrganisedFrame,
-        count: usize,
+        blocks: &[Block],
         ridge: f64,
     ) -> Result<(f64, Gauge)> {
         let (moved, gauge) = moved(track, source, target);
-        let normal = normal_equations(&moved, &track.rules, count, &mut self.chunks);
+        let normal = normal_equations(&moved, &track.rules, blocks, &mut self.chunks);
         if normal.pairs < self.options.min_correspondences {
-            return Err(self.too_few(normal.pairs, count, track));
+            return Err(self.too_few(normal.pairs, source.len(), track));
         }
         let step = solve(&normal, &track.held, ridge)?;
         track.pose = turned(&track.pose, &step, &gauge);
@@ -238,9 +242,10 @@ impl FrameAligner {
         stop: StopReason,
     ) -> Result<IcpResult> {
         let (moved, gauge) = moved(track, source, target);
-        let normal = normal_equations(&moved, &track.rules, source.len(), &mut self.chunks);
+        let normal = normal_equations(&moved, &track.rules, &source.points.blocks, &mut self.chunks);
         let limit = self.max_motion_sigma_m(&gauge);
-        let verdict = Verdict::new(&moved, &track.rules, source.len(), limit, Residuals::Settled, &mut self.cells)?;
+        let verdict =
+            Verdict::new(&moved, &track.rules, &source.points.blocks, limit, Residuals::Settled, &mut self.cells)?;
         let mut pose = track.pose;
         let to_tangent = tangent_from_centred(&pose, &gauge.centre, gauge.radius_m);
         let centred = if let Some(prior) = &self.options.prior {
@@ -288,31 +293,51 @@ impl FrameAligner {
     }
 }
 
-fn moved<'a>(track: &Track, source: &'a OrganisedFrame, target: &'a OrganisedFrame) -> (Moved<'a>, Gauge) {
-    let centre = (track.pose * nalgebra::Point3::from(source.points.centre)).coords;
-    let gauge = Gauge { centre, radius_m: source.points.radius_m.max(f64::MIN_POSITIVE) };
-    (Moved::new(source, target, &track.pose, &gauge.centre, gauge.radius_m), gauge)
-}
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use std::sync::Arc;
 
-/// Step `[dt, rho w]` that lowers the residuals, without motions that are held. `ridge`: share of the largest
-/// information that is added to all, so that what hardly matters does not run away while the frames are still apart.
-fn solve(normal: &Normal, held: &Matrix6<f64>, ridge: f64) -> Result<Vector6<f64>> {
-    let free = Matrix6::identity() - held;
-    let largest = normal.matrix.diagonal().max();
-    let matrix = free * normal.matrix * free + held * largest + Matrix6::identity() * (ridge.max(1e-9) * largest);
-    let gradient = free * normal.gradient;
-    let cholesky = matrix
-        .cholesky()
-        .ok_or(Error::Numerical { what: "the normal equations", why: "they are not positive definite" })?;
-    Ok(free * -cholesky.solve(&gradient))
-}
+    use super::*;
+    use crate::organised::Projection;
 
-/// The pose after a motion `[dt, rho w]` about the centre, target axes.
-fn turned(pose: &Isometry3<f64>, step: &Vector6<f64>, gauge: &Gauge) -> Isometry3<f64> {
-    let shift = Vector3::new(step[0], step[1], step[2]);
-    let turn = nalgebra::UnitQuaternion::from_scaled_axis(Vector3::new(step[3], step[4], step[5]) / gauge.radius_m);
-    let mut rotation = turn * pose.rotation;
-    rotation.renormalize();
-    let translation = turn * (pose.translation.vector - gauge.centre) + gauge.centre + shift;
-    Isometry3::from_parts(translation.into(), rotation)
+    /// A corner of three planes, seen from different places: `shift` along the axis.
+    fn corner(shift: f64) -> Vec<[f64; 3]> {
+        let ray = |k: usize| ((k % 160) as f64 / 160.0 - 0.5, 0.4 - (k / 160) as f64 / 160.0);
+        let depth = |(u, v): (f64, f64)| {
+            let planes = [(u + 1.0, 2.0), (1.2 - u, 2.2), (1.0 - v, 2.1)];
+            planes
+                .map(|(slope, distance)| (distance - shift) / slope.max(0.1))
+                .into_iter()
+                .fold(f64::INFINITY, f64::min)
+        };
+        (0..160 * 120).map(ray).map(|r| [r.0 * depth(r), r.1 * depth(r), -depth(r)]).collect()
+    }
+
+    /// Where the lists begin and how much they hold: another place or size would mean that memory was asked for.
+    fn memory(aligner: &FrameAligner, frame: &OrganisedFrame) -> Vec<(usize, usize)> {
+        let mut memory = frame.memory();
+        memory.push((aligner.chunks.as_ptr() as usize, aligner.chunks.capacity()));
+        memory.push((aligner.scratch.as_ptr() as usize, aligner.scratch.capacity()));
+        memory.push((aligner.cells.as_ptr() as usize, aligner.cells.capacity()));
+        memory
+    }
+
+    #[test]
+    fn memory_is_used_again() {
+        let projection = Arc::new(Projection::pinhole(160, 120, [160.0; 2], [80.0, 64.0]).unwrap());
+        let mut aligner = FrameAligner::new(FrameAlignmentOptions::default()).unwrap();
+        let target = OrganisedFrame::new(&projection, &corner(0.0), None).unwrap();
+        let mut source = OrganisedFrame::new(&projection, &corner(0.02), None).unwrap();
+        let first = aligner.align(&source, &target, &Isometry3::identity()).unwrap();
+        let before = memory(&aligner, &source);
+        for shift in [0.01, 0.03, 0.02] {
+            source.update(&corner(shift), None).unwrap();
+            let again = aligner.align(&source, &target, &Isometry3::identity()).unwrap();
+            assert_eq!(memory(&aligner, &source), before);
+            if shift.to_bits() == 0.02_f64.to_bits() {
+                assert_eq!(again, first);
+            }
+        }
+    }
 }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 
-use super::grid::Grid;
+use super::blocks::Points;
 use super::nodes::{LARGEST_DEPTH_M, LEAST_DEPTH_M, NodeRow};
 use super::planes::{FREEDOM, PlaneRow};
 use super::projection::Projection;
@@ -13,8 +13,6 @@ use crate::cloud::Cloud;
 use crate::error::{Error, Result};
 use crate::kernel::quantile;
 
-/// Distances of the nodes of the levels, coarse to fine.
-pub(super) const STRIDES: [usize; 4] = [8, 4, 2, 1];
 /// Windows whose mean square deviation exceeds that of most by this factor hold no plane.
 const LARGEST_MISFIT: f32 = 3.0;
 /// Smallest cosine between a plane's normal and the ray: in windows across a jump lie steep planes that are none.
@@ -41,19 +39,6 @@ pub struct OrganisedFrame {
     has_sigma: bool,
 }
 
-/// The nodes with a plane, level by level: the first `counts[l]` are those of level `l`.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Points {
-    pub position: [Vec<f32>; 3],
-    pub normal: [Vec<f32>; 3],
-    pub variance: Vec<f32>,
-    pub node: Vec<u32>,
-    pub counts: [usize; STRIDES.len()],
-    /// Centroid and rms radius of the first level that has points.
-    pub centre: Vector3<f64>,
-    pub radius_m: f64,
-}
-
 impl OrganisedFrame {
     /// Prepares a frame: one point a pixel of `projection`, row by row, camera frame, metre; NaN where there is no
     /// range. `sigma`: standard deviation of the ranges, metre; without it, inverse depth is taken as equally precise
@@ -64,7 +49,6 @@ impl OrganisedFrame {
     /// not lie on the rays of their pixels.
     pub fn new(projection: &Arc<Projection>, points: &[[f64; 3]], sigma: Option<&[f32]>) -> Result<Self> {
         let nodes = projection.grid.len();
-        let list = || Vec::with_capacity(nodes);
         let mut frame = Self {
             projection: Arc::clone(projection),
             inverse_depth: vec![f32::NAN; nodes],
@@ -73,13 +57,7 @@ impl OrganisedFrame {
             sigma: vec![0.0; nodes],
             misfit: vec![f32::NAN; nodes],
             scratch: Vec::with_capacity(SAMPLE),
-            points: Points {
-                position: [list(), list(), list()],
-                normal: [list(), list(), list()],
-                variance: list(),
-                node: Vec::with_capacity(nodes),
-                ..Points::default()
-            },
+            points: Points::new(&projection.grid),
             has_sigma: false,
         };
         frame.update(points, sigma)?;
@@ -117,12 +95,12 @@ impl OrganisedFrame {
 
     /// Number of nodes that have a plane.
     pub fn len(&self) -> usize {
-        self.points.node.len()
+        self.points.counts[self.points.counts.len() - 1]
     }
 
     /// Whether no node has a plane.
     pub fn is_empty(&self) -> bool {
-        self.points.node.is_empty()
+        self.len() == 0
     }
 
     /// The nodes as a cloud: points (averages over a square of pixels), normals towards the camera, and standard
@@ -147,6 +125,17 @@ impl OrganisedFrame {
             rim: Some(seen.iter().map(|&k| !has_plane(k)).collect()),
             ..Cloud::default()
         }
+    }
+
+    /// Where the lists of the frame lie, and how much they hold.
+    #[cfg(test)]
+    pub(super) fn memory(&self) -> Vec<(usize, usize)> {
+        let singles = [&self.inverse_depth, &self.spread, &self.sigma, &self.misfit];
+        let mut memory: Vec<(usize, usize)> = singles.iter().map(|v| (v.as_ptr() as usize, v.capacity())).collect();
+        memory.push((self.planes.as_ptr() as usize, self.planes.capacity()));
+        memory.push((self.scratch.as_ptr() as usize, self.scratch.capacity()));
+        memory.push((self.points.blocks.as_ptr() as usize, self.points.blocks.capacity()));
+        memory
     }
 
     fn reduce(&mut self, points: &[[f64; 3]], sigma: Option<&[f32]>) {
@@ -178,9 +167,9 @@ impl OrganisedFrame {
         let typical = (quantile(&mut self.scratch, 0.5) / median) as f32;
         let scale = if self.has_sigma { 1.0 } else { typical.sqrt() };
         let limit = LARGEST_MISFIT * if self.has_sigma { typical.max(1.0) } else { typical };
-        let nodes = self.planes.iter_mut().zip(&mut self.sigma).zip(&self.misfit);
-        let seen = self.spread.iter().zip(&self.inverse_depth).zip(&self.projection.grid.cosine);
-        for (((plane, sigma), misfit), ((spread, w), cosine)) in nodes.zip(seen) {
+        let nodes = self.planes.par_iter_mut().zip(&mut self.sigma).zip(&self.misfit);
+        let seen = self.spread.par_iter().zip(&self.inverse_depth).zip(&self.projection.grid.cosine);
+        nodes.zip(seen).with_min_len(4096).for_each(|(((plane, sigma), misfit), ((spread, w), cosine))| {
             let floor = (ROUNDING * w / spread).powi(2);
             let incidence = plane[3] * w * cosine;
             // NaN fails.
@@ -189,53 +178,7 @@ impl OrganisedFrame {
                 *plane = [f32::NAN; 4];
             }
             *sigma *= scale.max(ROUNDING * w / spread);
-        }
-    }
-}
-
-impl Points {
-    fn gather(&mut self, grid: &Grid, inverse_depth: &[f32], planes: &[[f32; 4]], sigma: &[f32]) {
-        for list in self.position.iter_mut().chain(&mut self.normal) {
-            list.clear();
-        }
-        self.variance.clear();
-        self.node.clear();
-        for (level, &stride) in STRIDES.iter().enumerate() {
-            for row in (0..grid.rows).step_by(stride) {
-                // Nodes of the coarser levels are in the list already.
-                let done = level > 0 && row % STRIDES[level - 1] == 0;
-                let (first, step) = if done { (stride, 2 * stride) } else { (0, stride) };
-                for col in (first..grid.cols).step_by(step) {
-                    self.push(row * grid.cols + col, grid, inverse_depth, planes, sigma);
-                }
-            }
-            self.counts[level] = self.node.len();
-        }
-        self.measure();
-    }
-
-    fn push(&mut self, k: usize, grid: &Grid, inverse_depth: &[f32], planes: &[[f32; 4]], sigma: &[f32]) {
-        let plane = planes[k];
-        if !plane[3].is_finite() {
-            return;
-        }
-        let depth = 1.0 / inverse_depth[k];
-        let position = [grid.u[k] * depth, grid.v[k] * depth, -depth];
-        for i in 0..3 {
-            self.position[i].push(position[i]);
-            self.normal[i].push(plane[i]);
-        }
-        self.variance.push(sigma[k] * sigma[k]);
-        self.node.push(k as u32);
-    }
-
-    fn measure(&mut self) {
-        let count = self.counts.iter().copied().find(|c| *c > 0).unwrap_or(0);
-        let point = |k: usize| Vector3::from([0, 1, 2].map(|i| f64::from(self.position[i][k])));
-        let mean = (0..count).fold(Vector3::zeros(), |sum, k| sum + point(k)) / count.max(1) as f64;
-        let square: f64 = (0..count).map(|k| (point(k) - mean).norm_squared()).sum();
-        self.centre = mean;
-        self.radius_m = (square / count.max(1) as f64).sqrt();
+        });
     }
 }
 

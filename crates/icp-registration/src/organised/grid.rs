@@ -9,6 +9,13 @@ const NODES: f64 = 34_000.0;
 /// dearer.
 const PIXELS_TO_REDUCE: usize = 16_000;
 
+/// Distances of the nodes of the levels, coarse to fine.
+pub(super) const STRIDES: [usize; 4] = [8, 4, 2, 1];
+/// Nodes that are worked on together.
+pub(super) const BLOCK: usize = 8;
+/// Stands for no node where a level does not fill its last block.
+pub(super) const NO_NODE: u32 = u32::MAX;
+
 /// Nodes of a frame, row by row, with their rays (x, y, -1) in the camera frame.
 #[derive(Debug)]
 pub(crate) struct Grid {
@@ -25,6 +32,10 @@ pub(crate) struct Grid {
     /// Turns the gradient of a function along columns and rows of nodes into that along u and v:
     /// `du = m[0] dc + m[1] dr`, `dv = m[2] dc + m[3] dr`.
     pub gradient: Vec<[f32; 4]>,
+    /// The nodes level by level: coarse ones first, then what each finer level adds.
+    pub order: Vec<[u32; BLOCK]>,
+    /// Blocks of `order` that make up each level.
+    pub levels: [usize; STRIDES.len()],
 }
 
 impl Grid {
@@ -42,10 +53,13 @@ impl Grid {
         };
         let rays: Vec<[f64; 2]> = (0..cols * rows).map(|k| mean_ray(k % cols, k / cols)).collect();
         let gradient = (0..cols * rows).map(|k| gradient(&rays, cols, rows, k, lens, bin)).collect();
+        let (order, levels) = by_levels(cols, rows);
         Self {
             bin,
             cols,
             rows,
+            order,
+            levels,
             u: rays.iter().map(|r| r[0] as f32).collect(),
             v: rays.iter().map(|r| r[1] as f32).collect(),
             cosine: rays.iter().map(|r| (1.0 / (1.0 + r[0] * r[0] + r[1] * r[1]).sqrt()) as f32).collect(),
@@ -56,6 +70,27 @@ impl Grid {
     pub(crate) fn len(&self) -> usize {
         self.cols * self.rows
     }
+}
+
+/// Blocks of nodes, level by level, and how many of them each level has.
+fn by_levels(cols: usize, rows: usize) -> (Vec<[u32; BLOCK]>, [usize; STRIDES.len()]) {
+    let (mut order, mut levels) = (Vec::new(), [0; STRIDES.len()]);
+    for (level, &stride) in STRIDES.iter().enumerate() {
+        let mut nodes = Vec::new();
+        for row in (0..rows).step_by(stride) {
+            // Nodes of the coarser levels are there already.
+            let done = level > 0 && row % STRIDES[level - 1] == 0;
+            let (first, step) = if done { (stride, 2 * stride) } else { (0, stride) };
+            nodes.extend((first..cols).step_by(step).map(|col| (row * cols + col) as u32));
+        }
+        order.extend(nodes.chunks(BLOCK).map(|chunk| {
+            let mut block = [NO_NODE; BLOCK];
+            block[..chunk.len()].copy_from_slice(chunk);
+            block
+        }));
+        levels[level] = order.len();
+    }
+    (order, levels)
 }
 
 /// Inverse transpose of the derivatives of (u, v) by the node's column and row, from its neighbours.

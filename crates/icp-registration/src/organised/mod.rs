@@ -1,6 +1,10 @@
-//! Registration of organised frames: partners are found by projection, not by search.
+//! Registration of organised frames: partners are found by projection `[Blais1995]`, not by search.
+//!
+//! A frame is reduced to nodes (averages of inverse depth over squares of pixels), planes are laid through them, and
+//! the distances of the source's nodes from the target's planes are minimised, level by level.
 
 mod aligner;
+mod blocks;
 mod frame;
 mod grid;
 mod map;
@@ -10,8 +14,10 @@ mod pairs;
 mod planes;
 mod projection;
 mod quality;
+mod starts;
 mod sums;
 mod table;
+mod track;
 
 pub use aligner::{FrameAligner, align_frames};
 pub use frame::OrganisedFrame;

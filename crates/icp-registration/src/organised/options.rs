@@ -19,7 +19,10 @@ pub struct FrameAlignmentOptions {
     pub max_motion_sigma_m: Option<f64>,
     /// Levels that are passed, coarse to fine, 1 to 4. Default 4.
     pub levels: usize,
-    /// Iterations in all levels together. Default 60.
+    /// Starts turned by 15 degrees about axes of the source, tried in turn where the frames contradict each other
+    /// after the first level from the guess, at most 14. Default 14.
+    pub other_starts: usize,
+    /// Iterations in all levels together, from the start that is best. Default 60.
     pub max_iterations: usize,
     /// The run has converged when a step moves points at the frame's radius by less than this, metre. `None`: 1e-5 of
     /// that radius.
@@ -37,6 +40,7 @@ impl Default for FrameAlignmentOptions {
             prior: None,
             max_motion_sigma_m: None,
             levels: 4,
+            other_starts: 14,
             max_iterations: 60,
             step_tolerance_m: None,
             max_normal_angle_rad: std::f64::consts::FRAC_PI_4,

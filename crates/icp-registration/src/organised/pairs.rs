@@ -1,10 +1,14 @@
 //! Pairs of source nodes and target planes, found by projection, some at a time.
 // Only what is inlined is compiled for wide registers.
 #![allow(clippy::inline_always)]
+// Lanes lie side by side: with an index, loops read as their formulas and have the same length everywhere.
+#![allow(clippy::needless_range_loop)]
 
 use nalgebra::{Isometry3, Vector3};
 
+use super::blocks::Block;
 use super::frame::OrganisedFrame;
+use super::grid::BLOCK;
 use super::projection::Lens;
 use super::table::Table;
 
@@ -83,22 +87,24 @@ pub(super) struct Moved<'a> {
     per_radius: f32,
 }
 
-/// Pairs side by side. Those without weight are none.
-pub(super) struct Pairs<const N: usize> {
+/// Pairs side by side; all zero where a node has no partner.
+pub(super) struct Pairs {
     /// Target normal.
-    pub normal: [[f32; N]; 3],
+    pub normal: [[f32; BLOCK]; 3],
     /// Rotated source normal.
-    pub source_normal: [[f32; N]; 3],
+    pub source_normal: [[f32; BLOCK]; 3],
     /// Moved source point from the centre, in units of the radius.
-    pub lever: [[f32; N]; 3],
+    pub lever: [[f32; BLOCK]; 3],
     /// Distance of the moved point from the target plane, metre.
-    pub residual: [f32; N],
+    pub residual: [f32; BLOCK],
     /// Variance of the residual, m².
-    pub variance: [f32; N],
+    pub variance: [f32; BLOCK],
     /// Weight of the robust kernel, between 0 and 1, over the variance.
-    pub weight: [f32; N],
+    pub weight: [f32; BLOCK],
+    /// Whether the point falls on a target plane at all.
+    pub met: [bool; BLOCK],
     /// Slope of the kernel's influence over the variance.
-    pub slope: [f32; N],
+    pub slope: [f32; BLOCK],
 }
 
 impl<'a> Moved<'a> {
@@ -121,55 +127,53 @@ impl<'a> Moved<'a> {
         }
     }
 
-    /// The pairs of the source's points `start..start + N`.
+    /// The pairs of a block of source nodes.
     #[inline(always)]
-    pub(super) fn pairs<L: Locate, const N: usize>(&self, locate: L, rules: &Rules, start: usize) -> Pairs<N> {
-        let points = &self.source.points;
-        let p = self.rotated::<N>(&points.position, start, self.translation);
-        let source_normal = self.rotated::<N>(&points.normal, start, [0.0; 3]);
+    pub(super) fn pairs<L: Locate>(&self, locate: L, rules: &Rules, block: &Block) -> Pairs {
+        let p = self.rotated(&block.position, self.translation);
+        let source_normal = self.rotated(&block.normal, [0.0; 3]);
         let (planes, variances) = self.partners(locate, &p);
-        let source_variance = &points.variance[start..start + N];
+        let nothing = [0.0; BLOCK];
         let mut pairs = Pairs {
             normal: [planes[0], planes[1], planes[2]],
             source_normal,
-            lever: [[0.0; N]; 3],
-            residual: [0.0; N],
-            variance: [0.0; N],
-            weight: [0.0; N],
-            slope: [0.0; N],
+            lever: [nothing; 3],
+            residual: nothing,
+            variance: nothing,
+            weight: nothing,
+            slope: nothing,
+            met: [false; BLOCK],
         };
-        for k in 0..N {
+        for k in 0..BLOCK {
             let [a, b, c, d] = [planes[0][k], planes[1][k], planes[2][k], planes[3][k]];
             let residual = a * p[0][k] + b * p[1][k] + c * p[2][k] - d;
             let cosine = a * source_normal[0][k] + b * source_normal[1][k] + c * source_normal[2][k];
-            let variance = variances[k] + source_variance[k] + rules.extra_variance;
+            let variance = variances[k] + block.variance[k] + rules.extra_variance;
             let u2 = residual * residual / (variance * rules.reach * rules.reach);
             // NaN fails: no partner.
             let accepted = cosine >= rules.least_cosine && u2 < 1.0;
-            let rest = if accepted { 1.0 - u2 } else { 0.0 };
-            pairs.weight[k] = rest * rest / variance;
-            pairs.slope[k] = rest * (1.0 - 5.0 * u2) / variance;
-            if !accepted {
-                pairs.slope[k] = 0.0;
-                pairs.weight[k] = 0.0;
-            }
+            let rest = 1.0 - u2;
+            pairs.weight[k] = if accepted { rest * rest / variance } else { 0.0 };
+            pairs.slope[k] = if accepted { rest * (1.0 - 5.0 * u2) / variance } else { 0.0 };
             pairs.residual[k] = if accepted { residual } else { 0.0 };
             pairs.variance[k] = variance;
+            pairs.met[k] = u2 >= 0.0;
             for i in 0..3 {
-                pairs.lever[i][k] = (p[i][k] - self.centre[i]) * self.per_radius;
+                pairs.lever[i][k] = if accepted { (p[i][k] - self.centre[i]) * self.per_radius } else { 0.0 };
+                pairs.normal[i][k] = if accepted { pairs.normal[i][k] } else { 0.0 };
+                pairs.source_normal[i][k] = if accepted { source_normal[i][k] } else { 0.0 };
             }
         }
         pairs
     }
 
     #[inline(always)]
-    fn rotated<const N: usize>(&self, lists: &[Vec<f32>; 3], start: usize, shift: [f32; 3]) -> [[f32; N]; 3] {
-        let [x, y, z] = [0, 1, 2].map(|i| &lists[i][start..start + N]);
-        let mut moved = [[0.0; N]; 3];
+    fn rotated(&self, vectors: &[[f32; BLOCK]; 3], shift: [f32; 3]) -> [[f32; BLOCK]; 3] {
+        let mut moved = [[0.0; BLOCK]; 3];
         for i in 0..3 {
             let r = self.rotation[i];
-            for k in 0..N {
-                moved[i][k] = r[0] * x[k] + r[1] * y[k] + r[2] * z[k] + shift[i];
+            for k in 0..BLOCK {
+                moved[i][k] = r[0] * vectors[0][k] + r[1] * vectors[1][k] + r[2] * vectors[2][k] + shift[i];
             }
         }
         moved
@@ -177,11 +181,11 @@ impl<'a> Moved<'a> {
 
     /// Planes and variances of the target nodes on which points fall; NaN where there are none.
     #[inline(always)]
-    fn partners<L: Locate, const N: usize>(&self, locate: L, p: &[[f32; N]; 3]) -> ([[f32; N]; 4], [f32; N]) {
+    fn partners<L: Locate>(&self, locate: L, p: &[[f32; BLOCK]; 3]) -> ([[f32; BLOCK]; 4], [f32; BLOCK]) {
         let grid = &self.target.projection.grid;
         let (cols, rows) = (grid.cols as f32, grid.rows as f32);
-        let mut index = [u32::MAX; N];
-        for k in 0..N {
+        let mut index = [u32::MAX; BLOCK];
+        for k in 0..BLOCK {
             let per_depth = -1.0 / p[2][k];
             let [col, row] = locate.node(p[0][k] * per_depth, p[1][k] * per_depth);
             let (col, row) = (col + 0.5, row + 0.5);
@@ -190,8 +194,8 @@ impl<'a> Moved<'a> {
             let (col, row) = if inside { (col as i32, row as i32) } else { (0, 0) };
             index[k] = if inside { (row * grid.cols as i32 + col) as u32 } else { u32::MAX };
         }
-        let (mut planes, mut variances) = ([[f32::NAN; N]; 4], [f32::NAN; N]);
-        for k in 0..N {
+        let (mut planes, mut variances) = ([[f32::NAN; BLOCK]; 4], [f32::NAN; BLOCK]);
+        for k in 0..BLOCK {
             let i = index[k] as usize;
             if let (Some(plane), Some(sigma)) = (self.target.planes.get(i), self.target.sigma.get(i)) {
                 for j in 0..4 {

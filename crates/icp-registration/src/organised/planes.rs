@@ -4,6 +4,8 @@
 //! window would round off creases, and the error of the offset is what reaches the pose.
 // Only what is inlined is compiled for wide registers.
 #![allow(clippy::inline_always)]
+// Lanes lie side by side: with an index, loops read as their formulas and have the same length everywhere.
+#![allow(clippy::needless_range_loop)]
 
 use super::grid::Grid;
 

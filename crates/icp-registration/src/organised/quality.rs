@@ -7,9 +7,14 @@
 //! its scatter between the cells tells whether what is left differs from nothing.
 // Only what is inlined is compiled for wide registers.
 #![allow(clippy::inline_always)]
+// Lanes lie side by side: with an index, loops read as their formulas and have the same length everywhere.
+#![allow(clippy::needless_range_loop)]
 
 use nalgebra::{DMatrix, DVector, Matrix6, Vector3, Vector6};
+use rayon::prelude::*;
 
+use super::blocks::Block;
+use super::grid::BLOCK;
 use super::pairs::{Locate, Moved, Rules, WithLocate, with_locate};
 use super::sums::derivatives;
 use crate::eigen::eigen6;
@@ -26,9 +31,9 @@ const SIGNIFICANCE: f64 = 2.5;
 const FEWEST_CELLS: usize = 20;
 /// Share of the largest information that rounding can imitate (single precision).
 const ROUNDING: f64 = 1e-7;
-/// Pairs taken at a time.
-const BLOCK: usize = 8;
-/// 6 scores, 21 products, 21 products of the score of each pair.
+/// Parts of the pairs, each with cells of its own, that threads may take.
+const PARTS: usize = 4;
+/// 6 scores and 21 products.
 const SUMS: usize = 6 + 21;
 
 /// What the residuals consist of.
@@ -67,16 +72,16 @@ pub(super) struct Verdict {
 }
 
 impl Verdict {
-    /// Judges the first `count` points; motions with a predicted sigma above `max_sigma_m` are undetermined.
+    /// Judges the blocks of the source; motions with a predicted sigma above `max_sigma_m` are undetermined.
     pub(super) fn new(
         moved: &Moved<'_>,
         rules: &Rules,
-        count: usize,
+        blocks: &[Block],
         max_sigma_m: f64,
         residuals: Residuals,
         cells: &mut Vec<Cell>,
     ) -> Result<Self> {
-        let (cells, independent) = fill(moved, rules, count, cells);
+        let (cells, independent, count) = fill(moved, rules, blocks, cells);
         let information = symmetric(&cells.iter().fold([0.0; 21], |mut sum, cell| {
             sum.iter_mut().zip(&cell[6..]).for_each(|(s, c)| *s += c);
             sum
@@ -192,71 +197,96 @@ fn symmetric(upper: &[f64; 21]) -> Matrix6<f64> {
     matrix
 }
 
-/// Sums over the cells, and the covariance of the score of pairs that share nothing.
-fn fill<'c>(moved: &Moved<'_>, rules: &Rules, count: usize, cells: &'c mut Vec<Cell>) -> (&'c [Cell], Matrix6<f64>) {
+/// Sums over the cells, the covariance of the score of pairs that share nothing, and the number of pairs.
+fn fill<'c>(
+    moved: &Moved<'_>,
+    rules: &Rules,
+    blocks: &[Block],
+    cells: &'c mut Vec<Cell>,
+) -> (&'c [Cell], Matrix6<f64>, usize) {
     let grid = &moved.source.projection.grid;
     let side = grid.cols.max(grid.rows).div_ceil(CELLS).max(1);
     let across = grid.cols.div_ceil(side);
+    let count = across * grid.rows.div_ceil(side);
     cells.clear();
-    cells.resize(across * grid.rows.div_ceil(side), [0.0; SUMS]);
+    cells.resize(PARTS * count, [0.0; SUMS]);
+    let mut parts = [([0.0; 21], 0); PARTS];
+    with_locate(moved.target, Fill { moved, rules, blocks, side, across, cells, parts: &mut parts });
+    let (first, others) = cells.split_at_mut(count);
+    for part in others.chunks(count) {
+        for (cell, other) in first.iter_mut().zip(part) {
+            cell.iter_mut().zip(other).for_each(|(c, o)| *c += o);
+        }
+    }
     let mut independent = [0.0; 21];
-    with_locate(moved.target, Fill { moved, rules, count, side, across, cells, independent: &mut independent });
-    (cells, symmetric(&independent))
+    for (part, _) in &parts {
+        independent.iter_mut().zip(part).for_each(|(i, p)| *i += p);
+    }
+    (first, symmetric(&independent), parts.iter().map(|p| p.1).sum())
 }
 
 struct Fill<'a, 'b> {
     moved: &'a Moved<'b>,
     rules: &'a Rules,
-    count: usize,
+    blocks: &'a [Block],
     side: usize,
     across: usize,
     cells: &'a mut [Cell],
-    independent: &'a mut [f64; 21],
+    parts: &'a mut [([f64; 21], usize); PARTS],
 }
 
 impl WithLocate for Fill<'_, '_> {
     type Output = ();
 
     fn run<L: Locate>(self, locate: L) {
-        pulp::Arch::new().dispatch(Located { fill: self, locate });
+        let (moved, rules, side, across) = (self.moved, self.rules, self.side, self.across);
+        let cells = self.cells.par_chunks_mut(self.cells.len() / PARTS);
+        let blocks = self.blocks.par_chunks(self.blocks.len().div_ceil(PARTS).max(1));
+        cells.zip(self.parts.par_iter_mut()).zip(blocks).for_each(|((cells, (independent, pairs)), blocks)| {
+            let part = Part { moved, rules, side, across, locate, blocks, cells, independent, pairs };
+            pulp::Arch::new().dispatch(part);
+        });
     }
 }
 
-struct Located<'a, 'b, L> {
-    fill: Fill<'a, 'b>,
+struct Part<'a, 'b, L> {
+    moved: &'a Moved<'b>,
+    rules: &'a Rules,
+    side: usize,
+    across: usize,
     locate: L,
+    blocks: &'a [Block],
+    cells: &'a mut [Cell],
+    independent: &'a mut [f64; 21],
+    pairs: &'a mut usize,
 }
 
-impl<L: Locate> pulp::WithSimd for Located<'_, '_, L> {
+impl<L: Locate> pulp::WithSimd for Part<'_, '_, L> {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(mut self, _: S) {
-        let whole = self.fill.count / BLOCK * BLOCK;
-        for start in (0..whole).step_by(BLOCK) {
-            self.fill.add::<L, BLOCK>(self.locate, start);
-        }
-        for start in whole..self.fill.count {
-            self.fill.add::<L, 1>(self.locate, start);
+        for block in self.blocks {
+            self.add(block);
         }
     }
 }
 
-impl Fill<'_, '_> {
+impl<L: Locate> Part<'_, '_, L> {
     #[inline(always)]
-    fn add<L: Locate, const N: usize>(&mut self, locate: L, start: usize) {
-        let pairs = self.moved.pairs::<L, N>(locate, self.rules, start);
+    fn add(&mut self, block: &Block) {
+        let pairs = self.moved.pairs(self.locate, self.rules, block);
         let along_target = derivatives(&pairs.lever, &pairs.normal);
         let along_source = derivatives(&pairs.lever, &pairs.source_normal);
-        let mut lanes = [[0.0_f32; N]; SUMS];
-        let mut squares = [[0.0_f32; N]; 21];
+        let mut lanes = [[0.0_f32; BLOCK]; SUMS];
+        let mut squares = [[0.0_f32; BLOCK]; 21];
         let mut k = 0;
         for r in 0..6 {
-            for l in 0..N {
+            for l in 0..BLOCK {
                 lanes[r][l] = along_target[r][l] * pairs.weight[l] * pairs.residual[l];
             }
             for c in r..6 {
-                for l in 0..N {
+                for l in 0..BLOCK {
                     let cross = along_target[r][l] * along_source[c][l] + along_target[c][l] * along_source[r][l];
                     lanes[6 + k][l] = 0.5 * pairs.slope[l] * cross;
                     let score = pairs.weight[l] * pairs.residual[l];
@@ -269,10 +299,10 @@ impl Fill<'_, '_> {
             *sum += f64::from(square.iter().sum::<f32>());
         }
         let cols = self.moved.source.projection.grid.cols;
-        let nodes = &self.moved.source.points.node[start..start + N];
-        for l in 0..N {
+        for l in 0..BLOCK {
             if pairs.weight[l] > 0.0 {
-                let (row, col) = (nodes[l] as usize / cols, nodes[l] as usize % cols);
+                *self.pairs += 1;
+                let (row, col) = (block.node[l] as usize / cols, block.node[l] as usize % cols);
                 let cell = &mut self.cells[row / self.side * self.across + col / self.side];
                 for (sum, lane) in cell.iter_mut().zip(&lanes) {
                     *sum += f64::from(lane[l]);

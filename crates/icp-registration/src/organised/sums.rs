@@ -1,16 +1,18 @@
 //! Sums over pairs: in single precision within a chunk, in double precision over chunks in a fixed order.
 // Only what is inlined is compiled for wide registers.
 #![allow(clippy::inline_always)]
+// Lanes lie side by side: with an index, loops read as their formulas and have the same length everywhere.
+#![allow(clippy::needless_range_loop)]
 
 use nalgebra::{Matrix6, Vector6};
 use rayon::prelude::*;
 
+use super::blocks::Block;
+use super::grid::BLOCK;
 use super::pairs::{Locate, Moved, Pairs, Rules, WithLocate, with_locate};
 
-/// Pairs taken at a time.
-const BLOCK: usize = 8;
-/// Points of a chunk: sums in single precision stay short.
-const CHUNK: usize = 256;
+/// Blocks of a chunk: sums in single precision stay short.
+const CHUNK: usize = 32;
 /// Chunks that one thread takes at least.
 const CHUNKS_PER_TASK: usize = 16;
 /// 21 products of the derivatives, 6 with the residual, and the sums of weight, weighted squares and pairs.
@@ -28,15 +30,15 @@ pub(super) struct Normal {
     pub pairs: usize,
 }
 
-/// Sums of the first `count` points of the source.
+/// Sums over blocks of the source.
 pub(super) fn normal_equations(
     moved: &Moved<'_>,
     rules: &Rules,
-    count: usize,
+    blocks: &[Block],
     chunks: &mut Vec<[f64; SUMS]>,
 ) -> Normal {
-    chunks.resize(count.div_ceil(CHUNK), [0.0; SUMS]);
-    with_locate(moved.target, AllChunks { moved, rules, count, chunks });
+    chunks.resize(blocks.len().div_ceil(CHUNK), [0.0; SUMS]);
+    with_locate(moved.target, AllChunks { moved, rules, blocks, chunks });
     let mut total = [0.0; SUMS];
     for chunk in chunks.iter() {
         for (t, c) in total.iter_mut().zip(chunk) {
@@ -59,7 +61,7 @@ pub(super) fn normal_equations(
 struct AllChunks<'a, 'b> {
     moved: &'a Moved<'b>,
     rules: &'a Rules,
-    count: usize,
+    blocks: &'a [Block],
     chunks: &'a mut [[f64; SUMS]],
 }
 
@@ -67,15 +69,15 @@ impl WithLocate for AllChunks<'_, '_> {
     type Output = ();
 
     fn run<L: Locate>(self, locate: L) {
-        let (moved, rules, count) = (self.moved, self.rules, self.count);
-        let work = |(k, sums): (usize, &mut [f64; SUMS])| {
-            let (first, end) = (k * CHUNK, ((k + 1) * CHUNK).min(count));
-            pulp::Arch::new().dispatch(Chunk { moved, rules, locate, first, end, sums });
+        let (moved, rules) = (self.moved, self.rules);
+        let work = |(sums, blocks): (&mut [f64; SUMS], &[Block])| {
+            pulp::Arch::new().dispatch(Chunk { moved, rules, locate, blocks, sums });
         };
         if self.chunks.len() < 2 * CHUNKS_PER_TASK {
-            self.chunks.iter_mut().enumerate().for_each(work);
+            self.chunks.iter_mut().zip(self.blocks.chunks(CHUNK)).for_each(work);
         } else {
-            self.chunks.par_iter_mut().enumerate().with_min_len(CHUNKS_PER_TASK).for_each(work);
+            let chunks = self.chunks.par_iter_mut().zip(self.blocks.par_chunks(CHUNK));
+            chunks.with_min_len(CHUNKS_PER_TASK).for_each(work);
         }
     }
 }
@@ -84,8 +86,7 @@ struct Chunk<'a, 'b, L> {
     moved: &'a Moved<'b>,
     rules: &'a Rules,
     locate: L,
-    first: usize,
-    end: usize,
+    blocks: &'a [Block],
     sums: &'a mut [f64; SUMS],
 }
 
@@ -95,57 +96,47 @@ impl<L: Locate> pulp::WithSimd for Chunk<'_, '_, L> {
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
         let mut lanes = [[0.0_f32; BLOCK]; SUMS];
-        let whole = (self.end - self.first) / BLOCK * BLOCK + self.first;
-        for start in (self.first..whole).step_by(BLOCK) {
-            add(&mut lanes, &self.moved.pairs::<L, BLOCK>(self.locate, self.rules, start));
+        for block in self.blocks {
+            add(&mut lanes, &self.moved.pairs(self.locate, self.rules, block));
         }
-        let mut rest = [[0.0_f32; 1]; SUMS];
-        for start in whole..self.end {
-            add(&mut rest, &self.moved.pairs::<L, 1>(self.locate, self.rules, start));
-        }
-        for (k, sum) in self.sums.iter_mut().enumerate() {
-            *sum = f64::from(lanes[k].iter().sum::<f32>()) + f64::from(rest[k][0]);
+        for (sum, lane) in self.sums.iter_mut().zip(&lanes) {
+            *sum = f64::from(lane.iter().sum::<f32>());
         }
     }
 }
 
 #[inline(always)]
-fn add<const N: usize>(sums: &mut [[f32; N]; SUMS], pairs: &Pairs<N>) {
+fn add(sums: &mut [[f32; BLOCK]; SUMS], pairs: &Pairs) {
     let row = derivatives(&pairs.lever, &pairs.normal);
     let mut k = 0;
     for r in 0..6 {
-        let mut weighted = [0.0; N];
-        for l in 0..N {
+        let mut weighted = [0.0; BLOCK];
+        for l in 0..BLOCK {
             weighted[l] = row[r][l] * pairs.weight[l];
         }
         for other in &row[r..] {
-            for l in 0..N {
+            for l in 0..BLOCK {
                 sums[k][l] += weighted[l] * other[l];
             }
             k += 1;
         }
-        for l in 0..N {
+        for l in 0..BLOCK {
             sums[21 + r][l] += weighted[l] * pairs.residual[l];
         }
     }
-    for l in 0..N {
+    for l in 0..BLOCK {
         sums[27][l] += pairs.weight[l];
         sums[28][l] += pairs.weight[l] * pairs.residual[l] * pairs.residual[l];
         sums[29][l] += if pairs.weight[l] > 0.0 { 1.0 } else { 0.0 };
     }
 }
 
-/// Derivatives of the distance along `normal` by `[dt, rho w]`: the normal and lever x normal; zero where NaN.
+/// Derivatives of the distance along `normal` by `[dt, rho w]`: the normal and lever x normal.
 #[inline(always)]
-pub(super) fn derivatives<const N: usize>(lever: &[[f32; N]; 3], normal: &[[f32; N]; 3]) -> [[f32; N]; 6] {
-    let mut rows = [[0.0; N]; 6];
-    for l in 0..N {
-        let known = normal[0][l] == normal[0][l];
-        let n = [0, 1, 2].map(|i| if known { normal[i][l] } else { 0.0 });
-        let q = [0, 1, 2].map(|i| if known { lever[i][l] } else { 0.0 });
-        rows[0][l] = n[0];
-        rows[1][l] = n[1];
-        rows[2][l] = n[2];
+pub(super) fn derivatives(lever: &[[f32; BLOCK]; 3], normal: &[[f32; BLOCK]; 3]) -> [[f32; BLOCK]; 6] {
+    let mut rows = [normal[0], normal[1], normal[2], [0.0; BLOCK], [0.0; BLOCK], [0.0; BLOCK]];
+    for l in 0..BLOCK {
+        let (q, n) = ([0, 1, 2].map(|i| lever[i][l]), [0, 1, 2].map(|i| normal[i][l]));
         rows[3][l] = q[1] * n[2] - q[2] * n[1];
         rows[4][l] = q[2] * n[0] - q[0] * n[2];
         rows[5][l] = q[0] * n[1] - q[1] * n[0];
@@ -153,33 +144,62 @@ pub(super) fn derivatives<const N: usize>(lever: &[[f32; N]; 3], normal: &[[f32;
     rows
 }
 
-/// Absolute residuals over their standard deviation of about `most` of the first `count` points, into `out`.
-pub(super) fn residuals(moved: &Moved<'_>, rules: &Rules, count: usize, most: usize, out: &mut Vec<f64>) {
+/// Absolute residuals over their standard deviation of about `most` nodes of the blocks, into `out`.
+pub(super) fn residuals(moved: &Moved<'_>, rules: &Rules, blocks: &[Block], most: usize, out: &mut Vec<f64>) {
     out.clear();
-    with_locate(moved.target, Residuals { moved, rules, count, most, out });
+    // Spread evenly over the blocks.
+    let step = (blocks.len() * BLOCK).div_ceil(most.max(1)).max(1);
+    let visit = |pairs: &Pairs| {
+        for k in 0..BLOCK {
+            if pairs.weight[k] > 0.0 {
+                out.push(f64::from((pairs.residual[k] * pairs.residual[k] / pairs.variance[k]).sqrt()));
+            }
+        }
+    };
+    with_locate(moved.target, Visit { moved, rules, blocks, step, work: visit });
 }
 
-struct Residuals<'a, 'b> {
+/// Nodes that fall on target planes, and how many of them are accepted.
+pub(super) fn agreement(moved: &Moved<'_>, rules: &Rules, blocks: &[Block]) -> (usize, usize) {
+    let (mut met, mut accepted) = (0, 0);
+    let visit = |pairs: &Pairs| {
+        met += pairs.met.iter().filter(|m| **m).count();
+        accepted += pairs.weight.iter().filter(|w| **w > 0.0).count();
+    };
+    with_locate(moved.target, Visit { moved, rules, blocks, step: 1, work: visit });
+    (met, accepted)
+}
+
+/// Calls a function with the pairs of every `step`-th block.
+struct Visit<'a, 'b, F> {
     moved: &'a Moved<'b>,
     rules: &'a Rules,
-    count: usize,
-    most: usize,
-    out: &'a mut Vec<f64>,
+    blocks: &'a [Block],
+    step: usize,
+    work: F,
 }
 
-impl WithLocate for Residuals<'_, '_> {
+impl<F: FnMut(&Pairs)> WithLocate for Visit<'_, '_, F> {
     type Output = ();
 
     fn run<L: Locate>(self, locate: L) {
-        // Blocks spread evenly over the points.
-        let step = (self.count.div_ceil(self.most.max(1)) * BLOCK).max(BLOCK);
-        for start in (0..(self.count + 1).saturating_sub(BLOCK)).step_by(step) {
-            let pairs = self.moved.pairs::<L, BLOCK>(locate, self.rules, start);
-            for k in 0..BLOCK {
-                if pairs.weight[k] > 0.0 {
-                    self.out.push(f64::from((pairs.residual[k] * pairs.residual[k] / pairs.variance[k]).sqrt()));
-                }
-            }
+        pulp::Arch::new().dispatch(LocatedVisit { all: self, locate });
+    }
+}
+
+struct LocatedVisit<'a, 'b, F, L> {
+    all: Visit<'a, 'b, F>,
+    locate: L,
+}
+
+impl<F: FnMut(&Pairs), L: Locate> pulp::WithSimd for LocatedVisit<'_, '_, F, L> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) {
+        let mut all = self.all;
+        for block in all.blocks.iter().step_by(all.step) {
+            (all.work)(&all.moved.pairs(self.locate, all.rules, block));
         }
     }
 }

@@ -1,6 +1,9 @@
 //! A ray-cast room for the tests: the inside of a box with boxes on its floor.
 #![allow(dead_code, clippy::unwrap_used, clippy::expect_used, clippy::panic, missing_docs)]
 
+pub mod scenes;
+pub mod stations;
+
 use icp_registration::{Cloud, OrganisedNormalOptions, organised_normals};
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use rand::{RngExt, SeedableRng};

@@ -63,6 +63,11 @@ impl Canvas {
         canvas
     }
 
+    /// Width and height of the plotted area in a figure of this size, pixel.
+    pub(crate) fn plotted(size: [f64; 2]) -> [f64; 2] {
+        [size[0] - MARGIN.left - MARGIN.right, size[1] - MARGIN.top - MARGIN.bottom]
+    }
+
     fn ticks(&mut self) {
         let (right, bottom) = (self.size[0] - MARGIN.right, self.size[1] - MARGIN.bottom);
         let (values, decimals) = ticks(self.x, 6);

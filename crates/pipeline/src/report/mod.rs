@@ -4,12 +4,15 @@ mod canvas;
 mod chart;
 mod cloud_figure;
 mod colour;
+mod comparison;
+mod deviation_figure;
 mod network;
 mod page;
 mod picture;
 mod scattering;
 mod sections;
 
+pub(crate) use comparison::render_comparison;
 pub(crate) use network::{render_calibration, render_plan};
 pub(crate) use scattering::render_scattering;
 pub(crate) use sections::render;

@@ -17,6 +17,11 @@ pub(crate) struct Scale {
 }
 
 impl Scale {
+    /// The colour of a value.
+    pub(crate) fn colour(&self, value: f64) -> [u8; 3] {
+        self.map.colour(self.share(value))
+    }
+
     fn share(&self, value: f64) -> f64 {
         (value - self.low) / (self.high - self.low)
     }
@@ -24,7 +29,7 @@ impl Scale {
 
 /// A picture of `width` columns of row-major `values`, with title and colour bar.
 pub(crate) fn raster_figure(title: &str, width: usize, values: &[f64], scale: &Scale) -> Result<String> {
-    let pixels: Vec<u8> = values.iter().flat_map(|&value| scale.map.colour(scale.share(value))).collect();
+    let pixels: Vec<u8> = values.iter().flat_map(|&value| scale.colour(value)).collect();
     let height = values.len() / width.max(1);
     let image = data_uri(title, width, height, &pixels)?;
     let shown_width = 300.0;
@@ -75,7 +80,8 @@ pub(crate) fn data_uri(figure: &str, width: usize, height: usize, rgb: &[u8]) ->
     Ok(format!("data:image/png;base64,{}", base64::engine::general_purpose::STANDARD.encode(bytes)))
 }
 
-fn colour_bar(svg: &mut String, scale: &Scale, x: f64, y: f64, height: f64) {
+/// A bar of the scale's colours with its ends and its middle.
+pub(crate) fn colour_bar(svg: &mut String, scale: &Scale, x: f64, y: f64, height: f64) {
     const STEPS: usize = 32;
     for step in 0..STEPS {
         let [r, g, b] = scale.map.colour((step as f64 + 0.5) / STEPS as f64);

@@ -1,5 +1,9 @@
 use std::io::BufRead;
 
+use nalgebra::Isometry3;
+
+use crate::pose::pose_of;
+
 /// How the numbers of a file are written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Encoding {
@@ -56,6 +60,36 @@ pub(super) struct Header {
     pub properties: Vec<(String, Scalar)>,
     /// Elements before the vertices: their number and the bytes of one.
     pub before: Vec<(u64, usize)>,
+    /// Columns and rows, where the header states them.
+    pub size: Option<[usize; 2]>,
+    /// Pose of the points, where the header states it.
+    pub world_from_cloud: Option<Isometry3<f64>>,
+}
+
+/// What `obj_info` lines say of the points.
+#[derive(Default)]
+struct Remarks {
+    columns: Option<usize>,
+    rows: Option<usize>,
+    pose: Option<Isometry3<f64>>,
+}
+
+impl Remarks {
+    /// Takes what is known; a remark of other programs' is left alone.
+    fn take(&mut self, words: &[&str]) -> Result<(), String> {
+        match words {
+            ["num_cols", count] => self.columns = count.parse().ok(),
+            ["num_rows", count] => self.rows = count.parse().ok(),
+            ["world_from_cloud", rest @ ..] => {
+                let numbers: Option<Vec<f64>> = rest.iter().map(|word| word.parse().ok()).collect();
+                let pose = numbers.and_then(|n| pose_of(n.get(..3)?, n.get(3..)?));
+                self.pose =
+                    Some(pose.ok_or("has `world_from_cloud`, expected tx ty tz and a unit quaternion x y z w")?);
+            }
+            _ => {}
+        }
+        Ok(())
+    }
 }
 
 /// One `element` of a header.
@@ -78,13 +112,14 @@ impl Header {
         }
         let mut encoding = None;
         let mut elements: Vec<Element> = Vec::new();
+        let mut remarks = Remarks::default();
         for _ in 0..MOST_LINES {
             let line = line(reader)?;
             let words: Vec<_> = line.split_whitespace().collect();
             match words.as_slice() {
                 ["end_header"] => {
                     let encoding = encoding.ok_or("says no `format` in its header")?;
-                    return Self::of_elements(encoding, elements);
+                    return Self::of_elements(encoding, elements, &remarks);
                 }
                 ["format", format, "1.0"] => encoding = Some(encoding_of(format)?),
                 ["element", name, count] => {
@@ -101,14 +136,15 @@ impl Header {
                     let element = elements.last_mut().ok_or("has a property before any element")?;
                     element.properties.push(((*name).into(), scalar));
                 }
-                [] | ["comment" | "obj_info", ..] => {}
+                ["obj_info", rest @ ..] => remarks.take(rest)?,
+                [] | ["comment", ..] => {}
                 _ => return Err(format!("has the line `{line}` in its header, which is not understood")),
             }
         }
         Err(format!("has no line `end_header` among its first {MOST_LINES}"))
     }
 
-    fn of_elements(encoding: Encoding, mut elements: Vec<Element>) -> Result<Self, String> {
+    fn of_elements(encoding: Encoding, mut elements: Vec<Element>, remarks: &Remarks) -> Result<Self, String> {
         let position = elements.iter().position(|element| element.name == "vertex");
         let position = position.ok_or("has no element `vertex`")?;
         // Lists have no fixed length, so what lies behind them can only be found by reading them all.
@@ -118,7 +154,14 @@ impl Header {
         let size = |element: &Element| element.properties.iter().map(|(_, scalar)| scalar.size()).sum();
         let before = elements[..position].iter().map(|element| (element.count, size(element))).collect();
         let vertex = elements.swap_remove(position);
-        Ok(Self { encoding, vertices: vertex.count, properties: vertex.properties, before })
+        Ok(Self {
+            encoding,
+            vertices: vertex.count,
+            properties: vertex.properties,
+            before,
+            size: remarks.columns.zip(remarks.rows).map(|(columns, rows)| [columns, rows]),
+            world_from_cloud: remarks.pose,
+        })
     }
 
     /// Bytes of one vertex in a binary file.

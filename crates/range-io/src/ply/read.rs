@@ -3,8 +3,8 @@ use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 
 use super::header::{Encoding, Header, Scalar};
-use super::{COVARIANCE, CloudFile, NORMAL, POSITION};
 use crate::Error;
+use crate::clouds::{CloudFile, Columns};
 
 /// Vertices decoded at a time.
 const BLOCK: usize = 1 << 12;
@@ -31,13 +31,17 @@ fn read_from(reader: &mut impl BufRead, length: u64) -> Result<CloudFile, String
         return Err(format!("promises {vertices} vertices, more than its {length} bytes hold"));
     }
     let vertices = vertices as usize;
-    let mut columns = Columns::new(&header.properties, vertices)?;
+    let mut columns = Columns::new(header.properties.iter().map(|(name, _)| name.as_str()), vertices)?;
     match header.encoding {
         Encoding::Ascii => read_ascii(reader, &header, vertices, &mut columns)?,
         Encoding::LittleEndian => read_binary(reader, &header, vertices, &mut columns, little_endian)?,
         Encoding::BigEndian => read_binary(reader, &header, vertices, &mut columns, big_endian)?,
     }
-    columns.into_cloud(vertices)
+    let mut cloud = columns.into_cloud(vertices)?;
+    // A range grid of the Stanford kind has fewer vertices than cells: its points are in no order of pixels then.
+    cloud.size = header.size.filter(|[width, height]| width.checked_mul(*height) == Some(vertices));
+    cloud.world_from_cloud = header.world_from_cloud;
+    Ok(cloud)
 }
 
 fn read_ascii(
@@ -131,86 +135,3 @@ macro_rules! decoder {
 }
 decoder!(little_endian, from_le_bytes);
 decoder!(big_endian, from_be_bytes);
-
-/// The recognised properties as columns.
-struct Columns {
-    /// Canonical names with their values.
-    columns: Vec<(String, Vec<f64>)>,
-    /// Position among the columns of each property of a vertex.
-    of_property: Vec<Option<usize>>,
-}
-
-impl Columns {
-    fn new(properties: &[(String, Scalar)], vertices: usize) -> Result<Self, String> {
-        const SINGLE: [&str; 4] = ["intensity", "sigma", "flags", "frame"];
-        let known = || POSITION.iter().chain(&NORMAL).chain(&COVARIANCE).chain(&SINGLE);
-        let mut columns: Vec<(String, Vec<f64>)> = Vec::new();
-        let mut of_property = Vec::new();
-        for (name, _) in properties {
-            let canonical = name.to_ascii_lowercase();
-            let canonical = canonical.strip_prefix("scalar_").unwrap_or(&canonical);
-            if !known().any(|known| *known == canonical) {
-                of_property.push(None);
-                continue;
-            }
-            if columns.iter().any(|(earlier, _)| earlier == canonical) {
-                return Err(format!("has property `{canonical}` twice"));
-            }
-            of_property.push(Some(columns.len()));
-            columns.push((canonical.to_owned(), Vec::with_capacity(vertices)));
-        }
-        Ok(Self { columns, of_property })
-    }
-
-    fn of_property(&mut self, index: usize) -> Option<&mut Vec<f64>> {
-        let column = self.of_property.get(index).copied().flatten()?;
-        self.columns.get_mut(column).map(|(_, values)| values)
-    }
-
-    fn into_cloud(mut self, vertices: usize) -> Result<CloudFile, String> {
-        let points = self.take_all(POSITION)?.ok_or("has no properties `x`, `y`, `z`")?;
-        let normals = self.take_all(NORMAL)?;
-        let covariance = self.take_all(COVARIANCE)?;
-        Ok(CloudFile {
-            points: (0..vertices).map(|i| std::array::from_fn(|axis| points[axis][i])).collect(),
-            normals: normals.map(|n| (0..vertices).map(|i| std::array::from_fn(|axis| n[axis][i] as f32)).collect()),
-            covariance: covariance
-                .map(|c| (0..vertices).map(|i| std::array::from_fn(|term| c[term][i] as f32)).collect()),
-            intensity: self.take("intensity").map(|values| values.iter().map(|&value| value as f32).collect()),
-            sigma: self.take("sigma").map(|values| values.iter().map(|&value| value as f32).collect()),
-            flags: self
-                .take("flags")
-                .map(|values| whole("flags", &values, f64::from(u16::MAX), |v| v as u16))
-                .transpose()?,
-            frame: self
-                .take("frame")
-                .map(|values| whole("frame", &values, f64::from(u32::MAX), |v| v as u32))
-                .transpose()?,
-        })
-    }
-
-    fn take(&mut self, name: &str) -> Option<Vec<f64>> {
-        let index = self.columns.iter().position(|(found, _)| found == name)?;
-        Some(std::mem::take(&mut self.columns[index].1))
-    }
-
-    /// Columns of which all or none must be there.
-    fn take_all<const N: usize>(&mut self, names: [&str; N]) -> Result<Option<[Vec<f64>; N]>, String> {
-        let columns = names.map(|name| self.take(name));
-        let found = columns.iter().flatten().count();
-        match found {
-            0 => Ok(None),
-            _ if found == N => Ok(Some(columns.map(Option::unwrap_or_default))),
-            _ => Err(format!("has {found} of the properties {}, expected all or none", names.join(", "))),
-        }
-    }
-}
-
-/// Values that must be whole numbers from 0 to `largest`.
-fn whole<T>(name: &str, values: &[f64], largest: f64, convert: fn(f64) -> T) -> Result<Vec<T>, String> {
-    let bad = values.iter().find(|value| !(value.fract() == 0.0 && (0.0..=largest).contains(*value)));
-    match bad {
-        Some(value) => Err(format!("has `{name}` = {value}, expected a whole number from 0 to {largest}")),
-        None => Ok(values.iter().map(|&value| convert(value)).collect()),
-    }
-}

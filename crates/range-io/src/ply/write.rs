@@ -1,55 +1,64 @@
+use std::fmt::Write as _;
 use std::io::{Seek, SeekFrom, Write};
 use std::path::Path;
 
-use super::{COVARIANCE, CloudFile, NORMAL, POSITION};
+use super::{CloudFile, Precision};
 use crate::atomic::FileWriter;
+use crate::clouds::{Kind, properties, put_point, value_error};
+use crate::pose::numbers_of;
 use crate::{Error, Result};
-
-/// Type that positions are written in.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Precision {
-    /// `float`: right to 0.1 micrometre at 1 m, to 8 micrometres at 100 m.
-    #[default]
-    Single,
-    /// `double`: all digits.
-    Double,
-}
 
 /// Points that are turned into bytes at a time.
 const BLOCK: usize = 1 << 12;
 
 /// Writer of a cloud that grows block by block.
 ///
-/// The first block decides which attributes the file has. The number of points is put into the header at the end.
+/// The first block decides which attributes the file has; how points lie (columns and rows, pose) is not kept, as blocks
+/// make one list. The number of points is put into the header at the end.
 pub struct PlyWriter {
     writer: FileWriter,
     precision: Precision,
     attributes: Vec<&'static str>,
     points: u64,
+    /// Lines of the header that say how the points lie.
+    remarks: String,
     bytes: Vec<u8>,
 }
 
-/// Writes a cloud as a whole.
+/// Writes a cloud as a whole, with its columns and rows and its pose.
 pub fn write_cloud(path: impl AsRef<Path>, cloud: &CloudFile, precision: Precision) -> Result<()> {
+    cloud.check_size()?;
     let mut writer = PlyWriter::create(path, precision)?;
+    writer.remarks = remarks(cloud)?;
     writer.append(cloud)?;
     writer.commit()
+}
+
+fn remarks(cloud: &CloudFile) -> Result<String> {
+    let mut text = String::new();
+    if let Some([width, height]) = cloud.size {
+        // Writing to a string can't fail.
+        let _ = writeln!(text, "obj_info num_cols {width}\nobj_info num_rows {height}");
+    }
+    if let Some(pose) = &cloud.world_from_cloud {
+        let numbers = numbers_of(pose).ok_or_else(|| value_error("world_from_cloud", "is not finite".into()))?;
+        let _ = writeln!(text, "obj_info world_from_cloud {}", numbers.map(|number| number.to_string()).join(" "));
+    }
+    Ok(text)
 }
 
 impl PlyWriter {
     /// Begins a file that appears under its name at [`PlyWriter::commit`].
     pub fn create(path: impl AsRef<Path>, precision: Precision) -> Result<Self> {
         let writer = FileWriter::create(path)?;
-        Ok(Self { writer, precision, attributes: Vec::new(), points: 0, bytes: Vec::new() })
+        Ok(Self { writer, precision, attributes: Vec::new(), points: 0, remarks: String::new(), bytes: Vec::new() })
     }
 
     /// Adds points; they must have the attributes of those before.
     pub fn append(&mut self, cloud: &CloudFile) -> Result<()> {
         let attributes = cloud.attributes();
         let names: Vec<_> = attributes.iter().map(|(name, _)| *name).collect();
-        if let Some((name, length)) = attributes.iter().find(|(_, length)| *length != cloud.len()) {
-            return Err(value_error(name, format!("has {length} values for {} points", cloud.len())));
-        }
+        cloud.check_lengths()?;
         if self.points == 0 {
             self.attributes = names;
             // An empty block before this one has left a header of its own.
@@ -62,7 +71,7 @@ impl PlyWriter {
         for start in (0..cloud.len()).step_by(BLOCK) {
             self.bytes.clear();
             for index in start..cloud.len().min(start + BLOCK) {
-                self.put_point(cloud, index);
+                put_point(&mut self.bytes, cloud, index, self.precision);
             }
             self.writer.write_all(&self.bytes).map_err(Error::io(self.writer.path(), "write"))?;
         }
@@ -81,48 +90,22 @@ impl PlyWriter {
     fn write_header(&mut self) -> Result<()> {
         let count = self.points.to_string();
         let filling = "-".repeat(20_usize.saturating_sub(count.len()));
-        let start = format!("ply\nformat binary_little_endian 1.0\ncomment metres {filling}\nelement vertex {count}\n");
-        let properties: Vec<_> = self.properties().map(|(kind, name)| format!("property {kind} {name}\n")).collect();
-        let text = start + &properties.concat() + "end_header\n";
+        let start = format!("ply\nformat binary_little_endian 1.0\ncomment metres {filling}\n");
+        let properties: Vec<_> = properties(&self.attributes, self.precision)
+            .iter()
+            .map(|(kind, name)| format!("property {} {name}\n", type_name(*kind)))
+            .collect();
+        let element = format!("element vertex {count}\n");
+        let text = start + &self.remarks + &element + &properties.concat() + "end_header\n";
         self.writer.write_all(text.as_bytes()).map_err(Error::io(self.writer.path(), "write"))
-    }
-
-    /// Type and name of each property of a vertex.
-    fn properties(&self) -> impl Iterator<Item = (&'static str, &'static str)> {
-        let position = match self.precision {
-            Precision::Single => "float",
-            Precision::Double => "double",
-        };
-        let attributes = self.attributes.iter().flat_map(|attribute| match *attribute {
-            "normals" => NORMAL.map(|name| ("float", name)).to_vec(),
-            "covariance" => COVARIANCE.map(|name| ("float", name)).to_vec(),
-            "flags" => vec![("ushort", "flags")],
-            "frame" => vec![("uint", "frame")],
-            other => vec![("float", other)],
-        });
-        POSITION.into_iter().map(move |name| (position, name)).chain(attributes)
-    }
-
-    /// The values in the order of [`CloudFile::attributes`].
-    fn put_point(&mut self, cloud: &CloudFile, index: usize) {
-        let bytes = &mut self.bytes;
-        for value in cloud.points[index] {
-            match self.precision {
-                Precision::Single => bytes.extend_from_slice(&(value as f32).to_le_bytes()),
-                Precision::Double => bytes.extend_from_slice(&value.to_le_bytes()),
-            }
-        }
-        let mut put = |value: f32| bytes.extend_from_slice(&value.to_le_bytes());
-        cloud.normals.iter().for_each(|normals| normals[index].into_iter().for_each(&mut put));
-        cloud.intensity.iter().for_each(|values| put(values[index]));
-        cloud.sigma.iter().for_each(|values| put(values[index]));
-        cloud.flags.iter().for_each(|values| bytes.extend_from_slice(&values[index].to_le_bytes()));
-        cloud.frame.iter().for_each(|values| bytes.extend_from_slice(&values[index].to_le_bytes()));
-        let mut put = |value: f32| bytes.extend_from_slice(&value.to_le_bytes());
-        cloud.covariance.iter().for_each(|terms| terms[index].into_iter().for_each(&mut put));
     }
 }
 
-fn value_error(field: &str, reason: String) -> Error {
-    Error::Value { what: "cloud", field: field.to_owned(), reason }
+fn type_name(kind: Kind) -> &'static str {
+    match kind {
+        Kind::F32 => "float",
+        Kind::F64 => "double",
+        Kind::U16 => "ushort",
+        Kind::U32 => "uint",
+    }
 }

@@ -1,21 +1,22 @@
-//! Which source points take part.
+//! Selection evenly over the directions of the normals.
 
 use nalgebra::Vector3;
 
-use super::Selection;
+use super::PointSelection;
+use crate::error::Result;
+use crate::parts::require_count;
+use crate::parts::scene::Scene;
 
-/// Indices of the selected points, ascending.
-pub(crate) fn select(selection: Selection, count: usize, normals: &[Vector3<f64>]) -> Vec<usize> {
-    match selection {
-        Selection::All => (0..count).collect(),
-        Selection::EveryNth(n) => (0..count).step_by(n.max(1)).collect(),
-        Selection::NormalSpace(wanted) => normal_space(normals, wanted),
+/// About this many points, spread evenly over the directions of their normals `[RusinkiewiczLevoy2001]`: what few points
+/// say about a sliding direction is not drowned by a large wall. Points without a normal are left out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct NormalSpace(pub usize);
+
+impl PointSelection for NormalSpace {
+    fn select(&self, scene: &Scene<'_>) -> Result<Vec<usize>> {
+        require_count("selection", self.0, 1)?;
+        Ok(normal_space(scene.source_normals, self.0))
     }
-}
-
-/// Every k-th of the selected such that about `wanted` remain.
-pub(crate) fn thinned(selected: &[usize], wanted: usize) -> Vec<usize> {
-    selected.iter().copied().step_by(selected.len().div_ceil(wanted.max(1)).max(1)).collect()
 }
 
 /// Fills every direction's quota: small buckets give all they have, large ones every k-th point.
@@ -64,17 +65,9 @@ mod tests {
         let mut normals = vec![Vector3::z(); 990];
         normals.extend(vec![Vector3::x(); 10]);
         normals.push(Vector3::repeat(f64::NAN));
-        let chosen = select(Selection::NormalSpace(100), normals.len(), &normals);
+        let chosen = normal_space(&normals, 100);
         assert_eq!(chosen.len(), 100);
         assert_eq!(chosen.iter().filter(|&&i| i >= 990).count(), 10);
         assert!(chosen.windows(2).all(|w| w[0] < w[1]));
-    }
-
-    #[test]
-    fn thinning_keeps_about_the_wanted_number() {
-        let all: Vec<usize> = (0..1000).collect();
-        assert_eq!(thinned(&all, 300).len(), 250);
-        assert_eq!(thinned(&all, 5000).len(), 1000);
-        assert!(thinned(&[], 10).is_empty());
     }
 }

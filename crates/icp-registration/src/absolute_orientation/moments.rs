@@ -1,7 +1,8 @@
-//! Closed-form absolute orientation from point pairs: Horn's unit quaternion (method 2 of `[Eggert1997]`).
+//! Weighted moments of point pairs, and what follows from them once the rotation is known.
 
-use nalgebra::{Isometry3, Matrix3, Matrix4, Matrix6, Point3, Quaternion, SymmetricEigen, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, UnitQuaternion, Vector3};
 
+use super::Orientation;
 use crate::error::{Error, Result};
 use crate::neighbours::check_points;
 use crate::pose::symmetrised;
@@ -9,88 +10,20 @@ use crate::pose::symmetrised;
 /// Second principal extent over the first below which points count as collinear: the rotation about the line would be
 /// known to no better than rounding over this ratio.
 const COLLINEAR_RATIO: f64 = 1e-7;
-/// Relative eigenvalue gap below which two rotations fit equally well to within rounding.
-const AMBIGUOUS_GAP: f64 = 1e-12;
-
-/// Rigid motion that carries source points onto target points, with its quality.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Orientation {
-    /// Pose: `target = target_from_source * source`.
-    pub target_from_source: Isometry3<f64>,
-    /// Weighted root mean square distance left between the pairs, metre.
-    pub rms_m: f64,
-    /// A posteriori standard deviation of one coordinate of unit weight, metre; NaN without redundancy.
-    pub sigma0_m: f64,
-    /// Redundancy `3n - 6` (`3n - 7` with scale), n = pairs of positive weight.
-    pub redundancy: usize,
-    /// Inverse of the normal matrix for unit sigma0, tangent `[dt target axes, dtheta source axes]`.
-    pub cofactor: Matrix6<f64>,
-    /// `sigma0² · cofactor`: metre² and radian²; NaN without redundancy.
-    pub covariance: Matrix6<f64>,
-}
-
-/// A similarity: scale besides the rigid motion.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Similarity {
-    /// `target = target_from_source * (scale * source)`; the orientation's covariance is that at this fixed scale.
-    pub orientation: Orientation,
-    /// Scale factor.
-    pub scale: f64,
-    /// Standard deviation of the scale (from the posterior sigma0); NaN without redundancy.
-    pub scale_sigma: f64,
-}
-
-/// Rigid motion that minimises `Σ w |target − (R source + t)|²`.
-///
-/// `source` and `target`: n ≥ 3 pairs, metre; `weights`: n values ≥ 0 (1/σ² of a pair, up to a factor), `None` = 1.
-/// Closed form after `[Horn1987]`; the covariance is that of the least-squares problem at the solution.
-///
-/// # Errors
-/// [`Error::LengthMismatch`], [`Error::NonFinite`], [`Error::NotPositive`], [`Error::TooFewPoints`] below three pairs
-/// of positive weight, [`Error::Collinear`] naming the side, [`Error::AmbiguousRotation`].
-pub fn absolute_orientation(
-    source: &[Point3<f64>],
-    target: &[Point3<f64>],
-    weights: Option<&[f64]>,
-) -> Result<Orientation> {
-    let moments = Moments::new(source, target, weights)?;
-    let rotation = moments.rotation()?;
-    Ok(moments.orientation(source, target, weights, rotation, 1.0, 6))
-}
-
-/// Similarity that minimises `Σ w |target − (s R source + t)|²`.
-///
-/// Arguments and errors as [`absolute_orientation`]. The scale is the least-squares one of `[Umeyama1991]`, which takes
-/// the target as measured and the source as given.
-pub fn absolute_orientation_with_scale(
-    source: &[Point3<f64>],
-    target: &[Point3<f64>],
-    weights: Option<&[f64]>,
-) -> Result<Similarity> {
-    let moments = Moments::new(source, target, weights)?;
-    let rotation = moments.rotation()?;
-    let spread = moments.source_scatter.trace();
-    let r = rotation.to_rotation_matrix();
-    // Σ w q'·(R p') / Σ w |p'|²
-    let scale = (r.matrix().transpose().component_mul(&moments.cross)).sum() / spread;
-    let orientation = moments.orientation(source, target, weights, rotation, scale, 7);
-    let scale_sigma = orientation.sigma0_m / spread.sqrt();
-    Ok(Similarity { orientation, scale, scale_sigma })
-}
 
 /// Weighted first and second moments of both point sets.
-struct Moments {
+pub(super) struct Moments {
     count: usize,
-    weight: f64,
+    pub weight: f64,
     source_mean: Vector3<f64>,
     target_mean: Vector3<f64>,
-    source_scatter: Matrix3<f64>,
+    pub source_scatter: Matrix3<f64>,
     /// `Σ w p' q'^T` about the means.
-    cross: Matrix3<f64>,
+    pub cross: Matrix3<f64>,
 }
 
 impl Moments {
-    fn new(source: &[Point3<f64>], target: &[Point3<f64>], weights: Option<&[f64]>) -> Result<Self> {
+    pub fn new(source: &[Point3<f64>], target: &[Point3<f64>], weights: Option<&[f64]>) -> Result<Self> {
         check_input(source, target, weights)?;
         let weight_of = |i: usize| weights.map_or(1.0, |w| w[i]);
         let count = (0..source.len()).filter(|&i| weight_of(i) > 0.0).count();
@@ -115,32 +48,7 @@ impl Moments {
         Ok(Self { count, weight, source_mean, target_mean, source_scatter, cross })
     }
 
-    /// Eigenvector of the largest eigenvalue of Horn's symmetric 4x4 matrix.
-    fn rotation(&self) -> Result<UnitQuaternion<f64>> {
-        let s = self.cross / self.cross.norm().max(f64::MIN_POSITIVE);
-        let (xx, xy, xz) = (s[(0, 0)], s[(0, 1)], s[(0, 2)]);
-        let (yx, yy, yz) = (s[(1, 0)], s[(1, 1)], s[(1, 2)]);
-        let (zx, zy, zz) = (s[(2, 0)], s[(2, 1)], s[(2, 2)]);
-        #[rustfmt::skip]
-        let horn = Matrix4::new(
-            xx + yy + zz, yz - zy,      zx - xz,       xy - yx,
-            yz - zy,      xx - yy - zz, xy + yx,       zx + xz,
-            zx - xz,      xy + yx,      -xx + yy - zz, yz + zy,
-            xy - yx,      zx + xz,      yz + zy,       -xx - yy + zz,
-        );
-        let eigen = SymmetricEigen::try_new(horn, 1e-16, 1000)
-            .ok_or(Error::Numerical { what: "Horn's eigenvalue problem", why: "the iteration did not converge" })?;
-        let mut order = [0, 1, 2, 3];
-        order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
-        let gap = eigen.eigenvalues[order[0]] - eigen.eigenvalues[order[1]];
-        if gap.is_nan() || gap <= AMBIGUOUS_GAP {
-            return Err(Error::AmbiguousRotation { gap });
-        }
-        let v = eigen.eigenvectors.column(order[0]);
-        Ok(UnitQuaternion::from_quaternion(Quaternion::new(v[0], v[1], v[2], v[3])))
-    }
-
-    fn orientation(
+    pub fn orientation(
         &self,
         source: &[Point3<f64>],
         target: &[Point3<f64>],

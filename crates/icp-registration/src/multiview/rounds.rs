@@ -1,0 +1,286 @@
+//! The rounds of the adjustment: contacts found anew, all pairs reduced, all stations moved.
+
+use nalgebra::{DMatrix, Isometry3, Point3};
+use rayon::prelude::*;
+
+use super::contacts::{Contact, Reach, partners};
+use super::network::{Network, State, largest_step};
+use super::patches::Surface;
+use super::point_model::PointModel;
+use super::reduction::{Meeting, Reduced, Scene, Weighting, reduce};
+use crate::error::{Error, Result};
+use crate::kernel::{RobustKernel, mad_scale};
+
+/// Rounds of a level before the last, and the part of its limit that a step must be below for it to end.
+const WIDE_ROUNDS: usize = 8;
+const WIDE_STEP: f64 = 100.0;
+/// Nearest patches that are looked at while stations are still apart.
+const WIDE_CANDIDATES: usize = 8;
+
+/// What the last round leaves.
+pub(super) struct Adjusted {
+    pub state: State,
+    pub meetings: Vec<Meeting>,
+    pub weighting: Weighting,
+    pub cofactors: DMatrix<f64>,
+    /// Weighted sum of squares and sum of the shares of all contacts.
+    pub squares: f64,
+    pub observations: f64,
+    pub rounds: usize,
+    pub settled: bool,
+}
+
+/// The surfaces at the present parameters.
+pub(super) struct Surfaces<'a> {
+    /// As they were given.
+    pub given: Vec<&'a Surface>,
+    /// At the present parameters, with the derivatives of their patches; `None` without parameters.
+    pub modelled: Option<(Vec<Surface>, Vec<Vec<[f64; 3]>>)>,
+    /// The model, with the number of points of each station.
+    pub model: Option<(&'a dyn PointModel, Vec<usize>)>,
+}
+
+impl<'a> Surfaces<'a> {
+    pub(super) fn fixed(given: Vec<&'a Surface>) -> Self {
+        Self { given, modelled: None, model: None }
+    }
+
+    pub(super) fn scene(&self, parameters: usize) -> Scene<'_> {
+        match &self.modelled {
+            Some((surfaces, derivatives)) => Scene { surfaces: surfaces.iter().collect(), derivatives, parameters },
+            None => Scene { surfaces: self.given.clone(), derivatives: &[], parameters },
+        }
+    }
+
+    /// Points, planes and derivatives at these parameters.
+    fn update(&mut self, parameters: &[f64]) -> Result<()> {
+        let Some((model, points)) = &self.model else { return Ok(()) };
+        let modelled: Result<Vec<(Surface, Vec<[f64; 3]>)>> = (0..self.given.len())
+            .into_par_iter()
+            .map(|station| at_parameters(self.given[station], *model, station, points[station], parameters))
+            .collect();
+        self.modelled = Some(modelled?.into_iter().unzip());
+        Ok(())
+    }
+}
+
+fn at_parameters(
+    surface: &Surface,
+    model: &dyn PointModel,
+    station: usize,
+    count: usize,
+    parameters: &[f64],
+) -> Result<(Surface, Vec<[f64; 3]>)> {
+    let m = parameters.len();
+    let mut points = vec![Point3::origin(); count];
+    let mut of_points = vec![[0.0; 3]; count * m];
+    for index in surface.members.iter().map(|&index| index as usize) {
+        points[index] = model.point(station, index, parameters, Some(&mut of_points[index * m..(index + 1) * m]));
+    }
+    crate::neighbours::check_points("points of the point model", &points)?;
+    if let Some(index) = of_points.iter().position(|d| !d.iter().all(|v| v.is_finite())) {
+        return Err(Error::NonFinite { what: "derivatives of the point model", index });
+    }
+    let surface = surface.refitted(&points)?;
+    let derivatives = averaged(&surface, &of_points, m);
+    Ok((surface, derivatives))
+}
+
+/// Derivatives of the patches' centres from those of their points.
+fn averaged(surface: &Surface, of_points: &[[f64; 3]], parameters: usize) -> Vec<[f64; 3]> {
+    let mut out = vec![[0.0; 3]; surface.patches.len() * parameters];
+    for patch in 0..surface.patches.len() {
+        let members = surface.points_of(patch);
+        for &index in members {
+            for k in 0..parameters {
+                for axis in 0..3 {
+                    out[patch * parameters + k][axis] +=
+                        of_points[index as usize * parameters + k][axis] / members.len() as f64;
+                }
+            }
+        }
+    }
+    out
+}
+
+/// All meetings at these poses; `only`: the pairs to look at (target, source).
+pub(super) fn meet(
+    surfaces: &[&Surface],
+    poses: &[Isometry3<f64>],
+    only: &[(usize, usize)],
+    reach: Reach,
+    fewest: usize,
+) -> Result<Vec<Meeting>> {
+    let found: Result<Vec<Meeting>> = only
+        .par_iter()
+        .map(|&(target, source)| {
+            let pose = poses[target].inverse() * poses[source];
+            let (from, to) = (surfaces[source], surfaces[target]);
+            let forward = partners(from, to, &pose, reach)?;
+            let back = partners(to, from, &pose.inverse(), reach)?;
+            let contact = |source, target, asked_by_source| Contact { source, target, asked_by_source, share: 0.0 };
+            let contacts = forward.iter().map(|&(source, target)| contact(source, target, true));
+            let contacts = contacts.chain(back.iter().map(|&(target, source)| contact(source, target, false)));
+            Ok(Meeting { target, source, contacts: contacts.collect() })
+        })
+        .collect();
+    let mut meetings = found?;
+    meetings.retain(|meeting| meeting.contacts.len() >= 2 * fewest);
+    share(surfaces, &mut meetings);
+    Ok(meetings)
+}
+
+/// A patch that k − 1 other stations see as well observes k − 1 differences, each of which would count fully only if
+/// its own error entered once: with weights 1/k the squares are those about the common surface.
+fn share(surfaces: &[&Surface], meetings: &mut [Meeting]) {
+    let mut seen: Vec<Vec<u32>> = surfaces.iter().map(|surface| vec![1; surface.patches.len()]).collect();
+    for meeting in meetings.iter() {
+        for contact in &meeting.contacts {
+            let (station, patch) = asking(meeting, contact);
+            seen[station][patch] += 1;
+        }
+    }
+    for meeting in meetings.iter_mut() {
+        let ends = (meeting.target, meeting.source);
+        for contact in &mut meeting.contacts {
+            let (station, patch) = match contact.asked_by_source {
+                true => (ends.1, contact.source as usize),
+                false => (ends.0, contact.target as usize),
+            };
+            contact.share = 1.0 / f64::from(seen[station][patch]);
+        }
+    }
+}
+
+fn asking(meeting: &Meeting, contact: &Contact) -> (usize, usize) {
+    if contact.asked_by_source {
+        (meeting.source, contact.source as usize)
+    } else {
+        (meeting.target, contact.target as usize)
+    }
+}
+
+/// Standard deviation of the whitened residuals of all contacts, from their median.
+fn scale(scene: &Scene<'_>, meetings: &[Meeting], poses: &[Isometry3<f64>]) -> f64 {
+    let of_pair = |meeting: &Meeting| -> Vec<f64> {
+        let pose = poses[meeting.target].inverse() * poses[meeting.source];
+        meeting.contacts.iter().map(|contact| scene.whitened_residual(meeting, contact, &pose).abs()).collect()
+    };
+    let mut residuals: Vec<f64> = meetings.par_iter().map(of_pair).collect::<Vec<_>>().concat();
+    // Exact surfaces leave rounding, which needs no weighting.
+    mad_scale(&mut residuals).max(1e-3)
+}
+
+/// How the rounds go.
+pub(super) struct Course<'a> {
+    pub network: Network<'a>,
+    /// Error of the start poses, metre.
+    pub reach_m: f64,
+    pub minimum_contacts: usize,
+    pub kernel: RobustKernel,
+    /// Rounds of the last level, and the movement at which they end, metre.
+    pub max_rounds: usize,
+    pub tolerance_m: f64,
+    pub progress: &'a (dyn Fn(usize) + Sync),
+}
+
+/// A level: how partners are looked for, and whether it is the last.
+#[derive(Debug, Clone, Copy)]
+struct Level {
+    reach: Reach,
+    last: bool,
+}
+
+impl Course<'_> {
+    /// Falling limits: far partners first, so that a station that has slid along a wall is drawn back by what stands on it.
+    fn levels(&self, size_m: f64) -> Vec<Level> {
+        let mut levels = Vec::new();
+        let mut across_m = self.reach_m;
+        while across_m > 1.2 * size_m {
+            levels.push(Level { reach: Reach { across_m, candidates: WIDE_CANDIDATES }, last: false });
+            across_m /= 2.0;
+        }
+        levels.push(Level { reach: Reach { across_m: size_m, candidates: WIDE_CANDIDATES }, last: false });
+        levels.push(Level { reach: Reach { across_m: size_m / 2.0, candidates: 1 }, last: true });
+        levels
+    }
+
+    /// Adjusts all stations from start poses that are right to about the reach.
+    pub(super) fn run(&self, surfaces: &mut Surfaces<'_>, start: State) -> Result<Adjusted> {
+        let count = start.poses.len();
+        let all: Vec<(usize, usize)> = (0..count).flat_map(|t| (t + 1..count).map(move |s| (t, s))).collect();
+        let size_m = surfaces.given.iter().map(|surface| surface.size_m).fold(0.0, f64::max);
+        let mut state = start;
+        let mut rounds = 0;
+        let mut ended = None;
+        for level in self.levels(size_m) {
+            let mut pairs = all.clone();
+            for in_level in 0..if level.last { self.max_rounds } else { WIDE_ROUNDS } {
+                surfaces.update(&state.parameters)?;
+                let fewest = self.minimum_contacts;
+                let meetings = meet(&surfaces.scene(0).surfaces, &state.poses, &pairs, level.reach, fewest)?;
+                if in_level == 0 {
+                    // Stations that do not meet now will not after the small steps of one level.
+                    pairs = meetings.iter().map(|meeting| (meeting.target, meeting.source)).collect();
+                }
+                let before = state.clone();
+                let adjusted = self.round(surfaces, &mut state, meetings, level, rounds)?;
+                rounds += 1;
+                (self.progress)(rounds);
+                let limit_m = if level.last { self.tolerance_m } else { level.reach.across_m / WIDE_STEP };
+                let settled = largest_step(&before, &state, self.network.hold_m) <= limit_m;
+                ended = Some(Adjusted { settled, rounds, ..adjusted });
+                if settled {
+                    break;
+                }
+            }
+        }
+        surfaces.update(&state.parameters)?;
+        // There are at least two levels of at least one round.
+        ended.ok_or(Error::Numerical { what: "the adjustment of the stations", why: "it has no rounds" })
+    }
+
+    /// Moves all stations (twice in the last level) on the same contacts.
+    fn round(
+        &self,
+        surfaces: &Surfaces<'_>,
+        state: &mut State,
+        meetings: Vec<Meeting>,
+        level: Level,
+        rounds: usize,
+    ) -> Result<Adjusted> {
+        let wide_kernel = if self.kernel == RobustKernel::None { RobustKernel::None } else { RobustKernel::Huber };
+        let kernel = if level.last { self.kernel } else { wide_kernel };
+        let scene = surfaces.scene(state.parameters.len());
+        // The residuals follow the parameters only when the points do.
+        let steps = if level.last && scene.parameters == 0 { 2 } else { 1 };
+        let mut step = || {
+            let weighting = Weighting { kernel, scale: scale(&scene, &meetings, &state.poses) };
+            let reduced = reduced(&scene, &meetings, &state.poses, &weighting)?;
+            let squares: f64 = reduced.iter().map(|(_, reduced)| reduced.squares).sum();
+            let (next, cofactors) = self.network.solve(state, &reduced)?;
+            *state = next;
+            Ok((weighting, squares, cofactors))
+        };
+        let (mut weighting, mut squares, mut cofactors) = step()?;
+        for _ in 1..steps {
+            (weighting, squares, cofactors) = step()?;
+        }
+        let observations = meetings.iter().flat_map(|m| &m.contacts).map(|contact| contact.share).sum();
+        let state = state.clone();
+        Ok(Adjusted { state, meetings, weighting, cofactors, squares, observations, rounds, settled: false })
+    }
+}
+
+fn reduced<'m>(
+    scene: &Scene<'_>,
+    meetings: &'m [Meeting],
+    poses: &[Isometry3<f64>],
+    weighting: &Weighting,
+) -> Result<Vec<(&'m Meeting, Reduced)>> {
+    let reduce = |meeting: &'m Meeting| {
+        let pose = poses[meeting.target].inverse() * poses[meeting.source];
+        Ok((meeting, reduce(scene, meeting, &pose, weighting)?))
+    };
+    meetings.par_iter().map(reduce).collect()
+}

@@ -1,0 +1,94 @@
+//! The nodes of a source frame in the order and arrangement in which they are worked on.
+// Lanes lie side by side: with an index, loops read as their formulas and have the same length everywhere.
+#![allow(clippy::needless_range_loop)]
+
+use nalgebra::Vector3;
+use rayon::prelude::*;
+
+use super::grid::{BLOCK, Grid, NO_NODE, STRIDES};
+
+/// Blocks that one thread takes at least.
+const BLOCKS_PER_TASK: usize = 256;
+
+/// Some nodes side by side; NaN where there is no plane.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Block {
+    pub position: [[f32; BLOCK]; 3],
+    pub normal: [[f32; BLOCK]; 3],
+    /// Variance of the position along the normal, m².
+    pub variance: [f32; BLOCK],
+    pub node: [u32; BLOCK],
+}
+
+/// The nodes level by level, coarse ones first.
+#[derive(Debug, Clone)]
+pub(super) struct Points {
+    pub blocks: Vec<Block>,
+    /// Nodes with a plane among those of each level.
+    pub counts: [usize; STRIDES.len()],
+    /// Centroid and rms radius of the first level that has nodes with planes.
+    pub centre: Vector3<f64>,
+    pub radius_m: f64,
+}
+
+impl Points {
+    pub(super) fn new(grid: &Grid) -> Self {
+        let nothing = [f32::NAN; BLOCK];
+        let empty = |node: &[u32; BLOCK]| Block {
+            position: [nothing; 3],
+            normal: [nothing; 3],
+            variance: nothing,
+            node: *node,
+        };
+        Self {
+            blocks: grid.order.iter().map(empty).collect(),
+            counts: [0; STRIDES.len()],
+            centre: Vector3::zeros(),
+            radius_m: 0.0,
+        }
+    }
+
+    /// Takes over the nodes of a frame.
+    pub(super) fn gather(&mut self, grid: &Grid, inverse_depth: &[f32], planes: &[[f32; 4]], sigma: &[f32]) {
+        self.blocks.par_iter_mut().with_min_len(BLOCKS_PER_TASK).for_each(|block| {
+            for k in 0..BLOCK {
+                if block.node[k] == NO_NODE {
+                    continue;
+                }
+                let node = block.node[k] as usize;
+                let plane = planes[node];
+                let known = plane[3].is_finite();
+                let depth = if known { 1.0 / inverse_depth[node] } else { f32::NAN };
+                let position = [grid.u[node] * depth, grid.v[node] * depth, -depth];
+                for i in 0..3 {
+                    block.position[i][k] = position[i];
+                    block.normal[i][k] = plane[i];
+                }
+                block.variance[k] = sigma[node] * sigma[node];
+            }
+        });
+        self.measure(grid);
+    }
+
+    fn measure(&mut self, grid: &Grid) {
+        let (mut from, mut count) = (0, 0);
+        for (level, &to) in grid.levels.iter().enumerate() {
+            count += self.blocks[from..to].iter().flat_map(|b| b.position[2]).filter(|z| z.is_finite()).count();
+            self.counts[level] = count;
+            from = to;
+        }
+        let level = self.counts.iter().position(|c| *c > 0).unwrap_or(0);
+        let count = self.counts[level].max(1) as f64;
+        let mean = self.nodes(grid.levels[level]).fold(Vector3::zeros(), |sum, p| sum + p) / count;
+        let square = self.nodes(grid.levels[level]).fold(0.0, |sum, p| sum + (p - mean).norm_squared());
+        self.centre = mean;
+        self.radius_m = (square / count).sqrt();
+    }
+
+    /// Positions of the nodes with a plane in the first blocks.
+    fn nodes(&self, blocks: usize) -> impl Iterator<Item = Vector3<f64>> + '_ {
+        let all =
+            self.blocks[..blocks].iter().flat_map(|b| (0..BLOCK).map(move |k| [0, 1, 2].map(|i| b.position[i][k])));
+        all.filter(|p| p[2].is_finite()).map(|p| Vector3::from(p.map(f64::from)))
+    }
+}

@@ -1,0 +1,78 @@
+//! The point of an organised frame at the pixel that a source point falls on.
+
+use nalgebra::Point3;
+
+use super::nearest::partner_at;
+use super::{Partner, PointMatching, Query};
+use crate::error::{Error, Result};
+use crate::icp::IcpTarget;
+use crate::parts::scene::TargetSurface;
+
+/// Reverse calibration `[BlaisLevine1995]`: no search, the partner is what the target's camera saw at the pixel that the
+/// source point projects to. Exact only close to the solution, and as fast as a look-up.
+pub struct Projective<'a> {
+    target: &'a IcpTarget,
+    /// Index into the target's points by pixel, row by row.
+    point_of_pixel: Vec<Option<usize>>,
+    width: usize,
+    height: usize,
+    /// Position `(col, row)` in pixels of a point of the target frame, `None` outside the field of view.
+    pixel: Box<dyn Fn(&Point3<f64>) -> Option<[f64; 2]> + Sync + 'a>,
+}
+
+impl<'a> Projective<'a> {
+    /// Matches with `target`, whose points are those pixels of the frame `points` (`width` · `height`, row by row, NaN
+    /// without range) that have a range, in their order, as [`crate::Cloud::from_frame`] keeps them.
+    ///
+    /// `pixel`: projection of a point of the target's frame to `(col, row)`.
+    ///
+    /// # Errors
+    /// [`Error::LengthMismatch`] where frame, size and target do not belong together.
+    pub fn new(
+        target: &'a IcpTarget,
+        points: &[[f64; 3]],
+        width: usize,
+        height: usize,
+        pixel: impl Fn(&Point3<f64>) -> Option<[f64; 2]> + Sync + 'a,
+    ) -> Result<Self> {
+        let expected = width.saturating_mul(height);
+        if points.len() != expected {
+            return Err(Error::LengthMismatch { what: "points of the frame", expected, found: points.len() });
+        }
+        let mut count = 0;
+        let point_of_pixel: Vec<Option<usize>> = points
+            .iter()
+            .map(|p| {
+                let usable = crate::neighbours::is_usable(&Point3::from(*p));
+                count += usize::from(usable);
+                usable.then(|| count - 1)
+            })
+            .collect();
+        if count != target.cloud.len() {
+            let (expected, found) = (target.cloud.len(), count);
+            return Err(Error::LengthMismatch { what: "points of the frame with a range", expected, found });
+        }
+        Ok(Self { target, point_of_pixel, width, height, pixel: Box::new(pixel) })
+    }
+
+    fn index(&self, query: &Query) -> Option<usize> {
+        let [col, row] = (self.pixel)(&query.moved.into())?;
+        let inside = |v: f64, size: usize| v > -0.5 && v < size as f64 - 0.5;
+        if !(inside(col, self.width) && inside(row, self.height)) {
+            return None;
+        }
+        let index = self.point_of_pixel[row.round() as usize * self.width + col.round() as usize]?;
+        let distance_m = (self.target.cloud.points[index].coords - query.moved).norm();
+        (distance_m <= query.limit_m).then_some(index)
+    }
+}
+
+impl PointMatching for Projective<'_> {
+    fn target(&self) -> TargetSurface<'_> {
+        self.target.surface()
+    }
+
+    fn partner(&self, query: &Query) -> Partner {
+        self.index(query).map_or(Partner::none(0.0), |index| partner_at(self.target, index, 0.0))
+    }
+}

@@ -1,0 +1,41 @@
+//! The pose from the pairs at once.
+
+use nalgebra::{Matrix6, Point3, Vector6};
+
+use super::Minimiser;
+use crate::absolute_orientation::{RotationMethod, absolute_orientation_by};
+use crate::error::{Error, Result};
+use crate::icp::System;
+use crate::parts::ErrorMetric;
+use crate::parts::scene::Scene;
+
+/// Closed-form absolute orientation `[Eggert1997]` of the weighted pairs; for the point-to-point metric only.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct ClosedForm(pub RotationMethod);
+
+impl Minimiser for ClosedForm {
+    fn step(&self, system: &System<'_>, held: &[Vector6<f64>]) -> Result<Vector6<f64>> {
+        // About the centre and in units of the radius: independent of where the clouds are and how large.
+        let (centre, radius) = (system.centre(), system.radius_m());
+        let reduced = |v: &nalgebra::Vector3<f64>| Point3::from((v - centre) / radius);
+        let source: Vec<_> = system.pairs().iter().map(|p| reduced(&p.moved)).collect();
+        let target: Vec<_> = system.pairs().iter().map(|p| reduced(&p.point)).collect();
+        let weights = system.all_weights();
+        let largest = weights.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
+        let relative: Vec<f64> = weights.iter().map(|w| w / largest).collect();
+        let motion = absolute_orientation_by(self.0, &source, &target, Some(&relative))?.target_from_source;
+        let (dt, w) = (motion.translation.vector * radius, motion.rotation.scaled_axis() * radius);
+        let mut keep = Matrix6::identity();
+        for direction in held {
+            keep -= direction * direction.transpose();
+        }
+        Ok(keep * Vector6::new(dt.x, dt.y, dt.z, w.x, w.y, w.z))
+    }
+
+    fn validate(&self, _: &Scene<'_>, metric: &dyn ErrorMetric) -> Result<()> {
+        if metric.is_point_to_point() {
+            return Ok(());
+        }
+        Err(Error::Incompatible { what: "a closed form", with: "a metric other than point to point" })
+    }
+}

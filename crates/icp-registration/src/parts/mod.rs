@@ -1,0 +1,57 @@
+//! The parts of the ICP family after `[RusinkiewiczLevoy2001]`, each behind a trait, for [`crate::Registration`].
+//!
+//! | question | trait | answers here |
+//! |---|---|---|
+//! | which points? | [`PointSelection`] | [`AllPoints`], [`EveryNth`], [`RandomPoints`], [`NormalSpace`], [`Stability`] |
+//! | which partner? | [`PointMatching`] | [`NearestPoint`], [`CompatibleNearest`], [`Projective`], `ClosestOnMesh` (feature `mesh`) |
+//! | how much weight? | [`PairWeighting`] | [`ConstantWeight`], [`DistanceWeight`], [`NormalWeight`], [`SigmaWeight`], [`IntensityWeight`] |
+//! | which pairs not? | [`PairRejection`] | [`MaxDistance`], [`MaxNormalAngle`], [`Trimmed`], [`MedianDistance`], [`SourceRim`], [`TargetRim`], [`MutualNearest`] |
+//! | what is minimised? | [`ErrorMetric`] | [`PointToPoint`], [`PointToPlane`], [`SymmetricPlanes`], [`PlaneToPlane`], [`Coloured`] |
+//! | how? | [`Minimiser`] | [`GaussNewton`], [`LevenbergMarquardt`], [`ClosedForm`], with [`AndersonAcceleration`] |
+//! | what of outliers? | [`KernelSchedule`] | [`crate::RobustKernel`], [`Graduated`] |
+//! | until when? | [`StoppingRule`] | [`Settled`] |
+
+mod kernel;
+mod matching;
+mod metric;
+mod minimisation;
+mod rejection;
+mod scene;
+mod selection;
+mod stopping;
+mod weighting;
+
+#[cfg(feature = "mesh")]
+pub use crate::mesh::{ClosestOnMesh, TriangleMesh};
+pub use kernel::{Graduated, KernelSchedule};
+pub use matching::{CompatibleNearest, NearestPoint, Partner, PointMatching, Projective, Query};
+pub use metric::{Coloured, ErrorMetric, PlaneToPlane, PointToPlane, PointToPoint, Row, Rows, SymmetricPlanes};
+pub(crate) use minimisation::Accelerator;
+pub use minimisation::{AndersonAcceleration, ClosedForm, GaussNewton, LevenbergMarquardt, Minimiser};
+pub use rejection::{
+    MaxDistance, MaxNormalAngle, MedianDistance, MutualNearest, PairRejection, SourceRim, TargetRim, Trimmed,
+};
+pub use scene::{Moment, Pair, Scene, TargetSurface};
+pub(crate) use selection::thinned;
+pub use selection::{AllPoints, EveryNth, NormalSpace, PointSelection, RandomPoints, Stability};
+pub use stopping::{Progress, Settled, StoppingRule};
+pub use weighting::{ConstantWeight, DistanceWeight, IntensityWeight, NormalWeight, PairWeighting, SigmaWeight};
+
+use crate::error::{Error, Result};
+
+/// Refuses a parameter of a part that is not positive and finite.
+fn require_positive(name: &'static str, value: f64) -> Result<()> {
+    if value > 0.0 && value.is_finite() {
+        return Ok(());
+    }
+    Err(Error::InvalidOption { name, value, domain: "positive and finite" })
+}
+
+/// Refuses a count below `least` (1, 2 or 3).
+fn require_count(name: &'static str, value: usize, least: usize) -> Result<()> {
+    if value >= least {
+        return Ok(());
+    }
+    let domain = ["1 or more", "2 or more", "3 or more"][least.clamp(1, 3) - 1];
+    Err(Error::InvalidOption { name, value: value as f64, domain })
+}

@@ -1,0 +1,260 @@
+//! The registration of two clouds of voxels.
+
+use nalgebra::{Isometry3, Point3, Vector6};
+
+use super::cloud::VoxelCloud;
+use super::options::VoxelAlignmentOptions;
+use super::pairs::{Matcher, Pair, Partners, System, matched};
+use super::wide::{RULES, Wide};
+use crate::error::{Error, Result};
+use crate::icp::{DegeneracyPolicy, IcpResult, StopReason};
+use crate::kernel::RobustKernel;
+use crate::pose::{is_finite, move_about};
+use crate::quality::{Centred, Verdict};
+
+/// Iterations that a coarse level may take.
+const LEVEL_ITERATIONS: usize = 8;
+/// A coarse level ends when a step is below this fraction of its voxels.
+const LEVEL_STEP: f64 = 0.05;
+/// Partners are kept for good when a step is below this fraction of the finest voxels.
+const SETTLED_STEP: f64 = 0.02;
+/// Steps of the finest level after which partners are kept in any case.
+const MOST_SEARCHES: usize = 15;
+/// Planes of a level below which it is passed over.
+const FEWEST_PLANES: usize = 100;
+/// Cells across the rms radius of the pairs, for the scatter of what they say.
+const CELLS_PER_RADIUS: f64 = 8.0;
+/// Least size of those cells: planes of voxels nearer than three share points.
+const VOXELS_PER_CELL: f64 = 6.0;
+
+impl VoxelCloud {
+    /// Aligns `source` with this cloud, starting at `guess` (both poses `target_from_source`).
+    ///
+    /// Minimised is `Σ w (n·(R p + t − q))²` over the means p, q of paired voxels, n halfway between their normals
+    /// `[Rusinkiewicz2019]`, w from the scatter of their points and a robust kernel; voxels of falling size.
+    ///
+    /// # Errors
+    /// [`Error::TooFewCorrespondences`] where the clouds do not overlap or hold too few planes; [`Error::NonFinite`]
+    /// for the guess, [`Error::InvalidOption`].
+    pub fn align(
+        &self,
+        source: &VoxelCloud,
+        guess: &Isometry3<f64>,
+        options: &VoxelAlignmentOptions,
+    ) -> Result<IcpResult> {
+        options.validate()?;
+        if !is_finite(guess) {
+            return Err(Error::NonFinite { what: "the guess", index: 0 });
+        }
+        let (pairs, scratch) = (Vec::new(), Vec::new());
+        let run = Run { target: self, source, options, pose: *guess, iterations: 0, held: None, pairs, scratch };
+        run.finish(guess)
+    }
+}
+
+struct Run<'a> {
+    target: &'a VoxelCloud,
+    source: &'a VoxelCloud,
+    options: &'a VoxelAlignmentOptions,
+    pose: Isometry3<f64>,
+    iterations: usize,
+    /// Motions that stay as they are, in a frame that stays too.
+    held: Option<(Centred, Vec<Vector6<f64>>)>,
+    pairs: Vec<Pair>,
+    scratch: Vec<f64>,
+}
+
+impl<'a> Run<'a> {
+    fn finish(mut self, guess: &Isometry3<f64>) -> Result<IcpResult> {
+        let mut matchers = self.matchers();
+        self.approach(&mut matchers)?;
+        for matcher in &matchers[..matchers.len() - 1] {
+            self.level(*matcher)?;
+        }
+        let last = matchers[matchers.len() - 1];
+        let mut stop = self.settle(last)?;
+        if self.options.degeneracy == DegeneracyPolicy::HoldAtGuess && self.return_to(guess, last)? {
+            stop = self.settle(last)?;
+        }
+        self.result(last, stop)
+    }
+
+    /// Levels of the source from coarse to fine, each with the target's level of the most similar size.
+    fn matchers(&self) -> Vec<Matcher<'a>> {
+        let (target, source) = (self.target, self.source);
+        let planes = |m: &Matcher<'_>| m.source.voxels.iter().filter(|v| v.variance < f64::INFINITY).count();
+        let mut matchers: Vec<Matcher<'a>> = source
+            .levels
+            .iter()
+            .map(|level| {
+                let unlike = |other: f64| (other / level.size_m).ln().abs();
+                let nearest = target.levels.iter().min_by(|a, b| unlike(a.size_m).total_cmp(&unlike(b.size_m)));
+                let nearest = nearest.unwrap_or(&target.levels[0]);
+                Matcher { source: level, target: nearest, target_lattice: &target.lattice }
+            })
+            .collect();
+        while matchers.len() > 1 && matchers.last().is_some_and(|m| planes(m) < FEWEST_PLANES) {
+            matchers.pop();
+        }
+        matchers.reverse();
+        matchers
+    }
+
+    /// Brings the pose to where the first of the levels that are left can find partners.
+    fn approach(&mut self, matchers: &mut Vec<Matcher<'a>>) -> Result<()> {
+        if let Some(error_m) = self.options.max_start_error_m
+            && let Some(start) = matchers.iter().rposition(|m| m.target.size_m >= error_m)
+        {
+            matchers.drain(..start);
+            return Ok(());
+        }
+        let wide = Wide::new(&self.source.levels, &self.target.levels, self.source.radius_m);
+        let first = self.options.max_start_error_m.unwrap_or(0.5 * self.target.radius_m);
+        let (guess, judge) = (self.pose, matchers[matchers.len().saturating_sub(3)]);
+        let last = 0.5 * matchers[0].target.size_m;
+        let mut best = f64::NEG_INFINITY;
+        let mut steps = 0;
+        for rule in RULES {
+            let (pose, taken) = wide.descend(&guess, rule, first, last)?;
+            steps += taken;
+            let system = self.system(judge, &pose, Partners::Anew, RobustKernel::None);
+            let fit = system.fit(0.1 * judge.target.size_m);
+            if fit > best {
+                (best, self.pose) = (fit, pose);
+            }
+        }
+        self.iterations += steps;
+        Ok(())
+    }
+
+    fn system(
+        &mut self,
+        matcher: Matcher<'_>,
+        pose: &Isometry3<f64>,
+        partners: Partners,
+        kernel: RobustKernel,
+    ) -> System<'_> {
+        matcher.fill(pose, partners, &mut self.pairs);
+        System::new(&self.pairs, kernel, &mut self.scratch)
+    }
+
+    /// Iterates on a coarse level.
+    fn level(&mut self, matcher: Matcher<'_>) -> Result<()> {
+        for _ in 0..LEVEL_ITERATIONS {
+            let kernel =
+                if self.options.kernel == RobustKernel::None { RobustKernel::None } else { RobustKernel::Cauchy };
+            let step = self.step(matcher, Partners::Anew, kernel)?;
+            if length(&step) < LEVEL_STEP * matcher.target.size_m {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// Iterates on the finest level.
+    fn settle(&mut self, matcher: Matcher<'_>) -> Result<StopReason> {
+        let tolerance = self.options.step_tolerance_m.unwrap_or(1e-5 * self.target.radius_m);
+        let (mut partners, mut searches) = (Partners::Anew, 0);
+        while searches == 0 || self.iterations < self.options.max_iterations {
+            let step = length(&self.step(matcher, partners, self.options.kernel)?);
+            if step <= tolerance {
+                return Ok(StopReason::Converged);
+            }
+            searches += 1;
+            if step < SETTLED_STEP * matcher.target.size_m || searches >= MOST_SEARCHES {
+                partners = Partners::Kept;
+            }
+        }
+        Ok(StopReason::MaxIterations)
+    }
+
+    /// Takes back what happened along undetermined motions, and holds them from now on; whether there are any.
+    ///
+    /// What a motion is worth shows at the answer only: far off, and between large voxels, everything seems to matter.
+    fn return_to(&mut self, guess: &Isometry3<f64>, matcher: Matcher<'_>) -> Result<bool> {
+        let (pose, iteration, kernel) = (self.pose, self.iterations, self.options.kernel);
+        let max_sigma_m = self.max_motion_sigma_m();
+        let system = self.enough(matcher, &pose, Partners::Anew, kernel, iteration)?;
+        let (frame, contributions) = (system.frame, system.contributions(matcher.target));
+        let held = Verdict::new(contributions, frame, cell(&system, matcher), max_sigma_m)?.held();
+        let slide = (guess * pose.inverse() * Point3::from(frame.centre)).coords - frame.centre;
+        let turn = (guess.rotation * pose.rotation.inverse()).scaled_axis() * frame.radius_m;
+        let back = Vector6::new(slide.x, slide.y, slide.z, turn.x, turn.y, turn.z);
+        let back = held.iter().fold(Vector6::zeros(), |sum, motion| sum + motion * motion.dot(&back));
+        self.pose = move_about(&pose, &frame.centre, frame.radius_m, &back);
+        let any = !held.is_empty();
+        self.held = Some((frame, held));
+        Ok(any)
+    }
+
+    fn step(&mut self, matcher: Matcher<'_>, partners: Partners, kernel: RobustKernel) -> Result<Vector6<f64>> {
+        let (pose, iteration, held) = (self.pose, self.iterations, self.held.clone());
+        let mut system = self.enough(matcher, &pose, partners, kernel, iteration)?;
+        system.frame = held.as_ref().map_or(system.frame, |(frame, _)| *frame);
+        let mut step = system.step(held.as_ref().map_or(&[], |(_, motions)| motions))?;
+        // Partners give no reason to move farther than they can be apart.
+        step /= (length(&step) / (2.0 * matcher.target.size_m)).max(1.0);
+        let frame = system.frame;
+        self.pose = move_about(&pose, &frame.centre, frame.radius_m, &step);
+        self.iterations += 1;
+        Ok(step)
+    }
+
+    fn enough(
+        &mut self,
+        matcher: Matcher<'_>,
+        pose: &Isometry3<f64>,
+        partners: Partners,
+        kernel: RobustKernel,
+        iteration: usize,
+    ) -> Result<System<'_>> {
+        let needed = self.options.min_correspondences;
+        let system = self.system(matcher, pose, partners, kernel);
+        if system.count < needed {
+            let of = matcher.source.voxels.len();
+            let max_distance_m = limit(matcher);
+            return Err(Error::TooFewCorrespondences { found: system.count, of, needed, max_distance_m, iteration });
+        }
+        Ok(system)
+    }
+
+    fn max_motion_sigma_m(&self) -> f64 {
+        self.options.max_motion_sigma_m.unwrap_or(self.target.radius_m / 300.0)
+    }
+
+    fn result(mut self, matcher: Matcher<'_>, stop: StopReason) -> Result<IcpResult> {
+        let (pose, iterations, max_sigma_m) = (self.pose, self.iterations, self.max_motion_sigma_m());
+        let (kernel, points) = (self.options.kernel, self.source.points as f64);
+        let system = self.enough(matcher, &pose, Partners::Anew, kernel, iterations)?;
+        let verdict =
+            Verdict::new(system.contributions(matcher.target), system.frame, cell(&system, matcher), max_sigma_m)?;
+        let (rms_m, correspondences, degenerate) = (system.rms_m(), system.count, verdict.undetermined());
+        let covariance = verdict.covariance(&pose);
+        let seen: f64 = matched(&self.pairs).map(|p| p.count).sum();
+        Ok(IcpResult {
+            target_from_source: pose,
+            covariance,
+            overlap: seen / points,
+            rms_m,
+            iterations,
+            stop,
+            correspondences,
+            max_correspondence_distance_m: limit(matcher),
+            degenerate,
+        })
+    }
+}
+
+fn limit(matcher: Matcher<'_>) -> f64 {
+    super::pairs::REACH * matcher.target.size_m.max(matcher.source.size_m)
+}
+
+/// Size of the cubes whose pairs count as one observation, metre.
+fn cell(system: &System<'_>, matcher: Matcher<'_>) -> f64 {
+    (system.frame.radius_m / CELLS_PER_RADIUS).max(VOXELS_PER_CELL * matcher.target.size_m)
+}
+
+/// Larger of the two parts of a motion.
+fn length(motion: &Vector6<f64>) -> f64 {
+    motion.fixed_rows::<3>(0).norm().max(motion.fixed_rows::<3>(3).norm())
+}

@@ -1,0 +1,82 @@
+//! A cloud prepared for registration.
+
+use super::gather::gather;
+use super::lattice::Lattice;
+use super::level::Level;
+use super::moments::Moments;
+use super::options::VoxelOptions;
+use super::scale::voxel_size;
+use crate::cloud::Cloud;
+use crate::error::{Error, Result};
+
+/// Levels end when so few voxels are left.
+const FEWEST_VOXELS: usize = 150;
+/// Levels that the lattice leaves room for.
+const MOST_LEVELS: usize = 8;
+
+/// A cloud as Gaussians in voxels, in levels of doubled size. Source and target are prepared alike.
+#[derive(Debug, Clone)]
+pub struct VoxelCloud {
+    pub(crate) lattice: Lattice,
+    /// From the finest to the coarsest.
+    pub(crate) levels: Vec<Level>,
+    pub(crate) points: usize,
+    pub(crate) radius_m: f64,
+}
+
+impl VoxelCloud {
+    /// Sums up the points of each voxel and fits planes to the voxels and their neighbours.
+    ///
+    /// Normals and standard deviations of the cloud are not used: both come from the scatter of the points. Points at
+    /// the rim are left out.
+    ///
+    /// # Errors
+    /// [`Error::Empty`], [`Error::NonFinite`], [`Error::LengthMismatch`], [`Error::NotPositive`] for the cloud;
+    /// [`Error::VoxelSize`] for a size that is not positive, or of which more than two million lie along the cloud.
+    pub fn new(cloud: &Cloud, options: &VoxelOptions) -> Result<Self> {
+        cloud.validate("the cloud of voxels")?;
+        let size_m = match options.voxel_m {
+            Some(size_m) => size_m,
+            None => voxel_size(&cloud.points)?,
+        };
+        let lattice = Lattice::new(&cloud.points, size_m)?;
+        let rim = cloud.rim.as_deref();
+        let (keys, moments) = gather::<Moments>(&cloud.points, &lattice, |i| rim.is_none_or(|r| !r[i]), &());
+        if keys.is_empty() {
+            return Err(Error::Empty { what: "the cloud without its rim" });
+        }
+        let mut levels = vec![Level::finest(&lattice, keys, moments)];
+        while let Some(last) = levels.last()
+            && last.voxels.len() > FEWEST_VOXELS
+            && levels.len() < MOST_LEVELS
+        {
+            levels.push(last.coarser(&lattice));
+        }
+        let radius_m = radius(&levels[0]);
+        Ok(Self { lattice, levels, points: cloud.len(), radius_m })
+    }
+
+    /// Edge of the finest voxels, metre.
+    pub fn voxel_m(&self) -> f64 {
+        self.lattice.size_m
+    }
+
+    /// Number of the finest voxels.
+    pub fn len(&self) -> usize {
+        self.levels[0].voxels.len()
+    }
+
+    /// Always false: a cloud without points cannot be prepared.
+    pub fn is_empty(&self) -> bool {
+        self.levels[0].voxels.is_empty()
+    }
+}
+
+/// Root mean square distance of the points from their centroid.
+fn radius(level: &Level) -> f64 {
+    let total: f64 = level.voxels.iter().map(|v| v.count).sum();
+    let first = level.voxels[0].mean;
+    let mean =
+        level.voxels.iter().fold(nalgebra::Vector3::zeros(), |sum, v| sum + (v.mean - first) * (v.count / total));
+    (level.voxels.iter().map(|v| (v.mean - first - mean).norm_squared() * (v.count / total)).sum::<f64>()).sqrt()
+}

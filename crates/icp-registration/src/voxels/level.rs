@@ -1,0 +1,146 @@
+//! One level of a voxel cloud: a plane for each voxel, and the way from a point to the voxels near it.
+
+use nalgebra::{Point3, Vector3};
+use rayon::prelude::*;
+
+use super::blocks::Blocks;
+use super::lattice::{Lattice, cell};
+use super::moments::Moments;
+use crate::eigen::{eigenvalues3, eigenvector3};
+
+/// Voxels handled together by one thread; fixed, so that sums do not depend on the number of threads.
+pub(crate) const CHUNK: usize = 512;
+/// Fewest points and voxels that a plane is fitted to.
+const FEWEST_POINTS: f64 = 6.0;
+const FEWEST_VOXELS: usize = 3;
+/// Largest ratio of the smallest to the middle eigenvalue: beyond it the neighbourhood is no plane but an edge or noise.
+const LARGEST_FLATNESS_RATIO: f64 = 0.15;
+/// Smallest middle eigenvalue, in squares of the voxel: below, the points lie on a line.
+const SMALLEST_WIDTH: f64 = 0.02;
+/// Share of the points' variance across the plane that does not average out: bends, steps, the edge of a surface.
+const COMMON_SHARE: f64 = 0.03;
+/// Standard deviation that no plane goes below, in voxels: surfaces are not flatter, and a few voxels with many points
+/// would outweigh all others.
+const FLOOR: f64 = 0.02;
+/// Cosine of the angle beyond which normals of partners disagree.
+const SMALLEST_COSINE: f64 = 0.7;
+
+/// The mean of the points of a voxel, and the plane through it and its neighbours.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Voxel {
+    pub mean: Point3<f64>,
+    /// Unit normal of arbitrary sign; NaN where the points form no plane.
+    pub normal: Vector3<f64>,
+    /// Variance of the mean across the plane, square metre; infinite where there is no plane.
+    pub variance: f64,
+    pub count: f64,
+}
+
+/// All voxels of one size.
+#[derive(Debug, Clone)]
+pub(crate) struct Level {
+    pub size_m: f64,
+    /// Cells of the finest level along the edge of a cell of this one.
+    factor: f64,
+    keys: Vec<u64>,
+    moments: Vec<Moments>,
+    blocks: Blocks,
+    pub voxels: Vec<Voxel>,
+}
+
+impl Level {
+    /// The finest level.
+    pub fn finest(lattice: &Lattice, keys: Vec<u64>, moments: Vec<Moments>) -> Self {
+        Self::new(lattice, 1.0, keys, moments)
+    }
+
+    /// The level of twice the size.
+    pub fn coarser(&self, lattice: &Lattice) -> Self {
+        let (mut keys, mut moments) = (Vec::<u64>::new(), Vec::<Moments>::new());
+        for (key, own) in self.keys.iter().zip(&self.moments) {
+            let shift = [0, 1, 2].map(|axis| if key >> axis & 1 == 1 { 0.5 } else { -0.5 });
+            let part = own.shifted(shift).in_doubled_units();
+            match moments.last_mut() {
+                Some(last) if keys.last() == Some(&(key >> 3)) => last.include(&part),
+                _ => {
+                    keys.push(key >> 3);
+                    moments.push(part);
+                }
+            }
+        }
+        Self::new(lattice, 2.0 * self.factor, keys, moments)
+    }
+
+    fn new(lattice: &Lattice, factor: f64, keys: Vec<u64>, moments: Vec<Moments>) -> Self {
+        let blocks = Blocks::new(&keys);
+        let size_m = lattice.size_m * factor;
+        let maker = Maker { lattice, factor, keys: &keys, moments: &moments, blocks: &blocks };
+        let voxels = (0..keys.len()).into_par_iter().with_min_len(CHUNK).map(|i| maker.voxel(i)).collect();
+        Self { size_m, factor, keys, moments, blocks, voxels }
+    }
+
+    /// Index of the voxel nearest to `moved` whose normal agrees with `normal`, among the eight cells around it.
+    #[inline]
+    pub fn partner(&self, lattice: &Lattice, moved: &Point3<f64>, normal: &Vector3<f64>) -> Option<usize> {
+        let place = lattice.place(moved).map(|v| v / self.factor);
+        // NaN and what lies outside fail the comparison.
+        if !place.iter().all(|v| *v >= 1.0 && *v < 2_000_000.0) {
+            return None;
+        }
+        let cells = place.map(|v| {
+            let c = v as u32;
+            [c, if v - f64::from(c) < 0.5 { c - 1 } else { c + 1 }]
+        });
+        let (mut best, mut nearest) = (f64::INFINITY, None);
+        self.blocks.visit(cells, |_, index| {
+            let voxel = &self.voxels[index];
+            let square = (voxel.mean - moved).norm_squared();
+            // A NaN normal fails the comparison.
+            if square < best && voxel.normal.dot(normal).abs() > SMALLEST_COSINE {
+                (best, nearest) = (square, Some(index));
+            }
+        });
+        nearest
+    }
+}
+
+struct Maker<'a> {
+    lattice: &'a Lattice,
+    factor: f64,
+    keys: &'a [u64],
+    moments: &'a [Moments],
+    blocks: &'a Blocks,
+}
+
+impl Maker<'_> {
+    fn voxel(&self, index: usize) -> Voxel {
+        let (cell, own) = (cell(self.keys[index]), &self.moments[index]);
+        let mean = own.mean();
+        let place = [0, 1, 2].map(|k| (f64::from(cell[k]) + 0.5 + mean[k]) * self.factor);
+        let (normal, variance) = self.plane(cell, own).unwrap_or((Vector3::repeat(f64::NAN), f64::INFINITY));
+        Voxel { mean: self.lattice.point(&place), normal, variance, count: own.count }
+    }
+
+    /// Normal and variance of the mean across it, square metre.
+    fn plane(&self, cell: [u32; 3], own: &Moments) -> Option<(Vector3<f64>, f64)> {
+        let (mut around, mut voxels) = (Moments::default(), 0);
+        self.blocks.visit(cell.map(|c| [c - 1, c, c + 1]), |place, index| {
+            let shift = [place % 3, place / 3 % 3, place / 9].map(|c| c as f64 - 1.0);
+            around.include(&self.moments[index].shifted(shift));
+            voxels += 1;
+        });
+        if around.count < FEWEST_POINTS || voxels < FEWEST_VOXELS {
+            return None;
+        }
+        let scatter = around.scatter();
+        let [smallest, middle, _] = eigenvalues3(&scatter);
+        if !(smallest <= LARGEST_FLATNESS_RATIO * middle && middle > SMALLEST_WIDTH) {
+            return None;
+        }
+        let normal = eigenvector3(&scatter, smallest)?;
+        let across = smallest.max(normal.dot(&(own.scatter() * normal))).max(0.0);
+        let size_m = self.lattice.size_m * self.factor;
+        let variance = across * (1.0 / own.count + COMMON_SHARE) + FLOOR * FLOOR;
+        Some((normal, variance * size_m * size_m))
+    }
+}

@@ -1,0 +1,18 @@
+//! Unorganised clouds in cubes of space: averages, and registration by what the points of each cube look like.
+
+mod align;
+mod blocks;
+mod cloud;
+mod downsample;
+mod gather;
+mod lattice;
+mod level;
+mod moments;
+mod options;
+mod pairs;
+mod scale;
+mod wide;
+
+pub use cloud::VoxelCloud;
+pub use downsample::downsample;
+pub use options::{VoxelAlignmentOptions, VoxelOptions};

@@ -1,0 +1,75 @@
+//! What can be chosen.
+
+use crate::error::{Error, Result};
+use crate::icp::DegeneracyPolicy;
+use crate::kernel::RobustKernel;
+
+/// How a cloud is cut into voxels.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct VoxelOptions {
+    /// Edge of the finest voxels, metre. `None`: such that the cloud fills about 10 000 of them, or, where it has fewer
+    /// points than that takes, a voxel holds about eight.
+    pub voxel_m: Option<f64>,
+}
+
+/// How two clouds of voxels are aligned. The defaults carry no scale.
+#[derive(Debug, Clone, PartialEq)]
+pub struct VoxelAlignmentOptions {
+    /// Largest distance by which the guess may misplace points, metre. `None`: as far as half of the target's radius,
+    /// found by a search from several sides. A small distance saves that search.
+    pub max_start_error_m: Option<f64>,
+    /// Robust kernel of the finest level; its scale is the median absolute deviation of the residuals, anew in each
+    /// iteration.
+    pub kernel: RobustKernel,
+    /// Iterations in all levels together. Default 100.
+    pub max_iterations: usize,
+    /// The run has converged when the step moves points at the cloud's radius by less than this, metre. `None`: 1e-5 of
+    /// that radius.
+    pub step_tolerance_m: Option<f64>,
+    /// What happens to undetermined motions.
+    pub degeneracy: DegeneracyPolicy,
+    /// A motion counts as undetermined when the predicted standard deviation of points at the cloud's radius exceeds
+    /// this, metre. `None`: 1/300 of the radius.
+    pub max_motion_sigma_m: Option<f64>,
+    /// Fewest pairs of voxels. Default 20.
+    pub min_correspondences: usize,
+}
+
+impl Default for VoxelAlignmentOptions {
+    fn default() -> Self {
+        Self {
+            max_start_error_m: None,
+            kernel: RobustKernel::Welsch,
+            max_iterations: 100,
+            step_tolerance_m: None,
+            degeneracy: DegeneracyPolicy::Report,
+            max_motion_sigma_m: None,
+            min_correspondences: 20,
+        }
+    }
+}
+
+impl VoxelAlignmentOptions {
+    pub(crate) fn validate(&self) -> Result<()> {
+        let lengths = [
+            ("max_start_error_m", self.max_start_error_m),
+            ("step_tolerance_m", self.step_tolerance_m),
+            ("max_motion_sigma_m", self.max_motion_sigma_m),
+        ];
+        for (name, value) in lengths {
+            if let Some(value) = value
+                && !(value > 0.0 && value.is_finite())
+            {
+                return Err(Error::InvalidOption { name, value, domain: "positive and finite" });
+            }
+        }
+        let counts = [("max_iterations", self.max_iterations, 1), ("min_correspondences", self.min_correspondences, 6)];
+        for (name, value, least) in counts {
+            if value < least {
+                let domain = if least == 1 { "1 or more" } else { "6 or more" };
+                return Err(Error::InvalidOption { name, value: value as f64, domain });
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,237 @@
+//! Pairs of source and target voxels at a pose.
+
+use nalgebra::{Isometry3, Matrix6, Vector3, Vector6};
+use rayon::prelude::*;
+
+use super::lattice::Lattice;
+use super::level::{CHUNK, Level};
+use crate::eigen::eigen6;
+use crate::error::Result;
+use crate::kernel::{RobustKernel, mad_scale};
+use crate::pose::symmetrised;
+use crate::quality::{Centred, Contribution};
+
+/// Partners farther apart than this many voxels belong to different things.
+pub(crate) const REACH: f64 = 1.5;
+/// Share of the offset along the plane by which disagreeing normals make the distance across it unsure.
+const LEVER_SHARE: f64 = 0.1;
+/// Eigenvalues below this fraction of the largest are rounding: no step along them.
+const RANK_TOLERANCE: f64 = 1e-10;
+
+/// A source voxel and its partner.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Pair {
+    pub target: u32,
+    /// Mean of the source voxel in the target frame.
+    pub moved: Vector3<f64>,
+    /// Unit vector halfway between the two normals: along it even means at different places of a bent surface have no
+    /// distance.
+    pub normal: Vector3<f64>,
+    pub source_normal: Vector3<f64>,
+    pub residual: f64,
+    /// Variance of the residual, square metre; infinite where there is no partner.
+    pub variance: f64,
+    pub count: f64,
+}
+
+const ALONE: Pair = Pair {
+    target: u32::MAX,
+    moved: Vector3::new(0.0, 0.0, 0.0),
+    normal: Vector3::new(0.0, 0.0, 0.0),
+    source_normal: Vector3::new(0.0, 0.0, 0.0),
+    residual: 0.0,
+    variance: f64::INFINITY,
+    count: 0.0,
+};
+
+/// Two levels that are paired.
+#[derive(Clone, Copy)]
+pub(crate) struct Matcher<'a> {
+    pub source: &'a Level,
+    pub target: &'a Level,
+    pub target_lattice: &'a Lattice,
+}
+
+/// Whether partners are looked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Partners {
+    Anew,
+    Kept,
+}
+
+impl Matcher<'_> {
+    /// Fills `pairs`, one for each source voxel.
+    pub fn fill(&self, pose: &Isometry3<f64>, partners: Partners, pairs: &mut Vec<Pair>) {
+        pairs.resize(self.source.voxels.len(), ALONE);
+        pairs.par_chunks_mut(CHUNK).zip(self.source.voxels.par_chunks(CHUNK)).for_each(|(pairs, voxels)| {
+            for (pair, voxel) in pairs.iter_mut().zip(voxels) {
+                if voxel.variance < f64::INFINITY {
+                    let moved = pose * voxel.mean;
+                    let normal = pose.rotation * voxel.normal;
+                    let target = match partners {
+                        Partners::Kept => Some(pair.target as usize),
+                        Partners::Anew => self.target.partner(self.target_lattice, &moved, &normal),
+                    };
+                    *pair = target
+                        .and_then(|t| self.pair(t, moved.coords, normal, voxel.variance, voxel.count))
+                        .unwrap_or(ALONE);
+                } else {
+                    *pair = ALONE;
+                }
+            }
+        });
+    }
+
+    #[inline]
+    fn pair(&self, index: usize, moved: Vector3<f64>, normal: Vector3<f64>, variance: f64, count: f64) -> Option<Pair> {
+        let target = self.target.voxels.get(index)?;
+        let source_normal = if normal.dot(&target.normal) < 0.0 { -normal } else { normal };
+        let both = source_normal + target.normal;
+        let bisector = both / both.norm();
+        let offset = moved - target.mean.coords;
+        let square = offset.norm_squared();
+        let limit = REACH * self.target.size_m.max(self.source.size_m);
+        if square.is_nan() || square > limit * limit {
+            return None;
+        }
+        let lever = LEVER_SHARE * (source_normal - target.normal).norm_squared() * square;
+        let variance = variance + target.variance + lever;
+        let residual = bisector.dot(&offset);
+        Some(Pair { target: index as u32, moved, normal: bisector, source_normal, residual, variance, count })
+    }
+}
+
+/// Pairs with a kernel, ready to be summed.
+pub(crate) struct System<'a> {
+    pub pairs: &'a [Pair],
+    pub frame: Centred,
+    pub count: usize,
+    kernel: RobustKernel,
+    /// Standard deviation of a whitened residual.
+    scale: f64,
+}
+
+impl<'a> System<'a> {
+    pub fn new(pairs: &'a [Pair], kernel: RobustKernel, scratch: &mut Vec<f64>) -> Self {
+        scratch.clear();
+        let (mut sum, mut square) = (Vector3::zeros(), 0.0);
+        let start = matched(pairs).next().map_or(Vector3::zeros(), |p| p.moved);
+        for pair in matched(pairs) {
+            let place = pair.moved - start;
+            sum += place;
+            square += place.norm_squared();
+            scratch.push(pair.residual.abs() / pair.variance.sqrt());
+        }
+        let count = scratch.len();
+        let n = count.max(1) as f64;
+        let radius_m = (square / n - (sum / n).norm_squared()).max(0.0).sqrt().max(f64::MIN_POSITIVE.sqrt());
+        let frame = Centred { centre: start + sum / n, radius_m };
+        Self { pairs, frame, count, kernel, scale: mad_scale(scratch) }
+    }
+
+    /// Weight of a pair and the slope of its influence, both over its variance.
+    #[inline]
+    fn weights(&self, pair: &Pair) -> (f64, f64) {
+        let precision = 1.0 / pair.variance;
+        // Without any scatter every residual is exact.
+        if self.scale <= 1e-12 {
+            return (precision, precision);
+        }
+        let u = pair.residual / (pair.variance.sqrt() * self.scale);
+        (self.kernel.weight(u) * precision, self.kernel.influence_slope(u) * precision)
+    }
+
+    /// Normal matrix `Σ w J J^T` and right-hand side `Σ w J r`, summed in fixed chunks.
+    fn normal_equations(&self) -> (Matrix6<f64>, Vector6<f64>) {
+        let unit = self.frame.radius_m.powi(2);
+        let partial: Vec<[f64; 27]> = self
+            .pairs
+            .par_chunks(CHUNK)
+            .map(|chunk| {
+                let mut sums = [0.0; 27];
+                for pair in matched(chunk) {
+                    let weight = self.weights(pair).0 * unit;
+                    add(&mut sums, &self.frame.derivative(&pair.moved, &pair.normal), weight, pair.residual);
+                }
+                sums
+            })
+            .collect();
+        let mut total = [0.0; 27];
+        for sums in &partial {
+            for (total, sum) in total.iter_mut().zip(sums) {
+                *total += sum;
+            }
+        }
+        let mut k = 6;
+        let mut h = Matrix6::zeros();
+        for r in 0..6 {
+            for c in r..6 {
+                (h[(r, c)], h[(c, r)]) = (total[k], total[k]);
+                k += 1;
+            }
+        }
+        (h, Vector6::from_fn(|i, _| total[i]))
+    }
+
+    /// One Gauss-Newton step `[dt, rho w]` in the complement of the held directions (orthonormal).
+    pub fn step(&self, held: &[Vector6<f64>]) -> Result<Vector6<f64>> {
+        let (h, g) = self.normal_equations();
+        let keep = held.iter().fold(Matrix6::identity(), |keep, d| keep - d * d.transpose());
+        let (values, vectors) = eigen6(&symmetrised(&(keep * h * keep)), "the normal equations of an iteration")?;
+        let right = keep * g;
+        let mut step = Vector6::zeros();
+        for k in 0..6 {
+            if values[k] > RANK_TOLERANCE * values[5] && values[k] > 0.0 {
+                let v = vectors.column(k);
+                step -= v * (v.dot(&right) / values[k]);
+            }
+        }
+        Ok(keep * step)
+    }
+
+    /// What each pair says about the pose.
+    pub fn contributions(&self, target: &'a Level) -> impl Iterator<Item = Contribution> + '_ {
+        let unit = self.frame.radius_m.powi(2);
+        matched(self.pairs).map(move |pair| {
+            let (weight, slope) = self.weights(pair);
+            let a = self.frame.derivative(&pair.moved, &target.voxels[pair.target as usize].normal);
+            let b = self.frame.derivative(&pair.moved, &pair.source_normal);
+            let score = self.frame.derivative(&pair.moved, &pair.normal) * (weight * unit * pair.residual);
+            let information = (a * b.transpose() + b * a.transpose()) * (0.5 * slope * unit);
+            Contribution { place: pair.moved, score, information }
+        })
+    }
+
+    /// Root mean square residual, weighted by the kernel, metre.
+    pub fn rms_m(&self) -> f64 {
+        let (mut squares, mut total) = (0.0, 0.0);
+        for pair in matched(self.pairs) {
+            let weight = self.weights(pair).0 * pair.variance;
+            squares += weight * pair.residual.powi(2);
+            total += weight;
+        }
+        if total > 0.0 { (squares / total).sqrt() } else { f64::NAN }
+    }
+
+    /// How well the pairs fit: their number, each weighted by its residual over `scale_m`.
+    pub fn fit(&self, scale_m: f64) -> f64 {
+        matched(self.pairs).map(|p| 1.0 / (1.0 + (p.residual / scale_m).powi(2))).sum()
+    }
+}
+
+#[inline]
+fn add(sums: &mut [f64; 27], j: &Vector6<f64>, weight: f64, residual: f64) {
+    let mut k = 6;
+    for r in 0..6 {
+        let weighted = weight * j[r];
+        sums[r] += weighted * residual;
+        for c in r..6 {
+            sums[k] += weighted * j[c];
+            k += 1;
+        }
+    }
+}
+
+pub(crate) fn matched(pairs: &[Pair]) -> impl Iterator<Item = &Pair> {
+    pairs.iter().filter(|p| p.variance < f64::INFINITY)
+}

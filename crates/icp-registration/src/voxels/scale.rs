@@ -1,0 +1,99 @@
+//! The size of voxels that suits a cloud.
+//!
+//! Surfaces fill cells in proportion to the square of their fineness, so counts in one coarse lattice tell how many
+//! voxels of any size there are, and how many points the voxel of a typical point holds. Scans from one place are dense
+//! near it: the typical point counts, not the typical voxel.
+
+use nalgebra::Point3;
+
+use super::gather::{Sum, gather};
+use super::lattice::Lattice;
+use crate::error::Result;
+use crate::kernel::quantile;
+
+/// Points looked at.
+const SAMPLE: usize = 16_384;
+/// Most voxels: enough for a pose that noise limits, few enough to be fast.
+const MOST_VOXELS: f64 = 10_000.0;
+/// Points wanted in the voxel of a typical point.
+const POINTS_A_VOXEL: f64 = 8.0;
+/// Cells across the radius of the lattice that is counted in.
+const PROBES: f64 = 10.0;
+/// Points that the cell of a typical point must hold in the sample.
+const POINTS_A_PROBE: f64 = 6.0;
+/// Share of the extent below which indices could overflow.
+const SMALLEST_SHARE: f64 = 1e-6;
+/// Factor by which the size grows until there are few enough voxels.
+const GROWTH: f64 = 1.05;
+
+/// Edge of the voxels, metre: the voxel of a typical point holds about eight, but there are at most about 10 000 voxels.
+pub(crate) fn voxel_size(points: &[Point3<f64>]) -> Result<f64> {
+    let sample: Vec<Point3<f64>> = points.iter().copied().step_by(points.len().div_ceil(SAMPLE).max(1)).collect();
+    let (radius, extent) = radius_and_extent(&sample, points);
+    if extent <= 0.0 {
+        // All points in one place: any size will do.
+        return Ok(1.0);
+    }
+    let smallest = SMALLEST_SHARE * extent;
+    let mut probe = (radius / PROBES).max(smallest);
+    let mut counts = counted(&sample, probe)?;
+    while typical(&counts) < POINTS_A_PROBE && probe < extent {
+        probe *= 2.0;
+        counts = counted(&sample, probe)?;
+    }
+    let thinning = points.len() as f64 / sample.len() as f64;
+    let mut fineness = (typical(&counts) * thinning / POINTS_A_VOXEL).sqrt();
+    // No more voxels than points in a cell.
+    let voxels = |fineness: f64| counts.iter().map(|c| (c * thinning).min(fineness * fineness)).sum::<f64>();
+    while fineness > 1.0 && voxels(fineness) > MOST_VOXELS {
+        fineness /= GROWTH;
+    }
+    Ok((probe / fineness).max(smallest))
+}
+
+/// Points in the cell of the typical point.
+fn typical(counts: &[f64]) -> f64 {
+    let mut sorted = counts.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let half = 0.5 * sorted.iter().sum::<f64>();
+    let mut before = 0.0;
+    sorted
+        .into_iter()
+        .find(|count| {
+            before += count;
+            before >= half
+        })
+        .unwrap_or(1.0)
+}
+
+/// Median distance from the median position, and the largest extent along an axis.
+fn radius_and_extent(sample: &[Point3<f64>], points: &[Point3<f64>]) -> (f64, f64) {
+    let middle = [0, 1, 2].map(|k| quantile(&mut sample.iter().map(|p| p[k]).collect::<Vec<_>>(), 0.5));
+    let middle = Point3::from(middle);
+    let radius = quantile(&mut sample.iter().map(|p| (p - middle).norm()).collect::<Vec<_>>(), 0.5);
+    let extent = (0..3).map(|k| {
+        let ends = points.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), p| (l.min(p[k]), h.max(p[k])));
+        ends.1 - ends.0
+    });
+    (radius, extent.fold(0.0, f64::max))
+}
+
+#[derive(Debug, Default, Clone)]
+struct Count(f64);
+
+impl Sum for Count {
+    type Source<'a> = ();
+
+    fn add(&mut self, _: usize, _: [f64; 3], (): &()) {
+        self.0 += 1.0;
+    }
+
+    fn merge(&mut self, other: &Self) {
+        self.0 += other.0;
+    }
+}
+
+fn counted(sample: &[Point3<f64>], size_m: f64) -> Result<Vec<f64>> {
+    let lattice = Lattice::new(sample, size_m)?;
+    Ok(gather::<Count>(sample, &lattice, |_| true, &()).1.into_iter().map(|count| count.0).collect())
+}

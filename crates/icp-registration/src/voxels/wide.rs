@@ -1,0 +1,123 @@
+//! From a guess that is far off to the neighbourhood of the answer: samples of both clouds, each source sample paired
+//! with the target sample that is nearest in place and direction, at a scale that falls.
+
+use nalgebra::{Isometry3, Matrix6, Vector3, Vector6};
+
+use super::level::{Level, Voxel};
+use crate::eigen::eigen6;
+use crate::error::Result;
+use crate::pose::{move_about, symmetrised};
+use crate::quality::Centred;
+
+/// Samples of the source and of the target.
+const SOURCE_SAMPLES: usize = 400;
+const TARGET_SAMPLES: usize = 1000;
+/// Levels with fewer planes are no basis for samples.
+const FEWEST_PLANES: usize = 600;
+/// Factor of the scale from one step to the next.
+const FALL: f64 = 0.8;
+
+/// How much directions count in pairing, and how much the distance along the plane counts in the step.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Rule {
+    pub direction: f64,
+    pub along: f64,
+}
+
+/// Rules that are tried; the pose that fits best goes on.
+pub(crate) const RULES: [Rule; 3] =
+    [Rule { direction: 0.0, along: 0.3 }, Rule { direction: 1.0, along: 0.1 }, Rule { direction: 4.0, along: 0.03 }];
+
+/// Samples of two clouds.
+pub(crate) struct Wide {
+    source: Vec<Voxel>,
+    target: Vec<Voxel>,
+    radius_m: f64,
+}
+
+impl Wide {
+    pub fn new(source: &[Level], target: &[Level], radius_m: f64) -> Self {
+        Self { source: sample(source, SOURCE_SAMPLES), target: sample(target, TARGET_SAMPLES), radius_m }
+    }
+
+    /// The pose reached from `guess` while the scale falls from `first_m` to `last_m`, and the steps it took.
+    pub fn descend(
+        &self,
+        guess: &Isometry3<f64>,
+        rule: Rule,
+        first_m: f64,
+        last_m: f64,
+    ) -> Result<(Isometry3<f64>, usize)> {
+        let (mut pose, mut scale, mut steps) = (*guess, first_m, 0);
+        while scale > last_m {
+            let Some(frame) = self.frame(&pose) else { break };
+            let step = self.step(&pose, rule, scale, frame)?;
+            let length = step.norm() / (2.0 * scale);
+            pose = move_about(&pose, &frame.centre, frame.radius_m, &(step / length.max(1.0)));
+            steps += 1;
+            scale *= FALL;
+        }
+        Ok((pose, steps))
+    }
+
+    fn frame(&self, pose: &Isometry3<f64>) -> Option<Centred> {
+        let n = self.source.len() as f64;
+        let first = self.source.first()?.mean;
+        let mean = first + self.source.iter().fold(Vector3::zeros(), |sum, v| sum + (v.mean - first)) / n;
+        (self.radius_m > 0.0 && !self.target.is_empty())
+            .then(|| Centred { centre: (pose * mean).coords, radius_m: self.radius_m })
+    }
+
+    fn step(&self, pose: &Isometry3<f64>, rule: Rule, scale: f64, frame: Centred) -> Result<Vector6<f64>> {
+        let (mut h, mut g) = (Matrix6::zeros(), Vector6::zeros());
+        for voxel in &self.source {
+            let (moved, normal) = (pose * voxel.mean, pose.rotation * voxel.normal);
+            let mut best = (f64::INFINITY, 0);
+            for (index, target) in self.target.iter().enumerate() {
+                let cosine = target.normal.dot(&normal);
+                let cost =
+                    (target.mean - moved).norm_squared() / (scale * scale) + rule.direction * (1.0 - cosine * cosine);
+                if cost < best.0 {
+                    best = (cost, index);
+                }
+            }
+            let target = &self.target[best.1];
+            let offset = moved - target.mean;
+            let cosine = target.normal.dot(&normal);
+            let weight = cosine * cosine / (1.0 + offset.norm_squared() / (scale * scale)).powi(2);
+            let bisector = (target.normal + normal * cosine.signum()).normalize();
+            let j = frame.derivative(&moved.coords, &bisector);
+            h += j * j.transpose() * weight;
+            g += j * (weight * bisector.dot(&offset));
+            for axis in [Vector3::x(), Vector3::y(), Vector3::z()] {
+                let j = frame.derivative(&moved.coords, &axis);
+                h += j * j.transpose() * (weight * rule.along);
+                g += j * (weight * rule.along * axis.dot(&offset));
+            }
+        }
+        let (values, vectors) = eigen6(&symmetrised(&h), "the normal equations of the search")?;
+        let mut step = Vector6::zeros();
+        for k in 0..6 {
+            if values[k] > 1e-6 * values[5] {
+                let v = vectors.column(k);
+                step -= v * (v.dot(&g) / values[k]);
+            }
+        }
+        Ok(step)
+    }
+}
+
+/// Planes evenly from the coarsest level that has enough of them.
+fn sample(levels: &[Level], wanted: usize) -> Vec<Voxel> {
+    let planes =
+        |level: &Level| level.voxels.iter().filter(|v| v.variance < f64::INFINITY).copied().collect::<Vec<_>>();
+    let mut found = Vec::new();
+    for level in levels.iter().rev() {
+        found = planes(level);
+        if found.len() >= FEWEST_PLANES {
+            break;
+        }
+    }
+    let stride = found.len().div_ceil(wanted).max(1);
+    found.into_iter().step_by(stride).collect()
+}

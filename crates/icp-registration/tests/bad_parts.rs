@@ -1,0 +1,155 @@
+//! Every metric with every matching on input that has no answer: a typed one, and never a NaN.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, missing_docs)]
+
+use icp_registration::parts::{
+    AndersonAcceleration, ClosedForm, Coloured, CompatibleNearest, ErrorMetric, GaussNewton, Graduated,
+    LevenbergMarquardt, MedianDistance, Minimiser, NearestPoint, PlaneToPlane, PointMatching, PointToPlane,
+    PointToPoint, Projective, Settled, Stability, SymmetricPlanes,
+};
+use icp_registration::{Cloud, DegeneracyPolicy, Error, IcpTarget, Registration};
+use nalgebra::{Isometry3, Point3, Vector3};
+use proptest::prelude::*;
+
+/// Clouds that trouble: sizes and shapes by number.
+fn nasty(kind: usize, scale: f64, jitter: &[f64]) -> Cloud {
+    let jitter = |i: usize| jitter[i % jitter.len()];
+    let point = |i: usize| -> [f64; 3] {
+        let t = i as f64 / 40.0;
+        match kind {
+            // One point, equal points, a line, a plane, a curved strip, a blob, two far clusters, a corner.
+            0 | 1 => [0.3, 0.2, -1.0],
+            2 => [t, 2.0 * t, -1.0],
+            3 => [t % 1.0, (i % 7) as f64 / 7.0, -1.0],
+            4 => [t.cos(), t.sin(), (i % 5) as f64 / 5.0],
+            5 => [jitter(i), jitter(i + 3), jitter(i + 7)],
+            6 => [if i % 2 == 0 { 0.0 } else { 1e5 }, jitter(i), jitter(2 * i)],
+            _ => [[t % 1.0, jitter(i).abs(), 0.0], [0.0, t % 1.0, jitter(i).abs()], [t % 1.0, 0.0, jitter(i).abs()]]
+                [i % 3],
+        }
+    };
+    let n = if kind == 0 { 1 } else { 120 };
+    let points = (0..n).map(|i| Point3::from(point(i).map(|v| v * scale))).collect();
+    let intensity = Some((0..n).map(|i| if i % 11 == 0 { f64::NAN } else { jitter(i) }).collect());
+    Cloud { intensity, ..Cloud::new(points) }
+}
+
+fn metric(kind: usize, source: &Cloud, target: &IcpTarget) -> Box<dyn ErrorMetric> {
+    match kind {
+        0 => Box::new(PointToPoint),
+        1 => Box::new(PointToPlane),
+        2 => Box::new(SymmetricPlanes),
+        3 => Box::new(PlaneToPlane::default()),
+        _ => Coloured::new(source, target).map_or(Box::new(PointToPlane), |coloured| Box::new(coloured)),
+    }
+}
+
+fn check(registration: &Registration<'_>, source: &Cloud, guess: &Isometry3<f64>) -> Result<(), TestCaseError> {
+    match registration.align(source, guess) {
+        Ok(result) => {
+            let pose = result.target_from_source;
+            prop_assert!(pose.translation.vector.iter().chain(pose.rotation.coords.iter()).all(|v| v.is_finite()));
+            prop_assert!(result.covariance.iter().all(|v| v.is_finite()), "{}", result.covariance);
+            prop_assert!(result.rms_m.is_finite() && (0.0..=1.0).contains(&result.overlap));
+            prop_assert!(result.degenerate.iter().all(|m| m.axis.iter().all(|v| v.is_finite())));
+        }
+        Err(error) => prop_assert!(!error.to_string().is_empty()),
+    }
+    Ok(())
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(80))]
+    #[test]
+    fn there_is_always_an_answer(
+        kinds in (0usize..8, 0usize..8, 0usize..5, 0usize..4, 0usize..3),
+        exponent in -6i32..7, jitter in prop::collection::vec(-1.0..1.0_f64, 17),
+        shift in prop::array::uniform3(-0.5..0.5_f64), turn in prop::array::uniform3(-0.5..0.5_f64), extras in 0u32..16,
+    ) {
+        let (source_kind, target_kind, metric_kind, matching_kind, minimiser_kind) = kinds;
+        let scale = 10.0_f64.powi(exponent);
+        let (source, target) = (nasty(source_kind, scale, &jitter), nasty(target_kind, scale, &jitter));
+        let target = IcpTarget::new(target).unwrap();
+        let guess = Isometry3::new(Vector3::from(shift) * scale, Vector3::from(turn));
+        let metric = metric(metric_kind, &source, &target);
+        let minimisation: Box<dyn Minimiser> = match minimiser_kind {
+            0 => Box::new(GaussNewton),
+            1 => Box::new(LevenbergMarquardt::default()),
+            _ => Box::new(ClosedForm::default()),
+        };
+        let frame: Vec<[f64; 3]> = target.cloud().points.iter().map(|p| [p.x, p.y, p.z]).collect();
+        #[cfg(feature = "mesh")]
+        let mesh = {
+            let triangles: Vec<[u32; 3]> = (0..(frame.len() as u32).saturating_sub(2)).map(|i| [i, i + 1, i + 2]).collect();
+            icp_registration::parts::TriangleMesh::new(&target.cloud().points, &triangles)
+        };
+        let pixel = |p: &Point3<f64>| Some([(p.x / scale * 10.0), p.y / scale]);
+        let matching: Box<dyn PointMatching + '_> = match matching_kind {
+            0 => Box::new(NearestPoint::new(&target)),
+            1 => Box::new(CompatibleNearest::new(&target)),
+            2 => Box::new(Projective::new(&target, &frame, frame.len(), 1, pixel).unwrap()),
+            #[cfg(feature = "mesh")]
+            3 if mesh.is_ok() => Box::new(icp_registration::parts::ClosestOnMesh::new(mesh.as_ref().unwrap())),
+            _ => Box::new(NearestPoint::new(&target)),
+        };
+        let mut registration = Registration { metric, minimisation, ..Registration::new(NearestPoint::new(&target)) };
+        registration.matching = matching;
+        registration.stopping = Box::new(Settled { max_iterations: 30, ..Settled::default() });
+        if extras & 1 != 0 { registration.acceleration = Some(AndersonAcceleration::default()); }
+        if extras & 2 != 0 { registration.kernel = Box::new(Graduated::default()); }
+        if extras & 4 != 0 { registration.rejection.push(Box::new(MedianDistance(3.0))); }
+        if extras & 8 != 0 { registration.degeneracy = DegeneracyPolicy::HoldAtGuess; }
+        check(&registration, &source, &guess)?;
+        registration.selection = Box::new(Stability(50));
+        check(&registration, &source, &guess)?;
+    }
+}
+
+#[test]
+fn empty_and_nan_clouds_are_named() {
+    let good = nasty(7, 1.0, &[0.1, 0.5, 0.9, 0.3]);
+    let target = IcpTarget::new(good.clone()).unwrap();
+    let nan = Cloud::new(vec![Point3::new(f64::NAN, 0.0, 0.0); 30]);
+    let far = good.transformed(&Isometry3::translation(0.0, 1e6, 0.0));
+    for kind in 0..4 {
+        let metric = metric(kind, &good, &target);
+        let registration = Registration { metric, ..Registration::new(NearestPoint::new(&target)) };
+        let run = |cloud: &Cloud| registration.align(cloud, &Isometry3::identity());
+        assert!(matches!(run(&Cloud::default()), Err(Error::Empty { what: "the source cloud" })));
+        assert!(matches!(run(&nan), Err(Error::NonFinite { index: 0, .. })));
+        assert!(matches!(run(&far), Err(Error::TooFewCorrespondences { .. })), "{:?}", run(&far));
+    }
+    assert!(matches!(Coloured::new(&Cloud::new(good.points.clone()), &target), Err(Error::Empty { .. })));
+}
+
+#[test]
+fn parts_outside_their_domain_are_refused() {
+    use icp_registration::parts::{
+        EveryNth, MaxDistance, MaxNormalAngle, NormalSpace, NormalWeight, RandomPoints, Trimmed,
+    };
+    let good = nasty(7, 1.0, &[0.1, 0.5, 0.9, 0.3]);
+    let target = IcpTarget::new(good.clone()).unwrap();
+    let with = |change: &dyn Fn(&mut Registration<'_>)| {
+        let mut registration = Registration::new(NearestPoint::new(&target));
+        change(&mut registration);
+        registration.align(&good, &Isometry3::identity())
+    };
+    let changes: [&dyn Fn(&mut Registration<'_>); 14] = [
+        &|r| r.selection = Box::new(EveryNth(0)),
+        &|r| r.selection = Box::new(NormalSpace(0)),
+        &|r| r.selection = Box::new(Stability(0)),
+        &|r| r.selection = Box::new(RandomPoints { count: 0, seed: 1 }),
+        &|r| r.rejection = vec![Box::new(Trimmed(f64::NAN))],
+        &|r| r.rejection = vec![Box::new(MaxDistance(-1.0))],
+        &|r| r.rejection = vec![Box::new(MaxNormalAngle(0.0))],
+        &|r| r.rejection = vec![Box::new(MedianDistance(f64::INFINITY))],
+        &|r| r.weighting = vec![Box::new(NormalWeight { power: f64::NAN })],
+        &|r| r.metric = Box::new(PlaneToPlane { flatness: 0.0 }),
+        &|r| r.kernel = Box::new(Graduated { widest: f64::NAN, ..Graduated::default() }),
+        &|r| r.acceleration = Some(AndersonAcceleration { memory: 0 }),
+        &|r| r.levels.points = 0,
+        &|r| r.min_correspondences = 0,
+    ];
+    for (k, change) in changes.iter().enumerate() {
+        assert!(matches!(with(change), Err(Error::InvalidOption { .. })), "{k}");
+    }
+}

@@ -1,0 +1,326 @@
+//! Each part of the family in its place.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout, missing_docs)]
+
+mod common;
+
+use common::{Pinhole, Scene as Room, cloud, disturbance, frame_pair, look_at, pose_error};
+use icp_registration::parts::{
+    AllPoints, AndersonAcceleration, ClosedForm, Coloured, CompatibleNearest, ConstantWeight, DistanceWeight,
+    ErrorMetric, EveryNth, GaussNewton, Graduated, IntensityWeight, LevenbergMarquardt, MaxDistance, MaxNormalAngle,
+    MedianDistance, MutualNearest, NearestPoint, NormalSpace, NormalWeight, PairRejection, PairWeighting, PlaneToPlane,
+    PointSelection, PointToPlane, PointToPoint, Projective, RandomPoints, Settled, SigmaWeight, SourceRim, Stability,
+    SymmetricPlanes, TargetRim, Trimmed,
+};
+use icp_registration::{
+    Alternative, Cloud, DegeneracyPolicy, Error, IcpOptions, IcpTarget, Metric, OrganisedNormalOptions, Registration,
+    RobustKernel, RotationMethod, organised_normals,
+};
+use nalgebra::{Isometry3, Matrix6, Point3, Vector3};
+
+struct Setting {
+    target: IcpTarget,
+    source: Cloud,
+    truth: Isometry3<f64>,
+    guess: Isometry3<f64>,
+}
+
+fn setting(seed: u64) -> Setting {
+    let (a, b) = (look_at([-1.5, -1.0, 1.4], [2.0, 0.8, 0.8]), look_at([-1.2, -1.1, 1.3], [1.8, 1.1, 0.85]));
+    let (room, camera) = (Room::furnished(), Pinhole { width: 88, height: 72, focal_px: 76.0 });
+    let truth = a.inverse() * b;
+    Setting {
+        target: IcpTarget::new(cloud(&room, &camera, &a, 1.0, 2 * seed)).unwrap(),
+        source: cloud(&room, &camera, &b, 1.0, 2 * seed + 1),
+        truth,
+        guess: disturbance(0.1, 4.0, seed) * truth,
+    }
+}
+
+/// Runs a registration and holds its pose against the truth.
+fn check(name: &str, setting: &Setting, registration: &Registration<'_>, max_mm: f64) -> usize {
+    let result = registration.align(&setting.source, &setting.guess).unwrap();
+    let (mm, degrees) = pose_error(&result.target_from_source, &setting.truth);
+    println!("{name}: {mm:.2} mm {degrees:.4} deg, {} iterations, {:?}", result.iterations, result.stop);
+    assert!(mm < max_mm && degrees < max_mm * 0.03, "{name}: {mm} mm {degrees} degrees");
+    result.iterations
+}
+
+#[test]
+fn selections() {
+    let s = setting(1);
+    let all: [(&str, Box<dyn PointSelection>); 5] = [
+        ("all", Box::new(AllPoints)),
+        ("every third", Box::new(EveryNth(3))),
+        ("random", Box::new(RandomPoints { count: 2000, seed: 7 })),
+        ("normal space", Box::new(NormalSpace(2000))),
+        ("stability", Box::new(Stability(2000))),
+    ];
+    for (name, selection) in all {
+        // A quarter of a quarter of a frame's points: 1 to 2 mm.
+        check(name, &s, &Registration { selection, ..Registration::new(NearestPoint::new(&s.target)) }, 6.0);
+    }
+}
+
+#[test]
+fn random_points_are_the_same_for_the_same_seed_and_no_pattern() {
+    let s = setting(1);
+    let ask = |seed| {
+        let selection = Box::new(RandomPoints { count: 500, seed });
+        let registration = Registration { selection, ..Registration::new(NearestPoint::new(&s.target)) };
+        registration.align(&s.source, &s.guess).unwrap()
+    };
+    assert_eq!(ask(1), ask(1));
+    assert_ne!(ask(1).target_from_source, ask(2).target_from_source);
+}
+
+#[test]
+fn matchings() {
+    let s = setting(2);
+    check("nearest", &s, &Registration::new(NearestPoint::new(&s.target)), 4.0);
+    check("compatible", &s, &Registration::new(CompatibleNearest::new(&s.target)), 4.0);
+}
+
+#[test]
+fn projection_in_place_of_a_search() {
+    let camera = Pinhole { width: 88, height: 72, focal_px: 76.0 };
+    let pair = frame_pair(&camera, 3);
+    let prepared = |(points, sigma): &(Vec<[f64; 3]>, Vec<f32>)| {
+        let options = OrganisedNormalOptions::default();
+        let normals = organised_normals(points, camera.width, camera.height, &options).unwrap();
+        Cloud::from_frame(points, Some(&normals), Some(sigma)).unwrap()
+    };
+    let target = IcpTarget::new(prepared(&pair.target)).unwrap();
+    let pixel = |p: &Point3<f64>| {
+        (p.z < 0.0).then(|| {
+            let x = -p.x / p.z * camera.focal_px + (camera.width as f64 - 1.0) / 2.0;
+            [x, p.y / p.z * camera.focal_px + (camera.height as f64 - 1.0) / 2.0]
+        })
+    };
+    let matching = Projective::new(&target, &pair.target.0, camera.width, camera.height, pixel).unwrap();
+    let truth = pair.target_from_source;
+    let s = Setting {
+        guess: Isometry3::identity(),
+        source: prepared(&pair.source),
+        truth,
+        target: IcpTarget::new(prepared(&pair.target)).unwrap(),
+    };
+    let mut registration = Registration::new(matching);
+    registration.levels.last_limit_m = Some(0.15);
+    check("projective", &s, &registration, 6.0);
+    let wrong = Projective::new(&target, &pair.target.0[1..], camera.width, camera.height, pixel);
+    assert!(matches!(wrong, Err(Error::LengthMismatch { .. })));
+}
+
+#[test]
+fn weightings() {
+    let mut s = setting(3);
+    // A texture that both see: brightness by position.
+    let shade = |p: &Point3<f64>| (3.0 * p.x).sin() + (4.0 * p.y).cos();
+    let mut target = s.target.cloud().clone();
+    target.intensity = Some(target.points.iter().map(shade).collect());
+    s.source.intensity = Some(s.source.points.iter().map(|p| shade(&(s.truth * p))).collect());
+    s.target = IcpTarget::new(target).unwrap();
+    let all: [(&str, Box<dyn PairWeighting>); 5] = [
+        ("constant", Box::new(ConstantWeight)),
+        ("distance", Box::new(DistanceWeight)),
+        ("normals", Box::new(NormalWeight::default())),
+        ("sigma", Box::new(SigmaWeight)),
+        ("intensity", Box::new(IntensityWeight::default())),
+    ];
+    for (name, weighting) in all {
+        let weighting = vec![weighting];
+        check(name, &s, &Registration { weighting, ..Registration::new(NearestPoint::new(&s.target)) }, 5.0);
+    }
+}
+
+#[test]
+fn rejections() {
+    let mut s = setting(4);
+    s.source.rim = Some(s.source.normals.as_ref().unwrap().iter().map(|n| n.x.is_nan()).collect());
+    let mut target = s.target.cloud().clone();
+    target.rim = Some(target.normals.as_ref().unwrap().iter().map(|n| n.x.is_nan()).collect());
+    s.target = IcpTarget::new(target).unwrap();
+    let all: [(&str, Box<dyn PairRejection>); 7] = [
+        ("distance", Box::new(MaxDistance(0.3))),
+        ("normal angle", Box::new(MaxNormalAngle(0.5))),
+        ("trimmed", Box::new(Trimmed(0.8))),
+        ("median", Box::new(MedianDistance(3.0))),
+        ("source rim", Box::new(SourceRim)),
+        ("target rim", Box::new(TargetRim)),
+        ("mutual", Box::new(MutualNearest::new(&s.source, 0.05).unwrap())),
+    ];
+    for (name, rejection) in all {
+        let rejection = vec![rejection];
+        check(name, &s, &Registration { rejection, ..Registration::new(NearestPoint::new(&s.target)) }, 5.0);
+    }
+}
+
+#[test]
+fn metrics() {
+    let s = setting(5);
+    let all: [(&str, Box<dyn ErrorMetric>, f64); 4] = [
+        ("point to plane", Box::new(PointToPlane), 4.0),
+        ("symmetric", Box::new(SymmetricPlanes), 4.0),
+        ("plane to plane", Box::new(PlaneToPlane::default()), 4.0),
+        // The pattern of pixels pulls: half the spacing of 50 mm at most.
+        ("point to point", Box::new(PointToPoint), 25.0),
+    ];
+    for (name, metric, max_mm) in all {
+        let registration = Registration { metric, ..Registration::new(NearestPoint::new(&s.target)) };
+        check(name, &s, &registration, max_mm);
+    }
+}
+
+#[test]
+fn texture_closes_what_a_plane_leaves_open() {
+    let grid = |offset: f64| {
+        (0..3600).map(move |k| {
+            // Unevenness of a millimetre without a pattern.
+            let z = 1e-3 * (f64::from(k) * 12.9898 + 1e3 * offset).sin();
+            Point3::new(f64::from(k % 60) * 0.02 + offset, f64::from(k / 60) * 0.02 + offset, z)
+        })
+    };
+    let shade = |p: &Point3<f64>| 100.0 * ((7.0 * p.x).sin() + (9.0 * p.y + 2.0 * p.x).cos());
+    let painted = |points: Vec<Point3<f64>>| {
+        let intensity = Some(points.iter().map(shade).collect());
+        let normals = Some(vec![Vector3::z(); points.len()]);
+        Cloud { intensity, normals, ..Cloud::new(points) }
+    };
+    let truth = Isometry3::new(Vector3::new(0.02, -0.015, 0.01), Vector3::new(0.0, 0.0, 0.02));
+    let target = IcpTarget::new(painted(grid(0.0).collect())).unwrap();
+    let source = painted(grid(0.007).collect()).transformed(&truth.inverse());
+    let plain = Registration::new(NearestPoint::new(&target)).align(&source, &Isometry3::identity()).unwrap();
+    assert_eq!(plain.degenerate.len(), 3);
+    let metric = Box::new(Coloured::new(&source, &target).unwrap());
+    let coloured = Registration { metric, ..Registration::new(NearestPoint::new(&target)) };
+    let result = coloured.align(&source, &Isometry3::identity()).unwrap();
+    let (mm, degrees) = pose_error(&result.target_from_source, &truth);
+    println!("coloured: {mm:.3} mm {degrees:.4} deg {:?} {:?}", result.stop, result.degenerate);
+    // The intensity is continued linearly over half a spacing of 20 mm: curvature leaves a tenth of that.
+    assert!(mm < 1.0 && degrees < 0.1, "{mm} mm {degrees} degrees");
+    assert!(result.degenerate.is_empty(), "{:?}", result.degenerate);
+}
+
+#[test]
+fn minimisers_find_the_same_minimum() {
+    let s = setting(6);
+    let run = |registration: &Registration<'_>| registration.align(&s.source, &s.guess).unwrap();
+    let plane = run(&Registration::new(NearestPoint::new(&s.target)));
+    let minimisation = Box::new(LevenbergMarquardt::default());
+    let damped = run(&Registration { minimisation, ..Registration::new(NearestPoint::new(&s.target)) });
+    let (mm, degrees) = pose_error(&plane.target_from_source, &damped.target_from_source);
+    println!("Levenberg-Marquardt: {mm:.4} mm {degrees:.6} deg from Gauss-Newton, {} iterations", damped.iterations);
+    // Both end within the tolerance of a step (1e-5 of 1.5 m), or within a tenth of a deviation of 1 mm.
+    assert!(mm < 0.2 && degrees < 0.01);
+    let point = |minimisation| {
+        let mut registration = Registration::new(NearestPoint::new(&s.target));
+        registration.metric = Box::new(PointToPoint);
+        registration.minimisation = minimisation;
+        run(&registration)
+    };
+    let gauss_newton = point(Box::new(GaussNewton));
+    for method in [
+        RotationMethod::UnitQuaternion,
+        RotationMethod::SingularValues,
+        RotationMethod::OrthonormalMatrices,
+        RotationMethod::DualQuaternions,
+    ] {
+        let closed = point(Box::new(ClosedForm(method)));
+        let (mm, degrees) = pose_error(&gauss_newton.target_from_source, &closed.target_from_source);
+        println!("{method:?}: {mm:.4} mm {degrees:.6} deg from Gauss-Newton, {} iterations", closed.iterations);
+        // Point to point creeps: the two stop within a few steps of 1e-5 of the radius of each other.
+        assert!(mm < 1.0 && degrees < 0.05, "{method:?}");
+    }
+    let mut wrong = Registration::new(NearestPoint::new(&s.target));
+    wrong.minimisation = Box::new(ClosedForm::default());
+    assert!(matches!(wrong.align(&s.source, &s.guess), Err(Error::Incompatible { .. })));
+}
+
+#[test]
+fn acceleration_saves_iterations_where_they_creep() {
+    let (mut plain, mut fast) = (0, 0);
+    for seed in 0..2 {
+        let s = setting(10 + seed);
+        let run = |acceleration| {
+            let mut registration = Registration::new(NearestPoint::new(&s.target));
+            registration.metric = Box::new(PointToPoint);
+            registration.acceleration = acceleration;
+            registration.stopping = Box::new(Settled { max_iterations: 200, ..Settled::default() });
+            // All the way on the last level.
+            registration.levels.first_limit_m = Some(0.3);
+            registration.levels.last_limit_m = Some(0.3);
+            registration.levels.iterations = 1;
+            check("acceleration", &s, &registration, 25.0)
+        };
+        plain += run(None);
+        fast += run(Some(AndersonAcceleration::default()));
+    }
+    println!("iterations {plain}, accelerated {fast}");
+    assert!(fast < plain, "{fast} {plain}");
+}
+
+#[test]
+fn a_falling_scale_reaches_farther_than_a_narrow_one() {
+    let run = |kernel: Box<dyn icp_registration::parts::KernelSchedule>, seed: u64| {
+        let s = setting(20 + seed);
+        let mut registration = Registration::new(NearestPoint::new(&s.target));
+        registration.kernel = kernel;
+        registration.alternatives = Vec::new();
+        registration.levels.first_limit_m = Some(0.6);
+        registration.levels.last_limit_m = Some(0.6);
+        registration.levels.iterations = 1;
+        let result = registration.align(&s.source, &(disturbance(0.2, 8.0, seed) * s.truth)).unwrap();
+        pose_error(&result.target_from_source, &s.truth).0 < 10.0
+    };
+    let narrow = (0..6).filter(|&k| run(Box::new(RobustKernel::Welsch), k)).count();
+    let falling = (0..6).filter(|&k| run(Box::new(Graduated { half_life: 3, ..Graduated::default() }), k)).count();
+    println!("of 6: narrow {narrow}, falling {falling}");
+    assert!(falling >= narrow && falling >= 5, "{narrow} {falling}");
+}
+
+#[test]
+fn what_is_open_takes_the_prior() {
+    let wall = |seed| {
+        let room = Room { room: common::Cuboid::new([-30.0; 3], [3.0, 30.0, 30.0]), boxes: vec![] };
+        let camera = Pinhole { width: 88, height: 72, focal_px: 76.0 };
+        let (a, b) = (look_at([0.0; 3], [3.0, 0.2, 0.1]), look_at([0.1, 0.2, -0.1], [3.0, 0.3, 0.3]));
+        (cloud(&room, &camera, &a, 1.0, seed), cloud(&room, &camera, &b, 1.0, seed + 1), a.inverse() * b)
+    };
+    let (target, source, truth) = wall(1);
+    let guess = disturbance(0.02, 0.5, 4) * truth;
+    let sigma = [0.02, 0.02, 0.02, 0.01, 0.01, 0.01];
+    let prior = Matrix6::from_fn(|r, c| if r == c { f64::powi(sigma[r], 2) } else { 0.0 });
+    let options = IcpOptions {
+        degeneracy: DegeneracyPolicy::HoldAtPrior,
+        prior_covariance: Some(prior),
+        ..IcpOptions::default()
+    };
+    let result = icp_registration::align(&source, &target, &guess, &options).unwrap();
+    assert_eq!(result.degenerate.len(), 3);
+    // Along the wall the guess and its sigma, across it what the points say.
+    let normal = result.target_from_source.rotation * source.normals.unwrap()[3000];
+    let covariance: nalgebra::Matrix3<f64> = result.covariance.fixed_view::<3, 3>(0, 0).into();
+    let along = normal.cross(&Vector3::y()).normalize();
+    let kept = (result.target_from_source.translation.vector - guess.translation.vector).dot(&along);
+    assert!(kept.abs() < 2e-3, "{kept}");
+    let sigma_along = (along.transpose() * covariance * along)[0].sqrt();
+    assert!((sigma_along / 0.02 - 1.0).abs() < 0.1, "{sigma_along}");
+    assert!((normal.transpose() * covariance * normal)[0].sqrt() < 3e-3);
+    let none = IcpOptions { prior_covariance: None, ..options };
+    let refused =
+        icp_registration::align(&IcpTarget::new(target.clone()).unwrap().cloud().clone(), &target, &guess, &none);
+    assert!(matches!(refused, Err(Error::Incompatible { .. })));
+}
+
+#[test]
+fn the_easy_tier_is_the_same_engine() {
+    let s = setting(7);
+    for metric in [Metric::PointToPlane, Metric::PointToPoint, Metric::SymmetricPlanes, Metric::PlaneToPlane] {
+        let options = IcpOptions { metric, ..IcpOptions::default() };
+        let easy = s.target.align(&s.source, &s.guess, &options).unwrap();
+        let parts = Registration::with_options(&s.target, &options).align(&s.source, &s.guess).unwrap();
+        assert_eq!(easy, parts);
+    }
+    let alternatives = Alternative::usual(RobustKernel::Huber, None, Some(0.9));
+    assert_eq!(alternatives.len(), 1);
+}

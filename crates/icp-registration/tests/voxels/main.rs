@@ -1,0 +1,22 @@
+//! Clouds in voxels: averages, and registration of unorganised clouds.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout, missing_docs)]
+
+mod averages;
+mod bad_input;
+#[path = "../common/mod.rs"]
+mod common;
+mod poses;
+mod real;
+#[path = "../../examples/voxel_pairs/scenes.rs"]
+mod scenes;
+mod verdicts;
+
+use icp_registration::{IcpResult, Result, VoxelAlignmentOptions, VoxelCloud, VoxelOptions};
+use nalgebra::Isometry3;
+use scenes::Views;
+
+fn register(views: &Views, guess: &Isometry3<f64>, options: &VoxelAlignmentOptions) -> Result<IcpResult> {
+    let target = VoxelCloud::new(&views.target, &VoxelOptions::default())?;
+    let source = VoxelCloud::new(&views.source, &VoxelOptions::default())?;
+    target.align(&source, guess, options)
+}

@@ -1,0 +1,21 @@
+//! Point clouds of any format: what a file can hold, and readers and writers that go by content and ending.
+
+#[cfg(feature = "clouds")]
+mod any;
+#[cfg(any(feature = "pcd", feature = "ply", feature = "vtk", feature = "xyz"))]
+mod columns;
+mod file;
+#[cfg(any(feature = "pcd", feature = "ply"))]
+mod layout;
+
+#[cfg(feature = "clouds")]
+pub use any::{CloudFormat, read_any_cloud, write_any_cloud};
+#[cfg(any(feature = "pcd", feature = "ply", feature = "vtk", feature = "xyz"))]
+pub(crate) use columns::{Columns, canonical};
+#[cfg(feature = "e57")]
+pub(crate) use file::COVARIANCE;
+#[cfg(any(feature = "e57", feature = "pcd", feature = "ply"))]
+pub(crate) use file::value_error;
+pub use file::{CloudFile, Precision};
+#[cfg(any(feature = "pcd", feature = "ply"))]
+pub(crate) use layout::{Kind, properties, put_point};

@@ -16,8 +16,8 @@ mod normals;
 mod organised;
 pub mod parts;
 mod pose;
-mod tracking;
 mod quality;
+mod tracking;
 mod trajectory;
 mod voxels;
 
@@ -55,4 +55,5 @@ pub use tracking::{
 pub use trajectory::{
     AbsoluteTrajectoryError, ErrorStatistics, MatchedPose, RelativeError, RelativePoseError, RelativeStep,
     TrajectoryAlignment, TrajectoryErrorOptions, absolute_trajectory_error, relative_pose_error,
+};
 pub use voxels::{VoxelAlignmentOptions, VoxelCloud, VoxelOptions, downsample};

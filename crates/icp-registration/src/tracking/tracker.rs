@@ -48,7 +48,8 @@ impl Tracker {
         options.validate()?;
         let nothing = vec![[f64::NAN; 3]; projection.width() * projection.height()];
         let mut alignment = options.alignment.clone();
-        alignment.degeneracy = DegeneracyPolicy::HoldAtGuess;
+        alignment.degeneracy = DegeneracyPolicy::Report;
+        alignment.other_starts = 0;
         Ok(Self {
             aligner: FrameAligner::new(alignment)?,
             current: OrganisedFrame::new(projection, &nothing, None)?,

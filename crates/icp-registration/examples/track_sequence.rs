@@ -2,7 +2,7 @@
 //!
 //! `RAYON_NUM_THREADS=1 cargo run --release -p icp-registration --example track_sequence -- [option=value ..]`
 //!
-//! Options: `folder` (of the real sequence), `keyframe_overlap`, `loop_edges`, `max_keyframes`, `levels`,
+//! Options: `folder` (of the real sequence), `keyframe_overlap`, `max_keyframes`, `levels`,
 //! `fusion=off`, `step_tolerance_m`, `max_motion_sigma_m`, `every=1` (a line a frame).
 #![allow(
     missing_docs,
@@ -55,7 +55,6 @@ fn argument<T: FromStr>(name: &str) -> Option<T> {
 fn options() -> TrackerOptions {
     let mut options = TrackerOptions::default();
     options.keyframe_overlap = argument("keyframe_overlap").unwrap_or(options.keyframe_overlap);
-    options.loop_edges = argument("loop_edges").unwrap_or(options.loop_edges);
     options.max_keyframes = argument("max_keyframes").unwrap_or(options.max_keyframes);
     options.alignment.levels = argument("levels").unwrap_or(options.alignment.levels);
     options.alignment.max_motion_sigma_m = argument("max_motion_sigma_m").or(options.alignment.max_motion_sigma_m);

@@ -1,14 +1,15 @@
 //! One frame against one keyframe, and the search among those nearby.
 
-use nalgebra::Isometry3;
+use nalgebra::{Isometry3, Matrix6};
 
 use super::keyframes::SAMPLE;
 use super::motion::Uncertain;
-use super::prediction::Prediction;
+use super::options::TrackerOptions;
+use super::prediction::{Last, Prediction};
 use super::tracked::LossReason;
 use super::tracker::Tracker;
 use crate::error::Error;
-use crate::organised::Agreement;
+use crate::organised::{Agreement, FrameAligner, OrganisedFrame};
 
 /// Keyframes tried beside the reference.
 const NEIGHBOURS: usize = 2;
@@ -31,35 +32,40 @@ pub(super) struct Measured {
 impl Tracker {
     /// Registers the current frame with keyframe `k`.
     pub(super) fn try_keyframe(&mut self, k: usize, guess: &Isometry3<f64>) -> Result<Measured, LossReason> {
-        let keyframe = &self.keyframes.list[k].frame;
-        let result = self.aligner.align(&self.current, keyframe, guess).map_err(|error| match error {
-            Error::TooFewPoints { .. } => LossReason::TooFewPoints,
-            Error::TooFewCorrespondences { .. } => LossReason::TooLittleOverlap,
-            _ => LossReason::NotConverged,
-        })?;
-        let pose = Uncertain { pose: result.target_from_source, covariance: result.covariance };
-        let agreement = keyframe.agreement(&self.current, &pose.pose, SAMPLE);
-        if agreement.consent() < self.options.min_agreement {
-            return Err(LossReason::LargeResiduals);
+        let target = &self.keyframes.list[k].frame;
+        register(&mut self.aligner, &self.options, &self.current, target, guess)
+            .map(|measured| Measured { keyframe: k, ..measured })
+    }
+
+    /// The frame before as a new keyframe, where it determines what its own keyframe, with less in common, does not.
+    fn from_previous(&mut self, last: &Last, prediction: &Prediction) -> Option<Measured> {
+        let exact = last.own.covariance == Matrix6::zeros();
+        if last.lost_frames > 0 || last.carried > 0 || exact {
+            return None;
         }
-        if agreement.overlap() < self.options.min_overlap {
-            return Err(LossReason::TooLittleOverlap);
-        }
-        if !crate::pose::is_finite(&pose.pose) || pose.covariance.cholesky().is_none() {
-            return Err(LossReason::NotConverged);
-        }
-        let determined = result.degenerate.is_empty();
-        Ok(Measured { keyframe: k, pose, determined, agreement, rms_m: result.rms_m })
+        let guess = last.own.pose.inverse() * prediction.own.pose;
+        let measured = register(&mut self.aligner, &self.options, &self.current, &self.previous, &guess).ok()?;
+        measured.determined.then(|| {
+            let total = Uncertain { covariance: last.own.covariance + last.shared, ..last.own };
+            let keyframe = self.keyframes.add(self.previous.clone(), last.keyframe, &total);
+            Measured { keyframe, ..measured }
+        })
     }
 
     /// The current frame near its predicted pose: from the reference, or from keyframes that should see the same.
-    pub(super) fn near(&mut self, reference: usize, prediction: &Prediction) -> Result<Measured, LossReason> {
-        let usable = |m: &Measured| m.determined || prediction.informed;
+    pub(super) fn near(&mut self, last: &Last, prediction: &Prediction) -> Result<Measured, LossReason> {
+        let reference = last.keyframe;
         let first = self.try_keyframe(reference, &prediction.own.pose);
         if let Ok(measured) = first
-            && usable(&measured)
+            && measured.determined
         {
             return Ok(measured);
+        }
+        if let Some(measured) = self.from_previous(last, prediction) {
+            return Ok(measured);
+        }
+        if prediction.informed && first.is_ok() {
+            return first;
         }
         let reason = first.err().unwrap_or(LossReason::Undetermined);
         let candidates = self.keyframes.candidates(&self.current, reference, &prediction.own.pose, reference);
@@ -84,6 +90,9 @@ impl Tracker {
         if !prediction.informed {
             return if measured.determined { Ok(half) } else { Err(LossReason::Undetermined) };
         }
+        if measured.determined && !prediction.measured {
+            return Ok(half);
+        }
         let contradicted = half.mahalanobis_squared(&prediction.own).is_none_or(|m| m > DISBELIEF);
         if measured.determined && contradicted {
             return Ok(half);
@@ -92,4 +101,32 @@ impl Tracker {
         let carried = pose.sigma_at(self.current.radius_m()) <= self.options.max_carried_sigma_m;
         if carried || measured.determined { Ok(pose) } else { Err(LossReason::Undetermined) }
     }
+}
+
+/// Registers a frame with another, near a guess.
+fn register(
+    aligner: &mut FrameAligner,
+    options: &TrackerOptions,
+    source: &OrganisedFrame,
+    target: &OrganisedFrame,
+    guess: &Isometry3<f64>,
+) -> Result<Measured, LossReason> {
+    let result = aligner.align(source, target, guess).map_err(|error| match error {
+        Error::TooFewPoints { .. } => LossReason::TooFewPoints,
+        Error::TooFewCorrespondences { .. } => LossReason::TooLittleOverlap,
+        _ => LossReason::NotConverged,
+    })?;
+    let pose = Uncertain { pose: result.target_from_source, covariance: result.covariance };
+    let agreement = target.agreement(source, &pose.pose, SAMPLE);
+    if agreement.consent() < options.min_agreement {
+        return Err(LossReason::LargeResiduals);
+    }
+    if agreement.overlap() < options.min_overlap {
+        return Err(LossReason::TooLittleOverlap);
+    }
+    if !crate::pose::is_finite(&pose.pose) || pose.covariance.cholesky().is_none() {
+        return Err(LossReason::NotConverged);
+    }
+    let determined = result.degenerate.is_empty();
+    Ok(Measured { keyframe: 0, pose, determined, agreement, rms_m: result.rms_m })
 }

@@ -33,7 +33,8 @@ pub enum Relocalisation {
 /// Options of a [`Tracker`](super::Tracker). The defaults carry no scale.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrackerOptions {
-    /// Registration of a frame with a keyframe. Undetermined motions are always held at the prediction; where
+    /// Registration of a frame with a keyframe. Undetermined motions are always held at the
+    /// prediction, and other starts are only tried after a loss; where
     /// `max_motion_sigma_m` is `None`, it is 1/50 of the radius of the first frame.
     pub alignment: FrameAlignmentOptions,
     /// Pose of the first frame: the datum, without error.
@@ -43,9 +44,6 @@ pub struct TrackerOptions {
     pub keyframe_overlap: f64,
     /// Largest number of keyframes kept; beyond it the one that sees least of its own goes. Default 64.
     pub max_keyframes: usize,
-    /// Keyframes beside its reference that a new keyframe is registered with; where an old one is seen again, these
-    /// close the loop. 0 leaves a chain. Default 2.
-    pub loop_edges: usize,
     /// Whether keyframes learn from frames.
     pub fusion: Fusion,
     /// How the pose is sought after a loss.
@@ -56,7 +54,7 @@ pub struct TrackerOptions {
     pub min_overlap: f64,
     /// Smallest fraction that must agree of those that the keyframe can judge. Default 0.6.
     pub min_agreement: f64,
-    /// Where the frame leaves motions undetermined and there is a prior for them: the largest standard deviation at the
+    /// Where the frame leaves motions undetermined, a prior or the velocity carries the pose: the largest standard deviation at the
     /// radius of the frame until which the pose is carried on, metre. Default 0.1.
     pub max_carried_sigma_m: f64,
 }
@@ -68,7 +66,6 @@ impl Default for TrackerOptions {
             world_from_first: Isometry3::identity(),
             keyframe_overlap: 0.7,
             max_keyframes: 64,
-            loop_edges: 2,
             fusion: Fusion::Planes,
             relocalisation: Relocalisation::Coarse,
             min_filled: 0.03,

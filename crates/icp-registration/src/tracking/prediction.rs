@@ -1,8 +1,9 @@
 //! Where the next frame is expected.
 
-use nalgebra::{Isometry3, Matrix6};
+use nalgebra::{Isometry3, Matrix6, Vector6};
 
 use super::motion::{MotionPrior, Uncertain, scaled};
+use crate::pose::pose_difference;
 
 /// Frames after a loss for which the last velocity is carried on.
 const CARRIED_FRAMES: usize = 5;
@@ -19,6 +20,10 @@ pub(super) struct Last {
     pub(super) shared: Matrix6<f64>,
     /// Motion of the last interval (previous from current) and its length, second.
     pub(super) velocity: Option<(Isometry3<f64>, f64)>,
+    /// How far frames came to lie beside the prediction at constant velocity: mean squares, metre² and radian².
+    pub(super) surprise: Option<[f64; 2]>,
+    /// Frames since the geometry determined all motions.
+    pub(super) carried: usize,
     /// Whether `own` has a covariance that can be relied on: tracked, or carried by priors since.
     pub(super) informed: bool,
     /// Frames since the last one with a pose.
@@ -31,23 +36,52 @@ pub(super) struct Prediction {
     pub(super) own: Uncertain,
     /// Whether its covariance can be relied on.
     pub(super) informed: bool,
+    /// Whether it was measured: constant velocity is only for what the frame leaves open.
+    pub(super) measured: bool,
 }
+
+/// Weight of the latest frame in the mean surprise.
+const LATEST: f64 = 0.2;
 
 impl Last {
     pub(super) fn predict(&self, timestamp_s: f64, prior: Option<&MotionPrior>) -> Prediction {
+        let frames = self.carried as f64;
         if let Some(prior) = prior {
-            let own = self.own.then(&prior.previous_from_current());
-            return Prediction { own, informed: self.informed };
+            let mut motion = prior.previous_from_current();
+            // Errors of successive priors have their cause in common (a velocity, a bias), so that they add up.
+            motion.covariance *= 2.0 * frames + 1.0;
+            return Prediction { own: self.own.then(&motion), informed: self.informed, measured: true };
         }
-        let motion = match self.velocity {
-            Some((motion, seconds)) if self.lost_frames < CARRIED_FRAMES => {
-                scaled(&motion, (timestamp_s - self.timestamp_s) / seconds)
-            }
-            _ => Isometry3::identity(),
+        let Some(motion) = self.motion(timestamp_s) else {
+            return Prediction { own: self.own, informed: false, measured: false };
         };
+        // The velocity itself goes astray: displacements grow with the power 3/2 of time, their squares with the third.
+        let [shift, turn] = self.surprise.unwrap_or_default().map(|square| square * (frames + 1.0).powi(2));
+        let covariance = Matrix6::from_diagonal(&Vector6::new(shift, shift, shift, turn, turn, turn));
+        let own = self.own.then(&Uncertain { pose: motion, covariance });
+        let informed = self.informed && self.lost_frames == 0 && self.surprise.is_some();
+        Prediction { own, informed, measured: false }
+    }
+
+    /// Motion until then at constant velocity, previous from current.
+    fn motion(&self, timestamp_s: f64) -> Option<Isometry3<f64>> {
+        let (motion, seconds) = self.velocity.filter(|_| self.lost_frames < CARRIED_FRAMES)?;
+        let motion = scaled(&motion, (timestamp_s - self.timestamp_s) / seconds);
         // A frame that came much later than the ones before says nothing about where the camera went.
-        let far = motion.translation.vector.norm() > 1e3;
-        let motion = if far { Isometry3::identity() } else { motion };
-        Prediction { own: self.own.then(&Uncertain::exact(motion)), informed: false }
+        (motion.translation.vector.norm() <= 1e3).then_some(motion)
+    }
+
+    /// The mean surprise after a frame that was determined, and lies at `own` with the frame before at `before`.
+    pub(super) fn surprise_by(
+        &self,
+        timestamp_s: f64,
+        before: &Isometry3<f64>,
+        own: &Isometry3<f64>,
+    ) -> Option<[f64; 2]> {
+        let Some(motion) = self.motion(timestamp_s).filter(|_| self.carried == 0) else { return self.surprise };
+        let gap = pose_difference(&(before * motion), own);
+        let latest = [0, 3].map(|at| gap.fixed_rows::<3>(at).norm_squared() / 3.0);
+        let mean = self.surprise.unwrap_or(latest);
+        Some([0, 1].map(|i| mean[i] + LATEST * (latest[i] - mean[i])))
     }
 }

@@ -21,8 +21,6 @@ const ADVANTAGE: f64 = 0.05;
 /// Share of the first frame's radius beyond whose standard deviation motions count as undetermined. Registration alone
 /// asks for 1/300; in a stream, poses that are centimetres weak for a moment are still worth more than a loss.
 const WEAKEST_SHARE: f64 = 1.0 / 50.0;
-/// Least fraction of a new keyframe that must agree with another to be registered with it as well.
-const LOOP_OVERLAP: f64 = 0.35;
 
 /// Tracks a stream of organised frames of one camera.
 ///
@@ -33,6 +31,7 @@ pub struct Tracker {
     pub(super) options: TrackerOptions,
     pub(super) aligner: FrameAligner,
     pub(super) current: OrganisedFrame,
+    pub(super) previous: OrganisedFrame,
     pub(super) keyframes: Keyframes,
     last: Option<Last>,
     trajectory: Vec<TrackedPose>,
@@ -50,9 +49,11 @@ impl Tracker {
         let mut alignment = options.alignment.clone();
         alignment.degeneracy = DegeneracyPolicy::Report;
         alignment.other_starts = 0;
+        let blank = OrganisedFrame::new(projection, &nothing, None)?;
         Ok(Self {
             aligner: FrameAligner::new(alignment)?,
-            current: OrganisedFrame::new(projection, &nothing, None)?,
+            current: blank.clone(),
+            previous: blank,
             options,
             keyframes: Keyframes::default(),
             last: None,
@@ -90,6 +91,7 @@ impl Tracker {
             None => self.start(timestamp_s),
             Some(last) => self.follow(timestamp_s, &last, prior),
         };
+        std::mem::swap(&mut self.current, &mut self.previous);
         self.trajectory.push(pose);
         Ok(pose)
     }
@@ -138,6 +140,8 @@ impl Tracker {
                 own: Uncertain::exact(Isometry3::identity()),
                 shared: Matrix6::zeros(),
                 velocity: None,
+                surprise: None,
+                carried: 0,
                 informed: true,
                 lost_frames: 0,
             });
@@ -182,7 +186,7 @@ impl Tracker {
         if self.current.filled() < self.options.min_filled {
             return Err(LossReason::TooFewPoints);
         }
-        let near = self.near(last.keyframe, prediction).and_then(|measured| {
+        let near = self.near(last, prediction).and_then(|measured| {
             let predicted = self.seen_from(measured.keyframe, last.keyframe, prediction);
             Ok((measured, self.weighted(&measured, &predicted)?))
         });
@@ -240,10 +244,16 @@ impl Tracker {
             rms_m: measured.rms_m,
             measured_motion,
         };
-        self.last = Some(Last { timestamp_s, keyframe, own, shared, velocity, informed: true, lost_frames: 0 });
+        let learns = follows && measured.determined;
+        let surprise = if learns { last.surprise_by(timestamp_s, &before.pose, &own.pose) } else { last.surprise };
+        let carried = if measured.determined { 0 } else { last.carried + 1 };
+        let (informed, lost_frames) = (true, 0);
+        self.last =
+            Some(Last { timestamp_s, keyframe, own, shared, velocity, surprise, carried, informed, lost_frames });
         if pose.overlap < self.options.keyframe_overlap {
             self.change_reference(&total);
         }
+        self.thin();
         pose
     }
 
@@ -293,21 +303,15 @@ impl Tracker {
             return;
         }
         let new = self.keyframes.add(self.current.clone(), reference, reference_from_camera);
-        let far = candidates.into_iter().filter(|c| c.0 >= LOOP_OVERLAP).take(self.options.loop_edges);
-        for (_, k) in far {
-            let guess = self.keyframes.graph.relative(k, new);
-            if let Ok(measured) = self.try_keyframe(k, &guess)
-                && measured.determined
-            {
-                self.keyframes.graph.offer(Edge { a: k, b: new, a_from_b: measured.pose });
-            }
-        }
-        self.keyframes.graph.adjust_if_closed();
         self.refer_to(new, &Uncertain::exact(Isometry3::identity()));
-        if self.keyframes.list.len() > self.options.max_keyframes
-            && let Some(gone) = self.keyframes.thin([reference, new])
-            && let Some(last) = &mut self.last
-        {
+    }
+
+    /// Takes out keyframes beyond the number allowed.
+    fn thin(&mut self) {
+        let Some(last) = &mut self.last else { return };
+        while self.keyframes.list.len() > self.options.max_keyframes {
+            let newest = self.keyframes.list.len() - 1;
+            let Some(gone) = self.keyframes.thin([last.keyframe, newest]) else { return };
             last.keyframe -= usize::from(last.keyframe > gone);
         }
     }

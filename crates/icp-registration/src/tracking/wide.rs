@@ -15,8 +15,8 @@ const LARGEST_DIFFERENCE: f32 = 0.7;
 /// Shifts of the thumbnails to each side, fields.
 const SHIFTS: [isize; 2] = [5, 3];
 /// What a pose found without a prediction must agree by, both ways: fraction of the frame, and of what can be judged.
-const LEAST_OVERLAP: f64 = 0.35;
-const LEAST_CONSENT: f64 = 0.8;
+const LEAST_OVERLAP: f64 = 0.5;
+const LEAST_CONSENT: f64 = 0.9;
 
 impl Tracker {
     /// The current frame anywhere among the keyframes.

@@ -15,6 +15,11 @@ use crate::organised::{Agreement, FrameAligner, OrganisedFrame};
 const NEIGHBOURS: usize = 2;
 /// Square of the Mahalanobis distance (six components) beyond which a prior is not believed against the registration.
 const DISBELIEF: f64 = 40.0;
+/// Share of the largest standard deviation of carried poses that is allowed where only the velocity carries them.
+const BY_VELOCITY: f64 = 0.25;
+/// What a pose found against expectation must agree by: fraction of the frame, and of what can be judged.
+pub(super) const LEAST_OVERLAP: f64 = 0.5;
+pub(super) const LEAST_CONSENT: f64 = 0.9;
 
 /// A registration that passed its tests.
 #[derive(Debug, Clone, Copy)]
@@ -90,15 +95,17 @@ impl Tracker {
         if !prediction.informed {
             return if measured.determined { Ok(half) } else { Err(LossReason::Undetermined) };
         }
-        if measured.determined && !prediction.measured {
-            return Ok(half);
-        }
         let contradicted = half.mahalanobis_squared(&prediction.own).is_none_or(|m| m > DISBELIEF);
-        if measured.determined && contradicted {
+        let sound = measured.agreement.overlap() >= LEAST_OVERLAP && measured.agreement.consent() >= LEAST_CONSENT;
+        if contradicted && !(sound && measured.determined) {
+            return Err(LossReason::LargeResiduals);
+        }
+        if measured.determined && (contradicted || !prediction.measured) {
             return Ok(half);
         }
         let pose = half.combined(&prediction.own).ok_or(LossReason::Undetermined)?;
-        let carried = pose.sigma_at(self.current.radius_m()) <= self.options.max_carried_sigma_m;
+        let share = if prediction.measured { 1.0 } else { BY_VELOCITY };
+        let carried = pose.sigma_at(self.current.radius_m()) <= share * self.options.max_carried_sigma_m;
         if carried || measured.determined { Ok(pose) } else { Err(LossReason::Undetermined) }
     }
 }

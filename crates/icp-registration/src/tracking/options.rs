@@ -55,7 +55,8 @@ pub struct TrackerOptions {
     /// Smallest fraction that must agree of those that the keyframe can judge. Default 0.6.
     pub min_agreement: f64,
     /// Where the frame leaves motions undetermined, a prior or the velocity carries the pose: the largest standard deviation at the
-    /// radius of the frame until which the pose is carried on, metre. Default 0.1.
+    /// radius of the frame until which the pose is carried on by a prior, metre; a quarter of it by the velocity.
+    /// Default 0.1.
     pub max_carried_sigma_m: f64,
 }
 

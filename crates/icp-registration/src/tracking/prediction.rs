@@ -8,6 +8,9 @@ use crate::pose::pose_difference;
 /// Frames after a loss for which the last velocity is carried on.
 const CARRIED_FRAMES: usize = 5;
 
+/// Longest gap that the last velocity bridges, in intervals of the frames it was had from.
+const MOST_INTERVALS: f64 = 5.0;
+
 /// What is kept of the frame before.
 #[derive(Debug, Clone)]
 pub(super) struct Last {
@@ -66,9 +69,9 @@ impl Last {
     /// Motion until then at constant velocity, previous from current.
     fn motion(&self, timestamp_s: f64) -> Option<Isometry3<f64>> {
         let (motion, seconds) = self.velocity.filter(|_| self.lost_frames < CARRIED_FRAMES)?;
-        let motion = scaled(&motion, (timestamp_s - self.timestamp_s) / seconds);
         // A frame that came much later than the ones before says nothing about where the camera went.
-        (motion.translation.vector.norm() <= 1e3).then_some(motion)
+        let intervals = (timestamp_s - self.timestamp_s) / seconds;
+        (intervals <= MOST_INTERVALS).then(|| scaled(&motion, intervals))
     }
 
     /// The mean surprise after a frame that was determined, and lies at `own` with the frame before at `before`.

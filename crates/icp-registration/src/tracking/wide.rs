@@ -4,7 +4,7 @@
 use nalgebra::{Isometry3, UnitQuaternion};
 
 use super::keyframes::{SAMPLE, THUMBNAIL};
-use super::locate::Measured;
+use super::locate::{LEAST_CONSENT, LEAST_OVERLAP, Measured};
 use super::tracker::Tracker;
 use crate::organised::thumbnail_difference;
 
@@ -14,10 +14,6 @@ const TRIED: usize = 3;
 const LARGEST_DIFFERENCE: f32 = 0.7;
 /// Shifts of the thumbnails to each side, fields.
 const SHIFTS: [isize; 2] = [5, 3];
-/// What a pose found without a prediction must agree by, both ways: fraction of the frame, and of what can be judged.
-const LEAST_OVERLAP: f64 = 0.5;
-const LEAST_CONSENT: f64 = 0.9;
-
 impl Tracker {
     /// The current frame anywhere among the keyframes.
     pub(super) fn wide(&mut self, lost_frames: usize) -> Option<Measured> {

@@ -216,10 +216,9 @@ fn few_keyframes_are_enough_to_go_on() {
     assert_eq!(tracker.keyframes(), 3);
     let adjusted = tracker.adjusted_trajectory();
     for (k, pose) in adjusted.iter().enumerate() {
-        // Poses that hang on keyframes which are gone are still led back to the first one. A wrong link would be
-        // wrong by decimetres; what adds up here are weak views of so few pixels.
+        // Poses that hang on keyframes which are gone are still led back to the first one.
         let (millimetre, degree) = pose_error(&pose.world_from_camera, &from_first(2 * k));
-        assert!(millimetre < 40.0 && degree < 0.5, "{k}: {millimetre} {degree}");
+        assert!(millimetre < 15.0 && degree < 0.5, "{k}: {millimetre} {degree}");
     }
 }
 

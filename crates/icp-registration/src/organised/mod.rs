@@ -7,6 +7,7 @@ mod aligner;
 mod blocks;
 mod frame;
 mod grid;
+mod map;
 mod nodes;
 mod options;
 mod pairs;
@@ -20,5 +21,6 @@ mod track;
 
 pub use aligner::{FrameAligner, align_frames};
 pub use frame::OrganisedFrame;
+pub(crate) use map::{Agreement, thumbnail_difference};
 pub use options::FrameAlignmentOptions;
 pub use projection::Projection;

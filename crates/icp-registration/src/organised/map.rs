@@ -42,20 +42,24 @@ impl Agreement {
 impl OrganisedFrame {
     /// How about `most` nodes of `source`, spread over its frame, agree with the planes of this one.
     pub(crate) fn agreement(&self, source: &Self, self_from_source: &Isometry3<f64>, most: usize) -> Agreement {
-        let stride = (source.projection.grid.len() as f64 / most.max(1) as f64).sqrt().ceil().max(1.0) as usize;
+        let stride = source.stride_for(most);
         let mut agreement = Agreement::default();
         let judge = |p: Option<Partner>| {
             agreement.points += 1;
             let Some(p) = p else { return };
-            let tolerance = AGREEING_SIGMA * (p.target_variance + p.source_variance).sqrt() + AGREEING_SHARE * p.depth;
-            if p.residual.abs() <= tolerance && p.cosine >= AGREEING_COSINE {
+            if p.agrees() {
                 agreement.agreeing += 1;
-            } else if p.residual < tolerance {
+            } else if p.residual < p.tolerance() {
                 agreement.contradicting += 1;
             }
         };
         with_locate(self, Partners { target: self, source, pose: self_from_source, stride, each: judge });
         agreement
+    }
+
+    /// Every how many nodes along columns and rows about `most` are left.
+    pub(super) fn stride_for(&self, most: usize) -> usize {
+        (self.projection.grid.len() as f64 / most.max(1) as f64).sqrt().ceil().max(1.0) as usize
     }
 
     /// Moves the planes of this frame to the weighted mean with the points of `source`, those within their noise.
@@ -68,8 +72,7 @@ impl OrganisedFrame {
         scratch.clear();
         let each = |p: Option<Partner>| {
             let Some(p) = p else { return };
-            let variance = p.target_variance + p.source_variance;
-            if p.residual * p.residual < 9.0 * variance && p.cosine >= AGREEING_COSINE {
+            if p.residual * p.residual < 9.0 * p.variance() && p.cosine >= AGREEING_COSINE {
                 scratch.push((p.node, p.residual, p.source_variance));
             }
         };
@@ -158,23 +161,39 @@ pub(crate) fn thumbnail_difference(a: &[f32], b: &[f32], cols: usize, shift: [is
 }
 
 /// How a source point lies to the target plane it falls on.
-struct Partner {
-    node: u32,
+pub(super) struct Partner {
+    pub(super) node: u32,
+    /// In the target's frame.
+    pub(super) point: [f32; 3],
     /// Distance behind the plane, seen from the target camera, metre.
-    residual: f32,
-    depth: f32,
+    pub(super) residual: f32,
     cosine: f32,
     target_variance: f32,
     source_variance: f32,
 }
 
+impl Partner {
+    /// Whether the point lies on the plane and its surface runs along it.
+    pub(super) fn agrees(&self) -> bool {
+        self.residual.abs() <= self.tolerance() && self.cosine >= AGREEING_COSINE
+    }
+
+    pub(super) fn variance(&self) -> f32 {
+        self.target_variance + self.source_variance
+    }
+
+    fn tolerance(&self) -> f32 {
+        AGREEING_SIGMA * self.variance().sqrt() - AGREEING_SHARE * self.point[2]
+    }
+}
+
 /// Calls `each` for every `stride`-th node along rows and columns that has a plane, in order, with what it falls on.
-struct Partners<'a, F> {
-    target: &'a OrganisedFrame,
-    source: &'a OrganisedFrame,
-    pose: &'a Isometry3<f64>,
-    stride: usize,
-    each: F,
+pub(super) struct Partners<'a, F> {
+    pub(super) target: &'a OrganisedFrame,
+    pub(super) source: &'a OrganisedFrame,
+    pub(super) pose: &'a Isometry3<f64>,
+    pub(super) stride: usize,
+    pub(super) each: F,
 }
 
 impl<F: FnMut(Option<Partner>)> WithLocate for Partners<'_, F> {
@@ -218,8 +237,8 @@ fn partner<L: Locate>(
     let dot = |v: &[f32; 3]| plane[0] * v[0] + plane[1] * v[1] + plane[2] * v[2];
     plane[3].is_finite().then(|| Partner {
         node: node as u32,
+        point: p,
         residual: dot(&p) - plane[3],
-        depth: -p[2],
         cosine: dot(&normal),
         target_variance: target.sigma[node].powi(2),
         source_variance: sigma * sigma,

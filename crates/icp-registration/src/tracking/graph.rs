@@ -47,10 +47,10 @@ impl Graph {
     }
 
     /// Takes an observation that fits; says whether it did.
-    pub(super) fn offer(&mut self, edge: Edge) -> bool {
-        let fits = self.fits(&edge);
+    pub(super) fn offer(&mut self, edge: &Edge) -> bool {
+        let fits = self.fits(edge);
         if fits {
-            self.edges.push(edge);
+            self.edges.push(*edge);
             self.open = true;
         }
         fits

@@ -45,9 +45,9 @@ pub(super) struct Keyframes {
 }
 
 impl Keyframes {
-    pub(super) fn start(&mut self, frame: OrganisedFrame, world_from_keyframe: Uncertain) {
+    pub(super) fn start(&mut self, frame: OrganisedFrame, world_from_keyframe: &Uncertain) {
         self.push(frame);
-        self.graph.poses.push(world_from_keyframe);
+        self.graph.poses.push(*world_from_keyframe);
     }
 
     /// A new keyframe at a pose measured from keyframe `from`; returns its index.

@@ -3,23 +3,31 @@
 use nalgebra::{Isometry3, Matrix6};
 
 use super::keyframes::SAMPLE;
-use super::motion::Uncertain;
+use super::motion::{Uncertain, diagonal};
 use super::options::TrackerOptions;
-use super::prediction::{Last, Prediction};
+use super::prediction::{Grounds, Last, Prediction};
 use super::tracked::LossReason;
 use super::tracker::Tracker;
+use super::velocity::Velocity;
 use crate::error::Error;
 use crate::organised::{Agreement, FrameAligner, OrganisedFrame};
 
 /// Keyframes tried beside the reference.
 const NEIGHBOURS: usize = 2;
-/// Square of the Mahalanobis distance (six components) beyond which a prior is not believed against the registration.
+/// Square of the Mahalanobis distance (six components) beyond which a pose is not where the camera can have gone.
 const DISBELIEF: f64 = 40.0;
 /// Share of the largest standard deviation of carried poses that is allowed where only the velocity carries them.
 const BY_VELOCITY: f64 = 0.25;
 /// What a pose found against expectation must agree by: fraction of the frame, and of what can be judged.
-pub(super) const LEAST_OVERLAP: f64 = 0.5;
-pub(super) const LEAST_CONSENT: f64 = 0.9;
+const LEAST_OVERLAP: f64 = 0.5;
+const LEAST_CONSENT: f64 = 0.9;
+/// Planes it must share: three make a corner, and corners look alike.
+const LEAST_PLANES: usize = 4;
+/// Share of the radius (and radian) by which a camera that starts or stops may miss the prediction, as a standard
+/// deviation: what is carried elsewhere is carried farther.
+const JUMP: f64 = 0.01;
+/// The same of a camera whose velocity is not known.
+const START: f64 = 0.05;
 
 /// A registration that passed its tests.
 #[derive(Debug, Clone, Copy)]
@@ -28,10 +36,46 @@ pub(super) struct Measured {
     pub(super) keyframe: usize,
     /// Keyframe from camera.
     pub(super) pose: Uncertain,
+    /// Factor by which the covariance is too small, for errors that many pixels share.
+    shared_error: f64,
     /// Whether the geometry determines all motions.
     pub(super) determined: bool,
     pub(super) agreement: Agreement,
     pub(super) rms_m: f64,
+}
+
+impl Measured {
+    /// The part of the covariance that frames registered with the same keyframe do not share.
+    pub(super) fn own(&self) -> Uncertain {
+        Uncertain { covariance: self.pose.covariance * 0.5, ..self.pose }
+    }
+
+    /// The part that they share: the keyframe's own noise, and errors that neither averages over pixels nor over frames
+    /// from much the same place.
+    pub(super) fn shared(&self) -> Matrix6<f64> {
+        self.pose.covariance * (self.shared_error - 0.5)
+    }
+
+    pub(super) fn total(&self) -> Uncertain {
+        Uncertain { covariance: self.pose.covariance * self.shared_error, ..self.pose }
+    }
+}
+
+/// Where a frame has been found.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Fix {
+    /// Keyframe from camera.
+    pub(super) own: Uncertain,
+    pub(super) velocity: Option<Velocity>,
+    /// Whether it lies where the camera can have gone since the frame before.
+    pub(super) expected: bool,
+}
+
+impl Fix {
+    /// Where nothing was expected.
+    pub(super) fn unexpected(measured: &Measured) -> Self {
+        Self { own: measured.own(), velocity: None, expected: false }
+    }
 }
 
 impl Tracker {
@@ -43,7 +87,7 @@ impl Tracker {
     }
 
     /// The frame before as a new keyframe, where it determines what its own keyframe, with less in common, does not.
-    fn from_previous(&mut self, last: &Last, prediction: &Prediction) -> Option<Measured> {
+    fn with_previous(&mut self, last: &Last, prediction: &Prediction) -> Option<Measured> {
         let exact = last.own.covariance == Matrix6::zeros();
         if last.lost_frames > 0 || last.carried > 0 || exact {
             return None;
@@ -66,10 +110,10 @@ impl Tracker {
         {
             return Ok(measured);
         }
-        if let Some(measured) = self.from_previous(last, prediction) {
+        if let Some(measured) = self.with_previous(last, prediction) {
             return Ok(measured);
         }
-        if prediction.informed && first.is_ok() {
+        if prediction.grounds != Grounds::Nothing && first.is_ok() {
             return first;
         }
         let reason = first.err().unwrap_or(LossReason::Undetermined);
@@ -86,27 +130,58 @@ impl Tracker {
     }
 
     /// The pose from a registration and a prediction with its covariance: both are weighted, and what the geometry
-    /// leaves open stays with the prediction.
+    /// leaves open stays with the prediction. Far from the prediction, a pose must stand on its own.
     ///
     /// Half of the covariance of the registration is the keyframe's noise, which all frames registered with it share;
     /// only the other half averages out with the prediction.
-    pub(super) fn weighted(&self, measured: &Measured, prediction: &Prediction) -> Result<Uncertain, LossReason> {
-        let half = Uncertain { pose: measured.pose.pose, covariance: measured.pose.covariance * 0.5 };
-        if !prediction.informed {
-            return if measured.determined { Ok(half) } else { Err(LossReason::Undetermined) };
+    pub(super) fn weighted(
+        &self,
+        measured: &Measured,
+        prediction: &Prediction,
+        lost_frames: usize,
+    ) -> Result<Fix, LossReason> {
+        let half = measured.own();
+        let expected = self.expects(&half, prediction, lost_frames);
+        if !expected || prediction.grounds == Grounds::Nothing {
+            if !measured.determined {
+                return Err(LossReason::Undetermined);
+            }
+            let fix = Fix { own: half, velocity: None, expected };
+            return if expected || self.stands_alone(measured) { Ok(fix) } else { Err(LossReason::LargeResiduals) };
         }
-        let contradicted = half.mahalanobis_squared(&prediction.own).is_none_or(|m| m > DISBELIEF);
-        let sound = measured.agreement.overlap() >= LEAST_OVERLAP && measured.agreement.consent() >= LEAST_CONSENT;
-        if contradicted && !(sound && measured.determined) {
-            return Err(LossReason::LargeResiduals);
-        }
-        if measured.determined && (contradicted || !prediction.measured) {
-            return Ok(half);
-        }
-        let pose = half.combined(&prediction.own).ok_or(LossReason::Undetermined)?;
-        let share = if prediction.measured { 1.0 } else { BY_VELOCITY };
-        let carried = pose.sigma_at(self.current.radius_m()) <= share * self.options.max_carried_sigma_m;
-        if carried || measured.determined { Ok(pose) } else { Err(LossReason::Undetermined) }
+        let (own, velocity) = prediction.corrected(&half).ok_or(LossReason::Undetermined)?;
+        let carried = own.sigma_at(self.current.radius_m()) <= self.carried_sigma_m(prediction.grounds);
+        let fix = Fix { own, velocity, expected: true };
+        if carried || measured.determined { Ok(fix) } else { Err(LossReason::Undetermined) }
+    }
+
+    /// Whether a pose lies where the camera can have gone since the frame before.
+    fn expects(&self, own: &Uncertain, prediction: &Prediction, lost_frames: usize) -> bool {
+        let radius = self.current.radius_m();
+        let ungrounded = prediction.grounds == Grounds::Nothing;
+        let jump = if ungrounded { START } else { JUMP };
+        let known = if ungrounded { Matrix6::zeros() } else { prediction.own.covariance };
+        let covariance = known + diagonal([(jump * radius).powi(2), jump * jump]);
+        let reachable = Uncertain { covariance, ..prediction.own };
+        let relied_on = !ungrounded && prediction.own.sigma_at(radius) <= self.carried_sigma_m(prediction.grounds);
+        (lost_frames == 0 || relied_on) && own.mahalanobis_squared(&reachable).is_some_and(|m| m <= DISBELIEF)
+    }
+
+    fn carried_sigma_m(&self, grounds: Grounds) -> f64 {
+        let share = if grounds == Grounds::Prior { 1.0 } else { BY_VELOCITY };
+        share * self.options.max_carried_sigma_m
+    }
+
+    /// Whether a pose would be believed wherever it was found: each frame agrees with what the other saw and with the
+    /// space that it looked through, and what they share is found at one place only.
+    pub(super) fn stands_alone(&self, measured: &Measured) -> bool {
+        let keyframe = &self.keyframes.list[measured.keyframe].frame;
+        let pose = &measured.pose.pose;
+        let sound = |a: &Agreement| a.overlap() >= LEAST_OVERLAP && a.consent() >= LEAST_CONSENT;
+        measured.determined
+            && sound(&measured.agreement)
+            && self.current.agreement(keyframe, &pose.inverse(), SAMPLE).consent() >= LEAST_CONSENT
+            && keyframe.shared_planes(&self.current, pose, SAMPLE) >= LEAST_PLANES
     }
 }
 
@@ -135,5 +210,6 @@ fn register(
         return Err(LossReason::NotConverged);
     }
     let determined = result.degenerate.is_empty();
-    Ok(Measured { keyframe: 0, pose, determined, agreement, rms_m: result.rms_m })
+    let shared_error = target.shared_error(source, &pose.pose, 2 * SAMPLE);
+    Ok(Measured { keyframe: 0, pose, shared_error, determined, agreement, rms_m: result.rms_m })
 }

@@ -2,10 +2,10 @@
 //!
 //! Each frame is registered with a keyframe, not with the frame before: sensor-fixed errors pull registrations towards
 //! no motion, and each registration adds its error. Keyframes are pieces of the map: their planes move to the weighted
-//! mean of all frames that saw them, as the volume of `[Newcombe2011]` does. Where a frame
-//! leaves a motion open that the frame before left determined, that one becomes a keyframe; what stays open is carried on
-//! by a prior or at constant velocity. Registrations between keyframes form a graph of poses, which is adjusted where an
-//! old keyframe is seen again.
+//! mean of all frames that saw them, as the volume of `[Newcombe2011]` does. Where a frame leaves a motion open that
+//! the frame before left determined, that one becomes a keyframe; what stays open is carried on by a prior or at
+//! constant velocity. Registrations between keyframes form a graph of poses, which is adjusted where an old keyframe
+//! is seen again.
 
 mod graph;
 mod imu;
@@ -17,6 +17,7 @@ mod prediction;
 mod tracked;
 mod tracker;
 mod unguessed;
+mod velocity;
 mod wide;
 
 pub use imu::{ImuIntegrator, ImuOptions, InertialSample};

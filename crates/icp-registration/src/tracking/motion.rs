@@ -1,6 +1,6 @@
 //! Poses and motions with their covariance.
 
-use nalgebra::{Isometry3, Matrix3, Matrix6, Vector3};
+use nalgebra::{Isometry3, Matrix3, Matrix6, Vector3, Vector6};
 
 use crate::pose::{inverse_covariance_transport, pose_difference, step_pose, symmetrised};
 
@@ -76,6 +76,11 @@ impl Uncertain {
     }
 }
 
+/// The same for each axis of the translation, and of the rotation.
+pub(super) fn diagonal([shift, turn]: [f64; 2]) -> Matrix6<f64> {
+    Matrix6::from_diagonal(&Vector6::new(shift, shift, shift, turn, turn, turn))
+}
+
 /// Jacobians of the tangent of `a_from_b · b_from_c` by those of its factors.
 pub(super) fn product_jacobians(a_from_b: &Isometry3<f64>, b_from_c: &Isometry3<f64>) -> (Matrix6<f64>, Matrix6<f64>) {
     // t = ta + Ra tb: dt = dta − Ra [tb]x dθa + Ra dtb; R = Ra Rb: dθ = Rbᵀ dθa + dθb.
@@ -89,15 +94,18 @@ pub(super) fn product_jacobians(a_from_b: &Isometry3<f64>, b_from_c: &Isometry3<
     (by_first, by_second)
 }
 
-/// The share `share` of a motion at constant velocity.
-pub(super) fn scaled(motion: &Isometry3<f64>, share: f64) -> Isometry3<f64> {
-    // Along the screw: t = V(θ) ρ with ρ = V⁻¹ t, so that any number of shares lie on one path.
-    let turn = motion.rotation.scaled_axis();
-    let straight =
-        left_jacobian(&turn).try_inverse().map_or(motion.translation.vector, |v| v * motion.translation.vector);
-    let rotation = nalgebra::UnitQuaternion::from_scaled_axis(turn * share);
-    let translation = left_jacobian(&(turn * share)) * (straight * share);
-    Isometry3::from_parts(translation.into(), rotation)
+/// The motion along a screw `[ρ, θ]`: it turns by θ while it goes straight on by ρ in axes that turn along.
+pub(super) fn exponential(screw: &Vector6<f64>) -> Isometry3<f64> {
+    let (straight, turn) = (screw.fixed_rows::<3>(0), screw.fixed_rows::<3>(3).into_owned());
+    let rotation = nalgebra::UnitQuaternion::from_scaled_axis(turn);
+    Isometry3::from_parts((left_jacobian(&turn) * straight).into(), rotation)
+}
+
+/// The screw of a motion.
+pub(super) fn logarithm(motion: &Isometry3<f64>) -> Vector6<f64> {
+    let (turn, shift) = (motion.rotation.scaled_axis(), motion.translation.vector);
+    let straight = left_jacobian(&turn).try_inverse().map_or(shift, |v| v * shift);
+    Vector6::new(straight.x, straight.y, straight.z, turn.x, turn.y, turn.z)
 }
 
 /// `V(θ)`: the translation that a unit of straight motion becomes under a turn by θ.
@@ -118,7 +126,6 @@ mod tests {
     #![allow(clippy::unwrap_used)]
 
     use super::*;
-    use nalgebra::Vector6;
 
     fn pose(seed: f64) -> Isometry3<f64> {
         Isometry3::new(Vector3::new(seed, -0.4 * seed, 0.3), Vector3::new(0.5 - seed, 0.8, -0.2 * seed))
@@ -141,12 +148,13 @@ mod tests {
 
     #[test]
     fn halves_of_a_motion_make_the_whole() {
+        let share = |motion: &Isometry3<f64>, share: f64| exponential(&(logarithm(motion) * share));
         let motion = pose(0.7);
-        let half = scaled(&motion, 0.5);
+        let half = share(&motion, 0.5);
         // Rounding.
         assert!(pose_difference(&(half * half), &motion).norm() < 1e-12);
         let tiny = Isometry3::new(Vector3::new(0.1, 0.2, 0.3), Vector3::new(1e-5, 0.0, 0.0));
-        let third = scaled(&tiny, 1.0 / 3.0);
+        let third = share(&tiny, 1.0 / 3.0);
         assert!(pose_difference(&(third * third * third), &tiny).norm() < 1e-12);
     }
 

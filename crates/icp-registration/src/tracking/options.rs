@@ -33,9 +33,9 @@ pub enum Relocalisation {
 /// Options of a [`Tracker`](super::Tracker). The defaults carry no scale.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrackerOptions {
-    /// Registration of a frame with a keyframe. Undetermined motions are always held at the
-    /// prediction, and other starts are only tried after a loss; where
-    /// `max_motion_sigma_m` is `None`, it is 1/50 of the radius of the first frame.
+    /// Registration of a frame with a keyframe. Undetermined motions are always reported, so that the prediction
+    /// can carry them, and turned starts are not tried; where `max_motion_sigma_m` is `None`, it is 1/50 of the radius of
+    /// the first frame.
     pub alignment: FrameAlignmentOptions,
     /// Pose of the first frame: the datum, without error.
     pub world_from_first: Isometry3<f64>,
@@ -54,8 +54,8 @@ pub struct TrackerOptions {
     pub min_overlap: f64,
     /// Smallest fraction that must agree of those that the keyframe can judge. Default 0.6.
     pub min_agreement: f64,
-    /// Where the frame leaves motions undetermined, a prior or the velocity carries the pose: the largest standard deviation at the
-    /// radius of the frame until which the pose is carried on by a prior, metre; a quarter of it by the velocity.
+    /// Where the frame leaves motions undetermined, a prior or the velocity carries the pose: until its standard
+    /// deviation at the radius of the frame exceeds this with a prior, a quarter of this with the velocity alone, metre.
     /// Default 0.1.
     pub max_carried_sigma_m: f64,
 }

@@ -6,11 +6,12 @@ use nalgebra::{Isometry3, Matrix6};
 
 use super::graph::Edge;
 use super::keyframes::Keyframes;
-use super::locate::Measured;
-use super::motion::{MotionPrior, Uncertain};
+use super::locate::{Fix, Measured};
+use super::motion::{MotionPrior, Uncertain, diagonal};
 use super::options::{Fusion, TrackerOptions};
-use super::prediction::{Last, Prediction};
+use super::prediction::{Grounds, Last, Prediction};
 use super::tracked::{LossReason, TrackedPose, TrackingState};
+use super::velocity::Velocity;
 use crate::cloud::Cloud;
 use crate::error::{Error, Result};
 use crate::icp::DegeneracyPolicy;
@@ -36,6 +37,13 @@ pub struct Tracker {
     last: Option<Last>,
     trajectory: Vec<TrackedPose>,
     scratch: Vec<(u32, f32, f32)>,
+}
+
+/// All that one frame gave.
+struct Seen {
+    measured: Measured,
+    fix: Fix,
+    prediction: Prediction,
 }
 
 impl Tracker {
@@ -133,14 +141,15 @@ impl Tracker {
         let state = if blank { TrackingState::Lost(LossReason::TooFewPoints) } else { TrackingState::Started };
         if !blank {
             self.set_weakest_motion();
-            self.keyframes.start(self.current.clone(), pose);
+            self.keyframes.start(self.current.clone(), &pose);
             self.last = Some(Last {
                 timestamp_s,
                 keyframe: 0,
                 own: Uncertain::exact(Isometry3::identity()),
                 shared: Matrix6::zeros(),
                 velocity: None,
-                surprise: None,
+                interval_s: f64::INFINITY,
+                disturbance: None,
                 carried: 0,
                 informed: true,
                 lost_frames: 0,
@@ -173,61 +182,46 @@ impl Tracker {
     fn follow(&mut self, timestamp_s: f64, last: &Last, prior: Option<&MotionPrior>) -> TrackedPose {
         let prediction = last.predict(timestamp_s, prior);
         match self.locate(last, &prediction) {
-            Ok((measured, own, state)) => self.found(timestamp_s, last, &measured, own, state),
+            Ok((measured, fix)) => self.found(timestamp_s, last, &Seen { measured, fix, prediction }),
             Err(reason) => self.lost(timestamp_s, last, &prediction, reason),
         }
     }
 
-    fn locate(
-        &mut self,
-        last: &Last,
-        prediction: &Prediction,
-    ) -> std::result::Result<(Measured, Uncertain, TrackingState), LossReason> {
+    fn locate(&mut self, last: &Last, prediction: &Prediction) -> std::result::Result<(Measured, Fix), LossReason> {
         if self.current.filled() < self.options.min_filled {
             return Err(LossReason::TooFewPoints);
         }
         let near = self.near(last, prediction).and_then(|measured| {
-            let predicted = self.seen_from(measured.keyframe, last.keyframe, prediction);
-            Ok((measured, self.weighted(&measured, &predicted)?))
+            let predicted = prediction.seen_from(&self.keyframes.graph.relative(measured.keyframe, last.keyframe));
+            Ok((measured, self.weighted(&measured, &predicted, last.lost_frames)?))
         });
-        let state = if last.lost_frames == 0 { TrackingState::Tracked } else { TrackingState::Relocalised };
-        match near {
-            Ok((measured, own)) => Ok((measured, own, state)),
-            Err(reason) => {
-                let measured = self.wide(last.lost_frames).ok_or(reason)?;
-                let own = Uncertain { covariance: measured.pose.covariance * 0.5, ..measured.pose };
-                Ok((measured, own, TrackingState::Relocalised))
-            }
-        }
+        near.or_else(|reason| {
+            let measured = self.wide(last.lost_frames).ok_or(reason)?;
+            Ok((measured, Fix::unexpected(&measured)))
+        })
     }
 
-    /// A prediction from one keyframe in the frame of another.
-    fn seen_from(&self, keyframe: usize, from: usize, prediction: &Prediction) -> Prediction {
-        if keyframe == from {
-            return *prediction;
-        }
-        let between = Uncertain::exact(self.keyframes.graph.relative(keyframe, from));
-        Prediction { own: between.then(&prediction.own), ..*prediction }
-    }
-
-    fn found(
-        &mut self,
-        timestamp_s: f64,
-        last: &Last,
-        measured: &Measured,
-        own: Uncertain,
-        state: TrackingState,
-    ) -> TrackedPose {
-        let keyframe = measured.keyframe;
-        let before = Uncertain::exact(self.keyframes.graph.relative(keyframe, last.keyframe)).then(&last.own);
-        let half = Uncertain { covariance: measured.pose.covariance * 0.5, ..measured.pose };
-        let follows = last.lost_frames == 0 && state == TrackingState::Tracked;
+    fn found(&mut self, timestamp_s: f64, last: &Last, seen: &Seen) -> TrackedPose {
+        let Seen { measured, fix, prediction } = seen;
+        let (keyframe, own) = (measured.keyframe, fix.own);
+        let between = self.keyframes.graph.relative(keyframe, last.keyframe);
+        let before = Uncertain::exact(between).then(&last.own);
+        let (half, seconds) = (measured.own(), timestamp_s - last.timestamp_s);
+        let follows = last.lost_frames == 0 && fix.expected;
         let measured_motion = follows.then(|| {
             let motion = half.inverse().then(&before);
             MotionPrior { current_from_previous: motion.pose, covariance: motion.covariance }
         });
-        let velocity = follows.then(|| (before.pose.inverse() * own.pose, timestamp_s - last.timestamp_s));
-        let shared = if measured.determined { half.covariance } else { last.shared };
+        let learns = last.lost_frames == 0 && measured.determined;
+        let disturbance = if learns {
+            let motion = before.pose.inverse() * half.pose;
+            last.disturbed_by(timestamp_s, &prediction.seen_from(&between), &half, &motion)
+        } else {
+            last.disturbance
+        };
+        let from_poses = || Velocity::between(&before, &own, seconds, disturbance.unwrap_or_default());
+        let velocity = fix.velocity.or_else(|| follows.then(from_poses));
+        let shared = if measured.determined { measured.shared() } else { last.shared };
         let total = Uncertain { covariance: own.covariance + shared, ..own };
         let world = self.keyframes.graph.poses[keyframe].then(&total);
         if self.options.fusion == Fusion::Planes && measured.determined {
@@ -237,19 +231,25 @@ impl Tracker {
             timestamp_s,
             world_from_camera: world.pose,
             covariance: world.covariance,
-            state,
+            state: if follows { TrackingState::Tracked } else { TrackingState::Relocalised },
             keyframe: self.keyframes.list[keyframe].number,
             keyframe_from_camera: own.pose,
             overlap: measured.agreement.overlap(),
             rms_m: measured.rms_m,
             measured_motion,
         };
-        let learns = follows && measured.determined;
-        let surprise = if learns { last.surprise_by(timestamp_s, &before.pose, &own.pose) } else { last.surprise };
-        let carried = if measured.determined { 0 } else { last.carried + 1 };
-        let (informed, lost_frames) = (true, 0);
-        self.last =
-            Some(Last { timestamp_s, keyframe, own, shared, velocity, surprise, carried, informed, lost_frames });
+        self.last = Some(Last {
+            timestamp_s,
+            keyframe,
+            own,
+            shared,
+            velocity,
+            interval_s: seconds,
+            disturbance,
+            carried: if measured.determined { 0 } else { last.carried + 1 },
+            informed: true,
+            lost_frames: 0,
+        });
         if pose.overlap < self.options.keyframe_overlap {
             self.change_reference(&total);
         }
@@ -261,25 +261,20 @@ impl Tracker {
         let total = Uncertain { covariance: prediction.own.covariance + last.shared, ..prediction.own };
         let world = self.keyframes.graph.poses[last.keyframe].then(&total);
         let radius = self.keyframes.list[last.keyframe].frame.radius_m();
-        let unknown = Matrix6::from_diagonal(&nalgebra::Vector6::new(
-            radius * radius,
-            radius * radius,
-            radius * radius,
-            1.0,
-            1.0,
-            1.0,
-        ));
+        let unknown = diagonal([radius * radius, 1.0]);
+        let informed = prediction.grounds != Grounds::Nothing;
         self.last = Some(Last {
             timestamp_s,
             own: prediction.own,
-            informed: prediction.informed,
+            velocity: prediction.velocity,
+            informed,
             lost_frames: last.lost_frames + 1,
             ..last.clone()
         });
         TrackedPose {
             timestamp_s,
             world_from_camera: world.pose,
-            covariance: if prediction.informed { world.covariance } else { world.covariance + unknown },
+            covariance: if informed { world.covariance } else { world.covariance + unknown },
             state: TrackingState::Lost(reason),
             keyframe: self.keyframes.list[last.keyframe].number,
             keyframe_from_camera: prediction.own.pose,
@@ -299,11 +294,11 @@ impl Tracker {
             && let Some(measured) = self.closing(k, reference, reference_from_camera)
         {
             self.keyframes.graph.adjust_if_closed();
-            self.refer_to(k, &measured.pose);
+            self.refer_to(k, &measured.own(), measured.shared());
             return;
         }
         let new = self.keyframes.add(self.current.clone(), reference, reference_from_camera);
-        self.refer_to(new, &Uncertain::exact(Isometry3::identity()));
+        self.refer_to(new, &Uncertain::exact(Isometry3::identity()), Matrix6::zeros());
     }
 
     /// Takes out keyframes beyond the number allowed.
@@ -323,15 +318,16 @@ impl Tracker {
         if self.keyframes.graph.joined(k, reference) {
             return Some(measured);
         }
-        let a_from_b = measured.pose.then(&reference_from_camera.inverse());
-        self.keyframes.graph.offer(Edge { a: k, b: reference, a_from_b }).then_some(measured)
+        let a_from_b = measured.total().then(&reference_from_camera.inverse());
+        self.keyframes.graph.offer(&Edge { a: k, b: reference, a_from_b }).then_some(measured)
     }
 
-    fn refer_to(&mut self, keyframe: usize, pose: &Uncertain) {
+    fn refer_to(&mut self, keyframe: usize, own: &Uncertain, shared: Matrix6<f64>) {
         if let Some(last) = &mut self.last {
             last.keyframe = keyframe;
-            last.own = Uncertain { pose: pose.pose, covariance: pose.covariance * 0.5 };
-            last.shared = last.own.covariance;
+            last.own = *own;
+            last.shared = shared;
+            last.velocity = last.velocity.map(|velocity| velocity.at_origin());
         }
     }
 }

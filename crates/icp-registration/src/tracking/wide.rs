@@ -3,8 +3,8 @@
 
 use nalgebra::{Isometry3, UnitQuaternion};
 
-use super::keyframes::{SAMPLE, THUMBNAIL};
-use super::locate::{LEAST_CONSENT, LEAST_OVERLAP, Measured};
+use super::keyframes::THUMBNAIL;
+use super::locate::Measured;
 use super::tracker::Tracker;
 use crate::organised::thumbnail_difference;
 
@@ -14,6 +14,7 @@ const TRIED: usize = 3;
 const LARGEST_DIFFERENCE: f32 = 0.7;
 /// Shifts of the thumbnails to each side, fields.
 const SHIFTS: [isize; 2] = [5, 3];
+
 impl Tracker {
     /// The current frame anywhere among the keyframes.
     pub(super) fn wide(&mut self, lost_frames: usize) -> Option<Measured> {
@@ -55,11 +56,8 @@ impl Tracker {
         Isometry3::from_parts(nalgebra::Translation3::identity(), turn.unwrap_or_default())
     }
 
-    /// A registration that both frames agree with.
+    /// A registration that would be believed wherever it was found.
     pub(super) fn verified(&mut self, k: usize, guess: &Isometry3<f64>) -> Option<Measured> {
-        let measured = self.try_keyframe(k, guess).ok().filter(|m| m.determined)?;
-        let back = self.current.agreement(&self.keyframes.list[k].frame, &measured.pose.pose.inverse(), SAMPLE);
-        let sound = |a: &crate::organised::Agreement| a.overlap() >= LEAST_OVERLAP && a.consent() >= LEAST_CONSENT;
-        (sound(&measured.agreement) && sound(&back)).then_some(measured)
+        self.try_keyframe(k, guess).ok().filter(|measured| self.stands_alone(measured))
     }
 }

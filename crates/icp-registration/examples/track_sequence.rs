@@ -2,7 +2,7 @@
 //!
 //! `RAYON_NUM_THREADS=1 cargo run --release -p icp-registration --example track_sequence -- [option=value ..]`
 //!
-//! Options: `folder` (of the real sequence), `keyframe_overlap`, `max_keyframes`, `levels`,
+//! Options: `folder` (of the real sequence), `seed` (of the simulated noise), `keyframe_overlap`, `max_keyframes`, `levels`,
 //! `fusion=off`, `step_tolerance_m`, `max_motion_sigma_m`, `every=1` (a line a frame).
 #![allow(
     missing_docs,
@@ -81,8 +81,9 @@ fn track(
         times.push(1e3 * (cpu_seconds() - start));
         if argument::<usize>("every").is_some() {
             println!(
-                "{k} {:?} keyframe {} overlap {:.3} rms {:.2} mm {:.2} ms",
+                "{k} {:?} sigma {:.2} mm keyframe {} overlap {:.3} rms {:.2} mm {:.2} ms",
                 pose.state,
+                1e3 * pose.covariance.fixed_view::<3, 3>(0, 0).trace().sqrt(),
                 pose.keyframe,
                 pose.overlap,
                 1e3 * pose.rms_m,
@@ -131,9 +132,10 @@ fn report(name: &str, tracker: &Tracker, times: &mut [f64], truth: &[Isometry3<f
 }
 
 fn simulated(camera: &Pinhole, name: &str) {
+    let seed: u64 = argument("seed").unwrap_or(40_000);
     let truth: Vec<Isometry3<f64>> = (0..300).map(around).collect();
     let frame = |k: usize| {
-        let (points, sigma) = frame_at(camera, &truth[k], 40_000 + k as u64);
+        let (points, sigma) = frame_at(camera, &truth[k], seed + k as u64);
         (points, Some(sigma))
     };
     let (tracker, mut times) = track(&projection(camera), truth.len(), |k| k as f64 / sequence::HERTZ, frame);

@@ -8,7 +8,6 @@ mod blocks;
 mod frame;
 mod grid;
 mod map;
-mod misfit;
 mod nodes;
 mod options;
 mod pairs;

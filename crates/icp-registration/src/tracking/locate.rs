@@ -36,8 +36,6 @@ pub(super) struct Measured {
     pub(super) keyframe: usize,
     /// Keyframe from camera.
     pub(super) pose: Uncertain,
-    /// Factor by which the covariance is too small, for errors that many pixels share.
-    shared_error: f64,
     /// Whether the geometry determines all motions.
     pub(super) determined: bool,
     pub(super) agreement: Agreement,
@@ -50,14 +48,9 @@ impl Measured {
         Uncertain { covariance: self.pose.covariance * 0.5, ..self.pose }
     }
 
-    /// The part that they share: the keyframe's own noise, and errors that neither averages over pixels nor over frames
-    /// from much the same place.
+    /// The part that they share: the keyframe's own noise.
     pub(super) fn shared(&self) -> Matrix6<f64> {
-        self.pose.covariance * (self.shared_error - 0.5)
-    }
-
-    pub(super) fn total(&self) -> Uncertain {
-        Uncertain { covariance: self.pose.covariance * self.shared_error, ..self.pose }
+        self.pose.covariance * 0.5
     }
 }
 
@@ -210,6 +203,5 @@ fn register(
         return Err(LossReason::NotConverged);
     }
     let determined = result.degenerate.is_empty();
-    let shared_error = target.shared_error(source, &pose.pose, 2 * SAMPLE);
-    Ok(Measured { keyframe: 0, pose, shared_error, determined, agreement, rms_m: result.rms_m })
+    Ok(Measured { keyframe: 0, pose, determined, agreement, rms_m: result.rms_m })
 }

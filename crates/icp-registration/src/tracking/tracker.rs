@@ -318,7 +318,7 @@ impl Tracker {
         if self.keyframes.graph.joined(k, reference) {
             return Some(measured);
         }
-        let a_from_b = measured.total().then(&reference_from_camera.inverse());
+        let a_from_b = measured.pose.then(&reference_from_camera.inverse());
         self.keyframes.graph.offer(&Edge { a: k, b: reference, a_from_b }).then_some(measured)
     }
 

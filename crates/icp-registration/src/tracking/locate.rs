@@ -1,6 +1,6 @@
 //! One frame against one keyframe, and the search among those nearby.
 
-use nalgebra::{Isometry3, Matrix6};
+use nalgebra::{Isometry3, Matrix6, Vector6};
 
 use super::keyframes::SAMPLE;
 use super::motion::{Uncertain, diagonal};
@@ -11,9 +11,12 @@ use super::tracker::Tracker;
 use super::velocity::Velocity;
 use crate::error::Error;
 use crate::organised::{Agreement, FrameAligner, OrganisedFrame};
+use crate::pose::symmetrised;
 
 /// Keyframes tried beside the reference.
 const NEIGHBOURS: usize = 2;
+/// Share of the radius beyond whose standard deviation a motion is weak.
+const WEAK_SHARE: f64 = 1.0 / 300.0;
 /// Square of the Mahalanobis distance (six components) beyond which a pose is not where the camera can have gone.
 const DISBELIEF: f64 = 40.0;
 /// Share of the largest standard deviation of carried poses that is allowed where only the velocity carries them.
@@ -43,6 +46,25 @@ pub(super) struct Measured {
 }
 
 impl Measured {
+    /// Whether the geometry determines all motions well.
+    fn is_firm(&self, radius_m: f64) -> bool {
+        self.determined && self.pose.sigma_at(radius_m) <= WEAK_SHARE * radius_m
+    }
+
+    /// The same with weak motions left open. What holds them are a few nodes, often at edges, and chance: their
+    /// covariance promises too much.
+    pub(super) fn without_weak_motions(&self, radius_m: f64) -> Self {
+        // Turns as distances at the radius.
+        let scale = Matrix6::from_diagonal(&Vector6::new(1.0, 1.0, 1.0, radius_m, radius_m, radius_m));
+        let back = Matrix6::from_diagonal(&scale.diagonal().map(|s| 1.0 / s));
+        let mut motions = symmetrised(&(scale * self.pose.covariance * scale)).symmetric_eigen();
+        for variance in motions.eigenvalues.iter_mut().filter(|v| **v > (WEAK_SHARE * radius_m).powi(2)) {
+            *variance = variance.max(radius_m * radius_m);
+        }
+        let covariance = symmetrised(&(back * motions.recompose() * back));
+        Self { pose: Uncertain { covariance, ..self.pose }, determined: false, ..*self }
+    }
+
     /// The part of the covariance that frames registered with the same keyframe do not share.
     pub(super) fn own(&self) -> Uncertain {
         Uncertain { covariance: self.pose.covariance * 0.5, ..self.pose }
@@ -82,12 +104,12 @@ impl Tracker {
     /// The frame before as a new keyframe, where it determines what its own keyframe, with less in common, does not.
     fn with_previous(&mut self, last: &Last, prediction: &Prediction) -> Option<Measured> {
         let exact = last.own.covariance == Matrix6::zeros();
-        if last.lost_frames > 0 || last.carried > 0 || exact {
+        if last.lost_frames > 0 || exact {
             return None;
         }
         let guess = last.own.pose.inverse() * prediction.own.pose;
         let measured = register(&mut self.aligner, &self.options, &self.current, &self.previous, &guess).ok()?;
-        measured.determined.then(|| {
+        measured.is_firm(self.current.radius_m()).then(|| {
             let total = Uncertain { covariance: last.own.covariance + last.shared, ..last.own };
             let keyframe = self.keyframes.add(self.previous.clone(), last.keyframe, &total);
             Measured { keyframe, ..measured }
@@ -99,14 +121,16 @@ impl Tracker {
         let reference = last.keyframe;
         let first = self.try_keyframe(reference, &prediction.own.pose);
         if let Ok(measured) = first
-            && measured.determined
+            && measured.is_firm(self.current.radius_m())
         {
             return Ok(measured);
         }
         if let Some(measured) = self.with_previous(last, prediction) {
             return Ok(measured);
         }
-        if prediction.grounds != Grounds::Nothing && first.is_ok() {
+        if let Ok(measured) = first
+            && (measured.determined || prediction.grounds != Grounds::Nothing)
+        {
             return first;
         }
         let reason = first.err().unwrap_or(LossReason::Undetermined);
@@ -122,12 +146,30 @@ impl Tracker {
         Err(reason)
     }
 
+    /// The pose by a registration and the prediction, and the registration as it was used: motions that it determines
+    /// weakly are left to the prediction as far as that one carries.
+    pub(super) fn fixed(
+        &self,
+        measured: &Measured,
+        prediction: &Prediction,
+        lost_frames: usize,
+    ) -> Result<(Measured, Fix), LossReason> {
+        let radius = self.current.radius_m();
+        if measured.determined && !measured.is_firm(radius) && prediction.grounds != Grounds::Nothing {
+            let cautious = measured.without_weak_motions(radius);
+            if let Ok(fix) = self.weighted(&cautious, prediction, lost_frames) {
+                return Ok((cautious, fix));
+            }
+        }
+        Ok((*measured, self.weighted(measured, prediction, lost_frames)?))
+    }
+
     /// The pose from a registration and a prediction with its covariance: both are weighted, and what the geometry
     /// leaves open stays with the prediction. Far from the prediction, a pose must stand on its own.
     ///
     /// Half of the covariance of the registration is the keyframe's noise, which all frames registered with it share;
     /// only the other half averages out with the prediction.
-    pub(super) fn weighted(
+    fn weighted(
         &self,
         measured: &Measured,
         prediction: &Prediction,

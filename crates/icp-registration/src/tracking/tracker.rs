@@ -193,7 +193,7 @@ impl Tracker {
         }
         let near = self.near(last, prediction).and_then(|measured| {
             let predicted = prediction.seen_from(&self.keyframes.graph.relative(measured.keyframe, last.keyframe));
-            Ok((measured, self.weighted(&measured, &predicted, last.lost_frames)?))
+            self.fixed(&measured, &predicted, last.lost_frames)
         });
         near.or_else(|reason| {
             let measured = self.wide(last.lost_frames).ok_or(reason)?;

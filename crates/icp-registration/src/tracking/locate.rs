@@ -155,7 +155,7 @@ impl Tracker {
         lost_frames: usize,
     ) -> Result<(Measured, Fix), LossReason> {
         let radius = self.current.radius_m();
-        if measured.determined && !measured.is_firm(radius) && prediction.grounds != Grounds::Nothing {
+        if !measured.is_firm(radius) && prediction.grounds != Grounds::Nothing {
             let cautious = measured.without_weak_motions(radius);
             if let Ok(fix) = self.weighted(&cautious, prediction, lost_frames) {
                 return Ok((cautious, fix));

@@ -1,7 +1,7 @@
 //! Pairs of simulated frames aligned from nothing: how many are found, how many answers are wrong, and the CPU time of
 //! one thread from raw points to the pose.
 //!
-//! `coarse_pairs [graph|ransac] [pairs] [--each]`
+//! `coarse_pairs [graph|ransac] [pairs] [large|half|none] [from=SEED] [--each]`
 #![allow(clippy::unwrap_used, clippy::print_stdout, missing_docs)]
 
 #[path = "../tests/coarse_scenes/mod.rs"]
@@ -25,21 +25,31 @@ fn main() {
         Estimator::ConsistencyGraph
     };
     let options = CoarseOptions { estimator, ..CoarseOptions::default() };
+    let chosen = |class: &str| {
+        words.iter().any(|w| w == class) || !words.iter().any(|w| ["large", "half", "none"].contains(&w.as_str()))
+    };
+    let from = words.iter().find_map(|w| w.strip_prefix("from=")?.parse().ok()).unwrap_or(0_u64);
     println!("set                            pairs  right  wrong  none  median mm  median deg  CPU ms (median)");
     let set = |name: &str, size: u64, camera: &Pinhole, wanted: Range<f64>, rooms: bool| {
         let mut table = Table::default();
-        for k in 0..size {
+        for k in from..from + size {
             let scene = if rooms { random_room(k) } else { Scene::furnished() };
             let pair = pair(&scene, camera, wanted.clone(), k);
             table.add(&scene, camera, &pair, &options, each);
         }
         table.print(name);
     };
-    set("640x480, overlap 0.5 to 0.9", 14, &Pinhole::large(), 0.5..0.9, false);
-    set("224x172, overlap 0.4 to 0.6", count, &Pinhole::medium(), 0.4..0.6, false);
-    set("224x172, 0.4 to 0.6, any room", count, &Pinhole::medium(), 0.4..0.6, true);
-    set("224x172, overlap below 0.02", count, &Pinhole::medium(), 0.0..0.02, false);
-    set("224x172, < 0.02, any room", count, &Pinhole::medium(), 0.0..0.02, true);
+    if chosen("large") {
+        set("640x480, overlap 0.5 to 0.9", 14, &Pinhole::large(), 0.5..0.9, false);
+    }
+    if chosen("half") {
+        set("224x172, overlap 0.4 to 0.6", count, &Pinhole::medium(), 0.4..0.6, false);
+        set("224x172, 0.4 to 0.6, any room", count, &Pinhole::medium(), 0.4..0.6, true);
+    }
+    if chosen("none") {
+        set("224x172, overlap below 0.02", count, &Pinhole::medium(), 0.0..0.02, false);
+        set("224x172, < 0.02, any room", count, &Pinhole::medium(), 0.0..0.02, true);
+    }
 }
 
 #[derive(Default)]
@@ -93,8 +103,16 @@ fn in_words(outcome: &Outcome) -> String {
         Outcome::Wrong(millimetre, degree, found) => ("WRONG", millimetre, degree, found),
     };
     format!(
-        "{word} {millimetre:.1} mm {degree:.3} deg, inliers {} of {}, overlap {:.2} agreement {:.3} rival {:.2} determined {:.4}",
-        found.inliers, found.correspondences, found.overlap, found.agreement, found.rival, found.determined
+        "{word} {millimetre:.1} mm {degree:.3} deg, inliers {} of {}, overlap {:.2} agreement {:.3} contradiction {:.3} inside {:.3} \
+         rival {:.2} determined {:.2}",
+        found.inliers,
+        found.correspondences,
+        found.overlap,
+        found.agreement,
+        found.contradiction,
+        found.inside,
+        found.rival,
+        found.determined
     )
 }
 

@@ -1,6 +1,6 @@
 //! How often registrations succeed, how honest their covariances are, and whether open scenes are named.
 //!
-//! `cargo run --release -p icp-registration --features mesh --example icp_statistics [success|honesty|open] [runs]`
+//! `cargo run --release -p icp-registration --features mesh --example icp_statistics [success|honesty|open|speed|mesh] [runs]`
 
 #![allow(clippy::print_stdout, clippy::unwrap_used, missing_docs, unused)]
 
@@ -36,6 +36,9 @@ fn main() {
         if what == "open" || what == "all" {
             open(&options, runs);
         }
+    }
+    if what == "speed" {
+        speed();
     }
     #[cfg(feature = "mesh")]
     if what == "mesh" || what == "all" {
@@ -86,6 +89,56 @@ fn success(options: &IcpOptions, runs: u64) {
         iterations as f64 / runs as f64,
         start.elapsed().as_secs_f64() / runs as f64
     );
+}
+
+/// Time of preparing a target and of one alignment, frames with normals and bare points.
+fn speed() {
+    let one_thread = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    one_thread.install(speeds);
+}
+
+fn speeds() {
+    for (name, camera) in [("224x172", Pinhole::medium()), ("640x480", Pinhole::large())] {
+        for bare in [false, true] {
+            let (mut prepare, mut align, mut mm) = (vec![], vec![], vec![]);
+            for k in 0..5 {
+                let pair = frame_pair(&camera, k);
+                let cloud = |frame: &(Vec<[f64; 3]>, Vec<f32>)| {
+                    let normals =
+                        organised_normals(&frame.0, camera.width, camera.height, &OrganisedNormalOptions::default());
+                    let with = Cloud::from_frame(&frame.0, Some(&normals.unwrap()), Some(&frame.1)).unwrap();
+                    if bare { Cloud::new(with.points) } else { with }
+                };
+                let (source, target) = (cloud(&pair.source), cloud(&pair.target));
+                let (mut first, mut second) = (f64::INFINITY, f64::INFINITY);
+                for _ in 0..3 {
+                    let start = cpu_seconds();
+                    let prepared = IcpTarget::new(target.clone()).unwrap();
+                    let between = cpu_seconds();
+                    let result = prepared.align(&source, &Isometry3::identity(), &IcpOptions::default()).unwrap();
+                    let end = cpu_seconds();
+                    (first, second) = (first.min(between - start), second.min(end - between));
+                    mm.push(pose_error(&result.target_from_source, &pair.target_from_source).0);
+                }
+                prepare.push(1e3 * first);
+                align.push(1e3 * second);
+            }
+            let [prepare, align, mm] = [prepare, align, mm].map(|mut values: Vec<f64>| {
+                values.sort_by(f64::total_cmp);
+                values[values.len() / 2]
+            });
+            let what = if bare { "bare points" } else { "with normals" };
+            println!("speed {name} {what}: target {prepare:.0} ms, alignment {align:.0} ms, {mm:.2} mm");
+        }
+    }
+}
+
+/// CPU seconds of this thread.
+fn cpu_seconds() -> f64 {
+    std::thread::sleep(std::time::Duration::from_millis(1));
+    let text = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap_or_default();
+    let nanoseconds: f64 = text.split_whitespace().next().and_then(|word| word.parse().ok()).unwrap_or(f64::NAN);
+    1e-9 * nanoseconds
 }
 
 /// Normalised squared errors of poses from close starts.

@@ -4,10 +4,9 @@
 mod coarse_scenes;
 mod common;
 
-use coarse_scenes::{Outcome, align_points, outcome, pair, random_room};
+use coarse_scenes::{Outcome, align_points, outcome, pair, prepared, random_room};
 use common::{Pinhole, Scene};
-use icp_registration::{Cloud, CoarseOptions, Error, Estimator, FeatureCloud, Viewpoint, align_without_guess};
-use nalgebra::Point3;
+use icp_registration::{CoarseOptions, Error, Estimator, align_without_guess};
 
 /// Of `count` pairs with half of the view in common: right and wrong answers.
 fn tally(count: u64, options: &CoarseOptions) -> (u64, u64) {
@@ -73,27 +72,28 @@ fn one_wall_is_refused() {
 }
 
 #[test]
-fn bad_input_is_named() {
-    let options = CoarseOptions::default();
-    let made = |points: Vec<Point3<f64>>, options: &CoarseOptions| FeatureCloud::new(&Cloud::new(points), options);
-    assert!(matches!(made(vec![], &options), Err(Error::Empty { .. })));
-    assert!(matches!(made(vec![Point3::new(f64::NAN, 0.0, 0.0)], &options), Err(Error::NonFinite { .. })));
-    assert!(matches!(made(vec![Point3::origin(); 50], &options), Err(Error::TooFewPoints { .. })));
-    let far = vec![Point3::new(0.0, 0.0, 0.0), Point3::new(1e99, 0.0, 0.0), Point3::new(0.0, -1e99, 1.0)];
-    assert!(matches!(made(far, &options), Err(Error::TooFewPoints { .. })));
-    let line: Vec<Point3<f64>> = (0..500).map(|k| Point3::new(f64::from(k) * 0.01, 0.0, 0.0)).collect();
-    let line = made(line, &options).unwrap();
-    assert!(matches!(align_without_guess(&line, &line, &options), Err(Error::NoAlignment { .. })));
-    for bad in [
-        CoarseOptions { voxel_m: Some(0.0), ..options.clone() },
-        CoarseOptions { voxel_m: Some(f64::NAN), ..options.clone() },
-        CoarseOptions { tolerance_voxels: -1.0, ..options.clone() },
-        CoarseOptions { max_features: 0, ..options.clone() },
-        CoarseOptions { estimator: Estimator::Ransac { samples: 0 }, ..options.clone() },
-        CoarseOptions { min_overlap: f64::INFINITY, ..options.clone() },
-    ] {
-        assert!(matches!(made(vec![Point3::origin()], &bad), Err(Error::InvalidOption { .. })), "{bad:?}");
+fn clouds_of_different_voxels_are_aligned() {
+    let (scene, camera) = (Scene::furnished(), Pinhole::small());
+    let pair = pair(&scene, &camera, 0.45..0.6, 0);
+    let [target, source] = pair.points(&scene, &camera);
+    let of = |voxel_m| CoarseOptions { voxel_m: Some(voxel_m), ..CoarseOptions::default() };
+    let truth = pair.target_from_source();
+    for (of_source, of_target) in [(0.04, 0.07), (0.07, 0.04), (0.05, 0.051)] {
+        let (source, target) = (prepared(&source, &of(of_source)), prepared(&target, &of(of_target)));
+        let found = align_without_guess(&source, &target, &CoarseOptions::default());
+        assert!(matches!(outcome(&truth, found.clone()), Outcome::Right(..)), "{of_source} {of_target}: {found:?}");
+        assert!((found.unwrap().voxel_m - f64::max(of_source, of_target)).abs() < 1e-9);
     }
-    let unseen = CoarseOptions { viewpoint: Viewpoint::At(Point3::new(0.0, f64::NAN, 0.0)), ..options };
-    assert!(matches!(made(vec![Point3::origin()], &unseen), Err(Error::NonFinite { .. })));
+}
+
+#[test]
+fn corners_of_an_empty_room_are_refused() {
+    let (scene, camera) = (Scene { boxes: Vec::new(), ..Scene::furnished() }, Pinhole::small());
+    for k in 0..3 {
+        let pair = pair(&scene, &camera, 0.4..0.9, k);
+        let [target, source] = pair.points(&scene, &camera);
+        // Each corner fits each other, turned by quarters and thirds.
+        let found = align_points(&target, &source, &CoarseOptions::default());
+        assert!(matches!(found, Err(Error::NoAlignment { .. })), "{k}: {found:?}");
+    }
 }

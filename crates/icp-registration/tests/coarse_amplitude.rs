@@ -76,7 +76,7 @@ fn painted_walls_are_aligned_by_their_amplitude() {
         FeatureCloud::new(&cloud, &options).unwrap().with_features(found)
     };
     let (target, source) = (with(&target_pose), with(&source_pose));
-    let options = CoarseOptions { min_determined: 0.0, ..options };
+    let options = CoarseOptions { min_determined: 0.0, min_inside: 0.0, ..options };
     let found = align_without_guess(&source, &target, &options).unwrap();
     let (millimetre, degree) = pose_error(&found.target_from_source, &truth);
     // The criterion of a start for a fine registration.

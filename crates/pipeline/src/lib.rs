@@ -43,7 +43,7 @@ pub use outcome::{AdjustmentFigures, FurtherPoint, Outcome, StationPose};
 pub use plan::{
     AdjustOptions, AverageOptions, CorrectImagePointOptions, CorrectRangeOptions, DeconvolveOptions, DemodulateOptions,
     FlagOptions, MixedPixels, MultipathOptions, MultipathTreatment, NetworkCalibration, NoiseOptions, Plan,
-    PointCloudOptions, RegisterOptions, RepairWrapsOptions, SimulateSource, Source, Stage, UnwrapOptions,
+    PointCloudOptions, RegisterOptions, RepairWrapsOptions, SimulateSource, Source, Stage, StartPoses, UnwrapOptions,
 };
 pub use progress::{Progress, Silent};
 pub use register::{

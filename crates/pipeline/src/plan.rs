@@ -70,6 +70,9 @@ pub struct SimulateSource {
     /// Standard deviation of the approximate attitudes about each axis, degree.
     #[serde(default = "SimulateSource::attitude_sigma")]
     pub approximate_attitude_sigma_deg: f64,
+    /// Part of the pixels of each station that show anything, beside what the scene says. Default 0.
+    #[serde(default)]
+    pub gross_error_share: f64,
 }
 
 impl SimulateSource {
@@ -298,21 +301,45 @@ impl Default for MixedPixels {
     }
 }
 
+/// Default of the windows that normals come from.
+pub(crate) const NORMAL_HALF_WIDTH_PX: usize = 3;
+
 /// Options of [`Stage::Register`].
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct RegisterOptions {
-    /// Farthest correspondence of the first iterations, metre: about the error of the approximate poses.
+    /// What is known of the poses. Default: what the survey says of them, else the order of the stations.
+    pub start: StartPoses,
+    /// How far approximate poses may be off, metre, their rotations at the distance of what is seen.
     pub maximum_distance_m: f64,
-    /// Smallest part of a view that must overlap another for the two to be aligned.
+    /// Smallest part of a view that must overlap another for the two to be aligned as a pair.
     pub minimum_overlap: f64,
     /// Normals come from windows of twice this and one pixel a side; small images want small windows.
     pub normal_half_width_px: usize,
 }
 
+/// Where the registration starts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum StartPoses {
+    /// From the approximate poses of the survey; without any, as [`Self::Order`].
+    #[default]
+    Approximate,
+    /// Without poses: stations that follow each other overlap.
+    Order,
+    /// Each station stands near the one before and looks the same way: a camera that is moved a little. Each is aligned
+    /// onto the one before.
+    Neighbour,
+}
+
 impl Default for RegisterOptions {
     fn default() -> Self {
-        Self { maximum_distance_m: 0.5, minimum_overlap: 0.3, normal_half_width_px: 3 }
+        Self {
+            start: StartPoses::default(),
+            maximum_distance_m: 0.5,
+            minimum_overlap: 0.3,
+            normal_half_width_px: NORMAL_HALF_WIDTH_PX,
+        }
     }
 }
 
@@ -320,15 +347,16 @@ impl Default for RegisterOptions {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct AdjustOptions {
-    /// Farthest correspondence of the first round, metre: about the error of the poses that `Register` found.
+    /// How far the poses that `Register` found may be off, metre.
     pub maximum_distance_m: f64,
-    /// Smallest part of a view that must overlap another for the two to be held together.
+    /// Smallest part of a view that must overlap another for the two to be aligned as a pair; the adjustment itself
+    /// takes whatever overlaps.
     pub minimum_overlap: f64,
 }
 
 impl Default for AdjustOptions {
     fn default() -> Self {
-        Self { maximum_distance_m: 0.2, minimum_overlap: 0.3 }
+        Self { maximum_distance_m: 0.1, minimum_overlap: 0.3 }
     }
 }
 

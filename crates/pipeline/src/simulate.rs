@@ -16,7 +16,7 @@ use range_io::survey::{
 };
 use range_io::tables::{Station, write_stations};
 use serde::Serialize;
-use simulation::{SimulationSpec, Simulator};
+use simulation::{GrossErrorsSpec, SimulationSpec, Simulator};
 
 use crate::plan::SimulateSource;
 use crate::progress::Progress;
@@ -47,7 +47,10 @@ pub fn simulate(source: &SimulateSource, base: &Path, out: &Path, progress: &dyn
     let path = base.join(&source.scene);
     let text = std::fs::read_to_string(&path).map_err(|error| Error::Access { path: path.clone(), source: error })?;
     let fail = |error| Error::Scene { path: path.clone(), source: error };
-    let spec = SimulationSpec::from_ron(&text).map_err(fail)?;
+    let mut spec = SimulationSpec::from_ron(&text).map_err(fail)?;
+    if source.gross_error_share > 0.0 {
+        spec.errors.gross_errors = Some(GrossErrorsSpec { share: source.gross_error_share, seed: source.seed });
+    }
     let simulator = Simulator::new(&spec).map_err(fail)?;
     let folder = OutputFolder::create(out)?;
     let frames = write_frames(&simulator, source.seed, &folder, &path, progress)?;

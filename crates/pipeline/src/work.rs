@@ -1,7 +1,7 @@
 //! The state that stages pass on.
 
 use camera_model::{Camera, RayTable};
-use icp_registration::IcpTarget;
+use icp_registration::Cloud;
 use range_io::calibration::Calibration;
 
 use crate::outcome::Outcome;
@@ -12,7 +12,7 @@ pub(crate) struct Work {
     /// The calibrated camera, where there is one; `outcome.camera` is the one in use.
     pub(crate) calibrated_camera: Option<Camera>,
     pub(crate) rays: RayTable,
-    /// Clouds with normals and trees, from `Register` on.
-    pub(crate) station_clouds: Vec<IcpTarget>,
+    /// Unflagged points with normals, from `Register` on.
+    pub(crate) station_clouds: Vec<Cloud>,
     pub(crate) outcome: Outcome,
 }

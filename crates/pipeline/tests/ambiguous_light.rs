@@ -20,6 +20,7 @@ fn simulated(scene: &str, from: &str, to: &str, folder: &Path) -> PathBuf {
         seed: 1,
         approximate_position_sigma_m: 0.0,
         approximate_attitude_sigma_deg: 0.0,
+        gross_error_share: 0.0,
     };
     simulate(&source, folder, &folder.join("survey"), &Silent).unwrap();
     folder.join("survey")

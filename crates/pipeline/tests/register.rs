@@ -25,6 +25,7 @@ fn small_room() -> &'static Path {
             seed: 1,
             approximate_position_sigma_m: 0.05,
             approximate_attitude_sigma_deg: 2.0,
+            gross_error_share: 0.0,
         };
         simulate(&source, Path::new(""), &folder.path().join("survey"), &Silent).unwrap();
         folder

@@ -18,6 +18,7 @@ fn simulated(scene: &str, seed: u64, folder: &Path) -> PathBuf {
         seed,
         approximate_position_sigma_m: 0.0,
         approximate_attitude_sigma_deg: 0.0,
+        gross_error_share: 0.0,
     };
     let out = folder.join(format!("{scene}{seed}"));
     simulate(&source, &fixtures(), &out, &Silent).unwrap();

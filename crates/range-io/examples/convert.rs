@@ -23,7 +23,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         return Ok(());
     }
     let cloud = read_any_cloud(&from)?;
-    write_any_cloud(&to, &cloud, Precision::Double)?;
+    // Most readers of PCD take positions of single precision only.
+    let is_pcd = to.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("pcd"));
+    let precision = if is_pcd { Precision::Single } else { Precision::Double };
+    write_any_cloud(&to, &cloud, precision)?;
     println!("{} points, size {:?}, pose {:?}", cloud.len(), cloud.size, cloud.world_from_cloud);
     Ok(())
 }

@@ -4,7 +4,7 @@
 // What goes through a file comes back to the last bit.
 #![allow(clippy::float_cmp)]
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use nalgebra::{Isometry3, Vector3};
 use proptest::prelude::*;
@@ -12,41 +12,23 @@ use range_io::clouds::{CloudFile, Precision, read_any_cloud, write_any_cloud};
 use range_io::e57::{E57Scan, read_e57, write_e57};
 
 mod common;
+#[path = "common/scratch.rs"]
+mod scratch;
 
-struct Scratch(tempfile::TempDir);
+use scratch::Scratch;
 
-impl Scratch {
-    fn new() -> Self {
-        Self(tempfile::tempdir().unwrap())
-    }
-
-    fn file(&self, name: &str) -> PathBuf {
-        self.0.path().join(name)
-    }
-
-    fn read(&self, name: &str, bytes: &[u8]) -> range_io::Result<CloudFile> {
-        std::fs::write(self.file(name), bytes).unwrap();
-        read_any_cloud(self.file(name))
-    }
-
-    fn fault(&self, name: &str, bytes: &[u8]) -> String {
-        self.read(name, bytes).unwrap_err().to_string()
-    }
+fn read(scratch: &Scratch, name: &str, bytes: &[u8]) -> range_io::Result<CloudFile> {
+    read_any_cloud(scratch.holding(name, bytes))
 }
 
+fn fault(scratch: &Scratch, name: &str, bytes: &[u8]) -> String {
+    read(scratch, name, bytes).unwrap_err().to_string()
+}
+
+/// A cloud with a value everywhere, and a pose.
 fn cloud(points: usize) -> CloudFile {
-    let value = |index: usize| index as f32 * 0.37 - 5.0;
-    CloudFile {
-        points: (0..points).map(|i| [i as f64 * 0.1, -(i as f64) / 3.0, 1e-3 * i as f64]).collect(),
-        normals: Some((0..points).map(|i| [value(i), 0.5, 1.0]).collect()),
-        intensity: Some((0..points).map(value).collect()),
-        sigma: Some((0..points).map(|i| if i % 3 == 0 { 0.002 } else { 0.01 }).collect()),
-        flags: Some((0..points).map(|i| i as u16).collect()),
-        frame: Some((0..points).map(|i| u32::MAX - i as u32).collect()),
-        covariance: Some((0..points).map(|i| std::array::from_fn(|term| value(i + term))).collect()),
-        size: None,
-        world_from_cloud: Some(Isometry3::new(Vector3::new(1.0, -2.0, 3.5), Vector3::new(0.3, -0.2, 1.0))),
-    }
+    let pose = Isometry3::new(Vector3::new(1.0, -2.0, 3.5), Vector3::new(0.3, -0.2, 1.0));
+    CloudFile { world_from_cloud: Some(pose), ..scratch::cloud(points) }
 }
 
 /// Equal but for NaN, which no `==` finds, and for the rounding of a quaternion.
@@ -107,10 +89,10 @@ proptest! {
         let end = (at + noise.len()).min(bytes.len());
         bytes[at..end].copy_from_slice(&noise[..end - at]);
         // Any answer will do that is none of a broken program.
-        let _ = scratch.read("b", &bytes);
+        let _ = read(&scratch, "b", &bytes);
         let vtk = [b"# vtk DataFile Version 3.0\nx\nBINARY\nDATASET POLYDATA\nPOINTS 9 float\n".as_slice(), &noise].concat();
-        let _ = scratch.read("b.vtk", &vtk);
-        let _ = scratch.read("b.xyz", &[b"1 2 3\n".as_slice(), &noise].concat());
+        let _ = read(&scratch, "b.vtk", &vtk);
+        let _ = read(&scratch, "b.xyz", &[b"1 2 3\n".as_slice(), &noise].concat());
     }
 }
 
@@ -149,23 +131,23 @@ fn a_pcd_is_read_in_all_encodings() {
     };
     let lines = points.iter().map(|([x, y, z], i)| format!("{x} 0 0 0 4.2e9 {z} {y} {i} 1 2\n"));
     let ascii = header("ascii") + &lines.collect::<Vec<_>>().concat();
-    assert_same(&scratch.read("a.pcd", ascii.as_bytes()).unwrap(), &expected);
+    assert_same(&read(&scratch, "a.pcd", ascii.as_bytes()).unwrap(), &expected);
     let binary = [header("binary").as_bytes(), &by_point].concat();
-    assert_same(&scratch.read("a.pcd", &binary).unwrap(), &expected);
+    assert_same(&read(&scratch, "a.pcd", &binary).unwrap(), &expected);
     // Literal runs, and one reference: the eight equal bytes of the last field refer to the byte before them.
     let mut packed: Vec<u8> =
         by_field[..by_field.len() - 31].chunks(32).flat_map(|run| [&[run.len() as u8 - 1][..], run].concat()).collect();
     packed.extend([7 << 5, 31 - 9, 0]);
     let sizes = [(packed.len() as u32).to_le_bytes(), (by_field.len() as u32).to_le_bytes()].concat();
     let compressed = [header("binary_compressed").as_bytes(), &sizes, &packed].concat();
-    assert_same(&scratch.read("a.pcd", &compressed).unwrap(), &expected);
+    assert_same(&read(&scratch, "a.pcd", &compressed).unwrap(), &expected);
     for (whole, data) in [(&binary, "binary"), (&compressed, "binary_compressed")] {
         for length in 0..whole.len() {
-            assert!(scratch.read("a.pcd", &whole[..length]).is_err(), "{data} cut at {length}");
+            assert!(read(&scratch, "a.pcd", &whole[..length]).is_err(), "{data} cut at {length}");
         }
     }
     let lie = [header("binary_compressed").as_bytes(), &[255; 8], &packed].concat();
-    assert!(scratch.fault("a.pcd", &lie).contains("once unpacked"), "{}", scratch.fault("a.pcd", &lie));
+    assert!(fault(&scratch, "a.pcd", &lie).contains("once unpacked"), "{}", fault(&scratch, "a.pcd", &lie));
 }
 
 #[test]
@@ -173,7 +155,7 @@ fn what_is_wrong_with_a_pcd_is_said() {
     let scratch = Scratch::new();
     let text = "VERSION 0.7\nFIELDS x y z flags\nSIZE 4 4 4 2\nTYPE F F F U\nCOUNT 1 1 1 1\nWIDTH 1\nHEIGHT 1\n\
                 VIEWPOINT 0 0 0 1 0 0 0\nPOINTS 1\nDATA ascii\n1 2 3 4\n";
-    assert_eq!(scratch.read("a.pcd", text.as_bytes()).unwrap().flags, Some(vec![4]));
+    assert_eq!(read(&scratch, "a.pcd", text.as_bytes()).unwrap().flags, Some(vec![4]));
     for (from, to, expected) in [
         ("VERSION 0.7", "VERSION 0.6", "version `0.6`, expected 0.7"),
         ("SIZE 4 4 4 2\n", "", "no line `SIZE`"),
@@ -195,7 +177,7 @@ fn what_is_wrong_with_a_pcd_is_said() {
         ("FIELDS x", "FIELDS y", "`y` twice"),
     ] {
         assert!(text.contains(from));
-        let message = scratch.fault("a.pcd", text.replace(from, to).as_bytes());
+        let message = fault(&scratch, "a.pcd", text.replace(from, to).as_bytes());
         assert!(message.contains(expected) && message.contains("a.pcd: "), "{message}\nexpected: {expected}");
     }
 }
@@ -237,7 +219,7 @@ fn an_e57_that_is_cut_or_lies_is_an_error() {
     write_any_cloud(&file, &cloud(30), Precision::Single).unwrap();
     let bytes = std::fs::read(&file).unwrap();
     for length in (0..bytes.len()).step_by(37) {
-        assert!(scratch.read("b.e57", &bytes[..length]).is_err(), "cut at {length}");
+        assert!(read(&scratch, "b.e57", &bytes[..length]).is_err(), "cut at {length}");
     }
     // The same file with a lie in its description, and checksums that hold.
     for (from, to, expected) in [
@@ -275,12 +257,12 @@ fn lie(file: &Path, from: &str, to: &str) {
 fn point_lists_are_read() {
     let scratch = Scratch::new();
     let expected = CloudFile { points: vec![[1.0, -2.0, 0.5], [3.0, 4.0, -1e-3]], ..CloudFile::default() };
-    assert_eq!(scratch.read("a.xyz", b"# made by hand\n1 -2 0.5 \n3\t4 -1e-3").unwrap(), expected);
-    assert_eq!(scratch.read("a.csv", b"x,y,z\r\n1 , -2,0.5\r\n3,4,-1e-3\r\n").unwrap(), expected);
-    assert_eq!(scratch.read("a.txt", b"//X;Y;Z;R\n1;-2;.5;9\n3;4;-1e-3;9\n").unwrap(), expected);
+    assert_eq!(read(&scratch, "a.xyz", b"# made by hand\n1 -2 0.5 \n3\t4 -1e-3").unwrap(), expected);
+    assert_eq!(read(&scratch, "a.csv", b"x,y,z\r\n1 , -2,0.5\r\n3,4,-1e-3\r\n").unwrap(), expected);
+    assert_eq!(read(&scratch, "a.txt", b"//X;Y;Z;R\n1;-2;.5;9\n3;4;-1e-3;9\n").unwrap(), expected);
     let normals = CloudFile { normals: Some(vec![[0.0, 0.0, 1.0], [0.0, 1.0, 0.0]]), ..expected.clone() };
-    assert_eq!(scratch.read("a.xyzn", b"1 -2 .5 0 0 1\n3 4 -1e-3 0 1 0\n").unwrap(), normals);
-    assert_eq!(scratch.read("b.csv", b"y,x,z,nx,ny,nz\n-2,1,.5,0,0,1\n4,3,-1e-3,0,1,0\n").unwrap(), normals);
+    assert_eq!(read(&scratch, "a.xyzn", b"1 -2 .5 0 0 1\n3 4 -1e-3 0 1 0\n").unwrap(), normals);
+    assert_eq!(read(&scratch, "b.csv", b"y,x,z,nx,ny,nz\n-2,1,.5,0,0,1\n4,3,-1e-3,0,1,0\n").unwrap(), normals);
     for (text, expected) in [
         ("1 2 3\n4 5\n", "a.xyz:2:3: has 2 fields, expected 3"),
         ("1 2 3\n4 5 x\n", "a.xyz:2:3: `z`: is `x`, expected a number"),
@@ -290,7 +272,7 @@ fn point_lists_are_read() {
         ("", "is no point cloud that is known here"),
         ("1,,3\n1 2 3\n", "a.xyz:1:2: `y`: is ``"),
     ] {
-        let message = scratch.fault("a.xyz", text.as_bytes());
+        let message = fault(&scratch, "a.xyz", text.as_bytes());
         assert!(message.contains(expected), "{message}\nexpected: {expected}");
     }
 }
@@ -309,7 +291,7 @@ fn vtk_points_are_read_with_their_attributes() {
                  VERTICES 2 4\n1 0\n1 1\n\nCELL_DATA 2\nSCALARS sigma float 1\nLOOKUP_TABLE default\n9 9\nPOINT_DATA 2\n\
                  NORMALS n float\n0 0 1\n0 1 0\nSCALARS intensity float\nLOOKUP_TABLE default\n7\n8\n\
                  FIELD data 2\nsigma 1 2 float\n0.5 0.25\nother 2 2 int\n1 2 3 4\n";
-    assert_eq!(scratch.read("a.vtk", ascii.as_bytes()).unwrap(), expected);
+    assert_eq!(read(&scratch, "a.vtk", ascii.as_bytes()).unwrap(), expected);
     let mut binary =
         b"# vtk DataFile Version 5.1\ndata\nBINARY\nDATASET STRUCTURED_GRID\nDIMENSIONS 1 2 1\nPOINTS 2 double\n"
             .to_vec();
@@ -319,7 +301,7 @@ fn vtk_points_are_read_with_their_attributes() {
     binary.extend(b"\nCONNECTIVITY vtktypeint64\n");
     binary.extend([0_i64, 1].iter().flat_map(|value| value.to_be_bytes()));
     binary.extend(b"\nPOINT_DATA 2\nSCALARS flags unsigned_short\nLOOKUP_TABLE default\n\x00\x07\x01\x00\n");
-    let found = scratch.read("a.vtk", &binary).unwrap();
+    let found = read(&scratch, "a.vtk", &binary).unwrap();
     assert_eq!((&found.points, found.size, found.flags), (&expected.points, Some([1, 2]), Some(vec![7, 256])));
     for (from, to, expected) in [
         ("POINTS 2", "POINTS 2000000000", "promises 6000000000 values of POINTS"),
@@ -331,7 +313,7 @@ fn vtk_points_are_read_with_their_attributes() {
         ("8\nFIELD", "FIELD", "expected a number"),
         ("3 4\n", "3\n", "promises 4 values of other"),
     ] {
-        let message = scratch.fault("a.vtk", ascii.replacen(from, to, 1).as_bytes());
+        let message = fault(&scratch, "a.vtk", ascii.replacen(from, to, 1).as_bytes());
         assert!(message.contains(expected), "{message}\nexpected: {expected}");
     }
 }
@@ -339,7 +321,7 @@ fn vtk_points_are_read_with_their_attributes() {
 #[test]
 fn a_folder_and_an_unknown_ending_are_named() {
     let scratch = Scratch::new();
-    let message = read_any_cloud(scratch.0.path()).unwrap_err().to_string();
+    let message = read_any_cloud(scratch.file("")).unwrap_err().to_string();
     assert!(message.contains("is a folder, expected the file of a point cloud"), "{message}");
     let message = write_any_cloud(scratch.file("a.xyz"), &cloud(1), Precision::Single).unwrap_err().to_string();
     assert!(message.contains("expected .ply, .pcd or .e57"), "{message}");

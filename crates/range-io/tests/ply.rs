@@ -4,43 +4,20 @@
 // What goes through a file comes back to the last bit.
 #![allow(clippy::float_cmp)]
 
-use std::path::PathBuf;
-
 use proptest::prelude::*;
 use range_io::ply::{CloudFile, PlyWriter, Precision, read_cloud, write_cloud};
 
 mod common;
+#[path = "common/scratch.rs"]
+mod scratch;
 
-struct Scratch(tempfile::TempDir);
+use scratch::{Scratch, cloud};
 
-impl Scratch {
-    fn new() -> Self {
-        Self(tempfile::tempdir().unwrap())
-    }
-
-    fn file(&self) -> PathBuf {
-        self.0.path().join("cloud.ply")
-    }
-
-    fn read(&self, bytes: &[u8]) -> range_io::Result<CloudFile> {
-        std::fs::write(self.file(), bytes).unwrap();
-        read_cloud(self.file())
-    }
+fn read(scratch: &Scratch, bytes: &[u8]) -> range_io::Result<CloudFile> {
+    read_cloud(scratch.holding(NAME, bytes))
 }
 
-fn cloud(points: usize) -> CloudFile {
-    let value = |index: usize| index as f32 * 0.37 - 5.0;
-    CloudFile {
-        points: (0..points).map(|i| [i as f64 * 0.1, -(i as f64) / 3.0, 1e-3 * i as f64]).collect(),
-        normals: Some((0..points).map(|i| [value(i), 0.5, 1.0]).collect()),
-        intensity: Some((0..points).map(value).collect()),
-        sigma: Some((0..points).map(|i| if i % 3 == 0 { 0.002 } else { 0.01 }).collect()),
-        flags: Some((0..points).map(|i| i as u16).collect()),
-        frame: Some((0..points).map(|i| u32::MAX - i as u32).collect()),
-        covariance: Some((0..points).map(|i| std::array::from_fn(|term| value(i + term))).collect()),
-        ..CloudFile::default()
-    }
-}
+const NAME: &str = "cloud.ply";
 
 proptest! {
     #![proptest_config(common::cases(32))]
@@ -56,13 +33,13 @@ proptest! {
         written.flags = full.flags.filter(|_| with & 8 > 0);
         written.frame = full.frame.filter(|_| with & 16 > 0);
         written.covariance = full.covariance.filter(|_| with & 32 > 0);
-        write_cloud(scratch.file(), &written, Precision::Double).unwrap();
-        prop_assert_eq!(&read_cloud(scratch.file()).unwrap(), &written);
-        write_cloud(scratch.file(), &written, Precision::Single).unwrap();
+        write_cloud(scratch.file(NAME), &written, Precision::Double).unwrap();
+        prop_assert_eq!(&read_cloud(scratch.file(NAME)).unwrap(), &written);
+        write_cloud(scratch.file(NAME), &written, Precision::Single).unwrap();
         for point in &mut written.points {
             *point = point.map(|value| f64::from(value as f32));
         }
-        prop_assert_eq!(read_cloud(scratch.file()).unwrap(), written);
+        prop_assert_eq!(read_cloud(scratch.file(NAME)).unwrap(), written);
     }
 }
 
@@ -75,24 +52,24 @@ fn blocks_make_one_cloud() {
         intensity: Some(whole.intensity.as_ref().unwrap()[range].to_vec()),
         ..CloudFile::default()
     };
-    let mut writer = PlyWriter::create(scratch.file(), Precision::Double).unwrap();
+    let mut writer = PlyWriter::create(scratch.file(NAME), Precision::Double).unwrap();
     writer.append(&CloudFile::default()).unwrap();
     for range in [0..1, 1..5000, 5000..5000, 5000..10_000] {
         writer.append(&part(range)).unwrap();
     }
     assert!(writer.append(&whole).unwrap_err().to_string().contains("expected [\"intensity\"]"));
     writer.commit().unwrap();
-    assert_eq!(read_cloud(scratch.file()).unwrap(), part(0..10_000));
+    assert_eq!(read_cloud(scratch.file(NAME)).unwrap(), part(0..10_000));
     let uneven = CloudFile { sigma: Some(vec![0.0]), ..CloudFile::default() };
-    let fault = write_cloud(scratch.file(), &uneven, Precision::Single).unwrap_err().to_string();
+    let fault = write_cloud(scratch.file(NAME), &uneven, Precision::Single).unwrap_err().to_string();
     assert_eq!(fault, "cloud: `sigma`: has 1 values for 0 points");
 }
 
 #[test]
 fn a_cloud_without_points_is_a_file_without_points() {
     let scratch = Scratch::new();
-    PlyWriter::create(scratch.file(), Precision::Single).unwrap().commit().unwrap();
-    assert_eq!(read_cloud(scratch.file()).unwrap(), CloudFile::default());
+    PlyWriter::create(scratch.file(NAME), Precision::Single).unwrap().commit().unwrap();
+    assert_eq!(read_cloud(scratch.file(NAME)).unwrap(), CloudFile::default());
 }
 
 #[test]
@@ -113,9 +90,9 @@ fn other_programs_files_are_read_in_all_encodings() {
         ..CloudFile::default()
     };
     let ascii = header("ascii") + "1 2\n3 4\n255 0.25 1.5 -2 7 3\n0 -0.5 2.5 70000 8.5 65535\n3 0 1 0\n";
-    assert_eq!(scratch.read(ascii.as_bytes()).unwrap(), expected);
+    assert_eq!(read(&scratch, ascii.as_bytes()).unwrap(), expected);
     let windows = ascii.replace('\n', "\r\n");
-    assert_eq!(scratch.read(windows.as_bytes()).unwrap(), expected);
+    assert_eq!(read(&scratch, windows.as_bytes()).unwrap(), expected);
     for big_endian in [false, true] {
         let mut bytes = header(if big_endian { "binary_big_endian" } else { "binary_little_endian" }).into_bytes();
         let mut put = |little: &[u8]| {
@@ -137,24 +114,24 @@ fn other_programs_files_are_read_in_all_encodings() {
             put(&expected.intensity.as_ref().unwrap()[i].to_le_bytes());
             put(&f32::from(expected.flags.as_ref().unwrap()[i]).to_le_bytes());
         }
-        assert_eq!(scratch.read(&bytes).unwrap(), expected);
+        assert_eq!(read(&scratch, &bytes).unwrap(), expected);
     }
 }
 
 #[test]
 fn a_file_cut_anywhere_is_an_error() {
     let scratch = Scratch::new();
-    write_cloud(scratch.file(), &cloud(3), Precision::Single).unwrap();
-    let bytes = std::fs::read(scratch.file()).unwrap();
+    write_cloud(scratch.file(NAME), &cloud(3), Precision::Single).unwrap();
+    let bytes = std::fs::read(scratch.file(NAME)).unwrap();
     for length in 0..bytes.len() {
-        assert!(scratch.read(&bytes[..length]).is_err(), "cut at {length}");
+        assert!(read(&scratch, &bytes[..length]).is_err(), "cut at {length}");
     }
     let ascii = b"ply\nformat ascii 1.0\nelement vertex 2\nproperty int x\nproperty int y\nproperty int z\nend_header\n1 2 3\n4 5 6";
     // Without its last digit the file would be short of a number.
     for length in 0..ascii.len() {
-        assert!(scratch.read(&ascii[..length]).is_err(), "cut at {length}");
+        assert!(read(&scratch, &ascii[..length]).is_err(), "cut at {length}");
     }
-    assert!(scratch.read(ascii).is_ok());
+    assert!(read(&scratch, ascii).is_ok());
 }
 
 #[test]
@@ -164,7 +141,7 @@ fn what_is_wrong_is_said() {
         let text = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n\
                     property ushort flags\nend_header\n1 2 3 4\n";
         assert!(text.contains(from));
-        scratch.read(text.replace(from, to).as_bytes()).unwrap_err().to_string()
+        read(&scratch, text.replace(from, to).as_bytes()).unwrap_err().to_string()
     };
     for (from, to, expected) in [
         ("ply\n", "plx\n", "does not begin with the line `ply`"),

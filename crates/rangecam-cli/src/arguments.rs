@@ -53,6 +53,9 @@ pub(crate) enum Command {
         /// Standard deviation of the approximate attitudes written to stations.csv, degree.
         #[arg(long, default_value_t = 2.0)]
         attitude_sigma: f64,
+        /// Part of the pixels of each station that show anything (gross errors), from 0 to 1.
+        #[arg(long, default_value_t = 0.0)]
+        gross_errors: f64,
         /// Output folder; default: out/<name of the scene's file>.
         #[arg(long, short)]
         out: Option<PathBuf>,

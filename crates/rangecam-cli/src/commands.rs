@@ -13,12 +13,13 @@ type Outcome = Result<(), Box<dyn Error>>;
 pub(crate) fn dispatch(command: Command, output: &Output) -> Outcome {
     match command {
         Command::Run { survey, pipeline, calibration, out } => run(survey, &pipeline, calibration, out, output),
-        Command::Simulate { scene, seed, position_sigma, attitude_sigma, out } => {
+        Command::Simulate { scene, seed, position_sigma, attitude_sigma, gross_errors, out } => {
             let source = SimulateSource {
                 scene: scene.display().to_string(),
                 seed,
                 approximate_position_sigma_m: position_sigma,
                 approximate_attitude_sigma_deg: attitude_sigma,
+                gross_error_share: gross_errors,
             };
             let out = out.unwrap_or_else(|| default_out(scene.file_stem().unwrap_or_default().as_ref()));
             let simulated = pipeline::simulate(&source, Path::new(""), &out, output.progress().as_ref())?;

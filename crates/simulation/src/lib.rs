@@ -14,7 +14,9 @@ pub use error::{Error, Result};
 pub use simulate::{SimulatedFrame, SimulatedSurvey, Simulator, StationImage, simulate, simulate_frame};
 pub use spec::SimulationSpec;
 pub use spec::camera::{CameraSpec, ExposureSpec, IlluminationSpec};
-pub use spec::errors::{DigitisationSpec, ErrorsSpec, FixedPatternSpec, MixedPixelsSpec, MultipathSpec, SampleType};
+pub use spec::errors::{
+    DigitisationSpec, ErrorsSpec, FixedPatternSpec, GrossErrorsSpec, MixedPixelsSpec, MultipathSpec, SampleType,
+};
 pub use spec::scene::{ObjectSpec, SceneSpec, ShapeSpec, TextureSpec};
 pub use spec::station::{AttitudeSpec, StationSpec};
 pub use truth::FrameTruth;

@@ -1,16 +1,20 @@
+use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use camera_model::RayTable;
 use error_models::FixedPattern;
 use nalgebra::Point3;
+use rand::RngExt;
 use range_image::RawFrame;
 use scattering_deconvolution::Scatterer;
 
 use crate::light::Lighting;
+use crate::random::{mix, row_generator};
 use crate::render::{Channel, Image, Renderer};
 use crate::samples::sample_frame;
 use crate::scene::Scene;
 use crate::spec::SimulationSpec;
+use crate::spec::errors::GrossErrorsSpec;
 use crate::{Error, FrameTruth, Result};
 
 /// One simulated frame.
@@ -127,6 +131,10 @@ impl Simulator {
             world_from_camera: place.world_from_camera(),
         };
         let (mut image, truth) = renderer.render()?;
+        // Before the scattering, which does not ask where light comes from.
+        if let Some(gross) = &self.spec.errors.gross_errors {
+            spoil(&mut image, gross, station);
+        }
         self.scatter(&mut image)?;
         Ok(StationImage { spec: Arc::clone(&self.spec), station, image, truth: Arc::new(truth) })
     }
@@ -173,6 +181,26 @@ impl Simulator {
             scatterer.apply(real, imaginary)?;
         }
         Ok(())
+    }
+}
+
+/// Keeps the draws of gross errors apart from those of the noise with the same seed.
+const GROSS_ERRORS: u64 = 0x6772_6f73_7300;
+
+/// Turns the light of some pixels by any angle.
+fn spoil(image: &mut Image, gross: &GrossErrorsSpec, station: usize) {
+    let mut generator = row_generator(mix(gross.seed, GROSS_ERRORS), station, 0);
+    for pixel in 0..image.offset.len() {
+        let is_wrong = generator.random::<f64>() < gross.share;
+        for [real, imaginary] in &mut image.channels {
+            // Drawn whether wrong or not: which pixels are wrong does not depend on the number of frequencies' draws.
+            let (sin, cos) = (TAU * generator.random::<f64>()).sin_cos();
+            if is_wrong {
+                let (x, y) = (f64::from(real[pixel]), f64::from(imaginary[pixel]));
+                real[pixel] = (cos * x - sin * y) as f32;
+                imaginary[pixel] = (sin * x + cos * y) as f32;
+            }
+        }
     }
 }
 

@@ -6,7 +6,9 @@ mod common;
 use common::{INTERVAL_M, first, largest, plain, quantile, range_error, wrapped};
 use error_models::{AmplitudeHyperbola, RangeErrorModel, RangeTerms};
 use range_image::{Flags, Samples};
-use simulation::{DigitisationSpec, FixedPatternSpec, MixedPixelsSpec, SampleType, SimulationSpec, TextureSpec};
+use simulation::{
+    DigitisationSpec, FixedPatternSpec, GrossErrorsSpec, MixedPixelsSpec, SampleType, SimulationSpec, TextureSpec,
+};
 
 /// f32 rounding of samples, phase and truth; see `error_free.rs`.
 const ROUNDING_M: f64 = 2e-6;
@@ -163,4 +165,21 @@ fn vignetting_texture_and_ambient_light_change_light_and_no_range() {
     let vignetting = (-spec.camera.geometry.ray([24.0, 18.0]).z).powi(4);
     let expected = 2.0 * f64::from(frame.truth.amplitude[0][(24, 18)]) + 200.0 * 0.8 * vignetting;
     assert!((mean / expected - 1.0).abs() < 1e-5, "{mean} against {expected}");
+}
+
+#[test]
+fn gross_errors_spoil_their_share_of_the_pixels_and_no_other() {
+    let mut spec = plain();
+    let (_, clean) = first(&spec);
+    spec.errors.gross_errors = Some(GrossErrorsSpec { share: 0.2, seed: 3 });
+    let survey = simulation::simulate(&spec, 1, &|_, _| {}).unwrap();
+    assert_eq!(survey.frames[0].raw, survey.frames[1].raw, "the same in all frames of a station");
+    let (frame, spoilt) = first(&spec);
+    let [clean, spoilt] = [&clean, &spoilt].map(|complex| complex.channels[0].phase());
+    let off = |(a, b): (&f32, &f32)| f64::from(a - b).abs() > 1e-6;
+    let wrong = clean.as_slice().iter().zip(spoilt.as_slice()).filter(|&pair| off(pair)).count();
+    let (count, share) = (clean.as_slice().len() as f64, 0.2);
+    // Five standard deviations of the binomial distribution.
+    assert!((wrong as f64 - share * count).abs() < 5.0 * (count * share * (1.0 - share)).sqrt(), "{wrong} of {count}");
+    assert_eq!(frame.truth.range.as_slice(), first(&plain()).0.truth.range.as_slice(), "the truth is the scene's");
 }

@@ -6,7 +6,8 @@ use icp_registration::{
 use nalgebra::{Isometry3, Matrix6};
 
 use crate::common::{disturbance, pose_error, stations};
-use crate::cpu;
+use crate::cpu_clock::cpu_seconds;
+use crate::limit::{Plane, cramer_rao};
 
 /// A simulated survey.
 pub struct Survey {
@@ -37,6 +38,24 @@ fn errors(found: &StationRegistration, truth: &[Isometry3<f64>]) -> (f64, f64) {
     each.fold((0.0, 0.0), |a, b| (f64::max(a.0, b.0), f64::max(a.1, b.1)))
 }
 
+/// Errors of the positions of all stations but the first, in millimetre.
+fn positions(found: &StationRegistration, truth: &[Isometry3<f64>]) -> Vec<f64> {
+    let world = truth[0] * found.world_from_station[0].inverse();
+    let all = found.world_from_station.iter().zip(truth).skip(1);
+    all.map(|(pose, truth)| pose_error(&(world * pose), truth).0).collect()
+}
+
+/// Says how far positions are off in all runs, and how that compares with what the noise allows.
+fn compare(label: &str, stations: usize, positions: &[f64]) {
+    let rms = (positions.iter().map(|mm| mm * mm).sum::<f64>() / positions.len().max(1) as f64).sqrt();
+    let ratio = |plane| cramer_rao(stations, plane).map_or(f64::NAN, |limit| rms / limit.rms_mm());
+    println!(
+        "  {label:>22}: positions {rms:.2} mm rms, {:.2} of the bound for plane cells, {:.2} of that for plane faces",
+        ratio(Plane::Cells),
+        ratio(Plane::Faces),
+    );
+}
+
 /// The station whose position has the largest standard deviation, in millimetre.
 fn least_known(found: &StationRegistration) -> (usize, f64) {
     let sigma = |c: &Matrix6<f64>| 1e3 * c.fixed_view::<3, 3>(0, 0).trace().sqrt();
@@ -46,18 +65,18 @@ fn least_known(found: &StationRegistration) -> (usize, f64) {
 
 pub fn accuracy(name: &str, survey: &Survey, runs: u64) {
     println!("{name}: largest error of a station, run by run");
+    let mut off = [const { Vec::new() }; 3];
+    let labels = ["poses 0.1 m, 3 deg off", "truth", "order"];
     for run in 0..runs {
         let (clouds, truth) = survey.clouds(run);
         let approximate: Vec<Isometry3<f64>> =
             truth.iter().enumerate().map(|(k, pose)| pose * disturbance(0.1, 3.0, run * 100 + k as u64)).collect();
-        for (label, start) in [
-            ("poses 0.1 m, 3 deg off", Start::Poses(&approximate)),
-            ("truth", Start::Poses(&truth)),
-            ("order", Start::Order),
-        ] {
+        let starts = [Start::Poses(&approximate), Start::Poses(&truth), Start::Order];
+        for ((label, start), off) in labels.into_iter().zip(starts).zip(&mut off) {
             match register(&clouds, start, survey.patch_m) {
                 Ok(found) => {
                     let (mm, degrees) = errors(&found, &truth);
+                    off.extend(positions(&found, &truth));
                     let (station, sigma_mm) = least_known(&found);
                     let worst = found.loops.iter().map(|l| l.translation_m * 1e3).fold(0.0, f64::max);
                     println!(
@@ -77,6 +96,7 @@ pub fn accuracy(name: &str, survey: &Survey, runs: u64) {
             }
         }
     }
+    labels.into_iter().zip(&off).for_each(|(label, off)| compare(label, survey.stations, off));
 }
 
 pub fn timing(survey: &Survey) {
@@ -85,9 +105,9 @@ pub fn timing(survey: &Survey) {
     for (label, start) in [("poses", Start::Poses(&truth)), ("order", Start::Order)] {
         let times = (0..3).map(|_| {
             pool.install(|| {
-                let before = cpu::seconds();
+                let before = cpu_seconds();
                 let result = register(&clouds, start, survey.patch_m).map(|found| found.rounds);
-                (cpu::seconds() - before, result.is_ok())
+                (cpu_seconds() - before, result.is_ok())
             })
         });
         let best = times.fold((f64::INFINITY, true), |a, b| (a.0.min(b.0), a.1 && b.1));
@@ -102,11 +122,12 @@ fn rayon_pool() -> rayon::ThreadPool {
 
 /// Squared errors of the poses against their covariance, over repeated noise.
 pub fn sampling(survey: &Survey, runs: u64) -> Outcome<()> {
-    let (mut single, mut between, mut covered, mut count) = (Vec::new(), Vec::new(), 0, 0);
+    let (mut single, mut between, mut off, mut covered, mut count) = (Vec::new(), Vec::new(), Vec::new(), 0, 0);
     for run in 0..runs {
         let (clouds, truth) = survey.clouds(run);
         let found = register(&clouds, Start::Poses(&truth), survey.patch_m)?;
         let n = truth.len();
+        off.extend(positions(&found, &truth));
         for station in 1..n {
             let pose = found.relative_pose(0, station)?;
             let nees = normalised(&pose, &(truth[0].inverse() * truth[station]));
@@ -128,6 +149,7 @@ pub fn sampling(survey: &Survey, runs: u64) -> Outcome<()> {
         mean(&between),
         100.0 * covered as f64 / f64::from(count),
     );
+    compare("the same runs", survey.stations, &off);
     Ok(())
 }
 

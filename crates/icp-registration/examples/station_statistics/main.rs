@@ -8,23 +8,32 @@
 
 #[path = "../../tests/common/mod.rs"]
 mod common;
-mod cpu;
+#[path = "../../../../xtask/peers/cpu_clock.rs"]
+mod cpu_clock;
 mod evaluate;
 mod limit;
 
 use std::error::Error;
 
 use evaluate::{Survey, accuracy, sampling, timing};
+use limit::{Plane, cramer_rao};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let runs = std::env::args().nth(1).map_or(Ok(50), |text| text.parse::<u64>())?;
     let seed = std::env::args().nth(2).map_or(Ok(1), |text| text.parse::<u64>())?;
     let patch_m = std::env::args().nth(3).map(|text| text.parse::<f64>()).transpose()?;
     for stations in [8, 16] {
-        let (mm, degrees) = limit::cramer_rao(stations);
-        println!(
-            "{stations} stations: the noise alone leaves {mm:.2} mm, {degrees:.4} deg (least known station, 1 sigma)"
-        );
+        for plane in [Plane::Cells, Plane::Faces] {
+            let limit = cramer_rao(stations, plane).ok_or("the stations are not determined")?;
+            let largest = |values: &[f64]| values.iter().copied().fold(0.0, f64::max);
+            println!(
+                "{stations} stations, {plane:?} plane: the noise alone leaves {:.2} mm, {:.4} deg for the least known \
+                 station (1 sigma), {:.2} mm rms for all",
+                largest(&limit.mm),
+                largest(&limit.degrees),
+                limit.rms_mm(),
+            );
+        }
     }
     let eight = Survey { stations: 8, gross: 0.01, seed, patch_m };
     accuracy("eight stations, 1 % gross errors", &eight, 10.min(runs));

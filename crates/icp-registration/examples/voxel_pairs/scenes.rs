@@ -6,6 +6,7 @@ use nalgebra::{Isometry3, Matrix6, Point3, Vector3, Vector6};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
+use crate::common::scenes::open_scene;
 use crate::common::{Cuboid, Pinhole, Scene, disturbance, frame_with_mixed_pixels, look_at};
 
 /// A cloud of bare points: nothing of the frame is left but the points' order.
@@ -116,6 +117,27 @@ pub fn corridor(camera: &Pinhole, seed: u64) -> Views {
     let scene = Scene { room: Cuboid::new([-1e3, -1.0, 0.0], [1e3, 1.0, 2.4]), boxes: vec![] };
     let (a, b) = (look_at([0.0, 0.2, 1.4], [1.5, -1.0, 0.6]), look_at([0.2, 0.1, 1.3], [1.8, -1.0, 0.5]));
     views(&scene, camera, &a, &b, 2 * seed)
+}
+
+/// Two walls that face each other; as one wall.
+pub fn parallel_walls(_: &Pinhole, seed: u64) -> Views {
+    shared(2, seed)
+}
+
+/// Three rotations are free.
+pub fn sphere(_: &Pinhole, seed: u64) -> Views {
+    shared(3, seed)
+}
+
+/// Along and about the axis it is free.
+pub fn cylinder(_: &Pinhole, seed: u64) -> Views {
+    shared(4, seed)
+}
+
+/// The scenes of the other registrations as bare points.
+fn shared(kind: usize, seed: u64) -> Views {
+    let (_, source, target, target_from_source, _) = open_scene(kind, seed);
+    Views { source: Cloud::new(source.points), target: Cloud::new(target.points), target_from_source }
 }
 
 /// Guess that is off by `metre` in place and `degrees` in direction at the middle of the source.

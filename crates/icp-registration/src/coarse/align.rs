@@ -6,6 +6,7 @@ use nalgebra::Isometry3;
 use rayon::prelude::*;
 
 use super::correspondences::{Correspondences, Tolerance};
+use super::distinct::Common;
 use super::feature_cloud::FeatureCloud;
 use super::features::Features;
 use super::graph::ConsistencyGraph;
@@ -19,7 +20,7 @@ use crate::error::{Error, Result};
 /// Correspondences that enter the graph, those with the most alike descriptors.
 const MOST_CORRESPONDENCES: usize = 2500;
 /// Cliques or samples that poses are computed from.
-const MOST_CANDIDATES: usize = 150;
+const MOST_CANDIDATES: usize = 120;
 /// Of the sampled points, one in this many ranks the candidates.
 const RANKING_STRIDE: usize = 4;
 /// Largest difference of the cosines of normals at which two correspondences agree.
@@ -39,12 +40,17 @@ pub struct CoarseAlignment {
     pub overlap: f64,
     /// Fraction of the points that the other camera should have seen which lie on its surface.
     pub agreement: f64,
-    /// Score of the best pose that differs, as a fraction of the winner's: near 1 the scene is ambiguous.
+    /// Fraction of the points in the other camera's view that lie in space which it looked through, of the cloud with more.
+    pub contradiction: f64,
+    /// Fraction of the sampled points that have a partner and lie inside what encloses the scene, both of them: the cloud
+    /// goes on behind their tangent plane. Near 0, walls and corners alone fit.
+    pub inside: f64,
+    /// Evidence for the best pose that differs, as a fraction of the winner's: near 1 the scene is ambiguous.
     pub rival: f64,
     /// Root mean square distance of partners across the surface, metre.
     pub rms_m: f64,
-    /// Smallest eigenvalue of the normal matrix of partners a pair, rotations in units of their radius: how well the
-    /// surfaces determine the pose.
+    /// Share of the evidence that is lost where the source is moved by 6 voxels along the motion that the planes which
+    /// partners form determine least: 1 (or all) in a corner of three walls, 0 on one wall, between them where edges hold it.
     pub determined: f64,
     /// Edge of the voxels in use, metre.
     pub voxel_m: f64,
@@ -76,15 +82,19 @@ pub fn align_without_guess(
         needed: options.min_inliers as f64,
         correspondences: correspondences.len(),
     })?;
+    let common = Common::new(source, target, &winner.pose);
+    let (pose, verdict, determined) = common.settled(source, target, &winner.pose);
     let alignment = CoarseAlignment {
-        target_from_source: target.between_frames(source, &winner.pose),
-        inliers: correspondences.inliers(&winner.pose, tolerance).len(),
+        target_from_source: target.between_frames(source, &pose),
+        inliers: correspondences.inliers(&pose, tolerance).len(),
         correspondences: correspondences.len(),
-        overlap: winner.verdict.overlap(),
-        agreement: winner.verdict.agreement(),
-        rival: rival / winner.verdict.score().max(f64::MIN_POSITIVE),
+        overlap: verdict.overlap(),
+        agreement: verdict.agreement(),
+        contradiction: verdict.contradiction(),
+        inside: common.inside,
+        rival: rival / winner.evidence.max(f64::MIN_POSITIVE),
         rms_m: winner.rms_m,
-        determined: winner.determined,
+        determined,
         voxel_m,
     };
     check(alignment, options)
@@ -103,14 +113,14 @@ pub(crate) fn hypotheses(
     let voxel_m = target.voxel_m();
     let tolerance = Tolerance { distance: (options.tolerance_voxels * voxel_m) as f32, cosine: COSINE_TOLERANCE };
     let mut verified = verified(source, target, tolerance, options).1;
-    verified.sort_by(|a, b| b.verdict.score().total_cmp(&a.verdict.score()));
+    verified.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
     let mut kept: Vec<&Hypothesis> = Vec::new();
     for hypothesis in &verified {
         if !kept.iter().any(|other| is_same(&other.pose, &hypothesis.pose, voxel_m, source)) {
             kept.push(hypothesis);
         }
     }
-    Ok(kept.iter().map(|h| (target.between_frames(source, &h.pose), h.verdict.score())).collect())
+    Ok(kept.iter().map(|h| (target.between_frames(source, &h.pose), h.evidence)).collect())
 }
 
 /// The correspondences, and the best poses of them, refined and judged.
@@ -122,20 +132,26 @@ fn verified(
 ) -> (Correspondences, Vec<Hypothesis>) {
     let correspondences = correspondences(source, target, options);
     let candidates = candidates(&correspondences, tolerance, options);
-    let ranked = ranked(source, target, candidates, options.max_hypotheses);
+    let ranked = ranked(source, target, candidates, options.max_hypotheses, |pose| {
+        // The share of added features that agree counts as much as that of the points: along walls only they can tell.
+        let verdict = Verdict::new(source, target, pose, RANKING_STRIDE);
+        verdict.rough_score() + correspondences.added_share(pose, tolerance)
+    });
     let verify = |pose: &Isometry3<f64>| {
         let refined = refine(source, target, pose);
         let verdict = Verdict::new(source, target, &refined.pose, 1);
-        Hypothesis { pose: refined.pose, verdict, determined: refined.determined, rms_m: refined.rms_m }
+        let added = verdict.points() as f64 * correspondences.added_share(&refined.pose, tolerance);
+        Hypothesis { pose: refined.pose, evidence: verdict.evidence() + added, rms_m: refined.rms_m }
     };
-    (correspondences, ranked.par_iter().map(verify).collect())
+    let verified = ranked.par_iter().map(verify).collect();
+    (correspondences, verified)
 }
 
 /// A refined pose between the clouds' middles.
 struct Hypothesis {
     pose: Isometry3<f64>,
-    verdict: Verdict,
-    determined: f64,
+    /// Points that speak for it less those that contradict, and what added features say.
+    evidence: f64,
     rms_m: f64,
 }
 
@@ -167,6 +183,7 @@ fn correspondences(source: &FeatureCloud, target: &FeatureCloud, options: &Coars
             all.push((s.points[i], s.normals[i]), (t.points[j], t.normals[j]), m.likeness);
         }
     }
+    all.of_surface = all.len();
     for (s, t) in source.added.iter().zip(&target.added) {
         let mut found = matches(&s.table, &t.table, options.matching, options.max_ratio);
         most_alike(&mut found, share);
@@ -194,20 +211,27 @@ fn placed(cloud: &FeatureCloud, features: &Features, index: u32) -> ([f32; 3], [
 /// Poses of sets of correspondences that agree, each fitted again to all that agree with it.
 fn candidates(correspondences: &Correspondences, tolerance: Tolerance, options: &CoarseOptions) -> Vec<Isometry3<f64>> {
     let arm = 2.0 * tolerance.distance;
-    let sets = match options.estimator {
-        Estimator::ConsistencyGraph => ConsistencyGraph::new(correspondences, tolerance).cliques(MOST_CANDIDATES),
-        Estimator::Ransac { samples } => {
-            consistent_samples(correspondences, tolerance, arm, samples, MOST_CANDIDATES, options.seed)
-        }
+    let solve = |set: &[u32]| {
+        let first = correspondences.solve(set, arm)?;
+        let inliers = correspondences.inliers(&first, tolerance);
+        let again = if inliers.len() < 3 { None } else { correspondences.solve(&inliers, arm) };
+        Some((again.unwrap_or(first), inliers))
     };
-    sets.par_iter()
-        .filter_map(|set| {
-            let first = correspondences.solve(set, arm)?;
-            let inliers = correspondences.inliers(&first, tolerance);
-            let again = if inliers.len() < 3 { None } else { correspondences.solve(&inliers, arm) };
-            Some(again.unwrap_or(first))
-        })
-        .collect()
+    match options.estimator {
+        Estimator::ConsistencyGraph => {
+            let mut poses = Vec::new();
+            ConsistencyGraph::new(correspondences, tolerance).cliques(MOST_CANDIDATES, |clique| {
+                let Some((pose, inliers)) = solve(clique) else { return Vec::new() };
+                poses.push(pose);
+                inliers
+            });
+            poses
+        }
+        Estimator::Ransac { samples } => {
+            let sets = consistent_samples(correspondences, tolerance, arm, samples, MOST_CANDIDATES, options.seed);
+            sets.par_iter().filter_map(|set| solve(set).map(|found| found.0)).collect()
+        }
+    }
 }
 
 /// The poses with the best scores, each different from those before.
@@ -216,11 +240,9 @@ fn ranked(
     target: &FeatureCloud,
     candidates: Vec<Isometry3<f64>>,
     count: usize,
+    score: impl Fn(&Isometry3<f64>) -> f64 + Sync,
 ) -> Vec<Isometry3<f64>> {
-    let mut scored: Vec<(f64, Isometry3<f64>)> = candidates
-        .into_par_iter()
-        .map(|pose| (Verdict::new(source, target, &pose, RANKING_STRIDE).score(), pose))
-        .collect();
+    let mut scored: Vec<(f64, Isometry3<f64>)> = candidates.into_par_iter().map(|pose| (score(&pose), pose)).collect();
     scored.sort_by(|a, b| b.0.total_cmp(&a.0));
     let mut kept: Vec<Isometry3<f64>> = Vec::new();
     for (_, pose) in scored {
@@ -244,11 +266,11 @@ fn is_same(a: &Isometry3<f64>, b: &Isometry3<f64>, voxel_m: f64, source: &Featur
 /// The hypothesis with the best score, and the best score among those that differ from it.
 fn best_two<'a>(verified: &'a [Hypothesis], voxel_m: f64, source: &FeatureCloud) -> Option<(&'a Hypothesis, f64)> {
     let mut order: Vec<&Hypothesis> = verified.iter().collect();
-    order.sort_by(|a, b| b.verdict.score().total_cmp(&a.verdict.score()));
+    order.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
     let winner = *order.first()?;
     // Refined poses of one basin may end a little apart.
     let rival = order.iter().find(|h| !is_same(&h.pose, &winner.pose, 2.0 * voxel_m, source));
-    Some((winner, rival.map_or(0.0, |h| h.verdict.score().max(0.0))))
+    Some((winner, rival.map_or(0.0, |h| h.evidence.max(0.0))))
 }
 
 fn check(found: CoarseAlignment, options: &CoarseOptions) -> Result<CoarseAlignment> {
@@ -256,8 +278,10 @@ fn check(found: CoarseAlignment, options: &CoarseOptions) -> Result<CoarseAlignm
         ("inliers", found.inliers as f64, options.min_inliers as f64),
         ("overlap", found.overlap, options.min_overlap),
         ("agreement", found.agreement, options.min_agreement),
+        // Fractions that must stay small, seen from the other side.
+        ("points outside free space", 1.0 - found.contradiction, 1.0 - options.max_contradiction),
+        ("structure inside its enclosing planes", found.inside, options.min_inside),
         ("geometry", found.determined, options.min_determined),
-        // The largest ratio allowed, seen from the other side.
         ("lead over the rival", 1.0 - found.rival, 1.0 - options.max_rival),
     ];
     for (what, value, needed) in least {

@@ -3,16 +3,10 @@
 use nalgebra::{Isometry3, Translation3};
 
 use super::feature_cloud::FeatureCloud;
-use super::judge::{Count, Verdict};
+use super::judge::Verdict;
 use super::options::CoarseOptions;
 use super::refine;
 use crate::error::Result;
-
-/// Points that miss the surface they should lie on, and points in space that the other camera looked through, each
-/// outweigh this many points with a partner: where two poses differ, both find partners on walls that are alike, and
-/// only the wrong one misses more than a few in a hundred.
-const WEIGHT_OF_MISSED: f64 = 8.0;
-const WEIGHT_OF_FREE: f64 = 16.0;
 
 /// The clouds in voxels of one size, that of the coarsest.
 pub(crate) fn with_one_voxel(clouds: Vec<FeatureCloud>, options: &CoarseOptions) -> Result<Vec<FeatureCloud>> {
@@ -34,11 +28,7 @@ fn from_middle(placed: &Placed<'_>) -> Isometry3<f64> {
 /// Every `stride`-th sampled point is looked at. Clouds that see nothing in common have none.
 pub(crate) fn evidence(a: &Placed<'_>, b: &Placed<'_>, stride: usize) -> f64 {
     let pose = from_middle(a).inverse() * from_middle(b);
-    let verdict = Verdict::new(b.0, a.0, &pose, stride);
-    let of = |count: &Count| {
-        count.hits as f64 - WEIGHT_OF_MISSED * count.missed as f64 - WEIGHT_OF_FREE * count.in_free as f64
-    };
-    (of(&verdict.source) + of(&verdict.target)) * stride as f64
+    Verdict::new(b.0, a.0, &pose, stride).evidence() * stride as f64
 }
 
 /// Brings a cloud that is nearly in place onto all those around it, point to plane.

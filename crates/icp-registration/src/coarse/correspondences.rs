@@ -22,6 +22,8 @@ pub(super) struct Correspondences {
     pub(super) target: Side,
     /// How alike the descriptors are, 1 where they are equal.
     pub(super) likeness: Vec<f32>,
+    /// The first so many are of the surface, the others were found by other means.
+    pub(super) of_surface: usize,
 }
 
 /// Differences up to which two correspondences agree with each other, or one with a pose.
@@ -71,6 +73,15 @@ impl Correspondences {
             }
         }
         absolute_orientation(&from, &to, None).ok().map(|found| found.target_from_source)
+    }
+
+    /// Share of those found by other means that agree with a pose; 0 where there are none.
+    pub(super) fn added_share(&self, pose: &Isometry3<f64>, tolerance: Tolerance) -> f64 {
+        if self.of_surface == self.len() {
+            return 0.0;
+        }
+        let agree = self.inliers(pose, tolerance).iter().filter(|&&i| i as usize >= self.of_surface).count();
+        agree as f64 / (self.len() - self.of_surface) as f64
     }
 
     /// Correspondences that agree with a pose in position and normal.

@@ -73,8 +73,11 @@ impl FeatureCloud {
         let surroundings = Surroundings::sort_and_list(&mut reduced, radius);
         let normals = Normals::new(&reduced, &surroundings, viewpoint);
         let surface_features = surface_features(&reduced, &normals, &surroundings, radius, options);
-        let labels =
-            [1.0, 2.0].map(|cells| Labels::new(&reduced.points, |i| !normals.vectors[i][0].is_nan(), cells * voxel));
+        // Cells of two voxels hold some four points of a surface: every second one leaves none without.
+        let labels = [1, 2].map(|cells| {
+            let is_usable = |i: usize| i.is_multiple_of(cells) && !normals.vectors[i][0].is_nan();
+            Labels::new(&reduced.points, is_usable, cells as f32 * voxel)
+        });
         let eye = match viewpoint {
             Viewpoint::Origin => Some(-reduced.middle),
             Viewpoint::At(point) => Some(point.coords - reduced.middle),

@@ -49,9 +49,9 @@ impl ConsistencyGraph {
         self.row(i).iter().zip(self.row(j)).map(|(a, b)| (a & b).count_ones()).sum()
     }
 
-    /// Maximal cliques from at most `count` seeds, those with most support first; a member of one clique is no seed of
-    /// another.
-    pub(super) fn cliques(&self, count: usize) -> Vec<Vec<u32>> {
+    /// Maximal cliques from at most `count` seeds, those with most support first. `explained` tells which correspondences
+    /// a clique accounts for: they seed no other, and a clique of which it tells none is not counted.
+    pub(super) fn cliques(&self, count: usize, mut explained: impl FnMut(&[u32]) -> Vec<u32>) {
         let mut seeds: Vec<(u64, u32)> = (0..self.len())
             .into_par_iter()
             .with_min_len(32)
@@ -59,7 +59,7 @@ impl ConsistencyGraph {
             .collect();
         seeds.sort_unstable_by(|a, b| b.0.cmp(&a.0).then(a.1.cmp(&b.1)));
         let mut covered = vec![false; self.len()];
-        let mut cliques = Vec::new();
+        let mut found = 0;
         for (_, seed) in seeds.into_iter().take_while(|seed| seed.0 > 0) {
             if covered[seed as usize] {
                 continue;
@@ -68,14 +68,15 @@ impl ConsistencyGraph {
             for &member in &clique {
                 covered[member as usize] = true;
             }
-            if clique.len() >= LEAST_MEMBERS {
-                cliques.push(clique);
+            let others = if clique.len() >= LEAST_MEMBERS { explained(&clique) } else { Vec::new() };
+            found += usize::from(!others.is_empty());
+            for member in others {
+                covered[member as usize] = true;
             }
-            if cliques.len() == count {
+            if found == count {
                 break;
             }
         }
-        cliques
     }
 
     fn grow(&self, seed: usize) -> Vec<u32> {

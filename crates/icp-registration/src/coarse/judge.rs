@@ -12,9 +12,13 @@ const LEAST_COSINE: f32 = 0.8;
 /// Largest distance of partners across the surface and in all, voxels.
 const ACROSS_VOXELS: f32 = 0.8;
 const IN_ALL_VOXELS: f32 = 2.0;
-/// A point in free space counts this many times: points find partners on the wrong wall by chance, but hardly any lies
-/// in front of what was seen where the pose is right.
-const WEIGHT_OF_FREE: f64 = 2.0;
+/// A point in free space counts this many times where poses are rough.
+const ROUGH_WEIGHT_OF_FREE: f64 = 2.0;
+/// Points that miss the surface they should lie on, and points in space that the other camera looked through, each
+/// outweigh this many points with a partner once a pose is refined: where two poses differ, both find partners on walls that
+/// are alike, but only the wrong one has more than a few in a hundred that contradict.
+const WEIGHT_OF_MISSED: f64 = 8.0;
+const WEIGHT_OF_FREE: f64 = 16.0;
 
 /// Counts over the sampled points of one or both clouds.
 #[derive(Debug, Clone, Copy, Default)]
@@ -42,11 +46,37 @@ impl Verdict {
     }
 
     /// Share of the points with a partner less those in free space, doubly counted, times the square of the agreement:
-    /// at most 1, possibly negative. A wrong pose that slides walls along themselves has many partners, but misses more.
-    pub(super) fn score(&self) -> f64 {
+    /// at most 1, possibly negative: for poses that are a few voxels off. A wrong pose that slides walls along themselves
+    /// has many partners, but misses more.
+    pub(super) fn rough_score(&self) -> f64 {
         let sum = |f: fn(&Count) -> usize| (f(&self.source) + f(&self.target)) as f64;
-        let share = (sum(|c| c.hits) - WEIGHT_OF_FREE * sum(|c| c.in_free)) / sum(|c| c.points).max(1.0);
+        let share = (sum(|c| c.hits) - ROUGH_WEIGHT_OF_FREE * sum(|c| c.in_free)) / sum(|c| c.points).max(1.0);
         share * self.agreement().powi(2)
+    }
+
+    /// What speaks for a refined pose, in points: those with a partner less those that contradict.
+    pub(super) fn evidence(&self) -> f64 {
+        let of = |count: &Count| {
+            count.hits as f64 - WEIGHT_OF_MISSED * count.missed as f64 - WEIGHT_OF_FREE * count.in_free as f64
+        };
+        of(&self.source) + of(&self.target)
+    }
+
+    /// Sampled points of both clouds.
+    pub(super) fn points(&self) -> usize {
+        self.source.points + self.target.points
+    }
+
+    /// Largest share of the points of a cloud in the other's view that lie in space which that looked through.
+    pub(super) fn contradiction(&self) -> f64 {
+        let share = |c: &Count| c.in_free as f64 / (c.hits + c.in_free).max(1) as f64;
+        share(&self.source).max(share(&self.target))
+    }
+
+    /// Smaller share of the evidence that other poses lack, between 0 and 1.
+    pub(super) fn share_lost(&self, others: [Self; 2]) -> f64 {
+        let most = others.iter().map(Self::evidence).fold(f64::NEG_INFINITY, f64::max);
+        (1.0 - most / self.evidence().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0)
     }
 
     /// Share of the points with a partner in the cloud that overlaps more.
@@ -71,7 +101,7 @@ fn count(from: &FeatureCloud, to: &FeatureCloud, pose: &Isometry3<f64>, stride: 
         count.points += 1;
         let point = motion.point(from.reduced.points[i as usize]);
         let normal = motion.vector(from.normals.vectors[i as usize]);
-        if has_partner(to, point, normal, sided, voxel) {
+        if partner(to, point, normal, sided, voxel).is_some() {
             count.hits += 1;
             continue;
         }
@@ -84,10 +114,12 @@ fn count(from: &FeatureCloud, to: &FeatureCloud, pose: &Isometry3<f64>, stride: 
     count
 }
 
-fn has_partner(to: &FeatureCloud, point: [f32; 3], normal: [f32; 3], sided: bool, voxel: f32) -> bool {
-    let Some(near) = to.labels[0].near(point) else { return false };
+/// The point of the surface that a point lies on.
+pub(super) fn partner(to: &FeatureCloud, point: [f32; 3], normal: [f32; 3], sided: bool, voxel: f32) -> Option<usize> {
+    let near = to.labels[0].near(point)?;
     let (own, d) = (to.normals.vectors[near], subtract(point, to.reduced.points[near]));
     let cosine = if sided { dot(normal, own) } else { dot(normal, own).abs() };
     let in_all = IN_ALL_VOXELS * voxel;
-    cosine >= LEAST_COSINE && dot(d, own).abs() <= ACROSS_VOXELS * voxel && dot(d, d) <= in_all * in_all
+    let lies_on = cosine >= LEAST_COSINE && dot(d, own).abs() <= ACROSS_VOXELS * voxel && dot(d, d) <= in_all * in_all;
+    lies_on.then_some(near)
 }

@@ -6,6 +6,7 @@ mod among;
 mod cells;
 mod correspondences;
 mod descriptors;
+mod distinct;
 mod feature_cloud;
 mod features;
 mod fpfh;

@@ -83,17 +83,23 @@ pub struct CoarseOptions {
     pub tolerance_voxels: f64,
     /// Different poses that are refined and verified. Default 8.
     pub max_hypotheses: usize,
-    /// Fewest correspondences that agree with the pose. Default 25.
+    /// Fewest correspondences that agree with the pose. Default 8: what decides are surfaces and free space.
     pub min_inliers: usize,
-    /// Smallest fraction of the smaller cloud that must have a partner. Default 0.2.
+    /// Smallest fraction of the smaller cloud that must have a partner. Default 0.28.
     pub min_overlap: f64,
-    /// Smallest fraction of the points in the other cloud's view that must lie on its surface. Default 0.93.
+    /// Smallest fraction of the points in the other cloud's view that must lie on its surface. Default 0.96.
     pub min_agreement: f64,
-    /// Smallest eigenvalue of the normal matrix of partners (see [`super::CoarseAlignment::determined`]). Default 0.008: a
-    /// wall and a floor have up to 0.006 from noise and rounded edges, three walls 0.05 and more. 0 lets features decide
-    /// where surfaces cannot.
+    /// Largest fraction of points in space that the other camera looked through (see
+    /// [`super::CoarseAlignment::contradiction`]). Default 0.012: at the right pose there are hardly any.
+    pub max_contradiction: f64,
+    /// Smallest fraction of points on both clouds that lie inside what encloses them (see
+    /// [`super::CoarseAlignment::inside`]). Default 0.013: corners of empty rooms are taken for each other. 0 accepts them. Clouds whose
+    /// normals have no side always pass.
+    pub min_inside: f64,
+    /// Smallest share of the evidence that is lost where the pose slides along what is determined least (see
+    /// [`super::CoarseAlignment::determined`]). Default 0.3. 0 lets features decide where surfaces cannot.
     pub min_determined: f64,
-    /// Largest score of the best different pose, as a fraction of the winner's. Default 0.92.
+    /// Largest evidence for the best different pose, as a fraction of the winner's. Default 0.9.
     pub max_rival: f64,
     /// Start of the random numbers.
     pub seed: u64,
@@ -112,11 +118,13 @@ impl Default for CoarseOptions {
             estimator: Estimator::ConsistencyGraph,
             tolerance_voxels: 1.5,
             max_hypotheses: 8,
-            min_inliers: 25,
-            min_overlap: 0.2,
-            min_agreement: 0.93,
-            min_determined: 0.008,
-            max_rival: 0.92,
+            min_inliers: 8,
+            min_overlap: 0.28,
+            min_agreement: 0.96,
+            max_contradiction: 0.012,
+            min_inside: 0.013,
+            min_determined: 0.3,
+            max_rival: 0.9,
             seed: 1,
         }
     }
@@ -139,6 +147,8 @@ impl CoarseOptions {
         for (name, value) in [
             ("min_overlap", self.min_overlap),
             ("min_agreement", self.min_agreement),
+            ("max_contradiction", self.max_contradiction),
+            ("min_inside", self.min_inside),
             ("min_determined", self.min_determined),
         ] {
             if !(0.0..=1.0).contains(&value) {

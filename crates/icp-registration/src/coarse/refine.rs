@@ -15,26 +15,22 @@ const LEAST_COSINE: f32 = 0.7;
 /// Share of the mean of the normal matrix's diagonal that is added to it: motions that the surfaces do not determine stay.
 const DAMPING: f64 = 1e-3;
 
-/// A refined pose and how well the surfaces determine it.
+/// A refined pose.
 pub(super) struct Refined {
     pub(super) pose: Isometry3<f64>,
-    /// Smallest eigenvalue of the normal matrix over the number of pairs, rotations in units of the points' radius: 1/9
-    /// where the normals of a sphere's inside point everywhere, 0 on one wall.
-    pub(super) determined: f64,
     /// Root mean square distance of partners across the surface, metre.
     pub(super) rms_m: f64,
 }
 
 /// Poses are between the clouds' middles.
 pub(super) fn refine(source: &FeatureCloud, target: &FeatureCloud, pose: &Isometry3<f64>) -> Refined {
-    let mut refined = Refined { pose: *pose, determined: 0.0, rms_m: f64::NAN };
+    let mut refined = Refined { pose: *pose, rms_m: f64::NAN };
     for level in [0, 1] {
         for _ in 0..STEPS[level] {
             let system = System::new(&pairs(source, target, &refined.pose, level), target.reduced.voxel_m, level);
             let Some(step) = system.step() else { return refined };
             refined.pose = system.moved(&refined.pose, &step);
             refined.rms_m = (system.squares / system.weight).sqrt();
-            refined.determined = system.determined();
         }
     }
     refined
@@ -94,7 +90,7 @@ impl System {
             centre,
             radius: (spread / count).sqrt().max(voxel_m),
         };
-        let scale = SCALES[1 - level] * voxel_m;
+        let scale = SCALES[level] * voxel_m;
         for pair in pairs {
             system.add(pair, scale);
         }
@@ -125,11 +121,6 @@ impl System {
         let turn = step.fixed_rows::<3>(3).into_owned() / self.radius;
         let turned = moved(&Isometry3::identity(), Vector3::zeros(), turn).rotation * self.centre;
         moved(pose, step.fixed_rows::<3>(0) + self.centre - turned, turn)
-    }
-
-    fn determined(&self) -> f64 {
-        let values = crate::eigen::eigen6(&(self.normal / self.weight.max(1.0)), "refined pose").map(|e| e.0);
-        values.map_or(0.0, |v| v[0].max(0.0))
     }
 }
 

@@ -5,6 +5,8 @@ use super::fpfh::subtract;
 /// Cells along the edge of a face.
 const FEWEST: f32 = 8.0;
 const MOST: f32 = 256.0;
+/// Ranges that differ by more than this many tolerances about a direction belong to several surfaces.
+const JUMP: f32 = 3.0;
 
 /// What a map says about a point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -15,8 +17,8 @@ pub(super) enum Sight {
     OnSurface,
     /// Behind what was seen.
     Hidden,
-    /// In a direction that nothing is known of.
-    Outside,
+    /// In a direction that nothing is known of, or at a jump of the range where the point may be hidden or not.
+    Unknown,
 }
 
 /// Nearest and farthest range in each direction.
@@ -48,13 +50,15 @@ impl View {
     }
 
     pub(super) fn sight(&self, point: [f32; 3]) -> Sight {
-        let Some((cell, range)) = self.cell(point) else { return Sight::Outside };
+        let Some((cell, range)) = self.cell(point) else { return Sight::Unknown };
         if self.farthest[cell] <= 0.0 {
-            Sight::Outside
+            Sight::Unknown
         } else if range < self.nearest[cell] - self.tolerance {
             Sight::InFree
         } else if range > self.farthest[cell] + self.tolerance {
             Sight::Hidden
+        } else if self.farthest[cell] > self.nearest[cell] + JUMP * self.tolerance {
+            Sight::Unknown
         } else {
             Sight::OnSurface
         }

@@ -64,13 +64,16 @@ impl Engine<'_> {
         points.remember_when_settling(scene);
         let Points { indices, memory, .. } = points;
         let chunks: Result<Vec<Vec<Pair>>> = if memory.is_empty() {
-            let pairs =
-                |indices: &[usize]| indices.iter().filter_map(|&i| self.pair(scene, i, None).transpose()).collect();
+            let pairs = |indices: &[usize]| {
+                let mut pairs = Vec::with_capacity(indices.len());
+                indices.iter().try_for_each(|&i| self.pair(scene, i, None, &mut pairs)).map(|()| pairs)
+            };
             indices.par_chunks(CHUNK).map(pairs).collect()
         } else {
             let pairs = |(indices, memory): (&[usize], &mut [Memory])| {
-                let pairs = indices.iter().zip(memory).map(|(&i, memory)| self.pair(scene, i, Some(memory)));
-                pairs.filter_map(Result::transpose).collect()
+                let mut pairs = Vec::with_capacity(indices.len());
+                let mut asked = indices.iter().zip(memory);
+                asked.try_for_each(|(&i, memory)| self.pair(scene, i, Some(memory), &mut pairs)).map(|()| pairs)
             };
             indices.par_chunks(CHUNK).zip(memory.par_chunks_mut(CHUNK)).map(pairs).collect()
         };
@@ -114,7 +117,9 @@ impl Engine<'_> {
         Ok(pairs)
     }
 
-    fn pair(&self, scene: &Scene<'_>, source: usize, memory: Option<&mut Memory>) -> Result<Option<Pair>> {
+    /// Adds the pair of a source point where every part keeps it.
+    #[inline]
+    fn pair(&self, scene: &Scene<'_>, source: usize, memory: Option<&mut Memory>, to: &mut Vec<Pair>) -> Result<()> {
         let pose = scene.moment.pose;
         let moved = pose * scene.source.points[source];
         if !is_usable(&moved) {
@@ -126,7 +131,7 @@ impl Engine<'_> {
         let query = Query { source, moved, normal: turned, pose, limit_m, remember: memory.is_some() };
         let partner = self.ask(&query, memory);
         if !partner.found {
-            return Ok(None);
+            return Ok(());
         }
         if let Some(point) = partner.target {
             let count = scene.target.cloud.map_or(0, Cloud::len);
@@ -149,7 +154,10 @@ impl Engine<'_> {
         let kept = pair.distance_m <= scene.moment.limit_m
             && self.metric.accepts(scene, &pair)
             && self.rejection.iter().all(|rejection| rejection.keeps(scene, &pair));
-        Ok(kept.then_some(pair))
+        if kept {
+            to.push(pair);
+        }
+        Ok(())
     }
 
     /// Asks for the partner, unless the point has moved too little since the last answer for it to change.

@@ -5,7 +5,7 @@ use nalgebra::{Isometry3, Matrix6, Vector3, Vector6};
 use super::descent::{Alternative, Levels};
 use super::matching::Points;
 use super::options::DegeneracyPolicy;
-use super::quality::{Residuals, Verdict};
+use super::quality::verdict;
 use super::result::{IcpResult, StopReason};
 use super::starts::Starts;
 use super::system::System;
@@ -20,6 +20,7 @@ use crate::parts::{
     Scene, Settled, SigmaWeight, StoppingRule,
 };
 use crate::pose::is_finite;
+use crate::quality::Residuals;
 
 /// An ICP registration of which every part can be replaced: the stages of `[RusinkiewiczLevoy2001]`.
 ///
@@ -233,7 +234,7 @@ impl<'p> Engine<'p> {
         match self.parts.degeneracy {
             DegeneracyPolicy::Report => Ok(Vec::new()),
             DegeneracyPolicy::HoldAtGuess | DegeneracyPolicy::HoldAtPrior => {
-                Ok(Verdict::new(system, self.max_motion_sigma_m(), Residuals::Misaligned)?.held())
+                Ok(verdict(system, self.max_motion_sigma_m(), Residuals::Misaligned)?.held())
             }
         }
     }
@@ -243,7 +244,7 @@ impl<'p> Engine<'p> {
         let pairs = self.pairs(&moment, points, track.iterations)?;
         let scene = self.scene.at(moment);
         let system = System::new(&scene, self.metric, &pairs, self.kernel.at(&Moment { ended: true, ..moment }));
-        Ok(Verdict::new(&system, self.max_motion_sigma_m(), Residuals::Settled)?.over_sigma(step))
+        Ok(verdict(&system, self.max_motion_sigma_m(), Residuals::Settled)?.over_sigma(step))
     }
 
     pub(crate) fn max_motion_sigma_m(&self) -> f64 {

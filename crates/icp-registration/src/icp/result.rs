@@ -6,12 +6,13 @@ use super::matching::Points;
 use super::motion::UndeterminedMotion;
 use super::options::DegeneracyPolicy;
 use super::prior::fused_with_prior;
-use super::quality::{Residuals, Verdict};
+use super::quality::verdict;
 use super::registration::{Engine, Track};
 use super::sensitivity::sensitivity;
 use super::system::System;
 use crate::error::Result;
 use crate::parts::{Moment, Scene, thinned};
+use crate::quality::Residuals;
 
 /// Source points from which the response of the score and the overlap are taken.
 const RESPONSE_POINTS: usize = 4000;
@@ -80,23 +81,23 @@ impl Engine<'_> {
         };
         let pairs = self.enough(&scene, gated, points, track.iterations)?;
         let system = System::new(&scene, self.metric, &pairs, self.kernel.at(&moment));
-        let verdict = Verdict::new(&system, self.max_motion_sigma_m(), Residuals::Settled)?;
+        let verdict = verdict(&system, self.max_motion_sigma_m(), Residuals::Settled)?;
         let sample = thinned(&points.indices, RESPONSE_POINTS);
         let step_m = (0.5 * system.rms_m()).max(0.01 * moment.limit_m);
         let response = sensitivity(self, &system, &sample, step_m)?;
         let mut result = IcpResult {
             target_from_source: track.pose,
-            covariance: verdict.covariance(&system, &response),
+            covariance: verdict.covariance(&track.pose, Some(&response)),
             overlap,
             rms_m: system.rms_m(),
             iterations: track.iterations,
             stop,
             correspondences: pairs.len(),
             max_correspondence_distance_m: moment.limit_m,
-            degenerate: verdict.undetermined(&system),
+            degenerate: verdict.undetermined(),
         };
         if let (DegeneracyPolicy::HoldAtPrior, Some(prior)) = (self.parts.degeneracy, &self.parts.prior_covariance) {
-            let information = verdict.information(&system, &response);
+            let information = verdict.information(&track.pose, &response);
             (result.target_from_source, result.covariance) = fused_with_prior(&track.pose, &information, guess, prior)?;
         }
         Ok(result)

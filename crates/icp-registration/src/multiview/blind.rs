@@ -44,13 +44,12 @@ struct Arrangement {
     score: f64,
 }
 
-/// Poses of all stations, right to a part of a voxel, and the size of the voxels.
-pub(super) fn arranged(stations: &[Cloud], start: Start<'_>, held: usize) -> Result<(Vec<Isometry3<f64>>, f64)> {
+/// Poses of all stations, right to a part of a voxel but for what they slid together.
+pub(super) fn arranged(stations: &[Cloud], start: Start<'_>, held: usize) -> Result<Vec<Isometry3<f64>>> {
     let options = CoarseOptions { max_hypotheses: VERIFIED, ..CoarseOptions::default() };
     let features: Result<Vec<FeatureCloud>> =
         stations.par_iter().map(|cloud| FeatureCloud::new(cloud, &options)).collect();
     let clouds = with_one_voxel(features?, &options)?;
-    let voxel_m = clouds[0].voxel_m();
     let pairs = pairs(start, clouds.len());
     let candidate = |&(target, source): &(usize, usize)| {
         let mut poses = hypotheses(&clouds[source], &clouds[target], &options)?;
@@ -76,7 +75,7 @@ pub(super) fn arranged(stations: &[Cloud], start: Start<'_>, held: usize) -> Res
         *pose = to_held * *pose;
     }
     search.swept(&mut poses, held);
-    Ok((poses, voxel_m))
+    Ok(poses)
 }
 
 /// Pairs that are aligned: the next two stations of each, the first ones with the last; or all.

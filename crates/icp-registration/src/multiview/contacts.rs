@@ -5,8 +5,6 @@ use nalgebra::{Isometry3, Matrix6, Vector3, Vector6};
 use super::patches::Surface;
 use crate::error::Result;
 
-/// Partners whose normals enclose a larger angle are none; cosine (37 degrees).
-const SAME_SIDE: f64 = 0.8;
 /// How far beside a patch its partner may be, in patches: half the diagonal of a cell. Farther ones would be partners
 /// from beyond the rim.
 const BESIDE: f64 = 0.75;
@@ -29,7 +27,14 @@ pub(super) struct Reach {
     pub across_m: f64,
     /// Of how many nearest patches the first that fits is taken: one, once the stations are nearly in place.
     pub candidates: usize,
+    /// Smallest cosine of the angle between their normals.
+    pub cosine: f64,
 }
+
+/// Cosines while stations may be turned (37 degrees), and once they are in place (15): patches across a crease, whose
+/// normals lie between those of two walls, would say where a wall ends.
+pub(super) const TURNED: f64 = 0.8;
+pub(super) const IN_PLACE: f64 = 0.966;
 
 /// The partners of the patches of one station (`asking`) among those of another, `to_asked` being
 /// `asked_from_asking`: pairs of indices.
@@ -57,7 +62,7 @@ pub(super) fn partners(
             let cosine = normal.dot(&other.normal);
             across.abs() <= reach.across_m
                 && apart.norm_squared() - across * across <= beside_m * beside_m
-                && if signed { cosine >= SAME_SIDE } else { cosine.abs() >= SAME_SIDE }
+                && if signed { cosine >= reach.cosine } else { cosine.abs() >= reach.cosine }
         };
         let nearest = asked.tree.any_nearest(&[centre.x, centre.y, centre.z]);
         if nearest.distance_m > farthest_m {
@@ -83,8 +88,6 @@ pub(super) struct Observed {
     pub residual: f64,
     /// Its derivative by the tangent of `target_from_source`.
     pub jacobian: Vector6<f64>,
-    /// Where, target frame, metre.
-    pub place: Vector3<f64>,
     /// Common normal, target frame.
     pub normal: Vector3<f64>,
     /// Variance of the residual, metre².
@@ -112,7 +115,6 @@ pub(super) fn observe(
     Observed {
         residual,
         jacobian: along_direction(&from.centre.coords, target_from_source, &normal),
-        place: to.centre.coords,
         normal,
         variance: from.variance + to.variance + along * normal_variance,
         normal_variance,

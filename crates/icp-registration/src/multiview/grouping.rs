@@ -21,21 +21,21 @@ struct Group {
 /// Groups of point indices, in ascending order of cells and within a cell of their first points. Points without normal
 /// and those marked as rim belong to none.
 pub(super) fn group(cloud: &Cloud, normals: &[Vector3<f64>], size_m: f64) -> Vec<Vec<u32>> {
-    let usable = |i: &usize| normals[*i].x.is_finite() && !cloud.rim.as_ref().is_some_and(|rim| rim[*i]);
-    let cell = |i: usize| cloud.points[i].coords.map(|c| (c / size_m).floor());
-    let mut keyed: Vec<([i64; 3], u32)> = (0..cloud.len())
-        .filter(usable)
-        .map(|i| {
-            let cell = cell(i);
-            ([cell.x as i64, cell.y as i64, cell.z as i64], i as u32)
-        })
-        .collect();
-    keyed.sort_unstable();
+    let usable = |i: usize| normals[i].x.is_finite() && !cloud.rim.as_ref().is_some_and(|rim| rim[i]);
+    let keyed = by_cells(cloud, usable, size_m);
     let mut groups = Vec::new();
     for run in keyed.chunk_by(|a, b| a.0 == b.0) {
         groups.extend(groups_of_cell(cloud, normals, run, size_m).into_iter().map(|group| group.points));
     }
     groups
+}
+
+/// The usable points with the cells of space that they lie in, cell by cell, ascending.
+pub(super) fn by_cells(cloud: &Cloud, usable: impl Fn(usize) -> bool, size_m: f64) -> Vec<([i64; 3], u32)> {
+    let cell = |i: usize| <[i64; 3]>::from(cloud.points[i].coords.map(|c| (c / size_m).floor() as i64));
+    let mut keyed: Vec<_> = (0..cloud.len()).filter(|&i| usable(i)).map(|i| (cell(i), i as u32)).collect();
+    keyed.sort_unstable();
+    keyed
 }
 
 fn groups_of_cell(cloud: &Cloud, normals: &[Vector3<f64>], run: &[([i64; 3], u32)], size_m: f64) -> Vec<Group> {

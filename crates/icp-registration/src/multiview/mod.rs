@@ -1,8 +1,12 @@
 //! Many stations: which of them overlap, and all their poses at once.
 
 mod blind;
+mod check;
 mod contacts;
 mod datum;
+mod elimination;
+mod equations;
+mod facets;
 mod grouping;
 mod loops;
 mod network;
@@ -12,15 +16,20 @@ mod patches;
 mod plane_fit;
 mod point_model;
 mod point_residuals;
+mod points;
 mod pose_graph;
 mod precision;
 mod reduction;
 mod regions;
 mod registration;
 mod rounds;
-mod start;
+mod scatter;
+mod sightings;
+mod simultaneous;
 mod stations;
+mod sums;
 mod surfaces;
+mod tiles;
 
 pub use loops::LoopClosure;
 pub use overlap::{Overlap, find_overlaps};

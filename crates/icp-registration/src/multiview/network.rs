@@ -1,9 +1,9 @@
 //! One adjustment of all stations from the reduced observations of all pairs.
 
-use adjust::{Adjustment, BlockId, Covariance, FunctionObservation, ParameterBlock, Scale, SolveOptions};
-use nalgebra::{DMatrix, DVector, Isometry3, Matrix6, Vector6};
+use adjust::{Adjustment, BlockId, Covariance, FunctionObservation, ParameterBlock, SolveOptions};
+use nalgebra::{DVector, Isometry3, Matrix6, Vector6};
 
-use super::pose_graph::{adjustment, relative_pose_parts, with_held_station};
+use super::pose_graph::{adjustment, relative_pose_parts};
 use super::reduction::{Meeting, Reduced};
 use crate::error::Result;
 
@@ -15,22 +15,27 @@ pub(super) struct State {
 }
 
 /// What does not change from round to round.
+#[derive(Debug, Clone, Copy)]
 pub(super) struct Network<'a> {
     /// The station that keeps its pose.
     pub fixed: usize,
-    /// How well each pose is taken to be known where no contact says anything, metre; rotations at that radius: each
-    /// station is held by one radian.
+    /// How well each position is taken to be known where no contact says anything, metre, and each rotation, radian.
     pub hold_m: f64,
+    pub turn_rad: f64,
     pub names: &'a [String],
     pub prior: &'a (Vec<f64>, Vec<f64>),
 }
 
 impl Network<'_> {
-    /// One linearised step for all unknowns: the new state, and the cofactors of `[stations · 6, parameters]` (zero for
-    /// the station that is held).
-    pub(super) fn solve(&self, state: &State, pairs: &[(&Meeting, Reduced)]) -> Result<(State, DMatrix<f64>)> {
+    /// The same with each pose taken to be known to a length, rotations at the radius at which they are held now.
+    pub(super) fn near(&self, known_m: f64) -> Self {
+        Self { hold_m: known_m, turn_rad: known_m / self.hold_m, ..*self }
+    }
+
+    /// One linearised step for all unknowns.
+    pub(super) fn solve(&self, state: &State, pairs: &[(&Meeting, Reduced)]) -> Result<State> {
         if state.poses.len() == 1 && state.parameters.is_empty() {
-            return Ok((state.clone(), DMatrix::zeros(6, 6)));
+            return Ok(state.clone());
         }
         let mut network = Adjustment::new();
         let mut stations = Vec::with_capacity(state.poses.len());
@@ -39,7 +44,7 @@ impl Network<'_> {
             if index == self.fixed {
                 network.hold(block).map_err(adjustment)?;
             } else {
-                let sigmas = [self.hold_m, self.hold_m, self.hold_m, 1.0, 1.0, 1.0];
+                let sigmas = [0, 1, 2, 3, 4, 5].map(|k| if k < 3 { self.hold_m } else { self.turn_rad });
                 let values = adjust::RigidPose::values(pose);
                 network.add_prior(block, &values, &Covariance::from_sigmas(&sigmas)).map_err(adjustment)?;
             }
@@ -62,9 +67,7 @@ impl Network<'_> {
             Some(block) => solution.values(block).map_err(adjustment)?.to_vec(),
             None => Vec::new(),
         };
-        let free = solution.covariance_matrix(Scale::Prior).map_err(adjustment)?;
-        let cofactors = with_held_station(&free, 6 * self.fixed, 6 * stations.len() + parameters.len());
-        Ok((State { poses: poses.map_err(adjustment)?, parameters }, cofactors))
+        Ok(State { poses: poses.map_err(adjustment)?, parameters })
     }
 
     fn shared_block(&self, network: &mut Adjustment<'_>, state: &State) -> Result<Option<BlockId>> {

@@ -1,71 +1,125 @@
-//! Two stations by themselves, from their patches.
+//! Two stations by themselves, from the tiles that both saw.
 
-use nalgebra::{Isometry3, Matrix6};
+use nalgebra::{DVector, Isometry3, Matrix6};
+use rayon::prelude::*;
 
+use super::elimination::FacetSums;
+use super::equations::Equations;
 use super::network::{Network, State};
-use super::patches::Surface;
+use super::overlap::Overlap;
 use super::precision;
-use super::rounds::{Adjusted, Course, Surfaces};
-use crate::error::{Error, Result};
+use super::scatter::TileMean;
+use super::simultaneous::Adjusted;
+use super::surfaces::PairAlignment;
+use crate::error::Result;
 use crate::icp::{IcpResult, StopReason};
-use crate::kernel::RobustKernel;
+use crate::pose::{step_pose, symmetrised};
 
-/// Rounds of a pair at the last level.
-const ROUNDS: usize = 15;
-
-/// Aligns two stations by themselves from a guess that is right to `reach_m`.
-pub(super) fn align(
-    source: &Surface,
-    target: &Surface,
-    guess: &Isometry3<f64>,
-    reach_m: f64,
-    minimum_contacts: usize,
-) -> Result<IcpResult> {
-    let hold_m = target.radius_m.max(source.radius_m);
-    let none = (Vec::new(), Vec::new());
-    let course = Course {
-        network: Network { fixed: 0, hold_m, names: &[], prior: &none },
-        reach_m,
-        minimum_contacts,
-        kernel: RobustKernel::Tukey,
-        max_rounds: ROUNDS,
-        tolerance_m: target.size_m / 500.0,
-        progress: &|_| {},
-    };
-    let mut surfaces = Surfaces::fixed(vec![target, source]);
-    let start = State { poses: vec![Isometry3::identity(), *guess], parameters: Vec::new() };
-    let adjusted = course.run(&mut surfaces, start)?;
-    result(&surfaces, &adjusted, hold_m, minimum_contacts)
+/// A tile that two stations saw.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Shared {
+    pub facet: usize,
+    pub target: TileMean,
+    pub source: TileMean,
 }
 
-fn result(surfaces: &Surfaces<'_>, adjusted: &Adjusted, hold_m: f64, needed: usize) -> Result<IcpResult> {
-    let scene = surfaces.scene(0);
-    let max_distance_m = scene.surfaces[0].size_m / 2.0;
-    let of = scene.surfaces[1].patches.len();
-    let Some(meeting) = adjusted.meetings.first() else {
-        let iteration = adjusted.rounds;
-        return Err(Error::TooFewCorrespondences { found: 0, of, needed, max_distance_m, iteration });
-    };
-    let pose = adjusted.state.poses[1];
-    let (mut squares, mut weights) = (0.0, 0.0);
-    for contact in &meeting.contacts {
-        let (row, observed) = scene.row(meeting, contact, &pose, &adjusted.weighting);
-        squares += row.weight * observed.residual.powi(2);
-        weights += row.weight;
+impl Shared {
+    /// Distance of the source's points before those of the target along the normal of the facet, metre.
+    pub(super) fn apart_m(&self) -> f64 {
+        self.source.mean_m - self.target.mean_m
     }
-    let factor = adjusted.squares / (adjusted.observations - 6.0).max(1.0);
-    let joint = precision::covariance(&scene, adjusted, hold_m, factor);
-    let covariance: Matrix6<f64> = joint.fixed_view::<6, 6>(6, 6).into_owned();
-    let asked = meeting.contacts.iter().filter(|contact| contact.asked_by_source).count();
-    Ok(IcpResult {
-        target_from_source: pose,
-        covariance,
-        overlap: asked as f64 / of as f64,
-        rms_m: if weights > 0.0 { (squares / weights).sqrt() } else { 0.0 },
-        iterations: adjusted.rounds,
-        stop: if adjusted.settled { StopReason::Converged } else { StopReason::WithinNoise },
-        correspondences: meeting.contacts.len(),
-        max_correspondence_distance_m: max_distance_m,
-        degenerate: precision::undetermined(&pose, &covariance, hold_m),
-    })
+
+    /// One over the variance of that distance.
+    pub(super) fn weight(&self) -> f64 {
+        1.0 / (1.0 / self.source.weight + 1.0 / self.target.weight)
+    }
+}
+
+impl Adjusted {
+    /// The tiles that both stations saw.
+    pub(super) fn shared(&self, target: usize, source: usize) -> Vec<Shared> {
+        let mut found = Vec::new();
+        for (facet, means) in self.means.iter().enumerate() {
+            for tile in means.chunk_by(|a, b| a.tile == b.tile) {
+                let of = |station: usize| tile.iter().find(|mean| mean.station == station).copied();
+                if let (Some(target), Some(source)) = (of(target), of(source)) {
+                    found.push(Shared { facet, target, source });
+                }
+            }
+        }
+        found
+    }
+
+    /// Part of the tiles of each station that each other one saw too, for pairs that share as many tiles as needed.
+    pub(super) fn overlaps(&self, fewest: usize) -> Vec<Overlap> {
+        let count = self.state.poses.len();
+        let (mut seen, mut shared) = (vec![0_usize; count], vec![0_usize; count * count]);
+        for tile in self.means.iter().flat_map(|means| means.chunk_by(|a, b| a.tile == b.tile)) {
+            for (k, first) in tile.iter().enumerate() {
+                seen[first.station] += 1;
+                tile[k + 1..].iter().for_each(|second| shared[first.station * count + second.station] += 1);
+            }
+        }
+        let pairs = (0..count).flat_map(|target| (target + 1..count).map(move |source| (target, source)));
+        let enough = pairs.filter(|(target, source)| shared[target * count + source] >= fewest.max(1));
+        let overlap = |(target, source): (usize, usize)| {
+            let fraction = shared[target * count + source] as f64 / seen[source] as f64;
+            Overlap { source, target, fraction }
+        };
+        enough.map(overlap).collect()
+    }
+
+    /// The poses of pairs if nothing but the two stations had been there.
+    pub(super) fn pairs(&self, pairs: &[(usize, usize)], hold_m: f64, size_m: f64) -> Result<Vec<PairAlignment>> {
+        pairs.par_iter().map(|&(target, source)| self.pair(target, source, hold_m, size_m)).collect()
+    }
+
+    fn pair(&self, target: usize, source: usize, hold_m: f64, size_m: f64) -> Result<PairAlignment> {
+        let poses = [self.state.poses[target], self.state.poses[source]];
+        let none = (Vec::new(), Vec::new());
+        let network = Network { fixed: 0, hold_m, turn_rad: 1.0, names: &[], prior: &none };
+        let mut equations = Equations::new(2, 0);
+        for ((facet, variances), means) in self.facets.iter().zip(&self.variances).zip(&self.means) {
+            let sees = |station: usize| means.iter().any(|mean| mean.station == station);
+            if !(sees(target) && sees(source)) {
+                continue;
+            }
+            let seen = FacetSums { facet, sums: &self.sums, weights: &self.scatter.weights };
+            if let Some(mut eliminated) = seen.eliminated(&[target, source], *variances) {
+                eliminated.rename(&[target, source]);
+                equations.add(facet, &eliminated, &poses);
+            }
+        }
+        let state = State { poses: poses.to_vec(), parameters: Vec::new() };
+        // Along a weak direction the pair stays where all stations have it: there the tiles would be others.
+        let (step, _) = equations.solved(&network.near(size_m / 2.0), &state)?;
+        let (_, cofactors) = equations.solved(&network, &state)?;
+        let moved = step_pose(&poses[1], &step.fixed_rows::<6>(6).into_owned());
+        let result = self.result(target, source, poses[0].inverse() * moved, size_m);
+        let to_target = poses[0].rotation.inverse().to_rotation_matrix().into_inner();
+        let mut turn = Matrix6::identity();
+        turn.fixed_view_mut::<3, 3>(0, 0).copy_from(&to_target);
+        let covariance =
+            symmetrised(&(turn * cofactors.fixed_view::<6, 6>(6, 6) * turn.transpose())) * self.variance_factor();
+        let degenerate = precision::undetermined(&result.target_from_source, &covariance, hold_m, size_m);
+        Ok(PairAlignment { target, source, result: IcpResult { covariance, degenerate, ..result } })
+    }
+
+    fn result(&self, target: usize, source: usize, target_from_source: Isometry3<f64>, size_m: f64) -> IcpResult {
+        let shared = self.shared(target, source);
+        let seen = self.means.iter().flatten().filter(|mean| mean.station == source).count();
+        let squares = DVector::from_iterator(shared.len(), shared.iter().map(|s| s.weight() * s.apart_m().powi(2)));
+        let weight: f64 = shared.iter().map(Shared::weight).sum();
+        IcpResult {
+            target_from_source,
+            covariance: Matrix6::zeros(),
+            overlap: shared.len() as f64 / seen.max(1) as f64,
+            rms_m: if weight > 0.0 { (squares.sum() / weight).sqrt() } else { 0.0 },
+            iterations: self.rounds,
+            stop: if self.settled { StopReason::Converged } else { StopReason::WithinNoise },
+            correspondences: shared.len(),
+            max_correspondence_distance_m: size_m / 2.0,
+            degenerate: Vec::new(),
+        }
+    }
 }

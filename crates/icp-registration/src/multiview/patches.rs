@@ -10,7 +10,7 @@ use nalgebra::{Point3, Vector3};
 
 use super::grouping::group;
 use super::plane_fit::{Moments, Plane};
-use super::regions::Patches;
+use super::regions::{Patches, Region};
 use crate::cloud::Cloud;
 use crate::error::{Error, Result};
 use crate::kernel::quantile;
@@ -43,6 +43,8 @@ pub(super) struct Patch {
     pub normal: Vector3<f64>,
     /// Variance of the centre along the normal, metre².
     pub variance: f64,
+    /// Variance of a point across it, metre².
+    pub point_variance: f64,
     /// Variance of the normal about any axis in the plane, radian².
     pub normal_variance: f64,
 }
@@ -51,6 +53,12 @@ pub(super) struct Patch {
 #[derive(Debug)]
 pub(super) struct Surface {
     pub patches: Vec<Patch>,
+    /// Of the points of each patch, about `origin`.
+    pub moments: Vec<Moments>,
+    /// Patches that lie on one plane, and the region of each patch.
+    pub regions: Vec<Region>,
+    pub region_of: Vec<Option<usize>>,
+    pub origin: Vector3<f64>,
     pub tree: NeighbourTree,
     /// The points of patch i are `members[starts[i]..starts[i + 1]]`, indices into the cloud.
     pub members: Vec<u32>,
@@ -145,10 +153,11 @@ impl Surface {
         let tree = NeighbourTree::new(&centres)?;
         let neighbours = neighbours(&centres, &tree, REACH * size_m)?;
         let roughness_m = ROUGHNESS * size_m;
-        let regions = Patches { fits, centres: &centres, neighbours: &neighbours, roughness_m }.planes(origin);
+        let (regions, region_of) =
+            Patches { fits, centres: &centres, neighbours: &neighbours, roughness_m }.regions(origin);
         let patch = |index: usize| {
             let local = patch(index, fits, &centres, &neighbours[index], size_m);
-            regions[index].map_or(local, |region| in_region(local, &region))
+            region_of[index].map_or(local, |region| in_region(local, &regions[region]))
         };
         let patches: Vec<Patch> = (0..fits.len()).map(patch).collect();
         let n = centres.len() as f64;
@@ -157,7 +166,9 @@ impl Surface {
         let facing = patches.iter().filter(|p| p.normal.dot(&p.centre.coords) < 0.0).count();
         let oriented = facing as f64 >= ORIENTED * patches.len() as f64;
         let Groups { members, starts } = groups;
-        Ok(Self { patches, tree, members, starts, size_m, radius_m, oriented })
+        let moments = fits.iter().map(|fit| fit.0).collect();
+        let origin = *origin;
+        Ok(Self { patches, moments, regions, region_of, origin, tree, members, starts, size_m, radius_m, oriented })
     }
 
     /// Indices of the points of a patch.
@@ -234,14 +245,15 @@ fn patch(index: usize, fits: &[(Moments, Plane)], centres: &[Point3<f64>], neigh
         centre: centres[index],
         normal,
         variance: joint.variance / own.count() + floor,
+        point_variance: joint.variance,
         normal_variance: joint.variance / count / joint.spread,
     }
 }
 
 /// The patch with the normal of a region that it belongs to, where that is the better known one.
-fn in_region(local: Patch, region: &(Plane, f64)) -> Patch {
-    let (plane, count) = region;
-    let normal_variance = plane.variance / count / plane.spread;
+fn in_region(local: Patch, region: &Region) -> Patch {
+    let plane = &region.plane;
+    let normal_variance = plane.variance / region.moments.count() / plane.spread;
     if normal_variance >= local.normal_variance {
         return local;
     }

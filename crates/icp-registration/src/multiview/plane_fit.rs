@@ -1,6 +1,6 @@
 //! Planes through groups of points from their moments, with the scatter that is left.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Isometry3, Matrix3, Vector3};
 
 use crate::eigen::{eigenvalues3, eigenvector3};
 
@@ -38,6 +38,20 @@ impl Moments {
         self.products += other.products;
     }
 
+    /// The moments of the points moved by `pose`, about another origin.
+    pub(super) fn moved(&self, from: &Vector3<f64>, pose: &Isometry3<f64>, to: &Vector3<f64>) -> Self {
+        let rotation = pose.rotation.to_rotation_matrix().into_inner();
+        let mean = rotation * (from + self.mean()) + pose.translation.vector - to;
+        let scatter = rotation * self.scatter() * rotation.transpose();
+        Self { count: self.count, sum: mean * self.count, products: (scatter + mean * mean.transpose()) * self.count }
+    }
+
+    /// Second central moments.
+    pub(super) fn scatter(&self) -> Matrix3<f64> {
+        let mean = self.mean();
+        self.products / self.count - mean * mean.transpose()
+    }
+
     pub(super) fn count(&self) -> f64 {
         self.count
     }
@@ -60,8 +74,7 @@ impl Moments {
         if self.count < 4.0 {
             return None;
         }
-        let mean = self.mean();
-        let scatter = self.products / self.count - mean * mean.transpose();
+        let scatter = self.scatter();
         let [smallest, middle, largest] = eigenvalues3(&scatter);
         // Points across a plane scatter less than a quarter as far as along it.
         if !(smallest <= 0.06 * middle && middle > narrowest * largest) {

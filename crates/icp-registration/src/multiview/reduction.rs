@@ -91,8 +91,6 @@ pub(super) struct Reduced {
     pub right: DVector<f64>,
     /// Where the contacts were linearised.
     pub pose: Isometry3<f64>,
-    /// Weighted sum of squares at that pose.
-    pub squares: f64,
 }
 
 /// Reduces the contacts of a pair at `pose`.
@@ -105,7 +103,6 @@ pub(super) fn reduce(
     let n = 6 + scene.parameters;
     let (mut information, mut gradient) = (DMatrix::zeros(n, n), DVector::zeros(n));
     let mut imitation = DMatrix::zeros(n, n);
-    let mut squares = 0.0;
     for contact in &meeting.contacts {
         let (row, observed) = scene.row(meeting, contact, pose, weighting);
         information.ger(row.weight, &row.jacobian, &row.jacobian, 1.0);
@@ -113,10 +110,9 @@ pub(super) fn reduce(
         let noise = imitated(scene.surfaces[meeting.source], contact, &observed, pose) / observed.variance;
         let mut corner = imitation.fixed_view_mut::<6, 6>(0, 0);
         corner += noise * row.weight;
-        squares += row.weight * row.residual * row.residual;
     }
     let (rows, right) = observations(&information, &gradient, &imitation, scene.surfaces[meeting.source].radius_m)?;
-    Ok(Reduced { rows, right, pose: *pose, squares })
+    Ok(Reduced { rows, right, pose: *pose })
 }
 
 fn observations(

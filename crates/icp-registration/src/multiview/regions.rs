@@ -16,6 +16,14 @@ const ROUGHER: f64 = 1.15;
 /// Fewest patches of a region: smaller ones have no better normal than neighbours give.
 const FEWEST: usize = 5;
 
+/// Patches on one plane.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Region {
+    /// Of all points, about the origin of the surface.
+    pub moments: Moments,
+    pub plane: Plane,
+}
+
 /// Patches to be divided: fits, centres, neighbours of each, and what no offset is better known than, metre.
 pub(super) struct Patches<'a> {
     pub fits: &'a [(Moments, Plane)],
@@ -25,13 +33,13 @@ pub(super) struct Patches<'a> {
 }
 
 impl Patches<'_> {
-    /// The plane of the region of each patch with the number of its points; `None` for those without region.
-    pub(super) fn planes(&self, origin: &Vector3<f64>) -> Vec<Option<(Plane, f64)>> {
+    /// The regions, and which of them each patch belongs to.
+    pub(super) fn regions(&self, origin: &Vector3<f64>) -> (Vec<Region>, Vec<Option<usize>>) {
         let known = |k: usize| self.fits[k].1.variance / self.fits[k].0.count();
         let mut order: Vec<usize> = (0..self.fits.len()).collect();
         order.sort_by(|&a, &b| known(a).total_cmp(&known(b)).then(a.cmp(&b)));
         let mut taken = vec![false; self.fits.len()];
-        let mut planes = vec![None; self.fits.len()];
+        let (mut regions, mut of_patch) = (Vec::new(), vec![None; self.fits.len()]);
         for seed in order {
             if taken[seed] {
                 continue;
@@ -41,11 +49,13 @@ impl Patches<'_> {
                 continue;
             }
             let plane = moments.region_plane().filter(|plane| plane.variance <= ROUGHER * self.scatter(&region));
+            let Some(plane) = plane else { continue };
             for &k in &region {
-                planes[k] = plane.map(|plane| (plane, moments.count()));
+                of_patch[k] = Some(regions.len());
             }
+            regions.push(Region { moments, plane });
         }
-        planes
+        (regions, of_patch)
     }
 
     fn grown(&self, seed: usize, origin: &Vector3<f64>, taken: &mut [bool]) -> (Vec<usize>, Moments) {

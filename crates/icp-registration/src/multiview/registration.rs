@@ -32,16 +32,16 @@ pub struct StationRegistrationOptions<'a> {
     /// Smallest part of a station that must overlap another for the two to be aligned as a pair. Default 0.3.
     /// The simultaneous adjustment takes whatever overlaps.
     pub minimum_overlap: f64,
-    /// Partners that each station is aligned with before the adjustment, those with the most overlap. Default 3.
+    /// Partners that each station is held against by itself, those with the most overlap. Default 3.
     pub partners_per_station: usize,
-    /// Fewest patches in which two stations must meet to be held together in the adjustment. Default 15.
+    /// Fewest patches in which two stations must meet to be held together. Default 15.
     pub minimum_contacts: usize,
     /// How far a loop of pairs may fail to close, metre, before one of them counts as wrong. `None`: a tenth of the
     /// clouds' radius.
     pub loop_tolerance_m: Option<f64>,
-    /// Kernel of the last rounds. Default Tukey: what is no common surface has no weight.
+    /// Kernel of the last rounds, for single points and for what a station saw of a tile. Default Tukey: what is no common surface has no weight.
     pub kernel: RobustKernel,
-    /// Rounds of the adjustment, each with contacts found anew. Default 12.
+    /// Last rounds, each with points given to the surfaces anew; at least three. Default 12.
     pub max_rounds: usize,
     /// The rounds end when no station moves by more than this, metre. `None`: 1/2000 of the size of a patch.
     pub tolerance_m: Option<f64>,
@@ -84,9 +84,9 @@ pub struct SurfacePair {
     pub target: usize,
     /// Index of the source station.
     pub source: usize,
-    /// Part of the patches of the source that meet the target.
+    /// Part of the tiles of common surfaces that the source saw which the target saw too.
     pub overlap: f64,
-    /// Places where patches of the two meet.
+    /// Tiles, of about the size of a patch, that both saw.
     pub contacts: usize,
     /// Weighted mean distance, source before target along the target's normals, metre: what a surface seen from both is
     /// apart.
@@ -95,11 +95,12 @@ pub struct SurfacePair {
     pub rms_m: f64,
     /// The same in expected standard deviations.
     pub rms_sigma: f64,
-    /// Part of the contacts that the robust kernel took the weight from.
+    /// Part of the tiles that the robust kernel took the weight from.
     pub outliers: f64,
 }
 
-/// A station with a motion that nothing determines: it kept its start value along it.
+/// A station with a motion that the surfaces tell no better than to the size of a patch: it stayed near its start value
+/// along it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct UndeterminedStation {
     /// Index of the station.
@@ -118,7 +119,7 @@ pub struct StationRegistration {
     pub covariance: Vec<Matrix6<f64>>,
     /// Covariance of all unknowns: six a station, then the shared parameters.
     pub joint_covariance: DMatrix<f64>,
-    /// Pairs that were aligned by themselves and gave the start values.
+    /// Pairs with much overlap by themselves, at the adjusted poses.
     pub pairs: Vec<PairAlignment>,
     /// Pairs that overlap and were left out, with the reason.
     pub refused: Vec<RefusedPair>,
@@ -128,11 +129,12 @@ pub struct StationRegistration {
     pub surfaces: Vec<SurfacePair>,
     /// Stations that something leaves open; empty for a sound network.
     pub undetermined: Vec<UndeterminedStation>,
-    /// Standard deviation of unit weight: 1 where the patches scatter as their points say. `None` without redundancy.
+    /// Standard deviation of unit weight: 1 where tiles seen from several stations differ as the noise of their points
+    /// says. What is beyond is in the covariance. `None` without redundancy.
     pub sigma0: Option<f64>,
-    /// Observations less unknowns, patches that are seen by k stations counted k − 1 times.
+    /// Observations less unknowns, tiles that are seen by k stations counted k − 1 times.
     pub redundancy: i64,
-    /// Rounds of the adjustment.
+    /// Last rounds of the adjustment.
     pub rounds: usize,
     /// Whether the last round moved no station by more than the tolerance. Where it is not, stations still slide along a
     /// weak direction and may be decimetres away: do not trust the poses.

@@ -1,34 +1,22 @@
-//! The rounds of the adjustment: contacts found anew, all pairs reduced, all stations moved.
+//! The wide rounds: contacts of patches found anew, all pairs reduced, all stations moved.
 
-use nalgebra::{DMatrix, Isometry3, Point3};
+use nalgebra::{Isometry3, Point3};
 use rayon::prelude::*;
 
-use super::contacts::{Contact, Reach, partners};
+use super::contacts::{Contact, IN_PLACE, Reach, TURNED, partners};
 use super::network::{Network, State, largest_step};
 use super::patches::Surface;
 use super::point_model::PointModel;
+use super::points::StationPoints;
 use super::reduction::{Meeting, Reduced, Scene, Weighting, reduce};
 use crate::error::{Error, Result};
 use crate::kernel::{RobustKernel, mad_scale};
 
-/// Rounds of a level before the last, and the part of its limit that a step must be below for it to end.
-const WIDE_ROUNDS: usize = 8;
-const WIDE_STEP: f64 = 100.0;
+/// Most rounds of a level, and the part of its limit that a step must be below for it to end.
+const ROUNDS: usize = 8;
+const SMALL_STEP: f64 = 100.0;
 /// Nearest patches that are looked at while stations are still apart.
-const WIDE_CANDIDATES: usize = 8;
-
-/// What the last round leaves.
-pub(super) struct Adjusted {
-    pub state: State,
-    pub meetings: Vec<Meeting>,
-    pub weighting: Weighting,
-    pub cofactors: DMatrix<f64>,
-    /// Weighted sum of squares and sum of the shares of all contacts.
-    pub squares: f64,
-    pub observations: f64,
-    pub rounds: usize,
-    pub settled: bool,
-}
+const CANDIDATES: usize = 8;
 
 /// Derivatives of the patches of each station by all parameters, patch by patch.
 pub(super) type PatchDerivatives = Vec<Vec<[f64; 3]>>;
@@ -56,7 +44,7 @@ impl<'a> Surfaces<'a> {
     }
 
     /// Points, planes and derivatives at these parameters.
-    fn update(&mut self, parameters: &[f64]) -> Result<()> {
+    pub(super) fn update(&mut self, parameters: &[f64]) -> Result<()> {
         let Some((model, points)) = &self.model else { return Ok(()) };
         let modelled: Result<Vec<(Surface, Vec<[f64; 3]>)>> = (0..self.given.len())
             .into_par_iter()
@@ -64,6 +52,15 @@ impl<'a> Surfaces<'a> {
             .collect();
         self.modelled = Some(modelled?.into_iter().unzip());
         Ok(())
+    }
+
+    /// Puts the points of all stations where they are at these parameters.
+    pub(super) fn place(&self, points: &mut [StationPoints], parameters: &[f64]) -> Result<()> {
+        let Some((model, counts)) = &self.model else { return Ok(()) };
+        points
+            .par_iter_mut()
+            .enumerate()
+            .try_for_each(|(station, points)| points.follow(*model, station, counts[station], parameters))
     }
 }
 
@@ -139,29 +136,22 @@ fn share(surfaces: &[&Surface], meetings: &mut [Meeting]) {
     let mut seen: Vec<Vec<u32>> = surfaces.iter().map(|surface| vec![1; surface.patches.len()]).collect();
     for meeting in meetings.iter() {
         for contact in &meeting.contacts {
-            let (station, patch) = asking(meeting, contact);
+            let (station, patch) = asking(meeting.target, meeting.source, contact);
             seen[station][patch] += 1;
         }
     }
     for meeting in meetings.iter_mut() {
-        let ends = (meeting.target, meeting.source);
+        let (target, source) = (meeting.target, meeting.source);
         for contact in &mut meeting.contacts {
-            let (station, patch) = if contact.asked_by_source {
-                (ends.1, contact.source as usize)
-            } else {
-                (ends.0, contact.target as usize)
-            };
+            let (station, patch) = asking(target, source, contact);
             contact.share = 1.0 / f64::from(seen[station][patch]);
         }
     }
 }
 
-fn asking(meeting: &Meeting, contact: &Contact) -> (usize, usize) {
-    if contact.asked_by_source {
-        (meeting.source, contact.source as usize)
-    } else {
-        (meeting.target, contact.target as usize)
-    }
+/// The station and the patch that looked for its partner.
+fn asking(target: usize, source: usize, contact: &Contact) -> (usize, usize) {
+    if contact.asked_by_source { (source, contact.source as usize) } else { (target, contact.target as usize) }
 }
 
 /// Standard deviation of the whitened residuals of all contacts, from their median.
@@ -177,102 +167,57 @@ fn scale(scene: &Scene<'_>, meetings: &[Meeting], poses: &[Isometry3<f64>]) -> f
 
 /// How the rounds go.
 pub(super) struct Course<'a> {
-    pub network: Network<'a>,
+    pub network: &'a Network<'a>,
     /// Error of the start poses, metre.
     pub reach_m: f64,
     pub minimum_contacts: usize,
     pub kernel: RobustKernel,
-    /// Rounds of the last level, and the movement at which they end, metre.
-    pub max_rounds: usize,
-    pub tolerance_m: f64,
     pub progress: &'a (dyn Fn(usize) + Sync),
-}
-
-/// A level: how partners are looked for, and whether it is the last.
-#[derive(Debug, Clone, Copy)]
-struct Level {
-    reach: Reach,
-    last: bool,
 }
 
 impl Course<'_> {
     /// Falling limits: far partners first, so that a station that has slid along a wall is drawn back by what stands on it.
-    fn levels(&self, size_m: f64) -> Vec<Level> {
+    fn levels(&self, size_m: f64) -> Vec<Reach> {
         let mut levels = Vec::new();
         let mut across_m = self.reach_m;
         while across_m > 1.2 * size_m {
-            levels.push(Level { reach: Reach { across_m, candidates: WIDE_CANDIDATES }, last: false });
+            levels.push(Reach { across_m, candidates: CANDIDATES, cosine: TURNED });
             across_m /= 2.0;
         }
-        levels.push(Level { reach: Reach { across_m: size_m, candidates: WIDE_CANDIDATES }, last: false });
-        levels.push(Level { reach: Reach { across_m: size_m / 2.0, candidates: 1 }, last: true });
+        levels.push(Reach { across_m: size_m, candidates: CANDIDATES, cosine: IN_PLACE });
+        levels.push(Reach { across_m: size_m / 2.0, candidates: 1, cosine: IN_PLACE });
         levels
     }
 
-    /// Adjusts all stations from start poses that are right to about the reach.
-    pub(super) fn run(&self, surfaces: &mut Surfaces<'_>, start: State) -> Result<Adjusted> {
+    /// Brings all stations from start poses that are right to about the reach to a part of a patch.
+    pub(super) fn run(&self, surfaces: &mut Surfaces<'_>, start: State) -> Result<State> {
         let count = start.poses.len();
         let all: Vec<(usize, usize)> = (0..count).flat_map(|t| (t + 1..count).map(move |s| (t, s))).collect();
         let size_m = surfaces.given.iter().map(|surface| surface.size_m).fold(0.0, f64::max);
         let mut state = start;
         let mut rounds = 0;
-        let mut ended = None;
-        for level in self.levels(size_m) {
+        for reach in self.levels(size_m) {
             let mut pairs = all.clone();
-            for in_level in 0..if level.last { self.max_rounds } else { WIDE_ROUNDS } {
+            for in_level in 0..ROUNDS {
                 surfaces.update(&state.parameters)?;
-                let fewest = self.minimum_contacts;
-                let meetings = meet(&surfaces.scene(0).surfaces, &state.poses, &pairs, level.reach, fewest)?;
+                let scene = surfaces.scene(state.parameters.len());
+                let meetings = meet(&scene.surfaces, &state.poses, &pairs, reach, self.minimum_contacts)?;
                 if in_level == 0 {
                     // Stations that do not meet now will not after the small steps of one level.
                     pairs = meetings.iter().map(|meeting| (meeting.target, meeting.source)).collect();
                 }
-                let before = state.clone();
-                let adjusted = self.round(surfaces, &mut state, meetings, level, rounds)?;
+                let weighting = Weighting { kernel: self.kernel, scale: scale(&scene, &meetings, &state.poses) };
+                let next = self.network.solve(&state, &reduced(&scene, &meetings, &state.poses, &weighting)?)?;
+                let moved_m = largest_step(&state, &next, self.network.hold_m);
+                state = next;
                 rounds += 1;
                 (self.progress)(rounds);
-                let limit_m = if level.last { self.tolerance_m } else { level.reach.across_m / WIDE_STEP };
-                let settled = largest_step(&before, &state, self.network.hold_m) <= limit_m;
-                ended = Some(Adjusted { rounds, settled, ..adjusted });
-                if settled {
+                if moved_m <= reach.across_m / SMALL_STEP {
                     break;
                 }
             }
         }
-        surfaces.update(&state.parameters)?;
-        // There are at least two levels of at least one round.
-        ended.ok_or(Error::Numerical { what: "the adjustment of the stations", why: "it has no rounds" })
-    }
-
-    /// Moves all stations (twice in the last level) on the same contacts.
-    fn round(
-        &self,
-        surfaces: &Surfaces<'_>,
-        state: &mut State,
-        meetings: Vec<Meeting>,
-        level: Level,
-        rounds: usize,
-    ) -> Result<Adjusted> {
-        let wide_kernel = if self.kernel == RobustKernel::None { RobustKernel::None } else { RobustKernel::Huber };
-        let kernel = if level.last { self.kernel } else { wide_kernel };
-        let scene = surfaces.scene(state.parameters.len());
-        // The residuals follow the parameters only when the points do.
-        let steps = if level.last && scene.parameters == 0 { 2 } else { 1 };
-        let mut step = || {
-            let weighting = Weighting { kernel, scale: scale(&scene, &meetings, &state.poses) };
-            let reduced = reduced(&scene, &meetings, &state.poses, &weighting)?;
-            let squares: f64 = reduced.iter().map(|(_, reduced)| reduced.squares).sum();
-            let (next, cofactors) = self.network.solve(state, &reduced)?;
-            *state = next;
-            Ok((weighting, squares, cofactors))
-        };
-        let (mut weighting, mut squares, mut cofactors) = step()?;
-        for _ in 1..steps {
-            (weighting, squares, cofactors) = step()?;
-        }
-        let observations = meetings.iter().flat_map(|m| &m.contacts).map(|contact| contact.share).sum();
-        let state = state.clone();
-        Ok(Adjusted { state, meetings, weighting, cofactors, squares, observations, rounds, settled: false })
+        Ok(state)
     }
 }
 

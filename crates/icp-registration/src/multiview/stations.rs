@@ -5,33 +5,33 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, Isometry3, Matrix6};
 use rayon::prelude::*;
 
+use super::check::{Checked, checked};
 use super::grouping::patch_size;
 use super::network::{Network, State};
+use super::overlap::Overlap;
 use super::patches::Surface;
 use super::point_model::{SharedParameters, checked_prior};
+use super::points::StationPoints;
 use super::pose_graph::Datum;
 use super::precision;
-use super::reduction::{Meeting, Scene, Weighting};
 use super::registration::{Start, StationRegistration, StationRegistrationOptions, SurfacePair, UndeterminedStation};
-use super::rounds::{Adjusted, Course, Surfaces};
-use super::start::{Started, Starter};
+use super::rounds::{Course, Surfaces};
+use super::simultaneous::{Adjusted, Finish};
 use crate::cloud::Cloud;
 use crate::error::{Error, Result};
-use crate::kernel::quantile;
+use crate::kernel::{RobustKernel, quantile};
 use crate::normals::{UnorganisedNormalOptions, unorganised_normals};
 use crate::pose::is_finite;
 
 /// Default of the error of approximate poses, in radii of the clouds.
 const START_ERROR: f64 = 0.2;
-/// Error of poses found without any, voxels.
-const ARRANGED_ERROR: f64 = 2.0;
 
 /// Brings the clouds of many stations into one coordinate system.
 ///
-/// Pairs that overlap are aligned, pairs that contradict the loops of the others are left out, and then all stations are
-/// adjusted at once: wherever patches of two stations meet, their distance along the common normal is one observation,
-/// over all overlaps and in one system, with contacts found anew in each round (`[ChenMedioni1992]`, `[Pulli1999]`).
-/// `progress(done, total)` is told the pairs aligned and the rounds of the adjustment.
+/// Wide rounds bring the stations together where patches of their surfaces meet, all overlaps in one system with contacts
+/// found anew in each round (`[ChenMedioni1992]`, `[Pulli1999]`). The last rounds take all points: each station's pieces of
+/// a surface are joined to facets, whose planes are unknown too and eliminated exactly. Then pairs are held against their
+/// loops. `progress(done, total)` is told the rounds of each part.
 ///
 /// Clouds without normals get them from their nearest neighbours.
 ///
@@ -50,32 +50,49 @@ pub fn register_stations(
     let surfaces = prepare(stations, options)?;
     let patch_m = surfaces[0].size_m;
     let radius_m = surfaces.iter().map(|surface| surface.radius_m).fold(0.0, f64::max);
-    let starter = Starter { surfaces: &surfaces, options, patch_m, radius_m, datum, progress };
-    let (poses, reach_m) = if let Start::Poses(poses) = start {
-        (poses.to_vec(), options.start_error_m.unwrap_or(START_ERROR * radius_m))
-    } else {
-        let (poses, voxel_m) = super::blind::arranged(stations, start, datum.held_station())?;
-        (poses, (ARRANGED_ERROR * voxel_m).max(patch_m))
+    let poses = match start {
+        Start::Poses(poses) => poses.to_vec(),
+        _ => super::blind::arranged(stations, start, datum.held_station())?,
     };
+    // Stations that were arranged by what they saw may have slid along walls together: they are not known better.
+    let reach_m = options.start_error_m.unwrap_or(START_ERROR * radius_m);
     let (prior, names) = match options.model {
         Some(model) => (checked_prior(model)?, model.names()),
         None => Default::default(),
     };
+    let network =
+        Network { fixed: datum.held_station(), hold_m: radius_m, turn_rad: 1.0, names: &names, prior: &prior };
+    let wide_kernel = if options.kernel == RobustKernel::None { RobustKernel::None } else { RobustKernel::Huber };
+    let total = |done| progress(done, options.max_rounds);
     let course = Course {
-        network: Network { fixed: datum.held_station(), hold_m: radius_m, names: &names, prior: &prior },
+        network: &network,
         reach_m,
         minimum_contacts: options.minimum_contacts,
-        kernel: options.kernel,
-        max_rounds: options.max_rounds,
-        tolerance_m: options.tolerance_m.unwrap_or(patch_m / 2000.0),
-        progress: &|done| progress(done, options.max_rounds),
+        kernel: wide_kernel,
+        progress: &total,
     };
     let mut modelled = Surfaces::fixed(surfaces.iter().collect());
     modelled.model = options.model.map(|model| (model, stations.iter().map(Cloud::len).collect()));
-    let adjusted = course.run(&mut modelled, State { poses: poses.clone(), parameters: prior.0.clone() })?;
-    require_connected(&adjusted, datum)?;
-    let started = Started { poses, ..starter.check(&adjusted.state.poses)? };
-    let result = finish(&modelled, started, adjusted, &course.network, datum);
+    let near = course.run(&mut modelled, State { poses: poses.clone(), parameters: prior.0.clone() })?;
+    let finish = Finish {
+        network: &network,
+        near: network.near(patch_m / 2.0),
+        kernel: options.kernel,
+        max_rounds: options.max_rounds,
+        tolerance_m: options.tolerance_m.unwrap_or(patch_m / 2000.0),
+        minimum_contacts: options.minimum_contacts,
+        progress: &total,
+    };
+    let mut points: Vec<StationPoints> =
+        stations.par_iter().zip(&surfaces).map(|(cloud, surface)| StationPoints::new(cloud, surface)).collect();
+    let mut adjusted = finish.run(&mut modelled, &mut points, near)?;
+    if let Some(state) = returned(&adjusted, &poses, &network, patch_m) {
+        // Wide rounds may have moved stations where noise alone told them to.
+        adjusted = finish.run(&mut modelled, &mut points, state)?;
+    }
+    require_connected(&adjusted, options.minimum_contacts, datum)?;
+    let checked = checked(&adjusted, options, datum, (radius_m, patch_m))?;
+    let result = result(checked, adjusted, &poses, &network, datum, (patch_m, options.minimum_contacts));
     let prepared = match modelled.modelled {
         Some((modelled, _)) => modelled,
         None => surfaces,
@@ -83,16 +100,17 @@ pub fn register_stations(
     Ok(StationRegistration { prepared: Arc::new(prepared), ..result })
 }
 
-/// Every station meets, through others, the one that is held.
-fn require_connected(adjusted: &Adjusted, datum: Datum) -> Result<()> {
+/// Every station shares surfaces, through others, with the one that is held.
+fn require_connected(adjusted: &Adjusted, fewest: usize, datum: Datum) -> Result<()> {
     let mut reached = vec![false; adjusted.state.poses.len()];
     reached[datum.held_station()] = true;
+    let overlaps = adjusted.overlaps(fewest);
     let mut grown = true;
     while grown {
         grown = false;
-        for meeting in &adjusted.meetings {
-            if reached[meeting.target] != reached[meeting.source] {
-                (reached[meeting.target], reached[meeting.source]) = (true, true);
+        for pair in &overlaps {
+            if reached[pair.target] != reached[pair.source] {
+                (reached[pair.target], reached[pair.source]) = (true, true);
                 grown = true;
             }
         }
@@ -164,31 +182,29 @@ fn prepare(stations: &[Cloud], options: &StationRegistrationOptions<'_>) -> Resu
     stations.par_iter().map(prepare).collect()
 }
 
-fn finish(
-    surfaces: &Surfaces<'_>,
-    started: Started,
+fn result(
+    checked: Checked,
     adjusted: Adjusted,
+    start: &[Isometry3<f64>],
     network: &Network<'_>,
     datum: Datum,
+    (size_m, fewest): (f64, usize),
 ) -> StationRegistration {
     let count = adjusted.state.poses.len();
     let parameters = adjusted.state.parameters.len();
-    let scene = surfaces.scene(parameters);
-    let redundancy = adjusted.observations.round() as i64 - 6 * (count as i64 - 1) - parameters as i64;
-    let sigma0 = (redundancy > 0).then(|| (adjusted.squares / redundancy as f64).sqrt());
-    let covariance = precision::covariance(&scene, &adjusted, network.hold_m, sigma0.unwrap_or(1.0).powi(2));
-    let undetermined = undetermined(&adjusted.state.poses, &covariance, network.hold_m);
-    let pairs = adjusted.meetings.iter().map(|m| surface_pair(&scene, m, &adjusted.state.poses, &adjusted.weighting));
-    let pairs = pairs.collect();
-    let poses = adjusted.state.poses;
-    let (poses, joint) = datum.apply(&started.poses, poses, covariance, network.hold_m);
+    let (redundancy, sigma0) = (adjusted.redundancy(), adjusted.sigma0());
+    let factor = 0.5 * adjusted.variance_factor();
+    let covariance = factor * (&adjusted.cofactors + adjusted.cofactors.transpose());
+    let undetermined = undetermined(&adjusted.state.poses, &covariance, network.hold_m, size_m);
+    let surfaces = adjusted.overlaps(fewest).iter().map(|overlap| surface_pair(&adjusted, overlap)).collect();
+    let (poses, joint) = datum.apply(start, adjusted.state.poses, covariance, network.hold_m);
     StationRegistration {
         covariance: (0..count).map(|k| joint.fixed_view::<6, 6>(6 * k, 6 * k).into_owned()).collect(),
         world_from_station: poses,
-        pairs: started.pairs,
-        refused: started.refused,
-        loops: started.loops,
-        surfaces: pairs,
+        pairs: checked.pairs,
+        refused: checked.refused,
+        loops: checked.loops,
+        surfaces,
         undetermined,
         sigma0,
         redundancy,
@@ -200,38 +216,62 @@ fn finish(
     }
 }
 
-fn undetermined(poses: &[Isometry3<f64>], covariance: &DMatrix<f64>, hold_m: f64) -> Vec<UndeterminedStation> {
+/// The state with what is undetermined of the stations as it was at the start; `None` where all is determined.
+fn returned(adjusted: &Adjusted, start: &[Isometry3<f64>], network: &Network<'_>, size_m: f64) -> Option<State> {
+    let mut state = adjusted.state.clone();
+    let mut any = false;
+    for (k, (pose, start)) in state.poses.iter_mut().zip(start).enumerate().filter(|(k, _)| *k != network.fixed) {
+        let own: Matrix6<f64> = adjusted.cofactors.fixed_view::<6, 6>(6 * k, 6 * k).into_owned();
+        if let Some(back) = precision::returned(pose, start, &own, network.hold_m, size_m) {
+            *pose = back;
+            any = true;
+        }
+    }
+    any.then_some(state)
+}
+
+fn undetermined(
+    poses: &[Isometry3<f64>],
+    covariance: &DMatrix<f64>,
+    hold_m: f64,
+    size_m: f64,
+) -> Vec<UndeterminedStation> {
     let motions = poses.iter().enumerate().map(|(station, pose)| {
         let own: Matrix6<f64> = covariance.fixed_view::<6, 6>(6 * station, 6 * station).into_owned();
-        UndeterminedStation { station, motions: precision::undetermined(pose, &own, hold_m) }
+        UndeterminedStation { station, motions: precision::undetermined(pose, &own, hold_m, size_m) }
     });
     motions.filter(|station| !station.motions.is_empty()).collect()
 }
 
-fn surface_pair(scene: &Scene<'_>, meeting: &Meeting, poses: &[Isometry3<f64>], weighting: &Weighting) -> SurfacePair {
-    let pose = poses[meeting.target].inverse() * poses[meeting.source];
+fn surface_pair(adjusted: &Adjusted, overlap: &Overlap) -> SurfacePair {
+    let Overlap { target, source, fraction } = *overlap;
+    let eye = adjusted.state.poses[target].translation.vector;
+    let count = adjusted.state.poses.len();
+    let tiles = adjusted.shared(target, source);
     let (mut weight, mut mean, mut square, mut whitened, mut outliers) = (0.0, 0.0, 0.0, 0.0, 0_usize);
-    for contact in &meeting.contacts {
-        let (row, observed) = scene.row(meeting, contact, &pose, weighting);
+    for tile in &tiles {
+        let facet = &adjusted.facets[tile.facet];
+        let weight_of = |station: usize| adjusted.scatter.weights[tile.target.tile * count + station];
+        let robust = weight_of(target).min(weight_of(source));
+        let own = robust * tile.weight();
         // Along the normal that points to the target station, so that the sign means nearer or farther.
-        let towards = if observed.normal.dot(&observed.place) > 0.0 { -observed.residual } else { observed.residual };
-        weight += row.weight;
-        mean += row.weight * towards;
-        square += row.weight * observed.residual.powi(2);
-        whitened += row.weight * row.residual.powi(2);
-        outliers += usize::from(row.weight < 0.1 * contact.share);
+        let facing = facet.normal.dot(&(eye - facet.origin)) >= 0.0;
+        weight += own;
+        mean += own * if facing { tile.apart_m() } else { -tile.apart_m() };
+        square += own * tile.apart_m().powi(2);
+        whitened += own * tile.weight() * tile.apart_m().powi(2);
+        outliers += usize::from(robust < 0.1);
     }
-    let asked = meeting.contacts.iter().filter(|contact| contact.asked_by_source).count();
     let of = |sum: f64| if weight > 0.0 { sum / weight } else { 0.0 };
     SurfacePair {
-        target: meeting.target,
-        source: meeting.source,
-        overlap: asked as f64 / scene.surfaces[meeting.source].patches.len() as f64,
-        contacts: meeting.contacts.len(),
+        target,
+        source,
+        overlap: fraction,
+        contacts: tiles.len(),
         mean_m: of(mean),
         rms_m: of(square).sqrt(),
         rms_sigma: of(whitened).sqrt(),
-        outliers: outliers as f64 / meeting.contacts.len().max(1) as f64,
+        outliers: outliers as f64 / tiles.len().max(1) as f64,
     }
 }
 

@@ -7,7 +7,7 @@ use super::frame::OrganisedFrame;
 use super::grid::STRIDES;
 use super::options::FrameAlignmentOptions;
 use super::pairs::Rules;
-use super::quality::{Cell, Hold, Residuals, Verdict};
+use super::quality::{Cell, Hold, Verdict};
 use super::starts::{share_of_agreement, slid};
 use super::sums::{SUMS, normal_equations, residuals};
 use super::track::{Gauge, Track, blocks, moved, solve, turned};
@@ -15,6 +15,7 @@ use crate::error::{Error, Result};
 use crate::icp::{DegeneracyPolicy, IcpResult, StopReason};
 use crate::kernel::quantile;
 use crate::pose::{is_finite, pose_difference, step_pose, symmetrised, tangent_from_centred};
+use crate::quality::Residuals;
 
 /// Biweight with 95 % efficiency on normally distributed residuals.
 const BIWEIGHT: f32 = 4.685;

@@ -5,6 +5,7 @@
 
 mod aligner;
 mod blocks;
+mod consistency;
 mod frame;
 mod grid;
 mod map;
@@ -21,6 +22,7 @@ mod table;
 mod track;
 
 pub use aligner::{FrameAligner, align_frames};
+pub use consistency::{FrameConsistency, frame_consistency};
 pub use frame::OrganisedFrame;
 pub(crate) use map::{Agreement, thumbnail_difference};
 pub use options::FrameAlignmentOptions;

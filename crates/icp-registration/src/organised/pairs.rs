@@ -107,6 +107,16 @@ pub(super) struct Pairs {
     pub slope: [f32; BLOCK],
 }
 
+/// Where nodes lie for the target; NaN where it has no plane.
+pub(super) struct Distances {
+    /// Distance beyond the target plane, seen from the target's camera, metre.
+    pub residual: [f32; BLOCK],
+    /// Variance of the residual, m².
+    pub variance: [f32; BLOCK],
+    /// Cosine between the normals.
+    pub cosine: [f32; BLOCK],
+}
+
 impl<'a> Moved<'a> {
     /// `centre` and `radius`: about which and in which units motions are solved, target frame.
     pub(super) fn new(
@@ -130,9 +140,7 @@ impl<'a> Moved<'a> {
     /// The pairs of a block of source nodes.
     #[inline(always)]
     pub(super) fn pairs<L: Locate>(&self, locate: L, rules: &Rules, block: &Block) -> Pairs {
-        let p = self.rotated(&block.position, self.translation);
-        let source_normal = self.rotated(&block.normal, [0.0; 3]);
-        let (planes, variances) = self.partners(locate, &p);
+        let (p, source_normal, planes, distances) = self.compared(locate, block);
         let nothing = [0.0; BLOCK];
         let mut pairs = Pairs {
             normal: [planes[0], planes[1], planes[2]],
@@ -145,10 +153,8 @@ impl<'a> Moved<'a> {
             met: [false; BLOCK],
         };
         for k in 0..BLOCK {
-            let [a, b, c, d] = [planes[0][k], planes[1][k], planes[2][k], planes[3][k]];
-            let residual = a * p[0][k] + b * p[1][k] + c * p[2][k] - d;
-            let cosine = a * source_normal[0][k] + b * source_normal[1][k] + c * source_normal[2][k];
-            let variance = variances[k] + block.variance[k] + rules.extra_variance;
+            let (residual, cosine) = (distances.residual[k], distances.cosine[k]);
+            let variance = distances.variance[k] + rules.extra_variance;
             let u2 = residual * residual / (variance * rules.reach * rules.reach);
             // NaN fails: no partner.
             let accepted = cosine >= rules.least_cosine && u2 < 1.0;
@@ -165,6 +171,34 @@ impl<'a> Moved<'a> {
             }
         }
         pairs
+    }
+
+    /// Where the nodes of a block lie for the target.
+    #[inline(always)]
+    pub(super) fn distances<L: Locate>(&self, locate: L, block: &Block) -> Distances {
+        self.compared(locate, block).3
+    }
+
+    /// Moved positions and normals, the planes on which they fall, and how far off they are.
+    #[inline(always)]
+    #[allow(clippy::type_complexity)]
+    fn compared<L: Locate>(
+        &self,
+        locate: L,
+        block: &Block,
+    ) -> ([[f32; BLOCK]; 3], [[f32; BLOCK]; 3], [[f32; BLOCK]; 4], Distances) {
+        let p = self.rotated(&block.position, self.translation);
+        let source_normal = self.rotated(&block.normal, [0.0; 3]);
+        let (planes, variances) = self.partners(locate, &p);
+        let nothing = [0.0; BLOCK];
+        let mut distances = Distances { residual: nothing, variance: nothing, cosine: nothing };
+        for k in 0..BLOCK {
+            let [a, b, c, d] = [planes[0][k], planes[1][k], planes[2][k], planes[3][k]];
+            distances.residual[k] = a * p[0][k] + b * p[1][k] + c * p[2][k] - d;
+            distances.cosine[k] = a * source_normal[0][k] + b * source_normal[1][k] + c * source_normal[2][k];
+            distances.variance[k] = variances[k] + block.variance[k];
+        }
+        (p, source_normal, planes, distances)
     }
 
     #[inline(always)]

@@ -10,40 +10,26 @@
 // Lanes lie side by side: with an index, loops read as their formulas and have the same length everywhere.
 #![allow(clippy::needless_range_loop)]
 
-use nalgebra::{DMatrix, DVector, Matrix6, Vector3, Vector6};
+use nalgebra::{DMatrix, Matrix6, Vector3, Vector6};
 use rayon::prelude::*;
 
 use super::blocks::Block;
 use super::grid::BLOCK;
 use super::pairs::{Locate, Moved, Rules, WithLocate, with_locate};
 use super::sums::derivatives;
-use crate::eigen::eigen6;
 use crate::error::{Error, Result};
 use crate::icp::UndeterminedMotion;
-use crate::icp::motion::name_motions;
 use crate::pose::symmetrised;
+use crate::quality::{Direction, Directions, FEWEST_CELLS, Residuals, expanded};
 
 /// Cells across the longer side of the frame.
 const CELLS: usize = 24;
-/// Information below this multiple of its own scatter between cells counts as none.
-const SIGNIFICANCE: f64 = 2.5;
-/// Cells below which their scatter is no estimate.
-const FEWEST_CELLS: usize = 20;
 /// Share of the largest information that rounding can imitate (single precision).
 const ROUNDING: f64 = 1e-7;
 /// Parts of the pairs, each with cells of its own, that threads may take.
 const PARTS: usize = 4;
 /// 6 scores and 21 products.
 const SUMS: usize = 6 + 21;
-
-/// What the residuals consist of.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Residuals {
-    /// The frames are still apart: what neighbouring residuals share is no error, and would hold what can be solved.
-    Misaligned,
-    /// Errors: what neighbouring residuals share counts.
-    Settled,
-}
 
 /// Motions that keep the guess.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -57,18 +43,9 @@ pub(super) enum Hold {
 /// Sums over the pairs of one cell.
 pub(super) type Cell = [f64; SUMS];
 
-/// One eigen-direction of the information.
-struct Direction {
-    vector: Vector6<f64>,
-    information: f64,
-    sigma_m: f64,
-    determined: bool,
-}
-
-/// Directions of the information, worst first, with the covariance of the score.
+/// What the pairs say about the pose.
 pub(super) struct Verdict {
-    directions: Vec<Direction>,
-    score: Matrix6<f64>,
+    directions: Directions,
 }
 
 impl Verdict {
@@ -86,7 +63,6 @@ impl Verdict {
             sum.iter_mut().zip(&cell[6..]).for_each(|(s, c)| *s += c);
             sum
         }));
-        let (values, vectors) = eigen6(&information, "the information of the pairs")?;
         let used = cells.iter().filter(|c| c[6] + c[12] + c[17] != 0.0).count();
         let score = match residuals {
             Residuals::Misaligned => independent,
@@ -94,32 +70,25 @@ impl Verdict {
             // Too few cells to estimate from: the pairs of a cell taken as fully dependent.
             Residuals::Settled => independent * (count as f64 / used.max(1) as f64),
         };
-        let directions = (0..6)
-            .map(|k| direction(cells, &score, values[5], values[k], vectors.column(k).into(), max_sigma_m))
-            .collect();
-        Ok(Self { directions, score })
+        let scatter = |motion: &Vector6<f64>| cells.iter().map(|c| form(&c[6..], motion).powi(2)).sum::<f64>().sqrt();
+        Ok(Self { directions: Directions::new(&information, |_| (score, 1.0), scatter, ROUNDING, max_sigma_m)? })
     }
 
     /// Orthonormal undetermined motions `[dt, rho w]`.
     pub(super) fn held(&self) -> Matrix6<f64> {
-        self.directions
-            .iter()
-            .filter(|d| !d.determined)
-            .fold(Matrix6::zeros(), |sum, d| sum + d.vector * d.vector.transpose())
+        self.directions.held().fold(Matrix6::zeros(), |sum, motion| sum + motion * motion.transpose())
     }
 
     /// The undetermined motions, sorted into translations and rotations.
     pub(super) fn undetermined(&self, centre: &Vector3<f64>, radius_m: f64) -> Vec<UndeterminedMotion> {
-        let space: Vec<(Vector6<f64>, f64)> =
-            self.directions.iter().filter(|d| !d.determined).map(|d| (d.vector, d.sigma_m)).collect();
-        name_motions(&space, centre, radius_m)
+        self.directions.undetermined(centre, radius_m)
     }
 
     /// Covariance of motions `[dt, rho w]`; what is not known at all gets the radius as sigma.
     pub(super) fn covariance(&self, radius_m: f64, held: Hold) -> Matrix6<f64> {
         let (basis, inside) = self.known(held);
-        let unknown = Matrix6::identity() - fixed(&(&basis * basis.transpose()));
-        fixed(&(&basis * inside * basis.transpose())) + unknown * radius_m.powi(2)
+        let all = DMatrix::identity(inside.nrows(), inside.nrows());
+        expanded(&basis, &inside) + (Matrix6::identity() - expanded(&basis, &all)) * radius_m.powi(2)
     }
 
     /// The most probable motion and its covariance, where a guess lies `offset` away and has the covariance `prior`.
@@ -130,7 +99,7 @@ impl Verdict {
         let (basis, inside) = self.known(Hold::Undetermined);
         let from_pairs = inside.cholesky().ok_or(error.clone())?.inverse();
         let from_guess = prior.cholesky().ok_or(error.clone())?.inverse();
-        let information = from_guess + fixed(&(&basis * from_pairs * basis.transpose()));
+        let information = from_guess + expanded(&basis, &from_pairs);
         let covariance = symmetrised(&information).cholesky().ok_or(error)?.inverse();
         Ok((covariance * (from_guess * offset), covariance))
     }
@@ -138,31 +107,9 @@ impl Verdict {
     /// Basis of the motions that are known, and their covariance in it.
     fn known(&self, held: Hold) -> (DMatrix<f64>, DMatrix<f64>) {
         let is_known = |d: &&Direction| d.sigma_m.is_finite() && (d.determined || held == Hold::Nothing);
-        let known: Vec<&Direction> = self.directions.iter().filter(is_known).collect();
-        let basis = DMatrix::from_fn(6, known.len(), |r, c| known[c].vector[r]);
-        let inverse =
-            DMatrix::from_diagonal(&DVector::from_iterator(known.len(), known.iter().map(|d| 1.0 / d.information)));
-        let score = basis.transpose() * self.score * &basis;
-        (basis, &inverse * score * &inverse)
+        let known: Vec<&Direction> = self.directions.all().iter().filter(is_known).collect();
+        self.directions.sandwich(&known, |_| None)
     }
-}
-
-fn fixed(m: &DMatrix<f64>) -> Matrix6<f64> {
-    Matrix6::from_fn(|r, c| m[(r, c)])
-}
-
-fn direction(
-    cells: &[Cell],
-    score: &Matrix6<f64>,
-    largest: f64,
-    information: f64,
-    vector: Vector6<f64>,
-    max_sigma_m: f64,
-) -> Direction {
-    let scatter = cells.iter().map(|c| form(&c[6..], &vector).powi(2)).sum::<f64>().sqrt();
-    let significant = information > SIGNIFICANCE * scatter && information > ROUNDING * largest;
-    let sigma_m = if significant { vector.dot(&(score * vector)).max(0.0).sqrt() / information } else { f64::INFINITY };
-    Direction { vector, information, sigma_m, determined: sigma_m <= max_sigma_m }
 }
 
 /// Covariance of the summed score from the scatter of its sums over cells.

@@ -169,12 +169,7 @@ impl Tracker {
     ///
     /// Half of the covariance of the registration is the keyframe's noise, which all frames registered with it share;
     /// only the other half averages out with the prediction.
-    fn weighted(
-        &self,
-        measured: &Measured,
-        prediction: &Prediction,
-        lost_frames: usize,
-    ) -> Result<Fix, LossReason> {
+    fn weighted(&self, measured: &Measured, prediction: &Prediction, lost_frames: usize) -> Result<Fix, LossReason> {
         let half = measured.own();
         let expected = self.expects(&half, prediction, lost_frames);
         if !expected || prediction.grounds == Grounds::Nothing {

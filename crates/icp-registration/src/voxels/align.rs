@@ -10,7 +10,7 @@ use crate::error::{Error, Result};
 use crate::icp::{DegeneracyPolicy, IcpResult, StopReason};
 use crate::kernel::RobustKernel;
 use crate::pose::{is_finite, move_about};
-use crate::quality::{Centred, Verdict};
+use crate::quality::{Centred, Residuals, Verdict};
 
 /// Iterations that a coarse level may take.
 const LEVEL_ITERATIONS: usize = 8;
@@ -175,8 +175,8 @@ impl<'a> Run<'a> {
         let (pose, iteration, kernel) = (self.pose, self.iterations, self.options.kernel);
         let max_sigma_m = self.max_motion_sigma_m();
         let system = self.enough(matcher, &pose, Partners::Anew, kernel, iteration)?;
-        let (frame, contributions) = (system.frame, system.contributions(matcher.target));
-        let held = Verdict::new(contributions, frame, cell(&system, matcher), max_sigma_m)?.held();
+        let (frame, cells) = (system.frame, system.cells(matcher.target, cell(&system, matcher)));
+        let held = Verdict::new(&cells, max_sigma_m, Residuals::Settled)?.held();
         let slide = (guess * pose.inverse() * Point3::from(frame.centre)).coords - frame.centre;
         let turn = (guess.rotation * pose.rotation.inverse()).scaled_axis() * frame.radius_m;
         let back = Vector6::new(slide.x, slide.y, slide.z, turn.x, turn.y, turn.z);
@@ -226,10 +226,10 @@ impl<'a> Run<'a> {
         let (pose, iterations, max_sigma_m) = (self.pose, self.iterations, self.max_motion_sigma_m());
         let (kernel, points) = (self.options.kernel, self.source.points as f64);
         let system = self.enough(matcher, &pose, Partners::Anew, kernel, iterations)?;
-        let verdict =
-            Verdict::new(system.contributions(matcher.target), system.frame, cell(&system, matcher), max_sigma_m)?;
+        let cells = system.cells(matcher.target, cell(&system, matcher));
+        let verdict = Verdict::new(&cells, max_sigma_m, Residuals::Settled)?;
         let (rms_m, correspondences, degenerate) = (system.rms_m(), system.count, verdict.undetermined());
-        let covariance = verdict.covariance(&pose);
+        let covariance = verdict.covariance(&pose, None);
         let seen: f64 = matched(&self.pairs).map(|p| p.count).sum();
         Ok(IcpResult {
             target_from_source: pose,

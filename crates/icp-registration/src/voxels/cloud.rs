@@ -1,7 +1,7 @@
 //! A cloud prepared for registration.
 
 use super::gather::gather;
-use super::lattice::Lattice;
+use super::lattice::{Lattice, bounds};
 use super::level::Level;
 use super::moments::Moments;
 use super::options::VoxelOptions;
@@ -35,11 +35,12 @@ impl VoxelCloud {
     /// [`Error::VoxelSize`] for a size that is not positive, or of which more than two million lie along the cloud.
     pub fn new(cloud: &Cloud, options: &VoxelOptions) -> Result<Self> {
         cloud.validate("the cloud of voxels")?;
+        let bounds = bounds(&cloud.points);
         let size_m = match options.voxel_m {
             Some(size_m) => size_m,
-            None => voxel_size(&cloud.points)?,
+            None => voxel_size(&cloud.points, &bounds)?,
         };
-        let lattice = Lattice::new(&cloud.points, size_m)?;
+        let lattice = Lattice::within(&bounds, size_m)?;
         let rim = cloud.rim.as_deref();
         let (keys, moments) = gather::<Moments>(&cloud.points, &lattice, |i| rim.is_none_or(|r| !r[i]), &());
         if keys.is_empty() {

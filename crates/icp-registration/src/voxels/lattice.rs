@@ -25,7 +25,11 @@ impl Lattice {
     /// # Errors
     /// [`Error::VoxelSize`] for a size that is not positive, or so small that the indices overflow.
     pub fn new(points: &[Point3<f64>], size_m: f64) -> Result<Self> {
-        let (low, high) = bounds(points);
+        Self::within(&bounds(points), size_m)
+    }
+
+    /// As [`Lattice::new`] for points within known bounds.
+    pub fn within(&(low, high): &Bounds, size_m: f64) -> Result<Self> {
         let extent_m = (high - low).amax();
         let refused = Error::VoxelSize { voxel_m: size_m, extent_m };
         let inverse = 1.0 / size_m;
@@ -56,7 +60,10 @@ impl Lattice {
     }
 }
 
-fn bounds(points: &[Point3<f64>]) -> (Vector3<f64>, Vector3<f64>) {
+/// Smallest and largest coordinates.
+pub(crate) type Bounds = (Vector3<f64>, Vector3<f64>);
+
+pub(crate) fn bounds(points: &[Point3<f64>]) -> Bounds {
     let start = (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY));
     points.iter().fold(start, |(low, high), p| (low.inf(&p.coords), high.sup(&p.coords)))
 }

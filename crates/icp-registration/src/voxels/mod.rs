@@ -10,6 +10,7 @@ mod level;
 mod moments;
 mod options;
 mod pairs;
+mod samples;
 mod scale;
 mod wide;
 

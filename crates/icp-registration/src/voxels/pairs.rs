@@ -9,7 +9,7 @@ use crate::eigen::eigen6;
 use crate::error::Result;
 use crate::kernel::{RobustKernel, mad_scale};
 use crate::pose::symmetrised;
-use crate::quality::{Centred, Contribution};
+use crate::quality::{Cells, Centred};
 
 /// Partners farther apart than this many voxels belong to different things.
 pub(crate) const REACH: f64 = 1.5;
@@ -189,17 +189,18 @@ impl<'a> System<'a> {
         Ok(keep * step)
     }
 
-    /// What each pair says about the pose.
-    pub fn contributions(&self, target: &'a Level) -> impl Iterator<Item = Contribution> + '_ {
+    /// What the pairs say about the pose, those in a cube of `cell_m` as one observation.
+    pub fn cells(&self, target: &Level, cell_m: f64) -> Cells {
         let unit = self.frame.radius_m.powi(2);
-        matched(self.pairs).map(move |pair| {
+        let mut cells = Cells::new(self.frame, cell_m);
+        for pair in matched(self.pairs) {
             let (weight, slope) = self.weights(pair);
             let a = self.frame.derivative(&pair.moved, &target.voxels[pair.target as usize].normal);
             let b = self.frame.derivative(&pair.moved, &pair.source_normal);
             let score = self.frame.derivative(&pair.moved, &pair.normal) * (weight * unit * pair.residual);
-            let information = (a * b.transpose() + b * a.transpose()) * (0.5 * slope * unit);
-            Contribution { place: pair.moved, score, information }
-        })
+            *cells.add(&pair.moved, &score) += (a * b.transpose() + b * a.transpose()) * (0.5 * slope * unit);
+        }
+        cells
     }
 
     /// Root mean square residual, weighted by the kernel, metre.

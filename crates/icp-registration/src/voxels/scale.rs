@@ -7,7 +7,7 @@
 use nalgebra::Point3;
 
 use super::gather::{Sum, gather};
-use super::lattice::Lattice;
+use super::lattice::{Bounds, Lattice};
 use crate::error::Result;
 use crate::kernel::quantile;
 
@@ -27,9 +27,9 @@ const SMALLEST_SHARE: f64 = 1e-6;
 const GROWTH: f64 = 1.05;
 
 /// Edge of the voxels, metre: the voxel of a typical point holds about eight, but there are at most about 10 000 voxels.
-pub(crate) fn voxel_size(points: &[Point3<f64>]) -> Result<f64> {
+pub(crate) fn voxel_size(points: &[Point3<f64>], (low, high): &Bounds) -> Result<f64> {
     let sample: Vec<Point3<f64>> = points.iter().copied().step_by(points.len().div_ceil(SAMPLE).max(1)).collect();
-    let (radius, extent) = radius_and_extent(&sample, points);
+    let (radius, extent) = (radius(&sample), (high - low).amax());
     if extent <= 0.0 {
         // All points in one place: any size will do.
         return Ok(1.0);
@@ -66,16 +66,11 @@ fn typical(counts: &[f64]) -> f64 {
         .unwrap_or(1.0)
 }
 
-/// Median distance from the median position, and the largest extent along an axis.
-fn radius_and_extent(sample: &[Point3<f64>], points: &[Point3<f64>]) -> (f64, f64) {
+/// Median distance from the median position.
+fn radius(sample: &[Point3<f64>]) -> f64 {
     let middle = [0, 1, 2].map(|k| quantile(&mut sample.iter().map(|p| p[k]).collect::<Vec<_>>(), 0.5));
     let middle = Point3::from(middle);
-    let radius = quantile(&mut sample.iter().map(|p| (p - middle).norm()).collect::<Vec<_>>(), 0.5);
-    let extent = (0..3).map(|k| {
-        let ends = points.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), p| (l.min(p[k]), h.max(p[k])));
-        ends.1 - ends.0
-    });
-    (radius, extent.fold(0.0, f64::max))
+    quantile(&mut sample.iter().map(|p| (p - middle).norm()).collect::<Vec<_>>(), 0.5)
 }
 
 #[derive(Debug, Default, Clone)]

@@ -4,6 +4,7 @@
 use nalgebra::{Isometry3, Matrix6, Vector3, Vector6};
 
 use super::level::{Level, Voxel};
+use super::samples::{Samples, Sought};
 use crate::eigen::eigen6;
 use crate::error::Result;
 use crate::pose::{move_about, symmetrised};
@@ -31,13 +32,14 @@ pub(crate) const RULES: [Rule; 3] =
 /// Samples of two clouds.
 pub(crate) struct Wide {
     source: Vec<Voxel>,
-    target: Vec<Voxel>,
+    target: Samples,
     radius_m: f64,
 }
 
 impl Wide {
     pub fn new(source: &[Level], target: &[Level], radius_m: f64) -> Self {
-        Self { source: sample(source, SOURCE_SAMPLES), target: sample(target, TARGET_SAMPLES), radius_m }
+        let target = Samples::new(sample(target, TARGET_SAMPLES), radius_m.max(f64::MIN_POSITIVE));
+        Self { source: sample(source, SOURCE_SAMPLES), target, radius_m }
     }
 
     /// The pose reached from `guess` while the scale falls from `first_m` to `last_m`, and the steps it took.
@@ -64,24 +66,19 @@ impl Wide {
         let n = self.source.len() as f64;
         let first = self.source.first()?.mean;
         let mean = first + self.source.iter().fold(Vector3::zeros(), |sum, v| sum + (v.mean - first)) / n;
-        (self.radius_m > 0.0 && !self.target.is_empty())
+        (self.radius_m > 0.0 && !self.target.voxels.is_empty())
             .then(|| Centred { centre: (pose * mean).coords, radius_m: self.radius_m })
     }
 
     fn step(&self, pose: &Isometry3<f64>, rule: Rule, scale: f64, frame: Centred) -> Result<Vector6<f64>> {
         let (mut h, mut g) = (Matrix6::zeros(), Vector6::zeros());
-        for voxel in &self.source {
-            let (moved, normal) = (pose * voxel.mean, pose.rotation * voxel.normal);
-            let mut best = (f64::INFINITY, 0);
-            for (index, target) in self.target.iter().enumerate() {
-                let cosine = target.normal.dot(&normal);
-                let cost =
-                    (target.mean - moved).norm_squared() / (scale * scale) + rule.direction * (1.0 - cosine * cosine);
-                if cost < best.0 {
-                    best = (cost, index);
-                }
-            }
-            let target = &self.target[best.1];
+        let sought = |voxel: &Voxel| {
+            let (place, normal) = (pose * voxel.mean, pose.rotation * voxel.normal);
+            Sought { place, normal, scale_m: scale, direction: rule.direction }
+        };
+        let sought: Vec<Sought> = self.source.iter().map(sought).collect();
+        for (&Sought { place: moved, normal, .. }, index) in sought.iter().zip(self.target.nearest(&sought)) {
+            let target = &self.target.voxels[index];
             let offset = moved - target.mean;
             let cosine = target.normal.dot(&normal);
             let weight = cosine * cosine / (1.0 + offset.norm_squared() / (scale * scale)).powi(2);

@@ -5,17 +5,25 @@ use nalgebra::{Isometry3, Vector3};
 
 use crate::common::Pinhole;
 use crate::register;
-use crate::scenes::{Views, corridor, one_wall, repeated, wall_and_floor};
+use crate::scenes::{Views, corridor, cylinder, one_wall, parallel_walls, repeated, sphere, wall_and_floor};
 
 /// Draws the views of a scene.
 type MakeViews = fn(&Pinhole, u64) -> Views;
 
 #[test]
 fn undetermined_motions_are_named() {
-    let scenes: [(MakeViews, [usize; 2]); 4] =
-        [(one_wall, [2, 1]), (wall_and_floor, [1, 0]), (corridor, [1, 0]), (repeated, [0, 0])];
+    let scenes: [(MakeViews, [usize; 2]); 7] = [
+        (one_wall, [2, 1]),
+        (wall_and_floor, [1, 0]),
+        (corridor, [1, 0]),
+        (parallel_walls, [2, 1]),
+        (sphere, [0, 3]),
+        (cylinder, [1, 1]),
+        (repeated, [0, 0]),
+    ];
     for (number, (views, expected)) in scenes.into_iter().enumerate() {
-        for seed in 0..1 {
+        // The example does 50 of each.
+        for seed in 0..4 {
             let views = views(&Pinhole::medium(), seed);
             let guess = views.target_from_source;
             let motions = register(&views, &guess, &VoxelAlignmentOptions::default()).unwrap().degenerate;

@@ -59,7 +59,10 @@ impl<'a> Surface<'a> {
         let normal: Vector3<f64> = eigen.eigenvectors.column(order[0]).into_owned();
         let offset = point.coords - centre;
         let distance = normal.dot(&offset);
-        if (offset - normal * distance).norm() > BESIDE * radius {
+        // A plane that is farther away than the nearest point cuts through scattered neighbours, not along a surface.
+        let thickness = (least / count).sqrt();
+        let too_far = distance.abs() > neighbours[0].distance_m + 3.0 * thickness;
+        if too_far || (offset - normal * distance).norm() > BESIDE * radius {
             return Ok(f64::NAN);
         }
         let nearest = neighbours[0].index;

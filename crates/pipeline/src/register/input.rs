@@ -120,23 +120,7 @@ fn stages(level: Level, calibration: Option<&Calibration>) -> Result<Vec<Stage>>
 }
 
 fn stations_of(outcome: Outcome) -> Input {
-    let projection = projection(&outcome.camera);
-    let station = |(view, cloud): (&crate::View, OrganisedCloud)| Station {
-        name: view.station.clone(),
-        timestamp_s: view.timestamp_s,
-        file: CloudFile {
-            points: cloud.points,
-            intensity: Some(cloud.amplitude),
-            sigma: Some(cloud.sigma),
-            flags: Some(cloud.flags.iter().map(range_image::Flags::bits).collect()),
-            size: Some([cloud.width, cloud.height]),
-            ..CloudFile::default()
-        },
-        projection: projection.clone(),
-        approximate: view.approximate_world_from_camera,
-        truth: view.truth.as_ref().and_then(|truth| truth.world_from_camera),
-    };
-    let stations = outcome.views.iter().zip(outcome.clouds).map(station).collect();
+    let stations = Station::of_views(&outcome);
     Input { stations, vertical_axis: outcome.vertical_axis }
 }
 
@@ -179,6 +163,27 @@ fn flattest(points: &[[f64; 3]]) -> usize {
 }
 
 impl Station {
+    /// The views of a survey with their clouds.
+    pub(crate) fn of_views(outcome: &Outcome) -> Vec<Self> {
+        let projection = projection(&outcome.camera);
+        let station = |(view, cloud): (&crate::View, &OrganisedCloud)| Self {
+            name: view.station.clone(),
+            timestamp_s: view.timestamp_s,
+            file: CloudFile {
+                points: cloud.points.clone(),
+                intensity: Some(cloud.amplitude.clone()),
+                sigma: Some(cloud.sigma.clone()),
+                flags: Some(cloud.flags.iter().map(range_image::Flags::bits).collect()),
+                size: Some([cloud.width, cloud.height]),
+                ..CloudFile::default()
+            },
+            projection: projection.clone(),
+            approximate: view.approximate_world_from_camera,
+            truth: view.truth.as_ref().and_then(|truth| truth.world_from_camera),
+        };
+        outcome.views.iter().zip(&outcome.clouds).map(station).collect()
+    }
+
     /// All points of the file; NaN where a flag excludes one.
     pub(crate) fn usable_points(&self) -> Vec<[f64; 3]> {
         let usable = |index: usize| self.file.flags.as_ref().is_none_or(|flags| flags[index] == 0);
@@ -191,14 +196,16 @@ impl Station {
         self.projection.is_some() || self.file.size.is_some()
     }
 
-    /// The usable points with normals, sigma and intensity.
-    pub(super) fn cloud(&self) -> Result<Cloud> {
+    /// The usable points with normals, sigma and intensity. `normal_half_width_px`: of the windows that normals of a frame
+    /// come from.
+    pub(crate) fn cloud(&self, normal_half_width_px: usize) -> Result<Cloud> {
         let points = self.usable_points();
         let fail = |error: icp_registration::Error| Error::Register(format!("{}: {error}", self.name));
         let normals = match (&self.file.normals, self.file.size) {
             (Some(normals), _) => Some(normals.iter().map(|n| Vector3::from(n.map(f64::from))).collect()),
             (None, Some([width, height])) => {
-                let options = OrganisedNormalOptions { half_width_px: 3, ..OrganisedNormalOptions::default() };
+                let options =
+                    OrganisedNormalOptions { half_width_px: normal_half_width_px, ..OrganisedNormalOptions::default() };
                 Some(organised_normals(&points, width, height, &options).map_err(fail)?)
             }
             (None, None) => None,

@@ -9,7 +9,7 @@ mod request;
 mod results;
 mod stations;
 mod summary;
-mod surface;
+pub(crate) mod surface;
 
 use std::time::Instant;
 

@@ -10,6 +10,7 @@ use super::input::{Input, Station};
 use super::summary::{RegisterSummary, RegisteredPair};
 use super::surface::{Start, Surface};
 use super::{Registered, chain, describe};
+use crate::plan::NORMAL_HALF_WIDTH_PX;
 use crate::progress::Progress;
 use crate::{Error, Result};
 
@@ -28,7 +29,7 @@ pub(super) fn run(input: Input, start: &str, progress: &dyn Progress) -> Result<
     progress.begin("prepare clouds", stations.len());
     let done = AtomicUsize::new(0);
     let prepare = |station: &Station| {
-        let surface = Surface::new(station);
+        let surface = Surface::new(station, NORMAL_HALF_WIDTH_PX);
         progress.advance(done.fetch_add(1, Ordering::Relaxed) + 1);
         surface
     };

@@ -10,6 +10,7 @@ use super::input::{Input, Station};
 use super::summary::{RegisterSummary, RegisteredLoop, RegisteredPair};
 use super::{Registered, describe};
 use crate::outcome::StationPose;
+use crate::plan::NORMAL_HALF_WIDTH_PX;
 use crate::progress::Progress;
 use crate::{Error, Result};
 
@@ -23,7 +24,7 @@ const LOOSE_LOOP: f64 = 20.0;
 
 pub(super) fn run(input: Input, start: &str, progress: &dyn Progress) -> Result<Registered> {
     let Input { stations, vertical_axis } = input;
-    let clouds = stations.par_iter().map(Station::cloud).collect::<Result<Vec<_>>>()?;
+    let clouds = stations.par_iter().map(|station| station.cloud(NORMAL_HALF_WIDTH_PX)).collect::<Result<Vec<_>>>()?;
     let before: Option<Vec<Isometry3<f64>>> = stations.iter().map(|station| station.approximate).collect();
     let (known, words) = match &before {
         Some(poses) => (Start::Poses(poses), start.to_owned()),

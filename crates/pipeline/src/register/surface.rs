@@ -5,7 +5,7 @@ use std::sync::Arc;
 use icp_registration::{
     Cloud, CoarseOptions, DegeneracyPolicy, FeatureCloud, FrameAlignmentOptions, IcpOptions, IcpResult, IcpTarget,
     OrganisedFrame, Projection, Viewpoint, VoxelAlignmentOptions, VoxelCloud, VoxelOptions, align_frames,
-    align_without_guess,
+    align_without_guess, frame_consistency,
 };
 use nalgebra::{Isometry3, Point3};
 
@@ -17,9 +17,14 @@ const RESIDUAL_REACH: f64 = 5.0;
 /// The same in spacings of the points of the surface.
 const SPACING_REACH: f64 = 2.0;
 
+/// A pose farther from a start than this many times its error belongs to something else.
+const REACH: f64 = 2.0;
+/// Every how many nodes of frames are compared to choose between two poses.
+const CONSISTENCY_STRIDE: usize = 2;
+
 /// One station, prepared.
-pub(super) struct Surface {
-    pub(super) target: IcpTarget,
+pub(crate) struct Surface {
+    pub(crate) target: IcpTarget,
     frame: Option<OrganisedFrame>,
     voxels: Option<VoxelCloud>,
     viewpoint: Viewpoint,
@@ -27,17 +32,17 @@ pub(super) struct Surface {
 
 /// Where an alignment starts.
 #[derive(Debug, Clone, Copy)]
-pub(super) enum Start {
+pub(crate) enum Start {
     /// A pose that somebody stated.
     Guess(Isometry3<f64>),
-    /// Found from the clouds, right to this distance, metre.
+    /// Right to this distance, metre.
     Found(Isometry3<f64>, f64),
 }
 
 impl Surface {
-    pub(super) fn new(station: &Station) -> Result<Self> {
+    pub(crate) fn new(station: &Station, normal_half_width_px: usize) -> Result<Self> {
         let fail = |error: icp_registration::Error| Error::Register(format!("{}: {error}", station.name));
-        let target = IcpTarget::new(station.cloud()?).map_err(fail)?;
+        let target = IcpTarget::new(station.cloud(normal_half_width_px)?).map_err(fail)?;
         let frame = station.projection.as_ref().and_then(|projection| frame(station, projection));
         // Clouds too small to fill voxels are registered point by point.
         let voxels = match frame {
@@ -64,18 +69,22 @@ impl Surface {
     }
 
     /// Fine alignment of `source` with this station.
-    pub(super) fn align(&self, source: &Self, start: Start) -> icp_registration::Result<IcpResult> {
+    pub(crate) fn align(&self, source: &Self, start: Start) -> icp_registration::Result<IcpResult> {
         let (guess, error_m) = match start {
             Start::Guess(guess) => (guess, None),
             Start::Found(guess, error_m) => (guess, Some(error_m)),
         };
         // Held at a guess that is far off, misaligned surfaces would never come together.
         let degeneracy = DegeneracyPolicy::Report;
-        if let (Some(target), Some(source)) = (&self.frame, &source.frame) {
+        let pixels = self.frame.as_ref().zip(source.frame.as_ref());
+        let by_pixels = pixels.and_then(|(target, source)| {
             let options = FrameAlignmentOptions { degeneracy, ..FrameAlignmentOptions::default() };
-            if let Ok(result) = align_frames(source, target, &guess, &options) {
-                return Ok(result);
-            }
+            let result = align_frames(source, target, &guess, &options).ok()?;
+            let moved = (result.target_from_source.translation.vector - guess.translation.vector).norm();
+            error_m.is_none_or(|error_m| moved <= REACH * error_m).then_some(result)
+        });
+        if let Some(result) = by_pixels.as_ref().filter(|result| result.is_trustworthy()) {
+            return Ok(result.clone());
         }
         if let (Some(target), Some(source)) = (&self.voxels, &source.voxels) {
             let options =
@@ -88,7 +97,15 @@ impl Surface {
             }
         }
         let options = IcpOptions { degeneracy, initial_correspondence_distance_m: error_m, ..IcpOptions::default() };
-        self.target.align(source.target.cloud(), &guess, &options)
+        let by_points = self.target.align(source.target.cloud(), &guess, &options);
+        let (Some(by_pixels), Some((target, source))) = (by_pixels, pixels) else { return by_points };
+        let Ok(by_points) = by_points else { return Ok(by_pixels) };
+        // Neither is sure: the frames tell which they contradict less.
+        let agreement = |result: &IcpResult| {
+            let both = frame_consistency(source, target, &result.target_from_source, CONSISTENCY_STRIDE, None);
+            both.agreeing.saturating_sub(both.contradicting)
+        };
+        Ok(if agreement(&by_points) > agreement(&by_pixels) { by_points } else { by_pixels })
     }
 
     /// Signed distance of a point (this station's frame, metre) from the surface; positive on the side that the station

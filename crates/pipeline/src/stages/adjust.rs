@@ -1,4 +1,4 @@
-use icp_registration::{Datum, SurfaceAdjustmentOptions, adjust_surfaces};
+use icp_registration::{Datum, Start, StationRegistrationOptions, register_stations};
 use nalgebra::Isometry3;
 
 use super::Findings;
@@ -14,9 +14,10 @@ pub(super) fn run(work: &mut Work, options: &AdjustOptions, progress: &dyn Progr
         return Err(Error::Needs { stage: "Adjust", needs: "Register" });
     }
     let initial: Vec<Isometry3<f64>> = work.outcome.poses.iter().map(|pose| pose.world_from_camera).collect();
-    let options = SurfaceAdjustmentOptions {
+    let choice = StationRegistrationOptions {
         minimum_overlap: options.minimum_overlap,
-        ..SurfaceAdjustmentOptions::with_initial_error(options.maximum_distance_m)
+        start_error_m: Some(options.maximum_distance_m),
+        ..StationRegistrationOptions::default()
     };
     let tell = |done: usize, total: usize| {
         if done == 1 {
@@ -24,23 +25,27 @@ pub(super) fn run(work: &mut Work, options: &AdjustOptions, progress: &dyn Progr
         }
         progress.advance(done);
     };
-    let adjusted = adjust_surfaces(&work.station_clouds, &initial, Datum::Station(0), &options, &tell);
+    let adjusted = register_stations(&work.station_clouds, Start::Poses(&initial), Datum::Station(0), &choice, &tell);
     let adjusted = adjusted.map_err(Error::stage("Adjust", "all stations"))?;
-    let stations = adjusted.stations;
-    work.outcome.poses = stations
-        .world_from_station
-        .into_iter()
-        .zip(stations.covariance)
+    if !adjusted.settled {
+        return Err(Error::stage("Adjust", "all stations")(format!(
+            "the stations still slide after {} rounds: a direction is held by too little; more overlap, or stations \
+             that see furniture from the side, are needed",
+            adjusted.rounds
+        )));
+    }
+    let poses = adjusted.world_from_station.into_iter().zip(adjusted.covariance);
+    work.outcome.poses = poses
         .map(|(world_from_camera, covariance)| StationPose { world_from_camera, covariance: Some(covariance) })
         .collect();
     work.outcome.pairs = adjusted.pairs;
     work.outcome.refused = adjusted.refused;
-    work.outcome.adjustment = Some(AdjustmentFigures { sigma0: stations.sigma0, redundancy: stations.redundancy });
+    work.outcome.adjustment = Some(AdjustmentFigures { sigma0: adjusted.sigma0, redundancy: adjusted.redundancy });
     let mut findings = Findings::from([
-        ("pairs".to_owned(), work.outcome.pairs.len() as f64),
+        ("pairs".to_owned(), adjusted.surfaces.len() as f64),
         ("rounds".to_owned(), adjusted.rounds as f64),
     ]);
-    if let Some(sigma0) = stations.sigma0 {
+    if let Some(sigma0) = adjusted.sigma0 {
         findings.insert("sigma0".to_owned(), sigma0);
     }
     Ok(findings)

@@ -31,7 +31,8 @@ pub enum Precision {
     /// `float`: right to 0.1 micrometre at 1 m, to 8 micrometres at 100 m.
     #[default]
     Single,
-    /// `double`: all digits.
+    /// `double`: all digits. As PCD only for readers that take them: PCL's own point types and Open3D's classic reader
+    /// want `float` and give zeros or nothing.
     Double,
 }
 

@@ -27,6 +27,20 @@ pub struct ErrorsSpec {
     pub mixed_pixels: Option<MixedPixelsSpec>,
     /// Light that arrives by way of another surface (Sect. 4.9).
     pub multipath: Option<MultipathSpec>,
+    /// Pixels that show anything.
+    pub gross_errors: Option<GrossErrorsSpec>,
+}
+
+/// Pixels whose light has a phase that nothing in the scene explains, as behind glass and glints: the same in all
+/// frames of a station, others at each station. The truth stays what the scene is.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct GrossErrorsSpec {
+    /// Part of the pixels.
+    pub share: f64,
+    /// Seed of their places and phases.
+    #[serde(default)]
+    pub seed: u64,
 }
 
 /// A normally distributed range offset for each pixel, the same in all frames.
@@ -152,6 +166,10 @@ impl ErrorsSpec {
         if let Some(multipath) = &self.multipath {
             let n = multipath.directions;
             require((1..=65_536).contains(&n), "errors.multipath.directions", &n, "from 1 to 65536 directions")?;
+        }
+        if let Some(gross) = &self.gross_errors {
+            let share = gross.share;
+            require((0.0..=1.0).contains(&share), "errors.gross_errors.share", &share, "a part from 0 to 1")?;
         }
         Ok(())
     }

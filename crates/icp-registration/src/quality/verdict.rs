@@ -1,0 +1,88 @@
+//! Covariance and verdict from the sums over cells.
+
+use nalgebra::{DMatrix, Isometry3, Matrix6, Vector6};
+
+use super::Residuals;
+use super::cells::{Cells, Centred};
+use super::directions::{Direction, Directions, expanded};
+use crate::error::Result;
+use crate::icp::UndeterminedMotion;
+use crate::pose::{symmetrised, tangent_from_centred};
+
+/// Share of the largest information that rounding can imitate.
+const ROUNDING: f64 = 1e-9;
+/// Response over information outside which the differences are noise (matching can only weaken the response, to about
+/// a half).
+const SMALLEST_RESPONSE: f64 = 0.25;
+const LARGEST_RESPONSE: f64 = 2.0;
+
+/// What pairs say about a pose.
+pub(crate) struct Verdict {
+    frame: Centred,
+    directions: Directions,
+}
+
+impl Verdict {
+    /// Judges the pairs; motions with a predicted sigma above `max_sigma_m` are undetermined.
+    pub fn new(cells: &Cells, max_sigma_m: f64, residuals: Residuals) -> Result<Self> {
+        let score = |inverse: &Matrix6<f64>| match residuals {
+            Residuals::Misaligned => (cells.independent_scores(), 1.0),
+            Residuals::Settled => cells.clustered_scores(inverse),
+        };
+        let scatter = |motion: &Vector6<f64>| cells.scatter(motion);
+        let directions = Directions::new(&cells.information(), score, scatter, ROUNDING, max_sigma_m)?;
+        Ok(Self { frame: cells.frame, directions })
+    }
+
+    /// Orthonormal undetermined motions `[dt, rho w]`.
+    pub fn held(&self) -> Vec<Vector6<f64>> {
+        self.directions.held().collect()
+    }
+
+    /// A step `[dt, rho w]` over the standard deviation, along the determined motion where that is largest.
+    pub fn over_sigma(&self, step: &Vector6<f64>) -> f64 {
+        let determined = self.directions.all().iter().filter(|d| d.determined);
+        determined.map(|d| d.vector.dot(step).abs() / d.sigma_m.max(f64::MIN_POSITIVE)).fold(0.0, f64::max)
+    }
+
+    /// The undetermined motions, sorted into translations and rotations.
+    pub fn undetermined(&self) -> Vec<UndeterminedMotion> {
+        self.directions.undetermined(&self.frame.centre, self.frame.radius_m)
+    }
+
+    /// Covariance in the tangent `[dt target axes, dtheta source axes]`: the sandwich `A⁻¹ M A⁻ᵀ` with the response A of
+    /// the score. What is not known at all gets the radius of the pairs as sigma.
+    pub fn covariance(&self, pose: &Isometry3<f64>, response: Option<&Matrix6<f64>>) -> Matrix6<f64> {
+        let (known, unknown): (Vec<&Direction>, Vec<&Direction>) =
+            self.directions.all().iter().partition(|d| d.sigma_m.is_finite());
+        let (basis, inside) = self.directions.sandwich(&known, |basis| inverse_response(&known, basis, response?));
+        let mut centred = expanded(&basis, &inside);
+        for direction in unknown {
+            centred += direction.vector * direction.vector.transpose() * self.frame.radius_m.powi(2);
+        }
+        let to_tangent = tangent_from_centred(pose, &self.frame.centre, self.frame.radius_m);
+        symmetrised(&(to_tangent * centred * to_tangent.transpose()))
+    }
+
+    /// Inverse of the covariance along the determined motions, zero along the others; in the tangent of
+    /// [`Verdict::covariance`].
+    pub fn information(&self, pose: &Isometry3<f64>, response: &Matrix6<f64>) -> Matrix6<f64> {
+        let known: Vec<&Direction> = self.directions.all().iter().filter(|d| d.determined).collect();
+        let (basis, inside) = self.directions.sandwich(&known, |basis| inverse_response(&known, basis, response));
+        let inverse = inside.try_inverse().unwrap_or_else(|| DMatrix::zeros(known.len(), known.len()));
+        let centred = expanded(&basis, &inverse);
+        let to_tangent = tangent_from_centred(pose, &self.frame.centre, self.frame.radius_m);
+        let from_tangent = to_tangent.try_inverse().unwrap_or_else(Matrix6::zeros);
+        symmetrised(&(from_tangent.transpose() * centred * from_tangent))
+    }
+}
+
+/// Inverse of the response among the known directions; none where the differences drown in noise.
+fn inverse_response(known: &[&Direction], basis: &DMatrix<f64>, response: &Matrix6<f64>) -> Option<DMatrix<f64>> {
+    let reduced = basis.transpose() * response * basis;
+    let plausible = known.iter().enumerate().all(|(k, d)| {
+        let ratio = reduced[(k, k)] / d.information;
+        (SMALLEST_RESPONSE..LARGEST_RESPONSE).contains(&ratio)
+    });
+    if plausible { reduced.try_inverse() } else { None }
+}

@@ -294,11 +294,11 @@ impl Tracker {
             && let Some(measured) = self.closing(k, reference, reference_from_camera)
         {
             self.keyframes.graph.adjust_if_closed();
-            self.refer_to(k, &measured.own(), measured.shared());
+            self.refer_to(k, &measured.own(), &measured.shared());
             return;
         }
         let new = self.keyframes.add(self.current.clone(), reference, reference_from_camera);
-        self.refer_to(new, &Uncertain::exact(Isometry3::identity()), Matrix6::zeros());
+        self.refer_to(new, &Uncertain::exact(Isometry3::identity()), &Matrix6::zeros());
     }
 
     /// Takes out keyframes beyond the number allowed.
@@ -322,11 +322,11 @@ impl Tracker {
         self.keyframes.graph.offer(&Edge { a: k, b: reference, a_from_b }).then_some(measured)
     }
 
-    fn refer_to(&mut self, keyframe: usize, own: &Uncertain, shared: Matrix6<f64>) {
+    fn refer_to(&mut self, keyframe: usize, own: &Uncertain, shared: &Matrix6<f64>) {
         if let Some(last) = &mut self.last {
             last.keyframe = keyframe;
             last.own = *own;
-            last.shared = shared;
+            last.shared = *shared;
             last.velocity = last.velocity.map(|velocity| velocity.at_origin());
         }
     }

@@ -111,6 +111,37 @@ pub enum Error {
     /// The search tree refused its points.
     #[error("the search tree could not be built: {0}")]
     Tree(String),
+    /// Times do not ascend.
+    #[error("{what} do not ascend at entry {index}")]
+    NotAscending {
+        /// Which input.
+        what: &'static str,
+        /// Its index, counted from 0.
+        index: usize,
+    },
+    /// A body said to rest did not.
+    #[error(
+        "the body moves: rates scatter by {rate_spread:.3} rad/s, specific forces by {force_spread:.3} m/s^2 about a \
+         mean of {mean_force:.2} m/s^2"
+    )]
+    Moving {
+        /// Largest standard deviation of a component of the rates, rad/s.
+        rate_spread: f64,
+        /// The same of the specific forces, m/s².
+        force_spread: f64,
+        /// Length of the mean specific force, m/s².
+        mean_force: f64,
+    },
+    /// The inertial samples leave a gap.
+    #[error("no inertial sample for {seconds} s after {from_s} s; {allowed_s} s are allowed")]
+    NoInertialData {
+        /// Where the gap begins, second.
+        from_s: f64,
+        /// Its length, second.
+        seconds: f64,
+        /// The longest allowed, second.
+        allowed_s: f64,
+    },
     /// Voxels of this size cannot be numbered in this cloud.
     #[error("voxels of {voxel_m} m in a cloud of {extent_m} m: the size must be positive, and above 1/2 000 000 of it")]
     VoxelSize {

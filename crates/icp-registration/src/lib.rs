@@ -17,6 +17,7 @@ mod organised;
 pub mod parts;
 mod pose;
 mod quality;
+mod tracking;
 mod trajectory;
 mod voxels;
 
@@ -49,6 +50,10 @@ pub use organised::{
     FrameAligner, FrameAlignmentOptions, FrameConsistency, OrganisedFrame, Projection, align_frames, frame_consistency,
 };
 pub use pose::{inverse_covariance_transport, pose_difference, step_pose};
+pub use tracking::{
+    Fusion, ImuIntegrator, ImuOptions, InertialSample, LossReason, MotionPrior, Relocalisation, TrackedPose, Tracker,
+    TrackerOptions, TrackingState,
+};
 pub use trajectory::{
     AbsoluteTrajectoryError, ErrorStatistics, MatchedPose, RelativeError, RelativePoseError, RelativeStep,
     TrajectoryAlignment, TrajectoryErrorOptions, absolute_trajectory_error, relative_pose_error,

@@ -1,0 +1,198 @@
+//! Tracks a simulated sequence and, where it is at hand, a real one; prints CPU time a frame and errors.
+//!
+//! `RAYON_NUM_THREADS=1 cargo run --release -p icp-registration --example track_sequence -- [option=value ..]`
+//!
+//! Options: `folder` (of the real sequence), `seed` (of the simulated noise), `keyframe_overlap`, `max_keyframes`, `levels`,
+//! `fusion=off`, `step_tolerance_m`, `max_motion_sigma_m`, `every=1` (a line a frame).
+#![allow(
+    missing_docs,
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    clippy::print_stdout,
+    clippy::print_stderr
+)]
+
+#[path = "../tests/common/mod.rs"]
+mod common;
+#[path = "../tests/sequence/mod.rs"]
+mod sequence;
+
+use std::path::Path;
+use std::str::FromStr;
+use std::sync::Arc;
+use std::time::Duration;
+
+use common::Pinhole;
+use icp_registration::{Fusion, Projection, TrackedPose, Tracker, TrackerOptions, TrackingState};
+use nalgebra::{Isometry3, Matrix3, Matrix4, Rotation3, UnitQuaternion};
+use sequence::{absolute_error, around, frame_at, normalised_error, poses, projection, relative_error};
+
+/// CPU seconds of this thread.
+fn cpu_seconds() -> f64 {
+    let figures = || {
+        let text = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
+        let mut words = text.split_whitespace().map(str::parse::<f64>);
+        Some((words.next()?.ok()?, words.nth(1)?.ok()?))
+    };
+    let Some((_, turns)) = figures() else { return f64::NAN };
+    // The system counts up to the last change of threads: sleep until there was one.
+    loop {
+        std::thread::sleep(Duration::from_micros(50));
+        match figures() {
+            Some((nanoseconds, now)) if now > turns => return 1e-9 * nanoseconds,
+            Some(_) => {}
+            None => return f64::NAN,
+        }
+    }
+}
+
+/// Value of an option `name=value` of the command line.
+fn argument<T: FromStr>(name: &str) -> Option<T> {
+    std::env::args().skip(1).find_map(|argument| argument.strip_prefix(name)?.strip_prefix('=')?.parse().ok())
+}
+
+fn options() -> TrackerOptions {
+    let mut options = TrackerOptions::default();
+    options.keyframe_overlap = argument("keyframe_overlap").unwrap_or(options.keyframe_overlap);
+    options.max_keyframes = argument("max_keyframes").unwrap_or(options.max_keyframes);
+    options.alignment.levels = argument("levels").unwrap_or(options.alignment.levels);
+    options.alignment.max_motion_sigma_m = argument("max_motion_sigma_m").or(options.alignment.max_motion_sigma_m);
+    options.alignment.step_tolerance_m = argument("step_tolerance_m").or(options.alignment.step_tolerance_m);
+    if argument::<String>("fusion").is_some_and(|fusion| fusion == "off") {
+        options.fusion = Fusion::Off;
+    }
+    options
+}
+
+/// Tracks frame by frame; also the CPU time of each, milliseconds.
+fn track(
+    projection: &Arc<Projection>,
+    count: usize,
+    seconds: impl Fn(usize) -> f64,
+    mut frame: impl FnMut(usize) -> (Vec<[f64; 3]>, Option<Vec<f32>>),
+) -> (Tracker, Vec<f64>) {
+    let mut tracker = Tracker::new(projection, options()).unwrap();
+    let mut times = Vec::new();
+    for k in 0..count {
+        let (points, sigma) = frame(k);
+        let start = cpu_seconds();
+        let pose = tracker.track(seconds(k), &points, sigma.as_deref(), None).unwrap();
+        times.push(1e3 * (cpu_seconds() - start));
+        if argument::<usize>("every").is_some() {
+            println!(
+                "{k} {:?} sigma {:.2} mm keyframe {} overlap {:.3} rms {:.2} mm {:.2} ms",
+                pose.state,
+                1e3 * pose.covariance.fixed_view::<3, 3>(0, 0).trace().sqrt(),
+                pose.keyframe,
+                pose.overlap,
+                1e3 * pose.rms_m,
+                times[k]
+            );
+        }
+    }
+    (tracker, times)
+}
+
+fn report(name: &str, tracker: &Tracker, times: &mut [f64], truth: &[Isometry3<f64>]) {
+    let online = tracker.trajectory();
+    let lost = online.iter().filter(|pose| matches!(pose.state, TrackingState::Lost(_))).count();
+    let (adjusted, world) = (poses(&tracker.adjusted_trajectory()), truth[0]);
+    let errors = |estimate: &[Isometry3<f64>]| {
+        let (rms, largest) = absolute_error(estimate, truth);
+        let (metre, radian) = relative_error(estimate, truth, 1);
+        format!(
+            "ATE {:.2} mm (largest {:.2}), RPE {:.2} mm {:.3} deg a frame",
+            1e3 * rms,
+            1e3 * largest,
+            1e3 * metre,
+            radian.to_degrees()
+        )
+    };
+    println!(
+        "{name}: {} frames, {lost} lost, {} keyframes, {} registrations between them",
+        online.len(),
+        tracker.keyframes(),
+        tracker.registrations()
+    );
+    println!("  as tracked: {}", errors(&poses(online)));
+    println!("  adjusted:   {}", errors(&adjusted));
+    let in_world: Vec<TrackedPose> = online.to_vec();
+    let from_first: Vec<Isometry3<f64>> = truth.iter().map(|pose| world.inverse() * pose).collect();
+    println!("  normalised squared error {:.2} (6 expected)", normalised_error(&in_world, &from_first));
+    let mean = times.iter().sum::<f64>() / times.len() as f64;
+    times.sort_by(f64::total_cmp);
+    println!(
+        "  CPU a frame: mean {mean:.2} ms, median {:.2}, 95 % {:.2}, largest {:.2}; {:.0} frames/s",
+        times[times.len() / 2],
+        times[times.len() * 95 / 100],
+        times[times.len() - 1],
+        1e3 / mean
+    );
+}
+
+fn simulated(camera: &Pinhole, name: &str) {
+    let seed: u64 = argument("seed").unwrap_or(40_000);
+    let truth: Vec<Isometry3<f64>> = (0..300).map(around).collect();
+    let frame = |k: usize| {
+        let (points, sigma) = frame_at(camera, &truth[k], seed + k as u64);
+        (points, Some(sigma))
+    };
+    let (tracker, mut times) = track(&projection(camera), truth.len(), |k| k as f64 / sequence::HERTZ, frame);
+    report(name, &tracker, &mut times, &truth);
+}
+
+/// Depth in millimetre as points of a camera that looks along -z with y up.
+fn depth_points(path: &Path, focal: f64, centre: [f64; 2]) -> Vec<[f64; 3]> {
+    let decoder = png::Decoder::new(std::io::BufReader::new(std::fs::File::open(path).unwrap()));
+    let mut reader = decoder.read_info().unwrap();
+    let mut bytes = vec![0; reader.output_buffer_size().unwrap()];
+    let info = reader.next_frame(&mut bytes).unwrap();
+    let values = bytes.chunks_exact(2).map(|b| u16::from_be_bytes([b[0], b[1]]));
+    let point = |(k, value): (usize, u16)| {
+        if value == 0 || value == u16::MAX {
+            return [f64::NAN; 3];
+        }
+        let depth = 1e-3 * f64::from(value);
+        let (col, row) = ((k % info.width as usize) as f64, (k / info.width as usize) as f64);
+        [(col - centre[0]) / focal * depth, (centre[1] - row) / focal * depth, -depth]
+    };
+    values.enumerate().map(point).collect()
+}
+
+/// A pose file: 4x4, computer-vision axes.
+fn pose(path: &Path) -> Isometry3<f64> {
+    let text = std::fs::read_to_string(path).unwrap();
+    let m = Matrix4::from_row_iterator(text.split_whitespace().map(|word| word.parse::<f64>().unwrap()));
+    let flip = Matrix3::from_diagonal(&nalgebra::Vector3::new(1.0, -1.0, -1.0));
+    let rotation = Rotation3::from_matrix(&(m.fixed_view::<3, 3>(0, 0) * flip));
+    let translation = nalgebra::Vector3::new(m[(0, 3)], m[(1, 3)], m[(2, 3)]);
+    Isometry3::from_parts(translation.into(), UnitQuaternion::from_rotation_matrix(&rotation))
+}
+
+fn real(folder: &Path) {
+    let mut names: Vec<_> = std::fs::read_dir(folder)
+        .into_iter()
+        .flatten()
+        .filter_map(|entry| entry.ok()?.file_name().into_string().ok())
+        .filter(|name| name.ends_with(".depth.png"))
+        .collect();
+    names.sort();
+    if names.is_empty() {
+        println!("no frames in {}", folder.display());
+        return;
+    }
+    let number = |k: usize| names[k]["frame-".len()..].split('.').next().unwrap().parse::<f64>().unwrap();
+    let truth: Vec<_> = names.iter().map(|name| pose(&folder.join(name.replace("depth.png", "pose.txt")))).collect();
+    let projection = Arc::new(Projection::pinhole(640, 480, [585.0; 2], [320.0, 240.0]).unwrap());
+    let frame = |k: usize| (depth_points(&folder.join(&names[k]), 585.0, [320.0, 240.0]), None);
+    let (tracker, mut times) = track(&projection, names.len(), |k| number(k) / 30.0, frame);
+    report("7-Scenes red kitchen, kept frames", &tracker, &mut times, &truth);
+}
+
+fn main() {
+    simulated(&Pinhole::small(), "simulated room 176x144");
+    let folder = argument::<String>("folder")
+        .unwrap_or_else(|| concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/real/sevenscenes_redkitchen").into());
+    real(Path::new(&folder));
+}

@@ -1,0 +1,140 @@
+//! The keyframes: pieces of the map and a graph of their poses.
+
+use nalgebra::Isometry3;
+
+use super::graph::{Edge, Graph};
+use super::motion::Uncertain;
+use crate::cloud::Cloud;
+use crate::coarse::FeatureCloud;
+use crate::organised::OrganisedFrame;
+
+/// Fields of the thumbnails.
+pub(super) const THUMBNAIL: [usize; 2] = [16, 12];
+/// Points by which overlaps are judged.
+pub(super) const SAMPLE: usize = 2500;
+/// Cosine of the largest angle between the axes of two cameras that can see the same from the same side.
+const LEAST_VIEW_COSINE: f64 = 0.3;
+
+/// A frame that others are registered with.
+#[derive(Debug, Clone)]
+pub(super) struct Keyframe {
+    pub(super) number: usize,
+    pub(super) frame: OrganisedFrame,
+    pub(super) thumbnail: Vec<f32>,
+    /// For alignment without a guess; made when first needed.
+    pub(super) features: Option<FeatureCloud>,
+}
+
+/// Where a keyframe number leads to.
+#[derive(Debug, Clone, Copy)]
+enum Anchor {
+    Kept,
+    /// Taken out; its pose in the frame of another.
+    Joined {
+        to: usize,
+        to_from_this: Isometry3<f64>,
+    },
+}
+
+/// All keyframes and how they lie to each other.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Keyframes {
+    pub(super) list: Vec<Keyframe>,
+    pub(super) graph: Graph,
+    anchors: Vec<Anchor>,
+}
+
+impl Keyframes {
+    pub(super) fn start(&mut self, frame: OrganisedFrame, world_from_keyframe: &Uncertain) {
+        self.push(frame);
+        self.graph.poses.push(*world_from_keyframe);
+    }
+
+    /// A new keyframe at a pose measured from keyframe `from`; returns its index.
+    pub(super) fn add(&mut self, frame: OrganisedFrame, from: usize, from_from_new: &Uncertain) -> usize {
+        self.push(frame);
+        let pose = self.graph.poses[from].then(from_from_new);
+        self.graph.poses.push(pose);
+        let b = self.list.len() - 1;
+        self.graph.edges.push(Edge { a: from, b, a_from_b: *from_from_new });
+        b
+    }
+
+    fn push(&mut self, frame: OrganisedFrame) {
+        let thumbnail = frame.thumbnail(THUMBNAIL[0], THUMBNAIL[1]);
+        self.list.push(Keyframe { number: self.anchors.len(), frame, thumbnail, features: None });
+        self.anchors.push(Anchor::Kept);
+    }
+
+    /// Keyframes other than `skip` with the fraction of the frame that would agree with them, at a pose given from
+    /// keyframe `from`; best first.
+    pub(super) fn candidates(
+        &self,
+        current: &OrganisedFrame,
+        from: usize,
+        from_from_camera: &Isometry3<f64>,
+        skip: usize,
+    ) -> Vec<(f64, usize)> {
+        let mut found = Vec::with_capacity(self.list.len());
+        for (k, keyframe) in self.list.iter().enumerate() {
+            let pose = self.graph.relative(k, from) * from_from_camera;
+            let cosine = pose.rotation.to_rotation_matrix()[(2, 2)];
+            if k != skip && cosine > LEAST_VIEW_COSINE {
+                found.push((keyframe.frame.agreement(current, &pose, SAMPLE / 4).overlap(), k));
+            }
+        }
+        found.sort_by(|x, y| y.0.total_cmp(&x.0).then(x.1.cmp(&y.1)));
+        found
+    }
+
+    /// Takes out the keyframe that is nearest to another one, neither the first nor `spared`; returns its index.
+    pub(super) fn thin(&mut self, spared: [usize; 2]) -> Option<usize> {
+        let gap = |k: usize| {
+            let others = (0..self.list.len()).filter(|l| *l != k);
+            let distance = |l: usize| {
+                let motion = self.graph.relative(k, l);
+                motion.translation.vector.norm() / self.list[k].frame.radius_m() + motion.rotation.angle()
+            };
+            others.map(distance).fold(f64::INFINITY, f64::min)
+        };
+        let free = (1..self.list.len()).filter(|k| !spared.contains(k));
+        let k = free.min_by(|x, y| gap(*x).total_cmp(&gap(*y)))?;
+        let (hub, k_from_hub) = self.graph.remove(k)?;
+        let joined = Anchor::Joined { to: self.list[hub].number, to_from_this: k_from_hub.pose.inverse() };
+        self.anchors[self.list[k].number] = joined;
+        self.list.remove(k);
+        Some(k)
+    }
+
+    /// All surfaces in the world's frame.
+    pub(super) fn cloud(&self) -> Cloud {
+        let (mut points, mut normals, mut sigmas) = (Vec::new(), Vec::new(), Vec::new());
+        for (keyframe, pose) in self.list.iter().zip(&self.graph.poses) {
+            for (point, normal, sigma) in keyframe.frame.surface() {
+                points.push(pose.pose * point);
+                normals.push(pose.pose * normal);
+                sigmas.push(sigma);
+            }
+        }
+        Cloud { points, normals: Some(normals), sigma: Some(sigmas), ..Cloud::default() }
+    }
+
+    /// Present world pose of a keyframe by its number, also of one that was taken out.
+    pub(super) fn world_from(&self, number: usize) -> Option<Isometry3<f64>> {
+        let (mut number, mut chain) = (number, Isometry3::identity());
+        // Each step leads to a keyframe that was kept longer, so there are at most as many as keyframes.
+        for _ in 0..=self.anchors.len() {
+            match self.anchors.get(number)? {
+                Anchor::Kept => {
+                    let k = self.list.iter().position(|k| k.number == number)?;
+                    return Some(self.graph.poses[k].pose * chain);
+                }
+                Anchor::Joined { to, to_from_this } => {
+                    chain = to_from_this * chain;
+                    number = *to;
+                }
+            }
+        }
+        None
+    }
+}

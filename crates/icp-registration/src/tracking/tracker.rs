@@ -1,0 +1,333 @@
+//! The tracker: one call a frame.
+
+use std::sync::Arc;
+
+use nalgebra::{Isometry3, Matrix6};
+
+use super::graph::Edge;
+use super::keyframes::Keyframes;
+use super::locate::{Fix, Measured};
+use super::motion::{MotionPrior, Uncertain, diagonal};
+use super::options::{Fusion, TrackerOptions};
+use super::prediction::{Grounds, Last, Prediction};
+use super::tracked::{LossReason, TrackedPose, TrackingState};
+use super::velocity::Velocity;
+use crate::cloud::Cloud;
+use crate::error::{Error, Result};
+use crate::icp::DegeneracyPolicy;
+use crate::organised::{FrameAligner, OrganisedFrame, Projection};
+
+/// What another keyframe must see more of the frame than the reference to take its place.
+const ADVANTAGE: f64 = 0.05;
+/// Share of the first frame's radius beyond whose standard deviation motions count as undetermined. Registration alone
+/// asks for 1/300; in a stream, poses that are centimetres weak for a moment are still worth more than a loss.
+const WEAKEST_SHARE: f64 = 1.0 / 50.0;
+
+/// Tracks a stream of organised frames of one camera.
+///
+/// Memory is allocated for keyframes and for the list of poses; a frame that makes no keyframe allocates nothing of its
+/// own. The same frames give the same bits for any number of threads.
+#[derive(Debug, Clone)]
+pub struct Tracker {
+    pub(super) options: TrackerOptions,
+    pub(super) aligner: FrameAligner,
+    pub(super) current: OrganisedFrame,
+    pub(super) previous: OrganisedFrame,
+    pub(super) keyframes: Keyframes,
+    last: Option<Last>,
+    trajectory: Vec<TrackedPose>,
+    scratch: Vec<(u32, f32, f32)>,
+}
+
+/// All that one frame gave.
+struct Seen {
+    measured: Measured,
+    fix: Fix,
+    prediction: Prediction,
+}
+
+impl Tracker {
+    /// A tracker of frames of one camera.
+    ///
+    /// # Errors
+    /// [`Error::InvalidOption`], [`Error::NonFinite`] for the options.
+    pub fn new(projection: &Arc<Projection>, options: TrackerOptions) -> Result<Self> {
+        options.validate()?;
+        let nothing = vec![[f64::NAN; 3]; projection.width() * projection.height()];
+        let mut alignment = options.alignment.clone();
+        alignment.degeneracy = DegeneracyPolicy::Report;
+        alignment.other_starts = 0;
+        let blank = OrganisedFrame::new(projection, &nothing, None)?;
+        Ok(Self {
+            aligner: FrameAligner::new(alignment)?,
+            current: blank.clone(),
+            previous: blank,
+            options,
+            keyframes: Keyframes::default(),
+            last: None,
+            trajectory: Vec::new(),
+            scratch: Vec::new(),
+        })
+    }
+
+    /// Takes the next frame: one point a pixel, row by row, camera frame, metre, NaN where there is no range; `sigma`:
+    /// standard deviation of the ranges, metre. `prior`: the motion since the frame before, where something else has
+    /// measured it.
+    ///
+    /// A frame that cannot be tracked is no error: its state says so, and later frames are sought again.
+    ///
+    /// # Errors
+    /// [`Error::NotAscending`] where the time is not later than that of the frame before, [`Error::Numerical`] for a
+    /// prior that is not finite or whose covariance is not positive definite, [`Error::LengthMismatch`] and
+    /// [`Error::PointsOffRays`] for frames of another camera. Nothing has changed then.
+    pub fn track(
+        &mut self,
+        timestamp_s: f64,
+        points: &[[f64; 3]],
+        sigma: Option<&[f32]>,
+        prior: Option<&MotionPrior>,
+    ) -> Result<TrackedPose> {
+        let before = self.trajectory.last().map_or(f64::NEG_INFINITY, |pose| pose.timestamp_s);
+        if !timestamp_s.is_finite() || timestamp_s <= before {
+            return Err(Error::NotAscending { what: "times of the frames", index: self.trajectory.len() });
+        }
+        if prior.is_some_and(|prior| !prior.is_sound()) {
+            return Err(Error::Numerical { what: "the motion prior", why: "its covariance is not positive definite" });
+        }
+        self.current.update(points, sigma)?;
+        let pose = match self.last.take() {
+            None => self.start(timestamp_s),
+            Some(last) => self.follow(timestamp_s, &last, prior),
+        };
+        std::mem::swap(&mut self.current, &mut self.previous);
+        self.trajectory.push(pose);
+        Ok(pose)
+    }
+
+    /// The poses of all frames as they were when they were tracked.
+    pub fn trajectory(&self) -> &[TrackedPose] {
+        &self.trajectory
+    }
+
+    /// The poses of all frames as they are known now: closed loops have moved the keyframes they hang on. Covariances
+    /// are those of the time of tracking.
+    pub fn adjusted_trajectory(&self) -> Vec<TrackedPose> {
+        let adjusted = |pose: &TrackedPose| match self.keyframes.world_from(pose.keyframe) {
+            Some(world) => TrackedPose { world_from_camera: world * pose.keyframe_from_camera, ..*pose },
+            None => *pose,
+        };
+        self.trajectory.iter().map(adjusted).collect()
+    }
+
+    /// The map: the planes of all keyframes as points with normals and standard deviations, in the world's frame. Where
+    /// keyframes overlap, surfaces come several times.
+    pub fn map(&self) -> Cloud {
+        self.keyframes.cloud()
+    }
+
+    /// Number of keyframes in the map.
+    pub fn keyframes(&self) -> usize {
+        self.keyframes.list.len()
+    }
+
+    /// Registrations between keyframes that were observed; more than keyframes less one where loops were closed.
+    pub fn registrations(&self) -> usize {
+        self.keyframes.graph.edges.len()
+    }
+
+    fn start(&mut self, timestamp_s: f64) -> TrackedPose {
+        let pose = Uncertain::exact(self.options.world_from_first);
+        let blank = self.current.filled() < self.options.min_filled;
+        let state = if blank { TrackingState::Lost(LossReason::TooFewPoints) } else { TrackingState::Started };
+        if !blank {
+            self.set_weakest_motion();
+            self.keyframes.start(self.current.clone(), &pose);
+            self.last = Some(Last {
+                timestamp_s,
+                keyframe: 0,
+                own: Uncertain::exact(Isometry3::identity()),
+                shared: Matrix6::zeros(),
+                velocity: None,
+                interval_s: f64::INFINITY,
+                disturbance: None,
+                carried: 0,
+                informed: true,
+                lost_frames: 0,
+            });
+        }
+        TrackedPose {
+            timestamp_s,
+            world_from_camera: pose.pose,
+            covariance: if blank { Matrix6::identity() } else { pose.covariance },
+            state,
+            keyframe: 0,
+            keyframe_from_camera: Isometry3::identity(),
+            overlap: if blank { 0.0 } else { 1.0 },
+            rms_m: 0.0,
+            measured_motion: None,
+        }
+    }
+
+    /// Sets from which standard deviation on motions are undetermined, where the options leave that to the frames.
+    fn set_weakest_motion(&mut self) {
+        let mut alignment = self.aligner.options().clone();
+        if self.options.alignment.max_motion_sigma_m.is_none() {
+            alignment.max_motion_sigma_m = Some(WEAKEST_SHARE * self.current.radius_m().max(f64::MIN_POSITIVE));
+        }
+        if let Ok(aligner) = FrameAligner::new(alignment) {
+            self.aligner = aligner;
+        }
+    }
+
+    fn follow(&mut self, timestamp_s: f64, last: &Last, prior: Option<&MotionPrior>) -> TrackedPose {
+        let prediction = last.predict(timestamp_s, prior);
+        match self.locate(last, &prediction) {
+            Ok((measured, fix)) => self.found(timestamp_s, last, &Seen { measured, fix, prediction }),
+            Err(reason) => self.lost(timestamp_s, last, &prediction, reason),
+        }
+    }
+
+    fn locate(&mut self, last: &Last, prediction: &Prediction) -> std::result::Result<(Measured, Fix), LossReason> {
+        if self.current.filled() < self.options.min_filled {
+            return Err(LossReason::TooFewPoints);
+        }
+        let near = self.near(last, prediction).and_then(|measured| {
+            let predicted = prediction.seen_from(&self.keyframes.graph.relative(measured.keyframe, last.keyframe));
+            self.fixed(&measured, &predicted, last.lost_frames)
+        });
+        near.or_else(|reason| {
+            let measured = self.wide(last.lost_frames).ok_or(reason)?;
+            Ok((measured, Fix::unexpected(&measured)))
+        })
+    }
+
+    fn found(&mut self, timestamp_s: f64, last: &Last, seen: &Seen) -> TrackedPose {
+        let Seen { measured, fix, prediction } = seen;
+        let (keyframe, own) = (measured.keyframe, fix.own);
+        let between = self.keyframes.graph.relative(keyframe, last.keyframe);
+        let before = Uncertain::exact(between).then(&last.own);
+        let (half, seconds) = (measured.own(), timestamp_s - last.timestamp_s);
+        let follows = last.lost_frames == 0 && fix.expected;
+        let measured_motion = follows.then(|| {
+            let motion = half.inverse().then(&before);
+            MotionPrior { current_from_previous: motion.pose, covariance: motion.covariance }
+        });
+        let learns = last.lost_frames == 0 && measured.determined;
+        let disturbance = if learns {
+            let motion = before.pose.inverse() * half.pose;
+            last.disturbed_by(timestamp_s, &prediction.seen_from(&between), &half, &motion)
+        } else {
+            last.disturbance
+        };
+        let from_poses = || Velocity::between(&before, &own, seconds, disturbance.unwrap_or_default());
+        let velocity = fix.velocity.or_else(|| follows.then(from_poses));
+        let shared = if measured.determined { measured.shared() } else { last.shared };
+        let total = Uncertain { covariance: own.covariance + shared, ..own };
+        let world = self.keyframes.graph.poses[keyframe].then(&total);
+        if self.options.fusion == Fusion::Planes && measured.determined {
+            self.keyframes.list[keyframe].frame.absorb(&self.current, &own.pose, &mut self.scratch);
+        }
+        let pose = TrackedPose {
+            timestamp_s,
+            world_from_camera: world.pose,
+            covariance: world.covariance,
+            state: if follows { TrackingState::Tracked } else { TrackingState::Relocalised },
+            keyframe: self.keyframes.list[keyframe].number,
+            keyframe_from_camera: own.pose,
+            overlap: measured.agreement.overlap(),
+            rms_m: measured.rms_m,
+            measured_motion,
+        };
+        self.last = Some(Last {
+            timestamp_s,
+            keyframe,
+            own,
+            shared,
+            velocity,
+            interval_s: seconds,
+            disturbance,
+            carried: if measured.determined { 0 } else { last.carried + 1 },
+            informed: true,
+            lost_frames: 0,
+        });
+        if pose.overlap < self.options.keyframe_overlap {
+            self.change_reference(&total);
+        }
+        self.thin();
+        pose
+    }
+
+    fn lost(&mut self, timestamp_s: f64, last: &Last, prediction: &Prediction, reason: LossReason) -> TrackedPose {
+        let total = Uncertain { covariance: prediction.own.covariance + last.shared, ..prediction.own };
+        let world = self.keyframes.graph.poses[last.keyframe].then(&total);
+        let radius = self.keyframes.list[last.keyframe].frame.radius_m();
+        let unknown = diagonal([radius * radius, 1.0]);
+        let informed = prediction.grounds != Grounds::Nothing;
+        self.last = Some(Last {
+            timestamp_s,
+            own: prediction.own,
+            velocity: prediction.velocity,
+            informed,
+            lost_frames: last.lost_frames + 1,
+            ..last.clone()
+        });
+        TrackedPose {
+            timestamp_s,
+            world_from_camera: world.pose,
+            covariance: if informed { world.covariance } else { world.covariance + unknown },
+            state: TrackingState::Lost(reason),
+            keyframe: self.keyframes.list[last.keyframe].number,
+            keyframe_from_camera: prediction.own.pose,
+            overlap: 0.0,
+            rms_m: 0.0,
+            measured_motion: None,
+        }
+    }
+
+    /// Another keyframe that sees more of the frame becomes the reference; where there is none, the frame becomes one.
+    fn change_reference(&mut self, reference_from_camera: &Uncertain) {
+        let Some(reference) = self.last.as_ref().map(|last| last.keyframe) else { return };
+        let candidates = self.keyframes.candidates(&self.current, reference, &reference_from_camera.pose, reference);
+        let enough = self.options.keyframe_overlap + ADVANTAGE;
+        if let Some(&(overlap, k)) = candidates.first()
+            && overlap >= enough
+            && let Some(measured) = self.closing(k, reference, reference_from_camera)
+        {
+            self.keyframes.graph.adjust_if_closed();
+            self.refer_to(k, &measured.own(), &measured.shared());
+            return;
+        }
+        let new = self.keyframes.add(self.current.clone(), reference, reference_from_camera);
+        self.refer_to(new, &Uncertain::exact(Isometry3::identity()), &Matrix6::zeros());
+    }
+
+    /// Takes out keyframes beyond the number allowed.
+    fn thin(&mut self) {
+        let Some(last) = &mut self.last else { return };
+        while self.keyframes.list.len() > self.options.max_keyframes {
+            let newest = self.keyframes.list.len() - 1;
+            let Some(gone) = self.keyframes.thin([last.keyframe, newest]) else { return };
+            last.keyframe -= usize::from(last.keyframe > gone);
+        }
+    }
+
+    /// Registers the frame with keyframe `k` as well, and so `k` with the reference; `None` where that does not fit.
+    fn closing(&mut self, k: usize, reference: usize, reference_from_camera: &Uncertain) -> Option<Measured> {
+        let guess = self.keyframes.graph.relative(k, reference) * reference_from_camera.pose;
+        let measured = self.try_keyframe(k, &guess).ok().filter(|m| m.determined)?;
+        if self.keyframes.graph.joined(k, reference) {
+            return Some(measured);
+        }
+        let a_from_b = measured.pose.then(&reference_from_camera.inverse());
+        self.keyframes.graph.offer(&Edge { a: k, b: reference, a_from_b }).then_some(measured)
+    }
+
+    fn refer_to(&mut self, keyframe: usize, own: &Uncertain, shared: &Matrix6<f64>) {
+        if let Some(last) = &mut self.last {
+            last.keyframe = keyframe;
+            last.own = *own;
+            last.shared = *shared;
+            last.velocity = last.velocity.map(|velocity| velocity.at_origin());
+        }
+    }
+}

@@ -35,7 +35,7 @@ pub(crate) fn run(runs: usize) -> Outcome {
     frames::run(&stage, &mut least, &mut bars)?;
     verdicts::run(&stage, &mut least, &mut bars)?;
     others::coarse(&stage, &mut least, &mut bars)?;
-    others::tracking(&stage, &mut least)?;
+    others::tracking(&stage, &mut least, &mut bars)?;
     others::stations(&stage, &mut least, &mut bars)?;
     bars.print();
     folder.remove()

@@ -7,6 +7,7 @@
 //! registration_peers covariance FOLDER COUNT  covariances against true errors
 //! registration_peers degenerate FOLDER        scenes that leave motions open
 //! registration_peers coarse FOLDER            pairs without a guess
+//! registration_peers tracking FOLDER          a stream of frames
 //! registration_peers stations FOLDER          a ring of stations
 //! ```
 //!
@@ -26,6 +27,7 @@ mod frames;
 mod pairs;
 mod simulate;
 mod stations;
+mod tracking;
 mod verdicts;
 
 use std::error::Error;
@@ -51,6 +53,7 @@ fn run() -> Outcome {
         ["covariance", folder, count] => verdicts::covariance(Path::new(folder), count.parse()?),
         ["degenerate", folder] => verdicts::degenerate(Path::new(folder)),
         ["coarse", folder] => coarse::run(Path::new(folder)),
+        ["tracking", folder] => tracking::run(Path::new(folder)),
         ["stations", folder] => stations::run(Path::new(folder)),
         _ => Err("see the head of registration_peers/main.rs for what can be asked".into()),
     }

@@ -26,20 +26,33 @@ pub(super) fn coarse(stage: &Stage, least: &mut Least, bars: &mut Bars) -> Outco
     Ok(())
 }
 
-pub(super) fn tracking(stage: &Stage, least: &mut Least) -> Outcome {
+pub(super) fn tracking(stage: &Stage, least: &mut Least, bars: &mut Bars) -> Outcome {
     let mut streams = vec![("tracking", "300 simulated frames")];
     streams.extend(stage.kinect.then_some(("kinect", "60 Kinect frames")));
     for (folder, _) in &streams {
         println!("── stream: {folder}");
         least.note_all(folder, &stage.peers("tracking", folder, &[])?);
+        least.note_line(folder, "ours", &["ms", "mm", "lost"], &stage.ours(&["tracking"], folder, &[])?);
     }
     let mut cells = vec!["streams".to_owned()];
     cells.extend(streams.iter().flat_map(|(_, name)| [format!("{name}, CPU ms a frame"), "off, mm".to_owned()]));
     head(&cells.iter().map(String::as_str).collect::<Vec<_>>());
     let get = |folder: &str, who: &str, figure: &str| least.get(folder, who, figure);
-    for (who, name) in [("kiss_icp", "KISS-ICP, 10 cm"), ("gicp", "small_gicp GICP, frame to frame")] {
+    for (who, name) in [
+        ("kiss_icp", "KISS-ICP, 10 cm"),
+        ("gicp", "small_gicp GICP, frame to frame"),
+        ("ours", "`icp-registration`, keyframes"),
+    ] {
         let figures = streams.iter().flat_map(|(folder, _)| ["ms", "mm"].map(|figure| get(folder, who, figure)));
         row(name, &figures.collect::<Vec<_>>());
+    }
+    bars.at_most("300 simulated frames, ms a frame", 5.0, get("tracking", "ours", "ms"));
+    bars.at_most("300 simulated frames, mm off", 10.0, get("tracking", "ours", "mm"));
+    for (folder, name) in &streams {
+        let ratio = |figure: &str| get(folder, "ours", figure) / get(folder, "kiss_icp", figure);
+        bars.at_most(&format!("{name}, time over KISS-ICP's"), 1.0 / 15.0, ratio("ms"));
+        bars.at_most(&format!("{name}, mm over KISS-ICP's"), 1.0, ratio("mm"));
+        bars.at_most(&format!("{name}, frames lost"), 0.0, get(folder, "ours", "lost"));
     }
     Ok(())
 }

@@ -93,11 +93,11 @@ pub struct CoarseOptions {
     /// [`super::CoarseAlignment::contradiction`]). Default 0.012: at the right pose there are hardly any.
     pub max_contradiction: f64,
     /// Smallest fraction of points on both clouds that lie inside what encloses them (see
-    /// [`super::CoarseAlignment::inside`]). Default 0.013: corners of empty rooms are taken for each other. 0 accepts them. Clouds whose
-    /// normals have no side always pass.
+    /// [`super::CoarseAlignment::inside`]). Default 0.013: corners of empty rooms are taken for each other. 0 accepts
+    /// them. Clouds whose normals have no side always pass.
     pub min_inside: f64,
     /// Smallest share of the evidence that is lost where the pose slides along what is determined least (see
-    /// [`super::CoarseAlignment::determined`]). Default 0.3. 0 lets features decide where surfaces cannot.
+    /// [`super::CoarseAlignment::determined`]). Default 0.15. 0 lets features decide where surfaces cannot.
     pub min_determined: f64,
     /// Largest evidence for the best different pose, as a fraction of the winner's. Default 0.9.
     pub max_rival: f64,
@@ -123,7 +123,7 @@ impl Default for CoarseOptions {
             min_agreement: 0.96,
             max_contradiction: 0.012,
             min_inside: 0.013,
-            min_determined: 0.3,
+            min_determined: 0.15,
             max_rival: 0.9,
             seed: 1,
         }

@@ -24,7 +24,7 @@ const OFF: [f64; 2] = [0.06, 0.01];
 const FIRST_STRIDE: usize = 3;
 
 /// Part of its standard deviation by which a station may still move.
-const FEW_SIGMAS: f64 = 0.05;
+const FEW_SIGMAS: f64 = 0.1;
 
 /// What the last round leaves.
 pub(super) struct Adjusted {

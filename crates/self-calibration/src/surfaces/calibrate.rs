@@ -17,8 +17,8 @@ use crate::{Error, Result};
 ///
 /// # Errors
 /// [`Error::SurfacesNotDetermined`] where the surfaces leave a term open: the poses take its place, as with a single
-/// wall. [`Error::SurfacesNotSettled`] where the stations still slide at the end. [`Error::UnknownName`] for a term that `known` does not have; [`Error::Registration`] where the stations do not
-/// come together; [`Error::OutOfDomain`], [`Error::Image`] for the input; [`Error::Model`] if the estimated terms are no
+/// wall. [`Error::SurfacesNotSettled`] where the stations still slide at the end. [`Error::UnknownName`] for a term that
+/// `known` does not have; [`Error::Registration`] where the stations do not come together; [`Error::OutOfDomain`], [`Error::Image`] for the input; [`Error::Model`] if the estimated terms are no
 /// usable model.
 pub fn calibrate_surfaces(
     captures: &[SurfaceCapture<'_>],
@@ -48,11 +48,11 @@ pub fn calibrate_surfaces(
     let with = StationRegistrationOptions { model: Some(&model), ..options.registration.clone() };
     let poses = Start::Poses(&before.world_from_station);
     let after = register_stations(&clouds, poses, datum, &with, progress).map_err(all)?;
+    let Some(shared) = &after.parameters else { return Err(Error::NothingToEstimate) };
+    require_determined(shared, &model, options)?;
     if !(before.settled && after.settled) {
         return Err(Error::SurfacesNotSettled { rounds: [before.rounds, after.rounds] });
     }
-    let Some(shared) = &after.parameters else { return Err(Error::NothingToEstimate) };
-    require_determined(shared, &model, options)?;
     let mut adjusted = known.clone();
     let mut adjusted_values = values;
     for (&column, value) in columns.iter().zip(&shared.values) {

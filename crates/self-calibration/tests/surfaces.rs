@@ -69,7 +69,7 @@ fn what_is_not_there_is_not_found() {
 }
 
 #[test]
-fn one_wall_leaves_the_offset_open() {
+fn one_wall_is_refused() {
     // Two stations beside each other that see one wall of the room.
     let poses = [
         round::room::look_at([-0.3, 0.2, 1.9], [-0.3, -2.0, 1.9]),
@@ -85,7 +85,12 @@ fn one_wall_leaves_the_offset_open() {
     let known = round::model(&[]);
     let refused = calibrate_surfaces(&captures, &round::camera(), &known, Datum::Station(0), &options, &|_, _| {});
     println!("{:?}", refused.as_ref().err());
-    assert!(matches!(refused, Err(Error::SurfacesNotDetermined { .. } | Error::Registration { .. })));
+    // The bulge of a wall tells an offset if walls are plane, but nothing holds the stations along it.
+    let is_refused = matches!(
+        refused,
+        Err(Error::SurfacesNotDetermined { .. } | Error::SurfacesNotSettled { .. } | Error::Registration { .. })
+    );
+    assert!(is_refused);
 }
 
 #[test]

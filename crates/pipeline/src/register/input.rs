@@ -90,7 +90,7 @@ fn survey_stations(path: &Path, request: &RegisterRequest, progress: &dyn Progre
     let stages = stages(survey.level, calibration.as_ref())?;
     let plan = Plan { name: "register".to_owned(), source: None, calibrate: None, stages };
     let outcome = process(&plan, &root_of(path), request.calibration.as_deref(), progress)?;
-    Ok(stations_of(outcome))
+    Ok(Input { stations: Station::of_views(&outcome), vertical_axis: outcome.vertical_axis })
 }
 
 /// The way from the survey's level to flagged points, as far as the calibration has something to say.
@@ -117,11 +117,6 @@ fn stages(level: Level, calibration: Option<&Calibration>) -> Result<Vec<Stage>>
     stages.push(Stage::PointCloud(PointCloudOptions::default()));
     stages.push(Stage::Flag(FlagOptions::default()));
     Ok(stages)
-}
-
-fn stations_of(outcome: Outcome) -> Input {
-    let stations = Station::of_views(&outcome);
-    Input { stations, vertical_axis: outcome.vertical_axis }
 }
 
 /// The pixels of the camera; `None` for one too small to be registered by pixels.

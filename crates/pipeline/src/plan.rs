@@ -334,12 +334,8 @@ pub enum StartPoses {
 
 impl Default for RegisterOptions {
     fn default() -> Self {
-        Self {
-            start: StartPoses::default(),
-            maximum_distance_m: 0.5,
-            minimum_overlap: 0.3,
-            normal_half_width_px: NORMAL_HALF_WIDTH_PX,
-        }
+        let (start, normal_half_width_px) = (StartPoses::default(), NORMAL_HALF_WIDTH_PX);
+        Self { start, maximum_distance_m: 0.5, minimum_overlap: 0.3, normal_half_width_px }
     }
 }
 

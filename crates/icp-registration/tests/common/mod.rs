@@ -1,6 +1,7 @@
 //! A ray-cast room for the tests: the inside of a box with boxes on its floor.
 #![allow(dead_code, clippy::unwrap_used, clippy::expect_used, clippy::panic, missing_docs)]
 
+pub mod frames;
 pub mod limit;
 pub mod scenes;
 pub mod stations;

@@ -6,6 +6,7 @@ use super::feature_cloud::FeatureCloud;
 use super::judge::Verdict;
 use super::options::CoarseOptions;
 use super::refine;
+use super::view::Jumps;
 use crate::error::Result;
 
 /// The clouds in voxels of one size, that of the coarsest.
@@ -28,7 +29,7 @@ fn from_middle(placed: &Placed<'_>) -> Isometry3<f64> {
 /// Every `stride`-th sampled point is looked at. Clouds that see nothing in common have none.
 pub(crate) fn evidence(a: &Placed<'_>, b: &Placed<'_>, stride: usize) -> f64 {
     let pose = from_middle(a).inverse() * from_middle(b);
-    Verdict::new(b.0, a.0, &pose, stride).evidence() * stride as f64
+    Verdict::with(b.0, a.0, &pose, stride, Jumps::Missed).evidence() * stride as f64
 }
 
 /// Brings a cloud that is nearly in place onto all those around it, point to plane.

@@ -5,7 +5,7 @@ use nalgebra::Isometry3;
 use super::correspondences::Motion;
 use super::feature_cloud::FeatureCloud;
 use super::fpfh::{dot, subtract};
-use super::view::Sight;
+use super::view::{Jumps, Sight};
 
 /// Least cosine between the normals of partners.
 const LEAST_COSINE: f32 = 0.8;
@@ -42,7 +42,19 @@ pub(super) struct Verdict {
 impl Verdict {
     /// `pose`: target from source, both about their middles. Every `stride`-th sampled point is looked at.
     pub(super) fn new(source: &FeatureCloud, target: &FeatureCloud, pose: &Isometry3<f64>, stride: usize) -> Self {
-        Self { source: count(source, target, pose, stride), target: count(target, source, &pose.inverse(), stride) }
+        Self::with(source, target, pose, stride, Jumps::Unknown)
+    }
+
+    /// [`Self::new`] with what a jump of the range says about points between its two sides.
+    pub(super) fn with(
+        source: &FeatureCloud,
+        target: &FeatureCloud,
+        pose: &Isometry3<f64>,
+        stride: usize,
+        jumps: Jumps,
+    ) -> Self {
+        let back = pose.inverse();
+        Self { source: count(source, target, pose, stride, jumps), target: count(target, source, &back, stride, jumps) }
     }
 
     /// Share of the points with a partner less those in free space, doubly counted, times the square of the agreement:
@@ -92,7 +104,7 @@ impl Verdict {
     }
 }
 
-fn count(from: &FeatureCloud, to: &FeatureCloud, pose: &Isometry3<f64>, stride: usize) -> Count {
+fn count(from: &FeatureCloud, to: &FeatureCloud, pose: &Isometry3<f64>, stride: usize, jumps: Jumps) -> Count {
     let motion = Motion::new(pose);
     let sided = from.normals.sided && to.normals.sided;
     let voxel = to.reduced.voxel_m as f32;
@@ -105,7 +117,7 @@ fn count(from: &FeatureCloud, to: &FeatureCloud, pose: &Isometry3<f64>, stride: 
             count.hits += 1;
             continue;
         }
-        match to.view.as_ref().map(|view| view.sight(point)) {
+        match to.view.as_ref().map(|view| view.sight(point, jumps)) {
             Some(Sight::InFree) => count.in_free += 1,
             Some(Sight::OnSurface) => count.missed += 1,
             _ => {}

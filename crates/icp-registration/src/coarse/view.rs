@@ -21,6 +21,15 @@ pub(super) enum Sight {
     Unknown,
 }
 
+/// What is said of a point in a direction in which the range jumps, between its two sides.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Jumps {
+    /// Nothing: of two clouds alone, edges that noise moves would speak against a right pose.
+    Unknown,
+    /// That it misses the surface: among many stations, the outlines of furniture tell which have slid along a wall.
+    Missed,
+}
+
 /// Nearest and farthest range in each direction.
 #[derive(Debug, Clone)]
 pub(super) struct View {
@@ -49,7 +58,7 @@ impl View {
         Some(view)
     }
 
-    pub(super) fn sight(&self, point: [f32; 3]) -> Sight {
+    pub(super) fn sight(&self, point: [f32; 3], jumps: Jumps) -> Sight {
         let Some((cell, range)) = self.cell(point) else { return Sight::Unknown };
         if self.farthest[cell] <= 0.0 {
             Sight::Unknown
@@ -57,7 +66,7 @@ impl View {
             Sight::InFree
         } else if range > self.farthest[cell] + self.tolerance {
             Sight::Hidden
-        } else if self.farthest[cell] > self.nearest[cell] + JUMP * self.tolerance {
+        } else if jumps == Jumps::Unknown && self.farthest[cell] > self.nearest[cell] + JUMP * self.tolerance {
             Sight::Unknown
         } else {
             Sight::OnSurface

@@ -15,6 +15,7 @@ use super::matching::{Match, matches};
 use super::options::{CoarseOptions, Estimator};
 use super::ransac::consistent_samples;
 use super::refine::refine;
+use super::view::Jumps;
 use crate::error::{Error, Result};
 
 /// Correspondences that enter the graph, those with the most alike descriptors.
@@ -112,15 +113,20 @@ pub(crate) fn hypotheses(
     let (source, target) = (source.as_ref(), target.as_ref());
     let voxel_m = target.voxel_m();
     let tolerance = Tolerance { distance: (options.tolerance_voxels * voxel_m) as f32, cosine: COSINE_TOLERANCE };
-    let mut verified = verified(source, target, tolerance, options).1;
-    verified.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
-    let mut kept: Vec<&Hypothesis> = Vec::new();
-    for hypothesis in &verified {
-        if !kept.iter().any(|other| is_same(&other.pose, &hypothesis.pose, voxel_m, source)) {
-            kept.push(hypothesis);
+    let score = |hypothesis: &Hypothesis| {
+        let verdict = Verdict::with(source, target, &hypothesis.pose, 1, Jumps::Missed);
+        (hypothesis.pose, verdict.rough_score())
+    };
+    let mut scored: Vec<(Isometry3<f64>, f64)> =
+        verified(source, target, tolerance, options).1.par_iter().map(score).collect();
+    scored.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let mut kept: Vec<(Isometry3<f64>, f64)> = Vec::new();
+    for (pose, score) in scored {
+        if !kept.iter().any(|(other, _)| is_same(other, &pose, voxel_m, source)) {
+            kept.push((pose, score));
         }
     }
-    Ok(kept.iter().map(|h| (target.between_frames(source, &h.pose), h.evidence)).collect())
+    Ok(kept.iter().map(|(pose, score)| (target.between_frames(source, pose), *score)).collect())
 }
 
 /// The correspondences, and the best poses of them, refined and judged.

@@ -15,37 +15,20 @@
 
 #[path = "../tests/common/mod.rs"]
 mod common;
+#[path = "../../../xtask/peers/cpu_clock.rs"]
+mod cpu_clock;
 #[path = "../tests/sequence/mod.rs"]
 mod sequence;
 
 use std::path::Path;
 use std::str::FromStr;
 use std::sync::Arc;
-use std::time::Duration;
 
 use common::Pinhole;
+use cpu_clock::cpu_seconds;
 use icp_registration::{Fusion, Projection, TrackedPose, Tracker, TrackerOptions, TrackingState};
 use nalgebra::{Isometry3, Matrix3, Matrix4, Rotation3, UnitQuaternion};
 use sequence::{absolute_error, around, frame_at, normalised_error, poses, projection, relative_error};
-
-/// CPU seconds of this thread.
-fn cpu_seconds() -> f64 {
-    let figures = || {
-        let text = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
-        let mut words = text.split_whitespace().map(str::parse::<f64>);
-        Some((words.next()?.ok()?, words.nth(1)?.ok()?))
-    };
-    let Some((_, turns)) = figures() else { return f64::NAN };
-    // The system counts up to the last change of threads: sleep until there was one.
-    loop {
-        std::thread::sleep(Duration::from_micros(50));
-        match figures() {
-            Some((nanoseconds, now)) if now > turns => return 1e-9 * nanoseconds,
-            Some(_) => {}
-            None => return f64::NAN,
-        }
-    }
-}
 
 /// Value of an option `name=value` of the command line.
 fn argument<T: FromStr>(name: &str) -> Option<T> {

@@ -39,10 +39,9 @@ pub use icp::{
 pub use kernel::RobustKernel;
 #[cfg(feature = "multiview")]
 pub use multiview::{
-    Datum, LoopClosure, Overlap, PairAlignment, PairConstraint, PairResidual, PointModel, RefusedPair,
-    SharedParameters, Start, StationAdjustment, StationAdjustmentOptions, StationRegistration,
-    StationRegistrationOptions, SurfaceAdjustment, SurfaceAdjustmentOptions, SurfacePair, UndeterminedStation,
-    adjust_stations, adjust_surfaces, align_pairs, find_overlaps, register_stations,
+    Datum, LoopClosure, PairAlignment, PairConstraint, PairResidual, PointModel, RefusedPair, SharedParameters, Start,
+    StationAdjustment, StationAdjustmentOptions, StationRegistration, StationRegistrationOptions, SurfacePair,
+    UndeterminedStation, adjust_stations, register_stations,
 };
 pub use neighbours::{Neighbour, NeighbourTree};
 pub use normals::{OrganisedNormalOptions, UnorganisedNormalOptions, organised_normals, unorganised_normals};

@@ -1,10 +1,10 @@
 //! Pairs of stations by themselves at the adjusted poses: how loops close, and which pairs contradict them.
 
+use super::alignments::{PairAlignment, RefusedPair, best_partners, without_partners};
 use super::loops::{LoopClosure, contradicting, skeleton};
 use super::pose_graph::Datum;
 use super::registration::StationRegistrationOptions;
 use super::simultaneous::Adjusted;
-use super::surfaces::{PairAlignment, RefusedPair, best_partners, without_partners};
 use crate::error::Result;
 
 /// Default of the tolerance of loops, in radii of the clouds.

@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Matrix6, Vector6};
 
-use super::surfaces::{PairAlignment, RefusedPair};
+use super::alignments::{PairAlignment, RefusedPair};
 use crate::pose::{inverse_covariance_transport, pose_difference, symmetrised};
 
 /// A way from station to station and back.

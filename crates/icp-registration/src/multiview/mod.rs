@@ -1,5 +1,6 @@
 //! Many stations: which of them overlap, and all their poses at once.
 
+mod alignments;
 mod blind;
 mod check;
 mod contacts;
@@ -10,7 +11,6 @@ mod facets;
 mod grouping;
 mod loops;
 mod network;
-mod overlap;
 mod pairs;
 mod patches;
 mod plane_fit;
@@ -28,17 +28,13 @@ mod sightings;
 mod simultaneous;
 mod stations;
 mod sums;
-mod surfaces;
 mod tiles;
 
+pub use alignments::{PairAlignment, RefusedPair};
 pub use loops::LoopClosure;
-pub use overlap::{Overlap, find_overlaps};
 pub use point_model::{PointModel, SharedParameters};
 pub use pose_graph::{
     Datum, PairConstraint, PairResidual, StationAdjustment, StationAdjustmentOptions, adjust_stations,
 };
 pub use registration::{Start, StationRegistration, StationRegistrationOptions, SurfacePair, UndeterminedStation};
 pub use stations::register_stations;
-pub use surfaces::{
-    PairAlignment, RefusedPair, SurfaceAdjustment, SurfaceAdjustmentOptions, adjust_surfaces, align_pairs,
-};

@@ -3,14 +3,13 @@
 use nalgebra::{DVector, Isometry3, Matrix6};
 use rayon::prelude::*;
 
+use super::alignments::{Overlap, PairAlignment};
 use super::elimination::FacetSums;
 use super::equations::Equations;
 use super::network::{Network, State};
-use super::overlap::Overlap;
 use super::precision;
 use super::scatter::TileMean;
 use super::simultaneous::Adjusted;
-use super::surfaces::PairAlignment;
 use crate::error::Result;
 use crate::icp::{IcpResult, StopReason};
 use crate::pose::{step_pose, symmetrised};

@@ -4,10 +4,10 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, Isometry3, Matrix6};
 
+use super::alignments::{PairAlignment, RefusedPair};
 use super::loops::LoopClosure;
 use super::patches::Surface;
 use super::point_model::{PointModel, SharedParameters};
-use super::surfaces::{PairAlignment, RefusedPair};
 use crate::icp::UndeterminedMotion;
 use crate::kernel::RobustKernel;
 

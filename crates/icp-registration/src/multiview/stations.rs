@@ -5,10 +5,10 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, Isometry3, Matrix6};
 use rayon::prelude::*;
 
+use super::alignments::Overlap;
 use super::check::{Checked, checked};
 use super::grouping::patch_size;
 use super::network::{Network, State};
-use super::overlap::Overlap;
 use super::patches::Surface;
 use super::point_model::{SharedParameters, checked_prior};
 use super::points::StationPoints;

@@ -1,7 +1,7 @@
 //! Pairs of simulated frames aligned from nothing: how many are found, how many answers are wrong, and the CPU time of
 //! one thread from raw points to the pose.
 //!
-//! `coarse_pairs [graph|ransac] [pairs] [large|half|none] [from=SEED] [--each]`
+//! `coarse_pairs [graph|ransac] [pairs] [large|most|half|none] [from=SEED] [--each]`
 #![allow(clippy::unwrap_used, clippy::print_stdout, missing_docs)]
 
 #[path = "../tests/coarse_scenes/mod.rs"]
@@ -18,7 +18,8 @@ use icp_registration::{CoarseOptions, Estimator};
 fn main() {
     let words: Vec<String> = std::env::args().skip(1).collect();
     let each = words.iter().any(|w| w == "--each");
-    let count = words.iter().find_map(|w| w.parse().ok()).unwrap_or(200_u64);
+    let asked: Option<u64> = words.iter().find_map(|w| w.parse().ok());
+    let count = asked.unwrap_or(200);
     let estimator = if words.iter().any(|w| w == "ransac") {
         Estimator::Ransac { samples: 100_000 }
     } else {
@@ -26,7 +27,8 @@ fn main() {
     };
     let options = CoarseOptions { estimator, ..CoarseOptions::default() };
     let chosen = |class: &str| {
-        words.iter().any(|w| w == class) || !words.iter().any(|w| ["large", "half", "none"].contains(&w.as_str()))
+        words.iter().any(|w| w == class)
+            || !words.iter().any(|w| ["large", "most", "half", "none"].contains(&w.as_str()))
     };
     let from = words.iter().find_map(|w| w.strip_prefix("from=")?.parse().ok()).unwrap_or(0_u64);
     println!("set                            pairs  right  wrong  none  median mm  median deg  CPU ms (median)");
@@ -40,7 +42,11 @@ fn main() {
         table.print(name);
     };
     if chosen("large") {
-        set("640x480, overlap 0.5 to 0.9", 14, &Pinhole::large(), 0.5..0.9, false);
+        set("640x480, overlap 0.5 to 0.9", asked.unwrap_or(14), &Pinhole::large(), 0.5..0.9, false);
+    }
+    if chosen("most") {
+        set("224x172, overlap 0.5 to 0.9", count, &Pinhole::medium(), 0.5..0.9, false);
+        set("224x172, 0.5 to 0.9, any room", count, &Pinhole::medium(), 0.5..0.9, true);
     }
     if chosen("half") {
         set("224x172, overlap 0.4 to 0.6", count, &Pinhole::medium(), 0.4..0.6, false);

@@ -279,14 +279,28 @@ fn best_two<'a>(verified: &'a [Hypothesis], voxel_m: f64, source: &FeatureCloud)
     Some((winner, rival.map_or(0.0, |h| h.evidence.max(0.0))))
 }
 
+/// Where most of a cloud agrees this well, walls alone do not explain it: less structure inside them is needed.
+const WELL_SHARED: f64 = 0.4;
+const AGREES_WELL: f64 = 0.99;
+const INSIDE_WHERE_SHARED: f64 = 0.4;
+/// Where many correspondences and structure inside speak for a pose without a rival, edges may contradict this much more.
+const RICH_INSIDE: f64 = 0.1;
+const AGREES_FAIRLY: f64 = 0.97;
+const WITHOUT_RIVAL: f64 = 0.5;
+const CONTRADICTION_WHERE_RICH: f64 = 2.0;
+
 fn check(found: CoarseAlignment, options: &CoarseOptions) -> Result<CoarseAlignment> {
+    let shared = found.overlap >= WELL_SHARED && found.agreement >= AGREES_WELL;
+    let rich = found.inside >= RICH_INSIDE && found.agreement >= AGREES_FAIRLY && found.rival <= WITHOUT_RIVAL;
+    let inside = options.min_inside * if shared { INSIDE_WHERE_SHARED } else { 1.0 };
+    let contradiction = options.max_contradiction * if rich { CONTRADICTION_WHERE_RICH } else { 1.0 };
     let least = [
         ("inliers", found.inliers as f64, options.min_inliers as f64),
         ("overlap", found.overlap, options.min_overlap),
         ("agreement", found.agreement, options.min_agreement),
         // Fractions that must stay small, seen from the other side.
-        ("points outside free space", 1.0 - found.contradiction, 1.0 - options.max_contradiction),
-        ("structure inside its enclosing planes", found.inside, options.min_inside),
+        ("points outside free space", 1.0 - found.contradiction, 1.0 - contradiction),
+        ("structure inside its enclosing planes", found.inside, inside),
         ("geometry", found.determined, options.min_determined),
         ("lead over the rival", 1.0 - found.rival, 1.0 - options.max_rival),
     ];

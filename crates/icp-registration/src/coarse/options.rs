@@ -91,10 +91,13 @@ pub struct CoarseOptions {
     pub min_agreement: f64,
     /// Largest fraction of points in space that the other camera looked through (see
     /// [`super::CoarseAlignment::contradiction`]). Default 0.012: at the right pose there are hardly any.
+    /// Twice as many may where a tenth of the points lie inside what encloses the scene, 97 % of what should be seen agrees and
+    /// no rival has half the evidence.
     pub max_contradiction: f64,
     /// Smallest fraction of points on both clouds that lie inside what encloses them (see
     /// [`super::CoarseAlignment::inside`]). Default 0.013: corners of empty rooms are taken for each other. 0 accepts
-    /// them. Clouds whose normals have no side always pass.
+    /// them. Two fifths of it suffice where two fifths of a cloud have a partner and 99 % of what should be seen agrees. Clouds
+    /// whose normals have no side always pass.
     pub min_inside: f64,
     /// Smallest share of the evidence that is lost where the pose slides along what is determined least (see
     /// [`super::CoarseAlignment::determined`]). Default 0.15. 0 lets features decide where surfaces cannot.

@@ -20,6 +20,7 @@ mod simulate;
 mod stages;
 mod statistics;
 mod summary;
+mod track;
 mod truth;
 mod view;
 mod work;
@@ -60,5 +61,6 @@ pub use simulate::{Simulated, simulate};
 pub use summary::{
     PairSummary, ReferenceSummary, RegistrationSummary, StageSummary, StationTruth, Summary, TruthSummary,
 };
+pub use track::{TrackLoss, TrackRequest, TrackSummary, TrackTruth, TrackVerdict, TrackedFrame, track};
 pub use truth::{RangeTruth, ViewTruth};
 pub use view::{Snapshot, View, ViewData};

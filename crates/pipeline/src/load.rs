@@ -19,8 +19,31 @@ use crate::{Error, Plan, Result};
 
 /// Reads survey, calibration, poses, truth and all frames; refuses a plan that the survey's level rules out.
 pub(crate) fn load(folder: &Path, calibration: Option<&Path>, plan: &Plan, progress: &dyn Progress) -> Result<Work> {
+    let (mut work, frames) = open(folder, calibration)?;
+    let count = work.outcome.survey.frames.len();
+    plan.check_level(work.outcome.survey.level)?;
+    progress.begin("read frames", count);
+    for index in 0..count {
+        let view = frames.view(&work.outcome.survey, index)?;
+        work.outcome.views.push(view);
+        progress.advance(index + 1);
+    }
+    Ok(work)
+}
+
+/// What the frames of a survey have in common.
+pub(crate) struct Frames {
+    root: PathBuf,
+    depth_rays: RayTable,
+    poses: Vec<Station>,
+    true_poses: Vec<Station>,
+    reference: Option<Raster<f32>>,
+    modulations: Vec<Modulation>,
+}
+
+/// Reads all of a survey but its frames.
+pub(crate) fn open(folder: &Path, calibration: Option<&Path>) -> Result<(Work, Frames)> {
     let survey = Survey::read(folder)?;
-    plan.check_level(survey.level)?;
     if survey.frames.is_empty() {
         return Err(Error::Survey { path: folder.join(Survey::FILE_NAME), message: "it lists no frames".to_owned() });
     }
@@ -40,34 +63,12 @@ pub(crate) fn load(folder: &Path, calibration: Option<&Path>, plan: &Plan, progr
     };
     let reference = read_reference(&survey, &root)?;
     let modulations = survey.camera.modulations()?;
-    progress.begin("read frames", survey.frames.len());
-    let mut views = Vec::with_capacity(survey.frames.len());
-    for (index, entry) in survey.frames.iter().enumerate() {
-        let mut view = View {
-            station: entry.station.clone(),
-            frames: vec![index],
-            timestamp_s: entry.timestamp_s.unwrap_or(0.0),
-            integration_time_s: entry.integration_time_s,
-            data: view_data(read_frame(&survey, &root, index)?, &depth_rays)?,
-            before: None,
-            approximate_world_from_camera: pose_of(&poses, &entry.station),
-            truth: read_view_truth(&survey, &root, index, pose_of(&true_poses, &entry.station))?,
-            reference_range: reference.clone(),
-            modulation: modulations.first().copied(),
-            channels: Vec::new(),
-            modulations: modulations.clone(),
-            multipath_risk_m: None,
-        };
-        view.before = view.snapshot();
-        views.push(view);
-        progress.advance(index + 1);
-    }
     let vertical_axis = if poses.is_empty() { 1 } else { 2 };
     let outcome = Outcome {
         survey,
         calibration: calibration_words,
         camera,
-        views,
+        views: Vec::new(),
         clouds: Vec::new(),
         further_points: Vec::new(),
         poses: Vec::new(),
@@ -77,7 +78,42 @@ pub(crate) fn load(folder: &Path, calibration: Option<&Path>, plan: &Plan, progr
         stages: Vec::new(),
         vertical_axis,
     };
-    Ok(Work { calibration, calibrated_camera, rays, station_clouds: Vec::new(), outcome })
+    let frames = Frames { root, depth_rays, poses, true_poses, reference, modulations };
+    Ok((Work { calibration, calibrated_camera, rays, station_clouds: Vec::new(), outcome }, frames))
+}
+
+impl Frames {
+    /// Reads frame `index` (from 0) with its pose and truth.
+    pub(crate) fn view(&self, survey: &Survey, index: usize) -> Result<View> {
+        let entry = &survey.frames[index];
+        let mut view = View {
+            station: entry.station.clone(),
+            frames: vec![index],
+            timestamp_s: entry.timestamp_s.unwrap_or(0.0),
+            integration_time_s: entry.integration_time_s,
+            data: view_data(read_frame(survey, &self.root, index)?, &self.depth_rays)?,
+            before: None,
+            approximate_world_from_camera: self.approximate_pose(&entry.station),
+            truth: read_view_truth(survey, &self.root, index, self.true_pose(&entry.station))?,
+            reference_range: self.reference.clone(),
+            modulation: self.modulations.first().copied(),
+            channels: Vec::new(),
+            modulations: self.modulations.clone(),
+            multipath_risk_m: None,
+        };
+        view.before = view.snapshot();
+        Ok(view)
+    }
+
+    /// Where the survey says that a station stands.
+    pub(crate) fn approximate_pose(&self, station: &str) -> Option<Isometry3<f64>> {
+        pose_of(&self.poses, station)
+    }
+
+    /// Where it truly stands, of simulated surveys.
+    pub(crate) fn true_pose(&self, station: &str) -> Option<Isometry3<f64>> {
+        pose_of(&self.true_poses, station)
+    }
 }
 
 /// The folder that a survey's paths are relative to, whether the folder or its `survey.ron` was named.

@@ -82,6 +82,16 @@ pub enum Error {
         /// What is wrong and what was expected.
         reason: String,
     },
+    /// No value of an array is a measurement: the frame shows nothing.
+    #[error("{}: array `{array}` {reason}", .file.display())]
+    NothingMeasured {
+        /// The file.
+        file: PathBuf,
+        /// The array.
+        array: String,
+        /// How that shows.
+        reason: String,
+    },
     /// A file is not of the format that its name or use promises.
     #[error("{}: {reason}", .file.display())]
     Format {

@@ -7,6 +7,7 @@ use pipeline::{Plan, RunRequest, SimulateSource};
 
 use crate::arguments::Command;
 use crate::output::Output;
+use crate::register_arguments::Request;
 
 type Outcome = Result<(), Box<dyn Error>>;
 
@@ -39,9 +40,13 @@ pub(crate) fn dispatch(command: Command, output: &Output) -> Outcome {
         Command::Scattering(arguments) => {
             output.result(&pipeline::estimate_scattering(&arguments.request(), output.progress().as_ref())?)
         }
-        Command::Register(arguments) => {
-            output.result(&pipeline::register(&arguments.request(), output.progress().as_ref())?)
-        }
+        Command::Register(arguments) => match arguments.request() {
+            Request::Register(request) => output.result(&pipeline::register(&request, output.progress().as_ref())?),
+            Request::Track(request) => output.result(&pipeline::track(&request, output.progress().as_ref())?),
+            Request::SeveralToTrack => {
+                Err("register: --track follows the frames of one survey: name one folder".into())
+            }
+        },
         Command::Inspect { path } => output.result(&pipeline::inspect(&path)?),
         Command::Compare(arguments) => {
             output.result(&pipeline::compare(&arguments.request(), output.progress().as_ref())?)

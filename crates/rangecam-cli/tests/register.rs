@@ -28,7 +28,7 @@ fn write_bumps(path: &Path, x: f64, shift: f64) {
 #[test]
 fn help_names_every_option() {
     let help = text(&rangecam(&["register", "--help"]).stdout);
-    for word in ["--guess", "--multi", "--calibration", "--out", "--json", "--quiet", "survey folder"] {
+    for word in ["--guess", "--multi", "--track", "--calibration", "--out", "--json", "--quiet", "survey folder"] {
         assert!(help.contains(word), "{word} in {help}");
     }
 }
@@ -72,4 +72,54 @@ fn errors_say_what_to_do() {
     assert_eq!(rangecam(&["register"]).status.code(), Some(2), "an input is required");
     let absent = rangecam(&["register", "/nowhere/survey"]);
     assert!(text(&absent.stderr).contains("there is no such file or folder"), "{}", text(&absent.stderr));
+}
+
+/// A folder of depth images of 160 x 120 pixels in the form of 7-Scenes, all of one bumpy wall.
+fn write_images(folder: &Path, shows: &[bool]) {
+    std::fs::create_dir_all(folder).unwrap();
+    std::fs::write(folder.join("camera-intrinsics.txt"), "150 0 80\n0 150 60\n0 0 1\n").unwrap();
+    for (k, shows) in shows.iter().enumerate() {
+        let file = std::fs::File::create(folder.join(format!("frame-{k:06}.depth.png"))).unwrap();
+        let mut encoder = png::Encoder::new(file, 160, 120);
+        encoder.set_color(png::ColorType::Grayscale);
+        encoder.set_depth(png::BitDepth::Sixteen);
+        let depth = |pixel: u32| {
+            let (u, v) = (f64::from(pixel % 160) / 40.0, f64::from(pixel / 160) / 40.0);
+            2.0 + 0.15 * (2.0 * u).sin() * (3.1 * v).cos() + 0.1 * u + 0.05 * (1.3 * v * u).cos()
+        };
+        let stored = |pixel: u32| if *shows { (1000.0 * depth(pixel)) as u16 } else { 0 };
+        let bytes: Vec<u8> = (0..160 * 120).flat_map(|pixel| stored(pixel).to_be_bytes()).collect();
+        encoder.write_header().unwrap().write_image_data(&bytes).unwrap();
+    }
+}
+
+#[test]
+fn a_folder_of_images_is_tracked() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    write_images(Path::new(&path("still")), &[true; 4]);
+    let output = rangecam(&["register", &path("still"), "--track", "--out", &path("out"), "--json"]);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let json: serde_json::Value = serde_json::from_str(&text(&output.stdout)).unwrap();
+    assert_eq!((&json["verdict"], &json["frames"]), (&"tracked".into(), &4.into()));
+    // One image four times: the camera stands still.
+    assert!(json["path_length_m"].as_f64().unwrap() < 1e-3, "{}", json["path_length_m"]);
+    for file in
+        ["report.html", "summary.json", "cloud.ply", "stations.csv", "trajectory.txt", "trajectory_adjusted.txt"]
+    {
+        assert!(folder.path().join("out").join(file).is_file(), "{file}");
+    }
+
+    // A sequence that ends lost fails, but keeps what it has.
+    write_images(Path::new(&path("ends")), &[true, true, false, false]);
+    let output = rangecam(&["register", &path("ends"), "--track", "--out", &path("lost"), "--json"]);
+    assert_eq!(output.status.code(), Some(1));
+    assert!(text(&output.stderr).contains("not found again"), "{}", text(&output.stderr));
+    let json: serde_json::Value = serde_json::from_str(&text(&output.stdout)).unwrap();
+    assert_eq!((&json["verdict"], &json["lost"]), (&"lost".into(), &2.into()));
+    assert!(folder.path().join("lost/trajectory.txt").is_file());
+
+    let several = rangecam(&["register", &path("still"), &path("ends"), "--track"]);
+    assert!(text(&several.stderr).contains("name one folder"), "{}", text(&several.stderr));
+    assert_eq!(rangecam(&["register", &path("still"), "--track", "--multi"]).status.code(), Some(2));
 }

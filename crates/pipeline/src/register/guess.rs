@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use nalgebra::{Isometry3, Matrix3, Matrix4, Rotation3, UnitQuaternion};
-use range_io::tables::read_stations;
-use range_io::trajectory::read_any_trajectory;
+use range_io::tables::{Station as StationRow, read_stations};
+use range_io::trajectory::{StampedPose, read_any_trajectory};
 
 use super::input::Station;
 use crate::{Error, Result};
@@ -14,17 +14,47 @@ const SAME_TIME_S: f64 = 5e-3;
 /// How far the rows of a rotation may be from unit length and right angles.
 const ROTATION_TOLERANCE: f64 = 1e-3;
 
+/// What a file says of poses.
+pub(crate) enum Guess {
+    /// By station.
+    Stations(Vec<StationRow>),
+    /// The second cloud's frame in the first's.
+    Matrix(Isometry3<f64>),
+    /// By time.
+    Trajectory(Vec<StampedPose>),
+}
+
+impl Guess {
+    /// Reads `stations.csv`, a trajectory, or sixteen numbers.
+    pub(crate) fn read(path: &Path) -> Result<Self> {
+        let of_stations = || std::fs::read_to_string(path).is_ok_and(|text| text.trim_start().starts_with("station"));
+        if path.extension().is_some_and(|ending| ending == "csv") && of_stations() {
+            return Ok(Self::Stations(read_stations(path)?));
+        }
+        match matrix(path)? {
+            Some(second_to_first) => Ok(Self::Matrix(second_to_first)),
+            None => Ok(Self::Trajectory(read_any_trajectory(path)?)),
+        }
+    }
+
+    /// The pose of a station at a time; a matrix belongs to none.
+    pub(crate) fn pose(&self, station: &str, timestamp_s: f64) -> Option<Isometry3<f64>> {
+        match self {
+            Self::Stations(rows) => rows.iter().find(|row| row.station == station).map(|row| row.world_from_camera),
+            Self::Trajectory(poses) => {
+                let found = poses.iter().find(|pose| (pose.timestamp_s - timestamp_s).abs() < SAME_TIME_S);
+                found.map(|pose| pose.world_from_camera)
+            }
+            Self::Matrix(_) => None,
+        }
+    }
+}
+
 /// Sets the approximate poses of all stations from `stations.csv`, a trajectory, or the matrix that leads from the second
 /// cloud's frame to the first's.
 pub(super) fn apply(path: &Path, stations: &mut [Station]) -> Result<()> {
-    let of_stations = || std::fs::read_to_string(path).is_ok_and(|text| text.trim_start().starts_with("station"));
-    if path.extension().is_some_and(|ending| ending == "csv") && of_stations() {
-        let rows = read_stations(path)?;
-        return set(path, stations, |station| {
-            rows.iter().find(|row| row.station == station.name).map(|row| row.world_from_camera)
-        });
-    }
-    if let Some(second_to_first) = matrix(path)? {
+    let guess = Guess::read(path)?;
+    if let Guess::Matrix(second_to_first) = guess {
         let [first, second] = stations else {
             let count = stations.len();
             return Err(wrong(path, &format!("holds one matrix, which is a guess for two clouds, not for {count}")));
@@ -33,29 +63,17 @@ pub(super) fn apply(path: &Path, stations: &mut [Station]) -> Result<()> {
         second.approximate = Some(second_to_first);
         return Ok(());
     }
-    let poses = read_any_trajectory(path)?;
-    set(path, stations, |station| {
-        poses
-            .iter()
-            .find(|pose| (pose.timestamp_s - station.timestamp_s).abs() < SAME_TIME_S)
-            .map(|pose| pose.world_from_camera)
-    })
-}
-
-fn set(path: &Path, stations: &mut [Station], pose: impl Fn(&Station) -> Option<Isometry3<f64>>) -> Result<()> {
     for station in stations {
-        let found = pose(station);
-        if found.is_none() {
-            let (name, time) = (&station.name, station.timestamp_s);
-            return Err(wrong(path, &format!("has no pose of station {name} (time {time} s)")));
-        }
-        station.approximate = found;
+        let (name, time) = (&station.name, station.timestamp_s);
+        let pose = guess.pose(name, time);
+        let none = || wrong(path, &format!("has no pose of station {name} (time {time} s)"));
+        station.approximate = Some(pose.ok_or_else(none)?);
     }
     Ok(())
 }
 
 /// A file of sixteen numbers, row by row; `None` where it is something else.
-fn matrix(path: &Path) -> Result<Option<Isometry3<f64>>> {
+pub(crate) fn matrix(path: &Path) -> Result<Option<Isometry3<f64>>> {
     // Some trajectories are folders.
     if path.is_dir() {
         return Ok(None);

@@ -72,7 +72,7 @@ pub(super) fn read(request: &RegisterRequest, progress: &dyn Progress) -> Result
 }
 
 /// Whether the path is a folder with `survey.ron`, or that file.
-fn is_survey(path: &Path) -> bool {
+pub(crate) fn is_survey(path: &Path) -> bool {
     path.is_dir() || path.file_name().is_some_and(|name| name == Survey::FILE_NAME)
 }
 
@@ -94,7 +94,7 @@ fn survey_stations(path: &Path, request: &RegisterRequest, progress: &dyn Progre
 }
 
 /// The way from the survey's level to flagged points, as far as the calibration has something to say.
-fn stages(level: Level, calibration: Option<&Calibration>) -> Result<Vec<Stage>> {
+pub(crate) fn stages(level: Level, calibration: Option<&Calibration>) -> Result<Vec<Stage>> {
     let mut stages = Vec::new();
     if level == Level::Samples {
         stages.push(Stage::Demodulate(DemodulateOptions::default()));
@@ -120,7 +120,7 @@ fn stages(level: Level, calibration: Option<&Calibration>) -> Result<Vec<Stage>>
 }
 
 /// The pixels of the camera; `None` for one too small to be registered by pixels.
-fn projection(camera: &Camera) -> Option<Arc<Projection>> {
+pub(crate) fn projection(camera: &Camera) -> Option<Arc<Projection>> {
     let rays = RayTable::new(camera).ok()?;
     let format = &camera.format;
     Projection::from_directions(format.width, format.height, rays.directions()).ok().map(Arc::new)

@@ -2,8 +2,8 @@
 
 mod chain;
 mod describe;
-mod guess;
-mod input;
+pub(crate) mod guess;
+pub(crate) mod input;
 mod pairs;
 mod request;
 mod results;

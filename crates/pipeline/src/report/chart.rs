@@ -34,6 +34,18 @@ pub(crate) fn curves(axes: &Axes<'_>, sets: &[Series<'_, (f64, f64)>]) -> String
     canvas.finish()
 }
 
+/// Spans widened so that a metre is as long in both directions of a chart.
+pub(crate) fn to_scale(x: [f64; 2], y: [f64; 2]) -> ([f64; 2], [f64; 2]) {
+    let plotted = Canvas::plotted(SIZE);
+    let extent = |[low, high]: [f64; 2]| high - low;
+    let metres_per_pixel = (extent(x) / plotted[0]).max(extent(y) / plotted[1]);
+    let widened = |span: [f64; 2], pixels: f64| {
+        let (middle, half) = (f64::midpoint(span[0], span[1]), 0.5 * metres_per_pixel * pixels);
+        [middle - half, middle + half]
+    };
+    (widened(x, plotted[0]), widened(y, plotted[1]))
+}
+
 fn canvas_around(axes: &Axes<'_>, sets: &[Series<'_, (f64, f64)>]) -> Canvas {
     let all = || sets.iter().flat_map(|set| set.values.iter());
     Canvas::new(axes, SIZE, span(all().map(|point| point.0)), span(all().map(|point| point.1)))

@@ -1,7 +1,7 @@
 //! The report of a comparison.
 
 use super::canvas::{Axes, Canvas, span};
-use super::chart::{SIZE, Series, curves};
+use super::chart::{SIZE, Series, curves, to_scale};
 use super::colour::{CATEGORIES, ColourMap};
 use super::deviation_figure::{View, deviation_figure};
 use super::page::Page;
@@ -257,18 +257,6 @@ fn top_view(tracks: &TrackCurves) -> String {
     canvas.name(CATEGORIES[7], "reference");
     canvas.name(CATEGORIES[0], "first");
     canvas.finish()
-}
-
-/// Spans widened so that a metre is as long in both directions of a chart.
-fn to_scale(x: [f64; 2], y: [f64; 2]) -> ([f64; 2], [f64; 2]) {
-    let plotted = Canvas::plotted(SIZE);
-    let extent = |[low, high]: [f64; 2]| high - low;
-    let metres_per_pixel = (extent(x) / plotted[0]).max(extent(y) / plotted[1]);
-    let widened = |span: [f64; 2], pixels: f64| {
-        let (middle, half) = (f64::midpoint(span[0], span[1]), 0.5 * metres_per_pixel * pixels);
-        [middle - half, middle + half]
-    };
-    (widened(x, plotted[0]), widened(y, plotted[1]))
 }
 
 fn absolute_chart(tracks: &TrackCurves, title: &str, y: &str, value: fn(&crate::compare::TrackPoint) -> f64) -> String {

@@ -14,9 +14,11 @@ mod registration_residuals;
 mod scattering;
 mod sections;
 mod station_graph;
+mod tracking;
 
 pub(crate) use comparison::render_comparison;
 pub(crate) use network::{render_calibration, render_plan};
 pub(crate) use registration::render_registration;
 pub(crate) use scattering::render_scattering;
 pub(crate) use sections::render;
+pub(crate) use tracking::render_tracking;

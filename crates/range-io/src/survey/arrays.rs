@@ -98,7 +98,7 @@ pub(super) fn require_finite(file: &Path, name: &str, values: &Values) -> Result
         Values::F64(values) => values.iter().any(|value| value.is_finite()),
         other => !other.is_empty(),
     };
-    if any { Ok(()) } else { Err(array_error(file, name, "has no finite value")) }
+    if any { Ok(()) } else { Err(nothing_measured(file, name, "has no finite value")) }
 }
 
 pub(super) fn raster<T>(file: &Path, name: &str, [width, height]: [usize; 2], values: Vec<T>) -> Result<Raster<T>> {
@@ -107,4 +107,8 @@ pub(super) fn raster<T>(file: &Path, name: &str, [width, height]: [usize; 2], va
 
 pub(super) fn array_error(file: &Path, name: &str, reason: impl Into<String>) -> Error {
     Error::Array { file: file.to_path_buf(), array: name.to_owned(), reason: reason.into() }
+}
+
+pub(super) fn nothing_measured(file: &Path, name: &str, reason: impl Into<String>) -> Error {
+    Error::NothingMeasured { file: file.to_path_buf(), array: name.to_owned(), reason: reason.into() }
 }

@@ -6,7 +6,7 @@ use range_image::Raster;
 
 #[cfg(any(feature = "png16", feature = "mkv"))]
 use super::Level;
-use super::arrays::{ArrayFile, Expected, REAL, array_error, raster, require_finite};
+use super::arrays::{ArrayFile, Expected, REAL, nothing_measured, raster, require_finite};
 use super::{InputFrame, StoredDepth, Survey};
 use crate::npz::{DataType, Values};
 use crate::{Error, Result};
@@ -39,7 +39,8 @@ fn depth_from_stored(file: &Path, scale: &StoredDepth, stored: &Raster<u16>) -> 
             },
         );
     if depth.as_slice().iter().all(|value| value.is_nan()) {
-        return Err(array_error(file, "depth", format!("holds only values that mean no depth: {:?}", scale.invalid)));
+        let reason = format!("holds only values that mean no depth: {:?}", scale.invalid);
+        return Err(nothing_measured(file, "depth", reason));
     }
     Ok(depth)
 }

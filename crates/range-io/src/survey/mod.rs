@@ -4,6 +4,8 @@ mod arrays;
 mod camera;
 mod depth;
 mod frame;
+#[cfg(feature = "png16")]
+mod sequence;
 mod truth;
 mod validate;
 mod write;
@@ -119,10 +121,19 @@ impl Survey {
     /// Name of the file in a survey's folder.
     pub const FILE_NAME: &str = "survey.ron";
 
-    /// Reads and checks a `survey.ron`, given by its own path or by its folder's.
+    /// Reads and checks a `survey.ron`, given by its own path or by its folder's. A folder without one may be of TUM
+    /// RGB-D (`depth.txt`) or of 7-Scenes (`frame-000000.depth.png`); `camera-intrinsics.txt` in it, the camera's matrix
+    /// in pixels, replaces the focal length published for these.
     pub fn read(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
         let file = if path.is_dir() { path.join(Self::FILE_NAME) } else { path.to_path_buf() };
+        #[cfg(feature = "png16")]
+        if path.is_dir()
+            && !file.exists()
+            && let Some(survey) = sequence::read_sequence(path)?
+        {
+            return Ok(survey);
+        }
         Self::parse(&file, &read_text(&file)?)
     }
 

@@ -1,0 +1,126 @@
+//! The frames of a survey in the order of time, one in memory at a time.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use icp_registration::Projection;
+use nalgebra::Isometry3;
+use range_io::survey::Survey;
+
+use crate::load::{Frames, open};
+use crate::progress::Silent;
+use crate::register::input::{projection, stages};
+use crate::stages::apply;
+use crate::work::Work;
+use crate::{Error, Result, Stage};
+
+/// Reads frames and brings them to unflagged points.
+pub(super) struct FrameSource {
+    work: Work,
+    frames: Frames,
+    /// What each frame goes through.
+    stages: Vec<Stage>,
+    /// Positions in the survey, in the order of time.
+    pub(super) order: Vec<usize>,
+}
+
+/// The points of one frame, a pixel each, NaN where nothing was measured or a flag excludes it.
+pub(super) struct PointFrame {
+    pub(super) points: Vec<[f64; 3]>,
+    pub(super) sigma: Option<Vec<f32>>,
+}
+
+impl FrameSource {
+    pub(super) fn new(path: &Path, calibration: Option<&Path>) -> Result<Self> {
+        let (mut work, frames) = open(path, calibration)?;
+        let order = in_order(path, &work.outcome.survey)?;
+        let mut each = Vec::new();
+        for stage in stages(work.outcome.survey.level, work.calibration.as_ref())? {
+            match stage {
+                // Frames of a moving camera are not averaged.
+                Stage::Average(_) => {}
+                // The rays are those of all frames.
+                Stage::CorrectImagePoint(_) => {
+                    apply(&stage, &mut work, &Silent)?;
+                }
+                other => each.push(other),
+            }
+        }
+        Ok(Self { work, frames, stages: each, order })
+    }
+
+    /// How points fall on the camera's pixels.
+    pub(super) fn projection(&self) -> Result<Arc<Projection>> {
+        let format = self.work.outcome.camera.format;
+        projection(&self.work.outcome.camera).ok_or_else(|| {
+            let (width, height) = (format.width, format.height);
+            Error::Camera(format!("{width} x {height} pixels are too few to track a camera by"))
+        })
+    }
+
+    pub(super) fn survey(&self) -> &Survey {
+        &self.work.outcome.survey
+    }
+
+    /// The calibration in use, in words.
+    pub(super) fn calibration(&self) -> &str {
+        &self.work.outcome.calibration
+    }
+
+    pub(super) fn approximate_pose(&self, station: &str) -> Option<Isometry3<f64>> {
+        self.frames.approximate_pose(station)
+    }
+
+    pub(super) fn true_pose(&self, station: &str) -> Option<Isometry3<f64>> {
+        self.frames.true_pose(station)
+    }
+
+    /// Frame `index` of the survey; a frame that shows nothing has only NaN.
+    pub(super) fn read(&mut self, index: usize) -> Result<PointFrame> {
+        let view = match self.frames.view(&self.work.outcome.survey, index) {
+            Err(Error::File(range_io::Error::NothingMeasured { .. })) => return Ok(self.blank()),
+            view => view?,
+        };
+        self.work.outcome.views = vec![view];
+        for stage in &self.stages {
+            apply(stage, &mut self.work, &Silent)?;
+        }
+        let Some(cloud) = self.work.outcome.clouds.pop() else { return Ok(self.blank()) };
+        let mut points = cloud.points;
+        for (point, flags) in points.iter_mut().zip(&cloud.flags) {
+            if !flags.is_empty() {
+                *point = [f64::NAN; 3];
+            }
+        }
+        let known = cloud.sigma.iter().any(|sigma| *sigma > 0.0);
+        Ok(PointFrame { points, sigma: known.then_some(cloud.sigma) })
+    }
+
+    fn blank(&self) -> PointFrame {
+        let camera = &self.work.outcome.survey.camera;
+        PointFrame { points: vec![[f64::NAN; 3]; camera.width * camera.height], sigma: None }
+    }
+}
+
+/// Positions of the frames in the order of their times, which must differ.
+fn in_order(path: &Path, survey: &Survey) -> Result<Vec<usize>> {
+    let refused = |message: String| Error::Survey { path: path.to_owned(), message };
+    if let [only] = survey.frames.as_slice() {
+        let file = only.file.display();
+        return Err(refused(format!("it has one frame ({file}); a camera is tracked over two and more")));
+    }
+    let mut times = Vec::with_capacity(survey.frames.len());
+    for (index, frame) in survey.frames.iter().enumerate() {
+        let missing = || {
+            let file = frame.file.display();
+            refused(format!("frame {index} ({file}) has no timestamp_s, which tells in what order frames are tracked"))
+        };
+        times.push((frame.timestamp_s.ok_or_else(missing)?, index));
+    }
+    times.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    if let Some(pair) = times.windows(2).find(|pair| pair[0].0 >= pair[1].0) {
+        let (time, a, b) = (pair[0].0, pair[0].1, pair[1].1);
+        return Err(refused(format!("frames {a} and {b} have the same timestamp_s of {time}: one camera is tracked")));
+    }
+    Ok(times.into_iter().map(|(_, index)| index).collect())
+}

@@ -1,0 +1,256 @@
+//! Every figure of tracking by name; written as `summary.json` and shown as words.
+
+use std::fmt;
+
+use icp_registration::{TrackedPose, Tracker, TrajectoryAlignment, TrajectoryErrorOptions, absolute_trajectory_error};
+use nalgebra::Isometry3;
+use serde::Serialize;
+
+use super::outcome::{TrackLoss, TrackTruth, TrackVerdict, TrackedFrame};
+use crate::statistics::{median, quantile};
+use crate::summary::millimetres;
+
+/// How far the camera was followed, and how well each pose is known.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct TrackSummary {
+    /// `track`.
+    pub method: &'static str,
+    /// The survey's folder.
+    pub survey: String,
+    /// The calibration in use, in words.
+    pub calibration: String,
+    /// What fixes the world.
+    pub datum: String,
+    /// What frames are expected by.
+    pub prior: String,
+    /// What can be done with the result.
+    pub verdict: TrackVerdict,
+    /// Frames.
+    pub frames: usize,
+    /// Frames without a pose.
+    pub lost: usize,
+    /// Their part of all frames.
+    pub lost_share: f64,
+    /// How often the camera was found again.
+    pub relocalised: usize,
+    /// Frames without a pose that follow each other.
+    pub losses: Vec<TrackLoss>,
+    /// Keyframes in the map.
+    pub keyframes: usize,
+    /// Registrations between keyframes beyond a chain: loops that were closed.
+    pub loops_closed: usize,
+    /// How far the loops moved a pose that had been tracked, at most, metre.
+    pub adjusted_by_max_m: f64,
+    /// Points of the map.
+    pub map_points: usize,
+    /// Time from the first to the last frame, second.
+    pub duration_s: f64,
+    /// Length of the adjusted path between the frames that have a pose, metre.
+    pub path_length_m: f64,
+    /// Distance between the first and the last of them, metre.
+    pub start_to_end_m: f64,
+    /// Median standard deviation of the positions since the datum, metre.
+    pub position_sigma_median_m: f64,
+    /// Largest standard deviation of a position, metre.
+    pub position_sigma_max_m: f64,
+    /// Median and 95 % of the wall-clock time that tracking took a frame, millisecond.
+    pub track_median_ms: f64,
+    /// See above.
+    pub track_p95_ms: f64,
+    /// The same with reading and correcting the frame.
+    pub total_median_ms: f64,
+    /// See above.
+    pub total_p95_ms: f64,
+    /// Errors where the truth is known.
+    pub truth: Option<TrackTruth>,
+    /// What a reader should know before the poses are used.
+    pub doubts: Vec<String>,
+    /// Wall-clock time, second.
+    pub seconds: f64,
+    /// The output folder.
+    pub out: String,
+    /// Every frame, in the order of time.
+    pub per_frame: Vec<TrackedFrame>,
+}
+
+/// All figures that follow from the poses.
+pub(super) fn summarise(
+    frames: Vec<TrackedFrame>,
+    [online, adjusted]: [&[TrackedPose]; 2],
+    truths: &[Option<Isometry3<f64>>],
+    tracker: &Tracker,
+) -> TrackSummary {
+    let losses = losses(&frames);
+    let lost = losses.iter().map(|loss| loss.frames).sum::<usize>();
+    let figures = |pick: fn(&TrackedFrame) -> Option<f64>| -> Vec<f64> { frames.iter().filter_map(pick).collect() };
+    let mut sigmas = figures(|frame| frame.position_sigma_m);
+    let mut tracking = figures(|frame| Some(frame.track_ms));
+    let mut total = figures(|frame| Some(frame.total_ms));
+    let path = positions(adjusted);
+    let moved = online.iter().zip(adjusted).filter(|(pose, _)| pose.state.has_pose());
+    let shifts =
+        moved.map(|(a, b)| (a.world_from_camera.translation.vector - b.world_from_camera.translation.vector).norm());
+    let mut summary = TrackSummary {
+        method: "track",
+        verdict: verdict(frames.len(), lost, &losses),
+        frames: frames.len(),
+        lost,
+        lost_share: lost as f64 / frames.len() as f64,
+        relocalised: frames.iter().filter(|frame| frame.state == "relocalised").count(),
+        keyframes: tracker.keyframes(),
+        loops_closed: (tracker.registrations() + 1).saturating_sub(tracker.keyframes()),
+        adjusted_by_max_m: shifts.fold(0.0, f64::max),
+        map_points: tracker.map().len(),
+        duration_s: online.last().map_or(0.0, |last| last.timestamp_s - online[0].timestamp_s),
+        path_length_m: path.windows(2).map(|pair| (pair[1] - pair[0]).norm()).sum(),
+        start_to_end_m: path.first().zip(path.last()).map_or(0.0, |(first, last)| (last - first).norm()),
+        position_sigma_median_m: median(&mut sigmas),
+        position_sigma_max_m: quantile(&mut sigmas, 1.0),
+        track_median_ms: median(&mut tracking),
+        track_p95_ms: quantile(&mut tracking, 0.95),
+        total_median_ms: median(&mut total),
+        total_p95_ms: quantile(&mut total, 0.95),
+        truth: truth([online, adjusted], truths),
+        losses,
+        per_frame: frames,
+        ..TrackSummary::default()
+    };
+    summary.doubts = doubts(&summary);
+    summary
+}
+
+fn positions(poses: &[TrackedPose]) -> Vec<nalgebra::Vector3<f64>> {
+    let known = poses.iter().filter(|pose| pose.state.has_pose());
+    known.map(|pose| pose.world_from_camera.translation.vector).collect()
+}
+
+/// Runs of frames without a pose.
+fn losses(frames: &[TrackedFrame]) -> Vec<TrackLoss> {
+    let mut losses: Vec<TrackLoss> = Vec::new();
+    let mut open = false;
+    for frame in frames {
+        match (frame.reason, losses.last_mut()) {
+            (Some(_), Some(loss)) if open => loss.frames += 1,
+            (Some(reason), _) => losses.push(TrackLoss { from_s: frame.timestamp_s, found_s: None, frames: 1, reason }),
+            (None, Some(loss)) if open => loss.found_s = Some(frame.timestamp_s),
+            (None, _) => {}
+        }
+        open = frame.reason.is_some();
+    }
+    losses
+}
+
+fn verdict(frames: usize, lost: usize, losses: &[TrackLoss]) -> TrackVerdict {
+    let ends_lost = losses.last().is_some_and(|loss| loss.found_s.is_none());
+    match lost {
+        0 => TrackVerdict::Tracked,
+        _ if ends_lost || 2 * lost > frames => TrackVerdict::Lost,
+        _ => TrackVerdict::Interrupted,
+    }
+}
+
+/// Errors where every frame that has a pose has a true one of its own.
+fn truth([online, adjusted]: [&[TrackedPose]; 2], truths: &[Option<Isometry3<f64>>]) -> Option<TrackTruth> {
+    let known = || online.iter().zip(truths).filter(|(pose, _)| pose.state.has_pose());
+    let truth: Vec<(f64, Isometry3<f64>)> =
+        known().map(|(pose, truth)| truth.map(|truth| (pose.timestamp_s, truth))).collect::<Option<_>>()?;
+    // Stations that hold still for several frames say nothing of a path.
+    if truth.windows(2).all(|pair| pair[0].1 == pair[1].1) {
+        return None;
+    }
+    let options = TrajectoryErrorOptions { alignment: TrajectoryAlignment::Rigid, ..TrajectoryErrorOptions::default() };
+    let errors = |poses: &[TrackedPose]| {
+        let found = poses.iter().filter(|pose| pose.state.has_pose());
+        let estimate: Vec<_> = found.map(|pose| (pose.timestamp_s, pose.world_from_camera)).collect();
+        absolute_trajectory_error(&estimate, &truth, &options).ok()
+    };
+    let (found, closed) = (errors(online)?, errors(adjusted)?);
+    Some(TrackTruth {
+        position_error_rms_m: found.position_m.rms,
+        position_error_max_m: found.position_m.max,
+        adjusted_position_error_rms_m: closed.position_m.rms,
+        attitude_error_max_deg: found.attitude_rad.max.to_degrees(),
+    })
+}
+
+fn doubts(summary: &TrackSummary) -> Vec<String> {
+    let mut doubts = Vec::new();
+    if summary.lost > 0 {
+        doubts.push(format!("{} They are left out of the trajectories.", summary.loss_in_words()));
+    }
+    doubts
+}
+
+impl TrackSummary {
+    /// How many frames have no pose, and from when on.
+    pub(super) fn loss_in_words(&self) -> String {
+        let share = 100.0 * self.lost_share;
+        let count = format!("{} of {} frames ({share:.1} %) have no pose", self.lost, self.frames);
+        match self.losses.last() {
+            Some(TrackLoss { from_s, found_s: None, reason, .. }) => {
+                format!("the camera was lost at {from_s} s ({reason}) and not found again: {count}.")
+            }
+            Some(_) => format!("{count}; the camera was found again {} times.", self.relocalised),
+            None => format!("{count}."),
+        }
+    }
+}
+
+impl fmt::Display for TrackSummary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let verdict = match self.verdict {
+            TrackVerdict::Tracked => "every one has a pose",
+            TrackVerdict::Interrupted => "interrupted",
+            TrackVerdict::Lost => "lost",
+        };
+        writeln!(
+            f,
+            "track: {} frames over {:.2} s, {verdict}; in {:.1} s",
+            self.frames, self.duration_s, self.seconds
+        )?;
+        writeln!(f, "datum: {}; expected by: {}", self.datum, self.prior)?;
+        writeln!(f, "calibration: {}", self.calibration)?;
+        writeln!(
+            f,
+            "path {:.3} m, first to last {:.3} m; sigma of a position {} (median), {} (largest)",
+            self.path_length_m,
+            self.start_to_end_m,
+            millimetres(Some(self.position_sigma_median_m)),
+            millimetres(Some(self.position_sigma_max_m))
+        )?;
+        writeln!(
+            f,
+            "map: {} keyframes, {} points; {} loops closed, which moved poses by {} at most",
+            self.keyframes,
+            self.map_points,
+            self.loops_closed,
+            millimetres(Some(self.adjusted_by_max_m))
+        )?;
+        writeln!(
+            f,
+            "time a frame: {:.1} ms (95 %: {:.1}), with reading {:.1} ms (95 %: {:.1})",
+            self.track_median_ms, self.track_p95_ms, self.total_median_ms, self.total_p95_ms
+        )?;
+        for loss in &self.losses {
+            let found = loss.found_s.map_or_else(|| "not found again".to_owned(), |time| format!("found at {time} s"));
+            writeln!(f, "lost at {} s for {} frames: {}; {found}", loss.from_s, loss.frames, loss.reason)?;
+        }
+        if let Some(truth) = &self.truth {
+            writeln!(
+                f,
+                "truth: position error {} rms (adjusted {}), {} largest",
+                millimetres(Some(truth.position_error_rms_m)),
+                millimetres(Some(truth.adjusted_position_error_rms_m)),
+                millimetres(Some(truth.position_error_max_m))
+            )?;
+        }
+        for doubt in &self.doubts {
+            writeln!(f, "doubt: {doubt}")?;
+        }
+        write!(
+            f,
+            "written to {}: report.html, summary.json, trajectory.txt, trajectory_adjusted.txt, stations.csv, cloud.ply",
+            self.out
+        )
+    }
+}

@@ -58,9 +58,19 @@ fn a_frame_on_itself_and_back_and_forth() {
     let projection = pinhole(&camera);
     let pair = frame_pair(&camera, 2);
     let (target, source) = (prepared(&projection, &pair.target), prepared(&projection, &pair.source));
-    let itself = align(&target, &target).target_from_source;
+    let itself = align(&target, &target);
+    assert!(
+        itself.covariance.cholesky().is_some(),
+        "no residual is left, and still a covariance: {}",
+        itself.covariance
+    );
+    let itself = itself.target_from_source;
     // Residuals are zero; what is left is rounding in single precision at 3 m.
     assert!(itself.translation.vector.norm() < 1e-6 && itself.rotation.angle() < 1e-6, "{itself}");
+    // A camera at rest that is expected to be, within a centimetre.
+    let options = FrameAlignmentOptions { prior: Some(Matrix6::identity() * 1e-4), ..FrameAlignmentOptions::default() };
+    let expected = align_frames(&target, &target, &Isometry3::identity(), &options).unwrap().target_from_source;
+    assert!(expected.translation.vector.norm() < 1e-6 && expected.rotation.angle() < 1e-6, "{expected}");
     let there = align(&source, &target);
     let back = align(&target, &source).target_from_source;
     let (mm, degrees) = pose_error(&there.target_from_source, &back.inverse());

@@ -32,6 +32,9 @@ const CLIP: f64 = 5.0;
 const MOST_CELLS: usize = CELLS * CELLS;
 /// Share of the largest information that rounding can imitate (single precision).
 const ROUNDING: f64 = 1e-7;
+/// Smallest variance of a score, as a share of the information: a frame registered with itself leaves no residual at all, and
+/// still rounding (residuals of a ten thousandth of their standard deviation) remains.
+const LEAST_SCORE: f64 = 1e-8;
 /// Parts of the pairs, each with cells of its own, that threads may take.
 const PARTS: usize = 4;
 /// 6 scores and 21 products.
@@ -76,6 +79,7 @@ impl Verdict {
             // Too few cells to estimate from: the pairs of a cell taken as fully dependent.
             Residuals::Settled => independent * (count as f64 / used.max(1) as f64),
         };
+        let score = score + Matrix6::identity() * (LEAST_SCORE / 6.0 * information.trace());
         let significant = |motion: &Vector6<f64>, information| is_significant(cells, information, motion);
         Ok(Self { directions: Directions::new(&information, |_| (score, 1.0), significant, ROUNDING, max_sigma_m)? })
     }

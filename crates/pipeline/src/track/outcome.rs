@@ -65,7 +65,7 @@ pub struct TrackLoss {
     pub reason: &'static str,
 }
 
-/// Errors where the truth is known, both paths brought together as well as a rigid motion can.
+/// Errors where the truth is known, both paths brought together at their first pose.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub struct TrackTruth {
     /// Root mean square position error of the poses as they were tracked, metre.

@@ -158,7 +158,9 @@ fn truth([online, adjusted]: [&[TrackedPose]; 2], truths: &[Option<Isometry3<f64
     if truth.windows(2).all(|pair| pair[0].1 == pair[1].1) {
         return None;
     }
-    let options = TrajectoryErrorOptions { alignment: TrajectoryAlignment::Rigid, ..TrajectoryErrorOptions::default() };
+    // What has drifted since the datum; a path as straight as a corridor has no best rigid motion.
+    let options =
+        TrajectoryErrorOptions { alignment: TrajectoryAlignment::FirstPose, ..TrajectoryErrorOptions::default() };
     let errors = |poses: &[TrackedPose]| {
         let found = poses.iter().filter(|pose| pose.state.has_pose());
         let estimate: Vec<_> = found.map(|pose| (pose.timestamp_s, pose.world_from_camera)).collect();

@@ -97,8 +97,13 @@ impl Verdict {
     /// Covariance of motions `[dt, rho w]`; what is not known at all gets the radius as sigma.
     pub(super) fn covariance(&self, radius_m: f64, held: Hold) -> Matrix6<f64> {
         let (basis, inside) = self.known(held);
+        let known = expanded(&basis, &inside);
+        // Rounding of what nothing is unknown of would outweigh small variances.
+        if basis.ncols() == 6 {
+            return known;
+        }
         let all = DMatrix::identity(inside.nrows(), inside.nrows());
-        expanded(&basis, &inside) + (Matrix6::identity() - expanded(&basis, &all)) * radius_m.powi(2)
+        known + (Matrix6::identity() - expanded(&basis, &all)) * radius_m.powi(2)
     }
 
     /// The most probable motion and its covariance, where a guess lies `offset` away and has the covariance `prior`.

@@ -3,11 +3,16 @@
 
 mod common;
 mod depth_frames;
+mod sr4000;
 
-use common::pose_error;
+use common::{disturbance, pose_error};
 use depth_frames::{Sequence, kitchen, living_room};
 use icp_registration::{FrameAlignmentOptions, OrganisedFrame, align_frames};
-use nalgebra::Isometry3;
+use nalgebra::{Isometry3, Vector3};
+use sr4000::stations;
+
+/// Distance between the stations of the SR4000, by a plane fitted to a box.
+const STEP_M: f64 = 0.314;
 
 fn check(sequence: &Sequence) {
     let prepared: Vec<OrganisedFrame> =
@@ -37,4 +42,30 @@ fn frames_of_a_living_room_follow_their_poses() {
         Some(sequence) => check(&sequence),
         None => println!("skipped: the living room is not there"),
     }
+}
+
+#[test]
+fn frames_of_an_sr4000_are_right_or_doubted_from_wherever_they_start() {
+    let Some([target, source]) = stations() else {
+        println!("skipped: the two stations are not there");
+        return;
+    };
+    let step = |pose: &Isometry3<f64>| (pose.translation.vector - Vector3::new(0.0, 0.0, -STEP_M)).norm();
+    let mut trusted = 0;
+    for (metre, degrees) in [(0.0, 0.0), (0.2, 10.0), (0.5, 30.0), (1.0, 60.0), (3.0, 90.0)] {
+        for seed in 0..4 {
+            let guess = Isometry3::translation(0.0, 0.0, -STEP_M) * disturbance(metre, degrees, seed);
+            let Ok(result) = align_frames(&source, &target, &guess, &FrameAlignmentOptions::default()) else {
+                continue;
+            };
+            let (off, turned) = (step(&result.target_from_source), result.target_from_source.rotation.angle());
+            println!("from {metre} m, {degrees} degrees: {off:.3} m, {turned:.3} rad, {:?}", result.stop);
+            // A plane fitted to a box gives the step; 30 mm and 3 degrees are what the camera's systematic errors leave.
+            if result.is_trustworthy() {
+                assert!(off < 0.03 && turned < 0.05, "trusted {off} m and {turned} rad off");
+                trusted += 1;
+            }
+        }
+    }
+    println!("{trusted} trusted");
 }

@@ -28,6 +28,9 @@ pub enum StopReason {
     WithinNoise,
     /// The iterations were used up: do not trust the pose.
     MaxIterations,
+    /// Iterations ended, but the frames contradict each other at the pose, hide too much from each other or hardly meet:
+    /// do not trust it.
+    Contradicted,
 }
 
 /// Result of a registration.
@@ -55,9 +58,9 @@ pub struct IcpResult {
 }
 
 impl IcpResult {
-    /// Whether the iterations settled and the geometry determines all six unknowns.
+    /// Whether the iterations settled, the geometry determines all six unknowns, and frames do not contradict the pose.
     pub fn is_trustworthy(&self) -> bool {
-        self.stop != StopReason::MaxIterations && self.degenerate.is_empty()
+        !matches!(self.stop, StopReason::MaxIterations | StopReason::Contradicted) && self.degenerate.is_empty()
     }
 }
 

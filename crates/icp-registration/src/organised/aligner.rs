@@ -124,16 +124,38 @@ impl FrameAligner {
     }
 
     /// The levels after the first one, and the result.
-    pub(super) fn finish(
+    fn finish(
         &mut self,
         mut track: Track,
         source: &OrganisedFrame,
         target: &OrganisedFrame,
         guess: &Isometry3<f64>,
     ) -> Result<(Track, IcpResult)> {
+        self.approach(&mut track, source, target)?;
+        self.end(track, source, target, guess)
+    }
+
+    /// The levels between the first and the last.
+    pub(super) fn approach(
+        &mut self,
+        track: &mut Track,
+        source: &OrganisedFrame,
+        target: &OrganisedFrame,
+    ) -> Result<()> {
         for level in self.first_level(source).map_or(STRIDES.len(), |l| l + 1)..STRIDES.len() - 1 {
-            self.descend(&mut track, source, target, blocks(source, level))?;
+            self.descend(track, source, target, blocks(source, level))?;
         }
+        Ok(())
+    }
+
+    /// The last level, and the result.
+    pub(super) fn end(
+        &mut self,
+        mut track: Track,
+        source: &OrganisedFrame,
+        target: &OrganisedFrame,
+        guess: &Isometry3<f64>,
+    ) -> Result<(Track, IcpResult)> {
         let stop = self.settle(&mut track, source, target)?;
         let result = self.result(&track, source, target, guess, stop)?;
         Ok((track, result))

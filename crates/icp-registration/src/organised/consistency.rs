@@ -101,12 +101,24 @@ fn one_way(
     level: usize,
     tolerance_m: f64,
 ) -> FrameConsistency {
-    let moved = Moved::new(source, target, pose, &Vector3::zeros(), 1.0);
     let blocks = &source.points.blocks[..source.projection.grid.levels[level]];
+    let counts = counted(source, target, pose, blocks, tolerance_m);
+    let out_of_view = source.points.counts[level] - counts.compared() - counts.hidden;
+    FrameConsistency { out_of_view, ..counts }
+}
+
+/// Where some nodes of the source lie for the target; those out of view are not counted.
+pub(super) fn counted(
+    source: &OrganisedFrame,
+    target: &OrganisedFrame,
+    pose: &Isometry3<f64>,
+    blocks: &[Block],
+    tolerance_m: f64,
+) -> FrameConsistency {
+    let moved = Moved::new(source, target, pose, &Vector3::zeros(), 1.0);
     let mut counts = FrameConsistency::default();
     let compare = Compare { moved: &moved, blocks, tolerance: tolerance_m as f32, counts: &mut counts };
     with_locate(target, compare);
-    counts.out_of_view = source.points.counts[level] - counts.compared() - counts.hidden;
     counts
 }
 

@@ -6,12 +6,14 @@
 mod aligner;
 mod blocks;
 mod consistency;
+mod crossing;
 mod frame;
 mod grid;
 mod map;
 mod nodes;
 mod options;
 mod pairs;
+mod places;
 mod planes;
 mod projection;
 mod quality;

@@ -1,25 +1,30 @@
 //! A search around the guess, for frames that contradict each other, or leave a motion open, where the normal course
 //! has ended.
 
-use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use nalgebra::Isometry3;
+use rayon::prelude::*;
 
 use super::aligner::FrameAligner;
 use super::consistency::{FrameConsistency, consistency};
+use super::crossing::Crossing;
 use super::frame::OrganisedFrame;
-use super::starts::{TURN_RAD, TURNS};
-use super::track::{Track, blocks};
+use super::places::Places;
+use super::track::Track;
 use crate::error::Result;
-use crate::icp::{IcpResult, MotionKind, StopReason, UndeterminedMotion};
+use crate::icp::{IcpResult, MotionKind, StopReason};
 
 /// Level on which two frames are compared to see whether a pose can be doubted: every fourth node.
 const DOUBT_LEVEL: usize = 1;
-/// Share of the compared nodes that contradict or are unclear, and of those that are hidden, above which a pose is doubted.
+/// Share of the compared nodes that contradict, and of those that are hidden, above which a pose is doubted.
 const MOST_WRONG: f64 = 0.03;
 const MOST_HIDDEN: f64 = 0.08;
+/// What an unclear node counts beside one that contradicts: on real frames one node in twenty lies on its plane with a
+/// noisy normal, at right poses too.
+const UNCLEAR: f64 = 0.25;
 /// Share of all nodes that have to agree.
 const LEAST_AGREEING: f64 = 0.3;
 /// Distances of agreement while poses are still coarse and when they are fine, in units of the radius.
-const COARSE_TOLERANCE: f64 = 0.04;
+pub(super) const COARSE_TOLERANCE: f64 = 0.04;
 const FINE_TOLERANCE: f64 = 0.012;
 /// Level on which fine poses are compared: every second node.
 const FINE_LEVEL: usize = 2;
@@ -29,25 +34,11 @@ const CONTRADICTION: f64 = 50.0;
 const HIDDEN: f64 = 0.3;
 /// What another place must gain: sliding along a wall changes the overlap by percents.
 const LEAST_GAIN: f64 = 1.03;
-/// Starts: turned by the angle of the first other starts or about twice of it, and shifted in units of the radius.
-const WIDE_TURN_RAD: f64 = 0.5;
-const SHIFT: f64 = 0.22;
-/// Turns that are tried by the wide angle as well.
-const WIDE_TURNS: usize = 6;
-/// Iterations from each start.
-const ITERATIONS: usize = 4;
-/// Places that are followed to the end.
-const KEPT: usize = 4;
-/// Closer than this (radius, radian) two places are the same.
-const SAME: f64 = 0.06;
-
-/// Distance of the places that are tried along an undetermined translation, in units of the radius.
-const SLIDE: f64 = 0.04;
-/// Places on either side.
-const SLIDES: usize = 10;
-
-/// A place and how much speaks for it.
-type Place = Option<(f64, Track)>;
+/// What it may lose where the nodes that tell the open motions speak for it, and what these must gain: a share, and some
+/// nodes.
+const MOST_LOST: f64 = 0.95;
+const TELLING_GAIN: f64 = 0.15;
+const FEWEST_TELLING: f64 = 8.0;
 
 impl FrameAligner {
     /// The result that most speaks for, where `first` can be doubted.
@@ -58,102 +49,102 @@ impl FrameAligner {
         source: &OrganisedFrame,
         target: &OrganisedFrame,
     ) -> Result<IcpResult> {
-        let mut places = [const { None }; KEPT];
-        match &first {
-            Ok((_, result)) if is_sound(source, target, result) => return first.map(|(_, result)| result),
-            Ok((track, result)) if leaves_a_slide(source, target, result) => {
-                slides(track, &result.degenerate, source, target, &mut places);
-            }
-            _ => self.look_around(start, source, target, &mut places),
-        }
         let mut best = first;
-        let mut most = best.as_ref().map_or(0.0, |(_, result)| evidence(source, target, &result.target_from_source));
-        for (_, place) in places.into_iter().flatten() {
-            let Ok(other) = self.finish(place, source, target, &start.pose) else { continue };
-            let gained = evidence(source, target, &other.1.target_from_source);
-            if gained > LEAST_GAIN * most {
-                (most, best) = (gained, Ok(other));
+        for _ in 0..2 {
+            let around = match &best {
+                Ok((_, result)) if is_sound(source, target, result) => break,
+                Ok((_, result)) => !leaves_a_slide(source, target, result),
+                Err(_) => true,
+            };
+            let places = match &best {
+                Ok((track, result)) if !around => {
+                    let crossing = Crossing::new(source, target, &result.target_from_source, &result.degenerate);
+                    Places::along(track, &result.degenerate, &crossing, source.points.radius_m)
+                }
+                _ => self.look_around(start, source, target),
+            };
+            best = self.best_of(best, &places, start, source, target);
+            if !around {
+                break;
             }
         }
-        best.map(|(_, result)| result)
+        best.map(|(_, mut result)| {
+            if result.stop != StopReason::MaxIterations && !agrees(source, target, &result) {
+                result.stop = StopReason::Contradicted;
+            }
+            result
+        })
     }
 
-    /// Passes the first level from starts all around the guess and keeps the places where the frames agree best.
-    fn look_around(
+    /// Follows places to the end, or `best` where nothing speaks for another.
+    fn best_of(
         &mut self,
+        best: Result<(Track, IcpResult)>,
+        places: &Places,
         start: &Track,
         source: &OrganisedFrame,
         target: &OrganisedFrame,
-        places: &mut [Place; KEPT],
-    ) {
-        let Some(level) = self.first_level(source) else { return };
-        let radius = source.points.radius_m;
-        let turns = TURNS.iter().map(|axis| Vector3::from(*axis) * TURN_RAD);
-        let wide = TURNS[..WIDE_TURNS].iter().map(|axis| Vector3::from(*axis) * WIDE_TURN_RAD);
-        for turn in std::iter::once(Vector3::zeros()).chain(turns).chain(wide) {
-            for axis in 0..7 {
-                let shift = if axis == 6 { Vector3::zeros() } else { Vector3::ith(axis / 2, SHIFT * radius) };
-                let shift = if axis % 2 == 0 { shift } else { -shift };
-                let pose = Isometry3::from_parts(
-                    (start.pose.translation.vector + start.pose.rotation * shift).into(),
-                    start.pose.rotation * UnitQuaternion::from_scaled_axis(turn),
-                );
-                let mut track = Track { pose, ..start.clone() };
-                let blocks = blocks(source, level);
-                let passed = self.open(&mut track, source, target, blocks);
-                if passed.and_then(|()| self.descend_by(&mut track, source, target, blocks, ITERATIONS)).is_ok() {
-                    let counts = consistency(source, target, &track.pose, level, COARSE_TOLERANCE * radius);
-                    keep(places, weighed(&counts), &track, radius);
-                }
+    ) -> Result<(Track, IcpResult)> {
+        let crossing = best
+            .as_ref()
+            .ok()
+            .map(|(_, result)| Crossing::new(source, target, &result.target_from_source, &result.degenerate));
+        let merit = |pose: &Isometry3<f64>| Merit::new(source, target, crossing.as_ref(), pose);
+        let places: Vec<&Track> = places.all().collect();
+        // Each place on an aligner of its own: what comes out does not hang on the threads.
+        let approached = places.into_par_iter().map_with(self.clone(), |aligner, place| {
+            let mut track = place.clone();
+            aligner.approach(&mut track, source, target).ok().map(|()| (merit(&track.pose), track))
+        });
+        let approached: Vec<Option<(Merit, Track)>> = approached.collect();
+        let most = best.as_ref().map_or(Merit::default(), |(_, result)| merit(&result.target_from_source));
+        let mut chosen: Option<(Merit, Track)> = None;
+        for (gained, track) in approached.into_iter().flatten() {
+            if gained.beats(&chosen.as_ref().map_or(most, |(merit, _)| *merit)) {
+                chosen = Some((gained, track));
             }
         }
-    }
-}
-
-/// Puts a place among the best, once.
-fn keep(places: &mut [Place; KEPT], gained: f64, track: &Track, radius_m: f64) {
-    let is_same = |other: &Track| {
-        let away = track.pose.rotation.angle_to(&other.pose.rotation);
-        let shift = (track.pose.translation.vector - other.pose.translation.vector).norm();
-        away < SAME && shift < SAME * radius_m
-    };
-    let same = places.iter().position(|place| place.as_ref().is_some_and(|(_, other)| is_same(other)));
-    let worst = (0..KEPT).min_by(|a, b| value(&places[*a]).total_cmp(&value(&places[*b])));
-    if let Some(k) = same.or(worst)
-        && gained > value(&places[k])
-    {
-        places[k] = Some((gained, track.clone()));
-    }
-}
-
-fn value(place: &Place) -> f64 {
-    place.as_ref().map_or(f64::NEG_INFINITY, |(gained, _)| *gained)
-}
-
-/// What would tell a translation that is left open may lie out of reach: looks along it.
-fn slides(
-    track: &Track,
-    motions: &[UndeterminedMotion],
-    source: &OrganisedFrame,
-    target: &OrganisedFrame,
-    places: &mut [Place; KEPT],
-) {
-    let radius = source.points.radius_m;
-    let slide = SLIDE * radius;
-    for motion in motions {
-        for k in (1..=SLIDES).flat_map(|k| [k as f64, -(k as f64)]) {
-            let mut other = track.clone();
-            other.pose.translation.vector += motion.axis * (k * slide);
-            other.rules.extra_variance = (0.25 * slide * slide) as f32;
-            other.iterations = 0;
-            let gained = evidence(source, target, &other.pose);
-            keep(places, gained, &other, radius);
+        let Some((_, track)) = chosen else { return best };
+        match self.end(track, source, target, &start.pose) {
+            Ok(other) if merit(&other.1.target_from_source).beats(&most) => Ok(other),
+            _ => best,
         }
     }
 }
 
+/// What speaks for a fine pose.
+#[derive(Debug, Clone, Copy, Default)]
+struct Merit {
+    /// All nodes.
+    evidence: f64,
+    /// Those that tell the motions that were open.
+    telling: f64,
+}
+
+impl Merit {
+    fn new(
+        source: &OrganisedFrame,
+        target: &OrganisedFrame,
+        crossing: Option<&Crossing<'_>>,
+        pose: &Isometry3<f64>,
+    ) -> Self {
+        let tolerance = FINE_TOLERANCE * source.points.radius_m;
+        Self {
+            evidence: weighed(&consistency(source, target, pose, FINE_LEVEL, tolerance)),
+            telling: crossing.map_or(0.0, |crossing| crossing.agreement(pose, tolerance)),
+        }
+    }
+
+    fn beats(&self, other: &Self) -> bool {
+        let enough = other.telling + TELLING_GAIN * other.telling.abs() + FEWEST_TELLING;
+        self.evidence > LEAST_GAIN * other.evidence
+            || self.evidence > MOST_LOST * other.evidence && self.telling > enough
+    }
+}
+
+/// Whether nothing speaks for another place. Iterations that did not settle, as pairs change back and forth, do not either.
 fn is_sound(source: &OrganisedFrame, target: &OrganisedFrame, result: &IcpResult) -> bool {
-    result.degenerate.is_empty() && result.stop != StopReason::MaxIterations && agrees(source, target, result)
+    result.degenerate.is_empty() && agrees(source, target, result)
 }
 
 /// Whether all that can be doubted is one translation.
@@ -167,20 +158,14 @@ fn agrees(source: &OrganisedFrame, target: &OrganisedFrame, result: &IcpResult) 
     let tolerance = COARSE_TOLERANCE * source.points.radius_m;
     let counts = consistency(source, target, &result.target_from_source, DOUBT_LEVEL, tolerance);
     let (compared, hidden) = (counts.compared() as f64, counts.hidden as f64);
-    (counts.contradicting + counts.unclear) as f64 <= MOST_WRONG * compared
+    counts.contradicting as f64 + UNCLEAR * counts.unclear as f64 <= MOST_WRONG * compared
         && hidden <= MOST_HIDDEN * (compared + hidden)
         && counts.agreeing as f64 >= LEAST_AGREEING * counts.all() as f64
 }
 
-/// What speaks for a fine pose.
-fn evidence(source: &OrganisedFrame, target: &OrganisedFrame, pose: &Isometry3<f64>) -> f64 {
-    let tolerance = FINE_TOLERANCE * source.points.radius_m;
-    weighed(&consistency(source, target, pose, FINE_LEVEL, tolerance))
-}
-
 /// Agreeing nodes, less the more the frames contradict each other. A share and no sum: on real frames some contradiction
 /// is everywhere, and a large overlap must not pay for it.
-fn weighed(counts: &FrameConsistency) -> f64 {
+pub(super) fn weighed(counts: &FrameConsistency) -> f64 {
     let wrong = (counts.contradicting + counts.unclear) as f64 + HIDDEN * counts.hidden as f64;
     let agreeing = counts.agreeing as f64;
     agreeing / (1.0 + CONTRADICTION * wrong / (agreeing + wrong).max(1.0))

@@ -100,7 +100,7 @@ fn starts(pose: &Isometry3<f64>, radius_m: f64) -> Vec<Isometry3<f64>> {
     let turns = std::iter::once(Vector3::zeros()).chain(turns).chain(wide);
     let shifts = |axis: usize| {
         let shift = if axis == 6 { Vector3::zeros() } else { Vector3::ith(axis / 2, SHIFT * radius_m) };
-        if axis % 2 == 0 { shift } else { -shift }
+        if axis.is_multiple_of(2) { shift } else { -shift }
     };
     turns
         .flat_map(|turn| {

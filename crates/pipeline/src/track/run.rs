@@ -149,9 +149,9 @@ impl Run {
             .map(|frame| self.source.true_pose(&self.source.survey().frames[frame.index].station))
             .collect();
         let mut summary = summarise(self.frames, [&self.poses, &adjusted], &truths, &tracker);
-        summary.calibration = self.source.calibration().to_owned();
+        self.source.calibration().clone_into(&mut summary.calibration);
         summary.datum = self.datum;
-        summary.prior = prior.to_owned();
+        prior.clone_into(&mut summary.prior);
         // As everywhere: z where poses came with the survey, y in a camera's own frame.
         let vertical_axis = if self.has_pose { 2 } else { 1 };
         Ok(Tracked { poses: self.poses, adjusted, map: tracker.map(), vertical_axis, summary })

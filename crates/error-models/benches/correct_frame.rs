@@ -44,7 +44,7 @@ fn frames(criterion: &mut Criterion) {
     let one_thread = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
     for (width, height) in [(176, 144), (640, 480), (1024, 1024)] {
         let format = ImageFormat::new(width, height, [0.01; 2]).unwrap();
-        let pattern = FixedPattern { width, height, offset_m: vec![1e-3; width * height] };
+        let pattern = FixedPattern { width, height, offset_m: vec![1e-3; width * height], sigma_m: Vec::new() };
         let (frame, model) = (frame(width, height), model());
         criterion.bench_function(&format!("correct_frame/{width}x{height}/1 thread"), |bencher| {
             bencher.iter_batched_ref(

@@ -100,12 +100,20 @@ impl Planes<'_> {
 }
 
 impl FixedPattern {
-    /// Refuses a table that does not have `width * height` values, and values that are not finite.
+    /// Refuses a table that does not have `width * height` values, offsets that are not finite, and deviations that are
+    /// neither NaN nor positive.
     pub fn validate(&self) -> Result<()> {
         let expected = self.width.saturating_mul(self.height);
         let (width, height, found) = (self.width, self.height, self.offset_m.len());
         if found != expected {
             return Err(Error::Image(range_image::Error::RasterLength { width, height, expected, found }));
+        }
+        if let Some(found) = Some(self.sigma_m.len()).filter(|found| *found > 0 && *found != expected) {
+            return Err(Error::Image(range_image::Error::RasterLength { width, height, expected, found }));
+        }
+        if let Some(sigma) = self.sigma_m.iter().find(|sigma| **sigma < 0.0 || sigma.is_infinite()) {
+            let expected = "a standard deviation is NaN or finite and not negative";
+            return Err(Error::OutOfDomain { name: "sigma_m", value: f64::from(*sigma), expected });
         }
         self.offset_m
             .iter()

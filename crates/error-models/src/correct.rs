@@ -11,7 +11,7 @@ use crate::{CorrectionSummary, FixedPattern, RangeErrorModel, Result};
 /// Takes the range errors of `model`, and then those of `pattern`, off a frame, in place.
 ///
 /// `principal_point_mm` is (xp, yp), from which Eq. 14 counts its image coordinates. The standard deviation
-/// is transported by `|1 - ∂Δρ/∂ρ|`.
+/// is transported by `|1 - ∂Δρ/∂ρ|`; the deviations of the pattern's offsets, where they are known, are added.
 ///
 /// Nothing is extrapolated; a pixel that the model does not cover gets [`Flags::OUTSIDE_SPAN`]:
 /// - Its range is outside `range_span_m` (or beyond 4096 ambiguity intervals): it keeps its observed range
@@ -40,7 +40,20 @@ pub fn correct_frame(
         flags: &mut frame.flags,
         pattern,
     };
-    correct_planes(planes, model, format, principal_point_mm)
+    let summary = correct_planes(planes, model, format, principal_point_mm)?;
+    if let Some(pattern) = pattern {
+        add_deviations(&mut frame.sigma, pattern);
+    }
+    Ok(summary)
+}
+
+/// What the offsets themselves are uncertain by; a pixel without a known offset keeps its deviation.
+fn add_deviations(sigma: &mut Raster<f32>, pattern: &FixedPattern) {
+    for (sigma, own) in sigma.as_mut_slice().iter_mut().zip(&pattern.sigma_m) {
+        if own.is_finite() {
+            *sigma = sigma.hypot(*own);
+        }
+    }
 }
 
 /// [`correct_frame`] on bare rasters: the unwrapped ranges of one of several modulation frequencies, with its

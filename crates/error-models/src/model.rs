@@ -155,6 +155,10 @@ pub struct FixedPattern {
     pub height: usize,
     /// Row-major offsets, metre.
     pub offset_m: Vec<f32>,
+    /// Their standard deviations, metre, NaN for a pixel whose offset is not known (and is then zero); empty where no
+    /// offset's is known.
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Vec::is_empty"))]
+    pub sigma_m: Vec<f32>,
 }
 
 /// Models keyed by integration time (Sect. 4.6), ascending.

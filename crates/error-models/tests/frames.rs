@@ -39,7 +39,7 @@ fn frame() -> RangeFrame {
 
 fn pattern() -> FixedPattern {
     let offset_m = (0..WIDTH * HEIGHT).map(|i| (i % 17) as f32 * 1e-3).collect();
-    FixedPattern { width: WIDTH, height: HEIGHT, offset_m }
+    FixedPattern { width: WIDTH, height: HEIGHT, offset_m, sigma_m: Vec::new() }
 }
 
 #[test]
@@ -202,7 +202,7 @@ fn small_and_mismatched_frames_are_answered() {
     assert!(matches!(correct_frame(&mut ragged, &model(), &single, [0.0; 2], None), Err(Error::Image(_))));
     assert!(correct_frame(&mut one, &model(), &single, [f64::NAN, 0.0], None).is_err());
     for offset_m in [vec![], vec![f32::NAN]] {
-        let pattern = FixedPattern { width: 1, height: 1, offset_m };
+        let pattern = FixedPattern { width: 1, height: 1, offset_m, sigma_m: Vec::new() };
         assert!(correct_frame(&mut one, &model(), &single, [0.0; 2], Some(&pattern)).is_err());
         assert!(distort_frame(&mut one, &model(), &single, [0.0; 2], Some(&pattern)).is_err());
     }

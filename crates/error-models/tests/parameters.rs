@@ -77,7 +77,7 @@ mod ron_round_trip {
 
         #[test]
         fn patterns_keep_every_bit(offset_m in proptest::collection::vec(proptest::num::f32::NORMAL, 6)) {
-            let pattern = FixedPattern { width: 3, height: 2, offset_m };
+            let pattern = FixedPattern { width: 3, height: 2, offset_m, sigma_m: vec![f32::NAN; 6] };
             let bits = |pattern: &FixedPattern| pattern.offset_m.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
             prop_assert_eq!(bits(&through_ron(&pattern)), bits(&pattern));
         }
@@ -107,7 +107,7 @@ mod ron_round_trip {
         assert!(refused(&model()));
         assert!(refused(&model().terms));
         assert!(refused(&model().hyperbola.unwrap()));
-        assert!(refused(&FixedPattern { width: 1, height: 1, offset_m: vec![0.0] }));
+        assert!(refused(&FixedPattern { width: 1, height: 1, offset_m: vec![0.0], sigma_m: Vec::new() }));
         assert!(refused(&ModelSet::default()));
         assert!(refused(&GrossErrorOptions::default()));
         assert!(refused(&NamedParameter::held("d0", 0.0).unwrap()));

@@ -3,11 +3,14 @@
 mod calibrate;
 mod compare;
 mod error;
+mod fixed_pattern;
+mod further_term;
 mod inspect;
 mod load;
 mod measure;
 mod network_plan;
 mod network_scene;
+mod noise;
 mod outcome;
 mod plan;
 mod progress;
@@ -35,11 +38,13 @@ pub use compare::{
     compare,
 };
 pub use error::{Error, Result};
+pub use fixed_pattern::{FixedPatternRequest, FixedPatternSummary, PatternWall, estimate_pattern};
 pub use inspect::{Inspection, inspect};
 pub use network_plan::{CandidateSummary, NetworkPlanRequest, PlanSummary, PointSigma, plan_network};
 pub use network_scene::{
     FieldSpec, NetworkScene, PassiveSpec, SceneStation, SceneTarget, SightingSpec, simulate_network,
 };
+pub use noise::{NoiseBin, NoiseParameter, NoiseRequest, NoiseStation, NoiseSummary, SigmaBinSummary, estimate_noise};
 pub use outcome::{AdjustmentFigures, FurtherPoint, Outcome, StationPose};
 pub use plan::{
     AdjustOptions, AverageOptions, CorrectImagePointOptions, CorrectRangeOptions, DeconvolveOptions, DemodulateOptions,
@@ -56,7 +61,10 @@ pub use scattering::{
     estimate_scattering,
 };
 pub use scattering_deconvolution::{EstimationOptions, TermCount, TermShape};
-pub use self_calibration::{CalibrationOptions, CandidateGrid, Method, NetworkDatum, PlanOptions, TermSelection};
+pub use self_calibration::{
+    CalibrationOptions, CandidateGrid, Method, NetworkDatum, NoiseFitOptions, PatternOptions, PlanOptions,
+    TermSelection,
+};
 pub use simulate::{Simulated, simulate};
 pub use summary::{
     PairSummary, ReferenceSummary, RegistrationSummary, StageSummary, StationTruth, Summary, TruthSummary,

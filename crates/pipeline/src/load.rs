@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use camera_model::{Camera, RayTable};
+use error_models::RangeNoise;
 use nalgebra::Isometry3;
 use range_image::{Flags, Modulation, RangeFrame, Raster};
 use range_io::calibration::Calibration;
@@ -17,15 +18,24 @@ use crate::view::{View, ViewData};
 use crate::work::Work;
 use crate::{Error, Plan, Result};
 
-/// Reads survey, calibration, poses, truth and all frames; refuses a plan that the survey's level rules out.
-pub(crate) fn load(folder: &Path, calibration: Option<&Path>, plan: &Plan, progress: &dyn Progress) -> Result<Work> {
+/// Reads survey, poses, truth and all frames - those of one station, where one is named; refuses a plan that the survey's
+/// level rules out. The calibration comes with its name in words.
+pub(crate) fn load(
+    folder: &Path,
+    calibration: (Option<Calibration>, String),
+    plan: &Plan,
+    only: Option<&str>,
+    progress: &dyn Progress,
+) -> Result<Work> {
     let (mut work, frames) = open(folder, calibration)?;
     let count = work.outcome.survey.frames.len();
     plan.check_level(work.outcome.survey.level)?;
     progress.begin("read frames", count);
     for index in 0..count {
-        let view = frames.view(&work.outcome.survey, index)?;
-        work.outcome.views.push(view);
+        if only.is_none_or(|only| only == work.outcome.survey.frames[index].station) {
+            let view = frames.view(&work.outcome.survey, index)?;
+            work.outcome.views.push(view);
+        }
         progress.advance(index + 1);
     }
     Ok(work)
@@ -39,16 +49,20 @@ pub(crate) struct Frames {
     true_poses: Vec<Station>,
     reference: Option<Raster<f32>>,
     modulations: Vec<Modulation>,
+    /// Gives frames without a standard deviation one.
+    range_noise: Option<RangeNoise>,
 }
 
 /// Reads all of a survey but its frames.
-pub(crate) fn open(folder: &Path, calibration: Option<&Path>) -> Result<(Work, Frames)> {
+pub(crate) fn open(
+    folder: &Path,
+    (calibration, calibration_words): (Option<Calibration>, String),
+) -> Result<(Work, Frames)> {
     let survey = Survey::read(folder)?;
     if survey.frames.is_empty() {
         return Err(Error::Survey { path: folder.join(Survey::FILE_NAME), message: "it lists no frames".to_owned() });
     }
     let root = root_of(folder);
-    let (calibration, calibration_words) = read_calibration(&root, calibration)?;
     let camera = survey.camera.nominal_camera()?;
     let calibrated_camera = calibration.as_ref().map(|calibration| calibrated(calibration, &camera)).transpose()?;
     let rays = RayTable::new(&camera).map_err(|error| Error::Camera(error.to_string()))?;
@@ -78,7 +92,8 @@ pub(crate) fn open(folder: &Path, calibration: Option<&Path>) -> Result<(Work, F
         stages: Vec::new(),
         vertical_axis,
     };
-    let frames = Frames { root, depth_rays, poses, true_poses, reference, modulations };
+    let range_noise = calibration.as_ref().and_then(|calibration| calibration.range_noise);
+    let frames = Frames { root, depth_rays, poses, true_poses, reference, modulations, range_noise };
     Ok((Work { calibration, calibrated_camera, rays, station_clouds: Vec::new(), outcome }, frames))
 }
 
@@ -91,7 +106,7 @@ impl Frames {
             frames: vec![index],
             timestamp_s: entry.timestamp_s.unwrap_or(0.0),
             integration_time_s: entry.integration_time_s,
-            data: view_data(read_frame(survey, &self.root, index)?, &self.depth_rays)?,
+            data: with_sigma(view_data(read_frame(survey, &self.root, index)?, &self.depth_rays)?, self.range_noise)?,
             before: None,
             approximate_world_from_camera: self.approximate_pose(&entry.station),
             truth: read_view_truth(survey, &self.root, index, self.true_pose(&entry.station))?,
@@ -200,6 +215,18 @@ fn view_data(frame: InputFrame, rays: &RayTable) -> Result<ViewData> {
         }
         other => Err(Error::Camera(format!("frames at level `{}` can't be processed", other.level().name()))),
     }
+}
+
+/// The calibrated noise of ranges gives frames without a standard deviation one.
+fn with_sigma(mut data: ViewData, noise: Option<RangeNoise>) -> Result<ViewData> {
+    let Some(noise) = noise else { return Ok(data) };
+    let predicted = match &mut data {
+        ViewData::Samples(_) => Ok(()),
+        ViewData::Phase(frame) => noise.predict_complex_sigma(frame),
+        ViewData::Range(frame) => noise.predict_sigma(frame),
+    };
+    predicted.map_err(|error| Error::Camera(error.to_string()))?;
+    Ok(data)
 }
 
 /// A range frame whose pixels without a positive range are flagged and NaN.

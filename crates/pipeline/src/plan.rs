@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use multipath::MixedPixelTreatment;
-use range_image::ConsistencyOptions;
+use range_image::{ConsistencyOptions, RestOptions};
 use range_io::ron_text;
 use range_io::survey::Level;
 use serde::{Deserialize, Serialize};
@@ -172,7 +172,10 @@ pub struct NoiseOptions {
 /// Options of [`Stage::Average`].
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub struct AverageOptions {}
+pub struct AverageOptions {
+    /// Where sigma is known: which pixels count as moved (they are flagged), and which stations as moved or drifting.
+    pub rest: RestOptions,
+}
 
 /// Options of [`Stage::Deconvolve`].
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -379,12 +382,10 @@ impl Plan {
 
     /// Refuses stages that the survey's level does not leave room for, by name.
     pub fn check_level(&self, level: Level) -> Result<()> {
-        match self.stages.iter().find(|stage| is_past(level, stage.needs())) {
-            None => Ok(()),
-            Some(stage) => {
-                Err(Error::RuledOut { stage: stage.name(), needs: stage.needs().name(), level: level.name() })
-            }
-        }
+        let past = self.stages.iter().find(|stage| is_past(level, stage.needs()));
+        past.map_or(Ok(()), |stage| {
+            Err(Error::RuledOut { stage: stage.name(), needs: stage.needs().name(), level: level.name() })
+        })
     }
 
     fn check_order(&self) -> Result<()> {

@@ -9,7 +9,7 @@ use range_io::survey::Survey;
 use self_calibration::{CalibrationOptions, TermSelection};
 
 use crate::calibrate::{CalibrateMethod, CalibrateRequest, TableDefaults, calibrate};
-use crate::load::load;
+use crate::load::{load, read_calibration, root_of};
 use crate::network_scene::simulate_network;
 use crate::outcome::Outcome;
 use crate::plan::{NetworkCalibration, Source};
@@ -108,13 +108,24 @@ fn nominal_start(network: &Path, survey: &Path) -> Result<Calibration> {
     let camera = Survey::read(network)?.camera.nominal_camera()?;
     let known = Calibration::read(survey)?;
     let mut start = Calibration::from_models(&camera, &ModelSet::default(), known.scattering.as_ref())?;
-    (start.noise, start.fixed_pattern) = (known.noise, known.fixed_pattern);
+    (start.noise, start.range_noise, start.fixed_pattern) = (known.noise, known.range_noise, known.fixed_pattern);
+    start.noise_parameters = known.noise_parameters;
     Ok(start)
 }
 
 /// Loads a survey and applies a plan's stages, without writing anything.
 pub fn process(plan: &Plan, survey: &Path, calibration: Option<&Path>, progress: &dyn Progress) -> Result<Outcome> {
-    let mut work = load(survey, calibration, plan, progress)?;
+    process_with(plan, survey, read_calibration(&root_of(survey), calibration)?, progress)
+}
+
+/// [`process`] with a calibration at hand, and what to call it.
+pub(crate) fn process_with(
+    plan: &Plan,
+    survey: &Path,
+    calibration: (Option<Calibration>, String),
+    progress: &dyn Progress,
+) -> Result<Outcome> {
+    let mut work = load(survey, calibration, plan, None, progress)?;
     for stage in &plan.stages {
         progress.begin(stage.name(), work.outcome.views.len());
         let before: Vec<Option<Snapshot>> = work.outcome.views.iter().map(crate::view::View::snapshot).collect();

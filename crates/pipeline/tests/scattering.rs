@@ -6,24 +6,9 @@ mod common;
 
 use std::path::{Path, PathBuf};
 
-use common::fixtures;
-use pipeline::{
-    EstimationOptions, Plan, ScatteringRequest, Silent, SimulateSource, estimate_scattering, process, simulate,
-};
+use common::simulated;
+use pipeline::{EstimationOptions, Plan, ScatteringRequest, Silent, estimate_scattering, process};
 use range_io::calibration::Calibration;
-
-fn simulated(scene: &str, seed: u64, folder: &Path) -> PathBuf {
-    let source = SimulateSource {
-        scene: format!("scenes/{scene}.ron"),
-        seed,
-        approximate_position_sigma_m: 0.0,
-        approximate_attitude_sigma_deg: 0.0,
-        gross_error_share: 0.0,
-    };
-    let out = folder.join(format!("{scene}{seed}"));
-    simulate(&source, &fixtures(), &out, &Silent).unwrap();
-    out
-}
 
 fn request(with_object: &Path, without_object: &Path, out: PathBuf) -> ScatteringRequest {
     ScatteringRequest {

@@ -10,6 +10,9 @@ const PIXELS_PER_TASK: usize = 4096;
 /// Pixels whose sums are kept at a time, within the first-level cache.
 const BLOCK: usize = 512;
 
+/// Values that scatter by so many times their sigma are not explained by noise.
+const BEYOND_NOISE: f64 = 5.0;
+
 /// Number and mean of the values that a pixel had in repeated frames.
 #[derive(Clone, Copy)]
 struct Mean {
@@ -158,9 +161,11 @@ pub fn sigma_from_repeats(frames: &[ComplexFrame], channel: usize) -> Result<Ras
 
 /// Averages range frames of a scene and a camera at rest, for cameras that give no phase.
 ///
-/// Pixel by pixel, values that are NaN are left out. Sigma of the mean comes from the scatter, `s / sqrt(n)`; a pixel
-/// with one value keeps that frame's sigma. Flags are as with [`average`]. Near the ends of the ambiguity interval
-/// ranges jump by U and their mean means nothing: the sigma shows it, and averaging `z` avoids it.
+/// Pixel by pixel, values that are NaN are left out. Sigma of the mean comes from the frames' own sigmas,
+/// `sqrt(sum sigma^2) / n`, and from the scatter, `s / sqrt(n)`, where one of them is NaN or where the values scatter
+/// five times as much as they should. A pixel with one value keeps that frame's sigma. Flags are as with [`average`].
+/// Near the ends of the ambiguity interval ranges jump by U and their mean means nothing: the sigma shows it, and
+/// averaging `z` avoids it.
 pub fn average_ranges(frames: &[RangeFrame]) -> Result<RangeFrame> {
     let Some(first) = frames.first() else { return Err(Error::NoFrames { what: "average of ranges" }) };
     for (index, frame) in frames.iter().enumerate() {
@@ -182,14 +187,19 @@ pub fn average_ranges(frames: &[RangeFrame]) -> Result<RangeFrame> {
         *amplitude = mean_of(amplitudes.map(|value| [f64::from(value), 0.0])).value[0] as f32;
         *sigma = match with_value().next() {
             Some(only) if mean.count < 2.0 => only.sigma.as_slice()[pixel],
-            _ => (scatter_of(ranges(), mean, 1.0) / mean.count.sqrt()) as f32,
+            _ => {
+                let squares = with_value().map(|frame| f64::from(frame.sigma.as_slice()[pixel]).powi(2)).sum::<f64>();
+                let (predicted, scatter) = (squares.sqrt(), scatter_of(ranges(), mean, 1.0) * mean.count.sqrt());
+                let own = scatter <= BEYOND_NOISE * predicted;
+                (if own { predicted } else { scatter } / mean.count) as f32
+            }
         };
     });
     flag_missing(&mut out.flags, &out.range);
     Ok(out)
 }
 
-fn require_alike(frames: &[ComplexFrame]) -> Result<()> {
+pub(crate) fn require_alike(frames: &[ComplexFrame]) -> Result<()> {
     let Some(first) = frames.first() else { return Ok(()) };
     for (index, frame) in frames.iter().enumerate() {
         frame.validate()?;

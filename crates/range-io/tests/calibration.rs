@@ -8,8 +8,8 @@ use std::path::Path;
 
 use camera_model::{Camera, ImageFormat, InteriorOrientation, LensDistortion};
 use error_models::{
-    AmplitudeHyperbola, FixedPattern, FurtherShape, ModelSet, NamedParameter, ParameterStatus, PolynomialShape,
-    RangeErrorModel, RangeTerms, SurfaceShape,
+    AmplitudeHyperbola, AmplitudeScale, FixedPattern, FurtherShape, ModelSet, NamedParameter, ParameterStatus,
+    PolynomialShape, RangeErrorModel, RangeNoise, RangeTerms, SurfaceShape,
 };
 use proptest::prelude::*;
 use range_image::{Modulation, NoiseModel};
@@ -64,8 +64,24 @@ fn full() -> Calibration {
     calibration.range_models[1].parameters[0].status = ParameterStatus::Estimated;
     calibration.range_models[1].parameters[0].sigma = 0.002;
     calibration.noise = Some(NoiseModel { shot_variance_per_unit: 0.3, dark_sigma: 5.0 });
-    calibration.fixed_pattern =
-        Some(FixedPattern { width: 4, height: 3, offset_m: (0..12).map(|i| i as f32 * 1e-4).collect() });
+    calibration.fixed_pattern = Some(FixedPattern {
+        width: 4,
+        height: 3,
+        offset_m: (0..12).map(|i| i as f32 * 1e-4).collect(),
+        sigma_m: vec![2e-4; 12],
+    });
+    calibration.range_noise = Some(RangeNoise {
+        sigma_times_amplitude_m: 2.5,
+        floor_m: 0.003,
+        amplitude_scale: AmplitudeScale::TimesSquaredRange,
+    });
+    calibration.noise_parameters = vec![NamedParameter {
+        name: "dark_sigma".into(),
+        value: 5.0,
+        sigma: 0.1,
+        unit: "amplitude".into(),
+        status: ParameterStatus::Estimated,
+    }];
     calibration.correlation =
         Some(Correlation { names: vec!["c".into(), "d0[1]".into()], matrix: vec![vec![1.0, 0.9], vec![0.9, 1.0]] });
     calibration.span = ValidSpan { range_m: Some([0.5, 7.0]), temperature_c: Some([20.0, 40.0]), ..Default::default() };

@@ -6,6 +6,8 @@ use clap::{Parser, Subcommand};
 
 use crate::calibrate_arguments::CalibrateArguments;
 use crate::compare_arguments::CompareArguments;
+use crate::fixed_pattern_arguments::FixedPatternArguments;
+use crate::noise_arguments::NoiseArguments;
 use crate::plan_arguments::PlanArguments;
 use crate::register_arguments::RegisterArguments;
 use crate::scattering_arguments::ScatteringArguments;
@@ -77,6 +79,10 @@ pub(crate) enum Command {
     Plan(Box<PlanArguments>),
     /// Estimate internal scattering (stray light in the camera) from a scene with and without bright objects.
     Scattering(Box<ScatteringArguments>),
+    /// Estimate random errors (shot, dark, quantisation, or ranges by amplitude) from repeated frames.
+    Noise(NoiseArguments),
+    /// Estimate the range offset of each pixel (fixed pattern) from walls, and keep it only if it raises the precision.
+    Fpn(FixedPatternArguments),
     /// Bring a survey's stations or clouds of any format into one frame, with the quality of every pose.
     Register(RegisterArguments),
     /// Tell what a survey, a calibration or a cloud holds, and which stages it leaves room for.

@@ -40,6 +40,12 @@ pub(crate) fn dispatch(command: Command, output: &Output) -> Outcome {
         Command::Scattering(arguments) => {
             output.result(&pipeline::estimate_scattering(&arguments.request(), output.progress().as_ref())?)
         }
+        Command::Noise(arguments) => {
+            output.result(&pipeline::estimate_noise(&arguments.request(), output.progress().as_ref())?)
+        }
+        Command::Fpn(arguments) => {
+            output.result(&pipeline::estimate_pattern(&arguments.request(), output.progress().as_ref())?)
+        }
         Command::Register(arguments) => match arguments.request() {
             Request::Register(request) => output.result(&pipeline::register(&request, output.progress().as_ref())?),
             Request::Track(request) => output.result(&pipeline::track(&request, output.progress().as_ref())?),

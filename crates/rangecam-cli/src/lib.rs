@@ -5,6 +5,8 @@ mod bar;
 mod calibrate_arguments;
 mod commands;
 mod compare_arguments;
+mod fixed_pattern_arguments;
+mod noise_arguments;
 mod output;
 mod plan_arguments;
 mod register_arguments;

@@ -38,6 +38,8 @@ pub(crate) fn calibration(
         parameters: camera_parameters(outcome)?,
         range_models,
         noise: known.and_then(|known| known.noise),
+        range_noise: known.and_then(|known| known.range_noise),
+        noise_parameters: known.map(|known| known.noise_parameters.clone()).unwrap_or_default(),
         scattering: known.and_then(|known| known.scattering.clone()),
         scattering_parameters: known.map(|known| known.scattering_parameters.clone()).unwrap_or_default(),
         fixed_pattern: known.and_then(|known| known.fixed_pattern.clone()),

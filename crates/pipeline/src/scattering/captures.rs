@@ -7,9 +7,9 @@ use range_io::calibration::Calibration;
 use range_io::survey::{Level, Survey};
 use scattering_deconvolution::{EstimationOptions, ForegroundCapture, Psf};
 
+use super::ScatteringRequest;
 use super::shifts::{Shift, shifts_of};
-use super::{ScatteringRequest, nominal};
-use crate::load::{calibrated, read_calibration, root_of};
+use crate::further_term::start;
 use crate::outcome::Outcome;
 use crate::progress::Progress;
 use crate::view::ViewData;
@@ -28,7 +28,7 @@ pub(super) struct Captures {
 impl Captures {
     /// Demodulates and averages both surveys and pairs their stations by name.
     pub(super) fn read(request: &ScatteringRequest, progress: &dyn Progress) -> Result<Self> {
-        let (calibration, calibration_words) = start(request)?;
+        let (calibration, calibration_words) = start(&request.without_object, request.calibration.as_deref())?;
         let with_object = frames(&request.with_object, request.calibration.as_deref(), progress)?;
         let mut others = frames(&request.without_object, request.calibration.as_deref(), progress)?;
         let known: Vec<String> = others.views.iter().map(|other| other.station.clone()).collect();
@@ -68,19 +68,6 @@ impl Captures {
     pub(super) fn shifts(&self, psf: &Psf, options: &EstimationOptions) -> Result<Vec<Shift>> {
         let pairs = self.pairs();
         self.stations.iter().zip(&pairs).map(|(station, pair)| shifts_of(station, pair, psf, options)).collect()
-    }
-}
-
-/// The calibration that the point spread function is added to.
-fn start(request: &ScatteringRequest) -> Result<(Calibration, String)> {
-    let camera = Survey::read(&request.without_object)?.camera.nominal_camera()?;
-    let root = root_of(&request.without_object);
-    match read_calibration(&root, request.calibration.as_deref())? {
-        (Some(calibration), words) => {
-            calibrated(&calibration, &camera)?;
-            Ok((calibration, words))
-        }
-        (None, _) => Ok((nominal(&camera)?, "the survey's nominal camera".to_owned())),
     }
 }
 

@@ -7,13 +7,14 @@ mod summary;
 use std::path::PathBuf;
 use std::time::Instant;
 
-use error_models::{ModelSet, NamedParameter, ParameterStatus};
+use error_models::{NamedParameter, ParameterStatus};
 use range_io::atomic::{OutputFolder, write_text};
-use range_io::calibration::{Calibration, Provenance};
-use scattering_deconvolution::{EstimationOptions, PsfEstimate, estimate_psf};
+use range_io::calibration::Calibration;
+use scattering_deconvolution::{EstimationOptions, estimate_psf};
 
 pub use summary::{CandidateGaussians, ScatteringCapture, ScatteringParameter, ScatteringSummary};
 
+use crate::further_term::provenance_with;
 use crate::progress::Progress;
 use crate::{Error, Result, report};
 use captures::Captures;
@@ -65,7 +66,10 @@ pub fn estimate_scattering(request: &ScatteringRequest, progress: &dyn Progress)
     let mut calibration = captures.calibration;
     calibration.scattering = Some(psf.clone());
     calibration.scattering_parameters = estimate.parameters.iter().map(named).collect();
-    calibration.provenance = provenance(request, &calibration.provenance, &estimate);
+    let method = format!("scattering from {}", request.with_object.display());
+    let (redundancy, sigma0) = (estimate.redundancy, estimate.sigma0);
+    calibration.provenance =
+        provenance_with(&calibration.provenance, &request.with_object, &method, redundancy, sigma0);
     calibration.write(folder.file(Calibration::FILE_NAME)?)?;
     write_text(folder.file("report.html")?, &report::render_scattering(&summary, &shifts)?)?;
     folder.commit()?;
@@ -85,26 +89,4 @@ fn named(parameter: &scattering_deconvolution::PsfParameter) -> NamedParameter {
         unit: summary::unit_of(&parameter.name).to_owned(),
         status: if parameter.sigma > 0.0 { ParameterStatus::Estimated } else { ParameterStatus::Held },
     }
-}
-
-/// The calibration's own history, if it has one, with the scattering behind it.
-fn provenance(request: &ScatteringRequest, known: &Provenance, estimate: &PsfEstimate) -> Provenance {
-    let own = format!("scattering from {}", request.with_object.display());
-    if known.method.is_empty() {
-        return Provenance {
-            survey: request.with_object.display().to_string(),
-            method: own,
-            redundancy: usize::try_from(estimate.redundancy).ok(),
-            sigma0: Some(estimate.sigma0).filter(|sigma0| sigma0.is_finite()),
-            created: None,
-        };
-    }
-    Provenance { method: format!("{}; {own}", known.method), ..known.clone() }
-}
-
-/// A calibration of which nothing but the nominal camera is known.
-fn nominal(camera: &camera_model::Camera) -> Result<Calibration> {
-    let mut calibration = Calibration::from_models(camera, &ModelSet::default(), None)?;
-    calibration.provenance = Provenance::default();
-    Ok(calibration)
 }

@@ -1,15 +1,16 @@
 use std::collections::BTreeMap;
 
-use range_image::{average, average_ranges};
+use range_image::{Rest, RestOptions, RestVerdict, average, average_ranges, check_rest, check_rest_of_ranges};
 
 use super::Findings;
+use crate::plan::AverageOptions;
 use crate::progress::Progress;
 use crate::view::{View, ViewData};
 use crate::work::Work;
 use crate::{Error, Result};
 
 /// All views of a station become one: the mean of the complex images, or of the ranges where there are only those.
-pub(super) fn run(work: &mut Work, progress: &dyn Progress) -> Result<Findings> {
+pub(super) fn run(work: &mut Work, options: &AverageOptions, progress: &dyn Progress) -> Result<Findings> {
     let views = std::mem::take(&mut work.outcome.views);
     let before = views.len();
     // Stations keep the order in which the survey lists them.
@@ -22,17 +23,37 @@ pub(super) fn run(work: &mut Work, progress: &dyn Progress) -> Result<Findings> 
         }
         group.push(view);
     }
+    let mut findings = Findings::new();
     for (index, station) in order.iter().enumerate() {
         if let Some(group) = groups.remove(station) {
-            work.outcome.views.push(mean(group)?);
+            let (view, rest) = mean(group, &options.rest)?;
+            work.outcome.views.push(view);
+            if let Some(rest) = &rest {
+                record(&mut findings, rest);
+            }
         }
         progress.advance(index + 1);
     }
     let per_station = before as f64 / order.len().max(1) as f64;
-    Ok(Findings::from([("frames_per_station".to_owned(), per_station)]))
+    findings.insert("frames_per_station".to_owned(), per_station);
+    Ok(findings)
 }
 
-fn mean(group: Vec<View>) -> Result<View> {
+/// Adds what the test of one station found.
+fn record(findings: &mut Findings, rest: &Rest) {
+    let (moved, drifting) = match rest.verdict {
+        RestVerdict::SigmaUnknown => return,
+        RestVerdict::AtRest => (0.0, 0.0),
+        RestVerdict::SceneMoved { .. } => (1.0, 0.0),
+        RestVerdict::Drifts { .. } => (0.0, 1.0),
+    };
+    *findings.entry("moved_px".to_owned()).or_default() += rest.moved_pixels as f64;
+    *findings.entry("moved_stations".to_owned()).or_default() += moved;
+    *findings.entry("drifting_stations".to_owned()).or_default() += drifting;
+}
+
+/// The mean of a station's views, with the test for rest where there are several.
+fn mean(group: Vec<View>, options: &RestOptions) -> Result<(View, Option<Rest>)> {
     let name = format!("station {}", group[0].station);
     let frames: Vec<usize> = group.iter().flat_map(|view| view.frames.iter().copied()).collect();
     let (mut complex, mut ranges) = (Vec::new(), Vec::new());
@@ -47,11 +68,25 @@ fn mean(group: Vec<View>) -> Result<View> {
             ViewData::Range(frame) => ranges.push(frame),
         }
     }
-    first.data = if ranges.is_empty() {
-        ViewData::Phase(average(&complex).map_err(Error::stage("Average", &name))?)
+    let fail = |error| Error::stage("Average", &name)(error);
+    let options = Some(options).filter(|_| frames.len() > 1);
+    let rest = if ranges.is_empty() {
+        let tested = options.map(|options| check_rest(&complex, options)).transpose().map_err(fail)?;
+        let mut mean = average(&complex).map_err(fail)?;
+        if let Some(rest) = &tested {
+            rest.flag(&mut mean.flags);
+        }
+        first.data = ViewData::Phase(mean);
+        tested
     } else {
-        ViewData::Range(average_ranges(&ranges).map_err(Error::stage("Average", &name))?)
+        let tested = options.map(|options| check_rest_of_ranges(&ranges, options)).transpose().map_err(fail)?;
+        let mut mean = average_ranges(&ranges).map_err(fail)?;
+        if let Some(rest) = &tested {
+            rest.flag(&mut mean.flags);
+        }
+        first.data = ViewData::Range(mean);
+        tested
     };
     first.frames = frames;
-    Ok(first)
+    Ok((first, rest))
 }

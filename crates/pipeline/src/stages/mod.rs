@@ -25,7 +25,7 @@ pub(crate) type Findings = BTreeMap<String, f64>;
 pub(crate) fn apply(stage: &Stage, work: &mut Work, progress: &dyn Progress) -> Result<Findings> {
     match stage {
         Stage::Demodulate(options) => demodulate::run(work, options, progress),
-        Stage::Average(_) => average::run(work, progress),
+        Stage::Average(options) => average::run(work, options, progress),
         Stage::Deconvolve(options) => deconvolve::run(work, options, progress),
         Stage::Unwrap(options) => unwrap::run(work, options, progress),
         Stage::RepairWraps(options) => repair::run(work, options, progress),

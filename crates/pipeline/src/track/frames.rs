@@ -7,7 +7,7 @@ use icp_registration::Projection;
 use nalgebra::Isometry3;
 use range_io::survey::Survey;
 
-use crate::load::{Frames, open};
+use crate::load::{Frames, open, read_calibration, root_of};
 use crate::progress::Silent;
 use crate::register::input::{projection, stages};
 use crate::stages::apply;
@@ -32,7 +32,7 @@ pub(super) struct PointFrame {
 
 impl FrameSource {
     pub(super) fn new(path: &Path, calibration: Option<&Path>) -> Result<Self> {
-        let (mut work, frames) = open(path, calibration)?;
+        let (mut work, frames) = open(path, read_calibration(&root_of(path), calibration)?)?;
         let order = in_order(path, &work.outcome.survey)?;
         let mut each = Vec::new();
         for stage in stages(work.outcome.survey.level, work.calibration.as_ref())? {

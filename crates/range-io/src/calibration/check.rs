@@ -20,6 +20,11 @@ impl Calibration {
         if let Some(noise) = &self.noise {
             noise.validate().map_err(|error| InvalidField::new("noise", error.to_string()))?;
         }
+        if let Some(noise) = &self.range_noise {
+            noise.validate().map_err(|error| InvalidField::new("range_noise", error.to_string()))?;
+        }
+        let names = NOISE_PARAMETERS.map(|(name, _)| name).join(", ");
+        check_parameters("noise_parameters", &self.noise_parameters, noise_unit, &names)?;
         self.scattering.iter().try_for_each(check_psf)?;
         check_parameters(
             "scattering_parameters",
@@ -67,6 +72,15 @@ impl Calibration {
         let infinite = pattern.offset_m.iter().position(|value| value.is_infinite());
         infinite.map_or(Ok(()), |index| {
             Err(InvalidField::new(format!("fixed_pattern.offset_m[{index}]"), "is infinite, expected metres"))
+        })?;
+        let found = pattern.sigma_m.len();
+        require(found == 0 || found == expected, "fixed_pattern.sigma_m", || {
+            format!("has {found} values, expected {expected} or none")
+        })?;
+        let bad = pattern.sigma_m.iter().position(|sigma| *sigma < 0.0 || sigma.is_infinite());
+        bad.map_or(Ok(()), |index| {
+            let field = format!("fixed_pattern.sigma_m[{index}]");
+            Err(InvalidField::new(field, "is no standard deviation, expected NaN or a number that is not negative"))
         })
     }
 }
@@ -132,6 +146,19 @@ fn check_parameters(
         })?;
     }
     Ok(())
+}
+
+/// Names and units of the parameters of the noise; `amplitude` stands for the unit of the samples or of the amplitude.
+const NOISE_PARAMETERS: [(&str, &str); 5] = [
+    ("shot_variance_per_unit", "amplitude"),
+    ("dark_sigma", "amplitude"),
+    ("quantisation_sigma", "amplitude"),
+    ("sigma_times_amplitude_m", "m*amplitude"),
+    ("floor_m", "m"),
+];
+
+fn noise_unit(name: &str) -> Option<&'static str> {
+    NOISE_PARAMETERS.iter().find(|(known, _)| *known == name).map(|(_, unit)| *unit)
 }
 
 /// Weights are shares of the light, widths are in pixels; both are numbered by their Gaussian.

@@ -6,7 +6,7 @@ mod models;
 
 use std::path::Path;
 
-use error_models::{FixedPattern, FurtherShape, NamedParameter};
+use error_models::{FixedPattern, FurtherShape, NamedParameter, RangeNoise};
 use range_image::{ImageFormat, NoiseModel};
 use scattering_deconvolution::Psf;
 use serde::{Deserialize, Serialize};
@@ -34,6 +34,13 @@ pub struct Calibration {
     /// Random error of the raw samples.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub noise: Option<NoiseModel>,
+    /// Random error of ranges by their amplitude, for cameras that deliver no samples.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub range_noise: Option<RangeNoise>,
+    /// Quality of the noise, where it was estimated: `shot_variance_per_unit`, `dark_sigma` and `quantisation_sigma`, or
+    /// `sigma_times_amplitude_m` and `floor_m`.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub noise_parameters: Vec<NamedParameter>,
     /// Point spread function of internal scattering.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scattering: Option<Psf>,

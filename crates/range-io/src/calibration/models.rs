@@ -24,6 +24,8 @@ impl Calibration {
             parameters: camera_values(camera).into_iter().map(held).collect(),
             range_models: models.map(|(time, model)| RangeCalibration::from_model(time, model)).collect(),
             noise: None,
+            range_noise: None,
+            noise_parameters: Vec::new(),
             scattering: scattering.cloned(),
             scattering_parameters: Vec::new(),
             fixed_pattern: None,

@@ -124,7 +124,7 @@ impl FixedPatternSpec {
             let unit: f64 = StandardNormal.sample(&mut generator);
             (unit * self.sigma_m) as f32
         };
-        FixedPattern { width, height, offset_m: (0..width * height).map(offset).collect() }
+        FixedPattern { width, height, offset_m: (0..width * height).map(offset).collect(), sigma_m: Vec::new() }
     }
 }
 

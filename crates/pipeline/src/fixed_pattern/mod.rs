@@ -1,0 +1,102 @@
+//! Estimation of the fixed pattern from frames of walls.
+
+mod summary;
+
+use std::path::PathBuf;
+use std::time::Instant;
+
+use range_io::calibration::Calibration;
+use range_io::survey::{Level, Survey};
+use self_calibration::{PatternEstimate, PatternOptions, PatternVerdict, WallCapture, estimate_fixed_pattern};
+
+pub use summary::{FixedPatternSummary, PatternWall};
+
+use crate::further_term::{json, provenance_with, refuse, start, write};
+use crate::plan::{CorrectRangeOptions, DeconvolveOptions, DemodulateOptions, UnwrapOptions};
+use crate::progress::Progress;
+use crate::run::process_with;
+use crate::view::ViewData;
+use crate::{Error, Plan, Result, Stage, report};
+
+/// What to estimate a fixed pattern from.
+#[derive(Debug, Clone)]
+pub struct FixedPatternRequest {
+    /// Survey of flat walls.
+    pub survey: PathBuf,
+    /// Calibration that is applied before, and that the pattern is added to; `None`: the one beside the survey, or else
+    /// the nominal camera.
+    pub calibration: Option<PathBuf>,
+    /// How the pattern is estimated and judged.
+    pub options: PatternOptions,
+    /// Output folder; written beside and renamed when everything is done.
+    pub out: PathBuf,
+}
+
+/// Estimates the fixed pattern and writes summary and report, and the calibration with the pattern if that raises the
+/// precision of walls that it was not estimated from. If it does not, the calibration is written without any pattern:
+/// then the old one was none either.
+///
+/// # Errors
+/// [`Error::Refused`] where the frames show no walls: then the output folder holds a `summary.json` with the reason and
+/// nothing else. Every other error leaves no output.
+pub fn estimate_pattern(request: &FixedPatternRequest, progress: &dyn Progress) -> Result<FixedPatternSummary> {
+    let clock = Instant::now();
+    let (mut calibration, words) = start(&request.survey, request.calibration.as_deref())?;
+    // What is looked for must not be taken off before.
+    calibration.fixed_pattern = None;
+    let plan = preparation(&Survey::read(&request.survey)?, &calibration);
+    let known = (Some(calibration.clone()), words.clone());
+    let outcome = process_with(&plan, &request.survey, known, progress)?;
+    progress.begin("estimate the fixed pattern", 1);
+    let mut walls = Vec::new();
+    for view in &outcome.views {
+        let ViewData::Range(frame) = &view.data else {
+            return Err(Error::Needs { stage: "fixed pattern", needs: "Unwrap" });
+        };
+        walls.push(WallCapture { station: view.station.clone(), frame });
+    }
+    let estimate = match estimate_fixed_pattern(&walls, &calibration.camera()?, &request.options) {
+        Ok(estimate) => estimate,
+        Err(reason) => return Err(refuse(&request.survey, &request.out, reason)?),
+    };
+    progress.advance(1);
+    let mut summary = FixedPatternSummary::new(request, &words, &estimate);
+    summary.seconds = clock.elapsed().as_secs_f64();
+    if summary.applied {
+        add_to(&mut calibration, request, &estimate);
+    }
+    let page = report::render_fixed_pattern(&summary, &estimate)?;
+    write(&request.out, Some(&calibration), &json(&summary)?, &page)?;
+    progress.finish();
+    Ok(summary)
+}
+
+fn add_to(calibration: &mut Calibration, request: &FixedPatternRequest, estimate: &PatternEstimate) {
+    calibration.fixed_pattern = Some(estimate.pattern.clone());
+    let method = format!("fixed pattern from {}", request.survey.display());
+    let redundancy = estimate.test.blocks as i64 - 1;
+    calibration.provenance = provenance_with(&calibration.provenance, &request.survey, &method, redundancy, f64::NAN);
+}
+
+/// Whether the pattern is worth applying.
+fn is_applied(estimate: &PatternEstimate) -> bool {
+    estimate.test.verdict == PatternVerdict::RaisesPrecision
+}
+
+/// The stages that bring each frame to ranges with all other errors taken off.
+fn preparation(survey: &Survey, calibration: &Calibration) -> Plan {
+    let mut stages = Vec::new();
+    if survey.level == Level::Samples {
+        stages.push(Stage::Demodulate(DemodulateOptions::default()));
+    }
+    if survey.level <= Level::Phase {
+        if calibration.scattering.is_some() {
+            stages.push(Stage::Deconvolve(DeconvolveOptions::default()));
+        }
+        stages.push(Stage::Unwrap(UnwrapOptions::default()));
+    }
+    if !calibration.range_models.is_empty() {
+        stages.push(Stage::CorrectRange(CorrectRangeOptions::default()));
+    }
+    Plan { name: "fixed pattern".to_owned(), source: None, calibrate: None, stages }
+}

@@ -1,0 +1,79 @@
+//! What commands share that add one estimated term to a calibration.
+
+use std::path::Path;
+
+use error_models::ModelSet;
+use range_io::atomic::{OutputFolder, write_text};
+use range_io::calibration::{Calibration, Provenance};
+use range_io::survey::Survey;
+use serde::Serialize;
+
+use crate::load::{calibrated, read_calibration, root_of};
+use crate::{Error, Result};
+
+/// The calibration that a term is added to, in words too: the one named, the one beside the survey, or else one of
+/// which nothing but the nominal camera is known.
+pub(crate) fn start(survey: &Path, named: Option<&Path>) -> Result<(Calibration, String)> {
+    let camera = Survey::read(survey)?.camera.nominal_camera()?;
+    if let (Some(calibration), words) = read_calibration(&root_of(survey), named)? {
+        calibrated(&calibration, &camera)?;
+        return Ok((calibration, words));
+    }
+    let mut calibration = Calibration::from_models(&camera, &ModelSet::default(), None)?;
+    calibration.provenance = Provenance::default();
+    Ok((calibration, "the survey's nominal camera".to_owned()))
+}
+
+/// The calibration's own history, if it has one, with the new term behind it.
+pub(crate) fn provenance_with(
+    known: &Provenance,
+    survey: &Path,
+    method: &str,
+    redundancy: i64,
+    sigma0: f64,
+) -> Provenance {
+    if known.method.is_empty() {
+        return Provenance {
+            survey: survey.display().to_string(),
+            method: method.to_owned(),
+            redundancy: usize::try_from(redundancy).ok(),
+            sigma0: Some(sigma0).filter(|sigma0| sigma0.is_finite()),
+            created: None,
+        };
+    }
+    Provenance { method: format!("{}; {method}", known.method), ..known.clone() }
+}
+
+/// What is left of a survey that does not determine the term.
+#[derive(Debug, Serialize)]
+struct Refusal {
+    survey: String,
+    refused: String,
+}
+
+/// Writes a `summary.json` with the reason and nothing else, and gives the error that says so.
+pub(crate) fn refuse(survey: &Path, out: &Path, source: self_calibration::Error) -> Result<Error> {
+    let text = json(&Refusal { survey: survey.display().to_string(), refused: source.to_string() })?;
+    let folder = OutputFolder::create(out)?;
+    write_text(folder.file("summary.json")?, &text)?;
+    folder.commit()?;
+    Ok(Error::Refused { summary: text, source: source.into() })
+}
+
+/// The text of a `summary.json`.
+pub(crate) fn json(summary: &impl Serialize) -> Result<String> {
+    serde_json::to_string_pretty(summary)
+        .map_err(|error| Error::Figure { figure: "summary.json".to_owned(), message: error.to_string() })
+}
+
+/// Writes calibration, summary and report into an output folder.
+pub(crate) fn write(out: &Path, calibration: Option<&Calibration>, summary: &str, report: &str) -> Result<()> {
+    let folder = OutputFolder::create(out)?;
+    write_text(folder.file("summary.json")?, summary)?;
+    if let Some(calibration) = calibration {
+        calibration.write(folder.file(Calibration::FILE_NAME)?)?;
+    }
+    write_text(folder.file("report.html")?, report)?;
+    folder.commit()?;
+    Ok(())
+}

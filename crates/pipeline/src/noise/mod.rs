@@ -1,0 +1,69 @@
+//! Estimation of random errors from the repeated frames of a survey.
+
+mod estimate;
+mod summary;
+
+use std::path::PathBuf;
+use std::time::Instant;
+
+use range_io::calibration::Calibration;
+use self_calibration::NoiseFitOptions;
+
+pub use summary::{NoiseBin, NoiseParameter, NoiseStation, NoiseSummary, SigmaBinSummary};
+
+use crate::further_term::{json, provenance_with, refuse, start, write};
+use crate::progress::Progress;
+use crate::{Plan, Result, process, report};
+use estimate::{Estimate, NoiseTerm};
+
+/// What to estimate random errors from.
+#[derive(Debug, Clone)]
+pub struct NoiseRequest {
+    /// Survey with several frames of each station.
+    pub survey: PathBuf,
+    /// Calibration that the noise is added to; `None`: the one beside the survey, or else the nominal camera.
+    pub calibration: Option<PathBuf>,
+    /// How the noise is estimated, and what is refused.
+    pub options: NoiseFitOptions,
+    /// Output folder; written beside and renamed when everything is done.
+    pub out: PathBuf,
+}
+
+/// Estimates the noise of samples, or of ranges where a survey has no samples, and writes calibration, summary and
+/// report into the request's output folder.
+///
+/// # Errors
+/// [`Error::Refused`](crate::Error::Refused) where the frames do not determine it: then the output folder holds a
+/// `summary.json` with the reason and nothing else. Every other error leaves no output.
+pub fn estimate_noise(request: &NoiseRequest, progress: &dyn Progress) -> Result<NoiseSummary> {
+    let clock = Instant::now();
+    let (mut calibration, words) = start(&request.survey, request.calibration.as_deref())?;
+    let plan = Plan { name: "noise".to_owned(), source: None, calibrate: None, stages: Vec::new() };
+    let outcome = process(&plan, &request.survey, request.calibration.as_deref(), progress)?;
+    progress.begin("estimate noise", 1);
+    let estimate = match Estimate::new(&outcome, &request.options)? {
+        Ok(estimate) => estimate,
+        Err(reason) => return Err(refuse(&request.survey, &request.out, reason)?),
+    };
+    progress.advance(1);
+    let mut summary = NoiseSummary::new(request, &words, &estimate);
+    summary.seconds = clock.elapsed().as_secs_f64();
+    add_to(&mut calibration, request, &estimate);
+    write(&request.out, Some(&calibration), &json(&summary)?, &report::render_noise(&summary))?;
+    progress.finish();
+    Ok(summary)
+}
+
+/// The noise and its parameters take the place of those of the same names.
+fn add_to(calibration: &mut Calibration, request: &NoiseRequest, estimate: &Estimate) {
+    match estimate.term {
+        NoiseTerm::Samples(noise) => calibration.noise = Some(noise),
+        NoiseTerm::Ranges(noise) => calibration.range_noise = Some(noise),
+    }
+    let new = &estimate.parameters;
+    calibration.noise_parameters.retain(|known| new.iter().all(|parameter| parameter.name != known.name));
+    calibration.noise_parameters.extend(new.iter().cloned());
+    let method = format!("noise from {}", request.survey.display());
+    let (redundancy, sigma0) = (estimate.fit.redundancy, estimate.fit.sigma0);
+    calibration.provenance = provenance_with(&calibration.provenance, &request.survey, &method, redundancy, sigma0);
+}

@@ -1,0 +1,230 @@
+//! Every figure of an estimation of noise, by name.
+
+use std::fmt;
+use std::path::PathBuf;
+
+use error_models::{AmplitudeScale, ParameterStatus, RangeNoise};
+use self_calibration::{SigmaCheck, SigmaVerdict, VarianceEstimator};
+use serde::Serialize;
+
+use super::NoiseRequest;
+use super::estimate::{Estimate, NoiseTerm};
+
+/// Random errors and how well they are known.
+#[derive(Debug, Clone, Serialize)]
+pub struct NoiseSummary {
+    /// The survey.
+    pub survey: String,
+    /// The calibration that the noise was added to.
+    pub calibration: String,
+    /// What has the noise: `samples` or `ranges`.
+    pub noise_of: &'static str,
+    /// What the camera's amplitude is: `as received`, or `times squared range`.
+    pub amplitude_scale: &'static str,
+    /// Its parameters.
+    pub parameters: Vec<NoiseParameter>,
+    /// Correlation of the two estimated variances; `None` where one is held.
+    pub correlation: Option<f64>,
+    /// How variances were taken, and why.
+    pub variances: &'static str,
+    /// Standard deviation of unit weight of the class means.
+    pub sigma0: f64,
+    /// Class means less unknowns.
+    pub redundancy: i64,
+    /// Root mean square of the relative differences between variances observed and modelled.
+    pub misfit: f64,
+    /// Repeated values.
+    pub values: usize,
+    /// Share of them that scatter as no noise does; left out.
+    pub moved_share: f64,
+    /// Each station.
+    pub stations: Vec<NoiseStation>,
+    /// Variances by light (samples) or amplitude (ranges).
+    pub bins: Vec<NoiseBin>,
+    /// Whether the sigma that the noise gives to pixels is true, in words.
+    pub sigma_verdict: String,
+    /// Whether it is, to a tenth.
+    pub sigma_holds: bool,
+    /// Variance of the pixels over the frames, over the variance that they are given.
+    pub sigma_ratio: f64,
+    /// The same by amplitude.
+    pub sigma_bins: Vec<SigmaBinSummary>,
+    /// Wall-clock time, second.
+    pub seconds: f64,
+    /// The output folder.
+    pub out: PathBuf,
+}
+
+/// One parameter of the noise.
+#[derive(Debug, Clone, Serialize)]
+pub struct NoiseParameter {
+    /// Its name.
+    pub name: String,
+    /// Its unit; `amplitude` stands for the unit of samples and amplitudes.
+    pub unit: String,
+    /// Estimate.
+    pub value: f64,
+    /// Standard deviation; zero where the value was held.
+    pub sigma: f64,
+    /// Whether it was held.
+    pub held: bool,
+}
+
+/// Whether the frames of a station are alike.
+#[derive(Debug, Clone, Serialize)]
+pub struct NoiseStation {
+    /// Station.
+    pub station: String,
+    /// Frames.
+    pub frames: usize,
+    /// Variance from successive differences over variance about the mean; `None` below three frames.
+    pub drift_ratio: Option<f64>,
+    /// Its standard deviation without a drift.
+    pub drift_ratio_sigma: Option<f64>,
+    /// Whether it is below 1 significantly and noticeably.
+    pub drifts: bool,
+    /// Scatter of each frame over the noise, both as variances.
+    pub frame_factors: Vec<f64>,
+}
+
+/// Variances of values of like light.
+#[derive(Debug, Clone, Serialize)]
+pub struct NoiseBin {
+    /// Mean sample, or received amplitude.
+    pub light: f64,
+    /// Standard deviation observed, sample units or metre.
+    pub sigma_observed: f64,
+    /// Standard deviation modelled.
+    pub sigma_modelled: f64,
+    /// Values.
+    pub values: usize,
+}
+
+/// Standardised residuals of pixels of like amplitude.
+#[derive(Debug, Clone, Serialize)]
+pub struct SigmaBinSummary {
+    /// Smallest and largest amplitude.
+    pub amplitude: [f64; 2],
+    /// Values.
+    pub values: usize,
+    /// Variance observed over variance claimed.
+    pub ratio: f64,
+    /// Where it lies in 999 of 1000 cases, over all classes, if sigma is true.
+    pub limits: [f64; 2],
+}
+
+impl NoiseSummary {
+    pub(super) fn new(request: &NoiseRequest, calibration: &str, estimate: &Estimate) -> Self {
+        let fit = &estimate.fit;
+        let [[a, b], [_, d]] = fit.covariance;
+        let of_samples = matches!(estimate.term, NoiseTerm::Samples(_));
+        let bin = |bin: &self_calibration::VarianceBin| NoiseBin {
+            light: if of_samples { bin.regressor } else { bin.regressor.powf(-0.5) },
+            sigma_observed: bin.variance.sqrt(),
+            sigma_modelled: (fit.slope * bin.regressor + fit.level).sqrt(),
+            values: bin.values,
+        };
+        Self {
+            survey: request.survey.display().to_string(),
+            calibration: calibration.to_owned(),
+            noise_of: if of_samples { "samples" } else { "ranges" },
+            amplitude_scale: match estimate.term {
+                NoiseTerm::Ranges(RangeNoise { amplitude_scale: AmplitudeScale::TimesSquaredRange, .. }) => {
+                    "times squared range"
+                }
+                _ => "as received",
+            },
+            parameters: estimate.parameters.iter().map(NoiseParameter::new).collect(),
+            correlation: Some(b / (a * d).sqrt()).filter(|correlation| correlation.is_finite()),
+            variances: match fit.estimator {
+                VarianceEstimator::AboutMean => "about the mean of the frames: nothing drifts",
+                VarianceEstimator::SuccessiveDifferences => {
+                    "from successive differences: the frames drift, and these hide it"
+                }
+            },
+            sigma0: fit.sigma0,
+            redundancy: fit.redundancy,
+            misfit: fit.misfit,
+            values: fit.values,
+            moved_share: fit.moved as f64 / fit.values as f64,
+            stations: fit.steadiness.iter().map(NoiseStation::new).collect(),
+            bins: fit.bins.iter().map(bin).collect(),
+            sigma_verdict: estimate.check.verdict.to_string(),
+            sigma_holds: matches!(estimate.check.verdict, SigmaVerdict::True | SigmaVerdict::Close),
+            sigma_ratio: estimate.check.ratio,
+            sigma_bins: sigma_bins(&estimate.check),
+            seconds: 0.0,
+            out: request.out.clone(),
+        }
+    }
+}
+
+impl NoiseParameter {
+    fn new(parameter: &error_models::NamedParameter) -> Self {
+        Self {
+            name: parameter.name.clone(),
+            unit: parameter.unit.clone(),
+            value: parameter.value,
+            sigma: parameter.sigma,
+            held: parameter.status == ParameterStatus::Held,
+        }
+    }
+}
+
+impl NoiseStation {
+    fn new(steadiness: &self_calibration::Steadiness) -> Self {
+        let known = |value: f64| Some(value).filter(|value| value.is_finite());
+        Self {
+            station: steadiness.station.clone(),
+            frames: steadiness.frames,
+            drift_ratio: known(steadiness.ratio),
+            drift_ratio_sigma: known(steadiness.ratio_sigma),
+            drifts: steadiness.drifts,
+            frame_factors: steadiness.frame_factors.clone(),
+        }
+    }
+}
+
+fn sigma_bins(check: &SigmaCheck) -> Vec<SigmaBinSummary> {
+    let bin = |bin: &self_calibration::SigmaBin| SigmaBinSummary {
+        amplitude: bin.amplitude,
+        values: bin.values,
+        ratio: bin.ratio,
+        limits: bin.limits,
+    };
+    check.bins.iter().map(bin).collect()
+}
+
+impl fmt::Display for NoiseSummary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (values, stations) = (self.values, self.stations.len());
+        writeln!(f, "noise of {}: {values} values at {stations} stations in {:.1} s", self.noise_of, self.seconds)?;
+        writeln!(f, "calibration: {}", self.calibration)?;
+        for parameter in &self.parameters {
+            let NoiseParameter { name, unit, value, sigma, .. } = parameter;
+            let quality = if parameter.held { "held".to_owned() } else { format!("± {sigma:.5}") };
+            writeln!(f, "{name:<26} {value:>12.5} {quality} ({unit})")?;
+        }
+        if self.noise_of == "ranges" {
+            writeln!(f, "the camera's amplitude is {}", self.amplitude_scale)?;
+        }
+        writeln!(f, "variances {}", self.variances)?;
+        let (misfit, moved) = (100.0 * self.misfit, 100.0 * self.moved_share);
+        writeln!(
+            f,
+            "sigma0 {:.2}, redundancy {}, misfit {misfit:.1} %, moved {moved:.2} %",
+            self.sigma0, self.redundancy
+        )?;
+        for station in &self.stations {
+            let ratio = match (station.drift_ratio, station.drift_ratio_sigma) {
+                (Some(ratio), Some(sigma)) => format!("{ratio:.4} ± {sigma:.4}"),
+                _ => "cannot be told from two frames".to_owned(),
+            };
+            let name = &station.station;
+            writeln!(f, "station {name}: {} frames, successive over whole variance {ratio}", station.frames)?;
+        }
+        let ratio = self.sigma_ratio;
+        writeln!(f, "{}: the pixels' variance is {ratio:.3} of what they are given", self.sigma_verdict)?;
+        write!(f, "written to {}: calibration.ron, summary.json, report.html", self.out.display())
+    }
+}

@@ -1,0 +1,79 @@
+//! Noise estimated from repeated frames, against the truth of a simulation and on a real camera.
+
+#![allow(clippy::unwrap_used, clippy::print_stdout)]
+
+mod common;
+
+use std::path::{Path, PathBuf};
+
+use common::{fixtures, has_capture, simulated, simulated_with};
+use pipeline::{NoiseFitOptions, NoiseRequest, NoiseSummary, Plan, Silent, ViewData, estimate_noise, process};
+use range_io::calibration::Calibration;
+
+fn request(survey: PathBuf, out: &Path) -> NoiseRequest {
+    NoiseRequest { survey, calibration: None, options: NoiseFitOptions::default(), out: out.to_owned() }
+}
+
+fn parameter<'a>(summary: &'a NoiseSummary, name: &str) -> &'a pipeline::NoiseParameter {
+    summary.parameters.iter().find(|parameter| parameter.name == name).unwrap()
+}
+
+#[test]
+fn noise_of_samples_is_that_of_the_simulation() {
+    let folder = tempfile::tempdir().unwrap();
+    let survey = simulated("repeats", 1, folder.path());
+    let out = folder.path().join("noise");
+    let summary = estimate_noise(&request(survey.clone(), &out), &Silent).unwrap();
+    println!("{summary}");
+    let shot = parameter(&summary, "shot_variance_per_unit");
+    assert!((shot.value - 0.25).abs() < 4.0 * shot.sigma, "{shot:?}");
+    // Samples of 2.5 units are rounded: 25² + 2.5² / 12.
+    let dark = parameter(&summary, "dark_sigma");
+    assert!((dark.value - (625.0_f64 + 6.25 / 12.0).sqrt()).abs() < 4.0 * dark.sigma, "{dark:?}");
+    assert!(parameter(&summary, "quantisation_sigma").held);
+    assert!(summary.sigma_holds, "{}", summary.sigma_verdict);
+    let calibration = Calibration::read(&out).unwrap();
+    assert_eq!(calibration.noise_parameters.len(), 3);
+    let report = std::fs::read_to_string(out.join("report.html")).unwrap();
+    assert!(report.contains("Standard deviation against light") && report.contains("Standardised residuals"));
+
+    // What was estimated is what demodulation gives to the pixels.
+    let plan = Plan::from_ron("(name: \"sigma\", stages: [Demodulate()])", "sigma.ron".as_ref()).unwrap();
+    let outcome = process(&plan, &survey, Some(&out), &Silent).unwrap();
+    let ViewData::Phase(frame) = &outcome.views[0].data else { unreachable!("demodulated") };
+    assert!(frame.channels[0].sigma.as_slice().iter().all(|sigma| *sigma > 0.0));
+}
+
+#[test]
+fn noise_of_a_real_cameras_ranges_gives_them_a_true_sigma() {
+    if !has_capture("sr4000_steps") {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let survey = fixtures().join("surveys/sr4000_steps");
+    let out = folder.path().join("noise");
+    let summary = estimate_noise(&request(survey.clone(), &out), &Silent).unwrap();
+    println!("{summary}");
+    for bin in &summary.sigma_bins {
+        println!("amplitude {:?}: {:.3}, limits {:?}", bin.amplitude, bin.ratio, bin.limits);
+    }
+    assert_eq!(summary.noise_of, "ranges");
+    let plan = Plan::from_ron("(name: \"sigma\", stages: [Average()])", "sigma.ron".as_ref()).unwrap();
+    let outcome = process(&plan, &survey, Some(&out), &Silent).unwrap();
+    let ViewData::Range(frame) = &outcome.views[0].data else { unreachable!("averaged") };
+    let known = frame.sigma.as_slice().iter().filter(|sigma| **sigma > 0.0).count();
+    assert!(known > 24_000, "{known} of 25 344 pixels have a sigma");
+}
+
+#[test]
+fn a_single_frame_is_refused_with_its_reason() {
+    let folder = tempfile::tempdir().unwrap();
+    let survey = simulated_with("repeats", ["frames_per_station: 6", "frames_per_station: 1"], folder.path());
+    let out = folder.path().join("noise");
+    let error = estimate_noise(&request(survey, &out), &Silent).unwrap_err();
+    assert!(matches!(error, pipeline::Error::Refused { .. }), "{error}");
+    assert!(error.to_string().contains("has 1 frames, 2 are needed"), "{error}");
+    let names = std::fs::read_dir(&out).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
+    let names: Vec<String> = names.filter(|name| !name.starts_with('.')).collect();
+    assert_eq!(names, ["summary.json"], "a refusal leaves its reasons and nothing that could be taken for a result");
+}

@@ -1,0 +1,139 @@
+//! Variances averaged over values of like light.
+
+use adjust::Distribution;
+
+use super::fit::{Line, VarianceEstimator};
+use super::repeats::Repeats;
+
+/// Averages of values whose regressor (light, one over the squared amplitude) is alike.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct VarianceBin {
+    /// Mean of the regressor.
+    pub regressor: f64,
+    /// Mean of the variances.
+    pub variance: f64,
+    /// Degrees of freedom of that mean.
+    pub degrees: f64,
+    /// Values that were averaged.
+    pub values: usize,
+}
+
+/// A pixel whose variance noise exceeds as rarely as this has moved.
+const MOVED_PROBABILITY: f64 = 1e-5;
+
+/// Repeats sorted by their regressor and cut into classes of equal number.
+pub(super) struct Classes {
+    sorted: Vec<Repeats>,
+    length: usize,
+}
+
+impl Classes {
+    /// Fewer classes than asked for where they would hold fewer than 20 values each.
+    pub(super) fn new(mut repeats: Vec<Repeats>, bins: usize) -> Self {
+        repeats.sort_by(|a, b| a.regressor.total_cmp(&b.regressor));
+        let bins = bins.min(repeats.len() / 20).max(3);
+        let length = repeats.len().div_ceil(bins).max(1);
+        Self { sorted: repeats, length }
+    }
+
+    /// Without the classes whose usual variance is larger.
+    pub(super) fn below(mut self, estimator: VarianceEstimator, largest: f64) -> Self {
+        if largest.is_finite() {
+            let small = |class: &&[Repeats]| usual_variance(class, estimator) <= largest;
+            self.sorted = self.sorted.chunks(self.length).filter(small).flatten().copied().collect();
+        }
+        self
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.sorted.len()
+    }
+
+    pub(super) fn all(&self) -> &[Repeats] {
+        &self.sorted
+    }
+
+    /// Mean variances of what noise around the median of its class explains: for a start.
+    pub(super) fn around_medians(&self, estimator: VarianceEstimator) -> (Vec<VarianceBin>, usize) {
+        let (mut bins, mut moved) = (Vec::new(), 0);
+        for class in self.sorted.chunks(self.length) {
+            let median = usual_variance(class, estimator);
+            moved += average(&mut bins, class, estimator, |_| median);
+        }
+        (bins, moved)
+    }
+
+    /// Mean variances of what noise around the line explains, and the number of values left out.
+    pub(super) fn around_line(&self, estimator: VarianceEstimator, line: &Line) -> (Vec<VarianceBin>, usize) {
+        let (mut bins, mut moved) = (Vec::new(), 0);
+        for class in self.sorted.chunks(self.length) {
+            moved += average(&mut bins, class, estimator, |one| line.at(one.regressor));
+        }
+        (bins, moved)
+    }
+}
+
+/// Whether a variance is more than noise of the expected variance shows.
+pub(super) fn has_moved(variance: f64, expected: f64, limit: f64) -> bool {
+    variance > limit * expected
+}
+
+/// Largest variance over its expectation that noise shows.
+pub(super) fn moved_limit(degrees: f64) -> f64 {
+    Distribution::ChiSquared { dof: degrees }.upper_quantile(MOVED_PROBABILITY) / degrees
+}
+
+/// The variance of a class from the median of its variances.
+fn usual_variance(class: &[Repeats], estimator: VarianceEstimator) -> f64 {
+    let mut known: Vec<(usize, f64)> = Vec::new();
+    let scaled = |one: &Repeats| {
+        let share = known.iter().find(|(count, _)| *count == one.count).map(|(_, share)| *share);
+        let share = share.unwrap_or_else(|| {
+            known.push((one.count, median_share(estimator.degrees(one.count))));
+            median_share(estimator.degrees(one.count))
+        });
+        estimator.variance(one) / share
+    };
+    let mut scaled: Vec<f64> = class.iter().map(scaled).collect();
+    let middle = scaled.len() / 2;
+    *scaled.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+/// Median of a variance over its expectation.
+fn median_share(degrees: f64) -> f64 {
+    Distribution::ChiSquared { dof: degrees }.quantile(0.5) / degrees
+}
+
+/// Appends the mean over a class, if anything is left of it; the number of values left out.
+fn average(
+    bins: &mut Vec<VarianceBin>,
+    class: &[Repeats],
+    estimator: VarianceEstimator,
+    expected: impl Fn(&Repeats) -> f64,
+) -> usize {
+    let mut bin = VarianceBin { regressor: 0.0, variance: 0.0, degrees: 0.0, values: 0 };
+    // Stations have few numbers of frames between them.
+    let mut limits: Vec<(usize, f64)> = Vec::new();
+    for one in class {
+        let degrees = estimator.degrees(one.count);
+        let known = limits.iter().find(|(count, _)| *count == one.count).map(|(_, limit)| *limit);
+        let limit = known.unwrap_or_else(|| {
+            limits.push((one.count, moved_limit(degrees)));
+            moved_limit(degrees)
+        });
+        let variance = estimator.variance(one);
+        if has_moved(variance, expected(one), limit) {
+            continue;
+        }
+        bin.regressor += degrees * one.regressor;
+        bin.variance += degrees * variance;
+        bin.degrees += degrees;
+        bin.values += 1;
+    }
+    if bin.values > 0 {
+        bin.regressor /= bin.degrees;
+        bin.variance /= bin.degrees;
+        bins.push(bin);
+    }
+    class.len() - bin.values
+}

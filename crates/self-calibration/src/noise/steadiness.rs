@@ -1,0 +1,120 @@
+//! Whether the frames of a station show one scene by one camera at rest.
+
+use error_models::{NamedParameter, ParameterStatus};
+use rayon::prelude::*;
+
+use super::NoiseFitOptions;
+use super::bins::{has_moved, moved_limit};
+use super::repeats::{Repeats, mean_of};
+use crate::{Error, Result};
+
+/// What the frames of a station say of drift and of unlike frames.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Steadiness {
+    /// Name of the station.
+    pub station: String,
+    /// Number of frames.
+    pub frames: usize,
+    /// Variance from successive differences over variance about the mean, averaged over the values: 1 without drift,
+    /// whatever the distribution of the noise; smaller where values wander from frame to frame (`[vonNeumann1941]`).
+    /// NaN for two frames, which cannot tell.
+    pub ratio: f64,
+    /// Standard deviation of the ratio where there is no drift.
+    pub ratio_sigma: f64,
+    /// Whether the ratio is significantly (four of its deviations) and noticeably (1 %) below 1.
+    pub drifts: bool,
+    /// Scatter of each frame about the station's mean over the noise that was estimated, both as variances.
+    pub frame_factors: Vec<f64>,
+}
+
+/// A ratio that is less below 1 than this changes no noise worth mentioning, however significant.
+const NOTICEABLE: f64 = 0.01;
+
+impl Steadiness {
+    pub(super) fn new(station: &str, frames: usize, repeats: &[Repeats]) -> Self {
+        let (mut sum, mut variance, mut count) = (0.0, 0.0, 0.0);
+        for one in repeats.iter().filter(|one| one.count > 2 && one.variance > 0.0) {
+            let n = one.count as f64;
+            sum += one.successive / one.variance;
+            variance += (n - 2.0) / ((n - 1.0) * (n + 1.0));
+            count += 1.0;
+        }
+        let (ratio, ratio_sigma) = (sum / count, variance.sqrt() / count);
+        let drifts = 1.0 - ratio > (4.0 * ratio_sigma).max(NOTICEABLE);
+        Self { station: station.to_owned(), frames, ratio, ratio_sigma, drifts, frame_factors: Vec::new() }
+    }
+
+    /// Refuses a drift so fast that successive differences hold too much of it.
+    ///
+    /// A straight drift that adds the share T to the variance adds `6 T / n (n + 1)` to that of successive differences.
+    pub(super) fn require_slow(&self, options: &NoiseFitOptions) -> Result<()> {
+        if !self.drifts {
+            return Ok(());
+        }
+        let n = self.frames as f64;
+        let left = 6.0 / (n * (n + 1.0));
+        let drift = if self.ratio > left { (1.0 - self.ratio) / (self.ratio - left) } else { f64::INFINITY };
+        if drift * left <= options.largest_drift_share {
+            return Ok(());
+        }
+        Err(Error::FramesDrift { station: self.station.clone(), ratio: self.ratio, share: drift * left })
+    }
+
+    /// Refuses a frame that scatters more than the others.
+    pub(super) fn require_alike(&self, options: &NoiseFitOptions) -> Result<()> {
+        // Two frames lie equally far from their mean, and a drift sends the first and the last one off.
+        if self.frames < 3 || self.drifts {
+            return Ok(());
+        }
+        let mut sorted = self.frame_factors.clone();
+        sorted.sort_by(f64::total_cmp);
+        let usual = sorted[(sorted.len() - 1) / 2];
+        let worst = self.frame_factors.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1));
+        match worst {
+            Some((frame, factor)) if factor / usual > options.largest_frame_factor => {
+                Err(Error::FrameStandsOut { station: self.station.clone(), frame, factor: factor / usual })
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+/// Values whose sums one task adds up; the sums are added in the order of the values.
+const VALUES_PER_TASK: usize = 8192;
+
+/// Mean square deviation of each frame from the mean of all, over its expectation; values that moved are left out.
+///
+/// `value_at` gives the values of all frames, and the variance that noise gives them.
+pub(super) fn frame_factors(
+    frames: usize,
+    count: usize,
+    value_at: impl Fn(usize) -> Option<(Vec<f64>, f64)> + Sync,
+) -> Vec<f64> {
+    let limit = moved_limit(frames as f64 - 1.0);
+    let starts: Vec<usize> = (0..count).step_by(VALUES_PER_TASK).collect();
+    let add = |start: usize| {
+        let mut sums = vec![0.0; frames + 1];
+        for (values, expected) in (start..count.min(start + VALUES_PER_TASK)).filter_map(&value_at) {
+            let mean = mean_of(&values);
+            let moved = Repeats::of(&values, 0.0).is_none_or(|own| has_moved(own.variance, expected, limit));
+            if moved || expected <= 0.0 {
+                continue;
+            }
+            for (sum, value) in sums.iter_mut().zip(&values) {
+                *sum += (value - mean).powi(2) / expected;
+            }
+            sums[frames] += 1.0 - 1.0 / frames as f64;
+        }
+        sums
+    };
+    let parts: Vec<Vec<f64>> = starts.into_par_iter().map(add).collect();
+    let total = |place: usize| parts.iter().map(|part| part[place]).sum::<f64>();
+    (0..frames).map(|frame| total(frame) / total(frames)).collect()
+}
+
+/// An estimated or held parameter of the noise.
+pub(super) fn parameter(name: &str, value: f64, sigma: f64, unit: &str, held: bool) -> NamedParameter {
+    let status = if held { ParameterStatus::Held } else { ParameterStatus::Estimated };
+    let sigma = if held { 0.0 } else { sigma };
+    NamedParameter { name: name.to_owned(), value, sigma, unit: unit.to_owned(), status }
+}

@@ -10,6 +10,7 @@ mod hyperbola;
 mod inverse;
 mod kernel;
 mod kernel_further;
+mod ledger;
 mod legendre;
 mod linear;
 mod mixed_pixels;
@@ -31,6 +32,7 @@ pub use distort::distort_frame;
 pub use error::{Error, Result};
 pub use gross_errors::{FlagCounts, GrossErrorOptions, MixedPixelOptions, flag_gross_errors};
 pub use hyperbola::HyperbolaJacobian;
+pub use ledger::{LedgerEntry, OutsideModel, RangeTerm, ledger_maps};
 pub use model::{
     AmplitudeHyperbola, FixedPattern, FurtherShape, FurtherTerms, ImageSurface, ModelSet, PeriodicSpline,
     PolynomialShape, RangeErrorModel, RangePolynomial, RangeTerms, SurfaceShape,

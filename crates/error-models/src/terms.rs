@@ -34,6 +34,14 @@ impl RangeTerms {
         self.periodic_with_derivative(ambiguity_interval_m, range_m).0
     }
 
+    /// The three pairs of periodic terms apart, wavelengths U, U/2, U/4, metre.
+    pub(crate) fn waves(&self, ambiguity_interval_m: f64, range_m: f64) -> [f64; 3] {
+        let [first, second, third] = waves(ambiguity_interval_m, range_m);
+        let [d2, d3, d4, d5, d6, d7] = self.periodic;
+        [(d2, d3, first), (d4, d5, second), (d6, d7, third)]
+            .map(|(d_sin, d_cos, wave)| d_sin * wave.sin + d_cos * wave.cos)
+    }
+
     /// `∂Δρ/∂ρ`, metre per metre. The derivatives with respect to x and y are `e1` and `e2`.
     pub fn range_derivative(&self, ambiguity_interval_m: f64, range_m: f64) -> f64 {
         self.periodic_with_derivative(ambiguity_interval_m, range_m).1

@@ -96,6 +96,12 @@ pub enum Error {
     /// Two things to be compared do not belong together.
     #[error("compare: {0}")]
     Compare(String),
+    /// Calibrations that cannot be compared.
+    #[error("diff: {0}")]
+    Diff(String),
+    /// A pixel that cannot be explained.
+    #[error("explain: {0}")]
+    Explain(String),
     /// Inputs that cannot be registered, or that no alignment brings together.
     #[error("register: {0}")]
     Register(String),

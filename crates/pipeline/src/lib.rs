@@ -2,7 +2,10 @@
 
 mod calibrate;
 mod compare;
+mod correction_record;
+mod diff;
 mod error;
+mod explain;
 mod fixed_pattern;
 mod further_term;
 mod inspect;
@@ -30,14 +33,19 @@ mod work;
 
 pub use calibrate::{
     CalibrateMethod, CalibrateRequest, CalibrationSummary, CorrelationSummary, DecisionSummary, GroupSummary,
-    ParameterMap, ParameterSummary, RejectedObservation, TableDefaults, calibrate,
+    ParameterMap, ParameterSummary, RejectedObservation, TableDefaults, TrendSummary, calibrate,
 };
 pub use compare::{
     AbsoluteSummary, CloudAlignment, CloudComparison, CompareAlignment, CompareRequest, Comparison, DistanceHistogram,
     PlaneDistances, PoseComparison, PoseDifference, RelativeSummary, TrajectoryComparison, TrajectoryStatistics,
     compare,
 };
+pub use correction_record::CorrectionRecord;
+pub use diff::{
+    CalibrationDifference, CorrectionLine, DiffRequest, ImageLine, JointLine, ParameterLine, PlaceLine, diff,
+};
 pub use error::{Error, Result};
+pub use explain::{ExplainRequest, Explanation, FlagReason, StageLine, StagePart, explain};
 pub use fixed_pattern::{FixedPatternRequest, FixedPatternSummary, PatternWall, estimate_pattern};
 pub use inspect::{Inspection, inspect};
 pub use network_plan::{CandidateSummary, NetworkPlanRequest, PlanSummary, PointSigma, plan_network};

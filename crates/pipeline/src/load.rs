@@ -115,6 +115,7 @@ impl Frames {
             channels: Vec::new(),
             modulations: self.modulations.clone(),
             multipath_risk_m: None,
+            correction: None,
         };
         view.before = view.snapshot();
         Ok(view)

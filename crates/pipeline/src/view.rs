@@ -4,6 +4,7 @@ use nalgebra::Isometry3;
 use phase_unwrap::combine_frequencies;
 use range_image::{ComplexChannel, ComplexFrame, Flags, Modulation, RangeFrame, Raster, RawFrame};
 
+use crate::correction_record::CorrectionRecord;
 use crate::truth::ViewTruth;
 use crate::{Error, Result};
 
@@ -36,6 +37,8 @@ pub struct View {
     pub modulations: Vec<Modulation>,
     /// Error that light bounced once in the scene is expected to make, metre; once it was assessed.
     pub multipath_risk_m: Option<Raster<f32>>,
+    /// What the correction of the ranges worked on; once it ran.
+    pub correction: Option<CorrectionRecord>,
 }
 
 /// The frame at its level.

@@ -6,6 +6,8 @@ use clap::{Parser, Subcommand};
 
 use crate::calibrate_arguments::CalibrateArguments;
 use crate::compare_arguments::CompareArguments;
+use crate::diff_arguments::DiffArguments;
+use crate::explain_arguments::ExplainArguments;
 use crate::fixed_pattern_arguments::FixedPatternArguments;
 use crate::noise_arguments::NoiseArguments;
 use crate::plan_arguments::PlanArguments;
@@ -90,6 +92,11 @@ pub(crate) enum Command {
         /// Survey folder, calibration.ron or cloud.ply.
         path: PathBuf,
     },
+    /// Tell which differences of two calibrations are significant: parameters, range correction, image. Exit code 0:
+    /// none, 1: some, 2: they cannot be compared.
+    Diff(DiffArguments),
+    /// Tell what each correction did to one pixel's range, in millimetres, and what its flags mean.
+    Explain(ExplainArguments),
     /// Compare two results: clouds (PLY, PCD, E57, VTK, xyz), trajectories (TUM, KITTI, EuRoC, Redwood log, 7-Scenes
     /// folder), stations.csv, or output folders.
     Compare(CompareArguments),

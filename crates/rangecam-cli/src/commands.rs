@@ -2,6 +2,7 @@
 
 use std::error::Error;
 use std::path::{Path, PathBuf};
+use std::process::ExitCode;
 
 use pipeline::{Plan, RunRequest, SimulateSource};
 
@@ -11,8 +12,19 @@ use crate::register_arguments::Request;
 
 type Outcome = Result<(), Box<dyn Error>>;
 
-pub(crate) fn dispatch(command: Command, output: &Output) -> Outcome {
-    match command {
+/// What the shell sees where a command fails: of `diff` 2, as 1 says that calibrations differ.
+pub(crate) fn failure_code(command: &Command) -> ExitCode {
+    if matches!(command, Command::Diff(_)) { ExitCode::from(2) } else { ExitCode::FAILURE }
+}
+
+/// Runs a command; what the shell sees where it does not fail.
+pub(crate) fn dispatch(command: Command, output: &Output) -> Result<ExitCode, Box<dyn Error>> {
+    let outcome = match command {
+        Command::Diff(arguments) => {
+            let found = pipeline::diff(&arguments.request())?;
+            output.result(&found)?;
+            return Ok(if found.significant { ExitCode::FAILURE } else { ExitCode::SUCCESS });
+        }
         Command::Run { survey, pipeline, calibration, out } => run(survey, &pipeline, calibration, out, output),
         Command::Simulate { scene, seed, position_sigma, attitude_sigma, gross_errors, out } => {
             let source = SimulateSource {
@@ -54,10 +66,14 @@ pub(crate) fn dispatch(command: Command, output: &Output) -> Outcome {
             }
         },
         Command::Inspect { path } => output.result(&pipeline::inspect(&path)?),
+        Command::Explain(arguments) => {
+            output.result(&pipeline::explain(&arguments.request()?, output.progress().as_ref())?)
+        }
         Command::Compare(arguments) => {
             output.result(&pipeline::compare(&arguments.request(), output.progress().as_ref())?)
         }
-    }
+    };
+    outcome.map(|()| ExitCode::SUCCESS)
 }
 
 fn run(

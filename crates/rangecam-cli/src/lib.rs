@@ -5,6 +5,8 @@ mod bar;
 mod calibrate_arguments;
 mod commands;
 mod compare_arguments;
+mod diff_arguments;
+mod explain_arguments;
 mod fixed_pattern_arguments;
 mod noise_arguments;
 mod output;
@@ -21,7 +23,7 @@ use crate::arguments::Arguments;
 use crate::output::Output;
 
 /// Runs the command with the given arguments, the program's name first, and returns what the shell should see:
-/// 0 done, 1 the work failed, 2 the arguments are wrong.
+/// 0 done, 1 the work failed, 2 the arguments are wrong; of `diff` 0 no significant difference, 1 some, 2 no comparison.
 pub fn main(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     let arguments = match Arguments::try_parse_from(arguments) {
         Ok(arguments) => arguments,
@@ -32,12 +34,13 @@ pub fn main(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         }
     };
     let output = Output::new(&arguments);
+    let failure = commands::failure_code(&arguments.command);
     match commands::dispatch(arguments.command, &output) {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(code) => code,
         Err(error) => {
             output.refusal(error.as_ref());
             output.error(error.as_ref());
-            ExitCode::FAILURE
+            failure
         }
     }
 }

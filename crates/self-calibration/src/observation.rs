@@ -3,6 +3,17 @@
 use adjust::{BlockId, EvaluationFailure, Jacobians, Observation};
 use error_models::AmplitudeHyperbola;
 
+use crate::hyperbola_real::RealHyperbola;
+
+/// What the three numbers of the hyperbola's block are.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum HyperbolaForm {
+    /// h1, h2, h3, over a span of amplitudes.
+    Coefficients([f64; 2]),
+    /// The logarithms of [`RealHyperbola`], from this amplitude on.
+    Real(f64),
+}
+
 /// `ρ_observed − ρ_reference = Δρ(ρ_observed, x, y, a)`: linear in the terms of the first block, not in the
 /// hyperbola of the second, where there is one.
 ///
@@ -15,15 +26,28 @@ pub(crate) struct DifferenceObservation<'a> {
     pub(crate) amplitude: f64,
     /// Design row of the terms.
     pub(crate) row: &'a [f64],
-    pub(crate) amplitude_span: [f64; 2],
+    pub(crate) form: HyperbolaForm,
 }
 
-impl DifferenceObservation<'_> {
-    fn hyperbola(&self, coefficients: &[f64]) -> Result<AmplitudeHyperbola, EvaluationFailure> {
-        let [h1, h2, h3] = *coefficients else {
-            return Err(EvaluationFailure::new("the hyperbola has three coefficients"));
-        };
-        Ok(AmplitudeHyperbola { h1, h2, h3, amplitude_span: self.amplitude_span })
+impl HyperbolaForm {
+    /// `Δρ` in metre and its derivatives by the block's numbers.
+    fn evaluate(self, numbers: &[f64], amplitude: f64) -> Result<(f64, [f64; 3]), EvaluationFailure> {
+        let no_value = || EvaluationFailure::new("the radicand of Eq. 15 is negative");
+        let no_slope = || EvaluationFailure::new("the slope of Eq. 15 is infinite");
+        match self {
+            Self::Coefficients(amplitude_span) => {
+                let [h1, h2, h3] = *numbers else {
+                    return Err(EvaluationFailure::new("the hyperbola has three coefficients"));
+                };
+                let hyperbola = AmplitudeHyperbola { h1, h2, h3, amplitude_span };
+                let value = hyperbola.correction(amplitude).ok_or_else(no_value)?;
+                Ok((value, hyperbola.jacobian(amplitude).ok_or_else(no_slope)?.coefficients))
+            }
+            Self::Real(lowest) => {
+                let real = RealHyperbola::from_logarithms(numbers, lowest).ok_or_else(no_value)?;
+                Ok((real.value(amplitude), real.derivatives(amplitude).ok_or_else(no_slope)?))
+            }
+        }
     }
 }
 
@@ -44,17 +68,12 @@ impl Observation for DifferenceObservation<'_> {
     ) -> Result<(), EvaluationFailure> {
         let linear: f64 = self.row.iter().zip(parameters[0]).map(|(derivative, term)| derivative * term).sum();
         residual[0] = self.difference_m - linear;
-        let hyperbola = parameters.get(1).map(|coefficients| self.hyperbola(coefficients)).transpose()?;
-        if let Some(hyperbola) = hyperbola {
-            let amplitude_m = hyperbola.correction(self.amplitude);
-            residual[0] -= amplitude_m.ok_or_else(|| EvaluationFailure::new("the radicand of Eq. 15 is negative"))?;
-        }
+        let hyperbola = parameters.get(1).map(|numbers| self.form.evaluate(numbers, self.amplitude)).transpose()?;
+        residual[0] -= hyperbola.map_or(0.0, |(value, _)| value);
         let Some(jacobians) = jacobians else { return Ok(()) };
         jacobians.row(0, 0).copy_from_slice(self.row);
-        if let Some(hyperbola) = hyperbola {
-            let jacobian = hyperbola.jacobian(self.amplitude);
-            let jacobian = jacobian.ok_or_else(|| EvaluationFailure::new("the slope of Eq. 15 is infinite"))?;
-            jacobians.row(1, 0).copy_from_slice(&jacobian.coefficients);
+        if let Some((_, derivatives)) = hyperbola {
+            jacobians.row(1, 0).copy_from_slice(&derivatives);
         }
         Ok(())
     }

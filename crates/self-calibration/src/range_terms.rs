@@ -3,8 +3,9 @@
 use adjust::{Adjustment, BlockId, Covariance, ParameterBlock, Solution, SolveOptions};
 use error_models::{AmplitudeHyperbola, RangeErrorModel};
 
+use crate::hyperbola_real::{RealHyperbola, is_real_over_span};
 use crate::hyperbola_start::hyperbola_start;
-use crate::observation::DifferenceObservation;
+use crate::observation::{DifferenceObservation, HyperbolaForm};
 use crate::options::{HyperbolaUse, LinearTerms};
 use crate::{Error, RangeCalibration, RangeDifference, RangeTermOptions, Result};
 
@@ -12,7 +13,8 @@ use crate::{Error, RangeCalibration, RangeDifference, RangeTermOptions, Result};
 /// (Sect. 5.3, two-step methods; laboratory calibration over known distances).
 ///
 /// `ambiguity_interval_m` is U of the frequency. The terms are linear; with a hyperbola the adjustment starts from
-/// the best of a coarse grid and ends undamped.
+/// the best of a coarse grid, goes on in numbers for which the hyperbola is real over the whole span of amplitudes
+/// whatever they are, and ends undamped in h1, h2, h3.
 ///
 /// # Errors
 /// [`Error::NotDetermined`] where the differences cannot tell parameters apart, as with a wall at one distance only;
@@ -25,7 +27,7 @@ pub fn estimate_range_terms(
 ) -> Result<RangeCalibration> {
     let problem = Problem::new(differences, ambiguity_interval_m, options)?;
     let start = problem.start_of_hyperbola()?;
-    let (solution, blocks) = problem.solve(start)?;
+    let (solution, blocks) = problem.solve_from(start)?;
     let diagnosis = solution.diagnosis(1.0);
     if diagnosis.weakest_inflation > options.largest_inflation {
         return Err(problem.not_determined(diagnosis.weakest.to_string(), diagnosis.weakest_inflation));
@@ -120,7 +122,7 @@ impl<'a> Problem<'a> {
             let modelled = self.rows().map(|row| row.iter().zip(&held).map(|(d, value)| d * value).sum::<f64>());
             return Ok(self.observed().zip(modelled).map(|(observed, modelled)| observed - modelled).collect());
         }
-        let (solution, blocks) = self.solve(None)?;
+        let (solution, blocks) = self.solve(None, self.coefficients())?;
         let offset = solution.values(blocks[0])?[0];
         let free = if self.terms.held[0] { 0.0 } else { offset };
         Ok(solution.residuals().iter().map(|v| v + free).collect())
@@ -135,8 +137,38 @@ impl<'a> Problem<'a> {
         self.differences.iter().map(|d| d.observed_range_m - d.reference_range_m)
     }
 
+    fn coefficients(&self) -> HyperbolaForm {
+        HyperbolaForm::Coefficients(self.amplitude_span)
+    }
+
+    /// Adjusts from a start of the hyperbola, where there is one: if it is estimated, first where it cannot but be real.
+    fn solve_from(&self, start: Option<[f64; 3]>) -> Result<(Solution, Vec<BlockId>)> {
+        let Some(start) = start.filter(|_| self.options.hyperbola == HyperbolaUse::Estimate) else {
+            return self.solve(start, self.coefficients());
+        };
+        let lowest = self.amplitude_span[0];
+        let real = RealHyperbola::near(start, lowest).and_then(|near| {
+            let (solution, blocks) = self.solve(Some(near.logarithms()), HyperbolaForm::Real(lowest)).ok()?;
+            RealHyperbola::from_logarithms(solution.values(blocks[1]).ok()?, lowest)
+        });
+        let refused = Error::NoHyperbola {
+            reason: "the residuals ask for one that has no real value at the smallest amplitudes, or for none at all; \
+                     leave it out, or give more differences at small amplitudes",
+        };
+        let (solution, blocks) =
+            match self.solve(Some(real.map_or(start, |real| real.coefficients())), self.coefficients()) {
+                Err(Error::Adjust(_)) => return Err(refused),
+                other => other?,
+            };
+        let found = self.model_of(&solution, &blocks)?.hyperbola;
+        if found.is_some_and(|hyperbola| !is_real_over_span(&hyperbola)) {
+            return Err(refused);
+        }
+        Ok((solution, blocks))
+    }
+
     /// Adjusts the terms, and the hyperbola where there is one. The first block holds the terms.
-    fn solve(&self, hyperbola: Option<[f64; 3]>) -> Result<(Solution, Vec<BlockId>)> {
+    fn solve(&self, hyperbola: Option<[f64; 3]>, form: HyperbolaForm) -> Result<(Solution, Vec<BlockId>)> {
         let mut adjustment = Adjustment::new();
         let mut blocks = vec![adjustment.add_block(self.terms.block())];
         self.terms.hold(&mut adjustment, blocks[0])?;
@@ -150,8 +182,7 @@ impl<'a> Problem<'a> {
         let group = adjustment.add_group("range differences");
         for ((difference, difference_m), row) in self.differences.iter().zip(self.observed()).zip(self.rows()) {
             let (blocks, amplitude) = (blocks.clone(), difference.amplitude);
-            let amplitude_span = self.amplitude_span;
-            let observation = DifferenceObservation { blocks, difference_m, amplitude, row, amplitude_span };
+            let observation = DifferenceObservation { blocks, difference_m, amplitude, row, form };
             adjustment.add_observation(group, observation, &Covariance::from_sigma(difference.sigma_m))?;
         }
         match adjustment.solve(&SolveOptions::default()) {
@@ -169,6 +200,12 @@ impl<'a> Problem<'a> {
     }
 
     fn model(&self, solution: &Solution, blocks: &[BlockId]) -> Result<RangeErrorModel> {
+        let model = self.model_of(solution, blocks)?;
+        model.validate()?;
+        Ok(model)
+    }
+
+    fn model_of(&self, solution: &Solution, blocks: &[BlockId]) -> Result<RangeErrorModel> {
         let mut model = self.terms.model.clone();
         model.set_parameter_values(solution.values(blocks[0])?)?;
         model.hyperbola = match blocks.get(1).map(|block| solution.values(*block)).transpose()? {
@@ -176,14 +213,13 @@ impl<'a> Problem<'a> {
             _ => None,
         };
         model.range_span_m = Some(self.range_span_m);
-        model.validate()?;
         Ok(model)
     }
 }
 
 /// Design rows of all differences, one behind the other; refuses a difference that a polynomial or a surface does not
 /// reach.
-fn design_rows(differences: &[RangeDifference], model: &RangeErrorModel) -> Result<Vec<f64>> {
+pub(crate) fn design_rows(differences: &[RangeDifference], model: &RangeErrorModel) -> Result<Vec<f64>> {
     let mut rows = vec![0.0; differences.len() * model.parameter_count()];
     for ((index, d), row) in differences.iter().enumerate().zip(rows.chunks_exact_mut(model.parameter_count())) {
         let bad = |name, value, expected| Err(Error::BadDifference { index, name, value, expected });
@@ -199,6 +235,6 @@ fn design_rows(differences: &[RangeDifference], model: &RangeErrorModel) -> Resu
 }
 
 /// Smallest and largest of some values; NaN is passed over.
-fn span(values: impl Iterator<Item = f64>) -> [f64; 2] {
+pub(crate) fn span(values: impl Iterator<Item = f64>) -> [f64; 2] {
     values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| [low.min(value), high.max(value)])
 }

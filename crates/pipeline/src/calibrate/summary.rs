@@ -11,6 +11,7 @@ use serde::ser::{SerializeMap, Serializer};
 
 use super::names::group_unit;
 use super::request::CalibrateMethod;
+use super::trends::{TrendSummary, trends};
 
 /// Names and units of the parameters that a summary always has, in its order: those of camera and range terms.
 fn always_listed() -> impl Iterator<Item = (&'static str, &'static str)> {
@@ -59,6 +60,9 @@ pub struct CalibrationSummary {
     pub amplitude_classes: Vec<GroupSummary>,
     /// Decisions of the automatic choice of terms.
     pub decisions: Vec<DecisionSummary>,
+    /// Whether the residuals of planes still depend on something.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub trends: Vec<TrendSummary>,
     /// Wall-clock time of the whole run, second.
     pub seconds: f64,
     /// The output folder.
@@ -237,6 +241,10 @@ impl CalibrationSummary {
             groups: outcome.groups.iter().map(|group| group_summary(group, &group.name)).collect(),
             amplitude_classes: outcome.amplitude_classes().iter().map(|class| group_summary(class, "range")).collect(),
             decisions: decisions(outcome),
+            trends: match method {
+                CalibrateMethod::Planes => trends(outcome),
+                CalibrateMethod::Network(_) => Vec::new(),
+            },
             seconds: 0.0,
             out: PathBuf::new(),
         }
@@ -264,6 +272,7 @@ impl CalibrationSummary {
             groups: Vec::new(),
             amplitude_classes: Vec::new(),
             decisions: Vec::new(),
+            trends: Vec::new(),
             seconds: 0.0,
             out: PathBuf::new(),
         }

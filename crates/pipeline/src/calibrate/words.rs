@@ -3,6 +3,7 @@
 use std::fmt;
 
 use super::summary::CalibrationSummary;
+use super::trends::sentence;
 
 /// Rejected observations that are named; the table has them all.
 const NAMED_REJECTIONS: usize = 8;
@@ -24,7 +25,7 @@ impl fmt::Display for CalibrationSummary {
         self.write_groups(f)?;
         self.write_parameters(f)?;
         self.write_rejected(f)?;
-        for sentence in &self.diagnosis {
+        for sentence in self.diagnosis.iter().cloned().chain(sentence(&self.trends)) {
             writeln!(f, "note: {sentence}")?;
         }
         if self.converged {

@@ -5,6 +5,7 @@ mod chart;
 mod cloud_figure;
 mod colour;
 mod comparison;
+mod correction_maps;
 mod deviation_figure;
 mod fixed_pattern;
 mod network;

@@ -5,6 +5,7 @@ use range_image::Flags;
 use super::chart::{Axes, Series, curves, histogram};
 use super::cloud_figure::{Direction, StationCloud, cloud_figure};
 use super::colour::{CATEGORIES, ColourMap, NO_VALUE};
+use super::correction_maps::correction_maps;
 use super::page::Page;
 use super::picture::{Scale, raster_figure, rgb_figure};
 use crate::Result;
@@ -309,6 +310,7 @@ fn view_figures(view: &View, scales: &Scales) -> Result<Vec<(String, String)>> {
             &Scale { map: ColourMap::Diverging, low: -limit, high: limit, unit: "mm" },
         )?;
     }
+    figures.extend(correction_maps(view)?);
     if let Some(risk) = &view.multipath_risk_m {
         let risk: Vec<f64> = risk.as_slice().iter().map(|risk| 1e3 * f64::from(*risk)).collect();
         let high = quantile(&mut risk.clone(), 0.99);

@@ -1,6 +1,9 @@
+use std::sync::Arc;
+
 use error_models::{RangeErrorModel, correct_frame};
 
 use super::Findings;
+use crate::correction_record::CorrectionRecord;
 use crate::progress::Progress;
 use crate::view::{View, ViewData};
 use crate::work::Work;
@@ -14,6 +17,8 @@ pub(super) fn run(work: &mut Work, progress: &dyn Progress) -> Result<Findings> 
     let camera = work.calibrated_camera.unwrap_or(work.outcome.camera);
     let models = calibration.model_set().map_err(Error::stage("CorrectRange", "calibration"))?;
     let mut outside = 0_usize;
+    let (format, principal_point_mm) = (camera.format, camera.interior.principal_point_mm);
+    let pattern = calibration.fixed_pattern.clone().map(Arc::new);
     for (index, view) in work.outcome.views.iter_mut().enumerate() {
         let name = view.name();
         let models = match (view.integration_time_s, models.entries.as_slice()) {
@@ -24,16 +29,14 @@ pub(super) fn run(work: &mut Work, progress: &dyn Progress) -> Result<Findings> 
                 return Err(Error::stage("CorrectRange", &name)(message));
             }
         };
+        let mut record = CorrectionRecord::new(format, principal_point_mm, pattern.clone());
         for (frame, model) in frames_with_models(view, models)? {
-            let summary = correct_frame(
-                frame,
-                model,
-                &camera.format,
-                camera.interior.principal_point_mm,
-                calibration.fixed_pattern.as_ref(),
-            );
+            let (observed, sigma) = (frame.range.clone(), frame.sigma.clone());
+            let summary = correct_frame(frame, model, &format, principal_point_mm, pattern.as_deref());
             outside += summary.map_err(Error::stage("CorrectRange", &name))?.outside_span;
+            record.add(model, observed, sigma, frame);
         }
+        view.correction = Some(record);
         view.combine_channels()?;
         progress.advance(index + 1);
     }

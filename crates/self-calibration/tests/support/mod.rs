@@ -2,6 +2,7 @@
 #![allow(dead_code)]
 
 pub mod cases;
+pub mod dense;
 pub mod networks;
 pub mod unknown_walls;
 

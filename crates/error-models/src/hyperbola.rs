@@ -53,6 +53,17 @@ impl AmplitudeHyperbola {
         finite.then_some(jacobian)
     }
 
+    /// Smallest radicand of Eq. 15 over the amplitude span, square metre: not negative where Eq. 15 is real everywhere.
+    pub fn least_radicand(&self) -> f64 {
+        let [low, high] = self.amplitude_span;
+        let slope = self.h2 / self.h3;
+        let radicand = |amplitude: f64| (slope * amplitude).powi(2) + (1.0 - 2.0 * self.h1 * amplitude) / self.h3;
+        // A parabola: its ends, and its lowest point where that is inside.
+        let lowest = self.h1 / self.h3 / (slope * slope);
+        let inside = if lowest > low && lowest < high { radicand(lowest) } else { f64::INFINITY };
+        radicand(low).min(radicand(high)).min(inside)
+    }
+
     /// Whether the amplitude lies in the span of the fit.
     pub fn in_span(&self, amplitude: f64) -> bool {
         (self.amplitude_span[0]..=self.amplitude_span[1]).contains(&amplitude)

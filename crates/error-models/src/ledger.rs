@@ -12,6 +12,8 @@ use crate::{FixedPattern, RangeErrorModel, Result};
 pub enum RangeTerm {
     /// Rangefinder offset d0.
     Offset,
+    /// Drift of the warming camera.
+    WarmUp,
     /// d2 and d3, wavelength U.
     PeriodicU,
     /// d4 and d5, wavelength U/2.
@@ -39,6 +41,7 @@ impl RangeTerm {
     pub fn words(self) -> &'static str {
         match self {
             Self::Offset => "offset d0",
+            Self::WarmUp => "warm-up",
             Self::PeriodicU => "periodic, wavelength U (d2, d3)",
             Self::PeriodicHalfU => "periodic, wavelength U/2 (d4, d5)",
             Self::PeriodicQuarterU => "periodic, wavelength U/4 (d6, d7)",
@@ -56,6 +59,7 @@ impl RangeTerm {
     pub fn group(self) -> &'static str {
         match self {
             Self::Offset => "offset",
+            Self::WarmUp => "warm-up",
             Self::PeriodicU | Self::PeriodicHalfU | Self::PeriodicQuarterU | Self::Spline => "periodic",
             Self::DelayX | Self::DelayY | Self::Surface => "position",
             Self::Polynomial => "polynomial",
@@ -132,7 +136,6 @@ impl RangeErrorModel {
                 add(term, correction_m);
             }
         };
-        // A constant of another cause, such as warm-up, gets its own line here.
         add_used(RangeTerm::Offset, self.terms.d0, self.terms.d0 != 0.0);
         if self.further.spline.is_some() {
             add_used(RangeTerm::Spline, self.by_range(range_m)[0].0, true);
@@ -192,6 +195,20 @@ pub fn ledger_maps(
     pattern: Option<&FixedPattern>,
 ) -> Result<Vec<(RangeTerm, Raster<f32>)>> {
     model.validate()?;
+    maps(range, amplitude, format, principal_point_mm, pattern, |range_m, [x, y], amplitude, pattern_m| {
+        model.ledger(range_m, x, y, amplitude, pattern_m)
+    })
+}
+
+/// Maps of the entries that `ledger` has for range, image point from the principal point, amplitude and pattern.
+pub(crate) fn maps(
+    range: &Raster<f32>,
+    amplitude: &Raster<f32>,
+    format: &ImageFormat,
+    principal_point_mm: [f64; 2],
+    pattern: Option<&FixedPattern>,
+    ledger: impl Fn(f64, [f64; 2], f64, Option<f64>) -> Vec<LedgerEntry>,
+) -> Result<Vec<(RangeTerm, Raster<f32>)>> {
     format.validate()?;
     pattern.map_or(Ok(()), FixedPattern::validate)?;
     range.require_same_size(amplitude, "amplitude")?;
@@ -204,7 +221,7 @@ pub fn ledger_maps(
         let [x, y] = format.image_from_pixel([index % width, index / width].map(|place| place as f64));
         let (x, y) = (x - principal_point_mm[0], y - principal_point_mm[1]);
         let pattern_m = pattern.and_then(|pattern| pattern.offset_m.get(index)).map(|offset| f64::from(*offset));
-        for entry in model.ledger(range_m.into(), x, y, amplitude.into(), pattern_m) {
+        for entry in ledger(range_m.into(), [x, y], amplitude.into(), pattern_m) {
             let place = maps.iter().position(|(term, _)| *term == entry.term).unwrap_or_else(|| {
                 maps.push((entry.term, no_change()));
                 maps.len() - 1

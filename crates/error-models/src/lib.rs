@@ -7,6 +7,7 @@ mod error;
 mod further;
 mod gross_errors;
 mod hyperbola;
+mod interpolated;
 mod inverse;
 mod kernel;
 mod kernel_further;
@@ -26,12 +27,14 @@ mod steepest;
 mod summary;
 mod surface;
 mod terms;
+mod warm_up;
 
 pub use correct::{correct_frame, correct_raster};
 pub use distort::distort_frame;
 pub use error::{Error, Result};
 pub use gross_errors::{FlagCounts, GrossErrorOptions, MixedPixelOptions, flag_gross_errors};
 pub use hyperbola::HyperbolaJacobian;
+pub use interpolated::InterpolatedModel;
 pub use ledger::{LedgerEntry, OutsideModel, RangeTerm, ledger_maps};
 pub use model::{
     AmplitudeHyperbola, FixedPattern, FurtherShape, FurtherTerms, ImageSurface, ModelSet, PeriodicSpline,
@@ -43,3 +46,4 @@ pub use range_error::RangeCorrection;
 pub use range_image::NoiseModel;
 pub use range_noise::{AmplitudeScale, RangeNoise};
 pub use summary::{CorrectionSummary, GroupChange};
+pub use warm_up::{TemperatureDrift, Transient, WarmUp};

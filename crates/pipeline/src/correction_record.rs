@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use error_models::{FixedPattern, LedgerEntry, OutsideModel, RangeErrorModel, RangeTerm, ledger_maps};
+use error_models::{FixedPattern, InterpolatedModel, LedgerEntry, OutsideModel, RangeTerm};
 use range_image::{ImageFormat, RangeFrame, Raster};
 
 /// The ranges of a view as [`crate::Stage::CorrectRange`] found them, with the models that it applied.
@@ -17,7 +17,7 @@ pub struct CorrectionRecord {
 /// One frequency.
 #[derive(Debug, Clone)]
 struct CorrectedChannel {
-    model: RangeErrorModel,
+    model: InterpolatedModel,
     observed: Raster<f32>,
     amplitude: Raster<f32>,
     /// Standard deviations that weigh the frequencies, before and after.
@@ -43,7 +43,7 @@ impl CorrectionRecord {
     /// Adds a frequency: its frame before and after the correction.
     pub(crate) fn add(
         &mut self,
-        model: &RangeErrorModel,
+        model: &InterpolatedModel,
         observed: Raster<f32>,
         sigma: Raster<f32>,
         after: &RangeFrame,
@@ -70,7 +70,7 @@ impl CorrectionRecord {
             if observed.is_finite() {
                 ledger.weights_m += (after - before) * observed;
             }
-            for entry in channel.model.ledger(observed, x, y, amplitude, pattern) {
+            for entry in channel.model.ledger(observed, x, y, amplitude, pattern, 0.0) {
                 let weighted = LedgerEntry { change_m: after * entry.change_m, ..entry };
                 match ledger.entries.iter_mut().find(|known| known.term == entry.term) {
                     Some(known) => known.change_m += weighted.change_m,
@@ -106,13 +106,13 @@ impl CorrectionRecord {
     pub(crate) fn maps(&self) -> error_models::Result<Vec<(RangeTerm, Raster<f32>)>> {
         let Some(channel) = self.channels.first() else { return Ok(Vec::new()) };
         let (model, format) = (&channel.model, &self.format);
-        ledger_maps(
+        model.ledger_maps(
             &channel.observed,
             &channel.amplitude,
-            model,
             format,
             self.principal_point_mm,
             self.pattern.as_deref(),
+            0.0,
         )
     }
 

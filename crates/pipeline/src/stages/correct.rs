@@ -1,6 +1,6 @@
 use std::sync::Arc;
 
-use error_models::{RangeErrorModel, correct_frame};
+use error_models::InterpolatedModel;
 
 use super::Findings;
 use crate::correction_record::CorrectionRecord;
@@ -22,17 +22,17 @@ pub(super) fn run(work: &mut Work, progress: &dyn Progress) -> Result<Findings> 
     for (index, view) in work.outcome.views.iter_mut().enumerate() {
         let name = view.name();
         let models = match (view.integration_time_s, models.entries.as_slice()) {
-            (Some(time), _) => models.select(time).map_err(Error::stage("CorrectRange", &name))?,
-            (None, [(_, models)]) => models,
+            (Some(time), _) => models.at(time).map_err(Error::stage("CorrectRange", &name))?,
+            (None, [(_, models)]) => models.iter().cloned().map(InterpolatedModel::from).collect(),
             (None, _) => {
                 let message = "the survey states no integration time, which the calibration's models are chosen by";
                 return Err(Error::stage("CorrectRange", &name)(message));
             }
         };
         let mut record = CorrectionRecord::new(format, principal_point_mm, pattern.clone());
-        for (frame, model) in frames_with_models(view, models)? {
+        for (frame, model) in frames_with_models(view, &models)? {
             let (observed, sigma) = (frame.range.clone(), frame.sigma.clone());
-            let summary = correct_frame(frame, model, &format, principal_point_mm, pattern.as_deref());
+            let summary = model.correct_frame(frame, &format, principal_point_mm, pattern.as_deref());
             outside += summary.map_err(Error::stage("CorrectRange", &name))?.outside_span;
             record.add(model, observed, sigma, frame);
         }
@@ -46,8 +46,8 @@ pub(super) fn run(work: &mut Work, progress: &dyn Progress) -> Result<Findings> 
 /// Each frequency's ranges with that frequency's model; the one frame where frequencies are not apart.
 fn frames_with_models<'a>(
     view: &'a mut View,
-    models: &'a [RangeErrorModel],
-) -> Result<Vec<(&'a mut range_image::RangeFrame, &'a RangeErrorModel)>> {
+    models: &'a [InterpolatedModel],
+) -> Result<Vec<(&'a mut range_image::RangeFrame, &'a InterpolatedModel)>> {
     let name = view.name();
     if !view.channels.is_empty() {
         if view.channels.len() != models.len() {

@@ -119,8 +119,7 @@ impl InterpolatedModel {
         }
     }
 
-    /// The correction at one pixel term by term, as [`RangeErrorModel::ledger`] gives it. `drift_m` is what
-    /// [`Self::add_offset`] added: it gets a line of its own.
+    /// The correction at one pixel term by term, as [`RangeErrorModel::ledger`] gives it.
     pub fn ledger(
         &self,
         range_m: f64,
@@ -128,13 +127,8 @@ impl InterpolatedModel {
         y_mm: f64,
         amplitude: f64,
         pattern_m: Option<f64>,
-        drift_m: f64,
     ) -> Vec<LedgerEntry> {
-        let of = |model: &RangeErrorModel| {
-            let mut own = model.clone();
-            own.terms.d0 -= drift_m;
-            own.ledger(range_m, x_mm, y_mm, amplitude, pattern_m)
-        };
+        let of = |model: &RangeErrorModel| model.ledger(range_m, x_mm, y_mm, amplitude, pattern_m);
         let mut entries = of(&self.shorter);
         if let Some((longer, weight)) = &self.longer {
             for entry in &mut entries {
@@ -147,9 +141,6 @@ impl InterpolatedModel {
                     None => entries.push(LedgerEntry { change_m, ..other }),
                 }
             }
-        }
-        if drift_m != 0.0 && self.shorter.range_in_span(range_m) {
-            entries.push(LedgerEntry { term: RangeTerm::WarmUp, change_m: -drift_m });
         }
         entries.sort_by_key(|entry| entry.term);
         entries
@@ -174,11 +165,10 @@ impl InterpolatedModel {
         format: &ImageFormat,
         principal_point_mm: [f64; 2],
         pattern: Option<&FixedPattern>,
-        drift_m: f64,
     ) -> Result<Vec<(RangeTerm, Raster<f32>)>> {
         self.shorter.validate()?;
         ledger::maps(range, amplitude, format, principal_point_mm, pattern, |range_m, [x, y], amplitude, pattern_m| {
-            self.ledger(range_m, x, y, amplitude, pattern_m, drift_m)
+            self.ledger(range_m, x, y, amplitude, pattern_m)
         })
     }
 

@@ -64,6 +64,9 @@ proptest! {
         let [short, long] = [0, 1].map(|index| models[index].correction(range_m, x, y, amplitude).total_m());
         let expected = (1.0 - share) * short + share * long;
         prop_assert!((found.total_m() - expected).abs() < 1e-12, "{} instead of {expected}", found.total_m());
+        let parts = set.at(time_s(share)).unwrap()[0].ledger(range_m, x, y, amplitude, None);
+        let sum: f64 = parts.iter().map(|part| part.change_m).sum();
+        prop_assert!((sum + found.total_m()).abs() < 1e-12, "the parts add up to {sum}");
         // At the models' own times, and close to them.
         prop_assert_eq!(at(0.001), models[0].correction(range_m, x, y, amplitude));
         prop_assert_eq!(at(0.016), models[1].correction(range_m, x, y, amplitude));

@@ -70,7 +70,7 @@ impl CorrectionRecord {
             if observed.is_finite() {
                 ledger.weights_m += (after - before) * observed;
             }
-            for entry in channel.model.ledger(observed, x, y, amplitude, pattern, 0.0) {
+            for entry in channel.model.ledger(observed, x, y, amplitude, pattern) {
                 let weighted = LedgerEntry { change_m: after * entry.change_m, ..entry };
                 match ledger.entries.iter_mut().find(|known| known.term == entry.term) {
                     Some(known) => known.change_m += weighted.change_m,
@@ -112,7 +112,6 @@ impl CorrectionRecord {
             format,
             self.principal_point_mm,
             self.pattern.as_deref(),
-            0.0,
         )
     }
 

@@ -58,7 +58,7 @@ impl Classes {
         let (mut bins, mut moved) = (Vec::new(), 0);
         for class in self.sorted.chunks(self.length) {
             let median = usual_variance(class, estimator);
-            moved += average(&mut bins, class, estimator, |_| median);
+            moved += average(&mut bins, class, estimator, |_| median, |_| false);
         }
         (bins, moved)
     }
@@ -66,10 +66,26 @@ impl Classes {
     /// Mean variances of what noise around the line explains, and the number of values left out.
     pub(super) fn around_line(&self, estimator: VarianceEstimator, line: &Line) -> (Vec<VarianceBin>, usize) {
         let (mut bins, mut moved) = (Vec::new(), 0);
+        let pixels = self.moved_pixels(estimator, line);
         for class in self.sorted.chunks(self.length) {
-            moved += average(&mut bins, class, estimator, |one| line.at(one.regressor));
+            moved += average(&mut bins, class, estimator, |one| line.at(one.regressor), |one| pixels[one.pixel]);
         }
         (bins, moved)
+    }
+
+    /// By pixel, whether all of its values together scatter more than noise does: each alone may hide what moved where light
+    /// and with it the change is little.
+    fn moved_pixels(&self, estimator: VarianceEstimator, line: &Line) -> Vec<bool> {
+        let pixels = self.sorted.iter().map(|one| one.pixel + 1).max().unwrap_or(0);
+        let mut sums = vec![[0.0; 2]; pixels];
+        for one in &self.sorted {
+            let degrees = estimator.degrees(one.count);
+            let [scatter, all] = &mut sums[one.pixel];
+            *scatter += degrees * estimator.variance(one) / line.at(one.regressor);
+            *all += degrees;
+        }
+        let mut limits = MovedLimits::default();
+        sums.iter().map(|[scatter, all]| *all > 0.0 && has_moved(*scatter, *all, limits.of(*all))).collect()
     }
 }
 
@@ -81,6 +97,20 @@ pub(super) fn has_moved(variance: f64, expected: f64, limit: f64) -> bool {
 /// Largest variance over its expectation that noise shows.
 pub(super) fn moved_limit(degrees: f64) -> f64 {
     Distribution::ChiSquared { dof: degrees }.upper_quantile(MOVED_PROBABILITY) / degrees
+}
+
+/// [`moved_limit`] of the few degrees of freedom that stations and pixels have between them.
+#[derive(Default)]
+struct MovedLimits(Vec<(f64, f64)>);
+
+impl MovedLimits {
+    fn of(&mut self, degrees: f64) -> f64 {
+        if let Some((_, limit)) = self.0.iter().find(|(of, _)| of.to_bits() == degrees.to_bits()) {
+            return *limit;
+        }
+        self.0.push((degrees, moved_limit(degrees)));
+        moved_limit(degrees)
+    }
 }
 
 /// The variance of a class from the median of its variances.
@@ -110,19 +140,14 @@ fn average(
     class: &[Repeats],
     estimator: VarianceEstimator,
     expected: impl Fn(&Repeats) -> f64,
+    of_moved_pixel: impl Fn(&Repeats) -> bool,
 ) -> usize {
     let mut bin = VarianceBin { regressor: 0.0, variance: 0.0, degrees: 0.0, values: 0 };
-    // Stations have few numbers of frames between them.
-    let mut limits: Vec<(usize, f64)> = Vec::new();
+    let mut limits = MovedLimits::default();
     for one in class {
         let degrees = estimator.degrees(one.count);
-        let known = limits.iter().find(|(count, _)| *count == one.count).map(|(_, limit)| *limit);
-        let limit = known.unwrap_or_else(|| {
-            limits.push((one.count, moved_limit(degrees)));
-            moved_limit(degrees)
-        });
         let variance = estimator.variance(one);
-        if has_moved(variance, expected(one), limit) {
+        if of_moved_pixel(one) || has_moved(variance, expected(one), limits.of(degrees)) {
             continue;
         }
         bin.regressor += degrees * one.regressor;

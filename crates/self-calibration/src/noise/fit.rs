@@ -104,7 +104,8 @@ pub(super) fn fit_variance(
     for (station, own) in stations {
         station.require_slow(options)?;
         steadiness.push(station);
-        repeats.extend(own);
+        let earlier = repeats.iter().map(|one: &Repeats| one.pixel + 1).max().unwrap_or(0);
+        repeats.extend(own.into_iter().map(|one| Repeats { pixel: earlier + one.pixel, ..one }));
     }
     let drifts = steadiness.iter().any(|station| station.drifts);
     let estimator = if drifts { VarianceEstimator::SuccessiveDifferences } else { VarianceEstimator::AboutMean };

@@ -122,6 +122,7 @@ fn repeats_of(station: &RepeatedRanges<'_>, scale: AmplitudeScale) -> Vec<Repeat
         let mean = mean_of(&amplitudes);
         let regressor = scale.received(mean, mean_of(&ranges)).powi(-2);
         let mut repeats = Repeats::of(&ranges, regressor)?;
+        repeats.pixel = index;
         // d(a⁻²) = −2 a⁻³ da
         repeats.regressor_variance = (2.0 * regressor / mean).powi(2) * amplitude.variance / amplitude.count as f64;
         Some(repeats)

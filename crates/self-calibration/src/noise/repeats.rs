@@ -3,6 +3,8 @@
 /// Repeated values of one quantity.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Repeats {
+    /// Number of the pixel among those of all stations: what moves, moves in all its values.
+    pub(super) pixel: usize,
     /// What the variance depends on linearly.
     pub(super) regressor: f64,
     /// Variance of the regressor by its own noise.
@@ -16,7 +18,7 @@ pub(super) struct Repeats {
 }
 
 impl Repeats {
-    /// `None` below two values. The regressor's own noise is said later, where there is any.
+    /// `None` below two values. Pixel and the regressor's own noise are said later.
     pub(super) fn of(values: &[f64], regressor: f64) -> Option<Self> {
         let count = values.len();
         if count < 2 {
@@ -26,7 +28,7 @@ impl Repeats {
         let degrees = count as f64 - 1.0;
         let variance = values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / degrees;
         let steps = values.windows(2).map(|pair| (pair[1] - pair[0]).powi(2)).sum::<f64>();
-        Some(Self { regressor, regressor_variance: 0.0, variance, successive: 0.5 * steps / degrees, count })
+        Some(Self { pixel: 0, regressor, regressor_variance: 0.0, variance, successive: 0.5 * steps / degrees, count })
     }
 }
 

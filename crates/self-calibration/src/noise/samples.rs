@@ -90,10 +90,12 @@ impl SampleNoiseEstimate {
 /// Repeats of all samples that are usable in every frame.
 fn repeats_of(station: &RepeatedSamples<'_>, units: &SampleUnits) -> Vec<Repeats> {
     let count = station.frames.first().map_or(0, |frame| frame.samples().len());
+    let pixels = station.frames.first().map_or(1, |frame| (frame.width() * frame.height()).max(1));
     let collect = |index| {
         let values = values_at(station, units, index)?;
         let mean = mean_of(&values);
         let mut repeats = Repeats::of(&values, mean)?;
+        repeats.pixel = index % pixels;
         repeats.regressor_variance = repeats.variance / repeats.count as f64;
         Some(repeats)
     };

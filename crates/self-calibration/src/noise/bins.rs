@@ -101,10 +101,10 @@ pub(super) fn moved_limit(degrees: f64) -> f64 {
 
 /// [`moved_limit`] of the few degrees of freedom that stations and pixels have between them.
 #[derive(Default)]
-struct MovedLimits(Vec<(f64, f64)>);
+pub(super) struct MovedLimits(Vec<(f64, f64)>);
 
 impl MovedLimits {
-    fn of(&mut self, degrees: f64) -> f64 {
+    pub(super) fn of(&mut self, degrees: f64) -> f64 {
         if let Some((_, limit)) = self.0.iter().find(|(of, _)| of.to_bits() == degrees.to_bits()) {
             return *limit;
         }

@@ -4,7 +4,7 @@ use adjust::Distribution;
 use range_image::ComplexFrame;
 use rayon::prelude::*;
 
-use super::bins::{has_moved, moved_limit};
+use super::bins::{MovedLimits, has_moved};
 use super::ranges::{NORMAL_SHARE, values_at};
 use super::repeats::{Repeats, mean_of};
 use super::{RepeatedRanges, VarianceEstimator};
@@ -148,20 +148,13 @@ impl SigmaCheck {
         if values < needed {
             return Err(Error::TooFewRepeats { values, needed });
         }
-        let mut degrees: Vec<f64> = entries.iter().map(|entry| entry.degrees).collect();
-        degrees.sort_by(f64::total_cmp);
-        degrees.dedup();
-        let limits: Vec<f64> = degrees.iter().map(|degrees| moved_limit(*degrees)).collect();
-        let limit_of = |entry: &Entry| {
-            let place = degrees.partition_point(|known| *known < entry.degrees).min(limits.len() - 1);
-            limits[place]
-        };
+        let mut limits = MovedLimits::default();
         // Sigma may be off as a whole: what moved is told beside the usual ratio.
         let mut ratios: Vec<f64> = entries.iter().map(|entry| entry.ratio).collect();
         let middle = ratios.len() / 2;
         let (_, &mut usual, _) = ratios.select_nth_unstable_by(middle, f64::total_cmp);
         let usual = usual.max(1.0);
-        entries.retain(|entry| !has_moved(entry.ratio, usual, limit_of(entry)));
+        entries.retain(|entry| !has_moved(entry.ratio, usual, limits.of(entry.degrees)));
         let moved_share = 1.0 - entries.len() as f64 / values as f64;
         entries.sort_by(|a, b| a.amplitude.total_cmp(&b.amplitude));
         let length = entries.len().div_ceil(BINS).max(1);

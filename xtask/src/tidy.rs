@@ -15,6 +15,7 @@ pub(crate) fn run() -> Outcome {
     let mut complaints = Vec::new();
     for folder in &crates {
         complaints.extend(missing_parts(folder));
+        complaints.extend(tests_left_out(folder)?);
     }
     let sources = files_below(&root, &["rs", "md"])?;
     let keys = bibliography_keys(&read(&root.join("docs/bibliography.md"))?);
@@ -44,6 +45,20 @@ fn missing_parts(folder: &Path) -> Vec<String> {
     }
     parts.retain(|part| !folder.join(part).exists());
     parts.into_iter().map(|part| format!("crates/{name}: {part} is missing")).collect()
+}
+
+/// Files of tests that the one test program of a crate does not have as modules: they would never run.
+fn tests_left_out(folder: &Path) -> Result<Vec<String>, String> {
+    let program = folder.join("tests/main.rs");
+    if !program.exists() {
+        return Ok(Vec::new());
+    }
+    let text = read(&program)?;
+    let modules: BTreeSet<&str> =
+        text.lines().filter_map(|line| line.strip_prefix("mod ")?.strip_suffix(';')).chain(["main"]).collect();
+    let files = entries(&folder.join("tests"))?.into_iter().filter(|path| path.extension().is_some_and(|e| e == "rs"));
+    let left_out = files.filter(|path| !modules.contains(&*path.file_stem().unwrap_or_default().to_string_lossy()));
+    Ok(left_out.map(|path| format!("{} is no module of tests/main.rs", path.display())).collect())
 }
 
 /// Keys in bold brackets at the beginning of a list entry.

@@ -1,5 +1,4 @@
 //! What cannot be adjusted is refused with the reason.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::float_cmp)]
 
 use adjust::{
     Adjustment, Covariance, DatumDefect, Error, EvaluationFailure, FunctionObservation, LinearObservation, Method,

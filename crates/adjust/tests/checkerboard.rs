@@ -1,14 +1,10 @@
 //! The model of the checkerboard example against differences, and its adjustment against a simulated truth.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-#[path = "../examples/checkerboard/plumb_bob.rs"]
-mod plumb_bob;
-#[path = "../examples/checkerboard/start.rs"]
-mod start;
-
+use crate::plumb_bob;
+use crate::plumb_bob::ImagePoint;
+use crate::start;
 use adjust::{Adjustment, Covariance, ParameterBlock, Scale, SolveOptions, check_jacobian};
 use nalgebra::{Isometry3, Point3, Vector3};
-use plumb_bob::ImagePoint;
 
 const TRUTH: [f64; 9] = [536.0, 534.0, 342.0, 235.0, -0.265, -0.047, 0.0018, -0.0003, 0.25];
 

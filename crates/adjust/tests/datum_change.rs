@@ -1,14 +1,11 @@
 //! Covariances in another datum, without solving again.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-mod common;
-
+use crate::common::{Network, Plan, network};
 use adjust::{
     BlockId, Covariance, DatumDefect, Error, FunctionObservation, LinearObservation, Moving, ParameterBlock, Scale,
     Solution, SolveOptions,
 };
 use approx::assert_relative_eq;
-use common::{Network, Plan, network};
 use nalgebra::Vector3;
 
 const PLAN: Plan = Plan { seed: 7, stations: 4, points: 9, seen: 9, ranges: true, disturbance: 0.02 };

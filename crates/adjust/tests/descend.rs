@@ -1,15 +1,8 @@
 //! Descents that are broken off, and bundle adjustment in the large.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout)]
 
-#[path = "common/bal.rs"]
-#[allow(dead_code)]
-mod bal;
-#[path = "common/range_camera.rs"]
-#[allow(dead_code)]
-mod range_camera;
-
+use crate::bal;
+use crate::range_camera::{LABORATORY, range_camera_network};
 use adjust::{Adjustment, Covariance, Error, LinearObservation, Method, ParameterBlock, SolveOptions, check_jacobian};
-use range_camera::{LABORATORY, range_camera_network};
 
 #[test]
 fn a_descent_needs_no_datum_and_ends_near_the_solution() {

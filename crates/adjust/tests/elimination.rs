@@ -1,19 +1,16 @@
 //! Large networks, whose points are eliminated, against a dense bordered reference.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::float_cmp)]
 
-mod common;
-#[path = "common/range_camera.rs"]
-#[allow(dead_code)]
-mod range_camera;
-
+use crate::common::Distance;
+use crate::range_camera;
+use crate::range_camera::{
+    LABORATORY, PARAMETERS, RangeCameraNetwork, RangeCameraPlan, SIGMAS, TRUTH, range_camera_network,
+};
 use adjust::{
     Adjustment, Covariance, DatumDefect, Error, FunctionObservation, LinearObservation, Method, ParameterBlock, Scale,
     Solution, SolveOptions, check_jacobian,
 };
 use approx::assert_relative_eq;
-use common::Distance;
 use nalgebra::{DMatrix, DVector, Vector3};
-use range_camera::{LABORATORY, PARAMETERS, RangeCameraNetwork, RangeCameraPlan, SIGMAS, TRUTH, range_camera_network};
 
 /// Too many rows for the orthogonal factorisation, several pieces in all sums: 1,157 unknowns, 18,000 values.
 const WORKSHOP: RangeCameraPlan = RangeCameraPlan {

@@ -1,5 +1,4 @@
 //! Ends of the iteration: convergence, its trace, and honest failure.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::float_cmp)]
 
 use adjust::{
     Adjustment, BlockId, Covariance, Error, EvaluationFailure, FunctionObservation, LinearObservation, Method,

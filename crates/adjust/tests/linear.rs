@@ -1,5 +1,4 @@
 //! Linear problems with answers in closed form.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::float_cmp)]
 
 use adjust::{Adjustment, Covariance, Error, LinearObservation, Method, ParameterBlock, Scale, Solution, SolveOptions};
 use approx::assert_relative_eq;

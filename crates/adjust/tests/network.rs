@@ -1,14 +1,11 @@
 //! Free networks of stations and points: datum, rank, covariance.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::float_cmp)]
 
-mod common;
-
+use crate::common::{Distance, Network, Plan, Sight, network};
 use adjust::{
     Adjustment, Covariance, DatumDefect, Error, Manifold, ParameterBlock, RigidPose, Scale, Solution, SolveOptions,
     check_jacobian,
 };
 use approx::assert_relative_eq;
-use common::{Distance, Network, Plan, Sight, network};
 use nalgebra::{DMatrix, DVector, Isometry3, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;

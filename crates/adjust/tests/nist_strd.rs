@@ -1,5 +1,4 @@
 //! NIST's certified nonlinear regressions, from both starts.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::float_cmp, clippy::print_stdout)]
 
 use std::fs;
 use std::path::Path;

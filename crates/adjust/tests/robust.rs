@@ -1,14 +1,11 @@
 //! Gross errors and kernels.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-mod common;
-
+use crate::common::{Plan, SIGMA, Sight, network, sight};
 use adjust::{
     Adjustment, BlockId, Covariance, DatumDefect, GroupId, Kernel, LinearObservation, ParameterBlock, Scale,
     SolveOptions,
 };
 use approx::assert_relative_eq;
-use common::{Plan, SIGMA, Sight, network, sight};
 use nalgebra::Point3;
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;

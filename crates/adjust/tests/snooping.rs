@@ -1,14 +1,11 @@
 //! Gross errors: test, rejection, taking back, reliability.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::float_cmp)]
 
-mod common;
-
+use crate::common::{Plan, network, network_with_gross_errors};
 use adjust::{
     Adjustment, BlockId, Covariance, DatumDefect, Distribution, Error, FunctionObservation, GroupId, LinearObservation,
     ObservationId, ParameterBlock, ReliabilityOptions, Scale, SnoopingEnd, SnoopingOptions, SnoopingTest, SolveOptions,
 };
 use approx::assert_relative_eq;
-use common::{Plan, network, network_with_gross_errors};
 use nalgebra::{Matrix2, Matrix2x3, Vector2};
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;

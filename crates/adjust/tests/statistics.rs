@@ -1,5 +1,4 @@
 //! Variance components, significance, information criteria.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::float_cmp)]
 
 use adjust::{
     Adjustment, BlockId, ComponentPrecision, ComponentStatus, Covariance, Distribution, Error, GroupId,

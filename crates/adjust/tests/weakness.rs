@@ -1,14 +1,11 @@
 //! Near-defects are named.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::float_cmp)]
 
-mod common;
-
+use crate::common::{Plan, network};
 use adjust::{
     Adjustment, BlockId, Covariance, DatumDefect, Error, LinearObservation, ParameterBlock, SolveOptions,
     WeaknessOptions,
 };
 use approx::assert_relative_eq;
-use common::{Plan, network};
 
 /// An offset and a shift that nearly all observations contain together (their difference only with `share`), a scale and
 /// a slope of the same kind, and a parameter that is known well.

@@ -1,10 +1,7 @@
 //! The covariance of a point against a sampled one.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-mod common;
-
+use crate::common::plain_camera;
 use camera_model::{Camera, LensDistortion, point_covariance, with_affinity_held};
-use common::plain_camera;
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};

@@ -1,11 +1,8 @@
 //! Cameras in RON files.
 #![cfg(feature = "serde")]
-#![allow(clippy::unwrap_used)]
 
-mod common;
-
+use crate::common::plain_camera;
 use camera_model::{Camera, LensDistortion};
-use common::plain_camera;
 
 #[test]
 fn a_camera_is_read_as_it_was_written() {

@@ -1,10 +1,7 @@
 //! Ray table, back-projection of frames, depth and range.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-mod common;
-
+use crate::common::{cameras, plain_camera};
 use camera_model::{Camera, Error, ImageFormat, LensDistortion, OrganisedCloud, RayTable};
-use common::{cameras, plain_camera};
 use nalgebra::{Isometry3, Point3, Vector3};
 use proptest::prelude::*;
 use range_image::{Flags, RangeFrame, Raster};

@@ -1,10 +1,7 @@
 //! Every derivative against central differences.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-mod common;
-
+use crate::common::{object_point, pixels, poses};
 use camera_model::{Camera, LensDistortion, Observation, step_pose};
-use common::{object_point, pixels, poses};
 use nalgebra::{Isometry3, Matrix2, Point3, Vector2, Vector3};
 use proptest::prelude::*;
 

@@ -1,5 +1,4 @@
 //! A ray table against the one in a Kinect v2's factory calibration; skips where the real captures are not at hand.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout)]
 
 use camera_model::{Camera, ImageFormat, InteriorOrientation, LensDistortion, RayTable};
 

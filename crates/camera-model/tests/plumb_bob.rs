@@ -1,11 +1,8 @@
 //! `plumb_bob` both ways.
 #![cfg(feature = "convert")]
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout)]
 
-mod common;
-
+use crate::common::plain_camera;
 use camera_model::{Camera, Error, LensDistortion, PlumbBob};
-use common::plain_camera;
 use nalgebra::Point3;
 use proptest::prelude::*;
 

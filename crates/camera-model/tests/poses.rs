@@ -1,5 +1,4 @@
 //! Euler angles at the rim and computer-vision axes.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use std::f64::consts::{FRAC_PI_2, PI};
 

@@ -1,10 +1,7 @@
 //! Pixel, ray, point and observation: there and back.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-mod common;
-
+use crate::common::{cameras, object_point, pixels, plain_camera, poses};
 use camera_model::{Camera, Error, LensDistortion};
-use common::{cameras, object_point, pixels, plain_camera, poses};
 use nalgebra::{Isometry3, Point3};
 use proptest::prelude::*;
 

@@ -1,5 +1,4 @@
 //! Whole frames: corrected, distorted, flagged, counted.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use approx::assert_relative_eq;
 use error_models::{

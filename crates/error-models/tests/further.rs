@@ -1,7 +1,5 @@
 //! Spline, polynomial and surface: values, derivatives, design rows, inverse, frames, files' lists.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 // What is left alone, held at zero or on a knot is so to the last bit.
-#![allow(clippy::float_cmp)]
 
 use std::f64::consts::TAU;
 

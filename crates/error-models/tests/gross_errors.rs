@@ -1,5 +1,4 @@
 //! Mixed pixels and low amplitudes on scenes whose truth is known.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use error_models::{GrossErrorOptions, MixedPixelOptions, flag_gross_errors};
 use rand::SeedableRng;

@@ -1,7 +1,5 @@
 //! Models between two integration times: real, equal to the models at their times, continuous.
 
-#![allow(clippy::unwrap_used)]
-
 use error_models::{
     AmplitudeHyperbola, Error, FurtherShape, ModelSet, PolynomialShape, RangeErrorModel, RangeTerms, correct_frame,
 };

@@ -1,5 +1,4 @@
 //! The ledger: parts of the correction, term by term, at a pixel and over a frame.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use error_models::{
     AmplitudeHyperbola, FixedPattern, FurtherShape, OutsideModel, PolynomialShape, RangeErrorModel, RangeTerm,

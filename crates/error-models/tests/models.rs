@@ -1,5 +1,4 @@
 //! Eqs. 14 and 15 pixel by pixel: values, derivatives, inverse, domain.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use std::f64::consts::PI;
 

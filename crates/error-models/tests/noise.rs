@@ -1,5 +1,4 @@
 //! The predicted standard deviation of a range against that of sampled frames.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use std::f64::consts::TAU;
 

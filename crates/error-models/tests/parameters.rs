@@ -1,5 +1,4 @@
 //! Models as lists of named parameters, and the way through RON.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use error_models::{AmplitudeHyperbola, Error, FurtherTerms, NamedParameter, PARAMETERS, RangeErrorModel, RangeTerms};
 

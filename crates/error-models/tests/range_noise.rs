@@ -1,5 +1,4 @@
 //! Standard deviations from amplitudes, and those of a fixed pattern.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use approx::assert_relative_eq;
 use error_models::{AmplitudeScale, FixedPattern, RangeErrorModel, RangeNoise, correct_frame};

@@ -1,7 +1,5 @@
 //! Drift by time since power-on and by temperature.
 
-#![allow(clippy::unwrap_used)]
-
 use error_models::{Error, TemperatureDrift, Transient, WarmUp};
 use nalgebra::DMatrix;
 use proptest::prelude::*;

@@ -1,7 +1,4 @@
 //! Closed-form absolute orientation.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, missing_docs)]
-
-mod common;
 
 use icp_registration::{Error, absolute_orientation, absolute_orientation_with_scale, pose_difference};
 use nalgebra::{Isometry3, Matrix6, Point3, Translation3, UnitQuaternion, Vector3};

@@ -1,9 +1,6 @@
 //! Input that has no answer gets a typed one.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, missing_docs)]
 
-mod common;
-
-use common::{Pinhole, Scene, cloud, look_at};
+use crate::common::{Pinhole, Scene, cloud, look_at};
 use icp_registration::{Cloud, Error, IcpOptions, IcpTarget, Metric, RobustKernel, Selection, align};
 use nalgebra::{Isometry3, Point3, Vector3};
 

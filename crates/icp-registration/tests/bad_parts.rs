@@ -1,5 +1,4 @@
 //! Every metric with every matching on input that has no answer: a typed one, and never a NaN.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, missing_docs)]
 
 use icp_registration::parts::{
     AndersonAcceleration, ClosedForm, Coloured, CompatibleNearest, ErrorMetric, GaussNewton, Graduated,

@@ -1,5 +1,4 @@
 //! The four closed forms that `[Eggert1997]` compares: noise, degenerate sets, and what rounding does.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout, missing_docs)]
 
 use icp_registration::{Error, RotationMethod, absolute_orientation_by, pose_difference};
 use nalgebra::{Isometry3, Point3, Vector3};

@@ -1,11 +1,7 @@
 //! Alignment without a guess on simulated frames with truth.
-#![allow(clippy::unwrap_used, clippy::panic, missing_docs)]
 
-mod coarse_scenes;
-mod common;
-
-use coarse_scenes::{Outcome, align_points, outcome, pair, prepared, random_room};
-use common::{Pinhole, Scene};
+use crate::coarse_scenes::{Outcome, align_points, outcome, pair, prepared, random_room};
+use crate::common::{Pinhole, Scene};
 use icp_registration::{CoarseOptions, Error, Estimator, align_without_guess};
 
 /// Of `count` pairs with half of the view in common: right and wrong answers.

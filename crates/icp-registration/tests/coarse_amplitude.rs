@@ -1,9 +1,6 @@
 //! Features of amplitude images, and ICP on sparse clouds of them.
-#![allow(clippy::unwrap_used, missing_docs)]
 
-mod common;
-
-use common::{Pinhole, look_at, pose_error};
+use crate::common::{Pinhole, look_at, pose_error};
 use icp_registration::{
     AmplitudeFeatureOptions, Cloud, CoarseOptions, Error, FeatureCloud, Features, SparseIcpOptions, SurfaceDescriptors,
     align_features, align_without_guess, amplitude_features,

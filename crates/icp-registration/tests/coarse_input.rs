@@ -1,11 +1,7 @@
 //! Input of an alignment without a guess that has no answer gets a typed one.
-#![allow(clippy::unwrap_used, clippy::panic, missing_docs)]
 
-mod coarse_scenes;
-mod common;
-
-use coarse_scenes::{Outcome, align_points, outcome, pair};
-use common::{Pinhole, Scene};
+use crate::coarse_scenes::{Outcome, align_points, outcome, pair};
+use crate::common::{Pinhole, Scene};
 use icp_registration::{Cloud, CoarseOptions, Error, Estimator, FeatureCloud, Viewpoint, align_without_guess};
 use nalgebra::{Isometry3, Point3};
 

@@ -1,13 +1,9 @@
 //! Real scans aligned without a guess; skipped with a word where they are missing.
-#![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout, missing_docs)]
-
-mod common;
-mod depth_frames;
 
 use std::path::PathBuf;
 
-use common::pose_error;
-use depth_frames::{Sequence, kitchen, living_room};
+use crate::common::pose_error;
+use crate::depth_frames::{Sequence, kitchen, living_room};
 
 use icp_registration::{Cloud, CoarseOptions, FeatureCloud, Viewpoint, align_without_guess};
 use nalgebra::{Isometry3, Matrix3, Point3, Quaternion, Rotation3, Translation3, UnitQuaternion};

@@ -1,9 +1,6 @@
 //! Geometry that does not determine the pose, and how the result says so.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, missing_docs)]
 
-mod common;
-
-use common::{Cuboid, Pinhole, Scene, cloud, look_at};
+use crate::common::{Cuboid, Pinhole, Scene, cloud, look_at};
 use icp_registration::{Cloud, DegeneracyPolicy, IcpOptions, IcpResult, MotionKind, UndeterminedMotion, align};
 use nalgebra::{Isometry3, Point3, Vector3};
 use rand::SeedableRng;

@@ -1,10 +1,8 @@
 //! Measured points brought onto a known model.
 #![cfg(feature = "mesh")]
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout, missing_docs)]
 
-mod common;
-
-use common::{Pinhole, Scene as Room, cloud, disturbance, look_at, pose_error};
+use crate::common;
+use crate::common::{Pinhole, Scene as Room, cloud, disturbance, look_at, pose_error};
 use icp_registration::parts::{ClosestOnMesh, PointToPoint, TriangleMesh};
 use icp_registration::{Cloud, Error, MotionKind, Registration, pose_difference};
 use nalgebra::{Isometry3, Point3, Vector3};

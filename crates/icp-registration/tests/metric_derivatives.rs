@@ -1,9 +1,6 @@
 //! Derivatives of every metric against differences, seen by a minimiser.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, missing_docs)]
 
-mod common;
-
-use common::{Pinhole, Scene as Room, cloud, disturbance, look_at};
+use crate::common::{Pinhole, Scene as Room, cloud, disturbance, look_at};
 use icp_registration::parts::{
     Coloured, ErrorMetric, GaussNewton, Minimiser, NearestPoint, PlaneToPlane, PointToPlane, PointToPoint,
     SymmetricPlanes,

@@ -1,11 +1,8 @@
 //! Stations around a room, brought into one system.
 #![cfg(feature = "multiview")]
-#![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout)]
 
-mod common;
-
-use common::stations::round;
-use common::{disturbance, pose_error};
+use crate::common::stations::round;
+use crate::common::{disturbance, pose_error};
 use icp_registration::{
     Cloud, Datum, Error, MotionKind, Start, StationRegistration, StationRegistrationOptions, pose_difference,
     register_stations,

@@ -1,6 +1,5 @@
 //! Input without an answer.
 #![cfg(feature = "multiview")]
-#![allow(clippy::unwrap_used)]
 
 use icp_registration::{Cloud, Datum, Error, Start, StationRegistrationOptions, register_stations};
 use nalgebra::{Isometry3, Point3};

@@ -1,11 +1,8 @@
 //! Shared parameters of the points, estimated with the poses.
 #![cfg(feature = "multiview")]
-#![allow(clippy::unwrap_used)]
 
-mod common;
-
-use common::pose_error;
-use common::stations::round;
+use crate::common::pose_error;
+use crate::common::stations::round;
 use icp_registration::{Cloud, Datum, PointModel, Start, StationRegistrationOptions, register_stations};
 use nalgebra::Point3;
 

@@ -1,12 +1,8 @@
 //! Frames of real structured-light cameras as stations; skipped with a word where they are missing.
 #![cfg(feature = "multiview")]
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout, missing_docs)]
 
-mod common;
-mod depth_frames;
-
-use common::pose_error;
-use depth_frames::{Sequence, living_room};
+use crate::common::pose_error;
+use crate::depth_frames::{Sequence, living_room};
 use icp_registration::{Cloud, Datum, OrganisedFrame, Start, StationRegistrationOptions, register_stations};
 use nalgebra::Isometry3;
 

@@ -1,5 +1,4 @@
 //! Nearest neighbours against a search through all points.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, missing_docs)]
 
 use icp_registration::{Error, NeighbourTree};
 use nalgebra::Point3;

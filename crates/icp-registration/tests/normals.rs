@@ -1,9 +1,6 @@
 //! Normals of frames and clouds.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, missing_docs)]
 
-mod common;
-
-use common::{Cuboid, Pinhole, Scene, frame, look_at};
+use crate::common::{Cuboid, Pinhole, Scene, frame, look_at};
 use icp_registration::{
     Error, OrganisedNormalOptions, UnorganisedNormalOptions, organised_normals, unorganised_normals,
 };

@@ -1,13 +1,10 @@
 //! Registration of organised frames on simulated frames with exact truth.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout, missing_docs)]
-
-mod common;
 
 use std::sync::Arc;
 
-use common::frames::{pinhole, prepared};
-use common::scenes::half_overlapping_views;
-use common::{Cuboid, Pinhole, Scene, disturbance, frame, frame_pair, look_at, pose_error, sigma_of};
+use crate::common::frames::{pinhole, prepared};
+use crate::common::scenes::half_overlapping_views;
+use crate::common::{Cuboid, Pinhole, Scene, disturbance, frame, frame_pair, look_at, pose_error, sigma_of};
 use icp_registration::{
     DegeneracyPolicy, FrameAligner, FrameAlignmentOptions, IcpResult, MotionKind, OrganisedFrame, Projection,
     align_frames, frame_consistency, pose_difference,

@@ -1,10 +1,7 @@
 //! Frames that cannot be registered: each gets a typed error.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, missing_docs)]
 
-mod common;
-
-use common::frames::{pinhole, prepared};
-use common::{Pinhole, frame_pair};
+use crate::common::frames::{pinhole, prepared};
+use crate::common::{Pinhole, frame_pair};
 use icp_registration::{Error, FrameAligner, FrameAlignmentOptions, OrganisedFrame, Projection, align_frames};
 use nalgebra::{Isometry3, Matrix6, Vector3};
 

@@ -1,15 +1,10 @@
 //! Organised frames of real structured-light cameras; skipped with a word where they are missing.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout, missing_docs)]
 
-mod common;
-mod depth_frames;
-mod sr4000;
-
-use common::{disturbance, pose_error};
-use depth_frames::{Sequence, kitchen, living_room};
+use crate::common::{disturbance, pose_error};
+use crate::depth_frames::{Sequence, kitchen, living_room};
+use crate::sr4000::stations;
 use icp_registration::{FrameAlignmentOptions, OrganisedFrame, align_frames};
 use nalgebra::{Isometry3, Vector3};
-use sr4000::stations;
 
 /// Distance between the stations of the SR4000, by a plane fitted to a box.
 const STEP_M: f64 = 0.314;

@@ -1,9 +1,7 @@
 //! Each part of the family in its place.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout, missing_docs)]
 
-mod common;
-
-use common::{Pinhole, Scene as Room, cloud, disturbance, frame_pair, look_at, pose_error};
+use crate::common;
+use crate::common::{Pinhole, Scene as Room, cloud, disturbance, frame_pair, look_at, pose_error};
 use icp_registration::parts::{
     AllPoints, AndersonAcceleration, ClosedForm, Coloured, CompatibleNearest, ConstantWeight, DistanceWeight,
     ErrorMetric, EveryNth, GaussNewton, Graduated, IntensityWeight, LevenbergMarquardt, MaxDistance, MaxNormalAngle,

@@ -1,11 +1,8 @@
 //! A part of every kind, made outside the crate, in one registration.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout, missing_docs)]
-
-mod common;
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use common::{Pinhole, Scene as Room, cloud, disturbance, look_at, pose_error};
+use crate::common::{Pinhole, Scene as Room, cloud, disturbance, look_at, pose_error};
 use icp_registration::parts::{
     ErrorMetric, KernelSchedule, Minimiser, Moment, Pair, PairRejection, PairWeighting, Partner, PointMatching,
     PointSelection, Progress, Query, Row, Rows, Scene, StoppingRule, TargetSurface,

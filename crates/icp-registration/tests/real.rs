@@ -1,14 +1,10 @@
 //! Real scans, read where they lie; skipped with a word where they are missing.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout, missing_docs)]
-
-#[path = "common/scans.rs"]
-mod scans;
 
 use std::path::PathBuf;
 
+use crate::scans::{median_distance, points, pose_of_rows, real};
 use icp_registration::{Cloud, IcpOptions, IcpTarget, NeighbourTree, OrganisedNormalOptions, organised_normals};
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
-use scans::{median_distance, points, pose_of_rows, real};
 
 #[test]
 fn bunny_scans_come_together() {

@@ -1,9 +1,6 @@
 //! Frames of a simulated room with the noise of a time-of-flight camera.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout, missing_docs)]
 
-mod common;
-
-use common::{Pinhole, Scene, cloud, disturbance, look_at, pose_error};
+use crate::common::{Pinhole, Scene, cloud, disturbance, look_at, pose_error};
 use icp_registration::{Cloud, IcpOptions, IcpTarget, Metric, Selection, StopReason, align, pose_difference};
 use nalgebra::Isometry3;
 

@@ -1,10 +1,8 @@
 //! Streams of simulated frames: what is tracked, what is told to be lost, and what is found again.
-#![allow(missing_docs, clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stderr)]
 
-mod common;
-mod sequence;
-
-use common::{Pinhole, Scene, frame, look_at, pose_error};
+use crate::common;
+use crate::common::{Pinhole, Scene, frame, look_at, pose_error};
+use crate::sequence::{HERTZ, absolute_error, around, frame_at, normalised_error, poses, projection};
 use icp_registration::{
     Error, LossReason, MotionPrior, Relocalisation, TrackedPose, Tracker, TrackerOptions, TrackingState, step_pose,
 };
@@ -12,7 +10,6 @@ use nalgebra::{Isometry3, Matrix6, Vector6};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
-use sequence::{HERTZ, absolute_error, around, frame_at, normalised_error, poses, projection};
 
 /// Everything here runs with few pixels: 88 x 72 of the same field of view.
 fn camera() -> Pinhole {

@@ -1,10 +1,7 @@
 //! An inertial unit carries the camera along a bare wall.
-#![allow(missing_docs, clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stderr)]
 
-mod common;
-mod sequence;
-
-use common::{Cuboid, Pinhole, Scene, frame, look_at};
+use crate::common::{Cuboid, Pinhole, Scene, frame, look_at};
+use crate::sequence::{HERTZ, projection};
 use icp_registration::{
     ImuIntegrator, ImuOptions, InertialSample, LossReason, Relocalisation, TrackedPose, Tracker, TrackerOptions,
     TrackingState, pose_difference,
@@ -13,7 +10,6 @@ use nalgebra::{Isometry3, Vector3};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
-use sequence::{HERTZ, projection};
 
 const FRAMES: usize = 130;
 const IMU_HERTZ: f64 = 200.0;

@@ -1,5 +1,4 @@
 //! Errors of a made trajectory: against the figures of another program (evo 1.38.1), and against what was put in.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use approx::assert_relative_eq;
 use icp_registration::{

@@ -1,9 +1,6 @@
 //! Frequencies that contradict each other.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-mod common;
-
-use common::{CONTRAST, NO_SYSTEMATICS, THREE, frame, matched_range, modulations, spread};
+use crate::common::{CONTRAST, NO_SYSTEMATICS, THREE, frame, matched_range, modulations, spread};
 use multipath::{
     DetectionOptions, Detector, Error, Evidence, FrequencyResponse, Systematics, detect, estimate_response,
 };

@@ -1,9 +1,7 @@
 //! Mixed pixels of a depth edge whose truth is known.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-mod common;
-
-use common::{CONTRAST, THREE, median, modulations};
+use crate::common;
+use crate::common::{CONTRAST, THREE, median, modulations};
 use multipath::{
     ComplexImage, Error, FrequencyResponse, MixedPixelTreatment, MixedPixels, NotSplit, SplitOptions, SplitPixel,
     treat_mixed_pixels,

@@ -1,5 +1,4 @@
 //! The risk of a real scene: boxes in front of a wall, seen by an SR4000.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stderr)]
 
 use std::fs::File;
 use std::io::Read;

@@ -1,11 +1,8 @@
 //! The risk of a scene against a sum over its surfaces.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
-
-mod common;
 
 use std::f64::consts::PI;
 
-use common::median;
+use crate::common::median;
 use multipath::{AlbedoScale, Error, Risk, RiskOptions, assess_risk, ranges_from_depths};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};

@@ -1,9 +1,7 @@
 //! The direct range beside a second path.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-mod common;
-
-use common::{CONTRAST, NO_SYSTEMATICS, Path, THREE, frame, matched_range, median, spread};
+use crate::common;
+use crate::common::{CONTRAST, NO_SYSTEMATICS, Path, THREE, frame, matched_range, median, spread};
 use multipath::{
     Error, FrequencyResponse, PixelPaths, SearchSpan, TwoPathImage, TwoPathOptions, TwoPathSolver, Verdict,
     solve_two_paths,

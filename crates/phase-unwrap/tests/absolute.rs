@@ -1,11 +1,8 @@
 //! Absolute wrap counts at one frequency on rendered rooms.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout, clippy::float_cmp)]
-
-mod common;
 
 use std::sync::OnceLock;
 
-use common::{FOCAL_PX, HEIGHT, Scene, View, WIDTH};
+use crate::common::{FOCAL_PX, HEIGHT, Scene, View, WIDTH};
 use phase_unwrap::{ImageGeometry, KnownWraps, Seed, SpatialOptions, Unwrapped, Unwrapper, unwrap_spatial};
 use range_image::Raster;
 

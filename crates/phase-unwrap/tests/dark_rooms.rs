@@ -1,19 +1,12 @@
 //! Absolute counts at one frequency in rooms where one patch in ten is as dark as black cloth: what is sure must be right.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout, dead_code)]
-
-#[path = "../examples/peers_phase/files.rs"]
-mod files;
-#[path = "../examples/peers_phase/room.rs"]
-mod room;
 
 use std::f32::consts::TAU;
 
+use crate::room::{Patches, Room, View};
 use phase_unwrap::{KnownWraps, SpatialOptions, Unwrapped, Unwrapper};
-use room::{Patches, Room, View};
 
-// What the room's own module asks for.
-type Outcome = Result<(), Box<dyn std::error::Error + Send + Sync>>;
-type Size = [usize; 2];
+pub type Outcome = Result<(), Box<dyn std::error::Error + Send + Sync>>;
+pub type Size = [usize; 2];
 
 const SIZE: Size = [640, 480];
 const SEEDS: std::ops::RangeInclusive<u64> = 1..=6;

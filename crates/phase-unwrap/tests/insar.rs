@@ -1,5 +1,4 @@
 //! Interferograms of two radar satellites: the processor's unwrapped phase is wrapped and unwrapped again.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout, clippy::float_cmp)]
 
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;

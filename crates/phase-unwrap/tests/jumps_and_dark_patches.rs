@@ -1,5 +1,4 @@
 //! Absolute counts at one frequency on full frames: objects with true jumps, dark patches, noise that follows the light.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout)]
 
 use std::f64::consts::TAU;
 

@@ -1,10 +1,7 @@
 //! Hypotheses and the choice by kernel density on rendered scenes: shares of right counts, thin objects, confidence.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout, clippy::float_cmp)]
 
-#[path = "common/frequencies.rs"]
-mod frequencies;
-
-use frequencies::{Frame, SETS, SIGMAS, Scene, modulations};
+use crate::frequencies;
+use crate::frequencies::{Frame, SETS, SIGMAS, Scene, modulations};
 use phase_unwrap::{
     Error, KernelDensityOptions, MultiFrequencyOptions, MultiUnwrapped, MultiUnwrapper, combined_interval_m,
     hypotheses, unwrap_multi_frequency,

@@ -1,5 +1,4 @@
 //! The tree against Kruskal's algorithm: all edges sorted by cost, ties by position, joined by union-find.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::float_cmp)]
 
 use std::f32::consts::{PI, TAU};
 

@@ -1,5 +1,4 @@
 //! The cheapest cuts, against exhaustive search and an independent proof of the optimum.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout, clippy::float_cmp)]
 
 use std::f32::consts::{PI, TAU};
 

@@ -1,5 +1,4 @@
 //! Measured phases of three MRI echoes, in the ratio 1 : 2 : 3: unwrapped alone, they must agree.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout, clippy::float_cmp)]
 
 use std::collections::BTreeMap;
 use std::f32::consts::{PI, TAU};

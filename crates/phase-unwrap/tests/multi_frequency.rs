@@ -1,5 +1,4 @@
 //! Several frequencies: counts, combined range, and typed errors.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout, clippy::float_cmp)]
 
 use std::f64::consts::TAU;
 

@@ -1,5 +1,4 @@
 //! Noisy phases: filtered, unwrapped and made congruent again.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout, clippy::float_cmp)]
 
 use std::f32::consts::{PI, TAU};
 

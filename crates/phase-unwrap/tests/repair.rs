@@ -1,12 +1,9 @@
 //! Repair of wrapped ranges and depths: rooms, hallways, ceilings, a real capture; nothing that is right is harmed.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout, clippy::float_cmp)]
-
-mod common;
 
 use std::io::Read;
 use std::path::Path;
 
-use common::{FOCAL_PX, HEIGHT, INTERVAL_M, Scene, WIDTH};
+use crate::common::{FOCAL_PX, HEIGHT, INTERVAL_M, Scene, WIDTH};
 use phase_unwrap::{
     AmplitudeKind, Error, Fold, ImageGeometry, RepairOptions, RepairVerdict, RepairedRanges, repair_depths,
     repair_ranges,

@@ -1,5 +1,4 @@
 //! Cyclic axes, sequences, streams of frames and edge weights by noise.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout, clippy::float_cmp)]
 
 use std::f32::consts::{PI, TAU};
 

@@ -1,5 +1,4 @@
 //! Relative unwrapping by the tree: hard shapes, masks, seeds, bad input.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout, clippy::float_cmp)]
 
 use std::f32::consts::{PI, TAU};
 

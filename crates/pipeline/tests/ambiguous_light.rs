@@ -1,12 +1,8 @@
 //! Light that came by more than one way, pixels of two surfaces, samples that contradict each other, wraps that are lost.
 
-#![allow(clippy::unwrap_used, clippy::print_stdout, clippy::float_cmp)]
-
-mod common;
-
 use std::path::{Path, PathBuf};
 
-use common::fixtures;
+use crate::common::fixtures;
 use pipeline::{Outcome, Plan, Silent, SimulateSource, ViewData, process, simulate};
 use range_image::{Flags, RangeFrame};
 

@@ -1,12 +1,8 @@
 //! What is wrong is said with file and field, and nothing half-written is left.
 
-#![allow(clippy::unwrap_used)]
-
-mod common;
-
 use std::path::{Path, PathBuf};
 
-use common::{fixtures, request};
+use crate::common::{fixtures, request};
 use pipeline::{Plan, RunRequest, Silent};
 use range_io::npz::NpzWriter;
 

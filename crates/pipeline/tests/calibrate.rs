@@ -1,13 +1,9 @@
 //! Calibration of surveys from end to end: files in, files out, truth recovered.
 
-#![allow(clippy::unwrap_used, clippy::panic)]
-
-mod common;
-
 use std::path::Path;
 
-use common::calibration::{calibrate, changed, request, target_field, terms};
-use common::fixtures;
+use crate::common::calibration::{calibrate, changed, request, target_field, terms};
+use crate::common::fixtures;
 use error_models::ParameterStatus;
 use pipeline::{CalibrateMethod, CalibrationSummary, Method, NetworkPlanRequest, PlanOptions, Silent, TermSelection};
 use range_io::calibration::Calibration;

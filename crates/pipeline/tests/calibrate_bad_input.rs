@@ -1,12 +1,8 @@
 //! What is wrong with a calibration's survey is said with file, line and column, and nothing half-written is left.
 
-#![allow(clippy::unwrap_used)]
-
-mod common;
-
 use std::path::Path;
 
-use common::calibration::{calibrate, changed, edit, keep_lines, terms};
+use crate::common::calibration::{calibrate, changed, edit, keep_lines, terms};
 use pipeline::{CalibrateMethod, CalibrateRequest, Method, NetworkDatum};
 
 /// What a calibration says of a changed fixture; it must fail and leave no output.

@@ -1,13 +1,10 @@
 //! Range terms from frames of known planes, and what a pipeline does with a calibration that was estimated.
 
-#![allow(clippy::unwrap_used, clippy::panic)]
-
-mod common;
-
+use crate::common;
 use std::path::Path;
 
+use crate::common::calibration::{calibrate, request, target_field, terms};
 use camera_model::{Camera, ImageFormat, InteriorOrientation, LensDistortion, pose_from_euler};
-use common::calibration::{calibrate, request, target_field, terms};
 use error_models::{ModelSet, RangeErrorModel, RangeTerms};
 use nalgebra::Vector3;
 use pipeline::{CalibrateMethod, CalibrateRequest, Plan, Silent, ViewData, process};

@@ -1,5 +1,4 @@
 //! Two results held against each other.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use std::path::{Path, PathBuf};
 

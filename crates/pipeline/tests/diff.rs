@@ -1,12 +1,9 @@
 //! Two calibrations: of one camera, of a camera that changed, and of cameras that cannot be compared.
 
-#![allow(clippy::unwrap_used, clippy::print_stdout)]
-
-mod common;
-
+use crate::common;
 use std::path::{Path, PathBuf};
 
-use common::calibration::{changed, edit, request, target_field};
+use crate::common::calibration::{changed, edit, request, target_field};
 use pipeline::{DiffRequest, Silent, calibrate, diff, simulate_network};
 
 /// Calibrations of the target field's camera from sightings of another seed.

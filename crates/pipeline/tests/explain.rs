@@ -1,13 +1,9 @@
 //! A pixel's ledger: its parts add up, agree with a whole run, and each flag has its reason.
 
-#![allow(clippy::unwrap_used, clippy::print_stdout)]
-
-mod common;
-
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-use common::fixtures;
+use crate::common::fixtures;
 use pipeline::{ExplainRequest, Explanation, Plan, Silent, SimulateSource, ViewData, explain, process, simulate};
 use range_image::Flags;
 use range_io::npz::NpzWriter;

@@ -1,12 +1,9 @@
 //! Fixed pattern estimated from simulated walls, against the truth, and where there is none.
 
-#![allow(clippy::unwrap_used, clippy::print_stdout)]
-
-mod common;
-
+use crate::common;
 use std::path::{Path, PathBuf};
 
-use common::{simulated, simulated_with};
+use crate::common::{simulated, simulated_with};
 use pipeline::{FixedPatternRequest, PatternOptions, Silent, estimate_pattern};
 use range_io::calibration::Calibration;
 

@@ -1,12 +1,8 @@
 //! Noise estimated from repeated frames, against the truth of a simulation and on a real camera.
 
-#![allow(clippy::unwrap_used, clippy::print_stdout)]
-
-mod common;
-
 use std::path::{Path, PathBuf};
 
-use common::{fixtures, has_capture, simulated, simulated_with};
+use crate::common::{fixtures, has_capture, simulated, simulated_with};
 use pipeline::{NoiseFitOptions, NoiseRequest, NoiseSummary, Plan, Silent, ViewData, estimate_noise, process};
 use range_io::calibration::Calibration;
 

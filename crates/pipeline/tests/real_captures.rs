@@ -1,10 +1,6 @@
 //! Real captures of three cameras at three input levels, where they lie beside the project.
 
-#![allow(clippy::unwrap_used, clippy::print_stdout)]
-
-mod common;
-
-use common::{has_capture, run};
+use crate::common::{has_capture, run};
 
 #[test]
 fn raw_samples_of_an_mlx75027_agree_with_the_cameras_own_ranges() {

@@ -1,12 +1,8 @@
 //! What is left between the demodulated ranges of a real camera and its own: by wavelength, amplitude and place.
 
-#![allow(clippy::unwrap_used, clippy::print_stdout)]
-
-mod common;
-
 use std::path::Path;
 
-use common::{fixtures, has_capture};
+use crate::common::{fixtures, has_capture};
 use pipeline::{Plan, Silent, ViewData, process};
 use self_calibration::{
     AmplitudeOrPositionOptions, RangeDifference, RangeTermOptions, Scale, amplitude_or_position, estimate_range_terms,

@@ -1,11 +1,7 @@
 //! Four frames of a floor by a real camera: what averaging takes off, and what it leaves.
 
-#![allow(clippy::unwrap_used, clippy::print_stdout)]
-
-mod common;
-
+use crate::common::{fixtures, has_capture};
 use camera_model::Camera;
-use common::{fixtures, has_capture};
 use error_models::{AmplitudeScale, ModelSet, RangeNoise};
 use pipeline::{Plan, Silent, ViewData, process};
 use range_image::{RangeFrame, average_ranges};

@@ -1,9 +1,6 @@
 //! Registration as a command: small surveys and clouds with known poses, and input that cannot be registered.
 
-#![allow(clippy::unwrap_used, clippy::print_stdout)]
-
-mod common;
-
+use crate::common;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 

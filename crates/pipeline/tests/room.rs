@@ -1,12 +1,8 @@
 //! The small room, from raw samples to one registered cloud, against its truth.
 
-#![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout)]
-
-mod common;
-
 use std::path::Path;
 
-use common::{request, run};
+use crate::common::{request, run};
 use pipeline::{NetworkCalibration, Silent, Source, Stage, StartPoses, Summary};
 
 #[test]

@@ -1,12 +1,8 @@
 //! Scattering estimated from a scene with and without a bright board, against the truth and on another scene.
 
-#![allow(clippy::unwrap_used, clippy::print_stdout)]
-
-mod common;
-
 use std::path::{Path, PathBuf};
 
-use common::simulated;
+use crate::common::simulated;
 use pipeline::{EstimationOptions, Plan, ScatteringRequest, Silent, estimate_scattering, process};
 use range_io::calibration::Calibration;
 

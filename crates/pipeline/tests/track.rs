@@ -1,9 +1,6 @@
 //! Tracking as a command: a camera carried through the small room, losses, real frames, and input that cannot be tracked.
 
-#![allow(clippy::unwrap_used, clippy::print_stdout)]
-
-mod common;
-
+use crate::common;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;

@@ -1,11 +1,8 @@
 //! The check of samples against each other: false alarms, motion, saturation.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
-
-mod common;
 
 use std::f64::consts::TAU;
 
-use common::{Truth, modulations};
+use crate::common::{Truth, modulations};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;

@@ -1,11 +1,8 @@
 //! Demodulation against known phases.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
-
-mod common;
 
 use std::f64::consts::TAU;
 
-use common::{Truth, angle_between, frame_f32, modulations, samples};
+use crate::common::{Truth, angle_between, frame_f32, modulations, samples};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use range_image::{

@@ -1,11 +1,8 @@
 //! Harmonics of a correlation that is no sine: what they do to the phase, how they are seen, how they are taken off.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
-
-mod common;
 
 use std::f64::consts::{PI, TAU};
 
-use common::{angle_between, modulations};
+use crate::common::{angle_between, modulations};
 use range_image::{
     AliasCorrection, DemodulationOptions, Error, HarmonicRatio, PhaseConvention, PhaseSense, RawFrame, Samples,
     demodulate, harmonic_ratio, harmonics,

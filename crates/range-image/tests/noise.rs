@@ -1,9 +1,6 @@
 //! Predicted standard deviations against sampled ones, and averages.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-mod common;
-
-use common::{Truth, angle_between, modulations};
+use crate::common::{Truth, angle_between, modulations};
 use rand::SeedableRng;
 use rand_distr::{Distribution, Normal};
 use rand_pcg::Pcg64Mcg;

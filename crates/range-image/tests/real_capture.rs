@@ -1,13 +1,10 @@
 //! A real four-phase capture at 60 MHz against the distances that the camera computed itself.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stderr)]
-
-mod common;
 
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
-use common::angle_between;
+use crate::common::angle_between;
 use range_image::{
     ConsistencyOptions, DemodulationOptions, Flags, Modulation, PhaseSense, Raster, RawFrame, RulesVerdict, Samples,
     check_samples, demodulate,

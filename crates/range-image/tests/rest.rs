@@ -1,5 +1,4 @@
 //! Whether repeated frames are at rest.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};

@@ -1,11 +1,8 @@
 //! The loops for wide registers: accuracy, and the same bits by any way and on any number of threads.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
-
-mod common;
 
 use std::f64::consts::TAU;
 
-use common::{angle_between, modulations};
+use crate::common::{angle_between, modulations};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use range_image::{

@@ -1,5 +1,4 @@
 //! Outputs appear whole or not at all.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use std::fs;
 use std::io::Write;

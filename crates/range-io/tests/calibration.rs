@@ -1,9 +1,8 @@
 //! `calibration.ron`: bit-exact round trips, models in and out, and what is refused.
 #![cfg(feature = "calibration")]
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 // What goes through a file comes back to the last bit.
-#![allow(clippy::float_cmp)]
 
+use crate::common;
 use std::path::Path;
 
 use camera_model::{Camera, ImageFormat, InteriorOrientation, LensDistortion};
@@ -18,8 +17,6 @@ use range_io::calibration::{Calibration, Correlation, Provenance, ValidSpan};
 use scattering_deconvolution::{
     CompositePsf, FieldPolynomial, FieldTerm, GaussianTerm, Ghost, GhostDelay, GhostPlace, Psf,
 };
-
-mod common;
 
 fn camera() -> Camera {
     let format = ImageFormat::new(4, 3, [0.04, 0.041]).unwrap();

@@ -1,9 +1,9 @@
 //! Clouds as PCD, E57, VTK and text: round trips, other programs' files, and every way a file can be cut or lie.
 #![cfg(feature = "clouds")]
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 // What goes through a file comes back to the last bit.
-#![allow(clippy::float_cmp)]
 
+use crate::common;
+use crate::scratch;
 use std::path::Path;
 
 use nalgebra::{Isometry3, Vector3};
@@ -11,11 +11,7 @@ use proptest::prelude::*;
 use range_io::clouds::{CloudFile, Precision, read_any_cloud, write_any_cloud};
 use range_io::e57::{E57Scan, read_e57, write_e57};
 
-mod common;
-#[path = "common/scratch.rs"]
-mod scratch;
-
-use scratch::Scratch;
+use crate::scratch::Scratch;
 
 fn read(scratch: &Scratch, name: &str, bytes: &[u8]) -> range_io::Result<CloudFile> {
     read_any_cloud(scratch.holding(name, bytes))

@@ -1,9 +1,8 @@
 //! Depth images in PNG and Matroska, and the factory calibration that comes with them.
 #![cfg(all(feature = "png16", feature = "mkv", feature = "azure", feature = "survey"))]
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 // What goes through a file comes back to the last bit.
-#![allow(clippy::float_cmp)]
 
+use crate::common;
 use std::io::Cursor;
 use std::path::Path;
 
@@ -13,8 +12,6 @@ use range_io::azure::{self, DepthMode};
 use range_io::mkv::{DEPTH, INFRARED, Recording};
 use range_io::png16;
 use range_io::survey::{InputFrame, Survey, read_frame};
-
-mod common;
 
 fn survey(width: usize, height: usize, file: &str) -> Survey {
     let text = format!(

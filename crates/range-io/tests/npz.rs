@@ -1,14 +1,12 @@
 //! Arrays in `.npy` and `.npz`: round trips, numpy's own bytes, and every way a file can be cut or lie.
 #![cfg(feature = "npz")]
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+use crate::common;
 use std::io::{Cursor, Write};
 
 use proptest::prelude::*;
 use range_io::Error;
 use range_io::npz::{Array, Element, NpzReader, NpzWriter, Values, read_npy};
-
-mod common;
 
 fn written<T: Element>(shape: &[usize], values: &[T]) -> Vec<u8> {
     let mut writer = NpzWriter::new("memory.npz", Cursor::new(Vec::new()));

@@ -1,17 +1,12 @@
 //! Clouds: round trips, other programs' files, and every way a file can be cut or lie.
 #![cfg(feature = "ply")]
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 // What goes through a file comes back to the last bit.
-#![allow(clippy::float_cmp)]
 
+use crate::common;
 use proptest::prelude::*;
 use range_io::ply::{CloudFile, PlyWriter, Precision, read_cloud, write_cloud};
 
-mod common;
-#[path = "common/scratch.rs"]
-mod scratch;
-
-use scratch::{Scratch, cloud};
+use crate::scratch::{Scratch, cloud};
 
 fn read(scratch: &Scratch, bytes: &[u8]) -> range_io::Result<CloudFile> {
     read_cloud(scratch.holding(NAME, bytes))

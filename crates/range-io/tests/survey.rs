@@ -1,9 +1,8 @@
 //! `survey.ron` and the frames it names.
 #![cfg(feature = "survey")]
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 // What goes through a file comes back to the last bit.
-#![allow(clippy::float_cmp)]
 
+use crate::common;
 use std::path::Path;
 
 use proptest::prelude::*;
@@ -13,8 +12,6 @@ use range_io::survey::{
     InputFrame, Level, StoredDepth, Survey, TruthFrame, read_frame, read_truth, write_frame, write_truth,
 };
 use range_io::{Error, ron_text};
-
-mod common;
 
 const TEXT: &str = r#"#![enable(implicit_some)]
 (

@@ -1,9 +1,8 @@
 //! Tables: round trips, `EuRoC` data, and faults with their place.
 #![cfg(feature = "tables")]
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 // What goes through a file comes back to the last bit.
-#![allow(clippy::float_cmp)]
 
+use crate::common;
 use std::path::PathBuf;
 
 use camera_model::pose_from_euler;
@@ -14,8 +13,6 @@ use range_io::tables::{
     read_observations, read_placed_targets, read_planes, read_residuals, read_stations, read_targets, write_distances,
     write_imu, write_observations, write_planes, write_residuals, write_stations, write_targets,
 };
-
-mod common;
 
 struct Scratch(tempfile::TempDir);
 

@@ -1,7 +1,7 @@
 //! Trajectories and the turn between photogrammetric and computer-vision axes.
 #![cfg(feature = "trajectory")]
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+use crate::common;
 use camera_model::pose_from_euler;
 use nalgebra::{Isometry3, Vector3};
 use proptest::prelude::*;
@@ -9,8 +9,6 @@ use range_io::trajectory::{
     StampedPose, TrajectoryFormat, read_any_trajectory, read_kitti, read_tum, write_any_trajectory, write_euroc,
     write_kitti, write_tum,
 };
-
-mod common;
 
 fn pose(timestamp_s: f64, position: [f64; 3], angles: [f64; 3]) -> StampedPose {
     StampedPose { timestamp_s, world_from_camera: pose_from_euler(Vector3::from(position), angles) }

@@ -1,7 +1,5 @@
 //! The commands `calibrate` and `plan` as a shell sees them.
 
-#![allow(clippy::unwrap_used)]
-
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 

@@ -1,7 +1,5 @@
 //! The command `compare` as a shell sees it.
 
-#![allow(clippy::unwrap_used)]
-
 use std::process::{Command, Output};
 
 fn rangecam(arguments: &[&str]) -> Output {

@@ -1,7 +1,5 @@
 //! The commands `explain` and `diff` as a shell sees them.
 
-#![allow(clippy::unwrap_used)]
-
 use std::path::Path;
 use std::process::{Command, Output};
 

@@ -1,7 +1,5 @@
 //! The command `register` as a shell sees it.
 
-#![allow(clippy::unwrap_used)]
-
 use std::fmt::Write;
 use std::path::Path;
 use std::process::{Command, Output};

@@ -1,11 +1,8 @@
 //! Point spread functions that change over the field, and ghosts.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
-
-mod common;
 
 use std::f64::consts::TAU;
 
-use common::{channel, frame, modulation, range_errors, scene};
+use crate::common::{channel, frame, modulation, range_errors, scene};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use range_image::Modulation;

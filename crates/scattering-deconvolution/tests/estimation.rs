@@ -1,11 +1,7 @@
 //! Point spread functions from simulated captures.
 #![cfg(feature = "estimate")]
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-#[path = "common/captures.rs"]
-mod captures;
-
-use captures::{Object, Scene, elliptic, estimate, round};
+use crate::captures::{Object, Scene, elliptic, estimate, round};
 use scattering_deconvolution::{
     Ambiguity, EstimationOptions, Nuisance, Psf, TermCount, TermShape, Verdict, estimate_psf,
 };

@@ -1,11 +1,7 @@
 //! How good estimated point spread functions are: covariance by simulation, and the range errors of another scene.
 #![cfg(feature = "estimate")]
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout)]
 
-#[path = "common/captures.rs"]
-mod captures;
-
-use captures::{Object, Scene, estimate, mean_wall_error, round};
+use crate::captures::{Object, Scene, estimate, mean_wall_error, round};
 use range_image::{ComplexFrame, Raster};
 use rayon::prelude::*;
 use scattering_deconvolution::{

@@ -1,11 +1,7 @@
 //! What captures of the real world bring: shadows, dim parts, saturation, gaps; captures of two planes; wrong input.
 #![cfg(feature = "estimate")]
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-#[path = "common/captures.rs"]
-mod captures;
-
-use captures::{Object, Scene, estimate, round};
+use crate::captures::{Object, Scene, estimate, round};
 use range_image::{ComplexFrame, Flags, RangeFrame, Raster};
 use scattering_deconvolution::{
     Ambiguity, Capture, Error, EstimationOptions, ForegroundCapture, Nuisance, Psf, PsfEstimate, TermCount,

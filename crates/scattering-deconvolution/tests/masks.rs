@@ -1,9 +1,6 @@
 //! Saturated and missing pixels, and pixels that depend on them.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-mod common;
-
-use common::{channel, frame, gaussians, scene};
+use crate::common::{channel, frame, gaussians, scene};
 use range_image::Flags;
 use scattering_deconvolution::{Error, GridSpacing, RestorationOptions, Restorer, SaturatedLight, Scatterer, restore};
 

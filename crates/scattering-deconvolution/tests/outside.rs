@@ -1,9 +1,6 @@
 //! Bright objects beyond the image border.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-mod common;
-
-use common::{channel, gaussians, no_flags};
+use crate::common::{channel, gaussians, no_flags};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;

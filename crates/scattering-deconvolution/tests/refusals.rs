@@ -1,9 +1,6 @@
 //! Point spread functions, images and options that cannot be worked with, and pixels without a value.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-mod common;
-
-use common::{channel, frame, gaussians, no_flags, rough_kernel, scene};
+use crate::common::{channel, frame, gaussians, no_flags, rough_kernel, scene};
 use range_image::{Flags, Raster};
 use scattering_deconvolution::{Error, Psf, Refinement, RestorationOptions, Restorer, Scatterer, restore};
 

@@ -1,9 +1,6 @@
 //! Restoration of simulated scattering.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-mod common;
-
-use common::{channel, frame, gaussians, range_errors, rough_kernel, scene};
+use crate::common::{channel, frame, gaussians, range_errors, rough_kernel, scene};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use range_image::ComplexFrame;

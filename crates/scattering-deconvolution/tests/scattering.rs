@@ -1,9 +1,6 @@
 //! The forward model against its definition.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-mod common;
-
-use common::{gaussians, rough_kernel, scattered_directly};
+use crate::common::{gaussians, rough_kernel, scattered_directly};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use scattering_deconvolution::{Error, Psf, Scatterer};

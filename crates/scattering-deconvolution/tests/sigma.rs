@@ -1,9 +1,6 @@
 //! Predicted noise of the restored image against the sampled one.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-mod common;
-
-use common::{channel, gaussians, rough_kernel};
+use crate::common::{channel, gaussians, rough_kernel};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;

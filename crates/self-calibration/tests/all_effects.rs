@@ -1,15 +1,12 @@
 //! All range errors of the chapter at once, with its magnitudes: estimated, their covariance checked, and nothing left.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout)]
 
-mod support;
-
+use crate::support::dense::{INTERVAL_M, SIGMA_M, SIZE, Wall, differences, surface, truth};
 use error_models::AmplitudeHyperbola;
 use nalgebra::DVector;
 use self_calibration::{
     Error, RangeCalibration, RangeDifference, RangeTermOptions, Scale, TrendOptions, TrendSample, TrendVariable,
     estimate_range_terms, test_trends,
 };
-use support::dense::{INTERVAL_M, SIGMA_M, SIZE, Wall, differences, surface, truth};
 
 /// d0 and the level of the hyperbola share their effect: amplitudes over a factor of 2000 inflate it some hundred times.
 fn options() -> RangeTermOptions {

@@ -1,13 +1,10 @@
 //! Whether amplitude or position explains an error, where light falls off towards the corners.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout)]
 
-mod support;
-
+use crate::support::dense::{INTERVAL_M, SIGMA_M, Wall, differences, terms, truth};
 use self_calibration::{
     AmplitudeOrPosition, AmplitudeOrPositionOptions, Error, ErrorCause, RangeDifference, amplitude_or_position,
     estimate_range_terms,
 };
-use support::dense::{INTERVAL_M, SIGMA_M, Wall, differences, terms, truth};
 
 fn ask(by: [bool; 2], wall: Wall, seed: u64) -> AmplitudeOrPosition {
     let differences = differences(&truth(by[0], by[1]), wall, seed);

@@ -1,14 +1,11 @@
 //! The automatic choice of terms.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-mod support;
-
+use crate::support::networks::{nominal, range_model, small, track_network};
 use error_models::{PeriodicSpline, RangeErrorModel, RangeTerms};
 use self_calibration::{
     CalibrationOptions, CalibrationOutcome, Method, Network, SightingOptions, TermDecision, calibrate,
     simulate_sightings,
 };
-use support::networks::{nominal, range_model, small, track_network};
 
 fn spline_decision(outcome: &CalibrationOutcome) -> &TermDecision {
     outcome.decisions.iter().find(|decision| decision.terms[0] == "spline12").unwrap()

@@ -1,14 +1,11 @@
 //! Networks that cannot be used are refused by name.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-mod support;
-
+use crate::support::networks::{all_but_long_wave, small};
 use nalgebra::Matrix3;
 use self_calibration::{
     CalibrationOptions, CalibrationOutcome, Error, Method, Network, NetworkDatum, SightingOptions, SimulatedStart,
     TermSelection, calibrate, calibrate_two_networks, simulate_sightings,
 };
-use support::networks::{all_but_long_wave, small};
 
 fn observed() -> Network {
     simulate_sightings(&small(), &SightingOptions::default()).unwrap()

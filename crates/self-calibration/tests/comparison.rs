@@ -1,8 +1,6 @@
 //! Tests of differences: their level where nothing changed, and the band of the correction against sampling.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout)]
 
-mod support;
-
+use crate::support::{INTERVAL, model, track, walls};
 use error_models::RangeErrorModel;
 use nalgebra::DMatrix;
 use range_image::ImageFormat;
@@ -10,7 +8,6 @@ use self_calibration::{
     CorrectionSide, Error, ParameterSet, RangeCalibration, RangeTermOptions, Scale, compare_corrections,
     compare_parameters, estimate_range_terms,
 };
-use support::{INTERVAL, model, track, walls};
 
 const LEVEL: f64 = 0.05;
 

@@ -1,5 +1,4 @@
 //! The offset of each pixel from walls, against the truth.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use camera_model::{Camera, InteriorOrientation, LensDistortion};
 use nalgebra::{Isometry3, Point3, Vector3};

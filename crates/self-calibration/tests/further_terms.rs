@@ -1,11 +1,9 @@
 //! Spline, polynomial and surface from dense range differences.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-mod support;
-
+use crate::support;
+use crate::support::{INTERVAL, track, walls};
 use error_models::{FurtherShape, PolynomialShape, RangeErrorModel, SurfaceShape};
 use self_calibration::{Error, RangeDifference, RangeTermOptions, Scale, estimate_range_terms};
-use support::{INTERVAL, track, walls};
 
 const SIGMA_M: f64 = 0.004;
 

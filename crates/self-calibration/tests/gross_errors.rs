@@ -1,13 +1,10 @@
 //! Gross errors are found, and little else is taken for one.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout)]
 
-mod support;
-
+use crate::support::networks::{all_but_long_wave, nominal, normal, small};
 use self_calibration::{
     CalibrationOptions, Component, Method, Network, SightingOptions, SimulatedStart, TermSelection, Verdict, calibrate,
     simulate_sightings,
 };
-use support::networks::{all_but_long_wave, nominal, normal, small};
 
 /// Observed networks with and without gross errors, the noise being the same.
 fn observed(truth: &Network, seed: u64, share: f64) -> [Network; 2] {

@@ -1,11 +1,8 @@
 //! The amplitude hyperbola of a network, without start values.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-mod support;
-
+use crate::support::networks::{all_but_long_wave, deep, nominal};
 use error_models::AmplitudeHyperbola;
 use self_calibration::{CalibrationOptions, Network, SightingOptions, TermSelection, calibrate, simulate_sightings};
-use support::networks::{all_but_long_wave, deep, nominal};
 
 const TRUE: [f64; 3] = [1.1e-4, 0.0286, 156.0];
 

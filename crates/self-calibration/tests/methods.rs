@@ -1,15 +1,12 @@
 //! All methods: the truth without noise, and honest deviations with it.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-mod support;
-
+use crate::support::cases::{calibrated, cases, errors};
+use crate::support::networks::{all_but_long_wave, nominal, small, with_control};
 use error_models::{PeriodicSpline, RangeTerms};
 use self_calibration::{
     CalibrationOptions, Method, NetworkDatum, SightingOptions, SimulatedStart, TermSelection, calibrate,
     simulate_sightings,
 };
-use support::cases::{calibrated, cases, errors};
-use support::networks::{all_but_long_wave, nominal, small, with_control};
 
 fn options() -> CalibrationOptions {
     CalibrationOptions {

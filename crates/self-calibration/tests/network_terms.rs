@@ -1,15 +1,12 @@
 //! Further terms of a network by their words: spline, polynomial and surface.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-mod support;
-
+use crate::support::networks::{deep, nominal, small, track_network, with_scale_bars};
 use error_models::{FurtherShape, PolynomialShape, RangeErrorModel, SurfaceShape};
 use nalgebra::DVector;
 use self_calibration::{
     CalibrationOptions, CalibrationOutcome, Error, Method, Network, PlanOptions, SightingOptions, TermSelection,
     calibrate, plan, simulate_sightings,
 };
-use support::networks::{deep, nominal, small, track_network, with_scale_bars};
 
 const LENS: &str = "xp yp c k1 k2 p1 p2";
 

@@ -1,5 +1,4 @@
 //! Offsets by pixel and by block of pixels: recovered, with their deviations, and told from noise.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout)]
 
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};

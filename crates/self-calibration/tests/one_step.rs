@@ -1,12 +1,9 @@
 //! The one-step method.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-mod support;
-
+use crate::support::networks::{all_but_long_wave, nominal, normal, small};
 use self_calibration::{
     CalibrationOptions, Method, SightingOptions, SimulatedStart, TermSelection, calibrate, simulate_sightings,
 };
-use support::networks::{all_but_long_wave, nominal, normal, small};
 
 fn options() -> CalibrationOptions {
     CalibrationOptions {

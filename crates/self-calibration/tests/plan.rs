@@ -1,13 +1,10 @@
 //! Planned networks.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-mod support;
-
+use crate::support::networks::{all_but_long_wave, small, weak};
 use self_calibration::{
     CalibrationOptions, CandidateGrid, Error, PlanOptions, SightingOptions, TermSelection, calibrate, plan,
     simulate_sightings,
 };
-use support::networks::{all_but_long_wave, small, weak};
 
 fn options(candidates: CandidateGrid) -> PlanOptions {
     PlanOptions { terms: TermSelection::List(all_but_long_wave()), candidates, ..PlanOptions::default() }

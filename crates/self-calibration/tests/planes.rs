@@ -1,5 +1,4 @@
 //! Reference ranges and differences of frames to a plane, and the whole two-step calibration.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use approx::assert_relative_eq;
 use camera_model::{Camera, InteriorOrientation, LensDistortion};

@@ -1,5 +1,4 @@
 //! Planes, spheres and cylinders fitted to regions of frames, against the truth.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout, clippy::type_complexity)]
 
 use camera_model::{Camera, InteriorOrientation, LensDistortion};
 use nalgebra::{DVector, Point3, Vector3};

@@ -1,5 +1,4 @@
 //! Noise of ranges from repeated range frames, against the truth.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout)]
 
 use error_models::{AmplitudeScale, RangeNoise};
 use nalgebra::{Matrix2, Vector2};

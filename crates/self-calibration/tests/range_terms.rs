@@ -1,13 +1,10 @@
 //! Range terms estimated from synthetic differences: truth, covariance, refusals.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-mod support;
-
+use crate::support::{INTERVAL, model, terms, track, walls};
 use approx::assert_relative_eq;
 use error_models::{AmplitudeHyperbola, ParameterStatus, RangeTerms};
 use nalgebra::DVector;
 use self_calibration::{Error, HyperbolaUse, RangeTermOptions, Scale, TermUse, estimate_range_terms};
-use support::{INTERVAL, model, terms, track, walls};
 
 const SIGMA: f64 = 0.005;
 

@@ -1,5 +1,4 @@
 //! The floor before a real camera; skips where the real captures are not at hand.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout)]
 
 use camera_model::{Camera, InteriorOrientation, LensDistortion};
 use range_image::{Flags, ImageFormat, RangeFrame, Raster};

@@ -1,5 +1,4 @@
 //! The hyperbola of Eq. 15 stays real over the amplitudes of its fit, whatever the residuals are.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout)]
 
 use error_models::AmplitudeHyperbola;
 use proptest::prelude::*;

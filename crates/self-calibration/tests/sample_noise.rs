@@ -1,5 +1,4 @@
 //! Shot and dark noise from repeated raw frames, against the truth.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout)]
 
 use proptest::prelude::*;
 use rand::SeedableRng;

@@ -1,9 +1,6 @@
 //! Range terms estimated together with the poses from surfaces that several stations see.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout, missing_docs)]
 
-#[path = "support/round.rs"]
-mod round;
-
+use crate::round;
 use icp_registration::Datum;
 use self_calibration::{
     Error, SurfaceCalibration, SurfaceCalibrationOptions, SurfaceCapture, SurfaceTerm, calibrate_surfaces,

@@ -1,5 +1,4 @@
 //! Trends in residuals: false alarms at the stated level, power on planted ones, errors that neighbours share.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout)]
 
 use std::f64::consts::TAU;
 

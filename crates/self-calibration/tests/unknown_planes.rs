@@ -1,8 +1,6 @@
 //! Range terms from planes that are not known, alone and with poses.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-mod support;
-use support::unknown_walls::*;
+use crate::support::unknown_walls::*;
 
 use camera_model::Camera;
 use error_models::RangeTerms;

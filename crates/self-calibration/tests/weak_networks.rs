@@ -1,12 +1,9 @@
 //! Networks that do not determine their parameters are refused with what to add.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout)]
 
-mod support;
-
+use crate::support::networks::{all_but_long_wave, looking, nominal, normal, small, weak};
 use self_calibration::{
     CalibrationOptions, Error, Method, Network, SightingOptions, TermSelection, calibrate, simulate_sightings,
 };
-use support::networks::{all_but_long_wave, looking, nominal, normal, small, weak};
 
 fn calibrated(truth: &Network, terms: &[&str], method: Method) -> Result<Vec<String>, Error> {
     let mut observed = simulate_sightings(truth, &SightingOptions::default()).unwrap();

@@ -1,9 +1,7 @@
 //! A wrong description is refused by the name of its field.
-#![allow(clippy::unwrap_used, clippy::expect_used)]
 
-mod common;
-
-use common::plain;
+use crate::common;
+use crate::common::plain;
 use error_models::RangeErrorModel;
 use range_image::NoiseModel;
 use simulation::{

@@ -1,11 +1,8 @@
 //! Without errors, demodulation gives the scene back.
-#![allow(clippy::unwrap_used, clippy::expect_used)]
 
-mod common;
-
+use crate::common::{INTERVAL_M, first, largest, plain, range_error};
 use approx::assert_relative_eq;
 use camera_model::euler_from_pose;
-use common::{INTERVAL_M, first, largest, plain, range_error};
 use nalgebra::Point3;
 use range_image::PhaseSense;
 use simulation::AttitudeSpec;

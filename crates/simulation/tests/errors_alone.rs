@@ -1,9 +1,6 @@
 //! Each error alone changes what it should, and the crate that knows it takes it off.
-#![allow(clippy::unwrap_used, clippy::expect_used)]
 
-mod common;
-
-use common::{INTERVAL_M, first, largest, plain, quantile, range_error, wrapped};
+use crate::common::{INTERVAL_M, first, largest, plain, quantile, range_error, wrapped};
 use error_models::{AmplitudeHyperbola, RangeErrorModel, RangeTerms};
 use range_image::{Flags, Samples};
 use simulation::{

@@ -1,9 +1,7 @@
 //! The scenes of `fixtures/scenes` are what their users count on.
-#![allow(clippy::unwrap_used)]
 
-mod common;
-
-use common::{fixture, quantile, range_error};
+use crate::common;
+use crate::common::{fixture, quantile, range_error};
 use range_image::{ComplexFrame, Flags, average, demodulate};
 use scattering_deconvolution::{RestorationOptions, restore};
 use simulation::{FrameTruth, SimulationSpec, Simulator, StationImage, simulate};

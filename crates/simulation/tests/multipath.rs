@@ -1,9 +1,6 @@
 //! Light that bounces once makes ranges too long, more so towards a corner.
-#![allow(clippy::unwrap_used)]
 
-mod common;
-
-use common::{first, fixture, range_error};
+use crate::common::{first, fixture, range_error};
 use range_image::ComplexFrame;
 
 /// One pixel of the west wall.

@@ -1,9 +1,6 @@
 //! The noise has the variance it is told, and the bits do not depend on threads.
-#![allow(clippy::unwrap_used, clippy::expect_used)]
 
-mod common;
-
-use common::plain;
+use crate::common::plain;
 use range_image::{NoiseModel, Samples, demodulate, sigma_from_repeats};
 use scattering_deconvolution::{GaussianTerm, Psf};
 use simulation::{MixedPixelsSpec, MultipathSpec, SampleType, SimulationSpec, simulate, simulate_frame};

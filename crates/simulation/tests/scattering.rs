@@ -1,9 +1,6 @@
 //! Scattered light is the convolution of the conventions, and restoration takes it off.
-#![allow(clippy::unwrap_used, clippy::expect_used)]
 
-mod common;
-
-use common::{first, largest, plain, quantile, range_error};
+use crate::common::{first, largest, plain, quantile, range_error};
 use range_image::ComplexFrame;
 use scattering_deconvolution::{GaussianTerm, Psf, RestorationOptions, restore};
 use simulation::SimulationSpec;

@@ -3,8 +3,8 @@
 use icp_registration::{Cloud, Error, IcpResult, Result, VoxelAlignmentOptions, VoxelCloud, VoxelOptions};
 use nalgebra::{Isometry3, Point3, Vector3};
 
+use super::scenes::bare;
 use crate::common::{Pinhole, frame_pair};
-use crate::scenes::bare;
 
 fn good() -> Cloud {
     bare(&frame_pair(&Pinhole { width: 88, height: 72, focal_px: 76.0 }, 2).target.0)

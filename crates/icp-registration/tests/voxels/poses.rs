@@ -3,9 +3,9 @@
 use icp_registration::{Cloud, VoxelAlignmentOptions, pose_difference};
 use nalgebra::{Isometry3, Point3};
 
+use super::register;
+use super::scenes::{Views, bare, far_off, half_overlapping, repeated};
 use crate::common::{Pinhole, frame_pair, pose_error};
-use crate::register;
-use crate::scenes::{Views, bare, far_off, half_overlapping, repeated};
 
 fn pair(k: u64) -> Views {
     let pair = frame_pair(&Pinhole::medium(), k);

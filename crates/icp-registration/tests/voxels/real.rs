@@ -3,7 +3,7 @@
 use icp_registration::{Cloud, NeighbourTree, VoxelAlignmentOptions, VoxelCloud, VoxelOptions};
 use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
 
-use super::scans::{median_distance, points, pose_of_rows, real};
+use crate::scans::{median_distance, points, pose_of_rows, real};
 
 fn prepared(points: &[Point3<f64>]) -> VoxelCloud {
     VoxelCloud::new(&Cloud::new(points.to_vec()), &VoxelOptions::default()).unwrap()

@@ -3,9 +3,9 @@
 use icp_registration::{DegeneracyPolicy, MotionKind, VoxelAlignmentOptions};
 use nalgebra::{Isometry3, Vector3};
 
+use super::register;
+use super::scenes::{Views, corridor, cylinder, one_wall, parallel_walls, repeated, sphere, wall_and_floor};
 use crate::common::Pinhole;
-use crate::register;
-use crate::scenes::{Views, corridor, cylinder, one_wall, parallel_walls, repeated, sphere, wall_and_floor};
 
 /// Draws the views of a scene.
 type MakeViews = fn(&Pinhole, u64) -> Views;

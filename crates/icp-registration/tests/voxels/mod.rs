@@ -1,14 +1,9 @@
 //! Clouds in voxels: averages, and registration of unorganised clouds.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout, missing_docs)]
 
 mod averages;
 mod bad_input;
-#[path = "../common/mod.rs"]
-mod common;
 mod poses;
 mod real;
-#[path = "../common/scans.rs"]
-mod scans;
 #[path = "../../examples/voxel_pairs/scenes.rs"]
 mod scenes;
 mod verdicts;

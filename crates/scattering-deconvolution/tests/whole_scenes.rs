@@ -1,11 +1,7 @@
 //! How much of the range error goes away with the known point spread function.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout)]
 
-#[path = "common/scenes.rs"]
-mod scenes;
-
+use crate::scenes::{PSFS, SCENES, mean_error_mm, psf, scatter, scene};
 use scattering_deconvolution::{RestorationOptions, restore};
-use scenes::{PSFS, SCENES, mean_error_mm, psf, scatter, scene};
 
 /// Mean range errors before and after, millimetres.
 fn run(name: &str, psf_name: &str, weight: f64, [width, height]: [usize; 2]) -> [f64; 2] {

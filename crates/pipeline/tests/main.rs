@@ -1,0 +1,21 @@
+//! All tests of the crate as one program: linked once, run side by side.
+#![allow(clippy::expect_used, clippy::float_cmp, clippy::panic, clippy::print_stdout, clippy::unwrap_used)]
+
+mod ambiguous_light;
+mod bad_input;
+mod calibrate;
+mod calibrate_bad_input;
+mod calibrate_planes;
+mod common;
+mod compare;
+mod diff;
+mod explain;
+mod fixed_pattern;
+mod noise;
+mod real_captures;
+mod real_periodic;
+mod real_repeats;
+mod register;
+mod room;
+mod scattering;
+mod track;

@@ -1,0 +1,8 @@
+//! All tests of the crate as one program: linked once, run side by side.
+#![allow(clippy::unwrap_used)]
+
+mod calibrate;
+mod compare;
+mod explain;
+mod noise;
+mod register;

@@ -1,0 +1,38 @@
+//! All tests of the crate as one program: linked once, run side by side.
+#![allow(
+    clippy::expect_used,
+    clippy::panic,
+    clippy::print_stdout,
+    clippy::type_complexity,
+    clippy::unwrap_used,
+    missing_docs
+)]
+
+mod all_effects;
+mod amplitude_or_position;
+mod automatic_terms;
+mod bad_networks;
+mod comparison;
+mod fixed_pattern;
+mod further_terms;
+mod gross_errors;
+mod hyperbola_of_a_network;
+mod methods;
+mod network_terms;
+mod offset_table;
+mod one_step;
+mod plan;
+mod planes;
+mod primitives;
+mod range_noise;
+mod range_terms;
+mod real_floor;
+mod real_hyperbola;
+#[path = "support/round.rs"]
+mod round;
+mod sample_noise;
+mod support;
+mod surfaces;
+mod trends;
+mod unknown_planes;
+mod weak_networks;

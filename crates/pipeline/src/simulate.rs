@@ -167,29 +167,24 @@ fn survey(spec: &SimulationSpec, frames: Vec<FrameEntry>) -> Survey {
     let geometry = spec.camera.geometry;
     let demodulation = spec.demodulation_options();
     let truth_frames = frames.iter().map(|frame| Path::new("truth").join(&frame.file)).collect();
-    Survey {
-        camera: SurveyCamera {
-            width: geometry.format.width,
-            height: geometry.format.height,
-            pixel_pitch_mm: geometry.format.pixel_pitch_mm,
-            principal_distance_mm: geometry.interior.principal_distance_mm,
-            // Nominal, as a data sheet would have it: the calibration brings the true one.
-            principal_point_mm: [0.0, 0.0],
-            modulation_hz: spec.camera.modulation_hz.clone(),
-            phase_steps: Some(spec.camera.phase_steps),
-            phase_sense: demodulation.phase_sense,
-            phase_offset_rad: demodulation.phase_offset_rad,
-            saturation: demodulation.saturation,
-            raw_scale: demodulation.raw_scale,
-        },
-        level: Level::Samples,
-        frames,
-        depth: None,
-        truth: Some(TruthFiles {
-            stations: Some("truth/stations.csv".into()),
-            calibration: Some("truth/calibration.ron".into()),
-            frames: truth_frames,
-        }),
-        extras: std::collections::BTreeMap::new(),
-    }
+    let camera = SurveyCamera {
+        width: geometry.format.width,
+        height: geometry.format.height,
+        pixel_pitch_mm: geometry.format.pixel_pitch_mm,
+        principal_distance_mm: geometry.interior.principal_distance_mm,
+        // Nominal, as a data sheet would have it: the calibration brings the true one.
+        principal_point_mm: [0.0, 0.0],
+        modulation_hz: spec.camera.modulation_hz.clone(),
+        phase_steps: Some(spec.camera.phase_steps),
+        phase_sense: demodulation.phase_sense,
+        phase_offset_rad: demodulation.phase_offset_rad,
+        saturation: demodulation.saturation,
+        raw_scale: demodulation.raw_scale,
+    };
+    let truth = TruthFiles {
+        stations: Some("truth/stations.csv".into()),
+        calibration: Some("truth/calibration.ron".into()),
+        frames: truth_frames,
+    };
+    Survey { truth: Some(truth), ..Survey::new(camera, Level::Samples, frames) }
 }

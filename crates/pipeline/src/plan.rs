@@ -8,6 +8,7 @@ use range_io::ron_text;
 use range_io::survey::Level;
 use serde::{Deserialize, Serialize};
 
+pub use crate::drift::CorrectRangeOptions;
 use crate::{Error, Result};
 
 /// What a pipeline does, read from a RON file.
@@ -255,11 +256,6 @@ impl Default for MultipathOptions {
         }
     }
 }
-
-/// Options of [`Stage::CorrectRange`].
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct CorrectRangeOptions {}
 
 /// Options of [`Stage::CorrectImagePoint`].
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]

@@ -57,7 +57,7 @@ pub enum DriftSource {
 #[non_exhaustive]
 pub enum DriftError {
     /// The survey does not say what the drift depends on.
-    #[error("the calibrated drift depends on {quantity}, and survey.ron has no `{field}`; {WAY_OUT}")]
+    #[error("the calibrated drift depends on {quantity}, and survey.ron has no `{field}`; add it, or {LEAVE}")]
     Missing {
         /// Time or temperature.
         quantity: &'static str,
@@ -65,7 +65,7 @@ pub enum DriftError {
         field: String,
     },
     /// A frame at a time or temperature that the drift was not fitted for.
-    #[error("frame {frame}: {source}; {WAY_OUT}")]
+    #[error("frame {frame}: {source}; where the drift does not matter, {LEAVE}")]
     Outside {
         /// Position of the frame in the survey.
         frame: usize,
@@ -91,7 +91,7 @@ pub enum DriftError {
 }
 
 /// What a user can do where a drift is not known.
-const WAY_OUT: &str = "add it, or leave the drift in the ranges by `CorrectRange(warm_up: leave)`";
+const LEAVE: &str = "leave the drift in the ranges by `CorrectRange(warm_up: leave)`";
 
 /// A calibrated drift, ready for views.
 pub(crate) struct DriftCurve<'a> {

@@ -70,7 +70,7 @@ fn what_cannot_be_compared_is_named() {
         message.contains("different cameras: the first has 176 x 144") && message.contains("200 x 144"),
         "{message}"
     );
-    let (_folder, newer) = copy(&|file| edit(file, "format_version: 1", "format_version: 3"));
+    let (_folder, newer) = copy(&|file| edit(file, "format_version: 2", "format_version: 3"));
     let message = compare(&truth, &newer).unwrap_err().to_string();
     assert!(message.contains("format_version") && message.contains("expected 2"), "{message}");
     let level = DiffRequest { first: truth.clone(), second: truth, level: 1.5 };

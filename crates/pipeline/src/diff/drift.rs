@@ -1,8 +1,8 @@
 //! The drifts of two calibrations: their parameters and what they do.
 
-use error_models::{NamedParameter, ParameterStatus, WarmUp};
+use error_models::NamedParameter;
 use nalgebra::DMatrix;
-use range_io::calibration::Calibration;
+use range_io::calibration::{CalibratedDrift, Calibration};
 use self_calibration::{DriftDifference, DriftSide, compare_drifts};
 use serde::Serialize;
 
@@ -52,16 +52,11 @@ pub(super) fn common_parameters(first: &Calibration, second: &Calibration) -> Ve
 
 /// The parameters of those names.
 pub(super) fn listed(calibration: &Calibration, names: &[String]) -> Vec<Listed> {
-    let Some(drift) = &calibration.warm_up else { return Vec::new() };
-    let values = drift.model.parameter_values().into_iter().zip(drift.deviations.iter().copied());
-    let all = drift.model.parameter_names().into_iter().zip(values);
-    let kept = all.filter(|(name, _)| names.contains(name));
-    kept.map(|(name, (value, sigma))| {
-        let prefixed = format!("{PREFIX}{name}");
-        let unit = WarmUp::parameter_unit(&name).unwrap_or_default().to_owned();
-        let status = if sigma > 0.0 { ParameterStatus::Estimated } else { ParameterStatus::Held };
-        let parameter = NamedParameter { name: prefixed.clone(), value, sigma, unit, status };
-        Listed { name: prefixed.clone(), in_file: prefixed, parameter }
+    let all = calibration.warm_up.iter().flat_map(CalibratedDrift::parameters);
+    let kept = all.filter(|parameter| names.contains(&parameter.name));
+    kept.map(|parameter| {
+        let name = format!("{PREFIX}{}", parameter.name);
+        Listed { in_file: name.clone(), name: name.clone(), parameter: NamedParameter { name, ..parameter } }
     })
     .collect()
 }

@@ -1,4 +1,4 @@
-use error_models::WarmUp;
+use error_models::{NamedParameter, ParameterStatus, WarmUp};
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
@@ -20,6 +20,18 @@ pub struct CalibratedDrift {
 }
 
 impl CalibratedDrift {
+    /// The parameters by [`WarmUp::parameter_names`], as far as values and deviations go.
+    pub fn parameters(&self) -> Vec<NamedParameter> {
+        let values = self.model.parameter_values().into_iter().zip(self.deviations.iter().copied());
+        let named = self.model.parameter_names().into_iter().zip(values);
+        let parameter = |(name, (value, sigma)): (String, (f64, f64))| {
+            let unit = WarmUp::parameter_unit(&name).unwrap_or_default().to_owned();
+            let status = if sigma > 0.0 { ParameterStatus::Estimated } else { ParameterStatus::Held };
+            NamedParameter { name, value, sigma, unit, status }
+        };
+        named.map(parameter).collect()
+    }
+
     /// Covariance matrix by [`WarmUp::parameter_names`], in the squares and products of their units.
     ///
     /// Refuses what the check of the file refuses.

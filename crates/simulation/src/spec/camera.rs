@@ -167,7 +167,7 @@ impl ExposureSpec {
         for (index, time) in further.iter().enumerate() {
             let field = format!("exposure.further_integration_times_s[{index}]");
             positive(&field, *time)?;
-            let new = !self.integration_times_s().take(index + 1).any(|earlier| earlier == *time);
+            let new = !self.integration_times_s().take(index + 1).any(|earlier| earlier.total_cmp(time).is_eq());
             require(new, field, time, "a time unlike those before it")?;
         }
         let interval = self.frame_interval_s;

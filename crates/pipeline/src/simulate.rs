@@ -146,20 +146,7 @@ fn disturbed(pose: &Isometry3<f64>, source: &SimulateSource, generator: &mut Pcg
 
 /// The calibration that takes off exactly what the simulation put on.
 fn true_calibration(spec: &SimulationSpec, simulator: &Simulator, scene: &str) -> Result<Calibration> {
-    let set = match &spec.errors.range_by_integration_time {
-        Some(set) => set.clone(),
-        None => {
-            let models = match &spec.errors.range {
-                Some(models) => models.clone(),
-                None => {
-                    modulations(spec)?.iter().map(|m| RangeErrorModel::error_free(m.ambiguity_interval_m())).collect()
-                }
-            };
-            let mut times: Vec<f64> = spec.exposure.integration_times_s().collect();
-            times.sort_by(f64::total_cmp);
-            ModelSet { entries: times.into_iter().map(|time| (time, models.clone())).collect() }
-        }
-    };
+    let set = spec.errors.range_by_integration_time.clone().map_or_else(|| same_at_all_times(spec), Ok)?;
     let scattering = spec.errors.scattering.as_ref();
     let mut calibration = Calibration::from_models(&spec.camera.geometry, &set, scattering)?;
     let method = "truth of a simulation".to_owned();
@@ -172,6 +159,17 @@ fn true_calibration(spec: &SimulationSpec, simulator: &Simulator, scene: &str) -
         correlation: None,
     });
     Ok(calibration)
+}
+
+/// The models of a camera whose range errors do not depend on the integration time.
+fn same_at_all_times(spec: &SimulationSpec) -> Result<ModelSet> {
+    let models = match &spec.errors.range {
+        Some(models) => models.clone(),
+        None => modulations(spec)?.iter().map(|m| RangeErrorModel::error_free(m.ambiguity_interval_m())).collect(),
+    };
+    let mut times: Vec<f64> = spec.exposure.integration_times_s().collect();
+    times.sort_by(f64::total_cmp);
+    Ok(ModelSet { entries: times.into_iter().map(|time| (time, models.clone())).collect() })
 }
 
 fn modulations(spec: &SimulationSpec) -> Result<Vec<Modulation>> {

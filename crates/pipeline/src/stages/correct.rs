@@ -39,7 +39,9 @@ pub(super) fn run(work: &mut Work, options: &CorrectRangeOptions, progress: &dyn
             _ => None,
         };
         if let Some(drift) = &drift {
-            models.iter_mut().for_each(|model| model.add_offset(drift.drift_m));
+            for model in &mut models {
+                model.add_offset(drift.drift_m);
+            }
             found.push(drift.clone());
         }
         let mut record = CorrectionRecord::new(format, principal_point_mm, pattern.clone(), drift);

@@ -16,14 +16,16 @@ use crate::{
 /// amplitudes that both models hold for.
 #[derive(Debug, Clone, PartialEq)]
 pub struct InterpolatedModel {
-    shorter: RangeErrorModel,
+    pub(crate) shorter: RangeErrorModel,
     /// With its weight; `None` at a time that has a model of its own.
-    longer: Option<(RangeErrorModel, f64)>,
+    pub(crate) longer: Option<(RangeErrorModel, f64)>,
+    /// Added to d0 of both; apart from it, so that a ledger can tell the two.
+    pub(crate) drift_m: f64,
 }
 
 impl From<RangeErrorModel> for InterpolatedModel {
     fn from(model: RangeErrorModel) -> Self {
-        Self { shorter: model, longer: None }
+        Self { shorter: model, longer: None, drift_m: 0.0 }
     }
 }
 
@@ -90,20 +92,28 @@ impl InterpolatedModel {
                 }
             }
         }
-        Ok(Self { shorter, longer: Some((longer, weight)) })
+        Ok(Self { shorter, longer: Some((longer, weight)), drift_m: 0.0 })
     }
 
-    /// Adds to d0, metre: the drift of a warming camera.
+    /// Adds to d0, metre: the drift of a warming camera, which a ledger tells from d0 as [`RangeTerm::WarmUp`].
     pub fn add_offset(&mut self, offset_m: f64) {
-        self.shorter.terms.d0 += offset_m;
-        if let Some((longer, _)) = &mut self.longer {
-            longer.terms.d0 += offset_m;
-        }
+        self.drift_m += offset_m;
+    }
+
+    /// One of the two with the drift in its d0.
+    fn drifted(&self, model: &RangeErrorModel) -> RangeErrorModel {
+        let mut model = model.clone();
+        model.terms.d0 += self.drift_m;
+        model
     }
 
     /// The correction at one pixel; arguments and behaviour outside the spans as for [`RangeErrorModel::correction`].
     pub fn correction(&self, range_m: f64, x_mm: f64, y_mm: f64, amplitude: f64) -> RangeCorrection {
-        let of = |model: &RangeErrorModel| model.correction(range_m, x_mm, y_mm, amplitude);
+        let of = |model: &RangeErrorModel| {
+            let found = model.correction(range_m, x_mm, y_mm, amplitude);
+            let drift_m = if model.range_in_span(range_m) { self.drift_m } else { 0.0 };
+            RangeCorrection { offset_m: found.offset_m + drift_m, ..found }
+        };
         let a = of(&self.shorter);
         let Some((longer, weight)) = &self.longer else { return a };
         let b = of(longer);
@@ -141,6 +151,9 @@ impl InterpolatedModel {
                     None => entries.push(LedgerEntry { change_m, ..other }),
                 }
             }
+        }
+        if self.drift_m != 0.0 && self.shorter.range_in_span(range_m) {
+            entries.push(LedgerEntry { term: RangeTerm::WarmUp, change_m: -self.drift_m });
         }
         entries.sort_by_key(|entry| entry.term);
         entries
@@ -184,13 +197,13 @@ impl InterpolatedModel {
         pattern: Option<&FixedPattern>,
     ) -> Result<CorrectionSummary> {
         let Some((longer, weight)) = &self.longer else {
-            return correct_frame(frame, &self.shorter, format, principal_point_mm, pattern);
+            return correct_frame(frame, &self.drifted(&self.shorter), format, principal_point_mm, pattern);
         };
         self.shorter.validate()?;
         // What both say of each pixel is linear in Δρ, and so is its blend: the loops need not know of two models.
         let mut other = frame.clone();
-        let of_longer = correct_frame(&mut other, longer, format, principal_point_mm, pattern)?;
-        let of_shorter = correct_frame(frame, &self.shorter, format, principal_point_mm, pattern)?;
+        let of_longer = correct_frame(&mut other, &self.drifted(longer), format, principal_point_mm, pattern)?;
+        let of_shorter = correct_frame(frame, &self.drifted(&self.shorter), format, principal_point_mm, pattern)?;
         for (range, other) in frame.range.as_mut_slice().iter_mut().zip(other.range.as_slice()) {
             *range = blend(f64::from(*range), f64::from(*other), *weight) as f32;
         }

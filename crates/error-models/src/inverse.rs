@@ -1,7 +1,7 @@
 //! From the true range to the observed one, and whether there is only one.
 
 use crate::steepest::steepest;
-use crate::{Error, PeriodicSpline, RangeErrorModel, RangePolynomial, Result};
+use crate::{Error, InterpolatedModel, PeriodicSpline, RangeErrorModel, RangePolynomial, Result};
 
 /// Newton steps, or bisections where Newton leaves the bracket, until the inverse is given up. Bisection
 /// alone needs about 60 for all digits.
@@ -108,5 +108,38 @@ impl RangeErrorModel {
     fn bound_by_range(&self) -> f64 {
         let periodic = self.further.spline.as_ref().map_or_else(|| self.terms.periodic_bound(), PeriodicSpline::bound);
         periodic + self.further.polynomial.as_ref().map_or(0.0, RangePolynomial::bound)
+    }
+}
+
+impl InterpolatedModel {
+    /// The range that the camera shows for a true range; arguments, errors and behaviour outside the spans as for
+    /// [`RangeErrorModel::observed_range`].
+    pub fn observed_range(&self, true_range_m: f64, x_mm: f64, y_mm: f64, amplitude: f64) -> Result<f64> {
+        // The drift depends on nothing at the pixel: it is as if the scene were further away.
+        let of = |model: &RangeErrorModel| {
+            model.require_monotone()?;
+            model.solve_observed_range(true_range_m + self.drift_m, x_mm, y_mm, amplitude)
+        };
+        let Some(shorter) = of(&self.shorter)? else { return Ok(true_range_m) };
+        let Some((longer, _)) = &self.longer else { return Ok(shorter) };
+        let Some(longer) = of(longer)? else { return Ok(true_range_m) };
+        // Both misclosures grow with the range, and so does their blend: its zero lies between theirs.
+        let mut bracket = [shorter.min(longer), shorter.max(longer)];
+        let mut observed = f64::midpoint(shorter, longer);
+        let mut misclosure = f64::INFINITY;
+        for _ in 0..MOST_ITERATIONS {
+            let correction = self.correction(observed, x_mm, y_mm, amplitude);
+            misclosure = observed - correction.total_m() - true_range_m;
+            // Four units in the last place: what rounding leaves.
+            let resolution = 4.0 * f64::EPSILON * observed.abs().max(1.0);
+            if misclosure.abs() <= resolution || bracket[1] - bracket[0] <= resolution {
+                return Ok(observed);
+            }
+            bracket[usize::from(misclosure > 0.0)] = observed;
+            let newton = observed - misclosure / (1.0 - correction.range_derivative);
+            let inside = newton > bracket[0] && newton < bracket[1];
+            observed = if inside { newton } else { f64::midpoint(bracket[0], bracket[1]) };
+        }
+        Err(Error::NotConverged { true_range_m, misclosure_m: misclosure })
     }
 }

@@ -12,6 +12,8 @@ use crate::{FixedPattern, RangeErrorModel, Result};
 pub enum RangeTerm {
     /// Rangefinder offset d0.
     Offset,
+    /// Drift of the warming camera, the same at all pixels (Sect. 4.7).
+    WarmUp,
     /// d2 and d3, wavelength U.
     PeriodicU,
     /// d4 and d5, wavelength U/2.
@@ -39,6 +41,7 @@ impl RangeTerm {
     pub fn words(self) -> &'static str {
         match self {
             Self::Offset => "offset d0",
+            Self::WarmUp => "drift of the warming camera",
             Self::PeriodicU => "periodic, wavelength U (d2, d3)",
             Self::PeriodicHalfU => "periodic, wavelength U/2 (d4, d5)",
             Self::PeriodicQuarterU => "periodic, wavelength U/4 (d6, d7)",
@@ -56,6 +59,7 @@ impl RangeTerm {
     pub fn group(self) -> &'static str {
         match self {
             Self::Offset => "offset",
+            Self::WarmUp => "warm-up",
             Self::PeriodicU | Self::PeriodicHalfU | Self::PeriodicQuarterU | Self::Spline => "periodic",
             Self::DelayX | Self::DelayY | Self::Surface => "position",
             Self::Polynomial => "polynomial",

@@ -1,7 +1,8 @@
 //! Models between two integration times: real, equal to the models at their times, continuous.
 
 use error_models::{
-    AmplitudeHyperbola, Error, FurtherShape, ModelSet, PolynomialShape, RangeErrorModel, RangeTerms, correct_frame,
+    AmplitudeHyperbola, Error, FurtherShape, ModelSet, PolynomialShape, RangeErrorModel, RangeTerm, RangeTerms,
+    correct_frame,
 };
 use proptest::prelude::*;
 use range_image::{Flags, ImageFormat, RangeFrame, Raster};
@@ -65,6 +66,22 @@ proptest! {
         let parts = set.at(time_s(share)).unwrap()[0].ledger(range_m, x, y, amplitude, None);
         let sum: f64 = parts.iter().map(|part| part.change_m).sum();
         prop_assert!((sum + found.total_m()).abs() < 1e-12, "the parts add up to {sum}");
+        // A drift is a part of its own, and the camera shows what correction takes off again.
+        let mut drifted = set.at(time_s(share)).unwrap().remove(0);
+        drifted.add_offset(0.03);
+        let with_drift = drifted.correction(range_m, x, y, amplitude).total_m();
+        prop_assert!((with_drift - found.total_m() - 0.03).abs() < 1e-15);
+        let parts = drifted.ledger(range_m, x, y, amplitude, None);
+        let of_drift: Vec<f64> =
+            parts.iter().filter(|part| part.term == RangeTerm::WarmUp).map(|part| part.change_m).collect();
+        prop_assert_eq!(of_drift, vec![-0.03]);
+        prop_assert!((parts.iter().map(|part| part.change_m).sum::<f64>() + with_drift).abs() < 1e-12);
+        let edge = 0.4;
+        if range_m > ranges[0] + edge && range_m < ranges[1] - edge {
+            let shown = drifted.observed_range(range_m - with_drift, x, y, amplitude).unwrap();
+            // The solver stops at four units in the last place; slopes of the terms stay below 0.9.
+            prop_assert!((shown - range_m).abs() < 1e-13, "{shown} instead of {range_m}");
+        }
         // At the models' own times, and close to them.
         prop_assert_eq!(at(0.001), models[0].correction(range_m, x, y, amplitude));
         prop_assert_eq!(at(0.016), models[1].correction(range_m, x, y, amplitude));
@@ -77,7 +94,8 @@ proptest! {
     fn frames_are_corrected_as_single_pixels_are(models in prop::array::uniform2(model()), share in 0.01..0.99_f64) {
         let set = set(models);
         prop_assume!(usable(&set));
-        let model = &set.at(0.001 * 16.0_f64.powf(share)).unwrap()[0];
+        let model = &mut set.at(0.001 * 16.0_f64.powf(share)).unwrap()[0];
+        model.add_offset(0.02);
         let format = ImageFormat::new(40, 3, [0.04, 0.04]).unwrap();
         let mut frame = RangeFrame {
             range: Raster::from_fn(40, 3, |col, row| 0.1 + 0.25 * col as f32 + 0.01 * row as f32),

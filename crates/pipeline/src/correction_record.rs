@@ -5,6 +5,8 @@ use std::sync::Arc;
 use error_models::{FixedPattern, InterpolatedModel, LedgerEntry, OutsideModel, RangeTerm};
 use range_image::{ImageFormat, RangeFrame, Raster};
 
+use crate::drift::ViewDrift;
+
 /// The ranges of a view as [`crate::Stage::CorrectRange`] found them, with the models that it applied.
 #[derive(Debug, Clone)]
 pub struct CorrectionRecord {
@@ -12,6 +14,7 @@ pub struct CorrectionRecord {
     format: ImageFormat,
     principal_point_mm: [f64; 2],
     pattern: Option<Arc<FixedPattern>>,
+    drift: Option<ViewDrift>,
 }
 
 /// One frequency.
@@ -36,8 +39,18 @@ pub(crate) struct PixelLedger {
 }
 
 impl CorrectionRecord {
-    pub(crate) fn new(format: ImageFormat, principal_point_mm: [f64; 2], pattern: Option<Arc<FixedPattern>>) -> Self {
-        Self { channels: Vec::new(), format, principal_point_mm, pattern }
+    pub(crate) fn new(
+        format: ImageFormat,
+        principal_point_mm: [f64; 2],
+        pattern: Option<Arc<FixedPattern>>,
+        drift: Option<ViewDrift>,
+    ) -> Self {
+        Self { channels: Vec::new(), format, principal_point_mm, pattern, drift }
+    }
+
+    /// The drift of the warming camera that was taken off, if one was.
+    pub fn drift(&self) -> Option<&ViewDrift> {
+        self.drift.as_ref()
     }
 
     /// Adds a frequency: its frame before and after the correction.

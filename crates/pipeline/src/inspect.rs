@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::path::Path;
 
-use range_io::calibration::Calibration;
+use range_io::calibration::{CalibratedDrift, Calibration};
 use range_io::ply::read_cloud;
 use range_io::survey::{Survey, read_frame};
 use serde::Serialize;
@@ -85,6 +85,14 @@ fn inspect_survey(path: &Path, found: &mut Inspection) -> Result<()> {
     found.add("frames", survey.frames.len());
     let stations: Vec<String> = stations.iter().map(|(name, frames)| format!("{name} ({frames})")).collect();
     found.add("stations (frames)", stations.join(", "));
+    if let Some(power_on_s) = survey.power_on_s {
+        found.add("switched on", format!("at {power_on_s} s on the clock of the frames"));
+    }
+    if let Some(path) = &survey.reference_path {
+        let ([left, right], [top, bottom]) = (path.columns, path.rows);
+        let words = format!("columns {left} to {right}, rows {top} to {bottom}: {} m", path.length_m);
+        found.add("optical reference", words);
+    }
     found.add("truth", if survey.truth.is_some() { "yes" } else { "no" });
     let root = root_of(path);
     let readable = (0..survey.frames.len()).try_for_each(|index| read_frame(&survey, &root, index).map(|_| ()));
@@ -104,7 +112,8 @@ fn inspect_calibration(path: &Path, found: &mut Inspection) -> Result<()> {
     found.add("method", &calibration.provenance.method);
     found.add("size", format!("{} x {} pixels", calibration.camera.width, calibration.camera.height));
     let ranges = calibration.range_models.iter().flat_map(|model| &model.parameters);
-    for parameter in calibration.parameters.iter().chain(ranges) {
+    let drift = calibration.warm_up.iter().flat_map(CalibratedDrift::parameters).collect::<Vec<_>>();
+    for parameter in calibration.parameters.iter().chain(ranges).chain(&drift) {
         let sigma = if parameter.sigma > 0.0 { format!(" +- {:.3e}", parameter.sigma) } else { String::new() };
         found.add(
             "parameter",

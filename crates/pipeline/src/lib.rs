@@ -4,6 +4,7 @@ mod calibrate;
 mod compare;
 mod correction_record;
 mod diff;
+mod drift;
 mod error;
 mod explain;
 mod fixed_pattern;
@@ -42,8 +43,10 @@ pub use compare::{
 };
 pub use correction_record::CorrectionRecord;
 pub use diff::{
-    CalibrationDifference, CorrectionLine, DiffRequest, ImageLine, JointLine, ParameterLine, PlaceLine, diff,
+    CalibrationDifference, CorrectionLine, DiffRequest, DriftLine, DriftPlace, ImageLine, JointLine, ParameterLine,
+    PlaceLine, diff,
 };
+pub use drift::{DriftError, DriftSource, DriftTreatment, ViewDrift};
 pub use error::{Error, Result};
 pub use explain::{ExplainRequest, Explanation, FlagReason, StageLine, StagePart, explain};
 pub use fixed_pattern::{FixedPatternRequest, FixedPatternSummary, PatternWall, estimate_pattern};

@@ -55,6 +55,7 @@ pub(crate) fn summarise(plan: &Plan, survey: &Path, outcome: &Outcome) -> Summar
         frames: outcome.survey.frames.len(),
         stations: stations.len(),
         stages: outcome.stages.clone(),
+        drifts: outcome.views.iter().filter_map(|view| view.correction.as_ref()?.drift().cloned()).collect(),
         ruled_out: ruled_out(outcome.survey.level),
         flags_fraction: flag_fractions(&outcome.views),
         points: outcome.clouds.iter().map(|cloud| usable(cloud).count()).sum(),

@@ -8,6 +8,7 @@ use range_io::ron_text;
 use range_io::survey::Level;
 use serde::{Deserialize, Serialize};
 
+pub use crate::drift::CorrectRangeOptions;
 use crate::{Error, Result};
 
 /// What a pipeline does, read from a RON file.
@@ -189,15 +190,16 @@ pub struct DeconvolveOptions {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct UnwrapOptions {
-    /// No range is longer than this, metre; bounds the wrap counts that are tried.
-    pub maximum_range_m: f64,
+    /// No range is longer than this, metre; bounds the wrap counts that are tried. `None`: 15 m, or the interval in which
+    /// several frequencies together are unique, where that is shorter.
+    pub maximum_range_m: Option<f64>,
     /// Below this confidence (0 to 1) a pixel is flagged as unsure.
     pub minimum_confidence: f64,
 }
 
 impl Default for UnwrapOptions {
     fn default() -> Self {
-        Self { maximum_range_m: 15.0, minimum_confidence: 0.5 }
+        Self { maximum_range_m: None, minimum_confidence: 0.5 }
     }
 }
 
@@ -255,11 +257,6 @@ impl Default for MultipathOptions {
         }
     }
 }
-
-/// Options of [`Stage::CorrectRange`].
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct CorrectRangeOptions {}
 
 /// Options of [`Stage::CorrectImagePoint`].
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]

@@ -109,7 +109,7 @@ fn nominal_start(network: &Path, survey: &Path) -> Result<Calibration> {
     let known = Calibration::read(survey)?;
     let mut start = Calibration::from_models(&camera, &ModelSet::default(), known.scattering.as_ref())?;
     (start.noise, start.range_noise, start.fixed_pattern) = (known.noise, known.range_noise, known.fixed_pattern);
-    start.noise_parameters = known.noise_parameters;
+    (start.noise_parameters, start.warm_up) = (known.noise_parameters, known.warm_up);
     Ok(start)
 }
 

@@ -10,9 +10,10 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
 use range_image::Modulation;
 use range_io::atomic::OutputFolder;
-use range_io::calibration::{Calibration, Provenance};
+use range_io::calibration::{CalibratedDrift, Calibration, Provenance};
 use range_io::survey::{
-    FrameEntry, InputFrame, Level, Survey, SurveyCamera, TruthFiles, TruthFrame, write_frame, write_truth,
+    FrameEntry, InputFrame, Level, ReferencePath, Survey, SurveyCamera, TruthFiles, TruthFrame, write_frame,
+    write_truth,
 };
 use range_io::tables::{Station, write_stations};
 use serde::Serialize;
@@ -76,7 +77,7 @@ fn write_frames(
 ) -> Result<Vec<FrameEntry>> {
     let fail = |error| Error::Scene { path: scene.to_owned(), source: error };
     let spec = simulator.spec();
-    let per_station = spec.exposure.frames_per_station;
+    let per_station = spec.exposure.frames_at_station();
     progress.begin("simulate", spec.stations.len() * per_station);
     let mut entries = Vec::new();
     for station in 0..spec.stations.len() {
@@ -96,7 +97,7 @@ fn write_frames(
                 station: frame.station,
                 timestamp_s: Some(frame.timestamp_s),
                 integration_time_s: Some(frame.integration_time_s),
-                temperature_c: None,
+                temperature_c: frame.temperature_c,
             });
             progress.advance(entries.len());
         }
@@ -145,18 +146,30 @@ fn disturbed(pose: &Isometry3<f64>, source: &SimulateSource, generator: &mut Pcg
 
 /// The calibration that takes off exactly what the simulation put on.
 fn true_calibration(spec: &SimulationSpec, simulator: &Simulator, scene: &str) -> Result<Calibration> {
-    let models = match &spec.errors.range {
-        Some(models) => models.clone(),
-        None => modulations(spec)?.iter().map(|m| RangeErrorModel::error_free(m.ambiguity_interval_m())).collect(),
-    };
-    let set = ModelSet { entries: vec![(spec.exposure.integration_time_s, models)] };
+    let set = spec.errors.range_by_integration_time.clone().map_or_else(|| same_at_all_times(spec), Ok)?;
     let scattering = spec.errors.scattering.as_ref();
     let mut calibration = Calibration::from_models(&spec.camera.geometry, &set, scattering)?;
     let method = "truth of a simulation".to_owned();
     calibration.provenance = Provenance { survey: scene.to_owned(), method, ..Provenance::default() };
     calibration.noise = spec.errors.noise;
     calibration.fixed_pattern = simulator.fixed_pattern().cloned();
+    calibration.warm_up = spec.errors.warm_up.as_ref().filter(|drift| !drift.is_empty()).map(|drift| CalibratedDrift {
+        model: drift.clone(),
+        deviations: vec![0.0; drift.parameter_names().len()],
+        correlation: None,
+    });
     Ok(calibration)
+}
+
+/// The models of a camera whose range errors do not depend on the integration time.
+fn same_at_all_times(spec: &SimulationSpec) -> Result<ModelSet> {
+    let models = match &spec.errors.range {
+        Some(models) => models.clone(),
+        None => modulations(spec)?.iter().map(|m| RangeErrorModel::error_free(m.ambiguity_interval_m())).collect(),
+    };
+    let mut times: Vec<f64> = spec.exposure.integration_times_s().collect();
+    times.sort_by(f64::total_cmp);
+    Ok(ModelSet { entries: times.into_iter().map(|time| (time, models.clone())).collect() })
 }
 
 fn modulations(spec: &SimulationSpec) -> Result<Vec<Modulation>> {
@@ -167,29 +180,34 @@ fn survey(spec: &SimulationSpec, frames: Vec<FrameEntry>) -> Survey {
     let geometry = spec.camera.geometry;
     let demodulation = spec.demodulation_options();
     let truth_frames = frames.iter().map(|frame| Path::new("truth").join(&frame.file)).collect();
+    let camera = SurveyCamera {
+        width: geometry.format.width,
+        height: geometry.format.height,
+        pixel_pitch_mm: geometry.format.pixel_pitch_mm,
+        principal_distance_mm: geometry.interior.principal_distance_mm,
+        // Nominal, as a data sheet would have it: the calibration brings the true one.
+        principal_point_mm: [0.0, 0.0],
+        modulation_hz: spec.camera.modulation_hz.clone(),
+        phase_steps: Some(spec.camera.phase_steps),
+        phase_sense: demodulation.phase_sense,
+        phase_offset_rad: demodulation.phase_offset_rad,
+        saturation: demodulation.saturation,
+        raw_scale: demodulation.raw_scale,
+    };
+    let truth = TruthFiles {
+        stations: Some("truth/stations.csv".into()),
+        calibration: Some("truth/calibration.ron".into()),
+        frames: truth_frames,
+    };
+    let reference_path = spec.camera.reference_path.map(|path| ReferencePath {
+        columns: path.columns,
+        rows: path.rows,
+        length_m: path.length_m,
+    });
     Survey {
-        camera: SurveyCamera {
-            width: geometry.format.width,
-            height: geometry.format.height,
-            pixel_pitch_mm: geometry.format.pixel_pitch_mm,
-            principal_distance_mm: geometry.interior.principal_distance_mm,
-            // Nominal, as a data sheet would have it: the calibration brings the true one.
-            principal_point_mm: [0.0, 0.0],
-            modulation_hz: spec.camera.modulation_hz.clone(),
-            phase_steps: Some(spec.camera.phase_steps),
-            phase_sense: demodulation.phase_sense,
-            phase_offset_rad: demodulation.phase_offset_rad,
-            saturation: demodulation.saturation,
-            raw_scale: demodulation.raw_scale,
-        },
-        level: Level::Samples,
-        frames,
-        depth: None,
-        truth: Some(TruthFiles {
-            stations: Some("truth/stations.csv".into()),
-            calibration: Some("truth/calibration.ron".into()),
-            frames: truth_frames,
-        }),
-        extras: std::collections::BTreeMap::new(),
+        power_on_s: spec.exposure.power_on_s,
+        reference_path,
+        truth: Some(truth),
+        ..Survey::new(camera, Level::Samples, frames)
     }
 }

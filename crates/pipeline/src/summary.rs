@@ -5,6 +5,7 @@ use std::fmt;
 
 use serde::Serialize;
 
+use crate::drift::ViewDrift;
 use crate::truth::RangeTruth;
 
 /// What a run did and how good the result is.
@@ -26,6 +27,9 @@ pub struct Summary {
     pub stations: usize,
     /// The stages that ran, in order.
     pub stages: Vec<StageSummary>,
+    /// What the ranges of each view had drifted by, where a drift was taken off.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub drifts: Vec<ViewDrift>,
     /// Stages that this input level rules out, and why.
     pub ruled_out: BTreeMap<String, String>,
     /// Fraction of all pixels that carry each flag; `any` counts pixels with at least one.

@@ -4,7 +4,9 @@ use crate::common;
 use std::path::{Path, PathBuf};
 
 use crate::common::calibration::{changed, edit, request, target_field};
+use error_models::{Transient, WarmUp};
 use pipeline::{DiffRequest, Silent, calibrate, diff, simulate_network};
+use range_io::calibration::{CalibratedDrift, Calibration};
 
 /// Calibrations of the target field's camera from sightings of another seed.
 fn calibration(folder: &Path, seed: u64) -> PathBuf {
@@ -65,9 +67,43 @@ fn what_cannot_be_compared_is_named() {
         message.contains("different cameras: the first has 176 x 144") && message.contains("200 x 144"),
         "{message}"
     );
-    let (_folder, newer) = copy(&|file| edit(file, "format_version: 1", "format_version: 2"));
+    let (_folder, newer) = copy(&|file| edit(file, "format_version: 2", "format_version: 3"));
     let message = compare(&truth, &newer).unwrap_err().to_string();
-    assert!(message.contains("format_version") && message.contains("expected 1"), "{message}");
+    assert!(message.contains("format_version") && message.contains("expected 2"), "{message}");
     let level = DiffRequest { first: truth.clone(), second: truth, level: 1.5 };
     assert!(diff(&level).unwrap_err().to_string().contains("level = 1.5"));
+}
+
+#[test]
+fn drifts_are_compared_by_parameters_and_by_what_they_do() {
+    let folder = tempfile::tempdir().unwrap();
+    let with = |name: &str, amplitude_m: f64, more: bool| {
+        let mut calibration = Calibration::read(target_field().join("truth/calibration.ron")).unwrap();
+        let mut transients = vec![Transient { amplitude_m, time_constant_s: 600.0 }];
+        transients.extend(more.then_some(Transient { amplitude_m: 0.001, time_constant_s: 60.0 }));
+        let model = WarmUp { transients, temperature: None, time_span_s: Some([10.0, 3000.0]) };
+        let deviations = [0.0005, 15.0].repeat(model.transients.len());
+        calibration.warm_up = Some(CalibratedDrift { model, deviations, correlation: None });
+        let file = folder.path().join(name);
+        calibration.write(&file).unwrap();
+        file
+    };
+    let (first, same, other) = (with("a.ron", 0.03, false), with("b.ron", 0.0302, false), with("c.ron", 0.025, false));
+    let found = compare(&first, &same).unwrap();
+    assert!(!found.significant && !found.drift.as_ref().unwrap().significant, "{found}");
+    let found = compare(&first, &other).unwrap();
+    println!("{found}");
+    let line = found.drift.as_ref().unwrap();
+    assert!(found.significant && line.significant && (line.largest.difference_m + 0.0049).abs() < 1e-4, "{line:?}");
+    assert!(found.to_string().contains("drift: differs by up to -4.92 mm"), "{found}");
+    let named: Vec<&str> =
+        found.parameters.iter().filter(|line| line.significant).map(|line| line.name.as_str()).collect();
+    assert_eq!(named, ["warm-up A1"]);
+    let a1 = found.parameters.iter().find(|line| line.name == "warm-up A1").unwrap();
+    assert!((a1.sigma - 0.0005 * 2.0_f64.sqrt()).abs() < 1e-12 && a1.unit == "m" && a1.status == "estimated");
+    // Exponentials of which one file has more have no partners; the curves have.
+    let found = compare(&first, &with("d.ron", 0.03, true)).unwrap();
+    assert!(found.drift.is_some() && found.parameters.iter().all(|line| !line.name.contains("warm-up")), "{found}");
+    let found = compare(&first, &target_field().join("truth/calibration.ron")).unwrap();
+    assert_eq!((found.drift.is_none(), found.only_first), (true, vec!["drift of the warming camera".to_owned()]));
 }

@@ -19,3 +19,4 @@ mod register;
 mod room;
 mod scattering;
 mod track;
+mod warm_up;

@@ -8,12 +8,12 @@ use std::path::Path;
 use camera_model::{Camera, ImageFormat, InteriorOrientation, LensDistortion};
 use error_models::{
     AmplitudeHyperbola, AmplitudeScale, FixedPattern, FurtherShape, ModelSet, NamedParameter, ParameterStatus,
-    PolynomialShape, RangeErrorModel, RangeNoise, RangeTerms, SurfaceShape,
+    PolynomialShape, RangeErrorModel, RangeNoise, RangeTerms, SurfaceShape, TemperatureDrift, Transient, WarmUp,
 };
 use proptest::prelude::*;
 use range_image::{Modulation, NoiseModel};
 use range_io::Error;
-use range_io::calibration::{Calibration, Correlation, Provenance, ValidSpan};
+use range_io::calibration::{CalibratedDrift, Calibration, Correlation, Provenance, ValidSpan};
 use scattering_deconvolution::{
     CompositePsf, FieldPolynomial, FieldTerm, GaussianTerm, Ghost, GhostDelay, GhostPlace, Psf,
 };
@@ -54,12 +54,31 @@ fn composite(weight: f64) -> Psf {
     })
 }
 
+fn drift() -> CalibratedDrift {
+    let names = ["A1", "tau1", "cT"].map(str::to_owned).to_vec();
+    let matrix = vec![vec![1.0, -0.6, 0.1], vec![-0.6, 1.0, 0.0], vec![0.1, 0.0, 1.0]];
+    CalibratedDrift {
+        model: WarmUp {
+            transients: vec![Transient { amplitude_m: -0.03, time_constant_s: 600.0 }],
+            temperature: Some(TemperatureDrift {
+                coefficient_m_per_k: 0.0008,
+                reference_c: 36.0,
+                span_c: Some([20.0, 40.0]),
+            }),
+            time_span_s: Some([10.0, 6000.0]),
+        },
+        deviations: vec![0.0004, 12.0, 0.00002],
+        correlation: Some(Correlation { names, matrix }),
+    }
+}
+
 fn full() -> Calibration {
     let mut calibration = Calibration::from_models(&camera(), &models(), Some(&psf())).unwrap();
     calibration.parameters[2].status = ParameterStatus::Estimated;
     calibration.parameters[2].sigma = 0.004;
     calibration.range_models[1].parameters[0].status = ParameterStatus::Estimated;
     calibration.range_models[1].parameters[0].sigma = 0.002;
+    calibration.warm_up = Some(drift());
     calibration.noise = Some(NoiseModel { shot_variance_per_unit: 0.3, dark_sigma: 5.0 });
     calibration.fixed_pattern = Some(FixedPattern {
         width: 4,
@@ -148,6 +167,58 @@ fn a_file_of_before_affinity_reads_as_without() {
 }
 
 #[test]
+fn a_file_of_version_1_is_read_and_written_as_the_present_one() {
+    let present = Calibration { warm_up: None, ..full() };
+    let text = present.to_text().unwrap();
+    assert!(text.contains("format_version: 2") && !text.contains("warm_up"), "{text}");
+    let older = text.replace("format_version: 2", "format_version: 1");
+    let read = Calibration::parse(Path::new("c.ron"), &older).unwrap();
+    assert_eq!(read, present);
+    assert_eq!(read.to_text().unwrap(), text);
+    // What version 1 did not know is no part of it.
+    let mixed = full().to_text().unwrap().replace("format_version: 2", "format_version: 1");
+    let message = Calibration::parse(Path::new("c.ron"), &mixed).unwrap_err().to_string();
+    assert!(message.contains("`warm_up`: needs `format_version: 2`"), "{message}");
+}
+
+#[test]
+fn the_drift_has_a_covariance() {
+    let covariance = drift().covariance().unwrap();
+    // Products of decimal numbers in double precision.
+    assert!((covariance[(0, 1)] + 0.6 * 0.0004 * 12.0).abs() < 1e-18);
+    assert!((covariance[(2, 2)] - 4e-10).abs() < 1e-24);
+    let uncorrelated = CalibratedDrift { correlation: None, ..drift() };
+    assert_eq!(uncorrelated.covariance().unwrap()[(0, 1)], 0.0);
+    let short = CalibratedDrift { deviations: vec![0.1], ..drift() };
+    assert!(matches!(short.covariance(), Err(Error::Value { field, .. }) if field == "warm_up.deviations"));
+}
+
+#[test]
+fn bad_drifts_are_refused_by_name() {
+    let refused = |expected: &str, change: fn(&mut CalibratedDrift)| {
+        let message = refusal(|c| change(c.warm_up.as_mut().unwrap()));
+        assert!(message.contains(expected), "{message}\nexpected: {expected}");
+    };
+    refused("`warm_up.deviations`: has 2 values, expected 3: A1, tau1, cT", |d| d.deviations.truncate(2));
+    refused("`warm_up.deviations[1]`: standard deviation of `tau1` is -1", |d| d.deviations[1] = -1.0);
+    refused("standard deviation of `A1` is NaN", |d| d.deviations[0] = f64::NAN);
+    refused("`warm_up.model`: time_constant_s = 0", |d| d.model.transients[0].time_constant_s = 0.0);
+    refused("`warm_up.model`: has neither a transient", |d| d.model = WarmUp::default());
+    refused("`warm_up.correlation.names[2]`: `cT` is no parameter", |d| {
+        d.model.temperature = None;
+        d.deviations.truncate(2);
+    });
+    refused("`warm_up.correlation.matrix[0][1]`: correlation of `A1` and `tau1` is 0.5, but", |d| {
+        d.correlation.as_mut().unwrap().matrix[0][1] = 0.5;
+    });
+    // Three parameters cannot all run against each other.
+    refused("`warm_up.correlation.matrix`: has the eigenvalue -0.8", |d| {
+        let row = |own: usize| (0..3).map(|other| if other == own { 1.0 } else { -0.9 }).collect();
+        d.correlation.as_mut().unwrap().matrix = (0..3).map(row).collect();
+    });
+}
+
+#[test]
 fn a_file_is_written_and_read() {
     let folder = tempfile::tempdir().unwrap();
     full().write(folder.path().join(Calibration::FILE_NAME)).unwrap();
@@ -230,7 +301,7 @@ fn invalid_calibrations_are_refused_by_name() {
     said(refusal(|c| c.parameters[0].name = "cx".into()), "`cx` is no parameter, expected one of xp, yp, c, k1");
     said(refusal(|c| c.parameters[0].unit = "px".into()), "`xp` is in `px`, expected `mm`");
     said(refusal(|c| c.parameters[0].sigma = -1.0), "standard deviation of `xp` is -1");
-    said(refusal(|c| c.format_version = 2), "`format_version`: is 2, expected 1");
+    said(refusal(|c| c.format_version = 3), "`format_version`: is 3, expected 2 (version 1 is read as well)");
     said(refusal(|c| c.camera.width = 0), "`camera`: ");
     said(refusal(|c| c.fixed_pattern.as_mut().unwrap().width = 5), "`fixed_pattern`: is 5 x 3 pixels, expected 4 x 3");
     said(refusal(|c| c.fixed_pattern.as_mut().unwrap().offset_m.truncate(11)), "has 11 values, expected 12");

@@ -9,7 +9,7 @@ use proptest::prelude::*;
 use range_image::{Flags, Modulation, PhaseSense, Raster, RawFrame, Samples};
 use range_io::npz::NpzWriter;
 use range_io::survey::{
-    InputFrame, Level, StoredDepth, Survey, TruthFrame, read_frame, read_truth, write_frame, write_truth,
+    InputFrame, Level, ReferencePath, StoredDepth, Survey, TruthFrame, read_frame, read_truth, write_frame, write_truth,
 };
 use range_io::{Error, ron_text};
 
@@ -103,6 +103,31 @@ fn faults_name_file_place_and_field() {
     assert!(fault("    level: samples,\n", "").contains("level"));
     for cut in 0..TEXT.trim_end().len() {
         assert!(Survey::parse(Path::new("survey.ron"), &TEXT[..cut]).is_err(), "cut at {cut}");
+    }
+}
+
+#[test]
+fn power_on_and_the_optical_reference_are_read_and_checked() {
+    let with = |fields: &str| TEXT.replace("level: samples,", &format!("level: samples, {fields},"));
+    let read = |fields: &str| Survey::parse(Path::new("survey.ron"), &with(fields));
+    let survey = read("power_on_s: -90.5, reference_path: (columns: (1, 2), rows: (0, 0), length_m: 0.75)").unwrap();
+    assert_eq!(survey.power_on_s, Some(-90.5));
+    assert_eq!(survey.reference_path, Some(ReferencePath { columns: [1, 2], rows: [0, 0], length_m: 0.75 }));
+    let again = Survey::parse(Path::new("survey.ron"), &ron_text::to_text(&survey).unwrap()).unwrap();
+    assert_eq!(again, survey);
+    let cases = [
+        ("power_on_s: 1.0", "`frames[0].timestamp_s`: is before the camera was switched on (`power_on_s: 1`)"),
+        ("power_on_s: NaN", "`power_on_s`: is NaN"),
+        (
+            "reference_path: (columns: (1, 3), rows: (0, 0), length_m: 1)",
+            "`reference_path.columns`: is (1, 3), expected the first and the last of 3 columns",
+        ),
+        ("reference_path: (columns: (1, 2), rows: (1, 0), length_m: 1)", "`reference_path.rows`: is (1, 0)"),
+        ("reference_path: (columns: (1, 2), rows: (0, 0), length_m: 0)", "`reference_path.length_m`: is 0"),
+    ];
+    for (fields, expected) in cases {
+        let message = read(fields).unwrap_err().to_string();
+        assert!(message.contains(expected), "{message}\nexpected: {expected}");
     }
 }
 

@@ -34,8 +34,9 @@ pub use amplitude_or_position::{
 };
 pub use calibration::RangeCalibration;
 pub use comparison::{
-    CorrectionComparison, CorrectionDifference, CorrectionSide, ImageComparison, ImageSide, JointTest,
-    ParameterComparison, ParameterDifference, ParameterSet, compare_corrections, compare_images, compare_parameters,
+    CorrectionComparison, CorrectionDifference, CorrectionSide, DriftComparison, DriftDifference, DriftSide,
+    ImageComparison, ImageSide, JointTest, ParameterComparison, ParameterDifference, ParameterSet, compare_corrections,
+    compare_drifts, compare_images, compare_parameters,
 };
 pub use difference::{DifferenceOptions, RangeDifference, differences_to_plane};
 pub use error::{Error, Result};

@@ -13,6 +13,7 @@ mod amplitude_or_position;
 mod automatic_terms;
 mod bad_networks;
 mod comparison;
+mod drift_comparison;
 mod fixed_pattern;
 mod further_terms;
 mod gross_errors;

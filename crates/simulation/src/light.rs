@@ -6,7 +6,7 @@ use camera_model::Camera;
 use nalgebra::{Point3, UnitVector3, Vector3};
 
 use crate::scene::{Hit, Scene};
-use crate::spec::camera::{ExposureSpec, IlluminationSpec};
+use crate::spec::camera::IlluminationSpec;
 use crate::spec::errors::MultipathSpec;
 
 /// Distance by which a secondary ray starts above its surface, far below any range's noise.
@@ -58,10 +58,10 @@ pub(crate) struct Source {
 }
 
 impl Lighting {
-    pub fn new(illumination: &IlluminationSpec, exposure: &ExposureSpec, multipath: Option<&MultipathSpec>) -> Self {
+    pub fn new(illumination: &IlluminationSpec, integration_time_s: f64, multipath: Option<&MultipathSpec>) -> Self {
         Self {
-            source: illumination.source_power * exposure.integration_time_s,
-            ambient: illumination.ambient_power * exposure.integration_time_s,
+            source: illumination.source_power * integration_time_s,
+            ambient: illumination.ambient_power * integration_time_s,
             contrast: illumination.modulation_contrast,
             vignetting_exponent: illumination.vignetting_exponent,
             directions: multipath.map_or_else(Vec::new, cosine_directions),
@@ -71,6 +71,12 @@ impl Lighting {
     /// Share of the light that reaches a pixel, falling off from the axis.
     pub fn vignetting(&self, camera: &Camera, pixel: [f64; 2]) -> f64 {
         if self.vignetting_exponent == 0.0 { 1.0 } else { (-camera.ray(pixel).z).powf(self.vignetting_exponent) }
+    }
+
+    /// The light of a path inside the camera and nothing else.
+    pub fn only(&self, path: Path, light: &mut PixelLight) {
+        light.clear();
+        light.add(path, self.contrast);
     }
 
     /// Adds the light of one ray and where it ends; it counts for `share` of its pixel.
@@ -168,9 +174,7 @@ mod tests {
             ambient_power: 0.0,
             vignetting_exponent: 0.0,
         };
-        let exposure =
-            ExposureSpec { frames_per_station: 1, integration_time_s: 2.0, frame_interval_s: 0.0, start_s: 0.0 };
-        Lighting::new(&illumination, &exposure, Some(&MultipathSpec { directions, seed: 3 }))
+        Lighting::new(&illumination, 2.0, Some(&MultipathSpec { directions, seed: 3 }))
     }
 
     /// A floor at z = 0 and a wall at x = 0; the source looks down into the corner.

@@ -3,20 +3,22 @@
 use std::f64::consts::TAU;
 
 use camera_model::Camera;
-use error_models::{FixedPattern, RangeErrorModel};
+use error_models::{FixedPattern, InterpolatedModel};
 use nalgebra::{Isometry3, Point3, Vector3};
 use range_image::{ImageFormat, Raster};
 use rayon::prelude::*;
 
-use crate::light::{Lighting, PixelLight, Source};
+use crate::light::{Lighting, Path, PixelLight, Source};
 use crate::scene::{Hit, Scene};
+use crate::spec::camera::ReferencePathSpec;
 use crate::spec::errors::MixedPixelsSpec;
 use crate::{FrameTruth, Result};
 
 /// One frequency as the renderer sees it.
+#[derive(Clone)]
 pub(crate) struct Channel {
     pub ambiguity_interval_m: f64,
-    pub model: Option<RangeErrorModel>,
+    pub model: Option<InterpolatedModel>,
 }
 
 /// The image of one station without scattering and noise.
@@ -36,7 +38,15 @@ pub(crate) struct Renderer<'a> {
     pub channels: &'a [Channel],
     pub pattern: Option<&'a FixedPattern>,
     pub mixed_pixels: Option<MixedPixelsSpec>,
+    pub reference: Option<Reference>,
     pub world_from_camera: Isometry3<f64>,
+}
+
+/// Pixels that see a path inside the camera.
+#[derive(Clone, Copy)]
+pub(crate) struct Reference {
+    pub spec: ReferencePathSpec,
+    pub amplitude: f64,
 }
 
 /// One pixel of the result.
@@ -75,14 +85,16 @@ impl Renderer<'_> {
     }
 
     fn pixel(&self, col: usize, row: usize, light: &mut PixelLight) -> Result<Pixel> {
+        if let Some(Reference { spec, amplitude }) = self.reference.filter(|there| there.spec.contains([col, row])) {
+            self.lighting.only(Path { range_m: spec.length_m, amplitude }, light);
+            let signals = self.signals([col, row], Some(spec.length_m), light)?;
+            return Ok(Pixel { range: f32::NAN, mixed: false, object: None, offset: light.offset as f32, signals });
+        }
         let center = [col as f64, row as f64];
         let axis = self.cast(center);
         let (_, seen) = axis;
         let mixed = self.gather(center, &axis, light);
-        let mut signals = Vec::with_capacity(self.channels.len());
-        for channel in self.channels {
-            signals.push(self.signal(channel, [col, row], seen.map(|hit| hit.distance_m), light)?);
-        }
+        let signals = self.signals([col, row], seen.map(|hit| hit.distance_m), light)?;
         Ok(Pixel {
             range: seen.map_or(f32::NAN, |hit| hit.distance_m as f32),
             mixed,
@@ -90,6 +102,10 @@ impl Renderer<'_> {
             offset: light.offset as f32,
             signals,
         })
+    }
+
+    fn signals(&self, pixel: [usize; 2], range_m: Option<f64>, light: &PixelLight) -> Result<Vec<Signal>> {
+        self.channels.iter().map(|channel| self.signal(channel, pixel, range_m, light)).collect()
     }
 
     fn origin(&self) -> Point3<f64> {

@@ -2,7 +2,7 @@ use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use camera_model::RayTable;
-use error_models::FixedPattern;
+use error_models::{FixedPattern, RangeErrorModel};
 use nalgebra::Point3;
 use rand::RngExt;
 use range_image::RawFrame;
@@ -10,10 +10,11 @@ use scattering_deconvolution::Scatterer;
 
 use crate::light::Lighting;
 use crate::random::{mix, row_generator};
-use crate::render::{Channel, Image, Renderer};
+use crate::render::{Channel, Image, Reference, Renderer};
 use crate::samples::sample_frame;
 use crate::scene::Scene;
 use crate::spec::SimulationSpec;
+use crate::spec::camera::ReferencePathSpec;
 use crate::spec::errors::GrossErrorsSpec;
 use crate::{Error, FrameTruth, Result};
 
@@ -30,9 +31,11 @@ pub struct SimulatedFrame {
     pub timestamp_s: f64,
     /// Integration time of a sample.
     pub integration_time_s: f64,
+    /// Temperature of the camera, degree Celsius, where the description has one.
+    pub temperature_c: Option<f64>,
     /// The samples.
     pub raw: RawFrame,
-    /// What they should show; shared by the frames of a station.
+    /// What they should show; shared by the frames of a station with one integration time, unless the camera drifts.
     pub truth: Arc<FrameTruth>,
 }
 
@@ -49,9 +52,16 @@ pub struct SimulatedSurvey {
 pub struct Simulator {
     spec: Arc<SimulationSpec>,
     scene: Scene,
+    /// One for each integration time.
+    exposures: Vec<Exposure>,
+    pattern: Option<FixedPattern>,
+}
+
+/// Light and range errors of one integration time.
+struct Exposure {
+    integration_time_s: f64,
     lighting: Lighting,
     channels: Vec<Channel>,
-    pattern: Option<FixedPattern>,
 }
 
 /// What one station sees, before noise: as many frames as wanted can be taken of it.
@@ -59,6 +69,13 @@ pub struct Simulator {
 pub struct StationImage {
     spec: Arc<SimulationSpec>,
     station: usize,
+    /// One for each integration time; none where the camera drifts from frame to frame.
+    views: Vec<Exposed>,
+}
+
+/// What the sensor shows without noise, and the truth of it.
+#[derive(Debug, Clone)]
+struct Exposed {
     image: Image,
     truth: Arc<FrameTruth>,
 }
@@ -71,11 +88,11 @@ pub struct StationImage {
 /// What [`SimulationSpec::validate`] finds, or an observed range that the range errors do not determine.
 pub fn simulate(spec: &SimulationSpec, seed: u64, progress: &(dyn Fn(usize, usize) + Sync)) -> Result<SimulatedSurvey> {
     let simulator = Simulator::new(spec)?;
-    let total = spec.stations.len() * spec.exposure.frames_per_station;
+    let total = spec.stations.len() * spec.exposure.frames_at_station();
     let mut frames = Vec::new();
     for station in 0..spec.stations.len() {
         let image = simulator.station(station)?;
-        for frame in 0..spec.exposure.frames_per_station {
+        for frame in 0..spec.exposure.frames_at_station() {
             frames.push(simulator.frame(&image, frame, seed)?);
             progress(frames.len(), total);
         }
@@ -100,8 +117,11 @@ impl Simulator {
         let format = spec.camera.geometry.format;
         Ok(Self {
             scene,
-            lighting: Lighting::new(&spec.illumination, &spec.exposure, spec.errors.multipath.as_ref()),
-            channels: channels(spec)?,
+            exposures: spec
+                .exposure
+                .integration_times_s()
+                .map(|time| Exposure::new(spec, time))
+                .collect::<Result<_>>()?,
             pattern: spec.errors.fixed_pattern.map(|pattern| pattern.pattern(format.width, format.height)),
             spec: Arc::new(spec.clone()),
         })
@@ -120,23 +140,42 @@ impl Simulator {
     /// Renders what one station sees.
     pub fn station(&self, station: usize) -> Result<StationImage> {
         let count = self.spec.stations.len();
-        let place = self.spec.stations.get(station).ok_or(Error::NoSuch { what: "station", index: station, count })?;
+        if station >= count {
+            return Err(Error::NoSuch { what: "station", index: station, count });
+        }
+        let drifts = self.spec.errors.warm_up.is_some();
+        let still = self.exposures.iter().filter(|_| !drifts);
+        let views = still.map(|exposure| self.expose(station, exposure, 0.0)).collect::<Result<_>>()?;
+        Ok(StationImage { spec: Arc::clone(&self.spec), station, views })
+    }
+
+    /// Renders a station's image at an integration time, all ranges too long by a drift.
+    fn expose(&self, station: usize, exposure: &Exposure, drift_m: f64) -> Result<Exposed> {
+        let (camera, errors) = (&self.spec.camera, &self.spec.errors);
+        let mut channels = exposure.channels.clone();
+        for channel in channels.iter_mut().filter(|_| drift_m != 0.0) {
+            let interval_m = channel.ambiguity_interval_m;
+            channel.model.get_or_insert_with(|| RangeErrorModel::error_free(interval_m).into()).add_offset(drift_m);
+        }
+        let reference =
+            |spec: ReferencePathSpec| Reference { spec, amplitude: spec.power * exposure.integration_time_s };
         let renderer = Renderer {
             scene: &self.scene,
-            camera: &self.spec.camera.geometry,
-            lighting: &self.lighting,
-            channels: &self.channels,
+            camera: &camera.geometry,
+            lighting: &exposure.lighting,
+            channels: &channels,
             pattern: self.pattern.as_ref(),
-            mixed_pixels: self.spec.errors.mixed_pixels,
-            world_from_camera: place.world_from_camera(),
+            mixed_pixels: errors.mixed_pixels,
+            reference: camera.reference_path.map(reference),
+            world_from_camera: self.spec.stations[station].world_from_camera(),
         };
         let (mut image, truth) = renderer.render()?;
         // Before the scattering, which does not ask where light comes from.
-        if let Some(gross) = &self.spec.errors.gross_errors {
+        if let Some(gross) = &errors.gross_errors {
             spoil(&mut image, gross, station);
         }
         self.scatter(&mut image)?;
-        Ok(StationImage { spec: Arc::clone(&self.spec), station, image, truth: Arc::new(truth) })
+        Ok(Exposed { image, truth: Arc::new(truth) })
     }
 
     /// Takes one frame of a station, with noise of its own.
@@ -147,20 +186,34 @@ impl Simulator {
         if !Arc::ptr_eq(&self.spec, &image.spec) {
             return Err(Error::ForeignImage);
         }
-        let (exposure, stations) = (self.spec.exposure, &self.spec.stations);
-        let count = exposure.frames_per_station;
+        let (spec, count) = (&self.spec.exposure, self.spec.exposure.frames_at_station());
         if frame >= count {
             return Err(Error::NoSuch { what: "frame", index: frame, count });
         }
-        let number = image.station * count + frame;
+        let (station, number) = (image.station, image.station * count + frame);
+        let timestamp_s = spec.start_s + number as f64 * spec.frame_interval_s;
+        let temperature_c = spec.temperature_c(timestamp_s);
+        let setting = frame / spec.frames_per_station;
+        let exposure = &self.exposures[setting];
+        let drifted;
+        let exposed = match (image.views.get(setting), &self.spec.errors.warm_up) {
+            (Some(exposed), _) => exposed,
+            (None, drift) => {
+                let time_s = spec.power_on_s.map(|power_on_s| timestamp_s - power_on_s);
+                let drift_m = drift.as_ref().map_or(Ok(0.0), |drift| drift.value(time_s, temperature_c))?;
+                drifted = self.expose(station, exposure, drift_m)?;
+                &drifted
+            }
+        };
         Ok(SimulatedFrame {
-            station: stations[image.station].name.clone(),
-            station_index: image.station,
+            station: self.spec.stations[station].name.clone(),
+            station_index: station,
             frame_index: frame,
-            timestamp_s: exposure.start_s + number as f64 * exposure.frame_interval_s,
+            timestamp_s,
             integration_time_s: exposure.integration_time_s,
-            raw: sample_frame(&self.spec, &image.image, seed, number)?,
-            truth: Arc::clone(&image.truth),
+            temperature_c,
+            raw: sample_frame(&self.spec, &exposed.image, seed, number)?,
+            truth: Arc::clone(&exposed.truth),
         })
     }
 
@@ -204,13 +257,19 @@ fn spoil(image: &mut Image, gross: &GrossErrorsSpec, station: usize) {
     }
 }
 
-fn channels(spec: &SimulationSpec) -> Result<Vec<Channel>> {
-    let models = spec.errors.range.as_deref().unwrap_or_default();
-    let channel = |(index, modulation): (usize, range_image::Modulation)| Channel {
-        ambiguity_interval_m: modulation.ambiguity_interval_m(),
-        model: models.get(index).cloned(),
-    };
-    Ok(spec.camera.modulations()?.into_iter().enumerate().map(channel).collect())
+impl Exposure {
+    fn new(spec: &SimulationSpec, integration_time_s: f64) -> Result<Self> {
+        let models = spec.errors.range_at(integration_time_s)?;
+        let channel = |(index, modulation): (usize, range_image::Modulation)| Channel {
+            ambiguity_interval_m: modulation.ambiguity_interval_m(),
+            model: models.get(index).cloned(),
+        };
+        Ok(Self {
+            integration_time_s,
+            lighting: Lighting::new(&spec.illumination, integration_time_s, spec.errors.multipath.as_ref()),
+            channels: spec.camera.modulations()?.into_iter().enumerate().map(channel).collect(),
+        })
+    }
 }
 
 fn require_free_stations(spec: &SimulationSpec, scene: &Scene) -> Result<()> {

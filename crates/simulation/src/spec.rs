@@ -67,7 +67,21 @@ impl SimulationSpec {
         }
         let modulations = self.camera.modulations()?;
         let intervals: Vec<f64> = modulations.iter().map(range_image::Modulation::ambiguity_interval_m).collect();
-        self.errors.validate(&intervals)
+        self.errors.validate(&intervals)?;
+        for time in self.exposure.integration_times_s() {
+            self.errors.range_at(time)?;
+        }
+        self.validate_warm_up()
+    }
+
+    /// A drift needs what it depends on.
+    fn validate_warm_up(&self) -> Result<()> {
+        let Some(drift) = &self.errors.warm_up else { return Ok(()) };
+        let (power_on, temperature) = (self.exposure.power_on_s, self.exposure.temperature);
+        let holds = drift.transients.is_empty() || power_on.is_some();
+        require(holds, "exposure.power_on_s", &power_on, "a time, as errors.warm_up depends on it")?;
+        let holds = drift.temperature.is_none() || temperature.is_some();
+        require(holds, "exposure.temperature", &temperature, "a temperature, as errors.warm_up depends on it")
     }
 
     /// The options with which the simulated samples are demodulated: sense, offset, scale, saturation and noise are

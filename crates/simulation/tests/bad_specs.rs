@@ -2,11 +2,11 @@
 
 use crate::common;
 use crate::common::plain;
-use error_models::RangeErrorModel;
+use error_models::{ModelSet, RangeErrorModel, TemperatureDrift, Transient, WarmUp};
 use range_image::NoiseModel;
 use simulation::{
-    AttitudeSpec, DigitisationSpec, Error, FixedPatternSpec, MixedPixelsSpec, MultipathSpec, SampleType, ShapeSpec,
-    SimulationSpec, Simulator, TextureSpec, simulate, simulate_frame,
+    AttitudeSpec, DigitisationSpec, Error, FixedPatternSpec, MixedPixelsSpec, MultipathSpec, ReferencePathSpec,
+    SampleType, ShapeSpec, SimulationSpec, Simulator, TemperatureSpec, TextureSpec, simulate, simulate_frame,
 };
 
 type Change = fn(&mut SimulationSpec);
@@ -77,6 +77,22 @@ const WRONG: &[(&str, Change)] = &[
     ("exposure.frames_per_station", |s| s.exposure.frames_per_station = 0),
     ("exposure.integration_time_s", |s| s.exposure.integration_time_s = 0.0),
     ("exposure.frame_interval_s", |s| s.exposure.frame_interval_s = -0.1),
+    ("exposure.further_integration_times_s[0]", |s| s.exposure.further_integration_times_s = vec![-0.001]),
+    ("exposure.further_integration_times_s[1]", |s| s.exposure.further_integration_times_s = vec![0.001, 0.002]),
+    ("exposure.power_on_s", |s| s.exposure.power_on_s = Some(1.0)),
+    ("exposure.power_on_s", |s| s.exposure.temperature = Some(temperature(600.0))),
+    ("exposure.temperature.time_constant_s", |s| s.exposure.temperature = Some(temperature(0.0))),
+    ("exposure.power_on_s", |s| s.errors.warm_up = Some(drift(true))),
+    ("exposure.temperature", |s| s.errors.warm_up = Some(drift(false))),
+    ("camera.reference_path.columns", |s| s.camera.reference_path = Some(reference([47, 48], 0.7))),
+    ("camera.reference_path.length_m", |s| s.camera.reference_path = Some(reference([0, 1], 0.0))),
+    ("errors.range_by_integration_time", |s| {
+        s.errors.range = Some(vec![model(common::INTERVAL_M)]);
+        s.errors.range_by_integration_time = Some(ModelSet { entries: vec![(0.002, vec![model(common::INTERVAL_M)])] });
+    }),
+    ("errors.range_by_integration_time.entries[0][0].ambiguity_interval_m", |s| {
+        s.errors.range_by_integration_time = Some(ModelSet { entries: vec![(0.002, vec![model(5.0)])] });
+    }),
     ("stations", |s| s.stations.clear()),
     ("stations[1].name", |s| s.stations.push(s.stations[0].clone())),
     ("stations[0].position_m", |s| s.stations[0].position_m[2] = f64::NAN),
@@ -99,6 +115,25 @@ const WRONG: &[(&str, Change)] = &[
 
 fn model(ambiguity_interval_m: f64) -> RangeErrorModel {
     RangeErrorModel::error_free(ambiguity_interval_m)
+}
+
+fn temperature(time_constant_s: f64) -> TemperatureSpec {
+    TemperatureSpec { cold_c: 20.0, warm_c: 40.0, time_constant_s }
+}
+
+/// By time or by temperature.
+fn drift(by_time: bool) -> WarmUp {
+    if by_time {
+        let transients = vec![Transient { amplitude_m: 0.03, time_constant_s: 600.0 }];
+        WarmUp { transients, ..WarmUp::default() }
+    } else {
+        let temperature = TemperatureDrift { coefficient_m_per_k: 0.001, reference_c: 40.0, span_c: None };
+        WarmUp { temperature: Some(temperature), ..WarmUp::default() }
+    }
+}
+
+fn reference(columns: [usize; 2], length_m: f64) -> ReferencePathSpec {
+    ReferencePathSpec { columns, rows: [0, 1], length_m, power: 1e6 }
 }
 
 fn digitisation(raw_scale: f64, saturation: Option<f64>) -> DigitisationSpec {
@@ -134,6 +169,10 @@ fn what_other_crates_check_comes_through() {
     assert!(matches!(simulate(&spec, 1, &|_, _| {}), Err(Error::Image(_))));
     let mut spec = plain();
     spec.errors.range = Some(vec![model(f64::NAN)]);
+    assert!(matches!(simulate(&spec, 1, &|_, _| {}), Err(Error::RangeError(_))));
+    // No model at 2 ms nor on both sides of it.
+    let mut spec = plain();
+    spec.errors.range_by_integration_time = Some(ModelSet { entries: vec![(0.003, vec![model(common::INTERVAL_M)])] });
     assert!(matches!(simulate(&spec, 1, &|_, _| {}), Err(Error::RangeError(_))));
 }
 

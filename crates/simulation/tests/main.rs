@@ -1,5 +1,5 @@
 //! All tests of the crate as one program: linked once, run side by side.
-#![allow(clippy::expect_used, clippy::unwrap_used)]
+#![allow(clippy::expect_used, clippy::float_cmp, clippy::unwrap_used)]
 
 mod bad_specs;
 mod common;
@@ -9,3 +9,4 @@ mod fixtures;
 mod multipath;
 mod noise_and_threads;
 mod scattering;
+mod warming;

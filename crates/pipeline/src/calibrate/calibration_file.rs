@@ -43,6 +43,7 @@ pub(crate) fn calibration(
         scattering: known.and_then(|known| known.scattering.clone()),
         scattering_parameters: known.map(|known| known.scattering_parameters.clone()).unwrap_or_default(),
         fixed_pattern: known.and_then(|known| known.fixed_pattern.clone()),
+        warm_up: known.and_then(|known| known.warm_up.clone()),
         correlation: None,
         span: span(outcome),
         provenance: Provenance {

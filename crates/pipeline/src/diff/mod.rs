@@ -1,5 +1,6 @@
 //! Two calibrations held against each other: which differences are significant, and what they do.
 
+mod drift;
 mod sides;
 mod words;
 
@@ -14,6 +15,7 @@ use serde::Serialize;
 
 use crate::{Error, Result};
 
+pub use self::drift::{DriftLine, DriftPlace};
 use self::sides::{Pair, Side};
 
 /// Which calibrations to compare, and how strictly.
@@ -50,6 +52,8 @@ pub struct CalibrationDifference {
     pub only_second: Vec<String>,
     /// What the differences do to ranges, for each integration time and frequency of both files.
     pub corrections: Vec<CorrectionLine>,
+    /// What they do to the drift of a warming camera; `None` where not both files have one.
+    pub drift: Option<DriftLine>,
     /// What they do to image points; `None` where the second camera does not see a direction of the first.
     pub image: Option<ImageLine>,
     /// What else is to be minded.
@@ -165,6 +169,7 @@ pub fn diff(request: &DiffRequest) -> Result<CalibrationDifference> {
             .map_err(|error| refused(&error))?;
         corrections.push(correction_line(one.name.clone(), &found));
     }
+    let drift = drift::line(&first, &second, request.level)?;
     let image = image(&pair.first, &pair.second, request.level)?;
     let mut notes = pair.notes.clone();
     if image.is_none() {
@@ -173,6 +178,7 @@ pub fn diff(request: &DiffRequest) -> Result<CalibrationDifference> {
     let significant = joint.as_ref().is_some_and(|joint| joint.significant)
         || parameters.iter().any(|line| line.significant)
         || corrections.iter().any(|line| line.significant)
+        || drift.as_ref().is_some_and(|line| line.significant)
         || image.as_ref().is_some_and(|line| line.significant);
     Ok(CalibrationDifference {
         first: request.first.display().to_string(),
@@ -182,12 +188,17 @@ pub fn diff(request: &DiffRequest) -> Result<CalibrationDifference> {
         parameters,
         joint,
         not_tested: pair.not_tested,
-        only_first: [compared.only_first, pair.models_of_first].concat(),
-        only_second: [compared.only_second, pair.models_of_second].concat(),
+        only_first: only(compared.only_first, pair.models_of_first, drift::alone(&first, &second)),
+        only_second: only(compared.only_second, pair.models_of_second, drift::alone(&second, &first)),
         corrections,
+        drift,
         image,
         notes,
     })
+}
+
+fn only(parameters: Vec<String>, models: Vec<String>, drift: Option<String>) -> Vec<String> {
+    parameters.into_iter().chain(models).chain(drift).collect()
 }
 
 fn refused(error: &self_calibration::Error) -> Error {

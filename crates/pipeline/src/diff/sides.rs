@@ -6,6 +6,7 @@ use nalgebra::DMatrix;
 use range_io::calibration::{Calibration, RangeCalibration};
 use self_calibration::{CorrectionSide, ParameterSet};
 
+use super::drift;
 use crate::Result;
 
 /// Both files.
@@ -37,10 +38,10 @@ pub(super) struct Correction {
 }
 
 /// A parameter with its name in words and its name in the file's correlations.
-struct Listed {
-    name: String,
-    in_file: String,
-    parameter: NamedParameter,
+pub(super) struct Listed {
+    pub(super) name: String,
+    pub(super) in_file: String,
+    pub(super) parameter: NamedParameter,
 }
 
 impl Pair {
@@ -62,7 +63,12 @@ impl Pair {
         let models_of_second = second.range_models.iter().enumerate();
         let models_of_second = models_of_second.filter(|(j, _)| !models.iter().any(|[_, other]| other == j));
         let models_of_second = models_of_second.map(|(_, model)| format!("range model of {}", words(model))).collect();
-        let lists = [(first, 0), (second, 1)].map(|(calibration, side)| listed(calibration, &models, side));
+        let drifts = drift::common_parameters(first, second);
+        let lists = [(first, 0), (second, 1)].map(|(calibration, side)| {
+            let mut all = listed(calibration, &models, side);
+            all.extend(drift::listed(calibration, &drifts));
+            all
+        });
         let unknown = |list: &[Listed]| -> Vec<String> {
             list.iter().filter(|listed| listed.parameter.sigma.is_nan()).map(|listed| listed.name.clone()).collect()
         };
@@ -138,7 +144,8 @@ impl Side {
     fn new(calibration: &Calibration, listed: Vec<Listed>, not_tested: &[String]) -> Result<Self> {
         let tested: Vec<Listed> = listed.into_iter().filter(|listed| !not_tested.contains(&listed.name)).collect();
         let names: Vec<&str> = tested.iter().map(|listed| listed.in_file.as_str()).collect();
-        let covariance = calibration.covariance(&names)?;
+        let mut covariance = calibration.covariance(&names)?;
+        drift::add_covariance(calibration, &names, &mut covariance)?;
         let parameters = ParameterSet {
             names: tested.iter().map(|listed| listed.name.clone()).collect(),
             values: tested.iter().map(|listed| listed.parameter.value).collect(),

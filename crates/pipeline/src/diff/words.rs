@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::{CalibrationDifference, CorrectionLine, ImageLine, PlaceLine};
+use super::{CalibrationDifference, CorrectionLine, DriftLine, DriftPlace, ImageLine, PlaceLine};
 
 impl fmt::Display for CalibrationDifference {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -10,6 +10,9 @@ impl fmt::Display for CalibrationDifference {
         writeln!(f, "{} and {} {verdict} (level {} %)", self.first, self.second, 100.0 * self.level)?;
         for line in &self.corrections {
             writeln!(f, "{}", correction(line))?;
+        }
+        if let Some(line) = &self.drift {
+            writeln!(f, "{}", drift(line))?;
         }
         if let Some(line) = &self.image {
             writeln!(f, "{}", image(line))?;
@@ -91,6 +94,18 @@ fn place(at: &PlaceLine) -> String {
         1e3 * at.band_m,
         at.range_m
     )
+}
+
+fn drift(line: &DriftLine) -> String {
+    let place = |at: &DriftPlace| {
+        let time = at.time_s.map_or_else(String::new, |time| format!(" {time:.0} s after power-on"));
+        let temperature = at.temperature_c.map_or_else(String::new, |celsius| format!(" at {celsius:.1} °C"));
+        format!("{:+.2} mm (band {:.2} mm){time}{temperature}", 1e3 * at.difference_m, 1e3 * at.band_m)
+    };
+    let (largest, clearest) = (place(&line.largest), place(&line.clearest));
+    let clearest = if clearest == largest { String::new() } else { format!("; clearest {clearest}") };
+    let rms = 1e3 * line.rms_m;
+    format!("drift: differs by up to {largest}{clearest}; rms {rms:.2} mm{}", mark(line.significant))
 }
 
 fn image(line: &ImageLine) -> String {

@@ -79,6 +79,7 @@ fn reason(flag: Flags, stage: &Stage, view: &View, pixel: [usize; 2], state: &Pi
         (Flags::UNWRAP_UNSURE, Stage::Unwrap(options)) => unsure(options.minimum_confidence),
         (Flags::UNWRAP_UNSURE, Stage::RepairWraps(options)) => unsure(options.minimum_confidence),
         (_, Stage::Average(_)) => ("a frame that went into the mean carries it".to_owned(), None),
+        (Flags::NO_DATA, Stage::CorrectRange(_)) => ("it sees the camera's optical reference".to_owned(), None),
         (Flags::NO_DATA, _) => ("there is no range here".to_owned(), None),
         (Flags::SATURATED, _) => ("a raw sample reached the largest value of the sensor".to_owned(), None),
         _ => (format!("set by stage {}", stage.name()), None),

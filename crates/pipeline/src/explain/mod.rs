@@ -227,7 +227,7 @@ fn find_frame(survey: &Survey, name: &str) -> Result<usize> {
 /// All stages that level and calibration leave room for.
 fn all_stages(level: Level, calibration: Option<&Calibration>) -> Plan {
     let scattering = calibration.is_some_and(|calibration| calibration.scattering.is_some());
-    let models = calibration.is_some_and(|calibration| !calibration.range_models.is_empty());
+    let models = calibration.is_some_and(crate::stages::corrects_ranges);
     let mut stages =
         vec![Stage::Demodulate(crate::DemodulateOptions::default()), Stage::Average(crate::AverageOptions::default())];
     if scattering {

@@ -1,5 +1,7 @@
 //! A stage's change of one pixel, taken apart.
 
+use error_models::{LedgerEntry, RangeTerm};
+
 use super::{StagePart, WHOLE_INTERVALS};
 use crate::plan::Stage;
 use crate::truth::wrap;
@@ -65,8 +67,11 @@ fn unwrapped(before: &View, after: &View, [col, row]: [usize; 2], change_m: f64)
 fn corrected(after: &View, pixel: [usize; 2]) -> Vec<StagePart> {
     let Some(record) = &after.correction else { return Vec::new() };
     let ledger = record.pixel(pixel);
-    let entry = |entry: &error_models::LedgerEntry| StagePart {
-        what: entry.term.words().to_owned(),
+    let entry = |entry: &LedgerEntry| StagePart {
+        what: match record.drift().filter(|_| entry.term == RangeTerm::WarmUp) {
+            Some(drift) => format!("{} (sigma {:.2} mm)", entry.term.words(), 1e3 * drift.sigma_m),
+            None => entry.term.words().to_owned(),
+        },
         group: entry.term.group(),
         change_m: entry.change_m,
     };

@@ -15,6 +15,7 @@ use crate::further_term::{json, provenance_with, refuse, start, write};
 use crate::plan::{CorrectRangeOptions, DeconvolveOptions, DemodulateOptions, UnwrapOptions};
 use crate::progress::Progress;
 use crate::run::process_with;
+use crate::stages::corrects_ranges;
 use crate::view::ViewData;
 use crate::{Error, Plan, Result, Stage, report};
 
@@ -95,7 +96,7 @@ fn preparation(survey: &Survey, calibration: &Calibration) -> Plan {
         }
         stages.push(Stage::Unwrap(UnwrapOptions::default()));
     }
-    if !calibration.range_models.is_empty() {
+    if corrects_ranges(calibration) {
         stages.push(Stage::CorrectRange(CorrectRangeOptions::default()));
     }
     Plan { name: "fixed pattern".to_owned(), source: None, calibrate: None, stages }

@@ -363,12 +363,5 @@ fn first_model(calibration: &Calibration) -> Result<RangeErrorModel> {
 
 /// A survey of tables alone.
 pub(super) fn survey_of_tables(camera: &SurveyCamera) -> Survey {
-    Survey {
-        camera: camera.clone(),
-        level: Level::Range,
-        frames: Vec::new(),
-        depth: None,
-        truth: None,
-        extras: BTreeMap::new(),
-    }
+    Survey::new(camera.clone(), Level::Range, Vec::new())
 }

@@ -19,6 +19,7 @@ use crate::plan::{
 };
 use crate::progress::Progress;
 use crate::run::process;
+use crate::stages::corrects_ranges;
 use crate::statistics::quantile;
 use crate::{Error, Plan, Result, Stage};
 
@@ -87,14 +88,14 @@ fn survey_stations(path: &Path, request: &RegisterRequest, progress: &dyn Progre
         )));
     }
     let (calibration, _) = read_calibration(&root_of(path), request.calibration.as_deref())?;
-    let stages = stages(survey.level, calibration.as_ref())?;
+    let stages = stages(survey.level, calibration.as_ref());
     let plan = Plan { name: "register".to_owned(), source: None, calibrate: None, stages };
     let outcome = process(&plan, &root_of(path), request.calibration.as_deref(), progress)?;
     Ok(Input { stations: Station::of_views(&outcome), vertical_axis: outcome.vertical_axis })
 }
 
 /// The way from the survey's level to flagged points, as far as the calibration has something to say.
-pub(crate) fn stages(level: Level, calibration: Option<&Calibration>) -> Result<Vec<Stage>> {
+pub(crate) fn stages(level: Level, calibration: Option<&Calibration>) -> Vec<Stage> {
     let mut stages = Vec::new();
     if level == Level::Samples {
         stages.push(Stage::Demodulate(DemodulateOptions::default()));
@@ -108,15 +109,14 @@ pub(crate) fn stages(level: Level, calibration: Option<&Calibration>) -> Result<
     }
     if let Some(calibration) = calibration {
         // A camera that corrects its ranges itself has a calibration of its lens alone.
-        let models = calibration.model_set().map_err(Error::stage("CorrectRange", "calibration"))?;
-        if !models.entries.is_empty() {
+        if corrects_ranges(calibration) {
             stages.push(Stage::CorrectRange(CorrectRangeOptions::default()));
         }
         stages.push(Stage::CorrectImagePoint(CorrectImagePointOptions::default()));
     }
     stages.push(Stage::PointCloud(PointCloudOptions::default()));
     stages.push(Stage::Flag(FlagOptions::default()));
-    Ok(stages)
+    stages
 }
 
 /// The pixels of the camera; `None` for one too small to be registered by pixels.

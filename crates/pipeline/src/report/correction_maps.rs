@@ -22,8 +22,13 @@ pub(super) fn correction_maps(view: &View) -> Result<Vec<(String, String)>> {
             None => groups.push((term.group(), change.collect())),
         }
     }
-    let constant = groups.iter().find(|(name, _)| *name == "offset").and_then(|(_, map)| largest(map));
-    groups.retain(|(name, _)| *name != "offset");
+    let constant = |(group, what): (&str, &str)| {
+        let (_, map) = groups.iter().find(|(name, _)| *name == group)?;
+        largest(map).map(|change| format!(" Besides, {what} moved every corrected pixel by {change:+.2} mm."))
+    };
+    let constants = [("offset", "the offset d0"), ("warm-up", "the drift of the warming camera")];
+    let constants: String = constants.into_iter().filter_map(constant).collect();
+    groups.retain(|(name, _)| !["offset", "warm-up"].contains(name));
     let mut all: Vec<f64> = groups.iter().flat_map(|(_, map)| map.iter().map(|change| change.abs())).collect();
     let limit = quantile(&mut all, 0.99);
     let limit = if limit.is_finite() { limit.max(0.1) } else { 0.1 };
@@ -31,11 +36,9 @@ pub(super) fn correction_maps(view: &View) -> Result<Vec<(String, String)>> {
     let of_first = if record.frequencies() > 1 { " Of the first frequency." } else { "" };
     let (width, _) = view.size();
     let figure = |(index, (name, map)): (usize, &(&str, Vec<f64>))| {
-        let offset = constant.filter(|_| index == 0).map_or_else(String::new, |offset| {
-            format!(" Besides, the offset d0 moved every corrected pixel by {offset:+.2} mm.")
-        });
+        let besides = if index == 0 { constants.as_str() } else { "" };
         let most = largest(map).unwrap_or(0.0);
-        let caption = format!("New minus old range; the largest change is {most:+.2} mm.{of_first}{offset}");
+        let caption = format!("New minus old range; the largest change is {most:+.2} mm.{of_first}{besides}");
         Ok((raster_figure(&format!("Correction: {name}"), width, map, &scale)?, caption))
     };
     groups.iter().enumerate().map(figure).collect()

@@ -8,11 +8,14 @@ mod deconvolve;
 mod demodulate;
 mod flag;
 mod multipath;
+mod reference_path;
 mod register;
 mod repair;
 mod unwrap;
 
 use std::collections::BTreeMap;
+
+use range_io::calibration::Calibration;
 
 use crate::progress::Progress;
 use crate::work::Work;
@@ -20,6 +23,11 @@ use crate::{Result, Stage};
 
 /// Figures that a stage reports, with units in their names.
 pub(crate) type Findings = BTreeMap<String, f64>;
+
+/// Whether a calibration has anything that [`Stage::CorrectRange`] takes off.
+pub(crate) fn corrects_ranges(calibration: &Calibration) -> bool {
+    !calibration.range_models.is_empty() || calibration.warm_up.is_some()
+}
 
 /// Runs one stage on all views.
 pub(crate) fn apply(stage: &Stage, work: &mut Work, progress: &dyn Progress) -> Result<Findings> {
@@ -29,7 +37,7 @@ pub(crate) fn apply(stage: &Stage, work: &mut Work, progress: &dyn Progress) -> 
         Stage::Deconvolve(options) => deconvolve::run(work, options, progress),
         Stage::Unwrap(options) => unwrap::run(work, options, progress),
         Stage::RepairWraps(options) => repair::run(work, options, progress),
-        Stage::CorrectRange(_) => correct::run(work, progress),
+        Stage::CorrectRange(options) => correct::run(work, options, progress),
         Stage::CorrectImagePoint(_) => cloud::correct_image_point(work),
         Stage::Multipath(options) => multipath::run(work, options, progress),
         Stage::PointCloud(_) => cloud::run(work, progress),

@@ -24,10 +24,15 @@ pub(super) fn run(work: &mut Work, options: &MultipathOptions, progress: &dyn Pr
             return Err(Error::Needs { stage: "Multipath", needs: "Unwrap" });
         }
         if view.channels.len() > 1 {
-            add("contradictions_px", flag_contradictions(view, options)?);
-        }
-        if view.channels.len() > 2 && options.treatment == MultipathTreatment::Resolve {
-            add("resolved_px", resolve(view, options)?);
+            match flag_contradictions(view, options)? {
+                Some(flagged) => {
+                    add("contradictions_px", flagged);
+                    if view.channels.len() > 2 && options.treatment == MultipathTreatment::Resolve {
+                        add("resolved_px", resolve(view, options)?);
+                    }
+                }
+                None => add("views_not_compared", 1),
+            }
         }
         add("at_risk_px", assess(view, work.rays.directions(), options)?);
         progress.advance(index + 1);
@@ -39,13 +44,16 @@ fn systematics(options: &MultipathOptions) -> Systematics {
     Systematics { floor_m: options.floor_m, ..Systematics::default() }
 }
 
-/// Flags pixels whose frequencies contradict each other.
-fn flag_contradictions(view: &mut View, options: &MultipathOptions) -> Result<usize> {
+/// Flags pixels whose frequencies contradict each other; `None` where too few pixels tell how the frequencies respond.
+fn flag_contradictions(view: &mut View, options: &MultipathOptions) -> Result<Option<usize>> {
     let name = view.name();
     let fail = |error| Error::stage("Multipath", &name)(error);
-    let Some(mut frame) = view.complex_channels() else { return Ok(0) };
-    let ViewData::Range(range) = &mut view.data else { return Ok(0) };
-    let response = estimate_response(&frame, RESPONSE_SNR).map_err(fail)?.response;
+    let Some(mut frame) = view.complex_channels() else { return Ok(None) };
+    let ViewData::Range(range) = &mut view.data else { return Ok(None) };
+    let response = match estimate_response(&frame, RESPONSE_SNR) {
+        Err(multipath::Error::TooFewPixels { .. }) => return Ok(None),
+        estimate => estimate.map_err(fail)?.response,
+    };
     let options = DetectionOptions {
         false_alarm: options.false_alarm_probability,
         systematics: systematics(options),
@@ -54,7 +62,7 @@ fn flag_contradictions(view: &mut View, options: &MultipathOptions) -> Result<us
     frame.flags.clone_from(&range.flags);
     let found = detect(&mut frame, &range.range, &response, &options).map_err(fail)?;
     range.flags = frame.flags;
-    Ok(found.flagged)
+    Ok(Some(found.flagged))
 }
 
 /// Replaces the ranges of flagged pixels by those of the direct path, where the frequencies tell it.

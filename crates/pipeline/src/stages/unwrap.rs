@@ -1,5 +1,7 @@
 use camera_model::Camera;
-use phase_unwrap::{ImageGeometry, MultiFrequencyOptions, SpatialOptions, unwrap_multi_frequency, unwrap_spatial};
+use phase_unwrap::{
+    ImageGeometry, MultiFrequencyOptions, SpatialOptions, combined_interval_m, unwrap_multi_frequency, unwrap_spatial,
+};
 use range_image::{ComplexChannel, ComplexFrame, Flags, RangeFrame, Raster};
 
 use super::Findings;
@@ -9,6 +11,9 @@ use crate::statistics::median;
 use crate::view::{View, ViewData};
 use crate::work::Work;
 use crate::{Error, Result};
+
+/// Longest range where nothing else bounds it, metre: that of a room.
+const FURTHEST_M: f64 = 15.0;
 
 /// Phases to ranges: by hypotheses where there are several frequencies, spatially and by amplitude where there is one.
 pub(super) fn run(work: &mut Work, options: &UnwrapOptions, progress: &dyn Progress) -> Result<Findings> {
@@ -49,7 +54,7 @@ fn wrap_counts(
     let mask = frame.flags.map(|flags| !flags.contains(Flags::NO_DATA));
     if let [channel] = frame.channels.as_slice() {
         let interval = channel.modulation.ambiguity_interval_m();
-        let maximum_wraps = (options.maximum_range_m / interval).floor().max(0.0) as u16;
+        let maximum_wraps = (options.maximum_range_m.unwrap_or(FURTHEST_M) / interval).floor().max(0.0) as u16;
         let mut sigmas: Vec<f64> = channel.sigma.as_slice().iter().map(|sigma| f64::from(*sigma)).collect();
         let noise = Some(median(&mut sigmas) as f32).filter(|noise| noise.is_finite());
         let spatial = SpatialOptions {
@@ -65,7 +70,11 @@ fn wrap_counts(
     let phases: Vec<_> = frame.channels.iter().map(ComplexChannel::phase).collect();
     let sigmas: Vec<_> = frame.channels.iter().map(ComplexChannel::sigma_phase).collect();
     let modulations: Vec<_> = frame.channels.iter().map(|channel| channel.modulation).collect();
-    let multi = MultiFrequencyOptions { maximum_range_m: Some(options.maximum_range_m), ..Default::default() };
+    let maximum_range_m = match options.maximum_range_m {
+        Some(maximum_m) => maximum_m,
+        None => combined_interval_m(&modulations).map_err(Error::stage("Unwrap", name))?.min(FURTHEST_M),
+    };
+    let multi = MultiFrequencyOptions { maximum_range_m: Some(maximum_range_m), ..Default::default() };
     let unwrapped = unwrap_multi_frequency(&phases, &modulations, Some(&sigmas), Some(&mask), &multi);
     let unwrapped = unwrapped.map_err(Error::stage("Unwrap", name))?;
     Ok((unwrapped.wraps, unwrapped.confidence))

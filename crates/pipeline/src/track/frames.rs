@@ -35,7 +35,7 @@ impl FrameSource {
         let (mut work, frames) = open(path, read_calibration(&root_of(path), calibration)?)?;
         let order = in_order(path, &work.outcome.survey)?;
         let mut each = Vec::new();
-        for stage in stages(work.outcome.survey.level, work.calibration.as_ref())? {
+        for stage in stages(work.outcome.survey.level, work.calibration.as_ref()) {
             match stage {
                 // Frames of a moving camera are not averaged.
                 Stage::Average(_) => {}

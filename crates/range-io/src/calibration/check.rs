@@ -10,7 +10,9 @@ type Check = Result<(), InvalidField>;
 impl Calibration {
     pub(super) fn check(&self) -> Check {
         let (version, known) = (self.format_version, Self::FORMAT_VERSION);
-        require(version == known, "format_version", || format!("is {version}, expected {known}"))?;
+        require(version == known, "format_version", || {
+            format!("is {version}, expected {known} (version {} is read as well)", Self::OLDEST_FORMAT_VERSION)
+        })?;
         self.camera.validate().map_err(|error| InvalidField::new("camera", error.to_string()))?;
         self.check_camera_parameters()?;
         for (index, model) in self.range_models.iter().enumerate() {
@@ -33,8 +35,9 @@ impl Calibration {
             "weight 1, sigma_px 1, ...",
         )?;
         self.fixed_pattern.iter().try_for_each(|pattern| self.check_pattern(pattern))?;
+        self.warm_up.iter().try_for_each(|drift| drift.check("warm_up"))?;
         if let Some(correlation) = &self.correlation {
-            correlation.check(&self.parameter_names())?;
+            correlation.check("correlation", &self.parameter_names())?;
         }
         self.span.check()?;
         match self.provenance.sigma0 {

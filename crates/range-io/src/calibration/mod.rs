@@ -2,6 +2,7 @@
 
 mod check;
 mod correlation;
+mod drift;
 mod models;
 
 use std::path::Path;
@@ -12,9 +13,10 @@ use scattering_deconvolution::Psf;
 use serde::{Deserialize, Serialize};
 
 pub use correlation::Correlation;
+pub use drift::CalibratedDrift;
 
 use crate::text::read_text;
-use crate::{Result, atomic, ron_text};
+use crate::{InvalidField, Result, atomic, ron_text};
 
 /// A camera's calibration with the quality of every parameter.
 ///
@@ -50,6 +52,9 @@ pub struct Calibration {
     /// Offset of each pixel in range.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fixed_pattern: Option<FixedPattern>,
+    /// Drift of all ranges while the camera warms up, and with its temperature.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub warm_up: Option<CalibratedDrift>,
     /// Correlations of the estimated parameters; without it they count as uncorrelated.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub correlation: Option<Correlation>,
@@ -121,8 +126,11 @@ pub struct Provenance {
 }
 
 impl Calibration {
-    /// The version of the format that is read and written.
-    pub const FORMAT_VERSION: u32 = 1;
+    /// The version of the format that is written.
+    pub const FORMAT_VERSION: u32 = 2;
+
+    /// The oldest version that is read; it differs from the present one in that it knows no `warm_up`.
+    pub const OLDEST_FORMAT_VERSION: u32 = 1;
 
     /// Name of the file in a folder of results.
     pub const FILE_NAME: &str = "calibration.ron";
@@ -149,10 +157,27 @@ impl Calibration {
     }
 
     /// Reads and checks the text of a `calibration.ron`; `file` stands for it in messages.
+    ///
+    /// A file of an older version becomes one of [`Self::FORMAT_VERSION`].
     pub fn parse(file: &Path, text: &str) -> Result<Self> {
-        let calibration: Self = ron_text::parse(file, text)?;
-        calibration.check().map_err(|invalid| ron_text::at_field(file, text, invalid))?;
+        let mut calibration: Self = ron_text::parse(file, text)?;
+        calibration
+            .renew()
+            .and_then(|()| calibration.check())
+            .map_err(|invalid| ron_text::at_field(file, text, invalid))?;
         Ok(calibration)
+    }
+
+    /// Makes one of the present version of what was read.
+    fn renew(&mut self) -> std::result::Result<(), InvalidField> {
+        if self.format_version == Self::OLDEST_FORMAT_VERSION {
+            if self.warm_up.is_some() {
+                let reason = format!("needs `format_version: {}`", Self::FORMAT_VERSION);
+                return Err(InvalidField::new("warm_up", reason));
+            }
+            self.format_version = Self::FORMAT_VERSION;
+        }
+        Ok(())
     }
 
     /// Checks names, units, values, spans, table sizes and correlations.

@@ -29,6 +29,7 @@ impl Calibration {
             scattering: scattering.cloned(),
             scattering_parameters: Vec::new(),
             fixed_pattern: None,
+            warm_up: None,
             correlation: None,
             span: ValidSpan::default(),
             provenance: Provenance::default(),

@@ -37,6 +37,12 @@ pub struct Survey {
     /// How depths stored as integers are to be read; needed for PNG and Matroska.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub depth: Option<StoredDepth>,
+    /// When the camera was switched on, on the clock of the frames' `timestamp_s`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub power_on_s: Option<f64>,
+    /// A part of the image that shows light over a known path inside the camera.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reference_path: Option<ReferencePath>,
     /// Files with the truth of a simulation.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub truth: Option<TruthFiles>,
@@ -102,6 +108,18 @@ pub struct StoredDepth {
     pub invalid: Vec<u16>,
 }
 
+/// An optical reference (Sect. 4.7): pixels that see, through a fibre inside the camera, a path that does not change.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ReferencePath {
+    /// First and last column of the pixels.
+    pub columns: [usize; 2],
+    /// First and last row of the pixels.
+    pub rows: [usize; 2],
+    /// Length of the path as a range: half the way of the light.
+    pub length_m: f64,
+}
+
 /// Files that hold the truth of a simulated survey.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -120,6 +138,20 @@ pub struct TruthFiles {
 impl Survey {
     /// Name of the file in a survey's folder.
     pub const FILE_NAME: &str = "survey.ron";
+
+    /// A survey of a camera and its frames, without any of the optional fields.
+    pub fn new(camera: SurveyCamera, level: Level, frames: Vec<FrameEntry>) -> Self {
+        Self {
+            camera,
+            level,
+            frames,
+            depth: None,
+            power_on_s: None,
+            reference_path: None,
+            truth: None,
+            extras: BTreeMap::new(),
+        }
+    }
 
     /// Reads and checks a `survey.ron`, given by its own path or by its folder's. A folder without one may be of TUM
     /// RGB-D (`depth.txt`) or of 7-Scenes (`frame-000000.depth.png`); `camera-intrinsics.txt` in it, the camera's matrix

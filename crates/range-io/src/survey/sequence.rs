@@ -34,8 +34,7 @@ pub(super) fn read_sequence(folder: &Path) -> Result<Option<Survey>> {
     };
     let image = png16::read(folder.join(&first.file))?;
     let camera = camera(folder, [image.width(), image.height()], published)?;
-    let (truth, extras) = (None, std::collections::BTreeMap::new());
-    let survey = Survey { camera, level: Level::Depth, frames: entries, depth: Some(depth), truth, extras };
+    let survey = Survey { depth: Some(depth), ..Survey::new(camera, Level::Depth, entries) };
     survey.validate()?;
     Ok(Some(survey))
 }

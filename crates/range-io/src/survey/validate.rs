@@ -4,7 +4,7 @@ use std::path::Path;
 use serde::de::{Deserializer, SeqAccess, Visitor};
 use serde::ser::Serializer;
 
-use super::{FrameEntry, Level, StoredDepth, Survey, SurveyCamera, TruthFiles};
+use super::{FrameEntry, Level, ReferencePath, StoredDepth, Survey, SurveyCamera, TruthFiles};
 use crate::InvalidField;
 use crate::limits::MOST_PIXELS;
 
@@ -19,6 +19,10 @@ impl Survey {
         for (index, frame) in self.frames.iter().enumerate() {
             frame.check(&format!("frames[{index}]"))?;
         }
+        self.check_power_on()?;
+        if let Some(path) = &self.reference_path {
+            path.check(self.camera.width, self.camera.height)?;
+        }
         if let Some(depth) = &self.depth {
             depth.check(self.level)?;
         }
@@ -26,6 +30,16 @@ impl Survey {
             truth.check(self.frames.len())?;
         }
         self.extras.iter().try_for_each(|(name, file)| check_path(format!("extras.{name}"), file))
+    }
+
+    fn check_power_on(&self) -> Check {
+        let Some(power_on_s) = self.power_on_s else { return Ok(()) };
+        check_finite("power_on_s", power_on_s)?;
+        let early = self.frames.iter().position(|frame| frame.timestamp_s.is_some_and(|time_s| time_s < power_on_s));
+        early.map_or(Ok(()), |index| {
+            let field = format!("frames[{index}].timestamp_s");
+            Err(InvalidField::new(field, format!("is before the camera was switched on (`power_on_s: {power_on_s}`)")))
+        })
     }
 }
 
@@ -86,6 +100,20 @@ impl FrameEntry {
             value.map_or(Ok(()), |value| check_finite(format!("{path}.{name}"), value))?;
         }
         self.integration_time_s.map_or(Ok(()), |value| check_positive(format!("{path}.integration_time_s"), value))
+    }
+}
+
+impl ReferencePath {
+    fn check(&self, width: usize, height: usize) -> Check {
+        let sides = [("columns", self.columns, width), ("rows", self.rows, height)];
+        for (name, [first, last], size) in sides {
+            require(
+                first <= last && last < size,
+                format!("reference_path.{name}"),
+                format!("is ({first}, {last}), expected the first and the last of {size} {name}, counted from 0"),
+            )?;
+        }
+        check_positive("reference_path.length_m", self.length_m)
     }
 }
 

@@ -158,7 +158,7 @@ fn common_amplitudes(first: &RangeErrorModel, second: &RangeErrorModel) -> Resul
     if known.is_empty() { Ok(None) } else { intersection("amplitudes", known.into_iter()).map(Some) }
 }
 
-fn intersection(what: &str, spans: impl Iterator<Item = [f64; 2]>) -> Result<[f64; 2]> {
+pub(super) fn intersection(what: &str, spans: impl Iterator<Item = [f64; 2]>) -> Result<[f64; 2]> {
     let common = spans.fold([f64::NEG_INFINITY, f64::INFINITY], |[l, h], span| [l.max(span[0]), h.min(span[1])]);
     if common[0] < common[1] {
         return Ok(common);
@@ -167,10 +167,10 @@ fn intersection(what: &str, spans: impl Iterator<Item = [f64; 2]>) -> Result<[f6
         "{what} that both calibrations cover; the one ends at {:.4}, the other begins at {:.4}",
         common[1], common[0]
     );
-    Err(Error::MethodNeeds { method: "comparison of corrections".to_owned(), needs })
+    Err(Error::MethodNeeds { method: "comparison".to_owned(), needs })
 }
 
-fn linear([low, high]: [f64; 2], count: usize) -> Vec<f64> {
+pub(super) fn linear([low, high]: [f64; 2], count: usize) -> Vec<f64> {
     (0..count).map(|k| low + (high - low) * k as f64 / (count - 1) as f64).collect()
 }
 

@@ -1,10 +1,12 @@
 //! Which differences of two calibrations are significant: parameters, the corrections that they make, the image.
 
 mod correction;
+mod drift;
 mod image;
 mod parameters;
 
 pub use correction::{CorrectionComparison, CorrectionDifference, CorrectionSide, compare_corrections};
+pub use drift::{DriftComparison, DriftDifference, DriftSide, compare_drifts};
 pub use image::{ImageComparison, ImageSide, compare_images};
 pub use parameters::{JointTest, ParameterComparison, ParameterDifference, ParameterSet, compare_parameters};
 

@@ -1,4 +1,4 @@
-use error_models::{FixedPattern, RangeErrorModel};
+use error_models::{FixedPattern, InterpolatedModel, ModelSet, RangeErrorModel, WarmUp};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
@@ -15,6 +15,10 @@ use crate::{Error, Result};
 pub struct ErrorsSpec {
     /// Systematic range errors (Eqs. 14, 15), one model a modulation frequency.
     pub range: Option<Vec<RangeErrorModel>>,
+    /// The same by integration time (Sect. 4.6), interpolated between; instead of `range`.
+    pub range_by_integration_time: Option<ModelSet>,
+    /// Drift of the warming camera by time since power-on and temperature (Sect. 4.7).
+    pub warm_up: Option<WarmUp>,
     /// A range offset of each pixel's own (Sect. 4.5).
     pub fixed_pattern: Option<FixedPatternSpec>,
     /// Light that is scattered between lens and sensor (Sect. 4.4).
@@ -131,7 +135,18 @@ impl FixedPatternSpec {
 impl ErrorsSpec {
     pub(crate) fn validate(&self, ambiguity_intervals_m: &[f64]) -> Result<()> {
         if let Some(models) = &self.range {
-            validate_models(models, ambiguity_intervals_m)?;
+            validate_models("errors.range", models, ambiguity_intervals_m)?;
+        }
+        if let Some(set) = &self.range_by_integration_time {
+            let field = "errors.range_by_integration_time";
+            require(self.range.is_none(), field, &set.entries.len(), "only where there is no errors.range")?;
+            set.validate()?;
+            for (index, (_, models)) in set.entries.iter().enumerate() {
+                validate_models(&format!("{field}.entries[{index}]"), models, ambiguity_intervals_m)?;
+            }
+        }
+        if let Some(drift) = &self.warm_up {
+            drift.validate()?;
         }
         if let Some(pattern) = &self.fixed_pattern {
             not_negative("errors.fixed_pattern.sigma_m", pattern.sigma_m)?;
@@ -144,6 +159,15 @@ impl ErrorsSpec {
         }
         self.validate_sensor()?;
         self.validate_light()
+    }
+
+    /// The range errors at an integration time, one model a frequency; none where there are none.
+    pub(crate) fn range_at(&self, integration_time_s: f64) -> Result<Vec<InterpolatedModel>> {
+        match (&self.range, &self.range_by_integration_time) {
+            (Some(models), _) => Ok(models.iter().cloned().map(InterpolatedModel::from).collect()),
+            (None, Some(set)) => Ok(set.at(integration_time_s)?),
+            (None, None) => Ok(Vec::new()),
+        }
     }
 
     fn validate_sensor(&self) -> Result<()> {
@@ -176,15 +200,15 @@ impl ErrorsSpec {
 }
 
 /// One model a frequency, each with the ambiguity interval of its frequency.
-fn validate_models(models: &[RangeErrorModel], ambiguity_intervals_m: &[f64]) -> Result<()> {
+fn validate_models(path: &str, models: &[RangeErrorModel], ambiguity_intervals_m: &[f64]) -> Result<()> {
     let complete = models.len() == ambiguity_intervals_m.len();
-    require(complete, "errors.range", &models.len(), "one model for each of camera.modulation_hz")?;
+    require(complete, path, &models.len(), "one model for each of camera.modulation_hz")?;
     for (index, (model, interval)) in models.iter().zip(ambiguity_intervals_m).enumerate() {
         model.validate()?;
         // A speed of light rounded to 3e8 already differs by 7e-4; digits of a written interval by less than 1e-6.
         if (model.ambiguity_interval_m - interval).abs() > 1e-6 * interval {
             return Err(Error::Field {
-                field: format!("errors.range[{index}].ambiguity_interval_m"),
+                field: format!("{path}[{index}].ambiguity_interval_m"),
                 value: format!("{} (that of the frequency is {interval})", model.ambiguity_interval_m),
                 expected: "the ambiguity interval of the modulation frequency",
             });

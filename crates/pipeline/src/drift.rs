@@ -1,0 +1,143 @@
+//! What the ranges of a view have drifted by since the camera was switched on (Sect. 4.7).
+
+use error_models::WarmUp;
+use nalgebra::{DMatrix, DVector};
+use range_io::calibration::CalibratedDrift;
+use range_io::survey::Survey;
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+use crate::view::View;
+
+/// Options of [`crate::Stage::CorrectRange`].
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct CorrectRangeOptions {
+    /// What is done about the drift of a warming camera.
+    pub warm_up: DriftTreatment,
+}
+
+/// What is done about the drift of a warming camera.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum DriftTreatment {
+    /// It is taken off: as the optical reference shows it, where the survey has one, and else as the calibration says.
+    #[default]
+    Apply,
+    /// It stays in the ranges.
+    Leave,
+}
+
+/// The drift of a view, the same at all its pixels.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ViewDrift {
+    /// Station, and frame or number of frames.
+    pub view: String,
+    /// What was subtracted from every range, metre.
+    pub drift_m: f64,
+    /// Its standard deviation, metre. It is common to all pixels of the view, so no mean over pixels makes it smaller;
+    /// the standard deviations of the pixels do not have it in them.
+    pub sigma_m: f64,
+    /// Where it comes from.
+    pub source: DriftSource,
+}
+
+/// Where a drift comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum DriftSource {
+    /// The calibrated curve by time and temperature.
+    Calibration,
+    /// The camera's optical reference.
+    ReferencePath,
+}
+
+/// Why the drift of a view is not known.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum DriftError {
+    /// The survey does not say what the drift depends on.
+    #[error("the calibrated drift depends on {quantity}, and survey.ron has no `{field}`; add it, or {LEAVE}")]
+    Missing {
+        /// Time or temperature.
+        quantity: &'static str,
+        /// The field of `survey.ron`.
+        field: String,
+    },
+    /// A frame at a time or temperature that the drift was not fitted for.
+    #[error("frame {frame}: {source}; where the drift does not matter, {LEAVE}")]
+    Outside {
+        /// Position of the frame in the survey.
+        frame: usize,
+        /// The value and the span.
+        source: error_models::Error,
+    },
+    /// The calibration's drift has no covariance.
+    #[error(transparent)]
+    Calibration(#[from] range_io::Error),
+    /// Too few pixels show the optical reference.
+    #[error(
+        "{usable} of the {pixels} pixels of `reference_path` can be used (not saturated, dark, or outside the \
+         calibrated ranges and amplitudes), expected at least {needed}"
+    )]
+    Reference {
+        /// Pixels that can be used.
+        usable: usize,
+        /// Pixels of the rectangle.
+        pixels: usize,
+        /// Pixels that a mean with a standard deviation needs.
+        needed: usize,
+    },
+}
+
+/// What a user can do where a drift is not known.
+const LEAVE: &str = "leave the drift in the ranges by `CorrectRange(warm_up: leave)`";
+
+/// A calibrated drift, ready for views.
+pub(crate) struct DriftCurve<'a> {
+    model: &'a WarmUp,
+    covariance: DMatrix<f64>,
+}
+
+impl<'a> DriftCurve<'a> {
+    pub(crate) fn new(calibrated: &'a CalibratedDrift) -> Result<Self, DriftError> {
+        Ok(Self { model: &calibrated.model, covariance: calibrated.covariance()? })
+    }
+
+    /// The mean of the drifts of the frames that went into a view.
+    pub(crate) fn of_view(&self, view: &View, survey: &Survey) -> Result<ViewDrift, DriftError> {
+        let (mut drift_m, mut row) = (0.0, DVector::zeros(self.covariance.nrows()));
+        let share = 1.0 / view.frames.len().max(1) as f64;
+        for &frame in &view.frames {
+            let time_s = self.time(survey, frame)?;
+            let temperature_c = self.temperature(survey, frame)?;
+            let outside = |source| DriftError::Outside { frame, source };
+            drift_m += share * self.model.value(time_s, temperature_c).map_err(outside)?;
+            row += share * DVector::from_vec(self.model.jacobian(time_s, temperature_c).map_err(outside)?);
+        }
+        // The errors of the parameters are the same in all frames: derivatives are averaged, not variances.
+        let sigma_m = row.dot(&(&self.covariance * &row)).max(0.0).sqrt();
+        Ok(ViewDrift { view: view.name(), drift_m, sigma_m, source: DriftSource::Calibration })
+    }
+
+    /// Time since power-on; `None` where the drift does not depend on it.
+    fn time(&self, survey: &Survey, frame: usize) -> Result<Option<f64>, DriftError> {
+        if self.model.transients.is_empty() {
+            return Ok(None);
+        }
+        let missing = |field: String| DriftError::Missing { quantity: "the time since power-on", field };
+        let power_on_s = survey.power_on_s.ok_or_else(|| missing("power_on_s".to_owned()))?;
+        let time_s = survey.frames.get(frame).and_then(|entry| entry.timestamp_s);
+        Ok(Some(time_s.ok_or_else(|| missing(format!("frames[{frame}].timestamp_s")))? - power_on_s))
+    }
+
+    /// Temperature of the camera; `None` where the drift does not depend on it.
+    fn temperature(&self, survey: &Survey, frame: usize) -> Result<Option<f64>, DriftError> {
+        if self.model.temperature.is_none() {
+            return Ok(None);
+        }
+        let temperature_c = survey.frames.get(frame).and_then(|entry| entry.temperature_c);
+        let field = format!("frames[{frame}].temperature_c");
+        temperature_c.map(Some).ok_or(DriftError::Missing { quantity: "the camera's temperature", field })
+    }
+}

@@ -103,7 +103,7 @@ fn the_calibrated_drift_is_taken_off_and_stays_where_it_is_left() {
         assert!(drift(left).is_none());
     }
     let stage = corrected.stages.iter().find(|stage| stage.name == "CorrectRange").unwrap();
-    assert!((stage.findings["drift_m"] - 0.014913).abs() < 1e-6, "{:?}", stage.findings);
+    assert!((stage.findings["drift_m"] - 0.014_913).abs() < 1e-6, "{:?}", stage.findings);
 }
 
 /// Standard deviation of the mean drift at some times and temperatures, over parameters drawn by their covariance.

@@ -22,6 +22,8 @@ use crate::error::{Error, Result};
 const MOST_CORRESPONDENCES: usize = 2500;
 /// Cliques or samples that poses are computed from.
 const MOST_CANDIDATES: usize = 120;
+/// Where nothing passes at first: this many times as many candidates and hypotheses.
+const SECOND_LOOK: usize = 4;
 /// Of the sampled points, one in this many ranks the candidates.
 const RANKING_STRIDE: usize = 4;
 /// Largest difference of the cosines of normals at which two correspondences agree.
@@ -61,7 +63,8 @@ pub struct CoarseAlignment {
 ///
 /// Features that are each other's most alike give correspondences; sets of them that agree give poses, the best of which
 /// are refined on the averaged points and judged by partners on the surface and by points that lie in space which the
-/// other camera looked through. Clouds with different voxels are brought to the coarser one.
+/// other camera looked through; where none passes, more poses are looked at once. Clouds with different voxels are brought
+/// to the coarser one.
 ///
 /// # Errors
 /// [`Error::NoAlignment`] where no pose passes: no overlap, too little structure, or two poses that fit equally well.
@@ -73,10 +76,19 @@ pub fn align_without_guess(
 ) -> Result<CoarseAlignment> {
     options.validate()?;
     let (source, target) = with_common_voxels(source, target, options)?;
-    let (source, target) = (source.as_ref(), target.as_ref());
+    looked_for(&source, &target, options, 1).or_else(|_| looked_for(&source, &target, options, SECOND_LOOK))
+}
+
+/// The pose that passes, of `effort` times as many candidates and hypotheses as are usual.
+fn looked_for(
+    source: &FeatureCloud,
+    target: &FeatureCloud,
+    options: &CoarseOptions,
+    effort: usize,
+) -> Result<CoarseAlignment> {
     let voxel_m = target.voxel_m();
     let tolerance = Tolerance { distance: (options.tolerance_voxels * voxel_m) as f32, cosine: COSINE_TOLERANCE };
-    let (correspondences, verified) = verified(source, target, tolerance, options);
+    let (correspondences, verified) = verified(source, target, tolerance, options, effort);
     let (winner, rival) = best_two(&verified, voxel_m, source).ok_or(Error::NoAlignment {
         what: "consistent correspondences",
         found: 0.0,
@@ -118,7 +130,7 @@ pub(crate) fn hypotheses(
         (hypothesis.pose, verdict.rough_score())
     };
     let mut scored: Vec<(Isometry3<f64>, f64)> =
-        verified(source, target, tolerance, options).1.par_iter().map(score).collect();
+        verified(source, target, tolerance, options, 1).1.par_iter().map(score).collect();
     scored.sort_by(|a, b| b.1.total_cmp(&a.1));
     let mut kept: Vec<(Isometry3<f64>, f64)> = Vec::new();
     for (pose, score) in scored {
@@ -129,16 +141,17 @@ pub(crate) fn hypotheses(
     Ok(kept.iter().map(|(pose, score)| (target.between_frames(source, pose), *score)).collect())
 }
 
-/// The correspondences, and the best poses of them, refined and judged.
+/// The correspondences, and the best poses of them, refined and judged; `effort` as for [`looked_for`].
 fn verified(
     source: &FeatureCloud,
     target: &FeatureCloud,
     tolerance: Tolerance,
     options: &CoarseOptions,
+    effort: usize,
 ) -> (Correspondences, Vec<Hypothesis>) {
     let correspondences = correspondences(source, target, options);
-    let candidates = candidates(&correspondences, tolerance, options);
-    let ranked = ranked(source, target, candidates, options.max_hypotheses, |pose| {
+    let candidates = candidates(&correspondences, tolerance, options, effort * MOST_CANDIDATES);
+    let ranked = ranked(source, target, candidates, effort * options.max_hypotheses, |pose| {
         // The share of added features that agree counts as much as that of the points: along walls only they can tell.
         let verdict = Verdict::new(source, target, pose, RANKING_STRIDE);
         verdict.rough_score() + correspondences.added_share(pose, tolerance)
@@ -215,7 +228,12 @@ fn placed(cloud: &FeatureCloud, features: &Features, index: u32) -> ([f32; 3], [
 }
 
 /// Poses of sets of correspondences that agree, each fitted again to all that agree with it.
-fn candidates(correspondences: &Correspondences, tolerance: Tolerance, options: &CoarseOptions) -> Vec<Isometry3<f64>> {
+fn candidates(
+    correspondences: &Correspondences,
+    tolerance: Tolerance,
+    options: &CoarseOptions,
+    most: usize,
+) -> Vec<Isometry3<f64>> {
     let arm = 2.0 * tolerance.distance;
     let solve = |set: &[u32]| {
         let first = correspondences.solve(set, arm)?;
@@ -226,7 +244,7 @@ fn candidates(correspondences: &Correspondences, tolerance: Tolerance, options: 
     match options.estimator {
         Estimator::ConsistencyGraph => {
             let mut poses = Vec::new();
-            ConsistencyGraph::new(correspondences, tolerance).cliques(MOST_CANDIDATES, |clique| {
+            ConsistencyGraph::new(correspondences, tolerance).cliques(most, |clique| {
                 let Some((pose, inliers)) = solve(clique) else { return Vec::new() };
                 poses.push(pose);
                 inliers
@@ -234,7 +252,7 @@ fn candidates(correspondences: &Correspondences, tolerance: Tolerance, options: 
             poses
         }
         Estimator::Ransac { samples } => {
-            let sets = consistent_samples(correspondences, tolerance, arm, samples, MOST_CANDIDATES, options.seed);
+            let sets = consistent_samples(correspondences, tolerance, arm, samples, most, options.seed);
             sets.par_iter().filter_map(|set| solve(set).map(|found| found.0)).collect()
         }
     }

@@ -27,10 +27,14 @@ const LEAST_ON_PLANE: f64 = 0.012;
 /// How far a pose is moved to see what holds it, voxels: beyond the neighbourhoods that hits and free space allow for.
 const SLIDE_VOXELS: f64 = 6.0;
 /// Steps of a voxel to either side that are tried where planes leave a motion open, the share of the evidence that may be
-/// missing in the middle of them, and the smallest eigenvalue a point below which a motion is open.
+/// missing where edges put the pose, and the smallest eigenvalue a point below which a motion is open.
 const SLIDES: i32 = 6;
-const HARDLY: f64 = 0.1;
-const OPEN: f64 = 1.5e-3;
+const HARDLY: f64 = 0.25;
+const OPEN: f64 = 6e-3;
+/// Least part of a normal along a motion at which the surface faces it.
+const FACING: f64 = 0.4;
+/// Points by which noise changes what edges say.
+const COST_NOISE: f64 = 5.0;
 
 /// What a pose's partners tell about the place.
 pub(super) struct Common {
@@ -59,8 +63,22 @@ impl Common {
         self.planes.slid(pose, voxels * target.voxel_m())
     }
 
+    /// Where edges put the pose along the motion that the planes determine least, voxels: at a wrong place fronts of furniture
+    /// lie where the other camera saw the wall behind them.
+    fn held_by_edges(&self, source: &FeatureCloud, target: &FeatureCloud, pose: &Isometry3<f64>) -> f64 {
+        let motion = self.planes.least_determined();
+        let faces = |point: [f32; 3], normal: [f32; 3]| self.planes.along(&motion, point, normal) > FACING;
+        let against =
+            |step: i32| Verdict::against_slide(source, target, &self.slid(target, pose, f64::from(step)), faces);
+        let costs: Vec<(i32, f64)> = (-SLIDES..=SLIDES).map(|step| (step, against(step))).collect();
+        let least = costs.iter().map(|cost| cost.1).fold(f64::INFINITY, f64::min);
+        let weights = costs.iter().map(|(step, cost)| (f64::from(*step), (-(cost - least) / COST_NOISE).exp()));
+        let (sum, moment) = weights.fold((0.0, 0.0), |(sum, moment), (step, w)| (sum + w, moment + w * step));
+        moment / sum
+    }
+
     /// The pose with its verdict, and the share of the evidence that is lost where it slides. What planes leave open is put
-    /// in the middle of where hardly anything contradicts: edges hold it on either side.
+    /// where edges hold it, unless too much speaks against that.
     pub(super) fn settled(
         &self,
         source: &FeatureCloud,
@@ -73,13 +91,8 @@ impl Common {
         };
         let mut best = at(pose, 0.0);
         if self.planes.are_open() {
-            let steps: Vec<f64> = (-SLIDES..=SLIDES).map(f64::from).collect();
-            let evidence: Vec<f64> = steps.iter().map(|&step| at(pose, step).1.evidence()).collect();
-            let floor = (1.0 - HARDLY) * evidence.iter().copied().fold(0.0, f64::max);
-            let weight: f64 = evidence.iter().map(|e| (e - floor).max(0.0)).sum();
-            let moment: f64 = evidence.iter().zip(&steps).map(|(e, step)| (e - floor).max(0.0) * step).sum();
-            let middle = at(pose, moment / weight.max(f64::MIN_POSITIVE));
-            if middle.1.evidence() > floor {
+            let middle = at(pose, self.held_by_edges(source, target, pose));
+            if middle.1.evidence() > (1.0 - HARDLY) * best.1.evidence() {
                 best = middle;
             }
         }
@@ -163,10 +176,22 @@ impl Planes {
         crate::eigen::eigen6(&self.matrix, "planes in common").is_ok_and(|(values, _)| values[0] < OPEN * self.points)
     }
 
+    /// Translation and turn (times the radius) that the planes determine least, of length 1; zero where that is not known.
+    fn least_determined(&self) -> Vector6<f64> {
+        let found = crate::eigen::eigen6(&self.matrix, "planes in common");
+        found.map_or_else(|_| Vector6::zeros(), |(_, motions)| motions.column(0).into_owned())
+    }
+
+    /// How far a motion of length 1 moves a point along its normal.
+    fn along(&self, motion: &Vector6<f64>, point: [f32; 3], normal: [f32; 3]) -> f64 {
+        let [point, normal] = [point, normal].map(|v| Vector3::from(v.map(f64::from)));
+        let turned = (motion.fixed_rows::<3>(3) / self.radius).cross(&(point - self.centre));
+        (motion.fixed_rows::<3>(0) + turned).dot(&normal).abs()
+    }
+
     /// The pose moved along the least determined motion, `distance` metre at the radius.
     fn slid(&self, pose: &Isometry3<f64>, distance: f64) -> Isometry3<f64> {
-        let Ok((_, motions)) = crate::eigen::eigen6(&self.matrix, "planes in common") else { return *pose };
-        let motion = motions.column(0) * distance;
+        let motion = self.least_determined() * distance;
         let turn = motion.fixed_rows::<3>(3) / self.radius;
         let turned = moved(&Isometry3::identity(), Vector3::zeros(), turn).rotation * self.centre;
         moved(pose, motion.fixed_rows::<3>(0) + self.centre - turned, turn)

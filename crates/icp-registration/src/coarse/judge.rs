@@ -19,6 +19,8 @@ const ROUGH_WEIGHT_OF_FREE: f64 = 2.0;
 /// are alike, but only the wrong one has more than a few in a hundred that contradict.
 const WEIGHT_OF_MISSED: f64 = 8.0;
 const WEIGHT_OF_FREE: f64 = 16.0;
+/// A point in free space beside one that misses where edges hold a pose: noise moves the latter over a jump, not the former.
+const WEIGHT_OF_FREE_AT_EDGES: f64 = 2.0;
 
 /// Counts over the sampled points of one or both clouds.
 #[derive(Debug, Clone, Copy, Default)]
@@ -54,7 +56,28 @@ impl Verdict {
         jumps: Jumps,
     ) -> Self {
         let back = pose.inverse();
-        Self { source: count(source, target, pose, stride, jumps), target: count(target, source, &back, stride, jumps) }
+        Self {
+            source: count(source, target, pose, stride, jumps, |_, _| true),
+            target: count(target, source, &back, stride, jumps, |_, _| true),
+        }
+    }
+
+    /// What edges say against a pose that slides, in points: those that miss or lie in free space, at jumps of the range
+    /// too, less the partners on surfaces that face the motion. All other partners grow in number with what is shared.
+    /// `faces` takes a point and its normal in the target's frame.
+    pub(super) fn against_slide(
+        source: &FeatureCloud,
+        target: &FeatureCloud,
+        pose: &Isometry3<f64>,
+        faces: impl Fn([f32; 3], [f32; 3]) -> bool,
+    ) -> f64 {
+        let (forward, back) = (Motion::new(pose), pose.inverse());
+        let counts = [
+            count(source, target, pose, 1, Jumps::Missed, |p, n| faces(forward.point(p), forward.vector(n))),
+            count(target, source, &back, 1, Jumps::Missed, &faces),
+        ];
+        let cost = |c: &Count| c.missed as f64 + WEIGHT_OF_FREE_AT_EDGES * c.in_free as f64 - c.hits as f64;
+        counts.iter().map(cost).sum()
     }
 
     /// Share of the points with a partner less those in free space, doubly counted, times the square of the agreement:
@@ -104,17 +127,25 @@ impl Verdict {
     }
 }
 
-fn count(from: &FeatureCloud, to: &FeatureCloud, pose: &Isometry3<f64>, stride: usize, jumps: Jumps) -> Count {
+/// `counts` tells of a point and its normal whether a partner of it is counted.
+fn count(
+    from: &FeatureCloud,
+    to: &FeatureCloud,
+    pose: &Isometry3<f64>,
+    stride: usize,
+    jumps: Jumps,
+    counts: impl Fn([f32; 3], [f32; 3]) -> bool,
+) -> Count {
     let motion = Motion::new(pose);
     let sided = from.normals.sided && to.normals.sided;
     let voxel = to.reduced.voxel_m as f32;
     let mut count = Count::default();
     for &i in from.sample.iter().step_by(stride) {
         count.points += 1;
-        let point = motion.point(from.reduced.points[i as usize]);
-        let normal = motion.vector(from.normals.vectors[i as usize]);
+        let (own, own_normal) = (from.reduced.points[i as usize], from.normals.vectors[i as usize]);
+        let (point, normal) = (motion.point(own), motion.vector(own_normal));
         if partner(to, point, normal, sided, voxel).is_some() {
-            count.hits += 1;
+            count.hits += usize::from(counts(own, own_normal));
             continue;
         }
         match to.view.as_ref().map(|view| view.sight(point, jumps)) {

@@ -27,6 +27,8 @@ pub(crate) struct Chunk<'a> {
     pub(crate) amplitude: &'a [f32],
     pub(crate) flags: &'a mut [Flags],
     pub(crate) pattern: Option<&'a [f32]>,
+    /// Deviations of the pattern's offsets, where they are known.
+    pub(crate) pattern_sigma: Option<&'a [f32]>,
     pub(crate) tally: Tally,
 }
 
@@ -77,6 +79,8 @@ impl Planes<'_> {
         let mut amplitude = self.amplitude.as_slice().chunks(length);
         let mut flags = self.flags.as_mut_slice().chunks_mut(length);
         let mut pattern = self.pattern.map(|pattern| pattern.offset_m.chunks(length));
+        let known = self.pattern.filter(|pattern| !pattern.sigma_m.is_empty());
+        let mut pattern_sigma = known.map(|pattern| pattern.sigma_m.chunks(length));
         let mut jobs: [Option<(Chunk<'_>, Result<()>)>; MOST_CHUNKS] = std::array::from_fn(|index| {
             let chunk = Chunk {
                 first_row: index * rows,
@@ -85,6 +89,7 @@ impl Planes<'_> {
                 amplitude: amplitude.next()?,
                 flags: flags.next()?,
                 pattern: pattern.as_mut().and_then(Iterator::next),
+                pattern_sigma: pattern_sigma.as_mut().and_then(Iterator::next),
                 tally: Tally::default(),
             };
             Some((chunk, Ok(())))
@@ -111,13 +116,19 @@ impl FixedPattern {
         if let Some(found) = Some(self.sigma_m.len()).filter(|found| *found > 0 && *found != expected) {
             return Err(Error::Image(range_image::Error::RasterLength { width, height, expected, found }));
         }
-        if let Some(sigma) = self.sigma_m.iter().find(|sigma| **sigma < 0.0 || sigma.is_infinite()) {
+        #[allow(clippy::needless_bitwise_bool)] // a branch would keep the search scalar
+        let bad_sigma = |sigma: &&f32| (**sigma < 0.0) | sigma.is_infinite();
+        if let Some(sigma) = find_any(&self.sigma_m, bad_sigma) {
             let expected = "a standard deviation is NaN or finite and not negative";
             return Err(Error::OutOfDomain { name: "sigma_m", value: f64::from(*sigma), expected });
         }
-        self.offset_m
-            .iter()
-            .find(|offset| !offset.is_finite())
-            .map_or(Ok(()), |offset| crate::error::require_finite("offset_m", f64::from(*offset)))
+        let not_finite = find_any(&self.offset_m, |offset| !offset.is_finite());
+        not_finite.map_or(Ok(()), |offset| crate::error::require_finite("offset_m", f64::from(*offset)))
     }
+}
+
+/// The first value that is bad. Whole blocks are looked at without a branch, which is several times as fast as a search.
+fn find_any(values: &[f32], bad: impl Fn(&&f32) -> bool) -> Option<&f32> {
+    let any = |block: &&[f32]| block.iter().fold(0_u32, |any, value| any | u32::from(bad(&value))) > 0;
+    values.chunks(1024).find(any)?.iter().find(&bad)
 }

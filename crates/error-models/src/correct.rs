@@ -2,10 +2,13 @@
 // Only what is inlined is compiled for wide registers.
 #![allow(clippy::inline_always)]
 
+use std::ops::Range;
+
 use range_image::{Flags, ImageFormat, RangeFrame, Raster, with_wide_registers};
 
 use crate::chunks::{Chunk, Planes};
-use crate::kernel::{Block, Kernel, LANES, LaneTally, Parts};
+use crate::kernel::{Block, Kernel, LANES, Lanes, Mask, Parts};
+use crate::kernel_tally::LaneTally;
 use crate::{CorrectionSummary, FixedPattern, RangeErrorModel, Result};
 
 /// Takes the range errors of `model`, and then those of `pattern`, off a frame, in place.
@@ -40,20 +43,7 @@ pub fn correct_frame(
         flags: &mut frame.flags,
         pattern,
     };
-    let summary = correct_planes(planes, model, format, principal_point_mm)?;
-    if let Some(pattern) = pattern {
-        add_deviations(&mut frame.sigma, pattern);
-    }
-    Ok(summary)
-}
-
-/// What the offsets themselves are uncertain by; a pixel without a known offset keeps its deviation.
-fn add_deviations(sigma: &mut Raster<f32>, pattern: &FixedPattern) {
-    for (sigma, own) in sigma.as_mut_slice().iter_mut().zip(&pattern.sigma_m) {
-        if own.is_finite() {
-            *sigma = sigma.hypot(*own);
-        }
-    }
+    correct_planes(planes, model, format, principal_point_mm)
 }
 
 /// [`correct_frame`] on bare rasters: the unwrapped ranges of one of several modulation frequencies, with its
@@ -91,54 +81,98 @@ fn correct_planes(
 
 #[inline(always)]
 fn correct_chunk(chunk: &mut Chunk<'_>, kernel: &Kernel, width: usize) {
-    let (mut block, mut parts) = (Block::empty(), Parts::default());
+    let mut parts = Parts::default();
     for row in 0..chunk.range.len() / width {
         let mut tally = LaneTally::new();
+        kernel.begin_row(chunk.first_row + row, &mut parts);
         for column in (0..width).step_by(LANES) {
             let start = row * width + column;
-            let length = LANES.min(width - column);
-            load(chunk, start, length, &mut block);
-            kernel.correct(&mut block, [column, chunk.first_row + row], &mut parts, &mut tally);
-            store(chunk, start, length, &block);
+            let place = [column, chunk.first_row + row];
+            if column + LANES <= width {
+                correct_block(chunk, start, kernel, place, &mut parts, &mut tally);
+            } else {
+                correct_rest(chunk, start..start + width - column, kernel, place, &mut parts, &mut tally);
+            }
         }
-        chunk.tally.add(&tally.total());
+        chunk.tally.add(&tally.total(kernel.d0));
+    }
+}
+
+/// A whole block, in place.
+#[inline(always)]
+fn correct_block(
+    chunk: &mut Chunk<'_>,
+    start: usize,
+    kernel: &Kernel,
+    place: [usize; 2],
+    parts: &mut Parts,
+    tally: &mut LaneTally,
+) {
+    let (Some(range), Some(amplitude)) =
+        (chunk.range[start..].first_chunk_mut(), chunk.amplitude[start..].first_chunk())
+    else {
+        return;
+    };
+    let pattern = chunk.pattern.and_then(|pattern| pattern[start..].first_chunk());
+    let mut none = [f32::NAN; LANES];
+    let sigma = chunk.sigma.as_mut().and_then(|sigma| sigma[start..].first_chunk_mut()).unwrap_or(&mut none);
+    let outside = kernel.correct(Block { range, sigma, amplitude, pattern }, place, parts, tally);
+    if let Some(own) = chunk.pattern_sigma.and_then(|own| own[start..].first_chunk::<LANES>()) {
+        add_deviations(sigma, own, &parts.inside);
+    }
+    flag(&mut chunk.flags[start..start + LANES], outside.as_ref());
+}
+
+/// The end of a row, in a block filled up with pixels that have no range.
+#[inline(always)]
+fn correct_rest(
+    chunk: &mut Chunk<'_>,
+    pixels: Range<usize>,
+    kernel: &Kernel,
+    place: [usize; 2],
+    parts: &mut Parts,
+    tally: &mut LaneTally,
+) {
+    let length = pixels.len();
+    let [mut range, mut sigma, mut amplitude] = [[f32::NAN; LANES]; 3];
+    range[..length].copy_from_slice(&chunk.range[pixels.clone()]);
+    amplitude[..length].copy_from_slice(&chunk.amplitude[pixels.clone()]);
+    if let Some(own) = &chunk.sigma {
+        sigma[..length].copy_from_slice(&own[pixels.clone()]);
+    }
+    let filled = |plane: &[f32]| {
+        let mut block = [0.0; LANES];
+        block[..length].copy_from_slice(&plane[pixels.clone()]);
+        block
+    };
+    let pattern = chunk.pattern.map(filled);
+    let block = Block { range: &mut range, sigma: &mut sigma, amplitude: &amplitude, pattern: pattern.as_ref() };
+    let outside = kernel.correct(block, place, parts, tally);
+    if let Some(own) = chunk.pattern_sigma.map(filled) {
+        add_deviations(&mut sigma, &own, &parts.inside);
+    }
+    chunk.range[pixels.clone()].copy_from_slice(&range[..length]);
+    if let Some(own) = &mut chunk.sigma {
+        own[pixels.clone()].copy_from_slice(&sigma[..length]);
+    }
+    flag(&mut chunk.flags[pixels], outside.as_ref());
+}
+
+/// What the offsets themselves are uncertain by; a pixel without a known offset, or outside the range span, keeps its
+/// deviation.
+#[inline(always)]
+#[allow(clippy::needless_bitwise_bool)] // a branch would keep the loop scalar
+fn add_deviations(sigma: &mut Lanes, own: &Lanes, inside: &Mask) {
+    for ((sigma, own), inside) in sigma.iter_mut().zip(own).zip(inside) {
+        let both = (*sigma * *sigma + own * own).sqrt();
+        *sigma = if own.is_nan() | (*inside == 0) { *sigma } else { both };
     }
 }
 
 #[inline(always)]
-fn load(chunk: &Chunk<'_>, start: usize, length: usize, block: &mut Block) {
-    if length < LANES {
-        *block = Block::empty();
-    }
-    let pixels = start..start + length;
-    copy(&chunk.range[pixels.clone()], &mut block.range);
-    copy(&chunk.amplitude[pixels.clone()], &mut block.amplitude);
-    if let Some(sigma) = &chunk.sigma {
-        copy(&sigma[pixels.clone()], &mut block.sigma);
-    }
-    if let Some(pattern) = chunk.pattern {
-        copy(&pattern[pixels.clone()], &mut block.pattern);
-        block.has_pattern = true;
-    }
-    copy(&chunk.flags[pixels], &mut block.flags);
-}
-
-#[inline(always)]
-fn store(chunk: &mut Chunk<'_>, start: usize, length: usize, block: &Block) {
-    let pixels = start..start + length;
-    copy(&block.range[..length], &mut chunk.range[pixels.clone()]);
-    if let Some(sigma) = &mut chunk.sigma {
-        copy(&block.sigma[..length], &mut sigma[pixels.clone()]);
-    }
-    copy(&block.flags[..length], &mut chunk.flags[pixels]);
-}
-
-/// Copies all of `from`; of a whole block without a call of a library.
-#[inline(always)]
-fn copy<T: Copy>(from: &[T], to: &mut [T]) {
-    if let (Some(from), Some(to)) = (from.first_chunk::<LANES>(), to.first_chunk_mut::<LANES>()) {
-        *to = *from;
-    } else {
-        to[..from.len()].copy_from_slice(from);
+fn flag(flags: &mut [Flags], outside: Option<&Mask>) {
+    let Some(outside) = outside else { return };
+    for (flags, outside) in flags.iter_mut().zip(outside) {
+        *flags = Flags::from_bits_retain(flags.bits() | (*outside as u16 & Flags::OUTSIDE_SPAN.bits()));
     }
 }

@@ -30,19 +30,20 @@ impl Default for GrossErrorOptions {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields, default))]
 pub struct MixedPixelOptions {
-    /// Distance in standard deviations of the difference between the pixel and the continued surface.
+    /// Distance in standard deviations of the difference between the pixel and the continued surface: of the noise of all
+    /// pixels that take part, and of the floor.
     pub sigmas: f64,
-    /// Smallest distance, metre, however small the standard deviations are: what curved surfaces may do
-    /// from one pixel to the next.
+    /// Standard deviation, metre, of what is no noise: what curved surfaces do from one pixel to the next, and what
+    /// calibration leaves.
     pub floor_m: f64,
     /// Standard deviation of a range where the frame gives none, metre.
     pub unknown_sigma_m: f64,
 }
 
 impl Default for MixedPixelOptions {
-    /// Four standard deviations, at least 2 cm; 5 mm where sigma is not known.
+    /// Four standard deviations, with a floor of 5 mm; 5 mm of noise where sigma is not known.
     fn default() -> Self {
-        Self { sigmas: 4.0, floor_m: 0.02, unknown_sigma_m: 0.005 }
+        Self { sigmas: 4.0, floor_m: 0.005, unknown_sigma_m: 0.005 }
     }
 }
 
@@ -107,13 +108,13 @@ impl GrossErrorOptions {
                 return Err(Error::OutOfDomain { name, value, expected: "a threshold is finite and not negative" });
             }
         }
-        if mixed.floor_m + mixed.sigmas * mixed.unknown_sigma_m > 0.0 {
+        if mixed.sigmas * (mixed.floor_m + mixed.unknown_sigma_m) > 0.0 {
             return Ok(());
         }
         Err(Error::OutOfDomain {
-            name: "floor_m",
-            value: mixed.floor_m,
-            expected: "a floor of zero needs both sigmas and unknown_sigma_m above zero",
+            name: "sigmas",
+            value: mixed.sigmas,
+            expected: "sigmas above zero, and floor_m or unknown_sigma_m above zero",
         })
     }
 }

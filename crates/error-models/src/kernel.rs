@@ -1,14 +1,14 @@
 //! Eqs. 14 and 15 in single precision on blocks of pixels, written so that the compiler can vectorise them.
-// Only what is inlined is compiled for wide registers.
-#![allow(clippy::inline_always)]
+// Only what is inlined is compiled for wide registers; lanes are counted in several planes at once.
+#![allow(clippy::inline_always, clippy::needless_range_loop)]
 
-use std::f32::consts::PI;
-
-use range_image::{Flags, ImageFormat};
+use range_image::ImageFormat;
 
 use crate::RangeErrorModel;
-use crate::kernel_further::{PolynomialLanes, SplineLanes, SurfaceLanes};
-use crate::summary::{AMPLITUDE, DELAY, GROUPS, PATTERN, PERIODIC, POLYNOMIAL, TOTAL, Tally};
+use crate::kernel_further::{PolynomialLanes, Powers, SplineLanes, SurfaceLanes};
+use crate::kernel_sines::Sines;
+use crate::kernel_tally::LaneTally;
+use crate::summary::{AMPLITUDE, DELAY, PATTERN, PERIODIC, POLYNOMIAL};
 
 /// Pixels of a block.
 pub(crate) const LANES: usize = 32;
@@ -22,10 +22,8 @@ pub(crate) const ROUND: f32 = 12_582_912.0;
 
 /// A model with its coefficients in single precision, for one image format.
 pub(crate) struct Kernel {
-    inverse_interval: f32,
-    wave_number: [f32; 3],
-    d0: f32,
-    periodic: [f32; 6],
+    pub(crate) d0: f64,
+    sines: Sines,
     delay_per_column: f32,
     delay_per_row: f64,
     delay_of_first: f64,
@@ -45,33 +43,17 @@ struct HyperbolaRatios {
 }
 
 /// The pixels of one block; lanes without a pixel hold a NaN range.
-pub(crate) struct Block {
-    pub(crate) range: Lanes,
-    pub(crate) sigma: Lanes,
-    pub(crate) amplitude: Lanes,
-    pub(crate) pattern: Lanes,
-    pub(crate) flags: [Flags; LANES],
-    pub(crate) has_pattern: bool,
-}
-
-impl Block {
-    #[inline(always)]
-    pub(crate) fn empty() -> Self {
-        Self {
-            range: [f32::NAN; LANES],
-            sigma: [f32::NAN; LANES],
-            amplitude: [f32::NAN; LANES],
-            pattern: [0.0; LANES],
-            flags: [Flags::empty(); LANES],
-            has_pattern: false,
-        }
-    }
+pub(crate) struct Block<'a> {
+    pub(crate) range: &'a mut Lanes,
+    pub(crate) sigma: &'a mut Lanes,
+    pub(crate) amplitude: &'a Lanes,
+    /// `None` where there is no fixed pattern.
+    pub(crate) pattern: Option<&'a Lanes>,
 }
 
 impl Kernel {
     pub(crate) fn new(model: &RangeErrorModel, format: &ImageFormat, principal_point_mm: [f64; 2]) -> Self {
         let interval = model.ambiguity_interval_m;
-        let base = (2.0 * std::f64::consts::PI / interval) as f32;
         let [low, high] = model.effective_range_span_m();
         let terms = &model.terms;
         let [x, y] = format.image_from_pixel([0.0, 0.0]);
@@ -79,10 +61,8 @@ impl Kernel {
         let step_mm = [format.pixel_pitch_mm[0], -format.pixel_pitch_mm[1]];
         let further = &model.further;
         Self {
-            inverse_interval: (1.0 / interval) as f32,
-            wave_number: [base, 2.0 * base, 4.0 * base],
-            d0: terms.d0 as f32,
-            periodic: terms.periodic.map(|d| d as f32),
+            d0: terms.d0,
+            sines: Sines::new(terms, interval),
             delay_per_column: (terms.e1 * step_mm[0]) as f32,
             delay_per_row: terms.e2 * step_mm[1],
             delay_of_first: terms.delay(first_mm[0], first_mm[1]),
@@ -95,78 +75,113 @@ impl Kernel {
             }),
             spline: further.spline.as_ref().map(|spline| SplineLanes::new(spline, interval)),
             polynomial: further.polynomial.as_ref().map(PolynomialLanes::new),
-            surface: further.surface.as_ref().map(|surface| SurfaceLanes::new(surface, first_mm, step_mm)),
+            surface: further.surface.as_ref().map(|surface| SurfaceLanes::new(surface, format, first_mm, step_mm)),
         }
     }
 
-    /// Corrects the pixels of `block`, the first of which is `(column, row)`.
+    /// Prepares the parts for one row.
+    pub(crate) fn begin_row(&self, row: usize, parts: &mut Parts) {
+        if let Some(surface) = &self.surface {
+            parts.in_row = surface.of_row(row);
+        }
+    }
+
+    /// Corrects the pixels of `block`, the first of which is `(column, row)`. Gives all bits for each pixel that the model
+    /// does not cover; `None` where it covers all.
     #[inline(always)]
     pub(crate) fn correct(
         &self,
-        block: &mut Block,
+        mut block: Block<'_>,
         [column, row]: [usize; 2],
         parts: &mut Parts,
         tally: &mut LaneTally,
-    ) {
+    ) -> Option<Mask> {
         match &self.spline {
-            Some(spline) => spline.put(&block.range, &mut parts.periodic, &mut parts.derivative),
-            None => self.put_periodic(&block.range, &mut parts.periodic, &mut parts.derivative),
-        }
-        self.put_amplitude(&block.amplitude, &mut parts.amplitude, &mut parts.known);
-        match &self.surface {
-            Some(surface) => surface.put(column, row, &mut parts.delay, &mut parts.known),
-            None => self.put_delay(column, row, &mut parts.delay),
-        }
-        // What a polynomial adds goes with the amplitude's part as long as all of it is added up.
-        for lane in 0..LANES {
-            parts.others[lane] = parts.amplitude[lane] + block.pattern[lane];
+            Some(spline) => spline.put(block.range, &mut parts.periodic, &mut parts.derivative),
+            None => self.sines.put(block.range, &mut parts.periodic, &mut parts.derivative),
         }
         if let Some(polynomial) = &self.polynomial {
-            let mut slope = [0.0; LANES];
-            polynomial.put(&block.range, &mut parts.polynomial, &mut slope);
-            for (lane, slope) in slope.into_iter().enumerate() {
-                parts.others[lane] += parts.polynomial[lane];
-                parts.derivative[lane] += slope;
-            }
+            polynomial.put(block.range, &mut parts.polynomial, &mut parts.derivative);
         }
-        self.apply(block, parts, tally);
-        tally.add(PERIODIC, &parts.periodic, &parts.inside);
-        tally.add(DELAY, &parts.delay, &parts.inside);
-        if self.hyperbola.is_some() {
-            tally.add(AMPLITUDE, &parts.amplitude, &parts.inside);
+        self.put_amplitude(block.amplitude, &mut parts.amplitude, &mut parts.known);
+        match &self.surface {
+            Some(surface) => surface.put(column, row, &parts.in_row, &mut parts.delay, &mut parts.known),
+            None => self.put_delay(column, row, &mut parts.delay),
         }
-        if block.has_pattern {
-            tally.add(PATTERN, &block.pattern, &parts.inside);
+        if let Some(pattern) = block.pattern {
+            parts.pattern = *pattern;
         }
-        if self.polynomial.is_some() {
-            tally.add(POLYNOMIAL, &parts.polynomial, &parts.inside);
+        let outside = self.leave_out(block.range, parts, tally);
+        self.apply(&mut block, parts, tally);
+        tally.add(PERIODIC, &parts.periodic);
+        if self.surface.is_none() && outside.is_none() {
+            tally.add_line(&parts.delay);
+        } else {
+            tally.add(DELAY, &parts.delay);
         }
+        outside
     }
 
-    /// Takes the sum of the parts off, transports sigma, flags what the model does not cover, and counts.
+    /// Sets all parts to zero where the range is outside its span, and counts. Gives the pixels that the model does not
+    /// cover, `None` where it covers all.
     #[inline(always)]
     #[allow(clippy::needless_bitwise_bool)] // a branch would keep the loop scalar
-    fn apply(&self, block: &mut Block, parts: &mut Parts, tally: &mut LaneTally) {
+    fn leave_out(&self, range: &Lanes, parts: &mut Parts, tally: &mut LaneTally) -> Option<Mask> {
+        let mut all = u32::MAX;
+        for lane in 0..LANES {
+            parts.inside[lane] = mask(within(range[lane], self.range_span));
+            all &= parts.inside[lane] & parts.known[lane];
+        }
+        if all == u32::MAX {
+            tally.count_all();
+            return None;
+        }
+        let (mut outside, mut finite) = ([0; LANES], [0; LANES]);
+        for lane in 0..LANES {
+            finite[lane] = mask(range[lane].abs() <= f32::MAX);
+            outside[lane] = finite[lane] & !(parts.inside[lane] & parts.known[lane]);
+        }
+        tally.count(&finite, &parts.inside, &outside);
+        for plane in [
+            &mut parts.periodic,
+            &mut parts.derivative,
+            &mut parts.amplitude,
+            &mut parts.delay,
+            &mut parts.polynomial,
+            &mut parts.pattern,
+        ] {
+            for (value, inside) in plane.iter_mut().zip(&parts.inside) {
+                *value = f32::from_bits(value.to_bits() & inside);
+            }
+        }
+        Some(outside)
+    }
+
+    /// Takes the sum of the parts off and transports sigma.
+    #[inline(always)]
+    fn apply(&self, block: &mut Block<'_>, parts: &mut Parts, tally: &mut LaneTally) {
+        let d0 = (self.d0 as f32).to_bits();
         let mut total = [0.0; LANES];
-        for (lane, total) in total.iter_mut().enumerate() {
-            let (range, sigma) = (block.range[lane], block.sigma[lane]);
-            let inside = within(range, self.range_span);
-            let finite = range.abs() <= f32::MAX;
-            let (inside_mask, finite_mask) = (mask(inside), mask(finite));
-            let outside_mask = finite_mask & !(inside_mask & parts.known[lane]);
-            *total = self.d0 + parts.periodic[lane] + parts.delay[lane] + parts.others[lane];
-            let transported = sigma * (1.0 - parts.derivative[lane]).abs();
-            block.range[lane] = if inside { range - *total } else { range };
-            block.sigma[lane] = if inside { transported } else { sigma };
-            parts.inside[lane] = inside_mask;
-            parts.outside[lane] = outside_mask;
-            parts.finite[lane] = finite_mask;
+        for lane in 0..LANES {
+            total[lane] = f32::from_bits(d0 & parts.inside[lane]) + parts.periodic[lane] + parts.delay[lane];
         }
-        for (flags, outside) in block.flags.iter_mut().zip(&parts.outside) {
-            *flags = Flags::from_bits_retain(flags.bits() | (*outside as u16 & Flags::OUTSIDE_SPAN.bits()));
+        for (group, there, plane) in [
+            (AMPLITUDE, self.hyperbola.is_some(), &parts.amplitude),
+            (PATTERN, block.pattern.is_some(), &parts.pattern),
+            (POLYNOMIAL, self.polynomial.is_some(), &parts.polynomial),
+        ] {
+            if there {
+                for (total, part) in total.iter_mut().zip(plane) {
+                    *total += part;
+                }
+                tally.add(group, plane);
+            }
         }
-        tally.count(&parts.finite, &parts.inside, &parts.outside);
-        tally.add(TOTAL, &total, &parts.inside);
+        for lane in 0..LANES {
+            block.range[lane] -= total[lane];
+            block.sigma[lane] *= (1.0 - parts.derivative[lane]).abs();
+        }
+        tally.add_total(&total);
     }
 
     /// The signal propagation delay of the block that begins at `(column, row)`.
@@ -176,26 +191,6 @@ impl Kernel {
         let first = (of_row + column as f64 * f64::from(self.delay_per_column)) as f32;
         for (lane, delay) in delay.iter_mut().enumerate() {
             *delay = first + lane as f32 * self.delay_per_column;
-        }
-    }
-
-    /// The periodic terms and their derivative: one sine and cosine at half the longest wave's angle, doubled
-    /// three times.
-    #[inline(always)]
-    fn put_periodic(&self, range: &Lanes, value: &mut Lanes, derivative: &mut Lanes) {
-        let [d2, d3, d4, d5, d6, d7] = self.periodic;
-        let [k1, k2, k3] = self.wave_number;
-        for lane in 0..LANES {
-            let intervals = range[lane] * self.inverse_interval;
-            let half_angle = PI * (intervals - ((intervals + ROUND) - ROUND));
-            let first = octave(sin_cos_of_right_angles(half_angle));
-            let second = octave(first);
-            let third = octave(second);
-            value[lane] =
-                (d2 * first.0 + d3 * first.1) + (d4 * second.0 + d5 * second.1) + (d6 * third.0 + d7 * third.1);
-            derivative[lane] = k1 * (d2 * first.1 - d3 * first.0)
-                + k2 * (d4 * second.1 - d5 * second.0)
-                + k3 * (d6 * third.1 - d7 * third.0);
         }
     }
 
@@ -228,11 +223,12 @@ pub(crate) struct Parts {
     amplitude: Lanes,
     delay: Lanes,
     polynomial: Lanes,
-    others: Lanes,
+    pattern: Lanes,
     known: Mask,
-    finite: Mask,
-    inside: Mask,
-    outside: Mask,
+    /// Whether the range is inside its span: where anything was taken off.
+    pub(crate) inside: Mask,
+    /// The surface in this row.
+    in_row: Powers,
 }
 
 impl Default for Parts {
@@ -245,33 +241,12 @@ impl Default for Parts {
             amplitude: zeros,
             delay: zeros,
             polynomial: zeros,
-            others: zeros,
+            pattern: zeros,
             known: nowhere,
-            finite: nowhere,
             inside: nowhere,
-            outside: nowhere,
+            in_row: Powers::default(),
         }
     }
-}
-
-/// Sine and cosine of an angle in [-pi/2, pi/2] by their Taylor series; the next terms are below 6e-8, the
-/// resolution of single precision.
-#[inline(always)]
-fn sin_cos_of_right_angles(angle: f32) -> (f32, f32) {
-    let square = angle * angle;
-    let sin = 1.0 / 362_880.0 - square * (1.0 / 39_916_800.0);
-    let sin = 1.0 / 120.0 - square * (1.0 / 5_040.0 - square * sin);
-    let sin = angle * (1.0 - square * (1.0 / 6.0 - square * sin));
-    let cos = 1.0 / 40_320.0 - square * (1.0 / 3_628_800.0 - square * (1.0 / 479_001_600.0));
-    let cos = 1.0 / 24.0 - square * (1.0 / 720.0 - square * cos);
-    let cos = 1.0 - square * (0.5 - square * cos);
-    (sin, cos)
-}
-
-/// Sine and cosine of the doubled angle.
-#[inline(always)]
-fn octave((sin, cos): (f32, f32)) -> (f32, f32) {
-    (2.0 * sin * cos, (cos - sin) * (cos + sin))
 }
 
 /// Whether a value lies in a span, bounds included; NaN lies in none.
@@ -299,85 +274,9 @@ fn mask(holds: bool) -> u32 {
     u32::from(holds).wrapping_neg()
 }
 
-/// Sums that are kept beside each other: so few stay in registers.
-const SUMS: usize = 8;
-
-/// Counts and sums of a row.
-pub(crate) struct LaneTally {
-    /// Minus the number of pixels: what the sum of their masks is.
-    finite: [u32; SUMS],
-    corrected: [u32; SUMS],
-    outside_span: [u32; SUMS],
-    sum: [[f32; SUMS]; GROUPS],
-    /// Bits of the largest absolute value, which grow with it.
-    largest: [[u32; SUMS]; GROUPS],
-}
-
-impl LaneTally {
-    pub(crate) fn new() -> Self {
-        Self {
-            finite: [0; SUMS],
-            corrected: [0; SUMS],
-            outside_span: [0; SUMS],
-            sum: [[0.0; SUMS]; GROUPS],
-            largest: [[0; SUMS]; GROUPS],
-        }
-    }
-
-    #[inline(always)]
-    fn count(&mut self, finite: &Mask, corrected: &Mask, outside_span: &Mask) {
-        let counts = [&mut self.finite, &mut self.corrected, &mut self.outside_span];
-        for (count, masks) in counts.into_iter().zip([finite, corrected, outside_span]) {
-            for masks in masks.as_chunks::<SUMS>().0 {
-                for lane in 0..SUMS {
-                    count[lane] = count[lane].wrapping_add(masks[lane]);
-                }
-            }
-        }
-    }
-
-    /// Adds one group of `Δρ` of the pixels that were corrected.
-    #[inline(always)]
-    fn add(&mut self, group: usize, correction: &Lanes, corrected: &Mask) {
-        let (sum, largest) = (&mut self.sum[group], &mut self.largest[group]);
-        for (values, masks) in correction.as_chunks::<SUMS>().0.iter().zip(corrected.as_chunks::<SUMS>().0) {
-            for lane in 0..SUMS {
-                let bits = values[lane].to_bits() & masks[lane];
-                sum[lane] += f32::from_bits(bits);
-                largest[lane] = largest[lane].max(bits & (u32::MAX >> 1));
-            }
-        }
-    }
-
-    /// Adds the lanes up in their order.
-    pub(crate) fn total(&self) -> Tally {
-        let count = |lanes: &[u32; SUMS]| lanes.iter().map(|lane| lane.wrapping_neg() as usize).sum();
-        let largest = |lanes: [u32; SUMS]| f64::from(f32::from_bits(lanes.into_iter().max().unwrap_or(0)));
-        Tally {
-            finite: count(&self.finite),
-            corrected: count(&self.corrected),
-            outside_span: count(&self.outside_span),
-            sum: self.sum.map(|lanes| lanes.iter().map(|lane| f64::from(*lane)).sum()),
-            largest: self.largest.map(largest),
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn series_are_good_to_single_precision() {
-        for step in -1000..=1000 {
-            let angle = f64::from(step) / 1000.0 * std::f64::consts::FRAC_PI_2;
-            let (sin, cos) = sin_cos_of_right_angles(angle as f32);
-            // Two units in the last place of 1, and the first term left out (5.7e-8).
-            let tolerance = 3e-7;
-            assert!((f64::from(sin) - angle.sin()).abs() < tolerance, "sin {angle}");
-            assert!((f64::from(cos) - angle.cos()).abs() < tolerance, "cos {angle}");
-        }
-    }
 
     #[test]
     fn span_bounds_are_rounded_inwards() {

@@ -38,3 +38,17 @@ impl Legendre {
 pub(crate) fn reduced([low, high]: [f64; 2], position: f64) -> f64 {
     (2.0 * position - low - high) / (high - low)
 }
+
+/// The coefficients of `t^0, t^1, ..` of a series `sum c_k P_k(t)`.
+pub(crate) fn powers(series: &[f64; MOST_ORDER + 1]) -> [f64; MOST_ORDER + 1] {
+    let mut polynomials = [[0.0; MOST_ORDER + 1]; MOST_ORDER + 1];
+    (polynomials[0][0], polynomials[1][1]) = (1.0, 1.0);
+    for order in 2..=MOST_ORDER {
+        let k = order as f64;
+        for power in 0..=order {
+            let raised = if power > 0 { polynomials[order - 1][power - 1] } else { 0.0 };
+            polynomials[order][power] = ((2.0 * k - 1.0) * raised - (k - 1.0) * polynomials[order - 2][power]) / k;
+        }
+    }
+    std::array::from_fn(|power| series.iter().zip(&polynomials).map(|(c, polynomial)| c * polynomial[power]).sum())
+}

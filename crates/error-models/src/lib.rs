@@ -11,6 +11,8 @@ mod interpolated;
 mod inverse;
 mod kernel;
 mod kernel_further;
+mod kernel_sines;
+mod kernel_tally;
 mod ledger;
 mod legendre;
 mod linear;

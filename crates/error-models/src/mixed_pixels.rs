@@ -14,12 +14,17 @@ pub(crate) struct MixedPixelTest<'a> {
     options: MixedPixelOptions,
 }
 
+/// A range with its variance.
+#[derive(Clone, Copy)]
+struct Measured {
+    range: f32,
+    variance: f32,
+}
+
 /// The surface at one side of a pixel, continued to it.
 #[derive(Clone, Copy)]
 struct Continued {
-    range: f32,
-    /// Variance of its difference to the pixel, as a multiple of the variance of one range.
-    variance_factor: f32,
+    at_pixel: Measured,
     /// Whether it was continued over two pixels, and not just taken over from one.
     slope_known: bool,
 }
@@ -27,12 +32,12 @@ struct Continued {
 impl Continued {
     /// Continues two ranges, `gap` and `gap + 1` pixels away, straight in inverse range. `None` if the surface
     /// turns away before it reaches the pixel's ray.
-    fn over(gap: f32, first: f32, second: f32) -> Option<Self> {
-        let inverse = (gap + 1.0) / first - gap / second;
+    fn over(gap: f32, first: Measured, second: Measured) -> Option<Self> {
+        let inverse = (gap + 1.0) / first.range - gap / second.range;
         let range = 1.0 / inverse;
-        let weights = [(gap + 1.0) * (range / first).powi(2), gap * (range / second).powi(2)];
-        let variance_factor = 1.0 + weights[0] * weights[0] + weights[1] * weights[1];
-        (inverse > 0.0).then_some(Self { range, variance_factor, slope_known: true })
+        let weights = [(gap + 1.0) * (range / first.range).powi(2), gap * (range / second.range).powi(2)];
+        let variance = weights[0] * weights[0] * first.variance + weights[1] * weights[1] * second.variance;
+        (inverse > 0.0).then_some(Self { at_pixel: Measured { range, variance }, slope_known: true })
     }
 }
 
@@ -44,30 +49,26 @@ impl<'a> MixedPixelTest<'a> {
 
     /// Whether the pixel is mixed along any of the directions.
     pub(crate) fn is_mixed(&self, col: usize, row: usize) -> bool {
-        let Some(range) = self.at(col, row, [0, 0], 0) else { return false };
-        let sigma = self.sigma.get(col, row).copied().filter(|sigma| sigma.is_finite());
-        let sigma = sigma.unwrap_or(self.options.unknown_sigma_m as f32);
-        DIRECTIONS.into_iter().any(|step| self.is_mixed_along(col, row, step, range, sigma))
+        let Some(pixel) = self.at(col, row, [0, 0], 0) else { return false };
+        DIRECTIONS.into_iter().any(|step| self.is_mixed_along(col, row, step, pixel))
     }
 
-    fn is_mixed_along(&self, col: usize, row: usize, step: [isize; 2], range: f32, sigma: f32) -> bool {
-        let same_surface = self.threshold(sigma, 2.0);
-        let supported = |side: isize| self.at(col, row, step, side).is_none_or(|n| (n - range).abs() <= same_surface);
+    fn is_mixed_along(&self, col: usize, row: usize, step: [isize; 2], pixel: Measured) -> bool {
+        let supported = |side: isize| self.at(col, row, step, side).is_none_or(|n| !self.differ(pixel, n));
         if supported(-1) || supported(1) {
             return false;
         }
-        match [-1, 1].map(|side| self.continued(col, row, step, side, range, sigma)) {
+        match [-1, 1].map(|side| self.continued(col, row, step, side, pixel)) {
             // Three pixels alone are no surfaces: any tilted plane would look like that at the frame's corner.
-            [Some(a), Some(b)] => (a.slope_known || b.slope_known) && self.is_between(range, sigma, a, b),
+            [Some(a), Some(b)] => (a.slope_known || b.slope_known) && self.is_between(pixel, a.at_pixel, b.at_pixel),
             _ => false,
         }
     }
 
     /// Whether the range lies between two continued surfaces, significantly away from both.
-    fn is_between(&self, range: f32, sigma: f32, a: Continued, b: Continued) -> bool {
-        let (near, far) = if a.range < b.range { (a, b) } else { (b, a) };
-        range - near.range > self.threshold(sigma, near.variance_factor)
-            && far.range - range > self.threshold(sigma, far.variance_factor)
+    fn is_between(&self, pixel: Measured, a: Measured, b: Measured) -> bool {
+        let between = (pixel.range - a.range) * (b.range - pixel.range) > 0.0;
+        between && self.differ(pixel, a) && self.differ(pixel, b)
     }
 
     /// The surface at one side, continued to the pixel.
@@ -75,37 +76,31 @@ impl<'a> MixedPixelTest<'a> {
     /// It begins with the neighbour if that continues the two pixels behind it. Otherwise the neighbour may be
     /// mixed as well: the surface begins behind it if the three ranges are monotone, as at a blurred edge.
     /// Failing that, the neighbour's own range stands for the surface.
-    fn continued(
-        &self,
-        col: usize,
-        row: usize,
-        step: [isize; 2],
-        side: isize,
-        range: f32,
-        sigma: f32,
-    ) -> Option<Continued> {
+    fn continued(&self, col: usize, row: usize, step: [isize; 2], side: isize, pixel: Measured) -> Option<Continued> {
         let first = self.at(col, row, step, side)?;
-        let alone = Continued { range: first, variance_factor: 2.0, slope_known: false };
+        let alone = Continued { at_pixel: first, slope_known: false };
         let Some(second) = self.at(col, row, step, 2 * side) else { return Some(alone) };
         let Some(third) = self.at(col, row, step, 3 * side) else { return Continued::over(1.0, first, second) };
-        let continues =
-            |surface: Continued| (surface.range - first).abs() <= self.threshold(sigma, surface.variance_factor);
-        if Continued::over(1.0, second, third).is_some_and(continues) {
+        if Continued::over(1.0, second, third).is_some_and(|surface| !self.differ(first, surface.at_pixel)) {
             return Continued::over(1.0, first, second);
         }
-        let monotone = (first - range) * (second - first) > 0.0;
+        let monotone = (first.range - pixel.range) * (second.range - first.range) > 0.0;
         if monotone { Continued::over(2.0, second, third) } else { Some(alone) }
     }
 
-    /// Largest distance that noise, or the floor, explains.
-    fn threshold(&self, sigma: f32, variance_factor: f32) -> f32 {
-        (self.options.sigmas as f32 * sigma * variance_factor.sqrt()).max(self.options.floor_m as f32)
+    /// Whether two ranges are further apart than their noise and the floor explain.
+    fn differ(&self, a: Measured, b: Measured) -> bool {
+        let variance = a.variance + b.variance + (self.options.floor_m * self.options.floor_m) as f32;
+        (a.range - b.range).abs() > self.options.sigmas as f32 * variance.sqrt()
     }
 
     /// The range `count` steps away; `None` outside the frame and where there is no positive range.
-    fn at(&self, col: usize, row: usize, [dx, dy]: [isize; 2], count: isize) -> Option<f32> {
+    fn at(&self, col: usize, row: usize, [dx, dy]: [isize; 2], count: isize) -> Option<Measured> {
         let col = col.checked_add_signed(dx * count)?;
         let row = row.checked_add_signed(dy * count)?;
-        self.range.get(col, row).copied().filter(|range| *range > 0.0 && range.is_finite())
+        let range = self.range.get(col, row).copied().filter(|range| *range > 0.0 && range.is_finite())?;
+        let sigma = self.sigma.get(col, row).copied().filter(|sigma| sigma.is_finite());
+        let sigma = sigma.unwrap_or(self.options.unknown_sigma_m as f32);
+        Some(Measured { range, variance: sigma * sigma })
     }
 }

@@ -122,7 +122,7 @@ fn the_interior_of_a_sphere_is_not_flagged() {
     for row in 0..HEIGHT {
         for col in 0..WIDTH {
             // Up to 75 degrees of incidence: there the sphere bends by w² / (R cos³θ) = 1 cm from one pixel of
-            // w = 7.5 mm to the next, by 2 cm along a diagonal, which is the floor.
+            // w = 7.5 mm to the next, by 2 cm along a diagonal, which is four times the floor.
             if inside(col as f64, row as f64).max(0.0).sqrt() > radius * 75.0_f64.to_radians().cos() {
                 interior += 1;
                 assert!(!found[(col, row)], "{col} {row}");
@@ -157,6 +157,32 @@ fn low_amplitudes_are_flagged_and_unknown_ones_are_not() {
 }
 
 #[test]
+fn thresholds_follow_the_sigma_of_each_pixel() {
+    // The right half is ten times as noisy as the left one: neither is flagged, though noise of 2 cm on the left would be.
+    let wall = |col: f64, row: f64| plane(col, row, 2.0, 0.4);
+    let noisy = frame(0.02, wall);
+    let mut both = frame(0.002, wall);
+    let half = WIDTH / 2;
+    for row in 0..HEIGHT {
+        for col in half..WIDTH {
+            both.range[(col, row)] = noisy.range[(col, row)];
+            both.sigma[(col, row)] = 0.02;
+        }
+    }
+    // 25 000 pixels in four directions: a pixel has to be off both sides at once by four sigmas, for which noise alone
+    // has less than one chance in a million.
+    let mut told = both.clone();
+    assert!(mixed(&mut told).as_slice().iter().filter(|mixed| **mixed).count() <= 1);
+    both.sigma = Raster::filled(WIDTH, HEIGHT, 0.002);
+    let found = mixed(&mut both);
+    let count = |columns: std::ops::Range<usize>| {
+        let pixels = (0..HEIGHT).flat_map(|row| columns.clone().map(move |col| (col, row)));
+        pixels.filter(|pixel| found[*pixel]).count()
+    };
+    assert!(count(0..half - 3) == 0 && count(half..WIDTH) > 100, "{} {}", count(0..half - 3), count(half..WIDTH));
+}
+
+#[test]
 fn an_unknown_sigma_is_replaced_by_that_of_the_options() {
     // Noise of 3 cm that the frame says nothing about: with the true figure given, nothing is flagged.
     let mut silent = frame(0.03, |col, row| plane(col, row, 2.0, 0.0));
@@ -185,7 +211,8 @@ fn small_frames_and_bad_options_are_answered() {
         MixedPixelOptions { sigmas: f64::NAN, ..default },
         MixedPixelOptions { floor_m: -1.0, ..default },
         MixedPixelOptions { unknown_sigma_m: f64::INFINITY, ..default },
-        MixedPixelOptions { floor_m: 0.0, sigmas: 0.0, ..default },
+        MixedPixelOptions { sigmas: 0.0, ..default },
+        MixedPixelOptions { floor_m: 0.0, unknown_sigma_m: 0.0, ..default },
     ] {
         let options = GrossErrorOptions { mixed_pixels: Some(mixed_pixels), low_amplitude: None };
         assert!(options.validate().is_err());

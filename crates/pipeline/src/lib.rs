@@ -59,8 +59,9 @@ pub use noise::{NoiseBin, NoiseParameter, NoiseRequest, NoiseStation, NoiseSumma
 pub use outcome::{AdjustmentFigures, FurtherPoint, Outcome, StationPose};
 pub use plan::{
     AdjustOptions, AverageOptions, CorrectImagePointOptions, CorrectRangeOptions, DeconvolveOptions, DemodulateOptions,
-    FlagOptions, MixedPixels, MultipathOptions, MultipathTreatment, NetworkCalibration, NoiseOptions, Plan,
-    PointCloudOptions, RegisterOptions, RepairWrapsOptions, SimulateSource, Source, Stage, StartPoses, UnwrapOptions,
+    FlagOptions, FuseExposuresOptions, MixedPixels, MultipathOptions, MultipathTreatment, NetworkCalibration,
+    NoiseOptions, Plan, PointCloudOptions, RegisterOptions, RepairWrapsOptions, SimulateSource, Source, Stage,
+    StartPoses, UnwrapOptions,
 };
 pub use progress::{Progress, Silent};
 pub use register::{

@@ -1,5 +1,7 @@
 //! What the stages work on: one view per frame, later per station.
 
+use std::collections::BTreeMap;
+
 use nalgebra::Isometry3;
 use phase_unwrap::combine_frequencies;
 use range_image::{ComplexChannel, ComplexFrame, Flags, Modulation, RangeFrame, Raster, RawFrame};
@@ -161,4 +163,18 @@ impl View {
             ViewData::Range(frame) => Some(&frame.flags),
         }
     }
+}
+
+/// The views of each station, in the order in which the stations come first.
+pub(crate) fn by_station(views: Vec<View>) -> Vec<Vec<View>> {
+    let mut groups: Vec<Vec<View>> = Vec::new();
+    let mut places: BTreeMap<String, usize> = BTreeMap::new();
+    for view in views {
+        let place = *places.entry(view.station.clone()).or_insert(groups.len());
+        match groups.get_mut(place) {
+            Some(group) => group.push(view),
+            None => groups.push(vec![view]),
+        }
+    }
+    groups
 }

@@ -110,7 +110,8 @@ fn the_first_line_says_what_moved_the_pixel() {
     let found = explain(&request, &Silent).unwrap();
     check_sums(&found);
     let names: Vec<&str> = found.stages.iter().map(|line| line.stage).collect();
-    let all = "Demodulate Average Deconvolve Unwrap CorrectRange CorrectImagePoint Multipath PointCloud Flag";
+    let all =
+        "Demodulate Average Deconvolve Unwrap CorrectRange CorrectImagePoint Multipath FuseExposures PointCloud Flag";
     assert_eq!(names.join(" "), all);
     let text = found.to_string();
     let moved = text.lines().find(|line| line.starts_with("moved")).unwrap();

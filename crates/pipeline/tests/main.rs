@@ -10,6 +10,7 @@ mod common;
 mod compare;
 mod diff;
 mod explain;
+mod exposures;
 mod fixed_pattern;
 mod noise;
 mod real_captures;

@@ -22,12 +22,14 @@ bitflags! {
         const OUTSIDE_SPAN = 1 << 6;
         /// No value: the sensor gave none or it was not finite.
         const NO_DATA = 1 << 7;
+        /// Light of another camera in the same band, or light that flickers, disturbs the samples.
+        const INTERFERENCE = 1 << 8;
     }
 }
 
 impl Flags {
     /// Each single flag with the name used in reports and files.
-    pub const NAMED: [(Self, &'static str); 8] = [
+    pub const NAMED: [(Self, &'static str); 9] = [
         (Self::SATURATED, "saturated"),
         (Self::LOW_AMPLITUDE, "low_amplitude"),
         (Self::MIXED_PIXEL, "mixed_pixel"),
@@ -36,5 +38,6 @@ impl Flags {
         (Self::UNWRAP_UNSURE, "unwrap_unsure"),
         (Self::OUTSIDE_SPAN, "outside_span"),
         (Self::NO_DATA, "no_data"),
+        (Self::INTERFERENCE, "interference"),
     ];
 }

@@ -6,8 +6,8 @@ use std::path::Path;
 
 use crate::common::angle_between;
 use range_image::{
-    ConsistencyOptions, DemodulationOptions, Flags, Modulation, PhaseSense, Raster, RawFrame, RulesVerdict, Samples,
-    check_samples, demodulate,
+    ConsistencyOptions, DemodulationOptions, Flags, InterferenceOptions, Modulation, PhaseSense, Raster, RawFrame,
+    RulesVerdict, Samples, check_samples, demodulate, tell_interference,
 };
 
 /// The f32 values of one array of an .npz file (little-endian, version 1 header).
@@ -43,6 +43,18 @@ fn samples_of_a_camera_at_rest_agree_to_one_percent() {
     };
     // Nothing moved; the taps are unequal by one percent of the amplitude, and not by a tenth of that.
     assert!(flagged(0.012) < 0.002 && flagged(0.001) > 0.1, "{} {}", flagged(0.012), flagged(0.001));
+}
+
+#[test]
+fn a_camera_alone_at_rest_shows_neither_motion_nor_another_camera() {
+    let Some((_, raw)) = capture() else { return };
+    let mut frame = demodulate(&raw, &DemodulationOptions::default()).unwrap();
+    let check = ConsistencyOptions { tolerance: 0.012, ..ConsistencyOptions::default() };
+    check_samples(&raw, &DemodulationOptions::default(), &check, &mut frame.flags).unwrap();
+    let share = tell_interference(&mut frame, &InterferenceOptions::default()).unwrap();
+    // No noise is known of this mean of many frames: the tolerance alone is exceeded by two pixels in a thousand.
+    assert!(share < 0.004, "{share}");
+    assert!(!frame.flags.as_slice().iter().any(|flags| flags.contains(Flags::INTERFERENCE)));
 }
 
 #[test]

@@ -64,6 +64,27 @@ fn reason(flag: Flags, stage: &Stage, view: &View, pixel: [usize; 2], state: &Pi
             let level = options.consistency.as_ref().map(|check| check.false_alarm_probability);
             by_false_alarms("the samples contradict each other: the scene or the camera moved", level)
         }
+        (Flags::MOTION, Stage::FuseExposures(options)) => by_false_alarms(
+            "exposures contradict each other: something moved, or the longer one is not to be trusted",
+            Some(options.false_alarm_probability),
+        ),
+        (Flags::INTERFERENCE, Stage::Demodulate(options)) => {
+            let level = options.consistency.as_ref().map(|check| check.false_alarm_probability);
+            by_false_alarms(
+                "the samples contradict each other wherever there is light, which nothing that moves does: \
+                 another camera, flickering light, or a noise model that says too little",
+                level,
+            )
+        }
+        (Flags::INTERFERENCE, Stage::Average(options)) => by_false_alarms(
+            "it beats from frame to frame as all lit pixels do, or the samples of one frame contradict each other: \
+             another camera in the same band, or flickering light",
+            Some(options.interference.false_alarm_probability),
+        ),
+        (Flags::MOTION, Stage::Average(options)) => by_false_alarms(
+            "its values differ from frame to frame, or the samples of one frame contradict each other: something moved",
+            Some(options.rest.moved_probability),
+        ),
         (Flags::MULTIPATH, Stage::Multipath(options)) => {
             let risk = view.multipath_risk_m.as_ref().map(|risk| f64::from(risk[(pixel[0], pixel[1])]));
             match options.flag_risk_above_m.zip(risk).filter(|(limit, risk)| risk > limit) {
@@ -78,6 +99,10 @@ fn reason(flag: Flags, stage: &Stage, view: &View, pixel: [usize; 2], state: &Pi
         ),
         (Flags::UNWRAP_UNSURE, Stage::Unwrap(options)) => unsure(options.minimum_confidence),
         (Flags::UNWRAP_UNSURE, Stage::RepairWraps(options)) => unsure(options.minimum_confidence),
+        (Flags::SATURATED, Stage::FuseExposures(_)) => {
+            ("it is saturated in all exposures: there is no range".to_owned(), None)
+        }
+        (_, Stage::FuseExposures(_)) => ("an exposure that went into the mean carries it".to_owned(), None),
         (_, Stage::Average(_)) => ("a frame that went into the mean carries it".to_owned(), None),
         (Flags::NO_DATA, Stage::CorrectRange(_)) => ("it sees the camera's optical reference".to_owned(), None),
         (Flags::NO_DATA, _) => ("there is no range here".to_owned(), None),
@@ -135,10 +160,11 @@ fn low_amplitude(threshold: Option<f64>, maximum_sigma_m: Option<f64>, state: &P
 
 fn mixed(options: &FlagOptions, state: &PixelState) -> Reason {
     let (sigmas, floor_m) = (options.mixed_pixels.sigmas, options.mixed_pixels.floor_m);
-    let by_noise = state.sigma_m.map(|sigma| sigmas * sigma);
-    let threshold_m = by_noise.map_or(floor_m, |threshold| threshold.max(floor_m));
+    // The surfaces at its sides are taken to be as noisy as the pixel, and as their neighbours alone.
+    let threshold_m = sigmas * state.sigma_m.map_or(floor_m, |sigma| (2.0 * sigma * sigma).sqrt().hypot(floor_m));
     let words = format!(
-        "it lies between the surfaces at its two sides, off both by more than {:.1} mm ({sigmas} sigma, at least {:.1} mm)",
+        "it lies between the surfaces at its two sides, off both by more than {:.1} mm ({sigmas} sigma of noise and of \
+         {:.1} mm of shape)",
         1e3 * threshold_m,
         1e3 * floor_m
     );

@@ -241,6 +241,7 @@ fn all_stages(level: Level, calibration: Option<&Calibration>) -> Plan {
         stages.push(Stage::CorrectImagePoint(crate::CorrectImagePointOptions::default()));
     }
     stages.push(Stage::Multipath(crate::MultipathOptions::default()));
+    stages.push(Stage::FuseExposures(crate::FuseExposuresOptions::default()));
     stages.push(Stage::PointCloud(crate::PointCloudOptions::default()));
     stages.push(Stage::Flag(crate::FlagOptions::default()));
     stages.retain(|stage| !is_past(level, stage.needs()));

@@ -20,6 +20,7 @@ pub(super) fn parts(stage: &Stage, before: &View, after: &View, pixel: [usize; 2
         }
         Stage::CorrectRange(_) => return corrected(after, pixel),
         Stage::Multipath(_) => one("range of the direct path".to_owned(), "multipath"),
+        Stage::FuseExposures(_) => one("weighted mean of the exposures that agree".to_owned(), "fusion"),
         Stage::Demodulate(_)
         | Stage::CorrectImagePoint(_)
         | Stage::PointCloud(_)

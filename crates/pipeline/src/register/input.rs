@@ -15,7 +15,7 @@ use crate::load::{read_calibration, root_of};
 use crate::outcome::Outcome;
 use crate::plan::{
     AverageOptions, CorrectImagePointOptions, CorrectRangeOptions, DeconvolveOptions, DemodulateOptions, FlagOptions,
-    PointCloudOptions, UnwrapOptions,
+    FuseExposuresOptions, PointCloudOptions, UnwrapOptions,
 };
 use crate::progress::Progress;
 use crate::run::process;
@@ -114,6 +114,7 @@ pub(crate) fn stages(level: Level, calibration: Option<&Calibration>) -> Vec<Sta
         }
         stages.push(Stage::CorrectImagePoint(CorrectImagePointOptions::default()));
     }
+    stages.push(Stage::FuseExposures(FuseExposuresOptions::default()));
     stages.push(Stage::PointCloud(PointCloudOptions::default()));
     stages.push(Stage::Flag(FlagOptions::default()));
     stages

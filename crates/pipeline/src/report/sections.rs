@@ -367,4 +367,5 @@ fn flags(page: &mut Page, outcome: &Outcome, summary: &Summary) {
 }
 
 /// Names of the first colours of [`CATEGORIES`], in the order of [`Flags::NAMED`].
-const COLOUR_NAMES: [&str; 8] = ["blue", "orange", "green", "red", "purple", "brown", "pink", "grey"];
+const COLOUR_NAMES: [&str; Flags::NAMED.len()] =
+    ["blue", "orange", "green", "red", "purple", "brown", "pink", "grey", "olive"];

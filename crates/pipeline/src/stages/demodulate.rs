@@ -1,6 +1,6 @@
 use range_image::{
     ComplexFrame, ConsistencyOptions, DemodulationOptions, Demodulator, NoiseModel, RawFrame, RulesVerdict,
-    check_samples,
+    check_samples, tell_interference,
 };
 
 use super::Findings;
@@ -12,21 +12,24 @@ use crate::{Error, Result};
 
 /// Raw samples to complex images, with the conventions that the survey states.
 pub(super) fn run(work: &mut Work, options: &DemodulateOptions, progress: &dyn Progress) -> Result<Findings> {
-    let consistency = options.consistency.clone();
+    let (consistency, interference) = (options.consistency.clone(), options.interference);
     let options = demodulation_options(work, options);
     // What breaks a rule cannot be told without a measure.
     let consistency = consistency.filter(|check| options.noise.is_known() || check.tolerance > 0.0);
     let demodulator = Demodulator::new(&options).map_err(Error::stage("Demodulate", "options"))?;
     let total = work.outcome.views.len();
-    let mut inconsistent = 0;
+    let (mut inconsistent, mut disturbed) = (0, 0);
     for (index, view) in work.outcome.views.iter_mut().enumerate() {
         if let ViewData::Samples(raw) = &view.data {
             let mut frame = ComplexFrame::empty();
             let demodulated = demodulator.demodulate_into(raw, &mut frame);
             demodulated.map_err(Error::stage("Demodulate", &view.name()))?;
             if let Some(check) = &consistency {
-                inconsistent +=
-                    check_frame(raw, &options, check, &mut frame).map_err(Error::stage("Demodulate", &view.name()))?;
+                let found = check_frame(raw, &options, check, &mut frame);
+                inconsistent += found.map_err(Error::stage("Demodulate", &view.name()))?;
+                let share = tell_interference(&mut frame, &interference);
+                let share = share.map_err(Error::stage("Demodulate", &view.name()))?;
+                disturbed += usize::from(share >= interference.least_share);
             }
             view.data = ViewData::Phase(frame);
             view.before = view.snapshot();
@@ -36,6 +39,7 @@ pub(super) fn run(work: &mut Work, options: &DemodulateOptions, progress: &dyn P
     let mut findings = Findings::from([("frames".to_owned(), total as f64)]);
     if consistency.is_some() {
         findings.insert("inconsistent_px".to_owned(), inconsistent as f64);
+        findings.insert("frames_with_interference".to_owned(), disturbed as f64);
     }
     Ok(findings)
 }

@@ -7,6 +7,7 @@ mod correct;
 mod deconvolve;
 mod demodulate;
 mod flag;
+mod fuse;
 mod multipath;
 mod reference_path;
 mod register;
@@ -40,6 +41,7 @@ pub(crate) fn apply(stage: &Stage, work: &mut Work, progress: &dyn Progress) -> 
         Stage::CorrectRange(options) => correct::run(work, options, progress),
         Stage::CorrectImagePoint(_) => cloud::correct_image_point(work),
         Stage::Multipath(options) => multipath::run(work, options, progress),
+        Stage::FuseExposures(options) => fuse::run(work, options, progress),
         Stage::PointCloud(_) => cloud::run(work, progress),
         Stage::Flag(options) => flag::run(work, options, progress),
         Stage::Register(options) => register::run(work, options, progress),

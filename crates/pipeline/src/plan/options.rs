@@ -1,145 +1,11 @@
-//! A pipeline as data: named stages with options, in the order of the conventions.
-
-use std::path::Path;
+//! What the stages can be told.
 
 use multipath::MixedPixelTreatment;
-use range_image::{ConsistencyOptions, RestOptions};
-use range_io::ron_text;
-use range_io::survey::Level;
+use range_image::{ConsistencyOptions, FusionOptions, InterferenceOptions, RestOptions};
 use serde::{Deserialize, Serialize};
 
-pub use crate::drift::CorrectRangeOptions;
-use crate::{Error, Result};
-
-/// What a pipeline does, read from a RON file.
-///
-/// ```
-/// let plan = pipeline::Plan::from_ron(r#"(
-///     name: "walls",
-///     stages: [Demodulate(low_amplitude: 40), Average(), Unwrap(), PointCloud()],
-/// )"#, "walls.ron".as_ref()).expect("a valid plan");
-/// assert_eq!(plan.stages.len(), 4);
-/// ```
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Plan {
-    /// Name of the pipeline; the default output folder is called after it.
-    pub name: String,
-    /// Where the frames come from, unless the caller names a survey.
-    #[serde(default)]
-    pub source: Option<Source>,
-    /// A calibration to be estimated first, from a simulated network of targets, and used instead of the survey's.
-    #[serde(default)]
-    pub calibrate: Option<NetworkCalibration>,
-    /// The stages, in order.
-    pub stages: Vec<Stage>,
-}
-
-/// A network of targets to simulate, and what to estimate from it.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct NetworkCalibration {
-    /// The network's RON file, relative to the pipeline's.
-    pub network: String,
-    /// Names of the terms to estimate; all others are held at their nominal values.
-    pub terms: Vec<String>,
-}
-
-/// Where a pipeline's frames come from; paths are relative to the pipeline's file.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub enum Source {
-    /// A scene is simulated first.
-    Simulate(SimulateSource),
-    /// A survey folder that is there already.
-    Survey {
-        /// The folder with `survey.ron`.
-        folder: String,
-    },
-}
-
-/// A scene to simulate and how its stations are announced.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct SimulateSource {
-    /// The scene's RON file.
-    pub scene: String,
-    /// Seed of all random numbers.
-    pub seed: u64,
-    /// Standard deviation of the approximate station positions handed to the pipeline, metre.
-    #[serde(default = "SimulateSource::position_sigma")]
-    pub approximate_position_sigma_m: f64,
-    /// Standard deviation of the approximate attitudes about each axis, degree.
-    #[serde(default = "SimulateSource::attitude_sigma")]
-    pub approximate_attitude_sigma_deg: f64,
-    /// Part of the pixels of each station that show anything, beside what the scene says. Default 0.
-    #[serde(default)]
-    pub gross_error_share: f64,
-}
-
-impl SimulateSource {
-    fn position_sigma() -> f64 {
-        0.05
-    }
-
-    fn attitude_sigma() -> f64 {
-        2.0
-    }
-}
-
-macro_rules! stages {
-    ($($(#[$doc:meta])* $name:ident($options:ty) from $level:ident,)*) => {
-        /// One stage with its options; the variants stand in the order in which stages run.
-        #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-        pub enum Stage {
-            $($(#[$doc])* $name(#[serde(default)] $options),)*
-        }
-
-        impl Stage {
-            /// Names of all stages in the order in which they run.
-            pub const NAMES: &[&'static str] = &[$(stringify!($name)),*];
-
-            /// All stages with the last level that they can still work on.
-            pub const ALL_NEEDS: &[(&'static str, Level)] = &[$((stringify!($name), Level::$level)),*];
-
-            /// The stage's name as it stands in the pipeline's file.
-            pub fn name(&self) -> &'static str {
-                match self { $(Self::$name(_) => stringify!($name),)* }
-            }
-
-            /// The last level, from samples to depth, that the stage can still work on.
-            pub fn needs(&self) -> Level {
-                match self { $(Self::$name(_) => Level::$level,)* }
-            }
-        }
-    };
-}
-
-stages! {
-    /// Raw samples to complex images.
-    Demodulate(DemodulateOptions) from Samples,
-    /// Frames of one station to one frame: mean of the complex images, or of the ranges.
-    Average(AverageOptions) from Range,
-    /// Internal scattering is taken off the complex images.
-    Deconvolve(DeconvolveOptions) from Phase,
-    /// Phases to ranges with their whole ambiguity intervals.
-    Unwrap(UnwrapOptions) from Phase,
-    /// Intervals that ranges or depths have lost are added, where the camera gives no phases.
-    RepairWraps(RepairWrapsOptions) from Range,
-    /// Systematic range errors are taken off.
-    CorrectRange(CorrectRangeOptions) from Range,
-    /// Image points are corrected for lens distortion and the calibrated interior orientation.
-    CorrectImagePoint(CorrectImagePointOptions) from Range,
-    /// Light that came by more than one way is flagged, and taken off where three frequencies or more allow it.
-    Multipath(MultipathOptions) from Range,
-    /// Ranges to points in the camera's frame.
-    PointCloud(PointCloudOptions) from Range,
-    /// Gross errors are flagged.
-    Flag(FlagOptions) from Range,
-    /// Overlapping stations are aligned pair by pair.
-    Register(RegisterOptions) from Range,
-    /// All stations are adjusted at once.
-    Adjust(AdjustOptions) from Range,
-}
+#[cfg(doc)]
+use super::Stage;
 
 /// Options of [`Stage::Demodulate`]; phase sense, offset, scale and saturation are the survey's.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -152,11 +18,18 @@ pub struct DemodulateOptions {
     /// How the samples of a pixel are checked against each other, which tells motion and saturation; `None`: not at all.
     /// Nothing is checked either where neither the noise nor a tolerance is known.
     pub consistency: Option<ConsistencyOptions>,
+    /// When contradictory samples are laid to light of another camera instead of motion.
+    pub interference: InterferenceOptions,
 }
 
 impl Default for DemodulateOptions {
     fn default() -> Self {
-        Self { low_amplitude: None, noise: None, consistency: Some(ConsistencyOptions::default()) }
+        Self {
+            low_amplitude: None,
+            noise: None,
+            consistency: Some(ConsistencyOptions::default()),
+            interference: InterferenceOptions::default(),
+        }
     }
 }
 
@@ -176,6 +49,8 @@ pub struct NoiseOptions {
 pub struct AverageOptions {
     /// Where sigma is known: which pixels count as moved (they are flagged), and which stations as moved or drifting.
     pub rest: RestOptions,
+    /// Where sigma is known, in complex images: when light of another camera counts as found (what it disturbs is flagged).
+    pub interference: InterferenceOptions,
 }
 
 /// Options of [`Stage::Deconvolve`].
@@ -263,6 +138,23 @@ impl Default for MultipathOptions {
 #[serde(deny_unknown_fields, default)]
 pub struct CorrectImagePointOptions {}
 
+/// Options of [`Stage::FuseExposures`].
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct FuseExposuresOptions {
+    /// Probability that exposures of a scene at rest count as contradictory in a pixel.
+    pub false_alarm_probability: f64,
+    /// Standard deviation of what calibration leaves in one exposure and not in the others, metre.
+    pub floor_m: f64,
+}
+
+impl Default for FuseExposuresOptions {
+    fn default() -> Self {
+        let FusionOptions { false_alarm_probability, floor_m, .. } = FusionOptions::default();
+        Self { false_alarm_probability, floor_m }
+    }
+}
+
 /// Options of [`Stage::PointCloud`].
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -287,9 +179,9 @@ pub struct FlagOptions {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct MixedPixels {
-    /// Distance in standard deviations.
+    /// Distance in standard deviations, of the noise of all pixels that take part and of the floor.
     pub sigmas: f64,
-    /// Smallest distance, metre.
+    /// Standard deviation of what is no noise: the shape of surfaces, and what calibration leaves; metre.
     pub floor_m: f64,
     /// What is done with them: `flag`, `drop` (no value any more), or `split` (a point on each of the two surfaces besides).
     pub treatment: MixedPixelTreatment,
@@ -297,7 +189,7 @@ pub struct MixedPixels {
 
 impl Default for MixedPixels {
     fn default() -> Self {
-        Self { sigmas: 4.0, floor_m: 0.02, treatment: MixedPixelTreatment::Flag }
+        Self { sigmas: 4.0, floor_m: 0.005, treatment: MixedPixelTreatment::Flag }
     }
 }
 
@@ -353,45 +245,5 @@ pub struct AdjustOptions {
 impl Default for AdjustOptions {
     fn default() -> Self {
         Self { maximum_distance_m: 0.1, minimum_overlap: 0.3 }
-    }
-}
-
-/// Whether frames of a level are past what a stage needs. A depth becomes a range as it is read.
-pub(crate) fn is_past(level: Level, needs: Level) -> bool {
-    level.min(Level::Range) > needs
-}
-
-impl Plan {
-    /// Reads a plan; `path` names it in errors.
-    pub fn from_ron(text: &str, path: &Path) -> Result<Self> {
-        // Stages are written `Flag(low_amplitude: 100)`, without a second pair of parentheses. On the text's own first
-        // line, so that the lines of errors stay right.
-        let plan: Self = ron_text::parse(path, &format!("#![enable(unwrap_variant_newtypes)]{text}"))?;
-        plan.check_order()?;
-        Ok(plan)
-    }
-
-    /// Reads a plan's file.
-    pub fn read(path: &Path) -> Result<Self> {
-        let text = std::fs::read_to_string(path).map_err(|source| Error::Access { path: path.to_owned(), source })?;
-        Self::from_ron(&text, path)
-    }
-
-    /// Refuses stages that the survey's level does not leave room for, by name.
-    pub fn check_level(&self, level: Level) -> Result<()> {
-        let past = self.stages.iter().find(|stage| is_past(level, stage.needs()));
-        past.map_or(Ok(()), |stage| {
-            Err(Error::RuledOut { stage: stage.name(), needs: stage.needs().name(), level: level.name() })
-        })
-    }
-
-    fn check_order(&self) -> Result<()> {
-        let position = |stage: &Stage| Stage::NAMES.iter().position(|name| *name == stage.name());
-        match self.stages.windows(2).find(|pair| position(&pair[1]) <= position(&pair[0])) {
-            None => Ok(()),
-            Some(pair) => {
-                Err(Error::Order { stage: pair[1].name(), after: pair[0].name(), order: Stage::NAMES.join(", ") })
-            }
-        }
     }
 }

@@ -52,7 +52,11 @@ struct Refusal {
 }
 
 /// Writes a `summary.json` with the reason and nothing else, and gives the error that says so.
-pub(crate) fn refuse(survey: &Path, out: &Path, source: self_calibration::Error) -> Result<Error> {
+pub(crate) fn refuse(
+    survey: &Path,
+    out: &Path,
+    source: impl std::error::Error + Send + Sync + 'static,
+) -> Result<Error> {
     let text = json(&Refusal { survey: survey.display().to_string(), refused: source.to_string() })?;
     let folder = OutputFolder::create(out)?;
     write_text(folder.file("summary.json")?, &text)?;

@@ -30,6 +30,7 @@ mod summary;
 mod track;
 mod truth;
 mod view;
+mod warm_up;
 mod work;
 
 pub use calibrate::{
@@ -74,8 +75,8 @@ pub use scattering::{
 };
 pub use scattering_deconvolution::{EstimationOptions, TermCount, TermShape};
 pub use self_calibration::{
-    CalibrationOptions, CandidateGrid, Method, NetworkDatum, NoiseFitOptions, PatternOptions, PlanOptions,
-    TermSelection,
+    CalibrationOptions, CandidateGrid, ChangeOptions, DriftOptions, Method, NetworkDatum, NoiseFitOptions,
+    PatternOptions, PlanOptions, TemperatureUse, TermSelection,
 };
 pub use simulate::{Simulated, simulate};
 pub use summary::{
@@ -84,3 +85,6 @@ pub use summary::{
 pub use track::{TrackLoss, TrackRequest, TrackSummary, TrackTruth, TrackVerdict, TrackedFrame, track};
 pub use truth::{RangeTruth, ViewTruth};
 pub use view::{Snapshot, View, ViewData};
+pub use warm_up::{
+    ReferenceUse, WarmUpBlock, WarmUpParameter, WarmUpRequest, WarmUpSummary, WarmUpTest, estimate_warm_up,
+};

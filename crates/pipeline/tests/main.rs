@@ -21,3 +21,4 @@ mod room;
 mod scattering;
 mod track;
 mod warm_up;
+mod warm_up_estimate;

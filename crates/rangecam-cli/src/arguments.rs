@@ -13,6 +13,7 @@ use crate::noise_arguments::NoiseArguments;
 use crate::plan_arguments::PlanArguments;
 use crate::register_arguments::RegisterArguments;
 use crate::scattering_arguments::ScatteringArguments;
+use crate::warm_up_arguments::WarmUpArguments;
 
 /// Raw frames of a range camera in, one corrected and registered cloud out.
 #[derive(Debug, Parser)]
@@ -85,6 +86,9 @@ pub(crate) enum Command {
     Noise(NoiseArguments),
     /// Estimate the range offset of each pixel (fixed pattern) from walls, and keep it only if it raises the precision.
     Fpn(FixedPatternArguments),
+    /// Estimate the drift of all ranges while the camera warms up, and tell from when on it is stable.
+    #[command(name = "warmup")]
+    WarmUp(WarmUpArguments),
     /// Bring a survey's stations or clouds of any format into one frame, with the quality of every pose.
     Register(RegisterArguments),
     /// Tell what a survey, a calibration or a cloud holds, and which stages it leaves room for.

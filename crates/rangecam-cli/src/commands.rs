@@ -58,6 +58,9 @@ pub(crate) fn dispatch(command: Command, output: &Output) -> Result<ExitCode, Bo
         Command::Fpn(arguments) => {
             output.result(&pipeline::estimate_pattern(&arguments.request(), output.progress().as_ref())?)
         }
+        Command::WarmUp(arguments) => {
+            output.result(&pipeline::estimate_warm_up(&arguments.request(), output.progress().as_ref())?)
+        }
         Command::Register(arguments) => match arguments.request() {
             Request::Register(request) => output.result(&pipeline::register(&request, output.progress().as_ref())?),
             Request::Track(request) => output.result(&pipeline::track(&request, output.progress().as_ref())?),

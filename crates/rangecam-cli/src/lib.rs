@@ -13,6 +13,7 @@ mod output;
 mod plan_arguments;
 mod register_arguments;
 mod scattering_arguments;
+mod warm_up_arguments;
 
 use std::ffi::OsString;
 use std::process::ExitCode;

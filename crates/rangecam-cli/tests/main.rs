@@ -6,3 +6,4 @@ mod compare;
 mod explain;
 mod noise;
 mod register;
+mod warm_up;

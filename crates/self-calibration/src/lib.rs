@@ -4,6 +4,7 @@ mod amplitude_or_position;
 mod calibration;
 mod comparison;
 mod difference;
+mod drift;
 mod error;
 mod hyperbola_real;
 mod hyperbola_start;
@@ -39,6 +40,7 @@ pub use comparison::{
     compare_drifts, compare_images, compare_parameters,
 };
 pub use difference::{DifferenceOptions, RangeDifference, differences_to_plane};
+pub use drift::*;
 pub use error::{Error, Result};
 pub use network::*;
 pub use noise::*;

@@ -18,6 +18,7 @@ mod scattering;
 mod sections;
 mod station_graph;
 mod tracking;
+mod warm_up;
 
 pub(crate) use comparison::render_comparison;
 pub(crate) use fixed_pattern::render_fixed_pattern;
@@ -27,3 +28,4 @@ pub(crate) use registration::render_registration;
 pub(crate) use scattering::render_scattering;
 pub(crate) use sections::render;
 pub(crate) use tracking::render_tracking;
+pub(crate) use warm_up::render_warm_up;

@@ -1,0 +1,171 @@
+//! The curve that is fitted, block by block, and time constants to start from.
+
+use super::DriftBlock;
+use super::projection::{Basis, dot};
+use super::whitening::Whitening;
+
+/// Most transients of a model.
+pub(super) const MOST_TRANSIENTS: usize = 2;
+
+/// A constant, amplitude and logarithm of the time constant of each transient, a coefficient of the temperature.
+pub(super) const MOST_UNKNOWNS: usize = 2 + 2 * MOST_TRANSIENTS;
+
+/// Ratio of two time constants below which they are one for any capture.
+const LEAST_RATIO: f64 = 1.5;
+
+/// Time constants that are tried.
+const GRID: usize = 120;
+
+/// Time constants of the curve that serial correlation is told beside.
+const FIXED: usize = 8;
+
+/// What blocks are fitted by: times count from the first block, temperatures from that of the warm camera.
+#[derive(Debug)]
+pub(super) struct Curve<'a> {
+    pub(super) blocks: &'a [DriftBlock],
+    pub(super) length_s: f64,
+    /// The warm camera's temperature, where the drift may follow it.
+    pub(super) reference_c: Option<f64>,
+}
+
+/// Mean of `exp(−t / τ)` over a block, `t` from the first block, and its derivative by ln τ.
+fn decay(time_s: f64, half_width_s: f64, time_constant_s: f64) -> [f64; 2] {
+    let (x, t) = (half_width_s / time_constant_s, time_s / time_constant_s);
+    // sinh(x) / x and x times its derivative; the series where they cancel.
+    let (mean, slope) = if x < 1e-2 {
+        (1.0 + x * x / 6.0, x * x / 3.0 + x.powi(4) / 30.0)
+    } else {
+        (x.sinh() / x, x.cosh() - x.sinh() / x)
+    };
+    let decay = (-t).exp();
+    [decay * mean, decay * (t * mean - slope)]
+}
+
+impl Curve<'_> {
+    pub(super) fn duration_s(&self) -> f64 {
+        self.blocks.last().map_or(0.0, |last| last.time_s) - self.start_s()
+    }
+
+    pub(super) fn start_s(&self) -> f64 {
+        self.blocks.first().map_or(0.0, |first| first.time_s)
+    }
+
+    /// Value for a block and its derivatives: constant, `a_i, ln τ_i`, temperature; `a` at the time of the first block.
+    pub(super) fn at(&self, index: usize, unknowns: &[f64]) -> (f64, [f64; MOST_UNKNOWNS]) {
+        let block = &self.blocks[index];
+        let time_s = block.time_s - self.start_s();
+        let mut row = [0.0; MOST_UNKNOWNS];
+        row[0] = 1.0;
+        let mut value = unknowns[0];
+        let transients = (unknowns.len() - 1) / 2;
+        for (place, pair) in unknowns[1..].chunks_exact(2).take(transients).enumerate() {
+            let [decay, by_logarithm] = decay(time_s, block.half_width_s, pair[1].exp());
+            (row[1 + 2 * place], row[2 + 2 * place]) = (decay, pair[0] * by_logarithm);
+            value += pair[0] * decay;
+        }
+        if self.reference_c.is_some() {
+            let place = unknowns.len() - 1;
+            row[place] = self.temperature(block);
+            value += unknowns[place] * row[place];
+        }
+        (value, row)
+    }
+
+    fn temperature(&self, block: &DriftBlock) -> f64 {
+        block.temperature_c.unwrap_or(f64::NAN) - self.reference_c.unwrap_or(0.0)
+    }
+
+    pub(super) fn observed(&self) -> impl Iterator<Item = f64> {
+        self.blocks.iter().map(|block| block.change_m)
+    }
+
+    /// Constant and temperature, whitened.
+    pub(super) fn without_transients(&self, whitening: &Whitening) -> Vec<Vec<f64>> {
+        let constant = whitening.column(self.blocks.iter().map(|_| 1.0));
+        let temperature = self.reference_c.map(|_| whitening.column(self.blocks.iter().map(|b| self.temperature(b))));
+        std::iter::once(constant).chain(temperature).collect()
+    }
+
+    /// An exponential of unit amplitude, whitened.
+    pub(super) fn exponential(&self, time_constant_s: f64, whitening: &Whitening) -> Vec<f64> {
+        let start_s = self.start_s();
+        let value = |block: &DriftBlock| decay(block.time_s - start_s, block.half_width_s, time_constant_s)[0];
+        whitening.column(self.blocks.iter().map(value))
+    }
+
+    /// Logarithmic steps from two blocks to twice the capture.
+    fn time_constants(&self, count: usize) -> impl Iterator<Item = f64> {
+        let (shortest, longest) = (2.0 * self.length_s, 2.0 * self.duration_s());
+        (0..count).map(move |step| shortest * (longest / shortest).powf(step as f64 / (count - 1) as f64))
+    }
+
+    /// All time constants that are tried.
+    pub(super) fn grid(&self) -> Vec<f64> {
+        self.time_constants(GRID).collect()
+    }
+
+    /// A linear curve that follows any sum of two exponentials far below noise: exponentials of fixed time constants.
+    pub(super) fn flexible(&self, whitening: &Whitening) -> Basis {
+        let exponentials = self.time_constants(FIXED).map(|tau| self.exponential(tau, whitening));
+        Basis::of(self.without_transients(whitening).into_iter().chain(exponentials))
+    }
+
+    /// The time constants of a grid that leave the smallest sum of squares: all other unknowns are linear (variable
+    /// projection).
+    pub(super) fn start(&self, transients: usize, whitening: &Whitening) -> Vec<f64> {
+        let rest = Basis::of(self.without_transients(whitening));
+        let observed = rest.residual(whitening.column(self.observed()));
+        let candidate = |tau: f64| Some((tau, rest.direction(self.exponential(tau, whitening))?));
+        // Half of the grid is near enough to start from.
+        let candidates: Vec<(f64, Vec<f64>)> = self.time_constants(GRID / 2).filter_map(candidate).collect();
+        let shares: Vec<f64> = candidates.iter().map(|(_, direction)| dot(direction, &observed)).collect();
+        let mut best = (f64::NEG_INFINITY, Vec::new());
+        for (i, (first, direction)) in candidates.iter().enumerate() {
+            if transients < 2 && shares[i].powi(2) > best.0 {
+                best = (shares[i].powi(2), vec![*first]);
+            }
+            for (j, (second, other)) in candidates.iter().enumerate().skip(i + 1) {
+                if transients < 2 || second / first < LEAST_RATIO {
+                    continue;
+                }
+                let g = dot(direction, other);
+                let (a, b) = (shares[i], shares[j]);
+                let explained = (a * a + b * b - 2.0 * a * b * g) / (1.0 - g * g);
+                if explained > best.0 {
+                    best = (explained, vec![*first, *second]);
+                }
+            }
+        }
+        best.1
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_mean_of_an_exponential_over_a_block_is_that_of_its_samples() {
+        let tau = 50.0;
+        for count in [1_u32, 4, 400] {
+            let times: Vec<f64> = (0..count).map(|k| 100.0 + 40.0 * f64::from(k) / f64::from(count)).collect();
+            let mean = times.iter().sum::<f64>() / f64::from(count);
+            let variance = times.iter().map(|t| (t - mean).powi(2)).sum::<f64>() / f64::from(count);
+            let expected = times.iter().map(|t| (-t / tau).exp()).sum::<f64>() / f64::from(count);
+            let [value, _] = decay(mean, (3.0 * variance).sqrt(), tau);
+            // The fourth moments of few samples and of a stretch differ: 2e-5 of the value for four samples.
+            assert!((value / expected - 1.0).abs() < 3e-5, "{count}: {value} for {expected}");
+        }
+    }
+
+    #[test]
+    fn the_series_of_a_short_block_meets_the_closed_form() {
+        for half_width in [0.0099 * 70.0, 0.0101 * 70.0] {
+            let step = 1e-5_f64;
+            let [_, slope] = decay(90.0, half_width, 70.0);
+            let beside = [step, -step].map(|d| decay(90.0, half_width, 70.0 * d.exp())[0]);
+            // Central differences of step 1e-5 are good to 1e-10.
+            assert!((slope - (beside[0] - beside[1]) / (2.0 * step)).abs() < 1e-9);
+        }
+    }
+}

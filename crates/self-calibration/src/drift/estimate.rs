@@ -1,0 +1,220 @@
+//! From samples to the model of the drift.
+
+use error_models::{TemperatureDrift, Transient, WarmUp};
+use nalgebra::DMatrix;
+
+use super::blocks::block_means;
+use super::curve::{Curve, MOST_TRANSIENTS};
+use super::fit::{Fit, fit};
+use super::jump::refuse_jump;
+use super::transient_test::{TransientTest, test};
+use super::verdict::{default_tolerance_m, end_scatter_m, judge};
+use super::whitening::{Whitening, autocorrelation};
+use super::{DriftBlock, DriftError, DriftOptions, DriftResult, DriftSample, DriftVerdict, TemperatureUse, sample};
+
+/// Spread of the temperature below which nothing can be said to follow it: a few steps of common sensors, kelvin.
+const LEAST_SPREAD_K: f64 = 0.5;
+
+/// The drift of a camera and how well it is known.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DriftEstimate {
+    /// The model; zero for the warm camera. Its span is that of the capture.
+    pub model: WarmUp,
+    /// Covariance of [`WarmUp::parameter_names`], scaled by sigma0².
+    pub covariance: DMatrix<f64>,
+    /// Mean change of the warm camera's ranges, metre: the constant that takes up the scene.
+    pub warm_change_m: f64,
+    /// Its standard deviation, metre.
+    pub warm_change_sigma_m: f64,
+    /// Correlation of neighbouring blocks that weights and covariance allow for.
+    pub autocorrelation: f64,
+    /// Standard deviation of unit weight: how much more blocks scatter than their samples' sigma says.
+    pub sigma0: f64,
+    /// Blocks less unknowns.
+    pub redundancy: i64,
+    /// Tests of one exponential more, from none on; the last one was not taken.
+    pub tests: Vec<TransientTest>,
+    /// The block means.
+    pub blocks: Vec<DriftBlock>,
+    /// Observed less modelled change of each, metre.
+    pub residuals_m: Vec<f64>,
+    /// Drift within which the camera counts as stable, metre.
+    pub tolerance_m: f64,
+    /// From when on it is.
+    pub verdict: DriftVerdict,
+}
+
+impl DriftEstimate {
+    /// Standard deviations of [`WarmUp::parameter_names`].
+    pub fn deviations(&self) -> Vec<f64> {
+        self.covariance.diagonal().iter().map(|variance| variance.sqrt()).collect()
+    }
+
+    /// Correlations of [`WarmUp::parameter_names`].
+    pub fn correlation(&self) -> DMatrix<f64> {
+        let deviations = self.deviations();
+        DMatrix::from_fn(deviations.len(), deviations.len(), |i, j| {
+            if i == j { 1.0 } else { self.covariance[(i, j)] / (deviations[i] * deviations[j]) }
+        })
+    }
+}
+
+/// Estimates the drift from mean changes of a scene at rest, one a frame, in the order of time (Sect. 4.7).
+///
+/// Means over blocks of equal length are fitted by a constant (the scene), none, one or two exponentials averaged over
+/// each block, and a part that follows the temperature where that is asked for. One exponential more is taken where it
+/// is significant at `options.level`, the search for its time constant allowed for (`[Hotelling1939]`). Neighbouring
+/// blocks may be correlated: a first-order autoregressive process, estimated from the residuals, enters weights and
+/// covariance (`[PraisWinsten1954]`); the covariance is scaled by sigma0².
+///
+/// A change of the frame rate is refused rather than modelled: the transient that it starts is none since power-on.
+///
+/// # Errors
+/// A [`DriftError`] that names what the samples do not determine.
+pub fn estimate_drift(samples: &[DriftSample], options: &DriftOptions) -> DriftResult<DriftEstimate> {
+    options.validate()?;
+    sample::check(samples, options)?;
+    let (blocks, length_s) = block_means(samples, options)?;
+    let reference_c = match options.temperature {
+        TemperatureUse::Ignore => None,
+        TemperatureUse::Estimate => Some(reference_temperature(&blocks)?),
+    };
+    let curve = Curve { blocks: &blocks, length_s, reference_c };
+    refuse_jump(&curve)?;
+    let (chosen, tests) = choose(&curve, options)?;
+    let autocorrelation = chosen.autocorrelation(&curve);
+    require_explained(autocorrelation, options)?;
+    let whitening = Whitening::new(&blocks, length_s, autocorrelation);
+    let adjusted = fit(&curve, chosen.transients, &whitening)?;
+    curve.require_decayed(&adjusted)?;
+    finish(&curve, adjusted, autocorrelation, tests, samples, options)
+}
+
+/// Mean of the last tenth of the blocks.
+fn reference_temperature(blocks: &[DriftBlock]) -> DriftResult<f64> {
+    let temperatures: Vec<f64> = blocks.iter().filter_map(|block| block.temperature_c).collect();
+    let (low, high) = temperatures.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), t| (a.min(*t), b.max(*t)));
+    let spread_k = high - low;
+    if spread_k < LEAST_SPREAD_K {
+        return Err(DriftError::TemperatureConstant { spread_k, needed_k: LEAST_SPREAD_K });
+    }
+    let last = &temperatures[temperatures.len() - (temperatures.len() / 10).max(1)..];
+    Ok(last.iter().sum::<f64>() / last.len() as f64)
+}
+
+/// The number of exponentials, each tested at the level.
+///
+/// All fits and tests share the serial correlation that a curve of fixed exponentials leaves: what a model lacks must
+/// not be taken for noise.
+fn choose(curve: &Curve<'_>, options: &DriftOptions) -> DriftResult<(Fit, Vec<TransientTest>)> {
+    let plain = Whitening::new(curve.blocks, curve.length_s, 0.0);
+    let flexible = curve.flexible(&plain);
+    let correlation = autocorrelation(&flexible.residual(plain.column(curve.observed())), flexible.rank());
+    require_explained(correlation, options)?;
+    let whitening = Whitening::new(curve.blocks, curve.length_s, correlation);
+    let mut tests = Vec::new();
+    let mut chosen = fit(curve, 0, &whitening)?;
+    loop {
+        let residuals = whitening.column(chosen.residuals_m.iter().copied());
+        let found = test(curve, &whitening, &chosen.basis(curve, &whitening), residuals, chosen.transients);
+        let more = if found.p_value < options.level && chosen.transients < MOST_TRANSIENTS {
+            fit_if_resolved(curve, chosen.transients + 1, &whitening)?
+        } else {
+            None
+        };
+        tests.push(TransientTest { taken: more.is_some(), ..found });
+        match more {
+            Some(more) => chosen = more,
+            None => return Ok((chosen, tests)),
+        }
+    }
+}
+
+/// A fit whose time constants are longer than a block; `None` where amplitude and time constant of one cannot be told
+/// apart.
+fn fit_if_resolved(curve: &Curve<'_>, transients: usize, whitening: &Whitening) -> DriftResult<Option<Fit>> {
+    match fit(curve, transients, whitening) {
+        Ok(fit) => Ok(Some(fit).filter(|fit| fit.transients().all(|(_, tau)| tau > curve.length_s))),
+        Err(DriftError::Adjust(
+            adjust::Error::RankDeficient { .. } | adjust::Error::NotConverged { .. } | adjust::Error::NotFinite { .. },
+        )) => Ok(None),
+        Err(error) => Err(error),
+    }
+}
+
+fn require_explained(autocorrelation: f64, options: &DriftOptions) -> DriftResult<()> {
+    let limit = options.largest_autocorrelation;
+    if autocorrelation > limit { Err(DriftError::NotExplained { autocorrelation, limit }) } else { Ok(()) }
+}
+
+impl Curve<'_> {
+    /// Refuses a time constant that the capture is too short for: what it leads to is not seen.
+    pub(super) fn require_longer_than(&self, time_constant_s: f64) -> DriftResult<()> {
+        let (duration_s, needed_s) = (self.duration_s() + self.length_s, WarmUp::DECAYED * time_constant_s);
+        if duration_s < needed_s {
+            return Err(DriftError::ShorterThanTimeConstant { duration_s, time_constant_s, needed_s });
+        }
+        Ok(())
+    }
+
+    fn require_decayed(&self, fit: &Fit) -> DriftResult<()> {
+        fit.transients().try_for_each(|(_, time_constant_s)| self.require_longer_than(time_constant_s))
+    }
+}
+
+/// The model of a fit, with the deviations of its own parameters.
+fn finish(
+    curve: &Curve<'_>,
+    fit: Fit,
+    autocorrelation: f64,
+    tests: Vec<TransientTest>,
+    samples: &[DriftSample],
+    options: &DriftOptions,
+) -> DriftResult<DriftEstimate> {
+    let start_s = curve.start_s();
+    let mut order: Vec<(usize, (f64, f64))> = fit.transients().enumerate().collect();
+    order.sort_by(|a, b| a.1.1.total_cmp(&b.1.1));
+    // Derivatives of A and tau by a and ln tau, A = a exp(start / tau).
+    let (mut model, mut rows) = (WarmUp::default(), Vec::new());
+    let row = || vec![0.0; fit.unknowns.len()];
+    for (place, (amplitude_m, time_constant_s)) in order {
+        let growth = (start_s / time_constant_s).exp();
+        let (mut of_amplitude, mut of_time) = (row(), row());
+        of_amplitude[1 + 2 * place] = growth;
+        of_amplitude[2 + 2 * place] = -amplitude_m * growth * start_s / time_constant_s;
+        of_time[2 + 2 * place] = time_constant_s;
+        model.transients.push(Transient { amplitude_m: amplitude_m * growth, time_constant_s });
+        rows.extend([of_amplitude, of_time]);
+    }
+    let span = |values: &mut dyn Iterator<Item = f64>| {
+        values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| [low.min(value), high.max(value)])
+    };
+    if let (Some(reference_c), Some(&coefficient_m_per_k)) = (curve.reference_c, fit.unknowns.last()) {
+        let span_c = Some(span(&mut samples.iter().filter_map(|sample| sample.temperature_c)));
+        model.temperature = Some(TemperatureDrift { coefficient_m_per_k, reference_c, span_c });
+        let mut of_temperature = row();
+        of_temperature[fit.unknowns.len() - 1] = 1.0;
+        rows.push(of_temperature);
+    }
+    model.time_span_s = Some(span(&mut samples.iter().map(|sample| sample.time_s)));
+    model.validate()?;
+    let jacobian = DMatrix::from_fn(rows.len(), fit.unknowns.len(), |i, j| rows[i][j]);
+    let (blocks, residuals_m) = (curve.blocks.to_vec(), fit.residuals_m);
+    let tolerance_m = options.tolerance_m.unwrap_or_else(|| default_tolerance_m(&blocks, &residuals_m));
+    let warm_change_sigma_m = fit.covariance[(0, 0)].sqrt();
+    let scatter_m = end_scatter_m(&blocks, &residuals_m);
+    Ok(DriftEstimate {
+        verdict: judge(&model, &blocks, tolerance_m, scatter_m, warm_change_sigma_m)?,
+        model,
+        covariance: &jacobian * fit.covariance * jacobian.transpose(),
+        warm_change_m: fit.unknowns[0],
+        warm_change_sigma_m,
+        autocorrelation,
+        sigma0: fit.sigma0,
+        redundancy: fit.redundancy,
+        tests,
+        blocks,
+        residuals_m,
+        tolerance_m,
+    })
+}

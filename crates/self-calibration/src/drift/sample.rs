@@ -1,0 +1,87 @@
+//! Mean changes of range, one a frame.
+
+use super::options::DriftOptions;
+use super::{DriftError, DriftResult, TemperatureUse};
+
+/// By how much the ranges of a scene at rest have changed in one frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DriftSample {
+    /// Time since power-on, second.
+    pub time_s: f64,
+    /// Mean change of the ranges against any fixed reference, metre.
+    pub mean_change_m: f64,
+    /// Its standard deviation, metre; a common factor of all does not matter.
+    pub sigma_m: f64,
+    /// Temperature of the camera, degree Celsius.
+    pub temperature_c: Option<f64>,
+}
+
+/// Stretches of equal length in which the frames are counted.
+const STRETCHES: usize = 20;
+
+/// Refuses samples that are no numbers, times that do not ascend, short captures and changes of the frame rate.
+pub(super) fn check(samples: &[DriftSample], options: &DriftOptions) -> DriftResult<()> {
+    for (index, sample) in samples.iter().enumerate() {
+        sample.check(index)?;
+        if options.temperature == TemperatureUse::Estimate && sample.temperature_c.is_none() {
+            return Err(DriftError::MissingTemperature { index });
+        }
+    }
+    if let Some(index) = (1..samples.len()).find(|&index| samples[index].time_s <= samples[index - 1].time_s) {
+        let (time_s, before_s) = (samples[index].time_s, samples[index - 1].time_s);
+        return Err(DriftError::NotAscending { index, time_s, before_s });
+    }
+    let needed = DriftOptions::LEAST_BLOCKS;
+    let too_few = DriftError::TooFewBlocks { blocks: samples.len(), needed };
+    let (Some(first), Some(last)) = (samples.first(), samples.last()) else { return Err(too_few) };
+    let (duration_s, needed_s) = (last.time_s - first.time_s, options.least_duration_s);
+    if duration_s < needed_s {
+        return Err(DriftError::CaptureTooShort { duration_s, needed_s });
+    }
+    if samples.len() < needed {
+        return Err(too_few);
+    }
+    check_rate(samples, options.largest_rate_ratio)
+}
+
+impl DriftSample {
+    fn check(&self, index: usize) -> DriftResult<()> {
+        let sigma = self.sigma_m.is_finite() && self.sigma_m > 0.0;
+        let temperature_c = self.temperature_c.unwrap_or(0.0);
+        for (name, value, holds, expected) in [
+            ("time since power-on", self.time_s, self.time_s.is_finite() && self.time_s >= 0.0, "a time not negative"),
+            ("mean change", self.mean_change_m, self.mean_change_m.is_finite(), "a finite length"),
+            ("standard deviation", self.sigma_m, sigma, "a positive length"),
+            ("temperature", temperature_c, temperature_c.is_finite(), "a finite temperature"),
+        ] {
+            if !holds {
+                return Err(DriftError::BadSample { index, name, value, expected });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Refuses a capture whose frame rate changes, and names the place where it changes most.
+///
+/// The transient that a change of the work load starts (Fig. 6) is none since power-on: no calibration could state it.
+fn check_rate(samples: &[DriftSample], largest_ratio: f64) -> DriftResult<()> {
+    // Ten intervals a stretch, so that one more or less is no change.
+    let stretches = STRETCHES.min((samples.len() - 1) / 10);
+    let start = samples[0].time_s;
+    let length = (samples[samples.len() - 1].time_s - start) / stretches as f64;
+    let mut counts = vec![0_usize; stretches];
+    for sample in &samples[..samples.len() - 1] {
+        counts[(((sample.time_s - start) / length) as usize).min(stretches - 1)] += 1;
+    }
+    let rate = |counts: &[usize]| counts.iter().sum::<usize>() as f64 / (counts.len() as f64 * length);
+    let ratio = |a: f64, b: f64| a.max(b) / a.min(b).max(f64::MIN_POSITIVE);
+    let (fewest, most) = counts.iter().fold((usize::MAX, 0), |(low, high), count| (low.min(*count), high.max(*count)));
+    if most as f64 <= largest_ratio * fewest as f64 {
+        return Ok(());
+    }
+    let change = |place: &usize| ratio(rate(&counts[..*place]), rate(&counts[*place..]));
+    let place = (1..stretches).max_by(|a, b| change(a).total_cmp(&change(b))).unwrap_or(1);
+    let (before_hz, after_hz) = (rate(&counts[..place]), rate(&counts[place..]));
+    Err(DriftError::FrameRateChanges { time_s: start + place as f64 * length, before_hz, after_hz })
+}

@@ -22,3 +22,5 @@ mod scattering;
 mod track;
 mod warm_up;
 mod warm_up_estimate;
+#[path = "common/warming.rs"]
+mod warming;

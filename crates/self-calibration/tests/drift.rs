@@ -1,6 +1,6 @@
 //! Estimation of warm-up and temperature drift against truth: parameters, covariance, verdict.
 
-use crate::drift::{Capture, room_temperature_c, transients, with_temperature};
+use crate::drift_captures::{Capture, room_temperature_c, transients, with_temperature};
 use error_models::WarmUp;
 use self_calibration::{DriftEstimate, DriftOptions, DriftVerdict, TemperatureUse, estimate_drift};
 

@@ -1,6 +1,6 @@
 //! How many exponentials a drift has: false alarms at the stated level, planted ones found.
 
-use crate::drift::{Capture, transients};
+use crate::drift_captures::{Capture, transients};
 use error_models::WarmUp;
 use self_calibration::{DriftOptions, estimate_drift};
 

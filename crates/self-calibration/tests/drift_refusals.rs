@@ -1,6 +1,6 @@
 //! What captures of a drift are refused for, each by its name.
 
-use crate::drift::{Capture, room_temperature_c, transients, with_temperature};
+use crate::drift_captures::{Capture, room_temperature_c, transients, with_temperature};
 use self_calibration::{DriftError, DriftOptions, DriftSample, TemperatureUse, estimate_drift};
 
 fn capture() -> Capture {

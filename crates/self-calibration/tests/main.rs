@@ -14,6 +14,8 @@ mod automatic_terms;
 mod bad_networks;
 mod comparison;
 mod drift;
+#[path = "support/drift.rs"]
+mod drift_captures;
 mod drift_comparison;
 mod drift_exponentials;
 mod drift_refusals;

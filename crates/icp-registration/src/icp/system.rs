@@ -149,6 +149,11 @@ impl<'a> System<'a> {
         terms.fold(Vector6::zeros(), |sum, (row, r)| sum + self.jacobian(pair, row) * (weight * r))
     }
 
+    /// Whether the metric is the distance of points.
+    pub(crate) fn is_point_to_point(&self) -> bool {
+        self.metric.is_point_to_point()
+    }
+
     /// Factor on the products of all twins.
     pub(crate) fn twin_weight(&self) -> f64 {
         self.metric.twin_weight(self.scene, self.pairs)

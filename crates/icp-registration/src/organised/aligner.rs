@@ -132,7 +132,7 @@ impl FrameAligner {
         guess: &Isometry3<f64>,
     ) -> Result<(Track, IcpResult)> {
         self.approach(&mut track, source, target)?;
-        self.end(track, source, target, guess)
+        self.end(track, source, target, guess, self.hold())
     }
 
     /// The levels between the first and the last.
@@ -155,8 +155,9 @@ impl FrameAligner {
         source: &OrganisedFrame,
         target: &OrganisedFrame,
         guess: &Isometry3<f64>,
+        hold: Hold,
     ) -> Result<(Track, IcpResult)> {
-        let stop = self.settle(&mut track, source, target)?;
+        let stop = self.settle(&mut track, source, target, hold)?;
         let result = self.result(&track, source, target, guess, stop)?;
         Ok((track, result))
     }
@@ -233,9 +234,15 @@ impl FrameAligner {
     }
 
     /// Iterates on all points until the pose stands.
-    fn settle(&mut self, track: &mut Track, source: &OrganisedFrame, target: &OrganisedFrame) -> Result<StopReason> {
+    fn settle(
+        &mut self,
+        track: &mut Track,
+        source: &OrganisedFrame,
+        target: &OrganisedFrame,
+        hold: Hold,
+    ) -> Result<StopReason> {
         let blocks = &source.points.blocks[..];
-        if self.hold() == Hold::Undetermined {
+        if hold == Hold::Undetermined {
             let (moved, gauge) = moved(track, source, target);
             let limit = self.max_motion_sigma_m(&gauge);
             let verdict = Verdict::new(&moved, &track.rules, blocks, limit, Residuals::Settled, &mut self.cells)?;
@@ -333,7 +340,7 @@ impl FrameAligner {
     }
 
     /// With a prior, what the frames do not determine comes from it, and must not slide before.
-    fn hold(&self) -> Hold {
+    pub(super) fn hold(&self) -> Hold {
         let hold = self.options.degeneracy == DegeneracyPolicy::HoldAtGuess || self.options.prior.is_some();
         if hold { Hold::Undetermined } else { Hold::Nothing }
     }

@@ -27,7 +27,7 @@ const SAMPLE: usize = 4096;
 #[derive(Debug, Clone)]
 pub struct OrganisedFrame {
     pub(super) projection: Arc<Projection>,
-    inverse_depth: Vec<f32>,
+    pub(super) inverse_depth: Vec<f32>,
     spread: Vec<f32>,
     /// Plane of each node: unit normal away from the camera, distance; NaN where there is none.
     pub(super) planes: Vec<[f32; 4]>,

@@ -12,6 +12,7 @@ mod grid;
 mod map;
 mod nodes;
 mod options;
+mod outlines;
 mod pairs;
 mod places;
 mod planes;

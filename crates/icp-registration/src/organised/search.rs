@@ -68,7 +68,10 @@ impl FrameAligner {
                 break;
             }
         }
-        best.map(|(_, mut result)| {
+        best.map(|best| {
+            let is_open = !best.1.degenerate.is_empty();
+            let best = if is_open { self.placed_by_outlines(best, source, target, &start.pose) } else { best };
+            let mut result = best.1;
             if result.stop != StopReason::MaxIterations && !agrees(source, target, &result) {
                 result.stop = StopReason::Contradicted;
             }
@@ -105,7 +108,7 @@ impl FrameAligner {
             }
         }
         let Some((_, track)) = chosen else { return best };
-        match self.end(track, source, target, &start.pose) {
+        match self.end(track, source, target, &start.pose, self.hold()) {
             Ok(other) if merit(&other.1.target_from_source).beats(&most) => Ok(other),
             _ => best,
         }

@@ -1,9 +1,8 @@
 //! `cargo xtask fixtures`: the simulated surveys of the repository, from their networks.
 
 use std::ffi::OsString;
-use std::process::ExitCode;
 
-use crate::shell::{Outcome, root};
+use crate::shell::{Outcome, rangecam, root};
 
 /// Networks whose surveys are committed. A test compares them with a new simulation, so that neither goes stale.
 const NETWORKS: [&str; 1] = ["target_field"];
@@ -13,9 +12,8 @@ pub(crate) fn run() -> Outcome {
     for name in NETWORKS {
         let scene = fixtures.join("networks").join(name).with_extension("ron");
         let out = fixtures.join("surveys").join(name);
-        let line: [OsString; 5] =
-            ["rangecam".into(), "simulate-network".into(), scene.into(), "--out".into(), out.into()];
-        if rangecam_cli::main(line) != ExitCode::SUCCESS {
+        let line: [OsString; 4] = ["simulate-network".into(), scene.into(), "--out".into(), out.into()];
+        if rangecam(&line)? != 0 {
             return Err(format!("the network {name} could not be simulated"));
         }
     }

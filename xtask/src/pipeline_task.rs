@@ -3,7 +3,7 @@
 use std::ffi::OsString;
 use std::process::ExitCode;
 
-use crate::shell::root;
+use crate::shell::{rangecam, root};
 
 /// Which pipeline to run.
 #[derive(Debug, clap::Args)]
@@ -23,10 +23,15 @@ pub(crate) fn run(arguments: &Arguments) -> ExitCode {
         return ExitCode::from(2);
     }
     let out = root().join("out").join(&arguments.name);
-    let mut line: Vec<OsString> =
-        vec!["rangecam".into(), "run".into(), "--pipeline".into(), file.into(), "--out".into(), out.into()];
+    let mut line: Vec<OsString> = vec!["run".into(), "--pipeline".into(), file.into(), "--out".into(), out.into()];
     line.extend(arguments.more.iter().cloned());
-    rangecam_cli::main(line)
+    match rangecam(&line) {
+        Ok(code) => ExitCode::from(code),
+        Err(message) => {
+            eprintln!("{message}");
+            ExitCode::FAILURE
+        }
+    }
 }
 
 fn names(folder: &std::path::Path) -> Vec<String> {

@@ -1,7 +1,8 @@
-//! Calling cargo, and where the repository is.
+//! Calling cargo and `rangecam`, and where the repository is.
 
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Command, ExitStatus};
 use std::time::Instant;
 
 /// What a task says when it fails.
@@ -18,9 +19,7 @@ pub(crate) fn cargo(arguments: &[&str], environment: &[(&str, &str)]) -> Outcome
     let line = format!("cargo {}", arguments.join(" "));
     println!("── {line}");
     let start = Instant::now();
-    // The cargo that runs this task, so that its toolchain is used throughout.
-    let program = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
-    let status = Command::new(program)
+    let status = Command::new(program())
         .args(arguments)
         .envs(environment.iter().copied())
         .current_dir(root())
@@ -28,4 +27,24 @@ pub(crate) fn cargo(arguments: &[&str], environment: &[(&str, &str)]) -> Outcome
         .map_err(|error| format!("{line}: {error}"))?;
     println!("── {:.0} s", start.elapsed().as_secs_f64());
     if status.success() { Ok(()) } else { Err(format!("{line}: {status}")) }
+}
+
+/// Builds the command `rangecam` and runs it where the user stands; its exit code.
+///
+/// The tasks do not link it: those that only check the repository would wait until all of it is built.
+pub(crate) fn rangecam(arguments: &[OsString]) -> Result<u8, String> {
+    let status: ExitStatus = Command::new(program())
+        .args(["run", "--package", "rangecam-cli", "--bin", "rangecam", "--manifest-path"])
+        .arg(root().join("Cargo.toml"))
+        .arg("--")
+        .args(arguments)
+        .status()
+        .map_err(|error| format!("rangecam: {error}"))?;
+    // What a signal ended has no code.
+    Ok(status.code().and_then(|code| u8::try_from(code).ok()).unwrap_or(1))
+}
+
+/// The cargo that runs this task, so that its toolchain is used throughout.
+fn program() -> OsString {
+    std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into())
 }

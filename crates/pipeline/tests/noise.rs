@@ -41,16 +41,28 @@ fn noise_of_samples_is_that_of_the_simulation() {
 }
 
 #[test]
-fn four_frames_of_a_real_camera_do_not_tell_the_parts_apart() {
+fn four_frames_of_a_real_camera_tell_its_noise() {
     if !has_capture("sr4000_steps") {
         return;
     }
     let folder = tempfile::tempdir().unwrap();
     let survey = fixtures().join("surveys/sr4000_steps");
-    // Its darkest pixels are so noisy that amplitudes of four frames spread by noise as they do by light.
-    let error = estimate_noise(&request(survey, &folder.path().join("noise")), &Silent).unwrap_err().to_string();
-    println!("{error}");
-    assert!(error.contains("cannot be told apart") && error.contains("show dark and bright surfaces"), "{error}");
+    let summary = estimate_noise(&request(survey, &folder.path().join("noise")), &Silent).unwrap();
+    println!("{summary}");
+    // This camera multiplies its amplitudes by the squared range, which nothing in the survey says.
+    assert_eq!(summary.amplitude_scale, "times squared range");
+    // Over a factor of twenty in light the line holds to what it states of itself: the misfit of variances, 15 %, is 8 % of
+    // deviations, and no bin is off by more than twice that. The brightest pixels are quieter than a floor common to all
+    // allows for: they are left out here.
+    assert!(summary.misfit < 0.2, "{}", summary.misfit);
+    let bins: Vec<_> = summary.bins.iter().filter(|bin| bin.light < 250.0).collect();
+    assert!(bins.len() > 50, "{}", bins.len());
+    for bin in bins {
+        let ratio = bin.sigma_modelled / bin.sigma_observed;
+        assert!((ratio - 1.0).abs() < summary.misfit, "{ratio} at an amplitude of {}", bin.light);
+    }
+    // The pixels' own scatter is 7 % beside what the line gives them, and the command says so.
+    assert!((summary.sigma_ratio - 1.0).abs() < 0.1 && !summary.sigma_holds, "{}", summary.sigma_verdict);
 }
 
 #[test]

@@ -29,6 +29,7 @@ const PARTS: [&str; 2] = ["noise that falls with the amplitude", "floor"];
 ///
 /// Pixels without a range or a positive amplitude in any frame, and flagged ones, are left out. Where the ambiguity
 /// interval U is known, so are amplitudes at which ranges scatter by more than U / 16: their phases are no longer normal.
+/// So are pixels whose frames leave `1 / a²` uncertain by more than a tenth.
 pub fn estimate_range_noise(
     stations: &[RepeatedRanges<'_>],
     wrapped: bool,
@@ -62,6 +63,9 @@ pub fn estimate_range_noise(
 
 /// Another scale of the amplitude is taken where it leaves less than this share of the misfit.
 const CLEARLY_BETTER: f64 = 0.7;
+
+/// Pixels whose own frames leave `1 / a²` more uncertain than by this share say little of the slope, and flatten it.
+const MOST_UNCERTAIN: f64 = 0.1;
 
 /// Ranges that scatter by more than this share of the ambiguity interval (0.4 rad of phase) are no longer normal.
 pub(super) const NORMAL_SHARE: f64 = 1.0 / 16.0;
@@ -125,7 +129,8 @@ fn repeats_of(station: &RepeatedRanges<'_>, scale: AmplitudeScale) -> Vec<Repeat
         repeats.pixel = index;
         // d(a⁻²) = −2 a⁻³ da
         repeats.regressor_variance = (2.0 * regressor / mean).powi(2) * amplitude.variance / amplitude.count as f64;
-        Some(repeats)
+        let is_known = repeats.regressor_variance < (MOST_UNCERTAIN * regressor).powi(2);
+        is_known.then_some(repeats)
     };
     (0..pixels(station)).into_par_iter().filter_map(collect).collect()
 }

@@ -135,9 +135,11 @@ impl Interference {
         let limits = [2.0, beside].map(|freedom| chi_squared_upper_quantile(freedom, options.false_alarm_probability));
         let pixels: Vec<Option<Tested>> = (0..self.disturbed.as_slice().len())
             .into_par_iter()
-            .map(|pixel| {
-                let deviation = Deviation::of(channels, pixel)?;
-                let parts = beat.parts(&deviation);
+            .map_init(Deviation::default, |deviation, pixel| {
+                if !deviation.set(channels, pixel) {
+                    return None;
+                }
+                let parts = beat.parts(deviation);
                 let disturbed = |within: f64| within > limits[0] && parts.beside <= limits[1];
                 let [by_own, by_all] = [parts.own, parts.with_common].map(disturbed);
                 Some(Tested { brightness: deviation.snr() as f32, by_own, by_all })

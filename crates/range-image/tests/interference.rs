@@ -93,13 +93,14 @@ fn noise_alone_is_no_interference() {
 fn another_camera_is_found_and_its_pixels_are_flagged() {
     // A beat of 1 rad from step to step averages out to 0.54 of itself: the sum of the four samples has 0.47 of it, and its
     // mirror image 0.26. A ratio that makes up for it is found as well.
-    for (within, ratio) in [(0.0, 0.15), (1.0, 0.28)] {
+    for (within, ratio, least) in [(0.0, 0.15, 0.9), (1.0, 0.28, 0.8)] {
         let second = Second { ratio, beat: &|frame, step| beat(frame, step, within) };
         let set = frames(8, 5, Some(&second), STILL);
         let found = check_interference(&set, &InterferenceOptions::default()).unwrap();
-        // All but those in which the beat looks like a phase or an amplitude that the frames have in common.
+        // All but those in which the beat looks like a phase or an amplitude that the frames have in common: more of them
+        // where half of it is a mirror image.
         assert!(
-            matches!(found.verdict, InterferenceVerdict::Found { share } if share > 0.8),
+            matches!(found.verdict, InterferenceVerdict::Found { share } if share > least),
             "{within}: {:?}",
             found.verdict
         );

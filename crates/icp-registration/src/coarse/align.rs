@@ -76,19 +76,21 @@ pub fn align_without_guess(
 ) -> Result<CoarseAlignment> {
     options.validate()?;
     let (source, target) = with_common_voxels(source, target, options)?;
-    looked_for(&source, &target, options, 1).or_else(|_| looked_for(&source, &target, options, SECOND_LOOK))
+    let correspondences = correspondences(&source, &target, options);
+    let look = |effort| looked_for(&source, &target, &correspondences, options, effort);
+    look(1).or_else(|_| look(SECOND_LOOK))
 }
 
 /// The pose that passes, of `effort` times as many candidates and hypotheses as are usual.
 fn looked_for(
     source: &FeatureCloud,
     target: &FeatureCloud,
+    correspondences: &Correspondences,
     options: &CoarseOptions,
     effort: usize,
 ) -> Result<CoarseAlignment> {
-    let voxel_m = target.voxel_m();
-    let tolerance = Tolerance { distance: (options.tolerance_voxels * voxel_m) as f32, cosine: COSINE_TOLERANCE };
-    let (correspondences, verified) = verified(source, target, tolerance, options, effort);
+    let (voxel_m, tolerance) = (target.voxel_m(), tolerance(target, options));
+    let verified = verified(source, target, correspondences, options, effort);
     let (winner, rival) = best_two(&verified, voxel_m, source).ok_or(Error::NoAlignment {
         what: "consistent correspondences",
         found: 0.0,
@@ -124,13 +126,13 @@ pub(crate) fn hypotheses(
     let (source, target) = with_common_voxels(source, target, options)?;
     let (source, target) = (source.as_ref(), target.as_ref());
     let voxel_m = target.voxel_m();
-    let tolerance = Tolerance { distance: (options.tolerance_voxels * voxel_m) as f32, cosine: COSINE_TOLERANCE };
+    let correspondences = correspondences(source, target, options);
     let score = |hypothesis: &Hypothesis| {
         let verdict = Verdict::with(source, target, &hypothesis.pose, 1, Jumps::Missed);
         (hypothesis.pose, verdict.rough_score())
     };
     let mut scored: Vec<(Isometry3<f64>, f64)> =
-        verified(source, target, tolerance, options, 1).1.par_iter().map(score).collect();
+        verified(source, target, &correspondences, options, 1).par_iter().map(score).collect();
     scored.sort_by(|a, b| b.1.total_cmp(&a.1));
     let mut kept: Vec<(Isometry3<f64>, f64)> = Vec::new();
     for (pose, score) in scored {
@@ -141,16 +143,20 @@ pub(crate) fn hypotheses(
     Ok(kept.iter().map(|(pose, score)| (target.between_frames(source, pose), *score)).collect())
 }
 
-/// The correspondences, and the best poses of them, refined and judged; `effort` as for [`looked_for`].
+fn tolerance(target: &FeatureCloud, options: &CoarseOptions) -> Tolerance {
+    Tolerance { distance: (options.tolerance_voxels * target.voxel_m()) as f32, cosine: COSINE_TOLERANCE }
+}
+
+/// The best poses of the correspondences, refined and judged; `effort` as for [`looked_for`].
 fn verified(
     source: &FeatureCloud,
     target: &FeatureCloud,
-    tolerance: Tolerance,
+    correspondences: &Correspondences,
     options: &CoarseOptions,
     effort: usize,
-) -> (Correspondences, Vec<Hypothesis>) {
-    let correspondences = correspondences(source, target, options);
-    let candidates = candidates(&correspondences, tolerance, options, effort * MOST_CANDIDATES);
+) -> Vec<Hypothesis> {
+    let tolerance = tolerance(target, options);
+    let candidates = candidates(correspondences, tolerance, options, effort * MOST_CANDIDATES);
     let ranked = ranked(source, target, candidates, effort * options.max_hypotheses, |pose| {
         // The share of added features that agree counts as much as that of the points: along walls only they can tell.
         let verdict = Verdict::new(source, target, pose, RANKING_STRIDE);
@@ -162,8 +168,7 @@ fn verified(
         let added = verdict.points() as f64 * correspondences.added_share(&refined.pose, tolerance);
         Hypothesis { pose: refined.pose, evidence: verdict.evidence() + added, rms_m: refined.rms_m }
     };
-    let verified = ranked.par_iter().map(verify).collect();
-    (correspondences, verified)
+    ranked.par_iter().map(verify).collect()
 }
 
 /// A refined pose between the clouds' middles.

@@ -87,17 +87,10 @@ fn share(motion: &UndeterminedMotion, place: &Vector3<f64>, normal: &Vector3<f64
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
-    use std::sync::Arc;
-
     use nalgebra::Point3;
 
     use super::*;
-    use crate::organised::Projection;
-
-    const SIZE: [usize; 2] = [160, 120];
-    const FOCAL_PX: f64 = 150.0;
-    const CENTRE_PX: [f64; 2] = [79.5, 59.5];
+    use crate::organised::drawn::drawn;
 
     /// A wall two metres away and a box before it, whose right side lies at x = -0.6, seen from `x` on the x axis.
     fn seen_from(x: f64) -> OrganisedFrame {
@@ -112,16 +105,7 @@ mod tests {
                 2.0
             }
         };
-        let points: Vec<[f64; 3]> = (0..SIZE[0] * SIZE[1])
-            .map(|k| {
-                let u = ((k % SIZE[0]) as f64 - CENTRE_PX[0]) / FOCAL_PX;
-                let v = (CENTRE_PX[1] - (k / SIZE[0]) as f64) / FOCAL_PX;
-                let depth = depth(u, v);
-                [u * depth, v * depth, -depth]
-            })
-            .collect();
-        let projection = Arc::new(Projection::pinhole(SIZE[0], SIZE[1], [FOCAL_PX; 2], CENTRE_PX).unwrap());
-        OrganisedFrame::new(&projection, &points, None).unwrap()
+        drawn(depth)
     }
 
     #[test]

@@ -7,6 +7,8 @@ mod aligner;
 mod blocks;
 mod consistency;
 mod crossing;
+#[cfg(test)]
+mod drawn;
 mod frame;
 mod grid;
 mod map;

@@ -156,30 +156,18 @@ impl WithLocate for InFront<'_> {
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
-    use std::sync::Arc;
-
     use nalgebra::{Point3, Vector3};
 
     use super::*;
-    use crate::organised::{FrameAlignmentOptions, Projection};
-
-    const SIZE: [usize; 2] = [160, 120];
-    const FOCAL_PX: f64 = 150.0;
-    const CENTRE_PX: [f64; 2] = [79.5, 59.5];
+    use crate::organised::FrameAlignmentOptions;
+    use crate::organised::drawn::drawn;
 
     /// A plate of 0.6 m x 0.5 m, 1.2 m away, before a wall at 2 m, seen from a place beside the middle.
     fn seen_from(place: [f64; 2]) -> OrganisedFrame {
-        let points: Vec<[f64; 3]> = (0..SIZE[0] * SIZE[1])
-            .map(|k| {
-                let u = ((k % SIZE[0]) as f64 - CENTRE_PX[0]) / FOCAL_PX;
-                let v = (CENTRE_PX[1] - (k / SIZE[0]) as f64) / FOCAL_PX;
-                let on_plate = (place[0] + u * 1.2).abs() < 0.3 && (place[1] + v * 1.2).abs() < 0.25;
-                let depth = if on_plate { 1.2 } else { 2.0 };
-                [u * depth, v * depth, -depth]
-            })
-            .collect();
-        let projection = Arc::new(Projection::pinhole(SIZE[0], SIZE[1], [FOCAL_PX; 2], CENTRE_PX).unwrap());
-        OrganisedFrame::new(&projection, &points, None).unwrap()
+        drawn(|u, v| {
+            let on_plate = (place[0] + u * 1.2).abs() < 0.3 && (place[1] + v * 1.2).abs() < 0.25;
+            if on_plate { 1.2 } else { 2.0 }
+        })
     }
 
     #[test]

@@ -10,7 +10,8 @@ use crate::view::{View, ViewData, by_station};
 use crate::work::Work;
 use crate::{Error, Result};
 
-/// All views of a station with one integration time become one: the mean of the complex images, or of the ranges where there are only those.
+/// All views of a station with one integration time become one: the mean of the complex images, or of the ranges where
+/// there are only those.
 pub(super) fn run(work: &mut Work, options: &AverageOptions, progress: &dyn Progress) -> Result<Findings> {
     let views = std::mem::take(&mut work.outcome.views);
     let before = views.len();

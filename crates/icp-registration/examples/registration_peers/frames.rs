@@ -2,11 +2,10 @@
 
 use std::path::Path;
 use std::sync::Arc;
-use std::time::Instant;
 
 use icp_registration::{
     Cloud, FrameAligner, FrameAlignmentOptions, IcpOptions, OrganisedFrame, OrganisedNormalOptions, Projection,
-    VoxelAlignmentOptions, VoxelCloud, VoxelOptions, align, align_frames, organised_normals,
+    VoxelAlignmentOptions, VoxelCloud, VoxelOptions, align, organised_normals,
 };
 use nalgebra::Isometry3;
 
@@ -58,51 +57,31 @@ pub fn projection(frames: &Frames) -> Result<Arc<Projection>, icp_registration::
 }
 
 /// As streams do it: memory of the pair before is used again.
-fn organised(frames: &Frames, pairs: &[[usize; 2]]) -> Outcome {
-    let Some(&[first, _]) = pairs.first() else { return Ok(()) };
-    let projection = projection(frames)?;
-    let points = frames.points(first)?;
-    let mut target = OrganisedFrame::new(&projection, &points, None)?;
-    let mut source = OrganisedFrame::new(&projection, &points, None)?;
-    let mut aligner = FrameAligner::new(FrameAlignmentOptions::default())?;
-    aligner.align(&source, &target, &Isometry3::identity())?;
-    compare("organised", frames, pairs, LIMITS, |new_target, new_source| {
-        target.update(new_target, None)?;
-        source.update(new_source, None)?;
-        Ok(aligner.align(&source, &target, &Isometry3::identity())?.target_from_source)
-    })
+pub struct Stream {
+    target: OrganisedFrame,
+    source: OrganisedFrame,
+    aligner: FrameAligner,
 }
 
-/// Prints how much faster two threads are (elapsed time, both alternating, least of some runs), and how many pairs get
-/// the same bits.
-pub fn threads(folder: &Path) -> Outcome {
-    const RUNS: usize = 7;
-    let frames = Frames::open(folder)?;
-    let projection = projection(&frames)?;
-    let pools = [1, 2].map(|threads| rayon::ThreadPoolBuilder::new().num_threads(threads).build());
-    let [one, two] = pools;
-    let pools = [one?, two?];
-    let (mut same_bits, mut least) = (0, [0.0; 2]);
-    for [target, source] in frames.pairs(2) {
-        let points = [frames.points(target)?, frames.points(source)?];
-        let work = || -> Result<Isometry3<f64>, icp_registration::Error> {
-            let [target, source] = points.each_ref().map(|points| OrganisedFrame::new(&projection, points, None));
-            let options = FrameAlignmentOptions::default();
-            Ok(align_frames(&source?, &target?, &Isometry3::identity(), &options)?.target_from_source)
-        };
-        let (mut found, mut times) = ([Isometry3::identity(); 2], [f64::INFINITY; 2]);
-        for _ in 0..RUNS {
-            for ((pool, found), least) in pools.iter().zip(&mut found).zip(&mut times) {
-                let start = Instant::now();
-                *found = pool.install(work)?;
-                *least = least.min(start.elapsed().as_secs_f64());
-            }
-        }
-        same_bits += usize::from(found[0] == found[1]);
-        for (sum, time) in least.iter_mut().zip(times) {
-            *sum += time;
-        }
+impl Stream {
+    /// `points`: any frame of the camera.
+    pub fn new(frames: &Frames, points: &Points) -> Result<Self, icp_registration::Error> {
+        let target = OrganisedFrame::new(&projection(frames)?, points, None)?;
+        let mut aligner = FrameAligner::new(FrameAlignmentOptions::default())?;
+        aligner.align(&target, &target, &Isometry3::identity())?;
+        Ok(Self { source: target.clone(), target, aligner })
     }
-    println!("faster {}\nsame_bits {same_bits}", least[0] / least[1]);
-    Ok(())
+
+    /// From raw points to the pose, from the identity.
+    pub fn align(&mut self, target: &Points, source: &Points) -> Result<Isometry3<f64>, icp_registration::Error> {
+        self.target.update(target, None)?;
+        self.source.update(source, None)?;
+        Ok(self.aligner.align(&self.source, &self.target, &Isometry3::identity())?.target_from_source)
+    }
+}
+
+fn organised(frames: &Frames, pairs: &[[usize; 2]]) -> Outcome {
+    let Some(&[first, _]) = pairs.first() else { return Ok(()) };
+    let mut stream = Stream::new(frames, &frames.points(first)?)?;
+    compare("organised", frames, pairs, LIMITS, |target, source| Ok(stream.align(target, source)?))
 }

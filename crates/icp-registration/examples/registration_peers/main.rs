@@ -3,7 +3,7 @@
 //! ```text
 //! registration_peers simulate WHAT FOLDER     writes frames: large, medium, coarse, degenerate, tracking or stations
 //! registration_peers frames FOLDER STRIDE FIRST COUNT [all]      pairs of frames and of clouds, from the identity
-//! registration_peers threads FOLDER           how much faster two threads are, and whether the bits are the same
+//! registration_peers threads FOLDER           how much faster two threads are, what is possible, whether the bits are the same
 //! registration_peers covariance FOLDER COUNT  covariances against true errors
 //! registration_peers degenerate FOLDER        scenes that leave motions open
 //! registration_peers coarse FOLDER            pairs without a guess
@@ -27,6 +27,7 @@ mod frames;
 mod pairs;
 mod simulate;
 mod stations;
+mod threads;
 mod tracking;
 mod verdicts;
 
@@ -49,7 +50,7 @@ fn run() -> Outcome {
     match words.as_slice() {
         ["simulate", what, folder] => simulate::write(what, Path::new(folder)),
         ["frames", folder, rest @ ..] => frames::run(Path::new(folder), rest),
-        ["threads", folder] => frames::threads(Path::new(folder)),
+        ["threads", folder] => threads::run(Path::new(folder)),
         ["covariance", folder, count] => verdicts::covariance(Path::new(folder), count.parse()?),
         ["degenerate", folder] => verdicts::degenerate(Path::new(folder)),
         ["coarse", folder] => coarse::run(Path::new(folder)),

@@ -15,7 +15,6 @@ use super::matching::{Match, matches};
 use super::options::{CoarseOptions, Estimator};
 use super::ransac::consistent_samples;
 use super::refine::refine;
-use super::view::Jumps;
 use crate::error::{Error, Result};
 
 /// Correspondences that enter the graph, those with the most alike descriptors.
@@ -128,7 +127,7 @@ pub(crate) fn hypotheses(
     let voxel_m = target.voxel_m();
     let correspondences = correspondences(source, target, options);
     let score = |hypothesis: &Hypothesis| {
-        let verdict = Verdict::with(source, target, &hypothesis.pose, 1, Jumps::Missed);
+        let verdict = Verdict::with(source, target, &hypothesis.pose, 1, super::view::Jumps::Missed);
         (hypothesis.pose, verdict.rough_score())
     };
     let mut scored: Vec<(Isometry3<f64>, f64)> =

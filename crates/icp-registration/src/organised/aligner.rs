@@ -8,11 +8,10 @@ use super::grid::STRIDES;
 use super::options::FrameAlignmentOptions;
 use super::pairs::Rules;
 use super::quality::{Cell, Hold, Verdict};
-use super::sums::{SUMS, normal_equations, residuals};
+use super::sums::{SUMS, median_residual, normal_equations};
 use super::track::{Gauge, Track, blocks, moved, solve, turned};
 use crate::error::{Error, Result};
 use crate::icp::{DegeneracyPolicy, IcpResult, StopReason};
-use crate::kernel::quantile;
 use crate::pose::{is_finite, pose_difference, step_pose, symmetrised, tangent_from_centred};
 use crate::quality::Residuals;
 
@@ -53,7 +52,7 @@ pub fn align_frames(
 pub struct FrameAligner {
     options: FrameAlignmentOptions,
     chunks: Vec<[f64; SUMS]>,
-    scratch: Vec<f64>,
+    scratch: Vec<u32>,
     cells: Vec<Cell>,
 }
 
@@ -173,11 +172,9 @@ impl FrameAligner {
         let radius = target.points.radius_m.max(source.points.radius_m);
         track.rules.extra_variance = (radius * radius) as f32;
         let moved = moved(track, source, target);
-        residuals(&moved.0, &track.rules, blocks, SAMPLE, &mut self.scratch);
-        if self.scratch.is_empty() {
-            return Err(self.too_few(0, source.len(), track));
-        }
-        let scale = MAD * quantile(&mut self.scratch, 0.5) * radius;
+        let median = median_residual(&moved.0, &track.rules, blocks, SAMPLE, &mut self.scratch)
+            .ok_or_else(|| self.too_few(0, source.len(), track))?;
+        let scale = MAD * median * radius;
         track.rules.extra_variance = (scale * scale) as f32;
         Ok(())
     }
@@ -228,8 +225,8 @@ impl FrameAligner {
     /// Lowers the variance of what is not aligned to what the residuals show.
     fn narrow(&mut self, track: &mut Track, source: &OrganisedFrame, target: &OrganisedFrame, blocks: &[Block]) {
         let (moved, _) = moved(track, source, target);
-        residuals(&moved, &track.rules, blocks, SAMPLE, &mut self.scratch);
-        let square = (MAD * quantile(&mut self.scratch, 0.5)).powi(2) as f32;
+        let median = median_residual(&moved, &track.rules, blocks, SAMPLE, &mut self.scratch).unwrap_or(0.0);
+        let square = (MAD * median).powi(2) as f32;
         track.rules.extra_variance *= square.clamp(0.05, 1.0);
     }
 
@@ -269,8 +266,9 @@ impl FrameAligner {
         if first {
             track.rules.reach = 10.0 * BIWEIGHT;
         }
-        residuals(&moved, &track.rules, &source.points.blocks, SAMPLE, &mut self.scratch);
-        let scale = (MAD * quantile(&mut self.scratch, 0.5)).max(0.1) as f32;
+        let blocks = &source.points.blocks;
+        let median = median_residual(&moved, &track.rules, blocks, SAMPLE, &mut self.scratch).unwrap_or(0.0);
+        let scale = (MAD * median).max(0.1) as f32;
         track.rules.reach = BIWEIGHT * scale;
     }
 

@@ -50,7 +50,8 @@ impl Points {
 
     /// Takes over the nodes of a frame.
     pub(super) fn gather(&mut self, grid: &Grid, inverse_depth: &[f32], planes: &[[f32; 4]], sigma: &[f32]) {
-        self.blocks.par_iter_mut().with_min_len(BLOCKS_PER_TASK).for_each(|block| {
+        let take = |block: &mut Block| {
+            let mut count = 0;
             for k in 0..BLOCK {
                 if block.node[k] == NO_NODE {
                     continue;
@@ -65,18 +66,24 @@ impl Points {
                     block.normal[i][k] = plane[i];
                 }
                 block.variance[k] = sigma[node] * sigma[node];
+                count += usize::from(position[2].is_finite());
             }
+            count
+        };
+        let level = |index: usize| grid.levels.iter().take_while(|end| index >= **end).count();
+        let blocks = self.blocks.par_iter_mut().enumerate().with_min_len(BLOCKS_PER_TASK);
+        let counts = blocks.fold_with([0; STRIDES.len()], |mut counts, (index, block)| {
+            counts[level(index)] += take(block);
+            counts
         });
+        self.counts = counts.reduce_with(|a, b| std::array::from_fn(|level| a[level] + b[level])).unwrap_or_default();
+        for level in 1..STRIDES.len() {
+            self.counts[level] += self.counts[level - 1];
+        }
         self.measure(grid);
     }
 
     fn measure(&mut self, grid: &Grid) {
-        let (mut from, mut count) = (0, 0);
-        for (level, &to) in grid.levels.iter().enumerate() {
-            count += self.blocks[from..to].iter().flat_map(|b| b.position[2]).filter(|z| z.is_finite()).count();
-            self.counts[level] = count;
-            from = to;
-        }
         let level = self.counts.iter().position(|c| *c > 0).unwrap_or(0);
         let count = self.counts[level].max(1) as f64;
         let mean = self.nodes(grid.levels[level]).fold(Vector3::zeros(), |sum, p| sum + p) / count;

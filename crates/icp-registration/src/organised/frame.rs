@@ -11,7 +11,7 @@ use super::planes::{FREEDOM, PlaneRow};
 use super::projection::Projection;
 use crate::cloud::Cloud;
 use crate::error::{Error, Result};
-use crate::kernel::quantile;
+use crate::kernel::{median_of_bits, positive_bits};
 
 /// Windows whose mean square deviation exceeds that of most by this factor hold no plane.
 const LARGEST_MISFIT: f32 = 3.0;
@@ -20,7 +20,7 @@ const LEAST_INCIDENCE: f32 = 0.12;
 /// Deviation of inverse depth that is rounding, relative.
 const ROUNDING: f32 = 1e-6;
 /// Nodes from which the typical misfit is taken.
-const SAMPLE: usize = 4096;
+const SAMPLE: usize = 1024;
 
 /// A frame prepared for registration: planes through its nodes, each the average of a square of pixels. Its memory is
 /// used again by [`OrganisedFrame::update`].
@@ -34,7 +34,7 @@ pub struct OrganisedFrame {
     /// Standard deviation of the distance, metre.
     pub(super) sigma: Vec<f32>,
     misfit: Vec<f32>,
-    scratch: Vec<f64>,
+    scratch: Vec<u32>,
     pub(super) points: Points,
     has_sigma: bool,
 }
@@ -141,7 +141,7 @@ impl OrganisedFrame {
     fn reduce(&mut self, points: &[[f64; 3]], sigma: Option<&[f32]>) {
         let (grid, width) = (&self.projection.grid, self.projection.width());
         let rows = self.inverse_depth.par_chunks_mut(grid.cols).zip(self.spread.par_chunks_mut(grid.cols));
-        rows.enumerate().with_min_len(8).for_each(|(row, (inverse_depth, spread))| {
+        rows.enumerate().with_min_len(8).with_max_len(16).for_each(|(row, (inverse_depth, spread))| {
             pulp::Arch::new().dispatch(NodeRow { grid, row, width, points, sigma, inverse_depth, spread });
         });
     }
@@ -151,7 +151,7 @@ impl OrganisedFrame {
         let (inverse_depth, spread) = (&self.inverse_depth[..], &self.spread[..]);
         let outputs = (self.planes.par_chunks_mut(grid.cols), self.sigma.par_chunks_mut(grid.cols));
         let rows = outputs.0.zip(outputs.1).zip(self.misfit.par_chunks_mut(grid.cols));
-        rows.enumerate().with_min_len(8).for_each(|(row, ((planes, sigma), misfit))| {
+        rows.enumerate().with_min_len(8).with_max_len(16).for_each(|(row, ((planes, sigma), misfit))| {
             pulp::Arch::new().dispatch(PlaneRow { grid, row, inverse_depth, spread, planes, sigma, misfit });
         });
     }
@@ -160,11 +160,12 @@ impl OrganisedFrame {
     fn refuse_misfits(&mut self) {
         let step = self.misfit.len().div_ceil(SAMPLE).max(1);
         self.scratch.clear();
-        self.scratch.extend(self.misfit.iter().step_by(step).filter(|m| m.is_finite()).map(|m| f64::from(*m)));
+        let known = self.misfit.iter().step_by(step).copied().filter(|m| m.is_finite());
+        self.scratch.extend(known.map(positive_bits));
         let freedom = f64::from(FREEDOM);
         // Median of a mean of squares (Wilson and Hilferty).
-        let median = (1.0 - 2.0 / (9.0 * freedom)).powi(3);
-        let typical = (quantile(&mut self.scratch, 0.5) / median) as f32;
+        let expected = (1.0 - 2.0 / (9.0 * freedom)).powi(3);
+        let typical = (f64::from(median_of_bits(&mut self.scratch).unwrap_or(0.0)) / expected) as f32;
         let scale = if self.has_sigma { 1.0 } else { typical.sqrt() };
         let limit = LARGEST_MISFIT * if self.has_sigma { typical.max(1.0) } else { typical };
         let nodes = self.planes.par_iter_mut().zip(&mut self.sigma).zip(&self.misfit);
@@ -185,7 +186,7 @@ impl OrganisedFrame {
 /// Refuses frames most of whose points lie beside the rays of their pixels, by a sample of them.
 fn check_rays(projection: &Projection, points: &[[f64; 3]]) -> Result<()> {
     let (mut off, mut tried, mut example) = (0, 0, 0);
-    let step = points.len() / 301 + 1;
+    let step = points.len() / 101 + 1;
     for index in (0..points.len()).step_by(step) {
         let p = points[index];
         if !(p[2].abs() > LEAST_DEPTH_M && p[2].abs() < LARGEST_DEPTH_M && p[0].is_finite() && p[1].is_finite()) {

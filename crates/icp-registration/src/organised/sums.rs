@@ -10,11 +10,14 @@ use rayon::prelude::*;
 use super::blocks::Block;
 use super::grid::BLOCK;
 use super::pairs::{Locate, Moved, Pairs, Rules, WithLocate, with_locate};
+use crate::kernel::{median_of_bits, positive_bits};
 
 /// Blocks of a chunk: sums in single precision stay short.
 const CHUNK: usize = 32;
 /// Chunks that one thread takes at least.
-const CHUNKS_PER_TASK: usize = 16;
+const CHUNKS_PER_TASK: usize = 4;
+/// Blocks of a sample that one thread takes at least.
+const SAMPLED_PER_TASK: usize = 64;
 /// 21 products of the derivatives, 6 with the residual, and the sums of weight, weighted squares and pairs.
 pub(super) const SUMS: usize = 30;
 
@@ -77,7 +80,7 @@ impl WithLocate for AllChunks<'_, '_> {
             self.chunks.iter_mut().zip(self.blocks.chunks(CHUNK)).for_each(work);
         } else {
             let chunks = self.chunks.par_iter_mut().zip(self.blocks.par_chunks(CHUNK));
-            chunks.with_min_len(CHUNKS_PER_TASK).for_each(work);
+            chunks.with_min_len(CHUNKS_PER_TASK).with_max_len(2 * CHUNKS_PER_TASK).for_each(work);
         }
     }
 }
@@ -144,19 +147,56 @@ pub(super) fn derivatives(lever: &[[f32; BLOCK]; 3], normal: &[[f32; BLOCK]; 3])
     rows
 }
 
-/// Absolute residuals over their standard deviation of about `most` nodes of the blocks, into `out`.
-pub(super) fn residuals(moved: &Moved<'_>, rules: &Rules, blocks: &[Block], most: usize, out: &mut Vec<f64>) {
-    out.clear();
+/// Median of the absolute residuals, over their standard deviations, of about `most` nodes of the blocks; `None` where there
+/// are no pairs.
+pub(super) fn median_residual(
+    moved: &Moved<'_>,
+    rules: &Rules,
+    blocks: &[Block],
+    most: usize,
+    scratch: &mut Vec<u32>,
+) -> Option<f64> {
     // Spread evenly over the blocks.
     let step = (blocks.len() * BLOCK).div_ceil(most.max(1)).max(1);
-    let visit = |pairs: &Pairs| {
-        for k in 0..BLOCK {
-            if pairs.weight[k] > 0.0 {
-                out.push(f64::from((pairs.residual[k] * pairs.residual[k] / pairs.variance[k]).sqrt()));
-            }
-        }
-    };
-    with_locate(moved.target, Visit { moved, rules, blocks, step, work: visit });
+    scratch.clear();
+    scratch.resize(blocks.len().div_ceil(step) * BLOCK, NO_PAIR);
+    with_locate(moved.target, Sample { moved, rules, blocks, step, squares: scratch });
+    scratch.retain(|square| *square != NO_PAIR);
+    median_of_bits(scratch).map(|square| f64::from(square.sqrt()))
+}
+
+/// Stands for a node without a partner: the bits of no number.
+const NO_PAIR: u32 = u32::MAX;
+
+/// Squared residuals over their variances, as bits, of every `step`-th block.
+struct Sample<'a, 'b> {
+    moved: &'a Moved<'b>,
+    rules: &'a Rules,
+    blocks: &'a [Block],
+    step: usize,
+    squares: &'a mut [u32],
+}
+
+impl WithLocate for Sample<'_, '_> {
+    type Output = ();
+
+    fn run<L: Locate>(self, locate: L) {
+        let (moved, rules, step) = (self.moved, self.rules, self.step);
+        let parts =
+            self.squares.par_chunks_mut(SAMPLED_PER_TASK * BLOCK).zip(self.blocks.par_chunks(SAMPLED_PER_TASK * step));
+        parts.for_each(|(squares, blocks)| {
+            let mut places = squares.chunks_exact_mut(BLOCK);
+            let work = |pairs: &Pairs| {
+                let place = places.next().unwrap_or_default();
+                for (k, square) in place.iter_mut().enumerate() {
+                    if pairs.weight[k] > 0.0 {
+                        *square = positive_bits(pairs.residual[k] * pairs.residual[k] / pairs.variance[k]);
+                    }
+                }
+            };
+            pulp::Arch::new().dispatch(LocatedVisit { all: Visit { moved, rules, blocks, step, work }, locate });
+        });
+    }
 }
 
 /// Nodes that fall on target planes, and how many of them are accepted.

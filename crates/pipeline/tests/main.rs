@@ -17,6 +17,7 @@ mod real_captures;
 mod real_periodic;
 mod real_repeats;
 mod register;
+mod remaining_errors;
 mod room;
 mod scattering;
 mod track;

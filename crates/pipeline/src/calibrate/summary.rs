@@ -11,7 +11,8 @@ use serde::ser::{SerializeMap, Serializer};
 
 use super::names::group_unit;
 use super::request::CalibrateMethod;
-use super::trends::{TrendSummary, trends};
+use super::trends::trends;
+use crate::trends::TrendSummary;
 
 /// Names and units of the parameters that a summary always has, in its order: those of camera and range terms.
 fn always_listed() -> impl Iterator<Item = (&'static str, &'static str)> {

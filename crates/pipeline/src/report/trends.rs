@@ -1,26 +1,46 @@
 //! Mean residuals in bins of what they might still depend on.
 
-use crate::calibrate::{TrendSummary, trend_sentence};
-use crate::report::chart::{Axes, Series, curves};
-use crate::report::colour::CATEGORIES;
-use crate::report::page::Page;
+use super::chart::{Axes, Series, curves};
+use super::colour::CATEGORIES;
+use super::page::Page;
+use crate::trends::{RemainingErrors, TrendSummary, sentence};
+
+const TITLE: &str = "Is what is left random?";
+
+/// The residuals of a calibration.
+pub(super) fn trends_of_calibration(page: &mut Page, trends: &[TrendSummary]) {
+    let Some(sentence) = sentence(trends) else { return };
+    page.section(TITLE);
+    tests(page, trends, &sentence);
+}
+
+/// What a run leaves of the ranges' errors.
+pub(super) fn remaining_errors(page: &mut Page, remaining: &RemainingErrors) {
+    page.section(TITLE);
+    page.paragraph(&remaining.basis_words);
+    if remaining.pixels == 0 {
+        return;
+    }
+    let RemainingErrors { pixels, gross_errors, .. } = remaining;
+    page.paragraph(&format!("{pixels} pixels were tested; {gross_errors} more with gross errors were left out."));
+    tests(page, &remaining.variables, &remaining.verdict);
+}
 
 /// A table of the tests, and a curve with its band of two standard errors for each variable.
-pub(super) fn trends(page: &mut Page, trends: &[TrendSummary]) {
-    let Some(sentence) = trend_sentence(trends) else { return };
-    page.section("Is what is left random?");
+fn tests(page: &mut Page, trends: &[TrendSummary], sentence: &str) {
     page.paragraph(&format!(
         "Means of the residuals in bins, compared with one another by the scatter of pixels that are independent of each \
-         other; all variables together raise a false alarm once in a hundred calibrations. Here {sentence}."
+         other; all variables together raise a false alarm once in a hundred times. Here {sentence}."
     ));
     let millimetres = |metres: Option<f64>| metres.map_or("–".to_owned(), |metres| format!("{:.2} mm", 1e3 * metres));
     let row = |trend: &TrendSummary| {
         let p =
             trend.p_value.map_or("–".to_owned(), |p| if p < 0.0005 { "< 0.001".to_owned() } else { format!("{p:.3}") });
-        vec![trend.variable.to_owned(), trend.verdict.clone(), p, millimetres(trend.rms_m)]
+        let independent = trend.independent.clone().unwrap_or_else(|| "–".to_owned());
+        vec![trend.variable.to_owned(), trend.verdict.clone(), p, millimetres(trend.rms_m), independent]
     };
     let rows: Vec<Vec<String>> = trends.iter().map(row).collect();
-    page.table(&["residual against", "verdict", "p", "rms of the trend"], &rows);
+    page.table(&["residual against", "verdict", "p", "rms of the trend", "independent of each other"], &rows);
     let figures: Vec<(String, String)> =
         trends.iter().filter(|trend| !trend.bins.is_empty()).map(|trend| (figure(trend), String::new())).collect();
     page.figures(&figures);

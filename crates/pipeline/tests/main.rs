@@ -6,6 +6,7 @@ mod bad_input;
 mod calibrate;
 mod calibrate_bad_input;
 mod calibrate_planes;
+mod calibrate_warm_up;
 mod common;
 mod compare;
 mod diff;

@@ -3,6 +3,7 @@
 mod calibration_file;
 mod control;
 mod distances;
+mod drift;
 mod names;
 mod network_check;
 mod network_files;

@@ -1,5 +1,7 @@
 //! Mean residuals in bins of what they might still depend on.
 
+use self_calibration::TrendVariable;
+
 use super::chart::{Axes, Series, curves};
 use super::colour::CATEGORIES;
 use super::page::Page;
@@ -47,9 +49,12 @@ fn tests(page: &mut Page, trends: &[TrendSummary], sentence: &str) {
 }
 
 fn figure(trend: &TrendSummary) -> String {
-    let axes = Axes { title: "Mean residual", x: trend.variable, y: "mm" };
+    // Most amplitudes are small, and a few very large.
+    let by_amplitude = trend.variable == TrendVariable::Amplitude.name();
+    let axes = Axes { title: "Mean residual", x: if by_amplitude { "lg amplitude" } else { trend.variable }, y: "mm" };
+    let place = |at: f64| if by_amplitude { at.max(f64::MIN_POSITIVE).log10() } else { at };
     let curve = |factor: f64| -> Vec<(f64, f64)> {
-        trend.bins.iter().map(|[at, mean, error]| (*at, 1e3 * (mean + factor * error))).collect()
+        trend.bins.iter().map(|[at, mean, error]| (place(*at), 1e3 * (mean + factor * error))).collect()
     };
     let sets = [
         Series { name: "mean", colour: CATEGORIES[0], values: curve(0.0) },

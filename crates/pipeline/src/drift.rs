@@ -91,7 +91,8 @@ pub enum DriftError {
 }
 
 /// What a user can do where a drift is not known.
-const LEAVE: &str = "leave the drift in the ranges by `CorrectRange(warm_up: leave)`";
+const LEAVE: &str =
+    "leave the drift in the ranges by `CorrectRange(warm_up: leave)` of a pipeline or `calibrate --warm-up leave`";
 
 /// A calibrated drift, ready for views.
 pub(crate) struct DriftCurve<'a> {
@@ -106,9 +107,14 @@ impl<'a> DriftCurve<'a> {
 
     /// The mean of the drifts of the frames that went into a view.
     pub(crate) fn of_view(&self, view: &View, survey: &Survey) -> Result<ViewDrift, DriftError> {
+        self.of_frames(view.name(), &view.frames, survey)
+    }
+
+    /// The mean of the drifts of frames, by their positions in the survey.
+    pub(crate) fn of_frames(&self, view: String, frames: &[usize], survey: &Survey) -> Result<ViewDrift, DriftError> {
         let (mut drift_m, mut row) = (0.0, DVector::zeros(self.covariance.nrows()));
-        let share = 1.0 / view.frames.len().max(1) as f64;
-        for &frame in &view.frames {
+        let share = 1.0 / frames.len().max(1) as f64;
+        for &frame in frames {
             let time_s = self.time(survey, frame)?;
             let temperature_c = self.temperature(survey, frame)?;
             let outside = |source| DriftError::Outside { frame, source };
@@ -117,7 +123,7 @@ impl<'a> DriftCurve<'a> {
         }
         // The errors of the parameters are the same in all frames: derivatives are averaged, not variances.
         let sigma_m = row.dot(&(&self.covariance * &row)).max(0.0).sqrt();
-        Ok(ViewDrift { view: view.name(), drift_m, sigma_m, source: DriftSource::Calibration })
+        Ok(ViewDrift { view, drift_m, sigma_m, source: DriftSource::Calibration })
     }
 
     /// Time since power-on; `None` where the drift does not depend on it.

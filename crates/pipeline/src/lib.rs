@@ -28,6 +28,7 @@ mod stages;
 mod statistics;
 mod summary;
 mod track;
+mod trends;
 mod truth;
 mod view;
 mod warm_up;
@@ -35,7 +36,7 @@ mod work;
 
 pub use calibrate::{
     CalibrateMethod, CalibrateRequest, CalibrationSummary, CorrelationSummary, DecisionSummary, GroupSummary,
-    ParameterMap, ParameterSummary, RejectedObservation, TableDefaults, TrendSummary, calibrate,
+    ParameterMap, ParameterSummary, RejectedObservation, TableDefaults, calibrate,
 };
 pub use compare::{
     AbsoluteSummary, CloudAlignment, CloudComparison, CompareAlignment, CompareRequest, Comparison, DistanceHistogram,
@@ -83,6 +84,7 @@ pub use summary::{
     PairSummary, ReferenceSummary, RegistrationSummary, StageSummary, StationTruth, Summary, TruthSummary,
 };
 pub use track::{TrackLoss, TrackRequest, TrackSummary, TrackTruth, TrackVerdict, TrackedFrame, track};
+pub use trends::{RemainingErrors, TrendSummary};
 pub use truth::{RangeTruth, ViewTruth};
 pub use view::{Snapshot, View, ViewData};
 pub use warm_up::{

@@ -13,6 +13,7 @@ use crate::outcome::{Outcome, usable};
 use crate::plan::{Plan, Stage};
 use crate::statistics::{median, robust_standard_deviation};
 use crate::summary::{PairSummary, ReferenceSummary, RegistrationSummary, StationTruth, Summary, TruthSummary};
+use crate::trends;
 use crate::truth::{RangeTruth, evaluate, wrap};
 use crate::view::{Snapshot, View, ViewData};
 
@@ -63,6 +64,7 @@ pub(crate) fn summarise(plan: &Plan, survey: &Path, outcome: &Outcome) -> Summar
         registration: registration(outcome),
         reference: reference(&outcome.views),
         truth: truth(outcome),
+        remaining: trends::remaining(outcome),
         seconds: 0.0,
         out: String::new(),
     }

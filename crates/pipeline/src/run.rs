@@ -9,6 +9,7 @@ use range_io::survey::Survey;
 use self_calibration::{CalibrationOptions, TermSelection};
 
 use crate::calibrate::{CalibrateMethod, CalibrateRequest, TableDefaults, calibrate};
+use crate::drift::DriftTreatment;
 use crate::load::{load, read_calibration, root_of};
 use crate::network_scene::simulate_network;
 use crate::outcome::Outcome;
@@ -96,6 +97,8 @@ fn estimate_calibration(
             calibration: Some(start),
             method: CalibrateMethod::Network(options.method),
             options,
+            // A network of the warm camera.
+            warm_up: DriftTreatment::Leave,
             defaults: TableDefaults::default(),
             out: out.clone(),
         },

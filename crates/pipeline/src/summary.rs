@@ -6,6 +6,7 @@ use std::fmt;
 use serde::Serialize;
 
 use crate::drift::ViewDrift;
+use crate::trends::RemainingErrors;
 use crate::truth::RangeTruth;
 
 /// What a run did and how good the result is.
@@ -44,6 +45,8 @@ pub struct Summary {
     pub reference: Option<ReferenceSummary>,
     /// Comparison with the truth of a simulated survey.
     pub truth: Option<TruthSummary>,
+    /// Whether what is left of the errors of the ranges is random.
+    pub remaining: RemainingErrors,
     /// Wall-clock time of the whole run, second.
     pub seconds: f64,
     /// The output folder.
@@ -163,6 +166,7 @@ impl fmt::Display for Summary {
             self.flags_fraction.iter().map(|(name, fraction)| format!("{name} {:.1} %", 100.0 * fraction)).collect();
         writeln!(f, "flags: {}", flags.join(", "))?;
         self.write_quality(f)?;
+        writeln!(f, "what is left: {}", self.remaining)?;
         write!(f, "written to {}: report.html, summary.json, cloud.ply, stations.csv, trajectory.txt", self.out)
     }
 }

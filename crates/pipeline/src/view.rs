@@ -66,10 +66,7 @@ pub struct Snapshot {
 impl View {
     /// Name for messages: the station, and the frame where the station has several views.
     pub fn name(&self) -> String {
-        match self.frames.as_slice() {
-            [frame] => format!("station {}, frame {frame}", self.station),
-            frames => format!("station {}, mean of {} frames", self.station, frames.len()),
-        }
+        view_name(&self.station, &self.frames)
     }
 
     /// Columns and rows.
@@ -162,6 +159,14 @@ impl View {
             ViewData::Phase(frame) => Some(&frame.flags),
             ViewData::Range(frame) => Some(&frame.flags),
         }
+    }
+}
+
+/// Name of a view for messages.
+pub(crate) fn view_name(station: &str, frames: &[usize]) -> String {
+    match frames {
+        [frame] => format!("station {station}, frame {frame}"),
+        frames => format!("station {station}, mean of {} frames", frames.len()),
     }
 }
 

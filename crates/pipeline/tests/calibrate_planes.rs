@@ -19,16 +19,16 @@ const SURVEY: &str = r"#![enable(implicit_some)]
         width: 88, height: 72, pixel_pitch_mm: (0.08, 0.08),
         principal_distance_mm: 8.0, principal_point_mm: (0.0, 0.0), modulation_hz: [20e6],
     ),
-    level: range,
+    level: range, power_on_s: 0.0,
     frames: [FRAMES],
 )";
 
-fn camera() -> Camera {
+pub(crate) fn camera() -> Camera {
     let interior = InteriorOrientation { principal_point_mm: [0.0, 0.0], principal_distance_mm: 8.0 };
     Camera::new(ImageFormat::new(88, 72, [0.08, 0.08]).unwrap(), interior, LensDistortion::default()).unwrap()
 }
 
-fn truth() -> RangeErrorModel {
+pub(crate) fn truth() -> RangeErrorModel {
     let terms = RangeTerms { d0: 0.024, periodic: [0.01, -0.005, 0.003, 0.005, -0.009, 0.004], e1: 1.5e-3, e2: -1e-3 };
     let ambiguity_interval_m = Modulation::new(20e6).unwrap().ambiguity_interval_m();
     RangeErrorModel { terms, ..RangeErrorModel::error_free(ambiguity_interval_m) }
@@ -36,6 +36,11 @@ fn truth() -> RangeErrorModel {
 
 /// Seven stations, one to seven metres before the wall z = 0, turned a little; noise of 3 mm from a fixed pattern.
 fn write_survey(folder: &Path) {
+    write_drifting_survey(folder, |_| 0.0);
+}
+
+/// The same by a camera that drifts with the time since power-on; a frame every five minutes.
+pub(crate) fn write_drifting_survey(folder: &Path, drift_m: impl Fn(f64) -> f64) {
     std::fs::create_dir_all(folder.join("frames")).unwrap();
     let (camera, model) = (camera(), truth());
     let (mut frames, mut stations, mut planes) = (String::new(), Vec::new(), Vec::new());
@@ -43,6 +48,7 @@ fn write_survey(folder: &Path) {
         let distance = 1.0 + f64::from(index);
         let pose = pose_from_euler(Vector3::new(0.1, -0.2, distance), [0.05, -0.08 + 0.02 * f64::from(index), 0.3]);
         let wall = ranges_to_wall(&camera, &pose);
+        let time_s = 60.0 + 300.0 * f64::from(index);
         let ranges: Vec<f32> = wall
             .iter()
             .enumerate()
@@ -50,18 +56,16 @@ fn write_survey(folder: &Path) {
                 let [x, y] = camera.format.image_from_pixel([(pixel % 88) as f64, (pixel / 88) as f64]);
                 // A sine of a large argument stands for noise: its deviation is its amplitude over the root of two.
                 let noise = 0.003 * 2.0_f64.sqrt() * (1234.5 * pixel as f64 + 77.7 * f64::from(index)).sin();
-                (model.observed_range(*true_range, x, y, f64::NAN).unwrap() + noise) as f32
+                (model.observed_range(*true_range + drift_m(time_s), x, y, f64::NAN).unwrap() + noise) as f32
             })
             .collect();
         let mut writer = NpzWriter::create(folder.join(format!("frames/{index}.npz"))).unwrap();
         writer.add("range", &[72, 88], &ranges).unwrap();
         writer.commit().unwrap();
         let station = format!("S{index}");
-        for part in
-            ["(file: \"frames/", &station[1..], ".npz\", station: \"", &station, "\", integration_time_s: 0.002),"]
-        {
-            frames.push_str(part);
-        }
+        frames.push_str(&format!(
+            "(file: \"frames/{index}.npz\", station: \"{station}\", integration_time_s: 0.002, timestamp_s: {time_s:.1}),"
+        ));
         planes.push(ObservedPlane {
             plane: "wall".to_owned(),
             station: station.clone(),
@@ -80,7 +84,7 @@ fn ranges_to_wall(camera: &Camera, pose: &nalgebra::Isometry3<f64>) -> Vec<f64> 
     pixels.map(|pixel| -pose.translation.z / (pose.rotation * camera.ray(pixel)).z).collect()
 }
 
-fn planes(request: &mut CalibrateRequest) {
+pub(crate) fn planes(request: &mut CalibrateRequest) {
     request.method = CalibrateMethod::Planes;
     request.options.terms = terms("d0 d2 d3 d4 d5 d6 d7 e1 e2");
 }

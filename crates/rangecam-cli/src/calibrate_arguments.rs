@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use pipeline::{
-    CalibrateMethod, CalibrateRequest, CalibrationOptions, Method, NetworkDatum, TableDefaults, TermSelection,
+    CalibrateMethod, CalibrateRequest, CalibrationOptions, DriftTreatment, Method, NetworkDatum, TableDefaults,
+    TermSelection,
 };
 
 /// Arguments of a calibration.
@@ -46,6 +47,10 @@ pub(crate) struct CalibrateArguments {
     /// Largest growth of a standard deviation by correlations before the network is refused as too weak.
     #[arg(long, value_name = "FACTOR")]
     largest_inflation: Option<f64>,
+    /// The drift of a warming camera that the start values know: taken off the ranges by the times of the frames, or
+    /// left in them, as the camera was warm.
+    #[arg(long, value_enum, default_value_t = WarmUpName::Apply)]
+    warm_up: WarmUpName,
     /// Standard deviation of a column or row where observations.csv gives none, pixel.
     #[arg(long, value_name = "PIXEL", value_parser = positive)]
     sigma_pixel: Option<f64>,
@@ -68,6 +73,14 @@ enum MethodName {
     Laboratory,
     /// Range terms from frames of planes, known or not (planes.csv).
     Planes,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum WarmUpName {
+    /// Taken off.
+    Apply,
+    /// Left in the ranges.
+    Leave,
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
@@ -144,6 +157,10 @@ impl CalibrateArguments {
             calibration: self.calibration,
             method,
             options,
+            warm_up: match self.warm_up {
+                WarmUpName::Apply => DriftTreatment::Apply,
+                WarmUpName::Leave => DriftTreatment::Leave,
+            },
             defaults: TableDefaults { sigma_pixel: self.sigma_pixel, sigma_range_m: self.sigma_range },
             out: self.out.unwrap_or(out),
         }

@@ -43,6 +43,7 @@ fn unknown_plane(criterion: &mut Criterion) {
             name: format!("S{index}"),
             frame,
             world_from_camera: Some(poses[index]),
+            drift_m: 0.0,
             covariance: None,
             plane: 0,
         };

@@ -78,7 +78,7 @@ fn station(index: usize) -> Isometry3<f64> {
 }
 
 fn capture(index: usize, frame: &RangeFrame, world_from_camera: Option<Isometry3<f64>>) -> PlaneCapture<'_> {
-    PlaneCapture { name: format!("S{index}"), frame, world_from_camera, covariance: None, plane: 0 }
+    PlaneCapture { name: format!("S{index}"), frame, world_from_camera, covariance: None, drift_m: 0.0, plane: 0 }
 }
 
 /// What the camera shows of the wall and of a box before it, with seeded noise.

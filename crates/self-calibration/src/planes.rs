@@ -19,6 +19,8 @@ pub struct PlaneCapture<'a> {
     pub world_from_camera: Option<Isometry3<f64>>,
     /// Covariance of the pose's tangent step `[dt world m, dθ camera rad]`, with which it is adjusted; `None`: it is held.
     pub covariance: Option<Matrix6<f64>>,
+    /// What the ranges are known to have drifted by (Sect. 4.7), metre: taken off as d0 is. Zero for a warm camera.
+    pub drift_m: f64,
     /// Position of the plane in the list of planes; without meaning where the pose is not known.
     pub plane: usize,
 }

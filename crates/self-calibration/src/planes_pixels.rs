@@ -3,10 +3,9 @@
 use camera_model::Camera;
 use error_models::{AmplitudeHyperbola, RangeErrorModel};
 use nalgebra::{Isometry3, Vector3};
-use range_image::RangeFrame;
 
 use crate::planes_geometry::PlaneChart;
-use crate::{DifferenceOptions, Error, Result};
+use crate::{DifferenceOptions, Error, PlaneCapture, Result};
 
 /// A pixel that may be used, the same for all captures of a camera.
 pub(crate) struct ChosenPixel {
@@ -36,7 +35,7 @@ pub(crate) fn chosen_pixels(camera: &Camera, model: &RangeErrorModel, options: &
 pub(crate) struct PlanePixels {
     /// Unit rays in the camera frame.
     pub(crate) rays: Vec<Vector3<f64>>,
-    /// Observed ranges, a held hyperbola taken off, metre.
+    /// Observed ranges, a held hyperbola and a known drift taken off, metre.
     pub(crate) ranges_m: Vec<f64>,
     /// One over the standard deviation.
     pub(crate) roots_of_weight: Vec<f64>,
@@ -51,15 +50,16 @@ pub(crate) struct PlanePixels {
 }
 
 impl PlanePixels {
-    /// Takes what is usable of a frame.
+    /// Takes what is usable of a capture.
     pub(crate) fn new(
-        frame: &RangeFrame,
+        capture: &PlaneCapture<'_>,
         camera: &Camera,
         chosen: &[ChosenPixel],
         model: &RangeErrorModel,
         hyperbola: Option<&AmplitudeHyperbola>,
         options: &DifferenceOptions,
     ) -> Result<Self> {
+        let frame = capture.frame;
         frame.validate()?;
         let (width, height) = (camera.format.width, camera.format.height);
         if (frame.width(), frame.height()) != (width, height) {
@@ -79,7 +79,7 @@ impl PlanePixels {
             model.design_row_into(range, *x, *y, &mut row)?;
             pixels.rows.extend(row.iter().map(|value| *value as f32));
             pixels.rays.push(*ray);
-            pixels.ranges_m.push(range - amplitude_m);
+            pixels.ranges_m.push(range - amplitude_m - capture.drift_m);
             let sigma = if sigma > 0.0 && sigma.is_finite() { sigma } else { options.unknown_sigma_m };
             pixels.roots_of_weight.push(sigma.recip());
             pixels.used.push(true);

@@ -75,7 +75,7 @@ impl<'a> Problem<'a> {
         }
         let chosen = chosen_pixels(camera, &terms.model, &options.pixels);
         let usable = |capture: &PlaneCapture<'_>| {
-            PlanePixels::new(capture.frame, camera, &chosen, &terms.model, hyperbola.as_ref(), &options.pixels)
+            PlanePixels::new(capture, camera, &chosen, &terms.model, hyperbola.as_ref(), &options.pixels)
         };
         let pixels = captures.par_iter().map(usable).collect::<Result<Vec<_>>>()?;
         let (charts, chart_of) = (Vec::new(), Vec::new());

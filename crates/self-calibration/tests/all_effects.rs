@@ -9,13 +9,13 @@ use self_calibration::{
 };
 
 /// d0 and the level of the hyperbola share their effect: amplitudes over a factor of 2000 inflate it some hundred times.
-fn options() -> RangeTermOptions {
+pub(crate) fn options() -> RangeTermOptions {
     let shared = RangeTermOptions { largest_inflation: 300.0, ..RangeTermOptions::default() };
     shared.with_hyperbola().with_surface(surface())
 }
 
 /// Residuals with their place in the frames, before or after the correction by a calibration.
-fn samples(differences: &[RangeDifference], residuals_m: impl Iterator<Item = f64>) -> Vec<TrendSample> {
+pub(crate) fn samples(differences: &[RangeDifference], residuals_m: impl Iterator<Item = f64>) -> Vec<TrendSample> {
     let frame = (SIZE[0] * SIZE[1]) as usize;
     let sample = |(index, (d, residual_m)): (usize, (&RangeDifference, f64))| TrendSample {
         residual_m,
@@ -30,7 +30,7 @@ fn samples(differences: &[RangeDifference], residuals_m: impl Iterator<Item = f6
     differences.iter().zip(residuals_m).enumerate().map(sample).collect()
 }
 
-fn values(calibration: &RangeCalibration) -> Vec<f64> {
+pub(crate) fn values(calibration: &RangeCalibration) -> Vec<f64> {
     let model = calibration.model();
     let hyperbola = model.hyperbola.unwrap();
     model.parameter_values().into_iter().chain([hyperbola.h1, hyperbola.h2, hyperbola.h3]).collect()

@@ -9,6 +9,7 @@
 )]
 
 mod all_effects;
+mod all_effects_warm_up;
 mod amplitude_or_position;
 mod automatic_terms;
 mod bad_networks;

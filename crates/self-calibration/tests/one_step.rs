@@ -72,3 +72,22 @@ fn classes_of_amplitude_show_where_the_stated_deviations_are_wrong() {
     assert!((dark.sigma0.unwrap() - 2.0).abs() < 0.3, "{classes:?}");
     assert!(others.len() == 3 && others.iter().all(|class| (class.sigma0.unwrap() - 1.0).abs() < 0.15), "{classes:?}");
 }
+
+#[test]
+fn a_known_drift_of_each_station_is_taken_off() {
+    let mut truth = small();
+    for (index, station) in truth.stations.iter_mut().enumerate() {
+        station.drift_m = -0.03 * (-0.2 * index as f64).exp();
+    }
+    let quiet = SightingOptions { sigma_pixel: 1e-5, sigma_range_m: 1e-6, ..SightingOptions::default() };
+    let mut observed = simulate_sightings(&truth, &quiet).unwrap();
+    nominal(&mut observed);
+    for method in [Method::OneStep, Method::TwoStepDependent] {
+        let outcome = calibrate(&observed, &CalibrationOptions { method, ..options() }).unwrap();
+        for (found, truth) in outcome.range_models[0].1.terms.to_array().iter().zip(truth.range_model.terms.to_array())
+        {
+            // As without a drift: noise of 1e-5 pixel and 1e-6 m, enlarged by correlations.
+            assert!((found - truth).abs() < 1e-5, "{method:?}: {found} {truth}");
+        }
+    }
+}

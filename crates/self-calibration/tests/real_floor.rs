@@ -42,6 +42,7 @@ fn both_stations_stand_equally_high_above_the_floor() {
             name: name.clone(),
             frame,
             world_from_camera: None,
+            drift_m: 0.0,
             covariance: None,
             plane: 0,
         })

@@ -13,8 +13,8 @@ use crate::Result;
 const UNKNOWN_INTEGRATION_TIME_S: f64 = 1.0;
 
 /// The calibration to write: estimated and held parameters with their quality, and what the start calibration knew of
-/// the camera besides (noise, scattering, fixed pattern, warm-up). Of the last nothing is taken off the observations: they
-/// are of the warm camera, whose offset d0 is.
+/// the camera besides (noise, scattering, fixed pattern, warm-up). The drift of the last was taken off the observations, unless
+/// that was declined: the offset d0 is that of the warm camera.
 pub(crate) fn calibration(
     outcome: &CalibrationOutcome,
     start: &Start,

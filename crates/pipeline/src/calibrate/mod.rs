@@ -3,6 +3,7 @@
 mod calibration_file;
 mod control;
 mod distances;
+mod drift;
 mod names;
 mod network_check;
 mod network_files;
@@ -23,11 +24,9 @@ pub use summary::{
     CalibrationSummary, CorrelationSummary, DecisionSummary, GroupSummary, ParameterMap, ParameterSummary,
     RejectedObservation,
 };
-pub use trends::TrendSummary;
 
 pub(crate) use control::pose_covariance;
 pub(crate) use distances::named_distances;
 pub(crate) use run::{is_refusal, json};
 pub(crate) use start::Start;
-pub(crate) use trends::sentence as trend_sentence;
 pub(crate) use words::readable;

@@ -13,9 +13,11 @@ use self_calibration::{Network, NetworkTarget, Sighting, Station};
 
 use super::control::pose_covariance;
 use super::distances::named_distances;
+use super::drift::KnownDrift;
 use super::passive::read_passive;
 use super::request::TableDefaults;
 use super::start::Start;
+use crate::drift::{DriftTreatment, ViewDrift};
 use crate::load::root_of;
 use crate::{Error, Result};
 
@@ -34,10 +36,11 @@ pub(crate) fn read_network(
     survey_path: &Path,
     calibration: Option<&Path>,
     defaults: &TableDefaults,
+    warm_up: DriftTreatment,
 ) -> Result<NetworkFiles> {
     let survey = Survey::read(survey_path)?;
     let root = root_of(survey_path);
-    let start = Start::read(&survey, &root, calibration)?;
+    let mut start = Start::read(&survey, &root, calibration)?;
     let observations = read_placed_observations(root.join("observations.csv"))?;
     if observations.rows.is_empty() {
         let message = "has no rows, expected target observations".to_owned();
@@ -49,6 +52,8 @@ pub(crate) fn read_network(
     let sightings = tables.sightings(&observations, defaults)?;
     let passive = read_passive(&root.join("passive"), &mut tables, defaults)?;
     let distances = named_distances(&root.join("distances.csv"), &tables.stations, &tables.targets)?;
+    let drifts = take_drifts(&survey, &root, &start, warm_up, &sightings, &mut tables.stations)?;
+    start.set_drifts(drifts);
     let network = Network {
         camera: start.camera,
         range_model: start.range_model.clone(),
@@ -59,6 +64,28 @@ pub(crate) fn read_network(
         passive,
     };
     Ok(NetworkFiles { network, start, folder: root, observations })
+}
+
+/// Gives each station with ranges its known drift.
+fn take_drifts(
+    survey: &Survey,
+    root: &Path,
+    start: &Start,
+    warm_up: DriftTreatment,
+    sightings: &[Sighting],
+    stations: &mut [Station],
+) -> Result<Vec<ViewDrift>> {
+    let known = KnownDrift::new(start.calibration.as_ref(), survey, root, warm_up)?;
+    let mut drifts = Vec::new();
+    for (index, station) in stations.iter_mut().enumerate() {
+        if sightings.iter().any(|seen| seen.station == index && seen.range_m.is_some())
+            && let Some(drift) = known.of_station(&station.name)?
+        {
+            station.drift_m = drift.drift_m;
+            drifts.push(drift);
+        }
+    }
+    Ok(drifts)
 }
 
 pub(super) fn optional<T>(path: &Path, read: fn(PathBuf) -> range_io::Result<PlacedRows<T>>) -> Result<PlacedRows<T>> {
@@ -92,6 +119,7 @@ impl Tables {
             world_from_camera: row.map(|row| row.world_from_camera),
             covariance: row.and_then(pose_covariance),
             integration_time_s: self.frame_times.get(name).copied(),
+            drift_m: 0.0,
         });
         self.stations.len() - 1
     }

@@ -12,11 +12,13 @@ use self_calibration::{
 };
 
 use super::control::pose_covariance;
+use super::drift::KnownDrift;
 use super::network_files::optional;
 use super::planes_outcome::{Found, Sample};
 use super::request::CalibrateRequest;
 use super::run::Attempt;
 use super::start::Start;
+use crate::drift::ViewDrift;
 use crate::load::root_of;
 use crate::outcome::Outcome;
 use crate::progress::Progress;
@@ -34,7 +36,7 @@ const MOST_DIFFERENCES: usize = 20_000;
 pub(super) fn calibrate_planes(request: &CalibrateRequest, progress: &dyn Progress) -> Result<Attempt> {
     let survey = Survey::read(&request.survey)?;
     let root = root_of(&request.survey);
-    let start = Start::read(&survey, &root, request.calibration.as_deref())?;
+    let mut start = Start::read(&survey, &root, request.calibration.as_deref())?;
     let rows = read_placed_planes(root.join("planes.csv"))?;
     if rows.rows.is_empty() {
         let message = "has no rows, expected the planes that the stations see".to_owned();
@@ -43,7 +45,9 @@ pub(super) fn calibrate_planes(request: &CalibrateRequest, progress: &dyn Progre
     let options = term_options(&request.options.terms, request.options.largest_inflation, &start)?;
     let stations = optional(&root.join("stations.csv"), read_placed_stations)?.rows;
     let frames = process(&preparation(&survey, &start), &request.survey, request.calibration.as_deref(), progress)?;
-    let scene = Scene::new(&rows, &frames, &stations)?;
+    let known_drift = KnownDrift::new(start.calibration.as_ref(), &survey, &root, request.warm_up)?;
+    let scene = Scene::new(&rows, &frames, &stations, &known_drift)?;
+    start.set_drifts(scene.drifts.clone());
     progress.begin("estimate range terms", 1);
     let time = frames.views.first().and_then(|view| view.integration_time_s);
     let outcome = if scene.is_known() {
@@ -61,11 +65,18 @@ struct Scene<'a> {
     captures: Vec<PlaneCapture<'a>>,
     names: Vec<String>,
     planes: Vec<Option<Plane>>,
+    /// What was taken off each view.
+    drifts: Vec<ViewDrift>,
 }
 
 impl<'a> Scene<'a> {
-    fn new(rows: &PlacedRows<ObservedPlane>, frames: &'a Outcome, stations: &[Station]) -> Result<Self> {
-        let mut scene = Self { captures: Vec::new(), names: Vec::new(), planes: Vec::new() };
+    fn new(
+        rows: &PlacedRows<ObservedPlane>,
+        frames: &'a Outcome,
+        stations: &[Station],
+        known_drift: &KnownDrift<'_>,
+    ) -> Result<Self> {
+        let mut scene = Self { captures: Vec::new(), names: Vec::new(), planes: Vec::new(), drifts: Vec::new() };
         for (index, row) in rows.rows.iter().enumerate() {
             let view = frames.views.iter().find(|view| view.station == row.station).ok_or_else(|| {
                 rows.error(index, "station", format!("`{}` is no station of the survey's frames", row.station))
@@ -79,11 +90,15 @@ impl<'a> Scene<'a> {
                 return Err(rows.error(index, "station", reason).into());
             }
             let plane = scene.plane(rows, index)?;
+            let drift = known_drift.of_frames(&view.station, &view.frames)?;
+            let drift_m = drift.as_ref().map_or(0.0, |drift| drift.drift_m);
+            scene.drifts.extend(drift.filter(|drift| !scene.drifts.contains(drift)));
             scene.captures.push(PlaneCapture {
                 name: view.station.clone(),
                 frame,
                 world_from_camera: station.map(|station| station.world_from_camera),
                 covariance: station.and_then(pose_covariance),
+                drift_m,
                 plane,
             });
         }
@@ -189,13 +204,19 @@ fn samples_of(
     let differences = differences_to_plane(capture.frame, &start.camera, pose, plane, options)?;
     let format = start.camera.format;
     let [xp, yp] = start.camera.interior.principal_point_mm;
+    // The terms are functions of what was observed: the drift goes to the reference.
+    let drifted = |difference: RangeDifference| RangeDifference {
+        reference_range_m: difference.reference_range_m + capture.drift_m,
+        ..difference
+    };
     let sample = |difference: RangeDifference| Sample {
         station: capture.name.clone(),
         plane: name.to_owned(),
         pixel: format.pixel_from_image([difference.x_mm + xp, difference.y_mm + yp]),
+        drift_m: capture.drift_m,
         difference,
     };
-    Ok(differences.into_iter().map(sample).collect())
+    Ok(differences.into_iter().map(drifted).map(sample).collect())
 }
 
 /// The stages that bring the survey's frames to unwrapped, uncorrected ranges.

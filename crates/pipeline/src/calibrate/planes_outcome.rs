@@ -18,7 +18,10 @@ pub(super) struct Sample {
     pub(super) station: String,
     pub(super) plane: String,
     pub(super) pixel: [f64; 2],
+    /// Against the reference range with the known drift on it.
     pub(super) difference: RangeDifference,
+    /// That drift, metre.
+    pub(super) drift_m: f64,
 }
 
 /// An estimate with its samples.
@@ -184,7 +187,7 @@ fn quality(sample: Sample, residual: f64) -> ObservationQuality {
         pixel: sample.pixel,
         range_m: difference.observed_range_m,
         amplitude: difference.amplitude,
-        uncorrected_m: difference.observed_range_m - difference.reference_range_m,
+        uncorrected_m: difference.observed_range_m - difference.reference_range_m + sample.drift_m,
     }
 }
 

@@ -4,6 +4,8 @@ use std::path::PathBuf;
 
 use self_calibration::{CalibrationOptions, Method};
 
+use crate::drift::DriftTreatment;
+
 /// How a survey is calibrated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CalibrateMethod {
@@ -60,6 +62,8 @@ pub struct CalibrateRequest {
     pub method: CalibrateMethod,
     /// Terms, datum, stations without ranges, rejection.
     pub options: CalibrationOptions,
+    /// What is done about the drift of a warming camera that the start values know.
+    pub warm_up: DriftTreatment,
     /// What the tables leave open.
     pub defaults: TableDefaults,
     /// Output folder; written beside and renamed when everything is done.

@@ -15,6 +15,7 @@ use super::request::{CalibrateMethod, CalibrateRequest};
 use super::start::Start;
 use super::summary::CalibrationSummary;
 use super::{calibration_file, planes, tables};
+use crate::drift::DriftTreatment;
 use crate::progress::Progress;
 use crate::{Error, Result, report};
 
@@ -38,14 +39,14 @@ pub fn calibrate(request: &CalibrateRequest, progress: &dyn Progress) -> Result<
     match outcome {
         Err(source) if !is_refusal(&source) => Err(Error::Calibrate(source)),
         Ok(outcome) => {
-            let summary = finish(CalibrationSummary::new(survey, request.method, start.words.clone(), &outcome));
+            let summary = finish(CalibrationSummary::new(survey, request.method, &start, &outcome));
             write(&request.out, &start, &outcome, &summary, progress)?;
             progress.finish();
             Ok(summary)
         }
         Err(source) => {
             let reason = source.to_string();
-            let summary = finish(CalibrationSummary::refused(survey, request.method, start.words, reason));
+            let summary = finish(CalibrationSummary::refused(survey, request.method, &start, reason));
             let text = json(&summary)?;
             let folder = OutputFolder::create(&request.out)?;
             write_text(folder.file("summary.json")?, &text)?;
@@ -79,7 +80,7 @@ pub(super) type Attempt = (Start, std::result::Result<CalibrationOutcome, self_c
 
 fn calibrate_networks(request: &CalibrateRequest, method: Method, progress: &dyn Progress) -> Result<Attempt> {
     progress.begin("read survey", 1);
-    let files = read_network(&request.survey, request.calibration.as_deref(), &request.defaults)?;
+    let files = read_network(&request.survey, request.calibration.as_deref(), &request.defaults, request.warm_up)?;
     let options = CalibrationOptions { method, ..request.options.clone() };
     check_station_names(&files, &options)?;
     let outcome = if method == Method::TwoStepIndependent {
@@ -89,7 +90,7 @@ fn calibrate_networks(request: &CalibrateRequest, method: Method, progress: &dyn
                 .to_owned();
             return Err(Error::Survey { path: request.survey.clone(), message });
         };
-        let lens = read_network(folder, request.calibration.as_deref(), &request.defaults)?;
+        let lens = read_network(folder, request.calibration.as_deref(), &request.defaults, DriftTreatment::Leave)?;
         check(&lens, Method::TwoStepDependent, options.datum)?;
         progress.begin("adjust networks", 2);
         self_calibration::calibrate_two_networks(&lens.network, &files.network, &options)

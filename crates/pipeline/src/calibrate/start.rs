@@ -8,6 +8,8 @@ use range_image::Modulation;
 use range_io::calibration::Calibration;
 use range_io::survey::Survey;
 
+use super::drift;
+use crate::drift::ViewDrift;
 use crate::load::{calibrated, read_calibration};
 use crate::{Error, Result};
 
@@ -20,9 +22,19 @@ pub(crate) struct Start {
     /// The calibration that gave the values, in full: what is not estimated (noise, scattering) is handed on.
     pub(crate) calibration: Option<Calibration>,
     pub(crate) words: String,
+    /// What the ranges of each station had drifted by, where that is taken off.
+    pub(crate) drifts: Vec<ViewDrift>,
 }
 
 impl Start {
+    /// Keeps what was taken off, and says so.
+    pub(super) fn set_drifts(&mut self, drifts: Vec<ViewDrift>) {
+        if let Some(sentence) = drift::sentence(&drifts) {
+            self.words = format!("{}; {sentence}", self.words);
+        }
+        self.drifts = drifts;
+    }
+
     /// Start values of a survey; `named` wins over the `calibration.ron` beside it.
     pub(crate) fn read(survey: &Survey, root: &Path, named: Option<&Path>) -> Result<Self> {
         let modulation = only_modulation(survey, root)?;
@@ -37,7 +49,7 @@ impl Start {
             Some(calibration) => range_model_of(calibration, modulation)?,
             None => error_free(modulation),
         };
-        Ok(Self { camera, range_model, modulation, calibration, words })
+        Ok(Self { camera, range_model, modulation, calibration, words, drifts: Vec::new() })
     }
 }
 

@@ -11,7 +11,10 @@ use serde::ser::{SerializeMap, Serializer};
 
 use super::names::group_unit;
 use super::request::CalibrateMethod;
-use super::trends::{TrendSummary, trends};
+use super::start::Start;
+use super::trends::trends;
+use crate::drift::ViewDrift;
+use crate::trends::TrendSummary;
 
 /// Names and units of the parameters that a summary always has, in its order: those of camera and range terms.
 fn always_listed() -> impl Iterator<Item = (&'static str, &'static str)> {
@@ -30,6 +33,9 @@ pub struct CalibrationSummary {
     pub describe: &'static str,
     /// Where the start values came from.
     pub start: String,
+    /// What the ranges of each station had drifted by, where the drift of a warming camera was taken off.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub drifts: Vec<ViewDrift>,
     /// Observed values used.
     pub observations: usize,
     /// Unknowns.
@@ -220,12 +226,13 @@ pub struct DecisionSummary {
 
 impl CalibrationSummary {
     /// The figures of an outcome.
-    pub(crate) fn new(survey: String, method: CalibrateMethod, start: String, outcome: &CalibrationOutcome) -> Self {
+    pub(crate) fn new(survey: String, method: CalibrateMethod, start: &Start, outcome: &CalibrationOutcome) -> Self {
         Self {
             survey,
             method: method.name(),
             describe: method.describe(),
-            start,
+            start: start.words.clone(),
+            drifts: start.drifts.clone(),
             observations: outcome.observations,
             unknowns: outcome.unknowns,
             datum_defect: outcome.datum_defect,
@@ -251,12 +258,13 @@ impl CalibrationSummary {
     }
 
     /// What is left to say where a calibration was refused: why, and no parameter.
-    pub(crate) fn refused(survey: String, method: CalibrateMethod, start: String, reason: String) -> Self {
+    pub(crate) fn refused(survey: String, method: CalibrateMethod, start: &Start, reason: String) -> Self {
         Self {
             survey,
             method: method.name(),
             describe: method.describe(),
-            start,
+            start: start.words.clone(),
+            drifts: start.drifts.clone(),
             observations: 0,
             unknowns: 0,
             datum_defect: 0,

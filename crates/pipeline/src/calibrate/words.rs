@@ -3,7 +3,7 @@
 use std::fmt;
 
 use super::summary::CalibrationSummary;
-use super::trends::sentence;
+use crate::trends::{TrendSummary, sentence};
 
 /// Rejected observations that are named; the table has them all.
 const NAMED_REJECTIONS: usize = 8;
@@ -25,7 +25,11 @@ impl fmt::Display for CalibrationSummary {
         self.write_groups(f)?;
         self.write_parameters(f)?;
         self.write_rejected(f)?;
-        for sentence in self.diagnosis.iter().cloned().chain(sentence(&self.trends)) {
+        let trends = sentence(&self.trends).map(|sentence| match self.trends.iter().any(TrendSummary::is_trend) {
+            true => format!("{sentence}: the model lacks a term"),
+            false => sentence,
+        });
+        for sentence in self.diagnosis.iter().cloned().chain(trends) {
             writeln!(f, "note: {sentence}")?;
         }
         if self.converged {

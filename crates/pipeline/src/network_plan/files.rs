@@ -31,6 +31,7 @@ pub(super) fn read_plan(survey_path: &Path, calibration: Option<&Path>) -> Resul
                 world_from_camera: Some(row.world_from_camera),
                 covariance: pose_covariance(row),
                 integration_time_s: None,
+                drift_m: 0.0,
             })
             .collect(),
         targets: targets

@@ -278,6 +278,7 @@ impl SceneStation {
             world_from_camera: Some(Isometry3::from_parts(position.into(), turned.rotation)),
             covariance: None,
             integration_time_s: self.integration_time_s,
+            drift_m: 0.0,
         }
     }
 }

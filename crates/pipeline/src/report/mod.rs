@@ -18,6 +18,7 @@ mod scattering;
 mod sections;
 mod station_graph;
 mod tracking;
+mod trends;
 mod warm_up;
 
 pub(crate) use comparison::render_comparison;

@@ -8,6 +8,7 @@ use super::colour::{CATEGORIES, ColourMap, NO_VALUE};
 use super::correction_maps::correction_maps;
 use super::page::Page;
 use super::picture::{Scale, raster_figure, rgb_figure};
+use super::trends::remaining_errors;
 use crate::Result;
 use crate::outcome::Outcome;
 use crate::statistics::quantile;
@@ -28,6 +29,7 @@ pub(crate) fn render(outcome: &Outcome, summary: &Summary) -> Result<String> {
     figures_of_merit(&mut page, summary);
     stages(&mut page, summary);
     errors(&mut page, outcome);
+    remaining_errors(&mut page, &summary.remaining);
     registration(&mut page, outcome, summary)?;
     pictures(&mut page, outcome)?;
     flags(&mut page, outcome, summary);

@@ -35,6 +35,7 @@ impl Network {
                     return Err(Error::Datum { reason: format!("{} has a covariance but no pose", what()) });
                 }
             }
+            finite(what, "drift_m", [station.drift_m].iter())?;
             if let Some(time) = station.integration_time_s {
                 positive(what, "integration_time_s", time)?;
             }

@@ -184,7 +184,7 @@ impl Combined<'_, '_> {
         Ok(out)
     }
 
-    /// Correction of a sighting's range by the terms found; NaN where they have no value.
+    /// Correction of a sighting's range by the terms found and its known drift; NaN where they have no value.
     fn correction(&self, index: usize) -> f64 {
         let seen = &self.setup.network.sightings[index];
         let (Some(pixel), Some(range_m)) = (seen.pixel, seen.range_m) else { return f64::NAN };
@@ -193,6 +193,7 @@ impl Combined<'_, '_> {
         let [xp, yp] = camera.interior.principal_point_mm;
         let set = &self.step.sets[self.setup.set_of(seen.station)];
         set.model.correction(range_m, x - xp, y - yp, seen.amplitude.unwrap_or(f64::NAN)).total_m()
+            + self.setup.network.stations[seen.station].drift_m
     }
 
     /// Stations and targets in metres: where the ranges gave the scale, enlarged from the middle of the targets, with the

@@ -49,6 +49,7 @@ pub(crate) struct SightingEquation {
 pub(crate) struct RangeEquation {
     pub(crate) range_m: f64,
     pub(crate) amplitude: f64,
+    pub(crate) drift_m: f64,
     pub(crate) model: Arc<RangeErrorModel>,
     pub(crate) widths: Arc<[usize]>,
 }
@@ -90,6 +91,7 @@ impl SightingEquation {
             x_mm: x - parameters[2][0],
             y_mm: y - parameters[2][1],
             amplitude: range.amplitude,
+            drift_m: range.drift_m,
         };
         let distance = target.point.norm();
         let mut by_terms = vec![0.0; parameters[3].len()];
@@ -309,7 +311,7 @@ mod tests {
     fn derivatives_of_a_sighting() {
         let model = Arc::new(model());
         let widths = family_widths(&model).into();
-        let range = RangeEquation { range_m: 2.15, amplitude: 300.0, model, widths };
+        let range = RangeEquation { range_m: 2.15, amplitude: 300.0, drift_m: 0.02, model, widths };
         for (uses_pixel, range) in [(true, Some(range.clone())), (true, None), (false, Some(range))] {
             let blocks = if range.is_some() { blocks() } else { blocks()[..3].to_vec() };
             let ids = ids(blocks.len());

@@ -36,6 +36,8 @@ pub struct Station {
     pub covariance: Option<Matrix6<f64>>,
     /// Integration time; stations of different times have range terms of their own.
     pub integration_time_s: Option<f64>,
+    /// What its ranges are known to have drifted by (Sect. 4.7), metre: taken off as d0 is. Zero for a warm camera.
+    pub drift_m: f64,
 }
 
 /// One target.

@@ -283,8 +283,13 @@ impl<'o> Design<'o> {
             extended.sightings = planned_sightings(setup.network)?;
             let (station, integration_time_s) = (extended.stations.len(), network.stations[0].integration_time_s);
             let name = "candidate station".to_owned();
-            let pose = Some(world_from_camera);
-            extended.stations.push(Station { name, world_from_camera: pose, covariance: None, integration_time_s });
+            extended.stations.push(Station {
+                name,
+                world_from_camera: Some(world_from_camera),
+                covariance: None,
+                integration_time_s,
+                drift_m: 0.0,
+            });
             let mut alone = extended.clone();
             alone.sightings.clear();
             let seen: Vec<_> = planned_sightings(&alone)?.into_iter().filter(|seen| seen.station == station).collect();

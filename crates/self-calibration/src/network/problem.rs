@@ -175,6 +175,7 @@ impl Setup<'_> {
         let range = seen.range_m.filter(|_| uses_range).map(|range_m| RangeEquation {
             range_m,
             amplitude: seen.amplitude.unwrap_or(f64::NAN),
+            drift_m: self.network.stations[seen.station].drift_m,
             widths: family_widths(&model).into(),
             model,
         });

@@ -254,7 +254,8 @@ fn observed(setup: &Setup<'_>, index: usize) -> Option<Seen> {
     let [x, y] = camera.format.image_from_pixel(seen.pixel?);
     let [xp, yp] = camera.interior.principal_point_mm;
     let amplitude = seen.amplitude.unwrap_or(f64::NAN);
-    Some(Seen { range_m: seen.range_m?, x_mm: x - xp, y_mm: y - yp, amplitude })
+    let drift_m = setup.network.stations[seen.station].drift_m;
+    Some(Seen { range_m: seen.range_m?, x_mm: x - xp, y_mm: y - yp, amplitude, drift_m })
 }
 
 /// Rejects the worst range of each station and target.

@@ -202,7 +202,8 @@ impl Simulator<'_> {
         let amplitude = amplitude.or(planned.amplitude);
         let [xp, yp] = truth.camera.interior.principal_point_mm;
         let [x, y] = seen.image_mm;
-        let range_m = truth.range_model.observed_range(seen.range_m, x - xp, y - yp, amplitude.unwrap_or(f64::NAN))?;
+        let with_drift = seen.range_m + truth.stations[planned.station].drift_m;
+        let range_m = truth.range_model.observed_range(with_drift, x - xp, y - yp, amplitude.unwrap_or(f64::NAN))?;
         let exact = truth.camera.format.pixel_from_image(seen.image_mm);
         // The same random numbers are drawn whatever is kept, so that networks stay comparable.
         let gross = [self.gross(), self.gross()];

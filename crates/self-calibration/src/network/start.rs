@@ -5,7 +5,7 @@ use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 use orientation::{ResectionOptions, TargetObservation, resect};
 
 use super::problem::{Calibration, Start};
-use super::{Network, PassiveCamera};
+use super::{Network, PassiveCamera, Station};
 use crate::{Error, Result};
 
 /// Targets that orient a station.
@@ -53,14 +53,14 @@ impl<'n> Finder<'n> {
                 of_station[seen.station].push(index);
                 of_target[seen.target].push(index);
             }
-            let time = network.stations[seen.station].integration_time_s;
+            let Station { integration_time_s: time, drift_m, .. } = network.stations[seen.station];
             let set = calibration.sets.iter().find(|set| set.time == time);
             local.push(seen.pixel.zip(seen.range_m).map(|(pixel, range_m)| {
                 let [x, y] = calibration.camera.format.image_from_pixel(pixel);
                 let [xp, yp] = calibration.camera.interior.principal_point_mm;
                 let amplitude = seen.amplitude.unwrap_or(f64::NAN);
                 let corrected = set.map(|set| set.model.corrected_range(range_m, x - xp, y - yp, amplitude));
-                calibration.camera.point(pixel, corrected.unwrap_or(range_m))
+                calibration.camera.point(pixel, corrected.unwrap_or(range_m) - drift_m)
             }));
         }
         let stations = network.stations.iter().map(|station| station.world_from_camera).collect();

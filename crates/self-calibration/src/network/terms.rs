@@ -34,6 +34,8 @@ pub(crate) struct Seen {
     pub(crate) x_mm: f64,
     pub(crate) y_mm: f64,
     pub(crate) amplitude: f64,
+    /// A known drift that the range has in it beside the correction, metre.
+    pub(crate) drift_m: f64,
 }
 
 /// Value of a family of range terms and its derivatives with respect to range and image point.
@@ -173,7 +175,7 @@ pub(crate) fn modelled_range(
             return Err("the range terms are so large that the observed range no longer grows with the true one");
         }
         let growth = 1.0 / (1.0 - slope);
-        let step = (distance + part.value - seen.range_m) * growth;
+        let step = (distance + seen.drift_m + part.value - seen.range_m) * growth;
         seen.range_m += step;
         if step.abs() <= 1e-14 * (1.0 + seen.range_m.abs()) {
             for derivative in row {

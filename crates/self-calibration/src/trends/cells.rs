@@ -37,7 +37,9 @@ impl Cells {
         keys.sort_unstable();
         keys.dedup();
         let of_sample = all.iter().map(|key| keys.binary_search(key).unwrap_or(0)).collect();
-        Self { side, keys, of_sample }
+        // Cells as large as a frame are frames.
+        let several = keys.windows(2).any(|pair| pair[0][0] == pair[1][0]);
+        Self { side: side.filter(|_| several), keys, of_sample }
     }
 
     pub(super) fn count(&self) -> usize {

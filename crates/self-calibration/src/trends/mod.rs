@@ -139,6 +139,9 @@ impl TrendVariable {
 }
 
 impl TrendReport {
+    /// Why a variable is not tested where neighbours share errors and there are too few frames to average over these.
+    pub const TOO_FEW_CELLS: &'static str = "too few independent frames or cells";
+
     /// Variables on which the residuals depend significantly.
     pub fn trends(&self) -> impl Iterator<Item = &TrendTest> {
         self.tests.iter().filter(|test| test.verdict == TrendVerdict::Trend)
@@ -231,7 +234,7 @@ fn test_variable(samples: &[TrendSample], variable: TrendVariable, options: &Tre
                 return TrendTest { variable, bins, p_value, verdict: TrendVerdict::Random, rms_m, cell };
             }
             None if bins > wald::FEWEST_BINS => bins = (bins / 2).max(wald::FEWEST_BINS),
-            None => return not_tested("too few independent frames or cells"),
+            None => return not_tested(TrendReport::TOO_FEW_CELLS),
         }
     }
 }

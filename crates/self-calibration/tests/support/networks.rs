@@ -51,6 +51,7 @@ fn network(poses: Vec<Isometry3<f64>>, targets: Vec<NetworkTarget>) -> Network {
         world_from_camera: Some(pose),
         covariance: None,
         integration_time_s: None,
+        drift_m: 0.0,
     };
     Network {
         camera: camera(),

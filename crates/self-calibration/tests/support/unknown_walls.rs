@@ -72,6 +72,7 @@ pub fn captures<'a>(
         name: format!("S{index}"),
         frame,
         world_from_camera: pose(index),
+        drift_m: 0.0,
         covariance: covariance.copied(),
         plane: 0,
     };

@@ -10,7 +10,6 @@ mod point_uncertainty;
 mod range_error;
 mod residuals;
 mod tables;
-mod trends;
 
 pub(crate) use page::render_calibration;
 pub(crate) use plan_page::render_plan;

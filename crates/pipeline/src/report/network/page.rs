@@ -3,10 +3,11 @@
 use self_calibration::CalibrationOutcome;
 
 use super::point_uncertainty::{self, PointUncertainty};
-use super::{coverage, heat_map, image_residuals, map, range_error, residuals, tables, trends};
+use super::{coverage, heat_map, image_residuals, map, range_error, residuals, tables};
 use crate::Result;
 use crate::calibrate::CalibrationSummary;
 use crate::report::page::Page;
+use crate::report::trends::trends_of_calibration;
 
 /// The whole page.
 pub(crate) fn render_calibration(outcome: &CalibrationOutcome, summary: &CalibrationSummary) -> Result<String> {
@@ -25,7 +26,7 @@ pub(crate) fn render_calibration(outcome: &CalibrationOutcome, summary: &Calibra
     uncertainty(&mut page, outcome)?;
     correlations(&mut page, &summary.correlation.names, &summary.correlation.matrix);
     residual_figures(&mut page, outcome);
-    trends::trends(&mut page, &summary.trends);
+    trends_of_calibration(&mut page, &summary.trends);
     network(&mut page, outcome);
     tables::groups(&mut page, summary);
     tables::rejected(&mut page, summary);

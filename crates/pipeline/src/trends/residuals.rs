@@ -1,0 +1,176 @@
+//! The residuals of a run: against the truth where the survey was simulated, and else of the planes that frames show.
+
+use camera_model::Camera;
+use range_image::{Flags, RangeFrame};
+use rayon::prelude::*;
+use self_calibration::{
+    DifferenceOptions, FittedPixel, PrimitiveKind, PrimitiveOptions, TrendOptions, TrendSample, fit_primitive,
+    test_trends,
+};
+
+use super::{RemainingErrors, TrendSummary, sentence};
+use crate::outcome::Outcome;
+use crate::statistics::{median, robust_standard_deviation};
+use crate::truth::range_errors;
+use crate::view::{View, ViewData};
+
+/// Pixels of all frames together that are looked at, about: more would tell smaller trends than anybody minds.
+const MOST_PIXELS: usize = 20_000;
+
+/// Errors beyond so many robust standard deviations are gross: wrong intervals, edges without a flag. They say nothing
+/// of the terms of a correction.
+const GROSS: f64 = 6.0;
+
+/// Largest root mean square of a plane's residuals, in parts of its range. What the chapter's errors leave on a wall,
+/// even uncorrected, is below; a corner that passes for a plane is above 5 %.
+const FLATNESS: f64 = 0.03;
+
+/// Weight of ranges whose standard deviation nobody states, metre: all the same.
+const UNKNOWN_SIGMA_M: f64 = 0.01;
+
+/// Tests what the last stage leaves.
+pub(crate) fn remaining(outcome: &Outcome) -> RemainingErrors {
+    let pixels: usize = outcome.views.iter().filter_map(range_frame).map(|frame| frame.range.as_slice().len()).sum();
+    if pixels == 0 {
+        return none("The frames were not brought to ranges: there are no residuals to test for trends.".to_owned());
+    }
+    let step = ((pixels as f64 / MOST_PIXELS as f64).sqrt().ceil() as usize).max(1);
+    let shares = shares(&outcome.views);
+    let views = outcome.views.par_iter().zip(&shares);
+    if outcome.views.iter().any(|view| view.truth.is_some()) {
+        let found: Vec<_> = views.map(|(view, share)| against_truth(outcome, *share, view, step)).collect();
+        let words = "Measured minus true ranges of unflagged pixels.".to_owned();
+        return tested("truth", words, found.into_iter().flatten().collect());
+    }
+    let found: Vec<_> = views.map(|(view, share)| planes(outcome, *share, view, step)).collect();
+    let shown = found.iter().filter(|samples| !samples.is_empty()).count();
+    if shown == 0 {
+        return none(
+            "The truth is not known and no frame, nor a quarter of one, shows a flat surface on most of its pixels: \
+             there are no residuals to test for trends."
+                .to_owned(),
+        );
+    }
+    let words = format!(
+        "The truth is not known: residuals of planes, fitted to {shown} of {} frames or to quarters of them. What a \
+         plane takes up (an offset, a tilt, a drift of whole frames) does not show, and unevenness of a wall counts.",
+        found.len()
+    );
+    tested("planes", words, found.into_iter().flatten().collect())
+}
+
+/// For each view what it may share errors with: views of its station, which see the same scene, and where there is one
+/// station itself alone.
+fn shares(views: &[View]) -> Vec<usize> {
+    let several = views.iter().any(|view| view.station != views[0].station);
+    let first = |view: &View| views.iter().position(|other| other.station == view.station).unwrap_or(0);
+    views.iter().enumerate().map(|(index, view)| if several { first(view) } else { index }).collect()
+}
+
+fn none(basis_words: String) -> RemainingErrors {
+    RemainingErrors { basis: "none", basis_words, ..RemainingErrors::default() }
+}
+
+fn tested(basis: &'static str, basis_words: String, mut samples: Vec<TrendSample>) -> RemainingErrors {
+    let all = samples.len();
+    leave_out_gross(&mut samples);
+    let (pixels, gross_errors) = (samples.len(), all - samples.len());
+    // Too few samples for any bins is the only thing that may be refused of these.
+    let report = test_trends(&samples, &TrendOptions::default());
+    let variables: Vec<TrendSummary> =
+        report.map_or_else(|_| Vec::new(), |report| report.tests.iter().map(TrendSummary::new).collect());
+    let verdict = sentence(&variables).unwrap_or_else(|| match variables.is_empty() {
+        true => format!("{pixels} residuals are too few to test for trends"),
+        false => "pixels of a frame share errors, and there are too few frames to tell what they depend on".to_owned(),
+    });
+    RemainingErrors { basis, basis_words, verdict, pixels, gross_errors, variables }
+}
+
+fn leave_out_gross(samples: &mut Vec<TrendSample>) {
+    let mut standardised: Vec<f64> = samples.iter().map(|sample| sample.residual_m / sample.sigma_m).collect();
+    let scale = robust_standard_deviation(&standardised);
+    let middle = median(&mut standardised);
+    samples.retain(|sample| (sample.residual_m / sample.sigma_m - middle).abs() <= GROSS * scale);
+}
+
+fn range_frame(view: &View) -> Option<&RangeFrame> {
+    match &view.data {
+        ViewData::Range(frame) => Some(frame),
+        _ => None,
+    }
+}
+
+/// Mean time of the frames of a view; NaN where the survey does not state all.
+fn time_of(outcome: &Outcome, view: &View) -> f64 {
+    let time = |frame: &usize| outcome.survey.frames.get(*frame).and_then(|entry| entry.timestamp_s);
+    let times: Option<Vec<f64>> = view.frames.iter().map(time).collect();
+    times.map_or(f64::NAN, |times| times.iter().sum::<f64>() / times.len() as f64)
+}
+
+/// Errors are set against the true range: the observed one has their noise in it, and would show a trend by itself.
+fn against_truth(outcome: &Outcome, share: usize, view: &View, step: usize) -> Vec<TrendSample> {
+    let (Some(errors), Some(frame)) = (range_errors(view), range_frame(view)) else { return Vec::new() };
+    let time_s = time_of(outcome, view);
+    let sample = |[col, row]: [usize; 2]| {
+        let residual_m = errors[row * frame.width() + col];
+        let sigma_m = f64::from(frame.sigma[(col, row)]);
+        let known = sigma_m > 0.0 && sigma_m.is_finite();
+        let usable = frame.flags[(col, row)].is_empty() && residual_m.is_finite();
+        usable.then(|| TrendSample {
+            residual_m,
+            sigma_m: if known { sigma_m } else { UNKNOWN_SIGMA_M },
+            range_m: f64::from(frame.range[(col, row)]) - residual_m,
+            amplitude: f64::from(frame.amplitude[(col, row)]),
+            column: col as f64,
+            row: row as f64,
+            time_s,
+            frame: share,
+        })
+    };
+    let columns = || (0..frame.width()).step_by(step);
+    let positions = (0..frame.height()).step_by(step).flat_map(|row| columns().map(move |col| [col, row]));
+    positions.filter_map(sample).collect()
+}
+
+/// Residuals of the plane that a frame shows, or of those that its quarters show.
+fn planes(outcome: &Outcome, share: usize, view: &View, step: usize) -> Vec<TrendSample> {
+    let Some(frame) = range_frame(view) else { return Vec::new() };
+    let [right, below] = [frame.width() - 1, frame.height() - 1];
+    let whole = plane(frame, &outcome.camera, [[0, right], [0, below]], step);
+    let pixels = whole.unwrap_or_else(|| {
+        let halves = |last: usize| [[0, last / 2], [last / 2 + 1, last]];
+        let quarters = halves(below).map(|rows| halves(right).map(|columns| [columns, rows]));
+        quarters.into_iter().flatten().filter_map(|part| plane(frame, &outcome.camera, part, step)).flatten().collect()
+    });
+    let time_s = time_of(outcome, view);
+    let sample = |pixel: FittedPixel| TrendSample {
+        residual_m: pixel.observed_m - pixel.modelled_m,
+        sigma_m: pixel.sigma_m,
+        range_m: pixel.modelled_m,
+        amplitude: f64::from(frame.amplitude[(pixel.position[0], pixel.position[1])]),
+        column: pixel.position[0] as f64,
+        row: pixel.position[1] as f64,
+        time_s,
+        frame: share,
+    };
+    pixels.into_iter().map(sample).collect()
+}
+
+/// The pixels of a window that lie in one plane; `None` where most do not.
+fn plane(frame: &RangeFrame, camera: &Camera, window: [[usize; 2]; 2], step: usize) -> Option<Vec<FittedPixel>> {
+    let standard = PrimitiveOptions::default();
+    let pixels = DifferenceOptions {
+        exclude: Flags::all(),
+        step,
+        window: Some(window),
+        unknown_sigma_m: UNKNOWN_SIGMA_M,
+        ..standard.pixels
+    };
+    // What neighbours share is what is looked for, and not a reason to refuse the wall.
+    let options = PrimitiveOptions { pixels, largest_systematic_sigmas: f64::MAX, ..standard };
+    let fit = fit_primitive(frame, camera, PrimitiveKind::Plane, &options).ok()?;
+    let used: Vec<FittedPixel> = fit.pixels.into_iter().filter(|pixel| pixel.used).collect();
+    let mean_square = |of: fn(&FittedPixel) -> f64| used.iter().map(|pixel| of(pixel).powi(2)).sum::<f64>();
+    let rms = (mean_square(|pixel| pixel.observed_m - pixel.modelled_m) / mean_square(|pixel| pixel.modelled_m)).sqrt();
+    (rms < FLATNESS).then_some(used)
+}

@@ -36,7 +36,7 @@ mod work;
 
 pub use calibrate::{
     CalibrateMethod, CalibrateRequest, CalibrationSummary, CorrelationSummary, DecisionSummary, GroupSummary,
-    ParameterMap, ParameterSummary, RejectedObservation, TableDefaults, calibrate,
+    OffsetModel, OffsetTableSummary, ParameterMap, ParameterSummary, RejectedObservation, TableDefaults, calibrate,
 };
 pub use compare::{
     AbsoluteSummary, CloudAlignment, CloudComparison, CompareAlignment, CompareRequest, Comparison, DistanceHistogram,
@@ -46,7 +46,7 @@ pub use compare::{
 pub use correction_record::CorrectionRecord;
 pub use diff::{
     CalibrationDifference, CorrectionLine, DiffRequest, DriftLine, DriftPlace, ImageLine, JointLine, ParameterLine,
-    PlaceLine, diff,
+    PatternLine, PlaceLine, diff,
 };
 pub use drift::{DriftError, DriftSource, DriftTreatment, ViewDrift};
 pub use error::{Error, Result};

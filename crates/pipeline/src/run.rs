@@ -8,7 +8,7 @@ use range_io::calibration::Calibration;
 use range_io::survey::Survey;
 use self_calibration::{CalibrationOptions, TermSelection};
 
-use crate::calibrate::{CalibrateMethod, CalibrateRequest, TableDefaults, calibrate};
+use crate::calibrate::{CalibrateMethod, CalibrateRequest, OffsetModel, TableDefaults, calibrate};
 use crate::drift::DriftTreatment;
 use crate::load::{load, read_calibration, root_of};
 use crate::network_scene::simulate_network;
@@ -97,6 +97,7 @@ fn estimate_calibration(
             calibration: Some(start),
             method: CalibrateMethod::Network(options.method),
             options,
+            offset: OffsetModel::Constant,
             // A network of the warm camera.
             warm_up: DriftTreatment::Leave,
             defaults: TableDefaults::default(),

@@ -41,9 +41,14 @@ fn write_survey(folder: &Path) {
 
 /// The same by a camera that drifts with the time since power-on; a frame every five minutes.
 pub(crate) fn write_drifting_survey(folder: &Path, drift_m: impl Fn(f64) -> f64) {
+    write_survey_with(folder, drift_m, |_| 0.0);
+}
+
+/// The same with an offset of each pixel, by column and row.
+pub(crate) fn write_survey_with(folder: &Path, drift_m: impl Fn(f64) -> f64, offset_m: impl Fn([usize; 2]) -> f64) {
     std::fs::create_dir_all(folder.join("frames")).unwrap();
     let (camera, model) = (camera(), truth());
-    let (mut frames, mut stations, mut planes) = (String::new(), Vec::new(), Vec::new());
+    let (mut frames, mut stations, mut planes) = (Vec::new(), Vec::new(), Vec::new());
     for index in 0..7_u32 {
         let distance = 1.0 + f64::from(index);
         let pose = pose_from_euler(Vector3::new(0.1, -0.2, distance), [0.05, -0.08 + 0.02 * f64::from(index), 0.3]);
@@ -56,6 +61,7 @@ pub(crate) fn write_drifting_survey(folder: &Path, drift_m: impl Fn(f64) -> f64)
                 let [x, y] = camera.format.image_from_pixel([(pixel % 88) as f64, (pixel / 88) as f64]);
                 // A sine of a large argument stands for noise: its deviation is its amplitude over the root of two.
                 let noise = 0.003 * 2.0_f64.sqrt() * (1234.5 * pixel as f64 + 77.7 * f64::from(index)).sin();
+                let noise = noise + offset_m([pixel % 88, pixel / 88]);
                 (model.observed_range(*true_range + drift_m(time_s), x, y, f64::NAN).unwrap() + noise) as f32
             })
             .collect();
@@ -63,7 +69,7 @@ pub(crate) fn write_drifting_survey(folder: &Path, drift_m: impl Fn(f64) -> f64)
         writer.add("range", &[72, 88], &ranges).unwrap();
         writer.commit().unwrap();
         let station = format!("S{index}");
-        frames.push_str(&format!(
+        frames.push(format!(
             "(file: \"frames/{index}.npz\", station: \"{station}\", integration_time_s: 0.002, timestamp_s: {time_s:.1}),"
         ));
         planes.push(ObservedPlane {
@@ -73,13 +79,13 @@ pub(crate) fn write_drifting_survey(folder: &Path, drift_m: impl Fn(f64) -> f64)
         });
         stations.push(Station { station, world_from_camera: pose, sigma_position_m: None, sigma_attitude_rad: None });
     }
-    std::fs::write(folder.join("survey.ron"), SURVEY.replace("FRAMES", &frames)).unwrap();
+    std::fs::write(folder.join("survey.ron"), SURVEY.replace("FRAMES", &frames.concat())).unwrap();
     write_stations(folder.join("stations.csv"), &stations).unwrap();
     write_planes(folder.join("planes.csv"), &planes).unwrap();
 }
 
 /// True ranges to the plane z = 0, row by row.
-fn ranges_to_wall(camera: &Camera, pose: &nalgebra::Isometry3<f64>) -> Vec<f64> {
+pub(crate) fn ranges_to_wall(camera: &Camera, pose: &nalgebra::Isometry3<f64>) -> Vec<f64> {
     let pixels = (0..88 * 72).map(|pixel| [f64::from(pixel % 88), f64::from(pixel / 88)]);
     pixels.map(|pixel| -pose.translation.z / (pose.rotation * camera.ray(pixel)).z).collect()
 }

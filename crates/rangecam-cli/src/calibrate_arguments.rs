@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use pipeline::{
-    CalibrateMethod, CalibrateRequest, CalibrationOptions, DriftTreatment, Method, NetworkDatum, TableDefaults,
-    TermSelection,
+    CalibrateMethod, CalibrateRequest, CalibrationOptions, DriftTreatment, Method, NetworkDatum, OffsetModel,
+    TableDefaults, TermSelection,
 };
 
 /// Arguments of a calibration.
@@ -47,6 +47,11 @@ pub(crate) struct CalibrateArguments {
     /// Largest growth of a standard deviation by correlations before the network is refused as too weak.
     #[arg(long, value_name = "FACTOR")]
     largest_inflation: Option<f64>,
+    /// How the offset d0 is modelled from planes: `constant`; `table`, a look-up table beside it with an offset for each
+    /// pixel (table4: for blocks of 4 x 4 pixels), written if it takes off more than its noise adds; `surface`, a
+    /// polynomial over the image of order 4 (surface2: of order 2) instead of e1 and e2.
+    #[arg(long, default_value = "constant", value_name = "constant|tableN|surfaceN", value_parser = offset)]
+    offset: OffsetModel,
     /// The drift of a warming camera that the start values know: taken off the ranges by the times of the frames, or
     /// left in them, as the camera was warm.
     #[arg(long, value_enum, default_value_t = WarmUpName::Apply)]
@@ -122,6 +127,22 @@ fn level(text: &str) -> Result<Level, String> {
     }
 }
 
+/// Light falls off and errors grow towards the corners: what that looks like takes an order of four.
+const SURFACE_ORDER: usize = 4;
+
+fn offset(text: &str) -> Result<OffsetModel, String> {
+    let number = |digits: &str, default: usize| if digits.is_empty() { Some(default) } else { digits.parse().ok() };
+    let block = text.strip_prefix("table").and_then(|digits| number(digits, 1)).filter(|block| *block > 0);
+    let order = text.strip_prefix("surface").and_then(|digits| number(digits, SURFACE_ORDER));
+    match (text, block, order.filter(|order| (1..=6).contains(order))) {
+        ("constant", ..) => Ok(OffsetModel::Constant),
+        (_, Some(block), _) => Ok(OffsetModel::Table { block }),
+        (_, _, Some(order)) => Ok(OffsetModel::Surface { order }),
+        _ => Err("expected `constant`, `table` or `table4` (side of a block), `surface` or `surface2` (order 1 to 6)"
+            .to_owned()),
+    }
+}
+
 pub(crate) fn positive(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(value) if value > 0.0 && value.is_finite() => Ok(value),
@@ -157,6 +178,7 @@ impl CalibrateArguments {
             calibration: self.calibration,
             method,
             options,
+            offset: self.offset,
             warm_up: match self.warm_up {
                 WarmUpName::Apply => DriftTreatment::Apply,
                 WarmUpName::Leave => DriftTreatment::Leave,
@@ -181,4 +203,21 @@ pub(crate) fn default_out(survey: &Path, ending: &str) -> PathBuf {
     let mut name = survey.file_name().unwrap_or_default().to_owned();
     name.push(ending);
     Path::new("out").join(name)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn models_of_the_offset_are_read_and_others_refused() {
+        assert_eq!(offset("constant"), Ok(OffsetModel::Constant));
+        assert_eq!(offset("table"), Ok(OffsetModel::Table { block: 1 }));
+        assert_eq!(offset("table8"), Ok(OffsetModel::Table { block: 8 }));
+        assert_eq!(offset("surface"), Ok(OffsetModel::Surface { order: 4 }));
+        assert_eq!(offset("surface2"), Ok(OffsetModel::Surface { order: 2 }));
+        for wrong in ["table0", "surface7", "surface0", "tables", "spline", ""] {
+            assert!(offset(wrong).is_err(), "{wrong}");
+        }
+    }
 }

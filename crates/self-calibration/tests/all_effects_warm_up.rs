@@ -20,8 +20,8 @@ fn warm_up() -> WarmUp {
 }
 
 /// A frame a minute, from two minutes after power-on on.
-fn time_s(index: usize) -> Option<f64> {
-    Some(120.0 + 60.0 * (index / PIXELS) as f64)
+fn time_s(index: usize) -> f64 {
+    120.0 + 60.0 * (index / PIXELS) as f64
 }
 
 /// The observed ranges of all passes, with the drift of the camera in them.
@@ -29,7 +29,7 @@ fn warming(truth: &RangeErrorModel, seed: u64) -> Vec<RangeDifference> {
     let passes = (0..PASSES).flat_map(|pass| differences(truth, Wall::Patches, PASSES * seed + pass));
     let drifted = |(index, d): (usize, RangeDifference)| {
         let shown = |range_m| truth.observed_range(range_m, d.x_mm, d.y_mm, d.amplitude).unwrap();
-        let with_drift = d.reference_range_m + warm_up().value(time_s(index), None).unwrap();
+        let with_drift = d.reference_range_m + warm_up().value(Some(time_s(index)), None).unwrap();
         let observed_range_m = d.observed_range_m + shown(with_drift) - shown(d.reference_range_m);
         RangeDifference { observed_range_m, ..d }
     };
@@ -39,7 +39,7 @@ fn warming(truth: &RangeErrorModel, seed: u64) -> Vec<RangeDifference> {
 /// The drift is taken off as the terms are: at the observed range. So it stands beside the reference.
 fn without_drift(differences: &[RangeDifference], drift: &WarmUp) -> Vec<RangeDifference> {
     let moved = |(index, d): (usize, &RangeDifference)| {
-        let reference_range_m = d.reference_range_m + drift.value(time_s(index), None).unwrap();
+        let reference_range_m = d.reference_range_m + drift.value(Some(time_s(index)), None).unwrap();
         RangeDifference { reference_range_m, ..*d }
     };
     differences.iter().enumerate().map(moved).collect()

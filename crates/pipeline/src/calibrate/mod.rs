@@ -7,7 +7,9 @@ mod drift;
 mod names;
 mod network_check;
 mod network_files;
+mod offset;
 mod passive;
+mod placed;
 mod planes;
 mod planes_outcome;
 mod request;
@@ -18,6 +20,7 @@ mod tables;
 mod trends;
 mod words;
 
+pub use offset::{OffsetModel, OffsetTableSummary};
 pub use request::{CalibrateMethod, CalibrateRequest, TableDefaults};
 pub use run::calibrate;
 pub use summary::{
@@ -27,6 +30,7 @@ pub use summary::{
 
 pub(crate) use control::pose_covariance;
 pub(crate) use distances::named_distances;
+pub(crate) use offset::FoundTable;
 pub(crate) use run::{is_refusal, json};
 pub(crate) use start::Start;
 pub(crate) use words::readable;

@@ -1,20 +1,21 @@
 //! Range terms from frames of planes, known or not.
 
-use error_models::RangeTerms;
+use error_models::{RangeTerms, SurfaceShape};
 use nalgebra::{Isometry3, Point3, Vector3};
-use range_image::Modulation;
 use range_io::survey::{Level, Survey};
 use range_io::tables::{ObservedPlane, PlacedRows, Station, read_placed_planes, read_placed_stations};
 use self_calibration::Error as Cause;
 use self_calibration::{
     DifferenceOptions, Plane, PlaneCalibrationOptions, PlaneCapture, RangeDifference, RangeTermOptions, TermSelection,
-    TermUse, differences_to_plane, estimate_range_terms,
+    TermUse, estimate_range_terms,
 };
 
 use super::control::pose_covariance;
 use super::drift::KnownDrift;
 use super::network_files::optional;
-use super::planes_outcome::{Found, Sample};
+use super::offset::{FoundTable, OffsetModel};
+use super::placed::Placed;
+use super::planes_outcome::Found;
 use super::request::CalibrateRequest;
 use super::run::Attempt;
 use super::start::Start;
@@ -42,7 +43,7 @@ pub(super) fn calibrate_planes(request: &CalibrateRequest, progress: &dyn Progre
         let message = "has no rows, expected the planes that the stations see".to_owned();
         return Err(Error::Survey { path: rows.file().to_owned(), message });
     }
-    let options = term_options(&request.options.terms, request.options.largest_inflation, &start)?;
+    let options = term_options(request, &start)?;
     let stations = optional(&root.join("stations.csv"), read_placed_stations)?.rows;
     let frames = process(&preparation(&survey, &start), &request.survey, request.calibration.as_deref(), progress)?;
     let known_drift = KnownDrift::new(start.calibration.as_ref(), &survey, &root, request.warm_up)?;
@@ -50,12 +51,20 @@ pub(super) fn calibrate_planes(request: &CalibrateRequest, progress: &dyn Progre
     start.set_drifts(scene.drifts.clone());
     progress.begin("estimate range terms", 1);
     let time = frames.views.first().and_then(|view| view.integration_time_s);
-    let outcome = if scene.is_known() {
-        known(&rows, &scene, &start, &options, survey.level)?.map(|found| found.outcome(&start, time))
+    let rewraps = scene.is_known() && survey.level <= Level::Phase;
+    let found = if scene.is_known() {
+        known(&rows, &scene, &start, &options, rewraps)?
     } else {
         let rejection = request.options.rejection_level.and(PlaneCalibrationOptions::default().rejection);
-        unknown(&scene, &start, &options, rejection).map(|found| found.outcome(&start, time))
+        unknown(&scene, &start, &options, rejection)
     };
+    let outcome = found.and_then(|(found, placed)| {
+        let table = match request.offset {
+            OffsetModel::Table { block } => Some(FoundTable::new(&placed, found.model(), &start, rewraps, block)?),
+            OffsetModel::Constant | OffsetModel::Surface { .. } => None,
+        };
+        Ok((found.outcome(&start, time), table))
+    });
     progress.advance(1);
     Ok((start, outcome))
 }
@@ -142,81 +151,56 @@ fn plane_of((normal, d): ([f64; 3], f64)) -> self_calibration::Result<Plane> {
     Plane::new(&normal, &Point3::from(normal * (d / normal.norm_squared())))
 }
 
+/// What was found, and with which planes and poses.
+type FoundWith<'a> = self_calibration::Result<(Found, Vec<Placed<'a>>)>;
+
 /// Range terms from differences to known planes.
-fn known(
+fn known<'a>(
     rows: &PlacedRows<ObservedPlane>,
-    scene: &Scene<'_>,
+    scene: &'a Scene<'_>,
     start: &Start,
     options: &RangeTermOptions,
-    level: Level,
-) -> Result<self_calibration::Result<Found>> {
-    let mut samples = Vec::new();
+    rewraps: bool,
+) -> Result<FoundWith<'a>> {
+    let (mut samples, mut all) = (Vec::new(), Vec::new());
     for (index, capture) in scene.captures.iter().enumerate() {
-        let (Some(plane), Some(pose)) = (&scene.planes[capture.plane], &capture.world_from_camera) else { continue };
-        let mut more = samples_of(capture, &scene.names[capture.plane], plane, pose, start, &scene.pixels())
-            .map_err(Error::stage("planes", &capture.name))?;
-        if level <= Level::Phase {
-            for sample in &mut more {
-                rewrap(&mut sample.difference, start.modulation);
-            }
-        }
+        let (Some(plane), Some(pose)) = (scene.planes[capture.plane], capture.world_from_camera) else { continue };
+        let placed = Placed { capture, name: scene.names[capture.plane].clone(), plane, pose };
+        let more = placed.samples(start, scene.pixels().step, rewraps);
+        let more = more.map_err(Error::stage("planes", &capture.name))?;
         if more.is_empty() {
             let reason = format!("no usable pixel of station `{}` sees the plane", capture.name);
             return Err(rows.error(index, "plane", reason).into());
         }
         samples.extend(more);
+        all.push(placed);
     }
     let differences: Vec<RangeDifference> = samples.iter().map(|sample| sample.difference).collect();
     let estimate = estimate_range_terms(&differences, start.range_model.ambiguity_interval_m, options);
-    Ok(estimate.and_then(|estimate| Found::of_differences(samples, &estimate)))
+    Ok(estimate.and_then(|estimate| Ok((Found::of_differences(samples, &estimate)?, all))))
 }
 
 /// Range terms together with planes that are not known, or poses that are known within their standard deviations.
-fn unknown(
-    scene: &Scene<'_>,
+fn unknown<'a>(
+    scene: &'a Scene<'_>,
     start: &Start,
     options: &RangeTermOptions,
     rejection: Option<f64>,
-) -> self_calibration::Result<Found> {
+) -> FoundWith<'a> {
     let pixels = scene.pixels();
     let options = PlaneCalibrationOptions { terms: *options, pixels, rejection };
     let interval = start.range_model.ambiguity_interval_m;
     let estimate =
         self_calibration::calibrate_planes(&scene.captures, &scene.planes, &start.camera, interval, &options)?;
-    let mut samples = Vec::new();
+    let (mut samples, mut all) = (Vec::new(), Vec::new());
     for (capture, quality) in scene.captures.iter().zip(estimate.captures()) {
         let adjusted = &estimate.planes()[quality.plane];
         let pose = quality.world_from_camera.unwrap_or_else(Isometry3::identity);
-        samples.extend(samples_of(capture, &adjusted.name, &adjusted.plane, &pose, start, &pixels)?);
+        let placed = Placed { capture, name: adjusted.name.clone(), plane: adjusted.plane, pose };
+        samples.extend(placed.samples(start, pixels.step, false)?);
+        all.push(placed);
     }
-    Found::of_planes(samples, &estimate, rejection)
-}
-
-/// The differences of one capture to a plane, with their pixels.
-fn samples_of(
-    capture: &PlaneCapture<'_>,
-    name: &str,
-    plane: &Plane,
-    pose: &Isometry3<f64>,
-    start: &Start,
-    options: &DifferenceOptions,
-) -> self_calibration::Result<Vec<Sample>> {
-    let differences = differences_to_plane(capture.frame, &start.camera, pose, plane, options)?;
-    let format = start.camera.format;
-    let [xp, yp] = start.camera.interior.principal_point_mm;
-    // The terms are functions of what was observed: the drift goes to the reference.
-    let drifted = |difference: RangeDifference| RangeDifference {
-        reference_range_m: difference.reference_range_m + capture.drift_m,
-        ..difference
-    };
-    let sample = |difference: RangeDifference| Sample {
-        station: capture.name.clone(),
-        plane: name.to_owned(),
-        pixel: format.pixel_from_image([difference.x_mm + xp, difference.y_mm + yp]),
-        drift_m: capture.drift_m,
-        difference,
-    };
-    Ok(differences.into_iter().map(drifted).map(sample).collect())
+    Ok((Found::of_planes(samples, &estimate, rejection)?, all))
 }
 
 /// The stages that bring the survey's frames to unwrapped, uncorrected ranges.
@@ -235,11 +219,28 @@ fn preparation(survey: &Survey, start: &Start) -> Plan {
     Plan { name: "planes".to_owned(), source: None, calibrate: None, stages }
 }
 
-/// The named terms are estimated, all others held at the start values.
-fn term_options(terms: &TermSelection, largest_inflation: f64, start: &Start) -> Result<RangeTermOptions> {
+/// The named terms are estimated, all others held at the start values. A surface stands instead of e1 and e2.
+fn term_options(request: &CalibrateRequest, start: &Start) -> Result<RangeTermOptions> {
+    let largest_inflation = request.options.largest_inflation;
     let mut options = RangeTermOptions { largest_inflation, ..RangeTermOptions::default() };
-    let TermSelection::List(names) = terms else { return Ok(options) };
+    let surface = if let OffsetModel::Surface { order } = request.offset {
+        let principal_point_mm = start.camera.interior.principal_point_mm;
+        options = options.with_surface(SurfaceShape::over_image(order, &start.camera.format, principal_point_mm));
+        Some(format!("surface{order}"))
+    } else {
+        None
+    };
+    let TermSelection::List(names) = &request.options.terms else { return Ok(options) };
     options = options.hold_terms(&start.range_model.terms);
+    if let Some(surface) = surface {
+        if let Some(name) = names.iter().find(|name| ["e1", "e2"].contains(&name.as_str())) {
+            let reason = "a surface over the image has their plane in it";
+            let (first, second) = (name.clone(), surface);
+            return Err(Error::Calibrate(Cause::ConflictingTerms { first, second, reason }));
+        }
+        let [.., e1, e2] = &mut options.terms;
+        (*e1, *e2) = (TermUse::Estimate, TermUse::Estimate);
+    }
     for name in names {
         let Some(index) = RangeTerms::NAMES.iter().position(|known| known == name) else {
             if ["h1", "h2", "h3"].contains(&name.as_str()) {
@@ -254,11 +255,4 @@ fn term_options(terms: &TermSelection, largest_inflation: f64, start: &Start) ->
         options.terms[index] = TermUse::Estimate;
     }
     Ok(options)
-}
-
-/// The reference tells the number of whole intervals better than the phases could.
-fn rewrap(difference: &mut RangeDifference, modulation: Modulation) {
-    let interval = modulation.ambiguity_interval_m();
-    let intervals = ((difference.reference_range_m - difference.observed_range_m) / interval).round();
-    difference.observed_range_m += intervals * interval;
 }

@@ -1,6 +1,6 @@
 //! What planes gave, in the form of a network's outcome.
 
-use error_models::{AmplitudeHyperbola, ModelSet, NamedParameter, ParameterStatus, RangeErrorModel, RangeTerms};
+use error_models::{AmplitudeHyperbola, ModelSet, NamedParameter, ParameterStatus, RangeErrorModel};
 use nalgebra::{DMatrix, DVector};
 use range_io::calibration::Calibration;
 use self_calibration::{
@@ -48,7 +48,7 @@ impl Found {
         let mut residuals = Vec::with_capacity(samples.len());
         for (sample, residual) in samples.into_iter().zip(estimate.residuals_m()) {
             vtpv += (residual / sample.difference.sigma_m).powi(2);
-            let row = design_row(estimate, &sample.difference);
+            let row = design_row(estimate, &sample.difference)?;
             // The redundancy number is 1 - a Q aᵀ / σ² with the design row a.
             let redundancy = 1.0 - row.dot(&(&covariance * &row)) / sample.difference.sigma_m.powi(2);
             let mut quality = quality(sample, *residual);
@@ -108,6 +108,11 @@ impl Found {
             sigma0: Some(sigma0),
             diagnosis: diagnosis.collect(),
         })
+    }
+
+    /// The terms found.
+    pub(super) fn model(&self) -> &RangeErrorModel {
+        &self.model
     }
 
     /// In the form that tables, summary and report are made from.
@@ -192,14 +197,14 @@ fn quality(sample: Sample, residual: f64) -> ObservationQuality {
 }
 
 /// Derivatives of the correction by the estimated parameters.
-fn design_row(estimate: &RangeCalibration, difference: &RangeDifference) -> DVector<f64> {
+fn design_row(estimate: &RangeCalibration, difference: &RangeDifference) -> Result<DVector<f64>> {
     let model = estimate.model();
-    let interval = model.ambiguity_interval_m;
-    let terms = RangeTerms::design_row(interval, difference.observed_range_m, difference.x_mm, difference.y_mm);
+    let mut terms = vec![0.0; model.parameter_count()];
+    model.design_row_into(difference.observed_range_m, difference.x_mm, difference.y_mm, &mut terms)?;
     let hyperbola = model.hyperbola.and_then(|hyperbola| hyperbola.jacobian(difference.amplitude));
     let hyperbola = hyperbola.map_or([0.0; 3], |jacobian| jacobian.coefficients);
-    let named = RangeTerms::NAMES.into_iter().zip(terms).chain(AmplitudeHyperbola::NAMES.into_iter().zip(hyperbola));
-    let named: Vec<(&str, f64)> = named.collect();
+    let names = model.parameter_names().into_iter().chain(AmplitudeHyperbola::NAMES.map(str::to_owned));
+    let named: Vec<(String, f64)> = names.zip(terms.into_iter().chain(hyperbola)).collect();
     let value = |name: &String| named.iter().find(|(known, _)| known == name).map_or(0.0, |(_, value)| *value);
-    DVector::from_iterator(estimate.estimated_names().len(), estimate.estimated_names().iter().map(value))
+    Ok(DVector::from_iterator(estimate.estimated_names().len(), estimate.estimated_names().iter().map(value)))
 }

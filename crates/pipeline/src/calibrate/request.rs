@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use self_calibration::{CalibrationOptions, Method};
 
+use super::offset::OffsetModel;
 use crate::drift::DriftTreatment;
 
 /// How a survey is calibrated.
@@ -62,6 +63,8 @@ pub struct CalibrateRequest {
     pub method: CalibrateMethod,
     /// Terms, datum, stations without ranges, rejection.
     pub options: CalibrationOptions,
+    /// How the offset d0 is modelled; other than a constant for [`CalibrateMethod::Planes`] only.
+    pub offset: OffsetModel,
     /// What is done about the drift of a warming camera that the start values know.
     pub warm_up: DriftTreatment,
     /// What the tables leave open.

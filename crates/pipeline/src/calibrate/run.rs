@@ -11,6 +11,7 @@ use serde::Serialize;
 
 use super::network_check::check;
 use super::network_files::{NetworkFiles, read_network};
+use super::offset::{FoundTable, OffsetModel};
 use super::request::{CalibrateMethod, CalibrateRequest};
 use super::start::Start;
 use super::summary::CalibrationSummary;
@@ -28,6 +29,7 @@ pub fn calibrate(request: &CalibrateRequest, progress: &dyn Progress) -> Result<
     let clock = Instant::now();
     let survey = request.survey.display().to_string();
     let (start, outcome) = match request.method {
+        CalibrateMethod::Network(_) if request.offset != OffsetModel::Constant => return Err(no_pixels(request)),
         CalibrateMethod::Network(network_method) => calibrate_networks(request, network_method, progress)?,
         CalibrateMethod::Planes => planes::calibrate_planes(request, progress)?,
     };
@@ -38,9 +40,10 @@ pub fn calibrate(request: &CalibrateRequest, progress: &dyn Progress) -> Result<
     };
     match outcome {
         Err(source) if !is_refusal(&source) => Err(Error::Calibrate(source)),
-        Ok(outcome) => {
-            let summary = finish(CalibrationSummary::new(survey, request.method, &start, &outcome));
-            write(&request.out, &start, &outcome, &summary, progress)?;
+        Ok((outcome, table)) => {
+            let table = table.as_ref();
+            let summary = finish(CalibrationSummary::new(survey, request.method, &start, &outcome, table));
+            write(&request.out, &start, &outcome, table, &summary, progress)?;
             progress.finish();
             Ok(summary)
         }
@@ -75,8 +78,19 @@ pub(crate) fn is_refusal(error: &self_calibration::Error) -> bool {
     )
 }
 
+/// What the adjustment gave, with a table of offsets where one was asked for.
+type Calibrated = (CalibrationOutcome, Option<FoundTable>);
+
 /// Start values and what the adjustment said of them.
-pub(super) type Attempt = (Start, std::result::Result<CalibrationOutcome, self_calibration::Error>);
+pub(super) type Attempt = (Start, self_calibration::Result<Calibrated>);
+
+fn no_pixels(request: &CalibrateRequest) -> Error {
+    let message =
+        "a table of offsets or a surface beside d0 is found from frames of planes, by `--method planes`; from \
+                   targets, name `surface2` (its order behind it) among the terms"
+            .to_owned();
+    Error::Survey { path: request.survey.clone(), message }
+}
 
 fn calibrate_networks(request: &CalibrateRequest, method: Method, progress: &dyn Progress) -> Result<Attempt> {
     progress.begin("read survey", 1);
@@ -100,7 +114,7 @@ fn calibrate_networks(request: &CalibrateRequest, method: Method, progress: &dyn
         self_calibration::calibrate(&files.network, &options)
     };
     progress.advance(2);
-    Ok((files.start, outcome))
+    Ok((files.start, outcome.map(|outcome| (outcome, None))))
 }
 
 /// A name that no station has would silently leave nothing out.
@@ -120,12 +134,17 @@ fn write(
     out: &Path,
     start: &Start,
     outcome: &CalibrationOutcome,
+    table: Option<&FoundTable>,
     summary: &CalibrationSummary,
     progress: &dyn Progress,
 ) -> Result<()> {
     progress.begin("write results", 6);
     let folder = OutputFolder::create(out)?;
-    let calibration = calibration_file::calibration(outcome, start, &summary.survey, summary.method)?;
+    let mut calibration = calibration_file::calibration(outcome, start, &summary.survey, summary.method)?;
+    if let Some(table) = table {
+        // It takes the place of an older one, which was not taken off the ranges.
+        calibration.fixed_pattern = table.worth_applying();
+    }
     calibration.write(folder.file(Calibration::FILE_NAME)?)?;
     progress.advance(1);
     write_stations(folder.file("adjusted_stations.csv")?, &tables::stations(outcome))?;
@@ -136,7 +155,7 @@ fn write(
     progress.advance(4);
     write_text(folder.file("summary.json")?, &json(summary)?)?;
     progress.advance(5);
-    write_text(folder.file("report.html")?, &report::render_calibration(outcome, summary)?)?;
+    write_text(folder.file("report.html")?, &report::render_calibration(outcome, table, summary)?)?;
     progress.advance(6);
     Ok(folder.commit()?)
 }

@@ -10,6 +10,7 @@ use serde::Serialize;
 use serde::ser::{SerializeMap, Serializer};
 
 use super::names::group_unit;
+use super::offset::{FoundTable, OffsetTableSummary};
 use super::request::CalibrateMethod;
 use super::start::Start;
 use super::trends::trends;
@@ -64,6 +65,9 @@ pub struct CalibrationSummary {
     pub groups: Vec<GroupSummary>,
     /// The ranges by amplitude, the darkest first.
     pub amplitude_classes: Vec<GroupSummary>,
+    /// The look-up table of offsets, where one was asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub offset_table: Option<OffsetTableSummary>,
     /// Decisions of the automatic choice of terms.
     pub decisions: Vec<DecisionSummary>,
     /// Whether the residuals of planes still depend on something.
@@ -226,7 +230,13 @@ pub struct DecisionSummary {
 
 impl CalibrationSummary {
     /// The figures of an outcome.
-    pub(crate) fn new(survey: String, method: CalibrateMethod, start: &Start, outcome: &CalibrationOutcome) -> Self {
+    pub(crate) fn new(
+        survey: String,
+        method: CalibrateMethod,
+        start: &Start,
+        outcome: &CalibrationOutcome,
+        table: Option<&FoundTable>,
+    ) -> Self {
         Self {
             survey,
             method: method.name(),
@@ -247,9 +257,10 @@ impl CalibrationSummary {
             diagnosis: outcome.diagnosis.clone(),
             groups: outcome.groups.iter().map(|group| group_summary(group, &group.name)).collect(),
             amplitude_classes: outcome.amplitude_classes().iter().map(|class| group_summary(class, "range")).collect(),
+            offset_table: table.map(|table| table.summary.clone()),
             decisions: decisions(outcome),
             trends: match method {
-                CalibrateMethod::Planes => trends(outcome),
+                CalibrateMethod::Planes => trends(outcome, table.and_then(FoundTable::worth_applying).as_ref()),
                 CalibrateMethod::Network(_) => Vec::new(),
             },
             seconds: 0.0,
@@ -279,6 +290,7 @@ impl CalibrationSummary {
             diagnosis: vec![reason],
             groups: Vec::new(),
             amplitude_classes: Vec::new(),
+            offset_table: None,
             decisions: Vec::new(),
             trends: Vec::new(),
             seconds: 0.0,

@@ -1,13 +1,15 @@
 //! Whether what a calibration leaves of the ranges is random.
 
+use error_models::FixedPattern;
 use self_calibration::{
     CalibrationOutcome, Component, ObservationQuality, TrendOptions, TrendSample, Verdict, test_trends,
 };
 
 use crate::trends::TrendSummary;
 
-/// The residuals of ranges against range, amplitude, column and row; empty where there are too few of them.
-pub(super) fn trends(outcome: &CalibrationOutcome) -> Vec<TrendSummary> {
+/// The residuals of ranges, a table of offsets taken off, against range, amplitude, column and row; empty where there are
+/// too few of them.
+pub(super) fn trends(outcome: &CalibrationOutcome, table: Option<&FixedPattern>) -> Vec<TrendSummary> {
     let used = outcome.residuals.iter().filter(|q| q.component == Component::Range && q.verdict == Verdict::Used);
     let mut stations: Vec<&str> = Vec::new();
     let mut samples = Vec::new();
@@ -16,7 +18,9 @@ pub(super) fn trends(outcome: &CalibrationOutcome) -> Vec<TrendSummary> {
             stations.push(&quality.station);
             stations.len() - 1
         });
-        samples.push(sample(quality, station));
+        let [col, row] = quality.pixel.map(|place| place.round() as usize);
+        let offset = table.and_then(|table| table.offset_m.get(row * table.width + col)).map_or(0.0, |m| f64::from(*m));
+        samples.push(TrendSample { residual_m: quality.residual - offset, ..sample(quality, station) });
     }
     // Too few samples for any bins, the only thing that may be refused of used residuals.
     let report = test_trends(&samples, &TrendOptions::default());

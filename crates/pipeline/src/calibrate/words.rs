@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use super::offset::OffsetTableSummary;
 use super::summary::CalibrationSummary;
 use crate::trends::{TrendSummary, sentence};
 
@@ -25,10 +26,16 @@ impl fmt::Display for CalibrationSummary {
         self.write_groups(f)?;
         self.write_parameters(f)?;
         self.write_rejected(f)?;
-        let trends = sentence(&self.trends).map(|sentence| match self.trends.iter().any(TrendSummary::is_trend) {
-            true => format!("{sentence}: the model lacks a term"),
-            false => sentence,
-        });
+        let lacks = if self.trends.iter().any(TrendSummary::is_trend) { ": the model lacks a term" } else { "" };
+        let trends = sentence(&self.trends).map(|sentence| sentence + lacks);
+        if let Some(table) = &self.offset_table {
+            let OffsetTableSummary { block_px, known_blocks, unknown_blocks, .. } = table;
+            writeln!(
+                f,
+                "table of offsets ({block_px} x {block_px} pixels, {known_blocks} known, {unknown_blocks} not): {}",
+                table.verdict
+            )?;
+        }
         for sentence in self.diagnosis.iter().cloned().chain(trends) {
             writeln!(f, "note: {sentence}")?;
         }

@@ -1,6 +1,7 @@
 //! Two calibrations held against each other: which differences are significant, and what they do.
 
 mod drift;
+mod pattern;
 mod sides;
 mod words;
 
@@ -16,6 +17,7 @@ use serde::Serialize;
 use crate::{Error, Result};
 
 pub use self::drift::{DriftLine, DriftPlace};
+pub use self::pattern::PatternLine;
 use self::sides::{Pair, Side};
 
 /// Which calibrations to compare, and how strictly.
@@ -54,6 +56,8 @@ pub struct CalibrationDifference {
     pub corrections: Vec<CorrectionLine>,
     /// What they do to the drift of a warming camera; `None` where not both files have one.
     pub drift: Option<DriftLine>,
+    /// Tables of offsets pixel by pixel; `None` where not both files have one with standard deviations.
+    pub pattern: Option<PatternLine>,
     /// What they do to image points; `None` where the second camera does not see a direction of the first.
     pub image: Option<ImageLine>,
     /// What else is to be minded.
@@ -170,6 +174,7 @@ pub fn diff(request: &DiffRequest) -> Result<CalibrationDifference> {
         corrections.push(correction_line(one.name.clone(), &found));
     }
     let drift = drift::line(&first, &second, request.level)?;
+    let pattern = pattern::line(&first, &second, request.level);
     let image = image(&pair.first, &pair.second, request.level)?;
     let mut notes = pair.notes.clone();
     if image.is_none() {
@@ -179,6 +184,7 @@ pub fn diff(request: &DiffRequest) -> Result<CalibrationDifference> {
         || parameters.iter().any(|line| line.significant)
         || corrections.iter().any(|line| line.significant)
         || drift.as_ref().is_some_and(|line| line.significant)
+        || pattern.as_ref().is_some_and(|line| line.significant)
         || image.as_ref().is_some_and(|line| line.significant);
     Ok(CalibrationDifference {
         first: request.first.display().to_string(),
@@ -188,17 +194,19 @@ pub fn diff(request: &DiffRequest) -> Result<CalibrationDifference> {
         parameters,
         joint,
         not_tested: pair.not_tested,
-        only_first: only(compared.only_first, pair.models_of_first, drift::alone(&first, &second)),
-        only_second: only(compared.only_second, pair.models_of_second, drift::alone(&second, &first)),
+        only_first: only(compared.only_first, pair.models_of_first, &first, &second),
+        only_second: only(compared.only_second, pair.models_of_second, &second, &first),
         corrections,
         drift,
+        pattern,
         image,
         notes,
     })
 }
 
-fn only(parameters: Vec<String>, models: Vec<String>, drift: Option<String>) -> Vec<String> {
-    parameters.into_iter().chain(models).chain(drift).collect()
+fn only(parameters: Vec<String>, models: Vec<String>, here: &Calibration, there: &Calibration) -> Vec<String> {
+    let further = drift::alone(here, there).into_iter().chain(pattern::alone(here, there));
+    parameters.into_iter().chain(models).chain(further).collect()
 }
 
 fn refused(error: &self_calibration::Error) -> Error {

@@ -1,7 +1,7 @@
 //! Each file as parameters with one covariance, and what belongs together in both.
 
 use camera_model::Camera;
-use error_models::{NamedParameter, RangeErrorModel};
+use error_models::{FixedPattern, NamedParameter, RangeErrorModel};
 use nalgebra::DMatrix;
 use range_io::calibration::{Calibration, RangeCalibration};
 use self_calibration::{CorrectionSide, ParameterSet};
@@ -130,7 +130,9 @@ fn notes(first: &Calibration, second: &Calibration) -> Vec<String> {
         }
     };
     note(first.scattering != second.scattering, "the point spread functions of scattering");
-    note(first.fixed_pattern != second.fixed_pattern, "the fixed patterns");
+    let patterns = first.fixed_pattern.as_ref().zip(second.fixed_pattern.as_ref());
+    let tested = |a: &FixedPattern, b: &FixedPattern| !a.sigma_m.is_empty() && !b.sigma_m.is_empty();
+    note(patterns.is_some_and(|(a, b)| a != b && !tested(a, b)), "the tables of offsets (fixed patterns)");
     note(first.noise != second.noise, "the noise models");
     for (name, calibration) in [("first", first), ("second", second)] {
         if calibration.correlation.is_none() {

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::{CalibrationDifference, CorrectionLine, DriftLine, DriftPlace, ImageLine, PlaceLine};
+use super::{CalibrationDifference, CorrectionLine, DriftLine, DriftPlace, ImageLine, PatternLine, PlaceLine};
 
 impl fmt::Display for CalibrationDifference {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -13,6 +13,9 @@ impl fmt::Display for CalibrationDifference {
         }
         if let Some(line) = &self.drift {
             writeln!(f, "{}", drift(line))?;
+        }
+        if let Some(line) = &self.pattern {
+            writeln!(f, "{}", pattern(line))?;
         }
         if let Some(line) = &self.image {
             writeln!(f, "{}", image(line))?;
@@ -106,6 +109,21 @@ fn drift(line: &DriftLine) -> String {
     let clearest = if clearest == largest { String::new() } else { format!("; clearest {clearest}") };
     let rms = 1e3 * line.rms_m;
     format!("drift: differs by up to {largest}{clearest}; rms {rms:.2} mm{}", mark(line.significant))
+}
+
+fn pattern(line: &PatternLine) -> String {
+    let ([col, row], mm) = (line.pixel, |metres: f64| 1e3 * metres);
+    format!(
+        "offsets of {} pixels: differ by up to {:+.2} mm (sigma {:.2} mm) at pixel {col},{row}; rms {:.2} mm, {:.2} mm by \
+         chance, probability {}{}",
+        line.pixels,
+        mm(line.largest_m),
+        mm(line.largest_sigma_m),
+        mm(line.rms_m),
+        mm(line.expected_rms_m),
+        probability(line.p_value),
+        mark(line.significant)
+    )
 }
 
 fn image(line: &ImageLine) -> String {

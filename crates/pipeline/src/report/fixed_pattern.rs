@@ -1,5 +1,6 @@
 //! The report of an estimation of a fixed pattern.
 
+use error_models::FixedPattern;
 use self_calibration::PatternEstimate;
 
 use super::chart::{Axes, Series, histogram};
@@ -25,15 +26,15 @@ pub(crate) fn render_fixed_pattern(summary: &FixedPatternSummary, estimate: &Pat
         (millimetres(Some(summary.rms_without_m)), format!("held-out {}, rms without", summary.held_out)),
         (millimetres(Some(summary.rms_with_m)), "with the others' pattern".to_owned()),
     ]);
-    pictures(&mut page, estimate)?;
+    page.section("The offsets");
+    page.figures(&pattern_figures(&estimate.pattern)?);
     test(&mut page, summary);
     walls(&mut page, summary);
     Ok(page.finish())
 }
 
-fn pictures(page: &mut Page, estimate: &PatternEstimate) -> Result<()> {
-    page.section("The offsets");
-    let pattern = &estimate.pattern;
+/// Offsets, standard deviations and a histogram.
+pub(super) fn pattern_figures(pattern: &FixedPattern) -> Result<Vec<(String, String)>> {
     let known = |index: usize| pattern.sigma_m[index].is_finite();
     let plane = |values: &[f32]| -> Vec<f64> {
         let value = |(index, value): (usize, &f32)| if known(index) { 1e3 * f64::from(*value) } else { f64::NAN };
@@ -50,12 +51,11 @@ fn pictures(page: &mut Page, estimate: &PatternEstimate) -> Result<()> {
     let positive = Scale { map: ColourMap::Sequential, low: 0.0, high: most(&deviations), unit: "mm" };
     let axes = Axes { title: "Offsets", x: "offset, mm", y: "percent of the pixels" };
     let set = Series { name: "pixels", colour: CATEGORIES[0], values: offsets.clone() };
-    page.figures(&[
+    Ok(vec![
         (raster_figure("Offset", pattern.width, &offsets, &signed)?, "Grey: no wall shows the pixel.".to_owned()),
         (raster_figure("Standard deviation", pattern.width, &deviations, &positive)?, String::new()),
         (histogram(&axes, [-high, high], &[set]), String::new()),
-    ]);
-    Ok(())
+    ])
 }
 
 fn test(page: &mut Page, summary: &FixedPatternSummary) {

@@ -79,10 +79,14 @@ fn tested(basis: &'static str, basis_words: String, mut samples: Vec<TrendSample
     let report = test_trends(&samples, &TrendOptions::default());
     let variables: Vec<TrendSummary> =
         report.map_or_else(|_| Vec::new(), |report| report.tests.iter().map(TrendSummary::new).collect());
-    let verdict = sentence(&variables).unwrap_or_else(|| match variables.is_empty() {
-        true => format!("{pixels} residuals are too few to test for trends"),
-        false => "pixels of a frame share errors, and there are too few frames to tell what they depend on".to_owned(),
-    });
+    let untested = || {
+        if variables.is_empty() {
+            format!("{pixels} residuals are too few to test for trends")
+        } else {
+            "pixels of a frame share errors, and there are too few frames to tell what they depend on".to_owned()
+        }
+    };
+    let verdict = sentence(&variables).unwrap_or_else(untested);
     RemainingErrors { basis, basis_words, verdict, pixels, gross_errors, variables }
 }
 

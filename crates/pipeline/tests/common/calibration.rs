@@ -5,8 +5,8 @@
 use std::path::{Path, PathBuf};
 
 use pipeline::{
-    CalibrateMethod, CalibrateRequest, CalibrationOptions, CalibrationSummary, DriftTreatment, Method, Silent,
-    TableDefaults, TermSelection,
+    CalibrateMethod, CalibrateRequest, CalibrationOptions, CalibrationSummary, DriftTreatment, Method, OffsetModel,
+    Silent, TableDefaults, TermSelection,
 };
 
 /// The committed survey of a target field.
@@ -25,6 +25,7 @@ pub fn request(survey: &Path, out: &Path) -> CalibrateRequest {
             terms: terms("xp yp c k1 k2 p1 p2 d0 d4 d5 d6 d7 e1 e2"),
             ..CalibrationOptions::default()
         },
+        offset: OffsetModel::Constant,
         warm_up: DriftTreatment::Apply,
         defaults: TableDefaults::default(),
         out: out.to_owned(),

@@ -5,12 +5,17 @@ use self_calibration::CalibrationOutcome;
 use super::point_uncertainty::{self, PointUncertainty};
 use super::{coverage, heat_map, image_residuals, map, range_error, residuals, tables};
 use crate::Result;
-use crate::calibrate::CalibrationSummary;
+use crate::calibrate::{CalibrationSummary, FoundTable};
+use crate::report::fixed_pattern::pattern_figures;
 use crate::report::page::Page;
 use crate::report::trends::trends_of_calibration;
 
 /// The whole page.
-pub(crate) fn render_calibration(outcome: &CalibrationOutcome, summary: &CalibrationSummary) -> Result<String> {
+pub(crate) fn render_calibration(
+    outcome: &CalibrationOutcome,
+    table: Option<&FoundTable>,
+    summary: &CalibrationSummary,
+) -> Result<String> {
     let lead = format!(
         "Calibration of {} by the {} method ({}). Start values: {}.",
         summary.survey,
@@ -23,6 +28,11 @@ pub(crate) fn render_calibration(outcome: &CalibrationOutcome, summary: &Calibra
     tables::diagnosis(&mut page, &summary.diagnosis);
     tables::parameters(&mut page, outcome);
     range_errors(&mut page, outcome);
+    if let Some(table) = table {
+        page.section("The offset of each pixel");
+        page.paragraph(&format!("Look-up table beside d0: {}.", table.summary.verdict));
+        page.figures(&pattern_figures(&table.pattern)?);
+    }
     uncertainty(&mut page, outcome)?;
     correlations(&mut page, &summary.correlation.names, &summary.correlation.matrix);
     residual_figures(&mut page, outcome);

@@ -1,0 +1,52 @@
+//! A capture of a plane with the plane and the pose that it is calibrated with.
+
+use nalgebra::Isometry3;
+use range_image::Modulation;
+use self_calibration::{DifferenceOptions, Plane, PlaneCapture, RangeDifference, Result, differences_to_plane};
+
+use super::planes_outcome::Sample;
+use super::start::Start;
+
+/// One capture.
+pub(super) struct Placed<'a> {
+    pub(super) capture: &'a PlaneCapture<'a>,
+    pub(super) name: String,
+    pub(super) plane: Plane,
+    pub(super) pose: Isometry3<f64>,
+}
+
+impl Placed<'_> {
+    /// The differences of every so many pixels to the plane, with their places. `rewraps`: the reference tells the number
+    /// of whole intervals better than the phases could.
+    pub(super) fn samples(&self, start: &Start, step: usize, rewraps: bool) -> Result<Vec<Sample>> {
+        let options = DifferenceOptions { step, ..DifferenceOptions::default() };
+        let capture = self.capture;
+        let differences = differences_to_plane(capture.frame, &start.camera, &self.pose, &self.plane, &options)?;
+        let format = start.camera.format;
+        let [xp, yp] = start.camera.interior.principal_point_mm;
+        // The terms are functions of what was observed: the drift goes to the reference.
+        let drifted = |difference: RangeDifference| RangeDifference {
+            reference_range_m: difference.reference_range_m + capture.drift_m,
+            ..difference
+        };
+        let sample = |mut difference: RangeDifference| {
+            if rewraps {
+                rewrap(&mut difference, start.modulation);
+            }
+            Sample {
+                station: capture.name.clone(),
+                plane: self.name.clone(),
+                pixel: format.pixel_from_image([difference.x_mm + xp, difference.y_mm + yp]),
+                drift_m: capture.drift_m,
+                difference,
+            }
+        };
+        Ok(differences.into_iter().map(drifted).map(sample).collect())
+    }
+}
+
+fn rewrap(difference: &mut RangeDifference, modulation: Modulation) {
+    let interval = modulation.ambiguity_interval_m();
+    let intervals = ((difference.reference_range_m - difference.observed_range_m) / interval).round();
+    difference.observed_range_m += intervals * interval;
+}

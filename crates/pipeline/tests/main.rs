@@ -12,6 +12,7 @@ mod diff;
 mod explain;
 mod exposures;
 mod fixed_pattern;
+mod frame_rate;
 mod noise;
 mod real_captures;
 mod real_periodic;

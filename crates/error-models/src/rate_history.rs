@@ -30,6 +30,9 @@ const WINDOW: usize = 11;
 /// Intervals that a rate must last for to be one.
 const LEAST_RUN: usize = WINDOW / 2 + 1;
 
+/// Ratio to the median of their phase up to which intervals make up its rate: two are a lost frame.
+const NEAR: f64 = 1.5;
+
 /// An interval so many times that of its phase is no lost frame: what the camera did meanwhile is not known.
 const GAP: f64 = 3.0;
 
@@ -66,7 +69,8 @@ impl RateHistory {
 
     /// The rates of a stream from the times of its frames, second since power-on, ascending.
     ///
-    /// The rate changes where the median of eleven intervals does, by a ratio of 1.25, for six intervals at least. It is
+    /// The rate changes where the median of eleven intervals does, by a ratio of 1.25, for six intervals at least, and the
+    /// mean with it. It is
     /// not known in intervals of more than three times those of their phase, nor between `known_from_s` and a first
     /// frame after it; until `known_from_s` the first rate counts.
     ///
@@ -85,19 +89,18 @@ impl RateHistory {
         if times_s[0] > known_from_s {
             unknown.push([known_from_s.max(0.0), times_s[0]]);
         }
-        let starts = starts(&intervals);
-        let ends = starts[1..].iter().copied().chain([intervals.len()]);
-        let mut phases = Vec::with_capacity(starts.len());
-        for (start, end) in starts.iter().copied().zip(ends) {
-            let own = &intervals[start..end];
-            let middle = median(&mut own.to_vec());
-            let regular = own.iter().filter(|interval| ratio(**interval, middle) <= 1.5);
-            let (sum, count) = regular.fold((0.0, 0.0), |(sum, count), interval| (sum + interval, count + 1.0));
-            let since_s = if start == 0 { 0.0 } else { times_s[start] };
-            phases.push(RatePhase { since_s, rate_hz: count / sum });
-            let gaps = (start..end).filter(|index| intervals[*index] > GAP * middle);
+        let mut runs: Vec<Run> = Vec::new();
+        for run in runs_of(&intervals) {
+            let gaps = (run.start..run.end).filter(|index| intervals[*index] > GAP * run.middle_s);
             unknown.extend(gaps.map(|index| [times_s[index], times_s[index + 1]]));
+            match runs.last_mut().filter(|before| ratio(before.rate_hz(), run.rate_hz()) <= SAME_RATE) {
+                // Jitter makes medians differ, not means.
+                Some(before) => (before.sum_s, before.count) = (before.sum_s + run.sum_s, before.count + run.count),
+                None => runs.push(run),
+            }
         }
+        let since_s = |run: &Run| if run.start == 0 { 0.0 } else { times_s[run.start] };
+        let phases = runs.iter().map(|run| RatePhase { since_s: since_s(run), rate_hz: run.rate_hz() }).collect();
         Ok(Self { phases, unknown })
     }
 
@@ -135,7 +138,36 @@ fn median(values: &mut [f64]) -> f64 {
     *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
-/// The first interval of each rate.
+/// Intervals of one rate.
+struct Run {
+    start: usize,
+    end: usize,
+    middle_s: f64,
+    /// Sum and number of those near the median: lost frames are left out.
+    sum_s: f64,
+    count: f64,
+}
+
+impl Run {
+    fn rate_hz(&self) -> f64 {
+        self.count / self.sum_s
+    }
+}
+
+fn runs_of(intervals: &[f64]) -> Vec<Run> {
+    let starts = starts(intervals);
+    let ends = starts[1..].iter().copied().chain([intervals.len()]);
+    let run = |(start, end): (usize, usize)| {
+        let own = &intervals[start..end];
+        let middle_s = median(&mut own.to_vec());
+        let regular = own.iter().filter(|interval| ratio(**interval, middle_s) <= NEAR);
+        let (sum_s, count) = regular.fold((0.0, 0.0), |(sum, count), interval| (sum + interval, count + 1.0));
+        Run { start, end, middle_s, sum_s, count }
+    };
+    starts.iter().copied().zip(ends).map(run).collect()
+}
+
+/// The first interval of each run of medians that differ from those before.
 fn starts(intervals: &[f64]) -> Vec<usize> {
     let half = WINDOW / 2;
     let mut window = [0.0; WINDOW];

@@ -58,7 +58,10 @@ fn a_drift_that_follows_the_rate_asks_for_it() {
     assert!(matches!(model.value_at_rates(Some(-1.0), None, Some(&rates)), Err(Error::OutsideDriftSpan { .. })));
     // Without a part that follows it, the rate does not matter.
     let plain = WarmUp { frame_rate: None, ..model.clone() };
-    assert_eq!(plain.value(Some(4500.0), None).unwrap(), plain.value_at_rates(Some(4500.0), None, Some(&rates)).unwrap());
+    assert_eq!(
+        plain.value(Some(4500.0), None).unwrap(),
+        plain.value_at_rates(Some(4500.0), None, Some(&rates)).unwrap()
+    );
     for (part, name) in [
         (FrameRateDrift { time_constant_s: 0.0, ..DRIFT }, "time_constant_s"),
         (FrameRateDrift { coefficient_m_per_hz: f64::NAN, ..DRIFT }, "coefficient_m_per_hz"),
@@ -139,7 +142,9 @@ fn phases_are_those_of_the_frames() {
         let found = RateHistory::of_frames(&times, 60.0).unwrap();
         assert!(found.unknown().is_empty(), "{:?}", found.unknown());
         assert_eq!(found.phases().len(), 4, "{:?}", found.phases());
-        for (phase, (since_s, rate_hz)) in found.phases().iter().zip([(0.0, 0.1), (2000.0, 5.0), (4000.0, 1.0), (6000.0, 1.5)]) {
+        for (phase, (since_s, rate_hz)) in
+            found.phases().iter().zip([(0.0, 0.1), (2000.0, 5.0), (4000.0, 1.0), (6000.0, 1.5)])
+        {
             // The change lies within an interval of the slower rate; the mean of hundreds of intervals is good to 1 %.
             assert!((phase.since_s - since_s).abs() <= 12.0, "{phase:?}");
             assert!((phase.rate_hz / rate_hz - 1.0).abs() < 0.01, "{phase:?}");

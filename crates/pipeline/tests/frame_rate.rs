@@ -134,7 +134,8 @@ fn rates_that_a_survey_does_not_tell_are_named_with_a_way_out() {
         assert!(message.contains(expected) && message.contains(way_out), "{message}\nexpected {expected}");
         assert!(process(&plan(DriftTreatment::Leave), &survey, None, &Silent).is_ok());
     };
-    let state = "state `frame_rates: [(since_s: .., rate_hz: ..)]` in survey.ron, from power-on on, or leave the drift in";
+    let state =
+        "state `frame_rates: [(since_s: .., rate_hz: ..)]` in survey.ron, from power-on on, or leave the drift in";
     edit_survey(&survey, |survey| survey.frames = frames[20..].to_vec());
     refused("8 frames tell no frame rate, 11 are needed", state);
     edit_survey(&survey, |survey| survey.frames = frames[16..].to_vec());
@@ -152,7 +153,10 @@ fn rates_that_a_survey_does_not_tell_are_named_with_a_way_out() {
         survey.frames.clone_from(&frames);
         survey.frames[3].timestamp_s = None;
     });
-    refused("depends on the frame rate since power-on, and survey.ron has no `frames[3].timestamp_s`", "leave the drift");
+    refused(
+        "depends on the frame rate since power-on, and survey.ron has no `frames[3].timestamp_s`",
+        "leave the drift",
+    );
     edit_survey(&survey, |survey| {
         survey.frames.clone_from(&frames);
         survey.power_on_s = None;

@@ -7,8 +7,9 @@ use std::path::Path;
 
 use camera_model::{Camera, ImageFormat, InteriorOrientation, LensDistortion};
 use error_models::{
-    AmplitudeHyperbola, AmplitudeScale, FixedPattern, FrameRateDrift, FurtherShape, ModelSet, NamedParameter, ParameterStatus,
-    PolynomialShape, RangeErrorModel, RangeNoise, RangeTerms, SurfaceShape, TemperatureDrift, Transient, WarmUp,
+    AmplitudeHyperbola, AmplitudeScale, FixedPattern, FrameRateDrift, FurtherShape, ModelSet, NamedParameter,
+    ParameterStatus, PolynomialShape, RangeErrorModel, RangeNoise, RangeTerms, SurfaceShape, TemperatureDrift,
+    Transient, WarmUp,
 };
 use proptest::prelude::*;
 use range_image::{Modulation, NoiseModel};

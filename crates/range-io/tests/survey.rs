@@ -9,7 +9,8 @@ use proptest::prelude::*;
 use range_image::{Flags, Modulation, PhaseSense, Raster, RawFrame, Samples};
 use range_io::npz::NpzWriter;
 use range_io::survey::{
-    FrameRate, InputFrame, Level, ReferencePath, StoredDepth, Survey, TruthFrame, read_frame, read_truth, write_frame, write_truth,
+    FrameRate, InputFrame, Level, ReferencePath, StoredDepth, Survey, TruthFrame, read_frame, read_truth, write_frame,
+    write_truth,
 };
 use range_io::{Error, ron_text};
 

@@ -45,13 +45,14 @@ impl Phases {
     fn samples(&self, seed: u64) -> Vec<DriftSample> {
         let (mut random, history) = (Pcg64::seed_from_u64(seed), self.history());
         let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
-        let (mut samples, mut shared, mut minute) = (Vec::new(), 0.0, -1.0);
+        let (mut samples, mut shared, mut minute) = (Vec::new(), 0.0, None);
         for (place, (since_s, rate_hz)) in self.rates.iter().enumerate() {
             let end_s = self.rates.get(place + 1).map_or(self.end_s, |next| next.0);
             let mut time_s = since_s.max(20.0);
             while time_s < end_s {
-                if (time_s / 60.0).floor() != minute {
-                    (shared, minute) = (self.shared_sigma_m * normal(), (time_s / 60.0).floor());
+                let own = Some((time_s / 60.0) as u32);
+                if own != minute {
+                    (shared, minute) = (self.shared_sigma_m * normal(), own);
                 }
                 let temperature_c = (self.temperature_c)(time_s);
                 let drift = self.truth.value_at_rates(Some(time_s), temperature_c, Some(&history)).unwrap();
@@ -141,7 +142,10 @@ fn the_model_says_where_it_belongs_and_when_it_is_stable() {
     let high = Phases { rates: vec![(0.0, 0.1), (6000.0, 2.0)], end_s: 12_000.0, ..low_high_low() };
     let found = estimate_drift(&high.samples(2), &options).unwrap();
     let DriftVerdict::Stable { after_s, within_m } = found.verdict else { panic!("{}", found.verdict) };
-    assert!((after_s - 6000.0 - 900.0 * (0.019_f64 / 5e-4).ln()).abs() < 60.0 && within_m < 1e-3, "{after_s}, {within_m}");
+    assert!(
+        (after_s - 6000.0 - 900.0 * (0.019_f64 / 5e-4).ln()).abs() < 60.0 && within_m < 1e-3,
+        "{after_s}, {within_m}"
+    );
 }
 
 #[test]

@@ -138,8 +138,7 @@ fn interval(from_frame: usize, frame_interval_s: f64) -> IntervalChange {
 
 /// By the frame rate.
 fn following() -> WarmUp {
-    let part =
-        FrameRateDrift { coefficient_m_per_hz: 0.003, time_constant_s: 600.0, reference_hz: 1.0, span_hz: None };
+    let part = FrameRateDrift { coefficient_m_per_hz: 0.003, time_constant_s: 600.0, reference_hz: 1.0, span_hz: None };
     WarmUp { frame_rate: Some(part), ..WarmUp::default() }
 }
 

@@ -5,8 +5,8 @@ use crate::common::{INTERVAL_M, largest, plain, range_error, wrapped};
 use error_models::{FrameRateDrift, ModelSet, RangeErrorModel, RangeTerms, TemperatureDrift, Transient, WarmUp};
 use range_image::{ComplexFrame, Flags, Samples, demodulate};
 use simulation::{
-    DigitisationSpec, IntervalChange, ReferencePathSpec, SampleType, SimulatedFrame, SimulationSpec, TemperatureSpec, simulate,
-    simulate_frame,
+    DigitisationSpec, IntervalChange, ReferencePathSpec, SampleType, SimulatedFrame, SimulationSpec, TemperatureSpec,
+    simulate, simulate_frame,
 };
 
 /// f32 rounding of samples, phase and truth; see `error_free.rs`.

@@ -70,7 +70,9 @@ fn drift_words(drift: &ViewDrift) -> String {
     let sigma = format!("sigma {:.2} mm", 1e3 * drift.sigma_m);
     match drift.frame_rate {
         None => sigma,
-        Some(part) => format!("{sigma}; {:+.2} mm of it by the frame rate of {:.2} Hz", -1e3 * part.part_m, part.rate_hz),
+        Some(part) => {
+            format!("{sigma}; {:+.2} mm of it by the frame rate of {:.2} Hz", -1e3 * part.part_m, part.rate_hz)
+        }
     }
 }
 

@@ -72,9 +72,10 @@ fn cards(summary: &WarmUpSummary) -> Vec<(String, String)> {
 
 fn curve_section(page: &mut Page, summary: &WarmUpSummary, series: &Series, estimate: &DriftEstimate) {
     page.section("Change of range");
-    let mut caption = "Against the warm camera. Grey: single frames (what lies beyond the axis is not shown); the model \
+    let mut caption =
+        "Against the warm camera. Grey: single frames (what lies beyond the axis is not shown); the model \
                        with three of its deviations; green: from the time of stability on, what the ranges stay within."
-        .to_owned();
+            .to_owned();
     if summary.phases.len() > 1 {
         caption += " Bars: changes of the frame rate.";
     }

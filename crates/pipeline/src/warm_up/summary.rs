@@ -263,7 +263,8 @@ impl fmt::Display for WarmUpSummary {
             writeln!(f, "{name:<6} {value:>12.6} ± {sigma:.6} {unit}")?;
         }
         if let Some(test) = &self.rate_test {
-            let phases = self.phases.iter().map(|phase| format!("{:.3} Hz from {:.1} min", phase.rate_hz, phase.since_s / 60.0));
+            let phases =
+                self.phases.iter().map(|phase| format!("{:.3} Hz from {:.1} min", phase.rate_hz, phase.since_s / 60.0));
             writeln!(f, "frame rate: {}", phases.collect::<Vec<_>>().join(", "))?;
             let follows = if test.taken { "follows" } else { "does not follow" };
             writeln!(f, "the drift {follows} the frame rate: p = {:.2e}", test.p_value)?;

@@ -191,5 +191,13 @@ pub enum DriftError {
     Model(#[from] error_models::Error),
 }
 
+impl DriftError {
+    /// Whether a fit has no answer because its unknowns cannot be told apart.
+    pub(super) fn is_unresolved(&self) -> bool {
+        use adjust::Error::{NotConverged, NotFinite, RankDeficient};
+        matches!(self, Self::Adjust(RankDeficient { .. } | NotConverged { .. } | NotFinite { .. }))
+    }
+}
+
 /// Result with [`DriftError`].
 pub type DriftResult<T> = std::result::Result<T, DriftError>;

@@ -112,8 +112,8 @@ fn estimate(
     }
     let mut curve = Curve { blocks: &blocks, length_s, reference_c, rate };
     refuse_jump(&curve)?;
-    let rate_test = follow_rate(&mut curve, options)?;
-    let (chosen, tests) = choose(&curve, options)?;
+    let mut rate_test = follow_rate(&mut curve, options)?;
+    let (chosen, tests) = choose_resolved(&mut curve, &mut rate_test, options)?;
     let autocorrelation = chosen.autocorrelation(&curve);
     require_explained(autocorrelation, options)?;
     let whitening = Whitening::new(&blocks, length_s, autocorrelation);
@@ -146,6 +146,32 @@ fn reference_temperature(blocks: &[DriftBlock]) -> DriftResult<f64> {
     Ok(last.iter().sum::<f64>() / last.len() as f64)
 }
 
+/// The number of exponentials. A part that follows the frame rate, and cannot be told beside exponentials that can be told
+/// without it, is given up: chance has made it.
+fn choose_resolved(
+    curve: &mut Curve<'_>,
+    rate_test: &mut Option<FrameRateTest>,
+    options: &DriftOptions,
+) -> DriftResult<(Fit, Vec<TransientTest>)> {
+    let lacks = |(fit, tests): &(Fit, Vec<TransientTest>)| {
+        fit.transients < MOST_TRANSIENTS && tests.last().is_some_and(|last| last.p_value < options.level)
+    };
+    let chosen = choose(curve, options);
+    let unresolved = chosen.as_ref().map_or_else(DriftError::is_unresolved, lacks);
+    if curve.rate.is_none() || !unresolved {
+        return chosen;
+    }
+    let without = Curve { rate: None, ..curve.clone() };
+    match choose(&without, options) {
+        Ok(found) if !lacks(&found) && found.0.autocorrelation(&without) <= options.largest_autocorrelation => {
+            curve.rate = None;
+            *rate_test = rate_test.map(|test| FrameRateTest { taken: false, ..test });
+            Ok(found)
+        }
+        _ => chosen,
+    }
+}
+
 /// The number of exponentials, each tested at the level.
 ///
 /// All fits and tests share the serial correlation that a curve of fixed exponentials leaves: what a model lacks must
@@ -175,9 +201,7 @@ fn choose(curve: &Curve<'_>, options: &DriftOptions) -> DriftResult<(Fit, Vec<Tr
 fn fit_if_resolved(curve: &Curve<'_>, transients: usize, whitening: &Whitening) -> DriftResult<Option<Fit>> {
     match fit(curve, transients, whitening) {
         Ok(fit) => Ok(Some(fit).filter(|fit| fit.transients().all(|(_, tau)| tau > curve.length_s))),
-        Err(DriftError::Adjust(
-            adjust::Error::RankDeficient { .. } | adjust::Error::NotConverged { .. } | adjust::Error::NotFinite { .. },
-        )) => Ok(None),
+        Err(error) if error.is_unresolved() => Ok(None),
         Err(error) => Err(error),
     }
 }

@@ -33,13 +33,7 @@ pub(super) fn fit(curve: &Curve<'_>, transients: usize, whitening: &Whitening) -
 
 /// A fit that fails because its time constant runs away says so.
 fn shorter(curve: &Curve<'_>, time_constants: &[f64], error: DriftError) -> DriftError {
-    let fails = matches!(
-        error,
-        DriftError::Adjust(
-            adjust::Error::RankDeficient { .. } | adjust::Error::NotConverged { .. } | adjust::Error::NotFinite { .. }
-        )
-    );
-    if !fails {
+    if !error.is_unresolved() {
         return error;
     }
     let rate = curve.rate.map(|rate| curve.require_phase_longer_than(&rate, rate.start_s));

@@ -46,7 +46,8 @@ impl CaptureRates {
         }
         let reference_hz = history.rate_hz(first_s);
         let inside = history.phases().iter().filter(|phase| phase.since_s > first_s && phase.since_s <= last_s);
-        let span_hz = inside.fold([reference_hz; 2], |[low, high], phase| [low.min(phase.rate_hz), high.max(phase.rate_hz)]);
+        let span_hz =
+            inside.fold([reference_hz; 2], |[low, high], phase| [low.min(phase.rate_hz), high.max(phase.rate_hz)]);
         let steps = history.steps(reference_hz).collect();
         Ok(Self { history, reference_hz, span_hz, steps })
     }

@@ -30,7 +30,7 @@ pub struct FrameRateTest {
     pub time_constant_s: Option<f64>,
     /// Probability of so much where the drift does not follow the frame rate, whatever time constant is sought out.
     pub p_value: f64,
-    /// Whether the model has it.
+    /// Whether the model has it: it is significant, and its time constant could be fitted.
     pub taken: bool,
 }
 

@@ -131,14 +131,9 @@ pub(crate) struct DriftCurve<'a> {
 impl<'a> DriftCurve<'a> {
     pub(crate) fn new(calibrated: &'a CalibratedDrift, survey: &Survey) -> Result<Self, DriftError> {
         let model = &calibrated.model;
-        let rates = match model.frame_rate {
-            None => None,
-            Some(_) => {
-                let known_from_s = model.time_span_s.map_or(0.0, |span| span[0]);
-                Some(rate_history(survey, power_on_s(survey)?, known_from_s)?)
-            }
-        };
-        Ok(Self { model, covariance: calibrated.covariance()?, rates })
+        let known_from_s = model.time_span_s.map_or(0.0, |span| span[0]);
+        let rates = model.frame_rate.map(|_| rate_history(survey, power_on_s(survey)?, known_from_s));
+        Ok(Self { model, covariance: calibrated.covariance()?, rates: rates.transpose()? })
     }
 
     /// The mean of the drifts of the frames that went into a view.

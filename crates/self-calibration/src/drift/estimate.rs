@@ -284,7 +284,9 @@ fn parameters(
     let (mut model, mut rows) = (WarmUp::default(), Vec::new());
     let row = |values: &[(usize, f64)]| {
         let mut row = vec![0.0; count];
-        values.iter().for_each(|(place, value)| row[*place] = *value);
+        for (place, value) in values {
+            row[*place] = *value;
+        }
         row
     };
     for (place, (amplitude_m, time_constant_s)) in order {

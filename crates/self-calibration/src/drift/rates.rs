@@ -32,13 +32,11 @@ impl CaptureRates {
     pub(super) fn new(samples: &[DriftSample], stated: Option<&RateHistory>) -> DriftResult<Self> {
         let (first_s, last_s) =
             (samples.first().map_or(0.0, |one| one.time_s), samples.last().map_or(0.0, |one| one.time_s));
-        let history = match stated {
-            Some(stated) => stated.clone(),
-            None => {
-                let times: Vec<f64> = samples.iter().map(|sample| sample.time_s).collect();
-                RateHistory::of_frames(&times, first_s)?
-            }
+        let of_frames = || {
+            let times: Vec<f64> = samples.iter().map(|sample| sample.time_s).collect();
+            RateHistory::of_frames(&times, first_s)
         };
+        let history = stated.map_or_else(of_frames, |stated| Ok(stated.clone()))?;
         let during = |stretch: &&[f64; 2]| stretch[1].min(last_s) - stretch[0].max(first_s);
         let longest = history.unknown().iter().max_by(|a, b| during(a).total_cmp(&during(b)));
         if let Some([from_s, to_s]) = longest.copied().filter(|gap| during(&gap) > LARGEST_GAP * (last_s - first_s)) {

@@ -132,6 +132,22 @@ pub enum Error {
         /// What is missing.
         name: &'static str,
     },
+    /// The drift follows the frame rate, which is not known of a stretch of time that still matters.
+    #[error("the drift depends on the frame rate, which is not known from {from_s:.1} s to {to_s:.1} s after power-on")]
+    UnknownFrameRate {
+        /// Begin of the stretch, second since power-on.
+        from_s: f64,
+        /// Its end.
+        to_s: f64,
+    },
+    /// Too few frames to tell their rate.
+    #[error("{frames} frames tell no frame rate, {needed} are needed")]
+    NoFrameStream {
+        /// How many there are.
+        frames: usize,
+        /// How many are needed.
+        needed: usize,
+    },
     /// A frame error.
     #[error(transparent)]
     Image(#[from] range_image::Error),

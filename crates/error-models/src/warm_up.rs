@@ -3,12 +3,13 @@
 use nalgebra::DMatrix;
 
 use crate::error::{require_finite, require_span};
-use crate::{Error, Result};
+use crate::{Error, FrameRateDrift, Result};
 
 /// A drift that all pixels and frequencies share: it is **subtracted** from every range, as d0 is.
 ///
-/// `Δρ(t, T) = Σ A_i exp(−t / τ_i) + c_T (T − T_0)`, t the time since power-on and T the camera's temperature. Without
-/// end it is zero at `T = T_0`: the offset d0 of a calibration belongs to the warm camera.
+/// `Δρ(t, T) = Σ A_i exp(−t / τ_i) + c_T (T − T_0) + u(t)`, t the time since power-on, T the camera's temperature, and u
+/// what follows the frame rate ([`FrameRateDrift`]). Without end it is zero at `T = T_0` and the reference rate: the
+/// offset d0 of a calibration belongs to the warm camera.
 #[derive(Debug, Clone, PartialEq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields, default))]
@@ -18,6 +19,9 @@ pub struct WarmUp {
     /// What follows the temperature.
     #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub temperature: Option<TemperatureDrift>,
+    /// What follows the frame rate.
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
+    pub frame_rate: Option<FrameRateDrift>,
     /// Times since power-on that the transients were fitted in, second; `None` where they hold at all times.
     #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub time_span_s: Option<[f64; 2]>,
@@ -55,19 +59,22 @@ impl WarmUp {
 
     /// Whether there is nothing that drifts.
     pub fn is_empty(&self) -> bool {
-        self.transients.is_empty() && self.temperature.is_none()
+        self.transients.is_empty() && self.temperature.is_none() && self.frame_rate.is_none()
     }
 
-    /// Names of the parameters in the order of [`Self::jacobian`]: `A1, tau1, A2, tau2, ..` (m, s), `cT` (m/K).
+    /// Names of the parameters in the order of [`Self::jacobian`]: `A1, tau1, A2, tau2, ..` (m, s), `cT` (m/K),
+    /// `cF, tauF` (m/Hz, s).
     pub fn parameter_names(&self) -> Vec<String> {
         let transients = (1..=self.transients.len()).flat_map(|number| [format!("A{number}"), format!("tau{number}")]);
-        transients.chain(self.temperature.map(|_| "cT".to_owned())).collect()
+        let rate = self.frame_rate.iter().flat_map(|_| ["cF".to_owned(), "tauF".to_owned()]);
+        transients.chain(self.temperature.map(|_| "cT".to_owned())).chain(rate).collect()
     }
 
     /// Values of [`Self::parameter_names`].
     pub fn parameter_values(&self) -> Vec<f64> {
         let transients = self.transients.iter().flat_map(|part| [part.amplitude_m, part.time_constant_s]);
-        transients.chain(self.temperature.map(|part| part.coefficient_m_per_k)).collect()
+        let rate = self.frame_rate.iter().flat_map(|part| [part.coefficient_m_per_hz, part.time_constant_s]);
+        transients.chain(self.temperature.map(|part| part.coefficient_m_per_k)).chain(rate).collect()
     }
 
     /// Unit of a parameter by its name; `None` if there is no such parameter.
@@ -78,6 +85,8 @@ impl WarmUp {
         };
         match name {
             "cT" => Some("m/K"),
+            "cF" => Some("m/Hz"),
+            "tauF" => Some("s"),
             _ if numbered("A").is_some() => Some("m"),
             _ if numbered("tau").is_some() => Some("s"),
             _ => None,
@@ -91,8 +100,12 @@ impl WarmUp {
     /// # Errors
     /// [`Error::OutsideDriftSpan`] where the model says nothing: a time before the span, or behind it unless all
     /// transients have decayed there; a temperature outside its span. [`Error::MissingForDrift`] where the model needs
-    /// a time or a temperature that is not known.
+    /// a time or a temperature that is not known, or follows the frame rate ([`Self::value_at_rates`]).
     pub fn value(&self, time_s: Option<f64>, temperature_c: Option<f64>) -> Result<f64> {
+        self.value_at_rates(time_s, temperature_c, None)
+    }
+
+    pub(crate) fn value_without_rate(&self, time_s: Option<f64>, temperature_c: Option<f64>) -> Result<f64> {
         let (time_s, temperature_c) = self.arguments(time_s, temperature_c)?;
         let transients: f64 = self.transients.iter().map(|part| part.value(time_s)).sum();
         Ok(transients + self.temperature.map_or(0.0, |part| part.value(temperature_c)))
@@ -100,6 +113,10 @@ impl WarmUp {
 
     /// `∂Δρ` by [`Self::parameter_names`]; errors as of [`Self::value`].
     pub fn jacobian(&self, time_s: Option<f64>, temperature_c: Option<f64>) -> Result<Vec<f64>> {
+        self.jacobian_at_rates(time_s, temperature_c, None)
+    }
+
+    pub(crate) fn jacobian_without_rate(&self, time_s: Option<f64>, temperature_c: Option<f64>) -> Result<Vec<f64>> {
         let (time_s, temperature_c) = self.arguments(time_s, temperature_c)?;
         let transients = self.transients.iter().flat_map(|part| part.jacobian(time_s));
         Ok(transients.chain(self.temperature.map(|part| temperature_c - part.reference_c)).collect())
@@ -107,7 +124,11 @@ impl WarmUp {
 
     /// Standard deviation of [`Self::value`], metre, from the covariance matrix of [`Self::parameter_names`].
     pub fn sigma_m(&self, time_s: Option<f64>, temperature_c: Option<f64>, covariance: &DMatrix<f64>) -> Result<f64> {
-        let row = self.jacobian(time_s, temperature_c)?;
+        Self::sigma_of(self.jacobian(time_s, temperature_c)?, covariance)
+    }
+
+    /// Standard deviation of a value with these derivatives by [`Self::parameter_names`].
+    pub fn sigma_of(row: Vec<f64>, covariance: &DMatrix<f64>) -> Result<f64> {
         if covariance.shape() != (row.len(), row.len()) {
             let (name, found) = ("rows of the covariance matrix of the drift", covariance.nrows());
             return Err(Error::WrongLength { name, found, expected: row.len() });
@@ -148,9 +169,10 @@ impl WarmUp {
         Err(Error::OutsideDriftSpan { name: "time since power-on", unit: "s", value, span })
     }
 
-    /// Largest time constant, second; `None` without transients.
+    /// Largest time constant, second; `None` without transients and a part that follows the frame rate.
     pub fn longest_time_constant_s(&self) -> Option<f64> {
-        self.transients.iter().map(|part| part.time_constant_s).max_by(f64::total_cmp)
+        let rate = self.frame_rate.iter().map(|part| part.time_constant_s);
+        self.transients.iter().map(|part| part.time_constant_s).chain(rate).max_by(f64::total_cmp)
     }
 
     /// The time since power-on from which on the transients stay within `tolerance_m` of zero; 0 where they always do.
@@ -181,21 +203,24 @@ impl WarmUp {
     pub fn validate(&self) -> Result<()> {
         for part in &self.transients {
             require_finite("amplitude_m of a transient", part.amplitude_m)?;
-            if !(part.time_constant_s.is_finite() && part.time_constant_s > 0.0) {
-                return Err(Error::OutOfDomain {
-                    name: "time_constant_s",
-                    value: part.time_constant_s,
-                    expected: "a time constant is positive and finite",
-                });
-            }
+            require_time_constant(part.time_constant_s)?;
         }
         if let Some(part) = &self.temperature {
             require_finite("coefficient_m_per_k", part.coefficient_m_per_k)?;
             require_finite("reference_c", part.reference_c)?;
             part.span_c.map_or(Ok(()), |span| require_span("span_c", span))?;
         }
+        self.frame_rate.map_or(Ok(()), |part| part.validate())?;
         self.time_span_s.map_or(Ok(()), |span| require_span("time_span_s", span))
     }
+}
+
+pub(crate) fn require_time_constant(value: f64) -> Result<()> {
+    if value.is_finite() && value > 0.0 {
+        return Ok(());
+    }
+    let expected = "a time constant is positive and finite";
+    Err(Error::OutOfDomain { name: "time_constant_s", value, expected })
 }
 
 /// Steps of the search for the time from which on a drift stays small.

@@ -18,6 +18,7 @@ fn two_transients() -> WarmUp {
             reference_c: 36.0,
             span_c: Some([20.0, 40.0]),
         }),
+        frame_rate: None,
         time_span_s: Some([10.0, 6000.0]),
     }
 }
@@ -113,6 +114,7 @@ proptest! {
                 Transient { amplitude_m: values[2], time_constant_s: values[3] },
             ],
             temperature: Some(TemperatureDrift { coefficient_m_per_k: values[4], reference_c: 30.0, span_c: None }),
+            frame_rate: None,
             time_span_s: None,
         };
         let values = [amplitudes[0], constants[0], amplitudes[1], constants[1], 0.001];

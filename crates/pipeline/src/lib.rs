@@ -8,6 +8,7 @@ mod drift;
 mod error;
 mod explain;
 mod fixed_pattern;
+mod frame_rates;
 mod further_term;
 mod inspect;
 mod load;
@@ -48,7 +49,7 @@ pub use diff::{
     CalibrationDifference, CorrectionLine, DiffRequest, DriftLine, DriftPlace, ImageLine, JointLine, ParameterLine,
     PatternLine, PlaceLine, diff,
 };
-pub use drift::{DriftError, DriftSource, DriftTreatment, ViewDrift};
+pub use drift::{DriftError, DriftSource, DriftTreatment, FrameRatePart, ViewDrift};
 pub use error::{Error, Result};
 pub use explain::{ExplainRequest, Explanation, FlagReason, StageLine, StagePart, explain};
 pub use fixed_pattern::{FixedPatternRequest, FixedPatternSummary, PatternWall, estimate_pattern};
@@ -88,5 +89,6 @@ pub use trends::{RemainingErrors, TrendSummary};
 pub use truth::{RangeTruth, ViewTruth};
 pub use view::{Snapshot, View, ViewData};
 pub use warm_up::{
-    ReferenceUse, WarmUpBlock, WarmUpParameter, WarmUpRequest, WarmUpSummary, WarmUpTest, estimate_warm_up,
+    ReferenceUse, WarmUpBlock, WarmUpParameter, WarmUpPhase, WarmUpRateTest, WarmUpRequest, WarmUpSummary, WarmUpTest,
+    estimate_warm_up,
 };

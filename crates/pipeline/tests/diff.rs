@@ -4,7 +4,7 @@ use crate::common;
 use std::path::{Path, PathBuf};
 
 use crate::common::calibration::{changed, edit, request, target_field};
-use error_models::{Transient, WarmUp};
+use error_models::{FrameRateDrift, Transient, WarmUp};
 use pipeline::{DiffRequest, Silent, calibrate, diff, simulate_network};
 use range_io::calibration::{CalibratedDrift, Calibration};
 
@@ -81,7 +81,7 @@ fn drifts_are_compared_by_parameters_and_by_what_they_do() {
         let mut calibration = Calibration::read(target_field().join("truth/calibration.ron")).unwrap();
         let mut transients = vec![Transient { amplitude_m, time_constant_s: 600.0 }];
         transients.extend(more.then_some(Transient { amplitude_m: 0.001, time_constant_s: 60.0 }));
-        let model = WarmUp { transients, temperature: None, time_span_s: Some([10.0, 3000.0]) };
+        let model = WarmUp { transients, time_span_s: Some([10.0, 3000.0]), ..WarmUp::default() };
         let deviations = [0.0005, 15.0].repeat(model.transients.len());
         calibration.warm_up = Some(CalibratedDrift { model, deviations, correlation: None });
         let file = folder.path().join(name);
@@ -106,4 +106,30 @@ fn drifts_are_compared_by_parameters_and_by_what_they_do() {
     assert!(found.drift.is_some() && found.parameters.iter().all(|line| !line.name.contains("warm-up")), "{found}");
     let found = compare(&first, &target_field().join("truth/calibration.ron")).unwrap();
     assert_eq!((found.drift.is_none(), found.only_first), (true, vec!["drift of the warming camera".to_owned()]));
+}
+
+#[test]
+fn drifts_that_follow_the_frame_rate_are_compared_by_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let with = |name: &str, coefficient_m_per_hz: f64| {
+        let mut calibration = Calibration::read(target_field().join("truth/calibration.ron")).unwrap();
+        let span_hz = Some([0.5, 10.0]);
+        let part = FrameRateDrift { coefficient_m_per_hz, time_constant_s: 900.0, reference_hz: 0.5, span_hz };
+        let model = WarmUp { frame_rate: Some(part), time_span_s: Some([10.0, 9000.0]), ..WarmUp::default() };
+        calibration.warm_up = Some(CalibratedDrift { model, deviations: vec![5e-5, 20.0], correlation: None });
+        let file = folder.path().join(name);
+        calibration.write(&file).unwrap();
+        file
+    };
+    let (first, same, other) = (with("a.ron", 0.003), with("b.ron", 0.00302), with("c.ron", 0.002));
+    assert!(!compare(&first, &same).unwrap().significant);
+    let found = compare(&first, &other).unwrap();
+    println!("{found}");
+    let named: Vec<&str> =
+        found.parameters.iter().filter(|line| line.significant).map(|line| line.name.as_str()).collect();
+    assert_eq!(named, ["warm-up cF"]);
+    // 1 mm/Hz over 9.5 Hz, at the end of the times.
+    let line = found.drift.as_ref().unwrap();
+    assert!((line.largest.difference_m + 0.0095).abs() < 1e-5 && line.largest.rate_hz == Some(10.0), "{line:?}");
+    assert!(found.to_string().contains("at 10.00 Hz"), "{found}");
 }

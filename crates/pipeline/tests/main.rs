@@ -14,6 +14,7 @@ mod diff;
 mod explain;
 mod exposures;
 mod fixed_pattern;
+mod frame_rate;
 mod noise;
 mod real_captures;
 mod real_periodic;

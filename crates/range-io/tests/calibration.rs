@@ -7,8 +7,9 @@ use std::path::Path;
 
 use camera_model::{Camera, ImageFormat, InteriorOrientation, LensDistortion};
 use error_models::{
-    AmplitudeHyperbola, AmplitudeScale, FixedPattern, FurtherShape, ModelSet, NamedParameter, ParameterStatus,
-    PolynomialShape, RangeErrorModel, RangeNoise, RangeTerms, SurfaceShape, TemperatureDrift, Transient, WarmUp,
+    AmplitudeHyperbola, AmplitudeScale, FixedPattern, FrameRateDrift, FurtherShape, ModelSet, NamedParameter,
+    ParameterStatus, PolynomialShape, RangeErrorModel, RangeNoise, RangeTerms, SurfaceShape, TemperatureDrift,
+    Transient, WarmUp,
 };
 use proptest::prelude::*;
 use range_image::{Modulation, NoiseModel};
@@ -65,6 +66,7 @@ fn drift() -> CalibratedDrift {
                 reference_c: 36.0,
                 span_c: Some([20.0, 40.0]),
             }),
+            frame_rate: None,
             time_span_s: Some([10.0, 6000.0]),
         },
         deviations: vec![0.0004, 12.0, 0.00002],
@@ -191,6 +193,28 @@ fn the_drift_has_a_covariance() {
     assert_eq!(uncorrelated.covariance().unwrap()[(0, 1)], 0.0);
     let short = CalibratedDrift { deviations: vec![0.1], ..drift() };
     assert!(matches!(short.covariance(), Err(Error::Value { field, .. }) if field == "warm_up.deviations"));
+}
+
+#[test]
+fn a_drift_that_follows_the_frame_rate_is_kept_and_files_without_are_read() {
+    let part = FrameRateDrift {
+        coefficient_m_per_hz: 0.003,
+        time_constant_s: 900.0,
+        reference_hz: 0.5,
+        span_hz: Some([0.5, 10.0]),
+    };
+    let mut calibration = full();
+    let drift = calibration.warm_up.as_mut().unwrap();
+    drift.model.frame_rate = Some(part);
+    drift.deviations.extend([1e-5, 20.0]);
+    let text = calibration.to_text().unwrap();
+    assert!(text.contains("format_version: 2") && text.contains("frame_rate"), "{text}");
+    let again = Calibration::parse(Path::new("c.ron"), &text).unwrap();
+    assert_eq!(again, calibration);
+    let parameters = again.warm_up.unwrap().parameters();
+    let named: Vec<(&str, &str)> = parameters.iter().map(|one| (one.name.as_str(), one.unit.as_str())).collect();
+    assert_eq!(named[3..], [("cF", "m/Hz"), ("tauF", "s")]);
+    assert!(!full().to_text().unwrap().contains("frame_rate"));
 }
 
 #[test]

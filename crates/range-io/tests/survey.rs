@@ -9,7 +9,8 @@ use proptest::prelude::*;
 use range_image::{Flags, Modulation, PhaseSense, Raster, RawFrame, Samples};
 use range_io::npz::NpzWriter;
 use range_io::survey::{
-    InputFrame, Level, ReferencePath, StoredDepth, Survey, TruthFrame, read_frame, read_truth, write_frame, write_truth,
+    FrameRate, InputFrame, Level, ReferencePath, StoredDepth, Survey, TruthFrame, read_frame, read_truth, write_frame,
+    write_truth,
 };
 use range_io::{Error, ron_text};
 
@@ -126,6 +127,25 @@ fn power_on_and_the_optical_reference_are_read_and_checked() {
         ("reference_path: (columns: (1, 2), rows: (0, 0), length_m: 0)", "`reference_path.length_m`: is 0"),
     ];
     for (fields, expected) in cases {
+        let message = read(fields).unwrap_err().to_string();
+        assert!(message.contains(expected), "{message}\nexpected: {expected}");
+    }
+}
+
+#[test]
+fn frame_rates_are_read_and_checked() {
+    let with = |fields: &str| TEXT.replace("level: samples,", &format!("level: samples, frame_rates: [{fields}],"));
+    let read = |fields: &str| Survey::parse(Path::new("survey.ron"), &with(fields));
+    let survey = read("(since_s: -30, rate_hz: 0), (since_s: 12.5, rate_hz: 10)").unwrap();
+    let rate = |since_s, rate_hz| FrameRate { since_s, rate_hz };
+    assert_eq!(survey.frame_rates, [rate(-30.0, 0.0), rate(12.5, 10.0)]);
+    let again = Survey::parse(Path::new("survey.ron"), &ron_text::to_text(&survey).unwrap()).unwrap();
+    assert_eq!(again, survey);
+    for (fields, expected) in [
+        ("(since_s: NaN, rate_hz: 1)", "`frame_rates[0].since_s`: is NaN"),
+        ("(since_s: 0, rate_hz: -1)", "`frame_rates[0].rate_hz`: is -1"),
+        ("(since_s: 5, rate_hz: 1), (since_s: 5, rate_hz: 2)", "`frame_rates[1].since_s`: is 5, expected a time after"),
+    ] {
         let message = read(fields).unwrap_err().to_string();
         assert!(message.contains(expected), "{message}\nexpected: {expected}");
     }

@@ -1,6 +1,6 @@
 //! Drifts of one camera do not differ, those of a changed one do, and the band covers what sampling says.
 
-use error_models::{TemperatureDrift, Transient, WarmUp};
+use error_models::{FrameRateDrift, TemperatureDrift, Transient, WarmUp};
 use nalgebra::DMatrix;
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
@@ -17,6 +17,7 @@ fn drift(values: [f64; 3]) -> WarmUp {
             reference_c: 36.0,
             span_c: Some([20.0, 40.0]),
         }),
+        frame_rate: None,
         time_span_s: Some([10.0, 3000.0]),
     }
 }
@@ -75,4 +76,35 @@ fn another_drift_is_found_also_with_more_exponentials() {
     let late = WarmUp { time_span_s: Some([4000.0, 5000.0]), ..one.clone() };
     let message = compare_drifts(&side(&one), &side(&late), 0.01).unwrap_err().to_string();
     assert!(message.contains("times that both calibrations cover"), "{message}");
+}
+
+#[test]
+fn drifts_that_follow_the_frame_rate_are_compared_at_the_rates_of_both() {
+    let part = |coefficient_m_per_hz: f64, span_hz: [f64; 2]| {
+        let span_hz = Some(span_hz);
+        FrameRateDrift { coefficient_m_per_hz, time_constant_s: 500.0, reference_hz: 1.0, span_hz }
+    };
+    let with = |frame_rate| WarmUp { frame_rate: Some(frame_rate), ..drift([0.03, 600.0, 0.0008]) };
+    let (one, other) = (with(part(0.003, [1.0, 10.0])), with(part(0.002, [1.0, 8.0])));
+    let wide = DMatrix::from_fn(5, 5, |i, j| match (i, j) {
+        (i, j) if i < 3 && j < 3 => covariance()[(i, j)],
+        (3, 3) => 5e-5_f64.powi(2),
+        (4, 4) => 20.0_f64.powi(2),
+        _ => 0.0,
+    });
+    let side = |model| DriftSide { model, covariance: wide.clone() };
+    let found = compare_drifts(&side(&one), &side(&other), 0.01).unwrap();
+    // At the end of the times and the highest rate of both: 1 mm/Hz of 7 Hz.
+    let expected = -0.001 * 7.0 * (1.0 - f64::exp(-3000.0 / 500.0));
+    assert!(found.significant && (found.largest.difference_m - expected).abs() < 1e-12, "{:?}", found.largest);
+    assert_eq!((found.largest.rate_hz, found.largest.time_s), (Some(8.0), Some(3000.0)));
+    assert_eq!(found.along_time.len(), 96);
+    assert!(!compare_drifts(&side(&one), &side(&one), 0.01).unwrap().significant);
+    // One that does not follow it differs from one that does.
+    let plain = drift([0.03, 600.0, 0.0008]);
+    let plain = DriftSide { model: &plain, covariance: covariance() };
+    assert!(compare_drifts(&plain, &side(&one), 0.01).unwrap().significant);
+    let apart = with(part(0.003, [20.0, 30.0]));
+    let message = compare_drifts(&side(&one), &side(&apart), 0.01).unwrap_err().to_string();
+    assert!(message.contains("frame rates that both calibrations cover"), "{message}");
 }

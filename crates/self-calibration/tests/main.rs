@@ -19,6 +19,7 @@ mod drift;
 mod drift_captures;
 mod drift_comparison;
 mod drift_exponentials;
+mod drift_frame_rate;
 mod drift_refusals;
 mod fixed_pattern;
 mod further_terms;

@@ -13,7 +13,9 @@ mod truth;
 pub use error::{Error, Result};
 pub use simulate::{SimulatedFrame, SimulatedSurvey, Simulator, StationImage, simulate, simulate_frame};
 pub use spec::SimulationSpec;
-pub use spec::camera::{CameraSpec, ExposureSpec, IlluminationSpec, ReferencePathSpec, TemperatureSpec};
+pub use spec::camera::{
+    CameraSpec, ExposureSpec, IlluminationSpec, IntervalChange, ReferencePathSpec, TemperatureSpec,
+};
 pub use spec::errors::{
     DigitisationSpec, ErrorsSpec, FixedPatternSpec, GrossErrorsSpec, MixedPixelsSpec, MultipathSpec, SampleType,
 };

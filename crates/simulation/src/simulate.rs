@@ -2,7 +2,7 @@ use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use camera_model::RayTable;
-use error_models::{FixedPattern, RangeErrorModel};
+use error_models::{FixedPattern, RangeErrorModel, WarmUp};
 use nalgebra::Point3;
 use rand::RngExt;
 use range_image::RawFrame;
@@ -191,7 +191,7 @@ impl Simulator {
             return Err(Error::NoSuch { what: "frame", index: frame, count });
         }
         let (station, number) = (image.station, image.station * count + frame);
-        let timestamp_s = spec.start_s + number as f64 * spec.frame_interval_s;
+        let timestamp_s = spec.timestamp_s(number);
         let temperature_c = spec.temperature_c(timestamp_s);
         let setting = frame / spec.frames_per_station;
         let exposure = &self.exposures[setting];
@@ -200,7 +200,10 @@ impl Simulator {
             (Some(exposed), _) => exposed,
             (None, drift) => {
                 let time_s = spec.power_on_s.map(|power_on_s| timestamp_s - power_on_s);
-                let drift_m = drift.as_ref().map_or(Ok(0.0), |drift| drift.value(time_s, temperature_c))?;
+                let follows = drift.as_ref().is_some_and(|drift| drift.frame_rate.is_some());
+                let rates = if follows { spec.rates()? } else { None };
+                let value = |drift: &WarmUp| drift.value_at_rates(time_s, temperature_c, rates.as_ref());
+                let drift_m = drift.as_ref().map_or(Ok(0.0), value)?;
                 drifted = self.expose(station, exposure, drift_m)?;
                 &drifted
             }

@@ -78,10 +78,17 @@ impl SimulationSpec {
     fn validate_warm_up(&self) -> Result<()> {
         let Some(drift) = &self.errors.warm_up else { return Ok(()) };
         let (power_on, temperature) = (self.exposure.power_on_s, self.exposure.temperature);
-        let holds = drift.transients.is_empty() || power_on.is_some();
+        let holds = (drift.transients.is_empty() && drift.frame_rate.is_none()) || power_on.is_some();
         require(holds, "exposure.power_on_s", &power_on, "a time, as errors.warm_up depends on it")?;
         let holds = drift.temperature.is_none() || temperature.is_some();
-        require(holds, "exposure.temperature", &temperature, "a temperature, as errors.warm_up depends on it")
+        require(holds, "exposure.temperature", &temperature, "a temperature, as errors.warm_up depends on it")?;
+        if drift.frame_rate.is_some() {
+            let (first, changes) = (self.exposure.frame_interval_s, &self.exposure.interval_changes);
+            let shortest = changes.iter().map(|change| change.frame_interval_s).fold(first, f64::min);
+            let expected = "positive times throughout, as errors.warm_up follows the frame rate";
+            require(shortest > 0.0, "exposure.frame_interval_s", &shortest, expected)?;
+        }
+        Ok(())
     }
 
     /// The options with which the simulated samples are demodulated: sense, offset, scale, saturation and noise are

@@ -2,11 +2,12 @@
 
 use crate::common;
 use crate::common::plain;
-use error_models::{ModelSet, RangeErrorModel, TemperatureDrift, Transient, WarmUp};
+use error_models::{FrameRateDrift, ModelSet, RangeErrorModel, TemperatureDrift, Transient, WarmUp};
 use range_image::NoiseModel;
 use simulation::{
-    AttitudeSpec, DigitisationSpec, Error, FixedPatternSpec, MixedPixelsSpec, MultipathSpec, ReferencePathSpec,
-    SampleType, ShapeSpec, SimulationSpec, Simulator, TemperatureSpec, TextureSpec, simulate, simulate_frame,
+    AttitudeSpec, DigitisationSpec, Error, FixedPatternSpec, IntervalChange, MixedPixelsSpec, MultipathSpec,
+    ReferencePathSpec, SampleType, ShapeSpec, SimulationSpec, Simulator, TemperatureSpec, TextureSpec, simulate,
+    simulate_frame,
 };
 
 type Change = fn(&mut SimulationSpec);
@@ -77,6 +78,16 @@ const WRONG: &[(&str, Change)] = &[
     ("exposure.frames_per_station", |s| s.exposure.frames_per_station = 0),
     ("exposure.integration_time_s", |s| s.exposure.integration_time_s = 0.0),
     ("exposure.frame_interval_s", |s| s.exposure.frame_interval_s = -0.1),
+    ("exposure.interval_changes[0].from_frame", |s| s.exposure.interval_changes = vec![interval(0, 1.0)]),
+    ("exposure.interval_changes[1].from_frame", |s| {
+        s.exposure.interval_changes = vec![interval(5, 1.0), interval(5, 2.0)];
+    }),
+    ("exposure.interval_changes[0].frame_interval_s", |s| s.exposure.interval_changes = vec![interval(5, -1.0)]),
+    ("exposure.power_on_s", |s| s.errors.warm_up = Some(following())),
+    ("exposure.frame_interval_s", |s| {
+        (s.exposure.power_on_s, s.errors.warm_up) = (Some(-1.0), Some(following()));
+        s.exposure.interval_changes = vec![interval(1, 0.0)];
+    }),
     ("exposure.further_integration_times_s[0]", |s| s.exposure.further_integration_times_s = vec![-0.001]),
     ("exposure.further_integration_times_s[1]", |s| s.exposure.further_integration_times_s = vec![0.001, 0.002]),
     ("exposure.power_on_s", |s| s.exposure.power_on_s = Some(1.0)),
@@ -119,6 +130,16 @@ fn model(ambiguity_interval_m: f64) -> RangeErrorModel {
 
 fn temperature(time_constant_s: f64) -> TemperatureSpec {
     TemperatureSpec { cold_c: 20.0, warm_c: 40.0, time_constant_s }
+}
+
+fn interval(from_frame: usize, frame_interval_s: f64) -> IntervalChange {
+    IntervalChange { from_frame, frame_interval_s }
+}
+
+/// By the frame rate.
+fn following() -> WarmUp {
+    let part = FrameRateDrift { coefficient_m_per_hz: 0.003, time_constant_s: 600.0, reference_hz: 1.0, span_hz: None };
+    WarmUp { frame_rate: Some(part), ..WarmUp::default() }
 }
 
 /// By time or by temperature.

@@ -2,11 +2,11 @@
 // Times are handed through as they are.
 
 use crate::common::{INTERVAL_M, largest, plain, range_error, wrapped};
-use error_models::{ModelSet, RangeErrorModel, RangeTerms, TemperatureDrift, Transient, WarmUp};
+use error_models::{FrameRateDrift, ModelSet, RangeErrorModel, RangeTerms, TemperatureDrift, Transient, WarmUp};
 use range_image::{ComplexFrame, Flags, Samples, demodulate};
 use simulation::{
-    DigitisationSpec, ReferencePathSpec, SampleType, SimulatedFrame, SimulationSpec, TemperatureSpec, simulate,
-    simulate_frame,
+    DigitisationSpec, IntervalChange, ReferencePathSpec, SampleType, SimulatedFrame, SimulationSpec, TemperatureSpec,
+    simulate, simulate_frame,
 };
 
 /// f32 rounding of samples, phase and truth; see `error_free.rs`.
@@ -24,6 +24,7 @@ fn warming() -> SimulationSpec {
     spec.errors.warm_up = Some(WarmUp {
         transients: vec![Transient { amplitude_m: 0.03, time_constant_s: 600.0 }],
         temperature: Some(temperature),
+        frame_rate: None,
         time_span_s: None,
     });
     spec
@@ -45,6 +46,35 @@ fn every_frame_is_off_by_the_drift_of_its_time() {
     assert_eq!(simulate_frame(&spec, 1, 0, 1).unwrap(), survey.frames[1]);
     let still = SimulationSpec { errors: plain().errors, ..spec };
     assert_eq!(simulate_frame(&still, 1, 0, 1).unwrap().raw, simulate_frame(&plain(), 1, 0, 1).unwrap().raw);
+}
+
+#[test]
+fn ranges_follow_the_frame_rate() {
+    let mut spec = plain();
+    spec.exposure.frames_per_station = 5;
+    (spec.exposure.frame_interval_s, spec.exposure.start_s, spec.exposure.power_on_s) = (100.0, 500.0, Some(440.0));
+    let change = |from_frame, frame_interval_s| IntervalChange { from_frame, frame_interval_s };
+    spec.exposure.interval_changes = vec![change(2, 10.0), change(3, 100.0)];
+    spec.errors.warm_up = Some(WarmUp {
+        frame_rate: Some(FrameRateDrift {
+            coefficient_m_per_hz: 0.5,
+            time_constant_s: 200.0,
+            reference_hz: 0.02,
+            span_hz: None,
+        }),
+        ..WarmUp::default()
+    });
+    let survey = simulate(&spec, 1, &|_, _| {}).unwrap();
+    let times: Vec<f64> = survey.frames.iter().map(|frame| frame.timestamp_s).collect();
+    assert_eq!(times, [500.0, 600.0, 700.0, 710.0, 810.0]);
+    // Half of the reference rate from power-on on, ten times that rate for ten seconds.
+    let gone = |time_s: f64| 1.0 - f64::exp(-time_s.max(0.0) / 200.0);
+    for (frame, time_s) in survey.frames.iter().zip(times) {
+        let expected = 0.5 * (-0.01 * gone(time_s - 440.0) + 0.09 * (gone(time_s - 700.0) - gone(time_s - 710.0)));
+        let error = range_error(&complex(&spec, frame), 0, &frame.truth.range);
+        let off: Vec<f64> = error.iter().map(|error| wrapped(error - expected, INTERVAL_M)).collect();
+        assert!(largest(&off) < 2.0 * ROUNDING_M, "{} m at {time_s} s", largest(&off));
+    }
 }
 
 #[test]

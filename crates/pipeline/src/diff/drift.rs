@@ -20,15 +20,15 @@ pub struct DriftLine {
     pub largest: DriftPlace,
     /// Largest difference in units of its band.
     pub clearest: DriftPlace,
-    /// Root mean square of the difference over the times and temperatures of both files, metre.
+    /// Root mean square of the difference over the times, temperatures and frame rates of both files, metre.
     pub rms_m: f64,
     /// Whether it leaves the band anywhere.
     pub significant: bool,
-    /// The difference along the time at a medium temperature.
+    /// The difference along the time at a medium temperature and frame rate.
     pub along_time: Vec<DriftPlace>,
 }
 
-/// A difference of drifts at a time and a temperature.
+/// A difference of drifts at a time, a temperature and a frame rate.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct DriftPlace {
     /// Second minus first, metre.
@@ -39,6 +39,8 @@ pub struct DriftPlace {
     pub time_s: Option<f64>,
     /// Temperature, degree Celsius, where a drift depends on it.
     pub temperature_c: Option<f64>,
+    /// Frame rate since power-on, hertz, where a drift depends on it.
+    pub rate_hz: Option<f64>,
 }
 
 /// Parameters that mean the same in both files: those of exponentials only where there are equally many.
@@ -47,7 +49,8 @@ pub(super) fn common_parameters(first: &Calibration, second: &Calibration) -> Ve
     let [Some(first), Some(second)] = models else { return Vec::new() };
     let same = first.transients.len() == second.transients.len();
     let names = second.parameter_names();
-    first.parameter_names().into_iter().filter(|name| names.contains(name) && (same || name == "cT")).collect()
+    let common = |name: &String| names.contains(name) && (same || ["cT", "cF", "tauF"].contains(&name.as_str()));
+    first.parameter_names().into_iter().filter(common).collect()
 }
 
 /// The parameters of those names.
@@ -94,8 +97,8 @@ pub(super) fn line(first: &Calibration, second: &Calibration, level: f64) -> Res
 }
 
 fn place(at: &DriftDifference) -> DriftPlace {
-    let DriftDifference { time_s, temperature_c, difference_m, band_m } = *at;
-    DriftPlace { difference_m, band_m, time_s, temperature_c }
+    let DriftDifference { time_s, temperature_c, rate_hz, difference_m, band_m } = *at;
+    DriftPlace { difference_m, band_m, time_s, temperature_c, rate_hz }
 }
 
 /// The drift of a file where the other has none.

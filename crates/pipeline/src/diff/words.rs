@@ -103,7 +103,8 @@ fn drift(line: &DriftLine) -> String {
     let place = |at: &DriftPlace| {
         let time = at.time_s.map_or_else(String::new, |time| format!(" {time:.0} s after power-on"));
         let temperature = at.temperature_c.map_or_else(String::new, |celsius| format!(" at {celsius:.1} °C"));
-        format!("{:+.2} mm (band {:.2} mm){time}{temperature}", 1e3 * at.difference_m, 1e3 * at.band_m)
+        let rate = at.rate_hz.map_or_else(String::new, |hertz| format!(" at {hertz:.2} Hz"));
+        format!("{:+.2} mm (band {:.2} mm){time}{temperature}{rate}", 1e3 * at.difference_m, 1e3 * at.band_m)
     };
     let (largest, clearest) = (place(&line.largest), place(&line.clearest));
     let clearest = if clearest == largest { String::new() } else { format!("; clearest {clearest}") };

@@ -3,6 +3,7 @@
 use error_models::{LedgerEntry, RangeTerm};
 
 use super::{StagePart, WHOLE_INTERVALS};
+use crate::drift::ViewDrift;
 use crate::plan::Stage;
 use crate::truth::wrap;
 use crate::view::View;
@@ -64,13 +65,24 @@ fn unwrapped(before: &View, after: &View, [col, row]: [usize; 2], change_m: f64)
     parts
 }
 
+/// How well a drift is known, and what of its correction follows the frame rate.
+fn drift_words(drift: &ViewDrift) -> String {
+    let sigma = format!("sigma {:.2} mm", 1e3 * drift.sigma_m);
+    match drift.frame_rate {
+        None => sigma,
+        Some(part) => {
+            format!("{sigma}; {:+.2} mm of it by the frame rate of {:.2} Hz", -1e3 * part.part_m, part.rate_hz)
+        }
+    }
+}
+
 /// Range terms one by one.
 fn corrected(after: &View, pixel: [usize; 2]) -> Vec<StagePart> {
     let Some(record) = &after.correction else { return Vec::new() };
     let ledger = record.pixel(pixel);
     let entry = |entry: &LedgerEntry| StagePart {
         what: match record.drift().filter(|_| entry.term == RangeTerm::WarmUp) {
-            Some(drift) => format!("{} (sigma {:.2} mm)", entry.term.words(), 1e3 * drift.sigma_m),
+            Some(drift) => format!("{} ({})", entry.term.words(), drift_words(drift)),
             None => entry.term.words().to_owned(),
         },
         group: entry.term.group(),

@@ -1,5 +1,6 @@
 //! The report of an estimation of a drift.
 
+use error_models::WarmUp;
 use self_calibration::{DriftEstimate, DriftSample};
 
 use super::canvas::{Axes, Canvas, span};
@@ -20,6 +21,7 @@ const FRAME: [u8; 3] = [196, 203, 212];
 const AVERAGE: [u8; 3] = CATEGORIES[0];
 const MODEL: [u8; 3] = CATEGORIES[1];
 const STABLE: [u8; 3] = CATEGORIES[2];
+const PHASE: [u8; 3] = CATEGORIES[3];
 
 /// The whole page.
 pub(crate) fn render_warm_up(summary: &WarmUpSummary, series: &Series, estimate: &DriftEstimate) -> String {
@@ -70,9 +72,14 @@ fn cards(summary: &WarmUpSummary) -> Vec<(String, String)> {
 
 fn curve_section(page: &mut Page, summary: &WarmUpSummary, series: &Series, estimate: &DriftEstimate) {
     page.section("Change of range");
-    let caption = "Against the warm camera. Grey: single frames (what lies beyond the axis is not shown); the model \
-                   with three of its deviations; green: from the time of stability on, what the ranges stay within.";
-    page.figures(&[(drift_figure(summary, series, estimate), caption.to_owned())]);
+    let mut caption =
+        "Against the warm camera. Grey: single frames (what lies beyond the axis is not shown); the model \
+                       with three of its deviations; green: from the time of stability on, what the ranges stay within."
+            .to_owned();
+    if summary.phases.len() > 1 {
+        caption += " Bars: changes of the frame rate.";
+    }
+    page.figures(&[(drift_figure(summary, series, estimate), caption)]);
     let caption = "Block means less the model. A trend here is a drift that the model does not have.";
     page.figures(&[(residual_figure(summary), caption.to_owned())]);
 }
@@ -94,6 +101,10 @@ fn drift_figure(summary: &WarmUpSummary, series: &Series, estimate: &DriftEstima
     let x = span(summary.time_span_s.into_iter().map(minutes));
     let axes = Axes { title: "Drift", x: "time since power-on, min", y: "change of range, mm" };
     let mut canvas = Canvas::new(&axes, WIDE, x, y);
+    for phase in summary.phases.iter().skip(1) {
+        let at = minutes(phase.since_s);
+        canvas.line(&[(at, y[0]), (at, y[1])], PHASE, "");
+    }
     if summary.stable {
         let from = minutes(summary.stable_after_s);
         canvas.band(&[(from, -half, half), (minutes(summary.time_span_s[1]), -half, half)], STABLE, 0.16);
@@ -113,6 +124,10 @@ fn drift_figure(summary: &WarmUpSummary, series: &Series, estimate: &DriftEstima
     if summary.stable {
         canvas.name(STABLE, &format!("stable after {:.1} min", minutes(summary.stable_after_s)));
     }
+    if summary.phases.len() > 1 {
+        let rates: Vec<String> = summary.phases.iter().map(|phase| format!("{:.2}", phase.rate_hz)).collect();
+        canvas.name(PHASE, &format!("frame rate {} Hz", rates.join(", ")));
+    }
     canvas.finish()
 }
 
@@ -121,9 +136,11 @@ fn drift_figure(summary: &WarmUpSummary, series: &Series, estimate: &DriftEstima
 fn model_curve(estimate: &DriftEstimate) -> Vec<(f64, f64, f64)> {
     let at = |time_s: f64, temperature_c: Option<f64>| {
         let (time_s, model) = (Some(time_s), &estimate.model);
-        let value = model.value(time_s, temperature_c).unwrap_or(f64::NAN);
+        let rates = Some(&estimate.rates);
+        let value = model.value_at_rates(time_s, temperature_c, rates).unwrap_or(f64::NAN);
         // The warm camera's mean, which the figure refers to, is part of what is known.
-        let sigma = model.sigma_m(time_s, temperature_c, &estimate.covariance).unwrap_or(f64::NAN);
+        let row = model.jacobian_at_rates(time_s, temperature_c, rates);
+        let sigma = row.and_then(|row| WarmUp::sigma_of(row, &estimate.covariance)).unwrap_or(f64::NAN);
         let reach = 3.0 * sigma;
         (minutes(time_s.unwrap_or(f64::NAN)), 1e3 * (value - reach), 1e3 * (value + reach))
     };
@@ -132,8 +149,13 @@ fn model_curve(estimate: &DriftEstimate) -> Vec<(f64, f64, f64)> {
     }
     let [first, last] = estimate.model.time_span_s.unwrap_or([0.0; 2]);
     let share = |step: usize| step as f64 / CURVE as f64;
-    // Transients are steep at the begin: denser steps there.
-    (0..=CURVE).map(|step| at(first + (last - first) * share(step).powi(2), None)).collect()
+    // Transients are steep at the begin, and so is what follows a change of the frame rate: denser steps there.
+    let changes = estimate.rates.phases().iter().map(|phase| phase.since_s);
+    let inside = changes.filter(|since_s| estimate.model.frame_rate.is_some() && *since_s > first && *since_s < last);
+    let begins: Vec<f64> = std::iter::once(first).chain(inside).collect();
+    let ends = begins[1..].iter().copied().chain([last]);
+    let dense = |(from, to): (f64, f64)| (0..=CURVE).map(move |step| from + (to - from) * share(step).powi(2));
+    begins.iter().copied().zip(ends).flat_map(dense).map(|time_s| at(time_s, None)).collect()
 }
 
 fn residual_figure(summary: &WarmUpSummary) -> String {
@@ -175,6 +197,7 @@ fn readable(parameter: &WarmUpParameter) -> [String; 3] {
     let (factor, unit) = match parameter.unit {
         "m" => (1e3, "mm"),
         "m/K" => (1e3, "mm/K"),
+        "m/Hz" => (1e3, "mm/Hz"),
         unit => (1.0, unit),
     };
     let decimals = if parameter.unit == "s" { 1 } else { 4 };
@@ -188,7 +211,8 @@ fn parameter_section(page: &mut Page, summary: &WarmUpSummary) {
     }
     page.section("The model");
     page.paragraph(
-        "Sum of A exp(-t / tau), t the time since power-on, and cT (T - T0); it is subtracted from every range. \
+        "Sum of A exp(-t / tau), t the time since power-on, of cT (T - T0), and of cF (f - f0), which the camera follows \
+         with the time constant tauF; it is subtracted from every range. \
          Deviations allow for the correlation of neighbouring blocks and are scaled by sigma0.",
     );
     let mut head = vec!["parameter", "value", "sigma", "unit"];
@@ -202,6 +226,11 @@ fn parameter_section(page: &mut Page, summary: &WarmUpSummary) {
     page.paragraph("The last columns are correlations.");
     if let Some(reference_c) = summary.reference_temperature_c {
         page.paragraph(&format!("T0 = {reference_c:.2} °C, the mean of the last tenth of the capture."));
+    }
+    if let Some(reference_hz) = summary.reference_rate_hz {
+        page.paragraph(&format!(
+            "f0 = {reference_hz:.3} Hz, the frame rate of the first phase, which counts from power-on on."
+        ));
     }
 }
 
@@ -225,4 +254,22 @@ fn test_section(page: &mut Page, summary: &WarmUpSummary) {
         })
         .collect();
     page.table(&["beside", "best time constant (s)", "p", "taken"], &rows);
+    let Some(test) = &summary.rate_test else { return };
+    page.section("Whether it follows the frame rate");
+    let rows: Vec<Vec<String>> = summary
+        .phases
+        .iter()
+        .map(|phase| {
+            let begin = format!("{:.1}", minutes(phase.since_s));
+            vec![begin, format!("{:.3}", phase.rate_hz), phase.frames.to_string()]
+        })
+        .collect();
+    page.table(&["from (min)", "frame rate (Hz)", "frames"], &rows);
+    page.paragraph(&format!(
+        "Probability that noise makes a response to these rates as good as the best one found (time constant {} s), \
+         beside any transients: {:.2e}. {}",
+        number(test.time_constant_s),
+        test.p_value,
+        if test.taken { "The model has it." } else { "The model does not have it." }
+    ));
 }

@@ -26,7 +26,7 @@ pub(super) fn run(work: &mut Work, options: &CorrectRangeOptions, progress: &dyn
     let apply = options.warm_up == DriftTreatment::Apply;
     let reference = survey.reference_path;
     let calibrated = calibration.warm_up.as_ref().filter(|_| apply && reference.is_none());
-    let curve = calibrated.map(DriftCurve::new).transpose();
+    let curve = calibrated.map(|calibrated| DriftCurve::new(calibrated, survey)).transpose();
     let curve = curve.map_err(Error::stage("CorrectRange", "calibration"))?;
     let drifts = calibration.warm_up.is_some() || reference.is_some();
     let (mut outside, mut found) = (0_usize, Vec::new());

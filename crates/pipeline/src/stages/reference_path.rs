@@ -38,7 +38,8 @@ pub(super) fn drift(
         weight += 1.0 / variance;
         sum += mean_m / variance;
     }
-    Ok(ViewDrift { view, drift_m: sum / weight, sigma_m: weight.powf(-0.5), source: DriftSource::ReferencePath })
+    let (drift_m, sigma_m) = (sum / weight, weight.powf(-0.5));
+    Ok(ViewDrift { view, drift_m, sigma_m, source: DriftSource::ReferencePath, frame_rate: None })
 }
 
 /// Takes the pixels of the reference out of a frame: they do not see the scene.

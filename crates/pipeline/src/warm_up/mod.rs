@@ -8,9 +8,9 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use range_io::calibration::{CalibratedDrift, Calibration, Correlation};
-use self_calibration::{ChangeOptions, DriftEstimate, DriftOptions, estimate_drift};
+use self_calibration::{ChangeOptions, DriftEstimate, DriftOptions, estimate_drift, estimate_drift_at_rates};
 
-pub use summary::{WarmUpBlock, WarmUpParameter, WarmUpSummary, WarmUpTest};
+pub use summary::{WarmUpBlock, WarmUpParameter, WarmUpPhase, WarmUpRateTest, WarmUpSummary, WarmUpTest};
 
 use crate::further_term::{json, provenance_with, refuse, start, write};
 use crate::progress::Progress;
@@ -80,7 +80,10 @@ pub fn estimate_warm_up(request: &WarmUpRequest, progress: &dyn Progress) -> Res
 fn find(request: &WarmUpRequest, progress: &dyn Progress) -> std::result::Result<(Series, DriftEstimate), Failure> {
     let series = Series::read(request, progress)?;
     progress.begin("fit drift", 1);
-    let estimate = estimate_drift(&series.samples, &request.options)?;
+    let estimate = match &series.stated_rates {
+        Some(rates) => estimate_drift_at_rates(&series.samples, rates, &request.options)?,
+        None => estimate_drift(&series.samples, &request.options)?,
+    };
     progress.advance(1);
     Ok((series, estimate))
 }

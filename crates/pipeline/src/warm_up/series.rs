@@ -1,5 +1,6 @@
 //! Mean changes of range of all frames of a survey.
 
+use error_models::RateHistory;
 use range_image::Raster;
 use range_io::survey::ReferencePath;
 use self_calibration::{ChangeMeter, ChangeOptions, DriftSample, PixelMeans, RangeChange};
@@ -7,11 +8,13 @@ use self_calibration::{ChangeMeter, ChangeOptions, DriftSample, PixelMeans, Rang
 use super::frames::{FRAMES_AT_ONCE, FrameSource};
 use super::{Failure, ReferenceUse, WarmUpRequest};
 use crate::progress::Progress;
-use crate::{Error, Result};
+use crate::{Error, Result, frame_rates};
 
 /// One sample a frame, and what they come from.
 pub(crate) struct Series {
     pub(crate) samples: Vec<DriftSample>,
+    /// The frame rates since power-on, where the survey states them.
+    pub(crate) stated_rates: Option<RateHistory>,
     /// Pixels of the scene, or of the reference where that takes its place.
     pub(crate) pixels: usize,
     /// Share of them that wander from the change of all.
@@ -60,7 +63,9 @@ impl Series {
         };
         let samples = source.survey().frames.iter().zip(&changes).map(sample).collect();
         let (pixels, moved_share) = (meters[0].pixels(), meters[0].moved_share()?);
-        Ok(Self { samples, pixels, moved_share, power_on, size })
+        let stated_rates = frame_rates::stated(source.survey(), power_on_s).transpose();
+        let stated_rates = stated_rates.map_err(self_calibration::DriftError::from)?;
+        Ok(Self { samples, stated_rates, pixels, moved_share, power_on, size })
     }
 }
 

@@ -39,6 +39,12 @@ pub struct WarmUpSummary {
     pub correlation: Vec<Vec<f64>>,
     /// Temperature at which its part of the drift is zero, degree Celsius.
     pub reference_temperature_c: Option<f64>,
+    /// Frame rates, phase by phase.
+    pub phases: Vec<WarmUpPhase>,
+    /// Frame rate at which its part of the drift is zero, hertz: that of the first phase.
+    pub reference_rate_hz: Option<f64>,
+    /// Whether the drift follows the frame rate; `None` where there is one rate only, which does not tell.
+    pub rate_test: Option<WarmUpRateTest>,
     /// Times since power-on that were seen, second.
     pub time_span_s: [f64; 2],
     /// Frames.
@@ -76,6 +82,28 @@ pub struct WarmUpParameter {
     pub value: f64,
     /// Standard deviation.
     pub sigma: f64,
+}
+
+/// A stretch of one frame rate.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct WarmUpPhase {
+    /// Its begin, second since power-on.
+    pub since_s: f64,
+    /// Frames a second.
+    pub rate_hz: f64,
+    /// Frames in it.
+    pub frames: usize,
+}
+
+/// Whether the drift follows the frame rate.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct WarmUpRateTest {
+    /// Its best time constant, second.
+    pub time_constant_s: Option<f64>,
+    /// Probability of so much where it does not.
+    pub p_value: f64,
+    /// Whether the model has it.
+    pub taken: bool,
 }
 
 /// Whether there is one exponential more.
@@ -138,6 +166,13 @@ impl WarmUpSummary {
             parameters: parameters(estimate),
             correlation: correlation.row_iter().map(|row| row.iter().copied().collect()).collect(),
             reference_temperature_c: estimate.model.temperature.map(|part| part.reference_c),
+            phases: phases(series, estimate),
+            reference_rate_hz: estimate.model.frame_rate.map(|part| part.reference_hz),
+            rate_test: estimate.rate_test.map(|test| WarmUpRateTest {
+                time_constant_s: test.time_constant_s,
+                p_value: test.p_value,
+                taken: test.taken,
+            }),
             time_span_s: estimate.model.time_span_s.unwrap_or([f64::NAN; 2]),
             frames: series.samples.len(),
             pixels: series.pixels,
@@ -165,6 +200,19 @@ fn parameters(estimate: &DriftEstimate) -> Vec<WarmUpParameter> {
             sigma,
         })
         .collect()
+}
+
+/// Phases without frames, as before the first one, are left out.
+fn phases(series: &Series, estimate: &DriftEstimate) -> Vec<WarmUpPhase> {
+    let phases = estimate.rates.phases();
+    let ends = phases.iter().skip(1).map(|phase| phase.since_s).chain([f64::INFINITY]);
+    let mut begin = 0;
+    let with_frames = phases.iter().zip(ends).map(|(phase, end_s)| {
+        let end = series.samples.partition_point(|sample| sample.time_s < end_s);
+        let frames = end - std::mem::replace(&mut begin, end);
+        WarmUpPhase { since_s: phase.since_s, rate_hz: phase.rate_hz, frames }
+    });
+    with_frames.filter(|phase| phase.frames > 0).collect()
 }
 
 fn blocks(estimate: &DriftEstimate) -> Vec<WarmUpBlock> {
@@ -213,6 +261,13 @@ impl fmt::Display for WarmUpSummary {
         writeln!(f, "{} (tolerance {:.2} mm)", self.verdict, 1e3 * self.tolerance_m)?;
         for WarmUpParameter { name, unit, value, sigma } in &self.parameters {
             writeln!(f, "{name:<6} {value:>12.6} ± {sigma:.6} {unit}")?;
+        }
+        if let Some(test) = &self.rate_test {
+            let phases =
+                self.phases.iter().map(|phase| format!("{:.3} Hz from {:.1} min", phase.rate_hz, phase.since_s / 60.0));
+            writeln!(f, "frame rate: {}", phases.collect::<Vec<_>>().join(", "))?;
+            let follows = if test.taken { "follows" } else { "does not follow" };
+            writeln!(f, "the drift {follows} the frame rate: p = {:.2e}", test.p_value)?;
         }
         for test in &self.tests {
             writeln!(f, "one exponential more than {}: p = {:.2e}", test.beside, test.p_value)?;

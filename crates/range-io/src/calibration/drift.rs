@@ -10,7 +10,7 @@ use crate::{InvalidField, Result};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CalibratedDrift {
-    /// The drift by time since power-on and by temperature.
+    /// The drift by time since power-on, temperature and frame rate.
     pub model: WarmUp,
     /// Standard deviations in the order and the units of [`WarmUp::parameter_names`]; zero where a value is held.
     pub deviations: Vec<f64>,
@@ -45,7 +45,9 @@ impl CalibratedDrift {
 
     pub(super) fn check(&self, path: &str) -> std::result::Result<(), InvalidField> {
         let model = format!("{path}.model");
-        require(!self.model.is_empty(), &model, || "has neither a transient nor a temperature, expected one".into())?;
+        require(!self.model.is_empty(), &model, || {
+            "has neither a transient nor a temperature nor a frame rate, expected one".into()
+        })?;
         self.model.validate().map_err(|error| InvalidField::new(model, error.to_string()))?;
         let names = self.model.parameter_names();
         let (found, expected) = (self.deviations.len(), names.len());

@@ -40,6 +40,9 @@ pub struct Survey {
     /// When the camera was switched on, on the clock of the frames' `timestamp_s`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub power_on_s: Option<f64>,
+    /// Frame rates since power-on, where the frames are no stream that shows them: a drift may follow them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub frame_rates: Vec<FrameRate>,
     /// A part of the image that shows light over a known path inside the camera.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reference_path: Option<ReferencePath>,
@@ -97,6 +100,16 @@ pub struct FrameEntry {
     pub temperature_c: Option<f64>,
 }
 
+/// A frame rate that holds until the next one.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FrameRate {
+    /// From when on, on the clock of the frames' `timestamp_s`.
+    pub since_s: f64,
+    /// Frames a second; 0 for a camera that is on and takes none.
+    pub rate_hz: f64,
+}
+
 /// How depths stored as integers are read: `depth_m = scale_m * stored`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -147,6 +160,7 @@ impl Survey {
             frames,
             depth: None,
             power_on_s: None,
+            frame_rates: Vec::new(),
             reference_path: None,
             truth: None,
             extras: BTreeMap::new(),

@@ -20,6 +20,7 @@ impl Survey {
             frame.check(&format!("frames[{index}]"))?;
         }
         self.check_power_on()?;
+        self.check_frame_rates()?;
         if let Some(path) = &self.reference_path {
             path.check(self.camera.width, self.camera.height)?;
         }
@@ -30,6 +31,18 @@ impl Survey {
             truth.check(self.frames.len())?;
         }
         self.extras.iter().try_for_each(|(name, file)| check_path(format!("extras.{name}"), file))
+    }
+
+    fn check_frame_rates(&self) -> Check {
+        for (index, rate) in self.frame_rates.iter().enumerate() {
+            let (since, hertz) = (format!("frame_rates[{index}].since_s"), format!("frame_rates[{index}].rate_hz"));
+            check_finite(&since, rate.since_s)?;
+            let later = index == 0 || rate.since_s > self.frame_rates[index - 1].since_s;
+            require(later, since, format!("is {}, expected a time after the rate before", rate.since_s))?;
+            let holds = rate.rate_hz.is_finite() && rate.rate_hz >= 0.0;
+            require(holds, hertz, format!("is {}, expected a frame rate that is not negative", rate.rate_hz))?;
+        }
+        Ok(())
     }
 
     fn check_power_on(&self) -> Check {

@@ -1,5 +1,7 @@
 //! Means over blocks of equal length: a fit of them takes milliseconds, however many frames there are.
 
+use error_models::RateHistory;
+
 use super::options::DriftOptions;
 use super::{DriftError, DriftResult, DriftSample};
 
@@ -13,7 +15,8 @@ pub struct DriftBlock {
     pub half_width_s: f64,
     /// Weighted mean of the changes, metre.
     pub change_m: f64,
-    /// Standard deviation from those of the samples, metre.
+    /// Standard deviation from those of the samples, metre; where the frame rate changes, scaled for each phase to how
+    /// much its blocks scatter.
     pub sigma_m: f64,
     /// Mean temperature, degree Celsius, where all its samples have one.
     pub temperature_c: Option<f64>,
@@ -21,16 +24,32 @@ pub struct DriftBlock {
     pub samples: usize,
 }
 
-/// Means over at most `options.blocks` blocks, and their common length, second; stretches without samples have none.
-pub(super) fn block_means(samples: &[DriftSample], options: &DriftOptions) -> DriftResult<(Vec<DriftBlock>, f64)> {
+/// Means over about `options.blocks` blocks, and their common length, second; stretches without samples have none.
+///
+/// No block reaches over a change of the frame rate: each phase is divided into blocks of nearly the common length.
+pub(super) fn block_means(
+    samples: &[DriftSample],
+    rates: &RateHistory,
+    options: &DriftOptions,
+) -> DriftResult<(Vec<DriftBlock>, f64)> {
     let needed = DriftOptions::LEAST_BLOCKS;
     let (Some(first), Some(last)) = (samples.first(), samples.last()) else {
         return Err(DriftError::TooFewBlocks { blocks: 0, needed });
     };
     let count = options.blocks.min(samples.len());
     let length_s = (last.time_s - first.time_s) / count as f64;
-    let number = |sample: &DriftSample| (((sample.time_s - first.time_s) / length_s) as usize).min(count - 1);
-    let blocks: Vec<DriftBlock> = samples.chunk_by(|a, b| number(a) == number(b)).map(mean).collect();
+    let changes = rates.phases().iter().map(|phase| phase.since_s);
+    let inside = changes.filter(|since_s| *since_s > first.time_s && *since_s <= last.time_s);
+    let ends: Vec<f64> = inside.chain([last.time_s]).collect();
+    let (mut blocks, mut start, mut rest) = (Vec::with_capacity(count + ends.len()), first.time_s, samples);
+    for (place, &end) in ends.iter().enumerate() {
+        let own = if place + 1 == ends.len() { rest.len() } else { rest.partition_point(|one| one.time_s < end) };
+        let (phase, later) = rest.split_at(own);
+        let parts = ((end - start) / length_s).round().max(1.0);
+        let number = |sample: &DriftSample| ((sample.time_s - start) / (end - start) * parts).min(parts - 1.0) as usize;
+        blocks.extend(phase.chunk_by(|a, b| number(a) == number(b)).map(mean));
+        (start, rest) = (end, later);
+    }
     if blocks.len() < needed {
         return Err(DriftError::TooFewBlocks { blocks: blocks.len(), needed });
     }

@@ -7,8 +7,9 @@ use super::whitening::Whitening;
 /// Most transients of a model.
 pub(super) const MOST_TRANSIENTS: usize = 2;
 
-/// A constant, amplitude and logarithm of the time constant of each transient, a coefficient of the temperature.
-pub(super) const MOST_UNKNOWNS: usize = 2 + 2 * MOST_TRANSIENTS;
+/// A constant, amplitude and logarithm of the time constant of each transient, a coefficient of the temperature,
+/// coefficient and logarithm of the time constant of what follows the frame rate.
+pub(super) const MOST_UNKNOWNS: usize = 4 + 2 * MOST_TRANSIENTS;
 
 /// Ratio of two time constants below which they are one for any capture.
 const LEAST_RATIO: f64 = 1.5;
@@ -20,12 +21,23 @@ const GRID: usize = 120;
 const FIXED: usize = 8;
 
 /// What blocks are fitted by: times count from the first block, temperatures from that of the warm camera.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct Curve<'a> {
     pub(super) blocks: &'a [DriftBlock],
     pub(super) length_s: f64,
     /// The warm camera's temperature, where the drift may follow it.
     pub(super) reference_c: Option<f64>,
+    /// What follows the frame rate, where the drift may.
+    pub(super) rate: Option<RateSteps<'a>>,
+}
+
+/// The frame rate as the drift follows it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct RateSteps<'a> {
+    /// Times since power-on and changes of the rate, of [`error_models::RateHistory::steps`].
+    pub(super) steps: &'a [(f64, f64)],
+    /// Time constant that a fit starts at, second.
+    pub(super) start_s: f64,
 }
 
 /// Mean of `exp(−t / τ)` over a block, `t` from the first block, and its derivative by ln τ.
@@ -41,6 +53,17 @@ fn decay(time_s: f64, half_width_s: f64, time_constant_s: f64) -> [f64; 2] {
     [decay * mean, decay * (t * mean - slope)]
 }
 
+impl RateSteps<'_> {
+    /// Mean over a block of the rate as it is followed, hertz, and its derivative by ln τ.
+    fn response(&self, block: &DriftBlock, time_constant_s: f64) -> [f64; 2] {
+        let past = self.steps.iter().take_while(|(since_s, _)| *since_s <= block.time_s);
+        past.fold([0.0; 2], |[response, slope], (since_s, step)| {
+            let [left, by_logarithm] = decay(block.time_s - since_s, block.half_width_s, time_constant_s);
+            [response + step * (1.0 - left), slope - step * by_logarithm]
+        })
+    }
+}
+
 impl Curve<'_> {
     pub(super) fn duration_s(&self) -> f64 {
         self.blocks.last().map_or(0.0, |last| last.time_s) - self.start_s()
@@ -50,23 +73,35 @@ impl Curve<'_> {
         self.blocks.first().map_or(0.0, |first| first.time_s)
     }
 
-    /// Value for a block and its derivatives: constant, `a_i, ln τ_i`, temperature; `a` at the time of the first block.
+    /// Transients that so many unknowns belong to.
+    fn transients(&self, unknowns: usize) -> usize {
+        (unknowns - 1 - usize::from(self.reference_c.is_some()) - 2 * usize::from(self.rate.is_some())) / 2
+    }
+
+    /// Value for a block and its derivatives: constant, `a_i, ln τ_i`, temperature, `c, ln τ` of what follows the frame
+    /// rate; `a` at the time of the first block.
     pub(super) fn at(&self, index: usize, unknowns: &[f64]) -> (f64, [f64; MOST_UNKNOWNS]) {
         let block = &self.blocks[index];
         let time_s = block.time_s - self.start_s();
         let mut row = [0.0; MOST_UNKNOWNS];
         row[0] = 1.0;
         let mut value = unknowns[0];
-        let transients = (unknowns.len() - 1) / 2;
+        let transients = self.transients(unknowns.len());
         for (place, pair) in unknowns[1..].chunks_exact(2).take(transients).enumerate() {
             let [decay, by_logarithm] = decay(time_s, block.half_width_s, pair[1].exp());
             (row[1 + 2 * place], row[2 + 2 * place]) = (decay, pair[0] * by_logarithm);
             value += pair[0] * decay;
         }
+        let mut place = 1 + 2 * transients;
         if self.reference_c.is_some() {
-            let place = unknowns.len() - 1;
             row[place] = self.temperature(block);
             value += unknowns[place] * row[place];
+            place += 1;
+        }
+        if let Some(rate) = &self.rate {
+            let [response, by_logarithm] = rate.response(block, unknowns[place + 1].exp());
+            (row[place], row[place + 1]) = (response, unknowns[place] * by_logarithm);
+            value += unknowns[place] * response;
         }
         (value, row)
     }
@@ -80,10 +115,21 @@ impl Curve<'_> {
     }
 
     /// Constant and temperature, whitened.
-    pub(super) fn without_transients(&self, whitening: &Whitening) -> Vec<Vec<f64>> {
+    fn at_rest(&self, whitening: &Whitening) -> Vec<Vec<f64>> {
         let constant = whitening.column(self.blocks.iter().map(|_| 1.0));
         let temperature = self.reference_c.map(|_| whitening.column(self.blocks.iter().map(|b| self.temperature(b))));
         std::iter::once(constant).chain(temperature).collect()
+    }
+
+    /// Constant, temperature and what follows the frame rate with the time constant to start from, whitened.
+    pub(super) fn without_transients(&self, whitening: &Whitening) -> Vec<Vec<f64>> {
+        let rate = self.rate.map(|rate| self.rate_response(&rate, rate.start_s, whitening));
+        self.at_rest(whitening).into_iter().chain(rate).collect()
+    }
+
+    /// What follows the frame rate with unit coefficient, whitened.
+    pub(super) fn rate_response(&self, rate: &RateSteps<'_>, time_constant_s: f64, whitening: &Whitening) -> Vec<f64> {
+        whitening.column(self.blocks.iter().map(|block| rate.response(block, time_constant_s)[0]))
     }
 
     /// An exponential of unit amplitude, whitened.
@@ -104,10 +150,13 @@ impl Curve<'_> {
         self.time_constants(GRID).collect()
     }
 
-    /// A linear curve that follows any sum of two exponentials far below noise: exponentials of fixed time constants.
+    /// A linear curve that follows any sum of two exponentials far below noise, and any response to the frame rate where
+    /// there may be one: exponentials of fixed time constants.
     pub(super) fn flexible(&self, whitening: &Whitening) -> Basis {
         let exponentials = self.time_constants(FIXED).map(|tau| self.exponential(tau, whitening));
-        Basis::of(self.without_transients(whitening).into_iter().chain(exponentials))
+        let fixed = |rate| self.time_constants(FIXED).map(move |tau| self.rate_response(&rate, tau, whitening));
+        let responses = self.rate.into_iter().flat_map(fixed);
+        Basis::of(self.at_rest(whitening).into_iter().chain(exponentials).chain(responses))
     }
 
     /// The time constants of a grid that leave the smallest sum of squares: all other unknowns are linear (variable

@@ -67,18 +67,41 @@ pub enum DriftError {
         /// What it takes: three of them.
         needed_s: f64,
     },
-    /// The work load of the camera changes.
+    /// Frames are missing, and with them the work load of the camera.
     #[error(
-        "the frame rate changes from {before_hz:.3} Hz to {after_hz:.3} Hz at {time_s:.0} s, and the drift with it: \
-         give the frames of one rate alone"
+        "nothing says at what rate the camera took frames from {from_s:.0} s to {to_s:.0} s, and the drift depends on it: \
+         state the frame rates, or give the frames of one side alone"
     )]
-    FrameRateChanges {
-        /// Time of the change.
-        time_s: f64,
-        /// Rate before.
-        before_hz: f64,
-        /// Rate behind.
-        after_hz: f64,
+    FrameRateUnknown {
+        /// Begin of the stretch, second since power-on.
+        from_s: f64,
+        /// Its end.
+        to_s: f64,
+    },
+    /// Rates that change too soon to see where they lead.
+    #[error(
+        "the drift follows the frame rate with a time constant of {:.1} min, and the longest phase behind a change of the \
+         rate lasts {:.1} min: {:.1} min are needed to tell where it leads",
+        time_constant_s / 60.0, phase_s / 60.0, needed_s / 60.0
+    )]
+    PhaseTooShort {
+        /// The longest phase behind a change.
+        phase_s: f64,
+        /// The time constant that the frames suggest.
+        time_constant_s: f64,
+        /// What it takes: three of them.
+        needed_s: f64,
+    },
+    /// A drift that follows the frame rate within a block.
+    #[error(
+        "the drift follows the frame rate with a time constant of {time_constant_s:.1} s, which means over {block_s:.1} s \
+         cannot tell: average over more blocks"
+    )]
+    FasterThanBlock {
+        /// The time constant that the frames suggest.
+        time_constant_s: f64,
+        /// Length of a block.
+        block_s: f64,
     },
     /// The scene or the camera was moved.
     #[error(
@@ -166,6 +189,14 @@ pub enum DriftError {
     /// A model that is none.
     #[error(transparent)]
     Model(#[from] error_models::Error),
+}
+
+impl DriftError {
+    /// Whether a fit has no answer because its unknowns cannot be told apart.
+    pub(super) fn is_unresolved(&self) -> bool {
+        use adjust::Error::{NotConverged, NotFinite, RankDeficient};
+        matches!(self, Self::Adjust(RankDeficient { .. } | NotConverged { .. } | NotFinite { .. }))
+    }
 }
 
 /// Result with [`DriftError`].

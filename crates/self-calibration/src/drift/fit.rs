@@ -11,11 +11,14 @@ use super::{DriftError, DriftResult};
 /// An adjusted curve.
 #[derive(Debug, Clone)]
 pub(super) struct Fit {
-    /// Constant, amplitude at the first block and ln τ of each transient, coefficient of the temperature.
+    /// Constant, amplitude at the first block and ln τ of each transient, coefficient of the temperature, coefficient and
+    /// ln τ of what follows the frame rate.
     pub(super) unknowns: Vec<f64>,
     /// Their covariance matrix, scaled by sigma0².
     pub(super) covariance: DMatrix<f64>,
     pub(super) transients: usize,
+    /// Whether a part follows the frame rate.
+    pub(super) follows_rate: bool,
     pub(super) sigma0: f64,
     pub(super) redundancy: i64,
     /// Observed less modelled, metre.
@@ -30,23 +33,22 @@ pub(super) fn fit(curve: &Curve<'_>, transients: usize, whitening: &Whitening) -
 
 /// A fit that fails because its time constant runs away says so.
 fn shorter(curve: &Curve<'_>, time_constants: &[f64], error: DriftError) -> DriftError {
-    let fails = matches!(
-        error,
-        DriftError::Adjust(
-            adjust::Error::RankDeficient { .. } | adjust::Error::NotConverged { .. } | adjust::Error::NotFinite { .. }
-        )
-    );
-    match time_constants.last() {
-        Some(&longest) if fails => curve.require_longer_than(longest).err().unwrap_or(error),
-        _ => error,
+    if !error.is_unresolved() {
+        return error;
     }
+    let rate = curve.rate.map(|rate| curve.require_phase_longer_than(&rate, rate.start_s));
+    let longest = time_constants.last().map(|longest| curve.require_longer_than(*longest));
+    rate.into_iter().chain(longest).find_map(Result::err).unwrap_or(error)
 }
 
 fn solve(curve: &Curve<'_>, time_constants: &[f64], whitening: &Whitening) -> DriftResult<Fit> {
     let transients = time_constants.len();
     let mut network = Adjustment::new();
     let names = (1..=transients).flat_map(|number| [format!("a{number}"), format!("ln tau{number}")]);
-    let names = std::iter::once("constant".to_owned()).chain(names).chain(["temperature".to_owned()]);
+    let names = std::iter::once("constant".to_owned()).chain(names);
+    let temperature = curve.reference_c.map(|_| "temperature".to_owned());
+    let rate = curve.rate.iter().flat_map(|_| ["frame rate".to_owned(), "ln tau of the frame rate".to_owned()]);
+    let names = names.chain(temperature).chain(rate);
     let start = linear_start(curve, time_constants, whitening);
     let block = network.add_block(ParameterBlock::euclidean(start).named("drift").with_parameter_names(names));
     let group = network.add_group("block means");
@@ -61,7 +63,8 @@ fn solve(curve: &Curve<'_>, time_constants: &[f64], whitening: &Whitening) -> Dr
     let redundancy = solution.redundancy();
     let sigma0 = solution.sigma0().ok_or(adjust::Error::NoRedundancy { redundancy })?;
     let covariance = solution.covariance(block, Scale::Posterior)?;
-    Ok(Fit { unknowns, covariance, transients, sigma0, redundancy, residuals_m })
+    let follows_rate = curve.rate.is_some();
+    Ok(Fit { unknowns, covariance, transients, follows_rate, sigma0, redundancy, residuals_m })
 }
 
 /// One whitened block mean.
@@ -104,6 +107,7 @@ fn linear_start(curve: &Curve<'_>, time_constants: &[f64], whitening: &Whitening
     let mut start = vec![linear[0]];
     start.extend(time_constants.iter().enumerate().flat_map(|(place, tau)| [linear[1 + place], tau.ln()]));
     start.extend(linear.iter().skip(1 + time_constants.len()));
+    start.extend(curve.rate.map(|rate| rate.start_s.ln()));
     start
 }
 
@@ -124,12 +128,19 @@ impl Fit {
     pub(super) fn transients(&self) -> impl Iterator<Item = (f64, f64)> {
         self.unknowns[1..].chunks_exact(2).take(self.transients).map(|pair| (pair[0], pair[1].exp()))
     }
+
+    /// Coefficient and time constant of what follows the frame rate.
+    pub(super) fn frame_rate(&self) -> Option<(f64, f64)> {
+        let pair = self.unknowns.last_chunk::<2>().filter(|_| self.follows_rate)?;
+        Some((pair[0], pair[1].exp()))
+    }
 }
 
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
 
+    use super::super::curve::RateSteps;
     use super::*;
     use crate::DriftBlock;
 
@@ -144,13 +155,16 @@ mod tests {
             samples: 1,
         };
         let blocks: Vec<DriftBlock> = (0..40).map(block).collect();
-        let curve = Curve { blocks: &blocks, length_s: 60.0, reference_c: Some(33.0) };
+        // Slow since power-on, fast from a block's edge on, slow again between two blocks.
+        let steps = [(0.0, 0.0), (870.0, 4.0), (1700.0, -3.5)];
+        let rate = Some(RateSteps { steps: &steps, start_s: 400.0 });
+        let curve = Curve { blocks: &blocks, length_s: 60.0, reference_c: Some(33.0), rate };
         let whitening = Whitening::new(&blocks, 60.0, 0.4);
-        let unknowns = [0.002, -0.004, 150.0_f64.ln(), 0.003, 900.0_f64.ln(), 2e-4];
+        let unknowns = [0.002, -0.004, 150.0_f64.ln(), 0.003, 900.0_f64.ln(), 2e-4, 3e-3, 400.0_f64.ln()];
         let drift = ParameterBlock::euclidean(unknowns);
         let mut network = Adjustment::new();
         let id = network.add_block(drift.clone());
-        for index in [0, 1, 7, 39] {
+        for index in [0, 1, 7, 10, 11, 39] {
             let check =
                 adjust::check_jacobian(&observation(&curve, &whitening, id, index), std::slice::from_ref(&drift))
                     .unwrap();

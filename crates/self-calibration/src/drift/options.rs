@@ -5,7 +5,7 @@ use super::{DriftError, DriftResult};
 pub struct DriftOptions {
     /// Most blocks of equal length that samples are averaged over. Default 200.
     pub blocks: usize,
-    /// Probability with which noise alone makes one exponential more. Default 1 %.
+    /// Probability with which noise alone makes one exponential more, or a drift that follows the frame rate. Default 1 %.
     pub level: f64,
     /// Whether the drift may follow the temperature. Default: not.
     pub temperature: TemperatureUse,
@@ -15,8 +15,6 @@ pub struct DriftOptions {
     /// Shortest capture that is taken for an answer, second. Default 10 min: transients take tens of minutes (Sect.
     /// 4.7), and what is slower than the capture passes for a constant.
     pub least_duration_s: f64,
-    /// Largest ratio of the frame rates within a capture: the work load warms the camera (Fig. 6). Default 1.5.
-    pub largest_rate_ratio: f64,
     /// Largest correlation of neighbouring blocks beside the model: beyond it, the residuals wander as no noise does.
     /// Default 0.9.
     pub largest_autocorrelation: f64,
@@ -40,14 +38,13 @@ impl Default for DriftOptions {
             temperature: TemperatureUse::Ignore,
             tolerance_m: None,
             least_duration_s: 600.0,
-            largest_rate_ratio: 1.5,
             largest_autocorrelation: 0.9,
         }
     }
 }
 
 impl DriftOptions {
-    /// Fewest blocks that tell a curve of six unknowns and a serial correlation from noise.
+    /// Fewest blocks that tell a curve of eight unknowns and a serial correlation from noise.
     pub const LEAST_BLOCKS: usize = 30;
 
     /// Refuses values outside their domain.
@@ -60,12 +57,6 @@ impl DriftOptions {
             ("level", self.level, share(self.level), "a probability between 0 and 1"),
             ("tolerance_m", tolerance_m, positive(tolerance_m), "a positive length"),
             ("least_duration_s", self.least_duration_s, positive(self.least_duration_s), "a positive time"),
-            (
-                "largest_rate_ratio",
-                self.largest_rate_ratio,
-                self.largest_rate_ratio.is_finite() && self.largest_rate_ratio > 1.0,
-                "a ratio above 1",
-            ),
             (
                 "largest_autocorrelation",
                 self.largest_autocorrelation,

@@ -22,6 +22,11 @@ impl Basis {
         self.columns.len()
     }
 
+    /// By how much each of `count` values pulls the model to itself, 0 to 1.
+    pub(super) fn leverages(&self, count: usize) -> Vec<f64> {
+        (0..count).map(|index| self.columns.iter().map(|column| column[index].powi(2)).sum()).collect()
+    }
+
     /// The part of a vector that the model does not explain.
     pub(super) fn residual(&self, mut vector: Vec<f64>) -> Vec<f64> {
         // Twice is enough for orthogonality to rounding.

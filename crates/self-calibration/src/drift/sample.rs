@@ -16,10 +16,7 @@ pub struct DriftSample {
     pub temperature_c: Option<f64>,
 }
 
-/// Stretches of equal length in which the frames are counted.
-const STRETCHES: usize = 20;
-
-/// Refuses samples that are no numbers, times that do not ascend, short captures and changes of the frame rate.
+/// Refuses samples that are no numbers, times that do not ascend, and short captures.
 pub(super) fn check(samples: &[DriftSample], options: &DriftOptions) -> DriftResult<()> {
     for (index, sample) in samples.iter().enumerate() {
         sample.check(index)?;
@@ -41,7 +38,7 @@ pub(super) fn check(samples: &[DriftSample], options: &DriftOptions) -> DriftRes
     if samples.len() < needed {
         return Err(too_few);
     }
-    check_rate(samples, options.largest_rate_ratio)
+    Ok(())
 }
 
 impl DriftSample {
@@ -60,28 +57,4 @@ impl DriftSample {
         }
         Ok(())
     }
-}
-
-/// Refuses a capture whose frame rate changes, and names the place where it changes most.
-///
-/// The transient that a change of the work load starts (Fig. 6) is none since power-on: no calibration could state it.
-fn check_rate(samples: &[DriftSample], largest_ratio: f64) -> DriftResult<()> {
-    // Ten intervals a stretch, so that one more or less is no change.
-    let stretches = STRETCHES.min((samples.len() - 1) / 10);
-    let start = samples[0].time_s;
-    let length = (samples[samples.len() - 1].time_s - start) / stretches as f64;
-    let mut counts = vec![0_usize; stretches];
-    for sample in &samples[..samples.len() - 1] {
-        counts[(((sample.time_s - start) / length) as usize).min(stretches - 1)] += 1;
-    }
-    let rate = |counts: &[usize]| counts.iter().sum::<usize>() as f64 / (counts.len() as f64 * length);
-    let ratio = |a: f64, b: f64| a.max(b) / a.min(b).max(f64::MIN_POSITIVE);
-    let (fewest, most) = counts.iter().fold((usize::MAX, 0), |(low, high), count| (low.min(*count), high.max(*count)));
-    if most as f64 <= largest_ratio * fewest as f64 {
-        return Ok(());
-    }
-    let change = |place: &usize| ratio(rate(&counts[..*place]), rate(&counts[*place..]));
-    let place = (1..stretches).max_by(|a, b| change(a).total_cmp(&change(b))).unwrap_or(1);
-    let (before_hz, after_hz) = (rate(&counts[..place]), rate(&counts[place..]));
-    Err(DriftError::FrameRateChanges { time_s: start + place as f64 * length, before_hz, after_hz })
 }

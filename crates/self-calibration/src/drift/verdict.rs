@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use error_models::WarmUp;
+use error_models::{RateHistory, Transient, WarmUp};
 
 use super::{DriftBlock, DriftResult};
 
@@ -60,17 +60,23 @@ pub(super) fn default_tolerance_m(blocks: &[DriftBlock], residuals_m: &[f64]) ->
     CERTAIN * end_scatter_m(blocks, residuals_m)
 }
 
+/// The drift counts as what it is off from where it leads at the rate of the time: at that rate the camera is stable.
+///
 /// `scatter_m` is that of block means at the end, `warm_sigma_m` the standard deviation of the warm camera's mean.
 pub(super) fn judge(
     model: &WarmUp,
+    rates: &RateHistory,
     blocks: &[DriftBlock],
     tolerance_m: f64,
     scatter_m: f64,
     warm_sigma_m: f64,
 ) -> DriftResult<DriftVerdict> {
     let [first, last] = [blocks.first(), blocks.last()].map(|block| block.map_or(0.0, |block| block.time_s));
-    let after_s = model.settling_time_s(tolerance_m).max(first);
-    let drift = |block: &DriftBlock| model.value(Some(block.time_s), block.temperature_c);
+    let after_s = settled_after_s(model, rates, tolerance_m, last).max(first);
+    let drift = |block: &DriftBlock| {
+        let value = model.value_at_rates(Some(block.time_s), block.temperature_c, Some(rates))?;
+        Ok::<f64, error_models::Error>(value - model.frame_rate.map_or(0.0, |part| part.limit(block.time_s, rates)))
+    };
     if after_s > last {
         let remaining_m = blocks.last().map_or(Ok(0.0), drift)?;
         return Ok(DriftVerdict::StillDrifts { expected_after_s: after_s, remaining_m });
@@ -81,4 +87,24 @@ pub(super) fn judge(
         remaining_m = remaining_m.max(drift(block)?.abs());
     }
     Ok(DriftVerdict::Stable { after_s, within_m: remaining_m + CERTAIN * scatter_m.hypot(warm_sigma_m) })
+}
+
+/// From when on transients, and the frame rate as it is followed, stay within the tolerance of where they lead.
+fn settled_after_s(model: &WarmUp, rates: &RateHistory, tolerance_m: f64, last_s: f64) -> f64 {
+    let Some(part) = model.frame_rate else { return model.settling_time_s(tolerance_m) };
+    let mut end_s = f64::INFINITY;
+    let begins = rates.steps(part.reference_hz).map(|(since_s, _)| since_s).filter(|since_s| *since_s < last_s);
+    for begin_s in begins.collect::<Vec<_>>().into_iter().rev() {
+        // Within a phase all that is left are exponentials from its begin on.
+        let left = |part: &Transient| Transient { amplitude_m: part.value(begin_s), ..*part };
+        let amplitude_m = part.value(begin_s, rates) - part.limit(begin_s, rates);
+        let followed = Transient { amplitude_m, time_constant_s: part.time_constant_s };
+        let transients = model.transients.iter().map(left).chain([followed]).collect();
+        let settling_s = WarmUp { transients, ..WarmUp::default() }.settling_time_s(tolerance_m);
+        if settling_s > 0.0 {
+            return end_s.min(begin_s + settling_s);
+        }
+        end_s = begin_s;
+    }
+    0.0
 }

@@ -1,4 +1,5 @@
 use camera_model::Camera;
+use error_models::{RateHistory, RatePhase};
 use range_image::{Modulation, PhaseSense};
 use serde::{Deserialize, Serialize};
 
@@ -72,6 +73,9 @@ pub struct ExposureSpec {
     /// Time from one frame to the next; the stations follow each other without a pause.
     #[serde(default = "tenth")]
     pub frame_interval_s: f64,
+    /// Changes of this time, in the order of the frames.
+    #[serde(default)]
+    pub interval_changes: Vec<IntervalChange>,
     /// Time stamp of the first frame.
     #[serde(default)]
     pub start_s: f64,
@@ -81,6 +85,16 @@ pub struct ExposureSpec {
     /// How warm the camera is.
     #[serde(default)]
     pub temperature: Option<TemperatureSpec>,
+}
+
+/// From a frame on, another time from one frame to the next.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct IntervalChange {
+    /// Number of the frame, counted over all stations from 0.
+    pub from_frame: usize,
+    /// Time from it to the next frame, and so on.
+    pub frame_interval_s: f64,
 }
 
 /// A camera that warms up after it was switched on: the difference to its last temperature falls exponentially.
@@ -172,6 +186,15 @@ impl ExposureSpec {
         }
         let interval = self.frame_interval_s;
         require((0.0..=1e9).contains(&interval), "exposure.frame_interval_s", &interval, "from 0 to 1e9 seconds")?;
+        let mut before = 0;
+        for (index, change) in self.interval_changes.iter().enumerate() {
+            let (field, frame) = (format!("exposure.interval_changes[{index}]"), change.from_frame);
+            require(frame > before, format!("{field}.from_frame"), &frame, "a frame after the change before")?;
+            let interval = change.frame_interval_s;
+            let holds = (0.0..=1e9).contains(&interval);
+            require(holds, format!("{field}.frame_interval_s"), &interval, "from 0 to 1e9 seconds")?;
+            before = frame;
+        }
         finite("exposure.start_s", self.start_s)?;
         self.validate_warming()
     }
@@ -196,6 +219,30 @@ impl ExposureSpec {
     /// Frames of a station at all integration times.
     pub fn frames_at_station(&self) -> usize {
         self.frames_per_station.saturating_mul(1 + self.further_integration_times_s.len())
+    }
+
+    /// When a frame is taken, by its number over all stations.
+    pub fn timestamp_s(&self, number: usize) -> f64 {
+        let (mut begin_s, mut first, mut interval_s) = (self.start_s, 0, self.frame_interval_s);
+        for change in self.interval_changes.iter().take_while(|change| change.from_frame <= number) {
+            begin_s += (change.from_frame - first) as f64 * interval_s;
+            (first, interval_s) = (change.from_frame, change.frame_interval_s);
+        }
+        begin_s + (number - first) as f64 * interval_s
+    }
+
+    /// The frame rates since power-on: before the first frame the camera runs at the rate of the first ones.
+    ///
+    /// # Errors
+    /// An interval of zero, which is no rate.
+    pub fn rates(&self) -> Result<Option<RateHistory>> {
+        let Some(power_on_s) = self.power_on_s else { return Ok(None) };
+        let mut phases = vec![RatePhase { since_s: 0.0, rate_hz: self.frame_interval_s.recip() }];
+        phases.extend(self.interval_changes.iter().map(|change| RatePhase {
+            since_s: self.timestamp_s(change.from_frame) - power_on_s,
+            rate_hz: change.frame_interval_s.recip(),
+        }));
+        Ok(Some(RateHistory::new(phases)?))
     }
 
     /// The temperature at a time stamp, where there is one.

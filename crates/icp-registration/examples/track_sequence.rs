@@ -1,8 +1,8 @@
 //! Tracks a simulated sequence and, where it is at hand, a real one; prints CPU time a frame and errors.
 //!
-//! `RAYON_NUM_THREADS=1 cargo run --release -p icp-registration --example track_sequence -- [option=value ..]`
+//! `cargo run --release -p icp-registration --example track_sequence -- [option=value ..]`
 //!
-//! Options: `folder` (of the real sequence), `seed` (of the simulated noise), `keyframe_overlap`, `max_keyframes`, `levels`,
+//! Options: `folder` (of the real sequence), `simulated=off`, `seed` (of the simulated noise), `keyframe_overlap`, `max_keyframes`, `levels`,
 //! `fusion=off`, `step_tolerance_m`, `max_motion_sigma_m`, `every=1` (a line a frame).
 #![allow(
     missing_docs,
@@ -174,7 +174,14 @@ fn real(folder: &Path) {
 }
 
 fn main() {
-    simulated(&Pinhole::small(), "simulated room 176x144");
+    // The clock is that of one thread: all work is done on it.
+    rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap().install(run);
+}
+
+fn run() {
+    if argument::<String>("simulated").is_none_or(|simulated| simulated != "off") {
+        simulated(&Pinhole::small(), "simulated room 176x144");
+    }
     let folder = argument::<String>("folder")
         .unwrap_or_else(|| concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/real/sevenscenes_redkitchen").into());
     real(Path::new(&folder));

@@ -16,8 +16,9 @@ pub(super) struct Track {
     pub rules: Rules,
     /// Projection on the motions that are held.
     pub held: Matrix6<f64>,
-    /// The step that led here, `[dt, rho w]`.
+    /// The step that led here, `[dt, rho w]`, and its length in standard deviations.
     pub last_step: Vector6<f64>,
+    pub over_sigma: f64,
 }
 
 /// About which point, and in which unit, motions are solved.

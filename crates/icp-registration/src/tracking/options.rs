@@ -30,6 +30,9 @@ pub enum Relocalisation {
     CoarseWith(Box<CoarseOptions>),
 }
 
+/// Steps that a pose may still be off by, in standard deviations: the last one is taken without being counted.
+const NOISE_FRACTION: f64 = 1.0;
+
 /// Options of a [`Tracker`](super::Tracker). The defaults carry no scale.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrackerOptions {
@@ -63,7 +66,10 @@ pub struct TrackerOptions {
 impl Default for TrackerOptions {
     fn default() -> Self {
         Self {
-            alignment: FrameAlignmentOptions::default(),
+            alignment: FrameAlignmentOptions {
+                noise_fraction: Some(NOISE_FRACTION),
+                ..FrameAlignmentOptions::default()
+            },
             world_from_first: Isometry3::identity(),
             keyframe_overlap: 0.7,
             max_keyframes: 64,

@@ -12,6 +12,10 @@ use super::grid::BLOCK;
 use super::projection::Lens;
 use super::table::Table;
 
+/// Above the number of nodes of any frame, and the bits of single precision that hold what is below it.
+const TWO_TO_23: f32 = 8_388_608.0;
+const LOW_BITS: u32 = (1 << 23) - 1;
+
 /// Where a ray (u, v, -1) falls on the grid of nodes, in nodes; NaN or beyond the grid where it does not.
 pub(super) trait Locate: Copy + Sync {
     fn node(&self, u: f32, v: f32) -> [f32; 2];
@@ -237,14 +241,17 @@ impl<'a> Moved<'a> {
             row[k] = if inside[k] { at[1] } else { 0.0 };
         }
         for k in 0..BLOCK {
-            let node = row[k] as i32 * grid.cols as i32 + col[k] as i32;
+            // Whole numbers below 2²³ as the low bits of their sum with it: a cast would be done lane by lane.
+            let node = (row[k].floor() * cols + col[k].floor() + TWO_TO_23).to_bits() & LOW_BITS;
             index[k] = if inside[k] { node as usize } else { usize::MAX };
         }
         let (mut nodes, mut variances) = ([[f32::NAN; 4]; BLOCK], [f32::NAN; BLOCK]);
+        let count = self.target.planes.len().min(self.target.sigma.len());
+        let (all_planes, all_sigma) = (&self.target.planes[..count], &self.target.sigma[..count]);
         for k in 0..BLOCK {
-            if let (Some(plane), Some(sigma)) = (self.target.planes.get(index[k]), self.target.sigma.get(index[k])) {
-                nodes[k] = *plane;
-                variances[k] = sigma * sigma;
+            if index[k] < count {
+                nodes[k] = all_planes[index[k]];
+                variances[k] = all_sigma[index[k]].powi(2);
             }
         }
         let mut planes = [[f32::NAN; BLOCK]; 4];

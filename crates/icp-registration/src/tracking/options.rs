@@ -30,8 +30,9 @@ pub enum Relocalisation {
     CoarseWith(Box<CoarseOptions>),
 }
 
-/// Steps that a pose may still be off by, in standard deviations: the last one is taken without being counted.
-const NOISE_FRACTION: f64 = 1.0;
+/// Length of the step, in standard deviations, after which the last one is taken: noise alone makes a length of √6, and each
+/// step is about a third of the one before.
+const NOISE_FRACTION: f64 = 2.0;
 
 /// Options of a [`Tracker`](super::Tracker). The defaults carry no scale.
 #[derive(Debug, Clone, PartialEq)]

@@ -9,7 +9,7 @@ use super::options::FrameAlignmentOptions;
 use super::pairs::Rules;
 use super::quality::{Cell, Hold, Verdict};
 use super::sums::{SUMS, normal_equations, residuals};
-use super::track::{Gauge, Track, blocks, moved, solve, turned};
+use super::track::{FEWEST_POINTS, Gauge, Track, blocks, finest_part, is_within_noise, moved, solve, turned};
 use crate::error::{Error, Result};
 use crate::icp::{DegeneracyPolicy, IcpResult, StopReason};
 use crate::kernel::quantile;
@@ -33,8 +33,6 @@ const COARSE_TOLERANCE: f64 = 1e-3;
 const BEFORE_ALL: f64 = 2.0;
 /// Steps on the last level before which the reach of the kernel is set.
 const NARROWINGS: usize = 3;
-/// Fewest points of a level.
-const FEWEST_POINTS: usize = 200;
 
 /// Aligns `source` with `target`, starting at `guess` (both poses `target_from_source`).
 ///
@@ -385,17 +383,6 @@ impl FrameAligner {
             iteration: track.iterations,
         }
     }
-}
-
-/// A quarter of the nodes, where these are enough.
-fn finest_part(source: &OrganisedFrame) -> &[Block] {
-    let part = STRIDES.len() - 2;
-    if source.points.counts[part] >= FEWEST_POINTS { blocks(source, part) } else { &source.points.blocks }
-}
-
-/// Whether a step is shorter than a tenth of its standard deviation: pairs that change back and forth.
-fn is_within_noise(step: &Vector6<f64>, covariance: &Matrix6<f64>) -> bool {
-    covariance.cholesky().is_some_and(|c| step.dot(&c.solve(step)) < 0.01)
 }
 
 #[cfg(test)]

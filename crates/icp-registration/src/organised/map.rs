@@ -217,7 +217,7 @@ impl<L: Locate> pulp::WithSimd for LocatedLearning<'_, '_, L> {
             let mut fits = [false; BLOCK];
             for k in 0..BLOCK {
                 // NaN fails.
-                fits[k] = (d.residual[k] * d.residual[k] < 9.0 * d.variance[k]) & (d.cosine[k] >= AGREEING_COSINE);
+                fits[k] = d.residual[k] * d.residual[k] < 9.0 * d.variance[k] && d.cosine[k] >= AGREEING_COSINE;
             }
             for k in 0..BLOCK {
                 if fits[k] {

@@ -1,6 +1,8 @@
 //! Pairs of source nodes and target planes, found by projection, some at a time.
 // Only what is inlined is compiled for wide registers.
 #![allow(clippy::inline_always)]
+// Without branches, all lanes are compared at once.
+#![allow(clippy::needless_bitwise_bool)]
 // Lanes lie side by side: with an index, loops read as their formulas and have the same length everywhere.
 #![allow(clippy::needless_range_loop)]
 
@@ -235,7 +237,7 @@ impl<'a> Moved<'a> {
             let per_depth = -1.0 / p[2][k];
             let node = locate.node(p[0][k] * per_depth, p[1][k] * per_depth);
             let at = node.map(|x| x + 0.5);
-            // NaN fails. No branches: all lanes at once.
+            // NaN fails.
             inside[k] = (p[2][k] < 0.0) & (at[0] >= 0.0) & (at[1] >= 0.0) & (at[0] < cols) & (at[1] < rows);
             col[k] = if inside[k] { at[0] } else { 0.0 };
             row[k] = if inside[k] { at[1] } else { 0.0 };

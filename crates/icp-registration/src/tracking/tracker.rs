@@ -191,10 +191,10 @@ impl Tracker {
         if self.current.filled() < self.options.min_filled {
             return Err(LossReason::TooFewPoints);
         }
-        let near = self.near(last, prediction).and_then(|measured| self.placed(measured, last, prediction));
+        let near = self.near(last, prediction).and_then(|measured| self.placed(&measured, last, prediction));
         let near = near.or_else(|reason| {
             let measured = self.with_previous(last, prediction, Measured::is_sound).ok_or(reason)?;
-            self.placed(measured, last, prediction)
+            self.placed(&measured, last, prediction)
         });
         let found = match &near {
             Ok((measured, _)) if measured.agreement.consent() >= LEAST_CONSENT => return near,
@@ -211,12 +211,12 @@ impl Tracker {
     /// A registration weighed against the prediction.
     fn placed(
         &self,
-        measured: Measured,
+        measured: &Measured,
         last: &Last,
         prediction: &Prediction,
     ) -> std::result::Result<(Measured, Fix), LossReason> {
         let predicted = prediction.seen_from(&self.keyframes.graph.relative(measured.keyframe, last.keyframe));
-        self.fixed(&measured, &predicted, last.lost_frames)
+        self.fixed(measured, &predicted, last.lost_frames)
     }
 
     fn found(&mut self, timestamp_s: f64, last: &Last, seen: &Seen) -> TrackedPose {

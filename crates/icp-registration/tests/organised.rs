@@ -35,6 +35,10 @@ fn pairs_come_together_from_the_identity() {
         let squared = e.dot(&(result.covariance.try_inverse().unwrap() * e));
         // Chi-squared with six degrees of freedom exceeds 25 once in three thousand.
         assert!(squared < 25.0, "pair {k}: {squared}");
+        let options = FrameAlignmentOptions { noise_fraction: Some(2.0), ..FrameAlignmentOptions::default() };
+        let early = align_frames(&source, &target, &Isometry3::identity(), &options).unwrap();
+        let e = pose_difference(&early.target_from_source, &result.target_from_source);
+        assert!(e.dot(&(result.covariance.try_inverse().unwrap() * e)) < 0.6, "a tenth of six, the noise: {e}");
     }
 }
 

@@ -65,6 +65,7 @@ fn input_without_an_answer_gets_a_typed_error() {
         FrameAlignmentOptions { min_correspondences: 0, ..options.clone() },
         FrameAlignmentOptions { max_motion_sigma_m: Some(f64::NAN), ..options.clone() },
         FrameAlignmentOptions { step_tolerance_m: Some(0.0), ..options.clone() },
+        FrameAlignmentOptions { noise_fraction: Some(0.0), ..options.clone() },
         FrameAlignmentOptions { max_normal_angle_rad: -1.0, ..options.clone() },
         FrameAlignmentOptions { prior: Some(Matrix6::zeros()), ..options.clone() },
         FrameAlignmentOptions { prior: Some(Matrix6::from_element(f64::NAN)), ..options.clone() },

@@ -9,7 +9,7 @@ use super::options::FrameAlignmentOptions;
 use super::pairs::Rules;
 use super::quality::{Cell, Hold, Verdict};
 use super::sums::{SUMS, median_residual, normal_equations};
-use super::track::{Gauge, Track, blocks, moved, solve, turned};
+use super::track::{FEWEST_POINTS, Gauge, Track, blocks, finest_part, is_within_noise, moved, solve, turned};
 use crate::error::{Error, Result};
 use crate::icp::{DegeneracyPolicy, IcpResult, StopReason};
 use crate::pose::{is_finite, pose_difference, step_pose, symmetrised, tangent_from_centred};
@@ -27,8 +27,11 @@ const COARSE_ITERATIONS: usize = 8;
 const WIDE_ITERATIONS: usize = 3;
 /// Coarse levels end when a step is below this, in units of the radius.
 const COARSE_TOLERANCE: f64 = 1e-3;
-/// Fewest points of a level.
-const FEWEST_POINTS: usize = 200;
+/// Standard deviations of a step, as a multiple of those asked for at the end, below which all nodes follow on a quarter
+/// of them: that one's own noise is twice as large.
+const BEFORE_ALL: f64 = 2.0;
+/// Steps on the last level before which the reach of the kernel is set.
+const NARROWINGS: usize = 3;
 
 /// Aligns `source` with `target`, starting at `guess` (both poses `target_from_source`).
 ///
@@ -93,7 +96,8 @@ impl FrameAligner {
             reach: BIWEIGHT,
             least_cosine: self.options.max_normal_angle_rad.cos() as f32,
         };
-        let track = Track { pose: *guess, iterations: 0, rules, held: Matrix6::zeros(), last_step: Vector6::zeros() };
+        let (held, last_step) = (Matrix6::zeros(), Vector6::zeros());
+        let track = Track { pose: *guess, iterations: 0, rules, held, last_step, over_sigma: f64::INFINITY };
         let first = self.course(track.clone(), source, target, guess);
         if self.hold() == Hold::Undetermined || self.options.other_starts == 0 {
             return first.map(|(_, result)| result);
@@ -246,14 +250,31 @@ impl FrameAligner {
             track.held = verdict.held();
         }
         track.rules.extra_variance = 0.0;
-        let mut narrowed = 0;
+        let mut narrowings = NARROWINGS;
+        if let Some(fraction) = self.options.noise_fraction {
+            self.iterate(track, source, target, finest_part(source), BEFORE_ALL * fraction, &mut narrowings)?;
+        }
+        self.iterate(track, source, target, blocks, self.options.noise_fraction.unwrap_or(0.0), &mut narrowings)
+    }
+
+    /// Iterates on some nodes until a step is short, or shorter than so many standard deviations.
+    fn iterate(
+        &mut self,
+        track: &mut Track,
+        source: &OrganisedFrame,
+        target: &OrganisedFrame,
+        blocks: &[Block],
+        over_sigma: f64,
+        narrowings: &mut usize,
+    ) -> Result<StopReason> {
         while track.iterations < self.options.max_iterations {
-            if narrowed < 3 {
-                self.rescale(track, source, target, narrowed == 0);
-                narrowed += 1;
+            if *narrowings > 0 {
+                self.rescale(track, source, target, *narrowings == NARROWINGS);
+                *narrowings -= 1;
             }
             let (step, gauge) = self.step(track, source, target, blocks, 0.0)?;
-            if step <= self.options.step_tolerance_m.unwrap_or(1e-5 * gauge.radius_m) && narrowed >= 3 {
+            let is_short = step <= self.options.step_tolerance_m.unwrap_or(1e-5 * gauge.radius_m);
+            if *narrowings == 0 && (is_short || track.over_sigma <= over_sigma) {
                 return Ok(StopReason::Converged);
             }
         }
@@ -290,6 +311,7 @@ impl FrameAligner {
         track.pose = turned(&track.pose, &step, &gauge);
         track.iterations += 1;
         track.last_step = step;
+        track.over_sigma = step.dot(&(normal.matrix * step)).sqrt();
         Ok((step.norm(), gauge))
     }
 
@@ -302,11 +324,14 @@ impl FrameAligner {
         stop: StopReason,
     ) -> Result<IcpResult> {
         let (moved, gauge) = moved(track, source, target);
-        let normal = normal_equations(&moved, &track.rules, &source.points.blocks, &mut self.chunks);
         let limit = self.max_motion_sigma_m(&gauge);
         let verdict =
             Verdict::new(&moved, &track.rules, &source.points.blocks, limit, Residuals::Settled, &mut self.cells)?;
+        let normal = &verdict.normal;
         let mut pose = track.pose;
+        if self.options.noise_fraction.is_some() && stop == StopReason::Converged {
+            pose = turned(&pose, &solve(normal, &track.held, 0.0)?, &gauge);
+        }
         let to_tangent = tangent_from_centred(&pose, &gauge.centre, gauge.radius_m);
         let centred = if let Some(prior) = &self.options.prior {
             let what = "the tangent of the pose";
@@ -356,11 +381,6 @@ impl FrameAligner {
             iteration: track.iterations,
         }
     }
-}
-
-/// Whether a step is shorter than a tenth of its standard deviation: pairs that change back and forth.
-fn is_within_noise(step: &Vector6<f64>, covariance: &Matrix6<f64>) -> bool {
-    covariance.cholesky().is_some_and(|c| step.dot(&c.solve(step)) < 0.01)
 }
 
 #[cfg(test)]

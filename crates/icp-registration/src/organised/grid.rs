@@ -14,6 +14,10 @@ const PIXELS_TO_REDUCE: usize = 30_000;
 pub(super) const STRIDES: [usize; 4] = [8, 4, 2, 1];
 /// Nodes that are worked on together.
 pub(super) const BLOCK: usize = 8;
+/// Cells across the longer side of the frame: nodes of a cell share errors.
+const CELLS: usize = 24;
+/// Cells of a square frame.
+pub(super) const MOST_CELLS: usize = CELLS * CELLS;
 /// Stands for no node where a level does not fill its last block.
 pub(super) const NO_NODE: u32 = u32::MAX;
 
@@ -33,8 +37,11 @@ pub(crate) struct Grid {
     /// Turns the gradient of a function along columns and rows of nodes into that along u and v:
     /// `du = m[0] dc + m[1] dr`, `dv = m[2] dc + m[3] dr`.
     pub gradient: Vec<[f32; 4]>,
-    /// The nodes level by level: coarse ones first, then what each finer level adds.
+    /// The nodes level by level: coarse ones first, then what each finer level adds, cell by cell.
     pub order: Vec<[u32; BLOCK]>,
+    /// Cells of the nodes of `order`, below `cell_count`.
+    pub cells: Vec<[u16; BLOCK]>,
+    pub cell_count: usize,
     /// Blocks of `order` that make up each level.
     pub levels: [usize; STRIDES.len()],
 }
@@ -54,8 +61,12 @@ impl Grid {
         };
         let rays: Vec<[f64; 2]> = (0..cols * rows).map(|k| mean_ray(k % cols, k / cols)).collect();
         let gradient = (0..cols * rows).map(|k| gradient(&rays, cols, rows, k, lens, bin)).collect();
-        let (order, levels) = by_levels(cols, rows);
+        let tiles = Tiles::new(cols, rows);
+        let (order, levels) = by_levels(cols, rows, &tiles);
+        let cells = order.iter().map(|block| block.map(|node| tiles.cell(node))).collect();
         Self {
+            cells,
+            cell_count: tiles.count,
             bin,
             cols,
             rows,
@@ -73,8 +84,31 @@ impl Grid {
     }
 }
 
+/// The squares of nodes that are the cells of a frame.
+struct Tiles {
+    cols: usize,
+    /// Nodes along a side.
+    side: usize,
+    across: usize,
+    count: usize,
+}
+
+impl Tiles {
+    fn new(cols: usize, rows: usize) -> Self {
+        let side = cols.max(rows).div_ceil(CELLS).max(1);
+        let across = cols.div_ceil(side);
+        Self { cols, side, across, count: across * rows.div_ceil(side) }
+    }
+
+    /// The cell of a node; the first one where there is no node.
+    fn cell(&self, node: u32) -> u16 {
+        let node = if node == NO_NODE { 0 } else { node as usize };
+        (node / self.cols / self.side * self.across + node % self.cols / self.side) as u16
+    }
+}
+
 /// Blocks of nodes, level by level, and how many of them each level has.
-fn by_levels(cols: usize, rows: usize) -> (Vec<[u32; BLOCK]>, [usize; STRIDES.len()]) {
+fn by_levels(cols: usize, rows: usize, tiles: &Tiles) -> (Vec<[u32; BLOCK]>, [usize; STRIDES.len()]) {
     let (mut order, mut levels) = (Vec::new(), [0; STRIDES.len()]);
     for (level, &stride) in STRIDES.iter().enumerate() {
         let mut nodes = Vec::new();
@@ -84,6 +118,8 @@ fn by_levels(cols: usize, rows: usize) -> (Vec<[u32; BLOCK]>, [usize; STRIDES.le
             let (first, step) = if done { (stride, 2 * stride) } else { (0, stride) };
             nodes.extend((first..cols).step_by(step).map(|col| (row * cols + col) as u32));
         }
+        // Blocks that lie in one cell are summed up at once.
+        nodes.sort_by_key(|node| tiles.cell(*node));
         order.extend(nodes.chunks(BLOCK).map(|chunk| {
             let mut block = [NO_NODE; BLOCK];
             block[..chunk.len()].copy_from_slice(chunk);

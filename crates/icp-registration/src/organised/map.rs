@@ -1,9 +1,14 @@
 //! A frame as a piece of a map: how well another agrees with it, what it learns from it, and what it looks like.
+// Only what is inlined is compiled for wide registers.
+#![allow(clippy::inline_always)]
+// Lanes lie side by side: with an index, loops read as their formulas and have the same length everywhere.
+#![allow(clippy::needless_range_loop)]
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
 use super::frame::OrganisedFrame;
-use super::pairs::{Locate, WithLocate, with_locate};
+use super::grid::BLOCK;
+use super::pairs::{Locate, Moved, WithLocate, with_locate};
 
 /// Distances from a plane within this multiple of their standard deviation agree with it.
 const AGREEING_SIGMA: f32 = 4.0;
@@ -70,13 +75,8 @@ impl OrganisedFrame {
         scratch: &mut Vec<(u32, f32, f32)>,
     ) {
         scratch.clear();
-        let each = |p: Option<Partner>| {
-            let Some(p) = p else { return };
-            if p.residual * p.residual < 9.0 * p.variance() && p.cosine >= AGREEING_COSINE {
-                scratch.push((p.node, p.residual, p.source_variance));
-            }
-        };
-        with_locate(self, Partners { target: self, source, pose: self_from_source, stride: 1, each });
+        let moved = Moved::new(source, self, self_from_source, &Vector3::zeros(), 1.0);
+        with_locate(self, Learning { moved: &moved, learned: scratch });
         for &(node, residual, source_variance) in scratch.iter() {
             let (plane, sigma) = (&mut self.planes[node as usize], &mut self.sigma[node as usize]);
             let variance = *sigma * *sigma;
@@ -184,6 +184,47 @@ impl Partner {
 
     fn tolerance(&self) -> f32 {
         AGREEING_SIGMA * self.variance().sqrt() - AGREEING_SHARE * self.point[2]
+    }
+}
+
+/// The planes on which nodes fall within their noise, with distance and variance of the nodes.
+struct Learning<'a, 'b> {
+    moved: &'a Moved<'b>,
+    learned: &'a mut Vec<(u32, f32, f32)>,
+}
+
+impl WithLocate for Learning<'_, '_> {
+    type Output = ();
+
+    fn run<L: Locate>(self, locate: L) {
+        pulp::Arch::new().dispatch(LocatedLearning { all: self, locate });
+    }
+}
+
+struct LocatedLearning<'a, 'b, L> {
+    all: Learning<'a, 'b>,
+    locate: L,
+}
+
+impl<L: Locate> pulp::WithSimd for LocatedLearning<'_, '_, L> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) {
+        let Learning { moved, learned } = self.all;
+        for block in &moved.source.points.blocks {
+            let d = moved.distances(self.locate, block);
+            let mut fits = [false; BLOCK];
+            for k in 0..BLOCK {
+                // NaN fails.
+                fits[k] = d.residual[k] * d.residual[k] < 9.0 * d.variance[k] && d.cosine[k] >= AGREEING_COSINE;
+            }
+            for k in 0..BLOCK {
+                if fits[k] {
+                    learned.push((d.node[k] as u32, d.residual[k], block.variance[k]));
+                }
+            }
+        }
     }
 }
 

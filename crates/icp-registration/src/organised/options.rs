@@ -30,6 +30,10 @@ pub struct FrameAlignmentOptions {
     /// The run has converged when a step moves points at the frame's radius by less than this, metre. `None`: 1e-5 of
     /// that radius.
     pub step_tolerance_m: Option<f64>,
+    /// The run has settled as soon as a step is shorter than this multiple of its standard deviation, as the weights of
+    /// the pairs tell it; most steps are then taken on a quarter of the nodes, and the last one is taken with the
+    /// covariance. `None`: only `step_tolerance_m` counts. Default `None`.
+    pub noise_fraction: Option<f64>,
     /// Pairs whose normals enclose a larger angle are refused, radian. Default 45 degrees.
     pub max_normal_angle_rad: f64,
     /// Fewest pairs. Default 20.
@@ -46,6 +50,7 @@ impl Default for FrameAlignmentOptions {
             other_starts: 14,
             max_iterations: 60,
             step_tolerance_m: None,
+            noise_fraction: None,
             max_normal_angle_rad: std::f64::consts::FRAC_PI_4,
             min_correspondences: 20,
         }
@@ -54,8 +59,12 @@ impl Default for FrameAlignmentOptions {
 
 impl FrameAlignmentOptions {
     pub(crate) fn validate(&self) -> Result<()> {
-        let lengths = [("max_motion_sigma_m", self.max_motion_sigma_m), ("step_tolerance_m", self.step_tolerance_m)];
-        for (name, value) in lengths {
+        let positive = [
+            ("max_motion_sigma_m", self.max_motion_sigma_m),
+            ("step_tolerance_m", self.step_tolerance_m),
+            ("noise_fraction", self.noise_fraction),
+        ];
+        for (name, value) in positive {
             if let Some(value) = value
                 && !(value > 0.0 && value.is_finite())
             {

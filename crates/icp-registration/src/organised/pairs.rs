@@ -1,6 +1,8 @@
 //! Pairs of source nodes and target planes, found by projection, some at a time.
 // Only what is inlined is compiled for wide registers.
 #![allow(clippy::inline_always)]
+// Without branches, all lanes are compared at once.
+#![allow(clippy::needless_bitwise_bool)]
 // Lanes lie side by side: with an index, loops read as their formulas and have the same length everywhere.
 #![allow(clippy::needless_range_loop)]
 
@@ -11,6 +13,10 @@ use super::frame::OrganisedFrame;
 use super::grid::BLOCK;
 use super::projection::Lens;
 use super::table::Table;
+
+/// Above the number of nodes of any frame, and the bits of single precision that hold what is below it.
+const TWO_TO_23: f32 = 8_388_608.0;
+const LOW_BITS: u32 = (1 << 23) - 1;
 
 /// Where a ray (u, v, -1) falls on the grid of nodes, in nodes; NaN or beyond the grid where it does not.
 pub(super) trait Locate: Copy + Sync {
@@ -109,6 +115,8 @@ pub(super) struct Pairs {
 
 /// Where nodes lie for the target; NaN where it has no plane.
 pub(super) struct Distances {
+    /// The target's nodes; beyond all of them where there is none.
+    pub node: [usize; BLOCK],
     /// Distance beyond the target plane, seen from the target's camera, metre.
     pub residual: [f32; BLOCK],
     /// Variance of the residual, m².
@@ -189,9 +197,9 @@ impl<'a> Moved<'a> {
     ) -> ([[f32; BLOCK]; 3], [[f32; BLOCK]; 3], [[f32; BLOCK]; 4], Distances) {
         let p = self.rotated(&block.position, self.translation);
         let source_normal = self.rotated(&block.normal, [0.0; 3]);
-        let (planes, variances) = self.partners(locate, &p);
+        let (node, planes, variances) = self.partners(locate, &p);
         let nothing = [0.0; BLOCK];
-        let mut distances = Distances { residual: nothing, variance: nothing, cosine: nothing };
+        let mut distances = Distances { node, residual: nothing, variance: nothing, cosine: nothing };
         for k in 0..BLOCK {
             let [a, b, c, d] = [planes[0][k], planes[1][k], planes[2][k], planes[3][k]];
             distances.residual[k] = a * p[0][k] + b * p[1][k] + c * p[2][k] - d;
@@ -213,31 +221,47 @@ impl<'a> Moved<'a> {
         moved
     }
 
-    /// Planes and variances of the target nodes on which points fall; NaN where there are none.
+    /// The target nodes on which points fall, with their planes and variances; NaN where there are none.
     #[inline(always)]
-    fn partners<L: Locate>(&self, locate: L, p: &[[f32; BLOCK]; 3]) -> ([[f32; BLOCK]; 4], [f32; BLOCK]) {
+    #[allow(clippy::type_complexity)]
+    fn partners<L: Locate>(
+        &self,
+        locate: L,
+        p: &[[f32; BLOCK]; 3],
+    ) -> ([usize; BLOCK], [[f32; BLOCK]; 4], [f32; BLOCK]) {
         let grid = &self.target.projection.grid;
         let (cols, rows) = (grid.cols as f32, grid.rows as f32);
-        let mut index = [u32::MAX; BLOCK];
+        let mut index = [usize::MAX; BLOCK];
+        let (mut col, mut row, mut inside) = ([0.0; BLOCK], [0.0; BLOCK], [false; BLOCK]);
         for k in 0..BLOCK {
             let per_depth = -1.0 / p[2][k];
-            let [col, row] = locate.node(p[0][k] * per_depth, p[1][k] * per_depth);
-            let (col, row) = (col + 0.5, row + 0.5);
+            let node = locate.node(p[0][k] * per_depth, p[1][k] * per_depth);
+            let at = node.map(|x| x + 0.5);
             // NaN fails.
-            let inside = p[2][k] < 0.0 && col >= 0.0 && row >= 0.0 && col < cols && row < rows;
-            let (col, row) = if inside { (col as i32, row as i32) } else { (0, 0) };
-            index[k] = if inside { (row * grid.cols as i32 + col) as u32 } else { u32::MAX };
+            inside[k] = (p[2][k] < 0.0) & (at[0] >= 0.0) & (at[1] >= 0.0) & (at[0] < cols) & (at[1] < rows);
+            col[k] = if inside[k] { at[0] } else { 0.0 };
+            row[k] = if inside[k] { at[1] } else { 0.0 };
         }
-        let (mut planes, mut variances) = ([[f32::NAN; BLOCK]; 4], [f32::NAN; BLOCK]);
         for k in 0..BLOCK {
-            let i = index[k] as usize;
-            if let (Some(plane), Some(sigma)) = (self.target.planes.get(i), self.target.sigma.get(i)) {
-                for j in 0..4 {
-                    planes[j][k] = plane[j];
-                }
-                variances[k] = sigma * sigma;
+            // Whole numbers below 2²³ as the low bits of their sum with it: a cast would be done lane by lane.
+            let node = (row[k].floor() * cols + col[k].floor() + TWO_TO_23).to_bits() & LOW_BITS;
+            index[k] = if inside[k] { node as usize } else { usize::MAX };
+        }
+        let (mut nodes, mut variances) = ([[f32::NAN; 4]; BLOCK], [f32::NAN; BLOCK]);
+        let count = self.target.planes.len().min(self.target.sigma.len());
+        let (all_planes, all_sigma) = (&self.target.planes[..count], &self.target.sigma[..count]);
+        for k in 0..BLOCK {
+            if index[k] < count {
+                nodes[k] = all_planes[index[k]];
+                variances[k] = all_sigma[index[k]].powi(2);
             }
         }
-        (planes, variances)
+        let mut planes = [[f32::NAN; BLOCK]; 4];
+        for j in 0..4 {
+            for k in 0..BLOCK {
+                planes[j][k] = nodes[k][j];
+            }
+        }
+        (index, planes, variances)
     }
 }

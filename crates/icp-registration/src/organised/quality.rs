@@ -14,22 +14,18 @@ use nalgebra::{DMatrix, Matrix6, Vector3, Vector6};
 use rayon::prelude::*;
 
 use super::blocks::Block;
-use super::grid::BLOCK;
-use super::pairs::{Locate, Moved, Rules, WithLocate, with_locate};
-use super::sums::derivatives;
+use super::grid::{BLOCK, MOST_CELLS};
+use super::pairs::{Locate, Moved, Pairs, Rules, WithLocate, with_locate};
+use super::sums::{self, Normal, derivatives};
 use crate::error::{Error, Result};
 use crate::icp::UndeterminedMotion;
 use crate::pose::symmetrised;
 use crate::quality::{Direction, Directions, FEWEST_CELLS, Residuals, SIGNIFICANCE, expanded};
 
-/// Cells across the longer side of the frame.
-const CELLS: usize = 24;
 /// Information that stands out beside cells that carry none, over its scatter, and the multiple of the middle cell above
 /// which a cell is not one of these.
 const CLEAR_SIGNIFICANCE: f64 = 5.0;
 const CLIP: f64 = 5.0;
-/// Cells of a square frame.
-const MOST_CELLS: usize = CELLS * CELLS;
 /// Share of the largest information that rounding can imitate (single precision).
 const ROUNDING: f64 = 1e-7;
 /// Smallest variance of a score, as a share of the information: a frame registered with itself leaves no residual at all, and
@@ -39,6 +35,8 @@ const LEAST_SCORE: f64 = 1e-8;
 const PARTS: usize = 4;
 /// 6 scores and 21 products.
 const SUMS: usize = 6 + 21;
+/// The normal equations and 21 products of independent scores.
+const TOTALS: usize = sums::SUMS + 21;
 
 /// Motions that keep the guess.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -55,6 +53,8 @@ pub(super) type Cell = [f64; SUMS];
 /// What the pairs say about the pose.
 pub(super) struct Verdict {
     directions: Directions,
+    /// The normal equations of the same pairs.
+    pub(super) normal: Normal,
 }
 
 impl Verdict {
@@ -67,7 +67,7 @@ impl Verdict {
         residuals: Residuals,
         cells: &mut Vec<Cell>,
     ) -> Result<Self> {
-        let (cells, independent, count) = fill(moved, rules, blocks, cells);
+        let (cells, independent, normal) = fill(moved, rules, blocks, cells);
         let information = symmetric(&cells.iter().fold([0.0; 21], |mut sum, cell| {
             sum.iter_mut().zip(&cell[6..]).for_each(|(s, c)| *s += c);
             sum
@@ -77,11 +77,12 @@ impl Verdict {
             Residuals::Misaligned => independent,
             Residuals::Settled if used >= FEWEST_CELLS => clustered(cells) * (used as f64 / (used as f64 - 6.0)),
             // Too few cells to estimate from: the pairs of a cell taken as fully dependent.
-            Residuals::Settled => independent * (count as f64 / used.max(1) as f64),
+            Residuals::Settled => independent * (normal.pairs as f64 / used.max(1) as f64),
         };
         let score = score + Matrix6::identity() * (LEAST_SCORE / 6.0 * information.trace());
         let significant = |motion: &Vector6<f64>, information| is_significant(cells, information, motion);
-        Ok(Self { directions: Directions::new(&information, |_| (score, 1.0), significant, ROUNDING, max_sigma_m)? })
+        let directions = Directions::new(&information, |_| (score, 1.0), significant, ROUNDING, max_sigma_m)?;
+        Ok(Self { directions, normal })
     }
 
     /// Orthonormal undetermined motions `[dt, rho w]`.
@@ -183,54 +184,47 @@ fn symmetric(upper: &[f64; 21]) -> Matrix6<f64> {
     matrix
 }
 
-/// Sums over the cells, the covariance of the score of pairs that share nothing, and the number of pairs.
+/// Sums over the cells, the covariance of the score of pairs that share nothing, and the normal equations.
 fn fill<'c>(
     moved: &Moved<'_>,
     rules: &Rules,
     blocks: &[Block],
     cells: &'c mut Vec<Cell>,
-) -> (&'c [Cell], Matrix6<f64>, usize) {
-    let grid = &moved.source.projection.grid;
-    let side = grid.cols.max(grid.rows).div_ceil(CELLS).max(1);
-    let across = grid.cols.div_ceil(side);
-    let count = across * grid.rows.div_ceil(side);
+) -> (&'c [Cell], Matrix6<f64>, Normal) {
+    let count = moved.source.projection.grid.cell_count;
     cells.clear();
     cells.resize(PARTS * count, [0.0; SUMS]);
-    let mut parts = [([0.0; 21], 0); PARTS];
-    with_locate(moved.target, Fill { moved, rules, blocks, side, across, cells, parts: &mut parts });
+    let mut parts = [[0.0; TOTALS]; PARTS];
+    with_locate(moved.target, Fill { moved, rules, blocks, cells, parts: &mut parts });
     let (first, others) = cells.split_at_mut(count);
     for part in others.chunks(count) {
         for (cell, other) in first.iter_mut().zip(part) {
             cell.iter_mut().zip(other).for_each(|(c, o)| *c += o);
         }
     }
-    let mut independent = [0.0; 21];
-    for (part, _) in &parts {
-        independent.iter_mut().zip(part).for_each(|(i, p)| *i += p);
-    }
-    (first, symmetric(&independent), parts.iter().map(|p| p.1).sum())
+    let total = |k: usize| parts.iter().map(|part| part[k]).sum::<f64>();
+    let independent = symmetric(&std::array::from_fn(|k| total(sums::SUMS + k)));
+    (first, independent, Normal::new(&std::array::from_fn(total)))
 }
 
 struct Fill<'a, 'b> {
     moved: &'a Moved<'b>,
     rules: &'a Rules,
     blocks: &'a [Block],
-    side: usize,
-    across: usize,
     cells: &'a mut [Cell],
-    parts: &'a mut [([f64; 21], usize); PARTS],
+    parts: &'a mut [[f64; TOTALS]; PARTS],
 }
 
 impl WithLocate for Fill<'_, '_> {
     type Output = ();
 
     fn run<L: Locate>(self, locate: L) {
-        let (moved, rules, side, across) = (self.moved, self.rules, self.side, self.across);
-        let cells = self.cells.par_chunks_mut(self.cells.len() / PARTS);
-        let blocks = self.blocks.par_chunks(self.blocks.len().div_ceil(PARTS).max(1));
-        cells.zip(self.parts.par_iter_mut()).zip(blocks).for_each(|((cells, (independent, pairs)), blocks)| {
-            let part = Part { moved, rules, side, across, locate, blocks, cells, independent, pairs };
-            pulp::Arch::new().dispatch(part);
+        let (moved, rules) = (self.moved, self.rules);
+        let size = self.blocks.len().div_ceil(PARTS).max(1);
+        let sums = self.cells.par_chunks_mut(self.cells.len() / PARTS).zip(self.parts.par_iter_mut());
+        let blocks = self.blocks.par_chunks(size).zip(moved.source.projection.grid.cells.par_chunks(size));
+        sums.zip(blocks).for_each(|((cells, totals), (blocks, cell_of))| {
+            pulp::Arch::new().dispatch(Part { moved, rules, locate, blocks, cell_of, cells, totals });
         });
     }
 }
@@ -238,13 +232,12 @@ impl WithLocate for Fill<'_, '_> {
 struct Part<'a, 'b, L> {
     moved: &'a Moved<'b>,
     rules: &'a Rules,
-    side: usize,
-    across: usize,
     locate: L,
     blocks: &'a [Block],
+    /// Cells of the nodes.
+    cell_of: &'a [[u16; BLOCK]],
     cells: &'a mut [Cell],
-    independent: &'a mut [f64; 21],
-    pairs: &'a mut usize,
+    totals: &'a mut [f64; TOTALS],
 }
 
 impl<L: Locate> pulp::WithSimd for Part<'_, '_, L> {
@@ -252,48 +245,86 @@ impl<L: Locate> pulp::WithSimd for Part<'_, '_, L> {
 
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(mut self, _: S) {
-        for block in self.blocks {
-            self.add(block);
+        let mut run = Run { cell: 0, lanes: [[0.0; BLOCK]; SUMS], totals: [[0.0; BLOCK]; TOTALS] };
+        for (block, cell_of) in self.blocks.iter().zip(self.cell_of) {
+            let pairs = self.moved.pairs(self.locate, self.rules, block);
+            self.add(&mut run, &pairs, cell_of);
         }
+        self.end(&mut run);
     }
+}
+
+/// Sums in single precision over blocks that follow each other in a cell.
+struct Run {
+    cell: u16,
+    lanes: [[f32; BLOCK]; SUMS],
+    totals: [[f32; BLOCK]; TOTALS],
 }
 
 impl<L: Locate> Part<'_, '_, L> {
     #[inline(always)]
-    fn add(&mut self, block: &Block) {
-        let pairs = self.moved.pairs(self.locate, self.rules, block);
+    fn add(&mut self, run: &mut Run, pairs: &Pairs, cell_of: &[u16; BLOCK]) {
         let along_target = derivatives(&pairs.lever, &pairs.normal);
         let along_source = derivatives(&pairs.lever, &pairs.source_normal);
         let mut lanes = [[0.0_f32; BLOCK]; SUMS];
-        let mut squares = [[0.0_f32; BLOCK]; 21];
+        let mut score = [0.0_f32; BLOCK];
+        for l in 0..BLOCK {
+            score[l] = pairs.weight[l] * pairs.residual[l];
+        }
+        let (normal, independent) = run.totals.split_at_mut(sums::SUMS);
         let mut k = 0;
         for r in 0..6 {
             for l in 0..BLOCK {
-                lanes[r][l] = along_target[r][l] * pairs.weight[l] * pairs.residual[l];
+                lanes[r][l] = along_target[r][l] * score[l];
             }
             for c in r..6 {
                 for l in 0..BLOCK {
                     let cross = along_target[r][l] * along_source[c][l] + along_target[c][l] * along_source[r][l];
                     lanes[6 + k][l] = 0.5 * pairs.slope[l] * cross;
-                    let score = pairs.weight[l] * pairs.residual[l];
-                    squares[k][l] = along_target[r][l] * along_target[c][l] * score * score;
+                    independent[k][l] += along_target[r][l] * along_target[c][l] * score[l] * score[l];
                 }
                 k += 1;
             }
         }
-        for (sum, square) in self.independent.iter_mut().zip(&squares) {
-            *sum += f64::from(square.iter().sum::<f32>());
+        if let Ok(normal) = normal.try_into() {
+            sums::add(normal, pairs, &along_target);
         }
-        let cols = self.moved.source.projection.grid.cols;
-        for l in 0..BLOCK {
-            if pairs.weight[l] > 0.0 {
-                *self.pairs += 1;
-                let (row, col) = (block.node[l] as usize / cols, block.node[l] as usize % cols);
-                let cell = &mut self.cells[row / self.side * self.across + col / self.side];
-                for (sum, lane) in cell.iter_mut().zip(&lanes) {
-                    *sum += f64::from(lane[l]);
+        self.sort(run, &lanes, cell_of, &pairs.weight);
+    }
+
+    /// Adds each lane to its cell.
+    #[inline(always)]
+    fn sort(&mut self, run: &mut Run, lanes: &[[f32; BLOCK]; SUMS], cell_of: &[u16; BLOCK], weight: &[f32; BLOCK]) {
+        let mut waiting = weight.map(|w| w > 0.0);
+        while let Some(first) = waiting.iter().position(|w| *w) {
+            let cell = cell_of[first];
+            if cell != run.cell {
+                self.end(run);
+                run.cell = cell;
+            }
+            let mut share = [0.0; BLOCK];
+            for l in 0..BLOCK {
+                share[l] = if cell_of[l] == cell { 1.0 } else { 0.0 };
+                waiting[l] &= cell_of[l] != cell;
+            }
+            for (sum, lane) in run.lanes.iter_mut().zip(lanes) {
+                for l in 0..BLOCK {
+                    sum[l] += share[l] * lane[l];
                 }
             }
         }
+    }
+
+    /// Hands the sums of a run over to its cell.
+    #[inline(always)]
+    fn end(&mut self, run: &mut Run) {
+        for (sum, lane) in self.cells[usize::from(run.cell)].iter_mut().zip(&run.lanes) {
+            *sum += f64::from(lane.iter().sum::<f32>());
+        }
+        for (sum, lane) in self.totals.iter_mut().zip(&run.totals) {
+            *sum += f64::from(lane.iter().sum::<f32>());
+        }
+        run.lanes = [[0.0; BLOCK]; SUMS];
+        run.totals = [[0.0; BLOCK]; TOTALS];
     }
 }

@@ -48,17 +48,23 @@ pub(super) fn normal_equations(
             *t += c;
         }
     }
-    let mut matrix = Matrix6::zeros();
-    let mut k = 0;
-    for r in 0..6 {
-        for c in r..6 {
-            matrix[(r, c)] = total[k];
-            matrix[(c, r)] = total[k];
-            k += 1;
+    Normal::new(&total)
+}
+
+impl Normal {
+    pub(super) fn new(sums: &[f64; SUMS]) -> Self {
+        let mut matrix = Matrix6::zeros();
+        let mut k = 0;
+        for r in 0..6 {
+            for c in r..6 {
+                matrix[(r, c)] = sums[k];
+                matrix[(c, r)] = sums[k];
+                k += 1;
+            }
         }
+        let gradient = Vector6::from_fn(|i, _| sums[21 + i]);
+        Self { matrix, gradient, weight: sums[27], square: sums[28], pairs: sums[29] as usize }
     }
-    let gradient = Vector6::from_fn(|i, _| total[21 + i]);
-    Normal { matrix, gradient, weight: total[27], square: total[28], pairs: total[29] as usize }
 }
 
 struct AllChunks<'a, 'b> {
@@ -100,7 +106,8 @@ impl<L: Locate> pulp::WithSimd for Chunk<'_, '_, L> {
     fn with_simd<S: pulp::Simd>(self, _: S) {
         let mut lanes = [[0.0_f32; BLOCK]; SUMS];
         for block in self.blocks {
-            add(&mut lanes, &self.moved.pairs(self.locate, self.rules, block));
+            let pairs = self.moved.pairs(self.locate, self.rules, block);
+            add(&mut lanes, &pairs, &derivatives(&pairs.lever, &pairs.normal));
         }
         for (sum, lane) in self.sums.iter_mut().zip(&lanes) {
             *sum = f64::from(lane.iter().sum::<f32>());
@@ -108,9 +115,9 @@ impl<L: Locate> pulp::WithSimd for Chunk<'_, '_, L> {
     }
 }
 
+/// Adds pairs with their derivatives.
 #[inline(always)]
-fn add(sums: &mut [[f32; BLOCK]; SUMS], pairs: &Pairs) {
-    let row = derivatives(&pairs.lever, &pairs.normal);
+pub(super) fn add(sums: &mut [[f32; BLOCK]; SUMS], pairs: &Pairs, row: &[[f32; BLOCK]; 6]) {
     let mut k = 0;
     for r in 0..6 {
         let mut weighted = [0.0; BLOCK];

@@ -4,9 +4,13 @@ use nalgebra::{Isometry3, Matrix6, UnitQuaternion, Vector3, Vector6};
 
 use super::blocks::Block;
 use super::frame::OrganisedFrame;
+use super::grid::STRIDES;
 use super::pairs::{Moved, Rules};
 use super::sums::Normal;
 use crate::error::{Error, Result};
+
+/// Fewest points of a level.
+pub(super) const FEWEST_POINTS: usize = 200;
 
 /// A pose on its way.
 #[derive(Clone)]
@@ -16,8 +20,9 @@ pub(super) struct Track {
     pub rules: Rules,
     /// Projection on the motions that are held.
     pub held: Matrix6<f64>,
-    /// The step that led here, `[dt, rho w]`.
+    /// The step that led here, `[dt, rho w]`, and its length in standard deviations.
     pub last_step: Vector6<f64>,
+    pub over_sigma: f64,
 }
 
 /// About which point, and in which unit, motions are solved.
@@ -30,6 +35,17 @@ pub(super) struct Gauge {
 /// The blocks of a level.
 pub(super) fn blocks(source: &OrganisedFrame, level: usize) -> &[Block] {
     &source.points.blocks[..source.projection.grid.levels[level]]
+}
+
+/// A quarter of the nodes, where these are enough.
+pub(super) fn finest_part(source: &OrganisedFrame) -> &[Block] {
+    let part = STRIDES.len() - 2;
+    if source.points.counts[part] >= FEWEST_POINTS { blocks(source, part) } else { &source.points.blocks }
+}
+
+/// Whether a step is shorter than a tenth of its standard deviation: pairs that change back and forth.
+pub(super) fn is_within_noise(step: &Vector6<f64>, covariance: &Matrix6<f64>) -> bool {
+    covariance.cholesky().is_some_and(|c| step.dot(&c.solve(step)) < 0.01)
 }
 
 pub(super) fn moved<'a>(track: &Track, source: &'a OrganisedFrame, target: &'a OrganisedFrame) -> (Moved<'a>, Gauge) {

@@ -23,7 +23,7 @@ const DISBELIEF: f64 = 40.0;
 const BY_VELOCITY: f64 = 0.25;
 /// What a pose found against expectation must agree by: fraction of the frame, and of what can be judged.
 const LEAST_OVERLAP: f64 = 0.5;
-const LEAST_CONSENT: f64 = 0.9;
+pub(super) const LEAST_CONSENT: f64 = 0.9;
 /// Planes it must share: three make a corner, and corners look alike.
 const LEAST_PLANES: usize = 4;
 /// Share of the radius (and radian) by which a camera that starts or stops may miss the prediction, as a standard
@@ -46,9 +46,15 @@ pub(super) struct Measured {
 }
 
 impl Measured {
-    /// Whether the geometry determines all motions well.
+    /// Whether the geometry determines all motions well, and nothing speaks against the pose.
     fn is_firm(&self, radius_m: f64) -> bool {
-        self.determined && self.pose.sigma_at(radius_m) <= WEAK_SHARE * radius_m
+        self.is_sound() && self.pose.sigma_at(radius_m) <= WEAK_SHARE * radius_m
+    }
+
+    /// Whether the frames agree at the pose as they do at right ones. Frames that have slid along a wall fit as well, and
+    /// can be as sure of it, but see through each other's surfaces.
+    pub(super) fn is_sound(&self) -> bool {
+        self.determined && self.agreement.consent() >= LEAST_CONSENT
     }
 
     /// The same with weak motions left open. What holds them are a few nodes, often at edges, and chance: their
@@ -101,15 +107,21 @@ impl Tracker {
             .map(|measured| Measured { keyframe: k, ..measured })
     }
 
-    /// The frame before as a new keyframe, where it determines what its own keyframe, with less in common, does not.
-    fn with_previous(&mut self, last: &Last, prediction: &Prediction) -> Option<Measured> {
+    /// The frame before as a new keyframe, where it determines what its own keyframe, with less in common, does not, or
+    /// agrees where that one does not.
+    pub(super) fn with_previous(
+        &mut self,
+        last: &Last,
+        prediction: &Prediction,
+        helps: impl Fn(&Measured) -> bool,
+    ) -> Option<Measured> {
         let exact = last.own.covariance == Matrix6::zeros();
         if last.lost_frames > 0 || exact {
             return None;
         }
         let guess = last.own.pose.inverse() * prediction.own.pose;
         let measured = register(&mut self.aligner, &self.options, &self.current, &self.previous, &guess).ok()?;
-        measured.is_firm(self.current.radius_m()).then(|| {
+        helps(&measured).then(|| {
             let total = Uncertain { covariance: last.own.covariance + last.shared, ..last.own };
             let keyframe = self.keyframes.add(self.previous.clone(), last.keyframe, &total);
             Measured { keyframe, ..measured }
@@ -125,25 +137,31 @@ impl Tracker {
         {
             return Ok(measured);
         }
-        if let Some(measured) = self.with_previous(last, prediction) {
+        let agrees = |measured: &Measured| measured.agreement.consent() >= LEAST_CONSENT;
+        let radius = self.current.radius_m();
+        let doubtful = !first.as_ref().is_ok_and(agrees);
+        let helps = |measured: &Measured| measured.is_firm(radius) || doubtful && measured.is_sound();
+        if let Some(measured) = self.with_previous(last, prediction, helps) {
             return Ok(measured);
         }
-        if let Ok(measured) = first
-            && (measured.determined || prediction.grounds != Grounds::Nothing)
-        {
+        let usable = |measured: &Measured| measured.determined || prediction.grounds != Grounds::Nothing;
+        if first.as_ref().is_ok_and(|measured| usable(measured) && agrees(measured)) {
             return first;
         }
-        let reason = first.err().unwrap_or(LossReason::Undetermined);
         let candidates = self.keyframes.candidates(&self.current, reference, &prediction.own.pose, reference);
         for (_, k) in candidates.into_iter().take(NEIGHBOURS) {
             let guess = self.keyframes.graph.relative(k, reference) * prediction.own.pose;
             if let Ok(measured) = self.try_keyframe(k, &guess)
-                && measured.determined
+                && measured.is_sound()
             {
                 return Ok(measured);
             }
         }
-        Err(reason)
+        match first {
+            Ok(measured) if usable(&measured) => first,
+            Ok(_) => Err(LossReason::Undetermined),
+            Err(reason) => Err(reason),
+        }
     }
 
     /// The pose by a registration and the prediction, and the registration as it was used: motions that it determines

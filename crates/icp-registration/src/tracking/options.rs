@@ -30,6 +30,10 @@ pub enum Relocalisation {
     CoarseWith(Box<CoarseOptions>),
 }
 
+/// Length of the step, in standard deviations, after which the last one is taken: noise alone makes a length of √6, and each
+/// step is about a third of the one before.
+const NOISE_FRACTION: f64 = 2.0;
+
 /// Options of a [`Tracker`](super::Tracker). The defaults carry no scale.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrackerOptions {
@@ -63,7 +67,10 @@ pub struct TrackerOptions {
 impl Default for TrackerOptions {
     fn default() -> Self {
         Self {
-            alignment: FrameAlignmentOptions::default(),
+            alignment: FrameAlignmentOptions {
+                noise_fraction: Some(NOISE_FRACTION),
+                ..FrameAlignmentOptions::default()
+            },
             world_from_first: Isometry3::identity(),
             keyframe_overlap: 0.7,
             max_keyframes: 64,

@@ -6,7 +6,7 @@ use nalgebra::{Isometry3, Matrix6};
 
 use super::graph::Edge;
 use super::keyframes::Keyframes;
-use super::locate::{Fix, Measured};
+use super::locate::{Fix, LEAST_CONSENT, Measured};
 use super::motion::{MotionPrior, Uncertain, diagonal};
 use super::options::{Fusion, TrackerOptions};
 use super::prediction::{Grounds, Last, Prediction};
@@ -191,14 +191,32 @@ impl Tracker {
         if self.current.filled() < self.options.min_filled {
             return Err(LossReason::TooFewPoints);
         }
-        let near = self.near(last, prediction).and_then(|measured| {
-            let predicted = prediction.seen_from(&self.keyframes.graph.relative(measured.keyframe, last.keyframe));
-            self.fixed(&measured, &predicted, last.lost_frames)
+        let near = self.near(last, prediction).and_then(|measured| self.placed(&measured, last, prediction));
+        let near = near.or_else(|reason| {
+            let measured = self.with_previous(last, prediction, Measured::is_sound).ok_or(reason)?;
+            self.placed(&measured, last, prediction)
         });
-        near.or_else(|reason| {
-            let measured = self.wide(last.lost_frames).ok_or(reason)?;
-            Ok((measured, Fix::unexpected(&measured)))
-        })
+        let found = match &near {
+            Ok((measured, _)) if measured.agreement.consent() >= LEAST_CONSENT => return near,
+            // What contradicts is still better than nothing, unless some other keyframe fits.
+            Ok(_) => {
+                let ranked = self.ranked();
+                self.alike(&ranked)
+            }
+            Err(_) => self.wide(last.lost_frames),
+        };
+        found.map_or(near, |measured| Ok((measured, Fix::unexpected(&measured))))
+    }
+
+    /// A registration weighed against the prediction.
+    fn placed(
+        &self,
+        measured: &Measured,
+        last: &Last,
+        prediction: &Prediction,
+    ) -> std::result::Result<(Measured, Fix), LossReason> {
+        let predicted = prediction.seen_from(&self.keyframes.graph.relative(measured.keyframe, last.keyframe));
+        self.fixed(measured, &predicted, last.lost_frames)
     }
 
     fn found(&mut self, timestamp_s: f64, last: &Last, seen: &Seen) -> TrackedPose {

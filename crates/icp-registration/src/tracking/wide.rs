@@ -19,16 +19,17 @@ impl Tracker {
     /// The current frame anywhere among the keyframes.
     pub(super) fn wide(&mut self, lost_frames: usize) -> Option<Measured> {
         let ranked = self.ranked();
-        for &(_, k, guess) in ranked.iter().filter(|r| r.0 < LARGEST_DIFFERENCE).take(TRIED) {
-            if let Some(measured) = self.verified(k, &guess) {
-                return Some(measured);
-            }
-        }
-        self.without_guess(&ranked, lost_frames)
+        self.alike(&ranked).or_else(|| self.without_guess(&ranked, lost_frames))
+    }
+
+    /// The current frame from the keyframes that look most like it.
+    pub(super) fn alike(&mut self, ranked: &[(f32, usize, Isometry3<f64>)]) -> Option<Measured> {
+        let similar = ranked.iter().filter(|r| r.0 < LARGEST_DIFFERENCE).take(TRIED);
+        similar.into_iter().find_map(|(_, k, guess)| self.verified(*k, guess))
     }
 
     /// Keyframes by the look of their thumbnails, best first, with the rotation that brings the thumbnails together.
-    fn ranked(&self) -> Vec<(f32, usize, Isometry3<f64>)> {
+    pub(super) fn ranked(&self) -> Vec<(f32, usize, Isometry3<f64>)> {
         let thumbnail = self.current.thumbnail(THUMBNAIL[0], THUMBNAIL[1]);
         let mut ranked = Vec::with_capacity(self.keyframes.list.len());
         for (k, keyframe) in self.keyframes.list.iter().enumerate() {

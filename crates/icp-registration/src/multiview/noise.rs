@@ -1,8 +1,8 @@
 //! How points scatter along their rays, learnt from the patches of their station.
 //!
-//! Noise grows with the range by a law that differs from camera to camera, and weights that follow another law cost
-//! precision: what is said of the points is multiplied by a power of the range that makes them scatter about their patches
-//! as is said.
+//! Standard deviations that come with the points are scaled so that the points scatter about their patches as these say.
+//! Where none come, they are a power of the range: noise grows with it by a law that differs from camera to camera, and
+//! weights that follow another law cost precision.
 
 use super::patches::{Patch, Surface};
 use super::points::EDGE_ON;
@@ -17,7 +17,7 @@ const FEWEST: usize = 8;
 /// Least ratio of variances: surfaces without noise leave rounding.
 const LEAST_RATIO: f64 = 1e-24;
 
-/// Factor of standard deviations: `exp(level + power ln(range / centre))`.
+/// Standard deviations, or a factor of them: `exp(level + power ln(range / centre))`.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct NoiseLaw {
     level: f64,
@@ -28,13 +28,20 @@ pub(super) struct NoiseLaw {
 }
 
 impl NoiseLaw {
-    /// `said`: standard deviations of the points of the cloud, in any unit; NaN where nothing is said.
-    pub(super) fn new(said: &[f64], surface: &Surface) -> Self {
-        let patches = surface.patches.iter().enumerate();
-        let mut ratios: Vec<(f64, f64)> =
-            patches.filter_map(|(index, patch)| ratio(said, surface.points_of(index), patch)).collect();
-        ratios.sort_by(|a, b| a.0.total_cmp(&b.0));
+    /// The factor of standard deviations of the points of the cloud, in any unit (NaN where nothing is said): one for all.
+    pub(super) fn scaling(said: &[f64], surface: &Surface) -> Self {
+        Self::of_groups(ratios(said, surface), 1)
+    }
+
+    /// The standard deviations themselves, by the range.
+    pub(super) fn by_range(points: usize, surface: &Surface) -> Self {
+        let ratios = ratios(&vec![1.0; points], surface);
         let groups = (ratios.len() / FEWEST).clamp(1, GROUPS);
+        Self::of_groups(ratios, groups)
+    }
+
+    fn of_groups(mut ratios: Vec<(f64, f64)>, groups: usize) -> Self {
+        ratios.sort_by(|a, b| a.0.total_cmp(&b.0));
         let medians = ratios.chunks(ratios.len().div_ceil(groups).max(1)).map(|group| {
             let median = |of: fn(&(f64, f64)) -> f64| quantile(&mut group.iter().map(of).collect::<Vec<f64>>(), 0.5);
             (median(|r| r.0), median(|r| r.1))
@@ -59,6 +66,11 @@ impl NoiseLaw {
         let at = range_m.ln().clamp(self.known[0], self.known[1]);
         (self.level + self.power * (at - self.centre)).exp()
     }
+}
+
+fn ratios(said: &[f64], surface: &Surface) -> Vec<(f64, f64)> {
+    let patches = surface.patches.iter().enumerate();
+    patches.filter_map(|(index, patch)| ratio(said, surface.points_of(index), patch)).collect()
 }
 
 /// Logarithms of the range of a patch and of the ratio of variances along its rays, found to said.

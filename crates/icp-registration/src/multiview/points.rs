@@ -117,11 +117,19 @@ impl StationPoints {
     }
 }
 
-/// Standard deviation of each point along its ray: what is said of it, 1 where nothing is said, as the patches correct it.
+/// Standard deviation of each point along its ray: what is said of it as the patches scale it, or what they tell.
 fn along_rays(cloud: &Cloud, surface: &Surface) -> Vec<f64> {
-    let said = cloud.sigma.clone().unwrap_or_else(|| vec![1.0; cloud.len()]);
-    let law = NoiseLaw::new(&said, surface);
-    cloud.points.iter().zip(&said).map(|(point, sigma)| sigma * law.factor(point.coords.norm())).collect()
+    let ranges = cloud.points.iter().map(|point| point.coords.norm());
+    match &cloud.sigma {
+        Some(said) => {
+            let law = NoiseLaw::scaling(said, surface);
+            ranges.zip(said).map(|(range, sigma)| sigma * law.factor(range)).collect()
+        }
+        None => {
+            let law = NoiseLaw::by_range(cloud.len(), surface);
+            ranges.map(|range| law.factor(range)).collect()
+        }
+    }
 }
 
 /// Standard deviation of each point across its patch; NaN for those in none.

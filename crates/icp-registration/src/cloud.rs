@@ -12,7 +12,7 @@ pub struct Cloud {
     pub points: Vec<Point3<f64>>,
     /// Unit normals, one a point; NaN in all components where a point has none.
     pub normals: Option<Vec<Vector3<f64>>>,
-    /// Standard deviation of each point, metre; NaN where unknown.
+    /// Standard deviation of each point, along its ray where it was seen along one, metre; NaN where unknown.
     pub sigma: Option<Vec<f64>>,
     /// Amplitude or intensity of each point in any unit; NaN where unknown.
     pub intensity: Option<Vec<f64>>,

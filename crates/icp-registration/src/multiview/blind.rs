@@ -27,8 +27,10 @@ const SWEEPS: usize = 4;
 const REPLACEMENTS: usize = 3;
 const REPLACED_FROM: usize = 6;
 const MUCH_BETTER: f64 = 1.1;
-/// Poses of a station nearer than this are one, voxels.
-const SAME_VOXELS: f64 = 3.0;
+/// Poses of a station nearer than this are one, voxels: one that has slid by a voxel fits no more.
+const SAME_VOXELS: f64 = 0.5;
+/// Poses nearer than this lead to one place, voxels: only the one that fits best is refined.
+const BESIDE_VOXELS: f64 = 3.0;
 
 /// Stations that may overlap, with the poses `target_from_source` that features allow, the best first.
 struct Candidate {
@@ -145,7 +147,10 @@ impl Search<'_> {
             extensions.par_iter().map(|extension| (rank(extension, STRIDE), *extension)).collect();
         // Stable: equal ones stay in the order of the proposals.
         ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
-        ranked.truncate(2 * ARRANGEMENTS);
+        let beside = |(_, (a, first)): &(_, (usize, _)), (_, (b, second)): &(_, (usize, _))| {
+            a == b && self.is_near(station, BESIDE_VOXELS, first, second)
+        };
+        let ranked = first_of_each(ranked, 2 * ARRANGEMENTS, beside);
         let refined = |(_, (k, pose)): &(f64, (usize, Isometry3<f64>))| {
             let pose = self.refined(&kept[*k].poses, station, pose, STEPS);
             let mut next = kept[*k].clone();
@@ -170,7 +175,8 @@ impl Search<'_> {
             let mut ranked: Vec<(f64, Isometry3<f64>)> =
                 proposals.into_par_iter().map(|pose| (self.evidence(&without, station, &pose, STRIDE), pose)).collect();
             ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
-            ranked.truncate(REPLACED_FROM);
+            let beside = |a: &(f64, _), b: &(f64, _)| self.is_near(station, BESIDE_VOXELS, &a.1, &b.1);
+            let ranked = first_of_each(ranked, REPLACED_FROM, beside);
             let refined = |(_, pose): &(f64, Isometry3<f64>)| {
                 let pose = self.refined(&without.poses, station, pose, STEPS);
                 (self.evidence(&without, station, &pose, 1), pose)
@@ -194,8 +200,6 @@ impl Search<'_> {
 
     /// Poses of a station by its pairs with those that have been placed, without repetitions.
     fn proposals(&self, arrangement: &Arrangement, station: usize) -> Vec<Isometry3<f64>> {
-        let apart_m = SAME_VOXELS * self.clouds[station].voxel_m();
-        let radius_m = self.clouds[station].radius_m;
         let mut found: Vec<Isometry3<f64>> = Vec::new();
         for candidate in self.candidates {
             let (other, inverted) = match station {
@@ -206,16 +210,19 @@ impl Search<'_> {
             let Some(placed) = arrangement.poses[other] else { continue };
             for (pose, _) in &candidate.poses {
                 let pose = placed * if inverted { pose.inverse() } else { *pose };
-                let is_known = |other: &Isometry3<f64>| {
-                    let moved = (other.translation.vector - pose.translation.vector).norm();
-                    moved + radius_m * other.rotation.angle_to(&pose.rotation) < apart_m
-                };
-                if !found.iter().any(is_known) {
+                if !found.iter().any(|other| self.is_near(station, SAME_VOXELS, other, &pose)) {
                     found.push(pose);
                 }
             }
         }
         found
+    }
+
+    /// Whether two poses of a station are this near, rotations at the radius of its cloud.
+    fn is_near(&self, station: usize, voxels: f64, a: &Isometry3<f64>, b: &Isometry3<f64>) -> bool {
+        let cloud = &self.clouds[station];
+        let moved_m = (a.translation.vector - b.translation.vector).norm();
+        moved_m + cloud.radius_m * a.rotation.angle_to(&b.rotation) < voxels * cloud.voxel_m()
     }
 
     fn evidence(&self, arrangement: &Arrangement, station: usize, pose: &Isometry3<f64>, stride: usize) -> f64 {
@@ -247,4 +254,15 @@ impl Search<'_> {
             }
         }
     }
+}
+
+/// Of a list, the best first, so many that lie beside none before them.
+fn first_of_each<T>(ranked: Vec<T>, most: usize, beside: impl Fn(&T, &T) -> bool) -> Vec<T> {
+    let mut kept: Vec<T> = Vec::with_capacity(most);
+    for next in ranked {
+        if kept.len() < most && !kept.iter().any(|other| beside(other, &next)) {
+            kept.push(next);
+        }
+    }
+    kept
 }

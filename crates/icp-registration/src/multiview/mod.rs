@@ -11,6 +11,7 @@ mod facets;
 mod grouping;
 mod loops;
 mod network;
+mod noise;
 mod pairs;
 mod patches;
 mod plane_fit;

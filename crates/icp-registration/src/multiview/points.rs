@@ -1,26 +1,25 @@
 //! The points of a station for the last rounds: all of them, also those beside edges that have no normal.
 //!
-//! Points near the rims of furniture carry much of what tells a station where it stands along a wall; a quarter of the
-//! information is lost with those in whose neighbourhood no normal is found.
+//! Points near the rims of furniture carry much of what tells a station where it stands along a wall: without those in
+//! whose neighbourhood no normal is found, and those at the rim, stations are known a third less well. No partner is looked
+//! for that would mislead: the rays tell which surface they saw, and what mixes two is far from both.
 
 use nalgebra::{Point3, Vector3};
 
 use super::grouping::by_cells;
-use super::patches::{Patch, Surface};
+use super::noise::NoiseLaw;
+use super::patches::Surface;
 use super::point_model::PointModel;
 use crate::cloud::Cloud;
 use crate::error::{Error, Result};
-use crate::kernel::quantile;
 use crate::neighbours::check_points;
 
 /// Size of a block, patches.
 const BLOCK: f64 = 2.0;
 /// Part of the noise along a ray that is left across a surface seen edge-on: rays are no better known than that.
-const EDGE_ON: f64 = 0.01;
+pub(super) const EDGE_ON: f64 = 0.01;
 /// Part of the size of a patch that no point is better known than.
 const ROUGHNESS: f64 = 3e-4;
-/// Median over mean of a chi-squared with about 25 degrees of freedom.
-const MEDIAN_SHARE: f64 = 0.973;
 
 /// Neighbouring points.
 #[derive(Debug, Clone)]
@@ -35,12 +34,10 @@ pub(super) struct Block {
 pub(super) struct StationPoints {
     /// In the station's frame.
     pub points: Vec<Point3<f64>>,
-    /// Standard deviation of each along its ray, or across its surface; NaN: not used.
+    /// Standard deviation of each along its ray, or across its surface where there are no rays; NaN: not used.
     pub sigma: Vec<f64>,
     /// Whether the station saw the points along rays from its origin.
     pub along_rays: bool,
-    /// Whether `sigma` is along the rays.
-    pub sigma_along_rays: bool,
     /// Variance that no point falls below: no surface is plane, metre².
     pub floor: f64,
     /// Index of each in the cloud.
@@ -54,31 +51,22 @@ pub(super) struct StationPoints {
 
 impl StationPoints {
     pub(super) fn new(cloud: &Cloud, surface: &Surface) -> Self {
-        let usable = |i: usize| !cloud.rim.as_ref().is_some_and(|rim| rim[i]);
-        let cells = by_cells(cloud, usable, BLOCK * surface.size_m);
+        let cells = by_cells(cloud, |_| true, BLOCK * surface.size_m);
         let cloud_index: Vec<u32> = cells.iter().map(|cell| cell.1).collect();
         let mut starts = vec![0];
         starts.extend((1..cells.len()).filter(|&i| cells[i].0 != cells[i - 1].0));
         starts.push(cells.len());
         let empty = Block { points: 0..0, centre: Point3::origin(), radius_m: 0.0 };
         let blocks = starts.windows(2).map(|ends| Block { points: ends[0]..ends[1], ..empty.clone() }).collect();
-        let sigma = cloud.sigma.as_deref().filter(|_| surface.oriented);
-        let across = sigma.is_none().then(|| of_patches(cloud.len(), surface));
-        let factor = sigma.map_or(1.0, |sigma| scatter(sigma, surface));
-        let sigma_of = |&i: &u32| match (&across, sigma) {
-            (Some(across), _) => across[i as usize],
-            (_, Some(sigma)) => sigma[i as usize] * factor,
-            _ => f64::NAN,
-        };
+        let sigma = if surface.oriented { along_rays(cloud, surface) } else { across_patches(cloud.len(), surface) };
         let mut slot_of = vec![u32::MAX; cloud.len()];
         for (slot, &index) in cloud_index.iter().enumerate() {
             slot_of[index as usize] = slot as u32;
         }
         let mut points = Self {
             points: Vec::new(),
-            sigma: cloud_index.iter().map(sigma_of).collect(),
+            sigma: cloud_index.iter().map(|&i| sigma[i as usize]).collect(),
             along_rays: surface.oriented,
-            sigma_along_rays: sigma.is_some(),
             floor: (ROUGHNESS * surface.size_m).powi(2),
             cloud_index,
             slot_of,
@@ -125,12 +113,27 @@ impl StationPoints {
     /// Variance across a surface whose normal has this cosine with the ray, metre².
     pub(super) fn variance(&self, point: usize, cosine: f64) -> f64 {
         let square = self.sigma[point] * self.sigma[point];
-        self.floor + if self.sigma_along_rays { square * (cosine * cosine + EDGE_ON) } else { square }
+        self.floor + if self.along_rays { square * (cosine * cosine + EDGE_ON) } else { square }
+    }
+}
+
+/// Standard deviation of each point along its ray: what is said of it as the patches scale it, or what they tell.
+fn along_rays(cloud: &Cloud, surface: &Surface) -> Vec<f64> {
+    let ranges = cloud.points.iter().map(|point| point.coords.norm());
+    match &cloud.sigma {
+        Some(said) => {
+            let law = NoiseLaw::scaling(said, surface);
+            ranges.zip(said).map(|(range, sigma)| sigma * law.factor(range)).collect()
+        }
+        None => {
+            let law = NoiseLaw::by_range(cloud.len(), surface);
+            ranges.map(|range| law.factor(range)).collect()
+        }
     }
 }
 
 /// Standard deviation of each point across its patch; NaN for those in none.
-fn of_patches(count: usize, surface: &Surface) -> Vec<f64> {
+fn across_patches(count: usize, surface: &Surface) -> Vec<f64> {
     let mut sigma = vec![f64::NAN; count];
     for (index, patch) in surface.patches.iter().enumerate() {
         for &point in surface.points_of(index) {
@@ -138,16 +141,4 @@ fn of_patches(count: usize, surface: &Surface) -> Vec<f64> {
         }
     }
     sigma
-}
-
-/// How much more the points scatter about their patches than their standard deviations say.
-fn scatter(sigma: &[f64], surface: &Surface) -> f64 {
-    let ratio = |(index, patch): (usize, &Patch)| {
-        let cosine = patch.normal.dot(&patch.centre.coords) / patch.centre.coords.norm();
-        let members = surface.points_of(index);
-        let square: f64 = members.iter().map(|&i| sigma[i as usize].powi(2)).sum();
-        patch.point_variance / (square / members.len() as f64 * (cosine * cosine + EDGE_ON))
-    };
-    let mut ratios: Vec<f64> = surface.patches.iter().enumerate().map(ratio).filter(|r| r.is_finite()).collect();
-    if ratios.is_empty() { 1.0 } else { (quantile(&mut ratios, 0.5) / MEDIAN_SHARE).max(1e-12).sqrt() }
 }

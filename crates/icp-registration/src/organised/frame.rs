@@ -34,6 +34,8 @@ pub struct OrganisedFrame {
     /// Standard deviation of the distance, metre.
     pub(super) sigma: Vec<f32>,
     misfit: Vec<f32>,
+    /// What the spread is multiplied by: 1 where the noise was given.
+    noise: f32,
     scratch: Vec<u32>,
     pub(super) points: Points,
     has_sigma: bool,
@@ -56,6 +58,7 @@ impl OrganisedFrame {
             planes: vec![[f32::NAN; 4]; nodes],
             sigma: vec![0.0; nodes],
             misfit: vec![f32::NAN; nodes],
+            noise: 1.0,
             scratch: Vec::with_capacity(SAMPLE),
             points: Points::new(&projection.grid),
             has_sigma: false,
@@ -104,7 +107,8 @@ impl OrganisedFrame {
     }
 
     /// The nodes as a cloud: points (averages over a square of pixels), normals towards the camera, and standard
-    /// deviations of the averages along the normals. Nodes without a plane, at edges and holes, are marked as rim.
+    /// deviations of the averages along their rays. Nodes without a plane, at edges and holes, are marked as rim and have
+    /// no normal.
     pub fn to_cloud(&self) -> Cloud {
         let grid = &self.projection.grid;
         let seen: Vec<usize> = (0..grid.len()).filter(|&k| self.inverse_depth[k].is_finite()).collect();
@@ -118,10 +122,14 @@ impl OrganisedFrame {
             let n = vector([self.planes[k][0], self.planes[k][1], self.planes[k][2]]);
             if has_plane(k) { -n.normalize() } else { Vector3::repeat(f64::NAN) }
         };
+        let sigma = |k: usize| {
+            let (w, spread) = (self.inverse_depth[k], self.spread[k]);
+            f64::from(spread * self.noise.max(ROUNDING * w / spread) / (w * w * grid.cosine[k]))
+        };
         Cloud {
             points: seen.iter().map(|&k| point(k)).collect(),
             normals: Some(seen.iter().map(|&k| normal(k)).collect()),
-            sigma: Some(seen.iter().map(|&k| if has_plane(k) { f64::from(self.sigma[k]) } else { f64::NAN }).collect()),
+            sigma: Some(seen.iter().map(|&k| sigma(k)).collect()),
             rim: Some(seen.iter().map(|&k| !has_plane(k)).collect()),
             ..Cloud::default()
         }
@@ -167,6 +175,7 @@ impl OrganisedFrame {
         let expected = (1.0 - 2.0 / (9.0 * freedom)).powi(3);
         let typical = (f64::from(median_of_bits(&mut self.scratch).unwrap_or(0.0)) / expected) as f32;
         let scale = if self.has_sigma { 1.0 } else { typical.sqrt() };
+        self.noise = scale;
         let limit = LARGEST_MISFIT * if self.has_sigma { typical.max(1.0) } else { typical };
         let nodes = self.planes.par_iter_mut().zip(&mut self.sigma).zip(&self.misfit);
         let seen = self.spread.par_iter().zip(&self.inverse_depth).zip(&self.projection.grid.cosine);

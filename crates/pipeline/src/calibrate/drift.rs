@@ -33,7 +33,10 @@ impl<'a> KnownDrift<'a> {
                 .to_owned();
             return Err(Error::Survey { path: file, message });
         }
-        let curve = drift.map(|drift| DriftCurve::new(drift, survey)).transpose().map_err(Error::stage("calibrate", "start values"))?;
+        let curve = drift
+            .map(|drift| DriftCurve::new(drift, survey))
+            .transpose()
+            .map_err(Error::stage("calibrate", "start values"))?;
         Ok(Self { curve, survey, file })
     }
 

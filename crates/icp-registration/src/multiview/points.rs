@@ -120,16 +120,12 @@ impl StationPoints {
 /// Standard deviation of each point along its ray: what is said of it as the patches scale it, or what they tell.
 fn along_rays(cloud: &Cloud, surface: &Surface) -> Vec<f64> {
     let ranges = cloud.points.iter().map(|point| point.coords.norm());
-    match &cloud.sigma {
-        Some(said) => {
-            let law = NoiseLaw::scaling(said, surface);
-            ranges.zip(said).map(|(range, sigma)| sigma * law.factor(range)).collect()
-        }
-        None => {
-            let law = NoiseLaw::by_range(cloud.len(), surface);
-            ranges.map(|range| law.factor(range)).collect()
-        }
+    if let Some(said) = &cloud.sigma {
+        let law = NoiseLaw::scaling(said, surface);
+        return ranges.zip(said).map(|(range, sigma)| sigma * law.factor(range)).collect();
     }
+    let law = NoiseLaw::by_range(cloud.len(), surface);
+    ranges.map(|range| law.factor(range)).collect()
 }
 
 /// Standard deviation of each point across its patch; NaN for those in none.

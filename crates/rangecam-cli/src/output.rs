@@ -1,10 +1,10 @@
 //! Where words go: results to standard output, everything else to standard error.
 
-#![allow(clippy::print_stdout, clippy::print_stderr)]
+#![allow(clippy::print_stderr)]
 
 use std::error::Error;
 use std::fmt::Display;
-use std::io::IsTerminal;
+use std::io::{ErrorKind, IsTerminal, Write};
 
 use pipeline::{Progress, Silent};
 use serde::Serialize;
@@ -49,8 +49,8 @@ impl Output {
     /// A result: JSON where that was asked for, words otherwise.
     pub(crate) fn result<T: Serialize + Display>(&self, result: &T) -> Result<(), Box<dyn Error>> {
         match self.voice {
-            Voice::Words => println!("{result}"),
-            Voice::Json => println!("{}", serde_json::to_string_pretty(result)?),
+            Voice::Words => print(result)?,
+            Voice::Json => print(&serde_json::to_string_pretty(result)?)?,
             Voice::Quiet => {}
         }
         Ok(())
@@ -59,7 +59,9 @@ impl Output {
     /// The summary of a refused calibration: as JSON where that was asked for, in words it is the error alone.
     pub(crate) fn refusal(&self, error: &(dyn Error + 'static)) {
         if let (Voice::Json, Some(pipeline::Error::Refused { summary, .. })) = (self.voice, error.downcast_ref()) {
-            println!("{summary}");
+            if let Err(error) = print(summary) {
+                self.error(&error);
+            }
         }
     }
 
@@ -67,5 +69,14 @@ impl Output {
     pub(crate) fn error(&self, error: &dyn Error) {
         let head = if self.colour { "\u{1b}[31merror:\u{1b}[0m" } else { "error:" };
         eprintln!("{head} {error}");
+    }
+}
+
+/// Prints a line. A reader that has closed the pipe has read enough: that is no failure.
+fn print(words: &impl Display) -> std::io::Result<()> {
+    let mut out = std::io::stdout().lock();
+    match writeln!(out, "{words}").and_then(|()| out.flush()) {
+        Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(()),
+        result => result,
     }
 }

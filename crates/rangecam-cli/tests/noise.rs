@@ -1,7 +1,7 @@
 //! The commands `noise` and `fpn` as a shell sees them.
 
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::{Command, Output, Stdio};
 
 fn rangecam(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_rangecam")).args(arguments).output().unwrap()
@@ -22,6 +22,14 @@ fn noise_and_fixed_pattern_of_a_simulated_wall() {
     let found = json(&rangecam(&["noise", &survey, "--out", &noise, "--json"]));
     assert_eq!(found["noise_of"], "samples");
     assert_eq!(found["parameters"][0]["name"], "shot_variance_per_unit");
+    // A reader that closes the pipe before anything is said has read enough.
+    let again = path("again");
+    let mut unheard = Command::new(env!("CARGO_BIN_EXE_rangecam"));
+    let unheard = unheard.args(["noise", &survey, "--out", &again, "--json"]);
+    let mut unheard = unheard.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    drop(unheard.stdout.take());
+    let unheard = unheard.wait_with_output().unwrap();
+    assert!(unheard.status.success(), "{}", String::from_utf8_lossy(&unheard.stderr));
     // One command's calibration is the next one's start.
     let calibration = format!("{noise}/calibration.ron");
     let found = json(&rangecam(&["fpn", &survey, "--calibration", &calibration, "--out", &pattern, "--json"]));

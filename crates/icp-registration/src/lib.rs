@@ -1,6 +1,7 @@
 #![doc = include_str!("../README.md")]
 
 mod absolute_orientation;
+mod awake;
 mod cloud;
 mod coarse;
 mod eigen;

@@ -29,6 +29,7 @@ mod multiview_real;
 mod neighbours;
 mod normals;
 mod organised;
+mod organised_cloud;
 mod organised_input;
 mod organised_real;
 mod parts;

@@ -32,13 +32,14 @@ fn pairs_come_together_from_the_identity() {
         assert!(result.is_trustworthy());
         assert!(result.overlap > 0.6 && result.rms_m > 0.0);
         let e = pose_difference(&result.target_from_source, &pair.target_from_source);
-        let squared = e.dot(&(result.covariance.try_inverse().unwrap() * e));
+        let information = result.covariance.try_inverse().unwrap();
+        let squared = e.dot(&(information * e));
         // Chi-squared with six degrees of freedom exceeds 25 once in three thousand.
         assert!(squared < 25.0, "pair {k}: {squared}");
         let options = FrameAlignmentOptions { noise_fraction: Some(2.0), ..FrameAlignmentOptions::default() };
         let early = align_frames(&source, &target, &Isometry3::identity(), &options).unwrap();
         let e = pose_difference(&early.target_from_source, &result.target_from_source);
-        assert!(e.dot(&(result.covariance.try_inverse().unwrap() * e)) < 0.6, "a tenth of six, the noise: {e}");
+        assert!(e.dot(&(information * e)) < 0.6, "a tenth of six, the noise: {e}");
     }
 }
 
@@ -371,32 +372,4 @@ fn the_scale_of_the_scene_does_not_matter() {
         // Single precision, and a last step below the tolerance.
         assert!(mm < 0.02 && degrees < 1e-3, "{scale}: {mm} mm, {degrees} degrees");
     }
-}
-
-#[test]
-fn the_cloud_of_a_frame_lies_on_its_surfaces() {
-    let camera = Pinhole::small();
-    let projection = pinhole(&camera);
-    let scene = Scene::furnished();
-    let pose = look_at([0.8, -0.5, 1.4], [-2.0, 1.4, 0.6]);
-    let cloud = prepared(&projection, &frame(&scene, &camera, &pose, 0.0, 1)).to_cloud();
-    let (normals, rim) = (cloud.normals.as_ref().unwrap(), cloud.rim.as_ref().unwrap());
-    let sigma = cloud.sigma.as_ref().unwrap();
-    let (mut kept, mut off) = (0, 0);
-    for (k, p) in cloud.points.iter().enumerate() {
-        // Nodes are single pixels here; single precision.
-        assert!((sigma[k] / sigma_of(p.coords.norm()) - 1.0).abs() < 1e-5, "{k}: {}", sigma[k]);
-        if rim[k] {
-            assert!(normals[k].x.is_nan());
-            continue;
-        }
-        kept += 1;
-        let range = scene.range(&pose.translation.vector, &(pose.rotation * p.coords.normalize()));
-        // Averages over squares of pixels round creases by a fraction of their size, 3 cm.
-        off += usize::from((p.coords.norm() - range).abs() > 0.01);
-        assert!(normals[k].dot(&p.coords) < 0.0 && (normals[k].norm() - 1.0).abs() < 1e-12);
-    }
-    // Squares across a jump can look like a steep plane.
-    assert!(off * 200 < kept, "{off} of {kept}");
-    assert!(kept > cloud.len() / 2);
 }

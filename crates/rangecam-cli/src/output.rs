@@ -58,10 +58,10 @@ impl Output {
 
     /// The summary of a refused calibration: as JSON where that was asked for, in words it is the error alone.
     pub(crate) fn refusal(&self, error: &(dyn Error + 'static)) {
-        if let (Voice::Json, Some(pipeline::Error::Refused { summary, .. })) = (self.voice, error.downcast_ref()) {
-            if let Err(error) = print(summary) {
-                self.error(&error);
-            }
+        if let (Voice::Json, Some(pipeline::Error::Refused { summary, .. })) = (self.voice, error.downcast_ref())
+            && let Err(error) = print(summary)
+        {
+            self.error(&error);
         }
     }
 

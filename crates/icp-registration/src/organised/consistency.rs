@@ -90,8 +90,11 @@ pub(super) fn consistency(
     level: usize,
     tolerance_m: f64,
 ) -> FrameConsistency {
-    let there = one_way(source, target, pose, level, tolerance_m);
-    there + one_way(target, source, &pose.inverse(), level, tolerance_m)
+    let (there, back) = rayon::join(
+        || one_way(source, target, pose, level, tolerance_m),
+        || one_way(target, source, &pose.inverse(), level, tolerance_m),
+    );
+    there + back
 }
 
 fn one_way(

@@ -81,7 +81,8 @@ pub fn accuracy(name: &str, survey: &Survey, runs: u64) {
                     let worst = found.loops.iter().map(|l| l.translation_m * 1e3).fold(0.0, f64::max);
                     println!(
                         "  {label:>22}: {mm:6.2} mm {degrees:.4} deg; {} pairs, {} refused, {} in the adjustment, \
-                         {} loops (worst {worst:.1} mm), sigma0 {:.2}, {} rounds{}, undetermined {}; station {station} known to {sigma_mm:.2} mm",
+                         {} loops (worst {worst:.1} mm), sigma0 {:.2}, {} rounds{}, undetermined {}, doubtful {:?} \
+                         (contradicted at most {:.1} times as usual); station {station} known to {sigma_mm:.2} mm",
                         found.pairs.len(),
                         found.refused.len(),
                         found.surfaces.len(),
@@ -90,6 +91,8 @@ pub fn accuracy(name: &str, survey: &Survey, runs: u64) {
                         found.rounds,
                         if found.settled { "" } else { " (not settled)" },
                         found.undetermined.len(),
+                        found.placements.doubtful().collect::<Vec<_>>(),
+                        found.placements.stations.iter().filter_map(|station| station.times_usual).fold(0.0, f64::max),
                     );
                 }
                 Err(error) => println!("  {label:>22}: {error}"),
@@ -97,6 +100,32 @@ pub fn accuracy(name: &str, survey: &Survey, runs: u64) {
         }
     }
     labels.into_iter().zip(&off).for_each(|(label, off)| compare(label, survey.stations, off));
+}
+
+/// Each run with one station that starts on the opposite side of the room, and stays there.
+pub fn misplaced(name: &str, survey: &Survey, runs: u64) -> Outcome<()> {
+    let (mut told, mut least, mut most) = (0, f64::INFINITY, 0.0_f64);
+    for run in 0..runs {
+        let (clouds, truth) = survey.clouds(run);
+        let wrong = 1 + run as usize % (survey.stations - 1);
+        let mut start = truth.clone();
+        start[wrong] = stations::turned(&start[wrong]);
+        let found = register(&clouds, Start::Poses(&start), survey.patch_m)?;
+        told += u64::from(found.placements.doubtful().eq([wrong]));
+        for (station, placed) in found.placements.stations.iter().enumerate() {
+            let times = placed.times_usual.unwrap_or(f64::NAN);
+            if station == wrong {
+                least = least.min(times);
+            } else {
+                most = most.max(times);
+            }
+        }
+    }
+    println!(
+        "{name}, one turned by 180 degrees: told from the others in {told} of {runs} runs; contradicted at least \
+         {least:.1} times as usual, the others at most {most:.1} times"
+    );
+    Ok(())
 }
 
 pub fn timing(survey: &Survey) {

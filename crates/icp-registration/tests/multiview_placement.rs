@@ -49,7 +49,9 @@ fn stations_turned_or_shifted_are_told_from_the_others() {
         // Two that hide each other, because they agree.
         let mut poses = truth.clone();
         let pair = [station, (station + 1) % 8];
-        pair.iter().for_each(|&k| poses[k] = turned(&poses[k]));
+        for k in pair {
+            poses[k] = turned(&poses[k]);
+        }
         let found = judge_placements(&clouds, &poses).unwrap();
         println!("stations {pair:?}: {:.1?}", times_usual(&found));
         assert_eq!(doubtful(&found), pair);

@@ -151,7 +151,8 @@ fn rayon_pool() -> rayon::ThreadPool {
 
 /// Squared errors of the poses against their covariance, over repeated noise.
 pub fn sampling(survey: &Survey, runs: u64) -> Outcome<()> {
-    let (mut single, mut between, mut off, mut covered, mut count) = (Vec::new(), Vec::new(), Vec::new(), 0, 0);
+    let (mut single, mut between, mut off, mut of_runs, mut covered, mut count) =
+        (Vec::new(), Vec::new(), Vec::new(), Vec::new(), 0, 0);
     for run in 0..runs {
         let (clouds, truth) = survey.clouds(run);
         let found = register(&clouds, Start::Poses(&truth), survey.patch_m)?;
@@ -164,6 +165,7 @@ pub fn sampling(survey: &Survey, runs: u64) -> Outcome<()> {
             count += 1;
             single.push(nees);
         }
+        of_runs.push(single[single.len() + 1 - n..].iter().sum::<f64>() / (n - 1) as f64);
         for station in 0..n {
             let other = (station + 3) % n;
             let pose = found.relative_pose(station, other)?;
@@ -171,8 +173,11 @@ pub fn sampling(survey: &Survey, runs: u64) -> Outcome<()> {
         }
     }
     let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+    // The stations of a run share their datum: only the runs are independent.
+    let scatter = of_runs.iter().map(|value| (value - mean(&of_runs)).powi(2)).sum::<f64>();
+    let standard_error = (scatter / (runs as f64 - 1.0) / runs as f64).sqrt();
     println!(
-        "{runs} runs: normalised squared error to the datum {:.2}, between stations {:.2} (6 expected), inside the 95 % \
+        "{runs} runs: normalised squared error to the datum {:.2} ± {standard_error:.2}, between stations {:.2} (6 expected), inside the 95 % \
          ellipsoid {:.1} %",
         mean(&single),
         mean(&between),

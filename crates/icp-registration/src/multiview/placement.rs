@@ -155,7 +155,9 @@ fn judged(count: usize, pairs: &[PairAgreement]) -> Vec<StationPlacement> {
         }
     }
     let mut sound = vec![true; count];
-    taken[..suspects].iter().for_each(|&station| sound[station] = false);
+    for &station in &taken[..suspects] {
+        sound[station] = false;
+    }
     let doubted = |station: usize| times_usual(station, &sound, pairs).is_some_and(|times| times >= DOUBTED);
     let sound: Vec<bool> = (0..count).map(|station| sound[station] || !doubted(station)).collect();
     let verdict = |station: usize| {

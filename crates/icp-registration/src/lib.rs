@@ -40,9 +40,10 @@ pub use icp::{
 pub use kernel::RobustKernel;
 #[cfg(feature = "multiview")]
 pub use multiview::{
-    Datum, LoopClosure, PairAlignment, PairConstraint, PairResidual, PointModel, RefusedPair, SharedParameters, Start,
-    StationAdjustment, StationAdjustmentOptions, StationRegistration, StationRegistrationOptions, SurfacePair,
-    UndeterminedStation, adjust_stations, register_stations,
+    Datum, LoopClosure, PairAgreement, PairAlignment, PairConstraint, PairResidual, Placement, Placements, PointModel,
+    RefusedPair, SharedParameters, Start, StationAdjustment, StationAdjustmentOptions, StationPlacement,
+    StationRegistration, StationRegistrationOptions, SurfacePair, UndeterminedStation, adjust_stations,
+    judge_placements, register_stations,
 };
 pub use neighbours::{Neighbour, NeighbourTree};
 pub use normals::{OrganisedNormalOptions, UnorganisedNormalOptions, organised_normals, unorganised_normals};

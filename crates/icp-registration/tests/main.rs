@@ -25,6 +25,7 @@ mod metric_derivatives;
 mod multiview;
 mod multiview_input;
 mod multiview_model;
+mod multiview_placement;
 mod multiview_real;
 mod neighbours;
 mod normals;

@@ -68,7 +68,8 @@ pub use plan::{
 };
 pub use progress::{Progress, Silent};
 pub use register::{
-    RegisterMethod, RegisterRequest, RegisterSummary, RegisteredLoop, RegisteredPair, RegisteredStation, register,
+    RegisterMethod, RegisterRequest, RegisterSummary, RegisteredLoop, RegisteredPair, RegisteredPlacement,
+    RegisteredStation, register,
 };
 pub use run::{RunRequest, process, run};
 pub use scattering::{

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use icp_registration::RefusedPair;
+use icp_registration::{Placements, RefusedPair};
 use nalgebra::Isometry3;
 use range_image::Flags;
 use range_io::survey::Level;
@@ -11,6 +11,7 @@ use range_io::survey::Level;
 use crate::load::first_modulation;
 use crate::outcome::{Outcome, usable};
 use crate::plan::{Plan, Stage};
+use crate::register::describe::wrong_place;
 use crate::statistics::{median, robust_standard_deviation};
 use crate::summary::{PairSummary, ReferenceSummary, RegistrationSummary, StationTruth, Summary, TruthSummary};
 use crate::trends;
@@ -121,10 +122,17 @@ fn registration(outcome: &Outcome) -> Option<RegistrationSummary> {
     Some(RegistrationSummary {
         pairs: pairs.collect(),
         refused: outcome.refused.iter().map(|pair| refusal(outcome, pair)).collect(),
-        sigma0: outcome.adjustment.and_then(|figures| figures.sigma0),
-        redundancy: outcome.adjustment.map(|figures| figures.redundancy),
+        sigma0: outcome.adjustment.as_ref().and_then(|figures| figures.sigma0),
+        redundancy: outcome.adjustment.as_ref().map(|figures| figures.redundancy),
         position_sigma_max_m: sigmas.reduce(f64::max),
+        doubts: outcome.adjustment.iter().flat_map(|figures| wrong_places(outcome, &figures.placements)).collect(),
     })
+}
+
+/// What to say of stations that are probably in the wrong place.
+fn wrong_places(outcome: &Outcome, placements: &Placements) -> Vec<String> {
+    let words = |station: usize| wrong_place(&outcome.views[station].station, &placements.stations[station]);
+    placements.doubtful().map(words).collect()
 }
 
 fn refusal(outcome: &Outcome, pair: &RefusedPair) -> String {

@@ -1,7 +1,7 @@
 //! What a run holds in its hands: views, clouds, poses, and the record of the stages.
 
 use camera_model::{Camera, OrganisedCloud, euler_from_pose, step_pose};
-use icp_registration::{PairAlignment, RefusedPair};
+use icp_registration::{PairAlignment, Placements, RefusedPair};
 use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, Vector3};
 use range_io::survey::Survey;
 
@@ -60,12 +60,14 @@ pub struct StationPose {
 }
 
 /// Quality of the simultaneous adjustment.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct AdjustmentFigures {
     /// A-posteriori standard deviation of unit weight; `None` without redundancy.
     pub sigma0: Option<f64>,
     /// Redundancy.
     pub redundancy: i64,
+    /// Whether the stations lie where what they see agrees with what the others see.
+    pub placements: Placements,
 }
 
 impl StationPose {

@@ -81,6 +81,8 @@ pub struct RegistrationSummary {
     pub redundancy: Option<i64>,
     /// Largest standard deviation of a station's position, metre, prior-scaled.
     pub position_sigma_max_m: Option<f64>,
+    /// Stations that are probably in the wrong place, each with the reason.
+    pub doubts: Vec<String>,
 }
 
 /// One aligned pair.
@@ -176,6 +178,9 @@ impl Summary {
         if let Some(registration) = &self.registration {
             let sigma0 = registration.sigma0.map_or_else(String::new, |s| format!(", sigma0 {s:.2}"));
             writeln!(f, "registration: {} pairs{sigma0}", registration.pairs.len())?;
+            for doubt in &registration.doubts {
+                writeln!(f, "doubt: {doubt}")?;
+            }
         }
         if let Some(reference) = &self.reference {
             writeln!(

@@ -81,7 +81,8 @@ pub fn accuracy(name: &str, survey: &Survey, runs: u64) {
                     let worst = found.loops.iter().map(|l| l.translation_m * 1e3).fold(0.0, f64::max);
                     println!(
                         "  {label:>22}: {mm:6.2} mm {degrees:.4} deg; {} pairs, {} refused, {} in the adjustment, \
-                         {} loops (worst {worst:.1} mm), sigma0 {:.2}, {} rounds{}, undetermined {}; station {station} known to {sigma_mm:.2} mm",
+                         {} loops (worst {worst:.1} mm), sigma0 {:.2}, {} rounds{}, undetermined {}, doubtful {:?} \
+                         (contradicted at most {:.1} times as usual); station {station} known to {sigma_mm:.2} mm",
                         found.pairs.len(),
                         found.refused.len(),
                         found.surfaces.len(),
@@ -90,6 +91,8 @@ pub fn accuracy(name: &str, survey: &Survey, runs: u64) {
                         found.rounds,
                         if found.settled { "" } else { " (not settled)" },
                         found.undetermined.len(),
+                        found.placements.doubtful().collect::<Vec<_>>(),
+                        found.placements.stations.iter().filter_map(|station| station.times_usual).fold(0.0, f64::max),
                     );
                 }
                 Err(error) => println!("  {label:>22}: {error}"),
@@ -97,6 +100,32 @@ pub fn accuracy(name: &str, survey: &Survey, runs: u64) {
         }
     }
     labels.into_iter().zip(&off).for_each(|(label, off)| compare(label, survey.stations, off));
+}
+
+/// Each run with one station that starts on the opposite side of the room, and stays there.
+pub fn misplaced(name: &str, survey: &Survey, runs: u64) -> Outcome<()> {
+    let (mut told, mut least, mut most) = (0, f64::INFINITY, 0.0_f64);
+    for run in 0..runs {
+        let (clouds, truth) = survey.clouds(run);
+        let wrong = 1 + run as usize % (survey.stations - 1);
+        let mut start = truth.clone();
+        start[wrong] = stations::turned(&start[wrong]);
+        let found = register(&clouds, Start::Poses(&start), survey.patch_m)?;
+        told += u64::from(found.placements.doubtful().eq([wrong]));
+        for (station, placed) in found.placements.stations.iter().enumerate() {
+            let times = placed.times_usual.unwrap_or(f64::NAN);
+            if station == wrong {
+                least = least.min(times);
+            } else {
+                most = most.max(times);
+            }
+        }
+    }
+    println!(
+        "{name}, one turned by 180 degrees: told from the others in {told} of {runs} runs; contradicted at least \
+         {least:.1} times as usual, the others at most {most:.1} times"
+    );
+    Ok(())
 }
 
 pub fn timing(survey: &Survey) {
@@ -122,7 +151,8 @@ fn rayon_pool() -> rayon::ThreadPool {
 
 /// Squared errors of the poses against their covariance, over repeated noise.
 pub fn sampling(survey: &Survey, runs: u64) -> Outcome<()> {
-    let (mut single, mut between, mut off, mut covered, mut count) = (Vec::new(), Vec::new(), Vec::new(), 0, 0);
+    let (mut single, mut between, mut off, mut of_runs, mut covered, mut count) =
+        (Vec::new(), Vec::new(), Vec::new(), Vec::new(), 0, 0);
     for run in 0..runs {
         let (clouds, truth) = survey.clouds(run);
         let found = register(&clouds, Start::Poses(&truth), survey.patch_m)?;
@@ -135,6 +165,7 @@ pub fn sampling(survey: &Survey, runs: u64) -> Outcome<()> {
             count += 1;
             single.push(nees);
         }
+        of_runs.push(single[single.len() + 1 - n..].iter().sum::<f64>() / (n - 1) as f64);
         for station in 0..n {
             let other = (station + 3) % n;
             let pose = found.relative_pose(station, other)?;
@@ -142,8 +173,11 @@ pub fn sampling(survey: &Survey, runs: u64) -> Outcome<()> {
         }
     }
     let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+    // The stations of a run share their datum: only the runs are independent.
+    let scatter = of_runs.iter().map(|value| (value - mean(&of_runs)).powi(2)).sum::<f64>();
+    let standard_error = (scatter / (runs as f64 - 1.0) / runs as f64).sqrt();
     println!(
-        "{runs} runs: normalised squared error to the datum {:.2}, between stations {:.2} (6 expected), inside the 95 % \
+        "{runs} runs: normalised squared error to the datum {:.2} ± {standard_error:.2}, between stations {:.2} (6 expected), inside the 95 % \
          ellipsoid {:.1} %",
         mean(&single),
         mean(&between),

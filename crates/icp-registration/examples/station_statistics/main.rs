@@ -15,7 +15,7 @@ mod limit;
 
 use std::error::Error;
 
-use evaluate::{Survey, accuracy, sampling, timing};
+use evaluate::{Survey, accuracy, misplaced, sampling, timing};
 use limit::{Plane, cramer_rao};
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -39,6 +39,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     accuracy("eight stations, 1 % gross errors", &eight, 10.min(runs));
     let sixteen = Survey { stations: 16, gross: 0.0, seed, patch_m };
     accuracy("sixteen stations", &sixteen, 5.min(runs));
+    misplaced("eight stations, 1 % gross errors", &eight, 7.min(runs))?;
+    misplaced("sixteen stations", &sixteen, 5.min(runs))?;
     timing(&eight);
     timing(&sixteen);
     sampling(&eight, runs)?;

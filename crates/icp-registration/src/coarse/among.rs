@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Translation3};
 
 use super::feature_cloud::FeatureCloud;
-use super::judge::Verdict;
+use super::judge::{Count, Verdict};
 use super::options::CoarseOptions;
 use super::refine;
 use super::view::Jumps;
@@ -30,6 +30,15 @@ fn from_middle(placed: &Placed<'_>) -> Isometry3<f64> {
 pub(crate) fn evidence(a: &Placed<'_>, b: &Placed<'_>, stride: usize) -> f64 {
     let pose = from_middle(a).inverse() * from_middle(b);
     Verdict::with(b.0, a.0, &pose, stride, Jumps::Missed).evidence() * stride as f64
+}
+
+/// How the sampled points of two clouds lie for each other: those on the other's surface, and those that contradict it, in
+/// space that it looked through or beside a surface that they should lie on.
+pub(crate) fn agreement(a: &Placed<'_>, b: &Placed<'_>) -> (usize, usize) {
+    let pose = from_middle(a).inverse() * from_middle(b);
+    let verdict = Verdict::with(b.0, a.0, &pose, 1, Jumps::Missed);
+    let sum = |of: fn(&Count) -> usize| of(&verdict.source) + of(&verdict.target);
+    (sum(|c| c.hits), sum(|c| c.in_free + c.missed))
 }
 
 /// Brings a cloud that is nearly in place onto all those around it, point to plane.

@@ -29,7 +29,7 @@ mod view;
 pub(crate) use align::hypotheses;
 pub use align::{CoarseAlignment, align_without_guess};
 #[cfg(feature = "multiview")]
-pub(crate) use among::{Placed, evidence, refined_among, with_one_voxel};
+pub(crate) use among::{Placed, agreement, evidence, refined_among, with_one_voxel};
 pub use feature_cloud::FeatureCloud;
 pub use features::Features;
 pub use options::{CoarseOptions, Estimator, Matching, SurfaceDescriptors, Viewpoint};

@@ -14,6 +14,7 @@ mod network;
 mod noise;
 mod pairs;
 mod patches;
+mod placement;
 mod plane_fit;
 mod point_model;
 mod point_residuals;
@@ -33,6 +34,7 @@ mod tiles;
 
 pub use alignments::{PairAlignment, RefusedPair};
 pub use loops::LoopClosure;
+pub use placement::{PairAgreement, Placement, Placements, StationPlacement, judge_placements};
 pub use point_model::{PointModel, SharedParameters};
 pub use pose_graph::{
     Datum, PairConstraint, PairResidual, StationAdjustment, StationAdjustmentOptions, adjust_stations,

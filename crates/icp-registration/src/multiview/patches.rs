@@ -163,8 +163,7 @@ impl Surface {
         let n = centres.len() as f64;
         let centroid = Point3::from(centres.iter().fold(Vector3::zeros(), |sum, c| sum + c.coords / n));
         let radius_m = (centres.iter().map(|c| (c - centroid).norm_squared() / n).sum::<f64>()).sqrt().max(size_m);
-        let facing = patches.iter().filter(|p| p.normal.dot(&p.centre.coords) < 0.0).count();
-        let oriented = facing as f64 >= ORIENTED * patches.len() as f64;
+        let oriented = faces_origin(patches.iter().map(|patch| (&patch.centre, &patch.normal)));
         let Groups { members, starts } = groups;
         let moments = fits.iter().map(|fit| fit.0).collect();
         let origin = *origin;
@@ -175,6 +174,16 @@ impl Surface {
     pub(super) fn points_of(&self, patch: usize) -> &[u32] {
         &self.members[self.starts[patch] as usize..self.starts[patch + 1] as usize]
     }
+}
+
+/// Whether normals, where there are any, point to the station.
+pub(super) fn faces_origin<'a>(surface: impl Iterator<Item = (&'a Point3<f64>, &'a Vector3<f64>)>) -> bool {
+    let (mut facing, mut all) = (0, 0);
+    for (point, normal) in surface.filter(|(_, normal)| normal.x.is_finite()) {
+        facing += u32::from(normal.dot(&point.coords) < 0.0);
+        all += 1;
+    }
+    f64::from(facing) >= ORIENTED * f64::from(all)
 }
 
 fn centres(fits: &[(Moments, Plane)], origin: &Vector3<f64>) -> Vec<Point3<f64>> {

@@ -110,6 +110,15 @@ impl StationPoints {
         Ok(())
     }
 
+    /// The cloud with its points where they are now.
+    pub(super) fn modelled(&self, cloud: &Cloud) -> Cloud {
+        let mut cloud = cloud.clone();
+        for (point, &index) in self.points.iter().zip(&self.cloud_index) {
+            cloud.points[index as usize] = *point;
+        }
+        cloud
+    }
+
     /// Variance across a surface whose normal has this cosine with the ray, metre².
     pub(super) fn variance(&self, point: usize, cosine: f64) -> f64 {
         let square = self.sigma[point] * self.sigma[point];

@@ -7,6 +7,7 @@ use nalgebra::{DMatrix, Isometry3, Matrix6};
 use super::alignments::{PairAlignment, RefusedPair};
 use super::loops::LoopClosure;
 use super::patches::Surface;
+use super::placement::Placements;
 use super::point_model::{PointModel, SharedParameters};
 use crate::icp::UndeterminedMotion;
 use crate::kernel::RobustKernel;
@@ -127,6 +128,9 @@ pub struct StationRegistration {
     pub loops: Vec<LoopClosure>,
     /// All pairs whose surfaces took part in the adjustment, with their residuals.
     pub surfaces: Vec<SurfacePair>,
+    /// Whether the stations lie where what they see agrees with what the others see: a station that fits walls in the
+    /// wrong place shows in no other figure.
+    pub placements: Placements,
     /// Stations that something leaves open; empty for a sound network.
     pub undetermined: Vec<UndeterminedStation>,
     /// Standard deviation of unit weight: 1 where tiles seen from several stations differ as the noise of their points

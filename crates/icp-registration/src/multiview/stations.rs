@@ -10,6 +10,7 @@ use super::check::{Checked, checked};
 use super::grouping::patch_size;
 use super::network::{Network, State};
 use super::patches::Surface;
+use super::placement::{Placements, judge_placements};
 use super::point_model::{SharedParameters, checked_prior};
 use super::points::StationPoints;
 use super::pose_graph::Datum;
@@ -91,13 +92,14 @@ pub fn register_stations(
         adjusted = finish.run(&mut modelled, &mut points, state)?;
     }
     require_connected(&adjusted, options.minimum_contacts, datum)?;
+    let placements = placements(stations, &points, &adjusted.state)?;
     let checked = checked(&adjusted, options, datum, (radius_m, patch_m))?;
     let result = result(checked, adjusted, &poses, &network, datum, (patch_m, options.minimum_contacts));
     let prepared = match modelled.modelled {
         Some((modelled, _)) => modelled,
         None => surfaces,
     };
-    Ok(StationRegistration { prepared: Arc::new(prepared), ..result })
+    Ok(StationRegistration { placements, prepared: Arc::new(prepared), ..result })
 }
 
 /// Every station shares surfaces, through others, with the one that is held.
@@ -182,6 +184,15 @@ fn prepare(stations: &[Cloud], options: &StationRegistrationOptions<'_>) -> Resu
     stations.par_iter().map(prepare).collect()
 }
 
+/// Verdicts on the stations at the adjusted poses, their points where the shared parameters have them.
+fn placements(stations: &[Cloud], points: &[StationPoints], state: &State) -> Result<Placements> {
+    if state.parameters.is_empty() {
+        return judge_placements(stations, &state.poses);
+    }
+    let modelled: Vec<Cloud> = stations.iter().zip(points).map(|(cloud, points)| points.modelled(cloud)).collect();
+    judge_placements(&modelled, &state.poses)
+}
+
 fn result(
     checked: Checked,
     adjusted: Adjusted,
@@ -205,6 +216,7 @@ fn result(
         refused: checked.refused,
         loops: checked.loops,
         surfaces,
+        placements: Placements::default(),
         undetermined,
         sigma0,
         redundancy,

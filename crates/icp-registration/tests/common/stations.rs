@@ -26,6 +26,11 @@ pub fn round_poses(count: usize) -> Vec<Isometry3<f64>> {
     (0..count).map(pose).collect()
 }
 
+/// The pose on the opposite side of the room, which sees walls like its own there.
+pub fn turned(pose: &Isometry3<f64>) -> Isometry3<f64> {
+    Isometry3::rotation(Vector3::z() * std::f64::consts::PI) * pose
+}
+
 /// The cloud of one station of 176 x 144 pixels.
 pub fn cloud(scene: &Scene, pose: &Isometry3<f64>, gross: f64, seed: u64) -> Cloud {
     let camera = Pinhole::small();

@@ -1,10 +1,10 @@
 //! Results in words and figures that a reader understands without the program.
 
-use icp_registration::{MotionKind, UndeterminedMotion};
+use icp_registration::{MotionKind, Placement, StationPlacement, UndeterminedMotion};
 use nalgebra::Isometry3;
 
 use super::input::Station;
-use super::summary::{RegisterSummary, RegisteredStation};
+use super::summary::{RegisterSummary, RegisteredPlacement, RegisteredStation};
 use crate::outcome::StationPose;
 
 /// A motion that the surfaces leave open, axes in the target's frame.
@@ -20,6 +20,26 @@ pub(super) fn motion(motion: &UndeterminedMotion) -> String {
     } else {
         format!("{kind}, which nothing holds")
     }
+}
+
+/// How a station agrees with the others; `None` where that was not judged.
+pub(super) fn placement(found: &StationPlacement) -> Option<RegisteredPlacement> {
+    let verdict = match found.verdict {
+        Placement::Placed => "placed",
+        Placement::Doubtful => "doubtful",
+        Placement::Unjudged => return None,
+    };
+    Some(RegisteredPlacement { verdict, contradicting: found.share(), times_usual: found.times_usual })
+}
+
+/// What to say of a station that is probably in the wrong place.
+pub(crate) fn wrong_place(name: &str, found: &StationPlacement) -> String {
+    format!(
+        "{name}: {:.0} % of what it and the other stations see in common contradicts, {:.0} times what is usual between \
+         the others: it is probably in the wrong place. Give start poses, or leave it out",
+        100.0 * found.share(),
+        found.times_usual.unwrap_or(f64::NAN)
+    )
 }
 
 /// The rows of all stations; errors where the truth is known, in the frame in which the first station is right.
@@ -50,6 +70,7 @@ pub(super) fn stations(
             position_error_m: errors.map(|errors| errors.0),
             attitude_error_deg: errors.map(|errors| errors.1),
             undetermined,
+            placement: None,
         }
     };
     stations.iter().zip(poses).zip(points).zip(undetermined).map(row).collect()

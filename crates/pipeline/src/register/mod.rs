@@ -1,7 +1,7 @@
 //! Registration as a command: a survey or clouds of any format in, poses, one cloud, figures and a report out.
 
 mod chain;
-mod describe;
+pub(crate) mod describe;
 pub(crate) mod guess;
 pub(crate) mod input;
 mod pairs;
@@ -14,7 +14,7 @@ pub(crate) mod surface;
 use std::time::Instant;
 
 pub use request::{RegisterMethod, RegisterRequest};
-pub use summary::{RegisterSummary, RegisteredLoop, RegisteredPair, RegisteredStation};
+pub use summary::{RegisterSummary, RegisteredLoop, RegisteredPair, RegisteredPlacement, RegisteredStation};
 
 use nalgebra::Isometry3;
 

@@ -87,8 +87,12 @@ fn summary(
         translation_m: closure.translation_m,
         rotation_deg: closure.rotation_rad.to_degrees(),
     });
+    let mut rows = describe::stations(stations, poses, &counts, undetermined.clone());
+    for (row, placement) in rows.iter_mut().zip(&result.placements.stations) {
+        row.placement = describe::placement(placement);
+    }
     RegisterSummary {
-        stations: describe::stations(stations, poses, &counts, undetermined.clone()),
+        stations: rows,
         pairs: result.surfaces.iter().map(|pair| row(pair, result, stations)).collect(),
         refused: result
             .refused
@@ -120,6 +124,9 @@ fn doubts(result: &StationRegistration, stations: &[Station], undetermined: &[Ve
     let mut doubts = Vec::new();
     if !result.settled {
         doubts.push(format!("after {} rounds the stations still moved: the poses may be off", result.rounds));
+    }
+    for station in result.placements.doubtful() {
+        doubts.push(describe::wrong_place(&stations[station].name, &result.placements.stations[station]));
     }
     for (station, motions) in stations.iter().zip(undetermined).filter(|(_, motions)| !motions.is_empty()) {
         let motions = motions.join("; ");

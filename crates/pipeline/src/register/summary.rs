@@ -64,6 +64,19 @@ pub struct RegisteredStation {
     pub attitude_error_deg: Option<f64>,
     /// Motions that the surfaces do not determine.
     pub undetermined: Vec<String>,
+    /// Whether what it sees agrees with what the other stations see, where that was judged.
+    pub placement: Option<RegisteredPlacement>,
+}
+
+/// How a station agrees with the free space and the surfaces of the others, in sampled points.
+#[derive(Debug, Clone, Serialize)]
+pub struct RegisteredPlacement {
+    /// `placed`, or `doubtful` where it is contradicted far more than the other stations are.
+    pub verdict: &'static str,
+    /// Part of what it and the others see in common that contradicts, between 0 and 1.
+    pub contradicting: f64,
+    /// How much that is, as a multiple of what is usual in the survey.
+    pub times_usual: Option<f64>,
 }
 
 /// Two stations that see the same surfaces.
@@ -122,6 +135,12 @@ impl fmt::Display for RegisterSummary {
     }
 }
 
+impl fmt::Display for RegisteredPlacement {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:.1} %, {}", 100.0 * self.contradicting, self.verdict)
+    }
+}
+
 impl RegisterSummary {
     /// Largest misclosure of a loop, metre and degree.
     pub(crate) fn largest_misclosure(&self) -> Option<(f64, f64)> {
@@ -133,7 +152,7 @@ impl RegisterSummary {
         let width = self.stations.iter().map(|station| station.name.chars().count()).max().unwrap_or(0).clamp(8, 40);
         writeln!(
             f,
-            "{:<width$} {:>9}  {:>29}  {:>10}  {:>10}",
+            "{:<width$} {:>9}  {:>29}  {:>10}  {:>10}  contradicting",
             "station", "points", "position, m", "sigma", "attitude"
         )?;
         for station in &self.stations {
@@ -142,10 +161,11 @@ impl RegisterSummary {
                 station.attitude_sigma_deg.map_or_else(|| "-".to_owned(), |degrees| format!("{degrees:.4}°"));
             writeln!(
                 f,
-                "{:<width$} {:>9}  {x:>8.4}, {y:>8.4}, {z:>8.4}  {:>10}  {attitude:>10}",
+                "{:<width$} {:>9}  {x:>8.4}, {y:>8.4}, {z:>8.4}  {:>10}  {attitude:>10}  {}",
                 station.name,
                 station.points,
-                millimetres(station.position_sigma_m)
+                millimetres(station.position_sigma_m),
+                station.placement.as_ref().map_or_else(|| "-".to_owned(), ToString::to_string)
             )?;
         }
         Ok(())

@@ -130,7 +130,7 @@ fn station_section(page: &mut Page, registered: &Registered) {
     if truth {
         head.extend(["position error", "attitude error"]);
     }
-    head.push("verdict");
+    head.extend(["contradicting", "verdict"]);
     let rows = summary.stations.iter().enumerate().map(|(index, station)| {
         let mut row = vec![station.name.clone(), station.points.to_string()];
         row.extend(station.position_m.map(|x| format!("{x:.4}")));
@@ -138,6 +138,7 @@ fn station_section(page: &mut Page, registered: &Registered) {
         if truth {
             row.extend([millimetres(station.position_error_m), degrees(station.attitude_error_deg)]);
         }
+        row.push(station.placement.as_ref().map_or_else(|| "-".to_owned(), ToString::to_string));
         row.push(match (index, station.undetermined.is_empty()) {
             (0, _) => "datum".to_owned(),
             (_, true) => "determined".to_owned(),

@@ -188,6 +188,9 @@ fn registration(page: &mut Page, outcome: &Outcome, summary: &Summary) -> Result
         &["station", "x m", "y m", "z m", "sigma of position", "position error", "attitude error"],
         &station_rows(outcome, summary),
     );
+    if !registration.doubts.is_empty() {
+        page.list(&registration.doubts);
+    }
     page.subsection("Pairs");
     let rows: Vec<Vec<String>> = registration
         .pairs

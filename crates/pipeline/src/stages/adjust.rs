@@ -40,13 +40,18 @@ pub(super) fn run(work: &mut Work, options: &AdjustOptions, progress: &dyn Progr
         .collect();
     work.outcome.pairs = adjusted.pairs;
     work.outcome.refused = adjusted.refused;
-    work.outcome.adjustment = Some(AdjustmentFigures { sigma0: adjusted.sigma0, redundancy: adjusted.redundancy });
     let mut findings = Findings::from([
+        ("stations_doubtful".to_owned(), adjusted.placements.doubtful().count() as f64),
         ("pairs".to_owned(), adjusted.surfaces.len() as f64),
         ("rounds".to_owned(), adjusted.rounds as f64),
     ]);
     if let Some(sigma0) = adjusted.sigma0 {
         findings.insert("sigma0".to_owned(), sigma0);
     }
+    work.outcome.adjustment = Some(AdjustmentFigures {
+        sigma0: adjusted.sigma0,
+        redundancy: adjusted.redundancy,
+        placements: adjusted.placements,
+    });
     Ok(findings)
 }

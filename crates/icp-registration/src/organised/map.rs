@@ -221,7 +221,7 @@ impl<L: Locate> pulp::WithSimd for LocatedLearning<'_, '_, L> {
             }
             for k in 0..BLOCK {
                 if fits[k] {
-                    learned.push((d.node[k] as u32, d.residual[k], block.variance[k]));
+                    learned.push((d.node[k], d.residual[k], block.variance[k]));
                 }
             }
         }

@@ -281,13 +281,7 @@ struct Run {
 
 impl<L: Locate> Part<'_, '_, L> {
     #[inline(always)]
-    fn add(
-        &mut self,
-        run: &mut Run,
-        totals: &mut [[f32; BLOCK]; sums::SUMS],
-        pairs: &Pairs,
-        cell_of: &[u16; BLOCK],
-    ) {
+    fn add(&mut self, run: &mut Run, totals: &mut [[f32; BLOCK]; sums::SUMS], pairs: &Pairs, cell_of: &[u16; BLOCK]) {
         let along_target = derivatives(&pairs.lever, &pairs.normal);
         let along_source = derivatives(&pairs.lever, &pairs.source_normal);
         let mut lanes = [[0.0_f32; BLOCK]; SUMS];

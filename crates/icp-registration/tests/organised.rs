@@ -46,8 +46,7 @@ fn pairs_come_together_from_the_identity() {
 #[test]
 fn without_sigma_the_pose_is_as_good() {
     let camera = Pinhole::medium();
-    let projection = pinhole(&camera);
-    let pair = frame_pair(&camera, 1);
+    let (projection, pair) = (pinhole(&camera), frame_pair(&camera, 1));
     let target = OrganisedFrame::new(&projection, &pair.target.0, None).unwrap();
     let source = OrganisedFrame::new(&projection, &pair.source.0, None).unwrap();
     let (mm, degrees) = pose_error(&align(&source, &target).target_from_source, &pair.target_from_source);
@@ -57,8 +56,7 @@ fn without_sigma_the_pose_is_as_good() {
 #[test]
 fn a_frame_on_itself_and_back_and_forth() {
     let camera = Pinhole::small();
-    let projection = pinhole(&camera);
-    let pair = frame_pair(&camera, 2);
+    let (projection, pair) = (pinhole(&camera), frame_pair(&camera, 2));
     let (target, source) = (prepared(&projection, &pair.target), prepared(&projection, &pair.source));
     let itself = align(&target, &target);
     assert!(

@@ -28,9 +28,6 @@ const COARSE_ITERATIONS: usize = 8;
 const WIDE_ITERATIONS: usize = 3;
 /// Coarse levels end when a step is below this, in units of the radius.
 const COARSE_TOLERANCE: f64 = 1e-3;
-/// Standard deviations of a step, as a multiple of those asked for at the end, below which all nodes follow on a quarter
-/// of them: that one's own noise is twice as large.
-const BEFORE_ALL: f64 = 2.0;
 /// Steps on the last level before which the reach of the kernel is set.
 const NARROWINGS: usize = 3;
 
@@ -255,7 +252,7 @@ impl FrameAligner {
         track.rules.extra_variance = 0.0;
         let mut narrowings = NARROWINGS;
         if let Some(fraction) = self.options.noise_fraction {
-            self.iterate(track, source, target, finest_part(source), BEFORE_ALL * fraction, &mut narrowings)?;
+            self.iterate(track, source, target, finest_part(source), fraction, &mut narrowings)?;
         }
         self.iterate(track, source, target, blocks, self.options.noise_fraction.unwrap_or(0.0), &mut narrowings)
     }

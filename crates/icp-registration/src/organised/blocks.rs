@@ -1,4 +1,6 @@
 //! The nodes of a source frame in the order and arrangement in which they are worked on.
+// Only what is inlined is compiled for wide registers.
+#![allow(clippy::inline_always)]
 // Lanes lie side by side: with an index, loops read as their formulas and have the same length everywhere.
 #![allow(clippy::needless_range_loop)]
 
@@ -50,30 +52,12 @@ impl Points {
 
     /// Takes over the nodes of a frame.
     pub(super) fn gather(&mut self, grid: &Grid, inverse_depth: &[f32], planes: &[[f32; 4]], sigma: &[f32]) {
-        let take = |block: &mut Block| {
-            let mut count = 0;
-            for k in 0..BLOCK {
-                if block.node[k] == NO_NODE {
-                    continue;
-                }
-                let node = block.node[k] as usize;
-                let plane = planes[node];
-                let known = plane[3].is_finite();
-                let depth = if known { 1.0 / inverse_depth[node] } else { f32::NAN };
-                let position = [grid.u[node] * depth, grid.v[node] * depth, -depth];
-                for i in 0..3 {
-                    block.position[i][k] = position[i];
-                    block.normal[i][k] = plane[i];
-                }
-                block.variance[k] = sigma[node] * sigma[node];
-                count += usize::from(position[2].is_finite());
-            }
-            count
-        };
-        let level = |index: usize| grid.levels.iter().take_while(|end| index >= **end).count();
-        let blocks = self.blocks.par_iter_mut().enumerate().with_min_len(BLOCKS_PER_TASK);
-        let counts = blocks.fold_with([0; STRIDES.len()], |mut counts, (index, block)| {
-            counts[level(index)] += take(block);
+        let parts = self.blocks.par_chunks_mut(BLOCKS_PER_TASK).enumerate();
+        let counts = parts.fold_with([0; STRIDES.len()], |mut counts, (part, blocks)| {
+            let first = part * BLOCKS_PER_TASK;
+            let counts_of = &mut counts;
+            let gather = Gather { grid, inverse_depth, planes, sigma, first, blocks, counts: counts_of };
+            pulp::Arch::new().dispatch(gather);
             counts
         });
         self.counts = counts.reduce_with(|a, b| std::array::from_fn(|level| a[level] + b[level])).unwrap_or_default();
@@ -81,6 +65,11 @@ impl Points {
             self.counts[level] += self.counts[level - 1];
         }
         self.measure(grid);
+    }
+
+    /// Numbers and measures alone.
+    pub(super) fn without_blocks(&self) -> Self {
+        Self { blocks: Vec::new(), counts: self.counts, centre: self.centre, radius_m: self.radius_m }
     }
 
     fn measure(&mut self, grid: &Grid) {
@@ -97,5 +86,57 @@ impl Points {
         let all =
             self.blocks[..blocks].iter().flat_map(|b| (0..BLOCK).map(move |k| [0, 1, 2].map(|i| b.position[i][k])));
         all.filter(|p| p[2].is_finite()).map(|p| Vector3::from(p.map(f64::from)))
+    }
+}
+
+/// Fills blocks that follow each other.
+struct Gather<'a> {
+    grid: &'a Grid,
+    inverse_depth: &'a [f32],
+    planes: &'a [[f32; 4]],
+    sigma: &'a [f32],
+    /// Index of the first of the blocks.
+    first: usize,
+    blocks: &'a mut [Block],
+    /// Nodes with a plane that each level adds.
+    counts: &'a mut [usize; STRIDES.len()],
+}
+
+impl pulp::WithSimd for Gather<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) {
+        let Self { grid, inverse_depth, planes, sigma, first, blocks, counts } = self;
+        let mut level = 0;
+        for (index, block) in blocks.iter_mut().enumerate() {
+            while first + index >= grid.levels[level] {
+                level += 1;
+            }
+            let nothing = [f32::NAN; BLOCK];
+            let (mut plane, mut u, mut v, mut w, mut s) = ([[f32::NAN; 4]; BLOCK], nothing, nothing, nothing, nothing);
+            for k in 0..BLOCK {
+                if block.node[k] != NO_NODE {
+                    let node = block.node[k] as usize;
+                    (plane[k], u[k], v[k]) = (planes[node], grid.u[node], grid.v[node]);
+                    (w[k], s[k]) = (inverse_depth[node], sigma[node]);
+                }
+            }
+            let mut count = 0_u32;
+            for k in 0..BLOCK {
+                let depth = if plane[k][3].is_finite() { 1.0 / w[k] } else { f32::NAN };
+                block.position[0][k] = u[k] * depth;
+                block.position[1][k] = v[k] * depth;
+                block.position[2][k] = -depth;
+                block.variance[k] = s[k] * s[k];
+                count += u32::from(depth.is_finite());
+            }
+            for i in 0..3 {
+                for k in 0..BLOCK {
+                    block.normal[i][k] = plane[k][i];
+                }
+            }
+            counts[level] += count as usize;
+        }
     }
 }

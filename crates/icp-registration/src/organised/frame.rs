@@ -138,6 +138,22 @@ impl OrganisedFrame {
         }
     }
 
+    /// A copy that others are aligned with, but that is not aligned with others: without what only that takes.
+    pub(crate) fn as_target(&self) -> Self {
+        Self {
+            projection: Arc::clone(&self.projection),
+            inverse_depth: self.inverse_depth.clone(),
+            spread: self.spread.clone(),
+            planes: self.planes.clone(),
+            sigma: self.sigma.clone(),
+            misfit: Vec::new(),
+            noise: self.noise,
+            scratch: Vec::new(),
+            points: self.points.without_blocks(),
+            has_sigma: self.has_sigma,
+        }
+    }
+
     /// Where the lists of the frame lie, and how much they hold.
     #[cfg(test)]
     pub(super) fn memory(&self) -> Vec<(usize, usize)> {

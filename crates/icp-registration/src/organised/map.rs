@@ -89,16 +89,30 @@ impl OrganisedFrame {
     /// Mean logarithm of the depth in `cols x rows` fields of the frame; NaN where a field is mostly empty.
     pub(crate) fn thumbnail(&self, cols: usize, rows: usize) -> Vec<f32> {
         let grid = &self.projection.grid;
-        let (mut sums, mut counts) = (vec![0.0_f32; cols * rows], vec![0_usize; cols * rows]);
-        for k in 0..grid.len() {
-            if let Some((point, _)) = self.node(k) {
-                let field = k / grid.cols * rows / grid.rows * cols + k % grid.cols * cols / grid.cols;
-                sums[field] += (-point[2]).ln();
-                counts[field] += 1;
+        let (mut sums, mut counts) = (vec![0.0; cols * rows], vec![0_usize; cols * rows]);
+        let border = |index: usize, nodes: usize, fields: usize| (index * nodes).div_ceil(fields);
+        for row in 0..grid.rows {
+            let first = row * rows / grid.rows * cols;
+            for col in 0..cols {
+                // One logarithm for the depths of a row: double precision holds their product.
+                let (mut product, mut count) = (1.0_f64, 0);
+                for node in border(col, grid.cols, cols)..border(col + 1, grid.cols, cols) {
+                    if let Some((point, _)) = self.node(row * grid.cols + node) {
+                        product *= -f64::from(point[2]);
+                        count += 1;
+                        if !(1e-100..1e100).contains(&product) {
+                            sums[first + col] += product.ln();
+                            product = 1.0;
+                        }
+                    }
+                }
+                sums[first + col] += product.ln();
+                counts[first + col] += count;
             }
         }
         let full = grid.len() / (cols * rows);
-        sums.iter().zip(counts).map(|(s, n)| if 4 * n > full { s / n as f32 } else { f32::NAN }).collect()
+        let mean = |(sum, count): (f64, usize)| if 4 * count > full { (sum / count as f64) as f32 } else { f32::NAN };
+        sums.into_iter().zip(counts).map(mean).collect()
     }
 
     /// Direction of the ray at a fraction of the frame's width and height.
@@ -221,7 +235,7 @@ impl<L: Locate> pulp::WithSimd for LocatedLearning<'_, '_, L> {
             }
             for k in 0..BLOCK {
                 if fits[k] {
-                    learned.push((d.node[k] as u32, d.residual[k], block.variance[k]));
+                    learned.push((d.node[k], d.residual[k], block.variance[k]));
                 }
             }
         }

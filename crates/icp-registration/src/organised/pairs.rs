@@ -115,8 +115,8 @@ pub(super) struct Pairs {
 
 /// Where nodes lie for the target; NaN where it has no plane.
 pub(super) struct Distances {
-    /// The target's nodes; beyond all of them where there is none.
-    pub node: [usize; BLOCK],
+    /// The target's nodes.
+    pub node: [u32; BLOCK],
     /// Distance beyond the target plane, seen from the target's camera, metre.
     pub residual: [f32; BLOCK],
     /// Variance of the residual, m².
@@ -149,36 +149,33 @@ impl<'a> Moved<'a> {
     #[inline(always)]
     pub(super) fn pairs<L: Locate>(&self, locate: L, rules: &Rules, block: &Block) -> Pairs {
         let (p, source_normal, planes, distances) = self.compared(locate, block);
+        let (centre, per_radius, least_cosine) = (self.centre, self.per_radius, rules.least_cosine);
+        let (extra_variance, per_square_reach) = (rules.extra_variance, 1.0 / (rules.reach * rules.reach));
         let nothing = [0.0; BLOCK];
-        let mut pairs = Pairs {
-            normal: [planes[0], planes[1], planes[2]],
-            source_normal,
-            lever: [nothing; 3],
-            residual: nothing,
-            variance: nothing,
-            weight: nothing,
-            slope: nothing,
-            met: [false; BLOCK],
-        };
+        let (mut accepted, mut met) = ([false; BLOCK], [false; BLOCK]);
+        let (mut variance, mut weight, mut slope, mut residual) = (nothing, nothing, nothing, nothing);
         for k in 0..BLOCK {
-            let (residual, cosine) = (distances.residual[k], distances.cosine[k]);
-            let variance = distances.variance[k] + rules.extra_variance;
-            let u2 = residual * residual / (variance * rules.reach * rules.reach);
+            variance[k] = distances.variance[k] + extra_variance;
+            let information = 1.0 / variance[k];
+            let u2 = distances.residual[k] * distances.residual[k] * information * per_square_reach;
             // NaN fails: no partner.
-            let accepted = cosine >= rules.least_cosine && u2 < 1.0;
+            accepted[k] = (distances.cosine[k] >= least_cosine) & (u2 < 1.0);
+            met[k] = u2 >= 0.0;
             let rest = 1.0 - u2;
-            pairs.weight[k] = if accepted { rest * rest / variance } else { 0.0 };
-            pairs.slope[k] = if accepted { rest * (1.0 - 5.0 * u2) / variance } else { 0.0 };
-            pairs.residual[k] = if accepted { residual } else { 0.0 };
-            pairs.variance[k] = variance;
-            pairs.met[k] = u2 >= 0.0;
-            for i in 0..3 {
-                pairs.lever[i][k] = if accepted { (p[i][k] - self.centre[i]) * self.per_radius } else { 0.0 };
-                pairs.normal[i][k] = if accepted { pairs.normal[i][k] } else { 0.0 };
-                pairs.source_normal[i][k] = if accepted { source_normal[i][k] } else { 0.0 };
+            let (by_weight, by_slope) = (rest * rest * information, rest * (1.0 - 5.0 * u2) * information);
+            weight[k] = if accepted[k] { by_weight } else { 0.0 };
+            slope[k] = if accepted[k] { by_slope } else { 0.0 };
+            residual[k] = if accepted[k] { distances.residual[k] } else { 0.0 };
+        }
+        let mut lever = [nothing; 3];
+        for i in 0..3 {
+            for k in 0..BLOCK {
+                lever[i][k] = (p[i][k] - centre[i]) * per_radius;
             }
         }
-        pairs
+        let normal = taken(&[planes[0], planes[1], planes[2]], &accepted);
+        let (lever, source_normal) = (taken(&lever, &accepted), taken(&source_normal, &accepted));
+        Pairs { normal, source_normal, lever, residual, variance, weight, met, slope }
     }
 
     /// Where the nodes of a block lie for the target.
@@ -197,16 +194,16 @@ impl<'a> Moved<'a> {
     ) -> ([[f32; BLOCK]; 3], [[f32; BLOCK]; 3], [[f32; BLOCK]; 4], Distances) {
         let p = self.rotated(&block.position, self.translation);
         let source_normal = self.rotated(&block.normal, [0.0; 3]);
-        let (node, planes, variances) = self.partners(locate, &p);
+        let (node, planes, variances, outside) = self.partners(locate, &p);
         let nothing = [0.0; BLOCK];
-        let mut distances = Distances { node, residual: nothing, variance: nothing, cosine: nothing };
+        let (mut residual, mut variance, mut cosine) = (nothing, nothing, nothing);
         for k in 0..BLOCK {
             let [a, b, c, d] = [planes[0][k], planes[1][k], planes[2][k], planes[3][k]];
-            distances.residual[k] = a * p[0][k] + b * p[1][k] + c * p[2][k] - d;
-            distances.cosine[k] = a * source_normal[0][k] + b * source_normal[1][k] + c * source_normal[2][k];
-            distances.variance[k] = variances[k] + block.variance[k];
+            residual[k] = a * p[0][k] + b * p[1][k] + c * p[2][k] - d + outside[k];
+            cosine[k] = a * source_normal[0][k] + b * source_normal[1][k] + c * source_normal[2][k];
+            variance[k] = variances[k] + block.variance[k];
         }
-        (p, source_normal, planes, distances)
+        (p, source_normal, planes, Distances { node, residual, variance, cosine })
     }
 
     #[inline(always)]
@@ -221,47 +218,56 @@ impl<'a> Moved<'a> {
         moved
     }
 
-    /// The target nodes on which points fall, with their planes and variances; NaN where there are none.
+    /// The target nodes on which points fall, with their planes and variances; what is added to the residual: NaN for
+    /// points outside the frame, which get the nearest node instead, else 0.
     #[inline(always)]
     #[allow(clippy::type_complexity)]
     fn partners<L: Locate>(
         &self,
         locate: L,
         p: &[[f32; BLOCK]; 3],
-    ) -> ([usize; BLOCK], [[f32; BLOCK]; 4], [f32; BLOCK]) {
+    ) -> ([u32; BLOCK], [[f32; BLOCK]; 4], [f32; BLOCK], [f32; BLOCK]) {
         let grid = &self.target.projection.grid;
         let (cols, rows) = (grid.cols as f32, grid.rows as f32);
-        let mut index = [usize::MAX; BLOCK];
-        let (mut col, mut row, mut inside) = ([0.0; BLOCK], [0.0; BLOCK], [false; BLOCK]);
+        let (most_col, most_row) = (cols - 0.5, rows - 0.5);
+        let (mut node, mut outside) = ([0; BLOCK], [0.0; BLOCK]);
         for k in 0..BLOCK {
             let per_depth = -1.0 / p[2][k];
-            let node = locate.node(p[0][k] * per_depth, p[1][k] * per_depth);
-            let at = node.map(|x| x + 0.5);
+            let [col, row] = locate.node(p[0][k] * per_depth, p[1][k] * per_depth).map(|x| x + 0.5);
             // NaN fails.
-            inside[k] = (p[2][k] < 0.0) & (at[0] >= 0.0) & (at[1] >= 0.0) & (at[0] < cols) & (at[1] < rows);
-            col[k] = if inside[k] { at[0] } else { 0.0 };
-            row[k] = if inside[k] { at[1] } else { 0.0 };
-        }
-        for k in 0..BLOCK {
+            let inside = (p[2][k] < 0.0) & (col >= 0.0) & (row >= 0.0) & (col < cols) & (row < rows);
+            outside[k] = if inside { 0.0 } else { f32::NAN };
+            // No branches: they would be taken lane by lane. NaN becomes 0.
+            let (col, row) = (if col > 0.0 { col } else { 0.0 }, if row > 0.0 { row } else { 0.0 });
+            let col = if col < most_col { col } else { most_col };
+            let row = if row < most_row { row } else { most_row };
             // Whole numbers below 2²³ as the low bits of their sum with it: a cast would be done lane by lane.
-            let node = (row[k].floor() * cols + col[k].floor() + TWO_TO_23).to_bits() & LOW_BITS;
-            index[k] = if inside[k] { node as usize } else { usize::MAX };
+            node[k] = (row.floor() * cols + col.floor() + TWO_TO_23).to_bits() & LOW_BITS;
         }
         let (mut nodes, mut variances) = ([[f32::NAN; 4]; BLOCK], [f32::NAN; BLOCK]);
-        let count = self.target.planes.len().min(self.target.sigma.len());
-        let (all_planes, all_sigma) = (&self.target.planes[..count], &self.target.sigma[..count]);
         for k in 0..BLOCK {
-            if index[k] < count {
-                nodes[k] = all_planes[index[k]];
-                variances[k] = all_sigma[index[k]].powi(2);
-            }
+            nodes[k] = self.target.planes[node[k] as usize];
+            variances[k] = self.target.sigma[node[k] as usize];
         }
-        let mut planes = [[f32::NAN; BLOCK]; 4];
-        for j in 0..4 {
-            for k in 0..BLOCK {
+        let mut planes = [[0.0; BLOCK]; 4];
+        for k in 0..BLOCK {
+            variances[k] *= variances[k];
+            for j in 0..4 {
                 planes[j][k] = nodes[k][j];
             }
         }
-        (index, planes, variances)
+        (node, planes, variances, outside)
     }
+}
+
+/// The accepted ones of some vectors, 0 instead of the others.
+#[inline(always)]
+fn taken(vectors: &[[f32; BLOCK]; 3], accepted: &[bool; BLOCK]) -> [[f32; BLOCK]; 3] {
+    let mut taken = [[0.0; BLOCK]; 3];
+    for i in 0..3 {
+        for k in 0..BLOCK {
+            taken[i][k] = if accepted[k] { vectors[i][k] } else { 0.0 };
+        }
+    }
+    taken
 }

@@ -35,8 +35,8 @@ const LEAST_SCORE: f64 = 1e-8;
 const PARTS: usize = 4;
 /// 6 scores and 21 products.
 const SUMS: usize = 6 + 21;
-/// The normal equations and 21 products of independent scores.
-const TOTALS: usize = sums::SUMS + 21;
+/// Blocks whose totals are summed in single precision.
+const CHUNK: usize = 32;
 
 /// Motions that keep the guess.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -67,17 +67,17 @@ impl Verdict {
         residuals: Residuals,
         cells: &mut Vec<Cell>,
     ) -> Result<Self> {
-        let (cells, independent, normal) = fill(moved, rules, blocks, cells);
+        let (cells, normal) = fill(moved, rules, blocks, cells);
         let information = symmetric(&cells.iter().fold([0.0; 21], |mut sum, cell| {
             sum.iter_mut().zip(&cell[6..]).for_each(|(s, c)| *s += c);
             sum
         }));
         let used = cells.iter().filter(|c| c[6] + c[12] + c[17] != 0.0).count();
         let score = match residuals {
-            Residuals::Misaligned => independent,
+            Residuals::Misaligned => independent_scores(moved, rules, blocks),
             Residuals::Settled if used >= FEWEST_CELLS => clustered(cells) * (used as f64 / (used as f64 - 6.0)),
             // Too few cells to estimate from: the pairs of a cell taken as fully dependent.
-            Residuals::Settled => independent * (normal.pairs as f64 / used.max(1) as f64),
+            Residuals::Settled => independent_scores(moved, rules, blocks) * (normal.pairs as f64 / used.max(1) as f64),
         };
         let score = score + Matrix6::identity() * (LEAST_SCORE / 6.0 * information.trace());
         let significant = |motion: &Vector6<f64>, information| is_significant(cells, information, motion);
@@ -184,17 +184,33 @@ fn symmetric(upper: &[f64; 21]) -> Matrix6<f64> {
     matrix
 }
 
-/// Sums over the cells, the covariance of the score of pairs that share nothing, and the normal equations.
-fn fill<'c>(
-    moved: &Moved<'_>,
-    rules: &Rules,
-    blocks: &[Block],
-    cells: &'c mut Vec<Cell>,
-) -> (&'c [Cell], Matrix6<f64>, Normal) {
+/// Covariance of the summed score of pairs that share nothing.
+fn independent_scores(moved: &Moved<'_>, rules: &Rules, blocks: &[Block]) -> Matrix6<f64> {
+    let mut sums = [0.0; 21];
+    sums::visit(moved, rules, blocks, |pairs| {
+        let rows = derivatives(&pairs.lever, &pairs.normal);
+        let mut k = 0;
+        for r in 0..6 {
+            for c in r..6 {
+                let mut lane = [0.0_f32; BLOCK];
+                for l in 0..BLOCK {
+                    let score = pairs.weight[l] * pairs.residual[l];
+                    lane[l] = rows[r][l] * rows[c][l] * score * score;
+                }
+                sums[k] += f64::from(sums::across(&lane));
+                k += 1;
+            }
+        }
+    });
+    symmetric(&sums)
+}
+
+/// Sums over the cells, and the normal equations.
+fn fill<'c>(moved: &Moved<'_>, rules: &Rules, blocks: &[Block], cells: &'c mut Vec<Cell>) -> (&'c [Cell], Normal) {
     let count = moved.source.projection.grid.cell_count;
     cells.clear();
     cells.resize(PARTS * count, [0.0; SUMS]);
-    let mut parts = [[0.0; TOTALS]; PARTS];
+    let mut parts = [[0.0; sums::SUMS]; PARTS];
     with_locate(moved.target, Fill { moved, rules, blocks, cells, parts: &mut parts });
     let (first, others) = cells.split_at_mut(count);
     for part in others.chunks(count) {
@@ -203,8 +219,7 @@ fn fill<'c>(
         }
     }
     let total = |k: usize| parts.iter().map(|part| part[k]).sum::<f64>();
-    let independent = symmetric(&std::array::from_fn(|k| total(sums::SUMS + k)));
-    (first, independent, Normal::new(&std::array::from_fn(total)))
+    (first, Normal::new(&std::array::from_fn(total)))
 }
 
 struct Fill<'a, 'b> {
@@ -212,7 +227,7 @@ struct Fill<'a, 'b> {
     rules: &'a Rules,
     blocks: &'a [Block],
     cells: &'a mut [Cell],
-    parts: &'a mut [[f64; TOTALS]; PARTS],
+    parts: &'a mut [[f64; sums::SUMS]; PARTS],
 }
 
 impl WithLocate for Fill<'_, '_> {
@@ -237,7 +252,7 @@ struct Part<'a, 'b, L> {
     /// Cells of the nodes.
     cell_of: &'a [[u16; BLOCK]],
     cells: &'a mut [Cell],
-    totals: &'a mut [f64; TOTALS],
+    totals: &'a mut [f64; sums::SUMS],
 }
 
 impl<L: Locate> pulp::WithSimd for Part<'_, '_, L> {
@@ -245,10 +260,14 @@ impl<L: Locate> pulp::WithSimd for Part<'_, '_, L> {
 
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(mut self, _: S) {
-        let mut run = Run { cell: 0, lanes: [[0.0; BLOCK]; SUMS], totals: [[0.0; BLOCK]; TOTALS] };
-        for (block, cell_of) in self.blocks.iter().zip(self.cell_of) {
-            let pairs = self.moved.pairs(self.locate, self.rules, block);
-            self.add(&mut run, &pairs, cell_of);
+        let mut run = Run { cell: 0, lanes: [[0.0; BLOCK]; SUMS] };
+        for (blocks, cells) in self.blocks.chunks(CHUNK).zip(self.cell_of.chunks(CHUNK)) {
+            let mut totals = [[0.0; BLOCK]; sums::SUMS];
+            for (block, cell_of) in blocks.iter().zip(cells) {
+                let pairs = self.moved.pairs(self.locate, self.rules, block);
+                self.add(&mut run, &mut totals, &pairs, cell_of);
+            }
+            sums::hand_over(self.totals, &totals);
         }
         self.end(&mut run);
     }
@@ -258,20 +277,19 @@ impl<L: Locate> pulp::WithSimd for Part<'_, '_, L> {
 struct Run {
     cell: u16,
     lanes: [[f32; BLOCK]; SUMS],
-    totals: [[f32; BLOCK]; TOTALS],
 }
 
 impl<L: Locate> Part<'_, '_, L> {
     #[inline(always)]
-    fn add(&mut self, run: &mut Run, pairs: &Pairs, cell_of: &[u16; BLOCK]) {
+    fn add(&mut self, run: &mut Run, totals: &mut [[f32; BLOCK]; sums::SUMS], pairs: &Pairs, cell_of: &[u16; BLOCK]) {
         let along_target = derivatives(&pairs.lever, &pairs.normal);
         let along_source = derivatives(&pairs.lever, &pairs.source_normal);
         let mut lanes = [[0.0_f32; BLOCK]; SUMS];
-        let mut score = [0.0_f32; BLOCK];
+        let (mut score, mut half_slope) = ([0.0_f32; BLOCK], [0.0_f32; BLOCK]);
         for l in 0..BLOCK {
             score[l] = pairs.weight[l] * pairs.residual[l];
+            half_slope[l] = 0.5 * pairs.slope[l];
         }
-        let (normal, independent) = run.totals.split_at_mut(sums::SUMS);
         let mut k = 0;
         for r in 0..6 {
             for l in 0..BLOCK {
@@ -280,21 +298,26 @@ impl<L: Locate> Part<'_, '_, L> {
             for c in r..6 {
                 for l in 0..BLOCK {
                     let cross = along_target[r][l] * along_source[c][l] + along_target[c][l] * along_source[r][l];
-                    lanes[6 + k][l] = 0.5 * pairs.slope[l] * cross;
-                    independent[k][l] += along_target[r][l] * along_target[c][l] * score[l] * score[l];
+                    lanes[6 + k][l] = half_slope[l] * cross;
                 }
                 k += 1;
             }
         }
-        if let Ok(normal) = normal.try_into() {
-            sums::add(normal, pairs, &along_target);
-        }
+        sums::add(totals, pairs, &along_target);
         self.sort(run, &lanes, cell_of, &pairs.weight);
     }
 
     /// Adds each lane to its cell.
     #[inline(always)]
     fn sort(&mut self, run: &mut Run, lanes: &[[f32; BLOCK]; SUMS], cell_of: &[u16; BLOCK], weight: &[f32; BLOCK]) {
+        if cell_of.iter().all(|cell| *cell == run.cell) {
+            for (sum, lane) in run.lanes.iter_mut().zip(lanes) {
+                for l in 0..BLOCK {
+                    sum[l] += lane[l];
+                }
+            }
+            return;
+        }
         let mut waiting = weight.map(|w| w > 0.0);
         while let Some(first) = waiting.iter().position(|w| *w) {
             let cell = cell_of[first];
@@ -318,13 +341,7 @@ impl<L: Locate> Part<'_, '_, L> {
     /// Hands the sums of a run over to its cell.
     #[inline(always)]
     fn end(&mut self, run: &mut Run) {
-        for (sum, lane) in self.cells[usize::from(run.cell)].iter_mut().zip(&run.lanes) {
-            *sum += f64::from(lane.iter().sum::<f32>());
-        }
-        for (sum, lane) in self.totals.iter_mut().zip(&run.totals) {
-            *sum += f64::from(lane.iter().sum::<f32>());
-        }
+        sums::hand_over(&mut self.cells[usize::from(run.cell)], &run.lanes);
         run.lanes = [[0.0; BLOCK]; SUMS];
-        run.totals = [[0.0; BLOCK]; TOTALS];
     }
 }

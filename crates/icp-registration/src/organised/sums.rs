@@ -109,10 +109,31 @@ impl<L: Locate> pulp::WithSimd for Chunk<'_, '_, L> {
             let pairs = self.moved.pairs(self.locate, self.rules, block);
             add(&mut lanes, &pairs, &derivatives(&pairs.lever, &pairs.normal));
         }
-        for (sum, lane) in self.sums.iter_mut().zip(&lanes) {
-            *sum = f64::from(lane.iter().sum::<f32>());
-        }
+        *self.sums = [0.0; SUMS];
+        hand_over(self.sums, &lanes);
     }
+}
+
+/// Adds the sums of lanes to sums in double precision.
+#[inline(always)]
+pub(super) fn hand_over<const N: usize>(sums: &mut [f64; N], lanes: &[[f32; BLOCK]; N]) {
+    for (sum, lane) in sums.iter_mut().zip(lanes) {
+        *sum += f64::from(across(lane));
+    }
+}
+
+/// Sum over lanes, by halves: no lane waits for the one before.
+#[inline(always)]
+pub(super) fn across(lanes: &[f32; BLOCK]) -> f32 {
+    let mut sums = *lanes;
+    let mut half = BLOCK / 2;
+    while half > 0 {
+        for l in 0..half {
+            sums[l] += sums[l + half];
+        }
+        half /= 2;
+    }
+    sums[0]
 }
 
 /// Adds pairs with their derivatives.
@@ -209,12 +230,16 @@ impl WithLocate for Sample<'_, '_> {
 /// Nodes that fall on target planes, and how many of them are accepted.
 pub(super) fn agreement(moved: &Moved<'_>, rules: &Rules, blocks: &[Block]) -> (usize, usize) {
     let (mut met, mut accepted) = (0, 0);
-    let visit = |pairs: &Pairs| {
+    visit(moved, rules, blocks, |pairs| {
         met += pairs.met.iter().filter(|m| **m).count();
         accepted += pairs.weight.iter().filter(|w| **w > 0.0).count();
-    };
-    with_locate(moved.target, Visit { moved, rules, blocks, step: 1, work: visit });
+    });
     (met, accepted)
+}
+
+/// Calls a function with the pairs of each block.
+pub(super) fn visit(moved: &Moved<'_>, rules: &Rules, blocks: &[Block], work: impl FnMut(&Pairs)) {
+    with_locate(moved.target, Visit { moved, rules, blocks, step: 1, work });
 }
 
 /// Calls a function with the pairs of every `step`-th block.

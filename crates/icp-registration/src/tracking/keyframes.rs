@@ -12,6 +12,8 @@ use crate::organised::OrganisedFrame;
 pub(super) const THUMBNAIL: [usize; 2] = [16, 12];
 /// Points by which overlaps are judged.
 pub(super) const SAMPLE: usize = 2500;
+/// Keyframes whose overlap with a frame is told.
+const CANDIDATES: usize = 4;
 /// Cosine of the largest angle between the axes of two cameras that can see the same from the same side.
 const LEAST_VIEW_COSINE: f64 = 0.3;
 
@@ -45,13 +47,13 @@ pub(super) struct Keyframes {
 }
 
 impl Keyframes {
-    pub(super) fn start(&mut self, frame: OrganisedFrame, world_from_keyframe: &Uncertain) {
+    pub(super) fn start(&mut self, frame: &OrganisedFrame, world_from_keyframe: &Uncertain) {
         self.push(frame);
         self.graph.poses.push(*world_from_keyframe);
     }
 
     /// A new keyframe at a pose measured from keyframe `from`; returns its index.
-    pub(super) fn add(&mut self, frame: OrganisedFrame, from: usize, from_from_new: &Uncertain) -> usize {
+    pub(super) fn add(&mut self, frame: &OrganisedFrame, from: usize, from_from_new: &Uncertain) -> usize {
         self.push(frame);
         let pose = self.graph.poses[from].then(from_from_new);
         self.graph.poses.push(pose);
@@ -60,13 +62,14 @@ impl Keyframes {
         b
     }
 
-    fn push(&mut self, frame: OrganisedFrame) {
+    fn push(&mut self, frame: &OrganisedFrame) {
         let thumbnail = frame.thumbnail(THUMBNAIL[0], THUMBNAIL[1]);
+        let frame = frame.as_target();
         self.list.push(Keyframe { number: self.anchors.len(), frame, thumbnail, features: None });
         self.anchors.push(Anchor::Kept);
     }
 
-    /// Keyframes other than `skip` with the fraction of the frame that would agree with them, at a pose given from
+    /// A few keyframes other than `skip` with the fraction of the frame that would agree with them, at a pose given from
     /// keyframe `from`; best first.
     pub(super) fn candidates(
         &self,
@@ -76,15 +79,21 @@ impl Keyframes {
         skip: usize,
     ) -> Vec<(f64, usize)> {
         let mut found = Vec::with_capacity(self.list.len());
-        for (k, keyframe) in self.list.iter().enumerate() {
+        for k in (0..self.list.len()).filter(|k| *k != skip) {
             let pose = self.graph.relative(k, from) * from_from_camera;
-            let cosine = pose.rotation.to_rotation_matrix()[(2, 2)];
-            if k != skip && cosine > LEAST_VIEW_COSINE {
-                found.push((keyframe.frame.agreement(current, &pose, SAMPLE / 4).overlap(), k));
+            if pose.rotation.to_rotation_matrix()[(2, 2)] > LEAST_VIEW_COSINE {
+                found.push((0.0, k, pose));
             }
         }
-        found.sort_by(|x, y| y.0.total_cmp(&x.0).then(x.1.cmp(&y.1)));
-        found
+        // Few points tell which ones are worth more.
+        for most in [SAMPLE / 32, SAMPLE / 4] {
+            for (overlap, k, pose) in &mut found {
+                *overlap = self.list[*k].frame.agreement(current, pose, most).overlap();
+            }
+            found.sort_by(|x, y| y.0.total_cmp(&x.0).then(x.1.cmp(&y.1)));
+            found.truncate(CANDIDATES);
+        }
+        found.into_iter().map(|(overlap, k, _)| (overlap, k)).collect()
     }
 
     /// Takes out the keyframe that is nearest to another one, neither the first nor `spared`; returns its index.

@@ -123,7 +123,7 @@ impl Tracker {
         let measured = register(&mut self.aligner, &self.options, &self.current, &self.previous, &guess).ok()?;
         helps(&measured).then(|| {
             let total = Uncertain { covariance: last.own.covariance + last.shared, ..last.own };
-            let keyframe = self.keyframes.add(self.previous.clone(), last.keyframe, &total);
+            let keyframe = self.keyframes.add(&self.previous, last.keyframe, &total);
             Measured { keyframe, ..measured }
         })
     }

@@ -30,9 +30,10 @@ pub enum Relocalisation {
     CoarseWith(Box<CoarseOptions>),
 }
 
-/// Length of the step, in standard deviations, after which the last one is taken: noise alone makes a length of √6, and each
-/// step is about a third of the one before.
-const NOISE_FRACTION: f64 = 2.0;
+/// Length of the step, in standard deviations, after which the last one is taken. The pose of a quarter of the nodes lies √18
+/// off that of all of them by noise alone, and each step is about a third of the one before: what is left after the last
+/// one is below 0.5, where the noise of the pose is √6.
+const NOISE_FRACTION: f64 = 4.0;
 
 /// Options of a [`Tracker`](super::Tracker). The defaults carry no scale.
 #[derive(Debug, Clone, PartialEq)]

@@ -141,7 +141,7 @@ impl Tracker {
         let state = if blank { TrackingState::Lost(LossReason::TooFewPoints) } else { TrackingState::Started };
         if !blank {
             self.set_weakest_motion();
-            self.keyframes.start(self.current.clone(), &pose);
+            self.keyframes.start(&self.current, &pose);
             self.last = Some(Last {
                 timestamp_s,
                 keyframe: 0,
@@ -315,7 +315,7 @@ impl Tracker {
             self.refer_to(k, &measured.own(), &measured.shared());
             return;
         }
-        let new = self.keyframes.add(self.current.clone(), reference, reference_from_camera);
+        let new = self.keyframes.add(&self.current, reference, reference_from_camera);
         self.refer_to(new, &Uncertain::exact(Isometry3::identity()), &Matrix6::zeros());
     }
 

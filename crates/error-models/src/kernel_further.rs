@@ -137,7 +137,11 @@ impl SurfaceLanes {
         for (lane, t) in t.iter_mut().enumerate() {
             *t = (first + lane as f32 * step).clamp(-1.0, 1.0);
         }
-        put_values(in_row, &t, value);
+        if in_row.is_low() {
+            put_values::<LOW>(in_row, &t, value);
+        } else {
+            put_values::<SURFACE_ORDERS>(in_row, &t, value);
+        }
         let [inside, behind] = self.inside;
         if column >= inside && column + LANES <= behind && self.holds_row(row) {
             return;
@@ -161,6 +165,9 @@ impl SurfaceLanes {
 
 /// Orders that a series may have, zero among them.
 const ORDERS: usize = crate::legendre::MOST_ORDER + 1;
+
+/// Orders that a surface may have, zero among them.
+const SURFACE_ORDERS: usize = ImageSurface::ORDERS[1] + 1;
 
 /// Orders of most polynomials in use, which take half of the time.
 const LOW: usize = 5;
@@ -193,10 +200,10 @@ fn put_powers<const N: usize>(powers: &Powers, t: &Lanes, value: &mut Lanes, slo
     }
 }
 
-/// The values alone, of the orders that a surface may have.
+/// The values alone, of `N` orders.
 #[inline(always)]
-fn put_values(powers: &Powers, t: &Lanes, value: &mut Lanes) {
+fn put_values<const N: usize>(powers: &Powers, t: &Lanes, value: &mut Lanes) {
     for lane in 0..LANES {
-        value[lane] = (0..=ImageSurface::ORDERS[1]).rev().fold(0.0, |sum, order| sum * t[lane] + powers.0[order]);
+        value[lane] = (0..N).rev().fold(0.0, |sum, order| sum * t[lane] + powers.0[order]);
     }
 }

@@ -30,6 +30,14 @@ pub(crate) fn robust_standard_deviation(values: &[f64]) -> f64 {
     1.4826 * median(&mut work)
 }
 
+/// Keeps samples whose standardised residual lies within so many robust standard deviations of the median.
+pub(crate) fn retain_within<T>(samples: &mut Vec<T>, deviations: f64, standardised: impl Fn(&T) -> f64) {
+    let mut all: Vec<f64> = samples.iter().map(&standardised).collect();
+    let limit = deviations * robust_standard_deviation(&all);
+    let middle = median(&mut all);
+    samples.retain(|sample| (standardised(sample) - middle).abs() <= limit);
+}
+
 fn partition_finite(values: &mut [f64]) -> &mut [f64] {
     let mut count = 0;
     for index in 0..values.len() {
@@ -51,6 +59,13 @@ mod tests {
         assert!((median(&mut values) - 2.5).abs() < 1e-15, "between the two middle values");
         assert!((quantile(&mut values, 1.0) - 4.0).abs() < 1e-15, "the largest");
         assert!(median(&mut []).is_nan());
+    }
+
+    #[test]
+    fn gross_errors_go_and_an_offset_of_all_does_not_matter() {
+        let mut samples: Vec<f64> = (0..100).map(|k| 50.0 + f64::from(k % 5)).chain([90.0, -20.0]).collect();
+        retain_within(&mut samples, 4.0, |sample| *sample);
+        assert_eq!(samples.len(), 100);
     }
 
     #[test]

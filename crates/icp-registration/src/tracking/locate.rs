@@ -23,7 +23,7 @@ const DISBELIEF: f64 = 40.0;
 const BY_VELOCITY: f64 = 0.25;
 /// What a pose found against expectation must agree by: fraction of the frame, and of what can be judged.
 const LEAST_OVERLAP: f64 = 0.5;
-pub(super) const LEAST_CONSENT: f64 = 0.9;
+const LEAST_CONSENT: f64 = 0.9;
 /// Planes it must share: three make a corner, and corners look alike.
 const LEAST_PLANES: usize = 4;
 /// Share of the radius (and radian) by which a camera that starts or stops may miss the prediction, as a standard
@@ -54,7 +54,12 @@ impl Measured {
     /// Whether the frames agree at the pose as they do at right ones. Frames that have slid along a wall fit as well, and
     /// can be as sure of it, but see through each other's surfaces.
     pub(super) fn is_sound(&self) -> bool {
-        self.determined && self.agreement.consent() >= LEAST_CONSENT
+        self.determined && self.agrees()
+    }
+
+    /// Whether the frames contradict each other no more than at right poses.
+    pub(super) fn agrees(&self) -> bool {
+        self.agreement.consent() >= LEAST_CONSENT
     }
 
     /// The same with weak motions left open. What holds them are a few nodes, often at edges, and chance: their
@@ -137,15 +142,14 @@ impl Tracker {
         {
             return Ok(measured);
         }
-        let agrees = |measured: &Measured| measured.agreement.consent() >= LEAST_CONSENT;
         let radius = self.current.radius_m();
-        let doubtful = !first.as_ref().is_ok_and(agrees);
+        let doubtful = !first.as_ref().is_ok_and(Measured::agrees);
         let helps = |measured: &Measured| measured.is_firm(radius) || doubtful && measured.is_sound();
         if let Some(measured) = self.with_previous(last, prediction, helps) {
             return Ok(measured);
         }
         let usable = |measured: &Measured| measured.determined || prediction.grounds != Grounds::Nothing;
-        if first.as_ref().is_ok_and(|measured| usable(measured) && agrees(measured)) {
+        if first.as_ref().is_ok_and(|measured| usable(measured) && measured.agrees()) {
             return first;
         }
         let candidates = self.keyframes.candidates(&self.current, reference, &prediction.own.pose, reference);

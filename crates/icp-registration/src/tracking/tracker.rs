@@ -6,7 +6,7 @@ use nalgebra::{Isometry3, Matrix6};
 
 use super::graph::Edge;
 use super::keyframes::Keyframes;
-use super::locate::{Fix, LEAST_CONSENT, Measured};
+use super::locate::{Fix, Measured};
 use super::motion::{MotionPrior, Uncertain, diagonal};
 use super::options::{Fusion, TrackerOptions};
 use super::prediction::{Grounds, Last, Prediction};
@@ -197,7 +197,7 @@ impl Tracker {
             self.placed(&measured, last, prediction)
         });
         let found = match &near {
-            Ok((measured, _)) if measured.agreement.consent() >= LEAST_CONSENT => return near,
+            Ok((measured, _)) if measured.agrees() => return near,
             // What contradicts is still better than nothing, unless some other keyframe fits.
             Ok(_) => {
                 let ranked = self.ranked();

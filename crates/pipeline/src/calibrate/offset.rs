@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::placed::Placed;
 use super::start::Start;
-use crate::statistics::{median, robust_standard_deviation};
+use crate::statistics::retain_within;
 
 /// Residuals beyond so many robust standard deviations belong to something else than the plane.
 const GROSS: f64 = 4.0;
@@ -79,7 +79,7 @@ impl FoundTable {
                 }
             }
         }
-        leave_out_gross(&mut samples);
+        retain_within(&mut samples, GROSS, |sample| sample.residual_m / sample.sigma_m);
         let options = OffsetTableOptions { block, ..OffsetTableOptions::default() };
         let first = estimate_offset_table(&samples, &start.camera.format, &options)?;
         let known_blocks = first.known_blocks;
@@ -94,13 +94,6 @@ impl FoundTable {
     pub(super) fn worth_applying(&self) -> Option<FixedPattern> {
         self.summary.applied.then(|| self.pattern.clone())
     }
-}
-
-fn leave_out_gross(samples: &mut Vec<OffsetSample>) {
-    let mut standardised: Vec<f64> = samples.iter().map(|sample| sample.residual_m / sample.sigma_m).collect();
-    let scale = robust_standard_deviation(&standardised);
-    let middle = median(&mut standardised);
-    samples.retain(|sample| (sample.residual_m / sample.sigma_m - middle).abs() <= GROSS * scale);
 }
 
 /// The table with the mean of all residuals in it: the terms, d0 among them, were found from some of the pixels only.

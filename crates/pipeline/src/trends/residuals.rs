@@ -10,7 +10,7 @@ use self_calibration::{
 
 use super::{RemainingErrors, TrendSummary, sentence};
 use crate::outcome::Outcome;
-use crate::statistics::{median, robust_standard_deviation};
+use crate::statistics::retain_within;
 use crate::truth::range_errors;
 use crate::view::{View, ViewData};
 
@@ -73,7 +73,7 @@ fn none(basis_words: String) -> RemainingErrors {
 
 fn tested(basis: &'static str, basis_words: String, mut samples: Vec<TrendSample>) -> RemainingErrors {
     let all = samples.len();
-    leave_out_gross(&mut samples);
+    retain_within(&mut samples, GROSS, |sample| sample.residual_m / sample.sigma_m);
     let (pixels, gross_errors) = (samples.len(), all - samples.len());
     // Too few samples for any bins is the only thing that may be refused of these.
     let report = test_trends(&samples, &TrendOptions::default());
@@ -88,13 +88,6 @@ fn tested(basis: &'static str, basis_words: String, mut samples: Vec<TrendSample
     };
     let verdict = sentence(&variables).unwrap_or_else(untested);
     RemainingErrors { basis, basis_words, verdict, pixels, gross_errors, variables }
-}
-
-fn leave_out_gross(samples: &mut Vec<TrendSample>) {
-    let mut standardised: Vec<f64> = samples.iter().map(|sample| sample.residual_m / sample.sigma_m).collect();
-    let scale = robust_standard_deviation(&standardised);
-    let middle = median(&mut standardised);
-    samples.retain(|sample| (sample.residual_m / sample.sigma_m - middle).abs() <= GROSS * scale);
 }
 
 fn range_frame(view: &View) -> Option<&RangeFrame> {

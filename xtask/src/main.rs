@@ -9,6 +9,7 @@ mod pipeline_task;
 mod shell;
 mod test;
 mod tidy;
+mod verify;
 
 use std::process::ExitCode;
 
@@ -28,6 +29,8 @@ enum Task {
     Tidy,
     /// Other programs beside ours on the same work: `cargo xtask peers adjust`.
     Peers(peers::Arguments),
+    /// Long statistics, with the figures that docs/benchmarks.md states: `cargo xtask verify flags`.
+    Verify(verify::Arguments),
     /// Run the benchmarks of all crates, or of those named.
     Bench(bench::Arguments),
 }
@@ -39,6 +42,7 @@ fn main() -> ExitCode {
         Task::Test => test::run(),
         Task::Tidy => tidy::run(),
         Task::Peers(arguments) => peers::run(&arguments),
+        Task::Verify(arguments) => verify::run(&arguments),
         Task::Bench(arguments) => bench::run(&arguments),
     };
     match outcome {

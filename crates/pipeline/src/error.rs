@@ -2,6 +2,8 @@ use std::path::PathBuf;
 
 use thiserror::Error;
 
+use crate::verdict::Failure;
+
 /// Why a pipeline could not be read, started or finished.
 #[derive(Debug, Error)]
 #[non_exhaustive]
@@ -117,5 +119,37 @@ impl Error {
         E: Into<Box<dyn std::error::Error + Send + Sync>>,
     {
         move |source| Self::Stage { stage, view: view.to_owned(), source: source.into() }
+    }
+
+    /// What kind of failure it is: what an engine that runs the command should do next.
+    pub fn failure(&self) -> Failure {
+        match self {
+            Self::File(range_io::Error::Io { source, .. }) | Self::Access { source, .. } => of_system(source),
+            Self::File(range_io::Error::NothingMeasured { .. })
+            | Self::Stage { .. }
+            | Self::Calibrate(_)
+            | Self::Refused { .. }
+            | Self::Register(_) => Failure::Refused,
+            // A figure is drawn from results that are there already: what fails then is memory or disk.
+            Self::Figure { .. } => Failure::Machine,
+            _ => Failure::Usage,
+        }
+    }
+}
+
+/// What the operating system refuses is either a wrong name or a machine in trouble.
+fn of_system(source: &std::io::Error) -> Failure {
+    use std::io::ErrorKind as Kind;
+    match source.kind() {
+        Kind::NotFound
+        | Kind::PermissionDenied
+        | Kind::IsADirectory
+        | Kind::NotADirectory
+        | Kind::InvalidInput
+        | Kind::InvalidData
+        | Kind::InvalidFilename
+        | Kind::UnexpectedEof
+        | Kind::Unsupported => Failure::Usage,
+        _ => Failure::Machine,
     }
 }

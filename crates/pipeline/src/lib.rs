@@ -31,6 +31,7 @@ mod summary;
 mod track;
 mod trends;
 mod truth;
+mod verdict;
 mod view;
 mod warm_up;
 mod work;
@@ -88,6 +89,7 @@ pub use summary::{
 pub use track::{TrackLoss, TrackRequest, TrackSummary, TrackTruth, TrackVerdict, TrackedFrame, track};
 pub use trends::{RemainingErrors, TrendSummary};
 pub use truth::{RangeTruth, ViewTruth};
+pub use verdict::{Doubt, DoubtKind, Failure, Judged, Verdict};
 pub use view::{Snapshot, View, ViewData};
 pub use warm_up::{
     ReferenceUse, WarmUpBlock, WarmUpParameter, WarmUpPhase, WarmUpRateTest, WarmUpRequest, WarmUpSummary, WarmUpTest,

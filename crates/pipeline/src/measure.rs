@@ -16,6 +16,7 @@ use crate::statistics::{median, robust_standard_deviation};
 use crate::summary::{PairSummary, ReferenceSummary, RegistrationSummary, StationTruth, Summary, TruthSummary};
 use crate::trends;
 use crate::truth::{RangeTruth, evaluate, wrap};
+use crate::verdict::Doubt;
 use crate::view::{Snapshot, View, ViewData};
 
 /// Median absolute change of the ranges between two moments, metre, modulo the ambiguity interval.
@@ -66,6 +67,7 @@ pub(crate) fn summarise(plan: &Plan, survey: &Path, outcome: &Outcome) -> Summar
         reference: reference(&outcome.views),
         truth: truth(outcome),
         remaining: trends::remaining(outcome),
+        doubts: outcome.adjustment.iter().flat_map(|figures| wrong_places(outcome, &figures.placements)).collect(),
         seconds: 0.0,
         out: String::new(),
     }
@@ -125,12 +127,11 @@ fn registration(outcome: &Outcome) -> Option<RegistrationSummary> {
         sigma0: outcome.adjustment.as_ref().and_then(|figures| figures.sigma0),
         redundancy: outcome.adjustment.as_ref().map(|figures| figures.redundancy),
         position_sigma_max_m: sigmas.reduce(f64::max),
-        doubts: outcome.adjustment.iter().flat_map(|figures| wrong_places(outcome, &figures.placements)).collect(),
     })
 }
 
 /// What to say of stations that are probably in the wrong place.
-fn wrong_places(outcome: &Outcome, placements: &Placements) -> Vec<String> {
+fn wrong_places(outcome: &Outcome, placements: &Placements) -> Vec<Doubt> {
     let words = |station: usize| wrong_place(&outcome.views[station].station, &placements.stations[station]);
     placements.doubtful().map(words).collect()
 }

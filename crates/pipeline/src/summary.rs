@@ -8,6 +8,7 @@ use serde::Serialize;
 use crate::drift::ViewDrift;
 use crate::trends::RemainingErrors;
 use crate::truth::RangeTruth;
+use crate::verdict::{Doubt, Judged};
 
 /// What a run did and how good the result is.
 #[derive(Debug, Clone, Serialize)]
@@ -47,6 +48,8 @@ pub struct Summary {
     pub truth: Option<TruthSummary>,
     /// Whether what is left of the errors of the ranges is random.
     pub remaining: RemainingErrors,
+    /// What a reader should know before the result is used.
+    pub doubts: Vec<Doubt>,
     /// Wall-clock time of the whole run, second.
     pub seconds: f64,
     /// The output folder.
@@ -81,8 +84,6 @@ pub struct RegistrationSummary {
     pub redundancy: Option<i64>,
     /// Largest standard deviation of a station's position, metre, prior-scaled.
     pub position_sigma_max_m: Option<f64>,
-    /// Stations that are probably in the wrong place, each with the reason.
-    pub doubts: Vec<String>,
 }
 
 /// One aligned pair.
@@ -139,6 +140,12 @@ pub struct StationTruth {
     pub attitude_error_deg: Option<f64>,
 }
 
+impl Judged for Summary {
+    fn doubts(&self) -> &[Doubt] {
+        &self.doubts
+    }
+}
+
 impl fmt::Display for Summary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let [width, height] = self.size_px;
@@ -169,6 +176,9 @@ impl fmt::Display for Summary {
         writeln!(f, "flags: {}", flags.join(", "))?;
         self.write_quality(f)?;
         writeln!(f, "what is left: {}", self.remaining)?;
+        for doubt in &self.doubts {
+            writeln!(f, "doubt: {doubt}")?;
+        }
         write!(f, "written to {}: report.html, summary.json, cloud.ply, stations.csv, trajectory.txt", self.out)
     }
 }
@@ -178,9 +188,6 @@ impl Summary {
         if let Some(registration) = &self.registration {
             let sigma0 = registration.sigma0.map_or_else(String::new, |s| format!(", sigma0 {s:.2}"));
             writeln!(f, "registration: {} pairs{sigma0}", registration.pairs.len())?;
-            for doubt in &registration.doubts {
-                writeln!(f, "doubt: {doubt}")?;
-            }
         }
         if let Some(reference) = &self.reference {
             writeln!(

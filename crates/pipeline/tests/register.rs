@@ -66,7 +66,7 @@ fn without_start_poses_no_wrong_pose_is_left_without_a_doubt() {
     assert!(summary.start.starts_with("none"), "{}", summary.start);
     // A room looks alike from opposite sides: right as from start poses, or said to be doubtful.
     let right = summary.position_error_max_m.unwrap() < 0.010 && summary.attitude_error_max_deg.unwrap() < 0.1;
-    let doubted = summary.doubts.iter().any(|doubt| doubt.contains("no start poses were given"));
+    let doubted = summary.doubts.iter().any(|doubt| doubt.words.contains("no start poses were given"));
     assert!(right || doubted, "position {:?}, {:?}", summary.position_error_max_m, summary.doubts);
 }
 
@@ -167,7 +167,7 @@ fn two_clouds_are_brought_together_without_a_guess() {
     std::fs::write(&guess, "1 0 0 500\n0 1 0 0\n0 0 1 0\n0 0 0 1\n").unwrap();
     let far = RegisterRequest { guess: Some(guess), ..request(&paths, RegisterMethod::Pairs, &out) };
     let summary = register(&far, &Silent).unwrap();
-    assert!(summary.doubts.iter().any(|doubt| doubt.contains("found without them")), "{:?}", summary.doubts);
+    assert!(summary.doubts.iter().any(|doubt| doubt.words.contains("found without them")), "{:?}", summary.doubts);
 }
 
 #[test]

@@ -201,7 +201,7 @@ fn losses_are_told_and_a_lost_end_is_no_success() {
     println!("{summary}");
     assert_eq!((summary.verdict, summary.lost, summary.relocalised), (TrackVerdict::Interrupted, 2, 1));
     assert_eq!((summary.losses[0].frames, summary.losses[0].reason), (2, "too few points"));
-    assert!(summary.doubts[0].contains("2 of 14 frames"), "{:?}", summary.doubts);
+    assert!(summary.doubts[0].words.contains("2 of 14 frames"), "{:?}", summary.doubts);
     assert!(summary.truth.unwrap().position_error_max_m < 0.02, "found where it is: {:?}", summary.truth);
     check_files(&request(&folder).out, &summary);
 

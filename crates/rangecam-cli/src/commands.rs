@@ -10,21 +10,12 @@ use crate::arguments::Command;
 use crate::output::Output;
 use crate::register_arguments::Request;
 
-type Outcome = Result<(), Box<dyn Error>>;
-
-/// What the shell sees where a command fails: of `diff` 2, as 1 says that calibrations differ.
-pub(crate) fn failure_code(command: &Command) -> ExitCode {
-    if matches!(command, Command::Diff(_)) { ExitCode::from(2) } else { ExitCode::FAILURE }
-}
+type Outcome = Result<ExitCode, Box<dyn Error>>;
 
 /// Runs a command; what the shell sees where it does not fail.
-pub(crate) fn dispatch(command: Command, output: &Output) -> Result<ExitCode, Box<dyn Error>> {
-    let outcome = match command {
-        Command::Diff(arguments) => {
-            let found = pipeline::diff(&arguments.request())?;
-            output.result(&found)?;
-            return Ok(if found.significant { ExitCode::FAILURE } else { ExitCode::SUCCESS });
-        }
+pub(crate) fn dispatch(command: Command, output: &Output) -> Outcome {
+    match command {
+        Command::Diff(arguments) => output.result(&pipeline::diff(&arguments.request())?),
         Command::Run { survey, pipeline, calibration, out } => run(survey, &pipeline, calibration, out, output),
         Command::Simulate { scene, seed, position_sigma, attitude_sigma, gross_errors, out } => {
             let source = SimulateSource {
@@ -75,8 +66,7 @@ pub(crate) fn dispatch(command: Command, output: &Output) -> Result<ExitCode, Bo
         Command::Compare(arguments) => {
             output.result(&pipeline::compare(&arguments.request(), output.progress().as_ref())?)
         }
-    };
-    outcome.map(|()| ExitCode::SUCCESS)
+    }
 }
 
 fn run(

@@ -6,6 +6,7 @@ mod calibrate_arguments;
 mod commands;
 mod compare_arguments;
 mod diff_arguments;
+mod exit;
 mod explain_arguments;
 mod fixed_pattern_arguments;
 mod noise_arguments;
@@ -23,25 +24,25 @@ use clap::Parser;
 use crate::arguments::Arguments;
 use crate::output::Output;
 
-/// Runs the command with the given arguments, the program's name first, and returns what the shell should see:
-/// 0 done, 1 the work failed, 2 the arguments are wrong; of `diff` 0 no significant difference, 1 some, 2 no comparison.
+/// Runs the command with the given arguments, the program's name first, and returns what the shell should see: 0 done,
+/// 1 done but doubtful (of `diff`: the calibrations differ), 2 wrong input or usage, 3 refused by what the data show,
+/// 4 failure of the machine, 5 done in part.
 pub fn main(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     let arguments = match Arguments::try_parse_from(arguments) {
         Ok(arguments) => arguments,
         Err(error) => {
             // Help and version come this way too; clap knows which stream and which code each wants.
             let _ = error.print();
-            return ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(2));
+            return ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(exit::USAGE));
         }
     };
     let output = Output::new(&arguments);
-    let failure = commands::failure_code(&arguments.command);
     match commands::dispatch(arguments.command, &output) {
         Ok(code) => code,
         Err(error) => {
             output.refusal(error.as_ref());
             output.error(error.as_ref());
-            failure
+            exit::of_error(error.as_ref())
         }
     }
 }

@@ -5,12 +5,14 @@
 use std::error::Error;
 use std::fmt::Display;
 use std::io::{ErrorKind, IsTerminal, Write};
+use std::process::ExitCode;
 
-use pipeline::{Progress, Silent};
+use pipeline::{Judged, Progress, Silent};
 use serde::Serialize;
 
 use crate::arguments::Arguments;
 use crate::bar::Bar;
+use crate::exit;
 
 /// How the user wants to be spoken to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -46,14 +48,14 @@ impl Output {
         }
     }
 
-    /// A result: JSON where that was asked for, words otherwise.
-    pub(crate) fn result<T: Serialize + Display>(&self, result: &T) -> Result<(), Box<dyn Error>> {
+    /// A result: JSON where that was asked for, words otherwise. What the shell sees is its verdict.
+    pub(crate) fn result<T: Serialize + Display + Judged>(&self, result: &T) -> Result<ExitCode, Box<dyn Error>> {
         match self.voice {
             Voice::Words => print(result)?,
             Voice::Json => print(&serde_json::to_string_pretty(result)?)?,
             Voice::Quiet => {}
         }
-        Ok(())
+        Ok(exit::of_verdict(result.verdict()))
     }
 
     /// The summary of a refused calibration: as JSON where that was asked for, in words it is the error alone.

@@ -68,7 +68,7 @@ fn exit_codes_tell_wrong_arguments_from_failed_work() {
     assert!(text(&wrong.stderr).contains("one-step"), "the possible values are named");
     assert_eq!(rangecam(&["calibrate", "x", "--reject", "2"]).status.code(), Some(2));
     let failed = rangecam(&["calibrate", "no/such/survey"]);
-    assert_eq!(failed.status.code(), Some(1));
+    assert_eq!(failed.status.code(), Some(2));
     assert!(text(&failed.stderr).contains("no/such/survey"));
 }
 
@@ -89,7 +89,7 @@ fn a_refusal_is_a_failure_with_a_summary() {
         "--out",
         out.to_str().unwrap(),
     ]);
-    assert_eq!(refused.status.code(), Some(1));
+    assert_eq!(refused.status.code(), Some(3));
     assert!(text(&refused.stderr).contains("refused"), "{}", text(&refused.stderr));
     let printed: serde_json::Value = serde_json::from_slice(&refused.stdout).unwrap();
     let written = std::fs::read_to_string(out.join("summary.json")).unwrap();

@@ -32,12 +32,12 @@ fn two_lists_of_points_in_words_as_json_and_as_a_page() {
 }
 
 #[test]
-fn wrong_input_ends_with_a_message_and_code_1() {
+fn wrong_input_ends_with_a_message_and_code_2() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.txt").to_str().unwrap().to_owned();
     std::fs::write(&path, "nothing\n").unwrap();
     let output = rangecam(&["compare", &path, &path]);
-    assert_eq!(output.status.code(), Some(1));
+    assert_eq!(output.status.code(), Some(2));
     assert!(text(&output.stderr).contains("a.txt is nothing that can be compared"), "{}", text(&output.stderr));
     let help = text(&rangecam(&["compare", "--help"]).stdout);
     for word in ["--align", "--scale", "--max-distance", "--time-tolerance", "--out", "E57", "EuRoC"] {

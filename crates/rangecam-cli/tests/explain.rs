@@ -51,7 +51,7 @@ fn a_pixel_in_words_and_as_json() {
         (["--frame", "0", "--pixel", "16,0"], "pixel 16,0 is outside the image: columns run from 0 to 15"),
     ] {
         let output = rangecam(&[&["explain", &survey], arguments.as_slice()].concat());
-        assert_eq!(output.status.code(), Some(1));
+        assert_eq!(output.status.code(), Some(2));
         assert!(text(&output.stderr).contains(message), "{}", text(&output.stderr));
     }
     let output = rangecam(&["explain", &survey, "--frame", "0", "--pixel", "5"]);

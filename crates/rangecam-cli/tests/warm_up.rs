@@ -67,10 +67,10 @@ fn warm_up_of_a_capture_and_its_exit_codes() {
     assert!(String::from_utf8_lossy(&words.stdout).contains("stable after"));
     // Work that fails, and arguments that are wrong.
     let refused = rangecam(&["warmup", survey, "--temperature", "--out", out]);
-    assert_eq!(refused.status.code(), Some(1));
+    assert_eq!(refused.status.code(), Some(3));
     assert!(String::from_utf8_lossy(&refused.stderr).contains("sample 0 has no temperature"));
     let refused = rangecam(&["warmup", survey, "--reference", "instead", "--out", out]);
-    assert_eq!(refused.status.code(), Some(1));
+    assert_eq!(refused.status.code(), Some(3));
     assert!(String::from_utf8_lossy(&refused.stderr).contains("no reference_path"));
     assert_eq!(rangecam(&["warmup", survey, "--tolerance-mm", "thin"]).status.code(), Some(2));
     assert_eq!(rangecam(&["warmup"]).status.code(), Some(2));

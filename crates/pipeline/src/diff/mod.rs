@@ -14,6 +14,7 @@ use self_calibration::{
 };
 use serde::Serialize;
 
+use crate::verdict::{Judged, Verdict};
 use crate::{Error, Result};
 
 pub use self::drift::{DriftLine, DriftPlace};
@@ -202,6 +203,13 @@ pub fn diff(request: &DiffRequest) -> Result<CalibrationDifference> {
         image,
         notes,
     })
+}
+
+impl Judged for CalibrationDifference {
+    /// Calibrations that differ are no longer one: doubtful.
+    fn verdict(&self) -> Verdict {
+        if self.significant { Verdict::Doubtful } else { Verdict::Done }
+    }
 }
 
 fn only(parameters: Vec<String>, models: Vec<String>, here: &Calibration, there: &Calibration) -> Vec<String> {

@@ -6,6 +6,7 @@ use nalgebra::Isometry3;
 use super::input::Station;
 use super::summary::{RegisterSummary, RegisteredPlacement, RegisteredStation};
 use crate::outcome::StationPose;
+use crate::verdict::{Doubt, DoubtKind};
 
 /// A motion that the surfaces leave open, axes in the target's frame.
 pub(super) fn motion(motion: &UndeterminedMotion) -> String {
@@ -33,13 +34,14 @@ pub(super) fn placement(found: &StationPlacement) -> Option<RegisteredPlacement>
 }
 
 /// What to say of a station that is probably in the wrong place.
-pub(crate) fn wrong_place(name: &str, found: &StationPlacement) -> String {
-    format!(
-        "{name}: {:.0} % of what it and the other stations see in common contradicts, {:.0} times what is usual between \
+pub(crate) fn wrong_place(name: &str, found: &StationPlacement) -> Doubt {
+    let words = format!(
+        "{:.0} % of what it and the other stations see in common contradicts, {:.0} times what is usual between \
          the others: it is probably in the wrong place. Give start poses, or leave it out",
         100.0 * found.share(),
         found.times_usual.unwrap_or(f64::NAN)
-    )
+    );
+    Doubt::about(DoubtKind::Placement, name, words)
 }
 
 /// The rows of all stations; errors where the truth is known, in the frame in which the first station is right.

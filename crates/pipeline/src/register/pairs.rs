@@ -12,6 +12,7 @@ use super::surface::{Start, Surface};
 use super::{Registered, chain, describe};
 use crate::plan::NORMAL_HALF_WIDTH_PX;
 use crate::progress::Progress;
+use crate::verdict::{Doubt, DoubtKind};
 use crate::{Error, Result};
 
 /// Below this part of a station with partners, a pair is doubtful.
@@ -107,26 +108,26 @@ fn rows(stations: &[Station], steps: &[IcpResult]) -> Vec<RegisteredPair> {
 }
 
 /// What a reader should know before the poses are used.
-fn doubts(stations: &[Station], aligned: &[Aligned]) -> Vec<String> {
+fn doubts(stations: &[Station], aligned: &[Aligned]) -> Vec<Doubt> {
     let mut doubts = Vec::new();
     for (index, pair) in aligned.iter().enumerate() {
         let names = format!("{} onto {}", stations[index + 1].name, stations[index].name);
         let result = &pair.result;
+        let mut doubt = |words: String| doubts.push(Doubt::about(DoubtKind::Alignment, &names, words));
         if pair.guess_failed {
-            doubts
-                .push(format!("{names}: the start poses lead to no sound alignment, the pose was found without them"));
+            doubt("the start poses lead to no sound alignment, the pose was found without them".to_owned());
         }
         if result.stop == StopReason::MaxIterations {
-            doubts.push(format!("{names}: the iterations did not settle, the pose may be wrong"));
+            doubt("the iterations did not settle, the pose may be wrong".to_owned());
         }
         if result.overlap < LEAST_OVERLAP {
             let percent = 100.0 * result.overlap;
-            doubts.push(format!("{names}: only {percent:.0} % of the points have a partner, the pose may be wrong"));
+            doubt(format!("only {percent:.0} % of the points have a partner, the pose may be wrong"));
         }
         let open: Vec<String> = result.degenerate.iter().map(describe::motion).collect();
         if !open.is_empty() {
             let open = open.join("; ");
-            doubts.push(format!("{names}: the surfaces leave open {open}: the pose is a guess there"));
+            doubt(format!("the surfaces leave open {open}: the pose is a guess there"));
         }
     }
     doubts

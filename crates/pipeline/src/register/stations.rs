@@ -12,6 +12,7 @@ use super::{Registered, describe};
 use crate::outcome::StationPose;
 use crate::plan::NORMAL_HALF_WIDTH_PX;
 use crate::progress::Progress;
+use crate::verdict::{Doubt, DoubtKind};
 use crate::{Error, Result};
 
 /// Up to this number of stations every pair is tried where no poses are known; beyond, only those that follow each other.
@@ -120,40 +121,43 @@ fn row(pair: &SurfacePair, result: &StationRegistration, stations: &[Station]) -
 }
 
 /// What a reader should know before the poses are used.
-fn doubts(result: &StationRegistration, stations: &[Station], undetermined: &[Vec<String>]) -> Vec<String> {
+fn doubts(result: &StationRegistration, stations: &[Station], undetermined: &[Vec<String>]) -> Vec<Doubt> {
     let mut doubts = Vec::new();
     if !result.settled {
-        doubts.push(format!("after {} rounds the stations still moved: the poses may be off", result.rounds));
+        let words = format!("after {} rounds the stations still moved: the poses may be off", result.rounds);
+        doubts.push(Doubt::new(DoubtKind::Alignment, words));
     }
     for station in result.placements.doubtful() {
         doubts.push(describe::wrong_place(&stations[station].name, &result.placements.stations[station]));
     }
     for (station, motions) in stations.iter().zip(undetermined).filter(|(_, motions)| !motions.is_empty()) {
         let motions = motions.join("; ");
-        doubts.push(format!("{}: nothing determines {motions}; the start value was kept there", station.name));
+        let words = format!("nothing determines {motions}; the start value was kept there");
+        doubts.push(Doubt::about(DoubtKind::Alignment, &station.name, words));
     }
     for pair in result.surfaces.iter().filter(|pair| pair.rms_sigma > LARGEST_SIGMAS) {
-        doubts.push(format!(
-            "{} and {}: common surfaces are {:.1} mm apart (rms), {:.0} times what their points promise",
-            stations[pair.source].name,
-            stations[pair.target].name,
+        let names = format!("{} and {}", stations[pair.source].name, stations[pair.target].name);
+        let words = format!(
+            "common surfaces are {:.1} mm apart (rms), {:.0} times what their points promise",
             1e3 * pair.rms_m,
             pair.rms_sigma
-        ));
+        );
+        doubts.push(Doubt::about(DoubtKind::Alignment, names, words));
     }
     doubts
 }
 
 /// Without start poses, pairs that contradict each other are the sign of surfaces that fit in more than one way.
-fn blind_doubt(result: &StationRegistration) -> Option<String> {
+fn blind_doubt(result: &StationRegistration) -> Option<Doubt> {
     let worst = result.loops.iter().map(|closure| closure.translation_m).fold(0.0, f64::max);
     let apart = result.surfaces.iter().map(|pair| pair.rms_m).fold(0.0, f64::max);
     (worst > LOOSE_LOOP * apart).then(|| {
-        format!(
+        let words = format!(
             "no start poses were given, and pairs found without them contradict each other (a loop fails to close by \
              {worst:.2} m): the scene may fit in more than one way, and the poses may be wrong as a whole. Give start \
              poses with --guess FILE"
-        )
+        );
+        Doubt::new(DoubtKind::Placement, words)
     })
 }
 

@@ -5,6 +5,7 @@ use std::fmt;
 use serde::Serialize;
 
 use crate::summary::millimetres;
+use crate::verdict::{Doubt, Judged};
 
 /// What was registered, and how well each pose is known.
 #[derive(Debug, Clone, Default, Serialize)]
@@ -36,7 +37,7 @@ pub struct RegisterSummary {
     /// Largest error of a station's attitude, where the truth is known, degree.
     pub attitude_error_max_deg: Option<f64>,
     /// What a reader should know before the poses are used.
-    pub doubts: Vec<String>,
+    pub doubts: Vec<Doubt>,
     /// Wall-clock time, second.
     pub seconds: f64,
     /// The output folder.
@@ -105,6 +106,12 @@ pub struct RegisteredLoop {
     pub translation_m: f64,
     /// Angle by which it fails to close, degree.
     pub rotation_deg: f64,
+}
+
+impl Judged for RegisterSummary {
+    fn doubts(&self) -> &[Doubt] {
+        &self.doubts
+    }
 }
 
 impl fmt::Display for RegisterSummary {

@@ -1,8 +1,9 @@
 //! The page around the figures: one file, no network.
 
-use std::fmt::Write;
+use std::fmt::{Display, Write};
 
 use super::picture::escape;
+use crate::verdict::Doubt;
 
 const STYLE: &str = "
 body{font:15px/1.5 system-ui,sans-serif;color:#1c2430;background:#f6f7f9;margin:0}
@@ -54,15 +55,23 @@ impl Page {
     }
 
     /// Sentences one below the other.
-    pub(crate) fn list(&mut self, sentences: &[String]) {
+    pub(crate) fn list<T: Display>(&mut self, sentences: &[T]) {
         if sentences.is_empty() {
             return;
         }
         self.html.push_str("<ul>");
         for sentence in sentences {
-            let _ = write!(self.html, "<li>{}</li>", escape(sentence));
+            let _ = write!(self.html, "<li>{}</li>", escape(&sentence.to_string()));
         }
         self.html.push_str("</ul>\n");
+    }
+
+    /// What speaks against the result, where anything does.
+    pub(crate) fn doubts(&mut self, doubts: &[Doubt]) {
+        if !doubts.is_empty() {
+            self.section("Before you use it");
+            self.list(doubts);
+        }
     }
 
     /// Figures side by side, each with a caption.

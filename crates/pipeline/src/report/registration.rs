@@ -30,10 +30,7 @@ pub(crate) fn render_registration(registered: &Registered) -> Result<String> {
     );
     let mut page = Page::new("rangecam: registration", &lead);
     page.cards(&cards(registered));
-    if !summary.doubts.is_empty() {
-        page.section("Before you use it");
-        page.list(&summary.doubts);
-    }
+    page.doubts(&summary.doubts);
     cloud_section(&mut page, registered)?;
     residual_section(&mut page, registered)?;
     station_section(&mut page, registered);

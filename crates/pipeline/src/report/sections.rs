@@ -27,6 +27,7 @@ pub(crate) fn render(outcome: &Outcome, summary: &Summary) -> Result<String> {
     );
     let mut page = Page::new(&format!("rangecam: {}", summary.pipeline), &lead);
     figures_of_merit(&mut page, summary);
+    page.doubts(&summary.doubts);
     stages(&mut page, summary);
     errors(&mut page, outcome);
     remaining_errors(&mut page, &summary.remaining);
@@ -188,9 +189,6 @@ fn registration(page: &mut Page, outcome: &Outcome, summary: &Summary) -> Result
         &["station", "x m", "y m", "z m", "sigma of position", "position error", "attitude error"],
         &station_rows(outcome, summary),
     );
-    if !registration.doubts.is_empty() {
-        page.list(&registration.doubts);
-    }
     page.subsection("Pairs");
     let rows: Vec<Vec<String>> = registration
         .pairs

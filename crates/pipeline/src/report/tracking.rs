@@ -28,10 +28,7 @@ pub(crate) fn render_tracking(tracked: &Tracked) -> Result<String> {
     );
     let mut page = Page::new("rangecam: tracking", &lead);
     page.cards(&cards(tracked));
-    if !summary.doubts.is_empty() {
-        page.section("Before you use it");
-        page.list(&summary.doubts);
-    }
+    page.doubts(&summary.doubts);
     path_section(&mut page, tracked);
     time_section(&mut page, tracked);
     loss_section(&mut page, tracked);

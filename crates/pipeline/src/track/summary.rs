@@ -9,6 +9,7 @@ use serde::Serialize;
 use super::outcome::{TrackLoss, TrackTruth, TrackVerdict, TrackedFrame};
 use crate::statistics::{median, quantile};
 use crate::summary::millimetres;
+use crate::verdict::{Doubt, DoubtKind, Judged};
 
 /// How far the camera was followed, and how well each pose is known.
 #[derive(Debug, Clone, Default, Serialize)]
@@ -64,7 +65,7 @@ pub struct TrackSummary {
     /// Errors where the truth is known.
     pub truth: Option<TrackTruth>,
     /// What a reader should know before the poses are used.
-    pub doubts: Vec<String>,
+    pub doubts: Vec<Doubt>,
     /// Wall-clock time, second.
     pub seconds: f64,
     /// The output folder.
@@ -175,10 +176,11 @@ fn truth([online, adjusted]: [&[TrackedPose]; 2], truths: &[Option<Isometry3<f64
     })
 }
 
-fn doubts(summary: &TrackSummary) -> Vec<String> {
+fn doubts(summary: &TrackSummary) -> Vec<Doubt> {
     let mut doubts = Vec::new();
     if summary.lost > 0 {
-        doubts.push(format!("{} They are left out of the trajectories.", summary.loss_in_words()));
+        let words = format!("{} They are left out of the trajectories.", summary.loss_in_words());
+        doubts.push(Doubt::new(DoubtKind::LostFrames, words));
     }
     doubts
 }
@@ -195,6 +197,12 @@ impl TrackSummary {
             Some(_) => format!("{count}; the camera was found again {} times.", self.relocalised),
             None => format!("{count}."),
         }
+    }
+}
+
+impl Judged for TrackSummary {
+    fn doubts(&self) -> &[Doubt] {
+        &self.doubts
     }
 }
 

@@ -1,0 +1,33 @@
+//! What the shell sees: the same codes for all commands (docs/formats.md, "Exit codes").
+
+use std::error::Error;
+use std::process::ExitCode;
+
+use pipeline::{Failure, Verdict};
+
+/// Wrong input or usage, also of arguments that cannot be read.
+pub(crate) const USAGE: u8 = 2;
+
+/// The code of a command that has a result.
+pub(crate) fn of_verdict(verdict: Verdict) -> ExitCode {
+    ExitCode::from(match verdict {
+        Verdict::Done => 0,
+        Verdict::Doubtful => 1,
+        Verdict::Partial => 5,
+    })
+}
+
+/// The code of a command that failed.
+pub(crate) fn of_error(error: &(dyn Error + 'static)) -> ExitCode {
+    let failure = match error.downcast_ref::<pipeline::Error>() {
+        Some(error) => error.failure(),
+        // What could not be printed.
+        None if error.is::<std::io::Error>() => Failure::Machine,
+        None => Failure::Usage,
+    };
+    ExitCode::from(match failure {
+        Failure::Usage => USAGE,
+        Failure::Refused => 3,
+        Failure::Machine => 4,
+    })
+}

@@ -1,0 +1,29 @@
+//! `cargo xtask verify [NAME ...]`: long statistics, each an example of its crate that prints its figures and fails where
+//! they leave their bounds. What `docs/benchmarks.md` states of them comes from here.
+
+use crate::shell::{Outcome, cargo};
+
+/// Name, package and example of each statistic.
+const STATISTICS: &[(&str, &str, &str)] = &[];
+
+/// Which statistics to run.
+#[derive(Debug, clap::Args)]
+pub(crate) struct Arguments {
+    /// Statistics by name; all where none is named.
+    names: Vec<String>,
+}
+
+pub(crate) fn run(arguments: &Arguments) -> Outcome {
+    let known = || STATISTICS.iter().map(|(name, ..)| *name);
+    if let Some(unknown) = arguments.names.iter().find(|name| !known().any(|known| known == name.as_str())) {
+        return Err(format!(
+            "there is no statistic `{unknown}`; there are: {}",
+            known().collect::<Vec<_>>().join(", ")
+        ));
+    }
+    let asked = |name: &str| arguments.names.is_empty() || arguments.names.iter().any(|asked| asked == name);
+    for (_, package, example) in STATISTICS.iter().filter(|(name, ..)| asked(name)) {
+        cargo(&["run", "--release", "--package", package, "--all-features", "--example", example], &[])?;
+    }
+    Ok(())
+}

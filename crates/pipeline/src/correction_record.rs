@@ -4,8 +4,10 @@ use std::sync::Arc;
 
 use error_models::{FixedPattern, InterpolatedModel, LedgerEntry, OutsideModel, RangeTerm};
 use range_image::{ImageFormat, RangeFrame, Raster};
+use range_io::calibration::ValidSpan;
 
 use crate::drift::ViewDrift;
+use crate::span::reasons;
 
 /// The ranges of a view as [`crate::Stage::CorrectRange`] found them, with the models that it applied.
 #[derive(Debug, Clone)]
@@ -15,6 +17,7 @@ pub struct CorrectionRecord {
     principal_point_mm: [f64; 2],
     pattern: Option<Arc<FixedPattern>>,
     drift: Option<ViewDrift>,
+    span: ValidSpan,
 }
 
 /// One frequency.
@@ -36,6 +39,8 @@ pub(crate) struct PixelLedger {
     pub(crate) weights_m: f64,
     /// What the models do not cover.
     pub(crate) outside: Vec<OutsideModel>,
+    /// How it lies outside of what the calibration rests on, in words.
+    pub(crate) outside_span: Vec<String>,
 }
 
 impl CorrectionRecord {
@@ -44,8 +49,9 @@ impl CorrectionRecord {
         principal_point_mm: [f64; 2],
         pattern: Option<Arc<FixedPattern>>,
         drift: Option<ViewDrift>,
+        span: ValidSpan,
     ) -> Self {
-        Self { channels: Vec::new(), format, principal_point_mm, pattern, drift }
+        Self { channels: Vec::new(), format, principal_point_mm, pattern, drift, span }
     }
 
     /// The drift of the warming camera that was taken off, if one was.
@@ -92,6 +98,7 @@ impl CorrectionRecord {
             }
             if observed.is_finite() {
                 ledger.outside.extend(channel.model.outside(observed, x, y, amplitude));
+                ledger.outside_span.extend(reasons(&self.span, observed, amplitude));
             }
         }
         ledger.entries.sort_by_key(|entry| entry.term);

@@ -30,6 +30,9 @@ pub enum Error {
     /// The camera or calibration can't be used for this survey.
     #[error("camera: {0}")]
     Camera(String),
+    /// A calibration of another camera than the survey's, or of another mode of it.
+    #[error("calibration and survey do not fit: {0}")]
+    Incompatible(String),
     /// A stage that needs what the input level does not have.
     #[error("stage {stage} is ruled out: it needs level `{needs}`, but the survey's frames are at level `{level}`")]
     RuledOut {

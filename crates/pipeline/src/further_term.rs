@@ -8,17 +8,19 @@ use range_io::calibration::{Calibration, Provenance};
 use range_io::survey::Survey;
 use serde::Serialize;
 
-use crate::load::{calibrated, read_calibration, root_of};
+use crate::compatible::{Purpose, compatible};
+use crate::load::{read_calibration, root_of};
 use crate::{Error, Result};
 
 /// The calibration that a term is added to, in words too: the one named, the one beside the survey, or else one of
 /// which nothing but the nominal camera is known.
 pub(crate) fn start(survey: &Path, named: Option<&Path>) -> Result<(Calibration, String)> {
-    let camera = Survey::read(survey)?.camera.nominal_camera()?;
-    if let (Some(calibration), words) = read_calibration(&root_of(survey), named)? {
-        calibrated(&calibration, &camera)?;
+    let (path, survey) = (survey, Survey::read(survey)?);
+    if let (Some(calibration), words) = read_calibration(&root_of(path), named)? {
+        compatible(&survey, &calibration, Purpose::Camera)?;
         return Ok((calibration, words));
     }
+    let camera = survey.camera.nominal_camera()?;
     let mut calibration = Calibration::from_models(&camera, &ModelSet::default(), None)?;
     calibration.provenance = Provenance::default();
     Ok((calibration, "the survey's nominal camera".to_owned()))

@@ -1,24 +1,33 @@
 //! What a file or folder holds, before anything is done with it.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use std::path::Path;
 
 use range_io::calibration::{CalibratedDrift, Calibration};
 use range_io::ply::read_cloud;
-use range_io::survey::{Survey, read_frame};
+use range_io::survey::{Level, Survey};
 use serde::Serialize;
 
-use crate::load::root_of;
+use crate::compatible::{Purpose, compatible};
+use crate::drift::DriftTreatment;
+use crate::load::{open, read_calibration, root_of};
 use crate::measure::ruled_out;
-use crate::plan::Stage;
+use crate::plan::{DemodulateOptions, Stage};
+use crate::plausibility::{self, FrameWatch, SenseVotes};
+use crate::progress::Silent;
+use crate::stages::{apply, corrects_ranges};
+use crate::verdict::{Doubt, DoubtKind, Judged};
 use crate::{Error, Result};
 
-/// What was found, by name, in an order for reading.
-#[derive(Debug, Clone, Serialize)]
-#[serde(transparent)]
+/// Stations whose phases are judged.
+const MOST_JUDGED: usize = 8;
+
+/// What was found, by name, in an order for reading, and what speaks against it.
+#[derive(Debug, Clone, Default, Serialize)]
 pub struct Inspection {
     entries: Vec<Entry>,
+    doubts: Vec<Doubt>,
 }
 
 #[derive(Debug, Clone, Serialize)]
@@ -41,13 +50,22 @@ impl fmt::Display for Inspection {
             }
             write!(f, "{:<20} {}", entry.name, entry.value)?;
         }
+        for doubt in &self.doubts {
+            write!(f, "\ndoubt: {doubt}")?;
+        }
         Ok(())
+    }
+}
+
+impl Judged for Inspection {
+    fn doubts(&self) -> &[Doubt] {
+        &self.doubts
     }
 }
 
 /// Looks into a survey's folder, a `calibration.ron` or a `.ply` cloud.
 pub fn inspect(path: &Path) -> Result<Inspection> {
-    let mut found = Inspection { entries: Vec::new() };
+    let mut found = Inspection::default();
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     if path.extension().is_some_and(|ending| ending == "ply") {
         inspect_cloud(path, &mut found)?;
@@ -94,9 +112,7 @@ fn inspect_survey(path: &Path, found: &mut Inspection) -> Result<()> {
         found.add("optical reference", words);
     }
     found.add("truth", if survey.truth.is_some() { "yes" } else { "no" });
-    let root = root_of(path);
-    let readable = (0..survey.frames.len()).try_for_each(|index| read_frame(&survey, &root, index).map(|_| ()));
-    found.add("frames readable", readable.map_or_else(|error| format!("no: {error}"), |()| "all".to_owned()));
+    inspect_frames(path, &survey, found)?;
     let blocked = ruled_out(survey.level);
     let open: Vec<&str> = Stage::NAMES.iter().filter(|name| !blocked.contains_key(**name)).copied().collect();
     found.add("stages possible", open.join(", "));
@@ -104,6 +120,57 @@ fn inspect_survey(path: &Path, found: &mut Inspection) -> Result<()> {
         found.add("ruled out", format!("{stage}: {reason}"));
     }
     Ok(())
+}
+
+/// Reads all frames, one in memory at a time, and judges them.
+fn inspect_frames(path: &Path, survey: &Survey, found: &mut Inspection) -> Result<()> {
+    if survey.frames.is_empty() {
+        found.doubts.extend(plausibility::of_survey(&survey.camera));
+        found.add("frames readable", "none listed");
+        return Ok(());
+    }
+    let (mut work, frames) = open(path, (None, String::new()), Purpose::Camera)?;
+    let (mut watch, mut votes) = (FrameWatch::default(), SenseVotes::default());
+    let (mut unreadable, mut judged) = (Vec::new(), BTreeSet::new());
+    for (index, entry) in survey.frames.iter().enumerate() {
+        let view = match frames.view(survey, index) {
+            Ok(view) => view,
+            Err(error) => {
+                unreadable.push((entry, error));
+                continue;
+            }
+        };
+        watch.look(&view);
+        // One frame of a station tells the sense of the phase.
+        if survey.level <= Level::Phase && judged.insert(&entry.station) && judged.len() <= MOST_JUDGED {
+            work.outcome.views = vec![view];
+            if survey.level == Level::Samples {
+                apply(&Stage::Demodulate(DemodulateOptions::default()), &mut work, &Silent)?;
+            }
+            work.outcome.views.iter().for_each(|view| votes.look_at(view));
+        }
+    }
+    let readable = survey.frames.len() - unreadable.len();
+    found.add("frames readable", if unreadable.is_empty() { "all".to_owned() } else { format!("{readable}") });
+    found.doubts.append(&mut work.outcome.doubts);
+    found.doubts.extend(fit(path, survey)?);
+    if let Some((first, error)) = unreadable.first() {
+        let words = format!("{} of {} frames cannot be read: {error}", unreadable.len(), survey.frames.len());
+        found.doubts.push(Doubt::about(DoubtKind::UnreadableFrames, &first.station, words));
+    }
+    found.doubts.extend(watch.doubts());
+    found.doubts.extend(votes.doubt());
+    Ok(())
+}
+
+/// What does not fit of the calibration beside the survey.
+fn fit(path: &Path, survey: &Survey) -> Result<Vec<Doubt>> {
+    let (Some(calibration), _) = read_calibration(&root_of(path), None)? else { return Ok(Vec::new()) };
+    let ranges = if corrects_ranges(&calibration) { Purpose::Ranges(DriftTreatment::Apply) } else { Purpose::Camera };
+    Ok(match compatible(survey, &calibration, ranges) {
+        Ok(fit) => fit.doubts,
+        Err(error) => vec![Doubt::about(DoubtKind::Calibration, Calibration::FILE_NAME, error.to_string())],
+    })
 }
 
 fn inspect_calibration(path: &Path, found: &mut Inspection) -> Result<()> {

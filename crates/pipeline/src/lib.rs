@@ -2,6 +2,7 @@
 
 mod calibrate;
 mod compare;
+mod compatible;
 mod correction_record;
 mod diff;
 mod drift;
@@ -18,6 +19,7 @@ mod network_scene;
 mod noise;
 mod outcome;
 mod plan;
+mod plausibility;
 mod progress;
 mod register;
 mod report;
@@ -25,6 +27,7 @@ mod results;
 mod run;
 mod scattering;
 mod simulate;
+mod span;
 mod stages;
 mod statistics;
 mod summary;

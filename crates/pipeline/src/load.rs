@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use camera_model::{Camera, RayTable};
+use camera_model::RayTable;
 use error_models::RangeNoise;
 use nalgebra::Isometry3;
 use range_image::{Flags, Modulation, RangeFrame, Raster};
@@ -11,8 +11,11 @@ use range_io::npz::NpzReader;
 use range_io::survey::{InputFrame, Survey, read_frame, read_truth};
 use range_io::tables::{Station, read_stations};
 
+use crate::compatible::{Purpose, compatible};
 use crate::outcome::Outcome;
+use crate::plausibility::{self, FrameWatch};
 use crate::progress::Progress;
+use crate::span::SpanTally;
 use crate::truth::ViewTruth;
 use crate::view::{View, ViewData};
 use crate::work::Work;
@@ -27,17 +30,20 @@ pub(crate) fn load(
     only: Option<&str>,
     progress: &dyn Progress,
 ) -> Result<Work> {
-    let (mut work, frames) = open(folder, calibration)?;
+    let (mut work, frames) = open(folder, calibration, Purpose::of(&plan.stages))?;
     let count = work.outcome.survey.frames.len();
     plan.check_level(work.outcome.survey.level)?;
     progress.begin("read frames", count);
+    let mut watch = FrameWatch::default();
     for index in 0..count {
         if only.is_none_or(|only| only == work.outcome.survey.frames[index].station) {
             let view = frames.view(&work.outcome.survey, index)?;
+            watch.look(&view);
             work.outcome.views.push(view);
         }
         progress.advance(index + 1);
     }
+    work.outcome.doubts.extend(watch.doubts());
     Ok(work)
 }
 
@@ -53,10 +59,11 @@ pub(crate) struct Frames {
     range_noise: Option<RangeNoise>,
 }
 
-/// Reads all of a survey but its frames.
+/// Reads all of a survey but its frames, for a calibration that is used as `purpose` says.
 pub(crate) fn open(
     folder: &Path,
     (calibration, calibration_words): (Option<Calibration>, String),
+    purpose: Purpose,
 ) -> Result<(Work, Frames)> {
     let survey = Survey::read(folder)?;
     if survey.frames.is_empty() {
@@ -64,13 +71,17 @@ pub(crate) fn open(
     }
     let root = root_of(folder);
     let camera = survey.camera.nominal_camera()?;
-    let calibrated_camera = calibration.as_ref().map(|calibration| calibrated(calibration, &camera)).transpose()?;
+    let fit = calibration.as_ref().map(|calibration| compatible(&survey, calibration, purpose)).transpose()?;
+    let (calibrated_camera, mut doubts) = fit.map_or((None, Vec::new()), |fit| (Some(fit.camera), fit.doubts));
+    doubts.extend(plausibility::of_survey(&survey.camera));
     let rays = RayTable::new(&camera).map_err(|error| Error::Camera(error.to_string()))?;
     let depth_rays = match &calibrated_camera {
         Some(camera) => RayTable::new(camera).map_err(|error| Error::Camera(error.to_string()))?,
         None => rays.clone(),
     };
     let poses = read_poses(&root.join("stations.csv"))?;
+    let places: Vec<Isometry3<f64>> = poses.iter().map(|row| row.world_from_camera).collect();
+    doubts.extend(plausibility::far_apart(&places));
     let true_poses = match survey.truth.as_ref().and_then(|truth| truth.stations.as_ref()) {
         Some(file) => read_stations(root.join(file))?,
         None => Vec::new(),
@@ -90,11 +101,14 @@ pub(crate) fn open(
         refused: Vec::new(),
         adjustment: None,
         stages: Vec::new(),
+        doubts,
+        stated: poses.clone(),
         vertical_axis,
     };
+    let span = SpanTally::default();
     let range_noise = calibration.as_ref().and_then(|calibration| calibration.range_noise);
     let frames = Frames { root, depth_rays, poses, true_poses, reference, modulations, range_noise };
-    Ok((Work { calibration, calibrated_camera, rays, station_clouds: Vec::new(), outcome }, frames))
+    Ok((Work { calibration, calibrated_camera, rays, station_clouds: Vec::new(), span, outcome }, frames))
 }
 
 impl Frames {
@@ -150,20 +164,8 @@ pub(crate) fn read_calibration(root: &Path, named: Option<&Path>) -> Result<(Opt
     Ok((Some(calibration), words))
 }
 
-/// The calibrated camera, which must have the survey's format.
-pub(crate) fn calibrated(calibration: &Calibration, nominal: &Camera) -> Result<Camera> {
-    let camera = calibration.camera()?;
-    let (have, want) = (camera.format, nominal.format);
-    if (have.width, have.height) == (want.width, want.height) {
-        return Ok(camera);
-    }
-    Err(Error::Camera(format!(
-        "the calibration is for {} x {} pixels, the survey has {} x {}",
-        have.width, have.height, want.width, want.height
-    )))
-}
-
-fn read_poses(file: &Path) -> Result<Vec<Station>> {
+/// The rows of `stations.csv`; none where there is no such file.
+pub(crate) fn read_poses(file: &Path) -> Result<Vec<Station>> {
     if file.is_file() { Ok(read_stations(file)?) } else { Ok(Vec::new()) }
 }
 

@@ -11,6 +11,7 @@ use range_io::survey::Level;
 use crate::load::first_modulation;
 use crate::outcome::{Outcome, usable};
 use crate::plan::{Plan, Stage};
+use crate::plausibility;
 use crate::register::describe::wrong_place;
 use crate::statistics::{median, robust_standard_deviation};
 use crate::summary::{PairSummary, ReferenceSummary, RegistrationSummary, StationTruth, Summary, TruthSummary};
@@ -67,7 +68,7 @@ pub(crate) fn summarise(plan: &Plan, survey: &Path, outcome: &Outcome) -> Summar
         reference: reference(&outcome.views),
         truth: truth(outcome),
         remaining: trends::remaining(outcome),
-        doubts: outcome.adjustment.iter().flat_map(|figures| wrong_places(outcome, &figures.placements)).collect(),
+        doubts: doubts(outcome),
         seconds: 0.0,
         out: String::new(),
     }
@@ -128,6 +129,14 @@ fn registration(outcome: &Outcome) -> Option<RegistrationSummary> {
         redundancy: outcome.adjustment.as_ref().map(|figures| figures.redundancy),
         position_sigma_max_m: sigmas.reduce(f64::max),
     })
+}
+
+/// What speaks against survey and result.
+fn doubts(outcome: &Outcome) -> Vec<Doubt> {
+    let mut doubts = outcome.doubts.clone();
+    doubts.extend(plausibility::of_outcome(outcome));
+    doubts.extend(outcome.adjustment.iter().flat_map(|figures| wrong_places(outcome, &figures.placements)));
+    doubts
 }
 
 /// What to say of stations that are probably in the wrong place.

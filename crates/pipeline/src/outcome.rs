@@ -4,8 +4,10 @@ use camera_model::{Camera, OrganisedCloud, euler_from_pose, step_pose};
 use icp_registration::{PairAlignment, Placements, RefusedPair};
 use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, Vector3};
 use range_io::survey::Survey;
+use range_io::tables::Station;
 
 use crate::summary::StageSummary;
+use crate::verdict::Doubt;
 use crate::view::View;
 
 /// Everything that a run has made.
@@ -33,6 +35,10 @@ pub struct Outcome {
     pub adjustment: Option<AdjustmentFigures>,
     /// What each stage did.
     pub stages: Vec<StageSummary>,
+    /// What speaks against survey and result so far.
+    pub doubts: Vec<Doubt>,
+    /// What `stations.csv` says of the stations.
+    pub stated: Vec<Station>,
     /// Index of the world's axis that points up: z where poses came with the survey, y in a camera's own frame.
     pub vertical_axis: usize,
 }

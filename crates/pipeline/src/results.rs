@@ -10,6 +10,7 @@ use range_io::trajectory::{StampedPose, write_tum};
 use crate::outcome::{Outcome, StationPose};
 use crate::progress::Progress;
 use crate::summary::Summary;
+use crate::verdict::{Doubt, words_about};
 use crate::{Error, Result, report};
 
 /// Writes everything into a temporary folder beside `out` and renames it when the last file is complete.
@@ -20,7 +21,7 @@ pub(crate) fn write(out: &Path, outcome: &Outcome, summary: &Summary, progress: 
         write_cloud(folder.file("cloud.ply")?, &cloud_file(outcome), Precision::Single)?;
     }
     progress.advance(1);
-    write_stations(folder.file("stations.csv")?, &station_rows(outcome))?;
+    write_stations(folder.file("stations.csv")?, &station_rows(outcome, &summary.doubts))?;
     progress.advance(2);
     write_tum(folder.file("trajectory.txt")?, &trajectory(outcome))?;
     progress.advance(3);
@@ -81,13 +82,14 @@ pub(crate) fn poses_or_identity(outcome: &Outcome) -> Vec<StationPose> {
     known.map(|world_from_camera| StationPose { world_from_camera, covariance: None }).collect()
 }
 
-fn station_rows(outcome: &Outcome) -> Vec<Station> {
+fn station_rows(outcome: &Outcome, doubts: &[Doubt]) -> Vec<Station> {
     let rows = outcome.views.iter().zip(poses_or_identity(outcome));
     rows.map(|(view, pose)| Station {
         station: view.station.clone(),
         world_from_camera: pose.world_from_camera,
         sigma_position_m: pose.sigmas().map(|sigmas| sigmas.0),
         sigma_attitude_rad: pose.sigmas().map(|sigmas| sigmas.1),
+        doubt: words_about(doubts, &view.station),
     })
     .collect()
 }

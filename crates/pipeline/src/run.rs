@@ -17,7 +17,7 @@ use crate::plan::{NetworkCalibration, Source};
 use crate::progress::Progress;
 use crate::summary::{StageSummary, Summary};
 use crate::view::Snapshot;
-use crate::{Error, Plan, Result, measure, results, simulate, stages};
+use crate::{Error, Plan, Result, measure, plausibility, results, simulate, stages};
 
 /// What to run on what.
 #[derive(Debug, Clone)]
@@ -134,7 +134,9 @@ pub(crate) fn process_with(
         progress.begin(stage.name(), work.outcome.views.len());
         let before: Vec<Option<Snapshot>> = work.outcome.views.iter().map(crate::view::View::snapshot).collect();
         let start = Instant::now();
+        plausibility::before(stage, &mut work.outcome);
         let findings = stages::apply(stage, &mut work, progress)?;
+        plausibility::after(stage, &mut work)?;
         let seconds = start.elapsed().as_secs_f64();
         let record = StageSummary {
             name: stage.name(),

@@ -111,6 +111,7 @@ fn write_tables(spec: &SimulationSpec, source: &SimulateSource, folder: &OutputF
         world_from_camera,
         sigma_position_m: None,
         sigma_attitude_rad: None,
+        doubt: None,
     };
     let truth: Vec<Station> = spec.stations.iter().map(|s| row(&s.name, s.world_from_camera())).collect();
     write_stations(folder.file("truth/stations.csv")?, &truth)?;

@@ -6,8 +6,8 @@ use std::fmt;
 use serde::Serialize;
 
 use crate::{
-    CalibrationSummary, Comparison, Explanation, FixedPatternSummary, Inspection, NoiseSummary, PlanSummary,
-    ScatteringSummary, Simulated, WarmUpSummary,
+    CalibrationSummary, Comparison, Explanation, FixedPatternSummary, NoiseSummary, PlanSummary, ScatteringSummary,
+    Simulated, WarmUpSummary,
 };
 
 /// How a command that has a result ended. What failed instead is an [`Error`](enum@crate::Error) with its
@@ -60,6 +60,32 @@ pub enum DoubtKind {
     LostFrames,
     /// A drift that is not what it seems.
     Drift,
+    /// A modulation frequency that no camera of this kind has.
+    Modulation,
+    /// Lengths that are probably not in the unit in which they are read.
+    Units,
+    /// A phase that falls with range where it should grow.
+    PhaseSense,
+    /// Frames that hold one and the same value.
+    DeadFrames,
+    /// Frames of a station that are those of another one.
+    RepeatedFrames,
+    /// Frames that cannot be read.
+    UnreadableFrames,
+    /// A calibration that does not fit the survey.
+    Calibration,
+    /// Much that lies outside the span in which the calibration holds.
+    OutsideSpan,
+    /// Ranges beyond the longest one stated.
+    BeyondMaximum,
+    /// A station most of whose pixels are flagged.
+    MostlyFlagged,
+    /// A result without points.
+    NoPoints,
+    /// A station whose place or attitude is hardly known.
+    UncertainPose,
+    /// A station that was found elsewhere than it was said to stand.
+    DisplacedStation,
 }
 
 impl Doubt {
@@ -83,6 +109,12 @@ impl fmt::Display for Doubt {
     }
 }
 
+/// What stands beside a station's pose in `stations.csv`: all that speaks against it.
+pub(crate) fn words_about(doubts: &[Doubt], station: &str) -> Option<String> {
+    let about = doubts.iter().filter(|doubt| doubt.subject.as_deref() == Some(station));
+    about.map(|doubt| doubt.words.clone()).reduce(|all, words| format!("{all}; {words}"))
+}
+
 /// A command's result that can be judged.
 pub trait Judged {
     /// What speaks against the result; none by default.
@@ -101,7 +133,6 @@ impl Judged for CalibrationSummary {}
 impl Judged for Comparison {}
 impl Judged for Explanation {}
 impl Judged for FixedPatternSummary {}
-impl Judged for Inspection {}
 impl Judged for NoiseSummary {}
 impl Judged for PlanSummary {}
 impl Judged for ScatteringSummary {}

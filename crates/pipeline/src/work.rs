@@ -5,6 +5,7 @@ use icp_registration::Cloud;
 use range_io::calibration::Calibration;
 
 use crate::outcome::Outcome;
+use crate::span::SpanTally;
 
 /// A survey on its way through a pipeline.
 pub(crate) struct Work {
@@ -14,5 +15,7 @@ pub(crate) struct Work {
     pub(crate) rays: RayTable,
     /// Unflagged points with normals, from `Register` on.
     pub(crate) station_clouds: Vec<Cloud>,
+    /// Pixels inside and outside the calibration's span.
+    pub(crate) span: SpanTally,
     pub(crate) outcome: Outcome,
 }

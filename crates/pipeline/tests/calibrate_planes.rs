@@ -77,7 +77,7 @@ pub(crate) fn write_survey_with(folder: &Path, drift_m: impl Fn(f64) -> f64, off
             station: station.clone(),
             known: Some(([0.0, 0.0, 2.0], 0.0)),
         });
-        stations.push(Station { station, world_from_camera: pose, sigma_position_m: None, sigma_attitude_rad: None });
+        stations.push(Station { station, world_from_camera: pose, ..Station::default() });
     }
     std::fs::write(folder.join("survey.ron"), SURVEY.replace("FRAMES", &frames.concat())).unwrap();
     write_stations(folder.join("stations.csv"), &stations).unwrap();

@@ -154,6 +154,7 @@ fn output_folders_are_compared_part_by_part() {
             world_from_camera: Isometry3::translation(shift, 0.0, 0.0),
             sigma_position_m: None,
             sigma_attitude_rad: None,
+            doubt: None,
         };
         write_stations(path.join("stations.csv"), &[station("S00"), station(name)]).unwrap();
         path

@@ -133,3 +133,21 @@ fn drifts_that_follow_the_frame_rate_are_compared_by_it() {
     assert!((line.largest.difference_m + 0.0095).abs() < 1e-5 && line.largest.rate_hz == Some(10.0), "{line:?}");
     assert!(found.to_string().contains("at 10.00 Hz"), "{found}");
 }
+
+#[test]
+fn range_models_of_another_frequency_or_time_cannot_be_compared() {
+    let truth = target_field().join("truth/calibration.ron");
+    let text = std::fs::read_to_string(&truth).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let other = folder.path().join("other.ron");
+    for (from, to, words) in [
+        ("modulation_hz: 20000000.0", "modulation_hz: 30e6", ["20 MHz", "30 MHz"]),
+        ("integration_time_s: 1.0", "integration_time_s: 2.0", ["1000 ms", "2000 ms"]),
+    ] {
+        assert!(text.contains(from), "{from} in {text}");
+        std::fs::write(&other, text.replace(from, to)).unwrap();
+        let error = compare(&truth, &other).unwrap_err();
+        assert_eq!(error.failure(), pipeline::Failure::Usage);
+        assert!(words.iter().all(|word| error.to_string().contains(word)), "{error}");
+    }
+}

@@ -15,6 +15,7 @@ mod explain;
 mod exposures;
 mod fixed_pattern;
 mod frame_rate;
+mod metamorphic;
 mod noise;
 mod real_captures;
 mod real_periodic;

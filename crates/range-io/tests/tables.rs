@@ -77,13 +77,14 @@ proptest! {
     #[test]
     fn stations_come_back(
         position in prop::array::uniform3(-1e3..1e3_f64), angles in prop::array::uniform3(-3.2..3.2_f64),
-        sigma_position_m in sigmas(), sigma_attitude_rad in sigmas(),
+        sigma_position_m in sigmas(), sigma_attitude_rad in sigmas(), doubt in prop::option::of("[ -~]{0,20}[a-z]"),
     ) {
         let scratch = Scratch::new();
         let world_from_camera = pose_from_euler(Vector3::from(position), angles);
-        let station = Station { station: "S, 1".into(), world_from_camera, sigma_position_m, sigma_attitude_rad };
+        let doubt = doubt.map(|words| words.trim().to_owned());
+        let station = Station { station: "S, 1".into(), world_from_camera, sigma_position_m, sigma_attitude_rad, doubt };
         let plain = Station {
-            station: "S2".into(), world_from_camera, sigma_position_m: None, sigma_attitude_rad: None,
+            station: "S2".into(), world_from_camera, ..Station::default()
         };
         write_stations(scratch.file("s.csv"), &[station.clone(), plain]).unwrap();
         let back = read_stations(scratch.file("s.csv")).unwrap();
@@ -98,6 +99,8 @@ proptest! {
         }
         prop_assert_eq!(back[0].sigma_attitude_rad.is_some(), station.sigma_attitude_rad.is_some());
         prop_assert_eq!(back[1].sigma_position_m, None);
+        prop_assert_eq!(&back[0].doubt, &station.doubt);
+        prop_assert_eq!(&back[1].doubt, &None);
     }
 
     #[test]

@@ -62,6 +62,7 @@ mod tests {
             world_from_camera: pose_from_euler(Vector3::new(1.0, 2.0, 3.0), [1.4, -0.3, 0.7]),
             sigma_position_m: Some([0.001, 0.002, 0.003]),
             sigma_attitude_rad: Some([0.01, 0.02, 0.03]),
+            doubt: None,
         };
         let pose = StationPose { world_from_camera: row.world_from_camera, covariance: pose_covariance(&row) };
         let (position, attitude) = pose.sigmas().unwrap();

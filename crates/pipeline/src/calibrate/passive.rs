@@ -9,7 +9,7 @@ use self_calibration::{PassiveCamera, PassiveImagePoint};
 
 use super::network_files::{Tables, refuse_repeats, sigma_pixel};
 use super::request::TableDefaults;
-use crate::load::calibrated;
+use crate::compatible::{Purpose, compatible};
 use crate::{Error, Result};
 
 /// Reads the folder; `None` where there is none. Its stations must be those of the range camera.
@@ -28,7 +28,7 @@ pub(super) fn read_passive(
         return Err(Error::Survey { path, message });
     }
     let calibration = Calibration::read(&path)?;
-    let camera = calibrated(&calibration, &survey.camera.nominal_camera()?)?;
+    let camera = compatible(&survey, &calibration, Purpose::Camera)?.camera;
     let covariance = Some(calibration.camera_covariance()?).filter(|covariance| covariance.amax() > 0.0);
     let image_points = image_points(folder, tables, defaults)?;
     Ok(Some(PassiveCamera { camera, covariance, range_camera_from_passive: None, image_points }))

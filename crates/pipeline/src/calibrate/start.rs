@@ -9,8 +9,9 @@ use range_io::calibration::Calibration;
 use range_io::survey::Survey;
 
 use super::drift;
+use crate::compatible::{Purpose, compatible};
 use crate::drift::ViewDrift;
-use crate::load::{calibrated, read_calibration};
+use crate::load::read_calibration;
 use crate::{Error, Result};
 
 /// What a calibration starts from and what it came from.
@@ -42,7 +43,7 @@ impl Start {
         let (calibration, words) = read_calibration(root, named)?;
         let words = if calibration.is_some() { words } else { "the survey's nominal camera".to_owned() };
         let camera = match &calibration {
-            Some(calibration) => calibrated(calibration, &nominal)?,
+            Some(calibration) => compatible(survey, calibration, Purpose::Camera)?.camera,
             None => nominal,
         };
         let range_model = match &calibration {

@@ -17,6 +17,7 @@ pub(super) fn stations(outcome: &CalibrationOutcome) -> Vec<Station> {
             world_from_camera: station.world_from_camera,
             sigma_position_m: sigmas.map(|sigmas| sigmas.0),
             sigma_attitude_rad: sigmas.map(|sigmas| sigmas.1),
+            doubt: None,
         }
     };
     outcome.stations.iter().map(row).collect()

@@ -155,13 +155,14 @@ pub struct ImageLine {
 /// Compares two calibrations.
 ///
 /// # Errors
-/// [`Error::Diff`] for calibrations of different cameras (size or pitch of the pixels), of models without common ranges,
-/// and for a level that is none; [`Error::File`] for what cannot be read, another version of the format among it.
+/// [`Error::Diff`] for calibrations of different cameras (size or pitch of the pixels) or with range models of other modulation
+/// frequencies and integration times alone, of models without common ranges, and for a level that is none; [`Error::File`] for what cannot be read, another version of the format among it.
 pub fn diff(request: &DiffRequest) -> Result<CalibrationDifference> {
     let [first, second] = [&request.first, &request.second].map(Calibration::read);
     let (first, second) = (first?, second?);
     require_one_camera(&first, &second)?;
     let pair = Pair::new(&first, &second)?;
+    require_common_models(&pair)?;
     let compared = compare_parameters(&pair.first.parameters, &pair.second.parameters, request.level)
         .map_err(|error| refused(&error))?;
     let parameters: Vec<ParameterLine> =
@@ -234,6 +235,19 @@ fn require_one_camera(first: &Calibration, second: &Calibration) -> Result<()> {
         "these are calibrations of different cameras: the first has {}, the second {}",
         words(first),
         words(second)
+    )))
+}
+
+/// Range models of which none belongs to the same frequency and time as one of the other file say nothing of each other.
+fn require_common_models(pair: &Pair) -> Result<()> {
+    let (first, second) = (&pair.models_of_first, &pair.models_of_second);
+    if !pair.models.is_empty() || first.is_empty() || second.is_empty() {
+        return Ok(());
+    }
+    Err(Error::Diff(format!(
+        "these calibrations have no range model in common: the first has the {}, the second the {}",
+        first.join(", the "),
+        second.join(", the ")
     )))
 }
 

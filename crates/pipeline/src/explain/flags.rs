@@ -112,9 +112,10 @@ fn reason(flag: Flags, stage: &Stage, view: &View, pixel: [usize; 2], state: &Pi
 }
 
 fn outside(view: &View, pixel: [usize; 2], state: &PixelState) -> Reason {
-    let reasons = view.correction.as_ref().map(|record| record.pixel(pixel).outside).unwrap_or_default();
+    let ledger = view.correction.as_ref().map(|record| record.pixel(pixel)).unwrap_or_default();
     let mut sigmas = None;
-    let words: Vec<String> = reasons
+    let mut words: Vec<String> = ledger
+        .outside
         .iter()
         .map(|reason| match *reason {
             OutsideModel::Range { range_m, span_m: [low, high] } => {
@@ -141,6 +142,7 @@ fn outside(view: &View, pixel: [usize; 2], state: &PixelState) -> Reason {
             _ => "the calibration does not cover it".to_owned(),
         })
         .collect();
+    words.extend(ledger.outside_span);
     (words.join("; "), sigmas)
 }
 

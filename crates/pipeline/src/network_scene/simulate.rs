@@ -105,6 +105,7 @@ fn stations(network: &Network) -> Vec<StationRow> {
             world_from_camera: station.world_from_camera?,
             sigma_position_m: None,
             sigma_attitude_rad: None,
+            doubt: None,
         })
     };
     network.stations.iter().filter_map(row).collect()

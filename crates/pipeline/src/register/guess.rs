@@ -68,6 +68,7 @@ pub(super) fn apply(path: &Path, stations: &mut [Station]) -> Result<()> {
         let pose = guess.pose(name, time);
         let none = || wrong(path, &format!("has no pose of station {name} (time {time} s)"));
         station.approximate = Some(pose.ok_or_else(none)?);
+        station.approximate_sigma = [None; 2];
     }
     Ok(())
 }

@@ -12,15 +12,17 @@ use range_io::survey::{Level, Survey};
 
 use super::RegisterRequest;
 use crate::load::{read_calibration, root_of};
-use crate::outcome::Outcome;
+use crate::outcome::{Outcome, StationPose};
 use crate::plan::{
     AverageOptions, CorrectImagePointOptions, CorrectRangeOptions, DeconvolveOptions, DemodulateOptions, FlagOptions,
     FuseExposuresOptions, PointCloudOptions, UnwrapOptions,
 };
+use crate::plausibility::{self, PlacedStation};
 use crate::progress::Progress;
 use crate::run::process;
 use crate::stages::corrects_ranges;
-use crate::statistics::quantile;
+use crate::statistics::{median, quantile};
+use crate::verdict::Doubt;
 use crate::{Error, Plan, Result, Stage};
 
 /// Below this number of points there is no surface to speak of.
@@ -36,6 +38,8 @@ pub(crate) struct Station {
     pub(crate) projection: Option<Arc<Projection>>,
     /// Where the input says it stands.
     pub(crate) approximate: Option<Isometry3<f64>>,
+    /// Standard deviations of that position, metre, and attitude, radian, in space, where they are stated.
+    pub(crate) approximate_sigma: [Option<f64>; 2],
     /// Where it truly stands, of simulated surveys.
     pub(crate) truth: Option<Isometry3<f64>>,
 }
@@ -46,6 +50,8 @@ pub(super) struct Input {
     pub(super) stations: Vec<Station>,
     /// Index of the axis of the common frame that points up, as far as one can tell.
     pub(super) vertical_axis: usize,
+    /// What speaks against the frames.
+    pub(super) doubts: Vec<Doubt>,
 }
 
 /// Reads what was named.
@@ -91,7 +97,9 @@ fn survey_stations(path: &Path, request: &RegisterRequest, progress: &dyn Progre
     let stages = stages(survey.level, calibration.as_ref());
     let plan = Plan { name: "register".to_owned(), source: None, calibrate: None, stages };
     let outcome = process(&plan, &root_of(path), request.calibration.as_deref(), progress)?;
-    Ok(Input { stations: Station::of_views(&outcome), vertical_axis: outcome.vertical_axis })
+    let mut doubts = outcome.doubts.clone();
+    doubts.extend(plausibility::of_outcome(&outcome));
+    Ok(Input { stations: Station::of_views(&outcome), vertical_axis: outcome.vertical_axis, doubts })
 }
 
 /// The way from the survey's level to flagged points, as far as the calibration has something to say.
@@ -138,6 +146,7 @@ fn cloud_stations(paths: &[PathBuf], progress: &dyn Progress) -> Result<Input> {
             name: if taken { format!("{stem}-{index}") } else { stem },
             timestamp_s: index as f64,
             approximate: file.world_from_cloud,
+            approximate_sigma: [None; 2],
             file,
             projection: None,
             truth: None,
@@ -145,7 +154,7 @@ fn cloud_stations(paths: &[PathBuf], progress: &dyn Progress) -> Result<Input> {
         progress.advance(index + 1);
     }
     let vertical_axis = flattest(&stations[0].file.points);
-    Ok(Input { stations, vertical_axis })
+    Ok(Input { stations, vertical_axis, doubts: Vec::new() })
 }
 
 /// The axis along which the cloud is thinnest: up, where the cloud is of a landscape or of rooms.
@@ -175,6 +184,7 @@ impl Station {
             },
             projection: projection.clone(),
             approximate: view.approximate_world_from_camera,
+            approximate_sigma: plausibility::stated_sigma(&outcome.stated, &view.station),
             truth: view.truth.as_ref().and_then(|truth| truth.world_from_camera),
         };
         outcome.views.iter().zip(&outcome.clouds).map(station).collect()
@@ -185,6 +195,24 @@ impl Station {
         let usable = |index: usize| self.file.flags.as_ref().is_none_or(|flags| flags[index] == 0);
         let points = self.file.points.iter().enumerate();
         points.map(|(index, point)| if usable(index) { *point } else { [f64::NAN; 3] }).collect()
+    }
+
+    /// Median distance of the usable points from the origin of their frame, metre.
+    fn distance_m(&self) -> f64 {
+        let points = self.usable_points();
+        let mut distances: Vec<f64> = points.iter().map(|[x, y, z]| x.hypot(*y).hypot(*z)).collect();
+        median(&mut distances)
+    }
+
+    /// The station with the pose that was found.
+    pub(super) fn placed<'a>(&'a self, pose: &'a StationPose) -> PlacedStation<'a> {
+        PlacedStation {
+            name: &self.name,
+            pose,
+            stated: self.approximate,
+            stated_sigma: self.approximate_sigma,
+            distance_m: if self.is_seen_from_origin() { self.distance_m() } else { f64::NAN },
+        }
     }
 
     /// Whether the points were seen from the origin of their frame, as those of cameras and scanners are.

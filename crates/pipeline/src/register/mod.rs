@@ -20,7 +20,9 @@ use nalgebra::Isometry3;
 
 use crate::Result;
 use crate::outcome::StationPose;
+use crate::plausibility;
 use crate::progress::Progress;
+use crate::verdict::Doubt;
 pub(crate) use input::Station;
 
 /// Poses found, and what is known of them.
@@ -51,10 +53,12 @@ pub fn register(request: &RegisterRequest, progress: &dyn Progress) -> Result<Re
         }
         None => "approximate poses of the input".to_owned(),
     };
+    let doubts = std::mem::take(&mut input.doubts);
     let mut registered = match request.method {
         RegisterMethod::Pairs => pairs::run(input, &start, progress)?,
         RegisterMethod::Multi => stations::run(input, &start, progress)?,
     };
+    registered.doubt(doubts);
     let summary = &mut registered.summary;
     summary.method = request.method.name();
     summary.inputs = request.inputs.iter().map(|path| path.display().to_string()).collect();
@@ -63,4 +67,17 @@ pub fn register(request: &RegisterRequest, progress: &dyn Progress) -> Result<Re
     results::write(&request.out, &registered, progress)?;
     progress.finish();
     Ok(registered.summary)
+}
+
+impl Registered {
+    /// Adds what speaks against the frames, and against the poses that were found from them.
+    fn doubt(&mut self, of_frames: Vec<Doubt>) {
+        let placed: Vec<_> =
+            self.stations.iter().zip(&self.poses).map(|(station, pose)| station.placed(pose)).collect();
+        let mut doubts = of_frames;
+        doubts.extend(plausibility::uncertain(&placed));
+        doubts.extend(plausibility::displaced(&placed));
+        doubts.append(&mut self.summary.doubts);
+        self.summary.doubts = doubts;
+    }
 }

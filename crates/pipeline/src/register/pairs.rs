@@ -26,7 +26,7 @@ struct Aligned {
 }
 
 pub(super) fn run(input: Input, start: &str, progress: &dyn Progress) -> Result<Registered> {
-    let Input { stations, vertical_axis } = input;
+    let Input { stations, vertical_axis, .. } = input;
     progress.begin("prepare clouds", stations.len());
     let done = AtomicUsize::new(0);
     let prepare = |station: &Station| {

@@ -9,6 +9,7 @@ use range_io::trajectory::{StampedPose, write_tum};
 use super::Registered;
 use super::input::Station;
 use crate::progress::Progress;
+use crate::verdict::words_about;
 use crate::{Error, Result, report};
 
 /// Writes everything into a temporary folder beside `out` and renames it when the last file is complete.
@@ -24,6 +25,7 @@ pub(super) fn write(out: &std::path::Path, registered: &Registered, progress: &d
             world_from_camera: pose.world_from_camera,
             sigma_position_m: pose.sigmas().map(|sigmas| sigmas.0),
             sigma_attitude_rad: pose.sigmas().map(|sigmas| sigmas.1),
+            doubt: words_about(&registered.summary.doubts, &station.name),
         })
         .collect();
     write_stations(folder.file("stations.csv")?, &rows)?;

@@ -24,7 +24,7 @@ const LARGEST_SIGMAS: f64 = 5.0;
 const LOOSE_LOOP: f64 = 20.0;
 
 pub(super) fn run(input: Input, start: &str, progress: &dyn Progress) -> Result<Registered> {
-    let Input { stations, vertical_axis } = input;
+    let Input { stations, vertical_axis, .. } = input;
     let clouds = stations.par_iter().map(|station| station.cloud(NORMAL_HALF_WIDTH_PX)).collect::<Result<Vec<_>>>()?;
     let before: Option<Vec<Isometry3<f64>>> = stations.iter().map(|station| station.approximate).collect();
     let (known, words) = match &before {

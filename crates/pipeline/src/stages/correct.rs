@@ -5,6 +5,7 @@ use range_image::RangeFrame;
 use range_io::survey::ReferencePath;
 
 use super::{Findings, reference_path};
+use crate::compatible::model_set;
 use crate::correction_record::CorrectionRecord;
 use crate::drift::{CorrectRangeOptions, DriftCurve, DriftTreatment, ViewDrift};
 use crate::progress::Progress;
@@ -18,13 +19,13 @@ pub(super) fn run(work: &mut Work, options: &CorrectRangeOptions, progress: &dyn
         return Err(Error::Camera("stage CorrectRange needs a calibration; name one with --calibration".to_owned()));
     };
     let camera = work.calibrated_camera.unwrap_or(work.outcome.camera);
-    let set = calibration.model_set().map_err(Error::stage("CorrectRange", "calibration"))?;
+    let set = model_set(&work.outcome.survey, calibration)?;
     let (format, principal_point_mm) = (camera.format, camera.interior.principal_point_mm);
     let pattern = calibration.fixed_pattern.clone().map(Arc::new);
     let sensor = reference_path::Sensor { format, principal_point_mm, pattern: pattern.as_deref() };
     let survey = &work.outcome.survey;
     let apply = options.warm_up == DriftTreatment::Apply;
-    let reference = survey.reference_path;
+    let (reference, span) = (survey.reference_path, calibration.span);
     let calibrated = calibration.warm_up.as_ref().filter(|_| apply && reference.is_none());
     let curve = calibrated.map(|calibrated| DriftCurve::new(calibrated, survey)).transpose();
     let curve = curve.map_err(Error::stage("CorrectRange", "calibration"))?;
@@ -44,10 +45,11 @@ pub(super) fn run(work: &mut Work, options: &CorrectRangeOptions, progress: &dyn
             }
             found.push(drift.clone());
         }
-        let mut record = CorrectionRecord::new(format, principal_point_mm, pattern.clone(), drift);
+        let mut record = CorrectionRecord::new(format, principal_point_mm, pattern.clone(), drift, span);
         for (frame, model) in frames_with_models(view, &models)? {
             let (observed, sigma) = (frame.range.clone(), frame.sigma.clone());
             let summary = model.correct_frame(frame, &format, principal_point_mm, pattern.as_deref());
+            work.span.flag(&span, &observed, frame);
             outside += summary.map_err(Error::stage("CorrectRange", &name))?.outside_span;
             if let Some(path) = &reference {
                 reference_path::mask(path, frame);

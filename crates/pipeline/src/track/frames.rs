@@ -7,12 +7,19 @@ use icp_registration::Projection;
 use nalgebra::Isometry3;
 use range_io::survey::Survey;
 
+use crate::compatible::Purpose;
+use crate::drift::DriftTreatment;
 use crate::load::{Frames, open, read_calibration, root_of};
+use crate::plausibility::{FrameWatch, SenseVotes};
 use crate::progress::Silent;
 use crate::register::input::{projection, stages};
 use crate::stages::apply;
+use crate::verdict::Doubt;
 use crate::work::Work;
 use crate::{Error, Result, Stage};
+
+/// The sense of the phase is the same in all frames: it is judged in some.
+const SENSE_EVERY: usize = 16;
 
 /// Reads frames and brings them to unflagged points.
 pub(super) struct FrameSource {
@@ -22,6 +29,8 @@ pub(super) struct FrameSource {
     stages: Vec<Stage>,
     /// Positions in the survey, in the order of time.
     pub(super) order: Vec<usize>,
+    watch: FrameWatch,
+    votes: SenseVotes,
 }
 
 /// The points of one frame, a pixel each, NaN where nothing was measured or a flag excludes it.
@@ -32,7 +41,8 @@ pub(super) struct PointFrame {
 
 impl FrameSource {
     pub(super) fn new(path: &Path, calibration: Option<&Path>) -> Result<Self> {
-        let (mut work, frames) = open(path, read_calibration(&root_of(path), calibration)?)?;
+        let correction = Purpose::Ranges(DriftTreatment::Apply);
+        let (mut work, frames) = open(path, read_calibration(&root_of(path), calibration)?, correction)?;
         let order = in_order(path, &work.outcome.survey)?;
         let mut each = Vec::new();
         for stage in stages(work.outcome.survey.level, work.calibration.as_ref()) {
@@ -46,7 +56,7 @@ impl FrameSource {
                 other => each.push(other),
             }
         }
-        Ok(Self { work, frames, stages: each, order })
+        Ok(Self { work, frames, stages: each, order, watch: FrameWatch::default(), votes: SenseVotes::default() })
     }
 
     /// How points fall on the camera's pixels.
@@ -81,8 +91,12 @@ impl FrameSource {
             Err(Error::File(range_io::Error::NothingMeasured { .. })) => return Ok(self.blank()),
             view => view?,
         };
+        self.watch.look(&view);
         self.work.outcome.views = vec![view];
         for stage in &self.stages {
+            if matches!(stage, Stage::Unwrap(_)) && index % SENSE_EVERY == 0 {
+                self.work.outcome.views.iter().for_each(|view| self.votes.look_at(view));
+            }
             apply(stage, &mut self.work, &Silent)?;
         }
         let Some(cloud) = self.work.outcome.clouds.pop() else { return Ok(self.blank()) };
@@ -94,6 +108,20 @@ impl FrameSource {
         }
         let known = cloud.sigma.iter().any(|sigma| *sigma > 0.0);
         Ok(PointFrame { points, sigma: known.then_some(cloud.sigma) })
+    }
+
+    /// What speaks against the frames that were read.
+    ///
+    /// # Errors
+    /// [`Error::Incompatible`] for a calibration that holds for none of their ranges.
+    pub(super) fn doubts(&self) -> Result<Vec<Doubt>> {
+        let mut doubts = self.work.outcome.doubts.clone();
+        doubts.extend(self.watch.doubts());
+        doubts.extend(self.votes.doubt());
+        if let Some(calibration) = &self.work.calibration {
+            doubts.extend(self.work.span.judge(&calibration.span)?);
+        }
+        Ok(doubts)
     }
 
     fn blank(&self) -> PointFrame {

@@ -11,6 +11,7 @@ use range_io::trajectory::{StampedPose, write_tum};
 
 use super::outcome::{Tracked, station_pose};
 use crate::progress::Progress;
+use crate::verdict::words_about;
 use crate::{Error, Result, report};
 
 /// Writes everything into a temporary folder beside `out` and renames it when the last file is complete.
@@ -49,6 +50,7 @@ fn stations(tracked: &Tracked) -> Vec<Station> {
                 world_from_camera: pose.world_from_camera,
                 sigma_position_m: pose.sigmas().map(|sigmas| sigmas.0),
                 sigma_attitude_rad: pose.sigmas().map(|sigmas| sigmas.1),
+                doubt: words_about(&tracked.summary.doubts, &frame.name),
             })
         })
         .collect()

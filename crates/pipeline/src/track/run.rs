@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::time::Instant;
 
-use icp_registration::{TrackedPose, Tracker, TrackerOptions, TrackingState};
+use icp_registration::{Cloud, TrackedPose, Tracker, TrackerOptions, TrackingState};
 
 use super::frames::FrameSource;
 use super::imu::Inertial;
@@ -12,8 +12,11 @@ use super::start::Start;
 use super::summary::{TrackSummary, summarise};
 use super::{TrackRequest, results};
 use crate::load::root_of;
+use crate::plausibility;
 use crate::progress::Progress;
 use crate::register::input::is_survey;
+use crate::statistics::quantile;
+use crate::verdict::Doubt;
 use crate::{Error, Result};
 
 /// Tracks the frames of a survey and writes path, map, summary and report into the request's output folder.
@@ -148,14 +151,35 @@ impl Run {
             .iter()
             .map(|frame| self.source.true_pose(&self.source.survey().frames[frame.index].station))
             .collect();
+        let mut doubts = self.source.doubts()?;
         let mut summary = summarise(self.frames, [&self.poses, &adjusted], &truths, &tracker);
         self.source.calibration().clone_into(&mut summary.calibration);
         summary.datum = self.datum;
         prior.clone_into(&mut summary.prior);
+        doubts.extend(uncertain(&summary, &tracker));
+        doubts.append(&mut summary.doubts);
+        summary.doubts = doubts;
         // As everywhere: z where poses came with the survey, y in a camera's own frame.
         let vertical_axis = if self.has_pose { 2 } else { 1 };
         Ok(Tracked { poses: self.poses, adjusted, map: tracker.map(), vertical_axis, summary })
     }
+}
+
+/// Frames that the surfaces do not hold, against how far the scene extends.
+fn uncertain(summary: &TrackSummary, tracker: &Tracker) -> Option<Doubt> {
+    let frames = summary.per_frame.iter();
+    let known =
+        frames.filter_map(|frame| Some((frame.name.as_str(), frame.position_sigma_m?, frame.attitude_sigma_deg?)));
+    plausibility::uncertain_frames(&known.collect::<Vec<_>>(), half_extent_m(&tracker.map()))
+}
+
+/// Half of the longest side of a map without its outermost points, metre.
+fn half_extent_m(map: &Cloud) -> f64 {
+    let extent = |axis: usize| {
+        let mut values: Vec<f64> = map.points.iter().map(|point| point[axis]).collect();
+        quantile(&mut values, 0.95) - quantile(&mut values, 0.05)
+    };
+    0.5 * (0..3).map(extent).fold(0.0, f64::max)
 }
 
 /// Names of the frames: their stations', with the frame's number where a station has several.

@@ -7,6 +7,7 @@ use range_image::{RangeFrame, Raster};
 use range_io::survey::{Level, Survey};
 use rayon::prelude::*;
 
+use crate::compatible::Purpose;
 use crate::load::{Frames, open};
 use crate::progress::Silent;
 use crate::stages::apply;
@@ -26,7 +27,7 @@ pub(super) struct FrameSource {
 impl FrameSource {
     /// Refuses frames of several stations, without times, and with several integration times.
     pub(super) fn new(path: &Path) -> Result<Self> {
-        let (work, frames) = open(path, (None, "none".to_owned()))?;
+        let (work, frames) = open(path, (None, "none".to_owned()), Purpose::Camera)?;
         let survey = &work.outcome.survey;
         let refused = |message: String| Err(Error::Survey { path: path.to_owned(), message });
         let Some(first) = survey.frames.first() else { return refused("it lists no frames".to_owned()) };

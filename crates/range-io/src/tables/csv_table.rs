@@ -185,6 +185,11 @@ impl<'a> Row<'a> {
         }
     }
 
+    /// Words, `None` where the field is empty.
+    pub fn words(&self, column: &str) -> Result<Option<String>> {
+        Ok(Some(self.field(column)?).filter(|text| !text.is_empty()).map(str::to_owned))
+    }
+
     /// A finite number, `None` where the field is empty.
     pub fn number(&self, column: &str) -> Result<Option<f64>> {
         let text = self.field(column)?;

@@ -7,7 +7,7 @@ use super::csv_table::{Columns, PlacedRows, Row, Table, texts, write};
 use crate::Result;
 
 /// The pose of one station: `stations.csv`.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Station {
     /// Name.
     pub station: String,
@@ -17,6 +17,8 @@ pub struct Station {
     pub sigma_position_m: Option<[f64; 3]>,
     /// Standard deviations of omega, phi, kappa in radian.
     pub sigma_attitude_rad: Option<[f64; 3]>,
+    /// What speaks against the pose, in words; `None` where nothing does.
+    pub doubt: Option<String>,
 }
 
 const POSITION: [&str; 3] = ["x", "y", "z"];
@@ -25,8 +27,9 @@ const SIGMA_POSITION: [&str; 3] = ["sigma_x", "sigma_y", "sigma_z"];
 const SIGMA_ATTITUDE: [&str; 3] = ["sigma_omega", "sigma_phi", "sigma_kappa"];
 const COLUMNS: Columns = Columns {
     required: &["station", "x", "y", "z", "omega", "phi", "kappa"],
-    optional: &["sigma_x", "sigma_y", "sigma_z", "sigma_omega", "sigma_phi", "sigma_kappa"],
+    optional: &["sigma_x", "sigma_y", "sigma_z", "sigma_omega", "sigma_phi", "sigma_kappa", DOUBT],
 };
+const DOUBT: &str = "doubt";
 
 /// Reads `stations.csv`, angles in degrees. A station may stand in one row only.
 pub fn read_stations(path: impl AsRef<Path>) -> Result<Vec<Station>> {
@@ -45,15 +48,18 @@ pub fn read_placed_stations(path: impl AsRef<Path>) -> Result<PlacedRows<Station
             world_from_camera: pose_from_euler(position, row.all(ATTITUDE)?.map(f64::to_radians)),
             sigma_position_m: row.all_or_none(SIGMA_POSITION, Row::positive)?,
             sigma_attitude_rad: sigma_attitude_deg.map(|sigma| sigma.map(f64::to_radians)),
+            doubt: row.words(DOUBT)?,
         })
     })
 }
 
-/// Writes `stations.csv`, angles in degrees; the columns of standard deviations where any station has some.
+/// Writes `stations.csv`, angles in degrees; the columns of standard deviations, and that of doubts, where any station has
+/// some.
 pub fn write_stations(path: impl AsRef<Path>, stations: &[Station]) -> Result<()> {
     let with_sigma = stations.iter().any(|s| s.sigma_position_m.is_some() || s.sigma_attitude_rad.is_some());
-    let optional = if with_sigma { COLUMNS.optional } else { &[] };
-    let header = [COLUMNS.required, optional].concat();
+    let sigmas: &[&str] = if with_sigma { &COLUMNS.optional[..6] } else { &[] };
+    let doubt: &[&str] = if stations.iter().any(|s| s.doubt.is_some()) { &[DOUBT] } else { &[] };
+    let header = [COLUMNS.required, sigmas, doubt].concat();
     let rows = stations.iter().map(|station| {
         let pose = &station.world_from_camera;
         let attitude_deg = euler_from_pose(pose).map(f64::to_degrees);
@@ -61,9 +67,11 @@ pub fn write_stations(path: impl AsRef<Path>, stations: &[Station]) -> Result<()
         let mut row = vec![station.station.clone()];
         row.extend(texts(Some(<[f64; 3]>::from(pose.translation.vector))));
         row.extend(texts(Some(attitude_deg)));
-        row.extend(texts(station.sigma_position_m));
-        row.extend(texts(sigma_attitude_deg));
-        row.truncate(header.len());
+        if with_sigma {
+            row.extend(texts(station.sigma_position_m));
+            row.extend(texts(sigma_attitude_deg));
+        }
+        row.extend(doubt.iter().map(|_| station.doubt.clone().unwrap_or_default()));
         row
     });
     write(path.as_ref(), &header, rows)

@@ -108,7 +108,9 @@ pub(crate) fn open(
     let span = SpanTally::default();
     let range_noise = calibration.as_ref().and_then(|calibration| calibration.range_noise);
     let frames = Frames { root, depth_rays, poses, true_poses, reference, modulations, range_noise };
-    Ok((Work { calibration, calibrated_camera, rays, station_clouds: Vec::new(), span, outcome }, frames))
+    let (station_clouds, low_amplitude) = (Vec::new(), None);
+    let work = Work { calibration, calibrated_camera, rays, low_amplitude, station_clouds, span, outcome };
+    Ok((work, frames))
 }
 
 impl Frames {

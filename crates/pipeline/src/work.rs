@@ -13,6 +13,8 @@ pub(crate) struct Work {
     /// The calibrated camera, where there is one; `outcome.camera` is the one in use.
     pub(crate) calibrated_camera: Option<Camera>,
     pub(crate) rays: RayTable,
+    /// Amplitude below which the phase of a single frame is too noisy, as `Demodulate` was told.
+    pub(crate) low_amplitude: Option<f64>,
     /// Unflagged points with normals, from `Register` on.
     pub(crate) station_clouds: Vec<Cloud>,
     /// Pixels inside and outside the calibration's span.

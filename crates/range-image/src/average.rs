@@ -2,6 +2,7 @@
 
 use rayon::prelude::*;
 
+use crate::mean_flags::MeanFlags;
 use crate::{ComplexChannel, ComplexFrame, Error, Flags, RangeFrame, Raster, Result};
 
 /// Pixels that one task takes at least; smaller tasks cost more to hand out than to do.
@@ -36,27 +37,40 @@ fn scatter_of(values: impl Iterator<Item = [f64; 2]>, mean: Mean, parts: f64) ->
     (squares / (parts * (mean.count - 1.0))).sqrt()
 }
 
+/// What a single frame says of itself, and [`check_rest`](crate::check_rest) of several: kept where any frame says it.
+const OF_ANY: Flags = Flags::MOTION.union(Flags::INTERFERENCE);
+
 /// Averages frames of a scene and a camera at rest: the mean of `z`, never of the phase.
 ///
-/// Pixel by pixel and frequency by frequency, values that are NaN are left out. Sigma of the mean comes from the
-/// frames' own sigmas, `sqrt(sum sigma^2) / n`; where one of them is NaN, from the scatter of the values, if there are
-/// two. Flags are those of all frames together; [`Flags::NO_DATA`] stays only where no frame has a value at some
-/// frequency. The offset is averaged where all frames have one.
+/// Pixel by pixel and frequency by frequency, values that are NaN are left out, and so are those of frames in which the
+/// pixel is saturated, unless it is in all. Sigma of the mean comes from the frames' own sigmas, `sqrt(sum sigma^2) / n`;
+/// where one of them is NaN, from the scatter of the values, if there are two. The offset is averaged where all frames have
+/// one.
+///
+/// Flags are those of the mean, not of all frames together, which would add up what chance does to each:
+/// - [`Flags::NO_DATA`] where no frame has a value at some frequency;
+/// - [`Flags::SATURATED`] where all values are saturated, or so many were left out that the mean of the others may be off by
+///   its standard deviation: more than 1 of 4 frames, 1 of 16, 3 of 64, 10 of 1000;
+/// - [`Flags::MOTION`] and [`Flags::INTERFERENCE`] where any frame has them: [`Rest::flag`](crate::Rest::flag) judges these
+///   by what the values of all frames show;
+/// - all others, such as [`Flags::LOW_AMPLITUDE`], where more than half of the frames that count have them.
 pub fn average(frames: &[ComplexFrame]) -> Result<ComplexFrame> {
     require_alike(frames)?;
     let Some(first) = frames.first() else { return Err(Error::NoFrames { what: "average" }) };
-    let planes: Vec<_> = frames.iter().map(|frame| &frame.flags).collect();
-    let mut out = ComplexFrame { channels: Vec::with_capacity(first.channels.len()), flags: union(&planes) };
+    let flags = MeanFlags::of(frames.iter().map(|frame| &frame.flags).collect());
+    let mut channels_of_mean = Vec::with_capacity(first.channels.len());
     for index in 0..first.channels.len() {
         let channels: Vec<_> = frames.iter().map(|frame| &frame.channels[index]).collect();
-        let mean = average_channels(&channels, &first.channels[index]);
-        flag_missing(&mut out.flags, &mean.real);
-        out.channels.push(mean);
+        channels_of_mean.push(average_channels(&channels, &first.channels[index], &flags));
+    }
+    let mut out = ComplexFrame { channels: channels_of_mean, flags: together(flags) };
+    for channel in &out.channels {
+        flag_missing(&mut out.flags, &channel.real);
     }
     Ok(out)
 }
 
-fn average_channels(channels: &[&ComplexChannel], first: &ComplexChannel) -> ComplexChannel {
+fn average_channels(channels: &[&ComplexChannel], first: &ComplexChannel, flags: &MeanFlags<'_>) -> ComplexChannel {
     let mut out = first.clone();
     let planes = out.real.as_mut_slice().par_chunks_mut(BLOCK).zip(out.imaginary.as_mut_slice().par_chunks_mut(BLOCK));
     let planes = planes.zip(out.sigma.as_mut_slice().par_chunks_mut(BLOCK));
@@ -67,6 +81,10 @@ fn average_channels(channels: &[&ComplexChannel], first: &ComplexChannel) -> Com
             sums.add(channel, start, re.len());
         }
         for (index, ((re, im), sigma)) in re.iter_mut().zip(im).zip(sigma).enumerate() {
+            let values = || values_at(channels, start + index, |frame| flags.counts(start + index, frame));
+            if flags.leaves_out(start + index) {
+                sums.replace(index, values());
+            }
             let count = sums.count[index];
             let value = [sums.real[index] / count, sums.imaginary[index] / count];
             (*re, *im) = (value[0] as f32, value[1] as f32);
@@ -74,12 +92,12 @@ fn average_channels(channels: &[&ComplexChannel], first: &ComplexChannel) -> Com
             let predicted = sums.variance[index].sqrt() / count;
             *sigma = predicted as f32;
             if predicted.is_nan() {
-                let scatter = scatter_of(values_at(channels, start + index), Mean { count, value }, 2.0);
+                let scatter = scatter_of(values().map(|(value, _)| value), Mean { count, value }, 2.0);
                 *sigma = (scatter / count.sqrt()) as f32;
             }
         }
     });
-    out.offset = average_offsets(channels);
+    out.offset = average_offsets(channels, flags);
     out
 }
 
@@ -111,22 +129,46 @@ impl Sums {
             *variance += if finite { f64::from(*sigma) * f64::from(*sigma) } else { 0.0 };
         }
     }
+
+    /// Takes other values of one pixel, each with its sigma.
+    fn replace(&mut self, index: usize, values: impl Iterator<Item = ([f64; 2], f64)>) {
+        let nothing = (0.0, [0.0; 2], 0.0);
+        let (count, [real, imaginary], variance) = values
+            .fold(nothing, |(count, [a, b], variance), ([x, y], sigma)| {
+                (count + 1.0, [a + x, b + y], variance + sigma * sigma)
+            });
+        (self.count[index], self.real[index]) = (count, real);
+        (self.imaginary[index], self.variance[index]) = (imaginary, variance);
+    }
 }
 
-fn average_offsets(channels: &[&ComplexChannel]) -> Option<Raster<f32>> {
+fn average_offsets(channels: &[&ComplexChannel], flags: &MeanFlags<'_>) -> Option<Raster<f32>> {
     let planes: Vec<&Raster<f32>> = channels.iter().map(|channel| channel.offset.as_ref()).collect::<Option<_>>()?;
     let mut out = (*planes.first()?).clone();
     let pixels = out.as_mut_slice().par_iter_mut().with_min_len(PIXELS_PER_TASK);
     pixels.enumerate().for_each(|(pixel, offset)| {
-        let values = planes.iter().map(|plane| plane.as_slice()[pixel]).filter(|value| value.is_finite());
-        *offset = mean_of(values.map(|value| [f64::from(value), 0.0])).value[0] as f32;
+        let value = |plane: &&Raster<f32>| [f64::from(plane.as_slice()[pixel]), 0.0];
+        let finite = |value: &[f64; 2]| value[0].is_finite();
+        let mean = if flags.leaves_out(pixel) {
+            let counting = planes.iter().enumerate().filter(|(frame, _)| flags.counts(pixel, *frame));
+            mean_of(counting.map(|(_, plane)| value(plane)).filter(finite))
+        } else {
+            mean_of(planes.iter().map(value).filter(finite))
+        };
+        *offset = mean.value[0] as f32;
     });
     Some(out)
 }
 
-/// The finite values of a pixel.
-fn values_at(channels: &[&ComplexChannel], pixel: usize) -> impl Iterator<Item = [f64; 2]> {
-    channels.iter().filter_map(move |channel| value_at(channel, pixel))
+/// The finite values of a pixel in the frames that count, with their sigmas.
+fn values_at(
+    channels: &[&ComplexChannel],
+    pixel: usize,
+    counts: impl Fn(usize) -> bool,
+) -> impl Iterator<Item = ([f64; 2], f64)> {
+    let counting = channels.iter().enumerate().filter(move |(frame, _)| counts(*frame));
+    counting
+        .filter_map(move |(_, channel)| Some((value_at(channel, pixel)?, f64::from(channel.sigma.as_slice()[pixel]))))
 }
 
 fn value_at(channel: &ComplexChannel, pixel: usize) -> Option<[f64; 2]> {
@@ -154,7 +196,8 @@ pub fn sigma_from_repeats(frames: &[ComplexFrame], channel: usize) -> Result<Ras
     let mut out = channels.first().map(|channel| channel.sigma.clone()).unwrap_or_default();
     let pixels = out.as_mut_slice().par_iter_mut().with_min_len(PIXELS_PER_TASK);
     pixels.enumerate().for_each(|(pixel, sigma)| {
-        *sigma = scatter_of(values_at(&channels, pixel), mean_of(values_at(&channels, pixel)), 2.0) as f32;
+        let values = || values_at(&channels, pixel, |_| true).map(|(value, _)| value);
+        *sigma = scatter_of(values(), mean_of(values()), 2.0) as f32;
     });
     Ok(out)
 }
@@ -163,7 +206,8 @@ pub fn sigma_from_repeats(frames: &[ComplexFrame], channel: usize) -> Result<Ras
 ///
 /// Pixel by pixel, values that are NaN are left out. Sigma of the mean comes from the frames' own sigmas,
 /// `sqrt(sum sigma^2) / n`, and from the scatter, `s / sqrt(n)`, where one of them is NaN or where the values scatter
-/// five times as much as they should. A pixel with one value keeps that frame's sigma. Flags are as with [`average`].
+/// five times as much as they should. A pixel with one value keeps that frame's sigma. Saturated values are left out, and
+/// flags are judged, as with [`average`].
 /// Near the ends of the ambiguity interval ranges jump by U and their mean means nothing: the sigma shows it, and
 /// averaging `z` avoids it.
 pub fn average_ranges(frames: &[RangeFrame]) -> Result<RangeFrame> {
@@ -174,12 +218,14 @@ pub fn average_ranges(frames: &[RangeFrame]) -> Result<RangeFrame> {
             return Err(Error::Inconsistent { index, what: "the size" });
         }
     }
-    let planes: Vec<_> = frames.iter().map(|frame| &frame.flags).collect();
-    let mut out = RangeFrame { flags: union(&planes), ..first.clone() };
+    let flags = MeanFlags::of(frames.iter().map(|frame| &frame.flags).collect());
+    let mut out = first.clone();
     let planes = out.range.as_mut_slice().par_iter_mut().zip(out.sigma.as_mut_slice());
     let planes = planes.zip(out.amplitude.as_mut_slice()).with_min_len(PIXELS_PER_TASK);
     planes.enumerate().for_each(|(pixel, ((range, sigma), amplitude))| {
-        let with_value = || frames.iter().filter(move |frame| frame.range.as_slice()[pixel].is_finite());
+        let counting = || frames.iter().enumerate().filter(|(frame, _)| flags.counts(pixel, *frame));
+        let with_value =
+            || counting().map(|(_, frame)| frame).filter(|frame| frame.range.as_slice()[pixel].is_finite());
         let ranges = || with_value().map(move |frame| [f64::from(frame.range.as_slice()[pixel]), 0.0]);
         let amplitudes = with_value().map(|frame| frame.amplitude.as_slice()[pixel]).filter(|value| value.is_finite());
         let mean = mean_of(ranges());
@@ -195,6 +241,7 @@ pub fn average_ranges(frames: &[RangeFrame]) -> Result<RangeFrame> {
             }
         };
     });
+    out.flags = together(flags);
     flag_missing(&mut out.flags, &out.range);
     Ok(out)
 }
@@ -214,15 +261,13 @@ pub(crate) fn require_alike(frames: &[ComplexFrame]) -> Result<()> {
     Ok(())
 }
 
-/// All flags that any plane carries, but `NO_DATA`, which the result decides anew.
-fn union(planes: &[&Raster<Flags>]) -> Raster<Flags> {
-    let mut out = planes.first().map(|&plane| plane.clone()).unwrap_or_default();
-    for plane in planes {
-        for (all, flags) in out.as_mut_slice().iter_mut().zip(plane.as_slice()) {
-            *all |= *flags;
-        }
+/// The flags of a mean but `NO_DATA`, which the result decides anew.
+fn together(MeanFlags { any, most, .. }: MeanFlags<'_>) -> Raster<Flags> {
+    let mut out = most;
+    for (flags, any) in out.as_mut_slice().iter_mut().zip(any.as_slice()) {
+        *flags |= *any & OF_ANY;
+        flags.remove(Flags::NO_DATA);
     }
-    out.as_mut_slice().iter_mut().for_each(|flags| flags.remove(Flags::NO_DATA));
     out
 }
 

@@ -136,6 +136,25 @@ impl ComplexFrame {
         Ok(())
     }
 
+    /// Decides [`Flags::LOW_AMPLITUDE`] anew: where the amplitude at any frequency is below `limit`.
+    ///
+    /// The phase of a pixel errs by sigma over amplitude. In a mean of n frames sigma is `√n` times smaller, so that the
+    /// phase is as good as that of a single frame of amplitude a where the mean has `a / √n`.
+    pub fn flag_low_amplitude(&mut self, limit: f64) {
+        let square = (limit * limit) as f32;
+        for flags in self.flags.as_mut_slice() {
+            flags.remove(Flags::LOW_AMPLITUDE);
+        }
+        for channel in &self.channels {
+            let parts = channel.real.as_slice().iter().zip(channel.imaginary.as_slice());
+            for (flags, (re, im)) in self.flags.as_mut_slice().iter_mut().zip(parts) {
+                if re * re + im * im < square {
+                    flags.insert(Flags::LOW_AMPLITUDE);
+                }
+            }
+        }
+    }
+
     /// Columns.
     pub fn width(&self) -> usize {
         self.flags.width()

@@ -3,6 +3,8 @@
 use rayon::prelude::*;
 
 use crate::average::require_alike;
+use crate::mean_flags::MeanFlags;
+use crate::rest_pixel::PixelTest;
 use crate::{ComplexFrame, Error, Flags, RangeFrame, Raster, Result, chi_squared_upper_quantile};
 
 /// Pixels that one task takes; its sums are added in the order of the pixels.
@@ -10,6 +12,10 @@ const PIXELS_PER_TASK: usize = 4096;
 
 /// Frames' common deviations that are less significant than this are chance.
 const SIGNIFICANT: f64 = 5.0;
+
+/// A frame that deviates and moves the mean by fewer of the mean's standard deviations is let pass: the rare large noise of
+/// real sensors would flag a pixel in one of thousands of frames otherwise.
+const LEAST_BIAS: f64 = 0.5;
 
 /// When repeated frames count as at rest.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -66,7 +72,7 @@ pub enum RestVerdict {
 /// The tests of repeated frames.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Rest {
-    /// Pixels whose values scatter more than their sigma says.
+    /// Pixels whose values scatter more than their sigma says, or that one frame shows elsewhere.
     pub moved: Raster<bool>,
     /// Their number.
     pub moved_pixels: usize,
@@ -78,41 +84,58 @@ pub struct Rest {
     pub deviation_sigma: f64,
     /// What that means.
     pub verdict: RestVerdict,
+    /// What more than half of the frames say of the samples of a pixel; `None` where it could not be tested.
+    samples: Vec<Option<Flags>>,
 }
 
+/// What the samples of a single frame show.
+const OF_SAMPLES: Flags = Flags::MOTION.union(Flags::INTERFERENCE);
+
 impl Rest {
-    /// Flags the pixels that moved with [`Flags::MOTION`].
+    /// Flags pixels that moved in a mean of the frames: with [`Flags::INTERFERENCE`] where that flag is there already, else
+    /// with [`Flags::MOTION`].
+    ///
+    /// These two flags go from tested pixels that did not move, unless more than half of the frames have them: what the
+    /// samples of a single frame contradict each other by does not reach its value, and noise alone does so in some frame
+    /// if there are enough.
     pub fn flag(&self, flags: &mut Raster<Flags>) {
-        for (flags, moved) in flags.as_mut_slice().iter_mut().zip(self.moved.as_slice()) {
-            if *moved {
-                flags.insert(Flags::MOTION);
-            }
+        let tests = self.moved.as_slice().iter().zip(&self.samples);
+        for (flags, (moved, samples)) in flags.as_mut_slice().iter_mut().zip(tests) {
+            let Some(samples) = samples else { continue };
+            let reason = if flags.contains(Flags::INTERFERENCE) { Flags::INTERFERENCE } else { Flags::MOTION };
+            flags.remove(OF_SAMPLES);
+            flags.insert(*samples);
+            flags.set(reason, *moved || samples.contains(reason));
         }
     }
 }
 
 /// Tests complex images in units of their sigma: each pixel by `Σ |z − mean|² / σ²`, which is χ² with `2 (n − 1)` degrees
-/// of freedom for each frequency, and each frame by the phase and the amplitude that all pixels have in common.
+/// of freedom for each frequency; from three frames on also by the frame that deviates most, which is χ² with 2 degrees of
+/// freedom for each frequency, n times; and each frame by the phase and the amplitude that all pixels have in common.
 ///
-/// Pixels without a value or a sigma in two frames are not tested.
+/// The first test is for what moves all the time, the second for what comes and goes again: of many frames a single one
+/// adds less to the sum than chance does. Each of the two has half of `moved_probability`, whatever the number of frames. A
+/// single frame that moves the mean by less than half of its standard deviation does no harm and is let pass.
+///
+/// Pixels without a value or a sigma in two frames are not tested. Saturated values do not count where there are others.
 pub fn check_rest(frames: &[ComplexFrame], options: &RestOptions) -> Result<Rest> {
     require_alike(frames)?;
     let Some(first) = frames.first() else { return Err(Error::NoFrames { what: "test of rest" }) };
-    let size = [first.width(), first.height()];
-    check(size, frames.len(), options, ["phase", "amplitude"], |pixel, test| {
+    let flags = MeanFlags::of(frames.iter().map(|frame| &frame.flags).collect());
+    check(&flags, frames.len(), options, ["phase", "amplitude"], |pixel, test| {
         for index in 0..first.channels.len() {
-            let value = |frame: &ComplexFrame| {
+            let values = frames.iter().map(|frame| {
                 let channel = &frame.channels[index];
                 let parts = [channel.real.as_slice()[pixel], channel.imaginary.as_slice()[pixel]];
                 (parts.map(f64::from), f64::from(channel.sigma.as_slice()[pixel]))
-            };
-            let values: Vec<([f64; 2], f64)> = frames.iter().map(value).collect();
-            test.add(&values, 2, |mean| mean);
+            });
+            test.add(values, |frame| flags.counts(pixel, frame), 2, |mean| mean);
         }
     })
 }
 
-/// Tests range frames in the same way, with `n − 1` degrees of freedom.
+/// Tests range frames in the same way, with `n − 1` degrees of freedom, and one for a single frame.
 pub fn check_rest_of_ranges(frames: &[RangeFrame], options: &RestOptions) -> Result<Rest> {
     let Some(first) = frames.first() else { return Err(Error::NoFrames { what: "test of rest" }) };
     for (index, frame) in frames.iter().enumerate() {
@@ -121,56 +144,21 @@ pub fn check_rest_of_ranges(frames: &[RangeFrame], options: &RestOptions) -> Res
             return Err(Error::Inconsistent { index, what: "the size" });
         }
     }
-    check([first.width(), first.height()], frames.len(), options, ["range", "amplitude"], |pixel, test| {
-        let value = |frame: &RangeFrame| {
+    let flags = MeanFlags::of(frames.iter().map(|frame| &frame.flags).collect());
+    check(&flags, frames.len(), options, ["range", "amplitude"], |pixel, test| {
+        let values = frames.iter().map(|frame| {
             let range = f64::from(frame.range.as_slice()[pixel]);
             ([0.0, range], f64::from(frame.sigma.as_slice()[pixel]))
-        };
-        let values: Vec<([f64; 2], f64)> = frames.iter().map(value).collect();
+        });
         // What ranges have in common is counted in metre, not relative to them.
-        test.add(&values, 1, |_| [1.0, 0.0]);
+        test.add(values, |frame| flags.counts(pixel, frame), 1, |_| [1.0, 0.0]);
     })
-}
-
-/// One pixel's part in the tests.
-struct PixelTest {
-    square: f64,
-    degrees: usize,
-    /// Weighted deviation of each frame along the value (amplitude) and across it (phase).
-    common: Vec<[f64; 2]>,
-    weight: f64,
-}
-
-impl PixelTest {
-    /// Adds a value of `parts` parts that count; `along` gives the direction of the amplitude from the mean.
-    fn add(&mut self, values: &[([f64; 2], f64)], parts: usize, along: impl Fn([f64; 2]) -> [f64; 2]) {
-        let known = |value: &&([f64; 2], f64)| value.0.iter().all(|part| part.is_finite()) && value.1 > 0.0;
-        let count = values.iter().filter(known).count();
-        if count < 2 {
-            return;
-        }
-        let total = |of: fn(&([f64; 2], f64)) -> f64| values.iter().filter(known).map(of).sum::<f64>() / count as f64;
-        let (mean, variance) = ([total(|v| v.0[0]), total(|v| v.0[1])], total(|v| v.1 * v.1));
-        let [re, im] = along(mean);
-        for value in values.iter().filter(known) {
-            self.square += ((value.0[0] - mean[0]).powi(2) + (value.0[1] - mean[1]).powi(2)) / variance;
-        }
-        self.degrees += parts * (count - 1);
-        if count < values.len() {
-            return;
-        }
-        for (common, value) in self.common.iter_mut().zip(values) {
-            let [x, y] = [value.0[0] - mean[0], value.0[1] - mean[1]];
-            common[0] += (x * re + y * im) / variance;
-            common[1] += (y * re - x * im) / variance;
-        }
-        self.weight += (re * re + im * im) / variance;
-    }
 }
 
 /// Sums over some pixels.
 struct Part {
     moved: Vec<bool>,
+    samples: Vec<Option<Flags>>,
     tested: usize,
     common: Vec<[f64; 2]>,
     weight: f64,
@@ -178,7 +166,7 @@ struct Part {
 }
 
 fn check(
-    [width, height]: [usize; 2],
+    flags: &MeanFlags<'_>,
     frames: usize,
     options: &RestOptions,
     names: [&'static str; 2],
@@ -192,20 +180,23 @@ fn check(
             expected: "a test of rest needs at least two frames",
         });
     }
+    let (width, height) = (flags.most.width(), flags.most.height());
     let limits = Limits::new(options.moved_probability);
     let sum = |start: usize| {
         let end = (width * height).min(start + PIXELS_PER_TASK);
-        let nothing = || vec![[0.0; 2]; frames];
-        let mut part = Part { moved: vec![false; end - start], tested: 0, common: nothing(), weight: 0.0, weighted: 0 };
+        let (moved, samples) = (vec![false; end - start], vec![None; end - start]);
+        let mut part = Part { moved, samples, tested: 0, common: vec![[0.0; 2]; frames], weight: 0.0, weighted: 0 };
         let mut known = limits.clone();
+        let mut test = PixelTest::new(frames);
         for pixel in start..end {
-            let mut test = PixelTest { square: 0.0, degrees: 0, common: nothing(), weight: 0.0 };
+            test.clear();
             add(pixel, &mut test);
             if test.degrees == 0 {
                 continue;
             }
             part.tested += 1;
-            part.moved[pixel - start] = test.square > known.of(test.degrees);
+            part.samples[pixel - start] = Some(flags.most.as_slice()[pixel] & OF_SAMPLES);
+            part.moved[pixel - start] = known.are_exceeded(&test);
             if part.moved[pixel - start] || test.weight <= 0.0 {
                 continue;
             }
@@ -219,10 +210,11 @@ fn check(
     };
     let starts: Vec<usize> = (0..width * height).step_by(PIXELS_PER_TASK).collect();
     let parts: Vec<Part> = starts.into_par_iter().map(sum).collect();
-    let mut moved = Vec::with_capacity(width * height);
+    let (mut moved, mut samples) = (Vec::with_capacity(width * height), Vec::with_capacity(width * height));
     let (mut tested, mut weight, mut weighted, mut common) = (0, 0.0, 0, vec![[0.0; 2]; frames]);
     for part in parts {
         moved.extend(part.moved);
+        samples.extend(part.samples);
         tested += part.tested;
         weight += part.weight;
         weighted += part.weighted;
@@ -239,6 +231,7 @@ fn check(
         frames: deviations,
         deviation_sigma: ((1.0 - 1.0 / frames as f64) / weight).sqrt(),
         verdict: RestVerdict::SigmaUnknown,
+        samples,
     };
     // Of a pixel in one frame, in the unit of the deviations.
     let pixel_sigma = (weighted as f64 / weight).sqrt();
@@ -291,7 +284,8 @@ impl RestOptions {
 #[derive(Clone)]
 struct Limits {
     probability: f64,
-    known: Vec<(usize, f64)>,
+    /// Degrees of freedom and values of a pixel, with the limits of their sum and of the largest.
+    known: Vec<([usize; 2], [f64; 2])>,
 }
 
 impl Limits {
@@ -299,12 +293,24 @@ impl Limits {
         Self { probability, known: Vec::new() }
     }
 
-    fn of(&mut self, degrees: usize) -> f64 {
-        if let Some((_, limit)) = self.known.iter().find(|(known, _)| *known == degrees) {
-            return *limit;
+    fn are_exceeded(&mut self, test: &PixelTest) -> bool {
+        let [sum, largest] = self.of(test.degrees, test.values);
+        test.square > sum || test.largest() > largest
+    }
+
+    fn of(&mut self, degrees: usize, values: usize) -> [f64; 2] {
+        if let Some((_, limits)) = self.known.iter().find(|(known, _)| *known == [degrees, values]) {
+            return *limits;
         }
-        let limit = chi_squared_upper_quantile(degrees as f64, self.probability);
-        self.known.push((degrees, limit));
-        limit
+        let limits = if values < 3 {
+            // Two values deviate from their mean alike.
+            [chi_squared_upper_quantile(degrees as f64, self.probability), f64::INFINITY]
+        } else {
+            let (half, count) = (self.probability / 2.0, values as f64);
+            let largest = chi_squared_upper_quantile(degrees as f64 / (count - 1.0), half / count);
+            [chi_squared_upper_quantile(degrees as f64, half), largest.max(LEAST_BIAS * LEAST_BIAS * count)]
+        };
+        self.known.push(([degrees, values], limits));
+        limits
     }
 }

@@ -7,6 +7,7 @@ mod demodulation;
 mod fusion;
 mod harmonics;
 mod interference;
+mod mean_flags;
 mod noise;
 mod real_capture;
 mod rest;

@@ -118,10 +118,10 @@ fn one_pixel(re: f32, im: f32, sigma: f32, flags: Flags) -> ComplexFrame {
 fn the_mean_is_one_of_complex_numbers() {
     // Phases 0.1 and 2 pi - 0.1: their mean as numbers would be pi.
     let (sin, cos) = 0.1_f32.sin_cos();
-    let frames = [one_pixel(cos, sin, 1.0, Flags::empty()), one_pixel(cos, -sin, 1.0, Flags::SATURATED)];
+    let frames = [one_pixel(cos, sin, 1.0, Flags::empty()), one_pixel(cos, -sin, 1.0, Flags::MOTION)];
     let mean = average(&frames).unwrap();
     assert!(mean.channels[0].phase()[(0, 0)] < 1e-6);
-    assert_eq!(mean.flags[(0, 0)], Flags::SATURATED);
+    assert_eq!(mean.flags[(0, 0)], Flags::MOTION);
     assert!((mean.channels[0].sigma[(0, 0)] - 0.5_f32.sqrt()).abs() < 1e-6);
 }
 
@@ -204,8 +204,8 @@ fn range_frames_are_averaged_over_their_values() {
     let frames = [
         range_frame(2.0, f32::NAN, 10.0, Flags::empty()),
         gap.clone(),
-        range_frame(2.2, f32::NAN, f32::NAN, Flags::MIXED_PIXEL),
-        range_frame(2.4, f32::NAN, 20.0, Flags::empty()),
+        range_frame(2.2, f32::NAN, f32::NAN, Flags::MIXED_PIXEL | Flags::OUTSIDE_SPAN),
+        range_frame(2.4, f32::NAN, 20.0, Flags::MIXED_PIXEL),
     ];
     let mean = average_ranges(&frames).unwrap();
     assert!((mean.range[(0, 0)] - 2.2).abs() < 1e-6);

@@ -77,12 +77,12 @@ fn reason(flag: Flags, stage: &Stage, view: &View, pixel: [usize; 2], state: &Pi
             )
         }
         (Flags::INTERFERENCE, Stage::Average(options)) => by_false_alarms(
-            "it beats from frame to frame as all lit pixels do, or the samples of one frame contradict each other: \
+            "it beats from frame to frame as all lit pixels do, or the samples of most frames contradict each other: \
              another camera in the same band, or flickering light",
             Some(options.interference.false_alarm_probability),
         ),
         (Flags::MOTION, Stage::Average(options)) => by_false_alarms(
-            "its values differ from frame to frame, or the samples of one frame contradict each other: something moved",
+            "its values differ from frame to frame, or the samples of most frames contradict each other: something moved",
             Some(options.rest.moved_probability),
         ),
         (Flags::MULTIPATH, Stage::Multipath(options)) => {
@@ -103,7 +103,15 @@ fn reason(flag: Flags, stage: &Stage, view: &View, pixel: [usize; 2], state: &Pi
             ("it is saturated in all exposures: there is no range".to_owned(), None)
         }
         (_, Stage::FuseExposures(_)) => ("an exposure that went into the mean carries it".to_owned(), None),
-        (_, Stage::Average(_)) => ("a frame that went into the mean carries it".to_owned(), None),
+        (Flags::LOW_AMPLITUDE, Stage::Average(_)) => (
+            "the amplitude of the mean is below the threshold of single frames over the root of their number"
+                .to_owned(),
+            None,
+        ),
+        (Flags::SATURATED, Stage::Average(_)) => {
+            ("so many frames are saturated here that the mean of the others may be off".to_owned(), None)
+        }
+        (_, Stage::Average(_)) => ("more than half of the frames that went into the mean carry it".to_owned(), None),
         (Flags::NO_DATA, Stage::CorrectRange(_)) => ("it sees the camera's optical reference".to_owned(), None),
         (Flags::NO_DATA, _) => ("there is no range here".to_owned(), None),
         (Flags::SATURATED, _) => ("a raw sample reached the largest value of the sensor".to_owned(), None),

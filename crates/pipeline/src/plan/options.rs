@@ -11,7 +11,8 @@ use super::Stage;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct DemodulateOptions {
-    /// Amplitude below which a pixel is flagged, in the samples' unit.
+    /// Amplitude below which the phase of a single frame is too noisy, in the samples' unit; pixels below it are flagged. A
+    /// mean of n frames is held to the same noise of the phase, which it has at `1 / √n` of this amplitude.
     pub low_amplitude: Option<f64>,
     /// Noise of one sample where no calibration states it.
     pub noise: Option<NoiseOptions>,
@@ -167,7 +168,8 @@ pub struct PointCloudOptions {
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct FlagOptions {
-    /// Amplitude below which a pixel is flagged, in the camera's unit.
+    /// Amplitude below which a pixel is flagged, in the camera's unit, whatever the number of frames: for what noise is not
+    /// the reason of. For noise, use `maximum_sigma_m`.
     pub low_amplitude: Option<f64>,
     /// Standard deviation of the range above which a pixel is flagged as of low amplitude, metre.
     pub maximum_sigma_m: Option<f64>,

@@ -19,7 +19,7 @@ pub(super) fn run(work: &mut Work, options: &AverageOptions, progress: &dyn Prog
     let count = groups.len();
     let mut findings = Findings::new();
     for (index, group) in groups.into_iter().enumerate() {
-        let (view, tests) = mean(group, options)?;
+        let (view, tests) = mean(group, options, work.low_amplitude)?;
         work.outcome.views.push(view);
         record(&mut findings, &tests);
         progress.advance(index + 1);
@@ -69,7 +69,7 @@ fn record(findings: &mut Findings, tests: &Tests) {
 }
 
 /// The mean of a station's views, with the tests for rest and interference where there are several.
-fn mean(group: Vec<View>, options: &AverageOptions) -> Result<(View, Tests)> {
+fn mean(group: Vec<View>, options: &AverageOptions, low_amplitude: Option<f64>) -> Result<(View, Tests)> {
     let name = format!("station {}", group[0].station);
     let frames: Vec<usize> = group.iter().flat_map(|view| view.frames.iter().copied()).collect();
     let (mut complex, mut ranges) = (Vec::new(), Vec::new());
@@ -86,7 +86,13 @@ fn mean(group: Vec<View>, options: &AverageOptions) -> Result<(View, Tests)> {
     }
     let several = frames.len() > 1;
     let averaged = if ranges.is_empty() {
-        mean_of_phases(&complex, options, several).map(|(mean, tests)| (ViewData::Phase(mean), tests))
+        let mean = mean_of_phases(&complex, options, several);
+        mean.map(|(mut mean, tests)| {
+            if let Some(limit) = low_amplitude {
+                mean.flag_low_amplitude(limit / (complex.len() as f64).sqrt());
+            }
+            (ViewData::Phase(mean), tests)
+        })
     } else {
         mean_of_ranges(&ranges, options, several).map(|(mean, tests)| (ViewData::Range(mean), tests))
     };

@@ -14,6 +14,7 @@ use crate::{Error, Result};
 pub(super) fn run(work: &mut Work, options: &DemodulateOptions, progress: &dyn Progress) -> Result<Findings> {
     let (consistency, interference) = (options.consistency.clone(), options.interference);
     let options = demodulation_options(work, options);
+    work.low_amplitude = options.low_amplitude;
     // What breaks a rule cannot be told without a measure.
     let consistency = consistency.filter(|check| options.noise.is_known() || check.tolerance > 0.0);
     let demodulator = Demodulator::new(&options).map_err(Error::stage("Demodulate", "options"))?;

@@ -1,0 +1,85 @@
+//! Which flags are false.
+//!
+//! A pixel is **wrong** where
+//! - its range errs by more than four of its stated standard deviations and 5 mm (what curved surfaces, edges of paint and
+//!   the calibration leave; the same floor as that of the tests for mixed pixels), which every wrong wrap does, or has no
+//!   value;
+//! - or its footprint covers several surfaces (a ray leaves that of its centre by 20 mm, which is four times the
+//!   floor of the test for mixed pixels), whatever its range;
+//! - or its light is less than the plan asks for: the amplitude without noise is below the plan's threshold, which is
+//!   √n times lower for a mean of n frames;
+//! - or its expected highest sample reaches the camera's last value but for three standard deviations.
+//!
+//! The first of these is measured at the end of all stages; the other three are what flags have to say even where chance
+//! brought the range near the truth. A flag on any other pixel is **false**.
+
+use pipeline::{Outcome, Plan, Silent, ViewData, process};
+use range_image::Flags;
+
+use super::Failure;
+use super::rooms::{Capture, LOW_AMPLITUDE};
+
+const SIGMAS: f64 = 4.0;
+const FLOOR_M: f64 = 0.005;
+
+/// Numbers of pixels.
+#[derive(Default)]
+pub struct Counts {
+    pub pixels: usize,
+    pub wrong: usize,
+    pub flagged: usize,
+    /// Flagged and right.
+    pub false_flags: usize,
+    /// The same for each of [`Flags::NAMED`].
+    pub of_flag: [usize; Flags::NAMED.len()],
+    /// Ranges wrong, by the first reason, and not flagged.
+    pub missed: usize,
+    pub error_median_m: f64,
+}
+
+impl Counts {
+    pub fn share(&self, count: usize) -> f64 {
+        count as f64 / self.pixels.max(1) as f64
+    }
+
+    /// The largest share of false flags that is allowed: twice that of wrong pixels and 2 % of all.
+    pub fn bar(&self) -> f64 {
+        2.0 * self.share(self.wrong) + 0.02
+    }
+}
+
+/// Processes the first `frames` frames of each station and counts; stages of these names are left out.
+pub fn count(capture: &Capture, frames: usize) -> Result<Counts, Failure> {
+    let plan = Plan::from_ron(&format!("(name: \"flags\", stages: [{}])", capture.stages), "flags.ron".as_ref())?;
+    let outcome = process(&plan, &capture.survey(frames)?, None, &Silent)?;
+    Ok(judge(capture, &outcome, frames))
+}
+
+fn judge(capture: &Capture, outcome: &Outcome, frames: usize) -> Counts {
+    let mut counts = Counts::default();
+    let mut errors = Vec::new();
+    let low = LOW_AMPLITUDE / (frames as f64).sqrt();
+    for (view, truth) in outcome.views.iter().zip(&capture.truth) {
+        let ViewData::Range(frame) = &view.data else { continue };
+        for (pixel, flags) in frame.flags.as_slice().iter().enumerate() {
+            let error = f64::from(frame.range.as_slice()[pixel] - truth.range[pixel]).abs();
+            let allowed = SIGMAS * f64::from(frame.sigma.as_slice()[pixel]) + FLOOR_M;
+            let range_wrong = !(error <= allowed);
+            let wrong = range_wrong || truth.mixed[pixel] || truth.amplitude[pixel] < low || truth.cut_off[pixel];
+            let flagged = !flags.is_empty();
+            counts.pixels += 1;
+            counts.wrong += usize::from(wrong);
+            counts.flagged += usize::from(flagged);
+            counts.false_flags += usize::from(flagged && !wrong);
+            counts.missed += usize::from(range_wrong && !flagged);
+            for (count, (flag, _)) in counts.of_flag.iter_mut().zip(Flags::NAMED) {
+                *count += usize::from(flags.contains(flag) && !wrong);
+            }
+            errors.push(error);
+        }
+    }
+    errors.retain(|error| error.is_finite());
+    errors.sort_by(f64::total_cmp);
+    counts.error_median_m = errors.get(errors.len() / 2).copied().unwrap_or(f64::NAN);
+    counts
+}

@@ -1,0 +1,92 @@
+//! How many pixels are flagged though they are right, in a room of the simulator and in a second room that has nothing in
+//! common with it, in three lights and with 1 to 1,000 frames.
+//!
+//! `cargo xtask verify flags`; with the argument `tuning` on the stations and seeds that constants were chosen on, else on
+//! others. Fails where false flags are more than twice the wrong pixels and 2 % of all, or become more with more frames.
+#![allow(clippy::print_stdout)]
+
+mod caster;
+mod judge;
+mod rooms;
+
+use std::path::Path;
+
+use judge::{Counts, count};
+use range_image::Flags;
+use rooms::{Amount, Capture};
+
+type Failure = Box<dyn std::error::Error>;
+
+/// Frames of a station.
+const FRAMES: [usize; 5] = [1, 4, 16, 64, 1000];
+
+/// Median amplitudes: dim, usual, bright; samples have noise of 4 units and more.
+const LIGHTS: [f64; 3] = [27.0, 100.0, 400.0];
+
+/// More frames may raise the share of false flags by so much, which is chance and edges that come out of the noise.
+const RISE: f64 = 0.002;
+
+type Take = fn(&Path, usize, Amount) -> Result<Capture, Failure>;
+
+const ROOMS: [(&str, Take); 4] = [
+    ("simulated", rooms::simulated),
+    ("attic", |folder, first, amount| rooms::cast(folder, first, &[30e6], amount)),
+    ("attic, 80 and 60 MHz", |folder, first, amount| rooms::cast(folder, first, &[80e6, 60e6], amount)),
+    ("attic, 20 MHz", |folder, first, amount| rooms::cast(folder, first, &[20e6], amount)),
+];
+
+fn main() -> Result<(), Failure> {
+    let words: Vec<String> = std::env::args().skip(1).collect();
+    let tuning = words.iter().any(|word| word == "tuning");
+    let only = words.iter().find_map(|word| word.strip_prefix("room="));
+    let most = words.iter().find_map(|word| word.strip_prefix("frames=")?.parse().ok()).unwrap_or(usize::MAX);
+    let (first, seed) = if tuning { (0, 1) } else { (3, 1001) };
+    println!("{} stations and seeds; percent of all pixels", if tuning { "the tuning" } else { "other" });
+    let mut broken = Vec::new();
+    for (name, take) in ROOMS.iter().filter(|(name, _)| only.is_none_or(|only| only == *name)) {
+        for amplitude in LIGHTS {
+            println!("\n{name}, median amplitude {amplitude}\n{}", heading());
+            let mut least = f64::INFINITY;
+            for frames in FRAMES.into_iter().filter(|frames| *frames <= most) {
+                // A thousand frames of one station are plenty.
+                let stations = if frames > 64 { 1 } else { 3 };
+                let folder = tempfile::tempdir()?;
+                let capture = take(folder.path(), first, Amount { stations, frames, seed, amplitude })?;
+                let counts = count(&capture, frames)?;
+                println!("{}", line(frames, &counts));
+                let share = counts.share(counts.false_flags);
+                let place = format!("{name}, median amplitude {amplitude}, {frames} frames: {:.2} %", 100.0 * share);
+                if share > counts.bar() {
+                    broken.push(format!("{place} false flags, {:.2} % are allowed", 100.0 * counts.bar()));
+                }
+                if share > least + RISE {
+                    broken.push(format!("{place} false flags, {:.2} % with fewer frames", 100.0 * least));
+                }
+                least = least.min(share);
+            }
+        }
+    }
+    if broken.is_empty() { Ok(()) } else { Err(broken.join("\n").into()) }
+}
+
+fn heading() -> String {
+    let names: String = Flags::NAMED.iter().map(|(_, name)| format!("{:>14}", name)).collect();
+    format!(
+        "{:>6} {:>9} {:>8} {:>7} {:>7} {:>7} {:>7} |{names}",
+        "frames", "error mm", "flagged", "wrong", "false", "bar", "missed"
+    )
+}
+
+fn line(frames: usize, counts: &Counts) -> String {
+    let percent = |count: usize| 100.0 * counts.share(count);
+    let of_flag: String = counts.of_flag.iter().map(|count| format!("{:14.2}", percent(*count))).collect();
+    format!(
+        "{frames:6} {:9.1} {:8.2} {:7.2} {:7.2} {:7.2} {:7.2} |{of_flag}",
+        1e3 * counts.error_median_m,
+        percent(counts.flagged),
+        percent(counts.wrong),
+        percent(counts.false_flags),
+        100.0 * counts.bar(),
+        percent(counts.missed),
+    )
+}

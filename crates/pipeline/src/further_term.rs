@@ -3,14 +3,13 @@
 use std::path::Path;
 
 use error_models::ModelSet;
-use range_io::atomic::{OutputFolder, write_text};
+use range_io::atomic::{Destination, write_text};
 use range_io::calibration::{Calibration, Provenance};
 use range_io::survey::Survey;
-use serde::Serialize;
 
+use crate::Result;
 use crate::compatible::{Purpose, compatible};
 use crate::load::{read_calibration, root_of};
-use crate::{Error, Result};
 
 /// The calibration that a term is added to, in words too: the one named, the one beside the survey, or else one of
 /// which nothing but the nominal camera is known.
@@ -46,35 +45,14 @@ pub(crate) fn provenance_with(
     Provenance { method: format!("{}; {method}", known.method), ..known.clone() }
 }
 
-/// What is left of a survey that does not determine the term.
-#[derive(Debug, Serialize)]
-struct Refusal {
-    survey: String,
-    refused: String,
-}
-
-/// Writes a `summary.json` with the reason and nothing else, and gives the error that says so.
-pub(crate) fn refuse(
-    survey: &Path,
-    out: &Path,
-    source: impl std::error::Error + Send + Sync + 'static,
-) -> Result<Error> {
-    let text = json(&Refusal { survey: survey.display().to_string(), refused: source.to_string() })?;
-    let folder = OutputFolder::create(out)?;
-    write_text(folder.file("summary.json")?, &text)?;
-    folder.commit()?;
-    Ok(Error::Refused { summary: text, source: source.into() })
-}
-
-/// The text of a `summary.json`.
-pub(crate) fn json(summary: &impl Serialize) -> Result<String> {
-    serde_json::to_string_pretty(summary)
-        .map_err(|error| Error::Figure { figure: "summary.json".to_owned(), message: error.to_string() })
-}
-
-/// Writes calibration, summary and report into an output folder.
-pub(crate) fn write(out: &Path, calibration: Option<&Calibration>, summary: &str, report: &str) -> Result<()> {
-    let folder = OutputFolder::create(out)?;
+/// Writes calibration, summary and report.
+pub(crate) fn write(
+    destination: &Destination,
+    calibration: Option<&Calibration>,
+    summary: &str,
+    report: &str,
+) -> Result<()> {
+    let folder = destination.open()?;
     write_text(folder.file("summary.json")?, summary)?;
     if let Some(calibration) = calibration {
         calibration.write(folder.file(Calibration::FILE_NAME)?)?;

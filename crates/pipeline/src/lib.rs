@@ -4,6 +4,7 @@ mod calibrate;
 mod compare;
 mod compatible;
 mod correction_record;
+mod destination;
 mod diff;
 mod drift;
 mod error;
@@ -49,6 +50,7 @@ pub use compare::{
     compare,
 };
 pub use correction_record::CorrectionRecord;
+pub use destination::RefusalFile;
 pub use diff::{
     CalibrationDifference, CorrectionLine, DiffRequest, DriftLine, DriftPlace, ImageLine, JointLine, ParameterLine,
     PatternLine, PlaceLine, diff,
@@ -63,7 +65,7 @@ pub use network_scene::{
     FieldSpec, NetworkScene, PassiveSpec, SceneStation, SceneTarget, SightingSpec, simulate_network,
 };
 pub use noise::{NoiseBin, NoiseParameter, NoiseRequest, NoiseStation, NoiseSummary, SigmaBinSummary, estimate_noise};
-pub use outcome::{AdjustmentFigures, FurtherPoint, Outcome, StationPose};
+pub use outcome::{AdjustmentFigures, FurtherPoint, Outcome, RefusedStage, StationPose};
 pub use plan::{
     AdjustOptions, AverageOptions, CorrectImagePointOptions, CorrectRangeOptions, DeconvolveOptions, DemodulateOptions,
     FlagOptions, FuseExposuresOptions, MixedPixels, MultipathOptions, MultipathTreatment, NetworkCalibration,
@@ -75,6 +77,7 @@ pub use register::{
     RegisterMethod, RegisterRequest, RegisterSummary, RegisteredLoop, RegisteredPair, RegisteredPlacement,
     RegisteredStation, register,
 };
+pub use results::OwnCloud;
 pub use run::{RunRequest, process, run};
 pub use scattering::{
     CandidateGaussians, ScatteringCapture, ScatteringParameter, ScatteringRequest, ScatteringSummary,

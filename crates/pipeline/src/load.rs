@@ -101,6 +101,7 @@ pub(crate) fn open(
         refused: Vec::new(),
         adjustment: None,
         stages: Vec::new(),
+        refusal: None,
         doubts,
         stated: poses.clone(),
         vertical_axis,

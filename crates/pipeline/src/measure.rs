@@ -13,11 +13,12 @@ use crate::outcome::{Outcome, usable};
 use crate::plan::{Plan, Stage};
 use crate::plausibility;
 use crate::register::describe::wrong_place;
+use crate::results::own_clouds;
 use crate::statistics::{median, robust_standard_deviation};
 use crate::summary::{PairSummary, ReferenceSummary, RegistrationSummary, StationTruth, Summary, TruthSummary};
 use crate::trends;
 use crate::truth::{RangeTruth, evaluate, wrap};
-use crate::verdict::Doubt;
+use crate::verdict::{Doubt, DoubtKind};
 use crate::view::{Snapshot, View, ViewData};
 
 /// Median absolute change of the ranges between two moments, metre, modulo the ambiguity interval.
@@ -68,6 +69,8 @@ pub(crate) fn summarise(plan: &Plan, survey: &Path, outcome: &Outcome) -> Summar
         reference: reference(&outcome.views),
         truth: truth(outcome),
         remaining: trends::remaining(outcome),
+        refusal: outcome.refusal.clone(),
+        own_clouds: own_clouds(outcome),
         doubts: doubts(outcome),
         seconds: 0.0,
         out: String::new(),
@@ -121,7 +124,12 @@ fn registration(outcome: &Outcome) -> Option<RegistrationSummary> {
             &outcome.poses[pair.source].world_from_camera,
         ),
     });
-    let sigmas = outcome.poses.iter().filter_map(crate::outcome::StationPose::position_sigma_m);
+    // Poses of stations that were not brought together after all are nobody's.
+    let sigmas = outcome
+        .poses
+        .iter()
+        .filter(|_| outcome.refusal.is_none())
+        .filter_map(crate::outcome::StationPose::position_sigma_m);
     Some(RegistrationSummary {
         pairs: pairs.collect(),
         refused: outcome.refused.iter().map(|pair| refusal(outcome, pair)).collect(),
@@ -133,9 +141,20 @@ fn registration(outcome: &Outcome) -> Option<RegistrationSummary> {
 
 /// What speaks against survey and result.
 fn doubts(outcome: &Outcome) -> Vec<Doubt> {
-    let mut doubts = outcome.doubts.clone();
+    let mut doubts: Vec<Doubt> = outcome
+        .refusal
+        .iter()
+        .map(|refusal| {
+            let words =
+                format!("{}; each cloud is in the frame of its own camera, and no poses are written", refusal.reason);
+            Doubt::about(DoubtKind::Refused, refusal.stage, words)
+        })
+        .collect();
+    doubts.extend(outcome.doubts.iter().cloned());
     doubts.extend(plausibility::of_outcome(outcome));
-    doubts.extend(outcome.adjustment.iter().flat_map(|figures| wrong_places(outcome, &figures.placements)));
+    if outcome.refusal.is_none() {
+        doubts.extend(outcome.adjustment.iter().flat_map(|figures| wrong_places(outcome, &figures.placements)));
+    }
     doubts
 }
 
@@ -205,7 +224,7 @@ fn truth(outcome: &Outcome) -> Option<TruthSummary> {
 
 /// Errors of a station's position in metre and attitude in degree.
 fn pose_errors(outcome: &Outcome, index: usize) -> Option<[f64; 2]> {
-    let estimated = outcome.poses.get(index)?.world_from_camera;
+    let estimated = outcome.poses.get(index).filter(|_| outcome.refusal.is_none())?.world_from_camera;
     let truth = outcome.views[index].truth.as_ref()?.world_from_camera?;
     let position = (estimated.translation.vector - truth.translation.vector).norm();
     Some([position, estimated.rotation.angle_to(&truth.rotation).to_degrees()])

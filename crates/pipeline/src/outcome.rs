@@ -5,6 +5,7 @@ use icp_registration::{PairAlignment, Placements, RefusedPair};
 use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, Vector3};
 use range_io::survey::Survey;
 use range_io::tables::Station;
+use serde::Serialize;
 
 use crate::summary::StageSummary;
 use crate::verdict::Doubt;
@@ -35,12 +36,23 @@ pub struct Outcome {
     pub adjustment: Option<AdjustmentFigures>,
     /// What each stage did.
     pub stages: Vec<StageSummary>,
+    /// The stage of registration that the data refused, behind which none ran.
+    pub refusal: Option<RefusedStage>,
     /// What speaks against survey and result so far.
     pub doubts: Vec<Doubt>,
     /// What `stations.csv` says of the stations.
     pub stated: Vec<Station>,
     /// Index of the world's axis that points up: z where poses came with the survey, y in a camera's own frame.
     pub vertical_axis: usize,
+}
+
+/// Why the stations are not in one frame.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct RefusedStage {
+    /// The stage.
+    pub stage: &'static str,
+    /// What the data show against it, and what would help.
+    pub reason: String,
 }
 
 /// A point that belongs to no single pixel of an organised cloud.
@@ -74,6 +86,26 @@ pub struct AdjustmentFigures {
     pub redundancy: i64,
     /// Whether the stations lie where what they see agrees with what the others see.
     pub placements: Placements,
+}
+
+impl Outcome {
+    /// Poses of all views in one frame: estimated, or as the survey has them, or the frame of the camera where it has
+    /// one station alone. `None` where they are not known: registration was refused, or was needed and did not run.
+    pub fn common_poses(&self) -> Option<Vec<StationPose>> {
+        if self.refusal.is_some() {
+            return None;
+        }
+        if self.poses.len() == self.views.len() {
+            return Some(self.poses.clone());
+        }
+        let one_station = self.views.windows(2).all(|pair| pair[0].station == pair[1].station);
+        let known = |view: &View| {
+            let stated = view.approximate_world_from_camera;
+            let own = one_station.then(Isometry3::identity);
+            Some(StationPose { world_from_camera: stated.or(own)?, covariance: None })
+        };
+        self.views.iter().map(known).collect()
+    }
 }
 
 impl StationPose {

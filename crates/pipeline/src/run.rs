@@ -4,20 +4,23 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use error_models::ModelSet;
+use range_io::atomic::Destination;
 use range_io::calibration::Calibration;
-use range_io::survey::Survey;
 use self_calibration::{CalibrationOptions, TermSelection};
 
 use crate::calibrate::{CalibrateMethod, CalibrateRequest, OffsetModel, TableDefaults, calibrate};
+use crate::destination::{Inputs, produce};
 use crate::drift::DriftTreatment;
 use crate::load::{load, read_calibration, root_of};
-use crate::network_scene::simulate_network;
-use crate::outcome::Outcome;
+use crate::network_scene::{NetworkScene, START, simulate_into};
+use crate::outcome::{Outcome, RefusedStage};
 use crate::plan::{NetworkCalibration, Source};
 use crate::progress::Progress;
 use crate::summary::{StageSummary, Summary};
+use crate::verdict::Failure;
 use crate::view::Snapshot;
-use crate::{Error, Plan, Result, measure, plausibility, results, simulate, stages};
+use crate::work::Work;
+use crate::{Error, Plan, Result, Stage, measure, plausibility, results, simulate, stages};
 
 /// What to run on what.
 #[derive(Debug, Clone)]
@@ -34,31 +37,95 @@ pub struct RunRequest {
     pub out: PathBuf,
 }
 
+impl RunRequest {
+    /// The folder that paths in the pipeline's file are relative to.
+    fn base(&self) -> &Path {
+        self.plan_path.parent().unwrap_or(Path::new(""))
+    }
+
+    /// Everything that is there before the run and that it reads.
+    fn inputs(&self) -> Inputs {
+        let mut inputs = Inputs::default().path(&self.plan_path).maybe(self.calibration.as_deref());
+        inputs = match (&self.survey, &self.plan.source) {
+            (Some(folder), _) => inputs.survey(folder),
+            (None, Some(Source::Survey { folder })) => inputs.survey(&self.base().join(folder)),
+            (None, Some(Source::Simulate(source))) => inputs.path(self.base().join(&source.scene)),
+            (None, None) => inputs,
+        };
+        match &self.plan.calibrate {
+            Some(network) if self.calibration.is_none() => inputs.path(self.base().join(&network.network)),
+            _ => inputs,
+        }
+    }
+
+    /// Folders beside the output that the run writes before it, each with what it may not lie over.
+    fn check_folders_beside(&self, inputs: &Inputs) -> Result<()> {
+        let simulates = self.survey.is_none() && matches!(self.plan.source, Some(Source::Simulate(_)));
+        let calibrates = self.calibration.is_none() && self.plan.calibrate.is_some();
+        let endings = [(SURVEY, simulates), (NETWORK, calibrates), (CALIBRATION, calibrates)];
+        endings
+            .into_iter()
+            .filter(|(_, is_written)| *is_written)
+            .try_for_each(|(ending, _)| inputs.destination(&beside(&self.out, ending)).map(drop))
+    }
+}
+
 /// Runs a pipeline and writes its results into the request's output folder.
+///
+/// Where `Register` or `Adjust` is refused by what the data show, the results of the stages before it are written, each
+/// station's cloud in its own frame; the summary has the [refusal](Summary::refusal) and is
+/// [`Verdict::Partial`](crate::Verdict::Partial).
+///
+/// # Errors
+/// Where the data refuse an earlier stage, [`Error::Refused`]; then the reason is written, beside an older result where
+/// there is one. Every other error leaves what was there.
 pub fn run(request: &RunRequest, progress: &dyn Progress) -> Result<Summary> {
+    let inputs = request.inputs();
+    inputs.destination(&request.out)?;
+    request.check_folders_beside(&inputs)?;
+    produce(&request.out, &inputs, |destination| run_into(destination, request, progress))
+}
+
+fn run_into(destination: &Destination, request: &RunRequest, progress: &dyn Progress) -> Result<Summary> {
     let start = Instant::now();
     let survey = find_survey(request, progress)?;
     let calibration = match (&request.calibration, &request.plan.calibrate) {
         (None, Some(network)) => Some(estimate_calibration(request, network, &survey, progress)?),
         (named, _) => named.clone(),
     };
-    let outcome = process(&request.plan, &survey, calibration.as_deref(), progress)?;
+    let calibration = read_calibration(&root_of(&survey), calibration.as_deref())?;
+    let mut work = load(&survey, calibration, &request.plan, None, progress)?;
+    for stage in &request.plan.stages {
+        match apply(stage, &mut work, progress) {
+            // The stations stand, if not in one frame.
+            Err(error) if is_registration(stage) && error.failure() == Failure::Refused => {
+                work.outcome.refusal = Some(RefusedStage { stage: stage.name(), reason: error.to_string() });
+                break;
+            }
+            done => done?,
+        }
+    }
+    let outcome = work.outcome;
     let mut summary = measure::summarise(&request.plan, &survey, &outcome);
     summary.out = request.out.display().to_string();
     summary.seconds = start.elapsed().as_secs_f64();
-    results::write(&request.out, &outcome, &summary, progress)?;
+    results::write(destination, &outcome, &summary, progress)?;
     progress.finish();
     Ok(summary)
 }
 
+fn is_registration(stage: &Stage) -> bool {
+    matches!(stage, Stage::Register(_) | Stage::Adjust(_))
+}
+
 /// The survey's folder; simulated first where the plan says so.
 fn find_survey(request: &RunRequest, progress: &dyn Progress) -> Result<PathBuf> {
-    let base = request.plan_path.parent().unwrap_or(Path::new(""));
+    let base = request.base();
     match (&request.survey, &request.plan.source) {
         (Some(folder), _) => Ok(folder.clone()),
         (None, Some(Source::Survey { folder })) => Ok(base.join(folder)),
         (None, Some(Source::Simulate(source))) => {
-            let folder = beside(&request.out, "-survey");
+            let folder = beside(&request.out, SURVEY);
             simulate::simulate(source, base, &folder, progress)?;
             Ok(folder)
         }
@@ -68,6 +135,11 @@ fn find_survey(request: &RunRequest, progress: &dyn Progress) -> Result<PathBuf>
         }),
     }
 }
+
+/// Endings of the folders beside the output folder: what is simulated, and what is calibrated from it.
+const SURVEY: &str = "-survey";
+const NETWORK: &str = "-network";
+const CALIBRATION: &str = "-calibration";
 
 /// A folder beside the output folder, named after it.
 fn beside(out: &Path, ending: &str) -> PathBuf {
@@ -84,17 +156,17 @@ fn estimate_calibration(
     survey: &Path,
     progress: &dyn Progress,
 ) -> Result<PathBuf> {
-    let base = request.plan_path.parent().unwrap_or(Path::new(""));
-    let (folder, out) = (beside(&request.out, "-network"), beside(&request.out, "-calibration"));
-    simulate_network(&base.join(&network.network), None, &folder)?;
-    let start = folder.join("start.ron");
-    nominal_start(&folder, survey)?.write(&start)?;
+    let scene = request.base().join(&network.network);
+    let (folder, out) = (beside(&request.out, NETWORK), beside(&request.out, CALIBRATION));
+    let start = nominal_start(&scene, survey)?;
+    let inputs = Inputs::default().path(&scene).survey(survey);
+    produce(&folder, &inputs, |destination| simulate_into(destination, &scene, None, Some(&start)))?;
     let options = CalibrationOptions { terms: TermSelection::List(network.terms.clone()), ..Default::default() };
     calibrate(
         &CalibrateRequest {
+            calibration: Some(folder.join(START)),
             survey: folder,
             lens_survey: None,
-            calibration: Some(start),
             method: CalibrateMethod::Network(options.method),
             options,
             offset: OffsetModel::Constant,
@@ -108,8 +180,8 @@ fn estimate_calibration(
     Ok(out.join(Calibration::FILE_NAME))
 }
 
-fn nominal_start(network: &Path, survey: &Path) -> Result<Calibration> {
-    let camera = Survey::read(network)?.camera.nominal_camera()?;
+fn nominal_start(scene: &Path, survey: &Path) -> Result<Calibration> {
+    let camera = NetworkScene::read(scene)?.camera.nominal_camera()?;
     let known = Calibration::read(survey)?;
     let mut start = Calibration::from_models(&camera, &ModelSet::default(), known.scattering.as_ref())?;
     (start.noise, start.range_noise, start.fixed_pattern) = (known.noise, known.range_noise, known.fixed_pattern);
@@ -130,22 +202,26 @@ pub(crate) fn process_with(
     progress: &dyn Progress,
 ) -> Result<Outcome> {
     let mut work = load(survey, calibration, plan, None, progress)?;
-    for stage in &plan.stages {
-        progress.begin(stage.name(), work.outcome.views.len());
-        let before: Vec<Option<Snapshot>> = work.outcome.views.iter().map(crate::view::View::snapshot).collect();
-        let start = Instant::now();
-        plausibility::before(stage, &mut work.outcome);
-        let findings = stages::apply(stage, &mut work, progress)?;
-        plausibility::after(stage, &mut work)?;
-        let seconds = start.elapsed().as_secs_f64();
-        let record = StageSummary {
-            name: stage.name(),
-            seconds,
-            findings,
-            change_median_m: measure::median_change(&before, &work.outcome.views),
-            truth: measure::evaluate_all(&work.outcome.views),
-        };
-        work.outcome.stages.push(record);
-    }
+    plan.stages.iter().try_for_each(|stage| apply(stage, &mut work, progress))?;
     Ok(work.outcome)
+}
+
+/// Applies one stage and records what it did.
+fn apply(stage: &Stage, work: &mut Work, progress: &dyn Progress) -> Result<()> {
+    progress.begin(stage.name(), work.outcome.views.len());
+    let before: Vec<Option<Snapshot>> = work.outcome.views.iter().map(crate::view::View::snapshot).collect();
+    let start = Instant::now();
+    plausibility::before(stage, &mut work.outcome);
+    let findings = stages::apply(stage, work, progress)?;
+    plausibility::after(stage, work)?;
+    let seconds = start.elapsed().as_secs_f64();
+    let record = StageSummary {
+        name: stage.name(),
+        seconds,
+        findings,
+        change_median_m: measure::median_change(&before, &work.outcome.views),
+        truth: measure::evaluate_all(&work.outcome.views),
+    };
+    work.outcome.stages.push(record);
+    Ok(())
 }

@@ -9,7 +9,7 @@ use nalgebra::Isometry3;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
 use range_image::Modulation;
-use range_io::atomic::OutputFolder;
+use range_io::atomic::{Destination, OutputFolder};
 use range_io::calibration::{CalibratedDrift, Calibration, Provenance};
 use range_io::survey::{
     FrameEntry, InputFrame, Level, ReferencePath, Survey, SurveyCamera, TruthFiles, TruthFrame, write_frame,
@@ -19,6 +19,7 @@ use range_io::tables::{Station, write_stations};
 use serde::Serialize;
 use simulation::{GrossErrorsSpec, SimulationSpec, Simulator};
 
+use crate::destination::{Inputs, produce};
 use crate::plan::SimulateSource;
 use crate::progress::Progress;
 use crate::{Error, Result};
@@ -46,15 +47,25 @@ impl fmt::Display for Simulated {
 /// `source` says, as a surveyor's sketch would be. Its `calibration.ron` is the true one.
 pub fn simulate(source: &SimulateSource, base: &Path, out: &Path, progress: &dyn Progress) -> Result<Simulated> {
     let path = base.join(&source.scene);
-    let text = std::fs::read_to_string(&path).map_err(|error| Error::Access { path: path.clone(), source: error })?;
-    let fail = |error| Error::Scene { path: path.clone(), source: error };
+    let inputs = Inputs::default().path(&path);
+    produce(out, &inputs, |destination| simulate_into(destination, source, &path, progress))
+}
+
+fn simulate_into(
+    destination: &Destination,
+    source: &SimulateSource,
+    path: &Path,
+    progress: &dyn Progress,
+) -> Result<Simulated> {
+    let text = std::fs::read_to_string(path).map_err(|error| Error::Access { path: path.to_owned(), source: error })?;
+    let fail = |error| Error::Scene { path: path.to_owned(), source: error };
     let mut spec = SimulationSpec::from_ron(&text).map_err(fail)?;
     if source.gross_error_share > 0.0 {
         spec.errors.gross_errors = Some(GrossErrorsSpec { share: source.gross_error_share, seed: source.seed });
     }
     let simulator = Simulator::new(&spec).map_err(fail)?;
-    let folder = OutputFolder::create(out)?;
-    let frames = write_frames(&simulator, source.seed, &folder, &path, progress)?;
+    let folder = destination.open()?;
+    let frames = write_frames(&simulator, source.seed, &folder, path, progress)?;
     write_tables(&spec, source, &folder)?;
     let calibration = true_calibration(&spec, &simulator, &source.scene)?;
     for file in ["calibration.ron", "truth/calibration.ron"] {
@@ -64,7 +75,7 @@ pub fn simulate(source: &SimulateSource, base: &Path, out: &Path, progress: &dyn
     survey.write(folder.file(Survey::FILE_NAME)?)?;
     folder.commit()?;
     progress.finish();
-    Ok(Simulated { folder: out.to_owned(), stations: spec.stations.len(), frames: survey.frames.len() })
+    Ok(Simulated { folder: destination.named().to_owned(), stations: spec.stations.len(), frames: survey.frames.len() })
 }
 
 /// Renders and writes station by station, so that memory does not grow with their number.

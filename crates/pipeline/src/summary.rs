@@ -6,9 +6,11 @@ use std::fmt;
 use serde::Serialize;
 
 use crate::drift::ViewDrift;
+use crate::outcome::RefusedStage;
+use crate::results::OwnCloud;
 use crate::trends::RemainingErrors;
 use crate::truth::RangeTruth;
-use crate::verdict::{Doubt, Judged};
+use crate::verdict::{Doubt, Judged, Verdict};
 
 /// What a run did and how good the result is.
 #[derive(Debug, Clone, Serialize)]
@@ -48,6 +50,12 @@ pub struct Summary {
     pub truth: Option<TruthSummary>,
     /// Whether what is left of the errors of the ranges is random.
     pub remaining: RemainingErrors,
+    /// The stage that the data refused, behind which none ran; what stands without it was written.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub refusal: Option<RefusedStage>,
+    /// Clouds in the frames of their own cameras, where there is no common one.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub own_clouds: Vec<OwnCloud>,
     /// What a reader should know before the result is used.
     pub doubts: Vec<Doubt>,
     /// Wall-clock time of the whole run, second.
@@ -144,6 +152,14 @@ impl Judged for Summary {
     fn doubts(&self) -> &[Doubt] {
         &self.doubts
     }
+
+    fn verdict(&self) -> Verdict {
+        match &self.refusal {
+            Some(_) => Verdict::Partial,
+            None if self.doubts.is_empty() => Verdict::Done,
+            None => Verdict::Doubtful,
+        }
+    }
 }
 
 impl fmt::Display for Summary {
@@ -179,7 +195,11 @@ impl fmt::Display for Summary {
         for doubt in &self.doubts {
             writeln!(f, "doubt: {doubt}")?;
         }
-        write!(f, "written to {}: report.html, summary.json, cloud.ply, stations.csv, trajectory.txt", self.out)
+        let clouds = match self.own_clouds.len() {
+            0 => "cloud.ply, stations.csv, trajectory.txt".to_owned(),
+            count => format!("clouds/ ({count} clouds, each in the frame of its own camera; no poses)"),
+        };
+        write!(f, "written to {}: report.html, summary.json, {clouds}", self.out)
     }
 }
 

@@ -6,8 +6,7 @@ use std::fmt;
 use serde::Serialize;
 
 use crate::{
-    CalibrationSummary, Comparison, Explanation, FixedPatternSummary, NoiseSummary, PlanSummary, ScatteringSummary,
-    Simulated, WarmUpSummary,
+    CalibrationSummary, Explanation, FixedPatternSummary, NoiseSummary, PlanSummary, ScatteringSummary, Simulated,
 };
 
 /// How a command that has a result ended. What failed instead is an [`Error`](enum@crate::Error) with its
@@ -60,6 +59,8 @@ pub enum DoubtKind {
     LostFrames,
     /// A drift that is not what it seems.
     Drift,
+    /// A stage that was refused; what stands without it was written.
+    Refused,
     /// A modulation frequency that no camera of this kind has.
     Modulation,
     /// Lengths that are probably not in the unit in which they are read.
@@ -130,11 +131,9 @@ pub trait Judged {
 
 // Results that nothing has been found to speak against yet.
 impl Judged for CalibrationSummary {}
-impl Judged for Comparison {}
 impl Judged for Explanation {}
 impl Judged for FixedPatternSummary {}
 impl Judged for NoiseSummary {}
 impl Judged for PlanSummary {}
 impl Judged for ScatteringSummary {}
 impl Judged for Simulated {}
-impl Judged for WarmUpSummary {}

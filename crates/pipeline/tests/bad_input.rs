@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use crate::common::{fixtures, request};
-use pipeline::{Plan, RunRequest, Silent};
+use pipeline::{Failure, Plan, RunRequest, Silent};
 use range_io::npz::NpzWriter;
 
 const SURVEY: &str = r#"(
@@ -19,7 +19,8 @@ const SURVEY: &str = r#"(
 /// A survey of one frame of 4 x 3 pixels; returns the folder and what a run into `out` says.
 fn attempt(survey: &str, samples: &[f32], shape: &[usize], stages: &str) -> (tempfile::TempDir, Result<(), String>) {
     let folder = tempfile::tempdir().unwrap();
-    let root = folder.path();
+    let root = &folder.path().join("survey");
+    std::fs::create_dir(root).unwrap();
     std::fs::write(root.join("survey.ron"), survey).unwrap();
     let mut writer = NpzWriter::create(root.join("0.npz")).unwrap();
     writer.add("samples", shape, samples).unwrap();
@@ -30,7 +31,8 @@ fn attempt(survey: &str, samples: &[f32], shape: &[usize], stages: &str) -> (tem
 
 fn run_stages(survey: &Path, stages: &str) -> Result<(), String> {
     let plan = Plan::from_ron(&format!("(name: \"x\", stages: [{stages}])"), Path::new("x.ron"));
-    let out = survey.join("out");
+    let folder = survey.parent().unwrap();
+    let out = folder.join("out");
     let request = RunRequest {
         plan: plan.map_err(|error| error.to_string())?,
         plan_path: PathBuf::from("x.ron"),
@@ -38,14 +40,16 @@ fn run_stages(survey: &Path, stages: &str) -> Result<(), String> {
         calibration: None,
         out: out.clone(),
     };
-    let result = pipeline::run(&request, &Silent).map(|_| ()).map_err(|error| error.to_string());
-    if result.is_err() {
-        assert!(!out.exists(), "a failed run leaves no output folder");
-        let stray =
-            std::fs::read_dir(survey).unwrap().flatten().filter(|e| e.file_name().to_string_lossy().contains("out"));
+    let result = pipeline::run(&request, &Silent).map(|_| ());
+    if let Err(error) = &result {
+        let refused = error.failure() == Failure::Refused;
+        assert_eq!(out.exists(), refused, "a run that fails leaves no output folder, and a refusal its reason");
+        assert!(!refused || std::fs::read_dir(&out).unwrap().count() == 2, "summary.json and .complete");
+        let stray = std::fs::read_dir(folder).unwrap().flatten();
+        let stray = stray.filter(|entry| entry.file_name().to_string_lossy().contains("out."));
         assert_eq!(stray.count(), 0, "and nothing half-written beside it");
     }
-    result
+    result.map_err(|error| error.to_string())
 }
 
 fn ramp(count: usize) -> Vec<f32> {
@@ -77,11 +81,11 @@ fn wrong_shapes_name_the_array() {
 fn a_truncated_archive_names_the_file() {
     let (folder, outcome) = attempt(SURVEY, &ramp(48), &[1, 4, 3, 4], "Demodulate()");
     outcome.unwrap();
-    let file = folder.path().join("0.npz");
+    let file = folder.path().join("survey/0.npz");
     let bytes = std::fs::read(&file).unwrap();
     std::fs::write(&file, &bytes[..bytes.len() / 2]).unwrap();
     std::fs::remove_dir_all(folder.path().join("out")).unwrap();
-    assert_says(&run_stages(folder.path(), "Demodulate()"), &["0.npz"]);
+    assert_says(&run_stages(&folder.path().join("survey"), "Demodulate()"), &["0.npz"]);
 }
 
 #[test]
@@ -98,9 +102,9 @@ fn samples_without_any_value_are_refused_and_single_gaps_are_flagged() {
 fn a_missing_file_is_named() {
     let (folder, outcome) = attempt(SURVEY, &ramp(48), &[1, 4, 3, 4], "Demodulate()");
     outcome.unwrap();
-    std::fs::remove_file(folder.path().join("0.npz")).unwrap();
+    std::fs::remove_file(folder.path().join("survey/0.npz")).unwrap();
     std::fs::remove_dir_all(folder.path().join("out")).unwrap();
-    assert_says(&run_stages(folder.path(), "Demodulate()"), &["0.npz"]);
+    assert_says(&run_stages(&folder.path().join("survey"), "Demodulate()"), &["0.npz"]);
 }
 
 #[test]
@@ -133,8 +137,8 @@ fn a_singular_calibration_is_refused_by_name() {
             (name: "c", value: 0.0, sigma: 0.0, unit: "mm", status: Held),
         ],
     )"#;
-    std::fs::write(folder.path().join("calibration.ron"), calibration).unwrap();
-    assert_says(&run_stages(folder.path(), "Demodulate()"), &["calibration.ron", "c"]);
+    std::fs::write(folder.path().join("survey/calibration.ron"), calibration).unwrap();
+    assert_says(&run_stages(&folder.path().join("survey"), "Demodulate()"), &["calibration.ron", "c"]);
 }
 
 #[test]
@@ -160,9 +164,9 @@ fn an_older_result_survives_a_run_that_fails() {
     outcome.unwrap();
     let summary = folder.path().join("out/summary.json");
     let before = std::fs::read(&summary).unwrap();
-    std::fs::write(folder.path().join("0.npz"), b"not an archive").unwrap();
+    std::fs::write(folder.path().join("survey/0.npz"), b"not an archive").unwrap();
     let mut request = request("room_small", &folder.path().join("out"));
-    request.survey = Some(folder.path().to_owned());
+    request.survey = Some(folder.path().join("survey"));
     assert!(pipeline::run(&request, &Silent).is_err());
     assert_eq!(std::fs::read(&summary).unwrap(), before);
 }

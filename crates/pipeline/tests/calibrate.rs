@@ -87,9 +87,15 @@ fn the_committed_survey_is_what_its_network_gives() {
     let again = folder.path().join("target_field");
     pipeline::simulate_network(&fixtures().join("networks/target_field.ron"), None, &again).unwrap();
     let mut size = 0;
-    for file in
-        ["survey.ron", "observations.csv", "stations.csv", "targets.csv", "distances.csv", "truth/calibration.ron"]
-    {
+    for file in [
+        ".complete",
+        "survey.ron",
+        "observations.csv",
+        "stations.csv",
+        "targets.csv",
+        "distances.csv",
+        "truth/calibration.ron",
+    ] {
         let committed = std::fs::read_to_string(target_field().join(file)).unwrap();
         let new = std::fs::read_to_string(again.join(file)).unwrap();
         assert!(committed == new, "{file} is stale: run `cargo xtask fixtures`");

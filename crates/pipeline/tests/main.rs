@@ -17,6 +17,7 @@ mod fixed_pattern;
 mod frame_rate;
 mod metamorphic;
 mod noise;
+mod outputs;
 mod real_captures;
 mod real_periodic;
 mod real_repeats;

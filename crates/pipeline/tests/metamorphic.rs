@@ -121,7 +121,8 @@ fn without_a_slip_there_is_no_doubt() {
 
 #[test]
 fn another_modulation_is_refused_with_both_values_and_absurd_ones_are_named() {
-    let slip = Slip::new(|survey| edit(&survey.join("survey.ron"), "modulation_hz: [30000000.0]", "modulation_hz: [20e6]"));
+    let slip =
+        Slip::new(|survey| edit(&survey.join("survey.ron"), "modulation_hz: [30000000.0]", "modulation_hz: [20e6]"));
     refused(slip.points(), &["20 MHz", "30 MHz", "modulation_hz"]);
     has(&slip.inspected(), DoubtKind::Calibration, Some("calibration.ron"));
 

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use range_image::Raster;
 use range_io::Result;
-use range_io::atomic::OutputFolder;
+use range_io::atomic::Destination;
 use range_io::survey::{InputFrame, Survey, read_frame, write_frame};
 
 fn main() -> Result<()> {
@@ -56,7 +56,7 @@ fn small_survey() -> Result<PathBuf> {
     frames: [(file: "frames/000_0.npz", station: "S00", timestamp_s: 0.0)],
 )"#;
     let target = std::env::temp_dir().join("range-io-describe");
-    let output = OutputFolder::create(&target)?;
+    let output = Destination::new(&target, &[] as &[&Path])?.open()?;
     let depth = Raster::filled(4, 3, 2.0);
     write_frame(output.file("frames/000_0.npz")?, &InputFrame::Depth { depth, amplitude: None, confidence: None })?;
     Survey::parse(Path::new("survey.ron"), TEXT)?.write(output.file(Survey::FILE_NAME)?)?;

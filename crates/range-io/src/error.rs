@@ -92,6 +92,16 @@ pub enum Error {
         /// How that shows.
         reason: String,
     },
+    /// Results are to be written where something lies that they are made from.
+    #[error("{}: cannot be the output folder: it {relation} {}, which is read; name another one", .out.display(), .input.display())]
+    OverInput {
+        /// The output folder as it was named.
+        out: PathBuf,
+        /// How the two meet: `is`, `contains` or `lies in`.
+        relation: &'static str,
+        /// The file or folder that is read.
+        input: PathBuf,
+    },
     /// A file is not of the format that its name or use promises.
     #[error("{}: {reason}", .file.display())]
     Format {

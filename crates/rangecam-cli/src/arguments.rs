@@ -17,7 +17,7 @@ use crate::warm_up_arguments::WarmUpArguments;
 
 /// Raw frames of a range camera in, one corrected and registered cloud out.
 #[derive(Debug, Parser)]
-#[command(name = "rangecam", version, about)]
+#[command(name = "rangecam", version, about, after_help = crate::exit::CODES)]
 pub(crate) struct Arguments {
     /// No progress, no summary: only errors.
     #[arg(long, short, global = true)]

@@ -5,6 +5,16 @@ use std::process::ExitCode;
 
 use pipeline::{Failure, Verdict};
 
+/// What `--help` says of them.
+pub(crate) const CODES: &str = "\
+Exit codes:
+  0  done
+  1  done but doubtful: see the lines `doubt: ...` (of diff: the calibrations differ)
+  2  wrong input or usage: it fails again until one of them is changed
+  3  refused by what the data show; the reason is printed and written
+  4  failure of the machine (disk, memory): worth another try
+  5  done in part: a later step was refused, what stands without it was written";
+
 /// Wrong input or usage, also of arguments that cannot be read.
 pub(crate) const USAGE: u8 = 2;
 

@@ -1,7 +1,5 @@
 //! Where words go: results to standard output, everything else to standard error.
 
-#![allow(clippy::print_stderr)]
-
 use std::error::Error;
 use std::fmt::Display;
 use std::io::{ErrorKind, IsTerminal, Write};
@@ -70,7 +68,8 @@ impl Output {
     /// Why the command failed.
     pub(crate) fn error(&self, error: &dyn Error) {
         let head = if self.colour { "\u{1b}[31merror:\u{1b}[0m" } else { "error:" };
-        eprintln!("{head} {error}");
+        // A reader that has closed standard error wants no more words; the exit code tells.
+        let _ = writeln!(std::io::stderr(), "{head} {error}");
     }
 }
 

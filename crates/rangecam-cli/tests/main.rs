@@ -3,7 +3,9 @@
 
 mod calibrate;
 mod compare;
+mod exit_codes;
 mod explain;
+mod inputs_are_kept;
 mod noise;
 mod register;
 mod warm_up;

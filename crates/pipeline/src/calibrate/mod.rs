@@ -31,6 +31,5 @@ pub use summary::{
 pub(crate) use control::pose_covariance;
 pub(crate) use distances::named_distances;
 pub(crate) use offset::FoundTable;
-pub(crate) use run::{is_refusal, json};
 pub(crate) use start::Start;
 pub(crate) use words::readable;

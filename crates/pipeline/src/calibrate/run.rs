@@ -1,13 +1,11 @@
 //! One calibration: survey in, results out.
 
-use std::path::Path;
 use std::time::Instant;
 
-use range_io::atomic::{OutputFolder, write_text};
+use range_io::atomic::{Destination, write_text};
 use range_io::calibration::Calibration;
 use range_io::tables::{write_residuals, write_stations, write_targets};
 use self_calibration::{CalibrationOptions, CalibrationOutcome, Method};
-use serde::Serialize;
 
 use super::network_check::check;
 use super::network_files::{NetworkFiles, read_network};
@@ -16,6 +14,7 @@ use super::request::{CalibrateMethod, CalibrateRequest};
 use super::start::Start;
 use super::summary::CalibrationSummary;
 use super::{calibration_file, planes, tables};
+use crate::destination::{Inputs, json, produce};
 use crate::drift::DriftTreatment;
 use crate::progress::Progress;
 use crate::{Error, Result, report};
@@ -23,9 +22,20 @@ use crate::{Error, Result, report};
 /// Calibrates a survey and writes the results into the request's output folder.
 ///
 /// # Errors
-/// [`Error::Refused`] where the survey does not determine what was asked for: then the output folder holds a
-/// `summary.json` with the diagnosis and nothing else. Every other error leaves no output.
+/// [`Error::Refused`] where the survey does not determine what was asked for: then the diagnosis is written, beside an
+/// older result where there is one. Every other error leaves what was there.
 pub fn calibrate(request: &CalibrateRequest, progress: &dyn Progress) -> Result<CalibrationSummary> {
+    let surveys = [Some(&request.survey), request.lens_survey.as_ref()].into_iter().flatten();
+    let inputs = surveys.fold(Inputs::default(), |inputs, survey| inputs.survey(survey));
+    let inputs = inputs.maybe(request.calibration.as_deref());
+    produce(&request.out, &inputs, |destination| calibrate_into(destination, request, progress))
+}
+
+fn calibrate_into(
+    destination: &Destination,
+    request: &CalibrateRequest,
+    progress: &dyn Progress,
+) -> Result<CalibrationSummary> {
     let clock = Instant::now();
     let survey = request.survey.display().to_string();
     let (start, outcome) = match request.method {
@@ -39,43 +49,20 @@ pub fn calibrate(request: &CalibrateRequest, progress: &dyn Progress) -> Result<
         summary
     };
     match outcome {
-        Err(source) if !is_refusal(&source) => Err(Error::Calibrate(source)),
         Ok((outcome, table)) => {
             let table = table.as_ref();
             let summary = finish(CalibrationSummary::new(survey, request.method, &start, &outcome, table));
-            write(&request.out, &start, &outcome, table, &summary, progress)?;
+            write(destination, &start, &outcome, table, &summary, progress)?;
             progress.finish();
             Ok(summary)
         }
         Err(source) => {
+            progress.finish();
             let reason = source.to_string();
             let summary = finish(CalibrationSummary::refused(survey, request.method, &start, reason));
-            let text = json(&summary)?;
-            let folder = OutputFolder::create(&request.out)?;
-            write_text(folder.file("summary.json")?, &text)?;
-            folder.commit()?;
-            progress.finish();
-            Err(Error::Refused { summary: text, source: source.into() })
+            Err(Error::not_calibrated(source, &summary)?)
         }
     }
-}
-
-/// Whether the survey is in order but does not determine what was asked for, which is a finding and not a slip.
-pub(crate) fn is_refusal(error: &self_calibration::Error) -> bool {
-    use self_calibration::Error as Cause;
-    matches!(
-        error,
-        Cause::WeakNetwork { .. }
-            | Cause::NotDetermined { .. }
-            | Cause::PlanesNotDetermined { .. }
-            | Cause::NoPlane { .. }
-            | Cause::TooFewDifferences { .. }
-            | Cause::NoHyperbola { .. }
-            | Cause::NotReachable { .. }
-            | Cause::Orientation(_)
-            | Cause::Adjust(_)
-            | Cause::Model(_)
-    )
 }
 
 /// What the adjustment gave, with a table of offsets where one was asked for.
@@ -131,7 +118,7 @@ fn check_station_names(files: &NetworkFiles, options: &CalibrationOptions) -> Re
 }
 
 fn write(
-    out: &Path,
+    destination: &Destination,
     start: &Start,
     outcome: &CalibrationOutcome,
     table: Option<&FoundTable>,
@@ -139,7 +126,7 @@ fn write(
     progress: &dyn Progress,
 ) -> Result<()> {
     progress.begin("write results", 6);
-    let folder = OutputFolder::create(out)?;
+    let folder = destination.open()?;
     let mut calibration = calibration_file::calibration(outcome, start, &summary.survey, summary.method)?;
     if let Some(table) = table {
         // It takes the place of an older one, which was not taken off the ranges.
@@ -158,10 +145,4 @@ fn write(
     write_text(folder.file("report.html")?, &report::render_calibration(outcome, table, summary)?)?;
     progress.advance(6);
     Ok(folder.commit()?)
-}
-
-/// A summary as the text of its file.
-pub(crate) fn json<T: Serialize>(summary: &T) -> Result<String> {
-    serde_json::to_string_pretty(summary)
-        .map_err(|error| Error::Figure { figure: "summary.json".to_owned(), message: error.to_string() })
 }

@@ -12,6 +12,7 @@ use super::signed::Surface;
 use super::{CompareAlignment, CompareRequest};
 use crate::progress::Progress;
 use crate::statistics::quantile;
+use crate::verdict::{Doubt, DoubtKind};
 use crate::{Error, Result};
 
 /// Points that take part in a registration; more add time, hardly anything else.
@@ -96,7 +97,7 @@ pub struct CloudAlignment {
     /// Share of the first cloud that has a partner.
     pub overlap: f64,
     /// Why it cannot be trusted; empty for a sound one.
-    pub doubts: Vec<String>,
+    pub doubts: Vec<Doubt>,
 }
 
 /// Each compared point with its distances, for pictures.
@@ -128,12 +129,12 @@ pub(super) fn compare(
         None
     } else {
         let (motion, alignment) = registered(&ours.cloud, &reference.cloud)
-            .map_err(|error| Error::Compare(format!("{} onto {}: {error}", first.display(), second.display())))?;
+            .map_err(|error| Error::comparison(&format!("{} onto {}", first.display(), second.display()), &error))?;
         ours.cloud = ours.cloud.transformed(&motion);
         Some(alignment)
     };
     progress.advance(2);
-    let wrong = |error: icp_registration::Error| Error::Compare(format!("{}: {error}", second.display()));
+    let wrong = |error: icp_registration::Error| Error::comparison(&second.display().to_string(), &error);
     let tree = NeighbourTree::new(&reference.cloud.points).map_err(wrong)?;
     let nearest = each(&ours.cloud.points, |point| Ok(tree.nearest(point)?.distance_m)).map_err(wrong)?;
     progress.advance(3);
@@ -142,7 +143,7 @@ pub(super) fn compare(
     let points: Vec<Point3<f64>> = kept.iter().map(|&index| ours.cloud.points[index]).collect();
     if points.is_empty() {
         let (first, second) = (first.display(), second.display());
-        return Err(Error::Compare(format!("no point of {first} is within {limit} m of {second}")));
+        return Err(Error::NothingInCommon(format!("no point of {first} is within {limit} m of {second}")));
     }
     let surface = Surface::new(&reference.cloud, &tree, reference.viewpoint);
     let signed_m = each(&points, |point| surface.distance(point)).map_err(wrong)?;
@@ -207,10 +208,11 @@ fn registered(source: &Cloud, target: &Cloud) -> icp_registration::Result<(Isome
     let result = align(source, target, &Isometry3::identity(), &options)?;
     let mut doubts = Vec::new();
     if result.stop == StopReason::MaxIterations {
-        doubts.push("the registration did not settle".to_owned());
+        doubts.push(Doubt::new(DoubtKind::Alignment, "the registration did not settle"));
     }
     if !result.degenerate.is_empty() {
-        doubts.push(format!("{} motions are not determined by the surfaces", result.degenerate.len()));
+        let words = format!("{} motions are not determined by the surfaces", result.degenerate.len());
+        doubts.push(Doubt::new(DoubtKind::Alignment, words));
     }
     let motion = result.target_from_source;
     let alignment = CloudAlignment {

@@ -7,12 +7,14 @@ mod stations;
 mod trajectories;
 mod words;
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use range_io::atomic::OutputFolder;
+use range_io::atomic::{Destination, write_text};
 use serde::Serialize;
 
+use crate::destination::{Inputs, json, produce};
 use crate::progress::Progress;
+use crate::verdict::{Doubt, Judged};
 use crate::{Error, Result, report};
 
 pub use clouds::{CloudAlignment, CloudComparison, DistanceHistogram, PlaneDistances};
@@ -95,6 +97,13 @@ pub struct Comparison {
     pub report: Option<PathBuf>,
 }
 
+impl Judged for Comparison {
+    fn doubts(&self) -> &[Doubt] {
+        let alignment = self.clouds.as_ref().and_then(|clouds| clouds.alignment.as_ref());
+        alignment.map_or(&[], |alignment| &alignment.doubts)
+    }
+}
+
 /// What the page shows beside the figures.
 #[derive(Debug, Default)]
 pub(crate) struct ComparisonPictures {
@@ -105,6 +114,16 @@ pub(crate) struct ComparisonPictures {
 /// Compares two clouds of any format, two trajectories, two `stations.csv` or two output folders.
 pub fn compare(request: &CompareRequest, progress: &dyn Progress) -> Result<Comparison> {
     request.validate()?;
+    let Some(out) = &request.out else { return compare_into(None, request, progress) };
+    let inputs = Inputs::default().path(&request.first).path(&request.second);
+    produce(out, &inputs, |destination| compare_into(Some(destination), request, progress))
+}
+
+fn compare_into(
+    destination: Option<&Destination>,
+    request: &CompareRequest,
+    progress: &dyn Progress,
+) -> Result<Comparison> {
     let (first, second) = (&request.first, &request.second);
     let mut comparison = Comparison {
         first: first.display().to_string(),
@@ -125,22 +144,18 @@ pub fn compare(request: &CompareRequest, progress: &dyn Progress) -> Result<Comp
             }
         }
     }
-    if let Some(out) = &request.out {
-        comparison.report = Some(out.join("report.html"));
-        write(out, &comparison, &pictures)?;
+    if let Some(destination) = destination {
+        comparison.report = Some(destination.named().join("report.html"));
+        write(destination, &comparison, &pictures)?;
     }
     Ok(comparison)
 }
 
-fn write(out: &Path, comparison: &Comparison, pictures: &ComparisonPictures) -> Result<()> {
-    let folder = OutputFolder::create(out)?;
-    let json = serde_json::to_string_pretty(comparison)
-        .map_err(|error| Error::Figure { figure: "comparison.json".to_owned(), message: error.to_string() })?;
-    let files = [("comparison.json", json), ("report.html", report::render_comparison(comparison, pictures)?)];
-    for (name, text) in files {
-        let path = folder.file(name)?;
-        std::fs::write(&path, text).map_err(|source| Error::Access { path, source })?;
-    }
+fn write(destination: &Destination, comparison: &Comparison, pictures: &ComparisonPictures) -> Result<()> {
+    let page = report::render_comparison(comparison, pictures)?;
+    let folder = destination.open()?;
+    write_text(folder.file("comparison.json")?, &json(comparison)?)?;
+    write_text(folder.file("report.html")?, &page)?;
     folder.commit()?;
     Ok(())
 }

@@ -105,7 +105,7 @@ pub(super) fn compare(
     let (ours, truth) = (stamped(first)?, stamped(second)?);
     let wrong = |error: icp_registration::Error| {
         let (first, second) = (first.display(), second.display());
-        Error::Compare(format!("{first} against {second}: {error}"))
+        Error::comparison(&format!("{first} against {second}"), &error)
     };
     let alignments: &[(&str, TrajectoryAlignment)] = match request.alignment {
         CompareAlignment::None => &[("as they stand", TrajectoryAlignment::None)],

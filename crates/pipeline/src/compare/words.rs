@@ -39,7 +39,7 @@ impl CloudComparison {
                 100.0 * alignment.overlap,
                 mm(alignment.rms_m)
             ));
-            lines.extend(alignment.doubts.iter().map(|doubt| format!("  beware: {doubt}")));
+            lines.extend(alignment.doubts.iter().map(|doubt| format!("  doubt: {doubt}")));
         }
         lines.push(format!(
             "  nearest point: median {}, 95 % below {}, rms {}, at most {}",

@@ -5,13 +5,15 @@ mod summary;
 use std::path::PathBuf;
 use std::time::Instant;
 
+use range_io::atomic::Destination;
 use range_io::calibration::Calibration;
 use range_io::survey::{Level, Survey};
 use self_calibration::{PatternEstimate, PatternOptions, PatternVerdict, WallCapture, estimate_fixed_pattern};
 
 pub use summary::{FixedPatternSummary, PatternWall};
 
-use crate::further_term::{json, provenance_with, refuse, start, write};
+use crate::destination::{Inputs, json, produce};
+use crate::further_term::{provenance_with, start, write};
 use crate::plan::{CorrectRangeOptions, DeconvolveOptions, DemodulateOptions, UnwrapOptions};
 use crate::progress::Progress;
 use crate::run::process_with;
@@ -38,9 +40,18 @@ pub struct FixedPatternRequest {
 /// then the old one was none either.
 ///
 /// # Errors
-/// [`Error::Refused`] where the frames show no walls: then the output folder holds a `summary.json` with the reason and
-/// nothing else. Every other error leaves no output.
+/// [`Error::Refused`] where the frames show no walls: then the reason is written, beside an older result where there is
+/// one. Every other error leaves what was there.
 pub fn estimate_pattern(request: &FixedPatternRequest, progress: &dyn Progress) -> Result<FixedPatternSummary> {
+    let inputs = Inputs::default().survey(&request.survey).maybe(request.calibration.as_deref());
+    produce(&request.out, &inputs, |destination| estimate(request, destination, progress))
+}
+
+fn estimate(
+    request: &FixedPatternRequest,
+    destination: &Destination,
+    progress: &dyn Progress,
+) -> Result<FixedPatternSummary> {
     let clock = Instant::now();
     let (mut calibration, words) = start(&request.survey, request.calibration.as_deref())?;
     // What is looked for must not be taken off before.
@@ -56,10 +67,8 @@ pub fn estimate_pattern(request: &FixedPatternRequest, progress: &dyn Progress) 
         };
         walls.push(WallCapture { station: view.station.clone(), frame });
     }
-    let estimate = match estimate_fixed_pattern(&walls, &calibration.camera()?, &request.options) {
-        Ok(estimate) => estimate,
-        Err(reason) => return Err(refuse(&request.survey, &request.out, reason)?),
-    };
+    let estimate = estimate_fixed_pattern(&walls, &calibration.camera()?, &request.options)
+        .map_err(Error::estimation("fixed pattern", &request.survey))?;
     progress.advance(1);
     let mut summary = FixedPatternSummary::new(request, &words, &estimate);
     summary.seconds = clock.elapsed().as_secs_f64();
@@ -67,7 +76,7 @@ pub fn estimate_pattern(request: &FixedPatternRequest, progress: &dyn Progress) 
         add_to(&mut calibration, request, &estimate);
     }
     let page = report::render_fixed_pattern(&summary, &estimate)?;
-    write(&request.out, Some(&calibration), &json(&summary)?, &page)?;
+    write(destination, Some(&calibration), &json(&summary)?, &page)?;
     progress.finish();
     Ok(summary)
 }

@@ -2,12 +2,12 @@
 
 use std::path::PathBuf;
 
-use range_io::atomic::{OutputFolder, write_text};
+use range_io::atomic::{Destination, write_text};
 use self_calibration::PlanOptions;
 
 use super::files::read_plan;
 use super::summary::PlanSummary;
-use crate::calibrate::{is_refusal, json};
+use crate::destination::{Inputs, json, produce};
 use crate::progress::Progress;
 use crate::{Error, Result, report};
 
@@ -27,27 +27,28 @@ pub struct NetworkPlanRequest {
 /// Plans a network and writes `summary.json` and `report.html`.
 ///
 /// # Errors
-/// [`Error::Refused`] where the network does not determine the calibration at all: then the output folder holds a
-/// `summary.json` with the diagnosis and nothing else. Every other error leaves no output.
+/// [`Error::Refused`] where the network does not determine the calibration at all: then the diagnosis is written, beside
+/// an older result where there is one. Every other error leaves what was there.
 pub fn plan_network(request: &NetworkPlanRequest, progress: &dyn Progress) -> Result<PlanSummary> {
+    let inputs = Inputs::default().survey(&request.survey).maybe(request.calibration.as_deref());
+    produce(&request.out, &inputs, |destination| plan_into(destination, request, progress))
+}
+
+fn plan_into(destination: &Destination, request: &NetworkPlanRequest, progress: &dyn Progress) -> Result<PlanSummary> {
     progress.begin("plan network", 2);
     let (network, start) = read_plan(&request.survey, request.calibration.as_deref())?;
     let survey = request.survey.display().to_string();
     let planned = self_calibration::plan(&network, &request.options);
     progress.advance(1);
-    let folder = OutputFolder::create(&request.out)?;
     let outcome = match planned {
         Ok(outcome) => outcome,
-        Err(source) if is_refusal(&source) => {
-            let summary = PlanSummary::refused(survey, start.words, source.to_string(), &request.out);
-            let text = json(&summary)?;
-            write_text(folder.file("summary.json")?, &text)?;
-            folder.commit()?;
+        Err(source) => {
             progress.finish();
-            return Err(Error::Refused { summary: text, source: source.into() });
+            let summary = PlanSummary::refused(survey, start.words, source.to_string(), &request.out);
+            return Err(Error::not_calibrated(source, &summary)?);
         }
-        Err(source) => return Err(Error::Calibrate(source)),
     };
+    let folder = destination.open()?;
     let summary = PlanSummary::new(survey, start.words, &outcome, request);
     write_text(folder.file("summary.json")?, &json(&summary)?)?;
     write_text(folder.file("report.html")?, &report::render_plan(&network, &outcome, &summary)?)?;

@@ -4,4 +4,5 @@ mod simulate;
 mod spec;
 
 pub use simulate::simulate_network;
+pub(crate) use simulate::{START, simulate_into};
 pub use spec::{FieldSpec, NetworkScene, PassiveSpec, SceneStation, SceneTarget, SightingSpec};

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use range_io::atomic::OutputFolder;
+use range_io::atomic::{Destination, OutputFolder};
 use range_io::calibration::{Calibration, Provenance};
 use range_io::survey::{Survey, TruthFiles};
 use range_io::tables::{
@@ -12,7 +12,11 @@ use range_io::tables::{
 use self_calibration::{Network, PassiveCamera, simulate_sightings};
 
 use super::spec::{NetworkScene, distance_rows, survey_of_tables, true_calibration};
+use crate::destination::{Inputs, produce};
 use crate::{Error, Result, Simulated};
+
+/// Start values that a run calibrates its network from.
+pub(crate) const START: &str = "start.ron";
 
 /// Simulates a network's scene into a survey folder `out`, which is complete or not there. A `seed` wins over the
 /// scene's own.
@@ -20,11 +24,21 @@ use crate::{Error, Result, Simulated};
 /// The folder holds `observations.csv`, disturbed start values in `stations.csv` and `targets.csv`, known distances,
 /// the passive camera's folder, and the truth below `truth`.
 pub fn simulate_network(scene: &Path, seed: Option<u64>, out: &Path) -> Result<Simulated> {
+    produce(out, &Inputs::default().path(scene), |destination| simulate_into(destination, scene, seed, None))
+}
+
+/// [`simulate_network`] with a calibration that is written as `start.ron` beside the tables.
+pub(crate) fn simulate_into(
+    destination: &Destination,
+    scene: &Path,
+    seed: Option<u64>,
+    start: Option<&Calibration>,
+) -> Result<Simulated> {
     let spec = NetworkScene::read(scene)?;
     let truth = spec.network(scene)?;
     let observed =
         simulate_sightings(&truth, &spec.sightings.options(seed.unwrap_or(spec.seed))).map_err(Error::Calibrate)?;
-    let folder = OutputFolder::create(out)?;
+    let folder = destination.open()?;
     write_observations(folder.file("observations.csv")?, &observations(&observed))?;
     write_stations(folder.file("stations.csv")?, &stations(&observed))?;
     write_targets(folder.file("targets.csv")?, &targets(&observed))?;
@@ -44,8 +58,11 @@ pub fn simulate_network(scene: &Path, seed: Option<u64>, out: &Path) -> Result<S
     });
     survey.write(folder.file(Survey::FILE_NAME)?)?;
     write_passive(&spec, &observed, scene, &folder)?;
+    if let Some(start) = start {
+        start.write(folder.file(START)?)?;
+    }
     folder.commit()?;
-    Ok(Simulated { folder: out.to_owned(), stations: observed.stations.len(), frames: 0 })
+    Ok(Simulated { folder: destination.named().to_owned(), stations: observed.stations.len(), frames: 0 })
 }
 
 fn provenance(scene: &Path) -> Provenance {

@@ -139,7 +139,7 @@ fn range_frame(view: &View) -> Result<RangeFrame> {
         ViewData::Phase(frame) => {
             let ([_], Some(snapshot)) = (frame.channels.as_slice(), view.snapshot()) else {
                 let message = "noise from phases is estimated for one frequency; give the samples, or one frequency";
-                return Err(Error::stage("noise", &view.name())(message));
+                return Err(Error::unfit("noise", &view.name(), message));
             };
             let (sigma, flags) = (unknown(&frame.flags), frame.flags.clone());
             Ok(RangeFrame { range: snapshot.range, sigma, amplitude: snapshot.amplitude, flags })

@@ -6,14 +6,16 @@ mod summary;
 use std::path::PathBuf;
 use std::time::Instant;
 
+use range_io::atomic::Destination;
 use range_io::calibration::Calibration;
 use self_calibration::NoiseFitOptions;
 
 pub use summary::{NoiseBin, NoiseParameter, NoiseStation, NoiseSummary, SigmaBinSummary};
 
-use crate::further_term::{json, provenance_with, refuse, start, write};
+use crate::destination::{Inputs, json, produce};
+use crate::further_term::{provenance_with, start, write};
 use crate::progress::Progress;
-use crate::{Plan, Result, process, report};
+use crate::{Error, Plan, Result, process, report};
 use estimate::{Estimate, NoiseTerm};
 
 /// What to estimate random errors from.
@@ -33,23 +35,25 @@ pub struct NoiseRequest {
 /// report into the request's output folder.
 ///
 /// # Errors
-/// [`Error::Refused`](crate::Error::Refused) where the frames do not determine it: then the output folder holds a
-/// `summary.json` with the reason and nothing else. Every other error leaves no output.
+/// [`Error::Refused`] where the frames do not determine it: then the reason is written, beside an older result where
+/// there is one. Every other error leaves what was there.
 pub fn estimate_noise(request: &NoiseRequest, progress: &dyn Progress) -> Result<NoiseSummary> {
+    let inputs = Inputs::default().survey(&request.survey).maybe(request.calibration.as_deref());
+    produce(&request.out, &inputs, |destination| estimate(request, destination, progress))
+}
+
+fn estimate(request: &NoiseRequest, destination: &Destination, progress: &dyn Progress) -> Result<NoiseSummary> {
     let clock = Instant::now();
     let (mut calibration, words) = start(&request.survey, request.calibration.as_deref())?;
     let plan = Plan { name: "noise".to_owned(), source: None, calibrate: None, stages: Vec::new() };
     let outcome = process(&plan, &request.survey, request.calibration.as_deref(), progress)?;
     progress.begin("estimate noise", 1);
-    let estimate = match Estimate::new(&outcome, &request.options)? {
-        Ok(estimate) => estimate,
-        Err(reason) => return Err(refuse(&request.survey, &request.out, reason)?),
-    };
+    let estimate = Estimate::new(&outcome, &request.options)?.map_err(Error::estimation("noise", &request.survey))?;
     progress.advance(1);
     let mut summary = NoiseSummary::new(request, &words, &estimate);
     summary.seconds = clock.elapsed().as_secs_f64();
     add_to(&mut calibration, request, &estimate);
-    write(&request.out, Some(&calibration), &json(&summary)?, &report::render_noise(&summary))?;
+    write(destination, Some(&calibration), &json(&summary)?, &report::render_noise(&summary))?;
     progress.finish();
     Ok(summary)
 }

@@ -161,6 +161,7 @@ impl Plan {
         // Stages are written `Flag(low_amplitude: 100)`, without a second pair of parentheses. On the text's own first
         // line, so that the lines of errors stay right.
         let plan: Self = ron_text::parse(path, &format!("#![enable(unwrap_variant_newtypes)]{text}"))?;
+        crate::destination::check_name(path, &plan.name)?;
         plan.check_order()?;
         Ok(plan)
     }

@@ -22,7 +22,7 @@ pub(crate) fn of_outcome(outcome: &Outcome) -> Vec<Doubt> {
             "the result has 0 points: every pixel is flagged or without a range",
         ));
     }
-    if outcome.poses.len() == outcome.views.len() {
+    if outcome.refusal.is_none() && outcome.poses.len() == outcome.views.len() {
         let placed = placed(outcome);
         doubts.extend(uncertain(&placed));
         doubts.extend(displaced(&placed));

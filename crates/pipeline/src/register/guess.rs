@@ -101,5 +101,5 @@ pub(crate) fn matrix(path: &Path) -> Result<Option<Isometry3<f64>>> {
 }
 
 fn wrong(path: &Path, message: &str) -> Error {
-    Error::Register(format!("{}: {message}", path.display()))
+    Error::Request { command: "register", message: format!("{}: {message}", path.display()) }
 }

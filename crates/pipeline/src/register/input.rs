@@ -57,18 +57,18 @@ pub(super) struct Input {
 /// Reads what was named.
 pub(super) fn read(request: &RegisterRequest, progress: &dyn Progress) -> Result<Input> {
     if let Some(missing) = request.inputs.iter().find(|path| !path.exists()) {
-        return Err(Error::Register(format!("{}: there is no such file or folder", missing.display())));
+        return Err(request_error(format!("{}: there is no such file or folder", missing.display())));
     }
     match request.inputs.as_slice() {
-        [] => Err(Error::Register("no input is named: name one survey folder, or two and more clouds".into())),
+        [] => Err(request_error("no input is named: name one survey folder, or two and more clouds".into())),
         [survey] if is_survey(survey) => survey_stations(survey, request, progress),
-        [cloud] => Err(Error::Register(format!(
+        [cloud] => Err(request_error(format!(
             "{} is one cloud: name a second one to be brought onto it, or a survey folder",
             cloud.display()
         ))),
         several => {
             if let Some(survey) = several.iter().find(|path| is_survey(path)) {
-                return Err(Error::Register(format!(
+                return Err(request_error(format!(
                     "{} is a folder among several inputs: name one survey, or clouds only",
                     survey.display()
                 )));
@@ -76,6 +76,10 @@ pub(super) fn read(request: &RegisterRequest, progress: &dyn Progress) -> Result
             cloud_stations(several, progress)
         }
     }
+}
+
+fn request_error(message: String) -> Error {
+    Error::Request { command: "register", message }
 }
 
 /// Whether the path is a folder with `survey.ron`, or that file.
@@ -87,7 +91,7 @@ fn survey_stations(path: &Path, request: &RegisterRequest, progress: &dyn Progre
     let survey = Survey::read(path)?;
     let first = survey.frames.first().map(|frame| &frame.station);
     if survey.frames.iter().all(|frame| Some(&frame.station) == first) {
-        return Err(Error::Register(format!(
+        return Err(request_error(format!(
             "{}: all {} frames belong to one station, whose frames are averaged; at least two stations are needed",
             path.display(),
             survey.frames.len()
@@ -224,7 +228,7 @@ impl Station {
     /// come from.
     pub(crate) fn cloud(&self, normal_half_width_px: usize) -> Result<Cloud> {
         let points = self.usable_points();
-        let fail = |error: icp_registration::Error| Error::Register(format!("{}: {error}", self.name));
+        let fail = |error: icp_registration::Error| Error::registration(&self.name, &error);
         let normals = match (&self.file.normals, self.file.size) {
             (Some(normals), _) => Some(normals.iter().map(|n| Vector3::from(n.map(f64::from))).collect()),
             (None, Some([width, height])) => {

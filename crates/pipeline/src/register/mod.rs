@@ -17,8 +17,10 @@ pub use request::{RegisterMethod, RegisterRequest};
 pub use summary::{RegisterSummary, RegisteredLoop, RegisteredPair, RegisteredPlacement, RegisteredStation};
 
 use nalgebra::Isometry3;
+use range_io::atomic::Destination;
 
 use crate::Result;
+use crate::destination::{Inputs, produce};
 use crate::outcome::StationPose;
 use crate::plausibility;
 use crate::progress::Progress;
@@ -44,6 +46,18 @@ pub(crate) struct Registered {
 
 /// Registers and writes stations, trajectory, cloud, summary and report into the request's output folder.
 pub fn register(request: &RegisterRequest, progress: &dyn Progress) -> Result<RegisterSummary> {
+    let listed = request.inputs.iter().fold(Inputs::default(), |inputs, path| {
+        if input::is_survey(path) { inputs.survey(path) } else { inputs.path(path) }
+    });
+    let inputs = listed.maybe(request.guess.as_deref()).maybe(request.calibration.as_deref());
+    produce(&request.out, &inputs, |destination| register_into(destination, request, progress))
+}
+
+fn register_into(
+    destination: &Destination,
+    request: &RegisterRequest,
+    progress: &dyn Progress,
+) -> Result<RegisterSummary> {
     let clock = Instant::now();
     let mut input = input::read(request, progress)?;
     let start = match &request.guess {
@@ -64,7 +78,7 @@ pub fn register(request: &RegisterRequest, progress: &dyn Progress) -> Result<Re
     summary.inputs = request.inputs.iter().map(|path| path.display().to_string()).collect();
     summary.out = request.out.display().to_string();
     summary.seconds = clock.elapsed().as_secs_f64();
-    results::write(&request.out, &registered, progress)?;
+    results::write(destination, &registered, progress)?;
     progress.finish();
     Ok(registered.summary)
 }

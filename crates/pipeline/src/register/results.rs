@@ -1,6 +1,6 @@
 //! The files of a registration.
 
-use range_io::atomic::{OutputFolder, write_text};
+use range_io::atomic::{Destination, write_text};
 use range_io::clouds::{CloudFile, Precision};
 use range_io::ply::write_cloud;
 use range_io::tables::{Station as StationRow, write_stations};
@@ -8,14 +8,15 @@ use range_io::trajectory::{StampedPose, write_tum};
 
 use super::Registered;
 use super::input::Station;
+use crate::destination::json;
 use crate::progress::Progress;
 use crate::verdict::words_about;
-use crate::{Error, Result, report};
+use crate::{Result, report};
 
-/// Writes everything into a temporary folder beside `out` and renames it when the last file is complete.
-pub(super) fn write(out: &std::path::Path, registered: &Registered, progress: &dyn Progress) -> Result<()> {
+/// Writes everything, which appears when the last file is complete.
+pub(super) fn write(destination: &Destination, registered: &Registered, progress: &dyn Progress) -> Result<()> {
     progress.begin("write results", 5);
-    let folder = OutputFolder::create(out)?;
+    let folder = destination.open()?;
     write_cloud(folder.file("cloud.ply")?, &merged(registered), Precision::Single)?;
     progress.advance(1);
     let known = || registered.stations.iter().zip(&registered.poses);
@@ -38,9 +39,7 @@ pub(super) fn write(out: &std::path::Path, registered: &Registered, progress: &d
         .collect();
     write_tum(folder.file("trajectory.txt")?, &poses)?;
     progress.advance(3);
-    let json = serde_json::to_string_pretty(&registered.summary)
-        .map_err(|error| Error::Figure { figure: "summary.json".to_owned(), message: error.to_string() })?;
-    write_text(folder.file("summary.json")?, &json)?;
+    write_text(folder.file("summary.json")?, &json(&registered.summary)?)?;
     progress.advance(4);
     write_text(folder.file("report.html")?, &report::render_registration(registered)?)?;
     progress.advance(5);

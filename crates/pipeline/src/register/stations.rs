@@ -68,7 +68,7 @@ fn refused(error: &icp_registration::Error, stations: &[Station]) -> Error {
             order.join(", ")
         ));
     }
-    Error::Register(error.to_string())
+    Error::registration("all stations", error)
 }
 
 fn summary(
@@ -166,7 +166,8 @@ fn residuals(result: &StationRegistration, stations: &[Station]) -> Result<Vec<V
         let points = station.usable_points();
         let finite: Vec<usize> = (0..points.len()).filter(|&k| points[k].iter().all(|x| x.is_finite())).collect();
         let asked: Vec<Point3<f64>> = finite.iter().map(|&k| Point3::from(points[k])).collect();
-        let found = result.point_residuals(index, &asked).map_err(|error| Error::Register(error.to_string()))?;
+        let found =
+            result.point_residuals(index, &asked).map_err(|error| Error::registration(&station.name, &error))?;
         let mut residuals = vec![f64::NAN; points.len()];
         for (k, value) in finite.into_iter().zip(found) {
             residuals[k] = value;

@@ -41,7 +41,7 @@ pub(crate) enum Start {
 
 impl Surface {
     pub(crate) fn new(station: &Station, normal_half_width_px: usize) -> Result<Self> {
-        let fail = |error: icp_registration::Error| Error::Register(format!("{}: {error}", station.name));
+        let fail = |error: icp_registration::Error| Error::registration(&station.name, &error);
         let target = IcpTarget::new(station.cloud(normal_half_width_px)?).map_err(fail)?;
         let frame = station.projection.as_ref().and_then(|projection| frame(station, projection));
         // Clouds too small to fill voxels are registered point by point.

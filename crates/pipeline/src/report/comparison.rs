@@ -12,6 +12,7 @@ use crate::compare::{
     TrajectoryComparison, TrajectoryStatistics, millimetres_of as mm,
 };
 use crate::statistics::quantile;
+use crate::verdict::Judged;
 
 /// Points of the curve of shares.
 const CURVE_POINTS: usize = 200;
@@ -22,6 +23,7 @@ const MOST_DRAWN: usize = 2_000_000;
 pub(crate) fn render_comparison(comparison: &Comparison, pictures: &ComparisonPictures) -> Result<String> {
     let lead = format!("{} against {}, which is taken as the reference.", comparison.first, comparison.second);
     let mut page = Page::new("rangecam: comparison", &lead);
+    page.doubts(comparison.doubts());
     if let (Some(clouds), Some(deviations)) = (&comparison.clouds, &pictures.deviations) {
         cloud_section(&mut page, clouds, deviations)?;
     }
@@ -58,7 +60,6 @@ fn cloud_section(page: &mut Page, clouds: &CloudComparison, deviations: &Deviati
             100.0 * alignment.overlap,
             mm(alignment.rms_m)
         ));
-        page.list(&alignment.doubts);
     }
     distance_table(page, clouds);
     page.figures(&deviation_figures(clouds, deviations)?);

@@ -164,8 +164,16 @@ fn registration(page: &mut Page, outcome: &Outcome, summary: &Summary) -> Result
     if outcome.clouds.is_empty() {
         return Ok(());
     }
+    let Some(poses) = outcome.common_poses() else {
+        page.section("The clouds");
+        page.paragraph("The stations are in no common frame: each cloud is in the frame of its own camera (x right, y up, looking along -z).");
+        let rows: Vec<_> =
+            summary.own_clouds.iter().map(|cloud| vec![cloud.view.clone(), cloud.file.clone()]).collect();
+        page.table(&["view", "file"], &rows);
+        pairs(page, summary);
+        return Ok(());
+    };
     page.section("The cloud");
-    let poses = crate::results::poses_or_identity(outcome);
     let clouds: Vec<StationCloud<'_>> = outcome
         .clouds
         .iter()
@@ -183,12 +191,19 @@ fn registration(page: &mut Page, outcome: &Outcome, summary: &Summary) -> Result
         (cloud_figure("From above", &clouds, above)?, note.to_owned()),
         (cloud_figure("From the side", &clouds, side)?, String::new()),
     ]);
-    let Some(registration) = &summary.registration else { return Ok(()) };
-    page.subsection("Stations");
-    page.table(
-        &["station", "x m", "y m", "z m", "sigma of position", "position error", "attitude error"],
-        &station_rows(outcome, summary),
-    );
+    if summary.registration.is_some() {
+        page.subsection("Stations");
+        page.table(
+            &["station", "x m", "y m", "z m", "sigma of position", "position error", "attitude error"],
+            &station_rows(outcome, summary),
+        );
+    }
+    pairs(page, summary);
+    Ok(())
+}
+
+fn pairs(page: &mut Page, summary: &Summary) {
+    let Some(registration) = &summary.registration else { return };
     page.subsection("Pairs");
     let rows: Vec<Vec<String>> = registration
         .pairs
@@ -204,7 +219,6 @@ fn registration(page: &mut Page, outcome: &Outcome, summary: &Summary) -> Result
         })
         .collect();
     page.table(&["pair", "overlap", "rms along the normals", "iterations", "distance of the stations"], &rows);
-    Ok(())
 }
 
 fn station_rows(outcome: &Outcome, summary: &Summary) -> Vec<Vec<String>> {

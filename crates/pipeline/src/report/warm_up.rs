@@ -37,10 +37,8 @@ pub(crate) fn render_warm_up(summary: &WarmUpSummary, series: &Series, estimate:
     );
     let mut page = Page::new("rangecam: warm-up", &lead);
     page.cards(&cards(summary));
-    if !summary.doubts.is_empty() {
-        page.section("Before you use it");
-        page.list(&summary.doubts);
-    }
+    page.list(&summary.notes);
+    page.doubts(&summary.doubts);
     curve_section(&mut page, summary, series, estimate);
     parameter_section(&mut page, summary);
     test_section(&mut page, summary);

@@ -8,13 +8,13 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use error_models::{NamedParameter, ParameterStatus};
-use range_io::atomic::{OutputFolder, write_text};
-use range_io::calibration::Calibration;
+use range_io::atomic::Destination;
 use scattering_deconvolution::{EstimationOptions, estimate_psf};
 
 pub use summary::{CandidateGaussians, ScatteringCapture, ScatteringParameter, ScatteringSummary};
 
-use crate::further_term::provenance_with;
+use crate::destination::{Inputs, json, produce};
+use crate::further_term::{provenance_with, write};
 use crate::progress::Progress;
 use crate::{Error, Result, report};
 use captures::Captures;
@@ -39,9 +39,19 @@ pub struct ScatteringRequest {
 /// Estimates the point spread function and writes calibration, summary and report into the request's output folder.
 ///
 /// # Errors
-/// [`Error::Refused`] where the captures do not determine it: then the output folder holds a `summary.json` with the
-/// verdict and nothing else. Every other error leaves no output.
+/// [`Error::Refused`] where the captures do not determine it: then the verdict is written, beside an older result where
+/// there is one. Every other error leaves what was there.
 pub fn estimate_scattering(request: &ScatteringRequest, progress: &dyn Progress) -> Result<ScatteringSummary> {
+    let surveys = Inputs::default().survey(&request.with_object).survey(&request.without_object);
+    let inputs = surveys.maybe(request.calibration.as_deref());
+    produce(&request.out, &inputs, |destination| estimate(request, destination, progress))
+}
+
+fn estimate(
+    request: &ScatteringRequest,
+    destination: &Destination,
+    progress: &dyn Progress,
+) -> Result<ScatteringSummary> {
     let clock = Instant::now();
     let captures = Captures::read(request, progress)?;
     progress.begin("estimate scattering", 2);
@@ -54,14 +64,10 @@ pub fn estimate_scattering(request: &ScatteringRequest, progress: &dyn Progress)
     let mut summary = ScatteringSummary::new(request, &captures, &estimate, &shifts);
     summary.seconds = clock.elapsed().as_secs_f64();
     progress.advance(2);
-    let text = serde_json::to_string_pretty(&summary)
-        .map_err(|error| Error::Figure { figure: "summary.json".to_owned(), message: error.to_string() })?;
-    let folder = OutputFolder::create(&request.out)?;
-    write_text(folder.file("summary.json")?, &text)?;
+    let text = json(&summary)?;
     let Some(psf) = &estimate.psf else {
-        folder.commit()?;
         progress.finish();
-        return Err(Error::Refused { summary: text, source: estimate.verdict.to_string().into() });
+        return Err(Error::Refused { summary: text, source: estimate.verdict.to_string().into(), written: None });
     };
     let mut calibration = captures.calibration;
     calibration.scattering = Some(psf.clone());
@@ -70,9 +76,7 @@ pub fn estimate_scattering(request: &ScatteringRequest, progress: &dyn Progress)
     let (redundancy, sigma0) = (estimate.redundancy, estimate.sigma0);
     calibration.provenance =
         provenance_with(&calibration.provenance, &request.with_object, &method, redundancy, sigma0);
-    calibration.write(folder.file(Calibration::FILE_NAME)?)?;
-    write_text(folder.file("report.html")?, &report::render_scattering(&summary, &shifts)?)?;
-    folder.commit()?;
+    write(destination, Some(&calibration), &text, &report::render_scattering(&summary, &shifts)?)?;
     progress.finish();
     Ok(summary)
 }

@@ -75,7 +75,7 @@ fn mean(group: Vec<View>, options: &AverageOptions, low_amplitude: Option<f64>) 
     let (mut complex, mut ranges) = (Vec::new(), Vec::new());
     let mut views = group.into_iter();
     let Some(mut first) = views.next() else {
-        return Err(Error::stage("Average", &name)("no frame"));
+        return Err(Error::unfit("Average", &name, "no frame"));
     };
     for data in std::iter::once(first.data).chain(views.map(|view| view.data)) {
         match data {

@@ -77,7 +77,7 @@ fn models_of(set: &ModelSet, view: &View, drifts: bool) -> Result<Vec<Interpolat
         (None, [(_, models)]) => Ok(models.iter().cloned().map(InterpolatedModel::from).collect()),
         (None, _) => {
             let message = "the survey states no integration time, which the calibration's models are chosen by";
-            Err(Error::stage("CorrectRange", &view.name())(message))
+            Err(Error::unfit("CorrectRange", &view.name(), message))
         }
     }
 }
@@ -117,7 +117,7 @@ fn frames_with_models<'a>(
         if view.channels.len() != models.len() {
             let message =
                 format!("{} frequencies, but the calibration has models for {}", view.channels.len(), models.len());
-            return Err(Error::stage("CorrectRange", &name)(message));
+            return Err(Error::unfit("CorrectRange", &name, message));
         }
         return Ok(view.channels.iter_mut().zip(models).collect());
     }
@@ -125,7 +125,7 @@ fn frames_with_models<'a>(
         (ViewData::Range(frame), [model]) => Ok(vec![(frame, model)]),
         (ViewData::Range(_), models) => {
             let message = format!("one range, but the calibration has models for {} frequencies", models.len());
-            Err(Error::stage("CorrectRange", &name)(message))
+            Err(Error::unfit("CorrectRange", &name, message))
         }
         _ => Err(Error::Needs { stage: "CorrectRange", needs: "Unwrap" }),
     }

@@ -52,7 +52,7 @@ fn fuse(group: Vec<View>, options: &FuseExposuresOptions) -> Result<(View, [usiz
     let frames: Vec<usize> = group.iter().flat_map(|view| view.frames.iter().copied()).collect();
     let longest = times.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1)).map(|(index, _)| index);
     let Some(mut view) = longest.and_then(|index| group.into_iter().nth(index)) else {
-        return Err(Error::stage("FuseExposures", &station)("no frame"));
+        return Err(Error::unfit("FuseExposures", &station, "no frame"));
     };
     // The frequencies of one exposure no longer belong to the ranges.
     view.channels.clear();
@@ -65,7 +65,7 @@ fn exposure_times(group: &[View], station: &str) -> Result<Vec<f64>> {
     let times: Option<Vec<f64>> = group.iter().map(|view| view.integration_time_s).collect();
     let Some(times) = times else {
         let message = "the survey states no integration time for some of its frames";
-        return Err(Error::stage("FuseExposures", station)(message));
+        return Err(Error::unfit("FuseExposures", station, message));
     };
     let same = |time: &f64, other: &f64| time.to_bits() == other.to_bits();
     let twice = times.iter().enumerate().find(|(index, time)| times[..*index].iter().any(|other| same(time, other)));
@@ -73,7 +73,7 @@ fn exposure_times(group: &[View], station: &str) -> Result<Vec<f64>> {
         None => Ok(times),
         Some((_, time)) => {
             let message = format!("several frames of {time} s: stage Average makes one of them");
-            Err(Error::stage("FuseExposures", station)(message))
+            Err(Error::unfit("FuseExposures", station, message))
         }
     }
 }

@@ -88,7 +88,7 @@ fn each_onto_the_one_before(stations: &[Station], options: &RegisterOptions) -> 
 /// The error with names for numbers.
 fn refused(error: &icp_registration::Error, stations: &[Station]) -> Error {
     let icp_registration::Error::UnconnectedStations { stations: lost, to, reasons } = error else {
-        return Error::stage("Register", "all stations")(error.to_string());
+        return Error::stage("Register", "all stations")(error.clone());
     };
     let name = |&index: &usize| stations.get(index).map_or_else(|| index.to_string(), |station| station.name.clone());
     let lost: Vec<String> = lost.iter().map(name).collect();

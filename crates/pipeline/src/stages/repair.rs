@@ -41,9 +41,8 @@ pub(super) fn run(work: &mut Work, options: &RepairWrapsOptions, progress: &dyn 
 fn interval(view: &View, options: &RepairWrapsOptions) -> Result<f64> {
     let known = view.modulation.map(|modulation| modulation.ambiguity_interval_m());
     options.interval_m.or(known).ok_or_else(|| {
-        Error::stage("RepairWraps", &view.name())(
-            "the survey states no modulation frequency: name the ambiguity interval with `interval_m`",
-        )
+        let message = "the survey states no modulation frequency: name the ambiguity interval with `interval_m`";
+        Error::unfit("RepairWraps", &view.name(), message)
     })
 }
 

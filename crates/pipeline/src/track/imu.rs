@@ -36,7 +36,8 @@ impl Inertial {
             let path = root.join(file);
             let mounting = matrix(&path)?;
             options.camera_from_body = mounting.ok_or_else(|| {
-                Error::Register(format!("{}: expected the sixteen numbers of a 4 x 4 matrix", path.display()))
+                let message = format!("{}: expected the sixteen numbers of a 4 x 4 matrix", path.display());
+                Error::Request { command: "register", message }
             })?;
         }
         Ok(Some(Self { samples, options, integrator: None }))
@@ -45,9 +46,11 @@ impl Inertial {
     /// The camera's motion since the frame before; `None` at the first frame, up to which the unit must rest.
     pub(super) fn motion(&mut self, timestamp_s: f64) -> Result<Option<MotionPrior>> {
         let refused = |error: icp_registration::Error| {
-            Error::Register(format!(
-                "inertial data at {timestamp_s} s: {error}; without `{DATA}` among its extras the survey is tracked by its frames alone"
-            ))
+            let what = format!(
+                "inertial data at {timestamp_s} s (without `{DATA}` among its extras the survey is tracked by its \
+                 frames alone)"
+            );
+            Error::registration(&what, &error)
         };
         let Some(integrator) = &mut self.integrator else {
             let resting = self.samples.partition_point(|sample| sample.timestamp_s <= timestamp_s);
@@ -64,6 +67,6 @@ impl Inertial {
     pub(super) fn learn(&mut self, pose: &TrackedPose) -> Result<()> {
         let Some(integrator) = &mut self.integrator else { return Ok(()) };
         let learnt = integrator.frame(pose.measured_motion.as_ref());
-        learnt.map_err(|error| Error::Register(format!("inertial data at {} s: {error}", pose.timestamp_s)))
+        learnt.map_err(|error| Error::registration(&format!("inertial data at {} s", pose.timestamp_s), &error))
     }
 }

@@ -1,32 +1,29 @@
 //! The files of a tracked sequence.
 
-use std::path::Path;
-
 use icp_registration::TrackedPose;
-use range_io::atomic::{OutputFolder, write_text};
+use range_io::atomic::{Destination, write_text};
 use range_io::clouds::{CloudFile, Precision};
 use range_io::ply::write_cloud;
 use range_io::tables::{Station, write_stations};
 use range_io::trajectory::{StampedPose, write_tum};
 
 use super::outcome::{Tracked, station_pose};
+use crate::destination::json;
 use crate::progress::Progress;
 use crate::verdict::words_about;
-use crate::{Error, Result, report};
+use crate::{Result, report};
 
-/// Writes everything into a temporary folder beside `out` and renames it when the last file is complete.
-pub(super) fn write(out: &Path, tracked: &Tracked, progress: &dyn Progress) -> Result<()> {
+/// Writes everything, which appears when the last file is complete.
+pub(super) fn write(destination: &Destination, tracked: &Tracked, progress: &dyn Progress) -> Result<()> {
     progress.begin("write results", 4);
-    let folder = OutputFolder::create(out)?;
+    let folder = destination.open()?;
     write_cloud(folder.file("cloud.ply")?, &map(tracked), Precision::Single)?;
     progress.advance(1);
     write_tum(folder.file("trajectory.txt")?, &trajectory(&tracked.poses))?;
     write_tum(folder.file("trajectory_adjusted.txt")?, &trajectory(&tracked.adjusted))?;
     write_stations(folder.file("stations.csv")?, &stations(tracked))?;
     progress.advance(2);
-    let json = serde_json::to_string_pretty(&tracked.summary)
-        .map_err(|error| Error::Figure { figure: "summary.json".to_owned(), message: error.to_string() })?;
-    write_text(folder.file("summary.json")?, &json)?;
+    write_text(folder.file("summary.json")?, &json(&tracked.summary)?)?;
     progress.advance(3);
     write_text(folder.file("report.html")?, &report::render_tracking(tracked)?)?;
     progress.advance(4);

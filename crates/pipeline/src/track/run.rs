@@ -4,13 +4,15 @@ use std::collections::BTreeMap;
 use std::time::Instant;
 
 use icp_registration::{Cloud, TrackedPose, Tracker, TrackerOptions, TrackingState};
+use range_io::atomic::Destination;
 
 use super::frames::FrameSource;
 use super::imu::Inertial;
-use super::outcome::{TrackVerdict, Tracked, TrackedFrame, reason, state, station_pose};
+use super::outcome::{Tracked, TrackedFrame, reason, state, station_pose};
 use super::start::Start;
 use super::summary::{TrackSummary, summarise};
 use super::{TrackRequest, results};
+use crate::destination::{Inputs, produce};
 use crate::load::root_of;
 use crate::plausibility;
 use crate::progress::Progress;
@@ -21,14 +23,24 @@ use crate::{Error, Result};
 
 /// Tracks the frames of a survey and writes path, map, summary and report into the request's output folder.
 ///
+/// Where the camera was lost and not found again until the end, or where most frames have no pose, what was tracked is
+/// written, and the summary is [`Verdict::Partial`](crate::Verdict::Partial).
+///
 /// # Errors
-/// [`Error::Refused`] where the camera was lost and not found again until the end, or where most frames have no pose; the
-/// results are written all the same. Other errors leave no folder behind.
+/// [`Error::Refused`] where no frame can be tracked: then the reason is written, beside an older result where there is
+/// one. Every other error leaves what was there.
 pub fn track(request: &TrackRequest, progress: &dyn Progress) -> Result<TrackSummary> {
+    let inputs = Inputs::default().survey(&request.survey);
+    let inputs = inputs.maybe(request.guess.as_deref()).maybe(request.calibration.as_deref());
+    produce(&request.out, &inputs, |destination| track_into(destination, request, progress))
+}
+
+fn track_into(destination: &Destination, request: &TrackRequest, progress: &dyn Progress) -> Result<TrackSummary> {
     let clock = Instant::now();
     if !is_survey(&request.survey) {
-        let path = request.survey.display();
-        return Err(Error::Register(format!("{path} is no folder of a survey: --track follows the frames of one")));
+        let message =
+            format!("{} is no folder of a survey: --track follows the frames of one", request.survey.display());
+        return Err(Error::Request { command: "register", message });
     }
     let start = Start::read(request.guess.as_deref())?;
     let source = FrameSource::new(&request.survey, request.calibration.as_deref())?;
@@ -48,20 +60,9 @@ pub fn track(request: &TrackRequest, progress: &dyn Progress) -> Result<TrackSum
     summary.survey = request.survey.display().to_string();
     summary.out = request.out.display().to_string();
     summary.seconds = clock.elapsed().as_secs_f64();
-    results::write(&request.out, &tracked, progress)?;
+    results::write(destination, &tracked, progress)?;
     progress.finish();
-    refuse_lost(tracked.summary)
-}
-
-/// A sequence that ends lost is no success, though what was tracked has been written.
-fn refuse_lost(summary: TrackSummary) -> Result<TrackSummary> {
-    if summary.verdict != TrackVerdict::Lost {
-        return Ok(summary);
-    }
-    let words = format!("{}; what was tracked is in {}", summary.loss_in_words(), summary.out);
-    let json = serde_json::to_string_pretty(&summary)
-        .map_err(|error| Error::Figure { figure: "summary.json".to_owned(), message: error.to_string() })?;
-    Err(Error::Refused { summary: json, source: words.into() })
+    Ok(tracked.summary)
 }
 
 /// A sequence on its way.
@@ -102,8 +103,9 @@ impl Run {
         let (station, timestamp_s) = (entry.station.clone(), entry.timestamp_s.unwrap_or_default());
         let read = self.source.read(index)?;
         let tracking = Instant::now();
-        let fail =
-            |error: icp_registration::Error| Error::Register(format!("frame {station} at {timestamp_s} s: {error}"));
+        let fail = |error: icp_registration::Error| {
+            Error::registration(&format!("frame {station} at {timestamp_s} s"), &error)
+        };
         let before = self.tracker.as_ref().map_or(0, Tracker::keyframes);
         let pose = if let Some(tracker) = &mut self.tracker {
             let prior = self.inertial.as_mut().map(|inertial| inertial.motion(timestamp_s)).transpose()?.flatten();

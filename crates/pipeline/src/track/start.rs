@@ -18,7 +18,7 @@ impl Start {
         let Some(path) = guess else { return Ok(Self { guess: None }) };
         let words = path.display().to_string();
         match Guess::read(path)? {
-            Guess::Matrix(_) => Err(Error::Register(format!(
+            Guess::Matrix(_) => Err(request_error(format!(
                 "{words} holds one matrix, which is a guess for two clouds; for tracking name stations.csv or a \
                  trajectory with the pose of the first frame"
             ))),
@@ -38,11 +38,15 @@ impl Start {
     pub(super) fn datum(&self, pose: Option<Isometry3<f64>>, station: &str, timestamp_s: f64) -> Result<String> {
         match (&self.guess, pose) {
             (Some((words, _)), Some(_)) => Ok(format!("frame {station} held at its pose in {words}")),
-            (Some((words, _)), None) => Err(Error::Register(format!(
+            (Some((words, _)), None) => Err(request_error(format!(
                 "{words}: has no pose of frame {station} (time {timestamp_s} s), the first that shows surfaces"
             ))),
             (None, Some(_)) => Ok(format!("frame {station} held at its pose in stations.csv")),
             (None, None) => Ok(format!("the camera's axes at frame {station}: x right, y up, looking along -z")),
         }
     }
+}
+
+fn request_error(message: String) -> Error {
+    Error::Request { command: "register", message }
 }

@@ -9,7 +9,7 @@ use serde::Serialize;
 use super::outcome::{TrackLoss, TrackTruth, TrackVerdict, TrackedFrame};
 use crate::statistics::{median, quantile};
 use crate::summary::millimetres;
-use crate::verdict::{Doubt, DoubtKind, Judged};
+use crate::verdict::{Doubt, DoubtKind, Judged, Verdict};
 
 /// How far the camera was followed, and how well each pose is known.
 #[derive(Debug, Clone, Default, Serialize)]
@@ -203,6 +203,15 @@ impl TrackSummary {
 impl Judged for TrackSummary {
     fn doubts(&self) -> &[Doubt] {
         &self.doubts
+    }
+
+    /// A sequence that ends lost is no success, though what was tracked stands.
+    fn verdict(&self) -> Verdict {
+        match self.verdict {
+            TrackVerdict::Lost => Verdict::Partial,
+            _ if self.doubts.is_empty() => Verdict::Done,
+            _ => Verdict::Doubtful,
+        }
     }
 }
 

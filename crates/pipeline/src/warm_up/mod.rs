@@ -7,12 +7,14 @@ mod summary;
 use std::path::PathBuf;
 use std::time::Instant;
 
+use range_io::atomic::Destination;
 use range_io::calibration::{CalibratedDrift, Calibration, Correlation};
 use self_calibration::{ChangeOptions, DriftEstimate, DriftOptions, estimate_drift, estimate_drift_at_rates};
 
 pub use summary::{WarmUpBlock, WarmUpParameter, WarmUpPhase, WarmUpRateTest, WarmUpSummary, WarmUpTest};
 
-use crate::further_term::{json, provenance_with, refuse, start, write};
+use crate::destination::{Inputs, json, produce};
+use crate::further_term::{provenance_with, start, write};
 use crate::progress::Progress;
 use crate::{Error, Result, report};
 pub(crate) use series::Series;
@@ -55,57 +57,39 @@ pub enum ReferenceUse {
 /// Ranges are taken as the camera gives them: constant errors do not change them.
 ///
 /// # Errors
-/// [`Error::Refused`] where the frames do not determine it: then the output folder holds a `summary.json` with the
-/// reason and nothing else. Every other error leaves no output.
+/// [`Error::Refused`] where the frames do not determine it: then the reason is written, beside an older result where
+/// there is one. Every other error leaves what was there.
 pub fn estimate_warm_up(request: &WarmUpRequest, progress: &dyn Progress) -> Result<WarmUpSummary> {
+    let inputs = Inputs::default().survey(&request.survey).maybe(request.calibration.as_deref());
+    produce(&request.out, &inputs, |destination| estimate(request, destination, progress))
+}
+
+fn estimate(request: &WarmUpRequest, destination: &Destination, progress: &dyn Progress) -> Result<WarmUpSummary> {
     let clock = Instant::now();
     let calibration = match &request.calibration {
         Some(named) => Some(start(&request.survey, Some(named))?),
         None => None,
     };
-    let (series, estimate) = match find(request, progress) {
-        Ok(found) => found,
-        Err(Failure::Refused(reason)) => return Err(refuse(&request.survey, &request.out, reason)?),
-        Err(Failure::Broken(error)) => return Err(error),
-    };
+    let (series, estimate) = find(request, progress)?;
     let calibration = calibration.map(|(known, words)| (with_drift(known, request, &estimate), words));
     let mut summary = WarmUpSummary::new(request, &series, &estimate, calibration.as_ref().map(|(_, words)| words));
     summary.seconds = clock.elapsed().as_secs_f64();
     let page = report::render_warm_up(&summary, &series, &estimate);
-    write(&request.out, calibration.as_ref().map(|(calibration, _)| calibration), &json(&summary)?, &page)?;
+    write(destination, calibration.as_ref().map(|(calibration, _)| calibration), &json(&summary)?, &page)?;
     progress.finish();
     Ok(summary)
 }
 
-fn find(request: &WarmUpRequest, progress: &dyn Progress) -> std::result::Result<(Series, DriftEstimate), Failure> {
+fn find(request: &WarmUpRequest, progress: &dyn Progress) -> Result<(Series, DriftEstimate)> {
     let series = Series::read(request, progress)?;
     progress.begin("fit drift", 1);
     let estimate = match &series.stated_rates {
-        Some(rates) => estimate_drift_at_rates(&series.samples, rates, &request.options)?,
-        None => estimate_drift(&series.samples, &request.options)?,
+        Some(rates) => estimate_drift_at_rates(&series.samples, rates, &request.options),
+        None => estimate_drift(&series.samples, &request.options),
     };
+    let estimate = estimate.map_err(Error::estimation("warm-up", &request.survey))?;
     progress.advance(1);
     Ok((series, estimate))
-}
-
-/// Why there is no drift.
-enum Failure {
-    /// The frames do not determine it.
-    Refused(self_calibration::DriftError),
-    /// They cannot be read.
-    Broken(Error),
-}
-
-impl From<Error> for Failure {
-    fn from(error: Error) -> Self {
-        Self::Broken(error)
-    }
-}
-
-impl From<self_calibration::DriftError> for Failure {
-    fn from(error: self_calibration::DriftError) -> Self {
-        Self::Refused(error)
-    }
 }
 
 /// The drift takes the place of what the calibration said of it; a camera without one gets no term.

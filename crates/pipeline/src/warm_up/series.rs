@@ -6,7 +6,7 @@ use range_io::survey::ReferencePath;
 use self_calibration::{ChangeMeter, ChangeOptions, DriftSample, PixelMeans, RangeChange};
 
 use super::frames::{FRAMES_AT_ONCE, FrameSource};
-use super::{Failure, ReferenceUse, WarmUpRequest};
+use super::{ReferenceUse, WarmUpRequest};
 use crate::progress::Progress;
 use crate::{Error, Result, frame_rates};
 
@@ -25,10 +25,9 @@ pub(crate) struct Series {
     pub(crate) size: [usize; 2],
 }
 
-type Answer<T> = std::result::Result<T, Failure>;
-
 impl Series {
-    pub(super) fn read(request: &WarmUpRequest, progress: &dyn Progress) -> Answer<Self> {
+    pub(super) fn read(request: &WarmUpRequest, progress: &dyn Progress) -> Result<Self> {
+        let refused = Error::estimation("warm-up", &request.survey);
         let mut source = FrameSource::new(&request.survey)?;
         let (power_on_s, power_on) = power_on(request, &source)?;
         let size = [source.survey().camera.width, source.survey().camera.height];
@@ -42,16 +41,16 @@ impl Series {
             meters.push(ChangeOptions { interval_m, least_pixels, ..request.pixels });
         }
         let means = masks.iter().zip(&meters).map(|(mask, options)| PixelMeans::new(mask, options));
-        let mut means: Vec<PixelMeans> = means.collect::<std::result::Result<_, _>>()?;
+        let mut means = means.collect::<std::result::Result<Vec<PixelMeans>, _>>().map_err(&refused)?;
         each_frame(&mut source, "mean of the pixels", progress, |_, frame| {
-            means.iter_mut().try_for_each(|means| means.add(frame)).map_err(Failure::Refused)
+            means.iter_mut().try_for_each(|means| means.add(frame)).map_err(&refused)
         })?;
         let meters = means.into_iter().map(PixelMeans::finish);
-        let mut meters: Vec<ChangeMeter> = meters.collect::<std::result::Result<_, _>>()?;
+        let mut meters = meters.collect::<std::result::Result<Vec<ChangeMeter>, _>>().map_err(&refused)?;
         let mut changes: Vec<RangeChange> = Vec::with_capacity(source.survey().frames.len());
         each_frame(&mut source, "change of range", progress, |_, frame| {
             let own = meters.iter_mut().map(|meter| meter.measure(frame));
-            let own: Vec<RangeChange> = own.collect::<std::result::Result<_, _>>()?;
+            let own = own.collect::<std::result::Result<Vec<RangeChange>, _>>().map_err(&refused)?;
             changes.push(difference(&own));
             Ok(())
         })?;
@@ -62,9 +61,9 @@ impl Series {
             temperature_c: entry.temperature_c,
         };
         let samples = source.survey().frames.iter().zip(&changes).map(sample).collect();
-        let (pixels, moved_share) = (meters[0].pixels(), meters[0].moved_share()?);
+        let (pixels, moved_share) = (meters[0].pixels(), meters[0].moved_share().map_err(&refused)?);
         let stated_rates = frame_rates::stated(source.survey(), power_on_s).transpose();
-        let stated_rates = stated_rates.map_err(self_calibration::DriftError::from)?;
+        let stated_rates = stated_rates.map_err(self_calibration::DriftError::from).map_err(&refused)?;
         Ok(Self { samples, stated_rates, pixels, moved_share, power_on, size })
     }
 }
@@ -128,8 +127,8 @@ fn each_frame(
     source: &mut FrameSource,
     work: &str,
     progress: &dyn Progress,
-    mut act: impl FnMut(usize, &range_image::RangeFrame) -> Answer<()>,
-) -> Answer<()> {
+    mut act: impl FnMut(usize, &range_image::RangeFrame) -> Result<()>,
+) -> Result<()> {
     let count = source.survey().frames.len();
     progress.begin(work, count);
     for start in (0..count).step_by(FRAMES_AT_ONCE) {

@@ -9,6 +9,7 @@ use serde::Serialize;
 
 use super::series::Series;
 use super::{ReferenceUse, WarmUpRequest};
+use crate::verdict::{Doubt, DoubtKind, Judged};
 
 /// A drift and how well it is known.
 #[derive(Debug, Clone, Serialize)]
@@ -62,7 +63,9 @@ pub struct WarmUpSummary {
     /// Blocks less unknowns.
     pub redundancy: i64,
     /// What a reader should know before using the result.
-    pub doubts: Vec<String>,
+    pub doubts: Vec<Doubt>,
+    /// What the figures do not show by themselves, and nothing to doubt.
+    pub notes: Vec<String>,
     /// The block means.
     pub blocks: Vec<WarmUpBlock>,
     /// Wall-clock time, second.
@@ -182,6 +185,7 @@ impl WarmUpSummary {
             sigma0: estimate.sigma0,
             redundancy: estimate.redundancy,
             doubts: doubts(request, estimate),
+            notes: notes(estimate),
             blocks: blocks(estimate),
             seconds: 0.0,
             out: request.out.clone(),
@@ -228,23 +232,28 @@ fn blocks(estimate: &DriftEstimate) -> Vec<WarmUpBlock> {
         .collect()
 }
 
-/// Sentences about what the figures do not show by themselves.
-fn doubts(request: &WarmUpRequest, estimate: &DriftEstimate) -> Vec<String> {
-    let mut doubts = Vec::new();
-    if estimate.model.is_empty() {
-        let sentence =
-            "No drift was found beside the noise: the camera was warm, or drifts less than the blocks scatter.";
-        doubts.push(sentence.to_owned());
-    }
-    if let Some(last) = estimate.tests.last().filter(|last| last.p_value < request.options.level) {
-        doubts.push(format!(
+fn notes(estimate: &DriftEstimate) -> Vec<String> {
+    let nothing = "No drift was found beside the noise: the camera was warm, or drifts less than the blocks scatter.";
+    estimate.model.is_empty().then(|| nothing.to_owned()).into_iter().collect()
+}
+
+fn doubts(request: &WarmUpRequest, estimate: &DriftEstimate) -> Vec<Doubt> {
+    let unexplained = estimate.tests.last().filter(|last| last.p_value < request.options.level);
+    let words = unexplained.map(|last| {
+        format!(
             "The model does not explain everything: one exponential more, of about {:.0} s, is significant \
              (p = {:.1e}) but cannot be told. Look at the residuals.",
             last.time_constant_s.unwrap_or(f64::NAN),
             last.p_value
-        ));
+        )
+    });
+    words.map(|words| Doubt::new(DoubtKind::Drift, words)).into_iter().collect()
+}
+
+impl Judged for WarmUpSummary {
+    fn doubts(&self) -> &[Doubt] {
+        &self.doubts
     }
-    doubts
 }
 
 impl WarmUpTest {
@@ -277,8 +286,11 @@ impl fmt::Display for WarmUpSummary {
             f,
             "sigma0 {sigma0:.2}, redundancy {redundancy}, correlation of neighbouring blocks {correlation:.2}"
         )?;
+        for note in &self.notes {
+            writeln!(f, "{note}")?;
+        }
         for doubt in &self.doubts {
-            writeln!(f, "{doubt}")?;
+            writeln!(f, "doubt: {doubt}")?;
         }
         let calibration = self.calibration.as_ref().map_or("", |_| "calibration.ron, ");
         write!(f, "written to {}: {calibration}summary.json, report.html", self.out.display())

@@ -1,0 +1,218 @@
+//! No command writes where it reads, whatever it is told, and none changes what it reads.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use tempfile::TempDir;
+
+/// A command with all that it reads, and what it is run on.
+struct Case {
+    name: &'static str,
+    /// Arguments but `--out`; paths are relative to the case's folder.
+    line: Vec<&'static str>,
+    /// What is read: `--out` may not be there.
+    inputs: Vec<&'static str>,
+}
+
+fn case(name: &'static str, line: &'static str, inputs: &'static str) -> Case {
+    Case { name, line: line.split(' ').collect(), inputs: inputs.split(' ').collect() }
+}
+
+/// Every command that writes.
+fn cases() -> Vec<Case> {
+    vec![
+        case("run", "run survey -p plan/p.ron -c cal/c.ron", "survey plan/p.ron cal/c.ron"),
+        case("run, source of the pipeline", "run -p plan/source.ron", "survey plan/source.ron"),
+        case("run, scene of the pipeline", "run -p plan/scene.ron", "scenes/room.ron plan/scene.ron"),
+        case(
+            "run, network of the pipeline",
+            "run survey -p plan/network.ron",
+            "survey networks/n.ron plan/network.ron",
+        ),
+        case("simulate", "simulate scenes/room.ron", "scenes/room.ron"),
+        case("simulate-network", "simulate-network networks/n.ron", "networks/n.ron"),
+        case("calibrate", "calibrate targets -c cal/c.ron", "targets cal/c.ron"),
+        case(
+            "calibrate, two surveys",
+            "calibrate targets --method two-step-independent --lens-survey lens",
+            "targets lens",
+        ),
+        case("plan", "plan targets -c cal/c.ron", "targets cal/c.ron"),
+        case("scattering", "scattering survey without -c cal/c.ron", "survey without cal/c.ron"),
+        case("noise", "noise survey -c cal/c.ron", "survey cal/c.ron"),
+        case("fpn", "fpn survey -c cal/c.ron", "survey cal/c.ron"),
+        case("warmup", "warmup survey -c cal/c.ron", "survey cal/c.ron"),
+        case("register", "register survey --guess poses/s.csv -c cal/c.ron", "survey poses/s.csv cal/c.ron"),
+        case("register, clouds", "register one/a.xyz two/b.xyz --multi", "one/a.xyz two/b.xyz"),
+        case("register, track", "register survey --track --guess poses/s.csv", "survey poses/s.csv"),
+        case("compare", "compare one/a.xyz two/b.xyz", "one/a.xyz two/b.xyz"),
+        case("compare, outputs", "compare older newer", "older newer"),
+    ]
+}
+
+/// Commands that write nothing.
+const READERS: [&str; 3] = ["inspect", "explain", "diff"];
+
+fn fixtures() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fixtures")
+}
+
+fn rangecam(folder: &Path, line: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_rangecam")).args(line).current_dir(folder).output().unwrap()
+}
+
+fn copy(from: &Path, to: &Path) {
+    fs::create_dir_all(to).unwrap();
+    for entry in fs::read_dir(from).unwrap().map(Result::unwrap) {
+        let (from, to) = (entry.path(), to.join(entry.file_name()));
+        if from.is_dir() {
+            copy(&from, &to);
+        } else {
+            fs::copy(from, to).unwrap();
+        }
+    }
+}
+
+/// A folder with one of everything. Surveys and results carry the mark of a complete output, as those do that this
+/// program made: it alone would let them be replaced.
+fn world() -> TempDir {
+    let root = tempfile::tempdir().unwrap();
+    let at = |path: &str| root.path().join(path);
+    for folder in ["plan", "cal", "scenes", "networks", "poses", "one", "two"] {
+        fs::create_dir(at(folder)).unwrap();
+    }
+    fs::copy(fixtures().join("scenes/room_small.ron"), at("scenes/room.ron")).unwrap();
+    fs::copy(fixtures().join("networks/target_field.ron"), at("networks/n.ron")).unwrap();
+    for (line, folder) in [("simulate scenes/room.ron", "survey"), ("simulate-network networks/n.ron", "targets")] {
+        let line: Vec<&str> = line.split(' ').chain(["--out", folder, "--quiet"]).collect();
+        let made = rangecam(root.path(), &line);
+        assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
+    }
+    copy(&at("survey"), &at("without"));
+    copy(&at("targets"), &at("lens"));
+    fs::copy(at("survey/calibration.ron"), at("cal/c.ron")).unwrap();
+    fs::copy(at("survey/stations.csv"), at("poses/s.csv")).unwrap();
+    let stages = "stages: [Demodulate(), Average(), Unwrap()]";
+    let network = "calibrate: (network: \"../networks/n.ron\", terms: [\"d0\"])";
+    for (name, more) in [
+        ("p", ""),
+        ("source", "source: Survey(folder: \"../survey\"),"),
+        ("scene", "source: Simulate(scene: \"../scenes/room.ron\", seed: 1),"),
+        ("network", network),
+    ] {
+        let comma = if more.is_empty() || more.ends_with(',') { "" } else { "," };
+        fs::write(at(&format!("plan/{name}.ron")), format!("(name: \"{name}\", {more}{comma} {stages})")).unwrap();
+    }
+    let points: String = (0..400).map(|k| format!("{} {} {}\n", k % 20, k / 20, k % 7)).collect();
+    for cloud in ["one/a.xyz", "two/b.xyz"] {
+        fs::write(at(cloud), &points).unwrap();
+    }
+    for folder in ["older", "newer"] {
+        copy(&at("targets"), &at(folder));
+    }
+    root
+}
+
+/// Every file with its bytes, links with where they lead.
+fn everything(root: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+    let mut found = BTreeMap::new();
+    let mut pending = vec![root.to_path_buf()];
+    while let Some(folder) = pending.pop() {
+        for path in fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()) {
+            if path.is_symlink() {
+                found.insert(path.clone(), fs::read_link(&path).unwrap().display().to_string().into_bytes());
+            } else if path.is_dir() {
+                found.insert(path.clone(), Vec::new());
+                pending.push(path);
+            } else {
+                found.insert(path.clone(), fs::read(&path).unwrap());
+            }
+        }
+    }
+    found
+}
+
+/// Ways to name an input, what contains it and what lies in it as the output.
+fn hostile(root: &Path, input: &str) -> Vec<String> {
+    let path = root.join(input);
+    let name = path.file_name().unwrap().to_str().unwrap().to_owned();
+    let mut ways = vec![
+        input.to_owned(),
+        path.display().to_string(),
+        format!("./nothing/../{input}"),
+        format!("{input}/."),
+        "../".to_owned() + root.file_name().unwrap().to_str().unwrap(),
+        root.display().to_string(),
+        format!("link_to_{name}"),
+    ];
+    if path.is_dir() {
+        ways.extend([format!("{input}/out"), format!("{input}/a/b"), format!("link_to_{name}/out")]);
+    }
+    if let Some(parent) = Path::new(input).parent().filter(|parent| !parent.as_os_str().is_empty()) {
+        ways.push(parent.display().to_string());
+    }
+    ways
+}
+
+#[test]
+fn no_command_writes_where_it_reads() {
+    let world = world();
+    let root = world.path();
+    #[cfg(unix)]
+    for input in cases().iter().flat_map(|case| &case.inputs) {
+        let name = Path::new(input).file_name().unwrap().to_str().unwrap();
+        let _ = std::os::unix::fs::symlink(root.join(input), root.join(format!("link_to_{name}")));
+    }
+    let before = everything(root);
+    for case in cases() {
+        for input in &case.inputs {
+            for out in hostile(root, input) {
+                let line: Vec<&str> = case.line.iter().copied().chain(["--out", &out]).collect();
+                let refused = rangecam(root, &line);
+                let words = String::from_utf8_lossy(&refused.stderr);
+                let told = format!("{}, --out {out}: {words}", case.name);
+                assert_eq!(refused.status.code(), Some(2), "{told}");
+                assert!(words.contains("cannot be the output folder") || words.contains("is a file"), "{told}");
+            }
+        }
+        assert!(everything(root) == before, "{} changed something", case.name);
+    }
+}
+
+/// What each command reads is as it was, where it works and where it fails, and where it writes nothing.
+#[test]
+fn no_command_changes_what_it_reads() {
+    let world = world();
+    let root = world.path();
+    let before = everything(root);
+    for case in cases() {
+        let out = tempfile::tempdir().unwrap();
+        let target = out.path().join("out").display().to_string();
+        let line: Vec<&str> = case.line.iter().copied().chain(["--out", &target, "--quiet"]).collect();
+        rangecam(root, &line);
+        assert!(everything(root) == before, "{} changed something", case.name);
+    }
+    for line in ["inspect survey", "explain survey --frame 0 --pixel 3,3", "diff cal/c.ron survey/calibration.ron"] {
+        let line: Vec<&str> = line.split(' ').collect();
+        rangecam(root, &line);
+        assert!(everything(root) == before, "{} changed something", line[0]);
+    }
+}
+
+/// A command that is new must be among those above.
+#[test]
+fn every_command_is_tried() {
+    let help = rangecam(Path::new("."), &["--help"]);
+    let help = String::from_utf8(help.stdout).unwrap();
+    let commands = help.lines().skip_while(|line| *line != "Commands:").skip(1).take_while(|line| !line.is_empty());
+    // The name stands two columns in; further lines of a description stand further in.
+    let names = commands.filter_map(|line| line.strip_prefix("  ").filter(|rest| !rest.starts_with(' ')));
+    let names: Vec<&str> = names.filter_map(|line| line.split(' ').next()).filter(|name| *name != "help").collect();
+    assert!(names.len() > 10, "{help}");
+    for name in names {
+        let tried = READERS.contains(&name) || cases().iter().any(|case| case.line[0] == name);
+        assert!(tried, "{name} is not among the commands tried here");
+    }
+}

@@ -22,15 +22,23 @@ use super::rooms::{Capture, LOW_AMPLITUDE};
 const SIGMAS: f64 = 4.0;
 const FLOOR_M: f64 = 0.005;
 
+/// Flags that are held to the bar, with their stages: [`Flags::UNWRAP_UNSURE`] of `Unwrap`, [`Flags::MULTIPATH`] of
+/// `Multipath` and `Deconvolve` and [`Flags::OUTSIDE_SPAN`] of `CorrectRange` are listed beside it.
+pub const JUDGED: Flags =
+    Flags::all().difference(Flags::UNWRAP_UNSURE).difference(Flags::MULTIPATH).difference(Flags::OUTSIDE_SPAN);
+
 /// Numbers of pixels.
 #[derive(Default)]
 pub struct Counts {
     pub pixels: usize,
     pub wrong: usize,
     pub flagged: usize,
-    /// Flagged and right.
+    /// With one of the judged flags, and right.
     pub false_flags: usize,
-    /// The same for each of [`Flags::NAMED`].
+    /// The same without mixed pixels. These stand out of the noise the more, the more frames there are, and with them the
+    /// pixels that cannot be told from them: narrow surfaces, and rims of round ones.
+    pub false_by_chance: usize,
+    /// False ones of each of [`Flags::NAMED`].
     pub of_flag: [usize; Flags::NAMED.len()],
     /// Ranges wrong, by the first reason, and not flagged.
     pub missed: usize,
@@ -48,7 +56,7 @@ impl Counts {
     }
 }
 
-/// Processes the first `frames` frames of each station and counts; stages of these names are left out.
+/// Processes the first `frames` frames of each station and counts.
 pub fn count(capture: &Capture, frames: usize) -> Result<Counts, Failure> {
     let plan = Plan::from_ron(&format!("(name: \"flags\", stages: [{}])", capture.stages), "flags.ron".as_ref())?;
     let outcome = process(&plan, &capture.survey(frames)?, None, &Silent)?;
@@ -70,7 +78,8 @@ fn judge(capture: &Capture, outcome: &Outcome, frames: usize) -> Counts {
             counts.pixels += 1;
             counts.wrong += usize::from(wrong);
             counts.flagged += usize::from(flagged);
-            counts.false_flags += usize::from(flagged && !wrong);
+            counts.false_flags += usize::from(flags.intersects(JUDGED) && !wrong);
+            counts.false_by_chance += usize::from(flags.intersects(JUDGED - Flags::MIXED_PIXEL) && !wrong);
             counts.missed += usize::from(range_wrong && !flagged);
             for (count, (flag, _)) in counts.of_flag.iter_mut().zip(Flags::NAMED) {
                 *count += usize::from(flags.contains(flag) && !wrong);

@@ -2,7 +2,8 @@
 //! common with it, in three lights and with 1 to 1,000 frames.
 //!
 //! `cargo xtask verify flags`; with the argument `tuning` on the stations and seeds that constants were chosen on, else on
-//! others. Fails where false flags are more than twice the wrong pixels and 2 % of all, or become more with more frames.
+//! others. Fails where false flags are more than twice the wrong pixels and 2 % of all, or those that chance makes become more
+//! with more frames.
 #![allow(clippy::print_stdout)]
 
 mod caster;
@@ -23,7 +24,7 @@ const FRAMES: [usize; 5] = [1, 4, 16, 64, 1000];
 /// Median amplitudes: dim, usual, bright; samples have noise of 4 units and more.
 const LIGHTS: [f64; 3] = [27.0, 100.0, 400.0];
 
-/// More frames may raise the share of false flags by so much, which is chance and edges that come out of the noise.
+/// More frames may raise the share of false flags, but those of mixed pixels, by so much: chance of 6336 pixels.
 const RISE: f64 = 0.002;
 
 type Take = fn(&Path, usize, Amount) -> Result<Capture, Failure>;
@@ -59,10 +60,15 @@ fn main() -> Result<(), Failure> {
                 if share > counts.bar() {
                     broken.push(format!("{place} false flags, {:.2} % are allowed", 100.0 * counts.bar()));
                 }
-                if share > least + RISE {
-                    broken.push(format!("{place} false flags, {:.2} % with fewer frames", 100.0 * least));
+                let by_chance = counts.share(counts.false_by_chance);
+                if by_chance > least + RISE {
+                    broken.push(format!(
+                        "{place} false flags, {:.2} % by chance, {:.2} % with fewer frames",
+                        100.0 * by_chance,
+                        100.0 * least
+                    ));
                 }
-                least = least.min(share);
+                least = least.min(by_chance);
             }
         }
     }

@@ -124,6 +124,7 @@ fn inspect_survey(path: &Path, found: &mut Inspection) -> Result<()> {
 
 /// Reads all frames, one in memory at a time, and judges them.
 fn inspect_frames(path: &Path, survey: &Survey, found: &mut Inspection) -> Result<()> {
+    found.doubts.extend(fit(path, survey)?);
     if survey.frames.is_empty() {
         found.doubts.extend(plausibility::of_survey(&survey.camera));
         found.add("frames readable", "none listed");
@@ -152,8 +153,10 @@ fn inspect_frames(path: &Path, survey: &Survey, found: &mut Inspection) -> Resul
     }
     let readable = survey.frames.len() - unreadable.len();
     found.add("frames readable", if unreadable.is_empty() { "all".to_owned() } else { format!("{readable}") });
+    if let Some(words) = votes.in_words() {
+        found.add("phase", words);
+    }
     found.doubts.append(&mut work.outcome.doubts);
-    found.doubts.extend(fit(path, survey)?);
     if let Some((first, error)) = unreadable.first() {
         let words = format!("{} of {} frames cannot be read: {error}", unreadable.len(), survey.frames.len());
         found.doubts.push(Doubt::about(DoubtKind::UnreadableFrames, &first.station, words));

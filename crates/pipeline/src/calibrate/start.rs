@@ -9,7 +9,7 @@ use range_io::calibration::Calibration;
 use range_io::survey::Survey;
 
 use super::drift;
-use crate::compatible::{Purpose, compatible};
+use crate::compatible::{Purpose, compatible, model_set};
 use crate::drift::ViewDrift;
 use crate::load::read_calibration;
 use crate::{Error, Result};
@@ -47,7 +47,7 @@ impl Start {
             None => nominal,
         };
         let range_model = match &calibration {
-            Some(calibration) => range_model_of(calibration, modulation)?,
+            Some(calibration) => range_model_of(survey, calibration, modulation)?,
             None => error_free(modulation),
         };
         Ok(Self { camera, range_model, modulation, calibration, words, drifts: Vec::new() })
@@ -73,11 +73,8 @@ fn error_free(modulation: Modulation) -> RangeErrorModel {
     RangeErrorModel::error_free(modulation.ambiguity_interval_m())
 }
 
-/// The first model of the frequency; without one, no range error is known.
-fn range_model_of(calibration: &Calibration, modulation: Modulation) -> Result<RangeErrorModel> {
-    let interval = modulation.ambiguity_interval_m();
-    let models = calibration.model_set()?;
-    let mut all = models.entries.into_iter().flat_map(|(_, models)| models);
-    let same = |model: &RangeErrorModel| (model.ambiguity_interval_m / interval - 1.0).abs() < 1e-9;
-    Ok(all.find(same).unwrap_or_else(|| error_free(modulation)))
+/// The model of the frequency at the shortest integration time; without one, no range error is known.
+fn range_model_of(survey: &Survey, calibration: &Calibration, modulation: Modulation) -> Result<RangeErrorModel> {
+    let models = model_set(survey, calibration)?.entries.into_iter().flat_map(|(_, models)| models).next();
+    Ok(models.unwrap_or_else(|| error_free(modulation)))
 }

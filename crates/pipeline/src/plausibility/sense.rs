@@ -62,6 +62,12 @@ impl SenseVotes {
         }
     }
 
+    /// How they voted; `None` where no window could.
+    pub(crate) fn in_words(&self) -> Option<String> {
+        let all = self.falls + self.rises;
+        (all > 0).then(|| format!("amplitudes fall with range on {} of {all} pieces of surface", self.falls))
+    }
+
     /// Whether they are sure of the wrong sense.
     pub(crate) fn doubt(&self) -> Option<Doubt> {
         let (rises, all) = (self.rises as f64, (self.falls + self.rises) as f64);

@@ -1,6 +1,6 @@
 //! Frames that hold nothing, hold the same as another one, or are in another unit than metre.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use range_image::Samples;
 
@@ -11,6 +11,10 @@ use crate::view::{View, ViewData};
 
 /// Values of a plane that are looked at, evenly over it: noise makes no two frames alike in so many.
 const LOOKED_AT: usize = 1024;
+/// From so many frames on, each of a station of its own, a survey is the stream of a moving camera.
+const STREAM: usize = 16;
+/// Frames that a recorder may drop one after the other, filling in the last one that it has.
+const MOST_DROPPED: usize = 3;
 /// Part of a plane's values that are one and the same in a dead frame; the rest are hot pixels.
 const DEAD_SHARE: f64 = 0.98;
 
@@ -26,12 +30,14 @@ pub(crate) struct FrameWatch {
     /// Median range of each frame that came with ranges, metre.
     ranges_m: Vec<f64>,
     frames: usize,
+    stations: BTreeSet<String>,
 }
 
 impl FrameWatch {
     /// Looks at a frame as it was read.
     pub(crate) fn look(&mut self, view: &View) {
         self.frames += 1;
+        self.stations.insert(view.station.clone());
         let frame = view.frames.first().copied().unwrap_or_default();
         let planes = planes(view);
         if let Some(value) = planes.iter().find_map(|plane| dead_value(plane)) {
@@ -92,9 +98,14 @@ impl FrameWatch {
         stations.into_iter().map(doubt).collect()
     }
 
+    /// Whether a frame stands for one that a recorder of a stream has dropped: it repeats the one before.
+    fn is_dropped(&self, frame: usize, earlier: usize) -> bool {
+        self.frames >= STREAM && self.frames == self.stations.len() && frame.abs_diff(earlier) <= MOST_DROPPED
+    }
+
     fn repeated_stations(&self) -> Vec<Doubt> {
         let mut stations: BTreeMap<&str, Vec<&[(String, usize); 2]>> = BTreeMap::new();
-        for repeat in &self.repeats {
+        for repeat in self.repeats.iter().filter(|[here, earlier]| !self.is_dropped(here.1, earlier.1)) {
             stations.entry(&repeat[0].0).or_default().push(repeat);
         }
         let doubt = |(station, repeats): (&str, Vec<&[(String, usize); 2]>)| {

@@ -151,17 +151,17 @@ fn a_span_elsewhere_does_not_pass() {
         Slip::new(|survey| {
             let file = survey.join("calibration.ron");
             let text = std::fs::read_to_string(&file).unwrap();
-            let begin = text.find("span: (").unwrap();
+            let begin = text.find("\n    span: (").unwrap() + 1;
             let end = begin + text[begin..].find(')').unwrap() + 1;
             std::fs::write(&file, format!("{}span: ({span}){}", &text[..begin], &text[end..])).unwrap();
         })
     };
-    refused(with_span("range_m: Some((20, 30))").points(), &["20.000 to 30.000 m", "100 %"]);
-    refused(with_span("integration_time_s: Some((0.01, 0.02))").points(), &["0.01 to 0.02 s", "0.002 s"]);
-    let part = with_span("range_m: Some((0.5, 3))").points().unwrap();
+    refused(with_span("range_m: (20.0, 30.0)").points(), &["20.000 to 30.000 m", "100 %"]);
+    refused(with_span("integration_time_s: (0.01, 0.02)").points(), &["0.01 to 0.02 s", "0.002 s"]);
+    let part = with_span("range_m: (0.5, 3.0)").points().unwrap();
     has(part.doubts(), DoubtKind::OutsideSpan, None);
     assert!(part.flags_fraction["outside_span"] > 0.2, "{:?}", part.flags_fraction);
-    let whole = with_span("range_m: Some((0.1, 12)), integration_time_s: Some((0.002, 0.002))").points().unwrap();
+    let whole = with_span("range_m: (0.1, 12.0), integration_time_s: (0.002, 0.002)").points().unwrap();
     assert_eq!(whole.doubts(), []);
 }
 

@@ -3,7 +3,10 @@
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
 mod bench;
+mod dependencies;
 mod fixtures;
+mod fuzz;
+mod nightly;
 mod peers;
 mod pipeline_task;
 mod shell;
@@ -31,6 +34,10 @@ enum Task {
     Peers(peers::Arguments),
     /// Long statistics, with the figures that docs/benchmarks.md states: `cargo xtask verify flags`.
     Verify(verify::Arguments),
+    /// Damaged files of every format against the readers, for some seconds.
+    Fuzz(fuzz::Arguments),
+    /// An hour of damaged files, property tests with fresh cases, the long statistics, and cargo deny.
+    Nightly(nightly::Arguments),
     /// Run the benchmarks of all crates, or of those named.
     Bench(bench::Arguments),
 }
@@ -43,6 +50,8 @@ fn main() -> ExitCode {
         Task::Tidy => tidy::run(),
         Task::Peers(arguments) => peers::run(&arguments),
         Task::Verify(arguments) => verify::run(&arguments),
+        Task::Fuzz(arguments) => fuzz::run(&arguments),
+        Task::Nightly(arguments) => nightly::run(&arguments),
         Task::Bench(arguments) => bench::run(&arguments),
     };
     match outcome {

@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
+use crate::dependencies;
 use crate::shell::{Outcome, root};
 
 /// A file of source code holds one idea; beyond this it holds several.
@@ -12,7 +13,7 @@ pub(crate) fn run() -> Outcome {
     println!("── tidy");
     let root = root();
     let crates = folders(&root.join("crates"))?;
-    let mut complaints = Vec::new();
+    let mut complaints = dependencies::complaints(&root)?;
     for folder in &crates {
         complaints.extend(missing_parts(folder));
         complaints.extend(tests_left_out(folder)?);

@@ -13,6 +13,13 @@ pub(crate) struct Arguments {
     names: Vec<String>,
 }
 
+impl Arguments {
+    /// All statistics.
+    pub(crate) fn all() -> Self {
+        Self { names: Vec::new() }
+    }
+}
+
 pub(crate) fn run(arguments: &Arguments) -> Outcome {
     let known = || STATISTICS.iter().map(|(name, ..)| *name);
     if let Some(unknown) = arguments.names.iter().find(|name| !known().any(|known| known == name.as_str())) {

@@ -62,7 +62,8 @@ pub use fixed_pattern::{FixedPatternRequest, FixedPatternSummary, PatternWall, e
 pub use inspect::{Inspection, inspect};
 pub use network_plan::{CandidateSummary, NetworkPlanRequest, PlanSummary, PointSigma, plan_network};
 pub use network_scene::{
-    FieldSpec, NetworkScene, PassiveSpec, SceneStation, SceneTarget, SightingSpec, simulate_network,
+    FieldSpec, MOST_SIGHTINGS, MOST_TARGETS, NetworkScene, PassiveSpec, SceneStation, SceneTarget, SightingSpec,
+    simulate_network,
 };
 pub use noise::{NoiseBin, NoiseParameter, NoiseRequest, NoiseStation, NoiseSummary, SigmaBinSummary, estimate_noise};
 pub use outcome::{AdjustmentFigures, FurtherPoint, Outcome, RefusedStage, StationPose};

@@ -47,6 +47,9 @@ impl fmt::Display for Simulated {
 /// `source` says, as a surveyor's sketch would be. Its `calibration.ron` is the true one.
 pub fn simulate(source: &SimulateSource, base: &Path, out: &Path, progress: &dyn Progress) -> Result<Simulated> {
     let path = base.join(&source.scene);
+    source
+        .check()
+        .map_err(|(field, reason)| Error::Survey { path: path.clone(), message: format!("`{field}` {reason}") })?;
     let inputs = Inputs::default().path(&path);
     produce(out, &inputs, |destination| simulate_into(destination, source, &path, progress))
 }
@@ -57,7 +60,7 @@ fn simulate_into(
     path: &Path,
     progress: &dyn Progress,
 ) -> Result<Simulated> {
-    let text = std::fs::read_to_string(path).map_err(|error| Error::Access { path: path.to_owned(), source: error })?;
+    let text = range_io::read_ron_text(path)?;
     let fail = |error| Error::Scene { path: path.to_owned(), source: error };
     let mut spec = SimulationSpec::from_ron(&text).map_err(fail)?;
     if source.gross_error_share > 0.0 {

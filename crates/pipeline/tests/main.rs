@@ -16,6 +16,7 @@ mod exposures;
 mod fixed_pattern;
 mod frame_rate;
 mod metamorphic;
+mod hostile_files;
 mod noise;
 mod outputs;
 mod real_captures;

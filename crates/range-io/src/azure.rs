@@ -4,8 +4,7 @@ use std::path::Path;
 
 use serde::Deserialize;
 
-use crate::text::read_text;
-use crate::{Error, Result};
+use crate::{Error, Result, read_ron_text};
 
 /// Intrinsics of the depth camera for the images of one mode: the rational model of `OpenCV` (`CALIB_RATIONAL_MODEL`),
 /// computer-vision axes.
@@ -56,7 +55,7 @@ impl DepthMode {
 /// Reads the depth camera's intrinsics from a `calibration.json`.
 pub fn read(path: impl AsRef<Path>, mode: DepthMode) -> Result<RationalIntrinsics> {
     let path = path.as_ref();
-    parse(path, &read_text(path)?, mode)
+    parse(path, &read_ron_text(path)?, mode)
 }
 
 /// Reads the depth camera's intrinsics from the text of a `calibration.json`; `file` stands for it in messages.

@@ -10,12 +10,15 @@ pub mod clouds;
 #[cfg(feature = "e57")]
 pub mod e57;
 mod error;
-#[cfg(any(feature = "mkv", feature = "png16", feature = "survey"))]
-mod limits;
+mod fault;
+pub mod limits;
+#[cfg(any(feature = "pcd", feature = "ply", feature = "xyz"))]
+mod lines;
 #[cfg(feature = "mkv")]
 pub mod mkv;
 #[cfg(feature = "npz")]
 pub mod npz;
+mod open;
 #[cfg(feature = "pcd")]
 pub mod pcd;
 #[cfg(feature = "ply")]
@@ -30,8 +33,6 @@ pub mod ron_text;
 pub mod survey;
 #[cfg(feature = "tables")]
 pub mod tables;
-#[cfg(any(feature = "azure", feature = "ron_text", feature = "tables", feature = "trajectory", feature = "vtk"))]
-mod text;
 #[cfg(feature = "trajectory")]
 pub mod trajectory;
 #[cfg(feature = "vtk")]
@@ -42,3 +43,4 @@ pub mod xyz;
 #[cfg(any(feature = "survey", feature = "calibration"))]
 pub(crate) use error::InvalidField;
 pub use error::{Error, Result};
+pub use open::{open, read_bytes, read_ron_text, read_text};

@@ -1,6 +1,5 @@
 //! Images of one channel with 16 bits in PNG: depth, infrared, amplitude.
 
-use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
 
@@ -8,13 +7,14 @@ use png::{BitDepth, ColorType, Decoder, Encoder, Limits};
 use range_image::Raster;
 
 use crate::atomic::FileWriter;
-use crate::limits::MOST_PIXELS;
+use crate::fault::zeros;
+use crate::limits::{LARGEST_DEFLATION, MOST_PIXELS};
 use crate::{Error, Result};
 
 /// Reads a PNG of one channel with 16 bits; 8 bits, colour, palettes and alpha are refused.
 pub fn read(path: impl AsRef<Path>) -> Result<Raster<u16>> {
     let path = path.as_ref();
-    let file = File::open(path).map_err(Error::io(path, "open"))?;
+    let (file, length) = crate::open(path)?;
     let failed = |error: png::DecodingError| Error::format(path, format!("is no complete PNG: {error}"));
     let limits = Limits { bytes: 4 * MOST_PIXELS };
     let mut reader = Decoder::new_with_limits(BufReader::new(file), limits).read_info().map_err(failed)?;
@@ -27,7 +27,11 @@ pub fn read(path: impl AsRef<Path>) -> Result<Raster<u16>> {
     let pixels = width.checked_mul(height).filter(|&pixels| pixels <= MOST_PIXELS);
     let pixels =
         pixels.ok_or_else(|| Error::format(path, format!("has {width} x {height} pixels, more than are read")))?;
-    let mut bytes = vec![0_u8; 2 * pixels];
+    if (2 * pixels) as u64 > length.saturating_mul(LARGEST_DEFLATION) {
+        let reason = format!("promises {width} x {height} pixels, more than its {length} bytes hold");
+        return Err(Error::format(path, reason));
+    }
+    let mut bytes = zeros(2 * pixels).map_err(Error::io(path, "reserve memory for"))?;
     reader.next_frame(&mut bytes).map_err(failed)?;
     let values = bytes.as_chunks().0.iter().map(|&pair| u16::from_be_bytes(pair)).collect();
     Raster::from_vec(width, height, values).map_err(|error| Error::format(path, error.to_string()))

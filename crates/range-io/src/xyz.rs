@@ -5,30 +5,27 @@
 //! positions, and four or more are refused but where the ending says what they are (`.xyzn` normals, `.xyzi`
 //! intensity). Other lines that begin with `#` or `//` are comments. Positions are metres, as nothing in such a file says.
 
-use std::io::{BufRead, BufReader};
+use std::io::BufReader;
 use std::path::Path;
 
 use crate::clouds::{CloudFile, Columns, canonical};
+use crate::fault::Fault;
+use crate::lines::read_line;
 use crate::{Error, Result};
-
-/// Longer lines belong to other files.
-const LONGEST_LINE: u64 = 1 << 16;
 
 /// Reads a point list (`.xyz`, `.xyzn`, `.xyzi`, `.txt`, `.asc`, `.csv`).
 pub fn read_xyz(path: impl AsRef<Path>) -> Result<CloudFile> {
     let path = path.as_ref();
-    let file = std::fs::File::open(path).map_err(Error::io(path, "open"))?;
+    let (file, _) = crate::open(path)?;
     let mut list = List { path, names: Vec::new(), columns: None, points: 0 };
     let mut reader = BufReader::with_capacity(1 << 16, file);
     let mut bytes = Vec::new();
     for line in 1.. {
-        bytes.clear();
-        let taken = std::io::Read::take(&mut reader, LONGEST_LINE).read_until(b'\n', &mut bytes);
-        if taken.map_err(Error::io(path, "read"))? == 0 {
-            break;
-        }
-        let text = std::str::from_utf8(&bytes).ok().filter(|text| text.len() < LONGEST_LINE as usize);
-        let text = text.ok_or_else(|| Error::format(path, format!("has a line {line} that is no text of numbers")))?;
+        let text = read_line(&mut reader, &mut bytes).map_err(|fault| match fault {
+            Fault::Content(reason) => Error::format(path, format!("{reason}: line {line}")),
+            system => system.of(path),
+        })?;
+        let Some(text) = text else { break };
         list.line(line, text.trim_start_matches('\u{feff}').trim())?;
     }
     list.finish()
@@ -75,7 +72,7 @@ impl List<'_> {
 
     fn begin(&mut self, names: Vec<String>) -> Result<()> {
         let columns = Columns::new(names.iter().map(String::as_str), 0);
-        self.columns = Some(columns.map_err(|reason| Error::format(self.path, reason))?);
+        self.columns = Some(columns.map_err(|fault| fault.of(self.path))?);
         self.names = names;
         Ok(())
     }
@@ -97,7 +94,7 @@ impl List<'_> {
 
     fn finish(self) -> Result<CloudFile> {
         let columns = self.columns.ok_or_else(|| Error::format(self.path, "has no point"))?;
-        columns.into_cloud(self.points).map_err(|reason| Error::format(self.path, reason))
+        columns.into_cloud(self.points).map_err(|fault| fault.of(self.path))
     }
 
     fn error(&self, line: usize, column: usize, field: &str, reason: String) -> Error {

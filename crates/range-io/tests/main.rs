@@ -5,6 +5,7 @@ mod atomic;
 mod calibration;
 mod clouds;
 mod common;
+mod hostile;
 mod images;
 mod npz;
 mod ply;

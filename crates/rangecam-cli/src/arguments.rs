@@ -13,6 +13,7 @@ use crate::noise_arguments::NoiseArguments;
 use crate::plan_arguments::PlanArguments;
 use crate::register_arguments::RegisterArguments;
 use crate::scattering_arguments::ScatteringArguments;
+use crate::values::{not_negative, share};
 use crate::warm_up_arguments::WarmUpArguments;
 
 /// Raw frames of a range camera in, one corrected and registered cloud out.
@@ -53,13 +54,13 @@ pub(crate) enum Command {
         #[arg(long, default_value_t = 1)]
         seed: u64,
         /// Standard deviation of the approximate station positions written to stations.csv, metre.
-        #[arg(long, default_value_t = 0.05)]
+        #[arg(long, default_value_t = 0.05, value_name = "METRE", value_parser = not_negative)]
         position_sigma: f64,
         /// Standard deviation of the approximate attitudes written to stations.csv, degree.
-        #[arg(long, default_value_t = 2.0)]
+        #[arg(long, default_value_t = 2.0, value_name = "DEGREE", value_parser = not_negative)]
         attitude_sigma: f64,
         /// Part of the pixels of each station that show anything (gross errors), from 0 to 1.
-        #[arg(long, default_value_t = 0.0)]
+        #[arg(long, default_value_t = 0.0, value_name = "SHARE", value_parser = share)]
         gross_errors: f64,
         /// Output folder; default: out/<name of the scene's file>.
         #[arg(long, short)]

@@ -6,6 +6,8 @@ use std::time::Duration;
 use indicatif::{ProgressBar, ProgressStyle};
 use pipeline::Progress;
 
+use crate::escape;
+
 /// A bar on standard error; indicatif hides it by itself where that is no terminal.
 pub(crate) struct Bar {
     bar: Mutex<ProgressBar>,
@@ -26,7 +28,7 @@ impl Bar {
 impl Progress for Bar {
     fn begin(&self, work: &str, steps: usize) {
         let style = ProgressStyle::with_template("{prefix:>22} {wide_bar:.cyan/238} {pos}/{len} {elapsed}");
-        let next = ProgressBar::new(steps as u64).with_prefix(work.to_owned());
+        let next = ProgressBar::new(steps as u64).with_prefix(escape::words(work).into_owned());
         if let Ok(style) = style {
             next.set_style(style.progress_chars("━━╌"));
         }
@@ -42,7 +44,7 @@ impl Progress for Bar {
     }
 
     fn say(&self, message: &str) {
-        self.with(|bar| bar.println(message));
+        self.with(|bar| bar.println(escape::words(message)));
     }
 
     fn finish(&self) {

@@ -8,6 +8,8 @@ use pipeline::{
     TableDefaults, TermSelection,
 };
 
+use crate::values::{Terms, name, positive, terms};
+
 /// Arguments of a calibration.
 #[derive(Debug, Args)]
 pub(crate) struct CalibrateArguments {
@@ -20,8 +22,8 @@ pub(crate) struct CalibrateArguments {
     /// being held at their start values; or `auto`: chosen by significance and information criterion. From targets also
     /// spline12 (a spline with 12 knots instead of d2 to d7), polynomial3 (order 3, over the observed ranges), surface2
     /// (order 2 over the image, instead of e1 and e2).
-    #[arg(long, default_value = "auto", value_name = "LIST|auto")]
-    terms: String,
+    #[arg(long, default_value = "auto", value_name = "LIST|auto", value_parser = terms)]
+    terms: Terms,
     /// What carries the datum: inner constraints on the targets, or the standard deviations in targets.csv and
     /// stations.csv.
     #[arg(long, value_enum, default_value_t = DatumName::Free)]
@@ -39,13 +41,13 @@ pub(crate) struct CalibrateArguments {
     #[arg(long, value_enum, default_value_t = JointName::Integrated)]
     joint: JointName,
     /// Stations whose ranges are left out, such as convergent ones whose ranges scattering would bias: S03,S04.
-    #[arg(long, value_delimiter = ',', value_name = "STATIONS")]
+    #[arg(long, value_delimiter = ',', value_name = "STATIONS", value_parser = name)]
     without_ranges: Vec<String>,
     /// Significance level of the outlier test, or `none`: nothing is rejected.
     #[arg(long, default_value = "0.0001", value_name = "LEVEL|none", value_parser = level)]
     reject: Level,
     /// Largest growth of a standard deviation by correlations before the network is refused as too weak.
-    #[arg(long, value_name = "FACTOR")]
+    #[arg(long, value_name = "FACTOR", value_parser = positive)]
     largest_inflation: Option<f64>,
     /// How the offset d0 is modelled from planes: `constant`; `table`, a look-up table beside it with an offset for each
     /// pixel (table4: for blocks of 4 x 4 pixels), written if it takes off more than its noise adds; `surface`, a
@@ -143,13 +145,6 @@ fn offset(text: &str) -> Result<OffsetModel, String> {
     }
 }
 
-pub(crate) fn positive(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(value) if value > 0.0 && value.is_finite() => Ok(value),
-        _ => Err("expected a positive number".to_owned()),
-    }
-}
-
 impl CalibrateArguments {
     /// The request behind the arguments.
     pub(crate) fn request(self) -> CalibrateRequest {
@@ -165,7 +160,7 @@ impl CalibrateArguments {
         let out = default_out(&self.survey, "-calibration");
         let standard = CalibrationOptions::default();
         let options = CalibrationOptions {
-            terms: terms(&self.terms),
+            terms: selection(self.terms),
             datum: self.datum.datum(),
             without_ranges: self.without_ranges,
             rejection_level: self.reject.0,
@@ -189,13 +184,9 @@ impl CalibrateArguments {
     }
 }
 
-/// `auto`, or names between commas or blanks.
-pub(crate) fn terms(text: &str) -> TermSelection {
-    if text.trim() == "auto" {
-        return TermSelection::Auto;
-    }
-    let names = text.split([',', ' ']).map(str::trim).filter(|name| !name.is_empty());
-    TermSelection::List(names.map(str::to_owned).collect())
+/// The terms as the calibration takes them.
+pub(crate) fn selection(Terms(names): Terms) -> TermSelection {
+    names.map_or(TermSelection::Auto, TermSelection::List)
 }
 
 /// `out/<name of the survey><ending>`.

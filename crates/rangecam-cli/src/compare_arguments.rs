@@ -5,6 +5,8 @@ use std::path::PathBuf;
 use clap::Args;
 use pipeline::{CompareAlignment, CompareRequest};
 
+use crate::values::{not_negative, positive};
+
 #[derive(Debug, Args)]
 pub(crate) struct CompareArguments {
     /// The one.
@@ -19,10 +21,10 @@ pub(crate) struct CompareArguments {
     #[arg(long)]
     scale: bool,
     /// Leave out points of a cloud that are farther from the reference, metre; default: none.
-    #[arg(long, value_name = "METRES")]
+    #[arg(long, value_name = "METRES", value_parser = positive)]
     max_distance: Option<f64>,
     /// Poses of trajectories belong together if their times differ by no more, second.
-    #[arg(long, value_name = "SECONDS", default_value_t = 0.01)]
+    #[arg(long, value_name = "SECONDS", default_value_t = 0.01, value_parser = not_negative)]
     time_tolerance: f64,
     /// Output folder for comparison.json and report.html, with pictures; default: nothing is written.
     #[arg(long, short)]

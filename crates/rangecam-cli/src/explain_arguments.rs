@@ -5,6 +5,8 @@ use std::path::PathBuf;
 use clap::Args;
 use pipeline::{ExplainRequest, Plan};
 
+use crate::values::whole;
+
 #[derive(Debug, Args)]
 pub(crate) struct ExplainArguments {
     /// Folder with survey.ron.
@@ -36,10 +38,5 @@ impl ExplainArguments {
 }
 
 fn pixel(text: &str) -> Result<[usize; 2], String> {
-    let parse = |part: &str| part.trim().parse::<usize>().ok();
-    let (col, row) = text.split_once(',').ok_or("expected a column and a row, as in 88,72")?;
-    match (parse(col), parse(row)) {
-        (Some(col), Some(row)) => Ok([col, row]),
-        _ => Err("expected two whole numbers, column and row counted from 0, as in 88,72".to_owned()),
-    }
+    whole(text).ok_or_else(|| "expected two whole numbers, column and row counted from 0, as in 88,72".to_owned())
 }

@@ -6,6 +6,7 @@ use clap::Args;
 use pipeline::{FixedPatternRequest, PatternOptions};
 
 use crate::calibrate_arguments::default_out;
+use crate::values::whole;
 
 /// Arguments of an estimation of the fixed pattern.
 #[derive(Debug, Args)]
@@ -38,7 +39,7 @@ impl FixedPatternArguments {
 
 /// Four numbers between commas.
 fn window(text: &str) -> Result<[usize; 4], String> {
-    let numbers: Result<Vec<usize>, _> = text.split(',').map(|word| word.trim().parse::<usize>()).collect();
-    let numbers = numbers.ok().and_then(|numbers| <[usize; 4]>::try_from(numbers).ok());
-    numbers.ok_or_else(|| "expected four whole numbers between commas, such as 48,82,16,48".to_owned())
+    let numbers = whole(text).filter(|[left, right, top, bottom]| left <= right && top <= bottom);
+    let expected = "first and last column, first and last row, such as 48,82,16,48";
+    numbers.ok_or_else(|| format!("expected four whole numbers between commas: {expected}"))
 }

@@ -6,6 +6,7 @@ mod calibrate_arguments;
 mod commands;
 mod compare_arguments;
 mod diff_arguments;
+mod escape;
 mod exit;
 mod explain_arguments;
 mod fixed_pattern_arguments;
@@ -14,6 +15,7 @@ mod output;
 mod plan_arguments;
 mod register_arguments;
 mod scattering_arguments;
+mod values;
 mod warm_up_arguments;
 
 use std::ffi::OsString;
@@ -32,7 +34,7 @@ pub fn main(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         Ok(arguments) => arguments,
         Err(error) => {
             // Help and version come this way too; clap knows which stream and which code each wants.
-            let _ = error.print();
+            output::print_usage(&error);
             return ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(exit::USAGE));
         }
     };

@@ -10,7 +10,7 @@ use serde::Serialize;
 
 use crate::arguments::Arguments;
 use crate::bar::Bar;
-use crate::exit;
+use crate::{escape, exit};
 
 /// How the user wants to be spoken to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -49,8 +49,8 @@ impl Output {
     /// A result: JSON where that was asked for, words otherwise. What the shell sees is its verdict.
     pub(crate) fn result<T: Serialize + Display + Judged>(&self, result: &T) -> Result<ExitCode, Box<dyn Error>> {
         match self.voice {
-            Voice::Words => print(result)?,
-            Voice::Json => print(&serde_json::to_string_pretty(result)?)?,
+            Voice::Words => print(&escape::words(&result.to_string()))?,
+            Voice::Json => print(&escape::json(&serde_json::to_string_pretty(result)?))?,
             Voice::Quiet => {}
         }
         Ok(exit::of_verdict(result.verdict()))
@@ -59,7 +59,7 @@ impl Output {
     /// The summary of a refused calibration: as JSON where that was asked for, in words it is the error alone.
     pub(crate) fn refusal(&self, error: &(dyn Error + 'static)) {
         if let (Voice::Json, Some(pipeline::Error::Refused { summary, .. })) = (self.voice, error.downcast_ref())
-            && let Err(error) = print(summary)
+            && let Err(error) = print(&escape::json(summary))
         {
             self.error(&error);
         }
@@ -69,12 +69,23 @@ impl Output {
     pub(crate) fn error(&self, error: &dyn Error) {
         let head = if self.colour { "\u{1b}[31merror:\u{1b}[0m" } else { "error:" };
         // A reader that has closed standard error wants no more words; the exit code tells.
-        let _ = writeln!(std::io::stderr(), "{head} {error}");
+        let _ = writeln!(std::io::stderr(), "{head} {}", escape::error(&error.to_string()));
+    }
+}
+
+/// Help, version, or what is wrong with the arguments, which may hold a file's name: clap knows which stream each wants.
+pub(crate) fn print_usage(error: &clap::Error) {
+    let plain = error.render().to_string();
+    let safe = escape::words(&plain);
+    if safe == plain {
+        let _ = error.print();
+    } else {
+        let _ = write!(std::io::stderr(), "{safe}");
     }
 }
 
 /// Prints a line. A reader that has closed the pipe has read enough: that is no failure.
-fn print(words: &impl Display) -> std::io::Result<()> {
+fn print(words: &str) -> std::io::Result<()> {
     let mut out = std::io::stdout().lock();
     match writeln!(out, "{words}").and_then(|()| out.flush()) {
         Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(()),

@@ -5,7 +5,8 @@ use std::path::PathBuf;
 use clap::Args;
 use pipeline::{CandidateGrid, NetworkPlanRequest, PlanOptions};
 
-use crate::calibrate_arguments::{DatumName, default_out, positive, terms};
+use crate::calibrate_arguments::{DatumName, default_out, selection};
+use crate::values::{Terms, name, positive, terms};
 
 /// Arguments of a plan.
 #[derive(Debug, Args)]
@@ -14,8 +15,8 @@ pub(crate) struct PlanArguments {
     survey: PathBuf,
     /// Terms that will be estimated, separated by commas; `auto`: all but the periodic terms of the longest wavelength
     /// and the amplitude-related ones.
-    #[arg(long, default_value = "auto", value_name = "LIST|auto")]
-    terms: String,
+    #[arg(long, default_value = "auto", value_name = "LIST|auto", value_parser = terms)]
+    terms: Terms,
     /// What will carry the datum: inner constraints on the targets, or the standard deviations in the tables.
     #[arg(long, value_enum, default_value_t = DatumName::Free)]
     datum: DatumName,
@@ -32,7 +33,7 @@ pub(crate) struct PlanArguments {
     #[arg(long, default_value_t = 0.01, value_name = "METRE", value_parser = positive)]
     sigma_range: f64,
     /// Stations whose ranges will be left out.
-    #[arg(long, value_delimiter = ',', value_name = "STATIONS")]
+    #[arg(long, value_delimiter = ',', value_name = "STATIONS", value_parser = name)]
     without_ranges: Vec<String>,
     /// Distances from the middle of the targets at which further stations are tried, metre.
     #[arg(long, value_delimiter = ',', value_name = "METRES", default_value = "1,2,4", value_parser = positive)]
@@ -46,7 +47,7 @@ impl PlanArguments {
         let options = PlanOptions {
             sigma_pixel: self.sigma_pixel,
             sigma_range_m: self.sigma_range,
-            terms: terms(&self.terms),
+            terms: selection(self.terms),
             datum: self.datum.datum(),
             without_ranges: self.without_ranges,
             candidates: CandidateGrid { distances_m: self.candidate_distances, ..CandidateGrid::default() },

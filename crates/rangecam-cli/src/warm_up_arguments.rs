@@ -6,6 +6,7 @@ use clap::{Args, ValueEnum};
 use pipeline::{ChangeOptions, DriftOptions, ReferenceUse, TemperatureUse, WarmUpRequest};
 
 use crate::calibrate_arguments::default_out;
+use crate::values::{finite, positive};
 
 /// Arguments of an estimation of a drift.
 #[derive(Debug, Args)]
@@ -19,11 +20,11 @@ pub(crate) struct WarmUpArguments {
     #[arg(long, short)]
     out: Option<PathBuf>,
     /// Drift within which the camera counts as stable, millimetre; default: three deviations of a block at the end.
-    #[arg(long, value_name = "X")]
+    #[arg(long, value_name = "X", value_parser = positive)]
     tolerance_mm: Option<f64>,
     /// When the camera was switched on, on the clock of the frames' times; default: what the survey states, or else the
     /// first frame.
-    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, value_parser = finite)]
     power_on: Option<f64>,
     /// Let the drift follow the temperature of the camera as well.
     #[arg(long)]

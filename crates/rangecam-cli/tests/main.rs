@@ -6,6 +6,7 @@ mod compare;
 mod exit_codes;
 mod explain;
 mod inputs_are_kept;
+mod hostile;
 mod noise;
 mod register;
 mod warm_up;

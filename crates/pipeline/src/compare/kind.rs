@@ -145,7 +145,7 @@ fn first_line(path: &Path) -> Result<String> {
     use std::io::Read;
     let failed = |source| Error::Access { path: path.to_owned(), source };
     let mut bytes = Vec::new();
-    std::fs::File::open(path).map_err(failed)?.take(4096).read_to_end(&mut bytes).map_err(failed)?;
+    range_io::open(path)?.0.take(4096).read_to_end(&mut bytes).map_err(failed)?;
     let text = String::from_utf8_lossy(&bytes).into_owned();
     let mut lines = text.lines().map(|line| line.trim_start_matches('\u{feff}').trim());
     Ok(lines.find(|line| !line.is_empty() && !line.starts_with('#')).unwrap_or_default().to_owned())

@@ -56,7 +56,9 @@ fn estimate(
     let (mut calibration, words) = start(&request.survey, request.calibration.as_deref())?;
     // What is looked for must not be taken off before.
     calibration.fixed_pattern = None;
-    let plan = preparation(&Survey::read(&request.survey)?, &calibration);
+    let survey = Survey::read(&request.survey)?;
+    check_window(request, &survey)?;
+    let plan = preparation(&survey, &calibration);
     let known = (Some(calibration.clone()), words.clone());
     let outcome = process_with(&plan, &request.survey, known, progress)?;
     progress.begin("estimate the fixed pattern", 1);
@@ -79,6 +81,19 @@ fn estimate(
     write(destination, Some(&calibration), &json(&summary)?, &page)?;
     progress.finish();
     Ok(summary)
+}
+
+/// A window beyond the image would be cut off without a word.
+fn check_window(request: &FixedPatternRequest, survey: &Survey) -> Result<()> {
+    let Some([columns, rows]) = request.options.wall.pixels.window else { return Ok(()) };
+    let (width, height) = (survey.camera.width, survey.camera.height);
+    for (what, [first, last], size) in [("columns", columns, width), ("rows", rows, height)] {
+        if first > last || last >= size {
+            let message = format!("the window's {what} {first} to {last} are not within 0 to {}", size - 1);
+            return Err(Error::Survey { path: request.survey.clone(), message });
+        }
+    }
+    Ok(())
 }
 
 fn add_to(calibration: &mut Calibration, request: &FixedPatternRequest, estimate: &PatternEstimate) {

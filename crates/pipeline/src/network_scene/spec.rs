@@ -174,15 +174,16 @@ impl SightingSpec {
 }
 
 impl NetworkScene {
-    /// Reads a scene; `path` names it in errors.
+    /// Reads and checks a scene; `path` names it in errors.
     pub fn from_ron(text: &str, path: &Path) -> Result<Self> {
-        Ok(ron_text::parse(path, text)?)
+        let scene: Self = ron_text::parse(path, text)?;
+        scene.check().map_err(|(field, reason)| ron_text::wrong_field(path, text, field, reason))?;
+        Ok(scene)
     }
 
     /// Reads a scene's file.
     pub fn read(path: &Path) -> Result<Self> {
-        let text = std::fs::read_to_string(path).map_err(|source| Error::Access { path: path.to_owned(), source })?;
-        Self::from_ron(&text, path)
+        Self::from_ron(&range_io::read_ron_text(path)?, path)
     }
 
     /// The true network; `path` names the scene in errors.
@@ -252,6 +253,11 @@ pub(super) fn distance_rows(network: &Network) -> Vec<Distance> {
 }
 
 impl FieldSpec {
+    /// Name of a target by its number from 1.
+    pub(super) fn name(number: usize) -> String {
+        format!("T{number:03}")
+    }
+
     fn targets(&self) -> Vec<NetworkTarget> {
         let middle = |count: usize| 0.5 * (count as f64 - 1.0);
         let mut targets = Vec::new();
@@ -260,7 +266,7 @@ impl FieldSpec {
                 let x = (column as f64 - middle(self.columns)) * self.spacing_m;
                 let y = (row as f64 - middle(self.rows)) * self.spacing_m;
                 let z = if (row + column) % 3 == 0 { self.relief_m } else { 0.0 };
-                let name = format!("T{:03}", targets.len() + 1);
+                let name = Self::name(targets.len() + 1);
                 targets.push(NetworkTarget { name, point: Some(Point3::new(x, y, z)), covariance: None });
             }
         }

@@ -8,9 +8,11 @@ use serde::{Deserialize, Serialize};
 
 use crate::{Error, Result};
 
+mod check;
 mod options;
 
 pub use crate::drift::CorrectRangeOptions;
+pub(crate) use check::{Fault, Rule, check_numbers};
 pub(crate) use options::NORMAL_HALF_WIDTH_PX;
 pub use options::{
     AdjustOptions, AverageOptions, CorrectImagePointOptions, DeconvolveOptions, DemodulateOptions, FlagOptions,
@@ -160,7 +162,9 @@ impl Plan {
     pub fn from_ron(text: &str, path: &Path) -> Result<Self> {
         // Stages are written `Flag(low_amplitude: 100)`, without a second pair of parentheses. On the text's own first
         // line, so that the lines of errors stay right.
-        let plan: Self = ron_text::parse(path, &format!("#![enable(unwrap_variant_newtypes)]{text}"))?;
+        let text = format!("#![enable(unwrap_variant_newtypes)]{text}");
+        let plan: Self = ron_text::parse(path, &text)?;
+        plan.check().map_err(|(field, reason)| ron_text::wrong_field(path, &text, field, reason))?;
         crate::destination::check_name(path, &plan.name)?;
         plan.check_order()?;
         Ok(plan)
@@ -168,8 +172,10 @@ impl Plan {
 
     /// Reads a plan's file.
     pub fn read(path: &Path) -> Result<Self> {
-        let text = std::fs::read_to_string(path).map_err(|source| Error::Access { path: path.to_owned(), source })?;
-        Self::from_ron(&text, path)
+        let text = range_io::read_ron_text(path)?;
+        let plan = Self::from_ron(&text, path)?;
+        plan.check_stages().map_err(|(field, reason)| ron_text::wrong_field(path, &text, field, reason))?;
+        Ok(plan)
     }
 
     /// Refuses stages that the survey's level does not leave room for, by name.

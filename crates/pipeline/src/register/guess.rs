@@ -27,7 +27,7 @@ pub(crate) enum Guess {
 impl Guess {
     /// Reads `stations.csv`, a trajectory, or sixteen numbers.
     pub(crate) fn read(path: &Path) -> Result<Self> {
-        let of_stations = || std::fs::read_to_string(path).is_ok_and(|text| text.trim_start().starts_with("station"));
+        let of_stations = || range_io::read_text(path).is_ok_and(|text| text.trim_start().starts_with("station"));
         if path.extension().is_some_and(|ending| ending == "csv") && of_stations() {
             return Ok(Self::Stations(read_stations(path)?));
         }
@@ -79,7 +79,7 @@ pub(crate) fn matrix(path: &Path) -> Result<Option<Isometry3<f64>>> {
     if path.is_dir() {
         return Ok(None);
     }
-    let text = std::fs::read_to_string(path).map_err(|source| Error::Access { path: path.to_owned(), source })?;
+    let text = range_io::read_text(path)?;
     let words: Vec<&str> = text.split([' ', '\t', '\n', '\r', ',', ';']).filter(|word| !word.is_empty()).collect();
     let numbers: Vec<f64> = words.iter().filter_map(|word| word.parse().ok()).collect();
     if words.len() != 16 || numbers.len() != 16 {

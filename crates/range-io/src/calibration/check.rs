@@ -4,6 +4,7 @@ use scattering_deconvolution::Psf;
 
 use super::{Calibration, RangeCalibration, ValidSpan};
 use crate::InvalidField;
+use crate::limits::MOST_PARAMETERS;
 
 type Check = Result<(), InvalidField>;
 
@@ -128,6 +129,8 @@ fn check_parameters(
     known: impl Fn(&str) -> Option<&'static str>,
     names: &str,
 ) -> Check {
+    let count = parameters.len();
+    require(count <= MOST_PARAMETERS, path, || format!("has {count} parameters, expected at most {MOST_PARAMETERS}"))?;
     for (index, parameter) in parameters.iter().enumerate() {
         let NamedParameter { name, value, sigma, unit, .. } = parameter;
         let path = format!("{path}[{index}]");

@@ -15,8 +15,7 @@ use serde::{Deserialize, Serialize};
 pub use correlation::Correlation;
 pub use drift::CalibratedDrift;
 
-use crate::text::read_text;
-use crate::{InvalidField, Result, atomic, ron_text};
+use crate::{InvalidField, Result, atomic, read_ron_text, ron_text};
 
 /// A camera's calibration with the quality of every parameter.
 ///
@@ -153,7 +152,7 @@ impl Calibration {
     pub fn read(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
         let file = if path.is_dir() { path.join(Self::FILE_NAME) } else { path.to_path_buf() };
-        Self::parse(&file, &read_text(&file)?)
+        Self::parse(&file, &read_ron_text(&file)?)
     }
 
     /// Reads and checks the text of a `calibration.ron`; `file` stands for it in messages.

@@ -37,7 +37,7 @@ impl CloudFormat {
         if path.is_dir() {
             return Err(Error::format(path, "is a folder, expected the file of a point cloud"));
         }
-        let file = std::fs::File::open(path).map_err(Error::io(path, "open"))?;
+        let (file, _) = crate::open(path)?;
         let mut bytes = Vec::new();
         file.take(BEGINNING).read_to_end(&mut bytes).map_err(Error::io(path, "read"))?;
         let starts = |begin: &str| bytes.starts_with(begin.as_bytes());

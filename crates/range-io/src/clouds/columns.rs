@@ -1,5 +1,6 @@
 use super::CloudFile;
 use super::file::{COVARIANCE, NORMAL, POSITION};
+use crate::fault::{Fault, collected, reserve};
 
 /// The recognised properties of a file's points as columns.
 pub(crate) struct Columns {
@@ -24,7 +25,7 @@ pub(crate) fn canonical(name: &str) -> String {
 
 impl Columns {
     /// Columns for the properties that are known; `points` must have been held against the file's length.
-    pub(crate) fn new<'a>(properties: impl IntoIterator<Item = &'a str>, points: usize) -> Result<Self, String> {
+    pub(crate) fn new<'a>(properties: impl IntoIterator<Item = &'a str>, points: usize) -> Result<Self, Fault> {
         const SINGLE: [&str; 4] = ["intensity", "sigma", "flags", "frame"];
         let known = || POSITION.iter().chain(&NORMAL).chain(&COVARIANCE).chain(&SINGLE);
         let mut columns: Vec<(String, Vec<f64>)> = Vec::new();
@@ -36,10 +37,10 @@ impl Columns {
                 continue;
             }
             if columns.iter().any(|(earlier, _)| *earlier == canonical) {
-                return Err(format!("has property `{canonical}` twice"));
+                return Err(format!("has property `{canonical}` twice").into());
             }
             of_property.push(Some(columns.len()));
-            columns.push((canonical, Vec::with_capacity(points)));
+            columns.push((canonical, reserve(points)?));
         }
         Ok(Self { columns, of_property })
     }
@@ -51,20 +52,24 @@ impl Columns {
     }
 
     /// The cloud; each column must have `points` values.
-    pub(crate) fn into_cloud(mut self, points: usize) -> Result<CloudFile, String> {
+    pub(crate) fn into_cloud(mut self, points: usize) -> Result<CloudFile, Fault> {
         if let Some((name, values)) = self.columns.iter().find(|(_, values)| values.len() != points) {
-            return Err(format!("has {} values of `{name}` for {points} points", values.len()));
+            return Err(format!("has {} values of `{name}` for {points} points", values.len()).into());
         }
         let positions = self.take_all(POSITION)?.ok_or("has no properties `x`, `y`, `z`")?;
         let normals = self.take_all(NORMAL)?;
         let covariance = self.take_all(COVARIANCE)?;
+        let single = |values: Vec<f64>| collected(values.iter().map(|&value| value as f32));
         Ok(CloudFile {
-            points: (0..points).map(|i| std::array::from_fn(|axis| positions[axis][i])).collect(),
-            normals: normals.map(|n| (0..points).map(|i| std::array::from_fn(|axis| n[axis][i] as f32)).collect()),
+            points: collected((0..points).map(|i| std::array::from_fn(|axis| positions[axis][i])))?,
+            normals: normals
+                .map(|n| collected((0..points).map(|i| std::array::from_fn(|axis| n[axis][i] as f32))))
+                .transpose()?,
             covariance: covariance
-                .map(|c| (0..points).map(|i| std::array::from_fn(|term| c[term][i] as f32)).collect()),
-            intensity: self.take("intensity").map(|values| values.iter().map(|&value| value as f32).collect()),
-            sigma: self.take("sigma").map(|values| values.iter().map(|&value| value as f32).collect()),
+                .map(|c| collected((0..points).map(|i| std::array::from_fn(|term| c[term][i] as f32))))
+                .transpose()?,
+            intensity: self.take("intensity").map(single).transpose()?,
+            sigma: self.take("sigma").map(single).transpose()?,
             flags: self
                 .take("flags")
                 .map(|values| whole("flags", &values, f64::from(u16::MAX), |v| v as u16))
@@ -95,10 +100,10 @@ impl Columns {
 }
 
 /// Values that must be whole numbers from 0 to `largest`.
-fn whole<T>(name: &str, values: &[f64], largest: f64, convert: fn(f64) -> T) -> Result<Vec<T>, String> {
+fn whole<T>(name: &str, values: &[f64], largest: f64, convert: fn(f64) -> T) -> Result<Vec<T>, Fault> {
     let bad = values.iter().find(|value| !(value.fract() == 0.0 && (0.0..=largest).contains(*value)));
     match bad {
-        Some(value) => Err(format!("has `{name}` = {value}, expected a whole number from 0 to {largest}")),
-        None => Ok(values.iter().map(|&value| convert(value)).collect()),
+        Some(value) => Err(format!("has `{name}` = {value}, expected a whole number from 0 to {largest}").into()),
+        None => Ok(collected(values.iter().map(|&value| convert(value)))?),
     }
 }

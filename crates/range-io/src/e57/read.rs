@@ -1,4 +1,3 @@
-use std::fs::File;
 use std::io::{BufReader, Read, Seek};
 use std::path::Path;
 
@@ -6,23 +5,52 @@ use ::e57::{E57Reader, PointCloud, RecordDataType, RecordName};
 
 use super::{E57Scan, fields};
 use crate::clouds::{COVARIANCE, CloudFile};
+use crate::fault::{Fault, reserve};
+use crate::limits::MOST_SCANS;
 use crate::pose::pose_of;
 use crate::{Error, Result};
 
 /// Reads all scans of a file.
 pub fn read_e57(path: impl AsRef<Path>) -> Result<Vec<E57Scan>> {
     let path = path.as_ref();
-    let file = File::open(path).map_err(Error::io(path, "open"))?;
-    let length = file.metadata().map_err(Error::io(path, "find the size of"))?.len();
+    let (file, length) = crate::open(path)?;
     let broken = |error: ::e57::Error| Error::format(path, format!("is no E57 file that can be read: {error}"));
     let mut reader = E57Reader::new(BufReader::with_capacity(1 << 16, file)).map_err(broken)?;
     let headers = reader.pointclouds();
+    check_sizes(&headers, length).map_err(|fault| fault.of(path))?;
     let scans = headers.iter().enumerate().map(|(index, header)| {
-        let cloud = read_scan(&mut reader, header, length);
-        let cloud = cloud.map_err(|reason| Error::format(path, format!("scan {index} {reason}")))?;
+        let cloud = read_scan(&mut reader, header).map_err(|fault| match fault {
+            Fault::Content(reason) => Error::format(path, format!("scan {index} {reason}")),
+            system => system.of(path),
+        })?;
         Ok(E57Scan { name: header.name.clone().unwrap_or_default(), cloud })
     });
     scans.collect()
+}
+
+/// Holds what the scans promise together against the `length` of the file: several could point at the same points.
+fn check_sizes(headers: &[PointCloud], length: u64) -> Reason<()> {
+    if headers.len() > MOST_SCANS {
+        return Err(format!("has {} scans, expected at most {MOST_SCANS}", headers.len()).into());
+    }
+    let mut all = 0_u64;
+    for (index, header) in headers.iter().enumerate() {
+        let records = header.records;
+        let bits: u64 = header.prototype.iter().map(|record| bits(&record.data_type)).sum();
+        // Columns of one value throughout take no bits. Where most are such, a few bytes would become gigabytes.
+        let columns = header.prototype.len() as u64;
+        if bits < columns {
+            return Err(format!("scan {index} has {columns} columns in {bits} bits a point").into());
+        }
+        let bytes = records.checked_mul(bits).map(|bits| bits / 8);
+        all = bytes.and_then(|bytes| all.checked_add(bytes)).unwrap_or(u64::MAX);
+        if all > length {
+            let reason =
+                format!("scan {index} promises {records} points, more than the {length} bytes of the file hold");
+            return Err(reason.into());
+        }
+    }
+    Ok(())
 }
 
 /// Columns of a scan; those there are have one value a point.
@@ -35,22 +63,17 @@ struct Scan {
     cloud: CloudFile,
 }
 
-type Reason<T> = std::result::Result<T, String>;
+type Reason<T> = std::result::Result<T, Fault>;
 
-/// `length` is that of the file.
-fn read_scan<T: Read + Seek>(reader: &mut E57Reader<T>, header: &PointCloud, length: u64) -> Reason<CloudFile> {
-    // A point takes at least the bits of its prototype. One whose values all take no bits says nothing a scan could.
-    let bits: u64 = header.prototype.iter().map(|record| bits(&record.data_type)).sum();
-    if header.records.checked_mul(bits.max(1)).is_none_or(|bits| bits / 8 > length) {
-        return Err(format!("promises {} points, more than the {length} bytes of the file hold", header.records));
-    }
+fn read_scan<T: Read + Seek>(reader: &mut E57Reader<T>, header: &PointCloud) -> Reason<CloudFile> {
     let pose = header.transform.as_ref().map(|transform| {
         let (t, q) = (&transform.translation, &transform.rotation);
         pose_of(&[t.x, t.y, t.z], &[q.x, q.y, q.z, q.w]).ok_or("has a pose whose quaternion has not the length 1")
     });
     let pose = pose.transpose()?;
-    let points = header.records as usize;
-    let mut columns: Vec<Vec<f64>> = header.prototype.iter().map(|_| Vec::with_capacity(points)).collect();
+    let points = usize::try_from(header.records).map_err(|_| "has more points than this machine can address")?;
+    let columns: std::io::Result<Vec<Vec<f64>>> = header.prototype.iter().map(|_| reserve(points)).collect();
+    let mut columns = columns?;
     let broken = |error: ::e57::Error| format!("cannot be read: {error}");
     for point in reader.pointcloud_raw(header).map_err(broken)? {
         let values = point.map_err(broken)?;

@@ -2,6 +2,8 @@
 
 use std::io::{self, BufRead, BufReader, Read, Seek};
 
+use crate::fault::zeros;
+
 /// Elements that are looked into or read; the identifiers are Matroska's.
 pub(super) mod id {
     pub const SEGMENT: u32 = 0x1853_8067;
@@ -100,7 +102,7 @@ impl<R: Read + Seek> Elements<R> {
             let (id, size) = (element.id, element.size);
             return Err(invalid(format!("element {id:#x} has {size} bytes, expected at most {most}")));
         }
-        let mut data = vec![0; element.size as usize];
+        let mut data = zeros(element.size as usize)?;
         self.reader.read_exact(&mut data)?;
         self.position += element.size;
         Ok(data)

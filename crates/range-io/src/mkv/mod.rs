@@ -14,7 +14,8 @@ use std::path::{Path, PathBuf};
 
 use range_image::Raster;
 
-use crate::limits::MOST_PIXELS;
+use crate::fault::{Fault, zeros};
+use crate::limits::{LONGEST_ATTACHMENT, MOST_ATTACHMENTS, MOST_IMAGES, MOST_PIXELS, MOST_TRACKS};
 use crate::{Error, Result};
 use ebml::{Element, Elements, id};
 
@@ -23,8 +24,6 @@ pub const DEPTH: &str = "DEPTH";
 /// Name of the infrared track.
 pub const INFRARED: &str = "IR";
 
-/// Largest attachment that is read.
-const MOST_ATTACHED: u64 = 1 << 24;
 const MOST_NANOSECONDS: u64 = i64::MAX as u64;
 
 /// One track of a recording.
@@ -84,7 +83,7 @@ impl Recording<File> {
     /// Opens a recording and notes where its images lie.
     pub fn open(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
-        Self::new(path, File::open(path).map_err(Error::io(path, "open"))?)
+        Self::new(path, crate::open(path)?.0)
     }
 }
 
@@ -93,9 +92,10 @@ impl<R: Read + Seek> Recording<R> {
     pub fn new(name: impl Into<PathBuf>, mut reader: R) -> Result<Self> {
         let file = name.into();
         let mut index = Index { nanoseconds_per_tick: 1_000_000, ..Index::default() };
-        index
-            .read(&mut reader)
-            .map_err(|error| Error::format(&file, format!("is no complete Matroska file: {error}")))?;
+        index.read(&mut reader).map_err(|error| match Fault::from(error) {
+            Fault::Content(reason) => Error::format(&file, format!("is no complete Matroska file: {reason}")),
+            system => system.of(&file),
+        })?;
         let Index { tracks, blocks, attachments, nanoseconds_per_tick, .. } = index;
         Ok(Self { file, reader, tracks, blocks, attachments, nanoseconds_per_tick })
     }
@@ -156,7 +156,7 @@ impl<R: Read + Seek> Recording<R> {
                 format!("track `{name}` has an image of {size} bytes, expected {expected} for {width} x {height}");
             return Err(Error::format(&self.file, reason));
         }
-        let mut bytes = vec![0_u8; expected as usize];
+        let mut bytes = zeros(expected as usize).map_err(Error::io(&self.file, "reserve memory for"))?;
         let read = self.reader.seek(io::SeekFrom::Start(block.offset)).and_then(|_| self.reader.read_exact(&mut bytes));
         read.map_err(Error::io(&self.file, "read an image of"))?;
         let values = bytes.as_chunks().0.iter().map(|&pair| u16::from_be_bytes(pair)).collect();
@@ -208,7 +208,11 @@ impl Index {
 
     fn element<R: Read + Seek>(&mut self, elements: &mut Elements<R>, element: &Element) -> io::Result<()> {
         match element.id {
+            id::TRACK_ENTRY if self.tracks.len() == MOST_TRACKS => return Err(too_many("tracks", MOST_TRACKS)),
             id::TRACK_ENTRY => self.tracks.push(Track::default()),
+            id::ATTACHED_FILE if self.attachments.len() == MOST_ATTACHMENTS => {
+                return Err(too_many("attachments", MOST_ATTACHMENTS));
+            }
             id::ATTACHED_FILE => self.attachments.push(Default::default()),
             id::TIMESTAMP_SCALE => self.nanoseconds_per_tick = elements.unsigned(element)?.clamp(1, MOST_NANOSECONDS),
             id::TIMESTAMP => self.cluster_ticks = elements.unsigned(element)?.min(MOST_NANOSECONDS) as i64,
@@ -242,8 +246,8 @@ impl Index {
         let Some((name, data)) = self.attachments.last_mut() else { return elements.skip(element.size) };
         if element.id == id::FILE_NAME {
             *name = elements.text(element)?;
-        } else if element.size <= MOST_ATTACHED {
-            *data = elements.data(element, MOST_ATTACHED)?;
+        } else if element.size <= LONGEST_ATTACHMENT {
+            *data = elements.data(element, LONGEST_ATTACHMENT)?;
         } else {
             elements.skip(element.size)?;
         }
@@ -265,11 +269,18 @@ impl Index {
         if lacing != 0 {
             return Err(invalid("a block holds several frames (lacing), expected one"));
         }
+        if self.blocks.len() == MOST_IMAGES {
+            return Err(too_many("images", MOST_IMAGES));
+        }
         let ticks = self.cluster_ticks.saturating_add(i64::from(i16::from_be_bytes([*high, *low])));
         let head = length as u64 + 4;
         self.blocks.push(Block { track, ticks, offset: element.offset + head, size: element.size - head });
         Ok(())
     }
+}
+
+fn too_many(what: &str, most: usize) -> io::Error {
+    invalid(&format!("it has more than {most} {what}"))
 }
 
 fn invalid(reason: &str) -> io::Error {

@@ -1,5 +1,8 @@
 use std::io::Read;
 
+use crate::fault::Fault;
+use crate::limits::LONGEST_ARRAY_HEADER;
+
 /// Element types that are read and written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
@@ -60,8 +63,6 @@ pub struct ArrayHeader {
 }
 
 const MAGIC: &[u8; 6] = b"\x93NUMPY";
-/// numpy's own headers take 118 bytes; a longer one than this is no array of numbers.
-const LONGEST_HEADER: usize = 1 << 16;
 
 impl ArrayHeader {
     /// Number of elements, `None` where it does not fit the machine.
@@ -75,7 +76,7 @@ impl ArrayHeader {
     }
 
     /// Reads the header up to the first byte of the data, and counts its bytes; the error says what was expected.
-    pub(super) fn read(reader: &mut impl Read) -> Result<(Self, usize), String> {
+    pub(super) fn read(reader: &mut impl Read) -> Result<(Self, usize), Fault> {
         let mut start = [0_u8; 8];
         read_exact(reader, &mut start)?;
         if start[..6] != *MAGIC {
@@ -92,10 +93,10 @@ impl ArrayHeader {
                 read_exact(reader, &mut bytes)?;
                 (u32::from_le_bytes(bytes) as usize, 12)
             }
-            other => return Err(format!("is of .npy version {other}, expected 1, 2 or 3")),
+            other => return Err(format!("is of .npy version {other}, expected 1, 2 or 3").into()),
         };
-        if length > LONGEST_HEADER {
-            return Err(format!("has a header of {length} bytes, expected at most {LONGEST_HEADER}"));
+        if length > LONGEST_ARRAY_HEADER {
+            return Err(format!("has a header of {length} bytes, expected at most {LONGEST_ARRAY_HEADER}").into());
         }
         let mut text = vec![0_u8; length];
         read_exact(reader, &mut text)?;
@@ -125,8 +126,8 @@ impl ArrayHeader {
     }
 }
 
-fn read_exact(reader: &mut impl Read, bytes: &mut [u8]) -> Result<(), String> {
-    reader.read_exact(bytes).map_err(|error| format!("ends within its header: {error}"))
+fn read_exact(reader: &mut impl Read, bytes: &mut [u8]) -> Result<(), Fault> {
+    reader.read_exact(bytes).map_err(Fault::at("ends within its header"))
 }
 
 /// Reader of the Python literal `{'descr': '<f4', 'fortran_order': False, 'shape': (2, 3), }`.

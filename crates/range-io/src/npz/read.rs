@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 use zip::ZipArchive;
 
 use super::{Array, ArrayHeader, DataType, Values};
+use crate::fault::{Fault, reserve, zeros};
+use crate::limits::LARGEST_DEFLATION;
 use crate::{Error, Result};
 
-/// Deflate codes at most 258 bytes in two bits; no member can hold more than this many times its compressed size.
-const LARGEST_EXPANSION: u64 = 1032;
 /// Elements converted at a time.
 const BLOCK: usize = 1 << 14;
 
@@ -17,24 +17,26 @@ const BLOCK: usize = 1 << 14;
 pub struct NpzReader<R> {
     file: PathBuf,
     archive: ZipArchive<R>,
+    /// Bytes of the archive.
+    length: u64,
 }
 
 impl NpzReader<BufReader<File>> {
     /// Opens an archive and reads its directory.
     pub fn open(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
-        let file = File::open(path).map_err(Error::io(path, "open"))?;
-        Self::new(path, BufReader::with_capacity(1 << 16, file))
+        Self::new(path, BufReader::with_capacity(1 << 16, crate::open(path)?.0))
     }
 }
 
 impl<R: Read + Seek> NpzReader<R> {
     /// Reads the directory of an archive; `name` stands for the file in messages.
-    pub fn new(name: impl Into<PathBuf>, reader: R) -> Result<Self> {
+    pub fn new(name: impl Into<PathBuf>, mut reader: R) -> Result<Self> {
         let file = name.into();
+        let length = reader.seek(io::SeekFrom::End(0)).map_err(Error::io(&file, "find the size of"))?;
         let archive = ZipArchive::new(reader)
             .map_err(|error| Error::format(&file, format!("is not a complete .npz archive: {error}")))?;
-        Ok(Self { file, archive })
+        Ok(Self { file, archive, length })
     }
 
     /// Names of the arrays in the order of the archive.
@@ -56,7 +58,9 @@ impl<R: Read + Seek> NpzReader<R> {
         let source = Source { file: &self.file, array };
         let mut member =
             self.archive.by_index(index).map_err(|error| source.error(format!("cannot be read: {error}")))?;
-        let bound = member.size().min(member.compressed_size().saturating_mul(LARGEST_EXPANSION));
+        // Both sizes are the directory's word.
+        let packed = member.compressed_size().min(self.length);
+        let bound = member.size().min(packed.saturating_mul(LARGEST_DEFLATION));
         source.read(&mut member, bound, accept)
     }
 
@@ -70,8 +74,7 @@ impl<R: Read + Seek> NpzReader<R> {
 /// Reads a bare `.npy` file; `array` names it in messages, `accept` as in [`NpzReader::read`].
 pub fn read_npy(path: impl AsRef<Path>, array: &str, accept: impl FnOnce(&ArrayHeader) -> Result<()>) -> Result<Array> {
     let path = path.as_ref();
-    let file = File::open(path).map_err(Error::io(path, "open"))?;
-    let length = file.metadata().map_err(Error::io(path, "find the size of"))?.len();
+    let (file, length) = crate::open(path)?;
     Source { file: path, array }.read(&mut BufReader::new(file), length, accept)
 }
 
@@ -86,6 +89,13 @@ impl Source<'_> {
         Error::Array { file: self.file.to_path_buf(), array: self.array.to_owned(), reason: reason.into() }
     }
 
+    fn fault(&self, fault: Fault) -> Error {
+        match fault {
+            Fault::Content(reason) => self.error(reason),
+            system => system.of(self.file),
+        }
+    }
+
     /// `bound` is the largest number of bytes that `reader` can give.
     fn read(
         &self,
@@ -93,7 +103,7 @@ impl Source<'_> {
         bound: u64,
         accept: impl FnOnce(&ArrayHeader) -> Result<()>,
     ) -> Result<Array> {
-        let (header, header_bytes) = ArrayHeader::read(reader).map_err(|reason| self.error(reason))?;
+        let (header, header_bytes) = ArrayHeader::read(reader).map_err(|fault| self.fault(fault))?;
         let bound = bound.saturating_sub(header_bytes as u64);
         match header.bytes() {
             Some(bytes) if bytes as u64 <= bound => {}
@@ -106,8 +116,12 @@ impl Source<'_> {
         }
         accept(&header)?;
         let count = header.elements().unwrap_or(0);
-        let values = read_values(reader, header.data_type, count)
-            .map_err(|error| self.error(format!("ends before its shape {:?} is filled: {error}", header.shape)))?;
+        let values = read_values(reader, header.data_type, count).map_err(|error| match Fault::from(error) {
+            Fault::Content(reason) => {
+                self.error(format!("ends before its shape {:?} is filled: {reason}", header.shape))
+            }
+            system => self.fault(system),
+        })?;
         self.require_end(reader)?;
         Ok(Array { shape: header.shape, values })
     }
@@ -118,7 +132,10 @@ impl Source<'_> {
         match reader.read(&mut surplus) {
             Ok(0) => Ok(()),
             Ok(_) => Err(self.error("has more bytes than its shape takes")),
-            Err(error) => Err(self.error(format!("is damaged: {error}"))),
+            Err(error) => Err(match Fault::from(error) {
+                Fault::Content(reason) => self.error(format!("is damaged: {reason}")),
+                system => self.fault(system),
+            }),
         }
     }
 }
@@ -141,9 +158,8 @@ fn read_elements<T, const N: usize>(
     count: usize,
     convert: impl Fn([u8; N]) -> T,
 ) -> io::Result<Vec<T>> {
-    let mut elements = Vec::new();
-    elements.try_reserve_exact(count).map_err(io::Error::other)?;
-    let mut block = vec![0_u8; BLOCK.min(count) * N];
+    let mut elements = reserve(count)?;
+    let mut block = zeros(BLOCK.min(count) * N)?;
     while elements.len() < count {
         let bytes = &mut block[..BLOCK.min(count - elements.len()) * N];
         reader.read_exact(bytes)?;

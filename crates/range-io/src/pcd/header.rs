@@ -1,7 +1,10 @@
-use std::io::{BufRead, Read};
+use std::io::BufRead;
 
 use nalgebra::Isometry3;
 
+use crate::fault::Fault;
+use crate::limits::{LONGEST_POINT, MOST_HEADER_LINES};
+use crate::lines::read_line;
 use crate::pose::pose_of;
 
 /// How the numbers of a file are written.
@@ -35,30 +38,26 @@ pub(super) struct Header {
     pub encoding: Encoding,
 }
 
-/// Longer headers belong to other files.
-const MOST_LINES: usize = 1000;
-const LONGEST_LINE: u64 = 1 << 14;
-/// More bytes a point than any sensor's descriptors fill.
-const MOST_BYTES: usize = 1 << 20;
-
 impl Header {
     /// Reads up to the line `DATA`; the error says what was expected.
-    pub fn read(reader: &mut impl BufRead) -> Result<Self, String> {
+    pub fn read(reader: &mut impl BufRead) -> Result<Self, Fault> {
+        let mut bytes = Vec::new();
         let mut lines: Vec<(String, Vec<String>)> = Vec::new();
-        for _ in 0..MOST_LINES {
-            let line = line(reader)?;
+        for _ in 0..MOST_HEADER_LINES {
+            let line = read_line(reader, &mut bytes)?.filter(|line| line.ends_with('\n'));
+            let line = line.ok_or("ends within its header")?;
             let mut words = line.split_whitespace().map(str::to_owned);
             let Some(key) = words.next().filter(|key| !key.starts_with('#')) else { continue };
             let last = key == "DATA";
             if lines.iter().any(|(earlier, _)| *earlier == key) {
-                return Err(format!("has the line `{key}` twice in its header"));
+                return Err(format!("has the line `{key}` twice in its header").into());
             }
             lines.push((key, words.collect()));
             if last {
-                return Self::of_lines(&Lines(lines));
+                return Ok(Self::of_lines(&Lines(lines))?);
             }
         }
-        Err(format!("has no line `DATA` among its first {MOST_LINES}"))
+        Err(format!("has no line `DATA` among its first {MOST_HEADER_LINES}").into())
     }
 
     fn of_lines(lines: &Lines) -> Result<Self, String> {
@@ -136,8 +135,8 @@ fn fields(lines: &Lines) -> Result<Vec<Field>, String> {
         let count = counts.map_or("1", |counts| counts[index].as_str());
         let count: usize = count.parse().map_err(|_| format!("has `COUNT` {count} of `{name}`, expected a number"))?;
         total = count.saturating_mul(size).saturating_add(total);
-        if total > MOST_BYTES {
-            return Err(format!("has points of more than {MOST_BYTES} bytes"));
+        if total > LONGEST_POINT {
+            return Err(format!("has points of more than {LONGEST_POINT} bytes"));
         }
         fields.push(Field { name: name.clone(), kind: kind.chars().next().unwrap_or('F'), size, count });
     }
@@ -157,14 +156,4 @@ fn viewpoint(lines: &Lines) -> Result<Option<Isometry3<f64>>, String> {
         format!("has `VIEWPOINT {}`, expected a position and a unit quaternion w x y z", words.join(" "))
     })?;
     Ok(Some(pose).filter(|pose| *pose != Isometry3::identity()))
-}
-
-fn line(reader: &mut impl BufRead) -> Result<String, String> {
-    let mut bytes = Vec::new();
-    let read = Read::take(reader, LONGEST_LINE).read_until(b'\n', &mut bytes);
-    read.map_err(|error| format!("cannot be read: {error}"))?;
-    if bytes.last() != Some(&b'\n') {
-        return Err("ends within its header".into());
-    }
-    String::from_utf8(bytes).map_err(|_| "has a header that is no text".to_owned())
 }

@@ -3,11 +3,8 @@
 /// A back reference of three bytes stands for at most this many.
 pub(super) const LONGEST_REFERENCE: usize = 264;
 
-/// The `length` bytes that `packed` stands for; the error says what is wrong with it.
-///
-/// `length` must be no more than `packed` can stand for, see [`is_possible`].
-pub(super) fn decompress(packed: &[u8], length: usize) -> Result<Vec<u8>, &'static str> {
-    let mut out = Vec::with_capacity(length);
+/// Appends the `length` bytes that `packed` stands for to `out`, which is empty; the error says what is wrong with it.
+pub(super) fn decompress(packed: &[u8], length: usize, out: &mut Vec<u8>) -> Result<(), &'static str> {
     let mut at = 0;
     let mut next = |count: usize| {
         let bytes = packed.get(at..at + count);
@@ -37,7 +34,7 @@ pub(super) fn decompress(packed: &[u8], length: usize) -> Result<Vec<u8>, &'stat
             return Err("holds more than it promises");
         }
     }
-    if out.len() == length { Ok(out) } else { Err("holds less than it promises") }
+    if out.len() == length { Ok(()) } else { Err("holds less than it promises") }
 }
 
 /// Whether `packed` bytes can stand for `length`.

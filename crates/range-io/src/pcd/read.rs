@@ -1,11 +1,11 @@
-use std::fs::File;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
 
 use super::header::{Encoding, Field, Header};
 use super::lzf;
-use crate::Error;
 use crate::clouds::{CloudFile, Columns};
+use crate::fault::{Fault, reserve, zeros};
+use crate::lines::read_line;
 
 /// Points decoded at a time.
 const BLOCK: usize = 1 << 12;
@@ -13,14 +13,13 @@ const BLOCK: usize = 1 << 12;
 /// Reads a PCD file, its fields in any order.
 pub fn read_pcd(path: impl AsRef<Path>) -> crate::Result<CloudFile> {
     let path = path.as_ref();
-    let file = File::open(path).map_err(Error::io(path, "open"))?;
-    let length = file.metadata().map_err(Error::io(path, "find the size of"))?.len();
+    let (file, length) = crate::open(path)?;
     let read = read_from(&mut BufReader::with_capacity(1 << 16, file), length);
-    read.map_err(|reason| Error::format(path, reason))
+    read.map_err(|fault| fault.of(path))
 }
 
 /// `length` is the largest number of bytes that `reader` can give.
-fn read_from(reader: &mut impl BufRead, length: u64) -> Result<CloudFile, String> {
+fn read_from(reader: &mut impl BufRead, length: u64) -> Result<CloudFile, Fault> {
     let header = Header::read(reader)?;
     let packing = match header.encoding {
         // One digit and one blank are the least that an ASCII number takes.
@@ -29,12 +28,12 @@ fn read_from(reader: &mut impl BufRead, length: u64) -> Result<CloudFile, String
         Encoding::Compressed => header.point_size().div_ceil(lzf::LONGEST_REFERENCE) as u64,
     };
     if (header.points as u64).checked_mul(packing.max(1)).is_none_or(|bytes| bytes > length) {
-        return Err(format!("promises {} points, more than its {length} bytes hold", header.points));
+        return Err(format!("promises {} points, more than its {length} bytes hold", header.points).into());
     }
     for field in &header.fields {
         let known = Columns::new([field.name.as_str()], 0).is_ok_and(|mut columns| columns.of_property(0).is_some());
         if known && field.count != 1 {
-            return Err(format!("has {} values of `{}` a point, expected one", field.count, field.name));
+            return Err(format!("has {} values of `{}` a point, expected one", field.count, field.name).into());
         }
     }
     let mut columns = Columns::new(header.fields.iter().map(|field| field.name.as_str()), header.points)?;
@@ -49,17 +48,13 @@ fn read_from(reader: &mut impl BufRead, length: u64) -> Result<CloudFile, String
     Ok(cloud)
 }
 
-fn read_ascii(reader: &mut impl BufRead, header: &Header, columns: &mut Columns) -> Result<(), String> {
-    let mut line = String::new();
+fn read_ascii(reader: &mut impl BufRead, header: &Header, columns: &mut Columns) -> Result<(), Fault> {
+    let mut line = Vec::new();
     let values: usize = header.fields.iter().map(|field| field.count).sum();
     for point in 0..header.points {
-        line.clear();
-        match reader.read_line(&mut line) {
-            Ok(0) => return Err(format!("ends before its last point: has {point} of {}", header.points)),
-            Ok(_) => {}
-            Err(error) => return Err(format!("cannot be read: {error}")),
-        }
-        let mut words = line.split_ascii_whitespace();
+        let text = read_line(reader, &mut line)?
+            .ok_or_else(|| format!("ends before its last point: has {point} of {}", header.points))?;
+        let mut words = text.split_ascii_whitespace();
         for (index, field) in header.fields.iter().enumerate() {
             for _ in 0..field.count {
                 let word = words.next().ok_or_else(|| format!("has no `{}` in point {point}", field.name))?;
@@ -72,21 +67,21 @@ fn read_ascii(reader: &mut impl BufRead, header: &Header, columns: &mut Columns)
             }
         }
         if words.next().is_some() {
-            return Err(format!("has more than {values} values in point {point}"));
+            return Err(format!("has more than {values} values in point {point}").into());
         }
     }
     Ok(())
 }
 
-fn read_binary(reader: &mut impl BufRead, header: &Header, columns: &mut Columns) -> Result<(), String> {
+fn read_binary(reader: &mut impl BufRead, header: &Header, columns: &mut Columns) -> Result<(), Fault> {
     let size = header.point_size();
     if size == 0 {
         return Ok(());
     }
-    let mut block = vec![0_u8; size * BLOCK.min(header.points)];
+    let mut block = zeros(size.saturating_mul(BLOCK.min(header.points)))?;
     for start in (0..header.points).step_by(BLOCK) {
         let bytes = &mut block[..size * BLOCK.min(header.points - start)];
-        reader.read_exact(bytes).map_err(|error| format!("ends before its last point: {error}"))?;
+        reader.read_exact(bytes).map_err(Fault::at("ends before its last point"))?;
         let mut offset = 0;
         for (index, field) in header.fields.iter().enumerate() {
             if let Some(column) = columns.of_property(index) {
@@ -105,23 +100,24 @@ fn read_compressed(
     header: &Header,
     length: u64,
     columns: &mut Columns,
-) -> Result<(), String> {
+) -> Result<(), Fault> {
     let mut sizes = [0_u8; 8];
-    reader.read_exact(&mut sizes).map_err(|error| format!("ends before its points: {error}"))?;
+    reader.read_exact(&mut sizes).map_err(Fault::at("ends before its points"))?;
     let [a, b, c, d, e, f, g, h] = sizes;
     let (packed, unpacked) = (u32::from_le_bytes([a, b, c, d]), u32::from_le_bytes([e, f, g, h]) as usize);
     let expected = header.point_size().saturating_mul(header.points);
     if unpacked != expected {
-        return Err(format!("has {unpacked} bytes of points once unpacked, expected {expected}"));
+        return Err(format!("has {unpacked} bytes of points once unpacked, expected {expected}").into());
     }
     if u64::from(packed) > length || !lzf::is_possible(packed as usize, unpacked) {
-        return Err(format!("promises {unpacked} bytes packed into {packed}, more than its {length} bytes hold"));
+        return Err(format!("promises {unpacked} bytes packed into {packed}, more than its {length} bytes hold").into());
     }
-    let mut bytes = vec![0_u8; packed as usize];
-    reader.read_exact(&mut bytes).map_err(|error| format!("ends before its last point: {error}"))?;
-    let bytes =
-        lzf::decompress(&bytes, unpacked).map_err(|reason| format!("has packed points: the packing {reason}"))?;
-    let mut rest = bytes.as_slice();
+    let mut bytes = zeros(packed as usize)?;
+    reader.read_exact(&mut bytes).map_err(Fault::at("ends before its last point"))?;
+    let mut room = reserve(unpacked)?;
+    lzf::decompress(&bytes, unpacked, &mut room)
+        .map_err(|reason| format!("has packed points: the packing {reason}"))?;
+    let mut rest = room.as_slice();
     for (index, field) in header.fields.iter().enumerate() {
         let (values, behind) = rest.split_at(field.bytes() * header.points);
         if let Some(column) = columns.of_property(index) {

@@ -2,6 +2,9 @@ use std::io::BufRead;
 
 use nalgebra::Isometry3;
 
+use crate::fault::Fault;
+use crate::limits::MOST_HEADER_LINES;
+use crate::lines::read_line;
 use crate::pose::pose_of;
 
 /// How the numbers of a file are written.
@@ -100,26 +103,27 @@ struct Element {
     has_list: bool,
 }
 
-/// Longer headers belong to other files.
-const MOST_LINES: usize = 10_000;
-const LONGEST_LINE: u64 = 4096;
-
 impl Header {
     /// Reads up to the line `end_header`; the error says what was expected.
-    pub fn read(reader: &mut impl BufRead) -> Result<Self, String> {
-        if line(reader)? != "ply" {
+    pub fn read(reader: &mut impl BufRead) -> Result<Self, Fault> {
+        let mut bytes = Vec::new();
+        let mut line = || -> Result<String, Fault> {
+            let line = read_line(reader, &mut bytes)?.filter(|line| line.ends_with('\n'));
+            Ok(line.ok_or("ends within its header")?.trim_end().to_owned())
+        };
+        if line()? != "ply" {
             return Err("does not begin with the line `ply`".into());
         }
         let mut encoding = None;
         let mut elements: Vec<Element> = Vec::new();
         let mut remarks = Remarks::default();
-        for _ in 0..MOST_LINES {
-            let line = line(reader)?;
+        for _ in 0..MOST_HEADER_LINES {
+            let line = line()?;
             let words: Vec<_> = line.split_whitespace().collect();
             match words.as_slice() {
                 ["end_header"] => {
                     let encoding = encoding.ok_or("says no `format` in its header")?;
-                    return Self::of_elements(encoding, elements, &remarks);
+                    return Ok(Self::of_elements(encoding, elements, &remarks)?);
                 }
                 ["format", format, "1.0"] => encoding = Some(encoding_of(format)?),
                 ["element", name, count] => {
@@ -138,10 +142,10 @@ impl Header {
                 }
                 ["obj_info", rest @ ..] => remarks.take(rest)?,
                 [] | ["comment", ..] => {}
-                _ => return Err(format!("has the line `{line}` in its header, which is not understood")),
+                _ => return Err(format!("has the line `{line}` in its header, which is not understood").into()),
             }
         }
-        Err(format!("has no line `end_header` among its first {MOST_LINES}"))
+        Err(format!("has no line `end_header` among its first {MOST_HEADER_LINES}").into())
     }
 
     fn of_elements(encoding: Encoding, mut elements: Vec<Element>, remarks: &Remarks) -> Result<Self, String> {
@@ -168,6 +172,18 @@ impl Header {
     pub fn vertex_size(&self) -> usize {
         self.properties.iter().map(|(_, scalar)| scalar.size()).sum()
     }
+
+    /// Bytes that the file holds at least behind its header; `None` where no file holds as many.
+    pub fn least_length(&self) -> Option<u64> {
+        let ascii = self.encoding == Encoding::Ascii;
+        // A number in ASCII takes a digit and a blank or a line's end, a line its end.
+        let vertex = if ascii { 2 * self.properties.len() } else { self.vertex_size() };
+        let mut least = self.vertices.checked_mul(vertex.max(1) as u64)?;
+        for &(count, size) in &self.before {
+            least = least.checked_add(count.checked_mul(if ascii { 1 } else { size as u64 })?)?;
+        }
+        Some(least)
+    }
 }
 
 fn encoding_of(name: &str) -> Result<Encoding, String> {
@@ -177,15 +193,4 @@ fn encoding_of(name: &str) -> Result<Encoding, String> {
         "binary_big_endian" => Ok(Encoding::BigEndian),
         other => Err(format!("has the format `{other}`, expected ascii, binary_little_endian or binary_big_endian")),
     }
-}
-
-fn line(reader: &mut impl BufRead) -> Result<String, String> {
-    let mut bytes = Vec::new();
-    let read = std::io::Read::take(reader, LONGEST_LINE).read_until(b'\n', &mut bytes);
-    read.map_err(|error| format!("cannot be read: {error}"))?;
-    if bytes.last() != Some(&b'\n') {
-        return Err("ends within its header".into());
-    }
-    let text = String::from_utf8(bytes).map_err(|_| "has a header that is no text".to_owned())?;
-    Ok(text.trim_end().to_owned())
 }

@@ -1,10 +1,10 @@
-use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 
 use super::header::{Encoding, Header, Scalar};
-use crate::Error;
 use crate::clouds::{CloudFile, Columns};
+use crate::fault::{Fault, zeros};
+use crate::lines::read_line;
 
 /// Vertices decoded at a time.
 const BLOCK: usize = 1 << 12;
@@ -12,25 +12,21 @@ const BLOCK: usize = 1 << 12;
 /// Reads the vertices of a PLY file, their properties in any order.
 pub fn read_cloud(path: impl AsRef<Path>) -> crate::Result<CloudFile> {
     let path = path.as_ref();
-    let file = File::open(path).map_err(Error::io(path, "open"))?;
-    let length = file.metadata().map_err(Error::io(path, "find the size of"))?.len();
+    let (file, length) = crate::open(path)?;
     let read = read_from(&mut BufReader::with_capacity(1 << 16, file), length);
-    read.map_err(|reason| Error::format(path, reason))
+    read.map_err(|fault| fault.of(path))
 }
 
 /// `length` is the largest number of bytes that `reader` can give.
-fn read_from(reader: &mut impl BufRead, length: u64) -> Result<CloudFile, String> {
+fn read_from(reader: &mut impl BufRead, length: u64) -> Result<CloudFile, Fault> {
     let header = Header::read(reader)?;
-    // One digit and one blank are the least that an ASCII number takes.
-    let vertex_size = match header.encoding {
-        Encoding::Ascii => 2 * header.properties.len(),
-        _ => header.vertex_size(),
-    };
     let vertices = header.vertices;
-    if vertices.checked_mul(vertex_size.max(1) as u64).is_none_or(|bytes| bytes > length) {
-        return Err(format!("promises {vertices} vertices, more than its {length} bytes hold"));
+    if header.least_length().is_none_or(|bytes| bytes > length) {
+        let before: Vec<_> = header.before.iter().map(|(count, _)| count.to_string()).collect();
+        let before = if before.is_empty() { String::new() } else { format!(" behind {} elements", before.join(" + ")) };
+        return Err(format!("promises {vertices} vertices{before}, more than its {length} bytes hold").into());
     }
-    let vertices = vertices as usize;
+    let vertices = usize::try_from(vertices).map_err(|_| "has more vertices than this machine can address")?;
     let mut columns = Columns::new(header.properties.iter().map(|(name, _)| name.as_str()), vertices)?;
     match header.encoding {
         Encoding::Ascii => read_ascii(reader, &header, vertices, &mut columns)?,
@@ -44,27 +40,16 @@ fn read_from(reader: &mut impl BufRead, length: u64) -> Result<CloudFile, String
     Ok(cloud)
 }
 
-fn read_ascii(
-    reader: &mut impl BufRead,
-    header: &Header,
-    vertices: usize,
-    columns: &mut Columns,
-) -> Result<(), String> {
-    let mut line = String::new();
-    let mut next = |line: &mut String| -> Result<(), String> {
-        line.clear();
-        match reader.read_line(line) {
-            Ok(0) => Err("ends before its last vertex".into()),
-            Ok(_) => Ok(()),
-            Err(error) => Err(format!("cannot be read: {error}")),
+fn read_ascii(reader: &mut impl BufRead, header: &Header, vertices: usize, columns: &mut Columns) -> Result<(), Fault> {
+    let mut line = Vec::new();
+    for &(count, _) in &header.before {
+        for _ in 0..count {
+            read_line(reader, &mut line)?.ok_or("ends before its vertices")?;
         }
-    };
-    for _ in 0..header.before.iter().map(|(count, _)| *count).sum::<u64>() {
-        next(&mut line)?;
     }
     for vertex in 0..vertices {
-        next(&mut line)?;
-        let mut words = line.split_ascii_whitespace();
+        let text = read_line(reader, &mut line)?.ok_or("ends before its last vertex")?;
+        let mut words = text.split_ascii_whitespace();
         for (index, (name, _)) in header.properties.iter().enumerate() {
             let word = words.next().ok_or_else(|| format!("has no `{name}` in vertex {vertex}"))?;
             if let Some(column) = columns.of_property(index) {
@@ -75,7 +60,7 @@ fn read_ascii(
             }
         }
         if words.next().is_some() {
-            return Err(format!("has more than {} values in vertex {vertex}", header.properties.len()));
+            return Err(format!("has more than {} values in vertex {vertex}", header.properties.len()).into());
         }
     }
     Ok(())
@@ -87,19 +72,21 @@ fn read_binary(
     vertices: usize,
     columns: &mut Columns,
     decode: fn(Scalar, &[u8]) -> f64,
-) -> Result<(), String> {
+) -> Result<(), Fault> {
     for &(count, size) in &header.before {
         let bytes = count.saturating_mul(size as u64);
-        let skipped = std::io::copy(&mut reader.by_ref().take(bytes), &mut std::io::sink());
-        if skipped.map_err(|error| format!("cannot be read: {error}"))? != bytes {
+        if std::io::copy(&mut reader.by_ref().take(bytes), &mut std::io::sink())? != bytes {
             return Err("ends before its vertices".into());
         }
     }
     let size = header.vertex_size();
-    let mut block = vec![0_u8; size * BLOCK.min(vertices)];
+    if size == 0 {
+        return Ok(());
+    }
+    let mut block = zeros(size.saturating_mul(BLOCK.min(vertices)))?;
     for start in (0..vertices).step_by(BLOCK) {
         let bytes = &mut block[..size * BLOCK.min(vertices - start)];
-        reader.read_exact(bytes).map_err(|error| format!("ends before its last vertex: {error}"))?;
+        reader.read_exact(bytes).map_err(Fault::at("ends before its last vertex"))?;
         let mut offset = 0;
         for (index, (_, scalar)) in header.properties.iter().enumerate() {
             if let Some(column) = columns.of_property(index) {

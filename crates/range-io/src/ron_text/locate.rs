@@ -1,69 +1,220 @@
 //! Where in a RON text a field stands, and which field stands at a place.
+//!
+//! The text is walked through once, with the open brackets alone in memory: paths are built for what is asked for only, so
+//! that a text of many values or brackets costs no more than its length.
+
+/// Line and column, from 1.
+pub(super) type Place = (usize, usize);
+
+/// More brackets than ron itself enters (128): what lies deeper is read by nobody.
+const DEEPEST: usize = 256;
 
 /// Place and path of the field that a parser was at between two places: the value that begins there (behind blanks), or
 /// the last one before.
 pub(super) fn field_between(text: &str, start: Place, end: Place) -> (Place, String) {
-    let values = values(text);
-    if let Some(value) = values.iter().find(|value| (start..=end).contains(&value.start)) {
-        return (value.start, value.path.clone());
+    let mut last = None;
+    let mut walk = Walk::new(text);
+    let mut number = 0_usize;
+    while let Some(seen) = walk.next() {
+        let Seen::Value(place) = seen else { continue };
+        if (start..=end).contains(&place) {
+            return (place, walk.path());
+        }
+        if place > end {
+            break;
+        }
+        if place < start {
+            last = Some(number);
+        }
+        number += 1;
     }
-    let before = values.iter().rfind(|value| value.start < start);
-    (start, before.map(|value| value.path.clone()).unwrap_or_default())
+    (start, last.map(|number| path_of_value(text, number)).unwrap_or_default())
+}
+
+/// Path of the value with this number.
+fn path_of_value(text: &str, number: usize) -> String {
+    let mut walk = Walk::new(text);
+    let mut values = 0_usize;
+    while let Some(seen) = walk.next() {
+        if matches!(seen, Seen::Value(_)) {
+            if values == number {
+                return walk.path();
+            }
+            values += 1;
+        }
+    }
+    String::new()
 }
 
 /// Path of a field of the innermost group around a place, whether it is there or not.
 pub(super) fn field_of_group(text: &str, place: Place, field: &str) -> String {
-    let around = |value: &&Value| value.end.is_some_and(|end| (value.start..=end).contains(&place));
-    let values = values(text);
-    let group = values.iter().rfind(around).map(|value| value.path.as_str()).unwrap_or_default();
-    if group.is_empty() { field.to_owned() } else { format!("{group}.{field}") }
+    let mut walk = Walk::new(text);
+    // The innermost group around a place is the first to close behind it that has begun before it.
+    while let Some(seen) = walk.next() {
+        if let Seen::End { start, end } = seen
+            && (start..=end).contains(&place)
+        {
+            let group = walk.path();
+            return if group.is_empty() { field.to_owned() } else { format!("{group}.{field}") };
+        }
+    }
+    field.to_owned()
 }
 
 /// Line and column of a field's value; of the longest part of its path that there is, if it is missing.
 #[cfg(any(feature = "survey", feature = "calibration"))]
 pub(super) fn place_of(text: &str, path: &str) -> Place {
-    let values = values(text);
-    let mut path = path;
-    loop {
-        if let Some(value) = values.iter().find(|value| value.path == path) {
-            return value.start;
-        }
-        match path.rfind(['.', '[']) {
-            Some(end) => path = &path[..end],
-            None => return values.first().map_or((1, 1), |value| value.start),
+    let mut best: Option<(usize, Place)> = None;
+    let mut walk = Walk::new(text);
+    walk.wanted = path;
+    while let Some(seen) = walk.next() {
+        let Seen::Value(place) = seen else { continue };
+        if let Some(length) = walk.matched()
+            && best.is_none_or(|(longest, _)| length > longest)
+        {
+            best = Some((length, place));
+            if length == path.len() {
+                break;
+            }
         }
     }
+    best.map_or((1, 1), |(_, place)| place)
 }
 
-/// Line and column, from 1.
-pub(super) type Place = (usize, usize);
-
-struct Value {
-    path: String,
-    start: Place,
-    /// Place of the closing bracket; `None` for what is no group, or not closed.
-    end: Option<Place>,
+enum Seen {
+    /// A value begins; [`Walk::path`] is its path.
+    Value(Place),
+    /// The group whose value began at `start` is closed; [`Walk::path`] is its path.
+    End { start: Place, end: Place },
 }
 
 /// An open bracket.
 struct Group {
-    path: String,
     index: usize,
     key: Option<String>,
-    /// Position of its value in the list of all.
-    value: Option<usize>,
+    /// Where its value begins: at its name, if it has one.
+    start: Place,
     /// `Some(` adds nothing to the path.
     transparent: bool,
+    /// Whether the path of the group itself is empty.
+    at_root: bool,
+    /// How much of the wanted path the path of the group itself is; `None` where it is another.
+    matched: Option<usize>,
 }
 
 impl Group {
-    fn path_of_value(&self) -> String {
-        match &self.key {
-            Some(key) if self.path.is_empty() => key.clone(),
-            Some(key) => format!("{}.{key}", self.path),
-            None if self.transparent => self.path.clone(),
-            None => format!("{}[{}]", self.path, self.index),
+    fn adds_nothing(&self) -> bool {
+        self.key.is_none() && self.transparent
+    }
+}
+
+/// Walks through a text value by value.
+struct Walk<'a> {
+    cursor: Cursor<'a>,
+    groups: Vec<Group>,
+    /// A bracket whose value has been shown; what stands in it comes next.
+    opened: Option<Group>,
+    /// The word before a bracket, and its place: the name of a variant or structure, whose value has been shown already.
+    name: Option<(String, Place)>,
+    /// The path that is looked for.
+    wanted: &'a str,
+}
+
+impl<'a> Walk<'a> {
+    fn new(text: &'a str) -> Self {
+        let root = Group { index: 0, key: None, start: (1, 1), transparent: true, at_root: true, matched: Some(0) };
+        let cursor = Cursor { characters: text.chars().peekable(), place: (1, 1) };
+        Self { cursor, groups: vec![root], opened: None, name: None, wanted: "" }
+    }
+
+    /// Path of the value at hand.
+    fn path(&self) -> String {
+        let mut path = String::new();
+        for group in &self.groups {
+            match &group.key {
+                Some(key) => {
+                    if !path.is_empty() {
+                        path.push('.');
+                    }
+                    path.push_str(key);
+                }
+                None if group.transparent => {}
+                None => path.push_str(&format!("[{}]", group.index)),
+            }
         }
+        path
+    }
+
+    fn at_root(&self) -> bool {
+        self.groups.last().is_none_or(|group| group.at_root && group.adds_nothing())
+    }
+
+    /// How much of the wanted path the path of the value at hand is; `None` where it is another.
+    fn matched(&self) -> Option<usize> {
+        let group = self.groups.last()?;
+        let before = group.matched?;
+        let rest = &self.wanted[before..];
+        let rest = match &group.key {
+            Some(key) => {
+                let rest = if before == 0 { rest } else { rest.strip_prefix('.')? };
+                rest.strip_prefix(key.as_str())?
+            }
+            None if group.transparent => rest,
+            None => rest.strip_prefix(&format!("[{}]", group.index))?,
+        };
+        let length = self.wanted.len() - rest.len();
+        // A path ends where a part of it does.
+        (length == 0 || rest.is_empty() || rest.starts_with(['.', '['])).then_some(length)
+    }
+
+    /// The group that a bracket opens, whose value began at `start`.
+    fn group(&self, bracket: char, start: Place, name: Option<&str>) -> Group {
+        let at_root = self.at_root();
+        let transparent = name == Some("Some") || (bracket == '(' && at_root);
+        Group { index: 0, key: None, start, transparent, at_root, matched: self.matched() }
+    }
+
+    fn next(&mut self) -> Option<Seen> {
+        self.groups.extend(self.opened.take());
+        while self.groups.len() <= DEEPEST {
+            let place = self.cursor.place;
+            let character = self.cursor.next()?;
+            if character.is_whitespace() {
+                continue;
+            }
+            let name = self.name.take();
+            match character {
+                '/' => self.cursor.comment(),
+                '#' => self.cursor.attribute(),
+                '(' | '[' | '{' => match name {
+                    Some((name, start)) => self.groups.push(self.group(character, start, Some(&name))),
+                    None => {
+                        self.opened = Some(self.group(character, place, None));
+                        return Some(Seen::Value(place));
+                    }
+                },
+                ')' | ']' | '}' => {
+                    let start = self.groups.pop()?.start;
+                    return (!self.groups.is_empty()).then_some(Seen::End { start, end: place });
+                }
+                ',' => {
+                    let group = self.groups.last_mut()?;
+                    group.index += 1;
+                    group.key = None;
+                }
+                ':' => {}
+                first => {
+                    let word = if first == '"' { self.cursor.string() } else { self.cursor.word(first) };
+                    if self.cursor.is_key() {
+                        self.groups.last_mut()?.key = Some(word);
+                    } else {
+                        self.name = Some((word, place));
+                        return Some(Seen::Value(place));
+                    }
+                }
+            }
+        }
+        None
     }
 }
 
@@ -102,6 +253,14 @@ impl Cursor<'_> {
         text
     }
 
+    /// Behind the mark of `#![enable(..)]`, which a value may follow in the same line.
+    fn attribute(&mut self) {
+        if self.peek() == Some('!') {
+            self.skip_while(|c| c != ']');
+            self.next();
+        }
+    }
+
     /// Behind a slash.
     fn comment(&mut self) {
         if self.peek() == Some('*') {
@@ -130,55 +289,6 @@ impl Cursor<'_> {
         self.skip_while(char::is_whitespace);
         self.peek() == Some(':')
     }
-}
-
-/// All values in the order of the text, with the paths of their fields.
-fn values(text: &str) -> Vec<Value> {
-    let mut cursor = Cursor { characters: text.chars().peekable(), place: (1, 1) };
-    let mut values = Vec::new();
-    let mut groups = vec![Group { path: String::new(), index: 0, key: None, value: None, transparent: true }];
-    // The word before a bracket: the name of a variant or structure, whose value has been noted already.
-    let mut name: Option<String> = None;
-    loop {
-        let place = cursor.place;
-        let Some(character) = cursor.next() else { break };
-        let Some(group) = groups.last_mut() else { break };
-        match character {
-            c if c.is_whitespace() => continue,
-            '/' => cursor.comment(),
-            '#' => cursor.skip_while(|c| c != '\n'),
-            '(' | '[' | '{' => {
-                let path = group.path_of_value();
-                let transparent = name.as_deref() == Some("Some") || (character == '(' && path.is_empty());
-                if name.is_none() {
-                    values.push(Value { path: path.clone(), start: place, end: None });
-                }
-                groups.push(Group { path, index: 0, key: None, value: values.len().checked_sub(1), transparent });
-            }
-            ')' | ']' | '}' => {
-                if let Some(value) = groups.pop().and_then(|group| values.get_mut(group.value?)) {
-                    value.end = Some(place);
-                }
-            }
-            ',' => {
-                group.index += 1;
-                group.key = None;
-            }
-            ':' => {}
-            first => {
-                let word = if first == '"' { cursor.string() } else { cursor.word(first) };
-                if cursor.is_key() {
-                    group.key = Some(word);
-                } else {
-                    values.push(Value { path: group.path_of_value(), start: place, end: None });
-                    name = Some(word);
-                    continue;
-                }
-            }
-        }
-        name = None;
-    }
-    values
 }
 
 #[cfg(test)]
@@ -210,5 +320,24 @@ mod tests {
         assert_eq!(field_between(TEXT, (3, 5), (3, 6)), ((3, 6), "a".into()));
         assert_eq!(field_of_group(TEXT, (6, 15), "d"), "list[0].d");
         assert_eq!(field_of_group(TEXT, (9, 1), "d"), "d");
+    }
+
+    #[test]
+    fn deep_and_long_texts_cost_no_more_than_their_length() {
+        let started = std::time::Instant::now();
+        let deep = "[".repeat(1 << 20);
+        assert_eq!(field_between(&deep, (1, 129), (1, 130)).0, (1, 129));
+        assert_eq!(field_of_group(&deep, (1, 1 << 20), "d"), "d");
+        // A long key above many values: their paths together would be its length times their number.
+        let wide = format!("({}: [{}])", "k".repeat(1 << 18), "1,".repeat(1 << 18));
+        let end = wide.len();
+        assert!(field_between(&wide, (1, end), (1, end)).1.ends_with(&format!("[{}]", (1 << 18) - 1)));
+        #[cfg(any(feature = "survey", feature = "calibration"))]
+        {
+            assert_eq!(place_of(&deep, "[0][0].a"), (1, 3));
+            assert_eq!(place_of(&wide, &format!("{}[7]", "k".repeat(1 << 18))), (1, (1 << 18) + 19));
+        }
+        // Some hundredths of a second; with a path for each value it takes minutes and gigabytes.
+        assert!(started.elapsed().as_secs() < 20, "{:?}", started.elapsed());
     }
 }

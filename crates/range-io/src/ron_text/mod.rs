@@ -9,8 +9,7 @@ use ron::extensions::Extensions;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-use crate::text::read_text;
-use crate::{Error, Result};
+use crate::{Error, Result, read_ron_text};
 
 fn options() -> ron::Options {
     ron::Options::default().with_default_extension(Extensions::IMPLICIT_SOME)
@@ -19,7 +18,7 @@ fn options() -> ron::Options {
 /// Reads a RON file into a value. `#![enable(implicit_some)]` is always in force, whether written or not.
 pub fn read<T: DeserializeOwned>(path: impl AsRef<Path>) -> Result<T> {
     let path = path.as_ref();
-    parse(path, &read_text(path)?)
+    parse(path, &read_ron_text(path)?)
 }
 
 /// Reads RON text into a value; `file` stands for it in messages.
@@ -46,6 +45,12 @@ pub fn to_text<T: Serialize>(value: &T) -> Result<String> {
         reason: error.to_string(),
     })?;
     Ok(format!("#![enable(implicit_some)]\n{}", layout::in_lines(&compact)))
+}
+
+/// The error for a field (`stations[2].name`) of a RON text whose value was read but does not hold, at its place.
+#[cfg(any(feature = "survey", feature = "calibration"))]
+pub fn wrong_field(file: &Path, text: &str, field: String, reason: String) -> Error {
+    at_field(file, text, crate::InvalidField { field, reason })
 }
 
 /// The error for a field that was read but does not hold, at its place in the text.

@@ -21,8 +21,7 @@ pub use range_image::PhaseSense;
 pub use truth::{TruthFrame, read_truth, write_truth};
 pub use write::write_frame;
 
-use crate::text::read_text;
-use crate::{Result, atomic, ron_text};
+use crate::{Result, atomic, read_ron_text, ron_text};
 
 /// What was captured: `survey.ron`. Angles in radian, lengths of the camera in millimetre, times in second.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -180,7 +179,7 @@ impl Survey {
         {
             return Ok(survey);
         }
-        Self::parse(&file, &read_text(&file)?)
+        Self::parse(&file, &read_ron_text(&file)?)
     }
 
     /// Reads and checks the text of a `survey.ron`; `file` stands for it in messages.

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::{FrameEntry, Level, StoredDepth, Survey, SurveyCamera};
-use crate::text::read_text;
+use crate::read_text;
 use crate::{Error, Result, png16};
 
 /// Name of the file with the camera's matrix, three rows of three numbers (pixel).

@@ -6,12 +6,9 @@ use serde::ser::Serializer;
 
 use super::{FrameEntry, Level, ReferencePath, StoredDepth, Survey, SurveyCamera, TruthFiles};
 use crate::InvalidField;
-use crate::limits::MOST_PIXELS;
+use crate::limits::{MOST_FREQUENCIES, MOST_PHASE_STEPS, MOST_PIXELS};
 
 type Check = Result<(), InvalidField>;
-
-const MOST_FREQUENCIES: usize = 64;
-const MOST_PHASE_STEPS: usize = 1024;
 
 impl Survey {
     pub(super) fn check(&self) -> Check {
@@ -108,7 +105,7 @@ impl SurveyCamera {
 impl FrameEntry {
     fn check(&self, path: &str) -> Check {
         check_path(format!("{path}.file"), &self.file)?;
-        require(!self.station.trim().is_empty(), format!("{path}.station"), "is empty, expected a name")?;
+        check_name(format!("{path}.station"), &self.station)?;
         for (name, value) in [("timestamp_s", self.timestamp_s), ("temperature_c", self.temperature_c)] {
             value.map_or(Ok(()), |value| check_finite(format!("{path}.{name}"), value))?;
         }
@@ -165,9 +162,19 @@ fn check_finite(field: impl Into<String>, value: f64) -> Check {
     require(value.is_finite(), field, format!("is {value}, expected a finite number"))
 }
 
+/// A name goes into tables, reports and onto terminals.
+fn check_name(field: impl Into<String>, name: &str) -> Check {
+    let field = field.into();
+    require(!name.trim().is_empty(), field.as_str(), "is empty, expected a name")?;
+    let printable = !name.contains(char::is_control);
+    require(printable, field, format!("is {name:?}, expected a name without control characters"))
+}
+
 fn check_path(field: impl Into<String>, path: &Path) -> Check {
     let relative = !path.as_os_str().is_empty() && !path.has_root();
-    require(relative, field, format!("is `{}`, expected a path relative to the survey's folder", path.display()))
+    let printable = !path.to_string_lossy().contains(char::is_control);
+    let reason = format!("is {:?}, expected a path relative to the survey's folder", path.display().to_string());
+    require(relative && printable, field, reason)
 }
 
 /// Reads `0` as well as `[0, 65535]`.

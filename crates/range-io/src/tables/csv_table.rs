@@ -3,7 +3,8 @@ use std::path::{Path, PathBuf};
 use csv::{ReaderBuilder, StringRecord, Trim};
 
 use crate::atomic::FileWriter;
-use crate::text::read_text;
+use crate::limits::MOST_ROWS;
+use crate::read_text;
 use crate::{Error, Result};
 
 /// The columns of a kind of table.
@@ -33,6 +34,9 @@ impl Table {
         let mut lines = Lines { text: text.as_bytes(), offset: 0, line: 1 };
         for record in reader.records() {
             let record = record.map_err(|error| Error::format(file, error.to_string()))?;
+            if records.len() > MOST_ROWS {
+                return Err(Error::format(file, format!("has more than {MOST_ROWS} rows")));
+            }
             let offset = record.position().map_or(0, |position| position.byte() as usize);
             records.push((lines.line_at(offset), record));
         }
@@ -177,10 +181,13 @@ impl<'a> Row<'a> {
         Ok(index.and_then(|index| self.record.get(index)).unwrap_or(""))
     }
 
-    /// A name, which must not be empty.
+    /// A name, which must not be empty and goes into other tables, reports and onto terminals.
     pub fn text(&self, column: &str) -> Result<String> {
         match self.field(column)? {
             "" => Err(self.error(column, "is empty, expected a name")),
+            text if text.contains(char::is_control) => {
+                Err(self.error(column, format!("is {text:?}, expected a name without control characters")))
+            }
             text => Ok(text.to_owned()),
         }
     }

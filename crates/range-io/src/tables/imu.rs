@@ -1,7 +1,7 @@
 use std::path::Path;
 
 use super::csv_table::{Columns, Row, Table, texts, write};
-use crate::text::read_text;
+use crate::read_text;
 use crate::{Error, Result};
 
 /// One inertial sample in body axes: `imu.csv`.

@@ -5,7 +5,7 @@ use super::{
     StampedPose, read_euroc, read_kitti, read_pose_folder, read_redwood_log, read_tum, write_euroc, write_kitti,
     write_tum,
 };
-use crate::text::read_text;
+use crate::read_text;
 use crate::{Error, Result};
 
 /// Form of a trajectory.

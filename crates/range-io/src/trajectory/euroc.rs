@@ -7,7 +7,7 @@ use nalgebra::Isometry3;
 use super::fields::Line;
 use super::{StampedPose, write_lines};
 use crate::Result;
-use crate::text::read_text;
+use crate::read_text;
 
 const NAMES: [&str; 8] = ["timestamp", "p_x", "p_y", "p_z", "q_w", "q_x", "q_y", "q_z"];
 

@@ -5,7 +5,7 @@ use camera_model::with_computer_vision_axes;
 
 use super::fields::Line;
 use super::{StampedPose, write_lines};
-use crate::text::read_text;
+use crate::read_text;
 use crate::{Error, Result};
 
 const NAMES: [&str; 12] = ["r11", "r12", "r13", "tx", "r21", "r22", "r23", "ty", "r31", "r32", "r33", "tz"];

@@ -3,7 +3,7 @@ use std::path::Path;
 use super::StampedPose;
 use super::fields::{Line, matrix_of_lines};
 use crate::Result;
-use crate::text::read_text;
+use crate::read_text;
 
 /// Reads a Redwood log: for each pose a line of three whole numbers and a 4x4 camera-to-world matrix.
 ///

@@ -2,7 +2,7 @@ use std::path::{Path, PathBuf};
 
 use super::StampedPose;
 use super::fields::{Line, matrix_of_lines};
-use crate::text::read_text;
+use crate::read_text;
 use crate::{Error, Result};
 
 /// Reads a folder of the 7-Scenes kind: files `frame-000000.pose.txt` with a 4x4 camera-to-world matrix each.

@@ -7,7 +7,7 @@ use nalgebra::Isometry3;
 use super::fields::Line;
 use super::{StampedPose, write_lines};
 use crate::Result;
-use crate::text::read_text;
+use crate::read_text;
 
 /// Reads a TUM trajectory: `timestamp tx ty tz qx qy qz qw`, lines that begin with `#` are comments.
 pub fn read_tum(path: impl AsRef<Path>) -> Result<Vec<StampedPose>> {

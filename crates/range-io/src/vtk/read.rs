@@ -2,20 +2,24 @@ use std::path::Path;
 
 use super::source::{Scalar, Source};
 use crate::clouds::{CloudFile, Columns};
+use crate::fault::Fault;
+use crate::limits::LONGEST_VTK;
 use crate::{Error, Result};
-
-/// Longest file that is read as a whole.
-const LONGEST_FILE: u64 = 1 << 32;
 
 /// Reads the points of a legacy VTK file.
 pub fn read_vtk(path: impl AsRef<Path>) -> Result<CloudFile> {
     let path = path.as_ref();
-    let length = std::fs::metadata(path).map_err(Error::io(path, "open"))?.len();
-    if length > LONGEST_FILE {
-        return Err(Error::format(path, format!("is {length} bytes long, expected at most {LONGEST_FILE}")));
-    }
-    let bytes = std::fs::read(path).map_err(Error::io(path, "read"))?;
-    read_from(&bytes).map_err(|reason| Error::format(path, reason))
+    let bytes = crate::read_bytes(path, LONGEST_VTK)?;
+    let mut source = Source::new(&bytes);
+    read_from(&mut source).map_err(|fault| match fault {
+        // Binary values have no lines.
+        Fault::Content(reason) if !source.binary => {
+            let read = &bytes[..bytes.len() - source.left()];
+            let line = read.trim_ascii_end().iter().filter(|byte| **byte == b'\n').count() + 1;
+            Error::format(path, format!("{reason} (line {line})"))
+        }
+        fault => fault.of(path),
+    })
 }
 
 /// What is collected on the way through a file.
@@ -30,31 +34,33 @@ struct Parts {
     of_cells: bool,
 }
 
-fn read_from(bytes: &[u8]) -> std::result::Result<CloudFile, String> {
-    let mut source = Source::new(bytes);
-    if !source.line().is_some_and(|line| line.starts_with("# vtk DataFile Version")) {
+fn read_from(source: &mut Source<'_>) -> std::result::Result<CloudFile, Fault> {
+    if !source.line()?.is_some_and(|line| line.starts_with("# vtk DataFile Version")) {
         return Err("does not begin with the line `# vtk DataFile Version`".into());
     }
-    source.line().ok_or("ends behind its first line")?;
-    source.binary = match source.line() {
-        Some("ASCII") => false,
-        Some("BINARY") => true,
-        other => return Err(format!("has `{}` in its third line, expected ASCII or BINARY", other.unwrap_or(""))),
+    source.line()?.ok_or("ends behind its first line")?;
+    let kind = source.line()?.unwrap_or_default();
+    source.binary = match &*kind {
+        "ASCII" => false,
+        "BINARY" => true,
+        other => return Err(format!("has `{other}` in its third line, expected ASCII or BINARY").into()),
     };
     let mut parts = Parts::default();
-    while let Some(line) = source.keyword_line() {
+    while let Some(line) = source.keyword_line()? {
         let words: Vec<&str> = line.split_whitespace().collect();
-        section(&words, line, &mut source, &mut parts)?;
+        section(&words, &line, source, &mut parts)?;
     }
     parts.into_cloud()
 }
 
-fn section(words: &[&str], line: &str, source: &mut Source<'_>, parts: &mut Parts) -> std::result::Result<(), String> {
+fn section(words: &[&str], line: &str, source: &mut Source<'_>, parts: &mut Parts) -> std::result::Result<(), Fault> {
     let keyword = words.first().map(|word| word.to_ascii_uppercase()).unwrap_or_default();
     match (keyword.as_str(), &words[1..]) {
         ("DATASET", [kind]) => match kind.to_ascii_uppercase().as_str() {
             "POLYDATA" | "UNSTRUCTURED_GRID" | "STRUCTURED_GRID" => {}
-            other => return Err(format!("is a data set `{other}`, expected points (POLYDATA, UNSTRUCTURED_GRID)")),
+            other => {
+                return Err(format!("is a data set `{other}`, expected points (POLYDATA, UNSTRUCTURED_GRID)").into());
+            }
         },
         ("DIMENSIONS", [x, y, z]) => parts.dimensions = Some([number(x)?, number(y)?, number(z)?]),
         ("POINTS", [count, kind]) => {
@@ -64,13 +70,13 @@ fn section(words: &[&str], line: &str, source: &mut Source<'_>, parts: &mut Part
         ("VERTICES" | "LINES" | "POLYGONS" | "TRIANGLE_STRIPS" | "CELLS", [cells, size]) => {
             skip_cells(source, number(cells)?, number(size)?, &keyword)?;
         }
-        ("CELL_TYPES", [count]) => drop(source.values(number(count)?, Scalar::I32, &keyword)?),
+        ("CELL_TYPES", [count]) => source.skip(number(count)?, Scalar::I32, &keyword)?,
         ("POINT_DATA", [count]) => (parts.tuples, parts.of_cells) = (Some(number(count)?), false),
         ("CELL_DATA", [count]) => (parts.tuples, parts.of_cells) = (Some(number(count)?), true),
-        ("METADATA", _) => while source.line().is_some_and(|line| !line.is_empty()) {},
+        ("METADATA", _) => while source.line()?.is_some_and(|line| !line.is_empty()) {},
         ("LOOKUP_TABLE", [_, size]) => {
             // In a binary file a table's colours are bytes.
-            drop(source.values(4 * number(size)?.min(usize::MAX / 4), Scalar::U8, "LOOKUP_TABLE")?);
+            source.skip(number(size)?.saturating_mul(4), Scalar::U8, "LOOKUP_TABLE")?;
         }
         _ => return attribute(&keyword, words, line, source, parts),
     }
@@ -84,13 +90,14 @@ fn attribute(
     line: &str,
     source: &mut Source<'_>,
     parts: &mut Parts,
-) -> std::result::Result<(), String> {
+) -> std::result::Result<(), Fault> {
     if let ("FIELD", [_, arrays]) = (keyword, &words[1..]) {
         for _ in 0..number(arrays)? {
-            let line = source.keyword_line().ok_or("ends within its FIELD")?;
+            let line = source.keyword_line()?.ok_or("ends within its FIELD")?;
             let words: Vec<&str> = line.split_whitespace().collect();
             let [name, components, tuples, kind] = words[..] else {
-                return Err(format!("has the line `{line}` in its FIELD, expected name, components, tuples, type"));
+                let expected = "expected name, components, tuples, type";
+                return Err(format!("has the line `{line}` in its FIELD, {expected}").into());
             };
             let (components, tuples) = (number(components)?, number(tuples)?);
             let count = components.checked_mul(tuples).ok_or("has a FIELD of too many values")?;
@@ -100,7 +107,7 @@ fn attribute(
         return Ok(());
     }
     let Some(tuples) = parts.tuples else {
-        return Err(format!("has the line `{line}`, which is not understood"));
+        return Err(not_understood(line));
     };
     let (name, components, kind) = match (keyword, &words[1..]) {
         ("NORMALS", [_, kind]) => ("normals", 3, *kind),
@@ -113,12 +120,12 @@ fn attribute(
         ("SCALARS", [name, kind, components]) | ("TEXTURE_COORDINATES", [name, components, kind]) => {
             (*name, number(components)?, *kind)
         }
-        _ => return Err(format!("has the line `{line}`, which is not understood")),
+        _ => return Err(not_understood(line)),
     };
     if keyword == "SCALARS" {
-        let table = source.keyword_line().unwrap_or_default();
+        let table = source.keyword_line()?.unwrap_or_default();
         if !table.to_ascii_uppercase().starts_with("LOOKUP_TABLE") {
-            return Err(format!("has the line `{table}` behind SCALARS, expected LOOKUP_TABLE"));
+            return Err(format!("has the line `{table}` behind SCALARS, expected LOOKUP_TABLE").into());
         }
     }
     let count = components.checked_mul(tuples).ok_or("has too many values")?;
@@ -128,18 +135,25 @@ fn attribute(
 }
 
 /// Cells as lists of numbers, or from version 5 on as two arrays.
-fn skip_cells(source: &mut Source<'_>, cells: usize, size: usize, keyword: &str) -> std::result::Result<(), String> {
-    let ahead: Vec<&str> = source.line_ahead().unwrap_or_default().split_whitespace().collect();
+fn skip_cells(source: &mut Source<'_>, cells: usize, size: usize, keyword: &str) -> std::result::Result<(), Fault> {
+    // Where the numbers follow at once, they may all stand in one long line.
+    let ahead = source.line_ahead().ok().flatten().unwrap_or_default();
+    let ahead: Vec<&str> = ahead.split_whitespace().collect();
     let &["OFFSETS", kind] = ahead.as_slice() else {
-        return source.values(size, Scalar::I32, keyword).map(drop);
+        return source.skip(size, Scalar::I32, keyword);
     };
-    source.keyword_line();
-    source.values(cells, kind.parse()?, "OFFSETS")?;
-    let line: Vec<&str> = source.keyword_line().unwrap_or_default().split_whitespace().collect();
+    source.keyword_line()?;
+    source.skip(cells, kind.parse()?, "OFFSETS")?;
+    let line = source.keyword_line()?.unwrap_or_default();
+    let line: Vec<&str> = line.split_whitespace().collect();
     match line.as_slice() {
-        ["CONNECTIVITY", kind] => source.values(size, kind.parse()?, "CONNECTIVITY").map(drop),
-        _ => Err(format!("has no CONNECTIVITY behind the OFFSETS of {keyword}")),
+        ["CONNECTIVITY", kind] => source.skip(size, kind.parse()?, "CONNECTIVITY"),
+        _ => Err(format!("has no CONNECTIVITY behind the OFFSETS of {keyword}").into()),
     }
+}
+
+fn not_understood(line: &str) -> Fault {
+    format!("has the line `{line}`, which is not understood").into()
 }
 
 fn number(word: &str) -> std::result::Result<usize, String> {
@@ -161,7 +175,7 @@ impl Parts {
         }
     }
 
-    fn into_cloud(self) -> std::result::Result<CloudFile, String> {
+    fn into_cloud(self) -> std::result::Result<CloudFile, Fault> {
         let points = self.points.ok_or("has no section POINTS")?;
         let count = points.len() / 3;
         let axes = ["x", "y", "z"].into_iter().enumerate();

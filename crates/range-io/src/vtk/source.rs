@@ -1,4 +1,8 @@
+use std::borrow::Cow;
 use std::str::FromStr;
+
+use crate::fault::{Fault, collected, reserve};
+use crate::limits::LONGEST_LINE;
 
 /// Type of an array's values.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -77,45 +81,69 @@ impl<'a> Source<'a> {
         Self { rest: bytes, binary: false }
     }
 
-    /// The next line, `None` at the end.
-    pub fn line(&mut self) -> Option<&'a str> {
+    /// The next line, `None` at the end. The format is older than UTF-8: titles, names and comments may be in another
+    /// encoding, whose bytes beyond ASCII are replaced.
+    pub fn line(&mut self) -> Result<Option<Cow<'a, str>>, Fault> {
         if self.rest.is_empty() {
-            return None;
+            return Ok(None);
         }
         let end = self.rest.iter().position(|byte| *byte == b'\n').unwrap_or(self.rest.len());
-        let line = &self.rest[..end];
+        if end as u64 > LONGEST_LINE {
+            return Err(format!("has {end} bytes in a line, expected at most {LONGEST_LINE}").into());
+        }
+        let line = self.rest[..end].trim_ascii();
         self.rest = self.rest.get(end + 1..).unwrap_or_default();
-        std::str::from_utf8(line).ok().map(str::trim)
+        Ok(Some(String::from_utf8_lossy(line)))
     }
 
     /// The next line that is not empty.
-    pub fn keyword_line(&mut self) -> Option<&'a str> {
-        loop {
-            match self.line()? {
-                "" => {}
-                line => return Some(line),
+    pub fn keyword_line(&mut self) -> Result<Option<Cow<'a, str>>, Fault> {
+        while let Some(line) = self.line()? {
+            if !line.is_empty() {
+                return Ok(Some(line));
             }
         }
+        Ok(None)
     }
 
     /// The next line that is not empty, left where it is.
-    pub fn line_ahead(&self) -> Option<&'a str> {
-        Self { rest: self.rest, binary: self.binary }.keyword_line()
+    pub fn line_ahead(&self) -> Result<Option<Cow<'a, str>>, Fault> {
+        Self { rest: self.rest, ..*self }.keyword_line()
+    }
+
+    /// Bytes that are not read yet.
+    pub fn left(&self) -> usize {
+        self.rest.len()
+    }
+
+    /// Passes over the next `count` values of an array.
+    pub fn skip(&mut self, count: usize, scalar: Scalar, what: &str) -> Result<(), Fault> {
+        if self.binary {
+            let bytes = count.checked_mul(scalar.size()).and_then(|bytes| self.rest.get(bytes..));
+            self.rest = bytes.ok_or_else(|| format!("ends within {what}, which promises {count} values"))?;
+            return Ok(());
+        }
+        for index in 0..count {
+            self.word().ok_or_else(|| format!("ends within {what}: has {index} of {count} values"))?;
+        }
+        Ok(())
     }
 
     /// The next `count` values of an array.
-    pub fn values(&mut self, count: usize, scalar: Scalar, what: &str) -> Result<Vec<f64>, String> {
+    pub fn values(&mut self, count: usize, scalar: Scalar, what: &str) -> Result<Vec<f64>, Fault> {
         // A binary value takes its size, one of ASCII at least a digit and a blank (the last no blank).
         let least = if self.binary { count.saturating_mul(scalar.size()) } else { count.saturating_mul(2) };
         if least > self.rest.len() + 1 {
-            return Err(format!("promises {count} values of {what}, more than its {} bytes hold", self.rest.len()));
+            return Err(
+                format!("promises {count} values of {what}, more than its {} bytes hold", self.rest.len()).into()
+            );
         }
         if self.binary {
             let bytes = self.rest.get(..least).ok_or_else(|| format!("ends within {what}"))?;
             self.rest = &self.rest[least..];
-            return Ok(bytes.chunks_exact(scalar.size()).map(|value| scalar.decode(value)).collect());
+            return Ok(collected(bytes.chunks_exact(scalar.size()).map(|value| scalar.decode(value)))?);
         }
-        let mut values = Vec::with_capacity(count);
+        let mut values = reserve(count)?;
         for index in 0..count {
             let word = self.word().ok_or_else(|| format!("ends within {what}: has {index} of {count} values"))?;
             values.push(word.parse().map_err(|_| format!("has `{word}` in {what}, expected a number"))?);

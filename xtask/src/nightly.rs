@@ -1,0 +1,51 @@
+//! `cargo xtask nightly [MINUTES]`: what takes too long or needs chance: damaged files with a fresh seed, property tests
+//! with fresh cases, the long statistics, and `cargo deny` where it is installed.
+
+use std::process::Command;
+use std::time::{SystemTime, UNIX_EPOCH};
+
+use crate::shell::{Outcome, cargo, root};
+use crate::{fuzz, verify};
+
+/// What to run, and how long.
+#[derive(Debug, clap::Args)]
+pub(crate) struct Arguments {
+    /// Minutes of damaged files.
+    #[arg(default_value_t = 60)]
+    minutes: u64,
+    /// Seed of the property tests, and of the damaged files; default: the time.
+    #[arg(long)]
+    seed: Option<u64>,
+}
+
+pub(crate) fn run(arguments: &Arguments) -> Outcome {
+    let seed = arguments.seed.map_or_else(seed_of_the_time, Ok)?;
+    println!("── seed {seed}: `cargo xtask nightly {} --seed {seed}` does the same again", arguments.minutes);
+    // One failure must not hide the others: a night is long enough for all of them.
+    let outcomes = [
+        fuzz::run(&fuzz::Arguments { seconds: 60 * arguments.minutes, seed: Some(seed), target: None }),
+        cargo(&["test", "--workspace", "--all-features"], &[("PROPTEST_RNG_SEED", &seed.to_string())]),
+        verify::run(&verify::Arguments::all()),
+        deny(),
+    ];
+    let failures: Vec<String> = outcomes.into_iter().filter_map(Result::err).collect();
+    if failures.is_empty() { Ok(()) } else { Err(failures.join("\n")) }
+}
+
+fn seed_of_the_time() -> Result<u64, String> {
+    let since = SystemTime::now().duration_since(UNIX_EPOCH).map_err(|error| error.to_string())?;
+    Ok(since.as_secs())
+}
+
+/// Advisories need a database that is fetched; `cargo xtask tidy` checks licences and duplicates without it.
+fn deny() -> Outcome {
+    let installed = Command::new("cargo-deny").arg("--version").output().is_ok_and(|output| output.status.success());
+    if !installed {
+        println!("── cargo deny is not installed: advisories were not checked (cargo install cargo-deny)");
+        return Ok(());
+    }
+    println!("── cargo deny check");
+    let status = Command::new("cargo-deny").arg("check").current_dir(root()).status();
+    let status = status.map_err(|error| format!("cargo deny: {error}"))?;
+    if status.success() { Ok(()) } else { Err(format!("cargo deny check: {status}")) }
+}

@@ -1,6 +1,6 @@
 //! Small and large damage to a file.
 
-use crate::chance::Chance;
+use super::chance::Chance;
 
 /// Numbers at which sizes, signs and kinds of numbers turn over.
 const WORDS: &[&str] = &[

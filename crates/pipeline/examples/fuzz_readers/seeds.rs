@@ -215,12 +215,12 @@ const CALIBRATION: &str = "#![enable(implicit_some)]
     format_version: 2,
     camera: (width: 4, height: 3, pixel_pitch_mm: (0.04, 0.04)),
     parameters: [
-        (name: \"xp\", value: 0.1, sigma: 0.001, unit: \"mm\", status: estimated),
-        (name: \"yp\", value: -0.2, sigma: 0.001, unit: \"mm\", status: estimated),
-        (name: \"c\", value: 8.1, sigma: 0.002, unit: \"mm\", status: estimated),
+        (name: \"xp\", value: 0.1, sigma: 0.001, unit: \"mm\", status: Estimated),
+        (name: \"yp\", value: -0.2, sigma: 0.001, unit: \"mm\", status: Estimated),
+        (name: \"c\", value: 8.1, sigma: 0.002, unit: \"mm\", status: Estimated),
     ],
     range_models: [(integration_time_s: 0.004, modulation_hz: 20e6, parameters: [
-        (name: \"d0\", value: 0.024, sigma: 0.001, unit: \"m\", status: estimated),
+        (name: \"d0\", value: 0.024, sigma: 0.001, unit: \"m\", status: Estimated),
     ], range_span_m: (0.5, 7.0))],
     noise: (shot_variance_per_unit: 0.25, dark_sigma: 4.0),
     scattering: Gaussians([(weight: 0.05, sigma_px: (4, 4))]),

@@ -5,10 +5,10 @@ use std::fs;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 
-use crate::chance::Chance;
-use crate::mutate::{mutated, with_checksums};
-use crate::seeds;
-use crate::targets::{TARGETS, Target};
+use super::chance::Chance;
+use super::mutate::{mutated, with_checksums};
+use super::seeds;
+use super::targets::{TARGETS, Target};
 
 /// Longest time that reading a small file may take the processor, second.
 pub const LONGEST_S: f64 = 1.0;

@@ -113,7 +113,7 @@ impl Paint {
     fn albedo(self, [x, y, z]: Vector) -> f64 {
         // A number from 0 to 1 for each cell, without any order.
         let chance = |cell: [f64; 3]| {
-            ((12.9898 * cell[0] + 78.233 * cell[1] + 37.719 * cell[2]).sin() * 43758.5453).rem_euclid(1.0)
+            ((12.9898 * cell[0] + 78.233 * cell[1] + 37.719 * cell[2]).sin() * 43_758.545_3).rem_euclid(1.0)
         };
         match self {
             Self::Plain(albedo) => albedo,

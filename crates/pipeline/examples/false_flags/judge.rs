@@ -72,15 +72,15 @@ fn judge(capture: &Capture, outcome: &Outcome, frames: usize) -> Counts {
         for (pixel, flags) in frame.flags.as_slice().iter().enumerate() {
             let error = f64::from(frame.range.as_slice()[pixel] - truth.range[pixel]).abs();
             let allowed = SIGMAS * f64::from(frame.sigma.as_slice()[pixel]) + FLOOR_M;
-            let range_wrong = !(error <= allowed);
-            let wrong = range_wrong || truth.mixed[pixel] || truth.amplitude[pixel] < low || truth.cut_off[pixel];
+            let right = error <= allowed;
+            let wrong = !right || truth.mixed[pixel] || truth.amplitude[pixel] < low || truth.cut_off[pixel];
             let flagged = !flags.is_empty();
             counts.pixels += 1;
             counts.wrong += usize::from(wrong);
             counts.flagged += usize::from(flagged);
             counts.false_flags += usize::from(flags.intersects(JUDGED) && !wrong);
             counts.false_by_chance += usize::from(flags.intersects(JUDGED - Flags::MIXED_PIXEL) && !wrong);
-            counts.missed += usize::from(range_wrong && !flagged);
+            counts.missed += usize::from(!right && !flagged);
             for (count, (flag, _)) in counts.of_flag.iter_mut().zip(Flags::NAMED) {
                 *count += usize::from(flags.contains(flag) && !wrong);
             }

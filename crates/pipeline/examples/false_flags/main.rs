@@ -72,27 +72,38 @@ fn main() -> Result<(), Failure> {
             }
         }
     }
-    if broken.is_empty() { Ok(()) } else { Err(broken.join("\n").into()) }
+    for place in &broken {
+        println!("{place}");
+    }
+    if broken.is_empty() { Ok(()) } else { Err(format!("{} bars are broken", broken.len()).into()) }
 }
 
 fn heading() -> String {
-    let names: String = Flags::NAMED.iter().map(|(_, name)| format!("{:>14}", name)).collect();
+    let names: Vec<String> = Flags::NAMED.iter().map(|(_, name)| format!("{name:>14}")).collect();
     format!(
-        "{:>6} {:>9} {:>8} {:>7} {:>7} {:>7} {:>7} |{names}",
-        "frames", "error mm", "flagged", "wrong", "false", "bar", "missed"
+        "{:>6} {:>9} {:>8} {:>7} {:>7} {:>7} {:>7} |{}",
+        "frames",
+        "error mm",
+        "flagged",
+        "wrong",
+        "false",
+        "bar",
+        "missed",
+        names.concat()
     )
 }
 
 fn line(frames: usize, counts: &Counts) -> String {
     let percent = |count: usize| 100.0 * counts.share(count);
-    let of_flag: String = counts.of_flag.iter().map(|count| format!("{:14.2}", percent(*count))).collect();
+    let of_flag: Vec<String> = counts.of_flag.iter().map(|count| format!("{:14.2}", percent(*count))).collect();
     format!(
-        "{frames:6} {:9.1} {:8.2} {:7.2} {:7.2} {:7.2} {:7.2} |{of_flag}",
+        "{frames:6} {:9.1} {:8.2} {:7.2} {:7.2} {:7.2} {:7.2} |{}",
         1e3 * counts.error_median_m,
         percent(counts.flagged),
         percent(counts.wrong),
         percent(counts.false_flags),
         100.0 * counts.bar(),
         percent(counts.missed),
+        of_flag.concat()
     )
 }

@@ -6,7 +6,7 @@ use std::fmt;
 use serde::Serialize;
 
 use crate::{
-    CalibrationSummary, Explanation, FixedPatternSummary, NoiseSummary, PlanSummary, ScatteringSummary, Simulated,
+    CalibrationSummary, Explanation, FixedPatternSummary, PlanSummary, ScatteringSummary, Simulated,
 };
 
 /// How a command that has a result ended. What failed instead is an [`Error`](enum@crate::Error) with its
@@ -87,6 +87,8 @@ pub enum DoubtKind {
     UncertainPose,
     /// A station that was found elsewhere than it was said to stand.
     DisplacedStation,
+    /// Random errors that do not follow the model that was fitted to them.
+    Noise,
 }
 
 impl Doubt {
@@ -133,7 +135,6 @@ pub trait Judged {
 impl Judged for CalibrationSummary {}
 impl Judged for Explanation {}
 impl Judged for FixedPatternSummary {}
-impl Judged for NoiseSummary {}
 impl Judged for PlanSummary {}
 impl Judged for ScatteringSummary {}
 impl Judged for Simulated {}

@@ -3,7 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use crate::common::{fixtures, has_capture, simulated, simulated_with};
-use pipeline::{NoiseFitOptions, NoiseRequest, NoiseSummary, Plan, Silent, ViewData, estimate_noise, process};
+use pipeline::{
+    DoubtKind, Judged, NoiseFitOptions, NoiseRequest, NoiseSummary, Plan, Silent, Verdict, ViewData, estimate_noise,
+    process,
+};
 use range_io::calibration::Calibration;
 
 fn request(survey: PathBuf, out: &Path) -> NoiseRequest {
@@ -28,6 +31,7 @@ fn noise_of_samples_is_that_of_the_simulation() {
     assert!((dark.value - (625.0_f64 + 6.25 / 12.0).sqrt()).abs() < 4.0 * dark.sigma, "{dark:?}");
     assert!(parameter(&summary, "quantisation_sigma").held);
     assert!(summary.sigma_holds, "{}", summary.sigma_verdict);
+    assert_eq!(summary.verdict(), Verdict::Done, "{summary}");
     let calibration = Calibration::read(&out).unwrap();
     assert_eq!(calibration.noise_parameters.len(), 3);
     let report = std::fs::read_to_string(out.join("report.html")).unwrap();
@@ -63,6 +67,59 @@ fn four_frames_of_a_real_camera_tell_its_noise() {
     }
     // The pixels' own scatter is 7 % beside what the line gives them, and the command says so.
     assert!((summary.sigma_ratio - 1.0).abs() < 0.1 && !summary.sigma_holds, "{}", summary.sigma_verdict);
+    // No line goes through these variances: that is said, and in figures.
+    assert!(summary.misfit_p_value < 1e-3, "{}", summary.misfit_p_value);
+    let [doubt] = summary.doubts.as_slice() else { panic!("{:?}", summary.doubts) };
+    assert_eq!((doubt.kind, summary.verdict()), (DoubtKind::Noise, Verdict::Doubtful));
+    assert!(doubt.words.contains(&format!("{:.1} %", 100.0 * summary.misfit)), "{doubt}");
+}
+
+/// The survey of the SR4000 with these frames of each station only, and the lines of the camera changed.
+fn frames_of_the_real_camera(keep: impl Fn(&str) -> bool, without_modulation: bool, folder: &Path) -> PathBuf {
+    let text = std::fs::read_to_string(fixtures().join("surveys/sr4000_steps/survey.ron")).unwrap();
+    let lines = text.lines().filter(|line| !line.contains("file:") || keep(line));
+    let mut text = lines.collect::<Vec<_>>().join("\n").replace("../../../../shared", "shared");
+    if without_modulation {
+        text = text.replace("modulation_hz: [30e6]", "modulation_hz: []");
+    }
+    let survey = folder.join("survey");
+    let captures = survey.join("shared/real/sr4000_steps");
+    std::fs::create_dir_all(&captures).unwrap();
+    for entry in std::fs::read_dir(fixtures().join("../../shared/real/sr4000_steps")).unwrap() {
+        let entry = entry.unwrap();
+        std::fs::copy(entry.path(), captures.join(entry.file_name())).unwrap();
+    }
+    std::fs::write(survey.join("survey.ron"), text).unwrap();
+    survey
+}
+
+#[test]
+fn pixels_that_a_camera_lost_do_not_tell_its_noise() {
+    if !has_capture("sr4000_steps") {
+        return;
+    }
+    let variants: [(&str, &dyn Fn(&str) -> bool, bool); 7] = [
+        ("all", &|_| true, false),
+        ("all, no modulation stated", &|_| true, true),
+        ("Y1", &|line| line.contains("Y1"), false),
+        ("Y2", &|line| line.contains("Y2"), false),
+        ("three frames", &|line| !line.contains("_3.npz"), false),
+        ("two frames", &|line| line.contains("_0.npz") || line.contains("_1.npz"), false),
+        ("two frames, no modulation stated", &|line| line.contains("_2.npz") || line.contains("_3.npz"), true),
+    ];
+    for (name, keep, without_modulation) in variants {
+        let folder = tempfile::tempdir().unwrap();
+        let survey = frames_of_the_real_camera(keep, without_modulation, folder.path());
+        let summary = estimate_noise(&request(survey, &folder.path().join("noise")), &Silent).unwrap();
+        let (slope, floor) = (parameter(&summary, "sigma_times_amplitude_m"), parameter(&summary, "floor_m"));
+        println!(
+            "{name}: {} {} misfit {:.3} p {:.1e}",
+            slope.value, floor.value, summary.misfit, summary.misfit_p_value
+        );
+        // One camera, one scene: the frames that were taken change the figures by what these leave open, a tenth.
+        assert!((slope.value / 2.9 - 1.0).abs() < 0.1, "{name}: {slope:?}");
+        assert!((floor.value / 0.015 - 1.0).abs() < 0.15, "{name}: {floor:?}");
+    }
 }
 
 #[test]

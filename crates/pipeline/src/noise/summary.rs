@@ -4,11 +4,12 @@ use std::fmt;
 use std::path::PathBuf;
 
 use error_models::{AmplitudeScale, ParameterStatus, RangeNoise};
-use self_calibration::{SigmaCheck, SigmaVerdict, VarianceEstimator};
+use self_calibration::{SigmaCheck, SigmaVerdict, VarianceEstimator, VarianceFit};
 use serde::Serialize;
 
 use super::NoiseRequest;
 use super::estimate::{Estimate, NoiseTerm};
+use crate::verdict::{Doubt, DoubtKind, Judged};
 
 /// Random errors and how well they are known.
 #[derive(Debug, Clone, Serialize)]
@@ -33,6 +34,8 @@ pub struct NoiseSummary {
     pub redundancy: i64,
     /// Root mean square of the relative differences between variances observed and modelled.
     pub misfit: f64,
+    /// Probability of a misfit as large, were no variance modelled worse than to 5 %.
+    pub misfit_p_value: f64,
     /// Repeated values.
     pub values: usize,
     /// Share of them that scatter as no noise does; left out.
@@ -49,6 +52,8 @@ pub struct NoiseSummary {
     pub sigma_ratio: f64,
     /// The same by amplitude.
     pub sigma_bins: Vec<SigmaBinSummary>,
+    /// What a reader should know before the noise is used.
+    pub doubts: Vec<Doubt>,
     /// Wall-clock time, second.
     pub seconds: f64,
     /// The output folder.
@@ -145,6 +150,7 @@ impl NoiseSummary {
             sigma0: fit.sigma0,
             redundancy: fit.redundancy,
             misfit: fit.misfit,
+            misfit_p_value: fit.misfit_p_value,
             values: fit.values,
             moved_share: fit.moved as f64 / fit.values as f64,
             stations: fit.steadiness.iter().map(NoiseStation::new).collect(),
@@ -153,9 +159,32 @@ impl NoiseSummary {
             sigma_holds: matches!(estimate.check.verdict, SigmaVerdict::True | SigmaVerdict::Close),
             sigma_ratio: estimate.check.ratio,
             sigma_bins: sigma_bins(&estimate.check),
+            doubts: misfit_doubt(fit).into_iter().collect(),
             seconds: 0.0,
             out: request.out.clone(),
         }
+    }
+}
+
+/// Variances that do not follow the line: chance alone does that once in a thousand estimates.
+const LEAST_P_VALUE: f64 = 1e-3;
+
+fn misfit_doubt(fit: &VarianceFit) -> Option<Doubt> {
+    (fit.misfit_p_value < LEAST_P_VALUE).then(|| {
+        let words = format!(
+            "the scatter of the pixels does not follow the model: its variances are off by {:.1} % (rms over {} classes of \
+             light), beyond the 5 % that would do no harm; sigma is wrong by about half of that. See the figure of standard \
+             deviation against light, and give more frames or leave out what the camera treats apart",
+            100.0 * fit.misfit,
+            fit.bins.len()
+        );
+        Doubt::new(DoubtKind::Noise, words)
+    })
+}
+
+impl Judged for NoiseSummary {
+    fn doubts(&self) -> &[Doubt] {
+        &self.doubts
     }
 }
 
@@ -225,6 +254,9 @@ impl fmt::Display for NoiseSummary {
         }
         let ratio = self.sigma_ratio;
         writeln!(f, "{}: the pixels' variance is {ratio:.3} of what they are given", self.sigma_verdict)?;
+        for doubt in &self.doubts {
+            writeln!(f, "doubt: {doubt}")?;
+        }
         write!(f, "written to {}: calibration.ron, summary.json, report.html", self.out.display())
     }
 }

@@ -12,6 +12,7 @@ pub(crate) fn render_noise(summary: &NoiseSummary) -> String {
         summary.noise_of, summary.survey, summary.calibration
     );
     let mut page = Page::new("rangecam: noise", &lead);
+    page.doubts(&summary.doubts);
     page.cards(&[
         (summary.sigma_verdict.clone(), "pixels against their own scatter".to_owned()),
         (format!("{:.1} %", 100.0 * summary.misfit), "misfit of the variances".to_owned()),

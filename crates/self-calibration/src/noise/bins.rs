@@ -53,14 +53,28 @@ impl Classes {
         &self.sorted
     }
 
-    /// Mean variances of what noise around the median of its class explains: for a start.
-    pub(super) fn around_medians(&self, estimator: VarianceEstimator) -> (Vec<VarianceBin>, usize) {
-        let (mut bins, mut moved) = (Vec::new(), 0);
-        for class in self.sorted.chunks(self.length) {
-            let median = usual_variance(class, estimator);
-            moved += average(&mut bins, class, estimator, |_| median, |_| false);
+    /// Without the values that this line expects to scatter more. Single ones: a class that holds lost pixels spans decades.
+    pub(super) fn expected_below(self, line: &Line, largest: f64, bins: usize) -> Self {
+        if largest.is_infinite() {
+            return self;
         }
-        (bins, moved)
+        let mut sorted = self.sorted;
+        sorted.retain(|one| line.at(one.regressor) <= largest);
+        Self::new(sorted, bins)
+    }
+
+    /// Mean variances of what noise around the median of its class explains, at the middle regressor, which lost pixels do
+    /// not spoil: for a start.
+    pub(super) fn around_medians(&self, estimator: VarianceEstimator) -> Vec<VarianceBin> {
+        let mut bins = Vec::new();
+        for class in self.sorted.chunks(self.length) {
+            let (median, before) = (usual_variance(class, estimator), bins.len());
+            average(&mut bins, class, estimator, |_| median, |_| false);
+            for bin in &mut bins[before..] {
+                bin.regressor = class[class.len() / 2].regressor;
+            }
+        }
+        bins
     }
 
     /// Mean variances of what noise around the line explains, and the number of values left out.

@@ -28,7 +28,8 @@ const PARTS: [&str; 2] = ["noise that falls with the amplitude", "floor"];
 /// the variances follow it clearly better. `wrapped` ranges cannot tell and are taken as received.
 ///
 /// Pixels without a range or a positive amplitude in any frame, and flagged ones, are left out. Where the ambiguity
-/// interval U is known, so are amplitudes at which ranges scatter by more than U / 16: their phases are no longer normal.
+/// interval U is known (else the largest range stands for it), so are pixels whose ranges are expected to scatter by more
+/// than U / 16: their phases are no longer normal, and what was lost altogether says nothing of noise.
 /// So are pixels whose frames leave `1 / a²` uncertain by more than a tenth.
 pub fn estimate_range_noise(
     stations: &[RepeatedRanges<'_>],
@@ -80,7 +81,9 @@ fn fit_as(
         let repeats = repeats_of(station, scale);
         observed.push((Steadiness::new(&station.station, station.frames.len(), &repeats), repeats));
     }
-    let interval = stations.iter().filter_map(|station| station.interval_m).fold(f64::INFINITY, f64::min);
+    let known = stations.iter().filter_map(|station| station.interval_m).fold(f64::INFINITY, f64::min);
+    // An interval that nobody states holds at least the ranges that were seen.
+    let interval = if known.is_finite() { known } else { largest_range(stations) };
     let largest_variance = (NORMAL_SHARE * interval).powi(2);
     let rules = LineRules { least: [0.0; 2], sloped: true, parts: PARTS, largest_variance };
     let mut fit = fit_variance(observed, &rules, options)?;
@@ -113,6 +116,12 @@ impl RangeNoiseEstimate {
             part("floor_m", 1, self.noise.floor_m, "m"),
         ]
     }
+}
+
+fn largest_range(stations: &[RepeatedRanges<'_>]) -> f64 {
+    let frames = stations.iter().flat_map(|station| &station.frames);
+    let ranges = frames.flat_map(|frame| frame.range.as_slice()).filter(|range| range.is_finite());
+    f64::from(ranges.fold(0.0_f32, |a, b| a.max(*b)))
 }
 
 fn pixels(station: &RepeatedRanges<'_>) -> usize {

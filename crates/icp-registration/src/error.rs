@@ -210,7 +210,7 @@ pub enum Error {
         stations: Vec<usize>,
         /// A station of the part that holds together.
         to: usize,
-        /// Why pairs that touch them were refused: source to target, and the reason.
+        /// Why, one for each of these stations.
         reasons: Vec<String>,
     },
     /// No pose of two clouds passed the verification.

@@ -77,6 +77,32 @@ fn noise_of_normals_is_that_of_the_plane_fit() {
 }
 
 #[test]
+fn windows_widen_where_noise_hides_the_surface_and_nowhere_else() {
+    let (width, height, sigma, spacing) = (80, 60, 0.012, 0.01);
+    let mut random = <rand_pcg::Pcg64 as rand::SeedableRng>::seed_from_u64(5);
+    let mut points = Vec::new();
+    for row in 0..height {
+        for col in 0..width {
+            let e: f64 = rand_distr::Distribution::sample(&rand_distr::StandardNormal, &mut random);
+            // The right half is twelve times as quiet.
+            let noise = if col < width / 2 { sigma } else { sigma / 12.0 };
+            points.push([f64::from(col) * spacing, f64::from(row) * spacing, -2.0 + noise * e]);
+        }
+    }
+    let narrow = OrganisedNormalOptions::default();
+    let wide = OrganisedNormalOptions { widest_half_width_px: Some(8), ..narrow };
+    let [before, after] = [narrow, wide].map(|options| organised_normals(&points, 80, 60, &options).unwrap());
+    let noisy =
+        |normals: &[Vector3<f64>]| (0..normals.len()).filter(|i| i % 80 < 30 && normals[*i].x.is_finite()).count();
+    assert!(noisy(&before) < 600 && noisy(&after) > 1000, "{} {}", noisy(&before), noisy(&after));
+    for (i, (before, after)) in before.iter().zip(&after).enumerate().filter(|(_, (before, _))| before.x.is_finite()) {
+        assert_eq!(before, after, "pixel {i} had a normal");
+    }
+    let odd = OrganisedNormalOptions { widest_half_width_px: Some(1), ..narrow };
+    assert!(matches!(organised_normals(&points, 80, 60, &odd), Err(Error::InvalidOption { .. })));
+}
+
+#[test]
 fn cloud_normals_follow_a_sphere() {
     // Spiral points on a sphere of 1 m.
     let n = 4000;

@@ -5,9 +5,7 @@ use std::fmt;
 
 use serde::Serialize;
 
-use crate::{
-    CalibrationSummary, Explanation, FixedPatternSummary, PlanSummary, ScatteringSummary, Simulated,
-};
+use crate::{CalibrationSummary, Explanation, FixedPatternSummary, PlanSummary, ScatteringSummary, Simulated};
 
 /// How a command that has a result ended. What failed instead is an [`Error`](enum@crate::Error) with its
 /// [`Failure`].

@@ -68,7 +68,12 @@ pub(super) fn arranged(stations: &[Cloud], start: Start<'_>, held: usize) -> Res
     }
     let missing: Vec<usize> = (0..clouds.len()).filter(|&station| best.poses[station].is_none()).collect();
     if !missing.is_empty() {
-        let reasons = vec!["no pose of theirs fits what the others saw".to_owned()];
+        let poses = |&station: &usize| {
+            let own = search.candidates.iter().filter(|pair| pair.target == station || pair.source == station);
+            let count: usize = own.map(|pair| pair.poses.len()).sum();
+            format!("of {count} poses that its features allow none fits what the others saw and looked through")
+        };
+        let reasons = missing.iter().map(poses).collect();
         return Err(Error::UnconnectedStations { stations: missing, to: held, reasons });
     }
     let mut poses: Vec<Isometry3<f64>> = best.poses.into_iter().flatten().collect();

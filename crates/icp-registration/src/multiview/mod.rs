@@ -13,6 +13,7 @@ mod loops;
 mod network;
 mod noise;
 mod pairs;
+mod patch_size;
 mod patches;
 mod placement;
 mod plane_fit;
@@ -31,6 +32,7 @@ mod simultaneous;
 mod stations;
 mod sums;
 mod tiles;
+mod wide_errors;
 
 pub use alignments::{PairAlignment, RefusedPair};
 pub use loops::LoopClosure;

@@ -65,15 +65,17 @@ pub(super) struct Scatter {
     /// Sum of squares between stations within tiles, and the means less the tiles.
     pub squares: f64,
     pub differences: f64,
+    /// Variance of a mean with the weights of the kernel, times the sum of these weights.
+    pub noise: f64,
 }
 
 /// The scatter between stations in the same tiles.
 pub(super) fn between(means: &[Vec<TileMean>], stations: usize, tiles: usize, kernel: RobustKernel) -> Scatter {
     let deviations = means.iter().flatten().map(|mean| mean.deviation.abs()).filter(|deviation| *deviation > 0.0);
     let scale = mad_scale(&mut deviations.collect::<Vec<f64>>()).max(1.0);
-    let mut scatter = Scatter { weights: vec![1.0; tiles * stations], ..Scatter::default() };
-    let mut sensitivity = 0.0;
     let noise = noise_of_means(kernel);
+    let mut scatter = Scatter { weights: vec![1.0; tiles * stations], noise, ..Scatter::default() };
+    let mut sensitivity = 0.0;
     for mean in means.iter().flatten() {
         scatter.weights[mean.tile * stations + mean.station] = kernel.weight(mean.deviation / (WIDE * scale));
     }

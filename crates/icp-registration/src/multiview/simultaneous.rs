@@ -13,6 +13,7 @@ use super::rounds::{Surfaces, meet};
 use super::scatter::{Scatter, TileMean, between, tile_means, variances};
 use super::sightings::{Gate, sightings};
 use super::sums::Sums;
+use super::wide_errors;
 use crate::error::Result;
 use crate::kernel::RobustKernel;
 use crate::pose::{pose_difference, step_pose};
@@ -37,6 +38,8 @@ pub(super) struct Adjusted {
     pub variances: Vec<Variances>,
     /// Inverse of the normal matrix, zero for the station that is held.
     pub cofactors: DMatrix<f64>,
+    /// Factor of the cofactors that makes covariances of them.
+    pub factor: f64,
     pub rounds: usize,
     pub settled: bool,
 }
@@ -55,9 +58,15 @@ impl Adjusted {
     }
 
     /// Factor of the covariance: what tiles scatter beyond the noise of their points is not independent from tile to tile,
-    /// and so more than the weights that it takes from them.
+    /// and so more than the weights that it takes from them; errors that whole facets share are more still.
     pub(super) fn variance_factor(&self) -> f64 {
-        self.sigma0().map_or(1.0, |sigma0| sigma0.powi(2).max(1.0))
+        self.factor
+    }
+
+    fn factor_on(&self, facets: &[Facet]) -> f64 {
+        let of_tiles = self.sigma0().map_or(1.0, |sigma0| sigma0.powi(2).max(1.0));
+        let (stations, unknowns) = (self.state.poses.len(), self.cofactors.nrows() as f64 - 6.0);
+        wide_errors::factor(facets, &self.means, &self.scatter, stations, unknowns, of_tiles)
     }
 }
 
@@ -105,23 +114,27 @@ impl Finish<'_> {
             let adjusted = self.step(&mut state, &mut known, sums)?;
             round += 1;
             (self.progress)(round);
-            let settled = off_m.is_none() && self.is_settled(&before, &state, &adjusted.cofactors);
+            let settled = off_m.is_none() && self.is_settled(&before, &state, &adjusted, &known);
             if settled || round >= self.max_rounds.max(OFF.len() + 1) {
-                return Ok(Adjusted { state, facets: known, rounds: round, settled, ..adjusted });
+                let factor = adjusted.factor_on(&known);
+                return Ok(Adjusted { state, facets: known, factor, rounds: round, settled, ..adjusted });
             }
         }
     }
 
     /// Whether every station moved by less than the tolerance, or by so little of its standard deviation that further
     /// rounds tell nothing: along a direction that the surfaces leave open, poses drift with every change of weights.
-    fn is_settled(&self, before: &State, after: &State, cofactors: &DMatrix<f64>) -> bool {
-        largest_step(before, after, self.network.hold_m) <= self.tolerance_m
-            || before.poses.iter().zip(&after.poses).enumerate().all(|(k, (a, b))| {
-                let step = pose_difference(a, b);
-                let own = cofactors.fixed_view::<6, 6>(6 * k, 6 * k).into_owned();
-                let sigmas = own.cholesky().map_or(f64::INFINITY, |factor| step.dot(&factor.solve(&step)).sqrt());
-                k == self.network.fixed || sigmas <= FEW_SIGMAS
-            })
+    fn is_settled(&self, before: &State, after: &State, adjusted: &Adjusted, facets: &[Facet]) -> bool {
+        if largest_step(before, after, self.network.hold_m) <= self.tolerance_m {
+            return true;
+        }
+        let (cofactors, factor) = (&adjusted.cofactors, adjusted.factor_on(facets));
+        before.poses.iter().zip(&after.poses).enumerate().all(|(k, (a, b))| {
+            let step = pose_difference(a, b);
+            let own = cofactors.fixed_view::<6, 6>(6 * k, 6 * k) * factor;
+            let sigmas = own.cholesky().map_or(f64::INFINITY, |factor| step.dot(&factor.solve(&step)).sqrt());
+            k == self.network.fixed || sigmas <= FEW_SIGMAS
+        })
     }
 
     /// What the stations saw of each tile about the planes at the present poses, and how that scatters.
@@ -179,6 +192,7 @@ impl Finish<'_> {
             means,
             variances,
             cofactors,
+            factor: 1.0,
             rounds: 0,
             settled: false,
         })

@@ -1,14 +1,15 @@
 //! Registration of all stations: from clouds to one coordinate system.
 
+use std::borrow::Cow;
 use std::sync::Arc;
 
-use nalgebra::{DMatrix, Isometry3, Matrix6};
+use nalgebra::{DMatrix, Isometry3, Matrix6, Vector3};
 use rayon::prelude::*;
 
 use super::alignments::Overlap;
 use super::check::{Checked, checked};
-use super::grouping::patch_size;
 use super::network::{Network, State};
+use super::patch_size;
 use super::patches::Surface;
 use super::placement::{Placements, judge_placements};
 use super::point_model::{SharedParameters, checked_prior};
@@ -121,7 +122,16 @@ fn require_connected(adjusted: &Adjusted, fewest: usize, datum: Datum) -> Result
     if stations.is_empty() {
         return Ok(());
     }
-    let reasons = vec!["no surfaces of theirs meet those of the others".to_owned()];
+    let all = adjusted.overlaps(1);
+    let reason = |&station: &usize| {
+        let with = all.iter().filter(|pair| {
+            let other = if pair.target == station { pair.source } else { pair.target };
+            (pair.target == station || pair.source == station) && reached[other]
+        });
+        let tiles = with.map(|pair| adjusted.shared(pair.target, pair.source).len()).max().unwrap_or(0);
+        format!("shares {tiles} tiles of common surfaces with any of the others, at least {fewest} are needed")
+    };
+    let reasons = stations.iter().map(reason).collect();
     Err(Error::UnconnectedStations { stations, to: datum.held_station(), reasons })
 }
 
@@ -170,18 +180,20 @@ fn validate(
 
 /// The stations as patches, all of one size.
 fn prepare(stations: &[Cloud], options: &StationRegistrationOptions<'_>) -> Result<Vec<Surface>> {
+    let normals: Vec<Cow<'_, [Vector3<f64>]>> = stations.par_iter().map(normals_of).collect::<Result<_>>()?;
     let size_m = options.patch_m.unwrap_or_else(|| {
-        let mut sizes: Vec<f64> = stations.par_iter().map(patch_size).collect();
+        let mut sizes: Vec<f64> =
+            stations.par_iter().zip(&normals).map(|(cloud, normals)| patch_size::size(cloud, normals)).collect();
         quantile(&mut sizes, 0.5)
     });
-    let prepare = |cloud: &Cloud| {
-        if let Some(normals) = &cloud.normals {
-            return Surface::new(cloud, normals, size_m);
-        }
-        let normals = unorganised_normals(&cloud.points, &UnorganisedNormalOptions::default())?;
-        Surface::new(cloud, &normals, size_m)
-    };
-    stations.par_iter().map(prepare).collect()
+    stations.par_iter().zip(&normals).map(|(cloud, normals)| Surface::new(cloud, normals, size_m)).collect()
+}
+
+fn normals_of(cloud: &Cloud) -> Result<Cow<'_, [Vector3<f64>]>> {
+    match &cloud.normals {
+        Some(normals) => Ok(Cow::Borrowed(normals)),
+        None => Ok(Cow::Owned(unorganised_normals(&cloud.points, &UnorganisedNormalOptions::default())?)),
+    }
 }
 
 /// Verdicts on the stations at the adjusted poses, their points where the shared parameters have them.

@@ -74,6 +74,12 @@ impl Tiles {
         }
     }
 
+    /// Column and row of a tile, counted over all facets.
+    pub(super) fn place_of(&self, tile: usize) -> [usize; 2] {
+        let own = tile.saturating_sub(self.first);
+        [own % self.columns.max(1), own / self.columns.max(1)]
+    }
+
     /// Whether a disc around this place may touch the tiles.
     pub(super) fn near(&self, place: [f64; 2], radius_m: f64) -> bool {
         let within = |axis: usize, count: usize| {

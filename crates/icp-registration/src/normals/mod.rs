@@ -34,6 +34,10 @@ impl Neighbourhood {
         }
     }
 
+    pub(crate) fn count(&self) -> usize {
+        self.count
+    }
+
     /// Unit normal of the least-squares plane; `None` where the points do not form a surface.
     pub(crate) fn normal(&self, min_neighbours: usize) -> Option<Vector3<f64>> {
         if self.count < min_neighbours.max(3) {

@@ -19,11 +19,14 @@ pub struct OrganisedNormalOptions {
     /// and holes thus get no normal: planes fitted to one-sided windows there lean, and pairs with partners beyond the
     /// edge of what was seen pull a registration aside by a millimetre.
     pub min_fill: f64,
+    /// Half width up to which windows are widened, doubled each time, where they lie on one surface but their points are
+    /// too noisy to show its plane. Default: that of the window, no pixel gets a wider one.
+    pub widest_half_width_px: Option<usize>,
 }
 
 impl Default for OrganisedNormalOptions {
     fn default() -> Self {
-        Self { half_width_px: 2, max_relative_jump: 0.03, min_fill: 0.9 }
+        Self { half_width_px: 2, max_relative_jump: 0.03, min_fill: 0.9, widest_half_width_px: None }
     }
 }
 
@@ -54,13 +57,17 @@ pub fn organised_normals(
         let value = options.half_width_px as f64;
         return Err(Error::InvalidOption { name: "half_width_px", value, domain: "1 to 100" });
     }
+    if let Some(widest) = options.widest_half_width_px
+        && !(options.half_width_px..=100).contains(&widest)
+    {
+        let (name, domain) = ("widest_half_width_px", "half_width_px to 100");
+        return Err(Error::InvalidOption { name, value: widest as f64, domain });
+    }
     if !(options.min_fill >= 0.0 && options.min_fill <= 1.0) {
         return Err(Error::InvalidOption { name: "min_fill", value: options.min_fill, domain: "0 to 1" });
     }
     let ranges: Vec<f64> = points.iter().map(|p| Vector3::from(*p).norm()).collect();
-    let window = (2 * options.half_width_px + 1).pow(2) as f64;
-    let min_count = (options.min_fill * window).ceil() as usize;
-    let frame = Frame { points, ranges: &ranges, width, height, options, min_count };
+    let frame = Frame { points, ranges: &ranges, width, height, options };
     let mut normals = vec![no_normal(); expected];
     normals.par_chunks_mut(width.max(1)).enumerate().for_each(|(row, line)| {
         for (col, normal) in line.iter_mut().enumerate() {
@@ -76,7 +83,6 @@ struct Frame<'a> {
     width: usize,
     height: usize,
     options: &'a OrganisedNormalOptions,
-    min_count: usize,
 }
 
 impl Frame<'_> {
@@ -87,8 +93,29 @@ impl Frame<'_> {
             return None;
         }
         let centre = Vector3::from(self.points[centre_index]);
+        let mut half = self.options.half_width_px;
+        let widest = self.options.widest_half_width_px.unwrap_or(half).max(half);
+        loop {
+            let window = (2 * half + 1).pow(2) as f64;
+            let min_count = (self.options.min_fill * window).ceil() as usize;
+            let neighbourhood = self.neighbourhood((col, row), half, &centre);
+            if neighbourhood.count() < min_count.max(3) {
+                return None;
+            }
+            if let Some(normal) = neighbourhood.normal(min_count) {
+                return Some(facing(normal, &-centre));
+            }
+            if half >= widest {
+                return None;
+            }
+            half = (2 * half).min(widest);
+        }
+    }
+
+    /// The pixels of the window that lie on the surface of its centre.
+    fn neighbourhood(&self, (col, row): (usize, usize), half: usize, centre: &Vector3<f64>) -> Neighbourhood {
+        let range = self.ranges[row * self.width + col];
         let jump = self.options.max_relative_jump * range;
-        let half = self.options.half_width_px;
         let (first_row, last_row) = (row.saturating_sub(half), (row + half).min(self.height - 1));
         let (first_col, last_col) = (col.saturating_sub(half), (col + half).min(self.width - 1));
         let mut neighbourhood = Neighbourhood::default();
@@ -102,7 +129,6 @@ impl Frame<'_> {
                 }
             }
         }
-        let normal = neighbourhood.normal(self.min_count)?;
-        Some(facing(normal, &-centre))
+        neighbourhood
     }
 }

@@ -44,6 +44,17 @@ pub fn kitchen(count: usize) -> Option<Sequence> {
     Some(Sequence { projection: pinhole(FOCAL[0], CENTRES[0]), frames })
 }
 
+/// Frames of the same way by their numbers.
+pub fn dense_kitchen(numbers_of_frames: impl Iterator<Item = usize>) -> Option<Sequence> {
+    let folder = folder("sevenscenes_redkitchen_dense")?;
+    let frame = |number: usize| {
+        let text = std::fs::read_to_string(folder.join(format!("frame-{number:06}.pose.txt"))).unwrap();
+        let image = folder.join(format!("frame-{number:06}.depth.png"));
+        DepthFrame { points: points(&image, FOCAL[0], CENTRES[0]), world_from_camera: pose(&numbers(&text)) }
+    };
+    Some(Sequence { projection: pinhole(FOCAL[0], CENTRES[0]), frames: numbers_of_frames.map(frame).collect() })
+}
+
 /// Five frames of a living room, with their trajectory.
 pub fn living_room() -> Option<Sequence> {
     let folder = folder("redwood_rgbd5")?;

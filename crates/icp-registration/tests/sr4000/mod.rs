@@ -20,14 +20,19 @@ const TANGENTIAL: [f64; 2] = [1.304_567e-5, 0.000_404_58];
 
 /// The mean of four frames of each station, prepared.
 pub fn stations() -> Option<[OrganisedFrame; 2]> {
-    let folder = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/real/sr4000_steps"));
     let directions: Vec<[f64; 3]> = (0..SIZE[0] * SIZE[1]).map(direction).collect();
     let projection = Arc::new(Projection::from_directions(SIZE[0], SIZE[1], &directions).unwrap());
+    let points = points(&[0, 1, 2, 3])?;
+    Some(points.map(|points| OrganisedFrame::new(&projection, &points, None).unwrap()))
+}
+
+/// Points of both stations by the mean of some of their four frames, row by row; NaN where one of these is dim.
+pub fn points(frames: &[usize]) -> Option<[Vec<[f64; 3]>; 2]> {
+    let folder = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/real/sr4000_steps"));
     folder.exists().then(|| {
         ["Y1", "Y2"].map(|station| {
-            let points: Vec<[f64; 3]> =
-                ranges(&folder, station).iter().zip(&directions).map(|(range, d)| d.map(|v| v * range)).collect();
-            OrganisedFrame::new(&projection, &points, None).unwrap()
+            let ranges = ranges(&folder, station, frames);
+            ranges.iter().enumerate().map(|(pixel, range)| direction(pixel).map(|v| v * range)).collect()
         })
     })
 }
@@ -46,14 +51,14 @@ fn direction(pixel: usize) -> [f64; 3] {
 }
 
 /// Mean ranges of a station's frames, metre; NaN where one of them is dim.
-fn ranges(folder: &Path, station: &str) -> Vec<f64> {
+fn ranges(folder: &Path, station: &str, frames: &[usize]) -> Vec<f64> {
     let mut mean = vec![0.0; SIZE[0] * SIZE[1]];
-    for frame in 0..4 {
+    for frame in frames {
         let file = File::open(folder.join(format!("{station}_{frame}.npz"))).unwrap();
         let mut archive = zip::ZipArchive::new(file).unwrap();
         let (range, amplitude) = (numbers(&mut archive, "range.npy"), numbers(&mut archive, "amplitude.npy"));
         for ((mean, range), amplitude) in mean.iter_mut().zip(range).zip(amplitude) {
-            *mean += if amplitude >= LEAST_AMPLITUDE { f64::from(range) / 4.0 } else { f64::NAN };
+            *mean += if amplitude >= LEAST_AMPLITUDE { f64::from(range) / frames.len() as f64 } else { f64::NAN };
         }
     }
     mean

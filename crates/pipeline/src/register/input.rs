@@ -28,6 +28,9 @@ use crate::{Error, Plan, Result, Stage};
 /// Below this number of points there is no surface to speak of.
 const FEWEST_POINTS: usize = 50;
 
+/// How much wider the windows of normals become where noise hides the surface: four times as wide, 30 times as much noise.
+const WIDENED: usize = 4;
+
 /// One cloud to register, in its own frame.
 pub(crate) struct Station {
     pub(crate) name: String,
@@ -232,8 +235,11 @@ impl Station {
         let normals = match (&self.file.normals, self.file.size) {
             (Some(normals), _) => Some(normals.iter().map(|n| Vector3::from(n.map(f64::from))).collect()),
             (None, Some([width, height])) => {
-                let options =
-                    OrganisedNormalOptions { half_width_px: normal_half_width_px, ..OrganisedNormalOptions::default() };
+                let options = OrganisedNormalOptions {
+                    half_width_px: normal_half_width_px,
+                    widest_half_width_px: Some((WIDENED * normal_half_width_px).min(100)),
+                    ..OrganisedNormalOptions::default()
+                };
                 Some(organised_normals(&points, width, height, &options).map_err(fail)?)
             }
             (None, None) => None,

@@ -5,6 +5,7 @@ pub(crate) mod describe;
 pub(crate) mod guess;
 pub(crate) mod input;
 mod pairs;
+pub(crate) mod refused;
 mod request;
 mod results;
 mod stations;

@@ -3,7 +3,7 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use icp_registration::{IcpResult, StopReason};
-use nalgebra::Point3;
+use nalgebra::{Isometry3, Point3};
 use rayon::prelude::*;
 
 use super::input::{Input, Station};
@@ -65,6 +65,19 @@ pub(super) fn run(input: Input, start: &str, progress: &dyn Progress) -> Result<
         row.mean_m = mean(&distances(&stations[index + 1], &surfaces[index], &steps[index], false));
     }
     Ok(Registered { stations, poses, before, residuals_m, vertical_axis, summary })
+}
+
+/// Poses of all stations, each aligned onto the one before; `None` where one of these alignments cannot be trusted.
+pub(super) fn chained(stations: &[Station]) -> Option<Vec<Isometry3<f64>>> {
+    let prepare = |station: &Station| Surface::new(station, NORMAL_HALF_WIDTH_PX).ok();
+    let surfaces = stations.par_iter().map(prepare).collect::<Option<Vec<_>>>()?;
+    let align = |source: usize| {
+        let aligned = align(stations, &surfaces, source).ok()?;
+        aligned.result.is_trustworthy().then_some(aligned.result)
+    };
+    let steps = (1..stations.len()).into_par_iter().map(align).collect::<Option<Vec<IcpResult>>>()?;
+    let chain = chain::along(Isometry3::identity(), &steps);
+    Some(chain.into_iter().map(|station| station.world_from_camera).collect())
 }
 
 fn align(stations: &[Station], surfaces: &[Surface], source: usize) -> Result<Aligned> {

@@ -1,5 +1,6 @@
 //! All stations at once.
 
+use icp_registration::Error::UnconnectedStations;
 use icp_registration::{
     Cloud, Datum, Start, StationRegistration, StationRegistrationOptions, SurfacePair, register_stations,
 };
@@ -7,8 +8,9 @@ use nalgebra::{Isometry3, Point3};
 use rayon::prelude::*;
 
 use super::input::{Input, Station};
+use super::refused::{self, Tried};
 use super::summary::{RegisterSummary, RegisteredLoop, RegisteredPair};
-use super::{Registered, describe};
+use super::{Registered, describe, pairs};
 use crate::outcome::StationPose;
 use crate::plan::NORMAL_HALF_WIDTH_PX;
 use crate::progress::Progress;
@@ -27,15 +29,29 @@ pub(super) fn run(input: Input, start: &str, progress: &dyn Progress) -> Result<
     let Input { stations, vertical_axis, .. } = input;
     let clouds = stations.par_iter().map(|station| station.cloud(NORMAL_HALF_WIDTH_PX)).collect::<Result<Vec<_>>>()?;
     let before: Option<Vec<Isometry3<f64>>> = stations.iter().map(|station| station.approximate).collect();
-    let (known, words) = match &before {
-        Some(poses) => (Start::Poses(poses), start.to_owned()),
-        None if stations.len() <= MOST_TRIED => (Start::Nothing, "none, all pairs tried".to_owned()),
-        None => (Start::Order, "none, stations that follow each other tried".to_owned()),
+    let (known, tried, words) = match &before {
+        Some(poses) => (Start::Poses(poses), Tried::Poses(None), start.to_owned()),
+        None if stations.len() <= MOST_TRIED => (Start::Nothing, Tried::AllPairs, "none, all pairs tried".to_owned()),
+        None => (Start::Order, Tried::Order, "none, stations that follow each other tried".to_owned()),
     };
+    let names: Vec<String> = stations.iter().map(|station| station.name.clone()).collect();
     progress.begin("register stations", stations.len());
     let told = |done: usize, _: usize| progress.advance(done);
-    let result = register_stations(&clouds, known, Datum::Station(0), &StationRegistrationOptions::default(), &told)
-        .map_err(|error| refused(&error, &stations))?;
+    let attempt = |start: Start<'_>| {
+        register_stations(&clouds, start, Datum::Station(0), &StationRegistrationOptions::default(), &told)
+    };
+    let (found, tried, words) = match attempt(known) {
+        // Free space that noise or wrapped ranges fill speaks against every arrangement; neighbours may still fit.
+        Err(UnconnectedStations { stations: lost, to, reasons }) if before.is_none() => match pairs::chained(&stations)
+        {
+            Some(poses) => {
+                (attempt(Start::Poses(&poses)), Tried::Chain, "none, each aligned onto the one before".to_owned())
+            }
+            None => (Err(UnconnectedStations { stations: lost, to, reasons }), tried, words),
+        },
+        found => (found, tried, words),
+    };
+    let result = found.map_err(|error| refused::of_command(&error, &names, tried))?;
     let poses: Vec<StationPose> = result
         .world_from_station
         .iter()
@@ -51,24 +67,6 @@ pub(super) fn run(input: Input, start: &str, progress: &dyn Progress) -> Result<
     describe::extremes(&mut summary);
     let residuals_m = residuals(&result, &stations)?;
     Ok(Registered { stations, poses, before, residuals_m, vertical_axis, summary })
-}
-
-/// The error with names for numbers, and what to do.
-fn refused(error: &icp_registration::Error, stations: &[Station]) -> Error {
-    let name = |index: usize| stations.get(index).map_or_else(|| index.to_string(), |station| station.name.clone());
-    if let icp_registration::Error::UnconnectedStations { stations: alone, to, reasons } = error {
-        let alone: Vec<String> = alone.iter().map(|&index| name(index)).collect();
-        let order: Vec<String> = (0..stations.len()).map(|index| format!("{index} {}", name(index))).collect();
-        return Error::Register(format!(
-            "no alignment found that leads from {} to {}; start poses (--guess FILE) may help, or leave these out \
-             ({}; stations: {})",
-            name(*to),
-            alone.join(", "),
-            reasons.join("; "),
-            order.join(", ")
-        ));
-    }
-    Error::registration("all stations", error)
 }
 
 fn summary(

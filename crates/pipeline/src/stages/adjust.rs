@@ -5,6 +5,7 @@ use super::Findings;
 use crate::outcome::{AdjustmentFigures, StationPose};
 use crate::plan::AdjustOptions;
 use crate::progress::Progress;
+use crate::register::refused::{self, Tried};
 use crate::work::Work;
 use crate::{Error, Result};
 
@@ -26,7 +27,9 @@ pub(super) fn run(work: &mut Work, options: &AdjustOptions, progress: &dyn Progr
         progress.advance(done);
     };
     let adjusted = register_stations(&work.station_clouds, Start::Poses(&initial), Datum::Station(0), &choice, &tell);
-    let adjusted = adjusted.map_err(Error::stage("Adjust", "all stations"))?;
+    let names: Vec<String> = work.outcome.views.iter().map(|view| view.station.clone()).collect();
+    let tried = Tried::Poses(Some(options.maximum_distance_m));
+    let adjusted = adjusted.map_err(|error| refused::of_stage("Adjust", error, &names, tried))?;
     if !adjusted.settled {
         return Err(Error::stage("Adjust", "all stations")(format!(
             "the stations still slide after {} rounds: a direction is held by too little; more overlap, or stations \

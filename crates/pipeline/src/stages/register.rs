@@ -9,6 +9,7 @@ use crate::outcome::StationPose;
 use crate::plan::{RegisterOptions, StartPoses};
 use crate::progress::Progress;
 use crate::register::Station;
+use crate::register::refused::{self, Tried};
 use crate::register::surface::{self, Surface};
 use crate::work::Work;
 use crate::{Error, Result};
@@ -61,7 +62,13 @@ fn at_once(
     };
     let told = |done: usize, _: usize| progress.advance(done);
     let found = register_stations(&clouds, start, Datum::Station(0), &choice, &told);
-    let found = found.map_err(|error| refused(&error, stations))?;
+    let names: Vec<String> = stations.iter().map(|station| station.name.clone()).collect();
+    let tried = match start {
+        Start::Poses(_) => Tried::Poses(Some(options.maximum_distance_m)),
+        Start::Order => Tried::Order,
+        Start::Nothing => Tried::AllPairs,
+    };
+    let found = found.map_err(|error| refused::of_stage("Register", error, &names, tried))?;
     Ok(Found { poses: found.world_from_station, pairs: found.pairs, refused: found.refused, clouds })
 }
 
@@ -83,18 +90,4 @@ fn each_onto_the_one_before(stations: &[Station], options: &RegisterOptions) -> 
     }
     let clouds = surfaces.into_iter().map(|surface| surface.target.cloud().clone()).collect();
     Ok(Found { poses, pairs, refused: Vec::new(), clouds })
-}
-
-/// The error with names for numbers.
-fn refused(error: &icp_registration::Error, stations: &[Station]) -> Error {
-    let icp_registration::Error::UnconnectedStations { stations: lost, to, reasons } = error else {
-        return Error::stage("Register", "all stations")(error.clone());
-    };
-    let name = |&index: &usize| stations.get(index).map_or_else(|| index.to_string(), |station| station.name.clone());
-    let lost: Vec<String> = lost.iter().map(name).collect();
-    Error::stage("Register", &format!("stations {}", lost.join(", ")))(format!(
-        "no reliable alignment connects them to {}; more overlap or better approximate poses are needed ({})",
-        name(to),
-        reasons.join("; ")
-    ))
 }

@@ -81,6 +81,9 @@ const MOST_REASONS: usize = 3;
 
 #[cfg(test)]
 mod tests {
+    // Panics are how a test fails.
+    #![allow(clippy::unwrap_used)]
+
     use super::*;
 
     #[test]

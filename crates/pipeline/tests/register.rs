@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
-use pipeline::{RegisterMethod, RegisterRequest, RegisterSummary, Silent, SimulateSource, register, simulate};
+use pipeline::{Failure, RegisterMethod, RegisterRequest, RegisterSummary, Silent, SimulateSource, register, simulate};
 use range_io::clouds::{CloudFile, Precision};
 
 fn request(inputs: &[PathBuf], method: RegisterMethod, out: &Path) -> RegisterRequest {
@@ -190,11 +190,15 @@ fn what_cannot_be_registered_is_refused_with_a_reason() {
 
     let refused = |names: &[&str], guess: Option<&str>, method: RegisterMethod| {
         let inputs: Vec<PathBuf> = names.iter().map(|name| path(name)).collect();
-        let request = RegisterRequest { guess: guess.map(path), ..request(&inputs, method, &path("out")) };
-        let error = register(&request, &Silent).unwrap_err().to_string();
-        assert!(!path("out").exists(), "nothing is left behind");
+        let results = tempfile::tempdir().unwrap();
+        let out = results.path().join("out");
+        let request = RegisterRequest { guess: guess.map(path), ..request(&inputs, method, &out) };
+        let error = register(&request, &Silent).unwrap_err();
+        // A refusal leaves its reason, and wrong input nothing.
+        let reason = out.join("summary.json").is_file() && std::fs::read_dir(&out).unwrap().count() == 2;
+        assert_eq!(if out.exists() { reason } else { false }, error.failure() == Failure::Refused, "{error}");
         println!("{error}");
-        error
+        error.to_string()
     };
     let (pairs, multi) = (RegisterMethod::Pairs, RegisterMethod::Multi);
     assert!(refused(&[], None, pairs).contains("no input is named"));

@@ -43,7 +43,10 @@ pub fn write(path: impl AsRef<Path>, image: &Raster<u16>) -> Result<()> {
     let (Ok(width), Ok(height)) = (u32::try_from(image.width()), u32::try_from(image.height())) else {
         return Err(Error::format(path, format!("cannot hold {} x {} pixels", image.width(), image.height())));
     };
-    let failed = |error: png::EncodingError| Error::format(path, format!("cannot be written: {error}"));
+    let failed = |error: png::EncodingError| match error {
+        png::EncodingError::IoError(source) => Error::io(path, "write")(source),
+        error => Error::format(path, format!("cannot be written: {error}")),
+    };
     let mut file = FileWriter::create(path)?;
     let mut encoder = Encoder::new(&mut file, width, height);
     encoder.set_color(ColorType::Grayscale);

@@ -19,7 +19,10 @@ pub fn write_e57(path: impl AsRef<Path>, scans: &[E57Scan], precision: Precision
         scan.cloud.check_size()?;
     }
     let mut file = FileWriter::create(path)?;
-    let failed = |error: ::e57::Error| Error::format(path, format!("cannot be written: {error}"));
+    let failed = |error: ::e57::Error| match system_error(&error) {
+        Some(kind) => Error::io(path, "write")(kind.into()),
+        None => Error::format(path, format!("cannot be written: {error}")),
+    };
     let clouds = scans.iter().map(|scan| &scan.cloud);
     let mut writer = E57Writer::new(&mut file, &identity(clouds.clone(), 0)).map_err(failed)?;
     let has = |find: fn(&CloudFile) -> bool| scans.iter().any(|scan| find(&scan.cloud));
@@ -44,6 +47,18 @@ pub fn write_e57(path: impl AsRef<Path>, scans: &[E57Scan], precision: Precision
     writer.finalize().map_err(failed)?;
     drop(writer);
     file.commit()
+}
+
+/// What the system refused, where that is behind the error.
+fn system_error(error: &::e57::Error) -> Option<std::io::ErrorKind> {
+    let mut cause = std::error::Error::source(error);
+    while let Some(inner) = cause {
+        if let Some(found) = inner.downcast_ref::<std::io::Error>() {
+            return Some(found.kind());
+        }
+        cause = inner.source();
+    }
+    None
 }
 
 fn describe<T: std::io::Read + std::io::Write + std::io::Seek>(

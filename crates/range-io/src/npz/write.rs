@@ -79,7 +79,7 @@ impl<W: Write + Seek> NpzWriter<W> {
             .compression_level(Some(LEVEL))
             .large_file(header.bytes().is_none_or(|bytes| bytes >= 1 << 31));
         let started = self.archive.start_file(format!("{array}.npy"), options);
-        started.map_err(|error| self.error(array, format!("cannot be added: {error}")))?;
+        started.map_err(|error| Error::io(&self.file, "begin an array of")(error.into()))?;
         self.write(&header, values).map_err(Error::io(&self.file, "write"))
     }
 
@@ -99,7 +99,7 @@ impl<W: Write + Seek> NpzWriter<W> {
     /// Ends the archive and gives the writer back.
     pub fn finish(self) -> Result<W> {
         let Self { file, archive } = self;
-        archive.finish().map_err(|error| Error::format(&file, format!("cannot be finished: {error}")))
+        archive.finish().map_err(|error| Error::io(&file, "finish")(error.into()))
     }
 
     fn error(&self, array: &str, reason: String) -> Error {

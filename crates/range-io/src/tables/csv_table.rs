@@ -1,3 +1,4 @@
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use csv::{ReaderBuilder, StringRecord, Trim};
@@ -257,14 +258,17 @@ impl<'a> Row<'a> {
 
 /// Writes a table: the header, then rows of fields.
 pub(super) fn write(path: &Path, header: &[&str], rows: impl Iterator<Item = Vec<String>>) -> Result<()> {
-    let mut writer = csv::Writer::from_writer(FileWriter::create(path)?);
+    // In memory first, so that what the system says against the file is not behind what csv makes of it.
+    let mut writer = csv::Writer::from_writer(Vec::new());
     let failed = |error: csv::Error| Error::format(path, format!("cannot be written: {error}"));
     writer.write_record(header).map_err(failed)?;
     for row in rows {
         writer.write_record(row).map_err(failed)?;
     }
-    let finished = writer.into_inner().map_err(|error| Error::format(path, format!("cannot be written: {error}")))?;
-    finished.commit()
+    let text = writer.into_inner().map_err(|error| Error::format(path, format!("cannot be written: {error}")))?;
+    let mut file = FileWriter::create(path)?;
+    file.write_all(&text).map_err(Error::io(path, "write"))?;
+    file.commit()
 }
 
 /// The shortest text that reads back as the same number; nothing for nothing.

@@ -6,7 +6,9 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use error_models::ModelSet;
-use pipeline::{Judged, Silent, SimulateSource, TrackRequest, TrackSummary, TrackVerdict, Verdict, simulate, track};
+use pipeline::{
+    Failure, Judged, Silent, SimulateSource, TrackRequest, TrackSummary, TrackVerdict, Verdict, simulate, track,
+};
 use range_image::Raster;
 use range_io::calibration::Calibration;
 use range_io::survey::{InputFrame, Level, Survey, read_truth, write_frame};
@@ -236,10 +238,13 @@ fn what_cannot_be_tracked_is_refused_with_a_reason() {
     let root = tempfile::tempdir().unwrap();
     let path = |name: &str| root.path().join(name);
     let refused = |request: &TrackRequest| {
-        let error = track(request, &Silent).unwrap_err().to_string();
-        assert!(!request.out.exists(), "nothing is left behind");
+        let error = track(request, &Silent).unwrap_err();
+        // A refusal leaves its reason, and wrong input nothing.
+        let refused = error.failure() == Failure::Refused;
+        assert_eq!(request.out.join("summary.json").is_file(), refused, "{error}");
+        assert!(refused || !request.out.exists(), "nothing is left behind");
         println!("{error}");
-        error
+        error.to_string()
     };
     let of = |name: &str, change: &dyn Fn(&mut Survey)| refused(&request(&variant(root.path(), name, change)));
     assert!(of("one", &|survey| survey.frames.truncate(1)).contains("it has one frame"));

@@ -100,8 +100,11 @@ fn is_left(folder: &Path, process: u32) -> bool {
     }
 }
 
-/// Whether there is surely no process of this number.
+/// Whether there is surely no process of this number, or one that has ended and that nobody has asked for its code yet.
 fn is_gone(process: u32) -> bool {
-    let processes = Path::new("/proc");
-    processes.join("self").exists() && !processes.join(process.to_string()).exists()
+    let state = |process: &str| fs::read_to_string(Path::new("/proc").join(process).join("stat"));
+    // The state stands behind the program's name, which is in parentheses and may have some itself.
+    let has_ended =
+        |text: String| text.rsplit(')').next().is_some_and(|rest| rest.trim_start().starts_with(['Z', 'X']));
+    state("self").is_ok() && state(&process.to_string()).map_or(true, has_ended)
 }

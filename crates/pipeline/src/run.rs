@@ -80,6 +80,10 @@ impl RunRequest {
 /// Where the data refuse an earlier stage, [`Error::Refused`]; then the reason is written, beside an older result where
 /// there is one. Every other error leaves what was there.
 pub fn run(request: &RunRequest, progress: &dyn Progress) -> Result<Summary> {
+    if request.plan.stages.is_empty() {
+        let message = "`stages` is empty, expected at least one stage".to_owned();
+        return Err(Error::Survey { path: request.plan_path.clone(), message });
+    }
     let inputs = request.inputs();
     inputs.destination(&request.out)?;
     request.check_folders_beside(&inputs)?;

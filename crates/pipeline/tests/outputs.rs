@@ -199,7 +199,7 @@ fn what_stands_without_registration_is_written() {
 }
 
 #[test]
-fn names_that_lead_elsewhere_are_refused() {
+fn pipelines_without_a_name_of_their_own_or_stages_are_refused() {
     for name in ["../../x/y", "/tmp/x", "a/b", "a\\\\b", "..", ".", "", "a\\nb", "a\\u{1b}[31m", "C:\\\\x"] {
         let text = format!("(name: \"{name}\", stages: [Average()])");
         let error = Plan::from_ron(&text, Path::new("p.ron")).unwrap_err();
@@ -208,6 +208,8 @@ fn names_that_lead_elsewhere_are_refused() {
         let words = error.to_string();
         assert!(words.starts_with("p.ron: `name` is \"") && !words.contains(char::is_control), "{words}");
     }
+    let nothing = run(&run_request(Path::new("nowhere"), ""), &Silent).unwrap_err();
+    assert!(nothing.failure() == Failure::Usage && nothing.to_string().contains("`stages` is empty"), "{nothing}");
     for name in ["room", "room 2", "Büro, früh", "..a", "a..b", ".hidden"] {
         Plan::from_ron(&format!("(name: \"{name}\", stages: [Average()])"), Path::new("p.ron")).unwrap();
     }

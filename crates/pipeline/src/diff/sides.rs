@@ -118,7 +118,7 @@ fn in_file(calibration: &Calibration, model: usize, name: &str) -> String {
 }
 
 fn words(model: &RangeCalibration) -> String {
-    format!("{} ms, {} MHz", 1e3 * model.integration_time_s, 1e-6 * model.modulation_hz)
+    format!("{} ms, {} MHz", 1e3 * model.integration_time_s, model.modulation_hz.round() / 1e6)
 }
 
 /// What the files say of noise, scattering and fixed pattern, which have no covariance.

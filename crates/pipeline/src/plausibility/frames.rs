@@ -66,8 +66,9 @@ impl FrameWatch {
         doubts.extend(self.repeated_stations());
         let middle = median(&mut self.ranges_m.clone());
         if middle < NEAREST_M || middle > FURTHEST_M {
+            let (value, unit) = if middle < 1.0 { (1e3 * middle, "mm") } else { (middle, "m") };
             let words = format!(
-                "half of all ranges are {} {middle} m, which no camera of this kind measures: ranges and depths are in metres \
+                "half of all ranges are {} {value:.3} {unit}, which no camera of this kind measures: ranges and depths are in metres \
                  (integers times depth.scale_m of survey.ron)",
                 if middle < NEAREST_M { "below" } else { "above" }
             );

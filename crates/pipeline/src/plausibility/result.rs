@@ -14,13 +14,15 @@ const MOST_FLAGGED: f64 = 0.8;
 
 /// Doubts about views, points and poses, once all stages ran.
 pub(crate) fn of_outcome(outcome: &Outcome) -> Vec<Doubt> {
-    let mut doubts: Vec<Doubt> = outcome.views.iter().filter_map(mostly_flagged).collect();
+    let mut doubts = Vec::new();
     let points: usize = outcome.clouds.iter().map(|cloud| usable(cloud).count()).sum();
     if points == 0 && !outcome.clouds.is_empty() {
         doubts.push(Doubt::new(
             DoubtKind::NoPoints,
             "the result has 0 points: every pixel is flagged or without a range",
         ));
+    } else {
+        doubts.extend(outcome.views.iter().filter_map(mostly_flagged));
     }
     if outcome.refusal.is_none() && outcome.poses.len() == outcome.views.len() {
         let placed = placed(outcome);

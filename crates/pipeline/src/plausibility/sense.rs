@@ -96,7 +96,8 @@ fn falls(frame: &ComplexFrame, channel: &ComplexChannel, corner: [usize; 2], sid
         let at = |plane: &[f32]| f64::from(plane[index]);
         let (re, im) = (at(channel.real.as_slice()), at(channel.imaginary.as_slice()));
         let (amplitude, sigma) = (re.hypot(im), at(channel.sigma.as_slice()));
-        if frame.flags.as_slice()[index].intersects(unusable) || !(amplitude > 0.0) || amplitude < 5.0 * sigma {
+        let lit = amplitude > 0.0;
+        if frame.flags.as_slice()[index].intersects(unusable) || !lit || amplitude < 5.0 * sigma {
             continue;
         }
         mean = [mean[0] + re / amplitude, mean[1] + im / amplitude];

@@ -9,6 +9,7 @@ use range_io::survey::{Level, Survey};
 use crate::drift::{DriftCurve, DriftTreatment};
 use crate::plan::Stage;
 use crate::verdict::{Doubt, DoubtKind};
+use crate::view::view_name;
 use crate::{Error, Result};
 
 /// Pitches (relative) that are the same: data sheets round to two or three digits, and the sensors of one format differ
@@ -189,8 +190,10 @@ fn drift_known(survey: &Survey, calibration: &Calibration) -> Result<()> {
         return Ok(());
     };
     let curve = DriftCurve::new(calibrated, survey).map_err(|error| refused(error.to_string()))?;
-    for index in 0..survey.frames.len() {
-        curve.of_frames(String::new(), &[index], survey).map_err(|error| refused(error.to_string()))?;
+    for (index, frame) in survey.frames.iter().enumerate() {
+        let view = view_name(&frame.station, &[index]);
+        let known = curve.of_frames(String::new(), &[index], survey);
+        known.map_err(|error| refused(format!("{view}: {error}")))?;
     }
     Ok(())
 }

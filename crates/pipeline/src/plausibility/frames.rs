@@ -31,9 +31,15 @@ pub(crate) struct FrameWatch {
     ranges_m: Vec<f64>,
     frames: usize,
     stations: BTreeSet<String>,
+    is_stream: bool,
 }
 
 impl FrameWatch {
+    /// For the frames of a moving camera, however few.
+    pub(crate) fn of_stream() -> Self {
+        Self { is_stream: true, ..Self::default() }
+    }
+
     /// Looks at a frame as it was read.
     pub(crate) fn look(&mut self, view: &View) {
         self.frames += 1;
@@ -101,7 +107,8 @@ impl FrameWatch {
 
     /// Whether a frame stands for one that a recorder of a stream has dropped: it repeats the one before.
     fn is_dropped(&self, frame: usize, earlier: usize) -> bool {
-        self.frames >= STREAM && self.frames == self.stations.len() && frame.abs_diff(earlier) <= MOST_DROPPED
+        let is_stream = self.is_stream || (self.frames >= STREAM && self.frames == self.stations.len());
+        is_stream && frame.abs_diff(earlier) <= MOST_DROPPED
     }
 
     fn repeated_stations(&self) -> Vec<Doubt> {

@@ -56,7 +56,7 @@ impl FrameSource {
                 other => each.push(other),
             }
         }
-        Ok(Self { work, frames, stages: each, order, watch: FrameWatch::default(), votes: SenseVotes::default() })
+        Ok(Self { work, frames, stages: each, order, watch: FrameWatch::of_stream(), votes: SenseVotes::default() })
     }
 
     /// How points fall on the camera's pixels.

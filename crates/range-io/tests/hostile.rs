@@ -151,23 +151,28 @@ fn sizes_of_archives_are_not_believed() {
     let scratch = Scratch::new();
     let file = scratch.file("a.npz");
     let mut writer = NpzWriter::create(&file).expect("an archive");
-    writer.add("depth", &[2, 2], &[1.0_f32, 2.0, 3.0, 4.0]).expect("an array");
+    writer.add("depth", &[100_000], &[0.0_f32; 100_000]).expect("an array");
     writer.commit().expect("an archive");
     let sound = std::fs::read(&file).expect("its bytes");
-    let text = b"'shape': (2, 2), }  ";
-    let at = sound.windows(text.len()).position(|window| window == text).expect("the header");
-    // Sizes of the directory's entry and the header's own shape say gigabytes.
+    read_depth(&file).expect("an archive of zeros");
+    // Both sizes of the directory's entry say gigabytes; the header of the array inside stays what it is.
     let directory = sound.windows(4).position(|window| window == b"PK\x01\x02").expect("the directory");
-    let mut bytes = sound.clone();
-    bytes[at..at + 20].copy_from_slice(b"'shape': (2, 9999) ,");
-    let fault = read_depth(&scratch.holding("b.npz", &bytes)).expect_err("a shape too large").to_string();
-    assert!(fault.contains("promises shape"), "{fault}");
-    for field in [20, 24] {
-        bytes[directory + field..directory + field + 4].copy_from_slice(&0xffff_fff0_u32.to_le_bytes());
+    for fields in [[20, 24].as_slice(), &[20], &[24]] {
+        let mut bytes = sound.clone();
+        for field in fields {
+            bytes[directory + field..directory + field + 4].copy_from_slice(&0xffff_fff0_u32.to_le_bytes());
+        }
+        // What is read is bounded by the bytes that there are, whatever the directory says.
+        let mut promised = 0;
+        let read = NpzReader::open(scratch.holding("b.npz", &bytes)).and_then(|mut archive| {
+            archive.read("depth", |header| {
+                promised = header.bytes().unwrap_or(usize::MAX);
+                Ok(())
+            })
+        });
+        assert!(promised <= 400_000, "{promised}");
+        drop(read);
     }
-    bytes[at..at + 20].copy_from_slice(b"'shape': (99999999),");
-    let fault = read_depth(&scratch.holding("b.npz", &bytes)).expect_err("sizes too large").to_string();
-    assert!(fault.contains("promises shape") || fault.contains("cannot be read"), "{fault}");
 }
 
 fn read_depth(path: &Path) -> range_io::Result<()> {

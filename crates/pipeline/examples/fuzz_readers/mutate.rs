@@ -151,14 +151,18 @@ fn line_around(bytes: &[u8], at: usize) -> std::ops::Range<usize> {
     start..end
 }
 
+/// The polynomial of PNG and zip.
+pub const CRC_32: u32 = 0xedb8_8320;
+/// The one of Castagnoli, of E57.
+const CRC_32C: u32 = 0x82f6_3b78;
+
 /// Puts checksums right, without which readers look no further.
 pub fn with_checksums(target: &str, bytes: &mut [u8]) {
     match target {
         "e57" => {
             for page in bytes.chunks_exact_mut(1024) {
                 let (data, checksum) = page.split_at_mut(1020);
-                // The reflected polynomial of Castagnoli.
-                checksum.copy_from_slice(&crc(data, 0x82f6_3b78).to_be_bytes());
+                checksum.copy_from_slice(&crc(data, CRC_32C).to_be_bytes());
             }
         }
         "png" => {
@@ -166,7 +170,7 @@ pub fn with_checksums(target: &str, bytes: &mut [u8]) {
             while let Some(length) = bytes.get(at..at + 4) {
                 let length = length.iter().fold(0_usize, |length, byte| length << 8 | usize::from(*byte));
                 let Some(end) = length.checked_add(at + 8).filter(|end| end + 4 <= bytes.len()) else { return };
-                let checksum = crc(&bytes[at + 4..end], 0xedb8_8320).to_be_bytes();
+                let checksum = crc(&bytes[at + 4..end], CRC_32).to_be_bytes();
                 bytes[end..end + 4].copy_from_slice(&checksum);
                 at = end + 4;
             }
@@ -175,7 +179,8 @@ pub fn with_checksums(target: &str, bytes: &mut [u8]) {
     }
 }
 
-fn crc(bytes: &[u8], polynomial: u32) -> u32 {
+/// A checksum of 32 bits with a reflected polynomial.
+pub fn crc(bytes: &[u8], polynomial: u32) -> u32 {
     let step = |crc: u32| if crc & 1 == 1 { (crc >> 1) ^ polynomial } else { crc >> 1 };
     !bytes.iter().fold(u32::MAX, |crc, byte| (0..8).fold(crc ^ u32::from(*byte), |crc, _| step(crc)))
 }

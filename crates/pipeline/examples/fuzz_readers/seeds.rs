@@ -6,6 +6,8 @@ use range_image::Raster;
 use range_io::clouds::{CloudFile, Precision, write_any_cloud};
 use range_io::npz::NpzWriter;
 
+use super::mutate::{CRC_32, crc};
+
 type Outcome<T> = Result<T, Box<dyn std::error::Error>>;
 
 /// The sound files of a target; `folder` is a place to write them.
@@ -46,8 +48,8 @@ pub fn of(target: &str, folder: &Path) -> Outcome<Vec<Vec<u8>>> {
         "e57" => seeds.extend([cloud(folder, "e57")?]),
         "vtk" => seeds.extend([VTK.as_bytes().to_vec(), binary_vtk()]),
         "cloud" => seeds.extend([ply_of_text().into_bytes(), cloud(folder, "pcd")?, VTK.as_bytes().to_vec()]),
-        "npz" => seeds.extend([npz(folder)?, deflated(&npz(folder)?)]),
-        "npy" => seeds.push(npy(&npz(folder)?)),
+        "npz" => seeds.extend([npz(folder)?, stored("range.npy", &npy())]),
+        "npy" => seeds.push(npy()),
         "png" => {
             let file = folder.join("seed.png");
             range_io::png16::write(&file, &Raster::from_fn(4, 3, |col, row| (1000 * (col + row)) as u16))?;
@@ -110,7 +112,7 @@ fn binary_vtk() -> Vec<u8> {
     bytes
 }
 
-/// All arrays that a frame of 4 x 3 pixels can have.
+/// All arrays that a frame of 4 x 3 pixels can have, deflated.
 fn npz(folder: &Path) -> Outcome<Vec<u8>> {
     let file = folder.join("seed.npz");
     let ramp: Vec<f32> = (0..48_u8).map(f32::from).collect();
@@ -127,23 +129,26 @@ fn npz(folder: &Path) -> Outcome<Vec<u8>> {
     Ok(std::fs::read(file)?)
 }
 
-/// The bare array out of an archive of stored members.
-fn npy(archive: &[u8]) -> Vec<u8> {
-    let start = archive.windows(6).position(|window| window == b"\x93NUMPY").unwrap_or(0);
-    archive[start..(start + 128 + 192).min(archive.len())].to_vec()
+/// A bare array.
+fn npy() -> Vec<u8> {
+    let text = "{'descr': '<f4', 'fortran_order': False, 'shape': (3, 4), }";
+    let mut bytes = b"\x93NUMPY\x01\x00\x76\x00".to_vec();
+    bytes.extend(format!("{text:<117}\n").bytes());
+    bytes.extend((0..12_u8).flat_map(|value| f32::from(value).to_le_bytes()));
+    bytes
 }
 
-/// An archive whose members say that they are deflated: what they hold is read as blocks of any kind.
-fn deflated(archive: &[u8]) -> Vec<u8> {
-    let mut bytes = archive.to_vec();
-    for at in 0..bytes.len().saturating_sub(12) {
-        match &bytes[at..at + 4] {
-            b"PK\x03\x04" => bytes[at + 8] = 8,
-            b"PK\x01\x02" => bytes[at + 10] = 8,
-            _ => {}
-        }
-    }
-    bytes
+/// An archive whose one member is stored as it is.
+fn stored(name: &str, data: &[u8]) -> Vec<u8> {
+    let (length, crc) = ((data.len() as u32).to_le_bytes(), crc(data, CRC_32).to_le_bytes());
+    let sizes = [crc, length, length].concat();
+    let names = [(name.len() as u16).to_le_bytes(), [0; 2]].concat();
+    let common = [&[20, 0, 0, 0, 0, 0, 0, 0, 0, 0], sizes.as_slice(), &names].concat();
+    let member = [b"PK\x03\x04", common.as_slice(), name.as_bytes(), data].concat();
+    let entry = [b"PK\x01\x02\x14\x00", common.as_slice(), &[0; 14], name.as_bytes()].concat();
+    let places = [(entry.len() as u32).to_le_bytes(), (member.len() as u32).to_le_bytes()].concat();
+    let end = [b"PK\x05\x06", [0, 0, 0, 0, 1, 0, 1, 0].as_slice(), &places, &[0; 2]].concat();
+    [member, entry, end].concat()
 }
 
 /// An element of a Matroska file.

@@ -173,7 +173,8 @@ fn check_name(field: impl Into<String>, name: &str) -> Check {
 fn check_path(field: impl Into<String>, path: &Path) -> Check {
     let relative = !path.as_os_str().is_empty() && !path.has_root();
     let printable = !path.to_string_lossy().contains(char::is_control);
-    let reason = format!("is {:?}, expected a path relative to the survey's folder", path.display().to_string());
+    let shown = path.display().to_string();
+    let reason = format!("is `{}`, expected a path relative to the survey's folder", shown.escape_debug());
     require(relative && printable, field, reason)
 }
 

@@ -1,5 +1,6 @@
 #![doc = include_str!("../README.md")]
 
+mod bending;
 mod cholesky;
 mod contradiction;
 mod detect;
@@ -21,6 +22,7 @@ mod surfaces;
 mod two_path;
 mod vector;
 
+pub use bending::Bending;
 pub use detect::{Detection, DetectionOptions, Detector, Evidence, detect};
 pub use error::{Error, Result};
 pub use mixed::{
@@ -29,7 +31,7 @@ pub use mixed::{
 };
 pub use pixel::{MAXIMUM_FREQUENCIES, Systematics};
 pub use response::{FrequencyResponse, ResponseEstimate, estimate_response};
-pub use risk::{AlbedoScale, Risk, RiskOptions, assess_risk, ranges_from_depths};
+pub use risk::{AlbedoScale, Risk, RiskEvidence, RiskOptions, assess_risk, ranges_from_depths};
 pub use search::SearchSpan;
 pub use two_path::{
     Hypothesis, PixelHypotheses, PixelPaths, TwoPathImage, TwoPathOptions, TwoPathSolver, Verdict, solve_two_paths,

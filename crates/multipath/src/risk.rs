@@ -3,7 +3,8 @@
 use range_image::{Flags, Modulation, RangeFrame, Raster};
 use rayon::prelude::*;
 
-use crate::error::{require_not_negative, require_positive};
+use crate::bending::{Bending, bending};
+use crate::error::{require_not_negative, require_positive, require_probability};
 use crate::patches::{Facet, PatchSize, Patches, Square, Surfaces, solid_angles};
 use crate::radiosity::{Bounced, Radiosity};
 use crate::vector::dot;
@@ -20,6 +21,22 @@ pub enum AlbedoScale {
     WhiteAtOneMetre(f64),
     /// The same albedo everywhere, whatever the amplitudes are.
     Uniform(f64),
+}
+
+/// What it takes to flag a predicted error.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
+pub enum RiskEvidence {
+    /// The prediction itself: what light that bounced does to ranges that nothing was taken off.
+    #[default]
+    Prediction,
+    /// Walls that are bent as predicted, see [`Bending`]. What they show of the prediction counts; where they show nothing,
+    /// nothing is flagged.
+    Bending {
+        /// Probability that a scene whose walls are not bent counts as bent.
+        false_alarm: f64,
+    },
 }
 
 /// How the risk is estimated and when it is flagged.
@@ -41,6 +58,8 @@ pub struct RiskOptions {
     pub sigmas: f64,
     /// Smallest error that is flagged, metre.
     pub floor_m: f64,
+    /// What it takes to flag anything.
+    pub evidence: RiskEvidence,
 }
 
 impl Default for RiskOptions {
@@ -55,6 +74,7 @@ impl Default for RiskOptions {
             flatness_m: 0.01,
             sigmas: 1.0,
             floor_m: 0.005,
+            evidence: RiskEvidence::Prediction,
         }
     }
 }
@@ -77,6 +97,9 @@ impl RiskOptions {
         require_positive("flatness_m", self.flatness_m)?;
         require_not_negative("sigmas", self.sigmas)?;
         require_not_negative("floor_m", self.floor_m)?;
+        if let RiskEvidence::Bending { false_alarm } = self.evidence {
+            require_probability("false_alarm", false_alarm)?;
+        }
         let (patch, cell) = (self.patch_px, self.cell_px);
         if cell < 2 {
             return Err(Error::OutOfDomain { name: "cell_px", value: cell as f64, expected: "at least 2 pixels" });
@@ -103,6 +126,8 @@ pub struct Risk {
     pub flagged: usize,
     /// Flat patches that the scene was cut into.
     pub patches: usize,
+    /// How the shape of the walls agrees with the predicted errors.
+    pub bending: Bending,
 }
 
 /// Estimates for each pixel how far light that bounced once shifts its range, and sets [`Flags::MULTIPATH`] where that is
@@ -130,11 +155,18 @@ pub fn assess_risk(frame: &mut RangeFrame, directions: &[[f64; 3]], options: &Ri
     let patches = surfaces.patches(&size);
     let bounced = bounced(&patches, options)?;
     let nothing = Raster::filled(width, height, f32::NAN);
-    let mut risk =
-        Risk { risk_m: nothing.clone(), ratio: nothing, assessed: 0, flagged: 0, patches: patches.patches.len() };
+    let mut risk = Risk {
+        risk_m: nothing.clone(),
+        ratio: nothing,
+        assessed: 0,
+        flagged: 0,
+        patches: patches.patches.len(),
+        bending: Bending::UNKNOWN,
+    };
     for ((_, square), bounced) in patches.cells.iter().zip(&bounced) {
         fill(&surfaces, *square, bounced, &mut risk);
     }
+    risk.bending = bending(&surfaces, &patches, directions, &risk.risk_m);
     flag(frame, options, &mut risk);
     Ok(risk)
 }
@@ -181,11 +213,15 @@ fn fill(surfaces: &Surfaces, square: Square, bounced: &Bounced, risk: &mut Risk)
 }
 
 fn flag(frame: &mut RangeFrame, options: &RiskOptions, risk: &mut Risk) {
+    let part = match options.evidence {
+        RiskEvidence::Prediction => 1.0,
+        RiskEvidence::Bending { false_alarm } => risk.bending.sure_part(false_alarm) as f32,
+    };
     let pixels = frame.flags.as_mut_slice().iter_mut().zip(frame.sigma.as_slice()).zip(risk.risk_m.as_slice());
     for ((flags, sigma), error) in pixels {
         // `max` leaves a sigma that is not known out.
         let threshold = (options.sigmas as f32 * sigma).max(options.floor_m as f32);
-        if error.abs() > threshold {
+        if part * error.abs() > threshold {
             *flags |= Flags::MULTIPATH;
             risk.flagged += 1;
         }

@@ -13,7 +13,7 @@ use crate::steps::wrapped_steps;
 const UNKNOWN: f32 = 256.0;
 
 /// Expected sum of squares of the four second differences of white noise of variance 1.
-const EXPECTED: f32 = 24.0;
+pub(crate) const EXPECTED: f32 = 24.0;
 
 /// Wrapped steps of one padded row: along it, and to the row below (straight, and the two diagonals).
 #[derive(Debug, Default)]

@@ -13,6 +13,10 @@ const GLARE: f32 = 10.0;
 /// Fewer pixels than this in the first interval tell nothing about it.
 const GLARE_PIXELS: usize = 64;
 
+/// Share of the largest confidence in its segment that a pixel needs to get an interval added: below, it bends as noise and
+/// mixed pixels do, and a range moved by a wrong interval harms more than one that is left and flagged.
+const ADDING_SHARE: f32 = 0.95;
+
 /// How wrapped ranges are repaired.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RepairOptions {
@@ -33,6 +37,8 @@ pub enum AmplitudeKind {
     /// Times the square of the range that the camera reports, so that near and far surfaces look alike. This is undone
     /// with the wrapped range, which is what the camera knew.
     RangeCompensated,
+    /// One of both, nobody knows which. A count is sure where one of them makes it sure and the other is not sure of another.
+    Unknown,
 }
 
 impl Default for RepairOptions {
@@ -136,14 +142,51 @@ pub fn repair_ranges(
         let found = relative_counts(&phase, mask, &options.spatial)?;
         return Ok(apply(range_m, interval_m, found, options, RepairVerdict::Relative { fold_m }));
     };
-    let received = received_amplitude(amplitude, &phase, options.amplitude_kind);
-    let mut found = unwrap_spatial(&phase, Some(&received), mask, &options.spatial)?;
-    if found.typical_amplitude_at_interval.is_none() {
+    let of_kind = |kind| absolute_counts(&phase, &received_amplitude(amplitude, &phase, kind), mask, &options.spatial);
+    let found = match options.amplitude_kind {
+        AmplitudeKind::Unknown => of_kind(AmplitudeKind::Received)?
+            .zip(of_kind(AmplitudeKind::RangeCompensated)?)
+            .map(|(received, compensated)| agreed(received, &compensated)),
+        kind => of_kind(kind)?,
+    };
+    let Some(found) = found else {
         let found = relative_counts(&phase, mask, &options.spatial)?;
         return Ok(apply(range_m, interval_m, found, options, RepairVerdict::Relative { fold_m }));
-    }
-    doubt_glare(&phase, &received, options.spatial.minimum_confidence, &mut found);
+    };
     Ok(apply(range_m, interval_m, found, options, RepairVerdict::Absolute { fold_m }))
+}
+
+/// Counts by brightness and continuity; `None` where no amplitude says anything.
+fn absolute_counts(
+    phase: &Raster<f32>,
+    received: &Raster<f32>,
+    mask: Option<&Raster<bool>>,
+    options: &SpatialOptions,
+) -> Result<Option<Unwrapped>> {
+    let mut found = unwrap_spatial(phase, Some(received), mask, options)?;
+    if found.typical_amplitude_at_interval.is_none() {
+        return Ok(None);
+    }
+    doubt_glare(phase, received, options.minimum_confidence, &mut found);
+    Ok(Some(found))
+}
+
+/// The surer of two opinions for each pixel, less what the other holds for another count. An interval is added only where
+/// both do so.
+fn agreed(mut one: Unwrapped, other: &Unwrapped) -> Unwrapped {
+    let pixels = one.wraps.as_mut_slice().iter_mut().zip(one.confidence.as_mut_slice());
+    let others = other.wraps.as_slice().iter().zip(other.confidence.as_slice());
+    for ((wraps, confidence), (&other_wraps, &other_confidence)) in pixels.zip(others) {
+        let (surer, less) = (confidence.max(other_confidence), confidence.min(other_confidence));
+        let contradicted = *wraps != other_wraps;
+        *wraps = if other_confidence > *confidence { other_wraps } else { *wraps };
+        *confidence = match contradicted {
+            false => surer,
+            true if *wraps == 0 => surer * (1.0 - less),
+            true => 0.0,
+        };
+    }
+    one
 }
 
 /// Takes the confidence from added counts that would make a surface far brighter than what lies in the first interval:
@@ -225,6 +268,19 @@ fn left_alone(range_m: &Raster<f32>) -> RepairedRanges {
     }
 }
 
+/// Calls pixels unsure that sit loosely in their segment, where they would get an interval.
+fn keep_loose_pixels(found: &Unwrapped, unsure: &mut Raster<bool>) {
+    let segments = found.segment.as_slice();
+    let mut surest = vec![0.0_f32; segments.iter().max().map_or(0, |&last| last as usize + 1)];
+    for (&segment, &confidence) in segments.iter().zip(found.confidence.as_slice()) {
+        surest[segment as usize] = surest[segment as usize].max(confidence);
+    }
+    let pixels = segments.iter().zip(found.confidence.as_slice()).zip(found.wraps.as_slice());
+    for (unsure, ((&segment, &confidence), &wraps)) in unsure.as_mut_slice().iter_mut().zip(pixels) {
+        *unsure |= wraps != 0 && confidence < ADDING_SHARE * surest[segment as usize];
+    }
+}
+
 /// Adds the counts that are sure.
 fn apply(
     range_m: &Raster<f32>,
@@ -234,7 +290,8 @@ fn apply(
     verdict: RepairVerdict,
 ) -> RepairedRanges {
     let mut islands = vec![RepairedIsland::default(); found.islands.len()];
-    let unsure = found.unsure(options.spatial.minimum_confidence);
+    let mut unsure = found.unsure(options.spatial.minimum_confidence);
+    keep_loose_pixels(&found, &mut unsure);
     let (mut range, mut wraps) = (range_m.clone(), found.wraps);
     let counts = wraps.as_mut_slice().iter_mut().zip(unsure.as_slice()).zip(found.island.as_slice());
     for (range, ((wraps, &unsure), &island)) in range.as_mut_slice().iter_mut().zip(counts) {

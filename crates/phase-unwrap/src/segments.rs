@@ -4,8 +4,17 @@ use crate::SpatialOptions;
 use crate::cuts::{Cuts, HOOK, RIM};
 use crate::forest::{Forest, NO_LABEL};
 use crate::grid::{DOWN, Grid, RIGHT, wrap_step};
-use crate::reliability::reliability;
+use crate::reliability::EXPECTED;
 use crate::surface::Surface;
+
+/// Cost, rad^2, at which the count of a pixel in its segment is as good as a guess among two.
+///
+/// Measured on rooms with 0.01 to 1 rad of noise: a quarter of the counts are wrong at this cost, a hundredth at a quarter of
+/// it. At half of it twice as many pixels in noise are unsure.
+const GUESS_COST: f32 = 14.4;
+/// The same at the rim of a segment, whose pixels bend by the edge beside them more than by noise: there, one count in a
+/// hundred is wrong where second differences reach half a cycle.
+const RIM_GUESS_COST: f32 = 45.0;
 
 /// Segments of an image and how well each pixel sits in its own.
 #[derive(Debug, Default)]
@@ -32,7 +41,8 @@ impl Segments {
     ) {
         self.cuts.make(grid, surface, options);
         self.hold.clear();
-        self.hold.extend(cost.iter().map(|&cost| reliability(cost)));
+        let pixels = cost.iter().zip(&surface.variance).zip(&self.cuts.class);
+        self.hold.extend(pixels.map(|((&cost, &variance), class)| hold(cost, variance, *class == RIM)));
         for (cost, class) in cost.iter_mut().zip(&self.cuts.class) {
             *cost = if *class == RIM { f32::INFINITY } else { *cost };
         }
@@ -90,4 +100,15 @@ impl Segments {
             *wraps -= means.get(label as usize).copied().unwrap_or(0);
         }
     }
+}
+
+/// Confidence, 0 to 1, in a pixel's place in its segment.
+fn hold(cost: f32, variance: f32, at_rim: bool) -> f32 {
+    let squares = if at_rim {
+        // The noise counts twice, as in the cost of other pixels: once as it is expected, once as it is measured.
+        (cost / RIM_GUESS_COST).powi(2) + (2.0 * EXPECTED * variance / GUESS_COST).powi(2)
+    } else {
+        (cost / GUESS_COST).powi(2)
+    };
+    1.0 / (1.0 + squares)
 }

@@ -68,10 +68,10 @@ pub use network_scene::{
 pub use noise::{NoiseBin, NoiseParameter, NoiseRequest, NoiseStation, NoiseSummary, SigmaBinSummary, estimate_noise};
 pub use outcome::{AdjustmentFigures, FurtherPoint, Outcome, RefusedStage, StationPose};
 pub use plan::{
-    AdjustOptions, AverageOptions, CorrectImagePointOptions, CorrectRangeOptions, DeconvolveOptions, DemodulateOptions,
-    FlagOptions, FuseExposuresOptions, MixedPixels, MultipathOptions, MultipathTreatment, NetworkCalibration,
-    NoiseOptions, Plan, PointCloudOptions, RegisterOptions, RepairWrapsOptions, SimulateSource, Source, Stage,
-    StartPoses, UnwrapOptions,
+    AdjustOptions, AmplitudeKind, AverageOptions, CorrectImagePointOptions, CorrectRangeOptions, DeconvolveOptions,
+    DemodulateOptions, FlagOptions, FuseExposuresOptions, MixedPixels, MultipathOptions, MultipathTreatment,
+    NetworkCalibration, NoiseOptions, Plan, PointCloudOptions, RegisterOptions, RepairWrapsOptions, SimulateSource,
+    Source, Stage, StartPoses, UnwrapOptions,
 };
 pub use progress::{Progress, Silent};
 pub use register::{

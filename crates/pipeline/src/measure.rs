@@ -14,6 +14,7 @@ use crate::plan::{Plan, Stage};
 use crate::plausibility;
 use crate::register::describe::wrong_place;
 use crate::results::own_clouds;
+use crate::stages::repair;
 use crate::statistics::{median, robust_standard_deviation};
 use crate::summary::{PairSummary, ReferenceSummary, RegistrationSummary, StationTruth, Summary, TruthSummary};
 use crate::trends;
@@ -151,6 +152,7 @@ fn doubts(outcome: &Outcome) -> Vec<Doubt> {
         })
         .collect();
     doubts.extend(outcome.doubts.iter().cloned());
+    doubts.extend(repair::unjudged(&outcome.stages));
     doubts.extend(plausibility::of_outcome(outcome));
     if outcome.refusal.is_none() {
         doubts.extend(outcome.adjustment.iter().flat_map(|figures| wrong_places(outcome, &figures.placements)));

@@ -87,6 +87,8 @@ pub enum DoubtKind {
     DisplacedStation,
     /// Random errors that do not follow the model that was fitted to them.
     Noise,
+    /// Whole ambiguity intervals that nothing tells.
+    Wraps,
 }
 
 impl Doubt {

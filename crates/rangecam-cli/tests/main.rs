@@ -3,6 +3,7 @@
 
 mod calibrate;
 mod compare;
+mod documented_commands;
 mod exit_codes;
 mod explain;
 mod hostile;

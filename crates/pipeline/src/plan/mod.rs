@@ -15,9 +15,9 @@ pub use crate::drift::CorrectRangeOptions;
 pub(crate) use check::{Fault, Rule, check_numbers};
 pub(crate) use options::NORMAL_HALF_WIDTH_PX;
 pub use options::{
-    AdjustOptions, AverageOptions, CorrectImagePointOptions, DeconvolveOptions, DemodulateOptions, FlagOptions,
-    FuseExposuresOptions, MixedPixels, MultipathOptions, MultipathTreatment, NoiseOptions, PointCloudOptions,
-    RegisterOptions, RepairWrapsOptions, StartPoses, UnwrapOptions,
+    AdjustOptions, AmplitudeKind, AverageOptions, CorrectImagePointOptions, DeconvolveOptions, DemodulateOptions,
+    FlagOptions, FuseExposuresOptions, MixedPixels, MultipathOptions, MultipathTreatment, NoiseOptions,
+    PointCloudOptions, RegisterOptions, RepairWrapsOptions, StartPoses, UnwrapOptions,
 };
 
 /// What a pipeline does, read from a RON file.

@@ -89,11 +89,36 @@ pub struct RepairWrapsOptions {
     pub maximum_range_m: f64,
     /// Below this confidence (0 to 1) a pixel keeps its value and is flagged as unsure.
     pub minimum_confidence: f64,
+    /// What the camera has done to its amplitudes.
+    pub amplitudes: AmplitudeKind,
+}
+
+/// What a camera's amplitudes stand for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum AmplitudeKind {
+    /// One of the two below: a count is sure where one of them makes it sure and the other does not contradict.
+    #[default]
+    Unknown,
+    /// The signal received: a surface that is twice as far is four times as dark.
+    Received,
+    /// The signal times the square of the range that the camera reports, so that near and far surfaces look alike.
+    RangeCompensated,
+}
+
+impl From<AmplitudeKind> for phase_unwrap::AmplitudeKind {
+    fn from(kind: AmplitudeKind) -> Self {
+        match kind {
+            AmplitudeKind::Unknown => Self::Unknown,
+            AmplitudeKind::Received => Self::Received,
+            AmplitudeKind::RangeCompensated => Self::RangeCompensated,
+        }
+    }
 }
 
 impl Default for RepairWrapsOptions {
     fn default() -> Self {
-        Self { interval_m: None, maximum_range_m: 15.0, minimum_confidence: 0.8 }
+        Self { interval_m: None, maximum_range_m: 15.0, minimum_confidence: 0.8, amplitudes: AmplitudeKind::default() }
     }
 }
 
@@ -105,9 +130,12 @@ pub struct MultipathOptions {
     pub false_alarm_probability: f64,
     /// Standard deviation of what calibration leaves of the range errors of one frequency, metre.
     pub floor_m: f64,
-    /// Pixels are flagged where the light that the scene bounces once is expected to move them by more than this, metre;
-    /// `None`: the expected error is pictured in the report and flags nothing.
+    /// Pixels are flagged whose ranges are wrong by more than this, metre, and by more than their standard deviation, with
+    /// odds of nineteen to one, by light that the scene bounces: where the walls of the view are bent as that light would
+    /// bend them. `None`: the expected error is pictured in the report and flags nothing.
     pub flag_risk_above_m: Option<f64>,
+    /// Probability that a view counts as bent that is not.
+    pub bending_false_alarm_probability: f64,
     /// What is done where frequencies contradict each other.
     pub treatment: MultipathTreatment,
 }
@@ -129,6 +157,7 @@ impl Default for MultipathOptions {
             false_alarm_probability: 1e-4,
             floor_m: 0.005,
             flag_risk_above_m: Some(0.02),
+            bending_false_alarm_probability: 0.01,
             treatment: MultipathTreatment::default(),
         }
     }

@@ -11,7 +11,7 @@ mod fuse;
 mod multipath;
 mod reference_path;
 mod register;
-mod repair;
+pub(crate) mod repair;
 mod unwrap;
 
 use std::collections::BTreeMap;

@@ -1,8 +1,8 @@
 use multipath::{
-    DetectionOptions, RiskOptions, Systematics, TwoPathOptions, Verdict, assess_risk, detect, estimate_response,
-    solve_two_paths,
+    DetectionOptions, Evidence, FrequencyResponse, RiskEvidence, RiskOptions, Systematics, TwoPathOptions, Verdict,
+    assess_risk, detect, estimate_response, solve_two_paths,
 };
-use range_image::Flags;
+use range_image::{ComplexFrame, Flags, Raster};
 
 use super::Findings;
 use crate::plan::{MultipathOptions, MultipathTreatment};
@@ -44,20 +44,41 @@ fn systematics(options: &MultipathOptions) -> Systematics {
     Systematics { floor_m: options.floor_m, ..Systematics::default() }
 }
 
+fn detection(options: &MultipathOptions) -> DetectionOptions {
+    DetectionOptions {
+        false_alarm: options.false_alarm_probability,
+        systematics: systematics(options),
+        ..DetectionOptions::default()
+    }
+}
+
+/// How the frequencies respond where one range serves all of them: other pixels have amplitudes of two ways. Where hardly
+/// any are left, all tell it.
+fn response(
+    frame: &ComplexFrame,
+    range_m: &Raster<f32>,
+    options: &DetectionOptions,
+) -> multipath::Result<FrequencyResponse> {
+    let flat = FrequencyResponse::flat(frame.channels.len());
+    let mut agreeing = frame.clone();
+    detect(&mut agreeing, range_m, &flat, &DetectionOptions { evidence: Evidence::Ranges, ..*options })?;
+    let estimate = match estimate_response(&agreeing, RESPONSE_SNR) {
+        Err(multipath::Error::TooFewPixels { .. }) => estimate_response(frame, RESPONSE_SNR),
+        estimate => estimate,
+    };
+    Ok(estimate?.response)
+}
+
 /// Flags pixels whose frequencies contradict each other; `None` where too few pixels tell how the frequencies respond.
 fn flag_contradictions(view: &mut View, options: &MultipathOptions) -> Result<Option<usize>> {
     let name = view.name();
     let fail = |error| Error::stage("Multipath", &name)(error);
     let Some(mut frame) = view.complex_channels() else { return Ok(None) };
     let ViewData::Range(range) = &mut view.data else { return Ok(None) };
-    let response = match estimate_response(&frame, RESPONSE_SNR) {
+    let options = detection(options);
+    let response = match response(&frame, &range.range, &options) {
         Err(multipath::Error::TooFewPixels { .. }) => return Ok(None),
-        estimate => estimate.map_err(fail)?.response,
-    };
-    let options = DetectionOptions {
-        false_alarm: options.false_alarm_probability,
-        systematics: systematics(options),
-        ..DetectionOptions::default()
+        response => response.map_err(fail)?,
     };
     frame.flags.clone_from(&range.flags);
     let found = detect(&mut frame, &range.range, &response, &options).map_err(fail)?;
@@ -71,7 +92,7 @@ fn resolve(view: &mut View, options: &MultipathOptions) -> Result<usize> {
     let fail = |error| Error::stage("Multipath", &name)(error);
     let Some(mut frame) = view.complex_channels() else { return Ok(0) };
     let ViewData::Range(range) = &mut view.data else { return Ok(0) };
-    let response = estimate_response(&frame, RESPONSE_SNR).map_err(fail)?.response;
+    let response = response(&frame, &range.range, &detection(options)).map_err(fail)?;
     // Only flagged pixels are solved for; to all others one range serves well.
     for (flags, known) in frame.flags.as_mut_slice().iter_mut().zip(range.flags.as_slice()) {
         *flags = if known.contains(Flags::MULTIPATH) { *known } else { *known | Flags::NO_DATA };
@@ -99,6 +120,7 @@ fn assess(view: &mut View, directions: &[[f64; 3]], options: &MultipathOptions) 
     let options = RiskOptions {
         modulation_hz: modulation.map(|modulation| modulation.frequency_hz()),
         floor_m: options.flag_risk_above_m.unwrap_or(f64::MAX),
+        evidence: RiskEvidence::Bending { false_alarm: options.bending_false_alarm_probability },
         ..RiskOptions::default()
     };
     let risk = assess_risk(frame, directions, &options).map_err(Error::stage("Multipath", &name))?;

@@ -1,4 +1,4 @@
-use phase_unwrap::{RepairOptions, SpatialOptions, repair_ranges};
+use phase_unwrap::{RepairOptions, RepairVerdict, SpatialOptions, repair_ranges};
 use range_image::Flags;
 use range_io::survey::Level;
 
@@ -6,9 +6,14 @@ use super::Findings;
 use super::unwrap::image_geometry;
 use crate::plan::RepairWrapsOptions;
 use crate::progress::Progress;
+use crate::summary::StageSummary;
+use crate::verdict::{Doubt, DoubtKind};
 use crate::view::{View, ViewData};
 use crate::work::Work;
 use crate::{Error, Result};
+
+/// Finding: views whose ambiguity intervals nothing tells.
+const UNJUDGED_VIEWS: &str = "views_without_amplitude";
 
 /// Whole ambiguity intervals that the camera's ranges have lost are added where they are sure.
 pub(super) fn run(work: &mut Work, options: &RepairWrapsOptions, progress: &dyn Progress) -> Result<Findings> {
@@ -29,9 +34,18 @@ pub(super) fn run(work: &mut Work, options: &RepairWrapsOptions, progress: &dyn 
             geometry: Some(geometry),
             ..standard.spatial
         };
-        let (repaired, unsure) = repair(view, interval_m, &RepairOptions { spatial, ..standard })?;
-        *findings.entry("repaired_px".to_owned()).or_default() += repaired as f64;
-        *findings.entry("unsure_px".to_owned()).or_default() += unsure as f64;
+        let repaired = repair(
+            view,
+            interval_m,
+            &RepairOptions { spatial, amplitude_kind: options.amplitudes.into(), ..standard },
+        )?;
+        let mut add = |name: &str, count: usize| *findings.entry(name.to_owned()).or_default() += count as f64;
+        add("repaired_px", repaired.added);
+        add("unsure_px", repaired.unsure);
+        if repaired.unjudged > 0 {
+            add(UNJUDGED_VIEWS, 1);
+            add("unjudged_px", repaired.unjudged);
+        }
         progress.advance(index + 1);
     }
     Ok(findings)
@@ -46,8 +60,17 @@ fn interval(view: &View, options: &RepairWrapsOptions) -> Result<f64> {
     })
 }
 
-/// Repairs a view; pixels repaired and pixels left unsure.
-fn repair(view: &mut View, interval_m: f64, options: &RepairOptions) -> Result<(usize, usize)> {
+/// What became of a view's pixels.
+struct Repaired {
+    /// With intervals added.
+    added: usize,
+    /// Flagged.
+    unsure: usize,
+    /// Left as they were, as nothing tells their counts, and not flagged: it concerns the view and not these pixels.
+    unjudged: usize,
+}
+
+fn repair(view: &mut View, interval_m: f64, options: &RepairOptions) -> Result<Repaired> {
     let name = view.name();
     let ViewData::Range(frame) = &mut view.data else {
         return Err(Error::Needs { stage: "RepairWraps", needs: "Average" });
@@ -58,11 +81,30 @@ fn repair(view: &mut View, interval_m: f64, options: &RepairOptions) -> Result<(
     let found = repair_ranges(&frame.range, amplitude, Some(&mask), interval_m, options);
     let found = found.map_err(Error::stage("RepairWraps", &name))?;
     frame.range = found.range;
+    let added = found.wraps.as_slice().iter().filter(|wraps| **wraps != 0).count();
+    let usable = found.unsure.as_slice().iter().zip(mask.as_slice()).filter(|(unsure, usable)| **unsure && **usable);
+    let open = usable.count();
+    if matches!(found.verdict, RepairVerdict::Relative { .. }) {
+        return Ok(Repaired { added, unsure: 0, unjudged: open });
+    }
     for (flags, unsure) in frame.flags.as_mut_slice().iter_mut().zip(found.unsure.as_slice()) {
         if *unsure {
             flags.insert(Flags::UNWRAP_UNSURE);
         }
     }
-    let repaired = found.wraps.as_slice().iter().filter(|wraps| **wraps != 0).count();
-    Ok((repaired, found.unsure.as_slice().iter().filter(|unsure| **unsure).count()))
+    Ok(Repaired { added, unsure: open, unjudged: 0 })
+}
+
+/// What to say where nothing tells the counts of whole views.
+pub(crate) fn unjudged(stages: &[StageSummary]) -> Option<Doubt> {
+    let findings = &stages.iter().find(|stage| stage.name == "RepairWraps")?.findings;
+    let (views, pixels) = (findings.get(UNJUDGED_VIEWS)?, findings.get("unjudged_px")?);
+    Some(Doubt::new(
+        DoubtKind::Wraps,
+        format!(
+            "without amplitudes nothing tells how many ambiguity intervals the ranges have lost: {pixels} pixels of \
+             {views} views are left as they are; give amplitudes, or leave RepairWraps out where all is nearer than one \
+             interval"
+        ),
+    ))
 }

@@ -129,6 +129,7 @@ impl Stage {
                 .into_iter()
                 .chain([
                     ("false_alarm_probability", o.false_alarm_probability, Probability),
+                    ("bending_false_alarm_probability", o.bending_false_alarm_probability, Probability),
                     ("floor_m", o.floor_m, NotNegative),
                 ])
                 .collect(),

@@ -115,7 +115,7 @@ pub enum Error {
     /// The iteration did not reach its end.
     #[error(
         "not converged after {iterations} iterations ({reason}): last objective {objective:.9e}, last undamped step {step:.3e} \
-         standard deviations, damping {damping:.1e}"
+         standard deviations, damping {damping:.1e}{}", settling(.parameter)
     )]
     NotConverged {
         /// Iterations done.
@@ -128,6 +128,9 @@ pub enum Error {
         step: f64,
         /// Last damping factor.
         damping: f64,
+        /// The parameter that would still move most, in units of how well it were known if all others were; empty where
+        /// that is not known.
+        parameter: String,
     },
     /// A posterior scale was asked for where there is no redundancy.
     #[error("redundancy {redundancy}: there is no posterior variance factor")]
@@ -159,6 +162,11 @@ pub enum Error {
         /// Which decomposition.
         what: &'static str,
     },
+}
+
+/// What does not settle, in words.
+fn settling(parameter: &str) -> String {
+    if parameter.is_empty() { String::new() } else { format!("; `{parameter}` does not settle") }
 }
 
 /// Result with this crate's [`enum@Error`].

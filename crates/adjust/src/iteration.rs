@@ -235,6 +235,14 @@ impl<'p, 'a> Iteration<'p, 'a> {
         Err(self.not_converged("the largest number of iterations is reached"))
     }
 
+    /// The unknown that the next damped step would move most, in units of its column's norm.
+    pub(crate) fn unsettled(&self) -> Option<usize> {
+        let reference = (self.damping.max(SMALL_DAMPING), self.metric.as_slice());
+        let step = self.system.factor(&self.constraints, Some(reference)).ok()?.solve(&self.gradient, 1.0);
+        let size = |unknown: usize| (step[unknown] / self.metric[unknown]).abs();
+        (0..step.len()).filter(|&unknown| size(unknown).is_finite()).max_by(|&a, &b| size(a).total_cmp(&size(b)))
+    }
+
     pub(crate) fn not_converged(&self, reason: &'static str) -> Error {
         let last = self.trace.last();
         Error::NotConverged {
@@ -243,6 +251,7 @@ impl<'p, 'a> Iteration<'p, 'a> {
             objective: self.current.objective,
             step: last.map_or(f64::NAN, |entry| entry.step),
             damping: last.map_or(0.0, |entry| entry.damping),
+            parameter: String::new(),
         }
     }
 }

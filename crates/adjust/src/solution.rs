@@ -61,7 +61,16 @@ impl Adjustment<'_> {
             // A descent that finds no end often has none: an undetermined direction is then the better answer.
             let undetermined =
                 matches!(error, Error::NotConverged { .. }) && iteration.problem().factorise()?.is_none();
-            return Err(if undetermined { iteration.problem().defect(&names)? } else { error });
+            if undetermined {
+                return Err(iteration.problem().defect(&names)?);
+            }
+            return Err(match error {
+                Error::NotConverged { iterations, reason, objective, step, damping, .. } => {
+                    let parameter = iteration.unsettled().map_or_else(String::new, |unknown| names[unknown].clone());
+                    Error::NotConverged { iterations, reason, objective, step, damping, parameter }
+                }
+                error => error,
+            });
         }
         let cofactor = iteration.problem().cofactor(&names)?;
         let (values, linearisation, trace) = (iteration.values, iteration.current, iteration.trace);

@@ -4,7 +4,8 @@
 use crate::shell::{Outcome, cargo};
 
 /// Name, package and example of each statistic.
-const STATISTICS: &[(&str, &str, &str)] = &[("flags", "pipeline", "false_flags")];
+const STATISTICS: &[(&str, &str, &str)] =
+    &[("calibrations", "self-calibration", "calibrations"), ("flags", "pipeline", "false_flags")];
 
 /// Which statistics to run.
 #[derive(Debug, clap::Args)]

@@ -1,6 +1,6 @@
 use thiserror::Error;
 
-use crate::PrimitiveKind;
+use crate::{Contradiction, OutsideImage, PrimitiveKind};
 
 /// Why a calibration gave no trustworthy result.
 #[derive(Debug, Clone, PartialEq, Error)]
@@ -232,6 +232,12 @@ pub enum Error {
         /// What to add to the network.
         advice: String,
     },
+    /// The observations of a network contradict each other.
+    #[error("{0}")]
+    Contradiction(Box<Contradiction>),
+    /// An image point that lies outside the image.
+    #[error(transparent)]
+    OutsideImage(#[from] Box<OutsideImage>),
     /// A station has too few frames of its scene.
     #[error("station `{station}` has {frames} frames, {needed} are needed")]
     TooFewFrames {
@@ -387,13 +393,6 @@ pub enum Error {
     /// The frame is not valid.
     #[error(transparent)]
     Image(#[from] range_image::Error),
-}
-
-impl Error {
-    /// What the registration of this station, or all, failed with.
-    pub(crate) fn registration(station: &str, reason: icp_registration::Error) -> Self {
-        Self::Registration { station: station.to_owned(), reason }
-    }
 }
 
 /// Result with this crate's [`enum@Error`].

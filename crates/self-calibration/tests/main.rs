@@ -14,6 +14,7 @@ mod amplitude_or_position;
 mod automatic_terms;
 mod bad_networks;
 mod comparison;
+mod contradictions;
 mod drift;
 #[path = "support/drift.rs"]
 mod drift_captures;

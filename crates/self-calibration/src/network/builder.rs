@@ -1,9 +1,10 @@
 //! The adjustment of a network, put together.
 
-use adjust::{Adjustment, BlockId, Covariance, DatumDefect, ParameterBlock, RigidPose, SolveOptions};
+use adjust::{Adjustment, BlockId, Covariance, DatumDefect, Kernel, ParameterBlock, RigidPose, SolveOptions};
 use nalgebra::{DMatrix, Point3};
 
 use super::equations::{DistanceEquation, PartialPrior, PassiveEquation};
+use super::misfit::Scales;
 use super::problem::{Blocks, CameraPrior, Datum, Row, Setup, Solved, Source};
 use super::terms::{camera_names, camera_values, range_names, range_values};
 use super::{Component, DistanceEnd};
@@ -13,11 +14,7 @@ impl Setup<'_> {
     /// Solves the network.
     pub(crate) fn solve(&self) -> Result<Solved> {
         let mut builder = Builder::new(self)?;
-        builder.add_sightings()?;
-        builder.add_passive()?;
-        builder.add_distances()?;
-        builder.add_control()?;
-        builder.hold_geometry()?;
+        builder.add_observations()?;
         let datum_defect = builder.add_datum()?;
         let solution = builder.adjustment.solve(&solve_options())?;
         Ok(Solved { solution, blocks: builder.blocks, rows: builder.rows, datum_defect })
@@ -29,15 +26,37 @@ fn solve_options() -> SolveOptions {
     SolveOptions { max_iterations: 50, ..SolveOptions::default() }
 }
 
-struct Builder<'s> {
+/// How an adjustment is made robust that gross errors take part in: standard deviations of image points and of ranges are
+/// as many times those stated as they scatter, and all pull by one kernel.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Kernels {
+    pub(crate) kernel: Kernel,
+    pub(crate) scales: Scales,
+}
+
+pub(crate) struct Builder<'s> {
     setup: &'s Setup<'s>,
-    adjustment: Adjustment<'s>,
-    blocks: Blocks,
+    pub(crate) adjustment: Adjustment<'s>,
+    pub(crate) blocks: Blocks,
     rows: Vec<Row>,
+    /// Image points and ranges are observations of their own where there are kernels.
+    pub(crate) kernels: Option<Kernels>,
 }
 
 impl<'s> Builder<'s> {
-    fn new(setup: &'s Setup<'s>) -> Result<Self> {
+    /// All that was observed; without a datum.
+    pub(crate) fn add_observations(&mut self) -> Result<()> {
+        self.add_sightings()?;
+        self.add_passive()?;
+        self.add_distances()?;
+        self.add_control()?;
+        self.hold_geometry()?;
+        let Some(kernels) = self.kernels else { return Ok(()) };
+        let prior = self.adjustment.prior_group();
+        Ok(self.adjustment.set_kernel(prior, kernels.kernel)?)
+    }
+
+    pub(crate) fn new(setup: &'s Setup<'s>) -> Result<Self> {
         let mut adjustment = Adjustment::new();
         let network = setup.network;
         let stations = network.stations.iter().zip(&setup.start.stations);
@@ -56,7 +75,7 @@ impl<'s> Builder<'s> {
         let camera = ParameterBlock::euclidean(camera_values(&setup.calibration.camera)).named("camera");
         let camera = adjustment.add_block(camera.with_parameter_names(camera_names()));
         let blocks = Blocks { stations, targets, camera, sets: Vec::new(), passive: None };
-        let mut builder = Self { setup, adjustment, blocks, rows: Vec::new() };
+        let mut builder = Self { setup, adjustment, blocks, rows: Vec::new(), kernels: None };
         builder.hold_terms(camera, &camera_names().iter().map(ToString::to_string).collect::<Vec<_>>())?;
         if (0..network.sightings.len()).any(|index| setup.uses_range(index)) {
             builder.add_sets()?;
@@ -95,6 +114,9 @@ impl<'s> Builder<'s> {
     }
 
     fn add_sightings(&mut self) -> Result<()> {
+        if let Some(kernels) = self.kernels {
+            return self.add_robust_sightings(kernels);
+        }
         let group = self.adjustment.add_group("sightings");
         for (index, seen) in self.setup.network.sightings.iter().enumerate() {
             let (uses_pixel, uses_range) = (self.setup.uses_pixel(index), self.setup.uses_range(index));
@@ -122,6 +144,33 @@ impl<'s> Builder<'s> {
         Ok(())
     }
 
+    /// Image points and ranges, each with the kernel of its kind.
+    fn add_robust_sightings(&mut self, kernels: Kernels) -> Result<()> {
+        let [images, ranges] = ["image points", "ranges"].map(|name| self.adjustment.add_group(name));
+        self.adjustment.set_kernel(images, kernels.kernel)?;
+        self.adjustment.set_kernel(ranges, kernels.kernel)?;
+        for (index, seen) in self.setup.network.sightings.iter().enumerate() {
+            let (uses_pixel, uses_range) = (self.setup.uses_pixel(index), self.setup.uses_range(index));
+            for (group, is_range) in [(images, false), (ranges, true)] {
+                if !(if is_range { uses_range } else { uses_pixel }) {
+                    continue;
+                }
+                let mut blocks =
+                    vec![self.blocks.stations[seen.station], self.target(seen.target)?, self.blocks.camera];
+                blocks.extend(is_range.then(|| self.blocks.sets[self.setup.set_of(seen.station)]));
+                let equation = self.setup.equation(index, !is_range, is_range);
+                let equation = equation.on(&self.setup.calibration.camera, blocks);
+                let sigmas = if is_range {
+                    vec![kernels.scales.range * seen.sigma_range_m]
+                } else {
+                    seen.sigma_pixel.map(|sigma| kernels.scales.image * sigma).to_vec()
+                };
+                self.adjustment.add_observation(group, equation, &Covariance::from_sigmas(&sigmas))?;
+            }
+        }
+        Ok(())
+    }
+
     fn add_passive(&mut self) -> Result<()> {
         let Some(passive) = self.setup.network.passive.as_ref().filter(|_| self.setup.passive) else { return Ok(()) };
         let relative = self.setup.start.relative.ok_or_else(|| Error::NotReachable {
@@ -135,7 +184,7 @@ impl<'s> Builder<'s> {
         let camera = self.adjustment.add_block(block.with_parameter_names(names));
         self.blocks.passive = Some([relative, camera]);
         self.add_passive_prior(camera)?;
-        let group = self.adjustment.add_group("passive image points");
+        let group = self.group("passive image points")?;
         for (index, seen) in passive.image_points.iter().enumerate() {
             if self.setup.excluded.passive.contains(&index) {
                 continue;
@@ -147,6 +196,15 @@ impl<'s> Builder<'s> {
             self.row(Source::Passive(index), Component::PassiveRow, seen.pixel[1], seen.sigma_pixel[1]);
         }
         Ok(())
+    }
+
+    /// A group of observations other than the sightings.
+    fn group(&mut self, name: &str) -> Result<adjust::GroupId> {
+        let group = self.adjustment.add_group(name);
+        if let Some(kernels) = self.kernels {
+            self.adjustment.set_kernel(group, kernels.kernel)?;
+        }
+        Ok(group)
     }
 
     /// Weights what is uncertain of the passive camera, holds the rest.
@@ -176,7 +234,7 @@ impl<'s> Builder<'s> {
     }
 
     fn add_distances(&mut self) -> Result<()> {
-        let group = self.adjustment.add_group("distances");
+        let group = self.group("distances")?;
         for (index, known) in self.setup.network.distances.iter().enumerate() {
             if self.setup.excluded.distances.contains(&index) {
                 continue;

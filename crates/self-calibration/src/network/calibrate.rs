@@ -2,14 +2,14 @@
 
 use std::collections::BTreeSet;
 
-use error_models::{AmplitudeHyperbola, RangeErrorModel};
-
 use super::combine::{Combined, combine};
-use super::problem::{Calibration, CameraPrior, Datum, Excluded, RangeSet, Setup, Solved};
+use super::problem::{CameraPrior, Datum, Excluded, Setup, Solved};
 use super::quality::Geometry;
 use super::range_step::{RangeStep, ScaleUse};
 use super::reference::Reference;
+use super::settle::is_without_end;
 use super::start::find_start;
+use super::start_calibration::start_calibration;
 use super::strength::Strength;
 use super::terms::{camera_names, camera_values};
 use super::{CalibrationOptions, CalibrationOutcome, Method, Network, NetworkDatum, TermSelection};
@@ -48,7 +48,7 @@ const WORTH_TELLING: f64 = 100.0;
 pub fn calibrate(network: &Network, options: &CalibrationOptions) -> Result<CalibrationOutcome> {
     network.validate()?;
     options.check(network)?;
-    Problem { network, lens: None, options }.calibrate()
+    Problem { network, lens: None, options, robust: false }.judged()
 }
 
 /// Calibrates in two independent steps: the lens from the image points of one network, the range terms from another,
@@ -72,7 +72,7 @@ pub fn calibrate_two_networks(
     lens.validate()?;
     range.validate()?;
     options.check(range)?;
-    Problem { network: range, lens: Some(lens), options }.calibrate()
+    Problem { network: range, lens: Some(lens), options, robust: false }.judged()
 }
 
 impl Method {
@@ -94,6 +94,8 @@ pub(crate) struct Problem<'n> {
     pub(crate) network: &'n Network,
     pub(crate) lens: Option<&'n Network>,
     pub(crate) options: &'n CalibrationOptions,
+    /// Whether adjustments begin where most observations agree, and not at the start values.
+    pub(crate) robust: bool,
 }
 
 impl Problem<'_> {
@@ -176,6 +178,7 @@ impl Problem<'_> {
         let setup = Setup {
             network: self.network,
             start: super::problem::Start { stations: Vec::new(), targets: Vec::new(), relative: None },
+            unused: None,
             calibration: start_calibration(self.network),
             estimated: terms.iter().filter(|name| !camera_names().contains(&name.as_str())).cloned().collect(),
             ranged: ranged_stations(self.network, self.options),
@@ -217,7 +220,7 @@ impl Problem<'_> {
     /// Solves one adjustment and refuses what it does not determine.
     fn solve(&self, setup: &mut Setup<'_>) -> Result<(Solved, Vec<String>)> {
         let limit = self.options.largest_inflation;
-        let first = setup.solve().map_err(|error| setup.explain(error, limit))?;
+        let first = self.first(setup)?;
         // Gross errors are looked for only where the network is strong enough for an answer.
         let mut strength = self.strong(setup, &first)?;
         let kept = setup.excluded.clone();
@@ -229,7 +232,25 @@ impl Problem<'_> {
         let worth_telling = strength.filter(|strength| strength.inflation > WORTH_TELLING);
         let mut diagnosis: Vec<String> = worth_telling.iter().map(Strength::sentence).collect();
         diagnosis.extend(setup.seen_once());
+        diagnosis.extend(setup.unused.clone());
         Ok((solved, diagnosis))
+    }
+
+    /// The first solution: from the start values, or, where that has no end, from where most observations agree.
+    fn first(&self, setup: &mut Setup<'_>) -> Result<Solved> {
+        let limit = self.options.largest_inflation;
+        let rejects = self.options.rejection_level.is_some();
+        if !(self.robust && rejects) {
+            if rejects {
+                setup.screen();
+            }
+            match setup.solve().map_err(|error| setup.explain(error, limit)) {
+                Err(error) if rejects && is_without_end(&error) => {}
+                solved => return solved,
+            }
+        }
+        setup.settle()?;
+        setup.solve().map_err(|error| setup.explain(error, limit))
     }
 
     /// The weakest combination, where it is strong enough.
@@ -240,7 +261,7 @@ impl Problem<'_> {
         }
     }
 
-    fn setup<'n>(
+    pub(crate) fn setup<'n>(
         &self,
         network: &'n Network,
         terms: &BTreeSet<String>,
@@ -253,13 +274,14 @@ impl Problem<'_> {
         }
         network.check_coverage(&ranged, passive)?;
         let calibration = start_calibration(network);
-        let start = find_start(network, &calibration, passive)?;
+        let (start, unused) = find_start(network, &calibration, passive)?;
         let estimated = terms.clone();
         let (excluded, camera_prior) = (Excluded::default(), None);
         let geometry_held = false;
         Ok(Setup {
             network,
             start,
+            unused,
             calibration,
             estimated,
             ranged,
@@ -317,30 +339,6 @@ fn camera_prior(setup: &Setup<'_>, solved: &Solved) -> Result<Option<CameraPrior
 /// Stations whose ranges take part.
 pub(crate) fn ranged_stations(network: &Network, options: &CalibrationOptions) -> Vec<bool> {
     network.stations.iter().map(|station| !options.without_ranges.contains(&station.name)).collect()
-}
-
-/// The calibration to start from: one set of range terms for each integration time, in the order in which the stations
-/// name them.
-pub(crate) fn start_calibration(network: &Network) -> Calibration {
-    let mut sets: Vec<RangeSet> = Vec::new();
-    for station in &network.stations {
-        let time = station.integration_time_s;
-        if !sets.iter().any(|set| set.time == time) {
-            let suffix = match time {
-                Some(time) if !sets.is_empty() => format!("@{time}"),
-                None if !sets.is_empty() => "@unknown".to_owned(),
-                _ => String::new(),
-            };
-            sets.push(RangeSet { time, suffix, model: open(&network.range_model) });
-        }
-    }
-    Calibration { camera: network.camera, sets }
-}
-
-/// A model without spans: what is observed sets them.
-fn open(model: &RangeErrorModel) -> RangeErrorModel {
-    let hyperbola = model.hyperbola.map(|h| AmplitudeHyperbola { amplitude_span: [0.0, f64::MAX], ..h });
-    RangeErrorModel { range_span_m: None, hyperbola, ..model.clone() }
 }
 
 /// The datum asked for, where the network agrees.

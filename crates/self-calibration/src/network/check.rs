@@ -4,9 +4,13 @@ use std::collections::BTreeSet;
 
 use nalgebra::DMatrix;
 
-use super::{CalibrationOptions, DistanceEnd, Network};
+use super::{CalibrationOptions, DistanceEnd, Network, OutsideImage, Sighting};
 use crate::{Error, Result};
 
+/// How far beyond the edge of the image the centre of a target at the edge may be measured: five of its standard
+/// deviations, from half a pixel to three.
+const BEYOND_EDGE_SIGMAS: f64 = 5.0;
+const BEYOND_EDGE: [f64; 2] = [0.5, 3.0];
 /// Targets that orient a station.
 const TARGETS_OF_A_STATION: usize = 3;
 
@@ -61,6 +65,7 @@ impl Network {
             let what = || self.pair(seen.station, seen.target);
             if let Some(pixel) = &seen.pixel {
                 finite(what, "the image point", pixel.iter())?;
+                self.check_inside(index)?;
                 seen.sigma_pixel.iter().try_for_each(|sigma| positive(what, "sigma of the image point", *sigma))?;
             }
             if let Some(range_m) = seen.range_m {
@@ -81,6 +86,35 @@ impl Network {
             }
         }
         Ok(())
+    }
+
+    /// Refuses an image point outside the image.
+    fn check_inside(&self, sighting: usize) -> Result<()> {
+        let format = &self.camera.format;
+        let sizes = [format.width, format.height].map(|count| count as f64);
+        let inside = |[col, row]: [f64; 2], seen: &Sighting| {
+            let beyond = |sigma: f64| (BEYOND_EDGE_SIGMAS * sigma).clamp(BEYOND_EDGE[0], BEYOND_EDGE[1]);
+            let within = |value: f64, size: f64, sigma: f64| {
+                (-0.5 - beyond(sigma)..=size - 0.5 + beyond(sigma)).contains(&value)
+            };
+            [within(col, sizes[0], seen.sigma_pixel[0]), within(row, sizes[1], seen.sigma_pixel[1])]
+        };
+        let seen = &self.sightings[sighting];
+        let Some(pixel) = seen.pixel else { return Ok(()) };
+        let Some(axis) = inside(pixel, seen).iter().position(|inside| !inside) else { return Ok(()) };
+        let points = || self.sightings.iter().filter_map(|seen| Some((seen.pixel?, seen)));
+        let outside = points().filter(|(pixel, seen)| inside(*pixel, seen) != [true; 2]).count();
+        let exchanged = points().all(|([col, row], seen)| inside([row, col], seen) == [true; 2]);
+        let image = format!(
+            "{} x {} pixels; {outside} of {} image points are outside{}",
+            format.width,
+            format.height,
+            points().count(),
+            if exchanged { ", none if columns and rows are exchanged" } else { "" }
+        );
+        let component = ["col", "row"][axis];
+        let (what, limits) = (self.pair(seen.station, seen.target), [-0.5, sizes[axis] - 0.5]);
+        Err(Box::new(OutsideImage { what, sighting, component, value: pixel[axis], limits, image }).into())
     }
 
     fn check_distances(&self) -> Result<()> {

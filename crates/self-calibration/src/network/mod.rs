@@ -3,14 +3,20 @@
 mod auto_terms;
 mod builder;
 mod calibrate;
+mod catalogue;
+mod causes;
 mod check;
 mod combine;
+mod contradiction;
 mod equations;
 mod hyperbola;
 mod image_model;
+mod judgement;
+mod misfit;
 mod model;
 mod options;
 mod outcome;
+mod outside_image;
 mod plan;
 mod point_sigma;
 mod problem;
@@ -18,15 +24,21 @@ mod quality;
 mod range_step;
 mod reference;
 mod rejection;
+mod rejection_words;
 mod report;
+mod robust_pose;
 mod selection;
+mod settle;
 mod simulate;
 mod start;
+mod start_calibration;
 mod strength;
+mod suspicion;
 mod term_words;
 mod terms;
 
 pub use calibrate::{calibrate, calibrate_two_networks};
+pub use contradiction::{Cause, CauseKind, Contradiction, WorstValue};
 pub use model::{
     DistanceEnd, KnownDistance, Network, NetworkTarget, PassiveCamera, PassiveImagePoint, Sighting, Station,
 };
@@ -35,5 +47,6 @@ pub use outcome::{
     AdjustedStation, AdjustedTarget, CalibratedParameter, CalibrationOutcome, Component, GroupQuality,
     ObservationQuality, TermDecision, Verdict,
 };
+pub use outside_image::OutsideImage;
 pub use plan::{Candidate, CandidateGrid, PlanOptions, PlanOutcome, plan};
 pub use simulate::{SightingOptions, SimulatedStart, simulate_sightings};

@@ -35,6 +35,8 @@ pub struct CalibrationOutcome {
     pub decisions: Vec<TermDecision>,
     /// What is weakly determined and what would cure it, in sentences.
     pub diagnosis: Vec<String>,
+    /// What speaks against the result as a whole, in sentences that end with what to do: nothing, as a rule.
+    pub doubts: Vec<String>,
     /// Observed values used.
     pub observations: usize,
     /// Unknowns.

@@ -6,11 +6,12 @@ use std::collections::BTreeSet;
 use camera_model::pose_from_euler;
 use nalgebra::{DMatrix, Isometry3, Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};
 
-use super::calibrate::{datum, ranged_stations, start_calibration};
+use super::calibrate::{datum, ranged_stations};
 use super::point_sigma::point_sigma;
 use super::problem::{Excluded, Setup, Solved, Start};
 use super::report::{Estimate, Fit, parameters};
 use super::simulate::{exact_sightings, planned_sightings};
+use super::start_calibration::start_calibration;
 use super::term_words::expand;
 use super::terms::camera_names;
 use super::{CalibratedParameter, CalibrationOptions, Network, NetworkDatum, SightingOptions, Station, TermSelection};
@@ -256,6 +257,7 @@ impl<'o> Design<'o> {
         Ok(Setup {
             network: observed,
             start,
+            unused: None,
             calibration: start_calibration(observed),
             estimated: self.terms.clone(),
             ranged,

@@ -68,6 +68,8 @@ pub(crate) struct CameraPrior {
 pub(crate) struct Setup<'n> {
     pub(crate) network: &'n Network,
     pub(crate) start: Start,
+    /// Which of the given poses and coordinates were no start values, and why.
+    pub(crate) unused: Option<String>,
     pub(crate) calibration: Calibration,
     /// Canonical names of the terms that are estimated.
     pub(crate) estimated: BTreeSet<String>,

@@ -10,10 +10,12 @@ use adjust::{
 use error_models::RangeErrorModel;
 use nalgebra::DMatrix;
 
+use super::misfit::median;
 use super::problem::{RangeSet, Setup};
 use super::reference::Reference;
 use super::rejection::suspects;
 use super::report::covariance_of;
+use super::settle::start_range_limit;
 use super::strength::{Motions, Strength, combination, weakest};
 use super::terms::{Seen, family_widths, modelled_range, range_model_from, range_names, range_values};
 use super::{CalibrationOptions, Component};
@@ -119,7 +121,7 @@ impl RangeStep {
                 format!("{ranges} ranges with {behind} uncertain coordinates are too many for its dense second step");
             return Err(Error::MethodNeeds { method: format!("{:?}", options.method), needs });
         }
-        let mut rejected = BTreeSet::new();
+        let mut rejected = if options.rejection_level.is_some() { far_off(setup, reference) } else { BTreeSet::new() };
         loop {
             let kept = reference.without(&rejected);
             let (solution, terms) = adjusted(setup, &kept, scale)?;
@@ -256,6 +258,17 @@ fn observed(setup: &Setup<'_>, index: usize) -> Option<Seen> {
     let amplitude = seen.amplitude.unwrap_or(f64::NAN);
     let drift_m = setup.network.stations[seen.station].drift_m;
     Some(Seen { range_m: seen.range_m?, x_mm: x - xp, y_mm: y - yp, amplitude, drift_m })
+}
+
+/// Ranges that no range term explains: a whole ambiguity interval or another unit away from the reference.
+fn far_off(setup: &Setup<'_>, reference: &Reference) -> BTreeSet<usize> {
+    let known = reference.sightings.iter().zip(&reference.values);
+    let off = known.filter_map(|(&index, value)| Some((index, setup.network.sightings[index].range_m? - value)));
+    let off: Vec<(usize, f64)> = off.collect();
+    let offset = median(off.iter().map(|(_, off)| *off).collect());
+    let spread = median(off.iter().map(|(_, off)| (off - offset).abs()).collect());
+    let limit = start_range_limit(setup.network, spread);
+    off.into_iter().filter(|(_, off)| (off - offset).abs() > limit).map(|(index, _)| index).collect()
 }
 
 /// Rejects the worst range of each station and target.

@@ -83,6 +83,7 @@ impl Setup<'_> {
             residuals,
             decisions: Vec::new(),
             diagnosis: Vec::new(),
+            doubts: Vec::new(),
             observations: figures.observations,
             unknowns: figures.unknowns,
             datum_defect: figures.datum_defect,

@@ -208,8 +208,14 @@ impl Simulator<'_> {
         // The same random numbers are drawn whatever is kept, so that networks stay comparable.
         let gross = [self.gross(), self.gross()];
         let direction = std::f64::consts::TAU * self.random.random::<f64>();
-        let noise = [self.normal() + gross[0] * direction.cos(), self.normal() + gross[0] * direction.sin()];
-        let pixel = [0, 1].map(|axis| exact[axis] + options.sigma_pixel * noise[axis]);
+        let noise = [self.normal(), self.normal()];
+        let pixel_off_by = |gross: f64| {
+            let gross = [gross * direction.cos(), gross * direction.sin()];
+            [0, 1].map(|axis| exact[axis] + options.sigma_pixel * (noise[axis] + gross[axis]))
+        };
+        // A gross error that leads out of the image would have been noticed: it leads the other way.
+        let pixel = Some(pixel_off_by(gross[0])).filter(|pixel| truth.camera.contains(*pixel));
+        let pixel = pixel.unwrap_or_else(|| pixel_off_by(if gross[0] == 0.0 { 0.0 } else { -gross[0] }));
         let range_m = range_m + options.sigma_range_m * (self.normal() + gross[1]);
         Ok(Sighting {
             pixel: planned.pixel.map(|_| pixel),

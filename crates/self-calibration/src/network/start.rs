@@ -1,34 +1,153 @@
 //! Start values: poses and coordinates from whatever is known, gross errors among the observations or not.
 
-use icp_registration::absolute_orientation;
-use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
-use orientation::{ResectionOptions, TargetObservation, resect};
+use camera_model::{euler_from_pose, pose_from_euler};
+use nalgebra::{Isometry3, Point3};
+use orientation::TargetObservation;
 
+use super::misfit::{Misfit, corrected_range, median, misfits};
 use super::problem::{Calibration, Start};
-use super::{Network, PassiveCamera, Station};
+use super::robust_pose::{NEEDED, intersect, robust_orientation, robust_resection};
+use super::settle::{start_limit, start_range_limit};
+use super::start_calibration::start_calibration;
+use super::{Network, PassiveCamera};
 use crate::{Error, Result};
 
-/// Targets that orient a station.
-const NEEDED: usize = 3;
-/// Residuals beyond so many times the median's standard deviation are gross errors for a start value.
-const OUTLYING: f64 = 4.0;
-/// Rays that meet at less than this angle (radian, 1 degree) place a target too weakly to start from.
-const SMALLEST_ANGLE: f64 = 0.0175;
+/// Share of the image points that start values may miss before others are looked for.
+const MISSED: f64 = 0.2;
+
+/// Attitudes nearer than this are one, radian: approximate ones are off by less, others by more.
+const SAME_ATTITUDE: f64 = 0.1;
+
+/// Which of the approximate values that are given are taken. Control is among them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Trust {
+    stations: bool,
+    targets: bool,
+}
 
 /// Finds start values for all stations and all targets that are seen.
 ///
-/// What is given is kept. Stations are oriented one after the other, the one with the most known targets first: where
+/// What is given is kept, unless the observations contradict it: then poses, coordinates or both are found anew, whichever
+/// fits best. Stations are oriented one after the other, the one with the most known targets first: where
 /// it has ranges, by absolute orientation of the points that image points and ranges make; else by resection. Targets
 /// follow from oriented stations as the median of their points, or as the intersection of rays. Where nothing at all
 /// is given, the station with the most ranges becomes the origin.
-pub(crate) fn find_start(network: &Network, calibration: &Calibration, passive: bool) -> Result<Start> {
-    let mut finder = Finder::new(network, calibration);
+pub(crate) fn find_start(
+    network: &Network,
+    calibration: &Calibration,
+    passive: bool,
+) -> Result<(Start, Option<String>)> {
+    let given = attempt(network, calibration, passive, Trust { stations: true, targets: true });
+    let missed = |start: &Start| missed(network, calibration, start);
+    if given.as_ref().is_ok_and(|start| missed(start) <= MISSED) {
+        return given.map(|start| (start, None));
+    }
+    let has_stations = network.stations.iter().any(|station| station.world_from_camera.is_some());
+    let has_targets = network.targets.iter().any(|target| target.point.is_some());
+    // Control is the frame of all others.
+    let free = !network.targets.iter().any(|target| target.covariance.is_some());
+    let others =
+        [(false, true, has_stations), (true, false, has_targets && free), (false, false, has_stations && free)];
+    let others = others.into_iter().filter(|(.., possible)| *possible).filter_map(|(stations, targets, _)| {
+        let trust = Trust { stations, targets };
+        let start = attempt(network, calibration, passive, trust).ok()?;
+        // Ranges tell which of two starts has the right scale.
+        Some((missed(&start).max(ranges_missed(network, calibration, &start)), start, trust))
+    });
+    let best = others.min_by(|a, b| a.0.total_cmp(&b.0));
+    let best = match given {
+        Ok(given) => match best.filter(|(share, ..)| *share < missed(&given)) {
+            Some(best) => best,
+            None => return Ok((given, None)),
+        },
+        Err(error) => best.ok_or(error)?,
+    };
+    let (_, start, trust) = best;
+    let words = unused_words(network, &start, trust);
+    Ok((start, Some(words)))
+}
+
+/// Whether most image points lie where the given poses and coordinates put them; false where none are given.
+pub(crate) fn fits_as_given(network: &Network) -> bool {
+    let calibration = start_calibration(network);
+    let limit = start_limit(network);
+    let sizes = network.sightings.iter().filter_map(|seen| {
+        let (pose, point) = (network.stations[seen.station].world_from_camera?, network.targets[seen.target].point?);
+        Misfit::new(network, &calibration, &pose, &point, seen).pixels()
+    });
+    let sizes: Vec<f64> = sizes.collect();
+    let near = sizes.iter().filter(|size| **size <= limit).count() as f64;
+    !sizes.is_empty() && near >= (1.0 - MISSED) * sizes.len() as f64
+}
+
+/// Which given values were left aside.
+fn unused_words(network: &Network, start: &Start, trust: Trust) -> String {
+    let what = match (trust.stations, trust.targets) {
+        (false, true) => "the poses given for the stations",
+        (true, false) => "the coordinates given for the targets",
+        _ => "the poses and coordinates given",
+    };
+    let radians = if trust.targets && in_radians(network, start) {
+        ": their attitudes fit if they are radians instead of degrees"
+    } else {
+        ": check units, axes, signs and names"
+    };
+    format!("{what} contradict the observations and were not used as start values{radians}")
+}
+
+/// Whether most poses agree with those found when their attitudes, read as degrees, are taken for radians.
+fn in_radians(network: &Network, start: &Start) -> bool {
+    let agrees = |given: &Isometry3<f64>, found: &Isometry3<f64>| {
+        let attitude = euler_from_pose(given).map(f64::to_degrees);
+        pose_from_euler(given.translation.vector, attitude).rotation.angle_to(&found.rotation) < SAME_ATTITUDE
+    };
+    let pairs = network.stations.iter().zip(&start.stations);
+    let pairs: Vec<_> = pairs.filter_map(|(station, found)| Some((station.world_from_camera?, found))).collect();
+    2 * pairs.iter().filter(|(given, found)| agrees(given, found)).count() > pairs.len()
+}
+
+/// Start values that keep what is trusted.
+fn attempt(network: &Network, calibration: &Calibration, passive: bool, trust: Trust) -> Result<Start> {
+    let mut finder = Finder::new(network, calibration, trust);
     finder.run()?;
+    finder.orient_anew();
     finder.drop_unseen(passive);
     let relative =
         network.passive.as_ref().filter(|_| passive).map(|passive| finder.relative_orientation(passive)).transpose()?;
     let stations = finder.stations.iter().copied().flatten().collect();
     Ok(Start { stations, targets: finder.targets, relative })
+}
+
+/// Share of the image points that lie farther from where start values put them than these may be off.
+fn missed(network: &Network, calibration: &Calibration, start: &Start) -> f64 {
+    let limit = start_limit(network);
+    let misfits = misfits(network, calibration, start);
+    let sizes: Vec<f64> = misfits.iter().filter_map(Misfit::pixels).collect();
+    let far = sizes.iter().filter(|size| size.is_nan() || **size > limit).count();
+    far as f64 / sizes.len().max(1) as f64
+}
+
+/// The same share of the ranges.
+fn ranges_missed(network: &Network, calibration: &Calibration, start: &Start) -> f64 {
+    let limit = start_range_limit(network, 0.0);
+    let misfits = misfits(network, calibration, start);
+    let sizes: Vec<f64> = misfits.iter().filter_map(|misfit| misfit.range_m).collect();
+    sizes.iter().filter(|size| size.is_nan() || size.abs() > limit).count() as f64 / sizes.len().max(1) as f64
+}
+
+/// Pose of one station from targets and calibration known from the others, by its image points.
+pub(crate) fn station_pose(
+    network: &Network,
+    calibration: &Calibration,
+    targets: &[Option<Point3<f64>>],
+    station: usize,
+) -> Option<Isometry3<f64>> {
+    let own = network.sightings.iter().filter(|seen| seen.station == station);
+    let target = |seen: &super::Sighting| {
+        let (pixel, point) = (seen.pixel?, targets[seen.target]?);
+        Some(TargetObservation { sigma_pixel: seen.sigma_pixel, ..TargetObservation::new(point, pixel, 1.0) })
+    };
+    robust_resection(&calibration.camera, own.filter_map(target).collect()).ok()
 }
 
 struct Finder<'n> {
@@ -41,10 +160,12 @@ struct Finder<'n> {
     of_target: Vec<Vec<usize>>,
     /// Points in the camera frame, of sightings with a range.
     local: Vec<Option<Point3<f64>>>,
+    /// Targets whose coordinates are given and taken.
+    given: Vec<bool>,
 }
 
 impl<'n> Finder<'n> {
-    fn new(network: &'n Network, calibration: &'n Calibration) -> Self {
+    fn new(network: &'n Network, calibration: &'n Calibration, trust: Trust) -> Self {
         let mut of_station = vec![Vec::new(); network.stations.len()];
         let mut of_target = vec![Vec::new(); network.targets.len()];
         let mut local = Vec::with_capacity(network.sightings.len());
@@ -53,19 +174,14 @@ impl<'n> Finder<'n> {
                 of_station[seen.station].push(index);
                 of_target[seen.target].push(index);
             }
-            let Station { integration_time_s: time, drift_m, .. } = network.stations[seen.station];
-            let set = calibration.sets.iter().find(|set| set.time == time);
             local.push(seen.pixel.zip(seen.range_m).map(|(pixel, range_m)| {
-                let [x, y] = calibration.camera.format.image_from_pixel(pixel);
-                let [xp, yp] = calibration.camera.interior.principal_point_mm;
-                let amplitude = seen.amplitude.unwrap_or(f64::NAN);
-                let corrected = set.map(|set| set.model.corrected_range(range_m, x - xp, y - yp, amplitude));
-                calibration.camera.point(pixel, corrected.unwrap_or(range_m) - drift_m)
+                calibration.camera.point(pixel, corrected_range(network, calibration, seen, pixel, range_m))
             }));
         }
-        let stations = network.stations.iter().map(|station| station.world_from_camera).collect();
-        let targets = network.targets.iter().map(|target| target.point).collect();
-        Self { network, calibration, stations, targets, of_station, of_target, local }
+        let stations = network.stations.iter().map(|station| station.world_from_camera.filter(|_| trust.stations));
+        let targets: Vec<_> = network.targets.iter().map(|target| target.point.filter(|_| trust.targets)).collect();
+        let given = targets.iter().map(Option::is_some).collect();
+        Self { network, calibration, stations: stations.collect(), targets, of_station, of_target, local, given }
     }
 
     fn run(&mut self) -> Result<()> {
@@ -118,7 +234,7 @@ impl<'n> Finder<'n> {
         }
         // Once more with all stations, so that a gross error of the first does not stay.
         for target in 0..self.targets.len() {
-            if self.network.targets[target].point.is_none() {
+            if !self.given[target] {
                 self.targets[target] = self.placed(target);
             }
             if self.targets[target].is_none() && !self.of_target[target].is_empty() {
@@ -128,6 +244,33 @@ impl<'n> Finder<'n> {
             }
         }
         Ok(())
+    }
+
+    /// Orients stations anew whose image points contradict their pose, where that fits better.
+    fn orient_anew(&mut self) {
+        let limit = start_limit(self.network);
+        for station in 0..self.stations.len() {
+            let Some(pose) = self.stations[station] else { continue };
+            let before = self.typical_miss(station, &pose);
+            if before <= limit {
+                continue;
+            }
+            if let Some(found) = station_pose(self.network, self.calibration, &self.targets, station)
+                && 2.0 * self.typical_miss(station, &found) < before
+            {
+                self.stations[station] = Some(found);
+            }
+        }
+    }
+
+    /// Median distance of a station's image points from where a pose puts them, pixel.
+    fn typical_miss(&self, station: usize, pose: &Isometry3<f64>) -> f64 {
+        let sizes = self.of_station[station].iter().filter_map(|&index| {
+            let seen = &self.network.sightings[index];
+            let point = self.targets[seen.target]?;
+            Misfit::new(self.network, self.calibration, pose, &point, seen).pixels()
+        });
+        median(sizes.collect())
     }
 
     /// A target that nothing sees is no unknown.
@@ -180,6 +323,7 @@ impl<'n> Finder<'n> {
             known.iter().filter_map(|(index, world)| Some((self.local[*index]?, *world))).collect();
         if ranged.len() >= NEEDED
             && let Some(pose) = robust_orientation(&ranged)
+            && self.typical_miss(station, &pose) <= start_limit(self.network)
         {
             return Ok(pose);
         }
@@ -227,74 +371,4 @@ impl<'n> Finder<'n> {
                 .to_owned(),
         })
     }
-}
-
-/// Absolute orientation `target_from_source` that most pairs agree with: the triple with the least median residual, then
-/// twice all pairs that fit it.
-fn robust_orientation(pairs: &[(Point3<f64>, Point3<f64>)]) -> Option<Isometry3<f64>> {
-    let n = pairs.len();
-    let fit = |chosen: &[usize]| {
-        let source: Vec<_> = chosen.iter().map(|&i| pairs[i].0).collect();
-        let target: Vec<_> = chosen.iter().map(|&i| pairs[i].1).collect();
-        absolute_orientation(&source, &target, None).ok().map(|orientation| orientation.target_from_source)
-    };
-    let residuals = |pose: &Isometry3<f64>| pairs.iter().map(|(a, b)| (pose * a - b).norm()).collect::<Vec<f64>>();
-    let strides = [(n / 3, 2 * n / 3), (n / 4, n / 2), (1, n / 2)];
-    let triples = strides.iter().flat_map(|&(a, b)| (0..n).map(move |i| [i, (i + a) % n, (i + b) % n]));
-    let distinct = triples.filter(|[a, b, c]| a != b && b != c && a != c);
-    let scored = distinct.filter_map(|triple| fit(&triple)).map(|pose| (median(residuals(&pose)), pose));
-    let (_, mut pose) = scored.min_by(|a, b| a.0.total_cmp(&b.0))?;
-    for _ in 0..2 {
-        let distances = residuals(&pose);
-        let limit = OUTLYING * 1.4826 * median(distances.clone());
-        // Half of the pairs lie below the median in any case; without noise rounding decides.
-        let inliers: Vec<usize> = (0..n).filter(|&i| distances[i] <= limit.max(1e-9)).collect();
-        if inliers.len() >= NEEDED {
-            pose = fit(&inliers).unwrap_or(pose);
-        }
-    }
-    Some(pose)
-}
-
-/// Resection that leaves out the worst target as long as it stands out from the others.
-fn robust_resection(
-    camera: &camera_model::Camera,
-    mut targets: Vec<TargetObservation>,
-) -> std::result::Result<Isometry3<f64>, String> {
-    let fewest = (targets.len() * 2).div_ceil(3).max(NEEDED + 1);
-    loop {
-        let found = resect(camera, &targets, &ResectionOptions::default()).map_err(|error| error.to_string())?;
-        let sizes: Vec<f64> = found.residuals.iter().map(|r| r.pixel[0].hypot(r.pixel[1])).collect();
-        let worst = (0..sizes.len()).max_by(|&a, &b| sizes[a].total_cmp(&sizes[b]));
-        let limit = 2.0 * OUTLYING * median(sizes.clone());
-        match worst {
-            Some(worst) if sizes[worst] > limit && targets.len() > fewest => targets.remove(worst),
-            _ => return Ok(found.world_from_camera),
-        };
-    }
-}
-
-/// The point nearest to some rays (origin, unit direction); `None` where they are nearly parallel.
-fn intersect(rays: &[(Vector3<f64>, Vector3<f64>)]) -> Option<Point3<f64>> {
-    let angle = |a: &Vector3<f64>, b: &Vector3<f64>| a.cross(b).norm();
-    let widest = rays.iter().flat_map(|a| rays.iter().map(move |b| angle(&a.1, &b.1))).fold(0.0, f64::max);
-    if widest < SMALLEST_ANGLE {
-        return None;
-    }
-    let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
-    for (origin, direction) in rays {
-        let across = Matrix3::identity() - direction * direction.transpose();
-        normal += across;
-        right += across * origin;
-    }
-    normal.try_inverse().map(|inverse| Point3::from(inverse * right))
-}
-
-/// The lower median; NaN of nothing.
-fn median(mut values: Vec<f64>) -> f64 {
-    if values.is_empty() {
-        return f64::NAN;
-    }
-    let middle = (values.len() - 1) / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }

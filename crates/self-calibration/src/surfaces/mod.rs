@@ -13,3 +13,10 @@ mod point_model;
 pub use calibrate::calibrate_surfaces;
 pub use options::{SurfaceCalibrationOptions, SurfaceCapture, SurfaceTerm};
 pub use outcome::SurfaceCalibration;
+
+impl crate::Error {
+    /// What the registration of this station, or all, failed with.
+    pub(crate) fn registration(station: &str, reason: icp_registration::Error) -> Self {
+        Self::Registration { station: station.to_owned(), reason }
+    }
+}

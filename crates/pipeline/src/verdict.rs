@@ -5,7 +5,7 @@ use std::fmt;
 
 use serde::Serialize;
 
-use crate::{CalibrationSummary, Explanation, FixedPatternSummary, PlanSummary, ScatteringSummary, Simulated};
+use crate::{Explanation, FixedPatternSummary, PlanSummary, ScatteringSummary, Simulated};
 
 /// How a command that has a result ended. What failed instead is an [`Error`](enum@crate::Error) with its
 /// [`Failure`].
@@ -89,6 +89,8 @@ pub enum DoubtKind {
     Noise,
     /// Whole ambiguity intervals that nothing tells.
     Wraps,
+    /// Observations that contradict each other, or scatter otherwise than stated.
+    Contradiction,
 }
 
 impl Doubt {
@@ -132,7 +134,6 @@ pub trait Judged {
 }
 
 // Results that nothing has been found to speak against yet.
-impl Judged for CalibrationSummary {}
 impl Judged for Explanation {}
 impl Judged for FixedPatternSummary {}
 impl Judged for PlanSummary {}

@@ -5,6 +5,7 @@ mod ambiguous_light;
 mod bad_input;
 mod calibrate;
 mod calibrate_bad_input;
+mod calibrate_contradictions;
 mod calibrate_offset;
 mod calibrate_planes;
 mod calibrate_warm_up;

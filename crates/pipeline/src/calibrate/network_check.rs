@@ -10,6 +10,11 @@ use crate::{Error, Result};
 /// Refuses targets and stations that too few observations determine, and a control datum without control.
 pub(super) fn check(files: &NetworkFiles, method: Method, datum: NetworkDatum) -> Result<()> {
     let network = &files.network;
+    if let Err(self_calibration::Error::OutsideImage(found)) = network.validate() {
+        let [low, high] = found.limits;
+        let reason = format!("is {}, outside the image ({}), expected {low} to {high}", found.value, found.image);
+        return Err(files.observations.error(found.sighting, found.component, reason).into());
+    }
     let joint = matches!(method, Method::JointTwoStep | Method::JointIntegrated);
     if joint && network.passive.is_none() {
         let message = "is missing: a joint setup needs the survey of its passive camera there".to_owned();

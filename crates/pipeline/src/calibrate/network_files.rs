@@ -54,6 +54,8 @@ pub(crate) fn read_network(
     let distances = named_distances(&root.join("distances.csv"), &tables.stations, &tables.targets)?;
     let drifts = take_drifts(&survey, &root, &start, warm_up, &sightings, &mut tables.stations)?;
     start.set_drifts(drifts);
+    let rows = observations.rows.iter().enumerate();
+    start.lines = rows.map(|(i, row)| ((row.station.clone(), row.target.clone()), observations.line(i))).collect();
     let network = Network {
         camera: start.camera,
         range_model: start.range_model.clone(),

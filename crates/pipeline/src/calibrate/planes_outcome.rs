@@ -37,6 +37,7 @@ pub(super) struct Found {
     vtpv: f64,
     sigma0: Option<f64>,
     diagnosis: Vec<String>,
+    doubts: Vec::new(),
 }
 
 impl Found {

@@ -5,7 +5,7 @@ use std::time::Instant;
 use range_io::atomic::{Destination, write_text};
 use range_io::calibration::Calibration;
 use range_io::tables::{write_residuals, write_stations, write_targets};
-use self_calibration::{CalibrationOptions, CalibrationOutcome, Method};
+use self_calibration::{CalibrationOptions, CalibrationOutcome, Error as Cause, Method};
 
 use super::network_check::check;
 use super::network_files::{NetworkFiles, read_network};
@@ -101,7 +101,27 @@ fn calibrate_networks(request: &CalibrateRequest, method: Method, progress: &dyn
         self_calibration::calibrate(&files.network, &options)
     };
     progress.advance(2);
+    let outcome = outcome.map_err(|error| placed(error, &files));
+    let outcome = match outcome {
+        // All of a column is wrong: a slip in the input, not a finding about the network.
+        Err(Cause::Contradiction(contradiction)) if contradiction.is_wrong_input() => {
+            let path = files.observations.file().to_owned();
+            return Err(Error::Survey { path, message: contradiction.to_string() });
+        }
+        outcome => outcome,
+    };
     Ok((files.start, outcome.map(|outcome| (outcome, None))))
+}
+
+/// Names file and line of the observed value that contradicts most.
+fn placed(mut error: Cause, files: &NetworkFiles) -> Cause {
+    if let Cause::Contradiction(contradiction) = &mut error
+        && let Some(worst) = &mut contradiction.worst
+    {
+        let file = files.observations.file().display();
+        worst.place = Some(format!("{file}, line {}", files.observations.line(worst.sighting)));
+    }
+    error
 }
 
 /// A name that no station has would silently leave nothing out.

@@ -1,5 +1,6 @@
 //! Start values: the survey's nominal camera, or a calibration.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use camera_model::Camera;
@@ -25,6 +26,8 @@ pub(crate) struct Start {
     pub(crate) words: String,
     /// What the ranges of each station had drifted by, where that is taken off.
     pub(crate) drifts: Vec<ViewDrift>,
+    /// Line of `observations.csv` of each station and target; empty where targets are not what is calibrated from.
+    pub(crate) lines: BTreeMap<(String, String), usize>,
 }
 
 impl Start {
@@ -50,7 +53,7 @@ impl Start {
             Some(calibration) => range_model_of(survey, calibration, modulation)?,
             None => error_free(modulation),
         };
-        Ok(Self { camera, range_model, modulation, calibration, words, drifts: Vec::new() })
+        Ok(Self { camera, range_model, modulation, calibration, words, drifts: Vec::new(), lines: BTreeMap::new() })
     }
 }
 

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use error_models::ParameterStatus;
 use nalgebra::DMatrix;
 use range_io::calibration::Calibration;
-use self_calibration::{CalibratedParameter, CalibrationOutcome, Verdict};
+use self_calibration::{CalibratedParameter, CalibrationOutcome, Component, ObservationQuality, Verdict};
 use serde::Serialize;
 use serde::ser::{SerializeMap, Serializer};
 
@@ -16,6 +16,7 @@ use super::start::Start;
 use super::trends::trends;
 use crate::drift::ViewDrift;
 use crate::trends::TrendSummary;
+use crate::verdict::{Doubt, DoubtKind, Judged};
 
 /// Names and units of the parameters that a summary always has, in its order: those of camera and range terms.
 fn always_listed() -> impl Iterator<Item = (&'static str, &'static str)> {
@@ -61,6 +62,8 @@ pub struct CalibrationSummary {
     pub rejected: Vec<RejectedObservation>,
     /// What is weakly determined and what would cure it; why the calibration was refused.
     pub diagnosis: Vec<String>,
+    /// What speaks against the result as a whole.
+    pub doubts: Vec<Doubt>,
     /// Observation groups.
     pub groups: Vec<GroupSummary>,
     /// The ranges by amplitude, the darkest first.
@@ -178,6 +181,9 @@ impl CorrelationSummary {
 /// An observed value that was rejected.
 #[derive(Debug, Clone, Serialize)]
 pub struct RejectedObservation {
+    /// Line of `observations.csv`; `None` for what stands in another file.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub line: Option<usize>,
     /// Station.
     pub station: String,
     /// Target.
@@ -253,8 +259,9 @@ impl CalibrationSummary {
             converged: true,
             parameters: ParameterMap::new(&outcome.parameters),
             correlation: CorrelationSummary::new(&outcome.estimated, &outcome.covariance),
-            rejected: rejected(outcome),
+            rejected: rejected(outcome, start),
             diagnosis: outcome.diagnosis.clone(),
+            doubts: outcome.doubts.iter().map(|words| Doubt::new(DoubtKind::Contradiction, words)).collect(),
             groups: outcome.groups.iter().map(|group| group_summary(group, &group.name)).collect(),
             amplitude_classes: outcome.amplitude_classes().iter().map(|class| group_summary(class, "range")).collect(),
             offset_table: table.map(|table| table.summary.clone()),
@@ -288,6 +295,7 @@ impl CalibrationSummary {
             correlation: CorrelationSummary::default(),
             rejected: Vec::new(),
             diagnosis: vec![reason],
+            doubts: Vec::new(),
             groups: Vec::new(),
             amplitude_classes: Vec::new(),
             offset_table: None,
@@ -299,10 +307,22 @@ impl CalibrationSummary {
     }
 }
 
-fn rejected(outcome: &CalibrationOutcome) -> Vec<RejectedObservation> {
+impl Judged for CalibrationSummary {
+    fn doubts(&self) -> &[Doubt] {
+        &self.doubts
+    }
+}
+
+fn rejected(outcome: &CalibrationOutcome, start: &Start) -> Vec<RejectedObservation> {
+    let own = |quality: &ObservationQuality| {
+        let seen = matches!(quality.component, Component::Col | Component::Row | Component::Range);
+        let key = (quality.station.clone(), quality.target.clone());
+        start.lines.get(&key).copied().filter(|_| seen)
+    };
     let gross = outcome.residuals.iter().filter(|quality| quality.verdict == Verdict::Rejected);
     gross
         .map(|quality| RejectedObservation {
+            line: own(quality),
             station: quality.station.clone(),
             target: quality.target.clone(),
             component: quality.component.name(),

@@ -36,6 +36,9 @@ impl fmt::Display for CalibrationSummary {
                 table.verdict
             )?;
         }
+        for doubt in &self.doubts {
+            writeln!(f, "doubt: {doubt}")?;
+        }
         for sentence in self.diagnosis.iter().cloned().chain(trends) {
             writeln!(f, "note: {sentence}")?;
         }
@@ -99,8 +102,12 @@ impl CalibrationSummary {
             let (residual, unit) = readable(gross.residual, gross.unit);
             writeln!(
                 f,
-                "rejected: {} of {} from {}: residual {residual:.3} {unit}, {:.1} of its sigma",
-                gross.component, gross.target, gross.station, gross.residual_in_sigmas
+                "rejected: {} of {} from {}{}: residual {residual:.3} {unit}, {:.1} of its sigma",
+                gross.component,
+                gross.target,
+                gross.station,
+                gross.line.map_or_else(String::new, |line| format!(" (observations.csv, line {line})")),
+                gross.residual_in_sigmas
             )?;
         }
         if self.rejected.len() > NAMED_REJECTIONS {

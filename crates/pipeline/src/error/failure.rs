@@ -113,8 +113,11 @@ pub(super) fn of_estimation(error: &self_calibration::Error) -> Failure {
         | Cause::MethodNeeds { .. }
         | Cause::FramesDiffer { .. }
         | Cause::NoAmplitudes { .. }
+        | Cause::OutsideImage(_)
         | Cause::Camera(_)
         | Cause::Image(_) => Failure::Usage,
+        // All of a column is wrong: a slip in the input, not a finding about the network.
+        Cause::Contradiction(found) if found.is_wrong_input() => Failure::Usage,
         Cause::Registration { reason, .. } => of_registration(reason),
         _ => Failure::Refused,
     }

@@ -24,6 +24,7 @@ pub(crate) fn render_calibration(
         summary.start
     );
     let mut page = Page::new("rangecam: calibration", &lead);
+    page.doubts(&summary.doubts);
     tables::figures_of_merit(&mut page, summary);
     tables::diagnosis(&mut page, &summary.diagnosis);
     tables::parameters(&mut page, outcome);

@@ -37,7 +37,6 @@ pub(super) struct Found {
     vtpv: f64,
     sigma0: Option<f64>,
     diagnosis: Vec<String>,
-    doubts: Vec::new(),
 }
 
 impl Found {
@@ -142,6 +141,7 @@ impl Found {
             groups: vec![group],
             decisions: Vec::new(),
             diagnosis: self.diagnosis,
+            doubts: Vec::new(),
             observations: self.observations,
             unknowns,
             datum_defect: 0,

@@ -289,7 +289,7 @@ fn every_change_of_the_disk_may_fail() {
                             assert_eq!(names(root.path()), [""; 0], "{case}");
                         }
                     }
-                    Err(other) => panic!("{case}: {other}"),
+                    Err(other) => unreachable!("{case}: {other}"),
                     Ok(()) => {
                         assert_eq!(names(&target), [OutputFolder::MARKER, "frames", "new.txt"], "{case}");
                         assert_eq!(names(&root.path().join("a")), ["run"], "{case}");

@@ -14,7 +14,8 @@ fn rangecam(line: &[&str]) -> Output {
 
 fn code(line: &[&str]) -> i32 {
     let output = rangecam(line);
-    output.status.code().unwrap_or_else(|| panic!("{line:?}: {}", String::from_utf8_lossy(&output.stderr)))
+    // -1: ended by a signal.
+    output.status.code().unwrap_or(-1)
 }
 
 #[test]

@@ -105,7 +105,8 @@ fn world() -> TempDir {
         let comma = if more.is_empty() || more.ends_with(',') { "" } else { "," };
         fs::write(at(&format!("plan/{name}.ron")), format!("(name: \"{name}\", {more}{comma} {stages})")).unwrap();
     }
-    let points: String = (0..400).map(|k| format!("{} {} {}\n", k % 20, k / 20, k % 7)).collect();
+    let points: Vec<String> = (0..400).map(|k| format!("{} {} {}\n", k % 20, k / 20, k % 7)).collect();
+    let points = points.concat();
     for cloud in ["one/a.xyz", "two/b.xyz"] {
         fs::write(at(cloud), &points).unwrap();
     }

@@ -4,7 +4,12 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// Lines that are not run, each with the reason; their options are held against the command's help.
-const NOT_RUN: [(&str, &str); 2] = [
+const NOT_RUN: [(&str, &str); 4] = [
+    ("rangecam calibrate survey --terms xp,yp,c,k1,k2,p1,p2,d0,spline12", "needs distances over the whole interval"),
+    (
+        "rangecam calibrate survey --method two-step-independent",
+        "needs targets whose coordinates were measured otherwise",
+    ),
     ("rangecam register sevenscenes/seq-01 --track", "needs a recorded sequence of some hundred frames"),
     ("rangecam compare out/kitchen sevenscenes/seq-01", "compares with that sequence"),
 ];
@@ -65,9 +70,9 @@ fn copy(from: &Path, to: &Path) {
     for entry in std::fs::read_dir(from).unwrap().flatten() {
         let target = to.join(entry.file_name());
         if entry.path().is_dir() {
-            copy(&entry.path(), &target)
+            copy(&entry.path(), &target);
         } else {
-            drop(std::fs::copy(entry.path(), target).unwrap())
+            std::fs::copy(entry.path(), target).unwrap();
         }
     }
 }
@@ -149,6 +154,9 @@ fn every_mention_of_cargo_names_what_is_there() {
         let own =
             Path::new(&place.split(".md:").next().unwrap().replace("/README.md", "").replace("/README", "")).to_owned();
         let package = after("-p").or(after("--package")).map_or(own, |name| root().join("crates").join(name));
+        if !["run", "test", "bench", "xtask"].contains(&words[1].as_str()) {
+            continue;
+        }
         if words[1] == "xtask" {
             require_task(&place, &line, &words);
             continue;
@@ -159,8 +167,15 @@ fn every_mention_of_cargo_names_what_is_there() {
             assert!(file.is_dir() || file.with_extension("rs").is_file(), "{place}: {line}: no example {example}");
         }
         if let Some(filter) = after("suite").filter(|filter| *filter != "--") {
-            let program = std::fs::read_to_string(package.join("tests/main.rs")).unwrap();
-            assert!(program.contains(&format!("mod {filter};")), "{place}: {line}: no tests {filter}");
+            let files = std::fs::read_dir(package.join("tests")).unwrap().map(|entry| entry.unwrap().path());
+            // A filter is a part of the name of a test or of its module.
+            let named = files.filter(|file| file.is_file()).any(|file| {
+                std::fs::read_to_string(file).unwrap().lines().any(|line| {
+                    let name = line.trim().strip_prefix("fn ").or(line.strip_prefix("mod "));
+                    name.is_some_and(|name| name.contains(filter.as_str()))
+                })
+            });
+            assert!(named, "{place}: {line}: no test {filter}");
         }
     }
 }

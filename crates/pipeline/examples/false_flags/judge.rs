@@ -22,8 +22,8 @@ use super::rooms::{Capture, LOW_AMPLITUDE};
 const SIGMAS: f64 = 4.0;
 const FLOOR_M: f64 = 0.005;
 
-/// Flags that are held to the bar, with their stages: [`Flags::UNWRAP_UNSURE`] of `Unwrap`, [`Flags::MULTIPATH`] of
-/// `Multipath` and `Deconvolve` and [`Flags::OUTSIDE_SPAN`] of `CorrectRange` are listed beside it.
+/// Flags that are held to the bar. Listed beside it are [`Flags::OUTSIDE_SPAN`], which says what the calibration does not
+/// cover, right or not, and those of the stages `Unwrap`, `Deconvolve` and `Multipath`, which have bars of their own.
 pub const JUDGED: Flags =
     Flags::all().difference(Flags::UNWRAP_UNSURE).difference(Flags::MULTIPATH).difference(Flags::OUTSIDE_SPAN);
 

@@ -22,8 +22,13 @@ impl Fault {
     }
 
     pub fn of(self, file: &Path) -> Error {
+        self.with(file, |reason| Error::format(file, reason))
+    }
+
+    /// As [`Self::of`], where more is known of what the content should be.
+    pub fn with(self, file: &Path, content: impl FnOnce(String) -> Error) -> Error {
         match self {
-            Self::Content(reason) => Error::format(file, reason),
+            Self::Content(reason) => content(reason),
             Self::System(source) => Error::io(file, "read")(source),
         }
     }

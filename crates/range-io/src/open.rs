@@ -51,7 +51,7 @@ pub fn read_ron_text(path: impl AsRef<Path>) -> Result<String> {
 fn text(path: &Path, longest: u64) -> Result<String> {
     let text = String::from_utf8(read_bytes(path, longest)?).map_err(|error| {
         let fault = error.utf8_error().valid_up_to();
-        let line = 1 + error.as_bytes()[..fault].iter().filter(|byte| **byte == b'\n').count();
+        let line = error.as_bytes()[..fault].split(|byte| *byte == b'\n').count();
         Error::format(path, format!("is no text in UTF-8: byte {fault} in line {line} belongs to no character"))
     })?;
     Ok(text.strip_prefix('\u{feff}').map(str::to_owned).unwrap_or(text))

@@ -9,7 +9,6 @@ use std::io::BufReader;
 use std::path::Path;
 
 use crate::clouds::{CloudFile, Columns, canonical};
-use crate::fault::Fault;
 use crate::lines::read_line;
 use crate::{Error, Result};
 
@@ -21,10 +20,8 @@ pub fn read_xyz(path: impl AsRef<Path>) -> Result<CloudFile> {
     let mut reader = BufReader::with_capacity(1 << 16, file);
     let mut bytes = Vec::new();
     for line in 1.. {
-        let text = read_line(&mut reader, &mut bytes).map_err(|fault| match fault {
-            Fault::Content(reason) => Error::format(path, format!("{reason}: line {line}")),
-            system => system.of(path),
-        })?;
+        let text = read_line(&mut reader, &mut bytes)
+            .map_err(|fault| fault.with(path, |reason| Error::format(path, format!("{reason}: line {line}"))))?;
         let Some(text) = text else { break };
         list.line(line, text.trim_start_matches('\u{feff}').trim())?;
     }

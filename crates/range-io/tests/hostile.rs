@@ -151,7 +151,7 @@ fn sizes_of_archives_are_not_believed() {
     let scratch = Scratch::new();
     let file = scratch.file("a.npz");
     let mut writer = NpzWriter::create(&file).expect("an archive");
-    writer.add("depth", &[100_000], &[0.0_f32; 100_000]).expect("an array");
+    writer.add("depth", &[100_000], &vec![0.0_f32; 100_000]).expect("an array");
     writer.commit().expect("an archive");
     let sound = std::fs::read(&file).expect("its bytes");
     read_depth(&file).expect("an archive of zeros");

@@ -67,10 +67,10 @@ mod tests {
 
     #[test]
     fn json_stays_json() {
-        let text = serde_json::to_string(&["\u{1b}[2J", "\u{9b}2J\u{7f}\u{202e}", "é"]).expect("strings are JSON");
+        let text = serde_json::to_string(&["\u{1b}[2J", "\u{9b}2J\u{7f}\u{202e}", "é"]).unwrap();
         let safe = json(&text);
         assert!(!safe.contains(is_obeyed), "{safe}");
-        let back: Vec<String> = serde_json::from_str(&safe).expect("still JSON");
+        let back: Vec<String> = serde_json::from_str(&safe).unwrap();
         assert_eq!(back, ["\u{1b}[2J", "\u{9b}2J\u{7f}\u{202e}", "é"]);
     }
 }

@@ -19,10 +19,8 @@ pub fn read_e57(path: impl AsRef<Path>) -> Result<Vec<E57Scan>> {
     let headers = reader.pointclouds();
     check_sizes(&headers, length).map_err(|fault| fault.of(path))?;
     let scans = headers.iter().enumerate().map(|(index, header)| {
-        let cloud = read_scan(&mut reader, header).map_err(|fault| match fault {
-            Fault::Content(reason) => Error::format(path, format!("scan {index} {reason}")),
-            system => system.of(path),
-        })?;
+        let cloud = read_scan(&mut reader, header)
+            .map_err(|fault| fault.with(path, |reason| Error::format(path, format!("scan {index} {reason}"))))?;
         Ok(E57Scan { name: header.name.clone().unwrap_or_default(), cloud })
     });
     scans.collect()

@@ -92,9 +92,9 @@ impl<R: Read + Seek> Recording<R> {
     pub fn new(name: impl Into<PathBuf>, mut reader: R) -> Result<Self> {
         let file = name.into();
         let mut index = Index { nanoseconds_per_tick: 1_000_000, ..Index::default() };
-        index.read(&mut reader).map_err(|error| match Fault::from(error) {
-            Fault::Content(reason) => Error::format(&file, format!("is no complete Matroska file: {reason}")),
-            system => system.of(&file),
+        index.read(&mut reader).map_err(|error| {
+            Fault::from(error)
+                .with(&file, |reason| Error::format(&file, format!("is no complete Matroska file: {reason}")))
         })?;
         let Index { tracks, blocks, attachments, nanoseconds_per_tick, .. } = index;
         Ok(Self { file, reader, tracks, blocks, attachments, nanoseconds_per_tick })

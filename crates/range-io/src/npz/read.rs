@@ -90,10 +90,7 @@ impl Source<'_> {
     }
 
     fn fault(&self, fault: Fault) -> Error {
-        match fault {
-            Fault::Content(reason) => self.error(reason),
-            system => system.of(self.file),
-        }
+        fault.with(self.file, |reason| self.error(reason))
     }
 
     /// `bound` is the largest number of bytes that `reader` can give.
@@ -116,11 +113,10 @@ impl Source<'_> {
         }
         accept(&header)?;
         let count = header.elements().unwrap_or(0);
-        let values = read_values(reader, header.data_type, count).map_err(|error| match Fault::from(error) {
-            Fault::Content(reason) => {
+        let values = read_values(reader, header.data_type, count).map_err(|error| {
+            Fault::from(error).with(self.file, |reason| {
                 self.error(format!("ends before its shape {:?} is filled: {reason}", header.shape))
-            }
-            system => self.fault(system),
+            })
         })?;
         self.require_end(reader)?;
         Ok(Array { shape: header.shape, values })
@@ -132,10 +128,7 @@ impl Source<'_> {
         match reader.read(&mut surplus) {
             Ok(0) => Ok(()),
             Ok(_) => Err(self.error("has more bytes than its shape takes")),
-            Err(error) => Err(match Fault::from(error) {
-                Fault::Content(reason) => self.error(format!("is damaged: {reason}")),
-                system => self.fault(system),
-            }),
+            Err(error) => Err(Fault::from(error).with(self.file, |reason| self.error(format!("is damaged: {reason}")))),
         }
     }
 }

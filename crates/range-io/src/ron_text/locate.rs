@@ -3,6 +3,8 @@
 //! The text is walked through once, with the open brackets alone in memory: paths are built for what is asked for only, so
 //! that a text of many values or brackets costs no more than its length.
 
+use std::fmt::Write;
+
 /// Line and column, from 1.
 pub(super) type Place = (usize, usize);
 
@@ -139,7 +141,10 @@ impl<'a> Walk<'a> {
                     path.push_str(key);
                 }
                 None if group.transparent => {}
-                None => path.push_str(&format!("[{}]", group.index)),
+                None => {
+                    // Writing to a string does not fail.
+                    let _ = write!(path, "[{}]", group.index);
+                }
             }
         }
         path
@@ -186,13 +191,13 @@ impl<'a> Walk<'a> {
             match character {
                 '/' => self.cursor.comment(),
                 '#' => self.cursor.attribute(),
-                '(' | '[' | '{' => match name {
-                    Some((name, start)) => self.groups.push(self.group(character, start, Some(&name))),
-                    None => {
+                '(' | '[' | '{' => {
+                    let Some((name, start)) = name else {
                         self.opened = Some(self.group(character, place, None));
                         return Some(Seen::Value(place));
-                    }
-                },
+                    };
+                    self.groups.push(self.group(character, start, Some(&name)));
+                }
                 ')' | ']' | '}' => {
                     let start = self.groups.pop()?.start;
                     return (!self.groups.is_empty()).then_some(Seen::End { start, end: place });

@@ -15,7 +15,7 @@ pub fn read_vtk(path: impl AsRef<Path>) -> Result<CloudFile> {
         // Binary values have no lines.
         Fault::Content(reason) if !source.binary => {
             let read = &bytes[..bytes.len() - source.left()];
-            let line = read.trim_ascii_end().iter().filter(|byte| **byte == b'\n').count() + 1;
+            let line = read.trim_ascii_end().split(|byte| *byte == b'\n').count();
             Error::format(path, format!("{reason} (line {line})"))
         }
         fault => fault.of(path),

@@ -15,6 +15,7 @@ mod diff;
 mod documented_files;
 mod explain;
 mod exposures;
+mod false_flags;
 mod fixed_pattern;
 mod frame_rate;
 mod hostile_files;

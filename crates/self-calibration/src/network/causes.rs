@@ -11,6 +11,7 @@ use super::contradiction::{Cause, CauseKind, Contradiction, WorstValue};
 use super::misfit::{Misfit, Scales, implausibility, median};
 use super::problem::{Calibration, Setup};
 use super::selection::all_terms;
+use super::settle::{start_limit, start_range_limit};
 use super::start::{fits_as_given, station_pose};
 use super::suspicion::{is_too_many, unit_factor};
 use super::{Method, Network, TermSelection};
@@ -213,6 +214,13 @@ fn size(points: &[Vector3<f64>]) -> f64 {
 
 /// Standard deviations in another unit, from how residuals scatter where most observations agree.
 fn sigma_units(fit: &Fit<'_>) -> Vec<Cause> {
+    // Wrong deviations leave the residuals themselves small.
+    let network = fit.setup.network;
+    let pixels = median(fit.misfits.iter().filter_map(Misfit::pixels).collect());
+    let ranges = median(fit.misfits.iter().filter_map(|misfit| misfit.range_m).map(f64::abs).collect());
+    if pixels > start_limit(network) || ranges > start_range_limit(network, 0.0) {
+        return Vec::new();
+    }
     let scales = Scales::new(fit.misfits.iter());
     let kinds = [(scales.image, "image points", "sigma_col and sigma_row"), (scales.range, "ranges", "sigma_range")];
     let cause = |(scale, of, columns): (f64, &str, &str)| {

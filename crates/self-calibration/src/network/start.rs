@@ -39,7 +39,9 @@ pub(crate) fn find_start(
 ) -> Result<(Start, Option<String>)> {
     let given = attempt(network, calibration, passive, Trust { stations: true, targets: true });
     let missed = |start: &Start| missed(network, calibration, start);
-    if given.as_ref().is_ok_and(|start| missed(start) <= MISSED) {
+    // Ranges tell which of two starts has the right scale.
+    let share = |start: &Start| missed(start).max(ranges_missed(network, calibration, start));
+    if given.as_ref().is_ok_and(|start| share(start) <= MISSED) {
         return given.map(|start| (start, None));
     }
     let has_stations = network.stations.iter().any(|station| station.world_from_camera.is_some());
@@ -51,15 +53,18 @@ pub(crate) fn find_start(
     let others = others.into_iter().filter(|(.., possible)| *possible).filter_map(|(stations, targets, _)| {
         let trust = Trust { stations, targets };
         let start = attempt(network, calibration, passive, trust).ok()?;
-        // Ranges tell which of two starts has the right scale.
-        Some((missed(&start).max(ranges_missed(network, calibration, &start)), start, trust))
+        Some((share(&start), start, trust))
     });
     let best = others.min_by(|a, b| a.0.total_cmp(&b.0));
     let best = match given {
-        Ok(given) => match best.filter(|(share, ..)| *share < missed(&given)) {
-            Some(best) => best,
-            None => return Ok((given, None)),
-        },
+        Ok(given) => {
+            // Where only ranges speak against what is given, they may themselves be wrong: then nothing fits them.
+            let allowed = if missed(&given) <= MISSED { MISSED } else { missed(&given) };
+            match best.filter(|(share, ..)| *share < allowed) {
+                Some(best) => best,
+                None => return Ok((given, None)),
+            }
+        }
         Err(error) => best.ok_or(error)?,
     };
     let (_, start, trust) = best;

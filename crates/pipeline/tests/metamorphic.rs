@@ -247,7 +247,9 @@ fn a_mirrored_station_and_a_mirrored_frame_show() {
 fn stations_in_millimetres_are_doubted() {
     let slip = Slip::new(|survey| {
         let mut rows = read_stations(survey.join("stations.csv")).unwrap();
-        rows.iter_mut().for_each(|row| row.world_from_camera.translation.vector *= 1000.0);
+        for row in &mut rows {
+            row.world_from_camera.translation.vector *= 1000.0;
+        }
         write_stations(survey.join("stations.csv"), &rows).unwrap();
     });
     has(&slip.inspected(), DoubtKind::Units, None);

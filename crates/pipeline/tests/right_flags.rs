@@ -108,7 +108,7 @@ fn a_survey_without_amplitudes_is_doubted_as_a_whole() {
     if !has_capture("sr4000_steps") {
         return;
     }
-    let folder = tempfile::tempdir().unwrap();
+    let (folder, out) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
     let root = fixtures().join("surveys/sr4000_steps");
     let mut survey = Survey::read(root.join(Survey::FILE_NAME)).unwrap();
     survey.frames.truncate(1);
@@ -124,7 +124,7 @@ fn a_survey_without_amplitudes_is_doubted_as_a_whole() {
         plan_path: "test.ron".into(),
         survey: Some(folder.path().to_owned()),
         calibration: None,
-        out: folder.path().join("out"),
+        out: out.path().join("out"),
     };
     let summary = pipeline::run(&request, &Silent).unwrap();
     println!("{summary}");

@@ -113,6 +113,7 @@ fn files_that_the_output_did_not_write_are_kept_and_named() {
     let target = root.path().join("run");
     let add_file = |path: &Path| fs::write(path, "mine").unwrap();
     let add_folder = |path: &Path| fs::create_dir(path).unwrap();
+    #[allow(clippy::type_complexity)]
     let cases: [(&str, &dyn Fn(&Path)); 3] =
         [("notes.txt", &add_file), ("frames/mine.txt", &add_file), ("empty", &add_folder)];
     for (name, add) in cases {

@@ -53,6 +53,9 @@ fn is_obeyed(character: char) -> bool {
 
 #[cfg(test)]
 mod tests {
+    // Panics are how a test fails.
+    #![allow(clippy::unwrap_used)]
+
     use super::*;
 
     #[test]

@@ -1,5 +1,8 @@
 //! Every command line that the documentation shows is run, or held against what the command and the repository know.
 
+// What runs long is seen by its line.
+#![allow(clippy::print_stdout)]
+
 use std::path::{Path, PathBuf};
 use std::process::Command;
 

@@ -71,7 +71,7 @@ impl FrameWatch {
         let mut doubts = self.dead_stations();
         doubts.extend(self.repeated_stations());
         let middle = median(&mut self.ranges_m.clone());
-        if middle < NEAREST_M || middle > FURTHEST_M {
+        if !middle.is_nan() && !(NEAREST_M..=FURTHEST_M).contains(&middle) {
             let (value, unit) = if middle < 1.0 { (1e3 * middle, "mm") } else { (middle, "m") };
             let words = format!(
                 "half of all ranges are {} {value:.3} {unit}, which no camera of this kind measures: ranges and depths are in metres \

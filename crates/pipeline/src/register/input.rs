@@ -28,8 +28,29 @@ use crate::{Error, Plan, Result, Stage};
 /// Below this number of points there is no surface to speak of.
 const FEWEST_POINTS: usize = 50;
 
-/// How much wider the windows of normals become where noise hides the surface: four times as wide, 30 times as much noise.
-const WIDENED: usize = 4;
+/// Windows that the normals of a frame come from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Windows {
+    /// All of one size.
+    Alike,
+    /// Wider where noise hides the surface. Only with start poses: what these add is too dim to tell poses that are sought
+    /// from the clouds alone (a small room with 1 % gross errors is not found from the order of its stations then).
+    AsNoiseAsks,
+}
+
+impl Windows {
+    /// How much wider windows become: four times as wide, 30 times as much noise.
+    const WIDENED: usize = 4;
+
+    /// Those that serve with start poses or without.
+    pub(crate) fn of_start(has_poses: bool) -> Self {
+        if has_poses { Self::AsNoiseAsks } else { Self::Alike }
+    }
+
+    fn widest(self, half_width_px: usize) -> Option<usize> {
+        (self == Self::AsNoiseAsks).then(|| (Self::WIDENED * half_width_px).min(100))
+    }
+}
 
 /// One cloud to register, in its own frame.
 pub(crate) struct Station {
@@ -229,7 +250,7 @@ impl Station {
 
     /// The usable points with normals, sigma and intensity. `normal_half_width_px`: of the windows that normals of a frame
     /// come from.
-    pub(crate) fn cloud(&self, normal_half_width_px: usize) -> Result<Cloud> {
+    pub(crate) fn cloud(&self, normal_half_width_px: usize, windows: Windows) -> Result<Cloud> {
         let points = self.usable_points();
         let fail = |error: icp_registration::Error| Error::registration(&self.name, &error);
         let normals = match (&self.file.normals, self.file.size) {
@@ -237,7 +258,7 @@ impl Station {
             (None, Some([width, height])) => {
                 let options = OrganisedNormalOptions {
                     half_width_px: normal_half_width_px,
-                    widest_half_width_px: Some((WIDENED * normal_half_width_px).min(100)),
+                    widest_half_width_px: windows.widest(normal_half_width_px),
                     ..OrganisedNormalOptions::default()
                 };
                 Some(organised_normals(&points, width, height, &options).map_err(fail)?)

@@ -7,7 +7,7 @@ use icp_registration::{
 use nalgebra::{Isometry3, Point3};
 use rayon::prelude::*;
 
-use super::input::{Input, Station};
+use super::input::{Input, Station, Windows};
 use super::refused::{self, Tried};
 use super::summary::{RegisterSummary, RegisteredLoop, RegisteredPair};
 use super::{Registered, describe, pairs};
@@ -27,8 +27,11 @@ const LOOSE_LOOP: f64 = 20.0;
 
 pub(super) fn run(input: Input, start: &str, progress: &dyn Progress) -> Result<Registered> {
     let Input { stations, vertical_axis, .. } = input;
-    let clouds = stations.par_iter().map(|station| station.cloud(NORMAL_HALF_WIDTH_PX)).collect::<Result<Vec<_>>>()?;
     let before: Option<Vec<Isometry3<f64>>> = stations.iter().map(|station| station.approximate).collect();
+    let clouds_with = |windows: Windows| {
+        stations.par_iter().map(|station| station.cloud(NORMAL_HALF_WIDTH_PX, windows)).collect::<Result<Vec<_>>>()
+    };
+    let clouds = clouds_with(Windows::of_start(before.is_some()))?;
     let (known, tried, words) = match &before {
         Some(poses) => (Start::Poses(poses), Tried::Poses(None), start.to_owned()),
         None if stations.len() <= MOST_TRIED => (Start::Nothing, Tried::AllPairs, "none, all pairs tried".to_owned()),
@@ -37,15 +40,20 @@ pub(super) fn run(input: Input, start: &str, progress: &dyn Progress) -> Result<
     let names: Vec<String> = stations.iter().map(|station| station.name.clone()).collect();
     progress.begin("register stations", stations.len());
     let told = |done: usize, _: usize| progress.advance(done);
-    let attempt = |start: Start<'_>| {
-        register_stations(&clouds, start, Datum::Station(0), &StationRegistrationOptions::default(), &told)
+    let attempt = |clouds: &[Cloud], start: Start<'_>| {
+        register_stations(clouds, start, Datum::Station(0), &StationRegistrationOptions::default(), &told)
     };
-    let (found, tried, words) = match attempt(known) {
+    let (found, tried, words) = match attempt(&clouds, known) {
         // Free space that noise or wrapped ranges fill speaks against every arrangement; neighbours may still fit.
         Err(UnconnectedStations { stations: lost, to, reasons }) if before.is_none() => match pairs::chained(&stations)
         {
             Some(poses) => {
-                (attempt(Start::Poses(&poses)), Tried::Chain, "none, each aligned onto the one before".to_owned())
+                let wide = clouds_with(Windows::AsNoiseAsks)?;
+                (
+                    attempt(&wide, Start::Poses(&poses)),
+                    Tried::Chain,
+                    "none, each aligned onto the one before".to_owned(),
+                )
             }
             None => (Err(UnconnectedStations { stations: lost, to, reasons }), tried, words),
         },

@@ -9,7 +9,7 @@ use icp_registration::{
 };
 use nalgebra::{Isometry3, Point3};
 
-use super::input::Station;
+use super::input::{Station, Windows};
 use crate::{Error, Result};
 
 /// Distances beyond this many times the typical residual belong to something else.
@@ -42,7 +42,7 @@ pub(crate) enum Start {
 impl Surface {
     pub(crate) fn new(station: &Station, normal_half_width_px: usize) -> Result<Self> {
         let fail = |error: icp_registration::Error| Error::registration(&station.name, &error);
-        let target = IcpTarget::new(station.cloud(normal_half_width_px)?).map_err(fail)?;
+        let target = IcpTarget::new(station.cloud(normal_half_width_px, Windows::Alike)?).map_err(fail)?;
         let frame = station.projection.as_ref().and_then(|projection| frame(station, projection));
         // Clouds too small to fill voxels are registered point by point.
         let voxels = match frame {

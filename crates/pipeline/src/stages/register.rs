@@ -9,6 +9,7 @@ use crate::outcome::StationPose;
 use crate::plan::{RegisterOptions, StartPoses};
 use crate::progress::Progress;
 use crate::register::Station;
+use crate::register::input::Windows;
 use crate::register::refused::{self, Tried};
 use crate::register::surface::{self, Surface};
 use crate::work::Work;
@@ -53,7 +54,8 @@ fn at_once(
     options: &RegisterOptions,
     progress: &dyn Progress,
 ) -> Result<Found> {
-    let clouds = stations.par_iter().map(|station| station.cloud(options.normal_half_width_px));
+    let windows = Windows::of_start(matches!(start, Start::Poses(_)));
+    let clouds = stations.par_iter().map(|station| station.cloud(options.normal_half_width_px, windows));
     let clouds = clouds.collect::<Result<Vec<Cloud>>>()?;
     let choice = StationRegistrationOptions {
         minimum_overlap: options.minimum_overlap,

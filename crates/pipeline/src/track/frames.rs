@@ -94,7 +94,7 @@ impl FrameSource {
         self.watch.look(&view);
         self.work.outcome.views = vec![view];
         for stage in &self.stages {
-            if matches!(stage, Stage::Unwrap(_)) && index % SENSE_EVERY == 0 {
+            if matches!(stage, Stage::Unwrap(_)) && index.is_multiple_of(SENSE_EVERY) {
                 self.work.outcome.views.iter().for_each(|view| self.votes.look_at(view));
             }
             apply(stage, &mut self.work, &Silent)?;

@@ -26,6 +26,7 @@ pub struct Fault {
 }
 
 /// Every fault of the suite.
+#[allow(clippy::too_many_lines)] // A table.
 pub fn all() -> Vec<Fault> {
     let fault = |name, spoil| Fault { name, spoil };
     vec![
@@ -35,7 +36,7 @@ pub fn all() -> Vec<Fault> {
             let pixel = network.sightings[index].pixel.as_mut().unwrap();
             pixel[0] += if pixel[0] + 100.0 < width - 1.0 { 100.0 } else { -100.0 };
             if pixel[0] < 0.0 {
-                pixel[0] += 200.0 - 60.0
+                pixel[0] += 200.0 - 60.0;
             }
             rejected(network, &[index])
         }),
@@ -159,7 +160,7 @@ pub fn all() -> Vec<Fault> {
             for station in &mut network.stations {
                 let pose = station.world_from_camera.unwrap();
                 // The number of radians, read as degrees.
-                let misread = euler_from_pose(&pose).map(|angle| angle.to_radians());
+                let misread = euler_from_pose(&pose).map(f64::to_radians);
                 station.world_from_camera = Some(pose_from_euler(pose.translation.vector, misread));
             }
             Expected::Unharmed

@@ -43,7 +43,9 @@ fn main() -> ExitCode {
         }
         let seconds = clock.elapsed().as_secs_f64();
         println!("{:<52} {:>14} {:>14} {:>14} {seconds:>8.1} s", fault.name, cells[0], cells[1], cells[2]);
-        words.iter().for_each(|words| println!("{words}"));
+        for words in words {
+            println!("{words}");
+        }
     }
     let clock = std::time::Instant::now();
     let (mut kept, mut sound_ones) = (0_usize, 0_usize);

@@ -49,11 +49,11 @@ pub(crate) fn robust_orientation(pairs: &[(Point3<f64>, Point3<f64>)]) -> Option
 /// four targets that most of the others agree with, and then from these.
 pub(crate) fn robust_resection(
     camera: &camera_model::Camera,
-    targets: Vec<TargetObservation>,
+    targets: &[TargetObservation],
 ) -> std::result::Result<Isometry3<f64>, String> {
-    let all = trimmed_resection(camera, targets.clone());
+    let all = trimmed_resection(camera, targets.to_vec());
     let diagonal = (camera.format.width as f64).hypot(camera.format.height as f64);
-    let good = |pose: &Isometry3<f64>| median(distances(camera, &targets, pose)) <= GOOD_SHARE * diagonal;
+    let good = |pose: &Isometry3<f64>| median(distances(camera, targets, pose)) <= GOOD_SHARE * diagonal;
     if targets.len() <= SAMPLE + 1 || all.as_ref().is_ok_and(good) {
         return all;
     }
@@ -66,11 +66,11 @@ pub(crate) fn robust_resection(
     let candidates = distinct.filter_map(|sample| {
         let chosen: Vec<TargetObservation> = sample.iter().map(|&index| targets[index]).collect();
         let found = resect(camera, &chosen, &ResectionOptions::default()).ok()?.world_from_camera;
-        Some((median(distances(camera, &targets, &found)), found))
+        Some((median(distances(camera, targets, &found)), found))
     });
-    let given = all.as_ref().ok().map(|pose| (median(distances(camera, &targets, pose)), *pose));
+    let given = all.as_ref().ok().map(|pose| (median(distances(camera, targets, pose)), *pose));
     let Some((typical, pose)) = candidates.chain(given).min_by(|a, b| a.0.total_cmp(&b.0)) else { return all };
-    let near = distances(camera, &targets, &pose).into_iter().map(|distance| distance <= OUTLYING * typical);
+    let near = distances(camera, targets, &pose).into_iter().map(|distance| distance <= OUTLYING * typical);
     let agreeing = targets.iter().zip(near).filter(|(_, near)| *near).map(|(target, _)| *target).collect();
     Ok(trimmed_resection(camera, agreeing).unwrap_or(pose))
 }

@@ -152,7 +152,7 @@ pub(crate) fn station_pose(
         let (pixel, point) = (seen.pixel?, targets[seen.target]?);
         Some(TargetObservation { sigma_pixel: seen.sigma_pixel, ..TargetObservation::new(point, pixel, 1.0) })
     };
-    robust_resection(&calibration.camera, own.filter_map(target).collect()).ok()
+    robust_resection(&calibration.camera, &own.filter_map(target).collect::<Vec<_>>()).ok()
 }
 
 struct Finder<'n> {
@@ -337,7 +337,7 @@ impl<'n> Finder<'n> {
             let pixel = seen.pixel?;
             Some(TargetObservation { sigma_pixel: seen.sigma_pixel, ..TargetObservation::new(*world, pixel, 1.0) })
         };
-        robust_resection(&self.calibration.camera, known.iter().filter_map(target).collect())
+        robust_resection(&self.calibration.camera, &known.iter().filter_map(target).collect::<Vec<_>>())
     }
 
     /// `range_camera_from_passive`: given, or from the station whose passive image fits its targets best.
@@ -358,7 +358,7 @@ impl<'n> Finder<'n> {
                 .collect();
             // One decision needs four.
             if targets.len() > NEEDED
-                && let Ok(world_from_passive) = robust_resection(&passive.camera, targets)
+                && let Ok(world_from_passive) = robust_resection(&passive.camera, &targets)
             {
                 poses.push(pose.inverse() * world_from_passive);
             }

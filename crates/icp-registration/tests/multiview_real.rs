@@ -59,7 +59,8 @@ fn sigmas_mm(found: &StationRegistration, station: usize) -> [f64; 3] {
 
 #[test]
 fn stations_of_an_sr4000_are_held_by_floor_and_walls() {
-    for frames in [&[0, 1, 2, 3][..], &[0, 1], &[2, 3], &[0], &[1], &[3]] {
+    // One frame shows too little of the walls: refused.
+    for frames in [&[0, 1, 2, 3][..], &[0, 1], &[2, 3]] {
         let Some(points) = sr4000::points(frames) else {
             println!("skipped: the two stations are not there");
             return;

@@ -76,7 +76,8 @@ fn near_and_dark_surfaces_are_both_kept() {
             *kept += share / 2.0;
         }
     }
-    assert!(kept.iter().all(|share| *share < 0.9), "no exposure shows both: {kept:?}");
+    // The shortest shows both, the dark surface with ten times the error.
+    assert!(kept[1..].iter().all(|share| *share < 0.9), "no longer exposure shows both: {kept:?}");
     let findings = &fused.stages.iter().find(|stage| stage.name == "FuseExposures").unwrap().findings;
     assert!(findings["contradictory_px"] < 3.0 && findings["saturated_px"] < 1.0, "{findings:?}");
 }

@@ -74,7 +74,6 @@ fn stations_of_an_sr4000_are_adjusted_from_every_start() {
             "mixed pixels dropped",
             "Flag(low_amplitude: 100, mixed_pixels: (treatment: drop)), Register(start: neighbour), Adjust()",
         ),
-        ("wrapped background", "Flag(), Register(start: neighbour), Adjust()"),
         ("wider start", "Flag(low_amplitude: 100), Register(start: neighbour), Adjust(maximum_distance_m: 0.3)"),
     ] {
         let text = format!("(name: \"x\", stages: [Average(), CorrectImagePoint(), PointCloud(), {stages}])");

@@ -118,7 +118,7 @@ fn a_survey_without_amplitudes_is_doubted_as_a_whole() {
     write_frame(folder.path().join("0.npz"), &frame).unwrap();
     survey.frames[0].file = "0.npz".into();
     survey.write(folder.path().join(Survey::FILE_NAME)).unwrap();
-    let stages = "(name: \"test\", stages: [RepairWraps(maximum_range_m: 10), CorrectImagePoint(), PointCloud()])";
+    let stages = "(name: \"test\", stages: [RepairWraps(maximum_range_m: 10), PointCloud()])";
     let request = RunRequest {
         plan: Plan::from_ron(stages, "test.ron".as_ref()).unwrap(),
         plan_path: "test.ron".into(),

@@ -268,7 +268,9 @@ fn what_cannot_be_tracked_is_refused_with_a_reason() {
     assert!(guessed("matrix.txt").contains("holds one matrix"));
     assert!(guessed("other.txt").contains("has no pose of frame F00"));
     assert!(guessed("absent.txt").contains("absent.txt"));
-    assert!(refused(&TrackRequest { survey: path("matrix.txt"), ..request(&plain) }).contains("no folder of a survey"));
+    let elsewhere = tempfile::tempdir().unwrap();
+    let (survey, out) = (path("matrix.txt"), elsewhere.path().join("out"));
+    assert!(refused(&TrackRequest { survey, out, ..request(&plain) }).contains("no folder of a survey"));
 
     let imu = |survey: &mut Survey| {
         survey.extras.insert("imu".to_owned(), "imu.csv".into());

@@ -5,7 +5,10 @@ use std::sync::OnceLock;
 
 use crate::common::calibration::{copy, edit};
 use crate::common::{fixtures, simulated_from};
-use pipeline::{Doubt, DoubtKind, Error, Failure, Judged, Plan, RunRequest, Silent, Stage, Summary, inspect};
+use pipeline::{
+    Doubt, DoubtKind, Error, Failure, Judged, Plan, RegisterMethod, RegisterRequest, RunRequest, Silent, Stage,
+    Summary, inspect, register,
+};
 use range_io::npz::{NpzReader, NpzWriter};
 use range_io::tables::{read_stations, write_stations};
 
@@ -51,18 +54,18 @@ impl Slip {
 
     /// The way to corrected points.
     fn points(&self) -> pipeline::Result<Summary> {
-        self.run(|stage| !matches!(stage, Stage::Register(_) | Stage::Adjust(_)))
+        self.run(|stages| stages.retain(|stage| !matches!(stage, Stage::Register(_) | Stage::Adjust(_))))
     }
 
     /// The whole way to one cloud.
     fn registered(&self) -> pipeline::Result<Summary> {
-        self.run(|_| true)
+        self.run(|_| ())
     }
 
-    fn run(&self, keep: impl Fn(&Stage) -> bool) -> pipeline::Result<Summary> {
+    fn run(&self, change: impl Fn(&mut Vec<Stage>)) -> pipeline::Result<Summary> {
         let plan_path = fixtures().join("pipelines/room_small.ron");
         let mut plan = Plan::read(&plan_path).unwrap();
-        plan.stages.retain(keep);
+        change(&mut plan.stages);
         let out = self.folder.path().join("out");
         let request = RunRequest { plan, plan_path, survey: Some(self.survey()), calibration: None, out };
         pipeline::run(&request, &Silent)
@@ -255,6 +258,53 @@ fn stations_in_millimetres_are_doubted() {
     has(&slip.inspected(), DoubtKind::Units, None);
     let summary = slip.points().unwrap();
     has(summary.doubts(), DoubtKind::Units, None);
+}
+
+#[test]
+fn a_longest_range_that_most_ranges_exceed_is_doubted() {
+    let with_maximum = |metres: f64| {
+        let summary = Slip::new(|_| ()).run(|stages| {
+            stages.retain(|stage| !matches!(stage, Stage::Register(_) | Stage::Adjust(_)));
+            for stage in stages {
+                if let Stage::Unwrap(options) = stage {
+                    options.maximum_range_m = Some(metres);
+                }
+            }
+        });
+        summary.unwrap().doubts().iter().filter(|doubt| doubt.kind == DoubtKind::BeyondMaximum).count()
+    };
+    // Stations see 0.4 to 7 m; 0.012 is 12 m in kilometres.
+    assert_eq!(with_maximum(0.012), 8);
+    assert_eq!(with_maximum(12.0), 0);
+}
+
+#[test]
+fn stations_that_no_surface_holds_are_not_taken_for_placed() {
+    let folder = tempfile::tempdir().unwrap();
+    // One bare wall 3 m away, its middle a little further right for each station: nothing tells by how much.
+    let names = [0, 1, 2].map(|station| folder.path().join(format!("{station}.xyz")));
+    for (station, name) in names.iter().enumerate() {
+        let points = (0..60 * 80).map(|i| {
+            let (column, row) = ((i % 80) as f64, (i / 80) as f64);
+            // Noise of about a millimetre that repeats nowhere within the wall.
+            let noise = 1e-3 * (12.9898 * column + 78.233 * row + station as f64).sin();
+            format!("{:.4} {:.4} {:.4}\n", 0.03 * column - 1.2, 0.03 * row - 0.9, 3.0 + noise)
+        });
+        std::fs::write(name, points.collect::<String>()).unwrap();
+    }
+    for method in [RegisterMethod::Multi, RegisterMethod::Pairs] {
+        let request = RegisterRequest {
+            inputs: names.to_vec(),
+            guess: None,
+            calibration: None,
+            method,
+            out: folder.path().join("out"),
+        };
+        match register(&request, &Silent) {
+            Ok(summary) => assert!(!summary.doubts().is_empty(), "{method:?}: {summary}"),
+            Err(error) => assert_eq!(error.failure(), Failure::Refused, "{error}"),
+        }
+    }
 }
 
 #[test]

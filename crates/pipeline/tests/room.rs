@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use crate::common::{request, run};
-use pipeline::{Judged, NetworkCalibration, Silent, Source, Stage, StartPoses, Summary, Verdict};
+use pipeline::{NetworkCalibration, Silent, Source, Stage, StartPoses, Summary};
 
 #[test]
 fn the_small_room_reaches_its_bars() {
@@ -48,11 +48,6 @@ fn the_order_of_the_stations_is_enough_with_gross_errors() {
     }
     let summary = pipeline::run(&request, &Silent).unwrap();
     println!("{summary}");
-    // Where it is not enough, that is said, and no pose is written.
-    if summary.verdict() == Verdict::Partial {
-        assert!(!out.join("stations.csv").exists());
-        return;
-    }
     require_poses(&summary);
 }
 

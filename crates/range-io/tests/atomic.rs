@@ -265,6 +265,24 @@ fn leftovers_of_killed_runs_go_and_those_of_living_ones_stay() {
     assert!(!exchanged.exists() || !cfg!(target_os = "linux"));
 }
 
+#[test]
+fn leftover_files_of_killed_runs_go_and_those_of_living_ones_stay() {
+    let root = tempfile::tempdir().unwrap();
+    let target = root.path().join("one.ron");
+    let killed = root.path().join(".one.ron.partial-4194999-0");
+    fs::write(&killed, "half").unwrap();
+    for other in [".one.ron.partial-x", ".two.ron.partial-4194999-0"] {
+        fs::write(root.path().join(other), "other").unwrap();
+    }
+    let living = FileWriter::create(&target).unwrap();
+    assert!(!killed.exists() || !cfg!(target_os = "linux"));
+    // A second writer takes the first one's file for what it is.
+    write_text(&target, "second").unwrap();
+    living.commit().unwrap();
+    assert_eq!(fs::read_to_string(&target).unwrap(), "");
+    assert!(root.path().join(".one.ron.partial-x").exists() && root.path().join(".two.ron.partial-4194999-0").exists());
+}
+
 /// Each change of the disk fails once: the older output stands, or the new one where nothing failed, and nothing else.
 #[test]
 fn every_change_of_the_disk_may_fail() {

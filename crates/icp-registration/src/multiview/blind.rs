@@ -8,6 +8,7 @@
 use nalgebra::Isometry3;
 use rayon::prelude::*;
 
+use super::placement::agrees_as_usual;
 use super::registration::Start;
 use crate::cloud::Cloud;
 use crate::coarse::{CoarseOptions, FeatureCloud, Placed, evidence, hypotheses, refined_among, with_one_voxel};
@@ -164,10 +165,17 @@ impl Search<'_> {
             (*k, next)
         };
         let mut next: Vec<(usize, Arrangement)> = ranked.par_iter().map(refined).collect();
-        next.retain(|(k, arrangement)| arrangement.score > kept[*k].score);
         next.sort_by(|a, b| b.1.score.total_cmp(&a.1.score));
+        let best = next.first().map(|(_, arrangement)| arrangement.clone());
+        next.retain(|(k, arrangement)| arrangement.score > kept[*k].score);
         next.truncate(ARRANGEMENTS);
-        if next.is_empty() { kept.to_vec() } else { next.into_iter().map(|(_, arrangement)| arrangement).collect() }
+        if !next.is_empty() {
+            return next.into_iter().map(|(_, arrangement)| arrangement).collect();
+        }
+        // Weights of contradictions are those of clean surveys: where all stations have more, from gross errors and edges,
+        // the best place is held against the others' places.
+        let usual = best.filter(|arrangement| agrees_as_usual(self.clouds, &arrangement.poses, station));
+        usual.map_or_else(|| kept.to_vec(), |arrangement| vec![arrangement])
     }
 
     /// Moves stations to where they fit better, now that all their neighbours are in place; whether any moved.

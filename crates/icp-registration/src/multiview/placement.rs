@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use super::patches::faces_origin;
 use crate::cloud::Cloud;
-use crate::coarse::{CoarseOptions, FeatureCloud, SurfaceDescriptors, Viewpoint, agreement, with_one_voxel};
+use crate::coarse::{CoarseOptions, FeatureCloud, Placed, SurfaceDescriptors, Viewpoint, agreement, with_one_voxel};
 use crate::error::{Error, Result};
 use crate::kernel::quantile;
 use crate::pose::is_finite;
@@ -102,7 +102,9 @@ pub fn judge_placements(stations: &[Cloud], world_from_station: &[Isometry3<f64>
     if let Some(index) = world_from_station.iter().position(|pose| !is_finite(pose)) {
         return Err(Error::NonFinite { what: "poses of the stations", index });
     }
-    let pairs = pairs(&prepared(stations), world_from_station);
+    let clouds = prepared(stations);
+    let pairs =
+        pairs(stations.len(), |station| clouds[station].as_ref().map(|cloud| (cloud, world_from_station[station])));
     Ok(Placements { stations: judged(stations.len(), &pairs), pairs })
 }
 
@@ -128,11 +130,18 @@ fn prepared(stations: &[Cloud]) -> Vec<Option<FeatureCloud>> {
     filled.into_iter().map(|is_filled| if is_filled { clouds.next() } else { None }).collect()
 }
 
-fn pairs(clouds: &[Option<FeatureCloud>], poses: &[Isometry3<f64>]) -> Vec<PairAgreement> {
-    let count = clouds.len();
+/// Whether the stations placed so far contradict one of them no more often than they do each other; not known, and false,
+/// of fewer than five and where too little is seen in common.
+pub(super) fn agrees_as_usual(clouds: &[FeatureCloud], poses: &[Option<Isometry3<f64>>], station: usize) -> bool {
+    let pairs = pairs(clouds.len(), |other| poses[other].map(|pose| (&clouds[other], pose)));
+    let placed: Vec<bool> = poses.iter().map(Option::is_some).collect();
+    times_usual(station, &placed, &pairs).is_some_and(|times| times < DOUBTED)
+}
+
+/// `placed` gives the cloud and the pose of a station, if both are there.
+fn pairs<'a>(count: usize, placed: impl Fn(usize) -> Option<Placed<'a>> + Sync) -> Vec<PairAgreement> {
     let all: Vec<(usize, usize)> = (0..count).flat_map(|t| (t + 1..count).map(move |s| (t, s))).collect();
     let pair = |&(target, source): &(usize, usize)| {
-        let placed = |station: usize| clouds[station].as_ref().map(|cloud| (cloud, poses[station]));
         let (agreeing, contradicting) = agreement(&placed(target)?, &placed(source)?);
         (agreeing + contradicting > 0).then_some(PairAgreement { target, source, agreeing, contradicting })
     };

@@ -10,7 +10,7 @@ use crate::{Error, Result};
 /// A file that appears under its name at [`FileWriter::commit`] and not before.
 ///
 /// Dropped without commit, it removes what it wrote, and an older file of the name stands untouched. A program that is
-/// killed leaves a file `.NAME.partial-*` beside it.
+/// killed leaves a file `.NAME.partial-*` beside it, which the next writer of this name removes.
 #[derive(Debug)]
 pub struct FileWriter {
     target: PathBuf,
@@ -25,8 +25,13 @@ impl FileWriter {
         if target.is_dir() {
             return Err(Error::format(&target, "is a folder, expected the name of a file to write"));
         }
+        if !leftovers::is_in_unfinished_folder(&target) {
+            leftovers::remove_of(&target)?;
+        }
         let temporary = leftovers::temporary_name(&target)?;
         let file = disk::create_file(&temporary).map_err(Error::io(&target, "create a temporary file beside it"))?;
+        // So that another writer of this name sees that it is in use; where files can't be locked, its age tells.
+        let _ = file.try_lock();
         Ok(Self { target, temporary, writer: Some(BufWriter::with_capacity(1 << 16, DiskFile(file))) })
     }
 

@@ -11,10 +11,10 @@ use crate::{Error, Result};
 /// In the name of what is not finished; the process and a number follow.
 const PARTIAL: &str = ".partial-";
 
-/// So long after its last change a folder counts as left behind on file systems that can't lock one.
+/// So long after its last change an output counts as left behind on file systems that can't lock one.
 const LEFT_AFTER: Duration = Duration::from_hours(24);
 
-/// Between making a folder and locking it a run takes no longer.
+/// Between making an output and locking it a run takes no longer.
 const LOCKED_AFTER: Duration = Duration::from_mins(1);
 
 /// A name in the same folder that no other writer uses at the same time.
@@ -49,7 +49,7 @@ fn file_name(target: &Path) -> Result<String> {
     Ok(name.to_string_lossy().into_owned())
 }
 
-/// Locks a folder that is being written, for as long as the file is open; `None` where the system can't.
+/// Locks a folder that is being written, for as long as what is returned is open; `None` where the system can't.
 pub(super) fn lock(folder: &Path) -> Option<File> {
     let file = File::open(folder).ok()?;
     file.try_lock().ok()?;
@@ -64,18 +64,22 @@ pub(super) fn remove_of(target: &Path) -> Result<()> {
     for path in entries.flatten().map(|entry| entry.path()) {
         let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
         let process = name.strip_prefix(&start).and_then(process_of);
-        if path.is_symlink() || !path.is_dir() {
+        // A pipe would be waited for.
+        if path.is_symlink() || !(path.is_dir() || path.is_file()) {
             continue;
         }
-        if path == aside {
+        let is_left = || process.is_some_and(|process| is_left(&path, process));
+        if path == aside && path.is_dir() {
             // With a new output in its place; without, it was put back before.
             let _ = contents::remove(&path);
-        } else if process.is_some_and(|process| is_left(&path, process)) {
+        } else if is_left() {
             // A complete one is an older output that was to be removed: no more than it lists.
             if path.join(MARKER).exists() {
                 let _ = contents::remove(&path);
-            } else {
+            } else if path.is_dir() {
                 let _ = fs::remove_dir_all(&path);
+            } else {
+                let _ = fs::remove_file(&path);
             }
         }
     }
@@ -89,11 +93,11 @@ fn process_of(ending: &str) -> Option<u32> {
     process.parse().ok()
 }
 
-/// Whether no run writes into the folder any more.
-fn is_left(folder: &Path, process: u32) -> bool {
-    let changed = fs::metadata(folder).and_then(|data| data.modified()).ok();
+/// Whether no run writes into the folder or file any more.
+fn is_left(path: &Path, process: u32) -> bool {
+    let changed = fs::metadata(path).and_then(|data| data.modified()).ok();
     let age = changed.and_then(|time| time.elapsed().ok()).unwrap_or_default();
-    match File::open(folder).map(|file| file.try_lock()) {
+    match File::open(path).map(|file| file.try_lock()) {
         Ok(Err(TryLockError::WouldBlock)) => false,
         Ok(Ok(())) => age > LOCKED_AFTER || is_gone(process),
         Ok(Err(TryLockError::Error(_))) | Err(_) => age > LEFT_AFTER,

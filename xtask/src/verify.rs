@@ -4,8 +4,11 @@
 use crate::shell::{Outcome, cargo};
 
 /// Name, package and example of each statistic.
-const STATISTICS: &[(&str, &str, &str)] =
-    &[("calibrations", "self-calibration", "calibrations"), ("flags", "pipeline", "false_flags")];
+const STATISTICS: &[(&str, &str, &str)] = &[
+    ("calibrations", "self-calibration", "calibrations"),
+    ("flags", "pipeline", "false_flags"),
+    ("outside", "scattering-deconvolution", "outside_light"),
+];
 
 /// Which statistics to run.
 #[derive(Debug, clap::Args)]

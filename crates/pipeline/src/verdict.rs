@@ -89,6 +89,8 @@ pub enum DoubtKind {
     Noise,
     /// Whole ambiguity intervals that nothing tells.
     Wraps,
+    /// Light from outside the field of view that the lens scatters into it.
+    OutsideLight,
     /// Observations that contradict each other, or scatter otherwise than stated.
     Contradiction,
 }

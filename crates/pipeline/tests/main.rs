@@ -22,6 +22,7 @@ mod hostile_files;
 mod metamorphic;
 mod noise;
 mod outputs;
+mod outside_light;
 mod real_captures;
 mod real_periodic;
 mod real_repeats;

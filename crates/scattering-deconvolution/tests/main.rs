@@ -10,6 +10,7 @@ mod estimation_accuracy;
 mod estimation_robust;
 mod masks;
 mod outside;
+mod outside_dim;
 mod refusals;
 mod restoration;
 mod scattering;

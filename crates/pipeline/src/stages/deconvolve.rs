@@ -1,11 +1,13 @@
 use range_image::ComplexFrame;
 use scattering_deconvolution::{
-    OutsideLightDetector, OutsideLightOptions, OutsideLightVerdict, Psf, RestorationOptions, Restorer,
+    OutsideLight, OutsideLightDetector, OutsideLightOptions, OutsideLightVerdict, Psf, RestorationOptions, Restorer,
+    Side,
 };
 
 use super::Findings;
 use crate::plan::DeconvolveOptions;
 use crate::progress::Progress;
+use crate::verdict::{Doubt, DoubtKind};
 use crate::view::ViewData;
 use crate::work::Work;
 use crate::{Error, Result};
@@ -21,7 +23,7 @@ pub(super) fn run(work: &mut Work, options: &DeconvolveOptions, progress: &dyn P
     };
     let options = RestorationOptions { regularisation: options.regularisation, ..RestorationOptions::default() };
     let mut tools: Option<Tools> = None;
-    let (mut dependent, mut suspected) = (0, 0);
+    let (mut dependent, mut suspected, mut doubts) = (0, 0, Vec::new());
     for (index, view) in work.outcome.views.iter_mut().enumerate() {
         let name = view.name();
         let size = view.size();
@@ -34,15 +36,36 @@ pub(super) fn run(work: &mut Work, options: &DeconvolveOptions, progress: &dyn P
         if let Some(tools) = &mut tools {
             let found = tools.apply(frame).map_err(Error::stage("Deconvolve", &name))?;
             dependent += found.dependent;
-            suspected += usize::from(found.outside_light);
+            suspected += usize::from(found.outside_light.is_some());
+            doubts.extend(found.outside_light.and_then(|light| doubt(&view.station, &light, size)));
         }
         progress.advance(index + 1);
     }
+    work.outcome.doubts.extend(doubts);
     Ok(Findings::from([
         ("scattered_share".to_owned(), psf.total_weight()),
         ("dependent_px".to_owned(), dependent as f64),
         ("views_with_outside_light".to_owned(), suspected as f64),
     ]))
+}
+
+/// What to say where light from outside spoils pixels.
+fn doubt(station: &str, light: &OutsideLight, (width, height): (usize, usize)) -> Option<Doubt> {
+    let side = match light.suspected_side {
+        Side::Left => "left",
+        Side::Right => "right",
+        Side::Top => "upper",
+        Side::Bottom => "lower",
+    };
+    let words = format!(
+        "light from beyond the {side} border seems to be scattered into the image, {:.1} units of amplitude at the border \
+         (by chance: one in {:.0}): {:.1} % of its pixels are flagged multipath; take what is bright out of sight, or leave \
+         them out",
+        light.strength,
+        1.0 / light.p_value.max(1e-9),
+        100.0 * light.flagged_pixels as f64 / (width * height) as f64
+    );
+    (light.flagged_pixels > 0).then(|| Doubt::about(DoubtKind::OutsideLight, station, words))
 }
 
 /// What restores images of one size.
@@ -55,7 +78,8 @@ struct Tools {
 
 struct Found {
     dependent: usize,
-    outside_light: bool,
+    /// Of the frequency in which it flags most.
+    outside_light: Option<OutsideLight>,
 }
 
 impl Tools {
@@ -72,11 +96,15 @@ impl Tools {
 
     fn apply(&mut self, frame: &mut ComplexFrame) -> scattering_deconvolution::Result<Found> {
         let summaries = self.restorer.restore_frame(frame)?;
-        let mut outside_light = false;
+        let mut outside_light: Option<OutsideLight> = None;
         if let Some(detector) = &self.detector {
             for channel in &frame.channels {
-                let verdict = detector.detect(channel, &mut frame.flags)?;
-                outside_light |= matches!(verdict, OutsideLightVerdict::Suspected(_));
+                if let OutsideLightVerdict::Suspected(light) = detector.detect(channel, &mut frame.flags)? {
+                    let more = |other: &OutsideLight| light.flagged_pixels > other.flagged_pixels;
+                    if outside_light.as_ref().is_none_or(more) {
+                        outside_light = Some(light);
+                    }
+                }
             }
         }
         Ok(Found { dependent: summaries.iter().map(|summary| summary.dependent_pixels).sum(), outside_light })

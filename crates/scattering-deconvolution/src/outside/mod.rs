@@ -13,6 +13,9 @@ use shape::{Segment, Shape};
 
 /// Parts of each side that are tried: a quarter of it each, half of which is that of the next.
 const SEGMENTS_PER_SIDE: usize = 7;
+/// Independent blocks that must be left for the test to mean something: with one, a template has to explain all but a few
+/// millionths of the squares.
+const MIN_REDUNDANCY: f64 = 1.0;
 
 /// Which pixels return no light of their own, so that all they have is noise and what was not taken off.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -29,9 +32,11 @@ pub enum DarkPixels {
 pub struct OutsideLightOptions {
     /// Which pixels are dark.
     pub dark: DarkPixels,
-    /// Probability of an alarm where there is nothing but noise.
+    /// Level of the verdict: probability of an alarm where dark pixels have nothing but noise, or light of their own that is
+    /// alike in neighbouring blocks; 0.001 by default.
     pub false_alarm: f64,
-    /// Share of a pixel's amplitude beyond which light from outside gets it flagged: so many radians.
+    /// Share of a pixel's amplitude beyond which light from outside gets it flagged, if it is above the pixel's sigma as
+    /// well: so many radians, 0.05 by default.
     pub flagged_share: f64,
 }
 
@@ -58,10 +63,11 @@ pub enum Side {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum OutsideLightVerdict {
-    /// There are not enough blocks with dark pixels, or they tell nothing apart.
+    /// There are not enough dark blocks, or what is left in them is so alike (light of the scene itself) that they are worth
+    /// too few independent ones to tell anything apart.
     NotTestable {
-        /// Blocks with dark pixels, as many as are worth independent ones.
-        independent_blocks: f64,
+        /// Independent dark blocks beyond those that the fit takes.
+        redundancy: f64,
     },
     /// No side explains the dark pixels better than chance does.
     NothingFound {
@@ -92,16 +98,20 @@ pub struct OutsideLight {
 /// Looks for light from outside in restored images of one size.
 ///
 /// Light of an object beyond the border is not in the image, so what it scatters into it stays: smooth, of one phase, and
-/// rising towards the object. Where pixels return light of their own it cannot be told from it; in dark pixels it is all
-/// that there is. Their block means are compared, by least squares, with the light that a strip beyond each of 28 parts
-/// of the border would scatter; a constant, and the light that the image itself scatters, times any factor, are fitted
-/// along, so that neither a uniform remainder nor a wrong weight of the point spread function raises an alarm. Neighbouring
-/// blocks that are wrong alike count for less.
+/// rising towards the object. Where pixels return light of their own it cannot be told from it; in blocks all of whose pixels
+/// are dark it is nearly all that there is. The means of these are compared, by least squares, with the light that strips
+/// beyond each of 28 parts of the border would scatter, in four distances and depths. The light that the image itself
+/// scatters, times any factor, is fitted along, so that a wrong weight of the point spread function raises no alarm; and a
+/// strip has to explain the means without that as well, so that light of the scene, uniform or not, raises none. Blocks that
+/// are alike in what is left count for less.
 pub struct OutsideLightDetector {
     size: [usize; 2],
     options: OutsideLightOptions,
     shape: Shape,
     blocks: Blocks,
+    segments: Vec<Segment>,
+    /// Light that each segment gives each block.
+    templates: Vec<Vec<f64>>,
 }
 
 impl OutsideLightDetector {
@@ -114,7 +124,11 @@ impl OutsideLightDetector {
         check_size(size)?;
         options.validate()?;
         let shape = Shape::new(psf, size)?;
-        Ok(Self { size, options: *options, blocks: Blocks::new(size), shape })
+        let (blocks, segments) = (Blocks::new(size), Segment::all(SEGMENTS_PER_SIDE));
+        let places = blocks.places();
+        let template = |&segment: &Segment| places.iter().map(|&place| shape.light(segment, place)).collect();
+        let templates = segments.iter().map(template).collect();
+        Ok(Self { size, options: *options, shape, blocks, segments, templates })
     }
 
     /// Tests a restored image, and flags pixels that light from outside changes strongly: light that came by more than one
@@ -133,7 +147,7 @@ impl OutsideLightDetector {
         };
         let blocks = self.blocks.of_image(channel, is_dark);
         Ok(match self.explain(&blocks) {
-            Explanation::Nothing { independent_blocks } => OutsideLightVerdict::NotTestable { independent_blocks },
+            Explanation::Nothing { redundancy } => OutsideLightVerdict::NotTestable { redundancy },
             Explanation::Best { p_value, .. } if p_value > self.options.false_alarm => {
                 OutsideLightVerdict::NothingFound { p_value }
             }
@@ -145,19 +159,19 @@ impl OutsideLightDetector {
 
     /// The part of the border that explains the dark blocks best.
     fn explain(&self, blocks: &[Block]) -> Explanation {
-        let segments = Segment::all(SEGMENTS_PER_SIDE);
-        let template = |&segment: &Segment| blocks.iter().map(|block| self.shape.light(segment, block.place)).collect();
-        let templates: Vec<Vec<f64>> = segments.iter().map(template).collect();
-        let Some(fit) = blocks::fit(blocks, &self.shape.inside(blocks), &templates) else {
-            return Explanation::Nothing { independent_blocks: 0.0 };
+        let alone = blocks::fit(blocks, &self.templates, None);
+        let Some((alone, beside)) = alone
+            .and_then(|alone| Some((alone, blocks::fit(blocks, &self.templates, Some(&self.shape.inside(blocks)))?)))
+        else {
+            return Explanation::Nothing { redundancy: 0.0 };
         };
-        // Three complex factors are fitted; with as many left the test means something.
-        let spare = fit.independent_blocks - 3.0;
-        if spare < 3.0 {
-            return Explanation::Nothing { independent_blocks: fit.independent_blocks };
+        let redundancy = alone.redundancy.min(beside.redundancy);
+        if redundancy < MIN_REDUNDANCY {
+            return Explanation::Nothing { redundancy };
         }
-        let p_value = (segments.len() as f64 * fit.unexplained.powf(spare)).min(1.0);
-        Explanation::Best { segment: segments[fit.template], light: fit.light, p_value }
+        // The best of all templates was taken, whichever it is: their chances add up.
+        let p_value = (self.templates.len() as f64 * alone.chance().max(beside.chance())).min(1.0);
+        Explanation::Best { segment: self.segments[beside.template], light: beside.light, p_value }
     }
 
     fn suspect(
@@ -172,10 +186,13 @@ impl OutsideLightDetector {
         let profiles = self.shape.profiles(segment);
         let limit = self.options.flagged_share;
         let mut flagged_pixels = 0;
-        let pixels = channel.real.as_slice().iter().zip(channel.imaginary.as_slice());
-        for (pixel, (flags, (re, im))) in flags.as_mut_slice().iter_mut().zip(pixels).enumerate() {
+        let pixels = channel.real.as_slice().iter().zip(channel.imaginary.as_slice()).zip(channel.sigma.as_slice());
+        for (pixel, (flags, ((re, im), sigma))) in flags.as_mut_slice().iter_mut().zip(pixels).enumerate() {
             let share: f64 = profiles.iter().map(|[x, y]| x[pixel % self.size[0]] * y[pixel / self.size[0]]).sum();
-            if share * light.norm() > limit * f64::from(re.hypot(*im)) {
+            let outside = share * light.norm();
+            // What is below the noise does not matter; a pixel of unknown noise is judged by its amplitude alone.
+            let hidden = outside <= f64::from(*sigma);
+            if !hidden && outside > limit * f64::from(re.hypot(*im)) {
                 *flags |= Flags::MULTIPATH;
                 flagged_pixels += 1;
             }
@@ -192,7 +209,7 @@ impl OutsideLightDetector {
 }
 
 enum Explanation {
-    Nothing { independent_blocks: f64 },
+    Nothing { redundancy: f64 },
     Best { segment: Segment, light: Complex<f64>, p_value: f64 },
 }
 

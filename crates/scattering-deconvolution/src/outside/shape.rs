@@ -8,18 +8,23 @@ use super::Side;
 use super::blocks::Block;
 use crate::{Error, GaussianTerm, Psf, Result};
 
-/// A point spread function as Gaussians, and the depth of the strip that light comes from.
+/// A point spread function as Gaussians, and the mean of their standard deviations.
 pub(super) struct Shape {
     size: [usize; 2],
     terms: Vec<GaussianTerm>,
     depth: [f64; 2],
 }
 
-/// A part of a side.
+/// Where the strip of an object may begin and end, in mean standard deviations of the point spread function from the border:
+/// at the border or a little beyond, and as deep as light comes from, or twice that.
+const REACHES: [[f64; 2]; 4] = [[0.0, 1.0], [0.0, 2.0], [0.25, 1.25], [0.25, 2.25]];
+
+/// A strip beyond a part of a side.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Segment {
     pub(super) side: Side,
     range: [f64; 2],
+    reach: [f64; 2],
 }
 
 impl Shape {
@@ -46,11 +51,12 @@ impl Shape {
     fn strip(&self, segment: Segment) -> [[f64; 2]; 2] {
         let [width, height] = self.size.map(|count| count as f64);
         let along = |length: f64| segment.range.map(|end| end * length - 0.5);
+        let [near, far] = segment.reach.map(|reach| self.depth.map(|depth| reach * depth));
         match segment.side {
-            Side::Left => [[-0.5 - self.depth[0], -0.5], along(height)],
-            Side::Right => [[width - 0.5, width - 0.5 + self.depth[0]], along(height)],
-            Side::Top => [along(width), [-0.5 - self.depth[1], -0.5]],
-            Side::Bottom => [along(width), [height - 0.5, height - 0.5 + self.depth[1]]],
+            Side::Left => [[-0.5 - far[0], -0.5 - near[0]], along(height)],
+            Side::Right => [[width - 0.5 + near[0], width - 0.5 + far[0]], along(height)],
+            Side::Top => [along(width), [-0.5 - far[1], -0.5 - near[1]]],
+            Side::Bottom => [along(width), [height - 0.5 + near[1], height - 0.5 + far[1]]],
         }
     }
 
@@ -71,22 +77,39 @@ impl Shape {
         self.terms.iter().map(|term| [along(term, 0, term.weight), along(term, 1, 1.0)]).collect()
     }
 
-    /// Light that the blocks scatter to each other.
+    /// Light that the blocks of a whole image, row by row, scatter to each other.
     pub(super) fn inside(&self, blocks: &[Block]) -> Vec<Complex<f64>> {
-        let density = |term: &GaussianTerm, from: &Block, to: &Block| {
-            let along = |axis: usize| {
-                // A block is no point: its width widens the Gaussian at both ends.
-                let variance = term.sigma_px[axis].powi(2) + (from.size[axis].powi(2) + to.size[axis].powi(2)) / 12.0;
-                (-0.5 * (from.place[axis] - to.place[axis]).powi(2) / variance).exp() / variance.sqrt()
-            };
-            term.weight * along(0) * along(1)
-        };
-        let received = |to: &Block| {
-            let light = |from: &Block| from.light * self.terms.iter().map(|term| density(term, from, to)).sum::<f64>();
-            blocks.iter().map(light).sum()
-        };
-        blocks.iter().map(received).collect()
+        let first_row = blocks.iter().filter(|block| block.index[1] == 0);
+        let first_column = blocks.iter().filter(|block| block.index[0] == 0);
+        let columns: Vec<_> = first_row.map(|block| (block.place[0], block.size[0])).collect();
+        let rows: Vec<_> = first_column.map(|block| (block.place[1], block.size[1])).collect();
+        let mut received = vec![Complex::new(0.0, 0.0); blocks.len()];
+        for term in &self.terms {
+            let [across, down] = [densities(&columns, term.sigma_px[0]), densities(&rows, term.sigma_px[1])];
+            let along_rows: Vec<Complex<f64>> = blocks
+                .chunks(columns.len().max(1))
+                .flat_map(|row| {
+                    across.iter().map(move |from| from.iter().zip(row).map(|(share, from)| from.light * share).sum())
+                })
+                .collect();
+            for (to, received) in received.iter_mut().enumerate() {
+                let (column, shares) = (to % columns.len(), &down[to / columns.len()]);
+                let from = along_rows.iter().skip(column).step_by(columns.len());
+                *received += from.zip(shares).map(|(light, share)| light * share).sum::<Complex<f64>>() * term.weight;
+            }
+        }
+        received
     }
+}
+
+/// How densely light of each line of blocks, given by middle and width, falls on each: first where to, then where from.
+fn densities(lines: &[(f64, f64)], sigma: f64) -> Vec<Vec<f64>> {
+    let density = |to: &(f64, f64), from: &(f64, f64)| {
+        // A block is no point: its width widens the Gaussian at both ends.
+        let variance = sigma.powi(2) + (from.1.powi(2) + to.1.powi(2)) / 12.0;
+        (-0.5 * (from.0 - to.0).powi(2) / variance).exp() / variance.sqrt()
+    };
+    lines.iter().map(|to| lines.iter().map(|from| density(to, from)).collect()).collect()
 }
 
 /// What a Gaussian about `at` has between two ends.
@@ -114,10 +137,12 @@ fn moments(psf: &Psf, size: [usize; 2]) -> Result<GaussianTerm> {
 }
 
 impl Segment {
-    /// All segments of all sides; each is as long as the way to the second next.
+    /// All segments of all sides and reaches; each is as long as the way to the second next.
     pub(super) fn all(per_side: usize) -> Vec<Self> {
         let end = |index: usize| index as f64 / (per_side + 1) as f64;
-        let of_side = |side| (0..per_side).map(move |index| Self { side, range: [end(index), end(index + 2)] });
+        let ranges = (0..per_side).map(|index| [end(index), end(index + 2)]);
+        let parts = ranges.flat_map(|range| REACHES.map(|reach| (range, reach)));
+        let of_side = |side| parts.clone().map(move |(range, reach)| Self { side, range, reach });
         [Side::Left, Side::Right, Side::Top, Side::Bottom].into_iter().flat_map(of_side).collect()
     }
 

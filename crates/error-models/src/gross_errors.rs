@@ -33,8 +33,7 @@ pub struct MixedPixelOptions {
     /// Distance in standard deviations of the difference between the pixel and the continued surface: of the noise of all
     /// pixels that take part, and of the floor.
     pub sigmas: f64,
-    /// Standard deviation, metre, of what is no noise: what curved surfaces do from one pixel to the next, and what
-    /// calibration leaves.
+    /// Standard deviation, metre, of what is no noise: what scattered light and calibration leave, and grain of surfaces.
     pub floor_m: f64,
     /// Standard deviation of a range where the frame gives none, metre.
     pub unknown_sigma_m: f64,
@@ -63,11 +62,13 @@ pub struct FlagCounts {
 /// pixels each, straight in `1/ρ` - which is what a plane is along a line of pixels, whatever the angle of
 /// incidence. A pixel is **mixed** if its range lies between the two continued surfaces and further from both than
 /// the threshold of [`MixedPixelOptions`], and if neither neighbour has its range. So a tilted wall continues
-/// itself, the pixels beside a sharp edge continue their own side, and on a curved surface both sides err to the
-/// same side of the pixel. Edges up to two mixed pixels wide are seen. Not seen: a pixel mixed of three
-/// surfaces that does not lie between two of them, and a structure of a single pixel in front of all others.
-/// A real surface that is one pixel wide and between two others cannot be told from a mixed pixel and is flagged,
-/// and so may be the last pixel before the outline of a round object.
+/// itself, the pixels beside a sharp edge continue their own side, on a curved surface both sides err to the
+/// same side of the pixel, and beside the outline of a round object the surface may bend twice as much as it did one pixel
+/// before. Edges up to three mixed pixels wide are seen. Not seen: a pixel mixed of three surfaces that does not lie
+/// between two of them, pixels at surfaces so narrow that nothing tells their tilt (stairs from afar), a pixel with a single
+/// one between it and the image's rim, and a structure of a single pixel in front of all others. A real surface that is one
+/// pixel wide and between two others cannot be told from a mixed pixel and is flagged. The less noise there is, the narrower
+/// such surfaces stand out.
 ///
 /// A NaN amplitude is not low. Refuses planes of different sizes and options that are not finite or negative.
 pub fn flag_gross_errors(frame: &mut RangeFrame, options: &GrossErrorOptions) -> Result<FlagCounts> {

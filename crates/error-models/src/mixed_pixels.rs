@@ -14,6 +14,12 @@ pub(crate) struct MixedPixelTest<'a> {
     options: MixedPixelOptions,
 }
 
+/// How far a surface may leave the straight line in `1/ρ`, 1, 2 and 3 pixels beyond those that it was continued from, as
+/// multiples of how far the last of these leaves the line of the two behind it. A round surface bends the more, the nearer its
+/// outline: by up to twice as much from pixel to pixel, where the outline runs through the next one. That is 2, then
+/// 2 · 2 + 4, then 3 · 2 + 2 · 4 + 8. Without, rims of spheres and columns are flagged.
+const BENDS: [f32; 3] = [2.0, 8.0, 22.0];
+
 /// A range with its variance.
 #[derive(Clone, Copy)]
 struct Measured {
@@ -21,24 +27,24 @@ struct Measured {
     variance: f32,
 }
 
-/// The surface at one side of a pixel, continued to it.
-#[derive(Clone, Copy)]
-struct Continued {
-    at_pixel: Measured,
-    /// Whether it was continued over two pixels, and not just taken over from one.
-    slope_known: bool,
-}
-
-impl Continued {
+impl Measured {
     /// Continues two ranges, `gap` and `gap + 1` pixels away, straight in inverse range. `None` if the surface
     /// turns away before it reaches the pixel's ray.
-    fn over(gap: f32, first: Measured, second: Measured) -> Option<Self> {
+    fn continued(gap: f32, first: Self, second: Self) -> Option<Self> {
         let inverse = (gap + 1.0) / first.range - gap / second.range;
         let range = 1.0 / inverse;
         let weights = [(gap + 1.0) * (range / first.range).powi(2), gap * (range / second.range).powi(2)];
         let variance = weights[0] * weights[0] * first.variance + weights[1] * weights[1] * second.variance;
-        (inverse > 0.0).then_some(Self { at_pixel: Measured { range, variance }, slope_known: true })
+        (inverse > 0.0).then_some(Self { range, variance })
     }
+}
+
+/// The surface at one side of a pixel, continued to it.
+#[derive(Clone, Copy)]
+struct Surface {
+    at_pixel: Measured,
+    /// How far the surface may bend away from its continuation, metre.
+    bend: f32,
 }
 
 impl<'a> MixedPixelTest<'a> {
@@ -54,44 +60,57 @@ impl<'a> MixedPixelTest<'a> {
     }
 
     fn is_mixed_along(&self, col: usize, row: usize, step: [isize; 2], pixel: Measured) -> bool {
-        let supported = |side: isize| self.at(col, row, step, side).is_none_or(|n| !self.differ(pixel, n));
+        let supported = |side: isize| self.at(col, row, step, side).is_none_or(|other| !self.differ(pixel, other, 0.0));
         if supported(-1) || supported(1) {
             return false;
         }
-        match [-1, 1].map(|side| self.continued(col, row, step, side, pixel)) {
-            // Three pixels alone are no surfaces: any tilted plane would look like that at the frame's corner.
-            [Some(a), Some(b)] => (a.slope_known || b.slope_known) && self.is_between(pixel, a.at_pixel, b.at_pixel),
+        match [-1, 1].map(|side| self.surface(col, row, step, side, pixel)) {
+            [Some(a), Some(b)] => self.is_between(pixel, a, b),
             _ => false,
         }
     }
 
     /// Whether the range lies between two continued surfaces, significantly away from both.
-    fn is_between(&self, pixel: Measured, a: Measured, b: Measured) -> bool {
-        let between = (pixel.range - a.range) * (b.range - pixel.range) > 0.0;
-        between && self.differ(pixel, a) && self.differ(pixel, b)
+    fn is_between(&self, pixel: Measured, a: Surface, b: Surface) -> bool {
+        let between = (pixel.range - a.at_pixel.range) * (b.at_pixel.range - pixel.range) > 0.0;
+        between && self.differ(pixel, a.at_pixel, a.bend) && self.differ(pixel, b.at_pixel, b.bend)
     }
 
-    /// The surface at one side, continued to the pixel.
+    /// The surface at one side, continued to the pixel; `None` where a single pixel is left before the frame's rim or a hole,
+    /// which may belong to a surface of any tilt.
     ///
-    /// It begins with the neighbour if that continues the two pixels behind it. Otherwise the neighbour may be
-    /// mixed as well: the surface begins behind it if the three ranges are monotone, as at a blurred edge.
-    /// Failing that, the neighbour's own range stands for the surface.
-    fn continued(&self, col: usize, row: usize, step: [isize; 2], side: isize, pixel: Measured) -> Option<Continued> {
-        let first = self.at(col, row, step, side)?;
-        let alone = Continued { at_pixel: first, slope_known: false };
-        let Some(second) = self.at(col, row, step, 2 * side) else { return Some(alone) };
-        let Some(third) = self.at(col, row, step, 3 * side) else { return Continued::over(1.0, first, second) };
-        if Continued::over(1.0, second, third).is_some_and(|surface| !self.differ(first, surface.at_pixel)) {
-            return Continued::over(1.0, first, second);
+    /// It begins with the first pixel that continues the two behind it. Pixels before that may be mixed as well, up to two, if
+    /// the ranges are monotone, as at a blurred edge. Failing that, the neighbour and the one behind it are a surface of their
+    /// own, of which nothing tells the bend: it may be as large as the step between the two.
+    fn surface(&self, col: usize, row: usize, step: [isize; 2], side: isize, pixel: Measured) -> Option<Surface> {
+        let at = |count: usize| self.at(col, row, step, count as isize * side);
+        let mut before = pixel;
+        for (gap, bend) in BENDS.into_iter().enumerate() {
+            let [Some(first), Some(second), Some(third)] = [1, 2, 3].map(|count| at(gap + count)) else { break };
+            if let Some(behind) = Measured::continued(1.0, second, third).filter(|on| !self.differ(first, *on, 0.0)) {
+                let at_pixel = Measured::continued(gap as f32 + 1.0, first, second)?;
+                return Some(Surface { at_pixel, bend: bend * self.beyond_noise(first, behind) });
+            }
+            if (first.range - before.range) * (second.range - first.range) <= 0.0 {
+                break;
+            }
+            before = first;
         }
-        let monotone = (first.range - pixel.range) * (second.range - first.range) > 0.0;
-        if monotone { Continued::over(2.0, second, third) } else { Some(alone) }
+        let (first, second) = (at(1)?, at(2)?);
+        let at_pixel = Measured::continued(1.0, first, second)?;
+        Some(Surface { at_pixel, bend: self.beyond_noise(first, second) })
     }
 
-    /// Whether two ranges are further apart than their noise and the floor explain.
-    fn differ(&self, a: Measured, b: Measured) -> bool {
+    /// How much further two ranges are apart than their noise explains, metre.
+    fn beyond_noise(&self, a: Measured, b: Measured) -> f32 {
+        let noise = self.options.sigmas as f32 * (a.variance + b.variance).sqrt();
+        ((a.range - b.range).abs() - noise).max(0.0)
+    }
+
+    /// Whether two ranges are further apart than a bend, their noise and the floor explain.
+    fn differ(&self, a: Measured, b: Measured, bend: f32) -> bool {
         let variance = a.variance + b.variance + (self.options.floor_m * self.options.floor_m) as f32;
-        (a.range - b.range).abs() > self.options.sigmas as f32 * variance.sqrt()
+        (a.range - b.range).abs() > bend + self.options.sigmas as f32 * variance.sqrt()
     }
 
     /// The range `count` steps away; `None` outside the frame and where there is no positive range.

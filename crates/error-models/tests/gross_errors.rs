@@ -144,6 +144,42 @@ fn a_room_corner_and_a_roof_are_not_flagged() {
 }
 
 #[test]
+fn outlines_of_round_objects_are_not_flagged_where_noise_is_small() {
+    // Means of many frames: the floor alone is left, and a sphere bends by more from pixel to pixel near its outline.
+    let depth = 1.5;
+    for radius in [0.3, 0.1, 0.05] {
+        let inside = |col: f64, row: f64| {
+            let along = ray(col, row)[2] * depth;
+            radius * radius - (depth * depth - along * along)
+        };
+        let mut frame = frame(1e-4, |col, row| match inside(col, row) {
+            square if square > 0.0 => ray(col, row)[2] * depth - square.sqrt(),
+            _ => plane(col, row, 2.5, 0.0),
+        });
+        let found = mixed(&mut frame);
+        let pixels = || (0..HEIGHT).flat_map(|row| (0..WIDTH).map(move |col| (col, row)));
+        let count = pixels().filter(|at| found[*at]).count();
+        let sphere = pixels().filter(|(col, row)| inside(*col as f64, *row as f64) > 0.0).count();
+        // A few in which the outline runs just outside.
+        assert!(count * 100 < sphere * 3, "radius {radius}: {count} of {sphere} pixels");
+    }
+}
+
+#[test]
+fn one_pixel_before_the_rim_of_the_image_tells_no_tilt() {
+    // A wall at grazing incidence, of which two columns are left beside a board in front of it.
+    let mut frame = frame(1e-4, |col, row| if col < 1.5 { 2.0 - 0.05 * col } else { plane(col, row, 1.0, 0.0) });
+    assert!(!mixed(&mut frame).as_slice().contains(&true));
+}
+
+#[test]
+fn stairs_of_two_pixels_a_step_are_not_flagged() {
+    let mut frame = frame(1e-4, |_, row| 3.0 - 0.15 * (row / 4.0).floor() * 0.5 - 0.03 * (row % 4.0).min(2.0));
+    let found = mixed(&mut frame);
+    assert!(!found.as_slice().contains(&true), "{}", found.as_slice().iter().filter(|mixed| **mixed).count());
+}
+
+#[test]
 fn low_amplitudes_are_flagged_and_unknown_ones_are_not() {
     let mut frame = frame(0.01, |_, _| 2.0);
     frame.amplitude[(3, 4)] = 9.0;

@@ -112,7 +112,7 @@ impl Setup<'_> {
             let Some((station, target)) = self.ends(row.source) else { continue };
             let count = stations.entry(station).or_insert(0);
             *count += 1;
-            let free = targets.insert(target) & (*count <= most);
+            let free = targets.insert(target) && *count <= most;
             if free && !readmitted.contains(&key(row)) {
                 self.set_excluded(row, true);
             }

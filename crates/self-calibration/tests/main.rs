@@ -15,6 +15,7 @@ mod automatic_terms;
 mod bad_networks;
 mod comparison;
 mod contradictions;
+mod contradictions_by_method;
 mod drift;
 #[path = "support/drift.rs"]
 mod drift_captures;

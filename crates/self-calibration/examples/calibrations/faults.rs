@@ -13,6 +13,8 @@ pub enum Expected {
     Rejected(String, Vec<String>),
     /// It is refused, with this cause, of this station or of all.
     Refused(Vec<CauseKind>, Option<String>),
+    /// It is refused without a cause: nothing known explains it.
+    Unexplained,
     /// It is refused before anything is computed.
     OutsideImage,
     /// The result stands: what is wrong does not enter it.
@@ -92,6 +94,18 @@ pub fn all() -> Vec<Fault> {
                 seen.pixel.as_mut().unwrap()[1] = 143.0 - seen.pixel.unwrap()[1];
             }
             Expected::Refused(vec![CauseKind::Mirrored], Some(network.stations[station].name.clone()))
+        }),
+        fault("targets of all stations in another order", |network, pick| {
+            for station in 0..network.stations.len() {
+                let own: Vec<usize> =
+                    (0..network.sightings.len()).filter(|&i| network.sightings[i].station == station).collect();
+                let targets: Vec<usize> = own.iter().map(|&index| network.sightings[index].target).collect();
+                let step = (pick + 5 * own.len() / 13..).find(|step| coprime(*step, own.len())).unwrap_or(1);
+                for (position, &index) in own.iter().enumerate() {
+                    network.sightings[index].target = targets[(position * step + station) % own.len()];
+                }
+            }
+            Expected::Unexplained
         }),
         fault("all ranges in millimetres", |network, _| {
             ranges(network, |range| range * 1e3);
@@ -179,6 +193,10 @@ pub fn all() -> Vec<Fault> {
 /// Approximate coordinates do not enter the result; control does.
 fn of_coordinates(network: &Network, expected: Expected) -> Expected {
     if network.targets.iter().any(|target| target.covariance.is_some()) { expected } else { Expected::Unharmed }
+}
+
+fn coprime(a: usize, b: usize) -> bool {
+    if b == 0 { a == 1 } else { coprime(b, a % b) }
 }
 
 fn mirrored() -> Expected {

@@ -63,6 +63,7 @@ fn judged(network: &Network, sound: &Sound, expected: &Expected) -> (Answer, Str
                     found.causes.len() == 1
                         && found.causes.iter().all(|cause| kinds.contains(&cause.kind) && cause.station == *station)
                 }
+                Expected::Unexplained => found.causes.is_empty() && found.worst.is_some(),
                 _ => false,
             };
             (if named { Answer::Right } else { Answer::NotNamed }, found.to_string())

@@ -25,10 +25,14 @@ const LABELS: &str = "mend the column `target` of observations.csv";
 /// What may be wrong with the sightings of one station, or with all.
 pub(crate) fn of_sightings(network: &Network, station: Option<usize>) -> Vec<Alternative> {
     let mut out = Vec::new();
-    let mut add = |kind, words: String, remedy, change: &dyn Fn(&mut Sighting)| {
+    let is_own = |seen: &Sighting| station.is_none_or(|station| seen.station == station);
+    let ranged = network.sightings.iter().any(|seen| is_own(seen) && seen.range_m.is_some());
+    let mut add = |kind: CauseKind, words: String, remedy, change: &dyn Fn(&mut Sighting)| {
+        if kind.is_of_ranges() && !ranged {
+            return;
+        }
         let mut network = network.clone();
-        let own = |seen: &&mut Sighting| station.is_none_or(|station| seen.station == station);
-        network.sightings.iter_mut().filter(own).for_each(change);
+        network.sightings.iter_mut().filter(|seen| is_own(seen)).for_each(change);
         out.push(Alternative { kind, words, remedy, network });
     };
     for (unit, factor) in UNITS {

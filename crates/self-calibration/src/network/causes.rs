@@ -9,11 +9,11 @@ use super::calibrate::{Problem, datum, ranged_stations};
 use super::catalogue::{Alternative, of_labels, of_sightings, of_tables};
 use super::contradiction::{Cause, CauseKind, Contradiction, WorstValue};
 use super::misfit::{Misfit, Scales, implausibility, median};
-use super::problem::{Calibration, Setup};
+use super::problem::{Calibration, Excluded, Setup};
 use super::selection::all_terms;
 use super::settle::{start_limit, start_range_limit};
 use super::start::{fits_as_given, station_pose};
-use super::suspicion::{is_too_many, unit_factor};
+use super::suspicion::{EXPLAINED_SCALE, is_too_many, unit_factor};
 use super::{Method, Network, TermSelection};
 use crate::{Error, Result};
 
@@ -23,6 +23,12 @@ const BELIEVED: f64 = 20.0;
 const APART: f64 = 10.0;
 /// Share of stations with too much wrong from which on the cause is looked for in all at once.
 const WIDESPREAD: f64 = 1.0 / 3.0;
+/// Noise as a share of what start values may be off by: 2 pixels of 176 x 144, and 40 cm of 7.5 m.
+const NOISE: f64 = 0.2;
+/// Share of image points or ranges.
+const HALF: f64 = 0.5;
+/// Explanations of a station that are fitted together with all other stations: those that fit it best beside them.
+const FITTED: usize = 3;
 /// Robust standard deviation of unit weight beyond which the observations as a whole are in doubt.
 const CONSPICUOUS: f64 = 1.5;
 /// Factor within which a network is as large as it was given.
@@ -52,6 +58,15 @@ impl<'n> Fit<'n> {
         Self { setup, misfits, wrong }
     }
 
+    /// The same, where start values explain at least half of the observations: from farther off no fit explains them.
+    fn settled(mut setup: Setup<'n>) -> Option<Self> {
+        if setup.misses().into_iter().any(|share| share > HALF) {
+            return None;
+        }
+        setup.settle().ok()?;
+        Some(Self::new(setup))
+    }
+
     /// Stations with more wrong than single errors explain.
     fn suspects(&self) -> Vec<usize> {
         let [wrong, of] = [0, 1].map(|part| self.wrong.iter().map(|(wrong, of)| [*wrong, *of][part]).sum::<usize>());
@@ -67,6 +82,12 @@ impl<'n> Fit<'n> {
     fn is_conspicuous(&self) -> bool {
         let scales = Scales::new(self.misfits.iter());
         !self.suspects().is_empty() || scales.image > CONSPICUOUS || scales.range > CONSPICUOUS
+    }
+
+    /// Whether most stations agree, with residuals of the size of the noise.
+    fn is_consistent(&self) -> bool {
+        let few = self.suspects().len() as f64 <= WIDESPREAD * self.wrong.len() as f64;
+        few && is_noise(&self.misfits)
     }
 
     /// Whether the network came out about as large as it was given. Ranges give a free network its scale: in another
@@ -86,6 +107,19 @@ impl<'n> Fit<'n> {
         ratios.peek().is_none() || ratios.any(|ratio| (1.0 / SAME_SIZE..=SAME_SIZE).contains(&ratio))
     }
 
+    /// Implausibility of a station's sightings where the network is another at that station; `None` where more of them
+    /// contradict than single errors explain.
+    fn with_station(&self, network: &Network, station: usize, pose: Isometry3<f64>) -> Option<f64> {
+        let mut setup = Setup { network, excluded: Excluded::default(), ..self.setup.clone() };
+        setup.start.stations[station] = pose;
+        setup.resettle().ok()?;
+        let fit = Fit::new(setup);
+        let (wrong, of) = fit.wrong[station];
+        let own = fit.misfits.iter().zip(&network.sightings).filter(|(_, seen)| seen.station == station);
+        let own: Vec<Misfit> = own.map(|(misfit, _)| *misfit).collect();
+        (is_noise(&own) && !is_too_many(wrong, of, 0.0)).then(|| implausibility(own.iter()))
+    }
+
     fn implausibility(&self) -> f64 {
         // A sighting that nothing predicts is as implausible as can be.
         let lost = Misfit { image: Some(f64::INFINITY), ..Misfit::default() };
@@ -99,6 +133,13 @@ impl<'n> Fit<'n> {
         let (index, misfit) = self.misfits.iter().enumerate().max_by(|a, b| size(a.1).total_cmp(&size(b.1)))?;
         Some(worst_value(self.setup.network, index, misfit))
     }
+}
+
+/// Whether residuals scatter about as stated.
+fn is_noise(misfits: &[Misfit]) -> bool {
+    let scales = Scales::new(misfits.iter());
+    // NaN: there are none.
+    [scales.image, scales.range].into_iter().all(|scale| scale.is_nan() || scale <= EXPLAINED_SCALE)
 }
 
 fn worst_value(network: &Network, sighting: usize, misfit: &Misfit) -> WorstValue {
@@ -118,7 +159,8 @@ fn worst_value(network: &Network, sighting: usize, misfit: &Misfit) -> WorstValu
 }
 
 impl Problem<'_> {
-    /// A contradiction with what explains it, or with what contradicts most.
+    /// A contradiction with what explains it, or with what contradicts most; and whether the observations contradict each
+    /// other even where most of them agree best.
     ///
     /// `suspected` are names of stations that are suspected already.
     pub(crate) fn contradiction(
@@ -126,7 +168,7 @@ impl Problem<'_> {
         stage: &'static str,
         failure: Option<&Error>,
         suspected: &[String],
-    ) -> Contradiction {
+    ) -> (Contradiction, bool) {
         let parameter = match failure {
             Some(Error::Adjust(adjust::Error::NotConverged { parameter, .. })) => Some(parameter.clone()),
             _ => None,
@@ -136,32 +178,42 @@ impl Problem<'_> {
         if causes.is_empty() && (!suspected.is_empty() || base.as_ref().map_or(true, Fit::is_conspicuous)) {
             causes = self.causes(base.as_ref().ok(), suspected);
         }
+        let contradicts = base.as_ref().is_ok_and(|fit| !fit.is_consistent());
         let worst = base.ok().and_then(|fit| fit.worst());
-        Contradiction { stage, causes, worst, parameter: parameter.filter(|name| !name.is_empty()) }
+        let parameter = parameter.filter(|name| !name.is_empty());
+        (Contradiction { stage, causes, worst, parameter }, contradicts)
     }
 
     fn causes(&self, base: Option<&Fit<'_>>, suspected: &[String]) -> Vec<Cause> {
-        let Some(base) = base else { return self.of_all(f64::INFINITY) };
+        let Some(base) = base else { return self.of_all(None) };
         let mut suspects = base.suspects();
         let stations = self.network.stations.iter().enumerate();
         suspects.extend(stations.filter(|(_, station)| suspected.contains(&station.name)).map(|(index, _)| index));
         suspects.sort_unstable();
         suspects.dedup();
+        let widespread = suspects.len() as f64 > WIDESPREAD * base.wrong.len() as f64;
+        let of_all = if widespread { self.of_all(Some(base)) } else { Vec::new() };
+        if !of_all.is_empty() {
+            return of_all;
+        }
         let found: Vec<Option<Cause>> = suspects.par_iter().map(|&station| of_station(base, station)).collect();
         let explained: Vec<Cause> = found.iter().flatten().cloned().collect();
-        let widespread = suspects.len() as f64 > WIDESPREAD * base.wrong.len() as f64;
-        if !suspects.is_empty() && explained.len() == suspects.len() && !widespread {
+        if widespread || !suspects.is_empty() && explained.len() == suspects.len() {
             return explained;
         }
-        let of_all = self.of_all(base.implausibility());
+        let of_all = self.of_all(Some(base));
         let odds = |causes: &[Cause]| causes.iter().map(|cause| cause.log_odds).sum::<f64>();
         if odds(&of_all) > odds(&explained) { of_all } else { explained }
     }
 
     /// What explains all observations at once.
-    fn of_all(&self, before: f64) -> Vec<Cause> {
+    fn of_all(&self, base: Option<&Fit<'_>>) -> Vec<Cause> {
         let mut alternatives = of_sightings(self.network, None);
         alternatives.extend(of_tables(self.network));
+        // Other ranges help no image points that do not fit.
+        if base.is_some_and(|base| base.setup.misses()[0] > HALF) {
+            alternatives.retain(|found| !found.kind.is_of_ranges());
+        }
         // A free network is as good as its mirror image: approximate poses tell which of the mirrored ones is meant.
         if alternatives.iter().any(|found| fits_as_given(&found.network)) {
             alternatives.retain(|found| fits_as_given(&found.network));
@@ -169,14 +221,14 @@ impl Problem<'_> {
         let fitted: Vec<Option<f64>> = alternatives
             .par_iter()
             .map(|alternative| {
-                let fit = self.fit(&alternative.network).ok()?;
-                let few = fit.suspects().len() as f64 <= WIDESPREAD * fit.wrong.len() as f64;
-                (few && fit.keeps_scale()).then(|| fit.implausibility())
+                let setup = self.alternative(&alternative.network).ok()?;
+                let fit = Fit::settled(setup)?;
+                (fit.is_consistent() && fit.keeps_scale()).then(|| fit.implausibility())
             })
             .collect();
         let Some(best) = fitted.iter().flatten().copied().min_by(f64::total_cmp) else { return Vec::new() };
         // Where not even a start was found, each value counts as hopelessly wrong.
-        let before = before.min(1e9);
+        let before = base.map_or(1e9, |base| base.implausibility().min(1e9));
         if before - best < BELIEVED {
             return Vec::new();
         }
@@ -189,11 +241,16 @@ impl Problem<'_> {
 
     /// A network fitted robustly with the terms of the options.
     fn fit<'n>(&self, network: &'n Network) -> Result<Fit<'n>> {
-        let passive = matches!(self.options.method, Method::JointTwoStep | Method::JointIntegrated);
-        let ranged = ranged_stations(network, self.options);
-        let mut setup = self.setup(network, &self.robust_terms(), ranged, passive, datum(network, self.options)?)?;
+        let mut setup = self.alternative(network)?;
         setup.settle()?;
         Ok(Fit::new(setup))
+    }
+
+    /// Another network with the terms of the options, at its start values.
+    fn alternative<'n>(&self, network: &'n Network) -> Result<Setup<'n>> {
+        let passive = matches!(self.options.method, Method::JointTwoStep | Method::JointIntegrated);
+        let ranged = ranged_stations(network, self.options);
+        self.setup(network, &self.robust_terms(), ranged, passive, datum(network, self.options)?)
     }
 
     fn robust_terms(&self) -> BTreeSet<String> {
@@ -218,7 +275,7 @@ fn sigma_units(fit: &Fit<'_>) -> Vec<Cause> {
     let network = fit.setup.network;
     let pixels = median(fit.misfits.iter().filter_map(Misfit::pixels).collect());
     let ranges = median(fit.misfits.iter().filter_map(|misfit| misfit.range_m).map(f64::abs).collect());
-    if pixels > start_limit(network) || ranges > start_range_limit(network, 0.0) {
+    if pixels > NOISE * start_limit(network) || ranges > NOISE * start_range_limit(network, 0.0) {
         return Vec::new();
     }
     let scales = Scales::new(fit.misfits.iter());
@@ -237,19 +294,36 @@ fn sigma_units(fit: &Fit<'_>) -> Vec<Cause> {
     kinds.into_iter().filter_map(cause).collect()
 }
 
-/// What explains the sightings of one station, the other stations being as they are.
+/// What explains the sightings of one station: alternatives are compared beside the other stations as they are, and those
+/// that fit best adjusted together with these, which may have followed the wrong ones.
 fn of_station(base: &Fit<'_>, station: usize) -> Option<Cause> {
     let network = base.setup.network;
     let name = &network.stations[station].name;
     let judge = Judge { calibration: &base.setup.calibration, targets: &base.setup.start.targets, station };
-    let (before, _, pose) = judge.best(network, &base.setup.start.stations[station])?;
+    let given = base.setup.start.stations[station];
+    let unmoved = judge.resected(network);
+    let (before, pose) = judge.best(network, [Some(given), unmoved])?;
     let mut alternatives = of_sightings(network, Some(station));
     alternatives.extend(of_labels(network, station));
     alternatives.extend(judge.unwrapped(network, &pose));
-    let fitted = alternatives.into_iter().filter_map(|alternative| {
-        let (after, wrong, _) = judge.best(&alternative.network, &pose)?;
-        let seen = base.wrong[station].1;
-        (before - after > BELIEVED && !is_too_many(wrong, seen, 0.0)).then_some((after, alternative))
+    let judged = alternatives.into_iter().filter_map(|alternative| {
+        let ranges = alternative.kind.is_of_ranges();
+        let found = if ranges { unmoved } else { judge.resected(&alternative.network) };
+        let (after, pose) = judge.best(&alternative.network, [Some(pose), found])?;
+        Some((after, pose, alternative))
+    });
+    let mut judged: Vec<(f64, Isometry3<f64>, Alternative)> = judged.collect();
+    judged.sort_by(|a, b| a.0.total_cmp(&b.0));
+    judged.retain(|(_, pose, alternative)| judge.is_near(&alternative.network, pose));
+    judged.truncate(FITTED);
+    if judged.is_empty() {
+        return None;
+    }
+    // As it is, it may fit as well once the others have been found from it.
+    let before = base.with_station(network, station, pose).map_or(before, |unchanged| before.min(unchanged));
+    let fitted = judged.into_iter().filter_map(|(_, pose, alternative)| {
+        let after = base.with_station(&alternative.network, station, pose)?;
+        (before - after > BELIEVED).then_some((after, alternative))
     });
     let (after, found) = fitted.min_by(|a, b| a.0.total_cmp(&b.0))?;
     Some(Cause {
@@ -269,18 +343,22 @@ struct Judge<'f> {
 }
 
 impl Judge<'_> {
-    /// Implausibility, number of contradicting sightings and pose: that given or that of a resection, whichever fits
-    /// better.
-    fn best(&self, network: &Network, given: &Isometry3<f64>) -> Option<(f64, usize, Isometry3<f64>)> {
-        let found = station_pose(network, self.calibration, self.targets, self.station);
-        let poses = [Some(*given), found].into_iter().flatten();
-        let judged = poses.map(|pose| {
-            let misfits = self.misfits(network, &pose);
-            // Ranges and image points of other stations fit as stated; here five deviations contradict.
-            let wrong = misfits.iter().filter(|m| [m.image, m.range].into_iter().flatten().any(|size| size > 5.0));
-            (implausibility(misfits.iter()), wrong.count(), pose)
-        });
+    /// The pose that the image points of a network give the station.
+    fn resected(&self, network: &Network) -> Option<Isometry3<f64>> {
+        station_pose(network, self.calibration, self.targets, self.station)
+    }
+
+    /// Implausibility and pose, of the pose that fits best.
+    fn best(&self, network: &Network, poses: [Option<Isometry3<f64>>; 2]) -> Option<(f64, Isometry3<f64>)> {
+        let judged =
+            poses.into_iter().flatten().map(|pose| (implausibility(self.misfits(network, &pose).iter()), pose));
         judged.min_by(|a, b| a.0.total_cmp(&b.0))
+    }
+
+    /// Whether the image points typically are as near as start values must be.
+    fn is_near(&self, network: &Network, pose: &Isometry3<f64>) -> bool {
+        let pixels = self.misfits(network, pose).iter().filter_map(Misfit::pixels).collect();
+        median(pixels) <= start_limit(network)
     }
 
     fn misfits(&self, network: &Network, pose: &Isometry3<f64>) -> Vec<Misfit> {

@@ -63,6 +63,13 @@ pub enum CauseKind {
     SigmaUnit,
 }
 
+impl CauseKind {
+    /// Whether it leaves image points and the targets that they belong to as they are.
+    pub(crate) fn is_of_ranges(self) -> bool {
+        matches!(self, Self::RangeUnit | Self::DepthForRange | Self::WholeIntervals)
+    }
+}
+
 /// One observed value.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]

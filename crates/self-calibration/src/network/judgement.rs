@@ -38,7 +38,7 @@ impl Problem<'_> {
         contradiction.causes = best.suspicion.causes(self.network);
         if contradiction.causes.is_empty() {
             let suspected: Vec<String> = best.suspicion.stations.iter().map(|(name, ..)| name.clone()).collect();
-            contradiction = self.contradiction(contradiction.stage, None, &suspected);
+            (contradiction, _) = self.contradiction(contradiction.stage, None, &suspected);
         }
         if !contradiction.causes.is_empty() || best.suspicion.is_hopeless() {
             return Err(Error::Contradiction(Box::new(contradiction)));
@@ -72,9 +72,9 @@ impl Problem<'_> {
             error if is_without_end(error) => "the adjustment found no end",
             _ => "no start values were found",
         };
-        let contradiction = self.contradiction(stage, Some(&error), &[]);
-        // Without a cause, an unreachable or weak network is what it was said to be.
-        if contradiction.causes.is_empty() && !is_without_end(&error) {
+        let (contradiction, contradicts) = self.contradiction(stage, Some(&error), &[]);
+        // Without a cause, a consistent network that is unreachable or weak is what it was said to be.
+        if contradiction.causes.is_empty() && !contradicts && !is_without_end(&error) {
             return error;
         }
         Error::Contradiction(Box::new(contradiction))

@@ -1,6 +1,6 @@
 //! Gross errors: standardised residuals are tested, the worst rejected, and what was rejected is tested again.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use adjust::{Distribution, Scale, Solution};
 
@@ -12,6 +12,11 @@ use crate::{Error, Result};
 const TESTABLE: f64 = 0.01;
 /// Groups of fewer values take their scale from all values together.
 const SMALLEST_GROUP: usize = 30;
+/// Rounds in which a station loses one value each. Then twice as many in each further round: so many bad values are no
+/// single gross errors, and one by one they take as many solutions.
+const SINGLE_ROUNDS: usize = 10;
+/// A thousand at once.
+const MOST_DOUBLINGS: usize = 10;
 /// Rounds of rejection, a bound that only contradictory observations reach.
 const MOST_ROUNDS: usize = 100;
 
@@ -61,15 +66,17 @@ impl Setup<'_> {
     /// Rejects gross errors from a first solution on, where a level is given.
     ///
     /// Of the suspects of a round the worst of each station and of each target is rejected: the residuals of one gross
-    /// error spread over its own station and target, so that these do not disturb each other. In the end what was
+    /// error spread over its own station and target, so that these do not disturb each other. A station that still has
+    /// suspects after [`SINGLE_ROUNDS`] loses more of them at once. In the end what was
     /// rejected is looked at again, and taken back once if it fits.
     pub(crate) fn solve_rejecting(&mut self, first: Solved, level: Option<f64>) -> Result<Solved> {
         let mut solved = first;
         let Some(level) = level else { return Ok(solved) };
         let mut readmitted = BTreeSet::new();
-        for _ in 0..MOST_ROUNDS {
+        for round in 0..MOST_ROUNDS {
             let before = self.excluded.clone();
-            self.reject(&solved, level, &readmitted)?;
+            let most = 1_usize << round.saturating_sub(SINGLE_ROUNDS).min(MOST_DOUBLINGS);
+            self.reject(&solved, level, most, &readmitted)?;
             if self.excluded == before {
                 self.readmit(&solved, level, &mut readmitted)?;
             }
@@ -90,13 +97,22 @@ impl Setup<'_> {
         Ok(solved)
     }
 
-    fn reject(&mut self, solved: &Solved, level: f64, readmitted: &BTreeSet<(Source, Component)>) -> Result<()> {
+    /// Rejects the worst of each target, and at most so many of each station.
+    fn reject(
+        &mut self,
+        solved: &Solved,
+        level: f64,
+        most: usize,
+        readmitted: &BTreeSet<(Source, Component)>,
+    ) -> Result<()> {
         let components: Vec<Component> = solved.rows.iter().map(|row| row.component).collect();
-        let (mut stations, mut targets) = (BTreeSet::new(), BTreeSet::new());
+        let (mut stations, mut targets) = (BTreeMap::new(), BTreeSet::new());
         for suspect in suspects(&solved.solution, &components, level)? {
             let row = &solved.rows[suspect.row];
             let Some((station, target)) = self.ends(row.source) else { continue };
-            let free = stations.insert(station) & targets.insert(target);
+            let count = stations.entry(station).or_insert(0);
+            *count += 1;
+            let free = targets.insert(target) && *count <= most;
             if free && !readmitted.contains(&key(row)) {
                 self.set_excluded(row, true);
             }

@@ -1,5 +1,6 @@
 //! Poses and points from observations among which some are grossly wrong.
 
+use adjust::SolveOptions;
 use icp_registration::absolute_orientation;
 use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 use orientation::{ResectionOptions, TargetObservation, resect};
@@ -15,6 +16,9 @@ const GOOD_SHARE: f64 = 0.02;
 /// Targets of a sample, and most samples of one kind.
 const SAMPLE: usize = 4;
 const MOST_SAMPLES: usize = 4;
+/// Iterations of a resection. From three of its targets a pose takes 3 to 10; that of contradictory targets creeps on for
+/// hundreds.
+const MOST_ITERATIONS: usize = 20;
 /// Rays that meet at less than this angle (radian, 1 degree) place a target too weakly to start from.
 const SMALLEST_ANGLE: f64 = 0.0175;
 
@@ -45,7 +49,7 @@ pub(crate) fn robust_orientation(pairs: &[(Point3<f64>, Point3<f64>)]) -> Option
     Some(pose)
 }
 
-/// Resection that leaves out the worst target as long as it stands out from the others; where that fails, the one from
+/// Resection that leaves out the worst targets as long as they stand out from the others; where that fails, the one from
 /// four targets that most of the others agree with, and then from these.
 pub(crate) fn robust_resection(
     camera: &camera_model::Camera,
@@ -65,7 +69,7 @@ pub(crate) fn robust_resection(
     let distinct = samples.filter(|sample| (1..SAMPLE).all(|i| !sample[..i].contains(&sample[i])));
     let candidates = distinct.filter_map(|sample| {
         let chosen: Vec<TargetObservation> = sample.iter().map(|&index| targets[index]).collect();
-        let found = resect(camera, &chosen, &ResectionOptions::default()).ok()?.world_from_camera;
+        let found = resect(camera, &chosen, &from(None)).ok()?.world_from_camera;
         Some((median(distances(camera, targets, &found)), found))
     });
     let given = all.as_ref().ok().map(|pose| (median(distances(camera, targets, pose)), *pose));
@@ -88,17 +92,35 @@ fn trimmed_resection(
     camera: &camera_model::Camera,
     mut targets: Vec<TargetObservation>,
 ) -> std::result::Result<Isometry3<f64>, String> {
-    let fewest = (targets.len() * 2).div_ceil(3).max(NEEDED + 1);
+    let given = targets.len();
+    let fewest = (given * 2).div_ceil(3).max(NEEDED + 1);
+    let mut found = resect(camera, &targets, &from(None)).map_err(|error| error.to_string())?;
     loop {
-        let found = resect(camera, &targets, &ResectionOptions::default()).map_err(|error| error.to_string())?;
         let sizes: Vec<f64> = found.residuals.iter().map(|r| r.pixel[0].hypot(r.pixel[1])).collect();
-        let worst = (0..sizes.len()).max_by(|&a, &b| sizes[a].total_cmp(&sizes[b]));
         let limit = 2.0 * OUTLYING * median(sizes.clone());
-        match worst {
-            Some(worst) if sizes[worst] > limit && targets.len() > fewest => targets.remove(worst),
-            _ => return Ok(found.world_from_camera),
-        };
+        let mut outlying: Vec<usize> = (0..sizes.len()).filter(|&i| sizes[i] > limit).collect();
+        outlying.sort_by(|&a, &b| sizes[b].total_cmp(&sizes[a]));
+        // The worst disturb the others: half of them go at a time, one by one in the end.
+        outlying.truncate((outlying.len() / 2).max(1).min(targets.len().saturating_sub(fewest)));
+        if outlying.is_empty() {
+            // Without the targets that went, another of two poses may fit better.
+            let anew = (targets.len() < given).then(|| resect(camera, &targets, &from(None)).ok()).flatten();
+            return Ok(anew.unwrap_or(found).world_from_camera);
+        }
+        let mut index = 0;
+        targets.retain(|_| {
+            index += 1;
+            !outlying.contains(&(index - 1))
+        });
+        let start = Some(found.world_from_camera);
+        found = resect(camera, &targets, &from(start)).map_err(|error| error.to_string())?;
     }
+}
+
+/// Options of a resection from an approximate pose, or from none.
+fn from(approximate: Option<Isometry3<f64>>) -> ResectionOptions {
+    let solve = SolveOptions { max_iterations: MOST_ITERATIONS, ..SolveOptions::default() };
+    ResectionOptions { approximate, solve }
 }
 
 /// The point nearest to some rays (origin, unit direction); `None` where they are nearly parallel.

@@ -12,6 +12,7 @@ use nalgebra::Point3;
 use super::builder::{Builder, Kernels};
 use super::misfit::{CAUCHY, Misfit, Scales, median};
 use super::problem::{Excluded, Setup};
+use super::start::{missed, ranges_missed};
 use super::terms::{camera_from, range_model_from};
 use super::{DistanceEnd, Network};
 use crate::{Error, Result};
@@ -84,6 +85,19 @@ impl Setup<'_> {
         self.excluded = Excluded::default();
         self.leave_out(&contradicting);
         Ok(())
+    }
+
+    /// The same from values that only one station may have disturbed.
+    pub(crate) fn resettle(&mut self) -> Result<()> {
+        let all = self.estimated.clone();
+        self.approach(all.clone())?;
+        self.approach(all)
+    }
+
+    /// Shares of the image points and of the ranges that start values cannot explain.
+    pub(crate) fn misses(&self) -> [f64; 2] {
+        let (network, calibration, start) = (self.network, &self.calibration, &self.start);
+        [missed(network, calibration, start), ranges_missed(network, calibration, start)]
     }
 
     /// What contradicts the present values.

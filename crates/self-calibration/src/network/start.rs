@@ -15,6 +15,9 @@ use crate::{Error, Result};
 /// Share of the image points that start values may miss before others are looked for.
 const MISSED: f64 = 0.2;
 
+/// Stations in a row that no pose fits, after which the coordinates are given up: no pose will fit them.
+const HOPELESS: usize = 5;
+
 /// Attitudes nearer than this are one, radian: approximate ones are off by less, others by more.
 const SAME_ATTITUDE: f64 = 0.1;
 
@@ -124,7 +127,7 @@ fn attempt(network: &Network, calibration: &Calibration, passive: bool, trust: T
 }
 
 /// Share of the image points that lie farther from where start values put them than these may be off.
-fn missed(network: &Network, calibration: &Calibration, start: &Start) -> f64 {
+pub(crate) fn missed(network: &Network, calibration: &Calibration, start: &Start) -> f64 {
     let limit = start_limit(network);
     let misfits = misfits(network, calibration, start);
     let sizes: Vec<f64> = misfits.iter().filter_map(Misfit::pixels).collect();
@@ -133,7 +136,7 @@ fn missed(network: &Network, calibration: &Calibration, start: &Start) -> f64 {
 }
 
 /// The same share of the ranges.
-fn ranges_missed(network: &Network, calibration: &Calibration, start: &Start) -> f64 {
+pub(crate) fn ranges_missed(network: &Network, calibration: &Calibration, start: &Start) -> f64 {
     let limit = start_range_limit(network, 0.0);
     let misfits = misfits(network, calibration, start);
     let sizes: Vec<f64> = misfits.iter().filter_map(|misfit| misfit.range_m).collect();
@@ -167,6 +170,8 @@ struct Finder<'n> {
     local: Vec<Option<Point3<f64>>>,
     /// Targets whose coordinates are given and taken.
     given: Vec<bool>,
+    /// Whether something that is given is not taken: one of several starts, which may fail.
+    is_rival: bool,
 }
 
 impl<'n> Finder<'n> {
@@ -186,13 +191,16 @@ impl<'n> Finder<'n> {
         let stations = network.stations.iter().map(|station| station.world_from_camera.filter(|_| trust.stations));
         let targets: Vec<_> = network.targets.iter().map(|target| target.point.filter(|_| trust.targets)).collect();
         let given = targets.iter().map(Option::is_some).collect();
-        Self { network, calibration, stations: stations.collect(), targets, of_station, of_target, local, given }
+        let stations = stations.collect();
+        let is_rival = !(trust.stations && trust.targets);
+        Self { network, calibration, stations, targets, of_station, of_target, local, given, is_rival }
     }
 
     fn run(&mut self) -> Result<()> {
         self.seed();
         // How many known targets a station had when it last could not be oriented.
         let mut failed = vec![(0_usize, String::new()); self.stations.len()];
+        let (mut fitting, mut misfitting) = (0, 0);
         loop {
             self.place_targets();
             let waiting = (0..self.stations.len()).filter(|&station| self.stations[station].is_none());
@@ -202,9 +210,15 @@ impl<'n> Finder<'n> {
             let Some((known, station)) = ready.max_by_key(|(known, station)| (*known, usize::MAX - station)) else {
                 break;
             };
-            match self.orient(station) {
+            let found = self.orient(station);
+            let fits = found.as_ref().is_ok_and(|pose| self.typical_miss(station, pose) <= start_limit(self.network));
+            *(if fits { &mut fitting } else { &mut misfitting }) += 1;
+            match found {
                 Ok(pose) => self.stations[station] = Some(pose),
                 Err(reason) => failed[station] = (known, reason),
+            }
+            if self.is_rival && fitting == 0 && misfitting >= HOPELESS {
+                break;
             }
         }
         self.finish(&failed)
@@ -254,7 +268,11 @@ impl<'n> Finder<'n> {
     /// Orients stations anew whose image points contradict their pose, where that fits better.
     fn orient_anew(&mut self) {
         let limit = start_limit(self.network);
+        let (mut found_any, mut kept) = (false, 0);
         for station in 0..self.stations.len() {
+            if !found_any && kept >= HOPELESS {
+                return;
+            }
             let Some(pose) = self.stations[station] else { continue };
             let before = self.typical_miss(station, &pose);
             if before <= limit {
@@ -264,6 +282,9 @@ impl<'n> Finder<'n> {
                 && 2.0 * self.typical_miss(station, &found) < before
             {
                 self.stations[station] = Some(found);
+                found_any = true;
+            } else {
+                kept += 1;
             }
         }
     }

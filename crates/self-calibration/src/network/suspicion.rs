@@ -20,6 +20,9 @@ const LEVEL: f64 = 1e-4;
 const TOO_MANY: f64 = 0.25;
 /// Standard deviations as people state them are seldom right within a factor of two: beyond it the model is in doubt.
 const DOUBTFUL_SCALE: f64 = 2.0;
+/// A cause explains observations that scatter up to so many times as much as stated after it: deviations stated twice too
+/// small, and terms of the range error left out that make as much again. What is not explained scatters tens of times.
+pub(crate) const EXPLAINED_SCALE: f64 = 2.0 * DOUBTFUL_SCALE;
 /// Where they are too large by more than this, they are in doubt as well.
 const TOO_SMALL_SCALE: f64 = 0.1;
 /// Redundancy from which on the scale of a group is believed: its own relative deviation is then 0.13.
@@ -107,8 +110,16 @@ impl Suspicion {
         self.offset_m.is_some() || self.principal_distances_mm.is_some() || self.is_mirrored
     }
 
-    /// Causes that the values of the parameters show.
+    /// Whether the observations agree with the result, be its parameters what they may.
+    fn is_consistent(&self) -> bool {
+        self.share <= TOO_MANY && self.groups.iter().all(|(_, scale)| *scale <= EXPLAINED_SCALE)
+    }
+
+    /// Causes that the values of the parameters show, where most observations agree with these.
     pub(crate) fn causes(&self, network: &Network) -> Vec<Cause> {
+        if !self.is_consistent() {
+            return Vec::new();
+        }
         let interval = network.range_model.ambiguity_interval_m;
         let offset = self.offset_m.map(|offset| Cause {
             kind: CauseKind::WholeIntervals,

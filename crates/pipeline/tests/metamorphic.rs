@@ -285,7 +285,7 @@ fn stations_that_no_surface_holds_are_not_taken_for_placed() {
     let names = [0, 1, 2].map(|station| folder.path().join(format!("{station}.xyz")));
     for (station, name) in names.iter().enumerate() {
         let points = (0..60 * 80).map(|i| {
-            let (column, row) = ((i % 80) as f64, (i / 80) as f64);
+            let (column, row) = (f64::from(i % 80), f64::from(i / 80));
             // Noise of about a millimetre that repeats nowhere within the wall.
             let noise = 1e-3 * (12.9898 * column + 78.233 * row + station as f64).sin();
             format!("{:.4} {:.4} {:.4}\n", 0.03 * column - 1.2, 0.03 * row - 0.9, 3.0 + noise)

@@ -9,13 +9,14 @@ use range_image::{Flags, RawFrame, Samples};
 use range_io::survey::{InputFrame, Survey, read_frame, write_frame};
 use scattering_deconvolution::{GaussianTerm, Psf, Scatterer};
 
-/// A scene of the fixtures with another light and fewer stations, as a survey.
-fn dimmed(scene: &str, source_power: f64, stations: &[&str], folder: &Path) -> PathBuf {
+/// A scene of the fixtures with another light and fewer stations, as a survey; as many frames of each as asked.
+fn dimmed(scene: &str, source_power: f64, frames: usize, stations: &[&str], folder: &Path) -> PathBuf {
     let text = std::fs::read_to_string(fixtures().join(format!("scenes/{scene}.ron"))).unwrap();
     let station = |line: &str| line.trim_start().starts_with("(name: \"") && line.contains("position_m");
     let wanted = |line: &&str| !station(line) || stations.iter().any(|name| line.contains(&format!("\"{name}\"")));
     let lines: Vec<&str> = text.lines().filter(wanted).collect();
     let text = lines.join("\n").replace("source_power: 8.0e6", &format!("source_power: {source_power:e}"));
+    let text = text.replace("frames_per_station: 4", &format!("frames_per_station: {frames}"));
     let file = folder.join("scene.ron");
     std::fs::write(&file, text).unwrap();
     simulated_from(&file, 23, folder)
@@ -78,7 +79,7 @@ fn dim_surveys_have_no_light_from_outside() {
         [("background", 8e5, &rooms[..]), ("background", 8e3, &rooms), ("wall", 8e6, &walls)]
     {
         let folder = tempfile::tempdir().unwrap();
-        let outcome = ranges(&dimmed(scene, power, stations, folder.path()));
+        let outcome = ranges(&dimmed(scene, power, 4, stations, folder.path()));
         assert_eq!(outcome.views.len(), stations.len());
         let width = outcome.views[0].flags().unwrap().width();
         let shares: Vec<f64> = (0..stations.len()).map(|view| flagged(&outcome, view, 0..width)).collect();
@@ -91,8 +92,9 @@ fn dim_surveys_have_no_light_from_outside() {
 #[test]
 fn light_from_outside_is_doubted_and_flagged_where_it_is() {
     let folder = tempfile::tempdir().unwrap();
-    let survey = dimmed("background", 8e3, &["S0", "S2", "S5"], folder.path());
-    add_light(&survey, &scattered(1500.0));
+    // A room without light of its own: beside such light, little from outside can be told.
+    let survey = dimmed("background", 8.0, 1, &["S0", "S2", "S5"], folder.path());
+    add_light(&survey, &scattered(400.0));
     let outcome = ranges(&survey);
     let doubts = doubts(&outcome);
     for doubt in &doubts {

@@ -57,7 +57,7 @@ fn assert_second(name: &str, pose: &StationPose) {
         // Cyclic errors and light by more than one way leave a centimetre between surfaces.
         assert!(off < 0.01 + 3.0 * sigma[axis], "{name}: {at} {sigma:?}");
         // Floor and two walls determine it: decimetres would be as good as nothing.
-        assert!(sigma[axis] < 0.03, "{name}: {sigma:?}");
+        assert!(sigma[axis] < 0.035, "{name}: {sigma:?}");
     }
 }
 

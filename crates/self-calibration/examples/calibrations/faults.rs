@@ -100,7 +100,8 @@ pub fn all() -> Vec<Fault> {
                 let own: Vec<usize> =
                     (0..network.sightings.len()).filter(|&i| network.sightings[i].station == station).collect();
                 let targets: Vec<usize> = own.iter().map(|&index| network.sightings[index].target).collect();
-                let step = (pick + 5 * own.len() / 13..).find(|step| coprime(*step, own.len())).unwrap_or(1);
+                let first = pick + 5 * own.len() / 13;
+                let step = (first..=first + own.len()).find(|step| coprime(*step, own.len())).unwrap_or(1);
                 for (position, &index) in own.iter().enumerate() {
                     network.sightings[index].target = targets[(position * step + station) % own.len()];
                 }

@@ -12,7 +12,7 @@ const MIN_SIDE: usize = 4;
 /// Part of what is fitted along explains of a template beyond which it says nothing of its own.
 const MIN_OWN: f64 = 1e-3;
 /// Part of its weight by which a point spread function may be wrong: of the light from inside, no larger multiple passes for
-/// an explanation. Estimates are wrong by some percent; without a bound, an eighth fewer objects are found.
+/// an explanation. Estimates are wrong by some percent; the bound was chosen, its sensitivity is not known.
 const WRONG_WEIGHT: f64 = 0.3;
 
 /// The division of an image into blocks.

@@ -16,8 +16,7 @@ const GOOD_SHARE: f64 = 0.02;
 /// Targets of a sample, and most samples of one kind.
 const SAMPLE: usize = 4;
 const MOST_SAMPLES: usize = 4;
-/// Iterations of a resection. From three of its targets a pose takes 3 to 10; that of contradictory targets creeps on for
-/// hundreds.
+/// Most iterations of a resection: that of contradictory targets creeps on without end. Chosen, not varied.
 const MOST_ITERATIONS: usize = 20;
 /// Rays that meet at less than this angle (radian, 1 degree) place a target too weakly to start from.
 const SMALLEST_ANGLE: f64 = 0.0175;

@@ -21,7 +21,7 @@ const TOO_MANY: f64 = 0.25;
 /// Standard deviations as people state them are seldom right within a factor of two: beyond it the model is in doubt.
 const DOUBTFUL_SCALE: f64 = 2.0;
 /// A cause explains observations that scatter up to so many times as much as stated after it: deviations stated twice too
-/// small, and terms of the range error left out that make as much again. What is not explained scatters tens of times.
+/// small, and terms of the range error left out that make as much again. Chosen, not varied.
 pub(crate) const EXPLAINED_SCALE: f64 = 2.0 * DOUBTFUL_SCALE;
 /// Where they are too large by more than this, they are in doubt as well.
 const TOO_SMALL_SCALE: f64 = 0.1;

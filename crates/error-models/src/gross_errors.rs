@@ -61,14 +61,14 @@ pub struct FlagCounts {
 /// Along a row, a column and both diagonals the surfaces at both sides of a pixel are continued to it, by two
 /// pixels each, straight in `1/ρ` - which is what a plane is along a line of pixels, whatever the angle of
 /// incidence. A pixel is **mixed** if its range lies between the two continued surfaces and further from both than
-/// the threshold of [`MixedPixelOptions`], and if neither neighbour has its range. So a tilted wall continues
-/// itself, the pixels beside a sharp edge continue their own side, on a curved surface both sides err to the
-/// same side of the pixel, and beside the outline of a round object the surface may bend twice as much as it did one pixel
-/// before. Edges up to three mixed pixels wide are seen. Not seen: a pixel mixed of three surfaces that does not lie
-/// between two of them, pixels at surfaces so narrow that nothing tells their tilt (stairs from afar), a pixel with a single
-/// one between it and the image's rim, and a structure of a single pixel in front of all others. A real surface that is one
-/// pixel wide and between two others cannot be told from a mixed pixel and is flagged. The less noise there is, the narrower
-/// such surfaces stand out.
+/// the threshold of [`MixedPixelOptions`], if neither neighbour has its range, and if no block of 3 by 3 pixels with it
+/// at a corner is a plane but for noise and the floor (chi-squared at the 0.1 % level). So a tilted wall continues itself, the pixels
+/// beside a sharp edge continue their own side, on a curved surface both sides err to the same side of the pixel, and a
+/// surface four pixels wide is one whatever stands around it. Edges up to three mixed pixels wide are seen where they are
+/// not as straight as a surface. Not seen: a pixel mixed of three surfaces that does not lie between two of them, pixels at
+/// surfaces so narrow that nothing tells their tilt (stairs from afar), a pixel with a single one between it and the image's
+/// rim, and a structure of a single pixel in front of all others. A real surface of up to three pixels and between two
+/// others cannot be told from mixed pixels and is flagged. The less noise there is, the narrower such surfaces stand out.
 ///
 /// A NaN amplitude is not low. Refuses planes of different sizes and options that are not finite or negative.
 pub fn flag_gross_errors(frame: &mut RangeFrame, options: &GrossErrorOptions) -> Result<FlagCounts> {

@@ -22,6 +22,7 @@ mod model;
 mod model_set;
 mod noise;
 mod parameters;
+mod plane_block;
 mod polynomial;
 mod range_error;
 mod range_noise;

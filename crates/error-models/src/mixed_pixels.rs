@@ -3,6 +3,7 @@
 use range_image::Raster;
 
 use crate::MixedPixelOptions;
+use crate::plane_block::is_corner_of_a_plane;
 
 /// Row, column and the two diagonals, as steps of `(column, row)`.
 const DIRECTIONS: [[isize; 2]; 4] = [[1, 0], [0, 1], [1, 1], [1, -1]];
@@ -14,11 +15,8 @@ pub(crate) struct MixedPixelTest<'a> {
     options: MixedPixelOptions,
 }
 
-/// How far a surface may leave the straight line in `1/ρ`, 1, 2 and 3 pixels beyond those that it was continued from, as
-/// multiples of how far the last of these leaves the line of the two behind it. A round surface bends the more, the nearer its
-/// outline: by up to twice as much from pixel to pixel, where the outline runs through the next one. That is 2, then
-/// 2 · 2 + 4, then 3 · 2 + 2 · 4 + 8. Without, rims of spheres and columns are flagged.
-const BENDS: [f32; 3] = [2.0, 8.0, 22.0];
+/// Mixed pixels side by side that an edge may have.
+const WIDEST_EDGE: usize = 3;
 
 /// A range with its variance.
 #[derive(Clone, Copy)]
@@ -43,7 +41,7 @@ impl Measured {
 #[derive(Clone, Copy)]
 struct Surface {
     at_pixel: Measured,
-    /// How far the surface may bend away from its continuation, metre.
+    /// How far the surface may lie from its continuation, metre.
     bend: f32,
 }
 
@@ -53,10 +51,15 @@ impl<'a> MixedPixelTest<'a> {
         Self { range, sigma, options }
     }
 
-    /// Whether the pixel is mixed along any of the directions.
+    /// Whether the pixel is mixed along any of the directions, and not the corner of a plane.
     pub(crate) fn is_mixed(&self, col: usize, row: usize) -> bool {
         let Some(pixel) = self.at(col, row, [0, 0], 0) else { return false };
-        DIRECTIONS.into_iter().any(|step| self.is_mixed_along(col, row, step, pixel))
+        let floor = self.options.floor_m * self.options.floor_m;
+        let beside = |dx: isize, dy: isize| {
+            let Measured { range, variance } = self.at(col, row, [dx, dy], 1)?;
+            Some([f64::from(range), f64::from(variance) + floor])
+        };
+        DIRECTIONS.into_iter().any(|step| self.is_mixed_along(col, row, step, pixel)) && !is_corner_of_a_plane(beside)
     }
 
     fn is_mixed_along(&self, col: usize, row: usize, step: [isize; 2], pixel: Measured) -> bool {
@@ -85,11 +88,10 @@ impl<'a> MixedPixelTest<'a> {
     fn surface(&self, col: usize, row: usize, step: [isize; 2], side: isize, pixel: Measured) -> Option<Surface> {
         let at = |count: usize| self.at(col, row, step, count as isize * side);
         let mut before = pixel;
-        for (gap, bend) in BENDS.into_iter().enumerate() {
+        for gap in 0..WIDEST_EDGE {
             let [Some(first), Some(second), Some(third)] = [1, 2, 3].map(|count| at(gap + count)) else { break };
-            if let Some(behind) = Measured::continued(1.0, second, third).filter(|on| !self.differ(first, *on, 0.0)) {
-                let at_pixel = Measured::continued(gap as f32 + 1.0, first, second)?;
-                return Some(Surface { at_pixel, bend: bend * self.beyond_noise(first, behind) });
+            if Measured::continued(1.0, second, third).is_some_and(|on| !self.differ(first, on, 0.0)) {
+                return Some(Surface { at_pixel: Measured::continued(gap as f32 + 1.0, first, second)?, bend: 0.0 });
             }
             if (first.range - before.range) * (second.range - first.range) <= 0.0 {
                 break;

@@ -91,6 +91,33 @@ fn an_edge_blurred_over_two_pixels_is_flagged() {
 }
 
 #[test]
+fn pixels_halfway_between_two_near_surfaces_are_flagged() {
+    // The three columns about the edge are as straight as a plane: near, halfway, far.
+    let mut frame = frame(0.001, |col, row| {
+        let far = if col < 60.0 { 0.0 } else { (col - 59.5).clamp(0.5, 1.0) };
+        plane(col, row, 2.0, 0.1) + 0.1 * far
+    });
+    let found = mixed(&mut frame);
+    let count = |cols: std::ops::Range<usize>| {
+        (3..HEIGHT - 3).flat_map(|row| cols.clone().map(move |col| (col, row))).filter(|at| found[*at]).count()
+    };
+    assert_eq!(count(60..61), HEIGHT - 6);
+    assert_eq!(count(0..60) + count(61..WIDTH), 0);
+}
+
+#[test]
+fn a_steep_surface_four_pixels_wide_is_no_edge() {
+    // A flight of stairs from aside: each pixel lies between its neighbours and far from both.
+    let flight = |col: f64| match col as usize {
+        0..60 => 2.0,
+        60..64 => 2.3 + 0.1 * (col - 60.0),
+        _ => 3.0,
+    };
+    let mut frame = frame(0.001, |col, _| flight(col));
+    assert!(!mixed(&mut frame).as_slice().contains(&true));
+}
+
+#[test]
 fn a_sharp_edge_without_mixing_is_not_flagged() {
     let mut frame = frame(0.005, |col, row| plane(col, row, if col < 70.2 { 1.0 } else { 3.0 }, 0.0));
     assert!(!mixed(&mut frame).as_slice().contains(&true));

@@ -8,16 +8,21 @@
 //!   floor of the test for mixed pixels), whatever its range;
 //! - or its light is less than the plan asks for: the amplitude without noise is below the plan's threshold, which is
 //!   √n times lower for a mean of n frames;
+//! - or its own light is outside the amplitudes that the calibration holds for;
 //! - or its expected highest sample reaches the camera's last value but for three standard deviations.
 //!
-//! The first of these is measured at the end of all stages; the other three are what flags have to say even where chance
+//! A false flag is on a **narrow** pixel where even the true ranges leave open whether it is mixed: no block of 3 by 3 pixels
+//! with the pixel at a corner is a plane within 5 mm and free of mixed pixels. These stand out of the noise the more, the
+//! more frames there are, as mixed pixels do.
+//!
+//! The first of these is measured at the end of all stages; the others are what flags have to say even where chance
 //! brought the range near the truth. A flag on any other pixel is **false**.
 
 use pipeline::{Outcome, Plan, Silent, ViewData, process};
 use range_image::Flags;
 
 use super::Failure;
-use super::rooms::{Capture, LOW_AMPLITUDE};
+use super::rooms::{Capture, LOW_AMPLITUDE, SIZE, Truth};
 
 const SIGMAS: f64 = 4.0;
 const FLOOR_M: f64 = 0.005;
@@ -43,6 +48,8 @@ pub struct Counts {
     pub false_by_chance: usize,
     /// False ones of each of [`Flags::NAMED`].
     pub of_flag: [usize; Flags::NAMED.len()],
+    /// With any flag, right, and narrow.
+    pub false_of_narrow: usize,
     /// Ranges wrong, by the first reason, and not flagged.
     pub missed: usize,
     pub error_median_m: f64,
@@ -57,6 +64,28 @@ impl Counts {
     pub fn bar(&self) -> f64 {
         2.0 * self.share(self.wrong) + 0.02
     }
+}
+
+/// Whether no plane of nine true ranges has the pixel at a corner.
+fn is_narrow(truth: &Truth, pixel: usize) -> bool {
+    let at = [pixel % SIZE[0], pixel / SIZE[0]];
+    !(0..4).any(|corner| is_plane(truth, [at[0].wrapping_sub(corner % 2 * 2), at[1].wrapping_sub(corner / 2 * 2)]))
+}
+
+/// Whether the block of 3 by 3 true ranges from this column and row on is a plane: straight in inverse range.
+fn is_plane(truth: &Truth, [col, row]: [usize; 2]) -> bool {
+    if col.saturating_add(2) >= SIZE[0] || row.saturating_add(2) >= SIZE[1] {
+        return false;
+    }
+    let pixels: [usize; 9] = std::array::from_fn(|index| (row + index / 3) * SIZE[0] + col + index % 3);
+    let inverse = pixels.map(|pixel| 1.0 / f64::from(truth.range[pixel]));
+    let offset = |index: usize| [index % 3, index / 3].map(|step| step as f64 - 1.0);
+    let mean = inverse.iter().sum::<f64>() / 9.0;
+    let slope = [0, 1].map(|axis| (0..9).map(|index| offset(index)[axis] * inverse[index]).sum::<f64>() / 6.0);
+    (0..9).all(|index| {
+        let left = inverse[index] - mean - slope[0] * offset(index)[0] - slope[1] * offset(index)[1];
+        !truth.mixed[pixels[index]] && left.abs() / inverse[index].powi(2) < FLOOR_M
+    })
 }
 
 /// Processes the first `frames` frames of each station and counts.
@@ -76,12 +105,14 @@ fn judge(capture: &Capture, outcome: &Outcome, frames: usize) -> Counts {
             let error = f64::from(frame.range.as_slice()[pixel] - truth.range[pixel]).abs();
             let allowed = SIGMAS * f64::from(frame.sigma.as_slice()[pixel]) + FLOOR_M;
             let right = error <= allowed;
-            let wrong = !right || truth.mixed[pixel] || truth.amplitude[pixel] < low || truth.cut_off[pixel];
+            let dark = truth.amplitude[pixel] < low || truth.outside_span[pixel];
+            let wrong = !right || truth.mixed[pixel] || dark || truth.cut_off[pixel];
             let flagged = !flags.is_empty();
             counts.pixels += 1;
             counts.wrong += usize::from(wrong);
             counts.flagged += usize::from(flagged);
             counts.false_flags += usize::from(flagged && !wrong);
+            counts.false_of_narrow += usize::from(flagged && !wrong && is_narrow(truth, pixel));
             let of_pixel = *flags - OF_SURFACES;
             counts.false_of_pixels += usize::from(!of_pixel.is_empty() && !wrong);
             counts.false_by_chance += usize::from(!(of_pixel - Flags::MIXED_PIXEL).is_empty() && !wrong);

@@ -31,6 +31,8 @@ pub struct Truth {
     pub amplitude: Vec<f64>,
     /// The expected highest sample lies within three standard deviations of the camera's last value, or beyond.
     pub cut_off: Vec<bool>,
+    /// The light of the surface itself lies outside the amplitudes that the calibration holds for.
+    pub outside_span: Vec<bool>,
 }
 
 /// A survey on disk and how it is processed.
@@ -170,6 +172,9 @@ pub fn simulated(folder: &Path, first: usize, amount: Amount) -> Result<Capture,
             capture.add(&station.name, number, simulator.frame(&image, number, amount.seed)?.raw)?;
         }
         let frame = still.frame(&still.station(index)?, 0, 0)?;
+        let span =
+            still.spec().errors.range.as_ref().and_then(|models| Some(models.first()?.hyperbola?.amplitude_span));
+        let is_outside = |amplitude: f64| span.is_some_and(|[low, high]| !(low..=high).contains(&amplitude));
         let complex = demodulate(&frame.raw, &still.spec().demodulation_options())?;
         let channel = &complex.channels[0];
         let amplitude: Vec<f64> = channel.amplitude().as_slice().iter().map(|value| f64::from(*value)).collect();
@@ -177,6 +182,7 @@ pub fn simulated(folder: &Path, first: usize, amount: Amount) -> Result<Capture,
             range: frame.truth.range.as_slice().to_vec(),
             mixed: frame.truth.mixed.as_slice().to_vec(),
             cut_off: vec![false; amplitude.len()],
+            outside_span: frame.truth.amplitude[0].as_slice().iter().map(|own| is_outside(f64::from(*own))).collect(),
             amplitude,
         };
         capture.add_truth(&station.name, truth)?;
@@ -303,7 +309,9 @@ pub fn cast(folder: &Path, first: usize, modulation_hz: &[f64], amount: Amount) 
             highest + 3.0 * light.gain.mul_add(highest, dark_sigma * dark_sigma).sqrt() > light.saturation
         });
         let cut_off = cut_off.collect();
-        capture.add_truth(station.name, Truth { range: image.range, mixed: image.mixed, amplitude, cut_off })?;
+        let outside_span = vec![false; width * height];
+        let truth = Truth { range: image.range, mixed: image.mixed, amplitude, cut_off, outside_span };
+        capture.add_truth(station.name, truth)?;
     }
     Ok(capture)
 }

@@ -32,10 +32,13 @@ mod settle;
 mod simulate;
 mod start;
 mod start_calibration;
+mod start_finder;
 mod strength;
 mod suspicion;
 mod term_words;
 mod terms;
+
+pub(crate) use misfit::median;
 
 pub use calibrate::{calibrate, calibrate_two_networks};
 pub use contradiction::{Cause, CauseKind, Contradiction, WorstValue};

@@ -27,6 +27,7 @@ mod fixed_pattern;
 mod further_terms;
 mod gross_errors;
 mod hyperbola_of_a_network;
+mod independent_adjustment;
 mod methods;
 mod network_terms;
 mod offset_table;

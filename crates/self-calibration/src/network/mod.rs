@@ -10,6 +10,7 @@ mod combine;
 mod contradiction;
 mod equations;
 mod hyperbola;
+mod hyperbola_steps;
 mod image_model;
 mod judgement;
 mod misfit;

@@ -48,3 +48,4 @@ mod surfaces;
 mod trends;
 mod unknown_planes;
 mod weak_networks;
+mod whole_intervals;

@@ -8,10 +8,7 @@ use pipeline::{NetworkScene, Plan, RunRequest, Silent, Source, Stage, Summary};
 use range_io::survey::Survey;
 
 /// Pipelines of the repository that are run elsewhere or not at all, each with the reason.
-const NOT_RUN_HERE: [(&str, &str); 2] = [
-    ("room_small", "run against its bars in room.rs"),
-    ("room_estimated", "its network is refused with some seeds; its way is run in room.rs with the small network"),
-];
+const NOT_RUN_HERE: [(&str, &str); 1] = [("room_small", "run against its bars in room.rs")];
 
 /// A block of RON in a page, with the place it stands at.
 struct Block {
@@ -133,7 +130,9 @@ fn every_pipeline_of_the_repository_runs() {
         assert_eq!(summary.stages.len(), plan.stages.len(), "{name}");
         if plan.stages.iter().any(|stage| matches!(stage, Stage::Adjust(_))) {
             let truth = summary.truth.as_ref().unwrap();
-            assert!(truth.position_error_max_m.unwrap() < 0.002, "{name}: {:?}", truth.position_error_max_m);
+            // The offset of an estimated calibration is known to 8 mm where a hyperbola is estimated beside it.
+            let bar = if plan.calibrate.is_some() { 0.02 } else { 0.002 };
+            assert!(truth.position_error_max_m.unwrap() < bar, "{name}: {:?}", truth.position_error_max_m);
         }
     }
 }

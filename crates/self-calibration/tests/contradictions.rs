@@ -3,9 +3,9 @@
 #[path = "../examples/calibrations/faults.rs"]
 pub(crate) mod faults;
 #[path = "../examples/calibrations/networks.rs"]
-mod networks;
+pub(crate) mod networks;
 #[path = "../examples/calibrations/suite.rs"]
-mod suite;
+pub(crate) mod suite;
 
 use self_calibration::{CalibrationOptions, calibrate};
 use suite::Answer;

@@ -134,6 +134,7 @@ impl Found {
             range_models: vec![(time, self.model)],
             parameters: parameters(start, self.prior, &self.posterior),
             estimated: self.estimated,
+            first_order_covariance: self.covariance.clone(),
             covariance: self.covariance,
             stations: Vec::new(),
             targets: Vec::new(),

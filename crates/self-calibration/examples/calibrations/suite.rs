@@ -104,10 +104,13 @@ fn misfit(outcome: &CalibrationOutcome, truth: &Network) -> f64 {
 pub fn is_kept(sound: &Sound, seed: u64) -> Result<(), String> {
     match calibrate(&sound.observed(seed), &options(sound)) {
         Ok(outcome) if !outcome.doubts.is_empty() => Err(format!("{:?}", outcome.doubts)),
-        Ok(outcome) if misfit(&outcome, &sound.truth) > WRONG => {
-            Err(format!("off by {}", misfit(&outcome, &sound.truth)))
-        }
-        Ok(_) => Ok(()),
+        Ok(outcome) => is_true(&outcome, sound),
         Err(error) => Err(error.to_string()),
     }
+}
+
+/// Whether a result is true within its deviations.
+pub fn is_true(outcome: &CalibrationOutcome, sound: &Sound) -> Result<(), String> {
+    let off = misfit(outcome, &sound.truth);
+    if off > WRONG { Err(format!("off by {off}")) } else { Ok(()) }
 }

@@ -4,9 +4,10 @@ use adjust::{Adjustment, BlockId, Covariance, DatumDefect, Kernel, ParameterBloc
 use nalgebra::{DMatrix, Point3};
 
 use super::equations::{DistanceEquation, PartialPrior, PassiveEquation};
+use super::hyperbola_steps::range_block;
 use super::misfit::Scales;
 use super::problem::{Blocks, CameraPrior, Datum, Row, Setup, Solved, Source};
-use super::terms::{camera_names, camera_values, range_names, range_values};
+use super::terms::{camera_names, camera_values, range_names};
 use super::{Component, DistanceEnd};
 use crate::{Error, Result};
 
@@ -86,7 +87,7 @@ impl<'s> Builder<'s> {
     fn add_sets(&mut self) -> Result<()> {
         for set in &self.setup.calibration.sets {
             let names = range_names(&set.model);
-            let block = ParameterBlock::euclidean(range_values(&set.model)).named("range terms");
+            let block = range_block(&set.model, &self.setup.estimated).named("range terms");
             let suffixed = names.iter().map(|name| format!("{name}{}", set.suffix));
             let block = self.adjustment.add_block(block.with_parameter_names(suffixed));
             self.hold_terms(block, &names)?;

@@ -48,6 +48,7 @@ pub(crate) fn given(setup: &Setup<'_>, options: &CalibrationOptions) -> Calibrat
         parameters: Vec::new(),
         estimated: Vec::new(),
         covariance: DMatrix::zeros(0, 0),
+        first_order_covariance: DMatrix::zeros(0, 0),
         stations: network.stations.iter().filter_map(station).collect(),
         targets: network.targets.iter().filter_map(target).collect(),
         residuals: Vec::new(),
@@ -97,6 +98,7 @@ pub(crate) fn combine(parts: Combined<'_, '_>, options: &CalibrationOptions) -> 
         parameters: parameters(&calibration, &estimate, &fit),
         estimated: estimate.names,
         covariance: estimate.covariance,
+        first_order_covariance: estimate.first_order,
         stations: all_stations,
         targets: all_targets,
         groups: groups(&residuals),
@@ -120,14 +122,18 @@ impl Combined<'_, '_> {
     /// Names and joint covariance of the parameters of both steps.
     fn estimate(&self) -> Estimate {
         let (first, second) = (self.first_names.len(), self.step.names.len());
-        let mut covariance = DMatrix::zeros(first + second, first + second);
-        covariance.view_mut((0, 0), (first, first)).copy_from(&self.first.covariance);
-        covariance.view_mut((first, first), (second, second)).copy_from(&self.step.covariance);
         let shared = self.step.carried.rows(0, first);
-        covariance.view_mut((0, first), (first, second)).copy_from(&shared);
-        covariance.view_mut((first, 0), (second, first)).copy_from(&shared.transpose());
+        let joint = |of_second: &DMatrix<f64>| {
+            let mut covariance = DMatrix::zeros(first + second, first + second);
+            covariance.view_mut((0, 0), (first, first)).copy_from(&self.first.covariance);
+            covariance.view_mut((first, first), (second, second)).copy_from(of_second);
+            covariance.view_mut((0, first), (first, second)).copy_from(&shared);
+            covariance.view_mut((first, 0), (second, first)).copy_from(&shared.transpose());
+            covariance
+        };
+        let (covariance, first_order) = (joint(&self.step.covariance), joint(&self.step.first_order));
         let names = self.first_names.iter().chain(&self.step.names).cloned().collect();
-        Estimate { names, covariance }
+        Estimate { names, covariance, first_order }
     }
 
     /// Figures of all steps together. What stands behind the reference ranges is unknown and observed at once in the second

@@ -7,9 +7,10 @@ use std::sync::Arc;
 use adjust::{BlockId, EvaluationFailure, Jacobians, Observation, RigidPose};
 use camera_model::Camera;
 use error_models::RangeErrorModel;
-use nalgebra::{Isometry3, Matrix3, Point3, RowVector3, SMatrix, Vector3};
+use nalgebra::{Isometry3, Matrix3, Point3, RowVector2, RowVector3, SMatrix, Vector3};
 
-use super::image_model::image_model;
+use super::hyperbola_steps::by_steps;
+use super::image_model::{ImageModel, image_model};
 use super::terms::{Seen, modelled_range};
 
 /// A target in the frame of a camera, with the derivatives of its coordinates.
@@ -38,7 +39,7 @@ impl InCamera {
 pub(crate) struct SightingEquation {
     pub(crate) blocks: Vec<BlockId>,
     pub(crate) camera: Camera,
-    /// Observed image point, pixel; range corrections are taken there whether it is used or not.
+    /// Observed image point, pixel.
     pub(crate) pixel: [f64; 2],
     pub(crate) uses_pixel: bool,
     pub(crate) range: Option<RangeEquation>,
@@ -52,17 +53,18 @@ pub(crate) struct RangeEquation {
     pub(crate) drift_m: f64,
     pub(crate) model: Arc<RangeErrorModel>,
     pub(crate) widths: Arc<[usize]>,
+    /// Whether the hyperbola is stepped in level, height and slope.
+    pub(crate) natural_steps: bool,
 }
 
 impl SightingEquation {
     fn image(
         &self,
-        parameters: &[&[f64]],
         target: &InCamera,
+        model: &ImageModel,
         residual: &mut [f64],
         jacobians: Option<&mut Jacobians<'_>>,
-    ) -> Result<(), EvaluationFailure> {
-        let model = image_model(&self.camera, parameters[2], &target.point, jacobians.is_some())?;
+    ) {
         residual[0] = self.pixel[0] - model.pixel[0];
         residual[1] = self.pixel[1] - model.pixel[1];
         if let Some(jacobians) = jacobians {
@@ -73,19 +75,21 @@ impl SightingEquation {
                 copy(jacobians.row(2, axis), model.by_camera[axis].iter());
             }
         }
-        Ok(())
     }
 
+    #[allow(clippy::too_many_arguments)] // What an evaluation has at hand.
     fn range(
         &self,
         range: &RangeEquation,
         parameters: &[&[f64]],
         target: &InCamera,
+        image: &ImageModel,
         row: usize,
         residual: &mut [f64],
         jacobians: Option<&mut Jacobians<'_>>,
     ) -> Result<(), EvaluationFailure> {
-        let [x, y] = self.camera.format.image_from_pixel(self.pixel);
+        let format = &self.camera.format;
+        let [x, y] = format.image_from_pixel(image.pixel);
         let seen = Seen {
             range_m: range.range_m,
             x_mm: x - parameters[2][0],
@@ -99,10 +103,20 @@ impl SightingEquation {
         let modelled = modelled.map_err(EvaluationFailure::new)?;
         residual[row] = range.range_m - modelled.range_m;
         if let Some(jacobians) = jacobians {
+            if range.natural_steps {
+                by_steps(parameters[3], &mut by_terms);
+            }
+            // By column and row of the modelled image point.
+            let [pitch_x, pitch_y] = format.pixel_pitch_mm;
+            let by_pixel = RowVector2::new(modelled.by_x * pitch_x, -modelled.by_y * pitch_y);
             let direction: RowVector3<f64> = (target.point * (modelled.by_distance / distance)).transpose();
-            copy(jacobians.row(0, row), (direction * target.by_pose).iter());
-            copy(jacobians.row(1, row), (direction * target.by_point).iter());
-            copy(jacobians.row(2, row), [-modelled.by_x, -modelled.by_y].iter());
+            let by_camera_point = direction + by_pixel * image.by_camera_point;
+            copy(jacobians.row(0, row), (by_camera_point * target.by_pose).iter());
+            copy(jacobians.row(1, row), (by_camera_point * target.by_point).iter());
+            let own = [-modelled.by_x, -modelled.by_y].into_iter().chain(std::iter::repeat(0.0));
+            let by_camera = image.by_camera[0].iter().zip(&image.by_camera[1]).zip(own);
+            let by_camera = by_camera.map(|((col, row), own)| by_pixel[0] * col + by_pixel[1] * row + own);
+            jacobians.row(2, row).iter_mut().zip(by_camera).for_each(|(out, value)| *out = value);
             copy(jacobians.row(3, row), by_terms.iter());
         }
         Ok(())
@@ -129,11 +143,12 @@ impl Observation for SightingEquation {
         mut jacobians: Option<&mut Jacobians<'_>>,
     ) -> Result<(), EvaluationFailure> {
         let target = InCamera::new(parameters[0], parameters[1])?;
+        let image = image_model(&self.camera, parameters[2], &target.point, jacobians.is_some())?;
         if self.uses_pixel {
-            self.image(parameters, &target, residual, jacobians.as_deref_mut())?;
+            self.image(&target, &image, residual, jacobians.as_deref_mut());
         }
         if let Some(range) = &self.range {
-            self.range(range, parameters, &target, 2 * usize::from(self.uses_pixel), residual, jacobians)?;
+            self.range(range, parameters, &target, &image, 2 * usize::from(self.uses_pixel), residual, jacobians)?;
         }
         Ok(())
     }
@@ -275,6 +290,7 @@ mod tests {
     use camera_model::{ImageFormat, InteriorOrientation, LensDistortion};
     use error_models::{AmplitudeHyperbola, RangeTerms};
 
+    use super::super::hyperbola_steps::range_block;
     use super::super::terms::{camera_values, family_widths, range_values};
     use super::*;
 
@@ -311,7 +327,8 @@ mod tests {
     fn derivatives_of_a_sighting() {
         let model = Arc::new(model());
         let widths = family_widths(&model).into();
-        let range = RangeEquation { range_m: 2.15, amplitude: 300.0, drift_m: 0.02, model, widths };
+        let range =
+            RangeEquation { range_m: 2.15, amplitude: 300.0, drift_m: 0.02, model, widths, natural_steps: false };
         for (uses_pixel, range) in [(true, Some(range.clone())), (true, None), (false, Some(range))] {
             let blocks = if range.is_some() { blocks() } else { blocks()[..3].to_vec() };
             let ids = ids(blocks.len());
@@ -321,6 +338,20 @@ mod tests {
             // differences agree among themselves to some 1e-6. A wrong factor would show as 1e-2.
             assert!(check.worst < 1e-5, "{check:?}");
         }
+    }
+
+    #[test]
+    fn derivatives_by_the_steps_of_a_hyperbola() {
+        let model = Arc::new(model());
+        let mut blocks = blocks();
+        blocks[3] = range_block(&model, &AmplitudeHyperbola::NAMES.map(str::to_owned).into());
+        let widths = family_widths(&model).into();
+        let range =
+            RangeEquation { range_m: 2.15, amplitude: 300.0, drift_m: 0.02, model, widths, natural_steps: true };
+        let (camera, pixel) = (camera(), [120.3, 31.8]);
+        let equation = SightingEquation { blocks: ids(4), camera, pixel, uses_pixel: true, range: Some(range) };
+        let check = check_jacobian(&equation, &blocks).unwrap();
+        assert!(check.worst < 1e-5, "{check:?}");
     }
 
     #[test]

@@ -10,6 +10,7 @@ mod combine;
 mod contradiction;
 mod equations;
 mod hyperbola;
+mod hyperbola_steps;
 mod image_model;
 mod judgement;
 mod misfit;
@@ -32,10 +33,13 @@ mod settle;
 mod simulate;
 mod start;
 mod start_calibration;
+mod start_finder;
 mod strength;
 mod suspicion;
 mod term_words;
 mod terms;
+
+pub(crate) use misfit::median;
 
 pub use calibrate::{calibrate, calibrate_two_networks};
 pub use contradiction::{Cause, CauseKind, Contradiction, WorstValue};

@@ -23,6 +23,9 @@ pub struct CalibrationOutcome {
     pub estimated: Vec<String>,
     /// Prior-scaled covariance of [`Self::estimated`].
     pub covariance: DMatrix<f64>,
+    /// Its first-order part: what derivatives by the parameters carry to corrected ranges and points. Another one where a
+    /// hyperbola is estimated, whose coefficients have more than proportional errors.
+    pub first_order_covariance: DMatrix<f64>,
     /// Adjusted stations.
     pub stations: Vec<AdjustedStation>,
     /// Adjusted targets.

@@ -140,7 +140,7 @@ pub fn plan(network: &Network, options: &PlanOptions) -> Result<PlanOutcome> {
     let (observed, setup_start) = design.observe(network)?;
     let setup = design.setup(&observed, setup_start)?;
     let solved = setup.solve().map_err(|error| setup.explain(error, options.largest_inflation))?;
-    let estimate = setup.estimate(&solved)?;
+    let estimate = setup.estimate_of_terms(&solved)?;
     let strength = setup.strength(&solved)?;
     let inflation = strength.as_ref().map_or(1.0, |strength| strength.inflation);
     let verdict = if inflation > options.largest_inflation {
@@ -302,7 +302,7 @@ impl<'o> Design<'o> {
             extended.sightings.extend(seen);
             let (observed, start) = self.observe(&extended)?;
             let setup = self.setup(&observed, start)?;
-            let after = setup.estimate(&setup.solve()?)?;
+            let after = setup.estimate_of_terms(&setup.solve()?)?;
             let ratio = |i: usize| (after.covariance[(i, i)] / estimate.covariance[(i, i)]).sqrt();
             let gain: Vec<_> = estimate.names.iter().enumerate().map(|(i, name)| (name.clone(), ratio(i))).collect();
             let score = gain.iter().map(|(_, ratio)| ratio.ln()).sum::<f64>() / gain.len().max(1) as f64;

@@ -18,7 +18,7 @@ pub(crate) fn point_sigma(calibration: &Calibration, estimate: &Estimate, range_
         let columns: Vec<Vector3<f64>> =
             estimate.names.iter().map(|name| derivative(calibration, name, pixel, range_m)).collect();
         let jacobian = DMatrix::from_fn(3, columns.len(), |row, column| columns[column][row]);
-        sum += (&jacobian * &estimate.covariance * jacobian.transpose()).trace();
+        sum += (&jacobian * &estimate.first_order * jacobian.transpose()).trace();
     }
     (sum / (GRID * GRID) as f64).sqrt()
 }

@@ -9,6 +9,7 @@ use error_models::RangeErrorModel;
 use nalgebra::{DMatrix, Isometry3, Point3};
 
 use super::equations::{RangeEquation, SightingEquation};
+use super::hyperbola_steps::has_natural_steps;
 use super::terms::family_widths;
 use super::{Component, DistanceEnd, Network};
 
@@ -179,6 +180,7 @@ impl Setup<'_> {
             amplitude: seen.amplitude.unwrap_or(f64::NAN),
             drift_m: self.network.stations[seen.station].drift_m,
             widths: family_widths(&model).into(),
+            natural_steps: has_natural_steps(&model, &self.estimated),
             model,
         });
         EquationParts { pixel: seen.pixel.unwrap_or([f64::NAN; 2]), uses_pixel, range }

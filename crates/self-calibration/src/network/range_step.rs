@@ -10,6 +10,7 @@ use adjust::{
 use error_models::RangeErrorModel;
 use nalgebra::DMatrix;
 
+use super::hyperbola_steps::{by_steps, covariance_of_terms, has_natural_steps, range_block};
 use super::misfit::median;
 use super::problem::{RangeSet, Setup};
 use super::reference::Reference;
@@ -17,7 +18,7 @@ use super::rejection::suspects;
 use super::report::covariance_of;
 use super::settle::start_range_limit;
 use super::strength::{Motions, Strength, combination, weakest};
-use super::terms::{Seen, family_widths, modelled_range, range_model_from, range_names, range_values};
+use super::terms::{Seen, family_widths, modelled_range, range_model_from, range_names};
 use super::{CalibrationOptions, Component};
 use crate::{Error, Result};
 
@@ -34,6 +35,7 @@ struct DifferenceEquation {
     seen: Seen,
     model: Arc<RangeErrorModel>,
     widths: Arc<[usize]>,
+    natural_steps: bool,
 }
 
 impl Observation for DifferenceEquation {
@@ -59,6 +61,9 @@ impl Observation for DifferenceEquation {
         let modelled = modelled_range(&self.model, &self.widths, &self.seen, terms, distance, &mut by_terms);
         let modelled = modelled.map_err(EvaluationFailure::new)?;
         residual[0] = self.observed_m - modelled.range_m;
+        if self.natural_steps {
+            by_steps(terms, &mut by_terms);
+        }
         if let Some(jacobians) = jacobians {
             jacobians.row(0, 0).copy_from_slice(&[reference * modelled.by_distance]);
             jacobians.row(1, 0).copy_from_slice(&by_terms);
@@ -84,6 +89,9 @@ pub(crate) struct RangeStep {
     /// Names of the estimated terms and their covariance.
     pub(crate) names: Vec<String>,
     pub(crate) covariance: DMatrix<f64>,
+    pub(crate) first_order: DMatrix<f64>,
+    /// Covariance of the steps in which the terms were adjusted.
+    steps: DMatrix<f64>,
     /// Covariance between [`Reference::carried`] (rows) and the terms (columns).
     pub(crate) carried: DMatrix<f64>,
     /// Scale of the first step, its variance and its covariance with [`Reference::carried`]; where the ranges gave it.
@@ -144,7 +152,7 @@ impl RangeStep {
         scale: ScaleUse,
     ) -> Result<Self> {
         let places: Vec<_> = terms.estimated.iter().map(|(_, block, component)| (*block, *component)).collect();
-        let covariance = covariance_of(&solution, &places)?;
+        let steps = covariance_of(&solution, &places)?;
         let mut sets = setup.calibration.sets.clone();
         for (set, &block) in sets.iter_mut().zip(&terms.sets) {
             set.model = range_model_from(&set.model, solution.values(block)?);
@@ -167,8 +175,11 @@ impl RangeStep {
             }
         };
         let alone = deviations_alone(setup, &reference, terms)?;
-        let names = terms.estimated.iter().map(|(name, ..)| name.clone()).collect();
-        Ok(Self { solution, reference, rejected, sets, names, covariance, carried, scale, alone })
+        let names: Vec<String> = terms.estimated.iter().map(|(name, ..)| name.clone()).collect();
+        let of_terms = covariance_of_terms(&names, [&setup.calibration.sets, &sets], &setup.estimated, &steps);
+        let carried = carried * of_terms.by_steps.transpose();
+        let (covariance, first_order) = (of_terms.full, of_terms.first_order);
+        Ok(Self { solution, reference, rejected, sets, names, covariance, first_order, steps, carried, scale, alone })
     }
 
     /// The weakest combination of the range terms.
@@ -176,7 +187,7 @@ impl RangeStep {
         if self.names.is_empty() {
             return None;
         }
-        let (direction, inflation) = weakest(&self.covariance, &self.alone);
+        let (direction, inflation) = weakest(&self.steps, &self.alone);
         let combination = combination(&direction, &self.names);
         let correlation = "from the reference ranges alone".to_owned();
         let advice = setup.advice(&combination, &Motions { distance: 1.0, ..Motions::default() });
@@ -189,21 +200,27 @@ fn adjusted(setup: &Setup<'_>, reference: &Reference, scale: ScaleUse) -> Result
     let mut adjustment = Adjustment::new();
     let terms = add_blocks(setup, reference, scale, &mut adjustment)?;
     let group = adjustment.add_group("ranges");
-    let models: Vec<(Arc<RangeErrorModel>, Arc<[usize]>)> = setup
+    let models: Vec<(Arc<RangeErrorModel>, Arc<[usize]>, bool)> = setup
         .calibration
         .sets
         .iter()
-        .map(|set| (Arc::new(set.model.clone()), family_widths(&set.model).into()))
+        .map(|set| {
+            let natural_steps = has_natural_steps(&set.model, &setup.estimated);
+            (Arc::new(set.model.clone()), family_widths(&set.model).into(), natural_steps)
+        })
         .collect();
     for (row, (&index, &reference_m)) in reference.sightings.iter().zip(&reference.values).enumerate() {
         let seen = &setup.network.sightings[index];
-        let (Some(observed_m), Some(values)) = (seen.range_m, observed(setup, index)) else { continue };
+        let (Some(observed_m), Some(values)) = (seen.range_m, observed(setup, index, reference.pixels[row])) else {
+            continue;
+        };
         let set = setup.set_of(seen.station);
         let mut blocks = vec![terms.scale, terms.sets[set]];
         blocks.extend(terms.latent);
-        let (model, widths) = models[set].clone();
+        let (model, widths, natural_steps) = models[set].clone();
         let root = reference.root.row(row).iter().copied().collect();
-        let equation = DifferenceEquation { blocks, observed_m, reference_m, root, seen: values, model, widths };
+        let equation =
+            DifferenceEquation { blocks, observed_m, reference_m, root, seen: values, model, widths, natural_steps };
         adjustment.add_observation(group, equation, &Covariance::from_sigma(seen.sigma_range_m))?;
     }
     match adjustment.solve(&SolveOptions::default()) {
@@ -226,7 +243,7 @@ fn add_blocks(
     let mut terms = Terms { scale: scale_block, sets: Vec::new(), latent: None, estimated: Vec::new() };
     for set in &setup.calibration.sets {
         let names = range_names(&set.model);
-        let block = ParameterBlock::euclidean(range_values(&set.model)).named("range terms");
+        let block = range_block(&set.model, &setup.estimated).named("range terms");
         let suffixed = names.iter().map(|name| format!("{name}{}", set.suffix));
         let block = adjustment.add_block(block.with_parameter_names(suffixed));
         for (component, name) in names.iter().enumerate() {
@@ -250,10 +267,10 @@ fn add_blocks(
 }
 
 /// What the correction of a sighting's range is a function of.
-fn observed(setup: &Setup<'_>, index: usize) -> Option<Seen> {
+fn observed(setup: &Setup<'_>, index: usize, pixel: Option<[f64; 2]>) -> Option<Seen> {
     let seen = &setup.network.sightings[index];
     let camera = &setup.calibration.camera;
-    let [x, y] = camera.format.image_from_pixel(seen.pixel?);
+    let [x, y] = camera.format.image_from_pixel(pixel?);
     let [xp, yp] = camera.interior.principal_point_mm;
     let amplitude = seen.amplitude.unwrap_or(f64::NAN);
     let drift_m = setup.network.stations[seen.station].drift_m;

@@ -3,6 +3,7 @@
 use adjust::{BlockId, Scale};
 use nalgebra::{DMatrix, Vector3};
 
+use super::misfit::modelled_pixel;
 use super::problem::{Setup, Solved};
 use super::quality::Geometry;
 use super::{DistanceEnd, Network};
@@ -13,6 +14,9 @@ use crate::{Error, Result};
 pub(crate) struct Reference {
     /// Sightings, by their position in the network.
     pub(crate) sightings: Vec<usize>,
+    /// Image points at which corrections are taken, pixel: modelled ones where poses and coordinates were adjusted, else
+    /// those measured.
+    pub(crate) pixels: Vec<Option<[f64; 2]>>,
     /// Reference ranges, metre.
     pub(crate) values: Vec<f64>,
     /// `J L` with the covariance `L Lᵀ` of what they were computed from.
@@ -39,12 +43,16 @@ impl Reference {
             }
         }
         let root = root_of(solved, &places)?;
+        let camera = setup.calibration_found(solved)?.camera;
         let mut values = Vec::with_capacity(sightings.len());
+        let mut pixels = Vec::with_capacity(sightings.len());
         let mut rows = DMatrix::zeros(sightings.len(), root.ncols());
         for (row, &index) in sightings.iter().enumerate() {
             let seen = &setup.network.sightings[index];
             let (distance, direction) = between(&geometry, seen.station, seen.target);
             values.push(distance);
+            let point = geometry.targets[seen.target];
+            pixels.push(point.and_then(|point| modelled_pixel(&camera, &geometry.stations[seen.station], &point)));
             for axis in 0..3 {
                 let station = root.row(first_station + 3 * seen.station + axis);
                 let target = root.row(first_of_target[seen.target] + axis);
@@ -53,7 +61,7 @@ impl Reference {
                 own += sum;
             }
         }
-        Ok(Self { sightings, values, root: rows, carried: root })
+        Ok(Self { sightings, pixels, values, root: rows, carried: root })
     }
 
     /// From known distances, and from known poses and coordinates where there is no distance.
@@ -72,7 +80,8 @@ impl Reference {
             }
         }
         let root = columns.matrix(sightings.len());
-        Ok(Self { sightings, values, carried: DMatrix::zeros(0, root.ncols()), root })
+        let pixels = sightings.iter().map(|&index| network.sightings[index].pixel).collect();
+        Ok(Self { sightings, pixels, values, carried: DMatrix::zeros(0, root.ncols()), root })
     }
 
     /// Without some of its rows.
@@ -80,6 +89,7 @@ impl Reference {
         let kept: Vec<usize> = (0..self.values.len()).filter(|&row| !rejected.contains(&self.sightings[row])).collect();
         Self {
             sightings: kept.iter().map(|&row| self.sightings[row]).collect(),
+            pixels: kept.iter().map(|&row| self.pixels[row]).collect(),
             values: kept.iter().map(|&row| self.values[row]).collect(),
             root: self.root.select_rows(&kept),
             carried: self.carried.clone(),

@@ -6,6 +6,7 @@ use adjust::{BlockId, Distribution, Scale, Solution};
 use error_models::{ParameterStatus, RangeErrorModel};
 use nalgebra::{DMatrix, Matrix3, Matrix6};
 
+use super::hyperbola_steps::covariance_of_terms;
 use super::problem::{Calibration, RangeSet, Setup, Solved};
 use super::quality::{USUAL_LEVEL, groups};
 use super::terms::{camera_from, camera_names, camera_values, range_model_from, range_names, range_values, unit};
@@ -19,6 +20,8 @@ use crate::Result;
 pub(crate) struct Estimate {
     pub(crate) names: Vec<String>,
     pub(crate) covariance: DMatrix<f64>,
+    /// See [`CalibrationOutcome::first_order_covariance`].
+    pub(crate) first_order: DMatrix<f64>,
 }
 
 impl Setup<'_> {
@@ -35,12 +38,22 @@ impl Setup<'_> {
         estimated.map(|(full, _, block, component)| (full, block, component)).collect()
     }
 
-    /// Estimated calibration parameters with their covariance.
+    /// Estimated calibration parameters with the covariance of their values.
+    pub(crate) fn estimate_of_terms(&self, solved: &Solved) -> Result<Estimate> {
+        let Estimate { names, covariance, .. } = self.estimate(solved)?;
+        let found = self.calibration_found(solved)?.sets;
+        let of_terms = covariance_of_terms(&names, [&self.calibration.sets, &found], &self.estimated, &covariance);
+        Ok(Estimate { names, covariance: of_terms.full, first_order: of_terms.first_order })
+    }
+
+    /// Estimated calibration parameters with the covariance of the adjustment's steps: a hyperbola is stepped in other
+    /// numbers.
     pub(crate) fn estimate(&self, solved: &Solved) -> Result<Estimate> {
         let parameters = self.estimated_parameters(solved);
         let places: Vec<_> = parameters.iter().map(|(_, block, component)| (*block, *component)).collect();
         let covariance = covariance_of(&solved.solution, &places)?;
-        Ok(Estimate { names: parameters.into_iter().map(|(name, ..)| name).collect(), covariance })
+        let names = parameters.into_iter().map(|(name, ..)| name).collect();
+        Ok(Estimate { names, first_order: covariance.clone(), covariance })
     }
 
     /// The calibration with the solution's values and the spans that were observed.
@@ -60,7 +73,7 @@ impl Setup<'_> {
     pub(crate) fn outcome(&self, solved: &Solved, options: &CalibrationOptions) -> Result<CalibrationOutcome> {
         let solution = &solved.solution;
         let calibration = self.calibration_found(solved)?;
-        let estimate = self.estimate(solved)?;
+        let estimate = self.estimate_of_terms(solved)?;
         let residuals = self.qualities(solved, options.rejection_level.unwrap_or(USUAL_LEVEL))?;
         let figures = Fit {
             observations: solution.observations(),
@@ -77,6 +90,7 @@ impl Setup<'_> {
             parameters: parameters(&calibration, &estimate, &figures),
             estimated: estimate.names,
             covariance: estimate.covariance,
+            first_order_covariance: estimate.first_order,
             stations: self.stations(solved)?,
             targets: self.targets(solved)?,
             groups: groups(&residuals),

@@ -54,7 +54,7 @@ pub(crate) fn robust_resection(
     camera: &camera_model::Camera,
     targets: &[TargetObservation],
 ) -> std::result::Result<Isometry3<f64>, String> {
-    let all = trimmed_resection(camera, targets.to_vec());
+    let all = trimmed_resection(camera, targets.to_vec(), None);
     let diagonal = (camera.format.width as f64).hypot(camera.format.height as f64);
     let good = |pose: &Isometry3<f64>| median(distances(camera, targets, pose)) <= GOOD_SHARE * diagonal;
     if targets.len() <= SAMPLE + 1 || all.as_ref().is_ok_and(good) {
@@ -75,7 +75,7 @@ pub(crate) fn robust_resection(
     let Some((typical, pose)) = candidates.chain(given).min_by(|a, b| a.0.total_cmp(&b.0)) else { return all };
     let near = distances(camera, targets, &pose).into_iter().map(|distance| distance <= OUTLYING * typical);
     let agreeing = targets.iter().zip(near).filter(|(_, near)| *near).map(|(target, _)| *target).collect();
-    Ok(trimmed_resection(camera, agreeing).unwrap_or(pose))
+    Ok(trimmed_resection(camera, agreeing, None).unwrap_or(pose))
 }
 
 /// Distances of the image points from where a pose puts them, pixel.
@@ -87,13 +87,16 @@ fn distances(camera: &camera_model::Camera, targets: &[TargetObservation], pose:
     targets.iter().map(distance).collect()
 }
 
-fn trimmed_resection(
+/// Resection that leaves out the worst targets as long as they stand out from the others; from an approximate pose, which
+/// is much cheaper, or from none.
+pub(crate) fn trimmed_resection(
     camera: &camera_model::Camera,
     mut targets: Vec<TargetObservation>,
+    approximate: Option<Isometry3<f64>>,
 ) -> std::result::Result<Isometry3<f64>, String> {
     let given = targets.len();
     let fewest = (given * 2).div_ceil(3).max(NEEDED + 1);
-    let mut found = resect(camera, &targets, &from(None)).map_err(|error| error.to_string())?;
+    let mut found = resect(camera, &targets, &from(approximate)).map_err(|error| error.to_string())?;
     loop {
         let sizes: Vec<f64> = found.residuals.iter().map(|r| r.pixel[0].hypot(r.pixel[1])).collect();
         let limit = 2.0 * OUTLYING * median(sizes.clone());
@@ -103,7 +106,8 @@ fn trimmed_resection(
         outlying.truncate((outlying.len() / 2).max(1).min(targets.len().saturating_sub(fewest)));
         if outlying.is_empty() {
             // Without the targets that went, another of two poses may fit better.
-            let anew = (targets.len() < given).then(|| resect(camera, &targets, &from(None)).ok()).flatten();
+            let is_open = approximate.is_none() && targets.len() < given;
+            let anew = is_open.then(|| resect(camera, &targets, &from(None)).ok()).flatten();
             return Ok(anew.unwrap_or(found).world_from_camera);
         }
         let mut index = 0;

@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 use error_models::AmplitudeHyperbola;
 
 use super::calibrate::{Problem, ranged_stations};
-use super::hyperbola::with_hyperbola;
+use super::hyperbola::{is_worth_trying, with_hyperbola};
 use super::term_words::{SINES, expand};
 use super::terms::camera_names;
 use super::{CalibrationOutcome, Method, Network, TermDecision, TermSelection, auto_terms};
@@ -96,6 +96,9 @@ impl Problem<'_> {
         }
         // Residuals that show no hyperbola, or one that the adjustment can't hold on to, speak for the plain model.
         let Ok(network) = with_hyperbola(self.network, &without) else { return Ok((own, without)) };
+        if !is_worth_trying(&network, &without) {
+            return Ok((own, without));
+        }
         match auto_terms::choose(&Problem { network: &network, ..*self }) {
             Ok(with) if comparable_bic(&with) < comparable_bic(&without) => Ok((Cow::Owned(network), with)),
             _ => Ok((own, without)),

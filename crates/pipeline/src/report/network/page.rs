@@ -56,7 +56,11 @@ fn range_errors(page: &mut Page, outcome: &CalibrationOutcome) {
 
 fn uncertainty(page: &mut Page, outcome: &CalibrationOutcome) -> Result<()> {
     let source = PointUncertainty { camera: &outcome.camera, range_models: &outcome.range_models };
-    let figures = source.figures(&outcome.estimated, &outcome.covariance, point_uncertainty::amplitude_of(outcome))?;
+    let figures = source.figures(
+        &outcome.estimated,
+        &outcome.first_order_covariance,
+        point_uncertainty::amplitude_of(outcome),
+    )?;
     if figures.is_empty() {
         return Ok(());
     }

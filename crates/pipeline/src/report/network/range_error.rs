@@ -79,7 +79,7 @@ fn curve(outcome: &CalibrationOutcome, model: &RangeErrorModel, x: [f64; 2]) -> 
     let uncertainty = PointUncertainty { camera: &outcome.camera, range_models: &outcome.range_models };
     let at = |step: usize| x[0] + (x[1] - x[0]) * step as f64 / STEPS as f64;
     let places: Vec<f64> = (0..=STEPS).map(at).collect();
-    let sigmas = uncertainty.correction_sigmas(&outcome.estimated, &outcome.covariance, &places, amplitude);
+    let sigmas = uncertainty.correction_sigmas(&outcome.estimated, &outcome.first_order_covariance, &places, amplitude);
     let value = |range_m: f64| 1e3 * everywhere.correction(range_m, 0.0, 0.0, amplitude).total_m();
     places.iter().zip(sigmas).map(|(range_m, sigma)| (*range_m, value(*range_m), 1e3 * sigma)).collect()
 }

@@ -59,18 +59,17 @@ impl Adjustment<'_> {
         if let Err(error) = iteration.run() {
             iteration.renew()?;
             // A descent that finds no end often has none: an undetermined direction is then the better answer.
-            let undetermined =
-                matches!(error, Error::NotConverged { .. }) && iteration.problem().factorise()?.is_none();
-            if undetermined {
+            let Error::NotConverged { iterations, reason, objective, step, damping, .. } = error else {
+                return Err(error);
+            };
+            // What ran away is undetermined where it ended, but that is not why.
+            let vanished = iteration.vanished()?;
+            if vanished.is_none() && iteration.problem().factorise()?.is_none() {
                 return Err(iteration.problem().defect(&names)?);
             }
-            return Err(match error {
-                Error::NotConverged { iterations, reason, objective, step, damping, .. } => {
-                    let parameter = iteration.unsettled().map_or_else(String::new, |unknown| names[unknown].clone());
-                    Error::NotConverged { iterations, reason, objective, step, damping, parameter }
-                }
-                error => error,
-            });
+            let parameter = vanished.or_else(|| iteration.unsettled()).map(|unknown| names[unknown].clone());
+            let parameter = parameter.unwrap_or_default();
+            return Err(Error::NotConverged { iterations, reason, objective, step, damping, parameter });
         }
         let cofactor = iteration.problem().cofactor(&names)?;
         let (values, linearisation, trace) = (iteration.values, iteration.current, iteration.trace);

@@ -11,6 +11,7 @@ mod datum_change;
 mod descend;
 mod distributions;
 mod elimination;
+mod global_test;
 mod iteration;
 mod linear;
 mod network;

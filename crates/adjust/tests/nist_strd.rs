@@ -1,5 +1,8 @@
 //! NIST's certified nonlinear regressions, from both starts.
 
+#[path = "nist_strd/hard.rs"]
+mod hard;
+
 use std::fs;
 use std::path::Path;
 
@@ -225,39 +228,53 @@ fn solve(problem: &Problem, start: &[f64]) -> Result<(f64, f64, f64, usize), adj
     ))
 }
 
+/// The files of lower and average difficulty that are looked for; the eight harder problems are part of the test.
+const FILES: [&str; 19] = [
+    "Chwirut1", "Chwirut2", "DanWood", "ENSO", "Gauss1", "Gauss2", "Gauss3", "Hahn1", "Kirby2", "Lanczos1", "Lanczos2",
+    "Lanczos3", "MGH17", "Misra1a", "Misra1b", "Misra1c", "Misra1d", "Nelson", "Roszman1",
+];
+
+/// All problems, or the eight harder ones where the captures are not at hand. A single missing file is an error.
+fn problems() -> Vec<Problem> {
+    let mut problems = hard::problems();
+    let folder = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/real/nist_strd"));
+    if folder.is_dir() {
+        problems.extend(FILES.map(|name| parse(&folder.join(format!("{name}.dat")))));
+    } else {
+        println!("skipped: {} is not there", folder.display());
+    }
+    problems
+}
+
 #[test]
 fn certified_values_are_reached_from_both_starts() {
-    let shared = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/real/nist_strd");
-    let Ok(entries) = fs::read_dir(shared) else {
-        println!("skipped: {shared} is not there");
-        return;
-    };
-    let files = entries.map(|entry| entry.unwrap().path());
-    let mut paths: Vec<_> = files.filter(|path| path.extension().is_some_and(|extension| extension == "dat")).collect();
-    paths.sort();
-    let (mut count, mut solved, mut parameter_digits, mut deviation_digits) = (0, 0, 0.0, 0.0);
-    for path in &paths {
-        let problem = parse(path);
+    let problems = problems();
+    let (mut count, mut parameter_digits, mut deviation_digits, mut unsolved) = (0, 0.0, 0.0, Vec::new());
+    for problem in &problems {
         for (index, start) in problem.starts.iter().enumerate() {
             count += 1;
-            match solve(&problem, start) {
+            match solve(problem, start) {
                 Ok((parameters, deviations, sum, iterations)) => {
                     println!(
                         "{:9} {index}: {parameters:5.2} {deviations:5.2} {sum:5.2} digits, {iterations} iterations",
                         problem.name
                     );
-                    solved += usize::from(parameters > 6.0);
+                    if parameters <= 6.0 {
+                        unsolved.push(format!("{} {index}: {parameters:.1} digits", problem.name));
+                    }
                     parameter_digits += parameters;
                     deviation_digits += deviations;
                 }
-                Err(error) => println!("{:9} {index}: {error}", problem.name),
+                Err(error) => unsolved.push(format!("{} {index}: {error}", problem.name)),
             }
         }
     }
     let (parameters, deviations) = (parameter_digits / f64::from(count), deviation_digits / f64::from(count));
-    println!("{solved} of {count} solved; mean digits: parameters {parameters:.2}, deviations {deviations:.2}");
-    assert_eq!(solved, count as usize);
-    // The end at 1e-8 of a standard deviation leaves at least this much in the mean over the problems.
-    assert!(parameters > 10.4, "{parameters}");
-    assert!(deviations > 10.1, "{deviations}");
+    println!("{count} runs; mean digits: parameters {parameters:.2}, deviations {deviations:.2}");
+    assert!(unsolved.is_empty(), "{unsolved:#?}");
+    // The end at 1e-8 of a standard deviation leaves at least this much in the mean over the problems. Among the harder
+    // ones MGH09 (large residuals, eleven observations) weighs more.
+    let all = problems.len() == 27;
+    assert!(parameters > if all { 10.4 } else { 10.2 }, "{parameters}");
+    assert!(deviations > if all { 10.1 } else { 9.9 }, "{deviations}");
 }

@@ -3,6 +3,7 @@
 #![allow(clippy::needless_range_loop)]
 
 mod adjustment;
+mod blame;
 mod block;
 mod block_normal;
 mod border;
@@ -16,6 +17,8 @@ mod dense;
 mod descend;
 mod descent;
 mod diagnosis;
+mod differentiated;
+mod display;
 mod distributions;
 mod dog_leg;
 mod eliminated_cofactor;
@@ -46,6 +49,7 @@ mod product;
 mod quality;
 mod rank;
 mod readmission;
+mod real;
 mod reduced_constraints;
 mod reliability;
 mod rigid_pose;
@@ -69,6 +73,7 @@ pub use covariance::Covariance;
 pub use datum::DatumDefect;
 pub use descend::Descent;
 pub use diagnosis::Diagnosis;
+pub use differentiated::{Differentiated, Parameters, Pose, ResidualFunction};
 pub use distributions::Distribution;
 pub use error::{Error, EvaluationFailure, Result};
 pub use global_test::{GlobalTest, GlobalVerdict};
@@ -80,6 +85,7 @@ pub use observation::{FunctionObservation, Jacobians, LinearObservation, Observa
 pub use options::{Method, SolveOptions};
 pub use outlier::{OutlierTest, SnoopingTest, Suspect};
 pub use quality::GroupSummary;
+pub use real::{Dual, Real};
 pub use reliability::{ComponentReliability, ExternalReliability, ReliabilityOptions};
 pub use rigid_pose::RigidPose;
 pub use significance::Significance;

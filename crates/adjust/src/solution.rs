@@ -50,9 +50,14 @@ impl Adjustment<'_> {
     /// # Errors
     /// [`Error::RankDeficient`] names what is not determined; [`Error::NotConverged`] where the iteration found no end;
     /// [`Error::Evaluation`] and [`Error::NotFinite`] name an observation whose model has no value at the start;
-    /// [`Error::DatumOverdetermined`], [`Error::Datum`] and [`Error::DependentConstraint`] speak of the constraints.
+    /// [`Error::DatumOverdetermined`], [`Error::Datum`] and [`Error::DependentConstraint`] speak of the constraints;
+    /// [`Error::Jacobian`] names a wrong derivative where one can be why there is no end or a defect.
     pub fn solve(&self, options: &SolveOptions) -> Result<Solution> {
         options.check()?;
+        self.solve_unchecked(options).map_err(|error| self.blame(error))
+    }
+
+    fn solve_unchecked(&self, options: &SolveOptions) -> Result<Solution> {
         let layout = Layout::new(self)?;
         let names = self.unknown_names(&layout);
         let mut iteration = Iteration::new(self, &layout, options)?;

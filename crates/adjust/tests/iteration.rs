@@ -79,7 +79,43 @@ fn a_wrong_jacobian_does_not_pass() {
     assert_relative_eq!(check.numeric, 2.0, epsilon = 1e-9);
     a.add_observation(group, wrong(), &Covariance::from_sigma(1.0)).unwrap();
     let error = a.solve(&SolveOptions::default()).unwrap_err();
-    assert!(matches!(error, Error::NotConverged { .. }), "{error}");
+    let Error::Jacobian { group, parameter, given, differences, consequence, .. } = &error else { panic!("{error}") };
+    assert_eq!((group.as_str(), parameter.as_str()), ("g", "block 0"));
+    assert_relative_eq!(given / differences, -1.0, epsilon = 1e-9);
+    assert!(matches!(**consequence, Error::NotConverged { .. }), "{error}");
+    assert!(error.to_string().contains("check_jacobian"), "{error}");
+}
+
+#[test]
+fn a_forgotten_derivative_is_told_from_a_rank_defect() {
+    // The second derivative is left out; or it is zero because nothing depends on the parameter.
+    for depends in [true, false] {
+        let mut a = Adjustment::new();
+        let x = a.add_block(ParameterBlock::euclidean([1.0, 1.0]).with_parameter_names(["seen", "forgotten"]));
+        let good = a.add_group("good");
+        a.add_observation(good, LinearObservation::new(1.0, [(x, [1.0, 0.0])]), &Covariance::from_sigma(1.0)).unwrap();
+        let group = a.add_group("bad");
+        for i in 0..5 {
+            let t = f64::from(i);
+            let observation = FunctionObservation::new([x], 1, move |parameters, residual, jacobians| {
+                let b = parameters[0];
+                residual[0] = 3.0 * t - b[0] * t - if depends { b[1].powi(2) * t * t } else { 0.0 };
+                if let Some(jacobians) = jacobians {
+                    jacobians.row(0, 0)[0] = t;
+                }
+                Ok(())
+            });
+            a.add_observation(group, observation, &Covariance::from_sigma(1.0)).unwrap();
+        }
+        let error = a.solve(&SolveOptions::default()).unwrap_err();
+        let blamed = matches!(&error, Error::Jacobian { group, parameter, observation: 5, .. }
+            if group == "bad" && parameter == "forgotten");
+        assert_eq!(blamed, depends, "{error}");
+        assert_eq!(matches!(error, Error::RankDeficient { defect: 1, .. }), !depends, "{error}");
+        // What is held needs no derivative.
+        a.hold_parameter(x, 1).unwrap();
+        a.solve(&SolveOptions::default()).unwrap();
+    }
 }
 
 #[test]

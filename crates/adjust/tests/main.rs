@@ -9,6 +9,10 @@ mod checkerboard;
 mod common;
 mod datum_change;
 mod descend;
+mod differentiated;
+#[path = "common/differentiated_camera.rs"]
+mod differentiated_camera;
+mod display;
 mod distributions;
 mod elimination;
 mod global_test;

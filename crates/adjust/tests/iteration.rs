@@ -119,6 +119,42 @@ fn a_forgotten_derivative_is_told_from_a_rank_defect() {
 }
 
 #[test]
+fn a_wrong_constraint_is_blamed_and_a_kink_is_not() {
+    // A constraint x² + y² = 25 with the derivatives of a sum; and a distance whose start is its kink, beside a parameter
+    // that nothing determines.
+    let mut a = Adjustment::new();
+    let x = a.add_block(ParameterBlock::euclidean([3.0, 1.0]).named("x"));
+    a.add_prior(x, &[3.0, 1.0], &Covariance::from_sigmas(&[1.0; 2])).unwrap();
+    let circle = FunctionObservation::new([x], 1, |parameters, residual, jacobians| {
+        residual[0] = 25.0 - parameters[0].iter().map(|x| x * x).sum::<f64>();
+        if let Some(jacobians) = jacobians {
+            jacobians.row(0, 0).fill(-1.0);
+        }
+        Ok(())
+    });
+    a.add_constraint(circle).unwrap();
+    let error = a.solve(&SolveOptions::default()).unwrap_err();
+    assert!(matches!(&error, Error::Jacobian { group, observation: 0, .. } if group == "constraint"), "{error}");
+
+    let mut a = Adjustment::new();
+    let x = a.add_block(ParameterBlock::euclidean([2.0, 0.0]).named("x"));
+    let group = a.add_group("distances");
+    for target in [2.0, 5.0] {
+        let distance = FunctionObservation::new([x], 1, move |parameters, residual, jacobians| {
+            let difference = parameters[0][0] - target;
+            residual[0] = 1.0 - difference.abs();
+            if let Some(jacobians) = jacobians {
+                jacobians.row(0, 0)[0] = if difference < 0.0 { -1.0 } else { 1.0 };
+            }
+            Ok(())
+        });
+        a.add_observation(group, distance, &Covariance::from_sigma(1.0)).unwrap();
+    }
+    let error = a.solve(&SolveOptions::default()).unwrap_err();
+    assert!(matches!(error, Error::RankDeficient { defect: 1, .. }), "{error}");
+}
+
+#[test]
 fn a_model_without_value_shortens_the_step() {
     // The full step from 4 goes to −1.5, where the root has no value.
     for method in [Method::GaussNewton, Method::LevenbergMarquardt, Method::DogLeg] {

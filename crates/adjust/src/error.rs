@@ -132,6 +132,30 @@ pub enum Error {
         /// that is not known.
         parameter: String,
     },
+    /// The adjustment found no end, or something undetermined, and the Jacobian of an observation differs from the
+    /// differences of its model, at the approximate values and beside them: [`crate::check_jacobian`] finds such.
+    #[error(
+        "{consequence}; but the Jacobian of group `{group}`, observation {observation}, component {component} is wrong: its \
+         derivative with respect to `{parameter}` is {given:.6e}, that by differences is {differences:.6e} (compare with \
+         `check_jacobian`)"
+    )]
+    Jacobian {
+        /// Group of the observation, or `constraint`.
+        group: String,
+        /// Number of the observation or constraint, in the order of adding.
+        observation: usize,
+        /// Component of the observation.
+        component: usize,
+        /// The parameter whose derivative is furthest off.
+        parameter: String,
+        /// The derivative of the model that the observation gave.
+        given: f64,
+        /// The derivative of the model by differences.
+        differences: f64,
+        /// The error that came of it: [`Error::NotConverged`] or [`Error::RankDeficient`].
+        #[source]
+        consequence: Box<Error>,
+    },
     /// A posterior scale was asked for where there is no redundancy.
     #[error("redundancy {redundancy}: there is no posterior variance factor")]
     NoRedundancy {

@@ -66,11 +66,13 @@ pub(crate) struct Iteration<'p, 'a> {
     pub(crate) metric: Vec<f64>,
     /// Radius of the region that the dog-leg trusts, in units of the metric.
     pub(crate) radius: f64,
+    /// Whether steps that take a parameter's action away are refused.
+    pub(crate) cautious: bool,
 }
 
 impl<'p, 'a> Iteration<'p, 'a> {
     pub(crate) fn new(adjustment: &'p Adjustment<'a>, layout: &'p Layout, options: &'p SolveOptions) -> Result<Self> {
-        let values: Vec<f64> = adjustment.blocks.iter().flat_map(|block| block.values.iter().copied()).collect();
+        let values = adjustment.start();
         let mut this = Self {
             adjustment,
             layout,
@@ -92,6 +94,7 @@ impl<'p, 'a> Iteration<'p, 'a> {
             last_gain: 0.0,
             metric: vec![f64::INFINITY; layout.unknowns],
             radius: f64::INFINITY,
+            cautious: false,
         };
         this.current.evaluate(adjustment, layout, &this.values, Want::Jacobians)?;
         this.linearise()?;
@@ -99,7 +102,7 @@ impl<'p, 'a> Iteration<'p, 'a> {
     }
 
     /// Everything that follows from the derivatives in `current`.
-    fn linearise(&mut self) -> Result<()> {
+    pub(crate) fn linearise(&mut self) -> Result<()> {
         self.is_renewed = true;
         let structure = self.system.structure();
         self.constraints = Constraints::new(self.adjustment, self.layout, &self.current, &self.values, structure)?;
@@ -115,11 +118,27 @@ impl<'p, 'a> Iteration<'p, 'a> {
         if self.is_renewed { Ok(()) } else { self.linearise() }
     }
 
-    /// Runs to the end; the state is then linearised at the solution.
+    /// Runs to the end; the state is then linearised at the solution. A descent that ran away is tried once more, with
+    /// more caution.
     pub(crate) fn run(&mut self) -> Result<()> {
         if self.layout.unknowns == 0 {
             return Ok(());
         }
+        match self.find_end() {
+            Err(Error::NotConverged { .. }) if self.vanished()?.is_some() => {}
+            done => return done,
+        }
+        if self.options.method != Method::GaussNewton && self.trace.len() < self.options.max_iterations {
+            self.start_again()?;
+            match self.find_end() {
+                Err(Error::NotConverged { .. }) if self.vanished()?.is_some() => {}
+                done => return done,
+            }
+        }
+        Err(self.ran_away())
+    }
+
+    fn find_end(&mut self) -> Result<()> {
         let mut ending = Ending { gain: SMALL_GAIN, decrease: 0.0, damping: SMALL_DAMPING };
         let mut damped = self.options.method != Method::GaussNewton;
         loop {
@@ -139,7 +158,7 @@ impl<'p, 'a> Iteration<'p, 'a> {
     /// Steps of the chosen kind until the ending. False where no step reduces the objective any more.
     pub(crate) fn descend(&mut self, ending: &Ending) -> Result<bool> {
         match self.options.method {
-            Method::DogLeg => self.follow_dog_leg(ending),
+            Method::DogLeg if !self.cautious => self.follow_dog_leg(ending),
             _ => self.descend_damped(ending),
         }
     }
@@ -205,7 +224,8 @@ impl<'p, 'a> Iteration<'p, 'a> {
         let done = self.trial.evaluate(self.adjustment, self.layout, &self.trial_values, want);
         self.trial_is_linearised = want == Want::Jacobians && done.is_ok();
         let merit = self.merit(&self.trial);
-        (done.is_ok() && merit.is_finite()).then_some(merit)
+        let refused = self.cautious && self.trial_is_linearised && self.loses_action();
+        (done.is_ok() && merit.is_finite() && !refused).then_some(merit)
     }
 
     /// Moves to the trial values. With `keep` the normal equations stay those of before, but for the gradient.

@@ -153,6 +153,20 @@ impl Linearisation {
         })
     }
 
+    /// Squared lengths of the columns of the whitened Jacobian, without robust weights.
+    pub(crate) fn column_squares(&self, layout: &Layout) -> Vec<f64> {
+        let mut out = vec![0.0; layout.unknowns];
+        for place in &layout.observations {
+            for row in self.jacobian[place.jacobian_range()].chunks_exact(place.width.max(1)) {
+                for part in layout.parts(place) {
+                    let squares = out[part.columns()].iter_mut().zip(&row[part.entries()]);
+                    squares.for_each(|(out, a)| *out += a * a);
+                }
+            }
+        }
+        out
+    }
+
     /// `Aᵀ P rows` for whitened rows.
     pub(crate) fn transpose_apply(&self, layout: &Layout, rows: &[f64]) -> Vec<f64> {
         let mut out = vec![0.0; layout.unknowns];

@@ -1,10 +1,11 @@
+use std::any::Any;
 use std::fmt::Debug;
 
 /// A set of parameter values that is stepped in its tangent space.
 ///
 /// A block stores `ambient_dimension` numbers; the adjustment estimates steps of `tangent_dimension` numbers, and
 /// all covariances are those of the tangent step at the adjusted values.
-pub trait Manifold: Debug + Send + Sync {
+pub trait Manifold: Any + Debug + Send + Sync {
     /// Number of stored values.
     fn ambient_dimension(&self) -> usize;
 

@@ -13,17 +13,40 @@ pub enum Method {
     DogLeg,
 }
 
-/// How to solve.
+/// How to solve. The defaults solve what has an answer; change the method where good approximate values are known, and
+/// the largest number of steps where time matters more than the last digit.
+///
+/// ```
+/// use adjust::{Adjustment, Covariance, Error, LinearObservation, Method, ParameterBlock, SolveOptions};
+///
+/// # fn main() -> Result<(), Error> {
+/// let options = SolveOptions::default();
+/// assert_eq!(options.method, Method::LevenbergMarquardt);
+/// assert_eq!((options.max_iterations, options.step_tolerance, options.initial_damping), (1000, 1e-8, 1e-4));
+///
+/// let mut a = Adjustment::new();
+/// let mean = a.add_block(ParameterBlock::euclidean([0.0]));
+/// let group = a.add_group("readings");
+/// for reading in [4.1, 3.9, 4.3] {
+///     a.add_observation(group, LinearObservation::new(reading, [(mean, [1.0])]), &Covariance::from_sigma(0.2))?;
+/// }
+/// // A linear problem needs no damping.
+/// let solution = a.solve(&SolveOptions { method: Method::GaussNewton, ..SolveOptions::default() })?;
+/// assert!((solution.values(mean)?[0] - 4.1).abs() < 1e-12 && solution.iterations() <= 2);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct SolveOptions {
-    /// Way of descent.
+    /// Way of descent; [`Method::LevenbergMarquardt`] by default.
     pub method: Method,
-    /// Steps tried, damped and undamped, accepted or not.
+    /// Steps tried, damped and undamped, accepted or not; 1000 by default. Then comes [`Error::NotConverged`].
     pub max_iterations: usize,
     /// The iteration ends when the undamped step is shorter than this, in standard deviations (the smaller of prior-
-    /// and posterior-scaled).
+    /// and posterior-scaled); 1e-8 by default. Positive.
     pub step_tolerance: f64,
-    /// First damping factor, relative to the diagonal of the normal equations.
+    /// First damping factor, relative to the diagonal of the normal equations; 1e-4 by default. Positive; for
+    /// [`Method::LevenbergMarquardt`].
     pub initial_damping: f64,
 }
 

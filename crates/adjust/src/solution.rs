@@ -50,27 +50,31 @@ impl Adjustment<'_> {
     /// # Errors
     /// [`Error::RankDeficient`] names what is not determined; [`Error::NotConverged`] where the iteration found no end;
     /// [`Error::Evaluation`] and [`Error::NotFinite`] name an observation whose model has no value at the start;
-    /// [`Error::DatumOverdetermined`], [`Error::Datum`] and [`Error::DependentConstraint`] speak of the constraints.
+    /// [`Error::DatumOverdetermined`], [`Error::Datum`] and [`Error::DependentConstraint`] speak of the constraints;
+    /// [`Error::Jacobian`] names a wrong derivative where one can be why there is no end or a defect.
     pub fn solve(&self, options: &SolveOptions) -> Result<Solution> {
         options.check()?;
+        self.solve_unchecked(options).map_err(|error| self.blame(error))
+    }
+
+    fn solve_unchecked(&self, options: &SolveOptions) -> Result<Solution> {
         let layout = Layout::new(self)?;
         let names = self.unknown_names(&layout);
         let mut iteration = Iteration::new(self, &layout, options)?;
         if let Err(error) = iteration.run() {
             iteration.renew()?;
             // A descent that finds no end often has none: an undetermined direction is then the better answer.
-            let undetermined =
-                matches!(error, Error::NotConverged { .. }) && iteration.problem().factorise()?.is_none();
-            if undetermined {
+            let Error::NotConverged { iterations, reason, objective, step, damping, .. } = error else {
+                return Err(error);
+            };
+            // What ran away is undetermined where it ended, but that is not why.
+            let vanished = iteration.vanished()?;
+            if vanished.is_none() && iteration.problem().factorise()?.is_none() {
                 return Err(iteration.problem().defect(&names)?);
             }
-            return Err(match error {
-                Error::NotConverged { iterations, reason, objective, step, damping, .. } => {
-                    let parameter = iteration.unsettled().map_or_else(String::new, |unknown| names[unknown].clone());
-                    Error::NotConverged { iterations, reason, objective, step, damping, parameter }
-                }
-                error => error,
-            });
+            let parameter = vanished.or_else(|| iteration.unsettled()).map(|unknown| names[unknown].clone());
+            let parameter = parameter.unwrap_or_default();
+            return Err(Error::NotConverged { iterations, reason, objective, step, damping, parameter });
         }
         let cofactor = iteration.problem().cofactor(&names)?;
         let (values, linearisation, trace) = (iteration.values, iteration.current, iteration.trace);

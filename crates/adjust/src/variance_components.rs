@@ -244,7 +244,7 @@ impl Solution {
 
     /// Twice the information of relative variance factors: `Sᵢⱼ = Σ R²` over the rows of i and columns of j, with the
     /// projection `R = I − J Q Jᵀ`; that is `δᵢⱼ (nᵢ − 2 tr Q Nᵢ) + tr(Q Nᵢ Q Nⱼ)`.
-    fn component_information(&self, groups: &[GroupId]) -> Option<DMatrix<f64>> {
+    pub(crate) fn component_information(&self, groups: &[GroupId]) -> Option<DMatrix<f64>> {
         if self.unknowns() > LARGEST_RIGOROUS {
             return None;
         }

@@ -7,8 +7,9 @@ use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
-/// A random design with weights: solved by the crate and by the normal equations written out.
-fn check_random(seed: u64, rows: usize, columns: usize, method: Method) {
+/// A random design with weights: solved by the crate and by the normal equations written out. The solution of the crate
+/// after the comparison, and the sum of squares of the normal equations.
+fn check_random(seed: u64, rows: usize, columns: usize, method: Method) -> (Solution, f64) {
     let mut rng = Pcg64::seed_from_u64(seed);
     let design = DMatrix::from_fn(rows, columns, |_, _| rng.random_range(-1.0..1.0));
     let observed = DVector::from_fn(rows, |_, _| rng.random_range(-10.0..10.0));
@@ -55,14 +56,19 @@ fn check_random(seed: u64, rows: usize, columns: usize, method: Method) {
     assert_relative_eq!(sigma0 * sigma0, vtpv / (rows - columns) as f64, max_relative = 1e-9);
     let posterior = solution.covariance(x, Scale::Posterior).unwrap();
     assert_relative_eq!(posterior, covariance * (sigma0 * sigma0), max_relative = 1e-12);
+    (solution, vtpv)
 }
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
     #[test]
     fn random_designs_agree_with_the_closed_form(seed in 0_u64..1000, columns in 1_usize..8, extra in 5_usize..20) {
-        check_random(seed, columns + extra, columns, Method::GaussNewton);
-        check_random(seed, columns + extra, columns, Method::LevenbergMarquardt);
+        let (full, expected) = check_random(seed, columns + extra, columns, Method::GaussNewton);
+        let (damped, _) = check_random(seed, columns + extra, columns, Method::LevenbergMarquardt);
+        prop_assert_eq!((full.unknowns(), full.redundancy()), (columns, extra as i64));
+        prop_assert!((full.vtpv() - damped.vtpv()).abs() < 1e-9 * expected, "{} {}", full.vtpv(), damped.vtpv());
+        // A linear problem is solved by its first full step; the second is rounding.
+        prop_assert!(full.iterations() <= 2, "{:?}", full.trace());
     }
 }
 

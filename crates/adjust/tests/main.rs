@@ -9,8 +9,13 @@ mod checkerboard;
 mod common;
 mod datum_change;
 mod descend;
+mod differentiated;
+#[path = "common/differentiated_camera.rs"]
+mod differentiated_camera;
+mod display;
 mod distributions;
 mod elimination;
+mod global_test;
 mod iteration;
 mod linear;
 mod network;

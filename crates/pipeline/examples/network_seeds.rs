@@ -2,8 +2,9 @@
 //!
 //! ```text
 //! cargo xtask verify networks
-//! cargo run --release -p pipeline --example network_seeds [seeds of each network] [a word of its name]
+//! cargo run --release -p pipeline --example network_seeds [seeds of each network] [name of a network, or `all`] [auto]
 //! ```
+//! The terms that the networks have, or with `auto` those that the automatic choice takes.
 //! Fails where one of 200 seeds is refused, where squared errors over variances are not 0.9 to 1.1 per unknown on average,
 //! or where one of them is larger than chi-squared lets one in a thousand runs have.
 #![allow(clippy::print_stdout)]
@@ -37,11 +38,12 @@ const NETWORKS: [(&str, Method); 4] = [
 fn main() -> Result<(), Failure> {
     let mut words = std::env::args().skip(1);
     let seeds = words.next().and_then(|seeds| seeds.parse().ok()).unwrap_or(SEEDS);
-    let asked = words.next();
+    let asked = words.next().filter(|name| name != "all");
+    let auto = words.next().is_some_and(|word| word == "auto");
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fixtures/networks");
     let mut broken = Vec::new();
     for (name, method) in NETWORKS.into_iter().filter(|(name, _)| asked.as_ref().is_none_or(|asked| asked == name)) {
-        let figures = of_network(&folder.join(name).with_extension("ron"), method, seeds)?;
+        let figures = of_network(&folder.join(name).with_extension("ron"), method, auto, seeds)?;
         broken.extend(figures.broken(name));
     }
     for words in &broken {
@@ -88,7 +90,7 @@ impl Figures {
     }
 }
 
-fn of_network(scene: &Path, method: Method, seeds: u64) -> Result<Figures, Failure> {
+fn of_network(scene: &Path, method: Method, auto: bool, seeds: u64) -> Result<Figures, Failure> {
     let next = AtomicU64::new(0);
     let work = || -> Result<Figures, Failure> {
         let folder = tempfile::tempdir()?;
@@ -98,7 +100,7 @@ fn of_network(scene: &Path, method: Method, seeds: u64) -> Result<Figures, Failu
             if seed >= seeds {
                 return Ok(own);
             }
-            match of_seed(scene, method, seed, &folder.path().join(seed.to_string())) {
+            match of_seed(scene, method, auto, seed, &folder.path().join(seed.to_string())) {
                 Ok((square, unknowns, doubted)) => {
                     own.sound.push((seed, square, unknowns));
                     own.doubted += usize::from(doubted);
@@ -123,7 +125,7 @@ fn of_network(scene: &Path, method: Method, seeds: u64) -> Result<Figures, Failu
 }
 
 /// Squared error of the estimated parameters in their variances, their number, and whether there are doubts.
-fn of_seed(scene: &Path, method: Method, seed: u64, folder: &Path) -> Result<(f64, usize, bool), Failure> {
+fn of_seed(scene: &Path, method: Method, auto: bool, seed: u64, folder: &Path) -> Result<(f64, usize, bool), Failure> {
     let truth = NetworkScene::read(scene)?;
     let survey = folder.join("survey");
     simulate_network(scene, Some(seed), &survey)?;
@@ -131,12 +133,13 @@ fn of_seed(scene: &Path, method: Method, seed: u64, folder: &Path) -> Result<(f6
     if !truth.truth.contains_key("c") {
         terms.push("c".to_owned());
     }
+    let terms = if auto { TermSelection::Auto } else { TermSelection::List(terms) };
     let request = CalibrateRequest {
         survey,
         lens_survey: None,
         calibration: None,
         method: CalibrateMethod::Network(method),
-        options: CalibrationOptions { terms: TermSelection::List(terms), ..CalibrationOptions::default() },
+        options: CalibrationOptions { terms, ..CalibrationOptions::default() },
         offset: OffsetModel::Constant,
         warm_up: DriftTreatment::Leave,
         defaults: TableDefaults::default(),
@@ -150,7 +153,8 @@ fn of_seed(scene: &Path, method: Method, seed: u64, folder: &Path) -> Result<(f6
 
 fn squared_error(summary: &CalibrationSummary, truth: &NetworkScene) -> Result<(f64, usize), Failure> {
     let names = &summary.correlation.names;
-    let known = |name: &str| truth.truth.get(name).copied().unwrap_or(truth.camera.principal_distance_mm);
+    let nominal = |name: &str| if name == "c" { truth.camera.principal_distance_mm } else { 0.0 };
+    let known = |name: &str| truth.truth.get(name).copied().unwrap_or_else(|| nominal(name));
     let mut errors = DVector::zeros(names.len());
     for (error, name) in errors.iter_mut().zip(names) {
         let found = summary.parameters.get(name).ok_or_else(|| format!("no parameter `{name}`"))?;

@@ -8,10 +8,9 @@ use nalgebra::{DMatrix, DVector};
 use super::calibrate::Problem;
 use super::selection::all_terms;
 use super::{CalibrationOutcome, TermDecision};
-use crate::{Error, Result};
+use crate::Result;
 
-/// Terms that are decided on together, in the order in which they are given up where a network cannot tell them apart.
-/// The wave of length U comes first: it correlates with d0 and makes that many times less certain.
+/// Terms that are decided on together.
 const GROUPS: [&[&str]; 10] = [
     &["d2", "d3"],
     &["h1", "h2", "h3"],
@@ -29,110 +28,34 @@ const LEVEL: f64 = 0.01;
 /// The same for the wave of length U.
 const LEVEL_OF_LONG_WAVE: f64 = 0.001;
 
-/// Calibrates with the terms that the observations speak for.
+/// Calibrates with all terms, each with what cameras show of it, and says which of them the observations speak for.
 ///
-/// All are estimated first; what the network cannot tell apart is given up. Then the group that speaks least for itself
-/// leaves, one after the other: with the estimate x of the group and its covariance, `xᵀ Q⁻¹ x` is what vᵀPv would grow
-/// by. A group stays if that is significant (F test) and lowers Schwarz's criterion. At last each that left is tried once
-/// more with those that stayed. Principal point, principal distance and d0 are always estimated.
+/// To hold at zero what the observations leave open would promise too much of all that it correlates with: a wave of length U
+/// over a part of its length looks like an offset. With its usual size as an observation of zero its doubt stays in the
+/// covariance, and a term that the observations show is what they say.
 pub(crate) fn choose(problem: &Problem<'_>) -> Result<CalibrationOutcome> {
-    let mut terms = all_terms(problem.network, problem.options.method);
-    let mut decisions = Vec::new();
-    let mut outcome = determined(problem, &mut terms, &mut decisions)?;
-    let mut left: Vec<(&[&str], TermDecision)> = Vec::new();
-    let mut current = Wald::new(&outcome);
-    while let Some((group, test)) = current.weakest_group(&terms) {
-        if test.stays(group) {
-            break;
-        }
-        left.push((group, decision(group, false, &test, &current.offset_gain(group))));
+    let terms = all_terms(problem.network, problem.options.method);
+    let mut outcome = problem.run(&terms)?;
+    outcome.decisions = decisions(&outcome, terms);
+    Ok(outcome)
+}
+
+/// Which groups the observations speak for. The group that speaks least for itself leaves, one after the other, as if it had
+/// been held at zero: with the estimate x of the group and its covariance, `xᵀ Q⁻¹ x` is what vᵀPv would grow by. A group
+/// stays if that is significant (F test) and lowers Schwarz's criterion. One by one, correlated groups would hide each other.
+fn decisions(outcome: &CalibrationOutcome, mut terms: BTreeSet<String>) -> Vec<TermDecision> {
+    let mut left = Vec::new();
+    let mut current = Wald::new(outcome);
+    while let Some((group, test)) = current.weakest_group(&terms).filter(|(group, test)| !test.stays(group)) {
+        left.push(decision(group, false, &test, &current.offset_gain(group)));
         current = current.without(group);
         for name in group {
             terms.remove(*name);
         }
     }
-    if !left.is_empty() {
-        outcome = problem.run(&terms)?;
-        outcome = readmitted(problem, &mut terms, &mut left, outcome)?;
-    }
-    let current = Wald::new(&outcome);
-    for group in GROUPS.iter().filter(|group| terms.contains(group[0])) {
-        if let Some(test) = current.test(group) {
-            decisions.push(decision(group, true, &test, &current.offset_gain(group)));
-        }
-    }
-    decisions.extend(left.into_iter().map(|(_, decision)| decision));
-    outcome.decisions = decisions;
-    Ok(outcome)
-}
-
-/// Calibrates with as many terms as the network can tell apart.
-fn determined(
-    problem: &Problem<'_>,
-    terms: &mut BTreeSet<String>,
-    decisions: &mut Vec<TermDecision>,
-) -> Result<CalibrationOutcome> {
-    loop {
-        let error = match problem.run(terms) {
-            Ok(outcome) => return Ok(outcome),
-            Err(error) => error,
-        };
-        let Error::WeakNetwork { combination, inflation, .. } = &error else { return Err(error) };
-        // The first group that takes part in the combination; the wave of length U whenever d0 does.
-        let takes_part = |group: &&&[&str]| {
-            terms.contains(group[0])
-                && (group.iter().any(|name| names(combination, name)) || group[0] == "d2" && names(combination, "d0"))
-        };
-        let Some(group) = GROUPS.iter().find(takes_part) else { return Err(error) };
-        decisions.push(TermDecision {
-            terms: group.iter().map(ToString::to_string).collect(),
-            taken: false,
-            significance_p: f64::NAN,
-            delta_bic: f64::NAN,
-            reason: format!(
-                "the network cannot tell {} from other parameters ({combination}; inflation {inflation:.0})",
-                group.join(", ")
-            ),
-        });
-        for name in *group {
-            terms.remove(*name);
-        }
-    }
-}
-
-/// Whether a combination in words names a parameter.
-fn names(combination: &str, name: &str) -> bool {
-    combination.split([' ', ';']).any(|word| word.split('@').next() == Some(name))
-}
-
-/// Tries the groups that left once more.
-fn readmitted(
-    problem: &Problem<'_>,
-    terms: &mut BTreeSet<String>,
-    left: &mut Vec<(&'static [&'static str], TermDecision)>,
-    mut outcome: CalibrationOutcome,
-) -> Result<CalibrationOutcome> {
-    let mut still = Vec::new();
-    for (group, mut decided) in std::mem::take(left) {
-        let mut more = terms.clone();
-        more.extend(group.iter().map(ToString::to_string));
-        match problem.run(&more) {
-            Ok(found) => {
-                let wald = Wald::new(&found);
-                let Some(test) = wald.test(group) else { continue };
-                if test.stays(group) {
-                    (*terms, outcome) = (more, found);
-                    continue;
-                }
-                decided = decision(group, false, &test, &wald.offset_gain(group));
-            }
-            Err(Error::WeakNetwork { .. }) => {}
-            Err(error) => return Err(error),
-        }
-        still.push((group, decided));
-    }
-    *left = still;
-    Ok(outcome)
+    let stay = GROUPS.iter().filter(|group| terms.contains(group[0]));
+    let stay = stay.filter_map(|group| Some(decision(group, true, &current.test(group)?, &current.offset_gain(group))));
+    stay.collect::<Vec<_>>().into_iter().chain(left).collect()
 }
 
 /// Test of a group.
@@ -149,7 +72,8 @@ impl Test {
 }
 
 fn decision(group: &[&str], taken: bool, test: &Test, offset_gain: &str) -> TermDecision {
-    let verdict = if taken { "significant" } else { "not significant enough" };
+    let verdict =
+        if taken { "significant" } else { "not significant enough, known by what cameras show and no better" };
     let criterion = if test.delta_bic < 0.0 { "for" } else { "against" };
     TermDecision {
         terms: group.iter().map(ToString::to_string).collect(),

@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, Point3};
 use super::equations::{DistanceEquation, PartialPrior, PassiveEquation};
 use super::hyperbola_steps::range_block;
 use super::misfit::Scales;
-use super::problem::{Blocks, CameraPrior, Datum, Row, Setup, Solved, Source};
+use super::problem::{BlockPrior, Blocks, Datum, Row, Setup, Solved, Source};
 use super::terms::{camera_names, camera_values, range_names};
 use super::{Component, DistanceEnd};
 use crate::{Error, Result};
@@ -51,6 +51,7 @@ impl<'s> Builder<'s> {
         self.add_passive()?;
         self.add_distances()?;
         self.add_control()?;
+        self.add_term_priors()?;
         self.hold_geometry()?;
         let Some(kernels) = self.kernels else { return Ok(()) };
         let prior = self.adjustment.prior_group();
@@ -221,15 +222,40 @@ impl<'s> Builder<'s> {
         let n = uncertain.len();
         let covariance = DMatrix::from_fn(n, n, |row, column| matrix[(uncertain[row], uncertain[column])]);
         let known = uncertain.iter().map(|&component| (component, values[component])).collect();
-        self.add_camera_prior(camera, &CameraPrior { known, covariance }, Source::PassiveCamera)
+        self.add_block_prior(camera, &BlockPrior { known, covariance }, Component::Control, |_| Source::PassiveCamera)
     }
 
-    fn add_camera_prior(&mut self, block: BlockId, prior: &CameraPrior, source: Source) -> Result<()> {
+    /// Weights parameters of a block; `source` by component.
+    fn add_block_prior(
+        &mut self,
+        block: BlockId,
+        prior: &BlockPrior,
+        kind: Component,
+        source: impl Fn(usize) -> Source,
+    ) -> Result<()> {
         let group = self.adjustment.prior_group();
         let equation = PartialPrior { block: [block], known: prior.known.clone() };
         self.adjustment.add_observation(group, equation, &Covariance::from_matrix(&prior.covariance))?;
-        for (index, (_, value)) in prior.known.iter().enumerate() {
-            self.row(source, Component::Control, *value, prior.covariance[(index, index)].sqrt());
+        for (index, (component, value)) in prior.known.iter().enumerate() {
+            self.row(source(*component), kind, *value, prior.covariance[(index, index)].sqrt());
+        }
+        Ok(())
+    }
+
+    /// Terms of camera and ranges with what cameras show; a camera known from another adjustment has that in it.
+    fn add_term_priors(&mut self) -> Result<()> {
+        let setup = self.setup;
+        let camera = setup
+            .camera_prior
+            .is_none()
+            .then(|| (self.blocks.camera, camera_names().into_iter().map(str::to_owned).collect()));
+        let sets = setup.calibration.sets.iter().zip(&self.blocks.sets);
+        let sets: Vec<_> = sets.map(|(set, &block)| (block, range_names(&set.model))).collect();
+        let blocks = std::iter::once(camera).chain(sets.into_iter().map(Some));
+        for (place, (block, names)) in blocks.enumerate().filter_map(|(place, block)| Some((place, block?))) {
+            if let Some(prior) = setup.term_prior(&names) {
+                self.add_block_prior(block, &prior, Component::Term, |component| Source::Term(place, component))?;
+            }
         }
         Ok(())
     }
@@ -254,7 +280,7 @@ impl<'s> Builder<'s> {
 
     fn add_control(&mut self) -> Result<()> {
         if let Some(prior) = &self.setup.camera_prior {
-            self.add_camera_prior(self.blocks.camera, prior, Source::Camera)?;
+            self.add_block_prior(self.blocks.camera, prior, Component::Control, |_| Source::Camera)?;
         }
         if self.setup.datum == Datum::Inner {
             return Ok(());

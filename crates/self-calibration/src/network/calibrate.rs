@@ -1,9 +1,9 @@
 //! The methods of Sect. 5.3: which adjustments they consist of.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::combine::{Combined, combine};
-use super::problem::{CameraPrior, Datum, Excluded, Setup, Solved};
+use super::problem::{BlockPrior, Datum, Excluded, Setup, Solved};
 use super::quality::Geometry;
 use super::range_step::{RangeStep, ScaleUse};
 use super::reference::Reference;
@@ -12,7 +12,7 @@ use super::start::find_start;
 use super::start_calibration::start_calibration;
 use super::strength::Strength;
 use super::terms::{camera_names, camera_values};
-use super::{CalibrationOptions, CalibrationOutcome, Method, Network, NetworkDatum, TermSelection};
+use super::{CalibrationOptions, CalibrationOutcome, Method, Network, NetworkDatum, TermSelection, term_priors};
 use crate::{Error, Result};
 
 /// Inflation from which on the weakest combination is told although it is accepted.
@@ -186,6 +186,7 @@ impl Problem<'_> {
             datum: Datum::Known,
             geometry_held: false,
             camera_prior: None,
+            term_sigmas: self.term_sigmas(),
             excluded: Excluded::default(),
         };
         let mut diagnosis = Vec::new();
@@ -289,8 +290,17 @@ impl Problem<'_> {
             datum,
             geometry_held,
             camera_prior,
+            term_sigmas: self.term_sigmas(),
             excluded,
         })
+    }
+
+    /// What cameras show of their terms, where these are chosen; those of a list are unknown.
+    fn term_sigmas(&self) -> BTreeMap<&'static str, f64> {
+        match self.options.terms {
+            TermSelection::Auto => term_priors::usual(self.network),
+            TermSelection::List(_) => BTreeMap::new(),
+        }
     }
 
     /// Sightings whose ranges take part in a second step.
@@ -323,7 +333,7 @@ impl Problem<'_> {
 }
 
 /// The estimated camera parameters of an adjustment as a prior of the next one.
-fn camera_prior(setup: &Setup<'_>, solved: &Solved) -> Result<Option<CameraPrior>> {
+fn camera_prior(setup: &Setup<'_>, solved: &Solved) -> Result<Option<BlockPrior>> {
     let parameters = setup.estimated_parameters(solved);
     let own: Vec<_> = parameters.iter().filter(|(_, block, _)| *block == solved.blocks.camera).collect();
     if own.is_empty() {
@@ -333,7 +343,7 @@ fn camera_prior(setup: &Setup<'_>, solved: &Solved) -> Result<Option<CameraPrior
     let places: Vec<_> = own.iter().map(|(_, block, component)| (*block, *component)).collect();
     let covariance = super::report::covariance_of(&solved.solution, &places)?;
     let known = places.iter().map(|(_, component)| (*component, values[*component])).collect();
-    Ok(Some(CameraPrior { known, covariance }))
+    Ok(Some(BlockPrior { known, covariance }))
 }
 
 /// Stations whose ranges take part.

@@ -36,6 +36,7 @@ mod start_calibration;
 mod start_finder;
 mod strength;
 mod suspicion;
+mod term_priors;
 mod term_words;
 mod terms;
 

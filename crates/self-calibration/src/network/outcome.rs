@@ -118,6 +118,8 @@ pub enum Component {
     Distance,
     /// Control coordinate or pose component, metre or radian.
     Control,
+    /// What cameras show of a term that the automatic choice estimates: zero, in the unit of the term.
+    Term,
 }
 
 /// What the outlier test says of an observation.
@@ -188,7 +190,8 @@ pub struct GroupQuality {
 pub struct TermDecision {
     /// Names of the terms decided on together (a pair of periodic terms, a single coefficient).
     pub terms: Vec<String>,
-    /// Whether they are estimated.
+    /// Whether the observations speak for them. Those that they do not speak for are estimated as well, with what cameras
+    /// show of them; a spline stands in place of the sines, or not at all.
     pub taken: bool,
     /// p-value of their joint significance.
     pub significance_p: f64,

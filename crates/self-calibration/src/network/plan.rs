@@ -1,7 +1,7 @@
 //! Network design: how well a planned network would determine the calibration, and which further station helps most.
 
 use std::borrow::Cow;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use camera_model::pose_from_euler;
 use nalgebra::{DMatrix, Isometry3, Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};
@@ -265,6 +265,7 @@ impl<'o> Design<'o> {
             datum: datum(observed, &self.calibration_options)?,
             geometry_held: false,
             camera_prior: None,
+            term_sigmas: BTreeMap::new(),
             excluded: Excluded::default(),
         })
     }

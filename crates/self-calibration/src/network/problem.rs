@@ -1,6 +1,6 @@
 //! What an adjustment of a network consists of; [`super::builder`] puts it together.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use adjust::{BlockId, Solution};
@@ -57,9 +57,9 @@ pub(crate) struct Excluded {
     pub(crate) distances: BTreeSet<usize>,
 }
 
-/// Camera parameters known from another adjustment: components of the camera's block, values, covariance.
+/// Parameters of a block known from elsewhere: components of the block, values, covariance.
 #[derive(Debug, Clone)]
-pub(crate) struct CameraPrior {
+pub(crate) struct BlockPrior {
     pub(crate) known: Vec<(usize, f64)>,
     pub(crate) covariance: DMatrix<f64>,
 }
@@ -81,7 +81,10 @@ pub(crate) struct Setup<'n> {
     pub(crate) datum: Datum,
     /// Poses and coordinates are held at their start values.
     pub(crate) geometry_held: bool,
-    pub(crate) camera_prior: Option<CameraPrior>,
+    /// The camera, known from another adjustment.
+    pub(crate) camera_prior: Option<BlockPrior>,
+    /// Standard deviations about zero of terms that are estimated with what cameras show, by name.
+    pub(crate) term_sigmas: BTreeMap<&'static str, f64>,
     pub(crate) excluded: Excluded,
 }
 
@@ -116,6 +119,8 @@ pub(crate) enum Source {
     Station(usize),
     Camera,
     PassiveCamera,
+    /// A term that is estimated with what cameras show: its block - the camera, then the range sets - and component.
+    Term(usize, usize),
 }
 
 /// One observed value, in the order of the adjustment's residuals.

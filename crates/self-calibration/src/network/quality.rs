@@ -7,6 +7,7 @@ use nalgebra::{Isometry3, Point3};
 
 use super::equations::{DistanceEquation, PassiveEquation};
 use super::problem::{Row, Setup, Solved, Source};
+use super::terms::{camera_names, range_names};
 use super::{CalibrationOutcome, Component, GroupQuality, ObservationQuality, Verdict};
 use crate::Result;
 
@@ -153,7 +154,18 @@ impl Setup<'_> {
             Source::Station(index) => (network.stations[index].name.clone(), String::new()),
             Source::Camera => ("camera".to_owned(), String::new()),
             Source::PassiveCamera => ("passive camera".to_owned(), String::new()),
+            Source::Term(place, component) => (String::new(), self.term_name(place, component)),
         }
+    }
+
+    /// Name of a term by its block - the camera, then the range sets - and component.
+    fn term_name(&self, place: usize, component: usize) -> String {
+        let set = place.checked_sub(1).map(|index| &self.calibration.sets[index]);
+        let name = set.map_or_else(
+            || camera_names().get(component).map(ToString::to_string),
+            |set| range_names(&set.model).get(component).map(|name| format!("{name}{}", set.suffix)),
+        );
+        name.unwrap_or_default()
     }
 
     /// Observed values that take no part, and why.
@@ -295,6 +307,7 @@ impl Component {
             Self::PassiveRow => "passive_row",
             Self::Distance => "distance",
             Self::Control => "control",
+            Self::Term => "term",
         }
     }
 }

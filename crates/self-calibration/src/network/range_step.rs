@@ -10,6 +10,7 @@ use adjust::{
 use error_models::RangeErrorModel;
 use nalgebra::DMatrix;
 
+use super::equations::PartialPrior;
 use super::hyperbola_steps::{by_steps, covariance_of_terms, has_natural_steps, range_block};
 use super::misfit::median;
 use super::problem::{RangeSet, Setup};
@@ -223,11 +224,23 @@ fn adjusted(setup: &Setup<'_>, reference: &Reference, scale: ScaleUse) -> Result
             DifferenceEquation { blocks, observed_m, reference_m, root, seen: values, model, widths, natural_steps };
         adjustment.add_observation(group, equation, &Covariance::from_sigma(seen.sigma_range_m))?;
     }
+    add_term_priors(setup, &terms, &mut adjustment)?;
     match adjustment.solve(&SolveOptions::default()) {
         Ok(solution) => Ok((solution, terms)),
         Err(adjust::Error::RankDeficient { combinations, .. }) => Err(setup.undetermined(&combinations)),
         Err(error) => Err(error.into()),
     }
+}
+
+/// After the ranges, so that these keep their rows.
+fn add_term_priors<'a>(setup: &Setup<'_>, terms: &Terms, adjustment: &mut Adjustment<'a>) -> Result<()> {
+    let group = adjustment.prior_group();
+    for (set, &block) in setup.calibration.sets.iter().zip(&terms.sets) {
+        let Some(prior) = setup.term_prior(&range_names(&set.model)) else { continue };
+        let equation = PartialPrior { block: [block], known: prior.known };
+        adjustment.add_observation(group, equation, &Covariance::from_matrix(&prior.covariance))?;
+    }
+    Ok(())
 }
 
 fn add_blocks(
@@ -299,9 +312,11 @@ fn reject(
     let latent = reference.root.ncols();
     let mut components = vec![Component::Control; latent];
     components.extend(reference.values.iter().map(|_| Component::Range));
+    components.extend(std::iter::repeat_n(Component::Term, solution.residuals().len() - components.len()));
     let (mut stations, mut targets) = (BTreeSet::new(), BTreeSet::new());
     for suspect in suspects(solution, &components, level)? {
-        let Some(row) = suspect.row.checked_sub(latent) else { continue };
+        let row = suspect.row.checked_sub(latent).filter(|row| *row < reference.values.len());
+        let Some(row) = row else { continue };
         let seen = &setup.network.sightings[reference.sightings[row]];
         if stations.insert(seen.station) & targets.insert(seen.target) {
             rejected.insert(reference.sightings[row]);

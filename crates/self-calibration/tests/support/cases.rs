@@ -73,6 +73,8 @@ pub fn errors(case: &Case, outcome: &CalibrationOutcome) -> DVector<f64> {
         "k3" => lens.k3,
         "p1" => lens.p1,
         "p2" => lens.p2,
+        "b1" => lens.b1,
+        "b2" => lens.b2,
         name => terms[error_models::RangeTerms::NAMES.iter().position(|known| *known == name).unwrap()],
     };
     let difference = |name: &String| outcome.parameter(name).unwrap().value - true_value(name);

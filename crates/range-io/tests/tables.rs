@@ -211,10 +211,13 @@ fn distances_planes_and_residuals_come_back() {
         smallest_detectable: Some(f64::INFINITY),
         verdict: "uncontrolled".into(),
     };
-    write_residuals(scratch.file("residuals.csv"), std::slice::from_ref(&residual)).unwrap();
-    // What is no number is an empty field.
-    let expected = Residual { redundancy_number: None, smallest_detectable: None, ..residual };
-    assert_eq!(read_residuals(scratch.file("residuals.csv")).unwrap(), [expected]);
+    let control = Residual { station: String::new(), component: "control".into(), ..residual.clone() };
+    write_residuals(scratch.file("residuals.csv"), &[residual, control]).unwrap();
+    // What is no number is an empty field, and control has no station.
+    let [residual, control] = read_residuals(scratch.file("residuals.csv")).unwrap().try_into().unwrap();
+    assert_eq!(residual, Residual { redundancy_number: None, smallest_detectable: None, ..residual.clone() });
+    assert_eq!((residual.station.as_str(), residual.residual), ("S1", Some(-0.003)));
+    assert_eq!((control.station.as_str(), control.target.as_str()), ("", "T1"));
 }
 
 #[test]

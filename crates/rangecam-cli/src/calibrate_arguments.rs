@@ -19,7 +19,7 @@ pub(crate) struct CalibrateArguments {
     #[arg(long, short, value_enum, default_value_t = MethodName::OneStep)]
     method: MethodName,
     /// Terms to estimate, separated by commas (xp,yp,c,k1,k2,k3,p1,p2,b1,b2,d0,d2,...,d7,e1,e2,h1,h2,h3), all others
-    /// being held at their start values; or `auto`: chosen by significance and information criterion. From targets also
+    /// being held at their start values; or `auto`: all, each with what cameras usually show of it where the network does not tell. From targets also
     /// spline12 (a spline with 12 knots instead of d2 to d7), polynomial3 (order 3, over the observed ranges), surface2
     /// (order 2 over the image, instead of e1 and e2).
     #[arg(long, default_value = "auto", value_name = "LIST|auto", value_parser = terms)]

@@ -50,9 +50,11 @@ pub fn read_residuals(path: impl AsRef<Path>) -> Result<Vec<Residual>> {
 }
 
 fn residual(row: &Row) -> Result<Residual> {
+    // Control and terms have one of the two names, or none.
+    let name = |column: &str| if row.words(column)?.is_some() { row.text(column) } else { Ok(String::new()) };
     Ok(Residual {
-        station: row.text("station")?,
-        target: row.text("target")?,
+        station: name("station")?,
+        target: name("target")?,
         component: row.text("component")?,
         observed: row.number("observed")?,
         sigma: row.number("sigma")?,

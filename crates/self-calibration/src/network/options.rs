@@ -20,7 +20,9 @@ pub enum Method {
 /// Which terms are estimated.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum TermSelection {
-    /// Chosen by significance and information criterion.
+    /// All, each with what cameras show of it as an observation of zero: waves and tilt of the range error with a standard
+    /// deviation of 2 cm, radial lens terms of 20, 10, 5 % and decentring ones of 1 % of the corner's radius, b1 and b2 of
+    /// 0.001. A hyperbola or a spline is taken by Schwarz's criterion.
     Auto,
     /// These, by their canonical names (`xp yp c k1 k2 k3 p1 p2 b1 b2 d0 d2..d7 e1 e2 h1 h2 h3`, and those of further
     /// terms that the range model has); all others are held. `splineN`, `polynomialN` and `surfaceN` stand for all terms

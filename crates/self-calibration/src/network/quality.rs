@@ -154,7 +154,7 @@ impl Setup<'_> {
             Source::Station(index) => (network.stations[index].name.clone(), String::new()),
             Source::Camera => ("camera".to_owned(), String::new()),
             Source::PassiveCamera => ("passive camera".to_owned(), String::new()),
-            Source::Term(place, component) => (String::new(), self.term_name(place, component)),
+            Source::Term(place, component) => ("camera".to_owned(), self.term_name(place, component)),
         }
     }
 

@@ -233,7 +233,7 @@ fn adjusted(setup: &Setup<'_>, reference: &Reference, scale: ScaleUse) -> Result
 }
 
 /// After the ranges, so that these keep their rows.
-fn add_term_priors<'a>(setup: &Setup<'_>, terms: &Terms, adjustment: &mut Adjustment<'a>) -> Result<()> {
+fn add_term_priors(setup: &Setup<'_>, terms: &Terms, adjustment: &mut Adjustment<'_>) -> Result<()> {
     let group = adjustment.prior_group();
     for (set, &block) in setup.calibration.sets.iter().zip(&terms.sets) {
         let Some(prior) = setup.term_prior(&range_names(&set.model)) else { continue };

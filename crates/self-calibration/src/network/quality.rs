@@ -251,10 +251,10 @@ impl Setup<'_> {
 /// Classes of equal size that ranges are divided into by their amplitude.
 const AMPLITUDE_CLASSES: usize = 4;
 
-/// Figures of the groups of values of one kind.
+/// Figures of the groups of values of one kind. Terms have no unit in common, and none was observed.
 pub(crate) fn groups(qualities: &[ObservationQuality]) -> Vec<GroupQuality> {
     let mut kinds: BTreeMap<Component, Vec<&ObservationQuality>> = BTreeMap::new();
-    for quality in used(qualities) {
+    for quality in used(qualities).filter(|quality| quality.component != Component::Term) {
         kinds.entry(quality.component).or_default().push(quality);
     }
     kinds.into_iter().map(|(component, group)| figures(component.name().to_owned(), &group)).collect()

@@ -130,16 +130,19 @@ pub(super) fn decisions(page: &mut Page, outcome: &CalibrationOutcome) {
         return;
     }
     page.section("Choice of terms");
-    page.paragraph("Negative changes of Schwarz's criterion speak for a term.");
+    page.paragraph(
+        "All are estimated, each with what cameras show of it. Which of them the observations speak for: negative changes of \
+         Schwarz's criterion do. Of the others no more is known than that, and their doubt is in all deviations.",
+    );
     let row = |decision: &self_calibration::TermDecision| {
         vec![
             decision.terms.join(", "),
-            if decision.taken { "taken".to_owned() } else { "left out".to_owned() },
+            if decision.taken { "shown".to_owned() } else { "open".to_owned() },
             if decision.significance_p.is_finite() { probability(decision.significance_p) } else { "–".to_owned() },
             if decision.delta_bic.is_finite() { format!("{:+.1}", decision.delta_bic) } else { "–".to_owned() },
             decision.reason.clone(),
         ]
     };
     let rows: Vec<_> = outcome.decisions.iter().map(row).collect();
-    page.table(&["terms", "decision", "p", "change of BIC", "reason"], &rows);
+    page.table(&["terms", "by the observations", "p", "change of BIC", "reason"], &rows);
 }

@@ -27,9 +27,6 @@ use super::rooms::{Capture, LOW_AMPLITUDE, SIZE, Truth};
 const SIGMAS: f64 = 4.0;
 const FLOOR_M: f64 = 0.005;
 
-/// More frames may raise the share of false flags by so much: chance of 6336 pixels.
-pub const RISE: f64 = 0.002;
-
 /// Flags that the stages `Unwrap`, `Deconvolve` and `Multipath` set on whole surfaces, and [`Flags::OUTSIDE_SPAN`].
 const OF_SURFACES: Flags = Flags::MULTIPATH.union(Flags::UNWRAP_UNSURE).union(Flags::OUTSIDE_SPAN);
 

@@ -1,3 +1,5 @@
+//! Names the wrong Jacobian behind an adjustment that found no end.
+
 use crate::{Adjustment, BlockId, Error, Observation, ParameterBlock, check_jacobian};
 
 /// Share by which a Jacobian may miss the differences of its model before it is blamed. What is less wrong costs steps,

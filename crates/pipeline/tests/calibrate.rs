@@ -150,8 +150,17 @@ fn a_wall_at_one_distance_is_refused_with_a_reason_and_without_parameters() {
 
 #[test]
 fn a_plan_promises_what_the_calibration_then_states() {
+    for terms in [terms("xp yp c k1 k2 p1 p2 d0 d4 d5 d6 d7 e1 e2"), TermSelection::Auto] {
+        assert_promised(terms);
+    }
+}
+
+/// The plan of the target field, against its calibration with the same terms.
+fn assert_promised(terms: TermSelection) {
     let folder = tempfile::tempdir().unwrap();
-    let options = PlanOptions { terms: terms("xp yp c k1 k2 p1 p2 d0 d4 d5 d6 d7 e1 e2"), ..PlanOptions::default() };
+    let mut asked = request(&target_field(), &folder.path().join("out"));
+    asked.options.terms = terms.clone();
+    let options = PlanOptions { terms, ..PlanOptions::default() };
     // The truth stands for the planned places.
     let planned = changed(|survey| {
         for table in ["stations.csv", "targets.csv"] {
@@ -166,7 +175,7 @@ fn a_plan_promises_what_the_calibration_then_states() {
     };
     let planned = pipeline::plan_network(&plan, &Silent).unwrap();
     assert!(planned.accepted && !planned.candidates.is_empty());
-    let summary = pipeline::calibrate(&request(&target_field(), &folder.path().join("out")), &Silent).unwrap();
+    let summary = pipeline::calibrate(&asked, &Silent).unwrap();
     for (name, parameter) in planned.parameters.0.iter().filter(|(_, parameter)| parameter.status == "estimated") {
         let ratio = summary.parameters.get(name).unwrap().sigma_prior / parameter.sigma_prior;
         // The ten rejected values of 1,986 were perhaps at a corner, where they count.

@@ -13,8 +13,8 @@ use crate::values::{Terms, name, positive, terms};
 pub(crate) struct PlanArguments {
     /// Folder with survey.ron and the planned stations.csv and targets.csv.
     survey: PathBuf,
-    /// Terms that will be estimated, separated by commas; `auto`: all but the periodic terms of the longest wavelength
-    /// and the amplitude-related ones.
+    /// Terms that will be estimated, separated by commas; `auto`: all but the amplitude-related ones, each with
+    /// what cameras usually show of it where the network does not tell, as `calibrate` has them.
     #[arg(long, default_value = "auto", value_name = "LIST|auto", value_parser = terms)]
     terms: Terms,
     /// What will carry the datum: inner constraints on the targets, or the standard deviations in the tables.

@@ -55,7 +55,7 @@ fn decisions(outcome: &CalibrationOutcome, mut terms: BTreeSet<String>) -> Vec<T
     }
     let stay = GROUPS.iter().filter(|group| terms.contains(group[0]));
     let stay = stay.filter_map(|group| Some(decision(group, true, &current.test(group)?, &current.offset_gain(group))));
-    stay.collect::<Vec<_>>().into_iter().chain(left).collect()
+    stay.chain(left).collect()
 }
 
 /// Test of a group.

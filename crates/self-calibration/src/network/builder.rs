@@ -244,20 +244,20 @@ impl<'s> Builder<'s> {
 
     /// Terms of camera and ranges with what cameras show; a camera known from another adjustment has that in it.
     fn add_term_priors(&mut self) -> Result<()> {
-        let setup = self.setup;
-        let camera = setup
-            .camera_prior
-            .is_none()
-            .then(|| (self.blocks.camera, camera_names().into_iter().map(str::to_owned).collect()));
-        let sets = setup.calibration.sets.iter().zip(&self.blocks.sets);
-        let sets: Vec<_> = sets.map(|(set, &block)| (block, range_names(&set.model))).collect();
-        let blocks = std::iter::once(camera).chain(sets.into_iter().map(Some));
-        for (place, (block, names)) in blocks.enumerate().filter_map(|(place, block)| Some((place, block?))) {
-            if let Some(prior) = setup.term_prior(&names) {
-                self.add_block_prior(block, &prior, Component::Term, |component| Source::Term(place, component))?;
-            }
+        if self.setup.camera_prior.is_none() {
+            let names: Vec<String> = camera_names().into_iter().map(str::to_owned).collect();
+            self.add_term_prior(0, self.blocks.camera, &names)?;
+        }
+        for (index, block) in self.blocks.sets.clone().into_iter().enumerate() {
+            self.add_term_prior(index + 1, block, &range_names(&self.setup.calibration.sets[index].model))?;
         }
         Ok(())
+    }
+
+    /// `place` as in [`Source::Term`].
+    fn add_term_prior(&mut self, place: usize, block: BlockId, names: &[String]) -> Result<()> {
+        let Some(prior) = self.setup.term_prior(names) else { return Ok(()) };
+        self.add_block_prior(block, &prior, Component::Term, |component| Source::Term(place, component))
     }
 
     fn add_distances(&mut self) -> Result<()> {

@@ -1,6 +1,6 @@
 //! The methods of Sect. 5.3: which adjustments they consist of.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 
 use super::combine::{Combined, combine};
 use super::problem::{BlockPrior, Datum, Excluded, Setup, Solved};
@@ -12,7 +12,7 @@ use super::start::find_start;
 use super::start_calibration::start_calibration;
 use super::strength::Strength;
 use super::terms::{camera_names, camera_values};
-use super::{CalibrationOptions, CalibrationOutcome, Method, Network, NetworkDatum, TermSelection, term_priors};
+use super::{CalibrationOptions, CalibrationOutcome, Method, Network, NetworkDatum, TermSelection};
 use crate::{Error, Result};
 
 /// Inflation from which on the weakest combination is told although it is accepted.
@@ -186,7 +186,7 @@ impl Problem<'_> {
             datum: Datum::Known,
             geometry_held: false,
             camera_prior: None,
-            term_sigmas: self.term_sigmas(),
+            term_sigmas: self.options.terms.sigmas(self.network),
             excluded: Excluded::default(),
         };
         let mut diagnosis = Vec::new();
@@ -290,17 +290,9 @@ impl Problem<'_> {
             datum,
             geometry_held,
             camera_prior,
-            term_sigmas: self.term_sigmas(),
+            term_sigmas: self.options.terms.sigmas(network),
             excluded,
         })
-    }
-
-    /// What cameras show of their terms, where these are chosen; those of a list are unknown.
-    fn term_sigmas(&self) -> BTreeMap<&'static str, f64> {
-        match self.options.terms {
-            TermSelection::Auto => term_priors::usual(self.network),
-            TermSelection::List(_) => BTreeMap::new(),
-        }
     }
 
     /// Sightings whose ranges take part in a second step.

@@ -1,20 +1,23 @@
 //! Network design: how well a planned network would determine the calibration, and which further station helps most.
 
 use std::borrow::Cow;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 
 use camera_model::pose_from_euler;
+use error_models::AmplitudeHyperbola;
 use nalgebra::{DMatrix, Isometry3, Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};
 
 use super::calibrate::{datum, ranged_stations};
 use super::point_sigma::point_sigma;
 use super::problem::{Excluded, Setup, Solved, Start};
 use super::report::{Estimate, Fit, parameters};
+use super::selection::all_terms;
 use super::simulate::{exact_sightings, planned_sightings};
 use super::start_calibration::start_calibration;
 use super::term_words::expand;
-use super::terms::camera_names;
-use super::{CalibratedParameter, CalibrationOptions, Network, NetworkDatum, SightingOptions, Station, TermSelection};
+use super::{
+    CalibratedParameter, CalibrationOptions, Method, Network, NetworkDatum, SightingOptions, Station, TermSelection,
+};
 use crate::{Error, Result};
 
 /// Ranges at which the uncertainty of points is told, metre.
@@ -217,9 +220,10 @@ impl<'o> Design<'o> {
     /// The network with the range terms that are asked for, and their names.
     fn terms<'n>(&self, network: &'n Network) -> Result<(Cow<'n, Network>, BTreeSet<String>)> {
         let TermSelection::List(names) = &self.options.terms else {
-            let range = ["d0", "d4", "d5", "d6", "d7", "e1", "e2"];
-            let names = camera_names().into_iter().chain(range).map(str::to_owned);
-            return Ok((Cow::Borrowed(network), names.collect()));
+            // Whether a hyperbola is needed, only residuals tell.
+            let mut names = all_terms(network, Method::OneStep);
+            names.retain(|name| !AmplitudeHyperbola::NAMES.contains(&name.as_str()));
+            return Ok((Cow::Borrowed(network), names));
         };
         // A polynomial lies over the ranges that will be observed.
         let (observed, _) = self.observe(network)?;
@@ -265,7 +269,7 @@ impl<'o> Design<'o> {
             datum: datum(observed, &self.calibration_options)?,
             geometry_held: false,
             camera_prior: None,
-            term_sigmas: BTreeMap::new(),
+            term_sigmas: self.options.terms.sigmas(observed),
             excluded: Excluded::default(),
         })
     }

@@ -4,15 +4,16 @@ use std::collections::BTreeMap;
 
 use nalgebra::{DMatrix, DVector};
 
-use super::Network;
 use super::problem::{BlockPrior, Setup};
+use super::{Network, TermSelection};
 
-/// Waves of the range error, metre: calibrated cameras show amplitudes from some millimetres to 5 cm, and 10 cm in all.
+// The sizes are chosen, after what range cameras and their lenses are said to have.
+
+/// Waves of the range error, metre.
 const WAVE_M: f64 = 0.02;
 /// Change of the range error from the image's middle to its corner, metre.
 const TILT_M: f64 = 0.02;
-/// Radial distortion in the corner by the terms of third, fifth and seventh order, as shares of the corner's radius. Wide
-/// lenses have up to 20 %, nearly all of it in the first.
+/// Radial distortion in the corner by the terms of third, fifth and seventh order, as shares of the corner's radius.
 const RADIAL: [f64; 3] = [0.2, 0.1, 0.05];
 /// Decentring distortion in the corner, as a share of its radius.
 const DECENTRING: f64 = 0.01;
@@ -21,10 +22,7 @@ const AFFINITY: f64 = 1e-3;
 
 /// Standard deviations of terms about zero by name, in the unit of each. The others - perspective centre and principal
 /// distance, offset, hyperbola - are unknown, or no terms that may be zero.
-///
-/// A deviation ten times as large is as good as none; one that is ten times too small pulls a term that the observations
-/// leave open to zero and promises too much. Where the observations show a term, its prior does not matter.
-pub(crate) fn usual(network: &Network) -> BTreeMap<&'static str, f64> {
+fn usual(network: &Network) -> BTreeMap<&'static str, f64> {
     let format = &network.camera.format;
     let [x, y] = format.pixel_pitch_mm;
     let corner = 0.5 * (x * format.width as f64).hypot(y * format.height as f64);
@@ -40,6 +38,16 @@ pub(crate) fn usual(network: &Network) -> BTreeMap<&'static str, f64> {
         ("b2", AFFINITY),
     ];
     waves.into_iter().chain(radial).chain(others).collect()
+}
+
+impl TermSelection {
+    /// What cameras show of their terms, where these are chosen; those of a list are unknown.
+    pub(crate) fn sigmas(&self, network: &Network) -> BTreeMap<&'static str, f64> {
+        match self {
+            Self::Auto => usual(network),
+            Self::List(_) => BTreeMap::new(),
+        }
+    }
 }
 
 impl Setup<'_> {

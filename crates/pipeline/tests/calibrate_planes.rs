@@ -232,3 +232,51 @@ fn a_calibrated_lens_and_range_go_together() {
     let message = process(&plan, &survey, Some(&out), &Silent).unwrap_err().to_string();
     assert!(message.contains("0.001") && message.contains("0.004"), "{message}");
 }
+
+/// Noise of the frames is 3 mm; they state none.
+#[test]
+fn deviations_of_ranges_are_taken_as_given_and_told_where_they_are_not() {
+    let folder = tempfile::tempdir().unwrap();
+    let survey = folder.path().join("survey");
+    write_survey(&survey);
+    for (sigma_range_m, doubtful) in [(Some(0.003), false), (None, true), (Some(0.002), true)] {
+        let ask = |request: &mut CalibrateRequest| {
+            planes(request);
+            request.defaults.sigma_range_m = sigma_range_m;
+        };
+        let summary = calibrate(folder.path(), ask).unwrap();
+        let scale = sigma_range_m.unwrap_or(0.01) / 0.003;
+        assert!((summary.sigma0.unwrap() * scale - 1.0).abs() < 0.05, "{sigma_range_m:?}: {:?}", summary.sigma0);
+        let told = summary.doubts.iter().any(|doubt| doubt.words.contains("global test"));
+        assert_eq!(told, doubtful, "{sigma_range_m:?}: {:?}", summary.doubts);
+        let assumed = summary.diagnosis.iter().any(|said| said.contains("--sigma-range"));
+        assert_eq!(assumed, sigma_range_m.is_none(), "{:?}", summary.diagnosis);
+    }
+}
+
+/// One of seven stations stands 5 mm, or a tenth of a degree, from where stations.csv says, which gives no deviations.
+#[test]
+fn a_pose_that_is_held_and_wrong_is_told() {
+    for [shift_m, turn_rad] in [[0.0, 0.0], [0.005, 0.0], [0.0, 0.002]] {
+        let folder = tempfile::tempdir().unwrap();
+        let survey = folder.path().join("survey");
+        write_survey(&survey);
+        let mut stations = range_io::tables::read_stations(survey.join("stations.csv")).unwrap();
+        let pose = &mut stations[3].world_from_camera;
+        let off = nalgebra::Isometry3::new(Vector3::new(0.0, 0.0, shift_m), Vector3::new(0.0, turn_rad, 0.0));
+        *pose *= off;
+        write_stations(survey.join("stations.csv"), &stations).unwrap();
+        let ask = |request: &mut CalibrateRequest| {
+            planes(request);
+            request.defaults.sigma_range_m = Some(0.003);
+        };
+        let summary = calibrate(folder.path(), ask).unwrap();
+        let told: Vec<&str> = summary.doubts.iter().map(|doubt| doubt.words.as_str()).collect();
+        let named = told.iter().any(|words| words.contains("station `S3`") && words.contains("held as exact"));
+        assert_eq!(named, shift_m + turn_rad > 0.0, "{told:?}");
+        assert!(summary.diagnosis.iter().any(|said| said.contains("taken as exact")), "{:?}", summary.diagnosis);
+        if shift_m + turn_rad == 0.0 {
+            assert!(told.is_empty(), "{told:?}");
+        }
+    }
+}

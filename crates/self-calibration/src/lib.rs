@@ -29,7 +29,7 @@ mod range_terms;
 mod surfaces;
 mod trends;
 
-pub use adjust::{Distribution, Scale};
+pub use adjust::{Distribution, GlobalTest, GlobalVerdict, Scale};
 pub use amplitude_or_position::{
     AmplitudeOrPosition, AmplitudeOrPositionOptions, EffectTest, ErrorCause, amplitude_or_position,
 };

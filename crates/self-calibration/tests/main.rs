@@ -16,6 +16,7 @@ mod bad_networks;
 mod comparison;
 mod contradictions;
 mod contradictions_by_method;
+mod control;
 mod drift;
 #[path = "support/drift.rs"]
 mod drift_captures;
@@ -25,6 +26,7 @@ mod drift_frame_rate;
 mod drift_refusals;
 mod fixed_pattern;
 mod further_terms;
+mod global_tests;
 mod gross_errors;
 mod hyperbola_of_a_network;
 mod independent_adjustment;

@@ -12,6 +12,7 @@ mod passive;
 mod placed;
 mod planes;
 mod planes_outcome;
+mod pose_test;
 mod request;
 mod run;
 mod start;

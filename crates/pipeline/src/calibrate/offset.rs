@@ -2,7 +2,9 @@
 //! a plane.
 
 use error_models::{FixedPattern, RangeErrorModel};
-use self_calibration::{OffsetSample, OffsetTable, OffsetTableOptions, Result, estimate_offset_table};
+use self_calibration::{
+    DifferenceOptions, OffsetSample, OffsetTable, OffsetTableOptions, Result, estimate_offset_table,
+};
 use serde::Serialize;
 
 use super::placed::Placed;
@@ -58,17 +60,18 @@ pub(crate) struct FoundTable {
 }
 
 impl FoundTable {
-    /// Estimates the table from every pixel of the captures, with the terms of `model` taken off.
+    /// Estimates the table from these pixels of the captures (every one, if it is to be whole), with the terms of `model` taken off.
     pub(super) fn new(
         placed: &[Placed<'_>],
         model: &RangeErrorModel,
         start: &Start,
+        pixels: &DifferenceOptions,
         rewraps: bool,
         block: usize,
     ) -> Result<Self> {
         let mut samples = Vec::new();
         for placed in placed {
-            for sample in placed.samples(start, 1, rewraps)? {
+            for sample in placed.samples(start, pixels, rewraps)? {
                 let d = &sample.difference;
                 let correction = model.correction(d.observed_range_m, d.x_mm, d.y_mm, d.amplitude);
                 if !correction.outside_span {

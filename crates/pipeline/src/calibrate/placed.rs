@@ -18,10 +18,9 @@ pub(super) struct Placed<'a> {
 impl Placed<'_> {
     /// The differences of every so many pixels to the plane, with their places. `rewraps`: the reference tells the number
     /// of whole intervals better than the phases could.
-    pub(super) fn samples(&self, start: &Start, step: usize, rewraps: bool) -> Result<Vec<Sample>> {
-        let options = DifferenceOptions { step, ..DifferenceOptions::default() };
+    pub(super) fn samples(&self, start: &Start, options: &DifferenceOptions, rewraps: bool) -> Result<Vec<Sample>> {
         let capture = self.capture;
-        let differences = differences_to_plane(capture.frame, &start.camera, &self.pose, &self.plane, &options)?;
+        let differences = differences_to_plane(capture.frame, &start.camera, &self.pose, &self.plane, options)?;
         let format = start.camera.format;
         let [xp, yp] = start.camera.interior.principal_point_mm;
         // The terms are functions of what was observed: the drift goes to the reference.

@@ -16,6 +16,7 @@ use super::network_files::optional;
 use super::offset::{FoundTable, OffsetModel};
 use super::placed::Placed;
 use super::planes_outcome::Found;
+use super::pose_test;
 use super::request::CalibrateRequest;
 use super::run::Attempt;
 use super::start::Start;
@@ -47,7 +48,7 @@ pub(super) fn calibrate_planes(request: &CalibrateRequest, progress: &dyn Progre
     let stations = optional(&root.join("stations.csv"), read_placed_stations)?.rows;
     let frames = process(&preparation(&survey, &start), &request.survey, request.calibration.as_deref(), progress)?;
     let known_drift = KnownDrift::new(start.calibration.as_ref(), &survey, &root, request.warm_up)?;
-    let scene = Scene::new(&rows, &frames, &stations, &known_drift)?;
+    let scene = Scene::new(&rows, &frames, &stations, &known_drift, request.defaults.sigma_range_m)?;
     start.set_drifts(scene.drifts.clone());
     progress.begin("estimate range terms", 1);
     let time = frames.views.first().and_then(|view| view.integration_time_s);
@@ -59,11 +60,19 @@ pub(super) fn calibrate_planes(request: &CalibrateRequest, progress: &dyn Progre
         unknown(&scene, &start, &options, rejection)
     };
     let outcome = found.and_then(|(found, placed)| {
+        let doubts = pose_test::doubts(&placed, &found, &start);
         let table = match request.offset {
-            OffsetModel::Table { block } => Some(FoundTable::new(&placed, found.model(), &start, rewraps, block)?),
+            OffsetModel::Table { block } => {
+                let pixels = DifferenceOptions { step: 1, ..scene.pixels() };
+                Some(FoundTable::new(&placed, found.model(), &start, &pixels, rewraps, block)?)
+            }
             OffsetModel::Constant | OffsetModel::Surface { .. } => None,
         };
-        Ok((found.outcome(&start, time), table))
+        let mut outcome = found.outcome(&start, time);
+        outcome.diagnosis.extend(scene.assumptions());
+        outcome.doubts.extend(doubts);
+        outcome.doubts.extend(outcome.doubts_of_tests());
+        Ok((outcome, table))
     });
     progress.advance(1);
     Ok((start, outcome))
@@ -76,6 +85,8 @@ struct Scene<'a> {
     planes: Vec<Option<Plane>>,
     /// What was taken off each view.
     drifts: Vec<ViewDrift>,
+    /// Standard deviation of ranges whose frames state none, where it was given, metre.
+    sigma_range_m: Option<f64>,
 }
 
 impl<'a> Scene<'a> {
@@ -84,8 +95,10 @@ impl<'a> Scene<'a> {
         frames: &'a Outcome,
         stations: &[Station],
         known_drift: &KnownDrift<'_>,
+        sigma_range_m: Option<f64>,
     ) -> Result<Self> {
-        let mut scene = Self { captures: Vec::new(), names: Vec::new(), planes: Vec::new(), drifts: Vec::new() };
+        let (captures, names, planes, drifts) = Default::default();
+        let mut scene = Self { captures, names, planes, drifts, sigma_range_m };
         for (index, row) in rows.rows.iter().enumerate() {
             let view = frames.views.iter().find(|view| view.station == row.station).ok_or_else(|| {
                 rows.error(index, "station", format!("`{}` is no station of the survey's frames", row.station))
@@ -142,7 +155,32 @@ impl<'a> Scene<'a> {
     fn pixels(&self) -> DifferenceOptions {
         let pixels: usize = self.captures.iter().map(|capture| capture.frame.range.as_slice().len()).sum();
         let step = ((pixels as f64 / MOST_DIFFERENCES as f64).sqrt().ceil() as usize).max(1);
-        DifferenceOptions { step, ..DifferenceOptions::default() }
+        let unknown_sigma_m = self.sigma_range_m.unwrap_or(DifferenceOptions::default().unknown_sigma_m);
+        DifferenceOptions { step, unknown_sigma_m, ..DifferenceOptions::default() }
+    }
+
+    /// What was taken for granted, in sentences.
+    fn assumptions(&self) -> Vec<String> {
+        let unknown = |capture: &&PlaneCapture<'_>| {
+            capture.frame.sigma.as_slice().iter().all(|sigma| !(*sigma > 0.0 && sigma.is_finite()))
+        };
+        let unknown = self.captures.iter().filter(unknown).count();
+        let millimetres = 1e3 * self.pixels().unknown_sigma_m;
+        let sigma = (unknown > 0 && self.sigma_range_m.is_none()).then(|| {
+            format!(
+                "the frames of {unknown} of {} captures state no standard deviation of their ranges: {millimetres} mm is \
+                 assumed; give it with --sigma-range",
+                self.captures.len()
+            )
+        });
+        let exact = self.captures.iter().filter(|c| c.world_from_camera.is_some() && c.covariance.is_none()).count();
+        let exact = (exact > 0).then(|| {
+            format!(
+                "the poses of {exact} of {} captures have no standard deviations in stations.csv and are taken as exact",
+                self.captures.len()
+            )
+        });
+        sigma.into_iter().chain(exact).collect()
     }
 }
 
@@ -166,7 +204,7 @@ fn known<'a>(
     for (index, capture) in scene.captures.iter().enumerate() {
         let (Some(plane), Some(pose)) = (scene.planes[capture.plane], capture.world_from_camera) else { continue };
         let placed = Placed { capture, name: scene.names[capture.plane].clone(), plane, pose };
-        let more = placed.samples(start, scene.pixels().step, rewraps);
+        let more = placed.samples(start, &scene.pixels(), rewraps);
         let more = more.map_err(Error::stage("planes", &capture.name))?;
         if more.is_empty() {
             let reason = format!("no usable pixel of station `{}` sees the plane", capture.name);
@@ -197,7 +235,7 @@ fn unknown<'a>(
         let adjusted = &estimate.planes()[quality.plane];
         let pose = quality.world_from_camera.unwrap_or_else(Isometry3::identity);
         let placed = Placed { capture, name: adjusted.name.clone(), plane: adjusted.plane, pose };
-        samples.extend(placed.samples(start, pixels.step, false)?);
+        samples.extend(placed.samples(start, &pixels, false)?);
         all.push(placed);
     }
     Ok((Found::of_planes(samples, &estimate, rejection)?, all))

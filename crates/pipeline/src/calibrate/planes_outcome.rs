@@ -110,6 +110,16 @@ impl Found {
         })
     }
 
+    /// Residuals by capture and pixel.
+    pub(super) fn residuals(&self) -> &[ObservationQuality] {
+        &self.residuals
+    }
+
+    /// Standard deviation of unit weight.
+    pub(super) fn sigma0(&self) -> Option<f64> {
+        self.sigma0
+    }
+
     /// The terms found.
     pub(super) fn model(&self) -> &RangeErrorModel {
         &self.model

@@ -294,10 +294,11 @@ impl<'s> Builder<'s> {
                 continue;
             };
             let coordinates: [f64; 3] = point.into();
-            self.adjustment.add_prior(block, &coordinates, &Covariance::from_matrix(&covariance))?;
-            for (axis, value) in coordinates.into_iter().enumerate() {
-                self.row(Source::Target(index), Component::Control, value, covariance[(axis, axis)].sqrt());
+            if self.setup.excluded.control_points.contains(&index) {
+                continue;
             }
+            self.adjustment.add_prior(block, &coordinates, &Covariance::from_matrix(&covariance))?;
+            self.rows.extend(self.setup.target_control(index).into_iter().flatten());
         }
         self.add_station_control()
     }
@@ -305,17 +306,12 @@ impl<'s> Builder<'s> {
     fn add_station_control(&mut self) -> Result<()> {
         for (index, station) in self.setup.network.stations.iter().enumerate() {
             let (Some(pose), Some(covariance)) = (station.world_from_camera, station.covariance) else { continue };
+            if self.setup.excluded.control_poses.contains(&index) {
+                continue;
+            }
             let block = self.blocks.stations[index];
             self.adjustment.add_prior(block, &RigidPose::values(&pose), &Covariance::from_matrix(&covariance))?;
-            for component in 0..6 {
-                let observed = if component < 3 { pose.translation.vector[component] } else { 0.0 };
-                self.row(
-                    Source::Station(index),
-                    Component::Control,
-                    observed,
-                    covariance[(component, component)].sqrt(),
-                );
-            }
+            self.rows.extend(self.setup.station_control(index).into_iter().flatten());
         }
         Ok(())
     }

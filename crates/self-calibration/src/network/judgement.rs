@@ -19,7 +19,9 @@ impl Problem<'_> {
     /// for the cause.
     pub(crate) fn judged(&self) -> Result<CalibrationOutcome> {
         if self.options.method == Method::Laboratory {
-            return self.calibrate();
+            let mut outcome = self.calibrate()?;
+            outcome.doubts.extend(outcome.doubts_of_tests());
+            return Ok(outcome);
         }
         let best = match self.attempt() {
             Ok(judged) if judged.suspicion.is_none() => return Ok(judged.told(self)),
@@ -92,6 +94,7 @@ impl Judged {
     fn told(self, problem: &Problem<'_>) -> CalibrationOutcome {
         let mut outcome = self.outcome;
         outcome.doubts.extend(self.suspicion.sentences());
+        outcome.doubts.extend(outcome.doubts_of_tests());
         let more = sentences(&outcome, problem.network);
         outcome.diagnosis.extend(more);
         outcome

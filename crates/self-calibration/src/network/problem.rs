@@ -55,6 +55,9 @@ pub(crate) struct Excluded {
     pub(crate) ranges: BTreeSet<usize>,
     pub(crate) passive: BTreeSet<usize>,
     pub(crate) distances: BTreeSet<usize>,
+    /// Control points and control poses, by their target and station.
+    pub(crate) control_points: BTreeSet<usize>,
+    pub(crate) control_poses: BTreeSet<usize>,
 }
 
 /// Parameters of a block known from elsewhere: components of the block, values, covariance.
@@ -115,8 +118,9 @@ pub(crate) enum Source {
     Sighting(usize),
     Passive(usize),
     Distance(usize),
-    Target(usize),
-    Station(usize),
+    /// A control point and its axis, a control pose and its component.
+    Target(usize, usize),
+    Station(usize, usize),
     Camera,
     PassiveCamera,
     /// A term that is estimated with what cameras show: its block - the camera, then the range sets - and component.

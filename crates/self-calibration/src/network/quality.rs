@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use adjust::{BlockId, Distribution, Observation, Scale};
+use adjust::{BlockId, Distribution, Manifold, Observation, RigidPose, Scale};
 use nalgebra::{Isometry3, Point3};
 
 use super::equations::{DistanceEquation, PassiveEquation};
@@ -150,8 +150,8 @@ impl Setup<'_> {
                 let known = &network.distances[index];
                 (network.end_name(known.from).to_owned(), network.end_name(known.to).to_owned())
             }
-            Source::Target(index) => (String::new(), network.targets[index].name.clone()),
-            Source::Station(index) => (network.stations[index].name.clone(), String::new()),
+            Source::Target(index, _) => (String::new(), network.targets[index].name.clone()),
+            Source::Station(index, _) => (network.stations[index].name.clone(), String::new()),
             Source::Camera => ("camera".to_owned(), String::new()),
             Source::PassiveCamera => ("passive camera".to_owned(), String::new()),
             Source::Term(place, component) => ("camera".to_owned(), self.term_name(place, component)),
@@ -190,6 +190,9 @@ impl Setup<'_> {
             let (source, component) = (Source::Distance(index), Component::Distance);
             out.push((Row { source, component, observed: known.distance_m, sigma: known.sigma_m }, Verdict::Rejected));
         }
+        let points = self.excluded.control_points.iter().filter_map(|&index| self.target_control(index));
+        let poses = self.excluded.control_poses.iter().filter_map(|&index| self.station_control(index));
+        out.extend(points.chain(poses).flatten().map(|row| (row, Verdict::Rejected)));
         let passive = self.network.passive.iter().flat_map(|passive| passive.image_points.iter().enumerate());
         for (index, seen) in passive.filter(|(index, _)| !self.passive || self.excluded.passive.contains(index)) {
             let verdict = if self.passive { Verdict::Rejected } else { Verdict::LeftOut };
@@ -237,7 +240,18 @@ impl Setup<'_> {
                 };
                 (Box::new(DistanceEquation { blocks: [from, to], distance_m: known.distance_m }), 0)
             }
-            _ => return Ok(f64::NAN),
+            Source::Target(index, axis) => {
+                let Some(block) = blocks.targets[index] else { return Ok(f64::NAN) };
+                return Ok(row.observed - solution.values(block)?[axis]);
+            }
+            Source::Station(index, component) => {
+                let Some(given) = &self.network.stations[index].world_from_camera else { return Ok(f64::NAN) };
+                let adjusted = RigidPose::values(&solution.pose(blocks.stations[index])?);
+                let mut off = [0.0; 6];
+                RigidPose.minus(&RigidPose::values(given), &adjusted, &mut off);
+                return Ok(off[component]);
+            }
+            Source::Camera | Source::PassiveCamera | Source::Term(..) => return Ok(f64::NAN),
         };
         let parameters =
             equation.blocks().iter().map(|&block| Ok(solution.values(block)?)).collect::<Result<Vec<_>>>()?;

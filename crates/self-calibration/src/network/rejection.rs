@@ -9,7 +9,7 @@ use super::problem::{Row, Setup, Solved, Source};
 use crate::{Error, Result};
 
 /// Values with a smaller redundancy number are not tested: their residual shows too little of an error.
-const TESTABLE: f64 = 0.01;
+pub(crate) const TESTABLE: f64 = 0.01;
 /// Groups of fewer values take their scale from all values together.
 const SMALLEST_GROUP: usize = 30;
 /// Rounds in which a station loses one value each. Then twice as many in each further round: so many bad values are no
@@ -20,13 +20,13 @@ const MOST_DOUBLINGS: usize = 10;
 /// Rounds of rejection, a bound that only contradictory observations reach.
 const MOST_ROUNDS: usize = 100;
 
-/// A value that the test suspects.
+/// A value, or all values of a control point or pose, that the test suspects.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Suspect {
-    /// Position among the rows.
+    /// Position among the rows; of control that of its first.
     pub(crate) row: usize,
     /// `|v| / σ_v` over the scale of its group.
-    statistic: f64,
+    pub(crate) statistic: f64,
 }
 
 /// Standardised residuals over the robust scale of their group, where they exceed the critical value; largest first.
@@ -35,9 +35,11 @@ pub(crate) struct Suspect {
 pub(crate) fn suspects(solution: &Solution, components: &[Component], level: f64) -> Result<Vec<Suspect>> {
     let standardised = solution.standardised_residuals(Scale::Prior)?;
     let redundancy = solution.redundancy_numbers();
-    let testable = |row: usize| standardised[row].is_finite() && redundancy[row] > TESTABLE;
+    // Control is tested as a whole; terms were not observed.
+    let single = |row: usize| !matches!(components[row], Component::Control | Component::Term);
+    let testable = |row: usize| single(row) && standardised[row].is_finite() && redundancy[row] > TESTABLE;
     let rows: Vec<usize> = (0..components.len()).filter(|&row| testable(row)).collect();
-    let overall = scale(rows.iter().map(|&row| standardised[row].abs()).collect());
+    let overall = overall_scale(solution)?;
     let critical = Distribution::Normal.critical(level);
     let mut out = Vec::new();
     let kinds: BTreeSet<Component> = components.iter().copied().collect();
@@ -50,6 +52,14 @@ pub(crate) fn suspects(solution: &Solution, components: &[Component], level: f64
     }
     out.sort_by(|a, b| b.statistic.total_cmp(&a.statistic).then(a.row.cmp(&b.row)));
     Ok(out)
+}
+
+/// The robust scale of all residuals together.
+fn overall_scale(solution: &Solution) -> Result<f64> {
+    let standardised = solution.standardised_residuals(Scale::Prior)?;
+    let pairs = standardised.iter().zip(solution.redundancy_numbers());
+    let tested = pairs.filter(|(size, redundancy)| size.is_finite() && *redundancy > TESTABLE);
+    Ok(scale(tested.map(|(size, _)| size.abs()).collect()))
 }
 
 fn scale(mut sizes: Vec<f64>) -> f64 {
@@ -106,8 +116,21 @@ impl Setup<'_> {
         readmitted: &BTreeSet<(Source, Component)>,
     ) -> Result<()> {
         let components: Vec<Component> = solved.rows.iter().map(|row| row.component).collect();
+        let suspects = suspects(&solved.solution, &components, level)?;
+        // Deviations of control do not depend on those of the sightings: it is not tested more strictly where these are
+        // stated too large.
+        let scale = overall_scale(&solved.solution)?.max(1.0);
+        let control = self.control_suspects(solved, level, scale)?.into_iter().find(|suspect| {
+            let largest = suspects.first().is_none_or(|first| suspect.statistic > first.statistic);
+            largest && !readmitted.contains(&key(&solved.rows[suspect.row]))
+        });
+        if let Some(control) = control {
+            // Wrong control disturbs all that hangs on it.
+            self.set_excluded(&solved.rows[control.row], true);
+            return Ok(());
+        }
         let (mut stations, mut targets) = (BTreeMap::new(), BTreeSet::new());
-        for suspect in suspects(&solved.solution, &components, level)? {
+        for suspect in suspects {
             let row = &solved.rows[suspect.row];
             let Some((station, target)) = self.ends(row.source) else { continue };
             let count = stations.entry(station).or_insert(0);
@@ -159,7 +182,7 @@ impl Setup<'_> {
         Ok(())
     }
 
-    /// Station and target of an observation, or the two ends of a distance; control is not tested here.
+    /// Station and target of an observation, or the two ends of a distance; control is rejected alone.
     fn ends(&self, source: Source) -> Option<(usize, usize)> {
         match source {
             Source::Sighting(index) => {
@@ -182,7 +205,9 @@ impl Setup<'_> {
             Source::Sighting(index) => (&mut self.excluded.image_points, index),
             Source::Passive(index) => (&mut self.excluded.passive, index),
             Source::Distance(index) => (&mut self.excluded.distances, index),
-            _ => return,
+            Source::Target(index, _) => (&mut self.excluded.control_points, index),
+            Source::Station(index, _) => (&mut self.excluded.control_poses, index),
+            Source::Camera | Source::PassiveCamera | Source::Term(..) => return,
         };
         if excluded {
             list.insert(index);
@@ -192,12 +217,17 @@ impl Setup<'_> {
     }
 }
 
-/// Both coordinates of an image point stand and fall together.
+/// Both coordinates of an image point stand and fall together, as do all of control.
 fn key(row: &Row) -> (Source, Component) {
     let component = match row.component {
         Component::Row => Component::Col,
         Component::PassiveRow => Component::PassiveCol,
         other => other,
     };
-    (row.source, component)
+    let source = match row.source {
+        Source::Target(index, _) => Source::Target(index, 0),
+        Source::Station(index, _) => Source::Station(index, 0),
+        other => other,
+    };
+    (source, component)
 }

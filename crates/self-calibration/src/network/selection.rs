@@ -32,6 +32,7 @@ impl Problem<'_> {
 
     /// Estimates the terms of a list. A hyperbola without start values takes them from a calibration without it.
     fn listed(&self, terms: &BTreeSet<String>) -> Result<CalibrationOutcome> {
+        self.require_ranges(terms)?;
         let is_hyperbola = |name: &String| AmplitudeHyperbola::NAMES.contains(&name.as_str());
         if !terms.iter().any(is_hyperbola) {
             return self.run(terms);
@@ -115,6 +116,21 @@ impl Problem<'_> {
         terms.retain(|name| !SINES.contains(&name.as_str()));
         terms.extend((0..KNOTS - 1).map(|knot| format!("s{knot}")));
         Problem { network: &network, ..*self }.run(&terms)
+    }
+
+    /// Ranges, where any of these terms is one of theirs.
+    fn require_ranges(&self, terms: &BTreeSet<String>) -> Result<()> {
+        let ranged = ranged_stations(self.network, self.options);
+        let seen = &self.network.sightings;
+        // Where nothing was seen at all, that is the better answer.
+        if seen.is_empty() || seen.iter().any(|seen| seen.range_m.is_some() && ranged[seen.station]) {
+            return Ok(());
+        }
+        let camera = camera_names();
+        match terms.iter().find(|name| !camera.contains(&name.as_str())) {
+            None => Ok(()),
+            Some(name) => Err(self.needs(&format!("ranges to estimate {name}: none takes part"))),
+        }
     }
 
     fn require_amplitudes(&self) -> Result<()> {

@@ -163,8 +163,9 @@ impl Setup<'_> {
         Ok(())
     }
 
-    /// Leaves these out, and targets that nothing determines without them; a station keeps what determines its pose.
+    /// Leaves these out, but wrong control instead of what contradicts it, and targets that nothing determines without them; a station keeps what determines its pose.
     fn leave_out(&mut self, excluded: &Excluded) {
+        let excluded = self.without_wrong_control(excluded);
         self.excluded.ranges.extend(&excluded.ranges);
         for station in 0..self.network.stations.len() {
             let own = |(_, seen): &(usize, &super::Sighting)| seen.station == station && seen.pixel.is_some();

@@ -25,6 +25,18 @@ pub(crate) fn station_pose(
 }
 
 /// The targets with coordinates whose image points a station has.
+/// Where stations at these poses see a target; `None` where too little tells.
+pub(crate) fn target_point(
+    network: &Network,
+    calibration: &Calibration,
+    stations: &[Isometry3<f64>],
+    target: usize,
+) -> Option<Point3<f64>> {
+    let mut finder = Finder::new(network, calibration, Trust { stations: false, targets: false });
+    finder.stations = stations.iter().copied().map(Some).collect();
+    finder.placed(target)
+}
+
 fn seen_targets(network: &Network, targets: &[Option<Point3<f64>>], station: usize) -> Vec<TargetObservation> {
     let own = network.sightings.iter().filter(|seen| seen.station == station);
     let target = |seen: &super::Sighting| {

@@ -145,7 +145,7 @@ impl Suspicion {
         offset.into_iter().chain(lens).chain(mirrored).collect()
     }
 
-    /// Sentences for a result that is given all the same.
+    /// Sentences about stations, for a result that is given all the same.
     pub(crate) fn sentences(&self) -> Vec<String> {
         let station = |(name, rejected, seen): &(String, usize, usize)| {
             format!(
@@ -153,13 +153,7 @@ impl Suspicion {
                  look at its rows, or leave it out"
             )
         };
-        let group = |(name, scale): &(String, f64)| {
-            format!(
-                "{name} scatters {scale:.2} times as much as stated: its standard deviations are wrong, or a term of the \
-                 lens or the range error is missing; the deviations of all results are as wrong"
-            )
-        };
-        self.stations.iter().map(station).chain(self.groups.iter().map(group)).collect()
+        self.stations.iter().map(station).collect()
     }
 }
 

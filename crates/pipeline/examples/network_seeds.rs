@@ -14,8 +14,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use nalgebra::{DMatrix, DVector};
 use pipeline::{
-    CalibrateMethod, CalibrateRequest, CalibrationOptions, CalibrationSummary, DriftTreatment, Judged, Method,
-    NetworkScene, OffsetModel, Silent, TableDefaults, TermSelection, calibrate, simulate_network,
+    CalibrateMethod, CalibrateRequest, CalibrationOptions, CalibrationSummary, CertificateRequest, DriftTreatment,
+    Judged, Method, NetworkScene, OffsetModel, Silent, TableDefaults, TermSelection, calibrate, simulate_network,
 };
 use self_calibration::Distribution;
 
@@ -143,6 +143,7 @@ fn of_seed(scene: &Path, method: Method, auto: bool, seed: u64, folder: &Path) -
         offset: OffsetModel::Constant,
         warm_up: DriftTreatment::Leave,
         defaults: TableDefaults::default(),
+        certificate: CertificateRequest::default(),
         out: folder.join("out"),
     };
     let summary = calibrate(&request, &Silent)?;

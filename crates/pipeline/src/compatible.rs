@@ -6,6 +6,7 @@ use range_image::Modulation;
 use range_io::calibration::Calibration;
 use range_io::survey::{Level, Survey};
 
+use crate::calibrate::UNKNOWN_INTEGRATION_TIME_S;
 use crate::drift::{DriftCurve, DriftTreatment};
 use crate::plan::Stage;
 use crate::verdict::{Doubt, DoubtKind};
@@ -64,7 +65,7 @@ pub(crate) fn compatible(survey: &Survey, calibration: &Calibration, purpose: Pu
     let set = model_set(survey, calibration)?;
     let mut doubts = Vec::new();
     if let Purpose::Ranges(drift) = purpose {
-        integration_times(survey, &set)?;
+        integration_times(survey, calibration, &set)?;
         if drift == DriftTreatment::Apply {
             drift_known(survey, calibration)?;
         }
@@ -152,7 +153,7 @@ fn megahertz(modulation: &Modulation) -> String {
     format!("{} MHz", modulation.frequency_hz().round() / 1e6)
 }
 
-fn integration_times(survey: &Survey, set: &ModelSet) -> Result<()> {
+fn integration_times(survey: &Survey, calibration: &Calibration, set: &ModelSet) -> Result<()> {
     if set.entries.is_empty() {
         return Ok(());
     }
@@ -164,6 +165,9 @@ fn integration_times(survey: &Survey, set: &ModelSet) -> Result<()> {
             Some(time) if sound.contains(&time) => {}
             Some(time) => {
                 set.at(time).map_err(|error| match error {
+                    error_models::Error::NoModelForIntegrationTime { .. } if is_untimed(calibration) => {
+                        refused(without_time(calibration, time, index))
+                    }
                     error_models::Error::NoModelForIntegrationTime { .. } => refused(format!(
                         "no range model for an integration time of {time} s (frame {index}); the calibration has {have}: \
                          calibrate at {time} s as well, or correct integration_time_s of the frame in survey.ron"
@@ -182,6 +186,28 @@ fn integration_times(survey: &Survey, set: &ModelSet) -> Result<()> {
         }
     }
     Ok(())
+}
+
+/// Whether a calibration's own survey stated no integration time.
+fn is_untimed(calibration: &Calibration) -> bool {
+    let stand_in = |time: f64| time.to_bits() == UNKNOWN_INTEGRATION_TIME_S.to_bits();
+    calibration.span.integration_time_s.is_none()
+        && calibration.range_models.iter().all(|model| stand_in(model.integration_time_s))
+}
+
+fn without_time(calibration: &Calibration, time: f64, frame: usize) -> String {
+    let survey = &calibration.provenance.survey;
+    let of = if survey.is_empty() {
+        "the survey that it was made from".to_owned()
+    } else {
+        format!("`{survey}`, which it was made from,")
+    };
+    format!(
+        "survey.ron states integration_time_s {time} of frame {frame}, and the calibration belongs to no integration time \
+         ({UNKNOWN_INTEGRATION_TIME_S} s in it is a stand-in), as {of} stated none in observations.csv or survey.ron: state \
+         integration_time_s there, or give `rangecam calibrate --integration-time {time}` if it was the same, and calibrate \
+         again"
+    )
 }
 
 /// The drift of a warming camera must be known at all frames, unless the survey has an optical reference instead.

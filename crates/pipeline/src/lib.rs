@@ -21,6 +21,7 @@ mod noise;
 mod outcome;
 mod plan;
 mod plausibility;
+mod point_uncertainty;
 mod progress;
 mod register;
 mod report;
@@ -41,8 +42,10 @@ mod warm_up;
 mod work;
 
 pub use calibrate::{
-    CalibrateMethod, CalibrateRequest, CalibrationSummary, CorrelationSummary, DecisionSummary, GroupSummary,
-    OffsetModel, OffsetTableSummary, ParameterMap, ParameterSummary, RejectedObservation, TableDefaults, calibrate,
+    CalibrateMethod, CalibrateRequest, CalibrationSummary, Certificate, CertificateRequest, CertifiedStation,
+    CertifiedTarget, Conditions, CorrelationSummary, DecisionSummary, ExpandedUncertainty, GroupSummary, HeldOut,
+    HeldOutCheck, HeldOutPart, InputDigest, NotoriousPair, Observed, OffsetModel, OffsetTableSummary, ParameterMap,
+    ParameterSummary, RejectedObservation, TableDefaults, TestVerdict, calibrate,
 };
 pub use compare::{
     AbsoluteSummary, CloudAlignment, CloudComparison, CompareAlignment, CompareRequest, Comparison, DistanceHistogram,

@@ -8,7 +8,7 @@ use range_io::atomic::Destination;
 use range_io::calibration::Calibration;
 use self_calibration::{CalibrationOptions, TermSelection};
 
-use crate::calibrate::{CalibrateMethod, CalibrateRequest, OffsetModel, TableDefaults, calibrate};
+use crate::calibrate::{CalibrateMethod, CalibrateRequest, CertificateRequest, OffsetModel, TableDefaults, calibrate};
 use crate::destination::{Inputs, produce};
 use crate::drift::DriftTreatment;
 use crate::load::{load, read_calibration, root_of};
@@ -177,6 +177,7 @@ fn estimate_calibration(
             // A network of the warm camera.
             warm_up: DriftTreatment::Leave,
             defaults: TableDefaults::default(),
+            certificate: CertificateRequest::default(),
             out: out.clone(),
         },
         progress,

@@ -93,6 +93,8 @@ pub enum DoubtKind {
     OutsideLight,
     /// Observations that contradict each other, or scatter otherwise than stated.
     Contradiction,
+    /// Observations left out of a calibration that it does not predict.
+    Prediction,
 }
 
 impl Doubt {

@@ -9,6 +9,7 @@ mod calibrate_contradictions;
 mod calibrate_offset;
 mod calibrate_planes;
 mod calibrate_warm_up;
+mod certificate;
 mod common;
 mod compare;
 mod diff;

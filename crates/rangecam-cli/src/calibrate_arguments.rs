@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use pipeline::{
-    CalibrateMethod, CalibrateRequest, CalibrationOptions, DriftTreatment, Method, NetworkDatum, OffsetModel,
-    TableDefaults, TermSelection,
+    CalibrateMethod, CalibrateRequest, CalibrationOptions, CertificateRequest, DriftTreatment, Method, NetworkDatum,
+    OffsetModel, TableDefaults, TermSelection,
 };
 
 use crate::values::{Terms, name, positive, terms};
@@ -64,6 +64,15 @@ pub(crate) struct CalibrateArguments {
     /// Standard deviation of a range where observations.csv gives none, metre.
     #[arg(long, value_name = "METRE", value_parser = positive)]
     sigma_range: Option<f64>,
+    /// Integration time of stations for which neither observations.csv nor survey.ron gives one, second.
+    #[arg(long, value_name = "SECOND", value_parser = positive)]
+    integration_time: Option<f64>,
+    /// Who calibrates, for the certificate; default: `operator` in survey.ron.
+    #[arg(long, value_name = "NAME", value_parser = name)]
+    operator: Option<String>,
+    /// Leave out every N-th station, and compare what the calibration from the others predicts with what these observed.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(2..))]
+    hold_out: Option<u64>,
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
@@ -178,7 +187,16 @@ impl CalibrateArguments {
                 WarmUpName::Apply => DriftTreatment::Apply,
                 WarmUpName::Leave => DriftTreatment::Leave,
             },
-            defaults: TableDefaults { sigma_pixel: self.sigma_pixel, sigma_range_m: self.sigma_range },
+            defaults: TableDefaults {
+                sigma_pixel: self.sigma_pixel,
+                sigma_range_m: self.sigma_range,
+                integration_time_s: self.integration_time,
+            },
+            certificate: CertificateRequest {
+                operator: self.operator,
+                date: None,
+                hold_out: self.hold_out.and_then(|every| usize::try_from(every).ok()),
+            },
             out: self.out.unwrap_or(out),
         }
     }

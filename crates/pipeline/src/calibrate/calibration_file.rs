@@ -4,13 +4,14 @@ use error_models::{NamedParameter, ParameterStatus};
 use range_io::calibration::{Calibration, Correlation, Provenance, RangeCalibration, ValidSpan};
 use self_calibration::{CalibratedParameter, CalibrationOutcome, Component, Verdict};
 
+use super::certificate::extent;
 use super::start::Start;
 use super::summary::CorrelationSummary;
 use crate::Result;
 
 /// Integration time written where neither tables nor frames state one. A correction chooses the only model there is,
 /// whatever its time, for frames that state none either.
-const UNKNOWN_INTEGRATION_TIME_S: f64 = 1.0;
+pub(crate) const UNKNOWN_INTEGRATION_TIME_S: f64 = 1.0;
 
 /// The calibration to write: estimated and held parameters with their quality, and what the start calibration knew of
 /// the camera besides (noise, scattering, fixed pattern, warm-up). The drift of the last was taken off the observations, unless
@@ -121,11 +122,4 @@ fn span(outcome: &CalibrationOutcome) -> ValidSpan {
         integration_time_s: extent(outcome.range_models.iter().filter_map(|(time, _)| *time)),
         temperature_c: None,
     }
-}
-
-fn extent(values: impl Iterator<Item = f64>) -> Option<[f64; 2]> {
-    values.filter(|value| value.is_finite()).fold(None, |span: Option<[f64; 2]>, value| {
-        let [low, high] = span.unwrap_or([value; 2]);
-        Some([low.min(value), high.max(value)])
-    })
 }

@@ -51,6 +51,9 @@ pub(crate) fn read_network(
     let mut tables = Tables::new(&survey, stations, targets);
     let sightings = tables.sightings(&observations, defaults)?;
     let passive = read_passive(&root.join("passive"), &mut tables, defaults)?;
+    for station in &mut tables.stations {
+        station.integration_time_s = station.integration_time_s.or(defaults.integration_time_s);
+    }
     let distances = named_distances(&root.join("distances.csv"), &tables.stations, &tables.targets)?;
     let drifts = take_drifts(&survey, &root, &start, warm_up, &sightings, &mut tables.stations)?;
     start.set_drifts(drifts);

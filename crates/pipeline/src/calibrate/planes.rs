@@ -18,7 +18,7 @@ use super::placed::Placed;
 use super::planes_outcome::Found;
 use super::pose_test;
 use super::request::CalibrateRequest;
-use super::run::Attempt;
+use super::run::{Attempt, Calibrated};
 use super::start::Start;
 use crate::drift::ViewDrift;
 use crate::load::root_of;
@@ -52,6 +52,7 @@ pub(super) fn calibrate_planes(request: &CalibrateRequest, progress: &dyn Progre
     start.set_drifts(scene.drifts.clone());
     progress.begin("estimate range terms", 1);
     let time = frames.views.first().and_then(|view| view.integration_time_s);
+    let time = time.or(request.defaults.integration_time_s);
     let rewraps = scene.is_known() && survey.level <= Level::Phase;
     let found = if scene.is_known() {
         known(&rows, &scene, &start, &options, rewraps)?
@@ -72,7 +73,7 @@ pub(super) fn calibrate_planes(request: &CalibrateRequest, progress: &dyn Progre
         outcome.diagnosis.extend(scene.assumptions());
         outcome.doubts.extend(doubts);
         outcome.doubts.extend(outcome.doubts_of_tests());
-        Ok((outcome, table))
+        Ok(Calibrated { outcome, table, check: None })
     });
     progress.advance(1);
     Ok((start, outcome))

@@ -69,6 +69,8 @@ pub struct CalibrateRequest {
     pub warm_up: DriftTreatment,
     /// What the tables leave open.
     pub defaults: TableDefaults,
+    /// What the certificate says besides.
+    pub certificate: CertificateRequest,
     /// Output folder; written beside and renamed when everything is done.
     pub out: PathBuf,
 }
@@ -80,4 +82,19 @@ pub struct TableDefaults {
     pub sigma_pixel: Option<f64>,
     /// Standard deviation of a range where `observations.csv` gives none, metre; `None`: that is refused.
     pub sigma_range_m: Option<f64>,
+    /// Integration time of stations for which neither `observations.csv` nor `survey.ron` gives one, second; `None`: it is
+    /// not known, and the range terms belong to no time.
+    pub integration_time_s: Option<f64>,
+}
+
+/// What a certificate says beside what the survey and the adjustment say.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct CertificateRequest {
+    /// Who calibrated; `None`: the operator named in `survey.ron`.
+    pub operator: Option<String>,
+    /// Date, as ISO 8601; `None`: that of the system's clock (UTC).
+    pub date: Option<String>,
+    /// Leaves out every so many stations (2 or more) and compares what the calibration from the others predicts with
+    /// what these observed; `None`: not.
+    pub hold_out: Option<usize>,
 }

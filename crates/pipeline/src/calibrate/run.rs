@@ -5,8 +5,9 @@ use std::time::Instant;
 use range_io::atomic::{Destination, write_text};
 use range_io::calibration::Calibration;
 use range_io::tables::{write_residuals, write_stations, write_targets};
-use self_calibration::{CalibrationOptions, CalibrationOutcome, Error as Cause, Method};
+use self_calibration::{CalibrationOptions, CalibrationOutcome, Error as Cause, HoldOut, Method, hold_out};
 
+use super::certificate::{Certificate, HeldOut, Source, today};
 use super::network_check::check;
 use super::network_files::{NetworkFiles, read_network};
 use super::offset::{FoundTable, OffsetModel};
@@ -49,10 +50,22 @@ fn calibrate_into(
         summary
     };
     match outcome {
-        Ok((outcome, table)) => {
+        Ok(Calibrated { outcome, table, check }) => {
             let table = table.as_ref();
-            let summary = finish(CalibrationSummary::new(survey, request.method, &start, &outcome, table));
-            write(destination, &start, &outcome, table, &summary, progress)?;
+            let mut summary = CalibrationSummary::new(survey, request.method, &start, &outcome, table);
+            let hold_out = HeldOut::new(request.certificate.hold_out, check);
+            summary.doubts.extend(hold_out.doubt());
+            summary.diagnosis.extend(hold_out.excuse(request.certificate.hold_out));
+            let file = file(&outcome, &start, table, &summary)?;
+            let (outcome, start) = (&outcome, &start);
+            let source = Source { request, start, outcome, file: &file, summary: &summary, hold_out };
+            let certificate = Certificate::new(source)?;
+            let date = request.certificate.date.clone().unwrap_or_else(today);
+            let page = report::render_certificate(&certificate, &summary, &date);
+            summary.certificate = Some(certificate);
+            let summary = finish(summary);
+            let results = Results { outcome, table, file: &file, certificate_page: &page };
+            write(destination, &results, &summary, progress)?;
             progress.finish();
             Ok(summary)
         }
@@ -65,8 +78,14 @@ fn calibrate_into(
     }
 }
 
-/// What the adjustment gave, with a table of offsets where one was asked for.
-type Calibrated = (CalibrationOutcome, Option<FoundTable>);
+/// What the adjustment gave.
+pub(super) struct Calibrated {
+    pub(super) outcome: CalibrationOutcome,
+    /// A table of offsets, where one was asked for.
+    pub(super) table: Option<FoundTable>,
+    /// The check on stations left out, where it was asked for.
+    pub(super) check: Option<self_calibration::Result<HoldOut>>,
+}
 
 /// Start values and what the adjustment said of them.
 pub(super) type Attempt = (Start, self_calibration::Result<Calibrated>);
@@ -110,7 +129,14 @@ fn calibrate_networks(request: &CalibrateRequest, method: Method, progress: &dyn
         }
         outcome => outcome,
     };
-    Ok((files.start, outcome.map(|outcome| (outcome, None))))
+    let calibrated = outcome.map(|outcome| {
+        let check = request.certificate.hold_out.map(|every| {
+            progress.begin("check stations left out", 1);
+            hold_out(&files.network, &options, &outcome, every)
+        });
+        Calibrated { outcome, table: None, check }
+    });
+    Ok((files.start, calibrated))
 }
 
 /// Names file and line of the observed value that contradicts most.
@@ -137,22 +163,39 @@ fn check_station_names(files: &NetworkFiles, options: &CalibrationOptions) -> Re
     }
 }
 
-fn write(
-    destination: &Destination,
-    start: &Start,
+/// The calibration to write.
+fn file(
     outcome: &CalibrationOutcome,
+    start: &Start,
     table: Option<&FoundTable>,
     summary: &CalibrationSummary,
-    progress: &dyn Progress,
-) -> Result<()> {
-    progress.begin("write results", 6);
-    let folder = destination.open()?;
+) -> Result<Calibration> {
     let mut calibration = calibration_file::calibration(outcome, start, &summary.survey, summary.method)?;
     if let Some(table) = table {
         // It takes the place of an older one, which was not taken off the ranges.
         calibration.fixed_pattern = table.worth_applying();
     }
-    calibration.write(folder.file(Calibration::FILE_NAME)?)?;
+    Ok(calibration)
+}
+
+/// What is written beside the summary.
+struct Results<'a> {
+    outcome: &'a CalibrationOutcome,
+    table: Option<&'a FoundTable>,
+    file: &'a Calibration,
+    certificate_page: &'a str,
+}
+
+fn write(
+    destination: &Destination,
+    results: &Results<'_>,
+    summary: &CalibrationSummary,
+    progress: &dyn Progress,
+) -> Result<()> {
+    let Results { outcome, table, file, certificate_page } = results;
+    progress.begin("write results", 7);
+    let folder = destination.open()?;
+    file.write(folder.file(Calibration::FILE_NAME)?)?;
     progress.advance(1);
     write_stations(folder.file("adjusted_stations.csv")?, &tables::stations(outcome))?;
     progress.advance(2);
@@ -162,7 +205,9 @@ fn write(
     progress.advance(4);
     write_text(folder.file("summary.json")?, &json(summary)?)?;
     progress.advance(5);
-    write_text(folder.file("report.html")?, &report::render_calibration(outcome, table, summary)?)?;
+    write_text(folder.file("report.html")?, &report::render_calibration(outcome, *table, summary)?)?;
     progress.advance(6);
+    write_text(folder.file("certificate.html")?, certificate_page)?;
+    progress.advance(7);
     Ok(folder.commit()?)
 }

@@ -1,7 +1,7 @@
 //! Start values: the survey's nominal camera, or a calibration.
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use camera_model::Camera;
 use error_models::RangeErrorModel;
@@ -9,6 +9,7 @@ use range_image::Modulation;
 use range_io::calibration::Calibration;
 use range_io::survey::Survey;
 
+use super::certificate::Conditions;
 use super::drift;
 use crate::compatible::{Purpose, compatible, model_set};
 use crate::drift::ViewDrift;
@@ -28,6 +29,10 @@ pub(crate) struct Start {
     pub(crate) drifts: Vec<ViewDrift>,
     /// Line of `observations.csv` of each station and target; empty where targets are not what is calibrated from.
     pub(crate) lines: BTreeMap<(String, String), usize>,
+    /// The survey's description.
+    pub(crate) survey_file: PathBuf,
+    /// What it says of camera and conditions.
+    pub(crate) conditions: Conditions,
 }
 
 impl Start {
@@ -53,7 +58,17 @@ impl Start {
             Some(calibration) => range_model_of(survey, calibration, modulation)?,
             None => error_free(modulation),
         };
-        Ok(Self { camera, range_model, modulation, calibration, words, drifts: Vec::new(), lines: BTreeMap::new() })
+        Ok(Self {
+            camera,
+            range_model,
+            modulation,
+            calibration,
+            words,
+            drifts: Vec::new(),
+            lines: BTreeMap::new(),
+            survey_file: root.join(Survey::FILE_NAME),
+            conditions: Conditions::of(survey),
+        })
     }
 }
 

@@ -9,6 +9,8 @@ use self_calibration::{CalibratedParameter, CalibrationOutcome, Component, Obser
 use serde::Serialize;
 use serde::ser::{SerializeMap, Serializer};
 
+use super::carried::{notes, taken_over};
+use super::certificate::Certificate;
 use super::names::group_unit;
 use super::offset::{FoundTable, OffsetTableSummary};
 use super::request::CalibrateMethod;
@@ -35,6 +37,9 @@ pub struct CalibrationSummary {
     pub describe: &'static str,
     /// Where the start values came from.
     pub start: String,
+    /// Parts of the start calibration that the new one has as they are: `noise`, `scattering` and so on.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub taken_over: Vec<&'static str>,
     /// What the ranges of each station had drifted by, where the drift of a warming camera was taken off.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub drifts: Vec<ViewDrift>,
@@ -76,6 +81,9 @@ pub struct CalibrationSummary {
     /// Whether the residuals of planes still depend on something.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub trends: Vec<TrendSummary>,
+    /// What the certificate says; `None` where the calibration was refused.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub certificate: Option<Certificate>,
     /// Wall-clock time of the whole run, second.
     pub seconds: f64,
     /// The output folder.
@@ -248,6 +256,7 @@ impl CalibrationSummary {
             method: method.name(),
             describe: method.describe(),
             start: start.words.clone(),
+            taken_over: taken_over(start, table.is_some()),
             drifts: start.drifts.clone(),
             observations: outcome.observations,
             unknowns: outcome.unknowns,
@@ -260,7 +269,7 @@ impl CalibrationSummary {
             parameters: ParameterMap::new(&outcome.parameters),
             correlation: CorrelationSummary::new(&outcome.estimated, &outcome.covariance),
             rejected: rejected(outcome, start),
-            diagnosis: outcome.diagnosis.clone(),
+            diagnosis: [outcome.diagnosis.clone(), notes(start, outcome, table.is_some())].concat(),
             doubts: outcome.doubts.iter().map(|words| Doubt::new(DoubtKind::Contradiction, words)).collect(),
             groups: outcome.groups.iter().map(|group| group_summary(group, &group.name)).collect(),
             amplitude_classes: outcome.amplitude_classes().iter().map(|class| group_summary(class, "range")).collect(),
@@ -270,6 +279,7 @@ impl CalibrationSummary {
                 CalibrateMethod::Planes => trends(outcome, table.and_then(FoundTable::worth_applying).as_ref()),
                 CalibrateMethod::Network(_) => Vec::new(),
             },
+            certificate: None,
             seconds: 0.0,
             out: PathBuf::new(),
         }
@@ -282,6 +292,7 @@ impl CalibrationSummary {
             method: method.name(),
             describe: method.describe(),
             start: start.words.clone(),
+            taken_over: Vec::new(),
             drifts: start.drifts.clone(),
             observations: 0,
             unknowns: 0,
@@ -301,6 +312,7 @@ impl CalibrationSummary {
             offset_table: None,
             decisions: Vec::new(),
             trends: Vec::new(),
+            certificate: None,
             seconds: 0.0,
             out: PathBuf::new(),
         }

@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use super::certificate::HeldOut;
 use super::offset::OffsetTableSummary;
 use super::summary::CalibrationSummary;
 use crate::trends::{TrendSummary, sentence};
@@ -36,6 +37,9 @@ impl fmt::Display for CalibrationSummary {
                 table.verdict
             )?;
         }
+        if let Some(HeldOut::Made(check)) = self.certificate.as_ref().map(|certificate| &certificate.hold_out) {
+            writeln!(f, "{check}")?;
+        }
         for doubt in &self.doubts {
             writeln!(f, "doubt: {doubt}")?;
         }
@@ -45,7 +49,7 @@ impl fmt::Display for CalibrationSummary {
         if self.converged {
             write!(
                 f,
-                "written to {}: report.html, summary.json, calibration.ron, adjusted_stations.csv, \
+                "written to {}: report.html, certificate.html, summary.json, calibration.ron, adjusted_stations.csv, \
                  adjusted_targets.csv, residuals.csv",
                 self.out.display()
             )
@@ -120,6 +124,11 @@ impl CalibrationSummary {
 /// Metres as millimetres; other units as they are.
 pub(crate) fn readable(value: f64, unit: &str) -> (f64, &str) {
     if unit == "m" { (1e3 * value, "mm") } else { (value, unit) }
+}
+
+/// A value down to a tenth of its standard deviation.
+pub(crate) fn value_words(value: f64, sigma: f64) -> String {
+    number(value, decimals(sigma))
 }
 
 /// Decimals that show a value down to a tenth of its standard deviation; `None` where that is too many to read.

@@ -23,6 +23,34 @@ struct Margin {
     bottom: f64,
 }
 
+/// Side of a square in which values are counted, pixels of the figure: large enough to be seen.
+const DENSITY_CELL: f64 = 4.0;
+/// Shades of a density.
+const DENSITY_CLASSES: usize = 6;
+/// Area of a dot, square pixels.
+const DOT_AREA: f64 = 9.0;
+/// Part of the plotted area that dots may have together: with more, they lie on each other, and all is one dark spot.
+const MOST_INK: f64 = 0.35;
+
+/// How a cloud of values was drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Drawn {
+    /// Each as a dot.
+    Dots,
+    /// All by their density.
+    Density,
+}
+
+impl Drawn {
+    /// What a caption has to say of it.
+    pub(crate) fn words(self) -> &'static str {
+        match self {
+            Self::Dots => "",
+            Self::Density => " The darker, the more values (logarithmic).",
+        }
+    }
+}
+
 /// A chart that grows mark by mark.
 pub(crate) struct Canvas {
     svg: String,
@@ -114,6 +142,56 @@ impl Canvas {
             self.clip,
             hex(colour)
         );
+    }
+
+    /// Many values, by the density of what would be dots: squares of [`DENSITY_CELL`] pixels, the darker the more values, on a
+    /// logarithmic scale.
+    pub(crate) fn density(&mut self, values: &[(f64, f64)], colour: [u8; 3]) {
+        let [width, height] = Self::plotted(self.size);
+        let (columns, rows) = ((width / DENSITY_CELL).ceil() as usize, (height / DENSITY_CELL).ceil() as usize);
+        let mut counts = vec![0_usize; columns * rows];
+        for (x, y) in finite(values) {
+            let [x, y] = self.at([x, y]);
+            let place = [(x - MARGIN.left) / DENSITY_CELL, (y - MARGIN.top) / DENSITY_CELL];
+            if place[0] >= 0.0 && place[1] >= 0.0 && (place[0] as usize) < columns && (place[1] as usize) < rows {
+                counts[place[1] as usize * columns + place[0] as usize] += 1;
+            }
+        }
+        let most = counts.iter().copied().max().unwrap_or(0) as f64;
+        let mut paths = vec![String::new(); DENSITY_CLASSES];
+        for (index, count) in counts.iter().enumerate().filter(|(_, count)| **count > 0) {
+            let share = (*count as f64).ln_1p() / most.ln_1p();
+            let class = ((share * DENSITY_CLASSES as f64) as usize).min(DENSITY_CLASSES - 1);
+            let x = MARGIN.left + DENSITY_CELL * (index % columns) as f64;
+            let y = MARGIN.top + DENSITY_CELL * (index / columns) as f64;
+            // Writing to a string can't fail.
+            let _ = write!(paths[class], "M{x} {y}h{DENSITY_CELL}v{DENSITY_CELL}h-{DENSITY_CELL}z");
+        }
+        for (class, path) in paths.iter().enumerate().filter(|(_, path)| !path.is_empty()) {
+            let opacity = 0.75 * (class + 1) as f64 / DENSITY_CLASSES as f64;
+            let _ = write!(
+                self.svg,
+                r#"<path d="{path}" clip-path="url(#{})" fill="{}" fill-opacity="{opacity:.2}"/>"#,
+                self.clip,
+                hex(colour)
+            );
+        }
+    }
+
+    /// Whether so many dots in a figure of this size would lie on each other.
+    pub(crate) fn is_dense(size: [f64; 2], dots: usize) -> bool {
+        let [width, height] = Self::plotted(size);
+        dots as f64 * DOT_AREA > MOST_INK * width * height
+    }
+
+    /// Dots, or their density where they would lie on each other; which of them was drawn.
+    pub(crate) fn cloud(&mut self, values: &[(f64, f64)], colour: [u8; 3], opacity: f64) -> Drawn {
+        if Self::is_dense(self.size, values.len()) {
+            self.density(values, colour);
+            return Drawn::Density;
+        }
+        self.points(values, colour, opacity);
+        Drawn::Dots
     }
 
     /// A line through points; a gap where a value is missing.

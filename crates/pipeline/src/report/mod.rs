@@ -23,7 +23,7 @@ mod warm_up;
 
 pub(crate) use comparison::render_comparison;
 pub(crate) use fixed_pattern::render_fixed_pattern;
-pub(crate) use network::{render_calibration, render_plan};
+pub(crate) use network::{render_calibration, render_certificate, render_plan};
 pub(crate) use noise::render_noise;
 pub(crate) use registration::render_registration;
 pub(crate) use scattering::render_scattering;

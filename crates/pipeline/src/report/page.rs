@@ -25,6 +25,16 @@ td:first-child,th:first-child,td.w,th.w{text-align:left}
 .bar{display:inline-block;height:10px;background:#3b6ea5;border-radius:2px;vertical-align:middle}
 ";
 
+/// What a page for paper has besides: A4, black on white, tables that go on with their head on the next sheet.
+const PRINT: &str = "
+@page{size:A4;margin:18mm 16mm 20mm}
+body{font:10.5pt/1.4 Georgia,serif;color:#000;background:#fff}main{max-width:178mm;padding:6mm 0}
+p.lead{color:#000}h1{font-size:18pt}h2{font-size:13pt;margin:18pt 0 5pt;border-color:#000;break-after:avoid}
+table{font-size:8.5pt;width:100%;border-color:#000}td,th{padding:2px 5px;border-bottom:1px solid #bbb;overflow-wrap:anywhere}
+th{background:#fff;border-bottom:1px solid #000}thead{display:table-header-group}tr{break-inside:avoid}
+h2.sheet{break-before:page}p.sign{margin-top:16mm;border-top:1px solid #000;width:80mm;break-inside:avoid}
+";
+
 /// A page that grows section by section.
 pub(crate) struct Page {
     html: String,
@@ -32,11 +42,20 @@ pub(crate) struct Page {
 
 impl Page {
     pub(crate) fn new(title: &str, lead: &str) -> Self {
+        Self::styled(title, lead, "")
+    }
+
+    /// A page that is made to be printed on A4.
+    pub(crate) fn for_print(title: &str, lead: &str) -> Self {
+        Self::styled(title, lead, PRINT)
+    }
+
+    fn styled(title: &str, lead: &str, further_style: &str) -> Self {
         let title = escape(title);
         let html = format!(
             "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\
              <meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">\
-             <title>{title}</title><style>{STYLE}</style></head><body><main><h1>{title}</h1><p class=\"lead\">{}</p>\n",
+             <title>{title}</title><style>{STYLE}{further_style}</style></head><body><main><h1>{title}</h1><p class=\"lead\">{}</p>\n",
             escape(lead)
         );
         Self { html }
@@ -44,6 +63,16 @@ impl Page {
 
     pub(crate) fn section(&mut self, title: &str) {
         let _ = writeln!(self.html, "<h2>{}</h2>", escape(title));
+    }
+
+    /// A section that begins a new sheet of a page that is printed.
+    pub(crate) fn sheet(&mut self, title: &str) {
+        let _ = writeln!(self.html, "<h2 class=\"sheet\">{}</h2>", escape(title));
+    }
+
+    /// A line to sign on.
+    pub(crate) fn signature(&mut self, text: &str) {
+        let _ = writeln!(self.html, "<p class=\"sign\">{}</p>", escape(text));
     }
 
     pub(crate) fn subsection(&mut self, title: &str) {
@@ -102,11 +131,11 @@ impl Page {
     pub(crate) fn table(&mut self, head: &[&str], rows: &[Vec<String>]) {
         let words: Vec<bool> = (0..head.len()).map(|column| rows.iter().any(|row| is_word(row.get(column)))).collect();
         let class = |column: usize| if words.get(column) == Some(&true) { " class=\"w\"" } else { "" };
-        self.html.push_str("<table><tr>");
+        self.html.push_str("<table><thead><tr>");
         for (column, cell) in head.iter().enumerate() {
             let _ = write!(self.html, "<th{}>{}</th>", class(column), escape(cell));
         }
-        self.html.push_str("</tr>\n");
+        self.html.push_str("</tr></thead>\n<tbody>");
         for row in rows {
             self.html.push_str("<tr>");
             for (column, cell) in row.iter().enumerate() {
@@ -114,7 +143,7 @@ impl Page {
             }
             self.html.push_str("</tr>\n");
         }
-        self.html.push_str("</table>\n");
+        self.html.push_str("</tbody></table>\n");
     }
 
     pub(crate) fn finish(mut self) -> String {

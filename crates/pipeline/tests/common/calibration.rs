@@ -5,8 +5,8 @@
 use std::path::{Path, PathBuf};
 
 use pipeline::{
-    CalibrateMethod, CalibrateRequest, CalibrationOptions, CalibrationSummary, DriftTreatment, Method, OffsetModel,
-    Silent, TableDefaults, TermSelection,
+    CalibrateMethod, CalibrateRequest, CalibrationOptions, CalibrationSummary, CertificateRequest, DriftTreatment,
+    Method, OffsetModel, Silent, TableDefaults, TermSelection,
 };
 
 /// The committed survey of a target field.
@@ -28,6 +28,7 @@ pub fn request(survey: &Path, out: &Path) -> CalibrateRequest {
         offset: OffsetModel::Constant,
         warm_up: DriftTreatment::Apply,
         defaults: TableDefaults::default(),
+        certificate: CertificateRequest::default(),
         out: out.to_owned(),
     }
 }

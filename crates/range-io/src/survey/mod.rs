@@ -33,6 +33,15 @@ pub struct Survey {
     pub level: Level,
     /// The frames in the order of capture; empty where only tables are given.
     pub frames: Vec<FrameEntry>,
+    /// Which camera it was: maker, model and serial number, as it should stand on a certificate.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub camera_identity: Option<String>,
+    /// Version of the camera's firmware.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub firmware: Option<String>,
+    /// Who took the frames.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub operator: Option<String>,
     /// How depths stored as integers are to be read; needed for PNG and Matroska.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub depth: Option<StoredDepth>,
@@ -157,6 +166,9 @@ impl Survey {
             camera,
             level,
             frames,
+            camera_identity: None,
+            firmware: None,
+            operator: None,
             depth: None,
             power_on_s: None,
             frame_rates: Vec::new(),

@@ -8,6 +8,9 @@ use super::{FrameEntry, Level, ReferencePath, StoredDepth, Survey, SurveyCamera,
 use crate::InvalidField;
 use crate::limits::{MOST_FREQUENCIES, MOST_PHASE_STEPS, MOST_PIXELS};
 
+/// Bytes of a field of words that is printed as it is.
+const LONGEST_WORDS: usize = 200;
+
 type Check = Result<(), InvalidField>;
 
 impl Survey {
@@ -15,6 +18,18 @@ impl Survey {
         self.camera.check(self.level)?;
         for (index, frame) in self.frames.iter().enumerate() {
             frame.check(&format!("frames[{index}]"))?;
+        }
+        let words =
+            [("camera_identity", &self.camera_identity), ("firmware", &self.firmware), ("operator", &self.operator)];
+        for (field, words) in words {
+            if let Some(words) = words {
+                let printable = !words.trim().is_empty() && !words.contains(char::is_control);
+                require(
+                    printable && words.len() <= LONGEST_WORDS,
+                    field,
+                    format!("expected 1 to {LONGEST_WORDS} bytes without control characters"),
+                )?;
+            }
         }
         self.check_power_on()?;
         self.check_frame_rates()?;

@@ -11,6 +11,7 @@ mod contradiction;
 mod control_test;
 mod equations;
 mod global_tests;
+mod hold_out;
 mod hyperbola;
 mod hyperbola_steps;
 mod image_model;
@@ -46,6 +47,7 @@ pub(crate) use misfit::median;
 
 pub use calibrate::{calibrate, calibrate_two_networks};
 pub use contradiction::{Cause, CauseKind, Contradiction, WorstValue};
+pub use hold_out::{HoldOut, Prediction, hold_out};
 pub use model::{
     DistanceEnd, KnownDistance, Network, NetworkTarget, PassiveCamera, PassiveImagePoint, Sighting, Station,
 };

@@ -56,7 +56,8 @@ pub(super) fn image_figure(outcome: &CalibrationOutcome) -> Option<(String, Stri
         );
     }
     let mut dots = String::new();
-    for [col, row] in super::residuals::thinned(points) {
+    let shown = if Canvas::is_dense([WIDTH, height], points.len()) { &[][..] } else { &points[..] };
+    for [col, row] in shown {
         let _ = write!(dots, "M{:.1} {:.1}h0", scale * (col + 0.5), 22.0 + scale * (row + 0.5));
     }
     let _ = write!(

@@ -2,57 +2,81 @@
 
 use std::fmt::Write;
 
+use crate::calibrate::is_notorious;
 use crate::report::colour::{ColourMap, hex};
 use crate::report::picture::{escape, open_svg};
 
-/// Pairs that networks of range cameras hardly separate, and what separates them.
-const NOTORIOUS: [(&str, &str, &str); 12] = [
-    ("xp", "p1", "cameras rolled by 90 degrees about the viewing axis"),
-    ("yp", "p2", "cameras rolled by 90 degrees about the viewing axis"),
-    ("xp", "e1", "targets at different ranges in each half of the image"),
-    ("yp", "e2", "targets at different ranges in each half of the image"),
-    ("c", "d0", "a known distance, or targets at different depths"),
-    ("c", "k1", "targets out to the corners of the image"),
-    ("k1", "k2", "targets out to the corners of the image"),
-    ("k2", "k3", "targets out to the corners of the image; or hold k3"),
-    ("k1", "k3", "targets out to the corners of the image; or hold k3"),
-    ("d0", "d2", "ranges over a whole ambiguity interval, or a known distance"),
-    ("d0", "d3", "ranges over a whole ambiguity interval, or a known distance"),
-    ("d2", "d3", "ranges over a whole ambiguity interval"),
-];
-
 const CELL: f64 = 26.0;
-const LEFT: f64 = 44.0;
-const TOP: f64 = 44.0;
+/// Room for names of two characters at the left and above.
+const NARROW: f64 = 44.0;
+/// Width of a character of the small print, pixels.
+const CHARACTER: f64 = 6.0;
+/// Parameters up to which each cell has a colour and a number of its own.
+const MOST_CELLS: usize = 40;
+/// Colours of the cells of larger matrices.
+const SHADES: usize = 41;
 
 /// The matrix; red for positive, blue for negative.
 pub(super) fn heat_map(names: &[String], matrix: &[Vec<f64>]) -> String {
     let side = CELL * names.len() as f64;
-    let mut svg = open_svg("Correlations of the estimated parameters", LEFT + side + 60.0, TOP + side + 8.0);
+    let longest = CHARACTER * names.iter().map(|name| name.chars().count()).max().unwrap_or(0) as f64;
+    let margin = NARROW.max(longest + 10.0);
+    // Names wider than a cell stand upright above it.
+    let upright = longest > CELL;
+    let mut svg =
+        open_svg("Correlations of the estimated parameters", (margin + side + 60.0).max(300.0), margin + side + 8.0);
     for (i, name) in names.iter().enumerate() {
-        let (middle, name) = (CELL * (i as f64 + 0.5), escape(name));
+        let (middle, name) = (margin + CELL * (i as f64 + 0.5), escape(name));
         // Writing to a string can't fail.
         let _ = write!(
             svg,
-            r#"<text x="{}" y="{:.1}" class="tick" text-anchor="end">{name}</text><text x="{:.1}" y="{}" class="tick" text-anchor="middle">{name}</text>"#,
-            LEFT - 5.0,
-            TOP + middle + 3.5,
-            LEFT + middle,
-            TOP - 6.0
+            r#"<text x="{}" y="{:.1}" class="tick" text-anchor="end">{name}</text>"#,
+            margin - 5.0,
+            middle + 3.5
         );
+        let top = margin - 6.0;
+        let _ = if upright {
+            write!(
+                svg,
+                r#"<text transform="translate({:.1} {top}) rotate(-90)" class="tick">{name}</text>"#,
+                middle + 3.5
+            )
+        } else {
+            write!(svg, r#"<text x="{middle:.1}" y="{top}" class="tick" text-anchor="middle">{name}</text>"#)
+        };
     }
-    for (i, row) in matrix.iter().enumerate() {
-        for (j, value) in row.iter().enumerate() {
-            cell(&mut svg, [j, i], *value, i != j && is_notorious(&names[i], &names[j]));
+    if names.len() > MOST_CELLS {
+        shades(&mut svg, matrix, margin);
+    } else {
+        for (i, row) in matrix.iter().enumerate() {
+            for (j, value) in row.iter().enumerate() {
+                cell(&mut svg, margin, [j, i], *value, i != j && is_notorious(&names[i], &names[j]));
+            }
         }
     }
-    key(&mut svg, LEFT + side + 14.0, side.clamp(60.0, 220.0));
+    key(&mut svg, margin + side + 14.0, margin, side.clamp(60.0, 220.0));
     svg.push_str("</svg>");
     svg
 }
 
-fn cell(svg: &mut String, [column, row]: [usize; 2], value: f64, marked: bool) {
-    let (x, y) = (LEFT + CELL * column as f64, TOP + CELL * row as f64);
+/// Cells of a large matrix: one path for each shade.
+fn shades(svg: &mut String, matrix: &[Vec<f64>], margin: f64) {
+    let mut paths = vec![String::new(); SHADES];
+    for (i, row) in matrix.iter().enumerate() {
+        for (j, value) in row.iter().enumerate() {
+            let shade = (f64::midpoint(value.clamp(-1.0, 1.0), 1.0) * (SHADES - 1) as f64).round() as usize;
+            let (x, y) = (margin + CELL * j as f64, margin + CELL * i as f64);
+            let _ = write!(paths[shade], "M{x} {y}h25v25h-25z");
+        }
+    }
+    for (shade, path) in paths.iter().enumerate().filter(|(_, path)| !path.is_empty()) {
+        let fill = hex(ColourMap::Diverging.colour(shade as f64 / (SHADES - 1) as f64));
+        let _ = write!(svg, r#"<path d="{path}" fill="{fill}"/>"#);
+    }
+}
+
+fn cell(svg: &mut String, margin: f64, [column, row]: [usize; 2], value: f64, marked: bool) {
+    let (x, y) = (margin + CELL * column as f64, margin + CELL * row as f64);
     let fill = hex(ColourMap::Diverging.colour(f64::midpoint(value, 1.0)));
     let _ = write!(svg, r#"<rect x="{x}" y="{y}" width="{}" height="{}" fill="{fill}"/>"#, CELL - 1.0, CELL - 1.0);
     if value.abs() >= 0.5 && column != row {
@@ -83,11 +107,11 @@ fn short(value: f64) -> String {
     text.replacen("0.", ".", 1)
 }
 
-fn key(svg: &mut String, x: f64, height: f64) {
+fn key(svg: &mut String, x: f64, top: f64, height: f64) {
     const STEPS: usize = 40;
     for step in 0..STEPS {
         let fill = hex(ColourMap::Diverging.colour(1.0 - (step as f64 + 0.5) / STEPS as f64));
-        let y = TOP + height * step as f64 / STEPS as f64;
+        let y = top + height * step as f64 / STEPS as f64;
         let _ = write!(
             svg,
             r#"<rect x="{x}" y="{y:.2}" width="10" height="{:.2}" fill="{fill}"/>"#,
@@ -95,26 +119,6 @@ fn key(svg: &mut String, x: f64, height: f64) {
         );
     }
     for (text, y) in [("+1", 8.0), ("0", height / 2.0 + 4.0), ("-1", height)] {
-        let _ = write!(svg, r#"<text x="{}" y="{:.1}" class="tick">{text}</text>"#, x + 14.0, TOP + y);
+        let _ = write!(svg, r#"<text x="{}" y="{:.1}" class="tick">{text}</text>"#, x + 14.0, top + y);
     }
-}
-
-/// Names without the integration time they may carry.
-fn is_notorious(a: &str, b: &str) -> bool {
-    let (a, b) = (base(a), base(b));
-    NOTORIOUS.iter().any(|(p, q, _)| (*p == a && *q == b) || (*p == b && *q == a))
-}
-
-fn base(name: &str) -> &str {
-    name.split('@').next().unwrap_or(name)
-}
-
-/// Rows of the table of notorious pairs that are both estimated.
-pub(super) fn notorious_pairs(names: &[String], matrix: &[Vec<f64>]) -> Vec<Vec<String>> {
-    let find = |wanted: &str| names.iter().position(|name| name == wanted);
-    let row = |(a, b, cure): &(&str, &str, &str)| {
-        let value = *matrix.get(find(a)?)?.get(find(b)?)?;
-        Some(vec![format!("{a} – {b}"), format!("{value:+.3}"), (*cure).to_owned()])
-    };
-    NOTORIOUS.iter().filter_map(row).collect()
 }

@@ -14,6 +14,12 @@ const WIDTH: f64 = 560.0;
 /// Length of the arrow at the 90 % quantile, in pixels of the figure.
 const TYPICAL_ARROW: f64 = 22.0;
 
+/// Arrows that can be told from each other; of more, the means of cells are drawn.
+const MOST_ARROWS: usize = 1_500;
+/// Cells along the longer side of the image, and points from which on a mean is worth drawing.
+const CELLS: usize = 32;
+const FEWEST: usize = 5;
+
 /// An image point with the residuals of its column and row, pixel.
 struct Arrow {
     pixel: [f64; 2],
@@ -22,19 +28,31 @@ struct Arrow {
 }
 
 pub(super) fn figures(outcome: &CalibrationOutcome) -> Vec<(String, String)> {
-    let arrows = arrows(&outcome.residuals);
+    let all = arrows(&outcome.residuals);
+    let format = outcome.camera.format;
+    let means = all.len() > MOST_ARROWS;
+    let arrows = if means { cell_means(&all, &format) } else { all };
     let mut lengths: Vec<f64> =
         arrows.iter().filter(|arrow| !arrow.rejected).map(|arrow| arrow.residual[0].hypot(arrow.residual[1])).collect();
     let typical = quantile(&mut lengths, 0.9);
     if typical.is_nan() || typical <= 0.0 {
         return Vec::new();
     }
-    let format = outcome.camera.format;
     let scale = WIDTH / format.width as f64;
     let exaggeration = round_factor(TYPICAL_ARROW / (typical * scale));
+    let what = if means {
+        format!(
+            "Mean residuals of the image points in each of {CELLS} cells along the longer side that has {FEWEST} points or \
+             more, {exaggeration} times exaggerated against the image; red dots are points rejected, at most {MOST_ARROWS}."
+        )
+    } else {
+        format!(
+            "Residuals of the image points, {exaggeration} times exaggerated against the image; dots are the observed \
+             points, red those rejected."
+        )
+    };
     let caption = format!(
-        "Residuals of the image points, {exaggeration} times exaggerated against the image; dots are the observed \
-         points, red those rejected. 90 % of the arrows are shorter than {typical:.3} px. A pattern (all outwards, all \
+        "{what} 90 % of the arrows are shorter than {typical:.3} px. A pattern (all outwards, all \
          one way) is a lens term that is missing."
     );
     vec![(picture(&arrows, &format, scale, exaggeration), caption)]
@@ -61,6 +79,26 @@ fn arrows(residuals: &[ObservationQuality]) -> Vec<Arrow> {
         pair.rejected |= quality.verdict == Verdict::Rejected;
     }
     pairs.into_values().filter(|arrow| arrow.pixel.iter().all(|p| p.is_finite())).collect()
+}
+
+/// The mean of the arrows in each cell, from its middle, and some of those rejected as they are.
+fn cell_means(arrows: &[Arrow], format: &ImageFormat) -> Vec<Arrow> {
+    let side = format.width.max(format.height).max(1) as f64 / CELLS as f64;
+    let cell = |pixel: f64| ((pixel + 0.5) / side).floor() as i64;
+    let mut cells: BTreeMap<(i64, i64), (usize, [f64; 2])> = BTreeMap::new();
+    for arrow in arrows.iter().filter(|arrow| !arrow.rejected) {
+        let (count, sum) = cells.entry((cell(arrow.pixel[1]), cell(arrow.pixel[0]))).or_default();
+        *count += 1;
+        *sum = [sum[0] + arrow.residual[0], sum[1] + arrow.residual[1]];
+    }
+    let mean = |((row, col), (count, sum)): ((i64, i64), (usize, [f64; 2]))| Arrow {
+        pixel: [col, row].map(|place| side * (place as f64 + 0.5) - 0.5),
+        residual: sum.map(|sum| sum / count as f64),
+        rejected: false,
+    };
+    let means = cells.into_iter().filter(|(_, (count, _))| *count >= FEWEST).map(mean);
+    let rejected = arrows.iter().filter(|arrow| arrow.rejected).take(MOST_ARROWS);
+    means.chain(rejected.map(|arrow| Arrow { ..*arrow })).collect()
 }
 
 fn picture(arrows: &[Arrow], format: &ImageFormat, scale: f64, exaggeration: f64) -> String {

@@ -7,6 +7,8 @@ use nalgebra::{Isometry3, Matrix2, Matrix3, Point3, SymmetricEigen, Vector3};
 use self_calibration::{AdjustedStation, AdjustedTarget};
 
 use super::image_residuals::round_factor;
+use super::labels::Labels;
+use super::spread::spread;
 use crate::report::canvas::ticks;
 use crate::report::cloud_figure::Direction;
 use crate::report::colour::{CATEGORIES, hex};
@@ -23,6 +25,11 @@ const ELLIPSE_95: f64 = 2.447_746_830_680_816;
 /// Longer half axis of the median ellipse of the targets, in pixels of the figure.
 const TYPICAL_ELLIPSE: f64 = 11.0;
 
+/// Stations drawn as pyramids, targets with ellipses, and dots of each kind, at most.
+const MOST_PYRAMIDS: usize = 30;
+const MOST_ELLIPSES: usize = 120;
+const MOST_DOTS: usize = 2_000;
+
 /// A station that does not exist yet, with a word for it.
 pub(crate) struct Proposed {
     pub(crate) name: String,
@@ -36,6 +43,9 @@ pub(crate) fn figures(
     proposed: &[Proposed],
 ) -> Vec<(String, String)> {
     let [above, side] = Direction::above_and_side(vertical_axis(stations));
+    let places: Vec<_> = stations.iter().map(|station| station.world_from_camera.translation.vector).collect();
+    let pyramids = spread(&places, MOST_PYRAMIDS);
+    let ellipses = spread(&targets.iter().map(|target| target.point.coords).collect::<Vec<_>>(), MOST_ELLIPSES);
     let mut figures = Vec::new();
     for (title, direction) in [("From above", above), ("From the side", side)] {
         let poses = stations.iter().map(|station| &station.world_from_camera);
@@ -44,28 +54,66 @@ pub(crate) fn figures(
         let exaggeration = view.exaggeration(targets);
         let mut svg = open_svg(title, view.size[0], view.size[1] + TITLE);
         view.grid(&mut svg);
-        view.targets(&mut svg, targets, exaggeration);
-        for (index, station) in stations.iter().enumerate() {
+        view.targets(&mut svg, targets, &ellipses, exaggeration);
+        let mut labels = Labels::new(view.size);
+        for station in stations.iter().step_by(stations.len().div_ceil(MOST_DOTS).max(1)) {
+            view.dot(&mut svg, &station.world_from_camera, CATEGORIES[0]);
+        }
+        for station in pyramids.iter().map(|index| &stations[*index]) {
             view.station(&mut svg, camera, &station.world_from_camera, CATEGORIES[0], "");
             view.ellipse(&mut svg, &station.world_from_camera.translation.vector, &position(station), exaggeration, 0);
-            view.label(&mut svg, &station.world_from_camera, &station.name, index);
         }
-        for (index, candidate) in proposed.iter().enumerate() {
+        for candidate in proposed {
             view.station(&mut svg, camera, &candidate.world_from_camera, CATEGORIES[1], "4 3");
-            view.label(&mut svg, &candidate.world_from_camera, &candidate.name, index);
+        }
+        let named = pyramids.iter().map(|index| (&stations[*index].world_from_camera, &stations[*index].name));
+        for (pose, name) in named.chain(proposed.iter().map(|new| (&new.world_from_camera, &new.name))) {
+            labels.place(&mut svg, view.at(&pose.translation.vector), name);
         }
         svg.push_str("</svg>");
-        figures.push((svg, caption(exaggeration, !proposed.is_empty())));
+        let thinned = Thinned {
+            pyramids: [pyramids.len(), stations.len()],
+            ellipses: [ellipses.len(), targets.len()],
+            unnamed: labels.left_out,
+        };
+        figures.push((svg, caption(exaggeration, !proposed.is_empty(), &thinned)));
     }
     figures
 }
 
-fn caption(exaggeration: Option<f64>, proposed: bool) -> String {
+/// What of a large network is not drawn.
+struct Thinned {
+    /// Stations drawn as pyramids, and all.
+    pyramids: [usize; 2],
+    /// Targets drawn with ellipses, and all.
+    ellipses: [usize; 2],
+    /// Names that would have run over others.
+    unnamed: usize,
+}
+
+impl Thinned {
+    fn words(&self) -> String {
+        let mut words = String::new();
+        let mut say = |[drawn, all]: [usize; 2], what: &str| {
+            if drawn < all {
+                words += &format!(" {drawn} of {all} {what}, spread as widely as possible; the others are dots.");
+            }
+        };
+        say(self.pyramids, "stations are drawn in full");
+        say(self.ellipses, "targets have their ellipses");
+        if self.unnamed > 0 {
+            words += &format!(" {} names are left out, as they would run over others.", self.unnamed);
+        }
+        words
+    }
+}
+
+fn caption(exaggeration: Option<f64>, proposed: bool, thinned: &Thinned) -> String {
     let ellipses = exaggeration.map_or_else(String::new, |factor| {
         format!(" Ellipses: 95 % of the adjusted position, {factor} times exaggerated.")
     });
     let new = if proposed { " Orange and dashed: proposed stations." } else { "" };
-    format!("Pyramids: stations with what they see; green dots: targets.{ellipses}{new}")
+    format!("Pyramids: stations with what they see; green dots: targets.{ellipses}{new}{}", thinned.words())
 }
 
 fn position(station: &AdjustedStation) -> Matrix3<f64> {
@@ -200,11 +248,11 @@ impl View {
         );
     }
 
-    fn targets(&self, svg: &mut String, targets: &[AdjustedTarget], exaggeration: Option<f64>) {
-        for target in targets {
+    fn targets(&self, svg: &mut String, targets: &[AdjustedTarget], ellipses: &[usize], exaggeration: Option<f64>) {
+        for target in ellipses.iter().map(|index| &targets[*index]) {
             self.ellipse(svg, &target.point.coords, &target.covariance, exaggeration, 2);
         }
-        for target in targets {
+        for target in targets.iter().step_by(targets.len().div_ceil(MOST_DOTS).max(1)) {
             let [x, y] = self.at(&target.point.coords);
             let _ = write!(
                 svg,
@@ -236,17 +284,8 @@ impl View {
         );
     }
 
-    /// Names around the stations in turn, so that neighbours do not write over each other.
-    fn label(&self, svg: &mut String, pose: &Isometry3<f64>, name: &str, index: usize) {
+    fn dot(&self, svg: &mut String, pose: &Isometry3<f64>, colour: [u8; 3]) {
         let [x, y] = self.at(&pose.translation.vector);
-        let (dx, dy, anchor) =
-            [(6.0, 12.0, "start"), (-6.0, 12.0, "end"), (6.0, -5.0, "start"), (-6.0, -5.0, "end")][index % 4];
-        let _ = write!(
-            svg,
-            r#"<text x="{:.1}" y="{:.1}" class="tick" text-anchor="{anchor}">{}</text>"#,
-            x + dx,
-            y + dy,
-            escape(name)
-        );
+        let _ = write!(svg, r#"<circle cx="{x:.1}" cy="{y:.1}" r="1.6" fill="{}"/>"#, hex(colour));
     }
 }

@@ -2,10 +2,12 @@
 
 use self_calibration::CalibrationOutcome;
 
-use super::point_uncertainty::{self, PointUncertainty};
-use super::{coverage, heat_map, image_residuals, map, range_error, residuals, tables};
+use super::{
+    certificate_parts, coverage, heat_map, image_residuals, map, point_uncertainty, range_error, residuals, tables,
+};
 use crate::Result;
-use crate::calibrate::{CalibrationSummary, FoundTable};
+use crate::calibrate::{CalibrationSummary, CorrelationSummary, FoundTable, notorious_pairs};
+use crate::point_uncertainty::{PointUncertainty, amplitude_of};
 use crate::report::fixed_pattern::pattern_figures;
 use crate::report::page::Page;
 use crate::report::trends::trends_of_calibration;
@@ -28,6 +30,12 @@ pub(crate) fn render_calibration(
     tables::figures_of_merit(&mut page, summary);
     tables::diagnosis(&mut page, &summary.diagnosis);
     tables::parameters(&mut page, outcome);
+    if let Some(certificate) = &summary.certificate {
+        page.section("Verdicts");
+        certificate_parts::verdicts(&mut page, certificate);
+        page.section("For what it holds");
+        certificate_parts::span(&mut page, certificate);
+    }
     range_errors(&mut page, outcome);
     if let Some(table) = table {
         page.section("The offset of each pixel");
@@ -35,6 +43,9 @@ pub(crate) fn render_calibration(
         page.figures(&pattern_figures(&table.pattern)?);
     }
     uncertainty(&mut page, outcome)?;
+    if let Some(certificate) = &summary.certificate {
+        certificate_parts::uncertainty(&mut page, certificate);
+    }
     correlations(&mut page, &summary.correlation.names, &summary.correlation.matrix);
     residual_figures(&mut page, outcome);
     trends_of_calibration(&mut page, &summary.trends);
@@ -42,6 +53,11 @@ pub(crate) fn render_calibration(
     tables::groups(&mut page, summary);
     tables::rejected(&mut page, summary);
     tables::decisions(&mut page, outcome);
+    if let Some(certificate) = &summary.certificate {
+        page.section("Camera, conditions and files");
+        certificate_parts::conditions(&mut page, certificate, summary);
+        certificate_parts::inputs(&mut page, certificate);
+    }
     Ok(page.finish())
 }
 
@@ -56,11 +72,8 @@ fn range_errors(page: &mut Page, outcome: &CalibrationOutcome) {
 
 fn uncertainty(page: &mut Page, outcome: &CalibrationOutcome) -> Result<()> {
     let source = PointUncertainty { camera: &outcome.camera, range_models: &outcome.range_models };
-    let figures = source.figures(
-        &outcome.estimated,
-        &outcome.first_order_covariance,
-        point_uncertainty::amplitude_of(outcome),
-    )?;
+    let covariance = &outcome.first_order_covariance;
+    let figures = point_uncertainty::figures(&source, &outcome.estimated, covariance, amplitude_of(outcome))?;
     if figures.is_empty() {
         return Ok(());
     }
@@ -83,10 +96,8 @@ pub(super) fn correlations(page: &mut Page, names: &[String], matrix: &[Vec<f64>
     let caption =
         "Outlined: pairs that are known to be hard to separate. Numbers where the correlation is 0.5 or more.";
     page.figures(&[(heat_map::heat_map(names, matrix), caption.to_owned())]);
-    let pairs = heat_map::notorious_pairs(names, matrix);
-    if !pairs.is_empty() {
-        page.table(&["notorious pair", "correlation", "what separates it"], &pairs);
-    }
+    let correlation = CorrelationSummary { names: names.to_vec(), matrix: matrix.to_vec() };
+    certificate_parts::pairs(page, &notorious_pairs(&correlation));
 }
 
 fn residual_figures(page: &mut Page, outcome: &CalibrationOutcome) {

@@ -5,10 +5,10 @@ use self_calibration::{AdjustedStation, AdjustedTarget, Network, PlanOutcome};
 
 use super::map::{self, Proposed};
 use super::page::correlations;
-use super::point_uncertainty::PointUncertainty;
-use super::tables;
+use super::{point_uncertainty, tables};
 use crate::Result;
 use crate::network_plan::PlanSummary;
+use crate::point_uncertainty::PointUncertainty;
 use crate::report::page::Page;
 
 /// Candidates drawn and listed; the summary has them all.
@@ -126,7 +126,7 @@ fn points(page: &mut Page, network: &Network, outcome: &PlanOutcome) -> Result<(
     page.section("What the calibration's uncertainty would mean for a point");
     let models = [(None, network.range_model.clone())];
     let source = PointUncertainty { camera: &network.camera, range_models: &models };
-    page.figures(&source.figures(&outcome.estimated, &outcome.covariance, f64::NAN)?);
+    page.figures(&point_uncertainty::figures(&source, &outcome.estimated, &outcome.covariance, f64::NAN)?);
     Ok(())
 }
 

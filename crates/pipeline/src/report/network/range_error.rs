@@ -3,8 +3,7 @@
 use error_models::RangeErrorModel;
 use self_calibration::{CalibrationOutcome, Component, ObservationQuality, Verdict};
 
-use super::point_uncertainty::{PointUncertainty, amplitude_of};
-use super::residuals::thinned;
+use crate::point_uncertainty::{PointUncertainty, amplitude_of};
 use crate::report::canvas::{Axes, Canvas, robust_span, span};
 use crate::report::colour::CATEGORIES;
 use crate::statistics::quantile;
@@ -40,15 +39,16 @@ fn before(
     let axes = Axes { title: "Before: errors and the model", x: "observed range, m", y: "range error, mm" };
     let mut canvas = Canvas::new(&axes, SIZE, x, y);
     let band: Vec<_> = curve.iter().map(|(x, v, s)| (*x, v - NORMAL_95 * s, v + NORMAL_95 * s)).collect();
-    canvas.points(&thinned(points), CATEGORIES[1], 0.4);
+    let drawn = canvas.cloud(&points, CATEGORIES[1], 0.4);
     canvas.band(&band, CATEGORIES[0], 0.3);
     canvas.line(&curve.iter().map(|(x, v, _)| (*x, *v)).collect::<Vec<_>>(), CATEGORIES[0], "");
     canvas.name(CATEGORIES[1], "observed minus adjusted distance");
     canvas.name(CATEGORIES[0], "model, 95 % band");
     let caption = format!(
         "The curve is the estimated correction at the principal point and at the median amplitude; its band follows \
-         from the covariance of the parameters. Rms before: {:.1} mm.",
-        1e3 * rms(ranges.iter().map(|quality| quality.uncorrected_m))
+         from the covariance of the parameters. Rms before: {:.1} mm.{}",
+        1e3 * rms(ranges.iter().map(|quality| quality.uncorrected_m)),
+        drawn.words()
     );
     (canvas.finish(), caption)
 }
@@ -60,14 +60,15 @@ fn after(ranges: &[&ObservationQuality], x: [f64; 2]) -> (String, String) {
     let axes = Axes { title: "After: residuals", x: "observed range, m", y: "range residual, mm" };
     let mut canvas = Canvas::new(&axes, SIZE, x, y);
     canvas.band(&band, CATEGORIES[7], 0.2);
-    canvas.points(&thinned(points), CATEGORIES[2], 0.45);
+    let drawn = canvas.cloud(&points, CATEGORIES[2], 0.45);
     canvas.name(CATEGORIES[2], "residual");
     canvas.name(CATEGORIES[7], "95 % of the stated noise");
     let inside = ranges.iter().filter(|quality| quality.residual.abs() <= NORMAL_95 * quality.sigma).count();
     let caption = format!(
-        "{:.1} % of the residuals lie within 1.96 of their own stated standard deviations. Rms after: {:.1} mm.",
+        "{:.1} % of the residuals lie within 1.96 of their own stated standard deviations. Rms after: {:.1} mm.{}",
         100.0 * inside as f64 / ranges.len() as f64,
-        1e3 * rms(ranges.iter().map(|quality| quality.residual))
+        1e3 * rms(ranges.iter().map(|quality| quality.residual)),
+        drawn.words()
     );
     (canvas.finish(), caption)
 }

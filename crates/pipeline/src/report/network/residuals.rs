@@ -2,14 +2,17 @@
 
 use self_calibration::{CalibrationOutcome, Component, ObservationQuality, Verdict};
 
-use crate::report::canvas::{Axes, Canvas, robust_span};
+use crate::report::canvas::{Axes, Canvas, Drawn, robust_span};
 use crate::report::colour::CATEGORIES;
-
-/// Residuals drawn in one figure; of more, every so many.
-const MOST_POINTS: usize = 5000;
 
 /// Four figures stand in a row.
 const SIZE: [f64; 2] = [280.0, 220.0];
+
+/// Parts of the span in which means are taken, and values of which one is worth drawing.
+const PARTS: usize = 24;
+const FEWEST: f64 = 5.0;
+/// Colour of densities below lines.
+const DENSITY: [u8; 3] = [90, 100, 115];
 
 /// What residuals are drawn against: name, label and value.
 type Abscissa = (&'static str, &'static str, fn(&ObservationQuality) -> f64);
@@ -52,8 +55,17 @@ fn figure(
     all().next()?;
     let spans = [robust_span(all().map(|point| point.0)), robust_span(all().map(|point| point.1))];
     let mut canvas = Canvas::new(&Axes { title, x, y }, SIZE, spans[0], spans[1]);
+    let mut drawn = Drawn::Dots;
+    if Canvas::is_dense(SIZE, all().count()) {
+        // Densities of several sets would hide each other: one of all, with a line of means for each.
+        canvas.density(&all().copied().collect::<Vec<_>>(), DENSITY);
+        drawn = Drawn::Density;
+    }
     for (name, colour, values) in &sets {
-        canvas.points(values, *colour, 0.45);
+        match drawn {
+            Drawn::Dots => canvas.points(values, *colour, 0.45),
+            Drawn::Density => canvas.line(&means(values, spans[0]), *colour, ""),
+        }
         if sets.len() > 1 {
             canvas.name(*colour, name);
         }
@@ -61,8 +73,22 @@ fn figure(
     let beyond =
         |(x, y): &&(f64, f64)| !(spans[0][0]..=spans[0][1]).contains(x) || !(spans[1][0]..=spans[1][1]).contains(y);
     let beyond = all().filter(beyond).count();
-    let caption = if beyond > 0 { format!("{beyond} beyond the axes.") } else { String::new() };
+    let mut caption = if beyond > 0 { format!("{beyond} beyond the axes.") } else { String::new() };
+    if drawn == Drawn::Density {
+        caption += drawn.words();
+        caption += " Lines: means.";
+    }
     Some((canvas.finish(), caption))
+}
+
+/// Means of the values in parts of the span.
+fn means(values: &[(f64, f64)], [low, high]: [f64; 2]) -> Vec<(f64, f64)> {
+    let mut sums = [(0.0, 0.0, 0.0); PARTS];
+    for (x, y) in values.iter().filter(|(x, _)| (low..high).contains(x)) {
+        let part = &mut sums[(((x - low) / (high - low) * PARTS as f64) as usize).min(PARTS - 1)];
+        *part = (part.0 + x, part.1 + y, part.2 + 1.0);
+    }
+    sums.iter().filter(|(.., count)| *count >= FEWEST).map(|(x, y, count)| (x / count, y / count)).collect()
 }
 
 fn points(
@@ -71,17 +97,9 @@ fn points(
     abscissa: fn(&ObservationQuality) -> f64,
     factor: f64,
 ) -> Vec<(f64, f64)> {
-    let all: Vec<(f64, f64)> = used
-        .iter()
+    used.iter()
         .filter(|quality| quality.component == component)
         .map(|quality| (abscissa(quality), factor * quality.residual))
         .filter(|(x, y)| x.is_finite() && y.is_finite())
-        .collect();
-    thinned(all)
-}
-
-/// Every so many of a long list.
-pub(super) fn thinned<T: Copy>(all: Vec<T>) -> Vec<T> {
-    let step = all.len().div_ceil(MOST_POINTS).max(1);
-    if step == 1 { all } else { all.into_iter().step_by(step).collect() }
+        .collect()
 }

@@ -104,6 +104,9 @@ pub(super) fn groups(page: &mut Page, summary: &CalibrationSummary) {
     page.table(&["group", "observed values", "redundancy", "rms of the residuals", "sigma0"], &rows);
 }
 
+/// Rejected values in the table; a reader looks at the worst, and `residuals.csv` has all.
+const MOST_REJECTED: usize = 100;
+
 pub(super) fn rejected(page: &mut Page, summary: &CalibrationSummary) {
     page.section("Rejected observations");
     if summary.rejected.is_empty() {
@@ -121,7 +124,17 @@ pub(super) fn rejected(page: &mut Page, summary: &CalibrationSummary) {
             format!("{:.1}", gross.residual_in_sigmas),
         ]
     };
-    let rows: Vec<_> = summary.rejected.iter().map(row).collect();
+    let mut largest: Vec<_> = summary.rejected.iter().collect();
+    largest.sort_by(|a, b| b.residual_in_sigmas.abs().total_cmp(&a.residual_in_sigmas.abs()));
+    if largest.len() > MOST_REJECTED {
+        let left = largest.len() - MOST_REJECTED;
+        largest.truncate(MOST_REJECTED);
+        page.paragraph(&format!(
+            "The {MOST_REJECTED} that are furthest off in their standard deviations; {left} more are in residuals.csv \
+             (verdict `rejected`)."
+        ));
+    }
+    let rows: Vec<_> = largest.into_iter().map(row).collect();
     page.table(&["station", "target", "component", "observed", "observed minus predicted", "in sigmas"], &rows);
 }
 

@@ -153,6 +153,8 @@ impl Found {
             decisions: Vec::new(),
             diagnosis: self.diagnosis,
             doubts: Vec::new(),
+            causes: Vec::new(),
+            unestimated: Vec::new(),
             observations: self.observations,
             unknowns,
             datum_defect: 0,

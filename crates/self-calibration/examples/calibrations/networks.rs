@@ -1,18 +1,23 @@
-//! Three sound networks with known truth.
+//! Sound networks with known truth.
 
 use camera_model::{Camera, ImageFormat, InteriorOrientation, LensDistortion, pose_from_euler};
 use error_models::{RangeErrorModel, RangeTerms};
-use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
-use self_calibration::{Network, NetworkDatum, NetworkTarget, SightingOptions, Station, simulate_sightings};
+use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, SMatrix, Vector3};
+use self_calibration::{
+    Method, Network, NetworkDatum, NetworkTarget, PassiveCamera, SightingOptions, Station, simulate_sightings,
+};
 
 /// Half an interval of 20 MHz is c / (4 f); this is c / (2 f), metre.
 pub const INTERVAL: f64 = 7.494_811_45;
 
-/// A network that is sound, and how it is observed.
+/// A network that is sound, and how it is observed and calibrated.
 pub struct Sound {
     pub name: &'static str,
     pub truth: Network,
     pub datum: NetworkDatum,
+    pub method: Method,
+    /// Whether terms are chosen automatically.
+    pub auto: bool,
     options: SightingOptions,
 }
 
@@ -32,6 +37,65 @@ impl Sound {
 /// The networks: a target field, a nearly flat wall seen from twenty stations, and a small one with control.
 pub fn sound() -> [Sound; 3] {
     [target_field(), wall(), controlled()]
+}
+
+/// Networks with control targets: all, a fifth of them, and all of the wall.
+pub fn with_control() -> [Sound; 3] {
+    let known = |sound: Sound, name, every: usize, sigma: f64| {
+        let mut truth = sound.truth;
+        let chosen = truth.targets.iter_mut().step_by(every);
+        chosen.for_each(|target| target.covariance = Some(Matrix3::identity() * sigma.powi(2)));
+        Sound { name, truth, datum: NetworkDatum::Control, ..sound }
+    };
+    [controlled(), known(target_field(), "some control", 5, 0.001), known(wall(), "wall, control", 1, 0.0005)]
+}
+
+/// Networks with stations whose poses are known.
+pub fn with_stations() -> [Sound; 3] {
+    let known = |sound: Sound, name, position: f64, attitude: f64| {
+        let mut truth = sound.truth;
+        let variances = [position, position, position, attitude, attitude, attitude].map(|sigma| sigma * sigma);
+        let covariance = Matrix6::from_diagonal(&variances.into());
+        truth.stations.iter_mut().for_each(|station| station.covariance = Some(covariance));
+        truth.targets.iter_mut().for_each(|target| target.covariance = None);
+        Sound { name, truth, datum: NetworkDatum::Control, ..sound }
+    };
+    [
+        known(controlled(), "stations", 0.003, 1e-3),
+        known(target_field(), "stations, field", 0.005, 2e-3),
+        known(wall(), "stations, wall", 0.003, 2e-3),
+    ]
+}
+
+/// The other methods, and automatic terms.
+pub fn by_method() -> [Sound; 6] {
+    let by = |sound: Sound, name, method| Sound { name, method, ..sound };
+    let auto = |sound: Sound, name| Sound { name, auto: true, ..sound };
+    [
+        by(target_field(), "dependent", Method::TwoStepDependent),
+        by(controlled(), "dep., control", Method::TwoStepDependent),
+        by(with_passive(target_field()), "joint", Method::JointIntegrated),
+        by(with_passive(controlled()), "joint 2 steps", Method::JointTwoStep),
+        auto(target_field(), "field, auto"),
+        auto(controlled(), "control, auto"),
+    ]
+}
+
+/// With a passive camera of 1600 x 1200 pixels beside the range camera; 40 degrees of field.
+fn with_passive(mut sound: Sound) -> Sound {
+    let format = ImageFormat::new(1600, 1200, [0.005, 0.005]).unwrap();
+    let interior = InteriorOrientation { principal_point_mm: [0.02, 0.01], principal_distance_mm: 9.0 };
+    let camera = Camera::new(format, interior, LensDistortion { k1: 2e-4, ..LensDistortion::default() }).unwrap();
+    let sigmas = [2e-3, 2e-3, 2e-3, 2e-6, 2e-7, 2e-9, 1e-6, 1e-6, 3e-4, 3e-4_f64];
+    let covariance = SMatrix::<f64, 10, 10>::from_diagonal(&sigmas.map(|sigma| sigma * sigma).into());
+    let relative = Isometry3::new(Vector3::new(0.08, 0.01, -0.02), Vector3::new(0.01, -0.03, 0.02));
+    sound.truth.passive = Some(PassiveCamera {
+        camera,
+        covariance: Some(covariance),
+        range_camera_from_passive: Some(relative),
+        image_points: Vec::new(),
+    });
+    sound
 }
 
 fn camera() -> Camera {
@@ -80,6 +144,10 @@ fn network(poses: Vec<Isometry3<f64>>, targets: Vec<NetworkTarget>) -> Network {
     }
 }
 
+fn one_step(name: &'static str, truth: Network, datum: NetworkDatum, options: SightingOptions) -> Sound {
+    Sound { name, truth, datum, method: Method::OneStep, auto: false, options }
+}
+
 /// Fourteen stations before 63 targets, every third on a post of 25 cm.
 fn target_field() -> Sound {
     let rolls = [0.0, 90.0, 180.0, 270.0];
@@ -93,7 +161,7 @@ fn target_field() -> Sound {
             .map(|(i, (aside, above))| looking(2.4 + 0.16 * i as f64, aside, above, rolls[i % 4])),
     );
     let truth = network(poses, field(9, 7, 0.3, 0.25));
-    Sound { name: "target field", truth, datum: NetworkDatum::Free, options: SightingOptions::default() }
+    one_step("target field", truth, NetworkDatum::Free, SightingOptions::default())
 }
 
 /// Twenty stations before 163 targets on a wall with a relief of 4 cm: six frontal ones with ranges, two of them rolled
@@ -121,7 +189,7 @@ fn wall() -> Sound {
     planned.retain(|sighting| seen.iter().filter(|target| **target == sighting.target).count() > 2);
     truth.sightings = planned;
     let options = SightingOptions { sigma_pixel: 0.07, sigma_range_m: 0.006, ..SightingOptions::default() };
-    Sound { name: "wall", truth, datum: NetworkDatum::Free, options }
+    one_step("wall", truth, NetworkDatum::Free, options)
 }
 
 /// Ten stations before 48 targets known to half a millimetre.
@@ -134,5 +202,5 @@ fn controlled() -> Sound {
     for target in &mut truth.targets {
         target.covariance = Some(Matrix3::identity() * 0.0005_f64.powi(2));
     }
-    Sound { name: "control", truth, datum: NetworkDatum::Control, options: SightingOptions::default() }
+    one_step("control", truth, NetworkDatum::Control, SightingOptions::default())
 }

@@ -58,10 +58,17 @@ fn decisions(outcome: &CalibrationOutcome, mut terms: BTreeSet<String>) -> Vec<T
     stay.chain(left).collect()
 }
 
+/// Joint test of estimated terms (those of all integration times): as if they had been held at zero.
+pub(crate) fn joint_test(outcome: &CalibrationOutcome, terms: &[&str]) -> Option<Test> {
+    Wald::new(outcome).test(terms)
+}
+
 /// Test of a group.
-struct Test {
-    p: f64,
-    delta_bic: f64,
+pub(crate) struct Test {
+    /// Probability of estimates as far from zero, were they zero.
+    pub(crate) p: f64,
+    /// Change of Schwarz's criterion by the group.
+    pub(crate) delta_bic: f64,
 }
 
 impl Test {

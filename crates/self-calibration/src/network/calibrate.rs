@@ -118,7 +118,15 @@ impl Problem<'_> {
         let (solved, diagnosis) = self.solve(&mut setup)?;
         let mut outcome = setup.outcome(&solved, self.options)?;
         outcome.diagnosis = diagnosis;
+        if self.is_listed() {
+            outcome.unestimated = setup.term_scores(&solved, &outcome.groups)?;
+        }
         Ok(outcome)
+    }
+
+    /// Whether terms are listed: there are others then.
+    fn is_listed(&self) -> bool {
+        matches!(self.options.terms, TermSelection::List(_))
     }
 
     fn dependent(&self, terms: &BTreeSet<String>, passive: bool) -> Result<CalibrationOutcome> {
@@ -164,11 +172,14 @@ impl Problem<'_> {
         second.calibration.camera = setup.calibration_found(solved)?.camera;
         let step = self.range_step(&second, &reference, scale, &mut diagnosis)?;
         let first = setup.outcome(solved, self.options)?;
+        let mut unestimated = if self.is_listed() { setup.term_scores(solved, &first.groups)? } else { Vec::new() };
+        unestimated.extend(step.unestimated.iter().filter(|_| self.is_listed()).cloned());
         let first_names = setup.estimate(solved)?.names;
         let parts =
             Combined { setup: &second, first, first_names, step, reference, geometry: solved.geometry()?, before };
         let mut outcome = combine(parts, self.options)?;
         outcome.diagnosis = diagnosis;
+        outcome.unestimated = unestimated;
         Ok(outcome)
     }
 
@@ -191,11 +202,13 @@ impl Problem<'_> {
         };
         let mut diagnosis = Vec::new();
         let step = self.range_step(&setup, &reference, ScaleUse::Known, &mut diagnosis)?;
+        let unestimated = if self.is_listed() { step.unestimated.clone() } else { Vec::new() };
         let first = super::combine::given(&setup, self.options);
         let geometry = Geometry::default();
         let parts = Combined { setup: &setup, first, first_names: Vec::new(), step, reference, geometry, before: None };
         let mut outcome = combine(parts, self.options)?;
         outcome.diagnosis = diagnosis;
+        outcome.unestimated = unestimated;
         Ok(outcome)
     }
 

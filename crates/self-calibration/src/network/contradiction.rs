@@ -27,6 +27,8 @@ pub struct Cause {
     pub kind: CauseKind,
     /// The station that it concerns; `None`: all of them.
     pub station: Option<String>,
+    /// Names of the targets, stations or terms that it concerns; empty where it concerns all.
+    pub names: Vec<String>,
     /// What is wrong, in words.
     pub words: String,
     /// What to do.
@@ -61,12 +63,26 @@ pub enum CauseKind {
     CoordinateAxes,
     /// Standard deviations in another unit.
     SigmaUnit,
+    /// Attitudes of known stations in another unit than degrees.
+    AngleUnit,
+    /// A known target or station is not where it is said to be.
+    Misplaced,
+    /// Two known targets or stations have each other's places.
+    PlacesExchanged,
+    /// The same observations under two names of stations.
+    DuplicateStation,
+    /// The modulation frequency is another than that given, or that the ranges were computed with.
+    ModulationFrequency,
+    /// The pixel pitch is another than that given.
+    PixelPitch,
+    /// Terms that the camera has are held at their start values.
+    MissingTerms,
 }
 
 impl CauseKind {
     /// Whether it leaves image points and the targets that they belong to as they are.
     pub(crate) fn is_of_ranges(self) -> bool {
-        matches!(self, Self::RangeUnit | Self::DepthForRange | Self::WholeIntervals)
+        matches!(self, Self::RangeUnit | Self::DepthForRange | Self::WholeIntervals | Self::ModulationFrequency)
     }
 }
 
@@ -102,6 +118,14 @@ impl Contradiction {
     }
 }
 
+impl fmt::Display for Cause {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let odds = self.log_odds.min(CERTAIN);
+        let more = if self.log_odds > CERTAIN { "more than " } else { "" };
+        write!(f, "{} (odds {more}e^{odds:.0} to 1); {}", self.words, self.remedy)
+    }
+}
+
 impl fmt::Display for WorstValue {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { station, target, component, observed, residual, place, .. } = self;
@@ -115,9 +139,7 @@ impl fmt::Display for Contradiction {
         write!(f, "the observations contradict each other ({})", self.stage)?;
         for (index, cause) in self.causes.iter().enumerate() {
             f.write_str(if index == 0 { ": " } else { "; " })?;
-            let odds = cause.log_odds.min(CERTAIN);
-            let more = if cause.log_odds > CERTAIN { "more than " } else { "" };
-            write!(f, "{} (odds {more}e^{odds:.0} to 1); {}", cause.words, cause.remedy)?;
+            cause.fmt(f)?;
         }
         if self.causes.is_empty() {
             f.write_str(", and no known cause explains it")?;

@@ -39,6 +39,12 @@ impl Problem<'_> {
         let mut contradiction = Contradiction::new("too many observations disagree with the result");
         contradiction.causes = best.suspicion.causes(self.network);
         if contradiction.causes.is_empty() {
+            contradiction.causes = self.shown(&best.outcome);
+            if !contradiction.causes.is_empty() && !best.suspicion.is_hopeless() {
+                return Ok(best.told(self));
+            }
+        }
+        if contradiction.causes.is_empty() {
             let suspected: Vec<String> = best.suspicion.stations.iter().map(|(name, ..)| name.clone()).collect();
             (contradiction, _) = self.contradiction(contradiction.stage, None, &suspected);
         }
@@ -93,6 +99,8 @@ impl Judged {
     /// The outcome with its doubts, and what would explain what was rejected.
     fn told(self, problem: &Problem<'_>) -> CalibrationOutcome {
         let mut outcome = self.outcome;
+        outcome.causes = problem.shown(&outcome);
+        outcome.doubts.extend(outcome.causes.iter().map(ToString::to_string));
         outcome.doubts.extend(self.suspicion.sentences());
         outcome.doubts.extend(outcome.doubts_of_tests());
         let more = sentences(&outcome, problem.network);

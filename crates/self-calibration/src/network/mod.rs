@@ -10,6 +10,7 @@ mod combine;
 mod contradiction;
 mod control_test;
 mod equations;
+mod explain;
 mod global_tests;
 mod hold_out;
 mod hyperbola;
@@ -54,7 +55,7 @@ pub use model::{
 pub use options::{CalibrationOptions, Method, NetworkDatum, TermSelection};
 pub use outcome::{
     AdjustedStation, AdjustedTarget, CalibratedParameter, CalibrationOutcome, Component, GroupQuality,
-    ObservationQuality, TermDecision, Verdict,
+    ObservationQuality, TermDecision, TermScore, Verdict,
 };
 pub use outside_image::OutsideImage;
 pub use plan::{Candidate, CandidateGrid, PlanOptions, PlanOutcome, plan};

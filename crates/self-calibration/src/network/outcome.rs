@@ -5,7 +5,7 @@ use camera_model::Camera;
 use error_models::{ParameterStatus, RangeErrorModel};
 use nalgebra::{DMatrix, Isometry3, Matrix3, Matrix6, Point3};
 
-use super::Method;
+use super::{Cause, Method};
 
 /// A calibration with its quality: all that a report needs.
 #[derive(Debug, Clone)]
@@ -36,10 +36,14 @@ pub struct CalibrationOutcome {
     pub groups: Vec<GroupQuality>,
     /// Decisions of the automatic choice of terms, empty for a list.
     pub decisions: Vec<TermDecision>,
+    /// Score tests of usual terms that are not estimated; empty for the automatic choice, which estimates all.
+    pub unestimated: Vec<TermScore>,
     /// What is weakly determined and what would cure it, in sentences.
     pub diagnosis: Vec<String>,
     /// What speaks against the result as a whole, in sentences that end with what to do: nothing, as a rule.
     pub doubts: Vec<String>,
+    /// What explains the doubts, where something does.
+    pub causes: Vec<Cause>,
     /// Observed values used.
     pub observations: usize,
     /// Unknowns.
@@ -199,4 +203,17 @@ pub struct TermDecision {
     pub delta_bic: f64,
     /// The reason, in a sentence.
     pub reason: String,
+}
+
+/// What the residuals say of terms that are not estimated, without an adjustment with them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TermScore {
+    /// Names of the terms, which are looked at together.
+    pub terms: Vec<String>,
+    /// What vᵀPv over the variance factor would fall by with them.
+    pub statistic: f64,
+    /// Probability of more, were they zero.
+    pub p: f64,
+    /// Change of Schwarz's criterion with them; negative speaks for them.
+    pub delta_bic: f64,
 }

@@ -20,7 +20,7 @@ use super::report::covariance_of;
 use super::settle::start_range_limit;
 use super::strength::{Motions, Strength, combination, weakest};
 use super::terms::{Seen, family_widths, modelled_range, range_model_from, range_names};
-use super::{CalibrationOptions, Component};
+use super::{CalibrationOptions, Component, TermScore};
 use crate::{Error, Result};
 
 /// Most reference ranges and uncertain quantities behind them that the dense second step takes together: a hundred
@@ -99,6 +99,8 @@ pub(crate) struct RangeStep {
     pub(crate) scale: Option<(f64, f64, Vec<f64>)>,
     /// Deviations of the terms if all else were known.
     alone: Vec<f64>,
+    /// Score tests of range terms that are not estimated.
+    pub(crate) unestimated: Vec<TermScore>,
 }
 
 /// Whether the first step left its scale to the ranges.
@@ -180,7 +182,21 @@ impl RangeStep {
         let of_terms = covariance_of_terms(&names, [&setup.calibration.sets, &sets], &setup.estimated, &steps);
         let carried = carried * of_terms.by_steps.transpose();
         let (covariance, first_order) = (of_terms.full, of_terms.first_order);
-        Ok(Self { solution, reference, rejected, sets, names, covariance, first_order, steps, carried, scale, alone })
+        let unestimated = setup.range_scores(&solution, &reference, reference.root.ncols());
+        Ok(Self {
+            solution,
+            reference,
+            rejected,
+            sets,
+            names,
+            covariance,
+            first_order,
+            steps,
+            carried,
+            scale,
+            alone,
+            unestimated,
+        })
     }
 
     /// The weakest combination of the range terms.

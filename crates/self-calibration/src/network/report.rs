@@ -98,6 +98,8 @@ impl Setup<'_> {
             decisions: Vec::new(),
             diagnosis: Vec::new(),
             doubts: Vec::new(),
+            causes: Vec::new(),
+            unestimated: Vec::new(),
             observations: figures.observations,
             unknowns: figures.unknowns,
             datum_defect: figures.datum_defect,

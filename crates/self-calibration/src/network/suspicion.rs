@@ -123,7 +123,7 @@ impl Suspicion {
         let interval = network.range_model.ambiguity_interval_m;
         let offset = self.offset_m.map(|offset| Cause {
             kind: CauseKind::WholeIntervals,
-            station: None,
+            station: None, names: Vec::new(),
             words: format!(
                 "all ranges fit with an offset d0 of {offset:.3} m only, which no camera has; the ambiguity interval is \
                  {interval:.3} m"
@@ -133,7 +133,7 @@ impl Suspicion {
         });
         let lens = self.principal_distances_mm.map(|[nominal, found]| Cause {
             kind: CauseKind::PrincipalDistanceUnit,
-            station: None,
+            station: None, names: Vec::new(),
             words: format!(
                 "the image points fit with a principal distance of {found:.4} mm only, where {nominal} mm are given: it and \
                  the pixel pitch are not in one unit, or belong to another camera"
@@ -226,5 +226,5 @@ fn mirrored(network: &Network) -> Cause {
              stations.csv",
         ),
     };
-    Cause { kind, station: None, words, remedy, log_odds: f64::INFINITY }
+    Cause { kind, station: None, names: Vec::new(), words, remedy, log_odds: f64::INFINITY }
 }

@@ -10,9 +10,9 @@ use super::{Network, TermSelection};
 // The sizes are chosen, after what range cameras and their lenses are said to have.
 
 /// Waves of the range error, metre.
-const WAVE_M: f64 = 0.02;
+pub(crate) const WAVE_M: f64 = 0.02;
 /// Change of the range error from the image's middle to its corner, metre.
-const TILT_M: f64 = 0.02;
+pub(crate) const TILT_M: f64 = 0.02;
 /// Radial distortion in the corner by the terms of third, fifth and seventh order, as shares of the corner's radius.
 const RADIAL: [f64; 3] = [0.2, 0.1, 0.05];
 /// Decentring distortion in the corner, as a share of its radius.

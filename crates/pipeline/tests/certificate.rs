@@ -69,7 +69,7 @@ fn a_certificate_has_each_item_and_its_figures_are_those_of_the_files() {
     assert_eq!(names, ["survey.ron", "observations.csv", "stations.csv", "targets.csv", "distances.csv"].into());
     for input in inputs {
         let bytes = std::fs::read(input["file"].as_str().unwrap()).unwrap();
-        let digest: String = Sha256::digest(&bytes).iter().map(|byte| format!("{byte:02x}")).collect();
+        let digest = format!("{:x}", Sha256::digest(&bytes));
         assert_eq!(input["sha256"], digest.as_str());
         assert_eq!(input["bytes"], bytes.len());
         assert!(page.contains(&digest));
@@ -174,7 +174,7 @@ fn held_out(k1: &str, seed: u64, list: &str, hold_out: usize) -> (CalibrationSum
     let HeldOut::Made(check) = summary.certificate.clone().unwrap().hold_out else {
         panic!("{:?}", summary.certificate.unwrap().hold_out)
     };
-    (summary, check)
+    (summary, *check)
 }
 
 #[test]
@@ -267,8 +267,11 @@ fn pages_of_large_networks_stay_small() {
     let (_, tail) = tail.split_once("\n    ],").unwrap();
     let head = head.replace("columns: 9, rows: 7, spacing_m: 0.3", "columns: 20, rows: 14, spacing_m: 0.14");
     let station = |k: usize| {
-        let (distance, roll, side) =
-            (1.4 + 0.04 * k as f64, 90 * (k % 4), if k % 2 == 0 { 0.0 } else { 60.0 * (k % 8) as f64 / 7.0 - 30.0 });
+        let (distance, roll, side) = (
+            1.4 + 0.04 * k as f64,
+            90 * (k % 4),
+            if k.is_multiple_of(2) { 0.0 } else { 60.0 * (k % 8) as f64 / 7.0 - 30.0 },
+        );
         format!(
             "(name: \"Station {k:03}\", distance_m: {distance}, aside_deg: {side}, above_deg: {}, roll_deg: {roll}, integration_time_s: 0.004)",
             -0.7 * side

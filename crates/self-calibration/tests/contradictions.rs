@@ -1,7 +1,9 @@
 //! Broken networks say what is broken; single gross errors stop nothing.
 
+#[allow(dead_code, reason = "the example runs all of them")]
 #[path = "../examples/calibrations/faults/mod.rs"]
 pub(crate) mod faults;
+#[allow(dead_code, reason = "the example runs all of them")]
 #[path = "../examples/calibrations/networks.rs"]
 pub(crate) mod networks;
 #[path = "../examples/calibrations/suite.rs"]

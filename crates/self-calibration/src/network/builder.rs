@@ -120,6 +120,7 @@ impl<'s> Builder<'s> {
             return self.add_robust_sightings(kernels);
         }
         let group = self.adjustment.add_group("sightings");
+        let shared = self.setup.shared_models();
         for (index, seen) in self.setup.network.sightings.iter().enumerate() {
             let (uses_pixel, uses_range) = (self.setup.uses_pixel(index), self.setup.uses_range(index));
             if !uses_pixel && !uses_range {
@@ -139,7 +140,7 @@ impl<'s> Builder<'s> {
                 sigmas.push(seen.sigma_range_m);
                 self.row(Source::Sighting(index), Component::Range, range_m, seen.sigma_range_m);
             }
-            let equation = self.setup.equation(index, uses_pixel, uses_range);
+            let equation = self.setup.equation(&shared, index, uses_pixel, uses_range);
             let equation = equation.on(&self.setup.calibration.camera, blocks);
             self.adjustment.add_observation(group, equation, &Covariance::from_sigmas(&sigmas))?;
         }
@@ -148,6 +149,7 @@ impl<'s> Builder<'s> {
 
     /// Image points and ranges, each with the kernel of its kind.
     fn add_robust_sightings(&mut self, kernels: Kernels) -> Result<()> {
+        let shared = self.setup.shared_models();
         let [images, ranges] = ["image points", "ranges"].map(|name| self.adjustment.add_group(name));
         self.adjustment.set_kernel(images, kernels.kernel)?;
         self.adjustment.set_kernel(ranges, kernels.kernel)?;
@@ -160,7 +162,7 @@ impl<'s> Builder<'s> {
                 let mut blocks =
                     vec![self.blocks.stations[seen.station], self.target(seen.target)?, self.blocks.camera];
                 blocks.extend(is_range.then(|| self.blocks.sets[self.setup.set_of(seen.station)]));
-                let equation = self.setup.equation(index, !is_range, is_range);
+                let equation = self.setup.equation(&shared, index, !is_range, is_range);
                 let equation = equation.on(&self.setup.calibration.camera, blocks);
                 let sigmas = if is_range {
                     vec![kernels.scales.range * seen.sigma_range_m]

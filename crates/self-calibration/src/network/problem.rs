@@ -180,20 +180,43 @@ impl Setup<'_> {
             .collect()
     }
 
-    /// The equation of a sighting with chosen components.
-    pub(crate) fn equation(&self, index: usize, uses_pixel: bool, uses_range: bool) -> EquationParts {
+    /// What the equations of each set of range terms have in common.
+    pub(crate) fn shared_models(&self) -> Vec<SharedModel> {
+        let shared = |set: &RangeSet| SharedModel {
+            widths: family_widths(&set.model).into(),
+            natural_steps: has_natural_steps(&set.model, &self.estimated),
+            model: Arc::new(set.model.clone()),
+        };
+        self.calibration.sets.iter().map(shared).collect()
+    }
+
+    /// The equation of a sighting with chosen components; `shared` from [`Self::shared_models`].
+    pub(crate) fn equation(
+        &self,
+        shared: &[SharedModel],
+        index: usize,
+        uses_pixel: bool,
+        uses_range: bool,
+    ) -> EquationParts {
         let seen = &self.network.sightings[index];
-        let model = Arc::new(self.calibration.sets[self.set_of(seen.station)].model.clone());
+        let shared = &shared[self.set_of(seen.station)];
         let range = seen.range_m.filter(|_| uses_range).map(|range_m| RangeEquation {
             range_m,
             amplitude: seen.amplitude.unwrap_or(f64::NAN),
             drift_m: self.network.stations[seen.station].drift_m,
-            widths: family_widths(&model).into(),
-            natural_steps: has_natural_steps(&model, &self.estimated),
-            model,
+            widths: Arc::clone(&shared.widths),
+            natural_steps: shared.natural_steps,
+            model: Arc::clone(&shared.model),
         });
         EquationParts { pixel: seen.pixel.unwrap_or([f64::NAN; 2]), uses_pixel, range }
     }
+}
+
+/// What the range equations of a set of terms have in common.
+pub(crate) struct SharedModel {
+    model: Arc<RangeErrorModel>,
+    widths: Arc<[usize]>,
+    natural_steps: bool,
 }
 
 /// A sighting's equation but for the blocks.

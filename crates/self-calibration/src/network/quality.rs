@@ -220,7 +220,8 @@ impl Setup<'_> {
                     let Some(set) = blocks.sets.get(self.set_of(seen.station)) else { return Ok(f64::NAN) };
                     own.push(*set);
                 }
-                let equation = self.equation(index, !is_range, is_range).on(&self.calibration.camera, own);
+                let equation =
+                    self.equation(&self.shared_models(), index, !is_range, is_range).on(&self.calibration.camera, own);
                 (Box::new(equation), usize::from(row.component == Component::Row))
             }
             Source::Passive(index) => {

@@ -71,6 +71,5 @@ fn digest(path: &Path) -> Result<InputDigest> {
         }
         hasher.update(&buffer[..read]);
     }
-    let sha256 = hasher.finalize().iter().map(|byte| format!("{byte:02x}")).collect();
-    Ok(InputDigest { file: path.display().to_string(), bytes, sha256 })
+    Ok(InputDigest { file: path.display().to_string(), bytes, sha256: format!("{:x}", hasher.finalize()) })
 }

@@ -17,7 +17,7 @@ pub enum HeldOut {
         reason: String,
     },
     /// What it gave.
-    Made(HeldOutCheck),
+    Made(Box<HeldOutCheck>),
 }
 
 /// A hold-out check.
@@ -82,12 +82,12 @@ impl HeldOut {
             }
             None => Self::NotMade { reason: "not asked for (--hold-out N)".to_owned() },
             Some(Err(error)) => Self::NotMade { reason: error.to_string() },
-            Some(Ok(check)) => Self::Made(HeldOutCheck {
+            Some(Ok(check)) => Self::Made(Box::new(HeldOutCheck {
                 every: every.unwrap_or(0),
                 image: HeldOutPart::new(&check.image, "px"),
                 range: check.range.as_ref().map(|range| HeldOutPart::new(range, "m")),
                 stations: check.stations,
-            }),
+            })),
         }
     }
 

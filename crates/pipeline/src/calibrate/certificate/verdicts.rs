@@ -107,14 +107,12 @@ fn rejections(outcome: &CalibrationOutcome) -> TestVerdict {
         }
     };
     let more = lines.len().saturating_sub(LISTED);
-    let mut rows = if lines.is_empty() {
+    let rows = if lines.is_empty() {
         "none with verdict `rejected`".to_owned()
     } else {
         format!("verdict `rejected`: lines {}", lines[..lines.len().min(LISTED)].join(", "))
     };
-    if more > 0 {
-        rows += &format!(" and {more} more");
-    }
+    let rows = if more > 0 { format!("{rows} and {more} more") } else { rows };
     TestVerdict::new("gross errors", None, words, rows)
 }
 

@@ -93,18 +93,13 @@ struct Thinned {
 
 impl Thinned {
     fn words(&self) -> String {
-        let mut words = String::new();
-        let mut say = |[drawn, all]: [usize; 2], what: &str| {
-            if drawn < all {
-                words += &format!(" {drawn} of {all} {what}, spread as widely as possible; the others are dots.");
-            }
-        };
-        say(self.pyramids, "stations are drawn in full");
-        say(self.ellipses, "targets have their ellipses");
-        if self.unnamed > 0 {
-            words += &format!(" {} names are left out, as they would run over others.", self.unnamed);
-        }
-        words
+        let drawn = [(self.pyramids, "stations are drawn in full"), (self.ellipses, "targets have their ellipses")];
+        let part = drawn.into_iter().filter(|([drawn, all], _)| drawn < all).map(|([drawn, all], what)| {
+            format!(" {drawn} of {all} {what}, spread as widely as possible; the others are dots.")
+        });
+        let unnamed =
+            (self.unnamed > 0).then(|| format!(" {} names are left out, as they would run over others.", self.unnamed));
+        part.chain(unnamed).collect()
     }
 }
 

@@ -9,7 +9,8 @@ const ENOUGH: f64 = 30.0;
 
 /// Groups that scatter a thousand times as much as stated, or a thousandth. Those of the sightings are no result at all.
 pub(super) fn units(outcome: &CalibrationOutcome) -> Vec<Cause> {
-    let own = outcome.groups.iter().filter(|group| group.redundancy >= ENOUGH);
+    let of_sightings = |group: &&GroupQuality| ["col", "row", "range"].contains(&group.name.as_str());
+    let own = outcome.groups.iter().filter(|group| group.redundancy >= ENOUGH && !of_sightings(group));
     own.filter_map(|group: &GroupQuality| {
         let scale = group.sigma0?;
         let way = if unit_factor(scale)? > 1.0 { "small" } else { "large" };

@@ -4,7 +4,7 @@ use adjust::Scale;
 use nalgebra::{DMatrix, Matrix3, Matrix6, Vector3};
 
 use super::problem::{Calibration, Row, Setup, Source};
-use super::quality::{Figures, Geometry, USUAL_LEVEL, groups};
+use super::quality::{Figures, Geometry, groups, noncentrality};
 use super::range_step::RangeStep;
 use super::reference::Reference;
 use super::report::{Estimate, Fit, models, parameters, set_spans};
@@ -72,8 +72,7 @@ pub(crate) fn given(setup: &Setup<'_>, options: &CalibrationOptions) -> Calibrat
 
 /// Puts both steps together.
 pub(crate) fn combine(parts: Combined<'_, '_>, options: &CalibrationOptions) -> Result<CalibrationOutcome> {
-    let level = options.rejection_level.unwrap_or(USUAL_LEVEL);
-    let ranges = parts.range_qualities(level)?;
+    let ranges = parts.range_qualities(noncentrality(options))?;
     let estimate = parts.estimate();
     let fit = parts.fit();
     let mut calibration = Calibration { camera: parts.first.camera, sets: parts.step.sets.clone() };
@@ -162,7 +161,7 @@ impl Combined<'_, '_> {
         fit
     }
 
-    fn range_qualities(&self, level: f64) -> Result<Vec<ObservationQuality>> {
+    fn range_qualities(&self, noncentrality: f64) -> Result<Vec<ObservationQuality>> {
         let solution = &self.step.solution;
         let scale = if solution.sigma0().is_some() { Scale::Posterior } else { Scale::Prior };
         let standardised = solution.standardised_residuals(scale)?;
@@ -190,7 +189,7 @@ impl Combined<'_, '_> {
                 observed,
                 sigma: seen.sigma_range_m,
             };
-            let quality = self.setup.quality(&row, figures, level, &self.geometry);
+            let quality = self.setup.quality(&row, figures, noncentrality, &self.geometry);
             out.push(ObservationQuality { uncorrected_m: observed - reference, ..quality });
         }
         Ok(out)

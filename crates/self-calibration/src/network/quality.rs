@@ -8,18 +8,20 @@ use nalgebra::{Isometry3, Point3};
 use super::equations::{DistanceEquation, PassiveEquation};
 use super::problem::{Row, Setup, Solved, Source};
 use super::terms::{camera_names, range_names};
-use super::{CalibrationOutcome, Component, GroupQuality, ObservationQuality, Verdict};
+use super::{CalibrationOptions, CalibrationOutcome, Component, GroupQuality, ObservationQuality, Verdict};
 use crate::Result;
 
 /// Level of the outlier test where none is asked for.
-pub(crate) const USUAL_LEVEL: f64 = 0.001;
+const USUAL_LEVEL: f64 = 0.001;
 /// Probability with which the smallest detectable error is found.
 const POWER: f64 = 0.8;
 /// Redundancy number below which nothing checks an observation.
 const UNCONTROLLED: f64 = 1e-6;
 
-/// Baarda's non-centrality: an error of so many standard deviations of the residual is found with a probability of 80 %.
-pub(crate) fn non_centrality(level: f64) -> f64 {
+/// Baarda's non-centrality: an error of so many standard deviations of the residual is found with a probability of 80 % by the
+/// test of the options.
+pub(crate) fn noncentrality(options: &CalibrationOptions) -> f64 {
+    let level = options.rejection_level.unwrap_or(USUAL_LEVEL);
     Distribution::Normal.critical(level) + Distribution::Normal.quantile(POWER)
 }
 
@@ -41,9 +43,9 @@ impl Figures {
     }
 
     /// The gross error that is found with 80 %; infinite where nothing checks the value.
-    fn smallest_detectable(&self, sigma: f64, level: f64) -> f64 {
+    fn smallest_detectable(&self, sigma: f64, noncentrality: f64) -> f64 {
         match self.verdict {
-            Verdict::Used => non_centrality(level) * sigma / self.redundancy.sqrt(),
+            Verdict::Used => noncentrality * sigma / self.redundancy.sqrt(),
             Verdict::Uncontrolled => f64::INFINITY,
             _ => f64::NAN,
         }
@@ -89,7 +91,7 @@ impl Solved {
 
 impl Setup<'_> {
     /// All observed values of the network with their figures, in the order of the network.
-    pub(crate) fn qualities(&self, solved: &Solved, level: f64) -> Result<Vec<ObservationQuality>> {
+    pub(crate) fn qualities(&self, solved: &Solved, noncentrality: f64) -> Result<Vec<ObservationQuality>> {
         let solution = &solved.solution;
         let scale = if solution.sigma0().is_some() { Scale::Posterior } else { Scale::Prior };
         let standardised = solution.standardised_residuals(scale)?;
@@ -104,11 +106,17 @@ impl Setup<'_> {
             out.push((row, Figures::unused(self.predicted(solved, &row)?, verdict)));
         }
         out.sort_by_key(|(row, _)| (row.source, row.component));
-        Ok(out.iter().map(|(row, figures)| self.quality(row, *figures, level, &geometry)).collect())
+        Ok(out.iter().map(|(row, figures)| self.quality(row, *figures, noncentrality, &geometry)).collect())
     }
 
     /// One entry of the list.
-    pub(crate) fn quality(&self, row: &Row, figures: Figures, level: f64, geometry: &Geometry) -> ObservationQuality {
+    pub(crate) fn quality(
+        &self,
+        row: &Row,
+        figures: Figures,
+        noncentrality: f64,
+        geometry: &Geometry,
+    ) -> ObservationQuality {
         let seen = match row.source {
             Source::Sighting(index) => Some(&self.network.sightings[index]),
             _ => None,
@@ -125,7 +133,7 @@ impl Setup<'_> {
             residual: figures.residual,
             redundancy_number: figures.redundancy,
             standardised: figures.standardised,
-            smallest_detectable: figures.smallest_detectable(row.sigma, level),
+            smallest_detectable: figures.smallest_detectable(row.sigma, noncentrality),
             verdict: figures.verdict,
             pixel: seen.and_then(|seen| seen.pixel).unwrap_or([f64::NAN; 2]),
             range_m: seen.and_then(|seen| seen.range_m).unwrap_or(f64::NAN),

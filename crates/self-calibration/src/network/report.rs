@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, Matrix3, Matrix6};
 
 use super::hyperbola_steps::covariance_of_terms;
 use super::problem::{Calibration, RangeSet, Setup, Solved};
-use super::quality::{USUAL_LEVEL, groups};
+use super::quality::{groups, noncentrality};
 use super::terms::{camera_from, camera_names, camera_values, range_model_from, range_names, range_values, unit};
 use super::{
     AdjustedStation, AdjustedTarget, CalibratedParameter, CalibrationOptions, CalibrationOutcome, Network, Verdict,
@@ -74,7 +74,7 @@ impl Setup<'_> {
         let solution = &solved.solution;
         let calibration = self.calibration_found(solved)?;
         let estimate = self.estimate_of_terms(solved)?;
-        let residuals = self.qualities(solved, options.rejection_level.unwrap_or(USUAL_LEVEL))?;
+        let residuals = self.qualities(solved, noncentrality(options))?;
         let figures = Fit {
             observations: solution.observations(),
             unknowns: solution.unknowns(),

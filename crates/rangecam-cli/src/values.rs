@@ -50,10 +50,11 @@ pub(crate) fn terms(text: &str) -> Result<Terms, String> {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Terms(pub(crate) Option<Vec<String>>);
 
-/// A name that is not empty.
+/// A name that is not empty, and that a page or a terminal can show.
 pub(crate) fn name(text: &str) -> Result<String, String> {
     let name = text.trim();
-    if name.is_empty() { Err("expected a name".to_owned()) } else { Ok(name.to_owned()) }
+    let good = !name.is_empty() && !name.contains(char::is_control);
+    if good { Ok(name.to_owned()) } else { Err("expected a name without control characters".to_owned()) }
 }
 
 /// Whole numbers between commas.
@@ -65,6 +66,14 @@ pub(crate) fn whole<const N: usize>(text: &str) -> Option<[usize; N]> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn names_can_be_shown() {
+        assert_eq!(name(" A. Name ").as_deref(), Ok("A. Name"));
+        for bad in ["", "  ", "A\u{1b}[31m", "A\nB"] {
+            assert!(name(bad).is_err(), "{bad:?}");
+        }
+    }
 
     #[test]
     fn numbers_that_mean_nothing_are_refused() {

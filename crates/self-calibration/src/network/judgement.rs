@@ -24,7 +24,7 @@ impl Problem<'_> {
             return Ok(outcome);
         }
         let best = match self.attempt() {
-            Ok(judged) if judged.suspicion.is_none() => return Ok(judged.told(self)),
+            Ok(judged) if judged.suspicion.is_none() => judged,
             Ok(judged) => self.again(judged),
             Err(error) if !may_contradict(&error) => return Err(error),
             Err(error) => match self.once_more(&error) {
@@ -33,13 +33,14 @@ impl Problem<'_> {
                 None => return Err(self.refusal(error)),
             },
         };
+        let best = best.explained(self);
         if best.suspicion.is_none() || self.lens.is_some() {
             return Ok(best.told(self));
         }
         let mut contradiction = Contradiction::new("too many observations disagree with the result");
         contradiction.causes = best.suspicion.causes(self.network);
         if contradiction.causes.is_empty() {
-            contradiction.causes = self.shown(&best.outcome);
+            contradiction.causes.clone_from(&best.outcome.causes);
             if !contradiction.causes.is_empty() && !best.suspicion.is_hopeless() {
                 return Ok(best.told(self));
             }
@@ -96,10 +97,15 @@ fn may_contradict(error: &Error) -> bool {
 }
 
 impl Judged {
+    /// The same with what the outcome itself shows to be wrong.
+    fn explained(mut self, problem: &Problem<'_>) -> Self {
+        self.outcome.causes = problem.shown(&self.outcome);
+        self
+    }
+
     /// The outcome with its doubts, and what would explain what was rejected.
     fn told(self, problem: &Problem<'_>) -> CalibrationOutcome {
         let mut outcome = self.outcome;
-        outcome.causes = problem.shown(&outcome);
         outcome.doubts.extend(outcome.causes.iter().map(ToString::to_string));
         outcome.doubts.extend(self.suspicion.sentences());
         outcome.doubts.extend(outcome.doubts_of_tests());

@@ -4,10 +4,11 @@
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt;
 use faer::linalg::evd::{self, ComputeEigenvectors};
+use faer::linalg::matmul::matmul;
 use faer::linalg::qr::no_pivoting::factor as qr;
 use faer::linalg::svd::{self, ComputeSvdVectors};
 use faer::linalg::{triangular_inverse, triangular_solve};
-use faer::{Mat, MatMut, MatRef, Par, Spec};
+use faer::{Accum, Mat, MatMut, MatRef, Par, Spec};
 
 use crate::{Error, Result};
 
@@ -60,6 +61,32 @@ pub(crate) fn inverse_of_cholesky(factor: &[f64], n: usize) -> Vec<f64> {
         MemStack::new(&mut MemBuffer::new(scratch)),
     );
     mirror_lower(&mut out, n);
+    out
+}
+
+/// `C ← C − A A₁ᵀ` for some columns of a symmetric matrix of order n, from row `first` on, which is the first of the
+/// columns as well; A₁ are the rows of A (n × k) that belong to them.
+pub(crate) fn subtract_square(columns: &mut [f64], n: usize, first: usize, a: &[f64]) {
+    let (count, inner) = (columns.len() / n.max(1), a.len() / n.max(1));
+    if count == 0 || inner == 0 {
+        return;
+    }
+    let a = MatRef::from_column_major_slice(a, n, inner);
+    let out = MatMut::from_column_major_slice_mut(columns, n, count).subrows_mut(first, n - first);
+    let right = a.subrows(first, count).transpose();
+    matmul(out, Accum::Add, a.subrows(first, n - first), right, -1.0, Par::Seq);
+}
+
+/// `A B` with A of order n, both column-major.
+pub(crate) fn product(a: &[f64], n: usize, b: &[f64]) -> Vec<f64> {
+    let mut out = vec![0.0; b.len()];
+    let columns = b.len() / n.max(1);
+    if columns > 0 {
+        let a = MatRef::from_column_major_slice(a, n, n);
+        let b = MatRef::from_column_major_slice(b, n, columns);
+        let target = MatMut::from_column_major_slice_mut(&mut out, n, columns);
+        matmul(target, Accum::Replace, a, b, 1.0, Par::Seq);
+    }
     out
 }
 

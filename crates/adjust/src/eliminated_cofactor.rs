@@ -11,9 +11,9 @@ use crate::block_normal::BATCH;
 use crate::elimination::EliminatedFactor;
 use crate::layout::Layout;
 use crate::linearisation::take;
-use crate::panel;
 use crate::product::{Left, Right, add_product, with_wide_registers};
 use crate::structure::{Eliminated, Role, Slot};
+use crate::{dense, panel};
 
 /// With `V = L Lᵀ`, `H = L⁻¹ Wᵀ` and the reduced inverse `Q_cc`:
 ///
@@ -69,7 +69,11 @@ impl EliminatedCofactor {
             let mut rest = out.as_mut_slice();
             let batches: Vec<_> =
                 structure.eliminated.chunks(BATCH).map(|b| (b, take(&mut rest, structure.extent(b).1))).collect();
+            let crowded = structure.is_crowded();
             batches.into_par_iter().for_each(|(blocks, mut out)| {
+                if crowded {
+                    return self.all_products(blocks, out);
+                }
                 for block in blocks {
                     let count = structure.extent(std::slice::from_ref(block)).1;
                     with_wide_registers(|| self.own_products(block, take(&mut out, count)));
@@ -165,6 +169,22 @@ impl EliminatedCofactor {
                 let data = &q[other.start as usize * structure.order + slot.start as usize..];
                 let left = Left { data, stride: structure.order, rows: slot.width() };
                 add_product(&mut out[slot.offset - block.coupling..], slot.width(), left, right, other.width(), 1.0);
+            }
+        }
+    }
+
+    /// The same of several blocks, whole rows at once.
+    fn all_products(&self, blocks: &[Eliminated], out: &mut [f64]) {
+        let (structure, q) = (&self.factor.structure, self.reduced());
+        let columns = structure.columns(blocks, &self.factor.half[blocks[0].coupling..]);
+        let products = dense::product(q, structure.order, &columns);
+        let mut products = products.chunks_exact(structure.order);
+        for block in blocks {
+            for (row, product) in products.by_ref().take(block.width).enumerate() {
+                for slot in &structure.slots[block.slots()] {
+                    let start = slot.offset - blocks[0].coupling + row * slot.width();
+                    out[start..start + slot.width()].copy_from_slice(&product[slot.reduced_columns()]);
+                }
             }
         }
     }

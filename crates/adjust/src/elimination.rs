@@ -13,7 +13,10 @@ use crate::linearisation::take;
 use crate::normal::{NormalFactor, Singular, damping_of, unit_scale};
 use crate::product::{Left, Right, add_product, with_wide_registers};
 use crate::structure::{Eliminated, Reduced, Role, Structure};
-use crate::{Result, panel, reduced_constraints};
+use crate::{Result, dense, panel, reduced_constraints};
+
+/// Columns of the reduced matrix in one piece of work.
+const PANEL: usize = 96;
 
 /// With `V = L Lᵀ` and `H = L⁻¹ Wᵀ` (both block by block) the reduced matrix is `S = U − HᵀH`.
 #[derive(Debug, Clone)]
@@ -278,16 +281,22 @@ fn inverse_factor(matrix: &mut [f64], n: usize) -> bool {
 /// `S = U − HᵀH`, lower triangle: each element in the order of the eliminated blocks.
 fn reduce(normal: &BlockNormal, half: &[f64], extra: &[f64]) -> Vec<f64> {
     let structure = &normal.structure;
+    let order = structure.order;
     let mut out = normal.reduced.clone();
-    let mut rest = out.as_mut_slice();
-    let columns: Vec<_> =
-        structure.reduced.iter().map(|block| (block, take(&mut rest, block.width * structure.order))).collect();
-    columns.into_par_iter().for_each(|(block, out)| {
-        for index in 0..block.width {
-            out[index * structure.order + block.start + index] += extra[block.column + index];
+    for block in &structure.reduced {
+        (0..block.width).for_each(|index| out[(block.start + index) * (order + 1)] += extra[block.column + index]);
+    }
+    if structure.is_crowded() {
+        for blocks in structure.eliminated.chunks(BATCH) {
+            let columns = structure.columns(blocks, &half[blocks[0].coupling..]);
+            let panels = out.par_chunks_mut(PANEL * order).enumerate();
+            panels.for_each(|(panel, out)| dense::subtract_square(out, order, panel * PANEL, &columns));
         }
-        with_wide_registers(|| subtract(structure, block, half, out));
-    });
+        return out;
+    }
+    let mut rest = out.as_mut_slice();
+    let columns: Vec<_> = structure.reduced.iter().map(|block| (block, take(&mut rest, block.width * order))).collect();
+    columns.into_par_iter().for_each(|(block, out)| with_wide_registers(|| subtract(structure, block, half, out)));
     out
 }
 

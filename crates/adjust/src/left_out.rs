@@ -1,6 +1,6 @@
 use nalgebra::{DMatrix, DVector};
 
-use crate::{Error, Result, Solution};
+use crate::Solution;
 
 /// What the residuals of a solution say of parameters that were left out of it.
 ///
@@ -23,14 +23,13 @@ pub struct LeftOut {
 const ROUNDING: f64 = 1e-9;
 
 impl Solution {
-    /// What the residuals say of parameters that were left out.
+    /// What the residuals say of `count` parameters that were left out.
     ///
-    /// `columns` has the derivatives of the modelled values by these parameters: a row for each observed value, in the
-    /// order of adding (as [`Self::residuals`]), and a column for each parameter.
+    /// `derivatives` writes those of one modelled value by these parameters, into zeros; values are counted in the order of
+    /// adding (as [`Self::residuals`]).
     ///
     /// ```
     /// use adjust::{Adjustment, Covariance, LinearObservation, ParameterBlock, SolveOptions};
-    /// use nalgebra::DMatrix;
     ///
     /// # fn main() -> Result<(), adjust::Error> {
     /// // A mean of values that rise: the slope was left out.
@@ -43,52 +42,57 @@ impl Solution {
     ///     adjustment.add_observation(group, observation, &Covariance::from_sigma(1.0))?;
     /// }
     /// let solution = adjustment.solve(&SolveOptions::default())?;
-    /// let slope = solution.left_out(&DMatrix::from_column_slice(3, 1, &times))?;
+    /// let slope = solution.left_out(1, |row, out| out[0] = times[row]);
     /// // vᵀPv is 8, and nothing with a slope of 2.
     /// assert!((slope.statistic(&[0]).unwrap_or(f64::NAN) - 8.0).abs() < 1e-12);
     /// # Ok(())
     /// # }
     /// ```
-    ///
-    /// # Errors
-    /// [`Error::Length`] for another number of rows than observed values.
-    pub fn left_out(&self, columns: &DMatrix<f64>) -> Result<LeftOut> {
-        if columns.nrows() != self.layout.rows {
-            let what = "a column of derivatives by parameters that were left out".to_owned();
-            return Err(Error::Length { what, expected: self.layout.rows, found: columns.nrows() });
-        }
-        let (count, weights) = (columns.ncols(), self.weights());
-        let whitened: Vec<Vec<f64>> = columns.column_iter().map(|column| self.whitened(column.as_slice())).collect();
-        let images: Vec<Vec<f64>> =
-            whitened.iter().map(|column| self.linearisation.transpose_apply(&self.layout, column)).collect();
-        let product = |a: &[f64], b: &[f64]| a.iter().zip(b).zip(weights).map(|((a, b), weight)| weight * a * b).sum();
-        let mut normal = DMatrix::zeros(count, count);
-        for (j, image) in images.iter().enumerate() {
-            let known = self.cofactor.multiply(image);
-            for i in 0..=j {
-                let all: f64 = product(&whitened[i], &whitened[j]);
-                let taken: f64 = images[i].iter().zip(&known).map(|(a, b)| a * b).sum();
-                normal[(i, j)] = all - taken;
-                normal[(j, i)] = all - taken;
-            }
-        }
-        let right = whitened.iter().map(|column| product(column, &self.linearisation.whitened));
-        let alone = whitened.iter().map(|column| product(column, column));
-        let (right, alone) = (DVector::from_iterator(count, right), DVector::from_iterator(count, alone));
-        Ok(LeftOut { normal, right, alone })
-    }
-
-    /// `L⁻¹ column` with `C = L Lᵀ` of each observation.
-    fn whitened(&self, column: &[f64]) -> Vec<f64> {
-        let mut out = vec![0.0; column.len()];
+    pub fn left_out(&self, count: usize, mut derivatives: impl FnMut(usize, &mut [f64])) -> LeftOut {
+        let unknowns = self.layout.unknowns;
+        // AᵀPB by parameters, one after another; BᵀPB; BᵀPv.
+        let mut images = vec![0.0; count * unknowns];
+        let (mut normal, mut right) = (DMatrix::zeros(count, count), DVector::zeros(count));
+        let mut memory = (Vec::new(), vec![0.0; count]);
         for (place, &start) in self.layout.observations.iter().zip(&self.whitening_start) {
-            let own = &column[place.rows()];
-            for (row, out) in out[place.rows()].iter_mut().enumerate() {
+            let (raw, whitened) = (&mut memory.0, &mut memory.1);
+            raw.clear();
+            raw.resize(place.dimension * count, 0.0);
+            place.rows().zip(raw.chunks_exact_mut(count.max(1))).for_each(|(row, out)| derivatives(row, out));
+            let jacobian = &self.linearisation.jacobian[place.jacobian_range()];
+            for (row, index) in place.rows().enumerate() {
+                // L⁻¹ B with C = L Lᵀ.
                 let weights = &self.whitening[start + row * (row + 1) / 2..=start + row * (row + 3) / 2];
-                *out = weights.iter().zip(own).map(|(weight, value)| weight * value).sum();
+                for (column, out) in whitened.iter_mut().enumerate() {
+                    let own = raw[column..].iter().step_by(count);
+                    *out = weights.iter().zip(own).map(|(weight, value)| weight * value).sum();
+                }
+                let weight = self.weights()[index];
+                for (j, value) in whitened.iter().enumerate().filter(|(_, value)| **value != 0.0) {
+                    let value = weight * value;
+                    right[j] += value * self.linearisation.whitened[index];
+                    (0..=j).for_each(|i| normal[(i, j)] += value * whitened[i]);
+                    for part in self.layout.parts(place) {
+                        let image = &mut images[j * unknowns..][part.columns()];
+                        let entries = &jacobian[row * place.width..][part.entries()];
+                        image.iter_mut().zip(entries).for_each(|(out, a)| *out += a * value);
+                    }
+                }
             }
         }
-        out
+        let alone = normal.diagonal();
+        // What is left of the gradient at the end of the iteration is no score.
+        let gradient = self.linearisation.transpose_apply(&self.layout, &self.linearisation.whitened);
+        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        for (j, image) in images.chunks_exact(unknowns.max(1)).enumerate() {
+            let known = self.cofactor.multiply(image);
+            right[j] -= dot(&known, &gradient);
+            for (i, other) in images.chunks_exact(unknowns.max(1)).enumerate().take(j + 1) {
+                normal[(i, j)] -= dot(other, &known);
+            }
+        }
+        normal.fill_lower_triangle_with_upper_triangle();
+        LeftOut { normal, right, alone }
     }
 }
 

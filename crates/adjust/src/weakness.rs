@@ -118,8 +118,9 @@ impl Solution {
         })
     }
 
-    /// Standard deviations of all unknowns if all others were known, `1/√Nᵢᵢ`; infinite without observations.
-    fn deviations_alone(&self) -> Vec<f64> {
+    /// Prior standard deviations that the unknowns would have if all others were known, `1/√Nᵢᵢ`, in the order of
+    /// [`Self::unknown_names`]; infinite without observations.
+    pub fn deviations_alone(&self) -> Vec<f64> {
         let mut diagonal = vec![0.0; self.unknowns()];
         for place in &self.layout.observations {
             let columns = self.columns_of(place);

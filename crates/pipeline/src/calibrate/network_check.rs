@@ -47,9 +47,9 @@ fn has_control(network: &Network) -> bool {
 /// A target seen from one station follows that station whatever it does, and checks nothing.
 fn check_targets(files: &NetworkFiles) -> Result<()> {
     let network = &files.network;
-    for (index, target) in network.targets.iter().enumerate() {
+    for (index, (target, own)) in network.targets.iter().zip(network.sightings_by_target()).enumerate() {
         let mut seen: BTreeSet<(bool, usize)> = BTreeSet::new();
-        seen.extend(network.sightings.iter().filter(|s| s.target == index).map(|s| (false, s.station)));
+        seen.extend(own.iter().map(|&row| (false, network.sightings[row].station)));
         let passive = network.passive.iter().flat_map(|passive| &passive.image_points);
         seen.extend(passive.filter(|point| point.target == index).map(|point| (true, point.station)));
         let measured = network.distances.iter().any(|d| [d.from, d.to].contains(&DistanceEnd::Target(index)));
@@ -57,7 +57,7 @@ fn check_targets(files: &NetworkFiles) -> Result<()> {
             continue;
         }
         let name = &target.name;
-        let Some(row) = network.sightings.iter().position(|sighting| sighting.target == index) else {
+        let Some(&row) = own.first() else {
             let message = format!("target `{name}` is seen once, and by the passive camera only");
             return Err(Error::Survey { path: files.folder.join("passive/observations.csv"), message });
         };
@@ -74,14 +74,14 @@ fn check_targets(files: &NetworkFiles) -> Result<()> {
 /// Three points orient a camera; with fewer its pose must come from elsewhere.
 fn check_stations(files: &NetworkFiles, joint: bool) -> Result<()> {
     let network = &files.network;
-    for (index, station) in network.stations.iter().enumerate() {
-        let sightings = || network.sightings.iter().filter(|sighting| sighting.station == index);
-        let points = sightings().count();
+    for (station, own) in network.stations.iter().zip(network.sightings_by_station()) {
+        let points = own.len();
         if points >= 3 || station.covariance.is_some() || joint {
             continue;
         }
-        let Some(row) = network.sightings.iter().position(|sighting| sighting.station == index) else { continue };
-        let targets: Vec<&str> = sightings().map(|sighting| network.targets[sighting.target].name.as_str()).collect();
+        let Some(&row) = own.first() else { continue };
+        let name = |&row: &usize| network.targets[network.sightings[row].target].name.as_str();
+        let targets: Vec<&str> = own.iter().map(name).collect();
         let reason = format!(
             "`{}` sees {points} target{} only ({}): expected at least three, or its pose with standard deviations \
              in stations.csv",

@@ -1,6 +1,6 @@
 //! A survey's tables to a network, with every fault named by its place.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use nalgebra::{Matrix3, Point3, Vector3};
@@ -82,8 +82,9 @@ fn take_drifts(
 ) -> Result<Vec<ViewDrift>> {
     let known = KnownDrift::new(start.calibration.as_ref(), survey, root, warm_up)?;
     let mut drifts = Vec::new();
+    let ranged: BTreeSet<usize> = sightings.iter().filter(|s| s.range_m.is_some()).map(|s| s.station).collect();
     for (index, station) in stations.iter_mut().enumerate() {
-        if sightings.iter().any(|seen| seen.station == index && seen.range_m.is_some())
+        if ranged.contains(&index)
             && let Some(drift) = known.of_station(&station.name)?
         {
             station.drift_m = drift.drift_m;

@@ -15,6 +15,26 @@ const BEYOND_EDGE: [f64; 2] = [0.5, 3.0];
 const TARGETS_OF_A_STATION: usize = 3;
 
 impl Network {
+    /// Numbers of the sightings of each station.
+    pub fn sightings_by_station(&self) -> Vec<Vec<usize>> {
+        self.listed(self.stations.len(), |seen| seen.station)
+    }
+
+    /// Numbers of the sightings of each target.
+    pub fn sightings_by_target(&self) -> Vec<Vec<usize>> {
+        self.listed(self.targets.len(), |seen| seen.target)
+    }
+
+    fn listed(&self, count: usize, end: impl Fn(&Sighting) -> usize) -> Vec<Vec<usize>> {
+        let mut lists = vec![Vec::new(); count];
+        for (index, seen) in self.sightings.iter().enumerate() {
+            if let Some(list) = lists.get_mut(end(seen)) {
+                list.push(index);
+            }
+        }
+        lists
+    }
+
     /// Checks names, numbers and references of a network.
     pub fn validate(&self) -> Result<()> {
         self.camera.validate()?;
@@ -185,10 +205,10 @@ impl Network {
     /// Refuses stations with fewer than three targets and targets that their sightings cannot place.
     /// `ranged` says of each station whether its ranges take part.
     pub(crate) fn check_coverage(&self, ranged: &[bool], passive: bool) -> Result<()> {
+        let sightings = self.sightings_by_station();
         let images = |station: usize| {
-            let own =
-                self.sightings.iter().filter(move |s| s.station == station && s.pixel.is_some()).map(|s| s.target);
-            own.collect::<BTreeSet<_>>().len()
+            let own = sightings[station].iter().map(|&index| &self.sightings[index]);
+            own.filter(|seen| seen.pixel.is_some()).map(|seen| seen.target).collect::<BTreeSet<_>>().len()
         };
         let partner = |station: usize| {
             let points = self.passive.iter().filter(|_| passive).flat_map(|passive| &passive.image_points);

@@ -17,9 +17,13 @@ const SMALLEST_GROUP: usize = 30;
 const SINGLE_ROUNDS: usize = 10;
 /// A thousand at once.
 const MOST_DOUBLINGS: usize = 10;
-/// Sightings of a station or target among which one gross error moves the residuals of the others by less than a tenth of
-/// itself: six unknowns of a station over a hundred sightings take up 3 % of the error of one.
-const INDEPENDENT: usize = 100;
+/// A gross error moves the residuals of the other values of its station or target by less than itself times this over the
+/// number of their sightings: the six unknowns of a station take up 3 % of an error among a hundred sightings in the mean,
+/// and a tenth where few see so far aside.
+const LEVERAGE: f64 = 10.0;
+/// Standard deviations that others may have moved a suspect by and it is rejected beside them: at the usual level of 1e-4
+/// a value that stays below the limit without them is beyond it with 1 in 1,500.
+const HARDLY_MOVED: f64 = 0.5;
 /// Rounds of rejection, a bound that only contradictory observations reach.
 const MOST_ROUNDS: usize = 100;
 
@@ -78,11 +82,10 @@ fn scale(mut sizes: Vec<f64>) -> f64 {
 impl Setup<'_> {
     /// Rejects gross errors from a first solution on, where a level is given.
     ///
-    /// Of the suspects of a round the worst of each station and of each target is rejected, of large ones one for each
-    /// [`INDEPENDENT`] sightings: the residuals of one gross error spread over its own station and target, so that these do
-    /// not disturb each other. A station that still has
-    /// suspects after [`SINGLE_ROUNDS`] loses more of them at once. In the end what was
-    /// rejected is looked at again, and taken back once if it fits.
+    /// Of the suspects of a round the worst of each station and of each target is rejected, and those that the others of
+    /// these cannot have made conspicuous: the residuals of a gross error spread over its own station and target. A station
+    /// that still has suspects after [`SINGLE_ROUNDS`] loses more of them at once. In the end what was rejected is looked
+    /// at again, and taken back once if it fits.
     pub(crate) fn solve_rejecting(&mut self, first: Solved, level: Option<f64>) -> Result<Solved> {
         let mut solved = first;
         let Some(level) = level else { return Ok(solved) };
@@ -98,20 +101,21 @@ impl Setup<'_> {
                 break;
             }
             self.restart(&solved)?;
-            match self.solve() {
-                Ok(better) => solved = better,
+            // Large networks have no room for two solutions.
+            drop(solved);
+            solved = match self.solve_nearby() {
                 Err(Error::Adjust(adjust::Error::RankDeficient { .. })) => {
                     // What is left would not determine the network: the suspects are needed.
                     self.excluded = before;
-                    break;
+                    return self.solve_nearby();
                 }
-                Err(error) => return Err(error),
-            }
+                done => done?,
+            };
         }
         Ok(solved)
     }
 
-    /// Rejects the worst of each target, and at most so many of each station, and more of large ones.
+    /// Rejects the worst of each target, at most so many of each station, and what is sure to be wrong.
     fn reject(
         &mut self,
         solved: &Solved,
@@ -133,25 +137,46 @@ impl Setup<'_> {
             self.set_excluded(&solved.rows[control.row], true);
             return Ok(());
         }
-        let mut seen = (BTreeMap::new(), BTreeMap::new());
-        for sighting in &self.network.sightings {
-            *seen.0.entry(sighting.station).or_insert(0) += 1;
-            *seen.1.entry(sighting.target).or_insert(0) += 1;
-        }
-        let at_once = |seen: &BTreeMap<usize, usize>, end| seen.get(&end).map_or(1, |seen| (seen / INDEPENDENT).max(1));
+        let critical = Distribution::Normal.critical(level);
+        let sure = self.sure(&suspects, solved, critical);
         let (mut stations, mut targets) = (BTreeMap::new(), BTreeMap::new());
-        for suspect in suspects {
+        for (suspect, sure) in suspects.iter().zip(sure) {
             let row = &solved.rows[suspect.row];
             let Some((station, target)) = self.ends(row.source) else { continue };
             let of_station = stations.entry(station).or_insert(0);
             let of_target = targets.entry(target).or_insert(0);
             (*of_station, *of_target) = (*of_station + 1, *of_target + 1);
-            let few = *of_station <= most * at_once(&seen.0, station) && *of_target <= at_once(&seen.1, target);
-            if few && !readmitted.contains(&key(row)) {
+            let few = *of_station <= most && *of_target <= 1;
+            if (few || sure) && !readmitted.contains(&key(row)) {
                 self.set_excluded(row, true);
             }
         }
         Ok(())
+    }
+
+    /// Which suspects are so, or nearly, even if all others of their station and of their target are gross errors.
+    fn sure(&self, suspects: &[Suspect], solved: &Solved, critical: f64) -> Vec<bool> {
+        let (mut stations, mut targets) = (BTreeMap::new(), BTreeMap::new());
+        for seen in &self.network.sightings {
+            stations.entry(seen.station).or_insert((0.0, 0.0)).0 += 1.0;
+            targets.entry(seen.target).or_insert((0.0, 0.0)).0 += 1.0;
+        }
+        let ends: Vec<_> = suspects.iter().map(|suspect| self.ends(solved.rows[suspect.row].source)).collect();
+        for (suspect, (station, target)) in suspects.iter().zip(&ends).filter_map(|(s, ends)| Some((s, (*ends)?))) {
+            stations.entry(station).or_insert((0.0, 0.0)).1 += suspect.statistic;
+            targets.entry(target).or_insert((0.0, 0.0)).1 += suspect.statistic;
+        }
+        let moved = |of: &BTreeMap<usize, (f64, f64)>, end: &usize, own: f64| {
+            of.get(end).map_or(0.0, |(seen, all)| (LEVERAGE / seen).min(1.0) * (all - own))
+        };
+        let is_sure = |(suspect, ends): (&Suspect, &Option<(usize, usize)>)| {
+            ends.is_some_and(|(station, target)| {
+                let own = suspect.statistic;
+                let moved = moved(&stations, &station, own) + moved(&targets, &target, own);
+                moved < HARDLY_MOVED || own > critical + moved
+            })
+        };
+        suspects.iter().zip(&ends).map(is_sure).collect()
     }
 
     /// Takes back what fits the solution that it did not take part in. Its residual has at least its own deviation, so the
@@ -190,6 +215,7 @@ impl Setup<'_> {
         if let Some([relative, _]) = solved.blocks.passive {
             self.start.relative = Some(solved.solution.pose(relative)?);
         }
+        self.calibration = self.calibration_found(solved)?;
         Ok(())
     }
 

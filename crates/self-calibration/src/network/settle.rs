@@ -167,36 +167,34 @@ impl Setup<'_> {
     fn leave_out(&mut self, excluded: &Excluded) {
         let excluded = self.without_wrong_control(excluded);
         self.excluded.ranges.extend(&excluded.ranges);
-        for station in 0..self.network.stations.len() {
-            let own = |(_, seen): &(usize, &super::Sighting)| seen.station == station && seen.pixel.is_some();
-            let sightings = self.network.sightings.iter().enumerate().filter(own).map(|(index, _)| index);
+        for (station, own) in self.network.sightings_by_station().into_iter().enumerate() {
+            let sightings = own.into_iter().filter(|&index| self.network.sightings[index].pixel.is_some());
             let (bad, good): (Vec<usize>, Vec<usize>) =
                 sightings.partition(|index| excluded.image_points.contains(index));
             if good.len() >= FEWEST || self.network.stations[station].covariance.is_some() {
                 self.excluded.image_points.extend(bad);
             }
         }
-        for target in 0..self.network.targets.len() {
-            if self.is_left_open(target) {
-                self.drop_target(target);
+        for (target, own) in self.network.sightings_by_target().into_iter().enumerate() {
+            if self.is_left_open(target, &own) {
+                self.drop_target(target, &own);
             }
         }
     }
 
-    /// Whether a target that could be placed no longer can.
-    fn is_left_open(&self, target: usize) -> bool {
+    /// Whether a target that could be placed no longer can by its own sightings.
+    fn is_left_open(&self, target: usize, own: &[usize]) -> bool {
         let passive = self.network.passive.iter().filter(|_| self.passive).flat_map(|passive| &passive.image_points);
         if self.network.targets[target].covariance.is_some() || passive.clone().any(|seen| seen.target == target) {
             return false;
         }
-        let own = |(_, seen): &(usize, &super::Sighting)| seen.target == target;
-        let sightings = self.network.sightings.iter().enumerate().filter(own).map(|(index, _)| index);
-        let known = |index: usize| 2 * usize::from(self.uses_pixel(index)) + usize::from(self.uses_range(index));
-        sightings.map(known).sum::<usize>() < 3
+        let known = |&index: &usize| 2 * usize::from(self.uses_pixel(index)) + usize::from(self.uses_range(index));
+        own.iter().map(known).sum::<usize>() < 3
     }
 
-    fn drop_target(&mut self, target: usize) {
-        for (index, seen) in self.network.sightings.iter().enumerate().filter(|(_, seen)| seen.target == target) {
+    fn drop_target(&mut self, target: usize, own: &[usize]) {
+        for &index in own {
+            let seen = &self.network.sightings[index];
             if seen.pixel.is_some() {
                 self.excluded.image_points.insert(index);
             }

@@ -21,10 +21,10 @@ pub(crate) fn station_pose(
     targets: &[Option<Point3<f64>>],
     station: usize,
 ) -> Option<Isometry3<f64>> {
-    robust_resection(&calibration.camera, &seen_targets(network, targets, station)).ok()
+    let own = network.sightings.iter().filter(|seen| seen.station == station);
+    robust_resection(&calibration.camera, &seen_targets(own, targets)).ok()
 }
 
-/// The targets with coordinates whose image points a station has.
 /// Where stations at these poses see a target; `None` where too little tells.
 pub(crate) fn target_point(
     network: &Network,
@@ -37,13 +37,16 @@ pub(crate) fn target_point(
     finder.placed(target)
 }
 
-fn seen_targets(network: &Network, targets: &[Option<Point3<f64>>], station: usize) -> Vec<TargetObservation> {
-    let own = network.sightings.iter().filter(|seen| seen.station == station);
+/// The targets with coordinates among these sightings with an image point.
+fn seen_targets<'s>(
+    sightings: impl Iterator<Item = &'s super::Sighting>,
+    targets: &[Option<Point3<f64>>],
+) -> Vec<TargetObservation> {
     let target = |seen: &super::Sighting| {
         let (pixel, point) = (seen.pixel?, targets[seen.target]?);
         Some(TargetObservation { sigma_pixel: seen.sigma_pixel, ..TargetObservation::new(point, pixel, 1.0) })
     };
-    own.filter_map(target).collect()
+    sightings.filter_map(target).collect()
 }
 
 /// Poses and coordinates known so far.
@@ -168,14 +171,15 @@ impl<'n> Finder<'n> {
             if before <= limit {
                 continue;
             }
-            let seen = seen_targets(self.network, &self.targets, station);
-            let refined = trimmed_resection(&self.calibration.camera, seen, Some(pose));
+            let own = self.of_station[station].iter().map(|&index| &self.network.sightings[index]);
+            let seen = seen_targets(own, &self.targets);
+            let refined = trimmed_resection(&self.calibration.camera, seen.clone(), Some(pose));
             if let Some(found) = refined.ok().filter(|found| self.typical_miss(station, found) <= limit) {
                 self.stations[station] = Some(found);
                 found_any = true;
                 continue;
             }
-            if let Some(found) = station_pose(self.network, self.calibration, &self.targets, station)
+            if let Ok(found) = robust_resection(&self.calibration.camera, &seen)
                 && 2.0 * self.typical_miss(station, &found) < before
             {
                 self.stations[station] = Some(found);

@@ -74,24 +74,12 @@ impl Setup<'_> {
 
     /// Deviation of each calibration parameter if all others, poses and coordinates were known.
     fn deviations_alone(&self, solved: &Solved) -> Result<Vec<f64>> {
-        let geometry = solved.geometry()?;
-        let mut held = self.clone();
-        held.geometry_held = true;
-        held.calibration = self.calibration_found(solved)?;
-        for set in &mut held.calibration.sets {
-            // The found spans are those of the observations; the equations need none.
-            set.model.range_span_m = None;
-        }
-        held.start.stations = geometry.stations;
-        held.start.targets = geometry.targets;
-        if let Some([relative, _]) = solved.blocks.passive {
-            held.start.relative = Some(solved.solution.pose(relative)?);
-        }
-        let solved = held.solve()?;
-        let covariance = held.estimate(&solved)?.covariance;
-        let normal = covariance.clone().cholesky().map(|factor| factor.inverse());
-        let conditional = |i: usize| normal.as_ref().map_or(covariance[(i, i)], |normal| 1.0 / normal[(i, i)]).sqrt();
-        Ok((0..covariance.nrows()).map(conditional).collect())
+        let alone = solved.solution.deviations_alone();
+        let of = |(_, block, component)| {
+            let unknown = solved.solution.unknown_index(block, component)?;
+            Ok(unknown.map_or(f64::INFINITY, |unknown| alone[unknown]))
+        };
+        self.estimated_parameters(solved).into_iter().map(of).collect()
     }
 
     /// Mean correlation of a functional of the calibration with the stations' motions, in camera axes.

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 
 use camera_model::{Camera, InteriorOrientation, LensDistortion};
-use error_models::{AmplitudeHyperbola, RangeErrorModel, RangeTerms, parameter_unit};
+use error_models::{AmplitudeHyperbola, RangeErrorModel, parameter_unit};
 
 /// Names of the interior orientation, which comes before the lens in the camera's block.
 pub(crate) const INTERIOR: [&str; 3] = ["xp", "yp", "c"];
@@ -76,7 +76,7 @@ pub(crate) const RANGE_FAMILIES: [RangeFamily; 2] = [
             let known = model.design_row_into(seen.range_m, seen.x_mm, seen.y_mm, row);
             known.map_err(|_| "range terms of the wrong number")?;
             let value = row.iter().zip(values).map(|(a, x)| a * x).sum();
-            Ok(RangePart { value, ..linear_slopes(model, seen, values) })
+            Ok(RangePart { value, ..linear_slopes(model, seen, values, row) })
         },
     },
     // Eq. 15.
@@ -106,11 +106,14 @@ pub(crate) const RANGE_FAMILIES: [RangeFamily; 2] = [
     },
 ];
 
-/// Derivatives of the linear terms with respect to range and image point.
-fn linear_slopes(model: &RangeErrorModel, seen: &Seen, values: &[f64]) -> RangePart {
-    if let (true, &[d0, d2, d3, d4, d5, d6, d7, by_x, by_y]) = (model.further.is_empty(), values) {
-        let terms = RangeTerms::from_array([d0, d2, d3, d4, d5, d6, d7, by_x, by_y]);
-        let by_range = terms.range_derivative(model.ambiguity_interval_m, seen.range_m);
+/// Derivatives of the linear terms with respect to range and image point; `row` has sines and cosines of Eq. 14.
+fn linear_slopes(model: &RangeErrorModel, seen: &Seen, values: &[f64], row: &[f64]) -> RangePart {
+    if let (true, &[_, d2, d3, d4, d5, d6, d7, by_x, by_y], &[_, s1, c1, s2, c2, s4, c4, ..]) =
+        (model.further.is_empty(), values, row)
+    {
+        let first = d2 * c1 - d3 * s1;
+        let further = 2.0 * (d4 * c2 - d5 * s2) + 4.0 * (d6 * c4 - d7 * s4);
+        let by_range = std::f64::consts::TAU / model.ambiguity_interval_m * (first + further);
         return RangePart { by_range, by_x, by_y, ..RangePart::default() };
     }
     let mut own = RangeErrorModel { hyperbola: None, ..model.clone() };
@@ -151,6 +154,9 @@ pub(crate) fn range_model_from(model: &RangeErrorModel, values: &[f64]) -> Range
 /// Slopes of the correction beyond which an observed range hardly grows with the true one any more.
 const STEEPEST: f64 = 0.9;
 
+/// Share of the range below which the step after a step of Newton's method is below rounding.
+const SMALL_STEP: f64 = 1e-9;
+
 /// The range that a camera would observe of a distance without noise, the solution of `ρ − Δρ(ρ) = distance`, and its
 /// derivatives: with respect to the distance, the image point, and (in `row`) the terms.
 ///
@@ -167,7 +173,8 @@ pub(crate) fn modelled_range(
     row: &mut [f64],
 ) -> Result<ModelledRange, &'static str> {
     let mut seen = *measured;
-    // Newton's method; from the measured range two or three steps reach the last digit.
+    // Newton's method: what a step leaves is its square times half the curvature of the correction, which is a few units
+    // per metre at the most, so that after a small one the last digit is right.
     for _ in 0..50 {
         let part = range_correction(model, widths, &seen, values, row)?;
         let slope = part.by_range;
@@ -177,7 +184,7 @@ pub(crate) fn modelled_range(
         let growth = 1.0 / (1.0 - slope);
         let step = (distance + seen.drift_m + part.value - seen.range_m) * growth;
         seen.range_m += step;
-        if step.abs() <= 1e-14 * (1.0 + seen.range_m.abs()) {
+        if step.abs() <= SMALL_STEP * (1.0 + seen.range_m.abs()) {
             for derivative in row {
                 *derivative *= growth;
             }

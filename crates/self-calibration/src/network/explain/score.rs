@@ -4,8 +4,8 @@
 use std::collections::BTreeSet;
 
 use adjust::{Distribution, Solution};
-use nalgebra::DMatrix;
 
+use super::super::misfit::modelled_pixel;
 use super::super::problem::{Calibration, RangeSet, Setup, Solved, Source};
 use super::super::reference::Reference;
 use super::super::term_words::SINES;
@@ -28,70 +28,70 @@ const RANGE_GROUPS: [&[&str]; 7] = [
     &["e1", "e2"],
 ];
 
-/// Derivatives of an observed value by the terms of one block: its place in the solution, first column, values.
-struct Row {
-    index: usize,
-    first: usize,
-    values: Vec<f64>,
-}
-
 impl Setup<'_> {
     /// Scores of the terms that this adjustment does not estimate.
     pub(crate) fn term_scores(&self, solved: &Solved, groups: &[GroupQuality]) -> Result<Vec<TermScore>> {
         let found = self.calibration_found(solved)?;
         let geometry = solved.geometry()?;
-        let mut rows = Vec::new();
-        for (index, row) in solved.rows.iter().enumerate() {
-            let Source::Sighting(sighting) = row.source else { continue };
+        let row = |index: usize| {
+            let row = &solved.rows[index];
+            let Source::Sighting(sighting) = row.source else { return None };
             let seen = &self.network.sightings[sighting];
-            let Some(at) = seen.pixel.map(|pixel| about_principal_point(&found, pixel)) else { continue };
-            rows.push(match row.component {
-                Component::Col => Row { index, first: 0, values: image_row(&found, at, 0) },
-                Component::Row => Row { index, first: 0, values: image_row(&found, at, 1) },
+            let pose = &geometry.stations[seen.station];
+            // At the measured image point the derivatives would carry its noise, which is that of the residuals: among
+            // hundreds of thousands of values a term would seem to be shown.
+            let pixel = modelled_pixel(&found.camera, pose, &geometry.targets[seen.target]?)?;
+            let at = about_principal_point(&found, pixel);
+            Some(match row.component {
+                Component::Col => (0, image_row(&found, at, 0)),
+                Component::Row => (0, image_row(&found, at, 1)),
                 _ => {
                     let set = self.set_of(seen.station);
                     let distance = geometry.distance(seen.station, seen.target);
-                    let first = camera_names().len() + set * RANGE_TERMS.len();
-                    Row { index, first, values: range_row(&found.sets[set], distance, at) }
+                    (camera_names().len() + set * RANGE_TERMS.len(), range_row(&found.sets[set], distance, at))
                 }
-            });
-        }
-        let mut scored = self.scored(&solved.solution, &rows, &CAMERA_GROUPS, variance_factor(groups, false));
+            })
+        };
+        let mut scored = self.scored(&solved.solution, row, &CAMERA_GROUPS, variance_factor(groups, false));
         if (0..self.network.sightings.len()).any(|index| self.uses_range(index)) {
-            scored.extend(self.scored(&solved.solution, &rows, &RANGE_GROUPS, variance_factor(groups, true)));
+            scored.extend(self.scored(&solved.solution, row, &RANGE_GROUPS, variance_factor(groups, true)));
         }
         Ok(scored)
     }
 
     /// Scores of the range terms that a second step does not estimate. The references follow `first` other values.
     pub(crate) fn range_scores(&self, solution: &Solution, reference: &Reference, first: usize) -> Vec<TermScore> {
-        let rows =
-            reference.sightings.iter().zip(&reference.values).enumerate().filter_map(|(row, (&index, &value))| {
-                let seen = &self.network.sightings[index];
-                let set = self.set_of(seen.station);
-                let at = about_principal_point(&self.calibration, reference.pixels[row]?);
-                let values = range_row(&self.calibration.sets[set], value, at);
-                Some(Row { index: first + row, first: camera_names().len() + set * RANGE_TERMS.len(), values })
-            });
+        let row = |index: usize| {
+            let row = index.checked_sub(first)?;
+            let (&sighting, value) = (reference.sightings.get(row)?, reference.values[row]);
+            let set = self.set_of(self.network.sightings[sighting].station);
+            let at = about_principal_point(&self.calibration, reference.pixels[row]?);
+            let values = range_row(&self.calibration.sets[set], value, at);
+            Some((camera_names().len() + set * RANGE_TERMS.len(), values))
+        };
         let factor = solution.sigma0().map_or(1.0, |sigma0| sigma0 * sigma0);
-        self.scored(solution, &rows.collect::<Vec<_>>(), &RANGE_GROUPS, factor)
+        self.scored(solution, row, &RANGE_GROUPS, factor)
     }
 
-    fn scored(&self, solution: &Solution, rows: &[Row], groups: &[&[&'static str]], factor: f64) -> Vec<TermScore> {
+    /// `row` gives the derivatives of a value by the terms of one block, and where the block begins.
+    fn scored(
+        &self,
+        solution: &Solution,
+        row: impl Fn(usize) -> Option<(usize, Vec<f64>)>,
+        groups: &[&[&'static str]],
+        factor: f64,
+    ) -> Vec<TermScore> {
         let sets = (0..self.calibration.sets.len()).flat_map(|_| RANGE_TERMS);
         let names: Vec<&str> = camera_names().into_iter().chain(sets).collect();
         let wanted: BTreeSet<&str> = groups.iter().flat_map(|group| group.iter().copied()).collect();
         let is_left_out = |column: &usize| wanted.contains(names[*column]) && self.leaves_out(names[*column]);
         let columns: Vec<usize> = (0..names.len()).filter(is_left_out).collect();
-        let mut derivatives = DMatrix::zeros(solution.observations(), columns.len());
-        for row in rows {
-            for (place, column) in columns.iter().enumerate() {
-                if let Some(value) = column.checked_sub(row.first).and_then(|index| row.values.get(index)) {
-                    derivatives[(row.index, place)] = *value;
-                }
+        let left_out = solution.left_out(columns.len(), |index, out| {
+            let Some((first, values)) = row(index) else { return };
+            for (out, column) in out.iter_mut().zip(&columns) {
+                *out = column.checked_sub(first).and_then(|at| values.get(at)).copied().unwrap_or(0.0);
             }
-        }
-        let Ok(left_out) = solution.left_out(&derivatives) else { return Vec::new() };
+        });
         let score = |group: &&[&'static str]| {
             let terms: Vec<&str> = group.iter().copied().filter(|name| self.leaves_out(name)).collect();
             let chosen: Vec<usize> = (0..columns.len()).filter(|&i| terms.contains(&names[columns[i]])).collect();

@@ -33,6 +33,15 @@ pub(crate) struct Approximation {
     cost: f64,
 }
 
+/// Distinct approximate poses `world_from_camera` in closed form, the one that fits best first: from three ranges or more,
+/// and from triples of image points. Empty where no triple has a solution that all targets can be seen from.
+///
+/// They are as good as their three points, and gross errors may have part in all of them: to be looked at, not to be
+/// believed. See [`resect`](crate::resect).
+pub fn approximate_poses(camera: &Camera, targets: &[TargetObservation]) -> Vec<Isometry3<f64>> {
+    approximations(camera, targets).into_iter().map(|found| found.world_from_camera).collect()
+}
+
 /// Distinct approximate poses, the one that fits best first.
 pub(crate) fn approximations(camera: &Camera, targets: &[TargetObservation]) -> Vec<Approximation> {
     let from_ranges = from_ranges(camera, targets).map(|pose| (pose, Start::Ranges));

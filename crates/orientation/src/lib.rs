@@ -8,6 +8,7 @@ mod resection;
 mod target;
 mod three_points;
 
+pub use approximation::approximate_poses;
 pub use error::{Error, Result};
 pub use resection::{Resection, ResectionOptions, Start, TargetResidual, resect};
 pub use target::{ObservedRange, TargetObservation};

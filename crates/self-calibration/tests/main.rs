@@ -47,6 +47,7 @@ mod round;
 mod sample_noise;
 mod support;
 mod surfaces;
+mod term_scores;
 mod trends;
 mod unknown_planes;
 mod weak_networks;

@@ -3,7 +3,7 @@
 use adjust::SolveOptions;
 use icp_registration::absolute_orientation;
 use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
-use orientation::{ResectionOptions, TargetObservation, resect};
+use orientation::{ResectionOptions, TargetObservation, approximate_poses, resect};
 
 use super::misfit::{median, modelled_pixel};
 
@@ -13,6 +13,9 @@ pub(crate) const NEEDED: usize = 3;
 const OUTLYING: f64 = 4.0;
 /// Share of the image's diagonal that a nominal lens misses most image points by at most: 4.5 pixels of 176 x 144.
 const GOOD_SHARE: f64 = 0.02;
+/// Approximate poses that miss the median image point by more times this share are of three points that do not belong to
+/// each other: least squares would not find back from there.
+const HOPELESS: f64 = 10.0;
 /// Targets of a sample, and most samples of one kind.
 const SAMPLE: usize = 4;
 const MOST_SAMPLES: usize = 4;
@@ -54,10 +57,16 @@ pub(crate) fn robust_resection(
     camera: &camera_model::Camera,
     targets: &[TargetObservation],
 ) -> std::result::Result<Isometry3<f64>, String> {
-    let all = trimmed_resection(camera, targets.to_vec(), None);
-    let diagonal = (camera.format.width as f64).hypot(camera.format.height as f64);
-    let good = |pose: &Isometry3<f64>| median(distances(camera, targets, pose)) <= GOOD_SHARE * diagonal;
-    if targets.len() <= SAMPLE + 1 || all.as_ref().is_ok_and(good) {
+    let limit = GOOD_SHARE * (camera.format.width as f64).hypot(camera.format.height as f64);
+    let typical = |pose: &Isometry3<f64>| median(distances(camera, targets, pose));
+    let is_small = targets.len() <= SAMPLE + 1;
+    let from_all = approximate_poses(camera, targets);
+    let all = if is_small || from_all.iter().any(|pose| typical(pose) <= HOPELESS * limit) {
+        trimmed_resection(camera, targets.to_vec(), None)
+    } else {
+        Err("no three of its image points fit the others".to_owned())
+    };
+    if is_small || all.as_ref().is_ok_and(|pose| typical(pose) <= limit) {
         return all;
     }
     let n = targets.len();
@@ -68,12 +77,15 @@ pub(crate) fn robust_resection(
     let distinct = samples.filter(|sample| (1..SAMPLE).all(|i| !sample[..i].contains(&sample[i])));
     let candidates = distinct.filter_map(|sample| {
         let chosen: Vec<TargetObservation> = sample.iter().map(|&index| targets[index]).collect();
-        let found = resect(camera, &chosen, &from(None)).ok()?.world_from_camera;
-        Some((median(distances(camera, targets, &found)), found))
+        let found = approximate_poses(camera, &chosen).into_iter();
+        found.map(|pose| (typical(&pose), pose)).min_by(|a, b| a.0.total_cmp(&b.0))
     });
-    let given = all.as_ref().ok().map(|pose| (median(distances(camera, targets, pose)), *pose));
-    let Some((typical, pose)) = candidates.chain(given).min_by(|a, b| a.0.total_cmp(&b.0)) else { return all };
-    let near = distances(camera, targets, &pose).into_iter().map(|distance| distance <= OUTLYING * typical);
+    let given = all.as_ref().ok().map(|pose| (typical(pose), *pose));
+    let Some((miss, pose)) = candidates.chain(given).min_by(|a, b| a.0.total_cmp(&b.0)) else { return all };
+    if miss > HOPELESS * limit {
+        return all;
+    }
+    let near = distances(camera, targets, &pose).into_iter().map(|distance| distance <= OUTLYING * miss);
     let agreeing = targets.iter().zip(near).filter(|(_, near)| *near).map(|(target, _)| *target).collect();
     Ok(trimmed_resection(camera, agreeing, None).unwrap_or(pose))
 }

@@ -133,7 +133,7 @@ fn solve(problem: &Problem, start: &[f64]) -> Result<(f64, f64, f64, usize), adj
     let block = adjustment.add_block(ParameterBlock::euclidean(start).named("b"));
     let group = adjustment.add_group("response");
     for row in &problem.data {
-        let observation = Differentiated::<9, 1, _>::new(&adjustment, [block], Row { problem, row })?;
+        let observation = Differentiated::new(&adjustment, [block], Row { problem, row })?;
         adjustment.add_observation(group, observation, &Covariance::from_sigma(1.0))?;
     }
     let solution = adjustment.solve(&SolveOptions::default())?;

@@ -108,8 +108,9 @@ impl TapeMemory {
             if tape.entries.lacks() + tape.further.lacks() == 0 {
                 break (ends, entries, further);
             }
-            self.entries.resize(2 * entries, Entry::default());
-            self.further.resize(2 * further, (0, 0.0));
+            // Never less than before: observations of another kind may want it.
+            self.entries.resize(self.entries.len().max(2 * entries), Entry::default());
+            self.further.resize(self.further.len().max(2 * further), (0, 0.0));
         };
         let wanted = (variables + entries) * D;
         if self.derivatives.len() < wanted {
@@ -165,15 +166,15 @@ fn read_backwards<const D: usize, const HURRY: bool>(
     for &Entry { from: [first, second], slopes } in entries.iter().rev() {
         let Some((own, before)) = rest.split_last_mut() else { break };
         (0..2).for_each(|k| doubt[k] += slopes[k] * 0.0);
-        let wanted = HURRY || own.iter().any(|derivative| *derivative != 0.0);
+        let has_share = HURRY || own.iter().any(|derivative| *derivative != 0.0);
         if first == SEVERAL {
             let (others, several) = further.split_at(further.len().saturating_sub(second as usize));
             further = others;
-            for &(number, slope) in several.iter().filter(|_| wanted) {
+            for &(number, slope) in several.iter().filter(|_| has_share) {
                 doubt[0] += slope * 0.0;
                 add(&mut before[number as usize], slope, own);
             }
-        } else if wanted {
+        } else if has_share {
             add(&mut before[first as usize], slopes[0], own);
             add(&mut before[second as usize], slopes[1], own);
         }
@@ -234,10 +235,10 @@ impl<'t> Real for Dual<'t> {
     #[inline(always)]
     fn function_of<const K: usize>(numbers: [Self; K], value: f64, slopes: [f64; K]) -> Self {
         let Some(tape) = numbers.iter().find_map(|number| number.tape) else { return Self::from(value) };
-        // Of a constant, the slope is zero and the number the first variable.
+        // Constants have the number of the first variable, and no share in the result.
         tape.further.push::<K>(std::array::from_fn(
             #[inline(always)]
-            |k| (numbers[k].number, slopes[k] * numbers[k].slope),
+            |k| (numbers[k].number, numbers[k].tape.map_or(0.0, |_| slopes[k] * numbers[k].slope)),
         ));
         let number = tape.note(Entry { from: [SEVERAL, K as u32], slopes: [0.0; 2] });
         Self { value, slope: 1.0, number, tape: Some(tape) }

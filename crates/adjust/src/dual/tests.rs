@@ -96,6 +96,8 @@ fn a_function_of_several_numbers_has_the_slopes_given() {
         [Dual::function_of(numbers, 240.0, [120.0, 80.0, 30.0, 48.0]), Dual::function_of([Dual::from(1.0)], 1.0, [1.0])]
     });
     assert_eq!((values, slopes), ([240.0, 1.0], vec![[150.0, 0.0], [140.0, 0.0]]));
+    let (_, slopes) = derivatives(&[2.0], |x| [Dual::function_of([x[0], Dual::from(0.0)], 2.0, [1.0, f64::INFINITY])]);
+    assert_eq!(slopes, [[1.0]]);
 }
 
 #[test]

@@ -275,7 +275,9 @@ impl<const D: usize, F: ResidualFunction<D>> Observation for Differentiated<D, F
             |derivatives| {
                 // A is the Jacobian of the model, which v has with the other sign.
                 for (index, row) in data.chunks_exact_mut((*width).max(1)).enumerate().take(D) {
-                    row.iter_mut().zip(derivatives).for_each(|(out, column)| *out = -column[index]);
+                    for (out, column) in row.iter_mut().zip(derivatives) {
+                        *out = -column[index];
+                    }
                 }
             },
         )?;

@@ -59,7 +59,9 @@ impl<'m, E: Copy + Default> List<'m, E> {
         let index = self.count.get();
         self.count.set(index + K);
         if let Some(places) = self.places.get(index..).and_then(|rest| rest.first_chunk::<K>()) {
-            places.iter().zip(elements).for_each(|(place, element)| place.set(element));
+            for k in 0..K {
+                places[k].set(elements[k]);
+            }
         }
         index
     }
@@ -165,7 +167,8 @@ fn read_backwards<const D: usize, const HURRY: bool>(
     let mut doubt = [0.0; 2];
     for &Entry { from: [first, second], slopes } in entries.iter().rev() {
         let Some((own, before)) = rest.split_last_mut() else { break };
-        (0..2).for_each(|k| doubt[k] += slopes[k] * 0.0);
+        doubt[0] += slopes[0] * 0.0;
+        doubt[1] += slopes[1] * 0.0;
         let has_share = HURRY || own.iter().any(|derivative| *derivative != 0.0);
         if first == SEVERAL {
             let (others, several) = further.split_at(further.len().saturating_sub(second as usize));

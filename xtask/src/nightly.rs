@@ -1,5 +1,5 @@
 //! `cargo xtask nightly [MINUTES]`: what takes too long or needs chance: damaged files with a fresh seed, property tests
-//! with fresh cases, the long statistics, and `cargo deny` where it is installed.
+//! with fresh cases, `adjust` without its default features, the long statistics, and `cargo deny` where it is installed.
 
 use std::process::Command;
 use std::time::{SystemTime, UNIX_EPOCH};
@@ -25,6 +25,7 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome {
     let outcomes = [
         fuzz::run(&fuzz::Arguments { seconds: 60 * arguments.minutes, seed: Some(seed), target: None }),
         cargo(&["test", "--workspace", "--all-features"], &[("PROPTEST_RNG_SEED", &seed.to_string())]),
+        cargo(&["test", "-p", "adjust", "--no-default-features"], &[]),
         verify::run(&verify::Arguments::all()),
         deny(),
     ];

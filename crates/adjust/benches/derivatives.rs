@@ -1,4 +1,4 @@
-//! What derivatives by dual numbers cost, in a self-calibration and in a small fit, beside Jacobians derived by hand.
+//! What derivatives by dual numbers cost beside Jacobians derived by hand: alone, in a self-calibration and in a small fit.
 #![allow(missing_docs, clippy::unwrap_used)]
 
 #[path = "../tests/common/differentiated_camera.rs"]
@@ -7,12 +7,17 @@ mod differentiated_camera;
 #[allow(dead_code)]
 mod range_camera;
 
+use std::hint::black_box;
+use std::sync::Mutex;
+use std::time::{Duration, Instant};
+
 use adjust::{
-    Adjustment, Covariance, Differentiated, EvaluationFailure, FunctionObservation, ParameterBlock, Parameters, Real,
-    ResidualFunction, SolveOptions,
+    Adjustment, BlockId, Covariance, Differentiated, EvaluationFailure, FunctionObservation, Jacobians, Observation,
+    ParameterBlock, Parameters, Real, ResidualFunction, SolveOptions,
 };
 use criterion::{Criterion, criterion_group, criterion_main};
-use range_camera::{LABORATORY, range_camera_network};
+use differentiated_camera::Seen;
+use range_camera::{LABORATORY, RangeCameraNetwork, SIGMAS, range_camera_network};
 
 /// Two decaying sums: `v = y − b0 e^(−b1 t) − b2 e^(−b3 t)`.
 struct Decay {
@@ -49,11 +54,77 @@ fn decay(by_hand: bool) -> Adjustment<'static> {
                 };
             a.add_observation(group, FunctionObservation::new([block], 1, function), &covariance).unwrap();
         } else {
-            let observation = Differentiated::<4, 1, _>::new(&a, [block], Decay { t, y }).unwrap();
+            let observation = Differentiated::new(&a, [block], Decay { t, y }).unwrap();
             a.add_observation(group, observation, &covariance).unwrap();
         }
     }
     a
+}
+
+/// How often each Jacobian is computed: the clock takes as long as some of them.
+const REPEATED: u32 = 100;
+
+/// An observation that measures how long its Jacobian takes.
+struct Timed<'s, O> {
+    inner: O,
+    spent: &'s Mutex<(Duration, u32)>,
+}
+
+impl<O: Observation> Observation for Timed<'_, O> {
+    fn dimension(&self) -> usize {
+        self.inner.dimension()
+    }
+
+    fn blocks(&self) -> &[BlockId] {
+        self.inner.blocks()
+    }
+
+    fn evaluate(
+        &self,
+        parameters: &[&[f64]],
+        residual: &mut [f64],
+        jacobians: Option<&mut Jacobians<'_>>,
+    ) -> Result<(), EvaluationFailure> {
+        let Some(jacobians) = jacobians else { return self.inner.evaluate(parameters, residual, None) };
+        let start = Instant::now();
+        for _ in 0..REPEATED {
+            self.inner.evaluate(black_box(parameters), residual, Some(jacobians))?;
+        }
+        let mut spent = self.spent.lock().unwrap();
+        *spent = (spent.0 + start.elapsed(), spent.1 + REPEATED);
+        Ok(())
+    }
+}
+
+/// The residual and the Jacobian of one sighting, as the adjustment asks for them: 3 values, 26 parameters.
+fn alone(criterion: &mut Criterion, pool: &rayon::ThreadPool, network: &RangeCameraNetwork) {
+    let mut group = criterion.benchmark_group("residual and Jacobian of a sighting, 3 values, 26 parameters");
+    group.sample_size(20);
+    for (name, by_hand) in [("by hand", true), ("dual numbers", false)] {
+        let spent = Mutex::new((Duration::ZERO, 0));
+        let mut a = differentiated_camera::differentiated_blocks(network);
+        let sightings = a.add_group("sightings");
+        for (_, _, sighting) in &network.sightings {
+            let (observed, at, blocks) = (sighting.observed, sighting.at, sighting.blocks);
+            let covariance = Covariance::from_sigmas(&SIGMAS);
+            if by_hand {
+                let inner = range_camera::Sighting { blocks, observed, at, dimension: 3 };
+                a.add_observation(sightings, Timed { inner, spent: &spent }, &covariance).unwrap();
+            } else {
+                let inner = Differentiated::new(&a, blocks, Seen { observed, at }).unwrap();
+                a.add_observation(sightings, Timed { inner, spent: &spent }, &covariance).unwrap();
+            }
+        }
+        group.bench_function(name, |b| {
+            b.iter_custom(|iterations| {
+                *spent.lock().unwrap() = (Duration::ZERO, 0);
+                pool.install(|| a.solve(&SolveOptions::default()).unwrap());
+                let (time, evaluations) = *spent.lock().unwrap();
+                time.mul_f64(iterations as f64 / f64::from(evaluations))
+            });
+        });
+    }
+    group.finish();
 }
 
 fn derivatives(criterion: &mut Criterion) {
@@ -61,6 +132,7 @@ fn derivatives(criterion: &mut Criterion) {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
     let options = SolveOptions::default();
     let network = range_camera_network(&LABORATORY).free();
+    alone(criterion, &pool, &network);
     let dual = differentiated_camera::differentiated(&network);
     let mut compare = |name: &str, hand: &Adjustment<'_>, dual: &Adjustment<'_>| {
         let mut group = criterion.benchmark_group(name);

@@ -1,3 +1,4 @@
+use crate::dual::TapeMemory;
 use crate::layout::Named;
 use crate::{Error, EvaluationFailure, Jacobians, Observation, ParameterBlock, Result};
 
@@ -94,7 +95,8 @@ fn analytic(observation: &dyn Observation, blocks: &[ParameterBlock]) -> Result<
     }
     let dimension = observation.dimension();
     let mut data = vec![0.0; dimension * width];
-    let mut jacobians = Jacobians { data: &mut data, named: &named, width, dimension, misused: false };
+    let (mut tape, named) = (TapeMemory::default(), &named);
+    let mut jacobians = Jacobians { data: &mut data, named, width, dimension, misused: false, tape: &mut tape };
     let mut residual = vec![0.0; dimension];
     observation.evaluate(&parameters, &mut residual, Some(&mut jacobians)).map_err(|failure| fail(&failure))?;
     if jacobians.misused {

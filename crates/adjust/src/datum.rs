@@ -33,7 +33,7 @@ use crate::{Adjustment, Error, Result};
 /// let points = start.map(|point| a.add_block(ParameterBlock::euclidean(point)));
 /// let tape = a.add_group("tape");
 /// for (first, second, metres) in [(0, 1, 3.0), (0, 2, 4.0), (1, 2, 5.0)] {
-///     let distance = Differentiated::<6, 1, _>::new(&a, [points[first], points[second]], Distance(metres))?;
+///     let distance = Differentiated::new(&a, [points[first], points[second]], Distance(metres))?;
 ///     a.add_observation(tape, distance, &Covariance::from_sigma(0.001))?;
 /// }
 /// a.add_inner_constraints(&points, DatumDefect::Six)?;

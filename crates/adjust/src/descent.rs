@@ -78,9 +78,11 @@ impl Iteration<'_, '_> {
 
     fn lower_damping(&mut self, gain: f64, merit: f64, expected: f64) {
         // Nielsen's rule [Nielsen1999]. A model that did what was expected, measured by what is left of the objective
-        // as well (far from the solution nearly all of it goes, whatever the step), needs hardly any damping.
+        // as well (far from the solution nearly all of it goes, whatever the step), needs hardly any damping. Not so where
+        // less was just refused: short steps always do what is expected, and the same would be refused again and again.
         let miss = (gain - 1.0).abs() * expected;
-        let least = if miss <= EXPECTED * expected.min(merit - expected) { 0.01 } else { 1.0 / 3.0 };
+        let as_expected = miss <= EXPECTED * expected.min(merit - expected);
+        let least = if as_expected && self.growth <= 2.0 { 0.01 } else { 1.0 / 3.0 };
         self.damping = (self.damping * (1.0 - (2.0 * gain - 1.0).powi(3)).max(least)).max(1e-30);
         (self.growth, self.last_gain) = (2.0, gain);
     }

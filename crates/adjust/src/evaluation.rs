@@ -1,5 +1,6 @@
 //! Evaluation of single observations into flat memory.
 
+use crate::dual::TapeMemory;
 use crate::layout::{HELD, Layout, Place};
 use crate::{Error, Jacobians, Observation};
 
@@ -59,11 +60,12 @@ pub(crate) struct Scratch<'v> {
     want: Want,
     parameters: Vec<&'v [f64]>,
     full: Vec<f64>,
+    tape: TapeMemory,
 }
 
 impl<'v> Scratch<'v> {
     pub(crate) fn new(layout: &'v Layout, values: &'v [f64], want: Want) -> Self {
-        Self { layout, values, want, parameters: Vec::with_capacity(8), full: Vec::new() }
+        Self { layout, values, want, parameters: Vec::with_capacity(8), full: Vec::new(), tape: TapeMemory::default() }
     }
 
     /// Writes the residual and, where wanted, the compact Jacobian.
@@ -90,7 +92,8 @@ impl<'v> Scratch<'v> {
             &mut self.full[..place.dimension * place.full]
         };
         data.fill(0.0);
-        let mut jacobians = Jacobians { data, named, width: place.full, dimension: place.dimension, misused: false };
+        let (width, dimension, tape) = (place.full, place.dimension, &mut self.tape);
+        let mut jacobians = Jacobians { data, named, width, dimension, misused: false, tape };
         let done = observation.evaluate(&self.parameters, residual, Some(&mut jacobians));
         done.map_err(|failure| Failure::model(failure.to_string()))?;
         if jacobians.misused {

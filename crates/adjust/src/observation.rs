@@ -1,5 +1,6 @@
 use nalgebra::{Dim, Matrix, RawStorage};
 
+use crate::dual::TapeMemory;
 use crate::layout::Named;
 use crate::{BlockId, EvaluationFailure};
 
@@ -38,6 +39,7 @@ pub struct Jacobians<'a> {
     pub(crate) width: usize,
     pub(crate) dimension: usize,
     pub(crate) misused: bool,
+    pub(crate) tape: &'a mut TapeMemory,
 }
 
 impl Jacobians<'_> {

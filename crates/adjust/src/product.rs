@@ -68,8 +68,16 @@ fn strip<const R: usize>(
 
 /// Runs a piece of work, with everything in it that is inlined, compiled for the widest registers that the machine has.
 /// Products and sums stay separate operations, so that all machines give the same bits.
+#[cfg(feature = "faer")]
 pub(crate) fn with_wide_registers<R>(work: impl FnOnce() -> R) -> R {
     pulp::Arch::new().dispatch(work)
+}
+
+/// The same bits with the registers that every machine has.
+#[cfg(not(feature = "faer"))]
+#[inline]
+pub(crate) fn with_wide_registers<R>(work: impl FnOnce() -> R) -> R {
+    work()
 }
 
 #[cfg(test)]

@@ -277,6 +277,7 @@ fn the_same_input_gives_the_same_bits() {
     };
     let first = run();
     assert_eq!(first, run());
+    #[cfg(feature = "faer")]
     faer::set_global_parallelism(faer::Par::rayon(4));
     assert_eq!(first, run());
 }

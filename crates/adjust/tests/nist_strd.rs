@@ -133,7 +133,7 @@ fn solve(problem: &Problem, start: &[f64]) -> Result<(f64, f64, f64, usize), adj
     let block = adjustment.add_block(ParameterBlock::euclidean(start).named("b"));
     let group = adjustment.add_group("response");
     for row in &problem.data {
-        let observation = Differentiated::<9, 1, _>::new(&adjustment, [block], Row { problem, row })?;
+        let observation = Differentiated::new(&adjustment, [block], Row { problem, row })?;
         adjustment.add_observation(group, observation, &Covariance::from_sigma(1.0))?;
     }
     let solution = adjustment.solve(&SolveOptions::default())?;
@@ -198,4 +198,16 @@ fn certified_values_are_reached_from_both_starts() {
     let all = problems.len() == 27;
     assert!(parameters > if all { 10.4 } else { 10.2 }, "{parameters}");
     assert!(deviations > if all { 10.1 } else { 9.9 }, "{deviations}");
+}
+
+#[test]
+fn the_last_digit_of_a_start_does_not_decide() {
+    // A narrow curved valley, on which damping that falls too fast goes round in circles: 12,000 iterations.
+    for problem in hard::problems().iter().filter(|problem| problem.name == "MGH10") {
+        for last in 0..8 {
+            let start: Vec<f64> = problem.starts[0].iter().map(|b| b * (1.0 + f64::from(last) * 1e-13)).collect();
+            let (parameters, ..) = solve(problem, &start).unwrap();
+            assert!(parameters > 9.0, "{last}: {parameters} digits");
+        }
+    }
 }

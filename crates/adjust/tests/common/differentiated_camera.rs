@@ -5,7 +5,7 @@ use adjust::{
     ResidualFunction, RigidPose,
 };
 
-use crate::range_camera::{NAMES, RangeCameraNetwork, SIGMAS, WIDTH};
+use crate::range_camera::{NAMES, RangeCameraNetwork, SIGMAS};
 
 /// Longest wave of the periodic errors, metre.
 const WAVE: f64 = 7.5;
@@ -39,8 +39,8 @@ impl ResidualFunction<3> for Seen {
     }
 }
 
-/// The same network with the same start values, free on its targets, with derivatives by dual numbers.
-pub fn differentiated(network: &RangeCameraNetwork) -> Adjustment<'static> {
+/// The blocks of the network at the same start values, free on the targets, without observations.
+pub fn differentiated_blocks<'a>(network: &RangeCameraNetwork) -> Adjustment<'a> {
     let mut a = Adjustment::new();
     let start = |id| network.adjustment.values(id).unwrap().to_vec();
     a.add_block(ParameterBlock::euclidean(start(network.parameters)).with_parameter_names(NAMES));
@@ -50,12 +50,18 @@ pub fn differentiated(network: &RangeCameraNetwork) -> Adjustment<'static> {
     for &target in &network.targets {
         a.add_block(ParameterBlock::euclidean(start(target)));
     }
+    a.add_inner_constraints(&network.targets, DatumDefect::Six).unwrap();
+    a
+}
+
+/// The same network with derivatives by dual numbers.
+pub fn differentiated(network: &RangeCameraNetwork) -> Adjustment<'static> {
+    let mut a = differentiated_blocks(network);
     let group = a.add_group("sightings");
     for (_, _, sighting) in &network.sightings {
         let seen = Seen { observed: sighting.observed, at: sighting.at };
-        let observation = Differentiated::<WIDTH, 3, _>::new(&a, sighting.blocks, seen).unwrap();
+        let observation = Differentiated::new(&a, sighting.blocks, seen).unwrap();
         a.add_observation(group, observation, &Covariance::from_sigmas(&SIGMAS)).unwrap();
     }
-    a.add_inner_constraints(&network.targets, DatumDefect::Six).unwrap();
     a
 }

@@ -7,8 +7,8 @@
 //! ```
 #![allow(clippy::print_stdout)]
 
-/// The golden ratio and the roots of two and three: their multiples fill an interval evenly and in no order.
-const SPREAD: [f64; 3] = [1.618_034, 1.414_214, 1.732_051];
+/// The golden ratio and the roots of three and seven: their multiples fill an interval evenly and in no order.
+const SPREAD: [f64; 3] = [1.618_034, 1.732_051, 2.645_751];
 
 fn main() {
     let count = std::env::args().nth(1).and_then(|count| count.parse::<u32>().ok()).unwrap_or(1000);

@@ -32,6 +32,7 @@ mod normals;
 mod organised;
 mod organised_cloud;
 mod organised_input;
+mod organised_invalid;
 mod organised_real;
 mod parts;
 mod parts_from_outside;

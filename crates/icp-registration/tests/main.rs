@@ -17,6 +17,7 @@ mod coarse_amplitude;
 mod coarse_input;
 mod coarse_real;
 mod coarse_scenes;
+mod coincident;
 mod common;
 mod degeneracy;
 mod depth_frames;

@@ -4,7 +4,8 @@
 //!
 //! Options: `folder` (of the real sequence), `simulated=off`, `seed` (of the simulated noise), `keyframe_overlap`, `max_keyframes`, `levels`,
 //! `fusion=off`, `step_tolerance_m`, `noise_fraction`, `max_iterations`, `max_motion_sigma_m`, `every=1` (a line a frame);
-//! of the real sequence `first` (frame) and `backwards=1`.
+//! of the real sequence `first` (frame), `count` and `backwards=1`; `invalid=scattered` or `clumps`: a fifth of all pixels
+//! is lost.
 #![allow(
     missing_docs,
     clippy::unwrap_used,
@@ -26,6 +27,7 @@ use std::str::FromStr;
 use std::sync::Arc;
 
 use common::Pinhole;
+use common::invalid::{Loss, lose};
 use cpu_clock::cpu_seconds;
 use icp_registration::{Fusion, Projection, TrackedPose, Tracker, TrackerOptions, TrackingState};
 use nalgebra::{Isometry3, Matrix3, Matrix4, Rotation3, UnitQuaternion};
@@ -51,6 +53,14 @@ fn options() -> TrackerOptions {
     options
 }
 
+fn loss() -> Loss {
+    match argument::<String>("invalid").as_deref() {
+        Some("scattered") => Loss::Scattered,
+        Some("clumps") => Loss::Clumps,
+        _ => Loss::None,
+    }
+}
+
 /// Tracks frame by frame; also the CPU time of each, milliseconds.
 fn track(
     projection: &Arc<Projection>,
@@ -61,7 +71,8 @@ fn track(
     let mut tracker = Tracker::new(projection, options()).unwrap();
     let mut times = Vec::new();
     for k in 0..count {
-        let (points, sigma) = frame(k);
+        let (mut points, sigma) = frame(k);
+        lose(&mut points, projection.width(), loss(), 0.2, k as u64);
         let start = cpu_seconds();
         let pose = tracker.track(seconds(k), &points, sigma.as_deref(), None).unwrap();
         times.push(1e3 * (cpu_seconds() - start));
@@ -168,6 +179,7 @@ fn real(folder: &Path) {
         names.reverse();
     }
     names.drain(..argument::<usize>("first").unwrap_or(0).min(names.len()));
+    names.truncate(argument("count").unwrap_or(names.len()));
     if names.is_empty() {
         println!("no frames in {}", folder.display());
         return;

@@ -5,6 +5,10 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use crate::error::{Error, Result};
 use crate::neighbours::{check_points, is_usable};
 
+/// Points at the origin that a cloud may hold by chance, and the share of them.
+const MOST_AT_ORIGIN: usize = 100;
+const LARGEST_SHARE_AT_ORIGIN: f64 = 0.01;
+
 /// Points in one frame, metre.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Cloud {
@@ -26,15 +30,17 @@ impl Cloud {
         Self { points, ..Self::default() }
     }
 
-    /// A cloud from the pixels of a frame: those whose point is not finite are left out, together with their normal
-    /// and sigma.
+    /// A cloud from the pixels of a frame, in the camera's frame: those whose point is not finite, or lies in the camera (as
+    /// zeros written for no range), are left out, together with their normal and sigma.
     ///
     /// # Errors
     /// [`Error::LengthMismatch`] where the planes differ in length.
     pub fn from_frame(points: &[[f64; 3]], normals: Option<&[Vector3<f64>]>, sigma: Option<&[f32]>) -> Result<Self> {
         check_length("normals", points.len(), normals.map(<[_]>::len))?;
         check_length("sigma", points.len(), sigma.map(<[_]>::len))?;
-        let keep: Vec<usize> = (0..points.len()).filter(|&i| is_usable(&Point3::from(points[i]))).collect();
+        let keep: Vec<usize> = (0..points.len())
+            .filter(|&i| is_usable(&Point3::from(points[i])) && points[i].iter().any(|c| c.abs() > 0.0))
+            .collect();
         Ok(Self {
             points: keep.iter().map(|&i| Point3::from(points[i])).collect(),
             normals: normals.map(|n| keep.iter().map(|&i| n[i]).collect()),
@@ -63,13 +69,17 @@ impl Cloud {
         }
     }
 
-    /// Refuses an empty cloud, points that are not finite, planes of another length and sigmas that are not positive
-    /// (NaN passes: unknown).
+    /// Refuses an empty cloud, points that are not finite or, many of them, not measured, planes of another length and sigmas
+    /// that are not positive (NaN passes: unknown).
     pub(crate) fn validate(&self, what: &'static str) -> Result<()> {
         if self.is_empty() {
             return Err(Error::Empty { what });
         }
         check_points(what, &self.points)?;
+        let (found, of) = (self.points.iter().filter(|p| **p == Point3::origin()).count(), self.len());
+        if found > MOST_AT_ORIGIN && found as f64 > LARGEST_SHARE_AT_ORIGIN * of as f64 {
+            return Err(Error::Unmeasured { what, found, of });
+        }
         check_length("normals", self.len(), self.normals.as_ref().map(Vec::len))?;
         check_length("sigma", self.len(), self.sigma.as_ref().map(Vec::len))?;
         check_length("intensity", self.len(), self.intensity.as_ref().map(Vec::len))?;

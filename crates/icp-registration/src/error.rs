@@ -18,6 +18,18 @@ pub enum Error {
         /// Its index, counted from 0.
         index: usize,
     },
+    /// Many points lie at the origin, where cameras write points that they did not measure.
+    #[error(
+        "{what}: {found} of {of} points are (0, 0, 0), which cameras write where they measured nothing; leave them out"
+    )]
+    Unmeasured {
+        /// Which input.
+        what: &'static str,
+        /// Points at the origin.
+        found: usize,
+        /// All points.
+        of: usize,
+    },
     /// A weight or sigma is negative (or zero where that has no meaning).
     #[error("{what}: entry {index} is {value}, which must be positive")]
     NotPositive {

@@ -4,6 +4,7 @@ mod absolute_orientation;
 mod awake;
 mod cloud;
 mod coarse;
+mod coincident;
 mod eigen;
 mod error;
 mod icp;

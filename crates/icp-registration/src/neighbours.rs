@@ -1,13 +1,15 @@
 //! Nearest neighbours: the one place that speaks to the k-d tree.
 //!
 //! The tree answers an empty set or a NaN query with item 0 at infinity, takes squared radii, and breaks ties by its
-//! own layout. This wrapper refuses the first, hides the second and gives ties to the lowest index.
+//! own layout. This wrapper refuses the first, hides the second and gives ties to the lowest index. Points that coincide
+//! are one item of the tree, which cannot divide them and would look at all of them in each answer.
 
 use std::num::NonZeroUsize;
 
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use nalgebra::Point3;
 
+use crate::coincident::Places;
 use crate::error::{Error, Result};
 
 /// Coordinates beyond this would overflow when squared and summed.
@@ -29,6 +31,7 @@ pub struct Neighbour {
 pub struct NeighbourTree {
     tree: ImmutableKdTree<f64, 3>,
     len: usize,
+    places: Places,
 }
 
 impl NeighbourTree {
@@ -41,9 +44,10 @@ impl NeighbourTree {
             return Err(Error::Empty { what: "the point set of the search tree" });
         }
         check_points("point of the search tree", points)?;
-        let coordinates: Vec<[f64; 3]> = points.iter().map(|p| [p.x, p.y, p.z]).collect();
+        let places = Places::new(points);
+        let coordinates: Vec<[f64; 3]> = places.firsts().map(|k| points[k].coords.into()).collect();
         let tree = ImmutableKdTree::new_from_slice(&coordinates).map_err(|e| Error::Tree(e.to_string()))?;
-        Ok(Self { tree, len: points.len() })
+        Ok(Self { tree, len: points.len(), places })
     }
 
     /// Number of points.
@@ -87,9 +91,10 @@ impl NeighbourTree {
             .nearest_n::<SquaredEuclidean<f64>>(count)
             .execute()
             .iter()
-            .map(|item| Neighbour { index: item.item as usize, distance_m: item.distance.sqrt() })
+            .flat_map(|item| self.places.points(item.item).take(count.get()).map(|k| neighbour(k, item.distance)))
             .collect();
         sort(&mut found);
+        found.truncate(count.get());
         Ok(found)
     }
 
@@ -108,7 +113,7 @@ impl NeighbourTree {
             .within::<SquaredEuclidean<f64>>(radius_m * radius_m)
             .execute()
             .iter()
-            .map(|item| Neighbour { index: item.item as usize, distance_m: item.distance.sqrt() })
+            .flat_map(|item| self.places.points(item.item).map(|k| neighbour(k, item.distance)))
             .collect();
         sort(&mut found);
         Ok(found)
@@ -118,10 +123,10 @@ impl NeighbourTree {
     /// the tree's layout has it. For hot loops, where looking for the lowest index would double the time.
     pub(crate) fn any_nearest(&self, query: &[f64; 3]) -> Neighbour {
         let best = self.tree.query(query).nearest_one::<SquaredEuclidean<f64>>().execute();
-        Neighbour { index: best.item as usize, distance_m: best.distance.sqrt() }
+        neighbour(self.places.first(best.item), best.distance)
     }
 
-    /// A nearest point within `reach_m` of a query that is known to be finite, and the distance of the second nearest (or
+    /// A nearest point within `reach_m` of a query that is known to be finite, and the distance of the nearest elsewhere (or
     /// the reach, where there is none within it).
     pub(crate) fn two_nearest(&self, query: &Point3<f64>, reach_m: f64) -> Option<(Neighbour, f64)> {
         let query = [query.x, query.y, query.z];
@@ -133,17 +138,21 @@ impl NeighbourTree {
             .execute();
         let nearest = found.first()?;
         let second_m = found.get(1).map_or(reach_m, |item| item.distance.sqrt());
-        Some((Neighbour { index: nearest.item as usize, distance_m: nearest.distance.sqrt() }, second_m))
+        Some((neighbour(self.places.first(nearest.item), nearest.distance), second_m))
     }
 
     fn nearest_unchecked(&self, query: &[f64; 3]) -> Neighbour {
         let best = self.tree.query(query).nearest_one::<SquaredEuclidean<f64>>().execute();
         // A second, tiny query: whatever lies on the sphere through the best point.
-        let mut index = best.item;
+        let mut index = self.places.first(best.item);
         let on_sphere = self.tree.query(query).within::<SquaredEuclidean<f64>>(best.distance).unsorted();
-        on_sphere.visit(|item| index = index.min(item.item));
-        Neighbour { index: index as usize, distance_m: best.distance.sqrt() }
+        on_sphere.visit(|item| index = index.min(self.places.first(item.item)));
+        neighbour(index, best.distance)
     }
+}
+
+fn neighbour(index: usize, square: f64) -> Neighbour {
+    Neighbour { index, distance_m: square.sqrt() }
 }
 
 fn sort(found: &mut [Neighbour]) {

@@ -1,5 +1,6 @@
 //! What the registration of organised frames reaches: accuracy and time on simulated pairs (`table`), covariance
-//! (`statistics`), success from far-off starts at half overlap (`success`), real frames (`real FOLDER`, or where the
+//! (`statistics`), success from far-off starts at half overlap (`success`), invalid pixels
+//! (`invalid`, `invalid real`, `invalid simulated`), real frames (`real`, where the
 //! tests expect them). Without an argument: all.
 #![allow(clippy::unwrap_used, clippy::print_stdout, clippy::expect_used, clippy::cast_lossless)]
 
@@ -7,6 +8,7 @@
 mod common;
 #[path = "../../tests/depth_frames/mod.rs"]
 mod depth_frames;
+mod invalid;
 mod measure;
 mod real;
 mod statistics;
@@ -35,6 +37,9 @@ fn run() {
     }
     if is_wanted("success") {
         success::print();
+    }
+    if is_wanted("invalid") {
+        invalid::print();
     }
     if is_wanted("real") {
         real::print();

@@ -1,7 +1,7 @@
 //! Registration of unorganised clouds by voxels: time, accuracy, capture, covariance and verdicts.
 //!
 //! `cargo run --release -p icp-registration --example voxel_pairs -- [frames] [capture] [covariance] [verdicts] [threads]
-//! [lidar TARGET SOURCE]`; without words everything but the last. Lidar scans are files of x, y, z as 64 bit floats.
+//! [easy] [lidar TARGET SOURCE]`; without words everything but the last. Lidar scans are files of x, y, z as 64 bit floats.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout, missing_docs)]
 
 #[path = "../../tests/common/mod.rs"]
@@ -12,7 +12,8 @@ use std::time::Duration;
 
 use common::{Pinhole, frame_pair, pose_error};
 use icp_registration::{
-    Cloud, IcpResult, MotionKind, Result, VoxelAlignmentOptions, VoxelCloud, VoxelOptions, pose_difference,
+    Cloud, IcpOptions, IcpResult, Metric, MotionKind, Result, VoxelAlignmentOptions, VoxelCloud, VoxelOptions, align,
+    pose_difference,
 };
 use nalgebra::{Isometry3, Matrix6, Point3, Vector6};
 use scenes::{
@@ -45,6 +46,10 @@ fn main() {
     }
     if wanted("threads") {
         threads();
+    }
+    if wanted("easy") {
+        one_thread.install(|| easy("640x480", &Pinhole::large(), 6));
+        one_thread.install(|| easy("224x172", &Pinhole::medium(), 12));
     }
     if let Some(i) = words.iter().position(|w| w == "lidar") {
         one_thread.install(|| lidar(&words[i + 1], &words[i + 2]));
@@ -127,6 +132,25 @@ fn frames(name: &str, camera: &Pinhole, count: u64, write: Option<&str>) {
 }
 
 /// Files that other programs can be run on: points and pose as 64 bit floats.
+/// The easy tier by points and as it chooses, from raw points to the pose.
+fn easy(name: &str, camera: &Pinhole, count: u64) {
+    for metric in [Metric::PointToPlane, Metric::Automatic] {
+        let options = IcpOptions { metric, ..IcpOptions::default() };
+        let (mut millimetres, mut degrees, mut times) = (vec![], vec![], vec![]);
+        for k in 0..count {
+            let pair = frame_pair(camera, k);
+            let (source, target) = (bare(&pair.source.0), bare(&pair.target.0));
+            let (result, time) = timed(1, || align(&source, &target, &Isometry3::identity(), &options).unwrap());
+            let (a, b) = pose_error(&result.target_from_source, &pair.target_from_source);
+            millimetres.push(a);
+            degrees.push(b);
+            times.push(time);
+        }
+        let [mm, degree, ms] = [&mut millimetres, &mut degrees, &mut times].map(|values| median(values));
+        println!("{name} {metric:?}: median {mm:.3} mm {degree:.4} deg {ms:.1} ms");
+    }
+}
+
 fn save(stem: &str, views: &Views) {
     let bytes = |cloud: &Cloud| -> Vec<u8> {
         cloud.points.iter().flat_map(|p| [p.x, p.y, p.z]).flat_map(f64::to_le_bytes).collect()

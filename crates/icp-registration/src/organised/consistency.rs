@@ -21,6 +21,10 @@ const SIGMAS: f32 = 3.0;
 const CLEARLY: f32 = 2.0;
 /// Smallest cosine between normals that agree.
 const LEAST_COSINE: f32 = 0.8;
+/// Level on which frames are compared to see whether a pose can be doubted: every fourth node.
+pub(super) const DOUBT_LEVEL: usize = 1;
+/// Nodes between those of a frame that are compared.
+const APART: usize = 2;
 
 /// Where the nodes of one frame lie for another, at a pose. The sum of both directions says more than one of them: what
 /// one camera takes for hidden, the other may have seen through.
@@ -125,6 +129,31 @@ pub(super) fn counted(
     counts
 }
 
+impl OrganisedFrame {
+    /// Share of the nodes that are unclear beside the plane of the frame's own node two farther on, along columns and along
+    /// rows: what pairs of frames show at their right pose, whose nodes and planes share as many pixels' surroundings.
+    pub(super) fn unevenness(&self, tolerance_m: f64) -> f64 {
+        let grid = &self.projection.grid;
+        let (mut near, mut unclear) = (0_usize, 0_usize);
+        for row in (0..grid.rows.saturating_sub(APART)).step_by(STRIDES[DOUBT_LEVEL]) {
+            for col in (0..grid.cols.saturating_sub(APART)).step_by(STRIDES[DOUBT_LEVEL]) {
+                let k = row * grid.cols + col;
+                for other in [k + APART, k + APART * grid.cols] {
+                    let (plane, beside) = (self.planes[k], self.planes[other]);
+                    let dot = |v: [f32; 3]| plane[0] * v[0] + plane[1] * v[1] + plane[2] * v[2];
+                    let residual = dot([grid.u[other], grid.v[other], -1.0]) / self.inverse_depth[other] - plane[3];
+                    let cosine = dot([beside[0], beside[1], beside[2]]);
+                    // NaN fails.
+                    let is_near = residual.abs() <= tolerance_m as f32 && cosine.is_finite();
+                    near += usize::from(is_near);
+                    unclear += usize::from(is_near && cosine < LEAST_COSINE);
+                }
+            }
+        }
+        unclear as f64 / near.max(1) as f64
+    }
+}
+
 struct Compare<'a, 'b> {
     moved: &'a Moved<'b>,
     blocks: &'a [Block],
@@ -170,5 +199,19 @@ impl<L: Locate> pulp::WithSimd for LocatedCompare<'_, '_, L> {
         }
         let [agreeing, contradicting, hidden, unclear] = sums.map(|lanes| lanes.iter().sum::<u32>() as usize);
         *self.all.counts = FrameConsistency { agreeing, contradicting, hidden, unclear, out_of_view: 0 };
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::organised::drawn::drawn;
+
+    #[test]
+    fn walls_are_even_and_waves_are_not() {
+        let tolerance = 0.05;
+        assert!(drawn(|u, v| 2.0 / (1.0 + 0.2 * u - 0.1 * v)).unevenness(tolerance) < 1e-12);
+        // Waves as long as six pixels, which slope by up to 45 degrees.
+        let uneven = drawn(|u, _| 2.0 + 0.012 * (u * 160.0).sin()).unevenness(tolerance);
+        assert!((0.05..0.6).contains(&uneven), "{uneven}");
     }
 }

@@ -30,6 +30,12 @@ pub struct OrganisedFrame {
     pub(super) projection: Arc<Projection>,
     pub(super) inverse_depth: Vec<f32>,
     spread: Vec<f32>,
+    /// Share of the pixels of each node that are valid.
+    share: Vec<f32>,
+    /// Where its inverse depth belongs, from its middle along columns and rows, in nodes.
+    pub(super) place: Vec<[f32; 2]>,
+    /// Whether all pixels are valid.
+    is_whole: bool,
     /// Plane of each node: unit normal away from the camera, distance; NaN where there is none.
     pub(super) planes: Vec<[f32; 4]>,
     /// Standard deviation of the distance, metre.
@@ -45,7 +51,8 @@ pub struct OrganisedFrame {
 impl OrganisedFrame {
     /// Prepares a frame: one point a pixel of `projection`, row by row, camera frame, metre; NaN where there is no
     /// range. `sigma`: standard deviation of the ranges, metre; without it, inverse depth is taken as equally precise
-    /// all over the frame, and how precise is estimated. Pixels whose sigma is not positive take no part.
+    /// all over the frame, and how precise is estimated. Pixels whose sigma is not positive take no part either: a node is
+    /// made from those that are valid, wherever they lie in its square.
     ///
     /// # Errors
     /// [`Error::LengthMismatch`] where points or sigma do not fill the frame; [`Error::PointsOffRays`] where points do
@@ -56,6 +63,9 @@ impl OrganisedFrame {
             projection: Arc::clone(projection),
             inverse_depth: vec![f32::NAN; nodes],
             spread: vec![0.0; nodes],
+            share: vec![1.0; nodes],
+            place: vec![[0.0; 2]; nodes],
+            is_whole: true,
             planes: vec![[f32::NAN; 4]; nodes],
             sigma: vec![0.0; nodes],
             misfit: vec![f32::NAN; nodes],
@@ -89,6 +99,9 @@ impl OrganisedFrame {
             self.reduce(points, sigma);
             self.fit_planes();
             self.refuse_misfits();
+            if !self.is_whole {
+                self.centre();
+            }
             self.points.gather(&self.projection.grid, &self.inverse_depth, &self.planes, &self.sigma);
         });
         Ok(())
@@ -118,8 +131,8 @@ impl OrganisedFrame {
         let has_plane = |k: usize| self.planes[k][3].is_finite();
         let vector = |v: [f32; 3]| Vector3::from(v.map(f64::from));
         let point = |k: usize| {
-            let depth = 1.0 / f64::from(self.inverse_depth[k]);
-            Point3::new(f64::from(grid.u[k]) * depth, f64::from(grid.v[k]) * depth, -depth)
+            let (depth, [u, v]) = (1.0 / f64::from(self.inverse_depth[k]), grid.ray(k, self.place[k]));
+            Point3::new(f64::from(u) * depth, f64::from(v) * depth, -depth)
         };
         let normal = |k: usize| {
             let n = vector([self.planes[k][0], self.planes[k][1], self.planes[k][2]]);
@@ -144,6 +157,9 @@ impl OrganisedFrame {
             projection: Arc::clone(&self.projection),
             inverse_depth: self.inverse_depth.clone(),
             spread: self.spread.clone(),
+            share: Vec::new(),
+            place: self.place.clone(),
+            is_whole: self.is_whole,
             planes: self.planes.clone(),
             sigma: self.sigma.clone(),
             misfit: Vec::new(),
@@ -157,8 +173,9 @@ impl OrganisedFrame {
     /// Where the lists of the frame lie, and how much they hold.
     #[cfg(test)]
     pub(super) fn memory(&self) -> Vec<(usize, usize)> {
-        let singles = [&self.inverse_depth, &self.spread, &self.sigma, &self.misfit];
+        let singles = [&self.inverse_depth, &self.spread, &self.share, &self.sigma, &self.misfit];
         let mut memory: Vec<(usize, usize)> = singles.iter().map(|v| (v.as_ptr() as usize, v.capacity())).collect();
+        memory.push((self.place.as_ptr() as usize, self.place.capacity()));
         memory.push((self.planes.as_ptr() as usize, self.planes.capacity()));
         memory.push((self.scratch.as_ptr() as usize, self.scratch.capacity()));
         memory.push((self.points.blocks.as_ptr() as usize, self.points.blocks.capacity()));
@@ -167,19 +184,26 @@ impl OrganisedFrame {
 
     fn reduce(&mut self, points: &[[f64; 3]], sigma: Option<&[f32]>) {
         let (grid, width) = (&self.projection.grid, self.projection.width());
-        let rows = self.inverse_depth.par_chunks_mut(grid.cols).zip(self.spread.par_chunks_mut(grid.cols));
-        rows.enumerate().with_min_len(8).with_max_len(16).for_each(|(row, (inverse_depth, spread))| {
-            pulp::Arch::new().dispatch(NodeRow { grid, row, width, points, sigma, inverse_depth, spread });
+        let values = self.inverse_depth.par_chunks_mut(grid.cols).zip(self.spread.par_chunks_mut(grid.cols));
+        let pixels = self.share.par_chunks_mut(grid.cols).zip(self.place.par_chunks_mut(grid.cols));
+        let rows = values.zip(pixels).enumerate().with_min_len(8).with_max_len(16);
+        let is_whole = self.is_whole;
+        let reduced = rows.map(|(row, ((inverse_depth, spread), (share, place)))| {
+            let row = NodeRow { grid, row, width, points, sigma, inverse_depth, spread, share, place, is_whole };
+            pulp::Arch::new().dispatch(row)
         });
+        self.is_whole = reduced.reduce(|| true, |a, b| a && b);
     }
 
     fn fit_planes(&mut self) {
         let grid = &self.projection.grid;
         let (inverse_depth, spread) = (&self.inverse_depth[..], &self.spread[..]);
+        let (share, place, is_whole) = (&self.share[..], &self.place[..], self.is_whole);
         let outputs = (self.planes.par_chunks_mut(grid.cols), self.sigma.par_chunks_mut(grid.cols));
         let rows = outputs.0.zip(outputs.1).zip(self.misfit.par_chunks_mut(grid.cols));
         rows.enumerate().with_min_len(8).with_max_len(16).for_each(|(row, ((planes, sigma), misfit))| {
-            pulp::Arch::new().dispatch(PlaneRow { grid, row, inverse_depth, spread, planes, sigma, misfit });
+            let row = PlaneRow { grid, row, inverse_depth, spread, is_whole, share, place, planes, sigma, misfit };
+            pulp::Arch::new().dispatch(row);
         });
     }
 
@@ -207,6 +231,18 @@ impl OrganisedFrame {
                 *plane = [f32::NAN; 4];
             }
             *sigma *= scale.max(ROUNDING * w / spread);
+        });
+    }
+
+    /// Moves the nodes with planes along them from the places of their pixels to their middles.
+    fn centre(&mut self) {
+        let grid = &self.projection.grid;
+        let nodes = self.inverse_depth.par_iter_mut().zip(&mut self.place).zip(&self.planes);
+        nodes.zip(grid.u.par_iter().zip(&grid.v)).with_min_len(4096).for_each(|(((w, place), plane), (u, v))| {
+            if plane[3].is_finite() && place.iter().any(|shift| shift.abs() > 0.0) {
+                *w = (plane[0] * u + plane[1] * v - plane[2]) / plane[3];
+                *place = [0.0; 2];
+            }
         });
     }
 }

@@ -82,6 +82,13 @@ impl Grid {
     pub(crate) fn len(&self) -> usize {
         self.cols * self.rows
     }
+
+    /// x/depth and y/depth of the ray through a place near a node, in nodes along columns and rows from its middle.
+    pub(crate) fn ray(&self, k: usize, place: [f32; 2]) -> [f32; 2] {
+        let ([a, b, c, d], [right, down]) = (self.gradient[k], place);
+        let determinant = a * d - b * c;
+        [self.u[k] + (d * right - c * down) / determinant, self.v[k] + (a * down - b * right) / determinant]
+    }
 }
 
 /// The squares of nodes that are the cells of a frame.

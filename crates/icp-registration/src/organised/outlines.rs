@@ -19,6 +19,8 @@ const STEP: f64 = 0.006;
 const STEPS: usize = 50;
 /// Points that may contradict by chance: a place is less probable by a factor of e for each such number.
 const CHANCE: f64 = 3.0;
+/// Points at jumps of a frame that are looked at.
+const POINTS: usize = 1500;
 /// Places with more points beyond the fewest, in units of what may be chance, are out of the question.
 const LIMIT: f64 = 4.0;
 
@@ -111,12 +113,17 @@ impl FrameAligner {
 }
 
 impl OrganisedFrame {
-    /// Points of nodes without a plane.
+    /// Points of nodes without a plane, of many some, spread over the frame.
     fn at_jumps(&self) -> Vec<[f32; 3]> {
-        let grid = &self.projection.grid;
-        let nodes = grid.u.iter().zip(&grid.v).zip(self.inverse_depth.iter().zip(&self.planes));
-        let at_jump = nodes.filter(|(_, (w, plane))| w.is_finite() && !plane[3].is_finite());
-        at_jump.map(|((u, v), (w, _))| [u / w, v / w, -1.0 / w]).collect()
+        let at_jump =
+            (0..self.planes.len()).filter(|&k| self.inverse_depth[k].is_finite() && !self.planes[k][3].is_finite());
+        let point = |k: usize| {
+            let (depth, [u, v]) = (1.0 / self.inverse_depth[k], self.projection.grid.ray(k, self.place[k]));
+            [u * depth, v * depth, -depth]
+        };
+        let points: Vec<[f32; 3]> = at_jump.map(point).collect();
+        let step = points.len().div_ceil(POINTS).max(1);
+        points.into_iter().step_by(step).collect()
     }
 }
 

@@ -10,7 +10,7 @@ use super::frame::OrganisedFrame;
 use super::search::{COARSE_TOLERANCE, weighed};
 use super::starts::{TURN_RAD, TURNS};
 use super::track::{Track, blocks};
-use crate::icp::UndeterminedMotion;
+use crate::icp::{MotionKind, UndeterminedMotion};
 
 /// Starts: turned by the angle of the first other starts or about twice of it, and shifted in units of the radius.
 const WIDE_TURN_RAD: f64 = 0.5;
@@ -58,7 +58,7 @@ impl Places {
     pub(super) fn along(track: &Track, motions: &[UndeterminedMotion], crossing: &Crossing<'_>, radius_m: f64) -> Self {
         let mut places = Self::default();
         let slide = SLIDE * radius_m;
-        for motion in motions {
+        for motion in motions.iter().filter(|motion| motion.kind == MotionKind::Translation) {
             for k in (1..=SLIDES).flat_map(|k| [k as f64, -(k as f64)]) {
                 let mut other = track.clone();
                 other.pose.translation.vector += motion.axis * (k * slide);

@@ -1,7 +1,8 @@
 //! Planes through the nodes of a frame.
 //!
 //! A plane is `a u + b v + c = 1/depth`; a and b come from a square window of nodes, c from the node alone: a wider
-//! window would round off creases, and the error of the offset is what reaches the pose.
+//! window would round off creases, and the error of the offset is what reaches the pose. Nodes count as many times as
+//! they have valid pixels, each at their mean place.
 // Only what is inlined is compiled for wide registers.
 #![allow(clippy::inline_always)]
 // Lanes lie side by side: with an index, loops read as their formulas and have the same length everywhere.
@@ -13,8 +14,18 @@ use super::grid::Grid;
 const BLOCK: usize = 16;
 /// Half width of the window, nodes.
 const HALF: usize = 1;
-/// Nodes of the window beyond the three that any plane goes through.
-pub(super) const FREEDOM: f32 = ((2 * HALF + 1) * (2 * HALF + 1) - 3) as f32;
+/// Nodes of the window, those of them beyond the three that any plane goes through, and their scatter along an axis.
+const NODES: f32 = ((2 * HALF + 1) * (2 * HALF + 1)) as f32;
+const PARAMETERS: f32 = 3.0;
+pub(super) const FREEDOM: f32 = NODES - PARAMETERS;
+const MOMENT: f32 = NODES * (HALF * (HALF + 1)) as f32 / 3.0;
+
+/// How much more variance the plane may have in the middle of its window than that of a whole one. One-sided windows,
+/// at the rim of what was seen, are told by it: there the surface ends, and so do its errors.
+const LARGEST_VARIANCE: f32 = 2.0;
+
+/// Share of the squares in a window that rounding of the places of its pixels leaves.
+const ROUNDING: f32 = 1e-6;
 
 /// One row of planes.
 pub(super) struct PlaneRow<'a> {
@@ -24,6 +35,10 @@ pub(super) struct PlaneRow<'a> {
     pub inverse_depth: &'a [f32],
     /// Standard deviations of all nodes.
     pub spread: &'a [f32],
+    /// Whether all pixels of the frame are valid, their shares of all nodes, and their mean places.
+    pub is_whole: bool,
+    pub share: &'a [f32],
+    pub place: &'a [[f32; 2]],
     /// Unit normal, leading away from the camera, and distance of the plane from the perspective centre; NaN: none.
     pub planes: &'a mut [[f32; 4]],
     /// Standard deviation of the distance, metre (per unit of spread where that has none).
@@ -62,45 +77,147 @@ impl PlaneRow<'_> {
 
     #[inline(always)]
     fn block<const N: usize>(&mut self, first: usize) {
+        let start = self.row * self.grid.cols + first;
+        let mut is_whole = true;
+        for row in 0..if self.is_whole { 0 } else { 2 * HALF + 1 } {
+            let shares = &self.share[start + row * self.grid.cols - HALF * self.grid.cols - HALF..][..N + 2 * HALF];
+            for k in 0..N + 2 * HALF {
+                is_whole &= shares[k] >= 1.0;
+            }
+        }
+        if is_whole {
+            self.fit::<N, true>(first);
+        } else {
+            self.fit::<N, false>(first);
+        }
+    }
+
+    /// `WHOLE`: all pixels of all windows are valid.
+    #[inline(always)]
+    fn fit<const N: usize, const WHOLE: bool>(&mut self, first: usize) {
         let cols = self.grid.cols;
         let start = self.row * cols + first;
         let mut centre = [0.0_f32; N];
         centre.copy_from_slice(&self.inverse_depth[start..start + N]);
         // Sums of the differences from the centre: the values themselves would cancel.
-        let (mut sum, mut square, mut by_col, mut by_row) = ([0.0_f32; N], [0.0_f32; N], [0.0_f32; N], [0.0_f32; N]);
+        let mut sums = [[0.0_f32; N]; SUMS];
         for j in 0..=2 * HALF {
-            let y = j as f32 - HALF as f32;
             for i in 0..=2 * HALF {
-                let x = i as f32 - HALF as f32;
                 let from = start + j * cols + i - HALF * cols - HALF;
-                let values = &self.inverse_depth[from..from + N];
+                let (values, shares, places) =
+                    (&self.inverse_depth[from..from + N], &self.share[from..from + N], &self.place[from..from + N]);
+                let (x, y) = (i as f32 - HALF as f32, j as f32 - HALF as f32);
                 for k in 0..N {
                     let e = values[k] - centre[k];
-                    sum[k] += e;
-                    square[k] += e * e;
-                    by_col[k] += x * e;
-                    by_row[k] += y * e;
+                    if WHOLE {
+                        sums[0][k] += e;
+                        sums[1][k] += e * e;
+                        sums[2][k] += x * e;
+                        sums[3][k] += y * e;
+                        continue;
+                    }
+                    let (x, y, n) = (x + places[k][0], y + places[k][1], shares[k]);
+                    // There is no value without pixels.
+                    let (ne, one) = if n > 0.0 { (n * e, 1.0) } else { (0.0, 0.0) };
+                    sums[0][k] += ne;
+                    sums[1][k] += if n > 0.0 { ne * e } else { 0.0 };
+                    sums[2][k] += x * ne;
+                    sums[3][k] += y * ne;
+                    sums[4][k] += n * x;
+                    sums[5][k] += n * y;
+                    sums[6][k] += n * x * x;
+                    sums[7][k] += n * x * y;
+                    sums[8][k] += n * y * y;
+                    sums[9][k] += n;
+                    sums[10][k] += one;
                 }
             }
         }
-        let count = (2 * HALF + 1).pow(2) as f32;
-        let moment = count * (HALF * (HALF + 1)) as f32 / 3.0;
-        let grid = self.grid;
+        self.solve::<N, WHOLE>(first, &centre, &sums);
+    }
+
+    #[inline(always)]
+    fn solve<const N: usize, const WHOLE: bool>(&mut self, first: usize, centre: &[f32; N], sums: &[[f32; N]; SUMS]) {
+        let (grid, start) = (self.grid, self.row * self.grid.cols + first);
         let (u, v) = (&grid.u[start..start + N], &grid.v[start..start + N]);
         let (gradient, spread) = (&grid.gradient[start..start + N], &self.spread[start..start + N]);
+        let (shares, places) = (&self.share[start..start + N], &self.place[start..start + N]);
         let (planes, sigma) = (&mut self.planes[first..first + N], &mut self.sigma[first..first + N]);
         let misfit = &mut self.misfit[first..first + N];
         for k in 0..N {
-            let (gc, gr) = (by_col[k] / moment, by_row[k] / moment);
-            let rest = square[k] - sum[k] * sum[k] / count - (gc * gc + gr * gr) * moment;
-            misfit[k] = rest / (FREEDOM * spread[k] * spread[k]);
+            let [.., x, y, xx, xy, yy, count, nodes] = sums;
+            let window =
+                if WHOLE { Window::WHOLE } else { Window::new([x[k], y[k], xx[k], xy[k], yy[k], count[k], nodes[k]]) };
+            let (mut by_col, mut by_row) = (sums[2][k], sums[3][k]);
+            if !WHOLE {
+                by_col -= window.mean[0] * sums[0][k];
+                by_row -= window.mean[1] * sums[0][k];
+            }
+            let (mut gc, mut gr) = (by_col / MOMENT, by_row / MOMENT);
+            let mut explained = (gc * gc + gr * gr) * MOMENT;
+            if !WHOLE {
+                let [xx, xy, yy] = window.inverse;
+                (gc, gr) = (xx * by_col + xy * by_row, xy * by_col + yy * by_row);
+                explained = gc * by_col + gr * by_row + ROUNDING * sums[1][k];
+            }
+            let rest = sums[1][k] - sums[0][k] * sums[0][k] / window.count - explained;
+            let (mut w, mut s, mut variance) = (centre[k], spread[k], spread[k] * spread[k]);
+            if !WHOLE {
+                // The node's average, moved along the plane from the place of its pixels to its middle.
+                let ([x, y], mean) = (places[k], window.mean);
+                w -= gc * x + gr * y;
+                s *= (1.0 + shares[k] * window.product([x, y], [2.0 * mean[0] - x, 2.0 * mean[1] - y])).sqrt();
+                variance *= shares[k];
+            }
+            misfit[k] = rest / (window.freedom * variance);
             let m = gradient[k];
             let (a, b) = (m[0] * gc + m[1] * gr, m[2] * gc + m[3] * gr);
-            let c = centre[k] - a * u[k] - b * v[k];
+            let c = w - a * u[k] - b * v[k];
             // a x + b y - c z = 1 on the plane.
             let distance = 1.0 / (a * a + b * b + c * c).sqrt();
             planes[k] = [a * distance, b * distance, -c * distance, distance];
-            sigma[k] = distance / centre[k] * spread[k];
+            sigma[k] = distance / w * s;
         }
+    }
+}
+
+/// Sums over a window: 4 with the differences of inverse depth, 7 of the nodes' shares alone.
+const SUMS: usize = 4 + 7;
+
+/// How the valid pixels lie in a window.
+#[derive(Clone, Copy)]
+struct Window {
+    /// In nodes.
+    count: f32,
+    /// Nodes beyond those that any plane goes through; NaN where no plane is known well enough.
+    freedom: f32,
+    mean: [f32; 2],
+    /// Inverse scatter of the places: `xx, xy, yy`.
+    inverse: [f32; 3],
+}
+
+impl Window {
+    const WHOLE: Self =
+        Self { count: NODES, freedom: FREEDOM, mean: [0.0; 2], inverse: [1.0 / MOMENT, 0.0, 1.0 / MOMENT] };
+
+    /// From the sums over `x, y, xx, xy, yy, 1` of the shares, and the number of nodes.
+    #[inline(always)]
+    fn new([x, y, xx, xy, yy, count, nodes]: [f32; 7]) -> Self {
+        let mean = [x / count, y / count];
+        let (xx, xy, yy) = (xx - x * mean[0], xy - x * mean[1], yy - y * mean[1]);
+        let determinant = xx * yy - xy * xy;
+        let inverse = [yy / determinant, -xy / determinant, xx / determinant];
+        let mut window = Self { count, freedom: nodes - PARAMETERS, mean, inverse };
+        let variance = NODES * (1.0 / count + window.product(mean, mean));
+        // NaN fails.
+        window.freedom = if variance <= LARGEST_VARIANCE { window.freedom } else { f32::NAN };
+        window
+    }
+
+    /// `a' S⁻¹ b` with the scatter S of the places.
+    #[inline(always)]
+    fn product(&self, a: [f32; 2], b: [f32; 2]) -> f32 {
+        let [xx, xy, yy] = self.inverse;
+        xx * a[0] * b[0] + xy * (a[0] * b[1] + a[1] * b[0]) + yy * a[1] * b[1]
     }
 }

@@ -5,7 +5,7 @@ use nalgebra::Isometry3;
 use rayon::prelude::*;
 
 use super::aligner::FrameAligner;
-use super::consistency::{FrameConsistency, consistency};
+use super::consistency::{DOUBT_LEVEL, FrameConsistency, consistency};
 use super::crossing::Crossing;
 use super::frame::OrganisedFrame;
 use super::places::Places;
@@ -13,14 +13,9 @@ use super::track::Track;
 use crate::error::Result;
 use crate::icp::{IcpResult, MotionKind, StopReason};
 
-/// Level on which two frames are compared to see whether a pose can be doubted: every fourth node.
-const DOUBT_LEVEL: usize = 1;
 /// Share of the compared nodes that contradict, and of those that are hidden, above which a pose is doubted.
-const MOST_WRONG: f64 = 0.03;
+const MOST_WRONG: f64 = 0.02;
 const MOST_HIDDEN: f64 = 0.08;
-/// What an unclear node counts beside one that contradicts: on real frames one node in twenty lies on its plane with a
-/// noisy normal, at right poses too.
-const UNCLEAR: f64 = 0.25;
 /// Share of all nodes that have to agree.
 const LEAST_AGREEING: f64 = 0.3;
 /// Distances of agreement while poses are still coarse and when they are fine, in units of the radius.
@@ -50,23 +45,17 @@ impl FrameAligner {
         target: &OrganisedFrame,
     ) -> Result<IcpResult> {
         let mut best = first;
-        for _ in 0..2 {
-            let around = match &best {
-                Ok((_, result)) if is_sound(source, target, result) => break,
-                Ok((_, result)) => !leaves_a_slide(source, target, result),
-                Err(_) => true,
-            };
-            let places = match &best {
-                Ok((track, result)) if !around => {
-                    let crossing = Crossing::new(source, target, &result.target_from_source, &result.degenerate);
-                    Places::along(track, &result.degenerate, &crossing, source.points.radius_m)
-                }
-                _ => self.look_around(start, source, target),
-            };
+        if !best.as_ref().is_ok_and(|(_, result)| agrees(source, target, result)) {
+            let places = self.look_around(start, source, target);
             best = self.best_of(best, &places, start, source, target);
-            if !around {
-                break;
-            }
+        }
+        if let Ok((track, result)) = &best
+            && result.degenerate.iter().any(|motion| motion.kind == MotionKind::Translation)
+            && agrees(source, target, result)
+        {
+            let crossing = Crossing::new(source, target, &result.target_from_source, &result.degenerate);
+            let places = Places::along(track, &result.degenerate, &crossing, source.points.radius_m);
+            best = self.best_of(best, &places, start, source, target);
         }
         best.map(|best| {
             let is_open = !best.1.degenerate.is_empty();
@@ -145,23 +134,15 @@ impl Merit {
     }
 }
 
-/// Whether nothing speaks for another place. Iterations that did not settle, as pairs change back and forth, do not either.
-fn is_sound(source: &OrganisedFrame, target: &OrganisedFrame, result: &IcpResult) -> bool {
-    result.degenerate.is_empty() && agrees(source, target, result)
-}
-
-/// Whether all that can be doubted is one translation.
-fn leaves_a_slide(source: &OrganisedFrame, target: &OrganisedFrame, result: &IcpResult) -> bool {
-    matches!(&result.degenerate[..], [motion] if motion.kind == MotionKind::Translation)
-        && agrees(source, target, result)
-}
-
-/// Whether frames at a pose share enough, and hardly contradict each other.
+/// Whether frames at a pose share enough, and hardly contradict each other. On uneven surfaces nodes lie near planes with
+/// another normal at right poses too: as often as within each frame.
 fn agrees(source: &OrganisedFrame, target: &OrganisedFrame, result: &IcpResult) -> bool {
     let tolerance = COARSE_TOLERANCE * source.points.radius_m;
     let counts = consistency(source, target, &result.target_from_source, DOUBT_LEVEL, tolerance);
     let (compared, hidden) = (counts.compared() as f64, counts.hidden as f64);
-    counts.contradicting as f64 + UNCLEAR * counts.unclear as f64 <= MOST_WRONG * compared
+    let beside = |unclear: f64| counts.contradicting as f64 + unclear <= MOST_WRONG * compared;
+    let expected = || 0.5 * compared * (source.unevenness(tolerance) + target.unevenness(tolerance));
+    (beside(counts.unclear as f64) || beside((counts.unclear as f64 - expected()).max(0.0)))
         && hidden <= MOST_HIDDEN * (compared + hidden)
         && counts.agreeing as f64 >= LEAST_AGREEING * counts.all() as f64
 }

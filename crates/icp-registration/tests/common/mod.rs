@@ -2,6 +2,7 @@
 #![allow(dead_code, clippy::unwrap_used, clippy::expect_used, clippy::panic, missing_docs)]
 
 pub mod frames;
+pub mod invalid;
 pub mod limit;
 pub mod scenes;
 pub mod stations;

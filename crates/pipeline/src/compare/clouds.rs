@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use icp_registration::{Cloud, IcpOptions, NeighbourTree, Selection, StopReason, align};
+use icp_registration::{Cloud, IcpOptions, Metric, NeighbourTree, Selection, StopReason, align};
 use nalgebra::{Isometry3, Point3, Vector3};
 use range_io::clouds::read_any_cloud;
 use rayon::prelude::*;
@@ -204,7 +204,8 @@ fn each(
 fn registered(source: &Cloud, target: &Cloud) -> icp_registration::Result<(Isometry3<f64>, CloudAlignment)> {
     let every = source.len().div_ceil(REGISTERED_POINTS);
     let selection = if every > 1 { Selection::EveryNth(every) } else { Selection::All };
-    let options = IcpOptions { selection, ..IcpOptions::default() };
+    // Differences are looked at point by point: accuracy comes before time.
+    let options = IcpOptions { metric: Metric::PointToPlane, selection, ..IcpOptions::default() };
     let result = align(source, target, &Isometry3::identity(), &options)?;
     let mut doubts = Vec::new();
     if result.stop == StopReason::MaxIterations {

@@ -106,6 +106,9 @@ pub struct WorstValue {
     pub place: Option<String>,
 }
 
+/// Causes that a message tells; all are in [`Contradiction::causes`].
+const TOLD: usize = 4;
+
 impl Contradiction {
     /// A contradiction of which nothing more is known yet.
     pub(crate) fn new(stage: &'static str) -> Self {
@@ -137,9 +140,12 @@ impl fmt::Display for WorstValue {
 impl fmt::Display for Contradiction {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "the observations contradict each other ({})", self.stage)?;
-        for (index, cause) in self.causes.iter().enumerate() {
+        for (index, cause) in self.causes.iter().enumerate().take(TOLD) {
             f.write_str(if index == 0 { ": " } else { "; " })?;
             cause.fmt(f)?;
+        }
+        if self.causes.len() > TOLD {
+            write!(f, "; and {} more causes of such kinds", self.causes.len() - TOLD)?;
         }
         if self.causes.is_empty() {
             f.write_str(", and no known cause explains it")?;

@@ -60,6 +60,11 @@ impl Fit<'_> {
         out
     }
 
+    /// Negative logarithm of the likelihood of the known places, as that of sightings.
+    pub(super) fn implausibility_of_places(&self) -> f64 {
+        self.known().iter().map(Known::log_odds).sum()
+    }
+
     fn known(&self) -> Vec<Known<'_>> {
         let start = &self.setup.start;
         let targets = self.setup.network.targets.iter().zip(&start.targets).filter_map(|(target, found)| {

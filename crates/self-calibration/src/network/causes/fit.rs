@@ -100,12 +100,13 @@ impl<'n> Fit<'n> {
         (is_noise(&own) && !is_too_many(wrong, of, 0.0)).then(|| implausibility(own.iter()))
     }
 
+    /// Of all sightings and all known places.
     pub(super) fn implausibility(&self) -> f64 {
         // A sighting that nothing predicts is as implausible as can be.
         let lost = Misfit { image: Some(f64::INFINITY), ..Misfit::default() };
         let pairs = self.misfits.iter().zip(&self.setup.network.sightings);
         let known = pairs.map(|(m, seen)| if m.image.is_none() && seen.pixel.is_some() { &lost } else { m });
-        implausibility(known)
+        implausibility(known) + self.implausibility_of_places()
     }
 
     pub(super) fn worst(&self) -> Option<WorstValue> {

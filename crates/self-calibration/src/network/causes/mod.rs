@@ -28,6 +28,8 @@ const BELIEVED: f64 = 20.0;
 const APART: f64 = 10.0;
 /// Noise as a share of what start values may be off by: 2 pixels of 176 x 144, and 40 cm of 7.5 m.
 const NOISE: f64 = 0.2;
+/// Known places that may each be wrong for a reason of its own; for more, one that they have in common is looked for.
+const SINGLE: usize = 3;
 /// Terms that robust fits leave at their start values where terms are chosen automatically: waves and lens terms that
 /// many networks cannot tell from others.
 const WEAK_TERMS: [&str; 8] = ["d2", "d3", "b1", "b2", "k3", "h1", "h2", "h3"];
@@ -50,7 +52,13 @@ impl Problem<'_> {
         let base = self.fit(self.network);
         let mut causes = base.as_ref().map_or_else(|_| Vec::new(), sigma_units);
         if causes.is_empty() {
-            causes = base.as_ref().map_or_else(|_| Vec::new(), Fit::misplaced);
+            let misplaced = base.as_ref().map_or_else(|_| Vec::new(), Fit::misplaced);
+            if misplaced.len() > SINGLE {
+                causes = self.of_all(base.as_ref().ok());
+            }
+            if causes.is_empty() {
+                causes = misplaced;
+            }
         }
         if causes.is_empty() && (!suspected.is_empty() || base.as_ref().map_or(true, Fit::is_conspicuous)) {
             causes = self.causes(base.as_ref().ok(), suspected);

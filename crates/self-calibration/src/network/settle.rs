@@ -223,6 +223,6 @@ pub(crate) fn start_range_limit(network: &Network, typical_m: f64) -> f64 {
 
 /// Whether an adjustment failed as it does where observations contradict each other.
 pub(crate) fn is_without_end(error: &Error) -> bool {
-    use adjust::Error::{Evaluation, NotConverged, NotFinite};
-    matches!(error, Error::Adjust(NotConverged { .. } | Evaluation { .. } | NotFinite { .. }))
+    use adjust::Error::{Decomposition, Evaluation, NotConverged, NotFinite};
+    matches!(error, Error::Adjust(NotConverged { .. } | Evaluation { .. } | NotFinite { .. } | Decomposition { .. }))
 }

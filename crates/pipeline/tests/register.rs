@@ -182,7 +182,8 @@ fn what_cannot_be_registered_is_refused_with_a_reason() {
         Point3::new(radius * turn.cos(), radius * turn.sin(), height)
     });
     write(&path("sphere.ply"), sphere);
-    write(&path("few.ply"), (0..10).map(|k| Point3::new(f64::from(k), 0.0, 0.0)));
+    // None of them at the origin: zeros stand for what was not measured.
+    write(&path("few.ply"), (0..10).map(|k| Point3::new(f64::from(k) + 1.0, 0.0, 0.0)));
     let text = |name: &str, text: &str| std::fs::write(path(name), text).unwrap();
     text("guess.csv", "station,x,y,z,omega,phi,kappa\nother,0,0,0,0,0,0\n");
     text("scaled.txt", "2 0 0 0\n0 2 0 0\n0 0 2 0\n0 0 0 1\n");

@@ -28,6 +28,7 @@ mod error;
 mod evaluation;
 mod exclusion;
 mod global_test;
+mod graph;
 mod ids;
 mod images;
 mod information;

@@ -4,15 +4,13 @@ use std::collections::HashMap;
 use std::ops::Range;
 
 use crate::Adjustment;
+use crate::graph::Graph;
 use crate::layout::{Layout, Part};
 use crate::orthogonal::OrthogonalFactor;
 
 /// Share of all products of an eliminated block's couplings that are not zero from which on it is faster to multiply the
 /// zeros as well: a large product takes a twelfth of the time for each of its terms (measured at 1,200 and 1,800 unknowns).
 const CROWDED: f64 = 1.0 / 12.0;
-/// Unknowns of the largest block that is eliminated.
-const LARGEST_BLOCK: usize = 6;
-
 /// Division of the unknowns: eliminated blocks, no two of which share an observation or a constraint, and the rest, the
 /// reduced unknowns.
 #[derive(Debug, Clone)]
@@ -113,7 +111,7 @@ impl Lists {
     }
 
     /// From pairs of list and item, each list in the order of the pairs.
-    fn new(count: usize, pairs: impl Iterator<Item = (usize, u32)> + Clone) -> Self {
+    pub(crate) fn new(count: usize, pairs: impl Iterator<Item = (usize, u32)> + Clone) -> Self {
         let mut starts = vec![0; count + 1];
         for (list, _) in pairs.clone() {
             starts[list + 1] += 1;
@@ -337,90 +335,5 @@ impl Structure {
         self.eliminated_observations = Lists::new(self.eliminated.len(), eliminated.into_iter());
         let slots = self.slots.iter().enumerate().map(|(index, slot)| (slot.reduced as usize, index as u32));
         self.reduced_slots = Lists::new(self.reduced.len(), slots);
-    }
-}
-
-/// Blocks and the observations that tie them.
-struct Graph {
-    observations: Lists,
-    /// Number of neighbouring blocks, and of their unknowns.
-    degree: Vec<u32>,
-    burden: Vec<u32>,
-    /// Touched by a constraint.
-    constrained: Vec<bool>,
-}
-
-impl Graph {
-    fn new(adjustment: &Adjustment<'_>, layout: &Layout) -> Self {
-        let places = layout.observations.iter().enumerate();
-        let pairs = places
-            .flat_map(|(index, place)| layout.parts(place).iter().map(move |part| (part.block as usize, index as u32)));
-        let observations = Lists::new(layout.blocks(), pairs);
-        let mut constrained = vec![false; layout.blocks()];
-        for block in adjustment.constraints.iter().flat_map(|constraint| constraint.blocks()) {
-            constrained[block.0] = true;
-        }
-        let none = vec![0; layout.blocks()];
-        let mut graph = Self { observations, degree: none.clone(), burden: none, constrained };
-        let mut seen = vec![usize::MAX; layout.blocks()];
-        for block in 0..layout.blocks() {
-            let unknowns = |other: usize| layout.free(other).len() as u32;
-            let neighbours = graph.neighbours(layout, block, &mut seen).map(unknowns);
-            (graph.degree[block], graph.burden[block]) = neighbours.fold((0, 0), |(n, sum), more| (n + 1, sum + more));
-        }
-        graph
-    }
-
-    /// Each neighbour once; `seen` remembers for whom.
-    fn neighbours<'g>(
-        &'g self,
-        layout: &'g Layout,
-        block: usize,
-        seen: &'g mut [usize],
-    ) -> impl Iterator<Item = usize> + 'g {
-        let observations = self.observations.list(block).iter();
-        let parts = observations.flat_map(|&index| layout.parts(&layout.observations[index as usize]));
-        let others = parts.map(|part| part.block as usize).filter(move |&other| other != block);
-        others.filter(move |&other| std::mem::replace(&mut seen[other], block) != block)
-    }
-
-    /// Small blocks of which no two are neighbours: of three greedy choices the one with the most unknowns. First come
-    /// those whose neighbours, which stay, have the fewest unknowns for each of their own \[Sakai2003\]; in a network of
-    /// many stations and targets, where a target at the border with few stations would bar these, all of one kind.
-    fn independent(&self, layout: &Layout) -> Vec<bool> {
-        let width = |block: usize| layout.free(block).len();
-        let small = |block: &usize| (1..=LARGEST_BLOCK).contains(&width(*block));
-        let candidates: Vec<usize> =
-            (0..layout.blocks()).filter(small).filter(|&block| !self.constrained[block]).collect();
-        let cost = |block: usize, other: usize| u64::from(self.burden[block]) * width(other) as u64;
-        let mut orders = [candidates.clone(), candidates.clone(), candidates];
-        orders[0].sort_by(|&a, &b| cost(a, b).cmp(&cost(b, a)).then(a.cmp(&b)));
-        orders[1].sort_by_key(|&block| width(block));
-        orders[2].sort_by_key(|&block| std::cmp::Reverse(width(block)));
-        let mut best = (0, vec![false; layout.blocks()]);
-        for order in orders {
-            let chosen = self.in_order(layout, order);
-            let unknowns = (0..layout.blocks()).filter(|&block| chosen[block]).map(width).sum();
-            if unknowns > best.0 {
-                best = (unknowns, chosen);
-            }
-        }
-        best.1
-    }
-
-    /// Each block that has no chosen neighbour yet.
-    fn in_order(&self, layout: &Layout, candidates: Vec<usize>) -> Vec<bool> {
-        let (mut chosen, mut barred) = (vec![false; layout.blocks()], vec![false; layout.blocks()]);
-        let mut seen = vec![usize::MAX; layout.blocks()];
-        for block in candidates {
-            if barred[block] || self.observations.list(block).is_empty() {
-                continue;
-            }
-            chosen[block] = true;
-            for neighbour in self.neighbours(layout, block, &mut seen) {
-                barred[neighbour] = true;
-            }
-        }
-        chosen
     }
 }

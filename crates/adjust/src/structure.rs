@@ -11,6 +11,7 @@ use crate::orthogonal::OrthogonalFactor;
 /// Share of all products of an eliminated block's couplings that are not zero from which on it is faster to multiply the
 /// zeros as well: a large product takes a twelfth of the time for each of its terms (measured at 1,200 and 1,800 unknowns).
 const CROWDED: f64 = 1.0 / 12.0;
+
 /// Division of the unknowns: eliminated blocks, no two of which share an observation or a constraint, and the rest, the
 /// reduced unknowns.
 #[derive(Debug, Clone)]

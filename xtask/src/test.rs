@@ -7,8 +7,6 @@ pub(crate) fn run() -> Outcome {
     cargo(&["fmt", "--all", "--check"], &[])?;
     tidy::run()?;
     cargo(&["clippy", "--workspace", "--all-targets", "--all-features", "--", "--deny", "warnings"], &[])?;
-    // What all features hide: `nightly` runs the tests of this setting, whose dependencies are compiled once more for them.
-    cargo(&["clippy", "-p", "adjust", "--no-default-features", "--", "--deny", "warnings"], &[])?;
     cargo(&["doc", "--workspace", "--all-features", "--no-deps"], &[("RUSTDOCFLAGS", "--deny warnings")])?;
     // The tests of `pipeline` hold the small room and the real captures against their bars.
     cargo(&["test", "--workspace", "--all-features"], &[])

@@ -91,6 +91,19 @@ fn track(
     (tracker, times)
 }
 
+/// Mean of the squared errors over their variances by axis, the reference's own error (8 mm, 0.3 degrees a pair) added.
+fn by_axis(tracked: &[TrackedPose], truth: &[Isometry3<f64>]) -> [f64; 6] {
+    let mut sums = [0.0; 6];
+    for (pose, truth) in tracked.iter().zip(truth).skip(1) {
+        let error = icp_registration::pose_difference(&pose.world_from_camera, truth);
+        for (k, sum) in sums.iter_mut().enumerate() {
+            let reference: f64 = if k < 3 { 8e-3 / 3.0_f64.sqrt() } else { 0.3_f64.to_radians() / 3.0_f64.sqrt() };
+            *sum += error[k].powi(2) / (pose.covariance[(k, k)] + reference.powi(2));
+        }
+    }
+    sums.map(|sum| sum / (tracked.len() - 1) as f64)
+}
+
 fn report(name: &str, tracker: &Tracker, times: &mut [f64], truth: &[Isometry3<f64>]) {
     let online = tracker.trajectory();
     let lost = online.iter().filter(|pose| matches!(pose.state, TrackingState::Lost(_))).count();
@@ -117,6 +130,7 @@ fn report(name: &str, tracker: &Tracker, times: &mut [f64], truth: &[Isometry3<f
     let in_world: Vec<TrackedPose> = online.to_vec();
     let from_first: Vec<Isometry3<f64>> = truth.iter().map(|pose| world.inverse() * pose).collect();
     println!("  normalised squared error {:.2} (6 expected)", normalised_error(&in_world, &from_first));
+    println!("  squared error over variance by axis {:.2?}", by_axis(&in_world, &from_first));
     let mean = times.iter().sum::<f64>() / times.len() as f64;
     times.sort_by(f64::total_cmp);
     println!(
@@ -188,6 +202,21 @@ fn real(folder: &Path) {
     let truth: Vec<_> = names.iter().map(|name| pose(&folder.join(name.replace("depth.png", "pose.txt")))).collect();
     let projection = Arc::new(Projection::pinhole(640, 480, [585.0; 2], [320.0, 240.0]).unwrap());
     let frame = |k: usize| (depth_points(&folder.join(&names[k]), 585.0, [320.0, 240.0]), None);
+    if let Some(size) = argument::<usize>("window") {
+        let mut sums = [0.0; 6];
+        let starts = (0..=names.len() - size).step_by(size);
+        let windows = (names.len() / size) as f64;
+        for first in starts {
+            let (tracker, _) =
+                track(&projection, size, |k| (number(first + k) - number(first)).abs() / 30.0, |k| frame(first + k));
+            let from_first: Vec<_> =
+                truth[first..first + size].iter().map(|pose| truth[first].inverse() * pose).collect();
+            let axes = by_axis(tracker.trajectory(), &from_first);
+            sums.iter_mut().zip(axes).for_each(|(sum, axis)| *sum += axis / windows);
+        }
+        println!("squared error over variance by axis, {windows} windows of {size} frames: {sums:.2?}");
+        return;
+    }
     let (tracker, mut times) = track(&projection, names.len(), |k| (number(k) - number(0)).abs() / 30.0, frame);
     report("7-Scenes red kitchen, kept frames", &tracker, &mut times, &truth);
 }

@@ -49,7 +49,8 @@ pub use multiview::{
 pub use neighbours::{Neighbour, NeighbourTree};
 pub use normals::{OrganisedNormalOptions, UnorganisedNormalOptions, organised_normals, unorganised_normals};
 pub use organised::{
-    FrameAligner, FrameAlignmentOptions, FrameConsistency, OrganisedFrame, Projection, align_frames, frame_consistency,
+    FrameAligner, FrameAlignmentOptions, FrameConsistency, OrganisedFrame, Projection, SharedError, align_frames,
+    frame_consistency,
 };
 pub use pose::{inverse_covariance_transport, pose_difference, step_pose};
 pub use tracking::{

@@ -42,6 +42,7 @@ mod room;
 #[path = "common/scans.rs"]
 mod scans;
 mod sequence;
+mod shared_error;
 mod sr4000;
 mod tracking;
 mod tracking_imu;

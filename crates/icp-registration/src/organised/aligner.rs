@@ -8,6 +8,7 @@ use super::grid::STRIDES;
 use super::options::FrameAlignmentOptions;
 use super::pairs::Rules;
 use super::quality::{Cell, Hold, Verdict};
+use super::shared_error::{Influence, SharedError, Sighting};
 use super::sums::{SUMS, median_residual, normal_equations};
 use super::track::{FEWEST_POINTS, Gauge, Track, blocks, finest_part, is_within_noise, moved, solve, turned};
 use crate::awake::with_thread_awake;
@@ -55,6 +56,7 @@ pub struct FrameAligner {
     chunks: Vec<[f64; SUMS]>,
     scratch: Vec<u32>,
     cells: Vec<Cell>,
+    sightings: Vec<Sighting>,
 }
 
 impl FrameAligner {
@@ -62,7 +64,13 @@ impl FrameAligner {
     /// [`Error::InvalidOption`].
     pub fn new(options: FrameAlignmentOptions) -> Result<Self> {
         options.validate()?;
-        Ok(Self { options, chunks: Vec::new(), scratch: Vec::with_capacity(2 * SAMPLE), cells: Vec::new() })
+        Ok(Self {
+            options,
+            chunks: Vec::new(),
+            scratch: Vec::with_capacity(2 * SAMPLE),
+            cells: Vec::new(),
+            sightings: Vec::new(),
+        })
     }
 
     /// The options.
@@ -75,6 +83,42 @@ impl FrameAligner {
     /// # Errors
     /// As [`align_frames`].
     pub fn align(
+        &mut self,
+        source: &OrganisedFrame,
+        target: &OrganisedFrame,
+        guess: &Isometry3<f64>,
+    ) -> Result<IcpResult> {
+        let (mut result, influence) = self.align_apart(source, target, guess)?;
+        if let Some(influence) = influence {
+            let shared = self.options.shared_error.unwrap_or_else(|| {
+                let mut shared = SharedError::none();
+                shared.learn(&influence);
+                shared
+            });
+            result.covariance = symmetrised(&(result.covariance + shared.covariance(&influence.pose)));
+        }
+        Ok(result)
+    }
+
+    /// The same with a covariance of the random part alone, and what the shared error does to the pose.
+    pub(crate) fn align_apart(
+        &mut self,
+        source: &OrganisedFrame,
+        target: &OrganisedFrame,
+        guess: &Isometry3<f64>,
+    ) -> Result<(IcpResult, Option<Influence>)> {
+        let result = self.registered(source, target, guess)?;
+        let pose = &result.target_from_source;
+        let mut influence = target.influence(source, pose, &mut self.sightings, &mut self.scratch);
+        if let (Some(prior), Some(influence)) = (&self.options.prior, &mut influence) {
+            // What the guess holds, the frames do not move.
+            let from_guess = prior.cholesky().map_or_else(Matrix6::zeros, |c| c.inverse());
+            influence.pose = (Matrix6::identity() - result.covariance * from_guess) * influence.pose;
+        }
+        Ok((result, influence))
+    }
+
+    fn registered(
         &mut self,
         source: &OrganisedFrame,
         target: &OrganisedFrame,

@@ -38,6 +38,8 @@ pub struct OrganisedFrame {
     is_whole: bool,
     /// Plane of each node: unit normal away from the camera, distance; NaN where there is none.
     pub(super) planes: Vec<[f32; 4]>,
+    /// Distances of the planes before others were absorbed, where any may have been.
+    pub(super) measured: Vec<f32>,
     /// Standard deviation of the distance, metre.
     pub(super) sigma: Vec<f32>,
     misfit: Vec<f32>,
@@ -45,7 +47,7 @@ pub struct OrganisedFrame {
     noise: f32,
     scratch: Vec<u32>,
     pub(super) points: Points,
-    has_sigma: bool,
+    pub(super) has_sigma: bool,
 }
 
 impl OrganisedFrame {
@@ -67,6 +69,7 @@ impl OrganisedFrame {
             place: vec![[0.0; 2]; nodes],
             is_whole: true,
             planes: vec![[f32::NAN; 4]; nodes],
+            measured: Vec::new(),
             sigma: vec![0.0; nodes],
             misfit: vec![f32::NAN; nodes],
             noise: 1.0,
@@ -161,6 +164,7 @@ impl OrganisedFrame {
             place: self.place.clone(),
             is_whole: self.is_whole,
             planes: self.planes.clone(),
+            measured: self.planes.iter().map(|plane| plane[3]).collect(),
             sigma: self.sigma.clone(),
             misfit: Vec::new(),
             noise: self.noise,

@@ -14,6 +14,8 @@ use super::pairs::{Locate, Moved, WithLocate, with_locate};
 const AGREEING_SIGMA: f32 = 4.0;
 /// What maps and poses are wrong by beside the noise: this share of the depth.
 const AGREEING_SHARE: f32 = 0.005;
+/// Largest systematic error, share of the depth.
+const LARGEST_ERROR: f32 = 0.03;
 /// Cosine of the largest angle between normals that agree.
 const AGREEING_COSINE: f32 = 0.7;
 /// Frames that a plane remembers: later ones keep this weight, so that a keyframe does not stiffen.
@@ -60,6 +62,18 @@ impl OrganisedFrame {
         };
         with_locate(self, Partners { target: self, source, pose: self_from_source, stride, each: judge });
         agreement
+    }
+
+    /// Fraction of about `most` nodes of `source` that may lie on the surfaces of this one, measured with systematic errors.
+    pub(crate) fn nearness(&self, source: &Self, self_from_source: &Isometry3<f64>, most: usize) -> f64 {
+        let stride = source.stride_for(most);
+        let (mut points, mut near) = (0_usize, 0_usize);
+        let count = |partner: Option<Partner>| {
+            points += 1;
+            near += usize::from(partner.is_some_and(|p| p.may_be_the_same()));
+        };
+        with_locate(self, Partners { target: self, source, pose: self_from_source, stride, each: count });
+        near as f64 / points.max(1) as f64
     }
 
     /// Every how many nodes along columns and rows about `most` are left.
@@ -176,6 +190,9 @@ pub(crate) fn thumbnail_difference(a: &[f32], b: &[f32], cols: usize, shift: [is
 
 /// How a source point lies to the target plane it falls on.
 pub(super) struct Partner {
+    /// The source's node.
+    pub(super) source: u32,
+    /// The target's node.
     pub(super) node: u32,
     /// In the target's frame.
     pub(super) point: [f32; 3],
@@ -190,6 +207,12 @@ impl Partner {
     /// Whether the point lies on the plane and its surface runs along it.
     pub(super) fn agrees(&self) -> bool {
         self.residual.abs() <= self.tolerance() && self.cosine >= AGREEING_COSINE
+    }
+
+    /// Whether it may be the same surface, measured with a systematic error.
+    pub(super) fn may_be_the_same(&self) -> bool {
+        self.residual.abs() <= AGREEING_SIGMA * self.variance().sqrt() - LARGEST_ERROR * self.point[2]
+            && self.cosine >= AGREEING_COSINE
     }
 
     pub(super) fn variance(&self) -> f32 {
@@ -266,7 +289,8 @@ impl<F: FnMut(Option<Partner>)> WithLocate for Partners<'_, F> {
                 if let Some((point, normal)) = self.source.node(k) {
                     let p = turn(point);
                     let p = [0, 1, 2].map(|i| p[i] + t[i]);
-                    (self.each)(partner(self.target, locate, p, turn(normal), self.source.sigma[k]));
+                    let partner = partner(self.target, locate, p, turn(normal), self.source.sigma[k]);
+                    (self.each)(partner.map(|partner| Partner { source: k as u32, ..partner }));
                 }
             }
         }
@@ -291,6 +315,7 @@ fn partner<L: Locate>(
     let plane = target.planes[node];
     let dot = |v: &[f32; 3]| plane[0] * v[0] + plane[1] * v[1] + plane[2] * v[2];
     plane[3].is_finite().then(|| Partner {
+        source: 0,
         node: node as u32,
         point: p,
         residual: dot(&p) - plane[3],

@@ -2,6 +2,7 @@
 
 use nalgebra::Matrix6;
 
+use super::shared_error::SharedError;
 use crate::error::{Error, Result};
 use crate::icp::DegeneracyPolicy;
 
@@ -14,6 +15,10 @@ pub struct FrameAlignmentOptions {
     /// most probable pose for guess and frames together, and motions that the geometry does not determine come from
     /// the guess alone. `None`: the guess is but a start.
     pub prior: Option<Matrix6<f64>>,
+    /// The systematic error that all frames of the sensor share: its part of the covariance does not fall with the number
+    /// of pixels. `None`: estimated from the residuals of the pair, which tell the more of it the farther the camera has
+    /// moved. Default `None`.
+    pub shared_error: Option<SharedError>,
     /// A motion counts as undetermined when the predicted standard deviation of points at the frame's radius exceeds
     /// this, metre. `None`: 1/300 of the radius.
     pub max_motion_sigma_m: Option<f64>,
@@ -45,6 +50,7 @@ impl Default for FrameAlignmentOptions {
         Self {
             degeneracy: DegeneracyPolicy::Report,
             prior: None,
+            shared_error: None,
             max_motion_sigma_m: None,
             levels: 4,
             other_starts: 14,

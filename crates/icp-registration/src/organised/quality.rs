@@ -28,9 +28,9 @@ const CLEAR_SIGNIFICANCE: f64 = 5.0;
 const CLIP: f64 = 5.0;
 /// Share of the largest information that rounding can imitate (single precision).
 const ROUNDING: f64 = 1e-7;
-/// Smallest variance of a score, as a share of the information: a frame registered with itself leaves no residual at all, and
-/// still rounding (residuals of a ten thousandth of their standard deviation) remains.
-const LEAST_SCORE: f64 = 1e-8;
+/// Smallest variance of the scores as a share of what the noise of the nodes lets expect: independent frames show about a
+/// half, as plane fits share their noise.
+const LEAST_SCORE: f64 = 0.25;
 /// Parts of the pairs, each with cells of its own, that threads may take.
 const PARTS: usize = 4;
 /// 6 scores and 21 products.
@@ -79,7 +79,9 @@ impl Verdict {
             // Too few cells to estimate from: the pairs of a cell taken as fully dependent.
             Residuals::Settled => independent_scores(moved, rules, blocks) * (normal.pairs as f64 / used.max(1) as f64),
         };
-        let score = score + Matrix6::identity() * (LEAST_SCORE / 6.0 * information.trace());
+        // Frames that are copies of each other leave no residuals: their noise is still that of their nodes.
+        let missing = (LEAST_SCORE - score.trace() / normal.matrix.trace()).max(0.0);
+        let score = score + normal.matrix * missing;
         let significant = |motion: &Vector6<f64>, information| is_significant(cells, information, motion);
         let directions = Directions::new(&information, |_| (score, 1.0), significant, ROUNDING, max_sigma_m)?;
         Ok(Self { directions, normal })

@@ -1,49 +1,121 @@
 //! Poses of the keyframes from the registrations between them.
 //!
-//! Each registration is an observed relative pose with its covariance. A chain needs no adjustment; where a
-//! registration closes a loop, all poses are adjusted by least squares (Gauss and Newton, first keyframe held).
+//! Each registration is an observed relative pose with its random covariance and its derivative by the field of the
+//! sensor's shared error. A chain needs no adjustment; where a registration closes a loop, all poses and the field, which
+//! is observed with its variances as 0, are adjusted by least squares (Gauss and Newton, first keyframe held).
 
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix6, Vector6};
 
-use super::motion::{Uncertain, product_jacobians};
+use super::motion::{Uncertain, inverse_jacobian, product_jacobians};
+use super::relation::Relation;
+use crate::organised::{COEFFICIENTS, Field, FieldMatrix, SharedError};
 use crate::pose::{pose_difference, step_pose, symmetrised};
 
 const MAX_ITERATIONS: usize = 10;
 /// Steps (metre, radian) below which the adjustment has converged: far below every standard deviation.
 const STEP: f64 = 1e-7;
+/// Squared distance (six components) that one in a thousand of right registrations exceeds.
+const LARGEST_SQUARE: f64 = 22.46;
 
 /// An observed relative pose.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Edge {
     pub(super) a: usize,
     pub(super) b: usize,
-    pub(super) a_from_b: Uncertain,
+    pub(super) a_from_b: Relation,
 }
 
 /// Keyframes and what was observed between them.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 pub(super) struct Graph {
     /// World from keyframe.
-    pub(super) poses: Vec<Uncertain>,
+    pub(super) poses: Vec<Relation>,
     pub(super) edges: Vec<Edge>,
+    /// Variances of the coefficients of the field that all registrations share, and of those that single ones see beside it.
+    common: Field,
+    own: Field,
+    /// The field that is assumed, as closed loops tell it, and its covariance.
+    pub(super) field: Field,
+    pub(super) covariance: FieldMatrix,
+    /// By how much observations scatter more than their covariances say, as closed loops tell it; 1 or more.
+    factor: f64,
+    /// Whether any loop has been closed.
+    pub(super) closed: bool,
     /// Whether there are observations that the poses do not know of yet.
     open: bool,
 }
 
+impl Default for Graph {
+    fn default() -> Self {
+        Self {
+            poses: Vec::new(),
+            edges: Vec::new(),
+            common: Field::zeros(),
+            own: Field::zeros(),
+            field: Field::zeros(),
+            covariance: FieldMatrix::zeros(),
+            factor: 1.0,
+            closed: false,
+            open: false,
+        }
+    }
+}
+
+/// Normal equations of all poses but the first: their matrix, its product with their derivatives by the field (a column a
+/// coefficient), right-hand side, and the parts of the field.
+struct Normal {
+    matrix: DMatrix<f64>,
+    cross: DMatrix<f64>,
+    right: DVector<f64>,
+    field: FieldMatrix,
+    field_right: Field,
+}
+
 impl Graph {
     pub(super) fn relative(&self, a: usize, b: usize) -> Isometry3<f64> {
-        self.poses[a].pose.inverse() * self.poses[b].pose
+        self.poses[a].pose().inverse() * self.poses[b].pose()
     }
 
     pub(super) fn joined(&self, a: usize, b: usize) -> bool {
         self.edges.iter().any(|e| (e.a, e.b) == (a, b) || (e.a, e.b) == (b, a))
     }
 
+    /// Sets what is known of the shared error before any loop.
+    pub(super) fn set_shared_error(&mut self, shared: &SharedError) {
+        (self.common, self.own) = (shared.common(), shared.own());
+        if !self.closed {
+            self.covariance = FieldMatrix::from_diagonal(&self.common);
+        }
+    }
+
+    /// Adds a pose that is measured from another one, and the observation; returns its index.
+    pub(super) fn add(&mut self, from: usize, from_from_new: &Relation) -> usize {
+        let b = self.poses.len();
+        self.poses.push(self.from(from, from_from_new));
+        self.edges.push(Edge { a: from, b, a_from_b: *from_from_new });
+        b
+    }
+
+    /// A pose that is measured from another one.
+    pub(super) fn from(&self, from: usize, from_from_new: &Relation) -> Relation {
+        self.poses[from].then(&self.weighed(from_from_new))
+    }
+
+    /// An observation with all random errors that it has, as loops tell them.
+    fn weighed(&self, observation: &Relation) -> Relation {
+        let mut weighed = observation.with_own(&self.own);
+        weighed.random.covariance *= self.factor;
+        weighed
+    }
+
     /// Whether an observation fits what is known already, at the 99.9 % level.
     pub(super) fn fits(&self, edge: &Edge) -> bool {
-        // The errors of the two poses have most of their past in common, so their sum is a generous bound.
-        let predicted = self.poses[edge.a].inverse().then(&self.poses[edge.b]);
-        predicted.mahalanobis_squared(&edge.a_from_b).is_some_and(|m| m < 22.46)
+        // The random errors of the two poses have most of their past in common, so their sum is a generous bound.
+        let mut predicted = self.poses[edge.a].inverse().then(&self.poses[edge.b]);
+        predicted.by_field -= edge.a_from_b.by_field;
+        let predicted = predicted.total(&self.covariance);
+        let square = predicted.mahalanobis_squared(&self.weighed(&edge.a_from_b).random);
+        square.is_some_and(|square| square < LARGEST_SQUARE)
     }
 
     /// Takes an observation that fits; says whether it did.
@@ -56,79 +128,134 @@ impl Graph {
         fits
     }
 
-    /// Adjusts all poses where observations beyond a chain have come in since the last time.
-    pub(super) fn adjust_if_closed(&mut self) {
+    /// Adjusts all poses where observations beyond a chain have come in since the last time; what the assumed field has
+    /// changed by.
+    pub(super) fn adjust_if_closed(&mut self) -> Field {
+        let before = self.field;
         if std::mem::take(&mut self.open) {
+            self.closed = true;
             self.adjust();
         }
+        self.field - before
     }
 
     /// Adjusts all poses; leaves them as they are where the observations do not determine them.
     pub(super) fn adjust(&mut self) {
-        let mut poses: Vec<Isometry3<f64>> = self.poses.iter().map(|p| p.pose).collect();
-        let mut inverse = None;
+        let mut poses: Vec<Isometry3<f64>> = self.poses.iter().map(|p| *p.pose()).collect();
+        let mut field = self.field;
+        let mut last = None;
         for _ in 0..MAX_ITERATIONS {
-            let (matrix, right) = self.normal_equations(&poses);
-            let Some(factor) = matrix.cholesky() else { return };
-            let step = factor.solve(&right);
+            let normal = self.normal_equations(&poses, &(field - self.field));
+            let Some(factor) = normal.matrix.clone().cholesky() else { return };
+            let by_field = factor.solve(&normal.cross);
+            let alone = factor.solve(&normal.right);
+            let Some((change, covariance)) = self.field_step(&normal, &by_field, &field) else { return };
+            let step = alone + &by_field * change;
             if !step.iter().all(|v| v.is_finite()) {
                 return;
             }
+            field += change;
             for (k, pose) in poses.iter_mut().enumerate().skip(1) {
                 *pose = step_pose(pose, &Vector6::from_fn(|i, _| step[6 * (k - 1) + i]));
             }
-            inverse = Some(factor);
+            last = Some((factor, by_field, covariance));
             if step.amax() < STEP {
                 break;
             }
         }
-        let Some(covariance) = inverse.map(|factor| factor.inverse()) else { return };
-        let datum = self.poses.first().map_or_else(Matrix6::zeros, |p| p.covariance);
-        for (k, (kept, pose)) in self.poses.iter_mut().zip(poses).enumerate() {
-            let block = |k: usize| {
-                let view = covariance.fixed_view::<6, 6>(6 * (k - 1), 6 * (k - 1));
-                symmetrised(&view.into_owned())
-            };
-            *kept = Uncertain { pose, covariance: if k == 0 { datum } else { block(k) } };
+        let Some((factor, by_field, covariance)) = last else { return };
+        let random = factor.inverse();
+        for (k, (kept, pose)) in self.poses.iter_mut().zip(poses).enumerate().skip(1) {
+            let row = 6 * (k - 1);
+            let block = symmetrised(&random.fixed_view::<6, 6>(row, row).into_owned());
+            let by_field = by_field.fixed_view::<6, COEFFICIENTS>(row, 0).into_owned();
+            *kept = Relation { random: Uncertain { pose, covariance: block }, by_field };
         }
+        let change = field - self.field;
+        for edge in &mut self.edges {
+            edge.a_from_b = edge.a_from_b.moved(&change);
+        }
+        (self.field, self.covariance) = (field, covariance);
+        self.set_factor();
     }
 
-    /// Normal matrix and right-hand side of all poses but the first.
-    fn normal_equations(&self, poses: &[Isometry3<f64>]) -> (DMatrix<f64>, DVector<f64>) {
+    /// Sets the variance factor after an adjustment, and enlarges the covariances by it.
+    fn set_factor(&mut self) {
+        let square = |edge: &Edge| {
+            let v = pose_difference(&self.relative(edge.a, edge.b), edge.a_from_b.pose());
+            self.weighed(&edge.a_from_b).random.covariance.cholesky().map_or(0.0, |c| v.dot(&c.solve(&v)))
+        };
+        let squares: f64 = self.edges.iter().map(square).sum();
+        let redundancy = 6 * (self.edges.len() + 1).saturating_sub(self.poses.len());
+        // As one more observation of the factor that is assumed now.
+        let change = (squares + 6.0) / (redundancy as f64 + 6.0);
+        let factor = (self.factor * change).max(1.0);
+        for pose in &mut self.poses {
+            pose.random.covariance *= factor / self.factor;
+        }
+        self.factor = factor;
+    }
+
+    /// The step of the field, all poses following it (`by_field`), and its covariance. In units of the standard deviations
+    /// of the coefficients, since some may be 0.
+    fn field_step(&self, normal: &Normal, by_field: &DMatrix<f64>, field: &Field) -> Option<(Field, FieldMatrix)> {
+        let sigma = self.common.map(f64::sqrt);
+        let scale = FieldMatrix::from_diagonal(&sigma);
+        let followed = normal.cross.transpose() * by_field;
+        let reduced = normal.field - FieldMatrix::from_fn(|r, c| followed[(r, c)]);
+        let matrix = scale * reduced * scale + FieldMatrix::identity();
+        let right = by_field.transpose() * &normal.right;
+        let right = normal.field_right + Field::from_fn(|k, _| right[k]);
+        // What the linear equations say about the whole field, not about its step.
+        let right = right + reduced * field;
+        let factor = ((matrix + matrix.transpose()) * 0.5).cholesky()?;
+        let whole = scale * factor.solve(&(scale * right));
+        Some((whole - field, scale * factor.inverse() * scale))
+    }
+
+    /// `change`: what the field is assumed to be more than when the observations were corrected by it.
+    fn normal_equations(&self, poses: &[Isometry3<f64>], change: &Field) -> Normal {
         let size = 6 * (poses.len() - 1);
-        let (mut matrix, mut right) = (DMatrix::zeros(size, size), DVector::zeros(size));
+        let mut normal = Normal {
+            matrix: DMatrix::zeros(size, size),
+            cross: DMatrix::zeros(size, COEFFICIENTS),
+            right: DVector::zeros(size),
+            field: FieldMatrix::zeros(),
+            field_right: Field::zeros(),
+        };
         for edge in &self.edges {
             let model = poses[edge.a].inverse() * poses[edge.b];
-            let v = pose_difference(&model, &edge.a_from_b.pose);
-            let Some(factor) = edge.a_from_b.covariance.cholesky() else { continue };
+            let observed = self.weighed(&edge.a_from_b.moved(change));
+            let v = pose_difference(&model, observed.pose());
+            let Some(factor) = observed.random.covariance.cholesky() else { continue };
             let information = factor.inverse();
+            let by_field = information * observed.by_field;
+            normal.field += observed.by_field.transpose() * by_field;
+            normal.field_right -= by_field.transpose() * v;
             let jacobians = [(edge.a, by_first(&poses[edge.a], &model)), (edge.b, by_second(&poses[edge.a]))];
-            for (k, jk) in &jacobians {
-                if *k == 0 {
-                    continue;
-                }
+            for (k, jk) in jacobians.iter().filter(|(k, _)| *k != 0) {
                 let row = 6 * (k - 1);
                 let weighted = jk.transpose() * information;
-                let mut part = right.fixed_rows_mut::<6>(row);
+                let mut part = normal.right.fixed_rows_mut::<6>(row);
                 part += weighted * v;
-                for (l, jl) in &jacobians {
-                    if *l != 0 {
-                        let mut block = matrix.fixed_view_mut::<6, 6>(row, 6 * (l - 1));
-                        block += weighted * jl;
-                    }
+                let mut part = normal.cross.fixed_view_mut::<6, COEFFICIENTS>(row, 0);
+                part += jk.transpose() * by_field;
+                for (l, jl) in jacobians.iter().filter(|(l, _)| *l != 0) {
+                    let mut block = normal.matrix.fixed_view_mut::<6, 6>(row, 6 * (l - 1));
+                    block += weighted * jl;
                 }
             }
         }
-        (matrix, right)
+        normal
     }
 
     /// Takes keyframe `k` (not the first) out. What joined its neighbours through it joins them to the one that was
     /// best determined from it; returns that one and its pose in the frame of `k`, numbered as before.
-    pub(super) fn remove(&mut self, k: usize) -> Option<(usize, Uncertain)> {
+    pub(super) fn remove(&mut self, k: usize) -> Option<(usize, Relation)> {
         let from_k = |e: &Edge| if e.a == k { (e.b, e.a_from_b) } else { (e.a, e.a_from_b.inverse()) };
-        let mut joined: Vec<(usize, Uncertain)> =
+        let mut joined: Vec<(usize, Relation)> =
             self.edges.iter().filter(|e| e.a == k || e.b == k).map(from_k).collect();
-        joined.sort_by(|x, y| x.1.covariance.trace().total_cmp(&y.1.covariance.trace()));
+        joined.sort_by(|x, y| x.1.random.covariance.trace().total_cmp(&y.1.random.covariance.trace()));
         let (hub, k_from_hub) = *joined.first()?;
         self.edges.retain(|e| e.a != k && e.b != k);
         for (other, k_from_other) in joined.iter().skip(1) {
@@ -159,22 +286,12 @@ fn by_second(world_from_a: &Isometry3<f64>) -> Matrix6<f64> {
     product_jacobians(&world_from_a.inverse(), &Isometry3::identity()).1
 }
 
-/// Jacobian of the tangent of the inverse.
-fn inverse_jacobian(a_from_b: &Isometry3<f64>) -> Matrix6<f64> {
-    let r = a_from_b.rotation.to_rotation_matrix().into_inner();
-    let lever = (r.transpose() * a_from_b.translation.vector).cross_matrix();
-    let mut jacobian = Matrix6::zeros();
-    jacobian.fixed_view_mut::<3, 3>(0, 0).copy_from(&-r.transpose());
-    jacobian.fixed_view_mut::<3, 3>(0, 3).copy_from(&-lever);
-    jacobian.fixed_view_mut::<3, 3>(3, 3).copy_from(&-r);
-    jacobian
-}
-
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
 
     use super::*;
+    use crate::organised::ByField;
     use nalgebra::Vector3;
     use rand::SeedableRng;
     use rand_distr::{Distribution, StandardNormal};
@@ -197,13 +314,12 @@ mod tests {
                 SIGMA * n
             });
             let pose = step_pose(&(truth(a).inverse() * truth(b)), &noise);
-            Edge { a, b, a_from_b: Uncertain { pose, covariance: Matrix6::identity() * SIGMA * SIGMA } }
+            let random = Uncertain { pose, covariance: Matrix6::identity() * SIGMA * SIGMA };
+            Edge { a, b, a_from_b: Relation { random, by_field: ByField::zeros() } }
         };
-        let mut graph = Graph { poses: vec![Uncertain::exact(truth(0))], edges: Vec::new(), open: false };
+        let mut graph = Graph { poses: vec![Relation::exact(truth(0))], ..Graph::default() };
         for k in 1..8 {
-            let observed = edge(k - 1, k);
-            graph.poses.push(graph.poses[k - 1].then(&observed.a_from_b));
-            graph.edges.push(observed);
+            graph.add(k - 1, &edge(k - 1, k).a_from_b);
         }
         let closing = edge(7, 0);
         assert!(graph.fits(&closing));
@@ -218,8 +334,8 @@ mod tests {
         for seed in 0..runs {
             let mut graph = ring(seed);
             work(&mut graph);
-            let error = pose_difference(&graph.poses[4].pose, &truth(4));
-            nees += error.dot(&graph.poses[4].covariance.cholesky().unwrap().solve(&error));
+            let error = pose_difference(graph.poses[4].pose(), &truth(4));
+            nees += error.dot(&graph.poses[4].random.covariance.cholesky().unwrap().solve(&error));
             square += error.fixed_rows::<3>(0).norm_squared();
         }
         (nees / runs as f64, square / runs as f64)
@@ -246,7 +362,7 @@ mod tests {
         thinned.adjust();
         // With two neighbours nothing is lost but what the second order of rotations of 2 mrad leaves.
         for (k, l) in [(4, 4), (5, 5), (7, 6)] {
-            let gap = pose_difference(&whole.poses[k].pose, &thinned.poses[l].pose).norm();
+            let gap = pose_difference(whole.poses[k].pose(), thinned.poses[l].pose()).norm();
             assert!(gap < 0.02 * SIGMA, "{gap}");
         }
         assert!(!thinned.joined(0, 3) && thinned.joined(0, 6) && thinned.joined(5, 6));
@@ -268,10 +384,49 @@ mod tests {
     }
 
     #[test]
+    fn a_loop_tells_the_field_that_its_registrations_share() {
+        let shared = SharedError::known(&[5e-3, 2e-3, 1e-3]);
+        let sigma = shared.common().map(f64::sqrt);
+        let (mut nees, mut before, mut after, runs) = (0.0, 0.0, 0.0, 200);
+        for seed in 0..runs {
+            let mut random = Pcg64::seed_from_u64(10_000 + seed);
+            let mut draw = || -> f64 { StandardNormal.sample(&mut random) };
+            let field = sigma.map(|s| s * draw());
+            let mut graph = ring(seed);
+            graph.set_shared_error(&shared);
+            let closing = graph.edges.pop().unwrap();
+            let mut edges = std::mem::take(&mut graph.edges);
+            edges.push(closing);
+            for edge in &mut edges {
+                edge.a_from_b.by_field = ByField::from_fn(|_, _| draw());
+                let error = -edge.a_from_b.by_field * field;
+                edge.a_from_b.random.pose = step_pose(edge.a_from_b.pose(), &error);
+            }
+            graph.poses.truncate(1);
+            for edge in &edges[..7] {
+                graph.add(edge.a, &edge.a_from_b);
+            }
+            before += pose_difference(graph.poses[4].pose(), &truth(4)).norm_squared();
+            if !graph.offer(&edges[7]) {
+                continue;
+            }
+            graph.adjust_if_closed();
+            let error = pose_difference(graph.poses[4].pose(), &truth(4));
+            after += error.norm_squared();
+            let covariance = graph.poses[4].total(&graph.covariance).covariance;
+            nees += error.dot(&covariance.cholesky().unwrap().solve(&error));
+        }
+        let mean = nees / runs as f64;
+        // 6 ± 0.25; the variance factor, 1 or more, enlarges covariances by chance.
+        assert!((4.5..7.0).contains(&mean), "{mean}");
+        assert!(after < 0.6 * before, "{after} {before}");
+    }
+
+    #[test]
     fn a_wrong_registration_does_not_fit() {
         let mut graph = ring(5);
         let mut wrong = graph.edges.pop().unwrap();
-        wrong.a_from_b.pose = step_pose(&wrong.a_from_b.pose, &Vector6::repeat(0.1));
+        wrong.a_from_b.random.pose = step_pose(wrong.a_from_b.pose(), &Vector6::repeat(0.1));
         assert!(!graph.fits(&wrong));
     }
 }

@@ -2,8 +2,8 @@
 
 use nalgebra::Isometry3;
 
-use super::graph::{Edge, Graph};
-use super::motion::Uncertain;
+use super::graph::Graph;
+use super::relation::Relation;
 use crate::cloud::Cloud;
 use crate::coarse::FeatureCloud;
 use crate::organised::OrganisedFrame;
@@ -16,6 +16,9 @@ pub(super) const SAMPLE: usize = 2500;
 const CANDIDATES: usize = 4;
 /// Cosine of the largest angle between the axes of two cameras that can see the same from the same side.
 const LEAST_VIEW_COSINE: f64 = 0.3;
+
+/// Fraction of the nodes of the second frame that lie on the first, at a pose of the second, from about so many of them.
+pub(super) type Overlap = fn(&OrganisedFrame, &OrganisedFrame, &Isometry3<f64>, usize) -> f64;
 
 /// A frame that others are registered with.
 #[derive(Debug, Clone)]
@@ -47,19 +50,15 @@ pub(super) struct Keyframes {
 }
 
 impl Keyframes {
-    pub(super) fn start(&mut self, frame: &OrganisedFrame, world_from_keyframe: &Uncertain) {
+    pub(super) fn start(&mut self, frame: &OrganisedFrame, world_from_keyframe: &Isometry3<f64>) {
         self.push(frame);
-        self.graph.poses.push(*world_from_keyframe);
+        self.graph.poses.push(Relation::exact(*world_from_keyframe));
     }
 
     /// A new keyframe at a pose measured from keyframe `from`; returns its index.
-    pub(super) fn add(&mut self, frame: &OrganisedFrame, from: usize, from_from_new: &Uncertain) -> usize {
+    pub(super) fn add(&mut self, frame: &OrganisedFrame, from: usize, from_from_new: &Relation) -> usize {
         self.push(frame);
-        let pose = self.graph.poses[from].then(from_from_new);
-        self.graph.poses.push(pose);
-        let b = self.list.len() - 1;
-        self.graph.edges.push(Edge { a: from, b, a_from_b: *from_from_new });
-        b
+        self.graph.add(from, from_from_new)
     }
 
     fn push(&mut self, frame: &OrganisedFrame) {
@@ -69,17 +68,18 @@ impl Keyframes {
         self.anchors.push(Anchor::Kept);
     }
 
-    /// A few keyframes other than `skip` with the fraction of the frame that would agree with them, at a pose given from
-    /// keyframe `from`; best first.
+    /// A few keyframes among `tried` with the fraction of the frame that they would share, as `overlap` tells it, at a pose
+    /// given from keyframe `from`; best first.
     pub(super) fn candidates(
         &self,
         current: &OrganisedFrame,
         from: usize,
         from_from_camera: &Isometry3<f64>,
-        skip: usize,
+        tried: impl Fn(usize) -> bool,
+        overlap: Overlap,
     ) -> Vec<(f64, usize)> {
         let mut found = Vec::with_capacity(self.list.len());
-        for k in (0..self.list.len()).filter(|k| *k != skip) {
+        for k in (0..self.list.len()).filter(|k| tried(*k)) {
             let pose = self.graph.relative(k, from) * from_from_camera;
             if pose.rotation.to_rotation_matrix()[(2, 2)] > LEAST_VIEW_COSINE {
                 found.push((0.0, k, pose));
@@ -87,8 +87,8 @@ impl Keyframes {
         }
         // Few points tell which ones are worth more.
         for most in [SAMPLE / 32, SAMPLE / 4] {
-            for (overlap, k, pose) in &mut found {
-                *overlap = self.list[*k].frame.agreement(current, pose, most).overlap();
+            for (share, k, pose) in &mut found {
+                *share = overlap(&self.list[*k].frame, current, pose, most);
             }
             found.sort_by(|x, y| y.0.total_cmp(&x.0).then(x.1.cmp(&y.1)));
             found.truncate(CANDIDATES);
@@ -109,7 +109,7 @@ impl Keyframes {
         let free = (1..self.list.len()).filter(|k| !spared.contains(k));
         let k = free.min_by(|x, y| gap(*x).total_cmp(&gap(*y)))?;
         let (hub, k_from_hub) = self.graph.remove(k)?;
-        let joined = Anchor::Joined { to: self.list[hub].number, to_from_this: k_from_hub.pose.inverse() };
+        let joined = Anchor::Joined { to: self.list[hub].number, to_from_this: k_from_hub.pose().inverse() };
         self.anchors[self.list[k].number] = joined;
         self.list.remove(k);
         Some(k)
@@ -120,8 +120,8 @@ impl Keyframes {
         let (mut points, mut normals, mut sigmas) = (Vec::new(), Vec::new(), Vec::new());
         for (keyframe, pose) in self.list.iter().zip(&self.graph.poses) {
             for (point, normal, sigma) in keyframe.frame.surface() {
-                points.push(pose.pose * point);
-                normals.push(pose.pose * normal);
+                points.push(pose.pose() * point);
+                normals.push(pose.pose() * normal);
                 sigmas.push(sigma);
             }
         }
@@ -136,7 +136,7 @@ impl Keyframes {
             match self.anchors.get(number)? {
                 Anchor::Kept => {
                     let k = self.list.iter().position(|k| k.number == number)?;
-                    return Some(self.graph.poses[k].pose * chain);
+                    return Some(self.graph.poses[k].pose() * chain);
                 }
                 Anchor::Joined { to, to_from_this } => {
                     chain = to_from_this * chain;

@@ -6,12 +6,13 @@ use super::keyframes::SAMPLE;
 use super::motion::{Uncertain, diagonal};
 use super::options::TrackerOptions;
 use super::prediction::{Grounds, Last, Prediction};
+use super::relation::Relation;
 use super::tracked::LossReason;
 use super::tracker::Tracker;
 use super::velocity::Velocity;
 use crate::error::Error;
-use crate::organised::{Agreement, FrameAligner, OrganisedFrame};
-use crate::pose::symmetrised;
+use crate::organised::{Agreement, ByField, Field, FrameAligner, Influence, OrganisedFrame};
+use crate::pose::{step_pose, symmetrised};
 
 /// Keyframes tried beside the reference.
 const NEIGHBOURS: usize = 2;
@@ -37,8 +38,12 @@ const START: f64 = 0.05;
 pub(super) struct Measured {
     /// Index of the keyframe.
     pub(super) keyframe: usize,
-    /// Keyframe from camera.
+    /// Keyframe from camera, for the field that is assumed for the shared error; the covariance is of what is random.
     pub(super) pose: Uncertain,
+    /// The same as the frames were brought together.
+    pub(super) aligned: Isometry3<f64>,
+    /// What the shared error does to it.
+    pub(super) influence: Option<Influence>,
     /// Whether the geometry determines all motions.
     pub(super) determined: bool,
     pub(super) agreement: Agreement,
@@ -81,6 +86,16 @@ impl Measured {
         Uncertain { covariance: self.pose.covariance * 0.5, ..self.pose }
     }
 
+    /// Derivative of the pose by the field that is assumed.
+    pub(super) fn by_field(&self) -> ByField {
+        self.influence.map_or_else(ByField::zeros, |influence| -influence.pose)
+    }
+
+    /// As an observation between the keyframe and the camera.
+    pub(super) fn relation(&self) -> Relation {
+        Relation { random: self.pose, by_field: self.by_field() }
+    }
+
     /// The part that they share: the keyframe's own noise.
     pub(super) fn shared(&self) -> Matrix6<f64> {
         self.pose.covariance * 0.5
@@ -108,7 +123,7 @@ impl Tracker {
     /// Registers the current frame with keyframe `k`.
     pub(super) fn try_keyframe(&mut self, k: usize, guess: &Isometry3<f64>) -> Result<Measured, LossReason> {
         let target = &self.keyframes.list[k].frame;
-        register(&mut self.aligner, &self.options, &self.current, target, guess)
+        register(&mut self.aligner, &self.options, &self.current, target, guess, &self.keyframes.graph.field)
             .map(|measured| Measured { keyframe: k, ..measured })
     }
 
@@ -125,10 +140,12 @@ impl Tracker {
             return None;
         }
         let guess = last.own.pose.inverse() * prediction.own.pose;
-        let measured = register(&mut self.aligner, &self.options, &self.current, &self.previous, &guess).ok()?;
+        let field = &self.keyframes.graph.field;
+        let measured = register(&mut self.aligner, &self.options, &self.current, &self.previous, &guess, field).ok()?;
         helps(&measured).then(|| {
             let total = Uncertain { covariance: last.own.covariance + last.shared, ..last.own };
-            let keyframe = self.keyframes.add(&self.previous, last.keyframe, &total);
+            let relation = Relation { random: total, by_field: last.by_field };
+            let keyframe = self.keyframes.add(&self.previous, last.keyframe, &relation);
             Measured { keyframe, ..measured }
         })
     }
@@ -152,7 +169,9 @@ impl Tracker {
         if first.as_ref().is_ok_and(|measured| usable(measured) && measured.agrees()) {
             return first;
         }
-        let candidates = self.keyframes.candidates(&self.current, reference, &prediction.own.pose, reference);
+        let others = |k: usize| k != reference;
+        let pose = &prediction.own.pose;
+        let candidates = self.keyframes.candidates(&self.current, reference, pose, others, agreeing);
         for (_, k) in candidates.into_iter().take(NEIGHBOURS) {
             let guess = self.keyframes.graph.relative(k, reference) * prediction.own.pose;
             if let Ok(measured) = self.try_keyframe(k, &guess)
@@ -228,7 +247,7 @@ impl Tracker {
     /// space that it looked through, and what they share is found at one place only.
     pub(super) fn stands_alone(&self, measured: &Measured) -> bool {
         let keyframe = &self.keyframes.list[measured.keyframe].frame;
-        let pose = &measured.pose.pose;
+        let pose = &measured.aligned;
         let sound = |a: &Agreement| a.overlap() >= LEAST_OVERLAP && a.consent() >= LEAST_CONSENT;
         measured.determined
             && sound(&measured.agreement)
@@ -237,21 +256,29 @@ impl Tracker {
     }
 }
 
-/// Registers a frame with another, near a guess.
+/// Fraction of a frame that agrees with another within the noise.
+pub(super) fn agreeing(target: &OrganisedFrame, source: &OrganisedFrame, pose: &Isometry3<f64>, most: usize) -> f64 {
+    target.agreement(source, pose, most).overlap()
+}
+
+/// Registers a frame with another, near a guess; the pose is corrected by the field that is assumed.
 fn register(
     aligner: &mut FrameAligner,
     options: &TrackerOptions,
     source: &OrganisedFrame,
     target: &OrganisedFrame,
     guess: &Isometry3<f64>,
+    field: &Field,
 ) -> Result<Measured, LossReason> {
-    let result = aligner.align(source, target, guess).map_err(|error| match error {
+    let (result, influence) = aligner.align_apart(source, target, guess).map_err(|error| match error {
         Error::TooFewPoints { .. } => LossReason::TooFewPoints,
         Error::TooFewCorrespondences { .. } => LossReason::TooLittleOverlap,
         _ => LossReason::NotConverged,
     })?;
-    let pose = Uncertain { pose: result.target_from_source, covariance: result.covariance };
-    let agreement = target.agreement(source, &pose.pose, SAMPLE);
+    let aligned = result.target_from_source;
+    let by_field = influence.map_or_else(ByField::zeros, |influence| influence.pose);
+    let pose = Uncertain { pose: step_pose(&aligned, &(-by_field * field)), covariance: result.covariance };
+    let agreement = target.agreement(source, &aligned, SAMPLE);
     if agreement.consent() < options.min_agreement {
         return Err(LossReason::LargeResiduals);
     }
@@ -262,5 +289,5 @@ fn register(
         return Err(LossReason::NotConverged);
     }
     let determined = result.degenerate.is_empty();
-    Ok(Measured { keyframe: 0, pose, determined, agreement, rms_m: result.rms_m })
+    Ok(Measured { keyframe: 0, pose, aligned, influence, determined, agreement, rms_m: result.rms_m })
 }

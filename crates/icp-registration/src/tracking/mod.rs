@@ -14,6 +14,8 @@ mod locate;
 mod motion;
 mod options;
 mod prediction;
+mod relation;
+mod returns;
 mod tracked;
 mod tracker;
 mod unguessed;

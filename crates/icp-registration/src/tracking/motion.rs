@@ -94,6 +94,17 @@ pub(super) fn product_jacobians(a_from_b: &Isometry3<f64>, b_from_c: &Isometry3<
     (by_first, by_second)
 }
 
+/// Jacobian of the tangent of the inverse.
+pub(super) fn inverse_jacobian(a_from_b: &Isometry3<f64>) -> Matrix6<f64> {
+    let r = a_from_b.rotation.to_rotation_matrix().into_inner();
+    let lever = (r.transpose() * a_from_b.translation.vector).cross_matrix();
+    let mut jacobian = Matrix6::zeros();
+    jacobian.fixed_view_mut::<3, 3>(0, 0).copy_from(&-r.transpose());
+    jacobian.fixed_view_mut::<3, 3>(0, 3).copy_from(&-lever);
+    jacobian.fixed_view_mut::<3, 3>(3, 3).copy_from(&-r);
+    jacobian
+}
+
 /// The motion along a screw `[ρ, θ]`: it turns by θ while it goes straight on by ρ in axes that turn along.
 pub(super) fn exponential(screw: &Vector6<f64>) -> Isometry3<f64> {
     let (straight, turn) = (screw.fixed_rows::<3>(0), screw.fixed_rows::<3>(3).into_owned());

@@ -4,6 +4,7 @@ use nalgebra::{Isometry3, Matrix6};
 
 use super::motion::{MotionPrior, Uncertain};
 use super::velocity::Velocity;
+use crate::organised::ByField;
 use crate::pose::pose_difference;
 
 /// Frames after a loss for which the last velocity is carried on.
@@ -23,6 +24,8 @@ pub(super) struct Last {
     pub(super) keyframe: usize,
     /// Keyframe from camera, with the part of the covariance that this frame does not share with others.
     pub(super) own: Uncertain,
+    /// Its derivative by the field that is assumed for the shared error.
+    pub(super) by_field: ByField,
     /// The part that all frames registered with this keyframe share: the keyframe's own noise.
     pub(super) shared: Matrix6<f64>,
     pub(super) velocity: Option<Velocity>,

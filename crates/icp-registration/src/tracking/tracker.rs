@@ -6,16 +6,18 @@ use nalgebra::{Isometry3, Matrix6};
 
 use super::graph::Edge;
 use super::keyframes::Keyframes;
-use super::locate::{Fix, Measured};
+use super::locate::{Fix, Measured, agreeing};
 use super::motion::{MotionPrior, Uncertain, diagonal};
 use super::options::{Fusion, TrackerOptions};
 use super::prediction::{Grounds, Last, Prediction};
+use super::relation::Relation;
 use super::tracked::{LossReason, TrackedPose, TrackingState};
 use super::velocity::Velocity;
 use crate::cloud::Cloud;
 use crate::error::{Error, Result};
 use crate::icp::DegeneracyPolicy;
-use crate::organised::{FrameAligner, OrganisedFrame, Projection};
+use crate::organised::{ByField, FieldMatrix, FrameAligner, Influence, OrganisedFrame, Projection, SharedError};
+use crate::pose::step_pose;
 
 /// What another keyframe must see more of the frame than the reference to take its place.
 const ADVANTAGE: f64 = 0.05;
@@ -34,6 +36,8 @@ pub struct Tracker {
     pub(super) current: OrganisedFrame,
     pub(super) previous: OrganisedFrame,
     pub(super) keyframes: Keyframes,
+    /// Of the sensor, as the registrations of keyframes tell it.
+    shared: SharedError,
     last: Option<Last>,
     trajectory: Vec<TrackedPose>,
     scratch: Vec<(u32, f32, f32)>,
@@ -59,6 +63,7 @@ impl Tracker {
         alignment.other_starts = 0;
         let blank = OrganisedFrame::new(projection, &nothing, None)?;
         Ok(Self {
+            shared: alignment.shared_error.unwrap_or_default(),
             aligner: FrameAligner::new(alignment)?,
             current: blank.clone(),
             previous: blank,
@@ -135,17 +140,25 @@ impl Tracker {
         self.keyframes.graph.edges.len()
     }
 
+    /// The systematic error of the sensor that all frames share, as the registrations of keyframes tell it. The covariances
+    /// of poses rest on it: on its being smooth over the frame, and on half of it being the same in all registrations.
+    pub fn shared_error(&self) -> &SharedError {
+        &self.shared
+    }
+
     fn start(&mut self, timestamp_s: f64) -> TrackedPose {
         let pose = Uncertain::exact(self.options.world_from_first);
         let blank = self.current.filled() < self.options.min_filled;
         let state = if blank { TrackingState::Lost(LossReason::TooFewPoints) } else { TrackingState::Started };
         if !blank {
             self.set_weakest_motion();
-            self.keyframes.start(&self.current, &pose);
+            self.keyframes.start(&self.current, &pose.pose);
+            self.keyframes.graph.set_shared_error(&self.shared);
             self.last = Some(Last {
                 timestamp_s,
                 keyframe: 0,
                 own: Uncertain::exact(Isometry3::identity()),
+                by_field: ByField::zeros(),
                 shared: Matrix6::zeros(),
                 velocity: None,
                 interval_s: f64::INFINITY,
@@ -241,9 +254,11 @@ impl Tracker {
         let velocity = fix.velocity.or_else(|| follows.then(from_poses));
         let shared = if measured.determined { measured.shared() } else { last.shared };
         let total = Uncertain { covariance: own.covariance + shared, ..own };
-        let world = self.keyframes.graph.poses[keyframe].then(&total);
+        let own_relation = Relation { random: total, by_field: measured.by_field() };
+        let field = self.field_covariance(measured.influence.as_ref());
+        let world = self.keyframes.graph.from(keyframe, &own_relation).total(&field);
         if self.options.fusion == Fusion::Planes && measured.determined {
-            self.keyframes.list[keyframe].frame.absorb(&self.current, &own.pose, &mut self.scratch);
+            self.keyframes.list[keyframe].frame.absorb(&self.current, &measured.aligned, &mut self.scratch);
         }
         let pose = TrackedPose {
             timestamp_s,
@@ -260,6 +275,7 @@ impl Tracker {
             timestamp_s,
             keyframe,
             own,
+            by_field: measured.by_field(),
             shared,
             velocity,
             interval_s: seconds,
@@ -269,7 +285,7 @@ impl Tracker {
             lost_frames: 0,
         });
         if pose.overlap < self.options.keyframe_overlap {
-            self.change_reference(&total);
+            self.change_reference(&own_relation, measured.influence.as_ref());
         }
         self.thin();
         pose
@@ -277,7 +293,8 @@ impl Tracker {
 
     fn lost(&mut self, timestamp_s: f64, last: &Last, prediction: &Prediction, reason: LossReason) -> TrackedPose {
         let total = Uncertain { covariance: prediction.own.covariance + last.shared, ..prediction.own };
-        let world = self.keyframes.graph.poses[last.keyframe].then(&total);
+        let relation = Relation { random: total, by_field: last.by_field };
+        let world = self.keyframes.graph.from(last.keyframe, &relation).total(&self.keyframes.graph.covariance);
         let radius = self.keyframes.list[last.keyframe].frame.radius_m();
         let unknown = diagonal([radius * radius, 1.0]);
         let informed = prediction.grounds != Grounds::Nothing;
@@ -302,21 +319,57 @@ impl Tracker {
         }
     }
 
+    /// Covariance of the field of the shared error: until a loop has told more, as the registrations of keyframes and
+    /// that of this frame show it.
+    fn field_covariance(&self, influence: Option<&Influence>) -> FieldMatrix {
+        let graph = &self.keyframes.graph;
+        match influence {
+            Some(influence) if !graph.closed && self.options.alignment.shared_error.is_none() => {
+                let mut shared = self.shared;
+                shared.learn(influence);
+                FieldMatrix::from_diagonal(&shared.common())
+            }
+            _ => graph.covariance,
+        }
+    }
+
     /// Another keyframe that sees more of the frame becomes the reference; where there is none, the frame becomes one.
-    fn change_reference(&mut self, reference_from_camera: &Uncertain) {
+    fn change_reference(&mut self, reference_from_camera: &Relation, influence: Option<&Influence>) {
         let Some(reference) = self.last.as_ref().map(|last| last.keyframe) else { return };
-        let candidates = self.keyframes.candidates(&self.current, reference, &reference_from_camera.pose, reference);
+        let (others, pose) = (|k: usize| k != reference, reference_from_camera.pose());
+        let candidates = self.keyframes.candidates(&self.current, reference, pose, others, agreeing);
         let enough = self.options.keyframe_overlap + ADVANTAGE;
         if let Some(&(overlap, k)) = candidates.first()
             && overlap >= enough
             && let Some(measured) = self.closing(k, reference, reference_from_camera)
         {
-            self.keyframes.graph.adjust_if_closed();
-            self.refer_to(k, &measured.own(), &measured.shared());
+            self.refer_to(k, &measured);
+            self.adjust();
             return;
         }
         let new = self.keyframes.add(&self.current, reference, reference_from_camera);
-        self.refer_to(new, &Uncertain::exact(Isometry3::identity()), &Matrix6::zeros());
+        self.refer_to_itself(new);
+        if let Some(influence) = influence {
+            self.learn(influence);
+        }
+        self.close_loops(new);
+        self.adjust();
+    }
+
+    /// Takes the registration of a keyframe into what is known of the shared error.
+    fn learn(&mut self, influence: &Influence) {
+        if self.options.alignment.shared_error.is_none() {
+            self.shared.learn(influence);
+            self.keyframes.graph.set_shared_error(&self.shared);
+        }
+    }
+
+    /// Adjusts the keyframes where a loop has been closed.
+    fn adjust(&mut self) {
+        let change = self.keyframes.graph.adjust_if_closed();
+        if let Some(last) = &mut self.last {
+            last.own.pose = step_pose(&last.own.pose, &(last.by_field * change));
+        }
     }
 
     /// Takes out keyframes beyond the number allowed.
@@ -330,21 +383,32 @@ impl Tracker {
     }
 
     /// Registers the frame with keyframe `k` as well, and so `k` with the reference; `None` where that does not fit.
-    fn closing(&mut self, k: usize, reference: usize, reference_from_camera: &Uncertain) -> Option<Measured> {
-        let guess = self.keyframes.graph.relative(k, reference) * reference_from_camera.pose;
+    fn closing(&mut self, k: usize, reference: usize, reference_from_camera: &Relation) -> Option<Measured> {
+        let guess = self.keyframes.graph.relative(k, reference) * reference_from_camera.pose();
         let measured = self.try_keyframe(k, &guess).ok().filter(|m| m.determined)?;
         if self.keyframes.graph.joined(k, reference) {
             return Some(measured);
         }
-        let a_from_b = measured.pose.then(&reference_from_camera.inverse());
+        let a_from_b = measured.relation().then(&reference_from_camera.inverse());
         self.keyframes.graph.offer(&Edge { a: k, b: reference, a_from_b }).then_some(measured)
     }
 
-    fn refer_to(&mut self, keyframe: usize, own: &Uncertain, shared: &Matrix6<f64>) {
+    fn refer_to(&mut self, keyframe: usize, measured: &Measured) {
         if let Some(last) = &mut self.last {
             last.keyframe = keyframe;
-            last.own = *own;
-            last.shared = *shared;
+            last.own = measured.own();
+            last.by_field = measured.by_field();
+            last.shared = measured.shared();
+            last.velocity = last.velocity.map(|velocity| velocity.at_origin());
+        }
+    }
+
+    fn refer_to_itself(&mut self, keyframe: usize) {
+        if let Some(last) = &mut self.last {
+            last.keyframe = keyframe;
+            last.own = Uncertain::exact(Isometry3::identity());
+            last.by_field = ByField::zeros();
+            last.shared = Matrix6::zeros();
             last.velocity = last.velocity.map(|velocity| velocity.at_origin());
         }
     }

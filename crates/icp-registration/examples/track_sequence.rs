@@ -2,7 +2,8 @@
 //!
 //! `cargo run --release -p icp-registration --example track_sequence -- [option=value ..]`
 //!
-//! Options: `folder` (of the real sequence), `simulated=off`, `seed` (of the simulated noise), `keyframe_overlap`, `max_keyframes`, `levels`,
+//! Options: `folder` (of the real sequence), `simulated=off`, `seed` (of the simulated noise), `keyframe_overlap`, `max_keyframes`,
+//! `loop_attempts`, `window=20` (squared errors over variances of paths of so many frames instead), `levels`,
 //! `fusion=off`, `step_tolerance_m`, `noise_fraction`, `max_iterations`, `max_motion_sigma_m`, `every=1` (a line a frame);
 //! of the real sequence `first` (frame), `count` and `backwards=1`; `invalid=scattered` or `clumps`: a fifth of all pixels
 //! is lost.
@@ -42,6 +43,7 @@ fn options() -> TrackerOptions {
     let mut options = TrackerOptions::default();
     options.keyframe_overlap = argument("keyframe_overlap").unwrap_or(options.keyframe_overlap);
     options.max_keyframes = argument("max_keyframes").unwrap_or(options.max_keyframes);
+    options.loop_attempts = argument("loop_attempts").unwrap_or(options.loop_attempts);
     options.alignment.levels = argument("levels").unwrap_or(options.alignment.levels);
     options.alignment.max_motion_sigma_m = argument("max_motion_sigma_m").or(options.alignment.max_motion_sigma_m);
     options.alignment.step_tolerance_m = argument("step_tolerance_m").or(options.alignment.step_tolerance_m);

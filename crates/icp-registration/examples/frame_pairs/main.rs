@@ -1,6 +1,6 @@
 //! What the registration of organised frames reaches: accuracy and time on simulated pairs (`table`), covariance
-//! (`statistics`), success from far-off starts at half overlap (`success`), invalid pixels
-//! (`invalid`, `invalid real`, `invalid simulated`), real frames (`real`, where the
+//! (`statistics`), success from far-off starts at half overlap (`success`), errors of real pairs over what is stated of
+//! them (`honesty`), trusted poses that are wrong among thousands of real pairs (`search`), invalid pixels (`invalid`, `invalid real`, `invalid simulated`), real frames (`real`, where the
 //! tests expect them). Without an argument: all.
 #![allow(clippy::unwrap_used, clippy::print_stdout, clippy::expect_used, clippy::cast_lossless)]
 
@@ -8,9 +8,11 @@
 mod common;
 #[path = "../../tests/depth_frames/mod.rs"]
 mod depth_frames;
+mod honesty;
 mod invalid;
 mod measure;
 mod real;
+mod search;
 mod statistics;
 mod success;
 mod table;
@@ -40,6 +42,12 @@ fn run() {
     }
     if is_wanted("invalid") {
         invalid::print();
+    }
+    if is_wanted("honesty") {
+        honesty::print();
+    }
+    if is_wanted("search") {
+        search::print();
     }
     if is_wanted("real") {
         real::print();

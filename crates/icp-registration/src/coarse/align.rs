@@ -310,16 +310,22 @@ const RICH_INSIDE: f64 = 0.1;
 const AGREES_FAIRLY: f64 = 0.97;
 const WITHOUT_RIVAL: f64 = 0.5;
 const CONTRADICTION_WHERE_RICH: f64 = 2.0;
+/// Where most of a cloud is shared with as much structure inside and without a rival, this much less need agree: what a sensor
+/// measures wrongly lets points miss at right poses (of 153 pairs of frames of a Kinect with 40 to 90 % in common, 69 agree by
+/// 0.96, 121 by 0.94, 146 by 0.92 and by 0.91; none of the poses is wrong).
+const LESS_WHERE_STRUCTURED: f64 = 0.04;
 
 fn check(found: CoarseAlignment, options: &CoarseOptions) -> Result<CoarseAlignment> {
     let shared = found.overlap >= WELL_SHARED && found.agreement >= AGREES_WELL;
     let rich = found.inside >= RICH_INSIDE && found.agreement >= AGREES_FAIRLY && found.rival <= WITHOUT_RIVAL;
+    let structured = found.overlap >= WELL_SHARED && found.inside >= RICH_INSIDE && found.rival <= WITHOUT_RIVAL;
+    let agreement = options.min_agreement - if structured { LESS_WHERE_STRUCTURED } else { 0.0 };
     let inside = options.min_inside * if shared { INSIDE_WHERE_SHARED } else { 1.0 };
     let contradiction = options.max_contradiction * if rich { CONTRADICTION_WHERE_RICH } else { 1.0 };
     let least = [
         ("inliers", found.inliers as f64, options.min_inliers as f64),
         ("overlap", found.overlap, options.min_overlap),
-        ("agreement", found.agreement, options.min_agreement),
+        ("agreement", found.agreement, agreement),
         // Fractions that must stay small, seen from the other side.
         ("points outside free space", 1.0 - found.contradiction, 1.0 - contradiction),
         ("structure inside its enclosing planes", found.inside, inside),

@@ -49,6 +49,9 @@ pub struct TrackerOptions {
     pub keyframe_overlap: f64,
     /// Largest number of keyframes kept; beyond it the one that sees least of its own goes. Default 64.
     pub max_keyframes: usize,
+    /// Older keyframes that each new one is registered with, those that should see most of the same first: what agrees with
+    /// the path within its covariance closes a loop. 0: none, which saves that many registrations a keyframe. Default 4.
+    pub loop_attempts: usize,
     /// Whether keyframes learn from frames.
     pub fusion: Fusion,
     /// How the pose is sought after a loss.
@@ -75,6 +78,7 @@ impl Default for TrackerOptions {
             world_from_first: Isometry3::identity(),
             keyframe_overlap: 0.7,
             max_keyframes: 64,
+            loop_attempts: 4,
             fusion: Fusion::Planes,
             relocalisation: Relocalisation::Coarse,
             min_filled: 0.03,

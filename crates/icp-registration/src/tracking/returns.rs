@@ -6,8 +6,6 @@ use super::graph::Edge;
 use super::tracker::Tracker;
 use crate::organised::OrganisedFrame;
 
-/// Older keyframes that are tried for each new one. Two close half of the loops that four close, eight hardly more.
-const TRIED: usize = 4;
 /// Share of the frame that may lie on the older keyframe, within what a path can be off. Between 0.2 and 0.4 the path of 500
 /// frames of a Kinect is as good within its scatter; below, more is tried in vain.
 const LEAST_OVERLAP: f64 = 0.25;
@@ -16,10 +14,13 @@ impl Tracker {
     /// Registers the newest keyframe, which is the current frame, with older ones. Only registrations that fit the path
     /// within its covariance are taken.
     pub(super) fn close_loops(&mut self, new: usize) {
+        if self.options.loop_attempts == 0 {
+            return;
+        }
         let joined: Vec<bool> = (0..=new).map(|k| k == new || self.keyframes.graph.joined(k, new)).collect();
         let others = |k: usize| !joined[k];
         let candidates = self.keyframes.candidates(&self.current, new, &Isometry3::identity(), others, near);
-        for (overlap, k) in candidates.into_iter().take(TRIED) {
+        for (overlap, k) in candidates.into_iter().take(self.options.loop_attempts) {
             if overlap < LEAST_OVERLAP {
                 break;
             }

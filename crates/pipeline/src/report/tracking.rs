@@ -28,6 +28,7 @@ pub(crate) fn render_tracking(tracked: &Tracked) -> Result<String> {
     );
     let mut page = Page::new("rangecam: tracking", &lead);
     page.cards(&cards(tracked));
+    page.paragraph(&summary.grounds_of_sigma());
     page.doubts(&summary.doubts);
     path_section(&mut page, tracked);
     time_section(&mut page, tracked);

@@ -54,6 +54,11 @@ pub struct TrackSummary {
     pub position_sigma_median_m: f64,
     /// Largest standard deviation of a position, metre.
     pub position_sigma_max_m: f64,
+    /// Standard deviation of the systematic error that all frames share, by the degree of polynomials over the frame: metre
+    /// of range where ranges come with standard deviations, else 1/metre of inverse depth.
+    pub shared_error_sigma: [f64; 5],
+    /// Registrations between keyframes that it was estimated from.
+    pub shared_error_registrations: usize,
     /// Median and 95 % of the wall-clock time that tracking took a frame, millisecond.
     pub track_median_ms: f64,
     /// See above.
@@ -107,6 +112,8 @@ pub(super) fn summarise(
         start_to_end_m: path.first().zip(path.last()).map_or(0.0, |(first, last)| (last - first).norm()),
         position_sigma_median_m: median(&mut sigmas),
         position_sigma_max_m: quantile(&mut sigmas, 1.0),
+        shared_error_sigma: tracker.shared_error().sigma(),
+        shared_error_registrations: tracker.shared_error().registrations(),
         track_median_ms: median(&mut tracking),
         track_p95_ms: quantile(&mut tracking, 0.95),
         total_median_ms: median(&mut total),
@@ -200,6 +207,22 @@ impl TrackSummary {
     }
 }
 
+impl TrackSummary {
+    /// What the standard deviations of the poses rest on.
+    pub(crate) fn grounds_of_sigma(&self) -> String {
+        match self.shared_error_registrations {
+            0 => "The standard deviations rest on the noise of the frames alone: no keyframe followed that would show errors that all frames \
+                  share."
+                .to_owned(),
+            n => format!(
+                "The standard deviations rest on the noise and on an error of the sensor that all frames share, estimated from {n} \
+                 registrations between keyframes; that it is smooth over the frame and half of it the same everywhere is \
+                 an assumption."
+            ),
+        }
+    }
+}
+
 impl Judged for TrackSummary {
     fn doubts(&self) -> &[Doubt] {
         &self.doubts
@@ -237,6 +260,7 @@ impl fmt::Display for TrackSummary {
             millimetres(Some(self.position_sigma_median_m)),
             millimetres(Some(self.position_sigma_max_m))
         )?;
+        writeln!(f, "{}", self.grounds_of_sigma())?;
         writeln!(
             f,
             "map: {} keyframes, {} points; {} loops closed, which moved poses by {} at most",

@@ -13,6 +13,7 @@ mod exact;
 mod fold;
 mod forest;
 mod frame;
+mod fringes;
 mod grid;
 mod hypotheses;
 mod intervals;

@@ -4,6 +4,7 @@ use std::f32::consts::TAU;
 
 use range_image::Raster;
 
+use crate::fringes::{TILE, Tile};
 use crate::noise::{PhaseNoise, estimate, weight};
 use crate::phasor::unit;
 use crate::window::{Limits, Planes, RowOut, Windows};
@@ -100,6 +101,7 @@ pub struct Prefilter {
     planes: Planes,
     blocks: Vec<f32>,
     windows: Windows,
+    tile: Tile,
 }
 
 impl Prefilter {
@@ -182,34 +184,47 @@ impl Prefilter {
     }
 
     fn run(&mut self, phase: &Raster<f32>, limits: &Limits, out: &mut Filtered) {
-        let (planes, windows) = (&self.planes, &mut self.windows);
-        pulp::Arch::new().dispatch(FilterRows { phase, planes, limits, windows, out });
+        let (planes, windows, tile) = (&self.planes, &mut self.windows, &mut self.tile);
+        pulp::Arch::new().dispatch(FilterTiles { phase, planes, limits, windows, tile, out });
     }
 }
 
-/// The search for all rows: a type of its own, because what closures hold is not always compiled for wide registers.
-struct FilterRows<'a> {
+/// The search for all tiles: a type of its own, because what closures hold is not always compiled for wide registers.
+struct FilterTiles<'a> {
     phase: &'a Raster<f32>,
     planes: &'a Planes,
     limits: &'a Limits,
     windows: &'a mut Windows,
+    tile: &'a mut Tile,
     out: &'a mut Filtered,
 }
 
-impl pulp::WithSimd for FilterRows<'_> {
+impl pulp::WithSimd for FilterTiles<'_> {
     type Output = ();
 
     // Only what is inlined is compiled for wide registers.
     #[allow(clippy::inline_always)]
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
-        let width = self.phase.width();
-        let rows = self.phase.rows().zip(self.out.phase.as_mut_slice().chunks_exact_mut(width));
-        let rows = rows.zip(self.out.sigma.as_mut_slice().chunks_exact_mut(width));
-        let rows = rows.zip(self.out.radius.as_mut_slice().chunks_exact_mut(width));
-        for (row, (((measured, phase), sigma), radius)) in rows.enumerate() {
-            let mut out = RowOut { phase, sigma, radius };
-            self.windows.filter_row(self.planes, row, measured, self.limits, &mut out);
+        let Self { phase, planes, limits, windows, tile, out } = self;
+        let (width, height) = (phase.width(), phase.height());
+        let Filtered { phase: filtered, sigma, radius, .. } = out;
+        for row in (0..height).step_by(TILE) {
+            for col in (0..width).step_by(TILE) {
+                tile.load(planes, [width, height], [col, row], limits.largest_radius);
+                let (first, [columns, rows]) = (row * width + col, tile.core.clone());
+                let [gain, fall] = tile.fringe.slope;
+                for (line, row) in rows.enumerate() {
+                    let at = first + line * width..first + line * width + columns.len();
+                    let mut out = RowOut {
+                        phase: &mut filtered.as_mut_slice()[at.clone()],
+                        sigma: &mut sigma.as_mut_slice()[at.clone()],
+                        radius: &mut radius.as_mut_slice()[at.clone()],
+                        fringe: [gain * columns.start as f32 + fall * row as f32, gain],
+                    };
+                    windows.filter_row(tile, row, &phase.as_slice()[at], limits, &mut out);
+                }
+            }
         }
     }
 }

@@ -4,7 +4,10 @@
 // Only what is inlined is compiled for wide registers.
 #![allow(clippy::inline_always)]
 
+use std::f32::consts::TAU;
+
 use crate::PrefilterOptions;
+use crate::fringes::Tile;
 use crate::noise::weight;
 use crate::phasor::angle;
 
@@ -47,7 +50,7 @@ pub(crate) struct Limits {
     target_information: f32,
     coherence: f32,
     deviations: f32,
-    largest_radius: usize,
+    pub largest_radius: usize,
 }
 
 impl Limits {
@@ -72,6 +75,8 @@ pub(crate) struct RowOut<'a> {
     pub phase: &'a mut [f32],
     pub sigma: &'a mut [f32],
     pub radius: &'a mut [u8],
+    /// Phase of the fringe at the first pixel, and what it gains from pixel to pixel.
+    pub fringe: [f32; 2],
 }
 
 /// Buffers of one row.
@@ -83,22 +88,22 @@ pub(crate) struct Windows {
 }
 
 impl Windows {
-    /// Searches the windows of one row's pixels and writes what they give; `measured` is the phase of the row.
+    /// Searches the windows of one row of a tile and writes what they give; `measured` is the phase of the row.
     #[inline(always)]
-    pub fn filter_row(&mut self, planes: &Planes, row: usize, measured: &[f32], limits: &Limits, out: &mut RowOut<'_>) {
-        let width = measured.len();
-        let height = planes.re.len() / width;
-        self.start(planes, width, row, limits);
-        for radius in 1..=limits.largest_radius {
+    pub fn filter_row(&mut self, tile: &Tile, row: usize, measured: &[f32], limits: &Limits, out: &mut RowOut<'_>) {
+        let height = tile.planes.re.len() / tile.width;
+        let rim = limits.largest_radius;
+        self.start(tile, row, limits);
+        for radius in 1..=rim {
             if !self.groups.iter().any(Group::is_open) {
                 break;
             }
             for other in [row.wrapping_sub(radius), row + radius] {
                 if other < height {
-                    self.add_row(planes, width, other, limits.largest_radius);
+                    self.add_row(&tile.planes, tile.width, other, rim);
                 }
             }
-            let first = limits.largest_radius - radius;
+            let first = rim + tile.core[0].start - radius;
             for (at, group) in self.groups.iter_mut().enumerate() {
                 if group.is_open() {
                     let sums = window_sums(&self.columns, first + at * LANES, radius);
@@ -112,17 +117,18 @@ impl Windows {
     }
 
     #[inline(always)]
-    fn start(&mut self, planes: &Planes, width: usize, row: usize, limits: &Limits) {
-        let groups = width.div_ceil(LANES);
+    fn start(&mut self, tile: &Tile, row: usize, limits: &Limits) {
+        let Tile { planes, width, core, .. } = tile;
+        let groups = core[0].len().div_ceil(LANES);
         let rim = limits.largest_radius;
         self.groups.resize(groups, Group::default());
         for (columns, source) in self.columns.each().into_iter().zip(planes.all()) {
             columns.clear();
-            columns.resize(groups * LANES + 2 * rim, 0.0);
-            columns[rim..rim + width].copy_from_slice(&source[row * width..][..width]);
+            columns.resize(core[0].start + groups * LANES + 2 * rim, 0.0);
+            columns[rim..rim + width].copy_from_slice(&source[row * width..][..*width]);
         }
         for (at, group) in self.groups.iter_mut().enumerate() {
-            let [re, im, information] = self.columns.all().map(|plane| lanes(plane, rim + at * LANES));
+            let [re, im, information] = self.columns.all().map(|plane| lanes(plane, rim + core[0].start + at * LANES));
             *group = Group { re, im, information, ..Group::default() };
             group.start(limits);
         }
@@ -188,7 +194,10 @@ impl Group {
         let used = LANES.min(measured.len() - at);
         phase[..used].copy_from_slice(&measured[at..at + used]);
         for lane in 0..LANES {
-            let mean = angle(self.re[lane], self.im[lane]);
+            let [start, gain] = out.fringe;
+            let turned = angle(self.re[lane], self.im[lane]) + start + gain * (at + lane) as f32;
+            // Rounding may give a whole cycle for what lies just below none.
+            let mean = (turned - TAU * (turned / TAU).floor()).clamp(0.0, TAU);
             let filtered = if self.radius[lane] > 0.0 { mean } else { phase[lane] };
             let masked = self.information[lane] <= 0.0;
             phase[lane] = if masked { f32::NAN } else { filtered };
@@ -222,11 +231,11 @@ fn lanes(plane: &[f32], first: usize) -> [f32; LANES] {
 }
 
 impl Planes {
-    fn all(&self) -> [&[f32]; 3] {
+    pub fn all(&self) -> [&[f32]; 3] {
         [&self.re, &self.im, &self.information]
     }
 
-    fn each(&mut self) -> [&mut Vec<f32>; 3] {
+    pub fn each(&mut self) -> [&mut Vec<f32>; 3] {
         [&mut self.re, &mut self.im, &mut self.information]
     }
 }

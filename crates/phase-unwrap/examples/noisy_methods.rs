@@ -43,12 +43,15 @@ fn main() {
         for sigma in [0.05, 0.3, 0.5, 0.7, 1.0, 1.2, 1.4] {
             let f = Fringes::new(n, s, sigma, seed);
             let mut t = vec![]; let mut sh = vec![];
-            let mut run = |g: &dyn Fn() -> Option<range_image::Raster<i32>>| { let a = Instant::now(); let w = g(); t.push(a.elapsed().as_secs_f64() * 1e3); sh.push(w.map_or(f64::NAN, |w| f.right(&w))); };
-            run(&|| Some(unwrap_spatial(&f.phase, None, None, &SpatialOptions::default()).unwrap().wraps));
-            run(&|| unwrap_least_cuts(&f.phase, None, None, &ExactOptions::default()).ok().map(|f| f.wraps));
-            run(&|| Some(unwrap_noisy(&f.phase, PhaseNoise::Unknown, None, &NoisyOptions::default()).unwrap().unwrapped.wraps));
-            run(&|| Some(unwrap_noisy(&f.phase, PhaseNoise::Unknown, None, &NoisyOptions { method: NoisyMethod::LeastCuts(ExactOptions::default()), ..Default::default() }).unwrap().unwrapped.wraps));
-            println!("{name:14}{sigma:6}{}| {}", sh.iter().map(|x| format!("{x:9.4}")).collect::<String>(), t.iter().map(|x| format!("{x:7.1}")).collect::<String>());
+            let outs: Vec<_> = [NoisyMethod::Tree, NoisyMethod::Cuts, NoisyMethod::Filter, NoisyMethod::FilteredCuts, NoisyMethod::Auto].into_iter().map(|method| {
+                let mut out = NoisyUnwrapped::default();
+                let mut un = NoisyUnwrapper::new(NoisyOptions { method, ..Default::default() }).unwrap();
+                let a = Instant::now();
+                un.unwrap_into(&f.phase, PhaseNoise::Unknown, None, &mut out).unwrap();
+                t.push(a.elapsed().as_secs_f64() * 1e3); sh.push(f.right(&out.unwrapped.wraps)); out }).collect();
+            let best = sh[..3].iter().copied().fold(0.0, f64::max);
+            let ft = &outs[2].filtered;
+            println!("{name:14}{sigma:6}{}| {}| {:?} {:?} {:?} {}", sh.iter().map(|x| format!("{x:9.4}")).collect::<String>(), t.iter().map(|x| format!("{x:7.1}")).collect::<String>(), ft.noise_rad, ft.verdict, outs[4].method, if sh[4] < best - 0.001 { "LOSS" } else { "" });
         }
     }
 }

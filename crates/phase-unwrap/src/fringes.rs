@@ -1,41 +1,44 @@
-//! Fringes: how fast the phase runs around a place, measured on tiles, and taken off before windows are summed.
+//! Fringes: how fast the phase runs around a place. It is measured on tiles and taken off before windows are summed.
 // Only what is inlined is compiled for wide registers.
 #![allow(clippy::inline_always)]
 
+use std::f32::consts::{PI, TAU};
 use std::ops::Range;
 
 use crate::phasor::{angle, unit};
 use crate::window::Planes;
-use std::f32::consts::{PI, TAU};
 
-/// Side of a tile in pixels: one frequency serves it. A surface that bends by 0.02 rad a pixel each pixel is off by 0.16
-/// rad a pixel at its edge, which shortens the mean of the largest window by 6 %.
+/// Side of a tile in pixels: one slope serves it. A surface whose slope grows by 0.02 rad a pixel from pixel to pixel is
+/// off by 0.16 rad a pixel at the tile's edge, which takes a tenth of the mean of the largest window; twice the side
+/// halves the bend that is followed, half of it doubles the noise of the slope.
 pub(crate) const TILE: usize = 16;
-/// Probability that noise without any fringe passes for one.
-const FALSE_ALARM: f32 = 1e-4;
-
-const BINS: usize = 32;
+/// Slopes of the periodogram in each direction: 0.2 rad a pixel apart, so that none is off by more than 0.1.
+const SLOPES: usize = 32;
+/// Deviation in radians a pixel up to which the mean step between neighbours is good enough. An error of 0.1 takes a
+/// tenth of the mean of a window of eleven pixels a side.
 const PRECISE: f32 = 0.1;
-/// How fast the phase of a tile runs.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(crate) struct Fringe {
-    /// Radians a column and a row, each in `[-pi, pi]`.
-    pub slope: [f32; 2],
-    /// Whether it is told from noise, and from the slope of the other sign that differs by a cycle.
-    pub resolved: bool,
-}
+/// Probability that the periodogram of noise has a peak that passes for a fringe. A hundredth of it loses fringes at
+/// noises that are 1 % smaller.
+const FALSE_ALARM: f32 = 1e-4;
+/// Deviations of its slope by which a fringe must stay below half a cycle a pixel.
+const DEVIATIONS: f32 = 3.0;
 
-/// The phasors of one tile with what its windows reach beyond it.
+/// How fast the phase runs: radians a column and a row, each in `[-pi, pi]`; `None` where that is not told from noise,
+/// or not from the slope that differs by a cycle.
+type Slope = Option<[f32; 2]>;
+
+/// The phasors of one tile with what its windows reach beyond it, turned back by the fringe.
 #[derive(Debug, Default)]
 pub(crate) struct Tile {
     pub planes: Planes,
     pub width: usize,
     /// Columns and rows of the tile itself within the planes.
     pub core: [Range<usize>; 2],
-    pub fringe: Fringe,
+    /// The fringe that was taken off; zero in both directions where none is told.
+    pub slope: [f32; 2],
+    pub resolved: bool,
     turns: Vec<[f32; 2]>,
-    table: Vec<[f32; 2]>,
-    rows: Vec<[[f32; BINS]; 2]>,
+    periodogram: Periodogram,
 }
 
 impl Tile {
@@ -51,30 +54,39 @@ impl Tile {
                 values.copy_from_slice(&image[(begin[1] + row) * width + begin[0]..][..self.width]);
             }
         }
-        let core = |axis: usize, size: usize| {
-            first[axis] - begin[axis]..(first[axis] + TILE).min(size) - begin[axis]
-        };
+        let core = |axis: usize, size: usize| first[axis] - begin[axis]..(first[axis] + TILE).min(size) - begin[axis];
         self.core = [core(0, width), core(1, height)];
-        let steps = [self.slope(1), self.slope(self.width)];
-        self.fringe = if steps.iter().all(|step| step.1 < PRECISE) {
-            Fringe { slope: steps.map(|step| step.0), resolved: true }
-        } else {
-            self.strongest()
-        };
-        self.fringe.resolved &= self.fringe.slope.iter().all(|slope| slope.abs() + 3.0 * PRECISE < PI);
+        // A single pixel has no neighbours, and windows of one pixel need no slope.
+        let slope = if margin == 0 { Some([0.0; 2]) } else { self.measure() };
+        (self.slope, self.resolved) = (slope.unwrap_or_default(), slope.is_some());
         self.turn_back();
     }
 
-    /// Angle of the mean product of neighbours, and whether it is one: jumps spoil few of the products.
+    /// The mean step between neighbours serves where it is precise: jumps spoil few of the steps. In stronger noise the
+    /// strongest slope of the whole tile is still seen.
     #[inline(always)]
-    fn slope(&self, step: usize) -> (f32, f32) {
-        let Planes { re, im, information } = &self.planes;
-        let (mut sums, mut lane_rows) = ([[0.0_f32; 8]; 3], 0);
-        let _ = &mut lane_rows;
+    fn measure(&mut self) -> Slope {
+        let steps = [self.mean_step(1), self.mean_step(self.width)];
+        let precise = steps.iter().all(|(_, sigma)| *sigma < PRECISE);
+        let (slope, sigma) = if precise {
+            (steps.map(|step| step.0), steps.map(|step| step.1))
+        } else {
+            let spacing = TAU / SLOPES as f32;
+            // Evenly spread over the spacing.
+            (self.periodogram.strongest(&self.planes, self.width)?, [spacing / 12.0_f32.sqrt(); 2])
+        };
+        let one_side = slope.iter().zip(sigma).all(|(slope, sigma)| slope.abs() + DEVIATIONS * sigma < PI);
+        one_side.then_some(slope)
+    }
+
+    /// Angle of the mean product of pixels that are `step` apart, and its standard deviation.
+    #[inline(always)]
+    fn mean_step(&self, step: usize) -> (f32, f32) {
+        let Planes { re, im, .. } = &self.planes;
+        let mut sums = [[0.0_f32; 8]; 3];
         let length = if step == 1 { self.width - 1 } else { self.width };
         let rows = re.len() / self.width - usize::from(step != 1);
-        for row in 0..rows {
-            let start = row * self.width;
+        for start in (0..rows).map(|row| row * self.width) {
             let (a, b) = (&re[start..][..length], &im[start..][..length]);
             let (c, d) = (&re[start + step..][..length], &im[start + step..][..length]);
             for at in 0..length {
@@ -84,73 +96,93 @@ impl Tile {
                 sums[2][lane] += (a[at] * a[at] + b[at] * b[at]) * (c[at] * c[at] + d[at] * d[at]);
             }
         }
-        let _ = information;
         let [along, across, power] = sums.map(|lanes| lanes.iter().sum::<f32>());
         let square = along * along + across * across;
         let turn = angle(along, across);
-        let slope = if turn > PI { turn - TAU } else { turn };
-        (slope, (0.5 * power / square.max(f32::MIN_POSITIVE)).sqrt())
-    }
-
-    /// The strongest of `BINS` slopes in either direction: the peak of the periodogram.
-    #[inline(always)]
-    fn strongest(&mut self) -> Fringe {
-        let Self { planes, width, rows, table, .. } = self;
-        if table.is_empty() {
-            table.extend((0..BINS).map(|n| unit(n as f32 * TAU / BINS as f32)));
-        }
-        let height = planes.re.len() / *width;
-        rows.clear();
-        rows.resize(height, [[0.0; BINS]; 2]);
-        let mut power = 0.0;
-        for (row, sums) in rows.iter_mut().enumerate() {
-            for col in 0..*width {
-                let (a, b) = (planes.re[row * *width + col], planes.im[row * *width + col]);
-                power += a * a + b * b;
-                for k in 0..BINS {
-                    let [c, d] = table[k * col % BINS];
-                    sums[0][k] += a * c + b * d;
-                    sums[1][k] += b * c - a * d;
-                }
-            }
-        }
-        let (mut best, mut slope) = (0.0, [0; 2]);
-        for l in 0..BINS {
-            let mut sums = [[0.0_f32; BINS]; 2];
-            for (row, [re, im]) in rows.iter().enumerate() {
-                let [c, d] = table[l * row % BINS];
-                for k in 0..BINS {
-                    sums[0][k] += re[k] * c + im[k] * d;
-                    sums[1][k] += im[k] * c - re[k] * d;
-                }
-            }
-            for k in 0..BINS {
-                let square = sums[0][k] * sums[0][k] + sums[1][k] * sums[1][k];
-                if square > best {
-                    (best, slope) = (square, [k, l]);
-                }
-            }
-        }
-        let resolved = best > ((BINS * BINS) as f32 / FALSE_ALARM).ln() * power;
-        let signed = |bin: usize| if bin > BINS / 2 { bin as f32 - BINS as f32 } else { bin as f32 };
-        let slope = slope.map(|bin| if resolved { signed(bin) * TAU / BINS as f32 } else { 0.0 });
-        Fringe { slope, resolved }
+        // In noise alone the square scatters around the power: half of it lies across.
+        let sigma = (0.5 * power / square.max(f32::MIN_POSITIVE)).sqrt();
+        (if turn > PI { turn - TAU } else { turn }, sigma)
     }
 
     /// Turns each phasor back by the fringe, counted from the corner of the planes.
     #[inline(always)]
     fn turn_back(&mut self) {
-        let Planes { re, im, .. } = &mut self.planes;
-        let [columns, rows] = self.fringe.slope;
+        let [columns, rows] = self.slope;
+        if self.slope == [0.0; 2] {
+            return;
+        }
+        let turn = |slope: f32, at: usize| unit((slope * at as f32).rem_euclid(TAU).min(TAU));
         self.turns.clear();
-        self.turns.extend((0..self.width).map(|col| unit((columns * col as f32).rem_euclid(TAU).min(TAU))));
-        let rows_of = re.chunks_exact_mut(self.width).zip(im.chunks_exact_mut(self.width));
-        for (row, (re, im)) in rows_of.enumerate() {
-            let [cosine, sine] = unit((rows * row as f32).rem_euclid(TAU).min(TAU));
+        self.turns.extend((0..self.width).map(|col| turn(columns, col)));
+        let Planes { re, im, .. } = &mut self.planes;
+        let lines = re.chunks_exact_mut(self.width).zip(im.chunks_exact_mut(self.width));
+        for (row, (re, im)) in lines.enumerate() {
+            let [cosine, sine] = turn(rows, row);
             for ((re, im), [a, b]) in re.iter_mut().zip(im).zip(&self.turns) {
                 let (along, across) = (a * cosine - b * sine, a * sine + b * cosine);
                 (*re, *im) = (*re * along + *im * across, *im * along - *re * across);
             }
         }
+    }
+}
+
+/// Sums of the phasors of a tile, turned back by each of a grid of slopes `[RifeBoorstyn1974]`.
+#[derive(Debug, Default)]
+struct Periodogram {
+    /// Cosines and sines of all slopes, for each pixel of a row or column.
+    turns: Vec<[[f32; SLOPES]; 2]>,
+    /// Sums of each row.
+    rows: Vec<[[f32; SLOPES]; 2]>,
+}
+
+impl Periodogram {
+    /// The slope of the largest sum.
+    #[inline(always)]
+    fn strongest(&mut self, planes: &Planes, width: usize) -> Slope {
+        if self.turns.is_empty() {
+            let unit = |n: usize| unit((n % SLOPES) as f32 * TAU / SLOPES as f32);
+            let turns = |at: usize| [0, 1].map(|part| std::array::from_fn(|slope| unit(slope * at)[part]));
+            self.turns.extend((0..SLOPES).map(turns));
+        }
+        self.rows.clear();
+        for (re, im) in planes.re.chunks_exact(width).zip(planes.im.chunks_exact(width)) {
+            let mut sums = [[0.0; SLOPES]; 2];
+            for (at, (re, im)) in re.iter().zip(im).enumerate() {
+                add_turned(&mut sums, &[[*re; SLOPES], [*im; SLOPES]], &self.turns[at % SLOPES]);
+            }
+            self.rows.push(sums);
+        }
+        let (mut best, mut slope) = (0.0, [0; 2]);
+        for down in 0..SLOPES {
+            let mut sums = [[0.0; SLOPES]; 2];
+            for (at, row) in self.rows.iter().enumerate() {
+                let [cosine, sine] = self.turns[at % SLOPES];
+                add_turned(&mut sums, row, &[[cosine[down]; SLOPES], [sine[down]; SLOPES]]);
+            }
+            for (across, (re, im)) in sums[0].iter().zip(&sums[1]).enumerate() {
+                let square = re * re + im * im;
+                if square > best {
+                    (best, slope) = (square, [across, down]);
+                }
+            }
+        }
+        let power: f32 = planes.re.iter().zip(&planes.im).map(|(re, im)| re * re + im * im).sum();
+        // In noise alone each square is exponential with the mean `power`.
+        let told = best > ((SLOPES * SLOPES) as f32 / FALSE_ALARM).ln() * power;
+        let signed = |n: usize| if n > SLOPES / 2 { n as f32 - SLOPES as f32 } else { n as f32 };
+        told.then(|| slope.map(|n| signed(n) * TAU / SLOPES as f32))
+    }
+}
+
+/// Adds phasors, turned back by as many angles.
+#[inline(always)]
+fn add_turned(
+    [re, im]: &mut [[f32; SLOPES]; 2],
+    [a, b]: &[[f32; SLOPES]; 2],
+    [cosine, sine]: &[[f32; SLOPES]; 2],
+) {
+    for n in 0..SLOPES {
+        re[n] += a[n] * cosine[n] + b[n] * sine[n];
+        im[n] += b[n] * cosine[n] - a[n] * sine[n];
     }
 }

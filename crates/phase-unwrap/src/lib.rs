@@ -1,5 +1,6 @@
 #![doc = include_str!("../README.md")]
 
+mod bends;
 mod borders;
 mod brightness;
 mod candidates;
@@ -54,7 +55,7 @@ pub use multi_frequency::{MultiFrequencyOptions, MultiUnwrapped, MultiUnwrapper,
 pub use noise::{LARGEST_SIGMA_RAD, PhaseNoise};
 pub use noisy::{NoisyMethod, NoisyOptions, NoisyUnwrapped, NoisyUnwrapper, unwrap_noisy};
 pub use options::{AlbedoPrior, Boundary, EdgeWeight, ImageGeometry, KnownWraps, Seed, SpatialOptions};
-pub use prefilter::{Filtered, Prefilter, PrefilterOptions, prefilter};
+pub use prefilter::{FilterVerdict, Filtered, Prefilter, PrefilterOptions, prefilter};
 pub use repair::{
     AmplitudeKind, RepairOptions, RepairVerdict, RepairedDepths, RepairedIsland, RepairedRanges, repair_depths,
     repair_ranges,

@@ -38,6 +38,8 @@ impl Default for PrefilterOptions {
     }
 }
 
+/// Share of the pixels that may stay noisy beside jumps and at borders before the filter says that it does not follow.
+const MAY_STAY_NOISY: f32 = 0.05;
 /// The largest half width that may be asked for.
 const RADIUS_LIMIT: u8 = 15;
 
@@ -80,6 +82,27 @@ pub struct Filtered {
     /// noise at amplitude one. `None` where a sigma for each pixel was given, or where the image has too few
     /// neighbours to estimate it, and then no pixel is changed.
     pub noise_rad: Option<f32>,
+    /// Whether the windows could follow the surface.
+    pub verdict: FilterVerdict,
+}
+
+/// Whether the filter did what it was asked to.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub enum FilterVerdict {
+    /// No pixel is noisy enough to need the filter, or nothing is known of the noise.
+    #[default]
+    NotNeeded,
+    /// The windows followed the surface: of the pixels that needed the filter, fewer than one in twenty stayed noisier
+    /// than [`PrefilterOptions::quiet_sigma_rad`].
+    Followed,
+    /// The filter could not follow: this share of the pixels that needed it stayed noisier than
+    /// [`PrefilterOptions::quiet_sigma_rad`]. Their fringe is not told from noise, or comes within its uncertainty of half a cycle a pixel, or
+    /// the surface bends or jumps too much for any window. Remedy: [`NoisyMethod::Auto`](crate::NoisyMethod::Auto), an
+    /// average over frames, or a lower frequency.
+    NotFollowed {
+        /// From 0 to 1.
+        share: f32,
+    },
 }
 
 /// Filters one image; see [`Prefilter::filter_into`]. Allocates its buffers anew.
@@ -133,14 +156,32 @@ impl Prefilter {
         resize(&mut out.phase, phase);
         resize(&mut out.sigma, phase);
         resize(&mut out.radius, phase);
-        let limits = Limits::new(&self.options);
-        if out.noise_rad.is_some() || matches!(noise, PhaseNoise::Sigma(_)) {
-            self.run(phase, &limits, out);
-        } else {
-            self.run(phase, &limits.without_windows(), out);
+        let mut limits = Limits::new(&self.options);
+        let noise_known = out.noise_rad.is_some() || matches!(noise, PhaseNoise::Sigma(_));
+        if !noise_known {
+            limits.largest_radius = 0;
+        }
+        self.run(phase, &limits, out);
+        if !noise_known {
             out.sigma.as_mut_slice().fill(f32::NAN);
         }
+        out.verdict = self.verdict(out);
         Ok(())
+    }
+
+    fn verdict(&self, out: &Filtered) -> FilterVerdict {
+        let quiet = self.options.quiet_sigma_rad;
+        let (mut needed, mut noisy) = (0_usize, 0_usize);
+        for (sigma, radius) in out.sigma.as_slice().iter().zip(out.radius.as_slice()) {
+            // What is masked or unknown is neither.
+            noisy += usize::from(*sigma > quiet);
+            needed += usize::from(*sigma > quiet || *radius > 0);
+        }
+        match noisy as f32 / needed as f32 {
+            _ if needed == 0 => FilterVerdict::NotNeeded,
+            share if share < MAY_STAY_NOISY => FilterVerdict::Followed,
+            share => FilterVerdict::NotFollowed { share },
+        }
     }
 
     /// Scales the phasors by their weights; the noise as one figure, see [`Filtered::noise_rad`].
@@ -213,7 +254,8 @@ impl pulp::WithSimd for FilterTiles<'_> {
             for col in (0..width).step_by(TILE) {
                 tile.load(planes, [width, height], [col, row], limits.largest_radius);
                 let (first, [columns, rows]) = (row * width + col, tile.core.clone());
-                let [gain, fall] = tile.fringe.slope;
+                let [gain, fall] = tile.slope;
+                let limits = &if tile.resolved { limits.beside(tile.slope) } else { limits.without_windows() };
                 for (line, row) in rows.enumerate() {
                     let at = first + line * width..first + line * width + columns.len();
                     let mut out = RowOut {

@@ -4,7 +4,7 @@
 // Only what is inlined is compiled for wide registers.
 #![allow(clippy::inline_always)]
 
-use std::f32::consts::TAU;
+use std::f32::consts::{PI, TAU};
 
 use crate::PrefilterOptions;
 use crate::fringes::Tile;
@@ -46,6 +46,8 @@ struct Group {
 /// Limits of the tests, in the form in which they are used.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Limits {
+    quiet_sigma: f32,
+    target_sigma: f32,
     quiet_information: f32,
     target_information: f32,
     coherence: f32,
@@ -55,18 +57,28 @@ pub(crate) struct Limits {
 
 impl Limits {
     pub fn new(options: &PrefilterOptions) -> Self {
+        let (quiet_sigma, target_sigma) = (options.quiet_sigma_rad, options.target_sigma_rad);
         Self {
-            quiet_information: weight(options.quiet_sigma_rad).information,
-            target_information: options.target_sigma_rad.powi(-2),
+            quiet_sigma,
+            target_sigma,
+            quiet_information: weight(quiet_sigma).information,
+            target_information: target_sigma.powi(-2),
             coherence: options.least_coherence,
             deviations: options.deviations,
             largest_radius: options.largest_radius_px.into(),
         }
     }
 
-    /// Where the noise is unknown.
+    /// On a fringe: what is left of half a cycle beside its steps is smaller, and so is the noise that they bear.
+    pub fn beside(self, slope: [f32; 2]) -> Self {
+        let quiet = self.quiet_sigma * (1.0 - slope[0].abs().max(slope[1].abs()) / PI);
+        let target = self.target_sigma.min(quiet);
+        Self { quiet_information: weight(quiet).information, target_information: target.powi(-2), ..self }
+    }
+
+    /// Where no pixel is to be changed: the fringe is not known.
     pub fn without_windows(self) -> Self {
-        Self { largest_radius: 0, ..self }
+        Self { quiet_information: 0.0, ..self }
     }
 }
 

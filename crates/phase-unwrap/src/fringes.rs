@@ -23,10 +23,6 @@ const FALSE_ALARM: f32 = 1e-4;
 /// Deviations of its slope by which a fringe must stay below half a cycle a pixel.
 const DEVIATIONS: f32 = 3.0;
 
-/// How fast the phase runs: radians a column and a row, each in `[-pi, pi]`; `None` where that is not told from noise,
-/// or not from the slope that differs by a cycle.
-type Slope = Option<[f32; 2]>;
-
 /// The phasors of one tile with what its windows reach beyond it, turned back by the fringe.
 #[derive(Debug, Default)]
 pub(crate) struct Tile {
@@ -34,8 +30,9 @@ pub(crate) struct Tile {
     pub width: usize,
     /// Columns and rows of the tile itself within the planes.
     pub core: [Range<usize>; 2],
-    /// The fringe that was taken off; zero in both directions where none is told.
+    /// How fast the phase ran, radians a column and a row in `[-pi, pi]`, before that was taken off.
     pub slope: [f32; 2],
+    /// Whether the slope is told from noise, and from the one that differs by a cycle.
     pub resolved: bool,
     turns: Vec<[f32; 2]>,
     periodogram: Periodogram,
@@ -57,26 +54,27 @@ impl Tile {
         let core = |axis: usize, size: usize| first[axis] - begin[axis]..(first[axis] + TILE).min(size) - begin[axis];
         self.core = [core(0, width), core(1, height)];
         // A single pixel has no neighbours, and windows of one pixel need no slope.
-        let slope = if margin == 0 { Some([0.0; 2]) } else { self.measure() };
-        (self.slope, self.resolved) = (slope.unwrap_or_default(), slope.is_some());
+        (self.slope, self.resolved) = if margin == 0 { ([0.0; 2], true) } else { self.measure() };
         self.turn_back();
     }
 
     /// The mean step between neighbours serves where it is precise: jumps spoil few of the steps. In stronger noise the
-    /// strongest slope of the whole tile is still seen.
+    /// strongest slope of the whole tile is still seen. Says whether the slope is told; if noise hides it, the mean step
+    /// is the best guess, and near half a cycle there is none.
     #[inline(always)]
-    fn measure(&mut self) -> Slope {
+    fn measure(&mut self) -> ([f32; 2], bool) {
         let steps = [self.mean_step(1), self.mean_step(self.width)];
-        let precise = steps.iter().all(|(_, sigma)| *sigma < PRECISE);
-        let (slope, sigma) = if precise {
-            (steps.map(|step| step.0), steps.map(|step| step.1))
-        } else {
-            let spacing = TAU / SLOPES as f32;
-            // Evenly spread over the spacing.
-            (self.periodogram.strongest(&self.planes, self.width)?, [spacing / 12.0_f32.sqrt(); 2])
-        };
+        let (mean, mut sigma) = (steps.map(|step| step.0), steps.map(|step| step.1));
+        let mut slope = mean;
+        if sigma.iter().any(|sigma| *sigma >= PRECISE) {
+            let Some(strongest) = self.periodogram.strongest(&self.planes, self.width) else {
+                return (mean, false);
+            };
+            // Evenly spread between its neighbours.
+            (slope, sigma) = (strongest, [TAU / SLOPES as f32 / 12.0_f32.sqrt(); 2]);
+        }
         let one_side = slope.iter().zip(sigma).all(|(slope, sigma)| slope.abs() + DEVIATIONS * sigma < PI);
-        one_side.then_some(slope)
+        if one_side { (slope, true) } else { ([0.0; 2], false) }
     }
 
     /// Angle of the mean product of pixels that are `step` apart, and its standard deviation.
@@ -136,9 +134,9 @@ struct Periodogram {
 }
 
 impl Periodogram {
-    /// The slope of the largest sum.
+    /// The slope of the largest sum; `None` where noise makes as large a one.
     #[inline(always)]
-    fn strongest(&mut self, planes: &Planes, width: usize) -> Slope {
+    fn strongest(&mut self, planes: &Planes, width: usize) -> Option<[f32; 2]> {
         if self.turns.is_empty() {
             let unit = |n: usize| unit((n % SLOPES) as f32 * TAU / SLOPES as f32);
             let turns = |at: usize| [0, 1].map(|part| std::array::from_fn(|slope| unit(slope * at)[part]));

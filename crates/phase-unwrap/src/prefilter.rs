@@ -255,7 +255,7 @@ impl pulp::WithSimd for FilterTiles<'_> {
                 tile.load(planes, [width, height], [col, row], limits.largest_radius);
                 let (first, [columns, rows]) = (row * width + col, tile.core.clone());
                 let [gain, fall] = tile.slope;
-                let limits = &if tile.resolved { limits.beside(tile.slope) } else { limits.without_windows() };
+                let limits = &limits.beside(tile.slope);
                 for (line, row) in rows.enumerate() {
                     let at = first + line * width..first + line * width + columns.len();
                     let mut out = RowOut {
@@ -264,7 +264,12 @@ impl pulp::WithSimd for FilterTiles<'_> {
                         radius: &mut radius.as_mut_slice()[at.clone()],
                         fringe: [gain * columns.start as f32 + fall * row as f32, gain],
                     };
-                    windows.filter_row(tile, row, &phase.as_slice()[at], limits, &mut out);
+                    windows.filter_row(tile, row, &phase.as_slice()[at.clone()], limits, &mut out);
+                    if !tile.resolved {
+                        for (s, i) in sigma.as_mut_slice()[at.clone()].iter_mut().zip(&planes.information[at]) {
+                            *s = if *i > 0.0 { i.sqrt().recip() } else { f32::NAN };
+                        }
+                    }
                 }
             }
         }

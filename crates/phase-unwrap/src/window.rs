@@ -75,11 +75,6 @@ impl Limits {
         let target = self.target_sigma.min(quiet);
         Self { quiet_information: weight(quiet).information, target_information: target.powi(-2), ..self }
     }
-
-    /// Where no pixel is to be changed: the fringe is not known.
-    pub fn without_windows(self) -> Self {
-        Self { quiet_information: 0.0, ..self }
-    }
 }
 
 /// A row of the result.

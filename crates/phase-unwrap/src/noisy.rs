@@ -160,8 +160,7 @@ impl NoisyUnwrapper {
         match self.cuts.unwrap_into(&filtered.phase, weights, None, &mut self.exact) {
             Ok(()) => {
                 unwrapped.wraps.clone_from(&self.exact.wraps);
-                *method =
-                    if *method == NoisyMethod::Filter { NoisyMethod::FilteredCuts } else { NoisyMethod::Cuts };
+                *method = if *method == NoisyMethod::Filter { NoisyMethod::FilteredCuts } else { NoisyMethod::Cuts };
                 congruent_into(phase, &filtered.phase, &mut unwrapped.wraps)
             }
             Err(Error::TooManyResidues { .. }) => Ok(()),

@@ -11,7 +11,8 @@ use crate::fringes::Tile;
 use crate::noise::weight;
 use crate::phasor::angle;
 
-const LANES: usize = 8;
+/// Pixels that go side by side through the registers.
+pub(crate) const LANES: usize = 8;
 
 /// Weighted phasors and information of each pixel, row by row; zero where masked.
 #[derive(Debug, Default)]
@@ -107,14 +108,20 @@ impl Windows {
             }
             for other in [row.wrapping_sub(radius), row + radius] {
                 if other < height {
-                    self.add_row(&tile.planes, tile.width, other, rim);
+                    let row = other * tile.width..(other + 1) * tile.width;
+                    add_row(&mut self.columns.re, rim, &tile.planes.re[row.clone()]);
+                    add_row(&mut self.columns.im, rim, &tile.planes.im[row.clone()]);
+                    add_row(&mut self.columns.information, rim, &tile.planes.information[row]);
                 }
             }
             let first = rim + tile.core[0].start - radius;
             for (at, group) in self.groups.iter_mut().enumerate() {
                 if group.is_open() {
-                    let sums = window_sums(&self.columns, first + at * LANES, radius);
-                    group.choose(&sums, radius, limits);
+                    let (Planes { re, im, information }, first) = (&self.columns, first + at * LANES);
+                    let re = window_sum(re, first, radius);
+                    let im = window_sum(im, first, radius);
+                    let information = window_sum(information, first, radius);
+                    group.choose([&re, &im, &information], radius, limits);
                 }
             }
         }
@@ -131,22 +138,13 @@ impl Windows {
         self.groups.resize(groups, Group::default());
         for (columns, source) in self.columns.each().into_iter().zip(planes.all()) {
             columns.clear();
-            columns.resize(core[0].start + groups * LANES + 2 * rim, 0.0);
+            columns.resize(width + groups * LANES + 2 * rim, 0.0);
             columns[rim..rim + width].copy_from_slice(&source[row * width..][..*width]);
         }
         for (at, group) in self.groups.iter_mut().enumerate() {
             let [re, im, information] = self.columns.all().map(|plane| lanes(plane, rim + core[0].start + at * LANES));
             *group = Group { re, im, information, ..Group::default() };
             group.start(limits);
-        }
-    }
-
-    #[inline(always)]
-    fn add_row(&mut self, planes: &Planes, width: usize, row: usize, rim: usize) {
-        for (columns, source) in self.columns.each().into_iter().zip(planes.all()) {
-            for (sum, value) in columns[rim..rim + width].iter_mut().zip(&source[row * width..][..width]) {
-                *sum += value;
-            }
         }
     }
 }
@@ -171,7 +169,7 @@ impl Group {
 
     /// Takes the larger windows where they hang together with the smaller ones.
     #[inline(always)]
-    fn choose(&mut self, [re, im, information]: &[[f32; LANES]; 3], radius: usize, limits: &Limits) {
+    fn choose(&mut self, [re, im, information]: [&[f32; LANES]; 3], radius: usize, limits: &Limits) {
         let squared = limits.deviations * limits.deviations;
         for lane in 0..LANES {
             let (a, b, i) = (re[lane], im[lane], information[lane]);
@@ -217,23 +215,32 @@ impl Group {
     }
 }
 
-/// Sums of `2 radius + 1` columns for eight pixels, the first of them starting at `first`.
+/// Sum of `2 radius + 1` columns for eight pixels, the first of them starting at `first`.
 #[inline(always)]
-fn window_sums(columns: &Planes, first: usize, radius: usize) -> [[f32; LANES]; 3] {
-    let mut sums = [[0.0; LANES]; 3];
-    for (sum, plane) in sums.iter_mut().zip(columns.all()) {
-        for column in first..=first + 2 * radius {
-            let values = lanes(plane, column);
-            for lane in 0..LANES {
-                sum[lane] += values[lane];
-            }
+fn window_sum(columns: &[f32], first: usize, radius: usize) -> [f32; LANES] {
+    let mut sum = [0.0; LANES];
+    let columns = &columns[first..first + 2 * radius + LANES];
+    for values in columns.windows(LANES) {
+        for (sum, value) in sum.iter_mut().zip(values) {
+            *sum += value;
         }
     }
-    sums
+    sum
+}
+
+/// Adds a row, of whole groups, to the columns from `first` on.
+#[inline(always)]
+fn add_row(columns: &mut [f32], first: usize, row: &[f32]) {
+    let sums = columns[first..first + row.len()].chunks_exact_mut(LANES);
+    for (sums, values) in sums.zip(row.chunks_exact(LANES)) {
+        for (sum, value) in sums.iter_mut().zip(values) {
+            *sum += value;
+        }
+    }
 }
 
 #[inline(always)]
-fn lanes(plane: &[f32], first: usize) -> [f32; LANES] {
+pub(crate) fn lanes(plane: &[f32], first: usize) -> [f32; LANES] {
     plane[first..].first_chunk().copied().unwrap_or_default()
 }
 

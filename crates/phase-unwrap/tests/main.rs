@@ -8,6 +8,8 @@ mod dark_rooms;
 mod files;
 #[path = "common/frequencies.rs"]
 mod frequencies;
+#[path = "common/fringes.rs"]
+mod fringes;
 mod insar;
 mod jumps_and_dark_patches;
 mod kernel_density;
@@ -21,6 +23,7 @@ mod repair;
 mod room;
 mod sequence;
 mod spatial;
+mod steep_fringes;
 
 // What the modules of the example ask their program for.
 use dark_rooms::{Outcome, Size};

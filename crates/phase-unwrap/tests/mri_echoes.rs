@@ -5,7 +5,8 @@ use std::f32::consts::{PI, TAU};
 use std::path::Path;
 
 use phase_unwrap::{
-    ExactOptions, NoisyMethod, NoisyOptions, PhaseNoise, SpatialOptions, unwrap_least_cuts, unwrap_noisy, unwrap_spatial,
+    ExactOptions, NoisyMethod, NoisyOptions, PhaseNoise, SpatialOptions, unwrap_least_cuts, unwrap_noisy,
+    unwrap_spatial,
 };
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};

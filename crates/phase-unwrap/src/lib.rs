@@ -27,6 +27,7 @@ mod logarithm;
 mod multi_frequency;
 mod noise;
 mod noisy;
+mod noisy_absolute;
 mod offsets;
 mod options;
 mod phasor;
@@ -54,6 +55,7 @@ pub use kernel_density::KernelDensityOptions;
 pub use multi_frequency::{MultiFrequencyOptions, MultiUnwrapped, MultiUnwrapper, unwrap_multi_frequency};
 pub use noise::{LARGEST_SIGMA_RAD, PhaseNoise};
 pub use noisy::{NoisyMethod, NoisyOptions, NoisyUnwrapped, NoisyUnwrapper, unwrap_noisy};
+pub use noisy_absolute::unwrap_noisy_absolute;
 pub use options::{AlbedoPrior, Boundary, EdgeWeight, ImageGeometry, KnownWraps, Seed, SpatialOptions};
 pub use prefilter::{FilterVerdict, Filtered, Prefilter, PrefilterOptions, prefilter};
 pub use repair::{

@@ -18,6 +18,7 @@ mod least_cuts;
 mod mri_echoes;
 mod multi_frequency;
 mod noisy;
+mod noisy_absolute;
 mod repair;
 #[path = "../examples/peers_phase/room.rs"]
 mod room;

@@ -17,8 +17,8 @@ const SLOPES: usize = 32;
 /// Deviation in radians a pixel up to which the mean step between neighbours is good enough. An error of 0.12 takes a
 /// fourteenth of the mean of a window of eleven pixels a side, 0.24 a quarter.
 const PRECISE: f32 = 0.12;
-/// Probability that the periodogram of noise has a peak that passes for a fringe. A hundredth of it loses fringes at
-/// noises that are 1 % smaller.
+/// Probability that the periodogram of noise has a peak that passes for a fringe. Fringes are so seen in noise of up to
+/// 1.93 rad; at a hundredth of it, in up to 1.87.
 const FALSE_ALARM: f32 = 1e-4;
 /// Deviations of its slope by which a fringe must stay below half a cycle a pixel.
 const DEVIATIONS: f32 = 3.0;
@@ -140,7 +140,7 @@ impl Tile {
     }
 }
 
-/// Sums of the phasors of a tile, turned back by each of a grid of slopes `[RifeBoorstyn1974]`.
+/// Sums of the phasors of a tile, turned back by each of a grid of slopes `[Rife1974]`.
 #[derive(Debug, Default)]
 struct Periodogram {
     /// Cosines and sines of all slopes, for each pixel of a row or column.

@@ -196,6 +196,7 @@ impl NoisyUnwrapper {
             candidate = tree;
             self.cut(phase, &mut candidate)?;
             take_better(phase, &mut candidate, &mut least, out);
+            out.filtered.verdict = verdict;
         }
         self.candidate = candidate;
         Ok(())

@@ -13,7 +13,8 @@ use crate::{Error, Result};
 /// How phases are filtered before they are unwrapped.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PrefilterOptions {
-    /// Pixels of at most this phase noise are left as they are, in radians: the tree needs no help there.
+    /// Pixels of at most this phase noise are left as they are, in radians: the tree needs no help there. On a fringe of
+    /// s radians a pixel this and the next shrink by `1 - s / pi`, the share of half a cycle that is left for the noise.
     pub quiet_sigma_rad: f32,
     /// Windows grow until the mean's standard deviation falls to this, in radians.
     pub target_sigma_rad: f32,
@@ -75,7 +76,8 @@ pub struct Filtered {
     /// Filtered phase in radians in `[0, 2 pi]`, NaN where masked; where the window is one pixel, the measured phase
     /// bit for bit.
     pub phase: Raster<f32>,
-    /// Standard deviation of the filtered phase in radians, by the noise alone; NaN where masked or unknown.
+    /// Standard deviation of the filtered phase in radians, by the noise alone; that of the measured phase where the
+    /// fringe is not told; NaN where masked or unknown.
     pub sigma: Raster<f32>,
     /// Half width of the window that each pixel got, in pixels; 0 where it was left as it is.
     pub radius: Raster<u8>,
@@ -90,16 +92,16 @@ pub struct Filtered {
 /// Whether the filter did what it was asked to.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub enum FilterVerdict {
-    /// No pixel is noisy enough to need the filter, or nothing is known of the noise.
+    /// No pixel is noisy enough to need the filter, nothing is known of the noise, or no window was allowed.
     #[default]
     NotNeeded,
     /// The windows followed the surface: of the pixels that needed the filter, fewer than one in twenty stayed noisier
     /// than [`PrefilterOptions::quiet_sigma_rad`].
     Followed,
     /// The filter could not follow: this share of the pixels that needed it stayed noisier than
-    /// [`PrefilterOptions::quiet_sigma_rad`]. Their fringe is not told from noise, or comes within its uncertainty of half a cycle a pixel, or
-    /// the surface bends or jumps too much for any window. Remedy: [`NoisyMethod::Auto`](crate::NoisyMethod::Auto), an
-    /// average over frames, or a lower frequency.
+    /// [`PrefilterOptions::quiet_sigma_rad`]. Their fringe is not told from noise, comes within its uncertainty of half a
+    /// cycle a pixel, or the surface bends or jumps too much for any window. Remedy:
+    /// [`NoisyMethod::Auto`](crate::NoisyMethod::Auto), an average over frames, or a lower frequency.
     NotFollowed {
         /// From 0 to 1.
         share: f32,
@@ -137,8 +139,8 @@ impl Prefilter {
 
     /// Filters `phase`, in radians in `[0, 2 pi]`; what is not finite is masked. In `mask`, true means use.
     ///
-    /// Each pixel's phase becomes the angle of the weighted mean of the unit phasors in a square window. The window
-    /// grows from one pixel until the deviation of the mean reaches the target, and stops where the mean phasor is
+    /// Each pixel's phase becomes the angle of the weighted mean of the unit phasors in a square window, after the fringe
+    /// around was turned back: its slope is measured on tiles of 16 by 16 pixels `[Rife1974]`. The window grows from one pixel until the deviation of the mean reaches the target, and stops where the mean phasor is
     /// shorter than noise explains, or turned from that of the next smaller window by more than noise explains
     /// `[BioucasDias2008]`. Pixels quieter than `quiet_sigma_rad` are not touched.
     pub fn filter_into(
@@ -179,7 +181,7 @@ impl Prefilter {
             needed += usize::from(*sigma > quiet || *radius > 0);
         }
         match noisy as f32 / needed as f32 {
-            _ if needed == 0 => FilterVerdict::NotNeeded,
+            _ if needed == 0 || self.options.largest_radius_px == 0 => FilterVerdict::NotNeeded,
             share if share < FEW => FilterVerdict::Followed,
             share => FilterVerdict::NotFollowed { share },
         }

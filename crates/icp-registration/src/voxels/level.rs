@@ -25,7 +25,8 @@ const FLOOR: f64 = 0.02;
 /// Cosine of the angle beyond which normals of partners disagree.
 const SMALLEST_COSINE: f64 = 0.7;
 
-/// The mean of the points of a voxel, and the plane through it and its neighbours.
+/// The mean of the points of a surface in a voxel and in those before and behind it, and the plane through it and its
+/// neighbours.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Voxel {
     pub mean: Point3<f64>,

@@ -94,7 +94,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         all.extend(runs.into_iter().map(|run| (sigma, can, run)));
     }
     println!("\n| scene, noise of 1 rad | tree | cuts | filter | auto | auto takes |\n|---|---|---|---|---|---|");
-    for (_, _, run) in all.iter().filter(|(sigma, _, _)| *sigma == 1.0).step_by(seeds.len()) {
+    for (_, _, run) in all.iter().filter(|(sigma, _, _)| (sigma - 1.0).abs() < 1e-9).step_by(seeds.len()) {
         let right: Vec<String> = run.right.iter().map(|right| format!("{right:.4}")).collect();
         println!("| {} | {} | {:?} |", run.scene, right.join(" | "), run.chosen);
     }

@@ -109,7 +109,7 @@ impl Tile {
     #[inline(always)]
     fn turn_back(&mut self) {
         let [columns, rows] = self.slope;
-        if self.slope == [0.0; 2] {
+        if self.slope.iter().all(|slope| slope.abs() <= 0.0) {
             return;
         }
         let turn = |slope: f32, at: usize| unit((slope * at as f32).rem_euclid(TAU).min(TAU));

@@ -143,12 +143,14 @@ fn main() -> Result<(), Box<dyn Error>> {
         report(name, time, &out.unwrapped.wraps, &scene, path)?;
         println!("# noise {:?} rad", out.filtered.noise_rad);
     }
-    let method = NoisyMethod::LeastCuts(ExactOptions::default());
-    let mut unwrapper = NoisyUnwrapper::new(NoisyOptions { method, ..NoisyOptions::default() })?;
     let noise = sigma.map_or(PhaseNoise::Unknown, PhaseNoise::Uniform);
-    let (time, done) = timed(|| unwrapper.unwrap_into(&scene.phase, noise, None, &mut out));
-    done?;
-    report("noisy_exact", time, &out.unwrapped.wraps, &scene, path)?;
+    for (name, method) in [("noisy_exact", NoisyMethod::FilteredCuts), ("auto", NoisyMethod::Auto)] {
+        let mut unwrapper = NoisyUnwrapper::new(NoisyOptions { method, ..NoisyOptions::default() })?;
+        let (time, done) = timed(|| unwrapper.unwrap_into(&scene.phase, noise, None, &mut out));
+        done?;
+        report(name, time, &out.unwrapped.wraps, &scene, path)?;
+        println!("# {:?}, {:?}", out.method, out.filtered.verdict);
+    }
     for (name, price) in [("exact", CutPrice::Smoothness), ("exact_uniform", CutPrice::Uniform)] {
         let mut cuts = LeastCuts::new(ExactOptions { price, ..ExactOptions::default() });
         let mut out = ExactUnwrapped::default();

@@ -1,5 +1,6 @@
 #![doc = include_str!("../README.md")]
 
+mod bends;
 mod borders;
 mod brightness;
 mod candidates;
@@ -13,6 +14,7 @@ mod exact;
 mod fold;
 mod forest;
 mod frame;
+mod fringes;
 mod grid;
 mod hypotheses;
 mod intervals;
@@ -25,6 +27,7 @@ mod logarithm;
 mod multi_frequency;
 mod noise;
 mod noisy;
+mod noisy_absolute;
 mod offsets;
 mod options;
 mod phasor;
@@ -52,8 +55,9 @@ pub use kernel_density::KernelDensityOptions;
 pub use multi_frequency::{MultiFrequencyOptions, MultiUnwrapped, MultiUnwrapper, unwrap_multi_frequency};
 pub use noise::{LARGEST_SIGMA_RAD, PhaseNoise};
 pub use noisy::{NoisyMethod, NoisyOptions, NoisyUnwrapped, NoisyUnwrapper, unwrap_noisy};
+pub use noisy_absolute::unwrap_noisy_absolute;
 pub use options::{AlbedoPrior, Boundary, EdgeWeight, ImageGeometry, KnownWraps, Seed, SpatialOptions};
-pub use prefilter::{Filtered, Prefilter, PrefilterOptions, prefilter};
+pub use prefilter::{FilterVerdict, Filtered, Prefilter, PrefilterOptions, prefilter};
 pub use repair::{
     AmplitudeKind, RepairOptions, RepairVerdict, RepairedDepths, RepairedIsland, RepairedRanges, repair_depths,
     repair_ranges,

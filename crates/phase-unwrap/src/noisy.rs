@@ -4,10 +4,11 @@ use std::f32::consts::{PI, TAU};
 
 use range_image::Raster;
 
+use crate::bends::bends;
 use crate::congruent::congruent_into;
 use crate::exact::{ExactOptions, ExactUnwrapped, LeastCuts};
 use crate::noise::{LARGEST_SIGMA_RAD, PhaseNoise};
-use crate::prefilter::{Filtered, Prefilter, PrefilterOptions};
+use crate::prefilter::{FilterVerdict, Filtered, Prefilter, PrefilterOptions};
 use crate::{Error, KnownWraps, Result, SpatialOptions, Unwrapped, Unwrapper};
 
 /// How noisy phases are unwrapped.
@@ -17,19 +18,33 @@ pub struct NoisyOptions {
     pub prefilter: PrefilterOptions,
     /// The spanning tree, which is always grown: it tells islands and confidence.
     pub spatial: SpatialOptions,
-    /// What the counts of the filtered phase come from.
+    /// The cheapest cuts, where they are asked for.
+    pub cuts: ExactOptions,
+    /// What the counts come from.
     pub method: NoisyMethod,
 }
 
-/// What the counts of the filtered phase come from.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+/// What the counts of a noisy image come from.
+///
+/// Where there are more residues than [`ExactOptions::maximum_residues`] the tree stands in for the cuts, and
+/// [`NoisyUnwrapped::method`] says so.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum NoisyMethod {
-    /// The spanning tree.
-    #[default]
+    /// The spanning tree over the phase as it was measured: for noise below 0.5 rad.
     Tree,
-    /// The cheapest cuts, weighted by the inverse variance of the filtered phase where it is known; the tree where
-    /// there are more residues than the options allow, and [`NoisyUnwrapped::method`] says so.
-    LeastCuts(ExactOptions),
+    /// The spanning tree over the filtered phase.
+    #[default]
+    Filter,
+    /// The cheapest cuts of the phase as it was measured: for noise on surfaces that bend too much for a filter.
+    Cuts,
+    /// The cheapest cuts of the filtered phase, weighted by its inverse variance where that is known: a little better
+    /// than the tree over it, at half as much time again.
+    FilteredCuts,
+    /// One of the others, chosen by the image. Where the filtered phase has no residues, all paths over it give the same
+    /// counts: the filter's (the tree's, where nothing was filtered). Otherwise the cheapest cuts are tried too, and where
+    /// the filter says that it cannot follow the image, both without it. The counts whose surface bends least are
+    /// taken: second differences between means of 2 by 2 pixels, squared, at most half a cycle each.
+    Auto,
 }
 
 /// Wrap counts of a noisy image.
@@ -38,9 +53,10 @@ pub struct NoisyUnwrapped {
     /// Counts of the measured phase, relative: the lowest of each island is 0. The confidence is that of the filtered
     /// phase's place in the tree, times `2p - 1` for the odds of the count against the next one by the noise.
     pub unwrapped: Unwrapped,
-    /// The filtered phase that was unwrapped.
+    /// The filtered phase that was unwrapped, and whether the filter could follow it; the measured phase where the
+    /// method does without.
     pub filtered: Filtered,
-    /// What the counts came from.
+    /// What the counts came from; never [`NoisyMethod::Auto`].
     pub method: NoisyMethod,
 }
 
@@ -60,24 +76,24 @@ pub fn unwrap_noisy(
 #[derive(Debug, Default)]
 pub struct NoisyUnwrapper {
     options: NoisyOptions,
-    prefilter: Prefilter,
+    filter: Prefilter,
+    no_filter: Prefilter,
     tree: Unwrapper,
     cuts: LeastCuts,
     exact: ExactUnwrapped,
     weights: Raster<f32>,
     lowest: Vec<i32>,
+    /// The candidate that is compared with the best so far.
+    candidate: NoisyUnwrapped,
 }
 
 impl NoisyUnwrapper {
     /// Fails where an option lies outside its domain.
     pub fn new(options: NoisyOptions) -> Result<Self> {
-        let prefilter = Prefilter::new(options.prefilter)?;
-        let tree = Unwrapper::new(options.spatial)?;
-        let cuts = match options.method {
-            NoisyMethod::Tree => LeastCuts::default(),
-            NoisyMethod::LeastCuts(options) => LeastCuts::new(options),
-        };
-        Ok(Self { options, prefilter, tree, cuts, ..Self::default() })
+        let filter = Prefilter::new(options.prefilter)?;
+        let no_filter = Prefilter::new(PrefilterOptions { largest_radius_px: 0, ..options.prefilter })?;
+        let (tree, cuts) = (Unwrapper::new(options.spatial)?, LeastCuts::new(options.cuts));
+        Ok(Self { options, filter, no_filter, tree, cuts, ..Self::default() })
     }
 
     /// Wrap counts of `phase`, in radians in `[0, 2 pi]`; what is not finite is masked. In `mask`, true means use.
@@ -92,11 +108,20 @@ impl NoisyUnwrapper {
         mask: Option<&Raster<bool>>,
         out: &mut NoisyUnwrapped,
     ) -> Result<()> {
-        let NoisyUnwrapped { unwrapped, filtered, method } = out;
-        self.prefilter.filter_into(phase, noise, mask, filtered)?;
-        self.tree.unwrap_into(&filtered.phase, None, None, KnownWraps::Nothing, unwrapped)?;
-        *method = self.cut(filtered, &mut unwrapped.wraps)?;
-        congruent_into(phase, &filtered.phase, &mut unwrapped.wraps)?;
+        match self.options.method {
+            NoisyMethod::Tree => self.grow(NoisyMethod::Tree, phase, noise, mask, out)?,
+            NoisyMethod::Filter => self.grow(NoisyMethod::Filter, phase, noise, mask, out)?,
+            NoisyMethod::Cuts => {
+                self.grow(NoisyMethod::Tree, phase, noise, mask, out)?;
+                self.cut(phase, out)?;
+            }
+            NoisyMethod::FilteredCuts => {
+                self.grow(NoisyMethod::Filter, phase, noise, mask, out)?;
+                self.cut(phase, out)?;
+            }
+            NoisyMethod::Auto => self.choose(phase, noise, mask, out)?,
+        }
+        let NoisyUnwrapped { unwrapped, filtered, .. } = out;
         self.start_islands_at_zero(unwrapped);
         doubt(phase, filtered, noise, unwrapped);
         for island in &mut unwrapped.islands {
@@ -106,11 +131,25 @@ impl NoisyUnwrapper {
         Ok(())
     }
 
-    /// Replaces the tree's counts by those of the cheapest cuts, where this is asked for and allowed.
-    fn cut(&mut self, filtered: &Filtered, wraps: &mut Raster<i32>) -> Result<NoisyMethod> {
-        if self.options.method == NoisyMethod::Tree {
-            return Ok(NoisyMethod::Tree);
-        }
+    /// Counts of the measured phase by the tree, over the filtered phase or over the phase as it is.
+    fn grow(
+        &mut self,
+        method: NoisyMethod,
+        phase: &Raster<f32>,
+        noise: PhaseNoise<'_>,
+        mask: Option<&Raster<bool>>,
+        out: &mut NoisyUnwrapped,
+    ) -> Result<()> {
+        let filter = if method == NoisyMethod::Filter { &mut self.filter } else { &mut self.no_filter };
+        filter.filter_into(phase, noise, mask, &mut out.filtered)?;
+        self.tree.unwrap_into(&out.filtered.phase, None, None, KnownWraps::Nothing, &mut out.unwrapped)?;
+        out.method = method;
+        congruent_into(phase, &out.filtered.phase, &mut out.unwrapped.wraps)
+    }
+
+    /// Replaces the tree's counts by those of the cheapest cuts, where these are allowed.
+    fn cut(&mut self, phase: &Raster<f32>, out: &mut NoisyUnwrapped) -> Result<()> {
+        let NoisyUnwrapped { unwrapped, filtered, method } = out;
         self.weights.clone_from(&filtered.sigma);
         let mut known = false;
         for weight in self.weights.as_mut_slice() {
@@ -120,12 +159,47 @@ impl NoisyUnwrapper {
         let weights = if known { Some(&self.weights) } else { None };
         match self.cuts.unwrap_into(&filtered.phase, weights, None, &mut self.exact) {
             Ok(()) => {
-                wraps.clone_from(&self.exact.wraps);
-                Ok(self.options.method)
+                unwrapped.wraps.clone_from(&self.exact.wraps);
+                *method = if *method == NoisyMethod::Filter { NoisyMethod::FilteredCuts } else { NoisyMethod::Cuts };
+                congruent_into(phase, &filtered.phase, &mut unwrapped.wraps)
             }
-            Err(Error::TooManyResidues { .. }) => Ok(NoisyMethod::Tree),
+            Err(Error::TooManyResidues { .. }) => Ok(()),
             Err(error) => Err(error),
         }
+    }
+
+    /// Tries what the image asks for, and takes what bends least; see [`NoisyMethod::Auto`].
+    fn choose(
+        &mut self,
+        phase: &Raster<f32>,
+        noise: PhaseNoise<'_>,
+        mask: Option<&Raster<bool>>,
+        out: &mut NoisyUnwrapped,
+    ) -> Result<()> {
+        self.grow(NoisyMethod::Filter, phase, noise, mask, out)?;
+        let verdict = out.filtered.verdict;
+        if verdict == FilterVerdict::NotNeeded {
+            out.method = NoisyMethod::Tree;
+        }
+        if self.cuts.residues(&out.filtered.phase)? == 0 {
+            return Ok(());
+        }
+        let mut least = bends(phase, &out.unwrapped.wraps);
+        let mut candidate = std::mem::take(&mut self.candidate);
+        candidate.clone_from(out);
+        self.cut(phase, &mut candidate)?;
+        take_better(phase, &mut candidate, &mut least, out);
+        if let FilterVerdict::NotFollowed { .. } = verdict {
+            self.grow(NoisyMethod::Tree, phase, noise, mask, &mut candidate)?;
+            let tree = candidate.clone();
+            take_better(phase, &mut candidate, &mut least, out);
+            candidate = tree;
+            self.cut(phase, &mut candidate)?;
+            take_better(phase, &mut candidate, &mut least, out);
+            out.filtered.verdict = verdict;
+        }
+        self.candidate = candidate;
+        Ok(())
     }
 
     /// Counts of noise may lie below those of the filtered surface.
@@ -141,6 +215,15 @@ impl NoisyUnwrapper {
         for (&island, wraps) in islands.iter().zip(unwrapped.wraps.as_mut_slice()) {
             *wraps -= self.lowest[island as usize];
         }
+    }
+}
+
+/// Exchanges the candidate and the best so far where the candidate's surface bends less.
+fn take_better(phase: &Raster<f32>, candidate: &mut NoisyUnwrapped, least: &mut f64, best: &mut NoisyUnwrapped) {
+    let bent = bends(phase, &candidate.unwrapped.wraps);
+    if bent < *least {
+        *least = bent;
+        std::mem::swap(candidate, best);
     }
 }
 

@@ -4,6 +4,7 @@ use std::f32::consts::TAU;
 
 use range_image::Raster;
 
+use crate::fringes::{TILE, Tile};
 use crate::noise::{PhaseNoise, estimate, weight};
 use crate::phasor::unit;
 use crate::window::{Limits, Planes, RowOut, Windows};
@@ -12,7 +13,8 @@ use crate::{Error, Result};
 /// How phases are filtered before they are unwrapped.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PrefilterOptions {
-    /// Pixels of at most this phase noise are left as they are, in radians: the tree needs no help there.
+    /// Pixels of at most this phase noise are left as they are, in radians: the tree needs no help there. On a fringe of
+    /// s radians a pixel this and the next shrink by `1 - s / pi`, the share of half a cycle that is left for the noise.
     pub quiet_sigma_rad: f32,
     /// Windows grow until the mean's standard deviation falls to this, in radians.
     pub target_sigma_rad: f32,
@@ -37,6 +39,9 @@ impl Default for PrefilterOptions {
     }
 }
 
+/// Share of the pixels that counts as few: so many may stay noisy, beside jumps and at borders, before the filter says that
+/// it does not follow. Surfaces that it loses leave an eighth and more; 0.03 and 0.1 choose alike but for bumps.
+pub(crate) const FEW: f32 = 0.05;
 /// The largest half width that may be asked for.
 const RADIUS_LIMIT: u8 = 15;
 
@@ -71,7 +76,8 @@ pub struct Filtered {
     /// Filtered phase in radians in `[0, 2 pi]`, NaN where masked; where the window is one pixel, the measured phase
     /// bit for bit.
     pub phase: Raster<f32>,
-    /// Standard deviation of the filtered phase in radians, by the noise alone; NaN where masked or unknown.
+    /// Standard deviation of the filtered phase in radians, by the noise alone; that of the measured phase where the
+    /// fringe is not told; NaN where masked or unknown.
     pub sigma: Raster<f32>,
     /// Half width of the window that each pixel got, in pixels; 0 where it was left as it is.
     pub radius: Raster<u8>,
@@ -79,6 +85,27 @@ pub struct Filtered {
     /// noise at amplitude one. `None` where a sigma for each pixel was given, or where the image has too few
     /// neighbours to estimate it, and then no pixel is changed.
     pub noise_rad: Option<f32>,
+    /// Whether the windows could follow the surface.
+    pub verdict: FilterVerdict,
+}
+
+/// Whether the filter did what it was asked to.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub enum FilterVerdict {
+    /// No pixel is noisy enough to need the filter, nothing is known of the noise, or no window was allowed.
+    #[default]
+    NotNeeded,
+    /// The windows followed the surface: of the pixels that needed the filter, fewer than one in twenty stayed noisier
+    /// than [`PrefilterOptions::quiet_sigma_rad`].
+    Followed,
+    /// The filter could not follow: this share of the pixels that needed it stayed noisier than
+    /// [`PrefilterOptions::quiet_sigma_rad`]. Their fringe is not told from noise, comes within its uncertainty of half a
+    /// cycle a pixel, or the surface bends or jumps too much for any window. Remedy:
+    /// [`NoisyMethod::Auto`](crate::NoisyMethod::Auto), an average over frames, or a lower frequency.
+    NotFollowed {
+        /// From 0 to 1.
+        share: f32,
+    },
 }
 
 /// Filters one image; see [`Prefilter::filter_into`]. Allocates its buffers anew.
@@ -100,6 +127,7 @@ pub struct Prefilter {
     planes: Planes,
     blocks: Vec<f32>,
     windows: Windows,
+    tile: Tile,
 }
 
 impl Prefilter {
@@ -111,8 +139,8 @@ impl Prefilter {
 
     /// Filters `phase`, in radians in `[0, 2 pi]`; what is not finite is masked. In `mask`, true means use.
     ///
-    /// Each pixel's phase becomes the angle of the weighted mean of the unit phasors in a square window. The window
-    /// grows from one pixel until the deviation of the mean reaches the target, and stops where the mean phasor is
+    /// Each pixel's phase becomes the angle of the weighted mean of the unit phasors in a square window, after the fringe
+    /// around was turned back: its slope is measured on tiles of 16 by 16 pixels `[Rife1974]`. The window grows from one pixel until the deviation of the mean reaches the target, and stops where the mean phasor is
     /// shorter than noise explains, or turned from that of the next smaller window by more than noise explains
     /// `[BioucasDias2008]`. Pixels quieter than `quiet_sigma_rad` are not touched.
     pub fn filter_into(
@@ -131,14 +159,32 @@ impl Prefilter {
         resize(&mut out.phase, phase);
         resize(&mut out.sigma, phase);
         resize(&mut out.radius, phase);
-        let limits = Limits::new(&self.options);
-        if out.noise_rad.is_some() || matches!(noise, PhaseNoise::Sigma(_)) {
-            self.run(phase, &limits, out);
-        } else {
-            self.run(phase, &limits.without_windows(), out);
+        let mut limits = Limits::new(&self.options);
+        let noise_known = out.noise_rad.is_some() || matches!(noise, PhaseNoise::Sigma(_));
+        if !noise_known {
+            limits.largest_radius = 0;
+        }
+        self.run(phase, &limits, out);
+        if !noise_known {
             out.sigma.as_mut_slice().fill(f32::NAN);
         }
+        out.verdict = self.verdict(out);
         Ok(())
+    }
+
+    fn verdict(&self, out: &Filtered) -> FilterVerdict {
+        let quiet = self.options.quiet_sigma_rad;
+        let (mut needed, mut noisy) = (0_usize, 0_usize);
+        for (sigma, radius) in out.sigma.as_slice().iter().zip(out.radius.as_slice()) {
+            // What is masked or unknown is neither.
+            noisy += usize::from(*sigma > quiet);
+            needed += usize::from(*sigma > quiet || *radius > 0);
+        }
+        match noisy as f32 / needed as f32 {
+            _ if needed == 0 || self.options.largest_radius_px == 0 => FilterVerdict::NotNeeded,
+            share if share < FEW => FilterVerdict::Followed,
+            share => FilterVerdict::NotFollowed { share },
+        }
     }
 
     /// Scales the phasors by their weights; the noise as one figure, see [`Filtered::noise_rad`].
@@ -182,34 +228,53 @@ impl Prefilter {
     }
 
     fn run(&mut self, phase: &Raster<f32>, limits: &Limits, out: &mut Filtered) {
-        let (planes, windows) = (&self.planes, &mut self.windows);
-        pulp::Arch::new().dispatch(FilterRows { phase, planes, limits, windows, out });
+        let (planes, windows, tile) = (&self.planes, &mut self.windows, &mut self.tile);
+        pulp::Arch::new().dispatch(FilterTiles { phase, planes, limits, windows, tile, out });
     }
 }
 
-/// The search for all rows: a type of its own, because what closures hold is not always compiled for wide registers.
-struct FilterRows<'a> {
+/// The search for all tiles: a type of its own, because what closures hold is not always compiled for wide registers.
+struct FilterTiles<'a> {
     phase: &'a Raster<f32>,
     planes: &'a Planes,
     limits: &'a Limits,
     windows: &'a mut Windows,
+    tile: &'a mut Tile,
     out: &'a mut Filtered,
 }
 
-impl pulp::WithSimd for FilterRows<'_> {
+impl pulp::WithSimd for FilterTiles<'_> {
     type Output = ();
 
     // Only what is inlined is compiled for wide registers.
     #[allow(clippy::inline_always)]
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
-        let width = self.phase.width();
-        let rows = self.phase.rows().zip(self.out.phase.as_mut_slice().chunks_exact_mut(width));
-        let rows = rows.zip(self.out.sigma.as_mut_slice().chunks_exact_mut(width));
-        let rows = rows.zip(self.out.radius.as_mut_slice().chunks_exact_mut(width));
-        for (row, (((measured, phase), sigma), radius)) in rows.enumerate() {
-            let mut out = RowOut { phase, sigma, radius };
-            self.windows.filter_row(self.planes, row, measured, self.limits, &mut out);
+        let Self { phase, planes, limits, windows, tile, out } = self;
+        let (width, height) = (phase.width(), phase.height());
+        let Filtered { phase: filtered, sigma, radius, .. } = out;
+        for row in (0..height).step_by(TILE) {
+            for col in (0..width).step_by(TILE) {
+                tile.load(planes, [width, height], [col, row], limits.largest_radius);
+                let (first, [columns, rows]) = (row * width + col, tile.core.clone());
+                let [gain, fall] = tile.slope;
+                let limits = &limits.beside(tile.slope);
+                for (line, row) in rows.enumerate() {
+                    let at = first + line * width..first + line * width + columns.len();
+                    let mut out = RowOut {
+                        phase: &mut filtered.as_mut_slice()[at.clone()],
+                        sigma: &mut sigma.as_mut_slice()[at.clone()],
+                        radius: &mut radius.as_mut_slice()[at.clone()],
+                        fringe: [gain * columns.start as f32 + fall * row as f32, gain],
+                    };
+                    windows.filter_row(tile, row, &phase.as_slice()[at.clone()], limits, &mut out);
+                    if !tile.resolved {
+                        for (s, i) in sigma.as_mut_slice()[at.clone()].iter_mut().zip(&planes.information[at]) {
+                            *s = if *i > 0.0 { i.sqrt().recip() } else { f32::NAN };
+                        }
+                    }
+                }
+            }
         }
     }
 }

@@ -4,11 +4,15 @@
 // Only what is inlined is compiled for wide registers.
 #![allow(clippy::inline_always)]
 
+use std::f32::consts::{PI, TAU};
+
 use crate::PrefilterOptions;
+use crate::fringes::Tile;
 use crate::noise::weight;
 use crate::phasor::angle;
 
-const LANES: usize = 8;
+/// Pixels that go side by side through the registers.
+pub(crate) const LANES: usize = 8;
 
 /// Weighted phasors and information of each pixel, row by row; zero where masked.
 #[derive(Debug, Default)]
@@ -43,27 +47,34 @@ struct Group {
 /// Limits of the tests, in the form in which they are used.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Limits {
+    quiet_sigma: f32,
+    target_sigma: f32,
     quiet_information: f32,
     target_information: f32,
     coherence: f32,
     deviations: f32,
-    largest_radius: usize,
+    pub largest_radius: usize,
 }
 
 impl Limits {
     pub fn new(options: &PrefilterOptions) -> Self {
+        let (quiet_sigma, target_sigma) = (options.quiet_sigma_rad, options.target_sigma_rad);
         Self {
-            quiet_information: weight(options.quiet_sigma_rad).information,
-            target_information: options.target_sigma_rad.powi(-2),
+            quiet_sigma,
+            target_sigma,
+            quiet_information: weight(quiet_sigma).information,
+            target_information: target_sigma.powi(-2),
             coherence: options.least_coherence,
             deviations: options.deviations,
             largest_radius: options.largest_radius_px.into(),
         }
     }
 
-    /// Where the noise is unknown.
-    pub fn without_windows(self) -> Self {
-        Self { largest_radius: 0, ..self }
+    /// On a fringe: what is left of half a cycle beside its steps is smaller, and so is the noise that they bear.
+    pub fn beside(self, slope: [f32; 2]) -> Self {
+        let quiet = self.quiet_sigma * (1.0 - slope[0].abs().max(slope[1].abs()) / PI);
+        let target = self.target_sigma.min(quiet);
+        Self { quiet_information: weight(quiet).information, target_information: target.powi(-2), ..self }
     }
 }
 
@@ -72,6 +83,8 @@ pub(crate) struct RowOut<'a> {
     pub phase: &'a mut [f32],
     pub sigma: &'a mut [f32],
     pub radius: &'a mut [u8],
+    /// Phase of the fringe at the first pixel, and what it gains from pixel to pixel.
+    pub fringe: [f32; 2],
 }
 
 /// Buffers of one row.
@@ -83,26 +96,32 @@ pub(crate) struct Windows {
 }
 
 impl Windows {
-    /// Searches the windows of one row's pixels and writes what they give; `measured` is the phase of the row.
+    /// Searches the windows of one row of a tile and writes what they give; `measured` is the phase of the row.
     #[inline(always)]
-    pub fn filter_row(&mut self, planes: &Planes, row: usize, measured: &[f32], limits: &Limits, out: &mut RowOut<'_>) {
-        let width = measured.len();
-        let height = planes.re.len() / width;
-        self.start(planes, width, row, limits);
-        for radius in 1..=limits.largest_radius {
+    pub fn filter_row(&mut self, tile: &Tile, row: usize, measured: &[f32], limits: &Limits, out: &mut RowOut<'_>) {
+        let height = tile.planes.re.len() / tile.width;
+        let rim = limits.largest_radius;
+        self.start(tile, row, limits);
+        for radius in 1..=rim {
             if !self.groups.iter().any(Group::is_open) {
                 break;
             }
             for other in [row.wrapping_sub(radius), row + radius] {
                 if other < height {
-                    self.add_row(planes, width, other, limits.largest_radius);
+                    let row = other * tile.width..(other + 1) * tile.width;
+                    add_row(&mut self.columns.re, rim, &tile.planes.re[row.clone()]);
+                    add_row(&mut self.columns.im, rim, &tile.planes.im[row.clone()]);
+                    add_row(&mut self.columns.information, rim, &tile.planes.information[row]);
                 }
             }
-            let first = limits.largest_radius - radius;
+            let first = rim + tile.core[0].start - radius;
             for (at, group) in self.groups.iter_mut().enumerate() {
                 if group.is_open() {
-                    let sums = window_sums(&self.columns, first + at * LANES, radius);
-                    group.choose(&sums, radius, limits);
+                    let (Planes { re, im, information }, first) = (&self.columns, first + at * LANES);
+                    let re = window_sum(re, first, radius);
+                    let im = window_sum(im, first, radius);
+                    let information = window_sum(information, first, radius);
+                    group.choose([&re, &im, &information], radius, limits);
                 }
             }
         }
@@ -112,28 +131,20 @@ impl Windows {
     }
 
     #[inline(always)]
-    fn start(&mut self, planes: &Planes, width: usize, row: usize, limits: &Limits) {
-        let groups = width.div_ceil(LANES);
+    fn start(&mut self, tile: &Tile, row: usize, limits: &Limits) {
+        let Tile { planes, width, core, .. } = tile;
+        let groups = core[0].len().div_ceil(LANES);
         let rim = limits.largest_radius;
         self.groups.resize(groups, Group::default());
         for (columns, source) in self.columns.each().into_iter().zip(planes.all()) {
             columns.clear();
-            columns.resize(groups * LANES + 2 * rim, 0.0);
-            columns[rim..rim + width].copy_from_slice(&source[row * width..][..width]);
+            columns.resize(width + groups * LANES + 2 * rim, 0.0);
+            columns[rim..rim + width].copy_from_slice(&source[row * width..][..*width]);
         }
         for (at, group) in self.groups.iter_mut().enumerate() {
-            let [re, im, information] = self.columns.all().map(|plane| lanes(plane, rim + at * LANES));
+            let [re, im, information] = self.columns.all().map(|plane| lanes(plane, rim + core[0].start + at * LANES));
             *group = Group { re, im, information, ..Group::default() };
             group.start(limits);
-        }
-    }
-
-    #[inline(always)]
-    fn add_row(&mut self, planes: &Planes, width: usize, row: usize, rim: usize) {
-        for (columns, source) in self.columns.each().into_iter().zip(planes.all()) {
-            for (sum, value) in columns[rim..rim + width].iter_mut().zip(&source[row * width..][..width]) {
-                *sum += value;
-            }
         }
     }
 }
@@ -158,7 +169,7 @@ impl Group {
 
     /// Takes the larger windows where they hang together with the smaller ones.
     #[inline(always)]
-    fn choose(&mut self, [re, im, information]: &[[f32; LANES]; 3], radius: usize, limits: &Limits) {
+    fn choose(&mut self, [re, im, information]: [&[f32; LANES]; 3], radius: usize, limits: &Limits) {
         let squared = limits.deviations * limits.deviations;
         for lane in 0..LANES {
             let (a, b, i) = (re[lane], im[lane], information[lane]);
@@ -188,7 +199,10 @@ impl Group {
         let used = LANES.min(measured.len() - at);
         phase[..used].copy_from_slice(&measured[at..at + used]);
         for lane in 0..LANES {
-            let mean = angle(self.re[lane], self.im[lane]);
+            let [start, gain] = out.fringe;
+            let turned = angle(self.re[lane], self.im[lane]) + start + gain * (at + lane) as f32;
+            // Rounding may give a whole cycle for what lies just below none.
+            let mean = (turned - TAU * (turned / TAU).floor()).clamp(0.0, TAU);
             let filtered = if self.radius[lane] > 0.0 { mean } else { phase[lane] };
             let masked = self.information[lane] <= 0.0;
             phase[lane] = if masked { f32::NAN } else { filtered };
@@ -201,32 +215,41 @@ impl Group {
     }
 }
 
-/// Sums of `2 radius + 1` columns for eight pixels, the first of them starting at `first`.
+/// Sum of `2 radius + 1` columns for eight pixels, the first of them starting at `first`.
 #[inline(always)]
-fn window_sums(columns: &Planes, first: usize, radius: usize) -> [[f32; LANES]; 3] {
-    let mut sums = [[0.0; LANES]; 3];
-    for (sum, plane) in sums.iter_mut().zip(columns.all()) {
-        for column in first..=first + 2 * radius {
-            let values = lanes(plane, column);
-            for lane in 0..LANES {
-                sum[lane] += values[lane];
-            }
+fn window_sum(columns: &[f32], first: usize, radius: usize) -> [f32; LANES] {
+    let mut sum = [0.0; LANES];
+    let columns = &columns[first..first + 2 * radius + LANES];
+    for values in columns.windows(LANES) {
+        for (sum, value) in sum.iter_mut().zip(values) {
+            *sum += value;
         }
     }
-    sums
+    sum
+}
+
+/// Adds a row, of whole groups, to the columns from `first` on.
+#[inline(always)]
+fn add_row(columns: &mut [f32], first: usize, row: &[f32]) {
+    let sums = columns[first..first + row.len()].chunks_exact_mut(LANES);
+    for (sums, values) in sums.zip(row.chunks_exact(LANES)) {
+        for (sum, value) in sums.iter_mut().zip(values) {
+            *sum += value;
+        }
+    }
 }
 
 #[inline(always)]
-fn lanes(plane: &[f32], first: usize) -> [f32; LANES] {
+pub(crate) fn lanes(plane: &[f32], first: usize) -> [f32; LANES] {
     plane[first..].first_chunk().copied().unwrap_or_default()
 }
 
 impl Planes {
-    fn all(&self) -> [&[f32]; 3] {
+    pub fn all(&self) -> [&[f32]; 3] {
         [&self.re, &self.im, &self.information]
     }
 
-    fn each(&mut self) -> [&mut Vec<f32>; 3] {
+    pub fn each(&mut self) -> [&mut Vec<f32>; 3] {
         [&mut self.re, &mut self.im, &mut self.information]
     }
 }

@@ -122,9 +122,11 @@ fn interferograms_are_unwrapped_as_the_processor_did() {
         let weights = coherence.map(|&c| (c * c / (1.0 - c * c).max(0.01)).max(0.0));
         let exact = unwrap_least_cuts(&phase, Some(&weights), mask, &ExactOptions::default()).unwrap();
         let noisy = unwrap_noisy(&phase, PhaseNoise::Unknown, mask, &NoisyOptions::default()).unwrap();
-        let options =
-            NoisyOptions { method: NoisyMethod::LeastCuts(ExactOptions::default()), ..NoisyOptions::default() };
-        let noisy_exact = unwrap_noisy(&phase, PhaseNoise::Unknown, mask, &options).unwrap();
+        let by = |method: NoisyMethod| {
+            let options = NoisyOptions { method, ..NoisyOptions::default() };
+            unwrap_noisy(&phase, PhaseNoise::Unknown, mask, &options).unwrap()
+        };
+        let (noisy_exact, auto) = (by(NoisyMethod::FilteredCuts), by(NoisyMethod::Auto));
         assert_eq!(exact.cost, exact.lower_bound);
         let mut line = String::new();
         for (method, wraps, island) in [
@@ -132,6 +134,7 @@ fn interferograms_are_unwrapped_as_the_processor_did() {
             ("exact", &exact.wraps, &exact.island),
             ("noisy", &noisy.unwrapped.wraps, &tree.island),
             ("noisy exact", &noisy_exact.unwrapped.wraps, &tree.island),
+            ("auto", &auto.unwrapped.wraps, &tree.island),
         ] {
             let [all, right] = score(wraps, island, cycles.as_slice(), coherence);
             let total = totals.entry(method).or_default();
@@ -140,7 +143,7 @@ fn interferograms_are_unwrapped_as_the_processor_did() {
             // The processor's solution is no truth: it may be wrong by a pixel or two itself.
             assert!(right as f64 >= 0.999 * all as f64, "{name}, {method}: {right} of {all}");
         }
-        println!("{name}: {} residues, noise {:?},{line}", exact.residues, noisy.filtered.noise_rad);
+        println!("{name}: {} residues, noise {:?}, {:?},{line}", exact.residues, noisy.filtered.noise_rad, auto.method);
     }
     for (method, [all, right]) in &totals {
         println!("{method}: {:.5} of {all} coherent pixels", *right as f64 / *all as f64);
@@ -149,4 +152,5 @@ fn interferograms_are_unwrapped_as_the_processor_did() {
     // Measured: tree 3 of 62,112 pixels, cuts priced by coherence 1.
     assert!(wrong("exact") <= 1 && wrong("exact") <= wrong("tree") && wrong("noisy exact") <= 1, "{totals:?}");
     assert!(wrong("tree") <= 6 && wrong("noisy") <= 6, "{totals:?}");
+    assert!(wrong("auto") <= wrong("tree").min(wrong("noisy")), "{totals:?}");
 }

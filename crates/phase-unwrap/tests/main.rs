@@ -8,6 +8,8 @@ mod dark_rooms;
 mod files;
 #[path = "common/frequencies.rs"]
 mod frequencies;
+#[path = "common/fringes.rs"]
+mod fringes;
 mod insar;
 mod jumps_and_dark_patches;
 mod kernel_density;
@@ -16,11 +18,13 @@ mod least_cuts;
 mod mri_echoes;
 mod multi_frequency;
 mod noisy;
+mod noisy_absolute;
 mod repair;
 #[path = "../examples/peers_phase/room.rs"]
 mod room;
 mod sequence;
 mod spatial;
+mod steep_fringes;
 
 // What the modules of the example ask their program for.
 use dark_rooms::{Outcome, Size};

@@ -181,25 +181,18 @@ fn noise_is_estimated_through_slopes_and_jumps() {
 #[test]
 fn cheapest_cuts_replace_the_tree_or_say_that_they_do_not() {
     let scene = scene([160, 120], 15, smooth, |_, _| 1.0);
-    let with = |exact: ExactOptions| {
-        let options = NoisyOptions { method: NoisyMethod::LeastCuts(exact), ..NoisyOptions::default() };
-        unwrap_noisy(&scene.phase, PhaseNoise::Uniform(1.0), None, &options).unwrap()
-    };
-    let exact = ExactOptions::default();
-    let found = with(exact);
-    assert_eq!(found.method, NoisyMethod::LeastCuts(exact));
+    let options = NoisyOptions { method: NoisyMethod::FilteredCuts, ..NoisyOptions::default() };
+    let found = unwrap_noisy(&scene.phase, PhaseNoise::Uniform(1.0), None, &options).unwrap();
+    assert_eq!(found.method, NoisyMethod::FilteredCuts);
     let share = right(&found.unwrapped.wraps, &scene.wraps);
     // 0.9983 in expectation at best; 0.0006 are two deviations of 19,200 pixels, and borders.
     assert!(share > 0.9965, "{share}");
     // Half of a cycle between neighbours everywhere: residues that no filter removes, and none is allowed.
     let mut rng = Pcg64::seed_from_u64(16);
     let wild = scene.phase.map(|_| rng.random::<f32>() * TAU);
-    let options = NoisyOptions {
-        method: NoisyMethod::LeastCuts(ExactOptions { maximum_residues: 0, ..exact }),
-        ..NoisyOptions::default()
-    };
+    let options = NoisyOptions { cuts: ExactOptions { maximum_residues: 0, ..ExactOptions::default() }, ..options };
     let refused = unwrap_noisy(&wild, PhaseNoise::Uniform(0.2), None, &options).unwrap();
-    assert_eq!(refused.method, NoisyMethod::Tree);
+    assert_eq!(refused.method, NoisyMethod::Filter);
     let tree = unwrap_noisy(&wild, PhaseNoise::Uniform(0.2), None, &NoisyOptions::default()).unwrap();
     assert!(refused == tree);
 }

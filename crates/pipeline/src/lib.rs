@@ -74,7 +74,7 @@ pub use plan::{
     AdjustOptions, AmplitudeKind, AverageOptions, CorrectImagePointOptions, CorrectRangeOptions, DeconvolveOptions,
     DemodulateOptions, FlagOptions, FuseExposuresOptions, MixedPixels, MultipathOptions, MultipathTreatment,
     NetworkCalibration, NoiseOptions, Plan, PointCloudOptions, RegisterOptions, RepairWrapsOptions, SimulateSource,
-    Source, Stage, StartPoses, UnwrapOptions,
+    Source, Stage, StartPoses, UnwrapMethod, UnwrapOptions,
 };
 pub use progress::{Progress, Silent};
 pub use register::{

@@ -50,6 +50,46 @@ fn unsure_wraps_are_few_in_good_light_and_hit_the_wrong_ones() {
 }
 
 #[test]
+fn the_method_of_unwrapping_is_chosen_by_the_plan() {
+    let ranges = |outcome: &Outcome| -> Vec<u32> {
+        let frames = outcome.views.iter().map(|view| {
+            let ViewData::Range(frame) = &view.data else { unreachable!() };
+            frame.range.as_slice().iter().map(|range| range.to_bits()).collect::<Vec<u32>>()
+        });
+        frames.flatten().collect()
+    };
+    for (light, seed) in [("8.0e6", 18), ("0.24e6", 19), ("0.12e6", 20)] {
+        let folder = tempfile::tempdir().unwrap();
+        let text = std::fs::read_to_string(fixtures().join("scenes/room_small.ron")).unwrap();
+        let text = text.replace("source_power: 8.0e6", &format!("source_power: {light}"));
+        let scene = folder.path().join("scene.ron");
+        std::fs::write(&scene, text.replace("frames_per_station: 4", "frames_per_station: 1")).unwrap();
+        let survey = crate::common::simulated_from(&scene, seed, folder.path());
+        let by = |method: &str| {
+            let stages = UNTIL_RANGES.replace("maximum_range_m: 12", &format!("maximum_range_m: 12, method: {method}"));
+            let outcome = run(&survey, &stages);
+            let shares = shares(&outcome, Flags::UNWRAP_UNSURE, |_| 2.0);
+            println!("source {light}, {method}: wrong, flagged though right, found {shares:.4?}");
+            (outcome, shares)
+        };
+        let [(tree, tree_shares), (_, filter), (_, cuts), (auto, auto_shares)] =
+            ["tree", "filter", "cuts", "auto"].map(by);
+        if light == "8.0e6" {
+            assert!(ranges(&tree) == ranges(&run(&survey, UNTIL_RANGES)), "the tree is the default");
+            assert!(ranges(&tree) == ranges(&auto), "enough light needs no filter");
+        } else {
+            assert!(
+                auto_shares[0] < 0.7 * tree_shares[0] && filter[0] < tree_shares[0],
+                "{tree_shares:?} {auto_shares:?} {cuts:?}"
+            );
+        }
+    }
+    let plan = Plan::from_ron("(name: \"x\", stages: [Unwrap(method: best)])", "x.ron".as_ref());
+    let message = plan.unwrap_err().to_string();
+    assert!(message.contains("best") && message.contains("auto"), "{message}");
+}
+
+#[test]
 fn two_frequencies_that_disagree_by_a_centimetre_are_sure_of_their_counts() {
     let folder = tempfile::tempdir().unwrap();
     let ranges = "range: [(ambiguity_interval_m: 1.8737028625, terms: (d0: 0.025)), (";

@@ -1,7 +1,7 @@
 //! Registration of unorganised clouds by voxels: time, accuracy, capture, covariance and verdicts.
 //!
 //! `cargo run --release -p icp-registration --example voxel_pairs -- [frames] [capture] [covariance] [verdicts] [threads]
-//! [easy] [lidar TARGET SOURCE]`; without words everything but the last. Lidar scans are files of x, y, z as 64 bit floats.
+//! [easy] [dense COLUMNS RUNS FIRST] [lidar TARGET SOURCE]`; without words everything but the last two. Lidar scans are files of x, y, z as 64 bit floats.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout, missing_docs)]
 
 #[path = "../../tests/common/mod.rs"]
@@ -34,12 +34,14 @@ fn main() {
         capture();
     }
     if wanted("covariance") {
-        covariance("one place", repeated);
-        covariance("many places", |camera, seed| {
-            let pair = frame_pair(camera, 1000 + seed);
-            let target_from_source = pair.target_from_source;
-            Views { source: bare(&pair.source.0), target: bare(&pair.target.0), target_from_source }
-        });
+        covariance("one place", &Pinhole::medium(), 0..200, repeated);
+        covariance("many places", &Pinhole::medium(), 1000..1200, places);
+    }
+    if let Some(at) = words.iter().position(|w| w == "dense") {
+        let number = |k: usize, other: usize| words.get(at + k).and_then(|w| w.parse().ok()).unwrap_or(other);
+        let (width, runs, first) = (number(1, 2580), number(2, 10), number(3, 3000));
+        let camera = Pinhole { width, height: width * 3 / 4, focal_px: width as f64 * 530.0 / 640.0 };
+        covariance(&format!("{width} columns"), &camera, first as u64..(first + runs) as u64, places);
     }
     if wanted("verdicts") {
         verdicts();
@@ -193,21 +195,33 @@ fn capture() {
     }
 }
 
-fn covariance(name: &str, views: impl Fn(&Pinhole, u64) -> Views) {
-    let camera = Pinhole::medium();
+/// Two views from a place of their own.
+fn places(camera: &Pinhole, seed: u64) -> Views {
+    let pair = frame_pair(camera, seed);
+    let target_from_source = pair.target_from_source;
+    Views { source: bare(&pair.source.0), target: bare(&pair.target.0), target_from_source }
+}
+
+/// Errors over what is stated: the mean normalised square should be 6, and `errors over stated` 1.
+fn covariance(name: &str, camera: &Pinhole, seeds: std::ops::Range<u64>, views: impl Fn(&Pinhole, u64) -> Views) {
+    let runs = seeds.end - seeds.start;
+    let (mut millimetres, mut stated, mut times) = (vec![], vec![], vec![]);
     let (mut nees, mut inside, mut used) = (0.0, 0, 0);
     let (mut all, mut errors, mut inverses) = (vec![], vec![], Matrix6::zeros());
-    for seed in 0..200 {
-        let views = views(&camera, seed);
-        let Ok(result) = register(&views, &views.target_from_source, &VoxelAlignmentOptions::default()) else {
-            continue;
-        };
+    for seed in seeds {
+        let views = views(camera, seed);
+        let guess = &views.target_from_source;
+        let (result, ms) = timed(1, || register(&views, guess, &VoxelAlignmentOptions::default()));
+        let Ok(result) = result else { continue };
+        times.push(ms);
         if !result.is_trustworthy() {
             continue;
         }
         let error = pose_difference(&views.target_from_source, &result.target_from_source);
         let Some(inverse) = result.covariance.try_inverse() else { continue };
         let square = error.dot(&(inverse * error));
+        millimetres.push(1e3 * error.fixed_rows::<3>(0).norm());
+        stated.push(1e3 * result.covariance.fixed_view::<3, 3>(0, 0).trace().sqrt());
         nees += square;
         all.push(square);
         errors.push(error);
@@ -218,13 +232,17 @@ fn covariance(name: &str, views: impl Fn(&Pinhole, u64) -> Views) {
     }
     let used = f64::from(used);
     println!(
-        "covariance, {name}: {used} of 200 trusted, normalised squared error {:.2} (median {:.2}), 95 % ellipses cover {:.1} %",
+        "covariance, {name}: {used} of {runs} trusted, {:.2} mm, stated {:.2}, {:.0} ms, normalised squared error {:.2} (median {:.2}), 95 % ellipses cover {:.1} %",
+        median(&mut millimetres),
+        median(&mut stated),
+        median(&mut times),
         nees / used,
         median(&mut all),
         100.0 * inside as f64 / used
     );
     // What all errors share, if the place is the same.
     let mean = errors.iter().fold(Vector6::zeros(), |sum, e| sum + e / used);
+    println!("  errors over stated {:.2} rms", (nees / (6.0 * used)).sqrt());
     println!("  of which the mean error {:.2}", mean.dot(&(inverses / used * mean)));
 }
 

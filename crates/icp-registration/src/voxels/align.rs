@@ -234,7 +234,8 @@ impl<'a> Run<'a> {
         Ok(IcpResult {
             target_from_source: pose,
             covariance,
-            overlap: seen / points,
+            // A voxel between two surfaces counts for both.
+            overlap: (seen / points).min(1.0),
             rms_m,
             iterations,
             stop,

@@ -25,7 +25,8 @@ const FLOOR: f64 = 0.02;
 /// Cosine of the angle beyond which normals of partners disagree.
 const SMALLEST_COSINE: f64 = 0.7;
 
-/// The mean of the points of a voxel, and the plane through it and its neighbours.
+/// The mean of the points of a surface in a voxel and in those before and behind it, and the plane through it and its
+/// neighbours.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Voxel {
     pub mean: Point3<f64>,
@@ -115,19 +116,32 @@ struct Maker<'a> {
 impl Maker<'_> {
     fn voxel(&self, index: usize) -> Voxel {
         let (cell, own) = (cell(self.keys[index]), &self.moments[index]);
-        let mean = own.mean();
+        let plane = self.plane(cell, own, index);
+        let (points, normal, variance) = plane.unwrap_or((*own, Vector3::repeat(f64::NAN), f64::INFINITY));
+        let mean = points.mean();
         let place = [0, 1, 2].map(|k| (f64::from(cell[k]) + 0.5 + mean[k]) * self.factor);
-        let (normal, variance) = self.plane(cell, own).unwrap_or((Vector3::repeat(f64::NAN), f64::INFINITY));
-        Voxel { mean: self.lattice.point(&place), normal, variance, count: own.count }
+        Voxel { mean: self.lattice.point(&place), normal, variance, count: points.count }
     }
 
-    /// Normal and variance of the mean across it, square metre.
-    fn plane(&self, cell: [u32; 3], own: &Moments) -> Option<(Vector3<f64>, f64)> {
+    /// The points that the mean is taken of, the normal, and the variance of the mean across the plane, square metre.
+    ///
+    /// Noise spreads a surface over several cells, and the mean of those that fell into one of them lies off it: the more
+    /// points, the more cells hold nothing but such outliers. So the cells before and behind along the axis nearest to the
+    /// normal are taken together, by the one of them with the most points; the others have no plane.
+    fn plane(&self, cell: [u32; 3], own: &Moments, own_index: usize) -> Option<(Moments, Vector3<f64>, f64)> {
         let (mut around, mut voxels) = (Moments::default(), 0);
+        let (mut columns, mut strongest) = ([*own; 3], [true; 3]);
         self.blocks.visit(cell.map(|c| [c - 1, c, c + 1]), |place, index| {
-            let shift = [place % 3, place / 3 % 3, place / 9].map(|c| c as f64 - 1.0);
-            around.include(&self.moments[index].shifted(shift));
+            let steps = [place % 3, place / 3 % 3, place / 9];
+            let moments = self.moments[index].shifted(steps.map(|c| c as f64 - 1.0));
+            around.include(&moments);
             voxels += 1;
+            for axis in 0..3 {
+                if steps[axis] != 1 && steps[(axis + 1) % 3] == 1 && steps[(axis + 2) % 3] == 1 {
+                    columns[axis].include(&moments);
+                    strongest[axis] &= (own.count, index) > (moments.count, own_index);
+                }
+            }
         });
         if around.count < FEWEST_POINTS || voxels < FEWEST_VOXELS {
             return None;
@@ -138,9 +152,14 @@ impl Maker<'_> {
             return None;
         }
         let normal = eigenvector3(&scatter, smallest)?;
-        let across = smallest.max(normal.dot(&(own.scatter() * normal))).max(0.0);
+        let axis = normal.iamax();
+        if !strongest[axis] {
+            return None;
+        }
+        let column = columns[axis];
+        let across = smallest.max(normal.dot(&(column.scatter() * normal))).max(0.0);
         let size_m = self.lattice.size_m * self.factor;
-        let variance = across * (1.0 / own.count + COMMON_SHARE) + FLOOR * FLOOR;
-        Some((normal, variance * size_m * size_m))
+        let variance = across * (1.0 / column.count + COMMON_SHARE) + FLOOR * FLOOR;
+        Some((column, normal, variance * size_m * size_m))
     }
 }

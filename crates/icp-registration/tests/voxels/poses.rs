@@ -66,6 +66,29 @@ fn errors_are_as_large_as_the_covariance_says() {
     assert!((3.5..9.0).contains(&mean), "normalised squared error {mean}");
 }
 
+/// Noise spreads a dense surface over several layers of voxels, whose means lie off it.
+#[test]
+fn more_points_do_not_make_it_worse() {
+    let (mut millimetres, mut squares) = (vec![], vec![]);
+    for k in 4000..4007 {
+        let pair = frame_pair(&Pinhole::large(), k);
+        let target_from_source = pair.target_from_source;
+        let views = Views { source: bare(&pair.source.0), target: bare(&pair.target.0), target_from_source };
+        let result = register(&views, &target_from_source, &VoxelAlignmentOptions::default()).unwrap();
+        let error = pose_difference(&target_from_source, &result.target_from_source);
+        millimetres.push(1e3 * error.fixed_rows::<3>(0).norm());
+        squares.push(error.dot(&(result.covariance.try_inverse().unwrap() * error)));
+    }
+    let middle = |values: &mut Vec<f64>| {
+        values.sort_by(f64::total_cmp);
+        values[values.len() / 2]
+    };
+    let (mm, square) = (middle(&mut millimetres), middle(&mut squares));
+    println!("median {mm:.3} mm, normalised squared error {square:.1}");
+    // Layer by layer it was 0.5 to 1 mm. Of stated errors the median is 5.3; 24 pairs have 10.7.
+    assert!(mm < 0.3 && square < 16.0, "{mm} mm, {square}");
+}
+
 #[test]
 fn results_scale_with_the_cloud() {
     let views = pair(1);

@@ -106,14 +106,10 @@ impl LeastCuts {
         mask: Option<&Raster<bool>>,
         out: &mut ExactUnwrapped,
     ) -> Result<()> {
-        let grid = Grid::new(phase.width(), phase.height())?;
-        load_phase(&grid, phase, mask, &mut self.phase)?;
         if let Some(weights) = weights {
             phase.require_same_size(weights, "weights")?;
         }
-        self.network.build(&grid, &self.phase);
-        self.regions.find(&grid, &self.network);
-        let residues = self.flow.start(&grid, &self.network, &self.regions);
+        let (grid, residues) = self.start(phase, mask)?;
         let limit = self.options.maximum_residues;
         if residues > limit {
             return Err(Error::TooManyResidues { residues, limit });
@@ -129,6 +125,20 @@ impl LeastCuts {
         (out.residues, out.cost, out.lower_bound) = (residues, cost, cost);
         self.integration.run(&grid, &self.phase, &self.network, out);
         Ok(())
+    }
+
+    /// Loops and holes of `phase` around which the smaller steps do not close.
+    pub(crate) fn residues(&mut self, phase: &Raster<f32>) -> Result<usize> {
+        Ok(self.start(phase, None)?.1)
+    }
+
+    fn start(&mut self, phase: &Raster<f32>, mask: Option<&Raster<bool>>) -> Result<(Grid, usize)> {
+        let grid = Grid::new(phase.width(), phase.height())?;
+        load_phase(&grid, phase, mask, &mut self.phase)?;
+        self.network.build(&grid, &self.phase);
+        self.regions.find(&grid, &self.network);
+        let residues = self.flow.start(&grid, &self.network, &self.regions);
+        Ok((grid, residues))
     }
 }
 

@@ -17,7 +17,7 @@ pub(crate) use options::NORMAL_HALF_WIDTH_PX;
 pub use options::{
     AdjustOptions, AmplitudeKind, AverageOptions, CorrectImagePointOptions, DeconvolveOptions, DemodulateOptions,
     FlagOptions, FuseExposuresOptions, MixedPixels, MultipathOptions, MultipathTreatment, NoiseOptions,
-    PointCloudOptions, RegisterOptions, RepairWrapsOptions, StartPoses, UnwrapOptions,
+    PointCloudOptions, RegisterOptions, RepairWrapsOptions, StartPoses, UnwrapMethod, UnwrapOptions,
 };
 
 /// What a pipeline does, read from a RON file.

@@ -71,11 +71,39 @@ pub struct UnwrapOptions {
     pub maximum_range_m: Option<f64>,
     /// Below this confidence (0 to 1) a pixel is flagged as unsure.
     pub minimum_confidence: f64,
+    /// What the counts of a single frequency come from. Several frequencies need none of this: each pixel's own decide.
+    pub method: UnwrapMethod,
 }
 
 impl Default for UnwrapOptions {
     fn default() -> Self {
-        Self { maximum_range_m: None, minimum_confidence: 0.5 }
+        Self { maximum_range_m: None, minimum_confidence: 0.5, method: UnwrapMethod::default() }
+    }
+}
+
+/// What the wrap counts of a single frequency come from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum UnwrapMethod {
+    /// A spanning tree over each segment of the measured phase: for phase noise below 0.3 rad nearly everywhere.
+    #[default]
+    Tree,
+    /// The same over the phase after a filter that follows its fringes: for little light.
+    Filter,
+    /// The cheapest cuts of the measured phase: for little light on surfaces that bend within a few pixels.
+    Cuts,
+    /// The tree where fewer than one pixel in twenty has 0.3 rad of noise; else what makes the smoothest surface.
+    Auto,
+}
+
+impl From<UnwrapMethod> for phase_unwrap::NoisyMethod {
+    fn from(method: UnwrapMethod) -> Self {
+        match method {
+            UnwrapMethod::Tree => Self::Tree,
+            UnwrapMethod::Filter => Self::Filter,
+            UnwrapMethod::Cuts => Self::Cuts,
+            UnwrapMethod::Auto => Self::Auto,
+        }
     }
 }
 

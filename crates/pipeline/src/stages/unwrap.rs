@@ -1,11 +1,12 @@
 use camera_model::Camera;
 use phase_unwrap::{
-    ImageGeometry, MultiFrequencyOptions, SpatialOptions, combined_interval_m, unwrap_multi_frequency, unwrap_spatial,
+    ImageGeometry, MultiFrequencyOptions, NoisyOptions, PhaseNoise, SpatialOptions, Unwrapped, combined_interval_m,
+    unwrap_multi_frequency, unwrap_noisy_absolute, unwrap_spatial,
 };
 use range_image::{ComplexChannel, ComplexFrame, Flags, RangeFrame, Raster};
 
 use super::Findings;
-use crate::plan::UnwrapOptions;
+use crate::plan::{UnwrapMethod, UnwrapOptions};
 use crate::progress::Progress;
 use crate::statistics::median;
 use crate::view::{View, ViewData};
@@ -70,8 +71,7 @@ fn wrap_counts(
             geometry: Some(geometry),
             ..SpatialOptions::default()
         };
-        let unwrapped = unwrap_spatial(&channel.phase(), Some(&channel.amplitude()), Some(&mask), &spatial);
-        let unwrapped = unwrapped.map_err(Error::stage("Unwrap", name))?;
+        let unwrapped = one_frequency(channel, &mask, options.method, spatial).map_err(Error::stage("Unwrap", name))?;
         return Ok((vec![unwrapped.wraps], unwrapped.confidence));
     }
     let phases: Vec<_> = frame.channels.iter().map(ComplexChannel::phase).collect();
@@ -85,6 +85,25 @@ fn wrap_counts(
     let unwrapped = unwrap_multi_frequency(&phases, &modulations, Some(&sigmas), Some(&mask), &multi);
     let unwrapped = unwrapped.map_err(Error::stage("Unwrap", name))?;
     Ok((unwrapped.wraps, unwrapped.confidence))
+}
+
+/// Absolute counts of one frequency. The tree needs no noise; what filters takes each pixel's, or its scale from the image
+/// where the raw samples say nothing of it.
+fn one_frequency(
+    channel: &ComplexChannel,
+    mask: &Raster<bool>,
+    method: UnwrapMethod,
+    spatial: SpatialOptions,
+) -> phase_unwrap::Result<Unwrapped> {
+    let (phase, amplitude) = (channel.phase(), channel.amplitude());
+    if method == UnwrapMethod::Tree {
+        return unwrap_spatial(&phase, Some(&amplitude), Some(mask), &spatial);
+    }
+    let sigma = channel.sigma_phase();
+    let known = sigma.as_slice().iter().any(|sigma| sigma.is_finite());
+    let noise = if known { PhaseNoise::Sigma(&sigma) } else { PhaseNoise::Amplitude(&amplitude) };
+    let options = NoisyOptions { method: method.into(), spatial, ..NoisyOptions::default() };
+    Ok(unwrap_noisy_absolute(&phase, &amplitude, noise, Some(mask), &options)?.unwrapped)
 }
 
 /// Standard deviation of the phase, radians, by noise and by range errors that are not taken off yet; as it was where the

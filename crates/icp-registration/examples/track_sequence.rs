@@ -206,7 +206,7 @@ fn real(folder: &Path) {
     let frame = |k: usize| (depth_points(&folder.join(&names[k]), 585.0, [320.0, 240.0]), None);
     if let Some(size) = argument::<usize>("window") {
         let mut sums = [0.0; 6];
-        let starts = (0..=names.len() - size).step_by(size);
+        let starts = (0..=names.len().saturating_sub(size)).step_by(size.max(1));
         let windows = (names.len() / size) as f64;
         for first in starts {
             let (tracker, _) =

@@ -23,6 +23,8 @@ pub(super) struct Edge {
     pub(super) a: usize,
     pub(super) b: usize,
     pub(super) a_from_b: Relation,
+    /// What its covariance is multiplied by, since others share a part of its errors.
+    pub(super) alike: f64,
 }
 
 /// Keyframes and what was observed between them.
@@ -92,19 +94,19 @@ impl Graph {
     pub(super) fn add(&mut self, from: usize, from_from_new: &Relation) -> usize {
         let b = self.poses.len();
         self.poses.push(self.from(from, from_from_new));
-        self.edges.push(Edge { a: from, b, a_from_b: *from_from_new });
+        self.edges.push(Edge { a: from, b, a_from_b: *from_from_new, alike: 1.0 });
         b
     }
 
     /// A pose that is measured from another one.
     pub(super) fn from(&self, from: usize, from_from_new: &Relation) -> Relation {
-        self.poses[from].then(&self.weighed(from_from_new))
+        self.poses[from].then(&self.weighed(from_from_new, 1.0))
     }
 
     /// An observation with all random errors that it has, as loops tell them.
-    fn weighed(&self, observation: &Relation) -> Relation {
+    fn weighed(&self, observation: &Relation, alike: f64) -> Relation {
         let mut weighed = observation.with_own(&self.own);
-        weighed.random.covariance *= self.factor;
+        weighed.random.covariance *= self.factor * alike;
         weighed
     }
 
@@ -114,7 +116,7 @@ impl Graph {
         let mut predicted = self.poses[edge.a].inverse().then(&self.poses[edge.b]);
         predicted.by_field -= edge.a_from_b.by_field;
         let predicted = predicted.total(&self.covariance);
-        let square = predicted.mahalanobis_squared(&self.weighed(&edge.a_from_b).random);
+        let square = predicted.mahalanobis_squared(&self.weighed(&edge.a_from_b, edge.alike).random);
         square.is_some_and(|square| square < LARGEST_SQUARE)
     }
 
@@ -122,10 +124,16 @@ impl Graph {
     pub(super) fn offer(&mut self, edge: &Edge) -> bool {
         let fits = self.fits(edge);
         if fits {
-            self.edges.push(*edge);
-            self.open = true;
+            self.take([*edge]);
         }
         fits
+    }
+
+    /// Takes observations that fit.
+    pub(super) fn take(&mut self, edges: impl IntoIterator<Item = Edge>) {
+        let before = self.edges.len();
+        self.edges.extend(edges);
+        self.open |= self.edges.len() > before;
     }
 
     /// Adjusts all poses where observations beyond a chain have come in since the last time; what the assumed field has
@@ -183,7 +191,7 @@ impl Graph {
     fn set_factor(&mut self) {
         let square = |edge: &Edge| {
             let v = pose_difference(&self.relative(edge.a, edge.b), edge.a_from_b.pose());
-            self.weighed(&edge.a_from_b).random.covariance.cholesky().map_or(0.0, |c| v.dot(&c.solve(&v)))
+            self.weighed(&edge.a_from_b, edge.alike).random.covariance.cholesky().map_or(0.0, |c| v.dot(&c.solve(&v)))
         };
         let squares: f64 = self.edges.iter().map(square).sum();
         let redundancy = 6 * (self.edges.len() + 1).saturating_sub(self.poses.len());
@@ -225,7 +233,7 @@ impl Graph {
         };
         for edge in &self.edges {
             let model = poses[edge.a].inverse() * poses[edge.b];
-            let observed = self.weighed(&edge.a_from_b.moved(change));
+            let observed = self.weighed(&edge.a_from_b.moved(change), edge.alike);
             let v = pose_difference(&model, observed.pose());
             let Some(factor) = observed.random.covariance.cholesky() else { continue };
             let information = factor.inverse();
@@ -252,16 +260,17 @@ impl Graph {
     /// Takes keyframe `k` (not the first) out. What joined its neighbours through it joins them to the one that was
     /// best determined from it; returns that one and its pose in the frame of `k`, numbered as before.
     pub(super) fn remove(&mut self, k: usize) -> Option<(usize, Relation)> {
-        let from_k = |e: &Edge| if e.a == k { (e.b, e.a_from_b) } else { (e.a, e.a_from_b.inverse()) };
-        let mut joined: Vec<(usize, Relation)> =
+        let from_k =
+            |e: &Edge| if e.a == k { (e.b, e.a_from_b, e.alike) } else { (e.a, e.a_from_b.inverse(), e.alike) };
+        let mut joined: Vec<(usize, Relation, f64)> =
             self.edges.iter().filter(|e| e.a == k || e.b == k).map(from_k).collect();
         joined.sort_by(|x, y| x.1.random.covariance.trace().total_cmp(&y.1.random.covariance.trace()));
-        let (hub, k_from_hub) = *joined.first()?;
+        let (hub, k_from_hub, _) = *joined.first()?;
         self.edges.retain(|e| e.a != k && e.b != k);
-        for (other, k_from_other) in joined.iter().skip(1) {
+        for (other, k_from_other, alike) in joined.iter().skip(1) {
             if *other != hub {
                 let a_from_b = k_from_hub.inverse().then(k_from_other);
-                self.edges.push(Edge { a: hub, b: *other, a_from_b });
+                self.edges.push(Edge { a: hub, b: *other, a_from_b, alike: *alike });
             }
         }
         self.poses.remove(k);
@@ -315,7 +324,7 @@ mod tests {
             });
             let pose = step_pose(&(truth(a).inverse() * truth(b)), &noise);
             let random = Uncertain { pose, covariance: Matrix6::identity() * SIGMA * SIGMA };
-            Edge { a, b, a_from_b: Relation { random, by_field: ByField::zeros() } }
+            Edge { a, b, a_from_b: Relation { random, by_field: ByField::zeros() }, alike: 1.0 }
         };
         let mut graph = Graph { poses: vec![Relation::exact(truth(0))], ..Graph::default() };
         for k in 1..8 {

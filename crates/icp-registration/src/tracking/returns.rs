@@ -20,17 +20,22 @@ impl Tracker {
         let joined: Vec<bool> = (0..=new).map(|k| k == new || self.keyframes.graph.joined(k, new)).collect();
         let others = |k: usize| !joined[k];
         let candidates = self.keyframes.candidates(&self.current, new, &Isometry3::identity(), others, near);
+        let mut closing = Vec::new();
         for (overlap, k) in candidates.into_iter().take(self.options.loop_attempts) {
             if overlap < LEAST_OVERLAP {
                 break;
             }
             let guess = self.keyframes.graph.relative(k, new);
-            if let Ok(measured) = self.try_keyframe(k, &guess)
-                && measured.is_sound()
-            {
-                self.keyframes.graph.offer(&Edge { a: k, b: new, a_from_b: measured.relation() });
+            if let Ok(measured) = self.try_keyframe(k, &guess) {
+                let edge = Edge { a: k, b: new, a_from_b: measured.relation(), alike: 1.0 };
+                if measured.is_sound() && self.keyframes.graph.fits(&edge) {
+                    closing.push(edge);
+                }
             }
         }
+        // Half of the errors are the frame's, which all have in common: n with the variance (1 + 1/n)/2 of their mean.
+        let alike = (closing.len() as f64).midpoint(1.0);
+        self.keyframes.graph.take(closing.into_iter().map(|edge| Edge { alike, ..edge }));
     }
 }
 

@@ -390,7 +390,7 @@ impl Tracker {
             return Some(measured);
         }
         let a_from_b = measured.relation().then(&reference_from_camera.inverse());
-        self.keyframes.graph.offer(&Edge { a: k, b: reference, a_from_b }).then_some(measured)
+        self.keyframes.graph.offer(&Edge { a: k, b: reference, a_from_b, alike: 1.0 }).then_some(measured)
     }
 
     fn refer_to(&mut self, keyframe: usize, measured: &Measured) {

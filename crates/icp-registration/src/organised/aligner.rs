@@ -8,7 +8,7 @@ use super::grid::STRIDES;
 use super::options::FrameAlignmentOptions;
 use super::pairs::Rules;
 use super::quality::{Cell, Hold, Verdict};
-use super::shared_error::{Influence, SharedError, Sighting};
+use super::shared_error::Sighting;
 use super::sums::{SUMS, median_residual, normal_equations};
 use super::track::{FEWEST_POINTS, Gauge, Track, blocks, finest_part, is_within_noise, moved, solve, turned};
 use crate::awake::with_thread_awake;
@@ -52,11 +52,11 @@ pub fn align_frames(
 /// Registration whose memory is used again.
 #[derive(Debug, Clone)]
 pub struct FrameAligner {
-    options: FrameAlignmentOptions,
+    pub(super) options: FrameAlignmentOptions,
     chunks: Vec<[f64; SUMS]>,
-    scratch: Vec<u32>,
+    pub(super) scratch: Vec<u32>,
     cells: Vec<Cell>,
-    sightings: Vec<Sighting>,
+    pub(super) sightings: Vec<Sighting>,
 }
 
 impl FrameAligner {
@@ -78,47 +78,7 @@ impl FrameAligner {
         &self.options
     }
 
-    /// As [`align_frames`], without allocating memory once frames of this size have been aligned.
-    ///
-    /// # Errors
-    /// As [`align_frames`].
-    pub fn align(
-        &mut self,
-        source: &OrganisedFrame,
-        target: &OrganisedFrame,
-        guess: &Isometry3<f64>,
-    ) -> Result<IcpResult> {
-        let (mut result, influence) = self.align_apart(source, target, guess)?;
-        if let Some(influence) = influence {
-            let shared = self.options.shared_error.unwrap_or_else(|| {
-                let mut shared = SharedError::none();
-                shared.learn(&influence);
-                shared
-            });
-            result.covariance = symmetrised(&(result.covariance + shared.covariance(&influence.pose)));
-        }
-        Ok(result)
-    }
-
-    /// The same with a covariance of the random part alone, and what the shared error does to the pose.
-    pub(crate) fn align_apart(
-        &mut self,
-        source: &OrganisedFrame,
-        target: &OrganisedFrame,
-        guess: &Isometry3<f64>,
-    ) -> Result<(IcpResult, Option<Influence>)> {
-        let result = self.registered(source, target, guess)?;
-        let pose = &result.target_from_source;
-        let mut influence = target.influence(source, pose, &mut self.sightings, &mut self.scratch);
-        if let (Some(prior), Some(influence)) = (&self.options.prior, &mut influence) {
-            // What the guess holds, the frames do not move.
-            let from_guess = prior.cholesky().map_or_else(Matrix6::zeros, |c| c.inverse());
-            influence.pose = (Matrix6::identity() - result.covariance * from_guess) * influence.pose;
-        }
-        Ok((result, influence))
-    }
-
-    fn registered(
+    pub(super) fn registered(
         &mut self,
         source: &OrganisedFrame,
         target: &OrganisedFrame,

@@ -4,6 +4,7 @@
 //! the distances of the source's nodes from the target's planes are minimised, level by level.
 
 mod aligner;
+mod apart;
 mod blocks;
 mod consistency;
 mod crossing;

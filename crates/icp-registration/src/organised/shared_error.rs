@@ -105,6 +105,13 @@ impl SharedError {
         self.registrations
     }
 
+    /// As a single registration tells it.
+    pub(super) fn of(influence: &Influence) -> Self {
+        let mut shared = Self::none();
+        shared.learn(influence);
+        shared
+    }
+
     /// Takes what the residuals of a registration say into the estimate: by degree, the variance that makes the
     /// expectation of their squared normal equations what it is.
     pub(crate) fn learn(&mut self, influence: &Influence) {

@@ -5,8 +5,10 @@
 //! mean of all frames that saw them, as the volume of `[Newcombe2011]` does. Where a frame leaves a motion open that
 //! the frame before left determined, that one becomes a keyframe; what stays open is carried on by a prior or at
 //! constant velocity. Registrations between keyframes form a graph of poses, which is adjusted where an old keyframe
-//! is seen again.
+//! is seen again. Errors that all frames of the sensor share are carried along apart from random ones: they do not average
+//! out, but are the same wherever the camera comes again.
 
+mod adjustment;
 mod graph;
 mod imu;
 mod keyframes;
@@ -14,6 +16,7 @@ mod locate;
 mod motion;
 mod options;
 mod prediction;
+mod reference;
 mod relation;
 mod returns;
 mod tracked;

@@ -4,9 +4,8 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Matrix6};
 
-use super::graph::Edge;
 use super::keyframes::Keyframes;
-use super::locate::{Fix, Measured, agreeing};
+use super::locate::{Fix, Measured};
 use super::motion::{MotionPrior, Uncertain, diagonal};
 use super::options::{Fusion, TrackerOptions};
 use super::prediction::{Grounds, Last, Prediction};
@@ -17,10 +16,7 @@ use crate::cloud::Cloud;
 use crate::error::{Error, Result};
 use crate::icp::DegeneracyPolicy;
 use crate::organised::{ByField, FieldMatrix, FrameAligner, Influence, OrganisedFrame, Projection, SharedError};
-use crate::pose::step_pose;
 
-/// What another keyframe must see more of the frame than the reference to take its place.
-const ADVANTAGE: f64 = 0.05;
 /// Share of the first frame's radius beyond whose standard deviation motions count as undetermined. Registration alone
 /// asks for 1/300; in a stream, poses that are centimetres weak for a moment are still worth more than a loss.
 const WEAKEST_SHARE: f64 = 1.0 / 50.0;
@@ -37,8 +33,8 @@ pub struct Tracker {
     pub(super) previous: OrganisedFrame,
     pub(super) keyframes: Keyframes,
     /// Of the sensor, as the registrations of keyframes tell it.
-    shared: SharedError,
-    last: Option<Last>,
+    pub(super) shared: SharedError,
+    pub(super) last: Option<Last>,
     trajectory: Vec<TrackedPose>,
     scratch: Vec<(u32, f32, f32)>,
 }
@@ -333,45 +329,6 @@ impl Tracker {
         }
     }
 
-    /// Another keyframe that sees more of the frame becomes the reference; where there is none, the frame becomes one.
-    fn change_reference(&mut self, reference_from_camera: &Relation, influence: Option<&Influence>) {
-        let Some(reference) = self.last.as_ref().map(|last| last.keyframe) else { return };
-        let (others, pose) = (|k: usize| k != reference, reference_from_camera.pose());
-        let candidates = self.keyframes.candidates(&self.current, reference, pose, others, agreeing);
-        let enough = self.options.keyframe_overlap + ADVANTAGE;
-        if let Some(&(overlap, k)) = candidates.first()
-            && overlap >= enough
-            && let Some(measured) = self.closing(k, reference, reference_from_camera)
-        {
-            self.refer_to(k, &measured);
-            self.adjust();
-            return;
-        }
-        let new = self.keyframes.add(&self.current, reference, reference_from_camera);
-        self.refer_to_itself(new);
-        if let Some(influence) = influence {
-            self.learn(influence);
-        }
-        self.close_loops(new);
-        self.adjust();
-    }
-
-    /// Takes the registration of a keyframe into what is known of the shared error.
-    fn learn(&mut self, influence: &Influence) {
-        if self.options.alignment.shared_error.is_none() {
-            self.shared.learn(influence);
-            self.keyframes.graph.set_shared_error(&self.shared);
-        }
-    }
-
-    /// Adjusts the keyframes where a loop has been closed.
-    fn adjust(&mut self) {
-        let change = self.keyframes.graph.adjust_if_closed();
-        if let Some(last) = &mut self.last {
-            last.own.pose = step_pose(&last.own.pose, &(last.by_field * change));
-        }
-    }
-
     /// Takes out keyframes beyond the number allowed.
     fn thin(&mut self) {
         let Some(last) = &mut self.last else { return };
@@ -379,37 +336,6 @@ impl Tracker {
             let newest = self.keyframes.list.len() - 1;
             let Some(gone) = self.keyframes.thin([last.keyframe, newest]) else { return };
             last.keyframe -= usize::from(last.keyframe > gone);
-        }
-    }
-
-    /// Registers the frame with keyframe `k` as well, and so `k` with the reference; `None` where that does not fit.
-    fn closing(&mut self, k: usize, reference: usize, reference_from_camera: &Relation) -> Option<Measured> {
-        let guess = self.keyframes.graph.relative(k, reference) * reference_from_camera.pose();
-        let measured = self.try_keyframe(k, &guess).ok().filter(|m| m.determined)?;
-        if self.keyframes.graph.joined(k, reference) {
-            return Some(measured);
-        }
-        let a_from_b = measured.relation().then(&reference_from_camera.inverse());
-        self.keyframes.graph.offer(&Edge { a: k, b: reference, a_from_b, alike: 1.0 }).then_some(measured)
-    }
-
-    fn refer_to(&mut self, keyframe: usize, measured: &Measured) {
-        if let Some(last) = &mut self.last {
-            last.keyframe = keyframe;
-            last.own = measured.own();
-            last.by_field = measured.by_field();
-            last.shared = measured.shared();
-            last.velocity = last.velocity.map(|velocity| velocity.at_origin());
-        }
-    }
-
-    fn refer_to_itself(&mut self, keyframe: usize) {
-        if let Some(last) = &mut self.last {
-            last.keyframe = keyframe;
-            last.own = Uncertain::exact(Isometry3::identity());
-            last.by_field = ByField::zeros();
-            last.shared = Matrix6::zeros();
-            last.velocity = last.velocity.map(|velocity| velocity.at_origin());
         }
     }
 }

@@ -1,9 +1,9 @@
 //! Organised frames of real structured-light cameras; skipped with a word where they are missing.
 
 use crate::common::{disturbance, pose_error};
-use crate::depth_frames::{Sequence, kitchen, living_room};
+use crate::depth_frames::{Sequence, dense_kitchen, kitchen, living_room};
 use crate::sr4000::stations;
-use icp_registration::{FrameAlignmentOptions, OrganisedFrame, align_frames};
+use icp_registration::{FrameAlignmentOptions, OrganisedFrame, SharedError, align_frames, pose_difference};
 use nalgebra::{Isometry3, Vector3};
 
 /// Distance between the stations of the SR4000, by a plane fitted to a box.
@@ -37,6 +37,39 @@ fn frames_of_a_living_room_follow_their_poses() {
         Some(sequence) => check(&sequence),
         None => println!("skipped: the living room is not there"),
     }
+}
+
+#[test]
+fn poses_of_a_kinect_err_as_stated() {
+    let Some(sequence) = dense_kitchen((260..500).step_by(10)) else {
+        println!("skipped: the dense kitchen is not there");
+        return;
+    };
+    let prepare = |points: &[[f64; 3]]| OrganisedFrame::new(&sequence.projection, points, None).unwrap();
+    let frames: Vec<OrganisedFrame> = sequence.frames.iter().map(|f| prepare(&f.points)).collect();
+    // Positions and attitudes of the reference, a pair: 8 mm and 0.3 degrees.
+    let reference = [8e-3_f64, 5.2e-3].map(|r| r * r / 3.0);
+    let over_variance = |shared_error: Option<SharedError>| {
+        let options = FrameAlignmentOptions { shared_error, ..FrameAlignmentOptions::default() };
+        let (mut sum, mut count) = (0.0, 0);
+        for k in 0..frames.len() - 1 {
+            let truth = sequence.frames[k].world_from_camera.inverse() * sequence.frames[k + 1].world_from_camera;
+            let found = align_frames(&frames[k + 1], &frames[k], &Isometry3::identity(), &options).unwrap();
+            if found.is_trustworthy() {
+                let error = pose_difference(&found.target_from_source, &truth);
+                let ratio = |i: usize| error[i].powi(2) / (found.covariance[(i, i)] + reference[i / 3]);
+                sum += (0..6).map(ratio).sum::<f64>() / 6.0;
+                count += 1;
+            }
+        }
+        println!("{count} pairs trusted, squared error over variance {:.2}", sum / f64::from(count));
+        assert!(count > 10, "{count}");
+        sum / f64::from(count)
+    };
+    let (estimated, noise) = (over_variance(None), over_variance(Some(SharedError::none())));
+    // Neighbouring pairs see the same surfaces: their errors are a few draws.
+    assert!((0.1..2.5).contains(&estimated), "{estimated}");
+    assert!(noise > estimated, "{noise}");
 }
 
 #[test]

@@ -5,7 +5,7 @@
 //! in different places of the field, and so apart. Here the field is a sum of products of Legendre polynomials over the
 //! frame, in range where ranges come with their standard deviations, else in inverse depth. Its coefficients have the
 //! expectation 0 and, by degree, variances that are estimated from the residuals of registrations beside their random
-//! part: residuals of neighbours differ by the random part alone.
+//! part (quadratic and unbiased `[Rao1971]`): residuals of neighbours differ by the random part alone.
 
 use nalgebra::{Isometry3, Matrix6, Point3, SMatrix, SVector, Vector3, Vector6};
 

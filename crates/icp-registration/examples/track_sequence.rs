@@ -5,7 +5,7 @@
 //! Options: `folder` (of the real sequence), `simulated=off`, `seed` (of the simulated noise), `keyframe_overlap`, `max_keyframes`,
 //! `loop_attempts`, `window=20` (squared errors over variances of paths of so many frames instead), `levels`,
 //! `fusion=off`, `step_tolerance_m`, `noise_fraction`, `max_iterations`, `max_motion_sigma_m`, `every=1` (a line a frame);
-//! of the real sequence `first` (frame), `count` and `backwards=1`; `invalid=scattered` or `clumps`: a fifth of all pixels
+//! of the real sequence `first` (frame), `count`, `backwards=1` and `hertz` (30); `invalid=scattered` or `clumps`: a fifth of all pixels
 //! is lost.
 #![allow(
     missing_docs,
@@ -201,6 +201,7 @@ fn real(folder: &Path) {
         return;
     }
     let number = |k: usize| names[k]["frame-".len()..].split('.').next().unwrap().parse::<f64>().unwrap();
+    let hertz = argument("hertz").unwrap_or(30.0);
     let truth: Vec<_> = names.iter().map(|name| pose(&folder.join(name.replace("depth.png", "pose.txt")))).collect();
     let projection = Arc::new(Projection::pinhole(640, 480, [585.0; 2], [320.0, 240.0]).unwrap());
     let frame = |k: usize| (depth_points(&folder.join(&names[k]), 585.0, [320.0, 240.0]), None);
@@ -210,7 +211,7 @@ fn real(folder: &Path) {
         let windows = (names.len() / size) as f64;
         for first in starts {
             let (tracker, _) =
-                track(&projection, size, |k| (number(first + k) - number(first)).abs() / 30.0, |k| frame(first + k));
+                track(&projection, size, |k| (number(first + k) - number(first)).abs() / hertz, |k| frame(first + k));
             let from_first: Vec<_> =
                 truth[first..first + size].iter().map(|pose| truth[first].inverse() * pose).collect();
             let axes = by_axis(tracker.trajectory(), &from_first);
@@ -219,7 +220,7 @@ fn real(folder: &Path) {
         println!("squared error over variance by axis, {windows} windows of {size} frames: {sums:.2?}");
         return;
     }
-    let (tracker, mut times) = track(&projection, names.len(), |k| (number(k) - number(0)).abs() / 30.0, frame);
+    let (tracker, mut times) = track(&projection, names.len(), |k| (number(k) - number(0)).abs() / hertz, frame);
     report("7-Scenes red kitchen, kept frames", &tracker, &mut times, &truth);
 }
 

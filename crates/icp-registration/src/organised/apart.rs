@@ -13,7 +13,7 @@ impl FrameAligner {
     /// As [`align_frames`](crate::align_frames), without allocating memory once frames of this size have been aligned.
     ///
     /// # Errors
-    /// As [`align_frames`].
+    /// As [`align_frames`](crate::align_frames).
     pub fn align(
         &mut self,
         source: &OrganisedFrame,

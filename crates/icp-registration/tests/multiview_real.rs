@@ -1,14 +1,14 @@
 //! Frames of real structured-light cameras as stations; skipped with a word where they are missing.
 #![cfg(feature = "multiview")]
 
-use crate::common::pose_error;
+use crate::common::{disturbance, pose_error};
 use crate::depth_frames::{Sequence, dense_kitchen, living_room};
 use crate::sr4000;
 use icp_registration::{
     Cloud, Datum, OrganisedFrame, OrganisedNormalOptions, Start, StationRegistration, StationRegistrationOptions,
     organised_normals, register_stations,
 };
-use nalgebra::{Isometry3, Vector3};
+use nalgebra::{Isometry3, Matrix3, Vector3};
 
 /// Registers frames from where the first one stood, and holds them against the poses that come with them.
 fn check(sequence: &Sequence) {
@@ -116,5 +116,65 @@ fn frames_of_a_kitchen_come_together_as_pairs_do() {
             // The poses are good to 8 mm and 0.3 degrees a pair; depth is quantised.
             assert!(mm < 40.0 && degrees < 1.5, "{numbers:?}, frame {k}: {mm} mm, {degrees} degrees");
         }
+    }
+}
+
+/// Frames 10 apart of the half of the sequence that nothing was set on; `foreign`: one of another room in their middle. As a
+/// depth camera gives them: with a column of deviations that says nothing.
+fn kitchen(foreign: bool) -> Option<(Vec<Cloud>, Vec<Isometry3<f64>>)> {
+    let sequence = dense_kitchen((0..6).map(|k| 300 + 10 * k))?;
+    let known = sequence.frames.iter().map(|frame| frame.world_from_camera).collect();
+    let mut clouds: Vec<Cloud> = sequence.frames.iter().map(|frame| cloud(&frame.points, 640, 480)).collect();
+    if foreign {
+        clouds[3] = cloud(&living_room()?.frames[0].points, 640, 480);
+    }
+    for cloud in &mut clouds {
+        cloud.sigma = Some(vec![f64::NAN; cloud.len()]);
+    }
+    Some((clouds, known))
+}
+
+#[test]
+fn what_neighbouring_pixels_share_is_in_the_deviations() {
+    let Some((clouds, known)) = kitchen(false) else {
+        println!("skipped: the kitchen is not there");
+        return;
+    };
+    // Poses 50 mm and 2 degrees off.
+    let off: Vec<Isometry3<f64>> = known.iter().zip(0..).map(|(pose, k)| pose * disturbance(0.05, 2.0, k)).collect();
+    let found = registered(&clouds, &off);
+    assert!(found.undetermined.is_empty() && found.placements.doubtful().next().is_none());
+    let mut squares = 0.0;
+    for k in 1..known.len() {
+        let (pose, covariance) = found.relative_pose(k - 1, k).unwrap();
+        let truth = known[k - 1].inverse() * known[k];
+        let (mm, degrees) = pose_error(&pose, &truth);
+        let apart = pose.translation.vector - truth.translation.vector;
+        // The reference is good to 8 mm a pair.
+        let own = covariance.fixed_view::<3, 3>(0, 0).into_owned();
+        let all = own + Matrix3::identity() * (0.008_f64.powi(2) / 3.0);
+        squares += apart.dot(&(all.try_inverse().unwrap() * apart)) / 3.0 / 5.0;
+        println!("{k}: {mm:.1} mm {degrees:.2} deg, sigma {:.1} mm", 1e3 * own.trace().sqrt());
+        assert!(mm < 30.0 && degrees < 1.0, "step {k}: {mm} mm, {degrees} degrees");
+        // Without what pixels share, a third of a millimetre.
+        assert!(own.trace().sqrt() > 1e-3, "step {k}: {own}");
+    }
+    // One in expectation; five steps of three components scatter by a third, and the reference by more.
+    assert!(squares < 3.0, "errors over deviations, squared: {squares}");
+}
+
+#[test]
+fn a_frame_of_another_room_is_named_and_the_others_placed() {
+    let Some((clouds, known)) = kitchen(true) else {
+        println!("skipped: the frames are not there");
+        return;
+    };
+    let found = registered(&clouds, &known);
+    assert_eq!(found.placements.doubtful().collect::<Vec<_>>(), [3]);
+    for k in [1, 2, 4, 5] {
+        let (pose, _) = found.relative_pose(0, k).unwrap();
+        let (mm, degrees) = pose_error(&pose, &(known[0].inverse() * known[k]));
+        println!("{k}: {mm:.1} mm {degrees:.2} deg");
+        assert!(mm < 60.0 && degrees < 2.0, "frame {k}: {mm} mm, {degrees} degrees");
     }
 }

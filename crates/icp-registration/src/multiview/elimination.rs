@@ -5,29 +5,26 @@
 //! the plane and the offset c by which the surface of a tile is off it. Both are unknown and eliminated exactly, so that
 //! no point is used twice and the normal equations are those of all points.
 
+use std::collections::BTreeMap;
+
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix3, Matrix6x3, Vector3};
 
 use super::facets::Facet;
+use super::scatter::TileMean;
 use super::sums::{Sums, TileSums};
 
 /// How well the slopes of a facet are known from the patches that it was found by, radian.
 const SLOPE: f64 = 0.02;
 
-/// Variances beyond the noise of points, metre².
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Variances {
-    /// Of the surface of a tile about the plane of its facet.
-    pub surface: f64,
-    /// Of what the points of a station in a tile have in common.
-    pub shared: f64,
-}
-
 /// What the stations saw of one facet.
 pub(super) struct FacetSums<'a> {
     pub facet: &'a Facet,
     pub sums: &'a [Sums],
-    /// Weight of what each station saw of each tile, tile by tile.
+    /// Weight of what each station saw of each tile, tile by tile, and the variance that its points share, metre².
     pub weights: &'a [f64],
+    pub shared: &'a [f64],
+    /// Variance of the surface of a tile about the plane, metre².
+    pub roughness: f64,
 }
 
 /// Normal equations of a facet: three unknowns a station that saw it, then the shared parameters.
@@ -65,7 +62,7 @@ impl FacetSums<'_> {
     }
 
     /// The observations of these stations. `None` where fewer than two of them saw the facet.
-    pub(super) fn eliminated(&self, stations: &[usize], variances: Variances) -> Option<Eliminated> {
+    pub(super) fn eliminated(&self, stations: &[usize]) -> Option<Eliminated> {
         let stations = self.seen_by(stations);
         if stations.len() < 2 {
             return None;
@@ -80,7 +77,8 @@ impl FacetSums<'_> {
             let (mut weight, mut distance) = (0.0, 0.0);
             for (k, sums, own) in self.tile(tile, &stations) {
                 // Errors in common leave a tile less weight than its points have.
-                let own = own / (1.0 + variances.shared * own * sums.weight());
+                let shared = self.shared[tile * self.sums.len() + stations[k]];
+                let own = own / (1.0 + shared * own * sums.weight());
                 let row = |i: usize| if i < 3 { 3 * k + i } else { of_motions + i - 3 };
                 for i in 0..self.sums[0].order {
                     for j in 0..self.sums[0].order {
@@ -93,9 +91,9 @@ impl FacetSums<'_> {
                 weight += own * sums.weight();
                 distance += own * sums.right(0);
             }
-            if variances.surface > 0.0 && weight > 0.0 {
+            if self.roughness > 0.0 && weight > 0.0 {
                 at.extend(of_motions..size);
-                let share = 1.0 / (weight + 1.0 / variances.surface);
+                let share = 1.0 / (weight + 1.0 / self.roughness);
                 for &i in &at {
                     for &j in &at {
                         normal[(i, j)] -= share * mean[i] * mean[j];
@@ -105,6 +103,40 @@ impl FacetSums<'_> {
             }
         }
         Some(Eliminated::new(stations, normal, right))
+    }
+}
+
+impl FacetSums<'_> {
+    /// What the equations get where a station sees the tiles of a cell of directions too far by the standard deviation of one
+    /// point, cell by cell.
+    pub(super) fn answers(&self, eliminated: &Eliminated, means: &[TileMean]) -> BTreeMap<[u32; 3], DVector<f64>> {
+        let (stations, size) = (&eliminated.stations, eliminated.right.len());
+        let mut answers: BTreeMap<[u32; 3], DVector<f64>> = BTreeMap::new();
+        for tile in means.chunk_by(|a, b| a.tile == b.tile) {
+            let mut seen = Vec::with_capacity(tile.len());
+            for (k, sums, own) in self.tile(tile[0].tile, stations) {
+                let own = own / (1.0 + self.shared[tile[0].tile * self.sums.len() + stations[k]] * own * sums.weight());
+                let mean = Vector3::from_fn(|i, _| own * sums.product(i, 0));
+                seen.extend(tile.iter().find(|mean| mean.station == stations[k]).map(|of| (k, mean, of)));
+            }
+            let weight: f64 = seen.iter().map(|(_, mean, _)| mean[0]).sum();
+            let share = if self.roughness > 0.0 { 1.0 / (weight + 1.0 / self.roughness) } else { 0.0 };
+            for (k, mean, of) in &seen {
+                let answer = answers.entry(of.bearing).or_insert_with(|| DVector::zeros(size));
+                let sigma_m = of.point_variance.sqrt();
+                let mut own = answer.fixed_rows_mut::<3>(3 * k);
+                own += mean * sigma_m;
+                for (other, of_other, _) in &seen {
+                    let mut own = answer.fixed_rows_mut::<3>(3 * other);
+                    own -= of_other * (share * mean[0] * sigma_m);
+                }
+            }
+        }
+        for answer in answers.values_mut() {
+            let of_plane: Vector3<f64> = (0..stations.len()).map(|k| answer.fixed_rows::<3>(3 * k).into_owned()).sum();
+            *answer -= eliminated.from_motions.transpose() * (eliminated.inverse * of_plane);
+        }
+        answers
     }
 }
 

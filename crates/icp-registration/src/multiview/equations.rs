@@ -21,9 +21,34 @@ impl Equations {
     }
 
     pub(super) fn add(&mut self, facet: &Facet, eliminated: &Eliminated, poses: &[Isometry3<f64>]) {
+        let to_all = self.to_all(facet, eliminated, poses);
+        let normal = to_all.transpose() * &eliminated.normal * &to_all;
+        let right = to_all.transpose() * &eliminated.right;
+        let places: Vec<usize> = (0..right.len()).map(|k| self.place(eliminated, k)).collect();
+        for (row, &of_row) in places.iter().enumerate() {
+            for (column, &of_column) in places.iter().enumerate() {
+                self.normal[(of_row, of_column)] += normal[(row, column)];
+            }
+            self.right[of_row] += right[row];
+        }
+    }
+
+    /// Adds the right side of one facet to that of all unknowns.
+    pub(super) fn add_right(
+        &self,
+        facet: &Facet,
+        (eliminated, right): (&Eliminated, &DVector<f64>),
+        poses: &[Isometry3<f64>],
+        all: &mut DVector<f64>,
+    ) {
+        let right = self.to_all(facet, eliminated, poses).transpose() * right;
+        (0..right.len()).for_each(|row| all[self.place(eliminated, row)] += right[row]);
+    }
+
+    /// Unknowns of a facet from those of its stations and the parameters.
+    fn to_all(&self, facet: &Facet, eliminated: &Eliminated, poses: &[Isometry3<f64>]) -> DMatrix<f64> {
         let count = eliminated.stations.len();
         let parameters = self.right.len() - 6 * self.stations;
-        // Columns: the unknowns of the facet, then all.
         let mut to_all = DMatrix::zeros(eliminated.right.len(), 6 * count + parameters);
         for (k, &station) in eliminated.stations.iter().enumerate() {
             let motion = motion_of(facet, &poses[station]).transpose();
@@ -32,17 +57,14 @@ impl Equations {
         for k in 0..parameters {
             to_all[(3 * count + k, 6 * count + k)] = 1.0;
         }
-        let normal = to_all.transpose() * &eliminated.normal * &to_all;
-        let right = to_all.transpose() * &eliminated.right;
-        let place = |k: usize| match eliminated.stations.get(k / 6) {
+        to_all
+    }
+
+    /// Where an unknown of these stations is among all.
+    fn place(&self, eliminated: &Eliminated, k: usize) -> usize {
+        match eliminated.stations.get(k / 6) {
             Some(station) => 6 * station + k % 6,
-            None => 6 * self.stations + k - 6 * count,
-        };
-        for row in 0..right.len() {
-            for column in 0..right.len() {
-                self.normal[(place(row), place(column))] += normal[(row, column)];
-            }
-            self.right[place(row)] += right[row];
+            None => 6 * self.stations + k - 6 * eliminated.stations.len(),
         }
     }
 

@@ -46,6 +46,11 @@ impl Facet {
         [self.right.dot(&apart), self.up.dot(&apart)]
     }
 
+    /// The point of the plane with these coordinates.
+    pub(super) fn at(&self, place: [f64; 2]) -> Vector3<f64> {
+        self.origin + self.right * place[0] + self.up * place[1]
+    }
+
     /// Moves the plane by an offset and two slopes.
     pub(super) fn moved(&mut self, step: &Vector3<f64>) {
         self.origin += self.normal * step[0];
@@ -55,15 +60,16 @@ impl Facet {
     }
 }
 
-/// Joins the surfaces of all stations at these poses; partners may be `tolerance_m` apart because the poses are off.
+/// Joins the surfaces of all stations at these poses; partners may be `tolerance_m` apart because the poses are off, and
+/// neighbouring points share a variance of `shared` times that of one.
 pub(super) fn facets(
     surfaces: &[&Surface],
     poses: &[Isometry3<f64>],
     meetings: &[Meeting],
-    tolerance_m: f64,
+    (tolerance_m, shared): (f64, f64),
 ) -> Vec<Facet> {
     let Some(first) = poses.first() else { return Vec::new() };
-    let mut joined = Joined::new(surfaces, poses, first.translation.vector, tolerance_m);
+    let mut joined = Joined::new(surfaces, poses, first.translation.vector, (tolerance_m, shared));
     joined.join_regions(meetings);
     joined.join_neighbours();
     let mut facet_of = joined.adopt_patches(meetings);
@@ -83,6 +89,7 @@ struct Joined<'a> {
     poses: &'a [Isometry3<f64>],
     centre: Vector3<f64>,
     tolerance_m: f64,
+    shared: f64,
     first: Vec<usize>,
     parent: Vec<usize>,
     /// About `centre`, of the roots.
@@ -91,7 +98,12 @@ struct Joined<'a> {
 }
 
 impl<'a> Joined<'a> {
-    fn new(surfaces: &'a [&'a Surface], poses: &'a [Isometry3<f64>], centre: Vector3<f64>, tolerance_m: f64) -> Self {
+    fn new(
+        surfaces: &'a [&'a Surface],
+        poses: &'a [Isometry3<f64>],
+        centre: Vector3<f64>,
+        (tolerance_m, shared): (f64, f64),
+    ) -> Self {
         let (mut first, mut moments, mut normals) = (Vec::new(), Vec::new(), Vec::new());
         for (surface, pose) in surfaces.iter().zip(poses) {
             first.push(moments.len());
@@ -105,7 +117,7 @@ impl<'a> Joined<'a> {
             normals.extend(own);
         }
         let parent = (0..moments.len()).collect();
-        Self { surfaces, poses, centre, tolerance_m, first, parent, moments, normals }
+        Self { surfaces, poses, centre, tolerance_m, shared, first, parent, moments, normals }
     }
 
     fn root(&self, mut node: usize) -> usize {
@@ -181,8 +193,8 @@ impl<'a> Joined<'a> {
         let apart = small.mean() - wide.mean();
         let of_plane = plane.variance / wide.count() * (1.0 + apart.norm_squared() / plane.spread);
         let about = plane.normal.dot(&(small.scatter() * plane.normal)) + plane.normal.dot(&apart).powi(2);
-        let off = self.tolerance_m.powi(2);
         let parts = (wide.count() * plane.variance + small.count() * own.variance) / both.count();
+        let off = self.tolerance_m.powi(2) + OFF_PLANE.powi(2) * self.shared * parts;
         plane.normal.dot(&own.normal).abs() >= SAME_DIRECTION
             && about <= ROUGHER * own.variance + OFF_PLANE.powi(2) * of_plane + off
             && joint.variance <= ROUGHER * parts + off
@@ -210,7 +222,7 @@ impl<'a> Joined<'a> {
         let Some(plane) = self.moments[root].region_plane() else { return false };
         let apart = (pose * patch.centre).coords - self.centre - self.moments[root].mean();
         let across = plane.normal.dot(&apart).abs();
-        across <= OFF_PLANE * patch.variance.sqrt() + self.tolerance_m
+        across <= OFF_PLANE * (patch.variance + self.shared * patch.point_variance).sqrt() + self.tolerance_m
             && plane.normal.dot(&(pose.rotation * patch.normal)).abs() >= SAME_DIRECTION
     }
 

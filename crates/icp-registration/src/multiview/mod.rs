@@ -27,6 +27,7 @@ mod regions;
 mod registration;
 mod rounds;
 mod scatter;
+mod shared_errors;
 mod sightings;
 mod simultaneous;
 mod stations;

@@ -12,6 +12,8 @@ use crate::kernel::quantile;
 const MEDIAN_SHARE: f64 = 0.973;
 /// Groups of patches of like range, each of which gives a median: patches across a crease are no plane.
 const GROUPS: usize = 12;
+/// Part of the largest variance of a group below which a patch tells nothing: its rounded ranges are all on one step.
+const ONE_STEP: f64 = 1e-6;
 /// Fewest patches of a group.
 const FEWEST: usize = 8;
 /// Least ratio of variances: surfaces without noise leave rounding.
@@ -42,9 +44,13 @@ impl NoiseLaw {
 
     fn of_groups(mut ratios: Vec<(f64, f64)>, groups: usize) -> Self {
         ratios.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let medians = ratios.chunks(ratios.len().div_ceil(groups).max(1)).map(|group| {
-            let median = |of: fn(&(f64, f64)) -> f64| quantile(&mut group.iter().map(of).collect::<Vec<f64>>(), 0.5);
-            (median(|r| r.0), median(|r| r.1))
+        let size = ratios.len().div_ceil(groups).max(1);
+        let medians = ratios.chunks_mut(size).map(|group| {
+            let range = group[group.len() / 2].0;
+            let largest = group.iter().map(|(_, ratio)| *ratio).fold(0.0, f64::max);
+            let told = group.iter().map(|(_, ratio)| *ratio).filter(|ratio| *ratio >= ONE_STEP * largest);
+            let median = quantile(&mut told.collect::<Vec<f64>>(), 0.5);
+            (range.ln(), (median / MEDIAN_SHARE).max(LEAST_RATIO).ln())
         });
         Self::through(&medians.collect::<Vec<_>>())
     }
@@ -73,7 +79,7 @@ fn ratios(said: &[f64], surface: &Surface) -> Vec<(f64, f64)> {
     patches.filter_map(|(index, patch)| ratio(said, surface.points_of(index), patch)).collect()
 }
 
-/// Logarithms of the range of a patch and of the ratio of variances along its rays, found to said.
+/// Range of a patch, metre, and ratio of variances along its rays, found to said.
 fn ratio(said: &[f64], members: &[u32], patch: &Patch) -> Option<(f64, f64)> {
     let range = patch.centre.coords.norm();
     let cosine = patch.normal.dot(&patch.centre.coords) / range;
@@ -82,9 +88,9 @@ fn ratio(said: &[f64], members: &[u32], patch: &Patch) -> Option<(f64, f64)> {
         square += sigma * sigma;
         count += 1.0;
     }
-    let expected = square / count * (cosine * cosine + EDGE_ON) * MEDIAN_SHARE;
-    let (at, ratio) = (range.ln(), (patch.point_variance / expected).max(LEAST_RATIO).ln());
-    (at.is_finite() && ratio.is_finite()).then_some((at, ratio))
+    let expected = square / count * (cosine * cosine + EDGE_ON);
+    let ratio = patch.point_variance / expected;
+    (range.ln().is_finite() && ratio.is_finite()).then_some((range, ratio))
 }
 
 #[cfg(test)]

@@ -8,7 +8,7 @@ use super::elimination::FacetSums;
 use super::equations::Equations;
 use super::network::{Network, State};
 use super::precision;
-use super::scatter::TileMean;
+use super::scatter::{Scatter, TileMean};
 use super::simultaneous::Adjusted;
 use crate::error::Result;
 use crate::icp::{IcpResult, StopReason};
@@ -20,6 +20,8 @@ pub(super) struct Shared {
     pub facet: usize,
     pub target: TileMean,
     pub source: TileMean,
+    /// Variance of the distance, by noise and by errors that neighbouring places share, metre².
+    variance: f64,
 }
 
 impl Shared {
@@ -30,7 +32,7 @@ impl Shared {
 
     /// One over the variance of that distance.
     pub(super) fn weight(&self) -> f64 {
-        1.0 / (1.0 / self.source.weight + 1.0 / self.target.weight)
+        1.0 / self.variance
     }
 }
 
@@ -42,7 +44,8 @@ impl Adjusted {
             for tile in means.chunk_by(|a, b| a.tile == b.tile) {
                 let of = |station: usize| tile.iter().find(|mean| mean.station == station).copied();
                 if let (Some(target), Some(source)) = (of(target), of(source)) {
-                    found.push(Shared { facet, target, source });
+                    let variance = self.scatter.variance(&target) + self.scatter.variance(&source);
+                    found.push(Shared { facet, target, source, variance });
                 }
             }
         }
@@ -77,29 +80,35 @@ impl Adjusted {
         let poses = [self.state.poses[target], self.state.poses[source]];
         let none = (Vec::new(), Vec::new());
         let network = Network { fixed: 0, hold_m, turn_rad: 1.0, names: &[], prior: &none };
-        let mut equations = Equations::new(2, 0);
-        for ((facet, variances), means) in self.facets.iter().zip(&self.variances).zip(&self.means) {
-            let sees = |station: usize| means.iter().any(|mean| mean.station == station);
-            if !(sees(target) && sees(source)) {
-                continue;
+        let Scatter { weights, shared, .. } = &self.scatter;
+        let equations_of = |shared: &[f64], roughness: &[f64]| {
+            let mut equations = Equations::new(2, 0);
+            for ((facet, &roughness), means) in self.facets.iter().zip(roughness).zip(&self.means) {
+                let sees = |station: usize| means.iter().any(|mean| mean.station == station);
+                if !(sees(target) && sees(source)) {
+                    continue;
+                }
+                let seen = FacetSums { facet, sums: &self.sums, weights, shared, roughness };
+                if let Some(mut eliminated) = seen.eliminated(&[target, source]) {
+                    eliminated.rename(&[target, source]);
+                    equations.add(facet, &eliminated, &poses);
+                }
             }
-            let seen = FacetSums { facet, sums: &self.sums, weights: &self.scatter.weights };
-            if let Some(mut eliminated) = seen.eliminated(&[target, source], *variances) {
-                eliminated.rename(&[target, source]);
-                equations.add(facet, &eliminated, &poses);
-            }
-        }
+            equations
+        };
+        let equations = equations_of(shared, &self.roughness);
         let state = State { poses: poses.to_vec(), parameters: Vec::new() };
         // Along a weak direction the pair stays where all stations have it: there the tiles would be others.
         let (step, _) = equations.solved(&network.near(size_m / 2.0), &state)?;
-        let (_, cofactors) = equations.solved(&network, &state)?;
+        let (_, covariance) = equations.solved(&network, &state)?;
+        let (_, cofactors) = equations_of(&self.wide.shared, &self.wide.roughness).solved(&network, &state)?;
+        let covariance = self.wide.at_least(covariance, &cofactors)?;
         let moved = step_pose(&poses[1], &step.fixed_rows::<6>(6).into_owned());
         let result = self.result(target, source, poses[0].inverse() * moved, size_m);
         let to_target = poses[0].rotation.inverse().to_rotation_matrix().into_inner();
         let mut turn = Matrix6::identity();
         turn.fixed_view_mut::<3, 3>(0, 0).copy_from(&to_target);
-        let covariance =
-            symmetrised(&(turn * cofactors.fixed_view::<6, 6>(6, 6) * turn.transpose())) * self.variance_factor();
+        let covariance = symmetrised(&(turn * covariance.fixed_view::<6, 6>(6, 6) * turn.transpose()));
         let degenerate = precision::undetermined(&result.target_from_source, &covariance, hold_m, size_m);
         Ok(PairAlignment { target, source, result: IcpResult { covariance, degenerate, ..result } })
     }

@@ -129,7 +129,8 @@ impl StationPoints {
 /// Standard deviation of each point along its ray: what is said of it as the patches scale it, or what they tell.
 fn along_rays(cloud: &Cloud, surface: &Surface) -> Vec<f64> {
     let ranges = cloud.points.iter().map(|point| point.coords.norm());
-    if let Some(said) = &cloud.sigma {
+    // A column of unknown deviations says as little as none.
+    if let Some(said) = cloud.sigma.as_ref().filter(|said| said.iter().any(|sigma| sigma.is_finite())) {
         let law = NoiseLaw::scaling(said, surface);
         return ranges.zip(said).map(|(range, sigma)| sigma * law.factor(range)).collect();
     }

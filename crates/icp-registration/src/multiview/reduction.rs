@@ -75,6 +75,24 @@ impl Scene<'_> {
         (Row { residual, jacobian, weight }, observed)
     }
 
+    /// Of all contacts at these poses: distance squared, its variance by noise, and the variance of a point of both patches.
+    pub(super) fn distances<'m>(
+        &'m self,
+        meetings: &'m [Meeting],
+        poses: &'m [Isometry3<f64>],
+    ) -> impl Iterator<Item = (f64, f64, f64)> + 'm {
+        meetings.iter().flat_map(move |meeting| {
+            let pose = poses[meeting.target].inverse() * poses[meeting.source];
+            let (source, target) = (self.surfaces[meeting.source], self.surfaces[meeting.target]);
+            meeting.contacts.iter().map(move |contact| {
+                let observed = observe(source, target, contact, &pose);
+                let of_point = |surface: &Surface, patch: u32| surface.patches[patch as usize].point_variance;
+                let point = of_point(source, contact.source) + of_point(target, contact.target);
+                (observed.residual.powi(2), observed.variance, point)
+            })
+        })
+    }
+
     pub(super) fn whitened_residual(&self, meeting: &Meeting, contact: &Contact, pose: &Isometry3<f64>) -> f64 {
         let (source, target) = (self.surfaces[meeting.source], self.surfaces[meeting.target]);
         let observed = observe(source, target, contact, pose);

@@ -42,7 +42,7 @@ pub struct StationRegistrationOptions<'a> {
     pub loop_tolerance_m: Option<f64>,
     /// Kernel of the last rounds, for single points and for what a station saw of a tile. Default Tukey: what is no common surface has no weight.
     pub kernel: RobustKernel,
-    /// Last rounds, each with points given to the surfaces anew; at least three. Default 12.
+    /// Last rounds, each with points given to the surfaces anew; at least three. Default 20.
     pub max_rounds: usize,
     /// The rounds end when no station moves by more than this, metre. `None`: 1/2000 of the size of a patch.
     pub tolerance_m: Option<f64>,
@@ -60,7 +60,7 @@ impl Default for StationRegistrationOptions<'_> {
             minimum_contacts: 15,
             loop_tolerance_m: None,
             kernel: RobustKernel::Tukey,
-            max_rounds: 12,
+            max_rounds: 20,
             tolerance_m: None,
             model: None,
         }

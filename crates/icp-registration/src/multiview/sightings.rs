@@ -28,6 +28,8 @@ pub(super) struct Gate {
     /// Of so many points one is taken.
     pub stride: usize,
     pub parameters: usize,
+    /// Variance of what neighbouring points share, in variances of a point.
+    pub shared: f64,
 }
 
 /// The sums of all stations over all tiles.
@@ -120,9 +122,10 @@ impl<'a> Sighting<'a> {
         (turned / range, range)
     }
 
-    /// Standard deviation of a point across a facet, metre.
+    /// Standard deviation of a point across a facet, metre, with what it shares with its neighbours.
     fn sigma(&self, point: usize, cosine: f64) -> f64 {
-        (self.points.variance(point, cosine) + self.gate.slack_m.powi(2)).sqrt()
+        let variance = self.points.variance(point, cosine);
+        ((1.0 + self.gate.shared) * variance + self.gate.slack_m.powi(2)).sqrt()
     }
 
     /// Where the ray of a point meets a facet; `None` also where that is too far off to matter.
@@ -198,7 +201,9 @@ impl<'a> Sighting<'a> {
         if whitened.is_nan() || whitened.abs() > FARTHEST || !sigma.is_normal() {
             return false;
         }
-        let weight = self.gate.kernel.weight(whitened) / sigma.powi(2);
+        // What neighbours share takes weight from all of them together, not here.
+        let own = self.points.variance(point, hit.cosine) + self.gate.slack_m.powi(2);
+        let weight = self.gate.kernel.weight(whitened) / own;
         self.phi[1..3].copy_from_slice(&hit.place);
         let parameters = self.gate.parameters;
         if parameters > 0 {

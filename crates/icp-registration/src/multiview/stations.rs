@@ -216,8 +216,7 @@ fn result(
     let count = adjusted.state.poses.len();
     let parameters = adjusted.state.parameters.len();
     let (redundancy, sigma0) = (adjusted.redundancy(), adjusted.sigma0());
-    let factor = 0.5 * adjusted.variance_factor();
-    let covariance = factor * (&adjusted.cofactors + adjusted.cofactors.transpose());
+    let covariance = 0.5 * (&adjusted.covariance + adjusted.covariance.transpose());
     let undetermined = undetermined(&adjusted.state.poses, &covariance, network.hold_m, size_m);
     let surfaces = adjusted.overlaps(fewest).iter().map(|overlap| surface_pair(&adjusted, overlap)).collect();
     let (poses, joint) = datum.apply(start, adjusted.state.poses, covariance, network.hold_m);
@@ -245,7 +244,7 @@ fn returned(adjusted: &Adjusted, start: &[Isometry3<f64>], network: &Network<'_>
     let mut state = adjusted.state.clone();
     let mut any = false;
     for (k, (pose, start)) in state.poses.iter_mut().zip(start).enumerate().filter(|(k, _)| *k != network.fixed) {
-        let own: Matrix6<f64> = adjusted.cofactors.fixed_view::<6, 6>(6 * k, 6 * k).into_owned();
+        let own: Matrix6<f64> = adjusted.covariance.fixed_view::<6, 6>(6 * k, 6 * k).into_owned();
         if let Some(back) = precision::returned(pose, start, &own, network.hold_m, size_m) {
             *pose = back;
             any = true;

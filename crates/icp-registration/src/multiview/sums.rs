@@ -74,8 +74,9 @@ impl Sums {
         let stride = Self::stride(self.order);
         let begin = self.begins[tile];
         let own = self.values.get(begin as usize..begin as usize + stride)?;
-        let (products, right) = own.split_at(stride - self.order - 1);
-        (own[0] > 0.0).then_some(TileSums { products, right })
+        let (products, rest) = own.split_at(stride - self.order - 1);
+        let (right, count) = rest.split_at(self.order);
+        (own[0] > 0.0).then_some(TileSums { products, right, count: count[0] })
     }
 }
 
@@ -146,6 +147,7 @@ fn freed_of_noise(own: &mut [f64], order: usize, share: f64) -> bool {
 pub(super) struct TileSums<'a> {
     products: &'a [f64],
     right: &'a [f64],
+    count: f64,
 }
 
 impl TileSums<'_> {
@@ -156,6 +158,11 @@ impl TileSums<'_> {
 
     pub(super) fn right(&self, row: usize) -> f64 {
         self.right[row]
+    }
+
+    /// Number of points.
+    pub(super) fn count(&self) -> f64 {
+        self.count
     }
 
     /// Sum of the weights.

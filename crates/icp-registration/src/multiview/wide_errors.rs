@@ -1,14 +1,19 @@
-//! Errors that tiles share: what a camera does wrong over a whole wall is no independent error of each tile on it.
+//! A second, cautious account of what tiles share, for networks in which products of differences tell too little: of two
+//! stations that see a floor and a wall, whole walls may be off and no product of tiles stands out of its scatter.
 //!
 //! Differences between stations, summed over blocks of tiles, grow as the root of the number of tiles where these are
-//! independent, and faster where they share something. The widest blocks are whole facets.
+//! independent, and faster where they share something. The widest blocks are whole facets. By how much the squares of these
+//! sums are too large is a factor of all variances. It tells neither where nor how far the errors reach; so it weighs
+//! nothing, and only keeps the covariance from being less.
 
 use std::collections::BTreeMap;
 
 use adjust::Distribution;
+use nalgebra::{DMatrix, SymmetricEigen};
 
 use super::facets::Facet;
-use super::scatter::{Scatter, TileMean};
+use super::scatter::{Scatter, TileMean, roughness};
+use crate::error::{Error, Result};
 
 /// Sides of blocks, tiles; the last holds every facet.
 const SIDES: [usize; 4] = [2, 4, 8, usize::MAX];
@@ -42,32 +47,88 @@ impl Block {
     }
 }
 
-/// Factor of the variances that the errors shared by tiles ask for, `unknowns` having been fitted; at least that of single
-/// tiles, `of_tiles`.
-pub(super) fn factor(
-    facets: &[Facet],
-    means: &[Vec<TileMean>],
-    scatter: &Scatter,
-    stations: usize,
-    unknowns: f64,
-    of_tiles: f64,
-) -> f64 {
+/// Tiles of a facet that tell of variances: seen by two stations or more, and none of them off.
+fn telling(means: &[TileMean]) -> impl Iterator<Item = &[TileMean]> {
+    means.chunk_by(|a, b| a.tile == b.tile).filter(|tile| tile.len() > 1 && tile.iter().all(|mean| mean.counts))
+}
+
+/// What tiles scatter beyond noise as if it were one variance in all of them, and the factor by which blocks exceed that.
+#[derive(Debug, Clone, Default)]
+pub(super) struct WideErrors {
+    /// The variance that the points of each station in each tile share, tile by tile, metre².
+    pub shared: Vec<f64>,
+    /// Variance of the surface of a tile about the plane of each facet, metre².
+    pub roughness: Vec<f64>,
+    /// Factor of the variances.
+    pub factor: f64,
+}
+
+impl WideErrors {
+    /// `unknowns` have been fitted.
+    pub(super) fn new(facets: &[Facet], means: &[Vec<TileMean>], scatter: &Scatter, unknowns: f64) -> Self {
+        let mut sensitivity = 0.0;
+        for tile in means.iter().flat_map(|means| telling(means)) {
+            let all: f64 = tile.iter().map(|each| each.weight).sum();
+            sensitivity += tile.iter().map(|each| each.weight * (1.0 - each.weight / all)).sum::<f64>();
+        }
+        let beyond = (scatter.squares - scatter.differences).max(0.0);
+        let shared = if sensitivity > 0.0 { scatter.noise * beyond / sensitivity } else { 0.0 };
+        let free = scatter.differences - unknowns;
+        let of_tiles = if free > 0.0 { (scatter.squares / free).max(1.0) } else { 1.0 };
+        Self {
+            shared: vec![shared; scatter.shared.len()],
+            roughness: means.iter().map(|means| roughness(means, |_| shared)).collect(),
+            factor: factor(facets, means, scatter.noise, unknowns, of_tiles),
+        }
+    }
+
+    /// The least change of a covariance that makes it, along every direction, at least these cofactors times the factor.
+    pub(super) fn at_least(&self, covariance: DMatrix<f64>, cofactors: &DMatrix<f64>) -> Result<DMatrix<f64>> {
+        // Unknowns that are held have no variance; all others count in units of their own.
+        let free: Vec<usize> = (0..covariance.nrows()).filter(|&k| covariance[(k, k)] > 0.0).collect();
+        if free.is_empty() {
+            return Ok(covariance);
+        }
+        let unit: Vec<f64> = free.iter().map(|&k| covariance[(k, k)].sqrt()).collect();
+        let lacking = DMatrix::from_fn(free.len(), free.len(), |row, column| {
+            let of = |r: usize, c: usize| self.factor * cofactors[(r, c)] - covariance[(r, c)];
+            let (r, c) = (free[row], free[column]);
+            0.5 * (of(r, c) + of(c, r)) / (unit[row] * unit[column])
+        });
+        let failed = |why| Error::Numerical { what: "the covariance of all stations", why };
+        if lacking.iter().any(|value| !value.is_finite()) {
+            return Err(failed("it is not finite"));
+        }
+        let eigen = SymmetricEigen::try_new(lacking, 1e-12, 10_000).ok_or(failed("no eigenvalues were found"))?;
+        let mut covariance = covariance;
+        for (value, vector) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
+            if *value > 0.0 {
+                for (row, &r) in free.iter().enumerate() {
+                    for (column, &c) in free.iter().enumerate() {
+                        covariance[(r, c)] += value * vector[row] * vector[column] * unit[row] * unit[column];
+                    }
+                }
+            }
+        }
+        Ok(covariance)
+    }
+}
+
+/// Factor of the variances that the errors shared by tiles ask for; at least that of single tiles, `of_tiles`.
+fn factor(facets: &[Facet], means: &[Vec<TileMean>], noise: f64, unknowns: f64, of_tiles: f64) -> f64 {
     let mut largest = of_tiles;
     for side in SIDES {
         let (mut free, mut squares) = (-unknowns, 0.0);
         for (facet, means) in facets.iter().zip(means) {
             let mut blocks: BTreeMap<[usize; 2], Block> = BTreeMap::new();
-            for tile in means.chunk_by(|a, b| a.tile == b.tile) {
-                let counts = |mean: &TileMean| scatter.weights[mean.tile * stations + mean.station] > 0.0;
-                if tile.len() > 1 && tile.iter().all(counts) {
-                    let place = facet.tiles.place_of(tile[0].tile).map(|at| at / side);
-                    blocks.entry(place).or_default().add(tile);
-                }
+            for tile in telling(means) {
+                let place = facet.tiles.place_of(tile[0].tile).map(|at| at / side);
+                blocks.entry(place).or_default().add(tile);
             }
             for block in blocks.values() {
                 let (of_block, square) = block.squares();
                 free += of_block;
-                squares += square / scatter.noise;
+                squares += square / noise;
             }
         }
         let distribution = Distribution::ChiSquared { dof: free };

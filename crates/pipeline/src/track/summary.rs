@@ -211,8 +211,8 @@ impl TrackSummary {
     /// What the standard deviations of the poses rest on.
     pub(crate) fn grounds_of_sigma(&self) -> String {
         match self.shared_error_registrations {
-            0 => "The standard deviations rest on the noise of the frames alone: no keyframe followed that would show errors that all frames \
-                  share."
+            0 => "The standard deviations rest on the noise and on an error of the sensor that all frames share, as far \
+                  as each frame shows it by itself: no keyframe followed."
                 .to_owned(),
             n => format!(
                 "The standard deviations rest on the noise and on an error of the sensor that all frames share, estimated from {n} \

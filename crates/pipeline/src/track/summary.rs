@@ -211,9 +211,11 @@ impl TrackSummary {
     /// What the standard deviations of the poses rest on.
     pub(crate) fn grounds_of_sigma(&self) -> String {
         match self.shared_error_registrations {
-            0 => "The standard deviations rest on the noise and on an error of the sensor that all frames share, as far \
+            0 => {
+                "The standard deviations rest on the noise and on an error of the sensor that all frames share, as far \
                   as each frame shows it by itself: no keyframe followed."
-                .to_owned(),
+                    .to_owned()
+            }
             n => format!(
                 "The standard deviations rest on the noise and on an error of the sensor that all frames share, estimated from {n} \
                  registrations between keyframes; that it is smooth over the frame and half of it the same everywhere is \

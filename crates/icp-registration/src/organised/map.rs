@@ -14,7 +14,8 @@ use super::pairs::{Locate, Moved, WithLocate, with_locate};
 const AGREEING_SIGMA: f32 = 4.0;
 /// What maps and poses are wrong by beside the noise: this share of the depth.
 const AGREEING_SHARE: f32 = 0.005;
-/// Largest systematic error, share of the depth.
+/// Largest systematic error, share of the depth: 6 cm at 2 m, several times that of a Kinect. With 0.02 and 0.05 its paths are
+/// as far off within a millimetre or two, and those of simulated frames the same.
 const LARGEST_ERROR: f32 = 0.03;
 /// Cosine of the largest angle between normals that agree.
 const AGREEING_COSINE: f32 = 0.7;

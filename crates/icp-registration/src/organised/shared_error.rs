@@ -36,8 +36,9 @@ const BIWEIGHT: f64 = 4.685;
 /// Standard deviations by which squares must exceed what noise lets expect (of one degree of freedom: 4 % by chance).
 const SIGNIFICANCE: f64 = 2.0;
 /// Share of an estimated variance that all registrations have in common. Residuals do not tell it: those of registrations
-/// that follow each other are of the same surfaces as well as of the same sensor. What it is matters little: with 0.25 to 1,
-/// 500 frames of a Kinect are tracked with a root mean square error of 26 to 30 mm, their two halves with 26 to 31 mm.
+/// that follow each other are of the same surfaces as well as of the same sensor. Paths hardly hang on it, what is stated of
+/// them does: with 0.25, 0.5, 0.75 and 1, 500 frames of a Kinect are tracked with 31, 30, 29 and 27 mm, and squared errors
+/// reach up to 6.2, 6.4, 7.2 and 14 of their variances.
 const IN_COMMON: f64 = 0.5;
 /// Least random part, in standard deviations of the nodes: below, frames are copies of each other.
 const LEAST_RANDOM: f64 = 0.1;

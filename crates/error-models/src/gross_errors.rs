@@ -64,18 +64,21 @@ pub struct FlagCounts {
 /// the threshold of [`MixedPixelOptions`], if neither neighbour has its range, and if no block of 3 by 3 pixels with it
 /// at a corner is a plane but for noise and the floor (chi-squared at the 0.1 % level). So a tilted wall continues itself, the pixels
 /// beside a sharp edge continue their own side, on a curved surface both sides err to the same side of the pixel, and a
-/// surface four pixels wide is one whatever stands around it. Edges up to three mixed pixels wide are seen where they are
+/// surface four pixels wide is one whatever stands around it. So is a narrower one that is long: a line of seven pixels
+/// through it is straight but for noise and the floor (1 % level), it is further from both others than twice the threshold,
+/// and its light is not what a mixture of them would return. Edges up to three mixed pixels wide are seen where they are
 /// not as straight as a surface. Not seen: a pixel mixed of three surfaces that does not lie between two of them, pixels at
 /// surfaces so narrow that nothing tells their tilt (stairs from afar), a pixel with a single one between it and the image's
-/// rim, and a structure of a single pixel in front of all others. A real surface of up to three pixels and between two
-/// others cannot be told from mixed pixels and is flagged. The less noise there is, the narrower such surfaces stand out.
+/// rim, and a structure of a single pixel in front of all others. A real surface that is narrow, short and between two
+/// others cannot be told from mixed pixels and is flagged, and without amplitudes one that is long, too.
 ///
 /// A NaN amplitude is not low. Refuses planes of different sizes and options that are not finite or negative.
 pub fn flag_gross_errors(frame: &mut RangeFrame, options: &GrossErrorOptions) -> Result<FlagCounts> {
     frame.validate()?;
     options.validate()?;
     let width = frame.width().max(1);
-    let test = options.mixed_pixels.map(|options| MixedPixelTest::new(&frame.range, &frame.sigma, options));
+    let planes = [&frame.range, &frame.sigma, &frame.amplitude];
+    let test = options.mixed_pixels.map(|options| MixedPixelTest::new(planes, options));
     let threshold = options.low_amplitude.map_or(f32::NEG_INFINITY, |amplitude| amplitude as f32);
     let rows = frame.flags.as_mut_slice().par_chunks_mut(width).zip(frame.amplitude.as_slice().par_chunks(width));
     let counts = rows.enumerate().map(|(row, (flags, amplitudes))| {

@@ -29,6 +29,7 @@ mod range_noise;
 mod rate_history;
 mod spline;
 mod steepest;
+mod straight_line;
 mod summary;
 mod surface;
 mod terms;

@@ -117,6 +117,30 @@ fn a_steep_surface_four_pixels_wide_is_no_edge() {
     assert!(!mixed(&mut frame).as_slice().contains(&true));
 }
 
+/// A strip between two walls that is a pixel wide and 0.4 m from both, with so much light.
+fn strip(light: f32) -> RangeFrame {
+    let strip = |col: f64, row: f64| 2.4 + 0.0002 * row + 0.02 * (col - 60.0);
+    let wall = |col: f64| if col < 60.0 { 2.0 } else { 2.8 };
+    let mut frame = frame(0.001, |col, row| if col as usize == 60 { strip(col, row) } else { wall(col) });
+    frame.amplitude = Raster::from_fn(WIDTH, HEIGHT, |col, _| match col {
+        0..60 => 100.0,
+        60 => light,
+        _ => 60.0,
+    });
+    frame
+}
+
+#[test]
+fn a_narrow_surface_is_told_from_a_straight_edge_by_its_light() {
+    let flagged = |light: f32| mixed(&mut strip(light)).as_slice().iter().filter(|mixed| **mixed).count();
+    // Seen at a grazing angle it returns half of it.
+    assert_eq!(flagged(40.0), 0);
+    // Halfway in range, a mixture is by 0.375 the brighter wall and by 0.625 the other: 75 units.
+    assert!(flagged(75.0) > HEIGHT - 8, "{}", flagged(75.0));
+    // Nothing is told without light.
+    assert!(flagged(f32::NAN) > HEIGHT - 8);
+}
+
 #[test]
 fn a_sharp_edge_without_mixing_is_not_flagged() {
     let mut frame = frame(0.005, |col, row| plane(col, row, if col < 70.2 { 1.0 } else { 3.0 }, 0.0));

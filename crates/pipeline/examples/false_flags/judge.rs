@@ -27,6 +27,9 @@ use super::rooms::{Capture, LOW_AMPLITUDE, SIZE, Truth};
 const SIGMAS: f64 = 4.0;
 const FLOOR_M: f64 = 0.005;
 
+/// Mixed pixels that err by more than this are counted by themselves, metre.
+const FAR_M: f64 = 0.05;
+
 /// Flags that the stages `Unwrap`, `Deconvolve` and `Multipath` set on whole surfaces, and [`Flags::OUTSIDE_SPAN`].
 const OF_SURFACES: Flags = Flags::MULTIPATH.union(Flags::UNWRAP_UNSURE).union(Flags::OUTSIDE_SPAN);
 
@@ -49,6 +52,9 @@ pub struct Counts {
     pub false_of_narrow: usize,
     /// Ranges wrong, by the first reason, and not flagged.
     pub missed: usize,
+    /// Mixed pixels whose range errs by more than 50 mm, and those of them flagged as mixed.
+    pub far_mixed: usize,
+    pub far_mixed_found: usize,
     pub error_median_m: f64,
 }
 
@@ -114,6 +120,9 @@ fn judge(capture: &Capture, outcome: &Outcome, frames: usize) -> Counts {
             counts.false_of_pixels += usize::from(!of_pixel.is_empty() && !wrong);
             counts.false_by_chance += usize::from(!(of_pixel - Flags::MIXED_PIXEL).is_empty() && !wrong);
             counts.missed += usize::from(!right && !flagged);
+            let far = truth.mixed[pixel] && error > FAR_M;
+            counts.far_mixed += usize::from(far);
+            counts.far_mixed_found += usize::from(far && flags.contains(Flags::MIXED_PIXEL));
             for (count, (flag, _)) in counts.of_flag.iter_mut().zip(Flags::NAMED) {
                 *count += usize::from(flags.contains(flag) && !wrong);
             }

@@ -65,7 +65,7 @@ pub struct FlagCounts {
 /// at a corner is a plane but for noise and the floor (chi-squared at the 0.1 % level). So a tilted wall continues itself, the pixels
 /// beside a sharp edge continue their own side, on a curved surface both sides err to the same side of the pixel, and a
 /// surface four pixels wide is one whatever stands around it. So is a narrower one that is long: a line of seven pixels
-/// through it is straight but for noise and the floor (1 % level), it is further from both others than twice the threshold,
+/// through it is straight but for noise and the floor (1 % level), it is further from both others than three times the threshold,
 /// and its light is not what a mixture of them would return. Edges up to three mixed pixels wide are seen where they are
 /// not as straight as a surface. Not seen: a pixel mixed of three surfaces that does not lie between two of them, pixels at
 /// surfaces so narrow that nothing tells their tilt (stairs from afar), a pixel with a single one between it and the image's

@@ -119,10 +119,11 @@ fn pixels_that_a_camera_lost_do_not_tell_its_noise() {
             "{name}: {} {} misfit {:.3} p {:.1e}",
             slope.value, floor.value, summary.misfit, summary.misfit_p_value
         );
-        // One camera, one scene: the frames that were taken change the figures by what these leave open: a tenth, of the floor
-        // from two frames a fifth.
-        assert!((slope.value / 2.9 - 1.0).abs() < 0.1, "{name}: {slope:?}");
-        assert!((floor.value / 0.015 - 1.0).abs() < 0.2, "{name}: {floor:?}");
+        // One camera, one scene: the frames that were taken change the figures by what these leave open: a twentieth, of the
+        // floor from two frames a fifth.
+        let open = if name.starts_with("two frames") { 0.2 } else { 0.05 };
+        assert!((slope.value / 2.9 - 1.0).abs() < 0.05, "{name}: {slope:?}");
+        assert!((floor.value / 0.015 - 1.0).abs() < open, "{name}: {floor:?}");
     }
 }
 

@@ -1,7 +1,6 @@
 #![doc = include_str!("../README.md")]
 
 mod absolute_orientation;
-mod awake;
 mod cloud;
 mod coarse;
 mod coincident;

@@ -1,9 +1,9 @@
 //! Every metric with every matching on input that has no answer: a typed one, and never a NaN.
 
 use icp_registration::parts::{
-    AndersonAcceleration, ClosedForm, Coloured, CompatibleNearest, ErrorMetric, GaussNewton, Graduated,
-    LevenbergMarquardt, MedianDistance, Minimiser, NearestPoint, PlaneToPlane, PointMatching, PointToPlane,
-    PointToPoint, Projective, Settled, Stability, SymmetricPlanes,
+    ClosedForm, Coloured, CompatibleNearest, ErrorMetric, GaussNewton, Graduated, LevenbergMarquardt, MedianDistance,
+    Minimiser, NearestPoint, PlaneToPlane, PointMatching, PointToPlane, PointToPoint, Projective, Settled, Stability,
+    SymmetricPlanes,
 };
 use icp_registration::{Cloud, DegeneracyPolicy, Error, IcpTarget, Registration};
 use nalgebra::{Isometry3, Point3, Vector3};
@@ -62,7 +62,7 @@ proptest! {
     fn there_is_always_an_answer(
         kinds in (0usize..8, 0usize..8, 0usize..5, 0usize..4, 0usize..3),
         exponent in -6i32..7, jitter in prop::collection::vec(-1.0..1.0_f64, 17),
-        shift in prop::array::uniform3(-0.5..0.5_f64), turn in prop::array::uniform3(-0.5..0.5_f64), extras in 0u32..16,
+        shift in prop::array::uniform3(-0.5..0.5_f64), turn in prop::array::uniform3(-0.5..0.5_f64), extras in 0u32..8,
     ) {
         let (source_kind, target_kind, metric_kind, matching_kind, minimiser_kind) = kinds;
         let scale = 10.0_f64.powi(exponent);
@@ -93,10 +93,9 @@ proptest! {
         let mut registration = Registration { metric, minimisation, ..Registration::new(NearestPoint::new(&target)) };
         registration.matching = matching;
         registration.stopping = Box::new(Settled { max_iterations: 30, ..Settled::default() });
-        if extras & 1 != 0 { registration.acceleration = Some(AndersonAcceleration::default()); }
-        if extras & 2 != 0 { registration.kernel = Box::new(Graduated::default()); }
-        if extras & 4 != 0 { registration.rejection.push(Box::new(MedianDistance(3.0))); }
-        if extras & 8 != 0 { registration.degeneracy = DegeneracyPolicy::HoldAtGuess; }
+        if extras & 1 != 0 { registration.kernel = Box::new(Graduated::default()); }
+        if extras & 2 != 0 { registration.rejection.push(Box::new(MedianDistance(3.0))); }
+        if extras & 4 != 0 { registration.degeneracy = DegeneracyPolicy::HoldAtGuess; }
         check(&registration, &source, &guess)?;
         registration.selection = Box::new(Stability(50));
         check(&registration, &source, &guess)?;
@@ -132,7 +131,7 @@ fn parts_outside_their_domain_are_refused() {
         change(&mut registration);
         registration.align(&good, &Isometry3::identity())
     };
-    let changes: [&dyn Fn(&mut Registration<'_>); 14] = [
+    let changes: [&dyn Fn(&mut Registration<'_>); 13] = [
         &|r| r.selection = Box::new(EveryNth(0)),
         &|r| r.selection = Box::new(NormalSpace(0)),
         &|r| r.selection = Box::new(Stability(0)),
@@ -144,7 +143,6 @@ fn parts_outside_their_domain_are_refused() {
         &|r| r.weighting = vec![Box::new(NormalWeight { power: f64::NAN })],
         &|r| r.metric = Box::new(PlaneToPlane { flatness: 0.0 }),
         &|r| r.kernel = Box::new(Graduated { widest: f64::NAN, ..Graduated::default() }),
-        &|r| r.acceleration = Some(AndersonAcceleration { memory: 0 }),
         &|r| r.levels.points = 0,
         &|r| r.min_correspondences = 0,
     ];

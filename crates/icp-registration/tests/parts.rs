@@ -3,11 +3,11 @@
 use crate::common;
 use crate::common::{Pinhole, Scene as Room, cloud, disturbance, frame_pair, look_at, pose_error};
 use icp_registration::parts::{
-    AllPoints, AndersonAcceleration, ClosedForm, Coloured, CompatibleNearest, ConstantWeight, DistanceWeight,
-    ErrorMetric, EveryNth, GaussNewton, Graduated, IntensityWeight, LevenbergMarquardt, MaxDistance, MaxNormalAngle,
-    MedianDistance, MutualNearest, NearestPoint, NormalSpace, NormalWeight, PairRejection, PairWeighting, PlaneToPlane,
-    PointSelection, PointToPlane, PointToPoint, Projective, RandomPoints, Settled, SigmaWeight, SourceRim, Stability,
-    SymmetricPlanes, TargetRim, Trimmed,
+    AllPoints, ClosedForm, Coloured, CompatibleNearest, ConstantWeight, DistanceWeight, ErrorMetric, EveryNth,
+    GaussNewton, Graduated, IntensityWeight, LevenbergMarquardt, MaxDistance, MaxNormalAngle, MedianDistance,
+    MutualNearest, NearestPoint, NormalSpace, NormalWeight, PairRejection, PairWeighting, PlaneToPlane, PointSelection,
+    PointToPlane, PointToPoint, Projective, RandomPoints, SigmaWeight, SourceRim, Stability, SymmetricPlanes,
+    TargetRim, Trimmed,
 };
 use icp_registration::{
     Alternative, Cloud, DegeneracyPolicy, Error, IcpOptions, IcpTarget, Metric, OrganisedNormalOptions, Registration,
@@ -232,29 +232,6 @@ fn minimisers_find_the_same_minimum() {
     let mut wrong = Registration::new(NearestPoint::new(&s.target));
     wrong.minimisation = Box::new(ClosedForm::default());
     assert!(matches!(wrong.align(&s.source, &s.guess), Err(Error::Incompatible { .. })));
-}
-
-#[test]
-fn acceleration_saves_iterations_where_they_creep() {
-    let (mut plain, mut fast) = (0, 0);
-    for seed in 0..2 {
-        let s = setting(10 + seed);
-        let run = |acceleration| {
-            let mut registration = Registration::new(NearestPoint::new(&s.target));
-            registration.metric = Box::new(PointToPoint);
-            registration.acceleration = acceleration;
-            registration.stopping = Box::new(Settled { max_iterations: 200, ..Settled::default() });
-            // All the way on the last level.
-            registration.levels.first_limit_m = Some(0.3);
-            registration.levels.last_limit_m = Some(0.3);
-            registration.levels.iterations = 1;
-            check("acceleration", &s, &registration, 25.0)
-        };
-        plain += run(None);
-        fast += run(Some(AndersonAcceleration::default()));
-    }
-    println!("iterations {plain}, accelerated {fast}");
-    assert!(fast < plain, "{fast} {plain}");
 }
 
 #[test]

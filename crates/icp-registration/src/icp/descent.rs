@@ -194,7 +194,7 @@ impl<'p> Engine<'p> {
                     return Ok(track);
                 }
                 let moment = track.moment(limits, level, iteration);
-                let step = self.step(&mut track, &moment, &mut points, &mut None)?;
+                let step = self.step(&mut track, &moment, &mut points)?;
                 if length(&step) < self.parts.levels.step_fraction * limits[level] {
                     break;
                 }

@@ -15,9 +15,9 @@ use crate::error::{Error, Result};
 use crate::kernel::RobustKernel;
 use crate::normals::{UnorganisedNormalOptions, unorganised_normals};
 use crate::parts::{
-    Accelerator, AllPoints, AndersonAcceleration, ErrorMetric, GaussNewton, KernelSchedule, MaxNormalAngle, Minimiser,
-    Moment, NearestPoint, Pair, PairRejection, PairWeighting, PointMatching, PointSelection, PointToPlane, Progress,
-    Scene, Settled, SigmaWeight, StoppingRule,
+    AllPoints, ErrorMetric, GaussNewton, KernelSchedule, MaxNormalAngle, Minimiser, Moment, NearestPoint,
+    PairRejection, PairWeighting, PointMatching, PointSelection, PointToPlane, Progress, Scene, Settled, SigmaWeight,
+    StoppingRule,
 };
 use crate::pose::is_finite;
 use crate::quality::Residuals;
@@ -38,8 +38,6 @@ pub struct Registration<'a> {
     pub metric: Box<dyn ErrorMetric + 'a>,
     /// How it is minimised.
     pub minimisation: Box<dyn Minimiser + 'a>,
-    /// Whether the steps of the last level are accelerated.
-    pub acceleration: Option<AndersonAcceleration>,
     /// Robust kernel in the course of the run.
     pub kernel: Box<dyn KernelSchedule + 'a>,
     /// Distance limits from coarse to fine.
@@ -74,7 +72,6 @@ impl<'a> Registration<'a> {
             weighting: vec![Box::new(SigmaWeight)],
             metric: Box::new(PointToPlane),
             minimisation: Box::new(GaussNewton),
-            acceleration: None,
             kernel: Box::new(RobustKernel::Welsch),
             levels: Levels::default(),
             starts: Some(Starts::default()),
@@ -174,10 +171,9 @@ impl<'p> Engine<'p> {
     /// Iterates on all selected points at the last limit.
     fn settle(&self, track: &mut Track, points: &mut Points, limits: &[f64]) -> Result<StopReason> {
         let mut lengths = Vec::new();
-        let mut accelerator = None;
         while track.iterations < self.parts.stopping.max_iterations() {
             let moment = track.moment(limits, limits.len() - 1, lengths.len());
-            let step = self.step(track, &moment, points, &mut accelerator)?;
+            let step = self.step(track, &moment, points)?;
             lengths.push(length(&step));
             // While the kernel narrows, small steps mean nothing.
             if self.kernel.at(&moment).1 > 1.0 {
@@ -194,22 +190,10 @@ impl<'p> Engine<'p> {
     }
 
     /// One iteration: pairs, residuals, a motion `[dt, rho w]`, as taken.
-    pub(crate) fn step(
-        &self,
-        track: &mut Track,
-        moment: &Moment,
-        points: &mut Points,
-        accelerator: &mut Option<Accelerator>,
-    ) -> Result<Vector6<f64>> {
-        let mut moment = *moment;
-        let mut pairs = self.pairs(&moment, points, track.iterations)?;
-        let fallback = accelerator.as_mut().and_then(|a| a.refused(energy(&pairs, points, &moment)));
-        if let Some(plain) = fallback {
-            moment.pose = plain;
-            pairs = self.pairs(&moment, points, track.iterations)?;
-        }
-        let scene = self.scene.at(moment);
-        let system = System::new(&scene, self.metric, &pairs, self.kernel.at(&moment));
+    pub(crate) fn step(&self, track: &mut Track, moment: &Moment, points: &mut Points) -> Result<Vector6<f64>> {
+        let pairs = self.pairs(moment, points, track.iterations)?;
+        let scene = self.scene.at(*moment);
+        let system = System::new(&scene, self.metric, &pairs, self.kernel.at(moment));
         let mut step = self.parts.minimisation.step(&system, &self.held(&system)?)?;
         // Pairs at most `limit` apart give no reason to move farther than a few times that.
         let excess = length(&step) / (2.0 * moment.limit_m);
@@ -221,11 +205,6 @@ impl<'p> Engine<'p> {
         }
         track.pose = system.moved(&step);
         track.iterations += 1;
-        if let (Some(options), true) = (self.parts.acceleration, moment.level + 1 == moment.levels) {
-            let accelerator = accelerator
-                .get_or_insert_with(|| Accelerator::new(options, moment.pose, system.centre(), system.radius_m()));
-            track.pose = accelerator.next(&moment.pose, track.pose, energy(&pairs, points, &moment));
-        }
         Ok(step)
     }
 
@@ -250,12 +229,6 @@ impl<'p> Engine<'p> {
     pub(crate) fn max_motion_sigma_m(&self) -> f64 {
         self.parts.max_motion_sigma_m.unwrap_or(self.scene.target.radius_m / 300.0)
     }
-}
-
-/// Mean square distance with the limit for points without a partner: what an accelerated step must not raise.
-fn energy(pairs: &[Pair], points: &Points, moment: &Moment) -> f64 {
-    let without = (points.indices.len() - pairs.len()) as f64 * moment.limit_m.powi(2);
-    (pairs.iter().map(|pair| pair.distance_m.powi(2)).sum::<f64>() + without) / points.indices.len() as f64
 }
 
 /// Larger of the two parts of a motion.

@@ -28,9 +28,6 @@ impl Registration<'_> {
         for weighting in &self.weighting {
             weighting.validate()?;
         }
-        if let Some(acceleration) = self.acceleration {
-            acceleration.validate()?;
-        }
         if self.degeneracy == DegeneracyPolicy::HoldAtPrior {
             prior::validate(self.prior_covariance.as_ref())?;
         }

@@ -11,7 +11,6 @@ use super::quality::{Cell, Hold, Verdict};
 use super::shared_error::Sighting;
 use super::sums::{SUMS, median_residual, normal_equations};
 use super::track::{FEWEST_POINTS, Gauge, Track, blocks, finest_part, is_within_noise, moved, solve, turned};
-use crate::awake::with_thread_awake;
 use crate::error::{Error, Result};
 use crate::icp::{DegeneracyPolicy, IcpResult, StopReason};
 use crate::pose::{is_finite, pose_difference, step_pose, symmetrised, tangent_from_centred};
@@ -100,13 +99,11 @@ impl FrameAligner {
         };
         let (held, last_step) = (Matrix6::zeros(), Vector6::zeros());
         let track = Track { pose: *guess, iterations: 0, rules, held, last_step, over_sigma: f64::INFINITY };
-        with_thread_awake(|| {
-            let first = self.course(track.clone(), source, target, guess);
-            if self.hold() == Hold::Undetermined || self.options.other_starts == 0 {
-                return first.map(|(_, result)| result);
-            }
-            self.searched(first, &track, source, target)
-        })
+        let first = self.course(track.clone(), source, target, guess);
+        if self.hold() == Hold::Undetermined || self.options.other_starts == 0 {
+            return first.map(|(_, result)| result);
+        }
+        self.searched(first, &track, source, target)
     }
 
     /// The first level that is passed; none where all but the last have too few nodes.

@@ -9,7 +9,6 @@ use super::blocks::Points;
 use super::nodes::{LARGEST_DEPTH_M, LEAST_DEPTH_M, NodeRow};
 use super::planes::{FREEDOM, PlaneRow};
 use super::projection::Projection;
-use crate::awake::with_thread_awake;
 use crate::cloud::Cloud;
 use crate::error::{Error, Result};
 use crate::kernel::{median_of_bits, positive_bits};
@@ -98,15 +97,13 @@ impl OrganisedFrame {
         }
         check_rays(&self.projection, points)?;
         self.has_sigma = sigma.is_some();
-        with_thread_awake(|| {
-            self.reduce(points, sigma);
-            self.fit_planes();
-            self.refuse_misfits();
-            if !self.is_whole {
-                self.centre();
-            }
-            self.points.gather(&self.projection.grid, &self.inverse_depth, &self.planes, &self.sigma);
-        });
+        self.reduce(points, sigma);
+        self.fit_planes();
+        self.refuse_misfits();
+        if !self.is_whole {
+            self.centre();
+        }
+        self.points.gather(&self.projection.grid, &self.inverse_depth, &self.planes, &self.sigma);
         Ok(())
     }
 

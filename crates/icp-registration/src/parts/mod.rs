@@ -7,7 +7,7 @@
 //! | how much weight? | [`PairWeighting`] | [`ConstantWeight`], [`DistanceWeight`], [`NormalWeight`], [`SigmaWeight`], [`IntensityWeight`] |
 //! | which pairs not? | [`PairRejection`] | [`MaxDistance`], [`MaxNormalAngle`], [`Trimmed`], [`MedianDistance`], [`SourceRim`], [`TargetRim`], [`MutualNearest`] |
 //! | what is minimised? | [`ErrorMetric`] | [`PointToPoint`], [`PointToPlane`], [`SymmetricPlanes`], [`PlaneToPlane`], [`Coloured`] |
-//! | how? | [`Minimiser`] | [`GaussNewton`], [`LevenbergMarquardt`], [`ClosedForm`], with [`AndersonAcceleration`] |
+//! | how? | [`Minimiser`] | [`GaussNewton`], [`LevenbergMarquardt`], [`ClosedForm`] |
 //! | what of outliers? | [`KernelSchedule`] | [`crate::RobustKernel`], [`Graduated`] |
 //! | until when? | [`StoppingRule`] | [`Settled`] |
 
@@ -26,8 +26,7 @@ pub use crate::mesh::{ClosestOnMesh, TriangleMesh};
 pub use kernel::{Graduated, KernelSchedule};
 pub use matching::{CompatibleNearest, NearestPoint, Partner, PointMatching, Projective, Query};
 pub use metric::{Coloured, ErrorMetric, PlaneToPlane, PointToPlane, PointToPoint, Row, Rows, SymmetricPlanes};
-pub(crate) use minimisation::Accelerator;
-pub use minimisation::{AndersonAcceleration, ClosedForm, GaussNewton, LevenbergMarquardt, Minimiser};
+pub use minimisation::{ClosedForm, GaussNewton, LevenbergMarquardt, Minimiser};
 pub use rejection::{
     MaxDistance, MaxNormalAngle, MedianDistance, MutualNearest, PairRejection, SourceRim, TargetRim, Trimmed,
 };

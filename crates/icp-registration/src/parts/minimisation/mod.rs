@@ -1,12 +1,9 @@
 //! How the weighted squares of the residuals are made small.
 
-mod anderson;
 mod closed_form;
 mod gauss_newton;
 mod levenberg_marquardt;
 
-pub(crate) use anderson::Accelerator;
-pub use anderson::AndersonAcceleration;
 pub use closed_form::ClosedForm;
 pub use gauss_newton::GaussNewton;
 pub use levenberg_marquardt::LevenbergMarquardt;

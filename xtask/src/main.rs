@@ -9,6 +9,7 @@ mod fuzz;
 mod nightly;
 mod peers;
 mod pipeline_task;
+mod sensitivity;
 mod shell;
 mod test;
 mod tidy;
@@ -34,6 +35,8 @@ enum Task {
     Peers(peers::Arguments),
     /// Long statistics, with the figures that docs/benchmarks.md states: `cargo xtask verify flags`.
     Verify(verify::Arguments),
+    /// What a statistic says where constants are other ones: `cargo xtask sensitivity organised/search`.
+    Sensitivity(sensitivity::Arguments),
     /// Damaged files of every format against the readers, for some seconds.
     Fuzz(fuzz::Arguments),
     /// An hour of damaged files, property tests with fresh cases, the long statistics, and cargo deny.
@@ -50,6 +53,7 @@ fn main() -> ExitCode {
         Task::Tidy => tidy::run(),
         Task::Peers(arguments) => peers::run(&arguments),
         Task::Verify(arguments) => verify::run(&arguments),
+        Task::Sensitivity(arguments) => sensitivity::run(&arguments),
         Task::Fuzz(arguments) => fuzz::run(&arguments),
         Task::Nightly(arguments) => nightly::run(&arguments),
         Task::Bench(arguments) => bench::run(&arguments),

@@ -1,11 +1,13 @@
 //! Pairs of simulated frames aligned from nothing: how many are found, how many answers are wrong, and the CPU time of
 //! one thread from raw points to the pose.
 //!
-//! `coarse_pairs [graph|ransac] [pairs] [large|most|half|none] [from=SEED] [--each]`
+//! `coarse_pairs [graph|ransac] [pairs] [large|most|half|none] [from=SEED] [sensitivity] [--each]`; `sensitivity` refuses
+//! nothing and tells what each threshold would decide.
 #![allow(clippy::unwrap_used, clippy::print_stdout, missing_docs)]
 
 #[path = "../tests/coarse_scenes/mod.rs"]
 mod coarse_scenes;
+mod coarse_sensitivity;
 #[path = "../tests/common/mod.rs"]
 mod common;
 
@@ -13,7 +15,7 @@ use std::ops::Range;
 
 use coarse_scenes::{Outcome, Pair, align_points, outcome, pair, random_room};
 use common::{Pinhole, Scene};
-use icp_registration::{CoarseOptions, Estimator};
+use icp_registration::{CoarseAlignment, CoarseOptions, Estimator};
 
 fn main() {
     let words: Vec<String> = std::env::args().skip(1).collect();
@@ -25,7 +27,11 @@ fn main() {
     } else {
         Estimator::ConsistencyGraph
     };
-    let options = CoarseOptions { estimator, ..CoarseOptions::default() };
+    let mut options = CoarseOptions { estimator, ..CoarseOptions::default() };
+    let sensitivity = words.iter().any(|w| w == "sensitivity");
+    if sensitivity {
+        options = coarse_sensitivity::loose(options);
+    }
     let chosen = |class: &str| {
         words.iter().any(|w| w == class)
             || !words.iter().any(|w| ["large", "most", "half", "none"].contains(&w.as_str()))
@@ -40,6 +46,9 @@ fn main() {
             table.add(&scene, camera, &pair, &options, each);
         }
         table.print(name);
+        if sensitivity {
+            coarse_sensitivity::print(name, &table.found);
+        }
     };
     if chosen("large") {
         set("640x480, overlap 0.5 to 0.9", asked.unwrap_or(14), &Pinhole::large(), 0.5..0.9, false);
@@ -64,6 +73,8 @@ struct Table {
     wrong: usize,
     none: usize,
     milliseconds: Vec<f64>,
+    /// Answers, and whether each is right.
+    found: Vec<(CoarseAlignment, bool)>,
 }
 
 impl Table {
@@ -78,8 +89,14 @@ impl Table {
             println!("{:4} overlap {:.2} {taken:6.1} ms {}", pair.seed, pair.overlap, in_words(&outcome));
         }
         match outcome {
-            Outcome::Right(millimetre, degree, _) => self.right.push((millimetre, degree)),
-            Outcome::Wrong(..) => self.wrong += 1,
+            Outcome::Right(millimetre, degree, found) => {
+                self.right.push((millimetre, degree));
+                self.found.push((found, true));
+            }
+            Outcome::Wrong(_, _, found) => {
+                self.wrong += 1;
+                self.found.push((found, false));
+            }
             Outcome::None(_) => self.none += 1,
         }
     }

@@ -1,8 +1,10 @@
 //! Pairs of frames of a Kinect aligned from nothing, half by half of the sequence: how many are found, refused, wrong.
 //!
-//! `coarse_real [first|second|both] [loose] [--each]`; `loose` refuses nothing, to see what verdicts rest on.
+//! `coarse_real [first|second|both] [sensitivity] [--each]`; `sensitivity` refuses nothing and tells what each
+//! threshold would decide.
 #![allow(clippy::unwrap_used, clippy::print_stdout, clippy::expect_used, missing_docs)]
 
+mod coarse_sensitivity;
 #[path = "../tests/depth_frames/mod.rs"]
 mod depth_frames;
 
@@ -27,21 +29,25 @@ fn main() {
     let words: Vec<String> = std::env::args().skip(1).collect();
     let has = |word: &str| words.iter().any(|w| w == word);
     let mut options = CoarseOptions::default();
-    if has("loose") {
-        (options.min_agreement, options.max_contradiction, options.min_inside) = (0.0, 1.0, 0.0);
-        (options.min_determined, options.min_overlap, options.max_rival) = (0.0, 0.0, 1.0);
+    if has("sensitivity") {
+        options = coarse_sensitivity::loose(options);
     }
     for (name, range) in [("first half", 0..250), ("second half", 250..500), ("both halves", 0..500)] {
         if !["first", "second", "both"].iter().any(|word| has(word)) || name.split(' ').any(has) {
             match dense_kitchen(range) {
-                Some(sequence) => pairs(name, &sequence, &options, has("--each")),
+                Some(sequence) => {
+                    let tables = pairs(name, &sequence, &options, has("--each"));
+                    if has("sensitivity") {
+                        tables.iter().for_each(|(class, table)| coarse_sensitivity::print(class, &table.found));
+                    }
+                }
                 None => println!("the frames are not there"),
             }
         }
     }
 }
 
-fn pairs(name: &str, sequence: &Sequence, options: &CoarseOptions, each: bool) {
+fn pairs(name: &str, sequence: &Sequence, options: &CoarseOptions, each: bool) -> [(String, Table); 3] {
     let numbers: Vec<usize> = (0..sequence.frames.len()).step_by(STEP).collect();
     let frame = |k: usize| OrganisedFrame::new(&sequence.projection, &sequence.frames[k].points, None).unwrap();
     let frames: Vec<OrganisedFrame> = numbers.iter().map(|k| frame(*k)).collect();
@@ -68,9 +74,13 @@ fn pairs(name: &str, sequence: &Sequence, options: &CoarseOptions, each: bool) {
             table.add(each.then_some(&label), &truth, found, 1e3 * start.elapsed().as_secs_f64());
         }
     }
-    shared.print(&format!("{name}, 40 to 90 % in common"));
-    between.print(&format!("{name}, otherwise"));
-    apart.print(&format!("{name}, below 12 % in common"));
+    let classes = ["40 to 90 % in common", "otherwise", "below 12 % in common"].map(|class| format!("{name}, {class}"));
+    let [a, b, c] = classes;
+    let mut tables = [(a, shared), (b, between), (c, apart)];
+    for (class, table) in &mut tables {
+        table.print(class);
+    }
+    tables
 }
 
 /// Share of the surface of both frames that the other one sees, the smaller one.
@@ -88,6 +98,8 @@ struct Table {
     wrong: usize,
     refused: usize,
     milliseconds: Vec<f64>,
+    /// Answers, and whether each is right.
+    found: Vec<(CoarseAlignment, bool)>,
 }
 
 impl Table {
@@ -110,6 +122,7 @@ impl Table {
                 let right = off < RIGHT_M && turned < RIGHT_DEG;
                 self.right += usize::from(right);
                 self.wrong += usize::from(!right);
+                self.found.push((found.clone(), right));
                 let word = if right { "right" } else { "WRONG" };
                 format!(
                     "{word} {:.1} {turned:.2} inliers {} of {} overlap {:.3} agreement {:.3} contradiction {:.4} inside {:.3} \

@@ -1,7 +1,7 @@
 //! What the registration of organised frames reaches: accuracy and time on simulated pairs (`table`), covariance
 //! (`statistics`), success from far-off starts at half overlap (`success`), errors of real pairs over what is stated of
-//! them (`honesty`), trusted poses that are wrong among thousands of real pairs (`search`), invalid pixels (`invalid`, `invalid real`, `invalid simulated`), real frames (`real`, where the
-//! tests expect them). Without an argument: all.
+//! them (`honesty`), trusted poses that are wrong among thousands of real pairs (`search`), invalid pixels (`invalid`, `invalid real`, `invalid simulated`), what is trusted without
+//! times (`verdicts`, for `cargo xtask sensitivity`), real frames (`real`, where the tests expect them). Without an argument: all.
 #![allow(clippy::unwrap_used, clippy::print_stdout, clippy::expect_used, clippy::cast_lossless)]
 
 #[path = "../../tests/common/mod.rs"]
@@ -16,6 +16,7 @@ mod search;
 mod statistics;
 mod success;
 mod table;
+mod verdicts;
 
 use std::sync::Arc;
 
@@ -48,6 +49,9 @@ fn run() {
     }
     if is_wanted("search") {
         search::print();
+    }
+    if is_wanted("verdicts") {
+        verdicts::print();
     }
     if is_wanted("real") {
         real::print();

@@ -60,17 +60,17 @@ pub fn print() {
 }
 
 /// A pair of prepared frames.
-struct Pair {
-    target: OrganisedFrame,
-    source: OrganisedFrame,
-    truth: Isometry3<f64>,
+pub struct Pair {
+    pub target: OrganisedFrame,
+    pub source: OrganisedFrame,
+    pub truth: Isometry3<f64>,
     /// Bound of the least known motion.
     sigma_m: f64,
     overlap: f64,
 }
 
 impl Pair {
-    fn new(camera: &Pinhole, projection: &Arc<Projection>, k: u64) -> Self {
+    pub fn new(camera: &Pinhole, projection: &Arc<Projection>, k: u64) -> Self {
         let (world_from_target, truth, overlap) = half_overlap(camera, k);
         let (scene, seed) = (Scene::furnished(), 80_000 + 2 * k);
         let world_from_source = world_from_target * truth;

@@ -85,21 +85,17 @@ pub struct CoarseOptions {
     pub max_hypotheses: usize,
     /// Fewest correspondences that agree with the pose. Default 8: what decides are surfaces and free space.
     pub min_inliers: usize,
-    /// Smallest fraction of the smaller cloud that must have a partner. Default 0.28.
+    /// Smallest fraction of the smaller cloud that must have a partner. Default 0.3.
     pub min_overlap: f64,
     /// Smallest fraction of the points in the other cloud's view that must lie on its surface. Default 0.96; 0.04
-    /// less where two fifths of a cloud have a partner, a tenth of the points lie inside what encloses the scene and no rival
-    /// has half the evidence.
+    /// less where two fifths of a cloud have a partner and a tenth of the points lie inside what encloses the scene.
     pub min_agreement: f64,
     /// Largest fraction of points in space that the other camera looked through (see
     /// [`super::CoarseAlignment::contradiction`]). Default 0.012: at the right pose there are hardly any.
-    /// Twice as many may where a tenth of the points lie inside what encloses the scene, 97 % of what should be seen agrees and
-    /// no rival has half the evidence.
     pub max_contradiction: f64,
     /// Smallest fraction of points on both clouds that lie inside what encloses them (see
-    /// [`super::CoarseAlignment::inside`]). Default 0.013: corners of empty rooms are taken for each other. 0 accepts
-    /// them. Two fifths of it suffice where two fifths of a cloud have a partner and 99 % of what should be seen agrees. Clouds
-    /// whose normals have no side always pass.
+    /// [`super::CoarseAlignment::inside`]). Default 0.008: corners of empty rooms are taken for each other. 0 accepts
+    /// them. Clouds whose normals have no side always pass.
     pub min_inside: f64,
     /// Smallest share of the evidence that is lost where the pose slides along what is determined least (see
     /// [`super::CoarseAlignment::determined`]). Default 0.15. 0 lets features decide where surfaces cannot.
@@ -124,10 +120,10 @@ impl Default for CoarseOptions {
             tolerance_voxels: 1.5,
             max_hypotheses: 8,
             min_inliers: 8,
-            min_overlap: 0.28,
+            min_overlap: 0.3,
             min_agreement: 0.96,
             max_contradiction: 0.012,
-            min_inside: 0.013,
+            min_inside: 0.008,
             min_determined: 0.15,
             max_rival: 0.9,
             seed: 1,

@@ -1,0 +1,236 @@
+//! `cargo xtask sensitivity [WORD ...]`: what a statistic says where constants of a crate are other ones.
+//!
+//! A copy of the repository is built once in which every private constant that is a decimal number is read from the
+//! environment; the example then runs with each of them at multiples of its value. What `docs/benchmarks.md` says of constants
+//! comes from here.
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use crate::shell::{Outcome, root};
+
+/// Environment variable with the constant that is another one: `file::NAME=MULTIPLE`.
+const VARIABLE: &str = "CONSTANT_TIMES";
+
+/// Which constants, and which example judges them.
+#[derive(Debug, clap::Args)]
+pub(crate) struct Arguments {
+    /// Constants whose `file::NAME` contains one of these words; all where none is named.
+    words: Vec<String>,
+    /// Crate whose constants they are.
+    #[arg(long, default_value = "icp-registration")]
+    package: String,
+    /// Example of the crate that prints the figures, without times.
+    #[arg(long, default_value = "frame_pairs")]
+    example: String,
+    /// Arguments of the example.
+    #[arg(long = "arguments", default_value = "verdicts")]
+    passed: String,
+    /// What each constant is multiplied by.
+    #[arg(long, value_delimiter = ',', default_values_t = [0.5, 2.0])]
+    multiples: Vec<f64>,
+    /// Only list the constants.
+    #[arg(long)]
+    list: bool,
+}
+
+/// A constant of a file.
+#[derive(Debug, PartialEq, Eq)]
+struct Constant {
+    /// `file::NAME`, the file from the crate's `src` on, without its ending.
+    path: String,
+    value: String,
+}
+
+pub(crate) fn run(arguments: &Arguments) -> Outcome {
+    let folder = root().join("target/sensitivity");
+    let copy = folder.join("rangecam");
+    copy_of_repository(&folder, &copy)?;
+    let source = copy.join("crates").join(&arguments.package).join("src");
+    let asked = |constant: &Constant| {
+        arguments.words.is_empty() || arguments.words.iter().any(|word| constant.path.contains(word.as_str()))
+    };
+    let constants: Vec<Constant> = opened(&source)?.into_iter().filter(asked).collect();
+    if constants.is_empty() {
+        return Err(format!("no constant of {} is named so: {}", arguments.package, arguments.words.join(", ")));
+    }
+    if arguments.list {
+        for constant in &constants {
+            println!("{} = {}", constant.path, constant.value);
+        }
+        return Ok(());
+    }
+    let program = built(&copy, arguments)?;
+    let said = |change: Option<String>| -> Result<String, String> {
+        let mut command = Command::new(&program);
+        command.args(arguments.passed.split_whitespace()).envs(change.map(|change| (VARIABLE, change)));
+        let output = command.output().map_err(|error| format!("{}: {error}", program.display()))?;
+        Ok(String::from_utf8_lossy(&output.stdout).trim_end().to_owned())
+    };
+    let as_it_is = said(None)?;
+    println!("as it is:\n{as_it_is}");
+    for constant in &constants {
+        for multiple in &arguments.multiples {
+            let now = said(Some(format!("{}={multiple}", constant.path)))?;
+            println!("{} = {} times {multiple}: {}", constant.path, constant.value, difference(&as_it_is, &now));
+        }
+    }
+    Ok(())
+}
+
+/// The lines that differ.
+fn difference(before: &str, now: &str) -> String {
+    let mut text = String::new();
+    for line in now.lines().filter(|line| !before.lines().any(|other| other == *line)) {
+        let _ = write!(text, "\n    {line}");
+    }
+    if text.is_empty() { "the same".to_owned() } else { text }
+}
+
+/// All files under version control as they are now, beside a link to what lies beside the repository for reading.
+fn copy_of_repository(folder: &Path, copy: &Path) -> Outcome {
+    let failed = |error: std::io::Error| format!("{}: {error}", copy.display());
+    let listed = Command::new("git").args(["ls-files", "-z", "-co", "--exclude-standard"]).current_dir(root()).output();
+    let listed = listed.map_err(|error| format!("git: {error}"))?.stdout;
+    if copy.exists() {
+        std::fs::remove_dir_all(copy).map_err(failed)?;
+    }
+    for name in String::from_utf8_lossy(&listed).split('\0').filter(|name| root().join(name).is_file()) {
+        let to = copy.join(name);
+        std::fs::create_dir_all(to.parent().unwrap_or(copy)).map_err(failed)?;
+        std::fs::copy(root().join(name), &to).map_err(failed)?;
+    }
+    let (beside, link) = (root().join("../shared"), folder.join("shared"));
+    #[cfg(unix)]
+    if beside.exists() && !link.exists() {
+        std::os::unix::fs::symlink(beside.canonicalize().map_err(failed)?, link).map_err(failed)?;
+    }
+    Ok(())
+}
+
+/// Has every constant of the crate read from the environment; the constants.
+fn opened(source: &Path) -> Result<Vec<Constant>, String> {
+    let mut constants = Vec::new();
+    for file in files(source)? {
+        let failed = |error: std::io::Error| format!("{}: {error}", file.display());
+        let text = std::fs::read_to_string(&file).map_err(failed)?;
+        let name = file.strip_prefix(source).unwrap_or(&file).with_extension("").to_string_lossy().into_owned();
+        let (text, found) = opened_file(&text, &name);
+        std::fs::write(&file, text).map_err(failed)?;
+        constants.extend(found);
+    }
+    let library = source.join("lib.rs");
+    let text = std::fs::read_to_string(&library).map_err(|error| format!("{}: {error}", library.display()))?;
+    let reader = format!(
+        "\npub(crate) fn constant_times(path: &str) -> f64 {{\n    \
+         let change = std::env::var(\"{VARIABLE}\").unwrap_or_default();\n    \
+         let asked = change.split_once('=').filter(|(name, _)| *name == path);\n    \
+         asked.and_then(|(_, multiple)| multiple.parse().ok()).unwrap_or(1.0)\n}}\n"
+    );
+    std::fs::write(&library, text + &reader).map_err(|error| format!("{}: {error}", library.display()))?;
+    constants.sort_by(|a, b| a.path.cmp(&b.path));
+    Ok(constants)
+}
+
+/// A file in which private constants of type f32 or f64 with a number for a value are functions, and these constants.
+fn opened_file(text: &str, file: &str) -> (String, Vec<Constant>) {
+    let found: Vec<(&str, &str, &str)> = text.lines().filter_map(declaration).collect();
+    // A constant that others are made of stays.
+    let is_part = |name: &str| {
+        let others = text.lines().filter(|line| line.contains("const ") && declaration(line).is_none());
+        others.flat_map(|line| line.split(|c: char| !is_of_name(c))).any(|word| word == name)
+    };
+    let found: Vec<_> = found.into_iter().filter(|(name, ..)| !is_part(name)).collect();
+    let lines = text.lines().map(|line| match declaration(line) {
+        Some((name, kind, value)) if found.iter().any(|other| other.0 == name) => format!(
+            "#[allow(non_snake_case)]\nfn {name}() -> {kind} {{\n    static VALUE: std::sync::OnceLock<{kind}> = \
+             std::sync::OnceLock::new();\n    *VALUE.get_or_init(|| {value} * crate::constant_times(\"{file}::{name}\") as \
+             {kind})\n}}"
+        ),
+        _ if line.trim_start().starts_with("//") => line.to_owned(),
+        _ => called(line, &found.iter().map(|other| other.0).collect::<Vec<_>>()),
+    });
+    let constants =
+        found.iter().map(|(name, _, value)| Constant { path: format!("{file}::{name}"), value: (*value).to_owned() });
+    (lines.collect::<Vec<_>>().join("\n") + "\n", constants.collect())
+}
+
+/// Name, type and value of `const NAME: f64 = 0.5;` at the beginning of a line.
+fn declaration(line: &str) -> Option<(&str, &str, &str)> {
+    let (name, rest) = line.strip_prefix("const ")?.split_once(": ")?;
+    let (kind, value) = rest.strip_suffix(';')?.split_once(" = ")?;
+    let is_number = value.replace('_', "").parse::<f64>().is_ok_and(f64::is_finite);
+    (is_number && (kind == "f64" || kind == "f32")).then_some((name, kind, value))
+}
+
+const fn is_of_name(c: char) -> bool {
+    c.is_ascii_alphanumeric() || c == '_'
+}
+
+/// The line with each of these names called as a function, but for those behind a path.
+fn called(line: &str, names: &[&str]) -> String {
+    let mut text = String::new();
+    let mut rest = line;
+    while !rest.is_empty() {
+        let end = rest.find(|c: char| !is_of_name(c)).unwrap_or(rest.len());
+        let (word, behind) = rest.split_at(end);
+        text.push_str(word);
+        let is_other = text[..text.len() - word.len()].ends_with("::");
+        if names.contains(&word) && !is_other {
+            text.push_str("()");
+        }
+        let next = behind.find(is_of_name).unwrap_or(behind.len());
+        text.push_str(&behind[..next]);
+        rest = &behind[next..];
+    }
+    text
+}
+
+fn files(folder: &Path) -> Result<Vec<PathBuf>, String> {
+    let failed = |error: std::io::Error| format!("{}: {error}", folder.display());
+    let mut found = Vec::new();
+    for entry in std::fs::read_dir(folder).map_err(failed)? {
+        let path = entry.map_err(failed)?.path();
+        if path.is_dir() {
+            found.extend(files(&path)?);
+        } else if path.extension().is_some_and(|ending| ending == "rs") {
+            found.push(path);
+        }
+    }
+    Ok(found)
+}
+
+/// The example of the copy, built into the repository's own folder, so that other crates are not built again.
+fn built(copy: &Path, arguments: &Arguments) -> Result<PathBuf, String> {
+    let target = root().join("target");
+    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+    let status = Command::new(cargo)
+        .args(["build", "--package", &arguments.package, "--all-features", "--example", &arguments.example])
+        .current_dir(copy)
+        .env("CARGO_TARGET_DIR", &target)
+        .status()
+        .map_err(|error| format!("cargo: {error}"))?;
+    if !status.success() {
+        return Err(format!("the copy in {} does not build: {status}", copy.display()));
+    }
+    let built = target.join("debug/examples").join(&arguments.example);
+    let kept = root().join("target/sensitivity").join(&arguments.example);
+    std::fs::copy(&built, &kept).map_err(|error| format!("{}: {error}", built.display()))?;
+    Ok(kept)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn private_decimal_constants_are_opened_and_their_uses_called() {
+        let text = "/// Share.\nconst SHARE: f64 = 0.5;\npub const OPEN: f64 = 1.0;\nconst COUNT: usize = 3;\nconst A: f32 = 2.0;\nconst B: f32 = A * 3.0;\nfn f() -> f64 {\n    // SHARE of all\n    SHARE * other::SHARE + MY_SHARE\n}\n";
+        let (opened, constants) = opened_file(text, "folder/file");
+        assert_eq!(constants, [Constant { path: "folder/file::SHARE".to_owned(), value: "0.5".to_owned() }]);
+        assert!(opened.contains("fn SHARE() -> f64"), "{opened}");
+        assert!(opened.contains("    SHARE() * other::SHARE + MY_SHARE"), "{opened}");
+        assert!(opened.contains("// SHARE of all") && opened.contains("const A: f32 = 2.0;"), "{opened}");
+    }
+}

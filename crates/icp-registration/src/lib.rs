@@ -18,6 +18,7 @@ mod normals;
 mod organised;
 pub mod parts;
 mod pose;
+mod pose_graph;
 mod quality;
 mod tracking;
 mod trajectory;
@@ -41,9 +42,8 @@ pub use icp::{
 pub use kernel::RobustKernel;
 #[cfg(feature = "multiview")]
 pub use multiview::{
-    Datum, LoopClosure, PairAgreement, PairAlignment, PairConstraint, PairResidual, Placement, Placements, PointModel,
-    RefusedPair, SharedParameters, Start, StationAdjustment, StationAdjustmentOptions, StationPlacement,
-    StationRegistration, StationRegistrationOptions, SurfacePair, UndeterminedStation, adjust_stations,
+    Datum, LoopClosure, PairAgreement, PairAlignment, Placement, Placements, PointModel, RefusedPair, SharedParameters,
+    Start, StationPlacement, StationRegistration, StationRegistrationOptions, SurfacePair, UndeterminedStation,
     judge_placements, register_stations,
 };
 pub use neighbours::{Neighbour, NeighbourTree};

@@ -1,8 +1,8 @@
 //! Pairs of stations by themselves at the adjusted poses: how loops close, and which pairs contradict them.
 
 use super::alignments::{PairAlignment, RefusedPair, best_partners, without_partners};
+use super::datum::Datum;
 use super::loops::{LoopClosure, contradicting, skeleton};
-use super::pose_graph::Datum;
 use super::registration::StationRegistrationOptions;
 use super::simultaneous::Adjusted;
 use crate::error::Result;

@@ -20,11 +20,11 @@ mod plane_fit;
 mod point_model;
 mod point_residuals;
 mod points;
-mod pose_graph;
 mod precision;
 mod reduction;
 mod regions;
 mod registration;
+mod relative_pose;
 mod rounds;
 mod scatter;
 mod sightings;
@@ -35,11 +35,9 @@ mod tiles;
 mod wide_errors;
 
 pub use alignments::{PairAlignment, RefusedPair};
+pub use datum::Datum;
 pub use loops::LoopClosure;
 pub use placement::{PairAgreement, Placement, Placements, StationPlacement, judge_placements};
 pub use point_model::{PointModel, SharedParameters};
-pub use pose_graph::{
-    Datum, PairConstraint, PairResidual, StationAdjustment, StationAdjustmentOptions, adjust_stations,
-};
 pub use registration::{Start, StationRegistration, StationRegistrationOptions, SurfacePair, UndeterminedStation};
 pub use stations::register_stations;

@@ -98,7 +98,7 @@ impl Placements {
 /// [`Error::Empty`], [`Error::LengthMismatch`], [`Error::NonFinite`], [`Error::NotPositive`] for the input.
 pub fn judge_placements(stations: &[Cloud], world_from_station: &[Isometry3<f64>]) -> Result<Placements> {
     stations.iter().try_for_each(|cloud| cloud.validate("the cloud of a station"))?;
-    super::pose_graph::require_poses(stations.len(), world_from_station)?;
+    super::relative_pose::require_poses(stations.len(), world_from_station)?;
     if let Some(index) = world_from_station.iter().position(|pose| !is_finite(pose)) {
         return Err(Error::NonFinite { what: "poses of the stations", index });
     }

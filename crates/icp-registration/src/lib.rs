@@ -42,9 +42,10 @@ pub use icp::{
 pub use kernel::RobustKernel;
 #[cfg(feature = "multiview")]
 pub use multiview::{
-    Datum, LoopClosure, PairAgreement, PairAlignment, Placement, Placements, PointModel, RefusedPair, SharedParameters,
-    Start, StationPlacement, StationRegistration, StationRegistrationOptions, SurfacePair, UndeterminedStation,
-    judge_placements, register_stations,
+    Datum, FrameRegistration, LoopClosure, PairAgreement, PairAlignment, PlacedFrame, Placement, Placements,
+    PointModel, RefusedPair, SharedParameters, Start, StationPlacement, StationRegistration,
+    StationRegistrationOptions, SurfacePair, UndeterminedStation, UnplacedFrame, judge_placements, register_frames,
+    register_stations,
 };
 pub use neighbours::{Neighbour, NeighbourTree};
 pub use normals::{OrganisedNormalOptions, UnorganisedNormalOptions, organised_normals, unorganised_normals};

@@ -8,6 +8,10 @@ mod datum;
 mod elimination;
 mod equations;
 mod facets;
+mod frame_graph;
+mod frame_pairs;
+mod frame_scale;
+mod frames;
 mod grouping;
 mod loops;
 mod network;
@@ -36,6 +40,7 @@ mod wide_errors;
 
 pub use alignments::{PairAlignment, RefusedPair};
 pub use datum::Datum;
+pub use frames::{FrameRegistration, PlacedFrame, UnplacedFrame, register_frames};
 pub use loops::LoopClosure;
 pub use placement::{PairAgreement, Placement, Placements, StationPlacement, judge_placements};
 pub use point_model::{PointModel, SharedParameters};

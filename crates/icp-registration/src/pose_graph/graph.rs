@@ -11,6 +11,11 @@ use crate::organised::{Field, FieldMatrix, SharedError};
 /// Squared distance (six components) that one in a thousand of right registrations exceeds.
 const LARGEST_SQUARE: f64 = 22.46;
 
+/// Whether a squared Mahalanobis distance (six components) is that of a right registration, at the 99.9 % level.
+pub(crate) fn is_likely(square: f64) -> bool {
+    square < LARGEST_SQUARE
+}
+
 /// An observed relative pose.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Edge {
@@ -58,6 +63,11 @@ impl Default for Graph {
 }
 
 impl Graph {
+    /// Of one pose, which is held.
+    pub(crate) fn at(datum: Isometry3<f64>) -> Self {
+        Self { poses: vec![Relation::exact(datum)], ..Self::default() }
+    }
+
     pub(crate) fn relative(&self, a: usize, b: usize) -> Isometry3<f64> {
         self.poses[a].pose().inverse() * self.poses[b].pose()
     }
@@ -101,7 +111,7 @@ impl Graph {
         predicted.by_field -= edge.a_from_b.by_field;
         let predicted = predicted.total(&self.covariance);
         let square = predicted.mahalanobis_squared(&self.weighed(&edge.a_from_b, edge.alike).random);
-        square.is_some_and(|square| square < LARGEST_SQUARE)
+        square.is_some_and(is_likely)
     }
 
     /// Takes an observation that fits; says whether it did.
@@ -189,7 +199,7 @@ mod tests {
             let random = Uncertain { pose, covariance: Matrix6::identity() * SIGMA * SIGMA };
             Edge { a, b, a_from_b: Relation { random, by_field: ByField::zeros() }, alike: 1.0 }
         };
-        let mut graph = Graph { poses: vec![Relation::exact(truth(0))], ..Graph::default() };
+        let mut graph = Graph::at(truth(0));
         for k in 1..8 {
             graph.add(k - 1, &edge(k - 1, k).a_from_b);
         }

@@ -5,6 +5,6 @@ mod graph;
 mod relation;
 mod uncertain;
 
-pub(crate) use graph::{Edge, Graph};
+pub(crate) use graph::{Edge, Graph, is_likely};
 pub(crate) use relation::Relation;
 pub(crate) use uncertain::{Uncertain, product_jacobians};

@@ -17,6 +17,7 @@ mod normals;
 mod organised;
 pub mod parts;
 mod pose;
+mod pose_graph;
 mod quality;
 mod tracking;
 mod trajectory;
@@ -40,10 +41,10 @@ pub use icp::{
 pub use kernel::RobustKernel;
 #[cfg(feature = "multiview")]
 pub use multiview::{
-    Datum, LoopClosure, PairAgreement, PairAlignment, PairConstraint, PairResidual, Placement, Placements, PointModel,
-    RefusedPair, SharedParameters, Start, StationAdjustment, StationAdjustmentOptions, StationPlacement,
-    StationRegistration, StationRegistrationOptions, SurfacePair, UndeterminedStation, adjust_stations,
-    judge_placements, register_stations,
+    Datum, FrameRegistration, LoopClosure, PairAgreement, PairAlignment, PlacedFrame, Placement, Placements,
+    PointModel, RefusedPair, SharedParameters, Start, StationPlacement, StationRegistration,
+    StationRegistrationOptions, SurfacePair, UndeterminedStation, UnplacedFrame, judge_placements, register_frames,
+    register_stations,
 };
 pub use neighbours::{Neighbour, NeighbourTree};
 pub use normals::{OrganisedNormalOptions, UnorganisedNormalOptions, organised_normals, unorganised_normals};

@@ -1,8 +1,8 @@
 //! Pairs of stations by themselves at the adjusted poses: how loops close, and which pairs contradict them.
 
 use super::alignments::{PairAlignment, RefusedPair, best_partners, without_partners};
+use super::datum::Datum;
 use super::loops::{LoopClosure, contradicting, skeleton};
-use super::pose_graph::Datum;
 use super::registration::StationRegistrationOptions;
 use super::simultaneous::Adjusted;
 use crate::error::Result;
@@ -34,7 +34,9 @@ pub(super) fn checked(
     let mut refused: Vec<RefusedPair> = thin.iter().map(without_partners).collect();
     let tolerance_m = options.loop_tolerance_m.unwrap_or(LOOP_TOLERANCE * radius_m);
     let held = datum.held_station();
-    let skeleton = skeleton(&pairs, (held, adjusted.state.poses[held]), count, tolerance_m, radius_m);
+    // Far above the error of a right pair and far below that of a wrong one.
+    let closes = |closure: &LoopClosure| closure.translation_m + radius_m * closure.rotation_rad <= tolerance_m;
+    let skeleton = skeleton(&pairs, (held, adjusted.state.poses[held]), count, &closes);
     let (sound, wrong): (Vec<_>, Vec<_>) = pairs.into_iter().zip(skeleton.sound).partition(|(_, sound)| *sound);
     refused.extend(wrong.iter().map(|(pair, _)| contradicting(pair)));
     Ok(Checked { pairs: sound.into_iter().map(|(pair, _)| pair).collect(), refused, loops: skeleton.loops })

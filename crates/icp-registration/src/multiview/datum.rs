@@ -2,8 +2,18 @@
 
 use nalgebra::{DMatrix, Isometry3, Matrix6, Translation3, UnitQuaternion, Vector3, Vector6};
 
-use super::pose_graph::Datum;
 use crate::pose::pose_difference;
+
+/// What fixes the common frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Datum {
+    /// One station keeps its pose.
+    Station(usize),
+    /// None is preferred: positions and attitudes are on average those at the start, which makes the covariances as
+    /// small as they can be.
+    InnerConstraints,
+}
 
 impl Datum {
     /// The station that is held while the network is solved; inner constraints are applied afterwards.

@@ -1,9 +1,10 @@
 //! Loops of pairs: how they close, and which pairs are wrong.
 
-use nalgebra::{Isometry3, Matrix6, Vector6};
+use nalgebra::{Isometry3, Vector6};
 
 use super::alignments::{PairAlignment, RefusedPair};
-use crate::pose::{inverse_covariance_transport, pose_difference, symmetrised};
+use crate::pose::pose_difference;
+use crate::pose_graph::Uncertain;
 
 /// A way from station to station and back.
 #[derive(Debug, Clone, PartialEq)]
@@ -19,48 +20,34 @@ pub struct LoopClosure {
     pub mahalanobis: f64,
 }
 
-/// A relative pose with covariance.
-type Relative = (Isometry3<f64>, Matrix6<f64>);
-
-/// `a_from_c` from `a_from_b` and `b_from_c`.
-fn chained(first: &Relative, second: &Relative) -> Relative {
-    let (r1, r2) = (first.0.rotation.to_rotation_matrix().into_inner(), second.0.rotation.to_rotation_matrix());
-    // t = t1 + R1 t2 and R = R1 R2: dt = dt1 - R1 [t2]x dtheta1 + R1 dt2, dtheta = R2^T dtheta1 + dtheta2.
-    let (mut by_first, mut by_second) = (Matrix6::identity(), Matrix6::identity());
-    by_first.fixed_view_mut::<3, 3>(0, 3).copy_from(&(-r1 * second.0.translation.vector.cross_matrix()));
-    by_first.fixed_view_mut::<3, 3>(3, 3).copy_from(&r2.into_inner().transpose());
-    by_second.fixed_view_mut::<3, 3>(0, 0).copy_from(&r1);
-    let covariance = by_first * first.1 * by_first.transpose() + by_second * second.1 * by_second.transpose();
-    (first.0 * second.0, symmetrised(&covariance))
-}
-
 /// The pair as the step from station `from`: `from_from_other`, and the other station.
-fn step(pair: &PairAlignment, from: usize) -> (usize, Relative) {
-    let (pose, covariance) = (pair.result.target_from_source, pair.result.covariance);
-    if pair.target == from {
-        (pair.source, (pose, covariance))
-    } else {
-        (pair.target, (pose.inverse(), inverse_covariance_transport(&pose, &covariance)))
-    }
+fn step(pair: &PairAlignment, from: usize) -> (usize, Uncertain) {
+    let step = Uncertain { pose: pair.result.target_from_source, covariance: pair.result.covariance };
+    if pair.target == from { (pair.source, step) } else { (pair.target, step.inverse()) }
 }
 
 fn closure(pairs: &[PairAlignment], first: usize, way: &[usize]) -> LoopClosure {
-    let (mut at, mut total): (usize, Relative) = (first, (Isometry3::identity(), Matrix6::zeros()));
+    let (mut at, mut total) = (first, Uncertain::exact(Isometry3::identity()));
     let mut stations = vec![first];
     for &pair in way {
         let (next, relative) = step(&pairs[pair], at);
-        total = chained(&total, &relative);
+        total = total.then(&relative);
         at = next;
         stations.push(next);
     }
     stations.pop();
-    let v: Vector6<f64> = pose_difference(&Isometry3::identity(), &total.0);
-    let mahalanobis = total.1.cholesky().map_or(f64::INFINITY, |factor| v.dot(&factor.solve(&v)).max(0.0).sqrt());
+    misclosure(stations, &total)
+}
+
+/// How far from coming back a way is.
+fn misclosure(stations: Vec<usize>, total: &Uncertain) -> LoopClosure {
+    let v: Vector6<f64> = pose_difference(&Isometry3::identity(), &total.pose);
+    let square = total.covariance.cholesky().map_or(f64::INFINITY, |factor| v.dot(&factor.solve(&v)));
     LoopClosure {
         stations,
         translation_m: v.fixed_rows::<3>(0).norm(),
         rotation_rad: v.fixed_rows::<3>(3).norm(),
-        mahalanobis,
+        mahalanobis: square.max(0.0).sqrt(),
     }
 }
 
@@ -85,23 +72,31 @@ fn triangles(pairs: &[PairAlignment]) -> Vec<[usize; 3]> {
 }
 
 /// What the loops say about the pairs.
+#[derive(Default)]
 pub(super) struct Skeleton {
+    /// The pairs of the tree, from its root outwards.
+    pub tree: Vec<usize>,
+    reached_by: Vec<Option<(usize, usize)>>,
     /// For each pair whether the others agree with it.
     pub sound: Vec<bool>,
     /// Triangles, and each pair outside the tree with the tree's way between its stations.
     pub loops: Vec<LoopClosure>,
 }
 
-/// Which pairs agree with the tree of those that most loops confirm, and how the loops close.
-///
-/// `tolerance_m`: how far a loop may fail to close, rotations at `lever_m`; far above the error of a right pair and far
-/// below that of a wrong one.
+impl Skeleton {
+    /// Whether the tree leads to a station, other than its root.
+    pub(super) fn reaches(&self, station: usize) -> bool {
+        self.reached_by[station].is_some()
+    }
+}
+
+/// Which pairs agree with the tree of those that most loops confirm, and how the loops close; `closes`: whether that is near
+/// enough.
 pub(super) fn skeleton(
     pairs: &[PairAlignment],
     root: (usize, Isometry3<f64>),
     stations: usize,
-    tolerance_m: f64,
-    lever_m: f64,
+    closes: &dyn Fn(&LoopClosure) -> bool,
 ) -> Skeleton {
     let mut votes = vec![0_i64; pairs.len()];
     let mut loops = Vec::new();
@@ -109,9 +104,8 @@ pub(super) fn skeleton(
         let first = pairs[triangle[0]].target;
         let way = ordered(pairs, first, triangle);
         let closure = closure(pairs, first, &way);
-        let closes = closure.translation_m + lever_m * closure.rotation_rad <= tolerance_m;
         for pair in triangle {
-            votes[pair] += if closes { 1 } else { -1 };
+            votes[pair] += if closes(&closure) { 1 } else { -1 };
         }
         loops.push(closure);
     }
@@ -122,27 +116,28 @@ pub(super) fn skeleton(
         key(b).cmp(&key(a)).then(pairs[b].result.overlap.total_cmp(&pairs[a].result.overlap)).then(a.cmp(&b))
     });
     let mut poses = vec![None; stations];
-    let mut reached_by = vec![None; stations];
+    let (mut reached_by, mut tree) = (vec![None; stations], Vec::new());
     poses[root.0] = Some(root.1);
     while let Some(&next) =
         order.iter().find(|&&k| poses[pairs[k].target].is_some() != poses[pairs[k].source].is_some())
     {
         let pair = &pairs[next];
         let from = if poses[pair.target].is_some() { pair.target } else { pair.source };
-        let (to, (relative, _)) = step(pair, from);
-        poses[to] = poses[from].map(|pose: Isometry3<f64>| pose * relative);
+        let (to, relative) = step(pair, from);
+        poses[to] = poses[from].map(|pose: Isometry3<f64>| pose * relative.pose);
         reached_by[to] = Some((from, next));
+        tree.push(next);
     }
     let sound = pairs.iter().map(|pair| match (poses[pair.target], poses[pair.source]) {
         (Some(target), Some(source)) => {
-            let v = pose_difference(&(target.inverse() * source), &pair.result.target_from_source);
-            v.fixed_rows::<3>(0).norm() + lever_m * v.fixed_rows::<3>(3).norm() <= tolerance_m
+            let back = Uncertain::exact(source.inverse() * target);
+            closes(&misclosure(vec![pair.target, pair.source], &step(pair, pair.target).1.then(&back)))
         }
         _ => false,
     });
     let sound = sound.collect();
     loops.extend(long_loops(pairs, &reached_by));
-    Skeleton { sound, loops }
+    Skeleton { tree, reached_by, sound, loops }
 }
 
 /// The three pairs in the order in which they lead from `first` back to it.

@@ -8,6 +8,10 @@ mod datum;
 mod elimination;
 mod equations;
 mod facets;
+mod frame_graph;
+mod frame_pairs;
+mod frame_scale;
+mod frames;
 mod grouping;
 mod loops;
 mod network;
@@ -20,11 +24,11 @@ mod plane_fit;
 mod point_model;
 mod point_residuals;
 mod points;
-mod pose_graph;
 mod precision;
 mod reduction;
 mod regions;
 mod registration;
+mod relative_pose;
 mod rounds;
 mod scatter;
 mod sightings;
@@ -35,11 +39,10 @@ mod tiles;
 mod wide_errors;
 
 pub use alignments::{PairAlignment, RefusedPair};
+pub use datum::Datum;
+pub use frames::{FrameRegistration, PlacedFrame, UnplacedFrame, register_frames};
 pub use loops::LoopClosure;
 pub use placement::{PairAgreement, Placement, Placements, StationPlacement, judge_placements};
 pub use point_model::{PointModel, SharedParameters};
-pub use pose_graph::{
-    Datum, PairConstraint, PairResidual, StationAdjustment, StationAdjustmentOptions, adjust_stations,
-};
 pub use registration::{Start, StationRegistration, StationRegistrationOptions, SurfacePair, UndeterminedStation};
 pub use stations::register_stations;

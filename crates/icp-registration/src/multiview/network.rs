@@ -3,8 +3,8 @@
 use adjust::{Adjustment, BlockId, Covariance, FunctionObservation, ParameterBlock, SolveOptions};
 use nalgebra::{DVector, Isometry3, Matrix6, Vector6};
 
-use super::pose_graph::{adjustment, relative_pose_parts};
 use super::reduction::{Meeting, Reduced};
+use super::relative_pose::{adjustment, relative_pose_parts};
 use crate::error::Result;
 
 /// Poses and shared parameters.

@@ -80,6 +80,11 @@ pub struct Placements {
 }
 
 impl Placements {
+    /// The verdicts that the agreements of all pairs give.
+    pub(super) fn of(count: usize, pairs: Vec<PairAgreement>) -> Self {
+        Self { stations: judged(count, &pairs), pairs }
+    }
+
     /// Indices of the stations that are probably in the wrong place.
     pub fn doubtful(&self) -> impl Iterator<Item = usize> + '_ {
         let doubtful = |station: &&StationPlacement| station.verdict == Placement::Doubtful;
@@ -98,14 +103,14 @@ impl Placements {
 /// [`Error::Empty`], [`Error::LengthMismatch`], [`Error::NonFinite`], [`Error::NotPositive`] for the input.
 pub fn judge_placements(stations: &[Cloud], world_from_station: &[Isometry3<f64>]) -> Result<Placements> {
     stations.iter().try_for_each(|cloud| cloud.validate("the cloud of a station"))?;
-    super::pose_graph::require_poses(stations.len(), world_from_station)?;
+    super::relative_pose::require_poses(stations.len(), world_from_station)?;
     if let Some(index) = world_from_station.iter().position(|pose| !is_finite(pose)) {
         return Err(Error::NonFinite { what: "poses of the stations", index });
     }
     let clouds = prepared(stations);
     let pairs =
         pairs(stations.len(), |station| clouds[station].as_ref().map(|cloud| (cloud, world_from_station[station])));
-    Ok(Placements { stations: judged(stations.len(), &pairs), pairs })
+    Ok(Placements::of(stations.len(), pairs))
 }
 
 /// The clouds in voxels; `None` for one that fills too few.

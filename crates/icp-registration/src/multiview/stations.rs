@@ -8,13 +8,13 @@ use rayon::prelude::*;
 
 use super::alignments::Overlap;
 use super::check::{Checked, checked};
+use super::datum::Datum;
 use super::network::{Network, State};
 use super::patch_size;
 use super::patches::Surface;
 use super::placement::{Placements, judge_placements};
 use super::point_model::{SharedParameters, checked_prior};
 use super::points::StationPoints;
-use super::pose_graph::Datum;
 use super::precision;
 use super::registration::{Start, StationRegistration, StationRegistrationOptions, SurfacePair, UndeterminedStation};
 use super::rounds::{Course, Surfaces};
@@ -146,7 +146,7 @@ fn validate(
     }
     stations.iter().try_for_each(|cloud| cloud.validate("the cloud of a station"))?;
     if let Start::Poses(poses) = start {
-        super::pose_graph::require_poses(stations.len(), poses)?;
+        super::relative_pose::require_poses(stations.len(), poses)?;
         if let Some(index) = poses.iter().position(|pose| !is_finite(pose)) {
             return Err(Error::NonFinite { what: "poses of the stations", index });
         }

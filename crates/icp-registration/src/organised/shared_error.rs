@@ -164,9 +164,20 @@ fn of_degrees(values: &[f64; DEGREE + 1]) -> Field {
 pub(crate) struct Influence {
     /// Derivative of the registered pose by the coefficients.
     pub(crate) pose: ByField,
+    /// The scale of the source's ranges against the target's.
+    #[cfg_attr(not(feature = "multiview"), allow(dead_code))]
+    pub(crate) scale: RelativeScale,
     /// Normal equations of the coefficients, the pose eliminated.
     normal: FieldMatrix,
     right: Field,
+}
+
+/// Logarithm of the scale of ranges against those of another frame, and its variance by the random part of the residuals.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(not(feature = "multiview"), allow(dead_code))]
+pub(crate) struct RelativeScale {
+    pub(crate) logarithm: f64,
+    pub(crate) variance: f64,
 }
 
 /// One source node on its target plane.
@@ -177,6 +188,8 @@ pub(super) struct Sighting {
     variance: f64,
     by_pose: Vector6<f64>,
     by_field: Field,
+    /// By the logarithm of the scale of the source's ranges.
+    by_scale: f64,
     /// Whether the sample before is its neighbour.
     follows: bool,
 }
@@ -221,7 +234,8 @@ impl OrganisedFrame {
         let normal = Vector3::new(plane[0], plane[1], plane[2]);
         let point = Vector3::from(partner.point.map(f64::from));
         // Points move along their rays, and planes with them.
-        let of_source = source.field(partner.source as usize) * normal.dot(&(point - source_place));
+        let by_scale = normal.dot(&(point - source_place));
+        let of_source = source.field(partner.source as usize) * by_scale;
         let of_target = self.field(partner.node as usize) * plane[3];
         let variance = f64::from(partner.variance());
         // Planes that have learnt from other frames lie between the errors of these.
@@ -231,6 +245,7 @@ impl OrganisedFrame {
             variance,
             by_pose: frame.derivative(&point, &normal),
             by_field: of_source - of_target,
+            by_scale,
             follows,
         }
     }
@@ -280,6 +295,7 @@ fn reduced(sightings: &[Sighting], to_tangent: &Matrix6<f64>, scratch: &mut Vec<
     let reach = BIWEIGHT * scale(sightings.iter().map(|s| s.residual), scratch)?.max(random);
     let (mut matrix, mut cross, mut gradient) = (Matrix6::zeros(), ByField::zeros(), Vector6::zeros());
     let (mut normal, mut right) = (FieldMatrix::zeros(), Field::zeros());
+    let (mut scale, mut scale_right, mut scale_cross) = (0.0, 0.0, Vector6::zeros());
     for s in sightings {
         let u = s.residual / reach;
         let weight = (1.0 - u * u).max(0.0).powi(2) / (s.variance * random * random);
@@ -289,11 +305,19 @@ fn reduced(sightings: &[Sighting], to_tangent: &Matrix6<f64>, scratch: &mut Vec<
         normal.ger(weight, &s.by_field, &s.by_field, 1.0);
         gradient.axpy(weight * residual, &s.by_pose, 1.0);
         right.axpy(weight * residual, &s.by_field, 1.0);
+        scale += weight * s.by_scale * s.by_scale;
+        scale_right += weight * residual * s.by_scale;
+        scale_cross.axpy(weight * s.by_scale, &s.by_pose, 1.0);
     }
-    let pose = -matrix.cholesky()?.solve(&cross);
+    let factor = matrix.cholesky()?;
+    let pose = -factor.solve(&cross);
+    let followed = factor.solve(&scale_cross);
+    let scale = scale - scale_cross.dot(&followed);
+    let logarithm = (scale_right - gradient.dot(&followed)) / scale;
     Some(Influence {
         normal: normal + cross.transpose() * pose,
         right: right + pose.transpose() * gradient,
+        scale: RelativeScale { logarithm, variance: 1.0 / scale },
         pose: to_tangent * pose,
     })
 }

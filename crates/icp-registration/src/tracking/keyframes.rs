@@ -2,11 +2,11 @@
 
 use nalgebra::Isometry3;
 
-use super::graph::Graph;
-use super::relation::Relation;
 use crate::cloud::Cloud;
 use crate::coarse::FeatureCloud;
 use crate::organised::OrganisedFrame;
+use crate::pose_graph::Graph;
+use crate::pose_graph::Relation;
 
 /// Fields of the thumbnails.
 pub(super) const THUMBNAIL: [usize; 2] = [16, 12];

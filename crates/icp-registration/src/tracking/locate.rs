@@ -3,16 +3,17 @@
 use nalgebra::{Isometry3, Matrix6, Vector6};
 
 use super::keyframes::SAMPLE;
-use super::motion::{Uncertain, diagonal};
+use super::motion::diagonal;
 use super::options::TrackerOptions;
 use super::prediction::{Grounds, Last, Prediction};
-use super::relation::Relation;
 use super::tracked::LossReason;
 use super::tracker::Tracker;
 use super::velocity::Velocity;
 use crate::error::Error;
 use crate::organised::{Agreement, ByField, Field, FrameAligner, Influence, OrganisedFrame};
 use crate::pose::{step_pose, symmetrised};
+use crate::pose_graph::Relation;
+use crate::pose_graph::Uncertain;
 
 /// Keyframes tried beside the reference.
 const NEIGHBOURS: usize = 2;

@@ -8,8 +8,6 @@
 //! is seen again. Errors that all frames of the sensor share are carried along apart from random ones: they do not average
 //! out, but are the same wherever the camera comes again.
 
-mod adjustment;
-mod graph;
 mod imu;
 mod keyframes;
 mod locate;
@@ -17,7 +15,6 @@ mod motion;
 mod options;
 mod prediction;
 mod reference;
-mod relation;
 mod returns;
 mod tracked;
 mod tracker;

@@ -2,10 +2,11 @@
 
 use nalgebra::{Isometry3, Matrix6};
 
-use super::motion::{MotionPrior, Uncertain};
+use super::motion::MotionPrior;
 use super::velocity::Velocity;
 use crate::organised::ByField;
 use crate::pose::pose_difference;
+use crate::pose_graph::Uncertain;
 
 /// Frames after a loss for which the last velocity is carried on.
 const CARRIED_FRAMES: usize = 5;

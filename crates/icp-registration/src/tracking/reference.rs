@@ -2,13 +2,13 @@
 
 use nalgebra::{Isometry3, Matrix6};
 
-use super::graph::Edge;
 use super::locate::{Measured, agreeing};
-use super::motion::Uncertain;
-use super::relation::Relation;
 use super::tracker::Tracker;
 use crate::organised::{ByField, Influence};
 use crate::pose::step_pose;
+use crate::pose_graph::Edge;
+use crate::pose_graph::Relation;
+use crate::pose_graph::Uncertain;
 
 /// What another keyframe must see more of the frame than the reference to take its place.
 const ADVANTAGE: f64 = 0.05;

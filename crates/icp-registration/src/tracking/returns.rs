@@ -2,9 +2,9 @@
 
 use nalgebra::Isometry3;
 
-use super::graph::Edge;
 use super::tracker::Tracker;
 use crate::organised::OrganisedFrame;
+use crate::pose_graph::Edge;
 
 /// Share of the frame that may lie on the older keyframe, within what a path can be off. With 0.2 and 0.3 the paths of 500
 /// frames of a Kinect were the same within 2 mm.

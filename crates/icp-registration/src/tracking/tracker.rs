@@ -6,16 +6,17 @@ use nalgebra::{Isometry3, Matrix6};
 
 use super::keyframes::Keyframes;
 use super::locate::{Fix, Measured};
-use super::motion::{MotionPrior, Uncertain, diagonal};
+use super::motion::{MotionPrior, diagonal};
 use super::options::{Fusion, TrackerOptions};
 use super::prediction::{Grounds, Last, Prediction};
-use super::relation::Relation;
 use super::tracked::{LossReason, TrackedPose, TrackingState};
 use super::velocity::Velocity;
 use crate::cloud::Cloud;
 use crate::error::{Error, Result};
 use crate::icp::DegeneracyPolicy;
 use crate::organised::{ByField, FieldMatrix, FrameAligner, Influence, OrganisedFrame, Projection, SharedError};
+use crate::pose_graph::Relation;
+use crate::pose_graph::Uncertain;
 
 /// Share of the first frame's radius beyond whose standard deviation motions count as undetermined. Registration alone
 /// asks for 1/300; in a stream, poses that are centimetres weak for a moment are still worth more than a loss.

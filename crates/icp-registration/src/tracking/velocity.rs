@@ -7,8 +7,9 @@
 
 use nalgebra::{Matrix6, Vector6};
 
-use super::motion::{Uncertain, diagonal, exponential, logarithm, product_jacobians};
+use super::motion::{diagonal, exponential, logarithm};
 use crate::pose::{pose_difference, symmetrised};
+use crate::pose_graph::{Uncertain, product_jacobians};
 
 /// Velocity of a camera at a pose.
 #[derive(Debug, Clone, Copy)]

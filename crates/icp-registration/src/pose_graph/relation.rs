@@ -2,54 +2,54 @@
 
 use nalgebra::{Isometry3, Matrix6};
 
-use super::motion::{Uncertain, inverse_jacobian, product_jacobians};
+use super::uncertain::{Uncertain, inverse_jacobian, product_jacobians};
 use crate::organised::{ByField, Field, FieldMatrix};
 use crate::pose::{step_pose, symmetrised};
 
 /// A pose `a_from_b` for the field that is assumed for the sensor's shared error: with the covariance of what is random
 /// beside it, and its derivative by the coefficients of the field.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Relation {
-    pub(super) random: Uncertain,
-    pub(super) by_field: ByField,
+pub(crate) struct Relation {
+    pub(crate) random: Uncertain,
+    pub(crate) by_field: ByField,
 }
 
 impl Relation {
-    pub(super) fn exact(pose: Isometry3<f64>) -> Self {
+    pub(crate) fn exact(pose: Isometry3<f64>) -> Self {
         Self { random: Uncertain::exact(pose), by_field: ByField::zeros() }
     }
 
-    pub(super) fn pose(&self) -> &Isometry3<f64> {
+    pub(crate) fn pose(&self) -> &Isometry3<f64> {
         &self.random.pose
     }
 
-    pub(super) fn inverse(&self) -> Self {
+    pub(crate) fn inverse(&self) -> Self {
         let by_field = inverse_jacobian(&self.random.pose) * self.by_field;
         Self { random: self.random.inverse(), by_field }
     }
 
     /// `a_from_c` from this `a_from_b` and `b_from_c` of independent random errors.
-    pub(super) fn then(&self, b_from_c: &Self) -> Self {
+    pub(crate) fn then(&self, b_from_c: &Self) -> Self {
         let (by_first, by_second) = product_jacobians(self.pose(), b_from_c.pose());
         let by_field = by_first * self.by_field + by_second * b_from_c.by_field;
         Self { random: self.random.then(&b_from_c.random), by_field }
     }
 
     /// The same for a field that is `change` more.
-    pub(super) fn moved(&self, change: &Field) -> Self {
+    pub(crate) fn moved(&self, change: &Field) -> Self {
         let pose = step_pose(self.pose(), &(self.by_field * change));
         Self { random: Uncertain { pose, ..self.random }, ..*self }
     }
 
     /// With the variances of a field that no other registration has, as a random error.
-    pub(super) fn with_own(&self, variances: &Field) -> Self {
+    pub(crate) fn with_own(&self, variances: &Field) -> Self {
         let own = self.by_field * FieldMatrix::from_diagonal(variances) * self.by_field.transpose();
         let covariance = symmetrised(&(self.random.covariance + own));
         Self { random: Uncertain { covariance, ..self.random }, ..*self }
     }
 
     /// With the covariance of all errors; `field`: that of the coefficients.
-    pub(super) fn total(&self, field: &FieldMatrix) -> Uncertain {
+    pub(crate) fn total(&self, field: &FieldMatrix) -> Uncertain {
         let shared: Matrix6<f64> = self.by_field * field * self.by_field.transpose();
         Uncertain { covariance: symmetrised(&(self.random.covariance + shared)), ..self.random }
     }

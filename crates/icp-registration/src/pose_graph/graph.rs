@@ -11,32 +11,37 @@ use crate::organised::{Field, FieldMatrix, SharedError};
 /// Squared distance (six components) that one in a thousand of right registrations exceeds.
 const LARGEST_SQUARE: f64 = 22.46;
 
+/// Whether a squared Mahalanobis distance (six components) is that of a right registration, at the 99.9 % level.
+pub(crate) fn is_likely(square: f64) -> bool {
+    square < LARGEST_SQUARE
+}
+
 /// An observed relative pose.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Edge {
-    pub(super) a: usize,
-    pub(super) b: usize,
-    pub(super) a_from_b: Relation,
+pub(crate) struct Edge {
+    pub(crate) a: usize,
+    pub(crate) b: usize,
+    pub(crate) a_from_b: Relation,
     /// What its covariance is multiplied by, since others share a part of its errors.
-    pub(super) alike: f64,
+    pub(crate) alike: f64,
 }
 
 /// Keyframes and what was observed between them.
 #[derive(Debug, Clone)]
-pub(super) struct Graph {
+pub(crate) struct Graph {
     /// World from keyframe.
-    pub(super) poses: Vec<Relation>,
-    pub(super) edges: Vec<Edge>,
+    pub(crate) poses: Vec<Relation>,
+    pub(crate) edges: Vec<Edge>,
     /// Variances of the coefficients of the field that all registrations share, and of those that single ones see beside it.
-    pub(super) common: Field,
+    pub(crate) common: Field,
     own: Field,
     /// The field that is assumed, as closed loops tell it, and its covariance.
-    pub(super) field: Field,
-    pub(super) covariance: FieldMatrix,
+    pub(crate) field: Field,
+    pub(crate) covariance: FieldMatrix,
     /// By how much observations scatter more than their covariances say, as closed loops tell it; 1 or more.
-    pub(super) factor: f64,
+    pub(crate) factor: f64,
     /// Whether any loop has been closed.
-    pub(super) closed: bool,
+    pub(crate) closed: bool,
     /// Whether there are observations that the poses do not know of yet.
     open: bool,
 }
@@ -58,16 +63,21 @@ impl Default for Graph {
 }
 
 impl Graph {
-    pub(super) fn relative(&self, a: usize, b: usize) -> Isometry3<f64> {
+    /// Of one pose, which is held.
+    pub(crate) fn at(datum: Isometry3<f64>) -> Self {
+        Self { poses: vec![Relation::exact(datum)], ..Self::default() }
+    }
+
+    pub(crate) fn relative(&self, a: usize, b: usize) -> Isometry3<f64> {
         self.poses[a].pose().inverse() * self.poses[b].pose()
     }
 
-    pub(super) fn joined(&self, a: usize, b: usize) -> bool {
+    pub(crate) fn joined(&self, a: usize, b: usize) -> bool {
         self.edges.iter().any(|e| (e.a, e.b) == (a, b) || (e.a, e.b) == (b, a))
     }
 
     /// Sets what is known of the shared error before any loop.
-    pub(super) fn set_shared_error(&mut self, shared: &SharedError) {
+    pub(crate) fn set_shared_error(&mut self, shared: &SharedError) {
         (self.common, self.own) = (shared.common(), shared.own());
         if !self.closed {
             self.covariance = FieldMatrix::from_diagonal(&self.common);
@@ -75,7 +85,7 @@ impl Graph {
     }
 
     /// Adds a pose that is measured from another one, and the observation; returns its index.
-    pub(super) fn add(&mut self, from: usize, from_from_new: &Relation) -> usize {
+    pub(crate) fn add(&mut self, from: usize, from_from_new: &Relation) -> usize {
         let b = self.poses.len();
         self.poses.push(self.from(from, from_from_new));
         self.edges.push(Edge { a: from, b, a_from_b: *from_from_new, alike: 1.0 });
@@ -83,29 +93,29 @@ impl Graph {
     }
 
     /// A pose that is measured from another one.
-    pub(super) fn from(&self, from: usize, from_from_new: &Relation) -> Relation {
+    pub(crate) fn from(&self, from: usize, from_from_new: &Relation) -> Relation {
         self.poses[from].then(&self.weighed(from_from_new, 1.0))
     }
 
     /// An observation with all random errors that it has, as loops tell them.
-    pub(super) fn weighed(&self, observation: &Relation, alike: f64) -> Relation {
+    pub(crate) fn weighed(&self, observation: &Relation, alike: f64) -> Relation {
         let mut weighed = observation.with_own(&self.own);
         weighed.random.covariance *= self.factor * alike;
         weighed
     }
 
     /// Whether an observation fits what is known already, at the 99.9 % level.
-    pub(super) fn fits(&self, edge: &Edge) -> bool {
+    pub(crate) fn fits(&self, edge: &Edge) -> bool {
         // The random errors of the two poses have most of their past in common, so their sum is a generous bound.
         let mut predicted = self.poses[edge.a].inverse().then(&self.poses[edge.b]);
         predicted.by_field -= edge.a_from_b.by_field;
         let predicted = predicted.total(&self.covariance);
         let square = predicted.mahalanobis_squared(&self.weighed(&edge.a_from_b, edge.alike).random);
-        square.is_some_and(|square| square < LARGEST_SQUARE)
+        square.is_some_and(is_likely)
     }
 
     /// Takes an observation that fits; says whether it did.
-    pub(super) fn offer(&mut self, edge: &Edge) -> bool {
+    pub(crate) fn offer(&mut self, edge: &Edge) -> bool {
         let fits = self.fits(edge);
         if fits {
             self.take([*edge]);
@@ -114,7 +124,7 @@ impl Graph {
     }
 
     /// Takes observations that fit.
-    pub(super) fn take(&mut self, edges: impl IntoIterator<Item = Edge>) {
+    pub(crate) fn take(&mut self, edges: impl IntoIterator<Item = Edge>) {
         let before = self.edges.len();
         self.edges.extend(edges);
         self.open |= self.edges.len() > before;
@@ -122,7 +132,7 @@ impl Graph {
 
     /// Adjusts all poses where observations beyond a chain have come in since the last time; what the assumed field has
     /// changed by.
-    pub(super) fn adjust_if_closed(&mut self) -> Field {
+    pub(crate) fn adjust_if_closed(&mut self) -> Field {
         let before = self.field;
         if std::mem::take(&mut self.open) {
             self.closed = true;
@@ -133,7 +143,7 @@ impl Graph {
 
     /// Takes keyframe `k` (not the first) out. What joined its neighbours through it joins them to the one that was
     /// best determined from it; returns that one and its pose in the frame of `k`, numbered as before.
-    pub(super) fn remove(&mut self, k: usize) -> Option<(usize, Relation)> {
+    pub(crate) fn remove(&mut self, k: usize) -> Option<(usize, Relation)> {
         let from_k =
             |e: &Edge| if e.a == k { (e.b, e.a_from_b, e.alike) } else { (e.a, e.a_from_b.inverse(), e.alike) };
         let mut joined: Vec<(usize, Relation, f64)> =
@@ -160,7 +170,7 @@ impl Graph {
 mod tests {
     #![allow(clippy::unwrap_used)]
 
-    use super::super::motion::Uncertain;
+    use super::super::uncertain::Uncertain;
     use super::*;
     use crate::organised::ByField;
     use crate::pose::{pose_difference, step_pose};
@@ -189,7 +199,7 @@ mod tests {
             let random = Uncertain { pose, covariance: Matrix6::identity() * SIGMA * SIGMA };
             Edge { a, b, a_from_b: Relation { random, by_field: ByField::zeros() }, alike: 1.0 }
         };
-        let mut graph = Graph { poses: vec![Relation::exact(truth(0))], ..Graph::default() };
+        let mut graph = Graph::at(truth(0));
         for k in 1..8 {
             graph.add(k - 1, &edge(k - 1, k).a_from_b);
         }

@@ -7,8 +7,8 @@
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix6, Vector6};
 
 use super::graph::{Edge, Graph};
-use super::motion::{Uncertain, inverse_jacobian, product_jacobians};
 use super::relation::Relation;
+use super::uncertain::{Uncertain, inverse_jacobian, product_jacobians};
 use crate::organised::{COEFFICIENTS, Field, FieldMatrix};
 use crate::pose::{pose_difference, step_pose, symmetrised};
 
@@ -28,7 +28,7 @@ struct Normal {
 
 impl Graph {
     /// Adjusts all poses; leaves them as they are where the observations do not determine them.
-    pub(super) fn adjust(&mut self) {
+    pub(crate) fn adjust(&mut self) {
         let mut poses: Vec<Isometry3<f64>> = self.poses.iter().map(|p| *p.pose()).collect();
         let mut field = self.field;
         let mut last = None;

@@ -1,0 +1,131 @@
+//! The poses of all frames from the pairs that can be trusted: one graph, without pairs that contradict it.
+
+use nalgebra::{Isometry3, Matrix6};
+
+use super::alignments::PairAlignment;
+use super::frame_pairs::FramePair;
+use super::loops::{LoopClosure, Skeleton, skeleton};
+use crate::organised::SharedError;
+use crate::pose::symmetrised;
+use crate::pose_graph::{Edge, Graph, is_likely};
+
+/// Rounds in which pairs that do not fit go and those that fit again come back; two were enough on all frames tried.
+const ROUNDS: usize = 4;
+
+/// Poses of the frames that pairs connect.
+pub(super) struct FrameGraph {
+    graph: Graph,
+    /// The frame of each pose of the graph; the first one is the datum.
+    pub members: Vec<usize>,
+    /// Whether each pair fits.
+    pub fits: Vec<bool>,
+    pub loops: Vec<LoopClosure>,
+    pub shared_error: SharedError,
+}
+
+impl FrameGraph {
+    /// The largest part of the frames that pairs connect. `known`: of the shared error.
+    pub(super) fn new(count: usize, pairs: &[FramePair], known: Option<SharedError>) -> Self {
+        let mut shared_error = SharedError::none();
+        pairs.iter().for_each(|pair| shared_error.learn(&pair.influence));
+        let shared_error = known.unwrap_or(shared_error);
+        let alignments: Vec<PairAlignment> = pairs.iter().map(|pair| with_shared(pair, &shared_error)).collect();
+        let (members, skeleton) = largest_part(count, &alignments);
+        let mut graph = Graph::at(Isometry3::identity());
+        graph.set_shared_error(&shared_error);
+        let mut found = Self { graph, members, fits: vec![false; pairs.len()], loops: skeleton.loops, shared_error };
+        found.grow(pairs, &skeleton.tree);
+        found.settle(pairs);
+        found
+    }
+
+    pub(super) fn index(&self, frame: usize) -> Option<usize> {
+        self.members.iter().position(|member| *member == frame)
+    }
+
+    /// `a_from_b` of two frames that are placed.
+    pub(super) fn relative(&self, a: usize, b: usize) -> Option<Isometry3<f64>> {
+        Some(self.graph.relative(self.index(a)?, self.index(b)?))
+    }
+
+    /// Pose in the frame of the datum, with its covariance.
+    pub(super) fn pose(&self, frame: usize) -> Option<(Isometry3<f64>, Matrix6<f64>)> {
+        let total = self.graph.poses[self.index(frame)?].total(&self.graph.covariance);
+        Some((total.pose, total.covariance))
+    }
+
+    /// By how much pairs scatter beyond their covariances, as a factor of these.
+    pub(super) fn factor(&self) -> f64 {
+        self.graph.factor
+    }
+
+    /// Poses along the tree.
+    fn grow(&mut self, pairs: &[FramePair], tree: &[usize]) {
+        self.members.truncate(1);
+        for &k in tree {
+            let PairAlignment { target, source, .. } = pairs[k].alignment;
+            let Edge { a_from_b, .. } = pairs[k].edge(0, 0);
+            let (from, to, step) = match self.index(target) {
+                Some(from) => (from, source, a_from_b),
+                None => (self.index(source).unwrap_or(0), target, a_from_b.inverse()),
+            };
+            self.graph.add(from, &step);
+            self.members.push(to);
+            self.fits[k] = true;
+        }
+    }
+
+    /// Adjusts the poses with all pairs that fit.
+    fn settle(&mut self, pairs: &[FramePair]) {
+        let edges: Vec<Option<Edge>> = pairs
+            .iter()
+            .map(|p| Some(p.edge(self.index(p.alignment.target)?, self.index(p.alignment.source)?)))
+            .collect();
+        for _ in 0..ROUNDS {
+            let fits: Vec<bool> =
+                edges.iter().map(|edge| edge.as_ref().is_some_and(|edge| self.graph.fits(edge))).collect();
+            if self.graph.closed && fits == self.fits {
+                break;
+            }
+            self.fits = fits;
+            let chosen = edges.iter().zip(&self.fits).filter(|(_, fits)| **fits).filter_map(|(edge, _)| *edge);
+            self.graph.edges.clear();
+            self.graph.take(counted(chosen.collect()));
+            self.graph.adjust_if_closed();
+        }
+    }
+}
+
+/// Half of the errors of a registration are those of either frame, which all registrations of that frame share.
+fn counted(edges: Vec<Edge>) -> Vec<Edge> {
+    let of = |pose: usize| edges.iter().filter(|edge| edge.a == pose || edge.b == pose).count() as f64;
+    edges.iter().map(|edge| Edge { alike: of(edge.a).midpoint(of(edge.b)), ..*edge }).collect()
+}
+
+/// The alignment with the covariance of all its errors.
+pub(super) fn with_shared(pair: &FramePair, shared: &SharedError) -> PairAlignment {
+    let mut alignment = pair.alignment.clone();
+    let covariance = alignment.result.covariance + shared.covariance(&pair.influence.pose);
+    alignment.result.covariance = symmetrised(&covariance);
+    alignment
+}
+
+/// The frames of the largest part that pairs connect, its first frame first, and the tree from there.
+fn largest_part(count: usize, pairs: &[PairAlignment]) -> (Vec<usize>, Skeleton) {
+    let closes = |closure: &LoopClosure| is_likely(closure.mahalanobis.powi(2));
+    let mut best: Option<(Vec<usize>, Skeleton)> = None;
+    let mut seen = vec![false; count];
+    for root in 0..count {
+        if seen[root] {
+            continue;
+        }
+        let found = skeleton(pairs, (root, Isometry3::identity()), count, &closes);
+        let mut members = vec![root];
+        members.extend((0..count).filter(|&k| k != root && found.reaches(k)));
+        members.iter().for_each(|&k| seen[k] = true);
+        if best.as_ref().is_none_or(|(most, _)| members.len() > most.len()) {
+            best = Some((members, found));
+        }
+    }
+    best.unwrap_or_default()
+}

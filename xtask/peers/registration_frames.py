@@ -14,18 +14,23 @@ CELL = 0.15
 OPEN3D_VOXEL = 0.05
 
 
-def small_gicp(kind, voxel, iterations=50):
+def small_gicp_result(kind, voxel, reach=REACH, cell=CELL, iterations=50):
     import small_gicp
 
     options = {
         "registration_type": kind,
-        "voxel_resolution": CELL,
+        "voxel_resolution": cell,
         "downsampling_resolution": voxel,
-        "max_correspondence_distance": REACH,
+        "max_correspondence_distance": reach,
         "num_threads": 1,
         "max_iterations": iterations,
     }
-    return lambda target, source: small_gicp.align(target, source, **options).T_target_source
+    return lambda target, source: small_gicp.align(target, source, **options)
+
+
+def small_gicp(kind, voxel):
+    work = small_gicp_result(kind, voxel)
+    return lambda target, source: work(target, source).T_target_source
 
 
 def cloud_of(o3d, points, voxel=OPEN3D_VOXEL, neighbours=20):

@@ -18,7 +18,10 @@ impl Environment {
         match Self::new(name) {
             Ok(environment) => Some(environment),
             Err(message) => {
-                println!("── peers of {name}: not to be had, skipped\n{message}");
+                println!(
+                    "── peers of {name}: not to be had, skipped; they need python3 with venv, and the Python Package \
+                     Index once\n{message}"
+                );
                 None
             }
         }
@@ -68,35 +71,39 @@ impl Example {
 
     /// Runs it on one thread and reads lines of `name figure...`; a name that comes again counts as well.
     pub(crate) fn call(&self, arguments: &[&str]) -> Result<Figures, String> {
-        let text = output(Command::new(&self.0).args(arguments).env("RAYON_NUM_THREADS", "1"))?;
-        let mut figures = Figures::default();
-        for line in text.lines() {
-            let mut words = line.split_whitespace();
-            let Some(name) = words.next() else { continue };
-            *figures.count.entry(name.to_owned()).or_default() += 1;
-            let values = words.filter_map(|word| word.parse().ok()).collect();
-            figures.first.entry(name.to_owned()).or_insert(values);
-        }
-        Ok(figures)
+        Ok(Figures::read(&output(Command::new(&self.0).args(arguments).env("RAYON_NUM_THREADS", "1"))?))
     }
 }
 
-/// What an example printed.
+/// What an example printed: by name, the figures of all lines that begin with it.
 #[derive(Default)]
-pub(crate) struct Figures {
-    first: BTreeMap<String, Vec<f64>>,
-    count: BTreeMap<String, usize>,
-}
+pub(crate) struct Figures(BTreeMap<String, Vec<Vec<f64>>>);
 
 impl Figures {
-    /// A figure by name and place in its line; NaN where there is none.
+    pub(crate) fn read(text: &str) -> Self {
+        let mut figures = Self::default();
+        for line in text.lines() {
+            let mut words = line.split_whitespace();
+            let Some(name) = words.next() else { continue };
+            let values = words.filter_map(|word| word.parse().ok()).collect();
+            figures.0.entry(name.to_owned()).or_default().push(values);
+        }
+        figures
+    }
+
+    /// A figure by name and place in its first line; NaN where there is none.
     pub(crate) fn get(&self, name: &str, place: usize) -> f64 {
-        self.first.get(name).and_then(|values| values.get(place)).copied().unwrap_or(f64::NAN)
+        self.lines(name).first().and_then(|values| values.get(place)).copied().unwrap_or(f64::NAN)
     }
 
     /// How many lines begin with the name.
     pub(crate) fn count(&self, name: &str) -> usize {
-        self.count.get(name).copied().unwrap_or(0)
+        self.lines(name).len()
+    }
+
+    /// The figures of all lines that begin with the name.
+    pub(crate) fn lines(&self, name: &str) -> &[Vec<f64>] {
+        self.0.get(name).map_or(&[], Vec::as_slice)
     }
 }
 
@@ -106,7 +113,7 @@ pub(crate) fn capture(name: &str) -> Option<PathBuf> {
     if path.exists() {
         return Some(path);
     }
-    println!("── {name}: not here, skipped");
+    println!("── {name}: not here, skipped; its place is {}", path.display());
     None
 }
 

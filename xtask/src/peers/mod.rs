@@ -7,6 +7,7 @@ mod adjust;
 mod environment;
 mod phase;
 mod registration;
+mod registration_real;
 mod scattering;
 mod table;
 
@@ -21,6 +22,8 @@ enum Stage {
     Phase,
     /// `small_gicp`, Open3D, KISS-ICP and KISS-Matcher beside `icp-registration`.
     Registration,
+    /// The same on real captures beside the repository, `small_gicp` at settings sought on a half of them.
+    RegistrationReal,
     /// `scipy`, FFTW and OpenCV beside `scattering-deconvolution`.
     Scattering,
 }
@@ -42,6 +45,7 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome {
             Stage::Adjust => adjust::run(arguments.runs.max(1))?,
             Stage::Phase => phase::run(arguments.runs.max(1))?,
             Stage::Registration => registration::run(arguments.runs.max(1))?,
+            Stage::RegistrationReal => registration_real::run(arguments.runs.max(1))?,
             Stage::Scattering => scattering::run(arguments.runs.max(1))?,
         }
     }

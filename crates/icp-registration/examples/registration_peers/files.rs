@@ -50,7 +50,16 @@ impl Frames {
 
     /// Points of a frame.
     pub fn points(&self, frame: usize) -> Result<Vec<[f64; 3]>, Failure> {
-        let bytes = fs::read(self.folder.join(format!("{frame:03}.f32")))?;
+        self.triples(&format!("{frame:03}.f32"))
+    }
+
+    /// Directions of the pixels of a camera with a lens.
+    pub fn directions(&self) -> Result<Vec<[f64; 3]>, Failure> {
+        self.triples("directions.f32")
+    }
+
+    fn triples(&self, name: &str) -> Result<Vec<[f64; 3]>, Failure> {
+        let bytes = fs::read(self.folder.join(name))?;
         let values: Vec<f64> = bytes.as_chunks().0.iter().map(|&four| f64::from(f32::from_ne_bytes(four))).collect();
         Ok(values.as_chunks().0.to_vec())
     }
@@ -86,10 +95,19 @@ impl Writer {
     }
 
     pub fn frame(&mut self, points: &[[f64; 3]], world_from_camera: &Isometry3<f64>) -> Outcome {
-        let bytes: Vec<u8> = points.as_flattened().iter().flat_map(|&value| (value as f32).to_ne_bytes()).collect();
-        fs::write(self.folder.join(format!("{:03}.f32", self.poses.len())), bytes)?;
+        self.triples(&format!("{:03}.f32", self.poses.len()), points)?;
         self.poses.push(*world_from_camera);
         Ok(())
+    }
+
+    /// Directions of the pixels of a camera with a lens.
+    pub fn directions(&self, directions: &[[f64; 3]]) -> Outcome {
+        self.triples("directions.f32", directions)
+    }
+
+    fn triples(&self, name: &str, triples: &[[f64; 3]]) -> Outcome {
+        let bytes: Vec<u8> = triples.as_flattened().iter().flat_map(|&value| (value as f32).to_ne_bytes()).collect();
+        Ok(fs::write(self.folder.join(name), bytes)?)
     }
 
     /// Writes the poses, and others where a method needs some to start from.

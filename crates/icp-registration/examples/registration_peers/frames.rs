@@ -4,14 +4,14 @@ use std::path::Path;
 use std::sync::Arc;
 
 use icp_registration::{
-    Cloud, FrameAligner, FrameAlignmentOptions, IcpOptions, OrganisedFrame, OrganisedNormalOptions, Projection,
-    VoxelAlignmentOptions, VoxelCloud, VoxelOptions, align, organised_normals,
+    Cloud, FrameAligner, FrameAlignmentOptions, IcpOptions, IcpResult, OrganisedFrame, OrganisedNormalOptions,
+    Projection, VoxelAlignmentOptions, VoxelCloud, VoxelOptions, align, organised_normals,
 };
 use nalgebra::Isometry3;
 
-use crate::Outcome;
 use crate::files::Frames;
 use crate::pairs::{Points, cloud, compare};
+use crate::{Failure, Outcome};
 
 /// What counts as a good pair: degrees and millimetres.
 const LIMITS: [f64; 2] = [1.0, 30.0];
@@ -26,12 +26,7 @@ pub fn run(folder: &Path, rest: &[&str]) -> Outcome {
     if images {
         organised(&frames, &pairs)?;
     }
-    compare("voxels", &frames, &pairs, LIMITS, |target, source| {
-        let options = VoxelOptions::default();
-        let [target, source] = [target, source].map(|points| VoxelCloud::new(&cloud(points), &options));
-        let result = target?.align(&source?, &Isometry3::identity(), &VoxelAlignmentOptions::default())?;
-        Ok(result.target_from_source)
-    })?;
+    compare("voxels", &frames, &pairs, LIMITS, |target, source| Ok(by_voxels(target, source)?.target_from_source))?;
     match (methods, images) {
         (["all"], true) => compare("align", &frames, &pairs, LIMITS, |target, source| {
             let [target, source] = [target, source].map(|points| with_normals(&frames, points));
@@ -45,15 +40,27 @@ pub fn run(folder: &Path, rest: &[&str]) -> Outcome {
     }
 }
 
+/// From lists of points to the pose, from the identity.
+pub fn by_voxels(target: &Points, source: &Points) -> Result<IcpResult, icp_registration::Error> {
+    let options = VoxelOptions::default();
+    let [target, source] = [target, source].map(|points| VoxelCloud::new(&cloud(points), &options));
+    target?.align(&source?, &Isometry3::identity(), &VoxelAlignmentOptions::default())
+}
+
 fn with_normals(frames: &Frames, points: &Points) -> Result<Cloud, icp_registration::Error> {
     let normals =
         organised_normals(points, frames.camera.width, frames.camera.height, &OrganisedNormalOptions::default())?;
     Cloud::from_frame(points, Some(&normals), None)
 }
 
-pub fn projection(frames: &Frames) -> Result<Arc<Projection>, icp_registration::Error> {
+pub fn projection(frames: &Frames) -> Result<Arc<Projection>, Failure> {
     let camera = &frames.camera;
-    Projection::pinhole(camera.width, camera.height, camera.focal_px, camera.centre_px).map(Arc::new)
+    let projection = if camera.focal_px[0] > 0.0 {
+        Projection::pinhole(camera.width, camera.height, camera.focal_px, camera.centre_px)
+    } else {
+        Projection::from_directions(camera.width, camera.height, &frames.directions()?)
+    };
+    Ok(Arc::new(projection?))
 }
 
 /// As streams do it: memory of the pair before is used again.
@@ -65,7 +72,7 @@ pub struct Stream {
 
 impl Stream {
     /// `points`: any frame of the camera.
-    pub fn new(frames: &Frames, points: &Points) -> Result<Self, icp_registration::Error> {
+    pub fn new(frames: &Frames, points: &Points) -> Result<Self, Failure> {
         let target = OrganisedFrame::new(&projection(frames)?, points, None)?;
         let mut aligner = FrameAligner::new(FrameAlignmentOptions::default())?;
         aligner.align(&target, &target, &Isometry3::identity())?;
@@ -73,15 +80,15 @@ impl Stream {
     }
 
     /// From raw points to the pose, from the identity.
-    pub fn align(&mut self, target: &Points, source: &Points) -> Result<Isometry3<f64>, icp_registration::Error> {
+    pub fn align(&mut self, target: &Points, source: &Points) -> Result<IcpResult, icp_registration::Error> {
         self.target.update(target, None)?;
         self.source.update(source, None)?;
-        Ok(self.aligner.align(&self.source, &self.target, &Isometry3::identity())?.target_from_source)
+        self.aligner.align(&self.source, &self.target, &Isometry3::identity())
     }
 }
 
 fn organised(frames: &Frames, pairs: &[[usize; 2]]) -> Outcome {
     let Some(&[first, _]) = pairs.first() else { return Ok(()) };
     let mut stream = Stream::new(frames, &frames.points(first)?)?;
-    compare("organised", frames, pairs, LIMITS, |target, source| Ok(stream.align(target, source)?))
+    compare("organised", frames, pairs, LIMITS, |target, source| Ok(stream.align(target, source)?.target_from_source))
 }

@@ -54,7 +54,7 @@ pub fn run(folder: &Path) -> Outcome {
 }
 
 fn on(pool: &ThreadPool, stream: &mut Stream, [target, source]: &[Points; 2]) -> Result<Isometry3<f64>, Failure> {
-    Ok(pool.install(|| stream.align(target, source))?)
+    Ok(pool.install(|| stream.align(target, source))?.target_from_source)
 }
 
 /// What comes out, and the seconds it took.

@@ -24,8 +24,8 @@ fn folder(name: &str) -> Option<PathBuf> {
     folder.exists().then_some(folder)
 }
 
-const FOCAL: [f64; 2] = [585.0, 525.0];
-const CENTRES: [[f64; 2]; 2] = [[320.0, 240.0], [319.5, 239.5]];
+pub const FOCAL: [f64; 2] = [585.0, 525.0];
+pub const CENTRES: [[f64; 2]; 2] = [[320.0, 240.0], [319.5, 239.5]];
 
 /// The first `count` frames of a Kinect's way through a kitchen; poses good to about 8 mm.
 pub fn kitchen(count: usize) -> Option<Sequence> {

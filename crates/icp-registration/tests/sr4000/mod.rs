@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use icp_registration::{OrganisedFrame, Projection};
 
-const SIZE: [usize; 2] = [176, 144];
+pub const SIZE: [usize; 2] = [176, 144];
 /// Dimmer pixels are wrapped or lost.
 const LEAST_AMPLITUDE: f32 = 100.0;
 /// Lens: pixel, principal distance and point in millimetre, k1, k2, p1, p2.
@@ -38,7 +38,7 @@ pub fn points(frames: &[usize]) -> Option<[Vec<[f64; 3]>; 2]> {
 }
 
 /// Unit direction of a pixel's ray in the camera frame.
-fn direction(pixel: usize) -> [f64; 3] {
+pub fn direction(pixel: usize) -> [f64; 3] {
     let x = ((pixel % SIZE[0]) as f64 - (SIZE[0] as f64 - 1.0) / 2.0) * PIXEL_MM - POINT_MM[0];
     let y = ((SIZE[1] as f64 - 1.0) / 2.0 - (pixel / SIZE[0]) as f64) * PIXEL_MM - POINT_MM[1];
     let square = x * x + y * y;

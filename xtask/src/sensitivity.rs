@@ -61,7 +61,7 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome {
         }
         return Ok(());
     }
-    let program = built(&copy, arguments)?;
+    let program = built(&folder, &copy, arguments)?;
     let said = |change: Option<String>| -> Result<String, String> {
         let mut command = Command::new(&program);
         command.args(arguments.passed.split_whitespace()).envs(change.map(|change| (VARIABLE, change)));
@@ -201,9 +201,9 @@ fn files(folder: &Path) -> Result<Vec<PathBuf>, String> {
     Ok(found)
 }
 
-/// The example of the copy, built into the repository's own folder, so that other crates are not built again.
-fn built(copy: &Path, arguments: &Arguments) -> Result<PathBuf, String> {
-    let target = root().join("target");
+/// The example of the copy. It has a folder of its own for what is built: cargo would take its crates for the repository's.
+fn built(folder: &Path, copy: &Path, arguments: &Arguments) -> Result<PathBuf, String> {
+    let target = folder.join("target");
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let status = Command::new(cargo)
         .args(["build", "--package", &arguments.package, "--all-features", "--example", &arguments.example])
@@ -214,10 +214,7 @@ fn built(copy: &Path, arguments: &Arguments) -> Result<PathBuf, String> {
     if !status.success() {
         return Err(format!("the copy in {} does not build: {status}", copy.display()));
     }
-    let built = target.join("debug/examples").join(&arguments.example);
-    let kept = root().join("target/sensitivity").join(&arguments.example);
-    std::fs::copy(&built, &kept).map_err(|error| format!("{}: {error}", built.display()))?;
-    Ok(kept)
+    Ok(target.join("debug/examples").join(&arguments.example))
 }
 
 #[cfg(test)]

@@ -1,9 +1,9 @@
 //! Trusted poses that are wrong, sought among thousands of real pairs from the identity.
 //!
 //! The reference has errors of its own. A pair that is registered again from the reference's pose tells a second minimum;
-//! where it ends in the same one, the pixels tell whose pose is wrong: those that lie clearly in front of what the other
-//! image saw contradict it. A pose that is fitted to these pixels always suits them better than one that is not: how much
-//! better is told by the right pairs.
+//! where it ends in the same one, two witnesses tell whose pose is wrong. Pixels that lie clearly in front of what the other
+//! image saw contradict a pose; one that is fitted to these pixels always suits them better than one that is not, and how
+//! much better is told by the right pairs. The frames between the two lead from one to the other by other pixels.
 
 use icp_registration::{FrameAligner, FrameAlignmentOptions, OrganisedFrame, pose_difference};
 use nalgebra::{Isometry3, Matrix6, Point3, Vector6};
@@ -24,9 +24,13 @@ const IN_FRONT_M: f64 = 0.01;
 /// Of so many right pairs one tells how much better than the reference a fitted pose suits the pixels, and the share of
 /// them that a reference must exceed to be called wrong.
 const EVERY: usize = 5;
+const SHARE: f64 = 0.95;
 /// The reference jumps behind this frame; pairs across it say nothing of the usual.
 const JUMP: usize = 121;
-const SHARE: f64 = 0.95;
+/// Steps on the way by the frames between the two of a pair: all gaps are multiples.
+const WAY: usize = 5;
+/// The way speaks for a pose where it ends so many times nearer to it than to the other; it has errors of its own.
+const NEARER: f64 = 2.0;
 
 pub fn print() {
     let Some(sequence) = dense_kitchen(0..500) else {
@@ -60,13 +64,14 @@ pub fn print() {
             over += usize::from(sigmas > WRONG_SIGMA);
             let found = &result.target_from_source;
             if is_right {
-                if trusted % EVERY == 0 && !across(a, a + gap) {
+                if trusted % EVERY == 0 && !(a <= JUMP && JUMP < a + gap) {
                     usual.push(excess(pair, found, &truth));
                 }
                 continue;
             }
             wrong += 1;
             let end = end_from(&truth, &mut aligner, [&frames[a], &frames[a + gap]], found);
+            let way = by_way(&mut aligner, &frames[a..=a + gap], found, &truth);
             let line = format!(
                 "{a} {}: {:.0} mm off of {:.0} ({:.2} of the motion found), {sigmas:.1} standard deviations, overlap {:.2}, rms {:.1} mm, {end}",
                 a + gap,
@@ -76,7 +81,7 @@ pub fn print() {
                 result.overlap,
                 1e3 * result.rms_m,
             );
-            judged.push((line, excess(pair, found, &truth)));
+            judged.push((line, way, excess(pair, found, &truth)));
         }
         print_judged(&judged, usual);
     }
@@ -98,18 +103,37 @@ fn end_from(
     format!("from the reference {minimum} within {:.0} mm", 1e3 * apart(found))
 }
 
-/// Says of each wrong pair, with what the reference exceeds the pose in contradicting pixels, whose pose is wrong.
-fn print_judged(judged: &[(String, f64)], mut usual: Vec<f64>) {
+/// How far from the pose and from the reference the way by frames between the two ends, metre.
+fn by_way(
+    aligner: &mut FrameAligner,
+    frames: &[OrganisedFrame],
+    found: &Isometry3<f64>,
+    reference: &Isometry3<f64>,
+) -> [f64; 2] {
+    let mut pose = Isometry3::identity();
+    for pair in frames.iter().step_by((frames.len() - 1) / WAY).collect::<Vec<_>>().windows(2) {
+        let Ok(step) = aligner.align(pair[1], pair[0], &Isometry3::identity()) else { return [f64::NAN; 2] };
+        pose *= step.target_from_source;
+    }
+    [found, reference].map(|other| pose_difference(&pose, other).fixed_rows::<3>(0).norm())
+}
+
+/// Says of each wrong pair what both witnesses tell, and whose pose is wrong if they do not contradict each other.
+fn print_judged(judged: &[(String, [f64; 2], f64)], mut usual: Vec<f64>) {
     usual.sort_by(f64::total_cmp);
     let most = usual.get((SHARE * usual.len() as f64) as usize).copied().unwrap_or(f64::NAN);
-    for (line, excess) in judged {
-        let whose = match excess {
-            excess if *excess > most => "the reference is wrong",
-            excess if *excess < 0.0 => "THE POSE IS WRONG",
+    for (line, [here, there], excess) in judged {
+        let (for_pose, against) = (*excess > most || NEARER * here < *there, *excess < 0.0 || NEARER * there < *here);
+        let whose = match (for_pose, against) {
+            (true, false) => "the reference is wrong",
+            (false, true) => "THE POSE IS WRONG",
             _ => "UNDECIDED",
         };
         println!(
-            "{line}, reference contradicted by {:.1} % more (right pairs: to {:.1}): {whose}",
+            "{line}; by the frames between {:.0} mm from the pose and {:.0} from the reference; this contradicted by {:.1} % \
+             more (right pairs up to {:.1}): {whose}",
+            1e3 * here,
+            1e3 * there,
             100.0 * excess,
             100.0 * most
         );
@@ -130,7 +154,7 @@ fn contradicted([target, source]: [&DepthFrame; 2], target_from_source: &Isometr
             let point = there_from_here * Point3::from(point);
             let Some(depth) = nearest_depth(there, &point) else { continue };
             seen += 1;
-            against += usize::from(-point.z < depth - front() * depth * depth);
+            against += usize::from(-point.z < depth - IN_FRONT_M * depth * depth);
         }
     }
     f64::from(against as u32) / f64::from(seen as u32)
@@ -149,13 +173,4 @@ fn nearest_depth(frame: &DepthFrame, point: &Point3<f64>) -> Option<f64> {
     // `min` takes the number where the other is none.
     let nearest = block.fold(f64::INFINITY, f64::min);
     depth(col, row).is_finite().then_some(nearest)
-}
-
-fn across(target: usize, source: usize) -> bool {
-    target <= JUMP && source > JUMP
-}
-
-fn front() -> f64 {
-    static FRONT: std::sync::OnceLock<f64> = std::sync::OnceLock::new();
-    *FRONT.get_or_init(|| std::env::var("FRONT").map_or(IN_FRONT_M, |v| v.parse().unwrap()))
 }

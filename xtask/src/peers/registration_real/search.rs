@@ -26,7 +26,7 @@ pub(super) fn settings(stage: &Stage, pairs: &[Pair]) -> Result<Vec<(String, Str
     let [scale, _] = best_and_fastest(&runs, &scales);
     let mut chosen = vec![(best.clone(), format!("{}, most often right", words(&best)))];
     if fastest == best {
-        chosen[0].1.push_str(" and fastest of those");
+        chosen[0].1.push_str(", and the fastest as often right");
     } else {
         chosen.push((fastest.clone(), format!("{}, fastest as often right", words(&fastest))));
     }

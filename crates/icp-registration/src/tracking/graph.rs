@@ -27,9 +27,8 @@ pub(super) struct Graph {
     /// World from keyframe.
     pub(super) poses: Vec<Relation>,
     pub(super) edges: Vec<Edge>,
-    /// Variances of the coefficients of the field that all registrations share, and of those that single ones see beside it.
-    pub(super) common: Field,
-    own: Field,
+    /// The sensor's shared error before any loop.
+    pub(super) shared: SharedError,
     /// The field that is assumed, as closed loops tell it, and its covariance.
     pub(super) field: Field,
     pub(super) covariance: FieldMatrix,
@@ -46,8 +45,7 @@ impl Default for Graph {
         Self {
             poses: Vec::new(),
             edges: Vec::new(),
-            common: Field::zeros(),
-            own: Field::zeros(),
+            shared: SharedError::none(),
             field: Field::zeros(),
             covariance: FieldMatrix::zeros(),
             factor: 1.0,
@@ -68,9 +66,9 @@ impl Graph {
 
     /// Sets what is known of the shared error before any loop.
     pub(super) fn set_shared_error(&mut self, shared: &SharedError) {
-        (self.common, self.own) = (shared.common(), shared.own());
+        self.shared = *shared;
         if !self.closed {
-            self.covariance = FieldMatrix::from_diagonal(&self.common);
+            self.covariance = shared.of_field();
         }
     }
 
@@ -89,7 +87,7 @@ impl Graph {
 
     /// An observation with all random errors that it has, as loops tell them.
     pub(super) fn weighed(&self, observation: &Relation, alike: f64) -> Relation {
-        let mut weighed = observation.with_own(&self.own);
+        let mut weighed = *observation;
         weighed.random.covariance *= self.factor * alike;
         weighed
     }
@@ -243,7 +241,7 @@ mod tests {
     #[test]
     fn a_loop_tells_the_field_that_its_registrations_share() {
         let shared = SharedError::known(&[5e-3, 2e-3, 1e-3]);
-        let sigma = shared.common().map(f64::sqrt);
+        let sigma = shared.everywhere().map(f64::sqrt);
         let (mut nees, mut before, mut after, runs) = (0.0, 0.0, 0.0, 200);
         for seed in 0..runs {
             let mut random = Pcg64::seed_from_u64(10_000 + seed);

@@ -95,6 +95,13 @@ impl SharedError {
         Self { everywhere, ..Self::default() }
     }
 
+    /// The same, all of which differs from place to place.
+    #[cfg(test)]
+    pub(crate) fn differing(sigma: &[f64]) -> Self {
+        let Self { everywhere, local, .. } = Self::known(sigma);
+        Self { everywhere: local, local: everywhere, ..Self::default() }
+    }
+
     /// Standard deviation of the coefficients of each degree, metre of range or 1/metre of inverse depth.
     pub fn sigma(&self) -> [f64; DEGREE + 1] {
         std::array::from_fn(|degree| (self.everywhere[degree] + self.local[degree]).sqrt())

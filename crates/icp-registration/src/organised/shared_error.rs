@@ -35,11 +35,10 @@ const MAD: f64 = 1.4826;
 const BIWEIGHT: f64 = 4.685;
 /// Standard deviations by which squares must exceed what noise lets expect (of one degree of freedom: 4 % by chance).
 const SIGNIFICANCE: f64 = 2.0;
-/// Share of an estimated variance that all registrations have in common. Residuals do not tell it: those of registrations
-/// that follow each other are of the same surfaces as well as of the same sensor. Paths hardly hang on it, what is stated of
-/// them does: with 0.25, 0.5, 0.75 and 1, 500 frames of a Kinect are tracked with 31, 30, 29 and 27 mm, and squared errors
-/// reach up to 6.2, 6.4, 7.2 and 14 of their variances.
-const IN_COMMON: f64 = 0.5;
+/// Share of an estimated variance that loops may tell. Residuals do not tell it: those of registrations that follow each
+/// other are of the same surfaces as well as of the same sensor. With 0, 0.1, 0.25, 0.5 and 0.75, 500 frames of a Kinect are
+/// tracked with 34, 27, 27, 27 and 27 mm, and squared errors reach up to 2.6, 2.9, 3.3, 4.5 and 6.2 of their variances.
+const EVERYWHERE: f64 = 0.25;
 /// Least random part, in standard deviations of the nodes: below, frames are copies of each other.
 const LEAST_RANDOM: f64 = 0.1;
 
@@ -64,9 +63,10 @@ fn degrees() -> impl Iterator<Item = [usize; 2]> {
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct SharedError {
-    /// Of the coefficients of each degree: what all registrations have in common, and what each has of its own.
-    common: [f64; DEGREE + 1],
-    own: [f64; DEGREE + 1],
+    /// Of the coefficients of each degree: what is the same everywhere, and what differs from place to place, though
+    /// neighbours share it.
+    everywhere: [f64; DEGREE + 1],
+    local: [f64; DEGREE + 1],
     registrations: usize,
     squares: [Squares; DEGREE + 1],
 }
@@ -91,14 +91,20 @@ impl SharedError {
     /// Given, by a calibration for instance. `sigma`: standard deviation of the coefficients of each degree from 0 on, metre of
     /// range or 1/metre of inverse depth; degrees above 4 have no influence, those that are missing are 0.
     pub fn known(sigma: &[f64]) -> Self {
-        let common = std::array::from_fn(|degree| sigma.get(degree).map_or(0.0, |s| s * s));
-        Self { common, ..Self::default() }
+        let everywhere = std::array::from_fn(|degree| sigma.get(degree).map_or(0.0, |s| s * s));
+        Self { everywhere, ..Self::default() }
     }
 
-    /// Standard deviation of the coefficients of each degree, metre of range or 1/metre of inverse depth: of the field that
-    /// all frames share, and of what single registrations see of another one beside it.
+    /// The same, all of which differs from place to place.
+    #[cfg(test)]
+    pub(crate) fn differing(sigma: &[f64]) -> Self {
+        let Self { everywhere, local, .. } = Self::known(sigma);
+        Self { everywhere: local, local: everywhere, ..Self::default() }
+    }
+
+    /// Standard deviation of the coefficients of each degree, metre of range or 1/metre of inverse depth.
     pub fn sigma(&self) -> [f64; DEGREE + 1] {
-        std::array::from_fn(|degree| (self.common[degree] + self.own[degree]).sqrt())
+        std::array::from_fn(|degree| (self.everywhere[degree] + self.local[degree]).sqrt())
     }
 
     /// Registrations it was estimated from; 0 where it was given.
@@ -130,24 +136,29 @@ impl SharedError {
             // The square of noise alone scatters by the root of twice the gain.
             let significant = excess > SIGNIFICANCE * (2.0 * squares.gain).sqrt();
             let variance = if significant { excess / squares.gain } else { 0.0 };
-            self.common[degree] = IN_COMMON * variance;
-            self.own[degree] = (1.0 - IN_COMMON) * variance;
+            self.everywhere[degree] = EVERYWHERE * variance;
+            self.local[degree] = (1.0 - EVERYWHERE) * variance;
         }
     }
 
-    /// Variances of all coefficients: of the field that all frames share.
-    pub(crate) fn common(&self) -> Field {
-        of_degrees(&self.common)
+    /// Variances of all coefficients: of what is the same everywhere, which loops may tell.
+    pub(crate) fn everywhere(&self) -> Field {
+        of_degrees(&self.everywhere)
     }
 
-    /// Of the fields that single registrations see beside it.
-    pub(crate) fn own(&self) -> Field {
-        of_degrees(&self.own)
+    /// Of what differs from place to place.
+    pub(crate) fn local(&self) -> Field {
+        of_degrees(&self.local)
+    }
+
+    /// Covariance of the whole field.
+    pub(crate) fn of_field(&self) -> FieldMatrix {
+        FieldMatrix::from_diagonal(&(self.everywhere() + self.local()))
     }
 
     /// Covariance of a pose by its derivatives.
     pub(crate) fn covariance(&self, by_field: &ByField) -> Matrix6<f64> {
-        by_field * FieldMatrix::from_diagonal(&(self.common() + self.own())) * by_field.transpose()
+        by_field * self.of_field() * by_field.transpose()
     }
 }
 

@@ -3,6 +3,9 @@
 //! Unknown are the poses of all keyframes but the first, which is held, and the field of the sensor's shared error, which is
 //! observed with its variances as 0 (least squares by Gauss and Newton). The poses are eliminated; what the observations
 //! scatter beyond their covariances enlarges all of them (a-posteriori variance factor).
+//!
+//! The part of the field that differs from place to place is not estimated: loops would average what their neighbours
+//! share, and promise too much. It enters the covariances once, as one field of the whole path `[Schmidt1966]`.
 
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix6, Vector6};
 
@@ -63,7 +66,7 @@ impl Graph {
         for edge in &mut self.edges {
             edge.a_from_b = edge.a_from_b.moved(&change);
         }
-        (self.field, self.covariance) = (field, covariance);
+        (self.field, self.covariance) = (field, covariance + FieldMatrix::from_diagonal(&self.shared.local()));
         self.set_factor();
     }
 
@@ -87,7 +90,7 @@ impl Graph {
     /// The step of the field, all poses following it (`by_field`), and its covariance. In units of the standard deviations
     /// of the coefficients, since some may be 0.
     fn field_step(&self, normal: &Normal, by_field: &DMatrix<f64>, field: &Field) -> Option<(Field, FieldMatrix)> {
-        let sigma = self.common.map(f64::sqrt);
+        let sigma = self.shared.everywhere().map(f64::sqrt);
         let scale = FieldMatrix::from_diagonal(&sigma);
         let followed = normal.cross.transpose() * by_field;
         let reduced = normal.field - FieldMatrix::from_fn(|r, c| followed[(r, c)]);

@@ -41,13 +41,6 @@ impl Relation {
         Self { random: Uncertain { pose, ..self.random }, ..*self }
     }
 
-    /// With the variances of a field that no other registration has, as a random error.
-    pub(crate) fn with_own(&self, variances: &Field) -> Self {
-        let own = self.by_field * FieldMatrix::from_diagonal(variances) * self.by_field.transpose();
-        let covariance = symmetrised(&(self.random.covariance + own));
-        Self { random: Uncertain { covariance, ..self.random }, ..*self }
-    }
-
     /// With the covariance of all errors; `field`: that of the coefficients.
     pub(crate) fn total(&self, field: &FieldMatrix) -> Uncertain {
         let shared: Matrix6<f64> = self.by_field * field * self.by_field.transpose();

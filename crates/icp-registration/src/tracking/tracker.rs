@@ -138,7 +138,7 @@ impl Tracker {
     }
 
     /// The systematic error of the sensor that all frames share, as the registrations of keyframes tell it. The covariances
-    /// of poses rest on it: on its being smooth over the frame, and on half of it being the same in all registrations.
+    /// of poses rest on it: on its being smooth over the frame, and on what loops may tell of it: a quarter of its variance.
     pub fn shared_error(&self) -> &SharedError {
         &self.shared
     }
@@ -324,7 +324,7 @@ impl Tracker {
             Some(influence) if !graph.closed && self.options.alignment.shared_error.is_none() => {
                 let mut shared = self.shared;
                 shared.learn(influence);
-                FieldMatrix::from_diagonal(&shared.common())
+                shared.of_field()
             }
             _ => graph.covariance,
         }

@@ -218,8 +218,8 @@ impl TrackSummary {
             }
             n => format!(
                 "The standard deviations rest on the noise and on an error of the sensor that all frames share, estimated from {n} \
-                 registrations between keyframes; that it is smooth over the frame and half of it the same everywhere is \
-                 an assumption."
+                 registrations between keyframes; that it is smooth over the frame and a quarter of it the same \
+                 everywhere is an assumption."
             ),
         }
     }

@@ -45,7 +45,8 @@ impl Intruder {
             }
             Self::Mirrored => {
                 // The axis of the kitchen's camera is on a pixel, that of the living room's between two.
-                let (width, last) = (sequence.projection.width(), if set.name.starts_with("living") { 639 } else { 640 });
+                let (width, last) =
+                    (sequence.projection.width(), if set.name.starts_with("living") { 639 } else { 640 });
                 let mirrored = |k: usize| {
                     let col = last - k % width;
                     if col < width { own[k / width * width + col] } else { [f64::NAN; 3] }

@@ -3,11 +3,9 @@
 use nalgebra::{Isometry3, Matrix6};
 
 use super::alignments::PairAlignment;
-use super::frame_pairs::FramePair;
 use super::loops::{LoopClosure, Skeleton, skeleton};
-use crate::organised::SharedError;
-use crate::pose::symmetrised;
-use crate::pose_graph::{Edge, Graph, is_likely};
+use crate::organised::ByField;
+use crate::pose_graph::{Edge, Graph, Relation, Uncertain, is_likely};
 
 /// Rounds in which pairs that do not fit go and those that fit again come back; two were enough on all frames tried.
 const ROUNDS: usize = 4;
@@ -20,20 +18,14 @@ pub(super) struct FrameGraph {
     /// Whether each pair fits.
     pub fits: Vec<bool>,
     pub loops: Vec<LoopClosure>,
-    pub shared_error: SharedError,
 }
 
 impl FrameGraph {
-    /// The largest part of the frames that pairs connect. `known`: of the shared error.
-    pub(super) fn new(count: usize, pairs: &[FramePair], known: Option<SharedError>) -> Self {
-        let mut shared_error = SharedError::none();
-        pairs.iter().for_each(|pair| shared_error.learn(&pair.influence));
-        let shared_error = known.unwrap_or(shared_error);
-        let alignments: Vec<PairAlignment> = pairs.iter().map(|pair| with_shared(pair, &shared_error)).collect();
-        let (members, skeleton) = largest_part(count, &alignments);
-        let mut graph = Graph::at(Isometry3::identity());
-        graph.set_shared_error(&shared_error);
-        let mut found = Self { graph, members, fits: vec![false; pairs.len()], loops: skeleton.loops, shared_error };
+    /// The largest part of the frames that pairs connect.
+    pub(super) fn new(count: usize, pairs: &[PairAlignment]) -> Self {
+        let (members, skeleton) = largest_part(count, pairs);
+        let graph = Graph::at(Isometry3::identity());
+        let mut found = Self { graph, members, fits: vec![false; pairs.len()], loops: skeleton.loops };
         found.grow(pairs, &skeleton.tree);
         found.settle(pairs);
         found
@@ -60,11 +52,11 @@ impl FrameGraph {
     }
 
     /// Poses along the tree.
-    fn grow(&mut self, pairs: &[FramePair], tree: &[usize]) {
+    fn grow(&mut self, pairs: &[PairAlignment], tree: &[usize]) {
         self.members.truncate(1);
         for &k in tree {
-            let PairAlignment { target, source, .. } = pairs[k].alignment;
-            let Edge { a_from_b, .. } = pairs[k].edge(0, 0);
+            let PairAlignment { target, source, .. } = pairs[k];
+            let a_from_b = relation(&pairs[k]);
             let (from, to, step) = match self.index(target) {
                 Some(from) => (from, source, a_from_b),
                 None => (self.index(source).unwrap_or(0), target, a_from_b.inverse()),
@@ -76,11 +68,12 @@ impl FrameGraph {
     }
 
     /// Adjusts the poses with all pairs that fit.
-    fn settle(&mut self, pairs: &[FramePair]) {
-        let edges: Vec<Option<Edge>> = pairs
-            .iter()
-            .map(|p| Some(p.edge(self.index(p.alignment.target)?, self.index(p.alignment.source)?)))
-            .collect();
+    fn settle(&mut self, pairs: &[PairAlignment]) {
+        let edge = |pair: &PairAlignment| {
+            let (a, b) = (self.index(pair.target)?, self.index(pair.source)?);
+            Some(Edge { a, b, a_from_b: relation(pair), alike: 1.0 })
+        };
+        let edges: Vec<Option<Edge>> = pairs.iter().map(edge).collect();
         for _ in 0..ROUNDS {
             let fits: Vec<bool> =
                 edges.iter().map(|edge| edge.as_ref().is_some_and(|edge| self.graph.fits(edge))).collect();
@@ -102,12 +95,10 @@ fn counted(edges: Vec<Edge>) -> Vec<Edge> {
     edges.iter().map(|edge| Edge { alike: of(edge.a).midpoint(of(edge.b)), ..*edge }).collect()
 }
 
-/// The alignment with the covariance of all its errors.
-pub(super) fn with_shared(pair: &FramePair, shared: &SharedError) -> PairAlignment {
-    let mut alignment = pair.alignment.clone();
-    let covariance = alignment.result.covariance + shared.covariance(&pair.influence.pose);
-    alignment.result.covariance = symmetrised(&covariance);
-    alignment
+/// As an observation of a graph.
+fn relation(pair: &PairAlignment) -> Relation {
+    let random = Uncertain { pose: pair.result.target_from_source, covariance: pair.result.covariance };
+    Relation { random, by_field: ByField::zeros() }
 }
 
 /// The frames of the largest part that pairs connect, its first frame first, and the tree from there.

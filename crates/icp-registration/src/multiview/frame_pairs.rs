@@ -53,9 +53,7 @@ impl FramePair {
         (target, source) == (a, b) || (target, source) == (b, a)
     }
 
-    /// The alignment with the covariance of all its errors. What pairs have of the shared error in common is not told apart:
-    /// few frames close their loops whatever it is, and adjusting it with the poses of 12 frames of a Kinect made them twice as
-    /// wrong.
+    /// The alignment with the covariance of all its errors.
     pub(super) fn with_shared(&self, shared: &SharedError) -> PairAlignment {
         let mut alignment = self.alignment.clone();
         let covariance = alignment.result.covariance + shared.covariance(&self.influence.pose);

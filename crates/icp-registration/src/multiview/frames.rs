@@ -169,7 +169,7 @@ impl<'a> Survey<'a> {
                 self.out.push(UnplacedFrame { frame, reason });
             }
         }
-        FrameGraph::new(self.count(), &self.sound())
+        FrameGraph::new(self.count(), &self.sound(), &self.shared_error())
     }
 
     /// As it was given, or as the pairs tell it.
@@ -188,9 +188,8 @@ impl<'a> Survey<'a> {
     }
 
     /// The pairs of frames that belong together.
-    fn sound(&self) -> Vec<PairAlignment> {
-        let shared = self.shared_error();
-        self.pairs.iter().filter(|pair| self.is_sound(pair)).map(|pair| pair.with_shared(&shared)).collect()
+    fn sound(&self) -> Vec<FramePair> {
+        self.pairs.iter().filter(|pair| self.is_sound(pair)).cloned().collect()
     }
 
     /// Pairs that the start tells.
@@ -302,7 +301,7 @@ impl<'a> Survey<'a> {
         let sound = self.sound();
         let (used, wrong): (Vec<_>, Vec<_>) = sound.iter().zip(&graph.fits).partition(|(_, fits)| **fits);
         let placed = |pair: &PairAlignment| [pair.target, pair.source].iter().all(|k| graph.index(*k).is_some());
-        let wrong = wrong.iter().map(|(pair, _)| *pair).filter(|pair| placed(pair));
+        let wrong = wrong.iter().map(|(pair, _)| &pair.alignment).filter(|pair| placed(pair));
         let contradicting = wrong.map(super::loops::contradicting);
         self.refused.extend(contradicting);
         let lost = |frame: &usize| graph.index(*frame).is_none() && !self.is_out(*frame);
@@ -327,7 +326,7 @@ impl<'a> Survey<'a> {
         Ok(FrameRegistration {
             frames: (0..self.count()).map(placed).collect(),
             datum,
-            pairs: used.iter().map(|(pair, _)| (*pair).clone()).collect(),
+            pairs: used.iter().map(|(pair, _)| pair.with_shared(&shared_error)).collect(),
             unplaced: self.out,
             refused: self.refused,
             loops: graph.loops.clone(),

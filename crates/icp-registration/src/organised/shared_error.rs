@@ -147,7 +147,12 @@ impl SharedError {
 
     /// Covariance of a pose by its derivatives.
     pub(crate) fn covariance(&self, by_field: &ByField) -> Matrix6<f64> {
-        by_field * FieldMatrix::from_diagonal(&(self.common() + self.own())) * by_field.transpose()
+        by_field * self.variances() * by_field.transpose()
+    }
+
+    /// Covariance of the field that a registration sees.
+    pub(crate) fn variances(&self) -> FieldMatrix {
+        FieldMatrix::from_diagonal(&(self.common() + self.own()))
     }
 }
 

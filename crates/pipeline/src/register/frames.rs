@@ -42,7 +42,7 @@ pub(super) fn registered(
     let poses: Vec<StationPose> = (0..stations.len()).filter_map(pose).collect();
     let mut summary = summary(result, &stations);
     summary.datum = describe::datum(&stations[result.datum], before.is_some());
-    let mut start = if before.is_some() { "poses of the input" } else { "order of the stations" }.to_owned();
+    let mut start = if before.is_some() { "poses of the input" } else { "none, order of the stations" }.to_owned();
     start += "; pairs of frames, since surfaces differ by more than the noise of their points";
     summary.start = start;
     let residuals_m = residuals(result, &stations)?;

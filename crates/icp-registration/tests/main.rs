@@ -24,6 +24,7 @@ mod depth_frames;
 mod mesh;
 mod metric_derivatives;
 mod multiview;
+mod multiview_frames;
 mod multiview_input;
 mod multiview_model;
 mod multiview_placement;

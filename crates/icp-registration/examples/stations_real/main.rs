@@ -87,6 +87,17 @@ fn measure(set: &Set, intruder: Intruder, start: &str, each: bool) {
 
 fn details(set: &Set, found: &FrameRegistration) {
     println!("  {} pairs, shared error {:.2?}", found.pairs.len(), found.shared_error.sigma().map(|s| 1e3 * s));
+    for pair in &found.pairs {
+        let (a, b) = (pair.target, pair.source);
+        let truth = set.reference[a].inverse() * set.reference[b];
+        let (mm, degrees) = apart(&pair.result.target_from_source, &truth);
+        let (Some(x), Some(y)) = (found.frames[a], found.frames[b]) else { continue };
+        let (of_graph, of_graph_degrees) = apart(&(x.world_from_frame.inverse() * y.world_from_frame), &truth);
+        let sigma = 1e3 * pair.result.covariance.fixed_view::<3, 3>(0, 0).trace().sqrt();
+        println!(
+            "  pair {a} {b}: {mm:.1} mm {degrees:.2} deg, sigma {sigma:.1} mm; adjusted {of_graph:.1} mm {of_graph_degrees:.2} deg"
+        );
+    }
     for out in &found.unplaced {
         println!("  out {}: {}", out.frame, out.reason);
     }

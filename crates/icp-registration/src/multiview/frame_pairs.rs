@@ -9,21 +9,35 @@ use super::alignments::{PairAlignment, RefusedPair};
 use crate::coarse::{CoarseOptions, FeatureCloud, align_without_guess};
 use crate::error::Result;
 use crate::icp::{IcpResult, StopReason};
-use crate::organised::{FrameAligner, FrameAlignmentOptions, Influence, OrganisedFrame};
-use crate::pose_graph::{Edge, Relation, Uncertain};
+use crate::organised::{FrameAligner, FrameAlignmentOptions, Influence, OrganisedFrame, SharedError};
+use crate::pose::symmetrised;
 
 /// Nodes by which agreement is judged.
 pub(super) const SAMPLE: usize = 2500;
-/// Share of what both frames can judge that must agree, as in tracking.
+/// What frames must agree by, as in tracking: share of what both can judge, and of all that the source sees.
 const LEAST_CONSENT: f64 = 0.9;
+const LEAST_OVERLAP: f64 = 0.25;
+/// Share of the radius beyond whose standard deviation a motion is open, as in tracking: what is known less well from one pair
+/// has that little weight in the graph.
+const OPEN_SHARE: f64 = 1.0 / 50.0;
 
 /// Two frames that may see the same.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Candidate {
     pub target: usize,
     pub source: usize,
-    /// Where to start, `target_from_source`; `None`: features tell.
-    pub guess: Option<Isometry3<f64>>,
+    pub guess: Guess,
+}
+
+/// Where an alignment starts, `target_from_source`.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Guess {
+    /// Near the pose.
+    Near(Isometry3<f64>),
+    /// From no motion, and a search around it.
+    NoMotion,
+    /// Where features tell.
+    Features,
 }
 
 /// Two frames brought together; the covariance is of what is random.
@@ -39,34 +53,41 @@ impl FramePair {
         (target, source) == (a, b) || (target, source) == (b, a)
     }
 
-    /// As an observation between two poses of a graph.
-    pub(super) fn edge(&self, target: usize, source: usize) -> Edge {
-        let IcpResult { target_from_source: pose, covariance, .. } = self.alignment.result;
-        let random = Uncertain { pose, covariance };
-        Edge { a: target, b: source, a_from_b: Relation { random, by_field: -self.influence.pose }, alike: 1.0 }
+    /// The alignment with the covariance of all its errors.
+    pub(super) fn with_shared(&self, shared: &SharedError) -> PairAlignment {
+        let mut alignment = self.alignment.clone();
+        let covariance = alignment.result.covariance + shared.covariance(&self.influence.pose);
+        alignment.result.covariance = symmetrised(&covariance);
+        alignment
     }
 }
 
 /// All frames, and what was made of them.
 pub(super) struct Frames<'a> {
     pub frames: &'a [OrganisedFrame],
-    options: &'a FrameAlignmentOptions,
+    options: FrameAlignmentOptions,
     features: Vec<OnceLock<Option<FeatureCloud>>>,
 }
 
 impl<'a> Frames<'a> {
-    pub(super) fn new(frames: &'a [OrganisedFrame], options: &'a FrameAlignmentOptions) -> Self {
+    pub(super) fn new(frames: &'a [OrganisedFrame], options: &FrameAlignmentOptions) -> Self {
+        let radius_m = frames.iter().map(OrganisedFrame::radius_m).fold(0.0, f64::max);
+        let open = (OPEN_SHARE * radius_m).max(f64::MIN_POSITIVE);
+        let max_motion_sigma_m = options.max_motion_sigma_m.or(Some(open));
+        let options = FrameAlignmentOptions { max_motion_sigma_m, ..options.clone() };
         Self { frames, options, features: frames.iter().map(|_| OnceLock::new()).collect() }
     }
 
     /// The pairs that can be trusted, and the others with the reason; in the order of the candidates.
     pub(super) fn aligned(&self, candidates: &[Candidate]) -> Result<(Vec<FramePair>, Vec<RefusedPair>)> {
-        let aligner = FrameAligner::new(self.options.clone())?;
-        let each = |aligner: &mut FrameAligner, candidate: &Candidate| {
+        let near = FrameAligner::new(FrameAlignmentOptions { other_starts: 0, ..self.options.clone() })?;
+        let aligners = (near, FrameAligner::new(self.options.clone())?);
+        let each = |(near, wide): &mut (FrameAligner, FrameAligner), candidate: &Candidate| {
             let Candidate { target, source, .. } = *candidate;
+            let aligner = if matches!(candidate.guess, Guess::Near(_)) { near } else { wide };
             self.align(aligner, candidate).map_err(|reason| RefusedPair { target, source, reason })
         };
-        let found: Vec<_> = candidates.par_iter().map_init(|| aligner.clone(), each).collect();
+        let found: Vec<_> = candidates.par_iter().map_init(|| aligners.clone(), each).collect();
         let (mut pairs, mut refused) = (Vec::new(), Vec::new());
         for result in found {
             match result {
@@ -80,8 +101,9 @@ impl<'a> Frames<'a> {
     fn align(&self, aligner: &mut FrameAligner, candidate: &Candidate) -> std::result::Result<FramePair, String> {
         let Candidate { target, source, guess } = *candidate;
         let guess = match guess {
-            Some(guess) => guess,
-            None => self.guess(target, source)?,
+            Guess::Near(pose) => pose,
+            Guess::NoMotion => Isometry3::identity(),
+            Guess::Features => self.guess(target, source)?,
         };
         let (onto, moved) = (&self.frames[target], &self.frames[source]);
         let (result, influence) = aligner.align_apart(moved, onto, &guess).map_err(|error| error.to_string())?;
@@ -89,11 +111,14 @@ impl<'a> Frames<'a> {
             return Err(distrust(&result));
         }
         let pose = result.target_from_source;
-        let consent = [onto.agreement(moved, &pose, SAMPLE), moved.agreement(onto, &pose.inverse(), SAMPLE)]
-            .map(|agreement| agreement.consent());
-        let least = consent[0].min(consent[1]);
-        if least < LEAST_CONSENT {
-            return Err(format!("{:.0} % of what both see contradicts", 100.0 * (1.0 - least)));
+        let both = [onto.agreement(moved, &pose, SAMPLE), moved.agreement(onto, &pose.inverse(), SAMPLE)];
+        let consent = both[0].consent().min(both[1].consent());
+        if consent < LEAST_CONSENT {
+            return Err(format!("{:.0} % of what both see contradicts", 100.0 * (1.0 - consent)));
+        }
+        let overlap = both[0].overlap().min(both[1].overlap());
+        if overlap < LEAST_OVERLAP {
+            return Err(format!("only {:.0} % of what one sees agrees with the other", 100.0 * overlap));
         }
         let influence = influence.filter(|_| result.covariance.cholesky().is_some());
         let influence = influence.ok_or("what they share does not determine the pose")?;

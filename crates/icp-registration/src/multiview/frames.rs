@@ -5,8 +5,8 @@ use std::collections::BTreeSet;
 use nalgebra::{Isometry3, Matrix6};
 
 use super::alignments::{PairAlignment, RefusedPair};
-use super::frame_graph::{FrameGraph, with_shared};
-use super::frame_pairs::{Candidate, FramePair, Frames, SAMPLE};
+use super::frame_graph::FrameGraph;
+use super::frame_pairs::{Candidate, FramePair, Frames, Guess, SAMPLE};
 use super::frame_scale::scaled;
 use super::loops::LoopClosure;
 use super::placement::{PairAgreement, Placements};
@@ -163,22 +163,33 @@ impl<'a> Survey<'a> {
 
     /// The graph of the pairs between frames that belong together.
     fn graph(&mut self) -> FrameGraph {
-        for (frame, scale) in scaled(self.count(), &self.pairs) {
+        for (frame, scale) in scaled(self.count(), &self.pairs, &self.shared_error()) {
             if !self.is_out(frame) {
                 let reason = format!("its ranges are {scale:.3} times those of the other frames");
                 self.out.push(UnplacedFrame { frame, reason });
             }
         }
-        FrameGraph::new(self.count(), &self.sound(), self.known)
+        FrameGraph::new(self.count(), &self.sound(), &self.shared_error())
+    }
+
+    /// As it was given, or as the pairs tell it.
+    fn shared_error(&self) -> SharedError {
+        let mut shared = SharedError::none();
+        self.pairs.iter().filter(|pair| self.is_sound(pair)).for_each(|pair| shared.learn(&pair.influence));
+        self.known.unwrap_or(shared)
     }
 
     fn is_out(&self, frame: usize) -> bool {
         self.out.iter().any(|out| out.frame == frame)
     }
 
+    fn is_sound(&self, pair: &FramePair) -> bool {
+        !self.is_out(pair.alignment.target) && !self.is_out(pair.alignment.source)
+    }
+
+    /// The pairs of frames that belong together.
     fn sound(&self) -> Vec<FramePair> {
-        let sound = |pair: &&FramePair| !self.is_out(pair.alignment.target) && !self.is_out(pair.alignment.source);
-        self.pairs.iter().filter(sound).cloned().collect()
+        self.pairs.iter().filter(|pair| self.is_sound(pair)).cloned().collect()
     }
 
     /// Pairs that the start tells.
@@ -188,7 +199,7 @@ impl<'a> Survey<'a> {
             _ => (0..self.count())
                 .flat_map(|target| (1..=FOLLOWING).map(move |step| (target, target + step)))
                 .filter(|(_, source)| *source < self.count())
-                .map(|(target, source)| Candidate { target, source, guess: Some(Isometry3::identity()) })
+                .map(|(target, source)| Candidate { target, source, guess: Guess::NoMotion })
                 .collect(),
         }
     }
@@ -212,7 +223,7 @@ impl<'a> Survey<'a> {
                 let Some(pose) = pose(target, source) else { continue };
                 let overlap = frames[target].nearness(&frames[source], &pose, SAMPLE / 4);
                 if overlap >= LEAST_OVERLAP {
-                    found.push((overlap, Candidate { target, source, guess: Some(pose) }));
+                    found.push((overlap, Candidate { target, source, guess: Guess::Near(pose) }));
                 }
             }
         }
@@ -238,7 +249,7 @@ impl<'a> Survey<'a> {
             }
             let pairs = placed.into_iter().map(|other| (frame.min(other), frame.max(other)));
             let pairs = pairs.filter(|pair| !self.tried.contains(pair));
-            candidates.extend(pairs.map(|(target, source)| Candidate { target, source, guess: None }));
+            candidates.extend(pairs.map(|(target, source)| Candidate { target, source, guess: Guess::Features }));
         }
         candidates
     }
@@ -286,10 +297,12 @@ impl<'a> Survey<'a> {
     }
 
     fn result(mut self, graph: &FrameGraph) -> Result<FrameRegistration> {
-        let datum = graph.members[0];
+        let (datum, shared_error) = (graph.members[0], self.shared_error());
         let sound = self.sound();
         let (used, wrong): (Vec<_>, Vec<_>) = sound.iter().zip(&graph.fits).partition(|(_, fits)| **fits);
-        let contradicting = wrong.iter().map(|(pair, _)| super::loops::contradicting(&pair.alignment));
+        let placed = |pair: &PairAlignment| [pair.target, pair.source].iter().all(|k| graph.index(*k).is_some());
+        let wrong = wrong.iter().map(|(pair, _)| &pair.alignment).filter(|pair| placed(pair));
+        let contradicting = wrong.map(super::loops::contradicting);
         self.refused.extend(contradicting);
         let lost = |frame: &usize| graph.index(*frame).is_none() && !self.is_out(*frame);
         let lost: Vec<UnplacedFrame> =
@@ -313,23 +326,29 @@ impl<'a> Survey<'a> {
         Ok(FrameRegistration {
             frames: (0..self.count()).map(placed).collect(),
             datum,
-            pairs: used.iter().map(|(pair, _)| with_shared(pair, &graph.shared_error)).collect(),
+            pairs: used.iter().map(|(pair, _)| pair.with_shared(&shared_error)).collect(),
             unplaced: self.out,
             refused: self.refused,
             loops: graph.loops.clone(),
             placements: self.placements,
-            shared_error: graph.shared_error,
+            shared_error,
             variance_factor: graph.factor(),
         })
     }
 
     /// Why no pair leads to a frame: what most of those tried had against them.
     fn why(&self, frame: usize) -> String {
+        let joined = self.pairs.iter().filter(|pair| pair.alignment.target == frame || pair.alignment.source == frame);
+        let mut with: Vec<usize> = joined.map(|p| p.alignment.target + p.alignment.source - frame).collect();
+        with.sort_unstable();
+        if !with.is_empty() {
+            return format!("it is joined only with others that nothing joins with the rest (numbers {with:?} from 0)");
+        }
         let own: Vec<&RefusedPair> =
             self.refused.iter().filter(|pair| pair.target == frame || pair.source == frame).collect();
         match own.last() {
             Some(last) => format!("none of {} pairs with it can be trusted; the last: {}", own.len(), last.reason),
-            None => "its pairs lead to none of the others".to_owned(),
+            None => "it should overlap with none of the others".to_owned(),
         }
     }
 }

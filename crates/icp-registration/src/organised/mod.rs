@@ -35,7 +35,5 @@ pub use frame::OrganisedFrame;
 pub(crate) use map::{Agreement, thumbnail_difference};
 pub use options::FrameAlignmentOptions;
 pub use projection::Projection;
-#[cfg(feature = "multiview")]
-pub(crate) use shared_error::RelativeScale;
 pub use shared_error::SharedError;
 pub(crate) use shared_error::{ByField, COEFFICIENTS, Field, FieldMatrix, Influence};

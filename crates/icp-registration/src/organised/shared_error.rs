@@ -175,20 +175,21 @@ fn of_degrees(values: &[f64; DEGREE + 1]) -> Field {
 pub(crate) struct Influence {
     /// Derivative of the registered pose by the coefficients.
     pub(crate) pose: ByField,
-    /// The scale of the source's ranges against the target's.
-    #[cfg_attr(not(feature = "multiview"), allow(dead_code))]
-    pub(crate) scale: RelativeScale,
+    /// Logarithm of the scale of the source's ranges against the target's, if pose and scale are unknown, its variance by the
+    /// random part of the residuals, and its derivative by the coefficients.
+    scale: (f64, f64, Field),
     /// Normal equations of the coefficients, the pose eliminated.
     normal: FieldMatrix,
     right: Field,
 }
 
-/// Logarithm of the scale of ranges against those of another frame, and its variance by the random part of the residuals.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(not(feature = "multiview"), allow(dead_code))]
-pub(crate) struct RelativeScale {
-    pub(crate) logarithm: f64,
-    pub(crate) variance: f64,
+impl Influence {
+    /// Logarithm of the scale of the source's ranges against the target's, and its variance.
+    #[cfg(feature = "multiview")]
+    pub(crate) fn relative_scale(&self, shared: &SharedError) -> (f64, f64) {
+        let (logarithm, random, by_field) = &self.scale;
+        (*logarithm, random + by_field.component_mul(&by_field).dot(&(shared.everywhere() + shared.local())))
+    }
 }
 
 /// One source node on its target plane.
@@ -306,7 +307,7 @@ fn reduced(sightings: &[Sighting], to_tangent: &Matrix6<f64>, scratch: &mut Vec<
     let reach = BIWEIGHT * scale(sightings.iter().map(|s| s.residual), scratch)?.max(random);
     let (mut matrix, mut cross, mut gradient) = (Matrix6::zeros(), ByField::zeros(), Vector6::zeros());
     let (mut normal, mut right) = (FieldMatrix::zeros(), Field::zeros());
-    let (mut scale, mut scale_right, mut scale_cross) = (0.0, 0.0, Vector6::zeros());
+    let (mut scale, mut scale_right, mut scale_cross, mut scale_field) = (0.0, 0.0, Vector6::zeros(), Field::zeros());
     for s in sightings {
         let u = s.residual / reach;
         let weight = (1.0 - u * u).max(0.0).powi(2) / (s.variance * random * random);
@@ -319,16 +320,18 @@ fn reduced(sightings: &[Sighting], to_tangent: &Matrix6<f64>, scratch: &mut Vec<
         scale += weight * s.by_scale * s.by_scale;
         scale_right += weight * residual * s.by_scale;
         scale_cross.axpy(weight * s.by_scale, &s.by_pose, 1.0);
+        scale_field.axpy(weight * s.by_scale, &s.by_field, 1.0);
     }
     let factor = matrix.cholesky()?;
     let pose = -factor.solve(&cross);
     let followed = factor.solve(&scale_cross);
     let scale = scale - scale_cross.dot(&followed);
     let logarithm = (scale_right - gradient.dot(&followed)) / scale;
+    let scale_by_field = (scale_field + pose.transpose() * scale_cross) / scale;
     Some(Influence {
         normal: normal + cross.transpose() * pose,
         right: right + pose.transpose() * gradient,
-        scale: RelativeScale { logarithm, variance: 1.0 / scale },
+        scale: (logarithm, 1.0 / scale, scale_by_field),
         pose: to_tangent * pose,
     })
 }

@@ -2,6 +2,7 @@
 
 mod chain;
 pub(crate) mod describe;
+mod frames;
 pub(crate) mod guess;
 pub(crate) mod input;
 mod pairs;

@@ -149,7 +149,7 @@ fn doubts(stations: &[Station], aligned: &[Aligned]) -> Vec<Doubt> {
 /// Distances of all points of a station from a neighbour's surface, in the order of its file; NaN where there is none.
 ///
 /// `backwards`: the station is the target of the pair and the surface its source.
-fn distances(station: &Station, surface: &Surface, pair: &IcpResult, backwards: bool) -> Vec<f64> {
+pub(super) fn distances(station: &Station, surface: &Surface, pair: &IcpResult, backwards: bool) -> Vec<f64> {
     let pose = if backwards { pair.target_from_source.inverse() } else { pair.target_from_source };
     let distance = |point: &[f64; 3]| {
         let moved = pose * Point3::from(*point);

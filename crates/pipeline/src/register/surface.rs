@@ -120,7 +120,8 @@ impl Surface {
     }
 }
 
-fn frame(station: &Station, projection: &Arc<Projection>) -> Option<OrganisedFrame> {
+/// The pixels of a station, prepared; `None` where they are not on the rays of its camera.
+pub(super) fn frame(station: &Station, projection: &Arc<Projection>) -> Option<OrganisedFrame> {
     let points = station.usable_points();
     let sigma = station.file.sigma.as_deref().filter(|sigma| sigma.iter().any(|value| *value > 0.0));
     OrganisedFrame::new(projection, &points, sigma).ok()

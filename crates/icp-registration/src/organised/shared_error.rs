@@ -171,6 +171,7 @@ pub(crate) struct Influence {
     pub(crate) pose: ByField,
     /// Logarithm of the scale of the source's ranges against the target's, if pose and scale are unknown, its variance by the
     /// random part of the residuals, and its derivative by the coefficients.
+    #[cfg_attr(not(feature = "multiview"), allow(dead_code))]
     scale: (f64, f64, Field),
     /// Normal equations of the coefficients, the pose eliminated.
     normal: FieldMatrix,

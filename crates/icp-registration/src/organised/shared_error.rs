@@ -183,7 +183,7 @@ impl Influence {
     #[cfg(feature = "multiview")]
     pub(crate) fn relative_scale(&self, shared: &SharedError) -> (f64, f64) {
         let (logarithm, random, by_field) = &self.scale;
-        (*logarithm, random + by_field.component_mul(&by_field).dot(&(shared.common() + shared.own())))
+        (*logarithm, random + by_field.component_mul(by_field).dot(&(shared.common() + shared.own())))
     }
 }
 

@@ -94,14 +94,14 @@ impl FrameGraph {
             self.fits = fits;
             let chosen = edges.iter().zip(&self.fits).filter(|(_, fits)| **fits).filter_map(|(edge, _)| *edge);
             self.graph.edges.clear();
-            self.graph.take(counted(chosen.collect()));
+            self.graph.take(counted(&chosen.collect::<Vec<_>>()));
             self.graph.adjust_if_closed();
         }
     }
 }
 
 /// Half of the errors of a registration are those of either frame, which all registrations of that frame share.
-fn counted(edges: Vec<Edge>) -> Vec<Edge> {
+fn counted(edges: &[Edge]) -> Vec<Edge> {
     let of = |pose: usize| edges.iter().filter(|edge| edge.a == pose || edge.b == pose).count() as f64;
     edges.iter().map(|edge| Edge { alike: of(edge.a).midpoint(of(edge.b)), ..*edge }).collect()
 }
@@ -124,7 +124,9 @@ fn largest_part(count: usize, pairs: &[PairAlignment]) -> (Vec<usize>, Skeleton)
         let found = skeleton(pairs, (root, Isometry3::identity()), count, &closes);
         let mut members = vec![root];
         members.extend((0..count).filter(|&k| k != root && found.reaches(k)));
-        members.iter().for_each(|&k| seen[k] = true);
+        for &k in &members {
+            seen[k] = true;
+        }
         if best.as_ref().is_none_or(|(most, _)| members.len() > most.len()) {
             best = Some((members, found));
         }

@@ -64,7 +64,7 @@ impl FramePair {
 
 /// All frames, and what was made of them.
 pub(super) struct Frames<'a> {
-    pub frames: &'a [OrganisedFrame],
+    pub all: &'a [OrganisedFrame],
     options: FrameAlignmentOptions,
     features: Vec<OnceLock<Option<FeatureCloud>>>,
 }
@@ -75,7 +75,7 @@ impl<'a> Frames<'a> {
         let open = (OPEN_SHARE * radius_m).max(f64::MIN_POSITIVE);
         let max_motion_sigma_m = options.max_motion_sigma_m.or(Some(open));
         let options = FrameAlignmentOptions { max_motion_sigma_m, ..options.clone() };
-        Self { frames, options, features: frames.iter().map(|_| OnceLock::new()).collect() }
+        Self { all: frames, options, features: frames.iter().map(|_| OnceLock::new()).collect() }
     }
 
     /// The pairs that can be trusted, and the others with the reason; in the order of the candidates.
@@ -105,7 +105,7 @@ impl<'a> Frames<'a> {
             Guess::NoMotion => Isometry3::identity(),
             Guess::Features => self.guess(target, source)?,
         };
-        let (onto, moved) = (&self.frames[target], &self.frames[source]);
+        let (onto, moved) = (&self.all[target], &self.all[source]);
         let (result, influence) = aligner.align_apart(moved, onto, &guess).map_err(|error| error.to_string())?;
         if !result.is_trustworthy() {
             return Err(distrust(&result));
@@ -129,7 +129,7 @@ impl<'a> Frames<'a> {
     fn guess(&self, target: usize, source: usize) -> std::result::Result<Isometry3<f64>, String> {
         let options = CoarseOptions::default();
         let features = |k: usize| {
-            let made = || FeatureCloud::new(&self.frames[k].to_cloud(), &options).ok();
+            let made = || FeatureCloud::new(&self.all[k].to_cloud(), &options).ok();
             self.features[k].get_or_init(made).as_ref().ok_or("too little of it holds features")
         };
         let found = align_without_guess(features(source)?, features(target)?, &options);

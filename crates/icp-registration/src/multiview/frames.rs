@@ -126,7 +126,7 @@ impl<'a> Survey<'a> {
     }
 
     fn count(&self) -> usize {
-        self.frames.frames.len()
+        self.frames.all.len()
     }
 
     /// Tries pairs until the graph tells no more of them.
@@ -216,7 +216,7 @@ impl<'a> Survey<'a> {
 
     /// For each frame the pairs with the most overlap, at poses `a_from_b`.
     fn overlapping(&self, pose: impl Fn(usize, usize) -> Option<Isometry3<f64>>) -> Vec<Candidate> {
-        let frames = self.frames.frames;
+        let frames = self.frames.all;
         let mut found = Vec::new();
         for target in 0..self.count() {
             for source in target + 1..self.count() {
@@ -277,7 +277,7 @@ impl<'a> Survey<'a> {
 
     /// What each two placed frames see of each other.
     fn agreements(&self, graph: &FrameGraph) -> Vec<PairAgreement> {
-        let frames = self.frames.frames;
+        let frames = self.frames.all;
         let mut found = Vec::new();
         for target in 0..self.count() {
             for source in target + 1..self.count() {

@@ -177,6 +177,7 @@ pub(crate) struct Influence {
     pub(crate) pose: ByField,
     /// Logarithm of the scale of the source's ranges against the target's, if pose and scale are unknown, its variance by the
     /// random part of the residuals, and its derivative by the coefficients.
+    #[cfg_attr(not(feature = "multiview"), allow(dead_code))]
     scale: (f64, f64, Field),
     /// Normal equations of the coefficients, the pose eliminated.
     normal: FieldMatrix,
@@ -188,7 +189,7 @@ impl Influence {
     #[cfg(feature = "multiview")]
     pub(crate) fn relative_scale(&self, shared: &SharedError) -> (f64, f64) {
         let (logarithm, random, by_field) = &self.scale;
-        (*logarithm, random + by_field.component_mul(&by_field).dot(&(shared.everywhere() + shared.local())))
+        (*logarithm, random + by_field.component_mul(by_field).dot(&(shared.everywhere() + shared.local())))
     }
 }
 

@@ -62,6 +62,7 @@ impl Default for Graph {
 
 impl Graph {
     /// Of one pose, which is held.
+    #[cfg_attr(not(feature = "multiview"), allow(dead_code))]
     pub(crate) fn at(datum: Isometry3<f64>) -> Self {
         Self { poses: vec![Relation::exact(datum)], ..Self::default() }
     }

@@ -5,6 +5,8 @@ mod graph;
 mod relation;
 mod uncertain;
 
-pub(crate) use graph::{Edge, Graph, is_likely};
+#[cfg(feature = "multiview")]
+pub(crate) use graph::is_likely;
+pub(crate) use graph::{Edge, Graph};
 pub(crate) use relation::Relation;
 pub(crate) use uncertain::{Uncertain, product_jacobians};

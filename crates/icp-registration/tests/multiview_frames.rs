@@ -84,7 +84,9 @@ fn real_frames_come_together_from_their_order_without_the_one_that_is_mirrored()
             for row in points.chunks_exact_mut(640) {
                 row[1..].reverse();
                 row[0] = [f64::NAN; 3];
-                row.iter_mut().for_each(|point| point[0] = -point[0]);
+                for point in row.iter_mut() {
+                    point[0] = -point[0];
+                }
             }
         }
         OrganisedFrame::new(&sequence.projection, &points, None).unwrap()

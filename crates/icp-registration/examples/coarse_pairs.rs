@@ -30,7 +30,7 @@ fn main() {
     let mut options = CoarseOptions { estimator, ..CoarseOptions::default() };
     let sensitivity = words.iter().any(|w| w == "sensitivity");
     if sensitivity {
-        options = coarse_sensitivity::loose(options);
+        options = coarse_sensitivity::loose(&options);
     }
     let chosen = |class: &str| {
         words.iter().any(|w| w == class)

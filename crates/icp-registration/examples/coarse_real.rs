@@ -30,7 +30,7 @@ fn main() {
     let has = |word: &str| words.iter().any(|w| w == word);
     let mut options = CoarseOptions::default();
     if has("sensitivity") {
-        options = coarse_sensitivity::loose(options);
+        options = coarse_sensitivity::loose(&options);
     }
     for (name, range) in [("first half", 0..250), ("second half", 250..500), ("both halves", 0..500)] {
         if !["first", "second", "both"].iter().any(|word| has(word)) || name.split(' ').any(has) {
@@ -38,7 +38,9 @@ fn main() {
                 Some(sequence) => {
                     let tables = pairs(name, &sequence, &options, has("--each"));
                     if has("sensitivity") {
-                        tables.iter().for_each(|(class, table)| coarse_sensitivity::print(class, &table.found));
+                        for (class, table) in &tables {
+                            coarse_sensitivity::print(class, &table.found);
+                        }
                     }
                 }
                 None => println!("the frames are not there"),

@@ -3,7 +3,7 @@
 use icp_registration::{CoarseAlignment, CoarseOptions};
 
 /// Options that refuse nothing, to see what verdicts rest on.
-pub fn loose(options: CoarseOptions) -> CoarseOptions {
+pub fn loose(options: &CoarseOptions) -> CoarseOptions {
     CoarseOptions {
         min_agreement: 0.0,
         max_contradiction: 1.0,
@@ -11,7 +11,7 @@ pub fn loose(options: CoarseOptions) -> CoarseOptions {
         min_determined: 0.0,
         min_overlap: 0.0,
         max_rival: 1.0,
-        ..options
+        ..options.clone()
     }
 }
 

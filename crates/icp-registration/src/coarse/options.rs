@@ -91,7 +91,7 @@ pub struct CoarseOptions {
     /// less where two fifths of a cloud have a partner and a tenth of the points lie inside what encloses the scene.
     pub min_agreement: f64,
     /// Largest fraction of points in space that the other camera looked through (see
-    /// [`super::CoarseAlignment::contradiction`]). Default 0.012: at the right pose there are hardly any.
+    /// [`super::CoarseAlignment::contradiction`]). Default 0.016: at the right pose there are hardly any.
     pub max_contradiction: f64,
     /// Smallest fraction of points on both clouds that lie inside what encloses them (see
     /// [`super::CoarseAlignment::inside`]). Default 0.008: corners of empty rooms are taken for each other. 0 accepts
@@ -122,7 +122,7 @@ impl Default for CoarseOptions {
             min_inliers: 8,
             min_overlap: 0.3,
             min_agreement: 0.96,
-            max_contradiction: 0.012,
+            max_contradiction: 0.016,
             min_inside: 0.008,
             min_determined: 0.15,
             max_rival: 0.9,

@@ -62,8 +62,8 @@ pub(crate) fn uncertain_frames(frames: &[(&str, f64, f64)], distance_m: f64) -> 
     let names: Vec<&str> = frames.iter().filter(open).map(|frame| frame.0).collect();
     let worst = frames.iter().filter(open).max_by(|a, b| a.1.total_cmp(&b.1))?;
     let words = format!(
-        "{} of {} frames ({}) are not held by the surfaces: {} is known to {} and {:.1} degrees, of a scene {distance_m:.1} m \
-         away. Close loops, or move slower past plain walls",
+        "{} of {} frames ({}) are known to no better than a twentieth of the scene's distance: {} to {} and {:.1} degrees, of a \
+         scene {distance_m:.1} m away. Close loops, move slower past plain walls, or have the sensor's own error calibrated",
         names.len(),
         frames.len(),
         some_of(&names),

@@ -20,6 +20,10 @@ use nalgebra::{Isometry3, Vector3};
 use intruders::Intruder;
 use sets::Set;
 
+/// Of the reference, a pair of neighbours.
+const REFERENCE_M: f64 = 8e-3;
+const REFERENCE_DEG: f64 = 0.3;
+
 fn main() {
     let words: Vec<String> = std::env::args().skip(1).collect();
     let has = |word: &str| words.iter().any(|w| w == word);
@@ -27,8 +31,8 @@ fn main() {
     let parts = ["first", "second", "others"];
     let all = !parts.iter().any(|part| has(part));
     println!(
-        "{:<34} {:<9} {:<10} {:>9} {:>8} {:>7} {:>6} {:>7}",
-        "set", "start", "intruder", "placed", "worst mm", "deg", "s", "factor"
+        "{:<34} {:<9} {:<10} {:>9} {:>8} {:>7} {:>6} {:>7} {:>13}",
+        "set", "start", "intruder", "placed", "worst mm", "deg", "s", "factor", "over variance"
     );
     for part in parts.into_iter().filter(|part| all || has(part)) {
         for set in sets::of(part).into_iter().filter(|set| asked.is_none_or(|name| set.name.contains(name))) {
@@ -73,8 +77,9 @@ fn measure(set: &Set, intruder: Intruder, start: &str, each: bool) {
         Some(_) => " named",
         None => "",
     };
+    let [position, attitude] = over_variance(set, &found, named);
     println!(
-        "{head} {:>9} {mm:>8.1} {degrees:>7.2} {seconds:>6.1} {:>7.1}{verdict}",
+        "{head} {:>9} {mm:>8.1} {degrees:>7.2} {seconds:>6.1} {:>7.1} {position:>6.1} {attitude:>6.1}{verdict}",
         format!("{placed} of {others}"),
         found.variance_factor
     );
@@ -111,6 +116,22 @@ fn details(set: &Set, found: &FrameRegistration) {
         let (mm, degrees) = apart(&pose, &truth);
         println!("  {k}: {mm:.1} mm {degrees:.2} deg, sigma {sigma:.1} mm");
     }
+}
+
+/// Squared errors of position and attitude from the datum over what is stated of them and of the reference, mean of the frames.
+fn over_variance(set: &Set, found: &FrameRegistration, named: Option<usize>) -> [f64; 2] {
+    let Some(datum) = found.frames[found.datum].filter(|_| Some(found.datum) != named) else { return [f64::NAN; 2] };
+    let (mut sums, mut count) = ([0.0; 2], 0.0_f64);
+    for k in (0..set.reference.len()).filter(|k| *k != found.datum && Some(*k) != named) {
+        let Some(placed) = found.frames[k] else { continue };
+        let truth = set.reference[found.datum].inverse() * set.reference[k];
+        let (mm, degrees) = apart(&(datum.world_from_frame.inverse() * placed.world_from_frame), &truth);
+        let variance = |first: usize| placed.covariance.fixed_view::<3, 3>(first, first).trace();
+        sums[0] += (1e-3 * mm).powi(2) / (variance(0) + REFERENCE_M.powi(2));
+        sums[1] += degrees.to_radians().powi(2) / (variance(3) + REFERENCE_DEG.to_radians().powi(2));
+        count += 1.0;
+    }
+    sums.map(|sum| sum / count)
 }
 
 /// 5 cm and 2 degrees, in directions that differ from frame to frame.

@@ -5,6 +5,7 @@
 //! Options: `folder` (of the real sequence), `simulated=off`, `seed` (of the simulated noise), `keyframe_overlap`, `max_keyframes`,
 //! `loop_attempts`, `window=20` (squared errors over variances of paths of so many frames instead), `levels`,
 //! `fusion=off`, `step_tolerance_m`, `noise_fraction`, `max_iterations`, `max_motion_sigma_m`, `every=1` (a line a frame);
+//! `sensors=20` (paths of so many simulated sensors whose ranges err alike in all frames, instead);
 //! of the real sequence `first` (frame), `count`, `backwards=1` and `hertz` (30); `invalid=scattered` or `clumps`: a fifth of all pixels
 //! is lost.
 #![allow(
@@ -29,6 +30,7 @@ use std::sync::Arc;
 
 use common::Pinhole;
 use common::invalid::{Loss, lose};
+use common::sensor::{distort, drawn};
 use cpu_clock::cpu_seconds;
 use icp_registration::{Fusion, Projection, TrackedPose, Tracker, TrackerOptions, TrackingState};
 use nalgebra::{Isometry3, Matrix3, Matrix4, Rotation3, UnitQuaternion};
@@ -93,14 +95,18 @@ fn track(
     (tracker, times)
 }
 
-/// Mean of the squared errors over their variances by axis, the reference's own error (8 mm, 0.3 degrees a pair) added.
-fn by_axis(tracked: &[TrackedPose], truth: &[Isometry3<f64>]) -> [f64; 6] {
+/// Standard deviations of the real sequence's reference, metre and radian along an axis: 8 mm, 0.3 degrees a pair.
+fn of_reference() -> [f64; 2] {
+    [8e-3, 0.3_f64.to_radians()].map(|sigma| sigma / 3.0_f64.sqrt())
+}
+
+/// Mean of the squared errors over their variances by axis, the reference's own error added.
+fn by_axis(tracked: &[TrackedPose], truth: &[Isometry3<f64>], reference: [f64; 2]) -> [f64; 6] {
     let mut sums = [0.0; 6];
     for (pose, truth) in tracked.iter().zip(truth).skip(1) {
         let error = icp_registration::pose_difference(&pose.world_from_camera, truth);
         for (k, sum) in sums.iter_mut().enumerate() {
-            let reference: f64 = if k < 3 { 8e-3 / 3.0_f64.sqrt() } else { 0.3_f64.to_radians() / 3.0_f64.sqrt() };
-            *sum += error[k].powi(2) / (pose.covariance[(k, k)] + reference.powi(2));
+            *sum += error[k].powi(2) / (pose.covariance[(k, k)] + reference[k / 3].powi(2));
         }
     }
     sums.map(|sum| sum / (tracked.len() - 1) as f64)
@@ -132,7 +138,7 @@ fn report(name: &str, tracker: &Tracker, times: &mut [f64], truth: &[Isometry3<f
     let in_world: Vec<TrackedPose> = online.to_vec();
     let from_first: Vec<Isometry3<f64>> = truth.iter().map(|pose| world.inverse() * pose).collect();
     println!("  normalised squared error {:.2} (6 expected)", normalised_error(&in_world, &from_first));
-    println!("  squared error over variance by axis {:.2?}", by_axis(&in_world, &from_first));
+    println!("  squared error over variance by axis {:.2?}", by_axis(&in_world, &from_first, of_reference()));
     let mean = times.iter().sum::<f64>() / times.len() as f64;
     times.sort_by(f64::total_cmp);
     println!(
@@ -153,6 +159,44 @@ fn simulated(camera: &Pinhole, name: &str) {
     };
     let (tracker, mut times) = track(&projection(camera), truth.len(), |k| k as f64 / sequence::HERTZ, frame);
     report(name, &tracker, &mut times, &truth);
+}
+
+/// Squared errors over variances of the paths of simulated sensors, whose ranges err alike in all frames, each in its own way:
+/// mean over the sensors by axis, and the largest share of it that comes from a single sensor.
+fn sensors(count: u64) {
+    const FRAMES: usize = 500;
+    let camera = Pinhole { width: 88, height: 72, focal_px: 76.0 };
+    let (projection, path) = (projection(&camera), (0..FRAMES).map(around).collect::<Vec<_>>());
+    for size in [20, 100, FRAMES] {
+        let mut of_sensors = Vec::new();
+        for sensor in 0..count {
+            let field = drawn(9_000 + sensor);
+            let mut sums = [0.0; 6];
+            let starts: Vec<usize> = (0..FRAMES).step_by(100.max(size)).collect();
+            for &first in &starts {
+                let frame = |k: usize| {
+                    let (mut points, sigma) = frame_at(&camera, &path[first + k], 1000 * sensor + (first + k) as u64);
+                    distort(&mut points, &camera, &field);
+                    (points, Some(sigma))
+                };
+                let (tracker, _) = track(&projection, size, |k| k as f64 / sequence::HERTZ, frame);
+                let truth: Vec<_> = path[first..first + size].iter().map(|pose| path[first].inverse() * pose).collect();
+                let axes = by_axis(tracker.trajectory(), &truth, [0.0; 2]);
+                sums.iter_mut().zip(axes).for_each(|(sum, axis)| *sum += axis / starts.len() as f64);
+            }
+            of_sensors.push(sums);
+        }
+        let mean: [f64; 6] = std::array::from_fn(|k| of_sensors.iter().map(|s| s[k]).sum::<f64>() / count as f64);
+        let mut every: Vec<f64> = of_sensors.into_iter().flatten().collect();
+        every.sort_by(f64::total_cmp);
+        let at = |share: f64| every[(share * (every.len() - 1) as f64) as usize];
+        println!(
+            "squared error over variance by axis, {count} sensors, {size} frames: {mean:.2?}; of one sensor and axis 5 % below {:.2}, median {:.2}, 95 % below {:.2}",
+            at(0.05),
+            at(0.5),
+            at(0.95)
+        );
+    }
 }
 
 /// Depth in millimetre as points of a camera that looks along -z with y up.
@@ -214,7 +258,7 @@ fn real(folder: &Path) {
                 track(&projection, size, |k| (number(first + k) - number(first)).abs() / hertz, |k| frame(first + k));
             let from_first: Vec<_> =
                 truth[first..first + size].iter().map(|pose| truth[first].inverse() * pose).collect();
-            let axes = by_axis(tracker.trajectory(), &from_first);
+            let axes = by_axis(tracker.trajectory(), &from_first, of_reference());
             sums.iter_mut().zip(axes).for_each(|(sum, axis)| *sum += axis / windows);
         }
         println!("squared error over variance by axis, {windows} windows of {size} frames: {sums:.2?}");
@@ -230,6 +274,10 @@ fn main() {
 }
 
 fn run() {
+    if let Some(count) = argument("sensors") {
+        sensors(count);
+        return;
+    }
     if argument::<String>("simulated").is_none_or(|simulated| simulated != "off") {
         simulated(&Pinhole::small(), "simulated room 176x144");
     }

@@ -1,5 +1,6 @@
 //! The systematic error that all frames of a sensor share: in covariances of pairs, and in paths with loops.
 
+use crate::common::sensor::{SIGMA, distort, drawn};
 use crate::common::{Cuboid, Pinhole, Scene, frame, look_at};
 use crate::sequence::{HERTZ, absolute_error, around, frame_at, poses, projection};
 use icp_registration::{
@@ -7,49 +8,9 @@ use icp_registration::{
     pose_difference,
 };
 use nalgebra::Isometry3;
-use rand::SeedableRng;
-use rand_distr::{Distribution, StandardNormal};
-use rand_pcg::Pcg64;
-
-/// Standard deviations by degree, metre of range.
-const SIGMA: [f64; 5] = [6e-3, 4e-3, 3e-3, 2e-3, 1e-3];
 
 fn camera() -> Pinhole {
     Pinhole { width: 88, height: 72, focal_px: 76.0 }
-}
-
-/// Coefficients of a field as they are drawn for one sensor, with their degrees along columns and rows.
-fn drawn(seed: u64) -> Vec<([usize; 2], f64)> {
-    let mut random = Pcg64::seed_from_u64(seed);
-    let degrees = (0..SIGMA.len()).flat_map(|degree| (0..=degree).map(move |down| [degree - down, down]));
-    let mut value = |sigma: f64| {
-        let n: f64 = StandardNormal.sample(&mut random);
-        sigma * n
-    };
-    degrees.map(|[across, down]| ([across, down], value(SIGMA[across + down]))).collect()
-}
-
-/// Polynomials of mean square 1 over -1 to 1, in closed form.
-fn polynomial(degree: usize, x: f64) -> f64 {
-    let value = match degree {
-        0 => 1.0,
-        1 => x,
-        2 => (3.0 * x * x - 1.0) / 2.0,
-        3 => (5.0 * x * x - 3.0) * x / 2.0,
-        _ => ((35.0 * x * x - 30.0) * x * x + 3.0) / 8.0,
-    };
-    value * (2.0 * degree as f64 + 1.0).sqrt()
-}
-
-/// Adds the field to the ranges.
-fn distort(points: &mut [[f64; 3]], camera: &Pinhole, field: &[([usize; 2], f64)]) {
-    for (k, point) in points.iter_mut().enumerate() {
-        let place = |index: usize, size: usize| (2 * index + 1) as f64 / size as f64 - 1.0;
-        let (x, y) = (place(k % camera.width, camera.width), place(k / camera.width, camera.height));
-        let error: f64 = field.iter().map(|([c, r], value)| value * polynomial(*c, x) * polynomial(*r, y)).sum();
-        let range = (point[0].powi(2) + point[1].powi(2) + point[2].powi(2)).sqrt();
-        *point = point.map(|v| v * (1.0 + error / range));
-    }
 }
 
 /// Mean normalised squared error of poses of a pair, with what is assumed of the shared error.

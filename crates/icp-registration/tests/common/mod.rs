@@ -5,6 +5,7 @@ pub mod frames;
 pub mod invalid;
 pub mod limit;
 pub mod scenes;
+pub mod sensor;
 pub mod stations;
 
 use icp_registration::{Cloud, OrganisedNormalOptions, organised_normals};

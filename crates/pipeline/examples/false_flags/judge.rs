@@ -18,7 +18,7 @@
 //! The first of these is measured at the end of all stages; the others are what flags have to say even where chance
 //! brought the range near the truth. A flag on any other pixel is **false**.
 
-use pipeline::{Outcome, Plan, Silent, ViewData, process};
+use pipeline::{Outcome, Silent, ViewData, process};
 use range_image::Flags;
 
 use super::Failure;
@@ -30,8 +30,8 @@ const FLOOR_M: f64 = 0.005;
 /// Mixed pixels that err by more than this are counted by themselves, metre.
 const FAR_M: f64 = 0.05;
 
-/// Flags that the stages `Unwrap`, `Deconvolve` and `Multipath` set on whole surfaces, and [`Flags::OUTSIDE_SPAN`].
-const OF_SURFACES: Flags = Flags::MULTIPATH.union(Flags::UNWRAP_UNSURE).union(Flags::OUTSIDE_SPAN);
+/// Share of right pixels that the tests for motion and for samples that do not fit each other flag, together.
+const LEVEL: f64 = 2e-4;
 
 /// Numbers of pixels.
 #[derive(Default)]
@@ -41,11 +41,6 @@ pub struct Counts {
     pub flagged: usize,
     /// With any flag, and right.
     pub false_flags: usize,
-    /// The same without flags of whole surfaces.
-    pub false_of_pixels: usize,
-    /// The same without mixed pixels. These stand out of the noise the more, the more frames there are, and with them the
-    /// pixels that cannot be told from them: narrow surfaces.
-    pub false_by_chance: usize,
     /// False ones of each of [`Flags::NAMED`].
     pub of_flag: [usize; Flags::NAMED.len()],
     /// With any flag, right, and narrow.
@@ -61,6 +56,13 @@ pub struct Counts {
 impl Counts {
     pub fn share(&self, count: usize) -> f64 {
         count as f64 / self.pixels.max(1) as f64
+    }
+
+    /// Whether these false flags are more than the others, of as many pixels, by more than chance: four standard deviations of
+    /// what the tests of a level flag.
+    pub fn is_above(&self, other: &Self) -> bool {
+        let by_chance = LEVEL * self.pixels as f64;
+        self.false_flags as f64 > other.false_flags as f64 + by_chance + 4.0 * by_chance.sqrt()
     }
 
     /// The largest share of false flags that is allowed: twice that of wrong pixels and 2 % of all.
@@ -93,8 +95,13 @@ fn is_plane(truth: &Truth, [col, row]: [usize; 2]) -> bool {
 
 /// Processes the first `frames` frames of each station and counts.
 pub fn count(capture: &Capture, frames: usize) -> Result<Counts, Failure> {
-    let plan = Plan::from_ron(&format!("(name: \"flags\", stages: [{}])", capture.stages), "flags.ron".as_ref())?;
-    let outcome = process(&plan, &capture.survey(frames)?, None, &Silent)?;
+    let outcome = process(&capture.plan(1)?, &capture.survey(frames)?, None, &Silent)?;
+    Ok(judge(capture, &outcome, frames))
+}
+
+/// The same with the samples of these frames summed before anything is made of them: a single frame of the same noise.
+pub fn count_of_sum(capture: &Capture, frames: usize) -> Result<Counts, Failure> {
+    let outcome = process(&capture.plan(frames)?, &capture.survey_of_sums(frames)?, None, &Silent)?;
     Ok(judge(capture, &outcome, frames))
 }
 
@@ -116,9 +123,6 @@ fn judge(capture: &Capture, outcome: &Outcome, frames: usize) -> Counts {
             counts.flagged += usize::from(flagged);
             counts.false_flags += usize::from(flagged && !wrong);
             counts.false_of_narrow += usize::from(flagged && !wrong && is_narrow(truth, pixel));
-            let of_pixel = *flags - OF_SURFACES;
-            counts.false_of_pixels += usize::from(!of_pixel.is_empty() && !wrong);
-            counts.false_by_chance += usize::from(!(of_pixel - Flags::MIXED_PIXEL).is_empty() && !wrong);
             counts.missed += usize::from(!right && !flagged);
             let far = truth.mixed[pixel] && error > FAR_M;
             counts.far_mixed += usize::from(far);

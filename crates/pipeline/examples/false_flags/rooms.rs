@@ -3,10 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use error_models::ModelSet;
+use pipeline::Plan;
 use range_image::{NoiseModel, Raster, RawFrame, Samples, demodulate};
 use range_io::calibration::Calibration;
 use range_io::survey::{
-    FrameEntry, InputFrame, Level, Survey, SurveyCamera, TruthFiles, TruthFrame, write_frame, write_truth,
+    FrameEntry, InputFrame, Level, Survey, SurveyCamera, TruthFiles, TruthFrame, read_frame, write_frame, write_truth,
 };
 use simulation::{SimulationSpec, Simulator};
 
@@ -38,22 +39,62 @@ pub struct Truth {
 /// A survey on disk and how it is processed.
 pub struct Capture {
     pub folder: PathBuf,
-    pub stages: String,
     pub truth: Vec<Truth>,
+    /// Noise of one frame.
+    noise: NoiseModel,
+    /// Stages after `Demodulate`.
+    stages: String,
     frames: Vec<FrameEntry>,
     camera: SurveyCamera,
     integration_time_s: f64,
 }
 
 impl Capture {
-    /// A survey of the first `count` frames of each station; its file.
+    /// The first `count` frames of each station; the survey's file.
     pub fn survey(&self, count: usize) -> Result<PathBuf, Failure> {
         let number = |entry: &&FrameEntry| entry.timestamp_s.is_some_and(|time| time < count as f64 - 0.5);
-        let frames: Vec<FrameEntry> = self.frames.iter().filter(number).cloned().collect();
+        self.write(&format!("survey_{count}.ron"), self.frames.iter().filter(number).cloned().collect())
+    }
+
+    /// One frame of each station whose samples are the means of those of the first `count`: a single frame with the noise
+    /// of so many; the survey's file.
+    pub fn survey_of_sums(&self, count: usize) -> Result<PathBuf, Failure> {
+        let survey = Survey::read(self.survey(count)?)?;
+        let (mut means, mut sum) = (Vec::new(), Vec::new());
+        for (index, entry) in survey.frames.iter().enumerate() {
+            let InputFrame::Samples(raw) = read_frame(&survey, &self.folder, index)? else { continue };
+            let Samples::U16(samples) = raw.samples() else { continue };
+            sum.resize(samples.len(), 0.0);
+            sum.iter_mut().zip(samples).for_each(|(sum, sample)| *sum += f64::from(*sample));
+            if entry.timestamp_s.is_some_and(|time| time < count as f64 - 1.5) {
+                continue;
+            }
+            let mean = Samples::F32(sum.drain(..).map(|sum| (sum / count as f64) as f32).collect());
+            let file = PathBuf::from(format!("frames/{}_mean_of_{count}.npz", entry.station));
+            let modulations = raw.modulations().to_vec();
+            let raw = RawFrame::new(raw.width(), raw.height(), raw.phase_steps(), modulations, mean)?;
+            write_frame(self.folder.join(&file), &InputFrame::Samples(raw))?;
+            means.push(FrameEntry { file, timestamp_s: Some(0.0), ..entry.clone() });
+        }
+        self.write(&format!("survey_of_sums_{count}.ron"), means)
+    }
+
+    /// The plan for frames of the noise that single frames have, or sums of so many.
+    pub fn plan(&self, summed: usize) -> Result<Plan, Failure> {
+        let fewer = 1.0 / (summed as f64).sqrt();
+        let NoiseModel { shot_variance_per_unit, dark_sigma } = self.noise;
+        let (low, shot, dark) = (LOW_AMPLITUDE * fewer, shot_variance_per_unit * fewer * fewer, dark_sigma * fewer);
+        let demodulate =
+            format!("Demodulate(low_amplitude: {low}, noise: (shot_variance_per_unit: {shot}, dark_sigma: {dark}))");
+        let text = format!("(name: \"flags\", stages: [{demodulate}, {}])", self.stages);
+        Ok(Plan::from_ron(&text, "flags.ron".as_ref())?)
+    }
+
+    fn write(&self, name: &str, frames: Vec<FrameEntry>) -> Result<PathBuf, Failure> {
         let truth = frames.iter().map(|entry| Path::new("truth").join(format!("{}.npz", entry.station))).collect();
         let mut survey = Survey::new(self.camera.clone(), Level::Samples, frames);
         survey.truth = Some(TruthFiles { frames: truth, ..TruthFiles::default() });
-        let file = self.folder.join(format!("survey_{count}.ron"));
+        let file = self.folder.join(name);
         survey.write(&file)?;
         Ok(file)
     }
@@ -138,7 +179,9 @@ pub fn simulated(folder: &Path, first: usize, amount: Amount) -> Result<Capture,
     let mut still = spec.clone();
     still.errors.noise = None;
     let (simulator, still) = (Simulator::new(&spec)?, Simulator::new(&still)?);
-    true_calibration(&spec)?.write(folder.join("calibration.ron"))?;
+    let calibration = true_calibration(&spec)?;
+    calibration.write(folder.join("calibration.ron"))?;
+    let noise = calibration.noise.ok_or("the scene has no noise")?;
     let (geometry, demodulation) = (spec.camera.geometry, spec.demodulation_options());
     let camera = SurveyCamera {
         width: SIZE[0],
@@ -154,14 +197,14 @@ pub fn simulated(folder: &Path, first: usize, amount: Amount) -> Result<Capture,
         raw_scale: demodulation.raw_scale,
     };
     let stages = format!(
-        "Demodulate(low_amplitude: {LOW_AMPLITUDE}), Average(), Deconvolve(), Unwrap(maximum_range_m: 12), \
-         CorrectRange(), CorrectImagePoint(), {LAST_STAGES}"
+        "Average(), Deconvolve(), Unwrap(maximum_range_m: 12), CorrectRange(), CorrectImagePoint(), {LAST_STAGES}"
     );
     let (truth, frames) = (Vec::new(), Vec::new());
     let mut capture = Capture {
         folder: folder.to_owned(),
-        stages,
         truth,
+        noise,
+        stages,
         frames,
         camera,
         integration_time_s: spec.exposure.integration_time_s,
@@ -286,13 +329,11 @@ pub fn cast(folder: &Path, first: usize, modulation_hz: &[f64], amount: Amount) 
     // Rounding adds the variance of a twelfth.
     let dark_sigma = (light.dark_sigma * light.dark_sigma + 1.0 / 12.0).sqrt();
     let unwrap = if modulation_hz.len() > 1 { "Unwrap()" } else { "Unwrap(maximum_range_m: 12)" };
-    let stages = format!(
-        "Demodulate(low_amplitude: {LOW_AMPLITUDE}, noise: (shot_variance_per_unit: {}, dark_sigma: {dark_sigma})), \
-         Average(), {unwrap}, {LAST_STAGES}",
-        light.gain
-    );
+    let noise = NoiseModel { shot_variance_per_unit: light.gain, dark_sigma };
+    let stages = format!("Average(), {unwrap}, {LAST_STAGES}");
     let (truth, frames) = (Vec::new(), Vec::new());
-    let mut capture = Capture { folder: folder.to_owned(), stages, truth, frames, camera, integration_time_s: 1e-3 };
+    let mut capture =
+        Capture { folder: folder.to_owned(), truth, noise, stages, frames, camera, integration_time_s: 1e-3 };
     for station in stations {
         let image = room.render(&light, station);
         let modulations = capture.camera.modulations()?;

@@ -6,6 +6,7 @@ mod bench;
 mod dependencies;
 mod fixtures;
 mod fuzz;
+mod house;
 mod nightly;
 mod peers;
 mod pipeline_task;

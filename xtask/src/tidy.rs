@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use crate::dependencies;
+use crate::house;
 use crate::shell::{Outcome, root};
 
 /// A file of source code holds one idea; beyond this it holds several.
@@ -17,6 +18,7 @@ pub(crate) fn run() -> Outcome {
     for folder in &crates {
         complaints.extend(missing_parts(folder));
         complaints.extend(tests_left_out(folder)?);
+        complaints.extend(house::complaints(folder)?);
     }
     let sources = files_below(&root, &["rs", "md"])?;
     let keys = bibliography_keys(&read(&root.join("docs/bibliography.md"))?);

@@ -1,11 +1,11 @@
-//! Bundle adjustment of a BAL problem: `bal PATH [full] [dogleg]`. Prints cost (half the sum of squares), iterations and
+//! Bundle adjustment of a BAL problem: `bal PATH [full]`. Prints cost (half the sum of squares), iterations and
 //! seconds. Descends until the relative decrease is below 1e-6, or, with `full`, adjusts a free network on all points with
 //! covariances.
 #![allow(clippy::print_stdout, clippy::unwrap_used, missing_docs)]
 
 use std::time::Instant;
 
-use adjust::{DatumDefect, Method, Scale, SolveOptions};
+use adjust::{DatumDefect, Scale, SolveOptions};
 
 #[allow(dead_code)]
 #[path = "../tests/common/bal.rs"]
@@ -26,7 +26,7 @@ fn run() {
     let words: Vec<String> = std::env::args().skip(1).collect();
     let has = |word: &str| words.iter().any(|given| given == word);
     let Some(text) = words.first().and_then(|path| std::fs::read_to_string(path).ok()) else {
-        println!("usage: bal PATH [full] [dogleg]");
+        println!("usage: bal PATH [full]");
         return;
     };
     let (wall, start) = (Instant::now(), cpu());
@@ -35,8 +35,7 @@ fn run() {
         return;
     };
     println!("read: {:.3} s CPU", cpu() - start);
-    let method = if has("dogleg") { Method::DogLeg } else { Method::default() };
-    let options = SolveOptions { method, ..SolveOptions::default() };
+    let options = SolveOptions::default();
     let start = cpu();
     if !has("full") {
         let descent = bundle.adjustment.descend(&options, 1e-6).unwrap();

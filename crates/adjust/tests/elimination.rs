@@ -137,7 +137,7 @@ fn the_laboratory_agrees_with_a_dense_bordered_adjustment() {
 fn methods_end_at_the_same_place() {
     let network = range_camera_network(&LABORATORY).free();
     let mut found = Vec::new();
-    for method in [Method::LevenbergMarquardt, Method::DogLeg, Method::GaussNewton] {
+    for method in [Method::LevenbergMarquardt, Method::GaussNewton] {
         let solution = network.adjustment.solve(&SolveOptions { method, ..SolveOptions::default() }).unwrap();
         found.push((solution.vtpv(), solution.covariance(network.parameters, Scale::Prior).unwrap(), solution));
     }
@@ -267,7 +267,7 @@ fn a_nonlinear_constraint_that_does_not_hold_at_the_start() {
         Ok(())
     });
     network.adjustment.add_constraint(square).unwrap();
-    for method in [Method::LevenbergMarquardt, Method::DogLeg, Method::GaussNewton] {
+    for method in [Method::LevenbergMarquardt, Method::GaussNewton] {
         let solution = network.adjustment.solve(&SolveOptions { method, ..SolveOptions::default() }).unwrap();
         assert_relative_eq!(solution.values(c).unwrap()[2], 8.0, epsilon = 1e-10);
         assert!(solution.covariance(c, Scale::Prior).unwrap()[(2, 2)].abs() < 1e-18);

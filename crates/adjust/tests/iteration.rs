@@ -30,7 +30,7 @@ fn decay(start: [f64; 2]) -> (Adjustment<'static>, BlockId) {
 #[test]
 fn the_trace_ends_undamped_below_the_tolerance() {
     let mut found = Vec::new();
-    for method in [Method::GaussNewton, Method::LevenbergMarquardt, Method::DogLeg] {
+    for method in [Method::GaussNewton, Method::LevenbergMarquardt] {
         let (a, b) = decay([1.0, 1.0]);
         let solution = a.solve(&SolveOptions { method, ..SolveOptions::default() }).unwrap();
         let trace = solution.trace();
@@ -41,7 +41,6 @@ fn the_trace_ends_undamped_below_the_tolerance() {
         assert_eq!(trace.len(), solution.iterations());
         let has = |kind| trace.iter().any(|entry| entry.kind == kind);
         assert_eq!(has(StepKind::Damped), method == Method::LevenbergMarquardt);
-        assert_eq!(has(StepKind::Trusted), method == Method::DogLeg);
         assert_relative_eq!(last.objective, solution.vtpv(), max_relative = 1e-12);
         found.push((solution.values(b).unwrap().to_vec(), solution.covariance(b, Scale::Prior).unwrap()));
     }
@@ -157,7 +156,7 @@ fn a_wrong_constraint_is_blamed_and_a_kink_is_not() {
 #[test]
 fn a_model_without_value_shortens_the_step() {
     // The full step from 4 goes to −1.5, where the root has no value.
-    for method in [Method::GaussNewton, Method::LevenbergMarquardt, Method::DogLeg] {
+    for method in [Method::GaussNewton, Method::LevenbergMarquardt] {
         let mut a = Adjustment::new();
         let x = a.add_block(ParameterBlock::euclidean([4.0]));
         let group = a.add_group("root");
@@ -180,7 +179,7 @@ fn a_model_without_value_shortens_the_step() {
 #[test]
 fn nonlinear_constraints_hold_at_the_end() {
     // The point of the unit circle that is nearest to (3, 4), from a start that is not on it.
-    for method in [Method::GaussNewton, Method::LevenbergMarquardt, Method::DogLeg] {
+    for method in [Method::GaussNewton, Method::LevenbergMarquardt] {
         let mut a = Adjustment::new();
         let p = a.add_block(ParameterBlock::euclidean([2.0, 0.1]));
         a.add_prior(p, &[3.0, 4.0], &Covariance::from_sigmas(&[1.0, 1.0])).unwrap();
@@ -205,44 +204,38 @@ fn nonlinear_constraints_hold_at_the_end() {
     }
 }
 
-/// Rosenbrock's valley with its floor beyond a circle: the way along the circle bends all the time, so that the region of
-/// trust binds and steps between the two legs are taken.
+/// Rosenbrock's valley with its floor beyond a circle: the way along the circle bends all the time.
 #[test]
 fn a_curved_valley_is_followed_along_a_constraint() {
-    let mut found = Vec::new();
-    for method in [Method::LevenbergMarquardt, Method::DogLeg] {
-        let mut a = Adjustment::new();
-        let x = a.add_block(ParameterBlock::euclidean([-1.2, 1.0]));
-        let group = a.add_group("valley");
-        let valley = FunctionObservation::new([x], 2, |parameters, residual, jacobians| {
-            let &[x, y] = parameters[0] else { return Err(EvaluationFailure::new("a point of the plane")) };
-            residual.copy_from_slice(&[-10.0 * (y - x * x), 2.0 - x]);
-            if let Some(jacobians) = jacobians {
-                jacobians.row(0, 0).copy_from_slice(&[-20.0 * x, 10.0]);
-                jacobians.row(0, 1)[0] = 1.0;
-            }
-            Ok(())
-        });
-        a.add_observation(group, valley, &Covariance::from_sigmas(&[1.0; 2])).unwrap();
-        let circle = FunctionObservation::new([x], 1, |parameters, residual, jacobians| {
-            let &[x, y] = parameters[0] else { return Err(EvaluationFailure::new("a point of the plane")) };
-            residual[0] = 9.0 - x * x - y * y;
-            if let Some(jacobians) = jacobians {
-                jacobians.row(0, 0).copy_from_slice(&[2.0 * x, 2.0 * y]);
-            }
-            Ok(())
-        });
-        a.add_constraint(circle).unwrap();
-        let solution = a.solve(&SolveOptions { method, ..SolveOptions::default() }).unwrap();
-        let &[x, y] = solution.values(x).unwrap() else { panic!("two values") };
-        assert_relative_eq!(x * x + y * y, 9.0, max_relative = 1e-14);
-        // On the circle the objective is stationary: its gradient has no part along the tangent (−y, x). The gradient's
-        // parts are of the order of 100, the step ended at 1e-8 standard deviations.
-        let gradient = [-200.0 * x * (y - x * x) - (2.0 - x), 100.0 * (y - x * x)];
-        assert!((gradient[1] * x - gradient[0] * y).abs() < 1e-5);
-        found.push([x, y]);
-    }
-    assert_relative_eq!(found[0][0], found[1][0], epsilon = 1e-9);
+    let mut a = Adjustment::new();
+    let x = a.add_block(ParameterBlock::euclidean([-1.2, 1.0]));
+    let group = a.add_group("valley");
+    let valley = FunctionObservation::new([x], 2, |parameters, residual, jacobians| {
+        let &[x, y] = parameters[0] else { return Err(EvaluationFailure::new("a point of the plane")) };
+        residual.copy_from_slice(&[-10.0 * (y - x * x), 2.0 - x]);
+        if let Some(jacobians) = jacobians {
+            jacobians.row(0, 0).copy_from_slice(&[-20.0 * x, 10.0]);
+            jacobians.row(0, 1)[0] = 1.0;
+        }
+        Ok(())
+    });
+    a.add_observation(group, valley, &Covariance::from_sigmas(&[1.0; 2])).unwrap();
+    let circle = FunctionObservation::new([x], 1, |parameters, residual, jacobians| {
+        let &[x, y] = parameters[0] else { return Err(EvaluationFailure::new("a point of the plane")) };
+        residual[0] = 9.0 - x * x - y * y;
+        if let Some(jacobians) = jacobians {
+            jacobians.row(0, 0).copy_from_slice(&[2.0 * x, 2.0 * y]);
+        }
+        Ok(())
+    });
+    a.add_constraint(circle).unwrap();
+    let solution = a.solve(&SolveOptions::default()).unwrap();
+    let &[x, y] = solution.values(x).unwrap() else { panic!("two values") };
+    assert_relative_eq!(x * x + y * y, 9.0, max_relative = 1e-14);
+    // On the circle the objective is stationary: its gradient has no part along the tangent (−y, x). The gradient's
+    // parts are of the order of 100, the step ended at 1e-8 standard deviations.
+    let gradient = [-200.0 * x * (y - x * x) - (2.0 - x), 100.0 * (y - x * x)];
+    assert!((gradient[1] * x - gradient[0] * y).abs() < 1e-5);
 }
 
 #[test]
@@ -285,16 +278,14 @@ fn a_descent_that_ends_on_a_plateau_is_tried_with_more_caution() {
         (0..100).map(|i| [10_f64.powf(-1.0 + 0.45 * f64::from(i / 10)), 10_f64.powf(-1.5 + 0.27 * f64::from(i % 10))]);
     for start in starts {
         for (scale, rate) in [(1.0, 1.0), (1e-3, 1e3), (7.0, 1e-4)] {
-            for method in [Method::LevenbergMarquardt, Method::DogLeg] {
-                let (a, b) = saturation([start[0] * scale, start[1] * rate], scale, rate);
-                match a.solve(&SolveOptions { method, ..SolveOptions::default() }) {
-                    Ok(solution) => {
-                        let values = solution.values(b).unwrap();
-                        assert_relative_eq!(values[0], 213.809_408_89 * scale, max_relative = 1e-9);
-                        assert_relative_eq!(values[1], 0.547_237_485_42 * rate, max_relative = 1e-9);
-                    }
-                    Err(error) => unsolved.push(format!("{start:?} {scale} {method:?}: {error}")),
+            let (a, b) = saturation([start[0] * scale, start[1] * rate], scale, rate);
+            match a.solve(&SolveOptions::default()) {
+                Ok(solution) => {
+                    let values = solution.values(b).unwrap();
+                    assert_relative_eq!(values[0], 213.809_408_89 * scale, max_relative = 1e-9);
+                    assert_relative_eq!(values[1], 0.547_237_485_42 * rate, max_relative = 1e-9);
                 }
+                Err(error) => unsolved.push(format!("{start:?} {scale}: {error}")),
             }
         }
     }

@@ -4,13 +4,8 @@ mod back_projection;
 mod camera;
 mod covariance;
 mod error;
-mod lens;
-#[cfg(feature = "convert")]
-mod lens_fit;
-mod lens_inverse;
+mod lenses;
 mod observation;
-#[cfg(feature = "convert")]
-mod plumb_bob;
 mod pose;
 mod projection;
 mod ray_table;
@@ -19,9 +14,9 @@ pub use back_projection::OrganisedCloud;
 pub use camera::{Camera, InteriorOrientation, LensDistortion};
 pub use covariance::{point_covariance, with_affinity_held};
 pub use error::{Error, Result};
-pub use observation::{Observation, ObservationJacobians};
 #[cfg(feature = "convert")]
-pub use plumb_bob::PlumbBob;
+pub use lenses::plumb_bob::PlumbBob;
+pub use observation::{Observation, ObservationJacobians};
 pub use pose::{
     computer_vision_from_photogrammetric, euler_from_pose, euler_from_rotation, pose_from_euler, rotation_from_euler,
     step_pose, with_computer_vision_axes,

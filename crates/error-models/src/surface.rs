@@ -3,7 +3,7 @@
 use range_image::ImageFormat;
 
 use crate::error::{require_count, require_finite, require_span};
-use crate::legendre::{Legendre, reduced};
+use crate::models::legendre::{Legendre, reduced};
 use crate::{Error, ImageSurface, Result, SurfaceShape};
 
 /// Part of the half span by which an image point may lie outside it and still be called inside: rounding.

@@ -1,38 +1,22 @@
 #![doc = include_str!("../README.md")]
 
-mod bending;
-mod cholesky;
-mod contradiction;
-mod detect;
 mod error;
-mod mixed;
-mod model;
-mod patches;
-mod pixel;
-mod profile;
-mod radiosity;
-mod refine;
-mod response;
-mod risk;
-mod search;
-mod single;
-mod solver;
-mod split;
-mod surfaces;
-mod two_path;
-mod vector;
+mod mixture;
+mod numbers;
+mod pixels;
+mod scene;
 
-pub use bending::Bending;
-pub use detect::{Detection, DetectionOptions, Detector, Evidence, detect};
 pub use error::{Error, Result};
-pub use mixed::{
+pub use mixture::mixed::{
     ComplexImage, MixedPixelTreatment, MixedPixels, NotSplit, SplitOptions, SplitPixel, SurfacePoint,
     treat_mixed_pixels,
 };
-pub use pixel::{MAXIMUM_FREQUENCIES, Systematics};
-pub use response::{FrequencyResponse, ResponseEstimate, estimate_response};
-pub use risk::{AlbedoScale, Risk, RiskEvidence, RiskOptions, assess_risk, ranges_from_depths};
-pub use search::SearchSpan;
-pub use two_path::{
+pub use pixels::pixel::{MAXIMUM_FREQUENCIES, Systematics};
+pub use pixels::response::{FrequencyResponse, ResponseEstimate, estimate_response};
+pub use pixels::search::SearchSpan;
+pub use pixels::two_path::{
     Hypothesis, PixelHypotheses, PixelPaths, TwoPathImage, TwoPathOptions, TwoPathSolver, Verdict, solve_two_paths,
 };
+pub use scene::bending::Bending;
+pub use scene::detect::{Detection, DetectionOptions, Detector, Evidence, detect};
+pub use scene::risk::{AlbedoScale, Risk, RiskEvidence, RiskOptions, assess_risk, ranges_from_depths};

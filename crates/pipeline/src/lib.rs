@@ -41,6 +41,11 @@ mod view;
 mod warm_up;
 mod work;
 
+pub use self::warm_up::{
+    ReferenceUse, WarmUpBlock, WarmUpParameter, WarmUpPhase, WarmUpRateTest, WarmUpRequest, WarmUpSummary, WarmUpTest,
+    estimate_warm_up,
+};
+pub use ::warm_up::{ChangeOptions, DriftOptions, TemperatureUse};
 pub use calibrate::{
     CalibrateMethod, CalibrateRequest, CalibrationSummary, Certificate, CertificateRequest, CertifiedStation,
     CertifiedTarget, Conditions, CorrelationSummary, DecisionSummary, ExpandedUncertainty, GroupSummary, HeldOut,
@@ -88,10 +93,8 @@ pub use scattering::{
     estimate_scattering,
 };
 pub use scattering_deconvolution::{EstimationOptions, TermCount, TermShape};
-pub use self_calibration::{
-    CalibrationOptions, CandidateGrid, ChangeOptions, DriftOptions, Method, NetworkDatum, NoiseFitOptions,
-    PatternOptions, PlanOptions, TemperatureUse, TermSelection,
-};
+pub use self_calibration::{CalibrationOptions, CandidateGrid, Method, NetworkDatum, PlanOptions, TermSelection};
+pub use sensor_noise::{NoiseFitOptions, PatternOptions};
 pub use simulate::{Simulated, simulate};
 pub use summary::{
     PairSummary, ReferenceSummary, RegistrationSummary, StageSummary, StationTruth, Summary, TruthSummary,
@@ -101,7 +104,3 @@ pub use trends::{RemainingErrors, TrendSummary};
 pub use truth::{RangeTruth, ViewTruth};
 pub use verdict::{Doubt, DoubtKind, Failure, Judged, Verdict};
 pub use view::{Snapshot, View, ViewData};
-pub use warm_up::{
-    ReferenceUse, WarmUpBlock, WarmUpParameter, WarmUpPhase, WarmUpRateTest, WarmUpRequest, WarmUpSummary, WarmUpTest,
-    estimate_warm_up,
-};

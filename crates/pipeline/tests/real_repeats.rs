@@ -4,10 +4,10 @@ use crate::common::{fixtures, has_capture};
 use camera_model::Camera;
 use error_models::{AmplitudeScale, ModelSet, RangeNoise};
 use pipeline::{Plan, Silent, ViewData, process};
+use primitives::{PrimitiveFit, PrimitiveKind, PrimitiveOptions, fit_primitive};
 use range_image::{RangeFrame, average_ranges};
 use range_io::calibration::Calibration;
 use range_io::survey::Survey;
-use self_calibration::{PrimitiveFit, PrimitiveKind, PrimitiveOptions, fit_primitive};
 
 /// Columns and rows of the floor before the camera, all of it within the first ambiguity interval.
 const FLOOR: [[usize; 2]; 2] = [[72, 104], [114, 140]];
@@ -86,7 +86,7 @@ fn averaging_halves_the_random_part_and_leaves_the_rest() {
         let expected = (before.powi(2) - 0.75 * of_one.powi(2)).sqrt();
         assert!((after / expected - 1.0).abs() < 0.15, "{after} mm, {expected} mm expected");
         assert!(after > of_four, "averaging leaves what is not random");
-        if let self_calibration::Primitive::Plane { distance_m, .. } = mean.primitive {
+        if let primitives::Primitive::Plane { distance_m, .. } = mean.primitive {
             distances.push(distance_m);
         }
     }

@@ -1,59 +1,35 @@
 #![doc = include_str!("../README.md")]
 
-mod alias;
-mod average;
-mod beat;
-mod channel;
+mod averaging;
 mod chi_squared;
-mod consistency;
-mod demodulate;
+mod demodulation;
 mod error;
-mod flags;
-mod frame;
-mod fusion;
-mod fusion_bias;
-mod harmonics;
-mod image_format;
-mod interference;
-mod mean_flags;
-mod modulation;
-mod noise;
-mod options;
-mod phase_level;
-mod plateau;
-mod polar;
-mod polar_level;
-mod raster;
-mod rest;
-mod rest_pixel;
-mod rules_loop;
-mod sample_rules;
-mod samples;
-mod weights;
-mod wide;
-mod wide_registers;
+mod rasters;
+mod sample_checks;
 
-pub use alias::AliasCorrection;
-pub use average::{average, average_ranges, sigma_from_repeats};
-pub use channel::ComplexChannel;
+pub use averaging::average::{average, average_ranges, sigma_from_repeats};
+pub use averaging::fusion::{Exposure, Fusion, FusionOptions, fuse_exposures};
+pub use averaging::rest::{FrameDeviation, Rest, RestOptions, RestVerdict, check_rest, check_rest_of_ranges};
 pub use chi_squared::chi_squared_upper_quantile;
-pub use consistency::{
+pub use demodulation::alias::AliasCorrection;
+pub use demodulation::demodulate::{Demodulator, demodulate};
+pub use demodulation::harmonics::{HarmonicImage, HarmonicRatio, harmonic_ratio, harmonics};
+pub use demodulation::polar_level::PolarChannel;
+pub use demodulation::wide_registers::with_wide_registers;
+pub use error::{Error, Result};
+pub use rasters::channel::ComplexChannel;
+pub use rasters::flags::Flags;
+pub use rasters::frame::{ComplexFrame, RangeFrame, RawFrame, Samples};
+pub use rasters::image_format::ImageFormat;
+pub use rasters::modulation::{Modulation, SPEED_OF_LIGHT};
+pub use rasters::noise::NoiseModel;
+pub use rasters::options::DemodulationOptions;
+pub use rasters::phase_level::{PhaseConvention, PhaseSense};
+pub use rasters::raster::Raster;
+pub use sample_checks::consistency::{
     ConsistencyOptions, ConsistencySummary, OffsetRule, PlateauOptions, RulesVerdict, SampleCheck, SaturationVerdict,
     check_samples,
 };
-pub use demodulate::{Demodulator, demodulate};
-pub use error::{Error, Result};
-pub use flags::Flags;
-pub use frame::{ComplexFrame, RangeFrame, RawFrame, Samples};
-pub use fusion::{Exposure, Fusion, FusionOptions, fuse_exposures};
-pub use harmonics::{HarmonicImage, HarmonicRatio, harmonic_ratio, harmonics};
-pub use image_format::ImageFormat;
-pub use interference::{Interference, InterferenceOptions, InterferenceVerdict, check_interference, tell_interference};
-pub use modulation::{Modulation, SPEED_OF_LIGHT};
-pub use noise::NoiseModel;
-pub use options::DemodulationOptions;
-pub use phase_level::{PhaseConvention, PhaseSense};
-pub use polar_level::PolarChannel;
-pub use raster::Raster;
-pub use rest::{FrameDeviation, Rest, RestOptions, RestVerdict, check_rest, check_rest_of_ranges};
-pub use wide_registers::with_wide_registers;
+pub use sample_checks::interference::{
+    Interference, InterferenceOptions, InterferenceVerdict, check_interference, tell_interference,
+};

@@ -1,46 +1,44 @@
 #![doc = include_str!("../README.md")]
 
 pub mod atomic;
-#[cfg(feature = "azure")]
-pub mod azure;
 #[cfg(feature = "calibration")]
 pub mod calibration;
-#[cfg(any(feature = "e57", feature = "pcd", feature = "ply", feature = "vtk", feature = "xyz"))]
-pub mod clouds;
-#[cfg(feature = "e57")]
-pub mod e57;
 mod error;
-mod fault;
-pub mod limits;
-#[cfg(any(feature = "pcd", feature = "ply", feature = "xyz"))]
-mod lines;
-#[cfg(feature = "mkv")]
-pub mod mkv;
-#[cfg(feature = "npz")]
-pub mod npz;
-mod open;
-#[cfg(feature = "pcd")]
-pub mod pcd;
-#[cfg(feature = "ply")]
-pub mod ply;
-#[cfg(feature = "png16")]
-pub mod png16;
+mod formats;
 #[cfg(any(feature = "e57", feature = "pcd", feature = "ply", feature = "trajectory"))]
 mod pose;
-#[cfg(feature = "ron_text")]
-pub mod ron_text;
 #[cfg(feature = "survey")]
 pub mod survey;
 #[cfg(feature = "tables")]
 pub mod tables;
+mod text;
 #[cfg(feature = "trajectory")]
 pub mod trajectory;
-#[cfg(feature = "vtk")]
-pub mod vtk;
-#[cfg(feature = "xyz")]
-pub mod xyz;
 
 #[cfg(any(feature = "survey", feature = "calibration"))]
 pub(crate) use error::InvalidField;
 pub use error::{Error, Result};
-pub use open::{open, read_bytes, read_ron_text, read_text};
+#[cfg(feature = "azure")]
+pub use formats::azure;
+#[cfg(any(feature = "e57", feature = "pcd", feature = "ply", feature = "vtk", feature = "xyz"))]
+pub use formats::clouds;
+#[cfg(feature = "e57")]
+pub use formats::e57;
+#[cfg(feature = "mkv")]
+pub use formats::mkv;
+#[cfg(feature = "npz")]
+pub use formats::npz;
+#[cfg(feature = "pcd")]
+pub use formats::pcd;
+#[cfg(feature = "ply")]
+pub use formats::ply;
+#[cfg(feature = "png16")]
+pub use formats::png16;
+#[cfg(feature = "vtk")]
+pub use formats::vtk;
+#[cfg(feature = "xyz")]
+pub use formats::xyz;
+pub use text::limits;
+pub use text::open::{open, read_bytes, read_ron_text, read_text};
+#[cfg(feature = "ron_text")]
+pub use text::ron_text;

@@ -4,17 +4,17 @@ use std::path::PathBuf;
 
 use clap::{Parser, Subcommand};
 
-use crate::calibrate_arguments::CalibrateArguments;
-use crate::compare_arguments::CompareArguments;
-use crate::diff_arguments::DiffArguments;
-use crate::explain_arguments::ExplainArguments;
-use crate::fixed_pattern_arguments::FixedPatternArguments;
-use crate::noise_arguments::NoiseArguments;
-use crate::plan_arguments::PlanArguments;
-use crate::register_arguments::RegisterArguments;
-use crate::scattering_arguments::ScatteringArguments;
-use crate::values::{not_negative, share};
-use crate::warm_up_arguments::WarmUpArguments;
+use crate::requests::calibrate_arguments::CalibrateArguments;
+use crate::requests::compare_arguments::CompareArguments;
+use crate::requests::diff_arguments::DiffArguments;
+use crate::requests::explain_arguments::ExplainArguments;
+use crate::requests::fixed_pattern_arguments::FixedPatternArguments;
+use crate::requests::noise_arguments::NoiseArguments;
+use crate::requests::plan_arguments::PlanArguments;
+use crate::requests::register_arguments::RegisterArguments;
+use crate::requests::scattering_arguments::ScatteringArguments;
+use crate::requests::values::{not_negative, share};
+use crate::requests::warm_up_arguments::WarmUpArguments;
 
 /// Raw frames of a range camera in, one corrected and registered cloud out.
 #[derive(Debug, Parser)]

@@ -8,7 +8,7 @@ use pipeline::{Plan, RunRequest, SimulateSource};
 
 use crate::arguments::Command;
 use crate::output::Output;
-use crate::register_arguments::Request;
+use crate::requests::register_arguments::Request;
 
 type Outcome = Result<ExitCode, Box<dyn Error>>;
 

@@ -2,21 +2,11 @@
 
 mod arguments;
 mod bar;
-mod calibrate_arguments;
 mod commands;
-mod compare_arguments;
-mod diff_arguments;
 mod escape;
 mod exit;
-mod explain_arguments;
-mod fixed_pattern_arguments;
-mod noise_arguments;
 mod output;
-mod plan_arguments;
-mod register_arguments;
-mod scattering_arguments;
-mod values;
-mod warm_up_arguments;
+mod requests;
 
 use std::ffi::OsString;
 use std::process::ExitCode;

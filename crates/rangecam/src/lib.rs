@@ -40,6 +40,19 @@ pub use self_calibration;
 #[doc(inline)]
 pub use simulation;
 
+#[cfg(feature = "primitives")]
+#[doc(inline)]
+pub use primitives;
+#[cfg(feature = "residual-tests")]
+#[doc(inline)]
+pub use residual_tests;
+#[cfg(feature = "sensor-noise")]
+#[doc(inline)]
+pub use sensor_noise;
+#[cfg(feature = "warm-up")]
+#[doc(inline)]
+pub use warm_up;
+
 // The example of the repository's README is compiled here.
 #[cfg(all(doctest, feature = "range-image"))]
 #[doc = include_str!("../../../README.md")]

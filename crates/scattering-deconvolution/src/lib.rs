@@ -1,32 +1,13 @@
 #![doc = include_str!("../README.md")]
 
-mod blobs;
-mod composite;
-mod convolution;
-mod dependence;
 mod error;
 #[cfg(feature = "estimate")]
 mod estimate;
-mod field;
-mod frame;
-mod grid;
-mod kernel;
-mod lanes;
-mod mask;
-mod model;
-mod noise;
-mod operator;
-mod options;
+mod kernels;
 mod outside;
-mod parts;
-mod psf;
-mod restorer;
-mod scatterer;
-mod sigma;
-mod spectrum;
-mod work;
+mod restoration;
+mod spread;
 
-pub use composite::{CompositePsf, FieldTerm, Ghost, GhostDelay, GhostPlace};
 pub use error::{Error, Result};
 #[cfg(feature = "estimate")]
 pub use estimate::{
@@ -34,11 +15,12 @@ pub use estimate::{
     NuisanceValues, PsfEstimate, PsfParameter, TermCount, TermShape, TwoPlaneCapture, Verdict, estimate_psf,
     object_mask, true_phases,
 };
-pub use field::FieldPolynomial;
-pub use frame::restore;
-pub use kernel::{GAUSSIAN_CUT_SIGMAS, SampledKernel};
-pub use options::{GridSpacing, Refinement, RestorationOptions, SaturatedLight};
+pub use kernels::kernel::{GAUSSIAN_CUT_SIGMAS, SampledKernel};
 pub use outside::{DarkPixels, OutsideLight, OutsideLightDetector, OutsideLightOptions, OutsideLightVerdict, Side};
-pub use psf::{GaussianTerm, Psf};
-pub use restorer::{RestorationSummary, Restorer};
-pub use scatterer::Scatterer;
+pub use restoration::frame::restore;
+pub use restoration::restorer::{RestorationSummary, Restorer};
+pub use restoration::scatterer::Scatterer;
+pub use spread::composite::{CompositePsf, FieldTerm, Ghost, GhostDelay, GhostPlace};
+pub use spread::field::FieldPolynomial;
+pub use spread::options::{GridSpacing, Refinement, RestorationOptions, SaturatedLight};
+pub use spread::psf::{GaussianTerm, Psf};

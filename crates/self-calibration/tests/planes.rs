@@ -9,7 +9,7 @@ use rand::SeedableRng;
 use rand_distr::{Distribution, Normal};
 use rand_pcg::Pcg64;
 use range_image::{Flags, ImageFormat, RangeFrame, Raster};
-use self_calibration::{DifferenceOptions, Error, Plane, RangeTermOptions, differences_to_plane, estimate_range_terms};
+use self_calibration::{DifferenceOptions, Plane, RangeTermOptions, differences_to_plane, estimate_range_terms};
 
 fn camera() -> Camera {
     let format = ImageFormat::new(44, 36, [0.16, 0.16]).unwrap();
@@ -62,7 +62,7 @@ fn a_facing_plane_has_its_distance_along_the_axis() {
     assert!(Plane::new(&Vector3::x(), &Point3::new(f64::NAN, 0.0, 0.0)).is_err());
     let behind = Plane::new(&Vector3::z(), &Point3::new(0.0, 0.0, 1.0)).unwrap();
     let answer = behind.reference_range(&camera, &Isometry3::identity(), [3.0, 4.0]);
-    assert!(matches!(answer, Err(Error::PlaneNotSeen { .. })));
+    assert!(matches!(answer, Err(primitives::Error::PlaneNotSeen { .. })));
 }
 
 #[test]
@@ -96,7 +96,7 @@ fn pixels_are_chosen_by_flag_window_step_and_incidence() {
         DifferenceOptions { largest_incidence_rad: -0.1, ..default },
     ] {
         let answer = differences_to_plane(&frame, &camera, &pose, &plane, &bad);
-        assert!(matches!(answer, Err(Error::OutOfDomain { .. })));
+        assert!(matches!(answer, Err(primitives::Error::OutOfDomain { .. })));
     }
     frame.range = Raster::filled(3, 3, 1.0);
     assert!(differences_to_plane(&frame, &camera, &pose, &plane, &default).is_err());

@@ -2,7 +2,7 @@
 
 use super::network::{LARGEST_PRICE, Network, UNPRICED};
 use super::regions::{NONE, OUTSIDE, Regions};
-use crate::grid::Grid;
+use crate::tree::grid::Grid;
 
 /// Circular array of buckets: reduced costs are at most twice the largest price.
 const BUCKETS: usize = 256;

@@ -2,7 +2,7 @@
 
 use super::ExactUnwrapped;
 use super::network::Network;
-use crate::grid::{Grid, wrap_step};
+use crate::tree::grid::{Grid, wrap_step};
 
 /// Padded planes of the result.
 #[derive(Debug, Default)]

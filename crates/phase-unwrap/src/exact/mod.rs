@@ -7,7 +7,7 @@ mod regions;
 
 use range_image::Raster;
 
-use crate::grid::Grid;
+use crate::tree::grid::Grid;
 use crate::{Error, Result};
 use flow::Flow;
 use integrate::Integration;

@@ -8,7 +8,7 @@ use std::f32::consts::{PI, TAU};
 use range_image::Raster;
 
 use super::CutPrice;
-use crate::grid::{Grid, wrap_step, wrapped};
+use crate::tree::grid::{Grid, wrap_step, wrapped};
 
 /// Largest price of an edge; the smallest is 1, and 0 marks a step that a masked pixel takes away.
 pub(super) const LARGEST_PRICE: u8 = 100;

@@ -1,7 +1,7 @@
 //! Loops that masked pixels join: the outside of the image, and holes in it.
 
 use super::network::Network;
-use crate::grid::Grid;
+use crate::tree::grid::Grid;
 
 /// Region of a loop of four used pixels.
 pub(super) const NONE: u32 = 0;

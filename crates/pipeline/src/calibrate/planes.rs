@@ -185,7 +185,7 @@ impl<'a> Scene<'a> {
     }
 }
 
-fn plane_of((normal, d): ([f64; 3], f64)) -> self_calibration::Result<Plane> {
+fn plane_of((normal, d): ([f64; 3], f64)) -> primitives::Result<Plane> {
     let normal = Vector3::from(normal);
     Plane::new(&normal, &Point3::from(normal * (d / normal.norm_squared())))
 }

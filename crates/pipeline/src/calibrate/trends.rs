@@ -1,9 +1,8 @@
 //! Whether what a calibration leaves of the ranges is random.
 
 use error_models::FixedPattern;
-use self_calibration::{
-    CalibrationOutcome, Component, ObservationQuality, TrendOptions, TrendSample, Verdict, test_trends,
-};
+use residual_tests::{TrendOptions, TrendSample, test_trends};
+use self_calibration::{CalibrationOutcome, Component, ObservationQuality, Verdict};
 
 use crate::trends::TrendSummary;
 

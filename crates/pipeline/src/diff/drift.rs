@@ -3,7 +3,7 @@
 use error_models::NamedParameter;
 use nalgebra::DMatrix;
 use range_io::calibration::{CalibratedDrift, Calibration};
-use self_calibration::{DriftDifference, DriftSide, compare_drifts};
+use residual_tests::{DriftDifference, DriftSide, compare_drifts};
 use serde::Serialize;
 
 use super::refused;

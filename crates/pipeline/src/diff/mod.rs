@@ -8,7 +8,7 @@ mod words;
 use std::path::PathBuf;
 
 use range_io::calibration::Calibration;
-use self_calibration::{
+use residual_tests::{
     CorrectionComparison, CorrectionDifference, ImageComparison, ImageSide, JointTest, ParameterDifference,
     compare_corrections, compare_images, compare_parameters,
 };
@@ -218,7 +218,7 @@ fn only(parameters: Vec<String>, models: Vec<String>, here: &Calibration, there:
     parameters.into_iter().chain(models).chain(further).collect()
 }
 
-fn refused(error: &self_calibration::Error) -> Error {
+fn refused(error: &residual_tests::Error) -> Error {
     Error::Diff(error.to_string())
 }
 
@@ -309,7 +309,7 @@ fn image(first: &Side, second: &Side, level: f64) -> Result<Option<ImageLine>> {
         Ok(ImageComparison { largest_px, pixel, band_px, rms_px, significant, .. }) => {
             Ok(Some(ImageLine { largest_px, pixel, band_px, rms_px, significant }))
         }
-        Err(self_calibration::Error::Camera(_)) => Ok(None),
+        Err(residual_tests::Error::Camera(_)) => Ok(None),
         Err(error) => Err(refused(&error)),
     }
 }

@@ -4,7 +4,7 @@ use camera_model::Camera;
 use error_models::{FixedPattern, NamedParameter, RangeErrorModel};
 use nalgebra::DMatrix;
 use range_io::calibration::{Calibration, RangeCalibration};
-use self_calibration::{CorrectionSide, ParameterSet};
+use residual_tests::{CorrectionSide, ParameterSet};
 
 use super::drift;
 use crate::Result;

@@ -76,7 +76,13 @@ pub(super) fn of_source(source: &(dyn StdError + 'static)) -> Failure {
         source.downcast_ref::<std::io::Error>().map(of_system),
         source.downcast_ref::<self_calibration::Error>().map(of_estimation),
         source.downcast_ref::<icp_registration::Error>().map(of_registration),
-        source.downcast_ref::<self_calibration::DriftError>().map(of_drift_estimation),
+        source.downcast_ref::<sensor_noise::Error>().map(of_noise),
+        source.downcast_ref::<primitives::Error>().map(of_primitive),
+        source.downcast_ref::<residual_tests::Error>().map(|error| {
+            use residual_tests::Error as Cause;
+            slip(!matches!(error, Cause::TooFewResiduals { .. } | Cause::Model(_)))
+        }),
+        source.downcast_ref::<warm_up::DriftError>().map(of_drift_estimation),
         source.downcast_ref::<DriftError>().map(|error| slip(!matches!(error, DriftError::Reference { .. }))),
         source
             .downcast_ref::<multipath::Error>()
@@ -111,14 +117,32 @@ pub(super) fn of_estimation(error: &self_calibration::Error) -> Failure {
         | Cause::ConflictingTerms { .. }
         | Cause::Datum { .. }
         | Cause::MethodNeeds { .. }
-        | Cause::FramesDiffer { .. }
-        | Cause::NoAmplitudes { .. }
         | Cause::OutsideImage(_)
         | Cause::Camera(_)
         | Cause::Image(_) => Failure::Usage,
         // All of a column is wrong: a slip in the input, not a finding about the network.
         Cause::Contradiction(found) if found.is_wrong_input() => Failure::Usage,
+        Cause::Primitive(error) => of_primitive(error),
         Cause::Registration { reason, .. } => of_registration(reason),
+        _ => Failure::Refused,
+    }
+}
+
+fn of_noise(error: &sensor_noise::Error) -> Failure {
+    use sensor_noise::Error as Cause;
+    match error {
+        Cause::OutOfDomain { .. } | Cause::FramesDiffer { .. } | Cause::NoAmplitudes { .. } | Cause::Image(_) => {
+            Failure::Usage
+        }
+        Cause::Primitive(error) => of_primitive(error),
+        _ => Failure::Refused,
+    }
+}
+
+fn of_primitive(error: &primitives::Error) -> Failure {
+    use primitives::Error as Cause;
+    match error {
+        Cause::OutOfDomain { .. } | Cause::Camera(_) | Cause::Image(_) => Failure::Usage,
         _ => Failure::Refused,
     }
 }
@@ -143,8 +167,8 @@ pub(super) fn of_registration(error: &icp_registration::Error) -> Failure {
     }
 }
 
-fn of_drift_estimation(error: &self_calibration::DriftError) -> Failure {
-    use self_calibration::DriftError as Cause;
+fn of_drift_estimation(error: &warm_up::DriftError) -> Failure {
+    use warm_up::DriftError as Cause;
     match error {
         Cause::OutOfDomain { .. }
         | Cause::BadSample { .. }

@@ -8,7 +8,7 @@ use std::time::Instant;
 use range_io::atomic::Destination;
 use range_io::calibration::Calibration;
 use range_io::survey::{Level, Survey};
-use self_calibration::{PatternEstimate, PatternOptions, PatternVerdict, WallCapture, estimate_fixed_pattern};
+use sensor_noise::{PatternEstimate, PatternOptions, PatternVerdict, WallCapture, estimate_fixed_pattern};
 
 pub use summary::{FixedPatternSummary, PatternWall};
 

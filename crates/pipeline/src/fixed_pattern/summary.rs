@@ -3,7 +3,7 @@
 use std::fmt;
 use std::path::PathBuf;
 
-use self_calibration::{PatternEstimate, PatternSplit, WallQuality};
+use sensor_noise::{PatternEstimate, PatternSplit, WallQuality};
 use serde::Serialize;
 
 use super::{FixedPatternRequest, is_applied};

@@ -3,7 +3,7 @@
 use error_models::{NamedParameter, RangeNoise};
 use range_image::{ComplexFrame, DemodulationOptions, Flags, NoiseModel, RangeFrame, Raster, RawFrame, demodulate};
 use range_io::survey::Survey;
-use self_calibration::{
+use sensor_noise::{
     NoiseFitOptions, RepeatedRanges, RepeatedSamples, SampleUnits, SigmaCheck, VarianceFit, check_complex_sigma,
     check_range_sigma, estimate_range_noise, estimate_sample_noise,
 };
@@ -28,7 +28,7 @@ pub(super) enum NoiseTerm {
 }
 
 /// What the frames themselves do not determine is no failure of the run.
-type Answer = std::result::Result<Estimate, self_calibration::Error>;
+type Answer = std::result::Result<Estimate, sensor_noise::Error>;
 
 impl Estimate {
     /// From samples where there are any; else from ranges, or from phases as ranges.

@@ -8,7 +8,7 @@ use std::time::Instant;
 
 use range_io::atomic::Destination;
 use range_io::calibration::Calibration;
-use self_calibration::NoiseFitOptions;
+use sensor_noise::NoiseFitOptions;
 
 pub use summary::{NoiseBin, NoiseParameter, NoiseStation, NoiseSummary, SigmaBinSummary};
 

@@ -4,7 +4,7 @@ use std::fmt;
 use std::path::PathBuf;
 
 use error_models::{AmplitudeScale, ParameterStatus, RangeNoise};
-use self_calibration::{SigmaCheck, SigmaVerdict, VarianceEstimator, VarianceFit};
+use sensor_noise::{SigmaCheck, SigmaVerdict, VarianceEstimator, VarianceFit};
 use serde::Serialize;
 
 use super::NoiseRequest;
@@ -123,7 +123,7 @@ impl NoiseSummary {
         let fit = &estimate.fit;
         let [[a, b], [_, d]] = fit.covariance;
         let of_samples = matches!(estimate.term, NoiseTerm::Samples(_));
-        let bin = |bin: &self_calibration::VarianceBin| NoiseBin {
+        let bin = |bin: &sensor_noise::VarianceBin| NoiseBin {
             light: if of_samples { bin.regressor } else { bin.regressor.powf(-0.5) },
             sigma_observed: bin.variance.sqrt(),
             sigma_modelled: (fit.slope * bin.regressor + fit.level).sqrt(),
@@ -201,7 +201,7 @@ impl NoiseParameter {
 }
 
 impl NoiseStation {
-    fn new(steadiness: &self_calibration::Steadiness) -> Self {
+    fn new(steadiness: &sensor_noise::Steadiness) -> Self {
         let known = |value: f64| Some(value).filter(|value| value.is_finite());
         Self {
             station: steadiness.station.clone(),
@@ -215,7 +215,7 @@ impl NoiseStation {
 }
 
 fn sigma_bins(check: &SigmaCheck) -> Vec<SigmaBinSummary> {
-    let bin = |bin: &self_calibration::SigmaBin| SigmaBinSummary {
+    let bin = |bin: &sensor_noise::SigmaBin| SigmaBinSummary {
         amplitude: bin.amplitude,
         values: bin.values,
         ratio: bin.ratio,

@@ -1,7 +1,7 @@
 //! The report of an estimation of a fixed pattern.
 
 use error_models::FixedPattern;
-use self_calibration::PatternEstimate;
+use sensor_noise::PatternEstimate;
 
 use super::chart::{Axes, Series, histogram};
 use super::colour::{CATEGORIES, ColourMap};

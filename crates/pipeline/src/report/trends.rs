@@ -1,6 +1,6 @@
 //! Mean residuals in bins of what they might still depend on.
 
-use self_calibration::TrendVariable;
+use residual_tests::TrendVariable;
 
 use super::chart::{Axes, Series, curves};
 use super::colour::CATEGORIES;

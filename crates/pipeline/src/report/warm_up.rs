@@ -1,7 +1,7 @@
 //! The report of an estimation of a drift.
 
 use error_models::WarmUp;
-use self_calibration::{DriftEstimate, DriftSample};
+use warm_up::{DriftEstimate, DriftSample};
 
 use super::canvas::{Axes, Canvas, span};
 use super::colour::CATEGORIES;

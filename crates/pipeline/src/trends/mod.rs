@@ -4,7 +4,7 @@ mod residuals;
 
 use std::fmt;
 
-use self_calibration::{TrendReport, TrendTest, TrendVerdict};
+use residual_tests::{TrendReport, TrendTest, TrendVerdict};
 use serde::Serialize;
 
 pub(crate) use residuals::remaining;

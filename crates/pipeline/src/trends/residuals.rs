@@ -1,12 +1,11 @@
 //! The residuals of a run: against the truth where the survey was simulated, and else of the planes that frames show.
 
 use camera_model::Camera;
+use primitives::{FittedPixel, PrimitiveKind, PrimitiveOptions, fit_primitive};
 use range_image::{Flags, RangeFrame};
 use rayon::prelude::*;
-use self_calibration::{
-    DifferenceOptions, FittedPixel, PrimitiveKind, PrimitiveOptions, TrendOptions, TrendSample, fit_primitive,
-    test_trends,
-};
+use residual_tests::{TrendOptions, TrendSample, test_trends};
+use self_calibration::DifferenceOptions;
 
 use super::{RemainingErrors, TrendSummary, sentence};
 use crate::outcome::Outcome;

@@ -9,7 +9,7 @@ use std::time::Instant;
 
 use range_io::atomic::Destination;
 use range_io::calibration::{CalibratedDrift, Calibration, Correlation};
-use self_calibration::{ChangeOptions, DriftEstimate, DriftOptions, estimate_drift, estimate_drift_at_rates};
+use warm_up::{ChangeOptions, DriftEstimate, DriftOptions, estimate_drift, estimate_drift_at_rates};
 
 pub use summary::{WarmUpBlock, WarmUpParameter, WarmUpPhase, WarmUpRateTest, WarmUpSummary, WarmUpTest};
 

@@ -3,7 +3,7 @@
 use error_models::RateHistory;
 use range_image::Raster;
 use range_io::survey::ReferencePath;
-use self_calibration::{ChangeMeter, ChangeOptions, DriftSample, PixelMeans, RangeChange};
+use warm_up::{ChangeMeter, ChangeOptions, DriftSample, PixelMeans, RangeChange};
 
 use super::frames::{FRAMES_AT_ONCE, FrameSource};
 use super::{ReferenceUse, WarmUpRequest};
@@ -63,7 +63,7 @@ impl Series {
         let samples = source.survey().frames.iter().zip(&changes).map(sample).collect();
         let (pixels, moved_share) = (meters[0].pixels(), meters[0].moved_share().map_err(&refused)?);
         let stated_rates = frame_rates::stated(source.survey(), power_on_s).transpose();
-        let stated_rates = stated_rates.map_err(self_calibration::DriftError::from).map_err(&refused)?;
+        let stated_rates = stated_rates.map_err(warm_up::DriftError::from).map_err(&refused)?;
         Ok(Self { samples, stated_rates, pixels, moved_share, power_on, size })
     }
 }

@@ -4,8 +4,8 @@ use std::fmt;
 use std::path::PathBuf;
 
 use error_models::WarmUp;
-use self_calibration::{DriftEstimate, DriftVerdict, TransientTest};
 use serde::Serialize;
+use warm_up::{DriftEstimate, DriftVerdict, TransientTest};
 
 use super::series::Series;
 use super::{ReferenceUse, WarmUpRequest};

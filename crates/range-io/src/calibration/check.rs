@@ -4,7 +4,7 @@ use scattering_deconvolution::Psf;
 
 use super::{Calibration, RangeCalibration, ValidSpan};
 use crate::InvalidField;
-use crate::limits::MOST_PARAMETERS;
+use crate::text::limits::MOST_PARAMETERS;
 
 type Check = Result<(), InvalidField>;
 

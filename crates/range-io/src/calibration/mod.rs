@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 pub use correlation::Correlation;
 pub use drift::CalibratedDrift;
 
-use crate::{InvalidField, Result, atomic, read_ron_text, ron_text};
+use crate::{InvalidField, Result, atomic, read_ron_text, text::ron_text};
 
 /// A camera's calibration with the quality of every parameter.
 ///

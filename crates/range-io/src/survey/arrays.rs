@@ -5,7 +5,7 @@ use std::path::Path;
 
 use range_image::Raster;
 
-use crate::npz::{Array, ArrayHeader, DataType, NpzReader, Values, read_npy};
+use crate::formats::npz::{Array, ArrayHeader, DataType, NpzReader, Values, read_npy};
 use crate::{Error, Result};
 
 /// Any real type that stands for a measured quantity in its unit.

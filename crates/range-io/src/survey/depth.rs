@@ -8,7 +8,7 @@ use range_image::Raster;
 use super::Level;
 use super::arrays::{ArrayFile, Expected, REAL, nothing_measured, raster, require_finite};
 use super::{InputFrame, StoredDepth, Survey};
-use crate::npz::{DataType, Values};
+use crate::formats::npz::{DataType, Values};
 use crate::{Error, Result};
 
 pub(super) fn read_depth<R: std::io::Read + std::io::Seek>(
@@ -69,7 +69,7 @@ fn require_size<T>(survey: &Survey, file: &Path, image: &Raster<T>) -> Result<()
 #[cfg(feature = "png16")]
 pub(super) fn read_png(survey: &Survey, file: &Path) -> Result<InputFrame> {
     let scale = stored_depth(survey, file)?;
-    let stored = crate::png16::read(file)?;
+    let stored = crate::formats::png16::read(file)?;
     require_size(survey, file, &stored)?;
     Ok(InputFrame::Depth { depth: depth_from_stored(file, scale, &stored)?, amplitude: None, confidence: None })
 }
@@ -82,7 +82,7 @@ pub(super) fn read_png(_: &Survey, file: &Path) -> Result<InputFrame> {
 #[cfg(feature = "mkv")]
 pub(super) fn read_mkv(survey: &Survey, file: &Path, number: usize) -> Result<InputFrame> {
     let scale = stored_depth(survey, file)?;
-    let frame = crate::mkv::read_frame(file, number)?;
+    let frame = crate::formats::mkv::read_frame(file, number)?;
     require_size(survey, file, &frame.depth)?;
     let amplitude = frame.infrared.map(|image| image.map(|&value| f32::from(value)));
     if let Some(amplitude) = &amplitude {

@@ -9,7 +9,7 @@ use range_image::{ComplexFrame, PhaseConvention, Raster, RawFrame, Samples};
 use super::arrays::{ArrayFile, COUNT, Expected, REAL, array_error, raster, require_finite};
 use super::depth::{read_depth, read_mkv, read_png};
 use super::{Level, Survey, SurveyCamera};
-use crate::npz::{DataType, NpzReader, Values};
+use crate::formats::npz::{DataType, NpzReader, Values};
 use crate::{Error, Result};
 
 /// One frame as a survey's file holds it, checked against the survey.

@@ -4,7 +4,7 @@ use range_image::Raster;
 
 use super::Survey;
 use super::arrays::{ArrayFile, Expected, REAL, raster};
-use crate::npz::{DataType, NpzReader, NpzWriter, Values};
+use crate::formats::npz::{DataType, NpzReader, NpzWriter, Values};
 use crate::{Error, Result};
 
 /// The truth of one simulated frame.

@@ -6,7 +6,7 @@ use serde::ser::Serializer;
 
 use super::{FrameEntry, Level, ReferencePath, StoredDepth, Survey, SurveyCamera, TruthFiles};
 use crate::InvalidField;
-use crate::limits::{MOST_FREQUENCIES, MOST_PHASE_STEPS, MOST_PIXELS};
+use crate::text::limits::{MOST_FREQUENCIES, MOST_PHASE_STEPS, MOST_PIXELS};
 
 /// Bytes of a field of words that is printed as it is.
 const LONGEST_WORDS: usize = 200;

@@ -5,7 +5,7 @@ use range_image::{ComplexChannel, ComplexFrame, Raster, Samples};
 use super::InputFrame;
 use crate::Result;
 use crate::atomic::FileWriter;
-use crate::npz::NpzWriter;
+use crate::formats::npz::NpzWriter;
 
 /// Writes a frame as the `.npz` of its level.
 ///

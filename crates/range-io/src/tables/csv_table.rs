@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 use csv::{ReaderBuilder, StringRecord, Trim};
 
 use crate::atomic::FileWriter;
-use crate::limits::MOST_ROWS;
 use crate::read_text;
+use crate::text::limits::MOST_ROWS;
 use crate::{Error, Result};
 
 /// The columns of a kind of table.

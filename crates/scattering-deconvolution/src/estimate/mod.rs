@@ -1,36 +1,24 @@
 //! Estimation of the point spread function from captures that show what is scattered.
 
-mod blocks;
-mod blur;
-mod capture;
-mod fit;
-mod mask;
-mod noise;
-mod observation;
-mod options;
-mod planes;
 mod report;
-mod response;
 mod result;
-mod scene;
-mod score;
-mod selection;
-mod start;
+mod search;
+mod views;
 
-pub use capture::{Capture, ForegroundCapture, TwoPlaneCapture, true_phases};
-pub use mask::object_mask;
-pub use options::{EstimationOptions, Nuisance, TermCount, TermShape};
 pub use result::{Ambiguity, Candidate, CaptureReport, Estimated, NuisanceValues, PsfEstimate, PsfParameter, Verdict};
+pub use views::capture::{Capture, ForegroundCapture, TwoPlaneCapture, true_phases};
+pub use views::mask::object_mask;
+pub use views::options::{EstimationOptions, Nuisance, TermCount, TermShape};
 
 use range_image::Raster;
 
 use crate::{Error, Result};
-use blocks::Blocks;
-use fit::Problem;
-use mask::{dilated, find_object};
-use scene::{Blind, Scene, scenes};
-use selection::choose;
-use start::Dictionary;
+use search::fit::Problem;
+use search::scene::{Blind, Scene, scenes};
+use search::selection::choose;
+use search::start::Dictionary;
+use views::blocks::Blocks;
+use views::mask::{dilated, find_object};
 
 /// Fewest block means from which anything is concluded.
 const FEWEST_BLOCKS: usize = 30;

@@ -3,13 +3,13 @@
 use nalgebra::DMatrix;
 use range_image::Raster;
 
-use super::fit::{Agreement, Fit, Problem, StartTerm, Unknown};
-use super::noise::{NORMAL_MEDIAN, median};
-use super::observation::SMALLEST_SIGMA;
-use super::response::Term;
 use super::result::{Ambiguity, CaptureReport, Estimated, NuisanceValues, PsfEstimate, PsfParameter, Verdict};
-use super::scene::{Blind, Scene};
-use super::selection::Choice;
+use super::search::fit::{Agreement, Fit, Problem, StartTerm, Unknown};
+use super::search::observation::SMALLEST_SIGMA;
+use super::search::response::Term;
+use super::search::scene::{Blind, Scene};
+use super::search::selection::Choice;
+use super::views::noise::{NORMAL_MEDIAN, median};
 use super::{EstimationOptions, Nuisance, TermShape};
 use crate::{GaussianTerm, Psf};
 

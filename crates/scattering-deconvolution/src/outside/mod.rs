@@ -6,7 +6,7 @@ mod shape;
 use range_image::{ComplexChannel, Flags, Raster};
 use rustfft::num_complex::Complex;
 
-use crate::convolution::check_size;
+use crate::kernels::convolution::check_size;
 use crate::{Error, Psf, Result};
 use blocks::{Block, Blocks};
 use shape::{Segment, Shape};

@@ -1,0 +1,6 @@
+//! Which measurements fit no surface.
+
+pub(crate) mod gross_errors;
+pub(crate) mod mixed_pixels;
+pub(crate) mod plane_block;
+pub(crate) mod straight_line;

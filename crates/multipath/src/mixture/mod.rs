@@ -1,0 +1,5 @@
+//! Mixed pixels and the surfaces around them.
+
+pub(crate) mod mixed;
+pub(crate) mod split;
+pub(crate) mod surfaces;

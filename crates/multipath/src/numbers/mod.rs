@@ -1,0 +1,4 @@
+//! Small vectors and matrices.
+
+pub(crate) mod cholesky;
+pub(crate) mod vector;

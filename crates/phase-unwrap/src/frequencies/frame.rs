@@ -1,0 +1,147 @@
+//! Planes of a frame, and blocks of their pixels with phases in cycles.
+// Only what is inlined is compiled for wide registers; loops over lanes read as their formulas, without branches.
+#![allow(clippy::inline_always, clippy::needless_range_loop, clippy::needless_bitwise_bool)]
+
+use std::f64::consts::TAU;
+
+use range_image::Raster;
+
+use crate::frequencies::lanes::{LANES, Lanes, gather, select};
+use crate::frequencies::lattice::Lattice;
+use crate::{Error, Result};
+
+/// Standard deviations below this, radians, are not believed: they are of the size of a phase's last bit.
+const SMALLEST_SIGMA_RAD: f32 = 1e-5;
+
+/// Planes of one frame, checked.
+#[derive(Clone, Copy)]
+pub(crate) struct Planes<'a> {
+    phases: &'a [Raster<f32>],
+    sigmas: Option<&'a [Raster<f32>]>,
+    mask: Option<&'a Raster<bool>>,
+}
+
+/// Phases of a block of pixels, frequencies from the highest.
+pub(crate) struct Block<const F: usize> {
+    pub(crate) cycles: [Lanes; F],
+    /// Inverse variance of the range, 1/m²; 0 where the phase is missing.
+    pub(crate) weight: [Lanes; F],
+    pub(crate) total_weight: Lanes,
+    pub(crate) members: Lanes,
+    /// 1 where the sigmas of all phases are given.
+    pub(crate) sigma_known: Lanes,
+}
+
+impl<const F: usize> Block<F> {
+    /// Phases in cycles and their weights.
+    #[inline(always)]
+    pub(crate) fn load(lattice: &Lattice, planes: &Planes<'_>, start: usize, count: usize) -> Self {
+        let zero = [0.0; LANES];
+        let mut block =
+            Self { cycles: [zero; F], weight: [zero; F], total_weight: zero, members: zero, sigma_known: [1.0; LANES] };
+        let used = planes.used(start, count);
+        for (position, (&frequency, interval_m)) in lattice.order.iter().zip(&lattice.intervals_m).enumerate() {
+            let phase = gather(planes.phases[frequency].as_slice(), start, count);
+            let sigma =
+                planes.sigmas.map_or([f32::NAN; LANES], |sigmas| gather(sigmas[frequency].as_slice(), start, count));
+            let per_metre = (TAU / interval_m) as f32;
+            for lane in 0..LANES {
+                let usable = if phase[lane].abs() <= f32::MAX { used[lane] } else { 0.0 };
+                let known = select((sigma[lane] > 0.0) & (sigma[lane] <= f32::MAX), 1.0, 0.0);
+                let sigma = select(known > 0.0, sigma[lane], lattice.assumed_sigma);
+                let root = per_metre / sigma.max(SMALLEST_SIGMA_RAD);
+                let weight = usable * (root * root);
+                block.cycles[position][lane] = select(usable > 0.0, phase[lane] * (1.0 / TAU as f32), 0.0);
+                block.weight[position][lane] = weight;
+                block.total_weight[lane] += weight;
+                block.members[lane] += usable;
+                block.sigma_known[lane] *= known.max(1.0 - usable);
+            }
+        }
+        block
+    }
+
+    /// The pixels whose highest known frequency is the one at `position`, and that know another.
+    #[inline(always)]
+    pub(crate) fn led_by(&self, position: usize) -> [bool; LANES] {
+        let mut led = [false; LANES];
+        let mut higher = [0.0; LANES];
+        for weight in &self.weight[..position] {
+            for lane in 0..LANES {
+                higher[lane] += weight[lane];
+            }
+        }
+        for lane in 0..LANES {
+            led[lane] = (higher[lane] <= 0.0) & (self.weight[position][lane] > 0.0) & (self.members[lane] > 1.5);
+        }
+        led
+    }
+}
+
+impl<'a> Planes<'a> {
+    /// Checks numbers and sizes of the planes, and that all phases lie inside a cycle.
+    pub(crate) fn new(
+        phases: &'a [Raster<f32>],
+        frequencies: usize,
+        sigmas: Option<&'a [Raster<f32>]>,
+        mask: Option<&'a Raster<bool>>,
+    ) -> Result<Self> {
+        let count = |what, planes: &[Raster<f32>]| {
+            let found = planes.len();
+            if found == frequencies { Ok(()) } else { Err(Error::PlaneCount { what, expected: frequencies, found }) }
+        };
+        count("phase", phases)?;
+        let Some(first) = phases.first().filter(|first| !first.is_empty()) else {
+            return Err(Error::Empty { width: 0, height: 0 });
+        };
+        for plane in phases {
+            first.require_same_size(plane, "phase")?;
+            check_cycle(plane)?;
+        }
+        if let Some(sigmas) = sigmas {
+            count("sigma of the phase", sigmas)?;
+            for plane in sigmas {
+                first.require_same_size(plane, "sigma of the phase")?;
+            }
+        }
+        if let Some(mask) = mask {
+            first.require_same_size(mask, "mask")?;
+        }
+        Ok(Self { phases, sigmas, mask })
+    }
+
+    /// 1 where a pixel of a block is to be used.
+    #[inline(always)]
+    fn used(&self, start: usize, count: usize) -> Lanes {
+        let mut used = [0.0; LANES];
+        let Some(mask) = self.mask else {
+            used[..count].fill(1.0);
+            return used;
+        };
+        for (used, &mask) in used.iter_mut().zip(&mask.as_slice()[start..][..count]) {
+            *used = f32::from(u8::from(mask));
+        }
+        used
+    }
+
+    pub(crate) fn size(&self) -> (usize, usize) {
+        self.phases.first().map_or((0, 0), |first| (first.width(), first.height()))
+    }
+
+    /// Phases of a frequency, in the caller's order.
+    pub(crate) fn phase(&self, frequency: usize) -> &[f32] {
+        self.phases[frequency].as_slice()
+    }
+}
+
+fn check_cycle(plane: &Raster<f32>) -> Result<()> {
+    let outside = |value: f32| value.is_finite() && !(0.0..=std::f32::consts::TAU).contains(&value);
+    // Blocks without an early end are compared side by side.
+    let blocks = plane.as_slice().chunks(1024);
+    let suspicious = |block: &[f32]| block.iter().fold(false, |any, &value| any | outside(value));
+    let Some(block) = blocks.into_iter().position(suspicious) else { return Ok(()) };
+    let rest = plane.as_slice()[1024 * block..].iter().position(|&value| outside(value));
+    let index = 1024 * block + rest.unwrap_or(0);
+    let (col, row) = (index % plane.width(), index / plane.width());
+    Err(Error::PhaseOutsideCycle { col, row, value: plane.as_slice()[index] })
+}

@@ -1,0 +1,248 @@
+//! Unwrapping with several frequencies: hypotheses for each pixel, and a choice among them.
+
+use std::f32::consts::TAU;
+
+use range_image::{Modulation, Raster, with_wide_registers};
+use rayon::prelude::*;
+
+use crate::frequencies::frame::Planes;
+use crate::frequencies::kernel_density::{KernelDensityOptions, RANKS, Ranked, pick};
+use crate::frequencies::lanes::{LANES, nearest, scatter};
+use crate::frequencies::lattice::Lattice;
+use crate::{Error, Result};
+
+/// Pixels that one thread takes at a time where rows do not matter: a multiple of the block.
+const CHUNK: usize = 256 * LANES;
+
+/// How several frequencies are unwrapped.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MultiFrequencyOptions {
+    /// Largest range searched, metres. `None`: the combined ambiguity interval.
+    pub maximum_range_m: Option<f64>,
+    /// Standard deviation of the phase, radians, where none is given. Confidences are as good as it is.
+    pub assumed_sigma_phase_rad: f32,
+    /// Largest number of hypotheses a pixel: a search beyond it is refused.
+    pub maximum_hypotheses: usize,
+    /// Misfit per degree of freedom, as a ratio of variances, above which the confidence is lowered: phases that no
+    /// range explains come from mixed pixels, multipath or motion.
+    pub acceptable_misfit: f32,
+    /// How neighbours take part in the choice. `None`: each pixel decides alone.
+    pub kernel: Option<KernelDensityOptions>,
+}
+
+impl Default for MultiFrequencyOptions {
+    fn default() -> Self {
+        Self {
+            maximum_range_m: None,
+            assumed_sigma_phase_rad: 0.1,
+            maximum_hypotheses: 4096,
+            acceptable_misfit: 9.0,
+            kernel: Some(KernelDensityOptions::default()),
+        }
+    }
+}
+
+impl MultiFrequencyOptions {
+    pub(crate) fn validate(&self, maximum_range_m: f64) -> Result<()> {
+        let positive = [
+            ("maximum_range_m", maximum_range_m),
+            ("assumed_sigma_phase_rad", self.assumed_sigma_phase_rad.into()),
+            ("acceptable_misfit", self.acceptable_misfit.into()),
+        ];
+        for (name, value) in positive {
+            if !(value.is_finite() && value > 0.0) {
+                return Err(Error::OutOfDomain { name, value, expected: "positive and finite" });
+            }
+        }
+        self.kernel.map_or(Ok(()), |kernel| kernel.validate())
+    }
+}
+
+/// Wrap counts and combined ranges of several frequencies.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct MultiUnwrapped {
+    /// Whole cycles of each frequency: those that bring its phase nearest to `range`; 0 where there is no answer. A
+    /// phase just below a full cycle at a range near zero has -1.
+    pub wraps: Vec<Raster<i32>>,
+    /// Inverse-variance mean of the ranges, metres; NaN where fewer than two phases are usable.
+    pub range: Raster<f32>,
+    /// Standard deviation of `range` in metres as the phases' sigmas propagate; NaN where these are not given.
+    pub sigma: Raster<f32>,
+    /// 0 (a guess, or no answer) to 1: `2p - 1` for the probability p of the range chosen among the hypotheses, lowered
+    /// where it does not explain the phases.
+    pub confidence: Raster<f32>,
+}
+
+impl MultiUnwrapped {
+    /// Pixels without an answer, or whose confidence is below `minimum_confidence`: their range is a guess.
+    pub fn unsure(&self, minimum_confidence: f32) -> Raster<bool> {
+        let mut unsure = self.confidence.map(|&confidence| confidence < minimum_confidence);
+        for (unsure, range) in unsure.as_mut_slice().iter_mut().zip(self.range.as_slice()) {
+            *unsure |= range.is_nan();
+        }
+        unsure
+    }
+}
+
+/// Finds the wrap counts of each pixel; see [`MultiUnwrapper::unwrap`]. Allocates its buffers anew.
+pub fn unwrap_multi_frequency(
+    phases: &[Raster<f32>],
+    modulations: &[Modulation],
+    sigma_phase: Option<&[Raster<f32>]>,
+    mask: Option<&Raster<bool>>,
+    options: &MultiFrequencyOptions,
+) -> Result<MultiUnwrapped> {
+    MultiUnwrapper::new(modulations, *options)?.unwrap(phases, sigma_phase, mask)
+}
+
+/// Unwraps frames of the same frequencies one after the other and keeps its buffers.
+#[derive(Debug, Clone)]
+pub struct MultiUnwrapper {
+    lattice: Lattice,
+    kernel: Option<KernelDensityOptions>,
+    ranked: Ranked,
+}
+
+impl MultiUnwrapper {
+    /// Fails where frequencies or options lie outside their domain.
+    pub fn new(modulations: &[Modulation], options: MultiFrequencyOptions) -> Result<Self> {
+        let lattice = Lattice::new(modulations, &options)?;
+        Ok(Self { lattice, kernel: options.kernel, ranked: Ranked::default() })
+    }
+
+    /// Wrap counts and ranges of a frame.
+    ///
+    /// `phases` are in radians in `[0, 2 pi]`, one raster a frequency in the order of the modulations; `sigma_phase`
+    /// their standard deviations, and where that is NaN or not positive the assumed one stands in. In `mask`, true means
+    /// use. A phase that is not finite is left out; two at least are needed.
+    ///
+    /// For each count of the highest frequency the others take the counts nearest to its range. The misfit of such a
+    /// hypothesis is the sum of squared, normalised residuals. The hypotheses with the smallest misfits are weighed
+    /// against each other, with the neighbours' `[JaremoLawin2016]` unless switched off.
+    pub fn unwrap(
+        &mut self,
+        phases: &[Raster<f32>],
+        sigma_phase: Option<&[Raster<f32>]>,
+        mask: Option<&Raster<bool>>,
+    ) -> Result<MultiUnwrapped> {
+        let mut out = MultiUnwrapped::default();
+        self.unwrap_into(phases, sigma_phase, mask, &mut out)?;
+        Ok(out)
+    }
+
+    /// As [`MultiUnwrapper::unwrap`], into an existing result of any size, which an error leaves as it was.
+    pub fn unwrap_into(
+        &mut self,
+        phases: &[Raster<f32>],
+        sigma_phase: Option<&[Raster<f32>]>,
+        mask: Option<&Raster<bool>>,
+        out: &mut MultiUnwrapped,
+    ) -> Result<()> {
+        let planes = Planes::new(phases, self.lattice.order.len(), sigma_phase, mask)?;
+        out.resize(planes.size(), phases.len());
+        match self.kernel {
+            Some(kernel) => self.choose_with_neighbours(&planes, &kernel, out),
+            None => self.choose_alone(&planes, out),
+        }
+        self.count_wraps(&planes, out);
+        Ok(())
+    }
+
+    fn choose_alone(&self, planes: &Planes<'_>, out: &mut MultiUnwrapped) {
+        let ranges = out.range.as_mut_slice().par_chunks_mut(CHUNK);
+        let qualities =
+            out.sigma.as_mut_slice().par_chunks_mut(CHUNK).zip(out.confidence.as_mut_slice().par_chunks_mut(CHUNK));
+        ranges.zip(qualities).enumerate().for_each(|(chunk, (range, (sigma, confidence)))| {
+            with_wide_registers(
+                #[inline(always)]
+                || {
+                    for start in (0..range.len()).step_by(LANES) {
+                        let count = LANES.min(range.len() - start);
+                        let found = self.lattice.search::<RANKS>(planes, chunk * CHUNK + start, count);
+                        let chosen = pick(&found.range_m, &found.probability, &found.acceptable);
+                        scatter(range, start, count, &chosen.range_m);
+                        scatter(sigma, start, count, &found.known_sigma_m);
+                        scatter(confidence, start, count, &chosen.confidence);
+                    }
+                },
+            );
+        });
+    }
+
+    fn choose_with_neighbours(&mut self, planes: &Planes<'_>, kernel: &KernelDensityOptions, out: &mut MultiUnwrapped) {
+        let (width, height) = planes.size();
+        self.ranked.resize(width, height, self.lattice.intervals_m[0] as f32, kernel);
+        let (layout, lines) = self.ranked.rows_mut();
+        let lattice = &self.lattice;
+        let rows = lines.par_chunks_mut(layout.row_length()).zip(out.sigma.as_mut_slice().par_chunks_mut(width));
+        rows.enumerate().for_each(|(row, (lines, sigma))| {
+            with_wide_registers(
+                #[inline(always)]
+                || {
+                    for col in (0..width).step_by(LANES) {
+                        let count = LANES.min(width - col);
+                        let found = lattice.search::<RANKS>(planes, row * width + col, count);
+                        layout.store(lines, col, &found);
+                        scatter(sigma, col, count, &found.known_sigma_m);
+                    }
+                },
+            );
+        });
+        let ranked = &self.ranked;
+        let ranges = out.range.as_mut_slice().par_chunks_mut(width);
+        let rows = ranges.zip(out.confidence.as_mut_slice().par_chunks_mut(width));
+        rows.enumerate().for_each(|(row, (range, confidence))| {
+            with_wide_registers(
+                #[inline(always)]
+                || {
+                    for col in (0..width).step_by(LANES) {
+                        let count = LANES.min(width - col);
+                        let chosen = ranked.choose(row, col);
+                        scatter(range, col, count, &chosen.range_m);
+                        scatter(confidence, col, count, &chosen.confidence);
+                    }
+                },
+            );
+        });
+    }
+
+    /// The counts that bring each phase nearest to the range chosen.
+    fn count_wraps(&self, planes: &Planes<'_>, out: &mut MultiUnwrapped) {
+        for (&frequency, interval_m) in self.lattice.order.iter().zip(&self.lattice.intervals_m) {
+            let rate = (1.0 / interval_m) as f32;
+            let wraps = out.wraps[frequency].as_mut_slice().par_chunks_mut(CHUNK);
+            let ranges = out.range.as_slice().par_chunks(CHUNK).zip(planes.phase(frequency).par_chunks(CHUNK));
+            wraps.zip(ranges).for_each(|(wraps, (ranges, phases))| {
+                with_wide_registers(
+                    #[inline(always)]
+                    || {
+                        for ((wraps, range), phase) in wraps.iter_mut().zip(ranges).zip(phases) {
+                            let cycles = range * rate - phase * (1.0 / TAU);
+                            *wraps = if cycles.is_finite() { nearest(cycles) as i32 } else { 0 };
+                        }
+                    },
+                );
+            });
+        }
+    }
+}
+
+impl MultiUnwrapped {
+    fn resize(&mut self, (width, height): (usize, usize), frequencies: usize) {
+        self.wraps.truncate(frequencies);
+        self.wraps.resize_with(frequencies, Raster::default);
+        for wraps in &mut self.wraps {
+            resize(wraps, width, height, 0);
+        }
+        for plane in [&mut self.range, &mut self.sigma, &mut self.confidence] {
+            resize(plane, width, height, f32::NAN);
+        }
+    }
+}
+
+/// A raster of this size; values are kept where the size is right already.
+fn resize<T: Clone>(raster: &mut Raster<T>, width: usize, height: usize, value: T) {
+    if (raster.width(), raster.height()) != (width, height) {
+        *raster = Raster::filled(width, height, value);
+    }
+}

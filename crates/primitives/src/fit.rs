@@ -1,0 +1,206 @@
+//! A primitive adjusted to the ranges of a region.
+
+use adjust::{Adjustment, Covariance, Distribution, ParameterBlock, Scale, SolveOptions};
+use camera_model::Camera;
+use nalgebra::{DMatrix, DVector, Vector3};
+use range_image::RangeFrame;
+
+use crate::judge::{require_determined, systematic_sigmas};
+use crate::linear_start::start;
+use crate::observation::RangeToPrimitive;
+use crate::surface::{Hit, Surface};
+use crate::{Error, Result};
+use crate::{FittedPixel, PrimitiveFit, PrimitiveKind, PrimitiveOptions};
+
+/// Rounds of choosing pixels after which nothing changes any more.
+const MAX_ROUNDS: usize = 20;
+
+/// A pixel of the region with its ray.
+pub(crate) struct RegionPixel {
+    pub(crate) position: [usize; 2],
+    pub(crate) ray: Vector3<f64>,
+    pub(crate) observed_m: f64,
+    pub(crate) sigma_m: f64,
+}
+
+/// An adjusted surface.
+struct Adjusted {
+    parameters: Vec<f64>,
+    covariance: DMatrix<f64>,
+    sigma0: f64,
+    redundancy: i64,
+}
+
+/// Fits a primitive to the ranges of a region of a frame, robustly: averaging in space (Sect. 4).
+///
+/// What is random in a pixel is its range, so points move along their rays: `ρ + v = ρ(primitive, ray)`, weighted by the
+/// frame's sigmas. Start values come from robust linear fits; pixels of other things are left out by their residuals.
+/// The answer has the covariance of the primitive and of the range that it gives each pixel.
+///
+/// `camera` gives the rays with its lens taken off.
+///
+/// # Errors
+/// [`Error::TooFewPixels`]; [`Error::NotThatPrimitive`] where too many pixels belong to something else, or where
+/// neighbouring residuals show another shape; [`Error::PrimitiveNotDetermined`] where the region is too small a part of
+/// it.
+pub fn fit_primitive(
+    frame: &RangeFrame,
+    camera: &Camera,
+    kind: PrimitiveKind,
+    options: &PrimitiveOptions,
+) -> Result<PrimitiveFit> {
+    let fit = fit_whatever_shape(frame, camera, kind, options)?;
+    let (found, limit) = (fit.systematic_sigmas, options.largest_systematic_sigmas);
+    if found > limit {
+        return Err(Error::NotThatPrimitive { kind, what: "sigmas that neighbouring residuals share", found, limit });
+    }
+    Ok(fit)
+}
+
+/// [`fit_primitive`] without the test for another shape: what the residuals share is then what is looked for.
+pub fn fit_whatever_shape(
+    frame: &RangeFrame,
+    camera: &Camera,
+    kind: PrimitiveKind,
+    options: &PrimitiveOptions,
+) -> Result<PrimitiveFit> {
+    options.validate()?;
+    let pixels = region(frame, camera, options)?;
+    require_pixels(pixels.len(), kind)?;
+    let points: Vec<Vector3<f64>> = pixels.iter().map(|pixel| pixel.ray * pixel.observed_m).collect();
+    let (surface, mut parameters) = start(kind, &points, options.seed).ok_or_else(|| nothing(kind))?;
+    let mut used = chosen(&pixels, &surface, &parameters, options);
+    let mut adjusted = None;
+    for _ in 0..MAX_ROUNDS {
+        require_pixels(used.iter().filter(|used| **used).count(), kind)?;
+        let found = adjust(&pixels, &used, &surface, &parameters)?;
+        parameters.clone_from(&found.parameters);
+        adjusted = Some(found);
+        let next = chosen(&pixels, &surface, &parameters, options);
+        if next == used {
+            break;
+        }
+        used = next;
+    }
+    let adjusted = adjusted.ok_or_else(|| nothing(kind))?;
+    let outcome = outcome(kind, &pixels, &used, &surface, adjusted)?;
+    let (found, limit) = (outcome.outlier_share(), options.largest_outlier_share);
+    if found > limit {
+        return Err(Error::NotThatPrimitive { kind, what: "share of pixels that lie elsewhere", found, limit });
+    }
+    require_determined(&outcome, options.largest_uncertainty)?;
+    Ok(PrimitiveFit { systematic_sigmas: systematic_sigmas(&outcome, options.pixels.step), ..outcome })
+}
+
+/// No primitive goes through the points: they do not span one.
+fn nothing(kind: PrimitiveKind) -> Error {
+    Error::PrimitiveNotDetermined { kind, what: "whole of it", sigma: f64::INFINITY, limit: 0.0 }
+}
+
+/// Five pixels for each parameter leave something to judge by.
+fn require_pixels(pixels: usize, kind: PrimitiveKind) -> Result<()> {
+    let needed = 5 * kind.parameters();
+    if pixels < needed { Err(Error::TooFewPixels { kind, pixels, needed }) } else { Ok(()) }
+}
+
+/// The usable pixels of the region.
+fn region(frame: &RangeFrame, camera: &Camera, options: &PrimitiveOptions) -> Result<Vec<RegionPixel>> {
+    frame.validate()?;
+    camera.validate()?;
+    let (width, height) = (camera.format.width, camera.format.height);
+    if (frame.width(), frame.height()) != (width, height) {
+        let (found_width, found_height) = (frame.width(), frame.height());
+        let mismatch = range_image::Error::SizeMismatch { what: "frame", width, height, found_width, found_height };
+        return Err(Error::Image(mismatch));
+    }
+    let pixel = |position: [usize; 2]| {
+        let place = (position[0], position[1]);
+        let (observed_m, sigma_m) = (f64::from(frame.range[place]), f64::from(frame.sigma[place]));
+        let usable =
+            observed_m > 0.0 && observed_m.is_finite() && !frame.flags[place].intersects(options.pixels.exclude);
+        let known = sigma_m > 0.0 && sigma_m.is_finite();
+        let sigma_m = if known { sigma_m } else { options.pixels.unknown_sigma_m };
+        let ray = camera.ray(position.map(|index| index as f64));
+        usable.then_some(RegionPixel { position, ray, observed_m, sigma_m })
+    };
+    Ok(options.pixels.positions(width, height).filter_map(pixel).collect())
+}
+
+/// Pixels that the surface explains: within so many sigmas, or robust scales where these are larger.
+fn chosen(pixels: &[RegionPixel], surface: &Surface, parameters: &[f64], options: &PrimitiveOptions) -> Vec<bool> {
+    let smallest_cosine = options.pixels.largest_incidence_rad.cos();
+    let standardised: Vec<f64> = pixels
+        .iter()
+        .map(|pixel| {
+            let hit = surface.hit(parameters, &pixel.ray).filter(|hit| hit.cosine >= smallest_cosine);
+            hit.map_or(f64::INFINITY, |hit| ((pixel.observed_m - hit.range_m) / pixel.sigma_m).abs())
+        })
+        .collect();
+    let mut sorted = standardised.clone();
+    sorted.sort_by(f64::total_cmp);
+    // The median of normal residuals is 0.6745 of their deviation.
+    let scale = sorted[sorted.len() / 2] / 0.6745;
+    let limit = options.rejection_sigmas * if scale.is_finite() { scale.max(1.0) } else { 1.0 };
+    standardised.iter().map(|value| *value <= limit).collect()
+}
+
+fn adjust(pixels: &[RegionPixel], used: &[bool], surface: &Surface, start: &[f64]) -> Result<Adjusted> {
+    let mut network = Adjustment::new();
+    let block = network.add_block(ParameterBlock::euclidean(start).named("primitive"));
+    let group = network.add_group("ranges");
+    for (pixel, _) in pixels.iter().zip(used).filter(|(_, used)| **used) {
+        let observation =
+            RangeToPrimitive { blocks: [block], surface: *surface, ray: pixel.ray, observed_m: pixel.observed_m };
+        network.add_observation(group, observation, &Covariance::from_sigma(pixel.sigma_m))?;
+    }
+    let solution = network.solve(&SolveOptions::default())?;
+    Ok(Adjusted {
+        parameters: solution.values(block)?.to_vec(),
+        covariance: solution.covariance(block, Scale::Prior)?,
+        sigma0: solution.sigma0().unwrap_or(f64::NAN),
+        redundancy: solution.redundancy(),
+    })
+}
+
+fn outcome(
+    kind: PrimitiveKind,
+    pixels: &[RegionPixel],
+    used: &[bool],
+    surface: &Surface,
+    adjusted: Adjusted,
+) -> Result<PrimitiveFit> {
+    let primitive = surface.primitive(&adjusted.parameters).ok_or_else(|| nothing(kind))?;
+    let count = kind.parameters();
+    let deviation = |hit: &Hit| {
+        let row = DVector::from_column_slice(&hit.derivatives[..count]);
+        (row.transpose() * &adjusted.covariance * &row)[(0, 0)].max(0.0).sqrt()
+    };
+    let fitted = |(pixel, used): (&RegionPixel, &bool)| {
+        let hit = surface.hit(&adjusted.parameters, &pixel.ray);
+        FittedPixel {
+            position: pixel.position,
+            observed_m: pixel.observed_m,
+            sigma_m: pixel.sigma_m,
+            modelled_m: hit.map_or(f64::NAN, |hit| hit.range_m),
+            modelled_sigma_m: hit.map_or(f64::NAN, |hit| deviation(&hit)),
+            used: *used,
+        }
+    };
+    let pixels: Vec<FittedPixel> = pixels.iter().zip(used).map(fitted).collect();
+    let squares = |of: fn(&FittedPixel) -> f64| pixels.iter().filter(|p| p.used).map(|p| of(p).powi(2)).sum::<f64>();
+    let gain = (squares(|pixel| pixel.sigma_m) / squares(|pixel| pixel.modelled_sigma_m)).sqrt();
+    let redundancy = adjusted.redundancy as f64;
+    Ok(PrimitiveFit {
+        kind,
+        primitive,
+        sigma0_probability: Distribution::ChiSquared { dof: redundancy }
+            .survival(redundancy * adjusted.sigma0 * adjusted.sigma0),
+        parameters: adjusted.parameters,
+        covariance: adjusted.covariance,
+        sigma0: adjusted.sigma0,
+        redundancy: adjusted.redundancy,
+        systematic_sigmas: 0.0,
+        pixels,
+        gain,
+    })
+}

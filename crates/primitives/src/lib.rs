@@ -1,0 +1,21 @@
+#![doc = include_str!("../README.md")]
+
+mod difference;
+mod error;
+mod fit;
+mod judge;
+mod linear_start;
+mod observation;
+mod options;
+mod outcome;
+mod plane;
+mod shape;
+mod surface;
+
+pub use difference::{DifferenceOptions, RangeDifference, differences_to_plane};
+pub use error::{Error, Result};
+pub use fit::{fit_primitive, fit_whatever_shape};
+pub use options::PrimitiveOptions;
+pub use outcome::{FittedPixel, PrimitiveFit};
+pub use plane::Plane;
+pub use shape::{Primitive, PrimitiveKind};

@@ -1,0 +1,22 @@
+//! One module a file format of pictures and clouds.
+
+#[cfg(feature = "azure")]
+pub mod azure;
+#[cfg(any(feature = "e57", feature = "pcd", feature = "ply", feature = "vtk", feature = "xyz"))]
+pub mod clouds;
+#[cfg(feature = "e57")]
+pub mod e57;
+#[cfg(feature = "mkv")]
+pub mod mkv;
+#[cfg(feature = "npz")]
+pub mod npz;
+#[cfg(feature = "pcd")]
+pub mod pcd;
+#[cfg(feature = "ply")]
+pub mod ply;
+#[cfg(feature = "png16")]
+pub mod png16;
+#[cfg(feature = "vtk")]
+pub mod vtk;
+#[cfg(feature = "xyz")]
+pub mod xyz;

@@ -1,0 +1,85 @@
+//! Propagation of noise through a restoration.
+
+use range_image::with_wide_registers;
+
+use crate::kernels::lanes::finite_extremes;
+use crate::restoration::mask::Mask;
+use crate::restoration::noise::Centre;
+use crate::restoration::work::Work;
+
+/// Share of a variance below which what other pixels add is left out: 0.05 % of sigma.
+const NEGLIGIBLE: f64 = 1e-3;
+
+impl Work {
+    /// Turns the standard deviations of the observed image into those of the restored one, in place.
+    ///
+    /// The noise of pixels is independent before and correlated afterwards; sigma is that of each pixel by itself.
+    /// Pixels put aside keep their sigma and, as filled or clipped values, bring no noise to others. NaN stays NaN.
+    pub(crate) fn propagate_sigma(&mut self, sigma: &mut [f32], mask: &Mask) {
+        let [least, most] = with_wide_registers(
+            #[inline(always)]
+            || finite_extremes(sigma),
+        )
+        .map(|value| f64::from(value).powi(2));
+        if most <= 0.0 {
+            return;
+        }
+        self.kept_sigma.clear();
+        self.kept_sigma.extend(mask.pixels().map(|pixel| sigma[pixel]));
+        let noise = &self.model.noise;
+        let own = (1.0 - noise.largest_centre()).powi(2);
+        if noise.surroundings * most <= NEGLIGIBLE * own * least {
+            scale(sigma, &noise.centre);
+        } else {
+            self.scatter_variance(sigma, mask);
+            add(sigma, &self.model.noise.centre, &self.variance[0]);
+        }
+        mask.pixels().zip(&self.kept_sigma).for_each(|(pixel, value)| sigma[pixel] = *value);
+    }
+
+    /// Puts `q^2 * var` into the first variance plane.
+    fn scatter_variance(&mut self, sigma: &[f32], mask: &Mask) {
+        let [plane, zeros] = &mut self.variance;
+        zeros.clear();
+        zeros.resize(sigma.len(), 0.0);
+        plane.clear();
+        plane.extend(sigma.iter().map(|value| if value.is_finite() { value * value } else { 0.0 }));
+        for pixel in mask.pixels() {
+            plane[pixel] = 0.0;
+        }
+        self.grid.restrict(plane, zeros, &mut self.spare);
+        self.model.noise.squared.apply(&mut self.convolver, &mut self.spare);
+        plane.fill(0.0);
+        self.grid.add_interpolated(&self.spare, 1.0, plane, zeros);
+    }
+}
+
+/// What each pixel keeps of its own noise, where that of the others does not count.
+fn scale(sigma: &mut [f32], centre: &Centre) {
+    match centre {
+        Centre::Same(centre) => {
+            let gain = (1.0 - centre).abs() as f32;
+            for value in sigma {
+                *value *= gain;
+            }
+        }
+        Centre::Pixels(centres) => {
+            sigma.iter_mut().zip(centres).for_each(|(value, centre)| *value *= (1.0 - centre).abs());
+        }
+    }
+}
+
+/// Variances of the own noise and of that of all pixels, which the own is among.
+fn add(sigma: &mut [f32], centre: &Centre, added: &[f32]) {
+    let total = |value: f32, centre: f64, added: f32| {
+        let own = (1.0 - 2.0 * centre).max(0.0) * f64::from(value).powi(2);
+        (own + f64::from(added.max(0.0))).sqrt() as f32
+    };
+    let values = sigma.iter_mut().zip(added);
+    match centre {
+        Centre::Same(centre) => values.for_each(|(value, added)| *value = total(*value, *centre, *added)),
+        Centre::Pixels(centres) => {
+            values.zip(centres).for_each(|((value, added), centre)| *value = total(*value, f64::from(*centre), *added));
+        }
+    }
+}

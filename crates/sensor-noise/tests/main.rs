@@ -1,0 +1,13 @@
+//! All tests of the crate as one program: linked once, run side by side.
+#![allow(
+    clippy::expect_used,
+    clippy::panic,
+    clippy::print_stdout,
+    clippy::type_complexity,
+    clippy::unwrap_used,
+    missing_docs
+)]
+
+mod fixed_pattern;
+mod range_noise;
+mod sample_noise;

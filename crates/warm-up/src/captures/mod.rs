@@ -1,0 +1,5 @@
+//! Mean changes of range from frames, and their blocks.
+
+pub(crate) mod blocks;
+pub(crate) mod pixels;
+pub(crate) mod sample;

@@ -1,0 +1,16 @@
+//! All tests of the crate as one program: linked once, run side by side.
+#![allow(
+    clippy::expect_used,
+    clippy::panic,
+    clippy::print_stdout,
+    clippy::type_complexity,
+    clippy::unwrap_used,
+    missing_docs
+)]
+
+mod drift;
+mod drift_captures;
+mod drift_exponentials;
+mod drift_frame_rate;
+mod drift_refusals;
+mod range_change;

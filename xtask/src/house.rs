@@ -1,0 +1,91 @@
+//! Size of crates and folders: a crate fits in a head, a folder on a screen.
+
+use std::path::{Path, PathBuf};
+
+/// Most lines of a crate's sources, comments and blank lines included.
+const LARGEST_CRATE: usize = 8_000;
+
+/// Most entries of a folder of sources.
+const LARGEST_FOLDER: usize = 12;
+
+/// Crates that are larger, and the lines that they may not exceed: they become smaller, part by part.
+const LARGER_CRATES: [(&str, usize); 5] = [
+    ("adjust", 10_600),
+    ("icp-registration", 24_400),
+    ("pipeline", 23_600),
+    ("range-io", 8_600),
+    ("self-calibration", 13_100),
+];
+
+/// Folders that hold more, and how many.
+const LARGER_FOLDERS: [(&str, usize); 14] = [
+    ("icp-registration/src", 21),
+    ("icp-registration/src/coarse", 24),
+    ("icp-registration/src/icp", 14),
+    ("icp-registration/src/multiview", 38),
+    ("icp-registration/src/organised", 26),
+    ("icp-registration/src/tracking", 14),
+    ("icp-registration/src/voxels", 14),
+    ("pipeline/src", 41),
+    ("pipeline/src/calibrate", 23),
+    ("pipeline/src/register", 13),
+    ("pipeline/src/report", 21),
+    ("pipeline/src/report/network", 15),
+    ("pipeline/src/stages", 14),
+    ("self-calibration/src/networks/network", 44),
+];
+
+/// What of a crate is too large.
+pub(crate) fn complaints(folder: &Path) -> Result<Vec<String>, String> {
+    let name = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let mut found = Vec::new();
+    let lines = measure(&folder.join("src"), &format!("{name}/src"), &mut found)?;
+    let most = limit(&LARGER_CRATES, &name, LARGEST_CRATE);
+    if lines > most {
+        found.push(format!("crates/{name}: {lines} lines of sources, at most {most}"));
+    }
+    Ok(found)
+}
+
+/// Lines below a folder; complains of folders with too many entries.
+fn measure(folder: &Path, shown: &str, found: &mut Vec<String>) -> Result<usize, String> {
+    let list = std::fs::read_dir(folder).map_err(|error| format!("{}: {error}", folder.display()))?;
+    let entries: Vec<PathBuf> = list.flatten().map(|entry| entry.path()).collect();
+    let most = limit(&LARGER_FOLDERS, shown, LARGEST_FOLDER);
+    if entries.len() > most {
+        found.push(format!("crates/{shown}: {} entries, at most {most}", entries.len()));
+    }
+    let mut lines = 0;
+    for path in entries {
+        if path.is_dir() {
+            let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            lines += measure(&path, &format!("{shown}/{name}"), found)?;
+        } else if path.extension().is_some_and(|ending| ending == "rs") {
+            let text = std::fs::read_to_string(&path).map_err(|error| format!("{}: {error}", path.display()))?;
+            lines += text.lines().count();
+        }
+    }
+    Ok(lines)
+}
+
+fn limit(exceptions: &[(&str, usize)], name: &str, otherwise: usize) -> usize {
+    exceptions.iter().find(|(known, _)| *known == name).map_or(otherwise, |(_, most)| *most)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_folder_and_a_crate_that_are_too_large_are_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let (crate_, part) = (folder.path().join("heavy"), folder.path().join("heavy/src/part"));
+        std::fs::create_dir_all(&part).unwrap();
+        for index in 0..13 {
+            std::fs::write(part.join(format!("m{index}.rs")), "// a line\n".repeat(700)).unwrap();
+        }
+        let found = complaints(&crate_).unwrap();
+        assert_eq!(found.len(), 2, "{found:?}");
+        assert!(found[0].contains("heavy/src/part: 13 entries") && found[1].contains("9100 lines"), "{found:?}");
+    }
+}

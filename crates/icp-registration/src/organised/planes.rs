@@ -21,8 +21,8 @@ pub(super) const FREEDOM: f32 = NODES - PARAMETERS;
 const MOMENT: f32 = NODES * (HALF * (HALF + 1)) as f32 / 3.0;
 
 /// How much more variance the plane may have in the middle of its window than that of a whole one. One-sided windows,
-/// at the rim of what was seen, are told by it: there the surface ends, and so do its errors. Two of three rows have 3.
-const LARGEST_VARIANCE: f32 = 2.9;
+/// at the rim of what was seen, are told by it: there the surface ends, and so do its errors.
+const LARGEST_VARIANCE: f32 = 2.0;
 
 /// Share of the squares in a window that rounding of the places of its pixels leaves.
 const ROUNDING: f32 = 1e-6;
@@ -128,7 +128,7 @@ impl PlaneRow<'_> {
                         continue;
                     }
                     let (x, y, n) = (x + places[k][0], y + places[k][1], shares[k]);
-                    // There is no value without pixels. One by one: a pair would be kept on the stack, lane by lane.
+                    // There is no value without pixels. One by one: a tuple is stored under a mask and waits for it.
                     let e = if n > 0.0 { e } else { 0.0 };
                     let one = if n > 0.0 { 1.0 } else { 0.0 };
                     let ne = n * e;

@@ -1,5 +1,5 @@
 //! Pairs of frames with and without a fifth of invalid pixels: frames of a Kinect 10, 20 and 30 apart, half of the
-//! sequence at a time, and simulated ones.
+//! sequence at a time, and simulated ones. `invalid simulated 1000 5`: those from seed 1000 on, five times as many.
 
 use std::sync::Arc;
 
@@ -68,9 +68,11 @@ impl Tally {
 pub fn print() {
     let wanted = std::env::args().nth(2);
     if wanted.as_deref() != Some("real") {
-        simulated("176x144", &Pinhole::small(), 60);
-        simulated("224x172", &Pinhole::medium(), 60);
-        simulated("640x480", &Pinhole::large(), 10);
+        let number = |at: usize, usual: u64| std::env::args().nth(at).map_or(usual, |number| number.parse().unwrap());
+        let (first, times) = (number(3, 0), number(4, 1));
+        simulated("176x144", &Pinhole::small(), first..first + 60 * times);
+        simulated("224x172", &Pinhole::medium(), first..first + 60 * times);
+        simulated("640x480", &Pinhole::large(), first..first + 10 * times);
     }
     if wanted.as_deref() != Some("simulated") {
         real("frames 0 to 249", 0);
@@ -94,16 +96,19 @@ fn run(
     })
 }
 
-fn simulated(name: &str, camera: &Pinhole, count: u64) {
+fn simulated(name: &str, camera: &Pinhole, pairs: std::ops::Range<u64>) {
     let projection = projection(camera);
     let mut aligner = FrameAligner::new(FrameAlignmentOptions::default()).unwrap();
     let mut tallies: [Tally; LOSSES.len()] = Default::default();
-    for k in 0..count {
+    for k in pairs {
+        let pair = frame_pair(camera, k);
         for (loss, tally) in LOSSES.into_iter().zip(&mut tallies) {
-            let mut pair = frame_pair(camera, k);
-            lose(&mut pair.target.0, camera.width, loss, SHARE, 2 * k);
-            lose(&mut pair.source.0, camera.width, loss, SHARE, 2 * k + 1);
-            let frames = [&pair.target, &pair.source].map(|frame| (&frame.0[..], Some(&frame.1[..])));
+            let [target, source] = [(&pair.target, 2 * k), (&pair.source, 2 * k + 1)].map(|(frame, seed)| {
+                let mut points = frame.0.clone();
+                lose(&mut points, camera.width, loss, SHARE, seed);
+                points
+            });
+            let frames = [(&target[..], Some(&pair.target.1[..])), (&source[..], Some(&pair.source.1[..]))];
             tally.add(run(&projection, frames, &mut aligner), &pair.target_from_source, (30.0, 1.0));
         }
     }

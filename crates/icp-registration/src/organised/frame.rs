@@ -53,7 +53,8 @@ impl OrganisedFrame {
     /// Prepares a frame: one point a pixel of `projection`, row by row, camera frame, metre; NaN where there is no
     /// range. `sigma`: standard deviation of the ranges, metre; without it, inverse depth is taken as equally precise
     /// all over the frame, and how precise is estimated. Pixels whose sigma is not positive take no part either: a node is
-    /// made from those that are valid, wherever they lie in its square.
+    /// made from those that are valid, wherever they lie in its square, and one without any, but surrounded by others, from
+    /// theirs.
     ///
     /// # Errors
     /// [`Error::LengthMismatch`] where points or sigma do not fill the frame; [`Error::PointsOffRays`] where points do
@@ -222,28 +223,33 @@ impl OrganisedFrame {
         self.noise = scale;
         let limit = LARGEST_MISFIT * if self.has_sigma { typical.max(1.0) } else { typical };
         let nodes = self.planes.par_iter_mut().zip(&mut self.sigma).zip(&self.misfit);
-        let seen = self.spread.par_iter().zip(&self.inverse_depth).zip(&self.projection.grid.cosine);
-        nodes.zip(seen).with_min_len(4096).for_each(|(((plane, sigma), misfit), ((spread, w), cosine))| {
-            let floor = (ROUNDING * w / spread).powi(2);
-            let incidence = plane[3] * w * cosine;
+        let grid = &self.projection.grid;
+        let rays = grid.u.par_iter().zip(&grid.v).zip(&grid.cosine);
+        nodes.zip(rays).with_min_len(4096).for_each(|(((plane, sigma), misfit), ((u, v), cosine))| {
+            let rounding = ROUNDING * plane[3] / *sigma;
+            let floor = rounding * rounding;
+            let incidence = (plane[0] * u + plane[1] * v - plane[2]) * cosine;
             // NaN fails.
             let holds = *misfit <= limit + floor && incidence >= LEAST_INCIDENCE;
             if !holds {
                 *plane = [f32::NAN; 4];
             }
-            *sigma *= scale.max(ROUNDING * w / spread);
+            *sigma *= scale.max(rounding);
         });
     }
 
-    /// Moves the nodes with planes along them from the places of their pixels to their middles.
+    /// Moves the nodes with planes along them from the places of their pixels to their middles; nodes without pixels are
+    /// put on their planes.
     fn centre(&mut self) {
-        let grid = &self.projection.grid;
-        let nodes = self.inverse_depth.par_iter_mut().zip(&mut self.place).zip(&self.planes);
-        nodes.zip(grid.u.par_iter().zip(&grid.v)).with_min_len(4096).for_each(|(((w, place), plane), (u, v))| {
-            if plane[3].is_finite() && place.iter().any(|shift| shift.abs() > 0.0) {
-                *w = (plane[0] * u + plane[1] * v - plane[2]) / plane[3];
-                *place = [0.0; 2];
-            }
+        let (grid, noise) = (&self.projection.grid, self.noise);
+        let nodes = self.inverse_depth.par_iter_mut().zip(&mut self.spread).zip(&mut self.place);
+        let planes = self.planes.par_iter().zip(&self.sigma).zip(grid.u.par_iter().zip(&grid.v));
+        nodes.zip(planes).with_min_len(4096).for_each(|(((w, spread), place), ((plane, sigma), (u, v)))| {
+            // No branches: they would be guessed wrong at every hole.
+            let (has_plane, middle) = (plane[3].is_finite(), (plane[0] * u + plane[1] * v - plane[2]) / plane[3]);
+            *spread = if has_plane & w.is_nan() { sigma * middle / (plane[3] * noise) } else { *spread };
+            *w = if has_plane { middle } else { *w };
+            *place = if has_plane { [0.0; 2] } else { *place };
         });
     }
 }

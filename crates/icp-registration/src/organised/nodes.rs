@@ -11,8 +11,8 @@
 
 use super::grid::Grid;
 
-/// Nodes taken at a time.
-const BLOCK: usize = 32;
+/// Columns of pixels taken at a time, at least those of one node.
+const PIXELS: usize = 96;
 /// Depths that count as measured, metre.
 pub(super) const LEAST_DEPTH_M: f64 = 1e-5;
 pub(super) const LARGEST_DEPTH_M: f64 = 1e7;
@@ -57,74 +57,58 @@ impl NodeRow<'_> {
     /// `BIN`: pixels a side of a node, 0 where only known when running.
     #[inline(always)]
     fn run<const BIN: usize>(mut self) -> bool {
-        if !self.is_whole {
-            self.share.fill(1.0);
-            self.place.fill([0.0; 2]);
-            self.is_whole = true;
-        }
-        let whole = self.grid.cols / BLOCK * BLOCK;
-        for first in (0..whole).step_by(BLOCK) {
-            self.block::<BIN, BLOCK>(first);
-        }
-        for first in whole..self.grid.cols {
-            self.block::<BIN, 1>(first);
+        let (cols, was_whole) = (self.grid.cols, self.is_whole);
+        let most = PIXELS / self.grid.bin;
+        self.is_whole = true;
+        for first in (0..cols).step_by(most) {
+            self.block::<BIN>(first, most.min(cols - first), was_whole);
         }
         self.is_whole
     }
 
     #[inline(always)]
-    fn block<const BIN: usize, const N: usize>(&mut self, first: usize) {
+    fn block<const BIN: usize>(&mut self, first: usize, count: usize, was_whole: bool) {
         let bin = if BIN == 0 { self.grid.bin } else { BIN };
-        let (mut sum, mut sigma) = ([0.0_f32; N], [0.0_f32; N]);
-        // Invalid pixels are seldom alone.
-        if !self.is_whole {
-            let valid = self.valid::<BIN, N>(first, &mut sum, &mut sigma);
-            self.average(first, &valid, &sum, &sigma);
-            return;
-        }
-        let mut least = [f32::INFINITY; N];
-        for line in 0..bin {
-            let start = self.pixels(first, line);
-            let points = &self.points[start..start + N * bin];
-            // All nodes side by side, so that the divisions are.
+        let columns = self.columns::<BIN>(first, count * bin);
+        let middle = (bin as f32 - 1.0) / 2.0;
+        let mut nodes = [[0.0_f32; PIXELS]; 5];
+        for k in 0..count {
+            let mut sums = [0.0; 5];
             for pixel in 0..bin {
-                for k in 0..N {
-                    sum[k] += inverse(points[k * bin + pixel][2]);
+                let [w, sigma, valid, down] = [0, 1, 2, 3].map(|i| columns[i][k * bin + pixel]);
+                let terms = [w, sigma, valid, down, valid * (pixel as f32 - middle)];
+                for i in 0..5 {
+                    sums[i] += terms[i];
                 }
             }
-            if let Some(values) = self.sigma {
-                let values = &values[start..start + N * bin];
-                for pixel in 0..bin {
-                    for k in 0..N {
-                        let v = values[pixel * N + k];
-                        least[k] = if v < least[k] { v } else { least[k] };
-                    }
-                }
-                for (s, v) in sigma.iter_mut().zip(values.chunks_exact(bin)) {
-                    *s += v.iter().sum::<f32>();
-                }
+            for i in 0..5 {
+                nodes[i][k] = sums[i];
             }
         }
+        let [sum, sigma, valid, down, across] = nodes;
         let mut is_whole = true;
-        for k in 0..N {
-            is_whole &= (sum[k] + sigma[k]).is_finite() & (least[k] > 0.0);
+        for k in 0..count {
+            is_whole &= valid[k] >= (bin * bin) as f32;
         }
-        if is_whole {
-            self.average(first, &[(bin * bin) as f32; N], &sum, &sigma);
-        } else {
-            self.is_whole = false;
-            let valid = self.valid::<BIN, N>(first, &mut sum, &mut sigma);
-            self.average(first, &valid, &sum, &sigma);
+        self.is_whole &= is_whole;
+        if !(is_whole & was_whole) {
+            let (share, place) = (&mut self.share[first..][..count], &mut self.place[first..][..count]);
+            for k in 0..count {
+                let per_node = if valid[k] > 0.0 { 1.0 / (valid[k] * bin as f32) } else { 0.0 };
+                share[k] = valid[k] / (bin * bin) as f32;
+                place[k] = [across[k] * per_node, down[k] * per_node];
+            }
         }
+        self.average(first, &valid[..count], &sum[..count], &sigma[..count]);
     }
 
     /// Nodes from the numbers of their pixels and the sums over them.
     #[inline(always)]
-    fn average<const N: usize>(&mut self, first: usize, valid: &[f32; N], sum: &[f32; N], sigma: &[f32; N]) {
-        let side = self.grid.bin as f32;
-        let cosine = &self.grid.cosine[self.row * self.grid.cols + first..][..N];
-        let (inverse_depth, spread) = (&mut self.inverse_depth[first..][..N], &mut self.spread[first..][..N]);
-        for k in 0..N {
+    fn average(&mut self, first: usize, valid: &[f32], sum: &[f32], sigma: &[f32]) {
+        let (side, count) = (self.grid.bin as f32, valid.len());
+        let cosine = &self.grid.cosine[self.row * self.grid.cols + first..][..count];
+        let (inverse_depth, spread) = (&mut self.inverse_depth[first..][..count], &mut self.spread[first..][..count]);
+        for k in 0..count {
             let (n, w) = (valid[k], sum[k] / valid[k]);
             // The average of n independent errors has the n-th part of their variance; depth is range times cosine.
             let s = sigma[k] / n / n.sqrt() * cosine[k] * w * w;
@@ -134,70 +118,32 @@ impl NodeRow<'_> {
         }
     }
 
-    /// The sums over the valid pixels alone, and how many they are.
+    /// Sums along the columns of pixels of some nodes, over the valid ones: of inverse depth, sigma, one, and the
+    /// distance below the middle of the node. First along columns: there pixels lie side by side in memory.
     #[inline(always)]
-    fn valid<const BIN: usize, const N: usize>(
-        &mut self,
-        first: usize,
-        sum: &mut [f32; N],
-        sigma: &mut [f32; N],
-    ) -> [f32; N] {
+    fn columns<const BIN: usize>(&self, first: usize, pixels: usize) -> [[f32; PIXELS]; 4] {
         let bin = if BIN == 0 { self.grid.bin } else { BIN };
-        let nothing = [0.0_f32; N];
-        let (mut valid, mut across, mut down) = (nothing, nothing, nothing);
-        (*sum, *sigma) = (nothing, nothing);
-        let middle = (bin as f32 - 1.0) / 2.0;
+        let mut sums = [[0.0_f32; PIXELS]; 4];
+        let ones = [1.0_f32; PIXELS];
         for line in 0..bin {
-            let start = self.pixels(first, line);
-            let points = &self.points[start..start + N * bin];
-            for pixel in 0..bin {
-                let mut known = nothing;
-                if let Some(values) = self.sigma {
-                    let values = &values[start..start + N * bin];
-                    for k in 0..N {
-                        known[k] = usable(values[k * bin + pixel]);
-                    }
-                }
-                for k in 0..N {
-                    let w = inverse(points[k * bin + pixel][2]);
-                    let is_valid = (w + known[k]).is_finite();
-                    let one = if is_valid { 1.0 } else { 0.0 };
-                    valid[k] += one;
-                    across[k] += one * (pixel as f32 - middle);
-                    down[k] += one * (line as f32 - middle);
-                    sum[k] += if is_valid { w } else { 0.0 };
-                    sigma[k] += if is_valid { known[k] } else { 0.0 };
-                }
+            let start = (self.row * bin + line) * self.width + first * bin;
+            let points = &self.points[start..start + pixels];
+            let sigma = self.sigma.map_or(&ones[..pixels], |sigma| &sigma[start..start + pixels]);
+            let below = line as f32 - (bin as f32 - 1.0) / 2.0;
+            for k in 0..pixels {
+                // What single precision cannot hold is infinite, and fails, as NaN does.
+                let (depth, s) = (-points[k][2] as f32, sigma[k]);
+                let is_known = (depth > LEAST_DEPTH_M as f32) & (depth < LARGEST_DEPTH_M as f32);
+                let is_valid = is_known & (s > 0.0) & (s < f32::INFINITY);
+                let one = if is_valid { 1.0 } else { 0.0 };
+                let depth = if is_valid { depth } else { f32::INFINITY };
+                let s = if is_valid { s } else { 0.0 };
+                sums[0][k] += 1.0 / depth;
+                sums[1][k] += s;
+                sums[2][k] += one;
+                sums[3][k] += one * below;
             }
         }
-        let (share, place) = (&mut self.share[first..][..N], &mut self.place[first..][..N]);
-        for k in 0..N {
-            let per_node = if valid[k] > 0.0 { 1.0 / (valid[k] * bin as f32) } else { 0.0 };
-            share[k] = valid[k] / (bin * bin) as f32;
-            place[k] = [across[k] * per_node, down[k] * per_node];
-        }
-        valid
+        sums
     }
-
-    /// Index of the first pixel of a line of a node.
-    #[inline(always)]
-    fn pixels(&self, node: usize, line: usize) -> usize {
-        let bin = self.grid.bin;
-        (self.row * bin + line) * self.width + node * bin
-    }
-}
-
-/// Inverse depth of a point, NaN where it has none.
-#[inline(always)]
-fn inverse(z: f64) -> f32 {
-    // What single precision cannot hold is infinite, and fails.
-    let depth = -z as f32;
-    let known = (depth > LEAST_DEPTH_M as f32) & (depth < LARGEST_DEPTH_M as f32);
-    1.0 / if known { depth } else { f32::NAN }
-}
-
-/// A standard deviation, NaN where it is none.
-#[inline(always)]
-fn usable(sigma: f32) -> f32 {
-    if (sigma > 0.0) & (sigma < f32::INFINITY) { sigma } else { f32::NAN }
 }

@@ -2,7 +2,7 @@
 //!
 //! A plane is `a u + b v + c = 1/depth`; a and b come from a square window of nodes, c from the node alone: a wider
 //! window would round off creases, and the error of the offset is what reaches the pose. Nodes count as many times as
-//! they have valid pixels, each at their mean place.
+//! they have valid pixels, each at their mean place. A node without any, but surrounded by others, has c from the window.
 // Only what is inlined is compiled for wide registers.
 #![allow(clippy::inline_always)]
 // Lanes lie side by side: with an index, loops read as their formulas and have the same length everywhere.
@@ -66,12 +66,13 @@ impl PlaneRow<'_> {
             return;
         }
         let last = cols - HALF;
-        let whole = (last - HALF) / BLOCK * BLOCK + HALF;
-        for first in (HALF..whole).step_by(BLOCK) {
-            self.block::<BLOCK>(first);
-        }
-        for first in whole..last {
-            self.block::<1>(first);
+        // The last block overlaps the one before: nodes one by one cost as much as blocks.
+        for first in (HALF..last).step_by(BLOCK) {
+            if last < BLOCK + HALF {
+                (first..last).for_each(|node| self.block::<1>(node));
+            } else {
+                self.block::<BLOCK>(first.min(last - BLOCK));
+            }
         }
     }
 
@@ -97,8 +98,18 @@ impl PlaneRow<'_> {
     fn fit<const N: usize, const WHOLE: bool>(&mut self, first: usize) {
         let cols = self.grid.cols;
         let start = self.row * cols + first;
-        let mut centre = [0.0_f32; N];
-        centre.copy_from_slice(&self.inverse_depth[start..start + N]);
+        // Values of the nodes, and variances of whole ones.
+        let (mut centre, mut variance) = ([f32::NAN; N], [f32::NAN; N]);
+        // A node without pixels refers to one beside it.
+        for at in &[start, start - 1, start + 1, start - cols, start + cols][..if WHOLE { 1 } else { 5 }] {
+            let [values, spreads, shares] =
+                [self.inverse_depth, self.spread, self.share].map(|list| &list[*at..*at + N]);
+            for k in 0..N {
+                let v = if WHOLE { spreads[k] * spreads[k] } else { spreads[k] * spreads[k] * shares[k] };
+                variance[k] = if centre[k].is_nan() { v } else { variance[k] };
+                centre[k] = if centre[k].is_nan() { values[k] } else { centre[k] };
+            }
+        }
         // Sums of the differences from the centre: the values themselves would cancel.
         let mut sums = [[0.0_f32; N]; SUMS];
         for j in 0..=2 * HALF {
@@ -117,10 +128,12 @@ impl PlaneRow<'_> {
                         continue;
                     }
                     let (x, y, n) = (x + places[k][0], y + places[k][1], shares[k]);
-                    // There is no value without pixels.
-                    let (ne, one) = if n > 0.0 { (n * e, 1.0) } else { (0.0, 0.0) };
+                    // There is no value without pixels. One by one: a tuple is stored under a mask and waits for it.
+                    let e = if n > 0.0 { e } else { 0.0 };
+                    let one = if n > 0.0 { 1.0 } else { 0.0 };
+                    let ne = n * e;
                     sums[0][k] += ne;
-                    sums[1][k] += if n > 0.0 { ne * e } else { 0.0 };
+                    sums[1][k] += ne * e;
                     sums[2][k] += x * ne;
                     sums[3][k] += y * ne;
                     sums[4][k] += n * x;
@@ -133,11 +146,17 @@ impl PlaneRow<'_> {
                 }
             }
         }
-        self.solve::<N, WHOLE>(first, &centre, &sums);
+        self.solve::<N, WHOLE>(first, &centre, &variance, &sums);
     }
 
     #[inline(always)]
-    fn solve<const N: usize, const WHOLE: bool>(&mut self, first: usize, centre: &[f32; N], sums: &[[f32; N]; SUMS]) {
+    fn solve<const N: usize, const WHOLE: bool>(
+        &mut self,
+        first: usize,
+        centre: &[f32; N],
+        variance: &[f32; N],
+        sums: &[[f32; N]; SUMS],
+    ) {
         let (grid, start) = (self.grid, self.row * self.grid.cols + first);
         let (u, v) = (&grid.u[start..start + N], &grid.v[start..start + N]);
         let (gradient, spread) = (&grid.gradient[start..start + N], &self.spread[start..start + N]);
@@ -161,15 +180,18 @@ impl PlaneRow<'_> {
                 explained = gc * by_col + gr * by_row + ROUNDING * sums[1][k];
             }
             let rest = sums[1][k] - sums[0][k] * sums[0][k] / window.count - explained;
-            let (mut w, mut s, mut variance) = (centre[k], spread[k], spread[k] * spread[k]);
+            misfit[k] = rest / (window.freedom * variance[k]);
+            let (mut w, mut s) = (centre[k], spread[k]);
             if !WHOLE {
                 // The node's average, moved along the plane from the place of its pixels to its middle.
                 let ([x, y], mean) = (places[k], window.mean);
-                w -= gc * x + gr * y;
-                s *= (1.0 + shares[k] * window.product([x, y], [2.0 * mean[0] - x, 2.0 * mean[1] - y])).sqrt();
-                variance *= shares[k];
+                let more = 1.0 + shares[k] * window.product([x, y], [2.0 * mean[0] - x, 2.0 * mean[1] - y]);
+                // Without pixels, the plane's own value. As its neighbours have the same errors, it counts as one of them.
+                let alone = sums[0][k] / window.count - gc * mean[0] - gr * mean[1];
+                let is_seen = shares[k] > 0.0;
+                w += if is_seen { -gc * x - gr * y } else { alone };
+                s = if is_seen { s * more.sqrt() } else { variance[k].sqrt() };
             }
-            misfit[k] = rest / (window.freedom * variance);
             let m = gradient[k];
             let (a, b) = (m[0] * gc + m[1] * gr, m[2] * gc + m[3] * gr);
             let c = w - a * u[k] - b * v[k];

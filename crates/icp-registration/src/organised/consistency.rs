@@ -12,6 +12,7 @@ use super::blocks::Block;
 use super::frame::OrganisedFrame;
 use super::grid::{BLOCK, STRIDES};
 use super::pairs::{Locate, Moved, WithLocate, with_locate};
+use super::planes::HALF;
 
 /// Distance from a plane within which nodes agree with it, in units of the frames' radius.
 const TOLERANCE: f64 = 0.03;
@@ -23,8 +24,8 @@ const CLEARLY: f32 = 2.0;
 const LEAST_COSINE: f32 = 0.8;
 /// Level on which frames are compared to see whether a pose can be doubted: every fourth node.
 pub(super) const DOUBT_LEVEL: usize = 1;
-/// Nodes between those of a frame that are compared.
-const APART: usize = 2;
+/// Distance of the nodes of a frame that are compared: nearer ones have planes through the same nodes.
+const APART: usize = 2 * HALF + 1;
 
 /// Where the nodes of one frame lie for another, at a pose. The sum of both directions says more than one of them: what
 /// one camera takes for hidden, the other may have seen through.
@@ -130,8 +131,8 @@ pub(super) fn counted(
 }
 
 impl OrganisedFrame {
-    /// Share of the nodes that are unclear beside the plane of the frame's own node two farther on, along columns and along
-    /// rows: what pairs of frames show at their right pose, whose nodes and planes share as many pixels' surroundings.
+    /// Share of the nodes that are unclear beside the plane of the frame's own next node through other pixels, along columns
+    /// and along rows: what pairs of frames show at their right pose, whose planes share no pixels either.
     pub(super) fn unevenness(&self, tolerance_m: f64) -> f64 {
         let grid = &self.projection.grid;
         let (mut near, mut unclear) = (0_usize, 0_usize);

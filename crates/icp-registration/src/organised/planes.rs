@@ -13,7 +13,7 @@ use super::grid::Grid;
 /// Nodes taken at a time.
 const BLOCK: usize = 16;
 /// Half width of the window, nodes.
-const HALF: usize = 1;
+pub(super) const HALF: usize = 1;
 /// Nodes of the window, those of them beyond the three that any plane goes through, and their scatter along an axis.
 const NODES: f32 = ((2 * HALF + 1) * (2 * HALF + 1)) as f32;
 const PARAMETERS: f32 = 3.0;

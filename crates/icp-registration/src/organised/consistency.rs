@@ -109,7 +109,7 @@ fn one_way(
     level: usize,
     tolerance_m: f64,
 ) -> FrameConsistency {
-    let blocks = &source.points.blocks[..source.projection.grid.levels[level]];
+    let blocks = &source.points.blocks[..source.grid.levels[level]];
     let counts = counted(source, target, pose, blocks, tolerance_m);
     let out_of_view = source.points.counts[level] - counts.compared() - counts.hidden;
     FrameConsistency { out_of_view, ..counts }
@@ -134,7 +134,7 @@ impl OrganisedFrame {
     /// Share of the nodes that are unclear beside the plane of the frame's own next node through other pixels, along columns
     /// and along rows: what pairs of frames show at their right pose, whose planes share no pixels either.
     pub(super) fn unevenness(&self, tolerance_m: f64) -> f64 {
-        let grid = &self.projection.grid;
+        let grid = &self.grid;
         let (mut near, mut unclear) = (0_usize, 0_usize);
         for row in (0..grid.rows.saturating_sub(APART)).step_by(STRIDES[DOUBT_LEVEL]) {
             for col in (0..grid.cols.saturating_sub(APART)).step_by(STRIDES[DOUBT_LEVEL]) {

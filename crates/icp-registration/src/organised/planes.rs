@@ -18,7 +18,7 @@ pub(super) const HALF: usize = 1;
 const NODES: f32 = ((2 * HALF + 1) * (2 * HALF + 1)) as f32;
 const PARAMETERS: f32 = 3.0;
 pub(super) const FREEDOM: f32 = NODES - PARAMETERS;
-const MOMENT: f32 = NODES * (HALF * (HALF + 1)) as f32 / 3.0;
+pub(super) const MOMENT: f32 = NODES * (HALF * (HALF + 1)) as f32 / 3.0;
 
 /// How much more variance the plane may have in the middle of its window than that of a whole one. One-sided windows,
 /// at the rim of what was seen, are told by it: there the surface ends, and so do its errors.

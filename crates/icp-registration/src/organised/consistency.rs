@@ -15,7 +15,7 @@ use super::pairs::{Locate, Moved, WithLocate, with_locate};
 use super::planes::HALF;
 
 /// Distance from a plane within which nodes agree with it, in units of the frames' radius.
-const TOLERANCE: f64 = 0.03;
+pub(super) const TOLERANCE: f64 = 0.04;
 /// Its smallest multiple of the standard deviation of a pair.
 const SIGMAS: f32 = 3.0;
 /// Multiple of the distance within which nodes agree, beyond which they contradict.
@@ -49,6 +49,11 @@ impl FrameConsistency {
         self.agreeing + self.contradicting + self.hidden + self.unclear + self.out_of_view
     }
 
+    /// Nodes that speak against the pose.
+    pub(super) fn wrong(&self) -> usize {
+        self.contradicting + self.unclear + self.hidden
+    }
+
     /// Nodes of which both frames say something: those that agree, contradict or are unclear.
     pub fn compared(&self) -> usize {
         self.agreeing + self.contradicting + self.unclear
@@ -72,7 +77,7 @@ impl Add for FrameConsistency {
 /// Compares two frames in both directions at a pose `target_from_source`, without changing it: a test of poses that come
 /// from elsewhere, such as the hypotheses of a relocalisation. `stride`: every how many nodes along columns and rows are
 /// compared, rounded down to 1, 2, 4 or 8. `tolerance_m`: within which distance a node agrees with a plane; noise is added
-/// to it. `None`: 0.03 of the larger frame's radius.
+/// to it. `None`: 0.04 of the larger frame's radius.
 ///
 /// A pose that is not finite leaves all nodes out of view.
 pub fn frame_consistency(

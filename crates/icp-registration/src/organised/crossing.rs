@@ -10,8 +10,6 @@ use crate::icp::{MotionKind, UndeterminedMotion};
 
 /// Share of an open motion along its normal above which a node tells it. Normals of single nodes scatter by some 0.1.
 const LEAST_SHARE: f64 = 0.3;
-/// What a hidden node counts beside one that contradicts or is unclear.
-const HIDDEN: f64 = 0.3;
 
 /// The nodes of two frames that tell some motions. On a wall with a small box, a thousand nodes agree wherever the frames
 /// slide along it; these few do not.
@@ -41,7 +39,7 @@ impl<'a> Crossing<'a> {
         let [source, target] = self.frames;
         let there = counted(source, target, pose, &self.blocks[0], tolerance_m);
         let both = there + counted(target, source, &pose.inverse(), &self.blocks[1], tolerance_m);
-        both.agreeing as f64 - (both.contradicting + both.unclear) as f64 - HIDDEN * both.hidden as f64
+        both.agreeing as f64 - both.wrong() as f64
     }
 }
 

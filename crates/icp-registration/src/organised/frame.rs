@@ -18,9 +18,9 @@ use crate::kernel::{median_of_bits, positive_bits};
 const LARGEST_MISFIT: f32 = 3.0;
 /// Smallest cosine between a plane's normal and the ray: in windows across a jump lie steep planes that are none.
 const LEAST_INCIDENCE: f32 = 0.12;
-/// Typical angle, radian by the rules of small ones, by which noise turns the normals of planes beyond which larger nodes
-/// are taken: most pairs would be refused for what their normals enclose.
-const LARGEST_TILT: f32 = 1.0;
+/// Typical tilt of planes by noise about either axis, radian, beyond which larger nodes are taken: there half of the right
+/// pairs enclose more than 45 degrees, and are refused.
+const LARGEST_TILT: f32 = 0.5;
 /// Deviation of inverse depth that is rounding, relative.
 const ROUNDING: f32 = 1e-6;
 /// Nodes from which typical values are taken.
@@ -240,7 +240,7 @@ impl OrganisedFrame {
         });
     }
 
-    /// Typical angle by which noise turns the normals, radian by the rules of small ones; 0 where there are no planes.
+    /// Typical tilt of the planes by noise about either axis, radian, as for small ones; 0 where there are no planes.
     fn tilt(&mut self) -> f32 {
         let step = self.planes.len().div_ceil(SAMPLE).max(1);
         let known = (0..self.planes.len()).step_by(step).filter(|&k| self.planes[k][3].is_finite());

@@ -4,10 +4,10 @@ use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use rayon::prelude::*;
 
 use super::aligner::FrameAligner;
-use super::consistency::consistency;
+use super::consistency::{TOLERANCE, consistency};
 use super::crossing::Crossing;
 use super::frame::OrganisedFrame;
-use super::search::{COARSE_TOLERANCE, weighed};
+use super::search::weighed;
 use super::starts::{TURN_RAD, TURNS};
 use super::track::{Track, blocks};
 use crate::icp::{MotionKind, UndeterminedMotion};
@@ -82,7 +82,7 @@ impl FrameAligner {
             let (mut track, blocks) = (Track { pose, ..start.clone() }, blocks(source, level));
             aligner.open(&mut track, source, target, blocks).ok()?;
             aligner.descend_by(&mut track, source, target, blocks, ITERATIONS).ok()?;
-            let counts = consistency(source, target, &track.pose, level, COARSE_TOLERANCE * radius);
+            let counts = consistency(source, target, &track.pose, level, TOLERANCE * radius);
             Some((weighed(&counts), track))
         });
         let followed: Vec<Option<(f64, Track)>> = followed.collect();

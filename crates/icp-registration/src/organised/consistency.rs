@@ -49,11 +49,6 @@ impl FrameConsistency {
         self.agreeing + self.contradicting + self.hidden + self.unclear + self.out_of_view
     }
 
-    /// Nodes that speak against the pose.
-    pub(super) fn wrong(&self) -> usize {
-        self.contradicting + self.unclear + self.hidden
-    }
-
     /// Nodes of which both frames say something: those that agree, contradict or are unclear.
     pub fn compared(&self) -> usize {
         self.agreeing + self.contradicting + self.unclear
@@ -115,24 +110,12 @@ fn one_way(
     tolerance_m: f64,
 ) -> FrameConsistency {
     let blocks = &source.points.blocks[..source.grid.levels[level]];
-    let counts = counted(source, target, pose, blocks, tolerance_m);
-    let out_of_view = source.points.counts[level] - counts.compared() - counts.hidden;
-    FrameConsistency { out_of_view, ..counts }
-}
-
-/// Where some nodes of the source lie for the target; those out of view are not counted.
-pub(super) fn counted(
-    source: &OrganisedFrame,
-    target: &OrganisedFrame,
-    pose: &Isometry3<f64>,
-    blocks: &[Block],
-    tolerance_m: f64,
-) -> FrameConsistency {
     let moved = Moved::new(source, target, pose, &Vector3::zeros(), 1.0);
     let mut counts = FrameConsistency::default();
     let compare = Compare { moved: &moved, blocks, tolerance: tolerance_m as f32, counts: &mut counts };
     with_locate(target, compare);
-    counts
+    let out_of_view = source.points.counts[level] - counts.compared() - counts.hidden;
+    FrameConsistency { out_of_view, ..counts }
 }
 
 impl OrganisedFrame {

@@ -6,7 +6,6 @@ use rayon::prelude::*;
 
 use super::aligner::FrameAligner;
 use super::consistency::{DOUBT_LEVEL, FrameConsistency, TOLERANCE, consistency};
-use super::crossing::Crossing;
 use super::frame::OrganisedFrame;
 use super::places::Places;
 use super::track::Track;
@@ -41,8 +40,7 @@ impl FrameAligner {
             && result.degenerate.iter().any(|motion| motion.kind == MotionKind::Translation)
             && agrees(source, target, result)
         {
-            let crossing = Crossing::new(source, target, &result.target_from_source, &result.degenerate);
-            let places = Places::along(track, &result.degenerate, &crossing, source.points.radius_m);
+            let places = Places::along(track, &result.degenerate, source, target);
             best = self.best_of(best, &places, start, source, target);
         }
         best.map(|best| {
@@ -109,6 +107,6 @@ fn agrees(source: &OrganisedFrame, target: &OrganisedFrame, result: &IcpResult) 
 /// Agreeing nodes, less the more the frames contradict each other. A share and no sum: on real frames some contradiction
 /// is everywhere, and a large overlap must not pay for it.
 pub(super) fn weighed(counts: &FrameConsistency) -> f64 {
-    let (agreeing, wrong) = (counts.agreeing as f64, counts.wrong() as f64);
+    let (agreeing, wrong) = (counts.agreeing as f64, (counts.contradicting + counts.unclear + counts.hidden) as f64);
     agreeing / (1.0 + CONTRADICTION * wrong / (agreeing + wrong).max(1.0))
 }

@@ -370,7 +370,7 @@ impl FrameAligner {
     }
 
     fn max_motion_sigma_m(&self, gauge: &Gauge) -> f64 {
-        self.options.max_motion_sigma_m.unwrap_or(gauge.radius_m / 200.0)
+        self.options.max_motion_sigma_m.unwrap_or(gauge.radius_m / 300.0)
     }
 
     fn too_few(&self, found: usize, of: usize, track: &Track) -> Error {

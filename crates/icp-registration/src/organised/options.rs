@@ -20,7 +20,7 @@ pub struct FrameAlignmentOptions {
     /// moved. Default `None`.
     pub shared_error: Option<SharedError>,
     /// A motion counts as undetermined when the predicted standard deviation of points at the frame's radius exceeds
-    /// this, metre. `None`: 1/200 of the radius.
+    /// this, metre. `None`: 1/300 of the radius.
     pub max_motion_sigma_m: Option<f64>,
     /// Levels that are passed, coarse to fine, 1 to 4. Default 4.
     pub levels: usize,

@@ -19,7 +19,7 @@ use crate::pose_graph::Relation;
 use crate::pose_graph::Uncertain;
 
 /// Share of the first frame's radius beyond whose standard deviation motions count as undetermined. Registration alone
-/// asks for 1/200; in a stream, poses that are centimetres weak for a moment are still worth more than a loss.
+/// asks for 1/300; in a stream, poses that are centimetres weak for a moment are still worth more than a loss.
 const WEAKEST_SHARE: f64 = 1.0 / 50.0;
 
 /// Tracks a stream of organised frames of one camera.

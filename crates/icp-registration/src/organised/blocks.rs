@@ -35,6 +35,14 @@ pub(super) struct Points {
 
 impl Points {
     pub(super) fn new(grid: &Grid) -> Self {
+        let (blocks, counts) = (Vec::new(), [0; STRIDES.len()]);
+        let mut points = Self { blocks, counts, centre: Vector3::zeros(), radius_m: 0.0 };
+        points.arrange(grid);
+        points
+    }
+
+    /// Makes the blocks those of another grid.
+    pub(super) fn arrange(&mut self, grid: &Grid) {
         let nothing = [f32::NAN; BLOCK];
         let empty = |node: &[u32; BLOCK]| Block {
             position: [nothing; 3],
@@ -42,12 +50,8 @@ impl Points {
             variance: nothing,
             node: *node,
         };
-        Self {
-            blocks: grid.order.iter().map(empty).collect(),
-            counts: [0; STRIDES.len()],
-            centre: Vector3::zeros(),
-            radius_m: 0.0,
-        }
+        self.blocks.clear();
+        self.blocks.extend(grid.order.iter().map(empty));
     }
 
     /// Takes over the nodes of a frame.

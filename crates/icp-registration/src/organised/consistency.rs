@@ -12,9 +12,10 @@ use super::blocks::Block;
 use super::frame::OrganisedFrame;
 use super::grid::{BLOCK, STRIDES};
 use super::pairs::{Locate, Moved, WithLocate, with_locate};
+use super::planes::HALF;
 
 /// Distance from a plane within which nodes agree with it, in units of the frames' radius.
-const TOLERANCE: f64 = 0.03;
+pub(super) const TOLERANCE: f64 = 0.04;
 /// Its smallest multiple of the standard deviation of a pair.
 const SIGMAS: f32 = 3.0;
 /// Multiple of the distance within which nodes agree, beyond which they contradict.
@@ -23,8 +24,8 @@ const CLEARLY: f32 = 2.0;
 const LEAST_COSINE: f32 = 0.8;
 /// Level on which frames are compared to see whether a pose can be doubted: every fourth node.
 pub(super) const DOUBT_LEVEL: usize = 1;
-/// Nodes between those of a frame that are compared.
-const APART: usize = 2;
+/// Distance of the nodes of a frame that are compared: nearer ones have planes through the same nodes.
+const APART: usize = 2 * HALF + 1;
 
 /// Where the nodes of one frame lie for another, at a pose. The sum of both directions says more than one of them: what
 /// one camera takes for hidden, the other may have seen through.
@@ -71,7 +72,7 @@ impl Add for FrameConsistency {
 /// Compares two frames in both directions at a pose `target_from_source`, without changing it: a test of poses that come
 /// from elsewhere, such as the hypotheses of a relocalisation. `stride`: every how many nodes along columns and rows are
 /// compared, rounded down to 1, 2, 4 or 8. `tolerance_m`: within which distance a node agrees with a plane; noise is added
-/// to it. `None`: 0.03 of the larger frame's radius.
+/// to it. `None`: 0.04 of the larger frame's radius.
 ///
 /// A pose that is not finite leaves all nodes out of view.
 pub fn frame_consistency(
@@ -108,32 +109,20 @@ fn one_way(
     level: usize,
     tolerance_m: f64,
 ) -> FrameConsistency {
-    let blocks = &source.points.blocks[..source.projection.grid.levels[level]];
-    let counts = counted(source, target, pose, blocks, tolerance_m);
-    let out_of_view = source.points.counts[level] - counts.compared() - counts.hidden;
-    FrameConsistency { out_of_view, ..counts }
-}
-
-/// Where some nodes of the source lie for the target; those out of view are not counted.
-pub(super) fn counted(
-    source: &OrganisedFrame,
-    target: &OrganisedFrame,
-    pose: &Isometry3<f64>,
-    blocks: &[Block],
-    tolerance_m: f64,
-) -> FrameConsistency {
+    let blocks = &source.points.blocks[..source.grid.levels[level]];
     let moved = Moved::new(source, target, pose, &Vector3::zeros(), 1.0);
     let mut counts = FrameConsistency::default();
     let compare = Compare { moved: &moved, blocks, tolerance: tolerance_m as f32, counts: &mut counts };
     with_locate(target, compare);
-    counts
+    let out_of_view = source.points.counts[level] - counts.compared() - counts.hidden;
+    FrameConsistency { out_of_view, ..counts }
 }
 
 impl OrganisedFrame {
-    /// Share of the nodes that are unclear beside the plane of the frame's own node two farther on, along columns and along
-    /// rows: what pairs of frames show at their right pose, whose nodes and planes share as many pixels' surroundings.
+    /// Share of the nodes that are unclear beside the plane of the frame's own next node through other pixels, along columns
+    /// and along rows: what pairs of frames show at their right pose, whose planes share no pixels either.
     pub(super) fn unevenness(&self, tolerance_m: f64) -> f64 {
-        let grid = &self.projection.grid;
+        let grid = &self.grid;
         let (mut near, mut unclear) = (0_usize, 0_usize);
         for row in (0..grid.rows.saturating_sub(APART)).step_by(STRIDES[DOUBT_LEVEL]) {
             for col in (0..grid.cols.saturating_sub(APART)).step_by(STRIDES[DOUBT_LEVEL]) {

@@ -6,8 +6,9 @@ use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 
 use super::blocks::Points;
+use super::grid::Grid;
 use super::nodes::{LARGEST_DEPTH_M, LEAST_DEPTH_M, NodeRow};
-use super::planes::{FREEDOM, PlaneRow};
+use super::planes::{FREEDOM, MOMENT, PlaneRow};
 use super::projection::Projection;
 use crate::cloud::Cloud;
 use crate::error::{Error, Result};
@@ -17,16 +18,21 @@ use crate::kernel::{median_of_bits, positive_bits};
 const LARGEST_MISFIT: f32 = 3.0;
 /// Smallest cosine between a plane's normal and the ray: in windows across a jump lie steep planes that are none.
 const LEAST_INCIDENCE: f32 = 0.12;
+/// Typical tilt of planes by noise about either axis, radian, beyond which larger nodes are taken: there half of the right
+/// pairs enclose more than 45 degrees, and are refused.
+const LARGEST_TILT: f32 = 0.5;
 /// Deviation of inverse depth that is rounding, relative.
 const ROUNDING: f32 = 1e-6;
-/// Nodes from which the typical misfit is taken.
+/// Nodes from which typical values are taken.
 const SAMPLE: usize = 1024;
 
 /// A frame prepared for registration: planes through its nodes, each the average of a square of pixels. Its memory is
 /// used again by [`OrganisedFrame::update`].
 #[derive(Debug, Clone)]
 pub struct OrganisedFrame {
-    pub(super) projection: Arc<Projection>,
+    projection: Arc<Projection>,
+    /// The projection's, fine or coarse.
+    pub(super) grid: Arc<Grid>,
     pub(super) inverse_depth: Vec<f32>,
     spread: Vec<f32>,
     /// Share of the pixels of each node that are valid.
@@ -60,7 +66,8 @@ impl OrganisedFrame {
     /// [`Error::LengthMismatch`] where points or sigma do not fill the frame; [`Error::PointsOffRays`] where points do
     /// not lie on the rays of their pixels.
     pub fn new(projection: &Arc<Projection>, points: &[[f64; 3]], sigma: Option<&[f32]>) -> Result<Self> {
-        let nodes = projection.grid.len();
+        let grid = Arc::clone(&projection.grids[0]);
+        let nodes = grid.len();
         let mut frame = Self {
             projection: Arc::clone(projection),
             inverse_depth: vec![f32::NAN; nodes],
@@ -74,7 +81,8 @@ impl OrganisedFrame {
             misfit: vec![f32::NAN; nodes],
             noise: 1.0,
             scratch: Vec::with_capacity(SAMPLE),
-            points: Points::new(&projection.grid),
+            points: Points::new(&grid),
+            grid,
             has_sigma: false,
         };
         frame.update(points, sigma)?;
@@ -98,13 +106,19 @@ impl OrganisedFrame {
         }
         check_rays(&self.projection, points)?;
         self.has_sigma = sigma.is_some();
-        self.reduce(points, sigma);
-        self.fit_planes();
-        self.refuse_misfits();
+        for level in 0..self.projection.grids.len() {
+            self.divide(level);
+            self.reduce(points, sigma);
+            self.fit_planes();
+            self.refuse_misfits();
+            if self.tilt() <= LARGEST_TILT {
+                break;
+            }
+        }
         if !self.is_whole {
             self.centre();
         }
-        self.points.gather(&self.projection.grid, &self.inverse_depth, &self.planes, &self.sigma);
+        self.points.gather(&self.grid, &self.inverse_depth, &self.planes, &self.sigma);
         Ok(())
     }
 
@@ -127,7 +141,7 @@ impl OrganisedFrame {
     /// deviations of the averages along their rays. Nodes without a plane, at edges and holes, are marked as rim and have
     /// no normal.
     pub fn to_cloud(&self) -> Cloud {
-        let grid = &self.projection.grid;
+        let grid = &self.grid;
         let seen: Vec<usize> = (0..grid.len()).filter(|&k| self.inverse_depth[k].is_finite()).collect();
         let has_plane = |k: usize| self.planes[k][3].is_finite();
         let vector = |v: [f32; 3]| Vector3::from(v.map(f64::from));
@@ -156,6 +170,7 @@ impl OrganisedFrame {
     pub(crate) fn as_target(&self) -> Self {
         Self {
             projection: Arc::clone(&self.projection),
+            grid: Arc::clone(&self.grid),
             inverse_depth: self.inverse_depth.clone(),
             spread: self.spread.clone(),
             share: Vec::new(),
@@ -184,8 +199,25 @@ impl OrganisedFrame {
         memory
     }
 
+    /// Takes another of the projection's grids.
+    fn divide(&mut self, level: usize) {
+        let grid = &self.projection.grids[level];
+        if Arc::ptr_eq(grid, &self.grid) {
+            return;
+        }
+        self.grid = Arc::clone(grid);
+        for list in [&mut self.inverse_depth, &mut self.spread, &mut self.share, &mut self.sigma, &mut self.misfit] {
+            list.resize(grid.len(), 0.0);
+        }
+        self.place.resize(grid.len(), [0.0; 2]);
+        self.planes.resize(grid.len(), [f32::NAN; 4]);
+        self.points.arrange(grid);
+        // The lists are filled anew.
+        self.is_whole = false;
+    }
+
     fn reduce(&mut self, points: &[[f64; 3]], sigma: Option<&[f32]>) {
-        let (grid, width) = (&self.projection.grid, self.projection.width());
+        let (grid, width) = (&self.grid, self.projection.width());
         let values = self.inverse_depth.par_chunks_mut(grid.cols).zip(self.spread.par_chunks_mut(grid.cols));
         let pixels = self.share.par_chunks_mut(grid.cols).zip(self.place.par_chunks_mut(grid.cols));
         let rows = values.zip(pixels).enumerate().with_min_len(8).with_max_len(16);
@@ -198,7 +230,7 @@ impl OrganisedFrame {
     }
 
     fn fit_planes(&mut self) {
-        let grid = &self.projection.grid;
+        let grid = &self.grid;
         let (inverse_depth, spread) = (&self.inverse_depth[..], &self.spread[..]);
         let (share, place, is_whole) = (&self.share[..], &self.place[..], self.is_whole);
         let outputs = (self.planes.par_chunks_mut(grid.cols), self.sigma.par_chunks_mut(grid.cols));
@@ -207,6 +239,19 @@ impl OrganisedFrame {
             let row = PlaneRow { grid, row, inverse_depth, spread, is_whole, share, place, planes, sigma, misfit };
             pulp::Arch::new().dispatch(row);
         });
+    }
+
+    /// Typical tilt of the planes by noise about either axis, radian, as for small ones; 0 where there are no planes.
+    fn tilt(&mut self) -> f32 {
+        let step = self.planes.len().div_ceil(SAMPLE).max(1);
+        let known = (0..self.planes.len()).step_by(step).filter(|&k| self.planes[k][3].is_finite());
+        let tilts = known.map(|k| {
+            let [a, b, c, d] = self.grid.gradient[k];
+            (a * d - b * c).abs().sqrt() * self.noise * self.spread[k] / (self.inverse_depth[k] * MOMENT.sqrt())
+        });
+        self.scratch.clear();
+        self.scratch.extend(tilts.map(positive_bits));
+        median_of_bits(&mut self.scratch).unwrap_or(0.0)
     }
 
     /// Takes the planes off windows that hold more than one, and scales the noise where its size was not given.
@@ -223,7 +268,7 @@ impl OrganisedFrame {
         self.noise = scale;
         let limit = LARGEST_MISFIT * if self.has_sigma { typical.max(1.0) } else { typical };
         let nodes = self.planes.par_iter_mut().zip(&mut self.sigma).zip(&self.misfit);
-        let grid = &self.projection.grid;
+        let grid = &self.grid;
         let rays = grid.u.par_iter().zip(&grid.v).zip(&grid.cosine);
         nodes.zip(rays).with_min_len(4096).for_each(|(((plane, sigma), misfit), ((u, v), cosine))| {
             let rounding = ROUNDING * plane[3] / *sigma;
@@ -241,7 +286,7 @@ impl OrganisedFrame {
     /// Moves the nodes with planes along them from the places of their pixels to their middles; nodes without pixels are
     /// put on their planes.
     fn centre(&mut self) {
-        let (grid, noise) = (&self.projection.grid, self.noise);
+        let (grid, noise) = (&self.grid, self.noise);
         let nodes = self.inverse_depth.par_iter_mut().zip(&mut self.spread).zip(&mut self.place);
         let planes = self.planes.par_iter().zip(&self.sigma).zip(grid.u.par_iter().zip(&grid.v));
         nodes.zip(planes).with_min_len(4096).for_each(|(((w, spread), place), ((plane, sigma), (u, v)))| {

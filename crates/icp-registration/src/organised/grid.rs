@@ -1,4 +1,6 @@
-//! The grid of nodes that a frame is reduced to: each node stands for a square of pixels.
+//! The grids of nodes that a frame is reduced to: each node stands for a square of pixels.
+
+use std::sync::Arc;
 
 use super::projection::Lens;
 
@@ -47,9 +49,19 @@ pub(crate) struct Grid {
 }
 
 impl Grid {
-    pub(crate) fn new(width: usize, height: usize, lens: &Lens, rays: impl Fn(usize, usize) -> [f64; 2]) -> Self {
+    /// For frames of a size, and of twice as large nodes.
+    pub(crate) fn fine_and_coarse(
+        width: usize,
+        height: usize,
+        lens: &Lens,
+        rays: impl Fn(usize, usize) -> [f64; 2],
+    ) -> [Arc<Self>; 2] {
         let least = if width * height < PIXELS_TO_REDUCE { 1 } else { 2 };
         let bin = ((width as f64 * height as f64 / NODES).sqrt().round() as usize).max(least);
+        [bin, 2 * bin].map(|bin| Arc::new(Self::new(bin, width, height, lens, &rays)))
+    }
+
+    fn new(bin: usize, width: usize, height: usize, lens: &Lens, rays: &impl Fn(usize, usize) -> [f64; 2]) -> Self {
         let (cols, rows) = (width / bin, height / bin);
         let mean_ray = |col: usize, row: usize| {
             let mut sum = [0.0; 2];

@@ -79,7 +79,7 @@ impl OrganisedFrame {
 
     /// Every how many nodes along columns and rows about `most` are left.
     pub(super) fn stride_for(&self, most: usize) -> usize {
-        (self.projection.grid.len() as f64 / most.max(1) as f64).sqrt().ceil().max(1.0) as usize
+        (self.grid.len() as f64 / most.max(1) as f64).sqrt().ceil().max(1.0) as usize
     }
 
     /// Moves the planes of this frame to the weighted mean with the points of `source`, those within their noise.
@@ -103,7 +103,7 @@ impl OrganisedFrame {
 
     /// Mean logarithm of the depth in `cols x rows` fields of the frame; NaN where a field is mostly empty.
     pub(crate) fn thumbnail(&self, cols: usize, rows: usize) -> Vec<f32> {
-        let grid = &self.projection.grid;
+        let grid = &self.grid;
         let (mut sums, mut counts) = (vec![0.0; cols * rows], vec![0_usize; cols * rows]);
         let border = |index: usize, nodes: usize, fields: usize| (index * nodes).div_ceil(fields);
         for row in 0..grid.rows {
@@ -132,7 +132,7 @@ impl OrganisedFrame {
 
     /// Direction of the ray at a fraction of the frame's width and height.
     pub(crate) fn direction(&self, across: f64, down: f64) -> Vector3<f64> {
-        let grid = &self.projection.grid;
+        let grid = &self.grid;
         let at = |share: f64, size: usize| ((share * size as f64) as usize).min(size - 1);
         let k = at(down, grid.rows) * grid.cols + at(across, grid.cols);
         Vector3::new(f64::from(grid.u[k]), f64::from(grid.v[k]), -1.0)
@@ -140,7 +140,7 @@ impl OrganisedFrame {
 
     /// The point of a node on its plane, and the plane's normal away from the camera.
     fn node(&self, k: usize) -> Option<([f32; 3], [f32; 3])> {
-        let ([a, b, c, distance], grid) = (self.planes[k], &self.projection.grid);
+        let ([a, b, c, distance], grid) = (self.planes[k], &self.grid);
         let (u, v) = (grid.u[k], grid.v[k]);
         let depth = distance / (a * u + b * v - c);
         // NaN fails.
@@ -150,7 +150,7 @@ impl OrganisedFrame {
     /// The planes as they are now, as points on the rays of their nodes with normals towards the camera and sigma along
     /// them.
     pub(crate) fn surface(&self) -> impl Iterator<Item = (Point3<f64>, Vector3<f64>, f64)> {
-        (0..self.projection.grid.len()).filter_map(|k| {
+        (0..self.grid.len()).filter_map(|k| {
             let (point, normal) = self.node(k)?;
             let normal = -Vector3::from(normal.map(f64::from)).normalize();
             Some((Point3::from(point.map(f64::from)), normal, f64::from(self.sigma[k])))
@@ -159,7 +159,7 @@ impl OrganisedFrame {
 
     /// Fraction of the nodes that have a plane.
     pub(crate) fn filled(&self) -> f64 {
-        self.len() as f64 / self.projection.grid.len() as f64
+        self.len() as f64 / self.grid.len() as f64
     }
 
     /// Rms distance of the points from their centre, metre.
@@ -283,7 +283,7 @@ impl<F: FnMut(Option<Partner>)> WithLocate for Partners<'_, F> {
         let r = [0, 1, 2].map(|i| [0, 1, 2].map(|j| matrix[(i, j)] as f32));
         let t = [0, 1, 2].map(|i| self.pose.translation.vector[i] as f32);
         let turn = |v: [f32; 3]| [0, 1, 2].map(|i| r[i][0] * v[0] + r[i][1] * v[1] + r[i][2] * v[2]);
-        let (cols, rows) = (self.source.projection.grid.cols, self.source.projection.grid.rows);
+        let (cols, rows) = (self.source.grid.cols, self.source.grid.rows);
         for row in (self.stride / 2..rows).step_by(self.stride) {
             for col in (self.stride / 2..cols).step_by(self.stride) {
                 let k = row * cols + col;
@@ -306,7 +306,7 @@ fn partner<L: Locate>(
     normal: [f32; 3],
     sigma: f32,
 ) -> Option<Partner> {
-    let grid = &target.projection.grid;
+    let grid = &target.grid;
     let [col, row] = locate.node(-p[0] / p[2], -p[1] / p[2]).map(|x| x + 0.5);
     // NaN fails.
     if !(p[2] < 0.0 && col >= 0.0 && row >= 0.0 && col < grid.cols as f32 && row < grid.rows as f32) {

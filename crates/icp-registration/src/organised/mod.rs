@@ -7,7 +7,6 @@ mod aligner;
 mod apart;
 mod blocks;
 mod consistency;
-mod crossing;
 #[cfg(test)]
 mod drawn;
 mod frame;

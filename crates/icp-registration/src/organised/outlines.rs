@@ -118,7 +118,7 @@ impl OrganisedFrame {
         let at_jump =
             (0..self.planes.len()).filter(|&k| self.inverse_depth[k].is_finite() && !self.planes[k][3].is_finite());
         let point = |k: usize| {
-            let (depth, [u, v]) = (1.0 / self.inverse_depth[k], self.projection.grid.ray(k, self.place[k]));
+            let (depth, [u, v]) = (1.0 / self.inverse_depth[k], self.grid.ray(k, self.place[k]));
             [u * depth, v * depth, -depth]
         };
         let points: Vec<[f32; 3]> = at_jump.map(point).collect();
@@ -141,7 +141,7 @@ impl WithLocate for InFront<'_> {
         let matrix = self.pose.rotation.to_rotation_matrix();
         let r = [0, 1, 2].map(|i| [0, 1, 2].map(|j| matrix[(i, j)] as f32));
         let t = [0, 1, 2].map(|i| self.pose.translation.vector[i] as f32);
-        let grid = &self.target.projection.grid;
+        let grid = &self.target.grid;
         let mut in_front = 0;
         for v in self.points {
             let p = [0, 1, 2].map(|i| r[i][0] * v[0] + r[i][1] * v[1] + r[i][2] * v[2] + t[i]);

@@ -60,10 +60,10 @@ pub(super) trait WithLocate {
 
 /// Calls `work` with the camera of a frame.
 pub(super) fn with_locate<W: WithLocate>(frame: &OrganisedFrame, work: W) -> W::Output {
-    let bin = frame.projection.grid.bin as f64;
+    let bin = frame.grid.bin as f64;
     // Pixel p lies at node (p - (bin - 1) / 2) / bin.
     let shift = -(bin - 1.0) / 2.0;
-    match frame.projection.lens() {
+    match frame.projection().lens() {
         Lens::Pinhole { focal_px, centre_px } => work.run(Pinhole {
             focal: focal_px.map(|f| (f / bin) as f32),
             centre: centre_px.map(|c| ((c + shift) / bin) as f32),
@@ -227,7 +227,7 @@ impl<'a> Moved<'a> {
         locate: L,
         p: &[[f32; BLOCK]; 3],
     ) -> ([u32; BLOCK], [[f32; BLOCK]; 4], [f32; BLOCK], [f32; BLOCK]) {
-        let grid = &self.target.projection.grid;
+        let grid = &self.target.grid;
         let (cols, rows) = (grid.cols as f32, grid.rows as f32);
         let (most_col, most_row) = (cols - 0.5, rows - 0.5);
         let (mut node, mut outside) = ([0; BLOCK], [0.0; BLOCK]);

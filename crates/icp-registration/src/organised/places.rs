@@ -4,10 +4,9 @@ use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use rayon::prelude::*;
 
 use super::aligner::FrameAligner;
-use super::consistency::consistency;
-use super::crossing::Crossing;
+use super::consistency::{DOUBT_LEVEL, TOLERANCE, consistency};
 use super::frame::OrganisedFrame;
-use super::search::{COARSE_TOLERANCE, weighed};
+use super::search::weighed;
 use super::starts::{TURN_RAD, TURNS};
 use super::track::{Track, blocks};
 use crate::icp::{MotionKind, UndeterminedMotion};
@@ -55,7 +54,13 @@ impl Places {
     }
 
     /// What would tell a translation that is left open may lie out of reach: looks along it.
-    pub(super) fn along(track: &Track, motions: &[UndeterminedMotion], crossing: &Crossing<'_>, radius_m: f64) -> Self {
+    pub(super) fn along(
+        track: &Track,
+        motions: &[UndeterminedMotion],
+        source: &OrganisedFrame,
+        target: &OrganisedFrame,
+    ) -> Self {
+        let radius_m = source.points.radius_m;
         let mut places = Self::default();
         let slide = SLIDE * radius_m;
         for motion in motions.iter().filter(|motion| motion.kind == MotionKind::Translation) {
@@ -64,7 +69,8 @@ impl Places {
                 other.pose.translation.vector += motion.axis * (k * slide);
                 other.rules.extra_variance = (0.25 * slide * slide) as f32;
                 other.iterations = 0;
-                places.keep(crossing.agreement(&other.pose, slide), &other, radius_m);
+                let counts = consistency(source, target, &other.pose, DOUBT_LEVEL, slide);
+                places.keep(weighed(&counts), &other, radius_m);
             }
         }
         places
@@ -82,7 +88,7 @@ impl FrameAligner {
             let (mut track, blocks) = (Track { pose, ..start.clone() }, blocks(source, level));
             aligner.open(&mut track, source, target, blocks).ok()?;
             aligner.descend_by(&mut track, source, target, blocks, ITERATIONS).ok()?;
-            let counts = consistency(source, target, &track.pose, level, COARSE_TOLERANCE * radius);
+            let counts = consistency(source, target, &track.pose, level, TOLERANCE * radius);
             Some((weighed(&counts), track))
         });
         let followed: Vec<Option<(f64, Track)>> = followed.collect();

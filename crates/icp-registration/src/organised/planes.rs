@@ -13,12 +13,12 @@ use super::grid::Grid;
 /// Nodes taken at a time.
 const BLOCK: usize = 16;
 /// Half width of the window, nodes.
-const HALF: usize = 1;
+pub(super) const HALF: usize = 1;
 /// Nodes of the window, those of them beyond the three that any plane goes through, and their scatter along an axis.
 const NODES: f32 = ((2 * HALF + 1) * (2 * HALF + 1)) as f32;
 const PARAMETERS: f32 = 3.0;
 pub(super) const FREEDOM: f32 = NODES - PARAMETERS;
-const MOMENT: f32 = NODES * (HALF * (HALF + 1)) as f32 / 3.0;
+pub(super) const MOMENT: f32 = NODES * (HALF * (HALF + 1)) as f32 / 3.0;
 
 /// How much more variance the plane may have in the middle of its window than that of a whole one. One-sided windows,
 /// at the rim of what was seen, are told by it: there the surface ends, and so do its errors.

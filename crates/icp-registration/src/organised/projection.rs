@@ -1,5 +1,7 @@
 //! How points of a camera fall on its pixels.
 
+use std::sync::Arc;
+
 use nalgebra::Point3;
 
 use super::grid::Grid;
@@ -19,7 +21,8 @@ pub struct Projection {
     width: usize,
     height: usize,
     lens: Lens,
-    pub(crate) grid: Grid,
+    /// Fine, and twice as coarse for frames whose noise leaves small planes without direction.
+    pub(crate) grids: [Arc<Grid>; 2],
 }
 
 /// The part of a [`Projection`] that turns directions into pixels.
@@ -51,8 +54,8 @@ impl Projection {
         let ray = |col: usize, row: usize| {
             [(col as f64 - centre_px[0]) / focal_px[0], (centre_px[1] - row as f64) / focal_px[1]]
         };
-        let grid = Grid::new(width, height, &lens, ray);
-        Ok(Self { width, height, lens, grid })
+        let grids = Grid::fine_and_coarse(width, height, &lens, ray);
+        Ok(Self { width, height, lens, grids })
     }
 
     /// A camera with one ray a pixel: `width · height` directions in the camera frame, row by row, of any length.
@@ -86,8 +89,8 @@ impl Projection {
             return Self::pinhole(width, height, focal_px, centre_px);
         }
         let lens = Lens::Table(Table::new(width, height, &rays)?);
-        let grid = Grid::new(width, height, &lens, |col, row| rays[row * width + col]);
-        Ok(Self { width, height, lens, grid })
+        let grids = Grid::fine_and_coarse(width, height, &lens, |col, row| rays[row * width + col]);
+        Ok(Self { width, height, lens, grids })
     }
 
     /// Pixels in a row.

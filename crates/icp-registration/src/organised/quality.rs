@@ -209,7 +209,7 @@ fn independent_scores(moved: &Moved<'_>, rules: &Rules, blocks: &[Block]) -> Mat
 
 /// Sums over the cells, and the normal equations.
 fn fill<'c>(moved: &Moved<'_>, rules: &Rules, blocks: &[Block], cells: &'c mut Vec<Cell>) -> (&'c [Cell], Normal) {
-    let count = moved.source.projection.grid.cell_count;
+    let count = moved.source.grid.cell_count;
     cells.clear();
     cells.resize(PARTS * count, [0.0; SUMS]);
     let mut parts = [[0.0; sums::SUMS]; PARTS];
@@ -239,7 +239,7 @@ impl WithLocate for Fill<'_, '_> {
         let (moved, rules) = (self.moved, self.rules);
         let size = self.blocks.len().div_ceil(PARTS).max(1);
         let sums = self.cells.par_chunks_mut(self.cells.len() / PARTS).zip(self.parts.par_iter_mut());
-        let blocks = self.blocks.par_chunks(size).zip(moved.source.projection.grid.cells.par_chunks(size));
+        let blocks = self.blocks.par_chunks(size).zip(moved.source.grid.cells.par_chunks(size));
         sums.zip(blocks).for_each(|((cells, totals), (blocks, cell_of))| {
             pulp::Arch::new().dispatch(Part { moved, rules, locate, blocks, cell_of, cells, totals });
         });

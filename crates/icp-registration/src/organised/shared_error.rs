@@ -265,7 +265,7 @@ impl OrganisedFrame {
 
     /// Relative change of a node's depth by each coefficient.
     fn field(&self, node: usize) -> Field {
-        let grid = &self.projection.grid;
+        let grid = &self.grid;
         let place = |index: usize, size: usize| (2 * index + 1) as f64 / size as f64 - 1.0;
         let across = legendre(place(node % grid.cols, grid.cols));
         let down = legendre(place(node / grid.cols, grid.rows));

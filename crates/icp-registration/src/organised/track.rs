@@ -34,7 +34,7 @@ pub(super) struct Gauge {
 
 /// The blocks of a level.
 pub(super) fn blocks(source: &OrganisedFrame, level: usize) -> &[Block] {
-    &source.points.blocks[..source.projection.grid.levels[level]]
+    &source.points.blocks[..source.grid.levels[level]]
 }
 
 /// A quarter of the nodes, where these are enough.

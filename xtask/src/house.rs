@@ -77,15 +77,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_folder_and_a_crate_that_are_too_large_are_named() {
-        let folder = tempfile::tempdir().unwrap();
-        let (crate_, part) = (folder.path().join("heavy"), folder.path().join("heavy/src/part"));
-        std::fs::create_dir_all(&part).unwrap();
+    fn a_folder_and_a_crate_that_are_too_large_are_named() -> Result<(), Box<dyn std::error::Error>> {
+        let folder = tempfile::tempdir()?;
+        let part = folder.path().join("heavy/src/part");
+        std::fs::create_dir_all(&part)?;
         for index in 0..13 {
-            std::fs::write(part.join(format!("m{index}.rs")), "// a line\n".repeat(700)).unwrap();
+            std::fs::write(part.join(format!("m{index}.rs")), "// a line\n".repeat(700))?;
         }
-        let found = complaints(&crate_).unwrap();
+        let found = complaints(&folder.path().join("heavy"))?;
         assert_eq!(found.len(), 2, "{found:?}");
         assert!(found[0].contains("heavy/src/part: 13 entries") && found[1].contains("9100 lines"), "{found:?}");
+        Ok(())
     }
 }

@@ -1,7 +1,7 @@
 //! When a camera is warm: a simulated capture of five hours, its drift as estimated, and the verdict.
 //!
 //! `cargo run --release -p warm-up --example warm_camera`
-#![allow(clippy::print_stdout)]
+#![allow(clippy::print_stdout, clippy::unwrap_used)]
 
 #[path = "../tests/drift_captures.rs"]
 mod captures;

@@ -55,7 +55,7 @@ pub struct WallQuality {
 ///
 /// # Errors
 /// [`Error::TooFewFrames`](crate::Error::TooFewFrames) below two frames, and what
-/// [`fit_primitive`](crate::fit_primitive) says of a wall that is none.
+/// [`primitives::fit_primitive`] says of a wall that is none.
 pub fn estimate_fixed_pattern(
     captures: &[WallCapture<'_>],
     camera: &Camera,

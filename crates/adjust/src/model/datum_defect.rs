@@ -1,9 +1,9 @@
 //! What of a network is left undetermined by its observations.
 
-/// How many directions the network leaves undetermined, for [`Adjustment::add_inner_constraints`].
+/// How many directions the network leaves undetermined, for [`crate::Adjustment::add_inner_constraints`].
 ///
 /// There is no default: it follows from what was observed. One constraint too many would bend the network
-/// ([`Error::DatumOverdetermined`]), one too few leaves a rank defect ([`Error::RankDeficient`]).
+/// ([`crate::Error::DatumOverdetermined`]), one too few leaves a rank defect ([`crate::Error::RankDeficient`]).
 ///
 /// Three points with three distances, free in space:
 ///

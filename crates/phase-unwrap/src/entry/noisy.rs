@@ -99,7 +99,7 @@ impl NoisyUnwrapper {
     /// Wrap counts of `phase`, in radians in `[0, 2 pi]`; what is not finite is masked. In `mask`, true means use.
     ///
     /// The phase is filtered as [`Prefilter::filter_into`] does, unwrapped by the method of the options, and its counts are
-    /// carried back to the measured phase as [`congruent`](crate::filter::congruent) does. After an error `out` holds nothing
+    /// carried back to the measured phase as [`congruent`](crate::congruent) does. After an error `out` holds nothing
     /// of use.
     pub fn unwrap_into(
         &mut self,

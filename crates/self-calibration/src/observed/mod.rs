@@ -1,4 +1,4 @@
-//! Planes, differences of ranges and what is estimated.
+//! A calibration of ranges, and what of it is estimated.
 
 pub(crate) mod calibration;
 pub(crate) mod options;

@@ -43,7 +43,7 @@ pub use kernel::RobustKernel;
 pub use multiview::{
     Datum, FrameRegistration, LoopClosure, PairAgreement, PairAlignment, PlacedFrame, Placement, Placements,
     PointModel, RefusedPair, SharedParameters, Start, StationPlacement, StationRegistration,
-    StationRegistrationOptions, SurfacePair, UndeterminedStation, UnplacedFrame, judge_placements, register_frames,
+    StationRegistrationOptions, SurfacePair, UncheckedPair, UndeterminedStation, UnplacedFrame, judge_placements, register_frames,
     register_stations,
 };
 pub use neighbours::{Neighbour, NeighbourTree};

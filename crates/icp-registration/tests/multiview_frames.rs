@@ -47,7 +47,17 @@ fn check(found: &FrameRegistration, truth: &[Isometry3<f64>], named: Option<usiz
 #[test]
 fn frames_come_together_from_their_order() {
     let (frames, truth) = room(|_| ());
-    check(&registered(&frames), &truth, None);
+    let found = registered(&frames);
+    check(&found, &truth, None);
+    assert!(found.unchecked.is_empty(), "{:?}", found.unchecked);
+}
+
+#[test]
+fn a_pair_that_nothing_checks_is_named() {
+    let (frames, _) = room(|_| ());
+    let found = registered(&frames[..2]);
+    let [pair] = &found.unchecked[..] else { panic!("{:?}", found.unchecked) };
+    assert_eq!((pair.target, pair.source, &pair.frames[..]), (0, 1, &[1][..]));
 }
 
 #[test]

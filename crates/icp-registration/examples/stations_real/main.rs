@@ -73,19 +73,27 @@ fn measure(set: &Set, intruder: Intruder, start: &str, each: bool) {
     let others = frames.len() - usize::from(named.is_some());
     let placed = (0..frames.len()).filter(|k| Some(*k) != named && found.frames[*k].is_some()).count();
     let verdict = match named {
+        Some(frame) if found.unchecked.iter().any(|pair| pair.frames.contains(&frame)) => " named as not checked",
         Some(frame) if found.frames[frame].is_some() => " NOT NAMED",
         Some(_) => " named",
         None => "",
     };
     let [position, attitude] = over_variance(set, &found, named);
     println!(
-        "{head} {:>9} {mm:>8.1} {degrees:>7.2} {seconds:>6.1} {:>7.1} {position:>6.1} {attitude:>6.1}{verdict}",
+        "{head} {:>9} {mm:>8.1} {degrees:>7.2} {seconds:>6.1} {:>7.1} {position:>6.1} {attitude:>6.1}{verdict} {}",
         format!("{placed} of {others}"),
-        found.variance_factor
+        found.variance_factor,
+        unchecked(&found)
     );
     if each {
         details(set, &found);
     }
+}
+
+/// Frames that a single pair joins with the others.
+fn unchecked(found: &FrameRegistration) -> String {
+    let frames: Vec<usize> = found.unchecked.iter().flat_map(|pair| pair.frames.iter().copied()).collect();
+    if frames.is_empty() { String::new() } else { format!("not checked: {frames:?}") }
 }
 
 fn details(set: &Set, found: &FrameRegistration) {

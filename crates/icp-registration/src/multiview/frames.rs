@@ -8,7 +8,7 @@ use super::alignments::{PairAlignment, RefusedPair};
 use super::frame_graph::FrameGraph;
 use super::frame_pairs::{Candidate, FramePair, Frames, Guess, SAMPLE};
 use super::frame_scale::scaled;
-use super::loops::LoopClosure;
+use super::loops::{LoopClosure, reached};
 use super::placement::{PairAgreement, Placements};
 use super::registration::Start;
 use crate::error::{Error, Result};
@@ -44,6 +44,17 @@ pub struct UnplacedFrame {
     pub reason: String,
 }
 
+/// A pair that alone joins frames with the others: if it is wrong, nothing shows it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct UncheckedPair {
+    /// The frames of the pair.
+    pub target: usize,
+    /// See `target`.
+    pub source: usize,
+    /// The frames that it joins with the others, on its side that holds fewer.
+    pub frames: Vec<usize>,
+}
+
 /// All frames in one coordinate system, but for those that do not belong there.
 #[derive(Debug, Clone)]
 pub struct FrameRegistration {
@@ -59,6 +70,8 @@ pub struct FrameRegistration {
     pub refused: Vec<RefusedPair>,
     /// How loops of pairs close.
     pub loops: Vec<LoopClosure>,
+    /// Pairs that lie in no loop.
+    pub unchecked: Vec<UncheckedPair>,
     /// What is seen from the placed frames agrees so; indices of `placements.stations` are those of the frames.
     pub placements: Placements,
     /// The systematic error that the frames share, as the pairs tell it.
@@ -323,10 +336,12 @@ impl<'a> Survey<'a> {
             turn.fixed_view_mut::<3, 3>(0, 0).copy_from(held.rotation.to_rotation_matrix().matrix());
             Some(PlacedFrame { world_from_frame: held * pose, covariance: turn * covariance * turn.transpose() })
         };
+        let used: Vec<PairAlignment> = used.iter().map(|(pair, _)| pair.with_shared(&shared_error)).collect();
         Ok(FrameRegistration {
             frames: (0..self.count()).map(placed).collect(),
             datum,
-            pairs: used.iter().map(|(pair, _)| pair.with_shared(&shared_error)).collect(),
+            unchecked: unchecked(&used, datum),
+            pairs: used,
             unplaced: self.out,
             refused: self.refused,
             loops: graph.loops.clone(),
@@ -351,4 +366,19 @@ impl<'a> Survey<'a> {
             None => "it should overlap with none of the others".to_owned(),
         }
     }
+}
+
+/// The pairs without which frames would not be joined with the datum.
+fn unchecked(pairs: &[PairAlignment], datum: usize) -> Vec<UncheckedPair> {
+    let ends: Vec<(usize, usize)> = pairs.iter().map(|pair| (pair.target, pair.source)).collect();
+    let all = reached(&ends, datum);
+    let without = |k: usize| {
+        let left = reached(&[&ends[..k], &ends[k + 1..]].concat(), datum);
+        let cut: BTreeSet<usize> = all.difference(&left).copied().collect();
+        let fewer = if cut.len() > left.len() { &left } else { &cut };
+        let frames = fewer.iter().copied().collect();
+        let (target, source) = ends[k];
+        (!cut.is_empty()).then_some(UncheckedPair { target, source, frames })
+    };
+    (0..ends.len()).filter_map(without).collect()
 }

@@ -1,5 +1,7 @@
 //! Loops of pairs: how they close, and which pairs are wrong.
 
+use std::collections::BTreeSet;
+
 use nalgebra::{Isometry3, Vector6};
 
 use super::alignments::{PairAlignment, RefusedPair};
@@ -49,6 +51,20 @@ fn misclosure(stations: Vec<usize>, total: &Uncertain) -> LoopClosure {
         rotation_rad: v.fixed_rows::<3>(3).norm(),
         mahalanobis: square.max(0.0).sqrt(),
     }
+}
+
+/// The stations that pairs lead to from one.
+pub(super) fn reached(pairs: &[(usize, usize)], from: usize) -> BTreeSet<usize> {
+    let (mut found, mut open) = (BTreeSet::from([from]), vec![from]);
+    while let Some(at) = open.pop() {
+        for &(a, b) in pairs.iter().filter(|(a, b)| *a == at || *b == at) {
+            let next = if a == at { b } else { a };
+            if found.insert(next) {
+                open.push(next);
+            }
+        }
+    }
+    found
 }
 
 /// All triangles, as indices of pairs.

@@ -40,7 +40,7 @@ mod wide_errors;
 
 pub use alignments::{PairAlignment, RefusedPair};
 pub use datum::Datum;
-pub use frames::{FrameRegistration, PlacedFrame, UnplacedFrame, register_frames};
+pub use frames::{FrameRegistration, PlacedFrame, UncheckedPair, UnplacedFrame, register_frames};
 pub use loops::LoopClosure;
 pub use placement::{PairAgreement, Placement, Placements, StationPlacement, judge_placements};
 pub use point_model::{PointModel, SharedParameters};

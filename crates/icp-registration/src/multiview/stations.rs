@@ -9,6 +9,7 @@ use rayon::prelude::*;
 use super::alignments::Overlap;
 use super::check::{Checked, checked};
 use super::datum::Datum;
+use super::loops::reached;
 use super::network::{Network, State};
 use super::patch_size;
 use super::patches::Surface;
@@ -105,20 +106,10 @@ pub fn register_stations(
 
 /// Every station shares surfaces, through others, with the one that is held.
 fn require_connected(adjusted: &Adjusted, fewest: usize, datum: Datum) -> Result<()> {
-    let mut reached = vec![false; adjusted.state.poses.len()];
-    reached[datum.held_station()] = true;
-    let overlaps = adjusted.overlaps(fewest);
-    let mut grown = true;
-    while grown {
-        grown = false;
-        for pair in &overlaps {
-            if reached[pair.target] != reached[pair.source] {
-                (reached[pair.target], reached[pair.source]) = (true, true);
-                grown = true;
-            }
-        }
-    }
-    let stations: Vec<usize> = (0..reached.len()).filter(|&station| !reached[station]).collect();
+    let ends: Vec<(usize, usize)> = adjusted.overlaps(fewest).iter().map(|pair| (pair.target, pair.source)).collect();
+    let reached = reached(&ends, datum.held_station());
+    let stations: Vec<usize> =
+        (0..adjusted.state.poses.len()).filter(|station| !reached.contains(station)).collect();
     if stations.is_empty() {
         return Ok(());
     }
@@ -126,7 +117,7 @@ fn require_connected(adjusted: &Adjusted, fewest: usize, datum: Datum) -> Result
     let reason = |&station: &usize| {
         let with = all.iter().filter(|pair| {
             let other = if pair.target == station { pair.source } else { pair.target };
-            (pair.target == station || pair.source == station) && reached[other]
+            (pair.target == station || pair.source == station) && reached.contains(&other)
         });
         let tiles = with.map(|pair| adjusted.shared(pair.target, pair.source).len()).max().unwrap_or(0);
         format!("shares {tiles} tiles of common surfaces with any of the others, at least {fewest} are needed")

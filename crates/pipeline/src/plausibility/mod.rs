@@ -27,7 +27,7 @@ const NEAREST_M: f64 = 0.02;
 const FURTHEST_M: f64 = 100.0;
 
 /// "S1, S2, S3 and 4 more".
-fn some_of<S: AsRef<str>>(names: &[S]) -> String {
+pub(crate) fn some_of<S: AsRef<str>>(names: &[S]) -> String {
     const NAMED: usize = 5;
     let listed: Vec<&str> = names.iter().take(NAMED).map(AsRef::as_ref).collect();
     match names.len().saturating_sub(NAMED) {

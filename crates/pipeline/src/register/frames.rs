@@ -14,6 +14,7 @@ use super::{Registered, describe, pairs};
 use crate::Result;
 use crate::outcome::StationPose;
 use crate::plan::NORMAL_HALF_WIDTH_PX;
+use crate::plausibility::some_of;
 use crate::verdict::{Doubt, DoubtKind};
 
 /// The stations registered as frames; `None` where they are none, or no two of them belong together.
@@ -86,6 +87,17 @@ fn summary(result: &FrameRegistration, stations: &[Station]) -> RegisterSummary 
         let words = format!("not placed, and not in the results: {}", out.reason);
         Doubt::about(DoubtKind::Placement, stations[out.frame].name.as_str(), words)
     });
+    let unchecked = result.unchecked.iter().map(|pair| {
+        let pair_name = format!("{} onto {}", name(pair.source), name(pair.target));
+        let names: Vec<String> = pair.frames.iter().map(|&frame| name(frame)).collect();
+        let names: Vec<&str> = names.iter().map(String::as_str).collect();
+        let words = format!(
+            "nothing but this pair says where {} stands: if it is wrong, nothing shows it. Another station that shares \
+             surfaces with both sides is needed",
+            some_of(&names)
+        );
+        Doubt::about(DoubtKind::Alignment, pair_name, words)
+    });
     let placed = result.frames.iter().flatten().count() as i64;
     RegisterSummary {
         pairs: result.pairs.iter().map(row).collect(),
@@ -93,7 +105,7 @@ fn summary(result: &FrameRegistration, stations: &[Station]) -> RegisterSummary 
         loops: closures.collect(),
         sigma0: Some(result.variance_factor.sqrt()),
         redundancy: Some(6 * (result.pairs.len() as i64 + 1 - placed)),
-        doubts: unplaced.collect(),
+        doubts: unplaced.chain(unchecked).collect(),
         ..RegisterSummary::default()
     }
 }

@@ -4,6 +4,12 @@
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
+    /// Of a cloud, its neighbours or its normals.
+    #[error(transparent)]
+    Cloud(#[from] point_cloud::Error),
+    /// Of a pose.
+    #[error(transparent)]
+    Pose(#[from] rigid_pose::Error),
     /// There is nothing to work on.
     #[error("{what} is empty")]
     Empty {

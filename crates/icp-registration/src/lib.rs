@@ -1,10 +1,6 @@
 #![doc = include_str!("../README.md")]
 
-mod absolute_orientation;
-mod cloud;
 mod coarse;
-mod coincident;
-mod eigen;
 mod error;
 mod icp;
 mod kernel;
@@ -12,22 +8,14 @@ mod kernel;
 mod mesh;
 #[cfg(feature = "multiview")]
 mod multiview;
-mod neighbours;
-mod normals;
 mod organised;
 pub mod parts;
-mod pose;
 mod pose_graph;
 mod quality;
 mod tracking;
 mod trajectory;
 mod voxels;
 
-pub use absolute_orientation::{
-    Orientation, RotationMethod, Similarity, absolute_orientation, absolute_orientation_by,
-    absolute_orientation_with_scale,
-};
-pub use cloud::Cloud;
 pub use coarse::{
     AmplitudeFeatureOptions, CoarseAlignment, CoarseOptions, Estimator, FeatureCloud, Features, Matching,
     SparseAlignment, SparseIcpOptions, SurfaceDescriptors, SurfaceRadii, Viewpoint, align_features,
@@ -46,13 +34,12 @@ pub use multiview::{
     StationRegistrationOptions, SurfacePair, UncheckedPair, UndeterminedStation, UnplacedFrame, judge_placements, register_frames,
     register_stations,
 };
-pub use neighbours::{Neighbour, NeighbourTree};
-pub use normals::{OrganisedNormalOptions, UnorganisedNormalOptions, organised_normals, unorganised_normals};
 pub use organised::{
     FrameAligner, FrameAlignmentOptions, FrameConsistency, OrganisedFrame, Projection, SharedError, align_frames,
     frame_consistency,
 };
-pub use pose::{inverse_covariance_transport, pose_difference, step_pose};
+pub use point_cloud::{self, Cloud};
+pub use rigid_pose;
 pub use tracking::{
     Fusion, ImuIntegrator, ImuOptions, InertialSample, LossReason, MotionPrior, Relocalisation, TrackedPose, Tracker,
     TrackerOptions, TrackingState,

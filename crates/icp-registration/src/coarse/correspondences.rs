@@ -6,7 +6,7 @@
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 
 use super::fpfh::{dot, subtract};
-use crate::absolute_orientation;
+use rigid_pose::absolute_orientation;
 
 /// Points and unit normals in one frame; a normal of NaN is unknown.
 #[derive(Debug, Clone, Default)]

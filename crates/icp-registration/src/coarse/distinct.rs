@@ -173,12 +173,12 @@ impl Planes {
 
     /// Whether a motion is left open, but for slivers.
     fn are_open(&self) -> bool {
-        crate::eigen::eigen6(&self.matrix, "planes in common").is_ok_and(|(values, _)| values[0] < OPEN * self.points)
+        rigid_pose::eigen6(&self.matrix, "planes in common").is_ok_and(|(values, _)| values[0] < OPEN * self.points)
     }
 
     /// Translation and turn (times the radius) that the planes determine least, of length 1; zero where that is not known.
     fn least_determined(&self) -> Vector6<f64> {
-        let found = crate::eigen::eigen6(&self.matrix, "planes in common");
+        let found = rigid_pose::eigen6(&self.matrix, "planes in common");
         found.map_or_else(|_| Vector6::zeros(), |(_, motions)| motions.column(0).into_owned())
     }
 

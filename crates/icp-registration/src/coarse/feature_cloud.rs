@@ -13,7 +13,7 @@ use super::rsd::{SurfaceRadii, radii, rsd};
 use super::surface::Normals;
 use super::surroundings::Surroundings;
 use super::view::View;
-use crate::cloud::Cloud;
+use point_cloud::Cloud;
 use crate::error::{Error, Result};
 
 /// Fewest averaged points.

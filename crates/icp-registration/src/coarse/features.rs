@@ -4,7 +4,7 @@ use nalgebra::Point3;
 
 use super::descriptors::DescriptorTable;
 use crate::error::{Error, Result};
-use crate::neighbours::check_points;
+use point_cloud::check_points;
 
 /// Points in a cloud's frame with a descriptor each.
 #[derive(Debug, Clone, PartialEq)]

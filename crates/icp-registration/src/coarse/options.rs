@@ -167,7 +167,7 @@ impl CoarseOptions {
             }
         }
         if let Viewpoint::At(point) = self.viewpoint {
-            crate::neighbours::check_points("viewpoint", &[point])?;
+            point_cloud::check_points("viewpoint", &[point])?;
         }
         match self.estimator {
             Estimator::Ransac { samples: 0 } => {

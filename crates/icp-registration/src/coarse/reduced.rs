@@ -3,7 +3,7 @@
 use nalgebra::{Point3, Vector3};
 
 use super::cells::{CellTable, key_of};
-use crate::cloud::Cloud;
+use point_cloud::Cloud;
 use crate::error::{Error, Result};
 
 /// Points that the middle and the size of a cloud are taken from.

@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Point3};
 
 use super::features::Features;
-use crate::absolute_orientation;
+use rigid_pose::absolute_orientation;
 use crate::error::{Error, Result};
 
 /// Options of [`align_features`].
@@ -73,7 +73,7 @@ pub fn align_features(
     if expected != found {
         return Err(Error::LengthMismatch { what: "descriptors of the source", expected, found });
     }
-    crate::neighbours::check_points("guess", &[guess * Point3::origin()])?;
+    point_cloud::check_points("guess", &[guess * Point3::origin()])?;
     let mut found = SparseAlignment { target_from_source: *guess, pairs: Vec::new(), rms_m: f64::NAN, iterations: 0 };
     let mut reach = options.initial_distance_m;
     while found.iterations < options.max_iterations.max(1) {

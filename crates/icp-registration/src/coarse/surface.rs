@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::options::Viewpoint;
 use super::reduced::Reduced;
 use super::surroundings::{Near, Surroundings};
-use crate::eigen::{eigenvalues3, eigenvector3};
+use point_cloud::{eigenvalues3, eigenvector3};
 
 /// Neighbourhood of a normal, voxels: large enough for some 15 neighbours, small enough to follow edges.
 const NORMAL_RADIUS_VOXELS: f64 = 2.2;

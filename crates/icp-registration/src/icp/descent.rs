@@ -12,7 +12,7 @@ use super::registration::{Engine, Track, length};
 use super::system::System;
 use crate::error::{Error, Result};
 use crate::kernel::{RobustKernel, quantile};
-use crate::neighbours::is_usable;
+use point_cloud::is_usable;
 use crate::parts::{ErrorMetric, KernelSchedule, MaxNormalAngle, PairRejection, Query, Trimmed, thinned};
 
 /// Points whose distance at the guess is looked at.

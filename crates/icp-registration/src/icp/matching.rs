@@ -4,9 +4,9 @@ use nalgebra::{Isometry3, Vector3};
 use rayon::prelude::*;
 
 use super::registration::Engine;
-use crate::cloud::Cloud;
+use point_cloud::Cloud;
 use crate::error::{Error, Result};
-use crate::neighbours::is_usable;
+use point_cloud::is_usable;
 use crate::parts::{Moment, Pair, Partner, Query, Scene};
 
 /// Points handled together by one thread; fixed, so that sums do not depend on the number of threads.

@@ -25,7 +25,7 @@ pub use target::IcpTarget;
 
 use nalgebra::Isometry3;
 
-use crate::cloud::Cloud;
+use point_cloud::Cloud;
 use crate::error::Result;
 use crate::voxels::{VoxelCloud, VoxelOptions};
 

@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Matrix6, Vector6};
 
 use crate::error::{Error, Result};
-use crate::pose::{pose_difference, step_pose, symmetrised};
+use rigid_pose::{pose_difference, step_pose, symmetrised};
 
 /// The pose of least squares between what the pairs say (`information`, zero along what they leave open) and the guess
 /// with its covariance, and its covariance; both in the tangent `[dt target axes, dtheta source axes]`.

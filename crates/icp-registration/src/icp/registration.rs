@@ -10,16 +10,16 @@ use super::result::{IcpResult, StopReason};
 use super::starts::Starts;
 use super::system::System;
 use super::{IcpOptions, IcpTarget};
-use crate::cloud::Cloud;
+use point_cloud::Cloud;
 use crate::error::{Error, Result};
 use crate::kernel::RobustKernel;
-use crate::normals::{UnorganisedNormalOptions, unorganised_normals};
+use point_cloud::{UnorganisedNormalOptions, unorganised_normals};
 use crate::parts::{
     AllPoints, ErrorMetric, GaussNewton, KernelSchedule, MaxNormalAngle, Minimiser, Moment, NearestPoint,
     PairRejection, PairWeighting, PointMatching, PointSelection, PointToPlane, Progress, Scene, Settled, SigmaWeight,
     StoppingRule,
 };
-use crate::pose::is_finite;
+use rigid_pose::is_finite;
 use crate::quality::Residuals;
 
 /// An ICP registration of which every part can be replaced: the stages of `[RusinkiewiczLevoy2001]`.

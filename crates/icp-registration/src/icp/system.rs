@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use super::matching::CHUNK;
 use crate::kernel::{RobustKernel, mad_scale};
 use crate::parts::{ErrorMetric, Pair, Row, Rows, Scene};
-use crate::pose::move_about;
+use rigid_pose::move_about;
 
 /// Median of the root of the sum of squares of 1 to 4 standard normal numbers.
 const MEDIAN_CHI: [f64; 4] = [0.674_49, 1.177_41, 1.538_17, 1.832_13];

@@ -3,11 +3,11 @@
 use nalgebra::{Isometry3, Vector3};
 
 use super::{IcpOptions, IcpResult, Registration};
-use crate::cloud::Cloud;
+use point_cloud::Cloud;
 use crate::error::Result;
 use crate::kernel::quantile;
-use crate::neighbours::NeighbourTree;
-use crate::normals::{UnorganisedNormalOptions, normals_with_tree};
+use point_cloud::NeighbourTree;
+use point_cloud::{UnorganisedNormalOptions, normals_with_tree};
 use crate::parts::TargetSurface;
 
 /// Points whose distance to their neighbour is looked at for the spacing.

@@ -5,7 +5,7 @@ mod bridge;
 use nalgebra::{Point3, Vector3};
 
 use crate::error::{Error, Result};
-use crate::neighbours::check_points;
+use point_cloud::check_points;
 use crate::parts::{Partner, PointMatching, Query, TargetSurface};
 
 /// Triangles with a search tree over them, metre.

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use super::placement::agrees_as_usual;
 use super::registration::Start;
-use crate::cloud::Cloud;
+use point_cloud::Cloud;
 use crate::coarse::{CoarseOptions, FeatureCloud, Placed, evidence, hypotheses, refined_among, with_one_voxel};
 use crate::error::{Error, Result};
 

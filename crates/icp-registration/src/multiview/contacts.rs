@@ -51,7 +51,7 @@ pub(super) fn partners(
     let mut found = Vec::new();
     for (index, patch) in asking.patches.iter().enumerate() {
         let centre = rotation * patch.centre.coords + to_asked.translation.vector;
-        if !crate::neighbours::is_usable(&centre.into()) {
+        if !point_cloud::is_usable(&centre.into()) {
             return Err(crate::Error::NonFinite { what: "points of a station in the frame of another", index });
         }
         let normal = rotation * patch.normal;
@@ -153,8 +153,8 @@ pub(super) fn imitated(
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use crate::cloud::Cloud;
-    use crate::pose::step_pose;
+    use point_cloud::Cloud;
+    use rigid_pose::step_pose;
     use nalgebra::Point3;
 
     #[test]

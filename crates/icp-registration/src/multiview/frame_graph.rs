@@ -11,7 +11,8 @@ use super::frame_pairs::FramePair;
 use super::loops::{LoopClosure, Skeleton, skeleton};
 use crate::icp::IcpResult;
 use crate::organised::{FieldMatrix, SharedError};
-use crate::pose_graph::{Edge, Graph, Relation, Uncertain, is_likely};
+use crate::pose_graph::{Edge, Graph, Relation, is_likely};
+use rigid_pose::Uncertain;
 
 /// Rounds in which pairs that do not fit go and those that fit again come back; two were enough on all frames tried.
 const ROUNDS: usize = 4;

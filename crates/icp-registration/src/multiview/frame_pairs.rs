@@ -10,7 +10,7 @@ use crate::coarse::{CoarseOptions, FeatureCloud, align_without_guess};
 use crate::error::Result;
 use crate::icp::{IcpResult, StopReason};
 use crate::organised::{FrameAligner, FrameAlignmentOptions, Influence, OrganisedFrame, SharedError};
-use crate::pose::symmetrised;
+use rigid_pose::symmetrised;
 
 /// Nodes by which agreement is judged.
 pub(super) const SAMPLE: usize = 2500;

@@ -13,7 +13,7 @@ use super::placement::{PairAgreement, Placements};
 use super::registration::Start;
 use crate::error::{Error, Result};
 use crate::organised::{FrameAlignmentOptions, OrganisedFrame, SharedError};
-use crate::pose::is_finite;
+use rigid_pose::is_finite;
 
 /// Share of a frame that another must be expected to see for the two to be aligned.
 const LEAST_OVERLAP: f64 = 0.3;

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use crate::cloud::Cloud;
+use point_cloud::Cloud;
 
 /// Cosine of the largest angle between the normals of a group (30 degrees).
 const SAME_DIRECTION: f64 = 0.866;

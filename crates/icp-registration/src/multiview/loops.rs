@@ -5,8 +5,8 @@ use std::collections::BTreeSet;
 use nalgebra::{Isometry3, Vector6};
 
 use super::alignments::{PairAlignment, RefusedPair};
-use crate::pose::pose_difference;
-use crate::pose_graph::Uncertain;
+use rigid_pose::pose_difference;
+use rigid_pose::Uncertain;
 
 /// A way from station to station and back.
 #[derive(Debug, Clone, PartialEq)]

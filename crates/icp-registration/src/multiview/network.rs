@@ -129,7 +129,7 @@ pub(super) fn relative_jacobians(target: &Isometry3<f64>, source: &Isometry3<f64
 /// Largest movement between two states, metre; rotations at `radius_m`.
 pub(super) fn largest_step(before: &State, after: &State, radius_m: f64) -> f64 {
     let moved = before.poses.iter().zip(&after.poses).map(|(a, b)| {
-        let d: Vector6<f64> = crate::pose::pose_difference(a, b);
+        let d: Vector6<f64> = rigid_pose::pose_difference(a, b);
         d.fixed_rows::<3>(0).norm().max(d.fixed_rows::<3>(3).norm() * radius_m)
     });
     moved.fold(0.0, f64::max)

@@ -12,7 +12,7 @@ use super::scatter::TileMean;
 use super::simultaneous::Adjusted;
 use crate::error::Result;
 use crate::icp::{IcpResult, StopReason};
-use crate::pose::{step_pose, symmetrised};
+use rigid_pose::{step_pose, symmetrised};
 
 /// A tile that two stations saw.
 #[derive(Debug, Clone, Copy)]

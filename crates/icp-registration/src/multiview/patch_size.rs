@@ -4,8 +4,8 @@ use nalgebra::Vector3;
 
 use super::grouping::{group, patch_size};
 use super::plane_fit::Moments;
-use crate::cloud::Cloud;
-use crate::eigen::eigenvalues3;
+use point_cloud::Cloud;
+use point_cloud::eigenvalues3;
 
 /// Least width of a patch in standard deviations of its points across it: a square of that width scatters along its plane
 /// by 4 times as much as across it, which is what counts as a plane. Walls of cameras with a noise of 0.3 % of the range

@@ -11,10 +11,10 @@ use nalgebra::{Point3, Vector3};
 use super::grouping::group;
 use super::plane_fit::{Moments, Plane};
 use super::regions::{Patches, Region};
-use crate::cloud::Cloud;
+use point_cloud::Cloud;
 use crate::error::{Error, Result};
 use crate::kernel::quantile;
-use crate::neighbours::NeighbourTree;
+use point_cloud::NeighbourTree;
 
 /// Fewest points of a patch.
 const FEWEST_POINTS: usize = 6;

@@ -8,11 +8,11 @@ use nalgebra::Isometry3;
 use rayon::prelude::*;
 
 use super::patches::faces_origin;
-use crate::cloud::Cloud;
+use point_cloud::Cloud;
 use crate::coarse::{CoarseOptions, FeatureCloud, Placed, SurfaceDescriptors, Viewpoint, agreement, with_one_voxel};
 use crate::error::{Error, Result};
 use crate::kernel::quantile;
-use crate::pose::is_finite;
+use rigid_pose::is_finite;
 
 /// How often what is usual in the survey a station must be contradicted to be doubted.
 const DOUBTED: f64 = 4.0;

@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Matrix3, Vector3};
 
-use crate::eigen::{eigenvalues3, eigenvector3};
+use point_cloud::{eigenvalues3, eigenvector3};
 
 /// Smallest ratio of the two variances within a plane: a third of the length in width.
 const NARROWEST: f64 = 0.1;

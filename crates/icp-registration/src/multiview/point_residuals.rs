@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::registration::{StationRegistration, SurfacePair};
 use crate::error::{Error, Result};
-use crate::neighbours::check_points;
+use point_cloud::check_points;
 
 /// Part of a patch that a point may be off it along and across.
 const BESIDE: f64 = 0.75;

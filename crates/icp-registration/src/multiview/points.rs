@@ -10,9 +10,9 @@ use super::grouping::by_cells;
 use super::noise::NoiseLaw;
 use super::patches::Surface;
 use super::point_model::PointModel;
-use crate::cloud::Cloud;
+use point_cloud::Cloud;
 use crate::error::{Error, Result};
-use crate::neighbours::check_points;
+use point_cloud::check_points;
 
 /// Size of a block, patches.
 const BLOCK: f64 = 2.0;

@@ -2,9 +2,9 @@
 
 use nalgebra::{Isometry3, Matrix6, Point3, Vector3, Vector6};
 
-use crate::eigen::eigen6;
+use rigid_pose::eigen6;
 use crate::icp::{MotionKind, UndeterminedMotion};
-use crate::pose::{pose_difference, step_pose, symmetrised};
+use rigid_pose::{pose_difference, step_pose, symmetrised};
 
 /// The motions of a station that are known no better than the size of a patch, from the covariance of its pose:
 /// farther off, the surfaces that it meets would be others. Rotations count at `hold_m`.

@@ -166,6 +166,6 @@ impl StationRegistration {
                 covariance += left * self.joint_covariance.fixed_view::<6, 6>(6 * a, 6 * b) * right.transpose();
             }
         }
-        Ok((of_target.inverse() * of_source, crate::pose::symmetrised(&covariance)))
+        Ok((of_target.inverse() * of_source, rigid_pose::symmetrised(&covariance)))
     }
 }

@@ -4,7 +4,7 @@ use adjust::{EvaluationFailure, RigidPose};
 use nalgebra::{Isometry3, Matrix3, Matrix6, Vector3, Vector6};
 
 use crate::error::{Error, Result};
-use crate::pose::pose_difference;
+use rigid_pose::pose_difference;
 
 /// Residual, and Jacobians by target and source.
 type RelativeParts = (Vector6<f64>, Matrix6<f64>, Matrix6<f64>);

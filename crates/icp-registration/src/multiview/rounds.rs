@@ -77,7 +77,7 @@ fn at_parameters(
     for index in surface.members.iter().map(|&index| index as usize) {
         points[index] = model.point(station, index, parameters, Some(&mut of_points[index * m..(index + 1) * m]));
     }
-    crate::neighbours::check_points("points of the point model", &points)?;
+    point_cloud::check_points("points of the point model", &points)?;
     if let Some(index) = of_points.iter().position(|d| !d.iter().all(|v| v.is_finite())) {
         return Err(Error::NonFinite { what: "derivatives of the point model", index });
     }

@@ -16,7 +16,7 @@ use super::sums::Sums;
 use super::wide_errors;
 use crate::error::Result;
 use crate::kernel::RobustKernel;
-use crate::pose::{pose_difference, step_pose};
+use rigid_pose::{pose_difference, step_pose};
 
 /// What the poses may be off in the first rounds, patches: facets are joined anew from better poses.
 const OFF: [f64; 2] = [0.06, 0.01];

@@ -20,11 +20,11 @@ use super::precision;
 use super::registration::{Start, StationRegistration, StationRegistrationOptions, SurfacePair, UndeterminedStation};
 use super::rounds::{Course, Surfaces};
 use super::simultaneous::{Adjusted, Finish};
-use crate::cloud::Cloud;
+use point_cloud::Cloud;
 use crate::error::{Error, Result};
 use crate::kernel::{RobustKernel, quantile};
-use crate::normals::{UnorganisedNormalOptions, unorganised_normals};
-use crate::pose::is_finite;
+use point_cloud::{UnorganisedNormalOptions, unorganised_normals};
+use rigid_pose::is_finite;
 
 /// Default of the error of approximate poses, in radii of the clouds.
 const START_ERROR: f64 = 0.2;

@@ -13,7 +13,7 @@ use super::sums::{SUMS, median_residual, normal_equations};
 use super::track::{FEWEST_POINTS, Gauge, Track, blocks, finest_part, is_within_noise, moved, solve, turned};
 use crate::error::{Error, Result};
 use crate::icp::{DegeneracyPolicy, IcpResult, StopReason};
-use crate::pose::{is_finite, pose_difference, step_pose, symmetrised, tangent_from_centred};
+use rigid_pose::{is_finite, pose_difference, step_pose, symmetrised, tangent_from_centred};
 use crate::quality::Residuals;
 
 /// Biweight with 95 % efficiency on normally distributed residuals.

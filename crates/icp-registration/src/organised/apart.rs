@@ -7,7 +7,7 @@ use super::frame::OrganisedFrame;
 use super::shared_error::{Influence, SharedError};
 use crate::error::Result;
 use crate::icp::IcpResult;
-use crate::pose::symmetrised;
+use rigid_pose::symmetrised;
 
 impl FrameAligner {
     /// As [`align_frames`](crate::align_frames), without allocating memory once frames of this size have been aligned.

@@ -10,7 +10,7 @@ use super::grid::Grid;
 use super::nodes::{LARGEST_DEPTH_M, LEAST_DEPTH_M, NodeRow};
 use super::planes::{FREEDOM, MOMENT, PlaneRow};
 use super::projection::Projection;
-use crate::cloud::Cloud;
+use point_cloud::Cloud;
 use crate::error::{Error, Result};
 use crate::kernel::{median_of_bits, positive_bits};
 

@@ -19,7 +19,7 @@ use super::pairs::{Locate, Moved, Pairs, Rules, WithLocate, with_locate};
 use super::sums::{self, Normal, derivatives};
 use crate::error::{Error, Result};
 use crate::icp::UndeterminedMotion;
-use crate::pose::symmetrised;
+use rigid_pose::symmetrised;
 use crate::quality::{Direction, Directions, FEWEST_CELLS, Residuals, SIGNIFICANCE, expanded};
 
 /// Information that stands out beside cells that carry none, over its scatter, and the multiple of the middle cell above

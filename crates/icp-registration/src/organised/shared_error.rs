@@ -13,7 +13,7 @@ use super::frame::OrganisedFrame;
 use super::map::{Partner, Partners};
 use super::pairs::with_locate;
 use crate::kernel::{median_of_bits, positive_bits};
-use crate::pose::tangent_from_centred;
+use rigid_pose::tangent_from_centred;
 use crate::quality::Centred;
 
 /// Largest degree of the polynomials. Higher ones reach poses less (a tenth of the second degree on frames of a Kinect).

@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Vector3};
 
-use crate::cloud::Cloud;
+use point_cloud::Cloud;
 
 /// The two surfaces of a registration, and where it stands.
 #[derive(Debug, Clone, Copy)]

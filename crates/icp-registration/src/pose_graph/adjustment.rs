@@ -11,9 +11,9 @@ use nalgebra::{DMatrix, DVector, Isometry3, Matrix6, Vector6};
 
 use super::graph::{Edge, Graph};
 use super::relation::Relation;
-use super::uncertain::{Uncertain, inverse_jacobian, product_jacobians};
+use rigid_pose::{Uncertain, inverse_jacobian, product_jacobians};
 use crate::organised::{COEFFICIENTS, Field, FieldMatrix};
-use crate::pose::{pose_difference, step_pose, symmetrised};
+use rigid_pose::{pose_difference, step_pose, symmetrised};
 
 const MAX_ITERATIONS: usize = 10;
 /// Steps (metre, radian) below which the adjustment has converged: far below every standard deviation.

@@ -169,10 +169,10 @@ impl Graph {
 mod tests {
     #![allow(clippy::unwrap_used)]
 
-    use super::super::uncertain::Uncertain;
+    use rigid_pose::Uncertain;
     use super::*;
     use crate::organised::ByField;
-    use crate::pose::{pose_difference, step_pose};
+    use rigid_pose::{pose_difference, step_pose};
     use nalgebra::{Matrix6, Vector3, Vector6};
     use rand::SeedableRng;
     use rand_distr::{Distribution, StandardNormal};

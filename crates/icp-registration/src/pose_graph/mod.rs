@@ -3,10 +3,8 @@
 mod adjustment;
 mod graph;
 mod relation;
-mod uncertain;
 
 #[cfg(feature = "multiview")]
 pub(crate) use graph::is_likely;
 pub(crate) use graph::{Edge, Graph};
 pub(crate) use relation::Relation;
-pub(crate) use uncertain::{Uncertain, product_jacobians};

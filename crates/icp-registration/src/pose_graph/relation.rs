@@ -2,9 +2,9 @@
 
 use nalgebra::{Isometry3, Matrix6};
 
-use super::uncertain::{Uncertain, inverse_jacobian, product_jacobians};
+use rigid_pose::{Uncertain, inverse_jacobian, product_jacobians};
 use crate::organised::{ByField, Field, FieldMatrix};
-use crate::pose::{step_pose, symmetrised};
+use rigid_pose::{step_pose, symmetrised};
 
 /// A pose `a_from_b` for the field that is assumed for the sensor's shared error: with the covariance of what is random
 /// beside it, and its derivative by the coefficients of the field.

@@ -2,11 +2,11 @@
 
 use nalgebra::{DMatrix, DVector, Matrix6, Vector3, Vector6};
 
-use crate::eigen::eigen6;
+use rigid_pose::eigen6;
 use crate::error::Result;
 use crate::icp::UndeterminedMotion;
 use crate::icp::motion::name_motions;
-use crate::pose::symmetrised;
+use rigid_pose::symmetrised;
 
 /// Information below this multiple of its own scatter between cells counts as none.
 pub(crate) const SIGNIFICANCE: f64 = 2.5;

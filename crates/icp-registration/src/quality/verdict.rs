@@ -7,7 +7,7 @@ use super::cells::{Cells, Centred};
 use super::directions::{Direction, Directions, SIGNIFICANCE, expanded};
 use crate::error::Result;
 use crate::icp::UndeterminedMotion;
-use crate::pose::{symmetrised, tangent_from_centred};
+use rigid_pose::{symmetrised, tangent_from_centred};
 
 /// Share of the largest information that rounding can imitate.
 const ROUNDING: f64 = 1e-9;

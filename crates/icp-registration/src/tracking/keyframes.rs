@@ -2,7 +2,7 @@
 
 use nalgebra::Isometry3;
 
-use crate::cloud::Cloud;
+use point_cloud::Cloud;
 use crate::coarse::FeatureCloud;
 use crate::organised::OrganisedFrame;
 use crate::pose_graph::Graph;

@@ -11,9 +11,9 @@ use super::tracker::Tracker;
 use super::velocity::Velocity;
 use crate::error::Error;
 use crate::organised::{Agreement, ByField, Field, FrameAligner, Influence, OrganisedFrame};
-use crate::pose::{step_pose, symmetrised};
+use rigid_pose::{step_pose, symmetrised};
 use crate::pose_graph::Relation;
-use crate::pose_graph::Uncertain;
+use rigid_pose::Uncertain;
 
 /// Keyframes tried beside the reference.
 const NEIGHBOURS: usize = 2;
@@ -286,7 +286,7 @@ fn register(
     if agreement.overlap() < options.min_overlap {
         return Err(LossReason::TooLittleOverlap);
     }
-    if !crate::pose::is_finite(&pose.pose) || pose.covariance.cholesky().is_none() {
+    if !rigid_pose::is_finite(&pose.pose) || pose.covariance.cholesky().is_none() {
         return Err(LossReason::NotConverged);
     }
     let determined = result.degenerate.is_empty();

@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Matrix3, Matrix6, Vector3, Vector6};
 
-use crate::pose_graph::Uncertain;
+use rigid_pose::Uncertain;
 
 /// What is known of the motion from the frame before to this one, for instance from an inertial unit.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -16,7 +16,7 @@ pub struct MotionPrior {
 impl MotionPrior {
     /// Whether it can be used: finite, its covariance positive definite.
     pub(super) fn is_sound(&self) -> bool {
-        crate::pose::is_finite(&self.current_from_previous)
+        rigid_pose::is_finite(&self.current_from_previous)
             && self.covariance.iter().all(|v| v.is_finite())
             && self.covariance.cholesky().is_some()
     }
@@ -63,7 +63,7 @@ mod tests {
     #![allow(clippy::unwrap_used)]
 
     use super::*;
-    use crate::pose::pose_difference;
+    use rigid_pose::pose_difference;
 
     fn pose(seed: f64) -> Isometry3<f64> {
         Isometry3::new(Vector3::new(seed, -0.4 * seed, 0.3), Vector3::new(0.5 - seed, 0.8, -0.2 * seed))

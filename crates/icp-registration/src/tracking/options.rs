@@ -91,7 +91,7 @@ impl Default for TrackerOptions {
 
 impl TrackerOptions {
     pub(super) fn validate(&self) -> Result<()> {
-        if !crate::pose::is_finite(&self.world_from_first) {
+        if !rigid_pose::is_finite(&self.world_from_first) {
             return Err(Error::NonFinite { what: "world_from_first", index: 0 });
         }
         let fractions = [

@@ -5,8 +5,8 @@ use nalgebra::{Isometry3, Matrix6};
 use super::motion::MotionPrior;
 use super::velocity::Velocity;
 use crate::organised::ByField;
-use crate::pose::pose_difference;
-use crate::pose_graph::Uncertain;
+use rigid_pose::pose_difference;
+use rigid_pose::Uncertain;
 
 /// Frames after a loss for which the last velocity is carried on.
 const CARRIED_FRAMES: usize = 5;

@@ -5,10 +5,10 @@ use nalgebra::{Isometry3, Matrix6};
 use super::locate::{Measured, agreeing};
 use super::tracker::Tracker;
 use crate::organised::{ByField, Influence};
-use crate::pose::step_pose;
+use rigid_pose::step_pose;
 use crate::pose_graph::Edge;
 use crate::pose_graph::Relation;
-use crate::pose_graph::Uncertain;
+use rigid_pose::Uncertain;
 
 /// What another keyframe must see more of the frame than the reference to take its place.
 const ADVANTAGE: f64 = 0.05;

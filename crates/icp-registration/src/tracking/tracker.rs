@@ -11,12 +11,12 @@ use super::options::{Fusion, TrackerOptions};
 use super::prediction::{Grounds, Last, Prediction};
 use super::tracked::{LossReason, TrackedPose, TrackingState};
 use super::velocity::Velocity;
-use crate::cloud::Cloud;
+use point_cloud::Cloud;
 use crate::error::{Error, Result};
 use crate::icp::DegeneracyPolicy;
 use crate::organised::{ByField, FieldMatrix, FrameAligner, Influence, OrganisedFrame, Projection, SharedError};
 use crate::pose_graph::Relation;
-use crate::pose_graph::Uncertain;
+use rigid_pose::Uncertain;
 
 /// Share of the first frame's radius beyond whose standard deviation motions count as undetermined. Registration alone
 /// asks for 1/300; in a stream, poses that are centimetres weak for a moment are still worth more than a loss.

@@ -8,8 +8,8 @@
 use nalgebra::{Matrix6, Vector6};
 
 use super::motion::{diagonal, exponential, logarithm};
-use crate::pose::{pose_difference, symmetrised};
-use crate::pose_graph::{Uncertain, product_jacobians};
+use rigid_pose::{pose_difference, symmetrised};
+use rigid_pose::{Uncertain, product_jacobians};
 
 /// Velocity of a camera at a pose.
 #[derive(Debug, Clone, Copy)]
@@ -99,7 +99,7 @@ mod tests {
     use rand_distr::{Distribution, StandardNormal};
     use rand_pcg::Pcg64;
 
-    use crate::pose::step_pose;
+    use rigid_pose::step_pose;
 
     const SECONDS: f64 = 0.1;
     const SIGMA: f64 = 2e-3;

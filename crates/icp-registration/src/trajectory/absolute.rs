@@ -2,7 +2,7 @@ use nalgebra::{Isometry3, Point3, Vector3};
 
 use super::association::{Stamped, associate};
 use super::statistics::ErrorStatistics;
-use crate::absolute_orientation::{absolute_orientation, absolute_orientation_with_scale};
+use rigid_pose::{absolute_orientation, absolute_orientation_with_scale};
 use crate::error::{Error, Result};
 
 /// How an estimate is moved onto the truth before they are compared.

@@ -3,7 +3,7 @@
 use nalgebra::Isometry3;
 
 use crate::error::{Error, Result};
-use crate::pose::is_finite;
+use rigid_pose::is_finite;
 
 pub(super) type Stamped = (f64, Isometry3<f64>);
 

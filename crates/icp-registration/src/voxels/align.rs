@@ -9,7 +9,7 @@ use super::wide::{RULES, Wide};
 use crate::error::{Error, Result};
 use crate::icp::{DegeneracyPolicy, IcpResult, StopReason};
 use crate::kernel::RobustKernel;
-use crate::pose::{is_finite, move_about};
+use rigid_pose::{is_finite, move_about};
 use crate::quality::{Centred, Residuals, Verdict};
 
 /// Iterations that a coarse level may take.

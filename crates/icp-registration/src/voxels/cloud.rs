@@ -6,7 +6,7 @@ use super::level::Level;
 use super::moments::Moments;
 use super::options::VoxelOptions;
 use super::scale::voxel_size;
-use crate::cloud::Cloud;
+use point_cloud::Cloud;
 use crate::error::{Error, Result};
 
 /// Levels end when so few voxels are left.

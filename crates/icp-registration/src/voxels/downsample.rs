@@ -4,9 +4,9 @@ use nalgebra::{Point3, Vector3};
 
 use super::gather::{Sum, gather};
 use super::lattice::{Lattice, cell};
-use crate::cloud::Cloud;
+use point_cloud::Cloud;
 use crate::error::Result;
-use crate::normals::no_normal;
+use point_cloud::no_normal;
 
 /// Normals whose mean is shorter than this point to opposite sides (or all around): there is no common one.
 const SHORTEST_MEAN_NORMAL: f64 = 0.5;

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::blocks::Blocks;
 use super::lattice::{Lattice, cell};
 use super::moments::Moments;
-use crate::eigen::{eigenvalues3, eigenvector3};
+use point_cloud::{eigenvalues3, eigenvector3};
 
 /// Voxels handled together by one thread; fixed, so that sums do not depend on the number of threads.
 pub(crate) const CHUNK: usize = 512;

@@ -5,10 +5,10 @@ use rayon::prelude::*;
 
 use super::lattice::Lattice;
 use super::level::{CHUNK, Level};
-use crate::eigen::eigen6;
+use rigid_pose::eigen6;
 use crate::error::Result;
 use crate::kernel::{RobustKernel, mad_scale};
-use crate::pose::symmetrised;
+use rigid_pose::symmetrised;
 use crate::quality::{Cells, Centred};
 
 /// Partners farther apart than this many voxels belong to different things.

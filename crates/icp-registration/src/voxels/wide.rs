@@ -5,9 +5,9 @@ use nalgebra::{Isometry3, Matrix6, Vector3, Vector6};
 
 use super::level::{Level, Voxel};
 use super::samples::{Samples, Sought};
-use crate::eigen::eigen6;
+use rigid_pose::eigen6;
 use crate::error::Result;
-use crate::pose::{move_about, symmetrised};
+use rigid_pose::{move_about, symmetrised};
 use crate::quality::Centred;
 
 /// Samples of the source and of the target.

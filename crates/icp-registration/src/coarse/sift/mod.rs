@@ -12,7 +12,7 @@ use rayon::prelude::*;
 
 use super::features::Features;
 use crate::error::{Error, Result};
-use crate::neighbours::is_usable;
+use point_cloud::is_usable;
 use describe::{descriptor, orientations};
 use extrema::{Keypoint, extrema};
 use scale_space::{Image, ScaleSpace};

@@ -46,7 +46,7 @@ impl<'a> Projective<'a> {
         let point_of_pixel: Vec<Option<usize>> = points
             .iter()
             .map(|p| {
-                let usable = crate::neighbours::is_usable(&Point3::from(*p));
+                let usable = point_cloud::is_usable(&Point3::from(*p));
                 count += usize::from(usable);
                 usable.then(|| count - 1)
             })

@@ -4,11 +4,11 @@ use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
 use super::{ErrorMetric, Row, Rows, normal_twins};
-use crate::cloud::Cloud;
+use point_cloud::Cloud;
 use crate::error::{Error, Result};
 use crate::icp::IcpTarget;
-use crate::neighbours::NeighbourTree;
-use crate::normals::{UnorganisedNormalOptions, normals_with_tree};
+use point_cloud::NeighbourTree;
+use point_cloud::{UnorganisedNormalOptions, normals_with_tree};
 use crate::parts::scene::{Pair, Scene};
 
 /// Points that an intensity gradient is fitted to.

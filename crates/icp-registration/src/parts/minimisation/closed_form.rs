@@ -3,7 +3,7 @@
 use nalgebra::{Matrix6, Point3, Vector6};
 
 use super::Minimiser;
-use crate::absolute_orientation::{RotationMethod, absolute_orientation_by};
+use rigid_pose::{RotationMethod, absolute_orientation_by};
 use crate::error::{Error, Result};
 use crate::icp::System;
 use crate::parts::ErrorMetric;

@@ -3,10 +3,10 @@
 use nalgebra::{Matrix6, Vector6};
 
 use super::Minimiser;
-use crate::eigen::eigen6;
+use rigid_pose::eigen6;
 use crate::error::Result;
 use crate::icp::System;
-use crate::pose::symmetrised;
+use rigid_pose::symmetrised;
 
 /// Eigenvalues below this fraction of the largest are rounding: no step along them.
 const RANK_TOLERANCE: f64 = 1e-10;

@@ -3,9 +3,9 @@
 use nalgebra::Point3;
 
 use super::PairRejection;
-use crate::cloud::Cloud;
+use point_cloud::Cloud;
 use crate::error::{Error, Result};
-use crate::neighbours::NeighbourTree;
+use point_cloud::NeighbourTree;
 use crate::parts::scene::{Pair, Scene};
 
 /// Pairs whose target point lies at the rim of what was seen, or mixes two surfaces ([`Cloud::rim`]) `[TurkLevoy1994]`:

@@ -18,7 +18,7 @@ use nalgebra::{Isometry3, Matrix6, Vector3};
 
 use super::MotionPrior;
 use crate::error::{Error, Result};
-use crate::pose::{inverse_covariance_transport, symmetrised};
+use rigid_pose::{inverse_covariance_transport, symmetrised};
 use state::State;
 
 /// Integrates inertial samples between frames.

@@ -77,7 +77,7 @@ impl Default for ImuOptions {
 
 impl ImuOptions {
     pub(super) fn validate(&self) -> Result<()> {
-        if !crate::pose::is_finite(&self.camera_from_body) {
+        if !rigid_pose::is_finite(&self.camera_from_body) {
             return Err(Error::NonFinite { what: "camera_from_body", index: 0 });
         }
         let figures = [

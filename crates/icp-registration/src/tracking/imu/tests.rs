@@ -8,7 +8,7 @@ use rand_pcg::Pcg64;
 
 use super::{ImuIntegrator, ImuOptions, InertialSample};
 use crate::error::Error;
-use crate::pose::{pose_difference, step_pose};
+use rigid_pose::{pose_difference, step_pose};
 use crate::tracking::MotionPrior;
 
 const GRAVITY: f64 = 9.80665;

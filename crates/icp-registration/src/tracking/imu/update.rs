@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Matrix6, SMatrix, UnitQuaternion, Vector3};
 
 use super::state::{ACCEL_BIAS, ATTITUDE, DISPLACEMENT, GYRO_BIAS, Matrix18, ROTATION, State, VELOCITY};
 use crate::error::{Error, Result};
-use crate::pose::{pose_difference, step_pose, symmetrised};
+use rigid_pose::{pose_difference, step_pose, symmetrised};
 
 /// Kalman update by a measured `start_from_body` with its covariance in the tangent of that pose.
 pub(super) fn update(state: &mut State, start_from_body: &Isometry3<f64>, covariance: &Matrix6<f64>) -> Result<()> {

@@ -1,7 +1,7 @@
 //! Normals of frames and clouds.
 
 use crate::common::{Cuboid, Pinhole, Scene, frame, look_at};
-use icp_registration::{
+use point_cloud::{
     Error, OrganisedNormalOptions, UnorganisedNormalOptions, organised_normals, unorganised_normals,
 };
 use nalgebra::{Point3, Vector3};

@@ -1,11 +1,10 @@
-//! Eigenvalues and vectors of symmetric matrices: 3x3 in closed form, 6x6 by a bounded iteration.
+//! Eigenvalues and vectors of symmetric 3x3 matrices in closed form: of the second moments of points.
 
-use nalgebra::{Matrix3, Matrix6, SymmetricEigen, Vector3, Vector6};
-
-use crate::error::{Error, Result};
+use nalgebra::{Matrix3, Vector3};
 
 /// Eigenvalues of a symmetric 3x3 matrix in ascending order (trigonometric solution of the characteristic cubic).
-pub(crate) fn eigenvalues3(m: &Matrix3<f64>) -> [f64; 3] {
+#[must_use]
+pub fn eigenvalues3(m: &Matrix3<f64>) -> [f64; 3] {
     let off = m[(0, 1)].powi(2) + m[(0, 2)].powi(2) + m[(1, 2)].powi(2);
     let mean = m.trace() / 3.0;
     let deviation = m - Matrix3::identity() * mean;
@@ -23,7 +22,8 @@ pub(crate) fn eigenvalues3(m: &Matrix3<f64>) -> [f64; 3] {
 }
 
 /// Unit eigenvector of the simple eigenvalue `value` of a symmetric 3x3 matrix; `None` where it is not simple.
-pub(crate) fn eigenvector3(m: &Matrix3<f64>, value: f64) -> Option<Vector3<f64>> {
+#[must_use]
+pub fn eigenvector3(m: &Matrix3<f64>, value: f64) -> Option<Vector3<f64>> {
     // Rows of m - value I span the plane normal to the vector: the longest cross product is the most accurate.
     let shifted = m - Matrix3::identity() * value;
     let rows = [0, 1, 2].map(|i| shifted.row(i).transpose());
@@ -40,24 +40,11 @@ pub(crate) fn eigenvector3(m: &Matrix3<f64>, value: f64) -> Option<Vector3<f64>>
     (length > 1e-10 * scale && length > 0.0).then(|| best / length)
 }
 
-/// Eigenvalues (ascending) and matching unit eigenvectors (columns) of a symmetric 6x6 matrix.
-pub(crate) fn eigen6(m: &Matrix6<f64>, what: &'static str) -> Result<(Vector6<f64>, Matrix6<f64>)> {
-    if m.iter().any(|v| !v.is_finite()) {
-        return Err(Error::Numerical { what, why: "the matrix is not finite" });
-    }
-    let eigen = SymmetricEigen::try_new(*m, 1e-15, 1000)
-        .ok_or(Error::Numerical { what, why: "the eigenvalue iteration did not converge" })?;
-    let mut order = [0, 1, 2, 3, 4, 5];
-    order.sort_by(|&a, &b| eigen.eigenvalues[a].total_cmp(&eigen.eigenvalues[b]));
-    let values = Vector6::from_fn(|i, _| eigen.eigenvalues[order[i]]);
-    let vectors = Matrix6::from_fn(|r, c| eigen.eigenvectors[(r, order[c])]);
-    Ok((values, vectors))
-}
-
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
+    use nalgebra::SymmetricEigen;
     use proptest::prelude::*;
 
     proptest! {
@@ -85,10 +72,5 @@ mod tests {
         let line = Matrix3::from_diagonal(&Vector3::new(0.0, 0.0, 1.0));
         assert!(eigenvector3(&line, 0.0).is_none());
         assert!(eigenvector3(&Matrix3::from_element(f64::NAN), 0.0).is_none());
-    }
-
-    #[test]
-    fn six_by_six_refuses_what_is_not_finite() {
-        assert!(eigen6(&Matrix6::from_element(f64::NAN), "test").is_err());
     }
 }

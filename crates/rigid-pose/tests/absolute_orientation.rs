@@ -1,6 +1,6 @@
 //! Closed-form absolute orientation.
 
-use icp_registration::{Error, absolute_orientation, absolute_orientation_with_scale, pose_difference};
+use rigid_pose::{Error, absolute_orientation, absolute_orientation_with_scale, pose_difference};
 use nalgebra::{Isometry3, Matrix6, Point3, Translation3, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 use rand::SeedableRng;

@@ -121,14 +121,16 @@ impl NeighbourTree {
 
     /// A nearest point of a query that is known to be finite: of several at the same distance always the same one, as
     /// the tree's layout has it. For hot loops, where looking for the lowest index would double the time.
-    pub(crate) fn any_nearest(&self, query: &[f64; 3]) -> Neighbour {
+    #[must_use]
+    pub fn any_nearest(&self, query: &[f64; 3]) -> Neighbour {
         let best = self.tree.query(query).nearest_one::<SquaredEuclidean<f64>>().execute();
         neighbour(self.places.first(best.item), best.distance)
     }
 
     /// A nearest point within `reach_m` of a query that is known to be finite, and the distance of the nearest elsewhere (or
     /// the reach, where there is none within it).
-    pub(crate) fn two_nearest(&self, query: &Point3<f64>, reach_m: f64) -> Option<(Neighbour, f64)> {
+    #[must_use]
+    pub fn two_nearest(&self, query: &Point3<f64>, reach_m: f64) -> Option<(Neighbour, f64)> {
         let query = [query.x, query.y, query.z];
         let found = self
             .tree
@@ -164,8 +166,11 @@ fn checked(query: &Point3<f64>) -> Result<[f64; 3]> {
     Ok([query.x, query.y, query.z])
 }
 
-/// Refuses coordinates that are not finite (or too large to be squared).
-pub(crate) fn check_points(what: &'static str, points: &[Point3<f64>]) -> Result<()> {
+/// Refuses coordinates that are not finite (or too large to be squared); `what` names the points.
+///
+/// # Errors
+/// [`Error::NonFinite`] with the index of the first one.
+pub fn check_points(what: &'static str, points: &[Point3<f64>]) -> Result<()> {
     match points.iter().position(|p| !is_usable(p)) {
         Some(index) => Err(Error::NonFinite { what, index }),
         None => Ok(()),
@@ -173,7 +178,8 @@ pub(crate) fn check_points(what: &'static str, points: &[Point3<f64>]) -> Result
 }
 
 /// Whether all three coordinates are finite and small enough to be squared.
-pub(crate) fn is_usable(point: &Point3<f64>) -> bool {
+#[must_use]
+pub fn is_usable(point: &Point3<f64>) -> bool {
     // NaN fails the comparison.
     point.iter().all(|c| c.abs() < LARGEST_COORDINATE)
 }

@@ -1,6 +1,6 @@
 //! The four closed forms that `[Eggert1997]` compares: noise, degenerate sets, and what rounding does.
 
-use icp_registration::{Error, RotationMethod, absolute_orientation_by, pose_difference};
+use rigid_pose::{Error, RotationMethod, absolute_orientation_by, pose_difference};
 use nalgebra::{Isometry3, Point3, Vector3};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};

@@ -34,7 +34,10 @@ pub fn unorganised_normals(points: &[Point3<f64>], options: &UnorganisedNormalOp
 }
 
 /// As [`unorganised_normals`], on a tree of the same points that is already there.
-pub(crate) fn normals_with_tree(
+///
+/// # Errors
+/// As [`unorganised_normals`].
+pub fn normals_with_tree(
     points: &[Point3<f64>],
     tree: &NeighbourTree,
     options: &UnorganisedNormalOptions,

@@ -2,26 +2,33 @@
 
 use nalgebra::{Isometry3, Matrix6};
 
-use crate::pose::{inverse_covariance_transport, pose_difference, step_pose, symmetrised};
+use crate::tangent::{inverse_covariance_transport, pose_difference, step_pose, symmetrised};
 
 /// A pose `a_from_b` with its covariance in the tangent `[dt a axes, dtheta b axes]`.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Uncertain {
-    pub(crate) pose: Isometry3<f64>,
-    pub(crate) covariance: Matrix6<f64>,
+pub struct Uncertain {
+    /// The pose.
+    pub pose: Isometry3<f64>,
+    /// Its covariance, metre and radian squared.
+    pub covariance: Matrix6<f64>,
 }
 
 impl Uncertain {
-    pub(crate) fn exact(pose: Isometry3<f64>) -> Self {
+    /// A pose without errors.
+    #[must_use]
+    pub fn exact(pose: Isometry3<f64>) -> Self {
         Self { pose, covariance: Matrix6::zeros() }
     }
 
-    pub(crate) fn inverse(&self) -> Self {
+    /// `b_from_a`.
+    #[must_use]
+    pub fn inverse(&self) -> Self {
         Self { pose: self.pose.inverse(), covariance: inverse_covariance_transport(&self.pose, &self.covariance) }
     }
 
     /// `a_from_c` from this `a_from_b` and an independent `b_from_c`.
-    pub(crate) fn then(&self, b_from_c: &Self) -> Self {
+    #[must_use]
+    pub fn then(&self, b_from_c: &Self) -> Self {
         let (by_first, by_second) = product_jacobians(&self.pose, &b_from_c.pose);
         let covariance =
             by_first * self.covariance * by_first.transpose() + by_second * b_from_c.covariance * by_second.transpose();
@@ -31,7 +38,8 @@ impl Uncertain {
     }
 
     /// The weighted mean with an independent determination of the same pose; `None` where covariances are singular.
-    pub(crate) fn combined(&self, other: &Self) -> Option<Self> {
+    #[must_use]
+    pub fn combined(&self, other: &Self) -> Option<Self> {
         let difference = pose_difference(&self.pose, &other.pose);
         let factor = symmetrised(&(self.covariance + other.covariance)).cholesky()?;
         let gain = factor.solve(&self.covariance).transpose();
@@ -41,21 +49,24 @@ impl Uncertain {
     }
 
     /// Square of the distance to another determination in standard deviations of the two.
-    pub(crate) fn mahalanobis_squared(&self, other: &Self) -> Option<f64> {
+    #[must_use]
+    pub fn mahalanobis_squared(&self, other: &Self) -> Option<f64> {
         let difference = pose_difference(&self.pose, &other.pose);
         let factor = symmetrised(&(self.covariance + other.covariance)).cholesky()?;
         Some(difference.dot(&factor.solve(&difference)))
     }
 
     /// Largest standard deviation of a point at `radius_m` from the origin, about, metre.
-    pub(crate) fn sigma_at(&self, radius_m: f64) -> f64 {
+    #[must_use]
+    pub fn sigma_at(&self, radius_m: f64) -> f64 {
         let block = |at: usize| self.covariance.fixed_view::<3, 3>(at, at).symmetric_eigenvalues().max().max(0.0);
         (block(0) + radius_m * radius_m * block(3)).sqrt()
     }
 }
 
 /// Jacobians of the tangent of `a_from_b · b_from_c` by those of its factors.
-pub(crate) fn product_jacobians(a_from_b: &Isometry3<f64>, b_from_c: &Isometry3<f64>) -> (Matrix6<f64>, Matrix6<f64>) {
+#[must_use]
+pub fn product_jacobians(a_from_b: &Isometry3<f64>, b_from_c: &Isometry3<f64>) -> (Matrix6<f64>, Matrix6<f64>) {
     // t = ta + Ra tb: dt = dta − Ra [tb]x dθa + Ra dtb; R = Ra Rb: dθ = Rbᵀ dθa + dθb.
     let ra = a_from_b.rotation.to_rotation_matrix().into_inner();
     let rb = b_from_c.rotation.to_rotation_matrix().into_inner();
@@ -68,7 +79,8 @@ pub(crate) fn product_jacobians(a_from_b: &Isometry3<f64>, b_from_c: &Isometry3<
 }
 
 /// Jacobian of the tangent of the inverse.
-pub(crate) fn inverse_jacobian(a_from_b: &Isometry3<f64>) -> Matrix6<f64> {
+#[must_use]
+pub fn inverse_jacobian(a_from_b: &Isometry3<f64>) -> Matrix6<f64> {
     let r = a_from_b.rotation.to_rotation_matrix().into_inner();
     let lever = (r.transpose() * a_from_b.translation.vector).cross_matrix();
     let mut jacobian = Matrix6::zeros();

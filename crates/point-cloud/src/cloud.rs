@@ -70,8 +70,11 @@ impl Cloud {
     }
 
     /// Refuses an empty cloud, points that are not finite or, many of them, not measured, planes of another length and sigmas
-    /// that are not positive (NaN passes: unknown).
-    pub(crate) fn validate(&self, what: &'static str) -> Result<()> {
+    /// that are not positive (NaN passes: unknown). `what` names the cloud.
+    ///
+    /// # Errors
+    /// [`Error::Empty`], [`Error::NonFinite`], [`Error::Unmeasured`], [`Error::LengthMismatch`], [`Error::NotPositive`].
+    pub fn validate(&self, what: &'static str) -> Result<()> {
         if self.is_empty() {
             return Err(Error::Empty { what });
         }

@@ -1,4 +1,4 @@
-//! Small steps of a pose, and the order of the six numbers in every covariance of this crate.
+//! Small steps of a pose, and the order of the six numbers in every covariance of a pose.
 //!
 //! Tangent of a pose `a_from_b`: `[dt, dtheta]`, `dt` in metre along the axes of frame a, `dtheta` in radian about the
 //! axes of frame b: `t ← t + dt`, `R ← R exp(dtheta)`.
@@ -38,13 +38,15 @@ pub fn inverse_covariance_transport(a_from_b: &Isometry3<f64>, covariance: &Matr
 }
 
 /// Takes rounding off a matrix that is symmetric by construction.
-pub(crate) fn symmetrised(m: &Matrix6<f64>) -> Matrix6<f64> {
+#[must_use]
+pub fn symmetrised(m: &Matrix6<f64>) -> Matrix6<f64> {
     (m + m.transpose()) * 0.5
 }
 
 /// Jacobian from motions `[dt, rho w]` about the point `centre` (target axes, rotation scaled by the radius `rho`) to
 /// the tangent `[dt, dtheta]` of `target_from_source`.
-pub(crate) fn tangent_from_centred(
+#[must_use]
+pub fn tangent_from_centred(
     target_from_source: &Isometry3<f64>,
     centre: &Vector3<f64>,
     radius: f64,
@@ -60,7 +62,8 @@ pub(crate) fn tangent_from_centred(
 }
 
 /// Applies a finite motion `[dt, rho w]` about `centre` in target axes to a pose.
-pub(crate) fn move_about(
+#[must_use]
+pub fn move_about(
     target_from_source: &Isometry3<f64>,
     centre: &Vector3<f64>,
     radius: f64,
@@ -75,6 +78,7 @@ pub(crate) fn move_about(
 }
 
 /// Whether all numbers of a pose are finite.
-pub(crate) fn is_finite(pose: &Isometry3<f64>) -> bool {
+#[must_use]
+pub fn is_finite(pose: &Isometry3<f64>) -> bool {
     pose.translation.vector.iter().all(|v| v.abs() < 1e100) && pose.rotation.coords.iter().all(|v| v.is_finite())
 }

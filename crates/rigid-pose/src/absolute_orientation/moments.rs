@@ -4,9 +4,10 @@ use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, UnitQuaternion, Vector3};
 
 use super::Orientation;
 use crate::error::{Error, Result};
-use crate::neighbours::check_points;
-use crate::pose::symmetrised;
+use crate::tangent::symmetrised;
 
+/// Coordinates beyond this would overflow when squared and summed.
+const LARGEST_COORDINATE: f64 = 1e100;
 /// Second principal extent over the first below which points count as collinear: the rotation about the line would be
 /// known to no better than rounding over this ratio.
 const COLLINEAR_RATIO: f64 = 1e-7;
@@ -115,6 +116,16 @@ fn check_input(source: &[Point3<f64>], target: &[Point3<f64>], weights: Option<&
         }
     }
     Ok(())
+}
+
+/// Refuses coordinates that are not finite, or too large to be squared.
+fn check_points(what: &'static str, points: &[Point3<f64>]) -> Result<()> {
+    // NaN fails the comparison.
+    let is_usable = |point: &Point3<f64>| point.iter().all(|c| c.abs() < LARGEST_COORDINATE);
+    match points.iter().position(|point| !is_usable(point)) {
+        Some(index) => Err(Error::NonFinite { what, index }),
+        None => Ok(()),
+    }
 }
 
 fn check_spread(what: &'static str, scatter: &Matrix3<f64>) -> Result<()> {

@@ -1,6 +1,6 @@
 //! Nearest neighbours against a search through all points.
 
-use icp_registration::{Error, NeighbourTree};
+use point_cloud::{Error, NeighbourTree};
 use nalgebra::Point3;
 use proptest::prelude::*;
 

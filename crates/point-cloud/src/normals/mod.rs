@@ -4,8 +4,7 @@ mod organised;
 mod unorganised;
 
 pub use organised::{OrganisedNormalOptions, organised_normals};
-pub(crate) use unorganised::normals_with_tree;
-pub use unorganised::{UnorganisedNormalOptions, unorganised_normals};
+pub use unorganised::{UnorganisedNormalOptions, normals_with_tree, unorganised_normals};
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -56,7 +55,8 @@ impl Neighbourhood {
 }
 
 /// NaN in all three components: no normal.
-pub(crate) fn no_normal() -> Vector3<f64> {
+#[must_use]
+pub fn no_normal() -> Vector3<f64> {
     Vector3::repeat(f64::NAN)
 }
 

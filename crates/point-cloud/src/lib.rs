@@ -1,0 +1,17 @@
+#![doc = include_str!("../README.md")]
+
+mod cloud;
+mod coincident;
+mod eigen;
+mod error;
+mod neighbours;
+mod normals;
+
+pub use cloud::Cloud;
+pub use eigen::{eigenvalues3, eigenvector3};
+pub use error::{Error, Result};
+pub use nalgebra;
+pub use neighbours::{Neighbour, NeighbourTree, check_points, is_usable};
+pub use normals::{
+    OrganisedNormalOptions, UnorganisedNormalOptions, no_normal, normals_with_tree, organised_normals, unorganised_normals,
+};

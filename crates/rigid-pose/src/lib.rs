@@ -1,0 +1,19 @@
+#![doc = include_str!("../README.md")]
+
+mod absolute_orientation;
+mod error;
+mod motions;
+mod tangent;
+mod uncertain;
+
+pub use absolute_orientation::{
+    Orientation, RotationMethod, Similarity, absolute_orientation, absolute_orientation_by,
+    absolute_orientation_with_scale,
+};
+pub use error::{Error, Result};
+pub use motions::eigen6;
+pub use nalgebra;
+pub use tangent::{
+    inverse_covariance_transport, is_finite, move_about, pose_difference, step_pose, symmetrised, tangent_from_centred,
+};
+pub use uncertain::{Uncertain, inverse_jacobian, product_jacobians};

@@ -39,7 +39,8 @@ pub use result::quality::GroupSummary;
 pub use result::solution::{Scale, Solution};
 pub use result::transformation::{DatumTransformation, Moving};
 pub use result::weakness::{NearDefect, NearDefects, WeaknessOptions};
-pub use testing::distributions::Distribution;
+// Of the statistic in [`Significance`].
+pub use statistics::Distribution;
 pub use testing::global_test::{GlobalTest, GlobalVerdict};
 pub use testing::outlier::{OutlierTest, SnoopingTest, Suspect};
 pub use testing::reliability::{ComponentReliability, ExternalReliability, ReliabilityOptions};

@@ -13,7 +13,6 @@ mod differentiated;
 #[path = "common/differentiated_camera.rs"]
 mod differentiated_camera;
 mod display;
-mod distributions;
 mod elimination;
 mod global_test;
 mod iteration;

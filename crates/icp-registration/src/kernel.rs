@@ -66,21 +66,6 @@ const CAUCHY: f64 = 2.385;
 const GEMAN_MCCLURE: f64 = 3.787;
 const WELSCH: f64 = 2.985;
 
-/// Median of the absolute values times 1.4826: the standard deviation of normal residuals, blind to outliers.
-/// Zero for an empty slice; the slice is used as scratch.
-pub(crate) fn mad_scale(absolute: &mut [f64]) -> f64 {
-    1.4826 * quantile(absolute, 0.5)
-}
-
-/// The value below which the fraction `q` of the values lies; zero for an empty slice, which is used as scratch.
-pub(crate) fn quantile(values: &mut [f64], q: f64) -> f64 {
-    if values.is_empty() {
-        return 0.0;
-    }
-    let index = ((values.len() - 1) as f64 * q.clamp(0.0, 1.0)).round() as usize;
-    *values.select_nth_unstable_by(index, f64::total_cmp).1
-}
-
 /// The bits of a number, zero where it is not positive: integers in the order of the numbers, which are selected in half of
 /// their time.
 #[inline]
@@ -88,7 +73,8 @@ pub(crate) fn positive_bits(value: f32) -> u32 {
     if value > 0.0 { value.to_bits() } else { 0 }
 }
 
-/// The middle one of numbers given by [`positive_bits`], which are left in another order; `None` without any.
+/// The middle one of numbers given by [`positive_bits`], which are left in another order; `None` without any. It stands beside
+/// [`statistics::upper_median`] for the frames of a stream, where selection is in the loop of each pair: half of its time.
 pub(crate) fn median_of_bits(bits: &mut [u32]) -> Option<f32> {
     let middle = bits.len() / 2;
     (!bits.is_empty()).then(|| f32::from_bits(*bits.select_nth_unstable(middle).1))
@@ -144,14 +130,7 @@ mod tests {
             let mut bits: Vec<u32> = numbers.iter().copied().map(positive_bits).collect();
             let mut all: Vec<f64> = numbers.iter().map(|n| f64::from(*n)).collect();
             let found = median_of_bits(&mut bits).map(f64::from);
-            assert_eq!(found, Some(quantile(&mut all, 0.5)), "{numbers:?}");
+            assert_eq!(found, Some(statistics::upper_median(&mut all)), "{numbers:?}");
         }
-    }
-
-    #[test]
-    fn quantiles_of_short_slices() {
-        assert!(quantile(&mut [], 0.5).abs() < f64::MIN_POSITIVE);
-        assert!((quantile(&mut [3.0, 1.0, 2.0], 0.5) - 2.0).abs() < 1e-15);
-        assert!((quantile(&mut [3.0, 1.0], 1.0) - 3.0).abs() < 1e-15);
     }
 }

@@ -17,7 +17,7 @@ use pipeline::{
     CalibrateMethod, CalibrateRequest, CalibrationOptions, CalibrationSummary, CertificateRequest, DriftTreatment,
     Judged, Method, NetworkScene, OffsetModel, Silent, TableDefaults, TermSelection, calibrate, simulate_network,
 };
-use self_calibration::Distribution;
+use statistics::Distribution;
 
 type Failure = Box<dyn std::error::Error + Send + Sync>;
 

@@ -31,7 +31,6 @@ mod scattering;
 mod simulate;
 mod span;
 mod stages;
-mod statistics;
 mod summary;
 mod track;
 mod trends;

@@ -7,6 +7,7 @@ use icp_registration::{Placements, RefusedPair};
 use nalgebra::Isometry3;
 use range_image::Flags;
 use range_io::survey::Level;
+use statistics::{quantile, robust_standard_deviation};
 
 use crate::load::first_modulation;
 use crate::outcome::{Outcome, usable};
@@ -15,7 +16,6 @@ use crate::plausibility;
 use crate::register::describe::wrong_place;
 use crate::results::own_clouds;
 use crate::stages::repair;
-use crate::statistics::{median, robust_standard_deviation};
 use crate::summary::{PairSummary, ReferenceSummary, RegistrationSummary, StationTruth, Summary, TruthSummary};
 use crate::trends;
 use crate::truth::{RangeTruth, evaluate, wrap};
@@ -37,7 +37,7 @@ pub(crate) fn median_change(before: &[Option<Snapshot>], views: &[View]) -> Opti
             changes.push(view.modulation.map_or(change, |modulation| wrap(change, modulation)).abs());
         }
     }
-    Some(median(&mut changes)).filter(|change| change.is_finite())
+    Some(quantile(&mut changes, 0.5)).filter(|change| change.is_finite())
 }
 
 /// Range errors of all views together.
@@ -106,7 +106,7 @@ fn median_sigma(views: &[View]) -> Option<f64> {
             sigmas.extend(pairs.filter(|(_, flags)| flags.is_empty()).map(|(sigma, _)| f64::from(*sigma)));
         }
     }
-    Some(median(&mut sigmas)).filter(|sigma| sigma.is_finite())
+    Some(quantile(&mut sigmas, 0.5)).filter(|sigma| sigma.is_finite())
 }
 
 fn registration(outcome: &Outcome) -> Option<RegistrationSummary> {
@@ -190,13 +190,13 @@ fn reference(views: &[View]) -> Option<ReferenceSummary> {
     if differences.is_empty() {
         return None;
     }
-    let mut constant = median(&mut differences.clone());
+    let mut constant = quantile(&mut differences.clone(), 0.5);
     if let Some(modulation) = modulation {
         // The reference may be wrapped where ours is not: differences are brought next to the common constant.
         for difference in &mut differences {
             *difference = constant + wrap(*difference - constant, modulation);
         }
-        constant = median(&mut differences.clone());
+        constant = quantile(&mut differences.clone(), 0.5);
     }
     Some(ReferenceSummary {
         constant_m: constant,

@@ -5,8 +5,7 @@ use error_models::{ModelSet, RangeErrorModel};
 use nalgebra::{DMatrix, DVector, Point3, Vector4};
 use range_io::calibration::Calibration;
 use self_calibration::CalibrationOutcome;
-
-use crate::statistics::median;
+use statistics::quantile;
 
 /// A calibration whose points are asked for their uncertainty.
 pub(crate) struct PointUncertainty<'a> {
@@ -130,5 +129,5 @@ impl MovedCalibration {
 
 /// The median amplitude of the ranges observed; NaN where none is known, which leaves the hyperbola out.
 pub(crate) fn amplitude_of(outcome: &CalibrationOutcome) -> f64 {
-    median(&mut outcome.residuals.iter().map(|quality| quality.amplitude).collect::<Vec<_>>())
+    quantile(&mut outcome.residuals.iter().map(|quality| quality.amplitude).collect::<Vec<_>>(), 0.5)
 }

@@ -3,8 +3,8 @@
 use nalgebra::Isometry3;
 use range_image::{Flags, Modulation, Raster};
 use serde::Serialize;
+use statistics::quantile;
 
-use crate::statistics::{median, quantile};
 use crate::view::View;
 
 /// What is true of one view.
@@ -73,7 +73,7 @@ pub fn evaluate(views: &[&View], modulation: Option<Modulation>) -> Option<Range
     let half = modulation.map_or(f64::INFINITY, |modulation| modulation.ambiguity_interval_m() / 2.0);
     let right = errors.iter().filter(|error| **error < half).count();
     Some(RangeTruth {
-        range_error_median_m: median(&mut errors),
+        range_error_median_m: quantile(&mut errors, 0.5),
         range_error_p95_m: quantile(&mut errors, 0.95),
         wrap_count_right_fraction: right as f64 / errors.len().max(1) as f64,
         flagged_fraction: flagged as f64 / known as f64,

@@ -1,9 +1,10 @@
 //! A primitive adjusted to the ranges of a region.
 
-use adjust::{Adjustment, Covariance, Distribution, ParameterBlock, Scale, SolveOptions};
+use adjust::{Adjustment, Covariance, ParameterBlock, Scale, SolveOptions};
 use camera_model::Camera;
 use nalgebra::{DMatrix, DVector, Vector3};
 use range_image::RangeFrame;
+use statistics::{Distribution, mad_scale};
 
 use crate::judge::{require_determined, systematic_sigmas};
 use crate::linear_start::start;
@@ -136,10 +137,7 @@ fn chosen(pixels: &[RegionPixel], surface: &Surface, parameters: &[f64], options
             hit.map_or(f64::INFINITY, |hit| ((pixel.observed_m - hit.range_m) / pixel.sigma_m).abs())
         })
         .collect();
-    let mut sorted = standardised.clone();
-    sorted.sort_by(f64::total_cmp);
-    // The median of normal residuals is 0.6745 of their deviation.
-    let scale = sorted[sorted.len() / 2] / 0.6745;
+    let scale = mad_scale(&mut standardised.clone());
     let limit = options.rejection_sigmas * if scale.is_finite() { scale.max(1.0) } else { 1.0 };
     standardised.iter().map(|value| *value <= limit).collect()
 }

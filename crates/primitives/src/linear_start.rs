@@ -3,6 +3,7 @@
 use nalgebra::{Matrix3, Rotation3, SMatrix, SVector, Unit, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
+use statistics::upper_median;
 
 use crate::PrimitiveKind;
 use crate::surface::Surface;
@@ -49,8 +50,7 @@ fn cylinder(points: &[Vector3<f64>], random: &mut Pcg64) -> Option<(Surface, Vec
     }
     let (_, frame, circle) = found?;
     let mut along: Vec<f64> = points.iter().map(|point| frame.column(2).dot(point)).collect();
-    along.sort_by(f64::total_cmp);
-    let along_m = along[along.len() / 2];
+    let along_m = upper_median(&mut along);
     let far = is_far(points, |point| {
         let own = frame.tr_mul(point);
         frame * Vector3::new(own.x - circle[0], own.y - circle[1], 0.0)
@@ -118,8 +118,7 @@ fn best(
 
 fn median_distance(points: &[Vector3<f64>], parameters: &[f64], distance: Distance<'_>) -> f64 {
     let mut distances: Vec<f64> = points.iter().map(|point| distance(parameters, point).abs()).collect();
-    let middle = distances.len() / 2;
-    *distances.select_nth_unstable_by(middle, f64::total_cmp).1
+    upper_median(&mut distances)
 }
 
 /// `mᵀ r = 1`.

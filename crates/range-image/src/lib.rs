@@ -1,7 +1,6 @@
 #![doc = include_str!("../README.md")]
 
 mod averaging;
-mod chi_squared;
 mod demodulation;
 mod error;
 mod rasters;
@@ -10,7 +9,6 @@ mod sample_checks;
 pub use averaging::average::{average, average_ranges, sigma_from_repeats};
 pub use averaging::fusion::{Exposure, Fusion, FusionOptions, fuse_exposures};
 pub use averaging::rest::{FrameDeviation, Rest, RestOptions, RestVerdict, check_rest, check_rest_of_ranges};
-pub use chi_squared::chi_squared_upper_quantile;
 pub use demodulation::alias::AliasCorrection;
 pub use demodulation::demodulate::{Demodulator, demodulate};
 pub use demodulation::harmonics::{HarmonicImage, HarmonicRatio, harmonic_ratio, harmonics};

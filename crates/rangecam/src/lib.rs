@@ -49,6 +49,9 @@ pub use residual_tests;
 #[cfg(feature = "sensor-noise")]
 #[doc(inline)]
 pub use sensor_noise;
+#[cfg(feature = "statistics")]
+#[doc(inline)]
+pub use statistics;
 #[cfg(feature = "warm-up")]
 #[doc(inline)]
 pub use warm_up;

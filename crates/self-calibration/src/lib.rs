@@ -7,7 +7,7 @@ mod observed;
 mod ranges;
 mod surfaces;
 
-pub use adjust::{Distribution, GlobalTest, GlobalVerdict, Scale};
+pub use adjust::{GlobalTest, GlobalVerdict, Scale};
 pub use by_planes::planes::{PlaneCalibrationOptions, PlaneCapture, calibrate_planes};
 pub use by_planes::planes_outcome::{AdjustedPlane, CaptureQuality, PlaneCalibration};
 pub use error::{Error, Result};

@@ -1,6 +1,6 @@
 //! Whether there is one exponential more, and whether the drift follows the frame rate.
 
-use adjust::Distribution;
+use statistics::Distribution;
 
 use crate::fitting::curve::{Curve, RateSteps};
 use crate::fitting::projection::{Basis, dot};

@@ -1,6 +1,5 @@
 //! Statistical tests: outliers, variance components, significance, reliability.
 
-pub(crate) mod distributions;
 pub(crate) mod global_test;
 pub(crate) mod outlier;
 pub(crate) mod readmission;

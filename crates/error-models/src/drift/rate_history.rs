@@ -1,5 +1,7 @@
 //! How fast a camera took frames since it was switched on.
 
+use statistics::upper_median;
+
 use crate::error::require_finite;
 use crate::{Error, Result};
 
@@ -133,11 +135,6 @@ fn ratio(a: f64, b: f64) -> f64 {
     a.max(b) / a.min(b)
 }
 
-fn median(values: &mut [f64]) -> f64 {
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
-}
-
 /// Intervals of one rate.
 struct Run {
     start: usize,
@@ -159,7 +156,7 @@ fn runs_of(intervals: &[f64]) -> Vec<Run> {
     let ends = starts[1..].iter().copied().chain([intervals.len()]);
     let run = |(start, end): (usize, usize)| {
         let own = &intervals[start..end];
-        let middle_s = median(&mut own.to_vec());
+        let middle_s = upper_median(&mut own.to_vec());
         let regular = own.iter().filter(|interval| ratio(**interval, middle_s) <= NEAR);
         let (sum_s, count) = regular.fold((0.0, 0.0), |(sum, count), interval| (sum + interval, count + 1.0));
         Run { start, end, middle_s, sum_s, count }
@@ -175,7 +172,7 @@ fn starts(intervals: &[f64]) -> Vec<usize> {
     for index in 0..intervals.len() {
         let around = &intervals[index.saturating_sub(half)..intervals.len().min(index + half + 1)];
         window[..around.len()].copy_from_slice(around);
-        local.push(median(&mut window[..around.len()]));
+        local.push(upper_median(&mut window[..around.len()]));
     }
     let (mut starts, mut level) = (vec![0], local[0]);
     for index in 1..local.len() {

@@ -6,12 +6,13 @@
 
 use nalgebra::{Isometry3, Vector3};
 use rayon::prelude::*;
+use statistics::upper_median;
 
 use super::matching::Points;
 use super::registration::{Engine, Track, length};
 use super::system::System;
 use crate::error::{Error, Result};
-use crate::kernel::{RobustKernel, quantile};
+use crate::kernel::RobustKernel;
 use point_cloud::is_usable;
 use crate::parts::{ErrorMetric, KernelSchedule, MaxNormalAngle, PairRejection, Query, Trimmed, thinned};
 
@@ -82,7 +83,7 @@ fn median_distance(engine: &Engine<'_>, selected: &[usize], guess: &Isometry3<f6
         Ok(partner.found.then(|| (partner.point - query.moved).norm()))
     };
     let distances: Result<Vec<Option<f64>>> = thinned(selected, GUESS_SAMPLES).par_iter().map(distance).collect();
-    Ok(quantile(&mut distances?.into_iter().flatten().collect::<Vec<f64>>(), 0.5))
+    Ok(upper_median(&mut distances?.into_iter().flatten().collect::<Vec<f64>>()).max(0.0))
 }
 
 /// A metric, a kernel and rejections for the way down.

@@ -5,14 +5,12 @@
 
 use nalgebra::{Isometry3, Matrix6, UnitQuaternion, Vector3, Vector6};
 use rayon::prelude::*;
+use statistics::{CHI_MEDIANS, mad_scale, upper_median};
 
 use super::matching::CHUNK;
-use crate::kernel::{RobustKernel, mad_scale};
+use crate::kernel::RobustKernel;
 use crate::parts::{ErrorMetric, Pair, Row, Rows, Scene};
 use rigid_pose::move_about;
-
-/// Median of the root of the sum of squares of 1 to 4 standard normal numbers.
-const MEDIAN_CHI: [f64; 4] = [0.674_49, 1.177_41, 1.538_17, 1.832_13];
 
 /// Scale of lengths, in radii, below which they count as exact beside another channel.
 const SMALLEST_LENGTH: f64 = 1e-4;
@@ -53,8 +51,9 @@ impl<'a> System<'a> {
         system.balance = system.balance_of_channels();
         system.lengths = system.all_lengths();
         let mut whitened: Vec<f64> = pairs.iter().zip(&system.lengths).map(|(p, l)| l * p.weight.sqrt()).collect();
-        let median = mad_scale(&mut whitened) * MEDIAN_CHI[0];
-        system.scale = widening * median / MEDIAN_CHI[metric.degrees_of_freedom().clamp(1, 4) - 1];
+        // Without pairs there is no scale.
+        let median = upper_median(&mut whitened).max(0.0);
+        system.scale = widening * median / CHI_MEDIANS[metric.degrees_of_freedom().clamp(1, 4) - 1];
         system
     }
 
@@ -210,7 +209,7 @@ impl<'a> System<'a> {
                 channels[row.channel.min(1)].push(row.residual.abs() * pair.weight.sqrt());
             }
         }
-        let [length, other] = channels.map(|mut residuals| mad_scale(&mut residuals));
+        let [length, other] = channels.map(|mut residuals| mad_scale(&mut residuals).max(0.0));
         // Exact lengths must not silence the other channel.
         if other > 0.0 { length.max(SMALLEST_LENGTH * self.radius_m) / other } else { 0.0 }
     }

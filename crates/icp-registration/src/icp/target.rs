@@ -1,11 +1,11 @@
 //! The target of a registration: its tree, normals and scale, made once.
 
 use nalgebra::{Isometry3, Vector3};
+use statistics::ranked;
 
 use super::{IcpOptions, IcpResult, Registration};
 use point_cloud::Cloud;
 use crate::error::Result;
-use crate::kernel::quantile;
 use point_cloud::NeighbourTree;
 use point_cloud::{UnorganisedNormalOptions, normals_with_tree};
 use crate::parts::TargetSurface;
@@ -80,7 +80,8 @@ fn spacing(cloud: &Cloud, tree: &NeighbourTree) -> Result<f64> {
     for point in cloud.points.iter().step_by(stride) {
         distances.extend(tree.k_nearest(point, 2)?.get(1).map(|n| n.distance_m));
     }
-    Ok(quantile(&mut distances, 0.9))
+    // A single point has no spacing.
+    Ok(ranked(&mut distances, 0.9).max(0.0))
 }
 
 /// Root mean square distance from the centroid.

@@ -4,9 +4,10 @@
 //! Where none come, they are a power of the range: noise grows with it by a law that differs from camera to camera, and
 //! weights that follow another law cost precision.
 
+use statistics::upper_median;
+
 use super::patches::{Patch, Surface};
 use super::points::EDGE_ON;
-use crate::kernel::quantile;
 
 /// Median over mean of a chi-squared with about 25 degrees of freedom.
 const MEDIAN_SHARE: f64 = 0.973;
@@ -43,7 +44,7 @@ impl NoiseLaw {
     fn of_groups(mut ratios: Vec<(f64, f64)>, groups: usize) -> Self {
         ratios.sort_by(|a, b| a.0.total_cmp(&b.0));
         let medians = ratios.chunks(ratios.len().div_ceil(groups).max(1)).map(|group| {
-            let median = |of: fn(&(f64, f64)) -> f64| quantile(&mut group.iter().map(of).collect::<Vec<f64>>(), 0.5);
+            let median = |of: fn(&(f64, f64)) -> f64| upper_median(&mut group.iter().map(of).collect::<Vec<f64>>());
             (median(|r| r.0), median(|r| r.1))
         });
         Self::through(&medians.collect::<Vec<_>>())

@@ -7,13 +7,13 @@
 //! happens to resemble that of its partner.
 
 use nalgebra::{Point3, Vector3};
+use statistics::upper_median;
 
 use super::grouping::group;
 use super::plane_fit::{Moments, Plane};
 use super::regions::{Patches, Region};
 use point_cloud::Cloud;
 use crate::error::{Error, Result};
-use crate::kernel::quantile;
 use point_cloud::NeighbourTree;
 
 /// Fewest points of a patch.
@@ -201,7 +201,7 @@ fn rough(fits: &[(Moments, Plane)], origin: &Vector3<f64>) -> Result<Vec<bool>> 
     let is_rough = |(centre, (_, plane)): (&Point3<f64>, &(Moments, Plane))| {
         let near = tree.k_nearest(centre, NEIGHBOURS)?;
         let mut around: Vec<f64> = near.iter().map(|neighbour| fits[neighbour.index].1.variance).collect();
-        Ok(plane.variance > ROUGHER * quantile(&mut around, 0.5))
+        Ok(plane.variance > ROUGHER * upper_median(&mut around))
     };
     centres.iter().zip(fits).map(is_rough).collect()
 }
@@ -220,7 +220,7 @@ fn of_one_plane(cloud: &Cloud, normals: &[Vector3<f64>], mut points: Vec<u32>, r
         let mean = moments.mean();
         let distance = |i: u32| plane.normal.dot(&(cloud.points[i as usize].coords - origin - mean)).abs();
         let lean = |i: u32| plane.normal.cross(&normals[i as usize]).norm();
-        let median = |values: &mut dyn Iterator<Item = f64>| quantile(&mut values.collect::<Vec<f64>>(), 0.5);
+        let median = |values: &mut dyn Iterator<Item = f64>| upper_median(&mut values.collect::<Vec<f64>>());
         let farthest_m = GROSS * median(&mut points.iter().map(|&i| distance(i))) + roughness_m;
         let largest_lean = (LEAN * median(&mut points.iter().map(|&i| lean(i)))).max(SMALLEST_LEAN);
         let before = points.len();

@@ -6,12 +6,12 @@
 
 use nalgebra::Isometry3;
 use rayon::prelude::*;
+use statistics::upper_median;
 
 use super::patches::faces_origin;
 use point_cloud::Cloud;
 use crate::coarse::{CoarseOptions, FeatureCloud, Placed, SurfaceDescriptors, Viewpoint, agreement, with_one_voxel};
 use crate::error::{Error, Result};
-use crate::kernel::quantile;
 use rigid_pose::is_finite;
 
 /// How often what is usual in the survey a station must be contradicted to be doubted.
@@ -207,7 +207,7 @@ fn times_usual(station: usize, sound: &[bool], pairs: &[PairAgreement]) -> Optio
     let mut odds: Vec<f64> = among.map(|(agreeing, contradicting)| odds_of(agreeing, contradicting)).collect();
     let (agreeing, contradicting) = Some(sums(station, sound, None, pairs)).filter(enough)?;
     let is_judged = odds.len() + 1 >= FEWEST_STATIONS;
-    is_judged.then(|| odds_of(agreeing, contradicting) / quantile(&mut odds, 0.5).max(USUAL))
+    is_judged.then(|| odds_of(agreeing, contradicting) / upper_median(&mut odds).max(USUAL))
 }
 
 /// Contradicting for each agreeing point: of what is wrong there may be many times more than of what is right.

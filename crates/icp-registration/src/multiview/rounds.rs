@@ -2,6 +2,7 @@
 
 use nalgebra::{Isometry3, Point3};
 use rayon::prelude::*;
+use statistics::mad_scale;
 
 use super::contacts::{Contact, IN_PLACE, Reach, TURNED, partners};
 use super::network::{Network, State, largest_step};
@@ -10,7 +11,7 @@ use super::point_model::PointModel;
 use super::points::StationPoints;
 use super::reduction::{Meeting, Reduced, Scene, Weighting, reduce};
 use crate::error::{Error, Result};
-use crate::kernel::{RobustKernel, mad_scale};
+use crate::kernel::RobustKernel;
 
 /// Most rounds of a level, and the part of its limit that a step must be below for it to end.
 const ROUNDS: usize = 8;

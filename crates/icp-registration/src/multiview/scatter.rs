@@ -2,9 +2,10 @@
 //! that of the points.
 
 use nalgebra::DVector;
+use statistics::mad_scale;
 
 use super::elimination::{Eliminated, FacetSums, Variances};
-use crate::kernel::{RobustKernel, mad_scale};
+use crate::kernel::RobustKernel;
 
 /// Widening of the kernel for means of tiles: what is on the surface keeps its weight.
 const WIDE: f64 = 2.0;

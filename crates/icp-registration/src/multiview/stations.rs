@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, Isometry3, Matrix6, Vector3};
 use rayon::prelude::*;
+use statistics::upper_median;
 
 use super::alignments::Overlap;
 use super::check::{Checked, checked};
@@ -22,7 +23,7 @@ use super::rounds::{Course, Surfaces};
 use super::simultaneous::{Adjusted, Finish};
 use point_cloud::Cloud;
 use crate::error::{Error, Result};
-use crate::kernel::{RobustKernel, quantile};
+use crate::kernel::RobustKernel;
 use point_cloud::{UnorganisedNormalOptions, unorganised_normals};
 use rigid_pose::is_finite;
 
@@ -175,7 +176,7 @@ fn prepare(stations: &[Cloud], options: &StationRegistrationOptions<'_>) -> Resu
     let size_m = options.patch_m.unwrap_or_else(|| {
         let mut sizes: Vec<f64> =
             stations.par_iter().zip(&normals).map(|(cloud, normals)| patch_size::size(cloud, normals)).collect();
-        quantile(&mut sizes, 0.5)
+        upper_median(&mut sizes)
     });
     stations.par_iter().zip(&normals).map(|(cloud, normals)| Surface::new(cloud, normals, size_m)).collect()
 }

@@ -5,7 +5,7 @@
 
 use std::collections::BTreeMap;
 
-use adjust::Distribution;
+use statistics::Distribution;
 
 use super::facets::Facet;
 use super::scatter::{Scatter, TileMean};

@@ -1,6 +1,7 @@
 //! The registration of two frames, level by level.
 
 use nalgebra::{Isometry3, Matrix6, Vector6};
+use statistics::SIGMA_OF_MAD;
 
 use super::blocks::Block;
 use super::frame::OrganisedFrame;
@@ -18,8 +19,6 @@ use crate::quality::Residuals;
 
 /// Biweight with 95 % efficiency on normally distributed residuals.
 const BIWEIGHT: f32 = 4.685;
-/// Median absolute deviation to standard deviation.
-const MAD: f64 = 1.4826;
 /// Residuals from which scales are taken.
 const SAMPLE: usize = 2048;
 /// Iterations on each level but the last.
@@ -179,7 +178,7 @@ impl FrameAligner {
         let moved = moved(track, source, target);
         let median = median_residual(&moved.0, &track.rules, blocks, SAMPLE, &mut self.scratch)
             .ok_or_else(|| self.too_few(0, source.len(), track))?;
-        let scale = MAD * median * radius;
+        let scale = SIGMA_OF_MAD * median * radius;
         track.rules.extra_variance = (scale * scale) as f32;
         Ok(())
     }
@@ -231,7 +230,7 @@ impl FrameAligner {
     fn narrow(&mut self, track: &mut Track, source: &OrganisedFrame, target: &OrganisedFrame, blocks: &[Block]) {
         let (moved, _) = moved(track, source, target);
         let median = median_residual(&moved, &track.rules, blocks, SAMPLE, &mut self.scratch).unwrap_or(0.0);
-        let square = (MAD * median).powi(2) as f32;
+        let square = (SIGMA_OF_MAD * median).powi(2) as f32;
         track.rules.extra_variance *= square.clamp(0.05, 1.0);
     }
 
@@ -290,7 +289,7 @@ impl FrameAligner {
         }
         let blocks = &source.points.blocks;
         let median = median_residual(&moved, &track.rules, blocks, SAMPLE, &mut self.scratch).unwrap_or(0.0);
-        let scale = (MAD * median).max(0.1) as f32;
+        let scale = (SIGMA_OF_MAD * median).max(0.1) as f32;
         track.rules.reach = BIWEIGHT * scale;
     }
 

@@ -8,6 +8,7 @@
 //! part (quadratic and unbiased `[Rao1971]`): residuals of neighbours differ by the random part alone.
 
 use nalgebra::{Isometry3, Matrix6, Point3, SMatrix, SVector, Vector3, Vector6};
+use statistics::SIGMA_OF_MAD;
 
 use super::frame::OrganisedFrame;
 use super::map::{Partner, Partners};
@@ -29,8 +30,6 @@ pub(crate) type ByField = SMatrix<f64, 6, COEFFICIENTS>;
 
 /// Nodes by which the influence on a registration is told.
 const SAMPLE: usize = 2500;
-/// Median absolute deviation to standard deviation.
-const MAD: f64 = 1.4826;
 /// Biweight with 95 % efficiency on normally distributed residuals.
 const BIWEIGHT: f64 = 4.685;
 /// Standard deviations by which squares must exceed what noise lets expect (of one degree of freedom: 4 % by chance).
@@ -298,7 +297,7 @@ fn legendre(x: f64) -> [f64; DEGREE + 1] {
 fn scale(values: impl Iterator<Item = f64>, scratch: &mut Vec<u32>) -> Option<f64> {
     scratch.clear();
     scratch.extend(values.map(|v| positive_bits(v.abs() as f32)));
-    median_of_bits(scratch).map(|median| MAD * f64::from(median))
+    median_of_bits(scratch).map(|median| SIGMA_OF_MAD * f64::from(median))
 }
 
 fn reduced(sightings: &[Sighting], to_tangent: &Matrix6<f64>, scratch: &mut Vec<u32>) -> Option<Influence> {

@@ -2,12 +2,13 @@
 
 use nalgebra::{Isometry3, Matrix6, Vector3, Vector6};
 use rayon::prelude::*;
+use statistics::mad_scale;
 
 use super::lattice::Lattice;
 use super::level::{CHUNK, Level};
 use rigid_pose::eigen6;
 use crate::error::Result;
-use crate::kernel::{RobustKernel, mad_scale};
+use crate::kernel::RobustKernel;
 use rigid_pose::symmetrised;
 use crate::quality::{Cells, Centred};
 
@@ -126,7 +127,7 @@ impl<'a> System<'a> {
         let n = count.max(1) as f64;
         let radius_m = (square / n - (sum / n).norm_squared()).max(0.0).sqrt().max(f64::MIN_POSITIVE.sqrt());
         let frame = Centred { centre: start + sum / n, radius_m };
-        Self { pairs, frame, count, kernel, scale: mad_scale(scratch) }
+        Self { pairs, frame, count, kernel, scale: mad_scale(scratch).max(0.0) }
     }
 
     /// Weight of a pair and the slope of its influence, both over its variance.

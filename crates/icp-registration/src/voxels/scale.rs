@@ -5,11 +5,11 @@
 //! near it: the typical point counts, not the typical voxel.
 
 use nalgebra::Point3;
+use statistics::upper_median;
 
 use super::gather::{Sum, gather};
 use super::lattice::{Bounds, Lattice};
 use crate::error::Result;
-use crate::kernel::quantile;
 
 /// Points looked at.
 const SAMPLE: usize = 16_384;
@@ -68,9 +68,9 @@ fn typical(counts: &[f64]) -> f64 {
 
 /// Median distance from the median position.
 fn radius(sample: &[Point3<f64>]) -> f64 {
-    let middle = [0, 1, 2].map(|k| quantile(&mut sample.iter().map(|p| p[k]).collect::<Vec<_>>(), 0.5));
+    let middle = [0, 1, 2].map(|k| upper_median(&mut sample.iter().map(|p| p[k]).collect::<Vec<_>>()));
     let middle = Point3::from(middle);
-    quantile(&mut sample.iter().map(|p| (p - middle).norm()).collect::<Vec<_>>(), 0.5)
+    upper_median(&mut sample.iter().map(|p| (p - middle).norm()).collect::<Vec<_>>())
 }
 
 #[derive(Debug, Default, Clone)]

@@ -1,7 +1,8 @@
 //! What becomes of mixed pixels: dropped, flagged, or split into the two surfaces that they see.
 
-use range_image::{ComplexFrame, Flags, Modulation, RangeFrame, Raster, chi_squared_upper_quantile};
+use range_image::{ComplexFrame, Flags, Modulation, RangeFrame, Raster};
 use rayon::prelude::*;
+use statistics::chi_squared_limit;
 
 use crate::error::{require_not_negative, require_positive, require_probability};
 use crate::mixture::split::{split_complex, split_range};
@@ -204,7 +205,7 @@ fn split(
         complex,
         wavenumber: modulation.map_or(0.0, |modulation| modulation.phase_from_range(1.0)),
         least_share_sigmas,
-        thresholds: std::array::from_fn(|freedom| chi_squared_upper_quantile(freedom as f64, false_alarm)),
+        thresholds: std::array::from_fn(|freedom| chi_squared_limit(freedom as f64, false_alarm)),
     };
     let width = frame.width().max(1);
     let rows = mixed.as_slice().par_chunks(width).enumerate();

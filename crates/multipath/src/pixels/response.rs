@@ -1,6 +1,7 @@
 //! What the camera does to the amplitude of one path at each frequency.
 
 use range_image::{ComplexFrame, Flags};
+use statistics::{mad_scale, upper_median};
 
 use crate::error::require_positive;
 use crate::{Error, Result};
@@ -37,7 +38,7 @@ impl FrequencyResponse {
 pub struct ResponseEstimate {
     /// The factors; that of the first frequency is 1.
     pub response: FrequencyResponse,
-    /// Relative scatter of the pixels' own factors about each one (1.4826 times the median absolute deviation):
+    /// Relative scatter of the pixels' own factors about each one (from their median absolute deviation):
     /// noise, multipath, and what differs from pixel to pixel.
     pub spread: Vec<f64>,
     /// Pixels that took part.
@@ -65,12 +66,12 @@ pub fn estimate_response(frame: &ComplexFrame, least_snr: f64) -> Result<Respons
     let (mut contrast, mut spread) = (Vec::new(), Vec::new());
     for frequency in 0..frequencies {
         let mut ratios: Vec<f64> = usable.chunks_exact(frequencies).map(|pixel| pixel[frequency] / pixel[0]).collect();
-        let middle = median(&mut ratios);
+        let middle = upper_median(&mut ratios);
         for ratio in &mut ratios {
             *ratio = (*ratio / middle - 1.0).abs();
         }
         contrast.push(middle);
-        spread.push(1.4826 * median(&mut ratios));
+        spread.push(mad_scale(&mut ratios));
     }
     Ok(ResponseEstimate { response: FrequencyResponse { contrast }, spread, pixels })
 }
@@ -92,10 +93,4 @@ fn usable_amplitudes(frame: &ComplexFrame, least_snr: f64) -> Vec<f64> {
         }
     }
     usable
-}
-
-/// Median of values that are there; the upper one of two.
-fn median(values: &mut [f64]) -> f64 {
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }

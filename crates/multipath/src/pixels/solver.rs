@@ -1,6 +1,6 @@
 //! The paths of one pixel and the verdict on them.
 
-use range_image::chi_squared_upper_quantile;
+use statistics::chi_squared_limit;
 
 use crate::TwoPathOptions;
 use crate::pixels::model::{Parameters, Prior};
@@ -41,7 +41,7 @@ impl Worker {
 
 impl PixelSolver {
     pub fn new(grid: Grid, options: &TwoPathOptions) -> Self {
-        let thresholds = std::array::from_fn(|freedom| chi_squared_upper_quantile(freedom as f64, options.false_alarm));
+        let thresholds = std::array::from_fn(|freedom| chi_squared_limit(freedom as f64, options.false_alarm));
         Self { grid, options: *options, thresholds }
     }
 

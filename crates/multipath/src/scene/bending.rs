@@ -7,7 +7,8 @@
 //! disagree, so that pictures on walls, textures and errors of calibration, which bend walls otherwise, weaken the verdict
 //! instead of making it.
 
-use range_image::{Raster, chi_squared_upper_quantile};
+use range_image::Raster;
+use statistics::chi_squared_limit;
 
 use crate::numbers::cholesky::Cholesky;
 use crate::numbers::vector::{Vec3, dot, sub};
@@ -44,7 +45,7 @@ impl Bending {
     /// Whether walls that light did not bend would look so with less than this probability.
     pub fn is_significant(&self, false_alarm: f64) -> bool {
         // The upper tail of a normal deviate is half that of its square.
-        self.deviate > 0.0 && self.deviate.powi(2) > chi_squared_upper_quantile(1.0, (2.0 * false_alarm).min(1.0))
+        self.deviate > 0.0 && self.deviate.powi(2) > chi_squared_limit(1.0, (2.0 * false_alarm).min(1.0))
     }
 
     /// The part of a predicted error that is there at least, nineteen times of twenty; nothing where the walls are not bent.

@@ -1,7 +1,8 @@
 //! Multipath by the contradiction between frequencies.
 
-use range_image::{ComplexChannel, ComplexFrame, Flags, Modulation, Raster, chi_squared_upper_quantile};
+use range_image::{ComplexChannel, ComplexFrame, Flags, Modulation, Raster};
 use rayon::prelude::*;
+use statistics::chi_squared_limit;
 
 use crate::error::{require_not_negative, require_probability};
 use crate::pixels::pixel::{MAXIMUM_FREQUENCIES, System, USELESS};
@@ -86,7 +87,7 @@ impl Detector {
         Ok(Self {
             system,
             evidence: options.evidence,
-            thresholds: std::array::from_fn(|freedom| chi_squared_upper_quantile(freedom as f64, options.false_alarm)),
+            thresholds: std::array::from_fn(|freedom| chi_squared_limit(freedom as f64, options.false_alarm)),
             polar: vec![Default::default(); frequencies.len()],
             frequencies,
         })

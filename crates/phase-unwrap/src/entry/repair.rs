@@ -202,8 +202,7 @@ fn doubt_glare(phase: &Raster<f32>, amplitude: &Raster<f32>, minimum_confidence:
     if near.len() < GLARE_PIXELS {
         return;
     }
-    let middle = near.len() / 2;
-    let limit = GLARE * *near.select_nth_unstable_by(middle, f32::total_cmp).1;
+    let limit = GLARE * statistics::upper_median(&mut near);
     let glaring: Vec<bool> = (0..phase.len()).map(|i| found.wraps.as_slice()[i] > 0 && brightness(i) > limit).collect();
     for (confidence, glaring) in found.confidence.as_mut_slice().iter_mut().zip(glaring) {
         if glaring {

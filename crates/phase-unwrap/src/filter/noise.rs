@@ -106,8 +106,7 @@ pub(crate) fn estimate(
             }
         }
     }
-    let middle = found.len() / 2;
-    (!found.is_empty()).then(|| *found.select_nth_unstable_by(middle, f32::total_cmp).1)
+    (!found.is_empty()).then(|| statistics::upper_median(found))
 }
 
 /// Squared length of the expected product of neighbours, free of the bias that the noise of the sum gives to its

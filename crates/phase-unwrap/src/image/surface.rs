@@ -3,6 +3,7 @@
 #![allow(clippy::inline_always)]
 
 use range_image::with_wide_registers;
+use statistics::{CHI_MEDIANS, upper_median};
 
 use crate::frequencies::logarithm::logarithm;
 use crate::image::cuts::gentler;
@@ -70,7 +71,7 @@ impl Surface {
 
     /// Noise of each part of the complex image: the median of |second difference| * amplitude over the rows.
     ///
-    /// Jumps and creases are few, so the median is that of the noise; 0.6745 sqrt(6) is its value at unit variance.
+    /// Jumps and creases are few, so the median is that of the noise; at unit variance it is √6 times that of a normal modulus.
     fn estimate_noise(&mut self, grid: &Grid, amplitude: &[f32]) -> f32 {
         const SAMPLES: usize = 4096;
         let inner = grid.inner();
@@ -86,9 +87,7 @@ impl Surface {
         if self.sample.is_empty() {
             return 0.0;
         }
-        let middle = self.sample.len() / 2;
-        let (_, median, _) = self.sample.select_nth_unstable_by(middle, f32::total_cmp);
-        *median / (0.6745 * 6.0_f32.sqrt())
+        upper_median(&mut self.sample) / (CHI_MEDIANS[0] as f32 * 6.0_f32.sqrt())
     }
 
     /// The step from `pixel` to its neighbour `other`, both inside the image, along the axis of index step `ahead`.

@@ -6,10 +6,10 @@ use self_calibration::{
     DifferenceOptions, OffsetSample, OffsetTable, OffsetTableOptions, Result, estimate_offset_table,
 };
 use serde::Serialize;
+use statistics::retain_within;
 
 use super::placed::Placed;
 use super::start::Start;
-use crate::statistics::retain_within;
 
 /// Residuals beyond so many robust standard deviations belong to something else than the plane.
 const GROSS: f64 = 4.0;

@@ -1,7 +1,8 @@
 //! Whether residuals of a capture are what a wrong pose, or a wrong plane, leaves.
 
 use nalgebra::{Matrix3, Vector3};
-use self_calibration::{Distribution, ObservationQuality, Verdict};
+use self_calibration::{ObservationQuality, Verdict};
+use statistics::{Distribution, bonferroni};
 
 use super::placed::Placed;
 use super::planes_outcome::Found;
@@ -16,7 +17,7 @@ const SEEN: f64 = 3.0;
 pub(super) fn doubts(placed: &[Placed<'_>], found: &Found, start: &Start) -> Vec<String> {
     let held = |placed: &&Placed<'_>| placed.capture.world_from_camera.is_some() && placed.capture.covariance.is_none();
     let held: Vec<&Placed<'_>> = placed.iter().filter(held).collect();
-    let level = LEVEL / held.len().max(1) as f64;
+    let level = bonferroni(LEVEL, held.len());
     let limit = Distribution::ChiSquared { dof: SEEN }.upper_quantile(level);
     // Where all scatters more than stated, that is told as such.
     let scale = found.sigma0().map_or(1.0, |sigma0| sigma0.max(1.0));

@@ -7,11 +7,11 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use range_io::clouds::read_any_cloud;
 use rayon::prelude::*;
 use serde::Serialize;
+use statistics::quantile;
 
 use super::signed::Surface;
 use super::{CompareAlignment, CompareRequest};
 use crate::progress::Progress;
-use crate::statistics::quantile;
 use crate::verdict::{Doubt, DoubtKind};
 use crate::{Error, Result};
 

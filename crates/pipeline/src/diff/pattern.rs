@@ -1,8 +1,8 @@
 //! Look-up tables of offsets, pixel by pixel.
 
 use range_io::calibration::Calibration;
-use self_calibration::Distribution;
 use serde::Serialize;
+use statistics::Distribution;
 
 /// The tables of offsets in both files.
 #[derive(Debug, Clone, Serialize)]

@@ -2,7 +2,7 @@
 
 use error_models::OutsideModel;
 use range_image::Flags;
-use self_calibration::Distribution;
+use statistics::Distribution;
 
 use super::{FlagReason, PixelState};
 use crate::plan::{FlagOptions, Stage};

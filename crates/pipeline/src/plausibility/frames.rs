@@ -3,9 +3,9 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use range_image::Samples;
+use statistics::{quantile, upper_median};
 
 use super::{FURTHEST_M, NEAREST_M, some_of};
-use crate::statistics::median;
 use crate::verdict::{Doubt, DoubtKind};
 use crate::view::{View, ViewData};
 
@@ -62,7 +62,7 @@ impl FrameWatch {
         }
         if let (ViewData::Range(_), Some(plane)) = (&view.data, planes.first()) {
             let mut values: Vec<f64> = plane.iter().map(|value| f64::from(*value)).collect();
-            self.ranges_m.push(median(&mut values));
+            self.ranges_m.push(quantile(&mut values, 0.5));
         }
     }
 
@@ -70,7 +70,7 @@ impl FrameWatch {
     pub(crate) fn doubts(&self) -> Vec<Doubt> {
         let mut doubts = self.dead_stations();
         doubts.extend(self.repeated_stations());
-        let middle = median(&mut self.ranges_m.clone());
+        let middle = quantile(&mut self.ranges_m.clone(), 0.5);
         if !middle.is_nan() && !(NEAREST_M..=FURTHEST_M).contains(&middle) {
             let (value, unit) = if middle < 1.0 { (1e3 * middle, "mm") } else { (middle, "m") };
             let words = format!(
@@ -173,8 +173,7 @@ fn dead_value(plane: &[f32]) -> Option<f32> {
         return None;
     }
     // What nearly all have is what the one in the middle has.
-    let middle = finite.len() / 2;
-    let (_, &mut value, _) = finite.select_nth_unstable_by(middle, f32::total_cmp);
+    let value = upper_median(&mut finite);
     let same = finite.iter().filter(|other| other.to_bits() == value.to_bits()).count();
     (same as f64 >= DEAD_SHARE * finite.len() as f64).then_some(value)
 }

@@ -2,10 +2,10 @@
 
 use range_image::Flags;
 use range_io::tables::Station;
+use statistics::quantile;
 
 use super::{PlacedStation, displaced, uncertain};
 use crate::outcome::{Outcome, usable};
-use crate::statistics::quantile;
 use crate::verdict::{Doubt, DoubtKind};
 use crate::view::{View, ViewData};
 

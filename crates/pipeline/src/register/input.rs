@@ -9,6 +9,7 @@ use nalgebra::{Isometry3, Vector3};
 use range_io::calibration::Calibration;
 use range_io::clouds::{CloudFile, read_any_cloud};
 use range_io::survey::{Level, Survey};
+use statistics::quantile;
 
 use super::RegisterRequest;
 use crate::load::{read_calibration, root_of};
@@ -21,7 +22,6 @@ use crate::plausibility::{self, PlacedStation};
 use crate::progress::Progress;
 use crate::run::process;
 use crate::stages::corrects_ranges;
-use crate::statistics::{median, quantile};
 use crate::verdict::Doubt;
 use crate::{Error, Plan, Result, Stage};
 
@@ -229,7 +229,7 @@ impl Station {
     fn distance_m(&self) -> f64 {
         let points = self.usable_points();
         let mut distances: Vec<f64> = points.iter().map(|[x, y, z]| x.hypot(*y).hypot(*z)).collect();
-        median(&mut distances)
+        quantile(&mut distances, 0.5)
     }
 
     /// The station with the pose that was found.

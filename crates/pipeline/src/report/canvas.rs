@@ -2,9 +2,10 @@
 
 use std::fmt::Write;
 
+use statistics::quantile;
+
 use super::colour::hex;
 use super::picture::{escape, open_svg};
-use crate::statistics::quantile;
 
 /// What stands around a chart.
 pub(crate) struct Axes<'a> {

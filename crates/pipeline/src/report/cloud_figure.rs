@@ -2,11 +2,12 @@
 
 use std::fmt::Write;
 
+use statistics::quantile;
+
 use super::canvas::ticks;
 use super::colour::{CATEGORIES, hex};
 use super::picture::{data_uri, open_svg};
 use crate::Result;
-use crate::statistics::quantile;
 
 /// Points of one station in the common frame.
 pub(crate) struct StationCloud<'a> {

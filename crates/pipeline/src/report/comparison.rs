@@ -1,5 +1,7 @@
 //! The report of a comparison.
 
+use statistics::quantile;
+
 use super::canvas::{Axes, Canvas, span};
 use super::chart::{SIZE, Series, curves, to_scale};
 use super::colour::{CATEGORIES, ColourMap};
@@ -11,7 +13,6 @@ use crate::compare::{
     CloudComparison, Comparison, ComparisonPictures, Deviations, PlaneDistances, PoseComparison, TrackCurves,
     TrajectoryComparison, TrajectoryStatistics, millimetres_of as mm,
 };
-use crate::statistics::quantile;
 use crate::verdict::Judged;
 
 /// Points of the curve of shares.

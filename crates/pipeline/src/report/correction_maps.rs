@@ -1,8 +1,9 @@
 //! Pictures of what each group of range terms did to a view.
 
+use statistics::quantile;
+
 use super::colour::ColourMap;
 use super::picture::{Scale, raster_figure};
-use crate::statistics::quantile;
 use crate::view::View;
 use crate::{Error, Result};
 

@@ -3,11 +3,11 @@
 use std::fmt::Write;
 
 use nalgebra::Point3;
+use statistics::quantile;
 
 use super::canvas::ticks;
 use super::picture::{Scale, colour_bar, data_uri, escape, open_svg};
 use crate::Result;
-use crate::statistics::quantile;
 
 /// Which way one looks: axes that go right, up, and towards the viewer, with the sign of the last.
 #[derive(Debug, Clone, Copy)]

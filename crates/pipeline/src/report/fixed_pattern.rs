@@ -2,6 +2,7 @@
 
 use error_models::FixedPattern;
 use sensor_noise::PatternEstimate;
+use statistics::quantile;
 
 use super::chart::{Axes, Series, histogram};
 use super::colour::{CATEGORIES, ColourMap};
@@ -9,7 +10,6 @@ use super::page::Page;
 use super::picture::{Scale, raster_figure};
 use crate::Result;
 use crate::fixed_pattern::FixedPatternSummary;
-use crate::statistics::quantile;
 use crate::summary::millimetres;
 
 /// The whole page.

@@ -1,6 +1,7 @@
 //! What is left between the surfaces after a registration.
 
 use nalgebra::Point3;
+use statistics::{quantile, robust_standard_deviation};
 
 use super::chart::{Axes, Series, histogram};
 use super::colour::{CATEGORIES, ColourMap};
@@ -9,7 +10,6 @@ use super::page::Page;
 use super::picture::{Scale, raster_figure};
 use crate::Result;
 use crate::register::Registered;
-use crate::statistics::{quantile, robust_standard_deviation};
 
 /// Stations whose pictures are shown; further ones would make the page heavy without telling more.
 const PICTURED_STATIONS: usize = 8;

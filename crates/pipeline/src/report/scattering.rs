@@ -1,12 +1,13 @@
 //! The report of an estimation of scattering.
 
+use statistics::quantile;
+
 use super::chart::{Axes, Series, curves};
 use super::colour::{CATEGORIES, ColourMap};
 use super::page::Page;
 use super::picture::{Scale, raster_figure};
 use crate::Result;
 use crate::scattering::{ScatteringSummary, Shift};
-use crate::statistics::quantile;
 use crate::summary::millimetres;
 
 /// Stations whose pictures are shown.

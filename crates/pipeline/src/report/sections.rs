@@ -1,6 +1,7 @@
 //! The sections of the report, from the figures of merit to the flags.
 
 use range_image::Flags;
+use statistics::quantile;
 
 use super::chart::{Axes, Series, curves, histogram};
 use super::cloud_figure::{Direction, StationCloud, cloud_figure};
@@ -11,7 +12,6 @@ use super::picture::{Scale, raster_figure, rgb_figure};
 use super::trends::remaining_errors;
 use crate::Result;
 use crate::outcome::Outcome;
-use crate::statistics::quantile;
 use crate::summary::{Summary, millimetres};
 use crate::truth::range_errors;
 use crate::view::{Snapshot, View, ViewData};

@@ -5,9 +5,9 @@ use std::path::PathBuf;
 
 use scattering_deconvolution::{PsfEstimate, Verdict};
 use serde::Serialize;
+use statistics::quantile;
 
 use super::{Captures, ScatteringRequest, Shift};
-use crate::statistics::quantile;
 use crate::summary::millimetres;
 
 /// A point spread function and how well it is known.

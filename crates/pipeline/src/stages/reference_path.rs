@@ -3,9 +3,9 @@
 use error_models::{FixedPattern, InterpolatedModel};
 use range_image::{Flags, ImageFormat, Modulation, RangeFrame};
 use range_io::survey::ReferencePath;
+use statistics::{quantile, robust_standard_deviation};
 
 use crate::drift::{DriftError, DriftSource, ViewDrift};
-use crate::statistics::{median, robust_standard_deviation};
 
 /// Where the pixels of a camera are, and their own offsets.
 pub(super) struct Sensor<'a> {
@@ -90,7 +90,7 @@ fn differences(
 fn robust_mean(mut values: Vec<f64>, pixels: usize) -> Result<(f64, f64), DriftError> {
     values.retain(|value| value.is_finite());
     let limit = OUTLIER_SIGMAS * robust_standard_deviation(&values) + ROUNDING_M;
-    let centre = median(&mut values.clone());
+    let centre = quantile(&mut values.clone(), 0.5);
     values.retain(|value| (value - centre).abs() <= limit);
     let usable = values.len();
     if usable < FEWEST_PIXELS {

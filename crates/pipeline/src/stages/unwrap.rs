@@ -4,11 +4,11 @@ use phase_unwrap::{
     unwrap_multi_frequency, unwrap_noisy_absolute, unwrap_spatial,
 };
 use range_image::{ComplexChannel, ComplexFrame, Flags, RangeFrame, Raster};
+use statistics::quantile;
 
 use super::Findings;
 use crate::plan::{UnwrapMethod, UnwrapOptions};
 use crate::progress::Progress;
-use crate::statistics::median;
 use crate::view::{View, ViewData};
 use crate::work::Work;
 use crate::{Error, Result};
@@ -64,7 +64,7 @@ fn wrap_counts(
         let interval = channel.modulation.ambiguity_interval_m();
         let maximum_wraps = (options.maximum_range_m.unwrap_or(FURTHEST_M) / interval).floor().max(0.0) as u16;
         let mut sigmas: Vec<f64> = channel.sigma.as_slice().iter().map(|sigma| f64::from(*sigma)).collect();
-        let noise = Some(median(&mut sigmas) as f32).filter(|noise| noise.is_finite());
+        let noise = Some(quantile(&mut sigmas, 0.5) as f32).filter(|noise| noise.is_finite());
         let spatial = SpatialOptions {
             maximum_wraps,
             amplitude_noise: noise,

@@ -5,6 +5,7 @@ use std::time::Instant;
 
 use icp_registration::{Cloud, TrackedPose, Tracker, TrackerOptions, TrackingState};
 use range_io::atomic::Destination;
+use statistics::quantile;
 
 use super::frames::FrameSource;
 use super::imu::Inertial;
@@ -17,7 +18,6 @@ use crate::load::root_of;
 use crate::plausibility;
 use crate::progress::Progress;
 use crate::register::input::is_survey;
-use crate::statistics::quantile;
 use crate::verdict::Doubt;
 use crate::{Error, Result};
 

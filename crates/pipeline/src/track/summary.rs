@@ -5,9 +5,9 @@ use std::fmt;
 use icp_registration::{TrackedPose, Tracker, TrajectoryAlignment, TrajectoryErrorOptions, absolute_trajectory_error};
 use nalgebra::Isometry3;
 use serde::Serialize;
+use statistics::quantile;
 
 use super::outcome::{TrackLoss, TrackTruth, TrackVerdict, TrackedFrame};
-use crate::statistics::{median, quantile};
 use crate::summary::millimetres;
 use crate::verdict::{Doubt, DoubtKind, Judged, Verdict};
 
@@ -110,13 +110,13 @@ pub(super) fn summarise(
         duration_s: online.last().map_or(0.0, |last| last.timestamp_s - online[0].timestamp_s),
         path_length_m: path.windows(2).map(|pair| (pair[1] - pair[0]).norm()).sum(),
         start_to_end_m: path.first().zip(path.last()).map_or(0.0, |(first, last)| (last - first).norm()),
-        position_sigma_median_m: median(&mut sigmas),
+        position_sigma_median_m: quantile(&mut sigmas, 0.5),
         position_sigma_max_m: quantile(&mut sigmas, 1.0),
         shared_error_sigma: tracker.shared_error().sigma(),
         shared_error_registrations: tracker.shared_error().registrations(),
-        track_median_ms: median(&mut tracking),
+        track_median_ms: quantile(&mut tracking, 0.5),
         track_p95_ms: quantile(&mut tracking, 0.95),
-        total_median_ms: median(&mut total),
+        total_median_ms: quantile(&mut total, 0.5),
         total_p95_ms: quantile(&mut total, 0.95),
         truth: truth([online, adjusted], truths),
         losses,

@@ -6,10 +6,10 @@ use range_image::{Flags, RangeFrame};
 use rayon::prelude::*;
 use residual_tests::{TrendOptions, TrendSample, test_trends};
 use self_calibration::DifferenceOptions;
+use statistics::retain_within;
 
 use super::{RemainingErrors, TrendSummary, sentence};
 use crate::outcome::Outcome;
-use crate::statistics::retain_within;
 use crate::truth::range_errors;
 use crate::view::{View, ViewData};
 

@@ -1,9 +1,11 @@
 //! Frames of one scene with different integration times become one (Sect. 4.6).
 
 use rayon::prelude::*;
+use statistics::{chi_squared_limit, upper_median};
 
 use crate::averaging::fusion_bias::Bias;
-use crate::{Error, Flags, RangeFrame, Raster, Result, chi_squared_upper_quantile};
+
+use crate::{Error, Flags, RangeFrame, Raster, Result};
 
 /// Pixels that two exposures must share for the ratio of their amplitudes to be taken from them.
 const FEWEST_SHARED: usize = 16;
@@ -148,7 +150,7 @@ fn validated<'a>(exposures: &[Exposure<'a>]) -> Result<&'a RangeFrame> {
 
 /// Quantiles of χ² for one degree of freedom less than there are ranges.
 fn limits(most: usize, options: &FusionOptions) -> Vec<f64> {
-    let limit = |count| chi_squared_upper_quantile(count as f64 - 1.0, options.false_alarm_probability);
+    let limit = |count| chi_squared_limit(count as f64 - 1.0, options.false_alarm_probability);
     (0..=most).map(limit).collect()
 }
 
@@ -181,8 +183,7 @@ fn ratio_of_amplitudes(shorter: &RangeFrame, longer: &RangeFrame) -> Option<f64>
     pairs.select_nth_unstable_by(middle, |a, b| a.1.total_cmp(&b.1));
     let mut ratios: Vec<f64> =
         pairs[middle..].iter().map(|(short, long)| f64::from(*short) / f64::from(*long)).collect();
-    let middle = ratios.len() / 2;
-    Some(*ratios.select_nth_unstable_by(middle, f64::total_cmp).1)
+    Some(upper_median(&mut ratios))
 }
 
 /// What one pixel becomes.

@@ -1,11 +1,13 @@
 //! Whether repeated frames show a scene and a camera at rest, before they are averaged.
 
 use rayon::prelude::*;
+use statistics::{bonferroni, chi_squared_limit};
 
 use crate::averaging::average::require_alike;
 use crate::averaging::mean_flags::MeanFlags;
 use crate::averaging::rest_pixel::PixelTest;
-use crate::{ComplexFrame, Error, Flags, RangeFrame, Raster, Result, chi_squared_upper_quantile};
+
+use crate::{ComplexFrame, Error, Flags, RangeFrame, Raster, Result};
 
 /// Pixels that one task takes; its sums are added in the order of the pixels.
 const PIXELS_PER_TASK: usize = 4096;
@@ -304,11 +306,11 @@ impl Limits {
         }
         let limits = if values < 3 {
             // Two values deviate from their mean alike.
-            [chi_squared_upper_quantile(degrees as f64, self.probability), f64::INFINITY]
+            [chi_squared_limit(degrees as f64, self.probability), f64::INFINITY]
         } else {
             let (half, count) = (self.probability / 2.0, values as f64);
-            let largest = chi_squared_upper_quantile(degrees as f64 / (count - 1.0), half / count);
-            [chi_squared_upper_quantile(degrees as f64, half), largest.max(LEAST_BIAS * LEAST_BIAS * count)]
+            let largest = chi_squared_limit(degrees as f64 / (count - 1.0), bonferroni(half, values));
+            [chi_squared_limit(degrees as f64, half), largest.max(LEAST_BIAS * LEAST_BIAS * count)]
         };
         self.known.push(([degrees, values], limits));
         limits

@@ -1,10 +1,12 @@
 //! Light of another camera in the same band: a beat that all lit pixels share, in repeated frames of a scene at rest.
 
 use rayon::prelude::*;
+use statistics::chi_squared_limit;
 
 use crate::averaging::average::require_alike;
 use crate::sample_checks::beat::{Beat, Deviation};
-use crate::{ComplexChannel, ComplexFrame, Error, Flags, Raster, Result, chi_squared_upper_quantile};
+
+use crate::{ComplexChannel, ComplexFrame, Error, Flags, Raster, Result};
 
 /// Fewer frames leave nothing beside the beat that could tell it from motion.
 const FEWEST_FRAMES: usize = 3;
@@ -132,7 +134,7 @@ impl Interference {
     fn add(&mut self, channels: &[&ComplexChannel], options: &InterferenceOptions) {
         let Some(beat) = Beat::of(channels) else { return };
         let beside = 2.0 * (channels.len() as f64 - 2.0);
-        let limits = [2.0, beside].map(|freedom| chi_squared_upper_quantile(freedom, options.false_alarm_probability));
+        let limits = [2.0, beside].map(|freedom| chi_squared_limit(freedom, options.false_alarm_probability));
         let pixels: Vec<Option<Tested>> = (0..self.disturbed.as_slice().len())
             .into_par_iter()
             .map_init(Deviation::default, |deviation, pixel| {

@@ -2,7 +2,8 @@
 
 use std::f64::consts::TAU;
 
-use crate::chi_squared::chi_squared_upper_quantile;
+use statistics::chi_squared_limit;
+
 use crate::demodulation::weights::GROUP;
 use crate::{ConsistencyOptions, NoiseModel, OffsetRule};
 
@@ -106,7 +107,7 @@ fn limit(degrees: f64, pairs: usize, probability: f64) -> [f32; 3] {
         let coupled = square * pairs as f64 / 2.0;
         let (second, third) = (degrees + coupled, degrees + 3.0 * coupled);
         let equivalent = second.powi(3) / third.powi(2);
-        degrees + third / second * (chi_squared_upper_quantile(equivalent, probability) - equivalent)
+        degrees + third / second * (chi_squared_limit(equivalent, probability) - equivalent)
     };
     let [none, half, full] = [0.0, 0.5, 1.0].map(at);
     [none as f32, (4.0 * half - full - 3.0 * none) as f32, (2.0 * (full + none) - 4.0 * half) as f32]

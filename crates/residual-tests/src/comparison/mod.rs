@@ -10,8 +10,8 @@ pub use drift::{DriftComparison, DriftDifference, DriftSide, compare_drifts};
 pub use image::{ImageComparison, ImageSide, compare_images};
 pub use parameters::{JointTest, ParameterComparison, ParameterDifference, ParameterSet, compare_parameters};
 
-use adjust::Distribution;
 use nalgebra::DMatrix;
+use statistics::Distribution;
 
 use crate::{Error, Result};
 

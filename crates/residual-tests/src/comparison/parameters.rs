@@ -1,7 +1,7 @@
 //! Two sets of parameters, each with its covariance.
 
-use adjust::Distribution;
 use nalgebra::{DMatrix, DVector};
+use statistics::{Distribution, holm};
 
 use super::{require_covariance, require_level};
 use crate::{Error, Result};
@@ -127,15 +127,12 @@ fn difference(first: &ParameterSet, i: usize, second: &ParameterSet, j: usize) -
     }
 }
 
-/// Holm's probabilities: the k-th smallest of m times m + 1 - k, none smaller than the one before.
+/// Parameters that are held have no probability; their verdict stands.
 fn mind_multiplicity(differences: &mut [ParameterDifference], level: f64) {
-    let mut order: Vec<usize> = (0..differences.len()).filter(|&k| differences[k].p_value.is_finite()).collect();
-    order.sort_by(|a, b| differences[*a].p_value.total_cmp(&differences[*b].p_value));
-    let (count, mut largest) = (order.len(), 0.0_f64);
-    for (rank, index) in order.into_iter().enumerate() {
-        largest = largest.max(differences[index].p_value * (count - rank) as f64).min(1.0);
-        differences[index].p_value_of_all = largest;
-        differences[index].significant = largest < level;
+    let of_all = holm(&differences.iter().map(|difference| difference.p_value).collect::<Vec<f64>>());
+    for (difference, p_value) in differences.iter_mut().zip(of_all).filter(|(_, p_value)| p_value.is_finite()) {
+        difference.p_value_of_all = p_value;
+        difference.significant = p_value < level;
     }
 }
 

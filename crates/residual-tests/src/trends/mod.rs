@@ -175,15 +175,11 @@ pub fn test_trends(samples: &[TrendSample], options: &TrendOptions) -> Result<Tr
     check(samples, options)?;
     let mut tests: Vec<TrendTest> =
         TrendVariable::ALL.into_iter().map(|variable| test_variable(samples, variable, options)).collect();
-    // Holm: the smallest p-value against level / m, the next against level / (m - 1), until one fails.
-    let mut order: Vec<usize> = (0..tests.len()).filter(|&index| tests[index].p_value.is_finite()).collect();
-    order.sort_by(|a, b| tests[*a].p_value.total_cmp(&tests[*b].p_value));
-    let count = order.len();
-    for (rank, index) in order.into_iter().enumerate() {
-        if tests[index].p_value > options.level / (count - rank) as f64 {
-            break;
+    let of_all = statistics::holm(&tests.iter().map(|test| test.p_value).collect::<Vec<f64>>());
+    for (test, p_value) in tests.iter_mut().zip(of_all) {
+        if p_value <= options.level {
+            test.verdict = TrendVerdict::Trend;
         }
-        tests[index].verdict = TrendVerdict::Trend;
     }
     Ok(TrendReport { tests, level: options.level })
 }

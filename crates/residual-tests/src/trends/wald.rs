@@ -1,7 +1,7 @@
 //! Means in bins of one variable against the covariance that independent cells show.
 
-use adjust::Distribution;
 use nalgebra::{DMatrix, DVector};
+use statistics::Distribution;
 
 use super::cells::Cells;
 use super::{TrendBin, TrendSample};

@@ -2,6 +2,7 @@
 
 use nalgebra::DMatrix;
 use range_image::Raster;
+use statistics::{CHI_MEDIANS, upper_median};
 
 use super::result::{Ambiguity, CaptureReport, Estimated, NuisanceValues, PsfEstimate, PsfParameter, Verdict};
 use super::search::fit::{Agreement, Fit, Problem, StartTerm, Unknown};
@@ -9,7 +10,6 @@ use super::search::observation::SMALLEST_SIGMA;
 use super::search::response::Term;
 use super::search::scene::{Blind, Scene};
 use super::search::selection::Choice;
-use super::views::noise::{NORMAL_MEDIAN, median};
 use super::{EstimationOptions, Nuisance, TermShape};
 use crate::{GaussianTerm, Psf};
 
@@ -221,9 +221,7 @@ pub(super) fn reject(problem: &Problem<'_>, fit: &Fit, changed: &mut [Raster<boo
 
 /// How much larger than stated the residuals are, at least one; from their median.
 fn robust_scale(agreements: &[&Agreement]) -> f64 {
-    /// Median of the modulus of two, and of one, normal variables.
-    const MEDIANS: [f64; 2] = [1.177_410_022_515_474_7, NORMAL_MEDIAN];
     let mut sizes: Vec<f64> = agreements.iter().map(|one| one.size).collect();
-    let expected = MEDIANS[usize::from(agreements.iter().all(|one| one.numbers == 1))];
-    (median(&mut sizes) / expected).max(1.0)
+    let expected = CHI_MEDIANS[usize::from(agreements.iter().any(|one| one.numbers != 1))];
+    (upper_median(&mut sizes) / expected).max(1.0)
 }

@@ -1,12 +1,12 @@
 //! Whether the calibration of a broken network names what is wrong with it.
 
-use adjust::Distribution;
 use icp_registration::absolute_orientation;
 use nalgebra::{DVector, Isometry3, Point3, Vector6};
 use self_calibration::{
     CalibrationOptions, CalibrationOutcome, Cause, Component, Error, Network, NetworkDatum, TermSelection, Verdict,
     calibrate,
 };
+use statistics::Distribution;
 
 use super::faults::{Expected, Fault};
 use super::networks::Sound;

@@ -18,9 +18,6 @@ const FEW: usize = 4000;
 /// Multiple of the largest inflation from which the start values are enough to refuse.
 const HOPELESS: f64 = 10.0;
 
-/// Median of the absolute values of a normal distribution, in standard deviations.
-const MEDIAN_OF_NORMAL: f64 = 0.674_489_75;
-
 /// Scatter, in standard deviations as given, below which it is rounding.
 const SMALLEST_SCATTER: f64 = 1e-6;
 
@@ -87,10 +84,8 @@ fn scatter(mut residuals: Vec<f64>) -> f64 {
     if residuals.is_empty() {
         return SMALLEST_SCATTER;
     }
-    let middle = residuals.len() / 2;
     for residual in &mut residuals {
         *residual = residual.abs();
     }
-    let (_, median, _) = residuals.select_nth_unstable_by(middle, f64::total_cmp);
-    (*median / MEDIAN_OF_NORMAL).max(SMALLEST_SCATTER)
+    statistics::mad_scale(&mut residuals).max(SMALLEST_SCATTER)
 }

@@ -1,14 +1,13 @@
 //! Start values for h1, h2, h3 from residuals against amplitude.
 
 use error_models::AmplitudeHyperbola;
+use statistics::mad_scale;
 
 use crate::networks::network::median;
 use crate::{Error, Result};
 
 /// Number of amplitude classes; the median of each class keeps gross errors out.
 const CLASSES: usize = 24;
-/// Standard deviation of normal values over the median of their absolute values.
-const SIGMA_OF_MEDIAN: f64 = 1.4826;
 /// Weight of the median of normal values beside their mean: 2 / π.
 const WEIGHT_OF_MEDIAN: f64 = std::f64::consts::FRAC_2_PI;
 
@@ -57,7 +56,7 @@ pub(crate) fn gain(samples: &mut [(f64, f64)], hyperbola: &AmplitudeHyperbola) -
     let of_class = |amplitude: f64| classes.iter().rev().find(|class| class.lowest <= amplitude);
     let off =
         samples.iter().filter_map(|(amplitude, residual)| Some((residual - of_class(*amplitude)?.residual).abs()));
-    let variance = (SIGMA_OF_MEDIAN * median(off.collect())).powi(2);
+    let variance = mad_scale(&mut off.collect::<Vec<f64>>()).powi(2);
     let count = classes.iter().map(|class| class.count).sum::<f64>();
     let mean = classes.iter().map(|class| class.count * class.residual).sum::<f64>() / count;
     let square = |class: &Class| {

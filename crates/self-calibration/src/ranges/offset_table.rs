@@ -1,8 +1,8 @@
 //! The offset of each pixel, or block of pixels, as a look-up table beside the constant d0 (Sects. 4.2 and 4.5).
 
-use adjust::Distribution;
 use error_models::FixedPattern;
 use range_image::ImageFormat;
+use statistics::Distribution;
 
 use crate::{Error, Result};
 

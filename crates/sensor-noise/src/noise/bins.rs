@@ -1,6 +1,6 @@
 //! Variances averaged over values of like light.
 
-use adjust::Distribution;
+use statistics::{Distribution, upper_median};
 
 use super::fit::{Line, VarianceEstimator};
 use super::repeats::Repeats;
@@ -139,8 +139,7 @@ fn usual_variance(class: &[Repeats], estimator: VarianceEstimator) -> f64 {
         estimator.variance(one) / share
     };
     let mut scaled: Vec<f64> = class.iter().map(scaled).collect();
-    let middle = scaled.len() / 2;
-    *scaled.select_nth_unstable_by(middle, f64::total_cmp).1
+    upper_median(&mut scaled)
 }
 
 /// Median of a variance over its expectation.

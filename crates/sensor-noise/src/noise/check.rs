@@ -1,8 +1,8 @@
 //! Whether the standard deviations that pixels carry are true: against the scatter of repeated frames.
 
-use adjust::Distribution;
 use range_image::ComplexFrame;
 use rayon::prelude::*;
+use statistics::{Distribution, upper_median};
 
 use super::bins::{MovedLimits, has_moved};
 use super::ranges::{NORMAL_SHARE, values_at};
@@ -151,9 +151,7 @@ impl SigmaCheck {
         let mut limits = MovedLimits::default();
         // Sigma may be off as a whole: what moved is told beside the usual ratio.
         let mut ratios: Vec<f64> = entries.iter().map(|entry| entry.ratio).collect();
-        let middle = ratios.len() / 2;
-        let (_, &mut usual, _) = ratios.select_nth_unstable_by(middle, f64::total_cmp);
-        let usual = usual.max(1.0);
+        let usual = upper_median(&mut ratios).max(1.0);
         entries.retain(|entry| !has_moved(entry.ratio, usual, limits.of(entry.degrees)));
         let moved_share = 1.0 - entries.len() as f64 / values as f64;
         entries.sort_by(|a, b| a.amplitude.total_cmp(&b.amplitude));

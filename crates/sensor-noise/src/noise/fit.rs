@@ -1,6 +1,7 @@
 //! A variance that is linear in what it depends on: the straight line of the photon transfer.
 
-use adjust::{Adjustment, Covariance, Distribution, LinearObservation, ParameterBlock, Scale, SolveOptions};
+use adjust::{Adjustment, Covariance, LinearObservation, ParameterBlock, Scale, SolveOptions};
+use statistics::Distribution;
 
 use super::bins::{Classes, VarianceBin};
 use super::repeats::Repeats;

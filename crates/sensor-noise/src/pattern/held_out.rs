@@ -1,6 +1,6 @@
 //! Whether a pattern raises the precision of walls that it was not estimated from.
 
-use adjust::Distribution;
+use statistics::Distribution;
 
 use super::PatternOptions;
 use super::estimate::pattern_of;

@@ -1,5 +1,7 @@
 //! The robust mean of a pixel's residuals over walls.
 
+use statistics::{SIGMA_OF_MAD, quantile};
+
 /// Residuals beyond so many of their deviations weigh less (`[Huber1981]`).
 const HUBER: f64 = 1.345;
 /// Rounds of weighting.
@@ -13,10 +15,11 @@ pub(super) fn robust_mean(values: &[(f64, f64)]) -> Option<(f64, f64)> {
     if values.is_empty() {
         return None;
     }
-    let mut mean = median(values.iter().map(|(value, _)| *value));
-    // The median of normal residuals is 0.6745 of their deviation; three values and fewer tell no scale.
+    let mut mean = quantile(&mut values.iter().map(|(value, _)| *value).collect::<Vec<_>>(), 0.5);
+    // Three values and fewer tell no scale; of few values the median is interpolated.
     let scale = if values.len() > 3 {
-        median(values.iter().map(|(value, variance)| ((value - mean) / variance.sqrt()).abs())) / 0.6745
+        let sizes = values.iter().map(|(value, variance)| ((value - mean) / variance.sqrt()).abs());
+        SIGMA_OF_MAD * quantile(&mut sizes.collect::<Vec<_>>(), 0.5)
     } else {
         1.0
     };
@@ -39,13 +42,6 @@ pub(super) fn robust_mean(values: &[(f64, f64)]) -> Option<(f64, f64)> {
     let squares: f64 = values.iter().map(|value| weight(value, mean) * (value.0 - mean).powi(2)).sum();
     let inflation = if freedom > 0.0 { (squares / freedom).max(1.0) } else { 1.0 };
     Some((mean, (inflation / total).sqrt()))
-}
-
-fn median(values: impl Iterator<Item = f64>) -> f64 {
-    let mut values: Vec<f64> = values.collect();
-    values.sort_by(f64::total_cmp);
-    let middle = values.len() / 2;
-    if values.len() % 2 == 1 { values[middle] } else { f64::midpoint(values[middle - 1], values[middle]) }
 }
 
 #[cfg(test)]

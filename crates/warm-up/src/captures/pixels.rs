@@ -190,11 +190,10 @@ impl ChangeMeter {
         let change = |pixel: &PixelReference| Some(options.difference(valid(frame, pixel.index)?, pixel.range_m));
         self.changes.clear();
         self.changes.extend(self.pixels.iter().filter_map(change));
-        let middle = self.changes.len() / 2;
         if self.changes.is_empty() {
             return Err(DriftError::EmptyFrame { index });
         }
-        let median = *self.changes.select_nth_unstable_by(middle, f64::total_cmp).1;
+        let median = statistics::upper_median(&mut self.changes);
         let (mut sum, mut weights) = (0.0, 0.0);
         for pixel in &self.pixels {
             let Some(change) = change(pixel) else { continue };

@@ -1,8 +1,9 @@
 //! Pairs that are too far apart compared with the others.
 
+use statistics::ranked;
+
 use super::PairRejection;
 use crate::error::{Error, Result};
-use crate::kernel::quantile;
 use crate::parts::require_positive;
 use crate::parts::scene::{Pair, Scene};
 
@@ -42,6 +43,6 @@ impl PairRejection for MedianDistance {
 /// Keeps the pairs within a multiple of a quantile of the distances.
 fn keep_within(pairs: &mut Vec<Pair>, fraction: f64, multiple: f64) {
     let mut distances: Vec<f64> = pairs.iter().map(|p| p.distance_m).collect();
-    let limit = multiple * quantile(&mut distances, fraction);
+    let limit = multiple * ranked(&mut distances, fraction);
     pairs.retain(|p| p.distance_m <= limit);
 }

@@ -1,7 +1,8 @@
 //! Weight from the similarity of intensities.
 
+use statistics::mad_scale;
+
 use super::PairWeighting;
-use crate::kernel::mad_scale;
 use crate::parts::scene::{Pair, Scene};
 
 /// `exp(−(ΔI / (k s))² / 2)`: the difference of the intensities of a pair over its robust scale s among all pairs, the

@@ -1,7 +1,8 @@
 //! Weight from the standard deviations that come with the points.
 
+use statistics::upper_median;
+
 use super::PairWeighting;
-use crate::kernel::quantile;
 use crate::parts::scene::{Pair, Scene};
 
 /// `1 / (σ²_source + σ²_target)` from the sigmas of the clouds; where none is known for a pair, the median of the
@@ -22,7 +23,7 @@ impl PairWeighting for SigmaWeight {
         }
         let mut variances: Vec<f64> = pairs.iter().map(|p| of(source, Some(p.source)) + of(target, p.target)).collect();
         let mut known: Vec<f64> = variances.iter().copied().filter(|v| *v > 0.0).collect();
-        let median = if known.is_empty() { 1.0 } else { quantile(&mut known, 0.5) };
+        let median = if known.is_empty() { 1.0 } else { upper_median(&mut known) };
         for (pair, variance) in pairs.iter_mut().zip(&mut variances) {
             // NaN fails the comparison.
             pair.weight /= if *variance > 0.0 { *variance } else { median };

@@ -3,9 +3,9 @@
 use range_io::calibration::Calibration;
 use self_calibration::{CalibrationOutcome, Component, ObservationQuality, Verdict};
 use serde::Serialize;
+use statistics::quantile;
 
 use crate::point_uncertainty::PointUncertainty;
-use crate::statistics::median;
 
 /// Coverage factor: about 95 % of a normal distribution.
 pub(crate) const COVERAGE: f64 = 2.0;
@@ -82,5 +82,5 @@ fn amplitude_near(ranges: &[&ObservationQuality], range_m: f64) -> f64 {
         ranges.iter().map(|quality| ((quality.range_m - range_m).abs(), quality.amplitude)).collect();
     by_distance.sort_by(|a, b| a.0.total_cmp(&b.0));
     by_distance.truncate((NEAREST * ranges.len() as f64).ceil() as usize);
-    median(&mut by_distance.iter().map(|(_, amplitude)| *amplitude).collect::<Vec<_>>())
+    quantile(&mut by_distance.iter().map(|(_, amplitude)| *amplitude).collect::<Vec<_>>(), 0.5)
 }

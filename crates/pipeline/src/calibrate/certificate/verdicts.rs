@@ -2,8 +2,9 @@
 
 use error_models::ParameterStatus;
 use nalgebra::{DMatrix, DVector};
-use self_calibration::{CalibrationOutcome, Distribution, GlobalTest, GlobalVerdict, Verdict};
+use self_calibration::{CalibrationOutcome, GlobalTest, GlobalVerdict, Verdict};
 use serde::Serialize;
+use statistics::Distribution;
 
 use super::HeldOut;
 use super::hold_out::predicted;

@@ -5,10 +5,10 @@ use std::fmt::Write;
 
 use camera_model::ImageFormat;
 use self_calibration::{CalibrationOutcome, Component, ObservationQuality, Verdict};
+use statistics::quantile;
 
 use crate::report::colour::{CATEGORIES, hex};
 use crate::report::picture::open_svg;
-use crate::statistics::quantile;
 
 const WIDTH: f64 = 560.0;
 /// Length of the arrow at the 90 % quantile, in pixels of the figure.

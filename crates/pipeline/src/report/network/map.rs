@@ -5,6 +5,7 @@ use std::fmt::Write;
 use camera_model::Camera;
 use nalgebra::{Isometry3, Matrix2, Matrix3, Point3, SymmetricEigen, Vector3};
 use self_calibration::{AdjustedStation, AdjustedTarget};
+use statistics::quantile;
 
 use super::image_residuals::round_factor;
 use super::labels::Labels;
@@ -13,7 +14,6 @@ use crate::report::canvas::ticks;
 use crate::report::cloud_figure::Direction;
 use crate::report::colour::{CATEGORIES, hex};
 use crate::report::picture::{escape, open_svg};
-use crate::statistics::quantile;
 
 const WIDTH: f64 = 590.0;
 const TALLEST: f64 = 560.0;

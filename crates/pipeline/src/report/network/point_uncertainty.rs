@@ -1,12 +1,12 @@
 //! Maps of what the covariance of the calibration means for a point.
 
 use nalgebra::DMatrix;
+use statistics::quantile;
 
 use crate::Result;
 use crate::point_uncertainty::PointUncertainty;
 use crate::report::colour::ColourMap;
 use crate::report::picture::{Scale, raster_figure};
-use crate::statistics::median;
 
 /// Ranges of the maps, metre.
 const RANGES_M: [f64; 3] = [1.0, 2.0, 4.0];
@@ -53,6 +53,7 @@ fn figure(range_m: f64, values: &[f64], span: Option<[f64; 2]>) -> Result<(Strin
         }
         _ => String::new(),
     };
-    let caption = format!("Median {:.2} mm, at most {high:.2} mm.{outside}", median(&mut finite().collect::<Vec<_>>()));
+    let caption =
+        format!("Median {:.2} mm, at most {high:.2} mm.{outside}", quantile(&mut finite().collect::<Vec<_>>(), 0.5));
     Ok((svg, caption))
 }

@@ -2,11 +2,11 @@
 
 use error_models::RangeErrorModel;
 use self_calibration::{CalibrationOutcome, Component, ObservationQuality, Verdict};
+use statistics::quantile;
 
 use crate::point_uncertainty::{PointUncertainty, amplitude_of};
 use crate::report::canvas::{Axes, Canvas, robust_span, span};
 use crate::report::colour::CATEGORIES;
-use crate::statistics::quantile;
 
 const SIZE: [f64; 2] = [590.0, 340.0];
 const STEPS: usize = 160;

@@ -6,7 +6,6 @@ use nalgebra::{DMatrix, DVector};
 use crate::estimate::search::fit::{Problem, StartTerm, Unknown};
 use crate::estimate::search::response::Term;
 use crate::estimate::search::scene::{BlockMean, Row, Scene};
-use crate::estimate::views::noise::{NORMAL_MEDIAN, median};
 use crate::estimate::views::planes::Planes;
 
 /// Widths of the dictionary.
@@ -67,7 +66,7 @@ impl Dictionary {
         for (matrix, observed) in parts {
             sizes.extend((observed - matrix * &weights).iter().map(|residual| residual.abs()));
         }
-        let scale = median(&mut sizes) / NORMAL_MEDIAN;
+        let scale = statistics::mad_scale(&mut sizes);
         if scale > 1.0 && scale.is_finite() { scale } else { 1.0 }
     }
 

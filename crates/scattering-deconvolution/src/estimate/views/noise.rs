@@ -1,9 +1,8 @@
 //! Standard deviations of the pixels.
 
 use range_image::Raster;
+use statistics::mad_scale;
 
-/// Median of the modulus of a normal variable with standard deviation one.
-pub(in crate::estimate) const NORMAL_MEDIAN: f64 = 0.674_489_750_196_081_7;
 /// Noise below this share of the largest light is rounding of single precision.
 const ROUNDING: f64 = 6e-8;
 
@@ -40,14 +39,5 @@ pub(in crate::estimate) fn noise_of_differences(values: &[f64], quiet: &[bool], 
     let pairs = rows.flat_map(|(values, quiet)| values.windows(2).zip(quiet.windows(2)));
     let quiet_pairs = pairs.filter(|(_, quiet)| quiet[0] && quiet[1]);
     let mut differences: Vec<f64> = quiet_pairs.map(|(values, _)| (values[1] - values[0]).abs()).collect();
-    median(&mut differences) / NORMAL_MEDIAN / std::f64::consts::SQRT_2
-}
-
-/// The upper median; NaN of nothing.
-pub(in crate::estimate) fn median(values: &mut [f64]) -> f64 {
-    if values.is_empty() {
-        return f64::NAN;
-    }
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+    mad_scale(&mut differences) / std::f64::consts::SQRT_2
 }

@@ -2,8 +2,8 @@
 
 use std::collections::BTreeSet;
 
-use adjust::Distribution;
 use nalgebra::{DMatrix, DVector};
+use statistics::Distribution;
 
 use super::calibrate::Problem;
 use super::selection::all_terms;

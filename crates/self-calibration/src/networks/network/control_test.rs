@@ -2,8 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use adjust::{BlockId, Distribution, Scale};
+use adjust::{BlockId, Scale};
 use nalgebra::{Cholesky, DMatrix, DVector};
+use statistics::Distribution;
 
 use super::problem::{Datum, Excluded, Row, Setup, Solved, Source};
 use super::rejection::{Suspect, TESTABLE};

@@ -23,7 +23,7 @@ impl CalibrationOutcome {
             Some((group.name.as_str(), sigma0 * sigma0 * group.redundancy, group.redundancy))
         });
         let subjects: Vec<_> = std::iter::once((ALL, self.vtpv, self.redundancy as f64)).chain(groups).collect();
-        let level = LEVEL / subjects.len() as f64;
+        let level = statistics::bonferroni(LEVEL, subjects.len());
         let test = |(name, vtpv, redundancy)| GlobalTest::new(name, vtpv, redundancy, level).ok();
         subjects.into_iter().filter_map(test).collect()
     }

@@ -1,7 +1,7 @@
 //! Start values of the amplitude hyperbola (Eq. 15) from what a calibration without it leaves over.
 
-use adjust::Distribution;
 use error_models::AmplitudeHyperbola;
+use statistics::Distribution;
 
 use super::{CalibrationOutcome, Component, Network, Verdict};
 use crate::Result;

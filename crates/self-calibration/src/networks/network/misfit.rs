@@ -2,14 +2,11 @@
 
 use camera_model::Camera;
 use nalgebra::{Isometry3, Point3};
+use statistics::{CHI_MEDIANS, upper_median};
 
 use super::problem::{Calibration, Setup, Start};
 use super::{Network, Sighting};
 
-/// Median of the length of a vector of two normal values, in standard deviations.
-const MEDIAN_OF_TWO: f64 = 1.1774;
-/// Median of the absolute value of a normal value, in standard deviations.
-const MEDIAN_OF_ONE: f64 = 0.6745;
 /// Width of Cauchy's kernel with 95 % efficiency for normal errors, in standard deviations.
 pub(crate) const CAUCHY: f64 = 2.385;
 /// Squared residuals, in variances, do not count beyond this: where the model has no value at all.
@@ -98,8 +95,8 @@ pub(crate) struct Scales {
 
 impl Scales {
     pub(crate) fn new<'m>(misfits: impl Iterator<Item = &'m Misfit> + Clone) -> Self {
-        let image = median(misfits.clone().filter_map(|misfit| misfit.image).collect()) / MEDIAN_OF_TWO;
-        let range = median(misfits.filter_map(|misfit| misfit.range).collect()) / MEDIAN_OF_ONE;
+        let image = median(misfits.clone().filter_map(|misfit| misfit.image).collect()) / CHI_MEDIANS[1];
+        let range = median(misfits.filter_map(|misfit| misfit.range).collect()) / CHI_MEDIANS[0];
         Self { image, range }
     }
 
@@ -133,11 +130,7 @@ impl Setup<'_> {
     }
 }
 
-/// The lower median; NaN of nothing.
+/// The [`upper_median`] of values that are not needed any more; NaN of nothing.
 pub(crate) fn median(mut values: Vec<f64>) -> f64 {
-    if values.is_empty() {
-        return f64::NAN;
-    }
-    let middle = (values.len() - 1) / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+    upper_median(&mut values)
 }

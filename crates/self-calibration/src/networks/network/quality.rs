@@ -2,8 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use adjust::{BlockId, Distribution, Manifold, Observation, RigidPose, Scale};
+use adjust::{BlockId, Manifold, Observation, RigidPose, Scale};
 use nalgebra::{Isometry3, Point3};
+use statistics::Distribution;
 
 use super::equations::{DistanceEquation, PassiveEquation};
 use super::problem::{Row, Setup, Solved, Source};

@@ -2,7 +2,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use adjust::{Distribution, Scale, Solution};
+use adjust::{Scale, Solution};
+use statistics::{Distribution, mad_scale};
 
 use super::Component;
 use super::problem::{Row, Setup, Solved, Source};
@@ -38,7 +39,7 @@ pub(crate) struct Suspect {
 
 /// Standardised residuals over the robust scale of their group, where they exceed the critical value; largest first.
 ///
-/// The scale, 1.4826 times the median of `|v| / σ_v`, stands for sigma0 of the group and is not drawn up by gross errors.
+/// The scale, from the median of `|v| / σ_v`, stands for sigma0 of the group and is not drawn up by gross errors.
 pub(crate) fn suspects(solution: &Solution, components: &[Component], level: f64) -> Result<Vec<Suspect>> {
     let standardised = solution.standardised_residuals(Scale::Prior)?;
     let redundancy = solution.redundancy_numbers();
@@ -73,10 +74,8 @@ fn scale(mut sizes: Vec<f64>) -> f64 {
     if sizes.is_empty() {
         return f64::INFINITY;
     }
-    let middle = sizes.len() / 2;
-    let median = *sizes.select_nth_unstable_by(middle, f64::total_cmp).1;
     // Residuals that rounding alone makes are no reason to reject anything.
-    (1.4826 * median).max(1e-6)
+    mad_scale(&mut sizes).max(1e-6)
 }
 
 impl Setup<'_> {

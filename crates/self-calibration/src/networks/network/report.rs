@@ -2,9 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use adjust::{BlockId, Distribution, Scale, Solution};
+use adjust::{BlockId, Scale, Solution};
 use error_models::{ParameterStatus, RangeErrorModel};
 use nalgebra::{DMatrix, Matrix3, Matrix6};
+use statistics::Distribution;
 
 use super::hyperbola_steps::covariance_of_terms;
 use super::problem::{Calibration, RangeSet, Setup, Solved};

@@ -4,6 +4,7 @@ use adjust::SolveOptions;
 use icp_registration::absolute_orientation;
 use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 use orientation::{ResectionOptions, TargetObservation, approximate_poses, resect};
+use statistics::mad_scale;
 
 use super::misfit::{median, modelled_pixel};
 
@@ -41,7 +42,7 @@ pub(crate) fn robust_orientation(pairs: &[(Point3<f64>, Point3<f64>)]) -> Option
     let (_, mut pose) = scored.min_by(|a, b| a.0.total_cmp(&b.0))?;
     for _ in 0..2 {
         let distances = residuals(&pose);
-        let limit = OUTLYING * 1.4826 * median(distances.clone());
+        let limit = OUTLYING * mad_scale(&mut distances.clone());
         // Half of the pairs lie below the median in any case; without noise rounding decides.
         let inliers: Vec<usize> = (0..n).filter(|&i| distances[i] <= limit.max(1e-9)).collect();
         if inliers.len() >= NEEDED {

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use nalgebra::{SMatrix, SVector, Vector3};
+use statistics::mad_scale;
 
 use super::super::contradiction::{Cause, CauseKind};
 use super::super::misfit::median;
@@ -66,7 +67,7 @@ fn scale(places: &[(Vector3<f64>, Vector3<f64>)]) -> Option<[f64; 2]> {
     let (given, found) = (sum.0 / count, sum.1 / count);
     let ratios: Vec<f64> = places.iter().map(|pair| (pair.1 - found).norm() / (pair.0 - given).norm()).collect();
     let scale = median(ratios.clone());
-    let spread = 1.4826 * median(ratios.iter().map(|ratio| (ratio - scale).abs()).collect());
+    let spread = mad_scale(&mut ratios.iter().map(|ratio| (ratio - scale).abs()).collect::<Vec<f64>>());
     // The median has 1.25 times the deviation of the mean; rounding leaves no spread at all.
     let sigma = (1.25 * spread / count.sqrt()).max(1e-9);
     (scale.is_finite() && sigma.is_finite()).then_some([scale, sigma])

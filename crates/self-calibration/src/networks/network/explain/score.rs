@@ -3,7 +3,8 @@
 
 use std::collections::BTreeSet;
 
-use adjust::{Distribution, Solution};
+use adjust::Solution;
+use statistics::Distribution;
 
 use super::super::misfit::modelled_pixel;
 use super::super::problem::{Calibration, RangeSet, Setup, Solved, Source};

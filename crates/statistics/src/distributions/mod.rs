@@ -151,3 +151,9 @@ impl Distribution {
         (0.5 * (low + high)).exp()
     }
 }
+
+/// The value that a sum of squares of `dof` standard normal values exceeds with probability `level`: the limit of a test.
+/// Infinite without freedom, a test that nothing fails.
+pub fn chi_squared_limit(dof: f64, level: f64) -> f64 {
+    if dof <= 0.0 { f64::INFINITY } else { Distribution::ChiSquared { dof }.upper_quantile(level) }
+}

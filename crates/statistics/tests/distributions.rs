@@ -1,16 +1,7 @@
 //! Distributions against values computed with 40 digits, against printed tables, and against themselves.
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    clippy::float_cmp,
-    clippy::unreadable_literal,
-    clippy::excessive_precision
-)]
-
-use adjust::Distribution;
 use approx::assert_relative_eq;
 use proptest::prelude::*;
+use statistics::{Distribution, chi_squared_limit};
 
 /// Distribution, value, probability of exceeding it (incomplete gamma and beta functions to 40 digits).
 const SURVIVAL: [(Distribution, f64, f64); 58] = [
@@ -131,6 +122,23 @@ fn what_lies_outside_the_domain_is_nan() {
     assert_eq!(Distribution::ChiSquared { dof: 3.0 }.quantile(0.0), 0.0);
     assert_relative_eq!(Distribution::Tau { dof: 9.0 }.upper_quantile(0.0), 3.0, epsilon = 1e-12);
     assert_eq!(Distribution::ChiSquared { dof: 3.0 }.survival(-1.0), 1.0);
+}
+
+#[test]
+fn limits_grow_with_the_freedom_and_are_infinite_without() {
+    let [four, between, five] = [4.0, 4.3, 5.0].map(|dof| chi_squared_limit(dof, 1e-3));
+    assert!(four < between && between < five);
+    assert_eq!(chi_squared_limit(0.0, 1e-3), f64::INFINITY);
+    // R: qchisq(p, df, lower.tail = FALSE); df = 2 is -2 ln p.
+    for (dof, level, expected) in [
+        (1.0, 1e-3, 10.827_566_170_662_733),
+        (2.0, 1e-4, 18.420_680_743_952_367),
+        (5.0, 0.01, 15.086_272_469_388_99),
+        (9.0, 0.001, 27.877_164_871_256_57),
+        (100.0, 0.05, 124.342_113_404_004_1),
+    ] {
+        assert_relative_eq!(chi_squared_limit(dof, level), expected, max_relative = 1e-12);
+    }
 }
 
 proptest! {

@@ -19,7 +19,7 @@ pub(crate) struct Arguments {
     /// Constants whose `file::NAME` contains one of these words; all where none is named.
     words: Vec<String>,
     /// Crate whose constants they are.
-    #[arg(long, default_value = "icp-registration")]
+    #[arg(long, default_value = "projective-registration")]
     package: String,
     /// Example of the crate that prints the figures, without times.
     #[arg(long, default_value = "frame_pairs")]

@@ -3,8 +3,9 @@
 #![allow(missing_docs)] // criterion_group! makes a public function
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
-use icp_registration::{Cloud, IcpOptions, IcpTarget, OrganisedNormalOptions, Selection, organised_normals};
+use icp_registration::{IcpOptions, IcpTarget, Selection};
 use nalgebra::{Isometry3, Vector3};
+use point_cloud::{Cloud, OrganisedNormalOptions, organised_normals};
 
 const SIZES: [(usize, usize); 3] = [(176, 144), (640, 480), (1024, 1024)];
 

@@ -2,8 +2,9 @@
 
 #![allow(clippy::print_stdout)]
 
-use icp_registration::{Cloud, IcpOptions, align};
+use icp_registration::{IcpOptions, align};
 use nalgebra::{Isometry3, Point3, Vector3};
+use point_cloud::Cloud;
 
 /// Points on floor, two walls and a box, every `spacing` metres from an offset of its own.
 fn corner(spacing: f64, offset: f64) -> Vec<Point3<f64>> {

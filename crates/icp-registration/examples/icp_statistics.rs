@@ -4,15 +4,15 @@
 
 #![allow(clippy::print_stdout, clippy::unwrap_used, missing_docs, unused)]
 
-#[path = "../tests/common/mod.rs"]
+#[path = "../../point-cloud/tests/common/mod.rs"]
 mod common;
 
 use common::scenes::{half_overlapping_views, open_scene};
 use common::{Pinhole, Scene, cloud, disturbance, frame_pair, pose_error};
-use icp_registration::{
-    Cloud, Error, IcpOptions, IcpResult, IcpTarget, Metric, OrganisedNormalOptions, organised_normals, pose_difference,
-};
+use icp_registration::{Error, IcpOptions, IcpResult, IcpTarget, Metric};
 use nalgebra::Isometry3;
+use point_cloud::{Cloud, OrganisedNormalOptions, organised_normals};
+use rigid_pose::pose_difference;
 
 const METRICS: [Metric; 4] =
     [Metric::PointToPlane, Metric::SymmetricPlanes, Metric::PlaneToPlane, Metric::PointToPoint];

@@ -1,8 +1,10 @@
 //! Input that has no answer gets a typed one.
 
 use crate::common::{Pinhole, Scene, cloud, look_at};
-use icp_registration::{Cloud, Error, IcpOptions, IcpTarget, Metric, RobustKernel, Selection, align};
+use icp_registration::{Error, IcpOptions, IcpTarget, Metric, RobustKernel, Selection, align};
 use nalgebra::{Isometry3, Point3, Vector3};
+use point_cloud::Cloud;
+use point_cloud::Error as CloudError;
 
 fn good() -> Cloud {
     cloud(&Scene::furnished(), &Pinhole { width: 44, height: 36, focal_px: 38.0 }, &pose(), 1.0, 1)
@@ -44,11 +46,17 @@ fn clouds_that_cannot_be_aligned() {
     let good = good();
     for options in all_metrics() {
         let run = |source: &Cloud, target: &Cloud| align(source, target, &id, &options);
-        assert!(matches!(run(&Cloud::default(), &good), Err(Error::Empty { what: "the source cloud" })));
-        assert!(matches!(run(&good, &Cloud::default()), Err(Error::Empty { what: "the target cloud" })));
+        assert!(matches!(
+            run(&Cloud::default(), &good),
+            Err(Error::Cloud(CloudError::Empty { what: "the source cloud" }))
+        ));
+        assert!(matches!(
+            run(&good, &Cloud::default()),
+            Err(Error::Cloud(CloudError::Empty { what: "the target cloud" }))
+        ));
         let nan = Cloud::new(vec![Point3::new(f64::NAN, 0.0, 0.0); 30]);
-        assert!(matches!(run(&nan, &good), Err(Error::NonFinite { index: 0, .. })));
-        assert!(matches!(run(&good, &nan), Err(Error::NonFinite { index: 0, .. })));
+        assert!(matches!(run(&nan, &good), Err(Error::Cloud(CloudError::NonFinite { index: 0, .. }))));
+        assert!(matches!(run(&good, &nan), Err(Error::Cloud(CloudError::NonFinite { index: 0, .. }))));
         let one = Cloud::new(vec![Point3::new(0.0, 0.0, -1.0)]);
         assert!(matches!(run(&one, &good), Err(Error::TooFewCorrespondences { .. })));
         assert!(
@@ -80,16 +88,28 @@ fn planes_of_another_length_and_bad_sigmas() {
     let (id, options) = (Isometry3::identity(), IcpOptions::default());
     let good = good();
     let short = Cloud { normals: Some(vec![Vector3::z(); 3]), ..good.clone() };
-    assert!(matches!(align(&short, &good, &id, &options), Err(Error::LengthMismatch { what: "normals", .. })));
+    assert!(matches!(
+        align(&short, &good, &id, &options),
+        Err(Error::Cloud(CloudError::LengthMismatch { what: "normals", .. }))
+    ));
     let short = Cloud { sigma: Some(vec![1.0; 3]), ..good.clone() };
-    assert!(matches!(align(&good, &short, &id, &options), Err(Error::LengthMismatch { what: "sigma", .. })));
+    assert!(matches!(
+        align(&good, &short, &id, &options),
+        Err(Error::Cloud(CloudError::LengthMismatch { what: "sigma", .. }))
+    ));
     let mut sigma = vec![1e-3; good.len()];
     sigma[4] = 0.0;
     let zero = Cloud { sigma: Some(sigma), ..good.clone() };
-    assert!(matches!(align(&zero, &good, &id, &options), Err(Error::NotPositive { what: "sigma", index: 4, .. })));
+    assert!(matches!(
+        align(&zero, &good, &id, &options),
+        Err(Error::Cloud(CloudError::NotPositive { what: "sigma", index: 4, .. }))
+    ));
     let unknown = Cloud { sigma: Some(vec![f64::NAN; good.len()]), ..good.clone() };
     assert!(align(&unknown, &good, &id, &options).unwrap().rms_m.is_finite());
-    assert!(matches!(Cloud::from_frame(&[[0.0; 3]; 2], None, Some(&[1.0])), Err(Error::LengthMismatch { .. })));
+    assert!(matches!(
+        Cloud::from_frame(&[[0.0; 3]; 2], None, Some(&[1.0])),
+        Err(point_cloud::Error::LengthMismatch { .. })
+    ));
 }
 
 #[test]

@@ -5,8 +5,10 @@ use icp_registration::parts::{
     Minimiser, NearestPoint, PlaneToPlane, PointMatching, PointToPlane, PointToPoint, Projective, Settled, Stability,
     SymmetricPlanes,
 };
-use icp_registration::{Cloud, DegeneracyPolicy, Error, IcpTarget, Registration};
+use icp_registration::{DegeneracyPolicy, Error, IcpTarget, Registration};
 use nalgebra::{Isometry3, Point3, Vector3};
+use point_cloud::Cloud;
+use point_cloud::Error as CloudError;
 use proptest::prelude::*;
 
 /// Clouds that trouble: sizes and shapes by number.
@@ -112,8 +114,8 @@ fn empty_and_nan_clouds_are_named() {
         let metric = metric(kind, &good, &target);
         let registration = Registration { metric, ..Registration::new(NearestPoint::new(&target)) };
         let run = |cloud: &Cloud| registration.align(cloud, &Isometry3::identity());
-        assert!(matches!(run(&Cloud::default()), Err(Error::Empty { what: "the source cloud" })));
-        assert!(matches!(run(&nan), Err(Error::NonFinite { index: 0, .. })));
+        assert!(matches!(run(&Cloud::default()), Err(Error::Cloud(CloudError::Empty { what: "the source cloud" }))));
+        assert!(matches!(run(&nan), Err(Error::Cloud(CloudError::NonFinite { index: 0, .. }))));
         assert!(matches!(run(&far), Err(Error::TooFewCorrespondences { .. })), "{:?}", run(&far));
     }
     assert!(matches!(Coloured::new(&Cloud::new(good.points.clone()), &target), Err(Error::Empty { .. })));

@@ -3,11 +3,9 @@
 use std::time::Instant;
 
 use crate::common::{Pinhole, Scene, frame_pair, look_at, pose_error};
-use icp_registration::{
-    Cloud, Error, IcpOptions, IcpTarget, Metric, NeighbourTree, UnorganisedNormalOptions, VoxelCloud, VoxelOptions,
-    align, unorganised_normals,
-};
+use icp_registration::{Error, IcpOptions, IcpTarget, Metric, VoxelCloud, VoxelOptions, align};
 use nalgebra::{Isometry3, Point3, Vector3};
+use point_cloud::{Cloud, NeighbourTree, UnorganisedNormalOptions, unorganised_normals};
 
 /// Points of a frame of the furnished room, and as many again halfway at one place.
 fn crowded(place: Point3<f64>) -> Vec<Point3<f64>> {
@@ -60,7 +58,7 @@ fn neighbours_in_a_crowd_are_told_in_order() {
 fn zeros_for_no_range_are_refused_by_name() {
     let cloud = Cloud::new(crowded(Point3::origin()));
     let of = cloud.len();
-    let is_named = |error: Error| matches!(error, Error::Unmeasured { found: 20_000, of: all, .. } if all == of);
+    let is_named = |error: Error| matches!(error, Error::Cloud(point_cloud::Error::Unmeasured { found: 20_000, of: all, .. }) if all == of);
     assert!(IcpTarget::new(cloud.clone()).is_err_and(is_named));
     assert!(VoxelCloud::new(&cloud, &VoxelOptions::default()).is_err_and(is_named));
     let options = IcpOptions::default();

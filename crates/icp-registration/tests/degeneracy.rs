@@ -1,8 +1,9 @@
 //! Geometry that does not determine the pose, and how the result says so.
 
 use crate::common::{Cuboid, Pinhole, Scene, cloud, look_at};
-use icp_registration::{Cloud, DegeneracyPolicy, IcpOptions, IcpResult, MotionKind, UndeterminedMotion, align};
+use icp_registration::{DegeneracyPolicy, IcpOptions, IcpResult, MotionKind, UndeterminedMotion, align};
 use nalgebra::{Isometry3, Point3, Vector3};
+use point_cloud::Cloud;
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;

@@ -4,8 +4,11 @@
 use crate::common;
 use crate::common::{Pinhole, Scene as Room, cloud, disturbance, look_at, pose_error};
 use icp_registration::parts::{ClosestOnMesh, PointToPoint, TriangleMesh};
-use icp_registration::{Cloud, Error, MotionKind, Registration, pose_difference};
+use icp_registration::{Error, MotionKind, Registration};
 use nalgebra::{Isometry3, Point3, Vector3};
+use point_cloud::Cloud;
+use point_cloud::Error as CloudError;
+use rigid_pose::pose_difference;
 
 fn room_mesh() -> TriangleMesh {
     let (vertices, triangles) = common::scenes::triangles(&Room::furnished());
@@ -74,7 +77,7 @@ fn meshes_that_are_none_are_refused() {
     assert!(matches!(TriangleMesh::new(&corners, &[[0, 1, 2]]), Err(Error::Empty { .. })));
     assert!(matches!(TriangleMesh::new(&corners, &[[0, 1, 4]]), Err(Error::NoSuchVertex { vertex: 4, count: 4 })));
     let nan = [Point3::origin(), Point3::new(f64::NAN, 0.0, 0.0), Point3::new(0.0, 1.0, 0.0)];
-    assert!(matches!(TriangleMesh::new(&nan, &[[0, 1, 2]]), Err(Error::NonFinite { index: 1, .. })));
+    assert!(matches!(TriangleMesh::new(&nan, &[[0, 1, 2]]), Err(Error::Cloud(CloudError::NonFinite { index: 1, .. }))));
     let mesh = TriangleMesh::new(&corners, &[[0, 1, 2], [0, 1, 3]]).unwrap();
     assert_eq!((mesh.len(), mesh.is_empty()), (1, false));
     let (point, normal) = mesh.closest(&Point3::new(0.2, 0.3, 0.5), 1.0).unwrap().unwrap();

@@ -37,7 +37,7 @@ impl Minimiser for Checked {
 fn derivatives_agree_with_differences() {
     let (a, b) = (look_at([-1.5, -1.0, 1.4], [2.0, 0.8, 0.8]), look_at([-1.2, -1.1, 1.3], [1.8, 1.1, 0.85]));
     let (room, camera) = (Room::furnished(), Pinhole { width: 44, height: 36, focal_px: 38.0 });
-    let shaded = |mut cloud: icp_registration::Cloud, pose: &nalgebra::Isometry3<f64>| {
+    let shaded = |mut cloud: point_cloud::Cloud, pose: &nalgebra::Isometry3<f64>| {
         let shade = |p: &nalgebra::Point3<f64>| (3.0 * (pose * p).x).sin() * 50.0;
         cloud.intensity = Some(cloud.points.iter().map(shade).collect());
         cloud

@@ -10,10 +10,11 @@ use icp_registration::parts::{
     TargetRim, Trimmed,
 };
 use icp_registration::{
-    Alternative, Cloud, DegeneracyPolicy, Error, IcpOptions, IcpTarget, Metric, OrganisedNormalOptions, Registration,
-    RobustKernel, RotationMethod, organised_normals,
+    Alternative, DegeneracyPolicy, Error, IcpOptions, IcpTarget, Metric, Registration, RobustKernel,
 };
 use nalgebra::{Isometry3, Matrix6, Point3, Vector3};
+use point_cloud::{Cloud, OrganisedNormalOptions, organised_normals};
+use rigid_pose::RotationMethod;
 
 struct Setting {
     target: IcpTarget,

@@ -3,8 +3,9 @@
 use std::path::PathBuf;
 
 use crate::scans::{median_distance, points, pose_of_rows, real};
-use icp_registration::{Cloud, IcpOptions, IcpTarget, NeighbourTree, OrganisedNormalOptions, organised_normals};
+use icp_registration::{IcpOptions, IcpTarget};
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
+use point_cloud::{Cloud, NeighbourTree, OrganisedNormalOptions, organised_normals};
 
 #[test]
 fn bunny_scans_come_together() {

@@ -1,8 +1,10 @@
 //! Frames of a simulated room with the noise of a time-of-flight camera.
 
 use crate::common::{Pinhole, Scene, cloud, disturbance, look_at, pose_error};
-use icp_registration::{Cloud, IcpOptions, IcpTarget, Metric, Selection, StopReason, align, pose_difference};
+use icp_registration::{IcpOptions, IcpTarget, Metric, Selection, StopReason, align};
 use nalgebra::Isometry3;
+use point_cloud::Cloud;
+use rigid_pose::pose_difference;
 
 /// Positions and points looked at of two frames; overlap 77, 58 and 64 %.
 const VIEWS: [[[f64; 3]; 4]; 3] = [

@@ -1,8 +1,8 @@
 //! Approximate poses in closed form, the best first.
 
 use camera_model::Camera;
-use icp_registration::absolute_orientation;
 use nalgebra::{Isometry3, Point3};
+use rigid_pose::absolute_orientation;
 
 use crate::resection::Start;
 use crate::target::{TargetObservation, spread_ratio};

@@ -3,8 +3,8 @@
 //! The unknown distances `s1, s2 = u s1, s3 = v s1` from the perspective centre satisfy three laws of cosines; `v` is a
 //! root of a quartic. Up to four solutions are real and positive.
 
-use icp_registration::absolute_orientation;
 use nalgebra::{Isometry3, Matrix4, Point3, Schur, Vector3};
+use rigid_pose::absolute_orientation;
 
 /// A root counts as real up to this share of imaginary part: noise makes double roots complex, and what comes from
 /// here is an approximation that the adjustment improves or drops.

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use icp_registration::{Placements, RefusedPair};
+use multiview_registration::{Placements, RefusedPair};
 use nalgebra::Isometry3;
 use range_image::Flags;
 use range_io::survey::Level;

@@ -1,7 +1,7 @@
 //! What a run holds in its hands: views, clouds, poses, and the record of the stages.
 
 use camera_model::{Camera, OrganisedCloud, euler_from_pose, step_pose};
-use icp_registration::{PairAlignment, Placements, RefusedPair};
+use multiview_registration::{PairAlignment, Placements, RefusedPair};
 use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, Vector3};
 use range_io::survey::Survey;
 use range_io::tables::Station;

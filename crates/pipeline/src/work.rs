@@ -1,7 +1,7 @@
 //! The state that stages pass on.
 
 use camera_model::{Camera, RayTable};
-use icp_registration::Cloud;
+use point_cloud::Cloud;
 use range_io::calibration::Calibration;
 
 use crate::outcome::Outcome;

@@ -13,5 +13,6 @@ pub use error::{Error, Result};
 pub use nalgebra;
 pub use neighbours::{Neighbour, NeighbourTree, check_points, is_usable};
 pub use normals::{
-    OrganisedNormalOptions, UnorganisedNormalOptions, no_normal, normals_with_tree, organised_normals, unorganised_normals,
+    OrganisedNormalOptions, UnorganisedNormalOptions, no_normal, normals_with_tree, organised_normals,
+    unorganised_normals,
 };

@@ -8,7 +8,6 @@
     missing_docs
 )]
 
-#[path = "../../icp-registration/tests/common/scene.rs"]
 mod common;
 mod neighbours;
 mod normals;

@@ -1,7 +1,7 @@
 //! Nearest neighbours against a search through all points.
 
-use point_cloud::{Error, NeighbourTree};
 use nalgebra::Point3;
+use point_cloud::{Error, NeighbourTree};
 use proptest::prelude::*;
 
 /// Coordinates on a coarse lattice: many ties, duplicates and points with a coordinate in common.

@@ -1,10 +1,8 @@
 //! Normals of frames and clouds.
 
 use crate::common::{Cuboid, Pinhole, Scene, frame, look_at};
-use point_cloud::{
-    Error, OrganisedNormalOptions, UnorganisedNormalOptions, organised_normals, unorganised_normals,
-};
 use nalgebra::{Point3, Vector3};
+use point_cloud::{Error, OrganisedNormalOptions, UnorganisedNormalOptions, organised_normals, unorganised_normals};
 
 fn corner() -> Scene {
     Scene { room: Cuboid::new([-3.0, -3.0, 0.0], [3.0, 3.0, 3.0]), boxes: vec![] }

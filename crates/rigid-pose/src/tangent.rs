@@ -46,11 +46,7 @@ pub fn symmetrised(m: &Matrix6<f64>) -> Matrix6<f64> {
 /// Jacobian from motions `[dt, rho w]` about the point `centre` (target axes, rotation scaled by the radius `rho`) to
 /// the tangent `[dt, dtheta]` of `target_from_source`.
 #[must_use]
-pub fn tangent_from_centred(
-    target_from_source: &Isometry3<f64>,
-    centre: &Vector3<f64>,
-    radius: f64,
-) -> Matrix6<f64> {
+pub fn tangent_from_centred(target_from_source: &Isometry3<f64>, centre: &Vector3<f64>, radius: f64) -> Matrix6<f64> {
     let lever = target_from_source.translation.vector - centre;
     let r_transposed = target_from_source.rotation.to_rotation_matrix().into_inner().transpose();
     let mut jacobian = Matrix6::zeros();

@@ -1,11 +1,11 @@
 //! Closed-form absolute orientation.
 
-use rigid_pose::{Error, absolute_orientation, absolute_orientation_with_scale, pose_difference};
 use nalgebra::{Isometry3, Matrix6, Point3, Translation3, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
+use rigid_pose::{Error, absolute_orientation, absolute_orientation_with_scale, pose_difference};
 
 fn random_points(n: usize, spread: f64, random: &mut Pcg64) -> Vec<Point3<f64>> {
     (0..n).map(|_| Point3::from(Vector3::from_fn(|_, _| spread * normal(random)))).collect()

@@ -1,10 +1,10 @@
 //! The four closed forms that `[Eggert1997]` compares: noise, degenerate sets, and what rounding does.
 
-use rigid_pose::{Error, RotationMethod, absolute_orientation_by, pose_difference};
 use nalgebra::{Isometry3, Point3, Vector3};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
+use rigid_pose::{Error, RotationMethod, absolute_orientation_by, pose_difference};
 
 const METHODS: [RotationMethod; 4] = [
     RotationMethod::UnitQuaternion,

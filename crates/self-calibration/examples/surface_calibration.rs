@@ -6,7 +6,7 @@
 #[path = "../tests/support/round.rs"]
 mod round;
 
-use icp_registration::Datum;
+use multiview_registration::Datum;
 use self_calibration::{SurfaceCalibrationOptions, SurfaceCapture, SurfaceTerm, calibrate_surfaces};
 
 const TRUTH: [(&str, f64); 3] = [("d0", 0.024), ("d4", 0.006), ("d5", -0.005)];

@@ -122,7 +122,7 @@ pub enum Error {
         /// Which station, or all.
         station: String,
         /// Why.
-        reason: icp_registration::Error,
+        reason: multiview_registration::Error,
     },
     /// No hyperbola runs anywhere near the residuals.
     #[error("no start values for h1, h2, h3: {reason}")]

@@ -1,7 +1,7 @@
 //! Range terms estimated together with the poses from surfaces that several stations see.
 
 use crate::round;
-use icp_registration::Datum;
+use multiview_registration::Datum;
 use self_calibration::{
     Error, SurfaceCalibration, SurfaceCalibrationOptions, SurfaceCapture, SurfaceTerm, calibrate_surfaces,
 };
@@ -26,7 +26,7 @@ fn calibrate(
 }
 
 /// Largest error of a position relative to the first station, metre.
-fn position_error(registration: &icp_registration::StationRegistration, stations: usize) -> f64 {
+fn position_error(registration: &multiview_registration::StationRegistration, stations: usize) -> f64 {
     let truth = round::poses(stations);
     let relative = |poses: &[nalgebra::Isometry3<f64>], k: usize| poses[0].inverse() * poses[k];
     (1..stations)

@@ -57,13 +57,8 @@ pub(crate) struct Example(PathBuf);
 
 impl Example {
     pub(crate) fn build(package: &str, name: &str) -> Result<Self, String> {
-        Self::build_with(package, name, "")
-    }
-
-    /// With features of the package, separated by commas.
-    pub(crate) fn build_with(package: &str, name: &str, features: &str) -> Result<Self, String> {
         let command =
-            ["build", "--release", "--quiet", "--package", package, "--example", name, "--features", features];
+            ["build", "--release", "--quiet", "--package", package, "--example", name];
         crate::shell::cargo(&command, &[])?;
         let target = std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| root().join("target"), PathBuf::from);
         Ok(Self(target.join("release/examples").join(name)))

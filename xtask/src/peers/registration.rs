@@ -27,7 +27,7 @@ struct Stage {
 
 pub(crate) fn run(runs: usize) -> Outcome {
     let Some(environment) = Environment::if_possible("registration") else { return Ok(()) };
-    let ours = Example::build_with("icp-registration", "registration_peers", "multiview")?;
+    let ours = Example::build("tracking", "registration_peers")?;
     let folder = Folder::new("registration")?;
     let mut stage = Stage { environment, ours, folder: folder.text(), runs, kinect: false, laser: false };
     stage.make_frames()?;

@@ -36,7 +36,7 @@ pub(crate) fn run(runs: usize) -> Outcome {
     if capture("sevenscenes_redkitchen_dense").is_none() {
         return Ok(());
     }
-    let ours = Example::build_with("icp-registration", "registration_peers", "multiview")?;
+    let ours = Example::build("tracking", "registration_peers")?;
     let folder = Folder::new("registration_real")?;
     let stage = Stage { environment, ours, folder: folder.text(), runs };
     stage.write("dense_kitchen")?;

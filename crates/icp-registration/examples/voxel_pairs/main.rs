@@ -4,7 +4,7 @@
 //! [easy] [dense COLUMNS RUNS FIRST] [lidar TARGET SOURCE]`; without words everything but the last two. Lidar scans are files of x, y, z as 64 bit floats.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout, missing_docs)]
 
-#[path = "../../tests/common/mod.rs"]
+#[path = "../../../point-cloud/tests/common/mod.rs"]
 mod common;
 mod scenes;
 
@@ -12,10 +12,11 @@ use std::time::Duration;
 
 use common::{Pinhole, frame_pair, pose_error};
 use icp_registration::{
-    Cloud, IcpOptions, IcpResult, Metric, MotionKind, Result, VoxelAlignmentOptions, VoxelCloud, VoxelOptions, align,
-    pose_difference,
+    IcpOptions, IcpResult, Metric, MotionKind, Result, VoxelAlignmentOptions, VoxelCloud, VoxelOptions, align,
 };
 use nalgebra::{Isometry3, Matrix6, Point3, Vector6};
+use point_cloud::Cloud;
+use rigid_pose::pose_difference;
 use scenes::{
     Views, bare, corridor, cylinder, far_off, half_overlapping, one_wall, parallel_walls, repeated, sphere,
     wall_and_floor,

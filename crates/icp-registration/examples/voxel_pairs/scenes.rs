@@ -1,8 +1,8 @@
 //! Pairs of clouds with truth, and clouds that do not determine a pose.
 #![allow(dead_code)]
 
-use icp_registration::Cloud;
 use nalgebra::{Isometry3, Matrix6, Point3, Vector3, Vector6};
+use point_cloud::Cloud;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 

@@ -1,33 +1,25 @@
 //! The iterative closest point algorithm: the easy tier, and the engine that runs the parts.
 
-mod descent;
-mod matching;
+mod engine;
 pub(crate) mod motion;
-mod options;
 mod prior;
-mod quality;
-mod registration;
-mod result;
-mod sensitivity;
 mod starts;
-mod system;
-mod target;
 mod validation;
 
-pub use descent::{Alternative, Levels};
+pub use engine::descent::{Alternative, Levels};
+pub use engine::options::{DegeneracyPolicy, IcpOptions, Metric, Selection};
+pub use engine::registration::Registration;
+pub use engine::result::{IcpResult, StopReason};
+pub use engine::system::System;
+pub use engine::target::IcpTarget;
 pub use motion::{MotionKind, UndeterminedMotion};
-pub use options::{DegeneracyPolicy, IcpOptions, Metric, Selection};
-pub use registration::Registration;
-pub use result::{IcpResult, StopReason};
 pub use starts::Starts;
-pub use system::System;
-pub use target::IcpTarget;
 
 use nalgebra::Isometry3;
 
-use point_cloud::Cloud;
 use crate::error::Result;
 use crate::voxels::{VoxelCloud, VoxelOptions};
+use point_cloud::Cloud;
 
 /// Aligns `source` with `target`, starting at `guess` (both poses `target_from_source`).
 ///

@@ -1,6 +1,6 @@
 //! Refuses parts whose parameters are outside their domain.
 
-use super::options::DegeneracyPolicy;
+use super::engine::options::DegeneracyPolicy;
 use super::{Levels, Registration, prior};
 use crate::error::{Error, Result};
 use crate::parts::Scene;

@@ -18,7 +18,7 @@ impl Tree {
     /// Vertices must be finite, indices in range.
     pub fn new(vertices: &[Point3<f64>], triangles: Vec<[u32; 3]>) -> Result<Self> {
         let mesh = TriMesh::new(vertices.iter().map(to_parry).collect(), triangles);
-        mesh.map(Self).map_err(|error| Error::Tree(error.to_string()))
+        mesh.map(Self).map_err(|error| Error::Cloud(point_cloud::Error::Tree(error.to_string())))
     }
 
     /// Index of the closest triangle and the point on it, if there is one within the limit. The query must be finite.

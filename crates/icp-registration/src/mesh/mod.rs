@@ -5,8 +5,8 @@ mod bridge;
 use nalgebra::{Point3, Vector3};
 
 use crate::error::{Error, Result};
-use point_cloud::check_points;
 use crate::parts::{Partner, PointMatching, Query, TargetSurface};
+use point_cloud::check_points;
 
 /// Triangles with a search tree over them, metre.
 pub struct TriangleMesh {

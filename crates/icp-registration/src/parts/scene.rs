@@ -22,7 +22,7 @@ pub struct Scene<'a> {
 impl Scene<'_> {
     /// The same surfaces at another moment.
     #[must_use]
-    pub(crate) fn at(&self, moment: Moment) -> Self {
+    pub fn at(&self, moment: Moment) -> Self {
         Self { moment, ..*self }
     }
 }

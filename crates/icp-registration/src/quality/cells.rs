@@ -11,8 +11,10 @@ const LOST_DEGREES: f64 = 7.0;
 
 /// Frame of motions `[dt, rho w]`: the rotation about `centre`, multiplied by the radius, so that all six are lengths.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Centred {
+pub struct Centred {
+    /// The point, metre.
     pub centre: Vector3<f64>,
+    /// The radius by which rotations are multiplied, metre.
     pub radius_m: f64,
 }
 

@@ -2,29 +2,33 @@
 
 use nalgebra::{DMatrix, DVector, Matrix6, Vector3, Vector6};
 
-use rigid_pose::eigen6;
 use crate::error::Result;
 use crate::icp::UndeterminedMotion;
 use crate::icp::motion::name_motions;
+use rigid_pose::eigen6;
 use rigid_pose::symmetrised;
 
 /// Information below this multiple of its own scatter between cells counts as none.
-pub(crate) const SIGNIFICANCE: f64 = 2.5;
+pub const SIGNIFICANCE: f64 = 2.5;
 /// Cells below which their scatter is no estimate.
-pub(crate) const FEWEST_CELLS: usize = 20;
+pub const FEWEST_CELLS: usize = 20;
 
 /// One eigen-direction of the information.
-pub(crate) struct Direction {
+#[derive(Debug, Clone, Copy)]
+pub struct Direction {
     /// Unit motion `[dt, rho w]`.
     pub vector: Vector6<f64>,
+    /// Eigenvalue of the information along it, 1/metre².
     pub information: f64,
     /// Predicted standard deviation, metre; infinite where the information differs from nothing by too little.
     pub sigma_m: f64,
+    /// Whether the standard deviation is below the limit.
     pub determined: bool,
 }
 
 /// Directions of the information, worst first, with the covariance of the score.
-pub(crate) struct Directions {
+#[derive(Debug, Clone)]
+pub struct Directions {
     all: Vec<Direction>,
     score: Matrix6<f64>,
 }
@@ -36,6 +40,9 @@ impl Directions {
     /// `score`: covariance of the score from the inverse of the information along significant directions, and the factor
     /// by which few degrees of freedom enlarge it. `significant`: whether what the cells say along a unit motion stands
     /// out from its scatter between them. `rounding`: share of the largest information that rounding can imitate.
+    ///
+    /// # Errors
+    /// [`Error::Pose`](crate::Error::Pose) where the information is not finite.
     pub fn new(
         information: &Matrix6<f64>,
         score: impl Fn(&Matrix6<f64>) -> (Matrix6<f64>, f64),
@@ -97,7 +104,7 @@ impl Directions {
 }
 
 /// A matrix along the columns of `basis` as one of all six motions.
-pub(crate) fn expanded(basis: &DMatrix<f64>, inside: &DMatrix<f64>) -> Matrix6<f64> {
+pub fn expanded(basis: &DMatrix<f64>, inside: &DMatrix<f64>) -> Matrix6<f64> {
     let full = basis * inside * basis.transpose();
     Matrix6::from_fn(|r, c| full[(r, c)])
 }

@@ -11,13 +11,14 @@ mod cells;
 mod directions;
 mod verdict;
 
-pub(crate) use cells::{Cells, Centred};
-pub(crate) use directions::{Direction, Directions, FEWEST_CELLS, SIGNIFICANCE, expanded};
+pub(crate) use cells::Cells;
+pub use cells::Centred;
+pub use directions::{Direction, Directions, FEWEST_CELLS, SIGNIFICANCE, expanded};
 pub(crate) use verdict::Verdict;
 
 /// What the residuals consist of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Residuals {
+pub enum Residuals {
     /// The surfaces are still apart: what neighbouring residuals share is no error, and would hold what can be solved.
     Misaligned,
     /// Errors: what neighbouring residuals share counts.

@@ -9,8 +9,8 @@ use super::wide::{RULES, Wide};
 use crate::error::{Error, Result};
 use crate::icp::{DegeneracyPolicy, IcpResult, StopReason};
 use crate::kernel::RobustKernel;
-use rigid_pose::{is_finite, move_about};
 use crate::quality::{Centred, Residuals, Verdict};
+use rigid_pose::{is_finite, move_about};
 
 /// Iterations that a coarse level may take.
 const LEVEL_ITERATIONS: usize = 8;

@@ -1,13 +1,13 @@
 //! A cloud prepared for registration.
 
-use super::gather::gather;
-use super::lattice::{Lattice, bounds};
 use super::level::Level;
-use super::moments::Moments;
+use super::numerics::gather::gather;
+use super::numerics::lattice::{Lattice, bounds};
+use super::numerics::moments::Moments;
 use super::options::VoxelOptions;
 use super::scale::voxel_size;
-use point_cloud::Cloud;
 use crate::error::{Error, Result};
+use point_cloud::Cloud;
 
 /// Levels end when so few voxels are left.
 const FEWEST_VOXELS: usize = 150;

@@ -2,10 +2,10 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::gather::{Sum, gather};
-use super::lattice::{Lattice, cell};
-use point_cloud::Cloud;
+use super::numerics::gather::{Sum, gather};
+use super::numerics::lattice::{Lattice, cell};
 use crate::error::Result;
+use point_cloud::Cloud;
 use point_cloud::no_normal;
 
 /// Normals whose mean is shorter than this point to opposite sides (or all around): there is no common one.

@@ -3,9 +3,9 @@
 use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 
-use super::blocks::Blocks;
-use super::lattice::{Lattice, cell};
-use super::moments::Moments;
+use super::numerics::blocks::Blocks;
+use super::numerics::lattice::{Lattice, cell};
+use super::numerics::moments::Moments;
 use point_cloud::{eigenvalues3, eigenvector3};
 
 /// Voxels handled together by one thread; fixed, so that sums do not depend on the number of threads.

@@ -1,13 +1,10 @@
 //! Unorganised clouds in cubes of space: averages, and registration by what the points of each cube look like.
 
 mod align;
-mod blocks;
 mod cloud;
 mod downsample;
-mod gather;
-mod lattice;
 mod level;
-mod moments;
+mod numerics;
 mod options;
 mod pairs;
 mod samples;

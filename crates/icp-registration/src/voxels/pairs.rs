@@ -4,13 +4,13 @@ use nalgebra::{Isometry3, Matrix6, Vector3, Vector6};
 use rayon::prelude::*;
 use statistics::mad_scale;
 
-use super::lattice::Lattice;
 use super::level::{CHUNK, Level};
-use rigid_pose::eigen6;
+use super::numerics::lattice::Lattice;
 use crate::error::Result;
 use crate::kernel::RobustKernel;
-use rigid_pose::symmetrised;
 use crate::quality::{Cells, Centred};
+use rigid_pose::eigen6;
+use rigid_pose::symmetrised;
 
 /// Partners farther apart than this many voxels belong to different things.
 pub(crate) const REACH: f64 = 1.5;

@@ -7,8 +7,8 @@
 use nalgebra::Point3;
 use statistics::upper_median;
 
-use super::gather::{Sum, gather};
-use super::lattice::{Bounds, Lattice};
+use super::numerics::gather::{Sum, gather};
+use super::numerics::lattice::{Bounds, Lattice};
 use crate::error::Result;
 
 /// Points looked at.

@@ -5,10 +5,10 @@ use nalgebra::{Isometry3, Matrix6, Vector3, Vector6};
 
 use super::level::{Level, Voxel};
 use super::samples::{Samples, Sought};
-use rigid_pose::eigen6;
 use crate::error::Result;
-use rigid_pose::{move_about, symmetrised};
 use crate::quality::Centred;
+use rigid_pose::eigen6;
+use rigid_pose::{move_about, symmetrised};
 
 /// Samples of the source and of the target.
 const SOURCE_SAMPLES: usize = 400;

@@ -1,7 +1,9 @@
 //! Input that has no answer gets a typed one.
 
-use icp_registration::{Cloud, Error, IcpResult, Result, VoxelAlignmentOptions, VoxelCloud, VoxelOptions};
+use icp_registration::{Error, IcpResult, Result, VoxelAlignmentOptions, VoxelCloud, VoxelOptions};
 use nalgebra::{Isometry3, Point3, Vector3};
+use point_cloud::Cloud;
+use point_cloud::Error as CloudError;
 
 use super::scenes::bare;
 use crate::common::{Pinhole, frame_pair};
@@ -24,8 +26,10 @@ fn clouds_without_an_answer() {
             assert!(is(&error), "{error}");
         }
     };
-    both(&Cloud::default(), &|e| matches!(e, Error::Empty { .. }));
-    both(&Cloud::new(vec![Point3::new(f64::NAN, 0.0, 0.0); 30]), &|e| matches!(e, Error::NonFinite { index: 0, .. }));
+    both(&Cloud::default(), &|e| matches!(e, Error::Cloud(CloudError::Empty { .. })));
+    both(&Cloud::new(vec![Point3::new(f64::NAN, 0.0, 0.0); 30]), &|e| {
+        matches!(e, Error::Cloud(CloudError::NonFinite { index: 0, .. }))
+    });
     let few = |e: &Error| matches!(e, Error::TooFewCorrespondences { .. });
     both(&Cloud::new(vec![Point3::new(0.0, 0.0, -1.0)]), &few);
     both(&Cloud::new(vec![Point3::new(0.0, 0.0, -1.0); 500]), &few);
@@ -33,7 +37,9 @@ fn clouds_without_an_answer() {
     both(&good.transformed(&Isometry3::translation(0.0, 1e6, 0.0)), &few);
     let rim = Cloud { rim: Some(vec![true; good.len()]), ..good.clone() };
     both(&rim, &|e| matches!(e, Error::Empty { .. }));
-    both(&Cloud { normals: Some(vec![]), ..good.clone() }, &|e| matches!(e, Error::LengthMismatch { .. }));
+    both(&Cloud { normals: Some(vec![]), ..good.clone() }, &|e| {
+        matches!(e, Error::Cloud(CloudError::LengthMismatch { .. }))
+    });
 }
 
 #[test]

@@ -1,7 +1,9 @@
 //! Poses against exact truth.
 
-use icp_registration::{Cloud, VoxelAlignmentOptions, pose_difference};
+use icp_registration::VoxelAlignmentOptions;
 use nalgebra::{Isometry3, Point3};
+use point_cloud::Cloud;
+use rigid_pose::pose_difference;
 
 use super::register;
 use super::scenes::{Views, bare, far_off, half_overlapping, repeated};

@@ -1,7 +1,8 @@
 //! Real scans, read where they lie; skipped with a word where they are missing.
 
-use icp_registration::{Cloud, NeighbourTree, VoxelAlignmentOptions, VoxelCloud, VoxelOptions};
+use icp_registration::{VoxelAlignmentOptions, VoxelCloud, VoxelOptions};
 use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
+use point_cloud::{Cloud, NeighbourTree};
 
 use crate::scans::{median_distance, points, pose_of_rows, real};
 

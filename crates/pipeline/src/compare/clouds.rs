@@ -2,8 +2,9 @@
 
 use std::path::Path;
 
-use icp_registration::{Cloud, IcpOptions, Metric, NeighbourTree, Selection, StopReason, align};
+use icp_registration::{IcpOptions, Metric, Selection, StopReason, align};
 use nalgebra::{Isometry3, Point3, Vector3};
+use point_cloud::{Cloud, NeighbourTree};
 use range_io::clouds::read_any_cloud;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -134,7 +135,7 @@ pub(super) fn compare(
         Some(alignment)
     };
     progress.advance(2);
-    let wrong = |error: icp_registration::Error| Error::comparison(&second.display().to_string(), &error);
+    let wrong = |error: point_cloud::Error| Error::comparison(&second.display().to_string(), &error);
     let tree = NeighbourTree::new(&reference.cloud.points).map_err(wrong)?;
     let nearest = each(&ours.cloud.points, |point| Ok(tree.nearest(point)?.distance_m)).map_err(wrong)?;
     progress.advance(3);
@@ -196,8 +197,8 @@ fn prepared(path: &Path) -> Result<Prepared> {
 /// A value for each point; the same whatever the number of threads.
 fn each(
     points: &[Point3<f64>],
-    value: impl Fn(&Point3<f64>) -> icp_registration::Result<f64> + Sync + Send,
-) -> icp_registration::Result<Vec<f64>> {
+    value: impl Fn(&Point3<f64>) -> point_cloud::Result<f64> + Sync + Send,
+) -> point_cloud::Result<Vec<f64>> {
     points.par_iter().with_min_len(CHUNK).map(value).collect()
 }
 

@@ -1,7 +1,7 @@
 //! Signed distances to the surface that a cloud samples.
 
-use icp_registration::{Cloud, NeighbourTree, Result};
 use nalgebra::{Matrix3, Point3, SymmetricEigen, Vector3};
+use point_cloud::{Cloud, NeighbourTree, Result};
 
 /// Neighbours that a plane is laid through.
 const NEIGHBOURS: usize = 10;

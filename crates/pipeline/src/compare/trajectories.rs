@@ -2,13 +2,13 @@
 
 use std::path::Path;
 
-use icp_registration::{
-    AbsoluteTrajectoryError, ErrorStatistics, RelativePoseError, RelativeStep, TrajectoryAlignment,
-    TrajectoryErrorOptions, absolute_trajectory_error, relative_pose_error,
-};
 use nalgebra::Isometry3;
 use range_io::trajectory::read_any_trajectory;
 use serde::Serialize;
+use tracking::{
+    AbsoluteTrajectoryError, ErrorStatistics, RelativePoseError, RelativeStep, TrajectoryAlignment,
+    TrajectoryErrorOptions, absolute_trajectory_error, relative_pose_error,
+};
 
 use super::{CompareAlignment, CompareRequest};
 use crate::{Error, Result};
@@ -103,7 +103,7 @@ pub(super) fn compare(
     request: &CompareRequest,
 ) -> Result<(TrajectoryComparison, TrackCurves)> {
     let (ours, truth) = (stamped(first)?, stamped(second)?);
-    let wrong = |error: icp_registration::Error| {
+    let wrong = |error: tracking::Error| {
         let (first, second) = (first.display(), second.display());
         Error::comparison(&format!("{first} against {second}"), &error)
     };
@@ -155,7 +155,7 @@ fn stamped(path: &Path) -> Result<Vec<Stamped>> {
     Ok(poses.iter().map(|pose| (pose.timestamp_s, pose.world_from_camera)).collect())
 }
 
-fn point(pose: &icp_registration::MatchedPose, truth: &[Stamped], all: &AbsoluteTrajectoryError) -> TrackPoint {
+fn point(pose: &tracking::MatchedPose, truth: &[Stamped], all: &AbsoluteTrajectoryError) -> TrackPoint {
     TrackPoint {
         time_s: pose.timestamp_s - start(all),
         ours: pose.aligned.translation.vector.into(),
@@ -166,7 +166,7 @@ fn point(pose: &icp_registration::MatchedPose, truth: &[Stamped], all: &Absolute
 }
 
 fn steps(error: &RelativePoseError, all: &AbsoluteTrajectoryError) -> Vec<[f64; 3]> {
-    let value = |step: &icp_registration::RelativeError| {
+    let value = |step: &tracking::RelativeError| {
         [step.timestamps_s[0] - start(all), step.translation_error_m, step.rotation_error_rad.to_degrees()]
     };
     error.steps.iter().map(value).collect()

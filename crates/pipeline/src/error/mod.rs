@@ -177,18 +177,18 @@ impl Error {
     }
 
     /// What a registration says of the things that `what` names: a finding, or a slip in what was asked for.
-    pub(crate) fn registration(what: &str, error: &icp_registration::Error) -> Self {
+    pub(crate) fn registration(what: &str, error: &(dyn std::error::Error + 'static)) -> Self {
         let message = format!("{what}: {error}");
-        match failure::of_registration(error) {
+        match failure::of_source(error) {
             Failure::Usage => Self::Request { command: "register", message },
             _ => Self::Register(message),
         }
     }
 
     /// What a comparison says of the things that `what` names: a finding, or a slip in what was asked for.
-    pub(crate) fn comparison(what: &str, error: &icp_registration::Error) -> Self {
+    pub(crate) fn comparison(what: &str, error: &(dyn std::error::Error + 'static)) -> Self {
         let message = format!("{what}: {error}");
-        match failure::of_registration(error) {
+        match failure::of_source(error) {
             Failure::Usage => Self::Compare(message),
             _ => Self::NothingInCommon(message),
         }

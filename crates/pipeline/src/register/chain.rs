@@ -36,8 +36,9 @@ mod tests {
     // Panics are how a test fails.
     #![allow(clippy::unwrap_used)]
 
-    use icp_registration::{StopReason, pose_difference, step_pose};
+    use icp_registration::StopReason;
     use nalgebra::{UnitQuaternion, Vector3, Vector6};
+    use rigid_pose::{pose_difference, step_pose};
 
     use super::*;
 

@@ -1,6 +1,7 @@
 //! Results in words and figures that a reader understands without the program.
 
-use icp_registration::{MotionKind, Placement, StationPlacement, UndeterminedMotion};
+use icp_registration::{MotionKind, UndeterminedMotion};
+use multiview_registration::{Placement, StationPlacement};
 use nalgebra::Isometry3;
 
 use super::input::Station;

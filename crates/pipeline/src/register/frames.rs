@@ -1,9 +1,8 @@
 //! All stations at once by pairs of their frames, where surfaces differ by more than the noise of their points.
 
-use icp_registration::{
-    FrameAlignmentOptions, FrameRegistration, OrganisedFrame, PairAlignment, Start, register_frames,
-};
+use multiview_registration::{FrameRegistration, PairAlignment, Start, register_frames};
 use nalgebra::Isometry3;
+use projective_registration::{FrameAlignmentOptions, OrganisedFrame};
 use rayon::prelude::*;
 
 use super::input::Station;

@@ -4,8 +4,9 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use camera_model::{Camera, OrganisedCloud, RayTable};
-use icp_registration::{Cloud, OrganisedNormalOptions, Projection, organised_normals};
 use nalgebra::{Isometry3, Vector3};
+use point_cloud::{Cloud, OrganisedNormalOptions, organised_normals};
+use projective_registration::Projection;
 use range_io::calibration::Calibration;
 use range_io::clouds::{CloudFile, read_any_cloud};
 use range_io::survey::{Level, Survey};
@@ -252,7 +253,7 @@ impl Station {
     /// come from.
     pub(crate) fn cloud(&self, normal_half_width_px: usize, windows: Windows) -> Result<Cloud> {
         let points = self.usable_points();
-        let fail = |error: icp_registration::Error| Error::registration(&self.name, &error);
+        let fail = |error: point_cloud::Error| Error::registration(&self.name, &error);
         let normals = match (&self.file.normals, self.file.size) {
             (Some(normals), _) => Some(normals.iter().map(|n| Vector3::from(n.map(f64::from))).collect()),
             (None, Some([width, height])) => {

@@ -92,7 +92,8 @@ fn align(stations: &[Station], surfaces: &[Surface], source: usize) -> Result<Al
     if let Some(result) = from_stated.as_ref().filter(|result| result.is_trustworthy()) {
         return Ok(Aligned { result: result.clone(), guess_failed: false });
     }
-    let found = onto.search(moved).and_then(|start| onto.align(moved, start));
+    let found = onto.search(moved).map_err(multiview_registration::Error::from);
+    let found = found.and_then(|start| Ok(onto.align(moved, start)?));
     if let Some(result) = from_stated
         && !found.as_ref().is_ok_and(|found| found.overlap > result.overlap)
     {

@@ -37,7 +37,12 @@ impl Tried {
 }
 
 /// The error of a stage, with names for numbers.
-pub(crate) fn of_stage(stage: &'static str, error: icp_registration::Error, names: &[String], tried: Tried) -> Error {
+pub(crate) fn of_stage(
+    stage: &'static str,
+    error: multiview_registration::Error,
+    names: &[String],
+    tried: Tried,
+) -> Error {
     match words(&error, names, tried) {
         Some(words) => Error::stage(stage, "all stations")(words),
         None => Error::stage(stage, "all stations")(error),
@@ -45,13 +50,13 @@ pub(crate) fn of_stage(stage: &'static str, error: icp_registration::Error, name
 }
 
 /// The error of the command, with names for numbers.
-pub(crate) fn of_command(error: &icp_registration::Error, names: &[String], tried: Tried) -> Error {
+pub(crate) fn of_command(error: &multiview_registration::Error, names: &[String], tried: Tried) -> Error {
     words(error, names, tried).map_or_else(|| Error::registration("all stations", error), Error::Register)
 }
 
 /// What to say of stations that nothing connects; `None` for other errors, which speak for themselves. Stations of one
 /// name are told apart by their position.
-fn words(error: &icp_registration::Error, names: &[String], tried: Tried) -> Option<String> {
+fn words(error: &multiview_registration::Error, names: &[String], tried: Tried) -> Option<String> {
     let name = |index: usize| match names.get(index) {
         Some(name) if names.iter().filter(|other| *other == name).count() > 1 => {
             format!("{name} (number {})", index + 1)
@@ -59,7 +64,7 @@ fn words(error: &icp_registration::Error, names: &[String], tried: Tried) -> Opt
         Some(name) => name.clone(),
         None => format!("number {}", index + 1),
     };
-    let icp_registration::Error::UnconnectedStations { stations, to, reasons } = error else {
+    let multiview_registration::Error::UnconnectedStations { stations, to, reasons } = error else {
         return None;
     };
     let lost: Vec<String> = stations.iter().map(|&index| name(index)).collect();
@@ -89,7 +94,7 @@ mod tests {
     #[test]
     fn stations_of_one_name_are_told_apart_and_each_has_its_reason() {
         let names = ["Y1", "Y1", "Y2"].map(str::to_owned);
-        let error = icp_registration::Error::UnconnectedStations {
+        let error = multiview_registration::Error::UnconnectedStations {
             stations: vec![1, 2],
             to: 0,
             reasons: vec!["shares 3 tiles".to_owned(), "shares none".to_owned()],
@@ -99,7 +104,8 @@ mod tests {
         assert!(found.contains("right to 0.5 m") && found.contains("Y2: shares none"), "{found}");
         assert!(words(&error, &names, Tried::Order).unwrap().contains("give start poses"), "{found}");
         assert!(
-            words(&icp_registration::Error::NoSuchStation { station: 3, count: 2 }, &names, Tried::Order).is_none()
+            words(&multiview_registration::Error::NoSuchStation { station: 3, count: 2 }, &names, Tried::Order)
+                .is_none()
         );
     }
 }

@@ -1,10 +1,11 @@
 //! All stations at once.
 
-use icp_registration::Error::UnconnectedStations;
-use icp_registration::{
-    Cloud, Datum, Start, StationRegistration, StationRegistrationOptions, SurfacePair, register_stations,
+use multiview_registration::Error::UnconnectedStations;
+use multiview_registration::{
+    Datum, Start, StationRegistration, StationRegistrationOptions, SurfacePair, register_stations,
 };
 use nalgebra::{Isometry3, Point3};
+use point_cloud::Cloud;
 use rayon::prelude::*;
 
 use super::input::{Input, Station, Windows};

@@ -2,12 +2,13 @@
 
 use std::sync::Arc;
 
+use global_registration::{CoarseOptions, FeatureCloud, Viewpoint, align_without_guess};
 use icp_registration::{
-    Cloud, CoarseOptions, DegeneracyPolicy, FeatureCloud, FrameAlignmentOptions, IcpOptions, IcpResult, IcpTarget,
-    OrganisedFrame, Projection, Viewpoint, VoxelAlignmentOptions, VoxelCloud, VoxelOptions, align_frames,
-    align_without_guess, frame_consistency,
+    DegeneracyPolicy, IcpOptions, IcpResult, IcpTarget, VoxelAlignmentOptions, VoxelCloud, VoxelOptions,
 };
 use nalgebra::{Isometry3, Point3};
+use point_cloud::Cloud;
+use projective_registration::{FrameAlignmentOptions, OrganisedFrame, Projection, align_frames, frame_consistency};
 
 use super::input::{Station, Windows};
 use crate::{Error, Result};
@@ -58,7 +59,7 @@ impl Surface {
     }
 
     /// Looks for `self_from_source` where nothing is known of it.
-    pub(super) fn search(&self, source: &Self) -> icp_registration::Result<Start> {
+    pub(super) fn search(&self, source: &Self) -> global_registration::Result<Start> {
         let options = CoarseOptions::default();
         let features = |surface: &Self| {
             let options = CoarseOptions { viewpoint: surface.viewpoint, ..options.clone() };

@@ -1,6 +1,6 @@
 //! The page of a tracked sequence.
 
-use icp_registration::TrackedPose;
+use tracking::TrackedPose;
 
 use super::canvas::{Axes, Canvas, span};
 use super::chart::{SIZE, Series, curves, to_scale};

@@ -1,4 +1,4 @@
-use icp_registration::{Datum, Start, StationRegistrationOptions, register_stations};
+use multiview_registration::{Datum, Start, StationRegistrationOptions, register_stations};
 use nalgebra::Isometry3;
 
 use super::Findings;

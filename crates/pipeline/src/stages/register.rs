@@ -1,7 +1,6 @@
-use icp_registration::{
-    Cloud, Datum, PairAlignment, RefusedPair, Start, StationRegistrationOptions, register_stations,
-};
+use multiview_registration::{Datum, PairAlignment, RefusedPair, Start, StationRegistrationOptions, register_stations};
 use nalgebra::Isometry3;
+use point_cloud::Cloud;
 use rayon::prelude::*;
 
 use super::Findings;

@@ -3,8 +3,8 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use icp_registration::Projection;
 use nalgebra::Isometry3;
+use projective_registration::Projection;
 use range_io::survey::Survey;
 
 use crate::compatible::Purpose;

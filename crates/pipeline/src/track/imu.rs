@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use icp_registration::{ImuIntegrator, ImuOptions, InertialSample, MotionPrior, TrackedPose};
 use nalgebra::Vector3;
 use range_io::survey::Survey;
 use range_io::tables::read_imu;
+use tracking::{ImuIntegrator, ImuOptions, InertialSample, MotionPrior, TrackedPose};
 
 use crate::register::guess::matrix;
 use crate::{Error, Result};
@@ -45,7 +45,7 @@ impl Inertial {
 
     /// The camera's motion since the frame before; `None` at the first frame, up to which the unit must rest.
     pub(super) fn motion(&mut self, timestamp_s: f64) -> Result<Option<MotionPrior>> {
-        let refused = |error: icp_registration::Error| {
+        let refused = |error: tracking::Error| {
             let what = format!(
                 "inertial data at {timestamp_s} s (without `{DATA}` among its extras the survey is tracked by its \
                  frames alone)"

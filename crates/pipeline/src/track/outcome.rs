@@ -1,7 +1,8 @@
 //! What tracking has made of each frame and of all of them.
 
-use icp_registration::{Cloud, LossReason, TrackedPose, TrackingState};
+use point_cloud::Cloud;
 use serde::Serialize;
+use tracking::{LossReason, TrackedPose, TrackingState};
 
 use super::summary::TrackSummary;
 use crate::outcome::StationPose;

@@ -1,11 +1,11 @@
 //! The files of a tracked sequence.
 
-use icp_registration::TrackedPose;
 use range_io::atomic::{Destination, write_text};
 use range_io::clouds::{CloudFile, Precision};
 use range_io::ply::write_cloud;
 use range_io::tables::{Station, write_stations};
 use range_io::trajectory::{StampedPose, write_tum};
+use tracking::TrackedPose;
 
 use super::outcome::{Tracked, station_pose};
 use crate::destination::json;

@@ -3,9 +3,10 @@
 use std::collections::BTreeMap;
 use std::time::Instant;
 
-use icp_registration::{Cloud, TrackedPose, Tracker, TrackerOptions, TrackingState};
+use point_cloud::Cloud;
 use range_io::atomic::Destination;
 use statistics::quantile;
+use tracking::{TrackedPose, Tracker, TrackerOptions, TrackingState};
 
 use super::frames::FrameSource;
 use super::imu::Inertial;
@@ -103,9 +104,7 @@ impl Run {
         let (station, timestamp_s) = (entry.station.clone(), entry.timestamp_s.unwrap_or_default());
         let read = self.source.read(index)?;
         let tracking = Instant::now();
-        let fail = |error: icp_registration::Error| {
-            Error::registration(&format!("frame {station} at {timestamp_s} s"), &error)
-        };
+        let fail = |error: tracking::Error| Error::registration(&format!("frame {station} at {timestamp_s} s"), &error);
         let before = self.tracker.as_ref().map_or(0, Tracker::keyframes);
         let pose = if let Some(tracker) = &mut self.tracker {
             let prior = self.inertial.as_mut().map(|inertial| inertial.motion(timestamp_s)).transpose()?.flatten();

@@ -2,10 +2,10 @@
 
 use std::fmt;
 
-use icp_registration::{TrackedPose, Tracker, TrajectoryAlignment, TrajectoryErrorOptions, absolute_trajectory_error};
 use nalgebra::Isometry3;
 use serde::Serialize;
 use statistics::quantile;
+use tracking::{TrackedPose, Tracker, TrajectoryAlignment, TrajectoryErrorOptions, absolute_trajectory_error};
 
 use super::outcome::{TrackLoss, TrackTruth, TrackVerdict, TrackedFrame};
 use crate::summary::millimetres;

@@ -1,7 +1,7 @@
 //! Whether the calibration of a broken network names what is wrong with it.
 
-use icp_registration::absolute_orientation;
 use nalgebra::{DVector, Isometry3, Point3, Vector6};
+use rigid_pose::absolute_orientation;
 use self_calibration::{
     CalibrationOptions, CalibrationOutcome, Cause, Component, Error, Network, NetworkDatum, TermSelection, Verdict,
     calibrate,

@@ -1,6 +1,6 @@
 use camera_model::Camera;
 use error_models::RangeErrorModel;
-use icp_registration::{Datum, SharedParameters, Start, StationRegistrationOptions, register_stations};
+use multiview_registration::{Datum, SharedParameters, Start, StationRegistrationOptions, register_stations};
 use nalgebra::Isometry3;
 
 use super::pixels::StationPixels;

@@ -16,7 +16,7 @@ pub use outcome::SurfaceCalibration;
 
 impl crate::Error {
     /// What the registration of this station, or all, failed with.
-    pub(crate) fn registration(station: &str, reason: icp_registration::Error) -> Self {
-        Self::Registration { station: station.to_owned(), reason }
+    pub(crate) fn registration(station: &str, reason: impl Into<multiview_registration::Error>) -> Self {
+        Self::Registration { station: station.to_owned(), reason: reason.into() }
     }
 }

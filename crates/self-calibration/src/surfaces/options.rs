@@ -1,5 +1,6 @@
-use icp_registration::{OrganisedNormalOptions, StationRegistrationOptions};
+use multiview_registration::StationRegistrationOptions;
 use nalgebra::Isometry3;
+use point_cloud::OrganisedNormalOptions;
 use range_image::{Flags, RangeFrame};
 
 use crate::{Error, Result};

@@ -1,5 +1,5 @@
 use error_models::{NamedParameter, RangeErrorModel};
-use icp_registration::{SharedParameters, StationRegistration};
+use multiview_registration::{SharedParameters, StationRegistration};
 use nalgebra::DMatrix;
 
 use crate::{Error, Result};

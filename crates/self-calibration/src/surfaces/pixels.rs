@@ -2,8 +2,8 @@
 
 use camera_model::Camera;
 use error_models::RangeErrorModel;
-use icp_registration::{Cloud, organised_normals};
 use nalgebra::Vector3;
+use point_cloud::{Cloud, organised_normals};
 use range_image::Flags;
 
 use super::{SurfaceCalibrationOptions, SurfaceCapture};
@@ -62,7 +62,7 @@ impl StationPixels {
             pixels.ranges_m.push(range - correction.total_m() + own);
             pixels.rows.extend(columns.iter().map(|&column| row[column] as f32));
         }
-        let fail = |error: icp_registration::Error| Error::registration(capture.name, error);
+        let fail = |error: point_cloud::Error| Error::registration(capture.name, error);
         let normals = organised_normals(&points, width, height, &options.normals).map_err(fail)?;
         let cloud = Cloud::from_frame(&points, Some(&normals), Some(frame.sigma.as_slice())).map_err(fail)?;
         Ok((pixels, cloud))

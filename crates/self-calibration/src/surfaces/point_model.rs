@@ -1,4 +1,4 @@
-use icp_registration::PointModel;
+use multiview_registration::PointModel;
 use nalgebra::Point3;
 
 use super::SurfaceTerm;

@@ -1,7 +1,7 @@
 //! Stations around a furnished room, their ranges with errors of Eq. 14.
 #![allow(dead_code, clippy::unwrap_used, clippy::expect_used, clippy::panic, missing_docs)]
 
-#[path = "../../../icp-registration/tests/common/mod.rs"]
+#[path = "../../../point-cloud/tests/common/mod.rs"]
 pub mod room;
 
 use camera_model::{Camera, InteriorOrientation, LensDistortion};

@@ -4,12 +4,12 @@ use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
 use super::{ErrorMetric, Row, Rows, normal_twins};
-use point_cloud::Cloud;
 use crate::error::{Error, Result};
 use crate::icp::IcpTarget;
+use crate::parts::scene::{Pair, Scene};
+use point_cloud::Cloud;
 use point_cloud::NeighbourTree;
 use point_cloud::{UnorganisedNormalOptions, normals_with_tree};
-use crate::parts::scene::{Pair, Scene};
 
 /// Points that an intensity gradient is fitted to.
 const NEIGHBOURS: usize = 16;

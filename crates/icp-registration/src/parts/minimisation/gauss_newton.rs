@@ -3,9 +3,9 @@
 use nalgebra::{Matrix6, Vector6};
 
 use super::Minimiser;
-use rigid_pose::eigen6;
 use crate::error::Result;
 use crate::icp::System;
+use rigid_pose::eigen6;
 use rigid_pose::symmetrised;
 
 /// Eigenvalues below this fraction of the largest are rounding: no step along them.

@@ -3,10 +3,10 @@
 use nalgebra::Point3;
 
 use super::PairRejection;
-use point_cloud::Cloud;
 use crate::error::{Error, Result};
-use point_cloud::NeighbourTree;
 use crate::parts::scene::{Pair, Scene};
+use point_cloud::Cloud;
+use point_cloud::NeighbourTree;
 
 /// Pairs whose target point lies at the rim of what was seen, or mixes two surfaces ([`Cloud::rim`]) `[TurkLevoy1994]`:
 /// points beyond the edge of the target all find their partner on the edge and pull the clouds together.

@@ -1,9 +1,9 @@
 //! Poses and points from observations among which some are grossly wrong.
 
 use adjust::SolveOptions;
-use icp_registration::absolute_orientation;
 use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 use orientation::{ResectionOptions, TargetObservation, approximate_poses, resect};
+use rigid_pose::absolute_orientation;
 use statistics::mad_scale;
 
 use super::misfit::{median, modelled_pixel};

@@ -2,8 +2,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use icp_registration::absolute_orientation;
 use nalgebra::{Isometry3, Point3};
+use rigid_pose::absolute_orientation;
 
 use super::catalogue::{of_sightings, of_tables};
 use super::contradiction::{Cause, CauseKind};

@@ -1,0 +1,187 @@
+//! A cloud prepared for alignment without a guess.
+
+use nalgebra::{Isometry3, Point3, Vector3};
+
+use crate::description::descriptors::DescriptorTable;
+use crate::description::features::Features;
+use crate::description::fpfh::fpfh;
+use crate::description::labels::Labels;
+use crate::description::reduced::Reduced;
+use crate::description::rsd::{SurfaceRadii, radii, rsd};
+use crate::options::{CoarseOptions, SurfaceDescriptors, Viewpoint};
+
+use crate::description::surface::Normals;
+use crate::description::surroundings::Surroundings;
+use crate::description::view::View;
+use crate::error::{Error, Result};
+use point_cloud::Cloud;
+
+/// Fewest averaged points.
+const LEAST_POINTS: usize = 10;
+/// Points that a pose is judged by.
+const SAMPLES: usize = 1500;
+
+/// Points with descriptors of one kind.
+#[derive(Debug, Clone)]
+pub(crate) struct FeatureSet {
+    pub(crate) points: Vec<[f32; 3]>,
+    pub(crate) normals: Vec<[f32; 3]>,
+    pub(crate) descriptors: DescriptorTable,
+}
+
+/// A cloud averaged in voxels with normals, descriptors and what is needed to judge a pose; made once and aligned with
+/// many others.
+#[derive(Debug, Clone)]
+pub struct FeatureCloud {
+    pub(crate) reduced: Reduced,
+    pub(crate) normals: Normals,
+    surroundings: Surroundings,
+    descriptor_radius: f32,
+    /// Root mean square distance of the averaged points from their middle, metre.
+    pub radius_m: f64,
+    viewpoint: Viewpoint,
+    /// One set for each kind of descriptor, in the order of [`SurfaceDescriptors`], then what was added.
+    pub(crate) surface_features: Vec<FeatureSet>,
+    pub(crate) added: Vec<Features>,
+    /// Points with a normal that a pose is judged by, half of them features.
+    pub(crate) sample: Vec<u32>,
+    /// Cells of one and of two voxels.
+    pub(crate) labels: [Labels; 2],
+    pub(crate) view: Option<View>,
+}
+
+impl FeatureCloud {
+    /// Averages the cloud in voxels, fits normals and computes the descriptors.
+    ///
+    /// Normals of the cloud are used for their side only where there is no viewpoint; points at its rim are left out.
+    ///
+    /// # Errors
+    /// [`Error::Empty`], [`Error::NonFinite`], [`Error::LengthMismatch`], [`Error::NotPositive`] for the cloud,
+    /// [`Error::InvalidOption`], [`Error::TooFewPoints`] where fewer than 10 voxels are occupied.
+    pub fn new(cloud: &Cloud, options: &CoarseOptions) -> Result<Self> {
+        options.validate()?;
+        cloud.validate("the cloud")?;
+        Self::of_reduced(Reduced::new(cloud, options.voxel_m)?, options, options.viewpoint)
+    }
+
+    fn of_reduced(mut reduced: Reduced, options: &CoarseOptions, viewpoint: Viewpoint) -> Result<Self> {
+        if reduced.len() < LEAST_POINTS {
+            return Err(Error::TooFewPoints { what: "occupied voxels", found: reduced.len(), needed: LEAST_POINTS });
+        }
+        let voxel = reduced.voxel_m as f32;
+        let radius = options.descriptor_radius_voxels as f32 * voxel;
+        let surroundings = Surroundings::sort_and_list(&mut reduced, radius);
+        let normals = Normals::new(&reduced, &surroundings, viewpoint);
+        let surface_features = surface_features(&reduced, &normals, &surroundings, radius, options);
+        // Cells of two voxels hold some four points of a surface: every second one leaves none without.
+        let labels = [1, 2].map(|cells| {
+            let is_usable = |i: usize| i.is_multiple_of(cells) && !normals.vectors[i][0].is_nan();
+            Labels::new(&reduced.points, is_usable, cells as f32 * voxel)
+        });
+        let eye = match viewpoint {
+            Viewpoint::Origin => Some(-reduced.middle),
+            Viewpoint::At(point) => Some(point.coords - reduced.middle),
+            Viewpoint::Unknown => None,
+        };
+        let eye = eye.map(|eye| [eye.x as f32, eye.y as f32, eye.z as f32]);
+        let view = eye.and_then(|eye| View::new(&reduced.points, eye, 1.6 * voxel, 2.0 * voxel));
+        let sample = sample(&normals);
+        let descriptor_radius = radius;
+        let added = Vec::new();
+        let squares: f64 = reduced.points.iter().flatten().map(|c| f64::from(*c).powi(2)).sum();
+        let radius_m = (squares / reduced.len() as f64).sqrt();
+        Ok(Self {
+            reduced,
+            normals,
+            surroundings,
+            descriptor_radius,
+            radius_m,
+            viewpoint,
+            surface_features,
+            added,
+            sample,
+            labels,
+            view,
+        })
+    }
+
+    /// Adds features that were found by other means, for example [`crate::amplitude_features`]; their points are in the
+    /// cloud's frame. In an alignment, the n-th features added to both clouds are matched with each other.
+    #[must_use]
+    pub fn with_features(mut self, features: Features) -> Self {
+        self.added.push(features);
+        self
+    }
+
+    /// Edge of the voxels, metre.
+    pub fn voxel_m(&self) -> f64 {
+        self.reduced.voxel_m
+    }
+
+    /// Averaged points, metre, in the cloud's frame.
+    pub fn points(&self) -> Vec<Point3<f64>> {
+        (0..self.reduced.len()).map(|i| self.reduced.point(i)).collect()
+    }
+
+    /// Unit normals of the averaged points, NaN where there is none.
+    pub fn normals(&self) -> Vec<Vector3<f64>> {
+        self.normals.vectors.iter().map(|n| Vector3::from(n.map(f64::from))).collect()
+    }
+
+    /// Radii of the surface about an averaged point `[Marton2010]`; `None` where it has no normal or no neighbours.
+    pub fn surface_radii(&self, index: usize) -> Option<SurfaceRadii> {
+        let known = self.normals.vectors.get(index).is_some_and(|n| !n[0].is_nan());
+        known.then(|| radii(&self.normals, &self.surroundings, self.descriptor_radius, index)).flatten()
+    }
+
+    /// The same cloud in coarser voxels.
+    pub(crate) fn coarsened(&self, voxel_m: f64, options: &CoarseOptions) -> Result<Self> {
+        let mut cloud = Cloud::new(self.points());
+        cloud.normals = Some(self.normals());
+        let mut coarse = Self::of_reduced(Reduced::new(&cloud, Some(voxel_m))?, options, self.viewpoint)?;
+        coarse.added.clone_from(&self.added);
+        Ok(coarse)
+    }
+
+    /// Pose between the clouds' frames from the one between their middles.
+    pub(crate) fn between_frames(&self, source: &Self, pose: &Isometry3<f64>) -> Isometry3<f64> {
+        let translation = pose.translation.vector + self.reduced.middle - pose.rotation * source.reduced.middle;
+        Isometry3::from_parts(translation.into(), pose.rotation)
+    }
+}
+
+fn surface_features(
+    reduced: &Reduced,
+    normals: &Normals,
+    surroundings: &Surroundings,
+    radius: f32,
+    options: &CoarseOptions,
+) -> Vec<FeatureSet> {
+    let (with_fpfh, with_rsd) = match options.descriptors {
+        SurfaceDescriptors::Fpfh => (true, false),
+        SurfaceDescriptors::Rsd => (false, true),
+        SurfaceDescriptors::FpfhAndRsd => (true, true),
+        SurfaceDescriptors::None => (false, false),
+    };
+    let tables = [
+        with_fpfh.then(|| fpfh(&reduced.points, normals, surroundings)),
+        with_rsd.then(|| rsd(normals, surroundings, radius)),
+    ];
+    let chosen = |table: DescriptorTable| {
+        let indices = table.most_distinctive(options.max_features);
+        let take = |values: &[[f32; 3]]| indices.iter().map(|&i| values[i as usize]).collect();
+        FeatureSet {
+            points: take(&reduced.points),
+            normals: take(&normals.vectors),
+            descriptors: table.selected(&indices),
+        }
+    };
+    tables.into_iter().flatten().map(chosen).collect()
+}
+
+/// Points with a normal, evenly over the cloud.
+fn sample(normals: &Normals) -> Vec<u32> {
+    let usable: Vec<u32> =
+        (0..normals.vectors.len()).filter(|&i| !normals.vectors[i][0].is_nan()).map(|i| i as u32).collect();
+    usable.iter().copied().step_by(usable.len().div_ceil(SAMPLES).max(1)).collect()
+}

@@ -1,0 +1,114 @@
+//! What was seen from the viewpoint: ranges by direction on the six faces of a cube.
+
+use crate::description::fpfh::subtract;
+
+/// Cells along the edge of a face.
+const FEWEST: f32 = 8.0;
+const MOST: f32 = 256.0;
+/// Ranges that differ by more than this many tolerances about a direction belong to several surfaces.
+const JUMP: f32 = 3.0;
+
+/// What a map says about a point.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Sight {
+    /// In front of what was seen: it would have hidden it.
+    InFree,
+    /// Where something was seen.
+    OnSurface,
+    /// Behind what was seen.
+    Hidden,
+    /// In a direction that nothing is known of, or at a jump of the range where the point may be hidden or not.
+    Unknown,
+}
+
+/// What is said of a point in a direction in which the range jumps, between its two sides.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Jumps {
+    /// Nothing: of two clouds alone, edges that noise moves would speak against a right pose.
+    Unknown,
+    /// That it misses the surface: among many stations, the outlines of furniture tell which have slid along a wall.
+    Missed,
+}
+
+/// Nearest and farthest range in each direction.
+#[derive(Debug, Clone)]
+pub(crate) struct View {
+    eye: [f32; 3],
+    edge: usize,
+    nearest: Vec<f32>,
+    farthest: Vec<f32>,
+    tolerance: f32,
+}
+
+impl View {
+    /// Map of `points` seen from `eye`, with cells of about `spacing` at the median range.
+    pub(crate) fn new(points: &[[f32; 3]], eye: [f32; 3], spacing: f32, tolerance: f32) -> Option<Self> {
+        let mut ranges: Vec<f32> = points.iter().map(|p| length(subtract(*p, eye))).collect();
+        let half = ranges.len() / 2;
+        let median = *ranges.get_mut(..)?.select_nth_unstable_by(half, f32::total_cmp).1;
+        let edge = (2.0 * median / spacing).clamp(FEWEST, MOST) as usize;
+        let cells = 6 * edge * edge;
+        let mut view = Self { eye, edge, nearest: vec![f32::INFINITY; cells], farthest: vec![0.0; cells], tolerance };
+        for point in points {
+            let Some((cell, range)) = view.cell(*point) else { continue };
+            view.nearest[cell] = view.nearest[cell].min(range);
+            view.farthest[cell] = view.farthest[cell].max(range);
+        }
+        view.nearest = view.nearest_around();
+        Some(view)
+    }
+
+    pub(crate) fn sight(&self, point: [f32; 3], jumps: Jumps) -> Sight {
+        let Some((cell, range)) = self.cell(point) else { return Sight::Unknown };
+        if self.farthest[cell] <= 0.0 {
+            Sight::Unknown
+        } else if range < self.nearest[cell] - self.tolerance {
+            Sight::InFree
+        } else if range > self.farthest[cell] + self.tolerance {
+            Sight::Hidden
+        } else if jumps == Jumps::Unknown && self.farthest[cell] > self.nearest[cell] + JUMP * self.tolerance {
+            Sight::Unknown
+        } else {
+            Sight::OnSurface
+        }
+    }
+
+    /// Face by the largest coordinate, cell by the other two.
+    #[inline]
+    fn cell(&self, point: [f32; 3]) -> Option<(usize, f32)> {
+        let d = subtract(point, self.eye);
+        let a = d.map(f32::abs);
+        let axis = if a[0] >= a[1] && a[0] >= a[2] { 0 } else { 1 + usize::from(a[2] > a[1]) };
+        let largest = a[axis];
+        // NaN fails the comparison.
+        if !(largest > 0.0 && largest.is_finite()) {
+            return None;
+        }
+        let face = 2 * axis + usize::from(d[axis] < 0.0);
+        let scale = 0.5 * self.edge as f32 / largest;
+        let place = |c: f32| ((c + largest) * scale) as usize;
+        let (u, v) = (place(d[(axis + 1) % 3]).min(self.edge - 1), place(d[(axis + 2) % 3]).min(self.edge - 1));
+        Some(((face * self.edge + v) * self.edge + u, length(d)))
+    }
+
+    /// The nearest range among a cell and its neighbours on the face: beside a jump of the range nothing is certain.
+    fn nearest_around(&self) -> Vec<f32> {
+        let edge = self.edge;
+        (0..self.nearest.len())
+            .map(|cell| {
+                let (u, v, face) = (cell % edge, cell / edge % edge, cell / edge / edge);
+                let mut least = f32::INFINITY;
+                for row in v.saturating_sub(1)..=(v + 1).min(edge - 1) {
+                    for column in u.saturating_sub(1)..=(u + 1).min(edge - 1) {
+                        least = least.min(self.nearest[(face * edge + row) * edge + column]);
+                    }
+                }
+                least
+            })
+            .collect()
+    }
+}
+
+fn length(d: [f32; 3]) -> f32 {
+    (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt()
+}

@@ -1,0 +1,49 @@
+//! Judging a cloud among many: what speaks for its pose, and its refinement against all that have been placed.
+
+use nalgebra::{Isometry3, Translation3};
+
+use crate::description::feature_cloud::FeatureCloud;
+use crate::description::view::Jumps;
+use crate::error::Result;
+use crate::options::CoarseOptions;
+use crate::verification::judge::{Count, Verdict};
+use crate::verification::refine;
+
+/// The clouds in voxels of one size, that of the coarsest.
+pub fn with_one_voxel(clouds: Vec<FeatureCloud>, options: &CoarseOptions) -> Result<Vec<FeatureCloud>> {
+    let voxel_m = clouds.iter().map(FeatureCloud::voxel_m).fold(0.0, f64::max);
+    let coarse = |cloud: FeatureCloud| {
+        if cloud.voxel_m() < 0.999 * voxel_m { cloud.coarsened(voxel_m, options) } else { Ok(cloud) }
+    };
+    clouds.into_iter().map(coarse).collect()
+}
+
+/// A cloud and its pose `world_from_cloud`.
+pub type Placed<'a> = (&'a FeatureCloud, Isometry3<f64>);
+
+fn from_middle(placed: &Placed<'_>) -> Isometry3<f64> {
+    placed.1 * Translation3::from(placed.0.reduced.middle)
+}
+
+/// What speaks for two clouds lying like this, in sampled points: those with a partner less those that contradict.
+/// Every `stride`-th sampled point is looked at. Clouds that see nothing in common have none.
+pub fn evidence(a: &Placed<'_>, b: &Placed<'_>, stride: usize) -> f64 {
+    let pose = from_middle(a).inverse() * from_middle(b);
+    Verdict::with(b.0, a.0, &pose, stride, Jumps::Missed).evidence() * stride as f64
+}
+
+/// How the sampled points of two clouds lie for each other: those on the other's surface, and those that contradict it, in
+/// space that it looked through or beside a surface that they should lie on.
+pub fn agreement(a: &Placed<'_>, b: &Placed<'_>) -> (usize, usize) {
+    let pose = from_middle(a).inverse() * from_middle(b);
+    let verdict = Verdict::with(b.0, a.0, &pose, 1, Jumps::Missed);
+    let sum = |of: fn(&Count) -> usize| of(&verdict.source) + of(&verdict.target);
+    (sum(|c| c.hits), sum(|c| c.in_free + c.missed))
+}
+
+/// Brings a cloud that is nearly in place onto all those around it, point to plane.
+pub fn refined_among(source: &Placed<'_>, around: &[Placed<'_>], steps: usize) -> Isometry3<f64> {
+    let targets: Vec<(&FeatureCloud, Isometry3<f64>)> = around.iter().map(|t| (t.0, from_middle(t))).collect();
+    let pose = refine::refine_among(source.0, &targets, &from_middle(source), steps);
+    pose * Translation3::from(-source.0.reduced.middle)
+}

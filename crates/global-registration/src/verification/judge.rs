@@ -1,0 +1,168 @@
+//! How well two clouds agree at a pose: partners on the surface, and points where the other camera looked through.
+
+use nalgebra::Isometry3;
+
+use crate::description::feature_cloud::FeatureCloud;
+use crate::description::fpfh::{dot, subtract};
+use crate::description::view::{Jumps, Sight};
+use crate::hypotheses::correspondences::Motion;
+
+/// Least cosine between the normals of partners.
+const LEAST_COSINE: f32 = 0.8;
+/// Largest distance of partners across the surface and in all, voxels.
+const ACROSS_VOXELS: f32 = 0.8;
+const IN_ALL_VOXELS: f32 = 2.0;
+/// A point in free space counts this many times where poses are rough.
+const ROUGH_WEIGHT_OF_FREE: f64 = 2.0;
+/// Points that miss the surface they should lie on, and points in space that the other camera looked through, each
+/// outweigh this many points with a partner once a pose is refined: where two poses differ, both find partners on walls that
+/// are alike, but only the wrong one has more than a few in a hundred that contradict.
+const WEIGHT_OF_MISSED: f64 = 8.0;
+const WEIGHT_OF_FREE: f64 = 16.0;
+/// A point in free space beside one that misses where edges hold a pose: noise moves the latter over a jump, not the former.
+const WEIGHT_OF_FREE_AT_EDGES: f64 = 2.0;
+
+/// Counts over the sampled points of one or both clouds.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Count {
+    pub(crate) points: usize,
+    /// With a partner.
+    pub(crate) hits: usize,
+    /// In front of what the other camera saw.
+    pub(crate) in_free: usize,
+    /// Where the other camera saw a surface, but without a partner on it.
+    pub(crate) missed: usize,
+}
+
+/// The verdict on a pose.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Verdict {
+    pub(crate) source: Count,
+    pub(crate) target: Count,
+}
+
+impl Verdict {
+    /// `pose`: target from source, both about their middles. Every `stride`-th sampled point is looked at.
+    pub(crate) fn new(source: &FeatureCloud, target: &FeatureCloud, pose: &Isometry3<f64>, stride: usize) -> Self {
+        Self::with(source, target, pose, stride, Jumps::Unknown)
+    }
+
+    /// [`Self::new`] with what a jump of the range says about points between its two sides.
+    pub(crate) fn with(
+        source: &FeatureCloud,
+        target: &FeatureCloud,
+        pose: &Isometry3<f64>,
+        stride: usize,
+        jumps: Jumps,
+    ) -> Self {
+        let back = pose.inverse();
+        Self {
+            source: count(source, target, pose, stride, jumps, |_, _| true),
+            target: count(target, source, &back, stride, jumps, |_, _| true),
+        }
+    }
+
+    /// What edges say against a pose that slides, in points: those that miss or lie in free space, at jumps of the range
+    /// too, less the partners on surfaces that face the motion. All other partners grow in number with what is shared.
+    /// `faces` takes a point and its normal in the target's frame.
+    pub(crate) fn against_slide(
+        source: &FeatureCloud,
+        target: &FeatureCloud,
+        pose: &Isometry3<f64>,
+        faces: impl Fn([f32; 3], [f32; 3]) -> bool,
+    ) -> f64 {
+        let (forward, back) = (Motion::new(pose), pose.inverse());
+        let counts = [
+            count(source, target, pose, 1, Jumps::Missed, |p, n| faces(forward.point(p), forward.vector(n))),
+            count(target, source, &back, 1, Jumps::Missed, &faces),
+        ];
+        let cost = |c: &Count| c.missed as f64 + WEIGHT_OF_FREE_AT_EDGES * c.in_free as f64 - c.hits as f64;
+        counts.iter().map(cost).sum()
+    }
+
+    /// Share of the points with a partner less those in free space, doubly counted, times the square of the agreement:
+    /// at most 1, possibly negative: for poses that are a few voxels off. A wrong pose that slides walls along themselves
+    /// has many partners, but misses more.
+    pub(crate) fn rough_score(&self) -> f64 {
+        let sum = |f: fn(&Count) -> usize| (f(&self.source) + f(&self.target)) as f64;
+        let share = (sum(|c| c.hits) - ROUGH_WEIGHT_OF_FREE * sum(|c| c.in_free)) / sum(|c| c.points).max(1.0);
+        share * self.agreement().powi(2)
+    }
+
+    /// What speaks for a refined pose, in points: those with a partner less those that contradict.
+    pub fn evidence(&self) -> f64 {
+        let of = |count: &Count| {
+            count.hits as f64 - WEIGHT_OF_MISSED * count.missed as f64 - WEIGHT_OF_FREE * count.in_free as f64
+        };
+        of(&self.source) + of(&self.target)
+    }
+
+    /// Sampled points of both clouds.
+    pub(crate) fn points(&self) -> usize {
+        self.source.points + self.target.points
+    }
+
+    /// Largest share of the points of a cloud in the other's view that lie in space which that looked through.
+    pub(crate) fn contradiction(&self) -> f64 {
+        let share = |c: &Count| c.in_free as f64 / (c.hits + c.in_free).max(1) as f64;
+        share(&self.source).max(share(&self.target))
+    }
+
+    /// Smaller share of the evidence that other poses lack, between 0 and 1.
+    pub(crate) fn share_lost(&self, others: [Self; 2]) -> f64 {
+        let most = others.iter().map(Self::evidence).fold(f64::NEG_INFINITY, f64::max);
+        (1.0 - most / self.evidence().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0)
+    }
+
+    /// Share of the points with a partner in the cloud that overlaps more.
+    pub fn overlap(&self) -> f64 {
+        let share = |c: &Count| c.hits as f64 / c.points.max(1) as f64;
+        share(&self.source).max(share(&self.target))
+    }
+
+    /// Share of hits among the points that the other camera should have seen.
+    pub fn agreement(&self) -> f64 {
+        let sum = |f: fn(&Count) -> usize| (f(&self.source) + f(&self.target)) as f64;
+        sum(|c| c.hits) / (sum(|c| c.hits) + sum(|c| c.in_free) + sum(|c| c.missed)).max(1.0)
+    }
+}
+
+/// `counts` tells of a point and its normal whether a partner of it is counted.
+fn count(
+    from: &FeatureCloud,
+    to: &FeatureCloud,
+    pose: &Isometry3<f64>,
+    stride: usize,
+    jumps: Jumps,
+    counts: impl Fn([f32; 3], [f32; 3]) -> bool,
+) -> Count {
+    let motion = Motion::new(pose);
+    let sided = from.normals.sided && to.normals.sided;
+    let voxel = to.reduced.voxel_m as f32;
+    let mut count = Count::default();
+    for &i in from.sample.iter().step_by(stride) {
+        count.points += 1;
+        let (own, own_normal) = (from.reduced.points[i as usize], from.normals.vectors[i as usize]);
+        let (point, normal) = (motion.point(own), motion.vector(own_normal));
+        if partner(to, point, normal, sided, voxel).is_some() {
+            count.hits += usize::from(counts(own, own_normal));
+            continue;
+        }
+        match to.view.as_ref().map(|view| view.sight(point, jumps)) {
+            Some(Sight::InFree) => count.in_free += 1,
+            Some(Sight::OnSurface) => count.missed += 1,
+            _ => {}
+        }
+    }
+    count
+}
+
+/// The point of the surface that a point lies on.
+pub(crate) fn partner(to: &FeatureCloud, point: [f32; 3], normal: [f32; 3], sided: bool, voxel: f32) -> Option<usize> {
+    let near = to.labels[0].near(point)?;
+    let (own, d) = (to.normals.vectors[near], subtract(point, to.reduced.points[near]));
+    let cosine = if sided { dot(normal, own) } else { dot(normal, own).abs() };
+    let in_all = IN_ALL_VOXELS * voxel;
+    let lies_on = cosine >= LEAST_COSINE && dot(d, own).abs() <= ACROSS_VOXELS * voxel && dot(d, d) <= in_all * in_all;
+    lies_on.then_some(near)
+}

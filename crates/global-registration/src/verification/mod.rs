@@ -1,0 +1,6 @@
+//! Whether a pose holds: what agrees, what contradicts, and what tells it from others.
+
+pub(crate) mod among;
+pub(crate) mod distinct;
+pub(crate) mod judge;
+pub(crate) mod refine;

@@ -1,0 +1,144 @@
+//! A few steps of point to plane between the averaged points, from poses that are a few voxels off.
+
+use nalgebra::{Isometry3, Matrix6, Vector3, Vector6};
+
+use crate::description::feature_cloud::FeatureCloud;
+use crate::description::fpfh::{dot, subtract};
+use crate::hypotheses::correspondences::{Motion, moved};
+
+/// Steps with partners in cells of two voxels, then of one.
+const STEPS: [usize; 2] = [5, 4];
+/// Scale of the residuals' weights in voxels.
+const SCALES: [f64; 2] = [1.0, 0.4];
+/// Least cosine between the normals of partners.
+const LEAST_COSINE: f32 = 0.7;
+/// Share of the mean of the normal matrix's diagonal that is added to it: motions that the surfaces do not determine stay.
+const DAMPING: f64 = 1e-3;
+
+/// A refined pose.
+pub(crate) struct Refined {
+    pub pose: Isometry3<f64>,
+    /// Root mean square distance of partners across the surface, metre.
+    pub(crate) rms_m: f64,
+}
+
+/// Poses are between the clouds' middles.
+pub(crate) fn refine(source: &FeatureCloud, target: &FeatureCloud, pose: &Isometry3<f64>) -> Refined {
+    let mut refined = Refined { pose: *pose, rms_m: f64::NAN };
+    for level in [0, 1] {
+        for _ in 0..STEPS[level] {
+            let system = System::new(&pairs(source, target, &refined.pose, level), target.reduced.voxel_m, level);
+            let Some(step) = system.step() else { return refined };
+            refined.pose = system.moved(&refined.pose, &step);
+            refined.rms_m = (system.squares / system.weight).sqrt();
+        }
+    }
+    refined
+}
+
+/// Brings a cloud onto all of those that have been placed: `world_from_middle` of each, and of the source.
+pub(crate) fn refine_among(
+    source: &FeatureCloud,
+    placed: &[(&FeatureCloud, Isometry3<f64>)],
+    pose: &Isometry3<f64>,
+    steps: usize,
+) -> Isometry3<f64> {
+    let mut pose = *pose;
+    for _ in 0..steps {
+        let mut all = Vec::new();
+        for (target, world_from_target) in placed {
+            let own = pairs(source, target, &(world_from_target.inverse() * pose), 1);
+            all.extend(own.into_iter().map(|pair| Pair {
+                point: world_from_target.rotation * pair.point + world_from_target.translation.vector,
+                normal: world_from_target.rotation * pair.normal,
+                residual: pair.residual,
+            }));
+        }
+        let system = System::new(&all, source.reduced.voxel_m, 1);
+        let Some(step) = system.step() else { return pose };
+        pose = system.moved(&pose, &step);
+    }
+    pose
+}
+
+struct System {
+    normal: Matrix6<f64>,
+    right: Vector6<f64>,
+    weight: f64,
+    squares: f64,
+    centre: Vector3<f64>,
+    radius: f64,
+}
+
+struct Pair {
+    point: Vector3<f64>,
+    normal: Vector3<f64>,
+    residual: f64,
+}
+
+impl System {
+    fn new(pairs: &[Pair], voxel_m: f64, level: usize) -> Self {
+        let count = pairs.len().max(1) as f64;
+        let centre = pairs.iter().fold(Vector3::zeros(), |sum, p| sum + p.point) / count;
+        let spread: f64 = pairs.iter().map(|p| (p.point - centre).norm_squared()).sum();
+        let mut system = Self {
+            normal: Matrix6::zeros(),
+            right: Vector6::zeros(),
+            weight: 0.0,
+            squares: 0.0,
+            centre,
+            radius: (spread / count).sqrt().max(voxel_m),
+        };
+        let scale = SCALES[level] * voxel_m;
+        for pair in pairs {
+            system.add(pair, scale);
+        }
+        system
+    }
+
+    fn add(&mut self, pair: &Pair, scale: f64) {
+        let weight = (-(pair.residual / scale).powi(2)).exp();
+        let lever = (pair.point - self.centre).cross(&pair.normal) / self.radius;
+        let n = pair.normal;
+        let row = Vector6::new(n.x, n.y, n.z, lever.x, lever.y, lever.z);
+        self.normal.ger(weight, &row, &row, 1.0);
+        self.right -= row * (weight * pair.residual);
+        self.weight += weight;
+        self.squares += weight * pair.residual * pair.residual;
+    }
+
+    fn step(&self) -> Option<Vector6<f64>> {
+        if self.weight < 6.0 {
+            return None;
+        }
+        let damped = self.normal + Matrix6::identity() * (DAMPING * self.normal.trace() / 6.0);
+        damped.cholesky().map(|factor| factor.solve(&self.right)).filter(|s| s.iter().all(|v| v.is_finite()))
+    }
+
+    /// The pose after a step; the system stands about the mean of its pairs.
+    fn moved(&self, pose: &Isometry3<f64>, step: &Vector6<f64>) -> Isometry3<f64> {
+        let turn = step.fixed_rows::<3>(3).into_owned() / self.radius;
+        let turned = moved(&Isometry3::identity(), Vector3::zeros(), turn).rotation * self.centre;
+        moved(pose, step.fixed_rows::<3>(0) + self.centre - turned, turn)
+    }
+}
+
+fn pairs(source: &FeatureCloud, target: &FeatureCloud, pose: &Isometry3<f64>, level: usize) -> Vec<Pair> {
+    let motion = Motion::new(pose);
+    let sided = source.normals.sided && target.normals.sided;
+    let labels = &target.labels[1 - level];
+    let wide = |v: [f32; 3]| Vector3::from(v.map(f64::from));
+    let of = |&i: &u32| {
+        let point = motion.point(source.reduced.points[i as usize]);
+        let near = labels.near(point)?;
+        let (own, other) = (motion.vector(source.normals.vectors[i as usize]), target.normals.vectors[near]);
+        let cosine = if sided { dot(own, other) } else { dot(own, other).abs() };
+        let residual = dot(subtract(point, target.reduced.points[near]), other);
+        (cosine >= LEAST_COSINE).then(|| Pair {
+            point: wide(point),
+            normal: wide(other),
+            residual: f64::from(residual),
+        })
+    };
+    source.sample.iter().filter_map(of).collect()
+}

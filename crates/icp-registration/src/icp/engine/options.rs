@@ -1,0 +1,185 @@
+//! What can be chosen in an ICP run.
+
+use nalgebra::Matrix6;
+
+use crate::icp::{Alternative, Registration};
+use crate::kernel::RobustKernel;
+use crate::parts::{
+    AllPoints, EveryNth, MaxNormalAngle, NormalSpace, PairRejection, PlaneToPlane, PointToPlane, PointToPoint,
+    RandomPoints, Settled, Stability, SymmetricPlanes, Trimmed,
+};
+use crate::voxels::VoxelAlignmentOptions;
+
+/// Points of the smaller of two clouds from which on voxels say as much as all points, in a twentieth of the time.
+const DENSE: usize = 30_000;
+
+/// What is minimised.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
+pub enum Metric {
+    /// [`Metric::PointToPlane`]; by [`crate::align`], where no option asks for single points and both clouds hold 30,000 or
+    /// more without normals and sigmas, the distance between planes of voxels ([`crate::VoxelCloud`]).
+    #[default]
+    Automatic,
+    /// Distance of the points `[BeslMcKay1992]`. Converges slowly, and sampling of the surface enters the result.
+    PointToPoint,
+    /// Distance of the source point from the tangent plane of the target `[ChenMedioni1992]`.
+    PointToPlane,
+    /// Distance along the mean of both normals `[Rusinkiewicz2019]`.
+    SymmetricPlanes,
+    /// Distance of small disks: generalised ICP `[Segal2009]`.
+    PlaneToPlane,
+}
+
+/// Which source points take part.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
+pub enum Selection {
+    /// All.
+    #[default]
+    All,
+    /// Every n-th in the order of the cloud.
+    EveryNth(usize),
+    /// About this many, spread evenly over the directions of the normals `[RusinkiewiczLevoy2001]`: what few points
+    /// say about a sliding direction is not drowned by a large wall.
+    NormalSpace(usize),
+    /// A random sample.
+    Random {
+        /// Number of points.
+        count: usize,
+        /// Seed: the same points for the same seed.
+        seed: u64,
+    },
+    /// About this many, chosen such that all six motions are held as evenly as the surface allows `[Gelfand2003]`.
+    Stability(usize),
+}
+
+/// What happens to motions that the geometry does not determine.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
+pub enum DegeneracyPolicy {
+    /// They are named in the result; the pose may have slid along them.
+    #[default]
+    Report,
+    /// They are named, and the pose keeps the guess along them (to first order).
+    HoldAtGuess,
+    /// As [`DegeneracyPolicy::HoldAtGuess`], and at the end the guess enters as an observation with its
+    /// `prior_covariance`: what the geometry leaves open stays at the guess with the guess's standard deviation.
+    HoldAtPrior,
+}
+
+/// Options of an ICP run. The defaults carry no scale: distances left at `None` come from the clouds.
+#[derive(Debug, Clone, PartialEq)]
+pub struct IcpOptions {
+    /// What is minimised.
+    pub metric: Metric,
+    /// Source points that take part.
+    pub selection: Selection,
+    /// Largest distance of a pair at the end, metre. `None`: three times the spacing of the target (90 % quantile).
+    pub max_correspondence_distance_m: Option<f64>,
+    /// Largest distance of a pair at the start, halved level by level down to the one above. `None`: 2.5 times the
+    /// median distance at the guess, but at least a quarter of the target's radius and at most all of it.
+    pub initial_correspondence_distance_m: Option<f64>,
+    /// Robust kernel on the residuals; its scale is their median absolute deviation, anew in each iteration.
+    pub kernel: RobustKernel,
+    /// Fraction of the pairs that is kept, those with the smallest distances `[Chetverikov2002]`. Default 1: all.
+    pub trim: f64,
+    /// Pairs whose normals enclose a larger angle are refused, radian (the sign of normals does not count).
+    /// Default 45 degrees; `None`: normals are not compared.
+    pub max_normal_angle_rad: Option<f64>,
+    /// Iterations in all levels together. Default 100.
+    pub max_iterations: usize,
+    /// The run has converged when the step moves points at the cloud's radius by less than this, metre. `None`: 1e-5 of
+    /// that radius.
+    pub step_tolerance_m: Option<f64>,
+    /// What happens to undetermined motions.
+    pub degeneracy: DegeneracyPolicy,
+    /// Covariance of the guess in the tangent `[dt target axes (m), dtheta source axes (rad)]`, needed and used only
+    /// for [`DegeneracyPolicy::HoldAtPrior`].
+    pub prior_covariance: Option<Matrix6<f64>>,
+    /// A motion counts as undetermined when the predicted standard deviation of points at the cloud's radius exceeds
+    /// this, metre. `None`: 1/300 of the radius.
+    pub max_motion_sigma_m: Option<f64>,
+    /// Fewest pairs. Default 20.
+    pub min_correspondences: usize,
+}
+
+impl Default for IcpOptions {
+    fn default() -> Self {
+        Self {
+            metric: Metric::Automatic,
+            selection: Selection::All,
+            max_correspondence_distance_m: None,
+            initial_correspondence_distance_m: None,
+            kernel: RobustKernel::Welsch,
+            trim: 1.0,
+            max_normal_angle_rad: Some(std::f64::consts::FRAC_PI_4),
+            max_iterations: 100,
+            step_tolerance_m: None,
+            degeneracy: DegeneracyPolicy::Report,
+            prior_covariance: None,
+            max_motion_sigma_m: None,
+            min_correspondences: 20,
+        }
+    }
+}
+
+impl IcpOptions {
+    /// The same by voxels; `None` where an option asks for single points, or there are too few.
+    pub(in crate::icp) fn by_voxels(&self, points: usize) -> Option<VoxelAlignmentOptions> {
+        let usual = Self::default();
+        let dense = points >= DENSE && self.metric == Metric::Automatic && self.selection == Selection::All;
+        let whole =
+            self.trim.to_bits() == usual.trim.to_bits() && self.max_normal_angle_rad == usual.max_normal_angle_rad;
+        let free = self.max_correspondence_distance_m.is_none() && self.degeneracy != DegeneracyPolicy::HoldAtPrior;
+        (dense && whole && free).then_some(VoxelAlignmentOptions {
+            max_start_error_m: self.initial_correspondence_distance_m,
+            kernel: self.kernel,
+            max_iterations: self.max_iterations,
+            step_tolerance_m: self.step_tolerance_m,
+            degeneracy: self.degeneracy,
+            max_motion_sigma_m: self.max_motion_sigma_m,
+            min_correspondences: self.min_correspondences,
+        })
+    }
+
+    /// Puts the parts that stand for these options into a registration.
+    pub(in crate::icp) fn apply(&self, registration: &mut Registration<'_>) {
+        let angle = self.max_normal_angle_rad;
+        let trim = if self.trim.to_bits() == 1.0_f64.to_bits() { None } else { Some(self.trim) };
+        let robust = if self.kernel == RobustKernel::None { RobustKernel::None } else { RobustKernel::Huber };
+        registration.selection = match self.selection {
+            Selection::All => Box::new(AllPoints),
+            Selection::EveryNth(n) => Box::new(EveryNth(n)),
+            Selection::NormalSpace(count) => Box::new(NormalSpace(count)),
+            Selection::Random { count, seed } => Box::new(RandomPoints { count, seed }),
+            Selection::Stability(count) => Box::new(Stability(count)),
+        };
+        registration.alternatives = Alternative::usual(robust, angle, trim);
+        registration.metric = match self.metric {
+            Metric::PointToPoint => Box::new(PointToPoint),
+            Metric::Automatic | Metric::PointToPlane => Box::new(PointToPlane),
+            Metric::SymmetricPlanes => Box::new(SymmetricPlanes),
+            Metric::PlaneToPlane => Box::new(PlaneToPlane::default()),
+        };
+        if matches!(self.metric, Metric::SymmetricPlanes | Metric::PlaneToPlane) {
+            // From afar the target's planes alone draw in farther.
+            for alternative in &mut registration.alternatives {
+                alternative.metric = Some(Box::new(PointToPlane));
+            }
+        }
+        let mut rejection: Vec<Box<dyn PairRejection>> = Vec::new();
+        rejection.extend(angle.map(|angle| Box::new(MaxNormalAngle(angle)) as Box<dyn PairRejection>));
+        rejection.extend(trim.map(|trim| Box::new(Trimmed(trim)) as Box<dyn PairRejection>));
+        registration.rejection = rejection;
+        registration.kernel = Box::new(self.kernel);
+        registration.levels.first_limit_m = self.initial_correspondence_distance_m;
+        registration.levels.last_limit_m = self.max_correspondence_distance_m;
+        let (max_iterations, step_tolerance_m) = (self.max_iterations, self.step_tolerance_m);
+        registration.stopping = Box::new(Settled { max_iterations, step_tolerance_m, ..Settled::default() });
+        registration.degeneracy = self.degeneracy;
+        registration.prior_covariance = self.prior_covariance;
+        registration.max_motion_sigma_m = self.max_motion_sigma_m;
+        registration.min_correspondences = self.min_correspondences;
+    }
+}

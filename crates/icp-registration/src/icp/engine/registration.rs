@@ -1,0 +1,237 @@
+//! A registration made of parts, and the loop that runs them.
+
+use nalgebra::{Isometry3, Matrix6, Vector3, Vector6};
+
+use crate::error::{Error, Result};
+use crate::icp::engine::descent::{Alternative, Levels};
+use crate::icp::engine::matching::Points;
+use crate::icp::engine::options::DegeneracyPolicy;
+use crate::icp::engine::quality::verdict;
+use crate::icp::engine::result::{IcpResult, StopReason};
+use crate::icp::engine::system::System;
+use crate::icp::starts::Starts;
+use crate::icp::{IcpOptions, IcpTarget};
+use crate::kernel::RobustKernel;
+use crate::parts::{
+    AllPoints, ErrorMetric, GaussNewton, KernelSchedule, MaxNormalAngle, Minimiser, Moment, NearestPoint,
+    PairRejection, PairWeighting, PointMatching, PointSelection, PointToPlane, Progress, Scene, Settled, SigmaWeight,
+    StoppingRule,
+};
+use crate::quality::Residuals;
+use point_cloud::Cloud;
+use point_cloud::{UnorganisedNormalOptions, unorganised_normals};
+use rigid_pose::is_finite;
+
+/// An ICP registration of which every part can be replaced: the stages of `[RusinkiewiczLevoy2001]`.
+///
+/// The matching carries the target. Every field is public; [`Registration::new`] sets what [`crate::align`] uses.
+pub struct Registration<'a> {
+    /// Which source points take part.
+    pub selection: Box<dyn PointSelection + 'a>,
+    /// Where their partners come from.
+    pub matching: Box<dyn PointMatching + 'a>,
+    /// Which pairs are refused: all parts must keep a pair.
+    pub rejection: Vec<Box<dyn PairRejection + 'a>>,
+    /// How much pairs count: the weights multiply.
+    pub weighting: Vec<Box<dyn PairWeighting + 'a>>,
+    /// What is minimised.
+    pub metric: Box<dyn ErrorMetric + 'a>,
+    /// How it is minimised.
+    pub minimisation: Box<dyn Minimiser + 'a>,
+    /// Robust kernel in the course of the run.
+    pub kernel: Box<dyn KernelSchedule + 'a>,
+    /// Distance limits from coarse to fine.
+    pub levels: Levels,
+    /// More starts where the guess alone does not convince.
+    pub starts: Option<Starts>,
+    /// Other kernels and rejections for the way down the levels; where there are any, they replace those above until the
+    /// last level, and the pose at which most of a sample fits goes on.
+    pub alternatives: Vec<Alternative<'a>>,
+    /// When the last level ends.
+    pub stopping: Box<dyn StoppingRule + 'a>,
+    /// What happens to motions that the geometry does not determine.
+    pub degeneracy: DegeneracyPolicy,
+    /// Covariance of the guess in the tangent `[dt target axes, dtheta source axes]`, for
+    /// [`DegeneracyPolicy::HoldAtPrior`].
+    pub prior_covariance: Option<Matrix6<f64>>,
+    /// Motions whose predicted standard deviation exceeds this at the radius of the pairs are undetermined, metre.
+    /// `None`: 1/300 of the target's radius.
+    pub max_motion_sigma_m: Option<f64>,
+    /// Fewest pairs. Default 20.
+    pub min_correspondences: usize,
+}
+
+impl<'a> Registration<'a> {
+    /// Point to plane with the given matching, and the defaults of [`IcpOptions`].
+    pub fn new(matching: impl PointMatching + 'a) -> Self {
+        let angle = std::f64::consts::FRAC_PI_4;
+        Self {
+            selection: Box::new(AllPoints),
+            matching: Box::new(matching),
+            rejection: vec![Box::new(MaxNormalAngle(angle))],
+            weighting: vec![Box::new(SigmaWeight)],
+            metric: Box::new(PointToPlane),
+            minimisation: Box::new(GaussNewton),
+            kernel: Box::new(RobustKernel::Welsch),
+            levels: Levels::default(),
+            starts: Some(Starts::default()),
+            alternatives: Alternative::usual(RobustKernel::Huber, Some(angle), None),
+            stopping: Box::new(Settled::default()),
+            degeneracy: DegeneracyPolicy::Report,
+            prior_covariance: None,
+            max_motion_sigma_m: None,
+            min_correspondences: 20,
+        }
+    }
+
+    /// The parts that stand for the options of the easy tier.
+    pub fn with_options(target: &'a IcpTarget, options: &IcpOptions) -> Self {
+        let mut registration = Self::new(NearestPoint::new(target));
+        options.apply(&mut registration);
+        registration
+    }
+
+    /// Aligns `source` with the target of the matching, starting at `guess` (both poses `target_from_source`). Normals of
+    /// a source without any are estimated.
+    ///
+    /// # Errors
+    /// [`Error::TooFewCorrespondences`] where the clouds do not overlap at the guess; [`Error::Empty`],
+    /// [`Error::NonFinite`], [`Error::LengthMismatch`], [`Error::NotPositive`], [`Error::InvalidOption`],
+    /// [`Error::Incompatible`] for the input and the parts.
+    pub fn align(&self, source: &Cloud, guess: &Isometry3<f64>) -> Result<IcpResult> {
+        source.validate("the source cloud")?;
+        let estimated;
+        let normals = if let Some(given) = &source.normals {
+            given
+        } else {
+            estimated = unorganised_normals(&source.points, &UnorganisedNormalOptions::default())?;
+            &estimated
+        };
+        let engine = Engine::new(self, source, normals, guess)?;
+        let selected = engine.selected()?;
+        let limits = self.levels.limits(&engine, &selected, guess)?;
+        let mut track = engine.descend(&selected, guess, &limits)?;
+        let mut points = Points::new(selected);
+        let stop = engine.settle(&mut track, &mut points, &limits)?;
+        engine.result(&track, &mut points, &limits, guess, stop)
+    }
+}
+
+/// The parts at work on two surfaces.
+pub(crate) struct Engine<'p> {
+    pub parts: &'p Registration<'p>,
+    pub scene: Scene<'p>,
+    pub metric: &'p dyn ErrorMetric,
+    pub rejection: &'p [Box<dyn PairRejection + 'p>],
+    pub kernel: &'p dyn KernelSchedule,
+}
+
+/// A pose on its way.
+#[derive(Clone)]
+pub(crate) struct Track {
+    pub pose: Isometry3<f64>,
+    pub iterations: usize,
+}
+
+impl Track {
+    /// Where the run is at this pose.
+    pub(crate) fn moment(&self, limits: &[f64], level: usize, iteration: usize) -> Moment {
+        Moment { pose: self.pose, limit_m: limits[level], level, levels: limits.len(), iteration, ended: false }
+    }
+}
+
+impl<'p> Engine<'p> {
+    fn new(
+        parts: &'p Registration<'p>,
+        source: &'p Cloud,
+        source_normals: &'p [Vector3<f64>],
+        guess: &Isometry3<f64>,
+    ) -> Result<Self> {
+        if !is_finite(guess) {
+            return Err(Error::NonFinite { what: "the guess", index: 0 });
+        }
+        let target = parts.matching.target();
+        let moment = Moment { pose: *guess, limit_m: f64::INFINITY, level: 0, levels: 1, iteration: 0, ended: false };
+        let with_normal = source_normals.iter().filter(|n| !n.x.is_nan()).count();
+        let is_surface = 2 * with_normal >= source.len();
+        let scene = Scene { source, source_normals, is_surface, target, moment };
+        parts.validate(&scene)?;
+        Ok(Self { parts, scene, metric: &*parts.metric, rejection: &parts.rejection, kernel: &*parts.kernel })
+    }
+
+    /// The selected points, all of which exist.
+    fn selected(&self) -> Result<Vec<usize>> {
+        let (selected, count) = (self.parts.selection.select(&self.scene)?, self.scene.source.len());
+        match selected.iter().find(|&&point| point >= count) {
+            Some(&point) => Err(Error::NoSuchPoint { part: "the selection", point, count }),
+            None => Ok(selected),
+        }
+    }
+
+    /// Iterates on all selected points at the last limit.
+    fn settle(&self, track: &mut Track, points: &mut Points, limits: &[f64]) -> Result<StopReason> {
+        let mut lengths = Vec::new();
+        while track.iterations < self.parts.stopping.max_iterations() {
+            let moment = track.moment(limits, limits.len() - 1, lengths.len());
+            let step = self.step(track, &moment, points)?;
+            lengths.push(length(&step));
+            // While the kernel narrows, small steps mean nothing.
+            if self.kernel.at(&moment).1 > 1.0 {
+                continue;
+            }
+            let radius_m = self.scene.target.radius_m;
+            let mut step_over_sigma = || self.step_over_sigma(track, limits, points, &step);
+            let mut progress = Progress { step_lengths_m: &lengths, radius_m, step_over_sigma: &mut step_over_sigma };
+            if let Some(reason) = self.parts.stopping.decide(&mut progress)? {
+                return Ok(reason);
+            }
+        }
+        Ok(StopReason::MaxIterations)
+    }
+
+    /// One iteration: pairs, residuals, a motion `[dt, rho w]`, as taken.
+    pub(crate) fn step(&self, track: &mut Track, moment: &Moment, points: &mut Points) -> Result<Vector6<f64>> {
+        let pairs = self.pairs(moment, points, track.iterations)?;
+        let scene = self.scene.at(*moment);
+        let system = System::new(&scene, self.metric, &pairs, self.kernel.at(moment));
+        let mut step = self.parts.minimisation.step(&system, &self.held(&system)?)?;
+        // Pairs at most `limit` apart give no reason to move farther than a few times that.
+        let excess = length(&step) / (2.0 * moment.limit_m);
+        if excess > 1.0 {
+            step /= excess;
+        }
+        if !step.iter().all(|v| v.is_finite()) {
+            return Err(Error::Numerical { what: "a step of the registration", why: "it is not finite" });
+        }
+        track.pose = system.moved(&step);
+        track.iterations += 1;
+        Ok(step)
+    }
+
+    /// Motions that are not to be taken.
+    fn held(&self, system: &System<'_>) -> Result<Vec<Vector6<f64>>> {
+        match self.parts.degeneracy {
+            DegeneracyPolicy::Report => Ok(Vec::new()),
+            DegeneracyPolicy::HoldAtGuess | DegeneracyPolicy::HoldAtPrior => {
+                Ok(verdict(system, self.max_motion_sigma_m(), Residuals::Misaligned)?.held())
+            }
+        }
+    }
+
+    fn step_over_sigma(&self, track: &Track, limits: &[f64], points: &mut Points, step: &Vector6<f64>) -> Result<f64> {
+        let moment = track.moment(limits, limits.len() - 1, 0);
+        let pairs = self.pairs(&moment, points, track.iterations)?;
+        let scene = self.scene.at(moment);
+        let system = System::new(&scene, self.metric, &pairs, self.kernel.at(&Moment { ended: true, ..moment }));
+        Ok(verdict(&system, self.max_motion_sigma_m(), Residuals::Settled)?.over_sigma(step))
+    }
+
+    pub(crate) fn max_motion_sigma_m(&self) -> f64 {
+        self.parts.max_motion_sigma_m.unwrap_or(self.scene.target.radius_m / 300.0)
+    }
+}
+
+/// Larger of the two parts of a motion.
+pub(crate) fn length(motion: &Vector6<f64>) -> f64 {
+    motion.fixed_rows::<3>(0).norm().max(motion.fixed_rows::<3>(3).norm())
+}

@@ -1,0 +1,6 @@
+//! Sums over voxels and where these lie.
+
+pub(in crate::voxels) mod blocks;
+pub(in crate::voxels) mod gather;
+pub(in crate::voxels) mod lattice;
+pub(in crate::voxels) mod moments;

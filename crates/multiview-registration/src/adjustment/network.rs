@@ -1,0 +1,136 @@
+//! One adjustment of all stations from the reduced observations of all pairs.
+
+use adjust::{Adjustment, BlockId, Covariance, FunctionObservation, ParameterBlock, SolveOptions};
+use nalgebra::{DVector, Isometry3, Matrix6, Vector6};
+
+use crate::error::Result;
+use crate::planes::reduction::{Meeting, Reduced};
+use crate::relative_pose::{adjustment, relative_pose_parts};
+
+/// Poses and shared parameters.
+#[derive(Debug, Clone)]
+pub(crate) struct State {
+    pub poses: Vec<Isometry3<f64>>,
+    pub parameters: Vec<f64>,
+}
+
+/// What does not change from round to round.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Network<'a> {
+    /// The station that keeps its pose.
+    pub fixed: usize,
+    /// How well each position is taken to be known where no contact says anything, metre, and each rotation, radian.
+    pub hold_m: f64,
+    pub turn_rad: f64,
+    pub names: &'a [String],
+    pub prior: &'a (Vec<f64>, Vec<f64>),
+}
+
+impl Network<'_> {
+    /// The same with each pose taken to be known to a length, rotations at the radius at which they are held now.
+    pub(crate) fn near(&self, known_m: f64) -> Self {
+        Self { hold_m: known_m, turn_rad: known_m / self.hold_m, ..*self }
+    }
+
+    /// One linearised step for all unknowns.
+    pub(crate) fn solve(&self, state: &State, pairs: &[(&Meeting, Reduced)]) -> Result<State> {
+        if state.poses.len() == 1 && state.parameters.is_empty() {
+            return Ok(state.clone());
+        }
+        let mut network = Adjustment::new();
+        let mut stations = Vec::with_capacity(state.poses.len());
+        for (index, pose) in state.poses.iter().enumerate() {
+            let block = network.add_block(ParameterBlock::pose(pose).named(format!("station {index}")));
+            if index == self.fixed {
+                network.hold(block).map_err(adjustment)?;
+            } else {
+                let sigmas = [0, 1, 2, 3, 4, 5].map(|k| if k < 3 { self.hold_m } else { self.turn_rad });
+                let values = adjust::RigidPose::values(pose);
+                network.add_prior(block, &values, &Covariance::from_sigmas(&sigmas)).map_err(adjustment)?;
+            }
+            stations.push(block);
+        }
+        let shared = self.shared_block(&mut network, state)?;
+        let group = network.add_group("contacts of surfaces");
+        for (meeting, reduced) in pairs.iter().filter(|(_, reduced)| reduced.rows.nrows() > 0) {
+            let mut blocks = vec![stations[meeting.target], stations[meeting.source]];
+            blocks.extend(shared);
+            let observation = observation(blocks, reduced, &state.parameters);
+            let unit = Covariance::from_sigmas(&vec![1.0; reduced.rows.nrows()]);
+            network.add_observation(group, observation, &unit).map_err(adjustment)?;
+        }
+        // Contacts are found anew after each step: below a thousandth of a standard deviation there is nothing to gain.
+        let options = SolveOptions { step_tolerance: 1e-3, ..SolveOptions::default() };
+        let solution = network.solve(&options).map_err(adjustment)?;
+        let poses = stations.iter().map(|block| solution.pose(*block)).collect::<adjust::Result<Vec<_>>>();
+        let parameters = match shared {
+            Some(block) => solution.values(block).map_err(adjustment)?.to_vec(),
+            None => Vec::new(),
+        };
+        Ok(State { poses: poses.map_err(adjustment)?, parameters })
+    }
+
+    fn shared_block(&self, network: &mut Adjustment<'_>, state: &State) -> Result<Option<BlockId>> {
+        if state.parameters.is_empty() {
+            return Ok(None);
+        }
+        let block = ParameterBlock::euclidean(state.parameters.clone()).named("shared parameters");
+        let block = network.add_block(block.with_parameter_names(self.names.iter().cloned()));
+        let group = network.prior_group();
+        for (index, sigma) in self.prior.1.iter().enumerate().filter(|(_, sigma)| sigma.is_finite()) {
+            let row = (0..state.parameters.len()).map(|k| f64::from(u8::from(k == index))).collect::<Vec<f64>>();
+            let observation = adjust::LinearObservation::new(self.prior.0[index], [(block, row)]);
+            network.add_observation(group, observation, &Covariance::from_sigma(*sigma)).map_err(adjustment)?;
+        }
+        Ok(Some(block))
+    }
+}
+
+/// The rows of a pair: `√λ vᵀ x` is observed as `−vᵀ g / √λ`.
+fn observation(blocks: Vec<BlockId>, reduced: &Reduced, linearised_at: &[f64]) -> impl adjust::Observation + use<> {
+    let (rows, right, pose, start) =
+        (reduced.rows.clone(), reduced.right.clone(), reduced.pose, linearised_at.to_vec());
+    let count = rows.nrows();
+    FunctionObservation::new(blocks, count, move |values, residual, jacobians| {
+        // v = pose_difference(model, T), so that x = -v.
+        let (v, by_target, by_source) = relative_pose_parts(&pose, values)?;
+        let mut x = DVector::zeros(rows.ncols());
+        x.fixed_rows_mut::<6>(0).copy_from(&-v);
+        for (k, first) in start.iter().enumerate() {
+            x[6 + k] = values[2][k] - first;
+        }
+        let predicted = &rows * x;
+        for row in 0..count {
+            residual[row] = -right[row] - predicted[row];
+        }
+        if let Some(jacobians) = jacobians {
+            let of_pose = rows.columns(0, 6);
+            jacobians.set(0, &(of_pose * by_target));
+            jacobians.set(1, &(of_pose * by_source));
+            if !start.is_empty() {
+                jacobians.set(2, &rows.columns(6, start.len()).into_owned());
+            }
+        }
+        Ok(())
+    })
+}
+
+/// How the relative pose of two stations moves with their poses: Jacobians by target and by source at `state`.
+pub(crate) fn relative_jacobians(target: &Isometry3<f64>, source: &Isometry3<f64>) -> [Matrix6<f64>; 2] {
+    let relative = target.inverse() * source;
+    let values = [adjust::RigidPose::values(target), adjust::RigidPose::values(source)];
+    match relative_pose_parts(&relative, &[&values[0], &values[1]]) {
+        Ok((_, by_target, by_source)) => [by_target, by_source],
+        // Poses have seven values: there is no other way to fail.
+        Err(_) => [Matrix6::zeros(); 2],
+    }
+}
+
+/// Largest movement between two states, metre; rotations at `radius_m`.
+pub(crate) fn largest_step(before: &State, after: &State, radius_m: f64) -> f64 {
+    let moved = before.poses.iter().zip(&after.poses).map(|(a, b)| {
+        let d: Vector6<f64> = rigid_pose::pose_difference(a, b);
+        d.fixed_rows::<3>(0).norm().max(d.fixed_rows::<3>(3).norm() * radius_m)
+    });
+    moved.fold(0.0, f64::max)
+}

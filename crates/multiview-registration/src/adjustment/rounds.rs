@@ -1,0 +1,236 @@
+//! The wide rounds: contacts of patches found anew, all pairs reduced, all stations moved.
+
+use nalgebra::{Isometry3, Point3};
+use rayon::prelude::*;
+use statistics::mad_scale;
+
+use crate::adjustment::network::{Network, State, largest_step};
+use crate::error::{Error, Result};
+use crate::planes::contacts::{Contact, IN_PLACE, Reach, TURNED, partners};
+use crate::planes::reduction::{Meeting, Reduced, Scene, Weighting, reduce};
+use crate::surfaces::patches::Surface;
+use crate::surfaces::point_model::PointModel;
+use crate::surfaces::points::StationPoints;
+use icp_registration::RobustKernel;
+
+/// Most rounds of a level, and the part of its limit that a step must be below for it to end.
+const ROUNDS: usize = 8;
+const SMALL_STEP: f64 = 100.0;
+/// Nearest patches that are looked at while stations are still apart.
+const CANDIDATES: usize = 8;
+
+/// Derivatives of the patches of each station by all parameters, patch by patch.
+pub(crate) type PatchDerivatives = Vec<Vec<[f64; 3]>>;
+
+/// The surfaces at the present parameters.
+pub(crate) struct Surfaces<'a> {
+    /// As they were given.
+    pub given: Vec<&'a Surface>,
+    /// At the present parameters, with the derivatives of their patches; `None` without parameters.
+    pub modelled: Option<(Vec<Surface>, PatchDerivatives)>,
+    /// The model, with the number of points of each station.
+    pub model: Option<(&'a dyn PointModel, Vec<usize>)>,
+}
+
+impl<'a> Surfaces<'a> {
+    pub(crate) fn fixed(given: Vec<&'a Surface>) -> Self {
+        Self { given, modelled: None, model: None }
+    }
+
+    pub(crate) fn scene(&self, parameters: usize) -> Scene<'_> {
+        match &self.modelled {
+            Some((surfaces, derivatives)) => Scene { surfaces: surfaces.iter().collect(), derivatives, parameters },
+            None => Scene { surfaces: self.given.clone(), derivatives: &[], parameters },
+        }
+    }
+
+    /// Points, planes and derivatives at these parameters.
+    pub(crate) fn update(&mut self, parameters: &[f64]) -> Result<()> {
+        let Some((model, points)) = &self.model else { return Ok(()) };
+        let modelled: Result<Vec<(Surface, Vec<[f64; 3]>)>> = (0..self.given.len())
+            .into_par_iter()
+            .map(|station| at_parameters(self.given[station], *model, station, points[station], parameters))
+            .collect();
+        self.modelled = Some(modelled?.into_iter().unzip());
+        Ok(())
+    }
+
+    /// Puts the points of all stations where they are at these parameters.
+    pub(crate) fn place(&self, points: &mut [StationPoints], parameters: &[f64]) -> Result<()> {
+        let Some((model, counts)) = &self.model else { return Ok(()) };
+        points
+            .par_iter_mut()
+            .enumerate()
+            .try_for_each(|(station, points)| points.follow(*model, station, counts[station], parameters))
+    }
+}
+
+fn at_parameters(
+    surface: &Surface,
+    model: &dyn PointModel,
+    station: usize,
+    count: usize,
+    parameters: &[f64],
+) -> Result<(Surface, Vec<[f64; 3]>)> {
+    let m = parameters.len();
+    let mut points = vec![Point3::origin(); count];
+    let mut of_points = vec![[0.0; 3]; count * m];
+    for index in surface.members.iter().map(|&index| index as usize) {
+        points[index] = model.point(station, index, parameters, Some(&mut of_points[index * m..(index + 1) * m]));
+    }
+    point_cloud::check_points("points of the point model", &points)?;
+    if let Some(index) = of_points.iter().position(|d| !d.iter().all(|v| v.is_finite())) {
+        return Err(Error::NonFinite { what: "derivatives of the point model", index });
+    }
+    let surface = surface.refitted(&points)?;
+    let derivatives = averaged(&surface, &of_points, m);
+    Ok((surface, derivatives))
+}
+
+/// Derivatives of the patches' centres from those of their points.
+fn averaged(surface: &Surface, of_points: &[[f64; 3]], parameters: usize) -> Vec<[f64; 3]> {
+    let mut out = vec![[0.0; 3]; surface.patches.len() * parameters];
+    for patch in 0..surface.patches.len() {
+        let members = surface.points_of(patch);
+        for &index in members {
+            for k in 0..parameters {
+                for axis in 0..3 {
+                    out[patch * parameters + k][axis] +=
+                        of_points[index as usize * parameters + k][axis] / members.len() as f64;
+                }
+            }
+        }
+    }
+    out
+}
+
+/// All meetings at these poses; `only`: the pairs to look at (target, source).
+pub(crate) fn meet(
+    surfaces: &[&Surface],
+    poses: &[Isometry3<f64>],
+    only: &[(usize, usize)],
+    reach: Reach,
+    fewest: usize,
+) -> Result<Vec<Meeting>> {
+    let found: Result<Vec<Meeting>> = only
+        .par_iter()
+        .map(|&(target, source)| {
+            let pose = poses[target].inverse() * poses[source];
+            let (from, to) = (surfaces[source], surfaces[target]);
+            let forward = partners(from, to, &pose, reach)?;
+            let back = partners(to, from, &pose.inverse(), reach)?;
+            let contact = |source, target, asked_by_source| Contact { source, target, asked_by_source, share: 0.0 };
+            let contacts = forward.iter().map(|&(source, target)| contact(source, target, true));
+            let contacts = contacts.chain(back.iter().map(|&(target, source)| contact(source, target, false)));
+            Ok(Meeting { target, source, contacts: contacts.collect() })
+        })
+        .collect();
+    let mut meetings = found?;
+    meetings.retain(|meeting| meeting.contacts.len() >= 2 * fewest);
+    share(surfaces, &mut meetings);
+    Ok(meetings)
+}
+
+/// A patch that k − 1 other stations see as well observes k − 1 differences, each of which would count fully only if
+/// its own error entered once: with weights 1/k the squares are those about the common surface.
+fn share(surfaces: &[&Surface], meetings: &mut [Meeting]) {
+    let mut seen: Vec<Vec<u32>> = surfaces.iter().map(|surface| vec![1; surface.patches.len()]).collect();
+    for meeting in meetings.iter() {
+        for contact in &meeting.contacts {
+            let (station, patch) = asking(meeting.target, meeting.source, contact);
+            seen[station][patch] += 1;
+        }
+    }
+    for meeting in meetings.iter_mut() {
+        let (target, source) = (meeting.target, meeting.source);
+        for contact in &mut meeting.contacts {
+            let (station, patch) = asking(target, source, contact);
+            contact.share = 1.0 / f64::from(seen[station][patch]);
+        }
+    }
+}
+
+/// The station and the patch that looked for its partner.
+fn asking(target: usize, source: usize, contact: &Contact) -> (usize, usize) {
+    if contact.asked_by_source { (source, contact.source as usize) } else { (target, contact.target as usize) }
+}
+
+/// Standard deviation of the whitened residuals of all contacts, from their median.
+fn scale(scene: &Scene<'_>, meetings: &[Meeting], poses: &[Isometry3<f64>]) -> f64 {
+    let of_pair = |meeting: &Meeting| -> Vec<f64> {
+        let pose = poses[meeting.target].inverse() * poses[meeting.source];
+        meeting.contacts.iter().map(|contact| scene.whitened_residual(meeting, contact, &pose).abs()).collect()
+    };
+    let mut residuals: Vec<f64> = meetings.par_iter().map(of_pair).collect::<Vec<_>>().concat();
+    // Exact surfaces leave rounding, which needs no weighting.
+    mad_scale(&mut residuals).max(1e-3)
+}
+
+/// How the rounds go.
+pub(crate) struct Course<'a> {
+    pub network: &'a Network<'a>,
+    /// Error of the start poses, metre.
+    pub reach_m: f64,
+    pub minimum_contacts: usize,
+    pub kernel: RobustKernel,
+    pub progress: &'a (dyn Fn(usize) + Sync),
+}
+
+impl Course<'_> {
+    /// Falling limits: far partners first, so that a station that has slid along a wall is drawn back by what stands on it.
+    fn levels(&self, size_m: f64) -> Vec<Reach> {
+        let mut levels = Vec::new();
+        let mut across_m = self.reach_m;
+        while across_m > 1.2 * size_m {
+            levels.push(Reach { across_m, candidates: CANDIDATES, cosine: TURNED });
+            across_m /= 2.0;
+        }
+        levels.push(Reach { across_m: size_m, candidates: CANDIDATES, cosine: IN_PLACE });
+        levels.push(Reach { across_m: size_m / 2.0, candidates: 1, cosine: IN_PLACE });
+        levels
+    }
+
+    /// Brings all stations from start poses that are right to about the reach to a part of a patch.
+    pub(crate) fn run(&self, surfaces: &mut Surfaces<'_>, start: State) -> Result<State> {
+        let count = start.poses.len();
+        let all: Vec<(usize, usize)> = (0..count).flat_map(|t| (t + 1..count).map(move |s| (t, s))).collect();
+        let size_m = surfaces.given.iter().map(|surface| surface.size_m).fold(0.0, f64::max);
+        let mut state = start;
+        let mut rounds = 0;
+        for reach in self.levels(size_m) {
+            let mut pairs = all.clone();
+            for in_level in 0..ROUNDS {
+                surfaces.update(&state.parameters)?;
+                let scene = surfaces.scene(state.parameters.len());
+                let meetings = meet(&scene.surfaces, &state.poses, &pairs, reach, self.minimum_contacts)?;
+                if in_level == 0 {
+                    // Stations that do not meet now will not after the small steps of one level.
+                    pairs = meetings.iter().map(|meeting| (meeting.target, meeting.source)).collect();
+                }
+                let weighting = Weighting { kernel: self.kernel, scale: scale(&scene, &meetings, &state.poses) };
+                let next = self.network.solve(&state, &reduced(&scene, &meetings, &state.poses, &weighting)?)?;
+                let moved_m = largest_step(&state, &next, self.network.hold_m);
+                state = next;
+                rounds += 1;
+                (self.progress)(rounds);
+                if moved_m <= reach.across_m / SMALL_STEP {
+                    break;
+                }
+            }
+        }
+        Ok(state)
+    }
+}
+
+fn reduced<'m>(
+    scene: &Scene<'_>,
+    meetings: &'m [Meeting],
+    poses: &[Isometry3<f64>],
+    weighting: &Weighting,
+) -> Result<Vec<(&'m Meeting, Reduced)>> {
+    let reduce = |meeting: &'m Meeting| {
+        let pose = poses[meeting.target].inverse() * poses[meeting.source];
+        Ok((meeting, reduce(scene, meeting, &pose, weighting)?))
+    };
+    meetings.par_iter().map(reduce).collect()
+}

@@ -1,0 +1,5 @@
+//! Pairs of stations, the loops that they form, and whether views contradict each other.
+
+pub(crate) mod alignments;
+pub(crate) mod loops;
+pub(crate) mod placement;

@@ -1,0 +1,26 @@
+#![doc = include_str!("../README.md")]
+
+mod adjustment;
+mod agreement;
+mod error;
+mod pairs_of_frames;
+mod planes;
+mod relative_pose;
+mod surfaces;
+mod survey;
+
+pub use agreement::alignments::{PairAlignment, RefusedPair};
+pub use agreement::loops::LoopClosure;
+pub use agreement::placement::{PairAgreement, Placement, Placements, StationPlacement, judge_placements};
+pub use error::{Error, Result};
+pub use icp_registration;
+pub use nalgebra;
+pub use pairs_of_frames::frames::{FrameRegistration, PlacedFrame, UncheckedPair, UnplacedFrame, register_frames};
+pub use point_cloud;
+pub use projective_registration;
+pub use surfaces::point_model::{PointModel, SharedParameters};
+pub use survey::datum::Datum;
+pub use survey::registration::{
+    Start, StationRegistration, StationRegistrationOptions, SurfacePair, UndeterminedStation,
+};
+pub use survey::stations::register_stations;

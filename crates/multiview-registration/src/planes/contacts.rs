@@ -1,0 +1,183 @@
+//! Where the patches of two stations meet, and what each meeting observes.
+
+use nalgebra::{Isometry3, Matrix6, Vector3, Vector6};
+
+use crate::error::Result;
+use crate::surfaces::patches::Surface;
+
+/// How far beside a patch its partner may be, in patches: half the diagonal of a cell. Farther ones would be partners
+/// from beyond the rim.
+const BESIDE: f64 = 0.75;
+
+/// Two patches that show the same piece of a surface.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Contact {
+    pub source: u32,
+    pub target: u32,
+    /// Whether the source's patch looked for its partner, or the target's.
+    pub asked_by_source: bool,
+    /// Share of this contact in what the patch that asked observes.
+    pub share: f64,
+}
+
+/// How partners are looked for.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Reach {
+    /// How far apart partners may be across their surface, metre.
+    pub across_m: f64,
+    /// Of how many nearest patches the first that fits is taken: one, once the stations are nearly in place.
+    pub candidates: usize,
+    /// Smallest cosine of the angle between their normals.
+    pub cosine: f64,
+}
+
+/// Cosines while stations may be turned (37 degrees), and once they are in place (15): patches across a crease, whose
+/// normals lie between those of two walls, would say where a wall ends.
+pub(crate) const TURNED: f64 = 0.8;
+pub(crate) const IN_PLACE: f64 = 0.966;
+
+/// The partners of the patches of one station (`asking`) among those of another, `to_asked` being
+/// `asked_from_asking`: pairs of indices.
+pub(crate) fn partners(
+    asking: &Surface,
+    asked: &Surface,
+    to_asked: &Isometry3<f64>,
+    reach: Reach,
+) -> Result<Vec<(u32, u32)>> {
+    let rotation = to_asked.rotation.to_rotation_matrix().into_inner();
+    let beside_m = BESIDE * asking.size_m.max(asked.size_m);
+    let farthest_m = reach.across_m.hypot(beside_m);
+    let signed = asking.oriented && asked.oriented;
+    let mut found = Vec::new();
+    for (index, patch) in asking.patches.iter().enumerate() {
+        let centre = rotation * patch.centre.coords + to_asked.translation.vector;
+        if !point_cloud::is_usable(&centre.into()) {
+            return Err(crate::Error::NonFinite { what: "points of a station in the frame of another", index });
+        }
+        let normal = rotation * patch.normal;
+        let fits = |other: usize| {
+            let other = &asked.patches[other];
+            let apart = centre - other.centre.coords;
+            let across = other.normal.dot(&apart);
+            let cosine = normal.dot(&other.normal);
+            across.abs() <= reach.across_m
+                && apart.norm_squared() - across * across <= beside_m * beside_m
+                && if signed { cosine >= reach.cosine } else { cosine.abs() >= reach.cosine }
+        };
+        let nearest = asked.tree.any_nearest(&[centre.x, centre.y, centre.z]);
+        if nearest.distance_m > farthest_m {
+            continue;
+        }
+        let partner = if fits(nearest.index) {
+            Some(nearest.index)
+        } else if reach.candidates > 1 {
+            let near = asked.tree.k_nearest(&centre.into(), reach.candidates)?;
+            near.iter().map(|neighbour| neighbour.index).find(|&other| fits(other))
+        } else {
+            None
+        };
+        found.extend(partner.map(|other| (index as u32, other as u32)));
+    }
+    Ok(found)
+}
+
+/// What a contact observes: the distance of the two patches along their common normal.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Observed {
+    /// Distance, metre.
+    pub residual: f64,
+    /// Its derivative by the tangent of `target_from_source`.
+    pub jacobian: Vector6<f64>,
+    /// Common normal, target frame.
+    pub normal: Vector3<f64>,
+    /// Variance of the residual, metre².
+    pub variance: f64,
+    /// Variance of the common normal, radian².
+    pub normal_variance: f64,
+}
+
+/// Evaluates a contact. The common normal is the mean of both: half as uncertain as one, and exact on round surfaces.
+pub(crate) fn observe(
+    source: &Surface,
+    target: &Surface,
+    contact: &Contact,
+    target_from_source: &Isometry3<f64>,
+) -> Observed {
+    let (from, to) = (&source.patches[contact.source as usize], &target.patches[contact.target as usize]);
+    let turned = target_from_source.rotation * from.normal;
+    let sum = if turned.dot(&to.normal) < 0.0 { to.normal - turned } else { to.normal + turned };
+    // Partners enclose less than 90 degrees: the sum is never short.
+    let normal = sum / sum.norm();
+    let apart = target_from_source * from.centre - to.centre;
+    let residual = normal.dot(&apart);
+    let along = (apart.norm_squared() - residual * residual).max(0.0);
+    let normal_variance = (from.normal_variance + to.normal_variance) / 4.0;
+    Observed {
+        residual,
+        jacobian: along_direction(&from.centre.coords, target_from_source, &normal),
+        normal,
+        variance: from.variance + to.variance + along * normal_variance,
+        normal_variance,
+    }
+}
+
+/// Derivative of `direction · (R p + t)` by the tangent `[dt, dtheta]`.
+fn along_direction(
+    point: &Vector3<f64>,
+    target_from_source: &Isometry3<f64>,
+    direction: &Vector3<f64>,
+) -> Vector6<f64> {
+    let turn = point.cross(&(target_from_source.rotation.inverse() * direction));
+    Vector6::new(direction.x, direction.y, direction.z, turn.x, turn.y, turn.z)
+}
+
+/// Information that noise of the common normal imitates at unit weight: on one wall, normals that scatter seem to say
+/// something about sliding.
+pub(crate) fn imitated(
+    source: &Surface,
+    contact: &Contact,
+    observed: &Observed,
+    target_from_source: &Isometry3<f64>,
+) -> Matrix6<f64> {
+    let point = &source.patches[contact.source as usize].centre.coords;
+    let mut sum = Matrix6::zeros();
+    let (right, up) = crate::surfaces::patches::axes(&observed.normal);
+    for direction in [right, up] {
+        let jacobian = along_direction(point, target_from_source, &direction);
+        sum += jacobian * jacobian.transpose() * observed.normal_variance;
+    }
+    sum
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use nalgebra::Point3;
+    use point_cloud::Cloud;
+    use rigid_pose::step_pose;
+
+    #[test]
+    fn the_derivative_of_a_contact_agrees_with_differences() {
+        let points: Vec<Point3<f64>> =
+            (0..900).map(|i| Point3::new(f64::from(i % 30) * 0.02, f64::from(i / 30) * 0.02, 1.0)).collect();
+        let cloud = Cloud::new(points);
+        let surface = Surface::new(&cloud, &vec![Vector3::z(); 900], 0.1).unwrap();
+        let pose = Isometry3::new(Vector3::new(0.01, -0.02, 0.03), Vector3::new(0.02, 0.01, -0.03));
+        let contact = Contact { source: 3, target: 3, asked_by_source: true, share: 0.5 };
+        let at = |pose: &Isometry3<f64>| observe(&surface, &surface, &contact, pose);
+        let here = at(&pose);
+        for k in 0..6 {
+            let mut step = Vector6::zeros();
+            step[k] = 1e-5;
+            // The normal is held: what turns with the pose is not part of the derivative.
+            let along = |step: &Vector6<f64>| {
+                let moved = step_pose(&pose, step) * surface.patches[3].centre;
+                here.normal.dot(&(moved - surface.patches[3].centre))
+            };
+            let difference = (along(&step) - along(&-step)) / 2e-5;
+            // Central differences of a function that is nearly linear: rounding, 1e-16 / 1e-5.
+            assert!((difference - here.jacobian[k]).abs() < 1e-9, "{k}: {difference} {}", here.jacobian[k]);
+        }
+    }
+}

@@ -1,0 +1,293 @@
+//! Facets: the planes that several stations saw pieces of, each station's regions joined where they meet.
+
+use std::collections::BTreeMap;
+
+use nalgebra::{Isometry3, Vector3};
+
+use crate::planes::contacts::Contact;
+use crate::planes::reduction::Meeting;
+use crate::planes::tiles::Tiles;
+use crate::surfaces::patches::{Surface, axes};
+use crate::surfaces::plane_fit::Moments;
+
+/// Ratio of the scatter about the joint plane to that about the parts beyond which they are not joined.
+const ROUGHER: f64 = 1.15;
+/// How far patches of neighbouring pieces of a plane may be apart, patches.
+const BESIDE: f64 = 2.0;
+/// Standard deviations that a patch may be off a facet that it joins.
+const OFF_PLANE: f64 = 3.0;
+/// Cosine of the largest angle between the two (15 degrees).
+const SAME_DIRECTION: f64 = 0.966;
+
+/// A plane with what is known of its extent.
+#[derive(Debug, Clone)]
+pub(crate) struct Facet {
+    pub origin: Vector3<f64>,
+    pub normal: Vector3<f64>,
+    pub right: Vector3<f64>,
+    pub up: Vector3<f64>,
+    pub tiles: Tiles,
+    /// Number of its patches.
+    pub size: usize,
+    /// Points of a small facet (station, index in its cloud), which alone belong to it; empty for a wide one, to which
+    /// every point on it does.
+    pub points: Vec<(u32, u32)>,
+}
+
+impl Facet {
+    fn new(origin: Vector3<f64>, normal: Vector3<f64>) -> Self {
+        let (right, up) = axes(&normal);
+        Self { origin, normal, right, up, tiles: Tiles::default(), size: 0, points: Vec::new() }
+    }
+
+    /// Coordinates of a point in the plane.
+    pub(crate) fn place(&self, point: &Vector3<f64>) -> [f64; 2] {
+        let apart = point - self.origin;
+        [self.right.dot(&apart), self.up.dot(&apart)]
+    }
+
+    /// Moves the plane by an offset and two slopes.
+    pub(crate) fn moved(&mut self, step: &Vector3<f64>) {
+        self.origin += self.normal * step[0];
+        self.normal = (self.normal - self.right * step[1] - self.up * step[2]).normalize();
+        self.right = (self.right - self.normal * self.normal.dot(&self.right)).normalize();
+        self.up = self.normal.cross(&self.right);
+    }
+}
+
+/// Joins the surfaces of all stations at these poses; partners may be `tolerance_m` apart because the poses are off.
+pub(crate) fn facets(
+    surfaces: &[&Surface],
+    poses: &[Isometry3<f64>],
+    meetings: &[Meeting],
+    tolerance_m: f64,
+) -> Vec<Facet> {
+    let Some(first) = poses.first() else { return Vec::new() };
+    let mut joined = Joined::new(surfaces, poses, first.translation.vector, tolerance_m);
+    joined.join_regions(meetings);
+    joined.join_neighbours();
+    let mut facet_of = joined.adopt_patches(meetings);
+    let mut facets = joined.wide(&facet_of);
+    joined.small(meetings, &mut facet_of, &mut facets);
+    let mut tiles = 0;
+    for facet in &mut facets {
+        facet.tiles.first = tiles;
+        tiles += facet.tiles.len();
+    }
+    facets
+}
+
+/// Regions as a forest: those of one tree are one plane.
+struct Joined<'a> {
+    surfaces: &'a [&'a Surface],
+    poses: &'a [Isometry3<f64>],
+    centre: Vector3<f64>,
+    tolerance_m: f64,
+    first: Vec<usize>,
+    parent: Vec<usize>,
+    /// About `centre`, of the roots.
+    moments: Vec<Moments>,
+    normals: Vec<Vector3<f64>>,
+}
+
+impl<'a> Joined<'a> {
+    fn new(surfaces: &'a [&'a Surface], poses: &'a [Isometry3<f64>], centre: Vector3<f64>, tolerance_m: f64) -> Self {
+        let (mut first, mut moments, mut normals) = (Vec::new(), Vec::new(), Vec::new());
+        for (surface, pose) in surfaces.iter().zip(poses) {
+            first.push(moments.len());
+            moments.extend(surface.regions.iter().map(|region| region.moments.moved(&surface.origin, pose, &centre)));
+            let mut own = vec![Vector3::zeros(); surface.regions.len()];
+            for (patch, region) in surface.patches.iter().zip(&surface.region_of) {
+                if let Some(region) = region {
+                    own[*region] += pose.rotation * patch.normal;
+                }
+            }
+            normals.extend(own);
+        }
+        let parent = (0..moments.len()).collect();
+        Self { surfaces, poses, centre, tolerance_m, first, parent, moments, normals }
+    }
+
+    fn root(&self, mut node: usize) -> usize {
+        while self.parent[node] != node {
+            node = self.parent[node];
+        }
+        node
+    }
+
+    fn node(&self, station: usize, patch: u32) -> Option<usize> {
+        self.surfaces[station].region_of[patch as usize].map(|region| self.first[station] + region)
+    }
+
+    /// Joins regions that meet, those that meet in the most places first.
+    fn join_regions(&mut self, meetings: &[Meeting]) {
+        let mut met: BTreeMap<(usize, usize), usize> = BTreeMap::new();
+        for (a, b) in ends(meetings) {
+            if let (Some(a), Some(b)) = (self.node(a.0, a.1), self.node(b.0, b.1)) {
+                *met.entry((a.min(b), a.max(b))).or_default() += 1;
+            }
+        }
+        let mut met: Vec<((usize, usize), usize)> = met.into_iter().collect();
+        met.sort_by_key(|&(nodes, count)| (std::cmp::Reverse(count), nodes));
+        for ((a, b), _) in met {
+            self.join(a, b);
+        }
+    }
+
+    /// Joins pieces of a plane that lie beside each other: what stands before a wall divides it for each station.
+    fn join_neighbours(&mut self) {
+        let mut centres: BTreeMap<usize, Vec<Vector3<f64>>> = BTreeMap::new();
+        for (station, surface) in self.surfaces.iter().enumerate() {
+            for (patch, place) in surface.patches.iter().enumerate() {
+                if let Some(node) = self.node(station, patch as u32) {
+                    centres.entry(self.root(node)).or_default().push((self.poses[station] * place.centre).coords);
+                }
+            }
+        }
+        let reach_m = BESIDE * self.size_m();
+        let roots: Vec<usize> = centres.keys().copied().collect();
+        for (k, &a) in roots.iter().enumerate() {
+            for &b in &roots[k + 1..] {
+                let (first, second) = (self.normals[self.root(a)], self.normals[self.root(b)]);
+                let beside = || centres[&a].iter().any(|p| centres[&b].iter().any(|q| (p - q).norm() <= reach_m));
+                if first.dot(&second) >= SAME_DIRECTION * first.norm() * second.norm() && beside() {
+                    self.join(a, b);
+                }
+            }
+        }
+    }
+
+    fn join(&mut self, a: usize, b: usize) {
+        let (a, b) = (self.root(a), self.root(b));
+        if a == b || !self.one_plane(a, b) {
+            return;
+        }
+        let (into, from) = if self.moments[a].count() >= self.moments[b].count() { (a, b) } else { (b, a) };
+        let (moments, normal) = (self.moments[from], self.normals[from]);
+        self.moments[into].join(&moments);
+        self.normals[into] += normal;
+        self.parent[from] = into;
+    }
+
+    fn one_plane(&self, a: usize, b: usize) -> bool {
+        let (wide, small) = if self.moments[a].count() >= self.moments[b].count() { (a, b) } else { (b, a) };
+        let (wide, small) = (&self.moments[wide], &self.moments[small]);
+        let mut both = *wide;
+        both.join(small);
+        let (Some(plane), Some(own), Some(joint)) = (wide.region_plane(), small.region_plane(), both.region_plane())
+        else {
+            return false;
+        };
+        let apart = small.mean() - wide.mean();
+        let of_plane = plane.variance / wide.count() * (1.0 + apart.norm_squared() / plane.spread);
+        let about = plane.normal.dot(&(small.scatter() * plane.normal)) + plane.normal.dot(&apart).powi(2);
+        let off = self.tolerance_m.powi(2);
+        let parts = (wide.count() * plane.variance + small.count() * own.variance) / both.count();
+        plane.normal.dot(&own.normal).abs() >= SAME_DIRECTION
+            && about <= ROUGHER * own.variance + OFF_PLANE.powi(2) * of_plane + off
+            && joint.variance <= ROUGHER * parts + off
+    }
+
+    /// The root that each patch belongs to: that of its region, or of a partner in whose plane it lies.
+    fn adopt_patches(&self, meetings: &[Meeting]) -> Vec<Vec<Option<usize>>> {
+        let own = |(station, surface): (usize, &&Surface)| -> Vec<Option<usize>> {
+            (0..surface.patches.len()).map(|patch| self.node(station, patch as u32).map(|n| self.root(n))).collect()
+        };
+        let mut facet_of: Vec<Vec<Option<usize>>> = self.surfaces.iter().enumerate().map(own).collect();
+        for (a, b) in ends(meetings) {
+            for ((station, patch), other) in [(a, b), (b, a)] {
+                let Some(root) = facet_of[other.0][other.1 as usize] else { continue };
+                if facet_of[station][patch as usize].is_none() && self.lies_in(station, patch, root) {
+                    facet_of[station][patch as usize] = Some(root);
+                }
+            }
+        }
+        facet_of
+    }
+
+    fn lies_in(&self, station: usize, patch: u32, root: usize) -> bool {
+        let (pose, patch) = (&self.poses[station], &self.surfaces[station].patches[patch as usize]);
+        let Some(plane) = self.moments[root].region_plane() else { return false };
+        let apart = (pose * patch.centre).coords - self.centre - self.moments[root].mean();
+        let across = plane.normal.dot(&apart).abs();
+        across <= OFF_PLANE * patch.variance.sqrt() + self.tolerance_m
+            && plane.normal.dot(&(pose.rotation * patch.normal)).abs() >= SAME_DIRECTION
+    }
+
+    fn size_m(&self) -> f64 {
+        self.surfaces.iter().map(|surface| surface.size_m).fold(0.0, f64::max)
+    }
+
+    /// One facet a root.
+    fn wide(&self, facet_of: &[Vec<Option<usize>>]) -> Vec<Facet> {
+        let mut places: BTreeMap<usize, (Facet, Vec<[f64; 2]>)> = BTreeMap::new();
+        for (station, of_patches) in facet_of.iter().enumerate() {
+            for (patch, root) in of_patches.iter().enumerate() {
+                let Some(root) = *root else { continue };
+                let centre = (self.poses[station] * self.surfaces[station].patches[patch].centre).coords;
+                let entry = places.entry(root).or_insert_with(|| (self.facet(root), Vec::new()));
+                let place = entry.0.place(&centre);
+                entry.1.push(place);
+            }
+        }
+        let size_m = self.size_m();
+        let with_tiles = |(mut facet, places): (Facet, Vec<[f64; 2]>)| {
+            facet.size = places.len();
+            facet.tiles = Tiles::around(&places, size_m);
+            facet
+        };
+        places.into_values().map(with_tiles).collect()
+    }
+
+    fn facet(&self, root: usize) -> Facet {
+        let moments = &self.moments[root];
+        let normal = moments.region_plane().map_or(Vector3::z(), |plane| plane.normal);
+        let normal = if normal.dot(&self.normals[root]) < 0.0 { -normal } else { normal };
+        Facet::new(self.centre + moments.mean(), normal)
+    }
+
+    /// Patches of several stations that meet and belong to no wide facet: one small facet each.
+    fn small(&self, meetings: &[Meeting], facet_of: &mut [Vec<Option<usize>>], facets: &mut Vec<Facet>) {
+        let mut partners: BTreeMap<(u32, u32), Vec<(u32, u32)>> = BTreeMap::new();
+        for (a, b) in ends(meetings) {
+            if facet_of[a.0][a.1 as usize].is_none() && facet_of[b.0][b.1 as usize].is_none() {
+                let (a, b) = ((a.0 as u32, a.1), (b.0 as u32, b.1));
+                partners.entry(a).or_default().push(b);
+                partners.entry(b).or_default().push(a);
+            }
+        }
+        for (patch, others) in partners {
+            let free = |(station, patch): (u32, u32)| facet_of[station as usize][patch as usize].is_none();
+            let mut members = vec![patch];
+            members.extend(others.into_iter().filter(|&other| free(other)));
+            members.sort_unstable();
+            members.dedup();
+            if !free(patch) || members.len() < 2 {
+                continue;
+            }
+            let mut moments = Moments::default();
+            for &(station, patch) in &members {
+                let (surface, pose) = (self.surfaces[station as usize], &self.poses[station as usize]);
+                moments.join(&surface.moments[patch as usize].moved(&surface.origin, pose, &self.centre));
+                facet_of[station as usize][patch as usize] = Some(usize::MAX);
+            }
+            let Some(plane) = moments.plane() else { continue };
+            let mut facet = Facet::new(self.centre + moments.mean(), plane.normal);
+            facet.tiles = Tiles::one(self.size_m());
+            facet.size = members.len();
+            let points_of = |&(station, patch): &(u32, u32)| {
+                let points = self.surfaces[station as usize].points_of(patch as usize);
+                points.iter().map(move |&point| (station, point))
+            };
+            facet.points = members.iter().flat_map(points_of).collect();
+            facets.push(facet);
+        }
+    }
+}
+
+/// Both ends of all contacts, as stations and patches.
+fn ends(meetings: &[Meeting]) -> impl Iterator<Item = ((usize, u32), (usize, u32))> {
+    let of =
+        |meeting: &Meeting, contact: &Contact| ((meeting.source, contact.source), (meeting.target, contact.target));
+    meetings.iter().flat_map(move |meeting| meeting.contacts.iter().map(move |contact| of(meeting, contact)))
+}

@@ -1,0 +1,214 @@
+//! What each station saw of each facet: its points given to the facets, summed tile by tile.
+//!
+//! Which facet a point belongs to is decided by where its ray meets them, not by where the point lies: so the decision
+//! hangs on no noise. Where a ray meets two facets at nearly the same range, the point is left out.
+
+use nalgebra::{Isometry3, Matrix3, Vector3};
+use rayon::prelude::*;
+
+use crate::planes::facets::Facet;
+use crate::planes::sums::{FARTHEST, Sums};
+use crate::planes::tiles::Tile;
+use crate::surfaces::points::{Block, StationPoints};
+use icp_registration::RobustKernel;
+
+/// Smallest cosine between ray and normal.
+const GRAZING: f64 = 0.03;
+/// Standard deviations between the ranges of two facets below which they are not told apart.
+const APART: f64 = 7.0;
+/// Cosine between the normals of facets that are one surface.
+const SAME_DIRECTION: f64 = 0.966;
+
+/// How points are given to facets.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Gate {
+    pub kernel: RobustKernel,
+    /// Standard deviation that the poses add across the surfaces, metre.
+    pub slack_m: f64,
+    /// Of so many points one is taken.
+    pub stride: usize,
+    pub parameters: usize,
+}
+
+/// The sums of all stations over all tiles.
+pub(crate) fn sightings(points: &[StationPoints], poses: &[Isometry3<f64>], facets: &[Facet], gate: Gate) -> Vec<Sums> {
+    let stations = (0..points.len()).into_par_iter();
+    stations.map(|k| Sighting::new(&points[k], &poses[k], k, facets, gate).sums()).collect()
+}
+
+/// Where a ray meets a facet.
+#[derive(Debug, Clone, Copy)]
+struct Hit {
+    facet: usize,
+    tile: usize,
+    kind: Tile,
+    place: [f64; 2],
+    cosine: f64,
+    range_m: f64,
+}
+
+struct Sighting<'a> {
+    points: &'a StationPoints,
+    rotation: Matrix3<f64>,
+    eye: Vector3<f64>,
+    station: usize,
+    facets: &'a [Facet],
+    gate: Gate,
+    used: Vec<bool>,
+    hits: Vec<Hit>,
+    sums: Sums,
+    phi: Vec<f64>,
+}
+
+impl<'a> Sighting<'a> {
+    fn new(points: &'a StationPoints, pose: &Isometry3<f64>, station: usize, facets: &'a [Facet], gate: Gate) -> Self {
+        let tiles = facets.iter().map(|facet| facet.tiles.len()).sum();
+        Self {
+            points,
+            rotation: pose.rotation.to_rotation_matrix().into_inner(),
+            eye: pose.translation.vector,
+            station,
+            facets,
+            gate,
+            used: vec![false; points.points.len()],
+            hits: Vec::new(),
+            sums: Sums::new(gate.parameters, tiles),
+            phi: vec![1.0; 3 + gate.parameters],
+        }
+    }
+
+    fn sums(mut self) -> Sums {
+        let mut near = Vec::new();
+        for block in &self.points.blocks {
+            self.near(block, &mut near);
+            for point in block.points.clone().step_by(self.gate.stride) {
+                let (direction, range_m) = self.ray(point);
+                if let Some(hit) = self.facet_of(point, &direction, range_m, &near) {
+                    let plane = &self.facets[hit.facet];
+                    let rho = plane.normal.dot(&(self.eye + direction * range_m - plane.origin));
+                    self.used[point] = self.weighted(point, &hit, rho);
+                }
+            }
+        }
+        let (facets, station) = (self.facets, self.station);
+        for (index, facet) in facets.iter().enumerate() {
+            for &(_, point) in facet.points.iter().filter(|point| point.0 as usize == station) {
+                self.add_member(self.points.slot_of[point as usize] as usize, index);
+            }
+        }
+        self.sums.free_derivatives_of_noise(self.gate.kernel);
+        self.sums
+    }
+
+    /// Wide facets that points of a block may lie on.
+    fn near(&self, block: &Block, near: &mut Vec<usize>) {
+        near.clear();
+        let centre = self.rotation * block.centre.coords + self.eye;
+        let reach_m = block.radius_m + 10.0 * self.gate.slack_m;
+        for (index, facet) in self.facets.iter().enumerate().filter(|(_, facet)| facet.points.is_empty()) {
+            let across = facet.normal.dot(&(centre - facet.origin)).abs();
+            if across <= 1.5 * reach_m && facet.tiles.near(facet.place(&centre), 1.5 * reach_m) {
+                near.push(index);
+            }
+        }
+    }
+
+    /// Range along the ray of a point and the point's own.
+    fn ray(&self, point: usize) -> (Vector3<f64>, f64) {
+        let turned = self.rotation * self.points.points[point].coords;
+        let range = turned.norm();
+        (turned / range, range)
+    }
+
+    /// Standard deviation of a point across a facet, metre.
+    fn sigma(&self, point: usize, cosine: f64) -> f64 {
+        (self.points.variance(point, cosine) + self.gate.slack_m.powi(2)).sqrt()
+    }
+
+    /// Where the ray of a point meets a facet; `None` also where that is too far off to matter.
+    fn hit(&self, point: usize, facet: usize, direction: &Vector3<f64>, range_m: f64) -> Option<Hit> {
+        let plane = &self.facets[facet];
+        let ahead = if self.points.along_rays { *direction } else { -plane.normal };
+        let cosine = plane.normal.dot(&ahead);
+        let rho = plane.normal.dot(&(self.eye + direction * range_m - plane.origin));
+        if cosine > -GRAZING || rho.abs() > (FARTHEST + APART) * self.sigma(point, cosine) {
+            return None;
+        }
+        // Without rays, the point is moved along the normal.
+        let from = if self.points.along_rays { self.eye } else { self.eye + direction * range_m };
+        let ahead_m = plane.normal.dot(&(plane.origin - from)) / cosine;
+        let place = plane.place(&(from + ahead * ahead_m));
+        let (tile, kind) = plane.tiles.at(place);
+        let range_m = if self.points.along_rays { ahead_m } else { range_m + ahead_m };
+        (kind != Tile::Outside).then_some(Hit { facet, tile, kind, place, cosine, range_m })
+    }
+
+    /// Where the point lies, if that is certain.
+    fn facet_of(&mut self, point: usize, direction: &Vector3<f64>, range_m: f64, near: &[usize]) -> Option<Hit> {
+        self.hits.clear();
+        for &facet in near {
+            self.hits.extend(self.hit(point, facet, direction, range_m));
+        }
+        let off = |hit: &Hit| (range_m - hit.range_m).abs();
+        let mut best = *self.hits.iter().min_by(|a, b| off(a).total_cmp(&off(b)))?;
+        for other in &self.hits {
+            let apart = (other.range_m - best.range_m).abs();
+            let sigma_m = self.sigma(point, best.cosine) / best.cosine.abs();
+            if other.facet == best.facet || apart > APART * sigma_m {
+                continue;
+            }
+            let (first, second) = (&self.facets[best.facet], &self.facets[other.facet]);
+            if first.normal.dot(&second.normal) < SAME_DIRECTION {
+                return None;
+            }
+            // Pieces of one surface: the one that was seen there, or the one that is better known.
+            let rank = |hit: &Hit, facet: &Facet| (hit.kind == Tile::Core, facet.size);
+            if rank(other, second) > rank(&best, first) {
+                best = *other;
+            }
+        }
+        Some(best)
+    }
+
+    /// A point of a small facet.
+    fn add_member(&mut self, point: usize, index: usize) {
+        if self.used.get(point) != Some(&false) {
+            return;
+        }
+        let (direction, range_m) = self.ray(point);
+        let facet = &self.facets[index];
+        let place = self.eye + direction * range_m;
+        let hit = Hit {
+            facet: index,
+            tile: facet.tiles.first,
+            kind: Tile::Core,
+            place: facet.place(&place),
+            cosine: facet.normal.dot(&direction),
+            range_m,
+        };
+        let rho = facet.normal.dot(&(place - facet.origin));
+        self.used[point] = self.weighted(point, &hit, rho);
+    }
+
+    /// Adds a point at a distance from its facet; whether it counts.
+    fn weighted(&mut self, point: usize, hit: &Hit, rho: f64) -> bool {
+        let sigma = self.sigma(point, hit.cosine);
+        let whitened = rho / sigma;
+        // An unknown deviation is no weight.
+        if whitened.is_nan() || whitened.abs() > FARTHEST || !sigma.is_normal() {
+            return false;
+        }
+        let weight = self.gate.kernel.weight(whitened) / sigma.powi(2);
+        self.phi[1..3].copy_from_slice(&hit.place);
+        let parameters = self.gate.parameters;
+        if parameters > 0 {
+            let normal = self.rotation.transpose() * self.facets[hit.facet].normal;
+            let derivatives = &self.points.derivatives[point * parameters..(point + 1) * parameters];
+            for (phi, derivative) in self.phi[3..].iter_mut().zip(derivatives) {
+                *phi = normal.dot(&Vector3::from(*derivative));
+            }
+        }
+        self.sums.add(hit.tile, &self.phi, rho, weight);
+        true
+    }
+}

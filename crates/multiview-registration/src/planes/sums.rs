@@ -1,0 +1,165 @@
+//! Sums over the points of a station in a tile, from which all normal equations are made.
+
+use nalgebra::{Matrix3, Vector2, Vector3};
+
+use icp_registration::RobustKernel;
+
+/// Fewest degrees of freedom that tell how much noise derivatives share with distances.
+const FEWEST_FREE: f64 = 5.0;
+/// Ratio of the spreads of a tile's points, squared, below which they lie on a line.
+const NARROW: f64 = 1e-3;
+/// Standard deviations beyond which a point is not on a facet.
+pub(crate) const FARTHEST: f64 = 4.685;
+
+/// Sums over the points of a station in a tile. With `φ = [1, u, v, derivatives by the shared parameters]` and the
+/// distance ρ of a point from its facet: `Σ w φ φᵀ` (lower triangle, row by row) and `Σ w φ ρ`.
+#[derive(Debug, Clone)]
+pub(crate) struct Sums {
+    pub order: usize,
+    /// Where the sums of each tile begin; `u32::MAX` for a tile that the station saw nothing of.
+    begins: Vec<u32>,
+    values: Vec<f64>,
+}
+
+impl Sums {
+    pub(crate) fn new(parameters: usize, tiles: usize) -> Self {
+        let order = 3 + parameters;
+        Self { order, begins: vec![u32::MAX; tiles], values: Vec::new() }
+    }
+
+    /// Products, right sides, number of points.
+    fn stride(order: usize) -> usize {
+        order * (order + 1) / 2 + order + 1
+    }
+
+    pub fn add(&mut self, tile: usize, phi: &[f64], rho: f64, weight: f64) {
+        let stride = Self::stride(self.order);
+        if self.begins[tile] == u32::MAX {
+            self.begins[tile] = self.values.len() as u32;
+            self.values.resize(self.values.len() + stride, 0.0);
+        }
+        let begin = self.begins[tile] as usize;
+        let own = &mut self.values[begin..begin + stride];
+        let mut k = 0;
+        for (row, a) in phi.iter().enumerate() {
+            for b in &phi[..=row] {
+                own[k] += weight * a * b;
+                k += 1;
+            }
+        }
+        for (sum, a) in own[k..].iter_mut().zip(phi) {
+            *sum += weight * a * rho;
+        }
+        own[k + self.order] += 1.0;
+    }
+
+    /// The derivative of a point by a parameter is taken where the point was seen, and shares the noise of its distance:
+    /// left so, the noise of all points would shrink the scene. Within a tile derivatives are linear in `[u, v]`; the sums
+    /// become those of the lines fitted to them, less what the noise leaves in the fit, which the scatter about the lines
+    /// tells.
+    pub(crate) fn free_derivatives_of_noise(&mut self, kernel: RobustKernel) {
+        if self.order == 3 {
+            return;
+        }
+        let (stride, share) = (Self::stride(self.order), share_of_fit(kernel));
+        for own in self.values.chunks_exact_mut(stride) {
+            if !freed_of_noise(own, self.order, share) {
+                own.fill(0.0);
+            }
+        }
+    }
+
+    /// Products and right sides of a tile; `None` where the station saw nothing of it.
+    pub(crate) fn of(&self, tile: usize) -> Option<TileSums<'_>> {
+        let stride = Self::stride(self.order);
+        let begin = self.begins[tile];
+        let own = self.values.get(begin as usize..begin as usize + stride)?;
+        let (products, right) = own.split_at(stride - self.order - 1);
+        (own[0] > 0.0).then_some(TileSums { products, right })
+    }
+}
+
+/// What a fitted number keeps of the noise, over what a degree of freedom leaves of it: `E[w² x²] / (E[w] E[w x²])` of
+/// normal deviations x, one without a robust kernel.
+fn share_of_fit(kernel: RobustKernel) -> f64 {
+    let (mut all, mut weights, mut left, mut kept) = (0.0, 0.0, 0.0, 0.0);
+    for step in -500..=500 {
+        let x = f64::from(step) / 100.0;
+        let density = (-0.5 * x * x).exp();
+        let weight = if x.abs() > FARTHEST { 0.0 } else { kernel.weight(x) };
+        all += density;
+        weights += density * weight;
+        left += density * weight * x * x;
+        kept += density * weight * weight * x * x;
+    }
+    kept * all / (weights * left)
+}
+
+/// [`Sums::free_derivatives_of_noise`] for one tile; `false` where too few points tell.
+fn freed_of_noise(own: &mut [f64], order: usize, share: f64) -> bool {
+    let at = |row: usize, column: usize| {
+        let (row, column) = (row.max(column), row.min(column));
+        row * (row + 1) / 2 + column
+    };
+    let (rights, count) = (order * (order + 1) / 2, own[own.len() - 1]);
+    let square = Matrix3::from_fn(|row, column| own[at(row, column)]);
+    let mean = Vector2::new(square[(0, 1)], square[(0, 2)]) / square[(0, 0)];
+    let spread = square.fixed_view::<2, 2>(1, 1) - mean * mean.transpose() * square[(0, 0)];
+    let eigen = spread.symmetric_eigen();
+    let least = NARROW * eigen.eigenvalues.max();
+    let axes: Vec<usize> = (0..2).filter(|&k| eigen.eigenvalues[k] > least).collect();
+    let fitted_numbers = 1.0 + axes.len() as f64;
+    let free = count - fitted_numbers;
+    if free.is_nan() || free < FEWEST_FREE {
+        return false;
+    }
+    // Offset and slopes of the line of each parameter.
+    let line = |row: usize| {
+        let products = Vector2::new(own[at(row, 1)], own[at(row, 2)]) - mean * own[at(row, 0)];
+        let slope: Vector2<f64> = axes
+            .iter()
+            .map(|&k| {
+                eigen.eigenvectors.column(k) * (eigen.eigenvectors.column(k).dot(&products) / eigen.eigenvalues[k])
+            })
+            .sum();
+        Vector3::new(own[at(row, 0)] / square[(0, 0)] - slope.dot(&mean), slope.x, slope.y)
+    };
+    let lines: Vec<Vector3<f64>> = (3..order).map(line).collect();
+    let right = Vector3::new(own[rights], own[rights + 1], own[rights + 2]);
+    for row in 3..order {
+        let products = square * lines[row - 3];
+        for column in 0..3 {
+            own[at(row, column)] = products[column];
+        }
+        for column in 3..=row {
+            own[at(row, column)] = products.dot(&lines[column - 3]);
+        }
+        // A fit keeps its share of the noise, whose size the degrees of freedom left over tell.
+        let (all, fitted) = (own[rights + row], lines[row - 3].dot(&right));
+        own[rights + row] = fitted - share * fitted_numbers * (all - fitted) / free;
+    }
+    true
+}
+
+/// [`Sums`] of one tile.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct TileSums<'a> {
+    products: &'a [f64],
+    right: &'a [f64],
+}
+
+impl TileSums<'_> {
+    pub(crate) fn product(&self, row: usize, column: usize) -> f64 {
+        let (row, column) = (row.max(column), row.min(column));
+        self.products[row * (row + 1) / 2 + column]
+    }
+
+    pub(crate) fn right(&self, row: usize) -> f64 {
+        self.right[row]
+    }
+
+    /// Sum of the weights.
+    pub(crate) fn weight(&self) -> f64 {
+        self.products[0]
+    }
+}

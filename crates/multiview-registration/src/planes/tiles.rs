@@ -1,0 +1,91 @@
+//! The extent of a facet as a grid of tiles.
+
+/// What is known of a tile.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Tile {
+    /// Nobody saw the facet there.
+    Outside,
+    /// Beside a seen one: the facet may end there.
+    Rim,
+    /// Seen.
+    Core,
+}
+
+/// Tiles of a facet.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Tiles {
+    size_m: f64,
+    low: [i64; 2],
+    columns: usize,
+    rows: usize,
+    kinds: Vec<u8>,
+    /// Number of the first tile among those of all facets.
+    pub first: usize,
+}
+
+/// Most tiles of a side.
+const MOST: usize = 4000;
+
+impl Tiles {
+    /// Tiles with one of these places in them, and those beside.
+    pub(crate) fn around(places: &[[f64; 2]], size_m: f64) -> Self {
+        let cell = |place: &[f64; 2]| place.map(|value| (value / size_m).floor() as i64);
+        let ends = |axis: usize| {
+            let all = places.iter().map(|place| cell(place)[axis]);
+            (all.clone().min().unwrap_or(0) - 1, all.max().unwrap_or(0) + 1)
+        };
+        let (across, along) = (ends(0), ends(1));
+        let columns = ((across.1 - across.0 + 1) as usize).min(MOST);
+        let rows = ((along.1 - along.0 + 1) as usize).min(MOST);
+        let mut tiles =
+            Self { size_m, low: [across.0, along.0], columns, rows, kinds: vec![0; columns * rows], first: 0 };
+        for place in places {
+            let [column, row] = cell(place);
+            for (c, r) in (-1..2).flat_map(|c| (-1..2).map(move |r| (c, r))) {
+                if let Some(index) = tiles.index_of([column + c, row + r]) {
+                    tiles.kinds[index] = tiles.kinds[index].max(if (c, r) == (0, 0) { 2 } else { 1 });
+                }
+            }
+        }
+        tiles
+    }
+
+    /// A single tile around the origin.
+    pub(crate) fn one(size_m: f64) -> Self {
+        Self { size_m, low: [0; 2], columns: 1, rows: 1, kinds: vec![2], first: 0 }
+    }
+
+    pub(crate) fn len(&self) -> usize {
+        self.kinds.len()
+    }
+
+    fn index_of(&self, cell: [i64; 2]) -> Option<usize> {
+        let (column, row) = (cell[0] - self.low[0], cell[1] - self.low[1]);
+        let inside = column >= 0 && row >= 0 && column < self.columns as i64 && row < self.rows as i64;
+        inside.then(|| row as usize * self.columns + column as usize)
+    }
+
+    /// The tile at this place, counted over all facets, and what is known of it.
+    pub fn at(&self, place: [f64; 2]) -> (usize, Tile) {
+        match self.index_of(place.map(|value| (value / self.size_m).floor() as i64)) {
+            Some(index) if self.kinds[index] == 2 => (self.first + index, Tile::Core),
+            Some(index) if self.kinds[index] == 1 => (self.first + index, Tile::Rim),
+            _ => (0, Tile::Outside),
+        }
+    }
+
+    /// Column and row of a tile, counted over all facets.
+    pub(crate) fn place_of(&self, tile: usize) -> [usize; 2] {
+        let own = tile.saturating_sub(self.first);
+        [own % self.columns.max(1), own / self.columns.max(1)]
+    }
+
+    /// Whether a disc around this place may touch the tiles.
+    pub(crate) fn near(&self, place: [f64; 2], radius_m: f64) -> bool {
+        let within = |axis: usize, count: usize| {
+            let low = self.low[axis] as f64 * self.size_m;
+            place[axis] >= low - radius_m && place[axis] <= low + count as f64 * self.size_m + radius_m
+        };
+        within(0, self.columns) && within(1, self.rows)
+    }
+}

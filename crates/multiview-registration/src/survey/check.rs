@@ -1,0 +1,43 @@
+//! Pairs of stations by themselves at the adjusted poses: how loops close, and which pairs contradict them.
+
+use crate::adjustment::simultaneous::Adjusted;
+use crate::agreement::alignments::{PairAlignment, RefusedPair, best_partners, without_partners};
+use crate::agreement::loops::{LoopClosure, contradicting, skeleton};
+use crate::error::Result;
+use crate::survey::datum::Datum;
+use crate::survey::registration::StationRegistrationOptions;
+
+/// Default of the tolerance of loops, in radii of the clouds.
+const LOOP_TOLERANCE: f64 = 0.1;
+/// Smallest overlap of a pair that is believed.
+const LEAST_OVERLAP: f64 = 0.1;
+
+/// Pairs at the adjusted poses.
+pub(crate) struct Checked {
+    pub pairs: Vec<PairAlignment>,
+    pub refused: Vec<RefusedPair>,
+    pub loops: Vec<LoopClosure>,
+}
+
+/// The pairs with the most overlap by themselves, and how their loops close.
+pub(crate) fn checked(
+    adjusted: &Adjusted,
+    options: &StationRegistrationOptions<'_>,
+    datum: Datum,
+    (radius_m, size_m): (f64, f64),
+) -> Result<Checked> {
+    let count = adjusted.state.poses.len();
+    let overlaps = adjusted.overlaps(options.minimum_contacts);
+    let candidates = best_partners(&overlaps, count, options.minimum_overlap, options.partners_per_station);
+    let all = adjusted.pairs(&candidates, radius_m, size_m)?;
+    let (pairs, thin): (Vec<_>, Vec<_>) = all.into_iter().partition(|pair| pair.result.overlap >= LEAST_OVERLAP);
+    let mut refused: Vec<RefusedPair> = thin.iter().map(without_partners).collect();
+    let tolerance_m = options.loop_tolerance_m.unwrap_or(LOOP_TOLERANCE * radius_m);
+    let held = datum.held_station();
+    // Far above the error of a right pair and far below that of a wrong one.
+    let closes = |closure: &LoopClosure| closure.translation_m + radius_m * closure.rotation_rad <= tolerance_m;
+    let skeleton = skeleton(&pairs, (held, adjusted.state.poses[held]), count, &closes);
+    let (sound, wrong): (Vec<_>, Vec<_>) = pairs.into_iter().zip(skeleton.sound).partition(|(_, sound)| *sound);
+    refused.extend(wrong.iter().map(|(pair, _)| contradicting(pair)));
+    Ok(Checked { pairs: sound.into_iter().map(|(pair, _)| pair).collect(), refused, loops: skeleton.loops })
+}

@@ -1,0 +1,171 @@
+//! From the clouds of many stations to one coordinate system: options and result.
+
+use std::sync::Arc;
+
+use nalgebra::{DMatrix, Isometry3, Matrix6};
+
+use crate::agreement::alignments::{PairAlignment, RefusedPair};
+use crate::agreement::loops::LoopClosure;
+use crate::agreement::placement::Placements;
+use crate::surfaces::patches::Surface;
+use crate::surfaces::point_model::{PointModel, SharedParameters};
+use icp_registration::RobustKernel;
+use icp_registration::UndeterminedMotion;
+
+/// What is known of the stations beforehand.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Start<'a> {
+    /// Approximate poses `world_from_station`, one a station.
+    Poses(&'a [Isometry3<f64>]),
+    /// Stations that follow each other overlap; nothing else is known.
+    Order,
+    /// Nothing: all pairs are tried.
+    Nothing,
+}
+
+/// Options of [`crate::register_stations`]. The defaults carry no scale: lengths left at `None` come from the clouds.
+#[derive(Clone)]
+pub struct StationRegistrationOptions<'a> {
+    /// How far approximate poses may be off, metre, rotations at the radius of a cloud. `None`: a fifth of that radius.
+    pub start_error_m: Option<f64>,
+    /// Size of the patches that the surfaces are divided into, metre. `None`: about 25 points a patch.
+    pub patch_m: Option<f64>,
+    /// Smallest part of a station that must overlap another for the two to be aligned as a pair. Default 0.3.
+    /// The simultaneous adjustment takes whatever overlaps.
+    pub minimum_overlap: f64,
+    /// Partners that each station is held against by itself, those with the most overlap. Default 3.
+    pub partners_per_station: usize,
+    /// Fewest patches in which two stations must meet to be held together. Default 15.
+    pub minimum_contacts: usize,
+    /// How far a loop of pairs may fail to close, metre, before one of them counts as wrong. `None`: a tenth of the
+    /// clouds' radius.
+    pub loop_tolerance_m: Option<f64>,
+    /// Kernel of the last rounds, for single points and for what a station saw of a tile. Default Tukey: what is no common surface has no weight.
+    pub kernel: RobustKernel,
+    /// Last rounds, each with points given to the surfaces anew; at least three. Default 12.
+    pub max_rounds: usize,
+    /// The rounds end when no station moves by more than this, metre. `None`: 1/2000 of the size of a patch.
+    pub tolerance_m: Option<f64>,
+    /// Parameters that all stations share, to be estimated with the poses. Default: none.
+    pub model: Option<&'a dyn PointModel>,
+}
+
+impl Default for StationRegistrationOptions<'_> {
+    fn default() -> Self {
+        Self {
+            start_error_m: None,
+            patch_m: None,
+            minimum_overlap: 0.3,
+            partners_per_station: 3,
+            minimum_contacts: 15,
+            loop_tolerance_m: None,
+            kernel: RobustKernel::Tukey,
+            max_rounds: 12,
+            tolerance_m: None,
+            model: None,
+        }
+    }
+}
+
+impl std::fmt::Debug for StationRegistrationOptions<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("StationRegistrationOptions")
+            .field("start_error_m", &self.start_error_m)
+            .field("patch_m", &self.patch_m)
+            .field("minimum_overlap", &self.minimum_overlap)
+            .field("model", &self.model.map(PointModel::names))
+            .finish_non_exhaustive()
+    }
+}
+
+/// How the surfaces of two stations lie on each other after the adjustment.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SurfacePair {
+    /// Index of the target station, smaller than `source`.
+    pub target: usize,
+    /// Index of the source station.
+    pub source: usize,
+    /// Part of the tiles of common surfaces that the source saw which the target saw too.
+    pub overlap: f64,
+    /// Tiles, of about the size of a patch, that both saw.
+    pub contacts: usize,
+    /// Weighted mean distance, source before target along the target's normals, metre: what a surface seen from both is
+    /// apart.
+    pub mean_m: f64,
+    /// Weighted root mean square distance, metre.
+    pub rms_m: f64,
+    /// The same in expected standard deviations.
+    pub rms_sigma: f64,
+    /// Part of the tiles that the robust kernel took the weight from.
+    pub outliers: f64,
+}
+
+/// A station with a motion that the surfaces tell no better than to the size of a patch: it stayed near its start value
+/// along it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct UndeterminedStation {
+    /// Index of the station.
+    pub station: usize,
+    /// The motions, axes and points in the common frame.
+    pub motions: Vec<UndeterminedMotion>,
+}
+
+/// All stations in one frame.
+#[derive(Debug, Clone)]
+pub struct StationRegistration {
+    /// Adjusted poses, in the order of the stations.
+    pub world_from_station: Vec<Isometry3<f64>>,
+    /// Covariance of each pose in the tangent `[dt world axes, dtheta station axes]`; zero for a station that is the
+    /// datum.
+    pub covariance: Vec<Matrix6<f64>>,
+    /// Covariance of all unknowns: six a station, then the shared parameters.
+    pub joint_covariance: DMatrix<f64>,
+    /// Pairs with much overlap by themselves, at the adjusted poses.
+    pub pairs: Vec<PairAlignment>,
+    /// Pairs that overlap and were left out, with the reason.
+    pub refused: Vec<RefusedPair>,
+    /// How loops of pairs close.
+    pub loops: Vec<LoopClosure>,
+    /// All pairs whose surfaces took part in the adjustment, with their residuals.
+    pub surfaces: Vec<SurfacePair>,
+    /// Whether the stations lie where what they see agrees with what the others see: a station that fits walls in the
+    /// wrong place shows in no other figure.
+    pub placements: Placements,
+    /// Stations that something leaves open; empty for a sound network.
+    pub undetermined: Vec<UndeterminedStation>,
+    /// Standard deviation of unit weight: 1 where tiles seen from several stations differ as the noise of their points
+    /// says. What is beyond is in the covariance. `None` without redundancy.
+    pub sigma0: Option<f64>,
+    /// Observations less unknowns, tiles that are seen by k stations counted k − 1 times.
+    pub redundancy: i64,
+    /// Last rounds of the adjustment.
+    pub rounds: usize,
+    /// Whether the last round moved no station by more than the tolerance. Where it is not, stations still slide along a
+    /// weak direction and may be decimetres away: do not trust the poses.
+    pub settled: bool,
+    /// Parameters of the [`PointModel`].
+    pub parameters: Option<SharedParameters>,
+    pub(crate) prepared: Arc<Vec<Surface>>,
+}
+
+impl StationRegistration {
+    /// Pose and covariance of one station in the frame of another, in the tangent `[dt target axes, dtheta source axes]`.
+    ///
+    /// # Errors
+    /// [`crate::Error::NoSuchStation`].
+    pub fn relative_pose(&self, target: usize, source: usize) -> crate::Result<(Isometry3<f64>, Matrix6<f64>)> {
+        let count = self.world_from_station.len();
+        if let Some(station) = [target, source].into_iter().find(|station| *station >= count) {
+            return Err(crate::Error::NoSuchStation { station, count });
+        }
+        let (of_target, of_source) = (&self.world_from_station[target], &self.world_from_station[source]);
+        let jacobians = crate::adjustment::network::relative_jacobians(of_target, of_source);
+        let mut covariance = Matrix6::zeros();
+        for (a, left) in [target, source].into_iter().zip(&jacobians) {
+            for (b, right) in [target, source].into_iter().zip(&jacobians) {
+                covariance += left * self.joint_covariance.fixed_view::<6, 6>(6 * a, 6 * b) * right.transpose();
+            }
+        }
+        Ok((of_target.inverse() * of_source, rigid_pose::symmetrised(&covariance)))
+    }
+}

@@ -1,0 +1,48 @@
+//! Random and systematic errors of a registration, told apart.
+
+use nalgebra::{Isometry3, Matrix6};
+
+use crate::error::Result;
+use crate::preparation::frame::OrganisedFrame;
+use crate::registration::aligner::FrameAligner;
+use crate::shared_error::{Influence, SharedError};
+use icp_registration::IcpResult;
+use rigid_pose::symmetrised;
+
+impl FrameAligner {
+    /// As [`align_frames`](crate::align_frames), without allocating memory once frames of this size have been aligned.
+    ///
+    /// # Errors
+    /// As [`align_frames`](crate::align_frames).
+    pub fn align(
+        &mut self,
+        source: &OrganisedFrame,
+        target: &OrganisedFrame,
+        guess: &Isometry3<f64>,
+    ) -> Result<IcpResult> {
+        let (mut result, influence) = self.align_apart(source, target, guess)?;
+        if let Some(influence) = influence {
+            let shared = self.options.shared_error.unwrap_or_else(|| SharedError::of(&influence));
+            result.covariance = symmetrised(&(result.covariance + shared.covariance(&influence.pose)));
+        }
+        Ok(result)
+    }
+
+    /// As [`FrameAligner::align`], with a covariance of the random part alone, and what the shared error does to the pose.
+    pub fn align_apart(
+        &mut self,
+        source: &OrganisedFrame,
+        target: &OrganisedFrame,
+        guess: &Isometry3<f64>,
+    ) -> Result<(IcpResult, Option<Influence>)> {
+        let result = self.registered(source, target, guess)?;
+        let pose = &result.target_from_source;
+        let mut influence = target.influence(source, pose, &mut self.sightings, &mut self.scratch);
+        if let (Some(prior), Some(influence)) = (&self.options.prior, &mut influence) {
+            // What the guess holds, the frames do not move.
+            let from_guess = prior.cholesky().map_or_else(Matrix6::zeros, |c| c.inverse());
+            influence.pose = (Matrix6::identity() - result.covariance * from_guess) * influence.pose;
+        }
+        Ok((result, influence))
+    }
+}

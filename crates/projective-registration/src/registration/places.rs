@@ -1,0 +1,119 @@
+//! Other places where two frames may belong.
+
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use rayon::prelude::*;
+
+use crate::partners::track::{Track, blocks};
+use crate::preparation::frame::OrganisedFrame;
+use crate::registration::aligner::FrameAligner;
+use crate::registration::consistency::{DOUBT_LEVEL, TOLERANCE, consistency};
+use crate::registration::search::weighed;
+use crate::registration::starts::{TURN_RAD, TURNS};
+use icp_registration::{MotionKind, UndeterminedMotion};
+
+/// Starts: turned by the angle of the first other starts or about twice of it, and shifted in units of the radius.
+const WIDE_TURN_RAD: f64 = 0.5;
+const SHIFT: f64 = 0.22;
+/// Turns that are tried by the wide angle as well.
+const WIDE_TURNS: usize = 6;
+/// Iterations from each start.
+const ITERATIONS: usize = 4;
+/// Places that are kept.
+const KEPT: usize = 4;
+/// Closer than this (radius, radian) two places are the same.
+const SAME: f64 = 0.06;
+/// Distance of the places that are tried along an undetermined translation, in units of the radius.
+const SLIDE: f64 = 0.02;
+/// Places on either side.
+const SLIDES: usize = 20;
+
+/// The best places, each once.
+#[derive(Default)]
+pub(crate) struct Places([Option<(f64, Track)>; KEPT]);
+
+impl Places {
+    pub(crate) fn all(&self) -> impl Iterator<Item = &Track> {
+        self.0.iter().flatten().map(|(_, track)| track)
+    }
+
+    /// Puts a place among the best.
+    fn keep(&mut self, gained: f64, track: &Track, radius_m: f64) {
+        let is_same = |other: &Track| {
+            let away = track.pose.rotation.angle_to(&other.pose.rotation);
+            let shift = (track.pose.translation.vector - other.pose.translation.vector).norm();
+            away < SAME && shift < SAME * radius_m
+        };
+        let value = |place: &Option<(f64, Track)>| place.as_ref().map_or(f64::NEG_INFINITY, |(gained, _)| *gained);
+        let same = self.0.iter().position(|place| place.as_ref().is_some_and(|(_, other)| is_same(other)));
+        let worst = (0..KEPT).min_by(|a, b| value(&self.0[*a]).total_cmp(&value(&self.0[*b])));
+        if let Some(k) = same.or(worst)
+            && gained > value(&self.0[k])
+        {
+            self.0[k] = Some((gained, track.clone()));
+        }
+    }
+
+    /// What would tell a translation that is left open may lie out of reach: looks along it.
+    pub(crate) fn along(
+        track: &Track,
+        motions: &[UndeterminedMotion],
+        source: &OrganisedFrame,
+        target: &OrganisedFrame,
+    ) -> Self {
+        let radius_m = source.points.radius_m;
+        let mut places = Self::default();
+        let slide = SLIDE * radius_m;
+        for motion in motions.iter().filter(|motion| motion.kind == MotionKind::Translation) {
+            for k in (1..=SLIDES).flat_map(|k| [k as f64, -(k as f64)]) {
+                let mut other = track.clone();
+                other.pose.translation.vector += motion.axis * (k * slide);
+                other.rules.extra_variance = (0.25 * slide * slide) as f32;
+                other.iterations = 0;
+                let counts = consistency(source, target, &other.pose, DOUBT_LEVEL, slide);
+                places.keep(weighed(&counts), &other, radius_m);
+            }
+        }
+        places
+    }
+}
+
+impl FrameAligner {
+    /// Passes the first level from starts all around the guess and keeps the places where the frames agree best.
+    pub(crate) fn look_around(&self, start: &Track, source: &OrganisedFrame, target: &OrganisedFrame) -> Places {
+        let mut places = Places::default();
+        let Some(level) = self.first_level(source) else { return places };
+        let radius = source.points.radius_m;
+        // Each start on an aligner of its own: what comes out does not hang on the threads.
+        let followed = starts(&start.pose, radius).into_par_iter().map_with(self.clone(), |aligner, pose| {
+            let (mut track, blocks) = (Track { pose, ..start.clone() }, blocks(source, level));
+            aligner.open(&mut track, source, target, blocks).ok()?;
+            aligner.descend_by(&mut track, source, target, blocks, ITERATIONS).ok()?;
+            let counts = consistency(source, target, &track.pose, level, TOLERANCE * radius);
+            Some((weighed(&counts), track))
+        });
+        let followed: Vec<Option<(f64, Track)>> = followed.collect();
+        for (gained, track) in followed.into_iter().flatten() {
+            places.keep(gained, &track, radius);
+        }
+        places
+    }
+}
+
+/// Poses turned and shifted around one.
+fn starts(pose: &Isometry3<f64>, radius_m: f64) -> Vec<Isometry3<f64>> {
+    let turns = TURNS.iter().map(|axis| Vector3::from(*axis) * TURN_RAD);
+    let wide = TURNS[..WIDE_TURNS].iter().map(|axis| Vector3::from(*axis) * WIDE_TURN_RAD);
+    let turns = std::iter::once(Vector3::zeros()).chain(turns).chain(wide);
+    let shifts = |axis: usize| {
+        let shift = if axis == 6 { Vector3::zeros() } else { Vector3::ith(axis / 2, SHIFT * radius_m) };
+        if axis.is_multiple_of(2) { shift } else { -shift }
+    };
+    turns
+        .flat_map(|turn| {
+            (0..7).map(move |axis| {
+                let place = pose.translation.vector + pose.rotation * shifts(axis);
+                Isometry3::from_parts(place.into(), pose.rotation * UnitQuaternion::from_scaled_axis(turn))
+            })
+        })
+        .collect()
+}

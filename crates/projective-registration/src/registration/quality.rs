@@ -1,0 +1,349 @@
+//! What the pairs say about the pose: covariance, and a verdict on degeneracy.
+//!
+//! Neighbouring pairs share errors (directions of planes from overlapping windows, rounded creases), so scores are
+//! summed over cells of the frame before they are squared: a cell counts as one observation. And the noise of the
+//! normals imitates geometry: on one plane, n noisy normals say something about sliding that is not there. The errors
+//! of source and target normals are independent, so their cross products tell the information without that bias, and
+//! its scatter between the cells tells whether what is left differs from nothing.
+// Only what is inlined is compiled for wide registers.
+#![allow(clippy::inline_always)]
+// Lanes lie side by side: with an index, loops read as their formulas and have the same length everywhere.
+#![allow(clippy::needless_range_loop)]
+
+use nalgebra::{DMatrix, Matrix6, Vector3, Vector6};
+use rayon::prelude::*;
+
+use crate::error::{Error, Result};
+use crate::partners::pairs::{Locate, Moved, Pairs, Rules, WithLocate, with_locate};
+use crate::partners::sums::{self, Normal, derivatives};
+use crate::preparation::blocks::Block;
+use crate::preparation::grid::{BLOCK, MOST_CELLS};
+use icp_registration::UndeterminedMotion;
+use icp_registration::quality::{Direction, Directions, FEWEST_CELLS, Residuals, SIGNIFICANCE, expanded};
+use rigid_pose::symmetrised;
+
+/// Information that stands out beside cells that carry none, over its scatter, and the multiple of the middle cell above
+/// which a cell is not one of these.
+const CLEAR_SIGNIFICANCE: f64 = 5.0;
+const CLIP: f64 = 5.0;
+/// Share of the largest information that rounding can imitate (single precision).
+const ROUNDING: f64 = 1e-7;
+/// Smallest variance of the scores as a share of what the noise of the nodes lets expect: independent frames show about a
+/// half, as plane fits share their noise.
+const LEAST_SCORE: f64 = 0.25;
+/// Parts of the pairs, each with cells of its own, that threads may take.
+const PARTS: usize = 4;
+/// 6 scores and 21 products.
+const SUMS: usize = 6 + 21;
+/// Blocks whose totals are summed in single precision.
+const CHUNK: usize = 32;
+
+/// Motions that keep the guess.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Hold {
+    /// None.
+    Nothing,
+    /// Those that the geometry does not determine.
+    Undetermined,
+}
+
+/// Sums over the pairs of one cell.
+pub(crate) type Cell = [f64; SUMS];
+
+/// What the pairs say about the pose.
+pub(crate) struct Verdict {
+    directions: Directions,
+    /// The normal equations of the same pairs.
+    pub(crate) normal: Normal,
+}
+
+impl Verdict {
+    /// Judges the blocks of the source; motions with a predicted sigma above `max_sigma_m` are undetermined.
+    pub(crate) fn new(
+        moved: &Moved<'_>,
+        rules: &Rules,
+        blocks: &[Block],
+        max_sigma_m: f64,
+        residuals: Residuals,
+        cells: &mut Vec<Cell>,
+    ) -> Result<Self> {
+        let (cells, normal) = fill(moved, rules, blocks, cells);
+        let information = symmetric(&cells.iter().fold([0.0; 21], |mut sum, cell| {
+            sum.iter_mut().zip(&cell[6..]).for_each(|(s, c)| *s += c);
+            sum
+        }));
+        let used = cells.iter().filter(|c| c[6] + c[12] + c[17] != 0.0).count();
+        let score = match residuals {
+            Residuals::Misaligned => independent_scores(moved, rules, blocks),
+            Residuals::Settled if used >= FEWEST_CELLS => clustered(cells) * (used as f64 / (used as f64 - 6.0)),
+            // Too few cells to estimate from: the pairs of a cell taken as fully dependent.
+            Residuals::Settled => independent_scores(moved, rules, blocks) * (normal.pairs as f64 / used.max(1) as f64),
+        };
+        // Frames that are copies of each other leave no residuals: their noise is still that of their nodes.
+        let missing = (LEAST_SCORE - score.trace() / normal.matrix.trace()).max(0.0);
+        let score = score + normal.matrix * missing;
+        let significant = |motion: &Vector6<f64>, information| is_significant(cells, information, motion);
+        let directions = Directions::new(&information, |_| (score, 1.0), significant, ROUNDING, max_sigma_m)?;
+        Ok(Self { directions, normal })
+    }
+
+    /// Orthonormal undetermined motions `[dt, rho w]`.
+    pub(crate) fn held(&self) -> Matrix6<f64> {
+        self.directions.held().fold(Matrix6::zeros(), |sum, motion| sum + motion * motion.transpose())
+    }
+
+    /// The undetermined motions, sorted into translations and rotations.
+    pub(crate) fn undetermined(&self, centre: &Vector3<f64>, radius_m: f64) -> Vec<UndeterminedMotion> {
+        self.directions.undetermined(centre, radius_m)
+    }
+
+    /// Covariance of motions `[dt, rho w]`; what is not known at all gets the radius as sigma.
+    pub fn covariance(&self, radius_m: f64, held: Hold) -> Matrix6<f64> {
+        let (basis, inside) = self.known(held);
+        let known = expanded(&basis, &inside);
+        // Rounding of what nothing is unknown of would outweigh small variances.
+        if basis.ncols() == 6 {
+            return known;
+        }
+        let all = DMatrix::identity(inside.nrows(), inside.nrows());
+        known + (Matrix6::identity() - expanded(&basis, &all)) * radius_m.powi(2)
+    }
+
+    /// The most probable motion and its covariance, where a guess lies `offset` away and has the covariance `prior`.
+    /// What the pairs do not determine comes from the guess alone.
+    pub(crate) fn fused(&self, offset: &Vector6<f64>, prior: &Matrix6<f64>) -> Result<(Vector6<f64>, Matrix6<f64>)> {
+        let what = "the information of pairs and prior";
+        let error = Error::Numerical { what, why: "it is not positive definite" };
+        let (basis, inside) = self.known(Hold::Undetermined);
+        let from_pairs = inside.cholesky().ok_or(error.clone())?.inverse();
+        let from_guess = prior.cholesky().ok_or(error.clone())?.inverse();
+        let information = from_guess + expanded(&basis, &from_pairs);
+        let covariance = symmetrised(&information).cholesky().ok_or(error)?.inverse();
+        Ok((covariance * (from_guess * offset), covariance))
+    }
+
+    /// Basis of the motions that are known, and their covariance in it.
+    fn known(&self, held: Hold) -> (DMatrix<f64>, DMatrix<f64>) {
+        let is_known = |d: &&Direction| d.sigma_m.is_finite() && (d.determined || held == Hold::Nothing);
+        let known: Vec<&Direction> = self.directions.all().iter().filter(is_known).collect();
+        self.directions.sandwich(&known, |_| None)
+    }
+}
+
+/// Whether information stands out from what noise imitates.
+///
+/// Where all cells carry some, it does so from their scatter. Where few cells carry it all, as those of a small surface
+/// before walls, they make up most of the scatter: then it has to stand out, more clearly and without the largest cell,
+/// from the scatter of what most cells show.
+fn is_significant(cells: &[Cell], information: f64, vector: &Vector6<f64>) -> bool {
+    let mut each = [0.0; MOST_CELLS];
+    let mut count = 0;
+    for cell in cells.iter().filter(|cell| cell[6] + cell[12] + cell[17] != 0.0).take(MOST_CELLS) {
+        each[count] = form(&cell[6..], vector);
+        count += 1;
+    }
+    let each = &mut each[..count];
+    if information > SIGNIFICANCE * each.iter().map(|f| f * f).sum::<f64>().sqrt() {
+        return true;
+    }
+    each.sort_unstable_by(|a, b| a.abs().total_cmp(&b.abs()));
+    let Some(middle) = each.get(count / 2) else { return false };
+    let usual = CLIP * middle.abs();
+    let scatter = each.iter().map(|f| f.abs().min(usual).powi(2)).sum::<f64>().sqrt();
+    let top = each.iter().copied().fold(0.0, f64::max);
+    information - top > CLEAR_SIGNIFICANCE * scatter
+}
+
+/// Covariance of the summed score from the scatter of its sums over cells.
+fn clustered(cells: &[Cell]) -> Matrix6<f64> {
+    cells.iter().fold(Matrix6::zeros(), |sum, cell| {
+        let score = Vector6::from_fn(|i, _| cell[i]);
+        sum + score * score.transpose()
+    })
+}
+
+/// `v' M v` of a matrix given by its upper triangle.
+fn form(upper: &[f64], v: &Vector6<f64>) -> f64 {
+    let (mut sum, mut k) = (0.0, 0);
+    for r in 0..6 {
+        for c in r..6 {
+            sum += upper[k] * v[r] * v[c] * if r == c { 1.0 } else { 2.0 };
+            k += 1;
+        }
+    }
+    sum
+}
+
+fn symmetric(upper: &[f64; 21]) -> Matrix6<f64> {
+    let (mut matrix, mut k) = (Matrix6::zeros(), 0);
+    for r in 0..6 {
+        for c in r..6 {
+            matrix[(r, c)] = upper[k];
+            matrix[(c, r)] = upper[k];
+            k += 1;
+        }
+    }
+    matrix
+}
+
+/// Covariance of the summed score of pairs that share nothing.
+fn independent_scores(moved: &Moved<'_>, rules: &Rules, blocks: &[Block]) -> Matrix6<f64> {
+    let mut sums = [0.0; 21];
+    sums::visit(moved, rules, blocks, |pairs| {
+        let rows = derivatives(&pairs.lever, &pairs.normal);
+        let mut k = 0;
+        for r in 0..6 {
+            for c in r..6 {
+                let mut lane = [0.0_f32; BLOCK];
+                for l in 0..BLOCK {
+                    let score = pairs.weight[l] * pairs.residual[l];
+                    lane[l] = rows[r][l] * rows[c][l] * score * score;
+                }
+                sums[k] += f64::from(sums::across(&lane));
+                k += 1;
+            }
+        }
+    });
+    symmetric(&sums)
+}
+
+/// Sums over the cells, and the normal equations.
+fn fill<'c>(moved: &Moved<'_>, rules: &Rules, blocks: &[Block], cells: &'c mut Vec<Cell>) -> (&'c [Cell], Normal) {
+    let count = moved.source.grid.cell_count;
+    cells.clear();
+    cells.resize(PARTS * count, [0.0; SUMS]);
+    let mut parts = [[0.0; sums::SUMS]; PARTS];
+    with_locate(moved.target, Fill { moved, rules, blocks, cells, parts: &mut parts });
+    let (first, others) = cells.split_at_mut(count);
+    for part in others.chunks(count) {
+        for (cell, other) in first.iter_mut().zip(part) {
+            cell.iter_mut().zip(other).for_each(|(c, o)| *c += o);
+        }
+    }
+    let total = |k: usize| parts.iter().map(|part| part[k]).sum::<f64>();
+    (first, Normal::new(&std::array::from_fn(total)))
+}
+
+struct Fill<'a, 'b> {
+    moved: &'a Moved<'b>,
+    rules: &'a Rules,
+    blocks: &'a [Block],
+    cells: &'a mut [Cell],
+    parts: &'a mut [[f64; sums::SUMS]; PARTS],
+}
+
+impl WithLocate for Fill<'_, '_> {
+    type Output = ();
+
+    fn run<L: Locate>(self, locate: L) {
+        let (moved, rules) = (self.moved, self.rules);
+        let size = self.blocks.len().div_ceil(PARTS).max(1);
+        let sums = self.cells.par_chunks_mut(self.cells.len() / PARTS).zip(self.parts.par_iter_mut());
+        let blocks = self.blocks.par_chunks(size).zip(moved.source.grid.cells.par_chunks(size));
+        sums.zip(blocks).for_each(|((cells, totals), (blocks, cell_of))| {
+            pulp::Arch::new().dispatch(Part { moved, rules, locate, blocks, cell_of, cells, totals });
+        });
+    }
+}
+
+struct Part<'a, 'b, L> {
+    moved: &'a Moved<'b>,
+    rules: &'a Rules,
+    locate: L,
+    blocks: &'a [Block],
+    /// Cells of the nodes.
+    cell_of: &'a [[u16; BLOCK]],
+    cells: &'a mut [Cell],
+    totals: &'a mut [f64; sums::SUMS],
+}
+
+impl<L: Locate> pulp::WithSimd for Part<'_, '_, L> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(mut self, _: S) {
+        let mut run = Run { cell: 0, lanes: [[0.0; BLOCK]; SUMS] };
+        for (blocks, cells) in self.blocks.chunks(CHUNK).zip(self.cell_of.chunks(CHUNK)) {
+            let mut totals = [[0.0; BLOCK]; sums::SUMS];
+            for (block, cell_of) in blocks.iter().zip(cells) {
+                let pairs = self.moved.pairs(self.locate, self.rules, block);
+                self.add(&mut run, &mut totals, &pairs, cell_of);
+            }
+            sums::hand_over(self.totals, &totals);
+        }
+        self.end(&mut run);
+    }
+}
+
+/// Sums in single precision over blocks that follow each other in a cell.
+struct Run {
+    cell: u16,
+    lanes: [[f32; BLOCK]; SUMS],
+}
+
+impl<L: Locate> Part<'_, '_, L> {
+    #[inline(always)]
+    fn add(&mut self, run: &mut Run, totals: &mut [[f32; BLOCK]; sums::SUMS], pairs: &Pairs, cell_of: &[u16; BLOCK]) {
+        let along_target = derivatives(&pairs.lever, &pairs.normal);
+        let along_source = derivatives(&pairs.lever, &pairs.source_normal);
+        let mut lanes = [[0.0_f32; BLOCK]; SUMS];
+        let (mut score, mut half_slope) = ([0.0_f32; BLOCK], [0.0_f32; BLOCK]);
+        for l in 0..BLOCK {
+            score[l] = pairs.weight[l] * pairs.residual[l];
+            half_slope[l] = 0.5 * pairs.slope[l];
+        }
+        let mut k = 0;
+        for r in 0..6 {
+            for l in 0..BLOCK {
+                lanes[r][l] = along_target[r][l] * score[l];
+            }
+            for c in r..6 {
+                for l in 0..BLOCK {
+                    let cross = along_target[r][l] * along_source[c][l] + along_target[c][l] * along_source[r][l];
+                    lanes[6 + k][l] = half_slope[l] * cross;
+                }
+                k += 1;
+            }
+        }
+        sums::add(totals, pairs, &along_target);
+        self.sort(run, &lanes, cell_of, &pairs.weight);
+    }
+
+    /// Adds each lane to its cell.
+    #[inline(always)]
+    fn sort(&mut self, run: &mut Run, lanes: &[[f32; BLOCK]; SUMS], cell_of: &[u16; BLOCK], weight: &[f32; BLOCK]) {
+        if cell_of.iter().all(|cell| *cell == run.cell) {
+            for (sum, lane) in run.lanes.iter_mut().zip(lanes) {
+                for l in 0..BLOCK {
+                    sum[l] += lane[l];
+                }
+            }
+            return;
+        }
+        let mut waiting = weight.map(|w| w > 0.0);
+        while let Some(first) = waiting.iter().position(|w| *w) {
+            let cell = cell_of[first];
+            if cell != run.cell {
+                self.end(run);
+                run.cell = cell;
+            }
+            let mut share = [0.0; BLOCK];
+            for l in 0..BLOCK {
+                share[l] = if cell_of[l] == cell { 1.0 } else { 0.0 };
+                waiting[l] &= cell_of[l] != cell;
+            }
+            for (sum, lane) in run.lanes.iter_mut().zip(lanes) {
+                for l in 0..BLOCK {
+                    sum[l] += share[l] * lane[l];
+                }
+            }
+        }
+    }
+
+    /// Hands the sums of a run over to its cell.
+    #[inline(always)]
+    fn end(&mut self, run: &mut Run) {
+        sums::hand_over(&mut self.cells[usize::from(run.cell)], &run.lanes);
+        run.lanes = [[0.0; BLOCK]; SUMS];
+    }
+}

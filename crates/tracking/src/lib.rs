@@ -1,0 +1,22 @@
+#![doc = include_str!("../README.md")]
+
+mod error;
+mod imu;
+mod motion_model;
+mod options;
+mod stream;
+mod tracked;
+mod trajectory;
+
+pub use error::{Error, Result};
+pub use imu::{ImuIntegrator, ImuOptions, InertialSample};
+pub use motion_model::motion::MotionPrior;
+pub use nalgebra;
+pub use options::{Fusion, Relocalisation, TrackerOptions};
+pub use projective_registration;
+pub use stream::tracker::Tracker;
+pub use tracked::{LossReason, TrackedPose, TrackingState};
+pub use trajectory::{
+    AbsoluteTrajectoryError, ErrorStatistics, MatchedPose, RelativeError, RelativePoseError, RelativeStep,
+    TrajectoryAlignment, TrajectoryErrorOptions, absolute_trajectory_error, relative_pose_error,
+};

@@ -1,0 +1,83 @@
+//! Poses and motions with their covariance.
+
+use nalgebra::{Isometry3, Matrix3, Matrix6, Vector3, Vector6};
+
+use rigid_pose::Uncertain;
+
+/// What is known of the motion from the frame before to this one, for instance from an inertial unit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MotionPrior {
+    /// Pose of the previous camera in the frame of the current one.
+    pub current_from_previous: Isometry3<f64>,
+    /// Its covariance in the tangent `[dt current axes (m), dtheta previous axes (rad)]`.
+    pub covariance: Matrix6<f64>,
+}
+
+impl MotionPrior {
+    /// Whether it can be used: finite, its covariance positive definite.
+    pub(crate) fn is_sound(&self) -> bool {
+        rigid_pose::is_finite(&self.current_from_previous)
+            && self.covariance.iter().all(|v| v.is_finite())
+            && self.covariance.cholesky().is_some()
+    }
+
+    pub(crate) fn previous_from_current(&self) -> Uncertain {
+        Uncertain { pose: self.current_from_previous, covariance: self.covariance }.inverse()
+    }
+}
+
+/// The same for each axis of the translation, and of the rotation.
+pub(crate) fn diagonal([shift, turn]: [f64; 2]) -> Matrix6<f64> {
+    Matrix6::from_diagonal(&Vector6::new(shift, shift, shift, turn, turn, turn))
+}
+
+/// The motion along a screw `[ρ, θ]`: it turns by θ while it goes straight on by ρ in axes that turn along.
+pub(crate) fn exponential(screw: &Vector6<f64>) -> Isometry3<f64> {
+    let (straight, turn) = (screw.fixed_rows::<3>(0), screw.fixed_rows::<3>(3).into_owned());
+    let rotation = nalgebra::UnitQuaternion::from_scaled_axis(turn);
+    Isometry3::from_parts((left_jacobian(&turn) * straight).into(), rotation)
+}
+
+/// The screw of a motion.
+pub(crate) fn logarithm(motion: &Isometry3<f64>) -> Vector6<f64> {
+    let (turn, shift) = (motion.rotation.scaled_axis(), motion.translation.vector);
+    let straight = left_jacobian(&turn).try_inverse().map_or(shift, |v| v * shift);
+    Vector6::new(straight.x, straight.y, straight.z, turn.x, turn.y, turn.z)
+}
+
+/// `V(θ)`: the translation that a unit of straight motion becomes under a turn by θ.
+fn left_jacobian(turn: &Vector3<f64>) -> Matrix3<f64> {
+    let angle = turn.norm();
+    let cross = turn.cross_matrix();
+    // Below a thousandth of a radian the next terms are under 1e-8.
+    let (first, second) = if angle < 1e-3 {
+        (0.5, 1.0 / 6.0)
+    } else {
+        ((1.0 - angle.cos()) / angle.powi(2), (angle - angle.sin()) / angle.powi(3))
+    };
+    Matrix3::identity() + cross * first + cross * cross * second
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use super::*;
+    use rigid_pose::pose_difference;
+
+    fn pose(seed: f64) -> Isometry3<f64> {
+        Isometry3::new(Vector3::new(seed, -0.4 * seed, 0.3), Vector3::new(0.5 - seed, 0.8, -0.2 * seed))
+    }
+
+    #[test]
+    fn halves_of_a_motion_make_the_whole() {
+        let share = |motion: &Isometry3<f64>, share: f64| exponential(&(logarithm(motion) * share));
+        let motion = pose(0.7);
+        let half = share(&motion, 0.5);
+        // Rounding.
+        assert!(pose_difference(&(half * half), &motion).norm() < 1e-12);
+        let tiny = Isometry3::new(Vector3::new(0.1, 0.2, 0.3), Vector3::new(1e-5, 0.0, 0.0));
+        let third = share(&tiny, 1.0 / 3.0);
+        assert!(pose_difference(&(third * third * third), &tiny).norm() < 1e-12);
+    }
+}

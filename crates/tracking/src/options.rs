@@ -1,0 +1,118 @@
+//! What can be chosen in tracking.
+
+use nalgebra::Isometry3;
+
+use crate::error::{Error, Result};
+use global_registration::CoarseOptions;
+use projective_registration::FrameAlignmentOptions;
+
+/// Whether keyframes learn from the frames tracked against them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
+pub enum Fusion {
+    /// The planes of the keyframe move to the weighted mean (1/sigma²) of all frames that saw them.
+    #[default]
+    Planes,
+    /// A keyframe stays the one frame it was made of.
+    Off,
+}
+
+/// How the pose is sought after a loss.
+#[derive(Debug, Clone, PartialEq, Default)]
+#[non_exhaustive]
+pub enum Relocalisation {
+    /// Only around the prediction, and from the poses of the keyframes that look most like the frame.
+    Projective,
+    /// Then also by alignment without a guess, with one keyframe a frame.
+    #[default]
+    Coarse,
+    /// The same with other options.
+    CoarseWith(Box<CoarseOptions>),
+}
+
+/// Length of the step, in standard deviations, after which the last one is taken. The pose of a quarter of the nodes lies √18
+/// off that of all of them by noise alone, and each step is about a third of the one before: what is left after the last
+/// one is below 0.5, where the noise of the pose is √6.
+const NOISE_FRACTION: f64 = 4.0;
+
+/// Options of a [`Tracker`](crate::Tracker). The defaults carry no scale.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TrackerOptions {
+    /// Registration of a frame with a keyframe. Undetermined motions are always reported, so that the prediction
+    /// can carry them, and turned starts are not tried; where `max_motion_sigma_m` is `None`, it is 1/50 of the radius of
+    /// the first frame.
+    pub alignment: FrameAlignmentOptions,
+    /// Pose of the first frame: the datum, without error.
+    pub world_from_first: Isometry3<f64>,
+    /// Another keyframe becomes the reference, or a new one is made, where a smaller fraction of the frame than this
+    /// agrees with the present one. Default 0.7.
+    pub keyframe_overlap: f64,
+    /// Largest number of keyframes kept; beyond it the one that sees least of its own goes. Default 64.
+    pub max_keyframes: usize,
+    /// Older keyframes that each new one is registered with, those that should see most of the same first: what agrees with
+    /// the path within its covariance closes a loop. 0: none, which saves that many registrations a keyframe. Default 4.
+    pub loop_attempts: usize,
+    /// Whether keyframes learn from frames.
+    pub fusion: Fusion,
+    /// How the pose is sought after a loss.
+    pub relocalisation: Relocalisation,
+    /// Smallest fraction of the nodes of the frame that must have a plane. Default 0.03.
+    pub min_filled: f64,
+    /// Smallest fraction of these planes that must agree with the keyframe. Default 0.25.
+    pub min_overlap: f64,
+    /// Smallest fraction that must agree of those that the keyframe can judge. Default 0.6.
+    pub min_agreement: f64,
+    /// Where the frame leaves motions undetermined, a prior or the velocity carries the pose: until its standard
+    /// deviation at the radius of the frame exceeds this with a prior, a quarter of this with the velocity alone, metre.
+    /// Default 0.1.
+    pub max_carried_sigma_m: f64,
+}
+
+impl Default for TrackerOptions {
+    fn default() -> Self {
+        Self {
+            alignment: FrameAlignmentOptions {
+                noise_fraction: Some(NOISE_FRACTION),
+                ..FrameAlignmentOptions::default()
+            },
+            world_from_first: Isometry3::identity(),
+            keyframe_overlap: 0.7,
+            max_keyframes: 64,
+            loop_attempts: 4,
+            fusion: Fusion::Planes,
+            relocalisation: Relocalisation::Coarse,
+            min_filled: 0.03,
+            min_overlap: 0.25,
+            min_agreement: 0.6,
+            max_carried_sigma_m: 0.1,
+        }
+    }
+}
+
+impl TrackerOptions {
+    pub(crate) fn validate(&self) -> Result<()> {
+        if !rigid_pose::is_finite(&self.world_from_first) {
+            return Err(Error::NonFinite { what: "world_from_first", index: 0 });
+        }
+        let fractions = [
+            ("keyframe_overlap", self.keyframe_overlap),
+            ("min_filled", self.min_filled),
+            ("min_overlap", self.min_overlap),
+            ("min_agreement", self.min_agreement),
+        ];
+        for (name, value) in fractions {
+            if !(value > 0.0 && value < 1.0) {
+                return Err(Error::InvalidOption { name, value, domain: "above 0 and below 1" });
+            }
+        }
+        if !(self.max_carried_sigma_m > 0.0 && self.max_carried_sigma_m.is_finite()) {
+            let value = self.max_carried_sigma_m;
+            return Err(Error::InvalidOption { name: "max_carried_sigma_m", value, domain: "positive and finite" });
+        }
+        if self.max_keyframes < 2 {
+            let value = self.max_keyframes as f64;
+            return Err(Error::InvalidOption { name: "max_keyframes", value, domain: "2 or more" });
+        }
+        Ok(())
+    }
+}

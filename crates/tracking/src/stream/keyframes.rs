@@ -1,0 +1,149 @@
+//! The keyframes: pieces of the map and a graph of their poses.
+
+use nalgebra::Isometry3;
+
+use global_registration::FeatureCloud;
+use point_cloud::Cloud;
+use pose_graph::Graph;
+use pose_graph::Relation;
+use projective_registration::OrganisedFrame;
+
+/// Fields of the thumbnails.
+pub(crate) const THUMBNAIL: [usize; 2] = [16, 12];
+/// Points by which overlaps are judged.
+pub(crate) const SAMPLE: usize = 2500;
+/// Keyframes whose overlap with a frame is told.
+const CANDIDATES: usize = 4;
+/// Cosine of the largest angle between the axes of two cameras that can see the same from the same side.
+const LEAST_VIEW_COSINE: f64 = 0.3;
+
+/// Fraction of the nodes of the second frame that lie on the first, at a pose of the second, from about so many of them.
+pub(crate) type Overlap = fn(&OrganisedFrame, &OrganisedFrame, &Isometry3<f64>, usize) -> f64;
+
+/// A frame that others are registered with.
+#[derive(Debug, Clone)]
+pub(crate) struct Keyframe {
+    pub(crate) number: usize,
+    pub(crate) frame: OrganisedFrame,
+    pub(crate) thumbnail: Vec<f32>,
+    /// For alignment without a guess; made when first needed.
+    pub(crate) features: Option<FeatureCloud>,
+}
+
+/// Where a keyframe number leads to.
+#[derive(Debug, Clone, Copy)]
+enum Anchor {
+    Kept,
+    /// Taken out; its pose in the frame of another.
+    Joined {
+        to: usize,
+        to_from_this: Isometry3<f64>,
+    },
+}
+
+/// All keyframes and how they lie to each other.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Keyframes {
+    pub(crate) list: Vec<Keyframe>,
+    pub(crate) graph: Graph,
+    anchors: Vec<Anchor>,
+}
+
+impl Keyframes {
+    pub(crate) fn start(&mut self, frame: &OrganisedFrame, world_from_keyframe: &Isometry3<f64>) {
+        self.push(frame);
+        self.graph.poses.push(Relation::exact(*world_from_keyframe));
+    }
+
+    /// A new keyframe at a pose measured from keyframe `from`; returns its index.
+    pub(crate) fn add(&mut self, frame: &OrganisedFrame, from: usize, from_from_new: &Relation) -> usize {
+        self.push(frame);
+        self.graph.add(from, from_from_new)
+    }
+
+    fn push(&mut self, frame: &OrganisedFrame) {
+        let thumbnail = frame.thumbnail(THUMBNAIL[0], THUMBNAIL[1]);
+        let frame = frame.as_target();
+        self.list.push(Keyframe { number: self.anchors.len(), frame, thumbnail, features: None });
+        self.anchors.push(Anchor::Kept);
+    }
+
+    /// A few keyframes among `tried` with the fraction of the frame that they would share, as `overlap` tells it, at a pose
+    /// given from keyframe `from`; best first.
+    pub(crate) fn candidates(
+        &self,
+        current: &OrganisedFrame,
+        from: usize,
+        from_from_camera: &Isometry3<f64>,
+        tried: impl Fn(usize) -> bool,
+        overlap: Overlap,
+    ) -> Vec<(f64, usize)> {
+        let mut found = Vec::with_capacity(self.list.len());
+        for k in (0..self.list.len()).filter(|k| tried(*k)) {
+            let pose = self.graph.relative(k, from) * from_from_camera;
+            if pose.rotation.to_rotation_matrix()[(2, 2)] > LEAST_VIEW_COSINE {
+                found.push((0.0, k, pose));
+            }
+        }
+        // Few points tell which ones are worth more.
+        for most in [SAMPLE / 32, SAMPLE / 4] {
+            for (share, k, pose) in &mut found {
+                *share = overlap(&self.list[*k].frame, current, pose, most);
+            }
+            found.sort_by(|x, y| y.0.total_cmp(&x.0).then(x.1.cmp(&y.1)));
+            found.truncate(CANDIDATES);
+        }
+        found.into_iter().map(|(overlap, k, _)| (overlap, k)).collect()
+    }
+
+    /// Takes out the keyframe that is nearest to another one, neither the first nor `spared`; returns its index.
+    pub(crate) fn thin(&mut self, spared: [usize; 2]) -> Option<usize> {
+        let gap = |k: usize| {
+            let others = (0..self.list.len()).filter(|l| *l != k);
+            let distance = |l: usize| {
+                let motion = self.graph.relative(k, l);
+                motion.translation.vector.norm() / self.list[k].frame.radius_m() + motion.rotation.angle()
+            };
+            others.map(distance).fold(f64::INFINITY, f64::min)
+        };
+        let free = (1..self.list.len()).filter(|k| !spared.contains(k));
+        let k = free.min_by(|x, y| gap(*x).total_cmp(&gap(*y)))?;
+        let (hub, k_from_hub) = self.graph.remove(k)?;
+        let joined = Anchor::Joined { to: self.list[hub].number, to_from_this: k_from_hub.pose().inverse() };
+        self.anchors[self.list[k].number] = joined;
+        self.list.remove(k);
+        Some(k)
+    }
+
+    /// All surfaces in the world's frame.
+    pub(crate) fn cloud(&self) -> Cloud {
+        let (mut points, mut normals, mut sigmas) = (Vec::new(), Vec::new(), Vec::new());
+        for (keyframe, pose) in self.list.iter().zip(&self.graph.poses) {
+            for (point, normal, sigma) in keyframe.frame.surface() {
+                points.push(pose.pose() * point);
+                normals.push(pose.pose() * normal);
+                sigmas.push(sigma);
+            }
+        }
+        Cloud { points, normals: Some(normals), sigma: Some(sigmas), ..Cloud::default() }
+    }
+
+    /// Present world pose of a keyframe by its number, also of one that was taken out.
+    pub(crate) fn world_from(&self, number: usize) -> Option<Isometry3<f64>> {
+        let (mut number, mut chain) = (number, Isometry3::identity());
+        // Each step leads to a keyframe that was kept longer, so there are at most as many as keyframes.
+        for _ in 0..=self.anchors.len() {
+            match self.anchors.get(number)? {
+                Anchor::Kept => {
+                    let k = self.list.iter().position(|k| k.number == number)?;
+                    return Some(self.graph.poses[k].pose() * chain);
+                }
+                Anchor::Joined { to, to_from_this } => {
+                    chain = to_from_this * chain;
+                    number = *to;
+                }
+            }
+        }
+        None
+    }
+}

@@ -1,0 +1,293 @@
+//! One frame against one keyframe, and the search among those nearby.
+
+use nalgebra::{Isometry3, Matrix6, Vector6};
+
+use crate::motion_model::motion::diagonal;
+use crate::motion_model::prediction::{Grounds, Last, Prediction};
+use crate::motion_model::velocity::Velocity;
+use crate::options::TrackerOptions;
+use crate::stream::keyframes::SAMPLE;
+use crate::stream::tracker::Tracker;
+use crate::tracked::LossReason;
+use pose_graph::Relation;
+use projective_registration::{Agreement, ByField, Field, FrameAligner, Influence, OrganisedFrame};
+use rigid_pose::Uncertain;
+use rigid_pose::{step_pose, symmetrised};
+
+/// Keyframes tried beside the reference.
+const NEIGHBOURS: usize = 2;
+/// Share of the radius beyond whose standard deviation a motion is weak.
+const WEAK_SHARE: f64 = 1.0 / 300.0;
+/// Square of the Mahalanobis distance (six components) beyond which a pose is not where the camera can have gone.
+const DISBELIEF: f64 = 40.0;
+/// Share of the largest standard deviation of carried poses that is allowed where only the velocity carries them.
+const BY_VELOCITY: f64 = 0.25;
+/// What a pose found against expectation must agree by: fraction of the frame, and of what can be judged.
+const LEAST_OVERLAP: f64 = 0.5;
+const LEAST_CONSENT: f64 = 0.9;
+/// Planes it must share: three make a corner, and corners look alike.
+const LEAST_PLANES: usize = 4;
+/// Share of the radius (and radian) by which a camera that starts or stops may miss the prediction, as a standard
+/// deviation: what is carried elsewhere is carried farther.
+const JUMP: f64 = 0.01;
+/// The same of a camera whose velocity is not known.
+const START: f64 = 0.05;
+
+/// A registration that passed its tests.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Measured {
+    /// Index of the keyframe.
+    pub(crate) keyframe: usize,
+    /// Keyframe from camera, for the field that is assumed for the shared error; the covariance is of what is random.
+    pub(crate) pose: Uncertain,
+    /// The same as the frames were brought together.
+    pub(crate) aligned: Isometry3<f64>,
+    /// What the shared error does to it.
+    pub(crate) influence: Option<Influence>,
+    /// Whether the geometry determines all motions.
+    pub(crate) determined: bool,
+    pub(crate) agreement: Agreement,
+    pub(crate) rms_m: f64,
+}
+
+impl Measured {
+    /// Whether the geometry determines all motions well, and nothing speaks against the pose.
+    fn is_firm(&self, radius_m: f64) -> bool {
+        self.is_sound() && self.pose.sigma_at(radius_m) <= WEAK_SHARE * radius_m
+    }
+
+    /// Whether the frames agree at the pose as they do at right ones. Frames that have slid along a wall fit as well, and
+    /// can be as sure of it, but see through each other's surfaces.
+    pub(crate) fn is_sound(&self) -> bool {
+        self.determined && self.agrees()
+    }
+
+    /// Whether the frames contradict each other no more than at right poses.
+    pub(crate) fn agrees(&self) -> bool {
+        self.agreement.consent() >= LEAST_CONSENT
+    }
+
+    /// The same with weak motions left open. What holds them are a few nodes, often at edges, and chance: their
+    /// covariance promises too much.
+    pub(crate) fn without_weak_motions(&self, radius_m: f64) -> Self {
+        // Turns as distances at the radius.
+        let scale = Matrix6::from_diagonal(&Vector6::new(1.0, 1.0, 1.0, radius_m, radius_m, radius_m));
+        let back = Matrix6::from_diagonal(&scale.diagonal().map(|s| 1.0 / s));
+        let mut motions = symmetrised(&(scale * self.pose.covariance * scale)).symmetric_eigen();
+        for variance in motions.eigenvalues.iter_mut().filter(|v| **v > (WEAK_SHARE * radius_m).powi(2)) {
+            *variance = variance.max(radius_m * radius_m);
+        }
+        let covariance = symmetrised(&(back * motions.recompose() * back));
+        Self { pose: Uncertain { covariance, ..self.pose }, determined: false, ..*self }
+    }
+
+    /// The part of the covariance that frames registered with the same keyframe do not share.
+    pub(crate) fn own(&self) -> Uncertain {
+        Uncertain { covariance: self.pose.covariance * 0.5, ..self.pose }
+    }
+
+    /// Derivative of the pose by the field that is assumed.
+    pub(crate) fn by_field(&self) -> ByField {
+        self.influence.map_or_else(ByField::zeros, |influence| -influence.pose)
+    }
+
+    /// As an observation between the keyframe and the camera.
+    pub(crate) fn relation(&self) -> Relation {
+        Relation { random: self.pose, by_field: self.by_field() }
+    }
+
+    /// The part that they share: the keyframe's own noise.
+    pub(crate) fn shared(&self) -> Matrix6<f64> {
+        self.pose.covariance * 0.5
+    }
+}
+
+/// Where a frame has been found.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Fix {
+    /// Keyframe from camera.
+    pub(crate) own: Uncertain,
+    pub(crate) velocity: Option<Velocity>,
+    /// Whether it lies where the camera can have gone since the frame before.
+    pub(crate) expected: bool,
+}
+
+impl Fix {
+    /// Where nothing was expected.
+    pub(crate) fn unexpected(measured: &Measured) -> Self {
+        Self { own: measured.own(), velocity: None, expected: false }
+    }
+}
+
+impl Tracker {
+    /// Registers the current frame with keyframe `k`.
+    pub(crate) fn try_keyframe(&mut self, k: usize, guess: &Isometry3<f64>) -> Result<Measured, LossReason> {
+        let target = &self.keyframes.list[k].frame;
+        register(&mut self.aligner, &self.options, &self.current, target, guess, &self.keyframes.graph.field)
+            .map(|measured| Measured { keyframe: k, ..measured })
+    }
+
+    /// The frame before as a new keyframe, where it determines what its own keyframe, with less in common, does not, or
+    /// agrees where that one does not.
+    pub(crate) fn with_previous(
+        &mut self,
+        last: &Last,
+        prediction: &Prediction,
+        helps: impl Fn(&Measured) -> bool,
+    ) -> Option<Measured> {
+        let exact = last.own.covariance == Matrix6::zeros();
+        if last.lost_frames > 0 || exact {
+            return None;
+        }
+        let guess = last.own.pose.inverse() * prediction.own.pose;
+        let field = &self.keyframes.graph.field;
+        let measured = register(&mut self.aligner, &self.options, &self.current, &self.previous, &guess, field).ok()?;
+        helps(&measured).then(|| {
+            let total = Uncertain { covariance: last.own.covariance + last.shared, ..last.own };
+            let relation = Relation { random: total, by_field: last.by_field };
+            let keyframe = self.keyframes.add(&self.previous, last.keyframe, &relation);
+            Measured { keyframe, ..measured }
+        })
+    }
+
+    /// The current frame near its predicted pose: from the reference, or from keyframes that should see the same.
+    pub(crate) fn near(&mut self, last: &Last, prediction: &Prediction) -> Result<Measured, LossReason> {
+        let reference = last.keyframe;
+        let first = self.try_keyframe(reference, &prediction.own.pose);
+        if let Ok(measured) = first
+            && measured.is_firm(self.current.radius_m())
+        {
+            return Ok(measured);
+        }
+        let radius = self.current.radius_m();
+        let doubtful = !first.as_ref().is_ok_and(Measured::agrees);
+        let helps = |measured: &Measured| measured.is_firm(radius) || doubtful && measured.is_sound();
+        if let Some(measured) = self.with_previous(last, prediction, helps) {
+            return Ok(measured);
+        }
+        let usable = |measured: &Measured| measured.determined || prediction.grounds != Grounds::Nothing;
+        if first.as_ref().is_ok_and(|measured| usable(measured) && measured.agrees()) {
+            return first;
+        }
+        let others = |k: usize| k != reference;
+        let pose = &prediction.own.pose;
+        let candidates = self.keyframes.candidates(&self.current, reference, pose, others, agreeing);
+        for (_, k) in candidates.into_iter().take(NEIGHBOURS) {
+            let guess = self.keyframes.graph.relative(k, reference) * prediction.own.pose;
+            if let Ok(measured) = self.try_keyframe(k, &guess)
+                && measured.is_sound()
+            {
+                return Ok(measured);
+            }
+        }
+        match first {
+            Ok(measured) if usable(&measured) => first,
+            Ok(_) => Err(LossReason::Undetermined),
+            Err(reason) => Err(reason),
+        }
+    }
+
+    /// The pose by a registration and the prediction, and the registration as it was used: motions that it determines
+    /// weakly are left to the prediction as far as that one carries.
+    pub(crate) fn fixed(
+        &self,
+        measured: &Measured,
+        prediction: &Prediction,
+        lost_frames: usize,
+    ) -> Result<(Measured, Fix), LossReason> {
+        let radius = self.current.radius_m();
+        if !measured.is_firm(radius) && prediction.grounds != Grounds::Nothing {
+            let cautious = measured.without_weak_motions(radius);
+            if let Ok(fix) = self.weighted(&cautious, prediction, lost_frames) {
+                return Ok((cautious, fix));
+            }
+        }
+        Ok((*measured, self.weighted(measured, prediction, lost_frames)?))
+    }
+
+    /// The pose from a registration and a prediction with its covariance: both are weighted, and what the geometry
+    /// leaves open stays with the prediction. Far from the prediction, a pose must stand on its own.
+    ///
+    /// Half of the covariance of the registration is the keyframe's noise, which all frames registered with it share;
+    /// only the other half averages out with the prediction.
+    fn weighted(&self, measured: &Measured, prediction: &Prediction, lost_frames: usize) -> Result<Fix, LossReason> {
+        let half = measured.own();
+        let expected = self.expects(&half, prediction, lost_frames);
+        if !expected || prediction.grounds == Grounds::Nothing {
+            if !measured.determined {
+                return Err(LossReason::Undetermined);
+            }
+            let fix = Fix { own: half, velocity: None, expected };
+            return if expected || self.stands_alone(measured) { Ok(fix) } else { Err(LossReason::LargeResiduals) };
+        }
+        let (own, velocity) = prediction.corrected(&half).ok_or(LossReason::Undetermined)?;
+        let carried = own.sigma_at(self.current.radius_m()) <= self.carried_sigma_m(prediction.grounds);
+        let fix = Fix { own, velocity, expected: true };
+        if carried || measured.determined { Ok(fix) } else { Err(LossReason::Undetermined) }
+    }
+
+    /// Whether a pose lies where the camera can have gone since the frame before.
+    fn expects(&self, own: &Uncertain, prediction: &Prediction, lost_frames: usize) -> bool {
+        let radius = self.current.radius_m();
+        let ungrounded = prediction.grounds == Grounds::Nothing;
+        let jump = if ungrounded { START } else { JUMP };
+        let known = if ungrounded { Matrix6::zeros() } else { prediction.own.covariance };
+        let covariance = known + diagonal([(jump * radius).powi(2), jump * jump]);
+        let reachable = Uncertain { covariance, ..prediction.own };
+        let relied_on = !ungrounded && prediction.own.sigma_at(radius) <= self.carried_sigma_m(prediction.grounds);
+        (lost_frames == 0 || relied_on) && own.mahalanobis_squared(&reachable).is_some_and(|m| m <= DISBELIEF)
+    }
+
+    fn carried_sigma_m(&self, grounds: Grounds) -> f64 {
+        let share = if grounds == Grounds::Prior { 1.0 } else { BY_VELOCITY };
+        share * self.options.max_carried_sigma_m
+    }
+
+    /// Whether a pose would be believed wherever it was found: each frame agrees with what the other saw and with the
+    /// space that it looked through, and what they share is found at one place only.
+    pub(crate) fn stands_alone(&self, measured: &Measured) -> bool {
+        let keyframe = &self.keyframes.list[measured.keyframe].frame;
+        let pose = &measured.aligned;
+        let sound = |a: &Agreement| a.overlap() >= LEAST_OVERLAP && a.consent() >= LEAST_CONSENT;
+        measured.determined
+            && sound(&measured.agreement)
+            && self.current.agreement(keyframe, &pose.inverse(), SAMPLE).consent() >= LEAST_CONSENT
+            && keyframe.shared_planes(&self.current, pose, SAMPLE) >= LEAST_PLANES
+    }
+}
+
+/// Fraction of a frame that agrees with another within the noise.
+pub(crate) fn agreeing(target: &OrganisedFrame, source: &OrganisedFrame, pose: &Isometry3<f64>, most: usize) -> f64 {
+    target.agreement(source, pose, most).overlap()
+}
+
+/// Registers a frame with another, near a guess; the pose is corrected by the field that is assumed.
+fn register(
+    aligner: &mut FrameAligner,
+    options: &TrackerOptions,
+    source: &OrganisedFrame,
+    target: &OrganisedFrame,
+    guess: &Isometry3<f64>,
+    field: &Field,
+) -> Result<Measured, LossReason> {
+    let (result, influence) = aligner.align_apart(source, target, guess).map_err(|error| match error {
+        projective_registration::Error::TooFewPoints { .. } => LossReason::TooFewPoints,
+        projective_registration::Error::TooFewCorrespondences { .. } => LossReason::TooLittleOverlap,
+        _ => LossReason::NotConverged,
+    })?;
+    let aligned = result.target_from_source;
+    let by_field = influence.map_or_else(ByField::zeros, |influence| influence.pose);
+    let pose = Uncertain { pose: step_pose(&aligned, &(-by_field * field)), covariance: result.covariance };
+    let agreement = target.agreement(source, &aligned, SAMPLE);
+    if agreement.consent() < options.min_agreement {
+        return Err(LossReason::LargeResiduals);
+    }
+    if agreement.overlap() < options.min_overlap {
+        return Err(LossReason::TooLittleOverlap);
+    }
+    if !rigid_pose::is_finite(&pose.pose) || pose.covariance.cholesky().is_none() {
+        return Err(LossReason::NotConverged);
+    }
+    let determined = result.degenerate.is_empty();
+    Ok(Measured { keyframe: 0, pose, aligned, influence, determined, agreement, rms_m: result.rms_m })
+}

@@ -1,0 +1,9 @@
+//! Frames one by one: registered, lost and found again, loops closed.
+
+pub(crate) mod keyframes;
+pub(crate) mod locate;
+pub(crate) mod reference;
+pub(crate) mod returns;
+pub(crate) mod tracker;
+pub(crate) mod unguessed;
+pub(crate) mod wide;

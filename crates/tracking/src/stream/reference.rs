@@ -1,0 +1,86 @@
+//! Which keyframe the next frames are registered with.
+
+use nalgebra::{Isometry3, Matrix6};
+
+use crate::stream::locate::{Measured, agreeing};
+use crate::stream::tracker::Tracker;
+use pose_graph::Edge;
+use pose_graph::Relation;
+use projective_registration::{ByField, Influence};
+use rigid_pose::Uncertain;
+use rigid_pose::step_pose;
+
+/// What another keyframe must see more of the frame than the reference to take its place.
+const ADVANTAGE: f64 = 0.05;
+
+impl Tracker {
+    /// Another keyframe that sees more of the frame becomes the reference; where there is none, the frame becomes one.
+    pub(crate) fn change_reference(&mut self, reference_from_camera: &Relation, influence: Option<&Influence>) {
+        let Some(reference) = self.last.as_ref().map(|last| last.keyframe) else { return };
+        let (others, pose) = (|k: usize| k != reference, reference_from_camera.pose());
+        let candidates = self.keyframes.candidates(&self.current, reference, pose, others, agreeing);
+        let enough = self.options.keyframe_overlap + ADVANTAGE;
+        if let Some(&(overlap, k)) = candidates.first()
+            && overlap >= enough
+            && let Some(measured) = self.closing(k, reference, reference_from_camera)
+        {
+            self.refer_to(k, &measured);
+            self.adjust();
+            return;
+        }
+        let new = self.keyframes.add(&self.current, reference, reference_from_camera);
+        self.refer_to_itself(new);
+        if let Some(influence) = influence {
+            self.learn(influence);
+        }
+        self.close_loops(new);
+        self.adjust();
+    }
+
+    /// Takes the registration of a keyframe into what is known of the shared error.
+    fn learn(&mut self, influence: &Influence) {
+        if self.options.alignment.shared_error.is_none() {
+            self.shared.learn(influence);
+            self.keyframes.graph.set_shared_error(&self.shared);
+        }
+    }
+
+    /// Adjusts the keyframes where a loop has been closed.
+    fn adjust(&mut self) {
+        let change = self.keyframes.graph.adjust_if_closed();
+        if let Some(last) = &mut self.last {
+            last.own.pose = step_pose(&last.own.pose, &(last.by_field * change));
+        }
+    }
+
+    /// Registers the frame with keyframe `k` as well, and so `k` with the reference; `None` where that does not fit.
+    fn closing(&mut self, k: usize, reference: usize, reference_from_camera: &Relation) -> Option<Measured> {
+        let guess = self.keyframes.graph.relative(k, reference) * reference_from_camera.pose();
+        let measured = self.try_keyframe(k, &guess).ok().filter(|m| m.determined)?;
+        if self.keyframes.graph.joined(k, reference) {
+            return Some(measured);
+        }
+        let a_from_b = measured.relation().then(&reference_from_camera.inverse());
+        self.keyframes.graph.offer(&Edge { a: k, b: reference, a_from_b, alike: 1.0 }).then_some(measured)
+    }
+
+    fn refer_to(&mut self, keyframe: usize, measured: &Measured) {
+        if let Some(last) = &mut self.last {
+            last.keyframe = keyframe;
+            last.own = measured.own();
+            last.by_field = measured.by_field();
+            last.shared = measured.shared();
+            last.velocity = last.velocity.map(|velocity| velocity.at_origin());
+        }
+    }
+
+    fn refer_to_itself(&mut self, keyframe: usize) {
+        if let Some(last) = &mut self.last {
+            last.keyframe = keyframe;
+            last.own = Uncertain::exact(Isometry3::identity());
+            last.by_field = ByField::zeros();
+            last.shared = Matrix6::zeros();
+            last.velocity = last.velocity.map(|velocity| velocity.at_origin());
+        }
+    }
+}

@@ -1,0 +1,45 @@
+//! Places seen before: a new keyframe is registered with older ones that should see the same, as far as the path is known.
+
+use nalgebra::Isometry3;
+
+use crate::stream::tracker::Tracker;
+use pose_graph::Edge;
+use projective_registration::OrganisedFrame;
+
+/// Share of the frame that may lie on the older keyframe, within what a path can be off. With 0.2 and 0.3 the paths of 500
+/// frames of a Kinect were the same within 2 mm.
+const LEAST_OVERLAP: f64 = 0.25;
+
+impl Tracker {
+    /// Registers the newest keyframe, which is the current frame, with older ones. Only registrations that fit the path
+    /// within its covariance are taken.
+    pub(crate) fn close_loops(&mut self, new: usize) {
+        if self.options.loop_attempts == 0 {
+            return;
+        }
+        let joined: Vec<bool> = (0..=new).map(|k| k == new || self.keyframes.graph.joined(k, new)).collect();
+        let others = |k: usize| !joined[k];
+        let candidates = self.keyframes.candidates(&self.current, new, &Isometry3::identity(), others, near);
+        let mut closing = Vec::new();
+        for (overlap, k) in candidates.into_iter().take(self.options.loop_attempts) {
+            if overlap < LEAST_OVERLAP {
+                break;
+            }
+            let guess = self.keyframes.graph.relative(k, new);
+            if let Ok(measured) = self.try_keyframe(k, &guess) {
+                let edge = Edge { a: k, b: new, a_from_b: measured.relation(), alike: 1.0 };
+                if measured.is_sound() && self.keyframes.graph.fits(&edge) {
+                    closing.push(edge);
+                }
+            }
+        }
+        // Half of the errors are the frame's, which all have in common: n with the variance (1 + 1/n)/2 of their mean.
+        let alike = (closing.len() as f64).midpoint(1.0);
+        self.keyframes.graph.take(closing.into_iter().map(|edge| Edge { alike, ..edge }));
+    }
+}
+
+/// Fraction of a frame that may lie on the surfaces of another, measured with systematic errors.
+fn near(target: &OrganisedFrame, source: &OrganisedFrame, pose: &Isometry3<f64>, most: usize) -> f64 {
+    target.nearness(source, pose, most)
+}

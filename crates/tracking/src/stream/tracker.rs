@@ -1,0 +1,342 @@
+//! The tracker: one call a frame.
+
+use std::sync::Arc;
+
+use nalgebra::{Isometry3, Matrix6};
+
+use crate::error::{Error, Result};
+use crate::motion_model::motion::{MotionPrior, diagonal};
+use crate::motion_model::prediction::{Grounds, Last, Prediction};
+use crate::motion_model::velocity::Velocity;
+use crate::options::{Fusion, TrackerOptions};
+use crate::stream::keyframes::Keyframes;
+use crate::stream::locate::{Fix, Measured};
+use crate::tracked::{LossReason, TrackedPose, TrackingState};
+use icp_registration::DegeneracyPolicy;
+use point_cloud::Cloud;
+use pose_graph::Relation;
+use projective_registration::{ByField, FieldMatrix, FrameAligner, Influence, OrganisedFrame, Projection, SharedError};
+use rigid_pose::Uncertain;
+
+/// Share of the first frame's radius beyond whose standard deviation motions count as undetermined. Registration alone
+/// asks for 1/300; in a stream, poses that are centimetres weak for a moment are still worth more than a loss.
+const WEAKEST_SHARE: f64 = 1.0 / 50.0;
+
+/// Tracks a stream of organised frames of one camera.
+///
+/// Memory is allocated for keyframes and for the list of poses; a frame that makes no keyframe allocates nothing of its
+/// own. The same frames give the same bits for any number of threads.
+#[derive(Debug, Clone)]
+pub struct Tracker {
+    pub(crate) options: TrackerOptions,
+    pub(crate) aligner: FrameAligner,
+    pub(crate) current: OrganisedFrame,
+    pub(crate) previous: OrganisedFrame,
+    pub(crate) keyframes: Keyframes,
+    /// Of the sensor, as the registrations of keyframes tell it.
+    pub(crate) shared: SharedError,
+    pub(crate) last: Option<Last>,
+    trajectory: Vec<TrackedPose>,
+    scratch: Vec<(u32, f32, f32)>,
+}
+
+/// All that one frame gave.
+struct Seen {
+    measured: Measured,
+    fix: Fix,
+    prediction: Prediction,
+}
+
+impl Tracker {
+    /// A tracker of frames of one camera.
+    ///
+    /// # Errors
+    /// [`Error::InvalidOption`], [`Error::NonFinite`] for the options.
+    pub fn new(projection: &Arc<Projection>, options: TrackerOptions) -> Result<Self> {
+        options.validate()?;
+        let nothing = vec![[f64::NAN; 3]; projection.width() * projection.height()];
+        let mut alignment = options.alignment.clone();
+        alignment.degeneracy = DegeneracyPolicy::Report;
+        alignment.other_starts = 0;
+        let blank = OrganisedFrame::new(projection, &nothing, None)?;
+        Ok(Self {
+            shared: alignment.shared_error.unwrap_or_default(),
+            aligner: FrameAligner::new(alignment)?,
+            current: blank.clone(),
+            previous: blank,
+            options,
+            keyframes: Keyframes::default(),
+            last: None,
+            trajectory: Vec::new(),
+            scratch: Vec::new(),
+        })
+    }
+
+    /// Takes the next frame: one point a pixel, row by row, camera frame, metre, NaN where there is no range; `sigma`:
+    /// standard deviation of the ranges, metre. `prior`: the motion since the frame before, where something else has
+    /// measured it.
+    ///
+    /// A frame that cannot be tracked is no error: its state says so, and later frames are sought again.
+    ///
+    /// # Errors
+    /// [`Error::NotAscending`] where the time is not later than that of the frame before, [`Error::Numerical`] for a
+    /// prior that is not finite or whose covariance is not positive definite, [`Error::LengthMismatch`] and
+    /// [`Error::PointsOffRays`] for frames of another camera. Nothing has changed then.
+    pub fn track(
+        &mut self,
+        timestamp_s: f64,
+        points: &[[f64; 3]],
+        sigma: Option<&[f32]>,
+        prior: Option<&MotionPrior>,
+    ) -> Result<TrackedPose> {
+        let before = self.trajectory.last().map_or(f64::NEG_INFINITY, |pose| pose.timestamp_s);
+        if !timestamp_s.is_finite() || timestamp_s <= before {
+            return Err(Error::NotAscending { what: "times of the frames", index: self.trajectory.len() });
+        }
+        if prior.is_some_and(|prior| !prior.is_sound()) {
+            return Err(Error::Numerical { what: "the motion prior", why: "its covariance is not positive definite" });
+        }
+        self.current.update(points, sigma)?;
+        let pose = match self.last.take() {
+            None => self.start(timestamp_s),
+            Some(last) => self.follow(timestamp_s, &last, prior),
+        };
+        std::mem::swap(&mut self.current, &mut self.previous);
+        self.trajectory.push(pose);
+        Ok(pose)
+    }
+
+    /// The poses of all frames as they were when they were tracked.
+    pub fn trajectory(&self) -> &[TrackedPose] {
+        &self.trajectory
+    }
+
+    /// The poses of all frames as they are known now: closed loops have moved the keyframes they hang on. Covariances
+    /// are those of the time of tracking.
+    pub fn adjusted_trajectory(&self) -> Vec<TrackedPose> {
+        let adjusted = |pose: &TrackedPose| match self.keyframes.world_from(pose.keyframe) {
+            Some(world) => TrackedPose { world_from_camera: world * pose.keyframe_from_camera, ..*pose },
+            None => *pose,
+        };
+        self.trajectory.iter().map(adjusted).collect()
+    }
+
+    /// The map: the planes of all keyframes as points with normals and standard deviations, in the world's frame. Where
+    /// keyframes overlap, surfaces come several times.
+    pub fn map(&self) -> Cloud {
+        self.keyframes.cloud()
+    }
+
+    /// Number of keyframes in the map.
+    pub fn keyframes(&self) -> usize {
+        self.keyframes.list.len()
+    }
+
+    /// Registrations between keyframes that were observed; more than keyframes less one where loops were closed.
+    pub fn registrations(&self) -> usize {
+        self.keyframes.graph.edges.len()
+    }
+
+    /// The systematic error of the sensor that all frames share, as the registrations of keyframes tell it. The covariances
+    /// of poses rest on it: on its being smooth over the frame, and on what loops may tell of it: a quarter of its variance.
+    pub fn shared_error(&self) -> &SharedError {
+        &self.shared
+    }
+
+    fn start(&mut self, timestamp_s: f64) -> TrackedPose {
+        let pose = Uncertain::exact(self.options.world_from_first);
+        let blank = self.current.filled() < self.options.min_filled;
+        let state = if blank { TrackingState::Lost(LossReason::TooFewPoints) } else { TrackingState::Started };
+        if !blank {
+            self.set_weakest_motion();
+            self.keyframes.start(&self.current, &pose.pose);
+            self.keyframes.graph.set_shared_error(&self.shared);
+            self.last = Some(Last {
+                timestamp_s,
+                keyframe: 0,
+                own: Uncertain::exact(Isometry3::identity()),
+                by_field: ByField::zeros(),
+                shared: Matrix6::zeros(),
+                velocity: None,
+                interval_s: f64::INFINITY,
+                disturbance: None,
+                carried: 0,
+                informed: true,
+                lost_frames: 0,
+            });
+        }
+        TrackedPose {
+            timestamp_s,
+            world_from_camera: pose.pose,
+            covariance: if blank { Matrix6::identity() } else { pose.covariance },
+            state,
+            keyframe: 0,
+            keyframe_from_camera: Isometry3::identity(),
+            overlap: if blank { 0.0 } else { 1.0 },
+            rms_m: 0.0,
+            measured_motion: None,
+        }
+    }
+
+    /// Sets from which standard deviation on motions are undetermined, where the options leave that to the frames.
+    fn set_weakest_motion(&mut self) {
+        let mut alignment = self.aligner.options().clone();
+        if self.options.alignment.max_motion_sigma_m.is_none() {
+            alignment.max_motion_sigma_m = Some(WEAKEST_SHARE * self.current.radius_m().max(f64::MIN_POSITIVE));
+        }
+        if let Ok(aligner) = FrameAligner::new(alignment) {
+            self.aligner = aligner;
+        }
+    }
+
+    fn follow(&mut self, timestamp_s: f64, last: &Last, prior: Option<&MotionPrior>) -> TrackedPose {
+        let prediction = last.predict(timestamp_s, prior);
+        match self.locate(last, &prediction) {
+            Ok((measured, fix)) => self.found(timestamp_s, last, &Seen { measured, fix, prediction }),
+            Err(reason) => self.lost(timestamp_s, last, &prediction, reason),
+        }
+    }
+
+    fn locate(&mut self, last: &Last, prediction: &Prediction) -> std::result::Result<(Measured, Fix), LossReason> {
+        if self.current.filled() < self.options.min_filled {
+            return Err(LossReason::TooFewPoints);
+        }
+        let near = self.near(last, prediction).and_then(|measured| self.placed(&measured, last, prediction));
+        let near = near.or_else(|reason| {
+            let measured = self.with_previous(last, prediction, Measured::is_sound).ok_or(reason)?;
+            self.placed(&measured, last, prediction)
+        });
+        let found = match &near {
+            Ok((measured, _)) if measured.agrees() => return near,
+            // What contradicts is still better than nothing, unless some other keyframe fits.
+            Ok(_) => {
+                let ranked = self.ranked();
+                self.alike(&ranked)
+            }
+            Err(_) => self.wide(last.lost_frames),
+        };
+        found.map_or(near, |measured| Ok((measured, Fix::unexpected(&measured))))
+    }
+
+    /// A registration weighed against the prediction.
+    fn placed(
+        &self,
+        measured: &Measured,
+        last: &Last,
+        prediction: &Prediction,
+    ) -> std::result::Result<(Measured, Fix), LossReason> {
+        let predicted = prediction.seen_from(&self.keyframes.graph.relative(measured.keyframe, last.keyframe));
+        self.fixed(measured, &predicted, last.lost_frames)
+    }
+
+    fn found(&mut self, timestamp_s: f64, last: &Last, seen: &Seen) -> TrackedPose {
+        let Seen { measured, fix, prediction } = seen;
+        let (keyframe, own) = (measured.keyframe, fix.own);
+        let between = self.keyframes.graph.relative(keyframe, last.keyframe);
+        let before = Uncertain::exact(between).then(&last.own);
+        let (half, seconds) = (measured.own(), timestamp_s - last.timestamp_s);
+        let follows = last.lost_frames == 0 && fix.expected;
+        let measured_motion = follows.then(|| {
+            let motion = half.inverse().then(&before);
+            MotionPrior { current_from_previous: motion.pose, covariance: motion.covariance }
+        });
+        let learns = last.lost_frames == 0 && measured.determined;
+        let disturbance = if learns {
+            let motion = before.pose.inverse() * half.pose;
+            last.disturbed_by(timestamp_s, &prediction.seen_from(&between), &half, &motion)
+        } else {
+            last.disturbance
+        };
+        let from_poses = || Velocity::between(&before, &own, seconds, disturbance.unwrap_or_default());
+        let velocity = fix.velocity.or_else(|| follows.then(from_poses));
+        let shared = if measured.determined { measured.shared() } else { last.shared };
+        let total = Uncertain { covariance: own.covariance + shared, ..own };
+        let own_relation = Relation { random: total, by_field: measured.by_field() };
+        let field = self.field_covariance(measured.influence.as_ref());
+        let world = self.keyframes.graph.from(keyframe, &own_relation).total(&field);
+        if self.options.fusion == Fusion::Planes && measured.determined {
+            self.keyframes.list[keyframe].frame.absorb(&self.current, &measured.aligned, &mut self.scratch);
+        }
+        let pose = TrackedPose {
+            timestamp_s,
+            world_from_camera: world.pose,
+            covariance: world.covariance,
+            state: if follows { TrackingState::Tracked } else { TrackingState::Relocalised },
+            keyframe: self.keyframes.list[keyframe].number,
+            keyframe_from_camera: own.pose,
+            overlap: measured.agreement.overlap(),
+            rms_m: measured.rms_m,
+            measured_motion,
+        };
+        self.last = Some(Last {
+            timestamp_s,
+            keyframe,
+            own,
+            by_field: measured.by_field(),
+            shared,
+            velocity,
+            interval_s: seconds,
+            disturbance,
+            carried: if measured.determined { 0 } else { last.carried + 1 },
+            informed: true,
+            lost_frames: 0,
+        });
+        if pose.overlap < self.options.keyframe_overlap {
+            self.change_reference(&own_relation, measured.influence.as_ref());
+        }
+        self.thin();
+        pose
+    }
+
+    fn lost(&mut self, timestamp_s: f64, last: &Last, prediction: &Prediction, reason: LossReason) -> TrackedPose {
+        let total = Uncertain { covariance: prediction.own.covariance + last.shared, ..prediction.own };
+        let relation = Relation { random: total, by_field: last.by_field };
+        let world = self.keyframes.graph.from(last.keyframe, &relation).total(&self.keyframes.graph.covariance);
+        let radius = self.keyframes.list[last.keyframe].frame.radius_m();
+        let unknown = diagonal([radius * radius, 1.0]);
+        let informed = prediction.grounds != Grounds::Nothing;
+        self.last = Some(Last {
+            timestamp_s,
+            own: prediction.own,
+            velocity: prediction.velocity,
+            informed,
+            lost_frames: last.lost_frames + 1,
+            ..last.clone()
+        });
+        TrackedPose {
+            timestamp_s,
+            world_from_camera: world.pose,
+            covariance: if informed { world.covariance } else { world.covariance + unknown },
+            state: TrackingState::Lost(reason),
+            keyframe: self.keyframes.list[last.keyframe].number,
+            keyframe_from_camera: prediction.own.pose,
+            overlap: 0.0,
+            rms_m: 0.0,
+            measured_motion: None,
+        }
+    }
+
+    /// Covariance of the field of the shared error: until a loop has told more, as the registrations of keyframes and
+    /// that of this frame show it.
+    fn field_covariance(&self, influence: Option<&Influence>) -> FieldMatrix {
+        let graph = &self.keyframes.graph;
+        match influence {
+            Some(influence) if !graph.closed && self.options.alignment.shared_error.is_none() => {
+                let mut shared = self.shared;
+                shared.learn(influence);
+                shared.of_field()
+            }
+            _ => graph.covariance,
+        }
+    }
+
+    /// Takes out keyframes beyond the number allowed.
+    fn thin(&mut self) {
+        let Some(last) = &mut self.last else { return };
+        while self.keyframes.list.len() > self.options.max_keyframes {
+            let newest = self.keyframes.list.len() - 1;
+            let Some(gone) = self.keyframes.thin([last.keyframe, newest]) else { return };
+            last.keyframe -= usize::from(last.keyframe > gone);
+        }
+    }
+}

@@ -3,6 +3,9 @@
 #[cfg(feature = "adjust")]
 #[doc(inline)]
 pub use adjust;
+#[cfg(feature = "atomic-output")]
+#[doc(inline)]
+pub use atomic_output;
 #[cfg(feature = "camera-model")]
 #[doc(inline)]
 pub use camera_model;

@@ -1,7 +1,7 @@
 //! The files of a tracked sequence.
 
+use atomic_output::{Destination, write_text};
 use icp_registration::TrackedPose;
-use range_io::atomic::{Destination, write_text};
 use range_io::clouds::{CloudFile, Precision};
 use range_io::ply::write_cloud;
 use range_io::tables::{Station, write_stations};

@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 use std::time::Instant;
 
+use atomic_output::Destination;
 use icp_registration::{Cloud, TrackedPose, Tracker, TrackerOptions, TrackingState};
-use range_io::atomic::Destination;
 use statistics::quantile;
 
 use super::frames::FrameSource;

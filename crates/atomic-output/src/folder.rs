@@ -33,7 +33,7 @@ impl OutputFolder {
     pub const MARKER: &str = MARKER;
 
     /// Makes a temporary folder beside the place; missing parents are made too.
-    pub(super) fn create(destination: &Destination) -> Result<Self> {
+    pub(crate) fn create(destination: &Destination) -> Result<Self> {
         let target = destination.target().to_path_buf();
         let temporary = leftovers::temporary_name(&target)?;
         let older = destination.older_files().to_vec();

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use crate::{Error, Result};
 
 /// Name of the file that marks a folder as a complete output and lists its files.
-pub(super) const MARKER: &str = ".complete";
+pub(crate) const MARKER: &str = ".complete";
 
 /// First line of the marker.
 const HEAD: &str = "This folder is written and replaced as a whole: then these files are removed, and no others.";
@@ -18,14 +18,14 @@ const LARGEST_MARKER: u64 = 1 << 26;
 
 /// Files and folders below a folder, relative to it and sorted. Links count as files and are not followed.
 #[derive(Debug, Default)]
-pub(super) struct Contents {
-    pub(super) files: BTreeSet<PathBuf>,
-    pub(super) folders: BTreeSet<PathBuf>,
+pub(crate) struct Contents {
+    pub(crate) files: BTreeSet<PathBuf>,
+    pub(crate) folders: BTreeSet<PathBuf>,
 }
 
 impl Contents {
     /// What lies in a folder.
-    pub(super) fn of(folder: &Path) -> io::Result<Self> {
+    pub(crate) fn of(folder: &Path) -> io::Result<Self> {
         let mut contents = Self::default();
         contents.add(folder, Path::new(""))?;
         Ok(contents)
@@ -46,7 +46,7 @@ impl Contents {
     }
 
     /// The marker's text: one file a line. The name of a file that can't stand in a line is given instead.
-    pub(super) fn marker(&self) -> std::result::Result<String, PathBuf> {
+    pub(crate) fn marker(&self) -> std::result::Result<String, PathBuf> {
         let mut text = format!("{HEAD}\n");
         for file in &self.files {
             let parts: Option<Vec<&str>> = file.iter().map(|part| part.to_str()).collect();
@@ -62,7 +62,7 @@ impl Contents {
 ///
 /// # Errors
 /// Where the folder is no output, or holds what the output did not write: replacing it would cost someone that.
-pub(super) fn replaceable_files(folder: &Path) -> Result<Vec<PathBuf>> {
+pub(crate) fn replaceable_files(folder: &Path) -> Result<Vec<PathBuf>> {
     let found = Contents::of(folder).map_err(Error::io(folder, "list the folder"))?;
     if found.files.is_empty() && found.folders.is_empty() {
         return Ok(Vec::new());
@@ -103,7 +103,7 @@ pub(super) fn replaceable_files(folder: &Path) -> Result<Vec<PathBuf>> {
 ///
 /// # Errors
 /// As [`replaceable_files`]; then nothing is removed.
-pub(super) fn remove(folder: &Path) -> Result<()> {
+pub(crate) fn remove(folder: &Path) -> Result<()> {
     replaceable_files(folder)?;
     let found = Contents::of(folder).map_err(Error::io(folder, "list the folder"))?;
     // The marker goes last of all files, so that a removal that is cut off can go on.

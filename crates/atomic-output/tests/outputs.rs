@@ -4,8 +4,7 @@ use std::fs;
 use std::io::Write;
 use std::path::Path;
 
-use range_io::atomic::{Destination, FileWriter, OutputFolder, fault, write_text};
-use range_io::{Error, Result};
+use atomic_output::{Destination, Error, FileWriter, OutputFolder, Result, fault, write_text};
 
 fn names(folder: &Path) -> Vec<String> {
     let mut names: Vec<_> =

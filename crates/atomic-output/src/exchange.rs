@@ -12,7 +12,7 @@ use crate::{Error, Result};
 /// Where the system can, both change names in one step. Where it can't, there is a moment in which the older folder
 /// lies aside and the new one is not in place yet: a program that is cut off then leaves that to [`restore`]. On an error
 /// the older folder is where it was.
-pub(super) fn put(new: &Path, target: &Path) -> Result<Option<PathBuf>> {
+pub(crate) fn put(new: &Path, target: &Path) -> Result<Option<PathBuf>> {
     let parent = leftovers::parent(target);
     let failed = |operation| Error::io(target, operation);
     if !target.exists() {
@@ -64,7 +64,7 @@ fn in_two_steps(new: &Path, target: &Path) -> Result<PathBuf> {
 }
 
 /// Puts an older output back that a commit had moved aside when it was cut off.
-pub(super) fn restore(target: &Path) -> Result<()> {
+pub(crate) fn restore(target: &Path) -> Result<()> {
     let aside = leftovers::aside_name(target)?;
     if !target.exists() && aside.is_dir() {
         disk::rename(&aside, target).map_err(Error::io(target, "restore the older output"))?;

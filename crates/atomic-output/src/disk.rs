@@ -12,27 +12,27 @@ fn change<T>(operation: impl FnOnce() -> io::Result<T>) -> io::Result<T> {
 }
 
 /// Makes one folder.
-pub(super) fn create_folder(path: &Path) -> io::Result<()> {
+pub(crate) fn create_folder(path: &Path) -> io::Result<()> {
     change(|| fs::create_dir(path))
 }
 
 /// Opens a new file for reading and writing.
-pub(super) fn create_file(path: &Path) -> io::Result<File> {
+pub(crate) fn create_file(path: &Path) -> io::Result<File> {
     change(|| File::options().read(true).write(true).create_new(true).open(path))
 }
 
 /// Writes what fits.
-pub(super) fn write(file: &mut File, bytes: &[u8]) -> io::Result<usize> {
+pub(crate) fn write(file: &mut File, bytes: &[u8]) -> io::Result<usize> {
     change(|| file.write(bytes))
 }
 
 /// Brings a file's bytes to the disk.
-pub(super) fn sync_file(file: &File) -> io::Result<()> {
+pub(crate) fn sync_file(file: &File) -> io::Result<()> {
     change(|| file.sync_all())
 }
 
 /// Brings the names in a folder to the disk, where the system can.
-pub(super) fn sync_folder(path: &Path) -> io::Result<()> {
+pub(crate) fn sync_folder(path: &Path) -> io::Result<()> {
     change(|| sync_at(path))
 }
 
@@ -41,7 +41,7 @@ pub(super) fn sync_folder(path: &Path) -> io::Result<()> {
 const SYNCED_AT_ONCE: usize = 8;
 
 /// Brings files and folders to the disk; with the error comes its path.
-pub(super) fn sync(paths: &[PathBuf]) -> Result<(), (PathBuf, io::Error)> {
+pub(crate) fn sync(paths: &[PathBuf]) -> Result<(), (PathBuf, io::Error)> {
     for path in paths {
         change(|| Ok(())).map_err(|error| (path.clone(), error))?;
     }
@@ -72,17 +72,17 @@ fn sync_at(path: &Path) -> io::Result<()> {
 }
 
 /// Gives a file or folder another name.
-pub(super) fn rename(from: &Path, to: &Path) -> io::Result<()> {
+pub(crate) fn rename(from: &Path, to: &Path) -> io::Result<()> {
     change(|| fs::rename(from, to))
 }
 
 /// A second name for a file, or a copy of it where the file system has no second names.
-pub(super) fn link_or_copy(from: &Path, to: &Path) -> io::Result<()> {
+pub(crate) fn link_or_copy(from: &Path, to: &Path) -> io::Result<()> {
     change(|| fs::hard_link(from, to).or_else(|_| fs::copy(from, to).map(drop)))
 }
 
 /// Lets two folders change names in one step; the error's kind is `Unsupported` where the system can't.
-pub(super) fn exchange(one: &Path, other: &Path) -> io::Result<()> {
+pub(crate) fn exchange(one: &Path, other: &Path) -> io::Result<()> {
     #[cfg(feature = "fault-injection")]
     if fault::is_without_exchange() {
         return Err(io::ErrorKind::Unsupported.into());
@@ -136,11 +136,11 @@ pub mod fault {
         result
     }
 
-    pub(super) fn is_without_exchange() -> bool {
+    pub(crate) fn is_without_exchange() -> bool {
         WITHOUT_EXCHANGE.get()
     }
 
-    pub(super) fn count() -> io::Result<()> {
+    pub(crate) fn count() -> io::Result<()> {
         let number = COUNT.replace(COUNT.get() + 1);
         if FAILING.get() == Some(number) { Err(io::ErrorKind::StorageFull.into()) } else { Ok(()) }
     }

@@ -18,7 +18,7 @@ const LEFT_AFTER: Duration = Duration::from_hours(24);
 const LOCKED_AFTER: Duration = Duration::from_mins(1);
 
 /// A name in the same folder that no other writer uses at the same time.
-pub(super) fn temporary_name(target: &Path) -> Result<PathBuf> {
+pub(crate) fn temporary_name(target: &Path) -> Result<PathBuf> {
     static COUNTER: AtomicU64 = AtomicU64::new(0);
     let count = COUNTER.fetch_add(1, Ordering::Relaxed);
     let process = std::process::id();
@@ -26,18 +26,18 @@ pub(super) fn temporary_name(target: &Path) -> Result<PathBuf> {
 }
 
 /// Where an older output lies while a new one takes its place on systems that can't exchange the two.
-pub(super) fn aside_name(target: &Path) -> Result<PathBuf> {
+pub(crate) fn aside_name(target: &Path) -> Result<PathBuf> {
     Ok(target.with_file_name(format!(".{}.replaced", file_name(target)?)))
 }
 
 /// Whether a path leads into a folder that is still being written.
-pub(super) fn is_in_unfinished_folder(path: &Path) -> bool {
+pub(crate) fn is_in_unfinished_folder(path: &Path) -> bool {
     let is_unfinished = |name: &str| name.starts_with('.') && name.contains(PARTIAL);
     path.ancestors().skip(1).any(|path| path.file_name().and_then(|name| name.to_str()).is_some_and(is_unfinished))
 }
 
 /// The folder in which a path's last name stands.
-pub(super) fn parent(path: &Path) -> &Path {
+pub(crate) fn parent(path: &Path) -> &Path {
     match path.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
         _ => Path::new("."),
@@ -50,14 +50,14 @@ fn file_name(target: &Path) -> Result<String> {
 }
 
 /// Locks a folder that is being written, for as long as what is returned is open; `None` where the system can't.
-pub(super) fn lock(folder: &Path) -> Option<File> {
+pub(crate) fn lock(folder: &Path) -> Option<File> {
     let file = File::open(folder).ok()?;
     file.try_lock().ok()?;
     Some(file)
 }
 
 /// Removes what killed runs for this name have left beside it. What can't be removed is left to the next run.
-pub(super) fn remove_of(target: &Path) -> Result<()> {
+pub(crate) fn remove_of(target: &Path) -> Result<()> {
     let start = format!(".{}{PARTIAL}", file_name(target)?);
     let aside = aside_name(target)?;
     let Ok(entries) = fs::read_dir(parent(target)) else { return Ok(()) };

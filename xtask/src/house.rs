@@ -9,15 +9,11 @@ const LARGEST_CRATE: usize = 8_000;
 const LARGEST_FOLDER: usize = 12;
 
 /// Crates that are larger, and the lines that they may not exceed: they become smaller, part by part.
-const LARGER_CRATES: [(&str, usize); 4] = [
-    ("adjust", 10_600),
-    ("icp-registration", 24_400),
-    ("pipeline", 23_600),
-    ("self-calibration", 13_100),
-];
+const LARGER_CRATES: [(&str, usize); 4] =
+    [("adjust", 10_600), ("icp-registration", 24_400), ("pipeline", 23_600), ("self-calibration", 13_100)];
 
 /// Folders that hold more, and how many.
-const LARGER_FOLDERS: [(&str, usize); 14] = [
+const LARGER_FOLDERS: [(&str, usize); 13] = [
     ("icp-registration/src", 21),
     ("icp-registration/src/coarse", 24),
     ("icp-registration/src/icp", 14),
@@ -31,7 +27,6 @@ const LARGER_FOLDERS: [(&str, usize); 14] = [
     ("pipeline/src/report", 21),
     ("pipeline/src/report/network", 15),
     ("pipeline/src/stages", 14),
-    ("self-calibration/src/networks/network", 44),
 ];
 
 /// What of a crate is too large.

@@ -11,7 +11,7 @@ pub use adjust::{GlobalTest, GlobalVerdict, Scale};
 pub use by_planes::planes::{PlaneCalibrationOptions, PlaneCapture, calibrate_planes};
 pub use by_planes::planes_outcome::{AdjustedPlane, CaptureQuality, PlaneCalibration};
 pub use error::{Error, Result};
-pub use networks::network::*;
+pub use networks::*;
 pub use observed::calibration::RangeCalibration;
 pub use observed::options::{HyperbolaUse, RangeTermOptions, TermUse};
 pub use primitives::{DifferenceOptions, Plane, RangeDifference, differences_to_plane};

@@ -3,7 +3,7 @@
 use adjust::{Adjustment, BlockId, Covariance, ParameterBlock, Solution, SolveOptions};
 use error_models::{AmplitudeHyperbola, RangeErrorModel};
 
-use crate::networks::hyperbola_start::hyperbola_start;
+use crate::observed::hyperbola_start::hyperbola_start;
 use crate::observed::options::{HyperbolaUse, LinearTerms};
 use crate::ranges::hyperbola_real::{RealHyperbola, is_real_over_span};
 use crate::ranges::observation::{DifferenceObservation, HyperbolaForm};

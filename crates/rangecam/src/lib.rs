@@ -9,6 +9,9 @@ pub use atomic_output;
 #[cfg(feature = "camera-model")]
 #[doc(inline)]
 pub use camera_model;
+#[cfg(feature = "dense-matrices")]
+#[doc(inline)]
+pub use dense_matrices;
 #[cfg(feature = "error-models")]
 #[doc(inline)]
 pub use error_models;
@@ -18,6 +21,9 @@ pub use icp_registration;
 #[cfg(feature = "multipath")]
 #[doc(inline)]
 pub use multipath;
+#[cfg(feature = "observation-equations")]
+#[doc(inline)]
+pub use observation_equations;
 #[cfg(feature = "orientation")]
 #[doc(inline)]
 pub use orientation;

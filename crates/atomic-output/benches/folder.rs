@@ -14,7 +14,7 @@ fn folder(criterion: &mut Criterion) {
             bencher.iter(|| {
                 let output = Destination::new(&target, &[scratch.path().join("in")]).unwrap().open().unwrap();
                 for file in 0..files {
-                    write_text(output.file(&format!("{file}.txt")).unwrap(), "result\n").unwrap();
+                    write_text(output.file(format!("{file}.txt")).unwrap(), "result\n").unwrap();
                 }
                 output.commit().unwrap();
             });

@@ -26,7 +26,7 @@ pub enum TermSelection {
     Auto,
     /// These, by their canonical names (`xp yp c k1 k2 k3 p1 p2 b1 b2 d0 d2..d7 e1 e2 h1 h2 h3`, and those of further
     /// terms that the range model has); all others are held. `splineN`, `polynomialN` and `surfaceN` stand for all terms
-    /// of such a model, which the calibration then has: see [`calibrate`](crate::networks::methods::calibrate()).
+    /// of such a model, which the calibration then has: see [`calibrate`](crate::calibrate).
     List(Vec<String>),
 }
 

@@ -10,7 +10,7 @@ const LARGEST_FOLDER: usize = 12;
 
 /// Crates that are larger, and the lines that they may not exceed: they become smaller, part by part.
 const LARGER_CRATES: [(&str, usize); 3] =
-    [("icp-registration", 24_400), ("pipeline", 23_600), ("self-calibration", 13_100)];
+    [("icp-registration", 24_200), ("pipeline", 23_500), ("self-calibration", 9_800)];
 
 /// Folders that hold more, and how many.
 const LARGER_FOLDERS: [(&str, usize); 13] = [
@@ -21,7 +21,7 @@ const LARGER_FOLDERS: [(&str, usize); 13] = [
     ("icp-registration/src/organised", 26),
     ("icp-registration/src/tracking", 14),
     ("icp-registration/src/voxels", 14),
-    ("pipeline/src", 41),
+    ("pipeline/src", 40),
     ("pipeline/src/calibrate", 23),
     ("pipeline/src/register", 13),
     ("pipeline/src/report", 21),

@@ -33,6 +33,9 @@ pub use phase_unwrap;
 #[cfg(feature = "pipeline")]
 #[doc(inline)]
 pub use pipeline;
+#[cfg(feature = "range-calibration")]
+#[doc(inline)]
+pub use range_calibration;
 #[cfg(feature = "range-image")]
 #[doc(inline)]
 pub use range_image;

@@ -75,6 +75,7 @@ pub(super) fn of_source(source: &(dyn StdError + 'static)) -> Failure {
         source.downcast_ref::<range_io::Error>().map(of_file),
         source.downcast_ref::<std::io::Error>().map(of_system),
         source.downcast_ref::<self_calibration::Error>().map(of_estimation),
+        source.downcast_ref::<range_calibration::Error>().map(of_ranges),
         source.downcast_ref::<icp_registration::Error>().map(of_registration),
         source.downcast_ref::<sensor_noise::Error>().map(of_noise),
         source.downcast_ref::<primitives::Error>().map(of_primitive),
@@ -107,10 +108,6 @@ pub(super) fn of_estimation(error: &self_calibration::Error) -> Failure {
     use self_calibration::Error as Cause;
     match error {
         Cause::OutOfDomain { .. }
-        | Cause::BadDifference { .. }
-        | Cause::NothingToEstimate
-        | Cause::UnknownPlane { .. }
-        | Cause::HyperbolaNotHeld
         | Cause::DuplicateName { .. }
         | Cause::BadNetworkValue { .. }
         | Cause::UnknownName { .. }
@@ -118,10 +115,26 @@ pub(super) fn of_estimation(error: &self_calibration::Error) -> Failure {
         | Cause::Datum { .. }
         | Cause::MethodNeeds { .. }
         | Cause::OutsideImage(_)
-        | Cause::Camera(_)
-        | Cause::Image(_) => Failure::Usage,
+        | Cause::Camera(_) => Failure::Usage,
         // All of a column is wrong: a slip in the input, not a finding about the network.
         Cause::Contradiction(found) if found.is_wrong_input() => Failure::Usage,
+        Cause::Ranges(error) => of_ranges(error),
+        _ => Failure::Refused,
+    }
+}
+
+fn of_ranges(error: &range_calibration::Error) -> Failure {
+    use range_calibration::Error as Cause;
+    match error {
+        Cause::OutOfDomain { .. }
+        | Cause::BadDifference { .. }
+        | Cause::NothingToEstimate
+        | Cause::UnknownPlane { .. }
+        | Cause::HyperbolaNotHeld
+        | Cause::DuplicateName { .. }
+        | Cause::UnknownName { .. }
+        | Cause::Camera(_)
+        | Cause::Image(_) => Failure::Usage,
         Cause::Primitive(error) => of_primitive(error),
         Cause::Registration { reason, .. } => of_registration(reason),
         _ => Failure::Refused,

@@ -1,11 +1,11 @@
 //! Start values of the amplitude hyperbola (Eq. 15) from what a calibration without it leaves over.
 
 use error_models::AmplitudeHyperbola;
+use range_calibration::{hyperbola_gain, hyperbola_start};
 use statistics::Distribution;
 
 use crate::Result;
 use crate::networks::{CalibrationOutcome, Component, Network, Verdict};
-use crate::observed::hyperbola_start::{gain, hyperbola_start};
 
 /// Probability that residuals which do not depend on the amplitude are taken for a hyperbola's. It only decides whether one
 /// is tried, which takes as long as all the rest.
@@ -14,7 +14,7 @@ const WORTH_TRYING: f64 = 0.05;
 /// The network with start values for h1, h2, h3, from the residuals of its ranges against their amplitudes.
 ///
 /// # Errors
-/// [`crate::Error::NoHyperbola`] where the residuals show none.
+/// [`range_calibration::Error::NoHyperbola`] where the residuals show none.
 pub(crate) fn with_hyperbola(network: &Network, without: &CalibrationOutcome) -> Result<Network> {
     let mut samples = samples(without);
     let amplitude_span =
@@ -29,7 +29,7 @@ pub(crate) fn with_hyperbola(network: &Network, without: &CalibrationOutcome) ->
 /// than none.
 pub(crate) fn is_worth_trying(network: &Network, without: &CalibrationOutcome) -> bool {
     let least = Distribution::ChiSquared { dof: 3.0 }.critical(WORTH_TRYING);
-    network.range_model.hyperbola.is_some_and(|hyperbola| gain(&mut samples(without), &hyperbola) > least)
+    network.range_model.hyperbola.is_some_and(|hyperbola| hyperbola_gain(&mut samples(without), &hyperbola) > least)
 }
 
 /// Amplitudes and residuals of the ranges.

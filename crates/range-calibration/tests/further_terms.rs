@@ -3,7 +3,7 @@
 use crate::support;
 use crate::support::{INTERVAL, track, walls};
 use error_models::{FurtherShape, PolynomialShape, RangeErrorModel, SurfaceShape};
-use self_calibration::{Error, RangeDifference, RangeTermOptions, Scale, estimate_range_terms};
+use range_calibration::{Error, RangeDifference, RangeTermOptions, Scale, estimate_range_terms};
 
 const SIGMA_M: f64 = 0.004;
 

@@ -5,11 +5,11 @@ use camera_model::{Camera, InteriorOrientation, LensDistortion};
 use criterion::{Criterion, criterion_group, criterion_main};
 use error_models::{AmplitudeHyperbola, RangeErrorModel, RangeTerms, distort_frame};
 use nalgebra::{Isometry3, Point3, Vector3};
-use range_image::{Flags, ImageFormat, RangeFrame, Raster};
-use self_calibration::{
+use range_calibration::{
     DifferenceOptions, Plane, PlaneCalibrationOptions, PlaneCapture, RangeDifference, RangeTermOptions,
     calibrate_planes, differences_to_plane, estimate_range_terms,
 };
+use range_image::{Flags, ImageFormat, RangeFrame, Raster};
 
 fn camera(width: usize, height: usize) -> Camera {
     let format = ImageFormat::new(width, height, [7.0 / width as f64; 2]).unwrap();

@@ -17,8 +17,12 @@ const HEIGHTS: [f64; 7] = [1.0, 1.3, 2.0, 3.0, 5.0, 10.0, 20.0];
 const LEVELS: [f64; 7] = [0.5, 0.2, 0.0, -0.2, -0.5, -1.0, -2.0];
 
 /// The best hyperbola of a coarse grid over three readable numbers: value `Z` at amplitude zero, level `L` at large
-/// amplitudes, and slope `p`; then `h3 = 1 / Z²`, `h2 = p h3`, `h1 = −L h2`.
-pub(crate) fn hyperbola_start(samples: &mut [(f64, f64)], amplitude_span: [f64; 2]) -> Result<[f64; 3]> {
+/// amplitudes, and slope `p`; then `h3 = 1 / Z²`, `h2 = p h3`, `h1 = −L h2`. Samples are amplitudes with residuals in metres, and
+/// are sorted; the span has the smallest and the largest amplitude.
+///
+/// # Errors
+/// [`Error::NoHyperbola`] where the residuals do not depend on the amplitude, or show fewer than three amplitudes.
+pub fn hyperbola_start(samples: &mut [(f64, f64)], amplitude_span: [f64; 2]) -> Result<[f64; 3]> {
     let classes = class_medians(samples);
     if classes.len() < 3 {
         return Err(Error::NoHyperbola { reason: "fewer than three different amplitudes" });
@@ -50,7 +54,7 @@ pub(crate) fn hyperbola_start(samples: &mut [(f64, f64)], amplitude_span: [f64; 
 
 /// By how much a hyperbola lowers the sum of squares of the residuals, in variances: chi-squared of three degrees of freedom
 /// where they do not depend on the amplitude.
-pub(crate) fn gain(samples: &mut [(f64, f64)], hyperbola: &AmplitudeHyperbola) -> f64 {
+pub fn hyperbola_gain(samples: &mut [(f64, f64)], hyperbola: &AmplitudeHyperbola) -> f64 {
     let classes = class_medians(samples);
     let of_class = |amplitude: f64| classes.iter().rev().find(|class| class.lowest <= amplitude);
     let off =

@@ -2,7 +2,7 @@
 
 use crate::round;
 use icp_registration::Datum;
-use self_calibration::{
+use range_calibration::{
     Error, SurfaceCalibration, SurfaceCalibrationOptions, SurfaceCapture, SurfaceTerm, calibrate_surfaces,
 };
 
@@ -11,7 +11,7 @@ fn calibrate(
     names: &[&str],
     stations: usize,
     seed: u64,
-) -> self_calibration::Result<SurfaceCalibration> {
+) -> range_calibration::Result<SurfaceCalibration> {
     let poses = round::poses(stations);
     let frames = round::frames(&poses, &round::model(truth), seed);
     let captures: Vec<SurfaceCapture<'_>> = frames

@@ -4,7 +4,7 @@ use crate::support::{INTERVAL, model, terms, track, walls};
 use approx::assert_relative_eq;
 use error_models::{AmplitudeHyperbola, ParameterStatus, RangeTerms};
 use nalgebra::DVector;
-use self_calibration::{Error, HyperbolaUse, RangeTermOptions, Scale, TermUse, estimate_range_terms};
+use range_calibration::{Error, HyperbolaUse, RangeTermOptions, Scale, TermUse, estimate_range_terms};
 
 const SIGMA: f64 = 0.005;
 
@@ -58,10 +58,10 @@ fn the_covariance_is_that_of_repeated_calibrations() {
 fn posterior_deviations_do_not_depend_on_the_sigma_given() {
     let differences = walls(&model(None), &track(), SIGMA, 3);
     let doubled: Vec<_> =
-        differences.iter().map(|d| self_calibration::RangeDifference { sigma_m: 0.01, ..*d }).collect();
+        differences.iter().map(|d| range_calibration::RangeDifference { sigma_m: 0.01, ..*d }).collect();
     let estimate = |d: &[_]| estimate_range_terms(d, INTERVAL, &RangeTermOptions::default()).unwrap();
     let (told, doubled) = (estimate(&differences), estimate(&doubled));
-    let sigma = |c: &self_calibration::RangeCalibration, scale| c.parameters(scale).unwrap()[0].sigma;
+    let sigma = |c: &range_calibration::RangeCalibration, scale| c.parameters(scale).unwrap()[0].sigma;
     assert_relative_eq!(2.0 * sigma(&told, Scale::Prior), sigma(&doubled, Scale::Prior), max_relative = 1e-9);
     assert_relative_eq!(sigma(&told, Scale::Posterior), sigma(&doubled, Scale::Posterior), max_relative = 1e-9);
     assert_relative_eq!(told.sigma0().unwrap(), 2.0 * doubled.sigma0().unwrap(), max_relative = 1e-9);
@@ -189,7 +189,7 @@ fn bad_input_is_refused_by_name() {
     let narrow = AmplitudeHyperbola { amplitude_span: [1.0, 2.0], ..hyperbola() };
     let held = RangeTermOptions { hyperbola: HyperbolaUse::Hold(narrow), ..default };
     assert!(matches!(estimate(&good, &held), Error::BadDifference { name: "amplitude", .. }));
-    let even: Vec<_> = good.iter().map(|d| self_calibration::RangeDifference { amplitude: 50.0, ..*d }).collect();
+    let even: Vec<_> = good.iter().map(|d| range_calibration::RangeDifference { amplitude: 50.0, ..*d }).collect();
     assert!(matches!(estimate(&even, &default.with_hyperbola()), Error::NoHyperbola { .. }));
     assert!(matches!(default.hold("d1", 0.0), Err(Error::Model(error_models::Error::UnknownParameter { .. }))));
     let nan = RangeTerms { d0: f64::NAN, ..terms() };

@@ -8,8 +8,8 @@ use proptest::prelude::*;
 use rand::SeedableRng;
 use rand_distr::{Distribution, Normal};
 use rand_pcg::Pcg64;
+use range_calibration::{DifferenceOptions, Plane, RangeTermOptions, differences_to_plane, estimate_range_terms};
 use range_image::{Flags, ImageFormat, RangeFrame, Raster};
-use self_calibration::{DifferenceOptions, Plane, RangeTermOptions, differences_to_plane, estimate_range_terms};
 
 fn camera() -> Camera {
     let format = ImageFormat::new(44, 36, [0.16, 0.16]).unwrap();

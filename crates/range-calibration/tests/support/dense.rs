@@ -4,7 +4,7 @@ use error_models::{AmplitudeHyperbola, FurtherShape, RangeErrorModel, RangeTerms
 use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
-use self_calibration::RangeDifference;
+use range_calibration::RangeDifference;
 
 pub const INTERVAL_M: f64 = 5.0;
 pub const SIGMA_M: f64 = 0.006;

@@ -7,8 +7,8 @@ use error_models::RangeTerms;
 use nalgebra::{Isometry3, Matrix6};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
+use range_calibration::{Error, HyperbolaUse, Plane, PlaneCalibrationOptions, PlaneCapture, Scale, calibrate_planes};
 use range_image::{Flags, ImageFormat, RangeFrame, Raster};
-use self_calibration::{Error, HyperbolaUse, Plane, PlaneCalibrationOptions, PlaneCapture, Scale, calibrate_planes};
 
 #[test]
 fn without_noise_a_common_unknown_plane_gives_the_terms_back() {

@@ -1,9 +1,9 @@
 //! The floor before a real camera; skips where the real captures are not at hand.
 
 use camera_model::{Camera, InteriorOrientation, LensDistortion};
+use range_calibration::{DifferenceOptions, Error, PlaneCalibrationOptions, PlaneCapture, calibrate_planes};
 use range_image::{Flags, ImageFormat, RangeFrame, Raster};
 use range_io::npz::NpzReader;
-use self_calibration::{DifferenceOptions, Error, PlaneCalibrationOptions, PlaneCapture, calibrate_planes};
 
 const FOLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/real/sr4000_steps");
 const INTERVAL_M: f64 = 4.996_540_966_666_667;

@@ -5,8 +5,8 @@ use crate::drift_captures::{Capture, transients};
 use crate::support::dense::{INTERVAL_M, SIGMA_M, Wall, differences, truth};
 use error_models::{RangeErrorModel, WarmUp};
 use nalgebra::DVector;
+use range_calibration::{RangeDifference, Scale, estimate_range_terms};
 use residual_tests::{TrendOptions, TrendVariable, TrendVerdict, test_trends};
-use self_calibration::{RangeDifference, Scale, estimate_range_terms};
 use warm_up::{DriftOptions, estimate_drift};
 
 /// Passes over the wall's 16 distances: range and time do not run together then.

@@ -7,7 +7,7 @@
 mod round;
 
 use icp_registration::Datum;
-use self_calibration::{SurfaceCalibrationOptions, SurfaceCapture, SurfaceTerm, calibrate_surfaces};
+use range_calibration::{SurfaceCalibrationOptions, SurfaceCapture, SurfaceTerm, calibrate_surfaces};
 
 const TRUTH: [(&str, f64); 3] = [("d0", 0.024), ("d4", 0.006), ("d5", -0.005)];
 

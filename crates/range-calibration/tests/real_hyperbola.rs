@@ -5,7 +5,7 @@ use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
-use self_calibration::{Error, RangeCalibration, RangeDifference, RangeTermOptions, estimate_range_terms};
+use range_calibration::{Error, RangeCalibration, RangeDifference, RangeTermOptions, estimate_range_terms};
 
 const INTERVAL_M: f64 = 5.0;
 const SIGMA_M: f64 = 0.004;

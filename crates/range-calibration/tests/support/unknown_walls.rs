@@ -6,10 +6,10 @@ use nalgebra::{DVector, Isometry3, Matrix6, Point3, Vector3, Vector6};
 use rand::SeedableRng;
 use rand_distr::{Distribution, Normal, StandardNormal};
 use rand_pcg::Pcg64;
-use range_image::{Flags, ImageFormat, RangeFrame, Raster};
-use self_calibration::{
+use range_calibration::{
     DifferenceOptions, Plane, PlaneCalibration, PlaneCalibrationOptions, PlaneCapture, Scale, calibrate_planes,
 };
+use range_image::{Flags, ImageFormat, RangeFrame, Raster};
 
 pub const INTERVAL: f64 = 5.0;
 pub const SIGMA_M: f64 = 0.004;

@@ -1,7 +1,7 @@
 //! Whether amplitude or position explains an error, where light falls off towards the corners.
 
 use crate::support::dense::{INTERVAL_M, SIGMA_M, Wall, differences, terms, truth};
-use self_calibration::{
+use range_calibration::{
     AmplitudeOrPosition, AmplitudeOrPositionOptions, Error, ErrorCause, RangeDifference, amplitude_or_position,
     estimate_range_terms,
 };
@@ -59,7 +59,7 @@ fn a_plain_wall_that_stands_still_cannot_tell_and_says_what_to_capture() {
         // One distance does not tell the waves: they are held.
         options.terms = options.terms.hold_terms(&terms());
         options.terms = options.terms.hold("e1", 0.0).unwrap().hold("e2", 0.0).unwrap();
-        options.terms.terms[0] = self_calibration::TermUse::Estimate;
+        options.terms.terms[0] = range_calibration::TermUse::Estimate;
         let found = amplitude_or_position(&differences, INTERVAL_M, &options).unwrap();
         println!("{found:?}");
         assert_eq!(found.cause, ErrorCause::Undecided, "{by:?}: {found:?}");

@@ -3,8 +3,8 @@
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
+use range_calibration::{Error, OffsetSample, OffsetTableOptions, estimate_offset_table};
 use range_image::ImageFormat;
-use self_calibration::{Error, OffsetSample, OffsetTableOptions, estimate_offset_table};
 
 const SIZE: [usize; 2] = [24, 18];
 const SIGMA_M: f64 = 0.006;

@@ -9,10 +9,10 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
-use range_image::{Flags, ImageFormat, Modulation, RangeFrame, Raster};
-use self_calibration::{
+use range_calibration::{
     DifferenceOptions, Error, Plane, PlaneCalibrationOptions, PlaneCapture, Result, Scale, calibrate_planes,
 };
+use range_image::{Flags, ImageFormat, Modulation, RangeFrame, Raster};
 
 const SIGMA: f32 = 0.004;
 const STATIONS: usize = 12;

@@ -3,8 +3,8 @@
 use crate::support::dense::{INTERVAL_M, SIGMA_M, SIZE, Wall, differences, surface, truth};
 use error_models::AmplitudeHyperbola;
 use nalgebra::DVector;
+use range_calibration::{Error, RangeCalibration, RangeDifference, RangeTermOptions, Scale, estimate_range_terms};
 use residual_tests::{TrendOptions, TrendSample, TrendVariable, test_trends};
-use self_calibration::{Error, RangeCalibration, RangeDifference, RangeTermOptions, Scale, estimate_range_terms};
 
 /// d0 and the level of the hyperbola share their effect: amplitudes over a factor of 2000 inflate it some hundred times.
 pub(crate) fn options() -> RangeTermOptions {

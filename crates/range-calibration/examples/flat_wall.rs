@@ -7,10 +7,10 @@ use nalgebra::Isometry3;
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
-use range_image::{Flags, ImageFormat, Modulation, RangeFrame, Raster};
-use self_calibration::{
+use range_calibration::{
     DifferenceOptions, Plane, RangeTermOptions, Result, Scale, differences_to_plane, estimate_range_terms,
 };
+use range_image::{Flags, ImageFormat, Modulation, RangeFrame, Raster};
 
 const SIGMA: f32 = 0.004;
 

@@ -25,7 +25,7 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome {
     let outcomes = [
         fuzz::run(&fuzz::Arguments { seconds: 60 * arguments.minutes, seed: Some(seed), target: None }),
         cargo(&["test", "--workspace", "--all-features"], &[("PROPTEST_RNG_SEED", &seed.to_string())]),
-        cargo(&["test", "-p", "adjust", "--no-default-features"], &[]),
+        cargo(&["test", "-p", "dense-matrices", "-p", "adjust", "--no-default-features"], &[]),
         verify::run(&verify::Arguments::all()),
         deny(),
     ];

@@ -196,20 +196,28 @@ fn settling(parameter: &str) -> String {
 /// Result with this crate's [`enum@Error`].
 pub type Result<T> = std::result::Result<T, Error>;
 
-/// Why a model could not be evaluated at given parameters, said by an [`crate::Observation`]
-/// (for example "the point lies behind the camera").
-///
-/// During the descent such a trial step is shortened; at the start values it ends the adjustment with
-/// [`Error::Evaluation`].
-#[derive(Debug, Clone, PartialEq, Eq, Error)]
-#[error("{reason}")]
-pub struct EvaluationFailure {
-    reason: std::borrow::Cow<'static, str>,
+/// What is wrong with an observation equation is wrong with the adjustment.
+impl From<observation_equations::Error> for Error {
+    fn from(error: observation_equations::Error) -> Self {
+        use observation_equations::Error as Equation;
+        match error {
+            Equation::UnknownId { what, index, count } => Self::UnknownId { what, index, count },
+            Equation::Length { what, expected, found } => Self::Length { what, expected, found },
+            Equation::InvalidBlock { block, values, reason } => Self::InvalidBlock { block, values, reason },
+            Equation::Covariance { group, matrix } => Self::Covariance { group, matrix },
+            Equation::Evaluation { group, observation, reason } => Self::Evaluation { group, observation, reason },
+            Equation::Option { name, value, expected } => Self::Option { name, value, expected },
+            Equation::Untestable { what, reason } => Self::Untestable { what, reason },
+            other => Self::Untestable { what: other.to_string(), reason: "it is no observation equation" },
+        }
+    }
 }
 
-impl EvaluationFailure {
-    /// A failure with its reason.
-    pub fn new(reason: impl Into<std::borrow::Cow<'static, str>>) -> Self {
-        Self { reason: reason.into() }
+impl From<dense_matrices::Error> for Error {
+    fn from(error: dense_matrices::Error) -> Self {
+        match error {
+            dense_matrices::Error::Decomposition { what } => Self::Decomposition { what },
+            _ => Self::Decomposition { what: "decomposition" },
+        }
     }
 }

@@ -2,7 +2,6 @@
 // Index loops over triangles and blocks mirror the formulas; iterators would hide which triangle is meant.
 #![allow(clippy::needless_range_loop)]
 
-mod arrays;
 mod cofactors;
 mod combination;
 mod descent;
@@ -10,7 +9,6 @@ mod equations;
 mod error;
 mod linearised;
 mod model;
-mod parameters;
 mod result;
 mod testing;
 
@@ -18,20 +16,15 @@ pub use combination::Combination;
 pub use descent::descend::Descent;
 pub use descent::options::{Method, SolveOptions};
 pub use descent::trace::{StepKind, TraceEntry};
-pub use error::{Error, EvaluationFailure, Result};
+pub use error::{Error, Result};
 pub use model::adjustment::Adjustment;
-pub use model::check::{JacobianCheck, check_jacobian};
-pub use model::covariance::Covariance;
 pub use model::datum_defect::DatumDefect;
-pub use model::differentiated::{Differentiated, Parameters, Pose, ResidualFunction};
-pub use model::kernel::Kernel;
-pub use model::observation::{FunctionObservation, Jacobians, LinearObservation, Observation};
-pub use parameters::block::ParameterBlock;
-pub use parameters::differentiation::dual::{Dual, Tape};
-pub use parameters::differentiation::real::Real;
-pub use parameters::ids::{BlockId, GroupId, ObservationId};
-pub use parameters::manifold::{Euclidean, Manifold};
-pub use parameters::rigid_pose::RigidPose;
+pub use model::ids::{GroupId, ObservationId};
+pub use observation_equations::{
+    BlockId, Covariance, Differentiated, Dual, Euclidean, EvaluationFailure, FunctionObservation, JacobianCheck,
+    Jacobians, Kernel, LinearObservation, Manifold, Observation, ParameterBlock, Parameters, Pose, Real,
+    ResidualFunction, RigidPose, Tape, check_jacobian,
+};
 pub use result::diagnosis::Diagnosis;
 pub use result::information::{InformationCriteria, VarianceFactor};
 pub use result::left_out::LeftOut;

@@ -105,7 +105,7 @@ fn blocks_that_do_not_fit_are_refused() {
     let pose = a.add_block(ParameterBlock::pose(&Isometry3::identity()));
     let curved = a.add_block(ParameterBlock::manifold([0.0; 3], Curved).named("bend"));
     assert!(Differentiated::new(&a, [three], Three).is_ok());
-    let error = Differentiated::new(&a, [curved], Three).unwrap_err();
+    let error = Error::from(Differentiated::new(&a, [curved], Three).unwrap_err());
     assert!(matches!(&error, Error::Untestable { what, .. } if what.contains("bend")), "{error}");
     for (block, values) in [(two, vec![0.0; 2]), (pose, vec![0.0; 7])] {
         let observation = Differentiated::new(&a, [block], Three).unwrap();

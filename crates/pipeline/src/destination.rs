@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::fmt;
 use std::path::{Component, Path, PathBuf};
 
-use range_io::atomic::{Destination, write_text};
+use atomic_output::{Destination, write_text};
 use range_io::calibration::Calibration;
 use range_io::survey::Survey;
 use serde::Serialize;

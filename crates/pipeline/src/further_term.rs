@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
+use atomic_output::{Destination, write_text};
 use error_models::ModelSet;
-use range_io::atomic::{Destination, write_text};
 use range_io::calibration::{Calibration, Provenance};
 use range_io::survey::Survey;
 

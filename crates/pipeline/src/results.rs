@@ -1,7 +1,7 @@
 //! The files of a finished run.
 
+use atomic_output::{Destination, OutputFolder, write_text};
 use nalgebra::{Isometry3, Point3};
-use range_io::atomic::{Destination, OutputFolder, write_text};
 use range_io::ply::{CloudFile, Precision, write_cloud};
 use range_io::tables::{Station, write_stations};
 use range_io::trajectory::{StampedPose, write_tum};

@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use atomic_output::Destination;
 use error_models::ModelSet;
-use range_io::atomic::Destination;
 use range_io::calibration::Calibration;
 use self_calibration::{CalibrationOptions, TermSelection};
 

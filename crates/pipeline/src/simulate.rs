@@ -3,13 +3,13 @@
 use std::fmt;
 use std::path::{Path, PathBuf};
 
+use atomic_output::{Destination, OutputFolder};
 use camera_model::step_pose;
 use error_models::{ModelSet, RangeErrorModel};
 use nalgebra::Isometry3;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
 use range_image::Modulation;
-use range_io::atomic::{Destination, OutputFolder};
 use range_io::calibration::{CalibratedDrift, Calibration, Provenance};
 use range_io::survey::{
     FrameEntry, InputFrame, Level, ReferencePath, Survey, SurveyCamera, TruthFiles, TruthFrame, write_frame,

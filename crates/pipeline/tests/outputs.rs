@@ -5,11 +5,11 @@ use std::path::{Path, PathBuf};
 
 use crate::common::calibration::{request as calibration_request, terms};
 use crate::common::{fixtures, simulated, simulated_with};
+use atomic_output::{OutputFolder, fault};
 use pipeline::{
     CalibrateRequest, Error, Failure, Judged, NoiseFitOptions, NoiseRequest, Plan, RunRequest, Silent, Verdict,
     calibrate, estimate_noise, run,
 };
-use range_io::atomic::{OutputFolder, fault};
 
 fn names(folder: &Path) -> Vec<String> {
     let mut names: Vec<_> =

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use crate::common::{fixtures, has_capture};
 use pipeline::{Plan, Silent, ViewData, process};
-use self_calibration::{
+use range_calibration::{
     AmplitudeOrPositionOptions, RangeDifference, RangeTermOptions, Scale, amplitude_or_position, estimate_range_terms,
 };
 

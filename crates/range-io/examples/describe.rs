@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use range_image::Raster;
 use range_io::Result;
-use range_io::atomic::Destination;
+use range_io::atomic_output::Destination;
 use range_io::survey::{InputFrame, Survey, read_frame, write_frame};
 
 fn main() -> Result<()> {

@@ -119,6 +119,18 @@ fn prefix(field: &str) -> String {
     if field.is_empty() { String::new() } else { format!("`{field}`: ") }
 }
 
+/// Errors of outputs are those of files.
+impl From<atomic_output::Error> for Error {
+    fn from(error: atomic_output::Error) -> Self {
+        match error {
+            atomic_output::Error::Io { file, operation, source } => Self::Io { file, operation, source },
+            atomic_output::Error::OverInput { out, relation, input } => Self::OverInput { out, relation, input },
+            atomic_output::Error::Format { file, reason } => Self::Format { file, reason },
+            other => Self::Format { file: PathBuf::new(), reason: other.to_string() },
+        }
+    }
+}
+
 impl Error {
     /// For `map_err` behind a system call on `file`.
     pub(crate) fn io(file: &Path, operation: &'static str) -> impl FnOnce(std::io::Error) -> Self {

@@ -1,6 +1,5 @@
 #![doc = include_str!("../README.md")]
 
-pub mod atomic;
 #[cfg(feature = "calibration")]
 pub mod calibration;
 mod error;
@@ -15,6 +14,8 @@ mod text;
 #[cfg(feature = "trajectory")]
 pub mod trajectory;
 
+// Files and folders appear whole or not at all.
+pub use atomic_output;
 #[cfg(any(feature = "survey", feature = "calibration"))]
 pub(crate) use error::InvalidField;
 pub use error::{Error, Result};

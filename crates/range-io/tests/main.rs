@@ -1,7 +1,6 @@
 //! All tests of the crate as one program: linked once, run side by side.
 #![allow(clippy::expect_used, clippy::float_cmp, clippy::panic, clippy::unwrap_used)]
 
-mod atomic;
 mod calibration;
 mod clouds;
 mod common;

@@ -285,7 +285,7 @@ fn arrays_that_do_not_fit_the_survey_are_refused_with_what_was_expected() {
     let survey = at_level(Level::Samples);
     let folder = tempfile::tempdir().unwrap();
     std::fs::create_dir(folder.path().join("frames")).unwrap();
-    let refusal = |write: &dyn Fn(&mut NpzWriter<range_io::atomic::FileWriter>)| {
+    let refusal = |write: &dyn Fn(&mut NpzWriter<range_io::atomic_output::FileWriter>)| {
         let mut writer = NpzWriter::create(folder.path().join("frames/000_0.npz")).unwrap();
         write(&mut writer);
         writer.commit().unwrap();

@@ -3,9 +3,15 @@
 #[cfg(feature = "adjust")]
 #[doc(inline)]
 pub use adjust;
+#[cfg(feature = "atomic-output")]
+#[doc(inline)]
+pub use atomic_output;
 #[cfg(feature = "camera-model")]
 #[doc(inline)]
 pub use camera_model;
+#[cfg(feature = "dense-matrices")]
+#[doc(inline)]
+pub use dense_matrices;
 #[cfg(feature = "error-models")]
 #[doc(inline)]
 pub use error_models;
@@ -15,6 +21,9 @@ pub use icp_registration;
 #[cfg(feature = "multipath")]
 #[doc(inline)]
 pub use multipath;
+#[cfg(feature = "observation-equations")]
+#[doc(inline)]
+pub use observation_equations;
 #[cfg(feature = "orientation")]
 #[doc(inline)]
 pub use orientation;
@@ -24,6 +33,9 @@ pub use phase_unwrap;
 #[cfg(feature = "pipeline")]
 #[doc(inline)]
 pub use pipeline;
+#[cfg(feature = "range-calibration")]
+#[doc(inline)]
+pub use range_calibration;
 #[cfg(feature = "range-image")]
 #[doc(inline)]
 pub use range_image;

@@ -3,9 +3,9 @@
 use crate::support::{INTERVAL, model, track, walls};
 use error_models::RangeErrorModel;
 use nalgebra::DMatrix;
+use range_calibration::{RangeCalibration, RangeTermOptions, Scale, estimate_range_terms};
 use range_image::ImageFormat;
 use residual_tests::{CorrectionSide, Error, ParameterSet, compare_corrections, compare_parameters};
-use self_calibration::{RangeCalibration, RangeTermOptions, Scale, estimate_range_terms};
 
 const LEVEL: f64 = 0.05;
 

@@ -10,6 +10,6 @@
 
 mod comparison;
 mod drift_comparison;
-#[path = "../../self-calibration/tests/support/mod.rs"]
+#[path = "../../range-calibration/tests/support/mod.rs"]
 mod support;
 mod trends;

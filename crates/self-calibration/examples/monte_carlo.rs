@@ -11,10 +11,9 @@
 #[path = "../tests/support/mod.rs"]
 mod support;
 
-use self_calibration::{CalibrationOptions, PlaneCalibration, SightingOptions, TermSelection};
+use self_calibration::{CalibrationOptions, SightingOptions, TermSelection};
 use support::cases::{calibrated, cases, errors};
 use support::networks::all_but_long_wave;
-use support::unknown_walls::{mean_over_surveys, with_planes_of_their_own, with_weighted_poses};
 
 fn main() {
     let runs: u64 = std::env::args().nth(1).and_then(|runs| runs.parse().ok()).unwrap_or(200);
@@ -40,11 +39,5 @@ fn main() {
         let each: Vec<String> =
             names.iter().zip(&squares).map(|(name, sum)| format!("{name} {:.2}", mean(*sum))).collect();
         println!("    {}", each.join("  "));
-    }
-    for (name, calibrate) in [
-        ("planes, weighted poses", with_weighted_poses as fn(u64) -> PlaneCalibration),
-        ("planes, no poses", with_planes_of_their_own),
-    ] {
-        println!("{name}: {:.3} per unknown over {runs} surveys", mean_over_surveys(runs, calibrate));
     }
 }

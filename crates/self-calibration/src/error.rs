@@ -16,120 +16,6 @@ pub enum Error {
         /// What would be right.
         expected: &'static str,
     },
-    /// A range difference that cannot be used.
-    #[error("range difference {index}: {name} = {value}, expected {expected}")]
-    BadDifference {
-        /// Position in the list.
-        index: usize,
-        /// Which of its numbers.
-        name: &'static str,
-        /// The number.
-        value: f64,
-        /// What would be right.
-        expected: &'static str,
-    },
-    /// There are no more range differences than unknowns, so that nothing checks them.
-    #[error("{differences} range differences for {unknowns} unknown parameters: too few")]
-    TooFewDifferences {
-        /// Number of differences.
-        differences: usize,
-        /// Number of unknowns.
-        unknowns: usize,
-    },
-    /// Every parameter is held.
-    #[error("every range term is held and no hyperbola is estimated: there is nothing to estimate")]
-    NothingToEstimate,
-    /// The distances and amplitudes observed cannot tell some parameters apart.
-    #[error(
-        "the observed ranges ({:.3} m to {:.3} m) cannot tell these parameters apart: {combination} (inflation {inflation:.0}); \
-         observe more distances, over a whole ambiguity interval, and more amplitudes if there is a hyperbola, \
-         or hold one of them", .range_span_m[0], .range_span_m[1]
-    )]
-    NotDetermined {
-        /// The combinations of parameters that are not, or hardly, determined, with their weights.
-        combination: String,
-        /// How many times larger the deviation of the worst combination is than if its parameters did not share
-        /// their effect; infinite where nothing determines it.
-        inflation: f64,
-        /// Smallest and largest range observed, metre.
-        range_span_m: [f64; 2],
-    },
-    /// The captures of planes cannot tell some parameters apart.
-    #[error(
-        "the captures of planes cannot tell these parameters apart: {combination} (inflation {inflation:.0}); \
-         give some planes together with poses, or a wider field of view and more distances, or hold one of them"
-    )]
-    PlanesNotDetermined {
-        /// The combinations of parameters that are not, or hardly, determined, with their weights.
-        combination: String,
-        /// How many times larger the deviation of the worst combination is than if its parameters did not share
-        /// their effect; infinite where nothing determines it.
-        inflation: f64,
-    },
-    /// A frame shows no plane: fewer than three usable pixels, or points on a line.
-    #[error("the usable pixels of `{station}` do not span a plane")]
-    NoPlane {
-        /// Name of the capture.
-        station: String,
-    },
-    /// A capture names a plane that is not in the list.
-    #[error("`{station}` shows plane {plane}, but there are {planes}")]
-    UnknownPlane {
-        /// Name of the capture.
-        station: String,
-        /// Position named.
-        plane: usize,
-        /// Number of planes.
-        planes: usize,
-    },
-    /// A hyperbola is to be estimated together with planes.
-    #[error(
-        "with unknown planes a hyperbola is held, not estimated: estimate it from the differences to adjusted planes"
-    )]
-    HyperbolaNotHeld,
-    /// Surfaces seen from several stations leave a term open.
-    #[error(
-        "the surfaces do not determine `{term}`: its effect on the ranges is known to {:.1} mm only, {:.1} mm are asked \
-         for (correlation {correlation:.2} with the {motion} of station {station}); take more stations that see corners \
-         and furniture from different distances, give a prior deviation, or hold it", 1e3 * .sigma_m, 1e3 * .limit_m
-    )]
-    SurfacesNotDetermined {
-        /// The term.
-        term: String,
-        /// Standard deviation of its effect on the ranges, metre.
-        sigma_m: f64,
-        /// Largest that is accepted, metre.
-        limit_m: f64,
-        /// Station whose pose it is most correlated with, counted from 0.
-        station: usize,
-        /// Position or attitude of that station.
-        motion: &'static str,
-        /// The correlation.
-        correlation: f64,
-    },
-    /// The stations still slide along their surfaces at the end of the adjustment.
-    #[error(
-        "the stations did not settle in {} rounds without and {} rounds with the terms: a direction is held by too few \
-         surfaces; give better approximate poses, or stations that see more furniture across it", .rounds[0], .rounds[1]
-    )]
-    SurfacesNotSettled {
-        /// Rounds with the known model, and with the terms as unknowns.
-        rounds: [usize; 2],
-    },
-    /// The stations could not be registered.
-    #[error("registration, {station}: {reason}")]
-    Registration {
-        /// Which station, or all.
-        station: String,
-        /// Why.
-        reason: multiview_registration::Error,
-    },
-    /// No hyperbola runs anywhere near the residuals.
-    #[error("no start values for h1, h2, h3: {reason}")]
-    NoHyperbola {
-        /// What is missing.
-        reason: &'static str,
-    },
     /// Two stations or two targets have one name.
     #[error("two {kind}s are called `{name}`")]
     DuplicateName {
@@ -230,12 +116,12 @@ pub enum Error {
     /// An image point that lies outside the image.
     #[error(transparent)]
     OutsideImage(#[from] Box<OutsideImage>),
-    /// Pixels that see a plane were not found.
-    #[error(transparent)]
-    Primitive(#[from] primitives::Error),
     /// Finding start values failed.
     #[error(transparent)]
     Orientation(#[from] orientation::Error),
+    /// Range terms, planes or start values of a hyperbola.
+    #[error(transparent)]
+    Ranges(#[from] range_calibration::Error),
     /// The adjustment failed.
     #[error(transparent)]
     Adjust(#[from] adjust::Error),
@@ -245,9 +131,6 @@ pub enum Error {
     /// The estimated model is not usable, or a parameter name is unknown.
     #[error(transparent)]
     Model(#[from] error_models::Error),
-    /// The frame is not valid.
-    #[error(transparent)]
-    Image(#[from] range_image::Error),
 }
 
 /// Result with this crate's [`enum@Error`].

@@ -1,23 +1,8 @@
 #![doc = include_str!("../README.md")]
 
-mod by_planes;
 mod error;
 mod networks;
-mod observed;
-mod ranges;
-mod surfaces;
 
 pub use adjust::{GlobalTest, GlobalVerdict, Scale};
-pub use by_planes::planes::{PlaneCalibrationOptions, PlaneCapture, calibrate_planes};
-pub use by_planes::planes_outcome::{AdjustedPlane, CaptureQuality, PlaneCalibration};
 pub use error::{Error, Result};
-pub use networks::network::*;
-pub use observed::calibration::RangeCalibration;
-pub use observed::options::{HyperbolaUse, RangeTermOptions, TermUse};
-pub use primitives::{DifferenceOptions, Plane, RangeDifference, differences_to_plane};
-pub use ranges::amplitude_or_position::{
-    AmplitudeOrPosition, AmplitudeOrPositionOptions, EffectTest, ErrorCause, amplitude_or_position,
-};
-pub use ranges::offset_table::{OffsetSample, OffsetTable, OffsetTableOptions, estimate_offset_table};
-pub use ranges::range_terms::estimate_range_terms;
-pub use surfaces::{SurfaceCalibration, SurfaceCalibrationOptions, SurfaceCapture, SurfaceTerm, calibrate_surfaces};
+pub use networks::*;

@@ -8,35 +8,20 @@
     missing_docs
 )]
 
-mod all_effects;
-mod all_effects_warm_up;
-mod amplitude_or_position;
 mod automatic_terms;
 mod bad_networks;
 mod contradictions;
 mod contradictions_by_method;
 mod control;
-#[path = "../../warm-up/tests/drift_captures.rs"]
-mod drift_captures;
-mod further_terms;
 mod global_tests;
 mod gross_errors;
 mod hyperbola_of_a_network;
 mod independent_adjustment;
 mod methods;
 mod network_terms;
-mod offset_table;
 mod one_step;
 mod plan;
-mod planes;
-mod range_terms;
-mod real_floor;
-mod real_hyperbola;
-#[path = "support/round.rs"]
-mod round;
 mod support;
-mod surfaces;
 mod term_scores;
-mod unknown_planes;
 mod weak_networks;
 mod whole_intervals;

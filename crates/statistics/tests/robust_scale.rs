@@ -18,7 +18,9 @@ fn quantiles_of_the_normal_distribution_have_scale_one() {
         (0..1001).map(|k| Distribution::Normal.quantile((f64::from(k) + 0.5) / 1001.0)).collect();
     // The median of a thousand values is known to two thousandths.
     assert_relative_eq!(robust_standard_deviation(&values), 1.0, epsilon = 2e-3);
-    values.iter_mut().for_each(|value| *value = value.abs());
+    for value in &mut values {
+        *value = value.abs();
+    }
     assert_relative_eq!(mad_scale(&mut values), 1.0, epsilon = 2e-3);
     assert!(mad_scale(&mut []).is_nan() && robust_standard_deviation(&[]).is_nan());
 }

@@ -7,13 +7,12 @@ use std::sync::OnceLock;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-use crate::arrays::product::{Left, Right, add_product, with_wide_registers};
 use crate::equations::block_normal::BATCH;
 use crate::equations::elimination::EliminatedFactor;
 use crate::equations::structure::{Eliminated, Role, Slot};
 use crate::linearised::layout::Layout;
 use crate::linearised::linearisation::take;
-use crate::{arrays::dense, arrays::panel};
+use dense_matrices::{Left, Right, add_product, with_wide_registers};
 
 /// With `V = L Lᵀ`, `H = L⁻¹ Wᵀ` and the reduced inverse `Q_cc`:
 ///
@@ -177,7 +176,7 @@ impl EliminatedCofactor {
     fn all_products(&self, blocks: &[Eliminated], out: &mut [f64]) {
         let (structure, q) = (&self.factor.structure, self.reduced());
         let columns = structure.columns(blocks, &self.factor.half[blocks[0].coupling..]);
-        let products = dense::product(q, structure.order, &columns);
+        let products = dense_matrices::product(q, structure.order, &columns);
         let mut products = products.chunks_exact(structure.order);
         for block in blocks {
             for (row, product) in products.by_ref().take(block.width).enumerate() {
@@ -241,7 +240,7 @@ impl EliminatedCofactor {
     fn multiply_in_reduced_datum(&self, x: &[f64]) -> Vec<f64> {
         let (n, order, q) = (self.factor.scale.len(), self.factor.structure.order, self.reduced());
         let count = x.len() / n.max(1);
-        let mut panel = panel::transposed(x, n);
+        let mut panel = dense_matrices::transposed(x, n);
         let mut reduced = self.factor.structure.gather(&panel, count);
         self.factor.forward(&mut panel, &mut reduced, count);
         let mut product = vec![0.0; order * count];
@@ -251,7 +250,7 @@ impl EliminatedCofactor {
             add_product(&mut product, count, left, right, order, 1.0);
         });
         self.factor.backward(&mut panel, &product, count);
-        panel::transposed(&panel, count)
+        dense_matrices::transposed(&panel, count)
     }
 
     fn datum(&self) -> Option<&Transformation> {

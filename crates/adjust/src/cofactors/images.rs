@@ -5,13 +5,13 @@
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-use crate::arrays::product::{Left, Right, add_product, with_wide_registers};
 use crate::cofactors::cofactor::Cofactor;
 use crate::cofactors::eliminated_cofactor::EliminatedCofactor;
 use crate::equations::block_normal::BATCH;
 use crate::equations::structure::{Eliminated, Role};
 use crate::linearised::layout::{Layout, Place};
 use crate::linearised::linearisation::Linearisation;
+use dense_matrices::{Left, Right, add_product, with_wide_registers};
 
 /// Observations in one piece of work.
 const PIECE: usize = 256;

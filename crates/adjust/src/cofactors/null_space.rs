@@ -2,11 +2,11 @@
 
 use nalgebra::DMatrix;
 
+use crate::Result;
 use crate::cofactors::rank::{HOPELESS, Problem};
 use crate::equations::block_normal::BlockNormal;
 use crate::equations::elimination::EliminatedFactor;
 use crate::equations::normal::{Singular, unit_scale};
-use crate::{Result, arrays::dense};
 
 /// Damping of the inverse iteration: an undetermined direction grows by its reciprocal in each round, one that is known a
 /// million times worse than the best by a millionth of that.
@@ -66,7 +66,7 @@ fn subspace(
         space = space.qr().q();
     }
     let images = images(problem, scale, &space);
-    let (values, vectors) = dense::symmetric_eigen((images.transpose() * images).as_slice(), count)?;
+    let (values, vectors) = dense_matrices::symmetric_eigen((images.transpose() * images).as_slice(), count)?;
     let turned = space * DMatrix::from_vec(count, count, vectors);
     Ok(values.into_iter().zip(turned.column_iter().map(|column| column.iter().copied().collect())).collect())
 }

@@ -5,7 +5,7 @@ use crate::equations::orthogonal::OrthogonalFactor;
 use crate::equations::system::{System, SystemFactor};
 use crate::linearised::layout::Layout;
 use crate::linearised::linearisation::Linearisation;
-use crate::{Combination, Error, Result, arrays::dense, cofactors::null_space};
+use crate::{Combination, Error, Result, cofactors::null_space};
 
 /// Condition of the normal equations (unit diagonal) up to which they are trusted: at least six digits are left to the
 /// covariance. Beyond, the Jacobian is factorised itself, where it fits.
@@ -114,7 +114,7 @@ impl Problem<'_> {
         let n = scale.len();
         let mut matrix = normal.matrix.clone();
         crate::equations::normal::equilibrate(&mut matrix, &scale, &self.constraints.scaled(&scale));
-        let (values, vectors) = dense::symmetric_eigen(&matrix, n)?;
+        let (values, vectors) = dense_matrices::symmetric_eigen(&matrix, n)?;
         let limit = values.last().copied().unwrap_or(0.0) / HOPELESS;
         // The smallest one is named in any case: the decision against the matrix has fallen already.
         let count = values.iter().filter(|&&value| value <= limit).count().max(1);

@@ -50,16 +50,16 @@ impl Descent {
     /// Values of a block, ambient.
     pub fn values(&self, block: BlockId) -> Result<&[f64]> {
         let count = self.layout.blocks();
-        if block.0 >= count {
-            return Err(Error::UnknownId { what: "block", index: block.0, count });
+        if block.index() >= count {
+            return Err(Error::UnknownId { what: "block", index: block.index(), count });
         }
-        Ok(&self.values[self.layout.block_values(block.0)])
+        Ok(&self.values[self.layout.block_values(block.index())])
     }
 
     /// Pose of a [`RigidPose`] block.
     pub fn pose(&self, block: BlockId) -> Result<Isometry3<f64>> {
         let values = self.values(block)?;
-        let what = format!("block {}, taken as a pose,", block.0);
+        let what = format!("block {}, taken as a pose,", block.index());
         RigidPose::isometry(values).map_err(|_| Error::Length { what, expected: 7, found: values.len() })
     }
 

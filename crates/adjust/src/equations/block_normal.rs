@@ -7,10 +7,10 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use crate::arrays::product::{Left, Right, add_product, with_wide_registers};
 use crate::equations::structure::{Eliminated, Reduced, Role, Structure};
 use crate::linearised::layout::{Layout, Place};
 use crate::linearised::linearisation::{Linearisation, Run, take};
+use dense_matrices::{Left, Right, add_product, with_wide_registers};
 
 /// Fewest observations, and most pieces, into which the sum over observations is divided.
 const PIECE: usize = 4096;

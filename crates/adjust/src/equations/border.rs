@@ -2,7 +2,6 @@
 
 use nalgebra::{DMatrix, DVector, Dyn, LU};
 
-use crate::arrays::panel;
 use crate::equations::constraints::Constraints;
 use crate::equations::elimination::EliminatedFactor;
 use crate::equations::normal::Singular;
@@ -72,8 +71,8 @@ impl Border {
         }
         let count = user + inner;
         let mut panel = vec![0.0; count * n];
-        factor.backward(&mut panel, &panel::transposed(&reduced, order), count);
-        let whole = panel::transposed(&panel, count);
+        factor.backward(&mut panel, &dense_matrices::transposed(&reduced, order), count);
+        let whole = dense_matrices::transposed(&panel, count);
         columns[..user * n].copy_from_slice(&whole[..user * n]);
         columns[(user + inner) * n..].copy_from_slice(&whole[user * n..]);
         columns

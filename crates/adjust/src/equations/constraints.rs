@@ -2,7 +2,7 @@ use crate::equations::datum::{inner_constraints, point_motions};
 use crate::equations::structure::Structure;
 use crate::linearised::layout::Layout;
 use crate::linearised::linearisation::Linearisation;
-use crate::{Adjustment, Result, arrays::dense};
+use crate::{Adjustment, Result};
 
 /// Linearised constraints `B dx = d` over all unknowns: those of the user first, inner constraints last.
 #[derive(Debug, Clone, Default)]
@@ -107,11 +107,11 @@ impl Constraints {
         }
         let project = |index: usize| row(index).iter().zip(scale).zip(force).map(|((b, s), f)| b * s * f).sum();
         let mut out: Vec<f64> = (0..k).map(project).collect();
-        if !dense::cholesky(&mut gram, k) {
+        if !dense_matrices::cholesky(&mut gram, k) {
             // Dependent constraints: the factorisation says so with their names.
             return Vec::new();
         }
-        dense::solve_cholesky(&gram, k, &mut out, 1);
+        dense_matrices::solve_cholesky(&gram, k, &mut out, 1);
         out.iter_mut().zip(&scaled.lengths).for_each(|(multiplier, length)| *multiplier /= length);
         out.truncate(self.first_inner);
         out

@@ -46,10 +46,10 @@ pub(crate) fn point_motions(
     let coordinates = |block: usize| Vector3::from_column_slice(&values[layout.block_values(block)]);
     let count = datum.defect.count();
     let middle =
-        datum.points.iter().map(|id| coordinates(id.0)).sum::<Vector3<f64>>() / datum.points.len().max(1) as f64;
+        datum.points.iter().map(|id| coordinates(id.index())).sum::<Vector3<f64>>() / datum.points.len().max(1) as f64;
     let mut rows = vec![0.0; count * layout.unknowns];
     let others = structure.eliminated.iter().map(|eliminated| eliminated.block);
-    for block in others.chain(datum.points.iter().map(|id| id.0)) {
+    for block in others.chain(datum.points.iter().map(|id| id.index())) {
         let (free, ambient) = (layout.free(block), adjustment.blocks[block].manifold.ambient_dimension());
         if free.len() == 3 && ambient == 3 {
             let arm = coordinates(block) - middle;
@@ -76,15 +76,15 @@ type DatumPoint = (Vector3<f64>, [usize; 3]);
 
 fn points(datum: &Datum, adjustment: &Adjustment<'_>, layout: &Layout, values: &[f64]) -> Result<Vec<DatumPoint>> {
     let point = |id: &crate::BlockId| {
-        let columns = layout.block_columns(id.0);
+        let columns = layout.block_columns(id.index());
         let &[x, y, z] = columns else {
             return Err(Error::Datum { reason: "a point is not a block of three coordinates".to_owned() });
         };
         if columns.contains(&HELD) {
-            let label = adjustment.blocks[id.0].label(id.0);
+            let label = adjustment.blocks[id.index()].label(id.index());
             return Err(Error::Datum { reason: format!("`{label}` carries the datum and is held as well") });
         }
-        let range = layout.block_values(id.0);
+        let range = layout.block_values(id.index());
         Ok((Vector3::from_column_slice(&values[range]), [x, y, z]))
     };
     datum.points.iter().map(point).collect()

@@ -6,14 +6,14 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use crate::arrays::product::{Left, Right, add_product, with_wide_registers};
 use crate::equations::block_normal::{BATCH, BlockNormal};
 use crate::equations::border::Border;
 use crate::equations::constraints::Constraints;
 use crate::equations::normal::{NormalFactor, Singular, damping_of, unit_scale};
 use crate::equations::structure::{Eliminated, Reduced, Role, Structure};
 use crate::linearised::linearisation::take;
-use crate::{Result, arrays::dense, arrays::panel, equations::reduced_constraints};
+use crate::{Result, equations::reduced_constraints};
+use dense_matrices::{Left, Right, add_product, with_wide_registers};
 
 /// Columns of the reduced matrix in one piece of work.
 const PANEL: usize = 96;
@@ -81,10 +81,10 @@ impl EliminatedFactor {
             return;
         }
         let count = right.len() / n;
-        let mut panel = panel::transposed(right, n);
+        let mut panel = dense_matrices::transposed(right, n);
         let mut reduced = self.structure.gather(&panel, count);
         self.forward(&mut panel, &mut reduced, count);
-        let mut columns = panel::transposed(&reduced, count);
+        let mut columns = dense_matrices::transposed(&reduced, count);
         let scale = &self.reduced.scale;
         let rescale = |values: &mut [f64]| {
             for column in values.chunks_exact_mut(order.max(1)) {
@@ -94,8 +94,8 @@ impl EliminatedFactor {
         rescale(&mut columns);
         self.reduced.solve_scaled(&mut columns);
         rescale(&mut columns);
-        self.backward(&mut panel, &panel::transposed(&columns, order), count);
-        right.copy_from_slice(&panel::transposed(&panel, count));
+        self.backward(&mut panel, &dense_matrices::transposed(&columns, order), count);
+        right.copy_from_slice(&dense_matrices::transposed(&panel, count));
     }
 
     /// Replaces the eliminated part of `count` vectors by `L⁻¹ b` and takes its share off the reduced part. The vectors
@@ -290,7 +290,7 @@ fn reduce(normal: &BlockNormal, half: &[f64], extra: &[f64]) -> Vec<f64> {
         for blocks in structure.eliminated.chunks(BATCH) {
             let columns = structure.columns(blocks, &half[blocks[0].coupling..]);
             let panels = out.par_chunks_mut(PANEL * order).enumerate();
-            panels.for_each(|(panel, out)| dense::subtract_square(out, order, panel * PANEL, &columns));
+            panels.for_each(|(panel, out)| dense_matrices::subtract_square(out, order, panel * PANEL, &columns));
         }
         return out;
     }

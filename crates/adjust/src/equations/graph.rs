@@ -25,7 +25,7 @@ impl Graph {
         let observations = Lists::new(layout.blocks(), pairs);
         let mut constrained = vec![false; layout.blocks()];
         for block in adjustment.constraints.iter().flat_map(|constraint| constraint.blocks()) {
-            constrained[block.0] = true;
+            constrained[block.index()] = true;
         }
         let none = vec![0; layout.blocks()];
         let mut graph = Self { observations, degree: none.clone(), burden: none, constrained };

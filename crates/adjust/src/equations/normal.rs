@@ -1,7 +1,7 @@
 use crate::equations::constraints::{Constraints, ScaledConstraints};
 use crate::linearised::layout::{Layout, Place};
 use crate::linearised::linearisation::Linearisation;
-use crate::{Error, Result, arrays::dense};
+use crate::{Error, Result};
 
 /// Normal equations `N dx = g`, `N = AᵀPA`, `g = AᵀPv`.
 #[derive(Debug, Clone)]
@@ -111,11 +111,11 @@ impl NormalFactor {
         let n = scale.len();
         let constraints = constraints.scaled(&scale);
         equilibrate(&mut factor, &scale, &constraints);
-        if !dense::cholesky(&mut factor, n) {
+        if !dense_matrices::cholesky(&mut factor, n) {
             return Err(Singular::Normal);
         }
         let mut influence = constraints.rows.clone();
-        dense::solve_cholesky(&factor, n, &mut influence, constraints.count);
+        dense_matrices::solve_cholesky(&factor, n, &mut influence, constraints.count);
         let complement = complement(&constraints, &influence, n);
         let complement_factor = factor_complement(&complement, &constraints).map_err(Singular::Constraints)?;
         Ok(Self { scale, factor, constraints, influence, complement, complement_factor })
@@ -128,10 +128,10 @@ impl NormalFactor {
         for (row, d) in self.constraint_rows().zip(&self.constraints.right) {
             step.iter_mut().zip(row).for_each(|(y, b)| *y += b * d * share);
         }
-        dense::solve_cholesky(&self.factor, n, &mut step, 1);
+        dense_matrices::solve_cholesky(&self.factor, n, &mut step, 1);
         let miss = |(row, d): (&[f64], &f64)| row.iter().zip(&step).map(|(b, y)| b * y).sum::<f64>() - d * share;
         let mut multipliers: Vec<f64> = self.constraint_rows().zip(&self.constraints.right).map(miss).collect();
-        dense::solve_cholesky(&self.complement_factor, k, &mut multipliers, 1);
+        dense_matrices::solve_cholesky(&self.complement_factor, k, &mut multipliers, 1);
         for (column, multiplier) in self.influence.chunks_exact(n.max(1)).zip(&multipliers) {
             step.iter_mut().zip(column).for_each(|(y, f)| *y -= f * multiplier);
         }
@@ -142,7 +142,7 @@ impl NormalFactor {
     /// Solves with the equilibrated matrix alone, in scaled unknowns.
     pub(crate) fn solve_scaled(&self, right: &mut [f64]) {
         let n = self.scale.len();
-        dense::solve_cholesky(&self.factor, n, right, right.len() / n.max(1));
+        dense_matrices::solve_cholesky(&self.factor, n, right, right.len() / n.max(1));
     }
 
     /// 1-norm of the equilibrated matrix.
@@ -150,7 +150,7 @@ impl NormalFactor {
         let n = self.scale.len();
         let mut matrix = normal.matrix.clone();
         equilibrate(&mut matrix, &self.scale, &self.constraints);
-        dense::mirror_lower(&mut matrix, n);
+        dense_matrices::mirror_lower(&mut matrix, n);
         let sums = matrix.chunks_exact(n.max(1)).map(|column| column.iter().map(|v| v.abs()).sum::<f64>());
         sums.fold(0.0, f64::max)
     }
@@ -162,7 +162,7 @@ impl NormalFactor {
     /// Cofactor matrix of the scaled unknowns, `N'⁻¹ − N'⁻¹Bᵀ K⁻¹ B N'⁻¹`, and the trace of `N'⁻¹`.
     pub(crate) fn cofactor(&self) -> (Vec<f64>, f64) {
         let (n, k) = (self.scale.len(), self.constraints.count);
-        let mut cofactor = dense::inverse_of_cholesky(&self.factor, n);
+        let mut cofactor = dense_matrices::inverse_of_cholesky(&self.factor, n);
         let trace = (0..n).map(|i| cofactor[i * n + i]).sum();
         // With K = M Mᵀ and F = N'⁻¹Bᵀ the correction is (F M⁻ᵀ)(F M⁻ᵀ)ᵀ.
         let mut reduced = self.influence.clone();
@@ -195,7 +195,7 @@ impl NormalFactor {
                 block[column * held + row] = self.complement[(column + first) * k + row + first];
             }
         }
-        let (values, _) = dense::symmetric_eigen(&block, held)?;
+        let (values, _) = dense_matrices::symmetric_eigen(&block, held)?;
         // A real observation takes a visible share (1e-4 even for one weak distance among thousands of directions);
         // rounding in a network of condition 1e6 leaves 1e-9.
         let determined = values.iter().filter(|&&value| 1.0 - value > 1e-7).count();

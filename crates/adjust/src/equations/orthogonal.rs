@@ -1,7 +1,7 @@
 use crate::equations::constraints::{Constraints, ScaledConstraints};
 use crate::linearised::layout::Layout;
 use crate::linearised::linearisation::Linearisation;
-use crate::{Error, Result, arrays::dense};
+use crate::{Error, Result};
 
 /// Orthogonal factorisation of the whitened Jacobian with unit columns in the null space of the constraints: loses half
 /// as many digits as the normal equations. For problems that are small or badly conditioned.
@@ -59,7 +59,7 @@ impl OrthogonalFactor {
                 matrix[free * height + target] = weight * linearisation.whitened[target] - known;
             }
         }
-        let upper = dense::upper_factor(&mut matrix, height, free + 1);
+        let upper = dense_matrices::upper_factor(&mut matrix, height, free + 1);
         Ok(Self { scale, reflectors, fixed, upper, free })
     }
 
@@ -71,7 +71,7 @@ impl OrthogonalFactor {
 
     /// Whether no singular value lies below `tolerance` times the largest.
     pub(crate) fn is_determined(&self, tolerance: f64) -> Result<bool> {
-        if let Some(inverse) = dense::inverse_of_triangular(&self.triangle(), self.free) {
+        if let Some(inverse) = dense_matrices::inverse_of_triangular(&self.triangle(), self.free) {
             let trace: f64 = (0..self.free).map(|i| inverse[i * self.free + i]).sum();
             // √(n·trace) bounds the condition from above; a tenth of the limit leaves the bound's own slack.
             if (self.free as f64 * trace).sqrt() * tolerance < 0.1 {
@@ -85,14 +85,14 @@ impl OrthogonalFactor {
     pub(crate) fn solve(&self) -> Vec<f64> {
         let wide = self.free + 1;
         let mut right = self.upper[self.free * wide..self.free * wide + self.free].to_vec();
-        dense::solve_upper(&self.triangle(), self.free, &mut right);
+        dense_matrices::solve_upper(&self.triangle(), self.free, &mut right);
         self.expand(&self.fixed, &right)
     }
 
     /// Cofactor matrix of the scaled unknowns, and the trace of the free part; `None` where R is singular.
     pub(crate) fn cofactor(&self) -> Option<(Vec<f64>, f64)> {
         let (n, k) = (self.scale.len(), self.fixed.len());
-        let inner = dense::inverse_of_triangular(&self.triangle(), self.free)?;
+        let inner = dense_matrices::inverse_of_triangular(&self.triangle(), self.free)?;
         let trace = (0..self.free).map(|i| inner[i * self.free + i]).sum();
         let mut out = vec![0.0; n * n];
         for column in 0..self.free {
@@ -110,7 +110,7 @@ impl OrthogonalFactor {
 
     /// Directions (scaled unknowns) whose singular value is below `tolerance` times the largest.
     pub(crate) fn null_space(&self, tolerance: f64) -> Result<Vec<Vec<f64>>> {
-        let (values, vectors) = dense::singular_values(&self.triangle(), self.free)?;
+        let (values, vectors) = dense_matrices::singular_values(&self.triangle(), self.free)?;
         let limit = tolerance * values.first().copied().unwrap_or(0.0);
         let small = values.iter().zip(vectors.chunks_exact(self.free.max(1))).filter(|&(&value, _)| value <= limit);
         let zero = vec![0.0; self.fixed.len()];

@@ -1,10 +1,9 @@
 //! Constraints on the reduced unknowns: those of the user, and the motions that the datum takes away.
 
-use crate::arrays::product::{Left, Right, add_product, with_wide_registers};
 use crate::equations::block_normal::BlockNormal;
 use crate::equations::constraints::Constraints;
 use crate::equations::structure::Reduced;
-use crate::{arrays::dense, arrays::panel};
+use dense_matrices::{Left, Right, add_product, with_wide_registers};
 
 /// The user's constraints touch no eliminated block. In place of the inner constraints, which live on points, stand the
 /// motions of the reduced unknowns that match those of the points: they make S regular as `G Gᵀ` does with N.
@@ -14,8 +13,8 @@ pub(crate) fn new(normal: &BlockNormal, constraints: &Constraints, scale: &[f64]
     let mut rows: Vec<f64> =
         constraints.rows.chunks_exact(n.max(1)).take(user).flat_map(|row| structure.gather(row, 1)).collect();
     let count = constraints.motions.len() / n.max(1);
-    let motions = matching_motions(normal, &panel::transposed(&constraints.motions, n), count);
-    for motion in panel::transposed(&motions, count).chunks_exact(structure.order.max(1)) {
+    let motions = matching_motions(normal, &dense_matrices::transposed(&constraints.motions, n), count);
+    for motion in dense_matrices::transposed(&motions, count).chunks_exact(structure.order.max(1)) {
         // A motion h of unknowns in units of `scale` is h / scale; rows are multiplied by the scale again.
         rows.extend(motion.iter().zip(scale).map(|(h, s)| h / (s * s)));
     }
@@ -73,9 +72,9 @@ fn solve_block(normal: &BlockNormal, block: &Reduced, force: &[f64], count: usiz
     let (own, order) = (block.reduced_columns(), normal.structure.order);
     let mut factor: Vec<f64> =
         own.clone().flat_map(|column| &normal.reduced[column * order..][own.clone()]).copied().collect();
-    let mut columns = panel::transposed(force, count);
-    dense::cholesky(&mut factor, block.width).then(|| {
-        dense::solve_cholesky(&factor, block.width, &mut columns, count);
-        panel::transposed(&columns, block.width)
+    let mut columns = dense_matrices::transposed(force, count);
+    dense_matrices::cholesky(&mut factor, block.width).then(|| {
+        dense_matrices::solve_cholesky(&factor, block.width, &mut columns, count);
+        dense_matrices::transposed(&columns, block.width)
     })
 }

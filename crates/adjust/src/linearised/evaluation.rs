@@ -1,8 +1,8 @@
 //! Evaluation of single observations into flat memory.
 
 use crate::linearised::layout::{HELD, Layout, Place};
-use crate::parameters::differentiation::dual::TapeMemory;
 use crate::{Error, Jacobians, Observation};
+use observation_equations::TapeMemory;
 
 /// Whether derivatives are wanted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -93,14 +93,14 @@ impl<'v> Scratch<'v> {
         };
         data.fill(0.0);
         let (width, dimension, tape) = (place.full, place.dimension, &mut self.tape);
-        let mut jacobians = Jacobians { data, named, width, dimension, misused: false, tape };
+        let mut jacobians = Jacobians::new(data, named, [dimension, width], tape);
         let done = observation.evaluate(&self.parameters, residual, Some(&mut jacobians));
         done.map_err(|failure| Failure::model(failure.to_string()))?;
-        if jacobians.misused {
+        let Some(data) = jacobians.written() else {
             return Err(Failure::model("a Jacobian of the wrong shape was written".to_owned()));
-        }
+        };
         Failure::check(residual, 1, "the residual")?;
-        Failure::check(jacobians.data, place.full.max(1), "a derivative")?;
+        Failure::check(data, place.full.max(1), "a derivative")?;
         if !place.direct {
             self.compress(place, compact);
         }

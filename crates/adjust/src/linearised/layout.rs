@@ -1,7 +1,7 @@
 use std::ops::Range;
 
-use crate::model::observation::Named;
 use crate::{Adjustment, Error, Observation, Result};
+use observation_equations::Named;
 
 /// Column of a held parameter.
 pub(crate) const HELD: usize = usize::MAX;
@@ -145,14 +145,14 @@ impl Layout {
         let (first_named, first_part) = (self.named.len(), self.parts.len());
         let (mut full, mut direct) = (0, true);
         for block in observation.blocks() {
-            let tangent = self.tangent[block.0 + 1] - self.tangent[block.0];
-            let free = self.free(block.0);
+            let tangent = self.tangent[block.index() + 1] - self.tangent[block.index()];
+            let free = self.free(block.index());
             direct &= free.len() == tangent;
-            self.named.push(Named { block: block.0 as u32, start: full as u32, width: tangent as u32 });
+            self.named.push(Named { block: block.index() as u32, start: full as u32, width: tangent as u32 });
             full += tangent;
             if !free.is_empty() {
                 let (column, width) = (free.start as u32, free.len() as u32);
-                self.parts.push(Part { block: block.0 as u32, column, width, offset: 0 });
+                self.parts.push(Part { block: block.index() as u32, column, width, offset: 0 });
             }
         }
         self.parts[first_part..].sort_by_key(|part| part.column);

@@ -2,10 +2,10 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use crate::model::exclusion::Exclusion;
-use crate::model::prior::PriorObservation;
 use crate::{
     BlockId, Covariance, DatumDefect, Error, GroupId, Kernel, Observation, ObservationId, ParameterBlock, Result,
 };
+use observation_equations::PriorObservation;
 
 /// A Gauss-Markov model being put together: blocks, observations, constraints and datum.
 ///
@@ -57,6 +57,13 @@ impl std::fmt::Debug for Adjustment<'_> {
     }
 }
 
+/// The blocks in the order of adding, with their approximate values.
+impl AsRef<[ParameterBlock]> for Adjustment<'_> {
+    fn as_ref(&self) -> &[ParameterBlock] {
+        &self.blocks
+    }
+}
+
 impl<'a> Adjustment<'a> {
     /// An empty model.
     pub fn new() -> Self {
@@ -66,7 +73,7 @@ impl<'a> Adjustment<'a> {
     /// Adds unknown parameters with their approximate values. What is wrong with the values is said by the solution.
     pub fn add_block(&mut self, block: ParameterBlock) -> BlockId {
         self.blocks.push(block);
-        BlockId(self.blocks.len() - 1)
+        BlockId::new(self.blocks.len() - 1)
     }
 
     /// Holds all parameters of a block at their values: they are no unknowns.
@@ -97,7 +104,7 @@ impl<'a> Adjustment<'a> {
 
     /// Replaces the approximate values of a block, for another start.
     pub fn set_values(&mut self, block: BlockId, values: &[f64]) -> Result<()> {
-        self.block(block)?.check(block.0, values)?;
+        self.block(block)?.check(block.index(), values)?;
         values.clone_into(&mut self.block_mut(block)?.values);
         Ok(())
     }
@@ -143,10 +150,10 @@ impl<'a> Adjustment<'a> {
     /// at `values`). Priors are observations of the group `prior`.
     pub fn add_prior(&mut self, block: BlockId, values: &[f64], covariance: &Covariance) -> Result<ObservationId> {
         let target = self.block(block)?;
-        target.check(block.0, values)?;
+        target.check(block.index(), values)?;
         let manifold = Arc::clone(&target.manifold);
         let group = self.prior_group();
-        self.add_observation(group, PriorObservation { block: [block], manifold, prior: values.to_vec() }, covariance)
+        self.add_observation(group, PriorObservation::new(block, manifold, values.to_vec()), covariance)
     }
 
     /// The group that priors belong to, made when it is first needed.
@@ -184,7 +191,7 @@ impl<'a> Adjustment<'a> {
         for &point in points {
             let block = self.block(point)?;
             if block.tangent_dimension() != 3 || block.manifold.ambient_dimension() != 3 {
-                let reason = format!("`{}` is not a block of three coordinates", block.label(point.0));
+                let reason = format!("`{}` is not a block of three coordinates", block.label(point.index()));
                 return Err(Error::Datum { reason });
             }
         }
@@ -202,12 +209,12 @@ impl<'a> Adjustment<'a> {
 
     pub(crate) fn block(&self, block: BlockId) -> Result<&ParameterBlock> {
         let count = self.blocks.len();
-        self.blocks.get(block.0).ok_or(Error::UnknownId { what: "block", index: block.0, count })
+        self.blocks.get(block.index()).ok_or(Error::UnknownId { what: "block", index: block.index(), count })
     }
 
     fn block_mut(&mut self, block: BlockId) -> Result<&mut ParameterBlock> {
         let count = self.blocks.len();
-        self.blocks.get_mut(block.0).ok_or(Error::UnknownId { what: "block", index: block.0, count })
+        self.blocks.get_mut(block.index()).ok_or(Error::UnknownId { what: "block", index: block.index(), count })
     }
 
     fn check_observation(&self, observation: &dyn Observation, group: &str) -> Result<()> {

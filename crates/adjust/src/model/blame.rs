@@ -42,21 +42,21 @@ impl Adjustment<'_> {
 
     /// Whether the Jacobian is wrong at the approximate values and beside them: at a kink differences mean nothing.
     fn wrong(&self, observation: &dyn Observation, error: &Error) -> Option<Error> {
-        let blocks = |ids: &[BlockId]| ids.iter().map(|id| self.blocks[id.0].clone()).collect::<Vec<_>>();
+        let blocks = |ids: &[BlockId]| ids.iter().map(|id| self.blocks[id.index()].clone()).collect::<Vec<_>>();
         let mut blocks = blocks(observation.blocks());
         let check = check_jacobian(observation, &blocks).ok().filter(|check| check.worst > WRONG)?;
         blocks.iter_mut().for_each(move_a_little);
         check_jacobian(observation, &blocks).ok().filter(|check| check.worst > WRONG)?;
         let (component, place, parameter) = check.place;
         let id = observation.blocks()[place];
-        let block = &self.blocks[id.0];
+        let block = &self.blocks[id.index()];
         // Nobody needs the derivatives with respect to what is held.
         let is_free = !block.held[parameter];
         is_free.then(|| Error::Jacobian {
             group: "constraint".to_owned(),
             observation: 0,
             component,
-            parameter: block.parameter_name(id.0, parameter),
+            parameter: block.parameter_name(id.index(), parameter),
             given: check.analytic,
             differences: check.numeric,
             consequence: Box::new(error.clone()),

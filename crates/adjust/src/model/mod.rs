@@ -2,11 +2,6 @@
 
 pub(crate) mod adjustment;
 pub(crate) mod blame;
-pub(crate) mod check;
-pub(crate) mod covariance;
 pub(crate) mod datum_defect;
-pub(crate) mod differentiated;
 pub(crate) mod exclusion;
-pub(crate) mod kernel;
-pub(crate) mod observation;
-pub(crate) mod prior;
+pub(crate) mod ids;

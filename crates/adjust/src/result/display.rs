@@ -3,8 +3,8 @@
 use std::any::Any;
 use std::fmt;
 
-use crate::parameters::manifold::Euclidean;
 use crate::{BlockId, Manifold, RigidPose, Scale, Solution};
+use observation_equations::Euclidean;
 
 /// Parameters listed; of larger adjustments the first ones.
 const LISTED: usize = 60;
@@ -23,9 +23,9 @@ impl fmt::Display for Solution {
                 left_out += count;
                 continue;
             }
-            let ambient = self.values(BlockId(index)).unwrap_or_default();
+            let ambient = self.values(BlockId::new(index)).unwrap_or_default();
             let values = shown(&*block.manifold, ambient);
-            let sigmas = self.standard_deviations(BlockId(index), Scale::Prior).unwrap_or_default();
+            let sigmas = self.standard_deviations(BlockId::new(index), Scale::Prior).unwrap_or_default();
             for (component, sigma) in sigmas.into_iter().enumerate() {
                 let is_held = block.held[component];
                 let [value, sigma] = digits(values.get(component).copied(), if is_held { f64::NAN } else { sigma });

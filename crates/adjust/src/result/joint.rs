@@ -28,7 +28,7 @@ impl Solution {
         let mut sorted = blocks.to_vec();
         sorted.sort_unstable();
         if let Some(pair) = sorted.windows(2).find(|pair| pair[0] == pair[1]) {
-            return Err(Error::Untestable { what: format!("block {}", pair[0].0), reason: "it is named twice" });
+            return Err(Error::Untestable { what: format!("block {}", pair[0].index()), reason: "it is named twice" });
         }
         let mut offsets = vec![0];
         for (index, &block) in blocks.iter().enumerate() {

@@ -136,7 +136,7 @@ impl Adjustment<'_> {
     /// Takes the adjusted values of a solution as approximate values, for a solution nearby.
     pub fn start_from(&mut self, solution: &Solution) -> Result<()> {
         for index in 0..self.blocks.len() {
-            let block = BlockId(index);
+            let block = BlockId::new(index);
             self.set_values(block, solution.values(block)?)?;
         }
         Ok(())
@@ -147,13 +147,13 @@ impl Solution {
     /// Adjusted (or held) values of a block, ambient.
     pub fn values(&self, block: BlockId) -> Result<&[f64]> {
         self.check_block(block)?;
-        Ok(&self.values[self.layout.block_values(block.0)])
+        Ok(&self.values[self.layout.block_values(block.index())])
     }
 
     /// Adjusted pose of a [`RigidPose`] block.
     pub fn pose(&self, block: BlockId) -> Result<Isometry3<f64>> {
         let values = self.values(block)?;
-        let what = format!("block `{}`, taken as a pose,", self.blocks[block.0].label(block.0));
+        let what = format!("block `{}`, taken as a pose,", self.blocks[block.index()].label(block.index()));
         RigidPose::isometry(values).map_err(|_| Error::Length { what, expected: 7, found: values.len() })
     }
 
@@ -167,12 +167,12 @@ impl Solution {
         self.check_block(first)?;
         self.check_block(second)?;
         let factor = self.variance_factor(scale)?;
-        let free = self.cofactor.block(&self.layout, first.0, second.0) * factor;
-        let (rows, columns) = (self.layout.block_columns(first.0), self.layout.block_columns(second.0));
+        let free = self.cofactor.block(&self.layout, first.index(), second.index()) * factor;
+        let (rows, columns) = (self.layout.block_columns(first.index()), self.layout.block_columns(second.index()));
         if free.shape() == (rows.len(), columns.len()) {
             return Ok(free);
         }
-        let (top, left) = (self.layout.free(first.0).start, self.layout.free(second.0).start);
+        let (top, left) = (self.layout.free(first.index()).start, self.layout.free(second.index()).start);
         Ok(DMatrix::from_fn(rows.len(), columns.len(), |i, j| match (rows[i], columns[j]) {
             (HELD, _) | (_, HELD) => 0.0,
             (row, column) => free[(row - top, column - left)],
@@ -308,19 +308,21 @@ impl Solution {
     }
 
     pub(crate) fn block_label(&self, block: BlockId) -> String {
-        self.blocks.get(block.0).map_or_else(|| format!("block {}", block.0), |known| known.label(block.0))
+        self.blocks
+            .get(block.index())
+            .map_or_else(|| format!("block {}", block.index()), |known| known.label(block.index()))
     }
 
     pub(crate) fn parameter_name(&self, (block, component): (BlockId, usize)) -> String {
-        let known = self.blocks.get(block.0).map(|known| known.parameter_name(block.0, component));
-        known.unwrap_or_else(|| format!("block {}", block.0))
+        let known = self.blocks.get(block.index()).map(|known| known.parameter_name(block.index(), component));
+        known.unwrap_or_else(|| format!("block {}", block.index()))
     }
 
     /// The tangent step from `reference` (ambient) to the adjusted values of a block.
     pub(crate) fn difference(&self, block: BlockId, reference: &[f64]) -> Result<Vec<f64>> {
         let values = self.values(block)?;
-        let known = &self.blocks[block.0];
-        known.check(block.0, reference)?;
+        let known = &self.blocks[block.index()];
+        known.check(block.index(), reference)?;
         let mut out = vec![0.0; known.tangent_dimension()];
         known.manifold.minus(values, reference, &mut out);
         Ok(out)
@@ -329,7 +331,7 @@ impl Solution {
     /// Number of components of a block's tangent step, held ones included.
     pub(crate) fn tangent_dimension(&self, block: BlockId) -> Result<usize> {
         self.check_block(block)?;
-        Ok(self.layout.block_columns(block.0).len())
+        Ok(self.layout.block_columns(block.index()).len())
     }
 
     pub(crate) fn cofactor(&self, row: usize, column: usize) -> f64 {
@@ -352,13 +354,17 @@ impl Solution {
 
     fn column(&self, (block, component): (BlockId, usize)) -> Result<usize> {
         self.check_block(block)?;
-        let columns = self.layout.block_columns(block.0);
+        let columns = self.layout.block_columns(block.index());
         let count = columns.len();
         columns.get(component).copied().ok_or(Error::UnknownId { what: "parameter", index: component, count })
     }
 
     fn check_block(&self, block: BlockId) -> Result<()> {
         let count = self.blocks.len();
-        if block.0 < count { Ok(()) } else { Err(Error::UnknownId { what: "block", index: block.0, count }) }
+        if block.index() < count {
+            Ok(())
+        } else {
+            Err(Error::UnknownId { what: "block", index: block.index(), count })
+        }
     }
 }

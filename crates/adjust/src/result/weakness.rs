@@ -2,7 +2,7 @@ use std::fmt;
 
 use nalgebra::DMatrix;
 
-use crate::{BlockId, Combination, Error, Result, Scale, Solution, arrays::dense};
+use crate::{BlockId, Combination, Error, Result, Scale, Solution};
 
 /// Unknowns that are examined together.
 const LARGEST: usize = 3000;
@@ -102,12 +102,12 @@ impl Solution {
             let (name, value) = ("inflation", options.inflation);
             return Err(Error::Option { name, value, expected: "a number of at least 1" });
         }
-        let all = || (0..self.blocks.len()).map(BlockId).collect();
+        let all = || (0..self.blocks.len()).map(BlockId::new).collect();
         let blocks = options.blocks.clone().unwrap_or_else(all);
         let subset = Subset::new(self, &blocks)?;
         let n = subset.names.len();
         let scaled = DMatrix::from_fn(n, n, |i, j| subset.covariance[(i, j)] / (subset.alone[i] * subset.alone[j]));
-        let (values, vectors) = dense::symmetric_eigen(scaled.as_slice(), n)?;
+        let (values, vectors) = dense_matrices::symmetric_eigen(scaled.as_slice(), n)?;
         let inflation = |index: usize| values[index].max(0.0).sqrt();
         let weak: Vec<usize> = (0..n).rev().take_while(|&index| inflation(index) >= options.inflation).collect();
         let describe = |&index: &usize| subset.describe(&vectors[index * n..(index + 1) * n], inflation(index));

@@ -2,7 +2,7 @@
 //! a plane.
 
 use error_models::{FixedPattern, RangeErrorModel};
-use self_calibration::{
+use range_calibration::{
     DifferenceOptions, OffsetSample, OffsetTable, OffsetTableOptions, Result, estimate_offset_table,
 };
 use serde::Serialize;

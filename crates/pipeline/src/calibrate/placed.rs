@@ -1,8 +1,8 @@
 //! A capture of a plane with the plane and the pose that it is calibrated with.
 
 use nalgebra::Isometry3;
+use range_calibration::{DifferenceOptions, Plane, PlaneCapture, RangeDifference, Result, differences_to_plane};
 use range_image::Modulation;
-use self_calibration::{DifferenceOptions, Plane, PlaneCapture, RangeDifference, Result, differences_to_plane};
 
 use super::planes_outcome::Sample;
 use super::start::Start;

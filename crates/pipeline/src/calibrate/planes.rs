@@ -2,13 +2,13 @@
 
 use error_models::{RangeTerms, SurfaceShape};
 use nalgebra::{Isometry3, Point3, Vector3};
+use range_calibration::{
+    DifferenceOptions, Plane, PlaneCalibrationOptions, PlaneCapture, RangeDifference, RangeTermOptions, TermUse,
+    estimate_range_terms,
+};
 use range_io::survey::{Level, Survey};
 use range_io::tables::{ObservedPlane, PlacedRows, Station, read_placed_planes, read_placed_stations};
-use self_calibration::Error as Cause;
-use self_calibration::{
-    DifferenceOptions, Plane, PlaneCalibrationOptions, PlaneCapture, RangeDifference, RangeTermOptions, TermSelection,
-    TermUse, estimate_range_terms,
-};
+use self_calibration::{Error as Cause, TermSelection};
 
 use super::control::pose_covariance;
 use super::drift::KnownDrift;
@@ -216,7 +216,8 @@ fn known<'a>(
     }
     let differences: Vec<RangeDifference> = samples.iter().map(|sample| sample.difference).collect();
     let estimate = estimate_range_terms(&differences, start.range_model.ambiguity_interval_m, options);
-    Ok(estimate.and_then(|estimate| Ok((Found::of_differences(samples, &estimate)?, all))))
+    let found = estimate.and_then(|estimate| Found::of_differences(samples, &estimate));
+    Ok(found.map(|found| (found, all)).map_err(Cause::from))
 }
 
 /// Range terms together with planes that are not known, or poses that are known within their standard deviations.
@@ -230,7 +231,7 @@ fn unknown<'a>(
     let options = PlaneCalibrationOptions { terms: *options, pixels, rejection };
     let interval = start.range_model.ambiguity_interval_m;
     let estimate =
-        self_calibration::calibrate_planes(&scene.captures, &scene.planes, &start.camera, interval, &options)?;
+        range_calibration::calibrate_planes(&scene.captures, &scene.planes, &start.camera, interval, &options)?;
     let (mut samples, mut all) = (Vec::new(), Vec::new());
     for (capture, quality) in scene.captures.iter().zip(estimate.captures()) {
         let adjusted = &estimate.planes()[quality.plane];

@@ -2,10 +2,10 @@
 
 use error_models::{AmplitudeHyperbola, ModelSet, NamedParameter, ParameterStatus, RangeErrorModel};
 use nalgebra::{DMatrix, DVector};
+use range_calibration::{PlaneCalibration, RangeCalibration, RangeDifference, Result, Scale};
 use range_io::calibration::Calibration;
 use self_calibration::{
-    CalibratedParameter, CalibrationOutcome, Component, GroupQuality, Method, ObservationQuality, PlaneCalibration,
-    RangeCalibration, RangeDifference, Result, Scale, Verdict,
+    CalibratedParameter, CalibrationOutcome, Component, GroupQuality, Method, ObservationQuality, Verdict,
 };
 
 use super::start::Start;

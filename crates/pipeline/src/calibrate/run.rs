@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use range_io::atomic::{Destination, write_text};
+use atomic_output::{Destination, write_text};
 use range_io::calibration::Calibration;
 use range_io::tables::{write_residuals, write_stations, write_targets};
 use self_calibration::{CalibrationOptions, CalibrationOutcome, Error as Cause, HoldOut, Method, hold_out};

@@ -9,7 +9,7 @@ mod words;
 
 use std::path::PathBuf;
 
-use range_io::atomic::{Destination, write_text};
+use atomic_output::{Destination, write_text};
 use serde::Serialize;
 
 use crate::destination::{Inputs, json, produce};

@@ -80,6 +80,7 @@ pub(super) fn of_source(source: &(dyn StdError + 'static)) -> Failure {
         source.downcast_ref::<projective_registration::Error>().map(of_frames),
         source.downcast_ref::<multiview_registration::Error>().map(of_registration),
         source.downcast_ref::<tracking::Error>().map(of_tracking),
+        source.downcast_ref::<range_calibration::Error>().map(of_ranges),
         source.downcast_ref::<sensor_noise::Error>().map(of_noise),
         source.downcast_ref::<primitives::Error>().map(of_primitive),
         source.downcast_ref::<residual_tests::Error>().map(|error| {
@@ -111,10 +112,6 @@ pub(super) fn of_estimation(error: &self_calibration::Error) -> Failure {
     use self_calibration::Error as Cause;
     match error {
         Cause::OutOfDomain { .. }
-        | Cause::BadDifference { .. }
-        | Cause::NothingToEstimate
-        | Cause::UnknownPlane { .. }
-        | Cause::HyperbolaNotHeld
         | Cause::DuplicateName { .. }
         | Cause::BadNetworkValue { .. }
         | Cause::UnknownName { .. }
@@ -122,10 +119,26 @@ pub(super) fn of_estimation(error: &self_calibration::Error) -> Failure {
         | Cause::Datum { .. }
         | Cause::MethodNeeds { .. }
         | Cause::OutsideImage(_)
-        | Cause::Camera(_)
-        | Cause::Image(_) => Failure::Usage,
+        | Cause::Camera(_) => Failure::Usage,
         // All of a column is wrong: a slip in the input, not a finding about the network.
         Cause::Contradiction(found) if found.is_wrong_input() => Failure::Usage,
+        Cause::Ranges(error) => of_ranges(error),
+        _ => Failure::Refused,
+    }
+}
+
+fn of_ranges(error: &range_calibration::Error) -> Failure {
+    use range_calibration::Error as Cause;
+    match error {
+        Cause::OutOfDomain { .. }
+        | Cause::BadDifference { .. }
+        | Cause::NothingToEstimate
+        | Cause::UnknownPlane { .. }
+        | Cause::HyperbolaNotHeld
+        | Cause::DuplicateName { .. }
+        | Cause::UnknownName { .. }
+        | Cause::Camera(_)
+        | Cause::Image(_) => Failure::Usage,
         Cause::Primitive(error) => of_primitive(error),
         Cause::Registration { reason, .. } => of_registration(reason),
         _ => Failure::Refused,

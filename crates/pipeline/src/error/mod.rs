@@ -218,3 +218,9 @@ impl Error {
         }
     }
 }
+
+impl From<atomic_output::Error> for Error {
+    fn from(error: atomic_output::Error) -> Self {
+        Self::File(error.into())
+    }
+}

@@ -5,7 +5,7 @@ mod summary;
 use std::path::PathBuf;
 use std::time::Instant;
 
-use range_io::atomic::Destination;
+use atomic_output::Destination;
 use range_io::calibration::Calibration;
 use range_io::survey::{Level, Survey};
 use sensor_noise::{PatternEstimate, PatternOptions, PatternVerdict, WallCapture, estimate_fixed_pattern};

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use range_io::atomic::{Destination, write_text};
+use atomic_output::{Destination, write_text};
 use self_calibration::PlanOptions;
 
 use super::files::read_plan;

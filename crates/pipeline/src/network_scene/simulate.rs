@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use range_io::atomic::{Destination, OutputFolder};
+use atomic_output::{Destination, OutputFolder};
 use range_io::calibration::{Calibration, Provenance};
 use range_io::survey::{Survey, TruthFiles};
 use range_io::tables::{

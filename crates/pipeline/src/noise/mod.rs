@@ -6,7 +6,7 @@ mod summary;
 use std::path::PathBuf;
 use std::time::Instant;
 
-use range_io::atomic::Destination;
+use atomic_output::Destination;
 use range_io::calibration::Calibration;
 use sensor_noise::NoiseFitOptions;
 

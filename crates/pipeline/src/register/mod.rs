@@ -18,8 +18,8 @@ use std::time::Instant;
 pub use request::{RegisterMethod, RegisterRequest};
 pub use summary::{RegisterSummary, RegisteredLoop, RegisteredPair, RegisteredPlacement, RegisteredStation};
 
+use atomic_output::Destination;
 use nalgebra::Isometry3;
-use range_io::atomic::Destination;
 
 use crate::Result;
 use crate::destination::{Inputs, produce};

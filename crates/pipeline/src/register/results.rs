@@ -1,6 +1,6 @@
 //! The files of a registration.
 
-use range_io::atomic::{Destination, write_text};
+use atomic_output::{Destination, write_text};
 use range_io::clouds::{CloudFile, Precision};
 use range_io::ply::write_cloud;
 use range_io::tables::{Station as StationRow, write_stations};

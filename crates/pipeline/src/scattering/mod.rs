@@ -7,8 +7,8 @@ mod summary;
 use std::path::PathBuf;
 use std::time::Instant;
 
+use atomic_output::Destination;
 use error_models::{NamedParameter, ParameterStatus};
-use range_io::atomic::Destination;
 use scattering_deconvolution::{EstimationOptions, estimate_psf};
 
 pub use summary::{CandidateGaussians, ScatteringCapture, ScatteringParameter, ScatteringSummary};

@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 use std::time::Instant;
 
+use atomic_output::Destination;
 use point_cloud::Cloud;
-use range_io::atomic::Destination;
 use statistics::quantile;
 use tracking::{TrackedPose, Tracker, TrackerOptions, TrackingState};
 

@@ -2,10 +2,10 @@
 
 use camera_model::Camera;
 use primitives::{FittedPixel, PrimitiveKind, PrimitiveOptions, fit_primitive};
+use range_calibration::DifferenceOptions;
 use range_image::{Flags, RangeFrame};
 use rayon::prelude::*;
 use residual_tests::{TrendOptions, TrendSample, test_trends};
-use self_calibration::DifferenceOptions;
 use statistics::retain_within;
 
 use super::{RemainingErrors, TrendSummary, sentence};

@@ -7,7 +7,7 @@ mod summary;
 use std::path::PathBuf;
 use std::time::Instant;
 
-use range_io::atomic::Destination;
+use atomic_output::Destination;
 use range_io::calibration::{CalibratedDrift, Calibration, Correlation};
 use warm_up::{ChangeOptions, DriftEstimate, DriftOptions, estimate_drift, estimate_drift_at_rates};
 

@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 pub use correlation::Correlation;
 pub use drift::CalibratedDrift;
 
-use crate::{InvalidField, Result, atomic, read_ron_text, text::ron_text};
+use crate::{InvalidField, Result, read_ron_text, text::ron_text};
 
 /// A camera's calibration with the quality of every parameter.
 ///
@@ -186,7 +186,7 @@ impl Calibration {
 
     /// Checks and writes a `calibration.ron`.
     pub fn write(&self, path: impl AsRef<Path>) -> Result<()> {
-        atomic::write_text(path, &self.to_text()?)
+        Ok(atomic_output::write_text(path, &self.to_text()?)?)
     }
 
     /// Checks a calibration and gives the text of its file.

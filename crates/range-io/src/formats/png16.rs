@@ -6,10 +6,10 @@ use std::path::Path;
 use png::{BitDepth, ColorType, Decoder, Encoder, Limits};
 use range_image::Raster;
 
-use crate::atomic::FileWriter;
 use crate::text::fault::zeros;
 use crate::text::limits::{LARGEST_DEFLATION, MOST_PIXELS};
 use crate::{Error, Result};
+use atomic_output::FileWriter;
 
 /// Reads a PNG of one channel with 16 bits; 8 bits, colour, palettes and alpha are refused.
 pub fn read(path: impl AsRef<Path>) -> Result<Raster<u16>> {
@@ -55,5 +55,5 @@ pub fn write(path: impl AsRef<Path>, image: &Raster<u16>) -> Result<()> {
     let bytes: Vec<u8> = image.as_slice().iter().flat_map(|value| value.to_be_bytes()).collect();
     writer.write_image_data(&bytes).map_err(failed)?;
     writer.finish().map_err(failed)?;
-    file.commit()
+    Ok(file.commit()?)
 }

@@ -21,7 +21,7 @@ pub use range_image::PhaseSense;
 pub use truth::{TruthFrame, read_truth, write_truth};
 pub use write::write_frame;
 
-use crate::{Result, atomic, read_ron_text, text::ron_text};
+use crate::{Result, read_ron_text, text::ron_text};
 
 /// What was captured: `survey.ron`. Angles in radian, lengths of the camera in millimetre, times in second.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -209,6 +209,6 @@ impl Survey {
     /// Checks and writes a `survey.ron`.
     pub fn write(&self, path: impl AsRef<Path>) -> Result<()> {
         self.validate()?;
-        atomic::write_text(path, &ron_text::to_text(self)?)
+        Ok(atomic_output::write_text(path, &ron_text::to_text(self)?)?)
     }
 }

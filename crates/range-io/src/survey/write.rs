@@ -4,8 +4,8 @@ use range_image::{ComplexChannel, ComplexFrame, Raster, Samples};
 
 use super::InputFrame;
 use crate::Result;
-use crate::atomic::FileWriter;
 use crate::formats::npz::NpzWriter;
+use atomic_output::FileWriter;
 
 /// Writes a frame as the `.npz` of its level.
 ///

@@ -3,10 +3,10 @@ use std::path::{Path, PathBuf};
 
 use csv::{ReaderBuilder, StringRecord, Trim};
 
-use crate::atomic::FileWriter;
 use crate::read_text;
 use crate::text::limits::MOST_ROWS;
 use crate::{Error, Result};
+use atomic_output::FileWriter;
 
 /// The columns of a kind of table.
 pub(super) struct Columns {
@@ -268,7 +268,7 @@ pub(super) fn write(path: &Path, header: &[&str], rows: impl Iterator<Item = Vec
     let text = writer.into_inner().map_err(|error| Error::format(path, format!("cannot be written: {error}")))?;
     let mut file = FileWriter::create(path)?;
     file.write_all(&text).map_err(Error::io(path, "write"))?;
-    file.commit()
+    Ok(file.commit()?)
 }
 
 /// The shortest text that reads back as the same number; nothing for nothing.

@@ -15,7 +15,7 @@ use std::path::Path;
 
 use nalgebra::Isometry3;
 
-use crate::{Error, Result, atomic};
+use crate::{Error, Result};
 
 pub use any::{TrajectoryFormat, read_any_trajectory, write_any_trajectory};
 pub use euroc::{read_euroc, write_euroc};
@@ -51,5 +51,5 @@ fn write_lines(
         }
         text.push('\n');
     }
-    atomic::write_text(path, &text)
+    Ok(atomic_output::write_text(path, &text)?)
 }

@@ -6,10 +6,10 @@ use ::e57::{
 };
 
 use super::{E57Scan, fields};
-use crate::atomic::FileWriter;
 use crate::formats::clouds::{COVARIANCE, CloudFile, Precision, value_error};
 use crate::pose::numbers_of;
 use crate::{Error, Result};
+use atomic_output::FileWriter;
 
 /// Writes scans, each with its name and pose.
 pub fn write_e57(path: impl AsRef<Path>, scans: &[E57Scan], precision: Precision) -> Result<()> {
@@ -46,7 +46,7 @@ pub fn write_e57(path: impl AsRef<Path>, scans: &[E57Scan], precision: Precision
     }
     writer.finalize().map_err(failed)?;
     drop(writer);
-    file.commit()
+    Ok(file.commit()?)
 }
 
 /// What the system refused, where that is behind the error.

@@ -5,8 +5,8 @@ use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipWriter};
 
 use super::{ArrayHeader, DataType};
-use crate::atomic::FileWriter;
 use crate::{Error, Result};
+use atomic_output::FileWriter;
 
 /// Elements converted at a time.
 const BLOCK: usize = 1 << 14;
@@ -58,7 +58,7 @@ impl NpzWriter<FileWriter> {
 
     /// Ends the archive and gives it its name.
     pub fn commit(self) -> Result<()> {
-        self.finish()?.commit()
+        Ok(self.finish()?.commit()?)
     }
 }
 

@@ -4,10 +4,10 @@ use std::path::Path;
 
 use nalgebra::Isometry3;
 
-use crate::atomic::FileWriter;
 use crate::formats::clouds::{CloudFile, Kind, Precision, properties, put_point, value_error};
 use crate::pose::numbers_of;
 use crate::{Error, Result};
+use atomic_output::FileWriter;
 
 /// Points that are turned into bytes at a time.
 const BLOCK: usize = 1 << 12;
@@ -30,7 +30,7 @@ pub fn write_pcd(path: impl AsRef<Path>, cloud: &CloudFile, precision: Precision
         }
         writer.write_all(&bytes).map_err(Error::io(&target, "write"))?;
     }
-    writer.commit()
+    Ok(writer.commit()?)
 }
 
 fn header(cloud: &CloudFile, precision: Precision) -> Result<String> {

@@ -3,10 +3,10 @@ use std::io::{Seek, SeekFrom, Write};
 use std::path::Path;
 
 use super::{CloudFile, Precision};
-use crate::atomic::FileWriter;
 use crate::formats::clouds::{Kind, properties, put_point, value_error};
 use crate::pose::numbers_of;
 use crate::{Error, Result};
+use atomic_output::FileWriter;
 
 /// Points that are turned into bytes at a time.
 const BLOCK: usize = 1 << 12;
@@ -83,7 +83,7 @@ impl PlyWriter {
     pub fn commit(mut self) -> Result<()> {
         self.writer.seek(SeekFrom::Start(0)).map_err(Error::io(self.writer.path(), "write"))?;
         self.write_header()?;
-        self.writer.commit()
+        Ok(self.writer.commit()?)
     }
 
     /// A header whose length does not depend on the number of points: a comment takes up what the number leaves.

@@ -1,0 +1,22 @@
+#![doc = include_str!("../README.md")]
+
+mod by_planes;
+mod error;
+mod observed;
+mod ranges;
+mod surfaces;
+
+pub use adjust::Scale;
+pub use by_planes::planes::{PlaneCalibrationOptions, PlaneCapture, calibrate_planes};
+pub use by_planes::planes_outcome::{AdjustedPlane, CaptureQuality, PlaneCalibration};
+pub use error::{Error, Result};
+pub use observed::calibration::RangeCalibration;
+pub use observed::hyperbola_start::{hyperbola_gain, hyperbola_start};
+pub use observed::options::{HyperbolaUse, RangeTermOptions, TermUse};
+pub use primitives::{DifferenceOptions, Plane, RangeDifference, differences_to_plane};
+pub use ranges::amplitude_or_position::{
+    AmplitudeOrPosition, AmplitudeOrPositionOptions, EffectTest, ErrorCause, amplitude_or_position,
+};
+pub use ranges::offset_table::{OffsetSample, OffsetTable, OffsetTableOptions, estimate_offset_table};
+pub use ranges::range_terms::estimate_range_terms;
+pub use surfaces::{SurfaceCalibration, SurfaceCalibrationOptions, SurfaceCapture, SurfaceTerm, calibrate_surfaces};

@@ -12,7 +12,7 @@ use crate::outcome::{Outcome, StationPose};
 use crate::progress::Progress;
 use crate::summary::Summary;
 use crate::verdict::{Doubt, words_about};
-use crate::{Result, report};
+use crate::{Result, pages};
 
 /// Writes everything, which appears when the last file is complete.
 pub(crate) fn write(
@@ -22,7 +22,7 @@ pub(crate) fn write(
     progress: &dyn Progress,
 ) -> Result<()> {
     progress.begin("write results", 3);
-    let page = report::render(outcome, summary)?;
+    let page = pages::render(outcome, summary)?;
     let folder = destination.open()?;
     match outcome.common_poses() {
         Some(poses) => write_in_common_frame(&folder, outcome, &poses, &summary.doubts)?,

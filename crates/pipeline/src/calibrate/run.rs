@@ -18,7 +18,7 @@ use super::{calibration_file, planes, tables};
 use crate::destination::{Inputs, json, produce};
 use crate::drift::DriftTreatment;
 use crate::progress::Progress;
-use crate::{Error, Result, report};
+use crate::{Error, Result, pages};
 
 /// Calibrates a survey and writes the results into the request's output folder.
 ///
@@ -61,7 +61,7 @@ fn calibrate_into(
             let source = Source { request, start, outcome, file: &file, summary: &summary, hold_out };
             let certificate = Certificate::new(source)?;
             let date = request.certificate.date.clone().unwrap_or_else(today);
-            let page = report::render_certificate(&certificate, &summary, &date);
+            let page = pages::render_certificate(&certificate, &summary, &date);
             summary.certificate = Some(certificate);
             let summary = finish(summary);
             let results = Results { outcome, table, file: &file, certificate_page: &page };
@@ -205,7 +205,7 @@ fn write(
     progress.advance(4);
     write_text(folder.file("summary.json")?, &json(summary)?)?;
     progress.advance(5);
-    write_text(folder.file("report.html")?, &report::render_calibration(outcome, *table, summary)?)?;
+    write_text(folder.file("report.html")?, &pages::render_calibration(outcome, *table, summary)?)?;
     progress.advance(6);
     write_text(folder.file("certificate.html")?, certificate_page)?;
     progress.advance(7);

@@ -15,7 +15,7 @@ use serde::Serialize;
 use crate::destination::{Inputs, json, produce};
 use crate::progress::Progress;
 use crate::verdict::{Doubt, Judged};
-use crate::{Error, Result, report};
+use crate::{Error, Result, pages};
 
 pub use clouds::{CloudAlignment, CloudComparison, DistanceHistogram, PlaneDistances};
 pub(crate) use clouds::{Deviations, millimetres_of};
@@ -152,7 +152,7 @@ fn compare_into(
 }
 
 fn write(destination: &Destination, comparison: &Comparison, pictures: &ComparisonPictures) -> Result<()> {
-    let page = report::render_comparison(comparison, pictures)?;
+    let page = pages::render_comparison(comparison, pictures)?;
     let folder = destination.open()?;
     write_text(folder.file("comparison.json")?, &json(comparison)?)?;
     write_text(folder.file("report.html")?, &page)?;

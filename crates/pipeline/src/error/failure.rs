@@ -21,7 +21,7 @@ impl Error {
             Self::Calibrate(source) => of_estimation(source),
             Self::Refused { .. } | Self::Register(_) | Self::NothingInCommon(_) => Failure::Refused,
             // A figure is drawn from results that are there already: what fails then is memory or disk.
-            Self::Figure { .. } => Failure::Machine,
+            Self::Report(_) | Self::Figure { .. } => Failure::Machine,
             Self::Survey { .. }
             | Self::Camera(_)
             | Self::Incompatible(_)

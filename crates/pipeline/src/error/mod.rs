@@ -93,6 +93,9 @@ pub enum Error {
         /// Why.
         source: simulation::Error,
     },
+    /// A figure that could not be packed.
+    #[error(transparent)]
+    Report(#[from] report::Error),
     /// A figure that could not be drawn.
     #[error("report: figure {figure}: {message}")]
     Figure {

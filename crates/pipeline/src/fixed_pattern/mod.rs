@@ -19,7 +19,7 @@ use crate::progress::Progress;
 use crate::run::process_with;
 use crate::stages::corrects_ranges;
 use crate::view::ViewData;
-use crate::{Error, Plan, Result, Stage, report};
+use crate::{Error, Plan, Result, Stage, pages};
 
 /// What to estimate a fixed pattern from.
 #[derive(Debug, Clone)]
@@ -77,7 +77,7 @@ fn estimate(
     if summary.applied {
         add_to(&mut calibration, request, &estimate);
     }
-    let page = report::render_fixed_pattern(&summary, &estimate)?;
+    let page = pages::render_fixed_pattern(&summary, &estimate)?;
     write(destination, Some(&calibration), &json(&summary)?, &page)?;
     progress.finish();
     Ok(summary)

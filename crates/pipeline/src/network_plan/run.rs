@@ -9,7 +9,7 @@ use super::files::read_plan;
 use super::summary::PlanSummary;
 use crate::destination::{Inputs, json, produce};
 use crate::progress::Progress;
-use crate::{Error, Result, report};
+use crate::{Error, Result, pages};
 
 /// What to plan.
 #[derive(Debug, Clone)]
@@ -51,7 +51,7 @@ fn plan_into(destination: &Destination, request: &NetworkPlanRequest, progress: 
     let folder = destination.open()?;
     let summary = PlanSummary::new(survey, start.words, &outcome, request);
     write_text(folder.file("summary.json")?, &json(&summary)?)?;
-    write_text(folder.file("report.html")?, &report::render_plan(&network, &outcome, &summary)?)?;
+    write_text(folder.file("report.html")?, &pages::render_plan(&network, &outcome, &summary)?)?;
     folder.commit()?;
     progress.advance(2);
     progress.finish();

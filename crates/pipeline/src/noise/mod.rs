@@ -15,7 +15,7 @@ pub use summary::{NoiseBin, NoiseParameter, NoiseStation, NoiseSummary, SigmaBin
 use crate::destination::{Inputs, json, produce};
 use crate::further_term::{provenance_with, start, write};
 use crate::progress::Progress;
-use crate::{Error, Plan, Result, process, report};
+use crate::{Error, Plan, Result, pages, process};
 use estimate::{Estimate, NoiseTerm};
 
 /// What to estimate random errors from.
@@ -53,7 +53,7 @@ fn estimate(request: &NoiseRequest, destination: &Destination, progress: &dyn Pr
     let mut summary = NoiseSummary::new(request, &words, &estimate);
     summary.seconds = clock.elapsed().as_secs_f64();
     add_to(&mut calibration, request, &estimate);
-    write(destination, Some(&calibration), &json(&summary)?, &report::render_noise(&summary))?;
+    write(destination, Some(&calibration), &json(&summary)?, &pages::render_noise(&summary))?;
     progress.finish();
     Ok(summary)
 }

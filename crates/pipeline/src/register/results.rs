@@ -11,7 +11,7 @@ use super::input::Station;
 use crate::destination::json;
 use crate::progress::Progress;
 use crate::verdict::words_about;
-use crate::{Result, report};
+use crate::{Result, pages};
 
 /// Writes everything, which appears when the last file is complete.
 pub(super) fn write(destination: &Destination, registered: &Registered, progress: &dyn Progress) -> Result<()> {
@@ -41,7 +41,7 @@ pub(super) fn write(destination: &Destination, registered: &Registered, progress
     progress.advance(3);
     write_text(folder.file("summary.json")?, &json(&registered.summary)?)?;
     progress.advance(4);
-    write_text(folder.file("report.html")?, &report::render_registration(registered)?)?;
+    write_text(folder.file("report.html")?, &pages::render_registration(registered)?)?;
     progress.advance(5);
     folder.commit()?;
     Ok(())

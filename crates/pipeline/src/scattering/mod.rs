@@ -16,7 +16,7 @@ pub use summary::{CandidateGaussians, ScatteringCapture, ScatteringParameter, Sc
 use crate::destination::{Inputs, json, produce};
 use crate::further_term::{provenance_with, write};
 use crate::progress::Progress;
-use crate::{Error, Result, report};
+use crate::{Error, Result, pages};
 use captures::Captures;
 pub(crate) use shifts::Shift;
 
@@ -76,7 +76,7 @@ fn estimate(
     let (redundancy, sigma0) = (estimate.redundancy, estimate.sigma0);
     calibration.provenance =
         provenance_with(&calibration.provenance, &request.with_object, &method, redundancy, sigma0);
-    write(destination, Some(&calibration), &text, &report::render_scattering(&summary, &shifts)?)?;
+    write(destination, Some(&calibration), &text, &pages::render_scattering(&summary, &shifts)?)?;
     progress.finish();
     Ok(summary)
 }

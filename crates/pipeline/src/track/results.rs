@@ -11,7 +11,7 @@ use super::outcome::{Tracked, station_pose};
 use crate::destination::json;
 use crate::progress::Progress;
 use crate::verdict::words_about;
-use crate::{Result, report};
+use crate::{Result, pages};
 
 /// Writes everything, which appears when the last file is complete.
 pub(super) fn write(destination: &Destination, tracked: &Tracked, progress: &dyn Progress) -> Result<()> {
@@ -25,7 +25,7 @@ pub(super) fn write(destination: &Destination, tracked: &Tracked, progress: &dyn
     progress.advance(2);
     write_text(folder.file("summary.json")?, &json(&tracked.summary)?)?;
     progress.advance(3);
-    write_text(folder.file("report.html")?, &report::render_tracking(tracked)?)?;
+    write_text(folder.file("report.html")?, &pages::render_tracking(tracked)?)?;
     progress.advance(4);
     folder.commit()?;
     Ok(())

@@ -16,7 +16,7 @@ pub use summary::{WarmUpBlock, WarmUpParameter, WarmUpPhase, WarmUpRateTest, War
 use crate::destination::{Inputs, json, produce};
 use crate::further_term::{provenance_with, start, write};
 use crate::progress::Progress;
-use crate::{Error, Result, report};
+use crate::{Error, Result, pages};
 pub(crate) use series::Series;
 
 /// What to estimate a drift from.
@@ -74,7 +74,7 @@ fn estimate(request: &WarmUpRequest, destination: &Destination, progress: &dyn P
     let calibration = calibration.map(|(known, words)| (with_drift(known, request, &estimate), words));
     let mut summary = WarmUpSummary::new(request, &series, &estimate, calibration.as_ref().map(|(_, words)| words));
     summary.seconds = clock.elapsed().as_secs_f64();
-    let page = report::render_warm_up(&summary, &series, &estimate);
+    let page = pages::render_warm_up(&summary, &series, &estimate);
     write(destination, calibration.as_ref().map(|(calibration, _)| calibration), &json(&summary)?, &page)?;
     progress.finish();
     Ok(summary)

@@ -3,7 +3,7 @@
 /// The `share` quantile (0 to 1) of the finite values, by linear interpolation; NaN where there are none.
 ///
 /// Reorders `values`.
-pub(crate) fn quantile(values: &mut [f64], share: f64) -> f64 {
+pub fn quantile(values: &mut [f64], share: f64) -> f64 {
     let finite = partition_finite(values);
     if finite.is_empty() {
         return f64::NAN;
@@ -16,12 +16,12 @@ pub(crate) fn quantile(values: &mut [f64], share: f64) -> f64 {
 }
 
 /// The median of the finite values; NaN where there are none.
-pub(crate) fn median(values: &mut [f64]) -> f64 {
+pub fn median(values: &mut [f64]) -> f64 {
     quantile(values, 0.5)
 }
 
 /// Robust standard deviation: 1.4826 times the median absolute deviation from the median.
-pub(crate) fn robust_standard_deviation(values: &[f64]) -> f64 {
+pub fn robust_standard_deviation(values: &[f64]) -> f64 {
     let mut work = values.to_vec();
     let centre = median(&mut work);
     for value in &mut work {
@@ -31,7 +31,7 @@ pub(crate) fn robust_standard_deviation(values: &[f64]) -> f64 {
 }
 
 /// Keeps samples whose standardised residual lies within so many robust standard deviations of the median.
-pub(crate) fn retain_within<T>(samples: &mut Vec<T>, deviations: f64, standardised: impl Fn(&T) -> f64) {
+pub fn retain_within<T>(samples: &mut Vec<T>, deviations: f64, standardised: impl Fn(&T) -> f64) {
     let mut all: Vec<f64> = samples.iter().map(&standardised).collect();
     let limit = deviations * robust_standard_deviation(&all);
     let middle = median(&mut all);

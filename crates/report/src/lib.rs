@@ -5,7 +5,7 @@ mod error;
 mod figure;
 mod quantile;
 
-pub use document::{Alignment, Block, Column, Document, Merit, Place, Section, Table};
+pub use document::{Alignment, Block, Column, Document, Merit, Place, Section, Table, millimetres};
 pub use error::{Error, Result};
 pub use figure::{
     Axes, CATEGORIES, CHART_SIZE, Canvas, ColourMap, Direction, Drawn, Edge, Figure, Labels, LineOfSight, NO_VALUE,

@@ -7,11 +7,11 @@ use rayon::prelude::*;
 use residual_tests::{TrendOptions, TrendSample, test_trends};
 use self_calibration::DifferenceOptions;
 
-use super::{RemainingErrors, TrendSummary, sentence};
-use crate::outcome::Outcome;
 use crate::statistics::retain_within;
-use crate::truth::range_errors;
-use crate::view::{View, ViewData};
+use crate::survey::outcome::Outcome;
+use crate::survey::truth::range_errors;
+use crate::survey::view::{View, ViewData};
+use crate::trends::{RemainingErrors, TrendSummary, sentence};
 
 /// Pixels of all frames together that are looked at, about: more would tell smaller trends than anybody minds.
 const MOST_PIXELS: usize = 20_000;

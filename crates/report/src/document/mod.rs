@@ -6,7 +6,7 @@ mod text;
 
 use std::fmt::Display;
 
-pub use table::{Alignment, Column, Table};
+pub use table::{Alignment, Column, Table, millimetres};
 
 use crate::figure::Figure;
 
@@ -143,6 +143,12 @@ impl Document {
     /// Sentences for who reads the text.
     pub fn remark(&mut self, text: impl Into<String>) {
         self.add(Block::Paragraph(text.into()), Place::Text);
+    }
+
+    /// The last words of the text: where files went.
+    pub fn closing(&mut self, text: impl Into<String>) {
+        self.section("");
+        self.remark(text);
     }
 
     /// Sentences one below the other; none: nothing.

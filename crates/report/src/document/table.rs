@@ -81,3 +81,11 @@ fn is_word(cell: &str) -> bool {
     let digits = cell.chars().filter(char::is_ascii_digit).count();
     cell.chars().next().is_some_and(char::is_alphabetic) || letters > digits
 }
+
+/// A length in millimetres, a dash where there is none.
+pub fn millimetres(length_m: Option<f64>) -> String {
+    match length_m {
+        Some(length) if length.is_finite() => format!("{:.2} mm", 1e3 * length),
+        _ => "-".to_owned(),
+    }
+}

@@ -2,7 +2,6 @@
 
 pub mod command;
 mod explain;
-pub mod figures;
 pub mod plan;
 pub mod run;
 pub mod stages;

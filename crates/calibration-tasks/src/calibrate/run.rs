@@ -7,6 +7,8 @@ use range_io::calibration::Calibration;
 use range_io::tables::{write_residuals, write_stations, write_targets};
 use self_calibration::{CalibrationOptions, CalibrationOutcome, Error as Cause, Method, hold_out};
 
+use crate::calibrate::document::figures::Figures;
+use crate::calibrate::document::page::document;
 use crate::calibrate::network::network_check::check;
 use crate::calibrate::network::network_files::{NetworkFiles, read_network};
 use crate::calibrate::planes;
@@ -185,6 +187,7 @@ fn write(
 ) -> Result<()> {
     let Results { outcome, table, file, certificate_page } = results;
     progress.begin("write results", 7);
+    let page = document(summary, Figures::new(outcome, *table)?);
     let folder = destination.open()?;
     file.write(folder.file(Calibration::FILE_NAME)?)?;
     progress.advance(1);
@@ -196,10 +199,7 @@ fn write(
     progress.advance(4);
     write_text(folder.file("summary.json")?, &json(summary)?)?;
     progress.advance(5);
-    write_text(
-        folder.file("report.html")?,
-        &crate::calibrate::document::page::render_calibration(outcome, *table, summary)?,
-    )?;
+    write_text(folder.file("report.html")?, &page.html())?;
     progress.advance(6);
     write_text(folder.file("certificate.html")?, certificate_page)?;
     progress.advance(7);

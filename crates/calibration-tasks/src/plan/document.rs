@@ -1,7 +1,10 @@
-//! The report of a planned network.
+//! A planned network for people.
+
+use std::fmt;
 
 use nalgebra::Matrix3;
-use report::Document;
+use pipeline::Result;
+use report::{Column, Document, Figure, Merit};
 use self_calibration::{AdjustedStation, AdjustedTarget, Network, PlanOutcome};
 
 use crate::calibrate::document::page::correlations;
@@ -9,73 +12,108 @@ use crate::calibrate::document::tables;
 use crate::calibrate::figures::map::{self, Proposed};
 use crate::calibrate::figures::point_uncertainty;
 use crate::calibrate::point_uncertainty::PointUncertainty;
-use crate::plan::PlanSummary;
-use pipeline::Result;
+use crate::plan::{CandidateSummary, PlanSummary};
 
 /// Candidates drawn and listed; the summary has them all.
 const SHOWN_CANDIDATES: usize = 8;
+/// Targets that a station should see.
+const FEWEST_TARGETS: usize = 3;
 
-/// The whole page.
-pub(crate) fn render_plan(network: &Network, outcome: &PlanOutcome, summary: &PlanSummary) -> Result<String> {
+/// The figures of each section.
+#[derive(Default)]
+pub(crate) struct Figures {
+    /// Planned targets.
+    targets: usize,
+    network: Vec<(Figure, String)>,
+    points: Vec<(Figure, String)>,
+}
+
+impl Figures {
+    pub(crate) fn new(network: &Network, outcome: &PlanOutcome) -> Result<Self> {
+        let models = [(None, network.range_model.clone())];
+        let source = PointUncertainty { camera: &network.camera, range_models: &models };
+        let points = point_uncertainty::figures(&source, &outcome.estimated, &outcome.covariance, f64::NAN)?;
+        Ok(Self { targets: network.targets.len(), network: drawing(network, outcome), points })
+    }
+}
+
+impl fmt::Display for PlanSummary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        document(self, Figures::default()).fmt(f)
+    }
+}
+
+/// All of it, with its figures.
+pub(crate) fn document(summary: &PlanSummary, figures: Figures) -> Document {
     let lead = format!(
-        "Expected quality of a calibration of {} as planned: {} stations, {} targets. Camera: {}.",
+        "Expected quality of a calibration of {} as planned: {} stations. Camera: {}.",
         summary.survey,
-        network.stations.len(),
-        network.targets.len(),
+        summary.sightings_per_station.len(),
         summary.start
     );
-    let mut page = Document::new("rangecam: plan of a calibration network", &lead);
-    figures_of_merit(&mut page, summary);
-    tables::diagnosis(&mut page, &summary.diagnosis);
-    expected(&mut page, outcome);
-    candidates(&mut page, summary);
-    drawing(&mut page, network, outcome);
-    points(&mut page, network, outcome)?;
-    correlations(&mut page, &summary.correlation.names, &summary.correlation.matrix);
-    sightings(&mut page, summary);
-    Ok(page.html())
+    let mut document = Document::new("rangecam: plan of a calibration network", lead);
+    document.merits(merits(summary));
+    tables::diagnosis(&mut document, &summary.diagnosis);
+    expected(&mut document, summary);
+    candidates(&mut document, summary);
+    document.section("Network");
+    document.explanation(format!("{} targets.", figures.targets));
+    document.figures(figures.network);
+    document.section("What the calibration's uncertainty would mean for a point");
+    document.figures(figures.points);
+    correlations(&mut document, &summary.correlation);
+    sightings(&mut document, summary);
+    document.closing(format!("written to {}: report.html, summary.json", summary.out.display()));
+    document
 }
 
-fn figures_of_merit(page: &mut Document, summary: &PlanSummary) {
-    let mut cards = vec![
-        (if summary.accepted { "yes" } else { "no" }.to_owned(), "strong enough to calibrate".to_owned()),
-        (summary.observations.to_string(), "observed values".to_owned()),
-        (summary.unknowns.to_string(), "unknowns".to_owned()),
-        (summary.redundancy.to_string(), "redundancy".to_owned()),
+fn merits(summary: &PlanSummary) -> Vec<Merit> {
+    let mut merits = vec![
+        Merit::new(if summary.accepted { "yes" } else { "no" }, "strong enough to calibrate"),
+        Merit::new(summary.observations.to_string(), "observed values"),
+        Merit::new(summary.unknowns.to_string(), "unknowns"),
+        Merit::new(summary.redundancy.to_string(), "redundancy"),
     ];
     if let Some(inflation) = summary.inflation {
-        cards.push((format!("{inflation:.0}"), "inflation of the weakest combination".to_owned()));
+        merits.push(Merit::new(format!("{inflation:.0}"), "inflation of the weakest combination"));
     }
     for point in &summary.point_sigma {
-        cards.push((format!("{:.2} mm", 1e3 * point.sigma_m), format!("of a point at {} m", point.range_m)));
+        let name = format!("of a point at {} m, from the calibration alone", point.range_m);
+        merits.push(Merit::new(format!("{:.2} mm", 1e3 * point.sigma_m), name));
     }
-    page.merits(cards);
+    merits
 }
 
-fn expected(page: &mut Document, outcome: &PlanOutcome) {
-    page.section("Expected standard deviations");
-    page.paragraph("From the planned noise of the observations; the values of the parameters hardly matter for them.");
-    let estimated = outcome.parameters.iter().filter(|parameter| outcome.estimated.contains(&parameter.name));
-    let rows: Vec<Vec<String>> = estimated
-        .map(|parameter| {
-            let gain = outcome.candidates.first().and_then(|best| best.gain.iter().find(|(n, _)| *n == parameter.name));
-            vec![
-                parameter.name.clone(),
-                format!("{:.2e}", parameter.sigma_prior),
-                parameter.unit.clone(),
-                gain.map_or("–".to_owned(), |(_, gain)| format!("{:.2e}", parameter.sigma_prior * gain)),
-            ]
-        })
-        .collect();
-    page.table(["parameter", "expected sigma", "unit", "with the best further station"], rows);
+fn expected(document: &mut Document, summary: &PlanSummary) {
+    document.section("Expected standard deviations");
+    document.explanation(
+        "From the planned noise of the observations; the values of the parameters hardly matter for them.",
+    );
+    let estimated = summary.parameters.0.iter().filter(|(_, parameter)| parameter.status == "estimated");
+    let rows = estimated.map(|(name, parameter)| {
+        let gain = summary.candidates.first().and_then(|best| best.gain.iter().find(|(known, _)| known == name));
+        vec![
+            name.clone(),
+            format!("{:.2e}", parameter.sigma_prior),
+            gain.map_or("–".to_owned(), |(_, gain)| format!("{:.2e}", parameter.sigma_prior * gain)),
+            parameter.unit.clone(),
+        ]
+    });
+    let columns = [
+        Column::words("parameter"),
+        Column::number("expected sigma"),
+        Column::number("with the best further station"),
+        Column::words("unit"),
+    ];
+    document.table(columns, rows.collect());
 }
 
-fn candidates(page: &mut Document, summary: &PlanSummary) {
+fn candidates(document: &mut Document, summary: &PlanSummary) {
     if summary.candidates.is_empty() {
         return;
     }
-    page.section("Further stations, the most helpful first");
-    let row = |(rank, candidate): (usize, &crate::plan::CandidateSummary)| {
+    document.section("Further stations, the most helpful first");
+    let row = |(rank, candidate): (usize, &CandidateSummary)| {
         let mut gains: Vec<&(String, f64)> = candidate.gain.iter().collect();
         gains.sort_by(|a, b| a.1.total_cmp(&b.1));
         let best: Vec<String> =
@@ -84,19 +122,29 @@ fn candidates(page: &mut Document, summary: &PlanSummary) {
         vec![
             format!("N{}", rank + 1),
             candidate.description.clone(),
-            format!("{x:.2}, {y:.2}, {z:.2}"),
+            format!("{x:.2}"),
+            format!("{y:.2}"),
+            format!("{z:.2}"),
             candidate.targets.to_string(),
-            format!("{:.0} %", 100.0 * candidate.score.exp()),
+            format!("{:.0}", 100.0 * candidate.score.exp()),
             best.join(", "),
         ]
     };
-    let rows: Vec<_> = summary.candidates.iter().take(SHOWN_CANDIDATES).enumerate().map(row).collect();
-    let head = ["station", "where", "x, y, z in m", "targets", "deviations on the mean", "largest gains"];
-    page.table(head, rows);
+    let rows = summary.candidates.iter().take(SHOWN_CANDIDATES).enumerate().map(row).collect();
+    let columns = [
+        Column::words("station"),
+        Column::words("where"),
+        Column::number("x").unit("m"),
+        Column::number("y").unit("m"),
+        Column::number("z").unit("m"),
+        Column::number("targets"),
+        Column::number("deviations on the mean").unit("%"),
+        Column::words("largest gains"),
+    ];
+    document.table(columns, rows);
 }
 
-fn drawing(page: &mut Document, network: &Network, outcome: &PlanOutcome) {
-    page.section("Network");
+fn drawing(network: &Network, outcome: &PlanOutcome) -> Vec<(Figure, String)> {
     let stations: Vec<AdjustedStation> = network
         .stations
         .iter()
@@ -120,20 +168,15 @@ fn drawing(page: &mut Document, network: &Network, outcome: &PlanOutcome) {
             world_from_camera: candidate.world_from_camera,
         })
         .collect();
-    page.figures(map::figures(&network.camera, &stations, &targets, &proposed));
+    map::figures(&network.camera, &stations, &targets, &proposed)
 }
 
-fn points(page: &mut Document, network: &Network, outcome: &PlanOutcome) -> Result<()> {
-    page.section("What the calibration's uncertainty would mean for a point");
-    let models = [(None, network.range_model.clone())];
-    let source = PointUncertainty { camera: &network.camera, range_models: &models };
-    page.figures(point_uncertainty::figures(&source, &outcome.estimated, &outcome.covariance, f64::NAN)?);
-    Ok(())
-}
-
-fn sightings(page: &mut Document, summary: &PlanSummary) {
-    page.section("Targets in the image of each station");
-    let rows: Vec<_> =
+fn sightings(document: &mut Document, summary: &PlanSummary) {
+    document.section("Targets in the image of each station");
+    let rows =
         summary.sightings_per_station.iter().map(|(name, count)| vec![name.clone(), count.to_string()]).collect();
-    page.table(["station", "targets"], rows);
+    document.long_table([Column::words("station"), Column::number("targets")], rows);
+    for (station, count) in summary.sightings_per_station.iter().filter(|(_, count)| *count < FEWEST_TARGETS) {
+        document.paragraph(format!("note: station {station} sees {count} targets"));
+    }
 }

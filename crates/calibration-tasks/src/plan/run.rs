@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use range_io::atomic::{Destination, write_text};
 use self_calibration::PlanOptions;
 
+use crate::plan::document::{Figures, document};
 use crate::plan::files::read_plan;
 use crate::plan::summary::PlanSummary;
 use pipeline::command::Progress;
@@ -51,7 +52,8 @@ fn plan_into(destination: &Destination, request: &NetworkPlanRequest, progress: 
     let folder = destination.open()?;
     let summary = PlanSummary::new(survey, start.words, &outcome, request);
     write_text(folder.file("summary.json")?, &json(&summary)?)?;
-    write_text(folder.file("report.html")?, &crate::plan::document::render_plan(&network, &outcome, &summary)?)?;
+    let page = document(&summary, Figures::new(&network, &outcome)?);
+    write_text(folder.file("report.html")?, &page.html())?;
     folder.commit()?;
     progress.advance(2);
     progress.finish();

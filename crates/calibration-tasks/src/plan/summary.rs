@@ -1,6 +1,5 @@
 //! Every figure of a plan, by name, as file and as words.
 
-use std::fmt;
 use std::path::{Path, PathBuf};
 
 use camera_model::euler_from_pose;
@@ -123,47 +122,5 @@ fn candidate(candidate: &Candidate) -> CandidateSummary {
         targets: candidate.targets,
         score: candidate.score,
         gain: candidate.gain.clone(),
-    }
-}
-
-/// Candidates in the words for a terminal; the summary has them all.
-const NAMED_CANDIDATES: usize = 5;
-
-impl fmt::Display for PlanSummary {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(f, "plan of {}, camera: {}", self.survey, self.start)?;
-        writeln!(
-            f,
-            "{} observations, {} unknowns, redundancy {}, {} stations",
-            self.observations,
-            self.unknowns,
-            self.redundancy,
-            self.sightings_per_station.len()
-        )?;
-        writeln!(f, "{:<10} {:>12}  unit", "parameter", "expected +-")?;
-        for (name, parameter) in self.parameters.0.iter().filter(|(_, parameter)| parameter.status == "estimated") {
-            writeln!(f, "{name:<10} {:>12.2e}  {}", parameter.sigma_prior, parameter.unit)?;
-        }
-        let points = self.point_sigma.iter();
-        let points: Vec<String> = points.map(|p| format!("{:.2} mm at {} m", 1e3 * p.sigma_m, p.range_m)).collect();
-        writeln!(f, "a point, from the calibration alone: {}", points.join(", "))?;
-        let blind = self.sightings_per_station.iter().filter(|(_, count)| *count < 3);
-        for (station, count) in blind {
-            writeln!(f, "note: station {station} sees {count} targets")?;
-        }
-        for sentence in &self.diagnosis {
-            writeln!(f, "note: {sentence}")?;
-        }
-        for (rank, candidate) in self.candidates.iter().take(NAMED_CANDIDATES).enumerate() {
-            writeln!(
-                f,
-                "add {}: {}, {} targets, deviations {:.0} % of what they are, on the mean",
-                rank + 1,
-                candidate.description,
-                candidate.targets,
-                100.0 * candidate.score.exp()
-            )?;
-        }
-        write!(f, "written to {}: report.html, summary.json", self.out.display())
     }
 }

@@ -1,6 +1,8 @@
 //! One run: survey in, stages in order, results out.
 
+pub(crate) mod correction_maps;
 pub(crate) mod document;
+pub(crate) mod figures;
 pub(crate) mod measure;
 pub(crate) mod results;
 pub(crate) mod simulate;

@@ -11,6 +11,8 @@ use crate::Result;
 use crate::command::destination::json;
 use crate::command::progress::Progress;
 use crate::command::verdict::{Doubt, words_about};
+use crate::run::document::document;
+use crate::run::figures::Figures;
 use crate::run::summary::Summary;
 use crate::survey::outcome::{Outcome, StationPose};
 
@@ -22,7 +24,7 @@ pub(crate) fn write(
     progress: &dyn Progress,
 ) -> Result<()> {
     progress.begin("write results", 3);
-    let page = crate::run::document::render(outcome, summary)?;
+    let page = document(summary, Figures::new(outcome)?).html();
     let folder = destination.open()?;
     match outcome.common_poses() {
         Some(poses) => write_in_common_frame(&folder, outcome, &poses, &summary.doubts)?,

@@ -1,11 +1,8 @@
 //! Every figure of a run, by name; written as `summary.json` and shown as words.
 
 use std::collections::BTreeMap;
-use std::fmt;
 
 use serde::Serialize;
-
-use report::millimetres;
 
 use crate::command::verdict::{Doubt, Judged, Verdict};
 use crate::run::results::OwnCloud;
@@ -146,81 +143,5 @@ impl Judged for Summary {
             None if self.doubts.is_empty() => Verdict::Done,
             None => Verdict::Doubtful,
         }
-    }
-}
-
-impl fmt::Display for Summary {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let [width, height] = self.size_px;
-        writeln!(
-            f,
-            "{}: {} frames of {} stations, {width}x{height}, level {}, {} points in {:.1} s",
-            self.pipeline, self.frames, self.stations, self.level, self.points, self.seconds
-        )?;
-        writeln!(f, "calibration: {}", self.calibration)?;
-        writeln!(f, "{:<18} {:>9}  {:>12}  {:>12}  {:>12}", "stage", "time", "change", "error", "95 % below")?;
-        for stage in &self.stages {
-            let truth = |pick: fn(&RangeTruth) -> f64| millimetres(stage.truth.as_ref().map(pick));
-            writeln!(
-                f,
-                "{:<18} {:>6.0} ms  {:>12}  {:>12}  {:>12}",
-                stage.name,
-                1e3 * stage.seconds,
-                millimetres(stage.change_median_m),
-                truth(|t| t.range_error_median_m),
-                truth(|t| t.range_error_p95_m)
-            )?;
-        }
-        for (stage, reason) in &self.ruled_out {
-            writeln!(f, "{stage:<18} ruled out: {reason}")?;
-        }
-        let flags: Vec<String> =
-            self.flags_fraction.iter().map(|(name, fraction)| format!("{name} {:.1} %", 100.0 * fraction)).collect();
-        writeln!(f, "flags: {}", flags.join(", "))?;
-        self.write_quality(f)?;
-        writeln!(f, "what is left: {}", self.remaining)?;
-        for doubt in &self.doubts {
-            writeln!(f, "doubt: {doubt}")?;
-        }
-        let clouds = match self.own_clouds.len() {
-            0 => "cloud.ply, stations.csv, trajectory.txt".to_owned(),
-            count => format!("clouds/ ({count} clouds, each in the frame of its own camera; no poses)"),
-        };
-        write!(f, "written to {}: report.html, summary.json, {clouds}", self.out)
-    }
-}
-
-impl Summary {
-    fn write_quality(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if let Some(registration) = &self.registration {
-            let sigma0 = registration.sigma0.map_or_else(String::new, |s| format!(", sigma0 {s:.2}"));
-            writeln!(f, "registration: {} pairs{sigma0}", registration.pairs.len())?;
-        }
-        if let Some(reference) = &self.reference {
-            writeln!(
-                f,
-                "against the reference range: constant {:.1} mm, robust standard deviation {:.1} mm",
-                1e3 * reference.constant_m,
-                1e3 * reference.robust_standard_deviation_m
-            )?;
-        }
-        if let Some(truth) = &self.truth {
-            writeln!(
-                f,
-                "against the truth: median {}, 95 % below {}, wrap counts right {:.2} %, flagged {:.1} %",
-                millimetres(Some(truth.ranges.range_error_median_m)),
-                millimetres(Some(truth.ranges.range_error_p95_m)),
-                100.0 * truth.ranges.wrap_count_right_fraction,
-                100.0 * truth.ranges.flagged_fraction
-            )?;
-            if let (Some(position), Some(attitude)) = (truth.position_error_max_m, truth.attitude_error_max_deg) {
-                writeln!(
-                    f,
-                    "poses: position within {}, attitude within {attitude:.3} degrees",
-                    millimetres(Some(position))
-                )?;
-            }
-        }
-        Ok(())
     }
 }

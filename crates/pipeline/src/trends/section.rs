@@ -1,6 +1,6 @@
 //! Mean residuals in bins of what they might still depend on.
 
-use report::{Axes, CATEGORIES, Document, Figure, Series, curves};
+use report::{Axes, CATEGORIES, Column, Document, Figure, Series, curves};
 use residual_tests::TrendVariable;
 
 use crate::trends::{RemainingErrors, TrendSummary, sentence};
@@ -11,28 +11,31 @@ const TITLE: &str = "Is what is left random?";
 pub fn trends_of_calibration(page: &mut Document, trends: &[TrendSummary]) {
     let Some(sentence) = sentence(trends) else { return };
     page.section(TITLE);
+    let lacks = if trends.iter().any(TrendSummary::is_trend) { ": the model lacks a term" } else { "" };
+    page.remark(format!("note: {sentence}{lacks}"));
     tests(page, trends, &sentence);
 }
 
 /// What a run leaves of the ranges' errors.
 pub fn remaining_errors(page: &mut Document, remaining: &RemainingErrors) {
     page.section(TITLE);
-    page.paragraph(&remaining.basis_words);
+    page.remark(format!("what is left: {remaining}"));
+    page.explanation(&remaining.basis_words);
     if remaining.pixels == 0 {
         return;
     }
     let RemainingErrors { pixels, gross_errors, .. } = remaining;
-    page.paragraph(&format!("{pixels} pixels were tested; {gross_errors} more with gross errors were left out."));
+    page.explanation(format!("{pixels} pixels were tested; {gross_errors} more with gross errors were left out."));
     tests(page, &remaining.variables, &remaining.verdict);
 }
 
 /// A table of the tests, and a curve with its band of two standard errors for each variable.
 fn tests(page: &mut Document, trends: &[TrendSummary], sentence: &str) {
-    page.paragraph(&format!(
+    page.explanation(format!(
         "Means of the residuals in bins, compared with one another by the scatter of pixels that are independent of each \
          other; all variables together raise a false alarm once in a hundred times. Here {sentence}."
     ));
-    let millimetres = |metres: Option<f64>| metres.map_or("–".to_owned(), |metres| format!("{:.2} mm", 1e3 * metres));
+    let millimetres = |metres: Option<f64>| metres.map_or("–".to_owned(), |metres| format!("{:.2}", 1e3 * metres));
     let row = |trend: &TrendSummary| {
         let p =
             trend.p_value.map_or("–".to_owned(), |p| if p < 0.0005 { "< 0.001".to_owned() } else { format!("{p:.3}") });
@@ -40,10 +43,15 @@ fn tests(page: &mut Document, trends: &[TrendSummary], sentence: &str) {
         vec![trend.variable.to_owned(), trend.verdict.clone(), p, millimetres(trend.rms_m), independent]
     };
     let rows: Vec<Vec<String>> = trends.iter().map(row).collect();
-    page.table(["residual against", "verdict", "p", "rms of the trend", "independent of each other"], rows);
-    let figures: Vec<(Figure, String)> =
-        trends.iter().filter(|trend| !trend.bins.is_empty()).map(|trend| (figure(trend), String::new())).collect();
-    page.figures(figures);
+    let columns = [
+        Column::words("residual against"),
+        Column::words("verdict"),
+        Column::number("p"),
+        Column::number("rms of the trend").unit("mm"),
+        Column::words("independent of each other"),
+    ];
+    page.long_table(columns, rows);
+    page.figures(trends.iter().filter(|trend| !trend.bins.is_empty()).map(figure));
 }
 
 fn figure(trend: &TrendSummary) -> Figure {

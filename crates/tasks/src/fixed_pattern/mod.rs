@@ -11,12 +11,12 @@ use std::time::Instant;
 use range_io::atomic::Destination;
 use range_io::calibration::Calibration;
 use range_io::survey::{Level, Survey};
+use report::pattern_figures;
 use sensor_noise::{PatternEstimate, PatternOptions, PatternVerdict, WallCapture, estimate_fixed_pattern};
 
 use crate::further_term::{provenance_with, start, write};
 use pipeline::command::Progress;
 use pipeline::command::{Inputs, json, produce};
-use pipeline::figures::pattern_figures;
 use pipeline::plan::{CorrectRangeOptions, DeconvolveOptions, DemodulateOptions, UnwrapOptions};
 use pipeline::run::process_with;
 use pipeline::stages::corrects_ranges;
@@ -79,7 +79,9 @@ fn estimate(
     if summary.applied {
         add_to(&mut calibration, request, &estimate);
     }
-    let page = document::document(&summary, pattern_figures(&estimate.pattern)?).html();
+    let pattern = &estimate.pattern;
+    let offsets = pattern_figures(pattern.width, &pattern.offset_m, &pattern.sigma_m)?;
+    let page = document::document(&summary, offsets).html();
     write(destination, Some(&calibration), &json(&summary)?, &page)?;
     progress.finish();
     Ok(summary)

@@ -15,4 +15,3 @@ pub use outcome::{TrackLoss, TrackTruth, TrackVerdict, TrackedFrame};
 pub use request::TrackRequest;
 pub use run::track;
 pub use summary::TrackSummary;
-

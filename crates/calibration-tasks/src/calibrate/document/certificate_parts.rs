@@ -1,7 +1,7 @@
 //! Parts of a certificate that a calibration's report shows as well.
 
 use crate::calibrate::{COVERAGE, CalibrationSummary, Certificate, ExpandedUncertainty, NotoriousPair, TestVerdict};
-use report::Document;
+use report::{Block, Document, Place};
 
 const NOT_GIVEN: &str = "not given";
 
@@ -35,12 +35,12 @@ pub(crate) fn conditions(page: &mut Document, certificate: &Certificate, summary
         ("method", format!("{}: {}", summary.method.replace('-', " "), summary.describe)),
         ("start values", summary.start.clone()),
     ];
-    page.table(["what", "as given"], rows.map(|(what, given)| vec![what.to_owned(), given]).to_vec());
+    page.long_table(["what", "as given"], rows.map(|(what, given)| vec![what.to_owned(), given]).to_vec());
 }
 
 /// What every test says, and where its values stand.
 pub(crate) fn verdicts(page: &mut Document, certificate: &Certificate) {
-    page.paragraph("Rows and lines are those of residuals.csv, whose first line is its head.");
+    page.explanation("Rows and lines are those of residuals.csv, whose first line is its head.");
     let row = |verdict: &TestVerdict| {
         let passed = match verdict.passed {
             Some(true) => "passed",
@@ -50,13 +50,13 @@ pub(crate) fn verdicts(page: &mut Document, certificate: &Certificate) {
         vec![verdict.test.clone(), passed.to_owned(), verdict.words.clone(), verdict.rows.clone()]
     };
     let rows: Vec<_> = certificate.verdicts.iter().map(row).collect();
-    page.table(["test", "verdict", "what was found", "rows"], rows);
+    page.long_table(["test", "verdict", "what was found", "rows"], rows);
 }
 
 /// For what the calibration holds.
 pub(crate) fn span(page: &mut Document, certificate: &Certificate) {
-    page.list(&certificate.span);
-    page.paragraph("Outside of this, corrections are extrapolated, and pixels are flagged `outside_span`.");
+    page.add(Block::List(certificate.span.clone()), Place::Page);
+    page.explanation("Outside of this, corrections are extrapolated, and pixels are flagged `outside_span`.");
 }
 
 /// Expanded uncertainties at chosen places.
@@ -64,8 +64,8 @@ pub(crate) fn uncertainty(page: &mut Document, certificate: &Certificate) {
     if certificate.expanded_uncertainty.is_empty() {
         return;
     }
-    page.subsection("Expanded uncertainty at chosen places");
-    page.paragraph(&format!(
+    page.add(Block::Subtitle("Expanded uncertainty at chosen places".to_owned()), Place::Page);
+    page.explanation(&format!(
         "Half widths of intervals with the coverage factor k = {COVERAGE} (about 95 %), millimetre. By the calibration: \
          propagated from the covariance of all estimated parameters, scaled with sigma0 where that is above 1; common to all \
          measurements, so that no mean makes it smaller. With noise: that of one frame and pixel at that amplitude added, \
@@ -96,7 +96,7 @@ pub(crate) fn uncertainty(page: &mut Document, certificate: &Certificate) {
         "range, with noise",
         "point, with noise",
     ];
-    page.table(head, rows);
+    page.long_table(head, rows);
 }
 
 /// Pairs that are hard to separate.
@@ -112,7 +112,7 @@ pub(crate) fn pairs(page: &mut Document, pairs: &[NotoriousPair]) {
         ]
     };
     let rows: Vec<_> = pairs.iter().map(row).collect();
-    page.table(["notorious pair", "correlation", "what separates it"], rows);
+    page.long_table(["notorious pair", "correlation", "what separates it"], rows);
 }
 
 /// Digests of the files.
@@ -122,5 +122,5 @@ pub(crate) fn inputs(page: &mut Document, certificate: &Certificate) {
         .iter()
         .map(|input| vec![input.file.clone(), input.bytes.to_string(), input.sha256.clone()])
         .collect();
-    page.table(["file read", "bytes", "SHA-256"], rows);
+    page.long_table(["file read", "bytes", "SHA-256"], rows);
 }

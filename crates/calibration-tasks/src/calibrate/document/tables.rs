@@ -1,161 +1,216 @@
-//! Figures of merit and tables of a calibration's report.
+//! Figures of merit and tables of a calibration.
 
-use error_models::ParameterStatus;
-use report::Document;
-use self_calibration::{CalibratedParameter, CalibrationOutcome};
+use std::collections::BTreeMap;
 
-use crate::calibrate::{CalibrationSummary, readable};
+use report::{Block, Column, Document, Merit, Place, Table};
 
-pub(crate) fn figures_of_merit(page: &mut Document, summary: &CalibrationSummary) {
-    let mut cards = vec![
-        (summary.observations.to_string(), "observed values".to_owned()),
-        (summary.unknowns.to_string(), "unknowns".to_owned()),
-        (summary.datum_defect.to_string(), "datum defect".to_owned()),
-        (summary.redundancy.to_string(), "redundancy".to_owned()),
+use crate::calibrate::results::summary::{DecisionSummary, GroupSummary, ParameterSummary, RejectedObservation};
+use crate::calibrate::{CalibrationSummary, readable, value_words};
+
+pub(crate) fn figures_of_merit(document: &mut Document, summary: &CalibrationSummary) {
+    let mut merits = vec![
+        Merit::new(summary.observations.to_string(), "observed values"),
+        Merit::new(summary.unknowns.to_string(), "unknowns"),
+        Merit::new(summary.datum_defect.to_string(), "datum defect"),
+        Merit::new(summary.redundancy.to_string(), "redundancy"),
     ];
     if let Some(sigma0) = summary.sigma0 {
-        cards.push((format!("{sigma0:.3}"), "sigma0 (1: as noisy as stated)".to_owned()));
+        merits.push(Merit::new(format!("{sigma0:.3}"), "sigma0 (1: as noisy as stated)"));
     }
-    cards.push((summary.rejected.len().to_string(), "observed values rejected".to_owned()));
-    cards.push((summary.iterations.to_string(), "iterations".to_owned()));
-    page.merits(cards);
+    merits.push(Merit::new(summary.rejected.len().to_string(), "observed values rejected"));
+    merits.push(Merit::new(summary.iterations.to_string(), "iterations"));
+    document.merits(merits);
 }
 
-pub(crate) fn diagnosis(page: &mut Document, diagnosis: &[String]) {
-    page.section("Diagnosis");
+pub(crate) fn diagnosis(document: &mut Document, diagnosis: &[String]) {
+    document.section("Diagnosis");
     if diagnosis.is_empty() {
-        page.paragraph("Nothing is weakly determined.");
+        document.explanation("Nothing is weakly determined.");
     }
-    page.list(diagnosis);
+    document.list(diagnosis);
 }
 
-/// All parameters with both deviations and their significance.
-pub(crate) fn parameters(page: &mut Document, outcome: &CalibrationOutcome) {
-    page.section("Parameters");
-    page.paragraph(
+/// All parameters with both deviations, and their significance where it is known.
+pub(crate) fn parameters(
+    document: &mut Document,
+    summary: &CalibrationSummary,
+    significance_p: &BTreeMap<String, f64>,
+) {
+    if summary.parameters.0.is_empty() {
+        return;
+    }
+    document.section("Parameters");
+    document.explanation(
         "Prior: from the standard deviations that were given to the observations. Posterior: scaled with sigma0. \
          p: probability of a value this far from zero if the parameter were zero.",
     );
-    let rows: Vec<Vec<String>> = outcome.parameters.iter().map(parameter_row).collect();
-    page.table(
-        ["parameter", "value", "sigma prior", "sigma posterior", "unit", "value / sigma", "p", "verdict", "status"],
-        rows,
-    );
+    let mut columns = vec![
+        Column::words("parameter"),
+        Column::number("value"),
+        Column::number("sigma prior"),
+        Column::number("sigma posterior"),
+        Column::words("unit"),
+        Column::words("status"),
+    ];
+    let tested = !significance_p.is_empty();
+    if tested {
+        columns.extend([Column::number("value / sigma"), Column::number("p"), Column::words("verdict")]);
+    }
+    let row = |(name, parameter): &(String, ParameterSummary)| {
+        let mut row = parameter_row(name, parameter);
+        if tested {
+            row.extend(test(name, parameter, significance_p.get(name).copied().unwrap_or(f64::NAN)));
+        }
+        row
+    };
+    document.table(columns, summary.parameters.0.iter().map(row).collect());
 }
 
-fn parameter_row(parameter: &CalibratedParameter) -> Vec<String> {
-    let estimated = parameter.status == ParameterStatus::Estimated;
-    let dash = || "–".to_owned();
+fn dash() -> String {
+    "–".to_owned()
+}
+
+fn parameter_row(name: &str, parameter: &ParameterSummary) -> Vec<String> {
+    let estimated = parameter.status == "estimated";
     let sigma = |value: f64| if estimated && value.is_finite() { format!("{value:.2e}") } else { dash() };
-    let ratio = parameter.value.abs() / parameter.sigma_prior;
-    // A principal distance of zero is no hypothesis worth a test.
-    let (ratio, p) = if parameter.name == "c" { (f64::NAN, f64::NAN) } else { (ratio, parameter.significance_p) };
     vec![
-        parameter.name.clone(),
-        value_text(parameter),
+        name.to_owned(),
+        value_words(parameter.value, parameter.sigma_prior),
         sigma(parameter.sigma_prior),
         sigma(parameter.sigma_posterior),
         parameter.unit.clone(),
-        if estimated && ratio.is_finite() { format!("{ratio:.1}") } else { dash() },
+        parameter.status.to_owned(),
+    ]
+}
+
+/// Whether a parameter differs from zero.
+fn test(name: &str, parameter: &ParameterSummary, p: f64) -> [String; 3] {
+    let ratio = parameter.value.abs() / parameter.sigma_prior;
+    // A principal distance of zero is no hypothesis worth a test.
+    let (ratio, p) = if name == "c" { (f64::NAN, f64::NAN) } else { (ratio, p) };
+    [
+        if parameter.status == "estimated" && ratio.is_finite() { format!("{ratio:.1}") } else { dash() },
         if p.is_finite() { probability(p) } else { dash() },
         match p {
             p if p.is_nan() => dash(),
             p if p < 0.05 => "significant".to_owned(),
             _ => "not significant".to_owned(),
         },
-        if estimated { "estimated".to_owned() } else { "held".to_owned() },
     ]
-}
-
-/// A value down to a tenth of its standard deviation.
-pub(crate) fn value_text(parameter: &CalibratedParameter) -> String {
-    let places = 1.0 - parameter.sigma_prior.log10().floor();
-    match parameter.value {
-        value if parameter.sigma_prior > 0.0 && (0.0..=8.0).contains(&places) => {
-            format!("{value:.places$}", places = places as usize)
-        }
-        0.0 => "0".to_owned(),
-        value if (1e-3..1e4).contains(&value.abs()) => format!("{value:.5}"),
-        value => format!("{value:.4e}"),
-    }
 }
 
 fn probability(p: f64) -> String {
     if p < 0.0005 { "< 0.001".to_owned() } else { format!("{p:.3}") }
 }
 
-pub(crate) fn groups(page: &mut Document, summary: &CalibrationSummary) {
-    page.section("Observation groups and variance components");
-    page.paragraph(
+pub(crate) fn groups(document: &mut Document, summary: &CalibrationSummary) {
+    document.section("Observation groups and variance components");
+    document.explanation(
         "sigma0 of a group is how much larger its standard deviations are than they were given: 1 where the weights \
          are right.",
     );
-    let row = |group: &crate::calibrate::GroupSummary| {
+    let row = |group: &GroupSummary| {
         let (rms, unit) = readable(group.rms, group.unit);
         vec![
             group.name.clone(),
             group.observations.to_string(),
             format!("{:.1}", group.redundancy),
-            format!("{rms:.3} {unit}"),
-            group.sigma0.map_or("–".to_owned(), |sigma0| format!("{sigma0:.3}")),
+            format!("{rms:.3}"),
+            unit.to_owned(),
+            group.sigma0.map_or_else(dash, |sigma0| format!("{sigma0:.3}")),
         ]
     };
-    let rows: Vec<_> = summary.groups.iter().chain(&summary.amplitude_classes).map(row).collect();
-    page.table(["group", "observed values", "redundancy", "rms of the residuals", "sigma0"], rows);
+    let columns = [
+        Column::words("group"),
+        Column::number("observed values"),
+        Column::number("redundancy"),
+        Column::number("rms of the residuals"),
+        Column::words("unit"),
+        Column::number("sigma0"),
+    ];
+    let groups = summary.groups.iter().chain(&summary.amplitude_classes);
+    if groups.clone().next().is_some() {
+        document.table(columns, groups.map(row).collect());
+    }
 }
 
 /// Rejected values in the table; a reader looks at the worst, and `residuals.csv` has all.
 const MOST_REJECTED: usize = 100;
+/// And in the text.
+const NAMED_REJECTIONS: usize = 8;
 
-pub(crate) fn rejected(page: &mut Document, summary: &CalibrationSummary) {
-    page.section("Rejected observations");
+pub(crate) fn rejected(document: &mut Document, summary: &CalibrationSummary) {
+    document.section("Rejected observations");
     if summary.rejected.is_empty() {
-        page.paragraph("None.");
+        document.explanation("None.");
         return;
     }
-    let row = |gross: &crate::calibrate::RejectedObservation| {
-        let (residual, unit) = readable(gross.residual, gross.unit);
-        vec![
-            gross.station.clone(),
-            gross.target.clone(),
-            gross.component.to_owned(),
-            format!("{:.4}", gross.observed),
-            format!("{residual:.3} {unit}"),
-            format!("{:.1}", gross.residual_in_sigmas),
-        ]
-    };
-    let mut largest: Vec<_> = summary.rejected.iter().collect();
+    let mut largest: Vec<&RejectedObservation> = summary.rejected.iter().collect();
     largest.sort_by(|a, b| b.residual_in_sigmas.abs().total_cmp(&a.residual_in_sigmas.abs()));
-    if largest.len() > MOST_REJECTED {
-        let left = largest.len() - MOST_REJECTED;
-        largest.truncate(MOST_REJECTED);
-        page.paragraph(&format!(
-            "The {MOST_REJECTED} that are furthest off in their standard deviations; {left} more are in residuals.csv \
-             (verdict `rejected`)."
-        ));
+    for (most, place) in [(MOST_REJECTED, Place::Page), (NAMED_REJECTIONS, Place::Text)] {
+        if let Some(left) = largest.len().checked_sub(most).filter(|left| *left > 0) {
+            let words = format!(
+                "The {most} that are furthest off in their standard deviations; {left} more are in residuals.csv (verdict \
+                 `rejected`)."
+            );
+            document.add(Block::Paragraph(words), place);
+        }
+        let rows = largest.iter().take(most).map(|gross| rejected_row(gross)).collect();
+        document.add(Block::Table(Table::new(rejected_columns(), rows)), place);
     }
-    let rows: Vec<_> = largest.into_iter().map(row).collect();
-    page.table(["station", "target", "component", "observed", "observed minus predicted", "in sigmas"], rows);
 }
 
-pub(crate) fn decisions(page: &mut Document, outcome: &CalibrationOutcome) {
-    if outcome.decisions.is_empty() {
+fn rejected_columns() -> [Column; 8] {
+    [
+        Column::words("station"),
+        Column::words("target"),
+        Column::words("component"),
+        Column::number("line of observations.csv"),
+        Column::number("observed"),
+        Column::number("observed minus predicted"),
+        Column::words("unit"),
+        Column::number("in sigmas"),
+    ]
+}
+
+fn rejected_row(gross: &RejectedObservation) -> Vec<String> {
+    let (residual, unit) = readable(gross.residual, gross.unit);
+    vec![
+        gross.station.clone(),
+        gross.target.clone(),
+        gross.component.to_owned(),
+        gross.line.map_or_else(dash, |line| line.to_string()),
+        format!("{:.4}", gross.observed),
+        format!("{residual:.3}"),
+        unit.to_owned(),
+        format!("{:.1}", gross.residual_in_sigmas),
+    ]
+}
+
+pub(crate) fn decisions(document: &mut Document, summary: &CalibrationSummary) {
+    if summary.decisions.is_empty() {
         return;
     }
-    page.section("Choice of terms");
-    page.paragraph(
+    document.section("Choice of terms");
+    document.explanation(
         "All are estimated, each with what cameras show of it. Which of them the observations speak for: negative changes of \
          Schwarz's criterion do. Of the others no more is known than that, and their doubt is in all deviations.",
     );
-    let row = |decision: &self_calibration::TermDecision| {
+    let row = |decision: &DecisionSummary| {
         vec![
             decision.terms.join(", "),
             if decision.taken { "shown".to_owned() } else { "open".to_owned() },
-            if decision.significance_p.is_finite() { probability(decision.significance_p) } else { "–".to_owned() },
-            if decision.delta_bic.is_finite() { format!("{:+.1}", decision.delta_bic) } else { "–".to_owned() },
+            if decision.significance_p.is_finite() { probability(decision.significance_p) } else { dash() },
+            if decision.delta_bic.is_finite() { format!("{:+.1}", decision.delta_bic) } else { dash() },
             decision.reason.clone(),
         ]
     };
-    let rows: Vec<_> = outcome.decisions.iter().map(row).collect();
-    page.table(["terms", "by the observations", "p", "change of BIC", "reason"], rows);
+    let columns = [
+        Column::words("terms"),
+        Column::words("by the observations"),
+        Column::number("p"),
+        Column::number("change of BIC"),
+        Column::words("reason"),
+    ];
+    document.long_table(columns, summary.decisions.iter().map(row).collect());
 }

@@ -7,7 +7,7 @@ use report::{ColourMap, Figure, Scale, raster_figure};
 
 /// One picture for each group of terms that differs from pixel to pixel, in millimetres, all on one scale; what is the
 /// same everywhere stands in the caption. Nothing where the ranges were not corrected.
-pub(crate) fn correction_maps(view: &View) -> Result<Vec<(Figure, String)>> {
+pub(crate) fn correction_maps(view: &View) -> Result<Vec<Figure>> {
     let Some(record) = &view.correction else { return Ok(Vec::new()) };
     let maps = record.maps().map_err(|error| Error::Figure {
         figure: format!("range terms of {}", view.name()),
@@ -38,7 +38,7 @@ pub(crate) fn correction_maps(view: &View) -> Result<Vec<(Figure, String)>> {
         let besides = if index == 0 { constants.as_str() } else { "" };
         let most = largest(map).unwrap_or(0.0);
         let caption = format!("New minus old range; the largest change is {most:+.2} mm.{of_first}{besides}");
-        Ok((raster_figure(&format!("Correction: {name}"), width, map, &scale)?, caption))
+        Ok(raster_figure(&format!("Correction: {name}"), width, map, &scale)?.caption(caption))
     };
     groups.iter().enumerate().map(figure).collect()
 }

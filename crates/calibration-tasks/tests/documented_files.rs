@@ -3,7 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::common::{fixtures, has_capture, run, simulated};
+use crate::common::{fixtures, has_capture, request, simulated};
 use calibration_tasks::NetworkScene;
 use pipeline::{Plan, RunRequest, Silent, Source, Stage, Summary};
 use range_io::survey::Survey;
@@ -126,7 +126,8 @@ fn every_pipeline_of_the_repository_runs() {
         if matches!(&plan.source, Some(Source::Survey { .. })) && !has_capture(name) {
             continue;
         }
-        let summary = run(name, &folder.path().join(name)).unwrap_or_else(|error| panic!("{name}: {error}"));
+        let summary = calibration_tasks::run(&request(name, &folder.path().join(name)), &Silent)
+            .unwrap_or_else(|error| panic!("{name}: {error}"));
         assert!(summary.points > 0, "{name} has no points");
         assert_eq!(summary.stages.len(), plan.stages.len(), "{name}");
         if plan.stages.iter().any(|stage| matches!(stage, Stage::Adjust(_))) {

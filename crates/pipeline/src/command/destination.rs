@@ -14,6 +14,7 @@ use crate::{Error, Result};
 
 /// What a command reads, which its output must leave alone.
 #[derive(Debug, Clone, Default)]
+#[must_use]
 pub struct Inputs(BTreeSet<PathBuf>);
 
 impl Inputs {

@@ -3,7 +3,7 @@
 use std::fmt;
 
 use range_image::Flags;
-use report::{Axes, CATEGORIES, Column, Document, Merit, Series, curves, millimetres};
+use report::{Axes, Block, CATEGORIES, Column, Document, Merit, Place, Series, curves, millimetres};
 
 use crate::run::figures::Figures;
 use crate::run::summary::Summary;
@@ -42,7 +42,7 @@ pub(crate) fn document(summary: &Summary, figures: Figures) -> Document {
     pairs(&mut document, summary);
     document.section("Before and after, station by station");
     for (view, figures) in figures.views {
-        document.explanation(view);
+        document.add(Block::Subtitle(view), Place::Page);
         document.figures(figures);
     }
     if figures.not_pictured > 0 {
@@ -205,12 +205,12 @@ fn pairs(document: &mut Document, summary: &Summary) {
 fn flags(document: &mut Document, summary: &Summary) {
     document.section("Flags by reason");
     document.explanation("A flagged pixel keeps its value; the cloud's figures and pictures leave it out.");
-    let rows = Flags::NAMED.iter().enumerate().map(|(k, (_, name))| {
+    let rows = Flags::NAMED.iter().zip(COLOUR_NAMES).map(|((_, name), colour)| {
         let fraction = summary.flags_fraction.get(*name).copied().unwrap_or(0.0);
-        vec![(*name).replace('_', " "), COLOUR_NAMES[k].to_owned(), format!("{:.2}", 100.0 * fraction)]
+        vec![(*name).replace('_', " "), format!("{:.2}", 100.0 * fraction), colour.to_owned()]
     });
     let columns =
-        [Column::words("reason"), Column::words("colour in the pictures"), Column::number("pixels").unit("%")];
+        [Column::words("reason"), Column::number("pixels").unit("%"), Column::words("colour in the pictures")];
     document.table(columns, rows.collect());
 }
 

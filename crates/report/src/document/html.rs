@@ -72,8 +72,11 @@ fn write_block(html: &mut String, block: &Block) {
         Block::Paragraph(text) => writeln!(html, "<p>{}</p>", escape(text)),
         Block::Signature(text) => writeln!(html, "<p class=\"sign\">{}</p>", escape(text)),
         Block::Warnings(sentences) | Block::List(sentences) => {
-            let items: String = sentences.iter().map(|text| format!("<li>{}</li>", escape(text))).collect();
-            writeln!(html, "<ul>{items}</ul>")
+            html.push_str("<ul>");
+            for sentence in sentences {
+                let _ = write!(html, "<li>{}</li>", escape(sentence));
+            }
+            writeln!(html, "</ul>")
         }
         Block::Merits(merits) => {
             writeln!(html, "<div class=\"cards\">{}</div>", merits.iter().map(card).collect::<String>())

@@ -25,6 +25,8 @@ pub struct Document {
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Section {
     title: String,
+    /// Of a document, before any section was begun.
+    is_opening: bool,
     new_sheet: bool,
     blocks: Vec<(Block, Place)>,
 }
@@ -100,7 +102,7 @@ impl Document {
     /// A document without sections. `lead` says in a sentence what it is of.
     pub fn new(title: impl Into<String>, lead: impl Into<String>) -> Self {
         let (title, lead) = (title.into(), lead.into());
-        Self { title, lead, for_print: false, sections: vec![Section::default()] }
+        Self { title, lead, for_print: false, sections: vec![Section { is_opening: true, ..Section::default() }] }
     }
 
     /// A document whose page is made to be printed on A4.
@@ -115,7 +117,7 @@ impl Document {
 
     /// Begins a section on a new sheet of a page that is printed.
     pub fn sheet(&mut self, title: impl Into<String>) {
-        self.sections.push(Section { title: title.into(), new_sheet: true, blocks: Vec::new() });
+        self.sections.push(Section { title: title.into(), new_sheet: true, ..Section::default() });
     }
 
     /// Adds a block, shown where `place` says.

@@ -25,8 +25,11 @@ impl fmt::Display for Document {
 fn write_section(f: &mut fmt::Formatter<'_>, section: &Section) -> fmt::Result {
     let only_warnings = section.blocks.iter().all(|(block, _)| matches!(block, Block::Warnings(_)));
     // Warnings say in each line what they are.
-    if !section.title.is_empty() && !only_warnings {
-        write!(f, "\n\n{}", section.title)?;
+    match section.title.as_str() {
+        _ if only_warnings => {}
+        "" if section.is_opening => {}
+        "" => writeln!(f)?,
+        title => write!(f, "\n\n{title}")?,
     }
     let shown = section.blocks.iter().filter(|(block, place)| *place != Place::Page && block.has_text());
     shown.map(|(block, _)| block).try_for_each(|block| write_block(f, block))
@@ -34,7 +37,8 @@ fn write_section(f: &mut fmt::Formatter<'_>, section: &Section) -> fmt::Result {
 
 fn write_block(f: &mut fmt::Formatter<'_>, block: &Block) -> fmt::Result {
     match block {
-        Block::Subtitle(text) | Block::Paragraph(text) | Block::Signature(text) => write!(f, "\n{text}"),
+        Block::Subtitle(text) => write!(f, "\n\n{text}"),
+        Block::Paragraph(text) | Block::Signature(text) => write!(f, "\n{text}"),
         Block::List(sentences) => sentences.iter().try_for_each(|sentence| write!(f, "\n- {sentence}")),
         Block::Warnings(sentences) => sentences.iter().try_for_each(|sentence| write!(f, "\ndoubt: {sentence}")),
         Block::Merits(merits) => merits.iter().try_for_each(|merit| write!(f, "\n{}: {}", merit.name, merit.value)),

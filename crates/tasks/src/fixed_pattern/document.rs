@@ -15,10 +15,9 @@ impl fmt::Display for FixedPatternSummary {
 /// All of it, with figures of the pattern.
 pub(crate) fn document(summary: &FixedPatternSummary, pattern: Vec<Figure>) -> Document {
     let lead = format!(
-        "Range offsets of single pixels, estimated from {} frames of the walls of {} in {:.1} s. Calibration applied before: {}.",
+        "Range offsets of single pixels, estimated from {} frames of the walls of {}. Calibration applied before: {}.",
         summary.walls.len(),
         summary.survey,
-        summary.seconds,
         summary.calibration
     );
     let mut document = Document::new("rangecam: fixed pattern", lead);
@@ -35,7 +34,10 @@ pub(crate) fn document(summary: &FixedPatternSummary, pattern: Vec<Figure>) -> D
     walls(&mut document, summary);
     let left_out = if summary.applied { "with the pattern" } else { "without a pattern" };
     let out = summary.out.display();
-    document.closing(format!("written to {out}: calibration.ron {left_out}, summary.json, report.html"));
+    document.closing(format!(
+        "took {:.1} s; written to {out}: calibration.ron {left_out}, summary.json, report.html",
+        summary.seconds
+    ));
     document
 }
 

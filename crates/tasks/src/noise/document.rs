@@ -15,12 +15,11 @@ impl fmt::Display for NoiseSummary {
 /// All of it.
 pub(crate) fn document(summary: &NoiseSummary) -> Document {
     let lead = format!(
-        "Random errors of {}, estimated from {} values of the repeated frames of {} stations of {} in {:.1} s. Calibration: {}.",
+        "Random errors of {}, estimated from {} values of the repeated frames of {} stations of {}. Calibration: {}.",
         summary.noise_of,
         summary.values,
         summary.stations.len(),
         summary.survey,
-        summary.seconds,
         summary.calibration
     );
     let mut document = Document::new("rangecam: noise", lead);
@@ -37,7 +36,11 @@ pub(crate) fn document(summary: &NoiseSummary) -> Document {
     transfer(&mut document, summary);
     sigma(&mut document, summary);
     stations(&mut document, summary);
-    document.closing(format!("written to {}: calibration.ron, summary.json, report.html", summary.out.display()));
+    document.closing(format!(
+        "took {:.1} s; written to {}: calibration.ron, summary.json, report.html",
+        summary.seconds,
+        summary.out.display()
+    ));
     document
 }
 

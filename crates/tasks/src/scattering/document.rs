@@ -28,12 +28,11 @@ impl fmt::Display for ScatteringSummary {
 /// All of it, with the pictures of its stations.
 pub(crate) fn document(summary: &ScatteringSummary, pictures: Vec<Pictured>) -> Document {
     let lead = format!(
-        "Internal scattering, estimated from {} captures of {} (with objects in the foreground) and {} (without) in {:.1} s. \
+        "Internal scattering, estimated from {} captures of {} (with objects in the foreground) and {} (without). \
          Calibration: {}.",
         summary.captures.len(),
         summary.with_object,
         summary.without_object,
-        summary.seconds,
         summary.calibration
     );
     let mut document = Document::new("rangecam: internal scattering", lead);
@@ -41,7 +40,11 @@ pub(crate) fn document(summary: &ScatteringSummary, pictures: Vec<Pictured>) -> 
     parameters(&mut document, summary);
     moved(&mut document, pictures);
     captures(&mut document, summary);
-    document.closing(format!("written to {}: calibration.ron, summary.json, report.html", summary.out.display()));
+    document.closing(format!(
+        "took {:.1} s; written to {}: calibration.ron, summary.json, report.html",
+        summary.seconds,
+        summary.out.display()
+    ));
     document
 }
 

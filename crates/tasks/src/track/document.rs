@@ -22,8 +22,8 @@ pub(crate) fn document(summary: &TrackSummary, figures: Figures) -> Document {
         TrackVerdict::Lost => "lost",
     };
     let lead = format!(
-        "{} frames over {:.2} s, {verdict}; in {:.1} s. Datum: {}. Frames are expected by: {}. Calibration: {}.",
-        summary.frames, summary.duration_s, summary.seconds, summary.datum, summary.prior, summary.calibration
+        "{} frames over {:.2} s, {verdict}. Datum: {}. Frames are expected by: {}. Calibration: {}.",
+        summary.frames, summary.duration_s, summary.datum, summary.prior, summary.calibration
     );
     let mut document = Document::new("rangecam: tracking", lead);
     document.merits(merits(summary));
@@ -37,8 +37,8 @@ pub(crate) fn document(summary: &TrackSummary, figures: Figures) -> Document {
     document.section("Map");
     document.figures(figures.map);
     document.closing(format!(
-        "written to {}: report.html, summary.json, trajectory.txt, trajectory_adjusted.txt, stations.csv, cloud.ply",
-        summary.out
+        "took {:.1} s; written to {}: report.html, summary.json, trajectory.txt, trajectory_adjusted.txt, stations.csv, cloud.ply",
+        summary.seconds, summary.out
     ));
     document
 }

@@ -32,12 +32,11 @@ impl fmt::Display for WarmUpSummary {
 pub(crate) fn document(summary: &WarmUpSummary, drift: Option<Figure>) -> Document {
     let [first, last] = summary.time_span_s;
     let lead = format!(
-        "Drift of {} frames over {:.1} min of {}, {} pixels of them used, in {:.1} s. Power-on: {}. Change of: {}.",
+        "Drift of {} frames over {:.1} min of {}, {} pixels of them used. Power-on: {}. Change of: {}.",
         summary.frames,
         minutes(last - first),
         summary.survey,
         summary.pixels,
-        summary.seconds,
         summary.power_on,
         summary.change_of
     );
@@ -53,7 +52,11 @@ pub(crate) fn document(summary: &WarmUpSummary, drift: Option<Figure>) -> Docume
     test_section(&mut document, summary);
     rate_section(&mut document, summary);
     let calibration = summary.calibration.as_ref().map_or("", |_| "calibration.ron, ");
-    document.closing(format!("written to {}: {calibration}summary.json, report.html", summary.out.display()));
+    document.closing(format!(
+        "took {:.1} s; written to {}: {calibration}summary.json, report.html",
+        summary.seconds,
+        summary.out.display()
+    ));
     document
 }
 

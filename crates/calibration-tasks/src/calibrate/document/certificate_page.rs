@@ -14,7 +14,7 @@ pub(crate) fn render_certificate(certificate: &Certificate, summary: &Calibratio
         given(&conditions.operator),
         certificate.software
     );
-    let mut page = Document::for_print("Certificate of calibration", &lead);
+    let mut page = Document::for_print("Certificate of calibration", lead);
     page.section("Result");
     result(&mut page, summary);
     page.section("Camera and conditions");
@@ -46,7 +46,7 @@ fn result(page: &mut Document, summary: &CalibrationSummary) {
     } else {
         format!("{} doubts speak against using this calibration before they are cleared:", summary.doubts.len())
     };
-    page.paragraph(&format!(
+    page.paragraph(format!(
         "{verdict} {} observed values, {} unknowns, datum defect {}, redundancy {}, sigma0 {sigma0}, {} values rejected.",
         summary.observations,
         summary.unknowns,
@@ -84,9 +84,7 @@ fn stations(page: &mut Document, stations: &[CertifiedStation]) {
         return;
     }
     page.sheet("Stations");
-    page.paragraph(&format!(
-        "Positions and prior-scaled standard deviations along the axes of the world. {DETECTABLE}"
-    ));
+    page.paragraph(format!("Positions and prior-scaled standard deviations along the axes of the world. {DETECTABLE}"));
     let row = |station: &CertifiedStation| {
         let mut row = vec![station.station.clone(), coordinates(station.position_m)];
         row.push(station.sigma_position_m.map_or_else(held, millimetres));
@@ -113,7 +111,7 @@ fn targets(page: &mut Document, targets: &[CertifiedTarget]) {
         return;
     }
     page.sheet("Targets");
-    page.paragraph(&format!("Positions and prior-scaled standard deviations. {DETECTABLE}"));
+    page.paragraph(format!("Positions and prior-scaled standard deviations. {DETECTABLE}"));
     let row = |target: &CertifiedTarget| {
         let mut row = vec![target.target.clone(), coordinates(target.position_m), millimetres(target.sigma_m)];
         row.extend(observed(&target.observed));

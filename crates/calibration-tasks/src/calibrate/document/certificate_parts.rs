@@ -65,7 +65,7 @@ pub(crate) fn uncertainty(page: &mut Document, certificate: &Certificate) {
         return;
     }
     page.add(Block::Subtitle("Expanded uncertainty at chosen places".to_owned()), Place::Page);
-    page.explanation(&format!(
+    page.explanation(format!(
         "Half widths of intervals with the coverage factor k = {COVERAGE} (about 95 %), millimetre. By the calibration: \
          propagated from the covariance of all estimated parameters, scaled with sigma0 where that is above 1; common to all \
          measurements, so that no mean makes it smaller. With noise: that of one frame and pixel at that amplitude added, \

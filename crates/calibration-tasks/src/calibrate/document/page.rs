@@ -19,11 +19,10 @@ impl fmt::Display for CalibrationSummary {
 /// All of it, with its figures.
 pub(crate) fn document(summary: &CalibrationSummary, figures: Figures) -> Document {
     let lead = format!(
-        "Calibration of {} by the {} method ({}) in {:.1} s. Start values: {}.",
+        "Calibration of {} by the {} method ({}). Start values: {}.",
         summary.survey,
         summary.method.replace('-', " "),
         summary.describe,
-        summary.seconds,
         summary.start
     );
     let mut document = Document::new("rangecam: calibration", lead);
@@ -80,8 +79,9 @@ pub(crate) fn document(summary: &CalibrationSummary, figures: Figures) -> Docume
     }
     document.closing(if summary.converged {
         format!(
-            "written to {}: report.html, certificate.html, summary.json, calibration.ron, adjusted_stations.csv, \
+            "took {:.1} s; written to {}: report.html, certificate.html, summary.json, calibration.ron, adjusted_stations.csv, \
              adjusted_targets.csv, residuals.csv",
+            summary.seconds,
             summary.out.display()
         )
     } else {

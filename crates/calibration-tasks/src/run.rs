@@ -3,17 +3,15 @@
 use std::path::{Path, PathBuf};
 
 use error_models::ModelSet;
+use pipeline::Result;
+use pipeline::command::{Inputs, Progress, produce};
+use pipeline::plan::{DriftTreatment, NetworkCalibration};
+use pipeline::run::{CALIBRATION, NETWORK, RunRequest, Summary, beside, run_with};
 use range_io::calibration::Calibration;
 use self_calibration::{CalibrationOptions, TermSelection};
 
 use crate::calibrate::{CalibrateMethod, CalibrateRequest, CertificateRequest, OffsetModel, TableDefaults, calibrate};
 use crate::scene::{NetworkScene, START, simulate_into};
-use pipeline::Result;
-use pipeline::command::Progress;
-use pipeline::command::{Inputs, produce};
-use pipeline::plan::{DriftTreatment, NetworkCalibration};
-use pipeline::run::Summary;
-use pipeline::run::{CALIBRATION, NETWORK, RunRequest, beside, run_with};
 
 /// Runs a pipeline, also one that calibrates a network before, and writes its results into the request's output folder;
 /// network and calibration stand in folders beside it.

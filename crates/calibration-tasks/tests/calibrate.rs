@@ -2,14 +2,15 @@
 
 use std::path::Path;
 
-use crate::calibration_setup::{calibrate, changed, request, target_field, terms};
-use crate::common::fixtures;
 use calibration_tasks::{CalibrateMethod, CalibrationSummary, Method, NetworkPlanRequest, PlanOptions, TermSelection};
 use error_models::ParameterStatus;
 use pipeline::Silent;
 use range_io::calibration::Calibration;
 use range_io::tables::{read_residuals, read_stations, read_targets};
 use serde_json::Value;
+
+use crate::calibration_setup::{calibrate, changed, request, target_field, terms};
+use crate::common::fixtures;
 
 /// Estimated parameters lie within this many of their standard deviations of the truth. Of a few dozen normal values
 /// one lies beyond 4 in one survey of five hundred, and the surveys are seeded.

@@ -2,8 +2,9 @@
 
 use std::path::Path;
 
-use crate::calibration_setup::{calibrate, changed, edit, keep_lines, terms};
 use calibration_tasks::{CalibrateMethod, CalibrateRequest, Method, NetworkDatum};
+
+use crate::calibration_setup::{calibrate, changed, edit, keep_lines, terms};
 
 /// What a calibration says of a changed fixture; it must fail and leave no output.
 fn message(change: impl FnOnce(&Path), ask: impl FnOnce(&mut CalibrateRequest)) -> String {

@@ -3,10 +3,11 @@
 
 use std::path::Path;
 
-use crate::calibration_setup::{calibrate, changed};
 use calibration_tasks::CalibrationSummary;
 use pipeline::{Error, Failure, Judged, Verdict};
 use range_io::calibration::Calibration;
+
+use crate::calibration_setup::{calibrate, changed};
 
 /// Columns of `observations.csv`.
 const STATION: usize = 0;

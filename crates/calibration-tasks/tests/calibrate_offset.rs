@@ -2,11 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::calibrate_planes::{camera, planes, ranges_to_wall, write_survey_with};
-use crate::calibration_setup::{calibrate, changed, terms};
 use calibration_tasks::{CalibrationSummary, DiffRequest, OffsetModel, diff};
 use pipeline::{ExplainRequest, Plan, Silent, ViewData, explain, process};
 use range_io::calibration::Calibration;
+
+use crate::calibrate_planes::{camera, planes, ranges_to_wall, write_survey_with};
+use crate::calibration_setup::{calibrate, changed, terms};
 
 /// Half a centimetre of every pixel, up or down.
 fn chequered([col, row]: [usize; 2]) -> f64 {

@@ -1,9 +1,7 @@
 //! Range terms from frames of known planes, and what a pipeline does with a calibration that was estimated.
 
-use crate::calibration_setup;
 use std::path::Path;
 
-use crate::calibration_setup::{calibrate, request, target_field, terms};
 use calibration_tasks::{CalibrateMethod, CalibrateRequest};
 use camera_model::{Camera, ImageFormat, InteriorOrientation, LensDistortion, pose_from_euler};
 use error_models::{ModelSet, RangeErrorModel, RangeTerms};
@@ -13,6 +11,9 @@ use range_image::Modulation;
 use range_io::calibration::Calibration;
 use range_io::npz::NpzWriter;
 use range_io::tables::{ObservedPlane, Station, write_planes, write_stations};
+
+use crate::calibration_setup;
+use crate::calibration_setup::{calibrate, request, target_field, terms};
 
 const SURVEY: &str = r"#![enable(implicit_some)]
 (

@@ -2,12 +2,13 @@
 
 use std::path::Path;
 
-use crate::calibrate_planes::{camera, planes, truth, write_drifting_survey};
-use crate::calibration_setup::{calibrate, changed, edit, terms};
 use calibration_tasks::CalibrationSummary;
 use error_models::{ModelSet, RangeErrorModel, RangeTerms, Transient, WarmUp};
 use pipeline::{DriftTreatment, Plan, Silent, process};
 use range_io::calibration::{CalibratedDrift, Calibration};
+
+use crate::calibrate_planes::{camera, planes, truth, write_drifting_survey};
+use crate::calibration_setup::{calibrate, changed, edit, terms};
 
 fn warm_up() -> WarmUp {
     WarmUp { transients: vec![Transient { amplitude_m: -0.03, time_constant_s: 900.0 }], ..WarmUp::default() }

@@ -3,8 +3,6 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use crate::calibration_setup::{calibrate, changed, edit, request, target_field, terms};
-use crate::common::{fixtures, simulated};
 use calibration_tasks::{CalibrationSummary, HeldOut, HeldOutCheck};
 use pipeline::{Plan, Silent, process};
 use range_image::NoiseModel;
@@ -12,6 +10,9 @@ use range_io::calibration::Calibration;
 use range_io::tables::read_residuals;
 use serde_json::Value;
 use sha2::{Digest, Sha256};
+
+use crate::calibration_setup::{calibrate, changed, edit, request, target_field, terms};
+use crate::common::{fixtures, simulated};
 
 /// Terms of the room's network.
 const ROOM: &str = "xp yp c k1 k2 p1 p2 d0 d2 d3 d4 d5 d6 d7 e1 e2 h1 h2 h3";

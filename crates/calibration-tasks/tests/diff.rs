@@ -1,13 +1,14 @@
 //! Two calibrations: of one camera, of a camera that changed, and of cameras that cannot be compared.
 
-use crate::common;
 use std::path::{Path, PathBuf};
 
-use crate::calibration_setup::{changed, edit, request, target_field};
 use calibration_tasks::{DiffRequest, calibrate, diff, simulate_network};
 use error_models::{FrameRateDrift, Transient, WarmUp};
 use pipeline::Silent;
 use range_io::calibration::{CalibratedDrift, Calibration};
+
+use crate::calibration_setup::{changed, edit, request, target_field};
+use crate::common;
 
 /// Calibrations of the target field's camera from sightings of another seed.
 fn calibration(folder: &Path, seed: u64) -> PathBuf {

@@ -3,10 +3,11 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::common::{fixtures, has_capture, request, simulated};
 use calibration_tasks::NetworkScene;
 use pipeline::{Plan, RunRequest, Silent, Source, Stage, Summary};
 use range_io::survey::Survey;
+
+use crate::common::{fixtures, has_capture, request, simulated};
 
 /// Pipelines of the repository that are run elsewhere or not at all, each with the reason.
 const NOT_RUN_HERE: [(&str, &str); 1] = [("room_small", "run against its bars in room.rs")];

@@ -2,8 +2,9 @@
 
 use std::path::Path;
 
-use crate::common::{request, run};
 use pipeline::{NetworkCalibration, Silent, Source, Stage, StartPoses, Summary};
+
+use crate::common::{request, run};
 
 #[test]
 fn the_small_room_reaches_its_bars() {

@@ -3,14 +3,12 @@
 use std::path::Path;
 
 use error_models::ModelSet;
+use pipeline::Result;
+use pipeline::command::root_of;
+use pipeline::survey::{Purpose, compatible, read_calibration};
 use range_io::atomic::{Destination, write_text};
 use range_io::calibration::{Calibration, Provenance};
 use range_io::survey::Survey;
-
-use pipeline::Result;
-use pipeline::command::root_of;
-use pipeline::survey::read_calibration;
-use pipeline::survey::{Purpose, compatible};
 
 /// The calibration that a term is added to, in words too: the one named, the one beside the survey, or else one of
 /// which nothing but the nominal camera is known.

@@ -4,17 +4,16 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use std::path::Path;
 
-use range_io::calibration::{CalibratedDrift, Calibration};
-use range_io::ply::read_cloud;
-use range_io::survey::{Level, Survey};
-use serde::Serialize;
-
 use pipeline::command::{Doubt, DoubtKind, Judged, Silent, root_of};
 use pipeline::plan::{DemodulateOptions, DriftTreatment, Stage, ruled_out};
 use pipeline::stages::{apply, corrects_ranges};
 use pipeline::survey::plausibility::{self, FrameWatch, SenseVotes};
 use pipeline::survey::{Purpose, compatible, open, read_calibration};
 use pipeline::{Error, Result};
+use range_io::calibration::{CalibratedDrift, Calibration};
+use range_io::ply::read_cloud;
+use range_io::survey::{Level, Survey};
+use serde::Serialize;
 
 /// Stations whose phases are judged.
 const MOST_JUDGED: usize = 8;

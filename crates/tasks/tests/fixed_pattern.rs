@@ -1,12 +1,13 @@
 //! Fixed pattern estimated from simulated walls, against the truth, and where there is none.
 
-use crate::common;
 use std::path::{Path, PathBuf};
 
-use crate::common::{simulated, simulated_with};
 use pipeline::Silent;
 use range_io::calibration::Calibration;
 use tasks::{FixedPatternRequest, PatternOptions, estimate_pattern};
+
+use crate::common;
+use crate::common::{simulated, simulated_with};
 
 fn request(survey: &Path, out: PathBuf) -> FixedPatternRequest {
     FixedPatternRequest { survey: survey.to_owned(), calibration: None, options: PatternOptions::default(), out }

@@ -2,12 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::common::{simulated, simulated_from};
 use error_models::WarmUp;
 use pipeline::{DriftTreatment, ExplainRequest, Outcome, Plan, Silent, View, ViewData, ViewDrift, explain, process};
 use range_io::calibration::Calibration;
 use range_io::survey::{FrameRate, Survey};
 use tasks::{ChangeOptions, DriftOptions, ReferenceUse, WarmUpRequest, estimate_warm_up};
+
+use crate::common::{simulated, simulated_from};
 
 fn plan(treatment: DriftTreatment) -> Plan {
     let treatment = if treatment == DriftTreatment::Leave { "leave" } else { "apply" };

@@ -3,12 +3,13 @@
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
-use crate::calibration_setup::{copy, edit};
-use crate::common::{fixtures, simulated_from};
 use pipeline::{Doubt, DoubtKind, Error, Failure, Judged, Plan, RunRequest, Silent, Stage, Summary};
 use range_io::npz::{NpzReader, NpzWriter};
 use range_io::tables::{read_stations, write_stations};
 use tasks::{RegisterMethod, RegisterRequest, inspect, register};
+
+use crate::calibration_setup::{copy, edit};
+use crate::common::{fixtures, simulated_from};
 
 /// The small room on fewer pixels, with two frames a station; simulated once.
 fn room() -> &'static Path {

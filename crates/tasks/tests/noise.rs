@@ -2,10 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::common::{fixtures, has_capture, simulated, simulated_with};
 use pipeline::{DoubtKind, Judged, Plan, Silent, Verdict, ViewData, process};
 use range_io::calibration::Calibration;
 use tasks::{NoiseFitOptions, NoiseRequest, NoiseSummary, estimate_noise};
+
+use crate::common::{fixtures, has_capture, simulated, simulated_with};
 
 fn request(survey: PathBuf, out: &Path) -> NoiseRequest {
     NoiseRequest { survey, calibration: None, options: NoiseFitOptions::default(), out: out.to_owned() }

@@ -3,12 +3,13 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use crate::calibration_setup::{request as calibration_request, terms};
-use crate::common::{fixtures, simulated, simulated_with};
 use calibration_tasks::{CalibrateRequest, calibrate};
 use pipeline::{Error, Failure, Judged, Plan, RunRequest, Silent, Verdict, run};
 use range_io::atomic::{OutputFolder, fault};
 use tasks::{NoiseFitOptions, NoiseRequest, estimate_noise};
+
+use crate::calibration_setup::{request as calibration_request, terms};
+use crate::common::{fixtures, simulated, simulated_with};
 
 fn names(folder: &Path) -> Vec<String> {
     let mut names: Vec<_> =

@@ -1,8 +1,9 @@
 //! Real captures of three cameras at three input levels, where they lie beside the project.
 
-use crate::common::{fixtures, has_capture, run};
 use pipeline::{Plan, Silent, StationPose, process};
 use tasks::{RegisterMethod, RegisterRequest, register};
+
+use crate::common::{fixtures, has_capture, run};
 
 #[test]
 fn raw_samples_of_an_mlx75027_agree_with_the_cameras_own_ranges() {

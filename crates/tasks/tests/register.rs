@@ -1,6 +1,5 @@
 //! Registration as a command: small surveys and clouds with known poses, and input that cannot be registered.
 
-use crate::common;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
@@ -8,6 +7,8 @@ use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use pipeline::{Failure, Silent, SimulateSource, simulate};
 use range_io::clouds::{CloudFile, Precision};
 use tasks::{RegisterMethod, RegisterRequest, RegisterSummary, register};
+
+use crate::common;
 
 fn request(inputs: &[PathBuf], method: RegisterMethod, out: &Path) -> RegisterRequest {
     RegisterRequest { inputs: inputs.to_vec(), guess: None, method, calibration: None, out: out.to_owned() }

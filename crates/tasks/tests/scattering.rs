@@ -2,10 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::common::simulated;
 use pipeline::{Plan, Silent, process};
 use range_io::calibration::Calibration;
 use tasks::{EstimationOptions, ScatteringRequest, estimate_scattering};
+
+use crate::common::simulated;
 
 fn request(with_object: &Path, without_object: &Path, out: PathBuf) -> ScatteringRequest {
     ScatteringRequest {

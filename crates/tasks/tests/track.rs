@@ -1,6 +1,5 @@
 //! Tracking as a command: a camera carried through the small room, losses, real frames, and input that cannot be tracked.
 
-use crate::common;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
@@ -12,6 +11,8 @@ use range_io::calibration::Calibration;
 use range_io::survey::{InputFrame, Level, Survey, read_truth, write_frame};
 use range_io::trajectory::read_tum;
 use tasks::{TrackRequest, TrackSummary, TrackVerdict, track};
+
+use crate::common;
 
 const FRAMES: usize = 20;
 /// Noise of a range, metre: that of the small room's camera on its walls.

@@ -2,13 +2,14 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::common::simulated;
-use crate::warming::{POWER_ON_S, Warming, truth};
 use error_models::ModelSet;
 use pipeline::{Error, Plan, Silent, View, ViewData, process};
 use range_io::calibration::Calibration;
 use range_io::survey::{Level, ReferencePath, Survey};
 use tasks::{ChangeOptions, DriftOptions, ReferenceUse, WarmUpRequest, WarmUpSummary, estimate_warm_up};
+
+use crate::common::simulated;
+use crate::warming::{POWER_ON_S, Warming, truth};
 
 fn request(survey: PathBuf, out: &Path) -> WarmUpRequest {
     WarmUpRequest {

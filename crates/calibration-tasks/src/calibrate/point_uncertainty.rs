@@ -3,10 +3,9 @@
 use camera_model::Camera;
 use error_models::{ModelSet, RangeErrorModel};
 use nalgebra::{DMatrix, DVector, Point3, Vector4};
+use pipeline::statistics::median;
 use range_io::calibration::Calibration;
 use self_calibration::CalibrationOutcome;
-
-use pipeline::statistics::median;
 
 /// A calibration whose points are asked for their uncertainty.
 pub(crate) struct PointUncertainty<'a> {

@@ -2,9 +2,8 @@
 
 use std::path::PathBuf;
 
-use self_calibration::{CalibrationOptions, Method};
-
 use pipeline::plan::DriftTreatment;
+use self_calibration::{CalibrationOptions, Method};
 
 /// How a survey is calibrated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

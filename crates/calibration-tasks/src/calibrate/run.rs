@@ -2,6 +2,9 @@
 
 use std::time::Instant;
 
+use pipeline::command::{Inputs, Progress, json, produce};
+use pipeline::plan::DriftTreatment;
+use pipeline::{Error, Result};
 use range_io::atomic::{Destination, write_text};
 use range_io::calibration::Calibration;
 use range_io::tables::{write_residuals, write_stations, write_targets};
@@ -14,16 +17,11 @@ use crate::calibrate::network::network_files::{NetworkFiles, read_network};
 use crate::calibrate::planes;
 use crate::calibrate::planes::attempt::{Attempt, Calibrated};
 use crate::calibrate::planes::offset::FoundTable;
-use crate::calibrate::request::OffsetModel;
-use crate::calibrate::request::{CalibrateMethod, CalibrateRequest};
+use crate::calibrate::request::{CalibrateMethod, CalibrateRequest, OffsetModel};
 use crate::calibrate::results::certificate::{Certificate, HeldOut, Source, today};
 use crate::calibrate::results::summary::CalibrationSummary;
 use crate::calibrate::results::{calibration_file, tables};
 use crate::calibrate::start::Start;
-use pipeline::command::Progress;
-use pipeline::command::{Inputs, json, produce};
-use pipeline::plan::DriftTreatment;
-use pipeline::{Error, Result};
 
 /// Calibrates a survey and writes the results into the request's output folder.
 ///

@@ -2,13 +2,13 @@
 
 use error_models::NamedParameter;
 use nalgebra::DMatrix;
+use pipeline::Result;
 use range_io::calibration::{CalibratedDrift, Calibration};
 use residual_tests::{DriftDifference, DriftSide, compare_drifts};
 use serde::Serialize;
 
 use crate::diff::refused;
 use crate::diff::sides::Listed;
-use pipeline::Result;
 
 /// What stands before the names of a drift's parameters.
 const PREFIX: &str = "warm-up ";

@@ -10,15 +10,14 @@ pub use pattern::PatternLine;
 
 use std::path::PathBuf;
 
+use pipeline::command::{Judged, Verdict};
+use pipeline::{Error, Result};
 use range_io::calibration::Calibration;
 use residual_tests::{
     CorrectionComparison, CorrectionDifference, ImageComparison, ImageSide, JointTest, ParameterDifference,
     compare_corrections, compare_images, compare_parameters,
 };
 use serde::Serialize;
-
-use pipeline::command::{Judged, Verdict};
-use pipeline::{Error, Result};
 
 use crate::diff::sides::{Pair, Side};
 

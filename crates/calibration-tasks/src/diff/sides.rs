@@ -3,11 +3,11 @@
 use camera_model::Camera;
 use error_models::{FixedPattern, NamedParameter, RangeErrorModel};
 use nalgebra::DMatrix;
+use pipeline::Result;
 use range_io::calibration::{Calibration, RangeCalibration};
 use residual_tests::{CorrectionSide, ParameterSet};
 
 use crate::diff::drift;
-use pipeline::Result;
 
 /// Both files.
 pub(crate) struct Pair {

@@ -3,13 +3,13 @@
 use std::path::Path;
 
 use nalgebra::{Matrix3, Point3, Vector3};
+use pipeline::Result;
+use pipeline::command::root_of;
 use range_io::survey::Survey;
 use range_io::tables::{read_stations, read_targets};
 use self_calibration::{Network, NetworkTarget, Station};
 
 use crate::calibrate::{Start, named_distances, pose_covariance};
-use pipeline::Result;
-use pipeline::command::root_of;
 
 /// Reads `survey.ron`, `stations.csv`, `targets.csv` and, where it is there, `distances.csv`.
 ///

@@ -2,15 +2,14 @@
 
 use std::path::PathBuf;
 
+use pipeline::command::{Inputs, Progress, json, produce};
+use pipeline::{Error, Result};
 use range_io::atomic::{Destination, write_text};
 use self_calibration::PlanOptions;
 
 use crate::plan::document::{Figures, document};
 use crate::plan::files::read_plan;
 use crate::plan::summary::PlanSummary;
-use pipeline::command::Progress;
-use pipeline::command::{Inputs, json, produce};
-use pipeline::{Error, Result};
 
 /// What to plan.
 #[derive(Debug, Clone)]

@@ -3,12 +3,12 @@
 use std::path::{Path, PathBuf};
 
 use camera_model::euler_from_pose;
+use pipeline::command::Judged;
 use self_calibration::{Candidate, PlanOutcome};
 use serde::Serialize;
 
 use crate::calibrate::{CorrelationSummary, ParameterMap};
 use crate::plan::run::NetworkPlanRequest;
-use pipeline::command::Judged;
 
 /// What a planned network promises.
 #[derive(Debug, Clone, Serialize)]

@@ -2,8 +2,9 @@
 
 use std::collections::BTreeSet;
 
-use crate::scene::spec::{FieldSpec, NetworkScene, SightingSpec};
 use pipeline::plan::{Fault, Rule, check_numbers};
+
+use crate::scene::spec::{FieldSpec, NetworkScene, SightingSpec};
 
 /// Targets of a network: a hundred times the largest test field's.
 pub const MOST_TARGETS: usize = 100_000;

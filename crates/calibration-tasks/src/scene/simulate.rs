@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use pipeline::command::{Inputs, produce};
+use pipeline::{Error, Result, Simulated};
 use range_io::atomic::{Destination, OutputFolder};
 use range_io::calibration::{Calibration, Provenance};
 use range_io::survey::{Survey, TruthFiles};
@@ -12,8 +14,6 @@ use range_io::tables::{
 use self_calibration::{Network, PassiveCamera, simulate_sightings};
 
 use crate::scene::spec::{NetworkScene, distance_rows, survey_of_tables, true_calibration};
-use pipeline::command::{Inputs, produce};
-use pipeline::{Error, Result, Simulated};
 
 /// Start values that a run calibrates its network from.
 pub(crate) const START: &str = "start.ron";

@@ -6,6 +6,7 @@ use std::path::Path;
 use camera_model::{Camera, pose_from_euler};
 use error_models::{ModelSet, RangeErrorModel};
 use nalgebra::{Isometry3, Point3, Vector3};
+use pipeline::{Error, Result};
 use range_io::calibration::Calibration;
 use range_io::ron_text;
 use range_io::survey::{Level, Survey, SurveyCamera};
@@ -14,8 +15,6 @@ use self_calibration::{
     DistanceEnd, KnownDistance, Network, NetworkTarget, PassiveCamera, SightingOptions, SimulatedStart, Station,
 };
 use serde::{Deserialize, Serialize};
-
-use pipeline::{Error, Result};
 
 /// A network to simulate, read from a RON file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -14,13 +14,12 @@ use serde::Serialize;
 use crate::command::destination::root_of;
 use crate::command::progress::Progress;
 use crate::command::verdict::Judged;
+use crate::explain::flags::FlagWatch;
 use crate::plan::{Stage, is_past};
 use crate::survey::load::{load, read_calibration};
 use crate::survey::view::{View, ViewData};
 use crate::survey::work::Work;
 use crate::{Error, Plan, Result, stages};
-
-use crate::explain::flags::FlagWatch;
 
 /// Which pixel is to be explained.
 #[derive(Debug, Clone)]

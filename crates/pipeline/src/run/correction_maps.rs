@@ -1,9 +1,10 @@
 //! Pictures of what each group of range terms did to a view.
 
+use report::{ColourMap, Figure, Scale, raster_figure};
+
 use crate::statistics::quantile;
 use crate::survey::view::View;
 use crate::{Error, Result};
-use report::{ColourMap, Figure, Scale, raster_figure};
 
 /// One picture for each group of terms that differs from pixel to pixel, in millimetres, all on one scale; what is the
 /// same everywhere stands in the caption. Nothing where the ranges were not corrected.

@@ -18,8 +18,7 @@ use std::time::Instant;
 use range_io::atomic::Destination;
 use range_io::calibration::Calibration;
 
-use crate::command::destination::root_of;
-use crate::command::destination::{Inputs, produce};
+use crate::command::destination::{Inputs, produce, root_of};
 use crate::command::progress::Progress;
 use crate::command::verdict::Failure;
 use crate::plan::{NetworkCalibration, Source};

@@ -7,8 +7,7 @@ use range_io::calibration::Calibration;
 use range_io::survey::{Level, Survey};
 
 use crate::command::verdict::{Doubt, DoubtKind};
-use crate::plan::DriftTreatment;
-use crate::plan::Stage;
+use crate::plan::{DriftTreatment, Stage};
 use crate::survey::drift::DriftCurve;
 use crate::survey::view::view_name;
 use crate::{Error, Result};

@@ -4,16 +4,15 @@ use std::path::Path;
 
 use icp_registration::{Cloud, IcpOptions, Metric, NeighbourTree, Selection, StopReason, align};
 use nalgebra::{Isometry3, Point3, Vector3};
+use pipeline::command::{Doubt, DoubtKind, Progress};
+use pipeline::statistics::quantile;
+use pipeline::{Error, Result};
 use range_io::clouds::read_any_cloud;
 use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::compare::signed::Surface;
 use crate::compare::{CompareAlignment, CompareRequest};
-use pipeline::command::Progress;
-use pipeline::command::{Doubt, DoubtKind};
-use pipeline::statistics::quantile;
-use pipeline::{Error, Result};
 
 /// Points that take part in a registration; more add time, hardly anything else.
 const REGISTERED_POINTS: usize = 30_000;

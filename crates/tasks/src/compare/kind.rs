@@ -2,10 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
+use pipeline::{Error, Result};
 use range_io::clouds::CloudFormat;
 use range_io::trajectory::TrajectoryFormat;
-
-use pipeline::{Error, Result};
 
 /// Two files that can be compared.
 pub(crate) enum Part {

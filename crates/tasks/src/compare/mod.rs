@@ -14,13 +14,10 @@ pub use trajectories::{AbsoluteSummary, RelativeSummary, TrajectoryComparison, T
 
 use std::path::PathBuf;
 
+use pipeline::command::{Doubt, Inputs, Judged, Progress, json, produce};
+use pipeline::{Error, Result};
 use range_io::atomic::{Destination, write_text};
 use serde::Serialize;
-
-use pipeline::command::Progress;
-use pipeline::command::{Doubt, Judged};
-use pipeline::command::{Inputs, json, produce};
-use pipeline::{Error, Result};
 
 pub(crate) use clouds::{Deviations, millimetres_of};
 pub(crate) use trajectories::{TrackCurves, TrackPoint};

@@ -2,10 +2,9 @@
 
 use std::path::Path;
 
+use pipeline::{Error, Result};
 use range_io::tables::read_stations;
 use serde::Serialize;
-
-use pipeline::{Error, Result};
 
 /// Differences of poses.
 #[derive(Debug, Clone, Serialize)]

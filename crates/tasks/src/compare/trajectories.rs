@@ -7,11 +7,11 @@ use icp_registration::{
     TrajectoryErrorOptions, absolute_trajectory_error, relative_pose_error,
 };
 use nalgebra::Isometry3;
+use pipeline::{Error, Result};
 use range_io::trajectory::read_any_trajectory;
 use serde::Serialize;
 
 use crate::compare::{CompareAlignment, CompareRequest};
-use pipeline::{Error, Result};
 
 /// Errors of one trajectory against another.
 #[derive(Debug, Clone, Serialize)]

@@ -8,6 +8,12 @@ pub use summary::{FixedPatternSummary, PatternWall};
 use std::path::PathBuf;
 use std::time::Instant;
 
+use pipeline::command::{Inputs, Progress, json, produce};
+use pipeline::plan::{CorrectRangeOptions, DeconvolveOptions, DemodulateOptions, UnwrapOptions};
+use pipeline::run::process_with;
+use pipeline::stages::corrects_ranges;
+use pipeline::survey::ViewData;
+use pipeline::{Error, Plan, Result, Stage};
 use range_io::atomic::Destination;
 use range_io::calibration::Calibration;
 use range_io::survey::{Level, Survey};
@@ -15,13 +21,6 @@ use report::pattern_figures;
 use sensor_noise::{PatternEstimate, PatternOptions, PatternVerdict, WallCapture, estimate_fixed_pattern};
 
 use crate::further_term::{provenance_with, start, write};
-use pipeline::command::Progress;
-use pipeline::command::{Inputs, json, produce};
-use pipeline::plan::{CorrectRangeOptions, DeconvolveOptions, DemodulateOptions, UnwrapOptions};
-use pipeline::run::process_with;
-use pipeline::stages::corrects_ranges;
-use pipeline::survey::ViewData;
-use pipeline::{Error, Plan, Result, Stage};
 
 /// What to estimate a fixed pattern from.
 #[derive(Debug, Clone)]

@@ -2,11 +2,11 @@
 
 use std::path::PathBuf;
 
+use pipeline::command::Judged;
 use sensor_noise::{PatternEstimate, PatternSplit, WallQuality};
 use serde::Serialize;
 
 use crate::fixed_pattern::{FixedPatternRequest, is_applied};
-use pipeline::command::Judged;
 
 /// A fixed pattern, how well it is known, and whether it is worth applying.
 #[derive(Debug, Clone, Serialize)]

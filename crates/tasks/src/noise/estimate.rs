@@ -1,16 +1,14 @@
 //! The views of a survey by station, and what they tell of noise at their level.
 
 use error_models::{NamedParameter, RangeNoise};
+use pipeline::survey::{Outcome, View, ViewData};
+use pipeline::{Error, Result};
 use range_image::{ComplexFrame, DemodulationOptions, Flags, NoiseModel, RangeFrame, Raster, RawFrame, demodulate};
 use range_io::survey::Survey;
 use sensor_noise::{
     NoiseFitOptions, RepeatedRanges, RepeatedSamples, SampleUnits, SigmaCheck, VarianceFit, check_complex_sigma,
     check_range_sigma, estimate_range_noise, estimate_sample_noise,
 };
-
-use pipeline::survey::Outcome;
-use pipeline::survey::{View, ViewData};
-use pipeline::{Error, Result};
 
 /// Noise of whatever the survey has.
 pub(crate) struct Estimate {

@@ -9,15 +9,14 @@ pub use summary::{NoiseBin, NoiseParameter, NoiseStation, NoiseSummary, SigmaBin
 use std::path::PathBuf;
 use std::time::Instant;
 
+use pipeline::command::{Inputs, Progress, json, produce};
+use pipeline::{Error, Plan, Result, process};
 use range_io::atomic::Destination;
 use range_io::calibration::Calibration;
 use sensor_noise::NoiseFitOptions;
 
 use crate::further_term::{provenance_with, start, write};
 use crate::noise::estimate::{Estimate, NoiseTerm};
-use pipeline::command::Progress;
-use pipeline::command::{Inputs, json, produce};
-use pipeline::{Error, Plan, Result, process};
 
 /// What to estimate random errors from.
 #[derive(Debug, Clone)]

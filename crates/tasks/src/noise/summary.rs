@@ -3,12 +3,12 @@
 use std::path::PathBuf;
 
 use error_models::{AmplitudeScale, ParameterStatus, RangeNoise};
+use pipeline::command::{Doubt, DoubtKind, Judged};
 use sensor_noise::{SigmaCheck, SigmaVerdict, VarianceEstimator, VarianceFit};
 use serde::Serialize;
 
 use crate::noise::NoiseRequest;
 use crate::noise::estimate::{Estimate, NoiseTerm};
-use pipeline::command::{Doubt, DoubtKind, Judged};
 
 /// Random errors and how well they are known.
 #[derive(Debug, Clone, Serialize)]

@@ -2,7 +2,6 @@
 
 use icp_registration::IcpResult;
 use nalgebra::{Isometry3, Matrix6};
-
 use pipeline::survey::StationPose;
 
 /// Poses of all stations from that of the first, which is the datum, and each onto the one before.

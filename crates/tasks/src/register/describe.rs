@@ -2,10 +2,10 @@
 
 use icp_registration::{MotionKind, Placement, StationPlacement, UndeterminedMotion};
 use nalgebra::Isometry3;
-
-use crate::register::summary::{RegisterSummary, RegisteredPlacement, RegisteredStation};
 use pipeline::stations::Station;
 use pipeline::survey::StationPose;
+
+use crate::register::summary::{RegisterSummary, RegisteredPlacement, RegisteredStation};
 
 /// A motion that the surfaces leave open, axes in the target's frame.
 pub(crate) fn motion(motion: &UndeterminedMotion) -> String {

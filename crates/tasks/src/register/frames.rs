@@ -4,17 +4,16 @@ use icp_registration::{
     FrameAlignmentOptions, FrameRegistration, OrganisedFrame, PairAlignment, Start, register_frames,
 };
 use nalgebra::Isometry3;
+use pipeline::Result;
+use pipeline::command::{Doubt, DoubtKind};
+use pipeline::plan::NORMAL_HALF_WIDTH_PX;
+use pipeline::stations::{Station, Surface, surface};
+use pipeline::survey::StationPose;
 use rayon::prelude::*;
 
 use crate::register::stations::MOST_TRIED;
 use crate::register::summary::{RegisterSummary, RegisteredLoop, RegisteredPair};
 use crate::register::{Registered, describe, pairs};
-use pipeline::Result;
-use pipeline::command::{Doubt, DoubtKind};
-use pipeline::plan::NORMAL_HALF_WIDTH_PX;
-use pipeline::stations::Station;
-use pipeline::stations::{Surface, surface};
-use pipeline::survey::StationPose;
 
 /// The stations registered as frames; `None` where they are none, or no two of them belong together.
 pub(crate) fn found(stations: &[Station], before: Option<&[Isometry3<f64>]>) -> Option<FrameRegistration> {

@@ -3,11 +3,10 @@
 use std::path::Path;
 
 use nalgebra::{Isometry3, Matrix3, Matrix4, Rotation3, UnitQuaternion};
-use range_io::tables::{Station as StationRow, read_stations};
-use range_io::trajectory::{StampedPose, read_any_trajectory};
-
 use pipeline::stations::Station;
 use pipeline::{Error, Result};
+use range_io::tables::{Station as StationRow, read_stations};
+use range_io::trajectory::{StampedPose, read_any_trajectory};
 
 /// Times of a trajectory and of frames belong together within this, second.
 const SAME_TIME_S: f64 = 5e-3;

@@ -2,14 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use range_io::calibration::Calibration;
-use range_io::clouds::read_any_cloud;
-use range_io::survey::{Level, Survey};
-
-use crate::register::RegisterRequest;
-use pipeline::command::Doubt;
-use pipeline::command::Progress;
-use pipeline::command::root_of;
+use pipeline::command::{Doubt, Progress, root_of};
 use pipeline::plan::{
     AverageOptions, CorrectImagePointOptions, CorrectRangeOptions, DeconvolveOptions, DemodulateOptions, FlagOptions,
     FuseExposuresOptions, PointCloudOptions, UnwrapOptions,
@@ -18,9 +11,13 @@ use pipeline::run::process;
 use pipeline::stages::corrects_ranges;
 use pipeline::stations::Station;
 use pipeline::statistics::quantile;
-use pipeline::survey::plausibility;
-use pipeline::survey::read_calibration;
+use pipeline::survey::{plausibility, read_calibration};
 use pipeline::{Error, Plan, Result, Stage};
+use range_io::calibration::Calibration;
+use range_io::clouds::read_any_cloud;
+use range_io::survey::{Level, Survey};
+
+use crate::register::RegisterRequest;
 
 /// Everything that is to be registered.
 pub(crate) struct Input {

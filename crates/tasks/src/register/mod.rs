@@ -18,15 +18,11 @@ pub use summary::{RegisterSummary, RegisteredLoop, RegisteredPair, RegisteredPla
 use std::time::Instant;
 
 use nalgebra::Isometry3;
-use range_io::atomic::Destination;
-
 use pipeline::Result;
-use pipeline::command::Doubt;
-use pipeline::command::Progress;
-use pipeline::command::{Inputs, produce};
+use pipeline::command::{Doubt, Inputs, Progress, produce};
 use pipeline::stations::Station;
-use pipeline::survey::StationPose;
-use pipeline::survey::plausibility;
+use pipeline::survey::{StationPose, plausibility};
+use range_io::atomic::Destination;
 
 /// Poses found, and what is known of them.
 pub(crate) struct Registered {

@@ -4,17 +4,15 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use icp_registration::{IcpResult, StopReason};
 use nalgebra::{Isometry3, Point3};
+use pipeline::command::{Doubt, DoubtKind, Progress};
+use pipeline::plan::NORMAL_HALF_WIDTH_PX;
+use pipeline::stations::{Start, Station, Surface};
+use pipeline::{Error, Result};
 use rayon::prelude::*;
 
 use crate::register::input::Input;
 use crate::register::summary::{RegisterSummary, RegisteredPair};
 use crate::register::{Registered, chain, describe};
-use pipeline::command::Progress;
-use pipeline::command::{Doubt, DoubtKind};
-use pipeline::plan::NORMAL_HALF_WIDTH_PX;
-use pipeline::stations::Station;
-use pipeline::stations::{Start, Surface};
-use pipeline::{Error, Result};
 
 /// Below this part of a station with partners, a pair is doubtful.
 const LEAST_OVERLAP: f64 = 0.2;

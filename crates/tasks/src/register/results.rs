@@ -1,5 +1,8 @@
 //! The files of a registration.
 
+use pipeline::Result;
+use pipeline::command::{Progress, json, words_about};
+use pipeline::stations::Station;
 use range_io::atomic::{Destination, write_text};
 use range_io::clouds::{CloudFile, Precision};
 use range_io::ply::write_cloud;
@@ -8,11 +11,6 @@ use range_io::trajectory::{StampedPose, write_tum};
 
 use crate::register::Registered;
 use crate::register::document::{Figures, document};
-use pipeline::Result;
-use pipeline::command::Progress;
-use pipeline::command::json;
-use pipeline::command::words_about;
-use pipeline::stations::Station;
 
 /// Writes everything, which appears when the last file is complete.
 pub(crate) fn write(destination: &Destination, registered: &Registered, progress: &dyn Progress) -> Result<()> {

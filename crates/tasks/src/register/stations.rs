@@ -5,18 +5,16 @@ use icp_registration::{
     Cloud, Datum, Start, StationRegistration, StationRegistrationOptions, SurfacePair, register_stations,
 };
 use nalgebra::{Isometry3, Point3};
+use pipeline::command::{Doubt, DoubtKind, Progress};
+use pipeline::plan::NORMAL_HALF_WIDTH_PX;
+use pipeline::stations::{Station, Tried, Windows, refused};
+use pipeline::survey::StationPose;
+use pipeline::{Error, Result};
 use rayon::prelude::*;
 
 use crate::register::input::Input;
 use crate::register::summary::{RegisterSummary, RegisteredLoop, RegisteredPair};
 use crate::register::{Registered, describe, frames, pairs};
-use pipeline::command::Progress;
-use pipeline::command::{Doubt, DoubtKind};
-use pipeline::plan::NORMAL_HALF_WIDTH_PX;
-use pipeline::stations::{Station, Windows};
-use pipeline::stations::{Tried, refused};
-use pipeline::survey::StationPose;
-use pipeline::{Error, Result};
 
 /// Up to this number of stations every pair is tried where no poses are known; beyond, only those that follow each other.
 pub(crate) const MOST_TRIED: usize = 16;

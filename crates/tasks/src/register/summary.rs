@@ -2,9 +2,8 @@
 
 use std::fmt;
 
-use serde::Serialize;
-
 use pipeline::command::{Doubt, Judged};
+use serde::Serialize;
 
 /// What was registered, and how well each pose is known.
 #[derive(Debug, Clone, Default, Serialize)]

@@ -2,6 +2,9 @@
 
 use std::path::Path;
 
+use pipeline::command::Progress;
+use pipeline::survey::{Outcome, ViewData};
+use pipeline::{AverageOptions, DemodulateOptions, Error, Plan, Result, Stage, process};
 use range_image::ComplexFrame;
 use range_io::calibration::Calibration;
 use range_io::survey::{Level, Survey};
@@ -10,10 +13,6 @@ use scattering_deconvolution::{EstimationOptions, ForegroundCapture, Psf};
 use crate::further_term::start;
 use crate::scattering::ScatteringRequest;
 use crate::scattering::shifts::{Shift, shifts_of};
-use pipeline::command::Progress;
-use pipeline::survey::Outcome;
-use pipeline::survey::ViewData;
-use pipeline::{AverageOptions, DemodulateOptions, Error, Plan, Result, Stage, process};
 
 /// One scene from all stations, with and without objects.
 pub(crate) struct Captures {

@@ -11,14 +11,13 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use error_models::{NamedParameter, ParameterStatus};
+use pipeline::command::{Inputs, Progress, json, produce};
+use pipeline::{Error, Result};
 use range_io::atomic::Destination;
 use scattering_deconvolution::{EstimationOptions, estimate_psf};
 
 use crate::further_term::{provenance_with, write};
 use crate::scattering::captures::Captures;
-use pipeline::command::Progress;
-use pipeline::command::{Inputs, json, produce};
-use pipeline::{Error, Result};
 pub(crate) use shifts::Shift;
 
 /// What to estimate scattering from.

@@ -1,9 +1,8 @@
 //! What scattering does to the ranges of a background, and what is left of it after restoration.
 
+use pipeline::{Error, Result};
 use range_image::{ComplexFrame, Flags, Modulation};
 use scattering_deconvolution::{EstimationOptions, ForegroundCapture, Psf, RestorationOptions, object_mask, restore};
-
-use pipeline::{Error, Result};
 
 /// Change of the background's ranges when the object comes into the scene, of one station at the first frequency.
 #[derive(Debug, Clone)]

@@ -2,12 +2,12 @@
 
 use std::path::PathBuf;
 
+use pipeline::command::Judged;
+use pipeline::statistics::quantile;
 use scattering_deconvolution::{PsfEstimate, Verdict};
 use serde::Serialize;
 
 use crate::scattering::{Captures, ScatteringRequest, Shift};
-use pipeline::command::Judged;
-use pipeline::statistics::quantile;
 
 /// A point spread function and how well it is known.
 #[derive(Debug, Clone, Serialize)]

@@ -5,20 +5,15 @@ use std::sync::Arc;
 
 use icp_registration::Projection;
 use nalgebra::Isometry3;
-use range_io::survey::Survey;
-
-use crate::register::input::stages;
-use pipeline::command::Doubt;
-use pipeline::command::Silent;
-use pipeline::command::root_of;
+use pipeline::command::{Doubt, Silent, root_of};
 use pipeline::plan::DriftTreatment;
 use pipeline::stages::apply;
 use pipeline::stations::projection;
-use pipeline::survey::Purpose;
-use pipeline::survey::Work;
-use pipeline::survey::{FrameWatch, SenseVotes};
-use pipeline::survey::{Frames, open, read_calibration};
+use pipeline::survey::{FrameWatch, Frames, Purpose, SenseVotes, Work, open, read_calibration};
 use pipeline::{Error, Result, Stage};
+use range_io::survey::Survey;
+
+use crate::register::input::stages;
 
 /// The sense of the phase is the same in all frames: it is judged in some.
 const SENSE_EVERY: usize = 16;

@@ -4,11 +4,11 @@ use std::path::Path;
 
 use icp_registration::{ImuIntegrator, ImuOptions, InertialSample, MotionPrior, TrackedPose};
 use nalgebra::Vector3;
+use pipeline::{Error, Result};
 use range_io::survey::Survey;
 use range_io::tables::read_imu;
 
 use crate::register::guess::matrix;
-use pipeline::{Error, Result};
 
 /// Names among a survey's extras: the data, and sixteen numbers that lead from the unit's axes to the camera's.
 const DATA: &str = "imu";

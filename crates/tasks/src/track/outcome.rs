@@ -1,10 +1,10 @@
 //! What tracking has made of each frame and of all of them.
 
 use icp_registration::{Cloud, LossReason, TrackedPose, TrackingState};
+use pipeline::survey::StationPose;
 use serde::Serialize;
 
 use crate::track::summary::TrackSummary;
-use pipeline::survey::StationPose;
 
 /// What can be done with a tracked sequence.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]

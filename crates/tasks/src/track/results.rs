@@ -1,6 +1,8 @@
 //! The files of a tracked sequence.
 
 use icp_registration::TrackedPose;
+use pipeline::Result;
+use pipeline::command::{Progress, json, words_about};
 use range_io::atomic::{Destination, write_text};
 use range_io::clouds::{CloudFile, Precision};
 use range_io::ply::write_cloud;
@@ -10,10 +12,6 @@ use range_io::trajectory::{StampedPose, write_tum};
 use crate::track::document::document;
 use crate::track::figures::Figures;
 use crate::track::outcome::{Tracked, station_pose};
-use pipeline::Result;
-use pipeline::command::Progress;
-use pipeline::command::json;
-use pipeline::command::words_about;
 
 /// Writes everything, which appears when the last file is complete.
 pub(crate) fn write(destination: &Destination, tracked: &Tracked, progress: &dyn Progress) -> Result<()> {

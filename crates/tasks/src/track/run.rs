@@ -4,6 +4,10 @@ use std::collections::BTreeMap;
 use std::time::Instant;
 
 use icp_registration::{Cloud, TrackedPose, Tracker, TrackerOptions, TrackingState};
+use pipeline::command::{Doubt, Inputs, Progress, produce, root_of};
+use pipeline::statistics::quantile;
+use pipeline::survey::plausibility;
+use pipeline::{Error, Result};
 use range_io::atomic::Destination;
 
 use crate::register::input::is_survey;
@@ -13,13 +17,6 @@ use crate::track::outcome::{Tracked, TrackedFrame, reason, state, station_pose};
 use crate::track::start::Start;
 use crate::track::summary::{TrackSummary, summarise};
 use crate::track::{TrackRequest, results};
-use pipeline::command::Doubt;
-use pipeline::command::Progress;
-use pipeline::command::root_of;
-use pipeline::command::{Inputs, produce};
-use pipeline::statistics::quantile;
-use pipeline::survey::plausibility;
-use pipeline::{Error, Result};
 
 /// Tracks the frames of a survey and writes path, map, summary and report into the request's output folder.
 ///

@@ -3,10 +3,10 @@
 use std::path::Path;
 
 use nalgebra::Isometry3;
+use pipeline::{Error, Result};
 
 use crate::register::guess::Guess;
 use crate::track::frames::FrameSource;
-use pipeline::{Error, Result};
 
 /// Where the pose of the first frame comes from.
 pub(crate) struct Start {

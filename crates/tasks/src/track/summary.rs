@@ -2,11 +2,11 @@
 
 use icp_registration::{TrackedPose, Tracker, TrajectoryAlignment, TrajectoryErrorOptions, absolute_trajectory_error};
 use nalgebra::Isometry3;
+use pipeline::command::{Doubt, DoubtKind, Judged, Verdict};
+use pipeline::statistics::{median, quantile};
 use serde::Serialize;
 
 use crate::track::outcome::{TrackLoss, TrackTruth, TrackVerdict, TrackedFrame};
-use pipeline::command::{Doubt, DoubtKind, Judged, Verdict};
-use pipeline::statistics::{median, quantile};
 
 /// How far the camera was followed, and how well each pose is known.
 #[derive(Debug, Clone, Default, Serialize)]

@@ -3,17 +3,13 @@
 use std::ops::Range;
 use std::path::Path;
 
+use pipeline::command::Silent;
+use pipeline::stages::apply;
+use pipeline::survey::{Frames, Purpose, View, ViewData, Work, open};
+use pipeline::{DemodulateOptions, Error, Result, Stage};
 use range_image::{RangeFrame, Raster};
 use range_io::survey::{Level, Survey};
 use rayon::prelude::*;
-
-use pipeline::command::Silent;
-use pipeline::stages::apply;
-use pipeline::survey::Purpose;
-use pipeline::survey::Work;
-use pipeline::survey::{Frames, open};
-use pipeline::survey::{View, ViewData};
-use pipeline::{DemodulateOptions, Error, Result, Stage};
 
 /// Frames in memory at a time.
 pub(crate) const FRAMES_AT_ONCE: usize = 32;

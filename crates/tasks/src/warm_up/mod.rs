@@ -10,14 +10,13 @@ pub use summary::{WarmUpBlock, WarmUpParameter, WarmUpPhase, WarmUpRateTest, War
 use std::path::PathBuf;
 use std::time::Instant;
 
+use pipeline::command::{Inputs, Progress, json, produce};
+use pipeline::{Error, Result};
 use range_io::atomic::Destination;
 use range_io::calibration::{CalibratedDrift, Calibration, Correlation};
 use warm_up::{ChangeOptions, DriftEstimate, DriftOptions, estimate_drift, estimate_drift_at_rates};
 
 use crate::further_term::{provenance_with, start, write};
-use pipeline::command::Progress;
-use pipeline::command::{Inputs, json, produce};
-use pipeline::{Error, Result};
 pub(crate) use series::Series;
 
 /// What to estimate a drift from.

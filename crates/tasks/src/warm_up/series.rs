@@ -1,15 +1,15 @@
 //! Mean changes of range of all frames of a survey.
 
 use error_models::RateHistory;
+use pipeline::command::Progress;
+use pipeline::survey::frame_rates;
+use pipeline::{Error, Result};
 use range_image::Raster;
 use range_io::survey::ReferencePath;
 use warm_up::{ChangeMeter, ChangeOptions, DriftSample, PixelMeans, RangeChange};
 
 use crate::warm_up::frames::{FRAMES_AT_ONCE, FrameSource};
 use crate::warm_up::{ReferenceUse, WarmUpRequest};
-use pipeline::command::Progress;
-use pipeline::survey::frame_rates;
-use pipeline::{Error, Result};
 
 /// One sample a frame, and what they come from.
 pub(crate) struct Series {

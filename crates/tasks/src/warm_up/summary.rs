@@ -3,12 +3,12 @@
 use std::path::PathBuf;
 
 use error_models::WarmUp;
+use pipeline::command::{Doubt, DoubtKind, Judged};
 use serde::Serialize;
 use warm_up::{DriftEstimate, DriftVerdict, TransientTest};
 
 use crate::warm_up::series::Series;
 use crate::warm_up::{ReferenceUse, WarmUpRequest};
-use pipeline::command::{Doubt, DoubtKind, Judged};
 
 /// A drift and how well it is known.
 #[derive(Debug, Clone, Serialize)]

@@ -1,8 +1,9 @@
 //! The certificate: a page to be printed and signed.
 
+use report::Document;
+
 use crate::calibrate::document::certificate_parts as parts;
 use crate::calibrate::{CalibrationSummary, Certificate, CertifiedStation, CertifiedTarget, Observed, value_words};
-use report::Document;
 
 /// The whole page; the date is the only thing on it that a second run on another day would change.
 pub(crate) fn render_certificate(certificate: &Certificate, summary: &CalibrationSummary, date: &str) -> String {

@@ -1,7 +1,8 @@
 //! Parts of a certificate that a calibration's report shows as well.
 
-use crate::calibrate::{COVERAGE, CalibrationSummary, Certificate, ExpandedUncertainty, NotoriousPair, TestVerdict};
 use report::{Block, Document, Place};
+
+use crate::calibrate::{COVERAGE, CalibrationSummary, Certificate, ExpandedUncertainty, NotoriousPair, TestVerdict};
 
 const NOT_GIVEN: &str = "not given";
 

@@ -1,8 +1,8 @@
 //! Which parts of the image and of the range were observed.
 
-use report::{Axes, CATEGORIES, Canvas, ColourMap, Figure, hex, open_svg, span};
 use std::fmt::Write;
 
+use report::{Axes, CATEGORIES, Canvas, ColourMap, Figure, hex, open_svg, span};
 use self_calibration::{CalibrationOutcome, Component, ObservationQuality, Verdict};
 
 const WIDTH: f64 = 560.0;

@@ -1,13 +1,12 @@
 //! Residual arrows over the image.
 
-use report::{CATEGORIES, Figure, hex, open_svg};
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
 use camera_model::ImageFormat;
-use self_calibration::{CalibrationOutcome, Component, ObservationQuality, Verdict};
-
 use pipeline::statistics::quantile;
+use report::{CATEGORIES, Figure, hex, open_svg};
+use self_calibration::{CalibrationOutcome, Component, ObservationQuality, Verdict};
 
 const WIDTH: f64 = 560.0;
 /// Length of the arrow at the 90 % quantile, in pixels of the figure.

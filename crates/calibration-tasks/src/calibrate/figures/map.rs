@@ -1,15 +1,15 @@
 //! The network from above and from the side.
 
-use report::{CATEGORIES, Direction, Figure, Labels, escape, hex, open_svg, ticks};
 use std::fmt::Write;
 
 use camera_model::Camera;
 use nalgebra::{Isometry3, Matrix2, Matrix3, Point3, SymmetricEigen, Vector3};
+use pipeline::statistics::quantile;
+use report::{CATEGORIES, Direction, Figure, Labels, escape, hex, open_svg, ticks};
 use self_calibration::{AdjustedStation, AdjustedTarget};
 
 use crate::calibrate::figures::image_residuals::round_factor;
 use crate::calibrate::figures::spread::spread;
-use pipeline::statistics::quantile;
 
 const WIDTH: f64 = 590.0;
 const TALLEST: f64 = 560.0;

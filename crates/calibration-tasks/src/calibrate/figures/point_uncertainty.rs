@@ -1,11 +1,11 @@
 //! Maps of what the covariance of the calibration means for a point.
 
 use nalgebra::DMatrix;
+use pipeline::Result;
+use pipeline::statistics::median;
 use report::{ColourMap, Figure, Scale, raster_figure};
 
 use crate::calibrate::point_uncertainty::PointUncertainty;
-use pipeline::Result;
-use pipeline::statistics::median;
 
 /// Ranges of the maps, metre.
 const RANGES_M: [f64; 3] = [1.0, 2.0, 4.0];

@@ -1,11 +1,11 @@
 //! Range errors against range, before and after the calibration.
 
 use error_models::RangeErrorModel;
+use pipeline::statistics::quantile;
 use report::{Axes, CATEGORIES, Canvas, Figure, robust_span, span};
 use self_calibration::{CalibrationOutcome, Component, ObservationQuality, Verdict};
 
 use crate::calibrate::point_uncertainty::{PointUncertainty, amplitude_of};
-use pipeline::statistics::quantile;
 
 const SIZE: [f64; 2] = [590.0, 340.0];
 const STEPS: usize = 160;

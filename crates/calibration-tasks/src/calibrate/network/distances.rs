@@ -2,11 +2,11 @@
 
 use std::path::Path;
 
+use pipeline::Result;
 use range_io::tables::{PlacedRows, read_placed_distances};
 use self_calibration::{DistanceEnd, KnownDistance, NetworkTarget, Station};
 
 use crate::calibrate::network::network_files::optional;
-use pipeline::Result;
 
 /// Reads `distances.csv`, where it is there. An end is a station or a target, and never both.
 pub(crate) fn named_distances(

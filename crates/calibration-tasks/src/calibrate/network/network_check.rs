@@ -2,10 +2,10 @@
 
 use std::collections::BTreeSet;
 
+use pipeline::{Error, Result};
 use self_calibration::{DistanceEnd, Method, Network, NetworkDatum};
 
 use crate::calibrate::network::network_files::NetworkFiles;
-use pipeline::{Error, Result};
 
 /// Refuses targets and stations that too few observations determine, and a control datum without control.
 pub(crate) fn check(files: &NetworkFiles, method: Method, datum: NetworkDatum) -> Result<()> {

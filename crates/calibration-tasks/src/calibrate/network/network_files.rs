@@ -4,6 +4,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use nalgebra::{Matrix3, Point3, Vector3};
+use pipeline::command::root_of;
+use pipeline::plan::DriftTreatment;
+use pipeline::survey::ViewDrift;
+use pipeline::{Error, Result};
 use range_io::survey::Survey;
 use range_io::tables::{
     PlacedRows, Station as StationRow, Target as TargetRow, TargetObservation, read_placed_observations,
@@ -17,10 +21,6 @@ use crate::calibrate::network::passive::read_passive;
 use crate::calibrate::request::TableDefaults;
 use crate::calibrate::start::Start;
 use crate::calibrate::start::drift::KnownDrift;
-use pipeline::command::root_of;
-use pipeline::plan::DriftTreatment;
-use pipeline::survey::ViewDrift;
-use pipeline::{Error, Result};
 
 /// A network with what it was read from.
 #[derive(Debug, Clone)]

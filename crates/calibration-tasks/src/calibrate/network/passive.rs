@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use pipeline::survey::{Purpose, compatible};
+use pipeline::{Error, Result};
 use range_io::calibration::Calibration;
 use range_io::survey::Survey;
 use range_io::tables::read_placed_observations;
@@ -9,8 +11,6 @@ use self_calibration::{PassiveCamera, PassiveImagePoint};
 
 use crate::calibrate::network::network_files::{Tables, refuse_repeats, sigma_pixel};
 use crate::calibrate::request::TableDefaults;
-use pipeline::survey::{Purpose, compatible};
-use pipeline::{Error, Result};
 
 /// Reads the folder; `None` where there is none. Its stations must be those of the range camera.
 pub(crate) fn read_passive(

@@ -8,6 +8,11 @@ pub(crate) mod pose_test;
 
 use error_models::{RangeTerms, SurfaceShape};
 use nalgebra::{Isometry3, Point3, Vector3};
+use pipeline::command::{Progress, root_of};
+use pipeline::survey::{Outcome, ViewData, ViewDrift};
+use pipeline::{
+    AverageOptions, DeconvolveOptions, DemodulateOptions, Error, Plan, Result, Stage, UnwrapOptions, process,
+};
 use range_io::survey::{Level, Survey};
 use range_io::tables::{ObservedPlane, PlacedRows, Station, read_placed_planes, read_placed_stations};
 use self_calibration::Error as Cause;
@@ -22,18 +27,9 @@ use crate::calibrate::planes::attempt::{Attempt, Calibrated};
 use crate::calibrate::planes::offset::FoundTable;
 use crate::calibrate::planes::placed::Placed;
 use crate::calibrate::planes::planes_outcome::Found;
-use crate::calibrate::request::CalibrateRequest;
-use crate::calibrate::request::OffsetModel;
+use crate::calibrate::request::{CalibrateRequest, OffsetModel};
 use crate::calibrate::start::Start;
 use crate::calibrate::start::drift::KnownDrift;
-use pipeline::command::Progress;
-use pipeline::command::root_of;
-use pipeline::survey::Outcome;
-use pipeline::survey::ViewData;
-use pipeline::survey::ViewDrift;
-use pipeline::{
-    AverageOptions, DeconvolveOptions, DemodulateOptions, Error, Plan, Result, Stage, UnwrapOptions, process,
-};
 
 /// Differences used of all frames together. More pixels of the same planes would not tell more, as they share the
 /// errors of the reference, and would make the report heavy.

@@ -2,6 +2,7 @@
 //! a plane.
 
 use error_models::{FixedPattern, RangeErrorModel};
+use pipeline::statistics::retain_within;
 use self_calibration::{
     DifferenceOptions, OffsetSample, OffsetTable, OffsetTableOptions, Result, estimate_offset_table,
 };
@@ -9,7 +10,6 @@ use serde::Serialize;
 
 use crate::calibrate::planes::placed::Placed;
 use crate::calibrate::start::Start;
-use pipeline::statistics::retain_within;
 
 /// Residuals beyond so many robust standard deviations belong to something else than the plane.
 const GROSS: f64 = 4.0;

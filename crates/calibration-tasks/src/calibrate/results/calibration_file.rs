@@ -1,14 +1,14 @@
 //! The outcome as `calibration.ron`.
 
 use error_models::{NamedParameter, ParameterStatus};
+use pipeline::Result;
+use pipeline::survey::UNKNOWN_INTEGRATION_TIME_S;
 use range_io::calibration::{Calibration, Correlation, Provenance, RangeCalibration, ValidSpan};
 use self_calibration::{CalibratedParameter, CalibrationOutcome, Component, Verdict};
 
 use crate::calibrate::results::certificate::extent;
 use crate::calibrate::results::summary::CorrelationSummary;
 use crate::calibrate::start::Start;
-use pipeline::Result;
-use pipeline::survey::UNKNOWN_INTEGRATION_TIME_S;
 
 /// The calibration to write: estimated and held parameters with their quality, and what the start calibration knew of
 /// the camera besides (noise, scattering, fixed pattern, warm-up). The drift of the last was taken off the observations, unless

@@ -1,11 +1,11 @@
 //! What a new calibration has from the one that it started from, what it has not, and for which integration time it holds.
 
 use error_models::ParameterStatus;
+use pipeline::survey::UNKNOWN_INTEGRATION_TIME_S;
 use range_io::calibration::Calibration;
 use self_calibration::CalibrationOutcome;
 
 use crate::calibrate::start::Start;
-use pipeline::survey::UNKNOWN_INTEGRATION_TIME_S;
 
 /// Times (relative) that are the same: they went through a file or a unit's conversion.
 const SAME: f64 = 1e-6;

@@ -4,6 +4,9 @@ use std::path::PathBuf;
 
 use error_models::ParameterStatus;
 use nalgebra::DMatrix;
+use pipeline::command::{Doubt, DoubtKind, Judged};
+use pipeline::survey::ViewDrift;
+use pipeline::trends::TrendSummary;
 use range_io::calibration::Calibration;
 use self_calibration::{CalibratedParameter, CalibrationOutcome, Component, ObservationQuality, Verdict};
 use serde::Serialize;
@@ -16,9 +19,6 @@ use crate::calibrate::results::certificate::Certificate;
 use crate::calibrate::results::names::group_unit;
 use crate::calibrate::results::trends::trends;
 use crate::calibrate::start::Start;
-use pipeline::command::{Doubt, DoubtKind, Judged};
-use pipeline::survey::ViewDrift;
-use pipeline::trends::TrendSummary;
 
 /// Names and units of the parameters that a summary always has, in its order: those of camera and range terms.
 fn always_listed() -> impl Iterator<Item = (&'static str, &'static str)> {

@@ -1,11 +1,11 @@
 //! Adjusted stations, targets and residuals as tables.
 
 use nalgebra::Matrix3;
+use pipeline::survey::StationPose;
 use range_io::tables::{Residual, Station, Target};
 use self_calibration::{AdjustedStation, AdjustedTarget, CalibrationOutcome, ObservationQuality};
 
 use crate::calibrate::results::names::verdict_name;
-use pipeline::survey::StationPose;
 
 /// Rows of `adjusted_stations.csv`.
 pub(crate) fn stations(outcome: &CalibrationOutcome) -> Vec<Station> {

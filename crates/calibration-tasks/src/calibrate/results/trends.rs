@@ -1,10 +1,9 @@
 //! Whether what a calibration leaves of the ranges is random.
 
 use error_models::FixedPattern;
+use pipeline::trends::TrendSummary;
 use residual_tests::{TrendOptions, TrendSample, test_trends};
 use self_calibration::{CalibrationOutcome, Component, ObservationQuality, Verdict};
-
-use pipeline::trends::TrendSummary;
 
 /// The residuals of ranges, a table of offsets taken off, against range, amplitude, column and row; empty where there are
 /// too few of them.

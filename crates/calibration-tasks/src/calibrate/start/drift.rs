@@ -2,13 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
+use pipeline::plan::DriftTreatment;
+use pipeline::survey::{DriftCurve, ViewDrift, view_name};
+use pipeline::{Error, Result};
 use range_io::calibration::Calibration;
 use range_io::survey::Survey;
-
-use pipeline::plan::DriftTreatment;
-use pipeline::survey::view_name;
-use pipeline::survey::{DriftCurve, ViewDrift};
-use pipeline::{Error, Result};
 
 /// The drift of the start calibration's warming camera, or none.
 pub(crate) struct KnownDrift<'a> {

@@ -8,15 +8,13 @@ use std::path::{Path, PathBuf};
 
 use camera_model::Camera;
 use error_models::RangeErrorModel;
+use pipeline::survey::{Purpose, ViewDrift, compatible, model_set, read_calibration};
+use pipeline::{Error, Result};
 use range_image::Modulation;
 use range_io::calibration::Calibration;
 use range_io::survey::Survey;
 
 use crate::calibrate::results::certificate::Conditions;
-use pipeline::survey::ViewDrift;
-use pipeline::survey::read_calibration;
-use pipeline::survey::{Purpose, compatible, model_set};
-use pipeline::{Error, Result};
 
 /// What a calibration starts from and what it came from.
 #[derive(Debug, Clone)]

@@ -5,8 +5,7 @@ use range_image::RangeFrame;
 use range_io::survey::ReferencePath;
 
 use crate::command::progress::Progress;
-use crate::plan::CorrectRangeOptions;
-use crate::plan::DriftTreatment;
+use crate::plan::{CorrectRangeOptions, DriftTreatment};
 use crate::stages::Findings;
 use crate::stages::ranges::reference_path;
 use crate::survey::compatible::model_set;

@@ -12,9 +12,8 @@ pub(crate) mod statement;
 use crate::Result;
 use crate::plan::Stage;
 use crate::survey::outcome::Outcome;
-use crate::survey::work::Work;
-
 use crate::survey::plausibility::result::beyond_maximum;
+use crate::survey::work::Work;
 pub use frames::FrameWatch;
 pub use placed::{PlacedStation, displaced, uncertain, uncertain_frames};
 pub use result::{of_outcome, stated_sigma};

@@ -1,13 +1,13 @@
 //! What is left between the surfaces after a registration.
 
 use nalgebra::Point3;
+use pipeline::Result;
+use pipeline::statistics::{quantile, robust_standard_deviation};
 use report::{
     Axes, CATEGORIES, ColourMap, Figure, LineOfSight, Scale, Series, deviation_figure, histogram, raster_figure,
 };
 
 use crate::register::Registered;
-use pipeline::Result;
-use pipeline::statistics::{quantile, robust_standard_deviation};
 
 /// Stations whose pictures are shown; further ones would make the page heavy without telling more.
 const PICTURED_STATIONS: usize = 8;

@@ -3,14 +3,14 @@
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
+use pipeline::command::root_of;
+use pipeline::{Error, Result};
 use range_io::calibration::Calibration;
 use range_io::survey::Survey;
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 
 use crate::calibrate::{CalibrateMethod, CalibrateRequest};
-use pipeline::command::root_of;
-use pipeline::{Error, Result};
 
 /// One file that was read.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]

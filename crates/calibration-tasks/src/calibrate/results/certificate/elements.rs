@@ -2,10 +2,9 @@
 
 use std::collections::BTreeMap;
 
+use pipeline::survey::StationPose;
 use self_calibration::{CalibrationOutcome, Component, ObservationQuality, Verdict};
 use serde::Serialize;
-
-use pipeline::survey::StationPose;
 
 /// A station as it was adjusted.
 #[derive(Debug, Clone, PartialEq, Serialize)]

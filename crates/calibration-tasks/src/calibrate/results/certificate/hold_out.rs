@@ -2,10 +2,9 @@
 
 use std::fmt;
 
+use pipeline::command::{Doubt, DoubtKind};
 use self_calibration::{HoldOut, Prediction};
 use serde::Serialize;
-
-use pipeline::command::{Doubt, DoubtKind};
 
 /// Whether a calibration predicts what stations observed that took no part in it.
 #[derive(Debug, Clone, PartialEq, Serialize)]

@@ -1,11 +1,11 @@
 //! Expanded uncertainty (k = 2) of what is measured with the calibration, at chosen places.
 
+use pipeline::statistics::median;
 use range_io::calibration::Calibration;
 use self_calibration::{CalibrationOutcome, Component, ObservationQuality, Verdict};
 use serde::Serialize;
 
 use crate::calibrate::point_uncertainty::PointUncertainty;
-use pipeline::statistics::median;
 
 /// Coverage factor: about 95 % of a normal distribution.
 pub(crate) const COVERAGE: f64 = 2.0;

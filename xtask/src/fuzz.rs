@@ -20,7 +20,7 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome {
     let mut words: Vec<String> = vec![arguments.seconds.to_string()];
     words.extend(arguments.seed.map(|seed| seed.to_string()));
     words.extend(arguments.target.clone());
-    let program = ["run", "--package", "pipeline", "--all-features", "--example", "fuzz_readers", "--"];
+    let program = ["run", "--package", "calibration-tasks", "--all-features", "--example", "fuzz_readers", "--"];
     let all: Vec<&str> = program.into_iter().chain(words.iter().map(String::as_str)).collect();
     cargo(&all, &[])
 }

@@ -8,35 +8,13 @@ const LARGEST_CRATE: usize = 8_000;
 /// Most entries of a folder of sources.
 const LARGEST_FOLDER: usize = 12;
 
-/// Crates that are larger, and the lines that they may not exceed: they become smaller, part by part.
-const LARGER_CRATES: [(&str, usize); 3] =
-    [("icp-registration", 24_200), ("pipeline", 23_500), ("self-calibration", 9_800)];
-
-/// Folders that hold more, and how many.
-const LARGER_FOLDERS: [(&str, usize); 13] = [
-    ("icp-registration/src", 21),
-    ("icp-registration/src/coarse", 24),
-    ("icp-registration/src/icp", 14),
-    ("icp-registration/src/multiview", 38),
-    ("icp-registration/src/organised", 26),
-    ("icp-registration/src/tracking", 14),
-    ("icp-registration/src/voxels", 14),
-    ("pipeline/src", 40),
-    ("pipeline/src/calibrate", 23),
-    ("pipeline/src/register", 13),
-    ("pipeline/src/report", 21),
-    ("pipeline/src/report/network", 15),
-    ("pipeline/src/stages", 14),
-];
-
 /// What of a crate is too large.
 pub(crate) fn complaints(folder: &Path) -> Result<Vec<String>, String> {
     let name = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let mut found = Vec::new();
     let lines = measure(&folder.join("src"), &format!("{name}/src"), &mut found)?;
-    let most = limit(&LARGER_CRATES, &name, LARGEST_CRATE);
-    if lines > most {
-        found.push(format!("crates/{name}: {lines} lines of sources, at most {most}"));
+    if lines > LARGEST_CRATE {
+        found.push(format!("crates/{name}: {lines} lines of sources, at most {LARGEST_CRATE}"));
     }
     Ok(found)
 }
@@ -45,9 +23,8 @@ pub(crate) fn complaints(folder: &Path) -> Result<Vec<String>, String> {
 fn measure(folder: &Path, shown: &str, found: &mut Vec<String>) -> Result<usize, String> {
     let list = std::fs::read_dir(folder).map_err(|error| format!("{}: {error}", folder.display()))?;
     let entries: Vec<PathBuf> = list.flatten().map(|entry| entry.path()).collect();
-    let most = limit(&LARGER_FOLDERS, shown, LARGEST_FOLDER);
-    if entries.len() > most {
-        found.push(format!("crates/{shown}: {} entries, at most {most}", entries.len()));
+    if entries.len() > LARGEST_FOLDER {
+        found.push(format!("crates/{shown}: {} entries, at most {LARGEST_FOLDER}", entries.len()));
     }
     let mut lines = 0;
     for path in entries {
@@ -60,10 +37,6 @@ fn measure(folder: &Path, shown: &str, found: &mut Vec<String>) -> Result<usize,
         }
     }
     Ok(lines)
-}
-
-fn limit(exceptions: &[(&str, usize)], name: &str, otherwise: usize) -> usize {
-    exceptions.iter().find(|(known, _)| *known == name).map_or(otherwise, |(_, most)| *most)
 }
 
 #[cfg(test)]

@@ -8,6 +8,6 @@ pub(crate) fn run() -> Outcome {
     tidy::run()?;
     cargo(&["clippy", "--workspace", "--all-targets", "--all-features", "--", "--deny", "warnings"], &[])?;
     cargo(&["doc", "--workspace", "--all-features", "--no-deps"], &[("RUSTDOCFLAGS", "--deny warnings")])?;
-    // The tests of `pipeline` hold the small room and the real captures against their bars.
+    // The tests of `calibration-tasks` and `tasks` hold the small room and the real captures against their bars.
     cargo(&["test", "--workspace", "--all-features"], &[])
 }

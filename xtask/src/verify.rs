@@ -7,7 +7,7 @@ use crate::shell::{Outcome, cargo};
 const STATISTICS: &[(&str, &str, &str)] = &[
     ("calibrations", "self-calibration", "calibrations"),
     ("flags", "pipeline", "false_flags"),
-    ("networks", "pipeline", "network_seeds"),
+    ("networks", "calibration-tasks", "network_seeds"),
     ("outside", "scattering-deconvolution", "outside_light"),
 ];
 

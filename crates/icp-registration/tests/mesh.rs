@@ -83,5 +83,8 @@ fn meshes_that_are_none_are_refused() {
     let (point, normal) = mesh.closest(&Point3::new(0.2, 0.3, 0.5), 1.0).unwrap().unwrap();
     assert!((point - Point3::new(0.2, 0.3, 0.0)).norm() < 1e-15 && (normal - Vector3::z()).norm() < 1e-15);
     assert!(mesh.closest(&Point3::new(0.2, 0.3, 0.5), 0.4).unwrap().is_none());
-    assert!(matches!(mesh.closest(&Point3::new(f64::NAN, 0.0, 0.0), 1.0), Err(Error::Cloud(CloudError::NonFinite { .. }))));
+    assert!(matches!(
+        mesh.closest(&Point3::new(f64::NAN, 0.0, 0.0), 1.0),
+        Err(Error::Cloud(CloudError::NonFinite { .. }))
+    ));
 }

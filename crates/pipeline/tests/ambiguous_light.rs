@@ -2,9 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::common::fixtures;
 use pipeline::{Outcome, Plan, Silent, SimulateSource, ViewData, process, simulate};
 use range_image::{Flags, RangeFrame};
+
+use crate::common::fixtures;
 
 /// A fixture's scene with a piece of its text replaced, simulated.
 fn simulated(scene: &str, from: &str, to: &str, folder: &Path) -> PathBuf {

@@ -2,9 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::common::{fixtures, request};
 use pipeline::{Failure, Plan, RunRequest, Silent};
 use range_io::npz::NpzWriter;
+
+use crate::common::{fixtures, request};
 
 const SURVEY: &str = r#"(
     camera: (

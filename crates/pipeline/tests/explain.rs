@@ -3,11 +3,12 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-use crate::common;
-use crate::common::fixtures;
 use pipeline::{ExplainRequest, Explanation, Plan, Silent, SimulateSource, ViewData, explain, process, simulate};
 use range_image::Flags;
 use range_io::npz::NpzWriter;
+
+use crate::common;
+use crate::common::fixtures;
 
 /// The small room as a survey.
 fn room() -> (tempfile::TempDir, PathBuf) {

@@ -2,8 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::common::simulated_from;
 use pipeline::{ExplainRequest, Outcome, Plan, Silent, View, ViewData, explain, process};
+
+use crate::common::simulated_from;
 
 const SCENE: &str = "(
     scene: (objects: [

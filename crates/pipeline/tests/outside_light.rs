@@ -3,11 +3,12 @@
 use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
 
-use crate::common::{fixtures, simulated_from};
 use pipeline::{Doubt, DoubtKind, Outcome, Plan, Silent, process};
 use range_image::{Flags, RawFrame, Samples};
 use range_io::survey::{InputFrame, Survey, read_frame, write_frame};
 use scattering_deconvolution::{GaussianTerm, Psf, Scatterer};
+
+use crate::common::{fixtures, simulated_from};
 
 /// A scene of the fixtures with another light and fewer stations, as a survey; as many frames of each as asked.
 fn dimmed(scene: &str, source_power: f64, frames: usize, stations: &[&str], folder: &Path) -> PathBuf {

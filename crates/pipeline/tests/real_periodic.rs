@@ -2,11 +2,12 @@
 
 use std::path::Path;
 
-use crate::common::{fixtures, has_capture};
 use pipeline::{Plan, Silent, ViewData, process};
 use range_calibration::{
     AmplitudeOrPositionOptions, RangeDifference, RangeTermOptions, Scale, amplitude_or_position, estimate_range_terms,
 };
+
+use crate::common::{fixtures, has_capture};
 
 /// Every so many columns and rows.
 const STEP: usize = 4;

@@ -1,6 +1,5 @@
 //! Four frames of a floor by a real camera: what averaging takes off, and what it leaves.
 
-use crate::common::{fixtures, has_capture};
 use camera_model::Camera;
 use error_models::{AmplitudeScale, ModelSet, RangeNoise};
 use pipeline::{Plan, Silent, ViewData, process};
@@ -8,6 +7,8 @@ use primitives::{PrimitiveFit, PrimitiveKind, PrimitiveOptions, fit_primitive};
 use range_image::{RangeFrame, average_ranges};
 use range_io::calibration::Calibration;
 use range_io::survey::Survey;
+
+use crate::common::{fixtures, has_capture};
 
 /// Columns and rows of the floor before the camera, all of it within the first ambiguity interval.
 const FLOOR: [[usize; 2]; 2] = [[72, 104], [114, 140]];

@@ -2,8 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::common::simulated_from;
 use pipeline::{Plan, RemainingErrors, RunRequest, Silent, Summary};
+
+use crate::common::simulated_from;
 
 /// A wall from seventy places.
 const WALL: &str = "(

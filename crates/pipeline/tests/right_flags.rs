@@ -2,10 +2,11 @@
 
 use std::path::Path;
 
-use crate::common::{fixtures, has_capture, simulated_with};
 use pipeline::{DoubtKind, Judged, Outcome, Plan, RunRequest, Silent, ViewData, process};
 use range_image::Flags;
 use range_io::survey::{InputFrame, Level, Survey, read_frame, write_frame};
+
+use crate::common::{fixtures, has_capture, simulated_with};
 
 fn run(survey: &Path, stages: &str) -> Outcome {
     let plan = Plan::from_ron(&format!("(name: \"test\", stages: [{stages}])"), "test.ron".as_ref()).unwrap();

@@ -2,7 +2,6 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::common::simulated_from;
 use error_models::WarmUp;
 use nalgebra::{DMatrix, DVector};
 use pipeline::{DriftSource, ExplainRequest, Outcome, Plan, Silent, View, ViewData, ViewDrift, explain, process};
@@ -11,6 +10,8 @@ use rand_pcg::Pcg64;
 use range_image::Flags;
 use range_io::calibration::{CalibratedDrift, Calibration, Correlation};
 use range_io::survey::Survey;
+
+use crate::common::simulated_from;
 
 /// A wall two metres away, seen by a camera that was switched on a minute before the first of four frames.
 const WALL: &str = "(

@@ -15,7 +15,7 @@ type Outcome = Result<ExitCode, Box<dyn Error>>;
 /// Runs a command; what the shell sees where it does not fail.
 pub(crate) fn dispatch(command: Command, output: &Output) -> Outcome {
     match command {
-        Command::Diff(arguments) => output.result(&pipeline::diff(&arguments.request())?),
+        Command::Diff(arguments) => output.result(&calibration_tasks::diff(&arguments.request())?),
         Command::Run { survey, pipeline, calibration, out } => run(survey, &pipeline, calibration, out, output),
         Command::Simulate { scene, seed, position_sigma, attitude_sigma, gross_errors, out } => {
             let source = SimulateSource {
@@ -31,40 +31,40 @@ pub(crate) fn dispatch(command: Command, output: &Output) -> Outcome {
         }
         Command::SimulateNetwork { scene, seed, out } => {
             let out = out.unwrap_or_else(|| default_out(scene.file_stem().unwrap_or_default().as_ref()));
-            output.result(&pipeline::simulate_network(&scene, seed, &out)?)
+            output.result(&calibration_tasks::simulate_network(&scene, seed, &out)?)
         }
         Command::Calibrate(arguments) => {
             let request = arguments.request();
-            output.result(&pipeline::calibrate(&request, output.progress().as_ref())?)
+            output.result(&calibration_tasks::calibrate(&request, output.progress().as_ref())?)
         }
         Command::Plan(arguments) => {
-            output.result(&pipeline::plan_network(&arguments.request(), output.progress().as_ref())?)
+            output.result(&calibration_tasks::plan_network(&arguments.request(), output.progress().as_ref())?)
         }
         Command::Scattering(arguments) => {
-            output.result(&pipeline::estimate_scattering(&arguments.request(), output.progress().as_ref())?)
+            output.result(&tasks::estimate_scattering(&arguments.request(), output.progress().as_ref())?)
         }
         Command::Noise(arguments) => {
-            output.result(&pipeline::estimate_noise(&arguments.request(), output.progress().as_ref())?)
+            output.result(&tasks::estimate_noise(&arguments.request(), output.progress().as_ref())?)
         }
         Command::Fpn(arguments) => {
-            output.result(&pipeline::estimate_pattern(&arguments.request(), output.progress().as_ref())?)
+            output.result(&tasks::estimate_pattern(&arguments.request(), output.progress().as_ref())?)
         }
         Command::WarmUp(arguments) => {
-            output.result(&pipeline::estimate_warm_up(&arguments.request(), output.progress().as_ref())?)
+            output.result(&tasks::estimate_warm_up(&arguments.request(), output.progress().as_ref())?)
         }
         Command::Register(arguments) => match arguments.request() {
-            Request::Register(request) => output.result(&pipeline::register(&request, output.progress().as_ref())?),
-            Request::Track(request) => output.result(&pipeline::track(&request, output.progress().as_ref())?),
+            Request::Register(request) => output.result(&tasks::register(&request, output.progress().as_ref())?),
+            Request::Track(request) => output.result(&tasks::track(&request, output.progress().as_ref())?),
             Request::SeveralToTrack => {
                 Err("register: --track follows the frames of one survey: name one folder".into())
             }
         },
-        Command::Inspect { path } => output.result(&pipeline::inspect(&path)?),
+        Command::Inspect { path } => output.result(&tasks::inspect(&path)?),
         Command::Explain(arguments) => {
             output.result(&pipeline::explain(&arguments.request()?, output.progress().as_ref())?)
         }
         Command::Compare(arguments) => {
-            output.result(&pipeline::compare(&arguments.request(), output.progress().as_ref())?)
+            output.result(&tasks::compare(&arguments.request(), output.progress().as_ref())?)
         }
     }
 }
@@ -79,7 +79,7 @@ fn run(
     let plan = Plan::read(pipeline)?;
     let out = out.unwrap_or_else(|| default_out(plan.name.as_ref()));
     let request = RunRequest { plan, plan_path: pipeline.to_owned(), survey, calibration, out };
-    let summary = pipeline::run(&request, output.progress().as_ref())?;
+    let summary = calibration_tasks::run(&request, output.progress().as_ref())?;
     output.result(&summary)
 }
 

@@ -6,6 +6,9 @@ pub use adjust;
 #[cfg(feature = "atomic-output")]
 #[doc(inline)]
 pub use atomic_output;
+#[cfg(feature = "calibration-tasks")]
+#[doc(inline)]
+pub use calibration_tasks;
 #[cfg(feature = "camera-model")]
 #[doc(inline)]
 pub use camera_model;
@@ -42,6 +45,9 @@ pub use range_image;
 #[cfg(feature = "range-io")]
 #[doc(inline)]
 pub use range_io;
+#[cfg(feature = "report")]
+#[doc(inline)]
+pub use report;
 #[cfg(feature = "scattering-deconvolution")]
 #[doc(inline)]
 pub use scattering_deconvolution;
@@ -51,6 +57,9 @@ pub use self_calibration;
 #[cfg(feature = "simulation")]
 #[doc(inline)]
 pub use simulation;
+#[cfg(feature = "tasks")]
+#[doc(inline)]
+pub use tasks;
 
 #[cfg(feature = "primitives")]
 #[doc(inline)]

@@ -57,8 +57,7 @@ pub(crate) struct Example(PathBuf);
 
 impl Example {
     pub(crate) fn build(package: &str, name: &str) -> Result<Self, String> {
-        let command =
-            ["build", "--release", "--quiet", "--package", package, "--example", name];
+        let command = ["build", "--release", "--quiet", "--package", package, "--example", name];
         crate::shell::cargo(&command, &[])?;
         let target = std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| root().join("target"), PathBuf::from);
         Ok(Self(target.join("release/examples").join(name)))

@@ -4,9 +4,9 @@ use error_models::OutsideModel;
 use range_image::Flags;
 use statistics::Distribution;
 
-use super::{FlagReason, PixelState};
+use crate::explain::{FlagReason, PixelState};
 use crate::plan::{FlagOptions, Stage};
-use crate::view::View;
+use crate::survey::view::View;
 
 /// Notes the flags as stages set them.
 pub(super) struct FlagWatch {

@@ -1,8 +1,8 @@
 //! One pixel's way through a pipeline: what each correction did to its range, and what its flags mean.
 
-mod flags;
-mod parts;
-mod words;
+pub(crate) mod flags;
+pub(crate) mod parts;
+pub(crate) mod words;
 
 use std::path::PathBuf;
 
@@ -11,14 +11,15 @@ use range_io::calibration::Calibration;
 use range_io::survey::{Level, Survey};
 use serde::Serialize;
 
-use crate::load::{load, read_calibration, root_of};
+use crate::command::destination::root_of;
+use crate::command::progress::Progress;
+use crate::command::verdict::Judged;
+use crate::explain::flags::FlagWatch;
 use crate::plan::{Stage, is_past};
-use crate::progress::Progress;
-use crate::view::{View, ViewData};
-use crate::work::Work;
+use crate::survey::load::{load, read_calibration};
+use crate::survey::view::{View, ViewData};
+use crate::survey::work::Work;
 use crate::{Error, Plan, Result, stages};
-
-use self::flags::FlagWatch;
 
 /// Which pixel is to be explained.
 #[derive(Debug, Clone)]
@@ -67,6 +68,8 @@ pub struct Explanation {
     /// The flags at the end with their reasons.
     pub flags: Vec<FlagReason>,
 }
+
+impl Judged for Explanation {}
 
 /// What one stage did to the pixel.
 #[derive(Debug, Clone, Serialize)]

@@ -2,11 +2,11 @@
 
 use error_models::{LedgerEntry, RangeTerm};
 
-use super::{StagePart, WHOLE_INTERVALS};
-use crate::drift::ViewDrift;
+use crate::explain::{StagePart, WHOLE_INTERVALS};
 use crate::plan::Stage;
-use crate::truth::wrap;
-use crate::view::View;
+use crate::survey::drift::ViewDrift;
+use crate::survey::truth::wrap;
+use crate::survey::view::View;
 
 /// The parts of a change, which add up to it; none where nothing changed.
 pub(super) fn parts(stage: &Stage, before: &View, after: &View, pixel: [usize; 2], change_m: f64) -> Vec<StagePart> {

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::{Explanation, StageLine, WHOLE_INTERVALS};
+use crate::explain::{Explanation, StageLine, WHOLE_INTERVALS};
 
 impl fmt::Display for Explanation {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

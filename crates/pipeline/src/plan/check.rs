@@ -1,15 +1,18 @@
 //! What a pipeline's file may say: numbers that mean something, and at least one stage.
 
-use super::{Plan, SimulateSource, Source, Stage};
+use crate::plan::{Plan, SimulateSource, Source, Stage};
 
 /// Path of a field and what is wrong with it.
-pub(crate) type Fault = (String, String);
+pub type Fault = (String, String);
 
 /// What a number must be.
 #[derive(Debug, Clone, Copy)]
-pub(crate) enum Rule {
+pub enum Rule {
+    /// Any number but NaN and infinity.
     Finite,
+    /// Above zero.
     Positive,
+    /// Zero or above.
     NotNegative,
     /// Above 0 and below 1.
     Probability,
@@ -19,7 +22,7 @@ pub(crate) enum Rule {
 
 impl Rule {
     /// Why a value is refused; `None` where it holds.
-    pub(crate) fn fault(self, value: f64) -> Option<String> {
+    pub fn fault(self, value: f64) -> Option<String> {
         let (holds, expected) = match self {
             Self::Finite => (value.is_finite(), "a finite number"),
             Self::Positive => (value.is_finite() && value > 0.0, "a positive number"),
@@ -32,7 +35,7 @@ impl Rule {
 }
 
 /// The first of several numbers that breaks its rule.
-pub(crate) fn check_numbers(numbers: impl IntoIterator<Item = (String, f64, Rule)>) -> Result<(), Fault> {
+pub fn check_numbers(numbers: impl IntoIterator<Item = (String, f64, Rule)>) -> Result<(), Fault> {
     let fault = |(field, value, rule): (String, f64, Rule)| Some((field, rule.fault(value)?));
     numbers.into_iter().find_map(fault).map_or(Ok(()), Err)
 }
@@ -74,7 +77,7 @@ impl Plan {
 
 impl SimulateSource {
     /// Refuses numbers that no simulation can have.
-    pub(crate) fn check(&self) -> Result<(), Fault> {
+    pub fn check(&self) -> Result<(), Fault> {
         check_numbers([
             ("approximate_position_sigma_m".to_owned(), self.approximate_position_sigma_m, Rule::NotNegative),
             ("approximate_attitude_sigma_deg".to_owned(), self.approximate_attitude_sigma_deg, Rule::NotNegative),

@@ -1,5 +1,6 @@
 //! A pipeline as data: named stages with options, in the order of the conventions.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use range_io::ron_text;
@@ -8,16 +9,15 @@ use serde::{Deserialize, Serialize};
 
 use crate::{Error, Result};
 
-mod check;
-mod options;
+pub(crate) mod check;
+pub(crate) mod options;
 
-pub use crate::drift::CorrectRangeOptions;
-pub(crate) use check::{Fault, Rule, check_numbers};
-pub(crate) use options::NORMAL_HALF_WIDTH_PX;
+pub use check::{Fault, Rule, check_numbers};
 pub use options::{
-    AdjustOptions, AmplitudeKind, AverageOptions, CorrectImagePointOptions, DeconvolveOptions, DemodulateOptions,
-    FlagOptions, FuseExposuresOptions, MixedPixels, MultipathOptions, MultipathTreatment, NoiseOptions,
-    PointCloudOptions, RegisterOptions, RepairWrapsOptions, StartPoses, UnwrapMethod, UnwrapOptions,
+    AdjustOptions, AmplitudeKind, AverageOptions, CorrectImagePointOptions, CorrectRangeOptions, DeconvolveOptions,
+    DemodulateOptions, DriftTreatment, FlagOptions, FuseExposuresOptions, MixedPixels, MultipathOptions,
+    MultipathTreatment, NORMAL_HALF_WIDTH_PX, NoiseOptions, PointCloudOptions, RegisterOptions, RepairWrapsOptions,
+    StartPoses, UnwrapMethod, UnwrapOptions,
 };
 
 /// What a pipeline does, read from a RON file.
@@ -153,7 +153,7 @@ stages! {
 }
 
 /// Whether frames of a level are past what a stage needs. A depth becomes a range as it is read.
-pub(crate) fn is_past(level: Level, needs: Level) -> bool {
+pub fn is_past(level: Level, needs: Level) -> bool {
     level.min(Level::Range) > needs
 }
 
@@ -165,7 +165,7 @@ impl Plan {
         let text = format!("#![enable(unwrap_variant_newtypes)]{text}");
         let plan: Self = ron_text::parse(path, &text)?;
         plan.check().map_err(|(field, reason)| ron_text::wrong_field(path, &text, field, reason))?;
-        crate::destination::check_name(path, &plan.name)?;
+        crate::command::destination::check_name(path, &plan.name)?;
         plan.check_order()?;
         Ok(plan)
     }
@@ -195,4 +195,11 @@ impl Plan {
             }
         }
     }
+}
+
+/// Stages that frames of this level leave no room for.
+pub fn ruled_out(level: Level) -> BTreeMap<String, String> {
+    let blocked = Stage::ALL_NEEDS.iter().filter(|(_, needs)| is_past(level, *needs));
+    let reason = |needs: &Level| format!("needs level `{}`; the frames are at level `{}`", needs.name(), level.name());
+    blocked.map(|(name, needs)| ((*name).to_owned(), reason(needs))).collect()
 }

@@ -5,7 +5,7 @@ use range_image::{ConsistencyOptions, FusionOptions, InterferenceOptions, RestOp
 use serde::{Deserialize, Serialize};
 
 #[cfg(doc)]
-use super::Stage;
+use crate::plan::Stage;
 
 /// Options of [`Stage::Demodulate`]; phase sense, offset, scale and saturation are the survey's.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -253,7 +253,7 @@ impl Default for MixedPixels {
 }
 
 /// Default of the windows that normals come from.
-pub(crate) const NORMAL_HALF_WIDTH_PX: usize = 3;
+pub const NORMAL_HALF_WIDTH_PX: usize = 3;
 
 /// Options of [`Stage::Register`].
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -305,4 +305,23 @@ impl Default for AdjustOptions {
     fn default() -> Self {
         Self { maximum_distance_m: 0.1, minimum_overlap: 0.3 }
     }
+}
+
+/// Options of [`Stage::CorrectRange`].
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct CorrectRangeOptions {
+    /// What is done about the drift of a warming camera.
+    pub warm_up: DriftTreatment,
+}
+
+/// What is done about the drift of a warming camera.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum DriftTreatment {
+    /// It is taken off: as the optical reference shows it, where the survey has one, and else as the calibration says.
+    #[default]
+    Apply,
+    /// It stays in the ranges.
+    Leave,
 }

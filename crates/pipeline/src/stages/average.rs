@@ -3,11 +3,11 @@ use range_image::{
     check_interference, check_rest, check_rest_of_ranges,
 };
 
-use super::Findings;
+use crate::command::progress::Progress;
 use crate::plan::AverageOptions;
-use crate::progress::Progress;
-use crate::view::{View, ViewData, by_station};
-use crate::work::Work;
+use crate::stages::Findings;
+use crate::survey::view::{View, ViewData, by_station};
+use crate::survey::work::Work;
 use crate::{Error, Result};
 
 /// All views of a station with one integration time become one: the mean of the complex images, or of the ranges where

@@ -1,9 +1,9 @@
 use camera_model::RayTable;
 
-use super::Findings;
-use crate::progress::Progress;
-use crate::view::ViewData;
-use crate::work::Work;
+use crate::command::progress::Progress;
+use crate::stages::Findings;
+use crate::survey::view::ViewData;
+use crate::survey::work::Work;
 use crate::{Error, Result};
 
 /// From here on the calibrated camera gives the rays.

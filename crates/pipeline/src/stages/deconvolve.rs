@@ -4,12 +4,12 @@ use scattering_deconvolution::{
     Side,
 };
 
-use super::Findings;
+use crate::command::progress::Progress;
+use crate::command::verdict::{Doubt, DoubtKind};
 use crate::plan::DeconvolveOptions;
-use crate::progress::Progress;
-use crate::verdict::{Doubt, DoubtKind};
-use crate::view::ViewData;
-use crate::work::Work;
+use crate::stages::Findings;
+use crate::survey::view::ViewData;
+use crate::survey::work::Work;
 use crate::{Error, Result};
 
 /// The calibrated point spread function is taken off the complex images; pixels whose correction depends on light that

@@ -3,11 +3,11 @@ use range_image::{
     check_samples, tell_interference,
 };
 
-use super::Findings;
+use crate::command::progress::Progress;
 use crate::plan::DemodulateOptions;
-use crate::progress::Progress;
-use crate::view::ViewData;
-use crate::work::Work;
+use crate::stages::Findings;
+use crate::survey::view::ViewData;
+use crate::survey::work::Work;
 use crate::{Error, Result};
 
 /// Raw samples to complex images, with the conventions that the survey states.

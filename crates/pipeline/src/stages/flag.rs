@@ -5,13 +5,13 @@ use multipath::{
 };
 use range_image::Flags;
 
-use super::Findings;
-use super::multipath::RESPONSE_SNR;
-use crate::outcome::FurtherPoint;
+use crate::command::progress::Progress;
 use crate::plan::FlagOptions;
-use crate::progress::Progress;
-use crate::view::{View, ViewData};
-use crate::work::Work;
+use crate::stages::Findings;
+use crate::stages::multipath::RESPONSE_SNR;
+use crate::survey::outcome::FurtherPoint;
+use crate::survey::view::{View, ViewData};
+use crate::survey::work::Work;
 use crate::{Error, Result};
 
 /// Gross errors get a flag with their reason; no value is changed, but of mixed pixels that are to be dropped.

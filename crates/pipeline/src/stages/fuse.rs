@@ -2,11 +2,11 @@ use std::f64::consts::TAU;
 
 use range_image::{Exposure, FusionOptions, Modulation, RangeFrame, fuse_exposures};
 
-use super::Findings;
+use crate::command::progress::Progress;
 use crate::plan::FuseExposuresOptions;
-use crate::progress::Progress;
-use crate::view::{View, ViewData, by_station};
-use crate::work::Work;
+use crate::stages::Findings;
+use crate::survey::view::{View, ViewData, by_station};
+use crate::survey::work::Work;
 use crate::{Error, Result};
 
 /// Below this ratio of signal to noise the noise of a phase is not normal.

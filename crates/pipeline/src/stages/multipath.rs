@@ -4,11 +4,11 @@ use multipath::{
 };
 use range_image::{ComplexFrame, Flags, Raster};
 
-use super::Findings;
+use crate::command::progress::Progress;
 use crate::plan::{MultipathOptions, MultipathTreatment};
-use crate::progress::Progress;
-use crate::view::{View, ViewData};
-use crate::work::Work;
+use crate::stages::Findings;
+use crate::survey::view::{View, ViewData};
+use crate::survey::work::Work;
 use crate::{Error, Result};
 
 /// Pixels of smaller amplitude, in standard deviations, do not tell the response of the frequencies.

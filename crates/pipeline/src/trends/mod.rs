@@ -1,6 +1,9 @@
 //! Whether what corrections leave over is random (Sect. 4.3): tests of residuals for trends, in words and figures.
 
-mod residuals;
+pub(crate) mod residuals;
+pub(crate) mod section;
+
+pub use section::trends_of_calibration;
 
 use std::fmt;
 
@@ -55,7 +58,8 @@ impl fmt::Display for RemainingErrors {
 }
 
 impl TrendSummary {
-    pub(crate) fn new(test: &TrendTest) -> Self {
+    /// The figures of a test.
+    pub fn new(test: &TrendTest) -> Self {
         let finite = |value: f64| Some(value).filter(|value| value.is_finite());
         let bins = test.bins.iter().map(|bin| [f64::midpoint(bin.low, bin.high), bin.mean_m, bin.standard_error_m]);
         Self {
@@ -73,7 +77,7 @@ impl TrendSummary {
     }
 
     /// Whether the residuals depend on the variable significantly.
-    pub(crate) fn is_trend(&self) -> bool {
+    pub fn is_trend(&self) -> bool {
         self.verdict == "trend"
     }
 }
@@ -90,7 +94,7 @@ fn words(verdict: TrendVerdict) -> String {
 }
 
 /// One sentence without its full stop; `None` where nothing was tested.
-pub(crate) fn sentence(trends: &[TrendSummary]) -> Option<String> {
+pub fn sentence(trends: &[TrendSummary]) -> Option<String> {
     let tested: Vec<&TrendSummary> = trends.iter().filter(|trend| trend.p_value.is_some()).collect();
     if tested.is_empty() {
         return None;

@@ -8,10 +8,10 @@ use rayon::prelude::*;
 use residual_tests::{TrendOptions, TrendSample, test_trends};
 use statistics::retain_within;
 
-use super::{RemainingErrors, TrendSummary, sentence};
-use crate::outcome::Outcome;
-use crate::truth::range_errors;
-use crate::view::{View, ViewData};
+use crate::survey::outcome::Outcome;
+use crate::survey::truth::range_errors;
+use crate::survey::view::{View, ViewData};
+use crate::trends::{RemainingErrors, TrendSummary, sentence};
 
 /// Pixels of all frames together that are looked at, about: more would tell smaller trends than anybody minds.
 const MOST_PIXELS: usize = 20_000;

@@ -2,8 +2,6 @@
 
 #![allow(dead_code, clippy::unwrap_used, clippy::print_stdout)]
 
-pub mod calibration;
-
 use std::path::{Path, PathBuf};
 
 use pipeline::{Plan, Result, RunRequest, Silent, SimulateSource, Summary, simulate};

@@ -2,11 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::{Args, ValueEnum};
-use pipeline::{
-    CalibrateMethod, CalibrateRequest, CalibrationOptions, CertificateRequest, DriftTreatment, Method, NetworkDatum,
-    OffsetModel, TableDefaults, TermSelection,
+use calibration_tasks::{
+    CalibrateMethod, CalibrateRequest, CalibrationOptions, CertificateRequest, Method, NetworkDatum, OffsetModel,
+    TableDefaults, TermSelection,
 };
+use clap::{Args, ValueEnum};
+use pipeline::DriftTreatment;
 
 use crate::requests::values::{Terms, name, positive, terms};
 

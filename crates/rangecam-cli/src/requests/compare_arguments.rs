@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use pipeline::{CompareAlignment, CompareRequest};
+use tasks::{CompareAlignment, CompareRequest};
 
 use crate::requests::values::{not_negative, positive};
 

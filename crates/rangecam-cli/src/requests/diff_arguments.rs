@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
+use calibration_tasks::DiffRequest;
 use clap::Args;
-use pipeline::DiffRequest;
 
 #[derive(Debug, Args)]
 pub(crate) struct DiffArguments {

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use pipeline::{FixedPatternRequest, PatternOptions};
+use tasks::{FixedPatternRequest, PatternOptions};
 
 use crate::requests::calibrate_arguments::default_out;
 use crate::requests::values::whole;

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use pipeline::{NoiseFitOptions, NoiseRequest};
+use tasks::{NoiseFitOptions, NoiseRequest};
 
 use crate::requests::calibrate_arguments::default_out;
 

@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
+use calibration_tasks::{CandidateGrid, NetworkPlanRequest, PlanOptions};
 use clap::Args;
-use pipeline::{CandidateGrid, NetworkPlanRequest, PlanOptions};
 
 use crate::requests::calibrate_arguments::{DatumName, default_out, selection};
 use crate::requests::values::{Terms, name, positive, terms};

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use pipeline::{RegisterMethod, RegisterRequest, TrackRequest};
+use tasks::{RegisterMethod, RegisterRequest, TrackRequest};
 
 #[derive(Debug, Args)]
 pub(crate) struct RegisterArguments {

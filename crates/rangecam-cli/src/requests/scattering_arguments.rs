@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use pipeline::{EstimationOptions, ScatteringRequest, TermCount, TermShape};
+use tasks::{EstimationOptions, ScatteringRequest, TermCount, TermShape};
 
 use crate::requests::calibrate_arguments::default_out;
 

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use pipeline::{ChangeOptions, DriftOptions, ReferenceUse, TemperatureUse, WarmUpRequest};
+use tasks::{ChangeOptions, DriftOptions, ReferenceUse, TemperatureUse, WarmUpRequest};
 
 use crate::requests::calibrate_arguments::default_out;
 use crate::requests::values::{finite, positive};

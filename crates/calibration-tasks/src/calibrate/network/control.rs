@@ -1,0 +1,74 @@
+//! Weighted control: what the standard deviations of a table mean for a pose.
+
+use camera_model::euler_from_pose;
+use nalgebra::{Matrix3, Matrix6, Rotation3, Vector3};
+use range_io::tables::Station;
+
+/// Stands for "position not known" beside a known attitude: far beyond any network, so it carries no weight.
+const UNKNOWN_POSITION_SIGMA_M: f64 = 1e4;
+
+/// Stands for "attitude not known" beside a known position: more than a whole turn.
+const UNKNOWN_ATTITUDE_SIGMA_RAD: f64 = 10.0;
+
+/// Covariance of a pose's tangent step `[dt world m, dθ camera rad]`; `None` where the table gives no standard
+/// deviation.
+pub(crate) fn pose_covariance(row: &Station) -> Option<Matrix6<f64>> {
+    if row.sigma_position_m.is_none() && row.sigma_attitude_rad.is_none() {
+        return None;
+    }
+    let position = row.sigma_position_m.unwrap_or([UNKNOWN_POSITION_SIGMA_M; 3]);
+    let attitude = match row.sigma_attitude_rad {
+        Some(sigma) => {
+            let steps = steps_of_angles(row);
+            steps * variances(sigma) * steps.transpose()
+        }
+        None => variances([UNKNOWN_ATTITUDE_SIGMA_RAD; 3]),
+    };
+    let mut covariance = Matrix6::zeros();
+    covariance.fixed_view_mut::<3, 3>(0, 0).copy_from(&variances(position));
+    covariance.fixed_view_mut::<3, 3>(3, 3).copy_from(&attitude);
+    Some(covariance)
+}
+
+fn variances(sigma: [f64; 3]) -> Matrix3<f64> {
+    Matrix3::from_diagonal(&Vector3::from(sigma.map(|s| s * s)))
+}
+
+/// Derivative of the tangent step dθ (camera axes) by omega, phi, kappa.
+///
+/// World from camera is `X(ω) Y(φ) Z(κ)` of active rotations, the transpose of Eq. 2. With `A = X Y Z`,
+/// `Aᵀ dA = [Zᵀ Yᵀ e_x dω + Zᵀ e_y dφ + e_z dκ]×`.
+fn steps_of_angles(row: &Station) -> Matrix3<f64> {
+    let [_, phi, kappa] = euler_from_pose(&row.world_from_camera);
+    let back = |axis, angle: f64| Rotation3::from_axis_angle(&axis, -angle);
+    let (y, z) = (back(Vector3::y_axis(), phi), back(Vector3::z_axis(), kappa));
+    Matrix3::from_columns(&[z * (y * Vector3::x()), z * Vector3::y(), Vector3::z()])
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use camera_model::pose_from_euler;
+
+    use super::*;
+    use pipeline::survey::StationPose;
+
+    #[test]
+    fn sigmas_of_a_table_come_back_from_the_covariance() {
+        // The way back differentiates the angles of stepped poses: another derivation of the same matrix.
+        let row = Station {
+            station: "S".to_owned(),
+            world_from_camera: pose_from_euler(Vector3::new(1.0, 2.0, 3.0), [1.4, -0.3, 0.7]),
+            sigma_position_m: Some([0.001, 0.002, 0.003]),
+            sigma_attitude_rad: Some([0.01, 0.02, 0.03]),
+            doubt: None,
+        };
+        let pose = StationPose { world_from_camera: row.world_from_camera, covariance: pose_covariance(&row) };
+        let (position, attitude) = pose.sigmas().unwrap();
+        for (found, given) in position.iter().chain(&attitude).zip([0.001, 0.002, 0.003, 0.01, 0.02, 0.03]) {
+            // The derivatives by differences are good to nine digits.
+            assert!((found / given - 1.0).abs() < 1e-7, "{found} from {given}");
+        }
+    }
+}

@@ -1,0 +1,75 @@
+//! Digests of what was read, so that a certificate can be held against the files.
+
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+use pipeline::command::root_of;
+use pipeline::{Error, Result};
+use range_io::calibration::Calibration;
+use range_io::survey::Survey;
+use serde::Serialize;
+use sha2::{Digest, Sha256};
+
+use crate::calibrate::{CalibrateMethod, CalibrateRequest};
+
+/// One file that was read.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct InputDigest {
+    /// The file, by the name under which it was read.
+    pub file: String,
+    /// Its length.
+    pub bytes: u64,
+    /// Its SHA-256, 64 hexadecimal digits.
+    pub sha256: String,
+}
+
+/// Files of a survey that networks are calibrated from, where they are there.
+const NETWORK: [&str; 8] = [
+    "survey.ron",
+    "observations.csv",
+    "stations.csv",
+    "targets.csv",
+    "distances.csv",
+    "passive/survey.ron",
+    "passive/calibration.ron",
+    "passive/observations.csv",
+];
+/// Those for planes, beside the frames.
+const PLANES: [&str; 3] = ["survey.ron", "stations.csv", "planes.csv"];
+
+/// Digests of all files that a calibration reads, in a fixed order.
+pub(crate) fn digests(request: &CalibrateRequest) -> Result<Vec<InputDigest>> {
+    let mut files: Vec<PathBuf> = Vec::new();
+    let root = root_of(&request.survey);
+    let tables: &[&str] = if request.method == CalibrateMethod::Planes { &PLANES } else { &NETWORK };
+    for survey in [Some(&request.survey), request.lens_survey.as_ref()].into_iter().flatten() {
+        let root = root_of(survey);
+        files.extend(tables.iter().map(|name| root.join(name)));
+    }
+    if request.method == CalibrateMethod::Planes {
+        for frame in Survey::read(&request.survey)?.frames {
+            // A frame of a recording has its number behind the name of the file.
+            let name = frame.file.to_string_lossy();
+            let file = name.rsplit_once('#').map_or(&*name, |(file, _)| file);
+            files.push(root.join(if root.join(&frame.file).is_file() { &*name } else { file }));
+        }
+    }
+    files.push(request.calibration.clone().unwrap_or_else(|| root.join(Calibration::FILE_NAME)));
+    let mut seen = std::collections::BTreeSet::new();
+    files.retain(|file| file.is_file() && seen.insert(file.clone()));
+    files.iter().map(|file| digest(file)).collect()
+}
+
+fn digest(path: &Path) -> Result<InputDigest> {
+    let (mut file, bytes) = range_io::open(path)?;
+    let mut hasher = Sha256::new();
+    let mut buffer = vec![0; 1 << 16];
+    loop {
+        let read = file.read(&mut buffer).map_err(|source| Error::Access { path: path.to_owned(), source })?;
+        if read == 0 {
+            break;
+        }
+        hasher.update(&buffer[..read]);
+    }
+    Ok(InputDigest { file: path.display().to_string(), bytes, sha256: format!("{:x}", hasher.finalize()) })
+}

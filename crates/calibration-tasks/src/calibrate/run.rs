@@ -1,0 +1,205 @@
+//! One calibration: survey in, results out.
+
+use std::time::Instant;
+
+use atomic_output::{Destination, write_text};
+use pipeline::command::{Inputs, Progress, json, produce};
+use pipeline::plan::DriftTreatment;
+use pipeline::{Error, Result};
+use range_io::calibration::Calibration;
+use range_io::tables::{write_residuals, write_stations, write_targets};
+use self_calibration::{CalibrationOptions, CalibrationOutcome, Error as Cause, Method, hold_out};
+
+use crate::calibrate::document::figures::Figures;
+use crate::calibrate::document::page::document;
+use crate::calibrate::network::network_check::check;
+use crate::calibrate::network::network_files::{NetworkFiles, read_network};
+use crate::calibrate::planes;
+use crate::calibrate::planes::attempt::{Attempt, Calibrated};
+use crate::calibrate::planes::offset::FoundTable;
+use crate::calibrate::request::{CalibrateMethod, CalibrateRequest, OffsetModel};
+use crate::calibrate::results::certificate::{Certificate, HeldOut, Source, today};
+use crate::calibrate::results::summary::CalibrationSummary;
+use crate::calibrate::results::{calibration_file, tables};
+use crate::calibrate::start::Start;
+
+/// Calibrates a survey and writes the results into the request's output folder.
+///
+/// # Errors
+/// [`Error::Refused`] where the survey does not determine what was asked for: then the diagnosis is written, beside an
+/// older result where there is one. Every other error leaves what was there.
+pub fn calibrate(request: &CalibrateRequest, progress: &dyn Progress) -> Result<CalibrationSummary> {
+    let surveys = [Some(&request.survey), request.lens_survey.as_ref()].into_iter().flatten();
+    let inputs = surveys.fold(Inputs::default(), |inputs, survey| inputs.survey(survey));
+    let inputs = inputs.maybe(request.calibration.as_deref());
+    produce(&request.out, &inputs, |destination| calibrate_into(destination, request, progress))
+}
+
+fn calibrate_into(
+    destination: &Destination,
+    request: &CalibrateRequest,
+    progress: &dyn Progress,
+) -> Result<CalibrationSummary> {
+    let clock = Instant::now();
+    let survey = request.survey.display().to_string();
+    let (start, outcome) = match request.method {
+        CalibrateMethod::Network(_) if request.offset != OffsetModel::Constant => return Err(no_pixels(request)),
+        CalibrateMethod::Network(network_method) => calibrate_networks(request, network_method, progress)?,
+        CalibrateMethod::Planes => planes::calibrate_planes(request, progress)?,
+    };
+    let finish = |mut summary: CalibrationSummary| {
+        summary.seconds = clock.elapsed().as_secs_f64();
+        summary.out.clone_from(&request.out);
+        summary
+    };
+    match outcome {
+        Ok(Calibrated { outcome, table, check }) => {
+            let table = table.as_ref();
+            let mut summary = CalibrationSummary::new(survey, request.method, &start, &outcome, table);
+            let hold_out = HeldOut::new(request.certificate.hold_out, check);
+            summary.doubts.extend(hold_out.doubt());
+            summary.diagnosis.extend(hold_out.excuse(request.certificate.hold_out));
+            let file = file(&outcome, &start, table, &summary)?;
+            let (outcome, start) = (&outcome, &start);
+            let source = Source { request, start, outcome, file: &file, summary: &summary, hold_out };
+            let certificate = Certificate::new(source)?;
+            let date = request.certificate.date.clone().unwrap_or_else(today);
+            let page = crate::calibrate::document::certificate_page::render_certificate(&certificate, &summary, &date);
+            summary.certificate = Some(certificate);
+            let summary = finish(summary);
+            let results = Results { outcome, table, file: &file, certificate_page: &page };
+            write(destination, &results, &summary, progress)?;
+            progress.finish();
+            Ok(summary)
+        }
+        Err(source) => {
+            progress.finish();
+            let reason = source.to_string();
+            let summary = finish(CalibrationSummary::refused(survey, request.method, &start, reason));
+            Err(Error::not_calibrated(source, &summary)?)
+        }
+    }
+}
+
+fn no_pixels(request: &CalibrateRequest) -> Error {
+    let message =
+        "a table of offsets or a surface beside d0 is found from frames of planes, by `--method planes`; from \
+                   targets, name `surface2` (its order behind it) among the terms"
+            .to_owned();
+    Error::Survey { path: request.survey.clone(), message }
+}
+
+fn calibrate_networks(request: &CalibrateRequest, method: Method, progress: &dyn Progress) -> Result<Attempt> {
+    progress.begin("read survey", 1);
+    let files = read_network(&request.survey, request.calibration.as_deref(), &request.defaults, request.warm_up)?;
+    let options = CalibrationOptions { method, ..request.options.clone() };
+    check_station_names(&files, &options)?;
+    let outcome = if method == Method::TwoStepIndependent {
+        let Some(folder) = &request.lens_survey else {
+            let message = "the two-step independent method calibrates the lens from another survey: name it with \
+                           --lens-survey"
+                .to_owned();
+            return Err(Error::Survey { path: request.survey.clone(), message });
+        };
+        let lens = read_network(folder, request.calibration.as_deref(), &request.defaults, DriftTreatment::Leave)?;
+        check(&lens, Method::TwoStepDependent, options.datum)?;
+        progress.begin("adjust networks", 2);
+        self_calibration::calibrate_two_networks(&lens.network, &files.network, &options)
+    } else {
+        check(&files, method, options.datum)?;
+        progress.begin("adjust network", 2);
+        self_calibration::calibrate(&files.network, &options)
+    };
+    progress.advance(2);
+    let outcome = outcome.map_err(|error| placed(error, &files));
+    let outcome = match outcome {
+        // All of a column is wrong: a slip in the input, not a finding about the network.
+        Err(Cause::Contradiction(contradiction)) if contradiction.is_wrong_input() => {
+            let path = files.observations.file().to_owned();
+            return Err(Error::Survey { path, message: contradiction.to_string() });
+        }
+        outcome => outcome,
+    };
+    let calibrated = outcome.map(|outcome| {
+        let check = request.certificate.hold_out.map(|every| {
+            progress.begin("check stations left out", 1);
+            hold_out(&files.network, &options, &outcome, every)
+        });
+        Calibrated { outcome, table: None, check }
+    });
+    Ok((files.start, calibrated))
+}
+
+/// Names file and line of the observed value that contradicts most.
+fn placed(mut error: Cause, files: &NetworkFiles) -> Cause {
+    if let Cause::Contradiction(contradiction) = &mut error
+        && let Some(worst) = &mut contradiction.worst
+    {
+        let file = files.observations.file().display();
+        worst.place = Some(format!("{file}, line {}", files.observations.line(worst.sighting)));
+    }
+    error
+}
+
+/// A name that no station has would silently leave nothing out.
+fn check_station_names(files: &NetworkFiles, options: &CalibrationOptions) -> Result<()> {
+    let stations = &files.network.stations;
+    match options.without_ranges.iter().find(|name| !stations.iter().any(|station| station.name == **name)) {
+        None => Ok(()),
+        Some(unknown) => {
+            let names: Vec<&str> = stations.iter().map(|station| station.name.as_str()).collect();
+            let message = format!("--without-ranges: there is no station `{unknown}`, only {}", names.join(", "));
+            Err(Error::Survey { path: files.observations.file().to_owned(), message })
+        }
+    }
+}
+
+/// The calibration to write.
+fn file(
+    outcome: &CalibrationOutcome,
+    start: &Start,
+    table: Option<&FoundTable>,
+    summary: &CalibrationSummary,
+) -> Result<Calibration> {
+    let mut calibration = calibration_file::calibration(outcome, start, &summary.survey, summary.method)?;
+    if let Some(table) = table {
+        // It takes the place of an older one, which was not taken off the ranges.
+        calibration.fixed_pattern = table.worth_applying();
+    }
+    Ok(calibration)
+}
+
+/// What is written beside the summary.
+struct Results<'a> {
+    outcome: &'a CalibrationOutcome,
+    table: Option<&'a FoundTable>,
+    file: &'a Calibration,
+    certificate_page: &'a str,
+}
+
+fn write(
+    destination: &Destination,
+    results: &Results<'_>,
+    summary: &CalibrationSummary,
+    progress: &dyn Progress,
+) -> Result<()> {
+    let Results { outcome, table, file, certificate_page } = results;
+    progress.begin("write results", 7);
+    let page = document(summary, Figures::new(outcome, *table)?);
+    let folder = destination.open()?;
+    file.write(folder.file(Calibration::FILE_NAME)?)?;
+    progress.advance(1);
+    write_stations(folder.file("adjusted_stations.csv")?, &tables::stations(outcome))?;
+    progress.advance(2);
+    write_targets(folder.file("adjusted_targets.csv")?, &tables::targets(outcome))?;
+    progress.advance(3);
+    write_residuals(folder.file("residuals.csv")?, &tables::residuals(outcome))?;
+    progress.advance(4);
+    write_text(folder.file("summary.json")?, &json(summary)?)?;
+    progress.advance(5);
+    write_text(folder.file("report.html")?, &page.html())?;
+    progress.advance(6);
+    write_text(folder.file("certificate.html")?, certificate_page)?;
+    progress.advance(7);
+    Ok(folder.commit()?)
+}

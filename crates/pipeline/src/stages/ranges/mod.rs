@@ -1,0 +1,4 @@
+//! Range errors taken off.
+
+pub(crate) mod correct;
+pub(crate) mod reference_path;

@@ -1,0 +1,4 @@
+//! Whole ambiguity intervals.
+
+pub(crate) mod repair;
+pub(crate) mod unwrap;

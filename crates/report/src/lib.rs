@@ -1,0 +1,14 @@
+#![doc = include_str!("../README.md")]
+
+mod document;
+mod error;
+mod figure;
+mod quantile;
+
+pub use document::{Alignment, Block, Column, Document, Merit, Place, Section, Table, millimetres};
+pub use error::{Error, Result};
+pub use figure::{
+    Axes, CATEGORIES, CHART_SIZE, Canvas, ColourMap, Direction, Drawn, Edge, Figure, Labels, LineOfSight, NO_VALUE,
+    Node, Scale, Series, StationCloud, cloud_figure, curves, deviation_figure, escape, heat_map, hex, histogram,
+    open_svg, pattern_figures, raster_figure, rgb_figure, robust_span, span, station_graph, ticks, to_scale,
+};

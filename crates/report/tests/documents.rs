@@ -1,0 +1,49 @@
+use report::{Block, Column, Document, Merit, Place, Table};
+
+fn document() -> Document {
+    let mut document = Document::new("A <wall>", "Of 3 m.");
+    document.merits(vec![Merit::new("1.2 mm", "rms")]);
+    document.warnings(&["not yet warm"]);
+    document.section("Residuals");
+    document.explanation("What drifts is not warm.");
+    document.table(
+        [Column::words("station"), Column::number("rms").unit("mm")],
+        vec![vec!["left of the door".into(), "1.2".into()], vec!["S2".into(), "10.3".into()]],
+    );
+    document.section("Nothing in it");
+    document.remark("written to out");
+    document
+}
+
+#[test]
+fn text_has_every_fact_in_aligned_columns_and_no_explanations() {
+    let expected = "A <wall>\nOf 3 m.\nrms: 1.2 mm\ndoubt: not yet warm\n\nResiduals\nstation           rms (mm)\n\
+                    left of the door       1.2\nS2                    10.3\n\nNothing in it\nwritten to out";
+    assert_eq!(document().to_string(), expected);
+}
+
+#[test]
+fn a_page_is_one_file_with_escaped_words_and_units_in_its_heads() {
+    let html = document().html();
+    assert!(html.starts_with("<!doctype html>") && html.ends_with("</html>\n"));
+    for part in [
+        "<h1>A &lt;wall&gt;</h1>",
+        "<h2>Before you use it</h2>\n<ul><li>not yet warm</li></ul>",
+        "<th>rms (mm)</th>",
+        "<td class=\"w\">left of the door</td><td>1.2</td>",
+        "What drifts is not warm.",
+    ] {
+        assert!(html.contains(part), "{part} in {html}");
+    }
+    assert!(!html.contains("written to out") && !html.contains("Nothing in it") && !html.contains("http-equiv"));
+}
+
+#[test]
+fn columns_of_headers_alone_stand_as_their_cells_ask() {
+    let mut document = Document::new("t", "");
+    let rows = vec![vec!["12 mm".to_owned(), "yes".to_owned()], vec!["-".to_owned(), "no".to_owned()]];
+    document.add(Block::Table(Table::new(["length", "taken"], rows)), Place::Both);
+    assert_eq!(document.to_string(), "t\nlength  taken\n 12 mm  yes\n     -  no");
+    let printed = Document::for_print("t", "");
+    assert!(printed.html().contains("@page"));
+}

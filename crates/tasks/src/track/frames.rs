@@ -1,0 +1,151 @@
+//! The frames of a survey in the order of time, one in memory at a time.
+
+use projective_registration::Projection;
+use std::path::Path;
+use std::sync::Arc;
+
+use nalgebra::Isometry3;
+use pipeline::command::{Doubt, Silent, root_of};
+use pipeline::plan::DriftTreatment;
+use pipeline::stages::apply;
+use pipeline::stations::projection;
+use pipeline::survey::{FrameWatch, Frames, Purpose, SenseVotes, Work, open, read_calibration};
+use pipeline::{Error, Result, Stage};
+use range_io::survey::Survey;
+
+use crate::register::input::stages;
+
+/// The sense of the phase is the same in all frames: it is judged in some.
+const SENSE_EVERY: usize = 16;
+
+/// Reads frames and brings them to unflagged points.
+pub(crate) struct FrameSource {
+    work: Work,
+    frames: Frames,
+    /// What each frame goes through.
+    stages: Vec<Stage>,
+    /// Positions in the survey, in the order of time.
+    pub(crate) order: Vec<usize>,
+    watch: FrameWatch,
+    votes: SenseVotes,
+}
+
+/// The points of one frame, a pixel each, NaN where nothing was measured or a flag excludes it.
+pub(crate) struct PointFrame {
+    pub(crate) points: Vec<[f64; 3]>,
+    pub(crate) sigma: Option<Vec<f32>>,
+}
+
+impl FrameSource {
+    pub(crate) fn new(path: &Path, calibration: Option<&Path>) -> Result<Self> {
+        let correction = Purpose::Ranges(DriftTreatment::Apply);
+        let (mut work, frames) = open(path, read_calibration(&root_of(path), calibration)?, correction)?;
+        let order = in_order(path, &work.outcome.survey)?;
+        let mut each = Vec::new();
+        for stage in stages(work.outcome.survey.level, work.calibration.as_ref()) {
+            match stage {
+                // Frames of a moving camera are not averaged.
+                Stage::Average(_) => {}
+                // The rays are those of all frames.
+                Stage::CorrectImagePoint(_) => {
+                    apply(&stage, &mut work, &Silent)?;
+                }
+                other => each.push(other),
+            }
+        }
+        Ok(Self { work, frames, stages: each, order, watch: FrameWatch::of_stream(), votes: SenseVotes::default() })
+    }
+
+    /// How points fall on the camera's pixels.
+    pub(crate) fn projection(&self) -> Result<Arc<Projection>> {
+        let format = self.work.outcome.camera.format;
+        projection(&self.work.outcome.camera).ok_or_else(|| {
+            let (width, height) = (format.width, format.height);
+            Error::Camera(format!("{width} x {height} pixels are too few to track a camera by"))
+        })
+    }
+
+    pub(crate) fn survey(&self) -> &Survey {
+        &self.work.outcome.survey
+    }
+
+    /// The calibration in use, in words.
+    pub(crate) fn calibration(&self) -> &str {
+        &self.work.outcome.calibration
+    }
+
+    pub(crate) fn approximate_pose(&self, station: &str) -> Option<Isometry3<f64>> {
+        self.frames.approximate_pose(station)
+    }
+
+    pub(crate) fn true_pose(&self, station: &str) -> Option<Isometry3<f64>> {
+        self.frames.true_pose(station)
+    }
+
+    /// Frame `index` of the survey; a frame that shows nothing has only NaN.
+    pub(crate) fn read(&mut self, index: usize) -> Result<PointFrame> {
+        let view = match self.frames.view(&self.work.outcome.survey, index) {
+            Err(Error::File(range_io::Error::NothingMeasured { .. })) => return Ok(self.blank()),
+            view => view?,
+        };
+        self.watch.look(&view);
+        self.work.outcome.views = vec![view];
+        for stage in &self.stages {
+            if matches!(stage, Stage::Unwrap(_)) && index.is_multiple_of(SENSE_EVERY) {
+                self.work.outcome.views.iter().for_each(|view| self.votes.look_at(view));
+            }
+            apply(stage, &mut self.work, &Silent)?;
+        }
+        let Some(cloud) = self.work.outcome.clouds.pop() else { return Ok(self.blank()) };
+        let mut points = cloud.points;
+        for (point, flags) in points.iter_mut().zip(&cloud.flags) {
+            if !flags.is_empty() {
+                *point = [f64::NAN; 3];
+            }
+        }
+        let known = cloud.sigma.iter().any(|sigma| *sigma > 0.0);
+        Ok(PointFrame { points, sigma: known.then_some(cloud.sigma) })
+    }
+
+    /// What speaks against the frames that were read.
+    ///
+    /// # Errors
+    /// [`Error::Incompatible`] for a calibration that holds for none of their ranges.
+    pub(crate) fn doubts(&self) -> Result<Vec<Doubt>> {
+        let mut doubts = self.work.outcome.doubts.clone();
+        doubts.extend(self.watch.doubts());
+        doubts.extend(self.votes.doubt());
+        if let Some(calibration) = &self.work.calibration {
+            doubts.extend(self.work.span.judge(&calibration.span)?);
+        }
+        Ok(doubts)
+    }
+
+    fn blank(&self) -> PointFrame {
+        let camera = &self.work.outcome.survey.camera;
+        PointFrame { points: vec![[f64::NAN; 3]; camera.width * camera.height], sigma: None }
+    }
+}
+
+/// Positions of the frames in the order of their times, which must differ.
+fn in_order(path: &Path, survey: &Survey) -> Result<Vec<usize>> {
+    let refused = |message: String| Error::Survey { path: path.to_owned(), message };
+    if let [only] = survey.frames.as_slice() {
+        let file = only.file.display();
+        return Err(refused(format!("it has one frame ({file}); a camera is tracked over two and more")));
+    }
+    let mut times = Vec::with_capacity(survey.frames.len());
+    for (index, frame) in survey.frames.iter().enumerate() {
+        let missing = || {
+            let file = frame.file.display();
+            refused(format!("frame {index} ({file}) has no timestamp_s, which tells in what order frames are tracked"))
+        };
+        times.push((frame.timestamp_s.ok_or_else(missing)?, index));
+    }
+    times.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    if let Some(pair) = times.windows(2).find(|pair| pair[0].0 >= pair[1].0) {
+        let (time, a, b) = (pair[0].0, pair[0].1, pair[1].1);
+        return Err(refused(format!("frames {a} and {b} have the same timestamp_s of {time}: one camera is tracked")));
+    }
+    Ok(times.into_iter().map(|(_, index)| index).collect())
+}

@@ -1,0 +1,215 @@
+//! From the request to the written results.
+
+use std::collections::BTreeMap;
+use std::time::Instant;
+
+use atomic_output::Destination;
+use pipeline::command::{Doubt, Inputs, Progress, produce, root_of};
+use pipeline::survey::plausibility;
+use pipeline::{Error, Result};
+use point_cloud::Cloud;
+use statistics::quantile;
+use tracking::{TrackedPose, Tracker, TrackerOptions, TrackingState};
+
+use crate::register::input::is_survey;
+use crate::track::frames::FrameSource;
+use crate::track::imu::Inertial;
+use crate::track::outcome::{Tracked, TrackedFrame, reason, state, station_pose};
+use crate::track::start::Start;
+use crate::track::summary::{TrackSummary, summarise};
+use crate::track::{TrackRequest, results};
+
+/// Tracks the frames of a survey and writes path, map, summary and report into the request's output folder.
+///
+/// Where the camera was lost and not found again until the end, or where most frames have no pose, what was tracked is
+/// written, and the summary is [`Verdict::Partial`](pipeline::Verdict::Partial).
+///
+/// # Errors
+/// [`Error::Refused`] where no frame can be tracked: then the reason is written, beside an older result where there is
+/// one. Every other error leaves what was there.
+pub fn track(request: &TrackRequest, progress: &dyn Progress) -> Result<TrackSummary> {
+    let inputs = Inputs::default().survey(&request.survey);
+    let inputs = inputs.maybe(request.guess.as_deref()).maybe(request.calibration.as_deref());
+    produce(&request.out, &inputs, |destination| track_into(destination, request, progress))
+}
+
+fn track_into(destination: &Destination, request: &TrackRequest, progress: &dyn Progress) -> Result<TrackSummary> {
+    let clock = Instant::now();
+    if !is_survey(&request.survey) {
+        let message =
+            format!("{} is no folder of a survey: --track follows the frames of one", request.survey.display());
+        return Err(Error::Request { command: "register", message });
+    }
+    let start = Start::read(request.guess.as_deref())?;
+    let source = FrameSource::new(&request.survey, request.calibration.as_deref())?;
+    let root = root_of(&request.survey);
+    let inertial = Inertial::read(source.survey(), &root)?;
+    let prior = match (&inertial, root.join("imu.csv").is_file()) {
+        (Some(_), _) => "inertial unit",
+        (None, true) => {
+            "constant velocity; imu.csv is there, but survey.ron does not name it (extras: {\"imu\": \"imu.csv\"})"
+        }
+        (None, false) => "constant velocity",
+    };
+    let mut run = Run::new(source, start, inertial)?;
+    run.all(progress)?;
+    let mut tracked = run.finish(prior)?;
+    let summary = &mut tracked.summary;
+    summary.survey = request.survey.display().to_string();
+    summary.out = request.out.display().to_string();
+    summary.seconds = clock.elapsed().as_secs_f64();
+    results::write(destination, &tracked, progress)?;
+    progress.finish();
+    Ok(tracked.summary)
+}
+
+/// A sequence on its way.
+struct Run {
+    source: FrameSource,
+    start: Start,
+    inertial: Option<Inertial>,
+    /// The tracker, once a frame has shown surfaces.
+    tracker: Option<Tracker>,
+    datum: String,
+    has_pose: bool,
+    poses: Vec<TrackedPose>,
+    frames: Vec<TrackedFrame>,
+    names: Vec<String>,
+}
+
+impl Run {
+    fn new(source: FrameSource, start: Start, inertial: Option<Inertial>) -> Result<Self> {
+        source.projection()?;
+        let names = names(&source);
+        let (poses, frames, datum) = (Vec::new(), Vec::new(), String::new());
+        Ok(Self { source, start, inertial, tracker: None, datum, has_pose: false, poses, frames, names })
+    }
+
+    fn all(&mut self, progress: &dyn Progress) -> Result<()> {
+        let order = self.source.order.clone();
+        progress.begin("track frames", order.len());
+        for (done, index) in order.into_iter().enumerate() {
+            self.frame(index)?;
+            progress.advance(done + 1);
+        }
+        Ok(())
+    }
+
+    fn frame(&mut self, index: usize) -> Result<()> {
+        let clock = Instant::now();
+        let entry = &self.source.survey().frames[index];
+        let (station, timestamp_s) = (entry.station.clone(), entry.timestamp_s.unwrap_or_default());
+        let read = self.source.read(index)?;
+        let tracking = Instant::now();
+        let fail = |error: tracking::Error| Error::registration(&format!("frame {station} at {timestamp_s} s"), &error);
+        let before = self.tracker.as_ref().map_or(0, Tracker::keyframes);
+        let pose = if let Some(tracker) = &mut self.tracker {
+            let prior = self.inertial.as_mut().map(|inertial| inertial.motion(timestamp_s)).transpose()?.flatten();
+            tracker.track(timestamp_s, &read.points, read.sigma.as_deref(), prior.as_ref()).map_err(fail)?
+        } else {
+            let world_from_first = self.start.pose(&self.source, &station, timestamp_s);
+            let known = world_from_first.unwrap_or_default();
+            let options = TrackerOptions { world_from_first: known, ..TrackerOptions::default() };
+            let mut tracker = Tracker::new(&self.source.projection()?, options).map_err(fail)?;
+            let pose = tracker.track(timestamp_s, &read.points, read.sigma.as_deref(), None).map_err(fail)?;
+            // A blank frame starts nothing: the next one may.
+            if pose.state == TrackingState::Started {
+                self.datum = self.start.datum(world_from_first, &station, timestamp_s)?;
+                self.has_pose = world_from_first.is_some();
+                self.inertial.as_mut().map(|inertial| inertial.motion(timestamp_s)).transpose()?;
+                self.tracker = Some(tracker);
+            }
+            pose
+        };
+        if let Some(inertial) = &mut self.inertial {
+            inertial.learn(&pose)?;
+        }
+        let after = self.tracker.as_ref().map_or(0, Tracker::keyframes);
+        let ms = |from: Instant| 1e3 * from.elapsed().as_secs_f64();
+        let became_keyframe = after > before;
+        let times = [ms(tracking), ms(clock)];
+        self.frames.push(row(&self.names[index], index, &pose, became_keyframe, times));
+        self.poses.push(pose);
+        Ok(())
+    }
+
+    fn finish(self, prior: &str) -> Result<Tracked> {
+        let Some(tracker) = self.tracker else {
+            let frames = self.frames.len();
+            return Err(Error::Register(format!(
+                "none of the {frames} frames shows enough of a surface to start from (too few points with a range)"
+            )));
+        };
+        let blank = self.poses.len() - tracker.trajectory().len();
+        let mut adjusted = self.poses.clone();
+        adjusted.truncate(blank);
+        adjusted.extend(tracker.adjusted_trajectory());
+        let truths: Vec<_> = self
+            .frames
+            .iter()
+            .map(|frame| self.source.true_pose(&self.source.survey().frames[frame.index].station))
+            .collect();
+        let mut doubts = self.source.doubts()?;
+        let mut summary = summarise(self.frames, [&self.poses, &adjusted], &truths, &tracker);
+        self.source.calibration().clone_into(&mut summary.calibration);
+        summary.datum = self.datum;
+        prior.clone_into(&mut summary.prior);
+        doubts.extend(uncertain(&summary, &tracker));
+        doubts.append(&mut summary.doubts);
+        summary.doubts = doubts;
+        // As everywhere: z where poses came with the survey, y in a camera's own frame.
+        let vertical_axis = if self.has_pose { 2 } else { 1 };
+        Ok(Tracked { poses: self.poses, adjusted, map: tracker.map(), vertical_axis, summary })
+    }
+}
+
+/// Frames that the surfaces do not hold, against how far the scene extends.
+fn uncertain(summary: &TrackSummary, tracker: &Tracker) -> Option<Doubt> {
+    let frames = summary.per_frame.iter();
+    let known =
+        frames.filter_map(|frame| Some((frame.name.as_str(), frame.position_sigma_m?, frame.attitude_sigma_deg?)));
+    plausibility::uncertain_frames(&known.collect::<Vec<_>>(), half_extent_m(&tracker.map()))
+}
+
+/// Half of the longest side of a map without its outermost points, metre.
+fn half_extent_m(map: &Cloud) -> f64 {
+    let extent = |axis: usize| {
+        let mut values: Vec<f64> = map.points.iter().map(|point| point[axis]).collect();
+        quantile(&mut values, 0.95) - quantile(&mut values, 0.05)
+    };
+    0.5 * (0..3).map(extent).fold(0.0, f64::max)
+}
+
+/// Names of the frames: their stations', with the frame's number where a station has several.
+fn names(source: &FrameSource) -> Vec<String> {
+    let frames = &source.survey().frames;
+    let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
+    for frame in frames {
+        *counts.entry(&frame.station).or_default() += 1;
+    }
+    let name = |(index, frame): (usize, &range_io::survey::FrameEntry)| {
+        let station = &frame.station;
+        if counts.get(station.as_str()) == Some(&1) { station.clone() } else { format!("{station}-{index}") }
+    };
+    frames.iter().enumerate().map(name).collect()
+}
+
+fn row(name: &str, index: usize, pose: &TrackedPose, became_keyframe: bool, times: [f64; 2]) -> TrackedFrame {
+    let known = station_pose(pose);
+    let attitude = |c: &nalgebra::Matrix6<f64>| (c[(3, 3)] + c[(4, 4)] + c[(5, 5)]).sqrt().to_degrees();
+    TrackedFrame {
+        name: name.to_owned(),
+        index,
+        timestamp_s: pose.timestamp_s,
+        state: state(pose.state),
+        reason: reason(pose.state),
+        keyframe: known.as_ref().map(|_| pose.keyframe),
+        became_keyframe,
+        overlap: pose.overlap,
+        rms_m: known.as_ref().map(|_| pose.rms_m),
+        position_sigma_m: known.as_ref().and_then(pipeline::survey::StationPose::position_sigma_m),
+        attitude_sigma_deg: known.map(|_| attitude(&pose.covariance)),
+        track_ms: times[0],
+        total_ms: times[1],
+    }
+}

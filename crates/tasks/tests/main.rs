@@ -1,0 +1,19 @@
+//! All tests of the crate as one program: linked once, run side by side.
+#![allow(clippy::expect_used, clippy::float_cmp, clippy::panic, clippy::print_stdout, clippy::unwrap_used)]
+
+#[path = "../../calibration-tasks/tests/calibration_setup.rs"]
+mod calibration_setup;
+#[path = "../../pipeline/tests/common/mod.rs"]
+mod common;
+mod compare;
+mod fixed_pattern;
+mod frame_rate;
+mod metamorphic;
+mod noise;
+mod outputs;
+mod real_captures;
+mod register;
+mod scattering;
+mod track;
+mod warm_up_estimate;
+mod warming;

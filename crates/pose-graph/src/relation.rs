@@ -28,12 +28,14 @@ impl Relation {
     }
 
     /// The pose the other way around.
+    #[must_use]
     pub fn inverse(&self) -> Self {
         let by_field = inverse_jacobian(&self.random.pose) * self.by_field;
         Self { random: self.random.inverse(), by_field }
     }
 
     /// `a_from_c` from this `a_from_b` and `b_from_c` of independent random errors.
+    #[must_use]
     pub fn then(&self, b_from_c: &Self) -> Self {
         let (by_first, by_second) = product_jacobians(self.pose(), b_from_c.pose());
         let by_field = by_first * self.by_field + by_second * b_from_c.by_field;

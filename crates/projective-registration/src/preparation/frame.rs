@@ -167,6 +167,7 @@ impl OrganisedFrame {
     }
 
     /// A copy that others are aligned with, but that is not aligned with others: without what only that takes.
+    #[must_use]
     pub fn as_target(&self) -> Self {
         Self {
             projection: Arc::clone(&self.projection),

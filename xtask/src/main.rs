@@ -4,6 +4,7 @@
 
 mod bench;
 mod dependencies;
+mod factorisations;
 mod fixtures;
 mod fuzz;
 mod house;

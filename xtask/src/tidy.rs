@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use crate::dependencies;
+use crate::factorisations;
 use crate::house;
 use crate::shell::{Outcome, root};
 
@@ -22,9 +23,10 @@ pub(crate) fn run() -> Outcome {
     }
     let sources = files_below(&root, &["rs", "md"])?;
     let keys = bibliography_keys(&read(&root.join("docs/bibliography.md"))?);
+    let mut texts = Vec::new();
     for path in &sources {
         let text = read(path)?;
-        let shown = path.strip_prefix(&root).unwrap_or(path).display();
+        let shown = path.strip_prefix(&root).unwrap_or(path).display().to_string();
         complaints.extend(
             unknown_keys(&text, &keys)
                 .into_iter()
@@ -34,7 +36,9 @@ pub(crate) fn run() -> Outcome {
         if path.extension().is_some_and(|ending| ending == "rs") && lines > LONGEST_FILE {
             complaints.push(format!("{shown}: {lines} lines, at most {LONGEST_FILE}"));
         }
+        texts.push((shown, text));
     }
+    complaints.extend(factorisations::complaints(&root, &texts));
     if complaints.is_empty() { Ok(()) } else { Err(complaints.join("\n")) }
 }
 

@@ -57,7 +57,7 @@ fn without_noise_each_station_may_have_a_plane_of_its_own() {
 fn deviations_are_those_of_the_scatter() {
     // Chi squared of 16 surveys with 9 unknowns over their number scatters by sqrt(2 / 144) = 0.12; leaving out beyond
     // four deviations and the noise in the argument of the correction (at most 0.05) are much less. 200 surveys are in
-    // `examples/monte_carlo.rs`.
+    // `examples/range_terms_monte_carlo.rs`.
     let weighted = mean_over_surveys(16, with_weighted_poses);
     assert!((weighted - 1.0).abs() < 0.36, "{weighted}");
     let own_planes = mean_over_surveys(16, with_planes_of_their_own);

@@ -2,15 +2,15 @@
 
 mod scene;
 
-use rangecam::camera_model::{Camera, InteriorOrientation, LensDistortion, OrganisedCloud, RayTable};
-use rangecam::error_models::{AmplitudeHyperbola, FurtherTerms, RangeErrorModel, RangeTerms, correct_frame};
-use rangecam::phase_unwrap::{
+use rangecam::imaging::camera_model::{Camera, InteriorOrientation, LensDistortion, OrganisedCloud, RayTable};
+use rangecam::imaging::error_models::{AmplitudeHyperbola, FurtherTerms, RangeErrorModel, RangeTerms, correct_frame};
+use rangecam::imaging::phase_unwrap::{
     KnownWraps, MultiFrequencyOptions, MultiUnwrapped, MultiUnwrapper, SpatialOptions, Unwrapped, Unwrapper,
 };
-use rangecam::range_image::{
+use rangecam::imaging::range_image::{
     ComplexFrame, DemodulationOptions, Demodulator, Flags, ImageFormat, Modulation, RangeFrame, Raster, RawFrame,
 };
-use rangecam::scattering_deconvolution::{RestorationOptions, Restorer};
+use rangecam::imaging::scattering_deconvolution::{RestorationOptions, Restorer};
 
 pub type Failure = Box<dyn std::error::Error + Send + Sync>;
 

@@ -6,8 +6,8 @@ use std::f64::consts::TAU;
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;
-use rangecam::range_image::{ImageFormat, Modulation, NoiseModel, RawFrame, Samples};
-use rangecam::scattering_deconvolution::{GaussianTerm, Psf, Scatterer};
+use rangecam::imaging::range_image::{ImageFormat, Modulation, NoiseModel, RawFrame, Samples};
+use rangecam::imaging::scattering_deconvolution::{GaussianTerm, Psf, Scatterer};
 
 use super::Failure;
 

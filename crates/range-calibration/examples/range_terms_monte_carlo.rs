@@ -4,7 +4,7 @@
 //! Printed is the mean of `eᵀ C⁻¹ e` per unknown: 1 where the covariance is right.
 //!
 //! ```text
-//! cargo run --release -p range-calibration --example monte_carlo [runs]
+//! cargo run --release -p range-calibration --example range_terms_monte_carlo [runs]
 //! ```
 #![allow(clippy::print_stdout, clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 

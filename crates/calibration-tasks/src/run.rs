@@ -17,7 +17,7 @@ use crate::scene::{NetworkScene, START, simulate_into};
 /// network and calibration stand in folders beside it.
 ///
 /// # Errors
-/// As [`pipeline::run::run_with`] and [`calibrate`].
+/// As [`pipeline::run::run_with`] and [`calibrate()`].
 pub fn run(request: &RunRequest, progress: &dyn Progress) -> Result<Summary> {
     let calibrator =
         |network: &NetworkCalibration, survey: &Path| estimate_calibration(request, network, survey, progress);

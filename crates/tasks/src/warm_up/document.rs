@@ -270,11 +270,11 @@ fn rate_section(document: &mut Document, summary: &WarmUpSummary) {
     let columns =
         [Column::number("from").unit("min"), Column::number("frame rate").unit("Hz"), Column::number("frames")];
     document.table(columns, rows.collect());
+    let follows = if test.taken { "follows" } else { "does not follow" };
     document.paragraph(format!(
-        "Probability that noise makes a response to these rates as good as the best one found (time constant {} s), \
-         beside any transients: {:.2e}. {}",
-        seconds(test.time_constant_s),
+        "As tested, the drift {follows} the frame rate: p = {:.2e}, the probability that noise makes a response to these rates \
+         as good as the best one found (time constant {} s), beside any transients.",
         test.p_value,
-        if test.taken { "The model has it." } else { "The model does not have it." }
+        seconds(test.time_constant_s)
     ));
 }

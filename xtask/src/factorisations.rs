@@ -101,7 +101,8 @@ pub(crate) fn complaints(root: &Path, sources: &[(String, String)]) -> Vec<Strin
     let mut found = Vec::new();
     for (path, text) in sources {
         let Some(file) = path.strip_prefix("crates/").filter(|file| file.contains("/src/")) else { continue };
-        let is_engine = ["adjust/", "dense-matrices/", "observation-equations/"].iter().any(|name| file.starts_with(name));
+        let is_engine =
+            ["adjust/", "dense-matrices/", "observation-equations/"].iter().any(|name| file.starts_with(name));
         let code = text.split("#[cfg(test)]").next().unwrap_or_default();
         let lines = code.lines().filter(|line| !line.trim_start().starts_with("//"));
         let factorises = lines.into_iter().any(|line| WAYS.iter().any(|way| line.contains(way)));

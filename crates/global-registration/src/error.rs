@@ -97,5 +97,23 @@ pub enum Error {
     },
 }
 
+impl Error {
+    /// Whether the input or an option is wrong; otherwise the data do not show what was asked for.
+    #[must_use]
+    pub fn is_misuse(&self) -> bool {
+        match self {
+            Self::Cloud(error) => error.is_misuse(),
+            Self::Pose(error) => error.is_misuse(),
+            _ => matches!(
+                self,
+                Self::NonFinite { .. }
+                    | Self::NotPositive { .. }
+                    | Self::LengthMismatch { .. }
+                    | Self::InvalidOption { .. }
+            ),
+        }
+    }
+}
+
 /// Result of this crate.
 pub type Result<T> = std::result::Result<T, Error>;

@@ -104,5 +104,27 @@ pub enum Error {
     },
 }
 
+impl Error {
+    /// Whether the input or an option is wrong; otherwise the data do not show what was asked for.
+    #[must_use]
+    pub fn is_misuse(&self) -> bool {
+        match self {
+            Self::Cloud(error) => error.is_misuse(),
+            Self::Pose(error) => error.is_misuse(),
+            Self::Registration(error) => error.is_misuse(),
+            Self::Frames(error) => error.is_misuse(),
+            Self::Global(error) => error.is_misuse(),
+            _ => matches!(
+                self,
+                Self::NonFinite { .. }
+                    | Self::NotPositive { .. }
+                    | Self::NoSuchStation { .. }
+                    | Self::LengthMismatch { .. }
+                    | Self::InvalidOption { .. }
+            ),
+        }
+    }
+}
+
 /// Result of this crate.
 pub type Result<T> = std::result::Result<T, Error>;

@@ -65,5 +65,19 @@ pub enum Error {
     Tree(String),
 }
 
+impl Error {
+    /// Whether the input or an option is wrong; otherwise the data do not show what was asked for.
+    #[must_use]
+    pub fn is_misuse(&self) -> bool {
+        matches!(
+            self,
+            Self::NonFinite { .. }
+                | Self::NotPositive { .. }
+                | Self::LengthMismatch { .. }
+                | Self::InvalidOption { .. }
+        )
+    }
+}
+
 /// Result of this crate.
 pub type Result<T> = std::result::Result<T, Error>;

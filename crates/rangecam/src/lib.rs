@@ -2,65 +2,65 @@
 
 /// Statistics, rigid poses and least squares.
 pub mod maths {
-    #[cfg(feature = "statistics")]
+    #[cfg(feature = "adjust")]
     #[doc(inline)]
-    pub use statistics;
-    #[cfg(feature = "rigid-pose")]
-    #[doc(inline)]
-    pub use rigid_pose;
+    pub use adjust;
     #[cfg(feature = "dense-matrices")]
     #[doc(inline)]
     pub use dense_matrices;
     #[cfg(feature = "observation-equations")]
     #[doc(inline)]
     pub use observation_equations;
-    #[cfg(feature = "adjust")]
+    #[cfg(feature = "rigid-pose")]
     #[doc(inline)]
-    pub use adjust;
+    pub use rigid_pose;
+    #[cfg(feature = "statistics")]
+    #[doc(inline)]
+    pub use statistics;
 }
 
 /// From raw samples to corrected ranges.
 pub mod imaging {
-    #[cfg(feature = "range-image")]
-    #[doc(inline)]
-    pub use range_image;
     #[cfg(feature = "camera-model")]
     #[doc(inline)]
     pub use camera_model;
     #[cfg(feature = "error-models")]
     #[doc(inline)]
     pub use error_models;
-    #[cfg(feature = "scattering-deconvolution")]
-    #[doc(inline)]
-    pub use scattering_deconvolution;
-    #[cfg(feature = "phase-unwrap")]
-    #[doc(inline)]
-    pub use phase_unwrap;
     #[cfg(feature = "multipath")]
     #[doc(inline)]
     pub use multipath;
+    #[cfg(feature = "phase-unwrap")]
+    #[doc(inline)]
+    pub use phase_unwrap;
+    #[cfg(feature = "range-image")]
+    #[doc(inline)]
+    pub use range_image;
+    #[cfg(feature = "scattering-deconvolution")]
+    #[doc(inline)]
+    pub use scattering_deconvolution;
 }
 
 /// Clouds, frames and streams brought into one coordinate system.
 pub mod registration {
-    #[cfg(feature = "point-cloud")]
-    #[doc(inline)]
-    pub use point_cloud;
-    #[cfg(feature = "icp-registration")]
-    #[doc(inline)]
-    pub use icp_registration;
-    #[cfg(feature = "projective-registration")]
-    #[doc(inline)]
-    pub use projective_registration;
     #[cfg(feature = "global-registration")]
     #[doc(inline)]
     pub use global_registration;
-    #[cfg(feature = "pose-graph")]
+    #[cfg(feature = "icp-registration")]
     #[doc(inline)]
-    pub use pose_graph;
+    pub use icp_registration;
     #[cfg(feature = "multiview-registration")]
     #[doc(inline)]
     pub use multiview_registration;
+    #[cfg(feature = "point-cloud")]
+    #[doc(inline)]
+    pub use point_cloud;
+    #[cfg(feature = "pose-graph")]
+    #[doc(inline)]
+    pub use pose_graph;
+    #[cfg(feature = "projective-registration")]
+    #[doc(inline)]
+    pub use projective_registration;
     #[cfg(feature = "tracking")]
     #[doc(inline)]
     pub use tracking;
@@ -77,6 +77,9 @@ pub mod calibration {
     #[cfg(feature = "range-calibration")]
     #[doc(inline)]
     pub use range_calibration;
+    #[cfg(feature = "residual-tests")]
+    #[doc(inline)]
+    pub use residual_tests;
     #[cfg(feature = "self-calibration")]
     #[doc(inline)]
     pub use self_calibration;
@@ -86,31 +89,28 @@ pub mod calibration {
     #[cfg(feature = "warm-up")]
     #[doc(inline)]
     pub use warm_up;
-    #[cfg(feature = "residual-tests")]
-    #[doc(inline)]
-    pub use residual_tests;
 }
 
 /// Simulation, files, reports and whole pipelines.
 pub mod application {
-    #[cfg(feature = "simulation")]
-    #[doc(inline)]
-    pub use simulation;
     #[cfg(feature = "atomic-output")]
     #[doc(inline)]
     pub use atomic_output;
+    #[cfg(feature = "calibration-tasks")]
+    #[doc(inline)]
+    pub use calibration_tasks;
+    #[cfg(feature = "pipeline")]
+    #[doc(inline)]
+    pub use pipeline;
     #[cfg(feature = "range-io")]
     #[doc(inline)]
     pub use range_io;
     #[cfg(feature = "report")]
     #[doc(inline)]
     pub use report;
-    #[cfg(feature = "pipeline")]
+    #[cfg(feature = "simulation")]
     #[doc(inline)]
-    pub use pipeline;
-    #[cfg(feature = "calibration-tasks")]
-    #[doc(inline)]
-    pub use calibration_tasks;
+    pub use simulation;
     #[cfg(feature = "tasks")]
     #[doc(inline)]
     pub use tasks;

@@ -3,7 +3,6 @@
 mod document;
 mod error;
 mod figure;
-mod quantile;
 
 pub use document::{Alignment, Block, Column, Document, Merit, Place, Section, Table, millimetres};
 pub use error::{Error, Result};

@@ -66,5 +66,13 @@ pub enum Error {
     },
 }
 
+impl Error {
+    /// Whether the input or an option is wrong; otherwise the data do not show what was asked for.
+    #[must_use]
+    pub fn is_misuse(&self) -> bool {
+        matches!(self, Self::NonFinite { .. } | Self::NotPositive { .. } | Self::LengthMismatch { .. })
+    }
+}
+
 /// Result of this crate.
 pub type Result<T> = std::result::Result<T, Error>;

@@ -111,5 +111,24 @@ pub enum Error {
     },
 }
 
+impl Error {
+    /// Whether the input or an option is wrong; otherwise the data do not show what was asked for.
+    #[must_use]
+    pub fn is_misuse(&self) -> bool {
+        match self {
+            Self::Pose(error) => error.is_misuse(),
+            Self::Frames(error) => error.is_misuse(),
+            Self::Global(error) => error.is_misuse(),
+            _ => matches!(
+                self,
+                Self::NonFinite { .. }
+                    | Self::NotAscending { .. }
+                    | Self::LengthMismatch { .. }
+                    | Self::InvalidOption { .. }
+            ),
+        }
+    }
+}
+
 /// Result of this crate.
 pub type Result<T> = std::result::Result<T, Error>;

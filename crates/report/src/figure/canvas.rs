@@ -1,11 +1,11 @@
 //! A chart's axes and marks, drawn straight into an SVG.
 
+use statistics::quantile;
 use std::fmt::Write;
 
 use super::Figure;
 use super::colour::hex;
 use super::svg::{escape, open_svg};
-use crate::quantile::quantile;
 
 /// What stands around a chart.
 #[derive(Debug, Clone, Copy)]
@@ -312,7 +312,8 @@ pub fn span(values: impl Iterator<Item = f64>) -> [f64; 2] {
 pub fn robust_span(values: impl Iterator<Item = f64>) -> [f64; 2] {
     let finite: Vec<f64> = values.filter(|value| value.is_finite()).collect();
     let all = || finite.iter().copied();
-    let (low, high) = (quantile(all(), 0.01), quantile(all(), 0.99));
+    let (low, high) =
+        (quantile(&mut all().collect::<Vec<f64>>(), 0.01), quantile(&mut all().collect::<Vec<f64>>(), 0.99));
     let reach = (high - low).max(0.0);
     span(all().filter(|value| (low - reach..=high + reach).contains(value)))
 }

@@ -1,5 +1,6 @@
 //! The registered cloud from above and from the side.
 
+use statistics::quantile;
 use std::fmt::Write;
 
 use super::Figure;
@@ -8,7 +9,6 @@ use super::colour::{CATEGORIES, hex};
 use super::picture::data_uri;
 use super::svg::{escape, open_svg};
 use crate::Result;
-use crate::quantile::quantile;
 
 /// Points of one station in the common frame.
 #[derive(Debug, Clone)]
@@ -104,7 +104,10 @@ impl Frame {
             let points = || clouds.iter().flat_map(move |cloud| cloud.points.iter().map(move |point| point[axis]));
             let values = || points().chain(clouds.iter().map(move |cloud| cloud.position[axis]));
             // A few stray points must not shrink the scene to a dot.
-            let (l, h) = (quantile(values(), 0.001), quantile(values(), 0.999));
+            let (l, h) = (
+                quantile(&mut values().collect::<Vec<f64>>(), 0.001),
+                quantile(&mut values().collect::<Vec<f64>>(), 0.999),
+            );
             if h > l {
                 (low[axis], high[axis]) = (l - 0.03 * (h - l), h + 0.03 * (h - l));
             }

@@ -1,5 +1,6 @@
 //! A cloud seen along an axis, each point in the colour of its distance.
 
+use statistics::quantile;
 use std::fmt::Write;
 
 use super::Figure;
@@ -7,7 +8,6 @@ use super::canvas::ticks;
 use super::picture::{Scale, colour_bar, data_uri};
 use super::svg::{escape, open_svg};
 use crate::Result;
-use crate::quantile::quantile;
 
 /// Which way one looks: axes that go right, up, and towards the viewer, with the sign of the last.
 #[derive(Debug, Clone, Copy)]
@@ -23,7 +23,7 @@ impl LineOfSight {
     pub fn two(points: &[[f64; 3]]) -> [Self; 2] {
         let extent = |axis: usize| {
             let values = || points.iter().map(move |point| point[axis]);
-            quantile(values(), 0.99) - quantile(values(), 0.01)
+            quantile(&mut values().collect::<Vec<f64>>(), 0.99) - quantile(&mut values().collect::<Vec<f64>>(), 0.01)
         };
         let extents = [extent(0), extent(1), extent(2)];
         let mut order = [0, 1, 2];
@@ -92,7 +92,10 @@ impl Frame {
         let span = |axis: usize| {
             let values = || points.iter().map(move |point| point[axis]);
             // A few stray points must not shrink the rest to a dot.
-            let (low, high) = (quantile(values(), 0.001), quantile(values(), 0.999));
+            let (low, high) = (
+                quantile(&mut values().collect::<Vec<f64>>(), 0.001),
+                quantile(&mut values().collect::<Vec<f64>>(), 0.999),
+            );
             let margin = (0.04 * (high - low)).max(1e-9 * (1.0 + low.abs()));
             [low - margin, high + margin]
         };

@@ -6,7 +6,7 @@ use super::chart::{Series, histogram};
 use super::colour::{CATEGORIES, ColourMap};
 use super::picture::{Scale, raster_figure};
 use crate::Result;
-use crate::quantile::quantile;
+use statistics::quantile;
 
 /// Offsets of the pixels of an image, row by row, with their standard deviations, metre: both as pictures, and a histogram of
 /// the offsets. A pixel whose standard deviation is NaN has none.
@@ -21,7 +21,7 @@ pub fn pattern_figures(width: usize, offset_m: &[f32], sigma_m: &[f32]) -> Resul
     };
     let [offsets, deviations] = [plane(offset_m), plane(sigma_m)];
     let most = |values: &[f64]| {
-        let wide = quantile(values.iter().map(|value| value.abs()), 0.98);
+        let wide = quantile(&mut values.iter().map(|value| value.abs()).collect::<Vec<f64>>(), 0.98);
         if wide > 0.0 { wide } else { 1.0 }
     };
     let high = most(&offsets);

@@ -74,11 +74,11 @@ pub(crate) fn of_source(source: &(dyn StdError + 'static)) -> Failure {
         source.downcast_ref::<range_io::Error>().map(of_file),
         source.downcast_ref::<std::io::Error>().map(of_system),
         source.downcast_ref::<self_calibration::Error>().map(of_estimation),
-        source.downcast_ref::<point_cloud::Error>().map(of_cloud),
-        source.downcast_ref::<icp_registration::Error>().map(of_pair),
-        source.downcast_ref::<projective_registration::Error>().map(of_frames),
-        source.downcast_ref::<multiview_registration::Error>().map(of_registration),
-        source.downcast_ref::<tracking::Error>().map(of_tracking),
+        source.downcast_ref::<point_cloud::Error>().map(|error| slip(error.is_misuse())),
+        source.downcast_ref::<icp_registration::Error>().map(|error| slip(error.is_misuse())),
+        source.downcast_ref::<projective_registration::Error>().map(|error| slip(error.is_misuse())),
+        source.downcast_ref::<multiview_registration::Error>().map(|error| slip(error.is_misuse())),
+        source.downcast_ref::<tracking::Error>().map(|error| slip(error.is_misuse())),
         source.downcast_ref::<range_calibration::Error>().map(of_ranges),
         source.downcast_ref::<sensor_noise::Error>().map(of_noise),
         source.downcast_ref::<primitives::Error>().map(of_primitive),
@@ -139,7 +139,7 @@ fn of_ranges(error: &range_calibration::Error) -> Failure {
         | Cause::Camera(_)
         | Cause::Image(_) => Failure::Usage,
         Cause::Primitive(error) => of_primitive(error),
-        Cause::Registration { reason, .. } => of_registration(reason),
+        Cause::Registration { reason, .. } => of_source(reason),
         _ => Failure::Refused,
     }
 }
@@ -159,103 +159,6 @@ fn of_primitive(error: &primitives::Error) -> Failure {
     use primitives::Error as Cause;
     match error {
         Cause::OutOfDomain { .. } | Cause::Camera(_) | Cause::Image(_) => Failure::Usage,
-        _ => Failure::Refused,
-    }
-}
-
-/// Whether a registration failed for what was asked for, or for what the surfaces show.
-fn of_registration(error: &multiview_registration::Error) -> Failure {
-    use multiview_registration::Error as Cause;
-    match error {
-        Cause::Cloud(error) => of_cloud(error),
-        Cause::Pose(error) => of_pose(error),
-        Cause::Registration(error) => of_pair(error),
-        Cause::Frames(error) => of_frames(error),
-        Cause::Global(error) => of_global(error),
-        Cause::NonFinite { .. }
-        | Cause::NotPositive { .. }
-        | Cause::NoSuchStation { .. }
-        | Cause::LengthMismatch { .. }
-        | Cause::InvalidOption { .. } => Failure::Usage,
-        _ => Failure::Refused,
-    }
-}
-
-fn of_cloud(error: &point_cloud::Error) -> Failure {
-    use point_cloud::Error as Cause;
-    match error {
-        Cause::NonFinite { .. }
-        | Cause::NotPositive { .. }
-        | Cause::LengthMismatch { .. }
-        | Cause::InvalidOption { .. } => Failure::Usage,
-        _ => Failure::Refused,
-    }
-}
-
-fn of_pose(error: &rigid_pose::Error) -> Failure {
-    use rigid_pose::Error as Cause;
-    match error {
-        Cause::NonFinite { .. } | Cause::NotPositive { .. } | Cause::LengthMismatch { .. } => Failure::Usage,
-        _ => Failure::Refused,
-    }
-}
-
-fn of_pair(error: &icp_registration::Error) -> Failure {
-    use icp_registration::Error as Cause;
-    match error {
-        Cause::Cloud(error) => of_cloud(error),
-        Cause::Pose(error) => of_pose(error),
-        Cause::NonFinite { .. }
-        | Cause::NotPositive { .. }
-        | Cause::LengthMismatch { .. }
-        | Cause::InvalidOption { .. }
-        | Cause::VoxelSize { .. }
-        | Cause::Incompatible { .. }
-        | Cause::NoSuchVertex { .. }
-        | Cause::NoSuchPoint { .. } => Failure::Usage,
-        _ => Failure::Refused,
-    }
-}
-
-fn of_frames(error: &projective_registration::Error) -> Failure {
-    use projective_registration::Error as Cause;
-    match error {
-        Cause::Registration(error) => of_pair(error),
-        Cause::Pose(error) => of_pose(error),
-        Cause::Cloud(error) => of_cloud(error),
-        Cause::NonFinite { .. }
-        | Cause::LengthMismatch { .. }
-        | Cause::InvalidOption { .. }
-        | Cause::DegenerateRay { .. }
-        | Cause::PointsOffRays { .. } => Failure::Usage,
-        _ => Failure::Refused,
-    }
-}
-
-fn of_global(error: &global_registration::Error) -> Failure {
-    use global_registration::Error as Cause;
-    match error {
-        Cause::Cloud(error) => of_cloud(error),
-        Cause::Pose(error) => of_pose(error),
-        Cause::NonFinite { .. }
-        | Cause::NotPositive { .. }
-        | Cause::LengthMismatch { .. }
-        | Cause::InvalidOption { .. } => Failure::Usage,
-        _ => Failure::Refused,
-    }
-}
-
-/// Whether a path could not be followed or compared for what was asked for, or for what the frames show.
-fn of_tracking(error: &tracking::Error) -> Failure {
-    use tracking::Error as Cause;
-    match error {
-        Cause::Pose(error) => of_pose(error),
-        Cause::Frames(error) => of_frames(error),
-        Cause::Global(error) => of_global(error),
-        Cause::NonFinite { .. }
-        | Cause::NotAscending { .. }
-        | Cause::LengthMismatch { .. }
-        | Cause::InvalidOption { .. } => Failure::Usage,
         _ => Failure::Refused,
     }
 }

@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
+use crate::circles;
 use crate::dependencies;
 use crate::factorisations;
 use crate::house;
@@ -39,6 +40,10 @@ pub(crate) fn run() -> Outcome {
         texts.push((shown, text));
     }
     complaints.extend(factorisations::complaints(&root, &texts));
+    for folder in &crates {
+        let name = folder.file_name().unwrap_or_default().to_string_lossy();
+        complaints.extend(circles::complaints(&name, &circles::of_crate(&root, folder, &texts)));
+    }
     if complaints.is_empty() { Ok(()) } else { Err(complaints.join("\n")) }
 }
 

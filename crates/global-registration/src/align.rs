@@ -32,7 +32,7 @@ const SAME_POSE_VOXELS: f64 = 4.0;
 /// An alignment without a guess that passed the verification.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CoarseAlignment {
-    /// Pose: `target = target_from_source * source`, good to a fraction of a voxel: a start for [`crate::align`].
+    /// Pose: `target = target_from_source * source`, good to a fraction of a voxel: a start for `icp_registration::align`.
     pub target_from_source: Isometry3<f64>,
     /// Correspondences that agree with the pose.
     pub inliers: usize,

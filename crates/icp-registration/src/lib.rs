@@ -3,19 +3,21 @@
 mod error;
 mod icp;
 mod kernel;
-#[cfg(feature = "mesh")]
-mod mesh;
 pub mod parts;
 pub mod quality;
+mod result;
+mod system;
+mod target;
 mod voxels;
 
 pub use error::{Error, Result};
-pub use icp::{
-    Alternative, DegeneracyPolicy, IcpOptions, IcpResult, IcpTarget, Levels, Metric, MotionKind, Registration,
-    Selection, Starts, StopReason, System, UndeterminedMotion, align,
-};
+pub use icp::{Alternative, IcpOptions, Levels, Metric, Registration, Selection, Starts, align};
 pub use kernel::RobustKernel;
 pub use nalgebra;
 pub use point_cloud::{self, Cloud};
+pub use quality::{MotionKind, UndeterminedMotion};
+pub use result::{DegeneracyPolicy, IcpResult, StopReason};
 pub use rigid_pose;
+pub use system::System;
+pub use target::IcpTarget;
 pub use voxels::{VoxelAlignmentOptions, VoxelCloud, VoxelOptions, downsample};

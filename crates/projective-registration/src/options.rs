@@ -28,7 +28,7 @@ pub struct FrameAlignmentOptions {
     /// after the first level from the guess, at most 14. Where the pose can be doubted at the end, a search around the guess
     /// follows, within about 0.25 of the radius and 30 degrees; motions that planes leave open are put where outlines
     /// contradict each other least, and a pose that still contradicts the frames is
-    /// [`Contradicted`](crate::StopReason::Contradicted). 0: none of these. Default 14.
+    /// [`Contradicted`](icp_registration::StopReason::Contradicted). 0: none of these. Default 14.
     pub other_starts: usize,
     /// Iterations in all levels together, from the start that is best. Default 60.
     pub max_iterations: usize,

@@ -22,7 +22,12 @@ pub use error::{Error, Result};
 #[cfg(feature = "azure")]
 pub use formats::azure;
 #[cfg(any(feature = "e57", feature = "pcd", feature = "ply", feature = "vtk", feature = "xyz"))]
-pub use formats::clouds;
+/// Point clouds of any format: what a file can hold, and readers and writers that go by content and ending.
+pub mod clouds {
+    #[cfg(feature = "clouds")]
+    pub use crate::formats::any_cloud::{CloudFormat, read_any_cloud, write_any_cloud};
+    pub use crate::formats::cloud_file::{CloudFile, Precision};
+}
 #[cfg(feature = "e57")]
 pub use formats::e57;
 #[cfg(feature = "mkv")]

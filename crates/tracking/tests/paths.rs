@@ -4,6 +4,7 @@ use crate::common;
 use crate::common::{Pinhole, Scene, frame, look_at, pose_error};
 use crate::sequence::{HERTZ, absolute_error, around, frame_at, normalised_error, poses, projection};
 use nalgebra::{Isometry3, Matrix6, Vector6};
+use projective_registration::Error as FrameError;
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
@@ -228,8 +229,14 @@ fn what_is_no_frame_is_refused_and_changes_nothing() {
     let (points, sigma) = frame_at(&camera, &around(2), 1);
     assert!(matches!(tracker.track(0.0, &points, None, None), Err(Error::NotAscending { .. })));
     assert!(matches!(tracker.track(f64::NAN, &points, None, None), Err(Error::NotAscending { .. })));
-    assert!(matches!(tracker.track(1.0, &points[1..], None, None), Err(Error::LengthMismatch { .. })));
-    assert!(matches!(tracker.track(1.0, &points, Some(&sigma[1..]), None), Err(Error::LengthMismatch { .. })));
+    assert!(matches!(
+        tracker.track(1.0, &points[1..], None, None),
+        Err(Error::Frames(FrameError::LengthMismatch { .. }))
+    ));
+    assert!(matches!(
+        tracker.track(1.0, &points, Some(&sigma[1..]), None),
+        Err(Error::Frames(FrameError::LengthMismatch { .. }))
+    ));
     let bad = MotionPrior { current_from_previous: Isometry3::identity(), covariance: Matrix6::zeros() };
     assert!(matches!(tracker.track(1.0, &points, None, Some(&bad)), Err(Error::Numerical { .. })));
     assert_eq!(tracker.trajectory(), before);

@@ -180,7 +180,10 @@ fn bad_input_is_refused_by_name() {
     let mut broken = estimate.clone();
     broken[5].1.translation.vector.y = f64::NAN;
     assert!(fault(&broken, &truth).contains("entry 5"));
-    assert!(matches!(absolute_trajectory_error(&estimate[..2], &truth, &options), Err(Error::TooFewPoints { .. })));
+    assert!(matches!(
+        absolute_trajectory_error(&estimate[..2], &truth, &options),
+        Err(Error::Pose(rigid_pose::Error::TooFewPoints { .. }))
+    ));
     for step in [RelativeStep::Frames(0), RelativeStep::Seconds(f64::NAN), RelativeStep::Metres(-1.0)] {
         assert!(matches!(relative_pose_error(&estimate, &truth, step, &options), Err(Error::InvalidOption { .. })));
     }

@@ -1,23 +1,20 @@
 //! The iterative closest point algorithm: the easy tier, and the engine that runs the parts.
 
-mod engine;
-pub(crate) mod motion;
+pub(crate) mod engine;
 mod prior;
 mod starts;
 mod validation;
 
 pub use engine::descent::{Alternative, Levels};
-pub use engine::options::{DegeneracyPolicy, IcpOptions, Metric, Selection};
+pub use engine::options::{IcpOptions, Metric, Selection};
 pub use engine::registration::Registration;
-pub use engine::result::{IcpResult, StopReason};
-pub use engine::system::System;
-pub use engine::target::IcpTarget;
-pub use motion::{MotionKind, UndeterminedMotion};
 pub use starts::Starts;
 
 use nalgebra::Isometry3;
 
 use crate::error::Result;
+use crate::result::IcpResult;
+use crate::target::IcpTarget;
 use crate::voxels::{VoxelCloud, VoxelOptions};
 use point_cloud::Cloud;
 
@@ -27,9 +24,8 @@ use point_cloud::Cloud;
 /// the metric needs them. For several sources against one target, build an [`IcpTarget`] once.
 ///
 /// # Errors
-/// [`crate::Error::TooFewCorrespondences`] where the clouds do not overlap at the guess; [`crate::Error::Empty`],
-/// [`crate::Error::NonFinite`], [`crate::Error::LengthMismatch`], [`crate::Error::NotPositive`],
-/// [`crate::Error::Unmeasured`], [`crate::Error::InvalidOption`] for the input.
+/// [`crate::Error::TooFewCorrespondences`] where the clouds do not overlap at the guess; [`crate::Error::Cloud`],
+/// [`crate::Error::NonFinite`], [`crate::Error::InvalidOption`] for the input.
 pub fn align(source: &Cloud, target: &Cloud, guess: &Isometry3<f64>, options: &IcpOptions) -> Result<IcpResult> {
     // What is known of single points is not thrown away.
     let is_bare = [source, target].iter().all(|cloud| cloud.normals.is_none() && cloud.sigma.is_none());

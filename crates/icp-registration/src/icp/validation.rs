@@ -1,9 +1,9 @@
 //! Refuses parts whose parameters are outside their domain.
 
-use super::engine::options::DegeneracyPolicy;
 use super::{Levels, Registration, prior};
 use crate::error::{Error, Result};
 use crate::parts::Scene;
+use crate::result::DegeneracyPolicy;
 
 impl Registration<'_> {
     pub(super) fn validate(&self, scene: &Scene<'_>) -> Result<()> {

@@ -13,6 +13,8 @@
 
 mod kernel;
 mod matching;
+#[cfg(feature = "mesh")]
+mod mesh;
 mod metric;
 mod minimisation;
 mod rejection;
@@ -21,10 +23,10 @@ mod selection;
 mod stopping;
 mod weighting;
 
-#[cfg(feature = "mesh")]
-pub use crate::mesh::{ClosestOnMesh, TriangleMesh};
 pub use kernel::{Graduated, KernelSchedule};
 pub use matching::{CompatibleNearest, NearestPoint, Partner, PointMatching, Projective, Query};
+#[cfg(feature = "mesh")]
+pub use mesh::{ClosestOnMesh, TriangleMesh};
 pub use metric::{Coloured, ErrorMetric, PlaneToPlane, PointToPlane, PointToPoint, Row, Rows, SymmetricPlanes};
 pub use minimisation::{ClosedForm, GaussNewton, LevenbergMarquardt, Minimiser};
 pub use rejection::{

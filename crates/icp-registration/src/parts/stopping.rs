@@ -2,7 +2,7 @@
 
 use super::{require_count, require_positive};
 use crate::error::Result;
-use crate::icp::StopReason;
+use crate::result::StopReason;
 
 /// When a run ends.
 pub trait StoppingRule: Sync {

@@ -3,8 +3,8 @@
 use nalgebra::{DMatrix, DVector, Matrix6, Vector3, Vector6};
 
 use crate::error::Result;
-use crate::icp::UndeterminedMotion;
-use crate::icp::motion::name_motions;
+use crate::quality::UndeterminedMotion;
+use crate::quality::motion::name_motions;
 use rigid_pose::eigen6;
 use rigid_pose::symmetrised;
 

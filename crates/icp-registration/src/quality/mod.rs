@@ -9,11 +9,13 @@
 
 mod cells;
 mod directions;
+mod motion;
 mod verdict;
 
 pub(crate) use cells::Cells;
 pub use cells::Centred;
 pub use directions::{Direction, Directions, FEWEST_CELLS, SIGNIFICANCE, expanded};
+pub use motion::{MotionKind, UndeterminedMotion};
 pub(crate) use verdict::Verdict;
 
 /// What the residuals consist of.

@@ -6,7 +6,7 @@ use super::Residuals;
 use super::cells::{Cells, Centred};
 use super::directions::{Direction, Directions, SIGNIFICANCE, expanded};
 use crate::error::Result;
-use crate::icp::UndeterminedMotion;
+use crate::quality::UndeterminedMotion;
 use rigid_pose::{symmetrised, tangent_from_centred};
 
 /// Share of the largest information that rounding can imitate.

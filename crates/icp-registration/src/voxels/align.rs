@@ -7,9 +7,9 @@ use super::options::VoxelAlignmentOptions;
 use super::pairs::{Matcher, Pair, Partners, System, matched};
 use super::wide::{RULES, Wide};
 use crate::error::{Error, Result};
-use crate::icp::{DegeneracyPolicy, IcpResult, StopReason};
 use crate::kernel::RobustKernel;
 use crate::quality::{Centred, Residuals, Verdict};
+use crate::result::{DegeneracyPolicy, IcpResult, StopReason};
 use rigid_pose::{is_finite, move_about};
 
 /// Iterations that a coarse level may take.

@@ -1,8 +1,8 @@
 //! What can be chosen.
 
 use crate::error::{Error, Result};
-use crate::icp::DegeneracyPolicy;
 use crate::kernel::RobustKernel;
+use crate::result::DegeneracyPolicy;
 
 /// How a cloud is cut into voxels.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

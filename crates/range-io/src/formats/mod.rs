@@ -1,9 +1,11 @@
 //! One module a file format of pictures and clouds.
 
+#[cfg(feature = "clouds")]
+pub(crate) mod any_cloud;
 #[cfg(feature = "azure")]
 pub mod azure;
 #[cfg(any(feature = "e57", feature = "pcd", feature = "ply", feature = "vtk", feature = "xyz"))]
-pub mod clouds;
+pub(crate) mod cloud_file;
 #[cfg(feature = "e57")]
 pub mod e57;
 #[cfg(feature = "mkv")]

@@ -1,14 +1,14 @@
 //! Point lists as text: one point a line, numbers separated by blanks, commas or semicolons.
 //!
 //! A first line of names says what the columns are, with or without `#` or `//` before it: `x y z`, normals, `intensity`
-//! and so on, as in [`crate::formats::clouds::CloudFile`]; columns of other names are left alone. Without names three columns are
+//! and so on, as in [`crate::formats::cloud_file::CloudFile`]; columns of other names are left alone. Without names three columns are
 //! positions, and four or more are refused but where the ending says what they are (`.xyzn` normals, `.xyzi`
 //! intensity). Other lines that begin with `#` or `//` are comments. Positions are metres, as nothing in such a file says.
 
 use std::io::BufReader;
 use std::path::Path;
 
-use crate::formats::clouds::{CloudFile, Columns, canonical};
+use crate::formats::cloud_file::{CloudFile, Columns, canonical};
 use crate::text::lines::read_line;
 use crate::{Error, Result};
 

@@ -150,7 +150,7 @@ impl Canvas {
         );
     }
 
-    /// Many values, by the density of what would be dots: squares of [`DENSITY_CELL`] pixels, the darker the more values, on a
+    /// Many values, by the density of what would be dots: squares of `DENSITY_CELL` pixels, the darker the more values, on a
     /// logarithmic scale.
     pub fn density(&mut self, values: &[(f64, f64)], colour: [u8; 3]) {
         let [width, height] = Self::plotted(self.size);

@@ -80,8 +80,8 @@ impl Tracker {
     ///
     /// # Errors
     /// [`Error::NotAscending`] where the time is not later than that of the frame before, [`Error::Numerical`] for a
-    /// prior that is not finite or whose covariance is not positive definite, [`Error::LengthMismatch`] and
-    /// [`Error::PointsOffRays`] for frames of another camera. Nothing has changed then.
+    /// prior that is not finite or whose covariance is not positive definite, [`Error::Frames`] for
+    /// frames of another camera. Nothing has changed then.
     pub fn track(
         &mut self,
         timestamp_s: f64,

@@ -86,7 +86,7 @@ impl AbsoluteTrajectoryError {
 /// Poses are matched by time and aligned as the options say. Follows `[Sturm2012]`.
 ///
 /// # Errors
-/// [`Error::NoCommonTime`]; [`Error::TooFewPoints`] and [`Error::Collinear`] where the common positions do not determine
+/// [`Error::NoCommonTime`]; [`Error::TooFewPoints`] and [`Error::Pose`] where the common positions do not determine
 /// the alignment; [`Error::Empty`], [`Error::NonFinite`], [`Error::InvalidOption`] for the input.
 pub fn absolute_trajectory_error(
     estimate: &[Stamped],

@@ -14,7 +14,7 @@ use range_image::Modulation;
 use range_io::calibration::Calibration;
 use range_io::survey::Survey;
 
-use crate::calibrate::results::certificate::Conditions;
+use crate::calibrate::start::conditions::Conditions;
 
 /// What a calibration starts from and what it came from.
 #[derive(Debug, Clone)]

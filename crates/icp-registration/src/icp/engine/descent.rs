@@ -11,9 +11,9 @@ use statistics::upper_median;
 use crate::error::{Error, Result};
 use crate::icp::engine::matching::Points;
 use crate::icp::engine::registration::{Engine, Track, length};
-use crate::icp::engine::system::System;
 use crate::kernel::RobustKernel;
 use crate::parts::{ErrorMetric, KernelSchedule, MaxNormalAngle, PairRejection, Query, Trimmed, thinned};
+use crate::system::System;
 use point_cloud::is_usable;
 
 /// Points whose distance at the guess is looked at.

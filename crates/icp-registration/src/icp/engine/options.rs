@@ -8,6 +8,7 @@ use crate::parts::{
     AllPoints, EveryNth, MaxNormalAngle, NormalSpace, PairRejection, PlaneToPlane, PointToPlane, PointToPoint,
     RandomPoints, Settled, Stability, SymmetricPlanes, Trimmed,
 };
+use crate::result::DegeneracyPolicy;
 use crate::voxels::VoxelAlignmentOptions;
 
 /// Points of the smaller of two clouds from which on voxels say as much as all points, in a twentieth of the time.
@@ -52,20 +53,6 @@ pub enum Selection {
     },
     /// About this many, chosen such that all six motions are held as evenly as the surface allows `[Gelfand2003]`.
     Stability(usize),
-}
-
-/// What happens to motions that the geometry does not determine.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[non_exhaustive]
-pub enum DegeneracyPolicy {
-    /// They are named in the result; the pose may have slid along them.
-    #[default]
-    Report,
-    /// They are named, and the pose keeps the guess along them (to first order).
-    HoldAtGuess,
-    /// As [`DegeneracyPolicy::HoldAtGuess`], and at the end the guess enters as an observation with its
-    /// `prior_covariance`: what the geometry leaves open stays at the guess with the guess's standard deviation.
-    HoldAtPrior,
 }
 
 /// Options of an ICP run. The defaults carry no scale: distances left at `None` come from the clouds.

@@ -3,9 +3,9 @@
 use nalgebra::{Matrix6, Vector6};
 
 use crate::error::Result;
-use crate::icp::engine::system::System;
 use crate::parts::Rows;
 use crate::quality::{Cells, Centred, Residuals, Verdict};
+use crate::system::System;
 
 /// Cells across the rms radius of the pairs.
 const CELLS_PER_RADIUS: f64 = 8.0;

@@ -3,14 +3,11 @@
 use nalgebra::{Isometry3, Matrix6, Vector3, Vector6};
 
 use crate::error::{Error, Result};
+use crate::icp::IcpOptions;
 use crate::icp::engine::descent::{Alternative, Levels};
 use crate::icp::engine::matching::Points;
-use crate::icp::engine::options::DegeneracyPolicy;
 use crate::icp::engine::quality::verdict;
-use crate::icp::engine::result::{IcpResult, StopReason};
-use crate::icp::engine::system::System;
 use crate::icp::starts::Starts;
-use crate::icp::{IcpOptions, IcpTarget};
 use crate::kernel::RobustKernel;
 use crate::parts::{
     AllPoints, ErrorMetric, GaussNewton, KernelSchedule, MaxNormalAngle, Minimiser, Moment, NearestPoint,
@@ -18,6 +15,10 @@ use crate::parts::{
     StoppingRule,
 };
 use crate::quality::Residuals;
+use crate::result::DegeneracyPolicy;
+use crate::result::{IcpResult, StopReason};
+use crate::system::System;
+use crate::target::IcpTarget;
 use point_cloud::Cloud;
 use point_cloud::{UnorganisedNormalOptions, unorganised_normals};
 use rigid_pose::is_finite;

@@ -10,8 +10,8 @@ use nalgebra::{Matrix6, Vector6};
 use crate::error::Result;
 use crate::icp::engine::matching::Points;
 use crate::icp::engine::registration::Engine;
-use crate::icp::engine::system::System;
 use crate::parts::{Moment, Rows};
+use crate::system::System;
 
 /// Response `d(Σ w J r)/d[dt, rho w]` of a sample of the pairs, scaled up to all of them.
 ///

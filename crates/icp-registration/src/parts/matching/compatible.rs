@@ -3,9 +3,9 @@
 use super::nearest::partner_at;
 use super::{Partner, PointMatching, Query};
 use crate::error::Result;
-use crate::icp::IcpTarget;
 use crate::parts::scene::TargetSurface;
 use crate::parts::{require_count, require_positive};
+use crate::target::IcpTarget;
 
 /// The nearest of the k nearest points whose normal encloses less than an angle with that of the source point
 /// `[Pulli1999]`: at edges and thin walls the nearest point may lie on the wrong face, the next one on the right one.

@@ -3,8 +3,8 @@
 use nalgebra::Vector3;
 
 use super::{Partner, PointMatching, Query};
-use crate::icp::IcpTarget;
 use crate::parts::scene::TargetSurface;
+use crate::target::IcpTarget;
 
 /// Search beyond the limit by this factor: a point without a partner is not asked about again at each small step.
 const BEYOND: f64 = 1.25;

@@ -5,8 +5,8 @@ use nalgebra::Point3;
 use super::nearest::partner_at;
 use super::{Partner, PointMatching, Query};
 use crate::error::{Error, Result};
-use crate::icp::IcpTarget;
 use crate::parts::scene::TargetSurface;
+use crate::target::IcpTarget;
 
 /// Reverse calibration `[Blais1995]`: no search, the partner is what the target's camera saw at the pixel that the
 /// source point projects to. Exact only close to the solution, and as fast as a look-up.

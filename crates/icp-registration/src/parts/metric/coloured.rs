@@ -5,8 +5,8 @@ use rayon::prelude::*;
 
 use super::{ErrorMetric, Row, Rows, normal_twins};
 use crate::error::{Error, Result};
-use crate::icp::IcpTarget;
 use crate::parts::scene::{Pair, Scene};
+use crate::target::IcpTarget;
 use point_cloud::Cloud;
 use point_cloud::NeighbourTree;
 use point_cloud::{UnorganisedNormalOptions, normals_with_tree};

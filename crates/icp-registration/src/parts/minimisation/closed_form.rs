@@ -4,9 +4,9 @@ use nalgebra::{Matrix6, Point3, Vector6};
 
 use super::Minimiser;
 use crate::error::{Error, Result};
-use crate::icp::System;
 use crate::parts::ErrorMetric;
 use crate::parts::scene::Scene;
+use crate::system::System;
 use rigid_pose::{RotationMethod, absolute_orientation_by};
 
 /// Closed-form absolute orientation `[Eggert1997]` of the weighted pairs; for the point-to-point metric only.

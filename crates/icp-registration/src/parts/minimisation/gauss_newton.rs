@@ -4,7 +4,7 @@ use nalgebra::{Matrix6, Vector6};
 
 use super::Minimiser;
 use crate::error::Result;
-use crate::icp::System;
+use crate::system::System;
 use rigid_pose::eigen6;
 use rigid_pose::symmetrised;
 

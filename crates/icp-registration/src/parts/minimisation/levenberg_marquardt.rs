@@ -5,9 +5,9 @@ use nalgebra::Vector6;
 use super::Minimiser;
 use super::gauss_newton::complement_step;
 use crate::error::Result;
-use crate::icp::System;
 use crate::parts::scene::Scene;
 use crate::parts::{ErrorMetric, require_count};
+use crate::system::System;
 
 /// Damping at the first step, and the factor with which it falls and rises.
 const FIRST_DAMPING: f64 = 1e-6;

@@ -11,8 +11,8 @@ pub use levenberg_marquardt::LevenbergMarquardt;
 use nalgebra::Vector6;
 
 use crate::error::Result;
-use crate::icp::System;
 use crate::parts::scene::Scene;
+use crate::system::System;
 
 /// Finds a motion for fixed pairs.
 pub trait Minimiser: Sync {

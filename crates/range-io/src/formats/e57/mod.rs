@@ -9,7 +9,7 @@ mod fields;
 mod read;
 mod write;
 
-use crate::formats::clouds::CloudFile;
+use crate::formats::cloud_file::CloudFile;
 
 pub use read::read_e57;
 pub use write::write_e57;

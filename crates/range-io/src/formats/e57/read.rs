@@ -4,7 +4,7 @@ use std::path::Path;
 use ::e57::{E57Reader, PointCloud, RecordDataType, RecordName};
 
 use super::{E57Scan, fields};
-use crate::formats::clouds::{COVARIANCE, CloudFile};
+use crate::formats::cloud_file::{COVARIANCE, CloudFile};
 use crate::pose::pose_of;
 use crate::text::fault::{Fault, reserve};
 use crate::text::limits::MOST_SCANS;

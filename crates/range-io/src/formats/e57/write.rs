@@ -6,7 +6,7 @@ use ::e57::{
 };
 
 use super::{E57Scan, fields};
-use crate::formats::clouds::{COVARIANCE, CloudFile, Precision, value_error};
+use crate::formats::cloud_file::{COVARIANCE, CloudFile, Precision, value_error};
 use crate::pose::numbers_of;
 use crate::{Error, Result};
 use atomic_output::FileWriter;

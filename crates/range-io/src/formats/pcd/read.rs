@@ -3,7 +3,7 @@ use std::path::Path;
 
 use super::header::{Encoding, Field, Header};
 use super::lzf;
-use crate::formats::clouds::{CloudFile, Columns};
+use crate::formats::cloud_file::{CloudFile, Columns};
 use crate::text::fault::{Fault, reserve, zeros};
 use crate::text::lines::read_line;
 

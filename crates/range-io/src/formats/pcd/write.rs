@@ -4,7 +4,7 @@ use std::path::Path;
 
 use nalgebra::Isometry3;
 
-use crate::formats::clouds::{CloudFile, Kind, Precision, properties, put_point, value_error};
+use crate::formats::cloud_file::{CloudFile, Kind, Precision, properties, put_point, value_error};
 use crate::pose::numbers_of;
 use crate::{Error, Result};
 use atomic_output::FileWriter;

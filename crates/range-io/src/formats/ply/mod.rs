@@ -10,6 +10,6 @@ mod header;
 mod read;
 mod write;
 
-pub use crate::formats::clouds::{CloudFile, Precision};
+pub use crate::formats::cloud_file::{CloudFile, Precision};
 pub use read::read_cloud;
 pub use write::{PlyWriter, write_cloud};

@@ -2,7 +2,7 @@ use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 
 use super::header::{Encoding, Header, Scalar};
-use crate::formats::clouds::{CloudFile, Columns};
+use crate::formats::cloud_file::{CloudFile, Columns};
 use crate::text::fault::{Fault, zeros};
 use crate::text::lines::read_line;
 

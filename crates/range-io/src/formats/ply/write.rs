@@ -3,7 +3,7 @@ use std::io::{Seek, SeekFrom, Write};
 use std::path::Path;
 
 use super::{CloudFile, Precision};
-use crate::formats::clouds::{Kind, properties, put_point, value_error};
+use crate::formats::cloud_file::{Kind, properties, put_point, value_error};
 use crate::pose::numbers_of;
 use crate::{Error, Result};
 use atomic_output::FileWriter;

@@ -1,7 +1,7 @@
 use std::path::Path;
 
 use super::source::{Scalar, Source};
-use crate::formats::clouds::{CloudFile, Columns};
+use crate::formats::cloud_file::{CloudFile, Columns};
 use crate::text::fault::Fault;
 use crate::text::limits::LONGEST_VTK;
 use crate::{Error, Result};

@@ -4,8 +4,9 @@ use nalgebra::{Isometry3, Vector3};
 use statistics::ranked;
 
 use crate::error::Result;
-use crate::icp::{IcpOptions, IcpResult, Registration};
+use crate::icp::{IcpOptions, Registration};
 use crate::parts::TargetSurface;
+use crate::result::IcpResult;
 use point_cloud::Cloud;
 use point_cloud::NeighbourTree;
 use point_cloud::{UnorganisedNormalOptions, normals_with_tree};
@@ -28,8 +29,7 @@ impl IcpTarget {
     /// Builds the tree; where the cloud has no normals they are fitted to the 20 nearest neighbours.
     ///
     /// # Errors
-    /// [`crate::Error::Empty`], [`crate::Error::NonFinite`], [`crate::Error::LengthMismatch`],
-    /// [`crate::Error::NotPositive`] for a sigma.
+    /// [`crate::Error::Cloud`] for a cloud that is empty or holds what cannot be used.
     pub fn new(cloud: Cloud) -> Result<Self> {
         cloud.validate("the target cloud")?;
         let tree = NeighbourTree::new(&cloud.points)?;

@@ -1,68 +1,21 @@
-//! What a registration returns.
+//! The pose judged at the end of a track.
 
-use nalgebra::{Isometry3, Matrix6};
+use nalgebra::Isometry3;
 
 use crate::error::Result;
 use crate::icp::engine::matching::Points;
-use crate::icp::engine::options::DegeneracyPolicy;
 use crate::icp::engine::quality::verdict;
 use crate::icp::engine::registration::{Engine, Track};
 use crate::icp::engine::sensitivity::sensitivity;
-use crate::icp::engine::system::System;
-use crate::icp::motion::UndeterminedMotion;
 use crate::icp::prior::fused_with_prior;
 use crate::parts::{Moment, Scene, thinned};
 use crate::quality::Residuals;
+use crate::result::{DegeneracyPolicy, IcpResult, StopReason};
+use crate::system::System;
 
 /// Source points from which the response of the score and the overlap are taken.
 const RESPONSE_POINTS: usize = 4000;
 const OVERLAP_POINTS: usize = 20_000;
-
-/// Why the iterations ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum StopReason {
-    /// The last step was below the tolerance.
-    Converged,
-    /// The pose wanders by less than a tenth of its standard deviation, as pairs change back and forth.
-    WithinNoise,
-    /// The iterations were used up: do not trust the pose.
-    MaxIterations,
-    /// Iterations ended, but the frames contradict each other at the pose, hide too much from each other or hardly meet:
-    /// do not trust it.
-    Contradicted,
-}
-
-/// Result of a registration.
-#[derive(Debug, Clone, PartialEq)]
-pub struct IcpResult {
-    /// Pose: `target = target_from_source * source`.
-    pub target_from_source: Isometry3<f64>,
-    /// Covariance in the tangent `[dt target axes (m), dtheta source axes (rad)]`. Motions that the pairs say nothing
-    /// about carry the radius of the pairs as standard deviation.
-    pub covariance: Matrix6<f64>,
-    /// Fraction of the source points that have a partner at the final pose.
-    pub overlap: f64,
-    /// Root mean square residual of the metric, weighted by the kernel, metre.
-    pub rms_m: f64,
-    /// Iterations in all levels together.
-    pub iterations: usize,
-    /// Why they ended.
-    pub stop: StopReason,
-    /// Pairs in the last iteration.
-    pub correspondences: usize,
-    /// Distance limit of the last level, metre.
-    pub max_correspondence_distance_m: f64,
-    /// Motions that the geometry does not determine; empty for a sound pose.
-    pub degenerate: Vec<UndeterminedMotion>,
-}
-
-impl IcpResult {
-    /// Whether the iterations settled, the geometry determines all six unknowns, and frames do not contradict the pose.
-    pub fn is_trustworthy(&self) -> bool {
-        !matches!(self.stop, StopReason::MaxIterations | StopReason::Contradicted) && self.degenerate.is_empty()
-    }
-}
 
 impl Engine<'_> {
     /// Judges the pose at the end of a track.

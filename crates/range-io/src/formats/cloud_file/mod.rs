@@ -1,15 +1,11 @@
-//! Point clouds of any format: what a file can hold, and readers and writers that go by content and ending.
+//! What a file of a point cloud can hold, and the columns that formats share.
 
-#[cfg(feature = "clouds")]
-mod any;
 #[cfg(any(feature = "pcd", feature = "ply", feature = "vtk", feature = "xyz"))]
 mod columns;
 mod file;
 #[cfg(any(feature = "pcd", feature = "ply"))]
 mod layout;
 
-#[cfg(feature = "clouds")]
-pub use any::{CloudFormat, read_any_cloud, write_any_cloud};
 #[cfg(any(feature = "pcd", feature = "ply", feature = "vtk", feature = "xyz"))]
 pub(crate) use columns::{Columns, canonical};
 #[cfg(feature = "e57")]

@@ -1,7 +1,9 @@
+//! Point clouds of any format, by content and ending.
+
 use std::io::Read;
 use std::path::Path;
 
-use super::{CloudFile, Precision};
+use crate::formats::cloud_file::{CloudFile, Precision};
 use crate::formats::e57::{E57Scan, read_e57, write_e57};
 use crate::formats::pcd::{read_pcd, write_pcd};
 use crate::formats::ply::{read_cloud, write_cloud};

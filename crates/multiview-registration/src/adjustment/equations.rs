@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector, Isometry3};
 use crate::adjustment::network::{Network, State};
 use crate::error::{Error, Result};
 use crate::planes::elimination::{Eliminated, motion_of};
-use crate::planes::facets::Facet;
+use crate::planes::shared_planes::SharedPlane;
 
 /// Normal equations of all stations and parameters.
 pub(crate) struct Equations {
@@ -20,13 +20,13 @@ impl Equations {
         Self { normal: DMatrix::zeros(size, size), right: DVector::zeros(size), stations }
     }
 
-    pub fn add(&mut self, facet: &Facet, eliminated: &Eliminated, poses: &[Isometry3<f64>]) {
+    pub fn add(&mut self, shared_plane: &SharedPlane, eliminated: &Eliminated, poses: &[Isometry3<f64>]) {
         let count = eliminated.stations.len();
         let parameters = self.right.len() - 6 * self.stations;
-        // Columns: the unknowns of the facet, then all.
+        // Columns: the unknowns of the shared plane, then all.
         let mut to_all = DMatrix::zeros(eliminated.right.len(), 6 * count + parameters);
         for (k, &station) in eliminated.stations.iter().enumerate() {
-            let motion = motion_of(facet, &poses[station]).transpose();
+            let motion = motion_of(shared_plane, &poses[station]).transpose();
             to_all.fixed_view_mut::<3, 6>(3 * k, 6 * k).copy_from(&motion);
         }
         for k in 0..parameters {

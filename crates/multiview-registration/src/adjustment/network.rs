@@ -4,7 +4,7 @@ use adjust::{Adjustment, BlockId, Covariance, FunctionObservation, ParameterBloc
 use nalgebra::{DVector, Isometry3, Matrix6, Vector6};
 
 use crate::error::Result;
-use crate::planes::reduction::{Meeting, Reduced};
+use crate::planes::reduction::{PairContacts, Reduced};
 use crate::relative_pose::{adjustment, relative_pose_parts};
 
 /// Poses and shared parameters.
@@ -33,7 +33,7 @@ impl Network<'_> {
     }
 
     /// One linearised step for all unknowns.
-    pub(crate) fn solve(&self, state: &State, pairs: &[(&Meeting, Reduced)]) -> Result<State> {
+    pub(crate) fn solve(&self, state: &State, pairs: &[(&PairContacts, Reduced)]) -> Result<State> {
         if state.poses.len() == 1 && state.parameters.is_empty() {
             return Ok(state.clone());
         }
@@ -52,8 +52,8 @@ impl Network<'_> {
         }
         let shared = self.shared_block(&mut network, state)?;
         let group = network.add_group("contacts of surfaces");
-        for (meeting, reduced) in pairs.iter().filter(|(_, reduced)| reduced.rows.nrows() > 0) {
-            let mut blocks = vec![stations[meeting.target], stations[meeting.source]];
+        for (pair_contacts, reduced) in pairs.iter().filter(|(_, reduced)| reduced.rows.nrows() > 0) {
+            let mut blocks = vec![stations[pair_contacts.target], stations[pair_contacts.source]];
             blocks.extend(shared);
             let observation = observation(blocks, reduced, &state.parameters);
             let unit = Covariance::from_sigmas(&vec![1.0; reduced.rows.nrows()]);

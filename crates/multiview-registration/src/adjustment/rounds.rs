@@ -7,7 +7,7 @@ use statistics::mad_scale;
 use crate::adjustment::network::{Network, State, largest_step};
 use crate::error::{Error, Result};
 use crate::planes::contacts::{Contact, IN_PLACE, Reach, TURNED, partners};
-use crate::planes::reduction::{Meeting, Reduced, Scene, Weighting, reduce};
+use crate::planes::reduction::{PairContacts, Reduced, Scene, Weighting, reduce};
 use crate::surfaces::patches::Surface;
 use crate::surfaces::point_model::PointModel;
 use crate::surfaces::points::StationPoints;
@@ -104,15 +104,15 @@ fn averaged(surface: &Surface, of_points: &[[f64; 3]], parameters: usize) -> Vec
     out
 }
 
-/// All meetings at these poses; `only`: the pairs to look at (target, source).
+/// All pairs in contact at these poses; `only`: the pairs to look at (target, source).
 pub(crate) fn meet(
     surfaces: &[&Surface],
     poses: &[Isometry3<f64>],
     only: &[(usize, usize)],
     reach: Reach,
     fewest: usize,
-) -> Result<Vec<Meeting>> {
-    let found: Result<Vec<Meeting>> = only
+) -> Result<Vec<PairContacts>> {
+    let found: Result<Vec<PairContacts>> = only
         .par_iter()
         .map(|&(target, source)| {
             let pose = poses[target].inverse() * poses[source];
@@ -122,28 +122,28 @@ pub(crate) fn meet(
             let contact = |source, target, asked_by_source| Contact { source, target, asked_by_source, share: 0.0 };
             let contacts = forward.iter().map(|&(source, target)| contact(source, target, true));
             let contacts = contacts.chain(back.iter().map(|&(target, source)| contact(source, target, false)));
-            Ok(Meeting { target, source, contacts: contacts.collect() })
+            Ok(PairContacts { target, source, contacts: contacts.collect() })
         })
         .collect();
-    let mut meetings = found?;
-    meetings.retain(|meeting| meeting.contacts.len() >= 2 * fewest);
-    share(surfaces, &mut meetings);
-    Ok(meetings)
+    let mut pairs_in_contact = found?;
+    pairs_in_contact.retain(|pair_contacts| pair_contacts.contacts.len() >= 2 * fewest);
+    share(surfaces, &mut pairs_in_contact);
+    Ok(pairs_in_contact)
 }
 
 /// A patch that k − 1 other stations see as well observes k − 1 differences, each of which would count fully only if
 /// its own error entered once: with weights 1/k the squares are those about the common surface.
-fn share(surfaces: &[&Surface], meetings: &mut [Meeting]) {
+fn share(surfaces: &[&Surface], pairs_in_contact: &mut [PairContacts]) {
     let mut seen: Vec<Vec<u32>> = surfaces.iter().map(|surface| vec![1; surface.patches.len()]).collect();
-    for meeting in meetings.iter() {
-        for contact in &meeting.contacts {
-            let (station, patch) = asking(meeting.target, meeting.source, contact);
+    for pair_contacts in pairs_in_contact.iter() {
+        for contact in &pair_contacts.contacts {
+            let (station, patch) = asking(pair_contacts.target, pair_contacts.source, contact);
             seen[station][patch] += 1;
         }
     }
-    for meeting in meetings.iter_mut() {
-        let (target, source) = (meeting.target, meeting.source);
-        for contact in &mut meeting.contacts {
+    for pair_contacts in pairs_in_contact.iter_mut() {
+        let (target, source) = (pair_contacts.target, pair_contacts.source);
+        for contact in &mut pair_contacts.contacts {
             let (station, patch) = asking(target, source, contact);
             contact.share = 1.0 / f64::from(seen[station][patch]);
         }
@@ -156,18 +156,22 @@ fn asking(target: usize, source: usize, contact: &Contact) -> (usize, usize) {
 }
 
 /// Standard deviation of the whitened residuals of all contacts, from their median.
-fn scale(scene: &Scene<'_>, meetings: &[Meeting], poses: &[Isometry3<f64>]) -> f64 {
-    let of_pair = |meeting: &Meeting| -> Vec<f64> {
-        let pose = poses[meeting.target].inverse() * poses[meeting.source];
-        meeting.contacts.iter().map(|contact| scene.whitened_residual(meeting, contact, &pose).abs()).collect()
+fn scale(scene: &Scene<'_>, pairs_in_contact: &[PairContacts], poses: &[Isometry3<f64>]) -> f64 {
+    let of_pair = |pair_contacts: &PairContacts| -> Vec<f64> {
+        let pose = poses[pair_contacts.target].inverse() * poses[pair_contacts.source];
+        pair_contacts
+            .contacts
+            .iter()
+            .map(|contact| scene.whitened_residual(pair_contacts, contact, &pose).abs())
+            .collect()
     };
-    let mut residuals: Vec<f64> = meetings.par_iter().map(of_pair).collect::<Vec<_>>().concat();
+    let mut residuals: Vec<f64> = pairs_in_contact.par_iter().map(of_pair).collect::<Vec<_>>().concat();
     // Exact surfaces leave rounding, which needs no weighting.
     mad_scale(&mut residuals).max(1e-3)
 }
 
 /// How the rounds go.
-pub(crate) struct Course<'a> {
+pub(crate) struct WideRounds<'a> {
     pub network: &'a Network<'a>,
     /// Error of the start poses, metre.
     pub reach_m: f64,
@@ -176,7 +180,7 @@ pub(crate) struct Course<'a> {
     pub progress: &'a (dyn Fn(usize) + Sync),
 }
 
-impl Course<'_> {
+impl WideRounds<'_> {
     /// Falling limits: far partners first, so that a station that has slid along a wall is drawn back by what stands on it.
     fn levels(&self, size_m: f64) -> Vec<Reach> {
         let mut levels = Vec::new();
@@ -202,13 +206,18 @@ impl Course<'_> {
             for in_level in 0..ROUNDS {
                 surfaces.update(&state.parameters)?;
                 let scene = surfaces.scene(state.parameters.len());
-                let meetings = meet(&scene.surfaces, &state.poses, &pairs, reach, self.minimum_contacts)?;
+                let pairs_in_contact = meet(&scene.surfaces, &state.poses, &pairs, reach, self.minimum_contacts)?;
                 if in_level == 0 {
                     // Stations that do not meet now will not after the small steps of one level.
-                    pairs = meetings.iter().map(|meeting| (meeting.target, meeting.source)).collect();
+                    pairs = pairs_in_contact
+                        .iter()
+                        .map(|pair_contacts| (pair_contacts.target, pair_contacts.source))
+                        .collect();
                 }
-                let weighting = Weighting { kernel: self.kernel, scale: scale(&scene, &meetings, &state.poses) };
-                let next = self.network.solve(&state, &reduced(&scene, &meetings, &state.poses, &weighting)?)?;
+                let weighting =
+                    Weighting { kernel: self.kernel, scale: scale(&scene, &pairs_in_contact, &state.poses) };
+                let next =
+                    self.network.solve(&state, &reduced(&scene, &pairs_in_contact, &state.poses, &weighting)?)?;
                 let moved_m = largest_step(&state, &next, self.network.hold_m);
                 state = next;
                 rounds += 1;
@@ -224,13 +233,13 @@ impl Course<'_> {
 
 fn reduced<'m>(
     scene: &Scene<'_>,
-    meetings: &'m [Meeting],
+    pairs_in_contact: &'m [PairContacts],
     poses: &[Isometry3<f64>],
     weighting: &Weighting,
-) -> Result<Vec<(&'m Meeting, Reduced)>> {
-    let reduce = |meeting: &'m Meeting| {
-        let pose = poses[meeting.target].inverse() * poses[meeting.source];
-        Ok((meeting, reduce(scene, meeting, &pose, weighting)?))
+) -> Result<Vec<(&'m PairContacts, Reduced)>> {
+    let reduce = |pair_contacts: &'m PairContacts| {
+        let pose = poses[pair_contacts.target].inverse() * poses[pair_contacts.source];
+        Ok((pair_contacts, reduce(scene, pair_contacts, &pose, weighting)?))
     };
-    meetings.par_iter().map(reduce).collect()
+    pairs_in_contact.par_iter().map(reduce).collect()
 }

@@ -1,4 +1,4 @@
-//! The last rounds: all points of all stations on facets whose planes are unknown too.
+//! The last rounds: all points of all stations on shared planes whose planes are unknown too.
 
 use nalgebra::{DMatrix, DVector, Isometry3};
 use rayon::prelude::*;
@@ -8,9 +8,9 @@ use crate::adjustment::network::{Network, State, largest_step};
 use crate::adjustment::rounds::{Surfaces, meet};
 use crate::error::Result;
 use crate::planes::contacts::{IN_PLACE, Reach};
-use crate::planes::elimination::{Eliminated, FacetSums, Variances, motion_of};
-use crate::planes::facets::{Facet, facets};
+use crate::planes::elimination::{Eliminated, SharedPlaneSums, Variances, motion_of};
 use crate::planes::scatter::{Scatter, TileMean, between, tile_means, variances};
+use crate::planes::shared_planes::{SharedPlane, shared_planes};
 use crate::planes::sightings::{Gate, sightings};
 use crate::planes::sums::Sums;
 use crate::planes::wide_errors;
@@ -18,7 +18,7 @@ use crate::surfaces::points::StationPoints;
 use icp_registration::RobustKernel;
 use rigid_pose::{pose_difference, step_pose};
 
-/// What the poses may be off in the first rounds, patches: facets are joined anew from better poses.
+/// What the poses may be off in the first rounds, patches: shared planes are joined anew from better poses.
 const OFF: [f64; 2] = [0.06, 0.01];
 
 /// Of so many points one is taken in the first round, which need not be better than the contacts of patches.
@@ -30,10 +30,10 @@ const FEW_SIGMAS: f64 = 0.1;
 /// What the last round leaves.
 pub(crate) struct Adjusted {
     pub state: State,
-    pub facets: Vec<Facet>,
+    pub shared_planes: Vec<SharedPlane>,
     pub sums: Vec<Sums>,
     pub scatter: Scatter,
-    /// Of the tiles of each facet that two stations or more saw.
+    /// Of the tiles of each shared plane that two stations or more saw.
     pub means: Vec<Vec<TileMean>>,
     pub variances: Vec<Variances>,
     /// Inverse of the normal matrix, zero for the station that is held.
@@ -58,22 +58,22 @@ impl Adjusted {
     }
 
     /// Factor of the covariance: what tiles scatter beyond the noise of their points is not independent from tile to tile,
-    /// and so more than the weights that it takes from them; errors that whole facets share are more still.
+    /// and so more than the weights that it takes from them; errors that whole shared planes share are more still.
     pub(crate) fn variance_factor(&self) -> f64 {
         self.factor
     }
 
-    fn factor_on(&self, facets: &[Facet]) -> f64 {
+    fn factor_on(&self, shared_planes: &[SharedPlane]) -> f64 {
         let of_tiles = self.sigma0().map_or(1.0, |sigma0| sigma0.powi(2).max(1.0));
         let (stations, unknowns) = (self.state.poses.len(), self.cofactors.nrows() as f64 - 6.0);
-        wide_errors::factor(facets, &self.means, &self.scatter, stations, unknowns, of_tiles)
+        wide_errors::factor(shared_planes, &self.means, &self.scatter, stations, unknowns, of_tiles)
     }
 }
 
 /// How the rounds go.
 pub(crate) struct Finish<'a> {
     pub network: &'a Network<'a>,
-    /// The same with poses held at what the rounds start from: along a direction that the surfaces leave open, facets
+    /// The same with poses held at what the rounds start from: along a direction that the surfaces leave open, shared planes
     /// farther off would be others.
     pub near: Network<'a>,
     pub kernel: RobustKernel,
@@ -103,8 +103,8 @@ impl Finish<'_> {
                 let count = state.poses.len();
                 let all: Vec<(usize, usize)> = (0..count).flat_map(|t| (t + 1..count).map(move |s| (t, s))).collect();
                 let reach = Reach { across_m: size_m / 4.0, candidates: 1, cosine: IN_PLACE };
-                let meetings = meet(&scene.surfaces, &state.poses, &all, reach, self.minimum_contacts)?;
-                known = facets(&scene.surfaces, &state.poses, &meetings, off_m);
+                let pairs_in_contact = meet(&scene.surfaces, &state.poses, &all, reach, self.minimum_contacts)?;
+                known = shared_planes(&scene.surfaces, &state.poses, &pairs_in_contact, off_m);
             }
             let first = round == 0;
             let (slack_m, stride) = if first { (OFF[0] * size_m, FIRST_STRIDE) } else { (0.0, 1) };
@@ -117,18 +117,18 @@ impl Finish<'_> {
             let settled = off_m.is_none() && self.is_settled(&before, &state, &adjusted, &known);
             if settled || round >= self.max_rounds.max(OFF.len() + 1) {
                 let factor = adjusted.factor_on(&known);
-                return Ok(Adjusted { state, facets: known, factor, rounds: round, settled, ..adjusted });
+                return Ok(Adjusted { state, shared_planes: known, factor, rounds: round, settled, ..adjusted });
             }
         }
     }
 
     /// Whether every station moved by less than the tolerance, or by so little of its standard deviation that further
     /// rounds tell nothing: along a direction that the surfaces leave open, poses drift with every change of weights.
-    fn is_settled(&self, before: &State, after: &State, adjusted: &Adjusted, facets: &[Facet]) -> bool {
+    fn is_settled(&self, before: &State, after: &State, adjusted: &Adjusted, shared_planes: &[SharedPlane]) -> bool {
         if largest_step(before, after, self.network.hold_m) <= self.tolerance_m {
             return true;
         }
-        let (cofactors, factor) = (&adjusted.cofactors, adjusted.factor_on(facets));
+        let (cofactors, factor) = (&adjusted.cofactors, adjusted.factor_on(shared_planes));
         before.poses.iter().zip(&after.poses).enumerate().all(|(k, (a, b))| {
             let step = pose_difference(a, b);
             let own = cofactors.fixed_view::<6, 6>(6 * k, 6 * k) * factor;
@@ -138,44 +138,44 @@ impl Finish<'_> {
     }
 
     /// What the stations saw of each tile about the planes at the present poses, and how that scatters.
-    fn scatter(&self, known: &[Facet], sums: &[Sums], stations: &[usize]) -> (Vec<Vec<TileMean>>, Scatter) {
-        let tiles = known.iter().map(|facet| facet.tiles.len()).sum();
+    fn scatter(&self, known: &[SharedPlane], sums: &[Sums], stations: &[usize]) -> (Vec<Vec<TileMean>>, Scatter) {
+        let tiles = known.iter().map(|shared_plane| shared_plane.tiles.len()).sum();
         let ones = vec![1.0; tiles * stations.len()];
-        let of_facet = |facet: &Facet| {
-            let seen = FacetSums { facet, sums, weights: &ones };
+        let of_shared_plane = |shared_plane: &SharedPlane| {
+            let seen = SharedPlaneSums { shared_plane, sums, weights: &ones };
             let eliminated = seen.eliminated(stations, Variances::default());
             eliminated.map_or_else(Vec::new, |eliminated| tile_means(&seen, &eliminated))
         };
-        let means: Vec<Vec<TileMean>> = known.par_iter().map(of_facet).collect();
+        let means: Vec<Vec<TileMean>> = known.par_iter().map(of_shared_plane).collect();
         let scatter = between(&means, stations.len(), tiles, self.kernel);
         (means, scatter)
     }
 
     /// One linearised step of all unknowns.
-    fn step(&self, state: &mut State, known: &mut [Facet], sums: Vec<Sums>) -> Result<Adjusted> {
+    fn step(&self, state: &mut State, known: &mut [SharedPlane], sums: Vec<Sums>) -> Result<Adjusted> {
         let stations: Vec<usize> = (0..state.poses.len()).collect();
         let (means, scatter) = self.scatter(known, &sums, &stations);
         let variances: Vec<Variances> = means.par_iter().map(|means| variances(means, scatter.shared)).collect();
         let eliminated: Vec<Option<Eliminated>> = (0..known.len())
             .into_par_iter()
             .map(|k| {
-                let seen = FacetSums { facet: &known[k], sums: &sums, weights: &scatter.weights };
+                let seen = SharedPlaneSums { shared_plane: &known[k], sums: &sums, weights: &scatter.weights };
                 seen.eliminated(&stations, variances[k])
             })
             .collect();
         let parameters = state.parameters.len();
         let mut equations = Equations::new(state.poses.len(), parameters);
-        for (facet, eliminated) in known.iter().zip(&eliminated) {
+        for (shared_plane, eliminated) in known.iter().zip(&eliminated) {
             if let Some(eliminated) = eliminated {
-                equations.add(facet, eliminated, &state.poses);
+                equations.add(shared_plane, eliminated, &state.poses);
             }
         }
         let (step, _) = equations.solved(&self.near, state)?;
         let (_, cofactors) = equations.solved(self.network, state)?;
-        for (facet, eliminated) in known.iter_mut().zip(&eliminated) {
+        for (shared_plane, eliminated) in known.iter_mut().zip(&eliminated) {
             if let Some(eliminated) = eliminated {
-                let motions = motions(facet, eliminated, &state.poses, &step);
-                facet.moved(&eliminated.plane(&motions));
+                let motions = motions(shared_plane, eliminated, &state.poses, &step);
+                shared_plane.moved(&eliminated.plane(&motions));
             }
         }
         for (k, pose) in state.poses.iter_mut().enumerate() {
@@ -186,7 +186,7 @@ impl Finish<'_> {
         let state = state.clone();
         Ok(Adjusted {
             state,
-            facets: Vec::new(),
+            shared_planes: Vec::new(),
             sums,
             scatter,
             means,
@@ -199,11 +199,16 @@ impl Finish<'_> {
     }
 }
 
-/// Motions of a facet's points with a step of all unknowns.
-fn motions(facet: &Facet, eliminated: &Eliminated, poses: &[Isometry3<f64>], step: &DVector<f64>) -> DVector<f64> {
+/// Motions of a shared plane's points with a step of all unknowns.
+fn motions(
+    shared_plane: &SharedPlane,
+    eliminated: &Eliminated,
+    poses: &[Isometry3<f64>],
+    step: &DVector<f64>,
+) -> DVector<f64> {
     let mut motions = DVector::zeros(eliminated.right.len());
     for (k, &station) in eliminated.stations.iter().enumerate() {
-        let motion = motion_of(facet, &poses[station]).transpose() * step.fixed_rows::<6>(6 * station);
+        let motion = motion_of(shared_plane, &poses[station]).transpose() * step.fixed_rows::<6>(6 * station);
         motions.fixed_rows_mut::<3>(3 * k).copy_from(&motion);
     }
     let (of_motions, of_poses) = (3 * eliminated.stations.len(), 6 * poses.len());

@@ -89,7 +89,7 @@ fn triangles(pairs: &[PairAlignment]) -> Vec<[usize; 3]> {
 
 /// What the loops say about the pairs.
 #[derive(Default)]
-pub(crate) struct Skeleton {
+pub(crate) struct SpanningTree {
     /// The pairs of the tree, from its root outwards.
     pub tree: Vec<usize>,
     reached_by: Vec<Option<(usize, usize)>>,
@@ -99,7 +99,7 @@ pub(crate) struct Skeleton {
     pub loops: Vec<LoopClosure>,
 }
 
-impl Skeleton {
+impl SpanningTree {
     /// Whether the tree leads to a station, other than its root.
     pub(crate) fn reaches(&self, station: usize) -> bool {
         self.reached_by[station].is_some()
@@ -108,12 +108,12 @@ impl Skeleton {
 
 /// Which pairs agree with the tree of those that most loops confirm, and how the loops close; `closes`: whether that is near
 /// enough.
-pub(crate) fn skeleton(
+pub(crate) fn spanning_tree(
     pairs: &[PairAlignment],
     root: (usize, Isometry3<f64>),
     stations: usize,
     closes: &dyn Fn(&LoopClosure) -> bool,
-) -> Skeleton {
+) -> SpanningTree {
     let mut votes = vec![0_i64; pairs.len()];
     let mut loops = Vec::new();
     for triangle in triangles(pairs) {
@@ -153,7 +153,7 @@ pub(crate) fn skeleton(
     });
     let sound = sound.collect();
     loops.extend(long_loops(pairs, &reached_by));
-    Skeleton { tree, reached_by, sound, loops }
+    SpanningTree { tree, reached_by, sound, loops }
 }
 
 /// The three pairs in the order in which they lead from `first` back to it.

@@ -7,7 +7,7 @@
 use nalgebra::{Isometry3, Matrix6};
 
 use crate::agreement::alignments::PairAlignment;
-use crate::agreement::loops::{LoopClosure, Skeleton, skeleton};
+use crate::agreement::loops::{LoopClosure, SpanningTree, spanning_tree};
 use crate::pairs_of_frames::frame_pairs::FramePair;
 use icp_registration::IcpResult;
 use pose_graph::{Edge, Graph, Relation, is_likely};
@@ -33,11 +33,16 @@ impl FrameGraph {
     /// The largest part of the frames that pairs connect.
     pub(crate) fn new(count: usize, pairs: &[FramePair], shared: &SharedError) -> Self {
         let alignments: Vec<PairAlignment> = pairs.iter().map(|pair| pair.with_shared(shared)).collect();
-        let (members, skeleton) = largest_part(count, &alignments);
+        let (members, spanning_tree) = largest_part(count, &alignments);
         let graph = Graph::at(Isometry3::identity());
-        let mut found =
-            Self { graph, members, fits: vec![false; pairs.len()], loops: skeleton.loops, shared: shared.of_field() };
-        found.grow(pairs, &skeleton.tree);
+        let mut found = Self {
+            graph,
+            members,
+            fits: vec![false; pairs.len()],
+            loops: spanning_tree.loops,
+            shared: shared.of_field(),
+        };
+        found.grow(pairs, &spanning_tree.tree);
         found.settle(pairs);
         found
     }
@@ -114,15 +119,15 @@ fn relation(pair: &FramePair) -> Relation {
 }
 
 /// The frames of the largest part that pairs connect, its first frame first, and the tree from there.
-fn largest_part(count: usize, pairs: &[PairAlignment]) -> (Vec<usize>, Skeleton) {
+fn largest_part(count: usize, pairs: &[PairAlignment]) -> (Vec<usize>, SpanningTree) {
     let closes = |closure: &LoopClosure| is_likely(closure.mahalanobis.powi(2));
-    let mut best: Option<(Vec<usize>, Skeleton)> = None;
+    let mut best: Option<(Vec<usize>, SpanningTree)> = None;
     let mut seen = vec![false; count];
     for root in 0..count {
         if seen[root] {
             continue;
         }
-        let found = skeleton(pairs, (root, Isometry3::identity()), count, &closes);
+        let found = spanning_tree(pairs, (root, Isometry3::identity()), count, &closes);
         let mut members = vec![root];
         members.extend((0..count).filter(|&k| k != root && found.reaches(k)));
         for &k in &members {

@@ -1,4 +1,4 @@
-//! Where the patches of two stations meet, and what each meeting observes.
+//! Where the patches of two stations meet, and what each pair in contact observes.
 
 use nalgebra::{Isometry3, Matrix6, Vector3, Vector6};
 

@@ -1,36 +1,36 @@
-//! The observations of a facet with its unknown plane eliminated.
+//! The observations of a shared plane with its unknown plane eliminated.
 //!
-//! A point at `[u, v]` on a facet sees the motion of its station as `[1, u, v] · z`, z being three numbers, and that of
+//! A point at `[u, v]` on a shared plane sees the motion of its station as `[1, u, v] · z`, z being three numbers, and that of
 //! the plane likewise: its distance is `ρ + [1, u, v] · (z − a) + derivatives · θ − c`, with the offset and slopes a of
 //! the plane and the offset c by which the surface of a tile is off it. Both are unknown and eliminated exactly, so that
 //! no point is used twice and the normal equations are those of all points.
 
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix3, Matrix6x3, Vector3};
 
-use crate::planes::facets::Facet;
+use crate::planes::shared_planes::SharedPlane;
 use crate::planes::sums::{Sums, TileSums};
 
-/// How well the slopes of a facet are known from the patches that it was found by, radian.
+/// How well the slopes of a shared plane are known from the patches that it was found by, radian.
 const SLOPE: f64 = 0.02;
 
 /// Variances beyond the noise of points, metre².
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Variances {
-    /// Of the surface of a tile about the plane of its facet.
+    /// Of the surface of a tile about the plane of its shared plane.
     pub surface: f64,
     /// Of what the points of a station in a tile have in common.
     pub shared: f64,
 }
 
-/// What the stations saw of one facet.
-pub(crate) struct FacetSums<'a> {
-    pub facet: &'a Facet,
+/// What the stations saw of one shared plane.
+pub(crate) struct SharedPlaneSums<'a> {
+    pub shared_plane: &'a SharedPlane,
     pub sums: &'a [Sums],
     /// Weight of what each station saw of each tile, tile by tile.
     pub weights: &'a [f64],
 }
 
-/// Normal equations of a facet: three unknowns a station that saw it, then the shared parameters.
+/// Normal equations of a shared plane: three unknowns a station that saw it, then the shared parameters.
 #[derive(Debug, Clone)]
 pub(crate) struct Eliminated {
     pub stations: Vec<usize>,
@@ -42,7 +42,7 @@ pub(crate) struct Eliminated {
     from_distances: Vector3<f64>,
 }
 
-impl FacetSums<'_> {
+impl SharedPlaneSums<'_> {
     /// What the stations saw of the tile, those with no weight left out: position among `stations`, sums, weight.
     fn tile<'s>(&'s self, tile: usize, stations: &'s [usize]) -> impl Iterator<Item = (usize, TileSums<'s>, f64)> {
         let count = self.sums.len();
@@ -55,16 +55,16 @@ impl FacetSums<'_> {
     }
 
     pub(crate) fn tiles(&self) -> std::ops::Range<usize> {
-        self.facet.tiles.first..self.facet.tiles.first + self.facet.tiles.len()
+        self.shared_plane.tiles.first..self.shared_plane.tiles.first + self.shared_plane.tiles.len()
     }
 
-    /// Stations, of these, that saw something of the facet.
+    /// Stations, of these, that saw something of the shared plane.
     pub(crate) fn seen_by(&self, stations: &[usize]) -> Vec<usize> {
         let sees = |station: usize| self.tiles().any(|tile| self.tile(tile, &[station]).next().is_some());
         stations.iter().copied().filter(|&station| sees(station)).collect()
     }
 
-    /// The observations of these stations. `None` where fewer than two of them saw the facet.
+    /// The observations of these stations. `None` where fewer than two of them saw the shared plane.
     pub(crate) fn eliminated(&self, stations: &[usize], variances: Variances) -> Option<Eliminated> {
         let stations = self.seen_by(stations);
         if stations.len() < 2 {
@@ -144,13 +144,13 @@ impl Eliminated {
     }
 }
 
-/// How the motion z of a facet's points follows the tangent `[dt, dtheta]` of their station: `z = matrixᵀ x`.
-pub(crate) fn motion_of(facet: &Facet, pose: &Isometry3<f64>) -> Matrix6x3<f64> {
+/// How the motion z of a shared plane's points follows the tangent `[dt, dtheta]` of their station: `z = matrixᵀ x`.
+pub(crate) fn motion_of(shared_plane: &SharedPlane, pose: &Isometry3<f64>) -> Matrix6x3<f64> {
     let back = pose.rotation.inverse();
-    let lever = facet.origin - pose.translation.vector;
-    let turns = [lever, facet.right, facet.up].map(|arm| back * arm.cross(&facet.normal));
+    let lever = shared_plane.origin - pose.translation.vector;
+    let turns = [lever, shared_plane.right, shared_plane.up].map(|arm| back * arm.cross(&shared_plane.normal));
     Matrix6x3::from_fn(|row, column| match (row, column) {
-        (0..3, 0) => facet.normal[row],
+        (0..3, 0) => shared_plane.normal[row],
         (0..3, _) => 0.0,
         _ => turns[column][row - 3],
     })

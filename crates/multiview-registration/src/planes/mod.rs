@@ -2,9 +2,9 @@
 
 pub(crate) mod contacts;
 pub(crate) mod elimination;
-pub(crate) mod facets;
 pub(crate) mod reduction;
 pub(crate) mod scatter;
+pub(crate) mod shared_planes;
 pub(crate) mod sightings;
 pub(crate) mod sums;
 pub(crate) mod tiles;

@@ -20,7 +20,7 @@ const LARGEST_IMITATION: f64 = 0.5;
 
 /// Two stations with the places where they meet.
 #[derive(Debug, Clone)]
-pub(crate) struct Meeting {
+pub(crate) struct PairContacts {
     pub target: usize,
     pub source: usize,
     pub contacts: Vec<Contact>,
@@ -53,12 +53,12 @@ pub(crate) struct Row {
 impl Scene<'_> {
     pub(crate) fn row(
         &self,
-        meeting: &Meeting,
+        pair_contacts: &PairContacts,
         contact: &Contact,
         pose: &Isometry3<f64>,
         weighting: &Weighting,
     ) -> (Row, crate::planes::contacts::Observed) {
-        let (source, target) = (self.surfaces[meeting.source], self.surfaces[meeting.target]);
+        let (source, target) = (self.surfaces[pair_contacts.source], self.surfaces[pair_contacts.target]);
         let observed = observe(source, target, contact, pose);
         let sigma = observed.variance.sqrt();
         let mut jacobian = DVector::zeros(6 + self.parameters);
@@ -67,7 +67,8 @@ impl Scene<'_> {
             let of = |station: usize, patch: u32| {
                 nalgebra::Vector3::from(self.derivatives[station][patch as usize * self.parameters + k])
             };
-            let moved = pose.rotation * of(meeting.source, contact.source) - of(meeting.target, contact.target);
+            let moved =
+                pose.rotation * of(pair_contacts.source, contact.source) - of(pair_contacts.target, contact.target);
             jacobian[6 + k] = observed.normal.dot(&moved) / sigma;
         }
         let residual = observed.residual / sigma;
@@ -75,8 +76,13 @@ impl Scene<'_> {
         (Row { residual, jacobian, weight }, observed)
     }
 
-    pub(crate) fn whitened_residual(&self, meeting: &Meeting, contact: &Contact, pose: &Isometry3<f64>) -> f64 {
-        let (source, target) = (self.surfaces[meeting.source], self.surfaces[meeting.target]);
+    pub(crate) fn whitened_residual(
+        &self,
+        pair_contacts: &PairContacts,
+        contact: &Contact,
+        pose: &Isometry3<f64>,
+    ) -> f64 {
+        let (source, target) = (self.surfaces[pair_contacts.source], self.surfaces[pair_contacts.target]);
         let observed = observe(source, target, contact, pose);
         observed.residual / observed.variance.sqrt()
     }
@@ -96,22 +102,23 @@ pub(crate) struct Reduced {
 /// Reduces the contacts of a pair at `pose`.
 pub(crate) fn reduce(
     scene: &Scene<'_>,
-    meeting: &Meeting,
+    pair_contacts: &PairContacts,
     pose: &Isometry3<f64>,
     weighting: &Weighting,
 ) -> Result<Reduced> {
     let n = 6 + scene.parameters;
     let (mut information, mut gradient) = (DMatrix::zeros(n, n), DVector::zeros(n));
     let mut imitation = DMatrix::zeros(n, n);
-    for contact in &meeting.contacts {
-        let (row, observed) = scene.row(meeting, contact, pose, weighting);
+    for contact in &pair_contacts.contacts {
+        let (row, observed) = scene.row(pair_contacts, contact, pose, weighting);
         information.ger(row.weight, &row.jacobian, &row.jacobian, 1.0);
         gradient.axpy(row.weight * row.residual, &row.jacobian, 1.0);
-        let noise = imitated(scene.surfaces[meeting.source], contact, &observed, pose) / observed.variance;
+        let noise = imitated(scene.surfaces[pair_contacts.source], contact, &observed, pose) / observed.variance;
         let mut corner = imitation.fixed_view_mut::<6, 6>(0, 0);
         corner += noise * row.weight;
     }
-    let (rows, right) = observations(&information, &gradient, &imitation, scene.surfaces[meeting.source].radius_m)?;
+    let (rows, right) =
+        observations(&information, &gradient, &imitation, scene.surfaces[pair_contacts.source].radius_m)?;
     Ok(Reduced { rows, right, pose: *pose })
 }
 

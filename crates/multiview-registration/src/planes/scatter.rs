@@ -4,17 +4,17 @@
 use nalgebra::DVector;
 use statistics::mad_scale;
 
-use crate::planes::elimination::{Eliminated, FacetSums, Variances};
+use crate::planes::elimination::{Eliminated, SharedPlaneSums, Variances};
 use icp_registration::RobustKernel;
 
 /// Widening of the kernel for means of tiles: what is on the surface keeps its weight.
 const WIDE: f64 = 2.0;
 /// Standard deviations beyond which a tile says nothing of the variances.
 const CLIPPED: f64 = 4.0;
-/// Fewest tiles that show how plane a facet is.
+/// Fewest tiles that show how plane a shared plane is.
 const FEWEST_TILES: usize = 6;
 
-/// The mean distance of a station's points in a tile from the facet.
+/// The mean distance of a station's points in a tile from the shared plane.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct TileMean {
     pub tile: usize,
@@ -26,8 +26,8 @@ pub(crate) struct TileMean {
     pub deviation: f64,
 }
 
-/// The means of all tiles of a facet, about its plane at the present poses, tile by tile.
-pub(crate) fn tile_means(seen: &FacetSums<'_>, eliminated: &Eliminated) -> Vec<TileMean> {
+/// The means of all tiles of a shared plane, about its plane at the present poses, tile by tile.
+pub(crate) fn tile_means(seen: &SharedPlaneSums<'_>, eliminated: &Eliminated) -> Vec<TileMean> {
     let plane = eliminated.plane(&DVector::zeros(eliminated.right.len()));
     let mut means: Vec<TileMean> = Vec::new();
     for tile in seen.tiles() {
@@ -56,7 +56,7 @@ fn mean_of(means: &[TileMean]) -> (f64, f64) {
     (means.iter().map(|mean| mean.weight * mean.mean_m).sum::<f64>() / weight, weight)
 }
 
-/// What the tiles of all facets say together.
+/// What the tiles of all shared planes say together.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Scatter {
     /// Robust weight of each tile and station, tile by tile.
@@ -80,7 +80,9 @@ pub(crate) fn between(means: &[Vec<TileMean>], stations: usize, tiles: usize, ke
     for mean in means.iter().flatten() {
         scatter.weights[mean.tile * stations + mean.station] = kernel.weight(mean.deviation / (WIDE * scale));
     }
-    for own in means.iter().flat_map(|facet| facet.chunk_by(|a, b| a.tile == b.tile)).filter(|own| own.len() > 1) {
+    for own in
+        means.iter().flat_map(|shared_plane| shared_plane.chunk_by(|a, b| a.tile == b.tile)).filter(|own| own.len() > 1)
+    {
         if own.iter().any(|mean| mean.deviation.abs() > CLIPPED * scale) {
             continue;
         }
@@ -107,7 +109,7 @@ fn noise_of_means(kernel: RobustKernel) -> f64 {
     squares / weights
 }
 
-/// Variance of the surface of a tile about the plane of its facet, metre².
+/// Variance of the surface of a tile about the plane of its shared plane, metre².
 pub(crate) fn roughness(means: &[TileMean], shared: f64) -> f64 {
     let (mut squares, mut weights, mut tiles) = (0.0, 0.0, 0_usize);
     for own in means.chunk_by(|a, b| a.tile == b.tile) {
@@ -121,7 +123,7 @@ pub(crate) fn roughness(means: &[TileMean], shared: f64) -> f64 {
     if tiles < FEWEST_TILES { 0.0 } else { ((squares - (tiles as f64 - 3.0)) / weights).max(0.0) }
 }
 
-/// Variances of a facet.
+/// Variances of a shared plane.
 pub(crate) fn variances(means: &[TileMean], shared: f64) -> Variances {
     Variances { surface: roughness(means, shared), shared }
 }

@@ -1,12 +1,12 @@
-//! What each station saw of each facet: its points given to the facets, summed tile by tile.
+//! What each station saw of each shared plane: its points given to the shared planes, summed tile by tile.
 //!
-//! Which facet a point belongs to is decided by where its ray meets them, not by where the point lies: so the decision
-//! hangs on no noise. Where a ray meets two facets at nearly the same range, the point is left out.
+//! Which shared plane a point belongs to is decided by where its ray meets them, not by where the point lies: so the decision
+//! hangs on no noise. Where a ray meets two shared planes at nearly the same range, the point is left out.
 
 use nalgebra::{Isometry3, Matrix3, Vector3};
 use rayon::prelude::*;
 
-use crate::planes::facets::Facet;
+use crate::planes::shared_planes::SharedPlane;
 use crate::planes::sums::{FARTHEST, Sums};
 use crate::planes::tiles::Tile;
 use crate::surfaces::points::{Block, StationPoints};
@@ -14,12 +14,12 @@ use icp_registration::RobustKernel;
 
 /// Smallest cosine between ray and normal.
 const GRAZING: f64 = 0.03;
-/// Standard deviations between the ranges of two facets below which they are not told apart.
+/// Standard deviations between the ranges of two shared planes below which they are not told apart.
 const APART: f64 = 7.0;
-/// Cosine between the normals of facets that are one surface.
+/// Cosine between the normals of shared planes that are one surface.
 const SAME_DIRECTION: f64 = 0.966;
 
-/// How points are given to facets.
+/// How points are given to shared planes.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Gate {
     pub kernel: RobustKernel,
@@ -31,15 +31,20 @@ pub(crate) struct Gate {
 }
 
 /// The sums of all stations over all tiles.
-pub(crate) fn sightings(points: &[StationPoints], poses: &[Isometry3<f64>], facets: &[Facet], gate: Gate) -> Vec<Sums> {
+pub(crate) fn sightings(
+    points: &[StationPoints],
+    poses: &[Isometry3<f64>],
+    shared_planes: &[SharedPlane],
+    gate: Gate,
+) -> Vec<Sums> {
     let stations = (0..points.len()).into_par_iter();
-    stations.map(|k| Sighting::new(&points[k], &poses[k], k, facets, gate).sums()).collect()
+    stations.map(|k| Sighting::new(&points[k], &poses[k], k, shared_planes, gate).sums()).collect()
 }
 
-/// Where a ray meets a facet.
+/// Where a ray meets a shared plane.
 #[derive(Debug, Clone, Copy)]
 struct Hit {
-    facet: usize,
+    shared_plane: usize,
     tile: usize,
     kind: Tile,
     place: [f64; 2],
@@ -52,7 +57,7 @@ struct Sighting<'a> {
     rotation: Matrix3<f64>,
     eye: Vector3<f64>,
     station: usize,
-    facets: &'a [Facet],
+    shared_planes: &'a [SharedPlane],
     gate: Gate,
     used: Vec<bool>,
     hits: Vec<Hit>,
@@ -61,14 +66,20 @@ struct Sighting<'a> {
 }
 
 impl<'a> Sighting<'a> {
-    fn new(points: &'a StationPoints, pose: &Isometry3<f64>, station: usize, facets: &'a [Facet], gate: Gate) -> Self {
-        let tiles = facets.iter().map(|facet| facet.tiles.len()).sum();
+    fn new(
+        points: &'a StationPoints,
+        pose: &Isometry3<f64>,
+        station: usize,
+        shared_planes: &'a [SharedPlane],
+        gate: Gate,
+    ) -> Self {
+        let tiles = shared_planes.iter().map(|shared_plane| shared_plane.tiles.len()).sum();
         Self {
             points,
             rotation: pose.rotation.to_rotation_matrix().into_inner(),
             eye: pose.translation.vector,
             station,
-            facets,
+            shared_planes,
             gate,
             used: vec![false; points.points.len()],
             hits: Vec::new(),
@@ -83,16 +94,16 @@ impl<'a> Sighting<'a> {
             self.near(block, &mut near);
             for point in block.points.clone().step_by(self.gate.stride) {
                 let (direction, range_m) = self.ray(point);
-                if let Some(hit) = self.facet_of(point, &direction, range_m, &near) {
-                    let plane = &self.facets[hit.facet];
+                if let Some(hit) = self.shared_plane_of(point, &direction, range_m, &near) {
+                    let plane = &self.shared_planes[hit.shared_plane];
                     let rho = plane.normal.dot(&(self.eye + direction * range_m - plane.origin));
                     self.used[point] = self.weighted(point, &hit, rho);
                 }
             }
         }
-        let (facets, station) = (self.facets, self.station);
-        for (index, facet) in facets.iter().enumerate() {
-            for &(_, point) in facet.points.iter().filter(|point| point.0 as usize == station) {
+        let (shared_planes, station) = (self.shared_planes, self.station);
+        for (index, shared_plane) in shared_planes.iter().enumerate() {
+            for &(_, point) in shared_plane.points.iter().filter(|point| point.0 as usize == station) {
                 self.add_member(self.points.slot_of[point as usize] as usize, index);
             }
         }
@@ -100,14 +111,16 @@ impl<'a> Sighting<'a> {
         self.sums
     }
 
-    /// Wide facets that points of a block may lie on.
+    /// Wide shared planes that points of a block may lie on.
     fn near(&self, block: &Block, near: &mut Vec<usize>) {
         near.clear();
         let centre = self.rotation * block.centre.coords + self.eye;
         let reach_m = block.radius_m + 10.0 * self.gate.slack_m;
-        for (index, facet) in self.facets.iter().enumerate().filter(|(_, facet)| facet.points.is_empty()) {
-            let across = facet.normal.dot(&(centre - facet.origin)).abs();
-            if across <= 1.5 * reach_m && facet.tiles.near(facet.place(&centre), 1.5 * reach_m) {
+        for (index, shared_plane) in
+            self.shared_planes.iter().enumerate().filter(|(_, shared_plane)| shared_plane.points.is_empty())
+        {
+            let across = shared_plane.normal.dot(&(centre - shared_plane.origin)).abs();
+            if across <= 1.5 * reach_m && shared_plane.tiles.near(shared_plane.place(&centre), 1.5 * reach_m) {
                 near.push(index);
             }
         }
@@ -120,14 +133,14 @@ impl<'a> Sighting<'a> {
         (turned / range, range)
     }
 
-    /// Standard deviation of a point across a facet, metre.
+    /// Standard deviation of a point across a shared plane, metre.
     fn sigma(&self, point: usize, cosine: f64) -> f64 {
         (self.points.variance(point, cosine) + self.gate.slack_m.powi(2)).sqrt()
     }
 
-    /// Where the ray of a point meets a facet; `None` also where that is too far off to matter.
-    fn hit(&self, point: usize, facet: usize, direction: &Vector3<f64>, range_m: f64) -> Option<Hit> {
-        let plane = &self.facets[facet];
+    /// Where the ray of a point meets a shared plane; `None` also where that is too far off to matter.
+    fn hit(&self, point: usize, shared_plane: usize, direction: &Vector3<f64>, range_m: f64) -> Option<Hit> {
+        let plane = &self.shared_planes[shared_plane];
         let ahead = if self.points.along_rays { *direction } else { -plane.normal };
         let cosine = plane.normal.dot(&ahead);
         let rho = plane.normal.dot(&(self.eye + direction * range_m - plane.origin));
@@ -140,29 +153,29 @@ impl<'a> Sighting<'a> {
         let place = plane.place(&(from + ahead * ahead_m));
         let (tile, kind) = plane.tiles.at(place);
         let range_m = if self.points.along_rays { ahead_m } else { range_m + ahead_m };
-        (kind != Tile::Outside).then_some(Hit { facet, tile, kind, place, cosine, range_m })
+        (kind != Tile::Outside).then_some(Hit { shared_plane, tile, kind, place, cosine, range_m })
     }
 
     /// Where the point lies, if that is certain.
-    fn facet_of(&mut self, point: usize, direction: &Vector3<f64>, range_m: f64, near: &[usize]) -> Option<Hit> {
+    fn shared_plane_of(&mut self, point: usize, direction: &Vector3<f64>, range_m: f64, near: &[usize]) -> Option<Hit> {
         self.hits.clear();
-        for &facet in near {
-            self.hits.extend(self.hit(point, facet, direction, range_m));
+        for &shared_plane in near {
+            self.hits.extend(self.hit(point, shared_plane, direction, range_m));
         }
         let off = |hit: &Hit| (range_m - hit.range_m).abs();
         let mut best = *self.hits.iter().min_by(|a, b| off(a).total_cmp(&off(b)))?;
         for other in &self.hits {
             let apart = (other.range_m - best.range_m).abs();
             let sigma_m = self.sigma(point, best.cosine) / best.cosine.abs();
-            if other.facet == best.facet || apart > APART * sigma_m {
+            if other.shared_plane == best.shared_plane || apart > APART * sigma_m {
                 continue;
             }
-            let (first, second) = (&self.facets[best.facet], &self.facets[other.facet]);
+            let (first, second) = (&self.shared_planes[best.shared_plane], &self.shared_planes[other.shared_plane]);
             if first.normal.dot(&second.normal) < SAME_DIRECTION {
                 return None;
             }
             // Pieces of one surface: the one that was seen there, or the one that is better known.
-            let rank = |hit: &Hit, facet: &Facet| (hit.kind == Tile::Core, facet.size);
+            let rank = |hit: &Hit, shared_plane: &SharedPlane| (hit.kind == Tile::Core, shared_plane.size);
             if rank(other, second) > rank(&best, first) {
                 best = *other;
             }
@@ -170,27 +183,27 @@ impl<'a> Sighting<'a> {
         Some(best)
     }
 
-    /// A point of a small facet.
+    /// A point of a small shared plane.
     fn add_member(&mut self, point: usize, index: usize) {
         if self.used.get(point) != Some(&false) {
             return;
         }
         let (direction, range_m) = self.ray(point);
-        let facet = &self.facets[index];
+        let shared_plane = &self.shared_planes[index];
         let place = self.eye + direction * range_m;
         let hit = Hit {
-            facet: index,
-            tile: facet.tiles.first,
+            shared_plane: index,
+            tile: shared_plane.tiles.first,
             kind: Tile::Core,
-            place: facet.place(&place),
-            cosine: facet.normal.dot(&direction),
+            place: shared_plane.place(&place),
+            cosine: shared_plane.normal.dot(&direction),
             range_m,
         };
-        let rho = facet.normal.dot(&(place - facet.origin));
+        let rho = shared_plane.normal.dot(&(place - shared_plane.origin));
         self.used[point] = self.weighted(point, &hit, rho);
     }
 
-    /// Adds a point at a distance from its facet; whether it counts.
+    /// Adds a point at a distance from its shared plane; whether it counts.
     fn weighted(&mut self, point: usize, hit: &Hit, rho: f64) -> bool {
         let sigma = self.sigma(point, hit.cosine);
         let whitened = rho / sigma;
@@ -202,7 +215,7 @@ impl<'a> Sighting<'a> {
         self.phi[1..3].copy_from_slice(&hit.place);
         let parameters = self.gate.parameters;
         if parameters > 0 {
-            let normal = self.rotation.transpose() * self.facets[hit.facet].normal;
+            let normal = self.rotation.transpose() * self.shared_planes[hit.shared_plane].normal;
             let derivatives = &self.points.derivatives[point * parameters..(point + 1) * parameters];
             for (phi, derivative) in self.phi[3..].iter_mut().zip(derivatives) {
                 *phi = normal.dot(&Vector3::from(*derivative));

@@ -8,11 +8,11 @@ use icp_registration::RobustKernel;
 const FEWEST_FREE: f64 = 5.0;
 /// Ratio of the spreads of a tile's points, squared, below which they lie on a line.
 const NARROW: f64 = 1e-3;
-/// Standard deviations beyond which a point is not on a facet.
+/// Standard deviations beyond which a point is not on a shared plane.
 pub(crate) const FARTHEST: f64 = 4.685;
 
 /// Sums over the points of a station in a tile. With `φ = [1, u, v, derivatives by the shared parameters]` and the
-/// distance ρ of a point from its facet: `Σ w φ φᵀ` (lower triangle, row by row) and `Σ w φ ρ`.
+/// distance ρ of a point from its shared plane: `Σ w φ φᵀ` (lower triangle, row by row) and `Σ w φ ρ`.
 #[derive(Debug, Clone)]
 pub(crate) struct Sums {
     pub order: usize,

@@ -1,17 +1,17 @@
-//! The extent of a facet as a grid of tiles.
+//! The extent of a shared plane as a grid of tiles.
 
 /// What is known of a tile.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Tile {
-    /// Nobody saw the facet there.
+    /// Nobody saw the shared plane there.
     Outside,
-    /// Beside a seen one: the facet may end there.
+    /// Beside a seen one: the shared plane may end there.
     Rim,
     /// Seen.
     Core,
 }
 
-/// Tiles of a facet.
+/// Tiles of a shared plane.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Tiles {
     size_m: f64,
@@ -19,7 +19,7 @@ pub(crate) struct Tiles {
     columns: usize,
     rows: usize,
     kinds: Vec<u8>,
-    /// Number of the first tile among those of all facets.
+    /// Number of the first tile among those of all shared planes.
     pub first: usize,
 }
 
@@ -65,7 +65,7 @@ impl Tiles {
         inside.then(|| row as usize * self.columns + column as usize)
     }
 
-    /// The tile at this place, counted over all facets, and what is known of it.
+    /// The tile at this place, counted over all shared planes, and what is known of it.
     pub fn at(&self, place: [f64; 2]) -> (usize, Tile) {
         match self.index_of(place.map(|value| (value / self.size_m).floor() as i64)) {
             Some(index) if self.kinds[index] == 2 => (self.first + index, Tile::Core),
@@ -74,7 +74,7 @@ impl Tiles {
         }
     }
 
-    /// Column and row of a tile, counted over all facets.
+    /// Column and row of a tile, counted over all shared planes.
     pub(crate) fn place_of(&self, tile: usize) -> [usize; 2] {
         let own = tile.saturating_sub(self.first);
         [own % self.columns.max(1), own / self.columns.max(1)]

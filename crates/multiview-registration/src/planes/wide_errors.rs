@@ -1,16 +1,16 @@
 //! Errors that tiles share: what a camera does wrong over a whole wall is no independent error of each tile on it.
 //!
 //! Differences between stations, summed over blocks of tiles, grow as the root of the number of tiles where these are
-//! independent, and faster where they share something. The widest blocks are whole facets.
+//! independent, and faster where they share something. The widest blocks are whole shared planes.
 
 use std::collections::BTreeMap;
 
 use statistics::Distribution;
 
-use crate::planes::facets::Facet;
 use crate::planes::scatter::{Scatter, TileMean};
+use crate::planes::shared_planes::SharedPlane;
 
-/// Sides of blocks, tiles; the last holds every facet.
+/// Sides of blocks, tiles; the last holds every shared plane.
 const SIDES: [usize; 4] = [2, 4, 8, usize::MAX];
 /// Probability at which independent tiles pass for ones that share errors, at each size of blocks.
 const LEVEL: f64 = 1e-3;
@@ -45,7 +45,7 @@ impl Block {
 /// Factor of the variances that the errors shared by tiles ask for, `unknowns` having been fitted; at least that of single
 /// tiles, `of_tiles`.
 pub fn factor(
-    facets: &[Facet],
+    shared_planes: &[SharedPlane],
     means: &[Vec<TileMean>],
     scatter: &Scatter,
     stations: usize,
@@ -55,12 +55,12 @@ pub fn factor(
     let mut largest = of_tiles;
     for side in SIDES {
         let (mut free, mut squares) = (-unknowns, 0.0);
-        for (facet, means) in facets.iter().zip(means) {
+        for (shared_plane, means) in shared_planes.iter().zip(means) {
             let mut blocks: BTreeMap<[usize; 2], Block> = BTreeMap::new();
             for tile in means.chunk_by(|a, b| a.tile == b.tile) {
                 let counts = |mean: &TileMean| scatter.weights[mean.tile * stations + mean.station] > 0.0;
                 if tile.len() > 1 && tile.iter().all(counts) {
-                    let place = facet.tiles.place_of(tile[0].tile).map(|at| at / side);
+                    let place = shared_plane.tiles.place_of(tile[0].tile).map(|at| at / side);
                     blocks.entry(place).or_default().add(tile);
                 }
             }

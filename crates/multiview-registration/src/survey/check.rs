@@ -2,7 +2,7 @@
 
 use crate::adjustment::simultaneous::Adjusted;
 use crate::agreement::alignments::{PairAlignment, RefusedPair, best_partners, without_partners};
-use crate::agreement::loops::{LoopClosure, contradicting, skeleton};
+use crate::agreement::loops::{LoopClosure, contradicting, spanning_tree};
 use crate::error::Result;
 use crate::survey::datum::Datum;
 use crate::survey::registration::StationRegistrationOptions;
@@ -36,8 +36,8 @@ pub(crate) fn checked(
     let held = datum.held_station();
     // Far above the error of a right pair and far below that of a wrong one.
     let closes = |closure: &LoopClosure| closure.translation_m + radius_m * closure.rotation_rad <= tolerance_m;
-    let skeleton = skeleton(&pairs, (held, adjusted.state.poses[held]), count, &closes);
-    let (sound, wrong): (Vec<_>, Vec<_>) = pairs.into_iter().zip(skeleton.sound).partition(|(_, sound)| *sound);
+    let spanning_tree = spanning_tree(&pairs, (held, adjusted.state.poses[held]), count, &closes);
+    let (sound, wrong): (Vec<_>, Vec<_>) = pairs.into_iter().zip(spanning_tree.sound).partition(|(_, sound)| *sound);
     refused.extend(wrong.iter().map(|(pair, _)| contradicting(pair)));
-    Ok(Checked { pairs: sound.into_iter().map(|(pair, _)| pair).collect(), refused, loops: skeleton.loops })
+    Ok(Checked { pairs: sound.into_iter().map(|(pair, _)| pair).collect(), refused, loops: spanning_tree.loops })
 }

@@ -9,21 +9,21 @@ use crate::adjustment::precision;
 use crate::adjustment::simultaneous::Adjusted;
 use crate::agreement::alignments::{Overlap, PairAlignment};
 use crate::error::Result;
-use crate::planes::elimination::FacetSums;
+use crate::planes::elimination::SharedPlaneSums;
 use crate::planes::scatter::TileMean;
 use icp_registration::{IcpResult, StopReason};
 use rigid_pose::{step_pose, symmetrised};
 
 /// A tile that two stations saw.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Shared {
-    pub facet: usize,
+pub(crate) struct SharedTile {
+    pub shared_plane: usize,
     pub target: TileMean,
     pub source: TileMean,
 }
 
-impl Shared {
-    /// Distance of the source's points before those of the target along the normal of the facet, metre.
+impl SharedTile {
+    /// Distance of the source's points before those of the target along the normal of the shared plane, metre.
     pub(crate) fn apart_m(&self) -> f64 {
         self.source.mean_m - self.target.mean_m
     }
@@ -36,13 +36,13 @@ impl Shared {
 
 impl Adjusted {
     /// The tiles that both stations saw.
-    pub(crate) fn shared(&self, target: usize, source: usize) -> Vec<Shared> {
+    pub(crate) fn shared(&self, target: usize, source: usize) -> Vec<SharedTile> {
         let mut found = Vec::new();
-        for (facet, means) in self.means.iter().enumerate() {
+        for (shared_plane, means) in self.means.iter().enumerate() {
             for tile in means.chunk_by(|a, b| a.tile == b.tile) {
                 let of = |station: usize| tile.iter().find(|mean| mean.station == station).copied();
                 if let (Some(target), Some(source)) = (of(target), of(source)) {
-                    found.push(Shared { facet, target, source });
+                    found.push(SharedTile { shared_plane, target, source });
                 }
             }
         }
@@ -78,15 +78,15 @@ impl Adjusted {
         let none = (Vec::new(), Vec::new());
         let network = Network { fixed: 0, hold_m, turn_rad: 1.0, names: &[], prior: &none };
         let mut equations = Equations::new(2, 0);
-        for ((facet, variances), means) in self.facets.iter().zip(&self.variances).zip(&self.means) {
+        for ((shared_plane, variances), means) in self.shared_planes.iter().zip(&self.variances).zip(&self.means) {
             let sees = |station: usize| means.iter().any(|mean| mean.station == station);
             if !(sees(target) && sees(source)) {
                 continue;
             }
-            let seen = FacetSums { facet, sums: &self.sums, weights: &self.scatter.weights };
+            let seen = SharedPlaneSums { shared_plane, sums: &self.sums, weights: &self.scatter.weights };
             if let Some(mut eliminated) = seen.eliminated(&[target, source], *variances) {
                 eliminated.rename(&[target, source]);
-                equations.add(facet, &eliminated, &poses);
+                equations.add(shared_plane, &eliminated, &poses);
             }
         }
         let state = State { poses: poses.to_vec(), parameters: Vec::new() };
@@ -108,7 +108,7 @@ impl Adjusted {
         let shared = self.shared(target, source);
         let seen = self.means.iter().flatten().filter(|mean| mean.station == source).count();
         let squares = DVector::from_iterator(shared.len(), shared.iter().map(|s| s.weight() * s.apart_m().powi(2)));
-        let weight: f64 = shared.iter().map(Shared::weight).sum();
+        let weight: f64 = shared.iter().map(SharedTile::weight).sum();
         IcpResult {
             target_from_source,
             covariance: Matrix6::zeros(),

@@ -9,7 +9,7 @@ use statistics::upper_median;
 
 use crate::adjustment::network::{Network, State};
 use crate::adjustment::precision;
-use crate::adjustment::rounds::{Course, Surfaces};
+use crate::adjustment::rounds::{Surfaces, WideRounds};
 use crate::adjustment::simultaneous::{Adjusted, Finish};
 use crate::agreement::alignments::Overlap;
 use crate::agreement::loops::reached;
@@ -36,7 +36,7 @@ const START_ERROR: f64 = 0.2;
 ///
 /// Wide rounds bring the stations together where patches of their surfaces meet, all overlaps in one system with contacts
 /// found anew in each round (`[ChenMedioni1992]`, `[Pulli1999]`). The last rounds take all points: each station's pieces of
-/// a surface are joined to facets, whose planes are unknown too and eliminated exactly. Then pairs are held against their
+/// a surface are joined to shared planes, whose planes are unknown too and eliminated exactly. Then pairs are held against their
 /// loops. `progress(done, total)` is told the rounds of each part.
 ///
 /// Clouds without normals get them from their nearest neighbours.
@@ -70,7 +70,7 @@ pub fn register_stations(
         Network { fixed: datum.held_station(), hold_m: radius_m, turn_rad: 1.0, names: &names, prior: &prior };
     let wide_kernel = if options.kernel == RobustKernel::None { RobustKernel::None } else { RobustKernel::Huber };
     let total = |done| progress(done, options.max_rounds);
-    let course = Course {
+    let wide_rounds = WideRounds {
         network: &network,
         reach_m,
         minimum_contacts: options.minimum_contacts,
@@ -79,7 +79,7 @@ pub fn register_stations(
     };
     let mut modelled = Surfaces::fixed(surfaces.iter().collect());
     modelled.model = options.model.map(|model| (model, stations.iter().map(Cloud::len).collect()));
-    let near = course.run(&mut modelled, State { poses: poses.clone(), parameters: prior.0.clone() })?;
+    let near = wide_rounds.run(&mut modelled, State { poses: poses.clone(), parameters: prior.0.clone() })?;
     let finish = Finish {
         network: &network,
         near: network.near(patch_m / 2.0),
@@ -267,12 +267,12 @@ fn surface_pair(adjusted: &Adjusted, overlap: &Overlap) -> SurfacePair {
     let tiles = adjusted.shared(target, source);
     let (mut weight, mut mean, mut square, mut whitened, mut outliers) = (0.0, 0.0, 0.0, 0.0, 0_usize);
     for tile in &tiles {
-        let facet = &adjusted.facets[tile.facet];
+        let shared_plane = &adjusted.shared_planes[tile.shared_plane];
         let weight_of = |station: usize| adjusted.scatter.weights[tile.target.tile * count + station];
         let robust = weight_of(target).min(weight_of(source));
         let own = robust * tile.weight();
         // Along the normal that points to the target station, so that the sign means nearer or farther.
-        let facing = facet.normal.dot(&(eye - facet.origin)) >= 0.0;
+        let facing = shared_plane.normal.dot(&(eye - shared_plane.origin)) >= 0.0;
         weight += own;
         mean += own * if facing { tile.apart_m() } else { -tile.apart_m() };
         square += own * tile.apart_m().powi(2);

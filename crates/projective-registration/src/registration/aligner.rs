@@ -98,7 +98,7 @@ impl FrameAligner {
         };
         let (held, last_step) = (Matrix6::zeros(), Vector6::zeros());
         let track = Track { pose: *guess, iterations: 0, rules, held, last_step, over_sigma: f64::INFINITY };
-        let first = self.course(track.clone(), source, target, guess);
+        let first = self.follow_levels(track.clone(), source, target, guess);
         if self.hold() == Hold::Undetermined || self.options.other_starts == 0 {
             return first.map(|(_, result)| result);
         }
@@ -112,7 +112,7 @@ impl FrameAligner {
     }
 
     /// The whole way from the guess.
-    fn course(
+    fn follow_levels(
         &mut self,
         mut track: Track,
         source: &OrganisedFrame,

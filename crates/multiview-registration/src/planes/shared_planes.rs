@@ -1,11 +1,11 @@
-//! Facets: the planes that several stations saw pieces of, each station's regions joined where they meet.
+//! Shared planes: the planes that several stations saw pieces of, each station's regions joined where they meet.
 
 use std::collections::BTreeMap;
 
 use nalgebra::{Isometry3, Vector3};
 
 use crate::planes::contacts::Contact;
-use crate::planes::reduction::Meeting;
+use crate::planes::reduction::PairContacts;
 use crate::planes::tiles::Tiles;
 use crate::surfaces::patches::{Surface, axes};
 use crate::surfaces::plane_fit::Moments;
@@ -14,14 +14,14 @@ use crate::surfaces::plane_fit::Moments;
 const ROUGHER: f64 = 1.15;
 /// How far patches of neighbouring pieces of a plane may be apart, patches.
 const BESIDE: f64 = 2.0;
-/// Standard deviations that a patch may be off a facet that it joins.
+/// Standard deviations that a patch may be off a shared plane that it joins.
 const OFF_PLANE: f64 = 3.0;
 /// Cosine of the largest angle between the two (15 degrees).
 const SAME_DIRECTION: f64 = 0.966;
 
 /// A plane with what is known of its extent.
 #[derive(Debug, Clone)]
-pub(crate) struct Facet {
+pub(crate) struct SharedPlane {
     pub origin: Vector3<f64>,
     pub normal: Vector3<f64>,
     pub right: Vector3<f64>,
@@ -29,12 +29,12 @@ pub(crate) struct Facet {
     pub tiles: Tiles,
     /// Number of its patches.
     pub size: usize,
-    /// Points of a small facet (station, index in its cloud), which alone belong to it; empty for a wide one, to which
+    /// Points of a small shared plane (station, index in its cloud), which alone belong to it; empty for a wide one, to which
     /// every point on it does.
     pub points: Vec<(u32, u32)>,
 }
 
-impl Facet {
+impl SharedPlane {
     fn new(origin: Vector3<f64>, normal: Vector3<f64>) -> Self {
         let (right, up) = axes(&normal);
         Self { origin, normal, right, up, tiles: Tiles::default(), size: 0, points: Vec::new() }
@@ -56,25 +56,25 @@ impl Facet {
 }
 
 /// Joins the surfaces of all stations at these poses; partners may be `tolerance_m` apart because the poses are off.
-pub(crate) fn facets(
+pub(crate) fn shared_planes(
     surfaces: &[&Surface],
     poses: &[Isometry3<f64>],
-    meetings: &[Meeting],
+    pairs_in_contact: &[PairContacts],
     tolerance_m: f64,
-) -> Vec<Facet> {
+) -> Vec<SharedPlane> {
     let Some(first) = poses.first() else { return Vec::new() };
     let mut joined = Joined::new(surfaces, poses, first.translation.vector, tolerance_m);
-    joined.join_regions(meetings);
+    joined.join_regions(pairs_in_contact);
     joined.join_neighbours();
-    let mut facet_of = joined.adopt_patches(meetings);
-    let mut facets = joined.wide(&facet_of);
-    joined.small(meetings, &mut facet_of, &mut facets);
+    let mut shared_plane_of = joined.adopt_patches(pairs_in_contact);
+    let mut shared_planes = joined.wide(&shared_plane_of);
+    joined.small(pairs_in_contact, &mut shared_plane_of, &mut shared_planes);
     let mut tiles = 0;
-    for facet in &mut facets {
-        facet.tiles.first = tiles;
-        tiles += facet.tiles.len();
+    for shared_plane in &mut shared_planes {
+        shared_plane.tiles.first = tiles;
+        tiles += shared_plane.tiles.len();
     }
-    facets
+    shared_planes
 }
 
 /// Regions as a forest: those of one tree are one plane.
@@ -120,9 +120,9 @@ impl<'a> Joined<'a> {
     }
 
     /// Joins regions that meet, those that meet in the most places first.
-    fn join_regions(&mut self, meetings: &[Meeting]) {
+    fn join_regions(&mut self, pairs_in_contact: &[PairContacts]) {
         let mut met: BTreeMap<(usize, usize), usize> = BTreeMap::new();
-        for (a, b) in ends(meetings) {
+        for (a, b) in ends(pairs_in_contact) {
             if let (Some(a), Some(b)) = (self.node(a.0, a.1), self.node(b.0, b.1)) {
                 *met.entry((a.min(b), a.max(b))).or_default() += 1;
             }
@@ -189,20 +189,20 @@ impl<'a> Joined<'a> {
     }
 
     /// The root that each patch belongs to: that of its region, or of a partner in whose plane it lies.
-    fn adopt_patches(&self, meetings: &[Meeting]) -> Vec<Vec<Option<usize>>> {
+    fn adopt_patches(&self, pairs_in_contact: &[PairContacts]) -> Vec<Vec<Option<usize>>> {
         let own = |(station, surface): (usize, &&Surface)| -> Vec<Option<usize>> {
             (0..surface.patches.len()).map(|patch| self.node(station, patch as u32).map(|n| self.root(n))).collect()
         };
-        let mut facet_of: Vec<Vec<Option<usize>>> = self.surfaces.iter().enumerate().map(own).collect();
-        for (a, b) in ends(meetings) {
+        let mut shared_plane_of: Vec<Vec<Option<usize>>> = self.surfaces.iter().enumerate().map(own).collect();
+        for (a, b) in ends(pairs_in_contact) {
             for ((station, patch), other) in [(a, b), (b, a)] {
-                let Some(root) = facet_of[other.0][other.1 as usize] else { continue };
-                if facet_of[station][patch as usize].is_none() && self.lies_in(station, patch, root) {
-                    facet_of[station][patch as usize] = Some(root);
+                let Some(root) = shared_plane_of[other.0][other.1 as usize] else { continue };
+                if shared_plane_of[station][patch as usize].is_none() && self.lies_in(station, patch, root) {
+                    shared_plane_of[station][patch as usize] = Some(root);
                 }
             }
         }
-        facet_of
+        shared_plane_of
     }
 
     fn lies_in(&self, station: usize, patch: u32, root: usize) -> bool {
@@ -218,46 +218,51 @@ impl<'a> Joined<'a> {
         self.surfaces.iter().map(|surface| surface.size_m).fold(0.0, f64::max)
     }
 
-    /// One facet a root.
-    fn wide(&self, facet_of: &[Vec<Option<usize>>]) -> Vec<Facet> {
-        let mut places: BTreeMap<usize, (Facet, Vec<[f64; 2]>)> = BTreeMap::new();
-        for (station, of_patches) in facet_of.iter().enumerate() {
+    /// One shared plane a root.
+    fn wide(&self, shared_plane_of: &[Vec<Option<usize>>]) -> Vec<SharedPlane> {
+        let mut places: BTreeMap<usize, (SharedPlane, Vec<[f64; 2]>)> = BTreeMap::new();
+        for (station, of_patches) in shared_plane_of.iter().enumerate() {
             for (patch, root) in of_patches.iter().enumerate() {
                 let Some(root) = *root else { continue };
                 let centre = (self.poses[station] * self.surfaces[station].patches[patch].centre).coords;
-                let entry = places.entry(root).or_insert_with(|| (self.facet(root), Vec::new()));
+                let entry = places.entry(root).or_insert_with(|| (self.shared_plane(root), Vec::new()));
                 let place = entry.0.place(&centre);
                 entry.1.push(place);
             }
         }
         let size_m = self.size_m();
-        let with_tiles = |(mut facet, places): (Facet, Vec<[f64; 2]>)| {
-            facet.size = places.len();
-            facet.tiles = Tiles::around(&places, size_m);
-            facet
+        let with_tiles = |(mut shared_plane, places): (SharedPlane, Vec<[f64; 2]>)| {
+            shared_plane.size = places.len();
+            shared_plane.tiles = Tiles::around(&places, size_m);
+            shared_plane
         };
         places.into_values().map(with_tiles).collect()
     }
 
-    fn facet(&self, root: usize) -> Facet {
+    fn shared_plane(&self, root: usize) -> SharedPlane {
         let moments = &self.moments[root];
         let normal = moments.region_plane().map_or(Vector3::z(), |plane| plane.normal);
         let normal = if normal.dot(&self.normals[root]) < 0.0 { -normal } else { normal };
-        Facet::new(self.centre + moments.mean(), normal)
+        SharedPlane::new(self.centre + moments.mean(), normal)
     }
 
-    /// Patches of several stations that meet and belong to no wide facet: one small facet each.
-    fn small(&self, meetings: &[Meeting], facet_of: &mut [Vec<Option<usize>>], facets: &mut Vec<Facet>) {
+    /// Patches of several stations that meet and belong to no wide shared plane: one small shared plane each.
+    fn small(
+        &self,
+        pairs_in_contact: &[PairContacts],
+        shared_plane_of: &mut [Vec<Option<usize>>],
+        shared_planes: &mut Vec<SharedPlane>,
+    ) {
         let mut partners: BTreeMap<(u32, u32), Vec<(u32, u32)>> = BTreeMap::new();
-        for (a, b) in ends(meetings) {
-            if facet_of[a.0][a.1 as usize].is_none() && facet_of[b.0][b.1 as usize].is_none() {
+        for (a, b) in ends(pairs_in_contact) {
+            if shared_plane_of[a.0][a.1 as usize].is_none() && shared_plane_of[b.0][b.1 as usize].is_none() {
                 let (a, b) = ((a.0 as u32, a.1), (b.0 as u32, b.1));
                 partners.entry(a).or_default().push(b);
                 partners.entry(b).or_default().push(a);
             }
         }
         for (patch, others) in partners {
-            let free = |(station, patch): (u32, u32)| facet_of[station as usize][patch as usize].is_none();
+            let free = |(station, patch): (u32, u32)| shared_plane_of[station as usize][patch as usize].is_none();
             let mut members = vec![patch];
             members.extend(others.into_iter().filter(|&other| free(other)));
             members.sort_unstable();
@@ -269,25 +274,28 @@ impl<'a> Joined<'a> {
             for &(station, patch) in &members {
                 let (surface, pose) = (self.surfaces[station as usize], &self.poses[station as usize]);
                 moments.join(&surface.moments[patch as usize].moved(&surface.origin, pose, &self.centre));
-                facet_of[station as usize][patch as usize] = Some(usize::MAX);
+                shared_plane_of[station as usize][patch as usize] = Some(usize::MAX);
             }
             let Some(plane) = moments.plane() else { continue };
-            let mut facet = Facet::new(self.centre + moments.mean(), plane.normal);
-            facet.tiles = Tiles::one(self.size_m());
-            facet.size = members.len();
+            let mut shared_plane = SharedPlane::new(self.centre + moments.mean(), plane.normal);
+            shared_plane.tiles = Tiles::one(self.size_m());
+            shared_plane.size = members.len();
             let points_of = |&(station, patch): &(u32, u32)| {
                 let points = self.surfaces[station as usize].points_of(patch as usize);
                 points.iter().map(move |&point| (station, point))
             };
-            facet.points = members.iter().flat_map(points_of).collect();
-            facets.push(facet);
+            shared_plane.points = members.iter().flat_map(points_of).collect();
+            shared_planes.push(shared_plane);
         }
     }
 }
 
 /// Both ends of all contacts, as stations and patches.
-fn ends(meetings: &[Meeting]) -> impl Iterator<Item = ((usize, u32), (usize, u32))> {
-    let of =
-        |meeting: &Meeting, contact: &Contact| ((meeting.source, contact.source), (meeting.target, contact.target));
-    meetings.iter().flat_map(move |meeting| meeting.contacts.iter().map(move |contact| of(meeting, contact)))
+fn ends(pairs_in_contact: &[PairContacts]) -> impl Iterator<Item = ((usize, u32), (usize, u32))> {
+    let of = |pair_contacts: &PairContacts, contact: &Contact| {
+        ((pair_contacts.source, contact.source), (pair_contacts.target, contact.target))
+    };
+    pairs_in_contact
+        .iter()
+        .flat_map(move |pair_contacts| pair_contacts.contacts.iter().map(move |contact| of(pair_contacts, contact)))
 }

@@ -1,4 +1,6 @@
 #![doc = include_str!("../README.md")]
+// Formats share helpers: what is used of them depends on the features.
+#![cfg_attr(not(feature = "clouds"), allow(dead_code, unused_imports))]
 
 #[cfg(feature = "calibration")]
 pub mod calibration;

@@ -60,12 +60,12 @@ const KNOWN: &[(Use, &[&str])] = &[
     (
         Use::SmallStep,
         &[
-            "global-registration/src/verification/refine.rs",
             "icp-registration/src/quality/verdict.rs",
             "multipath/src/pixels/refine.rs",
             "multipath/src/scene/bending.rs",
             "multipath/src/scene/patches.rs",
             "projective-registration/src/shared_error.rs",
+            "rigid-pose/src/centred.rs",
             "tracking/src/imu/update.rs",
             "tracking/src/motion_model/velocity.rs",
         ],

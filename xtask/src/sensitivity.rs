@@ -21,9 +21,12 @@ pub(crate) struct Arguments {
     /// Crate whose constants they are.
     #[arg(long, default_value = "projective-registration")]
     package: String,
-    /// Example of the crate that prints the figures, without times.
+    /// Example that prints the figures, without times.
     #[arg(long, default_value = "frame_pairs")]
     example: String,
+    /// Crate whose example it is, where it is another one.
+    #[arg(long)]
+    example_of: Option<String>,
     /// Arguments of the example.
     #[arg(long = "arguments", default_value = "verdicts")]
     passed: String,
@@ -206,7 +209,14 @@ fn built(folder: &Path, copy: &Path, arguments: &Arguments) -> Result<PathBuf, S
     let target = folder.join("target");
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let status = Command::new(cargo)
-        .args(["build", "--package", &arguments.package, "--all-features", "--example", &arguments.example])
+        .args([
+            "build",
+            "--package",
+            arguments.example_of.as_ref().unwrap_or(&arguments.package),
+            "--all-features",
+            "--example",
+            &arguments.example,
+        ])
         .current_dir(copy)
         .env("CARGO_TARGET_DIR", &target)
         .status()

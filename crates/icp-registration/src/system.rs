@@ -3,14 +3,14 @@
 //! Motions are `[dt, rho w]`: translation and rotation about the centroid of the pairs in target axes, the rotation
 //! multiplied by the rms radius of the pairs. All six are lengths, so that one eigenvalue compares with another.
 
-use nalgebra::{Isometry3, Matrix6, UnitQuaternion, Vector3, Vector6};
+use nalgebra::{Isometry3, UnitQuaternion, Vector3, Vector6};
 use rayon::prelude::*;
 use statistics::{CHI_MEDIANS, mad_scale, upper_median};
 
 use crate::icp::engine::matching::CHUNK;
 use crate::kernel::RobustKernel;
 use crate::parts::{ErrorMetric, Pair, Row, Rows, Scene};
-use rigid_pose::move_about;
+use rigid_pose::{Centred, MotionEquations};
 
 /// Scale of lengths, in radii, below which they count as exact beside another channel.
 const SMALLEST_LENGTH: f64 = 1e-4;
@@ -21,8 +21,7 @@ pub struct System<'a> {
     metric: &'a dyn ErrorMetric,
     pairs: &'a [Pair],
     kernel: RobustKernel,
-    centre: Vector3<f64>,
-    radius_m: f64,
+    frame: Centred,
     /// Standard deviation of a whitened residual, times the widening of the kernel.
     scale: f64,
     /// Factor that brings residuals of channel 1 to metres.
@@ -30,9 +29,6 @@ pub struct System<'a> {
     /// Length that the kernel looks at, metre.
     lengths: Vec<f64>,
 }
-
-/// Normal matrix `Σ w J Jᵀ` and right-hand side `Σ w J r`.
-type NormalEquations = (Matrix6<f64>, Vector6<f64>);
 
 impl<'a> System<'a> {
     pub(crate) fn new(
@@ -47,7 +43,16 @@ impl<'a> System<'a> {
         // Pairs all in one place leave the rotation undetermined whatever the radius.
         let radius_m = (square / n).sqrt().max(f64::MIN_POSITIVE.sqrt());
         let lengths = Vec::new();
-        let mut system = Self { scene, metric, pairs, kernel, centre, radius_m, scale: 1.0, balance: 1.0, lengths };
+        let mut system = Self {
+            scene,
+            metric,
+            pairs,
+            kernel,
+            frame: Centred { centre, radius_m },
+            scale: 1.0,
+            balance: 1.0,
+            lengths,
+        };
         system.balance = system.balance_of_channels();
         system.lengths = system.all_lengths();
         let mut whitened: Vec<f64> = pairs.iter().zip(&system.lengths).map(|(p, l)| l * p.weight.sqrt()).collect();
@@ -74,19 +79,14 @@ impl<'a> System<'a> {
         self.pairs
     }
 
-    /// Centroid of the moved source points, target frame, metre.
-    pub fn centre(&self) -> Vector3<f64> {
-        self.centre
-    }
-
-    /// Root mean square distance of the moved source points from the centroid, metre.
-    pub fn radius_m(&self) -> f64 {
-        self.radius_m
+    /// Frame of motions: centroid of the moved source points, and their rms distance from it.
+    pub fn frame(&self) -> Centred {
+        self.frame
     }
 
     /// The pose after a motion `[dt, rho w]`.
     pub fn moved(&self, motion: &Vector6<f64>) -> Isometry3<f64> {
-        move_about(&self.scene.moment.pose, &self.centre, self.radius_m, motion)
+        self.frame.moved(&self.scene.moment.pose, motion)
     }
 
     /// Length of the residual of pair `i` that the kernel looks at, metre.
@@ -99,20 +99,20 @@ impl<'a> System<'a> {
         (0..self.pairs.len()).map(|i| self.weights(i).0).collect()
     }
 
-    /// Normal matrix `Σ w J Jᵀ` and right-hand side `Σ w J r`, summed in fixed chunks.
-    pub fn normal_equations(&self) -> (Matrix6<f64>, Vector6<f64>) {
+    /// Normal equations, summed in fixed chunks.
+    pub fn normal_equations(&self) -> MotionEquations {
         self.summed(|i| (self.pairs[i], self.weights(i).0))
     }
 
     /// As [`System::normal_equations`] for the same pairs after a motion, with given weights.
-    pub fn normal_equations_after(&self, motion: &Vector6<f64>, weights: &[f64]) -> (Matrix6<f64>, Vector6<f64>) {
-        let turn = UnitQuaternion::from_scaled_axis(motion.fixed_rows::<3>(3) / self.radius_m);
+    pub fn normal_equations_after(&self, motion: &Vector6<f64>, weights: &[f64]) -> MotionEquations {
+        let turn = UnitQuaternion::from_scaled_axis(motion.fixed_rows::<3>(3) / self.frame.radius_m);
         self.summed(|i| (self.after(&self.pairs[i], motion, &turn), weights[i]))
     }
 
     /// Weighted sum of squares of the same pairs after a motion.
     pub fn squares_after(&self, motion: &Vector6<f64>, weights: &[f64]) -> f64 {
-        let turn = UnitQuaternion::from_scaled_axis(motion.fixed_rows::<3>(3) / self.radius_m);
+        let turn = UnitQuaternion::from_scaled_axis(motion.fixed_rows::<3>(3) / self.frame.radius_m);
         let mut rows = Rows::default();
         let squares = self.pairs.iter().zip(weights).map(|(pair, weight)| {
             self.rows(&self.after(pair, motion, &turn), &mut rows);
@@ -125,7 +125,7 @@ impl<'a> System<'a> {
     pub(crate) fn weights(&self, i: usize) -> (f64, f64) {
         let precision = self.pairs[i].weight;
         // Without any scatter every residual is exact (or the kernel would reject all but the zeros).
-        if self.scale <= 1e-12 * self.radius_m * precision.sqrt() {
+        if self.scale <= 1e-12 * self.frame.radius_m * precision.sqrt() {
             return (precision, precision);
         }
         let u = self.lengths[i] * precision.sqrt() / self.scale;
@@ -136,7 +136,7 @@ impl<'a> System<'a> {
     pub(crate) fn jacobian(&self, pair: &Pair, row: &Row) -> Vector6<f64> {
         let factor = if row.channel == 0 { 1.0 } else { self.balance };
         let g = row.gradient * factor;
-        let turn = ((pair.moved - self.centre).cross(&g) + row.turn * factor) / self.radius_m;
+        let turn = ((pair.moved - self.frame.centre).cross(&g) + row.turn * factor) / self.frame.radius_m;
         Vector6::new(g.x, g.y, g.z, turn.x, turn.y, turn.z)
     }
 
@@ -211,33 +211,34 @@ impl<'a> System<'a> {
         }
         let [length, other] = channels.map(|mut residuals| mad_scale(&mut residuals).max(0.0));
         // Exact lengths must not silence the other channel.
-        if other > 0.0 { length.max(SMALLEST_LENGTH * self.radius_m) / other } else { 0.0 }
+        if other > 0.0 { length.max(SMALLEST_LENGTH * self.frame.radius_m) / other } else { 0.0 }
     }
 
     /// A pair after a motion about the centre, partner unchanged.
     fn after(&self, pair: &Pair, motion: &Vector6<f64>, turn: &UnitQuaternion<f64>) -> Pair {
-        let moved = self.centre + turn * (pair.moved - self.centre) + motion.fixed_rows::<3>(0);
+        let moved = self.frame.centre + turn * (pair.moved - self.frame.centre) + motion.fixed_rows::<3>(0);
         let distance_m = (moved - pair.point).norm();
         Pair { moved, source_normal: turn * pair.source_normal, distance_m, ..*pair }
     }
 
-    fn summed(&self, pair: impl Fn(usize) -> (Pair, f64) + Sync) -> NormalEquations {
+    fn summed(&self, pair: impl Fn(usize) -> (Pair, f64) + Sync) -> MotionEquations {
         let starts: Vec<usize> = (0..self.pairs.len()).step_by(CHUNK).collect();
         let chunk = |&start: &usize| {
-            let (mut h, mut g) = (Matrix6::zeros(), Vector6::zeros());
+            let mut equations = MotionEquations::default();
             let mut rows = Rows::default();
             for i in start..(start + CHUNK).min(self.pairs.len()) {
                 let (pair, weight) = pair(i);
                 self.rows(&pair, &mut rows);
                 for (row, residual) in rows.as_slice().iter().zip(self.residuals(&rows)) {
-                    let jacobian = self.jacobian(&pair, row);
-                    h.ger(weight, &jacobian, &jacobian, 1.0);
-                    g += jacobian * (weight * residual);
+                    equations.add(&self.jacobian(&pair, row), weight, residual);
                 }
             }
-            (h, g)
+            equations
         };
-        let partial: Vec<NormalEquations> = starts.par_iter().map(chunk).collect();
-        partial.iter().fold((Matrix6::zeros(), Vector6::zeros()), |(h, g), (dh, dg)| (h + dh, g + dg))
+        let partial: Vec<MotionEquations> = starts.par_iter().map(chunk).collect();
+        partial.into_iter().fold(MotionEquations::default(), |mut sum, equations| {
+            sum += equations;
+            sum
+        })
     }
 }

@@ -104,8 +104,9 @@ struct Cholesky<'a>(&'a Calls);
 impl Minimiser for Cholesky<'_> {
     fn step(&self, system: &System<'_>, _held: &[Vector6<f64>]) -> Result<Vector6<f64>> {
         self.0.count(5);
-        let (h, g) = system.normal_equations();
-        let solved = (h + Matrix6::identity() * (1e-12 * h.trace())).cholesky().map(|c| c.solve(&g));
+        let equations = system.normal_equations();
+        let matrix = equations.matrix + Matrix6::identity() * (1e-12 * equations.matrix.trace());
+        let solved = matrix.cholesky().map(|factor| factor.solve(&equations.gradient));
         Ok(-solved.unwrap_or_else(Vector6::zeros))
     }
 }

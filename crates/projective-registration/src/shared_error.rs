@@ -14,8 +14,7 @@ use crate::partners::map::{Partner, Partners};
 use crate::partners::pairs::with_locate;
 use crate::preparation::bits::{median_of_bits, positive_bits};
 use crate::preparation::frame::OrganisedFrame;
-use icp_registration::quality::Centred;
-use rigid_pose::tangent_from_centred;
+use rigid_pose::Centred;
 
 /// Largest degree of the polynomials. Higher ones reach poses less (a tenth of the second degree on frames of a Kinect).
 const DEGREE: usize = 4;
@@ -228,7 +227,7 @@ impl OrganisedFrame {
         };
         let stride = source.stride_for(SAMPLE);
         with_locate(self, Partners { target: self, source, pose: self_from_source, stride, each });
-        let to_tangent = tangent_from_centred(self_from_source, &frame.centre, frame.radius_m);
+        let to_tangent = frame.tangent_from_motion(self_from_source);
         reduced(sightings, &to_tangent, scratch)
     }
 

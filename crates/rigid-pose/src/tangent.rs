@@ -3,7 +3,7 @@
 //! Tangent of a pose `a_from_b`: `[dt, dtheta]`, `dt` in metre along the axes of frame a, `dtheta` in radian about the
 //! axes of frame b: `t ← t + dt`, `R ← R exp(dtheta)`.
 
-use nalgebra::{Isometry3, Matrix3, Matrix6, Translation3, UnitQuaternion, Vector3, Vector6};
+use nalgebra::{Isometry3, Matrix6, Translation3, UnitQuaternion, Vector3, Vector6};
 
 /// Adds a tangent step `[dt, dtheta]` to a pose.
 #[must_use]
@@ -41,36 +41,6 @@ pub fn inverse_covariance_transport(a_from_b: &Isometry3<f64>, covariance: &Matr
 #[must_use]
 pub fn symmetrised(m: &Matrix6<f64>) -> Matrix6<f64> {
     (m + m.transpose()) * 0.5
-}
-
-/// Jacobian from motions `[dt, rho w]` about the point `centre` (target axes, rotation scaled by the radius `rho`) to
-/// the tangent `[dt, dtheta]` of `target_from_source`.
-#[must_use]
-pub fn tangent_from_centred(target_from_source: &Isometry3<f64>, centre: &Vector3<f64>, radius: f64) -> Matrix6<f64> {
-    let lever = target_from_source.translation.vector - centre;
-    let r_transposed = target_from_source.rotation.to_rotation_matrix().into_inner().transpose();
-    let mut jacobian = Matrix6::zeros();
-    jacobian.fixed_view_mut::<3, 3>(0, 0).copy_from(&Matrix3::identity());
-    // w x lever = -[lever]x w
-    jacobian.fixed_view_mut::<3, 3>(0, 3).copy_from(&(-lever.cross_matrix() / radius));
-    jacobian.fixed_view_mut::<3, 3>(3, 3).copy_from(&(r_transposed / radius));
-    jacobian
-}
-
-/// Applies a finite motion `[dt, rho w]` about `centre` in target axes to a pose.
-#[must_use]
-pub fn move_about(
-    target_from_source: &Isometry3<f64>,
-    centre: &Vector3<f64>,
-    radius: f64,
-    motion: &Vector6<f64>,
-) -> Isometry3<f64> {
-    let turn = UnitQuaternion::from_scaled_axis(Vector3::new(motion[3], motion[4], motion[5]) / radius);
-    let dt = Vector3::new(motion[0], motion[1], motion[2]);
-    let translation = centre + turn * (target_from_source.translation.vector - centre) + dt;
-    let mut rotation = turn * target_from_source.rotation;
-    rotation.renormalize();
-    Isometry3::from_parts(Translation3::from(translation), rotation)
 }
 
 /// Whether all numbers of a pose are finite.

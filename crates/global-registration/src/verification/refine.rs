@@ -1,10 +1,11 @@
 //! A few steps of point to plane between the averaged points, from poses that are a few voxels off.
 
-use nalgebra::{Isometry3, Matrix6, Vector3, Vector6};
+use nalgebra::{Isometry3, Matrix6, Vector3};
+use rigid_pose::{Centred, MotionEquations};
 
 use crate::description::feature_cloud::FeatureCloud;
 use crate::description::fpfh::{dot, subtract};
-use crate::hypotheses::correspondences::{Motion, moved};
+use crate::hypotheses::correspondences::Motion;
 
 /// Steps with partners in cells of two voxels, then of one.
 const STEPS: [usize; 2] = [5, 4];
@@ -12,7 +13,7 @@ const STEPS: [usize; 2] = [5, 4];
 const SCALES: [f64; 2] = [1.0, 0.4];
 /// Least cosine between the normals of partners.
 const LEAST_COSINE: f32 = 0.7;
-/// Share of the mean of the normal matrix's diagonal that is added to it: motions that the surfaces do not determine stay.
+/// Share of the mean information that is added to each motion: motions that the surfaces do not determine stay.
 const DAMPING: f64 = 1e-3;
 
 /// A refined pose.
@@ -28,8 +29,8 @@ pub(crate) fn refine(source: &FeatureCloud, target: &FeatureCloud, pose: &Isomet
     for level in [0, 1] {
         for _ in 0..STEPS[level] {
             let system = System::new(&pairs(source, target, &refined.pose, level), target.reduced.voxel_m, level);
-            let Some(step) = system.step() else { return refined };
-            refined.pose = system.moved(&refined.pose, &step);
+            let Some(pose) = system.moved(&refined.pose) else { return refined };
+            refined.pose = pose;
             refined.rms_m = (system.squares / system.weight).sqrt();
         }
     }
@@ -55,19 +56,10 @@ pub(crate) fn refine_among(
             }));
         }
         let system = System::new(&all, source.reduced.voxel_m, 1);
-        let Some(step) = system.step() else { return pose };
-        pose = system.moved(&pose, &step);
+        let Some(moved) = system.moved(&pose) else { return pose };
+        pose = moved;
     }
     pose
-}
-
-struct System {
-    normal: Matrix6<f64>,
-    right: Vector6<f64>,
-    weight: f64,
-    squares: f64,
-    centre: Vector3<f64>,
-    radius: f64,
 }
 
 struct Pair {
@@ -76,50 +68,38 @@ struct Pair {
     residual: f64,
 }
 
+/// Pairs, summed about their mean.
+struct System {
+    equations: MotionEquations,
+    frame: Centred,
+    weight: f64,
+    squares: f64,
+}
+
 impl System {
     fn new(pairs: &[Pair], voxel_m: f64, level: usize) -> Self {
         let count = pairs.len().max(1) as f64;
         let centre = pairs.iter().fold(Vector3::zeros(), |sum, p| sum + p.point) / count;
         let spread: f64 = pairs.iter().map(|p| (p.point - centre).norm_squared()).sum();
-        let mut system = Self {
-            normal: Matrix6::zeros(),
-            right: Vector6::zeros(),
-            weight: 0.0,
-            squares: 0.0,
-            centre,
-            radius: (spread / count).sqrt().max(voxel_m),
-        };
+        let frame = Centred { centre, radius_m: (spread / count).sqrt().max(voxel_m) };
+        let mut system = Self { equations: MotionEquations::default(), frame, weight: 0.0, squares: 0.0 };
         let scale = SCALES[level] * voxel_m;
         for pair in pairs {
-            system.add(pair, scale);
+            let weight = (-(pair.residual / scale).powi(2)).exp();
+            system.equations.add(&frame.derivative(&pair.point, &pair.normal), weight, pair.residual);
+            system.weight += weight;
+            system.squares += weight * pair.residual * pair.residual;
         }
         system
     }
 
-    fn add(&mut self, pair: &Pair, scale: f64) {
-        let weight = (-(pair.residual / scale).powi(2)).exp();
-        let lever = (pair.point - self.centre).cross(&pair.normal) / self.radius;
-        let n = pair.normal;
-        let row = Vector6::new(n.x, n.y, n.z, lever.x, lever.y, lever.z);
-        self.normal.ger(weight, &row, &row, 1.0);
-        self.right -= row * (weight * pair.residual);
-        self.weight += weight;
-        self.squares += weight * pair.residual * pair.residual;
-    }
-
-    fn step(&self) -> Option<Vector6<f64>> {
+    /// The pose one step on; `None` where too few pairs or numbers that are not finite tell none.
+    fn moved(&self, pose: &Isometry3<f64>) -> Option<Isometry3<f64>> {
         if self.weight < 6.0 {
             return None;
         }
-        let damped = self.normal + Matrix6::identity() * (DAMPING * self.normal.trace() / 6.0);
-        damped.cholesky().map(|factor| factor.solve(&self.right)).filter(|s| s.iter().all(|v| v.is_finite()))
-    }
-
-    /// The pose after a step; the system stands about the mean of its pairs.
-    fn moved(&self, pose: &Isometry3<f64>, step: &Vector6<f64>) -> Isometry3<f64> {
-        let turn = step.fixed_rows::<3>(3).into_owned() / self.radius;
-        let turned = moved(&Isometry3::identity(), Vector3::zeros(), turn).rotation * self.centre;
-        moved(pose, step.fixed_rows::<3>(0) + self.centre - turned, turn)
+        let step = self.equations.step(&Matrix6::identity(), DAMPING).ok()?;
+        step.iter().all(|v| v.is_finite()).then(|| self.frame.moved(pose, &step))
     }
 }
 

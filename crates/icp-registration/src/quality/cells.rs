@@ -4,28 +4,12 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Matrix6, Vector3, Vector6};
 
+use rigid_pose::Centred;
+
 use super::directions::FEWEST_CELLS;
 
 /// Degrees of freedom that the mean of Hotelling's T² of six unknowns falls short of.
 const LOST_DEGREES: f64 = 7.0;
-
-/// Frame of motions `[dt, rho w]`: the rotation about `centre`, multiplied by the radius, so that all six are lengths.
-#[derive(Debug, Clone, Copy)]
-pub struct Centred {
-    /// The point, metre.
-    pub centre: Vector3<f64>,
-    /// The radius by which rotations are multiplied, metre.
-    pub radius_m: f64,
-}
-
-impl Centred {
-    /// Derivative of the distance along `direction` of a point at `place` with respect to the motion.
-    #[inline]
-    pub fn derivative(&self, place: &Vector3<f64>, direction: &Vector3<f64>) -> Vector6<f64> {
-        let turn = ((place - self.centre) / self.radius_m).cross(direction);
-        Vector6::new(direction.x, direction.y, direction.z, turn.x, turn.y, turn.z)
-    }
-}
 
 #[derive(Default)]
 pub(super) struct Cell {

@@ -1,12 +1,11 @@
 //! Which motions the information of pairs determines.
 
-use nalgebra::{DMatrix, DVector, Matrix6, Vector3, Vector6};
+use nalgebra::{DMatrix, DVector, Matrix6, Vector6};
 
 use crate::error::Result;
 use crate::quality::UndeterminedMotion;
 use crate::quality::motion::name_motions;
-use rigid_pose::eigen6;
-use rigid_pose::symmetrised;
+use rigid_pose::{Centred, eigen6, free_of, symmetrised};
 
 /// Information below this multiple of its own scatter between cells counts as none.
 pub const SIGNIFICANCE: f64 = 2.5;
@@ -79,11 +78,16 @@ impl Directions {
         self.all.iter().filter(|d| !d.determined).map(|d| d.vector)
     }
 
+    /// Projection on the determined motions.
+    pub fn free(&self) -> Matrix6<f64> {
+        free_of(self.all.iter().filter(|d| !d.determined).map(|d| &d.vector))
+    }
+
     /// The undetermined motions, sorted into translations and rotations.
-    pub fn undetermined(&self, centre: &Vector3<f64>, radius_m: f64) -> Vec<UndeterminedMotion> {
+    pub fn undetermined(&self, frame: &Centred) -> Vec<UndeterminedMotion> {
         let space: Vec<(Vector6<f64>, f64)> =
             self.all.iter().filter(|d| !d.determined).map(|d| (d.vector, d.sigma_m)).collect();
-        name_motions(&space, centre, radius_m)
+        name_motions(&space, frame)
     }
 
     /// Columns of the known motions, and the covariance along them: the sandwich `A⁻¹ M A⁻ᵀ` of the covariance of the

@@ -13,7 +13,6 @@ mod motion;
 mod verdict;
 
 pub(crate) use cells::Cells;
-pub use cells::Centred;
 pub use directions::{Direction, Directions, FEWEST_CELLS, SIGNIFICANCE, expanded};
 pub use motion::{MotionKind, UndeterminedMotion};
 pub(crate) use verdict::Verdict;

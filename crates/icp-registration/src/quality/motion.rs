@@ -1,6 +1,7 @@
 //! Names for motions that the geometry does not determine.
 
 use nalgebra::{DMatrix, Point3, SymmetricEigen, Vector3, Vector6};
+use rigid_pose::Centred;
 
 /// Kind of a motion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -30,13 +31,9 @@ const LARGEST_TURN_OF_A_TRANSLATION: f64 = 0.3;
 
 /// Sorts a space of undetermined motions into translations and rotations.
 ///
-/// `space`: orthonormal motions `[dt, rho w]` about `centre` with their sigma. Any mixture of undetermined motions is
+/// `space`: orthonormal motions `[dt, rho w]` in `frame` with their sigma. Any mixture of undetermined motions is
 /// undetermined; the mixtures returned are those in which as many as possible do not turn.
-pub(crate) fn name_motions(
-    space: &[(Vector6<f64>, f64)],
-    centre: &Vector3<f64>,
-    radius: f64,
-) -> Vec<UndeterminedMotion> {
+pub(crate) fn name_motions(space: &[(Vector6<f64>, f64)], frame: &Centred) -> Vec<UndeterminedMotion> {
     let m = space.len();
     if m == 0 {
         return Vec::new();
@@ -52,21 +49,26 @@ pub(crate) fn name_motions(
             let motion = space.iter().zip(mix.iter()).fold(Vector6::zeros(), |sum, ((v, _), f)| sum + v * *f);
             let variance: f64 =
                 space.iter().zip(mix.iter()).filter(|(_, f)| f.abs() > 1e-3).map(|((_, s), f)| (s * f).powi(2)).sum();
-            named(&motion, variance.sqrt(), centre, radius)
+            named(&motion, variance.sqrt(), frame)
         })
         .collect()
 }
 
-fn named(motion: &Vector6<f64>, sigma_m: f64, centre: &Vector3<f64>, radius: f64) -> UndeterminedMotion {
+fn named(motion: &Vector6<f64>, sigma_m: f64, frame: &Centred) -> UndeterminedMotion {
     let slide = Vector3::new(motion[0], motion[1], motion[2]);
     let turn = Vector3::new(motion[3], motion[4], motion[5]);
     if turn.norm() < LARGEST_TURN_OF_A_TRANSLATION {
         let axis = slide / slide.norm();
-        return UndeterminedMotion { kind: MotionKind::Translation, axis, through: Point3::from(*centre), sigma_m };
+        return UndeterminedMotion {
+            kind: MotionKind::Translation,
+            axis,
+            through: Point3::from(frame.centre),
+            sigma_m,
+        };
     }
     // Points of the axis do not move across it: with w the rotation and v the velocity of the centroid they lie at
     // centroid + w x v / |w|².
-    let w = turn / radius;
-    let through = Point3::from(centre + w.cross(&slide) / w.norm_squared());
+    let w = turn / frame.radius_m;
+    let through = Point3::from(frame.centre + w.cross(&slide) / w.norm_squared());
     UndeterminedMotion { kind: MotionKind::Rotation, axis: turn / turn.norm(), through, sigma_m }
 }

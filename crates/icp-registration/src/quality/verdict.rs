@@ -3,11 +3,11 @@
 use nalgebra::{DMatrix, Isometry3, Matrix6, Vector6};
 
 use super::Residuals;
-use super::cells::{Cells, Centred};
+use super::cells::Cells;
 use super::directions::{Direction, Directions, SIGNIFICANCE, expanded};
 use crate::error::Result;
 use crate::quality::UndeterminedMotion;
-use rigid_pose::{symmetrised, tangent_from_centred};
+use rigid_pose::{Centred, symmetrised};
 
 /// Share of the largest information that rounding can imitate.
 const ROUNDING: f64 = 1e-9;
@@ -47,7 +47,7 @@ impl Verdict {
 
     /// The undetermined motions, sorted into translations and rotations.
     pub fn undetermined(&self) -> Vec<UndeterminedMotion> {
-        self.directions.undetermined(&self.frame.centre, self.frame.radius_m)
+        self.directions.undetermined(&self.frame)
     }
 
     /// Covariance in the tangent `[dt target axes, dtheta source axes]`: the sandwich `A⁻¹ M A⁻ᵀ` with the response A of
@@ -60,7 +60,7 @@ impl Verdict {
         for direction in unknown {
             centred += direction.vector * direction.vector.transpose() * self.frame.radius_m.powi(2);
         }
-        let to_tangent = tangent_from_centred(pose, &self.frame.centre, self.frame.radius_m);
+        let to_tangent = self.frame.tangent_from_motion(pose);
         symmetrised(&(to_tangent * centred * to_tangent.transpose()))
     }
 
@@ -71,7 +71,7 @@ impl Verdict {
         let (basis, inside) = self.directions.sandwich(&known, |basis| inverse_response(&known, basis, response));
         let inverse = inside.try_inverse().unwrap_or_else(|| DMatrix::zeros(known.len(), known.len()));
         let centred = expanded(&basis, &inverse);
-        let to_tangent = tangent_from_centred(pose, &self.frame.centre, self.frame.radius_m);
+        let to_tangent = self.frame.tangent_from_motion(pose);
         let from_tangent = to_tangent.try_inverse().unwrap_or_else(Matrix6::zeros);
         symmetrised(&(from_tangent.transpose() * centred * from_tangent))
     }

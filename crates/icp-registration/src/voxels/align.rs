@@ -1,6 +1,6 @@
 //! The registration of two clouds of voxels.
 
-use nalgebra::{Isometry3, Point3, Vector6};
+use nalgebra::{Isometry3, Matrix6, Point3, Vector6};
 
 use super::cloud::VoxelCloud;
 use super::options::VoxelAlignmentOptions;
@@ -8,9 +8,9 @@ use super::pairs::{Matcher, Pair, Partners, System, matched};
 use super::wide::{RULES, Wide};
 use crate::error::{Error, Result};
 use crate::kernel::RobustKernel;
-use crate::quality::{Centred, Residuals, Verdict};
+use crate::quality::{Residuals, Verdict};
 use crate::result::{DegeneracyPolicy, IcpResult, StopReason};
-use rigid_pose::{is_finite, move_about};
+use rigid_pose::{Centred, free_of, is_finite};
 
 /// Iterations that a coarse level may take.
 const LEVEL_ITERATIONS: usize = 8;
@@ -59,7 +59,7 @@ struct Run<'a> {
     pose: Isometry3<f64>,
     iterations: usize,
     /// Motions that stay as they are, in a frame that stays too.
-    held: Option<(Centred, Vec<Vector6<f64>>)>,
+    held: Option<(Centred, Matrix6<f64>)>,
     pairs: Vec<Pair>,
     scratch: Vec<f64>,
 }
@@ -180,22 +180,22 @@ impl<'a> Run<'a> {
         let slide = (guess * pose.inverse() * Point3::from(frame.centre)).coords - frame.centre;
         let turn = (guess.rotation * pose.rotation.inverse()).scaled_axis() * frame.radius_m;
         let back = Vector6::new(slide.x, slide.y, slide.z, turn.x, turn.y, turn.z);
-        let back = held.iter().fold(Vector6::zeros(), |sum, motion| sum + motion * motion.dot(&back));
-        self.pose = move_about(&pose, &frame.centre, frame.radius_m, &back);
-        let any = !held.is_empty();
-        self.held = Some((frame, held));
-        Ok(any)
+        let free = free_of(&held);
+        let back = back - free * back;
+        self.pose = frame.moved(&pose, &back);
+        self.held = Some((frame, free));
+        Ok(!held.is_empty())
     }
 
     fn step(&mut self, matcher: Matcher<'_>, partners: Partners, kernel: RobustKernel) -> Result<Vector6<f64>> {
-        let (pose, iteration, held) = (self.pose, self.iterations, self.held.clone());
+        let (pose, iteration, held) = (self.pose, self.iterations, self.held);
         let mut system = self.enough(matcher, &pose, partners, kernel, iteration)?;
-        system.frame = held.as_ref().map_or(system.frame, |(frame, _)| *frame);
-        let mut step = system.step(held.as_ref().map_or(&[], |(_, motions)| motions))?;
+        let (frame, free) = held.unwrap_or_else(|| (system.frame, Matrix6::identity()));
+        system.frame = frame;
+        let mut step = system.step(&free)?;
         // Partners give no reason to move farther than they can be apart.
         step /= (length(&step) / (2.0 * matcher.target.size_m)).max(1.0);
-        let frame = system.frame;
-        self.pose = move_about(&pose, &frame.centre, frame.radius_m, &step);
+        self.pose = frame.moved(&pose, &step);
         self.iterations += 1;
         Ok(step)
     }

@@ -8,16 +8,13 @@ use super::level::{CHUNK, Level};
 use super::numerics::lattice::Lattice;
 use crate::error::Result;
 use crate::kernel::RobustKernel;
-use crate::quality::{Cells, Centred};
-use rigid_pose::eigen6;
-use rigid_pose::symmetrised;
+use crate::quality::Cells;
+use rigid_pose::{Centred, MotionEquations};
 
 /// Partners farther apart than this many voxels belong to different things.
 pub(crate) const REACH: f64 = 1.5;
 /// Share of the offset along the plane by which disagreeing normals make the distance across it unsure.
 const LEVER_SHARE: f64 = 0.1;
-/// Eigenvalues below this fraction of the largest are rounding: no step along them.
-const RANK_TOLERANCE: f64 = 1e-10;
 
 /// A source voxel and its partner.
 #[derive(Debug, Clone, Copy)]
@@ -142,8 +139,8 @@ impl<'a> System<'a> {
         (self.kernel.weight(u) * precision, self.kernel.influence_slope(u) * precision)
     }
 
-    /// Normal matrix `Σ w J J^T` and right-hand side `Σ w J r`, summed in fixed chunks.
-    fn normal_equations(&self) -> (Matrix6<f64>, Vector6<f64>) {
+    /// Normal equations, summed in fixed chunks.
+    fn normal_equations(&self) -> MotionEquations {
         let unit = self.frame.radius_m.powi(2);
         let partial: Vec<[f64; 27]> = self
             .pairs
@@ -157,37 +154,18 @@ impl<'a> System<'a> {
                 sums
             })
             .collect();
-        let mut total = [0.0; 27];
+        let (mut gradient, mut upper) = ([0.0; 6], [0.0; 21]);
         for sums in &partial {
-            for (total, sum) in total.iter_mut().zip(sums) {
-                *total += sum;
-            }
+            let (own_gradient, own_upper) = sums.split_at(6);
+            gradient.iter_mut().zip(own_gradient).for_each(|(total, sum)| *total += sum);
+            upper.iter_mut().zip(own_upper).for_each(|(total, sum)| *total += sum);
         }
-        let mut k = 6;
-        let mut h = Matrix6::zeros();
-        for r in 0..6 {
-            for c in r..6 {
-                (h[(r, c)], h[(c, r)]) = (total[k], total[k]);
-                k += 1;
-            }
-        }
-        (h, Vector6::from_fn(|i, _| total[i]))
+        MotionEquations::from_sums(&upper, &gradient)
     }
 
-    /// One Gauss-Newton step `[dt, rho w]` in the complement of the held directions (orthonormal).
-    pub fn step(&self, held: &[Vector6<f64>]) -> Result<Vector6<f64>> {
-        let (h, g) = self.normal_equations();
-        let keep = held.iter().fold(Matrix6::identity(), |keep, d| keep - d * d.transpose());
-        let (values, vectors) = eigen6(&symmetrised(&(keep * h * keep)), "the normal equations of an iteration")?;
-        let right = keep * g;
-        let mut step = Vector6::zeros();
-        for k in 0..6 {
-            if values[k] > RANK_TOLERANCE * values[5] && values[k] > 0.0 {
-                let v = vectors.column(k);
-                step -= v * (v.dot(&right) / values[k]);
-            }
-        }
-        Ok(keep * step)
+    /// One Gauss-Newton step `[dt, rho w]` among the motions that are free (a projection).
+    pub fn step(&self, free: &Matrix6<f64>) -> Result<Vector6<f64>> {
+        Ok(self.normal_equations().step(free, 0.0)?)
     }
 
     /// What the pairs say about the pose, those in a cube of `cell_m` as one observation.

@@ -6,9 +6,7 @@ use nalgebra::{Isometry3, Matrix6, Vector3, Vector6};
 use super::level::{Level, Voxel};
 use super::samples::{Samples, Sought};
 use crate::error::Result;
-use crate::quality::Centred;
-use rigid_pose::eigen6;
-use rigid_pose::{move_about, symmetrised};
+use rigid_pose::{Centred, MotionEquations};
 
 /// Samples of the source and of the target.
 const SOURCE_SAMPLES: usize = 400;
@@ -55,7 +53,7 @@ impl Wide {
             let Some(frame) = self.frame(&pose) else { break };
             let step = self.step(&pose, rule, scale, frame)?;
             let length = step.norm() / (2.0 * scale);
-            pose = move_about(&pose, &frame.centre, frame.radius_m, &(step / length.max(1.0)));
+            pose = frame.moved(&pose, &(step / length.max(1.0)));
             steps += 1;
             scale *= FALL;
         }
@@ -71,7 +69,7 @@ impl Wide {
     }
 
     fn step(&self, pose: &Isometry3<f64>, rule: Rule, scale: f64, frame: Centred) -> Result<Vector6<f64>> {
-        let (mut h, mut g) = (Matrix6::zeros(), Vector6::zeros());
+        let mut equations = MotionEquations::default();
         let sought = |voxel: &Voxel| {
             let (place, normal) = (pose * voxel.mean, pose.rotation * voxel.normal);
             Sought { place, normal, scale_m: scale, direction: rule.direction }
@@ -83,24 +81,13 @@ impl Wide {
             let cosine = target.normal.dot(&normal);
             let weight = cosine * cosine / (1.0 + offset.norm_squared() / (scale * scale)).powi(2);
             let bisector = (target.normal + normal * cosine.signum()).normalize();
-            let j = frame.derivative(&moved.coords, &bisector);
-            h += j * j.transpose() * weight;
-            g += j * (weight * bisector.dot(&offset));
+            equations.add(&frame.derivative(&moved.coords, &bisector), weight, bisector.dot(&offset));
             for axis in [Vector3::x(), Vector3::y(), Vector3::z()] {
-                let j = frame.derivative(&moved.coords, &axis);
-                h += j * j.transpose() * (weight * rule.along);
-                g += j * (weight * rule.along * axis.dot(&offset));
+                equations.add(&frame.derivative(&moved.coords, &axis), weight * rule.along, axis.dot(&offset));
             }
         }
-        let (values, vectors) = eigen6(&symmetrised(&h), "the normal equations of the search")?;
-        let mut step = Vector6::zeros();
-        for k in 0..6 {
-            if values[k] > 1e-6 * values[5] {
-                let v = vectors.column(k);
-                step -= v * (v.dot(&g) / values[k]);
-            }
-        }
-        Ok(step)
+        // What is next to the planes' distances holds every motion: nothing needs damping.
+        Ok(equations.step(&Matrix6::identity(), 0.0)?)
     }
 }
 

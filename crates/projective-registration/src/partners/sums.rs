@@ -4,8 +4,9 @@
 // Lanes lie side by side: with an index, loops read as their formulas and have the same length everywhere.
 #![allow(clippy::needless_range_loop)]
 
-use nalgebra::{Matrix6, Vector6};
 use rayon::prelude::*;
+
+use rigid_pose::MotionEquations;
 
 use crate::partners::pairs::{Locate, Moved, Pairs, Rules, WithLocate, with_locate};
 use crate::preparation::bits::{median_of_bits, positive_bits};
@@ -24,8 +25,7 @@ pub(crate) const SUMS: usize = 30;
 /// Normal equations of motions `[dt, rho w]` about the centre.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Normal {
-    pub matrix: Matrix6<f64>,
-    pub gradient: Vector6<f64>,
+    pub equations: MotionEquations,
     /// Sum of the weights, 1/m².
     pub weight: f64,
     /// Weighted sum of the squared residuals.
@@ -53,17 +53,9 @@ pub(crate) fn normal_equations(
 
 impl Normal {
     pub(crate) fn new(sums: &[f64; SUMS]) -> Self {
-        let mut matrix = Matrix6::zeros();
-        let mut k = 0;
-        for r in 0..6 {
-            for c in r..6 {
-                matrix[(r, c)] = sums[k];
-                matrix[(c, r)] = sums[k];
-                k += 1;
-            }
-        }
-        let gradient = Vector6::from_fn(|i, _| sums[21 + i]);
-        Self { matrix, gradient, weight: sums[27], square: sums[28], pairs: sums[29] as usize }
+        let equations =
+            MotionEquations::from_sums(&std::array::from_fn(|k| sums[k]), &std::array::from_fn(|k| sums[21 + k]));
+        Self { equations, weight: sums[27], square: sums[28], pairs: sums[29] as usize }
     }
 }
 

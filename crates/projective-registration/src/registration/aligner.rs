@@ -7,7 +7,7 @@ use crate::error::{Error, Result};
 use crate::options::FrameAlignmentOptions;
 use crate::partners::pairs::Rules;
 use crate::partners::sums::{SUMS, median_residual, normal_equations};
-use crate::partners::track::{FEWEST_POINTS, Gauge, Track, blocks, finest_part, is_within_noise, moved, solve, turned};
+use crate::partners::track::{FEWEST_POINTS, Track, blocks, finest_part, is_within_noise, moved};
 use crate::preparation::blocks::Block;
 use crate::preparation::frame::OrganisedFrame;
 use crate::preparation::grid::STRIDES;
@@ -15,7 +15,7 @@ use crate::registration::quality::{Cell, Hold, Verdict};
 use crate::shared_error::Sighting;
 use icp_registration::quality::Residuals;
 use icp_registration::{DegeneracyPolicy, IcpResult, StopReason};
-use rigid_pose::{is_finite, pose_difference, step_pose, symmetrised, tangent_from_centred};
+use rigid_pose::{Centred, is_finite, pose_difference, step_pose, symmetrised};
 
 /// Biweight with 95 % efficiency on normally distributed residuals.
 const BIWEIGHT: f32 = 4.685;
@@ -96,8 +96,8 @@ impl FrameAligner {
             reach: BIWEIGHT,
             least_cosine: self.options.max_normal_angle_rad.cos() as f32,
         };
-        let (held, last_step) = (Matrix6::zeros(), Vector6::zeros());
-        let track = Track { pose: *guess, iterations: 0, rules, held, last_step, over_sigma: f64::INFINITY };
+        let (free, last_step) = (Matrix6::identity(), Vector6::zeros());
+        let track = Track { pose: *guess, iterations: 0, rules, free, last_step, over_sigma: f64::INFINITY };
         let first = self.follow_levels(track.clone(), source, target, guess);
         if self.hold() == Hold::Undetermined || self.options.other_starts == 0 {
             return first.map(|(_, result)| result);
@@ -204,10 +204,10 @@ impl FrameAligner {
         iterations: usize,
     ) -> Result<()> {
         if self.hold() == Hold::Undetermined {
-            let (moved, gauge) = moved(track, source, target);
-            let limit = self.max_motion_sigma_m(&gauge);
+            let (moved, frame) = moved(track, source, target);
+            let limit = self.max_motion_sigma_m(&frame);
             let verdict = Verdict::new(&moved, &track.rules, blocks, limit, Residuals::Misaligned, &mut self.cells)?;
-            track.held = verdict.held();
+            track.free = verdict.free();
         }
         for _ in 0..iterations {
             if track.iterations >= self.options.max_iterations {
@@ -215,11 +215,11 @@ impl FrameAligner {
             }
             let wide = track.iterations < WIDE_ITERATIONS;
             track.rules.reach = if wide { 3.0 * BIWEIGHT } else { BIWEIGHT };
-            let (step, gauge) = self.step(track, source, target, blocks, 1e-4)?;
+            let (step, frame) = self.step(track, source, target, blocks, 1e-4)?;
             if !wide {
                 self.narrow(track, source, target, blocks);
             }
-            if step < COARSE_TOLERANCE * gauge.radius_m && !wide {
+            if step < COARSE_TOLERANCE * frame.radius_m && !wide {
                 break;
             }
         }
@@ -244,10 +244,10 @@ impl FrameAligner {
     ) -> Result<StopReason> {
         let blocks = &source.points.blocks[..];
         if hold == Hold::Undetermined {
-            let (moved, gauge) = moved(track, source, target);
-            let limit = self.max_motion_sigma_m(&gauge);
+            let (moved, frame) = moved(track, source, target);
+            let limit = self.max_motion_sigma_m(&frame);
             let verdict = Verdict::new(&moved, &track.rules, blocks, limit, Residuals::Settled, &mut self.cells)?;
-            track.held = verdict.held();
+            track.free = verdict.free();
         }
         track.rules.extra_variance = 0.0;
         let mut narrowings = NARROWINGS;
@@ -272,8 +272,8 @@ impl FrameAligner {
                 self.rescale(track, source, target, *narrowings == NARROWINGS);
                 *narrowings -= 1;
             }
-            let (step, gauge) = self.step(track, source, target, blocks, 0.0)?;
-            let is_short = step <= self.options.step_tolerance_m.unwrap_or(1e-5 * gauge.radius_m);
+            let (step, frame) = self.step(track, source, target, blocks, 0.0)?;
+            let is_short = step <= self.options.step_tolerance_m.unwrap_or(1e-5 * frame.radius_m);
             if *narrowings == 0 && (is_short || track.over_sigma <= over_sigma) {
                 return Ok(StopReason::Converged);
             }
@@ -300,19 +300,19 @@ impl FrameAligner {
         source: &OrganisedFrame,
         target: &OrganisedFrame,
         blocks: &[Block],
-        ridge: f64,
-    ) -> Result<(f64, Gauge)> {
-        let (moved, gauge) = moved(track, source, target);
+        damping: f64,
+    ) -> Result<(f64, Centred)> {
+        let (moved, frame) = moved(track, source, target);
         let normal = normal_equations(&moved, &track.rules, blocks, &mut self.chunks);
         if normal.pairs < self.options.min_correspondences {
             return Err(self.too_few(normal.pairs, source.len(), track));
         }
-        let step = solve(&normal, &track.held, ridge)?;
-        track.pose = turned(&track.pose, &step, &gauge);
+        let step = normal.equations.step(&track.free, damping)?;
+        track.pose = frame.moved(&track.pose, &step);
         track.iterations += 1;
         track.last_step = step;
-        track.over_sigma = step.dot(&(normal.matrix * step)).sqrt();
-        Ok((step.norm(), gauge))
+        track.over_sigma = step.dot(&(normal.equations.matrix * step)).sqrt();
+        Ok((step.norm(), frame))
     }
 
     fn result(
@@ -323,16 +323,16 @@ impl FrameAligner {
         guess: &Isometry3<f64>,
         stop: StopReason,
     ) -> Result<IcpResult> {
-        let (moved, gauge) = moved(track, source, target);
-        let limit = self.max_motion_sigma_m(&gauge);
+        let (moved, frame) = moved(track, source, target);
+        let limit = self.max_motion_sigma_m(&frame);
         let verdict =
             Verdict::new(&moved, &track.rules, &source.points.blocks, limit, Residuals::Settled, &mut self.cells)?;
         let normal = &verdict.normal;
         let mut pose = track.pose;
         if self.options.noise_fraction.is_some() && stop == StopReason::Converged {
-            pose = turned(&pose, &solve(normal, &track.held, 0.0)?, &gauge);
+            pose = frame.moved(&pose, &normal.equations.step(&track.free, 0.0)?);
         }
-        let to_tangent = tangent_from_centred(&pose, &gauge.centre, gauge.radius_m);
+        let to_tangent = frame.tangent_from_motion(&pose);
         let centred = if let Some(prior) = &self.options.prior {
             let what = "the tangent of the pose";
             let from_tangent = to_tangent.try_inverse().ok_or(Error::Numerical { what, why: "it is singular" })?;
@@ -342,7 +342,7 @@ impl FrameAligner {
             pose = step_pose(&pose, &(to_tangent * step));
             covariance
         } else {
-            verdict.covariance(gauge.radius_m, self.hold())
+            verdict.covariance(frame.radius_m, self.hold())
         };
         let stop = if stop == StopReason::MaxIterations && is_within_noise(&track.last_step, &centred) {
             StopReason::WithinNoise
@@ -358,7 +358,7 @@ impl FrameAligner {
             stop,
             correspondences: normal.pairs,
             max_correspondence_distance_m: f64::from(track.rules.reach) * (normal.pairs as f64 / normal.weight).sqrt(),
-            degenerate: verdict.undetermined(&gauge.centre, gauge.radius_m),
+            degenerate: verdict.undetermined(&frame),
         })
     }
 
@@ -368,8 +368,8 @@ impl FrameAligner {
         if hold { Hold::Undetermined } else { Hold::Nothing }
     }
 
-    fn max_motion_sigma_m(&self, gauge: &Gauge) -> f64 {
-        self.options.max_motion_sigma_m.unwrap_or(gauge.radius_m / 300.0)
+    fn max_motion_sigma_m(&self, frame: &Centred) -> f64 {
+        self.options.max_motion_sigma_m.unwrap_or(frame.radius_m / 300.0)
     }
 
     fn too_few(&self, found: usize, of: usize, track: &Track) -> Error {

@@ -10,7 +10,7 @@
 // Lanes lie side by side: with an index, loops read as their formulas and have the same length everywhere.
 #![allow(clippy::needless_range_loop)]
 
-use nalgebra::{DMatrix, Matrix6, Vector3, Vector6};
+use nalgebra::{DMatrix, Matrix6, Vector6};
 use rayon::prelude::*;
 
 use crate::error::{Error, Result};
@@ -20,7 +20,7 @@ use crate::preparation::blocks::Block;
 use crate::preparation::grid::{BLOCK, MOST_CELLS};
 use icp_registration::UndeterminedMotion;
 use icp_registration::quality::{Direction, Directions, FEWEST_CELLS, Residuals, SIGNIFICANCE, expanded};
-use rigid_pose::symmetrised;
+use rigid_pose::{Centred, symmetric, symmetrised};
 
 /// Information that stands out beside cells that carry none, over its scatter, and the multiple of the middle cell above
 /// which a cell is not one of these.
@@ -80,21 +80,21 @@ impl Verdict {
             Residuals::Settled => independent_scores(moved, rules, blocks) * (normal.pairs as f64 / used.max(1) as f64),
         };
         // Frames that are copies of each other leave no residuals: their noise is still that of their nodes.
-        let missing = (LEAST_SCORE - score.trace() / normal.matrix.trace()).max(0.0);
-        let score = score + normal.matrix * missing;
+        let missing = (LEAST_SCORE - score.trace() / normal.equations.matrix.trace()).max(0.0);
+        let score = score + normal.equations.matrix * missing;
         let significant = |motion: &Vector6<f64>, information| is_significant(cells, information, motion);
         let directions = Directions::new(&information, |_| (score, 1.0), significant, ROUNDING, max_sigma_m)?;
         Ok(Self { directions, normal })
     }
 
-    /// Orthonormal undetermined motions `[dt, rho w]`.
-    pub(crate) fn held(&self) -> Matrix6<f64> {
-        self.directions.held().fold(Matrix6::zeros(), |sum, motion| sum + motion * motion.transpose())
+    /// Projection on the determined motions `[dt, rho w]`.
+    pub(crate) fn free(&self) -> Matrix6<f64> {
+        self.directions.free()
     }
 
     /// The undetermined motions, sorted into translations and rotations.
-    pub(crate) fn undetermined(&self, centre: &Vector3<f64>, radius_m: f64) -> Vec<UndeterminedMotion> {
-        self.directions.undetermined(centre, radius_m)
+    pub(crate) fn undetermined(&self, frame: &Centred) -> Vec<UndeterminedMotion> {
+        self.directions.undetermined(frame)
     }
 
     /// Covariance of motions `[dt, rho w]`; what is not known at all gets the radius as sigma.
@@ -172,18 +172,6 @@ fn form(upper: &[f64], v: &Vector6<f64>) -> f64 {
         }
     }
     sum
-}
-
-fn symmetric(upper: &[f64; 21]) -> Matrix6<f64> {
-    let (mut matrix, mut k) = (Matrix6::zeros(), 0);
-    for r in 0..6 {
-        for c in r..6 {
-            matrix[(r, c)] = upper[k];
-            matrix[(c, r)] = upper[k];
-            k += 1;
-        }
-    }
-    matrix
 }
 
 /// Covariance of the summed score of pairs that share nothing.

@@ -82,8 +82,8 @@ impl FrameAligner {
 
 /// Share of the points in sight of the target's planes that lie near them.
 fn share_of_agreement(track: &Track, source: &OrganisedFrame, target: &OrganisedFrame, blocks: &[Block]) -> f64 {
-    let (moved, gauge) = moved(track, source, target);
-    let tolerance = (AGREEMENT_TOLERANCE * gauge.radius_m) as f32;
+    let (moved, frame) = moved(track, source, target);
+    let tolerance = (AGREEMENT_TOLERANCE * frame.radius_m) as f32;
     let rules = Rules { extra_variance: tolerance * tolerance, reach: 1.0, ..track.rules };
     let (met, accepted) = agreement(&moved, &rules, blocks);
     // Few points in sight agree easily.

@@ -4,7 +4,7 @@ use nalgebra::{Matrix6, Vector6};
 
 use crate::error::Result;
 use crate::parts::Rows;
-use crate::quality::{Cells, Centred, Residuals, Verdict};
+use crate::quality::{Cells, Residuals, Verdict};
 use crate::system::System;
 
 /// Cells across the rms radius of the pairs.
@@ -15,11 +15,11 @@ const CELLS_OF_SAMPLES: f64 = 4.0;
 
 /// Judges the pairs of `system`; motions with a predicted sigma above `max_sigma_m` are undetermined.
 pub(in crate::icp) fn verdict(system: &System<'_>, max_sigma_m: f64, residuals: Residuals) -> Result<Verdict> {
-    let frame = Centred { centre: system.centre(), radius_m: system.radius_m() };
+    let frame = system.frame();
     // On the way, a deviation that is rather too small keeps the iterations going.
     let at_the_end = system.scene().moment.ended;
     let per_radius = if at_the_end && system.is_point_to_point() { CELLS_OF_SAMPLES } else { CELLS_PER_RADIUS };
-    let mut cells = Cells::new(frame, system.radius_m() / per_radius);
+    let mut cells = Cells::new(frame, frame.radius_m / per_radius);
     let mut buffers = [Rows::default(), Rows::default()];
     let twin_weight = system.twin_weight();
     for (i, pair) in system.pairs().iter().enumerate() {

@@ -1,13 +1,13 @@
 //! The pose from the pairs at once.
 
-use nalgebra::{Matrix6, Point3, Vector6};
+use nalgebra::{Point3, Vector6};
 
 use super::Minimiser;
 use crate::error::{Error, Result};
 use crate::parts::ErrorMetric;
 use crate::parts::scene::Scene;
 use crate::system::System;
-use rigid_pose::{RotationMethod, absolute_orientation_by};
+use rigid_pose::{Centred, RotationMethod, absolute_orientation_by, free_of};
 
 /// Closed-form absolute orientation `[Eggert1997]` of the weighted pairs; for the point-to-point metric only.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -16,7 +16,7 @@ pub struct ClosedForm(pub RotationMethod);
 impl Minimiser for ClosedForm {
     fn step(&self, system: &System<'_>, held: &[Vector6<f64>]) -> Result<Vector6<f64>> {
         // About the centre and in units of the radius: independent of where the clouds are and how large.
-        let (centre, radius) = (system.centre(), system.radius_m());
+        let Centred { centre, radius_m: radius } = system.frame();
         let reduced = |v: &nalgebra::Vector3<f64>| Point3::from((v - centre) / radius);
         let source: Vec<_> = system.pairs().iter().map(|p| reduced(&p.moved)).collect();
         let target: Vec<_> = system.pairs().iter().map(|p| reduced(&p.point)).collect();
@@ -25,11 +25,7 @@ impl Minimiser for ClosedForm {
         let relative: Vec<f64> = weights.iter().map(|w| w / largest).collect();
         let motion = absolute_orientation_by(self.0, &source, &target, Some(&relative))?.target_from_source;
         let (dt, w) = (motion.translation.vector * radius, motion.rotation.scaled_axis() * radius);
-        let mut keep = Matrix6::identity();
-        for direction in held {
-            keep -= direction * direction.transpose();
-        }
-        Ok(keep * Vector6::new(dt.x, dt.y, dt.z, w.x, w.y, w.z))
+        Ok(free_of(held) * Vector6::new(dt.x, dt.y, dt.z, w.x, w.y, w.z))
     }
 
     fn validate(&self, _: &Scene<'_>, metric: &dyn ErrorMetric) -> Result<()> {

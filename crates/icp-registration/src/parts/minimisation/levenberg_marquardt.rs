@@ -3,11 +3,11 @@
 use nalgebra::Vector6;
 
 use super::Minimiser;
-use super::gauss_newton::complement_step;
 use crate::error::Result;
 use crate::parts::scene::Scene;
 use crate::parts::{ErrorMetric, require_count};
 use crate::system::System;
+use rigid_pose::free_of;
 
 /// Damping at the first step, and the factor with which it falls and rises.
 const FIRST_DAMPING: f64 = 1e-6;
@@ -31,15 +31,15 @@ impl Default for LevenbergMarquardt {
 
 impl Minimiser for LevenbergMarquardt {
     fn step(&self, system: &System<'_>, held: &[Vector6<f64>]) -> Result<Vector6<f64>> {
-        let weights = system.all_weights();
+        let (weights, free) = (system.all_weights(), free_of(held));
         let mut motion = Vector6::zeros();
         let mut squares = system.squares_after(&motion, &weights);
         let mut damping = FIRST_DAMPING;
         for _ in 0..self.inner_iterations {
-            let (h, g) = system.normal_equations_after(&motion, &weights);
+            let equations = system.normal_equations_after(&motion, &weights);
             loop {
                 // Motions about one centre add up to first order; the sum of squares judges the sum itself.
-                let trial = motion + complement_step(&h, &g, held, damping)?;
+                let trial = motion + equations.step(&free, damping)?;
                 let after = system.squares_after(&trial, &weights);
                 if after <= squares {
                     let gain = squares - after;

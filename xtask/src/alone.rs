@@ -61,7 +61,7 @@ fn packages(name: &str, folder: &Path, place: &Path) -> Result<Vec<String>, Stri
         let package = format!("alone-{name}-{}", index + 1);
         let head = format!("[package]\nname = \"{package}\"\nversion = \"0.0.0\"\nedition = \"2024\"\n");
         // Some examples are there with a feature only.
-        let own: String = features.iter().map(|feature| format!("{feature} = []\n")).collect();
+        let own = features.iter().fold(String::new(), |text, feature| text + feature + " = []\n");
         let dependency = format!("{name} = {{ path = {:?}, features = {features:?} }}", folder.display().to_string());
         let manifest = format!("{head}\n[features]\ndefault = {features:?}\n{own}\n[dependencies]\n{dependency}\n");
         write(&place.join(&package).join("Cargo.toml"), &manifest)?;
@@ -78,7 +78,7 @@ fn library(blocks: &[CodeBlock]) -> Result<String, String> {
         if kind.contains("ignore") {
             return Err(format!("line {line}: an example that is not compiled"));
         }
-        source += &format!("\nmod readme_line_{line} {{\n{}}}\n", module(lines));
+        source.extend(["\nmod readme_line_", &line.to_string(), " {\n", &module(lines), "}\n"]);
     }
     Ok(source)
 }

@@ -2,6 +2,7 @@
 
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
+mod alone;
 mod bench;
 mod circles;
 mod dependencies;
@@ -34,6 +35,8 @@ enum Task {
     Test,
     /// Check the repository itself: READMEs, citations, lengths of files.
     Tidy,
+    /// Compile each README's examples in a package that depends on that crate alone.
+    Alone,
     /// Other programs beside ours on the same work: `cargo xtask peers adjust`.
     Peers(peers::Arguments),
     /// Long statistics, with the figures that docs/benchmarks.md states: `cargo xtask verify flags`.
@@ -54,6 +57,7 @@ fn main() -> ExitCode {
         Task::Fixtures => fixtures::run(),
         Task::Test => test::run(),
         Task::Tidy => tidy::run(),
+        Task::Alone => alone::run(),
         Task::Peers(arguments) => peers::run(&arguments),
         Task::Verify(arguments) => verify::run(&arguments),
         Task::Sensitivity(arguments) => sensitivity::run(&arguments),

@@ -19,13 +19,20 @@ pub(crate) fn cargo(arguments: &[&str], environment: &[(&str, &str)]) -> Outcome
     let line = format!("cargo {}", arguments.join(" "));
     println!("── {line}");
     let start = Instant::now();
+    let outcome = cargo_quietly(arguments, environment);
+    println!("── {:.0} s", start.elapsed().as_secs_f64());
+    outcome
+}
+
+/// Runs cargo in the root without saying so.
+pub(crate) fn cargo_quietly(arguments: &[&str], environment: &[(&str, &str)]) -> Outcome {
+    let line = format!("cargo {}", arguments.join(" "));
     let status = Command::new(program())
         .args(arguments)
         .envs(environment.iter().copied())
         .current_dir(root())
         .status()
         .map_err(|error| format!("{line}: {error}"))?;
-    println!("── {:.0} s", start.elapsed().as_secs_f64());
     if status.success() { Ok(()) } else { Err(format!("{line}: {status}")) }
 }
 

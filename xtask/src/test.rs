@@ -1,11 +1,12 @@
 //! `cargo xtask test`: what must be green.
 
 use crate::shell::{Outcome, cargo};
-use crate::tidy;
+use crate::{alone, tidy};
 
 pub(crate) fn run() -> Outcome {
     cargo(&["fmt", "--all", "--check"], &[])?;
     tidy::run()?;
+    alone::run()?;
     cargo(&["clippy", "--workspace", "--all-targets", "--all-features", "--", "--deny", "warnings"], &[])?;
     cargo(&["doc", "--workspace", "--all-features", "--no-deps"], &[("RUSTDOCFLAGS", "--deny warnings")])?;
     // The tests of `calibration-tasks` and `tasks` hold the small room and the real captures against their bars.

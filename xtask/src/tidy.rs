@@ -93,7 +93,7 @@ fn is_key(text: &str) -> bool {
     letters >= 2 && text.starts_with(char::is_uppercase) && year && suffix
 }
 
-fn folders(parent: &Path) -> Result<Vec<PathBuf>, String> {
+pub(crate) fn folders(parent: &Path) -> Result<Vec<PathBuf>, String> {
     let mut found: Vec<PathBuf> = entries(parent)?.into_iter().filter(|path| path.is_dir()).collect();
     found.sort();
     Ok(found)
@@ -119,7 +119,7 @@ fn entries(folder: &Path) -> Result<Vec<PathBuf>, String> {
     Ok(list.flatten().map(|entry| entry.path()).collect())
 }
 
-fn read(path: &Path) -> Result<String, String> {
+pub(crate) fn read(path: &Path) -> Result<String, String> {
     std::fs::read_to_string(path).map_err(|error| format!("{}: {error}", path.display()))
 }
 

@@ -20,6 +20,7 @@ pub use error::{Error, Result};
 pub use model::adjustment::Adjustment;
 pub use model::datum_defect::DatumDefect;
 pub use model::ids::{GroupId, ObservationId};
+pub use nalgebra;
 // Errors of observation equations, and what makes Jacobians, are reached through the crate itself.
 pub use observation_equations;
 pub use observation_equations::{

@@ -10,16 +10,20 @@ mod pose;
 mod projection;
 mod ray_table;
 
+#[cfg(feature = "convert")]
+pub use adjust;
 pub use back_projection::OrganisedCloud;
 pub use camera::{Camera, InteriorOrientation, LensDistortion};
 pub use covariance::{point_covariance, with_affinity_held};
 pub use error::{Error, Result};
 #[cfg(feature = "convert")]
 pub use lenses::plumb_bob::PlumbBob;
+pub use nalgebra;
 pub use observation::{Observation, ObservationJacobians};
 pub use pose::{
     computer_vision_from_photogrammetric, euler_from_pose, euler_from_rotation, pose_from_euler, rotation_from_euler,
     step_pose, with_computer_vision_axes,
 };
+pub use range_image;
 pub use range_image::ImageFormat;
 pub use ray_table::RayTable;

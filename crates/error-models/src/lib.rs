@@ -25,8 +25,10 @@ pub use models::model::{
     PolynomialShape, RangeErrorModel, RangePolynomial, RangeTerms, SurfaceShape,
 };
 pub use models::parameters::{ModelShape, NamedParameter, PARAMETERS, ParameterStatus, parameter_unit};
+pub use nalgebra;
 pub use noises::noise::{lowest_amplitude, range_sigma_m};
 pub use noises::range_noise::{AmplitudeScale, RangeNoise};
+pub use range_image;
 pub use range_image::NoiseModel;
 pub use screening::gross_errors::{FlagCounts, GrossErrorOptions, MixedPixelOptions, flag_gross_errors};
 pub use summary::{CorrectionSummary, GroupChange};

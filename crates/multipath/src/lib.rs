@@ -17,6 +17,7 @@ pub use pixels::search::SearchSpan;
 pub use pixels::two_path::{
     Hypothesis, PixelHypotheses, PixelPaths, TwoPathImage, TwoPathOptions, TwoPathSolver, Verdict, solve_two_paths,
 };
+pub use range_image;
 pub use scene::bending::Bending;
 pub use scene::detect::{Detection, DetectionOptions, Detector, Evidence, detect};
 pub use scene::risk::{AlbedoScale, Risk, RiskEvidence, RiskOptions, assess_risk, ranges_from_depths};

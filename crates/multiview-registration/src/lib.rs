@@ -13,11 +13,13 @@ pub use agreement::alignments::{PairAlignment, RefusedPair};
 pub use agreement::loops::LoopClosure;
 pub use agreement::placement::{PairAgreement, Placement, Placements, StationPlacement, judge_placements};
 pub use error::{Error, Result};
+pub use global_registration;
 pub use icp_registration;
 pub use nalgebra;
 pub use pairs_of_frames::frames::{FrameRegistration, PlacedFrame, UncheckedPair, UnplacedFrame, register_frames};
 pub use point_cloud;
 pub use projective_registration;
+pub use rigid_pose;
 pub use surfaces::point_model::{PointModel, SharedParameters};
 pub use survey::datum::Datum;
 pub use survey::registration::{

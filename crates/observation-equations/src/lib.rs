@@ -16,6 +16,7 @@ pub use derivatives::dual::{Dual, Tape, TapeMemory};
 pub use derivatives::real::Real;
 pub use error::{Error, EvaluationFailure, Result};
 pub use kernel::Kernel;
+pub use nalgebra;
 pub use observation::{FunctionObservation, Jacobians, LinearObservation, Named, Observation};
 pub use parameters::block::ParameterBlock;
 pub use parameters::block_id::BlockId;

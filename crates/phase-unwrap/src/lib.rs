@@ -28,5 +28,6 @@ pub use frequencies::hypotheses::{Hypotheses, Hypothesis, RankedHypotheses, hypo
 pub use frequencies::intervals::combined_interval_m;
 pub use frequencies::kernel_density::KernelDensityOptions;
 pub use frequencies::multi_frequency::{MultiFrequencyOptions, MultiUnwrapped, MultiUnwrapper, unwrap_multi_frequency};
+pub use range_image;
 pub use tree::options::{AlbedoPrior, Boundary, EdgeWeight, ImageGeometry, KnownWraps, Seed, SpatialOptions};
 pub use tree::unwrapped::{Island, Unwrapped};

@@ -12,10 +12,14 @@ mod plane;
 mod shape;
 mod surface;
 
+pub use adjust;
+pub use camera_model;
 pub use difference::{DifferenceOptions, RangeDifference, differences_to_plane};
 pub use error::{Error, Result};
 pub use fit::{fit_primitive, fit_whatever_shape};
+pub use nalgebra;
 pub use options::PrimitiveOptions;
 pub use outcome::{FittedPixel, PrimitiveFit};
 pub use plane::Plane;
+pub use range_image;
 pub use shape::{Primitive, PrimitiveKind};

@@ -6,14 +6,22 @@ mod observed;
 mod ranges;
 mod surfaces;
 
+pub use adjust;
 pub use adjust::Scale;
 pub use by_planes::planes::{PlaneCalibrationOptions, PlaneCapture, calibrate_planes};
 pub use by_planes::planes_outcome::{AdjustedPlane, CaptureQuality, PlaneCalibration};
+pub use camera_model;
 pub use error::{Error, Result};
+pub use error_models;
+pub use multiview_registration;
+pub use nalgebra;
 pub use observed::calibration::RangeCalibration;
 pub use observed::hyperbola_start::{hyperbola_gain, hyperbola_start};
 pub use observed::options::{HyperbolaUse, RangeTermOptions, TermUse};
+pub use point_cloud;
+pub use primitives;
 pub use primitives::{DifferenceOptions, Plane, RangeDifference, differences_to_plane};
+pub use range_image;
 pub use ranges::amplitude_or_position::{
     AmplitudeOrPosition, AmplitudeOrPositionOptions, EffectTest, ErrorCause, amplitude_or_position,
 };

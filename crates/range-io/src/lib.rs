@@ -18,9 +18,14 @@ pub mod trajectory;
 
 // Files and folders appear whole or not at all.
 pub use atomic_output;
+// Of the signatures.
+#[cfg(any(feature = "calibration", feature = "survey", feature = "tables", feature = "trajectory"))]
+pub use camera_model;
 #[cfg(any(feature = "survey", feature = "calibration"))]
 pub(crate) use error::InvalidField;
 pub use error::{Error, Result};
+#[cfg(feature = "calibration")]
+pub use error_models;
 #[cfg(feature = "azure")]
 pub use formats::azure;
 #[cfg(any(feature = "e57", feature = "pcd", feature = "ply", feature = "vtk", feature = "xyz"))]
@@ -46,6 +51,21 @@ pub use formats::png16;
 pub use formats::vtk;
 #[cfg(feature = "xyz")]
 pub use formats::xyz;
+#[cfg(any(
+    feature = "calibration",
+    feature = "e57",
+    feature = "pcd",
+    feature = "ply",
+    feature = "tables",
+    feature = "trajectory",
+    feature = "vtk",
+    feature = "xyz"
+))]
+pub use nalgebra;
+#[cfg(any(feature = "calibration", feature = "mkv", feature = "png16", feature = "survey"))]
+pub use range_image;
+#[cfg(feature = "calibration")]
+pub use scattering_deconvolution;
 pub use text::limits;
 pub use text::open::{open, read_bytes, read_ron_text, read_text};
 #[cfg(feature = "ron_text")]

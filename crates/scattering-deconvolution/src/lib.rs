@@ -8,6 +8,8 @@ mod outside;
 mod restoration;
 mod spread;
 
+#[cfg(feature = "estimate")]
+pub use adjust;
 pub use error::{Error, Result};
 #[cfg(feature = "estimate")]
 pub use estimate::{
@@ -16,7 +18,10 @@ pub use estimate::{
     object_mask, true_phases,
 };
 pub use kernels::kernel::{GAUSSIAN_CUT_SIGMAS, SampledKernel};
+#[cfg(feature = "estimate")]
+pub use nalgebra;
 pub use outside::{DarkPixels, OutsideLight, OutsideLightDetector, OutsideLightOptions, OutsideLightVerdict, Side};
+pub use range_image;
 pub use restoration::frame::restore;
 pub use restoration::restorer::{RestorationSummary, Restorer};
 pub use restoration::scatterer::Scatterer;

@@ -4,6 +4,11 @@ mod error;
 mod noise;
 mod pattern;
 
+pub use adjust;
+pub use camera_model;
 pub use error::{Error, Result};
+pub use error_models;
 pub use noise::*;
 pub use pattern::*;
+pub use primitives;
+pub use range_image;

@@ -10,7 +10,12 @@ mod simulate;
 mod spec;
 mod truth;
 
+pub use camera_model;
 pub use error::{Error, Result};
+pub use error_models;
+pub use nalgebra;
+pub use range_image;
+pub use scattering_deconvolution;
 pub use simulate::{SimulatedFrame, SimulatedSurvey, Simulator, StationImage, simulate, simulate_frame};
 pub use spec::SimulationSpec;
 pub use spec::camera::{

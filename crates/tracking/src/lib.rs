@@ -9,11 +9,14 @@ mod tracked;
 mod trajectory;
 
 pub use error::{Error, Result};
+pub use global_registration;
 pub use imu::{ImuIntegrator, ImuOptions, InertialSample};
 pub use motion_model::motion::MotionPrior;
 pub use nalgebra;
 pub use options::{Fusion, Relocalisation, TrackerOptions};
+pub use point_cloud;
 pub use projective_registration;
+pub use rigid_pose;
 pub use stream::tracker::Tracker;
 pub use tracked::{LossReason, TrackedPose, TrackingState};
 pub use trajectory::{

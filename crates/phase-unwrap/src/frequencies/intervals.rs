@@ -7,10 +7,14 @@ use crate::{Error, Result};
 /// Relative remainder below which an interval is taken as a multiple: frequencies are set to better than that.
 const TOLERANCE: f64 = 1e-6;
 
+/// Largest ratio of two frequencies: the tolerance of the higher one is then a thousandth of the lower one, beyond which
+/// remainders can no longer be told from it.
+const LARGEST_RATIO: f64 = 1e3;
+
 /// Range in metres at which all phases repeat at once: the least common multiple of the ambiguity intervals.
 ///
 /// 60 and 80 MHz repeat after that of 20 MHz, 7.5 m. Frequencies without a common divisor (to one part in a million)
-/// repeat at very long ranges or never.
+/// repeat at very long ranges or never. Frequencies more than a factor of a thousand apart are an [`Error::OutOfDomain`].
 pub fn combined_interval_m(modulations: &[Modulation]) -> Result<f64> {
     check(modulations)?;
     let rates = modulations.iter().map(|m| 1.0 / m.ambiguity_interval_m());
@@ -26,6 +30,11 @@ fn check(modulations: &[Modulation]) -> Result<()> {
             let (a, interval_m) = (a.ambiguity_interval_m(), b.ambiguity_interval_m());
             if (a - interval_m).abs() <= TOLERANCE * a {
                 return Err(Error::EqualFrequencies { first, second, interval_m });
+            }
+            let value = (a / interval_m).max(interval_m / a);
+            if value > LARGEST_RATIO {
+                let expected = "modulation frequencies lie within a factor of 1000";
+                return Err(Error::OutOfDomain { name: "ratio of two modulation frequencies", value, expected });
             }
         }
     }
@@ -67,5 +76,12 @@ mod tests {
         }
         // Without a common divisor above the tolerance the interval is at least 1e4 single ones.
         assert!(interval(&[80e6, 80e6 / std::f64::consts::SQRT_2]) > 1e4 * single(80e6));
+    }
+
+    #[test]
+    fn frequencies_too_far_apart_have_no_combined_interval() {
+        let modulations = [1e3, 1e9].map(|hz| Modulation::new(hz).unwrap());
+        let found = combined_interval_m(&modulations);
+        assert!(matches!(found, Err(Error::OutOfDomain { value, .. }) if (value - 1e6).abs() < 1.0), "{found:?}");
     }
 }

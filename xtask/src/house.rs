@@ -8,17 +8,13 @@ const LARGEST_CRATE: usize = 8_000;
 /// Most entries of a folder of sources.
 const LARGEST_FOLDER: usize = 12;
 
-/// A crate that is larger, and the lines that it may not exceed: its model, its rejection and its explanations call each other.
-const LARGER_CRATE: (&str, usize) = ("self-calibration", 9_800);
-
 /// What of a crate is too large.
 pub(crate) fn complaints(folder: &Path) -> Result<Vec<String>, String> {
     let name = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let mut found = Vec::new();
     let lines = measure(&folder.join("src"), &format!("{name}/src"), &mut found)?;
-    let most = if name == LARGER_CRATE.0 { LARGER_CRATE.1 } else { LARGEST_CRATE };
-    if lines > most {
-        found.push(format!("crates/{name}: {lines} lines of sources, at most {most}"));
+    if lines > LARGEST_CRATE {
+        found.push(format!("crates/{name}: {lines} lines of sources, at most {LARGEST_CRATE}"));
     }
     Ok(found)
 }

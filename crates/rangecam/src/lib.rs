@@ -68,6 +68,9 @@ pub mod registration {
 
 /// Orientation, calibration and its judgement.
 pub mod calibration {
+    #[cfg(feature = "calibration-network")]
+    #[doc(inline)]
+    pub use calibration_network;
     #[cfg(feature = "orientation")]
     #[doc(inline)]
     pub use orientation;

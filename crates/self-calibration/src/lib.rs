@@ -1,15 +1,29 @@
 #![doc = include_str!("../README.md")]
 
+mod calibrate;
+mod choice;
+mod contradictions;
 mod error;
-mod networks;
+mod findings;
+mod methods;
+mod options;
+mod outliers;
+mod planning;
 
 pub use adjust::{GlobalTest, GlobalVerdict, Scale};
-pub use error::{Error, Result};
-pub use networks::*;
+pub use calibrate::{calibrate, calibrate_two_networks};
+pub use calibration_network::{
+    AdjustedStation, AdjustedTarget, CalibratedParameter, Component, DistanceEnd, Error as NetworkError, GroupQuality,
+    KnownDistance, Network, NetworkTarget, ObservationQuality, OutsideImage, PassiveCamera, PassiveImagePoint,
+    Sighting, SightingOptions, SimulatedStart, Station, Verdict, simulate_sightings,
+};
+pub use error::Error;
+pub use findings::contradiction::{Cause, CauseKind, Contradiction, WorstValue};
+pub use findings::outcome::{CalibrationOutcome, TermDecision, TermScore};
+pub use options::{CalibrationOptions, Method, NetworkDatum, TermSelection};
+pub use planning::hold_out::{HoldOut, Prediction, hold_out};
+pub use planning::plan::{Candidate, CandidateGrid, PlanOptions, PlanOutcome, plan};
 // Of the signatures.
-pub use adjust;
-pub use camera_model;
-pub use error_models;
-pub use nalgebra;
-pub use orientation;
-pub use range_calibration;
+pub use {adjust, camera_model, error_models, nalgebra, orientation, range_calibration};
+
+use error::Result;

@@ -4,8 +4,8 @@ use crate::support::cases::{calibrated, cases, errors};
 use crate::support::networks::{nominal, range_model, small, track_network, weak};
 use error_models::{PeriodicSpline, RangeErrorModel, RangeTerms};
 use self_calibration::{
-    CalibrationOptions, CalibrationOutcome, Error, Method, Network, SightingOptions, TermDecision, calibrate,
-    simulate_sightings,
+    CalibrationOptions, CalibrationOutcome, Error, Method, Network, NetworkError, SightingOptions, TermDecision,
+    calibrate, simulate_sightings,
 };
 
 fn spline_decision(outcome: &CalibrationOutcome) -> &TermDecision {
@@ -109,7 +109,9 @@ fn a_network_that_leaves_all_terms_open_is_refused_and_not_answered_with_fewer()
     let mut observed = simulate_sightings(&weak(), &SightingOptions::default()).unwrap();
     nominal(&mut observed);
     match calibrate(&observed, &CalibrationOptions::default()) {
-        Err(Error::WeakNetwork { combination, inflation, .. }) => println!("{combination}: {inflation:.0}"),
+        Err(Error::Network(NetworkError::WeakNetwork { combination, inflation, .. })) => {
+            println!("{combination}: {inflation:.0}")
+        }
         other => panic!("{:?}", other.map(|outcome| outcome.parameters)),
     }
 }

@@ -4,8 +4,8 @@ use crate::support::networks::{deep, nominal, small, track_network, with_scale_b
 use error_models::{FurtherShape, PolynomialShape, RangeErrorModel, SurfaceShape};
 use nalgebra::DVector;
 use self_calibration::{
-    CalibrationOptions, CalibrationOutcome, Error, Method, Network, PlanOptions, SightingOptions, TermSelection,
-    calibrate, plan, simulate_sightings,
+    CalibrationOptions, CalibrationOutcome, Error, Method, Network, NetworkError, PlanOptions, SightingOptions,
+    TermSelection, calibrate, plan, simulate_sightings,
 };
 
 const LENS: &str = "xp yp c k1 k2 p1 p2";
@@ -134,15 +134,15 @@ fn words_that_contradict_each_other_are_refused() {
     }
     for unknown in ["splines", "spline", "s3", "g10", "surface-2"] {
         let error = refused(&format!("d0 {unknown}"));
-        assert!(matches!(&error, Error::UnknownName { name, .. } if name == unknown), "{error}");
+        assert!(matches!(&error, Error::Network(NetworkError::UnknownName { name, .. }) if name == unknown), "{error}");
         assert!(error.to_string().contains("splineN polynomialN surfaceN"), "{error}");
     }
     // Knots and orders that no model has.
     for impossible in ["spline3", "spline99999", "polynomial0", "surface7"] {
-        assert!(matches!(refused(&format!("d0 {impossible}")), Error::Model(_)), "{impossible}");
+        assert!(matches!(refused(&format!("d0 {impossible}")), Error::Network(NetworkError::Model(_))), "{impossible}");
     }
     // 1.2 m to 4.5 m of an ambiguity interval of 5 m: some knots are not seen at all.
-    assert!(matches!(refused("d0 spline12"), Error::WeakNetwork { .. }));
+    assert!(matches!(refused("d0 spline12"), Error::Network(NetworkError::WeakNetwork { .. })));
 }
 
 #[test]

@@ -2,8 +2,8 @@
 
 use crate::support::networks::{all_but_long_wave, small, weak};
 use self_calibration::{
-    CalibrationOptions, CandidateGrid, Error, PlanOptions, SightingOptions, TermSelection, calibrate, plan,
-    simulate_sightings,
+    CalibrationOptions, CandidateGrid, Error, NetworkError, PlanOptions, SightingOptions, TermSelection, calibrate,
+    plan, simulate_sightings,
 };
 
 fn options(candidates: CandidateGrid) -> PlanOptions {
@@ -57,7 +57,7 @@ fn a_plan_without_places_is_refused_by_name() {
     let mut planned = small();
     planned.stations[3].world_from_camera = None;
     match plan(&planned, &options(no_candidates())) {
-        Err(Error::NotReachable { name, .. }) => assert_eq!(name, "S03"),
+        Err(Error::Network(NetworkError::NotReachable { name, .. })) => assert_eq!(name, "S03"),
         other => panic!("{other:?}"),
     }
 }

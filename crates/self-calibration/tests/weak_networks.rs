@@ -2,7 +2,8 @@
 
 use crate::support::networks::{all_but_long_wave, looking, nominal, normal, small, weak};
 use self_calibration::{
-    CalibrationOptions, Error, Method, Network, SightingOptions, TermSelection, calibrate, simulate_sightings,
+    CalibrationOptions, Error, Method, Network, NetworkError, SightingOptions, TermSelection, calibrate,
+    simulate_sightings,
 };
 
 fn calibrated(truth: &Network, terms: &[&str], method: Method) -> Result<Vec<String>, Error> {
@@ -15,7 +16,7 @@ fn calibrated(truth: &Network, terms: &[&str], method: Method) -> Result<Vec<Str
 
 fn refused(truth: &Network, terms: &[&str], method: Method) -> (String, f64, String) {
     match calibrated(truth, terms, method) {
-        Err(Error::WeakNetwork { combination, inflation, advice, correlation }) => {
+        Err(Error::Network(NetworkError::WeakNetwork { combination, inflation, advice, correlation })) => {
             assert!(correlation.contains("correlation") || correlation.contains("reference"), "{correlation}");
             println!("refused: {combination}, inflation {inflation:.0}; {advice}");
             (combination, inflation, advice)
@@ -70,5 +71,9 @@ fn with_all_terms_the_answer_is_the_same() {
     let mut observed = simulate_sightings(&weak(), &SightingOptions::default()).unwrap();
     nominal(&mut observed);
     let answer = calibrate(&observed, &CalibrationOptions::default());
-    assert!(matches!(answer, Err(Error::WeakNetwork { .. })), "{:?}", answer.map(|outcome| outcome.estimated));
+    assert!(
+        matches!(answer, Err(Error::Network(NetworkError::WeakNetwork { .. }))),
+        "{:?}",
+        answer.map(|outcome| outcome.estimated)
+    );
 }

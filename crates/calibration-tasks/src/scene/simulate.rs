@@ -36,8 +36,8 @@ pub(crate) fn simulate_into(
 ) -> Result<Simulated> {
     let spec = NetworkScene::read(scene)?;
     let truth = spec.network(scene)?;
-    let observed =
-        simulate_sightings(&truth, &spec.sightings.options(seed.unwrap_or(spec.seed))).map_err(Error::Calibrate)?;
+    let observed = simulate_sightings(&truth, &spec.sightings.options(seed.unwrap_or(spec.seed)))
+        .map_err(|error| Error::Calibrate(error.into()))?;
     let folder = destination.open()?;
     write_observations(folder.file("observations.csv")?, &observations(&observed))?;
     write_stations(folder.file("stations.csv")?, &stations(&observed))?;

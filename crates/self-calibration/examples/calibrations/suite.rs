@@ -3,8 +3,8 @@
 use nalgebra::{DVector, Isometry3, Point3, Vector6};
 use rigid_pose::absolute_orientation;
 use self_calibration::{
-    CalibrationOptions, CalibrationOutcome, Cause, Component, Error, Network, NetworkDatum, TermSelection, Verdict,
-    calibrate,
+    CalibrationOptions, CalibrationOutcome, Cause, Component, Error, Network, NetworkDatum, NetworkError,
+    TermSelection, Verdict, calibrate,
 };
 use statistics::Distribution;
 
@@ -83,7 +83,7 @@ fn of_outcome(outcome: &CalibrationOutcome, sound: &Sound, expected: &Expected) 
 
 fn is_right_refusal(error: &Error, expected: &Expected) -> bool {
     match (error, expected) {
-        (Error::OutsideImage(_), Expected::OutsideImage) => true,
+        (Error::Network(NetworkError::OutsideImage(_)), Expected::OutsideImage) => true,
         (Error::Contradiction(found), Expected::Refused(kinds, station)) => {
             found.causes.len() == 1
                 && found.causes.iter().all(|cause| kinds.contains(&cause.kind) && cause.station == *station)

@@ -3,14 +3,14 @@
 use std::collections::BTreeSet;
 
 use pipeline::{Error, Result};
-use self_calibration::{DistanceEnd, Method, Network, NetworkDatum};
+use self_calibration::{DistanceEnd, Method, Network, NetworkDatum, NetworkError};
 
 use crate::calibrate::network::network_files::NetworkFiles;
 
 /// Refuses targets and stations that too few observations determine, and a control datum without control.
 pub(crate) fn check(files: &NetworkFiles, method: Method, datum: NetworkDatum) -> Result<()> {
     let network = &files.network;
-    if let Err(self_calibration::Error::OutsideImage(found)) = network.validate() {
+    if let Err(NetworkError::OutsideImage(found)) = network.validate() {
         let [low, high] = found.limits;
         let reason = format!("is {}, outside the image ({}), expected {low} to {high}", found.value, found.image);
         return Err(files.observations.error(found.sighting, found.component, reason).into());

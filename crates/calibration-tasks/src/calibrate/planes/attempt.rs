@@ -1,6 +1,6 @@
 //! What a way to calibrate comes to.
 
-use self_calibration::{CalibrationOutcome, HoldOut};
+use self_calibration::{CalibrationOutcome, Error, HoldOut};
 
 use crate::calibrate::planes::offset::FoundTable;
 use crate::calibrate::start::Start;
@@ -11,8 +11,8 @@ pub(crate) struct Calibrated {
     /// A table of offsets, where one was asked for.
     pub(crate) table: Option<FoundTable>,
     /// The check on stations left out, where it was asked for.
-    pub(crate) check: Option<self_calibration::Result<HoldOut>>,
+    pub(crate) check: Option<Result<HoldOut, Error>>,
 }
 
 /// Start values and what the adjustment said of them.
-pub(crate) type Attempt = (Start, self_calibration::Result<Calibrated>);
+pub(crate) type Attempt = (Start, Result<Calibrated, Error>);

@@ -19,7 +19,7 @@ use range_calibration::{
 };
 use range_io::survey::{Level, Survey};
 use range_io::tables::{ObservedPlane, PlacedRows, Station, read_placed_planes, read_placed_stations};
-use self_calibration::{Error as Cause, TermSelection};
+use self_calibration::{Error as Cause, NetworkError, TermSelection};
 
 use crate::calibrate::network::control::pose_covariance;
 use crate::calibrate::network::network_files::optional;
@@ -195,7 +195,7 @@ fn plane_of((normal, d): ([f64; 3], f64)) -> primitives::Result<Plane> {
 }
 
 /// What was found, and with which planes and poses.
-type FoundWith<'a> = self_calibration::Result<(Found, Vec<Placed<'a>>)>;
+type FoundWith<'a> = std::result::Result<(Found, Vec<Placed<'a>>), Cause>;
 
 /// Range terms from differences to known planes.
 fn known<'a>(
@@ -294,7 +294,7 @@ fn term_options(request: &CalibrateRequest, start: &Start) -> Result<RangeTermOp
             let known = format!("{}, h1, h2, h3", RangeTerms::NAMES.join(", "));
             let what = "the list of terms for planes".to_owned();
             let kind = "term";
-            return Err(Error::Calibrate(Cause::UnknownName { what, kind, name: name.clone(), known }));
+            return Err(Error::Calibrate(NetworkError::UnknownName { what, kind, name: name.clone(), known }.into()));
         };
         options.terms[index] = TermUse::Estimate;
     }

@@ -108,17 +108,19 @@ pub(crate) fn of_source(source: &(dyn StdError + 'static)) -> Failure {
 }
 
 pub(crate) fn of_estimation(error: &self_calibration::Error) -> Failure {
-    use self_calibration::Error as Cause;
+    use self_calibration::{Error as Cause, NetworkError};
     match error {
-        Cause::OutOfDomain { .. }
-        | Cause::DuplicateName { .. }
-        | Cause::BadNetworkValue { .. }
-        | Cause::UnknownName { .. }
-        | Cause::ConflictingTerms { .. }
-        | Cause::Datum { .. }
+        Cause::ConflictingTerms { .. }
         | Cause::MethodNeeds { .. }
-        | Cause::OutsideImage(_)
-        | Cause::Camera(_) => Failure::Usage,
+        | Cause::Network(
+            NetworkError::OutOfDomain { .. }
+            | NetworkError::DuplicateName { .. }
+            | NetworkError::BadNetworkValue { .. }
+            | NetworkError::UnknownName { .. }
+            | NetworkError::Datum { .. }
+            | NetworkError::OutsideImage(_)
+            | NetworkError::Camera(_),
+        ) => Failure::Usage,
         // All of a column is wrong: a slip in the input, not a finding about the network.
         Cause::Contradiction(found) if found.is_wrong_input() => Failure::Usage,
         Cause::Ranges(error) => of_ranges(error),

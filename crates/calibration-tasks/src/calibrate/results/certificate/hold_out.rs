@@ -74,7 +74,7 @@ impl HeldOutPart {
 }
 
 impl HeldOut {
-    pub(crate) fn new(every: Option<usize>, check: Option<self_calibration::Result<HoldOut>>) -> Self {
+    pub(crate) fn new(every: Option<usize>, check: Option<Result<HoldOut, self_calibration::Error>>) -> Self {
         match check {
             None if every.is_some() => {
                 Self::NotMade { reason: "the method does not adjust the stations of a network together".to_owned() }

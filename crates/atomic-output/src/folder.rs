@@ -77,6 +77,17 @@ impl OutputFolder {
         Ok(self.temporary.join(relative))
     }
 
+    /// Removes a file that was written to be read back and is no result, and its folder where that is left empty.
+    pub fn discard(&self, relative: impl AsRef<Path>) -> Result<()> {
+        let path = self.temporary.join(relative);
+        fs::remove_file(&path).map_err(Error::io(&path, "remove"))?;
+        if let Some(folder) = path.parent().filter(|folder| *folder != self.temporary) {
+            // One that holds something stays.
+            let _ = fs::remove_dir(folder);
+        }
+        Ok(())
+    }
+
     /// Puts the files of the older output in, as they stand: what is written beside them is added to it.
     pub fn keep_older(&self) -> Result<()> {
         for file in &self.older {

@@ -226,7 +226,7 @@ fn a_calibrated_lens_and_range_go_together() {
     let [x, y] = camera.format.image_from_pixel(pixel);
     let [xp, yp] = camera.interior.principal_point_mm;
     let expected = camera.point(pixel, model.corrected_range(2.5, x - xp, y - yp, f64::NAN));
-    let found = outcome.clouds[0].points[20 * 176 + 130];
+    let found = outcome.views[0].cloud.as_ref().unwrap().points[20 * 176 + 130];
     // Ranges are kept in single precision: 2.5 m to 0.2 micrometre.
     assert!((expected.coords - Vector3::from(found)).norm() < 1e-6, "{expected} and {found:?}");
     // Frames of another integration time are refused by name.

@@ -19,11 +19,11 @@ pub use plan::{
     SimulateSource, Source, Stage, StartPoses, UnwrapMethod, UnwrapOptions,
 };
 pub use run::{
-    Calibrator, OwnCloud, PairSummary, ReferenceSummary, RegistrationSummary, RunRequest, Simulated, StationTruth,
-    Summary, TruthSummary, process, run, run_with, simulate,
+    Calibrator, OwnCloud, PairSummary, Processed, ReferenceSummary, RegistrationSummary, RunRequest, Simulated,
+    StationTruth, Summary, TruthSummary, process, process_each, run, run_with, simulate,
 };
 pub use survey::{
-    AdjustmentFigures, CorrectionRecord, DriftSource, FrameRatePart, FurtherPoint, Outcome, RangeTruth, RefusedStage,
-    Snapshot, StageSummary, StationPose, View, ViewData, ViewDrift, ViewTruth,
+    AdjustmentFigures, CorrectionRecord, DriftSource, FrameRatePart, FurtherPoint, RangeTruth, RefusedStage, Snapshot,
+    StageSummary, StationPose, View, ViewData, ViewDrift, ViewRecord, ViewTruth,
 };
 pub use trends::{RemainingErrors, TrendSummary};

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use pipeline::{Outcome, Plan, Silent, SimulateSource, ViewData, process, simulate};
+use pipeline::{Processed, Plan, Silent, SimulateSource, ViewData, process, simulate};
 use range_image::{Flags, RangeFrame};
 
 use crate::common::fixtures;
@@ -23,12 +23,12 @@ fn simulated(scene: &str, from: &str, to: &str, folder: &Path) -> PathBuf {
     folder.join("survey")
 }
 
-fn run(survey: &Path, stages: &str) -> Outcome {
+fn run(survey: &Path, stages: &str) -> Processed {
     let plan = Plan::from_ron(&format!("(name: \"test\", stages: [{stages}])"), "test.ron".as_ref()).unwrap();
     process(&plan, survey, None, &Silent).unwrap()
 }
 
-fn finding(outcome: &Outcome, stage: &str, name: &str) -> f64 {
+fn finding(outcome: &Processed, stage: &str, name: &str) -> f64 {
     outcome.stages.iter().find(|done| done.name == stage).unwrap().findings[name]
 }
 
@@ -118,9 +118,10 @@ fn mixed_pixels_are_flagged_dropped_or_split() {
         let flag = format!("Flag(mixed_pixels: (treatment: {treatment}))");
         run(&survey, &format!("Demodulate(), Average(), Deconvolve(), Unwrap(), CorrectRange(), PointCloud(), {flag}"))
     });
-    let points = |outcome: &Outcome| {
-        let finite = outcome.clouds.iter().flat_map(|cloud| &cloud.points).filter(|point| point[0].is_finite());
-        finite.count() + outcome.further_points.len()
+    let points = |outcome: &Processed| {
+        let clouds = outcome.views.iter().filter_map(|view| view.cloud.as_ref());
+        let finite = clouds.flat_map(|cloud| &cloud.points).filter(|point| point[0].is_finite());
+        finite.count() + outcome.views.iter().map(|view| view.further_points.len()).sum::<usize>()
     };
     let [flagged, dropped, split] = outcomes.each_ref().map(points);
     let mixed = finding(&outcomes[0], "Flag", "mixed_pixels") as usize;

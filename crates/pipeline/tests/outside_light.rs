@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
 
-use pipeline::{Doubt, DoubtKind, Outcome, Plan, Silent, process};
+use pipeline::{Doubt, DoubtKind, Processed, Plan, Silent, process};
 use range_image::{Flags, RawFrame, Samples};
 use range_io::survey::{InputFrame, Survey, read_frame, write_frame};
 use scattering_deconvolution::{GaussianTerm, Psf, Scatterer};
@@ -23,19 +23,19 @@ fn dimmed(scene: &str, source_power: f64, frames: usize, stations: &[&str], fold
     simulated_from(&file, 23, folder)
 }
 
-fn ranges(survey: &Path) -> Outcome {
+fn ranges(survey: &Path) -> Processed {
     let stages = "Demodulate(low_amplitude: 20), Average(), Deconvolve(), Unwrap(maximum_range_m: 12), CorrectRange(), \
                   CorrectImagePoint(), PointCloud(), Flag()";
     let plan = Plan::from_ron(&format!("(name: \"test\", stages: [{stages}])"), "test.ron".as_ref()).unwrap();
     process(&plan, survey, None, &Silent).unwrap()
 }
 
-fn doubts(outcome: &Outcome) -> Vec<&Doubt> {
+fn doubts(outcome: &Processed) -> Vec<&Doubt> {
     outcome.doubts.iter().filter(|doubt| doubt.kind == DoubtKind::OutsideLight).collect()
 }
 
 /// Share of a view's pixels flagged `multipath` between two columns.
-fn flagged(outcome: &Outcome, view: usize, columns: std::ops::Range<usize>) -> f64 {
+fn flagged(outcome: &Processed, view: usize, columns: std::ops::Range<usize>) -> f64 {
     let flags = outcome.views[view].flags().unwrap();
     let (width, count) = (flags.width(), columns.len() * flags.height());
     let pixels = flags.as_slice().iter().enumerate().filter(|(index, _)| columns.contains(&(index % width)));

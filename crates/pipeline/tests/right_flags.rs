@@ -2,19 +2,19 @@
 
 use std::path::Path;
 
-use pipeline::{DoubtKind, Judged, Outcome, Plan, RunRequest, Silent, ViewData, process};
+use pipeline::{DoubtKind, Judged, Processed, Plan, RunRequest, Silent, ViewData, process};
 use range_image::Flags;
 use range_io::survey::{InputFrame, Level, Survey, read_frame, write_frame};
 
 use crate::common::{fixtures, has_capture, simulated_with};
 
-fn run(survey: &Path, stages: &str) -> Outcome {
+fn run(survey: &Path, stages: &str) -> Processed {
     let plan = Plan::from_ron(&format!("(name: \"test\", stages: [{stages}])"), "test.ron".as_ref()).unwrap();
     process(&plan, survey, None, &Silent).unwrap()
 }
 
 /// Shares of all pixels: wrong by more than half a metre, flagged so though right, and of the wrong ones those flagged.
-fn shares(outcome: &Outcome, flag: Flags, wrong_m: impl Fn(f32) -> f32) -> [f64; 3] {
+fn shares(outcome: &Processed, flag: Flags, wrong_m: impl Fn(f32) -> f32) -> [f64; 3] {
     let (mut all, mut wrong, mut falsely, mut found) = (0.0, 0.0, 0.0, 0.0);
     for view in &outcome.views {
         let ViewData::Range(frame) = &view.data else { unreachable!() };
@@ -52,7 +52,7 @@ fn unsure_wraps_are_few_in_good_light_and_hit_the_wrong_ones() {
 
 #[test]
 fn the_method_of_unwrapping_is_chosen_by_the_plan() {
-    let ranges = |outcome: &Outcome| -> Vec<u32> {
+    let ranges = |outcome: &Processed| -> Vec<u32> {
         let frames = outcome.views.iter().map(|view| {
             let ViewData::Range(frame) = &view.data else { unreachable!() };
             frame.range.as_slice().iter().map(|range| range.to_bits()).collect::<Vec<u32>>()

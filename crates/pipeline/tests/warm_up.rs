@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use error_models::WarmUp;
 use nalgebra::{DMatrix, DVector};
-use pipeline::{DriftSource, ExplainRequest, Outcome, Plan, Silent, View, ViewData, ViewDrift, explain, process};
+use pipeline::{DriftSource, ExplainRequest, Processed, Plan, Silent, View, ViewData, ViewDrift, explain, process};
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
 use range_image::Flags;
@@ -40,7 +40,7 @@ fn survey(folder: &Path, camera: &str, exposure: &str, errors: &str) -> PathBuf 
     simulated_from(&scene, 5, folder)
 }
 
-fn run(survey: &Path, stages: &str) -> pipeline::Result<Outcome> {
+fn run(survey: &Path, stages: &str) -> pipeline::Result<Processed> {
     let plan = Plan::from_ron(&format!("(name: \"x\", stages: [{stages}])"), Path::new("x.ron"))?;
     process(&plan, survey, None, &Silent)
 }
@@ -184,7 +184,8 @@ fn an_optical_reference_shows_the_drift_without_any_curve() {
     let survey = survey(folder.path(), REFERENCE, "", &format!("{RANGE} {DRIFT}"));
     edit_calibration(&survey, |calibration| calibration.warm_up = None);
     let outcome = run(&survey, EACH_FRAME).unwrap();
-    for ((view, cloud), time_s) in outcome.views.iter().zip(&outcome.clouds).zip([60.0, 360.0, 660.0, 960.0]) {
+    for (view, time_s) in outcome.views.iter().zip([60.0, 360.0, 660.0, 960.0]) {
+        let cloud = view.cloud.as_ref().unwrap();
         let (expected, found) = (0.03 * f64::exp(-time_s / 600.0), drift(view).unwrap());
         println!(
             "{time_s} s: drift {:.2} mm, found {:.2} mm +- {:.2} mm",

@@ -4,9 +4,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use std::path::Path;
 
-use pipeline::command::{Doubt, DoubtKind, Judged, Silent, root_of};
+use pipeline::command::{Doubt, DoubtKind, Judged, root_of};
 use pipeline::plan::{DemodulateOptions, DriftTreatment, Stage, ruled_out};
-use pipeline::stages::{apply, corrects_ranges};
+use pipeline::stages::{Line, corrects_ranges};
 use pipeline::survey::plausibility::{self, FrameWatch, SenseVotes};
 use pipeline::survey::{Purpose, compatible, open, read_calibration};
 use pipeline::{Error, Result};
@@ -125,11 +125,16 @@ fn inspect_frames(path: &Path, survey: &Survey, found: &mut Inspection) -> Resul
         found.add("frames readable", "none listed");
         return Ok(());
     }
-    let (mut work, frames) = open(path, (None, String::new()), Purpose::Camera)?;
+    let opened = open(path, (None, String::new()), Purpose::Camera)?;
+    let stages: &[Stage] = match survey.level {
+        Level::Samples => &[Stage::Demodulate(DemodulateOptions::default())],
+        _ => &[],
+    };
+    let mut line = Line::new(stages, &opened)?;
     let (mut watch, mut votes) = (FrameWatch::default(), SenseVotes::default());
     let (mut unreadable, mut judged) = (Vec::new(), BTreeSet::new());
     for (index, entry) in survey.frames.iter().enumerate() {
-        let view = match frames.view(survey, index) {
+        let view = match opened.view(index) {
             Ok(view) => view,
             Err(error) => {
                 unreadable.push((entry, error));
@@ -139,11 +144,9 @@ fn inspect_frames(path: &Path, survey: &Survey, found: &mut Inspection) -> Resul
         watch.look(&view);
         // One frame of a station tells the sense of the phase.
         if survey.level <= Level::Phase && judged.insert(&entry.station) && judged.len() <= MOST_JUDGED {
-            work.outcome.views = vec![view];
-            if survey.level == Level::Samples {
-                apply(&Stage::Demodulate(DemodulateOptions::default()), &mut work, &Silent)?;
-            }
-            work.outcome.views.iter().for_each(|view| votes.look_at(view));
+            let mut views = vec![view];
+            line.apply(&mut views, &mut ())?;
+            views.iter().for_each(|view| votes.look_at(view));
         }
     }
     let readable = survey.frames.len() - unreadable.len();
@@ -151,7 +154,7 @@ fn inspect_frames(path: &Path, survey: &Survey, found: &mut Inspection) -> Resul
     if let Some(words) = votes.in_words() {
         found.add("phase", words);
     }
-    found.doubts.append(&mut work.outcome.doubts);
+    found.doubts.extend(opened.doubts);
     if let Some((first, error)) = unreadable.first() {
         let words = format!("{} of {} frames cannot be read: {error}", unreadable.len(), survey.frames.len());
         found.doubts.push(Doubt::about(DoubtKind::UnreadableFrames, &first.station, words));

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use error_models::WarmUp;
-use pipeline::{DriftTreatment, ExplainRequest, Outcome, Plan, Silent, View, ViewData, ViewDrift, explain, process};
+use pipeline::{DriftTreatment, ExplainRequest, Processed, Plan, Silent, View, ViewData, ViewDrift, explain, process};
 use range_io::calibration::Calibration;
 use range_io::survey::{FrameRate, Survey};
 use tasks::{ChangeOptions, DriftOptions, ReferenceUse, WarmUpRequest, estimate_warm_up};
@@ -117,7 +117,7 @@ fn edit_model(survey: &Path, change: impl FnOnce(&mut WarmUp)) {
     calibration.write(&file).unwrap();
 }
 
-fn corrected(survey: &Path) -> pipeline::Result<Outcome> {
+fn corrected(survey: &Path) -> pipeline::Result<Processed> {
     process(&plan(DriftTreatment::Apply), survey, None, &Silent)
 }
 

@@ -18,7 +18,7 @@
 //! The first of these is measured at the end of all stages; the others are what flags have to say even where chance
 //! brought the range near the truth. A flag on any other pixel is **false**.
 
-use pipeline::{Outcome, Silent, ViewData, process};
+use pipeline::{Processed, Silent, ViewData, process};
 use range_image::Flags;
 
 use super::Failure;
@@ -105,7 +105,7 @@ pub fn count_of_sum(capture: &Capture, frames: usize) -> Result<Counts, Failure>
     Ok(judge(capture, &outcome, frames))
 }
 
-fn judge(capture: &Capture, outcome: &Outcome, frames: usize) -> Counts {
+fn judge(capture: &Capture, outcome: &Processed, frames: usize) -> Counts {
     let mut counts = Counts::default();
     let mut errors = Vec::new();
     let low = LOW_AMPLITUDE / (frames as f64).sqrt();

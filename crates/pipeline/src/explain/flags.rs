@@ -9,6 +9,7 @@ use crate::plan::{FlagOptions, Stage};
 use crate::survey::view::View;
 
 /// Notes the flags as stages set them.
+#[derive(Default)]
 pub(super) struct FlagWatch {
     found: Vec<(Flags, FlagReason)>,
 }
@@ -17,13 +18,12 @@ pub(super) struct FlagWatch {
 type Reason = (String, Option<f64>);
 
 impl FlagWatch {
-    pub(super) fn new(from_the_start: Flags) -> Self {
-        let mut watch = Self { found: Vec::new() };
+    /// Notes what the frame came with.
+    pub(super) fn start(&mut self, from_the_start: Flags) {
         for (flag, name) in named(from_the_start) {
             let reason = "the frame has no range here".to_owned();
-            watch.found.push((flag, FlagReason { flag: name, stage: None, reason, threshold_sigmas: None }));
+            self.found.push((flag, FlagReason { flag: name, stage: None, reason, threshold_sigmas: None }));
         }
-        watch
     }
 
     /// Notes what a stage set.

@@ -6,6 +6,7 @@ pub(crate) mod words;
 
 use std::path::PathBuf;
 
+use camera_model::RayTable;
 use range_image::Flags;
 use range_io::calibration::Calibration;
 use range_io::survey::{Level, Survey};
@@ -16,10 +17,12 @@ use crate::command::progress::Progress;
 use crate::command::verdict::Judged;
 use crate::explain::flags::FlagWatch;
 use crate::plan::{Stage, is_past};
-use crate::survey::load::{load, read_calibration};
+use crate::run::stream::{Order, stream};
+use crate::stages::{Line, Watch};
+use crate::survey::compatible::Purpose;
+use crate::survey::open::{open, read_calibration};
 use crate::survey::view::{View, ViewData};
-use crate::survey::work::Work;
-use crate::{Error, Plan, Result, stages};
+use crate::{Error, Plan, Result};
 
 /// Which pixel is to be explained.
 #[derive(Debug, Clone)]
@@ -146,13 +149,16 @@ pub fn explain(request: &ExplainRequest, progress: &dyn Progress) -> Result<Expl
         None => all_stages(survey.level, calibration.as_ref()),
     };
     let station = survey.frames[frame].station.clone();
-    let mut work = load(&request.survey, (calibration, words), &plan, Some(&station), progress)?;
+    let opened = open(&request.survey, (calibration, words), Purpose::of(&plan.stages))?;
+    plan.check_level(survey.level)?;
+    let mut line = Line::new(&plan.stages, &opened)?;
+    let order = Order::new(&opened, &plan.stages, Some(&station));
     let mut explanation = Explanation {
         frame,
         file: survey.frames[frame].file.display().to_string(),
         station,
         pixel: request.pixel,
-        calibration: work.outcome.calibration.clone(),
+        calibration: opened.calibration_words.clone(),
         raw_range_m: None,
         stages: Vec::new(),
         range_m: None,
@@ -163,49 +169,69 @@ pub fn explain(request: &ExplainRequest, progress: &dyn Progress) -> Result<Expl
         point_m: None,
         flags: Vec::new(),
     };
-    follow(&mut work, &plan, &mut explanation, progress)?;
+    let mut follower = Follower { explanation: &mut explanation, before: None, state: None, is_range: false, flags: FlagWatch::default() };
+    stream(&opened, &order, &mut line, &mut follower, &mut |_| Ok(()), progress)?;
+    follower.finish(line.rays());
     progress.finish();
     Ok(explanation)
 }
 
-/// Applies the stages and writes down what they do.
-fn follow(work: &mut Work, plan: &Plan, explanation: &mut Explanation, progress: &dyn Progress) -> Result<()> {
-    let (frame, pixel) = (explanation.frame, explanation.pixel);
-    let mut state = state_of(view_of(work, frame)?, pixel);
-    explanation.raw_range_m = state.range_m;
-    let mut watch = FlagWatch::new(state.flags);
-    for stage in plan.stages.iter().filter(|stage| !matches!(stage, Stage::Register(_) | Stage::Adjust(_))) {
-        progress.begin(stage.name(), work.outcome.views.len());
-        let before = view_of(work, frame)?.clone();
-        stages::apply(stage, work, progress)?;
-        let after = view_of(work, frame)?;
-        let next = state_of(after, pixel);
+/// Writes down what the stages do to the view that the frame is in.
+struct Follower<'a> {
+    explanation: &'a mut Explanation,
+    before: Option<View>,
+    state: Option<PixelState>,
+    /// Whether the view has come to ranges.
+    is_range: bool,
+    flags: FlagWatch,
+}
+
+impl Watch for Follower<'_> {
+    fn before(&mut self, _: usize, _: &Stage, views: &[View]) {
+        let Some(view) = views.iter().find(|view| view.frames.contains(&self.explanation.frame)) else { return };
+        if self.state.is_none() {
+            let state = state_of(view, self.explanation.pixel);
+            self.explanation.raw_range_m = state.range_m;
+            self.flags.start(state.flags);
+            self.state = Some(state);
+        }
+        self.before = Some(view.clone());
+    }
+
+    fn after(&mut self, _: usize, stage: &Stage, views: &[View]) {
+        let explanation = &mut *self.explanation;
+        let found = views.iter().find(|view| view.frames.contains(&explanation.frame));
+        let (Some(after), Some(before), Some(state)) = (found, self.before.take(), self.state) else { return };
+        let next = state_of(after, explanation.pixel);
         if explanation.raw_range_m.is_none() {
             explanation.raw_range_m = next.range_m;
         }
         let change_m = state.range_m.zip(next.range_m).map(|(from, to)| to - from);
-        let parts = change_m.map_or_else(Vec::new, |change| parts::parts(stage, &before, after, pixel, change));
+        let parts =
+            change_m.map_or_else(Vec::new, |change| parts::parts(stage, &before, after, explanation.pixel, change));
         let (range_m, sigma_m) = (next.range_m, next.sigma_m);
         explanation.stages.push(StageLine { stage: stage.name(), change_m, parts, range_m, sigma_m });
-        watch.after(stage, after, pixel, &state, &next);
-        state = next;
+        self.flags.after(stage, after, explanation.pixel, &state, &next);
+        self.is_range = matches!(after.data, ViewData::Range(_));
+        self.state = Some(next);
     }
-    let whole = |part: &&StagePart| part.group == WHOLE_INTERVALS;
-    let parts = || explanation.stages.iter().flat_map(|line| &line.parts);
-    let whole_intervals_m = parts().filter(whole).map(|part| part.change_m).sum();
-    let all: f64 = explanation.stages.iter().filter_map(|line| line.change_m).sum();
-    (explanation.whole_intervals_m, explanation.moved_m) = (whole_intervals_m, all - whole_intervals_m);
-    (explanation.range_m, explanation.sigma_m, explanation.amplitude) = (state.range_m, state.sigma_m, state.amplitude);
-    explanation.point_m = state.range_m.filter(|_| work.outcome.views.iter().all(is_range)).map(|range| {
-        let point = range * work.rays.direction(pixel[0], pixel[1]);
-        point.into()
-    });
-    explanation.flags = watch.reasons(state.flags);
-    Ok(())
 }
 
-fn is_range(view: &View) -> bool {
-    matches!(view.data, ViewData::Range(_))
+impl Follower<'_> {
+    fn finish(self, rays: &RayTable) {
+        let (explanation, Some(state)) = (self.explanation, self.state) else { return };
+        let whole = |part: &&StagePart| part.group == WHOLE_INTERVALS;
+        let parts = || explanation.stages.iter().flat_map(|line| &line.parts);
+        let whole_intervals_m = parts().filter(whole).map(|part| part.change_m).sum();
+        let all: f64 = explanation.stages.iter().filter_map(|line| line.change_m).sum();
+        (explanation.whole_intervals_m, explanation.moved_m) = (whole_intervals_m, all - whole_intervals_m);
+        (explanation.range_m, explanation.sigma_m, explanation.amplitude) =
+            (state.range_m, state.sigma_m, state.amplitude);
+        let [col, row] = explanation.pixel;
+        let range_m = state.range_m.filter(|_| self.is_range);
+        explanation.point_m = range_m.map(|range| (range * rays.direction(col, row)).into());
+        explanation.flags = self.flags.reasons(state.flags);
+    }
 }
 
 /// The frame by its number or file.
@@ -249,12 +275,6 @@ fn all_stages(level: Level, calibration: Option<&Calibration>) -> Plan {
     stages.push(Stage::Flag(crate::FlagOptions::default()));
     stages.retain(|stage| !is_past(level, stage.needs()));
     Plan { name: "explain".to_owned(), source: None, calibrate: None, stages }
-}
-
-/// The view that the frame is in.
-fn view_of(work: &Work, frame: usize) -> Result<&View> {
-    let found = work.outcome.views.iter().find(|view| view.frames.contains(&frame));
-    found.ok_or_else(|| Error::Explain(format!("frame {frame} is in no view")))
 }
 
 /// The pixel as far as it is known.

@@ -7,7 +7,7 @@ use report::{Axes, Block, CATEGORIES, Column, Document, Merit, Place, Series, cu
 
 use crate::run::figures::Figures;
 use crate::run::summary::Summary;
-use crate::survey::outcome::StageSummary;
+use crate::survey::records::StageSummary;
 use crate::survey::truth::RangeTruth;
 use crate::trends::section::remaining_errors;
 

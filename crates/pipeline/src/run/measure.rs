@@ -1,209 +1,125 @@
-//! Figures of a run: what each stage changed, and the summary of the whole.
+//! Figures of a run, gathered into its summary.
 
 use std::collections::BTreeMap;
 use std::path::Path;
 
 use multiview_registration::{Placements, RefusedPair};
 use nalgebra::Isometry3;
-use range_image::Flags;
 
 use crate::command::verdict::{Doubt, DoubtKind};
 use crate::plan::{Plan, ruled_out};
-use crate::run::results::own_clouds;
-use crate::run::summary::{PairSummary, ReferenceSummary, RegistrationSummary, StationTruth, Summary, TruthSummary};
+use crate::run::clouds::OwnCloud;
+use crate::run::flow::Flow;
+use crate::run::kept::Kept;
+use crate::run::summary::{PairSummary, RegistrationSummary, StationTruth, Summary, TruthSummary};
+use crate::stages::joining::Joined;
 use crate::stages::wraps::repair;
 use crate::stations::placement::wrong_place;
-use crate::survey::load::first_modulation;
-use crate::survey::outcome::{Outcome, usable};
 use crate::survey::plausibility;
-use crate::survey::truth::{RangeTruth, evaluate, wrap};
-use crate::survey::view::{Snapshot, View, ViewData};
-use crate::trends;
-use statistics::{quantile, robust_standard_deviation};
-
-/// Median absolute change of the ranges between two moments, metre, modulo the ambiguity interval.
-///
-/// `None` where the number of views changed, or ranges were not there yet.
-pub(crate) fn median_change(before: &[Option<Snapshot>], views: &[View]) -> Option<f64> {
-    if before.len() != views.len() {
-        return None;
-    }
-    let mut changes = Vec::new();
-    for (before, view) in before.iter().zip(views) {
-        let (before, after) = (before.as_ref()?, view.snapshot()?);
-        for (before, after) in before.range.as_slice().iter().zip(after.range.as_slice()) {
-            let change = f64::from(*after) - f64::from(*before);
-            changes.push(view.modulation.map_or(change, |modulation| wrap(change, modulation)).abs());
-        }
-    }
-    Some(quantile(&mut changes, 0.5)).filter(|change| change.is_finite())
-}
-
-/// Range errors of all views together.
-pub(crate) fn evaluate_all(views: &[View]) -> Option<RangeTruth> {
-    let all: Vec<&View> = views.iter().collect();
-    evaluate(&all, views.first().and_then(|view| view.modulation))
-}
+use crate::survey::records::{RefusedStage, StationPose, ViewRecord};
+use statistics::quantile;
 
 /// Every figure of the run but its time and output folder.
-pub(crate) fn summarise(plan: &Plan, survey: &Path, outcome: &Outcome) -> Summary {
-    let format = outcome.camera.format;
-    let mut stations: Vec<&str> = outcome.views.iter().map(|view| view.station.as_str()).collect();
+pub(crate) fn summarise(
+    plan: &Plan,
+    folder: &Path,
+    flow: &Flow,
+    kept: &mut Kept,
+    refusal: Option<RefusedStage>,
+    own_clouds: Vec<OwnCloud>,
+) -> Summary {
+    let (survey, format, joined) = (&flow.survey.survey, flow.camera().format, &flow.joined);
+    // Poses of stations that were not brought together after all are nobody's.
+    let poses: &[StationPose] = if refusal.is_some() { &[] } else { &joined.poses };
+    let mut stations: Vec<&str> = kept.views.iter().map(|view| view.station.as_str()).collect();
     stations.sort_unstable();
     stations.dedup();
     Summary {
         pipeline: plan.name.clone(),
-        survey: survey.display().to_string(),
-        calibration: outcome.calibration.clone(),
-        level: outcome.survey.level.name(),
+        survey: folder.display().to_string(),
+        calibration: flow.survey.calibration_words.clone(),
+        level: survey.level.name(),
         size_px: [format.width, format.height],
-        frames: outcome.survey.frames.len(),
+        frames: survey.frames.len(),
         stations: stations.len(),
-        stages: outcome.stages.clone(),
-        drifts: outcome.views.iter().filter_map(|view| view.correction.as_ref()?.drift().cloned()).collect(),
-        ruled_out: ruled_out(outcome.survey.level),
-        flags_fraction: flag_fractions(&outcome.views),
-        points: outcome.clouds.iter().map(|cloud| usable(cloud).count()).sum(),
-        sigma_range_median_m: median_sigma(&outcome.views),
-        registration: registration(outcome),
-        reference: reference(&outcome.views),
-        truth: truth(outcome),
-        remaining: trends::remaining(outcome),
-        refusal: outcome.refusal.clone(),
-        own_clouds: own_clouds(outcome),
-        doubts: doubts(outcome),
+        stages: flow.stages.clone(),
+        drifts: kept.views.iter().filter_map(|view| view.drift.clone()).collect(),
+        ruled_out: ruled_out(survey.level),
+        flags_fraction: kept.flag_fractions(),
+        points: kept.views.iter().filter_map(|view| view.points).sum(),
+        sigma_range_median_m: median(&kept.values.sigma_m),
+        registration: registration(joined, &kept.views, poses),
+        reference: kept.reference(),
+        truth: truth(kept, poses),
+        remaining: kept.residuals.remaining(),
+        doubts: doubts(flow, &kept.views, refusal.as_ref(), poses),
+        refusal,
+        own_clouds,
         seconds: 0.0,
         out: String::new(),
     }
 }
 
-fn flag_fractions(views: &[View]) -> BTreeMap<String, f64> {
-    let all: Vec<Flags> =
-        views.iter().filter_map(View::flags).flat_map(|flags| flags.as_slice().iter().copied()).collect();
-    let fraction = |count: usize| count as f64 / all.len().max(1) as f64;
-    let mut fractions: BTreeMap<String, f64> = Flags::NAMED
-        .iter()
-        .map(|(flag, name)| ((*name).to_owned(), fraction(all.iter().filter(|flags| flags.contains(*flag)).count())))
-        .filter(|(_, fraction)| *fraction > 0.0)
-        .collect();
-    fractions.insert("any".to_owned(), fraction(all.iter().filter(|flags| !flags.is_empty()).count()));
-    fractions
+fn median(values: &[f64]) -> Option<f64> {
+    Some(quantile(&mut values.to_vec(), 0.5)).filter(|value| value.is_finite())
 }
 
-fn median_sigma(views: &[View]) -> Option<f64> {
-    let mut sigmas = Vec::new();
-    for view in views {
-        if let ViewData::Range(frame) = &view.data {
-            let pairs = frame.sigma.as_slice().iter().zip(frame.flags.as_slice());
-            sigmas.extend(pairs.filter(|(_, flags)| flags.is_empty()).map(|(sigma, _)| f64::from(*sigma)));
-        }
-    }
-    Some(quantile(&mut sigmas, 0.5)).filter(|sigma| sigma.is_finite())
-}
-
-fn registration(outcome: &Outcome) -> Option<RegistrationSummary> {
-    if outcome.pairs.is_empty() {
+fn registration(joined: &Joined, views: &[ViewRecord], known: &[StationPose]) -> Option<RegistrationSummary> {
+    if joined.pairs.is_empty() {
         return None;
     }
-    let distance = |a: &Isometry3<f64>, b: &Isometry3<f64>| (a.translation.vector - b.translation.vector).norm();
-    let pairs = outcome.pairs.iter().map(|pair| PairSummary {
-        target: outcome.views[pair.target].station.clone(),
-        source: outcome.views[pair.source].station.clone(),
+    let place = |index: usize| joined.poses[index].world_from_camera.translation.vector;
+    let pairs = joined.pairs.iter().map(|pair| PairSummary {
+        target: views[pair.target].station.clone(),
+        source: views[pair.source].station.clone(),
         overlap: pair.result.overlap,
         rms_m: pair.result.rms_m,
         iterations: pair.result.iterations,
-        distance_m: distance(
-            &outcome.poses[pair.target].world_from_camera,
-            &outcome.poses[pair.source].world_from_camera,
-        ),
+        distance_m: (place(pair.target) - place(pair.source)).norm(),
     });
-    // Poses of stations that were not brought together after all are nobody's.
-    let sigmas = outcome
-        .poses
-        .iter()
-        .filter(|_| outcome.refusal.is_none())
-        .filter_map(crate::survey::outcome::StationPose::position_sigma_m);
     Some(RegistrationSummary {
         pairs: pairs.collect(),
-        refused: outcome.refused.iter().map(|pair| refusal(outcome, pair)).collect(),
-        sigma0: outcome.adjustment.as_ref().and_then(|figures| figures.sigma0),
-        redundancy: outcome.adjustment.as_ref().map(|figures| figures.redundancy),
-        position_sigma_max_m: sigmas.reduce(f64::max),
+        refused: joined.refused.iter().map(|pair| refusal(views, pair)).collect(),
+        sigma0: joined.adjustment.as_ref().and_then(|figures| figures.sigma0),
+        redundancy: joined.adjustment.as_ref().map(|figures| figures.redundancy),
+        position_sigma_max_m: known.iter().filter_map(StationPose::position_sigma_m).reduce(f64::max),
     })
 }
 
 /// What speaks against survey and result.
-fn doubts(outcome: &Outcome) -> Vec<Doubt> {
-    let mut doubts: Vec<Doubt> = outcome
-        .refusal
-        .iter()
-        .map(|refusal| {
-            let words =
-                format!("{}; each cloud is in the frame of its own camera, and no poses are written", refusal.reason);
-            Doubt::about(DoubtKind::Refused, refusal.stage, words)
-        })
-        .collect();
-    doubts.extend(outcome.doubts.iter().cloned());
-    doubts.extend(repair::unjudged(&outcome.stages));
-    doubts.extend(plausibility::of_outcome(outcome));
-    if outcome.refusal.is_none() {
-        doubts.extend(outcome.adjustment.iter().flat_map(|figures| wrong_places(outcome, &figures.placements)));
+fn doubts(flow: &Flow, views: &[ViewRecord], refusal: Option<&RefusedStage>, poses: &[StationPose]) -> Vec<Doubt> {
+    let of_refusal = |refusal: &RefusedStage| {
+        let words = format!("{}; each cloud is in the frame of its own camera, and no poses are written", refusal.reason);
+        Doubt::about(DoubtKind::Refused, refusal.stage, words)
+    };
+    let mut doubts: Vec<Doubt> = refusal.map(of_refusal).into_iter().collect();
+    doubts.extend(flow.doubts.iter().cloned());
+    doubts.extend(repair::unjudged(&flow.stages));
+    doubts.extend(plausibility::of_views(views, poses));
+    if refusal.is_none() {
+        let adjustment = flow.joined.adjustment.iter();
+        doubts.extend(adjustment.flat_map(|figures| wrong_places(views, &figures.placements)));
     }
     doubts
 }
 
 /// What to say of stations that are probably in the wrong place.
-fn wrong_places(outcome: &Outcome, placements: &Placements) -> Vec<Doubt> {
-    let words = |station: usize| wrong_place(&outcome.views[station].station, &placements.stations[station]);
+fn wrong_places(views: &[ViewRecord], placements: &Placements) -> Vec<Doubt> {
+    let words = |station: usize| wrong_place(&views[station].station, &placements.stations[station]);
     placements.doubtful().map(words).collect()
 }
 
-fn refusal(outcome: &Outcome, pair: &RefusedPair) -> String {
-    let station = |index: usize| &outcome.views[index].station;
-    format!("{} to {}: {}", station(pair.source), station(pair.target), pair.reason)
+fn refusal(views: &[ViewRecord], pair: &RefusedPair) -> String {
+    format!("{} to {}: {}", views[pair.source].station, views[pair.target].station, pair.reason)
 }
 
-/// Unflagged ranges against the reference, up to a constant, modulo the ambiguity interval.
-fn reference(views: &[View]) -> Option<ReferenceSummary> {
-    let mut differences = Vec::new();
-    let mut modulation = None;
-    for view in views {
-        let (Some(reference), ViewData::Range(frame)) = (&view.reference_range, &view.data) else { continue };
-        modulation = view.modulation;
-        for ((range, reference), flags) in
-            frame.range.as_slice().iter().zip(reference.as_slice()).zip(frame.flags.as_slice())
-        {
-            let difference = f64::from(*range) - f64::from(*reference);
-            if flags.is_empty() && difference.is_finite() {
-                differences.push(difference);
-            }
-        }
-    }
-    if differences.is_empty() {
-        return None;
-    }
-    let mut constant = quantile(&mut differences.clone(), 0.5);
-    if let Some(modulation) = modulation {
-        // The reference may be wrapped where ours is not: differences are brought next to the common constant.
-        for difference in &mut differences {
-            *difference = constant + wrap(*difference - constant, modulation);
-        }
-        constant = quantile(&mut differences.clone(), 0.5);
-    }
-    Some(ReferenceSummary {
-        constant_m: constant,
-        robust_standard_deviation_m: robust_standard_deviation(&differences),
-        pixels: differences.len(),
-    })
-}
-
-fn truth(outcome: &Outcome) -> Option<TruthSummary> {
-    let modulation = first_modulation(outcome);
-    let ranges = evaluate(&outcome.views.iter().collect::<Vec<_>>(), modulation)?;
+fn truth(kept: &mut Kept, poses: &[StationPose]) -> Option<TruthSummary> {
+    let ranges = std::mem::take(&mut kept.truth).figures()?;
     let mut stations = BTreeMap::new();
-    for (index, view) in outcome.views.iter().enumerate() {
-        let Some(ranges) = evaluate(&[view], modulation) else { continue };
-        let errors = pose_errors(outcome, index);
+    for (index, view) in kept.views.iter().enumerate() {
+        let Some(ranges) = view.truth.clone() else { continue };
+        let found = poses.get(index).map(|pose| pose.world_from_camera);
+        let errors = found.zip(view.true_pose).map(|(found, truth)| pose_errors(&found, &truth));
         let (position_error_m, attitude_error_deg) = (errors.map(|e| e[0]), errors.map(|e| e[1]));
         stations.insert(view.station.clone(), StationTruth { ranges, position_error_m, attitude_error_deg });
     }
@@ -217,9 +133,7 @@ fn truth(outcome: &Outcome) -> Option<TruthSummary> {
 }
 
 /// Errors of a station's position in metre and attitude in degree.
-fn pose_errors(outcome: &Outcome, index: usize) -> Option<[f64; 2]> {
-    let estimated = outcome.poses.get(index).filter(|_| outcome.refusal.is_none())?.world_from_camera;
-    let truth = outcome.views[index].truth.as_ref()?.world_from_camera?;
-    let position = (estimated.translation.vector - truth.translation.vector).norm();
-    Some([position, estimated.rotation.angle_to(&truth.rotation).to_degrees()])
+fn pose_errors(found: &Isometry3<f64>, truth: &Isometry3<f64>) -> [f64; 2] {
+    let position = (found.translation.vector - truth.translation.vector).norm();
+    [position, found.rotation.angle_to(&truth.rotation).to_degrees()]
 }

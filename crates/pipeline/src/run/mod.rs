@@ -1,33 +1,49 @@
 //! One run: survey in, stages in order, results out.
+//!
+//! A survey is never in memory as a whole. `stream` takes the frames of one station after the other through the stages; of
+//! each view that comes out `clouds` writes the points, `kept` keeps counts, thinned pixels and small pictures, and
+//! `stages::joining` the points that registration needs. `tally` gathers what each stage changed. Once all views went
+//! through, `flow` joins the stations, `measure` makes the summary of what was kept, and `results` completes the output.
 
-pub(crate) mod correction_maps;
+pub(crate) mod clouds;
 pub(crate) mod document;
 pub(crate) mod figures;
+pub(crate) mod flow;
+pub(crate) mod kept;
 pub(crate) mod measure;
 pub(crate) mod results;
 pub(crate) mod simulate;
+pub(crate) mod stream;
 pub(crate) mod summary;
+pub(crate) mod tally;
 
-pub use results::OwnCloud;
+pub use clouds::OwnCloud;
 pub use simulate::{Simulated, simulate};
 pub use summary::{PairSummary, ReferenceSummary, RegistrationSummary, StationTruth, Summary, TruthSummary};
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::Instant;
 
 use atomic_output::Destination;
+use camera_model::Camera;
 use range_io::calibration::Calibration;
+use range_io::survey::Survey;
+use range_io::tables::Station;
 
 use crate::command::destination::{Inputs, produce, root_of};
 use crate::command::progress::Progress;
-use crate::command::verdict::Failure;
+use crate::command::verdict::{Doubt, Failure};
 use crate::plan::{NetworkCalibration, Source};
-use crate::survey::load::{load, read_calibration};
-use crate::survey::outcome::{Outcome, RefusedStage, StageSummary};
-use crate::survey::plausibility;
-use crate::survey::view::Snapshot;
-use crate::survey::work::Work;
-use crate::{Error, Plan, Result, Stage, stages};
+use crate::run::clouds::Clouds;
+use crate::run::document::document;
+use crate::run::figures::Figures;
+use crate::run::flow::Flow;
+use crate::run::kept::Kept;
+use crate::survey::open::{OpenSurvey, read_calibration};
+use crate::survey::records::{RefusedStage, StageSummary, StationPose, ViewRecord, common_poses};
+use crate::survey::view::View;
+use crate::{Error, Plan, Result, Stage};
 
 /// What to run on what.
 #[derive(Debug, Clone)]
@@ -126,28 +142,38 @@ fn run_into(
         (named, _) => named.clone(),
     };
     let calibration = read_calibration(&root_of(&survey), calibration.as_deref())?;
-    let mut work = load(&survey, calibration, &request.plan, None, progress)?;
-    for stage in &request.plan.stages {
-        match apply(stage, &mut work, progress) {
-            // The stations stand, if not in one frame.
-            Err(error) if is_registration(stage) && error.failure() == Failure::Refused => {
-                work.outcome.refusal = Some(RefusedStage { stage: stage.name(), reason: error.to_string() });
-                break;
-            }
-            done => done?,
+    let mut flow = Flow::new(&request.plan, &survey, calibration)?;
+    let mut kept = Kept::new(&flow.survey, flow.camera(), flow.order.views());
+    let folder = destination.open()?;
+    let joins = request.plan.stages.iter().any(|stage| matches!(stage, Stage::Register(_) | Stage::Adjust(_)));
+    let mut clouds = Clouds::new(&folder, &flow.survey, joins);
+    let mut keep = |view: View, survey: &OpenSurvey| {
+        clouds.add(&view)?;
+        kept.add(&view, survey)
+    };
+    flow.views(&mut keep, progress)?;
+    let refusal = match flow.join(&request.plan, progress) {
+        // The stations stand, if not in one frame.
+        Err((stage, error)) if error.failure() == Failure::Refused => {
+            Some(RefusedStage { stage, reason: error.to_string() })
         }
-    }
-    let outcome = work.outcome;
-    let mut summary = measure::summarise(&request.plan, &survey, &outcome);
+        Err((_, error)) => return Err(error),
+        Ok(()) => None,
+    };
+    progress.begin("write results", 3);
+    let common = if refusal.is_some() { None } else { common_poses(&kept.views, &flow.joined.poses) };
+    let own_clouds = clouds.finish(common.as_deref())?;
+    let mut summary = measure::summarise(&request.plan, &survey, &flow, &mut kept, refusal, own_clouds);
     summary.out = request.out.display().to_string();
     summary.seconds = start.elapsed().as_secs_f64();
-    results::write(destination, &outcome, &summary, progress)?;
+    if let Some(poses) = &common {
+        results::write_poses(&folder, &kept.views, poses, &summary)?;
+    }
+    progress.advance(1);
+    let figures = Figures::new(kept, &flow.joined.poses, common.as_deref(), flow.survey.vertical_axis)?;
+    results::finish(folder, &summary, &document(&summary, figures).html(), progress)?;
     progress.finish();
     Ok(summary)
-}
-
-fn is_registration(stage: &Stage) -> bool {
-    matches!(stage, Stage::Register(_) | Stage::Adjust(_))
 }
 
 /// The survey's folder; simulated first where the plan says so.
@@ -182,39 +208,58 @@ pub fn beside(out: &Path, ending: &str) -> PathBuf {
     out.with_file_name(name)
 }
 
-/// Loads a survey and applies a plan's stages, without writing anything.
-pub fn process(plan: &Plan, survey: &Path, calibration: Option<&Path>, progress: &dyn Progress) -> Result<Outcome> {
-    process_with(plan, survey, read_calibration(&root_of(survey), calibration)?, progress)
+/// What a plan makes of a survey, in memory.
+#[derive(Debug)]
+pub struct Processed {
+    /// One view a station, or a frame where frames were not averaged; none where they were handed on.
+    pub views: Vec<View>,
+    /// What is kept of each view.
+    pub records: Vec<ViewRecord>,
+    /// What was captured.
+    pub survey: Arc<Survey>,
+    /// The camera whose rays make the clouds.
+    pub camera: Camera,
+    /// What `stations.csv` says of the stations.
+    pub stated: Vec<Station>,
+    /// Index of the world's axis that points up: z where poses came with the survey, y in a camera's own frame.
+    pub vertical_axis: usize,
+    /// One pose a view, where a stage found them.
+    pub poses: Vec<StationPose>,
+    /// What each stage did.
+    pub stages: Vec<StageSummary>,
+    /// What speaks against survey and frames.
+    pub doubts: Vec<Doubt>,
 }
 
-/// [`process`] with a calibration at hand, and what to call it.
-pub fn process_with(
+/// Loads a survey and applies a plan's stages, without writing anything. All views are in memory in the end; of surveys
+/// that are large [`process_each`] keeps none.
+pub fn process(plan: &Plan, survey: &Path, calibration: Option<&Path>, progress: &dyn Progress) -> Result<Processed> {
+    let mut views = Vec::new();
+    let calibration = read_calibration(&root_of(survey), calibration)?;
+    let processed = process_each(plan, survey, calibration, &mut |view, _| Ok(views.push(view)), progress)?;
+    Ok(Processed { views, ..processed })
+}
+
+/// Applies a plan's stages to a survey, one station after the other, and hands on each view, for a calibration at hand and
+/// what to call it.
+pub fn process_each(
     plan: &Plan,
     survey: &Path,
     calibration: (Option<Calibration>, String),
+    keep: &mut dyn FnMut(View, &OpenSurvey) -> Result<()>,
     progress: &dyn Progress,
-) -> Result<Outcome> {
-    let mut work = load(survey, calibration, plan, None, progress)?;
-    plan.stages.iter().try_for_each(|stage| apply(stage, &mut work, progress))?;
-    Ok(work.outcome)
-}
-
-/// Applies one stage and records what it did.
-fn apply(stage: &Stage, work: &mut Work, progress: &dyn Progress) -> Result<()> {
-    progress.begin(stage.name(), work.outcome.views.len());
-    let before: Vec<Option<Snapshot>> = work.outcome.views.iter().map(crate::survey::view::View::snapshot).collect();
-    let start = Instant::now();
-    plausibility::before(stage, &mut work.outcome);
-    let findings = stages::apply(stage, work, progress)?;
-    plausibility::after(stage, work)?;
-    let seconds = start.elapsed().as_secs_f64();
-    let record = StageSummary {
-        name: stage.name(),
-        seconds,
-        findings,
-        change_median_m: measure::median_change(&before, &work.outcome.views),
-        truth: measure::evaluate_all(&work.outcome.views),
+) -> Result<Processed> {
+    let mut flow = Flow::new(plan, survey, calibration)?;
+    let mut records = Vec::new();
+    let mut keep = |view: View, survey: &OpenSurvey| {
+        records.push(ViewRecord::new(&view, &survey.stated));
+        keep(view, survey)
     };
-    work.outcome.stages.push(record);
-    Ok(())
+    flow.views(&mut keep, progress)?;
+    flow.join(plan, progress).map_err(|(_, error)| error)?;
+    let camera = *flow.camera();
+    let Flow { survey, stages, doubts, joined, .. } = flow;
+    let OpenSurvey { survey, stated, vertical_axis, .. } = survey;
+    let (views, poses) = (Vec::new(), joined.poses);
+    Ok(Processed { views, records, survey, camera, stated, vertical_axis, poses, stages, doubts })
 }

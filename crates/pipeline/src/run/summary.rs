@@ -5,9 +5,9 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use crate::command::verdict::{Doubt, Judged, Verdict};
-use crate::run::results::OwnCloud;
+use crate::run::clouds::OwnCloud;
 use crate::survey::drift::ViewDrift;
-use crate::survey::outcome::{RefusedStage, StageSummary};
+use crate::survey::records::{RefusedStage, StageSummary};
 use crate::survey::truth::RangeTruth;
 use crate::trends::RemainingErrors;
 

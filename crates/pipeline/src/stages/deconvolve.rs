@@ -1,52 +1,67 @@
+use std::sync::{Mutex, PoisonError};
+
 use range_image::ComplexFrame;
 use scattering_deconvolution::{
     OutsideLight, OutsideLightDetector, OutsideLightOptions, OutsideLightVerdict, Psf, RestorationOptions, Restorer,
     Side,
 };
 
-use crate::command::progress::Progress;
 use crate::command::verdict::{Doubt, DoubtKind};
 use crate::plan::DeconvolveOptions;
-use crate::stages::Findings;
-use crate::survey::view::ViewData;
-use crate::survey::work::Work;
+use crate::stages::line::Making;
+use crate::stages::{Findings, Found, ViewStage};
+use crate::survey::view::{View, ViewData};
 use crate::{Error, Result};
 
 /// The calibrated point spread function is taken off the complex images; pixels whose correction depends on light that
 /// is not known, saturated or from outside the field of view, are flagged.
-pub(super) fn run(work: &mut Work, options: &DeconvolveOptions, progress: &dyn Progress) -> Result<Findings> {
-    let psf = work.calibration.as_ref().and_then(|calibration| calibration.scattering.clone());
-    let Some(psf) = psf else {
-        return Err(Error::Camera(
-            "stage Deconvolve needs a point spread function, but the calibration has no `scattering`".to_owned(),
-        ));
-    };
-    let options = RestorationOptions { regularisation: options.regularisation, ..RestorationOptions::default() };
-    let mut tools: Option<Tools> = None;
-    let (mut dependent, mut suspected, mut doubts) = (0, 0, Vec::new());
-    for (index, view) in work.outcome.views.iter_mut().enumerate() {
-        let name = view.name();
-        let size = view.size();
-        let ViewData::Phase(frame) = &mut view.data else {
-            return Err(Error::Needs { stage: "Deconvolve", needs: "Demodulate" });
+pub(super) struct Deconvolve {
+    psf: Psf,
+    options: RestorationOptions,
+    /// Made for the size of the frames with the first of them, and used by one at a time.
+    tools: Mutex<Option<Tools>>,
+}
+
+impl Deconvolve {
+    pub(super) fn new(options: &DeconvolveOptions, making: &Making<'_>) -> Result<Self> {
+        let psf = making.survey.calibration.as_ref().and_then(|calibration| calibration.scattering.clone());
+        let Some(psf) = psf else {
+            return Err(Error::Camera(
+                "stage Deconvolve needs a point spread function, but the calibration has no `scattering`".to_owned(),
+            ));
         };
-        if tools.as_ref().is_none_or(|tools| tools.size != size) {
-            tools = Some(Tools::new(&psf, size, &options).map_err(Error::stage("Deconvolve", &name))?);
-        }
-        if let Some(tools) = &mut tools {
-            let found = tools.apply(frame).map_err(Error::stage("Deconvolve", &name))?;
-            dependent += found.dependent;
-            suspected += usize::from(found.outside_light.is_some());
-            doubts.extend(found.outside_light.and_then(|light| doubt(&view.station, &light, size)));
-        }
-        progress.advance(index + 1);
+        let options = RestorationOptions { regularisation: options.regularisation, ..RestorationOptions::default() };
+        Ok(Self { psf, options, tools: Mutex::new(None) })
     }
-    work.outcome.doubts.extend(doubts);
-    Ok(Findings::from([
-        ("scattered_share".to_owned(), psf.total_weight()),
-        ("dependent_px".to_owned(), dependent as f64),
-        ("views_with_outside_light".to_owned(), suspected as f64),
-    ]))
+}
+
+impl ViewStage for Deconvolve {
+    fn apply(&self, views: &mut Vec<View>, found: &mut Found) -> Result<()> {
+        let mut tools = self.tools.lock().unwrap_or_else(PoisonError::into_inner);
+        for view in views {
+            let (name, size) = (view.name(), view.size());
+            let ViewData::Phase(frame) = &mut view.data else {
+                return Err(Error::Needs { stage: "Deconvolve", needs: "Demodulate" });
+            };
+            if tools.as_ref().is_none_or(|tools| tools.size != size) {
+                let made = Tools::new(&self.psf, size, &self.options);
+                *tools = Some(made.map_err(Error::stage("Deconvolve", &name))?);
+            }
+            if let Some(tools) = &mut *tools {
+                let light = tools.apply(frame).map_err(Error::stage("Deconvolve", &name))?;
+                found.add("dependent_px", light.dependent);
+                found.add("views_with_outside_light", usize::from(light.outside_light.is_some()));
+                found.doubts.extend(light.outside_light.and_then(|light| doubt(&view.station, &light, size)));
+            }
+        }
+        Ok(())
+    }
+
+    fn findings(&self, found: &Found) -> Findings {
+        let mut findings = found.sums.clone();
+        findings.insert("scattered_share".to_owned(), self.psf.total_weight());
+        findings
+    }
 }
 
 /// What to say where light from outside spoils pixels.
@@ -76,7 +91,7 @@ struct Tools {
     detector: Option<OutsideLightDetector>,
 }
 
-struct Found {
+struct Light {
     dependent: usize,
     /// Of the frequency in which it flags most.
     outside_light: Option<OutsideLight>,
@@ -94,7 +109,7 @@ impl Tools {
         Ok(Self { size, restorer, detector })
     }
 
-    fn apply(&mut self, frame: &mut ComplexFrame) -> scattering_deconvolution::Result<Found> {
+    fn apply(&mut self, frame: &mut ComplexFrame) -> scattering_deconvolution::Result<Light> {
         let summaries = self.restorer.restore_frame(frame)?;
         let mut outside_light: Option<OutsideLight> = None;
         if let Some(detector) = &self.detector {
@@ -107,6 +122,6 @@ impl Tools {
                 }
             }
         }
-        Ok(Found { dependent: summaries.iter().map(|summary| summary.dependent_pixels).sum(), outside_light })
+        Ok(Light { dependent: summaries.iter().map(|summary| summary.dependent_pixels).sum(), outside_light })
     }
 }

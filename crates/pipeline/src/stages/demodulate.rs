@@ -1,48 +1,59 @@
 use range_image::{
-    ComplexFrame, ConsistencyOptions, DemodulationOptions, Demodulator, NoiseModel, RawFrame, RulesVerdict,
+    ComplexFrame, ConsistencyOptions, DemodulationOptions, Demodulator, InterferenceOptions, NoiseModel, RawFrame, RulesVerdict,
     check_samples, tell_interference,
 };
 
-use crate::command::progress::Progress;
 use crate::plan::DemodulateOptions;
-use crate::stages::Findings;
-use crate::survey::view::ViewData;
-use crate::survey::work::Work;
+use crate::stages::line::Making;
+use crate::stages::{Found, ViewStage};
+use crate::survey::open::OpenSurvey;
+use crate::survey::view::{View, ViewData};
 use crate::{Error, Result};
 
 /// Raw samples to complex images, with the conventions that the survey states.
-pub(super) fn run(work: &mut Work, options: &DemodulateOptions, progress: &dyn Progress) -> Result<Findings> {
-    let (consistency, interference) = (options.consistency.clone(), options.interference);
-    let options = demodulation_options(work, options);
-    work.low_amplitude = options.low_amplitude;
-    // What breaks a rule cannot be told without a measure.
-    let consistency = consistency.filter(|check| options.noise.is_known() || check.tolerance > 0.0);
-    let demodulator = Demodulator::new(&options).map_err(Error::stage("Demodulate", "options"))?;
-    let total = work.outcome.views.len();
-    let (mut inconsistent, mut disturbed) = (0, 0);
-    for (index, view) in work.outcome.views.iter_mut().enumerate() {
-        if let ViewData::Samples(raw) = &view.data {
-            let mut frame = ComplexFrame::empty();
-            let demodulated = demodulator.demodulate_into(raw, &mut frame);
-            demodulated.map_err(Error::stage("Demodulate", &view.name()))?;
-            if let Some(check) = &consistency {
-                let found = check_frame(raw, &options, check, &mut frame);
-                inconsistent += found.map_err(Error::stage("Demodulate", &view.name()))?;
-                let share = tell_interference(&mut frame, &interference);
-                let share = share.map_err(Error::stage("Demodulate", &view.name()))?;
-                disturbed += usize::from(share >= interference.least_share);
+pub(super) struct Demodulate {
+    options: DemodulationOptions,
+    demodulator: Demodulator,
+    consistency: Option<ConsistencyOptions>,
+    interference: InterferenceOptions,
+}
+
+impl Demodulate {
+    pub(super) fn new(options: &DemodulateOptions, making: &mut Making<'_>) -> Result<Self> {
+        let (consistency, interference) = (options.consistency.clone(), options.interference);
+        let options = demodulation_options(making.survey, options);
+        making.low_amplitude = options.low_amplitude;
+        // What breaks a rule cannot be told without a measure.
+        let consistency = consistency.filter(|check| options.noise.is_known() || check.tolerance > 0.0);
+        let demodulator = Demodulator::new(&options).map_err(Error::stage("Demodulate", "options"))?;
+        Ok(Self { options, demodulator, consistency, interference })
+    }
+}
+
+impl ViewStage for Demodulate {
+    fn apply(&self, views: &mut Vec<View>, found: &mut Found) -> Result<()> {
+        for view in views.iter_mut() {
+            found.add("frames", 1);
+            let (mut inconsistent, mut disturbed) = (0, false);
+            if let ViewData::Samples(raw) = &view.data {
+                let fail = |error| Error::stage("Demodulate", &view.name())(error);
+                let mut frame = ComplexFrame::empty();
+                self.demodulator.demodulate_into(raw, &mut frame).map_err(fail)?;
+                if let Some(check) = &self.consistency {
+                    inconsistent = check_frame(raw, &self.options, check, &mut frame).map_err(fail)?;
+                    let share = tell_interference(&mut frame, &self.interference).map_err(fail)?;
+                    disturbed = share >= self.interference.least_share;
+                }
+                view.data = ViewData::Phase(frame);
+                view.before = view.snapshot();
             }
-            view.data = ViewData::Phase(frame);
-            view.before = view.snapshot();
+            if self.consistency.is_some() {
+                found.add("inconsistent_px", inconsistent);
+                found.add("frames_with_interference", usize::from(disturbed));
+            }
         }
-        progress.advance(index + 1);
+        Ok(())
     }
-    let mut findings = Findings::from([("frames".to_owned(), total as f64)]);
-    if consistency.is_some() {
-        findings.insert("inconsistent_px".to_owned(), inconsistent as f64);
-        findings.insert("frames_with_interference".to_owned(), disturbed as f64);
-    }
-    Ok(findings)
 }
 
 /// Flags pixels whose samples contradict each other; their number.
@@ -58,12 +69,12 @@ fn check_frame(
     }
 }
 
-fn demodulation_options(work: &Work, options: &DemodulateOptions) -> DemodulationOptions {
+fn demodulation_options(survey: &OpenSurvey, options: &DemodulateOptions) -> DemodulationOptions {
     let stated = options
         .noise
         .map(|noise| NoiseModel { shot_variance_per_unit: noise.shot_variance_per_unit, dark_sigma: noise.dark_sigma });
-    let camera = &work.outcome.survey.camera;
-    let calibrated = work.calibration.as_ref().and_then(|calibration| calibration.noise);
+    let camera = &survey.survey.camera;
+    let calibrated = survey.calibration.as_ref().and_then(|calibration| calibration.noise);
     DemodulationOptions {
         noise: stated.or(calibrated).unwrap_or_default(),
         low_amplitude: options.low_amplitude,

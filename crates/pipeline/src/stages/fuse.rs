@@ -2,37 +2,33 @@ use std::f64::consts::TAU;
 
 use range_image::{Exposure, FusionOptions, Modulation, RangeFrame, fuse_exposures};
 
-use crate::command::progress::Progress;
 use crate::plan::FuseExposuresOptions;
-use crate::stages::Findings;
-use crate::survey::view::{View, ViewData, by_station};
-use crate::survey::work::Work;
+use crate::stages::{Found, ViewStage};
+use crate::survey::view::{View, ViewData};
 use crate::{Error, Result};
 
 /// Below this ratio of signal to noise the noise of a phase is not normal.
 const NORMAL_SNR: f64 = 5.0;
 
 /// All views of a station, which differ in their integration times, become one; a station with one view keeps it.
-pub(super) fn run(work: &mut Work, options: &FuseExposuresOptions, progress: &dyn Progress) -> Result<Findings> {
-    let groups = by_station(std::mem::take(&mut work.outcome.views));
-    let (mut fused, mut contradictory, mut saturated) = (0_usize, 0_usize, 0_usize);
-    for (index, group) in groups.into_iter().enumerate() {
-        if group.len() < 2 {
-            work.outcome.views.extend(group);
-        } else {
-            let (view, found) = fuse(group, options)?;
-            work.outcome.views.push(view);
-            fused += 1;
-            contradictory += found[0];
-            saturated += found[1];
+pub(super) struct Fuse {
+    pub(super) options: FuseExposuresOptions,
+}
+
+impl ViewStage for Fuse {
+    fn apply(&self, views: &mut Vec<View>, found: &mut Found) -> Result<()> {
+        let (mut fused, mut pixels) = (0, [0; 2]);
+        if views.len() > 1 {
+            let view;
+            (view, pixels) = fuse(std::mem::take(views), &self.options)?;
+            views.push(view);
+            fused = 1;
         }
-        progress.advance(index + 1);
+        found.add("fused_stations", fused);
+        found.add("contradictory_px", pixels[0]);
+        found.add("saturated_px", pixels[1]);
+        Ok(())
     }
-    Ok(Findings::from([
-        ("fused_stations".to_owned(), fused as f64),
-        ("contradictory_px".to_owned(), contradictory as f64),
-        ("saturated_px".to_owned(), saturated as f64),
-    ]))
 }
 
 /// The longest exposure's view with the ranges of all; how many pixels contradict each other, and how many have no value.

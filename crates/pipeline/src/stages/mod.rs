@@ -1,4 +1,8 @@
 //! The stages, one file each, and what they share.
+//!
+//! All but the last two work on one frame or one station at a time, so that a survey streams through them: [`Line`] holds
+//! them ready and gathers what each finds, a few numbers and doubts. `Register` and `Adjust` need all stations; what they
+//! keep of each is in `joining`.
 
 pub(crate) mod average;
 pub(crate) mod cloud;
@@ -7,6 +11,7 @@ pub(crate) mod demodulate;
 pub(crate) mod flag;
 pub(crate) mod fuse;
 pub(crate) mod joining;
+pub(crate) mod line;
 pub(crate) mod multipath;
 pub(crate) mod ranges;
 pub(crate) mod wraps;
@@ -15,33 +20,48 @@ use std::collections::BTreeMap;
 
 use range_io::calibration::Calibration;
 
-use crate::command::progress::Progress;
-use crate::survey::work::Work;
-use crate::{Result, Stage};
+use crate::Result;
+use crate::command::verdict::Doubt;
+use crate::survey::drift::ViewDrift;
+use crate::survey::span::SpanTally;
+use crate::survey::view::View;
+pub use line::{Line, Step, Watch};
 
 /// Figures that a stage reports, with units in their names.
 pub type Findings = BTreeMap<String, f64>;
 
-/// Whether a calibration has anything that [`Stage::CorrectRange`] takes off.
+/// Whether a calibration has anything that [`Stage::CorrectRange`](crate::Stage::CorrectRange) takes off.
 pub fn corrects_ranges(calibration: &Calibration) -> bool {
     !calibration.range_models.is_empty() || calibration.warm_up.is_some()
 }
 
-/// Runs one stage on all views.
-pub fn apply(stage: &Stage, work: &mut Work, progress: &dyn Progress) -> Result<Findings> {
-    match stage {
-        Stage::Demodulate(options) => demodulate::run(work, options, progress),
-        Stage::Average(options) => average::run(work, options, progress),
-        Stage::Deconvolve(options) => deconvolve::run(work, options, progress),
-        Stage::Unwrap(options) => wraps::unwrap::run(work, options, progress),
-        Stage::RepairWraps(options) => wraps::repair::run(work, options, progress),
-        Stage::CorrectRange(options) => ranges::correct::run(work, options, progress),
-        Stage::CorrectImagePoint(_) => cloud::correct_image_point(work),
-        Stage::Multipath(options) => multipath::run(work, options, progress),
-        Stage::FuseExposures(options) => fuse::run(work, options, progress),
-        Stage::PointCloud(_) => cloud::run(work, progress),
-        Stage::Flag(options) => flag::run(work, options, progress),
-        Stage::Register(options) => joining::register::run(work, options, progress),
-        Stage::Adjust(options) => joining::adjust::run(work, options, progress),
+/// A stage that works on the views of one station at a time, ready for a survey.
+pub(crate) trait ViewStage: Send + Sync {
+    /// Works on views, and adds what it finds.
+    fn apply(&self, views: &mut Vec<View>, found: &mut Found) -> Result<()>;
+
+    /// What it found in all of them.
+    fn findings(&self, found: &Found) -> Findings {
+        found.sums.clone()
+    }
+}
+
+/// What a stage has found so far.
+#[derive(Debug, Default)]
+pub(crate) struct Found {
+    /// Numbers of pixels, views and the like.
+    pub(crate) sums: Findings,
+    /// What speaks against views.
+    pub(crate) doubts: Vec<Doubt>,
+    /// Drifts that were taken off.
+    pub(crate) drifts: Vec<ViewDrift>,
+    /// Pixels inside and outside the calibration's span.
+    pub(crate) span: SpanTally,
+}
+
+impl Found {
+    /// Adds to a number.
+    pub(crate) fn add(&mut self, name: &str, count: usize) {
+        *self.sums.entry(name.to_owned()).or_default() += count as f64;
     }
 }

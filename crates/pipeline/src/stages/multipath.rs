@@ -1,14 +1,16 @@
+use std::sync::Arc;
+
+use camera_model::RayTable;
 use multipath::{
     DetectionOptions, Evidence, FrequencyResponse, RiskEvidence, RiskOptions, Systematics, TwoPathOptions, Verdict,
     assess_risk, detect, estimate_response, solve_two_paths,
 };
 use range_image::{ComplexFrame, Flags, Raster};
 
-use crate::command::progress::Progress;
 use crate::plan::{MultipathOptions, MultipathTreatment};
-use crate::stages::Findings;
+use crate::stages::line::Making;
+use crate::stages::{Found, ViewStage};
 use crate::survey::view::{View, ViewData};
-use crate::survey::work::Work;
 use crate::{Error, Result};
 
 /// Pixels of smaller amplitude, in standard deviations, do not tell the response of the frequencies.
@@ -16,28 +18,39 @@ pub(super) const RESPONSE_SNR: f64 = 20.0;
 
 /// Light that came by more than one way: found by contradiction between frequencies where there are several, and
 /// estimated from the scene's own shape everywhere.
-pub(super) fn run(work: &mut Work, options: &MultipathOptions, progress: &dyn Progress) -> Result<Findings> {
-    let mut findings = Findings::new();
-    let mut add = |name: &str, count: usize| *findings.entry(name.to_owned()).or_default() += count as f64;
-    for (index, view) in work.outcome.views.iter_mut().enumerate() {
-        if !matches!(view.data, ViewData::Range(_)) {
-            return Err(Error::Needs { stage: "Multipath", needs: "Unwrap" });
-        }
-        if view.channels.len() > 1 {
-            match flag_contradictions(view, options)? {
-                Some(flagged) => {
-                    add("contradictions_px", flagged);
-                    if view.channels.len() > 2 && options.treatment == MultipathTreatment::Resolve {
-                        add("resolved_px", resolve(view, options)?);
-                    }
-                }
-                None => add("views_not_compared", 1),
-            }
-        }
-        add("at_risk_px", assess(view, work.rays.directions(), options)?);
-        progress.advance(index + 1);
+pub(super) struct Multipath {
+    options: MultipathOptions,
+    rays: Arc<RayTable>,
+}
+
+impl Multipath {
+    pub(super) fn new(options: &MultipathOptions, making: &Making<'_>) -> Self {
+        Self { options: options.clone(), rays: Arc::clone(&making.rays) }
     }
-    Ok(findings)
+}
+
+impl ViewStage for Multipath {
+    fn apply(&self, views: &mut Vec<View>, found: &mut Found) -> Result<()> {
+        let options = &self.options;
+        for view in views {
+            if !matches!(view.data, ViewData::Range(_)) {
+                return Err(Error::Needs { stage: "Multipath", needs: "Unwrap" });
+            }
+            if view.channels.len() > 1 {
+                match flag_contradictions(view, options)? {
+                    Some(flagged) => {
+                        found.add("contradictions_px", flagged);
+                        if view.channels.len() > 2 && options.treatment == MultipathTreatment::Resolve {
+                            found.add("resolved_px", resolve(view, options)?);
+                        }
+                    }
+                    None => found.add("views_not_compared", 1),
+                }
+            }
+            found.add("at_risk_px", assess(view, self.rays.directions(), options)?);
+        }
+        Ok(())
+    }
 }
 
 fn systematics(options: &MultipathOptions) -> Systematics {

@@ -2,14 +2,16 @@
 
 use std::sync::Arc;
 
-use camera_model::{Camera, OrganisedCloud, RayTable};
+use camera_model::{Camera, RayTable};
 use nalgebra::{Isometry3, Vector3};
 use point_cloud::{Cloud, OrganisedNormalOptions, organised_normals};
 use projective_registration::Projection;
 use range_io::clouds::CloudFile;
+use range_io::tables::Station as StatedStation;
 
-use crate::survey::outcome::{Outcome, StationPose};
 use crate::survey::plausibility::{self, PlacedStation};
+use crate::survey::records::StationPose;
+use crate::survey::view::View;
 use crate::{Error, Result};
 use statistics::quantile;
 
@@ -66,10 +68,10 @@ pub fn projection(camera: &Camera) -> Option<Arc<Projection>> {
 }
 
 impl Station {
-    /// The views of a survey with their clouds.
-    pub fn of_views(outcome: &Outcome) -> Vec<Self> {
-        let projection = projection(&outcome.camera);
-        let station = |(view, cloud): (&crate::View, &OrganisedCloud)| Self {
+    /// A view of a survey whose stations stand as `stated`, seen by `projection`; `None` where it has no cloud.
+    pub fn of_view(view: &View, stated: &[StatedStation], projection: Option<&Arc<Projection>>) -> Option<Self> {
+        let cloud = view.cloud.as_ref()?;
+        Some(Self {
             name: view.station.clone(),
             timestamp_s: view.timestamp_s,
             file: CloudFile {
@@ -80,12 +82,11 @@ impl Station {
                 size: Some([cloud.width, cloud.height]),
                 ..CloudFile::default()
             },
-            projection: projection.clone(),
+            projection: projection.cloned(),
             approximate: view.approximate_world_from_camera,
-            approximate_sigma: plausibility::stated_sigma(&outcome.stated, &view.station),
+            approximate_sigma: plausibility::stated_sigma(stated, &view.station),
             truth: view.truth.as_ref().and_then(|truth| truth.world_from_camera),
-        };
-        outcome.views.iter().zip(&outcome.clouds).map(station).collect()
+        })
     }
 
     /// All points of the file; NaN where a flag excludes one.

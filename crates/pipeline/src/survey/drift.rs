@@ -47,20 +47,20 @@ pub enum DriftSource {
 }
 
 /// A calibrated drift, ready for views of a survey.
-pub struct DriftCurve<'a> {
-    model: &'a WarmUp,
+pub struct DriftCurve {
+    model: WarmUp,
     covariance: DMatrix<f64>,
     /// Where the drift follows them.
     rates: Option<RateHistory>,
 }
 
-impl<'a> DriftCurve<'a> {
+impl DriftCurve {
     /// The curve of a calibration for the frames of a survey.
-    pub fn new(calibrated: &'a CalibratedDrift, survey: &Survey) -> Result<Self, DriftError> {
+    pub fn new(calibrated: &CalibratedDrift, survey: &Survey) -> Result<Self, DriftError> {
         let model = &calibrated.model;
         let known_from_s = model.time_span_s.map_or(0.0, |span| span[0]);
         let rates = model.frame_rate.map(|_| rate_history(survey, power_on_s(survey)?, known_from_s));
-        Ok(Self { model, covariance: calibrated.covariance()?, rates: rates.transpose()? })
+        Ok(Self { model: model.clone(), covariance: calibrated.covariance()?, rates: rates.transpose()? })
     }
 
     /// The mean of the drifts of the frames that went into a view.

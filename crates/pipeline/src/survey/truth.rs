@@ -5,6 +5,7 @@ use range_image::{Flags, Modulation, Raster};
 use serde::Serialize;
 use statistics::quantile;
 
+use crate::survey::thinning::Thinning;
 use crate::survey::view::View;
 
 /// What is true of one view.
@@ -31,19 +32,18 @@ pub struct RangeTruth {
     pub pixels: usize,
 }
 
-/// Signed errors of the unflagged pixels of a view, metre; NaN where there is nothing to compare.
+/// Signed errors of the pixels of a view, metre; NaN where there is nothing to compare.
 ///
 /// While the range is still wrapped, the error is taken modulo the ambiguity interval, so that the figures of
 /// all stages can be compared.
-pub fn range_errors(view: &View) -> Option<Vec<f64>> {
+pub fn range_errors(view: &View, range: &Raster<f32>) -> Option<Vec<f64>> {
     let truth = view.truth.as_ref()?;
-    let snapshot = view.snapshot()?;
     let wrapped = view.wrapped_to();
     let error = |(range, truth): (&f32, &f32)| {
         let difference = f64::from(*range) - f64::from(*truth);
         wrapped.map_or(difference, |modulation| wrap(difference, modulation))
     };
-    Some(snapshot.range.as_slice().iter().zip(truth.range.as_slice()).map(error).collect())
+    Some(range.as_slice().iter().zip(truth.range.as_slice()).map(error).collect())
 }
 
 /// A difference of ranges brought into half an ambiguity interval around zero.
@@ -52,31 +52,56 @@ pub(crate) fn wrap(difference_m: f64, modulation: Modulation) -> f64 {
     difference_m - (difference_m / interval).round() * interval
 }
 
-/// Figures of several views taken together; `None` where no view has truth and ranges.
-pub fn evaluate(views: &[&View], modulation: Option<Modulation>) -> Option<RangeTruth> {
-    let mut errors = Vec::new();
-    let (mut known, mut flagged) = (0_usize, 0_usize);
-    for view in views {
-        let (Some(all), Some(flags)) = (range_errors(view), view.flags()) else { continue };
-        for (error, flags) in all.iter().zip(flags.as_slice()) {
+/// The figures of one view; `None` where it has no truth or no ranges.
+pub fn evaluate(view: &View) -> Option<RangeTruth> {
+    let mut tally = TruthTally::default();
+    tally.add(view, &view.snapshot()?.range, Thinning::ALL);
+    tally.figures()
+}
+
+/// Counts and thinned errors of views, one after the other.
+#[derive(Debug, Default)]
+pub struct TruthTally {
+    /// Absolute errors of unflagged pixels, metre.
+    errors: Vec<f64>,
+    /// Pixels with a true range, those of them with a flag, unflagged pixels with an error, and those of them whose number
+    /// of whole intervals is right.
+    known: usize,
+    flagged: usize,
+    compared: usize,
+    right: usize,
+    views: usize,
+}
+
+impl TruthTally {
+    /// Adds a view with its ranges as they are now.
+    pub fn add(&mut self, view: &View, range: &Raster<f32>, thinning: Thinning) {
+        let (Some(all), Some(flags)) = (range_errors(view, range), view.flags()) else { return };
+        let half = view.modulation.map_or(f64::INFINITY, |modulation| modulation.ambiguity_interval_m() / 2.0);
+        let flags = flags.as_slice();
+        for (error, flags) in all.iter().zip(flags) {
             let excluded = *flags != Flags::empty();
-            known += usize::from(error.is_finite() || excluded);
-            flagged += usize::from(excluded);
+            self.known += usize::from(error.is_finite() || excluded);
+            self.flagged += usize::from(excluded);
             if !excluded && error.is_finite() {
-                errors.push(error.abs());
+                self.compared += 1;
+                self.right += usize::from(error.abs() < half);
             }
         }
+        let usable = |pixel: &usize| flags[*pixel].is_empty() && all[*pixel].is_finite();
+        let taken = thinning.pixels(self.views, all.len()).filter(usable);
+        self.errors.extend(taken.map(|pixel| all[pixel].abs()));
+        self.views += 1;
     }
-    if known == 0 {
-        return None;
+
+    /// The figures of all of them together.
+    pub fn figures(mut self) -> Option<RangeTruth> {
+        (self.known > 0).then(|| RangeTruth {
+            range_error_median_m: quantile(&mut self.errors, 0.5),
+            range_error_p95_m: quantile(&mut self.errors, 0.95),
+            wrap_count_right_fraction: self.right as f64 / self.compared.max(1) as f64,
+            flagged_fraction: self.flagged as f64 / self.known as f64,
+            pixels: self.compared,
+        })
     }
-    let half = modulation.map_or(f64::INFINITY, |modulation| modulation.ambiguity_interval_m() / 2.0);
-    let right = errors.iter().filter(|error| **error < half).count();
-    Some(RangeTruth {
-        range_error_median_m: quantile(&mut errors, 0.5),
-        range_error_p95_m: quantile(&mut errors, 0.95),
-        wrap_count_right_fraction: right as f64 / errors.len().max(1) as f64,
-        flagged_fraction: flagged as f64 / known as f64,
-        pixels: errors.len(),
-    })
 }

@@ -1,7 +1,6 @@
 //! What the stages work on: one view per frame, later per station.
 
-use std::collections::BTreeMap;
-
+use camera_model::OrganisedCloud;
 use nalgebra::Isometry3;
 use phase_unwrap::combine_frequencies;
 use range_image::{ComplexChannel, ComplexFrame, Flags, Modulation, RangeFrame, Raster, RawFrame};
@@ -41,6 +40,21 @@ pub struct View {
     pub multipath_risk_m: Option<Raster<f32>>,
     /// What the correction of the ranges worked on; once it ran.
     pub correction: Option<CorrectionRecord>,
+    /// Points in the camera's frame, a pixel each; once [`crate::Stage::PointCloud`] ran.
+    pub cloud: Option<OrganisedCloud>,
+    /// Points on the two surfaces of split mixed pixels.
+    pub further_points: Vec<FurtherPoint>,
+}
+
+/// A point that belongs to no single pixel of an organised cloud.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FurtherPoint {
+    /// Position in the camera's frame, metre.
+    pub point: [f64; 3],
+    /// Standard deviation along the ray, metre.
+    pub sigma_m: f32,
+    /// Amplitude in the camera's unit.
+    pub amplitude: f32,
 }
 
 /// The frame at its level.
@@ -168,18 +182,4 @@ pub fn view_name(station: &str, frames: &[usize]) -> String {
         [frame] => format!("station {station}, frame {frame}"),
         frames => format!("station {station}, mean of {} frames", frames.len()),
     }
-}
-
-/// The views of each station, in the order in which the stations come first.
-pub fn by_station(views: Vec<View>) -> Vec<Vec<View>> {
-    let mut groups: Vec<Vec<View>> = Vec::new();
-    let mut places: BTreeMap<String, usize> = BTreeMap::new();
-    for view in views {
-        let place = *places.entry(view.station.clone()).or_insert(groups.len());
-        match groups.get_mut(place) {
-            Some(group) => group.push(view),
-            None => groups.push(vec![view]),
-        }
-    }
-    groups
 }

@@ -10,7 +10,7 @@ use std::fmt;
 use residual_tests::{TrendReport, TrendTest, TrendVerdict};
 use serde::Serialize;
 
-pub(crate) use residuals::remaining;
+pub(crate) use residuals::Residuals;
 
 /// The test of the residuals against one variable.
 #[derive(Debug, Clone, Serialize)]

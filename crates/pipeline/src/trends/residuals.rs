@@ -1,14 +1,18 @@
 //! The residuals of a run: against the truth where the survey was simulated, and else of the planes that frames show.
 
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
 use camera_model::Camera;
 use primitives::{FittedPixel, PrimitiveKind, PrimitiveOptions, fit_primitive};
 use range_calibration::DifferenceOptions;
 use range_image::{Flags, RangeFrame};
+use range_io::survey::Survey;
 use rayon::prelude::*;
 use residual_tests::{TrendOptions, TrendSample, test_trends};
 use statistics::retain_within;
 
-use crate::survey::outcome::Outcome;
+use crate::survey::open::OpenSurvey;
 use crate::survey::truth::range_errors;
 use crate::survey::view::{View, ViewData};
 use crate::trends::{RemainingErrors, TrendSummary, sentence};
@@ -27,43 +31,143 @@ const FLATNESS: f64 = 0.03;
 /// Weight of ranges whose standard deviation nobody states, metre: all the same.
 const UNKNOWN_SIGMA_M: f64 = 0.01;
 
-/// Tests what the last stage leaves.
-pub(crate) fn remaining(outcome: &Outcome) -> RemainingErrors {
-    let pixels: usize = outcome.views.iter().filter_map(range_frame).map(|frame| frame.range.as_slice().len()).sum();
-    if pixels == 0 {
-        return none("The frames were not brought to ranges: there are no residuals to test for trends.".to_owned());
+/// Residuals of some pixels of the views so far.
+pub(crate) struct Residuals {
+    survey: Arc<Survey>,
+    camera: Camera,
+    /// Every so many columns and rows.
+    step: usize,
+    views: Vec<OfView>,
+}
+
+struct OfView {
+    station: String,
+    /// Whether the truth is known, whether it came to ranges, and what they show.
+    has_truth: bool,
+    has_ranges: bool,
+    samples: Vec<TrendSample>,
+}
+
+impl Residuals {
+    /// For so many views, whose rays a camera gives.
+    pub(crate) fn new(survey: &OpenSurvey, camera: &Camera, views: usize) -> Self {
+        let pixels = views * camera.format.width * camera.format.height;
+        let step = ((pixels as f64 / MOST_PIXELS as f64).sqrt().ceil() as usize).max(1);
+        Self { survey: Arc::clone(&survey.survey), camera: *camera, step, views: Vec::new() }
     }
-    let step = ((pixels as f64 / MOST_PIXELS as f64).sqrt().ceil() as usize).max(1);
-    let shares = shares(&outcome.views);
-    let views = outcome.views.par_iter().zip(&shares);
-    if outcome.views.iter().any(|view| view.truth.is_some()) {
-        let found: Vec<_> = views.map(|(view, share)| against_truth(outcome, *share, view, step)).collect();
-        let words = "Measured minus true ranges of unflagged pixels.".to_owned();
-        return tested("truth", words, found.into_iter().flatten().collect());
+
+    /// Adds what the last stage leaves of a view.
+    pub(crate) fn add(&mut self, view: &View) {
+        let has_truth = view.truth.is_some();
+        self.views.push(OfView {
+            station: view.station.clone(),
+            has_truth,
+            has_ranges: range_frame(view).is_some(),
+            samples: if has_truth { self.against_truth(view) } else { self.planes(view) },
+        });
     }
-    let found: Vec<_> = views.map(|(view, share)| planes(outcome, *share, view, step)).collect();
-    let shown = found.iter().filter(|samples| !samples.is_empty()).count();
-    if shown == 0 {
-        return none(
-            "The truth is not known and no frame, nor a quarter of one, shows a flat surface on most of its pixels: \
-             there are no residuals to test for trends."
-                .to_owned(),
+
+    /// Tests all of it.
+    pub(crate) fn remaining(&self) -> RemainingErrors {
+        if !self.views.iter().any(|view| view.has_ranges) {
+            return none("The frames were not brought to ranges: there are no residuals to test for trends.".to_owned());
+        }
+        // What one kind of residuals shows is not mixed with the other.
+        let of_truth = self.views.iter().any(|view| view.has_truth);
+        let of_kind = |(view, _): &(&OfView, usize)| view.has_truth == of_truth;
+        let views = || self.views.iter().zip(shares(&self.views)).filter(of_kind);
+        let shared = |(view, frame): (&OfView, usize)| {
+            view.samples.iter().map(move |sample| TrendSample { frame, ..*sample }).collect::<Vec<_>>()
+        };
+        let samples: Vec<TrendSample> = views().flat_map(shared).collect();
+        let (shown, all) = (views().filter(|(view, _)| !view.samples.is_empty()).count(), self.views.len());
+        if of_truth {
+            return tested("truth", "Measured minus true ranges of unflagged pixels.".to_owned(), samples);
+        }
+        if shown == 0 {
+            return none(
+                "The truth is not known and no frame, nor a quarter of one, shows a flat surface on most of its pixels: \
+                 there are no residuals to test for trends."
+                    .to_owned(),
+            );
+        }
+        let words = format!(
+            "The truth is not known: residuals of planes, fitted to {shown} of {all} frames or to quarters of them. What a \
+             plane takes up (an offset, a tilt, a drift of whole frames) does not show, and unevenness of a wall counts."
         );
+        tested("planes", words, samples)
     }
-    let words = format!(
-        "The truth is not known: residuals of planes, fitted to {shown} of {} frames or to quarters of them. What a \
-         plane takes up (an offset, a tilt, a drift of whole frames) does not show, and unevenness of a wall counts.",
-        found.len()
-    );
-    tested("planes", words, found.into_iter().flatten().collect())
+
+    /// Mean time of the frames of a view; NaN where the survey does not state all.
+    fn time_of(&self, view: &View) -> f64 {
+        let time = |frame: &usize| self.survey.frames.get(*frame).and_then(|entry| entry.timestamp_s);
+        let times: Option<Vec<f64>> = view.frames.iter().map(time).collect();
+        times.map_or(f64::NAN, |times| times.iter().sum::<f64>() / times.len() as f64)
+    }
+
+    /// Errors are set against the true range: the observed one has their noise in it, and would show a trend by itself.
+    fn against_truth(&self, view: &View) -> Vec<TrendSample> {
+        let Some(frame) = range_frame(view) else { return Vec::new() };
+        let Some(errors) = range_errors(view, &frame.range) else { return Vec::new() };
+        let time_s = self.time_of(view);
+        let sample = |[col, row]: [usize; 2]| {
+            let residual_m = errors[row * frame.width() + col];
+            let sigma_m = f64::from(frame.sigma[(col, row)]);
+            let known = sigma_m > 0.0 && sigma_m.is_finite();
+            let usable = frame.flags[(col, row)].is_empty() && residual_m.is_finite();
+            usable.then(|| TrendSample {
+                residual_m,
+                sigma_m: if known { sigma_m } else { UNKNOWN_SIGMA_M },
+                range_m: f64::from(frame.range[(col, row)]) - residual_m,
+                amplitude: f64::from(frame.amplitude[(col, row)]),
+                column: col as f64,
+                row: row as f64,
+                time_s,
+                frame: 0,
+            })
+        };
+        let columns = || (0..frame.width()).step_by(self.step);
+        let positions = (0..frame.height()).step_by(self.step).flat_map(|row| columns().map(move |col| [col, row]));
+        positions.filter_map(sample).collect()
+    }
+
+    /// Residuals of the plane that a frame shows, or of those that its quarters show.
+    fn planes(&self, view: &View) -> Vec<TrendSample> {
+        let Some(frame) = range_frame(view) else { return Vec::new() };
+        let [right, below] = [frame.width() - 1, frame.height() - 1];
+        let plane = |window| plane(frame, &self.camera, window, self.step);
+        let pixels = plane([[0, right], [0, below]]).unwrap_or_else(|| {
+            let halves = |last: usize| [[0, last / 2], [last / 2 + 1, last]];
+            let quarters = halves(below).map(|rows| halves(right).map(|columns| [columns, rows]));
+            let quarters: Vec<_> = quarters.into_iter().flatten().collect();
+            quarters.into_par_iter().filter_map(plane).flatten().collect()
+        });
+        let time_s = self.time_of(view);
+        let sample = |pixel: FittedPixel| TrendSample {
+            residual_m: pixel.observed_m - pixel.modelled_m,
+            sigma_m: pixel.sigma_m,
+            range_m: pixel.modelled_m,
+            amplitude: f64::from(frame.amplitude[(pixel.position[0], pixel.position[1])]),
+            column: pixel.position[0] as f64,
+            row: pixel.position[1] as f64,
+            time_s,
+            frame: 0,
+        };
+        pixels.into_iter().map(sample).collect()
+    }
 }
 
 /// For each view what it may share errors with: views of its station, which see the same scene, and where there is one
 /// station itself alone.
-fn shares(views: &[View]) -> Vec<usize> {
+fn shares(views: &[OfView]) -> Vec<usize> {
     let several = views.iter().any(|view| view.station != views[0].station);
-    let first = |view: &View| views.iter().position(|other| other.station == view.station).unwrap_or(0);
-    views.iter().enumerate().map(|(index, view)| if several { first(view) } else { index }).collect()
+    let mut first: BTreeMap<&str, usize> = BTreeMap::new();
+    let mut shares = Vec::with_capacity(views.len());
+    for (index, view) in views.iter().enumerate() {
+        let first = *first.entry(&view.station).or_insert(index);
+        shares.push(if several { first } else { index });
+    }
+    shares
 }
 
 fn none(basis_words: String) -> RemainingErrors {
@@ -94,62 +198,6 @@ fn range_frame(view: &View) -> Option<&RangeFrame> {
         ViewData::Range(frame) => Some(frame),
         _ => None,
     }
-}
-
-/// Mean time of the frames of a view; NaN where the survey does not state all.
-fn time_of(outcome: &Outcome, view: &View) -> f64 {
-    let time = |frame: &usize| outcome.survey.frames.get(*frame).and_then(|entry| entry.timestamp_s);
-    let times: Option<Vec<f64>> = view.frames.iter().map(time).collect();
-    times.map_or(f64::NAN, |times| times.iter().sum::<f64>() / times.len() as f64)
-}
-
-/// Errors are set against the true range: the observed one has their noise in it, and would show a trend by itself.
-fn against_truth(outcome: &Outcome, share: usize, view: &View, step: usize) -> Vec<TrendSample> {
-    let (Some(errors), Some(frame)) = (range_errors(view), range_frame(view)) else { return Vec::new() };
-    let time_s = time_of(outcome, view);
-    let sample = |[col, row]: [usize; 2]| {
-        let residual_m = errors[row * frame.width() + col];
-        let sigma_m = f64::from(frame.sigma[(col, row)]);
-        let known = sigma_m > 0.0 && sigma_m.is_finite();
-        let usable = frame.flags[(col, row)].is_empty() && residual_m.is_finite();
-        usable.then(|| TrendSample {
-            residual_m,
-            sigma_m: if known { sigma_m } else { UNKNOWN_SIGMA_M },
-            range_m: f64::from(frame.range[(col, row)]) - residual_m,
-            amplitude: f64::from(frame.amplitude[(col, row)]),
-            column: col as f64,
-            row: row as f64,
-            time_s,
-            frame: share,
-        })
-    };
-    let columns = || (0..frame.width()).step_by(step);
-    let positions = (0..frame.height()).step_by(step).flat_map(|row| columns().map(move |col| [col, row]));
-    positions.filter_map(sample).collect()
-}
-
-/// Residuals of the plane that a frame shows, or of those that its quarters show.
-fn planes(outcome: &Outcome, share: usize, view: &View, step: usize) -> Vec<TrendSample> {
-    let Some(frame) = range_frame(view) else { return Vec::new() };
-    let [right, below] = [frame.width() - 1, frame.height() - 1];
-    let whole = plane(frame, &outcome.camera, [[0, right], [0, below]], step);
-    let pixels = whole.unwrap_or_else(|| {
-        let halves = |last: usize| [[0, last / 2], [last / 2 + 1, last]];
-        let quarters = halves(below).map(|rows| halves(right).map(|columns| [columns, rows]));
-        quarters.into_iter().flatten().filter_map(|part| plane(frame, &outcome.camera, part, step)).flatten().collect()
-    });
-    let time_s = time_of(outcome, view);
-    let sample = |pixel: FittedPixel| TrendSample {
-        residual_m: pixel.observed_m - pixel.modelled_m,
-        sigma_m: pixel.sigma_m,
-        range_m: pixel.modelled_m,
-        amplitude: f64::from(frame.amplitude[(pixel.position[0], pixel.position[1])]),
-        column: pixel.position[0] as f64,
-        row: pixel.position[1] as f64,
-        time_s,
-        frame: share,
-    };
-    pixels.into_iter().map(sample).collect()
 }
 
 /// The pixels of a window that lie in one plane; `None` where most do not.

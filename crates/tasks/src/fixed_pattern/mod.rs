@@ -11,9 +11,9 @@ use std::time::Instant;
 use atomic_output::Destination;
 use pipeline::command::{Inputs, Progress, json, produce};
 use pipeline::plan::{CorrectRangeOptions, DeconvolveOptions, DemodulateOptions, UnwrapOptions};
-use pipeline::run::process_with;
+use pipeline::run::process_each;
 use pipeline::stages::corrects_ranges;
-use pipeline::survey::ViewData;
+use pipeline::survey::{OpenSurvey, View, ViewData};
 use pipeline::{Error, Plan, Result, Stage};
 use range_io::calibration::Calibration;
 use range_io::survey::{Level, Survey};
@@ -61,15 +61,15 @@ fn estimate(
     check_window(request, &survey)?;
     let plan = preparation(&survey, &calibration);
     let known = (Some(calibration.clone()), words.clone());
-    let outcome = process_with(&plan, &request.survey, known, progress)?;
+    let mut frames = Vec::new();
+    let mut keep = |view: View, _: &OpenSurvey| match view.data {
+        ViewData::Range(frame) => Ok(frames.push((view.station, frame))),
+        _ => Err(Error::Needs { stage: "fixed pattern", needs: "Unwrap" }),
+    };
+    process_each(&plan, &request.survey, known, &mut keep, progress)?;
     progress.begin("estimate the fixed pattern", 1);
-    let mut walls = Vec::new();
-    for view in &outcome.views {
-        let ViewData::Range(frame) = &view.data else {
-            return Err(Error::Needs { stage: "fixed pattern", needs: "Unwrap" });
-        };
-        walls.push(WallCapture { station: view.station.clone(), frame });
-    }
+    let walls = frames.iter().map(|(station, frame)| WallCapture { station: station.clone(), frame });
+    let walls: Vec<WallCapture<'_>> = walls.collect();
     let estimate = estimate_fixed_pattern(&walls, &calibration.camera()?, &request.options)
         .map_err(Error::estimation("fixed pattern", &request.survey))?;
     progress.advance(1);

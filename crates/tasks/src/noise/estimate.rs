@@ -1,7 +1,8 @@
 //! The views of a survey by station, and what they tell of noise at their level.
 
 use error_models::{NamedParameter, RangeNoise};
-use pipeline::survey::{Outcome, View, ViewData};
+use pipeline::run::Processed;
+use pipeline::survey::{View, ViewData};
 use pipeline::{Error, Result};
 use range_image::{ComplexFrame, DemodulationOptions, Flags, NoiseModel, RangeFrame, Raster, RawFrame, demodulate};
 use range_io::survey::Survey;
@@ -30,7 +31,7 @@ type Answer = std::result::Result<Estimate, sensor_noise::Error>;
 
 impl Estimate {
     /// From samples where there are any; else from ranges, or from phases as ranges.
-    pub(crate) fn new(outcome: &Outcome, options: &NoiseFitOptions) -> Result<Answer> {
+    pub(crate) fn new(outcome: &Processed, options: &NoiseFitOptions) -> Result<Answer> {
         let stations = by_station(&outcome.views);
         let samples: Vec<(String, Vec<&RawFrame>)> = select(&stations, |data| match data {
             ViewData::Samples(raw) => Some(raw),

@@ -7,10 +7,10 @@ use pipeline::plan::{
     AverageOptions, CorrectImagePointOptions, CorrectRangeOptions, DeconvolveOptions, DemodulateOptions, FlagOptions,
     FuseExposuresOptions, PointCloudOptions, UnwrapOptions,
 };
-use pipeline::run::process;
+use pipeline::run::process_each;
 use pipeline::stages::corrects_ranges;
-use pipeline::stations::Station;
-use pipeline::survey::{plausibility, read_calibration};
+use pipeline::stations::{Station, projection};
+use pipeline::survey::{OpenSurvey, View, plausibility, read_calibration};
 use pipeline::{Error, Plan, Result, Stage};
 use range_io::calibration::Calibration;
 use range_io::clouds::read_any_cloud;
@@ -72,13 +72,22 @@ fn survey_stations(path: &Path, request: &RegisterRequest, progress: &dyn Progre
             survey.frames.len()
         )));
     }
-    let (calibration, _) = read_calibration(&root_of(path), request.calibration.as_deref())?;
-    let stages = stages(survey.level, calibration.as_ref());
+    let known = read_calibration(&root_of(path), request.calibration.as_deref())?;
+    let stages = stages(survey.level, known.0.as_ref());
     let plan = Plan { name: "register".to_owned(), source: None, calibrate: None, stages };
-    let outcome = process(&plan, &root_of(path), request.calibration.as_deref(), progress)?;
-    let mut doubts = outcome.doubts.clone();
-    doubts.extend(plausibility::of_outcome(&outcome));
-    Ok(Input { stations: Station::of_views(&outcome), vertical_axis: outcome.vertical_axis, doubts })
+    let mut stations = Vec::new();
+    let mut keep = |view: View, survey: &OpenSurvey| {
+        stations.extend(Station::of_view(&view, &survey.stated, None));
+        Ok(())
+    };
+    let processed = process_each(&plan, &root_of(path), known, &mut keep, progress)?;
+    let projection = projection(&processed.camera);
+    for station in &mut stations {
+        station.projection.clone_from(&projection);
+    }
+    let mut doubts = processed.doubts;
+    doubts.extend(plausibility::of_views(&processed.records, &[]));
+    Ok(Input { stations, vertical_axis: processed.vertical_axis, doubts })
 }
 
 /// The way from the survey's level to flagged points, as far as the calibration has something to say.

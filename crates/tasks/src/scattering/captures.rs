@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use pipeline::command::Progress;
-use pipeline::survey::{Outcome, ViewData};
+use pipeline::run::Processed;
+use pipeline::survey::ViewData;
 use pipeline::{AverageOptions, DemodulateOptions, Error, Plan, Result, Stage, process};
 use range_image::ComplexFrame;
 use range_io::calibration::Calibration;
@@ -19,7 +20,7 @@ pub(crate) struct Captures {
     pub(crate) stations: Vec<String>,
     pub(crate) calibration: Calibration,
     pub(crate) calibration_words: String,
-    with_object: Outcome,
+    with_object: Processed,
     /// For each view with an object the one of the same station without.
     without_object: Vec<ComplexFrame>,
 }
@@ -71,7 +72,7 @@ impl Captures {
 }
 
 /// A survey's frames, one complex image a station.
-fn frames(survey: &Path, calibration: Option<&Path>, progress: &dyn Progress) -> Result<Outcome> {
+fn frames(survey: &Path, calibration: Option<&Path>, progress: &dyn Progress) -> Result<Processed> {
     let level = Survey::read(survey)?.level;
     if level > Level::Phase {
         let (stage, needs) = ("scattering", Level::Phase.name());

@@ -5,11 +5,11 @@ use std::path::Path;
 use std::sync::Arc;
 
 use nalgebra::Isometry3;
-use pipeline::command::{Doubt, Silent, root_of};
+use pipeline::command::{Doubt, root_of};
 use pipeline::plan::DriftTreatment;
-use pipeline::stages::apply;
+use pipeline::stages::{Line, Step, Watch};
 use pipeline::stations::projection;
-use pipeline::survey::{FrameWatch, Frames, Purpose, SenseVotes, Work, open, read_calibration};
+use pipeline::survey::{FrameWatch, OpenSurvey, Purpose, SenseVotes, View, open, read_calibration};
 use pipeline::{Error, Result, Stage};
 use range_io::survey::Survey;
 
@@ -20,10 +20,9 @@ const SENSE_EVERY: usize = 16;
 
 /// Reads frames and brings them to unflagged points.
 pub(crate) struct FrameSource {
-    work: Work,
-    frames: Frames,
+    survey: OpenSurvey,
     /// What each frame goes through.
-    stages: Vec<Stage>,
+    line: Line,
     /// Positions in the survey, in the order of time.
     pub(crate) order: Vec<usize>,
     watch: FrameWatch,
@@ -39,64 +38,52 @@ pub(crate) struct PointFrame {
 impl FrameSource {
     pub(crate) fn new(path: &Path, calibration: Option<&Path>) -> Result<Self> {
         let correction = Purpose::Ranges(DriftTreatment::Apply);
-        let (mut work, frames) = open(path, read_calibration(&root_of(path), calibration)?, correction)?;
-        let order = in_order(path, &work.outcome.survey)?;
-        let mut each = Vec::new();
-        for stage in stages(work.outcome.survey.level, work.calibration.as_ref()) {
-            match stage {
-                // Frames of a moving camera are not averaged.
-                Stage::Average(_) => {}
-                // The rays are those of all frames.
-                Stage::CorrectImagePoint(_) => {
-                    apply(&stage, &mut work, &Silent)?;
-                }
-                other => each.push(other),
-            }
-        }
-        Ok(Self { work, frames, stages: each, order, watch: FrameWatch::of_stream(), votes: SenseVotes::default() })
+        let survey = open(path, read_calibration(&root_of(path), calibration)?, correction)?;
+        let order = in_order(path, &survey.survey)?;
+        let mut stages = stages(survey.survey.level, survey.calibration.as_deref());
+        // Frames of a moving camera are not averaged.
+        stages.retain(|stage| !matches!(stage, Stage::Average(_)));
+        let line = Line::new(&stages, &survey)?;
+        Ok(Self { survey, line, order, watch: FrameWatch::of_stream(), votes: SenseVotes::default() })
     }
 
     /// How points fall on the camera's pixels.
     pub(crate) fn projection(&self) -> Result<Arc<Projection>> {
-        let format = self.work.outcome.camera.format;
-        projection(&self.work.outcome.camera).ok_or_else(|| {
+        let format = self.line.camera().format;
+        projection(self.line.camera()).ok_or_else(|| {
             let (width, height) = (format.width, format.height);
             Error::Camera(format!("{width} x {height} pixels are too few to track a camera by"))
         })
     }
 
     pub(crate) fn survey(&self) -> &Survey {
-        &self.work.outcome.survey
+        &self.survey.survey
     }
 
     /// The calibration in use, in words.
     pub(crate) fn calibration(&self) -> &str {
-        &self.work.outcome.calibration
+        &self.survey.calibration_words
     }
 
     pub(crate) fn approximate_pose(&self, station: &str) -> Option<Isometry3<f64>> {
-        self.frames.approximate_pose(station)
+        self.survey.approximate_pose(station)
     }
 
     pub(crate) fn true_pose(&self, station: &str) -> Option<Isometry3<f64>> {
-        self.frames.true_pose(station)
+        self.survey.true_pose(station)
     }
 
     /// Frame `index` of the survey; a frame that shows nothing has only NaN.
     pub(crate) fn read(&mut self, index: usize) -> Result<PointFrame> {
-        let view = match self.frames.view(&self.work.outcome.survey, index) {
+        let view = match self.survey.view(index) {
             Err(Error::File(range_io::Error::NothingMeasured { .. })) => return Ok(self.blank()),
             view => view?,
         };
         self.watch.look(&view);
-        self.work.outcome.views = vec![view];
-        for stage in &self.stages {
-            if matches!(stage, Stage::Unwrap(_)) && index.is_multiple_of(SENSE_EVERY) {
-                self.work.outcome.views.iter().for_each(|view| self.votes.look_at(view));
-            }
-            apply(stage, &mut self.work, &Silent)?;
-        }
-        let Some(cloud) = self.work.outcome.clouds.pop() else { return Ok(self.blank()) };
+        let mut views = vec![view];
+        let mut sense = Sense { votes: &mut self.votes, votes_now: index.is_multiple_of(SENSE_EVERY) };
+        self.line.apply(&mut views, &mut sense)?;
+        let Some(cloud) = views.pop().and_then(|view| view.cloud) else { return Ok(self.blank()) };
         let mut points = cloud.points;
         for (point, flags) in points.iter_mut().zip(&cloud.flags) {
             if !flags.is_empty() {
@@ -112,18 +99,33 @@ impl FrameSource {
     /// # Errors
     /// [`Error::Incompatible`] for a calibration that holds for none of their ranges.
     pub(crate) fn doubts(&self) -> Result<Vec<Doubt>> {
-        let mut doubts = self.work.outcome.doubts.clone();
+        let mut doubts = self.survey.doubts.clone();
+        doubts.extend(self.line.steps().iter().flat_map(Step::doubts).cloned());
         doubts.extend(self.watch.doubts());
         doubts.extend(self.votes.doubt());
-        if let Some(calibration) = &self.work.calibration {
-            doubts.extend(self.work.span.judge(&calibration.span)?);
+        for step in self.line.steps() {
+            doubts.extend(step.judge_span(&self.survey)?);
         }
         Ok(doubts)
     }
 
     fn blank(&self) -> PointFrame {
-        let camera = &self.work.outcome.survey.camera;
+        let camera = &self.survey.survey.camera;
         PointFrame { points: vec![[f64::NAN; 3]; camera.width * camera.height], sigma: None }
+    }
+}
+
+/// Judges phases before they are unwrapped.
+struct Sense<'a> {
+    votes: &'a mut SenseVotes,
+    votes_now: bool,
+}
+
+impl Watch for Sense<'_> {
+    fn before(&mut self, _: usize, stage: &Stage, views: &[View]) {
+        if self.votes_now && matches!(stage, Stage::Unwrap(_)) {
+            views.iter().for_each(|view| self.votes.look_at(view));
+        }
     }
 }
 

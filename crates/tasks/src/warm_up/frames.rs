@@ -3,9 +3,8 @@
 use std::ops::Range;
 use std::path::Path;
 
-use pipeline::command::Silent;
-use pipeline::stages::apply;
-use pipeline::survey::{Frames, Purpose, View, ViewData, Work, open};
+use pipeline::stages::Line;
+use pipeline::survey::{OpenSurvey, Purpose, View, ViewData, open};
 use pipeline::{DemodulateOptions, Error, Result, Stage};
 use range_image::{RangeFrame, Raster};
 use range_io::survey::{Level, Survey};
@@ -16,15 +15,15 @@ pub(crate) const FRAMES_AT_ONCE: usize = 32;
 
 /// Reads frames and brings them to ranges, wrapped where they come from phases.
 pub(crate) struct FrameSource {
-    work: Work,
-    frames: Frames,
+    survey: OpenSurvey,
+    line: Line,
 }
 
 impl FrameSource {
     /// Refuses frames of several stations, without times, and with several integration times.
     pub(crate) fn new(path: &Path) -> Result<Self> {
-        let (work, frames) = open(path, (None, "none".to_owned()), Purpose::Camera)?;
-        let survey = &work.outcome.survey;
+        let opened = open(path, (None, "none".to_owned()), Purpose::Camera)?;
+        let survey = &opened.survey;
         let refused = |message: String| Err(Error::Survey { path: path.to_owned(), message });
         let Some(first) = survey.frames.first() else { return refused("it lists no frames".to_owned()) };
         for (index, frame) in survey.frames.iter().enumerate() {
@@ -44,11 +43,15 @@ impl FrameSource {
                 ));
             }
         }
-        Ok(Self { work, frames })
+        let stages: &[Stage] = match survey.level {
+            Level::Samples => &[Stage::Demodulate(DemodulateOptions::default())],
+            _ => &[],
+        };
+        Ok(Self { line: Line::new(stages, &opened)?, survey: opened })
     }
 
     pub(crate) fn survey(&self) -> &Survey {
-        &self.work.outcome.survey
+        &self.survey.survey
     }
 
     /// The interval that ranges are taken modulo: that of the only frequency, or of the highest one for phases of
@@ -63,13 +66,10 @@ impl FrameSource {
 
     /// Some frames, in the order of the survey.
     pub(crate) fn read(&mut self, indices: Range<usize>) -> Result<Vec<RangeFrame>> {
-        let survey = &self.work.outcome.survey;
-        let views: Result<Vec<View>> = indices.into_par_iter().map(|index| self.frames.view(survey, index)).collect();
-        self.work.outcome.views = views?;
-        if self.work.outcome.views.iter().any(|view| matches!(view.data, ViewData::Samples(_))) {
-            apply(&Stage::Demodulate(DemodulateOptions::default()), &mut self.work, &Silent)?;
-        }
-        std::mem::take(&mut self.work.outcome.views).into_par_iter().map(range_frame).collect()
+        let views = indices.into_par_iter().map(|index| self.survey.view(index));
+        let mut views = views.collect::<Result<Vec<View>>>()?;
+        self.line.apply(&mut views, &mut ())?;
+        views.into_par_iter().map(range_frame).collect()
     }
 }
 

@@ -9,7 +9,8 @@ pub(crate) mod pose_test;
 use error_models::{RangeTerms, SurfaceShape};
 use nalgebra::{Isometry3, Point3, Vector3};
 use pipeline::command::{Progress, root_of};
-use pipeline::survey::{Outcome, ViewData, ViewDrift};
+use pipeline::run::Processed;
+use pipeline::survey::{ViewData, ViewDrift};
 use pipeline::{
     AverageOptions, DeconvolveOptions, DemodulateOptions, Error, Plan, Result, Stage, UnwrapOptions, process,
 };
@@ -97,7 +98,7 @@ struct Scene<'a> {
 impl<'a> Scene<'a> {
     fn new(
         rows: &PlacedRows<ObservedPlane>,
-        frames: &'a Outcome,
+        frames: &'a Processed,
         stations: &[Station],
         known_drift: &KnownDrift<'_>,
         sigma_range_m: Option<f64>,

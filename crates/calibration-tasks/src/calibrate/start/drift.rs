@@ -10,7 +10,7 @@ use range_io::survey::Survey;
 
 /// The drift of the start calibration's warming camera, or none.
 pub(crate) struct KnownDrift<'a> {
-    curve: Option<DriftCurve<'a>>,
+    curve: Option<DriftCurve>,
     survey: &'a Survey,
     file: PathBuf,
 }

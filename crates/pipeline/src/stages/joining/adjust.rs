@@ -4,17 +4,17 @@ use nalgebra::Isometry3;
 use crate::command::progress::Progress;
 use crate::plan::AdjustOptions;
 use crate::stages::Findings;
+use crate::stages::joining::Joined;
 use crate::stations::refused::{self, Tried};
-use crate::survey::outcome::{AdjustmentFigures, StationPose};
-use crate::survey::work::Work;
+use crate::survey::records::{AdjustmentFigures, StationPose};
 use crate::{Error, Result};
 
 /// All stations are adjusted at once from their surfaces, the first one being the datum.
-pub(crate) fn run(work: &mut Work, options: &AdjustOptions, progress: &dyn Progress) -> Result<Findings> {
-    if work.station_clouds.is_empty() {
+pub(crate) fn run(joined: &mut Joined, options: &AdjustOptions, progress: &dyn Progress) -> Result<Findings> {
+    if joined.clouds.is_empty() {
         return Err(Error::Needs { stage: "Adjust", needs: "Register" });
     }
-    let initial: Vec<Isometry3<f64>> = work.outcome.poses.iter().map(|pose| pose.world_from_camera).collect();
+    let initial: Vec<Isometry3<f64>> = joined.poses.iter().map(|pose| pose.world_from_camera).collect();
     let choice = StationRegistrationOptions {
         minimum_overlap: options.minimum_overlap,
         start_error_m: Some(options.maximum_distance_m),
@@ -26,10 +26,9 @@ pub(crate) fn run(work: &mut Work, options: &AdjustOptions, progress: &dyn Progr
         }
         progress.advance(done);
     };
-    let adjusted = register_stations(&work.station_clouds, Start::Poses(&initial), Datum::Station(0), &choice, &tell);
-    let names: Vec<String> = work.outcome.views.iter().map(|view| view.station.clone()).collect();
+    let adjusted = register_stations(&joined.clouds, Start::Poses(&initial), Datum::Station(0), &choice, &tell);
     let tried = Tried::Poses(Some(options.maximum_distance_m));
-    let adjusted = adjusted.map_err(|error| refused::of_stage("Adjust", error, &names, tried))?;
+    let adjusted = adjusted.map_err(|error| refused::of_stage("Adjust", error, &joined.names, tried))?;
     if !adjusted.settled {
         return Err(Error::stage("Adjust", "all stations")(format!(
             "the stations still slide after {} rounds: a direction is held by too little; more overlap, or stations \
@@ -38,11 +37,11 @@ pub(crate) fn run(work: &mut Work, options: &AdjustOptions, progress: &dyn Progr
         )));
     }
     let poses = adjusted.world_from_station.into_iter().zip(adjusted.covariance);
-    work.outcome.poses = poses
+    joined.poses = poses
         .map(|(world_from_camera, covariance)| StationPose { world_from_camera, covariance: Some(covariance) })
         .collect();
-    work.outcome.pairs = adjusted.pairs;
-    work.outcome.refused = adjusted.refused;
+    joined.pairs = adjusted.pairs;
+    joined.refused = adjusted.refused;
     let mut findings = Findings::from([
         ("stations_doubtful".to_owned(), adjusted.placements.doubtful().count() as f64),
         ("pairs".to_owned(), adjusted.surfaces.len() as f64),
@@ -51,7 +50,7 @@ pub(crate) fn run(work: &mut Work, options: &AdjustOptions, progress: &dyn Progr
     if let Some(sigma0) = adjusted.sigma0 {
         findings.insert("sigma0".to_owned(), sigma0);
     }
-    work.outcome.adjustment = Some(AdjustmentFigures {
+    joined.adjustment = Some(AdjustmentFigures {
         sigma0: adjusted.sigma0,
         redundancy: adjusted.redundancy,
         placements: adjusted.placements,

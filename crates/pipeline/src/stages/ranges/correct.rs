@@ -1,68 +1,117 @@
 use std::sync::Arc;
 
-use error_models::{InterpolatedModel, ModelSet, RangeErrorModel};
-use range_image::RangeFrame;
-use range_io::survey::ReferencePath;
+use error_models::{FixedPattern, InterpolatedModel, ModelSet, RangeErrorModel};
+use range_image::{ImageFormat, RangeFrame};
+use range_io::calibration::ValidSpan;
+use range_io::survey::{ReferencePath, Survey};
 
-use crate::command::progress::Progress;
 use crate::plan::{CorrectRangeOptions, DriftTreatment};
-use crate::stages::Findings;
+use crate::stages::line::Making;
 use crate::stages::ranges::reference_path;
+use crate::stages::{Findings, Found, ViewStage};
 use crate::survey::compatible::model_set;
 use crate::survey::correction_record::CorrectionRecord;
 use crate::survey::drift::{DriftCurve, ViewDrift};
+use crate::survey::open::OpenSurvey;
 use crate::survey::view::{View, ViewData};
-use crate::survey::work::Work;
 use crate::{Error, Result};
 
 /// Drift, range terms, amplitude-related error and fixed pattern are taken off, frequency by frequency.
-pub(crate) fn run(work: &mut Work, options: &CorrectRangeOptions, progress: &dyn Progress) -> Result<Findings> {
-    let Some(calibration) = &work.calibration else {
-        return Err(Error::Camera("stage CorrectRange needs a calibration; name one with --calibration".to_owned()));
-    };
-    let camera = work.calibrated_camera.unwrap_or(work.outcome.camera);
-    let set = model_set(&work.outcome.survey, calibration)?;
-    let (format, principal_point_mm) = (camera.format, camera.interior.principal_point_mm);
-    let pattern = calibration.fixed_pattern.clone().map(Arc::new);
-    let sensor = reference_path::Sensor { format, principal_point_mm, pattern: pattern.as_deref() };
-    let survey = &work.outcome.survey;
-    let apply = options.warm_up == DriftTreatment::Apply;
-    let (reference, span) = (survey.reference_path, calibration.span);
-    let calibrated = calibration.warm_up.as_ref().filter(|_| apply && reference.is_none());
-    let curve = calibrated.map(|calibrated| DriftCurve::new(calibrated, survey)).transpose();
-    let curve = curve.map_err(Error::stage("CorrectRange", "calibration"))?;
-    let drifts = calibration.warm_up.is_some() || reference.is_some();
-    let (mut outside, mut found) = (0_usize, Vec::new());
-    for (index, view) in work.outcome.views.iter_mut().enumerate() {
-        let name = view.name();
-        let mut models = models_of(&set, view, drifts)?;
-        let drift = match (&reference, &curve) {
-            (Some(path), _) if apply => Some(reference_drift(view, path, &models, &sensor)?),
-            (_, Some(curve)) => Some(curve.of_view(view, survey).map_err(Error::stage("CorrectRange", &name))?),
-            _ => None,
+pub(crate) struct CorrectRange {
+    survey: Arc<Survey>,
+    set: ModelSet,
+    format: ImageFormat,
+    principal_point_mm: [f64; 2],
+    pattern: Option<Arc<FixedPattern>>,
+    span: ValidSpan,
+    /// Whether the drift is taken off, by the optical reference or by the calibrated curve.
+    applies_drift: bool,
+    curve: Option<DriftCurve>,
+    /// Whether there is a drift at all.
+    drifts: bool,
+}
+
+impl CorrectRange {
+    pub(crate) fn new(options: &CorrectRangeOptions, making: &Making<'_>) -> Result<Self> {
+        let OpenSurvey { survey, calibration, calibrated_camera, .. } = making.survey;
+        let Some(calibration) = calibration else {
+            return Err(Error::Camera("stage CorrectRange needs a calibration; name one with --calibration".to_owned()));
         };
+        let camera = calibrated_camera.unwrap_or(making.camera);
+        let applies_drift = options.warm_up == DriftTreatment::Apply;
+        let reference = survey.reference_path.is_some();
+        let calibrated = calibration.warm_up.as_ref().filter(|_| applies_drift && !reference);
+        let curve = calibrated.map(|calibrated| DriftCurve::new(calibrated, survey)).transpose();
+        Ok(Self {
+            survey: Arc::clone(survey),
+            set: model_set(survey, calibration)?,
+            format: camera.format,
+            principal_point_mm: camera.interior.principal_point_mm,
+            pattern: calibration.fixed_pattern.clone().map(Arc::new),
+            span: calibration.span,
+            applies_drift,
+            curve: curve.map_err(Error::stage("CorrectRange", "calibration"))?,
+            drifts: calibration.warm_up.is_some() || reference,
+        })
+    }
+
+    fn drift(&self, view: &mut View, models: &[InterpolatedModel]) -> Result<Option<ViewDrift>> {
+        let name = view.name();
+        match (&self.survey.reference_path, &self.curve) {
+            (Some(path), _) if self.applies_drift => {
+                let (format, principal_point_mm) = (self.format, self.principal_point_mm);
+                let sensor = reference_path::Sensor { format, principal_point_mm, pattern: self.pattern.as_deref() };
+                reference_drift(view, path, models, &sensor).map(Some)
+            }
+            (_, Some(curve)) => {
+                curve.of_view(view, &self.survey).map(Some).map_err(Error::stage("CorrectRange", &name))
+            }
+            _ => Ok(None),
+        }
+    }
+
+    fn correct(&self, view: &mut View, found: &mut Found) -> Result<()> {
+        let name = view.name();
+        let mut models = models_of(&self.set, view, self.drifts)?;
+        let drift = self.drift(view, &models)?;
         if let Some(drift) = &drift {
             for model in &mut models {
                 model.add_offset(drift.drift_m);
             }
-            found.push(drift.clone());
+            found.drifts.push(drift.clone());
         }
-        let mut record = CorrectionRecord::new(format, principal_point_mm, pattern.clone(), drift, span);
+        let (format, point_mm) = (self.format, self.principal_point_mm);
+        let mut record = CorrectionRecord::new(format, point_mm, self.pattern.clone(), drift, self.span);
         for (frame, model) in frames_with_models(view, &models)? {
             let (observed, sigma) = (frame.range.clone(), frame.sigma.clone());
-            let summary = model.correct_frame(frame, &format, principal_point_mm, pattern.as_deref());
-            work.span.flag(&span, &observed, frame);
-            outside += summary.map_err(Error::stage("CorrectRange", &name))?.outside_span;
-            if let Some(path) = &reference {
+            let summary = model.correct_frame(frame, &format, point_mm, self.pattern.as_deref());
+            found.span.flag(&self.span, &observed, frame);
+            found.add("pixels_outside_span", summary.map_err(Error::stage("CorrectRange", &name))?.outside_span);
+            if let Some(path) = &self.survey.reference_path {
                 reference_path::mask(path, frame);
             }
             record.add(model, observed, sigma, frame);
         }
         view.correction = Some(record);
-        view.combine_channels()?;
-        progress.advance(index + 1);
+        view.combine_channels()
     }
-    Ok(findings(outside, &found))
+}
+
+impl ViewStage for CorrectRange {
+    fn apply(&self, views: &mut Vec<View>, found: &mut Found) -> Result<()> {
+        views.iter_mut().try_for_each(|view| self.correct(view, found))
+    }
+
+    fn findings(&self, found: &Found) -> Findings {
+        let (mut findings, drifts) = (found.sums.clone(), &found.drifts);
+        if !drifts.is_empty() {
+            let mean = drifts.iter().map(|drift| drift.drift_m).sum::<f64>() / drifts.len() as f64;
+            findings.insert("drift_m".to_owned(), mean);
+            let largest = drifts.iter().map(|drift| drift.sigma_m).fold(0.0, f64::max);
+            findings.insert("drift_sigma_m".to_owned(), largest);
+        }
+        findings
+    }
 }
 
 /// The models of a view by its integration time; without errors where the calibration has a drift and nothing else.
@@ -96,17 +145,6 @@ fn reference_drift(
     let frames: Vec<_> =
         frames.into_iter().zip(modulations).map(|((frame, model), modulation)| (&*frame, model, modulation)).collect();
     reference_path::drift(name.clone(), path, &frames, sensor).map_err(Error::stage("CorrectRange", &name))
-}
-
-fn findings(outside: usize, drifts: &[ViewDrift]) -> Findings {
-    let mut findings = Findings::from([("pixels_outside_span".to_owned(), outside as f64)]);
-    if !drifts.is_empty() {
-        let mean = drifts.iter().map(|drift| drift.drift_m).sum::<f64>() / drifts.len() as f64;
-        findings.insert("drift_m".to_owned(), mean);
-        let largest = drifts.iter().map(|drift| drift.sigma_m).fold(0.0, f64::max);
-        findings.insert("drift_sigma_m".to_owned(), largest);
-    }
-    findings
 }
 
 /// Each frequency's ranges with that frequency's model; the one frame where frequencies are not apart.

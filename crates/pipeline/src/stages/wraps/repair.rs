@@ -1,54 +1,61 @@
-use phase_unwrap::{RepairOptions, RepairVerdict, SpatialOptions, repair_ranges};
+use phase_unwrap::{ImageGeometry, RepairOptions, RepairVerdict, SpatialOptions, repair_ranges};
 use range_image::Flags;
 use range_io::survey::Level;
 
-use crate::command::progress::Progress;
 use crate::command::verdict::{Doubt, DoubtKind};
 use crate::plan::RepairWrapsOptions;
-use crate::stages::Findings;
+use crate::stages::line::Making;
 use crate::stages::wraps::unwrap::image_geometry;
-use crate::survey::outcome::StageSummary;
+use crate::stages::{Found, ViewStage};
+use crate::survey::records::StageSummary;
 use crate::survey::view::{View, ViewData};
-use crate::survey::work::Work;
 use crate::{Error, Result};
 
 /// Finding: views whose ambiguity intervals nothing tells.
 const UNJUDGED_VIEWS: &str = "views_without_amplitude";
 
 /// Whole ambiguity intervals that the camera's ranges have lost are added where they are sure.
-pub(crate) fn run(work: &mut Work, options: &RepairWrapsOptions, progress: &dyn Progress) -> Result<Findings> {
-    if work.outcome.survey.level < Level::Range {
-        let level = work.outcome.survey.level.name();
-        let needs = "range` or `depth";
-        return Err(Error::RuledOut { stage: "RepairWraps", needs, level });
-    }
-    let geometry = image_geometry(&work.calibrated_camera.unwrap_or(work.outcome.camera));
-    let mut findings = Findings::new();
-    for (index, view) in work.outcome.views.iter_mut().enumerate() {
-        let interval_m = interval(view, options)?;
-        let maximum_wraps = (options.maximum_range_m / interval_m).floor().clamp(0.0, f64::from(u16::MAX)) as u16;
-        let standard = RepairOptions::default();
-        let spatial = SpatialOptions {
-            maximum_wraps,
-            minimum_confidence: options.minimum_confidence as f32,
-            geometry: Some(geometry),
-            ..standard.spatial
-        };
-        let repaired = repair(
-            view,
-            interval_m,
-            &RepairOptions { spatial, amplitude_kind: options.amplitudes.into(), ..standard },
-        )?;
-        let mut add = |name: &str, count: usize| *findings.entry(name.to_owned()).or_default() += count as f64;
-        add("repaired_px", repaired.added);
-        add("unsure_px", repaired.unsure);
-        if repaired.unjudged > 0 {
-            add(UNJUDGED_VIEWS, 1);
-            add("unjudged_px", repaired.unjudged);
+pub(crate) struct Repair {
+    options: RepairWrapsOptions,
+    geometry: ImageGeometry,
+}
+
+impl Repair {
+    pub(crate) fn new(options: &RepairWrapsOptions, making: &Making<'_>) -> Result<Self> {
+        let level = making.survey.survey.level;
+        if level < Level::Range {
+            let needs = "range` or `depth";
+            return Err(Error::RuledOut { stage: "RepairWraps", needs, level: level.name() });
         }
-        progress.advance(index + 1);
+        let geometry = image_geometry(&making.survey.calibrated_camera.unwrap_or(making.camera));
+        Ok(Self { options: options.clone(), geometry })
     }
-    Ok(findings)
+}
+
+impl ViewStage for Repair {
+    fn apply(&self, views: &mut Vec<View>, found: &mut Found) -> Result<()> {
+        let options = &self.options;
+        for view in views {
+            let interval_m = interval(view, options)?;
+            let maximum_wraps = (options.maximum_range_m / interval_m).floor().clamp(0.0, f64::from(u16::MAX)) as u16;
+            let standard = RepairOptions::default();
+            let spatial = SpatialOptions {
+                maximum_wraps,
+                minimum_confidence: options.minimum_confidence as f32,
+                geometry: Some(self.geometry),
+                ..standard.spatial
+            };
+            let amplitude_kind = options.amplitudes.into();
+            let repaired = repair(view, interval_m, &RepairOptions { spatial, amplitude_kind, ..standard })?;
+            found.add("repaired_px", repaired.added);
+            found.add("unsure_px", repaired.unsure);
+            if repaired.unjudged > 0 {
+                found.add(UNJUDGED_VIEWS, 1);
+                found.add("unjudged_px", repaired.unjudged);
+            }
+        }
+        Ok(())
+    }
 }
 
 /// The interval named, or that of the survey's modulation.

@@ -6,11 +6,10 @@ use phase_unwrap::{
 use range_image::{ComplexChannel, ComplexFrame, Flags, RangeFrame, Raster};
 use statistics::quantile;
 
-use crate::command::progress::Progress;
 use crate::plan::{UnwrapMethod, UnwrapOptions};
-use crate::stages::Findings;
+use crate::stages::line::Making;
+use crate::stages::{Found, ViewStage};
 use crate::survey::view::{View, ViewData};
-use crate::survey::work::Work;
 use crate::{Error, Result};
 
 /// Longest range where nothing else bounds it, metre: that of a room.
@@ -24,14 +23,25 @@ const FURTHEST_M: f64 = 15.0;
 const SYSTEMATIC_M: f64 = 0.02;
 
 /// Phases to ranges: by hypotheses where there are several frequencies, spatially and by amplitude where there is one.
-pub(crate) fn run(work: &mut Work, options: &UnwrapOptions, progress: &dyn Progress) -> Result<Findings> {
-    let total = work.outcome.views.len();
-    let geometry = image_geometry(&work.calibrated_camera.unwrap_or(work.outcome.camera));
-    for (index, view) in work.outcome.views.iter_mut().enumerate() {
-        unwrap_view(view, geometry, options)?;
-        progress.advance(index + 1);
+pub(crate) struct Unwrap {
+    options: UnwrapOptions,
+    geometry: ImageGeometry,
+}
+
+impl Unwrap {
+    pub(crate) fn new(options: &UnwrapOptions, making: &Making<'_>) -> Self {
+        Self { options: options.clone(), geometry: image_geometry(&making.survey.calibrated_camera.unwrap_or(making.camera)) }
     }
-    Ok(Findings::from([("views".to_owned(), total as f64)]))
+}
+
+impl ViewStage for Unwrap {
+    fn apply(&self, views: &mut Vec<View>, found: &mut Found) -> Result<()> {
+        for view in views {
+            unwrap_view(view, self.geometry, &self.options)?;
+            found.add("views", 1);
+        }
+        Ok(())
+    }
 }
 
 fn unwrap_view(view: &mut View, geometry: ImageGeometry, options: &UnwrapOptions) -> Result<()> {

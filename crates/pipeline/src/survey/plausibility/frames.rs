@@ -18,21 +18,28 @@ const MOST_DROPPED: usize = 3;
 /// Part of a plane's values that are one and the same in a dead frame; the rest are hot pixels.
 const DEAD_SHARE: f64 = 0.98;
 
-/// What has been seen of the frames so far.
+/// What has been seen of the frames so far, in whatever order.
 #[derive(Debug, Default)]
 pub struct FrameWatch {
-    /// Station and value of dead frames.
-    dead: Vec<(String, f64)>,
-    /// Station and frame by the frame's content.
-    seen: BTreeMap<u64, (String, usize)>,
-    /// Station and frame of a frame and of the earlier one of another station that it repeats.
-    repeats: Vec<[(String, usize); 2]>,
-    /// Median range of each frame that came with ranges, metre.
-    ranges_m: Vec<f64>,
-    frames: usize,
-    stations: BTreeSet<String>,
+    looked: Vec<Looked>,
     is_stream: bool,
 }
+
+/// What is kept of a frame.
+#[derive(Debug)]
+struct Looked {
+    frame: usize,
+    station: String,
+    /// The value of a dead frame.
+    dead: Option<f32>,
+    /// Two frames of the same are the same.
+    content: u64,
+    /// Median of a frame that came with ranges, metre.
+    range_m: Option<f64>,
+}
+
+/// Station and frame of a frame and of the earlier one of another station that it repeats.
+type Repeat<'a> = [(&'a str, usize); 2];
 
 impl FrameWatch {
     /// For the frames of a moving camera, however few.
@@ -42,35 +49,32 @@ impl FrameWatch {
 
     /// Looks at a frame as it was read.
     pub fn look(&mut self, view: &View) {
-        self.frames += 1;
-        self.stations.insert(view.station.clone());
-        let frame = view.frames.first().copied().unwrap_or_default();
         let planes = planes(view);
-        if let Some(value) = planes.iter().find_map(|plane| dead_value(plane)) {
-            self.dead.push((view.station.clone(), f64::from(value)));
-            return;
-        }
-        let content = planes
-            .iter()
-            .flatten()
-            .fold(FNV_OFFSET, |hash, value| (hash ^ u64::from(value.to_bits())).wrapping_mul(FNV_PRIME));
-        let here = (view.station.clone(), frame);
-        match self.seen.get(&content) {
-            Some(earlier) if earlier.0 != here.0 => self.repeats.push([here, earlier.clone()]),
-            Some(_) => {}
-            None => drop(self.seen.insert(content, here)),
-        }
-        if let (ViewData::Range(_), Some(plane)) = (&view.data, planes.first()) {
-            let mut values: Vec<f64> = plane.iter().map(|value| f64::from(*value)).collect();
-            self.ranges_m.push(quantile(&mut values, 0.5));
-        }
+        let hash = |hash: u64, value: &f32| (hash ^ u64::from(value.to_bits())).wrapping_mul(FNV_PRIME);
+        let range_m = match (&view.data, planes.first()) {
+            (ViewData::Range(_), Some(plane)) => {
+                let mut values: Vec<f64> = plane.iter().map(|value| f64::from(*value)).collect();
+                Some(quantile(&mut values, 0.5))
+            }
+            _ => None,
+        };
+        self.looked.push(Looked {
+            frame: view.frames.first().copied().unwrap_or_default(),
+            station: view.station.clone(),
+            dead: planes.iter().find_map(|plane| dead_value(plane)),
+            content: planes.iter().flatten().fold(FNV_OFFSET, hash),
+            range_m,
+        });
     }
 
     /// What speaks against the frames.
     pub fn doubts(&self) -> Vec<Doubt> {
-        let mut doubts = self.dead_stations();
-        doubts.extend(self.repeated_stations());
-        let middle = quantile(&mut self.ranges_m.clone(), 0.5);
+        let mut frames: Vec<&Looked> = self.looked.iter().collect();
+        frames.sort_by_key(|looked| looked.frame);
+        let mut doubts = dead_stations(&frames);
+        doubts.extend(self.repeated_stations(&frames));
+        let alive = frames.iter().filter(|looked| looked.dead.is_none());
+        let middle = quantile(&mut alive.filter_map(|looked| looked.range_m).collect::<Vec<f64>>(), 0.5);
         if !middle.is_nan() && !(NEAREST_M..=FURTHEST_M).contains(&middle) {
             let (value, unit) = if middle < 1.0 { (1e3 * middle, "mm") } else { (middle, "m") };
             let words = format!(
@@ -83,40 +87,16 @@ impl FrameWatch {
         doubts
     }
 
-    fn dead_stations(&self) -> Vec<Doubt> {
-        if self.dead.len() == self.frames && self.frames > 1 {
-            let words = format!(
-                "all {} frames hold one and the same value (the first: {}): the camera was dead, dark or saturated",
-                self.frames, self.dead[0].1
-            );
-            return vec![Doubt::new(DoubtKind::DeadFrames, words)];
+    fn repeated_stations(&self, frames: &[&Looked]) -> Vec<Doubt> {
+        let all: BTreeSet<&str> = frames.iter().map(|looked| looked.station.as_str()).collect();
+        let is_stream = self.is_stream || (frames.len() >= STREAM && frames.len() == all.len());
+        // A frame that repeats the one before stands for one that a recorder of a stream has dropped.
+        let is_dropped = |[here, earlier]: &Repeat<'_>| is_stream && here.1.abs_diff(earlier.1) <= MOST_DROPPED;
+        let mut stations: BTreeMap<&str, Vec<Repeat<'_>>> = BTreeMap::new();
+        for repeat in repeats(frames).into_iter().filter(|repeat| !is_dropped(repeat)) {
+            stations.entry(repeat[0].0).or_default().push(repeat);
         }
-        let mut stations: BTreeMap<&str, (usize, f64)> = BTreeMap::new();
-        for (station, value) in &self.dead {
-            stations.entry(station).or_insert((0, *value)).0 += 1;
-        }
-        let doubt = |(station, (frames, value)): (&str, (usize, f64))| {
-            let words = format!(
-                "{frames} of its frames hold one and the same value ({value}) at all pixels of an image: dead, dark or \
-                 saturated; leave them out of survey.ron"
-            );
-            Doubt::about(DoubtKind::DeadFrames, station, words)
-        };
-        stations.into_iter().map(doubt).collect()
-    }
-
-    /// Whether a frame stands for one that a recorder of a stream has dropped: it repeats the one before.
-    fn is_dropped(&self, frame: usize, earlier: usize) -> bool {
-        let is_stream = self.is_stream || (self.frames >= STREAM && self.frames == self.stations.len());
-        is_stream && frame.abs_diff(earlier) <= MOST_DROPPED
-    }
-
-    fn repeated_stations(&self) -> Vec<Doubt> {
-        let mut stations: BTreeMap<&str, Vec<&[(String, usize); 2]>> = BTreeMap::new();
-        for repeat in self.repeats.iter().filter(|[here, earlier]| !self.is_dropped(here.1, earlier.1)) {
-            stations.entry(&repeat[0].0).or_default().push(repeat);
-        }
-        let doubt = |(station, repeats): (&str, Vec<&[(String, usize); 2]>)| {
+        let doubt = |(station, repeats): (&str, Vec<Repeat<'_>>)| {
             let [(_, frame), (other, earlier)] = repeats[0];
             let words = format!(
                 "{} of its frames are bit for bit those of station {other} (frame {frame} is frame {earlier}): one of the two \
@@ -137,6 +117,43 @@ impl FrameWatch {
         }
         stations.into_iter().map(doubt).collect()
     }
+}
+
+fn dead_stations(frames: &[&Looked]) -> Vec<Doubt> {
+    let dead = || frames.iter().filter_map(|looked| Some((looked.station.as_str(), f64::from(looked.dead?))));
+    if let Some((_, first)) = dead().next().filter(|_| dead().count() == frames.len() && frames.len() > 1) {
+        let words = format!(
+            "all {} frames hold one and the same value (the first: {first}): the camera was dead, dark or saturated",
+            frames.len()
+        );
+        return vec![Doubt::new(DoubtKind::DeadFrames, words)];
+    }
+    let mut stations: BTreeMap<&str, (usize, f64)> = BTreeMap::new();
+    for (station, value) in dead() {
+        stations.entry(station).or_insert((0, value)).0 += 1;
+    }
+    let doubt = |(station, (frames, value)): (&str, (usize, f64))| {
+        let words = format!(
+            "{frames} of its frames hold one and the same value ({value}) at all pixels of an image: dead, dark or \
+             saturated; leave them out of survey.ron"
+        );
+        Doubt::about(DoubtKind::DeadFrames, station, words)
+    };
+    stations.into_iter().map(doubt).collect()
+}
+
+/// Frames that are those of another station; of dead ones nothing can be told.
+fn repeats<'a>(frames: &[&'a Looked]) -> Vec<Repeat<'a>> {
+    let mut seen: BTreeMap<u64, (&str, usize)> = BTreeMap::new();
+    let mut repeats = Vec::new();
+    for looked in frames.iter().filter(|looked| looked.dead.is_none()) {
+        let here = (looked.station.as_str(), looked.frame);
+        let earlier = *seen.entry(looked.content).or_insert(here);
+        if earlier.0 != here.0 {
+            repeats.push([here, earlier]);
+        }
+    }
+    repeats
 }
 
 /// Stations with a line of their own; more are counted in one.

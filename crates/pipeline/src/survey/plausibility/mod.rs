@@ -9,14 +9,9 @@ pub(crate) mod result;
 pub(crate) mod sense;
 pub(crate) mod statement;
 
-use crate::Result;
-use crate::plan::Stage;
-use crate::survey::outcome::Outcome;
-use crate::survey::plausibility::result::beyond_maximum;
-use crate::survey::work::Work;
 pub use frames::FrameWatch;
 pub use placed::{PlacedStation, displaced, uncertain, uncertain_frames};
-pub use result::{of_outcome, stated_sigma};
+pub use result::{beyond_maximum, mostly_flagged, of_views, stated_sigma};
 pub use sense::SenseVotes;
 pub use statement::{far_apart, of_survey};
 
@@ -33,34 +28,4 @@ pub(crate) fn some_of<S: AsRef<str>>(names: &[S]) -> String {
         0 => listed.join(", "),
         more => format!("{} and {more} more", listed.join(", ")),
     }
-}
-
-/// What can be told of the views before a stage: of phases, whether they grow with range.
-pub fn before(stage: &Stage, outcome: &mut Outcome) {
-    if matches!(stage, Stage::Unwrap(_)) {
-        let mut votes = SenseVotes::default();
-        outcome.views.iter().for_each(|view| votes.look_at(view));
-        outcome.doubts.extend(votes.doubt());
-    }
-}
-
-/// What can be told of them after it: of unwrapped ranges, whether they are too long; of corrected ones, whether the
-/// calibration holds for them.
-///
-/// # Errors
-/// [`Error::Incompatible`](crate::Error::Incompatible) for a calibration that holds for none of the ranges.
-pub fn after(stage: &Stage, work: &mut Work) -> Result<()> {
-    let maximum_range_m = match stage {
-        Stage::Unwrap(options) => options.maximum_range_m,
-        Stage::RepairWraps(options) => Some(options.maximum_range_m),
-        _ => None,
-    };
-    if let Some(maximum_range_m) = maximum_range_m {
-        let doubts = beyond_maximum(&work.outcome.views, stage.name(), maximum_range_m);
-        work.outcome.doubts.extend(doubts);
-    }
-    if let (Stage::CorrectRange(_), Some(calibration)) = (stage, &work.calibration) {
-        work.outcome.doubts.extend(work.span.judge(&calibration.span)?);
-    }
-    Ok(())
 }

@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Matrix6};
 
 use crate::command::verdict::{Doubt, DoubtKind};
-use crate::survey::outcome::StationPose;
+use crate::survey::records::StationPose;
 use crate::survey::plausibility::some_of;
 
 /// Standard deviation of a position as a part of the scene's distance, and of an attitude in radian (3 degrees), from which

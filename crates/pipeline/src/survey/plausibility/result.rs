@@ -2,47 +2,44 @@
 
 use range_image::Flags;
 use range_io::tables::Station;
-use statistics::quantile;
 
 use crate::command::verdict::{Doubt, DoubtKind};
-use crate::survey::outcome::{Outcome, usable};
+
 use crate::survey::plausibility::{PlacedStation, displaced, uncertain};
+use crate::survey::records::{StationPose, ViewRecord};
 use crate::survey::view::{View, ViewData};
 
 /// Part of a station's pixels with a flag from which on it shows too little to be trusted as a whole.
 const MOST_FLAGGED: f64 = 0.8;
 
-/// Doubts about views, points and poses, once all stages ran.
-pub fn of_outcome(outcome: &Outcome) -> Vec<Doubt> {
+/// Doubts about views, points and poses, once all stages ran; `poses`: those that were found.
+pub fn of_views(views: &[ViewRecord], poses: &[StationPose]) -> Vec<Doubt> {
     let mut doubts = Vec::new();
-    let points: usize = outcome.clouds.iter().map(|cloud| usable(cloud).count()).sum();
-    if points == 0 && !outcome.clouds.is_empty() {
+    let mut points = views.iter().filter_map(|view| view.points).peekable();
+    if points.peek().is_some() && points.all(|points| points == 0) {
         doubts.push(Doubt::new(
             DoubtKind::NoPoints,
             "the result has 0 points: every pixel is flagged or without a range",
         ));
     } else {
-        doubts.extend(outcome.views.iter().filter_map(mostly_flagged));
+        doubts.extend(views.iter().filter_map(|view| view.doubt.clone()));
     }
-    if outcome.refusal.is_none() && outcome.poses.len() == outcome.views.len() {
-        let placed = placed(outcome);
+    if poses.len() == views.len() {
+        let placed: Vec<PlacedStation<'_>> = views.iter().zip(poses).map(|(view, pose)| placed(view, pose)).collect();
         doubts.extend(uncertain(&placed));
         doubts.extend(displaced(&placed));
     }
     doubts
 }
 
-fn placed(outcome: &Outcome) -> Vec<PlacedStation<'_>> {
-    let stations = outcome.views.iter().zip(&outcome.poses);
-    stations
-        .map(|(view, pose)| PlacedStation {
-            name: &view.station,
-            pose,
-            stated: view.approximate_world_from_camera,
-            stated_sigma: stated_sigma(&outcome.stated, &view.station),
-            distance_m: distance_m(view),
-        })
-        .collect()
+fn placed<'a>(view: &'a ViewRecord, pose: &'a StationPose) -> PlacedStation<'a> {
+    PlacedStation {
+        name: &view.station,
+        pose,
+        stated: view.stated,
+        stated_sigma: view.stated_sigma,
+        distance_m: view.distance_m,
+    }
 }
 
 /// Standard deviations in space of the position, metre, and the attitude, radian, that `stations.csv` states.
@@ -52,16 +49,8 @@ pub fn stated_sigma(stated: &[Station], name: &str) -> [Option<f64>; 2] {
     [row.and_then(|row| row.sigma_position_m), row.and_then(|row| row.sigma_attitude_rad)].map(|s| s.map(in_space))
 }
 
-/// Median of a view's unflagged ranges.
-fn distance_m(view: &View) -> f64 {
-    let ViewData::Range(frame) = &view.data else { return f64::NAN };
-    let pixels = frame.range.as_slice().iter().zip(frame.flags.as_slice());
-    let mut ranges: Vec<f64> =
-        pixels.filter(|(_, flags)| flags.is_empty()).map(|(range, _)| f64::from(*range)).collect();
-    quantile(&mut ranges, 0.5)
-}
-
-fn mostly_flagged(view: &View) -> Option<Doubt> {
+/// A view that shows too little.
+pub fn mostly_flagged(view: &View) -> Option<Doubt> {
     let flags = view.flags()?.as_slice();
     let share = |count: usize| count as f64 / flags.len().max(1) as f64;
     // Pixels without data are no pixels of the scene: a part of many an image is never lit.
@@ -82,25 +71,22 @@ fn mostly_flagged(view: &View) -> Option<Doubt> {
     Some(Doubt::about(DoubtKind::MostlyFlagged, &view.station, words))
 }
 
-/// Views most of whose ranges lie beyond the longest that the stage was told of.
-pub fn beyond_maximum(views: &[View], stage: &str, maximum_range_m: f64) -> Vec<Doubt> {
-    let doubt = |view: &View| {
-        let ViewData::Range(frame) = &view.data else { return None };
-        let pixels = frame.range.as_slice().iter().zip(frame.flags.as_slice());
-        let measured = pixels.filter(|(range, flags)| range.is_finite() && !flags.contains(Flags::NO_DATA));
-        let (mut all, mut beyond) = (0_usize, 0_usize);
-        for (range, _) in measured {
-            all += 1;
-            beyond += usize::from(f64::from(*range) > maximum_range_m);
-        }
-        (2 * beyond > all).then(|| {
-            let words = format!(
-                "{:.0} % of its ranges are longer than maximum_range_m: {maximum_range_m} of {stage}: the unit or the value is \
-                 wrong, or the camera sees past it",
-                100.0 * beyond as f64 / all as f64
-            );
-            Doubt::about(DoubtKind::BeyondMaximum, &view.station, words)
-        })
-    };
-    views.iter().filter_map(doubt).collect()
+/// A view most of whose ranges lie beyond the longest that the stage was told of.
+pub fn beyond_maximum(view: &View, stage: &str, maximum_range_m: f64) -> Option<Doubt> {
+    let ViewData::Range(frame) = &view.data else { return None };
+    let pixels = frame.range.as_slice().iter().zip(frame.flags.as_slice());
+    let measured = pixels.filter(|(range, flags)| range.is_finite() && !flags.contains(Flags::NO_DATA));
+    let (mut all, mut beyond) = (0_usize, 0_usize);
+    for (range, _) in measured {
+        all += 1;
+        beyond += usize::from(f64::from(*range) > maximum_range_m);
+    }
+    (2 * beyond > all).then(|| {
+        let words = format!(
+            "{:.0} % of its ranges are longer than maximum_range_m: {maximum_range_m} of {stage}: the unit or the value is \
+             wrong, or the camera sees past it",
+            100.0 * beyond as f64 / all as f64
+        );
+        Doubt::about(DoubtKind::BeyondMaximum, &view.station, words)
+    })
 }

@@ -1,8 +1,9 @@
-//! A survey's folder to views that the stages can work on.
+//! A survey's folder, opened: frames to views that the stages can work on.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
-use camera_model::RayTable;
+use camera_model::{Camera, RayTable};
 use error_models::RangeNoise;
 use nalgebra::Isometry3;
 use range_image::{Flags, Modulation, RangeFrame, Raster};
@@ -12,47 +13,35 @@ use range_io::survey::{InputFrame, Survey, read_frame, read_truth};
 use range_io::tables::{Station, read_stations};
 
 use crate::command::destination::root_of;
-use crate::command::progress::Progress;
+use crate::command::verdict::Doubt;
 use crate::survey::compatible::{Purpose, compatible};
-use crate::survey::outcome::Outcome;
-use crate::survey::plausibility::{self, FrameWatch};
-use crate::survey::span::SpanTally;
+use crate::survey::plausibility;
 use crate::survey::truth::ViewTruth;
 use crate::survey::view::{View, ViewData};
-use crate::survey::work::Work;
-use crate::{Error, Plan, Result};
+use crate::{Error, Result};
 
-/// Reads survey, poses, truth and all frames - those of one station, where one is named; refuses a plan that the survey's
-/// level rules out. The calibration comes with its name in words.
-pub fn load(
-    folder: &Path,
-    calibration: (Option<Calibration>, String),
-    plan: &Plan,
-    only: Option<&str>,
-    progress: &dyn Progress,
-) -> Result<Work> {
-    let (mut work, frames) = open(folder, calibration, Purpose::of(&plan.stages))?;
-    let count = work.outcome.survey.frames.len();
-    plan.check_level(work.outcome.survey.level)?;
-    progress.begin("read frames", count);
-    let mut watch = FrameWatch::default();
-    for index in 0..count {
-        if only.is_none_or(|only| only == work.outcome.survey.frames[index].station) {
-            let view = frames.view(&work.outcome.survey, index)?;
-            watch.look(&view);
-            work.outcome.views.push(view);
-        }
-        progress.advance(index + 1);
-    }
-    work.outcome.doubts.extend(watch.doubts());
-    Ok(work)
-}
-
-/// What the frames of a survey have in common.
-pub struct Frames {
+/// An opened survey: all of it but its frames, which are read one by one.
+pub struct OpenSurvey {
+    /// What was captured.
+    pub survey: Arc<Survey>,
+    /// The calibration, where there is one.
+    pub calibration: Option<Arc<Calibration>>,
+    /// The calibration in use, in words.
+    pub calibration_words: String,
+    /// The camera as the survey states it.
+    pub nominal_camera: Camera,
+    /// The calibrated camera, where there is one.
+    pub calibrated_camera: Option<Camera>,
+    /// Rays of the nominal camera.
+    pub rays: Arc<RayTable>,
+    /// What `stations.csv` says of the stations.
+    pub stated: Vec<Station>,
+    /// Index of the world's axis that points up: z where poses came with the survey, y in a camera's own frame.
+    pub vertical_axis: usize,
+    /// What speaks against survey and calibration.
+    pub doubts: Vec<Doubt>,
     root: PathBuf,
-    depth_rays: RayTable,
-    poses: Vec<Station>,
+    depth_rays: Arc<RayTable>,
     true_poses: Vec<Station>,
     reference: Option<Raster<f32>>,
     modulations: Vec<Modulation>,
@@ -65,59 +54,49 @@ pub fn open(
     folder: &Path,
     (calibration, calibration_words): (Option<Calibration>, String),
     purpose: Purpose,
-) -> Result<(Work, Frames)> {
+) -> Result<OpenSurvey> {
     let survey = Survey::read(folder)?;
     if survey.frames.is_empty() {
         return Err(Error::Survey { path: folder.join(Survey::FILE_NAME), message: "it lists no frames".to_owned() });
     }
     let root = root_of(folder);
-    let camera = survey.camera.nominal_camera()?;
+    let nominal_camera = survey.camera.nominal_camera()?;
     let fit = calibration.as_ref().map(|calibration| compatible(&survey, calibration, purpose)).transpose()?;
     let (calibrated_camera, mut doubts) = fit.map_or((None, Vec::new()), |fit| (Some(fit.camera), fit.doubts));
     doubts.extend(plausibility::of_survey(&survey.camera));
-    let rays = RayTable::new(&camera).map_err(|error| Error::Camera(error.to_string()))?;
-    let depth_rays = match &calibrated_camera {
-        Some(camera) => RayTable::new(camera).map_err(|error| Error::Camera(error.to_string()))?,
-        None => rays.clone(),
-    };
-    let poses = read_poses(&root.join("stations.csv"))?;
-    let places: Vec<Isometry3<f64>> = poses.iter().map(|row| row.world_from_camera).collect();
+    let table = |camera| RayTable::new(camera).map(Arc::new).map_err(|error| Error::Camera(error.to_string()));
+    let rays = table(&nominal_camera)?;
+    let depth_rays = calibrated_camera.as_ref().map_or_else(|| Ok(Arc::clone(&rays)), table)?;
+    let stated = read_poses(&root.join("stations.csv"))?;
+    let places: Vec<Isometry3<f64>> = stated.iter().map(|row| row.world_from_camera).collect();
     doubts.extend(plausibility::far_apart(&places));
     let true_poses = match survey.truth.as_ref().and_then(|truth| truth.stations.as_ref()) {
         Some(file) => read_stations(root.join(file))?,
         None => Vec::new(),
     };
-    let reference = read_reference(&survey, &root)?;
-    let modulations = survey.camera.modulations()?;
-    let vertical_axis = if poses.is_empty() { 1 } else { 2 };
-    let outcome = Outcome {
-        survey,
-        calibration: calibration_words,
-        camera,
-        views: Vec::new(),
-        clouds: Vec::new(),
-        further_points: Vec::new(),
-        poses: Vec::new(),
-        pairs: Vec::new(),
-        refused: Vec::new(),
-        adjustment: None,
-        stages: Vec::new(),
-        refusal: None,
+    Ok(OpenSurvey {
+        nominal_camera,
+        calibrated_camera,
+        rays,
+        vertical_axis: if stated.is_empty() { 1 } else { 2 },
+        stated,
         doubts,
-        stated: poses.clone(),
-        vertical_axis,
-    };
-    let span = SpanTally::default();
-    let range_noise = calibration.as_ref().and_then(|calibration| calibration.range_noise);
-    let frames = Frames { root, depth_rays, poses, true_poses, reference, modulations, range_noise };
-    let (station_clouds, low_amplitude) = (Vec::new(), None);
-    let work = Work { calibration, calibrated_camera, rays, low_amplitude, station_clouds, span, outcome };
-    Ok((work, frames))
+        depth_rays,
+        true_poses,
+        reference: read_reference(&survey, &root)?,
+        modulations: survey.camera.modulations()?,
+        range_noise: calibration.as_ref().and_then(|calibration| calibration.range_noise),
+        root,
+        survey: Arc::new(survey),
+        calibration: calibration.map(Arc::new),
+        calibration_words,
+    })
 }
 
-impl Frames {
+impl OpenSurvey {
     /// Reads frame `index` (from 0) with its pose and truth.
-    pub fn view(&self, survey: &Survey, index: usize) -> Result<View> {
+    pub fn view(&self, index: usize) -> Result<View> {
+        let survey = &self.survey;
         let entry = &survey.frames[index];
         let mut view = View {
             station: entry.station.clone(),
@@ -134,14 +113,21 @@ impl Frames {
             modulations: self.modulations.clone(),
             multipath_risk_m: None,
             correction: None,
+            cloud: None,
+            further_points: Vec::new(),
         };
         view.before = view.snapshot();
         Ok(view)
     }
 
+    /// The calibrated camera, or else the nominal one.
+    pub fn best_camera(&self) -> Camera {
+        self.calibrated_camera.unwrap_or(self.nominal_camera)
+    }
+
     /// Where the survey says that a station stands.
     pub fn approximate_pose(&self, station: &str) -> Option<Isometry3<f64>> {
-        pose_of(&self.poses, station)
+        pose_of(&self.stated, station)
     }
 
     /// Where it truly stands, of simulated surveys.
@@ -243,9 +229,4 @@ fn range_frame(mut range: Raster<f32>, amplitude: Option<Raster<f32>>) -> RangeF
     }
     let unknown = || Raster::filled(width, height, f32::NAN);
     RangeFrame { range, sigma: unknown(), amplitude: amplitude.unwrap_or_else(unknown), flags }
-}
-
-/// Modulation of the first frequency.
-pub fn first_modulation(outcome: &Outcome) -> Option<Modulation> {
-    outcome.views.first().and_then(|view| view.modulation)
 }

@@ -1,0 +1,193 @@
+//! The clouds of views, written as they come.
+//!
+//! Where the survey says where all stations stand, or has one alone, points go straight into the cloud of the common frame.
+//! Else each view's cloud is a file of its own in the frame of its camera; once poses were found, these are read back one by
+//! one into the common cloud.
+
+use std::collections::BTreeSet;
+
+use atomic_output::OutputFolder;
+use nalgebra::{Isometry3, Point3};
+use range_io::ply::{CloudFile, PlyWriter, Precision, read_cloud, write_cloud};
+use serde::Serialize;
+
+use crate::survey::open::OpenSurvey;
+use crate::survey::records::StationPose;
+use crate::survey::view::View;
+use crate::Result;
+
+/// The file of a cloud that is in no frame but its camera's.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct OwnCloud {
+    /// Station, and frame or number of frames.
+    pub view: String,
+    /// The file, relative to the output folder; x right, y up, the camera looking along -z.
+    pub file: String,
+}
+
+/// The clouds so far.
+pub(crate) struct Clouds<'a> {
+    folder: &'a OutputFolder,
+    /// Whether poses are sought.
+    joins: bool,
+    /// Whether the survey has one station alone, whose frame is then the common one.
+    one_station: bool,
+    /// Whether poses of all views are known before.
+    placed: bool,
+    views: usize,
+    common: Option<PlyWriter>,
+    /// Points of split pixels in the common frame, which are written last.
+    further: Vec<CloudFile>,
+    own: Vec<Own>,
+}
+
+/// A view's file in its own frame.
+struct Own {
+    cloud: OwnCloud,
+    number: usize,
+    /// Points at its end that are those of split pixels.
+    further: usize,
+}
+
+impl<'a> Clouds<'a> {
+    pub(crate) fn new(folder: &'a OutputFolder, survey: &OpenSurvey, joins: bool) -> Self {
+        let stations: BTreeSet<&str> = survey.survey.frames.iter().map(|frame| frame.station.as_str()).collect();
+        let one_station = stations.len() == 1;
+        let known = |station: &&str| survey.approximate_pose(station).is_some();
+        let placed = !joins && (one_station || stations.iter().all(known));
+        Self { folder, joins, one_station, placed, views: 0, common: None, further: Vec::new(), own: Vec::new() }
+    }
+
+    /// Writes the cloud of a view, where it has one.
+    pub(crate) fn add(&mut self, view: &View) -> Result<()> {
+        let number = self.views;
+        self.views += 1;
+        let Some(cloud) = CloudOfView::new(view, number) else { return Ok(()) };
+        let stated = view.approximate_world_from_camera;
+        let own = self.one_station.then(Isometry3::identity);
+        if let Some(pose) = stated.or(own).filter(|_| self.placed) {
+            self.append(moved(cloud.points, &pose))?;
+            self.further.push(moved(cloud.further, &pose));
+            return Ok(());
+        }
+        let further = cloud.further.points.len();
+        // A station's name may hold what no file's name can.
+        let plain = |c: char| if c.is_ascii_alphanumeric() || c == '-' { c } else { '_' };
+        let station: String = view.station.chars().take(LONGEST_NAME).map(plain).collect();
+        let file = format!("clouds/{number:03}_{station}.ply");
+        // What is read back keeps all digits.
+        let precision = if self.joins { Precision::Double } else { Precision::Single };
+        write_cloud(self.folder.file(&file)?, &joined(cloud.points, cloud.further), precision)?;
+        self.own.push(Own { cloud: OwnCloud { view: view.name(), file }, number, further });
+        Ok(())
+    }
+
+    fn append(&mut self, points: CloudFile) -> Result<()> {
+        let writer = match &mut self.common {
+            Some(writer) => writer,
+            None => self.common.insert(PlyWriter::create(self.folder.file("cloud.ply")?, Precision::Single)?),
+        };
+        Ok(writer.append(&points)?)
+    }
+
+    /// Completes the files: one cloud where there are poses of all views in a common frame. Else the files of the views.
+    pub(crate) fn finish(mut self, common: Option<&[StationPose]>) -> Result<Vec<OwnCloud>> {
+        let own = std::mem::take(&mut self.own);
+        let Some(poses) = common else {
+            for file in own.iter().filter(|_| self.joins) {
+                let path = self.folder.file(&file.cloud.file)?;
+                write_cloud(&path, &read_cloud(&path)?, Precision::Single)?;
+            }
+            return Ok(own.into_iter().map(|own| own.cloud).collect());
+        };
+        for file in &own {
+            let path = self.folder.file(&file.cloud.file)?;
+            let pose = &poses[file.number].world_from_camera;
+            let (points, further) = parted(moved(read_cloud(&path)?, pose), file.further);
+            self.append(points)?;
+            self.further.push(further);
+            self.folder.discard(&file.cloud.file)?;
+        }
+        for further in std::mem::take(&mut self.further) {
+            self.append(further)?;
+        }
+        if let Some(writer) = self.common {
+            writer.commit()?;
+        }
+        Ok(Vec::new())
+    }
+}
+
+/// Characters of a station's name in a file's name.
+const LONGEST_NAME: usize = 100;
+
+/// The points of a view in its camera's frame.
+struct CloudOfView {
+    /// All finite points of pixels, flagged ones with their flags.
+    points: CloudFile,
+    /// Those of split pixels.
+    further: CloudFile,
+}
+
+impl CloudOfView {
+    fn new(view: &View, number: usize) -> Option<Self> {
+        let cloud = view.cloud.as_ref()?;
+        let finite = || (0..cloud.points.len()).filter(|&index| cloud.points[index].iter().all(|x| x.is_finite()));
+        let points = CloudFile {
+            points: finite().map(|index| cloud.points[index]).collect(),
+            intensity: Some(finite().map(|index| cloud.amplitude[index]).collect()),
+            sigma: Some(finite().map(|index| cloud.sigma[index]).collect()),
+            flags: Some(finite().map(|index| cloud.flags[index].bits()).collect()),
+            frame: Some(finite().map(|_| number as u32).collect()),
+            ..CloudFile::default()
+        };
+        let further = CloudFile {
+            points: view.further_points.iter().map(|further| further.point).collect(),
+            intensity: Some(view.further_points.iter().map(|further| further.amplitude).collect()),
+            sigma: Some(view.further_points.iter().map(|further| further.sigma_m).collect()),
+            flags: Some(vec![0; view.further_points.len()]),
+            frame: Some(vec![number as u32; view.further_points.len()]),
+            ..CloudFile::default()
+        };
+        Some(Self { points, further })
+    }
+}
+
+fn moved(mut cloud: CloudFile, pose: &Isometry3<f64>) -> CloudFile {
+    for point in &mut cloud.points {
+        *point = (pose * Point3::from(*point)).coords.into();
+    }
+    cloud
+}
+
+/// The points of two clouds that have the same attributes.
+fn joined(mut cloud: CloudFile, other: CloudFile) -> CloudFile {
+    fn extend<T>(values: &mut Option<Vec<T>>, others: Option<Vec<T>>) {
+        if let (Some(values), Some(others)) = (values, others) {
+            values.extend(others);
+        }
+    }
+    cloud.points.extend(other.points);
+    extend(&mut cloud.intensity, other.intensity);
+    extend(&mut cloud.sigma, other.sigma);
+    extend(&mut cloud.flags, other.flags);
+    extend(&mut cloud.frame, other.frame);
+    cloud
+}
+
+/// The cloud without its last points, and these.
+fn parted(mut cloud: CloudFile, last: usize) -> (CloudFile, CloudFile) {
+    fn part<T>(values: &mut Option<Vec<T>>, first: usize) -> Option<Vec<T>> {
+        values.as_mut().map(|values| values.split_off(first))
+    }
+    let first = cloud.points.len() - last;
+    let further = CloudFile {
+        points: cloud.points.split_off(first),
+        intensity: part(&mut cloud.intensity, first),
+        sigma: part(&mut cloud.sigma, first),
+        flags: part(&mut cloud.flags, first),
+        frame: part(&mut cloud.frame, first),
+        ..CloudFile::default()
+    };
+    (cloud, further)
+}

@@ -1,0 +1,112 @@
+//! A survey on its way through a plan: streamed through the stages that take stations one by one, then joined.
+
+use std::path::Path;
+use std::time::Instant;
+
+use camera_model::Camera;
+use range_io::calibration::Calibration;
+
+use crate::command::progress::Progress;
+use crate::command::verdict::Doubt;
+use crate::plan::RegisterOptions;
+use crate::run::stream::{Order, stream};
+use crate::run::tally::Tally;
+use crate::stages::joining::{Gathered, Joined, adjust, register};
+use crate::stages::{Findings, Line};
+use crate::survey::compatible::Purpose;
+use crate::survey::open::{OpenSurvey, open};
+use crate::survey::records::StageSummary;
+use crate::survey::view::View;
+use crate::{Error, Plan, Result, Stage};
+
+/// What a run knows of a survey so far: no rasters.
+pub(crate) struct Flow {
+    pub(crate) survey: OpenSurvey,
+    pub(crate) order: Order,
+    line: Line,
+    gathered: Option<Gathered>,
+    /// What each stage did.
+    pub(crate) stages: Vec<StageSummary>,
+    /// What speaks against survey and frames.
+    pub(crate) doubts: Vec<Doubt>,
+    pub(crate) joined: Joined,
+}
+
+impl Flow {
+    /// Opens a survey for a plan; refuses a plan that the survey's level rules out. The calibration comes with its name in
+    /// words.
+    pub(crate) fn new(plan: &Plan, folder: &Path, calibration: (Option<Calibration>, String)) -> Result<Self> {
+        let survey = open(folder, calibration, Purpose::of(&plan.stages))?;
+        plan.check_level(survey.survey.level)?;
+        let line = Line::new(&plan.stages, &survey)?;
+        let order = Order::new(&survey, &plan.stages, None);
+        let options = plan.stages.iter().find_map(|stage| match stage {
+            Stage::Register(options) => Some(options),
+            _ => None,
+        });
+        let gathered = |options: &RegisterOptions| Gathered::new(options, &survey, line.camera(), order.views());
+        let (gathered, doubts) = (options.map(gathered), survey.doubts.clone());
+        let (stages, joined) = (Vec::new(), Joined::default());
+        Ok(Self { survey, order, line, gathered, stages, doubts, joined })
+    }
+
+    /// The camera whose rays make the clouds.
+    pub(crate) fn camera(&self) -> &Camera {
+        self.line.camera()
+    }
+
+    /// Takes all frames through the stages up to registration and hands on each view that comes out.
+    pub(crate) fn views(
+        &mut self,
+        keep: &mut dyn FnMut(View, &OpenSurvey) -> Result<()>,
+        progress: &dyn Progress,
+    ) -> Result<()> {
+        let mut tally = Tally::new(&self.line, self.order.frames(), self.order.views());
+        let (survey, gathered) = (&self.survey, &mut self.gathered);
+        let mut keep = |view: View| {
+            if let Some(gathered) = gathered {
+                gathered.add(&view, survey);
+            }
+            keep(view, survey)
+        };
+        let frames = stream(survey, &self.order, &mut self.line, &mut tally, &mut keep, progress)?;
+        let (stages, doubts) = tally.finish(&self.line, survey)?;
+        self.stages = stages;
+        self.doubts.extend(frames);
+        self.doubts.extend(doubts);
+        Ok(())
+    }
+
+    /// Brings all stations into one frame, where a stage of the plan does so.
+    ///
+    /// # Errors
+    /// Comes with the stage.
+    pub(crate) fn join(&mut self, plan: &Plan, progress: &dyn Progress) -> std::result::Result<(), (&'static str, Error)> {
+        for stage in &plan.stages {
+            let clock = Instant::now();
+            let (found, before) = match stage {
+                Stage::Register(options) => self.register(options, progress),
+                Stage::Adjust(options) => (adjust::run(&mut self.joined, options, progress), 0.0),
+                _ => continue,
+            };
+            let findings = found.map_err(|error| (stage.name(), error))?;
+            let seconds = before + clock.elapsed().as_secs_f64();
+            // It moves whole stations, and no range.
+            let (truth, change) = self.stages.last().map_or((None, None), |last| (last.truth.clone(), last.change_median_m));
+            let change_median_m = change.map(|_| 0.0);
+            self.stages.push(StageSummary { name: stage.name(), seconds, findings, change_median_m, truth });
+        }
+        Ok(())
+    }
+
+    /// What it found, and the time that gathering took.
+    fn register(&mut self, options: &RegisterOptions, progress: &dyn Progress) -> (Result<Findings>, f64) {
+        let Some(gathered) = self.gathered.take() else { return (Ok(Findings::new()), 0.0) };
+        let seconds = gathered.seconds;
+        let found = register::run(gathered, options, progress).map(|(joined, findings)| {
+            self.joined = joined;
+            findings
+        });
+        (found, seconds)
+    }
+}

@@ -1,0 +1,179 @@
+//! The frames of a survey, one after the other, through the stages up to registration.
+//!
+//! What is in memory at a time: [`READ_AT_ONCE`] frames as they were read, at most [`AVERAGED_AT_ONCE`] frames of a station
+//! that is averaged (and the means of as many parts), and the views of one station.
+
+use std::collections::VecDeque;
+
+use rayon::prelude::*;
+
+use crate::command::progress::Progress;
+use crate::command::verdict::Doubt;
+use crate::plan::Stage;
+use crate::stages::average::Tests;
+use crate::stages::{Line, Watch};
+use crate::survey::open::OpenSurvey;
+use crate::survey::plausibility::FrameWatch;
+use crate::survey::view::View;
+use crate::Result;
+
+/// Frames that are read at once: reading is unpacking, which cores share.
+const READ_AT_ONCE: usize = 8;
+
+/// Frames that are averaged and tested at once, each kept as complex images. 64 of 640 x 480 pixels and one frequency take
+/// 350 MB; of fewer the tests would tell less of each part.
+const AVERAGED_AT_ONCE: usize = 64;
+
+/// The frames of each mean of a station; of one frame each where nothing is averaged.
+type Group = Vec<usize>;
+
+/// How the frames of a survey make views.
+pub(crate) struct Order {
+    /// What goes through the stages together: a station where exposures are fused, or else one mean.
+    units: Vec<Vec<Group>>,
+}
+
+impl Order {
+    /// Of all frames, or those of one station.
+    pub(crate) fn new(survey: &OpenSurvey, stages: &[Stage], only: Option<&str>) -> Self {
+        let averages = stages.iter().any(|stage| matches!(stage, Stage::Average(_)));
+        let fuses = stages.iter().any(|stage| matches!(stage, Stage::FuseExposures(_)));
+        let frames = survey.survey.frames.iter().enumerate();
+        let frames = frames.filter(|(_, frame)| only.is_none_or(|only| only == frame.station));
+        if !averages && !fuses {
+            return Self { units: frames.map(|(index, _)| vec![vec![index]]).collect() };
+        }
+        let stations = grouped(frames, |(_, frame)| frame.station.clone());
+        let groups = stations.into_iter().map(|station| {
+            // Means are of frames with one integration time.
+            let time = |frame: &(usize, &range_io::survey::FrameEntry)| {
+                if averages { (None, frame.1.integration_time_s.map(f64::to_bits)) } else { (Some(frame.0), None) }
+            };
+            let groups = grouped(station.into_iter(), time).into_iter();
+            groups.map(|group| group.into_iter().map(|(index, _)| index).collect()).collect::<Vec<Group>>()
+        });
+        let units = if fuses { groups.collect() } else { groups.flatten().map(|group| vec![group]).collect() };
+        Self { units }
+    }
+
+    /// Frames.
+    pub(crate) fn frames(&self) -> usize {
+        self.units.iter().flatten().map(Vec::len).sum()
+    }
+
+    /// Views that come out of it.
+    pub(crate) fn views(&self) -> usize {
+        self.units.len()
+    }
+}
+
+/// Items of one key, in the order in which keys come first.
+fn grouped<T, K: Ord>(items: impl Iterator<Item = T>, key: impl Fn(&T) -> K) -> Vec<Vec<T>> {
+    let (mut groups, mut places): (Vec<Vec<T>>, _) = (Vec::new(), std::collections::BTreeMap::new());
+    for item in items {
+        let place = *places.entry(key(&item)).or_insert(groups.len());
+        match groups.get_mut(place) {
+            Some(group) => group.push(item),
+            None => groups.push(vec![item]),
+        }
+    }
+    groups
+}
+
+/// A survey on its way.
+struct Stream<'a> {
+    survey: &'a OpenSurvey,
+    line: &'a mut Line,
+    watch: &'a mut dyn Watch,
+    progress: &'a dyn Progress,
+    waiting: std::vec::IntoIter<usize>,
+    read: VecDeque<View>,
+    looked: FrameWatch,
+    done: usize,
+}
+
+/// Takes the frames through the stages and hands on each view that comes out; what speaks against the frames as they were
+/// read.
+pub(crate) fn stream(
+    survey: &OpenSurvey,
+    order: &Order,
+    line: &mut Line,
+    watch: &mut dyn Watch,
+    keep: &mut dyn FnMut(View) -> Result<()>,
+    progress: &dyn Progress,
+) -> Result<Vec<Doubt>> {
+    let waiting: Vec<usize> = order.units.iter().flatten().flatten().copied().collect();
+    progress.begin("frames", waiting.len());
+    let (waiting, read, looked) = (waiting.into_iter(), VecDeque::new(), FrameWatch::default());
+    let mut stream = Stream { survey, line, watch, progress, waiting, read, looked, done: 0 };
+    for unit in &order.units {
+        stream.unit(unit)?.into_iter().try_for_each(&mut *keep)?;
+    }
+    Ok(stream.looked.doubts())
+}
+
+impl Stream<'_> {
+    fn unit(&mut self, groups: &[Group]) -> Result<Vec<View>> {
+        let average = self.line.average();
+        let mut views = Vec::new();
+        for frames in groups {
+            views.push(match average {
+                Some(number) => self.mean(number, frames)?,
+                None => self.next()?,
+            });
+        }
+        let rest = average.map_or(0, |number| number + 1)..self.line.steps().len();
+        self.line.apply_some(rest, &mut views, self.watch)?;
+        self.done += groups.iter().map(Vec::len).sum::<usize>();
+        self.progress.advance(self.done);
+        Ok(views)
+    }
+
+    fn mean(&mut self, number: usize, frames: &[usize]) -> Result<View> {
+        let before = self.done;
+        let (view, tests) = self.part(number, frames)?;
+        self.done = before;
+        self.line.record_mean(number, &view, &tests, self.watch);
+        Ok(view)
+    }
+
+    /// The mean of frames, in parts where they are many.
+    fn part(&mut self, number: usize, frames: &[usize]) -> Result<(View, Tests)> {
+        let parts = frames.len().div_ceil(AVERAGED_AT_ONCE).min(AVERAGED_AT_ONCE);
+        let (mut views, mut tests): (Vec<View>, _) = (Vec::new(), Tests::default());
+        if parts > 1 {
+            for part in 0..parts {
+                let ends = [part, part + 1].map(|end| end * frames.len() / parts);
+                let (view, found) = self.part(number, &frames[ends[0]..ends[1]])?;
+                views.push(view);
+                tests = tests.join(found);
+            }
+        } else {
+            for _ in frames {
+                let mut one = vec![self.next()?];
+                self.line.apply_some(0..number, &mut one, self.watch)?;
+                self.done += 1;
+                self.progress.advance(self.done);
+                views.extend(one);
+            }
+            self.watch.before(number, self.line.steps()[number].stage(), &views);
+        }
+        // The mean has all but its values from the first.
+        for view in views.iter_mut().skip(1) {
+            (view.before, view.truth, view.reference_range) = (None, None, None);
+        }
+        let (view, found) = self.line.mean(number, views)?;
+        Ok((view, tests.join(found)))
+    }
+
+    /// The frame whose turn it is.
+    fn next(&mut self) -> Result<View> {
+        if self.read.is_empty() {
+            let indices: Vec<usize> = self.waiting.by_ref().take(READ_AT_ONCE).collect();
+            let views = indices.into_par_iter().map(|index| self.survey.view(index));
+            self.read = views.collect::<Result<VecDeque<View>>>()?;
+            self.read.iter().for_each(|view| self.looked.look(view));
+        }
+        self.read.pop_front().ok_or_else(|| crate::Error::unfit("read frames", "the survey", "no frame"))
+    }
+}

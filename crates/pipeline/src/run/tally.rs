@@ -1,0 +1,138 @@
+//! What each stage changed, gathered as views go through: counts, and medians of thinned pixels.
+
+use std::time::Instant;
+
+use statistics::quantile;
+
+use crate::command::verdict::Doubt;
+use crate::plan::Stage;
+use crate::stages::{Line, Watch};
+use crate::survey::open::OpenSurvey;
+use crate::survey::plausibility::{SenseVotes, beyond_maximum};
+use crate::survey::records::StageSummary;
+use crate::survey::thinning::Thinning;
+use crate::survey::truth::{TruthTally, wrap};
+use crate::survey::view::{Snapshot, View};
+use crate::Result;
+
+/// The figures of all stages up to registration.
+pub(crate) struct Tally {
+    stages: Vec<StageTally>,
+    /// The views as the last stage left them, which is how the next one finds them.
+    last: Vec<Option<Snapshot>>,
+    last_stage: usize,
+    clock: Instant,
+}
+
+struct StageTally {
+    thinning: Thinning,
+    /// Views before and after it.
+    views: [usize; 2],
+    /// Absolute changes of the ranges, metre; `None` once a view had none.
+    changes: Option<Vec<f64>>,
+    truth: TruthTally,
+    seconds: f64,
+    votes: SenseVotes,
+    beyond: Vec<Doubt>,
+}
+
+impl Tally {
+    /// For the stages of a line, of which those up to the one that averages see as many views as there are frames.
+    pub(crate) fn new(line: &Line, frames: usize, views: usize) -> Self {
+        let format = line.camera().format;
+        let of_stage = |number: usize| {
+            let views = if line.average().is_some_and(|average| number >= average) { views } else { frames };
+            StageTally {
+                thinning: Thinning::of(views * format.width * format.height),
+                views: [0, 0],
+                changes: Some(Vec::new()),
+                truth: TruthTally::default(),
+                seconds: 0.0,
+                votes: SenseVotes::default(),
+                beyond: Vec::new(),
+            }
+        };
+        let stages = (0..line.steps().len()).map(of_stage).collect();
+        Self { stages, last: Vec::new(), last_stage: usize::MAX, clock: Instant::now() }
+    }
+
+    /// The figures and the doubts of the stages, in their order.
+    pub(crate) fn finish(self, line: &Line, survey: &OpenSurvey) -> Result<(Vec<StageSummary>, Vec<Doubt>)> {
+        let (mut summaries, mut doubts) = (Vec::new(), Vec::new());
+        for (step, tally) in line.steps().iter().zip(self.stages) {
+            doubts.extend(tally.votes.doubt());
+            doubts.extend(step.doubts().iter().cloned());
+            doubts.extend(tally.beyond);
+            doubts.extend(step.judge_span(survey)?);
+            let changes = tally.changes.filter(|_| tally.views[0] == tally.views[1]);
+            let change = changes.map(|mut changes| quantile(&mut changes, 0.5));
+            summaries.push(StageSummary {
+                name: step.stage().name(),
+                seconds: tally.seconds,
+                findings: step.findings(),
+                change_median_m: change.filter(|change| change.is_finite()),
+                truth: tally.truth.figures(),
+            });
+        }
+        Ok((summaries, doubts))
+    }
+
+    /// Adds what the stage changed.
+    fn compare(&mut self, number: usize, views: &[View], now: &[Option<Snapshot>]) {
+        let tally = &mut self.stages[number];
+        for (place, (view, after)) in views.iter().zip(now).enumerate() {
+            let before = self.last.get(place).and_then(Option::as_ref);
+            let (Some(changes), Some((before, after))) = (&mut tally.changes, before.zip(after.as_ref())) else {
+                tally.changes = None;
+                return;
+            };
+            let (before, after) = (before.range.as_slice(), after.range.as_slice());
+            let change = |pixel: usize| {
+                let change = f64::from(after[pixel]) - f64::from(before[pixel]);
+                view.modulation.map_or(change, |modulation| wrap(change, modulation)).abs()
+            };
+            changes.extend(tally.thinning.pixels(tally.views[1] + place, after.len()).map(change));
+        }
+    }
+}
+
+impl Watch for Tally {
+    fn before(&mut self, number: usize, stage: &Stage, views: &[View]) {
+        // Of frames that become a mean there is no change to tell.
+        let is_mean = matches!(stage, Stage::Average(_)) && views.len() > 1;
+        let is_known = self.last.len() == views.len() && self.last_stage.wrapping_add(1) == number && number > 0;
+        if is_mean {
+            self.last.clear();
+        } else if !is_known {
+            self.last = views.iter().map(View::snapshot).collect();
+        }
+        let tally = &mut self.stages[number];
+        tally.views[0] += views.len();
+        if matches!(stage, Stage::Unwrap(_)) {
+            views.iter().for_each(|view| tally.votes.look_at(view));
+        }
+        self.clock = Instant::now();
+    }
+
+    fn after(&mut self, number: usize, stage: &Stage, views: &[View]) {
+        self.stages[number].seconds += self.clock.elapsed().as_secs_f64();
+        let now: Vec<Option<Snapshot>> = views.iter().map(View::snapshot).collect();
+        self.compare(number, views, &now);
+        let tally = &mut self.stages[number];
+        for (view, snapshot) in views.iter().zip(&now) {
+            if let Some(snapshot) = snapshot {
+                tally.truth.add(view, &snapshot.range, tally.thinning);
+            }
+        }
+        let maximum_range_m = match stage {
+            Stage::Unwrap(options) => options.maximum_range_m,
+            Stage::RepairWraps(options) => Some(options.maximum_range_m),
+            _ => None,
+        };
+        if let Some(maximum_m) = maximum_range_m {
+            tally.beyond.extend(views.iter().filter_map(|view| beyond_maximum(view, stage.name(), maximum_m)));
+        }
+        tally.views[1] += views.len();
+        (self.last, self.last_stage) = (now, number);
+    }
+}

@@ -1,0 +1,28 @@
+//! Medians, quantiles and pictures of the pixels of many views, from so many of them as tell these well enough.
+
+/// Values that are kept of one quantity, about: the median of so many is known to a thousandth of a standard deviation, and
+/// they take 16 MB. A survey of fewer pixels, 60 frames of 176 x 144, keeps all.
+const MOST_VALUES: usize = 1 << 21;
+
+/// Every how many pixels one is kept.
+#[derive(Debug, Clone, Copy)]
+pub struct Thinning {
+    stride: usize,
+}
+
+impl Thinning {
+    /// Keeps all.
+    pub const ALL: Self = Self { stride: 1 };
+
+    /// For so many pixels in all views together.
+    pub fn of(pixels: usize) -> Self {
+        let stride = pixels.div_ceil(MOST_VALUES).max(1);
+        // Widths of images are even: an odd stride takes pixels of all columns.
+        Self { stride: stride | 1 }
+    }
+
+    /// Pixels of the view of this number, of `count` pixels.
+    pub fn pixels(self, view: usize, count: usize) -> impl Iterator<Item = usize> {
+        (view % self.stride..count).step_by(self.stride)
+    }
+}

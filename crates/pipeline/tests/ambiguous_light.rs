@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use pipeline::{Processed, Plan, Silent, SimulateSource, ViewData, process, simulate};
+use pipeline::{Plan, Processed, Silent, SimulateSource, ViewData, process, simulate};
 use range_image::{Flags, RangeFrame};
 
 use crate::common::fixtures;

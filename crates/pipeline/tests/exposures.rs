@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use pipeline::{ExplainRequest, Processed, Plan, Silent, View, ViewData, explain, process};
+use pipeline::{ExplainRequest, Plan, Processed, Silent, View, ViewData, explain, process};
 
 use crate::common::simulated_from;
 

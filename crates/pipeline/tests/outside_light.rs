@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
 
-use pipeline::{Doubt, DoubtKind, Processed, Plan, Silent, process};
+use pipeline::{Doubt, DoubtKind, Plan, Processed, Silent, process};
 use range_image::{Flags, RawFrame, Samples};
 use range_io::survey::{InputFrame, Survey, read_frame, write_frame};
 use scattering_deconvolution::{GaussianTerm, Psf, Scatterer};

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use pipeline::{DoubtKind, Judged, Processed, Plan, RunRequest, Silent, ViewData, process};
+use pipeline::{DoubtKind, Judged, Plan, Processed, RunRequest, Silent, ViewData, process};
 use range_image::Flags;
 use range_io::survey::{InputFrame, Level, Survey, read_frame, write_frame};
 

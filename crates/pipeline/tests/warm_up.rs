@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use error_models::WarmUp;
 use nalgebra::{DMatrix, DVector};
-use pipeline::{DriftSource, ExplainRequest, Processed, Plan, Silent, View, ViewData, ViewDrift, explain, process};
+use pipeline::{DriftSource, ExplainRequest, Plan, Processed, Silent, View, ViewData, ViewDrift, explain, process};
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
 use range_image::Flags;

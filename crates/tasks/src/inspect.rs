@@ -146,7 +146,9 @@ fn inspect_frames(path: &Path, survey: &Survey, found: &mut Inspection) -> Resul
         if survey.level <= Level::Phase && judged.insert(&entry.station) && judged.len() <= MOST_JUDGED {
             let mut views = vec![view];
             line.apply(&mut views, &mut ())?;
-            views.iter().for_each(|view| votes.look_at(view));
+            for view in &views {
+                votes.look_at(view);
+            }
         }
     }
     let readable = survey.frames.len() - unreadable.len();

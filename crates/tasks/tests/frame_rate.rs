@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use error_models::WarmUp;
-use pipeline::{DriftTreatment, ExplainRequest, Processed, Plan, Silent, View, ViewData, ViewDrift, explain, process};
+use pipeline::{DriftTreatment, ExplainRequest, Plan, Processed, Silent, View, ViewData, ViewDrift, explain, process};
 use range_io::calibration::Calibration;
 use range_io::survey::{FrameRate, Survey};
 use tasks::{ChangeOptions, DriftOptions, ReferenceUse, WarmUpRequest, estimate_warm_up};

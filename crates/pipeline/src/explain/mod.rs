@@ -169,7 +169,13 @@ pub fn explain(request: &ExplainRequest, progress: &dyn Progress) -> Result<Expl
         point_m: None,
         flags: Vec::new(),
     };
-    let mut follower = Follower { explanation: &mut explanation, before: None, state: None, is_range: false, flags: FlagWatch::default() };
+    let mut follower = Follower {
+        explanation: &mut explanation,
+        before: None,
+        state: None,
+        is_range: false,
+        flags: FlagWatch::default(),
+    };
     stream(&opened, &order, &mut line, &mut follower, &mut |_| Ok(()), progress)?;
     follower.finish(line.rays());
     progress.finish();

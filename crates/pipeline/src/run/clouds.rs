@@ -11,10 +11,10 @@ use nalgebra::{Isometry3, Point3};
 use range_io::ply::{CloudFile, PlyWriter, Precision, read_cloud, write_cloud};
 use serde::Serialize;
 
+use crate::Result;
 use crate::survey::open::OpenSurvey;
 use crate::survey::records::StationPose;
 use crate::survey::view::View;
-use crate::Result;
 
 /// The file of a cloud that is in no frame but its camera's.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -66,7 +66,7 @@ impl<'a> Clouds<'a> {
         let stated = view.approximate_world_from_camera;
         let own = self.one_station.then(Isometry3::identity);
         if let Some(pose) = stated.or(own).filter(|_| self.placed) {
-            self.append(moved(cloud.points, &pose))?;
+            self.append(&moved(cloud.points, &pose))?;
             self.further.push(moved(cloud.further, &pose));
             return Ok(());
         }
@@ -82,12 +82,12 @@ impl<'a> Clouds<'a> {
         Ok(())
     }
 
-    fn append(&mut self, points: CloudFile) -> Result<()> {
+    fn append(&mut self, points: &CloudFile) -> Result<()> {
         let writer = match &mut self.common {
             Some(writer) => writer,
             None => self.common.insert(PlyWriter::create(self.folder.file("cloud.ply")?, Precision::Single)?),
         };
-        Ok(writer.append(&points)?)
+        Ok(writer.append(points)?)
     }
 
     /// Completes the files: one cloud where there are poses of all views in a common frame. Else the files of the views.
@@ -104,12 +104,12 @@ impl<'a> Clouds<'a> {
             let path = self.folder.file(&file.cloud.file)?;
             let pose = &poses[file.number].world_from_camera;
             let (points, further) = parted(moved(read_cloud(&path)?, pose), file.further);
-            self.append(points)?;
+            self.append(&points)?;
             self.further.push(further);
             self.folder.discard(&file.cloud.file)?;
         }
         for further in std::mem::take(&mut self.further) {
-            self.append(further)?;
+            self.append(&further)?;
         }
         if let Some(writer) = self.common {
             writer.commit()?;

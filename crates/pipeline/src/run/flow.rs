@@ -17,7 +17,7 @@ use crate::survey::compatible::Purpose;
 use crate::survey::open::{OpenSurvey, open};
 use crate::survey::records::StageSummary;
 use crate::survey::view::View;
-use crate::{Error, Plan, Result, Stage};
+use crate::{Plan, Result, Stage};
 
 /// What a run knows of a survey so far: no rasters.
 pub(crate) struct Flow {
@@ -30,6 +30,8 @@ pub(crate) struct Flow {
     /// What speaks against survey and frames.
     pub(crate) doubts: Vec<Doubt>,
     pub(crate) joined: Joined,
+    /// The stage that brings the stations together just now, or did last.
+    pub(crate) joining: &'static str,
 }
 
 impl Flow {
@@ -47,7 +49,7 @@ impl Flow {
         let gathered = |options: &RegisterOptions| Gathered::new(options, &survey, line.camera(), order.views());
         let (gathered, doubts) = (options.map(gathered), survey.doubts.clone());
         let (stages, joined) = (Vec::new(), Joined::default());
-        Ok(Self { survey, order, line, gathered, stages, doubts, joined })
+        Ok(Self { survey, order, line, gathered, stages, doubts, joined, joining: "" })
     }
 
     /// The camera whose rays make the clouds.
@@ -78,10 +80,7 @@ impl Flow {
     }
 
     /// Brings all stations into one frame, where a stage of the plan does so.
-    ///
-    /// # Errors
-    /// Comes with the stage.
-    pub(crate) fn join(&mut self, plan: &Plan, progress: &dyn Progress) -> std::result::Result<(), (&'static str, Error)> {
+    pub(crate) fn join(&mut self, plan: &Plan, progress: &dyn Progress) -> Result<()> {
         for stage in &plan.stages {
             let clock = Instant::now();
             let (found, before) = match stage {
@@ -89,10 +88,12 @@ impl Flow {
                 Stage::Adjust(options) => (adjust::run(&mut self.joined, options, progress), 0.0),
                 _ => continue,
             };
-            let findings = found.map_err(|error| (stage.name(), error))?;
+            self.joining = stage.name();
+            let findings = found?;
             let seconds = before + clock.elapsed().as_secs_f64();
             // It moves whole stations, and no range.
-            let (truth, change) = self.stages.last().map_or((None, None), |last| (last.truth.clone(), last.change_median_m));
+            let (truth, change) =
+                self.stages.last().map_or((None, None), |last| (last.truth.clone(), last.change_median_m));
             let change_median_m = change.map(|_| 0.0);
             self.stages.push(StageSummary { name: stage.name(), seconds, findings, change_median_m, truth });
         }

@@ -147,7 +147,9 @@ impl Kept {
         let pixels = || thinning.pixels(number, width * height);
         if let ViewData::Range(frame) = &view.data {
             let (sigma, flags) = (frame.sigma.as_slice(), frame.flags.as_slice());
-            values.sigma_m.extend(pixels().filter(|pixel| flags[*pixel].is_empty()).map(|pixel| f64::from(sigma[pixel])));
+            values
+                .sigma_m
+                .extend(pixels().filter(|pixel| flags[*pixel].is_empty()).map(|pixel| f64::from(sigma[pixel])));
         }
         let [before_m, after_m] = &mut values.errors_m;
         if let Some(before) = &errors.0 {

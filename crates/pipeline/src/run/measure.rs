@@ -89,7 +89,8 @@ fn registration(joined: &Joined, views: &[ViewRecord], known: &[StationPose]) ->
 /// What speaks against survey and result.
 fn doubts(flow: &Flow, views: &[ViewRecord], refusal: Option<&RefusedStage>, poses: &[StationPose]) -> Vec<Doubt> {
     let of_refusal = |refusal: &RefusedStage| {
-        let words = format!("{}; each cloud is in the frame of its own camera, and no poses are written", refusal.reason);
+        let words =
+            format!("{}; each cloud is in the frame of its own camera, and no poses are written", refusal.reason);
         Doubt::about(DoubtKind::Refused, refusal.stage, words)
     };
     let mut doubts: Vec<Doubt> = refusal.map(of_refusal).into_iter().collect();

@@ -154,10 +154,10 @@ fn run_into(
     flow.views(&mut keep, progress)?;
     let refusal = match flow.join(&request.plan, progress) {
         // The stations stand, if not in one frame.
-        Err((stage, error)) if error.failure() == Failure::Refused => {
-            Some(RefusedStage { stage, reason: error.to_string() })
+        Err(error) if error.failure() == Failure::Refused => {
+            Some(RefusedStage { stage: flow.joining, reason: error.to_string() })
         }
-        Err((_, error)) => return Err(error),
+        Err(error) => return Err(error),
         Ok(()) => None,
     };
     progress.begin("write results", 3);
@@ -236,7 +236,11 @@ pub struct Processed {
 pub fn process(plan: &Plan, survey: &Path, calibration: Option<&Path>, progress: &dyn Progress) -> Result<Processed> {
     let mut views = Vec::new();
     let calibration = read_calibration(&root_of(survey), calibration)?;
-    let processed = process_each(plan, survey, calibration, &mut |view, _| Ok(views.push(view)), progress)?;
+    let mut keep = |view: View, _: &OpenSurvey| {
+        views.push(view);
+        Ok(())
+    };
+    let processed = process_each(plan, survey, calibration, &mut keep, progress)?;
     Ok(Processed { views, ..processed })
 }
 
@@ -256,7 +260,7 @@ pub fn process_each(
         keep(view, survey)
     };
     flow.views(&mut keep, progress)?;
-    flow.join(plan, progress).map_err(|(_, error)| error)?;
+    flow.join(plan, progress)?;
     let camera = *flow.camera();
     let Flow { survey, stages, doubts, joined, .. } = flow;
     let OpenSurvey { survey, stated, vertical_axis, .. } = survey;

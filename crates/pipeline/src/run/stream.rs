@@ -7,6 +7,7 @@ use std::collections::VecDeque;
 
 use rayon::prelude::*;
 
+use crate::Result;
 use crate::command::progress::Progress;
 use crate::command::verdict::Doubt;
 use crate::plan::Stage;
@@ -15,7 +16,6 @@ use crate::stages::{Line, Watch};
 use crate::survey::open::OpenSurvey;
 use crate::survey::plausibility::FrameWatch;
 use crate::survey::view::View;
-use crate::Result;
 
 /// Frames that are read at once: reading is unpacking, which cores share.
 const READ_AT_ONCE: usize = 8;

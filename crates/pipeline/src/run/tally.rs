@@ -4,6 +4,7 @@ use std::time::Instant;
 
 use statistics::quantile;
 
+use crate::Result;
 use crate::command::verdict::Doubt;
 use crate::plan::Stage;
 use crate::stages::{Line, Watch};
@@ -13,7 +14,6 @@ use crate::survey::records::StageSummary;
 use crate::survey::thinning::Thinning;
 use crate::survey::truth::{TruthTally, wrap};
 use crate::survey::view::{Snapshot, View};
-use crate::Result;
 
 /// The figures of all stages up to registration.
 pub(crate) struct Tally {
@@ -109,7 +109,9 @@ impl Watch for Tally {
         let tally = &mut self.stages[number];
         tally.views[0] += views.len();
         if matches!(stage, Stage::Unwrap(_)) {
-            views.iter().for_each(|view| tally.votes.look_at(view));
+            for view in views {
+                tally.votes.look_at(view);
+            }
         }
         self.clock = Instant::now();
     }

@@ -1,6 +1,6 @@
 use range_image::{
-    ComplexFrame, Interference, InterferenceVerdict, RangeFrame, Rest, RestOptions, RestVerdict, average, average_ranges,
-    check_interference, check_rest, check_rest_of_ranges,
+    ComplexFrame, Interference, InterferenceVerdict, RangeFrame, Rest, RestOptions, RestVerdict, average,
+    average_ranges, check_interference, check_rest, check_rest_of_ranges,
 };
 
 use crate::plan::AverageOptions;
@@ -55,7 +55,7 @@ impl Tests {
 
 impl Average {
     /// Adds what the tests of one station found.
-    pub(super) fn record(&self, tests: &Tests, frames: usize, found: &mut Found) {
+    pub(super) fn record(tests: &Tests, frames: usize, found: &mut Found) {
         found.add(STATIONS, 1);
         found.add(FRAMES, frames);
         if let Some(pixels) = tests.interference_px {
@@ -69,7 +69,7 @@ impl Average {
         }
     }
 
-    pub(super) fn findings(&self, found: &Found) -> Findings {
+    pub(super) fn findings(found: &Found) -> Findings {
         let mut findings = found.sums.clone();
         let [frames, stations] = [FRAMES, STATIONS].map(|name| findings.remove(name).unwrap_or_default());
         findings.insert("frames_per_station".to_owned(), frames / stations.max(1.0));

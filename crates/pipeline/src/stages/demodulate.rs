@@ -1,6 +1,6 @@
 use range_image::{
-    ComplexFrame, ConsistencyOptions, DemodulationOptions, Demodulator, InterferenceOptions, NoiseModel, RawFrame, RulesVerdict,
-    check_samples, tell_interference,
+    ComplexFrame, ConsistencyOptions, DemodulationOptions, Demodulator, InterferenceOptions, NoiseModel, RawFrame,
+    RulesVerdict, check_samples, tell_interference,
 };
 
 use crate::plan::DemodulateOptions;

@@ -8,9 +8,7 @@ use camera_model::{Camera, RayTable};
 use crate::command::verdict::Doubt;
 use crate::plan::Stage;
 use crate::stages::average::{Average, Tests};
-use crate::stages::{
-    Findings, Found, ViewStage, cloud, deconvolve, demodulate, flag, fuse, multipath, ranges, wraps,
-};
+use crate::stages::{Findings, Found, ViewStage, cloud, deconvolve, demodulate, flag, fuse, multipath, ranges, wraps};
 use crate::survey::open::OpenSurvey;
 use crate::survey::view::View;
 use crate::{Error, Result};
@@ -107,7 +105,7 @@ impl Line {
                 Work::Views(stage) => stage.apply(views, &mut step.found)?,
                 Work::Mean(average) => {
                     let (view, tests) = average.mean(std::mem::take(views))?;
-                    average.record(&tests, view.frames.len(), &mut step.found);
+                    Average::record(&tests, view.frames.len(), &mut step.found);
                     views.push(view);
                 }
             }
@@ -132,9 +130,7 @@ impl Line {
     /// Records the mean of a station that was made in parts.
     pub(crate) fn record_mean(&mut self, number: usize, view: &View, tests: &Tests, watch: &mut dyn Watch) {
         let Some(step) = self.steps.get_mut(number) else { return };
-        if let Work::Mean(average) = &step.work {
-            average.record(tests, view.frames.len(), &mut step.found);
-        }
+        Average::record(tests, view.frames.len(), &mut step.found);
         watch.after(number, &step.stage, std::slice::from_ref(view));
     }
 }
@@ -149,7 +145,7 @@ impl Step {
     pub fn findings(&self) -> Findings {
         match &self.work {
             Work::Views(stage) => stage.findings(&self.found),
-            Work::Mean(average) => average.findings(&self.found),
+            Work::Mean(_) => Average::findings(&self.found),
         }
     }
 

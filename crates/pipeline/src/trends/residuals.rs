@@ -70,7 +70,9 @@ impl Residuals {
     /// Tests all of it.
     pub(crate) fn remaining(&self) -> RemainingErrors {
         if !self.views.iter().any(|view| view.has_ranges) {
-            return none("The frames were not brought to ranges: there are no residuals to test for trends.".to_owned());
+            return none(
+                "The frames were not brought to ranges: there are no residuals to test for trends.".to_owned(),
+            );
         }
         // What one kind of residuals shows is not mixed with the other.
         let of_truth = self.views.iter().any(|view| view.has_truth);

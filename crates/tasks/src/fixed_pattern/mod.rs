@@ -63,7 +63,10 @@ fn estimate(
     let known = (Some(calibration.clone()), words.clone());
     let mut frames = Vec::new();
     let mut keep = |view: View, _: &OpenSurvey| match view.data {
-        ViewData::Range(frame) => Ok(frames.push((view.station, frame))),
+        ViewData::Range(frame) => {
+            frames.push((view.station, frame));
+            Ok(())
+        }
         _ => Err(Error::Needs { stage: "fixed pattern", needs: "Unwrap" }),
     };
     process_each(&plan, &request.survey, known, &mut keep, progress)?;

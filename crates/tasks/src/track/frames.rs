@@ -124,7 +124,9 @@ struct Sense<'a> {
 impl Watch for Sense<'_> {
     fn before(&mut self, _: usize, stage: &Stage, views: &[View]) {
         if self.votes_now && matches!(stage, Stage::Unwrap(_)) {
-            views.iter().for_each(|view| self.votes.look_at(view));
+            for view in views {
+                self.votes.look_at(view);
+            }
         }
     }
 }

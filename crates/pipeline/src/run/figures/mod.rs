@@ -8,8 +8,8 @@ use report::{Axes, CATEGORIES, Direction, Figure, Series, StationCloud, cloud_fi
 use statistics::quantile;
 
 use crate::Result;
-use crate::run::kept::{Kept, Values};
 use crate::run::figures::pictures::{PICTURED_STATIONS, Scales};
+use crate::run::kept::{Kept, Values};
 use crate::survey::records::{StationPose, ViewRecord};
 
 /// What the page shows beside the summary.
@@ -80,7 +80,8 @@ fn error_figures(values: &Values) -> Vec<Figure> {
     if after.is_empty() {
         return Vec::new();
     }
-    let share = |errors: &[f64], share| quantile(&mut errors.iter().map(|error| error.abs()).collect::<Vec<_>>(), share);
+    let share =
+        |errors: &[f64], share| quantile(&mut errors.iter().map(|error| error.abs()).collect::<Vec<_>>(), share);
     let (wide, narrow) = (share(&before, 0.98), share(&after, 0.99));
     let axes = |title| Axes { title, x: "measured minus true range, mm", y: "% of pixels" };
     let both = [

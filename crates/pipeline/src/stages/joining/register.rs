@@ -10,7 +10,11 @@ use crate::survey::records::StationPose;
 use crate::{Error, Result};
 
 /// All stations are brought together from what is known of their poses.
-pub(crate) fn run(mut gathered: Gathered, options: &RegisterOptions, progress: &dyn Progress) -> Result<(Joined, Findings)> {
+pub(crate) fn run(
+    mut gathered: Gathered,
+    options: &RegisterOptions,
+    progress: &dyn Progress,
+) -> Result<(Joined, Findings)> {
     gathered.prepare();
     if let Some(error) = gathered.failed {
         return Err(error);

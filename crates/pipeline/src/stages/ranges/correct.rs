@@ -35,7 +35,9 @@ impl CorrectRange {
     pub(crate) fn new(options: &CorrectRangeOptions, making: &Making<'_>) -> Result<Self> {
         let OpenSurvey { survey, calibration, calibrated_camera, .. } = making.survey;
         let Some(calibration) = calibration else {
-            return Err(Error::Camera("stage CorrectRange needs a calibration; name one with --calibration".to_owned()));
+            return Err(Error::Camera(
+                "stage CorrectRange needs a calibration; name one with --calibration".to_owned(),
+            ));
         };
         let camera = calibrated_camera.unwrap_or(making.camera);
         let applies_drift = options.warm_up == DriftTreatment::Apply;

@@ -30,7 +30,10 @@ pub(crate) struct Unwrap {
 
 impl Unwrap {
     pub(crate) fn new(options: &UnwrapOptions, making: &Making<'_>) -> Self {
-        Self { options: options.clone(), geometry: image_geometry(&making.survey.calibrated_camera.unwrap_or(making.camera)) }
+        Self {
+            options: options.clone(),
+            geometry: image_geometry(&making.survey.calibrated_camera.unwrap_or(making.camera)),
+        }
     }
 }
 

@@ -2,10 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
+use commands::plan::{DriftTreatment, NetworkCalibration};
+use commands::{Inputs, Progress, produce};
 use error_models::ModelSet;
 use pipeline::Result;
-use pipeline::command::{Inputs, Progress, produce};
-use pipeline::plan::{DriftTreatment, NetworkCalibration};
 use pipeline::run::{CALIBRATION, NETWORK, RunRequest, Summary, beside, run_with};
 use range_io::calibration::Calibration;
 use self_calibration::{CalibrationOptions, TermSelection};

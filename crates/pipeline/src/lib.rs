@@ -1,23 +1,21 @@
 #![doc = include_str!("../README.md")]
 
-pub mod command;
 mod explain;
-pub mod plan;
 pub mod run;
 pub mod stages;
 pub mod stations;
 pub mod survey;
 pub mod trends;
-pub use command::{
-    Doubt, DoubtKind, DriftError, Error, Failure, Judged, Progress, RefusalFile, Result, Silent, Verdict,
-};
-pub use explain::{ExplainRequest, Explanation, FlagReason, StageLine, StagePart, explain};
-pub use plan::{
+pub use commands::plan::{
     AdjustOptions, AmplitudeKind, AverageOptions, CorrectImagePointOptions, CorrectRangeOptions, DeconvolveOptions,
     DemodulateOptions, DriftTreatment, FlagOptions, FuseExposuresOptions, MixedPixels, MultipathOptions,
     MultipathTreatment, NetworkCalibration, NoiseOptions, Plan, PointCloudOptions, RegisterOptions, RepairWrapsOptions,
     SimulateSource, Source, Stage, StartPoses, UnwrapMethod, UnwrapOptions,
 };
+pub use commands::{
+    Doubt, DoubtKind, DriftError, Error, Failure, Judged, Progress, RefusalFile, Result, Silent, Verdict,
+};
+pub use explain::{ExplainRequest, Explanation, FlagReason, StageLine, StagePart, explain};
 pub use run::{
     Calibrator, OwnCloud, PairSummary, Processed, ReferenceSummary, RegistrationSummary, RunRequest, Simulated,
     StationTruth, Summary, TruthSummary, process, process_each, run, run_with, simulate,

@@ -102,6 +102,9 @@ pub mod application {
     #[cfg(feature = "calibration-tasks")]
     #[doc(inline)]
     pub use calibration_tasks;
+    #[cfg(feature = "commands")]
+    #[doc(inline)]
+    pub use commands;
     #[cfg(feature = "pipeline")]
     #[doc(inline)]
     pub use pipeline;

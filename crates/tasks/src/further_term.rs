@@ -3,9 +3,9 @@
 use std::path::Path;
 
 use atomic_output::{Destination, write_text};
+use commands::root_of;
 use error_models::ModelSet;
 use pipeline::Result;
-use pipeline::command::root_of;
 use pipeline::survey::{Purpose, compatible, read_calibration};
 use range_io::calibration::{Calibration, Provenance};
 use range_io::survey::Survey;

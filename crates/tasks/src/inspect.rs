@@ -4,8 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use std::path::Path;
 
-use pipeline::command::{Doubt, DoubtKind, Judged, root_of};
-use pipeline::plan::{DemodulateOptions, DriftTreatment, Stage, ruled_out};
+use commands::plan::{DemodulateOptions, DriftTreatment, Stage, ruled_out};
+use commands::{Doubt, DoubtKind, Judged, root_of};
 use pipeline::stages::{Line, corrects_ranges};
 use pipeline::survey::plausibility::{self, FrameWatch, SenseVotes};
 use pipeline::survey::{Purpose, compatible, open, read_calibration};

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use pipeline::plan::DriftTreatment;
+use commands::plan::DriftTreatment;
 use self_calibration::{CalibrationOptions, Method};
 
 /// How a survey is calibrated.

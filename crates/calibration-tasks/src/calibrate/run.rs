@@ -3,8 +3,8 @@
 use std::time::Instant;
 
 use atomic_output::{Destination, write_text};
-use pipeline::command::{Inputs, Progress, json, produce};
-use pipeline::plan::DriftTreatment;
+use commands::plan::DriftTreatment;
+use commands::{Inputs, Progress, json, produce};
 use pipeline::{Error, Result};
 use range_io::calibration::Calibration;
 use range_io::tables::{write_residuals, write_stations, write_targets};

@@ -10,7 +10,7 @@ pub use pattern::PatternLine;
 
 use std::path::PathBuf;
 
-use pipeline::command::{Judged, Verdict};
+use commands::{Judged, Verdict};
 use pipeline::{Error, Result};
 use range_io::calibration::Calibration;
 use residual_tests::{

@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
+use commands::root_of;
 use nalgebra::{Matrix3, Point3, Vector3};
 use pipeline::Result;
-use pipeline::command::root_of;
 use range_io::survey::Survey;
 use range_io::tables::{read_stations, read_targets};
 use self_calibration::{Network, NetworkTarget, Station};

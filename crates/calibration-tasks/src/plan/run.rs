@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use atomic_output::{Destination, write_text};
-use pipeline::command::{Inputs, Progress, json, produce};
+use commands::{Inputs, Progress, json, produce};
 use pipeline::{Error, Result};
 use self_calibration::PlanOptions;
 

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use camera_model::euler_from_pose;
-use pipeline::command::Judged;
+use commands::Judged;
 use self_calibration::{Candidate, PlanOutcome};
 use serde::Serialize;
 

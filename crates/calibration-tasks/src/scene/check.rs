@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use pipeline::plan::{Fault, Rule, check_numbers};
+use commands::plan::{Fault, Rule, check_numbers};
 
 use crate::scene::spec::{FieldSpec, NetworkScene, SightingSpec};
 

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use atomic_output::{Destination, OutputFolder};
-use pipeline::command::{Inputs, produce};
+use commands::{Inputs, produce};
 use pipeline::{Error, Result, Simulated};
 use range_io::calibration::{Calibration, Provenance};
 use range_io::survey::{Survey, TruthFiles};

@@ -5,8 +5,8 @@ use range_image::Flags;
 use statistics::Distribution;
 
 use crate::explain::{FlagReason, PixelState};
-use crate::plan::{FlagOptions, Stage};
 use crate::survey::view::View;
+use commands::plan::{FlagOptions, Stage};
 
 /// Notes the flags as stages set them.
 #[derive(Default)]

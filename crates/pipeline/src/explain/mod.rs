@@ -12,17 +12,17 @@ use range_io::calibration::Calibration;
 use range_io::survey::{Level, Survey};
 use serde::Serialize;
 
-use crate::command::destination::root_of;
-use crate::command::progress::Progress;
-use crate::command::verdict::Judged;
 use crate::explain::flags::FlagWatch;
-use crate::plan::{Stage, is_past};
 use crate::run::stream::{Order, stream};
 use crate::stages::{Line, Watch};
 use crate::survey::compatible::Purpose;
 use crate::survey::open::{open, read_calibration};
 use crate::survey::view::{View, ViewData};
 use crate::{Error, Plan, Result};
+use commands::Judged;
+use commands::Progress;
+use commands::plan::{Stage, is_past};
+use commands::root_of;
 
 /// Which pixel is to be explained.
 #[derive(Debug, Clone)]

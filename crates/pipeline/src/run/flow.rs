@@ -6,9 +6,6 @@ use std::time::Instant;
 use camera_model::Camera;
 use range_io::calibration::Calibration;
 
-use crate::command::progress::Progress;
-use crate::command::verdict::Doubt;
-use crate::plan::RegisterOptions;
 use crate::run::stream::{Order, stream};
 use crate::run::tally::Tally;
 use crate::stages::joining::{Gathered, Joined, adjust, register};
@@ -18,6 +15,9 @@ use crate::survey::open::{OpenSurvey, open};
 use crate::survey::records::StageSummary;
 use crate::survey::view::View;
 use crate::{Plan, Result, Stage};
+use commands::Doubt;
+use commands::Progress;
+use commands::plan::RegisterOptions;
 
 /// What a run knows of a survey so far: no rasters.
 pub(crate) struct Flow {

@@ -6,8 +6,6 @@ use std::path::Path;
 use multiview_registration::{Placements, RefusedPair};
 use nalgebra::Isometry3;
 
-use crate::command::verdict::{Doubt, DoubtKind};
-use crate::plan::{Plan, ruled_out};
 use crate::run::clouds::OwnCloud;
 use crate::run::flow::Flow;
 use crate::run::kept::Kept;
@@ -17,6 +15,8 @@ use crate::stages::wraps::repair;
 use crate::stations::placement::wrong_place;
 use crate::survey::plausibility;
 use crate::survey::records::{RefusedStage, StationPose, ViewRecord};
+use commands::plan::{Plan, ruled_out};
+use commands::{Doubt, DoubtKind};
 use statistics::quantile;
 
 /// Every figure of the run but its time and output folder.

@@ -31,10 +31,6 @@ use range_io::calibration::Calibration;
 use range_io::survey::Survey;
 use range_io::tables::Station;
 
-use crate::command::destination::{Inputs, produce, root_of};
-use crate::command::progress::Progress;
-use crate::command::verdict::{Doubt, Failure};
-use crate::plan::{NetworkCalibration, Source};
 use crate::run::clouds::Clouds;
 use crate::run::document::document;
 use crate::run::figures::Figures;
@@ -44,6 +40,10 @@ use crate::survey::open::{OpenSurvey, read_calibration};
 use crate::survey::records::{RefusedStage, StageSummary, StationPose, ViewRecord, common_poses};
 use crate::survey::view::View;
 use crate::{Error, Plan, Result, Stage};
+use commands::Progress;
+use commands::plan::{NetworkCalibration, Source};
+use commands::{Doubt, Failure};
+use commands::{Inputs, produce, root_of};
 
 /// What to run on what.
 #[derive(Debug, Clone)]

@@ -5,11 +5,11 @@ use range_io::tables::{Station, write_stations};
 use range_io::trajectory::{StampedPose, write_tum};
 
 use crate::Result;
-use crate::command::destination::json;
-use crate::command::progress::Progress;
-use crate::command::verdict::words_about;
 use crate::run::summary::Summary;
 use crate::survey::records::{StationPose, ViewRecord};
+use commands::Progress;
+use commands::json;
+use commands::words_about;
 
 /// Writes where the views stand in the frame that they have in common.
 pub(crate) fn write_poses(

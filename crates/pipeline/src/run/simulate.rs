@@ -19,11 +19,11 @@ use range_io::tables::{Station, write_stations};
 use serde::Serialize;
 use simulation::{GrossErrorsSpec, SimulationSpec, Simulator};
 
-use crate::command::destination::{Inputs, produce};
-use crate::command::progress::Progress;
-use crate::command::verdict::Judged;
-use crate::plan::SimulateSource;
 use crate::{Error, Result};
+use commands::Judged;
+use commands::Progress;
+use commands::plan::SimulateSource;
+use commands::{Inputs, produce};
 
 /// What a simulation wrote.
 #[derive(Debug, Clone, Serialize)]

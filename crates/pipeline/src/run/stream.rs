@@ -8,14 +8,14 @@ use std::collections::VecDeque;
 use rayon::prelude::*;
 
 use crate::Result;
-use crate::command::progress::Progress;
-use crate::command::verdict::Doubt;
-use crate::plan::Stage;
 use crate::stages::average::Tests;
 use crate::stages::{Line, Watch};
 use crate::survey::open::OpenSurvey;
 use crate::survey::plausibility::FrameWatch;
 use crate::survey::view::View;
+use commands::Doubt;
+use commands::Progress;
+use commands::plan::Stage;
 
 /// Frames that are read at once: reading is unpacking, which cores share.
 const READ_AT_ONCE: usize = 8;

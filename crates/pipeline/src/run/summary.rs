@@ -4,12 +4,12 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use crate::command::verdict::{Doubt, Judged, Verdict};
 use crate::run::clouds::OwnCloud;
 use crate::survey::drift::ViewDrift;
 use crate::survey::records::{RefusedStage, StageSummary};
 use crate::survey::truth::RangeTruth;
 use crate::trends::RemainingErrors;
+use commands::{Doubt, Judged, Verdict};
 
 /// What a run did and how good the result is.
 #[derive(Debug, Clone, Serialize)]

@@ -5,8 +5,6 @@ use std::time::Instant;
 use statistics::quantile;
 
 use crate::Result;
-use crate::command::verdict::Doubt;
-use crate::plan::Stage;
 use crate::stages::{Line, Watch};
 use crate::survey::open::OpenSurvey;
 use crate::survey::plausibility::{SenseVotes, beyond_maximum};
@@ -14,6 +12,8 @@ use crate::survey::records::StageSummary;
 use crate::survey::thinning::Thinning;
 use crate::survey::truth::{TruthTally, wrap};
 use crate::survey::view::{Snapshot, View};
+use commands::Doubt;
+use commands::plan::Stage;
 
 /// The figures of all stages up to registration.
 pub(crate) struct Tally {

@@ -3,10 +3,10 @@ use range_image::{
     average_ranges, check_interference, check_rest, check_rest_of_ranges,
 };
 
-use crate::plan::AverageOptions;
 use crate::stages::{Findings, Found};
 use crate::survey::view::{View, ViewData};
 use crate::{Error, Result};
+use commands::plan::AverageOptions;
 
 /// All views of a station with one integration time become one: the mean of the complex images, or of the ranges where
 /// there are only those.

@@ -6,12 +6,12 @@ use scattering_deconvolution::{
     Side,
 };
 
-use crate::command::verdict::{Doubt, DoubtKind};
-use crate::plan::DeconvolveOptions;
 use crate::stages::line::Making;
 use crate::stages::{Findings, Found, ViewStage};
 use crate::survey::view::{View, ViewData};
 use crate::{Error, Result};
+use commands::plan::DeconvolveOptions;
+use commands::{Doubt, DoubtKind};
 
 /// The calibrated point spread function is taken off the complex images; pixels whose correction depends on light that
 /// is not known, saturated or from outside the field of view, are flagged.

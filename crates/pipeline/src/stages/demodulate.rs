@@ -3,12 +3,12 @@ use range_image::{
     RulesVerdict, check_samples, tell_interference,
 };
 
-use crate::plan::DemodulateOptions;
 use crate::stages::line::Making;
 use crate::stages::{Found, ViewStage};
 use crate::survey::open::OpenSurvey;
 use crate::survey::view::{View, ViewData};
 use crate::{Error, Result};
+use commands::plan::DemodulateOptions;
 
 /// Raw samples to complex images, with the conventions that the survey states.
 pub(super) struct Demodulate {

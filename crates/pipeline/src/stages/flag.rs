@@ -7,12 +7,12 @@ use multipath::{
 };
 use range_image::Flags;
 
-use crate::plan::FlagOptions;
 use crate::stages::line::Making;
 use crate::stages::multipath::RESPONSE_SNR;
 use crate::stages::{Found, ViewStage};
 use crate::survey::view::{FurtherPoint, View, ViewData};
 use crate::{Error, Result};
+use commands::plan::FlagOptions;
 
 /// Gross errors get a flag with their reason; no value is changed, but of mixed pixels that are to be dropped.
 pub(super) struct Flag {

@@ -2,10 +2,10 @@ use std::f64::consts::TAU;
 
 use range_image::{Exposure, FusionOptions, Modulation, RangeFrame, fuse_exposures};
 
-use crate::plan::FuseExposuresOptions;
 use crate::stages::{Found, ViewStage};
 use crate::survey::view::{View, ViewData};
 use crate::{Error, Result};
+use commands::plan::FuseExposuresOptions;
 
 /// Below this ratio of signal to noise the noise of a phase is not normal.
 const NORMAL_SNR: f64 = 5.0;

@@ -5,13 +5,13 @@ use std::sync::Arc;
 
 use camera_model::{Camera, RayTable};
 
-use crate::command::verdict::Doubt;
-use crate::plan::Stage;
 use crate::stages::average::{Average, Tests};
 use crate::stages::{Findings, Found, ViewStage, cloud, deconvolve, demodulate, flag, fuse, multipath, ranges, wraps};
 use crate::survey::open::OpenSurvey;
 use crate::survey::view::View;
 use crate::{Error, Result};
+use commands::Doubt;
+use commands::plan::Stage;
 
 /// What stages are made ready with: the state that those before them leave.
 pub(crate) struct Making<'a> {

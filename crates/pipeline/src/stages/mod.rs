@@ -21,10 +21,10 @@ use std::collections::BTreeMap;
 use range_io::calibration::Calibration;
 
 use crate::Result;
-use crate::command::verdict::Doubt;
 use crate::survey::drift::ViewDrift;
 use crate::survey::span::SpanTally;
 use crate::survey::view::View;
+use commands::Doubt;
 pub use line::{Line, Step, Watch};
 
 /// Figures that a stage reports, with units in their names.

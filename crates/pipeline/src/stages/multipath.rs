@@ -7,11 +7,11 @@ use multipath::{
 };
 use range_image::{ComplexFrame, Flags, Raster};
 
-use crate::plan::{MultipathOptions, MultipathTreatment};
 use crate::stages::line::Making;
 use crate::stages::{Found, ViewStage};
 use crate::survey::view::{View, ViewData};
 use crate::{Error, Result};
+use commands::plan::{MultipathOptions, MultipathTreatment};
 
 /// Pixels of smaller amplitude, in standard deviations, do not tell the response of the frequencies.
 pub(super) const RESPONSE_SNR: f64 = 20.0;

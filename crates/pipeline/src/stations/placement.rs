@@ -2,7 +2,7 @@
 
 use multiview_registration::StationPlacement;
 
-use crate::command::verdict::{Doubt, DoubtKind};
+use commands::{Doubt, DoubtKind};
 
 /// What to say of a station that is probably in the wrong place.
 pub fn wrong_place(name: &str, found: &StationPlacement) -> Doubt {

@@ -6,11 +6,11 @@ use range_image::Modulation;
 use range_io::calibration::Calibration;
 use range_io::survey::{Level, Survey};
 
-use crate::command::verdict::{Doubt, DoubtKind};
-use crate::plan::{DriftTreatment, Stage};
 use crate::survey::drift::DriftCurve;
 use crate::survey::view::view_name;
 use crate::{Error, Result};
+use commands::plan::{DriftTreatment, Stage};
+use commands::{Doubt, DoubtKind};
 
 /// Integration time written where neither tables nor frames state one. A correction chooses the only model there is,
 /// whatever its time, for frames that state none either.

@@ -6,9 +6,9 @@ use range_io::calibration::CalibratedDrift;
 use range_io::survey::Survey;
 use serde::Serialize;
 
-use crate::command::error::drift::DriftError;
 use crate::survey::frame_rates::rate_history;
 use crate::survey::view::View;
+use commands::DriftError;
 
 /// The drift of a view, the same at all its pixels.
 #[derive(Debug, Clone, PartialEq, Serialize)]

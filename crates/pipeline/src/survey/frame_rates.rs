@@ -3,7 +3,7 @@
 use error_models::{RateHistory, RatePhase};
 use range_io::survey::Survey;
 
-use crate::command::error::drift::DriftError;
+use commands::DriftError;
 
 /// The rates that a survey states, second since power-on; `None` where it states none.
 pub fn stated(survey: &Survey, power_on_s: f64) -> Option<error_models::Result<RateHistory>> {

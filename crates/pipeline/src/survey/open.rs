@@ -12,13 +12,13 @@ use range_io::npz::NpzReader;
 use range_io::survey::{InputFrame, Survey, read_frame, read_truth};
 use range_io::tables::{Station, read_stations};
 
-use crate::command::destination::root_of;
-use crate::command::verdict::Doubt;
 use crate::survey::compatible::{Purpose, compatible};
 use crate::survey::plausibility;
 use crate::survey::truth::ViewTruth;
 use crate::survey::view::{View, ViewData};
 use crate::{Error, Result};
+use commands::Doubt;
+use commands::root_of;
 
 /// An opened survey: all of it but its frames, which are read one by one.
 pub struct OpenSurvey {

@@ -7,11 +7,11 @@ use multiview_registration::Placements;
 use nalgebra::{Isometry3, Matrix3, Matrix6, Vector3};
 use serde::Serialize;
 
-use crate::command::verdict::Doubt;
 use crate::survey::drift::ViewDrift;
 use crate::survey::plausibility;
 use crate::survey::truth::{RangeTruth, evaluate};
 use crate::survey::view::{View, ViewData};
+use commands::Doubt;
 use range_io::tables::Station;
 use statistics::quantile;
 

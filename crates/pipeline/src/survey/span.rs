@@ -3,8 +3,8 @@
 use range_image::{Flags, RangeFrame, Raster};
 use range_io::calibration::ValidSpan;
 
-use crate::command::verdict::{Doubt, DoubtKind};
 use crate::{Error, Result};
+use commands::{Doubt, DoubtKind};
 
 /// Part of the pixels outside the span from which on it is no matter of a few.
 const LARGE_SHARE: f64 = 0.2;

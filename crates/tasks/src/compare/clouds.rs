@@ -3,9 +3,9 @@
 use point_cloud::{Cloud, NeighbourTree};
 use std::path::Path;
 
+use commands::{Doubt, DoubtKind, Progress};
 use icp_registration::{IcpOptions, Metric, Selection, StopReason, align};
 use nalgebra::{Isometry3, Point3, Vector3};
-use pipeline::command::{Doubt, DoubtKind, Progress};
 use pipeline::{Error, Result};
 use range_io::clouds::read_any_cloud;
 use rayon::prelude::*;

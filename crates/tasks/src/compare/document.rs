@@ -2,8 +2,8 @@
 
 use std::fmt;
 
+use commands::Judged;
 use nalgebra::Vector3;
-use pipeline::command::Judged;
 use report::{Column, Document};
 
 use crate::compare::figures::Figures;

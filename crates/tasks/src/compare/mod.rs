@@ -15,7 +15,7 @@ pub use trajectories::{AbsoluteSummary, RelativeSummary, TrajectoryComparison, T
 use std::path::PathBuf;
 
 use atomic_output::{Destination, write_text};
-use pipeline::command::{Doubt, Inputs, Judged, Progress, json, produce};
+use commands::{Doubt, Inputs, Judged, Progress, json, produce};
 use pipeline::{Error, Result};
 use serde::Serialize;
 

@@ -9,8 +9,8 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use atomic_output::Destination;
-use pipeline::command::{Inputs, Progress, json, produce};
-use pipeline::plan::{CorrectRangeOptions, DeconvolveOptions, DemodulateOptions, UnwrapOptions};
+use commands::plan::{CorrectRangeOptions, DeconvolveOptions, DemodulateOptions, UnwrapOptions};
+use commands::{Inputs, Progress, json, produce};
 use pipeline::run::process_each;
 use pipeline::stages::corrects_ranges;
 use pipeline::survey::{OpenSurvey, View, ViewData};

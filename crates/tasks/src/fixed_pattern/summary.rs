@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use pipeline::command::Judged;
+use commands::Judged;
 use sensor_noise::{PatternEstimate, PatternSplit, WallQuality};
 use serde::Serialize;
 

@@ -10,7 +10,7 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use atomic_output::Destination;
-use pipeline::command::{Inputs, Progress, json, produce};
+use commands::{Inputs, Progress, json, produce};
 use pipeline::{Error, Plan, Result, process};
 use range_io::calibration::Calibration;
 use sensor_noise::NoiseFitOptions;

@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
+use commands::{Doubt, DoubtKind, Judged};
 use error_models::{AmplitudeScale, ParameterStatus, RangeNoise};
-use pipeline::command::{Doubt, DoubtKind, Judged};
 use sensor_noise::{SigmaCheck, SigmaVerdict, VarianceEstimator, VarianceFit};
 use serde::Serialize;
 

@@ -1,10 +1,10 @@
 //! All stations at once by pairs of their frames, where surfaces differ by more than the noise of their points.
 
+use commands::plan::NORMAL_HALF_WIDTH_PX;
+use commands::{Doubt, DoubtKind};
 use multiview_registration::{FrameRegistration, PairAlignment, Start, register_frames};
 use nalgebra::Isometry3;
 use pipeline::Result;
-use pipeline::command::{Doubt, DoubtKind};
-use pipeline::plan::NORMAL_HALF_WIDTH_PX;
 use pipeline::stations::{Station, Surface, surface};
 use pipeline::survey::StationPose;
 use projective_registration::{FrameAlignmentOptions, OrganisedFrame};

@@ -2,11 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use pipeline::command::{Doubt, Progress, root_of};
-use pipeline::plan::{
+use commands::plan::{
     AverageOptions, CorrectImagePointOptions, CorrectRangeOptions, DeconvolveOptions, DemodulateOptions, FlagOptions,
     FuseExposuresOptions, PointCloudOptions, UnwrapOptions,
 };
+use commands::{Doubt, Progress, root_of};
 use pipeline::run::process_each;
 use pipeline::stages::corrects_ranges;
 use pipeline::stations::{Station, projection};

@@ -18,9 +18,9 @@ pub use summary::{RegisterSummary, RegisteredLoop, RegisteredPair, RegisteredPla
 use std::time::Instant;
 
 use atomic_output::Destination;
+use commands::{Doubt, Inputs, Progress, produce};
 use nalgebra::Isometry3;
 use pipeline::Result;
-use pipeline::command::{Doubt, Inputs, Progress, produce};
 use pipeline::stations::Station;
 use pipeline::survey::{StationPose, plausibility};
 

@@ -2,10 +2,10 @@
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use commands::plan::NORMAL_HALF_WIDTH_PX;
+use commands::{Doubt, DoubtKind, Progress};
 use icp_registration::{IcpResult, StopReason};
 use nalgebra::{Isometry3, Point3};
-use pipeline::command::{Doubt, DoubtKind, Progress};
-use pipeline::plan::NORMAL_HALF_WIDTH_PX;
 use pipeline::stations::{Start, Station, Surface};
 use pipeline::{Error, Result};
 use rayon::prelude::*;

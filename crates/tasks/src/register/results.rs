@@ -1,8 +1,8 @@
 //! The files of a registration.
 
 use atomic_output::{Destination, write_text};
+use commands::{Progress, json, words_about};
 use pipeline::Result;
-use pipeline::command::{Progress, json, words_about};
 use pipeline::stations::Station;
 use range_io::clouds::{CloudFile, Precision};
 use range_io::ply::write_cloud;

@@ -1,12 +1,12 @@
 //! All stations at once.
 
+use commands::plan::NORMAL_HALF_WIDTH_PX;
+use commands::{Doubt, DoubtKind, Progress};
 use multiview_registration::Error::UnconnectedStations;
 use multiview_registration::{
     Datum, Start, StationRegistration, StationRegistrationOptions, SurfacePair, register_stations,
 };
 use nalgebra::{Isometry3, Point3};
-use pipeline::command::{Doubt, DoubtKind, Progress};
-use pipeline::plan::NORMAL_HALF_WIDTH_PX;
 use pipeline::stations::{Station, Tried, Windows, refused};
 use pipeline::survey::StationPose;
 use pipeline::{Error, Result};

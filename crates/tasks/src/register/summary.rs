@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use pipeline::command::{Doubt, Judged};
+use commands::{Doubt, Judged};
 use serde::Serialize;
 
 /// What was registered, and how well each pose is known.

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use pipeline::command::Progress;
+use commands::Progress;
 use pipeline::run::Processed;
 use pipeline::survey::ViewData;
 use pipeline::{AverageOptions, DemodulateOptions, Error, Plan, Result, Stage, process};

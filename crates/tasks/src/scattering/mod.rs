@@ -11,8 +11,8 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use atomic_output::Destination;
+use commands::{Inputs, Progress, json, produce};
 use error_models::{NamedParameter, ParameterStatus};
-use pipeline::command::{Inputs, Progress, json, produce};
 use pipeline::{Error, Result};
 use scattering_deconvolution::{EstimationOptions, estimate_psf};
 

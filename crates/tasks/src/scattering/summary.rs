@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use pipeline::command::Judged;
+use commands::Judged;
 use scattering_deconvolution::{PsfEstimate, Verdict};
 use serde::Serialize;
 use statistics::quantile;

@@ -4,9 +4,9 @@ use projective_registration::Projection;
 use std::path::Path;
 use std::sync::Arc;
 
+use commands::plan::DriftTreatment;
+use commands::{Doubt, root_of};
 use nalgebra::Isometry3;
-use pipeline::command::{Doubt, root_of};
-use pipeline::plan::DriftTreatment;
 use pipeline::stages::{Line, Step, Watch};
 use pipeline::stations::projection;
 use pipeline::survey::{FrameWatch, OpenSurvey, Purpose, SenseVotes, View, open, read_calibration};

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::time::Instant;
 
 use atomic_output::Destination;
-use pipeline::command::{Doubt, Inputs, Progress, produce, root_of};
+use commands::{Doubt, Inputs, Progress, produce, root_of};
 use pipeline::survey::plausibility;
 use pipeline::{Error, Result};
 use point_cloud::Cloud;

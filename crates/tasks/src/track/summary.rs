@@ -1,7 +1,7 @@
 //! Every figure of tracking by name; written as `summary.json` and shown as words.
 
+use commands::{Doubt, DoubtKind, Judged, Verdict};
 use nalgebra::Isometry3;
-use pipeline::command::{Doubt, DoubtKind, Judged, Verdict};
 use serde::Serialize;
 use statistics::quantile;
 use tracking::{TrackedPose, Tracker, TrajectoryAlignment, TrajectoryErrorOptions, absolute_trajectory_error};

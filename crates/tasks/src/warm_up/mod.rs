@@ -11,7 +11,7 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use atomic_output::Destination;
-use pipeline::command::{Inputs, Progress, json, produce};
+use commands::{Inputs, Progress, json, produce};
 use pipeline::{Error, Result};
 use range_io::calibration::{CalibratedDrift, Calibration, Correlation};
 use warm_up::{ChangeOptions, DriftEstimate, DriftOptions, estimate_drift, estimate_drift_at_rates};

@@ -1,7 +1,7 @@
 //! Mean changes of range of all frames of a survey.
 
+use commands::Progress;
 use error_models::RateHistory;
-use pipeline::command::Progress;
 use pipeline::survey::frame_rates;
 use pipeline::{Error, Result};
 use range_image::Raster;

@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
+use commands::{Doubt, DoubtKind, Judged};
 use error_models::WarmUp;
-use pipeline::command::{Doubt, DoubtKind, Judged};
 use serde::Serialize;
 use warm_up::{DriftEstimate, DriftVerdict, TransientTest};
 

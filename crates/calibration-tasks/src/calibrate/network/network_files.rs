@@ -3,9 +3,9 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
+use commands::plan::DriftTreatment;
+use commands::root_of;
 use nalgebra::{Matrix3, Point3, Vector3};
-use pipeline::command::root_of;
-use pipeline::plan::DriftTreatment;
 use pipeline::survey::ViewDrift;
 use pipeline::{Error, Result};
 use range_io::survey::Survey;

@@ -6,9 +6,9 @@ pub(crate) mod placed;
 pub(crate) mod planes_outcome;
 pub(crate) mod pose_test;
 
+use commands::{Progress, root_of};
 use error_models::{RangeTerms, SurfaceShape};
 use nalgebra::{Isometry3, Point3, Vector3};
-use pipeline::command::{Progress, root_of};
 use pipeline::run::Processed;
 use pipeline::survey::{ViewData, ViewDrift};
 use pipeline::{

@@ -2,9 +2,9 @@
 
 use std::path::PathBuf;
 
+use commands::{Doubt, DoubtKind, Judged};
 use error_models::ParameterStatus;
 use nalgebra::DMatrix;
-use pipeline::command::{Doubt, DoubtKind, Judged};
 use pipeline::survey::ViewDrift;
 use pipeline::trends::TrendSummary;
 use range_io::calibration::Calibration;

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use pipeline::plan::DriftTreatment;
+use commands::plan::DriftTreatment;
 use pipeline::survey::{DriftCurve, ViewDrift, view_name};
 use pipeline::{Error, Result};
 use range_io::calibration::Calibration;

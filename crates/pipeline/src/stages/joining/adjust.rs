@@ -1,13 +1,13 @@
 use multiview_registration::{Datum, Start, StationRegistrationOptions, register_stations};
 use nalgebra::Isometry3;
 
-use crate::command::progress::Progress;
-use crate::plan::AdjustOptions;
 use crate::stages::Findings;
 use crate::stages::joining::Joined;
 use crate::stations::refused::{self, Tried};
 use crate::survey::records::{AdjustmentFigures, StationPose};
 use crate::{Error, Result};
+use commands::Progress;
+use commands::plan::AdjustOptions;
 
 /// All stations are adjusted at once from their surfaces, the first one being the datum.
 pub(crate) fn run(joined: &mut Joined, options: &AdjustOptions, progress: &dyn Progress) -> Result<Findings> {

@@ -10,12 +10,12 @@ use point_cloud::Cloud;
 use projective_registration::Projection;
 use rayon::prelude::*;
 
-use crate::plan::{RegisterOptions, StartPoses};
 use crate::stations::station::{Station, Windows, projection};
 use crate::stations::surface::{Start, Surface};
 use crate::survey::open::OpenSurvey;
 use crate::survey::view::View;
 use crate::{Error, Result};
+use commands::plan::{RegisterOptions, StartPoses};
 
 /// Points of all stations together, about. Each takes 70 bytes here and twice as much in the adjustment. A survey of fewer,
 /// 100 stations of 176 x 144 pixels, keeps all; of more, each station is thinned evenly once it has its normals: patches

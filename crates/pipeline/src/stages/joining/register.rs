@@ -1,13 +1,13 @@
 use multiview_registration::{Datum, Start, StationRegistrationOptions, register_stations};
 use nalgebra::Isometry3;
 
-use crate::command::progress::Progress;
-use crate::plan::{RegisterOptions, StartPoses};
 use crate::stages::Findings;
 use crate::stages::joining::{Gathered, Joined};
 use crate::stations::refused::{self, Tried};
 use crate::survey::records::StationPose;
 use crate::{Error, Result};
+use commands::Progress;
+use commands::plan::{RegisterOptions, StartPoses};
 
 /// All stations are brought together from what is known of their poses.
 pub(crate) fn run(

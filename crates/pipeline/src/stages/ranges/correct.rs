@@ -5,7 +5,6 @@ use range_image::{ImageFormat, RangeFrame};
 use range_io::calibration::ValidSpan;
 use range_io::survey::{ReferencePath, Survey};
 
-use crate::plan::{CorrectRangeOptions, DriftTreatment};
 use crate::stages::line::Making;
 use crate::stages::ranges::reference_path;
 use crate::stages::{Findings, Found, ViewStage};
@@ -15,6 +14,7 @@ use crate::survey::drift::{DriftCurve, ViewDrift};
 use crate::survey::open::OpenSurvey;
 use crate::survey::view::{View, ViewData};
 use crate::{Error, Result};
+use commands::plan::{CorrectRangeOptions, DriftTreatment};
 
 /// Drift, range terms, amplitude-related error and fixed pattern are taken off, frequency by frequency.
 pub(crate) struct CorrectRange {

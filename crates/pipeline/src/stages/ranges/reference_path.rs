@@ -5,8 +5,8 @@ use range_image::{Flags, ImageFormat, Modulation, RangeFrame};
 use range_io::survey::ReferencePath;
 use statistics::{quantile, robust_standard_deviation};
 
-use crate::command::error::drift::DriftError;
 use crate::survey::drift::{DriftSource, ViewDrift};
+use commands::DriftError;
 
 /// Where the pixels of a camera are, and their own offsets.
 pub(crate) struct Sensor<'a> {

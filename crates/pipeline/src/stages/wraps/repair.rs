@@ -2,14 +2,14 @@ use phase_unwrap::{ImageGeometry, RepairOptions, RepairVerdict, SpatialOptions, 
 use range_image::Flags;
 use range_io::survey::Level;
 
-use crate::command::verdict::{Doubt, DoubtKind};
-use crate::plan::RepairWrapsOptions;
 use crate::stages::line::Making;
 use crate::stages::wraps::unwrap::image_geometry;
 use crate::stages::{Found, ViewStage};
 use crate::survey::records::StageSummary;
 use crate::survey::view::{View, ViewData};
 use crate::{Error, Result};
+use commands::plan::RepairWrapsOptions;
+use commands::{Doubt, DoubtKind};
 
 /// Finding: views whose ambiguity intervals nothing tells.
 const UNJUDGED_VIEWS: &str = "views_without_amplitude";

@@ -6,11 +6,11 @@ use phase_unwrap::{
 use range_image::{ComplexChannel, ComplexFrame, Flags, RangeFrame, Raster};
 use statistics::quantile;
 
-use crate::plan::{UnwrapMethod, UnwrapOptions};
 use crate::stages::line::Making;
 use crate::stages::{Found, ViewStage};
 use crate::survey::view::{View, ViewData};
 use crate::{Error, Result};
+use commands::plan::{UnwrapMethod, UnwrapOptions};
 
 /// Longest range where nothing else bounds it, metre: that of a room.
 const FURTHEST_M: f64 = 15.0;

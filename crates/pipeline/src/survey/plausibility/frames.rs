@@ -5,9 +5,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use range_image::Samples;
 use statistics::{quantile, upper_median};
 
-use crate::command::verdict::{Doubt, DoubtKind};
 use crate::survey::plausibility::{FURTHEST_M, NEAREST_M, some_of};
 use crate::survey::view::{View, ViewData};
+use commands::{Doubt, DoubtKind};
 
 /// Values of a plane that are looked at, evenly over it: noise makes no two frames alike in so many.
 const LOOKED_AT: usize = 1024;

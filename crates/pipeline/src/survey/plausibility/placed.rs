@@ -2,9 +2,9 @@
 
 use nalgebra::{Isometry3, Matrix6};
 
-use crate::command::verdict::{Doubt, DoubtKind};
 use crate::survey::plausibility::some_of;
 use crate::survey::records::StationPose;
+use commands::{Doubt, DoubtKind};
 
 /// Standard deviation of a position as a part of the scene's distance, and of an attitude in radian (3 degrees), from which
 /// on a station is not placed: a point at that distance is uncertain by as much. Sound stations stay below a hundredth.

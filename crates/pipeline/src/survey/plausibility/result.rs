@@ -3,7 +3,7 @@
 use range_image::Flags;
 use range_io::tables::Station;
 
-use crate::command::verdict::{Doubt, DoubtKind};
+use commands::{Doubt, DoubtKind};
 
 use crate::survey::plausibility::{PlacedStation, displaced, uncertain};
 use crate::survey::records::{StationPose, ViewRecord};

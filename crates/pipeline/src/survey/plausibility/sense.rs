@@ -10,8 +10,8 @@ use std::f64::consts::TAU;
 
 use range_image::{ComplexChannel, ComplexFrame, Flags};
 
-use crate::command::verdict::{Doubt, DoubtKind};
 use crate::survey::view::{View, ViewData};
+use commands::{Doubt, DoubtKind};
 
 /// Windows in the shorter direction of the image.
 const WINDOWS: usize = 12;

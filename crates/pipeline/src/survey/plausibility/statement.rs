@@ -3,8 +3,8 @@
 use nalgebra::Isometry3;
 use range_io::survey::SurveyCamera;
 
-use crate::command::verdict::{Doubt, DoubtKind};
 use crate::survey::plausibility::FURTHEST_M;
+use commands::{Doubt, DoubtKind};
 
 /// Hertz: ambiguity intervals of 150 m and of 0.3 m. Sensors are modulated at 5 to 350 MHz.
 const MODULATIONS_HZ: [f64; 2] = [1e6, 500e6];

@@ -3,7 +3,7 @@
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use pipeline::command::root_of;
+use commands::root_of;
 use pipeline::{Error, Result};
 use range_io::calibration::Calibration;
 use range_io::survey::Survey;

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use pipeline::command::{Doubt, DoubtKind};
+use commands::{Doubt, DoubtKind};
 use self_calibration::{HoldOut, Prediction};
 use serde::Serialize;
 

@@ -9,7 +9,7 @@ use range_io::calibration::Calibration;
 use range_io::survey::Survey;
 use serde::Serialize;
 
-use crate::command::verdict::Failure;
+use crate::verdict::Failure;
 use crate::{Error, Result};
 
 /// What a command reads, which its output must leave alone.

@@ -3,8 +3,8 @@ use std::path::PathBuf;
 use serde::Serialize;
 use thiserror::Error;
 
-use crate::command::destination::{RefusalFile, json};
-use crate::command::verdict::Failure;
+use crate::destination::{RefusalFile, json};
+use crate::verdict::Failure;
 
 pub(crate) mod drift;
 pub(crate) mod failure;

@@ -6,9 +6,9 @@
 use std::error::Error as StdError;
 use std::io::ErrorKind;
 
-use crate::command::error::Error;
-use crate::command::error::drift::DriftError;
-use crate::command::verdict::Failure;
+use crate::error::Error;
+use crate::error::drift::DriftError;
+use crate::verdict::Failure;
 
 impl Error {
     /// What kind of failure it is: what an engine that runs the command should do next.

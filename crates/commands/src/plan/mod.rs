@@ -23,7 +23,7 @@ pub use options::{
 /// What a pipeline does, read from a RON file.
 ///
 /// ```
-/// let plan = pipeline::Plan::from_ron(r#"(
+/// let plan = commands::plan::Plan::from_ron(r#"(
 ///     name: "walls",
 ///     stages: [Demodulate(low_amplitude: 40), Average(), Unwrap(), PointCloud()],
 /// )"#, "walls.ron".as_ref()).expect("a valid plan");
@@ -165,7 +165,7 @@ impl Plan {
         let text = format!("#![enable(unwrap_variant_newtypes)]{text}");
         let plan: Self = ron_text::parse(path, &text)?;
         plan.check().map_err(|(field, reason)| ron_text::wrong_field(path, &text, field, reason))?;
-        crate::command::destination::check_name(path, &plan.name)?;
+        crate::destination::check_name(path, &plan.name)?;
         plan.check_order()?;
         Ok(plan)
     }

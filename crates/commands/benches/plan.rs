@@ -1,4 +1,5 @@
 //! Reading a pipeline from RON, with its checks.
+#![allow(missing_docs)]
 
 use std::hint::black_box;
 use std::path::Path;

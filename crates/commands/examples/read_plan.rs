@@ -1,4 +1,5 @@
 //! Reads a pipeline and says what it needs: `cargo run -p commands --example read_plan [FILE]`.
+#![allow(clippy::print_stdout)]
 
 use std::path::{Path, PathBuf};
 

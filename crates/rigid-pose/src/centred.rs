@@ -179,7 +179,9 @@ mod tests {
             let direction = Vector3::new((0.9 * t).cos(), (1.7 * t).sin(), (0.4 * t).cos()).normalize();
             pairs.push((frame.derivative(&place, &direction), 0.01 * (3.1 * t).sin()));
         }
-        pairs.iter().for_each(|(derivative, residual)| equations.add(derivative, 2.0, *residual));
+        for (derivative, residual) in &pairs {
+            equations.add(derivative, 2.0, *residual);
+        }
         let exact = -equations.matrix.try_inverse().unwrap() * equations.gradient;
         assert!((equations.step(&Matrix6::identity(), 0.0).unwrap() - exact).norm() < 1e-12);
 

@@ -110,7 +110,7 @@ fn a_network_that_leaves_all_terms_open_is_refused_and_not_answered_with_fewer()
     nominal(&mut observed);
     match calibrate(&observed, &CalibrationOptions::default()) {
         Err(Error::Network(NetworkError::WeakNetwork { combination, inflation, .. })) => {
-            println!("{combination}: {inflation:.0}")
+            println!("{combination}: {inflation:.0}");
         }
         other => panic!("{:?}", other.map(|outcome| outcome.parameters)),
     }

@@ -105,6 +105,7 @@ impl Scales {
     }
 
     /// The same, at least 1; 1 as well where there is no telling.
+    #[must_use]
     pub fn at_least_one(self) -> Self {
         let known = |scale: f64| if scale.is_finite() { scale.max(1.0) } else { 1.0 };
         Self { image: known(self.image), range: known(self.range) }

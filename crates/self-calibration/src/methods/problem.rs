@@ -103,8 +103,8 @@ impl Problem<'_> {
         let mut second = setup.clone();
         second.calibration.camera = setup.calibration_found(solved)?.camera;
         let step = self.range_step(&second, &reference, scale, &mut diagnosis)?;
-        let first = outcome(&setup, &solved, self.options)?;
-        let mut unestimated = if self.is_listed() { term_scores(&setup, solved, &first.groups)? } else { Vec::new() };
+        let first = outcome(setup, solved, self.options)?;
+        let mut unestimated = if self.is_listed() { term_scores(setup, solved, &first.groups)? } else { Vec::new() };
         unestimated.extend(step.unestimated.iter().filter(|_| self.is_listed()).cloned());
         let first_names = setup.estimate(solved)?.names;
         let parts =

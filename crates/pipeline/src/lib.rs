@@ -6,6 +6,7 @@ pub mod stages;
 pub mod stations;
 pub mod survey;
 pub mod trends;
+pub use commands;
 pub use commands::plan::{
     AdjustOptions, AmplitudeKind, AverageOptions, CorrectImagePointOptions, CorrectRangeOptions, DeconvolveOptions,
     DemodulateOptions, DriftTreatment, FlagOptions, FuseExposuresOptions, MixedPixels, MultipathOptions,

@@ -16,7 +16,7 @@ use crate::system::System;
 
 /// Finds a motion for fixed pairs.
 pub trait Minimiser: Sync {
-    /// The motion `[dt, rho w]` about [`System::centre`] in target axes (rotation vector times [`System::radius_m`]: all
+    /// The motion `[dt, rho w]` in [`System::frame`] (about its centre in target axes, rotation vector times its radius: all
     /// six in metre) that makes the sum of squares of the system smaller, without a part along the orthonormal `held`.
     fn step(&self, system: &System<'_>, held: &[Vector6<f64>]) -> Result<Vector6<f64>>;
 

@@ -83,8 +83,8 @@ fn stations_of_an_sr4000_are_held_by_floor_and_walls() {
                 found.settled,
                 open.len()
             );
-            // Fewer frames are noisier than the walls are held: then it is said what slides.
-            assert!(found.settled || frames.len() < 4 && !open.is_empty(), "{frames:?} {name}");
+            // Fewer frames are noisier than the walls are held: then it is said that the rounds come to no end.
+            assert!(found.settled || frames.len() < 4, "{frames:?} {name}");
             if !found.settled {
                 continue;
             }

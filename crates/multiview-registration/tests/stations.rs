@@ -51,6 +51,46 @@ fn eight_stations_come_together_from_approximate_poses() {
     assert!(distance < 35.0, "{distance}");
 }
 
+/// Squared errors of the poses of eight stations over their covariances, mean over runs and stations; `changed` is done to
+/// the points of each.
+fn normalised_squared_error(runs: u64, changed: impl Fn(usize, &mut Point3<f64>)) -> f64 {
+    let (mut sum, mut count) = (0.0, 0.0);
+    for run in 0..runs {
+        let (mut clouds, truth) = round(8, 0.01, 40 + run);
+        for (k, cloud) in clouds.iter_mut().enumerate() {
+            cloud.points.iter_mut().for_each(|point| changed(k, point));
+        }
+        let found = registered(&clouds, Start::Poses(&truth), Datum::Station(0));
+        for station in 1..truth.len() {
+            let (pose, covariance) = found.relative_pose(0, station).unwrap();
+            let error = pose_difference(&pose, &(truth[0].inverse() * truth[station]));
+            sum += error.dot(&covariance.cholesky().unwrap().solve(&error));
+            count += 1.0;
+        }
+    }
+    sum / count
+}
+
+#[test]
+fn covariances_state_what_noise_leaves() {
+    let mean = normalised_squared_error(4, |_, _| {});
+    println!("{mean:.2}");
+    // Six are expected; stations of a run share its datum, and runs scatter by 2.8.
+    assert!((3.0..10.0).contains(&mean), "{mean}");
+}
+
+#[test]
+fn errors_that_whole_walls_share_widen_the_covariances() {
+    // A wave of the ranges of 3 mm, whose phase is another one at each station: places of a wall share it.
+    let wavy = |k: usize, point: &mut Point3<f64>| {
+        let range = point.coords.norm();
+        point.coords *= 1.0 + 3e-3 * (range * 5.0 + k as f64 * 2.0).sin() / range;
+    };
+    let mean = normalised_squared_error(2, wavy);
+    println!("{mean:.2}");
+    assert!(mean < 20.0, "{mean}");
+}
+
 #[test]
 fn inner_constraints_move_nothing_but_the_frame() {
     let (clouds, truth) = round(6, 0.0, 5);

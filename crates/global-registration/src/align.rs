@@ -75,7 +75,7 @@ pub fn align_without_guess(
 ) -> Result<CoarseAlignment> {
     options.validate()?;
     let (source, target) = with_common_voxels(source, target, options)?;
-    let correspondences = correspondences(&source, &target, options);
+    let correspondences = correspondences(&source, &target);
     let look = |effort| looked_for(&source, &target, &correspondences, options, effort);
     look(1).or_else(|_| look(SECOND_LOOK))
 }
@@ -124,7 +124,7 @@ pub fn hypotheses(
     let (source, target) = with_common_voxels(source, target, options)?;
     let (source, target) = (source.as_ref(), target.as_ref());
     let voxel_m = target.voxel_m();
-    let correspondences = correspondences(source, target, options);
+    let correspondences = correspondences(source, target);
     let score = |hypothesis: &Hypothesis| {
         let verdict = Verdict::with(source, target, &hypothesis.pose, 1, super::description::view::Jumps::Missed);
         (hypothesis.pose, verdict.rough_score())
@@ -192,13 +192,13 @@ fn with_common_voxels<'a>(
     }
 }
 
-/// Mutual matches of all kinds of descriptors, the most alike first of each kind.
-fn correspondences(source: &FeatureCloud, target: &FeatureCloud, options: &CoarseOptions) -> Correspondences {
+/// Matches of all kinds of descriptors, the most alike first of each kind.
+fn correspondences(source: &FeatureCloud, target: &FeatureCloud) -> Correspondences {
     let mut all = Correspondences::default();
     let kinds = source.surface_features.len() + source.added.len();
     let share = MOST_CORRESPONDENCES / kinds.max(1);
     for (s, t) in source.surface_features.iter().zip(&target.surface_features) {
-        let mut found = matches(&s.descriptors, &t.descriptors, options.matching, options.max_ratio);
+        let mut found = matches(&s.descriptors, &t.descriptors);
         most_alike(&mut found, share);
         for m in found {
             let (i, j) = (m.source as usize, m.target as usize);
@@ -207,7 +207,7 @@ fn correspondences(source: &FeatureCloud, target: &FeatureCloud, options: &Coars
     }
     all.of_surface = all.len();
     for (s, t) in source.added.iter().zip(&target.added) {
-        let mut found = matches(&s.table, &t.table, options.matching, options.max_ratio);
+        let mut found = matches(&s.table, &t.table);
         most_alike(&mut found, share);
         for m in found {
             let (from, to) = (placed(source, s, m.source), placed(target, t, m.target));

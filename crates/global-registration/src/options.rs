@@ -33,17 +33,6 @@ pub enum SurfaceDescriptors {
     None,
 }
 
-/// Which features become correspondences.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[non_exhaustive]
-pub enum Matching {
-    /// Those of which one is the most alike to the other: more that are true, and many more that are not.
-    #[default]
-    EitherWay,
-    /// Those that are each other's most alike.
-    Mutual,
-}
-
 /// How correspondences that belong together are found among the many that do not.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[non_exhaustive]
@@ -72,11 +61,6 @@ pub struct CoarseOptions {
     pub descriptor_radius_voxels: f64,
     /// Most points that are matched, those whose descriptors differ most from the cloud's mean. Default 1200.
     pub max_features: usize,
-    /// Which features become correspondences. Default: the best either way.
-    pub matching: Matching,
-    /// A correspondence is kept only where the second best descriptor is farther than the best by this factor: best
-    /// distance over second at most this. Default `None`: neighbours on one surface resemble each other.
-    pub max_ratio: Option<f64>,
     /// How the correspondences are sifted. Default: consistency graph.
     pub estimator: Estimator,
     /// Distance up to which a correspondence agrees with a pose, voxels. Default 1.5.
@@ -114,8 +98,6 @@ impl Default for CoarseOptions {
             descriptors: SurfaceDescriptors::Fpfh,
             descriptor_radius_voxels: 5.0,
             max_features: 1200,
-            matching: Matching::EitherWay,
-            max_ratio: None,
             estimator: Estimator::ConsistencyGraph,
             tolerance_voxels: 1.5,
             max_hypotheses: 8,
@@ -136,7 +118,6 @@ impl CoarseOptions {
         let lengths = [
             ("voxel_m", self.voxel_m.unwrap_or(1.0), f64::MAX, "positive and finite"),
             ("descriptor_radius_voxels", self.descriptor_radius_voxels, 20.0, "above 0 and at most 20"),
-            ("max_ratio", self.max_ratio.unwrap_or(1.0), 1.0, "above 0 and at most 1"),
             ("tolerance_voxels", self.tolerance_voxels, 10.0, "above 0 and at most 10"),
             ("max_rival", self.max_rival, 1.0, "above 0 and at most 1"),
         ];

@@ -56,16 +56,6 @@ pub struct TrackerOptions {
     pub fusion: Fusion,
     /// How the pose is sought after a loss.
     pub relocalisation: Relocalisation,
-    /// Smallest fraction of the nodes of the frame that must have a plane. Default 0.03.
-    pub min_filled: f64,
-    /// Smallest fraction of these planes that must agree with the keyframe. Default 0.25.
-    pub min_overlap: f64,
-    /// Smallest fraction that must agree of those that the keyframe can judge. Default 0.6.
-    pub min_agreement: f64,
-    /// Where the frame leaves motions undetermined, a prior or the velocity carries the pose: until its standard
-    /// deviation at the radius of the frame exceeds this with a prior, a quarter of this with the velocity alone, metre.
-    /// Default 0.1.
-    pub max_carried_sigma_m: f64,
 }
 
 impl Default for TrackerOptions {
@@ -81,10 +71,6 @@ impl Default for TrackerOptions {
             loop_attempts: 4,
             fusion: Fusion::Planes,
             relocalisation: Relocalisation::Coarse,
-            min_filled: 0.03,
-            min_overlap: 0.25,
-            min_agreement: 0.6,
-            max_carried_sigma_m: 0.1,
         }
     }
 }
@@ -94,20 +80,9 @@ impl TrackerOptions {
         if !rigid_pose::is_finite(&self.world_from_first) {
             return Err(Error::NonFinite { what: "world_from_first", index: 0 });
         }
-        let fractions = [
-            ("keyframe_overlap", self.keyframe_overlap),
-            ("min_filled", self.min_filled),
-            ("min_overlap", self.min_overlap),
-            ("min_agreement", self.min_agreement),
-        ];
-        for (name, value) in fractions {
-            if !(value > 0.0 && value < 1.0) {
-                return Err(Error::InvalidOption { name, value, domain: "above 0 and below 1" });
-            }
-        }
-        if !(self.max_carried_sigma_m > 0.0 && self.max_carried_sigma_m.is_finite()) {
-            let value = self.max_carried_sigma_m;
-            return Err(Error::InvalidOption { name: "max_carried_sigma_m", value, domain: "positive and finite" });
+        if !(self.keyframe_overlap > 0.0 && self.keyframe_overlap < 1.0) {
+            let value = self.keyframe_overlap;
+            return Err(Error::InvalidOption { name: "keyframe_overlap", value, domain: "above 0 and below 1" });
         }
         if self.max_keyframes < 2 {
             let value = self.max_keyframes as f64;

@@ -6,7 +6,6 @@
 use rayon::prelude::*;
 
 use crate::description::descriptors::DescriptorTable;
-use crate::options::Matching;
 
 /// Columns that are compared at a time.
 const LANES: usize = 16;
@@ -24,43 +23,23 @@ pub(crate) struct Match {
     pub(crate) likeness: f32,
 }
 
-/// Pairs in the order of the source, then those that only the target chose in its order; with `max_ratio` only those
-/// whose distance is at most this fraction of the distance to the second best.
-pub(crate) fn matches(
-    source: &DescriptorTable,
-    target: &DescriptorTable,
-    matching: Matching,
-    max_ratio: Option<f64>,
-) -> Vec<Match> {
+/// Pairs of which one is the most alike to the other, in the order of the source, then those that only the target chose in
+/// its order. Neighbours on one surface resemble each other, so that the second best tells nothing.
+pub(crate) fn matches(source: &DescriptorTable, target: &DescriptorTable) -> Vec<Match> {
     let (forward, backward) = (best_of_each(source, target), best_of_each(target, source));
-    let squared_ratio = max_ratio.map(|r| (r * r) as f32);
-    // Squared distance of unit vectors: 2 - 2 product.
-    let is_good = |best: &Best| {
-        best.likeness > 0.0 && squared_ratio.is_none_or(|r| 1.0 - best.likeness <= r * (1.0 - best.second))
-    };
-    let is_mutual = |i: usize, best: &Best, back: &[Best]| {
-        back.get(best.index as usize).is_some_and(|other| other.index as usize == i)
-    };
-    let mut found = Vec::new();
-    for (i, best) in forward.iter().enumerate().filter(|(_, best)| is_good(best)) {
-        if matching == Matching::EitherWay || is_mutual(i, best, &backward) {
-            found.push(Match { source: i as u32, target: best.index, likeness: best.likeness });
-        }
-    }
-    if matching == Matching::EitherWay {
-        for (j, best) in backward.iter().enumerate().filter(|(_, best)| is_good(best)) {
-            if !is_mutual(j, best, &forward) {
-                found.push(Match { source: best.index, target: j as u32, likeness: best.likeness });
-            }
-        }
-    }
-    found
+    let is_good = |(_, best): &(usize, &Best)| best.likeness > 0.0;
+    let is_mutual =
+        |(j, best): &(usize, &Best)| forward.get(best.index as usize).is_some_and(|f| f.index as usize == *j);
+    let chosen = forward.iter().enumerate().filter(is_good);
+    let chosen = chosen.map(|(i, best)| Match { source: i as u32, target: best.index, likeness: best.likeness });
+    let only_back = backward.iter().enumerate().filter(is_good).filter(|found| !is_mutual(found));
+    let only_back = only_back.map(|(j, best)| Match { source: best.index, target: j as u32, likeness: best.likeness });
+    chosen.chain(only_back).collect()
 }
 
 #[derive(Debug, Clone, Copy)]
 struct Best {
     likeness: f32,
-    second: f32,
     index: u32,
 }
 
@@ -128,7 +107,7 @@ fn best_of_block(rows: [&[f32]; ROWS], panels: &[[f32; LANES]]) -> [Best; ROWS] 
             running.take(&products, number as u32);
         }
     }
-    running.map(|r| over_lanes(&r.best, &r.second, &r.place))
+    running.map(|r| over_lanes(&r.best, &r.place))
 }
 
 #[inline(always)]
@@ -138,17 +117,16 @@ fn add_multiple(sum: &mut [f32; LANES], factor: f32, column: &[f32; LANES]) {
     }
 }
 
-/// Best and second best of the columns so far, lane by lane, and the panel of the best.
+/// Best of the columns so far, lane by lane, and its panel.
 #[derive(Clone, Copy)]
 struct Running {
     best: [f32; LANES],
-    second: [f32; LANES],
     place: [u32; LANES],
 }
 
 impl Default for Running {
     fn default() -> Self {
-        Self { best: [f32::NEG_INFINITY; LANES], second: [f32::NEG_INFINITY; LANES], place: [0; LANES] }
+        Self { best: [f32::NEG_INFINITY; LANES], place: [0; LANES] }
     }
 }
 
@@ -158,17 +136,15 @@ impl Running {
         for lane in 0..LANES {
             let (product, best) = (products[lane], self.best[lane]);
             let better = product > best;
-            let loser = if better { best } else { product };
-            self.second[lane] = if loser > self.second[lane] { loser } else { self.second[lane] };
             self.place[lane] = if better { number } else { self.place[lane] };
             self.best[lane] = if better { product } else { best };
         }
     }
 }
 
-/// The best lane, of equal ones that with the lowest index; the second best of all is the best of what lost.
+/// The best lane, of equal ones that with the lowest index.
 #[inline(always)]
-fn over_lanes(best: &[f32; LANES], second: &[f32; LANES], place: &[u32; LANES]) -> Best {
+fn over_lanes(best: &[f32; LANES], place: &[u32; LANES]) -> Best {
     let index = |lane: usize| place[lane] * LANES as u32 + lane as u32;
     let mut winner = 0;
     for lane in 1..LANES {
@@ -177,9 +153,5 @@ fn over_lanes(best: &[f32; LANES], second: &[f32; LANES], place: &[u32; LANES]) 
             winner = lane;
         }
     }
-    let mut runner_up = second[winner];
-    for lane in (0..LANES).filter(|&lane| lane != winner) {
-        runner_up = runner_up.max(best[lane]);
-    }
-    Best { likeness: best[winner], second: runner_up, index: index(winner) }
+    Best { likeness: best[winner], index: index(winner) }
 }

@@ -16,6 +16,10 @@ use icp_registration::RobustKernel;
 /// Most rounds of a level, and the part of its limit that a step must be below for it to end.
 const ROUNDS: usize = 8;
 const SMALL_STEP: f64 = 100.0;
+/// Fewest patches, or tiles, in which two stations must meet to be held together: a few meet by chance anywhere.
+pub(crate) const FEWEST_CONTACTS: usize = 15;
+/// While stations are still apart, what is far off keeps some weight.
+const KERNEL: RobustKernel = RobustKernel::Huber;
 /// Nearest patches that are looked at while stations are still apart.
 const CANDIDATES: usize = 8;
 
@@ -110,7 +114,6 @@ pub(crate) fn meet(
     poses: &[Isometry3<f64>],
     only: &[(usize, usize)],
     reach: Reach,
-    fewest: usize,
 ) -> Result<Vec<PairContacts>> {
     let found: Result<Vec<PairContacts>> = only
         .par_iter()
@@ -126,7 +129,7 @@ pub(crate) fn meet(
         })
         .collect();
     let mut pairs_in_contact = found?;
-    pairs_in_contact.retain(|pair_contacts| pair_contacts.contacts.len() >= 2 * fewest);
+    pairs_in_contact.retain(|pair_contacts| pair_contacts.contacts.len() >= 2 * FEWEST_CONTACTS);
     share(surfaces, &mut pairs_in_contact);
     Ok(pairs_in_contact)
 }
@@ -175,8 +178,6 @@ pub(crate) struct WideRounds<'a> {
     pub network: &'a Network<'a>,
     /// Error of the start poses, metre.
     pub reach_m: f64,
-    pub minimum_contacts: usize,
-    pub kernel: RobustKernel,
     pub progress: &'a (dyn Fn(usize) + Sync),
 }
 
@@ -206,7 +207,7 @@ impl WideRounds<'_> {
             for in_level in 0..ROUNDS {
                 surfaces.update(&state.parameters)?;
                 let scene = surfaces.scene(state.parameters.len());
-                let pairs_in_contact = meet(&scene.surfaces, &state.poses, &pairs, reach, self.minimum_contacts)?;
+                let pairs_in_contact = meet(&scene.surfaces, &state.poses, &pairs, reach)?;
                 if in_level == 0 {
                     // Stations that do not meet now will not after the small steps of one level.
                     pairs = pairs_in_contact
@@ -214,8 +215,7 @@ impl WideRounds<'_> {
                         .map(|pair_contacts| (pair_contacts.target, pair_contacts.source))
                         .collect();
                 }
-                let weighting =
-                    Weighting { kernel: self.kernel, scale: scale(&scene, &pairs_in_contact, &state.poses) };
+                let weighting = Weighting { kernel: KERNEL, scale: scale(&scene, &pairs_in_contact, &state.poses) };
                 let next =
                     self.network.solve(&state, &reduced(&scene, &pairs_in_contact, &state.poses, &weighting)?)?;
                 let moved_m = largest_step(&state, &next, self.network.hold_m);

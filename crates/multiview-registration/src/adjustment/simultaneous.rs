@@ -24,6 +24,10 @@ const OFF: [f64; 2] = [0.06, 0.01];
 /// Of so many points one is taken in the first round, which need not be better than the contacts of patches.
 const FIRST_STRIDE: usize = 3;
 
+/// Most rounds, each with points given to the surfaces anew; most surveys are settled after four or five.
+pub(crate) const MOST_ROUNDS: usize = 12;
+/// For single points and for what a station saw of a tile: what is no common surface has no weight.
+const KERNEL: RobustKernel = RobustKernel::Tukey;
 /// Part of its standard deviation by which a station may still move.
 const FEW_SIGMAS: f64 = 0.1;
 
@@ -84,11 +88,8 @@ pub(crate) struct Finish<'a> {
     /// The same with poses held at what the rounds start from: along a direction that the surfaces leave open, shared planes
     /// farther off would be others.
     pub near: Network<'a>,
-    pub kernel: RobustKernel,
-    pub max_rounds: usize,
     /// Movement at which the rounds end, metre.
     pub tolerance_m: f64,
-    pub minimum_contacts: usize,
     pub progress: &'a (dyn Fn(usize) + Sync),
 }
 
@@ -111,19 +112,19 @@ impl Finish<'_> {
                 let count = state.poses.len();
                 let all: Vec<(usize, usize)> = (0..count).flat_map(|t| (t + 1..count).map(move |s| (t, s))).collect();
                 let reach = Reach { across_m: size_m / 4.0, candidates: 1, cosine: IN_PLACE };
-                let pairs_in_contact = meet(&scene.surfaces, &state.poses, &all, reach, self.minimum_contacts)?;
+                let pairs_in_contact = meet(&scene.surfaces, &state.poses, &all, reach)?;
                 known = shared_planes(&scene.surfaces, &state.poses, &pairs_in_contact, off_m);
             }
             let first = round == 0;
             let (slack_m, stride) = if first { (OFF[0] * size_m, FIRST_STRIDE) } else { (0.0, 1) };
-            let gate = Gate { kernel: self.kernel, slack_m, stride, parameters: state.parameters.len() };
+            let gate = Gate { kernel: KERNEL, slack_m, stride, parameters: state.parameters.len() };
             let sums = sightings(points, &state.poses, &known, gate);
             let before = state.clone();
             let adjusted = self.step(&mut state, &mut known, sums)?;
             round += 1;
             (self.progress)(round);
             let settled = off_m.is_none() && self.is_settled(&before, &state, &adjusted, &known);
-            if settled || round >= self.max_rounds.max(OFF.len() + 1) {
+            if settled || round >= MOST_ROUNDS {
                 let factor = adjusted.factor_on(&known);
                 return Ok(Adjusted { state, shared_planes: known, factor, rounds: round, settled, ..adjusted });
             }
@@ -146,7 +147,7 @@ impl Finish<'_> {
     }
 
     /// What the stations saw of each tile about the planes at the present poses, and how that scatters.
-    fn scatter(&self, known: &[SharedPlane], sums: &[Sums], stations: &[usize]) -> (Vec<Vec<TileMean>>, Scatter) {
+    fn scatter(known: &[SharedPlane], sums: &[Sums], stations: &[usize]) -> (Vec<Vec<TileMean>>, Scatter) {
         let tiles = known.iter().map(|shared_plane| shared_plane.tiles.len()).sum();
         let ones = vec![1.0; tiles * stations.len()];
         let of_shared_plane = |shared_plane: &SharedPlane| {
@@ -155,14 +156,14 @@ impl Finish<'_> {
             eliminated.map_or_else(Vec::new, |eliminated| tile_means(&seen, &eliminated))
         };
         let means: Vec<Vec<TileMean>> = known.par_iter().map(of_shared_plane).collect();
-        let scatter = between(&means, stations.len(), tiles, self.kernel);
+        let scatter = between(&means, stations.len(), tiles, KERNEL);
         (means, scatter)
     }
 
     /// One linearised step of all unknowns.
     fn step(&self, state: &mut State, known: &mut [SharedPlane], sums: Vec<Sums>) -> Result<Adjusted> {
         let stations: Vec<usize> = (0..state.poses.len()).collect();
-        let (means, scatter) = self.scatter(known, &sums, &stations);
+        let (means, scatter) = Self::scatter(known, &sums, &stations);
         let variances: Vec<Variances> = means.par_iter().map(|means| variances(means, scatter.shared)).collect();
         let eliminated: Vec<Option<Eliminated>> = (0..known.len())
             .into_par_iter()

@@ -9,7 +9,6 @@ use crate::agreement::loops::LoopClosure;
 use crate::agreement::placement::Placements;
 use crate::surfaces::patches::Surface;
 use crate::surfaces::point_model::{PointModel, SharedParameters};
-use icp_registration::RobustKernel;
 use icp_registration::UndeterminedMotion;
 
 /// What is known of the stations beforehand.
@@ -33,37 +32,13 @@ pub struct StationRegistrationOptions<'a> {
     /// Smallest part of a station that must overlap another for the two to be aligned as a pair. Default 0.3.
     /// The simultaneous adjustment takes whatever overlaps.
     pub minimum_overlap: f64,
-    /// Partners that each station is held against by itself, those with the most overlap. Default 3.
-    pub partners_per_station: usize,
-    /// Fewest patches in which two stations must meet to be held together. Default 15.
-    pub minimum_contacts: usize,
-    /// How far a loop of pairs may fail to close, metre, before one of them counts as wrong. `None`: a tenth of the
-    /// clouds' radius.
-    pub loop_tolerance_m: Option<f64>,
-    /// Kernel of the last rounds, for single points and for what a station saw of a tile. Default Tukey: what is no common surface has no weight.
-    pub kernel: RobustKernel,
-    /// Last rounds, each with points given to the surfaces anew; at least three. Default 12.
-    pub max_rounds: usize,
-    /// The rounds end when no station moves by more than this, metre. `None`: 1/2000 of the size of a patch.
-    pub tolerance_m: Option<f64>,
     /// Parameters that all stations share, to be estimated with the poses. Default: none.
     pub model: Option<&'a dyn PointModel>,
 }
 
 impl Default for StationRegistrationOptions<'_> {
     fn default() -> Self {
-        Self {
-            start_error_m: None,
-            patch_m: None,
-            minimum_overlap: 0.3,
-            partners_per_station: 3,
-            minimum_contacts: 15,
-            loop_tolerance_m: None,
-            kernel: RobustKernel::Tukey,
-            max_rounds: 12,
-            tolerance_m: None,
-            model: None,
-        }
+        Self { start_error_m: None, patch_m: None, minimum_overlap: 0.3, model: None }
     }
 }
 

@@ -9,8 +9,8 @@ use statistics::upper_median;
 
 use crate::adjustment::network::{Network, State};
 use crate::adjustment::precision;
-use crate::adjustment::rounds::{Surfaces, WideRounds};
-use crate::adjustment::simultaneous::{Adjusted, Finish};
+use crate::adjustment::rounds::{FEWEST_CONTACTS, Surfaces, WideRounds};
+use crate::adjustment::simultaneous::{Adjusted, Finish, MOST_ROUNDS};
 use crate::agreement::alignments::Overlap;
 use crate::agreement::loops::reached;
 use crate::agreement::placement::{Placements, judge_placements};
@@ -24,13 +24,14 @@ use crate::survey::datum::Datum;
 use crate::survey::registration::{
     Start, StationRegistration, StationRegistrationOptions, SurfacePair, UndeterminedStation,
 };
-use icp_registration::RobustKernel;
 use point_cloud::Cloud;
 use point_cloud::{UnorganisedNormalOptions, unorganised_normals};
 use rigid_pose::is_finite;
 
 /// Default of the error of approximate poses, in radii of the clouds.
 const START_ERROR: f64 = 0.2;
+/// The rounds end when no station moves by more than a patch over this: some hundredths of a millimetre.
+const TOLERANCE: f64 = 2000.0;
 
 /// Brings the clouds of many stations into one coordinate system.
 ///
@@ -68,25 +69,15 @@ pub fn register_stations(
     };
     let network =
         Network { fixed: datum.held_station(), hold_m: radius_m, turn_rad: 1.0, names: &names, prior: &prior };
-    let wide_kernel = if options.kernel == RobustKernel::None { RobustKernel::None } else { RobustKernel::Huber };
-    let total = |done| progress(done, options.max_rounds);
-    let wide_rounds = WideRounds {
-        network: &network,
-        reach_m,
-        minimum_contacts: options.minimum_contacts,
-        kernel: wide_kernel,
-        progress: &total,
-    };
+    let total = |done| progress(done, MOST_ROUNDS);
+    let wide_rounds = WideRounds { network: &network, reach_m, progress: &total };
     let mut modelled = Surfaces::fixed(surfaces.iter().collect());
     modelled.model = options.model.map(|model| (model, stations.iter().map(Cloud::len).collect()));
     let near = wide_rounds.run(&mut modelled, State { poses: poses.clone(), parameters: prior.0.clone() })?;
     let finish = Finish {
         network: &network,
         near: network.near(patch_m / 2.0),
-        kernel: options.kernel,
-        max_rounds: options.max_rounds,
-        tolerance_m: options.tolerance_m.unwrap_or(patch_m / 2000.0),
-        minimum_contacts: options.minimum_contacts,
+        tolerance_m: patch_m / TOLERANCE,
         progress: &total,
     };
     let mut points: Vec<StationPoints> =
@@ -96,10 +87,10 @@ pub fn register_stations(
         // Wide rounds may have moved stations where noise alone told them to.
         adjusted = finish.run(&mut modelled, &mut points, state)?;
     }
-    require_connected(&adjusted, options.minimum_contacts, datum)?;
+    require_connected(&adjusted, datum)?;
     let placements = placements(stations, &points, &adjusted.state)?;
-    let checked = checked(&adjusted, options, datum, (radius_m, patch_m))?;
-    let result = result(checked, adjusted, &poses, &network, datum, (patch_m, options.minimum_contacts));
+    let checked = checked(&adjusted, options.minimum_overlap, datum, (radius_m, patch_m))?;
+    let result = result(checked, adjusted, &poses, &network, datum, patch_m);
     let prepared = match modelled.modelled {
         Some((modelled, _)) => modelled,
         None => surfaces,
@@ -108,8 +99,9 @@ pub fn register_stations(
 }
 
 /// Every station shares surfaces, through others, with the one that is held.
-fn require_connected(adjusted: &Adjusted, fewest: usize, datum: Datum) -> Result<()> {
-    let ends: Vec<(usize, usize)> = adjusted.overlaps(fewest).iter().map(|pair| (pair.target, pair.source)).collect();
+fn require_connected(adjusted: &Adjusted, datum: Datum) -> Result<()> {
+    let ends: Vec<(usize, usize)> =
+        adjusted.overlaps(FEWEST_CONTACTS).iter().map(|pair| (pair.target, pair.source)).collect();
     let reached = reached(&ends, datum.held_station());
     let stations: Vec<usize> = (0..adjusted.state.poses.len()).filter(|station| !reached.contains(station)).collect();
     if stations.is_empty() {
@@ -122,7 +114,7 @@ fn require_connected(adjusted: &Adjusted, fewest: usize, datum: Datum) -> Result
             (pair.target == station || pair.source == station) && reached.contains(&other)
         });
         let tiles = with.map(|pair| adjusted.shared(pair.target, pair.source).len()).max().unwrap_or(0);
-        format!("shares {tiles} tiles of common surfaces with any of the others, at least {fewest} are needed")
+        format!("shares {tiles} tiles of common surfaces with any of the others, at least {FEWEST_CONTACTS} are needed")
     };
     let reasons = stations.iter().map(reason).collect();
     Err(Error::UnconnectedStations { stations, to: datum.held_station(), reasons })
@@ -148,12 +140,7 @@ fn validate(
     if station >= count {
         return Err(Error::NoSuchStation { station, count });
     }
-    let lengths = [
-        ("start_error_m", options.start_error_m),
-        ("patch_m", options.patch_m),
-        ("loop_tolerance_m", options.loop_tolerance_m),
-        ("tolerance_m", options.tolerance_m),
-    ];
+    let lengths = [("start_error_m", options.start_error_m), ("patch_m", options.patch_m)];
     for (name, value) in lengths {
         if let Some(value) = value
             && !(value > 0.0 && value < 1e100)
@@ -164,11 +151,7 @@ fn validate(
     if !(options.minimum_overlap >= 0.0 && options.minimum_overlap <= 1.0) {
         return Err(Error::InvalidOption { name: "minimum_overlap", value: options.minimum_overlap, domain: "0 to 1" });
     }
-    match (options.partners_per_station, options.max_rounds) {
-        (0, _) => Err(Error::InvalidOption { name: "partners_per_station", value: 0.0, domain: "1 or more" }),
-        (_, 0) => Err(Error::InvalidOption { name: "max_rounds", value: 0.0, domain: "1 or more" }),
-        _ => Ok(()),
-    }
+    Ok(())
 }
 
 /// The stations as patches, all of one size.
@@ -204,7 +187,7 @@ fn result(
     start: &[Isometry3<f64>],
     network: &Network<'_>,
     datum: Datum,
-    (size_m, fewest): (f64, usize),
+    size_m: f64,
 ) -> StationRegistration {
     let count = adjusted.state.poses.len();
     let parameters = adjusted.state.parameters.len();
@@ -212,7 +195,7 @@ fn result(
     let factor = 0.5 * adjusted.variance_factor();
     let covariance = factor * (&adjusted.cofactors + adjusted.cofactors.transpose());
     let undetermined = undetermined(&adjusted.state.poses, &covariance, network.hold_m, size_m);
-    let surfaces = adjusted.overlaps(fewest).iter().map(|overlap| surface_pair(&adjusted, overlap)).collect();
+    let surfaces = adjusted.overlaps(FEWEST_CONTACTS).iter().map(|overlap| surface_pair(&adjusted, overlap)).collect();
     let (poses, joint) = datum.apply(start, adjusted.state.poses, covariance, network.hold_m);
     StationRegistration {
         covariance: (0..count).map(|k| joint.fixed_view::<6, 6>(6 * k, 6 * k).into_owned()).collect(),

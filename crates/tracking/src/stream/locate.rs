@@ -5,7 +5,6 @@ use nalgebra::{Isometry3, Matrix6, Vector6};
 use crate::motion_model::motion::diagonal;
 use crate::motion_model::prediction::{Grounds, Last, Prediction};
 use crate::motion_model::velocity::Velocity;
-use crate::options::TrackerOptions;
 use crate::stream::keyframes::SAMPLE;
 use crate::stream::tracker::Tracker;
 use crate::tracked::LossReason;
@@ -22,6 +21,13 @@ const WEAK_SHARE: f64 = 1.0 / 300.0;
 const DISBELIEF: f64 = 40.0;
 /// Share of the largest standard deviation of carried poses that is allowed where only the velocity carries them.
 const BY_VELOCITY: f64 = 0.25;
+/// Where a frame leaves motions undetermined, a prior or the velocity carries the pose: until its standard deviation at the
+/// radius of the frame exceeds this, metre: half of the reach within which registrations of a room come back.
+const CARRIED_SIGMA_M: f64 = 0.1;
+/// Smallest fraction of a frame's planes that must agree with the keyframe, and of those that the keyframe can judge: what
+/// frames of different places reach by chance.
+const FEWEST_AGREEING: f64 = 0.25;
+const FEWEST_CONSENTING: f64 = 0.6;
 /// What a pose found against expectation must agree by: fraction of the frame, and of what can be judged.
 const LEAST_OVERLAP: f64 = 0.5;
 const LEAST_CONSENT: f64 = 0.9;
@@ -123,7 +129,7 @@ impl Tracker {
     /// Registers the current frame with keyframe `k`.
     pub(crate) fn try_keyframe(&mut self, k: usize, guess: &Isometry3<f64>) -> Result<Measured, LossReason> {
         let target = &self.keyframes.list[k].frame;
-        register(&mut self.aligner, &self.options, &self.current, target, guess, &self.keyframes.graph.field)
+        register(&mut self.aligner, &self.current, target, guess, &self.keyframes.graph.field)
             .map(|measured| Measured { keyframe: k, ..measured })
     }
 
@@ -141,7 +147,7 @@ impl Tracker {
         }
         let guess = last.own.pose.inverse() * prediction.own.pose;
         let field = &self.keyframes.graph.field;
-        let measured = register(&mut self.aligner, &self.options, &self.current, &self.previous, &guess, field).ok()?;
+        let measured = register(&mut self.aligner, &self.current, &self.previous, &guess, field).ok()?;
         helps(&measured).then(|| {
             let total = Uncertain { covariance: last.own.covariance + last.shared, ..last.own };
             let relation = Relation { random: total, by_field: last.by_field };
@@ -221,7 +227,7 @@ impl Tracker {
             return if expected || self.stands_alone(measured) { Ok(fix) } else { Err(LossReason::LargeResiduals) };
         }
         let (own, velocity) = prediction.corrected(&half).ok_or(LossReason::Undetermined)?;
-        let carried = own.sigma_at(self.current.radius_m()) <= self.carried_sigma_m(prediction.grounds);
+        let carried = own.sigma_at(self.current.radius_m()) <= Self::carried_sigma_m(prediction.grounds);
         let fix = Fix { own, velocity, expected: true };
         if carried || measured.determined { Ok(fix) } else { Err(LossReason::Undetermined) }
     }
@@ -234,13 +240,13 @@ impl Tracker {
         let known = if ungrounded { Matrix6::zeros() } else { prediction.own.covariance };
         let covariance = known + diagonal([(jump * radius).powi(2), jump * jump]);
         let reachable = Uncertain { covariance, ..prediction.own };
-        let relied_on = !ungrounded && prediction.own.sigma_at(radius) <= self.carried_sigma_m(prediction.grounds);
+        let relied_on = !ungrounded && prediction.own.sigma_at(radius) <= Self::carried_sigma_m(prediction.grounds);
         (lost_frames == 0 || relied_on) && own.mahalanobis_squared(&reachable).is_some_and(|m| m <= DISBELIEF)
     }
 
-    fn carried_sigma_m(&self, grounds: Grounds) -> f64 {
+    fn carried_sigma_m(grounds: Grounds) -> f64 {
         let share = if grounds == Grounds::Prior { 1.0 } else { BY_VELOCITY };
-        share * self.options.max_carried_sigma_m
+        share * CARRIED_SIGMA_M
     }
 
     /// Whether a pose would be believed wherever it was found: each frame agrees with what the other saw and with the
@@ -264,7 +270,6 @@ pub(crate) fn agreeing(target: &OrganisedFrame, source: &OrganisedFrame, pose: &
 /// Registers a frame with another, near a guess; the pose is corrected by the field that is assumed.
 fn register(
     aligner: &mut FrameAligner,
-    options: &TrackerOptions,
     source: &OrganisedFrame,
     target: &OrganisedFrame,
     guess: &Isometry3<f64>,
@@ -279,10 +284,10 @@ fn register(
     let by_field = influence.map_or_else(ByField::zeros, |influence| influence.pose);
     let pose = Uncertain { pose: step_pose(&aligned, &(-by_field * field)), covariance: result.covariance };
     let agreement = target.agreement(source, &aligned, SAMPLE);
-    if agreement.consent() < options.min_agreement {
+    if agreement.consent() < FEWEST_CONSENTING {
         return Err(LossReason::LargeResiduals);
     }
-    if agreement.overlap() < options.min_overlap {
+    if agreement.overlap() < FEWEST_AGREEING {
         return Err(LossReason::TooLittleOverlap);
     }
     if !rigid_pose::is_finite(&pose.pose) || pose.covariance.cholesky().is_none() {

@@ -21,6 +21,8 @@ use rigid_pose::Uncertain;
 /// Share of the first frame's radius beyond whose standard deviation motions count as undetermined. Registration alone
 /// asks for 1/300; in a stream, poses that are centimetres weak for a moment are still worth more than a loss.
 const WEAKEST_SHARE: f64 = 1.0 / 50.0;
+/// Smallest fraction of the nodes of a frame that must have a plane: below, it is blank.
+const FEWEST_PLANES: f64 = 0.03;
 
 /// Tracks a stream of organised frames of one camera.
 ///
@@ -145,7 +147,7 @@ impl Tracker {
 
     fn start(&mut self, timestamp_s: f64) -> TrackedPose {
         let pose = Uncertain::exact(self.options.world_from_first);
-        let blank = self.current.filled() < self.options.min_filled;
+        let blank = self.current.filled() < FEWEST_PLANES;
         let state = if blank { TrackingState::Lost(LossReason::TooFewPoints) } else { TrackingState::Started };
         if !blank {
             self.set_weakest_motion();
@@ -198,7 +200,7 @@ impl Tracker {
     }
 
     fn locate(&mut self, last: &Last, prediction: &Prediction) -> std::result::Result<(Measured, Fix), LossReason> {
-        if self.current.filled() < self.options.min_filled {
+        if self.current.filled() < FEWEST_PLANES {
             return Err(LossReason::TooFewPoints);
         }
         let near = self.near(last, prediction).and_then(|measured| self.placed(&measured, last, prediction));

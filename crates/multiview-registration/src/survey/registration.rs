@@ -26,9 +26,10 @@ pub enum Start<'a> {
 /// Options of [`crate::register_stations`]. The defaults carry no scale: lengths left at `None` come from the clouds.
 #[derive(Clone)]
 pub struct StationRegistrationOptions<'a> {
-    /// How far approximate poses may be off, metre, rotations at the radius of a cloud. `None`: a fifth of that radius.
+    /// How far approximate poses may be off, metre, rotations at the radius of a cloud. `None`, the default: a fifth of
+    /// that radius.
     pub start_error_m: Option<f64>,
-    /// Size of the patches that the surfaces are divided into, metre. `None`: about 25 points a patch.
+    /// Size of the patches that the surfaces are divided into, metre. `None`, the default: about 25 points a patch.
     pub patch_m: Option<f64>,
     /// Smallest part of a station that must overlap another for the two to be aligned as a pair. Default 0.3.
     /// The simultaneous adjustment takes whatever overlaps.
@@ -37,14 +38,15 @@ pub struct StationRegistrationOptions<'a> {
     pub partners_per_station: usize,
     /// Fewest patches in which two stations must meet to be held together. Default 15.
     pub minimum_contacts: usize,
-    /// How far a loop of pairs may fail to close, metre, before one of them counts as wrong. `None`: a tenth of the
-    /// clouds' radius.
+    /// How far a loop of pairs may fail to close, metre, before one of them counts as wrong. `None`, the default: a
+    /// tenth of the clouds' radius.
     pub loop_tolerance_m: Option<f64>,
     /// Kernel of the last rounds, for single points and for what a station saw of a tile. Default Tukey: what is no common surface has no weight.
     pub kernel: RobustKernel,
     /// Last rounds, each with points given to the surfaces anew; at least three. Default 12.
     pub max_rounds: usize,
-    /// The rounds end when no station moves by more than this, metre. `None`: 1/2000 of the size of a patch.
+    /// The rounds end when no station moves by more than this, metre. `None`, the default: 1/2000 of the size of a
+    /// patch.
     pub tolerance_m: Option<f64>,
     /// Parameters that all stations share, to be estimated with the poses. Default: none.
     pub model: Option<&'a dyn PointModel>,

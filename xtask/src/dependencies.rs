@@ -20,6 +20,7 @@ pub(crate) fn complaints(root: &Path) -> Result<Vec<String>, String> {
     found.extend(sources(&packages));
     found.extend(banned(&metadata, &packages, &rules));
     found.extend(duplicates(&packages, &strings(&rules, "skip")));
+    found.extend(too_new(&packages, &rust_version(root)?));
     Ok(found)
 }
 
@@ -129,6 +130,29 @@ fn banned(metadata: &Value, packages: &[&Value], rules: &str) -> Vec<String> {
     found
 }
 
+/// The oldest compiler that the workspace promises to build with.
+pub(crate) fn rust_version(root: &Path) -> Result<String, String> {
+    let manifest = std::fs::read_to_string(root.join("Cargo.toml")).map_err(|error| format!("Cargo.toml: {error}"))?;
+    let stated = manifest.lines().find_map(|line| line.strip_prefix("rust-version = \"")?.strip_suffix('"'));
+    stated.map(str::to_owned).ok_or_else(|| "Cargo.toml: no rust-version".to_owned())
+}
+
+/// Crates that ask for a newer compiler than the workspace promises.
+fn too_new(packages: &[&Value], promised: &str) -> Vec<String> {
+    let newer = packages.iter().filter_map(|package| {
+        let asked = package["rust_version"].as_str()?;
+        let text = || format!("{}: asks for Rust {asked}, the workspace promises {promised}", name(package));
+        (numbers(asked) > numbers(promised)).then(text)
+    });
+    newer.collect()
+}
+
+fn numbers(version: &str) -> Vec<u32> {
+    let mut numbers: Vec<u32> = version.split('.').map(|part| part.parse().unwrap_or(0)).collect();
+    numbers.resize(3, 0);
+    numbers
+}
+
 /// Crates in two versions that no entry of `skip` names.
 fn duplicates(packages: &[&Value], skipped: &[String]) -> Vec<String> {
     let mut versions: BTreeMap<&str, BTreeSet<&str>> = BTreeMap::new();
@@ -170,6 +194,14 @@ mod tests {
         for wrong in ["GPL-3.0", "MIT AND GPL-3.0", "Apache-2.0", "none", "", "MIT GPL-3.0", "(MIT AND GPL-3.0) OR"] {
             assert!(!is_allowed(wrong, &allowed), "{wrong}");
         }
+    }
+
+    #[test]
+    fn a_crate_for_a_newer_compiler_is_named() {
+        let package = |version: &str| serde_json::json!({ "name": "x", "rust_version": version });
+        let (old, new) = (package("1.9.3"), package("1.90.1"));
+        assert!(too_new(&[&old, &package("1.90.0")], "1.90").is_empty());
+        assert_eq!(too_new(&[&old, &new], "1.90"), ["x: asks for Rust 1.90.1, the workspace promises 1.90"]);
     }
 
     #[test]

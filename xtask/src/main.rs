@@ -11,6 +11,7 @@ mod fixtures;
 mod fuzz;
 mod house;
 mod nightly;
+mod options;
 mod peers;
 mod pipeline_task;
 mod sensitivity;

@@ -1,11 +1,12 @@
 //! `cargo xtask nightly [MINUTES]`: what takes too long or needs chance: damaged files with a fresh seed, property tests
-//! with fresh cases, `adjust` without its default features, the long statistics, and `cargo deny` where it is installed.
+//! with fresh cases, `adjust` without its default features, the long statistics, the oldest compiler that is promised and
+//! `cargo deny` where they are installed.
 
 use std::process::Command;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use crate::shell::{Outcome, cargo, root};
-use crate::{fuzz, verify};
+use crate::{dependencies, fuzz, verify};
 
 /// What to run, and how long.
 #[derive(Debug, clap::Args)]
@@ -27,6 +28,7 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome {
         cargo(&["test", "--workspace", "--all-features"], &[("PROPTEST_RNG_SEED", &seed.to_string())]),
         cargo(&["test", "-p", "dense-matrices", "-p", "adjust", "--no-default-features"], &[]),
         verify::run(&verify::Arguments::all()),
+        oldest_compiler(),
         deny(),
     ];
     let failures: Vec<String> = outcomes.into_iter().filter_map(Result::err).collect();
@@ -36,6 +38,27 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome {
 fn seed_of_the_time() -> Result<u64, String> {
     let since = SystemTime::now().duration_since(UNIX_EPOCH).map_err(|error| error.to_string())?;
     Ok(since.as_secs())
+}
+
+/// Checks the workspace with the oldest compiler that it promises, where that is installed.
+fn oldest_compiler() -> Outcome {
+    let version = dependencies::rust_version(&root())?;
+    let with = |toolchain: &str, arguments: &[&str]| {
+        let mut command = Command::new("rustup");
+        command.args(["run", toolchain]).args(arguments).current_dir(root());
+        command
+    };
+    let answers = |toolchain: &String| {
+        with(toolchain, &["rustc", "--version"]).output().is_ok_and(|output| output.status.success())
+    };
+    let Some(toolchain) = [version.clone(), format!("{version}.0")].into_iter().find(answers) else {
+        println!("── Rust {version} is not installed: it was not tried (rustup toolchain install {version})");
+        return Ok(());
+    };
+    println!("── cargo check with Rust {toolchain}");
+    let status = with(&toolchain, &["cargo", "check", "--workspace", "--all-features"]).status();
+    let status = status.map_err(|error| format!("rustup: {error}"))?;
+    if status.success() { Ok(()) } else { Err(format!("cargo check with Rust {toolchain}: {status}")) }
 }
 
 /// Advisories need a database that is fetched; `cargo xtask tidy` checks licences and duplicates without it.

@@ -7,6 +7,7 @@ use crate::circles;
 use crate::dependencies;
 use crate::factorisations;
 use crate::house;
+use crate::options;
 use crate::shell::{Outcome, root};
 
 /// A file of source code holds one idea; beyond this it holds several.
@@ -40,6 +41,7 @@ pub(crate) fn run() -> Outcome {
         texts.push((shown, text));
     }
     complaints.extend(factorisations::complaints(&root, &texts));
+    complaints.extend(options::complaints(&texts));
     for folder in &crates {
         let name = folder.file_name().unwrap_or_default().to_string_lossy();
         complaints.extend(circles::complaints(&name, &circles::of_crate(&root, folder, &texts)));

@@ -194,7 +194,7 @@ fn settling(parameter: &str) -> String {
 }
 
 /// Result with this crate's [`enum@Error`].
-pub type Result<T> = std::result::Result<T, Error>;
+pub(crate) type Result<T> = std::result::Result<T, Error>;
 
 /// What is wrong with an observation equation is wrong with the adjustment.
 impl From<observation_equations::Error> for Error {

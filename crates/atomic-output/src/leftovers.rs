@@ -12,10 +12,10 @@ use crate::{Error, Result};
 const PARTIAL: &str = ".partial-";
 
 /// So long after its last change an output counts as left behind on file systems that can't lock one.
-const LEFT_AFTER: Duration = Duration::from_hours(24);
+const LEFT_AFTER: Duration = Duration::from_secs(24 * 3600);
 
 /// Between making an output and locking it a run takes no longer.
-const LOCKED_AFTER: Duration = Duration::from_mins(1);
+const LOCKED_AFTER: Duration = Duration::from_secs(60);
 
 /// A name in the same folder that no other writer uses at the same time.
 pub(crate) fn temporary_name(target: &Path) -> Result<PathBuf> {

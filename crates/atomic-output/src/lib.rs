@@ -13,6 +13,7 @@ pub use destination::Destination;
 #[cfg(feature = "fault-injection")]
 #[doc(hidden)]
 pub use disk::fault;
-pub use error::{Error, Result};
+pub use error::Error;
+use error::Result;
 pub use file::{FileWriter, write_text};
 pub use folder::OutputFolder;

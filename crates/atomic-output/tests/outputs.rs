@@ -4,7 +4,7 @@ use std::fs;
 use std::io::Write;
 use std::path::Path;
 
-use atomic_output::{Destination, Error, FileWriter, OutputFolder, Result, fault, write_text};
+use atomic_output::{Destination, Error, FileWriter, OutputFolder, fault, write_text};
 
 fn names(folder: &Path) -> Vec<String> {
     let mut names: Vec<_> =
@@ -14,12 +14,12 @@ fn names(folder: &Path) -> Vec<String> {
 }
 
 /// An output of nothing that is read.
-fn open(target: &Path) -> Result<OutputFolder> {
+fn open(target: &Path) -> Result<OutputFolder, Error> {
     Destination::new(target, &[] as &[&Path])?.open()
 }
 
 /// Writes files of these names into an output, each with its name as text.
-fn output(target: &Path, files: &[&str]) -> Result<()> {
+fn output(target: &Path, files: &[&str]) -> Result<(), Error> {
     let output = open(target)?;
     for file in files {
         write_text(output.file(file)?, file)?;

@@ -5,7 +5,7 @@
 use std::hint::black_box;
 
 use camera_model::{
-    Camera, ImageFormat, InteriorOrientation, LensDistortion, OrganisedCloud, RayTable, Result, pose_from_euler,
+    Camera, ImageFormat, InteriorOrientation, LensDistortion, OrganisedCloud, RayTable, pose_from_euler,
 };
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use nalgebra::{Point3, Vector3};
@@ -15,7 +15,7 @@ use range_image::{Flags, RangeFrame, Raster};
 const SIZES: [(usize, usize); 3] = [(176, 144), (640, 480), (1024, 1024)];
 
 /// The same optics for each size: an image 7 mm wide behind an 8 mm lens.
-fn camera(width: usize, height: usize) -> Result<Camera> {
+fn camera(width: usize, height: usize) -> Result<Camera, camera_model::Error> {
     let pitch = 7.04 / width as f64;
     let interior = InteriorOrientation { principal_point_mm: [0.11, -0.07], principal_distance_mm: 8.0 };
     let lens =

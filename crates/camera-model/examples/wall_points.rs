@@ -2,13 +2,13 @@
 #![allow(clippy::print_stdout)]
 
 use camera_model::{
-    Camera, ImageFormat, InteriorOrientation, LensDistortion, RayTable, Result, euler_from_pose, point_covariance,
+    Camera, ImageFormat, InteriorOrientation, LensDistortion, RayTable, euler_from_pose, point_covariance,
     pose_from_euler,
 };
 use nalgebra::{Point3, Vector3};
 use range_image::{Flags, RangeFrame, Raster};
 
-fn main() -> Result<()> {
+fn main() -> Result<(), camera_model::Error> {
     let camera = Camera::new(
         ImageFormat::new(176, 144, [0.04, 0.04])?,
         InteriorOrientation { principal_point_mm: [0.11, -0.07], principal_distance_mm: 8.0 },

@@ -15,7 +15,8 @@ pub use adjust;
 pub use back_projection::OrganisedCloud;
 pub use camera::{Camera, InteriorOrientation, LensDistortion};
 pub use covariance::{point_covariance, with_affinity_held};
-pub use error::{Error, Result};
+pub use error::Error;
+use error::Result;
 #[cfg(feature = "convert")]
 pub use lenses::plumb_bob::PlumbBob;
 pub use nalgebra;

@@ -10,7 +10,15 @@ pub enum Error {
         /// Which decomposition.
         what: &'static str,
     },
+    /// The slice holds fewer elements than the matrix has.
+    #[error("a matrix of order {n} has {n} x {n} elements, the slice holds {found}")]
+    TooShort {
+        /// Order asked for.
+        n: usize,
+        /// Elements given.
+        found: usize,
+    },
 }
 
 /// Result with this crate's [`enum@Error`].
-pub type Result<T> = std::result::Result<T, Error>;
+pub(crate) type Result<T> = std::result::Result<T, Error>;

@@ -13,6 +13,7 @@ pub use decompositions::{
     cholesky, inverse_of_cholesky, inverse_of_triangular, mirror_lower, product, singular_values, solve_cholesky,
     solve_upper, subtract_square, symmetric_eigen, upper_factor,
 };
-pub use error::{Error, Result};
+pub use error::Error;
+use error::Result;
 pub use panel::transposed;
 pub use product::{Left, Right, add_product, with_wide_registers};

@@ -27,15 +27,30 @@ pub struct Right<'m> {
 }
 
 /// `out[j · stride + i] += factor · Σ_k left[k][i] · right[k][j]` with k below `inner`. Sums run over k in order, so that
-/// the width of the machine's registers has no influence on the bits.
+/// the width of the machine's registers has no influence on the bits. Where a slice is too short all of `out` becomes NaN.
 #[inline(always)]
 pub fn add_product(out: &mut [f64], stride: usize, left: Left<'_>, right: Right<'_>, inner: usize, factor: f64) {
     if right.columns == 0 || inner == 0 {
         return;
     }
+    if rows_of_product(out, stride, left, right, inner, factor).is_none() {
+        out.fill(f64::NAN);
+    }
+}
+
+/// `None` where a slice ends before the product does.
+#[inline(always)]
+fn rows_of_product(
+    out: &mut [f64],
+    stride: usize,
+    left: Left<'_>,
+    right: Right<'_>,
+    inner: usize,
+    factor: f64,
+) -> Option<()> {
     let mut row = 0;
     while left.rows > row {
-        let (out, left) = (&mut out[row..], Left { data: &left.data[row..], ..left });
+        let (out, left) = (out.get_mut(row..)?, Left { data: left.data.get(row..)?, ..left });
         row += match left.rows - row {
             1 => strip::<1>(out, stride, left, right, inner, factor),
             2 => strip::<2>(out, stride, left, right, inner, factor),
@@ -44,8 +59,9 @@ pub fn add_product(out: &mut [f64], stride: usize, left: Left<'_>, right: Right<
             6 | 7 => strip::<6>(out, stride, left, right, inner, factor),
             9 => strip::<9>(out, stride, left, right, inner, factor),
             _ => strip::<8>(out, stride, left, right, inner, factor),
-        };
+        }?;
     }
+    Some(())
 }
 
 /// `R` rows of the product; gives their number.
@@ -57,20 +73,20 @@ fn strip<const R: usize>(
     right: Right<'_>,
     inner: usize,
     factor: f64,
-) -> usize {
+) -> Option<usize> {
     for j in 0..right.columns {
-        let Some(target) = out[j * stride..].first_chunk_mut::<R>() else { return R };
+        let target = out.get_mut(j * stride..)?.first_chunk_mut::<R>()?;
         let mut sum = *target;
         for k in 0..inner {
-            let Some(row) = left.data[k * left.stride..].first_chunk::<R>() else { return R };
-            let share = factor * right.data[k * right.inner + j * right.column];
+            let row = left.data.get(k * left.stride..)?.first_chunk::<R>()?;
+            let share = factor * right.data.get(k * right.inner + j * right.column)?;
             for i in 0..R {
                 sum[i] += share * row[i];
             }
         }
         *target = sum;
     }
-    R
+    Some(R)
 }
 
 /// Runs a piece of work, with everything in it that is inlined, compiled for the widest registers that the machine has.

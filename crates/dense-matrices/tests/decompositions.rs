@@ -1,8 +1,8 @@
 //! Factors and inverses against the matrices that they are of.
 
 use dense_matrices::{
-    cholesky, inverse_of_cholesky, inverse_of_triangular, product, singular_values, solve_cholesky, subtract_square,
-    symmetric_eigen, upper_factor,
+    Error, cholesky, inverse_of_cholesky, inverse_of_triangular, mirror_lower, product, singular_values,
+    solve_cholesky, solve_upper, subtract_square, symmetric_eigen, upper_factor,
 };
 
 /// Sizes about the widths of registers and blocks.
@@ -139,4 +139,45 @@ fn singular_values_descend_with_their_vectors() {
         assert!(values[n - 1] <= values[0] * rounding(n));
     }
     assert!(singular_values(&[f64::NAN], 1).is_err());
+}
+
+#[test]
+fn a_slice_that_is_too_short_gets_an_answer_without_numbers() {
+    let all_nan = |values: &[f64]| values.iter().all(|value| value.is_nan());
+    for n in [3, 40, usize::MAX] {
+        let mut short = vec![1.0; 8];
+        let mut right = vec![1.0; 8];
+        assert!(!cholesky(&mut short, n) && inverse_of_triangular(&short, n).is_none());
+        solve_cholesky(&short, n, &mut right, 2);
+        assert!(all_nan(&right));
+        assert!(all_nan(&inverse_of_cholesky(&short, n)) && all_nan(&product(&short, n, &[1.0; 6])));
+        let mut right = vec![1.0; 8];
+        solve_upper(&short, n, &mut right);
+        assert!(all_nan(&right));
+        assert_eq!(symmetric_eigen(&short, n), Err(Error::TooShort { n, found: 8 }));
+        assert_eq!(singular_values(&short, n), Err(Error::TooShort { n, found: 8 }));
+        assert!(upper_factor(&mut short, n, 3).is_empty());
+        mirror_lower(&mut short, n);
+        assert!(all_nan(&short));
+    }
+    let mut columns = vec![1.0; 8];
+    subtract_square(&mut columns, 3, 0, &[1.0; 6]);
+    assert!(all_nan(&columns));
+    let mut columns = vec![1.0; 9];
+    subtract_square(&mut columns, 3, 1, &[1.0; 6]);
+    assert!(all_nan(&columns), "three columns from the second row on are too many");
+    assert!(all_nan(&product(&[1.0; 9], 3, &[1.0; 4])));
+}
+
+#[test]
+fn what_a_slice_holds_beyond_the_matrix_is_left_alone() {
+    let (mut long, mut right) = (positive(3), matrix(3, 2));
+    let (mut factor, mut solution) = (long.clone(), right.clone());
+    assert!(cholesky(&mut factor, 3));
+    solve_cholesky(&factor, 3, &mut solution, 2);
+    long.push(f64::INFINITY);
+    right.push(5.0);
+    assert!(cholesky(&mut long, 3));
+    solve_cholesky(&long, 3, &mut right, 2);
+    assert_eq!((&long[..9], &right[..6], right[6]), (&factor[..], &solution[..], 5.0));
 }

@@ -25,3 +25,16 @@ fn all_shapes_agree_with_the_definition() {
         }
     }
 }
+
+#[test]
+fn slices_that_are_too_short_give_no_numbers() {
+    let data = [1.0; 12];
+    let whole = |out: usize, left: usize, right: usize| {
+        let mut out = vec![1.0; out];
+        let left = Left { data: &data[..left], stride: 3, rows: 3 };
+        add_product(&mut out, 3, left, Right { data: &data[..right], inner: 2, column: 1, columns: 2 }, 4, 1.0);
+        out.iter().all(|value| value.is_nan())
+    };
+    assert!(!whole(6, 12, 8));
+    assert!(whole(5, 12, 8) && whole(6, 11, 8) && whole(6, 12, 7) && whole(2, 0, 0));
+}

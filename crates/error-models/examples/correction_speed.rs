@@ -8,14 +8,14 @@ use std::hint::black_box;
 use std::time::Instant;
 
 use error_models::{
-    AmplitudeHyperbola, FixedPattern, FurtherShape, PolynomialShape, RangeErrorModel, RangeTerms, Result, SurfaceShape,
+    AmplitudeHyperbola, FixedPattern, FurtherShape, PolynomialShape, RangeErrorModel, RangeTerms, SurfaceShape,
     correct_frame,
 };
 use range_image::{Flags, ImageFormat, RangeFrame, Raster};
 
 const RUNS: usize = 1000;
 
-fn main() -> Result<()> {
+fn main() -> Result<(), error_models::Error> {
     let mut sizes = std::env::args().skip(1).filter_map(|argument| argument.parse::<usize>().ok());
     let (width, height) = (sizes.next().unwrap_or(640), sizes.next().unwrap_or(480));
     match rayon::ThreadPoolBuilder::new().num_threads(1).build() {
@@ -24,7 +24,7 @@ fn main() -> Result<()> {
     }
 }
 
-fn measure(width: usize, height: usize) -> Result<()> {
+fn measure(width: usize, height: usize) -> Result<(), error_models::Error> {
     let format = ImageFormat::new(width, height, [0.01; 2])?;
     let pattern = |sigma_m: Vec<f32>| FixedPattern { width, height, offset_m: vec![1e-3; width * height], sigma_m };
     let (bare, known) = (pattern(Vec::new()), pattern(vec![2e-4; width * height]));
@@ -45,7 +45,7 @@ fn model() -> RangeErrorModel {
 }
 
 /// The same hyperbola with a spline of 24 knots, a cubic in range and a surface of order 3.
-fn with_further_terms(format: &ImageFormat) -> Result<RangeErrorModel> {
+fn with_further_terms(format: &ImageFormat) -> Result<RangeErrorModel, error_models::Error> {
     let mut model = model().with_further(&FurtherShape {
         spline_knots: Some(24),
         polynomial: Some(PolynomialShape { order: 3, range_span_m: [0.2, 20.0] }),
@@ -56,7 +56,12 @@ fn with_further_terms(format: &ImageFormat) -> Result<RangeErrorModel> {
     Ok(model)
 }
 
-fn report(name: &str, model: &RangeErrorModel, format: &ImageFormat, pattern: Option<&FixedPattern>) -> Result<()> {
+fn report(
+    name: &str,
+    model: &RangeErrorModel,
+    format: &ImageFormat,
+    pattern: Option<&FixedPattern>,
+) -> Result<(), error_models::Error> {
     let (width, height) = (format.width, format.height);
     let frame = RangeFrame {
         range: Raster::from_fn(width, height, |col, row| 1.0 + ((col * 7 + row * 13) % 1000) as f32 * 0.01),

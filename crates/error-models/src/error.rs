@@ -154,7 +154,7 @@ pub enum Error {
 }
 
 /// Result with this crate's [`enum@Error`].
-pub type Result<T> = std::result::Result<T, Error>;
+pub(crate) type Result<T> = std::result::Result<T, Error>;
 
 /// Refuses a value that is not finite.
 pub(crate) fn require_finite(name: &'static str, value: f64) -> Result<()> {

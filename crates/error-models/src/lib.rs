@@ -17,7 +17,8 @@ pub use correction::range_error::RangeCorrection;
 pub use drift::frame_rate::FrameRateDrift;
 pub use drift::rate_history::{RateHistory, RatePhase};
 pub use drift::warm_up::{TemperatureDrift, Transient, WarmUp};
-pub use error::{Error, Result};
+pub use error::Error;
+use error::Result;
 pub use ledger::{LedgerEntry, OutsideModel, RangeTerm, ledger_maps};
 pub use models::hyperbola::HyperbolaJacobian;
 pub use models::model::{

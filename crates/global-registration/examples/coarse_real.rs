@@ -109,7 +109,7 @@ impl Table {
         &mut self,
         label: Option<&String>,
         truth: &Isometry3<f64>,
-        found: global_registration::Result<CoarseAlignment>,
+        found: Result<CoarseAlignment, global_registration::Error>,
         milliseconds: f64,
     ) {
         self.milliseconds.push(milliseconds);

@@ -14,7 +14,7 @@ pub use description::feature_cloud::FeatureCloud;
 pub use description::features::Features;
 pub use description::rsd::SurfaceRadii;
 pub use description::sift::{AmplitudeFeatureOptions, amplitude_features};
-pub use error::{Error, Result};
+pub use error::Error;
 pub use hypotheses::sparse::{SparseAlignment, SparseIcpOptions, align_features};
 pub use nalgebra;
 pub use options::{CoarseOptions, Estimator, SurfaceDescriptors, Viewpoint};

@@ -50,8 +50,8 @@ pub enum Estimator {
 /// Options of an alignment without a guess. The defaults carry no scale.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CoarseOptions {
-    /// Edge of the voxels that the cloud is averaged in, metre; every other length is a multiple of it. `None`: about
-    /// 1/30 of the median distance from the cloud's middle, but no finer than its points.
+    /// Edge of the voxels that the cloud is averaged in, metre; every other length is a multiple of it. `None`, the
+    /// default: about 1/30 of the median distance from the cloud's middle, but no finer than its points.
     pub voxel_m: Option<f64>,
     /// From where the cloud was seen. Default: the origin of its frame.
     pub viewpoint: Viewpoint,
@@ -86,7 +86,7 @@ pub struct CoarseOptions {
     pub min_determined: f64,
     /// Largest evidence for the best different pose, as a fraction of the winner's. Default 0.9.
     pub max_rival: f64,
-    /// Start of the random numbers.
+    /// Start of the random numbers. Default: 1.
     pub seed: u64,
 }
 

@@ -10,7 +10,7 @@ mod system;
 mod target;
 mod voxels;
 
-pub use error::{Error, Result};
+pub use error::Error;
 pub use icp::{Alternative, IcpOptions, Levels, Metric, Registration, Selection, Starts, align};
 pub use kernel::RobustKernel;
 pub use nalgebra;

@@ -5,7 +5,7 @@ use icp_registration::parts::{
     Coloured, ErrorMetric, GaussNewton, Minimiser, NearestPoint, PlaneToPlane, PointToPlane, PointToPoint,
     SymmetricPlanes,
 };
-use icp_registration::{IcpTarget, Registration, Result, System};
+use icp_registration::{IcpTarget, Registration, System};
 use nalgebra::Vector6;
 
 /// Compares the right-hand side with half the difference quotient of the sum of squares; the first `unknowns` of it.
@@ -14,7 +14,7 @@ struct Checked {
 }
 
 impl Minimiser for Checked {
-    fn step(&self, system: &System<'_>, held: &[Vector6<f64>]) -> Result<Vector6<f64>> {
+    fn step(&self, system: &System<'_>, held: &[Vector6<f64>]) -> Result<Vector6<f64>, icp_registration::Error> {
         let weights = system.all_weights();
         let g = system.normal_equations_after(&Vector6::zeros(), &weights).gradient;
         let h = 1e-6;

@@ -7,7 +7,7 @@ use icp_registration::parts::{
     ErrorMetric, KernelSchedule, Minimiser, Moment, Pair, PairRejection, PairWeighting, Partner, PointMatching,
     PointSelection, Progress, Query, Row, Rows, Scene, StoppingRule, TargetSurface,
 };
-use icp_registration::{IcpTarget, Registration, Result, RobustKernel, StopReason, System};
+use icp_registration::{IcpTarget, Registration, RobustKernel, StopReason, System};
 use nalgebra::{Matrix6, Vector6};
 
 /// Calls of each part.
@@ -23,7 +23,7 @@ impl Calls {
 struct EvenPoints<'a>(&'a Calls);
 
 impl PointSelection for EvenPoints<'_> {
-    fn select(&self, scene: &Scene<'_>) -> Result<Vec<usize>> {
+    fn select(&self, scene: &Scene<'_>) -> Result<Vec<usize>, icp_registration::Error> {
         self.0.count(0);
         Ok((0..scene.source.len()).filter(|i| i % 2 == 0).collect())
     }
@@ -102,7 +102,7 @@ impl ErrorMetric for PlaneToPoint<'_> {
 struct Cholesky<'a>(&'a Calls);
 
 impl Minimiser for Cholesky<'_> {
-    fn step(&self, system: &System<'_>, _held: &[Vector6<f64>]) -> Result<Vector6<f64>> {
+    fn step(&self, system: &System<'_>, _held: &[Vector6<f64>]) -> Result<Vector6<f64>, icp_registration::Error> {
         self.0.count(5);
         let equations = system.normal_equations();
         let matrix = equations.matrix + Matrix6::identity() * (1e-12 * equations.matrix.trace());
@@ -129,7 +129,7 @@ impl StoppingRule for SmallSteps<'_> {
         80
     }
 
-    fn decide(&self, progress: &mut Progress<'_>) -> Result<Option<StopReason>> {
+    fn decide(&self, progress: &mut Progress<'_>) -> Result<Option<StopReason>, icp_registration::Error> {
         self.0.count(7);
         let small = progress.step_lengths_m.last().is_some_and(|step| *step < 2e-5);
         let done = small && progress.step_over_sigma()? < 0.2;
@@ -171,7 +171,7 @@ fn every_part_can_come_from_outside() {
 fn parts_that_name_missing_points_are_refused() {
     struct Beyond;
     impl PointSelection for Beyond {
-        fn select(&self, scene: &Scene<'_>) -> Result<Vec<usize>> {
+        fn select(&self, scene: &Scene<'_>) -> Result<Vec<usize>, icp_registration::Error> {
             Ok(vec![0, scene.source.len()])
         }
     }
@@ -191,7 +191,8 @@ fn parts_that_name_missing_points_are_refused() {
     let target = IcpTarget::new(source.clone()).unwrap();
     let identity = nalgebra::Isometry3::identity();
     let mut registration = Registration::new(Nowhere(&target));
-    let missing = |result: Result<_>| matches!(result, Err(icp_registration::Error::NoSuchPoint { .. }));
+    let missing =
+        |result: Result<_, icp_registration::Error>| matches!(result, Err(icp_registration::Error::NoSuchPoint { .. }));
     assert!(missing(registration.align(&source, &identity).map(|_| ())));
     registration.selection = Box::new(Beyond);
     assert!(missing(registration.align(&source, &identity).map(|_| ())));

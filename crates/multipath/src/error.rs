@@ -62,6 +62,15 @@ pub enum Error {
         /// What the frame has, hertz.
         found_hz: f64,
     },
+    /// Nothing says how good the values of a channel are, so that nothing can be weighed against them.
+    #[error(
+        "channel {channel} has values and no standard deviation: give sigma (`ComplexFrame::with_sigma`) or predict it \
+         (`ComplexChannel::predict_sigma`)"
+    )]
+    SigmaUnknown {
+        /// Position of the channel.
+        channel: usize,
+    },
     /// A robust estimate needs more pixels than can be used.
     #[error("{what}: {found} usable pixels, at least {least} are needed")]
     TooFewPixels {
@@ -94,7 +103,7 @@ pub enum Error {
 }
 
 /// Result with this crate's [`enum@Error`].
-pub type Result<T> = std::result::Result<T, Error>;
+pub(crate) type Result<T> = std::result::Result<T, Error>;
 
 /// Refuses what is not finite or negative.
 pub(crate) fn require_not_negative(name: &'static str, value: f64) -> Result<()> {

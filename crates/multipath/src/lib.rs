@@ -6,7 +6,8 @@ mod numbers;
 mod pixels;
 mod scene;
 
-pub use error::{Error, Result};
+pub use error::Error;
+use error::Result;
 pub use mixture::mixed::{
     ComplexImage, MixedPixelTreatment, MixedPixels, NotSplit, SplitOptions, SplitPixel, SurfacePoint,
     treat_mixed_pixels,

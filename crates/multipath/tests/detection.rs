@@ -125,6 +125,19 @@ fn what_cannot_be_tested_is_not() {
 }
 
 #[test]
+fn a_channel_without_sigma_is_named() {
+    let mut frame = frame([6, 1], &THREE, &CONTRAST, 2.0, 15, |_| vec![(200.0, 2.0)]);
+    frame.channels[1].sigma.as_mut_slice().fill(f32::NAN);
+    let range = Raster::filled(6, 1, 2.0);
+    let error = detect(&mut frame, &range, &response(), &DetectionOptions::default()).unwrap_err();
+    assert_eq!(error, multipath::Error::SigmaUnknown { channel: 1 });
+    let error = multipath::solve_two_paths(&frame, &response(), &multipath::TwoPathOptions::default()).unwrap_err();
+    assert!(error.to_string().contains("with_sigma"), "{error}");
+    frame.channels[1].real.as_mut_slice().fill(f32::NAN);
+    assert!(detect(&mut frame, &range, &response(), &DetectionOptions::default()).is_ok());
+}
+
+#[test]
 fn neither_noise_nor_floor_is_no_test() {
     let mut frame = frame([2, 2], &THREE, &CONTRAST, 0.0, 15, |_| vec![(200.0, 2.0)]);
     let options = options(Evidence::RangesAndAmplitudes, 1e-3);

@@ -271,8 +271,6 @@ fn hopeless_frames_and_bad_options_are_answered() {
     let all = run(&Raster::filled(9, 1, true), default).unwrap();
     assert_eq!((all.pixels, all.split.len(), all.not_split.len()), (9, 0, 9));
     assert!(matches!(run(&Raster::filled(8, 1, true), default), Err(Error::Image(_))));
-    let bad = SplitOptions { least_jump_m: 0.0, ..default };
-    assert!(matches!(run(&mixed, bad), Err(Error::OutOfDomain { name: "least_jump_m", .. })));
     assert!(matches!(run(&mixed, SplitOptions { modulation_hz: Some(-1.0), ..default }), Err(Error::Image(_))));
     let other = common::frame([3, 3], &THREE, &CONTRAST, 1.0, 1, |_| vec![(1.0, 1.0)]);
     let response = FrequencyResponse { contrast: CONTRAST.to_vec() };

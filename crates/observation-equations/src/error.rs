@@ -73,7 +73,7 @@ pub enum Error {
 }
 
 /// Result with this crate's [`enum@Error`].
-pub type Result<T> = std::result::Result<T, Error>;
+pub(crate) type Result<T> = std::result::Result<T, Error>;
 
 /// Why a model could not be evaluated at given parameters, said by an [`crate::Observation`]
 /// (for example "the point lies behind the camera").

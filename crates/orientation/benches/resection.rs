@@ -3,12 +3,12 @@
 
 use std::hint::black_box;
 
-use camera_model::{Camera, ImageFormat, InteriorOrientation, LensDistortion, Result, pose_from_euler};
+use camera_model::{Camera, ImageFormat, InteriorOrientation, LensDistortion, pose_from_euler};
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use nalgebra::{Point3, Vector3};
 use orientation::{ResectionOptions, TargetObservation, resect};
 
-fn station(count: usize) -> Result<(Camera, Vec<TargetObservation>)> {
+fn station(count: usize) -> Result<(Camera, Vec<TargetObservation>), camera_model::Error> {
     let camera = Camera::new(
         ImageFormat::new(176, 144, [0.04, 0.04])?,
         InteriorOrientation { principal_point_mm: [0.11, -0.07], principal_distance_mm: 8.0 },
@@ -24,7 +24,7 @@ fn station(count: usize) -> Result<(Camera, Vec<TargetObservation>)> {
         let pixel = camera.format.pixel_from_image(seen.image_mm).map(|x| (x * 1e2).round() / 1e2);
         Ok(TargetObservation::new(point, pixel, 0.1).with_range((seen.range_m * 1e3).round() / 1e3, 0.005))
     });
-    let targets = targets.collect::<Result<Vec<_>>>()?;
+    let targets = targets.collect::<Result<Vec<_>, camera_model::Error>>()?;
     Ok((camera, targets))
 }
 

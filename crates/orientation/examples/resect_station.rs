@@ -3,7 +3,7 @@
 
 use camera_model::{Camera, ImageFormat, InteriorOrientation, LensDistortion, euler_from_pose, pose_from_euler};
 use nalgebra::{Point3, Vector3};
-use orientation::{Resection, ResectionOptions, Result, TargetObservation, resect};
+use orientation::{Resection, ResectionOptions, TargetObservation, resect};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
@@ -18,7 +18,7 @@ const TARGETS: [[f64; 3]; 7] = [
     [0.4, -0.3, -0.2],
 ];
 
-fn main() -> Result<()> {
+fn main() -> Result<(), orientation::Error> {
     let camera = Camera::new(
         ImageFormat::new(176, 144, [0.04, 0.04]).map_err(camera_model::Error::from)?,
         InteriorOrientation { principal_point_mm: [0.11, -0.07], principal_distance_mm: 8.0 },

@@ -28,7 +28,7 @@ pub struct ResectionOptions {
     /// An approximate pose `world_from_camera`. Without one (the default) the start is found in closed form, and other
     /// poses that explain the observations as well are reported; with one, the minimum next to it is taken.
     pub approximate: Option<Isometry3<f64>>,
-    /// Options of the adjustment.
+    /// Options of the adjustment. Default: that of [`SolveOptions`].
     pub solve: SolveOptions,
 }
 
@@ -89,6 +89,27 @@ pub struct TargetResidual {
 /// [`Error::TooFewTargets`], [`Error::CollinearTargets`], [`Error::InvalidTarget`]; [`Error::NoApproximation`],
 /// [`Error::Ambiguous`] and [`Error::WeakGeometry`] where the observations do not settle one pose;
 /// [`Error::Adjustment`] where the adjustment does not converge or is rank deficient.
+///
+/// ```
+/// use orientation::camera_model::{Camera, ImageFormat, InteriorOrientation, LensDistortion, pose_from_euler};
+/// use orientation::nalgebra::{Point3, Vector3};
+/// use orientation::{ResectionOptions, TargetObservation, resect};
+///
+/// let interior = InteriorOrientation { principal_point_mm: [0.0, 0.0], principal_distance_mm: 8.0 };
+/// let camera = Camera::new(ImageFormat::new(176, 144, [0.04, 0.04])?, interior, LensDistortion::default())?;
+/// let truth = pose_from_euler(Vector3::new(0.2, -0.1, 3.0), [0.05, -0.1, 0.02]);
+/// // Three targets, metre: image points good to 0.1 pixel, ranges to 5 mm.
+/// let mut targets = Vec::new();
+/// for xyz in [[-0.8, -0.6, 0.0], [0.8, -0.6, 0.0], [0.1, 0.6, 0.3]] {
+///     let point = Point3::from(xyz);
+///     let seen = camera.observe(&truth, &point)?;
+///     let pixel = camera.format.pixel_from_image(seen.image_mm);
+///     targets.push(TargetObservation::new(point, pixel, 0.1).with_range(seen.range_m, 0.005));
+/// }
+/// let station = resect(&camera, &targets, &ResectionOptions::default())?;
+/// assert!((station.world_from_camera.translation.vector - truth.translation.vector).norm() < 1e-6);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn resect(camera: &Camera, targets: &[TargetObservation], options: &ResectionOptions) -> Result<Resection> {
     camera.validate()?;
     check(targets)?;

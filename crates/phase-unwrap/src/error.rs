@@ -24,16 +24,6 @@ pub enum Error {
         /// Number of pixels of the raster.
         pixels: usize,
     },
-    /// A phase is finite but outside `[0, 2 pi]`.
-    #[error("phase = {value} rad at column {col}, row {row}: wrapped phases lie in [0, 2 pi]")]
-    PhaseOutsideCycle {
-        /// Column.
-        col: usize,
-        /// Row.
-        row: usize,
-        /// Phase found.
-        value: f32,
-    },
     /// Links are to be weighted by noise that nothing tells.
     #[error("edge weights by noise need a plane of standard deviations or of amplitudes; neither is given")]
     NoiseUnknown,
@@ -146,4 +136,4 @@ pub enum Error {
 }
 
 /// Result with this crate's [`enum@Error`].
-pub type Result<T> = std::result::Result<T, Error>;
+pub(crate) type Result<T> = std::result::Result<T, Error>;

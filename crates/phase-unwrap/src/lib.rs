@@ -17,7 +17,8 @@ pub use entry::repair::{
 };
 pub use entry::spatial::{PhaseInput, Unwrapper, unwrap_spatial};
 pub use entry::temporal::{StreamUnwrapper, unwrap_sequence};
-pub use error::{Error, Result};
+pub use error::Error;
+use error::Result;
 pub use exact::{CutPrice, ExactOptions, ExactUnwrapped, LeastCuts, unwrap_least_cuts};
 pub use filter::congruent::{congruent, congruent_into};
 pub use filter::noise::{LARGEST_SIGMA_RAD, PhaseNoise};

@@ -244,16 +244,8 @@ fn bad_options_get_a_typed_answer() {
         let options = MultiFrequencyOptions { kernel: Some(kernel), ..MultiFrequencyOptions::default() };
         MultiUnwrapper::new(&modulations, options).unwrap_err()
     };
-    let default = KernelDensityOptions::default();
-    assert!(matches!(with(KernelDensityOptions { radius: 0, ..default }), Error::OutOfDomain { name: "radius", .. }));
-    assert!(matches!(with(KernelDensityOptions { radius: 4, ..default }), Error::OutOfDomain { name: "radius", .. }));
-    let nan = f32::NAN;
-    for kernel in [
-        KernelDensityOptions { tolerance_cycles: nan, ..default },
-        KernelDensityOptions { background: 0.0, ..default },
-        KernelDensityOptions { scattered: nan, ..default },
-    ] {
-        assert!(matches!(with(kernel), Error::OutOfDomain { .. }));
+    for radius in [0, 4] {
+        assert!(matches!(with(KernelDensityOptions { radius }), Error::OutOfDomain { name: "radius", .. }));
     }
     let nine: Vec<f64> = (0..9).map(|n| 10e6 + 1e6 * f64::from(n)).collect();
     let error = MultiUnwrapper::new(&frequencies::modulations(&nine), MultiFrequencyOptions::default()).unwrap_err();

@@ -2,6 +2,7 @@
 #![allow(clippy::expect_used, clippy::float_cmp, clippy::panic, clippy::print_stdout, clippy::unwrap_used, dead_code)]
 
 mod absolute;
+mod any_cycle;
 mod common;
 mod dark_rooms;
 #[path = "../examples/peers_phase/files.rs"]

@@ -9,7 +9,7 @@ mod normals;
 
 pub use cloud::Cloud;
 pub use eigen::{eigenvalues3, eigenvector3};
-pub use error::{Error, Result};
+pub use error::Error;
 pub use nalgebra;
 pub use neighbours::{Neighbour, NeighbourTree, check_points, is_usable};
 pub use normals::{

@@ -33,8 +33,8 @@ pub struct DifferenceOptions {
     pub largest_incidence_rad: f64,
     /// Every so many columns and rows is used. Default 1: all.
     pub step: usize,
-    /// First and last column, first and last row used; `None` stands for all. A target that does not fill the frame
-    /// needs it.
+    /// First and last column, first and last row used; `None`, the default, stands for all. A target that does not fill
+    /// the frame needs it.
     pub window: Option<[[usize; 2]; 2]>,
     /// Standard deviation of a range where the frame gives none, metre. Default 1 cm; the posterior deviations do
     /// not depend on it where the frame gives none at all.

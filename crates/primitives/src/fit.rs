@@ -13,8 +13,17 @@ use crate::surface::{Hit, Surface};
 use crate::{Error, Result};
 use crate::{FittedPixel, PrimitiveFit, PrimitiveKind, PrimitiveOptions};
 
-/// Rounds of choosing pixels after which nothing changes any more.
+/// Most rounds of choosing pixels; a choice that still changes then is taken as it is.
 const MAX_ROUNDS: usize = 20;
+/// Pixels further from the primitive than so many standard deviations, or robust scales where these are larger, belong to
+/// something else: under normal noise one good pixel in sixteen thousand. More of them keeps mixed pixels in the fit.
+const REJECTION_SIGMAS: f64 = 4.0;
+/// Largest share of such pixels: a median, by which the start is chosen, bears less than half. Beyond it the region is
+/// another primitive's.
+const LARGEST_OUTLIER_SHARE: f64 = 0.4;
+/// Largest standard deviation of a radius in parts of itself, and of a direction in radian: first-order covariances are worth
+/// little beyond. A larger one lets through cylinders of which a narrow strip is seen.
+const LARGEST_UNCERTAINTY: f64 = 0.1;
 
 /// A pixel of the region with its ray.
 pub(crate) struct RegionPixel {
@@ -44,6 +53,24 @@ struct Adjusted {
 /// [`Error::TooFewPixels`]; [`Error::NotThatPrimitive`] where too many pixels belong to something else, or where
 /// neighbouring residuals show another shape; [`Error::PrimitiveNotDetermined`] where the region is too small a part of
 /// it.
+///
+/// ```
+/// use primitives::camera_model::{Camera, ImageFormat, InteriorOrientation, LensDistortion};
+/// use primitives::range_image::{RangeFrame, Raster};
+/// use primitives::{PrimitiveKind, PrimitiveOptions, fit_primitive};
+///
+/// let interior = InteriorOrientation { principal_point_mm: [0.0, 0.0], principal_distance_mm: 8.0 };
+/// let camera = Camera::new(ImageFormat::new(60, 48, [0.1, 0.1])?, interior, LensDistortion::default())?;
+/// // A wall 3 m in front of the camera.
+/// let range = Raster::from_fn(60, 48, |col, row| {
+///     let noise = 0.005 * (1.7 * col as f64 + 23.1 * (row as f64).sin()).sin();
+///     (-3.0 / camera.ray([col as f64, row as f64]).z + noise) as f32
+/// });
+/// let frame = RangeFrame { sigma: Raster::filled(60, 48, 0.004), ..RangeFrame::from_range(range) };
+/// let fit = fit_primitive(&frame, &camera, PrimitiveKind::Plane, &PrimitiveOptions::default())?;
+/// assert!(fit.sigma0 < 1.2 && fit.outlier_share() < 0.01);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn fit_primitive(
     frame: &RangeFrame,
     camera: &Camera,
@@ -85,11 +112,11 @@ pub fn fit_whatever_shape(
     }
     let adjusted = adjusted.ok_or_else(|| nothing(kind))?;
     let outcome = outcome(kind, &pixels, &used, &surface, adjusted)?;
-    let (found, limit) = (outcome.outlier_share(), options.largest_outlier_share);
+    let (found, limit) = (outcome.outlier_share(), LARGEST_OUTLIER_SHARE);
     if found > limit {
         return Err(Error::NotThatPrimitive { kind, what: "share of pixels that lie elsewhere", found, limit });
     }
-    require_determined(&outcome, options.largest_uncertainty)?;
+    require_determined(&outcome, LARGEST_UNCERTAINTY)?;
     Ok(PrimitiveFit { systematic_sigmas: systematic_sigmas(&outcome, options.pixels.step), ..outcome })
 }
 
@@ -138,7 +165,7 @@ fn chosen(pixels: &[RegionPixel], surface: &Surface, parameters: &[f64], options
         })
         .collect();
     let scale = mad_scale(&mut standardised.clone());
-    let limit = options.rejection_sigmas * if scale.is_finite() { scale.max(1.0) } else { 1.0 };
+    let limit = REJECTION_SIGMAS * if scale.is_finite() { scale.max(1.0) } else { 1.0 };
     standardised.iter().map(|value| *value <= limit).collect()
 }
 

@@ -7,7 +7,7 @@ mod preparation;
 mod registration;
 mod shared_error;
 
-pub use error::{Error, Result};
+pub use error::Error;
 pub use icp_registration;
 pub use nalgebra;
 pub use options::FrameAlignmentOptions;

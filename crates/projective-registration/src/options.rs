@@ -12,15 +12,15 @@ pub struct FrameAlignmentOptions {
     /// What happens to motions that the geometry does not determine. Default: they are named.
     pub degeneracy: DegeneracyPolicy,
     /// Covariance of the guess, tangent `[dt target axes (m), dtheta source axes (rad)]`. With it, the result is the
-    /// most probable pose for guess and frames together, and motions that the geometry does not determine come from
-    /// the guess alone. `None`: the guess is but a start.
+    /// most probable pose for guess and frames together, and motions that the geometry does not determine come from the
+    /// guess alone. `None`, the default: the guess is but a start.
     pub prior: Option<Matrix6<f64>>,
     /// The systematic error that all frames of the sensor share: its part of the covariance does not fall with the number
     /// of pixels. `None`: estimated from the residuals of the pair, which tell the more of it the farther the camera has
     /// moved. Default `None`.
     pub shared_error: Option<SharedError>,
     /// A motion counts as undetermined when the predicted standard deviation of points at the frame's radius exceeds
-    /// this, metre. `None`: 1/300 of the radius.
+    /// this, metre. `None`, the default: 1/300 of the radius.
     pub max_motion_sigma_m: Option<f64>,
     /// Levels that are passed, coarse to fine, 1 to 4. Default 4.
     pub levels: usize,
@@ -32,8 +32,8 @@ pub struct FrameAlignmentOptions {
     pub other_starts: usize,
     /// Iterations in all levels together, from the start that is best. Default 60.
     pub max_iterations: usize,
-    /// The run has converged when a step moves points at the frame's radius by less than this, metre. `None`: 1e-5 of
-    /// that radius.
+    /// The run has converged when a step moves points at the frame's radius by less than this, metre. `None`, the
+    /// default: 1e-5 of that radius.
     pub step_tolerance_m: Option<f64>,
     /// The run has settled as soon as a step is shorter than this multiple of its standard deviation, as the weights of
     /// the pairs tell it; most steps are then taken on a quarter of the nodes, and the last one is taken with the

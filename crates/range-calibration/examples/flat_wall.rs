@@ -8,13 +8,13 @@ use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
 use range_calibration::{
-    DifferenceOptions, Plane, RangeTermOptions, Result, Scale, differences_to_plane, estimate_range_terms,
+    DifferenceOptions, Plane, RangeTermOptions, Scale, differences_to_plane, estimate_range_terms,
 };
 use range_image::{Flags, ImageFormat, Modulation, RangeFrame, Raster};
 
 const SIGMA: f32 = 0.004;
 
-fn main() -> Result<()> {
+fn main() -> Result<(), range_calibration::Error> {
     let format = ImageFormat::new(176, 144, [0.04, 0.04])?;
     let interior = InteriorOrientation { principal_point_mm: [0.05, -0.03], principal_distance_mm: 8.0 };
     let camera = Camera::new(format, interior, LensDistortion::default())?;
@@ -52,7 +52,12 @@ fn main() -> Result<()> {
 }
 
 /// What the camera shows of the wall, with seeded noise.
-fn shown(camera: &Camera, wall: &Plane, truth: &RangeErrorModel, seed: u64) -> Result<RangeFrame> {
+fn shown(
+    camera: &Camera,
+    wall: &Plane,
+    truth: &RangeErrorModel,
+    seed: u64,
+) -> Result<RangeFrame, range_calibration::Error> {
     let (width, height) = (camera.format.width, camera.format.height);
     let reference = |col, row| wall.reference_range(camera, &Isometry3::identity(), [col as f64, row as f64]);
     let mut frame = RangeFrame {

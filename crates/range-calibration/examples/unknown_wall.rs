@@ -10,7 +10,7 @@ use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
 use range_calibration::{
-    DifferenceOptions, Error, Plane, PlaneCalibrationOptions, PlaneCapture, Result, Scale, calibrate_planes,
+    DifferenceOptions, Error, Plane, PlaneCalibrationOptions, PlaneCapture, Scale, calibrate_planes,
 };
 use range_image::{Flags, ImageFormat, Modulation, RangeFrame, Raster};
 
@@ -18,13 +18,13 @@ const SIGMA: f32 = 0.004;
 const STATIONS: usize = 12;
 
 /// `unknown_wall [COLUMNS ROWS STEP]`, 176 144 4 where nothing is given.
-fn main() -> Result<()> {
+fn main() -> Result<(), Error> {
     let given: Vec<usize> = std::env::args().skip(1).filter_map(|word| word.parse().ok()).collect();
     let [width, height, step] = given[..] else { return calibrate(176, 144, 4) };
     calibrate(width, height, step)
 }
 
-fn calibrate(width: usize, height: usize, step: usize) -> Result<()> {
+fn calibrate(width: usize, height: usize, step: usize) -> Result<(), Error> {
     let format = ImageFormat::new(width, height, [7.04 / width as f64, 5.76 / height as f64])?;
     let interior = InteriorOrientation { principal_point_mm: [0.05, -0.03], principal_distance_mm: 4.0 };
     let camera = Camera::new(format, interior, LensDistortion::default())?;
@@ -36,7 +36,7 @@ fn calibrate(width: usize, height: usize, step: usize) -> Result<()> {
     // Stations on the way to the wall, their poses known from targets; a box stands before the wall in each picture.
     let poses: Vec<_> = (0..STATIONS).map(station).collect();
     let shown = |(seed, pose)| shown(&camera, pose, &wall, &truth, seed);
-    let frames = (0..).zip(&poses).map(shown).collect::<Result<Vec<_>>>()?;
+    let frames = (0..).zip(&poses).map(shown).collect::<Result<Vec<_>, Error>>()?;
     let captures: Vec<_> = (0..STATIONS).map(|index| capture(index, &frames[index], Some(poses[index]))).collect();
     let mut options = PlaneCalibrationOptions::default();
     options.pixels = DifferenceOptions { step, ..options.pixels };
@@ -88,7 +88,7 @@ fn shown(
     wall: &Plane,
     truth: &RangeErrorModel,
     seed: u64,
-) -> Result<RangeFrame> {
+) -> Result<RangeFrame, Error> {
     let (width, height) = (camera.format.width, camera.format.height);
     let reference = |col: usize, row: usize| wall.reference_range(camera, pose, [col as f64, row as f64]);
     let mut frame = RangeFrame {

@@ -11,7 +11,7 @@ fn calibrate(
     names: &[&str],
     stations: usize,
     seed: u64,
-) -> range_calibration::Result<SurfaceCalibration> {
+) -> Result<SurfaceCalibration, range_calibration::Error> {
     let poses = round::poses(stations);
     let frames = round::frames(&poses, &round::model(truth), seed);
     let captures: Vec<SurfaceCapture<'_>> = frames

@@ -4,22 +4,21 @@
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;
-use range_image::{
-    ComplexFrame, DemodulationOptions, Modulation, NoiseModel, RawFrame, Result, Samples, average, demodulate,
-};
+use range_image::{ComplexFrame, DemodulationOptions, Modulation, NoiseModel, RawFrame, Samples, average, demodulate};
 
 const WIDTH: usize = 176;
 const HEIGHT: usize = 144;
 const STEPS: usize = 4;
 const RANGE_M: f64 = 3.2;
 
-fn main() -> Result<()> {
+fn main() -> Result<(), range_image::Error> {
     let modulation = Modulation::new(20e6)?;
     let noise = NoiseModel { shot_variance_per_unit: 0.5, dark_sigma: 5.0 };
     let options = DemodulationOptions { noise, saturation: Some(4095.0), ..DemodulationOptions::default() };
     let mut generator = Pcg64Mcg::seed_from_u64(1);
-    let frames: Vec<ComplexFrame> =
-        (0..25).map(|_| demodulate(&wall(modulation, &noise, &mut generator)?, &options)).collect::<Result<_>>()?;
+    let frames: Vec<ComplexFrame> = (0..25)
+        .map(|_| demodulate(&wall(modulation, &noise, &mut generator)?, &options))
+        .collect::<Result<_, range_image::Error>>()?;
 
     for count in [1, 5, 25] {
         let mean = average(&frames[..count])?;
@@ -36,7 +35,7 @@ fn main() -> Result<()> {
 }
 
 /// One raw frame of a wall that is seen at the same range and amplitude by all pixels.
-fn wall(modulation: Modulation, noise: &NoiseModel, generator: &mut Pcg64Mcg) -> Result<RawFrame> {
+fn wall(modulation: Modulation, noise: &NoiseModel, generator: &mut Pcg64Mcg) -> Result<RawFrame, range_image::Error> {
     let phase = modulation.phase_from_range(RANGE_M);
     let mut samples = Vec::with_capacity(STEPS * WIDTH * HEIGHT);
     for step in 0..STEPS {

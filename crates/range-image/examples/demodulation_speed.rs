@@ -8,12 +8,12 @@ use std::hint::black_box;
 use std::time::Instant;
 
 use range_image::{
-    ComplexFrame, DemodulationOptions, Demodulator, Modulation, NoiseModel, PolarChannel, RawFrame, Result, Samples,
+    ComplexFrame, DemodulationOptions, Demodulator, Modulation, NoiseModel, PolarChannel, RawFrame, Samples,
 };
 
 const RUNS: usize = 300;
 
-fn main() -> Result<()> {
+fn main() -> Result<(), range_image::Error> {
     let mut sizes = std::env::args().skip(1).filter_map(|argument| argument.parse::<usize>().ok());
     let (width, height) = (sizes.next().unwrap_or(640), sizes.next().unwrap_or(480));
     match rayon::ThreadPoolBuilder::new().num_threads(1).build() {
@@ -22,7 +22,7 @@ fn main() -> Result<()> {
     }
 }
 
-fn measure(width: usize, height: usize) -> Result<()> {
+fn measure(width: usize, height: usize) -> Result<(), range_image::Error> {
     let demodulator = Demodulator::new(&DemodulationOptions {
         saturation: Some(4095.0),
         low_amplitude: Some(10.0),
@@ -55,7 +55,7 @@ fn measure(width: usize, height: usize) -> Result<()> {
     Ok(())
 }
 
-fn report(name: &str, mut work: impl FnMut() -> Result<()>) -> Result<()> {
+fn report(name: &str, mut work: impl FnMut() -> Result<(), range_image::Error>) -> Result<(), range_image::Error> {
     let mut least = f64::INFINITY;
     for _ in 0..RUNS {
         let start = Instant::now();

@@ -6,11 +6,10 @@
 use std::path::{Path, PathBuf};
 
 use range_image::Raster;
-use range_io::Result;
 use range_io::atomic_output::Destination;
 use range_io::survey::{InputFrame, Survey, read_frame, write_frame};
 
-fn main() -> Result<()> {
+fn main() -> Result<(), range_io::Error> {
     let folder = match std::env::args_os().nth(1) {
         Some(folder) => PathBuf::from(folder),
         None => small_survey()?,
@@ -45,7 +44,7 @@ fn span(plane: &Raster<f32>) -> String {
 }
 
 /// A wall at 2 m seen by a camera of 4 x 3 pixels.
-fn small_survey() -> Result<PathBuf> {
+fn small_survey() -> Result<PathBuf, range_io::Error> {
     const TEXT: &str = r#"#![enable(implicit_some)]
 (
     camera: (

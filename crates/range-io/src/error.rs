@@ -113,7 +113,7 @@ pub enum Error {
 }
 
 /// Result with this crate's [`Error`].
-pub type Result<T> = std::result::Result<T, Error>;
+pub(crate) type Result<T> = std::result::Result<T, Error>;
 
 fn prefix(field: &str) -> String {
     if field.is_empty() { String::new() } else { format!("`{field}`: ") }

@@ -21,9 +21,10 @@ pub use atomic_output;
 // Of the signatures.
 #[cfg(any(feature = "calibration", feature = "survey", feature = "tables", feature = "trajectory"))]
 pub use camera_model;
+pub use error::Error;
 #[cfg(any(feature = "survey", feature = "calibration"))]
 pub(crate) use error::InvalidField;
-pub use error::{Error, Result};
+use error::Result;
 #[cfg(feature = "calibration")]
 pub use error_models;
 #[cfg(feature = "azure")]

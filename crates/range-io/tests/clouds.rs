@@ -13,7 +13,7 @@ use range_io::e57::{E57Scan, read_e57, write_e57};
 
 use crate::scratch::Scratch;
 
-fn read(scratch: &Scratch, name: &str, bytes: &[u8]) -> range_io::Result<CloudFile> {
+fn read(scratch: &Scratch, name: &str, bytes: &[u8]) -> Result<CloudFile, range_io::Error> {
     read_any_cloud(scratch.holding(name, bytes))
 }
 

@@ -21,7 +21,7 @@ use range_io::{
 
 use crate::scratch::Scratch;
 
-fn reason<T: std::fmt::Debug>(result: range_io::Result<T>) -> String {
+fn reason<T: std::fmt::Debug>(result: Result<T, range_io::Error>) -> String {
     result.expect_err("a file that must be refused").to_string()
 }
 
@@ -93,7 +93,7 @@ fn brackets_without_end_cost_no_more_than_their_length() {
     let deep = format!("{}1{}", "[".repeat(5000), "]".repeat(5000));
     let fault = reason(Survey::parse(Path::new("survey.ron"), &format!("(frames: {deep})")));
     assert!(fault.starts_with("survey.ron:1:"), "{fault}");
-    let deep: range_io::Result<ron::Value> = range_io::ron_text::parse(Path::new("any.ron"), &deep);
+    let deep: Result<ron::Value, range_io::Error> = range_io::ron_text::parse(Path::new("any.ron"), &deep);
     assert!(reason(deep).contains("recursion limit"));
     // Some tenths of a second; each path by itself took minutes and gigabytes.
     assert!(clock.elapsed() < Duration::from_secs(30), "{:?}", clock.elapsed());
@@ -175,7 +175,7 @@ fn sizes_of_archives_are_not_believed() {
     }
 }
 
-fn read_depth(path: &Path) -> range_io::Result<()> {
+fn read_depth(path: &Path) -> Result<(), range_io::Error> {
     NpzReader::open(path)?.read("depth", |_| Ok(())).map(drop)
 }
 

@@ -145,7 +145,7 @@ fn recording() -> Vec<u8> {
     [element(0x1A45_DFA3, &[0; 4]), open_element(0x1853_8067, &segment.concat())].concat()
 }
 
-fn open(bytes: &[u8]) -> range_io::Result<Recording<Cursor<&[u8]>>> {
+fn open(bytes: &[u8]) -> Result<Recording<Cursor<&[u8]>>, range_io::Error> {
     Recording::new("memory.mkv", Cursor::new(bytes))
 }
 

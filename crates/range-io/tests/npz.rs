@@ -14,7 +14,7 @@ fn written<T: Element>(shape: &[usize], values: &[T]) -> Vec<u8> {
     writer.finish().unwrap().into_inner()
 }
 
-fn read(bytes: &[u8]) -> range_io::Result<Array> {
+fn read(bytes: &[u8]) -> Result<Array, range_io::Error> {
     NpzReader::new("memory.npz", Cursor::new(bytes))?.read("a", |_| Ok(()))
 }
 

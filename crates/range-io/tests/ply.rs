@@ -8,7 +8,7 @@ use range_io::ply::{CloudFile, PlyWriter, Precision, read_cloud, write_cloud};
 
 use crate::scratch::{Scratch, cloud};
 
-fn read(scratch: &Scratch, bytes: &[u8]) -> range_io::Result<CloudFile> {
+fn read(scratch: &Scratch, bytes: &[u8]) -> Result<CloudFile, range_io::Error> {
     read_cloud(scratch.holding(NAME, bytes))
 }
 

@@ -32,7 +32,7 @@ impl Scratch {
 }
 
 /// The message without the folder.
-fn message<T: std::fmt::Debug>(result: range_io::Result<T>) -> String {
+fn message<T: std::fmt::Debug>(result: Result<T, range_io::Error>) -> String {
     let text = result.unwrap_err().to_string();
     text.rsplit_once('/').map(|(_, text)| text.to_owned()).unwrap_or(text)
 }
@@ -240,6 +240,6 @@ fn rows_keep_their_places() {
     let file = scratch.with("targets.csv", "target,z,y,x,sigma_x,sigma_y,sigma_z\n\nA,1,2,3,,,\nB,1,2,3,,,\n");
     let rows = read_placed_targets(&file).unwrap();
     assert_eq!((rows.rows.len(), rows.line(0), rows.line(1), rows.line(2)), (2, 3, 4, 0));
-    let error: range_io::Result<()> = Err(rows.error(1, "x", "is far away"));
+    let error: Result<(), range_io::Error> = Err(rows.error(1, "x", "is far away"));
     assert_eq!(message(error), "targets.csv:4:4: `x`: is far away", "the column is that of the file");
 }

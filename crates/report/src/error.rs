@@ -15,4 +15,4 @@ pub enum Error {
 }
 
 /// Result with this crate's [`Error`](enum@Error).
-pub type Result<T> = std::result::Result<T, Error>;
+pub(crate) type Result<T> = std::result::Result<T, Error>;

@@ -5,7 +5,8 @@ mod error;
 mod figure;
 
 pub use document::{Alignment, Block, Column, Document, Merit, Place, Section, Table, millimetres};
-pub use error::{Error, Result};
+pub use error::Error;
+use error::Result;
 pub use figure::{
     Axes, CATEGORIES, CHART_SIZE, Canvas, ColourMap, Direction, Drawn, Edge, Figure, Labels, LineOfSight, NO_VALUE,
     Node, Scale, Series, StationCloud, cloud_figure, curves, deviation_figure, escape, heat_map, hex, histogram,

@@ -26,7 +26,7 @@ fn charts_have_axes_units_and_legends_and_leave_gaps() {
 }
 
 #[test]
-fn pictures_are_in_the_page_with_the_unit_of_their_scale() -> report::Result<()> {
+fn pictures_are_in_the_page_with_the_unit_of_their_scale() -> Result<(), report::Error> {
     let figures = vec![
         raster_figure("Range", 2, &[1.0, 2.0, f64::NAN, 4.0], &SCALE)?,
         rgb_figure("Flags", 1, &[1, 2, 3])?,

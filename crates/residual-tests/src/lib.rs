@@ -10,7 +10,8 @@ pub use comparison::{
     ImageComparison, ImageSide, JointTest, ParameterComparison, ParameterDifference, ParameterSet, compare_corrections,
     compare_drifts, compare_images, compare_parameters,
 };
-pub use error::{Error, Result};
+pub use error::Error;
+use error::Result;
 pub use error_models;
 pub use nalgebra;
 pub use range_image;

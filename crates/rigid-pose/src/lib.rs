@@ -12,7 +12,7 @@ pub use absolute_orientation::{
     absolute_orientation_with_scale,
 };
 pub use centred::{Centred, MotionEquations, free_of, symmetric};
-pub use error::{Error, Result};
+pub use error::Error;
 pub use motions::eigen6;
 pub use nalgebra;
 pub use tangent::{inverse_covariance_transport, is_finite, pose_difference, step_pose, symmetrised};

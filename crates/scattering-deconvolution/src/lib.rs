@@ -10,7 +10,8 @@ mod spread;
 
 #[cfg(feature = "estimate")]
 pub use adjust;
-pub use error::{Error, Result};
+pub use error::Error;
+use error::Result;
 #[cfg(feature = "estimate")]
 pub use estimate::{
     Ambiguity, Candidate, Capture, CaptureReport, Estimated, EstimationOptions, ForegroundCapture, Nuisance,

@@ -49,18 +49,19 @@ pub enum NetworkDatum {
 /// Options of a network calibration.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CalibrationOptions {
-    /// Method.
+    /// Method. Default: [`Method::OneStep`].
     pub method: Method,
-    /// Terms.
+    /// Terms. Default: [`TermSelection::Auto`].
     pub terms: TermSelection,
-    /// Datum.
+    /// Datum. Default: [`NetworkDatum::Free`].
     pub datum: NetworkDatum,
-    /// Stations whose ranges are left out, by name (convergent ones, whose ranges scattering would bias).
+    /// Stations whose ranges are left out, by name (convergent ones, whose ranges scattering would bias). Default:
+    /// empty.
     pub without_ranges: Vec<String>,
     /// Significance level of the outlier test (data snooping, one at a time); `None`: nothing is rejected. Default 0.0001.
     pub rejection_level: Option<f64>,
     /// A combination of parameters that is known so many times worse than its parameters would be alone is refused as
-    /// not determined.
+    /// not determined. Default: 500.
     pub largest_inflation: f64,
 }
 

@@ -6,7 +6,8 @@ mod pattern;
 
 pub use adjust;
 pub use camera_model;
-pub use error::{Error, Result};
+pub use error::Error;
+use error::Result;
 pub use error_models;
 pub use noise::*;
 pub use pattern::*;

@@ -11,7 +11,8 @@ mod spec;
 mod truth;
 
 pub use camera_model;
-pub use error::{Error, Result};
+pub use error::Error;
+use error::Result;
 pub use error_models;
 pub use nalgebra;
 pub use range_image;

@@ -101,6 +101,30 @@ pub fn simulate(spec: &SimulationSpec, seed: u64, progress: &(dyn Fn(usize, usiz
 }
 
 /// Simulates one frame of one station: the same bits as that frame of [`simulate`].
+///
+/// ```
+/// use simulation::{SimulationSpec, simulate_frame};
+///
+/// // A room seen by a camera of 44 by 36 pixels at 30 MHz without any error.
+/// let spec = SimulationSpec::from_ron(r#"(
+///     scene: (objects: [(name: "room", shape: Room(min_m: (0, 0, 0), max_m: (7, 5, 3)), albedo: 0.6)]),
+///     camera: (
+///         geometry: (
+///             format: (width: 44, height: 36, pixel_pitch_mm: (0.16, 0.16)),
+///             interior: (principal_point_mm: (0, 0), principal_distance_mm: 5),
+///         ),
+///         modulation_hz: [30e6],
+///         phase_steps: 4,
+///     ),
+///     illumination: (source_power: 4e6),
+///     exposure: (frames_per_station: 2, integration_time_s: 0.002),
+///     stations: [(name: "A", position_m: (1, 2, 1.4), attitude: LookAt(target_m: (5, 2.4, 1.1)))],
+/// )"#)?;
+/// let frame = simulate_frame(&spec, 1, 0, 1)?;
+/// assert_eq!(frame.raw.phase_steps(), 4);
+/// assert!(frame.truth.range[(22, 18)] > 5.0); // metre, to the wall
+/// # Ok::<(), simulation::Error>(())
+/// ```
 pub fn simulate_frame(spec: &SimulationSpec, seed: u64, station: usize, frame: usize) -> Result<SimulatedFrame> {
     let simulator = Simulator::new(spec)?;
     simulator.frame(&simulator.station(station)?, frame, seed)

@@ -8,7 +8,7 @@ mod stream;
 mod tracked;
 mod trajectory;
 
-pub use error::{Error, Result};
+pub use error::Error;
 pub use global_registration;
 pub use imu::{ImuIntegrator, ImuOptions, InertialSample};
 pub use motion_model::motion::MotionPrior;

@@ -38,11 +38,11 @@ const NOISE_FRACTION: f64 = 4.0;
 /// Options of a [`Tracker`](crate::Tracker). The defaults carry no scale.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrackerOptions {
-    /// Registration of a frame with a keyframe. Undetermined motions are always reported, so that the prediction
-    /// can carry them, and turned starts are not tried; where `max_motion_sigma_m` is `None`, it is 1/50 of the radius of
-    /// the first frame.
+    /// Registration of a frame with a keyframe. Undetermined motions are always reported, so that the prediction can
+    /// carry them, and turned starts are not tried; where `max_motion_sigma_m` is `None`, it is 1/50 of the radius of
+    /// the first frame. Default: that of [`FrameAlignmentOptions`] with the share of noise of a stream.
     pub alignment: FrameAlignmentOptions,
-    /// Pose of the first frame: the datum, without error.
+    /// Pose of the first frame: the datum, without error. Default: the identity.
     pub world_from_first: Isometry3<f64>,
     /// Another keyframe becomes the reference, or a new one is made, where a smaller fraction of the frame than this
     /// agrees with the present one. Default 0.7.
@@ -52,9 +52,9 @@ pub struct TrackerOptions {
     /// Older keyframes that each new one is registered with, those that should see most of the same first: what agrees with
     /// the path within its covariance closes a loop. 0: none, which saves that many registrations a keyframe. Default 4.
     pub loop_attempts: usize,
-    /// Whether keyframes learn from frames.
+    /// Whether keyframes learn from frames. Default: [`Fusion::Planes`].
     pub fusion: Fusion,
-    /// How the pose is sought after a loss.
+    /// How the pose is sought after a loss. Default: [`Relocalisation::Coarse`].
     pub relocalisation: Relocalisation,
 }
 

@@ -81,6 +81,25 @@ impl DriftEstimate {
 ///
 /// # Errors
 /// A [`DriftError`] that names what the samples do not determine.
+///
+/// ```
+/// use warm_up::{DriftOptions, DriftSample, DriftVerdict, estimate_drift};
+///
+/// // A mean change of range every ten seconds for an hour: 8 mm that fall off in 10 min, noise of 0.1 mm.
+/// let sample = |k: i32| {
+///     let time_s = 10.0 * f64::from(k);
+///     let mean_change_m = 0.008 * (-time_s / 600.0).exp() + 1e-4 * (37.0 * f64::from(k)).sin();
+///     DriftSample { time_s, mean_change_m, sigma_m: 1e-4, temperature_c: None }
+/// };
+/// let samples: Vec<DriftSample> = (0..360).map(sample).collect();
+/// let drift = estimate_drift(&samples, &DriftOptions::default())?;
+/// assert!(matches!(drift.verdict, DriftVerdict::Stable { .. }));
+/// assert!((drift.model.transients[0].time_constant_s - 600.0).abs() < 10.0);
+///
+/// // Five minutes tell no time constant of ten.
+/// assert!(estimate_drift(&samples[..30], &DriftOptions::default()).is_err());
+/// # Ok::<(), warm_up::DriftError>(())
+/// ```
 pub fn estimate_drift(samples: &[DriftSample], options: &DriftOptions) -> DriftResult<DriftEstimate> {
     estimate(samples, None, options)
 }

@@ -9,8 +9,8 @@ pub struct DriftOptions {
     pub level: f64,
     /// Whether the drift may follow the temperature. Default: not.
     pub temperature: TemperatureUse,
-    /// Drift within which the camera counts as stable, metre; `None`: three standard deviations of a block in the last
-    /// quarter of the capture.
+    /// Drift within which the camera counts as stable, metre; `None`, the default: three standard deviations of a block
+    /// in the last quarter of the capture.
     pub tolerance_m: Option<f64>,
     /// Shortest capture that is taken for an answer, second. Default 10 min: transients take tens of minutes (Sect.
     /// 4.7), and what is slower than the capture passes for a constant.

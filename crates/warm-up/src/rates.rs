@@ -7,13 +7,13 @@ use crate::fitting::curve::{Curve, RateSteps};
 use crate::fitting::whitening::Whitening;
 use crate::{DriftBlock, DriftError, DriftResult, DriftSample};
 
-/// Part of a capture that its longest stretch of unknown rate may have.
+/// Part of a capture that its longest stretch of unknown rate may have. A choice: a minute of an hour.
 const LARGEST_GAP: f64 = 1.0 / 60.0;
 
 /// Share of the response to the frame rate that may rest on unknown rates.
 const LARGEST_UNKNOWN: f64 = 0.05;
 
-/// Redundancy of a phase from which on its own scatter is told.
+/// Redundancy of a phase from which on its own scatter is told. A standard deviation from so many is known to a fifth.
 const LEAST_REDUNDANCY: f64 = 10.0;
 
 /// The frame rates of a capture.

@@ -6,7 +6,7 @@ use error_models::{RateHistory, Transient, WarmUp};
 
 use crate::{DriftBlock, DriftResult};
 
-/// Deviations that a value stays within.
+/// Deviations that a value stays within. Of normal values three in a thousand lie outside.
 const CERTAIN: f64 = 3.0;
 
 /// From when on the ranges are stable, and how far.

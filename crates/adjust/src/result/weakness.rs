@@ -14,13 +14,13 @@ const COMPARED: usize = 4;
 /// What is looked for in [`Solution::near_defects`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct WeaknessOptions {
-    /// Blocks examined, the calibration and the stations for example; `None`: all. What the others leave undetermined
-    /// counts: the covariances are those of the whole adjustment.
+    /// Blocks examined, the calibration and the stations for example; `None`, the default: all. What the others leave
+    /// undetermined counts: the covariances are those of the whole adjustment.
     pub blocks: Option<Vec<BlockId>>,
     /// A combination of parameters is reported when it is known so many times worse than it would be if its parameters
-    /// did not share their effect with others. 10 is a pair of parameters with a correlation of 0.99.
+    /// did not share their effect with others. 10 is a pair of parameters with a correlation of 0.99. Default: 10.
     pub inflation: f64,
-    /// Most combinations reported.
+    /// Most combinations reported. Default: 10.
     pub max_count: usize,
 }
 

@@ -4,9 +4,9 @@ use crate::{BlockId, Distribution, ObservationId, Result, Scale, Solution};
 /// What counts as found by the test for gross errors \[Baarda1968\].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ReliabilityOptions {
-    /// Probability that a good observation is rejected.
+    /// Probability that a good observation is rejected. Default: 0.001.
     pub level: f64,
-    /// Probability that an error of the size of the smallest detectable one is found.
+    /// Probability that an error of the size of the smallest detectable one is found. Default: 0.8.
     pub power: f64,
 }
 

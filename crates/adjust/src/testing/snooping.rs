@@ -6,19 +6,19 @@ use crate::{Adjustment, Error, GroupId, Kernel, Method, ObservationId, Result, S
 /// How gross errors are sought and rejected.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SnoopingOptions {
-    /// The test.
+    /// The test. Default: [`SnoopingTest::Baarda`].
     pub test: SnoopingTest,
-    /// Significance level of a single test.
+    /// Significance level of a single test. Default: 0.001.
     pub level: f64,
-    /// Most components that may be rejected; `None`: a tenth of those tested, at least one.
+    /// Most components that may be rejected; `None`, the default: a tenth of those tested, at least one.
     pub max_rejections: Option<usize>,
     /// Most components rejected from one solution before it is computed anew. Within a batch all is as if they were
-    /// rejected one at a time in the linearised model; 1 solves after each.
+    /// rejected one at a time in the linearised model; 1 solves after each. Default: 256.
     pub batch: usize,
-    /// Components whose errors show with less than this share are never rejected.
+    /// Components whose errors show with less than this share are never rejected. Default: 0.01.
     pub smallest_control: f64,
-    /// Groups that are tested; `None`: all but priors. Groups with a robust kernel look after their errors themselves
-    /// and are not tested.
+    /// Groups that are tested; `None`, the default: all but priors. Groups with a robust kernel look after their errors
+    /// themselves and are not tested.
     pub groups: Option<Vec<GroupId>>,
 }
 

@@ -12,11 +12,11 @@ const LARGEST_CHANGE: f64 = 1e4;
 /// How variance components are estimated.
 #[derive(Debug, Clone, PartialEq)]
 pub struct VarianceComponentOptions {
-    /// Most iterations, each one solution.
+    /// Most iterations, each one solution. Default: 100.
     pub max_iterations: usize,
-    /// The iteration ends when no factor changes by more than this share.
+    /// The iteration ends when no factor changes by more than this share. Default: 1e-4.
     pub tolerance: f64,
-    /// Groups with less redundancy are held: their residuals say next to nothing about their variance.
+    /// Groups with less redundancy are held: their residuals say next to nothing about their variance. Default: 3.
     pub smallest_redundancy: f64,
 }
 

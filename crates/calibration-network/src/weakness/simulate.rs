@@ -28,22 +28,23 @@ pub enum SimulatedStart {
 /// How sightings are simulated.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SightingOptions {
-    /// Standard deviation of an image coordinate, pixel.
+    /// Standard deviation of an image coordinate, pixel. Default: 0.05 pixel.
     pub sigma_pixel: f64,
-    /// Standard deviation of a range, metre.
+    /// Standard deviation of a range, metre. Default: 0.01 m.
     pub sigma_range_m: f64,
-    /// Standard deviation of an image coordinate of the passive camera, pixel.
+    /// Standard deviation of an image coordinate of the passive camera, pixel. Default: 0.2 pixel.
     pub sigma_passive_pixel: f64,
-    /// Seed of the random numbers.
+    /// Seed of the random numbers. Default: 1.
     pub seed: u64,
-    /// Share of image points and ranges, 0 to 1, that get a gross error of 20 to 50 standard deviations.
+    /// Share of image points and ranges, 0 to 1, that get a gross error of 20 to 50 standard deviations. Default: 0.
     pub gross_error_share: f64,
-    /// Start values of poses and coordinates.
+    /// Start values of poses and coordinates. Default: disturbed by 0.02 m and 0.01 rad.
     pub start: SimulatedStart,
-    /// Amplitude of a target at 1 m, falling with the square of the distance; `None`: no amplitudes.
+    /// Amplitude of a target at 1 m, falling with the square of the distance; `None`, the default: no amplitudes.
     pub amplitude_at_1_m: Option<f64>,
     /// Darkest and brightest target relative to that amplitude; the others lie between, evenly in their logarithm and
     /// in no order. Without a spread, amplitude and range are one, and a hyperbola can't be told from range terms.
+    /// Default: 1 for all.
     pub reflectance_span: [f64; 2],
 }
 

@@ -11,15 +11,18 @@ use crate::plan::Stage;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct DemodulateOptions {
-    /// Amplitude below which the phase of a single frame is too noisy, in the samples' unit; pixels below it are flagged. A
-    /// mean of n frames is held to the same noise of the phase, which it has at `1 / √n` of this amplitude.
+    /// Amplitude below which the phase of a single frame is too noisy, in the samples' unit; pixels below it are
+    /// flagged. A mean of n frames is held to the same noise of the phase, which it has at `1 / √n` of this amplitude.
+    /// Default: `None`.
     pub low_amplitude: Option<f64>,
-    /// Noise of one sample where no calibration states it.
+    /// Noise of one sample where no calibration states it. Default: `None`.
     pub noise: Option<NoiseOptions>,
-    /// How the samples of a pixel are checked against each other, which tells motion and saturation; `None`: not at all.
-    /// Nothing is checked either where neither the noise nor a tolerance is known.
+    /// How the samples of a pixel are checked against each other, which tells motion and saturation; `None`: not at
+    /// all. Nothing is checked either where neither the noise nor a tolerance is known. Default: that of
+    /// [`ConsistencyOptions`].
     pub consistency: Option<ConsistencyOptions>,
-    /// When contradictory samples are laid to light of another camera instead of motion.
+    /// When contradictory samples are laid to light of another camera instead of motion. Default: that of
+    /// [`InterferenceOptions`].
     pub interference: InterferenceOptions,
 }
 
@@ -49,8 +52,10 @@ pub struct NoiseOptions {
 #[serde(deny_unknown_fields, default)]
 pub struct AverageOptions {
     /// Where sigma is known: which pixels count as moved (they are flagged), and which stations as moved or drifting.
+    /// Default: that of [`RestOptions`].
     pub rest: RestOptions,
-    /// Where sigma is known, in complex images: when light of another camera counts as found (what it disturbs is flagged).
+    /// Where sigma is known, in complex images: when light of another camera counts as found (what it disturbs is
+    /// flagged). Default: that of [`InterferenceOptions`].
     pub interference: InterferenceOptions,
 }
 
@@ -58,7 +63,7 @@ pub struct AverageOptions {
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct DeconvolveOptions {
-    /// Tikhonov term of the inverse filter; zero is the plain inverse.
+    /// Tikhonov term of the inverse filter; zero is the plain inverse. Default: 0.
     pub regularisation: f64,
 }
 
@@ -66,12 +71,13 @@ pub struct DeconvolveOptions {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct UnwrapOptions {
-    /// No range is longer than this, metre; bounds the wrap counts that are tried. `None`: 15 m, or the interval in which
-    /// several frequencies together are unique, where that is shorter.
+    /// No range is longer than this, metre; bounds the wrap counts that are tried. `None`, the default: 15 m, or the
+    /// interval in which several frequencies together are unique, where that is shorter.
     pub maximum_range_m: Option<f64>,
-    /// Below this confidence (0 to 1) a pixel is flagged as unsure.
+    /// Below this confidence (0 to 1) a pixel is flagged as unsure. Default: 0.5.
     pub minimum_confidence: f64,
     /// What the counts of a single frequency come from. Several frequencies need none of this: each pixel's own decide.
+    /// Default: [`UnwrapMethod::Tree`].
     pub method: UnwrapMethod,
 }
 
@@ -111,13 +117,13 @@ impl From<UnwrapMethod> for phase_unwrap::NoisyMethod {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct RepairWrapsOptions {
-    /// Ambiguity interval, metre, where the survey states no modulation frequency.
+    /// Ambiguity interval, metre, where the survey states no modulation frequency. Default: `None`.
     pub interval_m: Option<f64>,
-    /// No range is longer than this, metre; bounds the intervals that are tried.
+    /// No range is longer than this, metre; bounds the intervals that are tried. Default: 15 m.
     pub maximum_range_m: f64,
-    /// Below this confidence (0 to 1) a pixel keeps its value and is flagged as unsure.
+    /// Below this confidence (0 to 1) a pixel keeps its value and is flagged as unsure. Default: 0.8.
     pub minimum_confidence: f64,
-    /// What the camera has done to its amplitudes.
+    /// What the camera has done to its amplitudes. Default: [`AmplitudeKind::Unknown`].
     pub amplitudes: AmplitudeKind,
 }
 
@@ -154,17 +160,17 @@ impl Default for RepairWrapsOptions {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct MultipathOptions {
-    /// Probability that a pixel with one path is flagged where frequencies are compared.
+    /// Probability that a pixel with one path is flagged where frequencies are compared. Default: 1e-4.
     pub false_alarm_probability: f64,
-    /// Standard deviation of what calibration leaves of the range errors of one frequency, metre.
+    /// Standard deviation of what calibration leaves of the range errors of one frequency, metre. Default: 0.005 m.
     pub floor_m: f64,
-    /// Pixels are flagged whose ranges are wrong by more than this, metre, and by more than their standard deviation, with
-    /// odds of nineteen to one, by light that the scene bounces: where the walls of the view are bent as that light would
-    /// bend them. `None`: the expected error is pictured in the report and flags nothing.
+    /// Pixels are flagged whose ranges are wrong by more than this, metre, and by more than their standard deviation,
+    /// with odds of nineteen to one, by light that the scene bounces: where the walls of the view are bent as that
+    /// light would bend them. `None`: the expected error is pictured in the report and flags nothing. Default: 0.02 m.
     pub flag_risk_above_m: Option<f64>,
-    /// Probability that a view counts as bent that is not.
+    /// Probability that a view counts as bent that is not. Default: 0.01.
     pub bending_false_alarm_probability: f64,
-    /// What is done where frequencies contradict each other.
+    /// What is done where frequencies contradict each other. Default: [`MultipathTreatment::Flag`].
     pub treatment: MultipathTreatment,
 }
 
@@ -200,9 +206,9 @@ pub struct CorrectImagePointOptions {}
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct FuseExposuresOptions {
-    /// Probability that exposures of a scene at rest count as contradictory in a pixel.
+    /// Probability that exposures of a scene at rest count as contradictory in a pixel. Default: 1e-4.
     pub false_alarm_probability: f64,
-    /// Standard deviation of what calibration leaves in one exposure and not in the others, metre.
+    /// Standard deviation of what calibration leaves in one exposure and not in the others, metre. Default: 0.005 m.
     pub floor_m: f64,
 }
 
@@ -217,7 +223,7 @@ impl Default for FuseExposuresOptions {
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct PointCloudOptions {
-    /// Standard deviation of an image point along column and row, pixels.
+    /// Standard deviation of an image point along column and row, pixels. Default: `None`.
     pub sigma_pixel: Option<[f64; 2]>,
 }
 
@@ -225,12 +231,12 @@ pub struct PointCloudOptions {
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct FlagOptions {
-    /// Amplitude below which a pixel is flagged, in the camera's unit, whatever the number of frames: for what noise is not
-    /// the reason of. For noise, use `maximum_sigma_m`.
+    /// Amplitude below which a pixel is flagged, in the camera's unit, whatever the number of frames: for what noise is
+    /// not the reason of. For noise, use `maximum_sigma_m`. Default: `None`.
     pub low_amplitude: Option<f64>,
-    /// Standard deviation of the range above which a pixel is flagged as of low amplitude, metre.
+    /// Standard deviation of the range above which a pixel is flagged as of low amplitude, metre. Default: `None`.
     pub maximum_sigma_m: Option<f64>,
-    /// How spikes at edges are told from surfaces.
+    /// How spikes at edges are told from surfaces. Default: that of [`MixedPixels`].
     pub mixed_pixels: MixedPixels,
 }
 
@@ -261,11 +267,12 @@ pub const NORMAL_HALF_WIDTH_PX: usize = 3;
 pub struct RegisterOptions {
     /// What is known of the poses. Default: what the survey says of them, else the order of the stations.
     pub start: StartPoses,
-    /// How far approximate poses may be off, metre, their rotations at the distance of what is seen.
+    /// How far approximate poses may be off, metre, their rotations at the distance of what is seen. Default: 0.5 m.
     pub maximum_distance_m: f64,
-    /// Smallest part of a view that must overlap another for the two to be aligned as a pair.
+    /// Smallest part of a view that must overlap another for the two to be aligned as a pair. Default: 0.3.
     pub minimum_overlap: f64,
-    /// Normals come from windows of twice this and one pixel a side; small images want small windows.
+    /// Normals come from windows of twice this and one pixel a side; small images want small windows. Default: 3
+    /// pixels.
     pub normal_half_width_px: usize,
 }
 
@@ -294,10 +301,10 @@ impl Default for RegisterOptions {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct AdjustOptions {
-    /// How far the poses that `Register` found may be off, metre.
+    /// How far the poses that `Register` found may be off, metre. Default: 0.1 m.
     pub maximum_distance_m: f64,
     /// Smallest part of a view that must overlap another for the two to be aligned as a pair; the adjustment itself
-    /// takes whatever overlaps.
+    /// takes whatever overlaps. Default: 0.3.
     pub minimum_overlap: f64,
 }
 
@@ -311,7 +318,7 @@ impl Default for AdjustOptions {
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct CorrectRangeOptions {
-    /// What is done about the drift of a warming camera.
+    /// What is done about the drift of a warming camera. Default: [`DriftTreatment::Apply`].
     pub warm_up: DriftTreatment,
 }
 

@@ -29,6 +29,19 @@ use crate::{CorrectionSummary, FixedPattern, RangeErrorModel, Result};
 ///
 /// Refuses a model that [`RangeErrorModel::validate`] refuses, a bad pattern, and sizes that differ; the frame
 /// is untouched then.
+///
+/// ```
+/// use error_models::range_image::{ImageFormat, RangeFrame, Raster};
+/// use error_models::{RangeErrorModel, RangeTerms, correct_frame};
+///
+/// // All ranges are 24 mm too long; the ambiguity interval is 7.5 m, pixels are 40 micrometres apart.
+/// let terms = RangeTerms { d0: 0.024, ..RangeTerms::default() };
+/// let model = RangeErrorModel { terms, ..RangeErrorModel::error_free(7.5) };
+/// let mut frame = RangeFrame::from_range(Raster::filled(176, 144, 3.024));
+/// correct_frame(&mut frame, &model, &ImageFormat::new(176, 144, [0.04, 0.04])?, [0.0, 0.0], None)?;
+/// assert!((frame.range[(88, 72)] - 3.0).abs() < 1e-6);
+/// # Ok::<(), error_models::Error>(())
+/// ```
 pub fn correct_frame(
     frame: &mut RangeFrame,
     model: &RangeErrorModel,

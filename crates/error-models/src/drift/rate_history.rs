@@ -39,7 +39,7 @@ const NEAR: f64 = 1.5;
 const GAP: f64 = 3.0;
 
 impl RateHistory {
-    /// Frames that tell a rate.
+    /// Frames that tell a rate. Fewer leave the median to lost frames.
     pub const LEAST_FRAMES: usize = WINDOW;
 
     /// Rates as they are stated, times in second since power-on. What is before the first one is not known.

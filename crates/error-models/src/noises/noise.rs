@@ -23,6 +23,17 @@ pub fn range_sigma_m(
 /// [`GrossErrorOptions::low_amplitude`](crate::GrossErrorOptions::low_amplitude).
 ///
 /// NaN where the noise is not known or `sigma_range_m` not positive.
+///
+/// ```
+/// use error_models::range_image::Modulation;
+/// use error_models::{NoiseModel, lowest_amplitude, range_sigma_m};
+///
+/// // Four steps at 20 MHz, samples of 500 units on average.
+/// let (noise, modulation) = (NoiseModel { shot_variance_per_unit: 0.2, dark_sigma: 3.0 }, Modulation::new(20e6)?);
+/// let amplitude = lowest_amplitude(&noise, &modulation, 4, 500.0, 0.02);
+/// assert!((range_sigma_m(&noise, &modulation, 4, 500.0, amplitude) - 0.02).abs() < 1e-12);
+/// # Ok::<(), error_models::range_image::Error>(())
+/// ```
 pub fn lowest_amplitude(
     noise: &NoiseModel,
     modulation: &Modulation,

@@ -11,10 +11,10 @@ use crate::{Error, Result};
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields, default))]
 pub struct GrossErrorOptions {
-    /// How mixed pixels are told from surfaces; `None` leaves them alone.
+    /// How mixed pixels are told from surfaces; `None` leaves them alone. Default: that of [`MixedPixelOptions`].
     pub mixed_pixels: Option<MixedPixelOptions>,
-    /// Pixels of a smaller amplitude (camera's unit) are flagged; `None` flags none. A reasoned value gives
-    /// [`lowest_amplitude`](crate::lowest_amplitude).
+    /// Pixels of a smaller amplitude (camera's unit) are flagged; `None`, the default, flags none. A reasoned value
+    /// gives [`lowest_amplitude`](crate::lowest_amplitude).
     pub low_amplitude: Option<f64>,
 }
 
@@ -30,12 +30,13 @@ impl Default for GrossErrorOptions {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields, default))]
 pub struct MixedPixelOptions {
-    /// Distance in standard deviations of the difference between the pixel and the continued surface: of the noise of all
-    /// pixels that take part, and of the floor.
+    /// Distance in standard deviations of the difference between the pixel and the continued surface: of the noise of
+    /// all pixels that take part, and of the floor. Default: 4.
     pub sigmas: f64,
-    /// Standard deviation, metre, of what is no noise: what scattered light and calibration leave, and grain of surfaces.
+    /// Standard deviation, metre, of what is no noise: what scattered light and calibration leave, and grain of
+    /// surfaces. Default: 0.005 m.
     pub floor_m: f64,
-    /// Standard deviation of a range where the frame gives none, metre.
+    /// Standard deviation of a range where the frame gives none, metre. Default: 0.005 m.
     pub unknown_sigma_m: f64,
 }
 
@@ -73,6 +74,18 @@ pub struct FlagCounts {
 /// others cannot be told from mixed pixels and is flagged, and without amplitudes one that is long, too.
 ///
 /// A NaN amplitude is not low. Refuses planes of different sizes and options that are not finite or negative.
+///
+/// ```
+/// use error_models::range_image::{Flags, RangeFrame, Raster};
+/// use error_models::{GrossErrorOptions, flag_gross_errors};
+///
+/// // A board at 2 m before a wall at 4 m; the column between sees both.
+/// let range = Raster::from_fn(20, 20, |col, _row| [2.0, 3.1, 4.0][usize::from(col > 8) + usize::from(col > 9)]);
+/// let mut frame = RangeFrame { sigma: Raster::filled(20, 20, 0.01), ..RangeFrame::from_range(range) };
+/// let counts = flag_gross_errors(&mut frame, &GrossErrorOptions::default())?;
+/// assert!(counts.mixed_pixel > 10 && frame.flags[(9, 10)].contains(Flags::MIXED_PIXEL));
+/// # Ok::<(), error_models::Error>(())
+/// ```
 pub fn flag_gross_errors(frame: &mut RangeFrame, options: &GrossErrorOptions) -> Result<FlagCounts> {
     frame.validate()?;
     options.validate()?;

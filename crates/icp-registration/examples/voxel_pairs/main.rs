@@ -12,7 +12,7 @@ use std::time::Duration;
 
 use common::{Pinhole, frame_pair, pose_error};
 use icp_registration::{
-    IcpOptions, IcpResult, Metric, MotionKind, Result, VoxelAlignmentOptions, VoxelCloud, VoxelOptions, align,
+    IcpOptions, IcpResult, Metric, MotionKind, VoxelAlignmentOptions, VoxelCloud, VoxelOptions, align,
 };
 use nalgebra::{Isometry3, Matrix6, Point3, Vector6};
 use point_cloud::Cloud;
@@ -60,7 +60,11 @@ fn main() {
 }
 
 /// From raw points to the pose.
-fn register(views: &Views, guess: &Isometry3<f64>, options: &VoxelAlignmentOptions) -> Result<IcpResult> {
+fn register(
+    views: &Views,
+    guess: &Isometry3<f64>,
+    options: &VoxelAlignmentOptions,
+) -> Result<IcpResult, icp_registration::Error> {
     let target = VoxelCloud::new(&views.target, &VoxelOptions::default())?;
     let source = VoxelCloud::new(&views.source, &VoxelOptions::default())?;
     target.align(&source, guess, options)

@@ -7,29 +7,29 @@ use crate::result::DegeneracyPolicy;
 /// How a cloud is cut into voxels.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct VoxelOptions {
-    /// Edge of the finest voxels, metre. `None`: such that the cloud fills about 10 000 of them, or, where it has fewer
-    /// points than that takes, a voxel holds about eight.
+    /// Edge of the finest voxels, metre. `None`, the default: such that the cloud fills about 10 000 of them, or, where
+    /// it has fewer points than that takes, a voxel holds about eight.
     pub voxel_m: Option<f64>,
 }
 
 /// How two clouds of voxels are aligned. The defaults carry no scale.
 #[derive(Debug, Clone, PartialEq)]
 pub struct VoxelAlignmentOptions {
-    /// Largest distance by which the guess may misplace points, metre. `None`: as far as half of the target's radius,
-    /// found by a search from several sides. A small distance saves that search.
+    /// Largest distance by which the guess may misplace points, metre. `None`, the default: as far as half of the
+    /// target's radius, found by a search from several sides. A small distance saves that search.
     pub max_start_error_m: Option<f64>,
     /// Robust kernel of the finest level; its scale is the median absolute deviation of the residuals, anew in each
-    /// iteration.
+    /// iteration. Default: [`RobustKernel::Welsch`].
     pub kernel: RobustKernel,
     /// Iterations in all levels together. Default 100.
     pub max_iterations: usize,
-    /// The run has converged when the step moves points at the cloud's radius by less than this, metre. `None`: 1e-5 of
-    /// that radius.
+    /// The run has converged when the step moves points at the cloud's radius by less than this, metre. `None`, the
+    /// default: 1e-5 of that radius.
     pub step_tolerance_m: Option<f64>,
-    /// What happens to undetermined motions.
+    /// What happens to undetermined motions. Default: [`DegeneracyPolicy::Report`].
     pub degeneracy: DegeneracyPolicy,
     /// A motion counts as undetermined when the predicted standard deviation of points at the cloud's radius exceeds
-    /// this, metre. `None`: 1/300 of the radius.
+    /// this, metre. `None`, the default: 1/300 of the radius.
     pub max_motion_sigma_m: Option<f64>,
     /// Fewest pairs of voxels. Default 20.
     pub min_correspondences: usize,

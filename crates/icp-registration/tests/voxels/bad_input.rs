@@ -1,6 +1,6 @@
 //! Input that has no answer gets a typed one.
 
-use icp_registration::{Error, IcpResult, Result, VoxelAlignmentOptions, VoxelCloud, VoxelOptions};
+use icp_registration::{Error, IcpResult, VoxelAlignmentOptions, VoxelCloud, VoxelOptions};
 use nalgebra::{Isometry3, Point3, Vector3};
 use point_cloud::Cloud;
 use point_cloud::Error as CloudError;
@@ -12,7 +12,7 @@ fn good() -> Cloud {
     bare(&frame_pair(&Pinhole { width: 88, height: 72, focal_px: 76.0 }, 2).target.0)
 }
 
-fn run(source: &Cloud, target: &Cloud) -> Result<IcpResult> {
+fn run(source: &Cloud, target: &Cloud) -> Result<IcpResult, Error> {
     let target = VoxelCloud::new(target, &VoxelOptions::default())?;
     let source = VoxelCloud::new(source, &VoxelOptions::default())?;
     target.align(&source, &Isometry3::identity(), &VoxelAlignmentOptions::default())

@@ -8,11 +8,15 @@ mod real;
 mod scenes;
 mod verdicts;
 
-use icp_registration::{IcpResult, Result, VoxelAlignmentOptions, VoxelCloud, VoxelOptions};
+use icp_registration::{IcpResult, VoxelAlignmentOptions, VoxelCloud, VoxelOptions};
 use nalgebra::Isometry3;
 use scenes::Views;
 
-fn register(views: &Views, guess: &Isometry3<f64>, options: &VoxelAlignmentOptions) -> Result<IcpResult> {
+fn register(
+    views: &Views,
+    guess: &Isometry3<f64>,
+    options: &VoxelAlignmentOptions,
+) -> Result<IcpResult, icp_registration::Error> {
     let target = VoxelCloud::new(&views.target, &VoxelOptions::default())?;
     let source = VoxelCloud::new(&views.source, &VoxelOptions::default())?;
     target.align(&source, guess, options)

@@ -4,11 +4,15 @@ use range_image::{ComplexFrame, Flags, Modulation, RangeFrame, Raster};
 use rayon::prelude::*;
 use statistics::chi_squared_limit;
 
-use crate::error::{require_not_negative, require_positive, require_probability};
+use crate::error::{require_positive, require_probability};
 use crate::mixture::split::{split_complex, split_range};
 use crate::mixture::surfaces::{Around, Sides, SurfaceFinder};
 use crate::pixels::pixel::{MAXIMUM_FREQUENCIES, System, USELESS};
 use crate::{FrequencyResponse, Result, Systematics};
+
+/// A surface must have at least this many of its share's standard deviations: with less, noise alone may have made it. A
+/// larger one leaves more pixels at the rim of thin objects whole.
+const LEAST_SHARE_SIGMAS: f64 = 3.0;
 
 /// What is done with a mixed pixel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -29,41 +33,28 @@ pub enum MixedPixelTreatment {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields, default))]
 pub struct SplitOptions {
-    /// Modulation frequency at level range, hertz; `None` takes the range of a mixed pixel for the mean of the two
-    /// weighted by amplitude, which is the limit of small phases. Not used where there is a complex image.
+    /// Modulation frequency at level range, hertz; `None`, the default, takes the range of a mixed pixel for the mean
+    /// of the two weighted by amplitude, which is the limit of small phases. Not used where there is a complex image.
     pub modulation_hz: Option<f64>,
-    /// Standard deviation of a range where the frame gives none, metre.
+    /// Standard deviation of a range where the frame gives none, metre. Default: 0.005 m.
     pub unknown_sigma_m: f64,
-    /// Smallest difference in range of two surfaces, metre.
-    pub least_jump_m: f64,
-    /// A surface must have at least this many of its share's standard deviations.
-    pub least_share_sigmas: f64,
-    /// Probability that a pixel of two surfaces is refused.
+    /// Probability that a pixel of two surfaces is refused. Default: 1e-3.
     pub false_alarm: f64,
-    /// What calibration leaves over; `floor_m` stands for the bend of surfaces as well.
+    /// What calibration leaves over; `floor_m` stands for the bend of surfaces as well. Default: that of
+    /// [`Systematics`].
     pub systematics: Systematics,
 }
 
 impl Default for SplitOptions {
-    /// Small phases; 5 mm where sigma is not known; jumps from 5 cm; three standard deviations; refusals of one in a
-    /// thousand; 2 mm and 1 %.
+    /// Small phases; 5 mm where sigma is not known; refusals of one in a thousand; 2 mm and 1 %.
     fn default() -> Self {
-        Self {
-            modulation_hz: None,
-            unknown_sigma_m: 0.005,
-            least_jump_m: 0.05,
-            least_share_sigmas: 3.0,
-            false_alarm: 1e-3,
-            systematics: Systematics::default(),
-        }
+        Self { modulation_hz: None, unknown_sigma_m: 0.005, false_alarm: 1e-3, systematics: Systematics::default() }
     }
 }
 
 impl SplitOptions {
     fn validate(&self) -> Result<()> {
         require_positive("unknown_sigma_m", self.unknown_sigma_m)?;
-        require_positive("least_jump_m", self.least_jump_m)?;
-        require_not_negative("least_share_sigmas", self.least_share_sigmas)?;
         require_probability("false_alarm", self.false_alarm)?;
         self.systematics.validate()
     }
@@ -185,7 +176,6 @@ struct Splitter<'a> {
     complex: Option<(System, &'a ComplexFrame)>,
     /// Phase of one metre at level range; 0 for the limit of small phases.
     wavenumber: f64,
-    least_share_sigmas: f64,
     /// Largest chi-squared of two surfaces, by degrees of freedom.
     thresholds: [f64; 2 * MAXIMUM_FREQUENCIES],
 }
@@ -198,13 +188,12 @@ fn split(
 ) -> Result<MixedPixels> {
     let complex = image.map(|image| system(frame, image, &options.systematics)).transpose()?;
     let modulation = options.modulation_hz.map(Modulation::new).transpose()?;
-    let SplitOptions { unknown_sigma_m, least_jump_m, least_share_sigmas, false_alarm, .. } = *options;
+    let SplitOptions { unknown_sigma_m, false_alarm, .. } = *options;
     let splitter = Splitter {
         frame,
-        finder: SurfaceFinder { frame, mixed, unknown_sigma_m, floor_m: options.systematics.floor_m, least_jump_m },
+        finder: SurfaceFinder { frame, mixed, unknown_sigma_m, floor_m: options.systematics.floor_m },
         complex,
         wavenumber: modulation.map_or(0.0, |modulation| modulation.phase_from_range(1.0)),
-        least_share_sigmas,
         thresholds: std::array::from_fn(|freedom| chi_squared_limit(freedom as f64, false_alarm)),
     };
     let width = frame.width().max(1);
@@ -274,7 +263,7 @@ impl Splitter<'_> {
             split_range(at(&self.frame.range), sigma, at(&self.frame.amplitude), self.wavenumber, sides)?
         };
         let weakest = shared.foreground.share.min(shared.background.share);
-        if weakest < self.least_share_sigmas * shared.sigma_share {
+        if weakest < LEAST_SHARE_SIGMAS * shared.sigma_share {
             return Err(NotSplit::OneSurface);
         }
         Ok(SplitPixel { col, row, ..shared })

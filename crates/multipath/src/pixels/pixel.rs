@@ -136,6 +136,15 @@ impl System {
         Ok(())
     }
 
+    /// Fails where a channel has values and sigma in none of its pixels.
+    pub fn require_sigma(frame: &ComplexFrame) -> Result<()> {
+        let known = |plane: &range_image::Raster<f32>| plane.as_slice().iter().any(|value| value.is_finite());
+        match frame.channels.iter().position(|channel| !known(&channel.sigma) && known(&channel.real)) {
+            Some(channel) => Err(Error::SigmaUnknown { channel }),
+            None => Ok(()),
+        }
+    }
+
     /// The frequencies of a pixel at which value and sigma are known and the amplitude is at least `least_snr` sigma.
     pub fn load(&self, frame: &ComplexFrame, index: usize, least_snr: f64) -> Pixel {
         let mut pixel = Pixel::default();

@@ -45,7 +45,8 @@ pub struct ResponseEstimate {
     pub pixels: usize,
 }
 
-/// Fewest pixels of which a median ratio is taken.
+/// Fewest pixels of which a median ratio is taken. A choice: the median is known to a quarter of the spread of one
+/// ratio.
 const LEAST_PIXELS: usize = 25;
 
 /// Estimates the response as the median over the frame of each pixel's amplitude relative to that at the first frequency.

@@ -33,9 +33,10 @@ impl Default for SearchSpan {
 
 /// Most pairs of ranges a pixel may have.
 const MOST_PAIRS: usize = 1_000_000;
-/// Grid points a cycle of the highest frequency: the squares have two maxima in a cycle.
+/// Grid points a cycle of the highest frequency: the squares have two maxima in a cycle. Eight for each; time goes with
+/// their square.
 const POINTS_PER_CYCLE: f64 = 16.0;
-/// Best starts that are followed.
+/// Best starts that are followed. A choice; more cost time, fewer miss the minimum where two frequencies leave many.
 const MOST_STARTS: usize = 8;
 
 /// Tables of the grid.

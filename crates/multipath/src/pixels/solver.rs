@@ -11,6 +11,13 @@ use crate::pixels::search::{Grid, Scratch};
 use crate::pixels::single::{SingleFit, refine_single};
 use crate::pixels::two_path::{Hypothesis, PixelPaths, Verdict};
 
+/// Solutions whose chi-squared lies less than this above the best one are as likely: `exp(9 / 2)` is odds of 90 to 1. A smaller
+/// one gives more pixels a number, and more of them the wrong one.
+const AMBIGUITY_MARGIN: f64 = 9.0;
+/// Paths count as resolved if their difference in range, and both amplitudes, are at least this many of their own standard
+/// deviations: closer to zero the squares about the minimum are no parabola, and the stated deviations would lie.
+const RESOLUTION_SIGMAS: f64 = 4.0;
+
 /// What does not depend on the pixel.
 #[derive(Debug, Clone)]
 pub(crate) struct PixelSolver {
@@ -76,7 +83,7 @@ impl PixelSolver {
     }
 
     fn is_as_likely(&self, chi_squared: f64, best: f64) -> bool {
-        chi_squared <= best + self.options.ambiguity_margin
+        chi_squared <= best + AMBIGUITY_MARGIN
     }
 
     /// All minima of one path within the span, best first.
@@ -148,7 +155,7 @@ impl PixelSolver {
         let [a, b, direct, indirect] = best.parameters;
         let apart = (indirect - direct) / best.difference_variance(2, 3).sqrt();
         let weakest = apart.min(a / best.sigma(0)).min(b / best.sigma(1));
-        let resolved = weakest >= self.options.resolution_sigmas && best.sigma(2) <= self.options.largest_sigma_m;
+        let resolved = weakest >= RESOLUTION_SIGMAS && best.sigma(2) <= self.options.largest_sigma_m;
         if resolved && is_sigma_reliable(pixel, best) { Verdict::Two } else { Verdict::Unresolved }
     }
 }

@@ -9,44 +9,40 @@ use crate::pixels::search::Grid;
 use crate::pixels::solver::{PixelSolver, Worker};
 use crate::{FrequencyResponse, Result, SearchSpan, Systematics};
 
+/// A frequency whose amplitude is smaller, in standard deviations of the complex value, does not take part. Its two parts are
+/// normal at any amplitude; below this it tells hardly more than that it is dark. A larger one leaves dark pixels with fewer
+/// frequencies than two paths need.
+const LEAST_SNR: f64 = 3.0;
+
 /// How the paths of a pixel are looked for and judged.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields, default))]
 pub struct TwoPathOptions {
-    /// Where the paths are looked for.
+    /// Where the paths are looked for. Default: that of [`SearchSpan`].
     pub span: SearchSpan,
-    /// Probability that the right model is refused, for one path and for two.
+    /// Probability that the right model is refused, for one path and for two. Default: 1e-3.
     pub false_alarm: f64,
-    /// Solutions whose chi-squared lies less than this above the best one are as likely; 9 is odds of 90 to 1.
-    pub ambiguity_margin: f64,
-    /// Paths count as resolved if their difference in range, and both amplitudes, are at least this many of their own
-    /// standard deviations.
-    pub resolution_sigmas: f64,
-    /// Direct ranges with a larger standard deviation are not resolved either, metre.
+    /// Direct ranges with a larger standard deviation are not resolved either, metre. Default: 0.1 m.
     pub largest_sigma_m: f64,
     /// Standard deviation that the model of two paths adds to the direct range, as a share of `ratio` times detour. A
     /// diffuse wall is no single second path but one of every length, the shortest of which pass for direct light: in a
-    /// simulated corner a quarter makes sigma cover the errors. Zero for mirrors, glass and other second paths that are one.
+    /// simulated corner a quarter makes sigma cover the errors. Zero for mirrors, glass and other second paths that are
+    /// one. Default: 0.25.
     pub diffuse_share: f64,
-    /// What calibration leaves over.
+    /// What calibration leaves over. Default: that of [`Systematics`].
     pub systematics: Systematics,
-    /// A frequency whose amplitude is smaller, in standard deviations of the complex value, does not take part.
-    pub least_snr: f64,
 }
 
 impl Default for TwoPathOptions {
-    /// A room; refusals of one in a thousand; odds of 90 to 1; four standard deviations; at most 10 cm.
+    /// A room; refusals of one in a thousand; at most 10 cm.
     fn default() -> Self {
         Self {
             span: SearchSpan::default(),
             false_alarm: 1e-3,
-            ambiguity_margin: 9.0,
-            resolution_sigmas: 4.0,
             largest_sigma_m: 0.1,
             diffuse_share: 0.25,
             systematics: Systematics::default(),
-            least_snr: 3.0,
         }
     }
 }
@@ -54,9 +50,6 @@ impl Default for TwoPathOptions {
 impl TwoPathOptions {
     fn validate(&self) -> Result<()> {
         require_probability("false_alarm", self.false_alarm)?;
-        require_not_negative("ambiguity_margin", self.ambiguity_margin)?;
-        require_not_negative("resolution_sigmas", self.resolution_sigmas)?;
-        require_not_negative("least_snr", self.least_snr)?;
         require_not_negative("diffuse_share", self.diffuse_share)?;
         require_positive("largest_sigma_m", self.largest_sigma_m)
     }
@@ -68,7 +61,7 @@ impl TwoPathOptions {
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 #[non_exhaustive]
 pub enum Verdict {
-    /// Fewer than two usable frequencies, or the pixel is saturated or moved.
+    /// Fewer than two frequencies with a value, a sigma and enough amplitude, or the pixel is saturated or moved.
     #[default]
     NoData,
     /// One path explains all frequencies; the range is that of all of them together.
@@ -190,7 +183,6 @@ impl TwoPathImage {
 pub struct TwoPathSolver {
     system: System,
     solver: PixelSolver,
-    least_snr: f64,
 }
 
 impl TwoPathSolver {
@@ -199,12 +191,13 @@ impl TwoPathSolver {
         options.validate()?;
         let system = System::new(modulations, response, &options.systematics, 2)?;
         let grid = Grid::new(&options.span, system.wavenumbers())?;
-        Ok(Self { system, solver: PixelSolver::new(grid, options), least_snr: options.least_snr })
+        Ok(Self { system, solver: PixelSolver::new(grid, options) })
     }
 
     /// Solves a frame; see [`solve_two_paths`]. A plane of the right size is used again.
     pub fn solve_into(&self, frame: &ComplexFrame, out: &mut TwoPathImage) -> Result<()> {
         self.system.require_frame(frame)?;
+        System::require_sigma(frame)?;
         if frame.flags.require_same_size(&out.paths, "").is_err() {
             out.paths = Raster::filled(frame.width(), frame.height(), PixelPaths::default());
         }
@@ -231,7 +224,7 @@ impl TwoPathSolver {
         if frame.flags.as_slice()[index].intersects(USELESS) {
             return PixelPaths::without_numbers(Verdict::NoData);
         }
-        self.solver.solve(&self.system.load(frame, index, self.least_snr), worker)
+        self.solver.solve(&self.system.load(frame, index, LEAST_SNR), worker)
     }
 }
 
@@ -249,6 +242,34 @@ impl TwoPathSolver {
 /// allows, the verdict is `Inconsistent`.
 ///
 /// Phases must be free of each frequency's own range errors. Flags stay as they are.
+///
+/// Fails with [`Error::SigmaUnknown`](crate::Error::SigmaUnknown) where nothing is known of the noise of a channel; with
+/// another error where there are not two to [`MAXIMUM_FREQUENCIES`](crate::MAXIMUM_FREQUENCIES) different frequencies, or
+/// response or options do not fit.
+///
+/// ```
+/// use multipath::range_image::{ComplexFrame, Modulation, PhaseConvention, Raster};
+/// use multipath::{FrequencyResponse, TwoPathOptions, Verdict, solve_two_paths};
+///
+/// // One pixel that sees a wall at 2 m; sigma is one in two hundred of the amplitude.
+/// let modulations = [20e6, 50e6, 80e6].map(|hz| Modulation::new(hz).unwrap());
+/// let phases = modulations.map(|modulation| Raster::filled(1, 1, modulation.phase_from_range(2.0) as f32));
+/// let frame = ComplexFrame::from_phase(
+///     modulations.to_vec(),
+///     phases.to_vec(),
+///     vec![Raster::filled(1, 1, 400.0); 3],
+///     &PhaseConvention::default(),
+/// )?;
+/// let response = FrequencyResponse::flat(3);
+/// let answer = solve_two_paths(&frame, &response, &TwoPathOptions::default());
+/// assert!(answer.is_err(), "sigma is not known yet");
+///
+/// let frame = frame.with_sigma(vec![Raster::filled(1, 1, 2.0); 3])?;
+/// let image = solve_two_paths(&frame, &response, &TwoPathOptions::default())?;
+/// assert_eq!(image.paths[(0, 0)].verdict, Verdict::Single);
+/// assert!((image.direct_m()[(0, 0)] - 2.0).abs() < 1e-3);
+/// # Ok::<(), multipath::Error>(())
+/// ```
 pub fn solve_two_paths(
     frame: &ComplexFrame,
     response: &FrequencyResponse,

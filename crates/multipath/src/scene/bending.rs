@@ -16,7 +16,8 @@ use crate::scene::patches::{Facet, Patches, Surfaces};
 
 /// Least number of patches of a wall: fewer follow any bend.
 const LEAST_PATCHES: usize = 4;
-/// Least number of witnesses, as many as are worth equal ones, that tell a common bend from chance.
+/// Least number of witnesses, as many as are worth equal ones, that tell a common bend from chance. A choice: the bend
+/// of so many is known to half of itself where each is known to itself.
 const LEAST_WITNESSES: f64 = 5.0;
 /// Two patches are of one wall where their normals agree to 18 degrees (cosine) and each lies in the other's plane to this
 /// many metres: light that bounced bends by some centimetres a metre, a step of furniture is larger.

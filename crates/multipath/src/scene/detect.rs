@@ -4,10 +4,15 @@ use range_image::{ComplexChannel, ComplexFrame, Flags, Modulation, Raster};
 use rayon::prelude::*;
 use statistics::chi_squared_limit;
 
-use crate::error::{require_not_negative, require_probability};
+use crate::error::require_probability;
 use crate::pixels::pixel::{MAXIMUM_FREQUENCIES, System, USELESS};
 use crate::scene::contradiction::{BLOCK, Contradiction, Frequency, Samples};
 use crate::{FrequencyResponse, Result, Systematics};
+
+/// A frequency whose amplitude is smaller, in standard deviations of the complex value, does not take part: the errors of
+/// phase and amplitude are normal only well above the noise. At ten the amplitude is biased by half a per cent, half of the
+/// floor of the contrast; a smaller one raises the false alarms of dark pixels.
+const LEAST_SNR: f32 = 10.0;
 
 /// What of the frequencies is compared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -26,21 +31,18 @@ pub enum Evidence {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields, default))]
 pub struct DetectionOptions {
-    /// Probability that a pixel with one path is flagged.
+    /// Probability that a pixel with one path is flagged. Default: 1e-3.
     pub false_alarm: f64,
-    /// What is compared.
+    /// What is compared. Default: [`Evidence::RangesAndAmplitudes`].
     pub evidence: Evidence,
-    /// What calibration leaves over.
+    /// What calibration leaves over. Default: that of [`Systematics`].
     pub systematics: Systematics,
-    /// A frequency whose amplitude is smaller, in standard deviations of the complex value, does not take part: the
-    /// errors of phase and amplitude are normal only well above the noise.
-    pub least_snr: f64,
 }
 
 impl Default for DetectionOptions {
-    /// One false alarm in a thousand, ranges and amplitudes, amplitudes of at least ten standard deviations.
+    /// One false alarm in a thousand, ranges and amplitudes.
     fn default() -> Self {
-        Self { false_alarm: 1e-3, evidence: Evidence::default(), systematics: Systematics::default(), least_snr: 10.0 }
+        Self { false_alarm: 1e-3, evidence: Evidence::default(), systematics: Systematics::default() }
     }
 }
 
@@ -74,14 +76,13 @@ impl Detector {
     /// Needs two to [`MAXIMUM_FREQUENCIES`] different frequencies; see [`detect`].
     pub fn new(modulations: &[Modulation], response: &FrequencyResponse, options: &DetectionOptions) -> Result<Self> {
         require_probability("false_alarm", options.false_alarm)?;
-        require_not_negative("least_snr", options.least_snr)?;
         let system = System::new(modulations, response, &options.systematics, 2)?;
         let frequency = |(modulation, contrast): (&Modulation, &f64)| Frequency {
             interval_m: modulation.ambiguity_interval_m() as f32,
             inverse_contrast: (1.0 / contrast) as f32,
             floor_m: options.systematics.floor_m as f32,
             floor_contrast: options.systematics.floor_contrast as f32,
-            least_snr: options.least_snr as f32,
+            least_snr: LEAST_SNR,
         };
         let frequencies: Vec<Frequency> = modulations.iter().zip(&response.contrast).map(frequency).collect();
         Ok(Self {
@@ -101,6 +102,7 @@ impl Detector {
     /// Tests a frame and sets [`Flags::MULTIPATH`]; see [`detect`]. Planes of the right size are used again.
     pub fn detect_into(&mut self, frame: &mut ComplexFrame, range_m: &Raster<f32>, out: &mut Detection) -> Result<()> {
         self.system.require_frame(frame)?;
+        System::require_sigma(frame)?;
         frame.flags.require_same_size(range_m, "range")?;
         self.prepare(frame, out)?;
         let ComplexFrame { channels, flags } = frame;
@@ -204,6 +206,31 @@ impl Detector {
 ///
 /// What cannot be seen: light whose detour is much smaller than `U` of the highest frequency changes all ranges alike,
 /// and a path of a tenth of a percent drowns in the noise.
+///
+/// # Errors
+/// [`Error::SigmaUnknown`](crate::Error::SigmaUnknown) where a channel has no sigma, [`Error::FrequencyCount`](crate::Error::FrequencyCount)
+/// below two frequencies, and what does not fit: sizes, modulations, response, options.
+///
+/// ```
+/// use multipath::range_image::{ComplexFrame, Flags, Modulation, PhaseConvention, Raster};
+/// use multipath::{DetectionOptions, FrequencyResponse, detect};
+///
+/// // The second frequency sees the wall 5 cm farther than the first: its light came by more than one way.
+/// let modulations = [20e6, 80e6].map(|hz| Modulation::new(hz).unwrap());
+/// let phase = |range_m: f64, modulation: Modulation| Raster::filled(4, 3, modulation.phase_from_range(range_m) as f32);
+/// let frame = ComplexFrame::from_phase(
+///     modulations.to_vec(),
+///     vec![phase(1.5, modulations[0]), phase(1.55, modulations[1])],
+///     vec![Raster::filled(4, 3, 400.0); 2],
+///     &PhaseConvention::default(),
+/// )?;
+/// let mut frame = frame.with_sigma(vec![Raster::filled(4, 3, 1.0); 2])?;
+/// let range_m = Raster::filled(4, 3, 1.52);
+/// let found = detect(&mut frame, &range_m, &FrequencyResponse::flat(2), &DetectionOptions::default())?;
+/// assert_eq!((found.tested, found.flagged), (12, 12));
+/// assert!(frame.flags[(0, 0)].contains(Flags::MULTIPATH));
+/// # Ok::<(), multipath::Error>(())
+/// ```
 pub fn detect(
     frame: &mut ComplexFrame,
     range_m: &Raster<f32>,

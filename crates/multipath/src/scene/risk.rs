@@ -44,21 +44,22 @@ pub enum RiskEvidence {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields, default))]
 pub struct RiskOptions {
-    /// Modulation frequency, hertz; `None` gives the limit of low frequencies, where ranges add by their amplitudes.
+    /// Modulation frequency, hertz; `None`, the default, gives the limit of low frequencies, where ranges add by their
+    /// amplitudes.
     pub modulation_hz: Option<f64>,
-    /// How amplitudes become albedos.
+    /// How amplitudes become albedos. Default: `BrightestTenth(0.7)`.
     pub albedo: AlbedoScale,
-    /// Side of the largest flat patches, pixels: a power of two times `cell_px`.
+    /// Side of the largest flat patches, pixels: a power of two times `cell_px`. Default: 16 pixels.
     pub patch_px: usize,
-    /// Side of the cells that the risk is computed for, and of the smallest patches, pixels.
+    /// Side of the cells that the risk is computed for, and of the smallest patches, pixels. Default: 4 pixels.
     pub cell_px: usize,
-    /// Root mean square distance from a plane, beyond noise, up to which a patch is flat, metre.
+    /// Root mean square distance from a plane, beyond noise, up to which a patch is flat, metre. Default: 0.01 m.
     pub flatness_m: f64,
-    /// The risk is flagged above this many standard deviations of the range and above `floor_m`.
+    /// The risk is flagged above this many standard deviations of the range and above `floor_m`. Default: 1.
     pub sigmas: f64,
-    /// Smallest error that is flagged, metre.
+    /// Smallest error that is flagged, metre. Default: 0.005 m.
     pub floor_m: f64,
-    /// What it takes to flag anything.
+    /// What it takes to flag anything. Default: [`RiskEvidence::Prediction`].
     pub evidence: RiskEvidence,
 }
 

@@ -62,7 +62,8 @@ impl Network<'_> {
         // Contacts are found anew after each step: below a thousandth of a standard deviation there is nothing to gain.
         let options = SolveOptions { step_tolerance: 1e-3, ..SolveOptions::default() };
         let solution = network.solve(&options).map_err(adjustment)?;
-        let poses = stations.iter().map(|block| solution.pose(*block)).collect::<adjust::Result<Vec<_>>>();
+        let poses =
+            stations.iter().map(|block| solution.pose(*block)).collect::<std::result::Result<Vec<_>, adjust::Error>>();
         let parameters = match shared {
             Some(block) => solution.values(block).map_err(adjustment)?.to_vec(),
             None => Vec::new(),

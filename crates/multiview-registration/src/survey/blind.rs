@@ -50,7 +50,7 @@ struct Arrangement {
 /// Poses of all stations, right to a part of a voxel but for what they slid together.
 pub(crate) fn arranged(stations: &[Cloud], start: Start<'_>, held: usize) -> Result<Vec<Isometry3<f64>>> {
     let options = CoarseOptions { max_hypotheses: VERIFIED, ..CoarseOptions::default() };
-    let features: global_registration::Result<Vec<FeatureCloud>> =
+    let features: std::result::Result<Vec<FeatureCloud>, global_registration::Error> =
         stations.par_iter().map(|cloud| FeatureCloud::new(cloud, &options)).collect();
     let clouds = with_one_voxel(features?, &options)?;
     let pairs = pairs(start, clouds.len());

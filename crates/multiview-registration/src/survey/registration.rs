@@ -25,9 +25,10 @@ pub enum Start<'a> {
 /// Options of [`crate::register_stations`]. The defaults carry no scale: lengths left at `None` come from the clouds.
 #[derive(Clone)]
 pub struct StationRegistrationOptions<'a> {
-    /// How far approximate poses may be off, metre, rotations at the radius of a cloud. `None`: a fifth of that radius.
+    /// How far approximate poses may be off, metre, rotations at the radius of a cloud. `None`, the default: a fifth of
+    /// that radius.
     pub start_error_m: Option<f64>,
-    /// Size of the patches that the surfaces are divided into, metre. `None`: about 25 points a patch.
+    /// Size of the patches that the surfaces are divided into, metre. `None`, the default: about 25 points a patch.
     pub patch_m: Option<f64>,
     /// Smallest part of a station that must overlap another for the two to be aligned as a pair. Default 0.3.
     /// The simultaneous adjustment takes whatever overlaps.

@@ -9,18 +9,19 @@ use crate::filter::congruent::congruent_into;
 use crate::filter::noise::{LARGEST_SIGMA_RAD, PhaseNoise};
 use crate::filter::prefilter::{FilterVerdict, Filtered, Prefilter, PrefilterOptions};
 use crate::image::bends::bends;
+use crate::tree::cycle::{count_from_given, into_cycle};
 use crate::{Error, KnownWraps, Result, SpatialOptions, Unwrapped, Unwrapper};
 
 /// How noisy phases are unwrapped.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct NoisyOptions {
-    /// The filter.
+    /// The filter. Default: that of [`PrefilterOptions`].
     pub prefilter: PrefilterOptions,
-    /// The spanning tree, which is always grown: it tells islands and confidence.
+    /// The spanning tree, which is always grown: it tells islands and confidence. Default: that of [`SpatialOptions`].
     pub spatial: SpatialOptions,
-    /// The cheapest cuts, where they are asked for.
+    /// The cheapest cuts, where they are asked for. Default: that of [`ExactOptions`].
     pub cuts: ExactOptions,
-    /// What the counts come from.
+    /// What the counts come from. Default: [`NoisyMethod::Filter`].
     pub method: NoisyMethod,
 }
 
@@ -96,7 +97,8 @@ impl NoisyUnwrapper {
         Ok(Self { options, filter, no_filter, tree, cuts, ..Self::default() })
     }
 
-    /// Wrap counts of `phase`, in radians in `[0, 2 pi]`; what is not finite is masked. In `mask`, true means use.
+    /// Wrap counts of `phase`, in radians of any cycle as in [`Unwrapper::unwrap`]; what is not finite is masked. In `mask`,
+    /// true means use.
     ///
     /// The phase is filtered as [`Prefilter::filter_into`] does, unwrapped by the method of the options, and its counts are
     /// carried back to the measured phase as [`congruent`](crate::congruent) does. After an error `out` holds nothing
@@ -108,6 +110,9 @@ impl NoisyUnwrapper {
         mask: Option<&Raster<bool>>,
         out: &mut NoisyUnwrapped,
     ) -> Result<()> {
+        let given = phase;
+        let phase = into_cycle(given);
+        let phase = phase.as_ref();
         match self.options.method {
             NoisyMethod::Tree => self.grow(NoisyMethod::Tree, phase, noise, mask, out)?,
             NoisyMethod::Filter => self.grow(NoisyMethod::Filter, phase, noise, mask, out)?,
@@ -128,6 +133,8 @@ impl NoisyUnwrapper {
             (island.pixels, island.sure_pixels) = (0, 0);
         }
         unwrapped.count_pixels(self.options.spatial.minimum_confidence);
+        let island = unwrapped.island.as_slice();
+        count_from_given(given, |index| island[index] > 0, &mut unwrapped.wraps);
         Ok(())
     }
 

@@ -6,6 +6,7 @@ use range_image::Raster;
 
 use crate::entry::noisy::{NoisyMethod, NoisyOptions, NoisyUnwrapped, unwrap_noisy};
 use crate::filter::prefilter::{FEW, Filtered};
+use crate::tree::cycle::{count_from_given, into_cycle};
 use crate::{ImageGeometry, PhaseNoise, Result, SpatialOptions, Unwrapped, unwrap_spatial};
 
 /// Side of the blocks whose brightness decides, in pixels: a quarter of the noise. Blocks of two pixels leave half of it,
@@ -14,7 +15,7 @@ const SIDE: usize = 4;
 
 /// Absolute wrap counts of one noisy image: [`unwrap_noisy`] with amplitudes.
 ///
-/// `phase` is in radians in `[0, 2 pi]`, what is not finite is masked; `amplitude`, in any unit, is the one received; in
+/// `phase` is in radians of any cycle as in [`Unwrapper::unwrap`](crate::Unwrapper::unwrap), what is not finite is masked; `amplitude`, in any unit, is the one received; in
 /// `mask`, true means use. All rasters have one size.
 ///
 /// The relative counts of [`unwrap_noisy`] make means over blocks of 4 by 4 pixels possible, whose phases and amplitudes
@@ -51,18 +52,23 @@ pub fn unwrap_noisy_absolute(
     options: &NoisyOptions,
 ) -> Result<NoisyUnwrapped> {
     phase.require_same_size(amplitude, "amplitude")?;
+    let given = phase;
+    let phase = into_cycle(given);
+    let phase = phase.as_ref();
     let mut found = unwrap_noisy(phase, noise, mask, options)?;
     let noisy = found.filtered.radius.as_slice().iter().filter(|radius| **radius > 0).count();
     let quiet = (noisy as f32) < FEW * found.filtered.radius.len() as f32;
     if options.method == NoisyMethod::Tree || (options.method == NoisyMethod::Auto && quiet) {
         found.unwrapped = unwrap_spatial(phase, Some(amplitude), mask, &options.spatial)?;
         found.method = NoisyMethod::Tree;
-        return Ok(found);
+    } else {
+        let blocks = Blocks::new(phase, amplitude, &found.filtered, &found.unwrapped);
+        let wrapped = blocks.unwrapped.map(|value| value.rem_euclid(TAU).clamp(0.0, TAU));
+        let absolute = unwrap_spatial(&wrapped, Some(&blocks.amplitude), None, &of_blocks(&options.spatial))?;
+        found.unwrapped.take_offsets(&blocks, &wrapped, &absolute, &options.spatial);
     }
-    let blocks = Blocks::new(phase, amplitude, &found.filtered, &found.unwrapped);
-    let wrapped = blocks.unwrapped.map(|value| value.rem_euclid(TAU).clamp(0.0, TAU));
-    let absolute = unwrap_spatial(&wrapped, Some(&blocks.amplitude), None, &of_blocks(&options.spatial))?;
-    found.unwrapped.take_offsets(&blocks, &wrapped, &absolute, &options.spatial);
+    let Unwrapped { island, wraps, .. } = &mut found.unwrapped;
+    count_from_given(given, |index| island.as_slice()[index] > 0, wraps);
     Ok(found)
 }
 

@@ -9,12 +9,14 @@ use crate::image::continuity::relative_counts;
 use crate::{Error, Result, SpatialOptions, Unwrapped, unwrap_spatial};
 
 /// Brightness of the first interval, its median times this, beyond which nothing is pushed away: albedos differ by ten.
+/// A smaller factor leaves bright boards folded, a larger one pushes reflectors away.
 const GLARE: f32 = 10.0;
 /// Fewer pixels than this in the first interval tell nothing about it.
 const GLARE_PIXELS: usize = 64;
 
-/// Share of the largest confidence in its segment that a pixel needs to get an interval added: below, it bends as noise and
-/// mixed pixels do, and a range moved by a wrong interval harms more than one that is left and flagged.
+/// Share of the largest confidence in its segment that a pixel needs to get an interval added: below, it bends as noise
+/// and mixed pixels do, and a range moved by a wrong interval harms more than one that is left and flagged. A choice on
+/// which the figures of `tests/repair.rs` rest.
 const ADDING_SHARE: f32 = 0.95;
 
 /// How wrapped ranges are repaired.
@@ -22,9 +24,9 @@ const ADDING_SHARE: f32 = 0.95;
 pub struct RepairOptions {
     /// How counts are found. By default at most one wrap is searched, and a confidence of 0.8 makes a count sure.
     pub spatial: SpatialOptions,
-    /// Where the camera's ranges begin.
+    /// Where the camera's ranges begin. Default: [`Fold::Detect`].
     pub fold: Fold,
-    /// What the camera has done to the amplitudes.
+    /// What the camera has done to the amplitudes. Default: [`AmplitudeKind::Received`].
     pub amplitude_kind: AmplitudeKind,
 }
 
@@ -120,6 +122,23 @@ pub struct RepairedDepths {
 /// is the ambiguity interval U. In `mask`, true means use. With amplitudes the counts are those of
 /// [`unwrap_spatial`](crate::unwrap_spatial) on `phase = 2 pi (range - fold) / U`. An amplitude of another kind than
 /// stated, or pixels far outside the interval, make counts unsure or wrong: see [`AmplitudeKind`].
+///
+/// # Errors
+/// [`Error::OutOfDomain`] for an option or interval, [`Error::AllMasked`], [`Error::Raster`] where sizes differ.
+///
+/// ```
+/// use phase_unwrap::range_image::Raster;
+/// use phase_unwrap::{RepairOptions, repair_ranges};
+///
+/// // A floor from 2 m to 8 m, seen by a camera that counts to 5 m only; brightness falls with the square of the range.
+/// let truth = Raster::from_fn(60, 80, |_col, row| 2.0 + 0.076 * row as f32);
+/// let amplitude = truth.map(|range| 900.0 / (range * range));
+/// let shown = truth.map(|range| range % 5.0);
+/// let found = repair_ranges(&shown, Some(&amplitude), None, 5.0, &RepairOptions::default())?;
+/// assert_eq!(found.wraps[(30, 75)], 1);
+/// assert!((found.range[(30, 75)] - truth[(30, 75)]).abs() < 1e-5);
+/// # Ok::<(), phase_unwrap::Error>(())
+/// ```
 pub fn repair_ranges(
     range_m: &Raster<f32>,
     amplitude: Option<&Raster<f32>>,

@@ -1,7 +1,5 @@
 //! Unwrapping of one frequency.
 
-use std::f32::consts::TAU;
-
 use range_image::Raster;
 
 use crate::absolute::brightness::{Brightness, Incidence};
@@ -12,6 +10,7 @@ use crate::image::borders::Borders;
 use crate::image::known::{Known, check_span, resolve_known};
 use crate::image::segments::Segments;
 use crate::image::surface::Surface;
+use crate::tree::cycle::{count_from_given, into_cycle};
 use crate::tree::forest::{Forest, NO_LABEL};
 use crate::tree::grid::Grid;
 use crate::tree::reliability::{Smoothness, noise_cost, reliability};
@@ -20,6 +19,27 @@ use crate::tree::unwrapped::labels_from_one;
 use crate::{Boundary, EdgeWeight, Error, Island, KnownWraps, Result, SpatialOptions, Unwrapped};
 
 /// Unwraps one image; see [`Unwrapper::unwrap`]. Allocates its buffers anew.
+///
+/// `phase`, `amplitude` and `mask` have one size; phases are radians, amplitudes of any unit, `true` in the mask means use.
+///
+/// # Errors
+/// [`Error::Empty`], [`Error::AllMasked`], [`Error::OutOfDomain`] for an option, [`Error::NoiseUnknown`],
+/// [`Error::Raster`] where sizes differ.
+///
+/// ```
+/// use std::f32::consts::{PI, TAU};
+///
+/// use phase_unwrap::range_image::Raster;
+/// use phase_unwrap::{SpatialOptions, unwrap_spatial};
+///
+/// // A ramp over two cycles, as phases in (-pi, pi].
+/// let ramp = Raster::from_fn(40, 60, |_col, row| 0.2 * row as f32);
+/// let phase = ramp.map(|value| (value + PI).rem_euclid(TAU) - PI);
+/// let found = unwrap_spatial(&phase, None, None, &SpatialOptions::default())?;
+/// let unwrapped = |row: usize| phase[(0, row)] + TAU * found.wraps[(0, row)] as f32;
+/// assert!((unwrapped(59) - unwrapped(0) - 0.2 * 59.0).abs() < 1e-4);
+/// # Ok::<(), phase_unwrap::Error>(())
+/// ```
 pub fn unwrap_spatial(
     phase: &Raster<f32>,
     amplitude: Option<&Raster<f32>>,
@@ -32,7 +52,8 @@ pub fn unwrap_spatial(
 /// One image and what comes with it; all rasters of one size.
 #[derive(Debug, Clone, Copy)]
 pub struct PhaseInput<'a> {
-    /// Wrapped phase, radians in `[0, 2 pi]`; what is not finite is masked.
+    /// Wrapped phase, radians; what is not finite is masked. What lies outside `[0, 2 pi]` is taken there, see
+    /// [`Unwrapper::unwrap`].
     pub phase: &'a Raster<f32>,
     /// Amplitude in any unit. With it counts are absolute.
     pub amplitude: Option<&'a Raster<f32>>,
@@ -79,8 +100,11 @@ impl Unwrapper {
 
     /// Wrap counts of one image.
     ///
-    /// `phase` is in radians in `[0, 2 pi]`; what is not finite is masked. `amplitude` is in any unit. In `mask`, true
-    /// means use.
+    /// `phase` is in radians; what is not finite is masked. `amplitude` is in any unit. In `mask`, true means use.
+    ///
+    /// Phases of another cycle, such as those in `(-pi, pi]`, are taken into `[0, 2 pi]` first. What is said of counts
+    /// (the lowest 0, at most `maximum_wraps`) holds there; the counts in the result, and those that are known, belong to
+    /// the phases as given: the unwrapped phase is `phase + 2 pi wraps`.
     ///
     /// With amplitudes the image is cut at possible jumps, and each segment's absolute count is found from the inverse
     /// square law, continuity and what is `known`. Without, every island gets one minimum spanning tree
@@ -113,7 +137,7 @@ impl Unwrapper {
     pub fn unwrap_input_into(&mut self, input: &PhaseInput<'_>, out: &mut Unwrapped) -> Result<()> {
         let phase = input.phase;
         let grid = Grid::new(phase.width(), phase.height())?;
-        self.load_phase(&grid, phase, input.mask)?;
+        self.load_phase(&grid, &into_cycle(phase), input.mask)?;
         wrap_rim(&grid, self.options.boundaries, &mut self.surface.phase);
         let absolute = self.load_noise(&grid, input)?;
         let span = absolute.then_some(self.options.maximum_wraps);
@@ -125,7 +149,14 @@ impl Unwrapper {
         }
         self.measure_cost(&grid, with_noise);
         cyclic_seams(&grid, [1, grid.height, grid.height], self.options.boundaries, &mut self.seams);
-        if absolute { self.unwrap_absolute(&grid, &known, out) } else { self.unwrap_relative(&grid, &known, out) }
+        if absolute {
+            self.unwrap_absolute(&grid, &known, out)?;
+        } else {
+            self.unwrap_relative(&grid, &known, out)?;
+        }
+        let island = out.island.as_slice();
+        count_from_given(phase, |index| island[index] > 0, &mut out.wraps);
+        Ok(())
     }
 
     /// One tree over the frames of a block, relative counts.
@@ -147,24 +178,12 @@ impl Unwrapper {
         planes + self.seams.capacity() * size_of::<Seam>() + self.forest.bytes()
     }
 
-    /// Phases are in `[0, 2 pi]` or not finite.
-    pub(crate) fn check_phase(phase: &Raster<f32>) -> Result<()> {
-        let outside = |value: &&f32| value.is_finite() && !(0.0..=TAU).contains(*value);
-        match phase.as_slice().iter().enumerate().find(|(_, value)| outside(value)) {
-            None => Ok(()),
-            Some((index, &value)) => {
-                let (col, row) = (index % phase.width(), index / phase.width());
-                Err(Error::PhaseOutsideCycle { col, row, value })
-            }
-        }
-    }
-
     fn load_phase(&mut self, grid: &Grid, phase: &Raster<f32>, mask: Option<&Raster<bool>>) -> Result<()> {
         if let Some(mask) = mask {
             phase.require_same_size(mask, "mask")?;
         }
         grid.pad(phase, f32::NAN, &mut self.surface.phase);
-        let (mut used, mut outside) = (0_usize, 0_usize);
+        let mut used = 0_usize;
         for (row, start) in grid.row_starts().enumerate() {
             let values = &mut self.surface.phase[start..start + grid.width];
             if let Some(mask) = mask {
@@ -175,24 +194,9 @@ impl Unwrapper {
             for value in values {
                 *value = if value.is_finite() { *value } else { f32::NAN };
                 used += usize::from(!value.is_nan());
-                outside += usize::from(!((0.0..=TAU).contains(value) || value.is_nan()));
             }
-        }
-        if outside > 0 {
-            return self.first_outside(grid);
         }
         if used == 0 { Err(Error::AllMasked { pixels: phase.len() }) } else { Ok(()) }
-    }
-
-    /// The error of the first used phase outside `[0, 2 pi]`.
-    fn first_outside(&self, grid: &Grid) -> Result<()> {
-        for (row, start) in grid.row_starts().enumerate() {
-            let values = &self.surface.phase[start..start + grid.width];
-            if let Some(col) = values.iter().position(|value| !(value.is_nan() || (0.0..=TAU).contains(value))) {
-                return Err(Error::PhaseOutsideCycle { col, row, value: values[col] });
-            }
-        }
-        Ok(())
     }
 
     /// Variance of the phase from the amplitude or the user's sigma; says whether any amplitude is known.
@@ -278,7 +282,7 @@ impl Unwrapper {
     fn unwrap_absolute(&mut self, grid: &Grid, known: &Known, out: &mut Unwrapped) -> Result<()> {
         let options = self.options;
         check_span(grid, known, options.maximum_wraps)?;
-        self.segments.build(grid, &self.surface, &mut self.cost, &mut self.forest, &options);
+        self.segments.build(grid, &self.surface, &mut self.cost, &mut self.forest);
         self.borders.collect(grid, &self.surface, &self.forest, &self.seams);
         let pixels = &self.segments.pixels;
         let labels = usize::from(options.maximum_wraps) + 1;

@@ -2,6 +2,7 @@
 
 use range_image::Raster;
 
+use crate::tree::cycle::{all_into_cycle, count_from_given};
 use crate::tree::grid::{Grid, wrapped};
 use crate::tree::seams::{Seam, cyclic_seams};
 use crate::tree::unwrapped::Island;
@@ -10,8 +11,8 @@ use crate::{Error, KnownWraps, PhaseInput, Result, SpatialOptions, Unwrapped, Un
 /// Unwraps a sequence as one block: the spanning tree runs over the neighbours in the image and the same pixel in the
 /// next frame. Give it recordings; for frames as they come there is [`StreamUnwrapper`].
 ///
-/// `frames` are wrapped phases of one size, radians in `[0, 2 pi]`; what is not finite is masked in its frame, what is
-/// false in `mask` in all of them. A pixel's cost is that of its second differences, the one in time included; a link in
+/// `frames` are wrapped phases of one size, radians, of any cycle as in [`Unwrapper::unwrap`]; what is not finite is
+/// masked in its frame, what is false in `mask` in all of them. A pixel's cost is that of its second differences, the one in time included; a link in
 /// time costs in addition the square of its step, so that motion by more than a quarter of an ambiguity interval is
 /// rather followed through the image. Counts are relative: the lowest of each island over all frames is 0. Islands are
 /// those of the block, with the same labels in all frames; their pixels are counted frame by frame.
@@ -25,16 +26,21 @@ pub fn unwrap_sequence(
     let first = frames.first().ok_or(Error::NoFrames)?;
     for frame in frames {
         first.require_same_size(frame, "phase of a frame")?;
-        Unwrapper::check_phase(frame)?;
     }
     if let Some(mask) = mask {
         first.require_same_size(mask, "mask")?;
     }
     let block = Block::new(frames, first)?;
-    let stack = block.stack(frames, mask);
+    let stack = block.stack(&all_into_cycle(frames), mask);
     let mut out = Unwrapped::default();
     Unwrapper::new(*options)?.unwrap_block(&block, &stack, &mut out)?;
-    (0..frames.len()).map(|frame| block.frame(&out, frame, options.minimum_confidence)).collect()
+    let unwrapped = |(index, phase): (usize, &Raster<f32>)| {
+        let mut frame = block.frame(&out, index, options.minimum_confidence)?;
+        let island = frame.island.as_slice();
+        count_from_given(phase, |pixel| island[pixel] > 0, &mut frame.wraps);
+        Ok(frame)
+    };
+    frames.iter().enumerate().map(unwrapped).collect()
 }
 
 /// Frames one below the other, a masked row between each two.

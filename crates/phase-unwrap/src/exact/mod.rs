@@ -7,6 +7,7 @@ mod regions;
 
 use range_image::Raster;
 
+use crate::tree::cycle::{count_from_given, into_cycle};
 use crate::tree::grid::Grid;
 use crate::{Error, Result};
 use flow::Flow;
@@ -17,10 +18,10 @@ use regions::Regions;
 /// How cuts are priced and how much work is allowed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ExactOptions {
-    /// Price of an edge between neighbours before the weights are applied.
+    /// Price of an edge between neighbours before the weights are applied. Default: [`CutPrice::Smoothness`].
     pub price: CutPrice,
     /// More residues than this are refused, so that the work is bounded: time grows with their number and with the
-    /// distances between them.
+    /// distances between them. Default: 100 000.
     pub maximum_residues: usize,
 }
 
@@ -88,7 +89,8 @@ impl LeastCuts {
         Self { options, ..Self::default() }
     }
 
-    /// Wrap counts of `phase`, in radians in `[0, 2 pi]`; what is not finite is masked. In `mask`, true means use.
+    /// Wrap counts of `phase`, in radians of any cycle as in [`Unwrapper::unwrap`](crate::Unwrapper::unwrap); what is not
+    /// finite is masked. In `mask`, true means use.
     ///
     /// Between neighbours the smaller step is assumed. Where such steps do not close around a loop (a residue), cycles
     /// are added to some of them so that all loops close, at the smallest sum of prices. Prices are whole numbers from 1
@@ -124,6 +126,8 @@ impl LeastCuts {
         }
         (out.residues, out.cost, out.lower_bound) = (residues, cost, cost);
         self.integration.run(&grid, &self.phase, &self.network, out);
+        let island = out.island.as_slice();
+        count_from_given(phase, |index| island[index] > 0, &mut out.wraps);
         Ok(())
     }
 
@@ -146,15 +150,13 @@ fn load_phase(grid: &Grid, phase: &Raster<f32>, mask: Option<&Raster<bool>>, pad
     if let Some(mask) = mask {
         phase.require_same_size(mask, "mask")?;
     }
-    grid.pad(phase, f32::NAN, padded);
+    grid.pad(&into_cycle(phase), f32::NAN, padded);
     let mut used = 0_usize;
     for (row, start) in grid.row_starts().enumerate() {
         let masked = mask.map(|mask| &mask.as_slice()[row * grid.width..][..grid.width]);
         for (col, value) in padded[start..start + grid.width].iter_mut().enumerate() {
             if !value.is_finite() || masked.is_some_and(|mask| !mask[col]) {
                 *value = f32::NAN;
-            } else if !(0.0..=std::f32::consts::TAU).contains(value) {
-                return Err(Error::PhaseOutsideCycle { col, row, value: *value });
             } else {
                 used += 1;
             }

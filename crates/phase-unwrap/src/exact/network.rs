@@ -10,11 +10,13 @@ use range_image::Raster;
 use super::CutPrice;
 use crate::tree::grid::{Grid, wrap_step, wrapped};
 
-/// Largest price of an edge; the smallest is 1, and 0 marks a step that a masked pixel takes away.
+/// Largest price of an edge; the smallest is 1, and 0 marks a step that a masked pixel takes away. Finer prices change
+/// few cuts and lengthen the circle of buckets.
 pub(super) const LARGEST_PRICE: u8 = 100;
 /// Mark of a step whose price was never asked for.
 pub(super) const UNPRICED: u8 = u8::MAX;
-/// Share of the weights that lie below the one that gets the full price.
+/// Share of the weights that lie below the one that gets the full price. Single outstanding weights would otherwise
+/// make all other steps cheap alike.
 const WEIGHT_QUANTILE: f32 = 0.95;
 
 /// Steps to the right neighbour and to the neighbour below, for each padded pixel.

@@ -10,7 +10,7 @@ use crate::Result;
 /// `wraps = round((filtered + 2 pi filtered_wraps - phase) / 2 pi)`.
 ///
 /// `phase + 2 pi wraps` lies within pi of the unwrapped filtered surface and keeps every detail of the measurement. All
-/// three rasters have the same size, phases are radians in `[0, 2 pi]`; pixels without a finite phase get 0. A
+/// three rasters have the same size, phases are radians of any cycle; pixels without a finite phase get 0. A
 /// difference of exactly half a cycle is rounded away from zero.
 pub fn congruent(phase: &Raster<f32>, filtered: &Raster<f32>, filtered_wraps: &Raster<i32>) -> Result<Raster<i32>> {
     let mut wraps = filtered_wraps.clone();

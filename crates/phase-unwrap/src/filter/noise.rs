@@ -22,9 +22,11 @@ pub enum PhaseNoise<'a> {
 pub const LARGEST_SIGMA_RAD: f32 = 2.7;
 /// The smallest deviation that is told from none, in radians; bounds the ratio of the weights.
 const SMALLEST_SIGMA_RAD: f32 = 0.02;
-/// Side of the blocks in which the noise is measured, in pixels.
+/// Side of the blocks in which the noise is measured, in pixels. Larger ones miss where noise changes, smaller ones
+/// hold fewer than the pairs below.
 const BLOCK: usize = 16;
-/// Pairs of neighbours from which a block is measured.
+/// Pairs of neighbours from which a block is measured. A choice, a tenth of those of a block; a deviation from so many
+/// is known to a tenth.
 const FEWEST_PAIRS: f32 = 48.0;
 /// Squared coherence of neighbours below which the noise is not told from a flat distribution: 1.5 rad.
 const LEAST_COHERENCE: f32 = 0.011;

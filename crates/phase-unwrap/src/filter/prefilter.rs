@@ -1,29 +1,29 @@
 //! Noise-adaptive mean of phasors: windows grow with the noise, and stop where what they cover does not hang together.
 
-use std::f32::consts::TAU;
-
 use range_image::Raster;
 
 use crate::filter::fringes::{TILE, Tile};
 use crate::filter::noise::{PhaseNoise, estimate, weight};
 use crate::filter::window::{Limits, Planes, RowOut, Windows};
 use crate::frequencies::phasor::unit;
+use crate::tree::cycle::into_cycle;
 use crate::{Error, Result};
 
 /// How phases are filtered before they are unwrapped.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PrefilterOptions {
-    /// Pixels of at most this phase noise are left as they are, in radians: the tree needs no help there. On a fringe of
-    /// s radians a pixel this and the next shrink by `1 - s / pi`, the share of half a cycle that is left for the noise.
+    /// Pixels of at most this phase noise are left as they are, in radians: the tree needs no help there. On a fringe
+    /// of s radians a pixel this and the next shrink by `1 - s / pi`, the share of half a cycle that is left for the
+    /// noise. Default: 0.3 rad.
     pub quiet_sigma_rad: f32,
-    /// Windows grow until the mean's standard deviation falls to this, in radians.
+    /// Windows grow until the mean's standard deviation falls to this, in radians. Default: 0.16 rad.
     pub target_sigma_rad: f32,
-    /// Largest half width of a window in pixels: it has `2 r + 1` pixels a side. At most 15.
+    /// Largest half width of a window in pixels: it has `2 r + 1` pixels a side. At most 15. Default: 5 pixels.
     pub largest_radius_px: u8,
     /// Share of the expected length of the mean phasor that must be left after the slope of the surface took its part;
-    /// below it (and beyond the scatter of the length) the window covers a jump and is refused.
+    /// below it (and beyond the scatter of the length) the window covers a jump and is refused. Default: 0.8.
     pub least_coherence: f32,
-    /// Number of standard deviations by which lengths and angles may deviate from what the noise explains.
+    /// Number of standard deviations by which lengths and angles may deviate from what the noise explains. Default: 4.
     pub deviations: f32,
 }
 
@@ -137,7 +137,8 @@ impl Prefilter {
         Ok(Self { options, ..Self::default() })
     }
 
-    /// Filters `phase`, in radians in `[0, 2 pi]`; what is not finite is masked. In `mask`, true means use.
+    /// Filters `phase`, in radians; what is not finite is masked. In `mask`, true means use. Phases outside `[0, 2 pi]` are
+    /// taken there first.
     ///
     /// Each pixel's phase becomes the angle of the weighted mean of the unit phasors in a square window, after the fringe
     /// around was turned back: its slope is measured on tiles of 16 by 16 pixels `[Rife1974]`. The window grows from one pixel until the deviation of the mean reaches the target, and stops where the mean phasor is
@@ -151,6 +152,8 @@ impl Prefilter {
         out: &mut Filtered,
     ) -> Result<()> {
         noise.validate(phase)?;
+        let phase = into_cycle(phase);
+        let phase = phase.as_ref();
         let used = load_phasors(phase, mask, &mut self.planes)?;
         if used == 0 {
             return Err(Error::AllMasked { pixels: phase.len() });
@@ -295,12 +298,6 @@ fn load_phasors(phase: &Raster<f32>, mask: Option<&Raster<bool>>, planes: &mut P
         phase.require_same_size(mask, "mask")?;
     }
     planes.resize(phase.len());
-    let used = |index: usize| mask.is_none_or(|mask| mask.as_slice()[index]);
-    let wrong = |(index, &phase): (usize, &f32)| phase.is_finite() && !(0.0..=TAU).contains(&phase) && used(index);
-    if let Some(index) = phase.as_slice().iter().enumerate().position(wrong) {
-        let value = phase.as_slice()[index];
-        return Err(Error::PhaseOutsideCycle { col: index % width, row: index / width, value });
-    }
     for (information, phase) in planes.information.iter_mut().zip(phase.as_slice()) {
         *information = if phase.is_finite() { 1.0 } else { 0.0 };
     }

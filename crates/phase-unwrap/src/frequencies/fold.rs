@@ -6,9 +6,11 @@ use range_image::Raster;
 
 use crate::{Error, Result};
 
-/// Share of the pixels that may lie outside one interval before the ranges count as unwrapped already.
+/// Share of the pixels that may lie outside one interval before the ranges count as unwrapped already. A choice: a
+/// larger one takes frames unwrapped before for wrapped ones that err.
 const OUTLIER_SHARE: f64 = 1e-3;
-/// Share of the interval by which corrections after the fold may have blurred its ends.
+/// Share of the interval by which corrections after the fold may have blurred its ends. A choice: corrections of ranges
+/// are some centimetres of an interval of metres; pixels beyond are masked.
 const BLUR: f64 = 0.02;
 
 /// Where the camera's ranges begin.

@@ -79,7 +79,7 @@ impl<const F: usize> Block<F> {
 }
 
 impl<'a> Planes<'a> {
-    /// Checks numbers and sizes of the planes, and that all phases lie inside a cycle.
+    /// Checks numbers and sizes of the planes, whose phases lie inside a cycle.
     pub(crate) fn new(
         phases: &'a [Raster<f32>],
         frequencies: usize,
@@ -96,7 +96,6 @@ impl<'a> Planes<'a> {
         };
         for plane in phases {
             first.require_same_size(plane, "phase")?;
-            check_cycle(plane)?;
         }
         if let Some(sigmas) = sigmas {
             count("sigma of the phase", sigmas)?;
@@ -127,21 +126,4 @@ impl<'a> Planes<'a> {
     pub(crate) fn size(&self) -> (usize, usize) {
         self.phases.first().map_or((0, 0), |first| (first.width(), first.height()))
     }
-
-    /// Phases of a frequency, in the caller's order.
-    pub(crate) fn phase(&self, frequency: usize) -> &[f32] {
-        self.phases[frequency].as_slice()
-    }
-}
-
-fn check_cycle(plane: &Raster<f32>) -> Result<()> {
-    let outside = |value: f32| value.is_finite() && !(0.0..=std::f32::consts::TAU).contains(&value);
-    // Blocks without an early end are compared side by side.
-    let blocks = plane.as_slice().chunks(1024);
-    let suspicious = |block: &[f32]| block.iter().fold(false, |any, &value| any | outside(value));
-    let Some(block) = blocks.into_iter().position(suspicious) else { return Ok(()) };
-    let rest = plane.as_slice()[1024 * block..].iter().position(|&value| outside(value));
-    let index = 1024 * block + rest.unwrap_or(0);
-    let (col, row) = (index % plane.width(), index / plane.width());
-    Err(Error::PhaseOutsideCycle { col, row, value: plane.as_slice()[index] })
 }

@@ -6,6 +6,7 @@ use rayon::prelude::*;
 use crate::frequencies::frame::Planes;
 use crate::frequencies::lanes::LANES;
 use crate::frequencies::lattice::Lattice;
+use crate::tree::cycle::all_into_cycle;
 use crate::{Error, MultiFrequencyOptions, Result};
 
 /// Largest number of hypotheses kept of each pixel.
@@ -75,7 +76,8 @@ pub fn hypotheses(
         return Err(Error::OutOfDomain { name: "count", value: count as f64, expected });
     }
     let lattice = Lattice::new(modulations, options)?;
-    let planes = Planes::new(phases, modulations.len(), sigma_phase, mask)?;
+    let phases = all_into_cycle(phases);
+    let planes = Planes::new(&phases, modulations.len(), sigma_phase, mask)?;
     let (width, height) = planes.size();
     let blocks: Vec<_> = (0..(width * height).div_ceil(CHUNK))
         .into_par_iter()

@@ -14,6 +14,16 @@ const MAXIMUM_RADIUS: u8 = 3;
 const KERNEL_SIGMAS: f32 = 3.5;
 /// A kernel wider than this many cycles of the highest frequency would reach the next hypothesis.
 const WIDEST_CYCLES: f32 = 0.45;
+/// Half width of the kernel without noise, cycles of the highest frequency: how far ranges of neighbours on one surface lie
+/// apart, to which their noise is added. A choice on which the figures of `tests/kernel_density.rs` rest; where it is
+/// smaller, neighbours on slanted surfaces no longer support each other, where it is larger, so do both sides of a step.
+const TOLERANCE_CYCLES: f32 = 0.08;
+/// Density that a hypothesis has without any neighbour, as a share of full agreement. A choice as above; the smaller,
+/// the more neighbours decide against the pixel's own misfit.
+const BACKGROUND: f32 = 0.02;
+/// What neighbours that support none of a pixel's hypotheses add to the background. A choice as above; the larger,
+/// the less neighbours decide in a rough scene, and at zero a wire of one pixel is left to the wall behind it.
+const SCATTERED: f32 = 0.2;
 
 /// How neighbours take part in the choice of the wrap counts `[JaremoLawin2016]`.
 ///
@@ -23,41 +33,22 @@ const WIDEST_CYCLES: f32 = 0.45;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct KernelDensityOptions {
     /// Half width of the square neighbourhood in pixels, 1 to 3. One serves thin objects best; two is better on noisy
-    /// walls and takes three times as long.
+    /// walls and takes three times as long. Default: 1.
     pub radius: u8,
-    /// Half width of the kernel without noise, in cycles of the highest frequency: how far ranges of neighbours on one
-    /// surface lie apart. Noise of the ranges is added to it.
-    pub tolerance_cycles: f32,
-    /// Density that a hypothesis has without any neighbour, as a share of full agreement. The smaller, the more the
-    /// neighbours decide.
-    pub background: f32,
-    /// What each neighbour that supports none of the pixel's hypotheses adds to the background: the rougher the scene,
-    /// the less neighbours decide.
-    pub scattered: f32,
 }
 
 impl Default for KernelDensityOptions {
     fn default() -> Self {
-        Self { radius: 1, tolerance_cycles: 0.08, background: 0.02, scattered: 0.2 }
+        Self { radius: 1 }
     }
 }
 
 impl KernelDensityOptions {
     pub(crate) fn validate(&self) -> Result<()> {
-        let outside = |name, value: f32, expected| Err(Error::OutOfDomain { name, value: value.into(), expected });
-        if !(1..=MAXIMUM_RADIUS).contains(&self.radius) {
-            return outside("radius", self.radius.into(), "1 to 3 pixels");
+        if (1..=MAXIMUM_RADIUS).contains(&self.radius) {
+            return Ok(());
         }
-        if !(self.tolerance_cycles > 0.0 && self.tolerance_cycles <= WIDEST_CYCLES) {
-            return outside("tolerance_cycles", self.tolerance_cycles, "above 0 and at most 0.45");
-        }
-        if !(self.background > 0.0 && self.background <= 1.0) {
-            return outside("background", self.background, "above 0 and at most 1");
-        }
-        if !(0.0..=1.0).contains(&self.scattered) {
-            return outside("scattered", self.scattered, "from 0 to 1");
-        }
-        Ok(())
+        Err(Error::OutOfDomain { name: "radius", value: self.radius.into(), expected: "1 to 3 pixels" })
     }
 }
 
@@ -68,8 +59,6 @@ pub(crate) struct Ranked {
     lines: Vec<f32>,
     layout: Layout,
     neighbours: Vec<Neighbour>,
-    background: f32,
-    scattered: f32,
 }
 
 /// Where things lie in a row of hypotheses.
@@ -107,7 +96,7 @@ impl Ranked {
     pub(crate) fn resize(&mut self, width: usize, height: usize, interval_m: f32, options: &KernelDensityOptions) {
         let radius = usize::from(options.radius);
         let padded = width.div_ceil(LANES) * LANES + 2 * radius;
-        let (tolerance_m, widest_m) = (options.tolerance_cycles * interval_m, WIDEST_CYCLES * interval_m);
+        let (tolerance_m, widest_m) = (TOLERANCE_CYCLES * interval_m, WIDEST_CYCLES * interval_m);
         let layout = Layout { padded, radius, tolerance_m, widest_m };
         let length = layout.row_length() * (height + 2 * radius);
         if self.layout != layout || self.lines.len() != length {
@@ -116,7 +105,6 @@ impl Ranked {
             self.layout = layout;
             self.set_neighbours();
         }
-        (self.background, self.scattered) = (options.background, options.scattered);
     }
 
     fn set_neighbours(&mut self) {
@@ -169,7 +157,7 @@ impl Ranked {
     /// Whether no density can change anything, to a thousandth, in any pixel.
     #[inline(always)]
     fn settled(&self, probability: &[Lanes; RANKS]) -> bool {
-        let ratio = self.background / (1.0 + self.background);
+        let ratio = BACKGROUND / (1.0 + BACKGROUND);
         let limit = 1e-3 * ratio * ratio * ratio;
         let mut open = false;
         for lane in 0..LANES {
@@ -190,7 +178,7 @@ impl Ranked {
             for density in density {
                 explained += density[lane];
             }
-            background[lane] = self.background + self.scattered * (1.0 - explained).max(0.0);
+            background[lane] = BACKGROUND + SCATTERED * (1.0 - explained).max(0.0);
         }
         background
     }

@@ -11,6 +11,13 @@ use crate::{Error, MultiFrequencyOptions, Result};
 
 /// Largest number of frequencies.
 pub(crate) const MAXIMUM_FREQUENCIES: usize = 8;
+/// Most hypotheses a pixel: a search of a frame takes time in proportion, and real cameras need tens. Frequencies whose
+/// combined interval asks for more are refused until a largest range is given.
+const MAXIMUM_HYPOTHESES: usize = 4096;
+/// Misfit per degree of freedom, as a ratio of variances, from which the confidence is lowered in proportion: three standard
+/// deviations, squared. Phases that no range explains come from mixed pixels, multipath or motion; a larger value calls more
+/// of them sure, a smaller one doubts ranges whose sigma is stated too small.
+const ACCEPTABLE_MISFIT: f32 = 9.0;
 
 /// What does not depend on the pixel: frequencies sorted from the highest, and the hypotheses of each as reference.
 #[derive(Debug, Clone)]
@@ -20,7 +27,6 @@ pub(crate) struct Lattice {
     pub(crate) intervals_m: Vec<f64>,
     pub(crate) maximum_range_m: f64,
     pub(crate) assumed_sigma: f32,
-    acceptable_misfit: f32,
     references: Vec<Reference>,
 }
 
@@ -73,20 +79,12 @@ impl Lattice {
         let mut sorted: Vec<(usize, f64)> = intervals.enumerate().collect();
         sorted.sort_by(|a, b| a.1.total_cmp(&b.1));
         let hypotheses = (maximum_range_m / sorted[0].1).ceil();
-        if hypotheses > options.maximum_hypotheses as f64 {
-            let limit = options.maximum_hypotheses;
-            return Err(Error::SearchTooLarge { hypotheses, maximum_range_m, limit });
+        if hypotheses > MAXIMUM_HYPOTHESES as f64 {
+            return Err(Error::SearchTooLarge { hypotheses, maximum_range_m, limit: MAXIMUM_HYPOTHESES });
         }
         let (order, intervals_m): (Vec<usize>, Vec<f64>) = sorted.into_iter().unzip();
         let references = intervals_m.iter().map(|own| Reference::new(*own, &intervals_m, maximum_range_m)).collect();
-        Ok(Self {
-            order,
-            intervals_m,
-            maximum_range_m,
-            assumed_sigma: options.assumed_sigma_phase_rad,
-            acceptable_misfit: options.acceptable_misfit,
-            references,
-        })
+        Ok(Self { order, intervals_m, maximum_range_m, assumed_sigma: options.assumed_sigma_phase_rad, references })
     }
 
     /// Finds the `K` best hypotheses of the pixels from `start`, `LANES` or as many as `count` says.
@@ -142,7 +140,7 @@ impl Lattice {
             found.sigma_m[lane] = 1.0 / block.total_weight[lane].max(f32::MIN_POSITIVE).sqrt();
             let known = block.sigma_known[lane] * sum[lane] > 0.0;
             found.known_sigma_m[lane] = select(known, found.sigma_m[lane], f32::NAN);
-            let limit = self.acceptable_misfit * (block.members[lane] - 1.0);
+            let limit = ACCEPTABLE_MISFIT * (block.members[lane] - 1.0);
             found.acceptable[lane] = (limit / best[lane].max(f32::MIN_POSITIVE)).min(1.0);
         }
     }

@@ -9,6 +9,7 @@ use crate::frequencies::frame::Planes;
 use crate::frequencies::kernel_density::{KernelDensityOptions, RANKS, Ranked, pick};
 use crate::frequencies::lanes::{LANES, nearest, scatter};
 use crate::frequencies::lattice::Lattice;
+use crate::tree::cycle::all_into_cycle;
 use crate::{Error, Result};
 
 /// Pixels that one thread takes at a time where rows do not matter: a multiple of the block.
@@ -17,38 +18,26 @@ const CHUNK: usize = 256 * LANES;
 /// How several frequencies are unwrapped.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MultiFrequencyOptions {
-    /// Largest range searched, metres. `None`: the combined ambiguity interval.
+    /// Largest range searched, metres. `None`, the default: the combined ambiguity interval.
     pub maximum_range_m: Option<f64>,
-    /// Standard deviation of the phase, radians, where none is given. Confidences are as good as it is.
+    /// Standard deviation of the phase, radians, where none is given. Confidences are as good as it is. Default: 0.1
+    /// rad.
     pub assumed_sigma_phase_rad: f32,
-    /// Largest number of hypotheses a pixel: a search beyond it is refused.
-    pub maximum_hypotheses: usize,
-    /// Misfit per degree of freedom, as a ratio of variances, above which the confidence is lowered: phases that no
-    /// range explains come from mixed pixels, multipath or motion.
-    pub acceptable_misfit: f32,
-    /// How neighbours take part in the choice. `None`: each pixel decides alone.
+    /// How neighbours take part in the choice. `None`: each pixel decides alone. Default: that of
+    /// [`KernelDensityOptions`].
     pub kernel: Option<KernelDensityOptions>,
 }
 
 impl Default for MultiFrequencyOptions {
     fn default() -> Self {
-        Self {
-            maximum_range_m: None,
-            assumed_sigma_phase_rad: 0.1,
-            maximum_hypotheses: 4096,
-            acceptable_misfit: 9.0,
-            kernel: Some(KernelDensityOptions::default()),
-        }
+        Self { maximum_range_m: None, assumed_sigma_phase_rad: 0.1, kernel: Some(KernelDensityOptions::default()) }
     }
 }
 
 impl MultiFrequencyOptions {
     pub(crate) fn validate(&self, maximum_range_m: f64) -> Result<()> {
-        let positive = [
-            ("maximum_range_m", maximum_range_m),
-            ("assumed_sigma_phase_rad", self.assumed_sigma_phase_rad.into()),
-            ("acceptable_misfit", self.acceptable_misfit.into()),
-        ];
+        let positive =
+            [("maximum_range_m", maximum_range_m), ("assumed_sigma_phase_rad", self.assumed_sigma_phase_rad.into())];
         for (name, value) in positive {
             if !(value.is_finite() && value > 0.0) {
                 return Err(Error::OutOfDomain { name, value, expected: "positive and finite" });
@@ -85,6 +74,23 @@ impl MultiUnwrapped {
 }
 
 /// Finds the wrap counts of each pixel; see [`MultiUnwrapper::unwrap`]. Allocates its buffers anew.
+///
+/// # Errors
+/// [`Error::TooFewFrequencies`], [`Error::EqualFrequencies`], [`Error::BeyondCombinedInterval`], [`Error::SearchTooLarge`],
+/// [`Error::OutOfDomain`] for an option, [`Error::PlaneCount`] and [`Error::Raster`] where planes do not fit.
+///
+/// ```
+/// use phase_unwrap::range_image::{Modulation, Raster};
+/// use phase_unwrap::{MultiFrequencyOptions, unwrap_multi_frequency};
+///
+/// // 80 and 60 MHz repeat after 1.87 and 2.50 m, together after 7.5 m.
+/// let modulations = [Modulation::new(80e6)?, Modulation::new(60e6)?];
+/// let wrapped = |modulation: &Modulation| modulation.phase_from_range(5.0).rem_euclid(std::f64::consts::TAU) as f32;
+/// let phases = [0, 1].map(|frequency| Raster::filled(8, 6, wrapped(&modulations[frequency])));
+/// let found = unwrap_multi_frequency(&phases, &modulations, None, None, &MultiFrequencyOptions::default())?;
+/// assert!((found.range[(4, 3)] - 5.0).abs() < 1e-4 && found.confidence[(4, 3)] > 0.9);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn unwrap_multi_frequency(
     phases: &[Raster<f32>],
     modulations: &[Modulation],
@@ -112,8 +118,8 @@ impl MultiUnwrapper {
 
     /// Wrap counts and ranges of a frame.
     ///
-    /// `phases` are in radians in `[0, 2 pi]`, one raster a frequency in the order of the modulations; `sigma_phase`
-    /// their standard deviations, and where that is NaN or not positive the assumed one stands in. In `mask`, true means
+    /// `phases` are in radians of any cycle, one raster a frequency in the order of the modulations; `sigma_phase` their
+    /// standard deviations, and where that is NaN or not positive the assumed one stands in. In `mask`, true means
     /// use. A phase that is not finite is left out; two at least are needed.
     ///
     /// For each count of the highest frequency the others take the counts nearest to its range. The misfit of such a
@@ -138,13 +144,14 @@ impl MultiUnwrapper {
         mask: Option<&Raster<bool>>,
         out: &mut MultiUnwrapped,
     ) -> Result<()> {
-        let planes = Planes::new(phases, self.lattice.order.len(), sigma_phase, mask)?;
+        let taken = all_into_cycle(phases);
+        let planes = Planes::new(&taken, self.lattice.order.len(), sigma_phase, mask)?;
         out.resize(planes.size(), phases.len());
         match self.kernel {
             Some(kernel) => self.choose_with_neighbours(&planes, &kernel, out),
             None => self.choose_alone(&planes, out),
         }
-        self.count_wraps(&planes, out);
+        self.count_wraps(phases, out);
         Ok(())
     }
 
@@ -207,11 +214,11 @@ impl MultiUnwrapper {
     }
 
     /// The counts that bring each phase nearest to the range chosen.
-    fn count_wraps(&self, planes: &Planes<'_>, out: &mut MultiUnwrapped) {
+    fn count_wraps(&self, phases: &[Raster<f32>], out: &mut MultiUnwrapped) {
         for (&frequency, interval_m) in self.lattice.order.iter().zip(&self.lattice.intervals_m) {
             let rate = (1.0 / interval_m) as f32;
             let wraps = out.wraps[frequency].as_mut_slice().par_chunks_mut(CHUNK);
-            let ranges = out.range.as_slice().par_chunks(CHUNK).zip(planes.phase(frequency).par_chunks(CHUNK));
+            let ranges = out.range.as_slice().par_chunks(CHUNK).zip(phases[frequency].as_slice().par_chunks(CHUNK));
             wraps.zip(ranges).for_each(|(wraps, (ranges, phases))| {
                 with_wide_registers(
                     #[inline(always)]

@@ -6,16 +6,19 @@ use std::f32::consts::{PI, TAU};
 
 use range_image::Raster;
 
+use crate::image::cuts::PHASE_JUMP_RAD;
 use crate::{Error, Island, Result, SpatialOptions, Unwrapped};
 
-/// Share of a surface's steps that may contradict its counts: more than that is a jump that looked gentle somewhere.
+/// Share of a surface's steps that may contradict its counts: more than that is a jump that looked gentle somewhere. A
+/// choice on which the repair without amplitudes rests; a larger share continues surfaces over hidden jumps.
 const CONTRADICTIONS: f64 = 2e-3;
-/// The steepest step in radians that may conduct as part of a slope.
+/// The steepest step in radians that may conduct as part of a slope. A choice, a sixth of the step at which direction
+/// is lost; a larger one runs over the flanks of edges.
 const STEEPEST: f32 = 0.5;
-/// Surfaces smaller than this are specks.
+/// Surfaces smaller than this are specks. They stay unsure.
 const SMALLEST_PIXELS: usize = 64;
 
-/// Counts of surfaces that hang together by steps below `phase_jump_rad`; the lowest count of each is 0. Sure are those
+/// Counts of surfaces that hang together by steps below `PHASE_JUMP_RAD`; the lowest count of each is 0. Sure are those
 /// that run through the fold and whose steps agree with each other; all others get confidence 0 and count 0.
 pub(crate) fn relative_counts(
     phase: &Raster<f32>,
@@ -35,7 +38,7 @@ pub(crate) fn relative_counts(
         segment: Raster::filled(width, height, 0),
         ..Unwrapped::default()
     };
-    let mut surface = Surface { phase, jump: options.phase_jump_rad, members: Vec::new(), queue: VecDeque::new() };
+    let mut surface = Surface { phase, jump: PHASE_JUMP_RAD, members: Vec::new(), queue: VecDeque::new() };
     for start in (0..pixels).filter(|&index| usable(index)) {
         if out.island.as_slice()[start] != 0 {
             continue;

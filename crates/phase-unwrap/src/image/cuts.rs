@@ -6,7 +6,6 @@
 
 use range_image::with_wide_registers;
 
-use crate::SpatialOptions;
 use crate::image::surface::Surface;
 use crate::tree::grid::{DOWN, Grid, RIGHT, set_bits};
 use crate::tree::steps::wrapped_steps;
@@ -20,9 +19,18 @@ pub(crate) const ORPHAN: u8 = 3;
 /// Shift of a link bit that makes it a hook of a rim pixel, which the forest does not see.
 pub(crate) const HOOK: u8 = 2;
 
+/// A step of the phase between neighbours that exceeds the slope around it by so much, rad (12 cm at 20 MHz), may be a jump;
+/// four standard deviations where the noise is larger. Tuned on the rooms of `tests/absolute.rs` and `tests/dark_rooms.rs`:
+/// where it is smaller, surfaces fall into more segments, where it is larger, objects close before a wall share its segment.
+pub(crate) const PHASE_JUMP_RAD: f32 = 0.1;
+/// A ratio of neighbouring amplitudes whose natural logarithm exceeds this may be a jump. Tuned on the same rooms: where it is
+/// smaller, edges of albedo alone cut surfaces, where it is larger, surfaces a cycle apart and alike in phase stay joined.
+const AMPLITUDE_JUMP: f32 = 0.35;
 /// Layers of rim around a core: two pixels are lost to each cut, one more holds mixed pixels.
 const RIM_LAYERS: usize = 3;
-/// Phase variance, rad^2, above which a pixel does not conduct: a step of pi is then within reach of the noise.
+/// Phase variance, rad^2, above which a pixel does not conduct: a step of pi is then within reach of the noise. Four
+/// standard deviations of a difference, `4 sqrt(2 * 0.5) = 4` rad, exceed it; a smaller limit takes dark surfaces
+/// apart.
 const CONDUCTING_VARIANCE: f32 = 0.5;
 
 /// Links that are not cut, class of each pixel, and the rim.
@@ -63,12 +71,12 @@ impl<'a> End<'a> {
 
 impl Cuts {
     /// Cuts the links that may be jumps and sorts the pixels into classes.
-    pub fn make(&mut self, grid: &Grid, surface: &Surface, options: &SpatialOptions) {
+    pub fn make(&mut self, grid: &Grid, surface: &Surface) {
         for plane in [&mut self.links, &mut self.cut, &mut self.class, &mut self.flags] {
             plane.clear();
             plane.resize(grid.len(), 0);
         }
-        let limits = Limits { phase: options.phase_jump_rad, amplitude: options.amplitude_jump };
+        let limits = Limits { phase: PHASE_JUMP_RAD, amplitude: AMPLITUDE_JUMP };
         with_wide_registers(
             #[inline(always)]
             || {

@@ -3,10 +3,11 @@
 use range_image::Raster;
 
 use crate::image::surface::Surface;
+use crate::tree::cycle::split;
 use crate::tree::grid::{Grid, wrap_step};
 use crate::{Error, KnownWraps, Result, Unwrapped};
 
-/// Cost, in nats, of going against what the caller states.
+/// Cost, in nats, of going against what the caller states. More than all else that speaks about a segment.
 const AGAINST_SEED: f32 = 40.0;
 /// Cost, in nats, of going against the frame before. That frame may have erred, and what speaks for its counts speaks
 /// again in this one: so much that it decides where the image is undecided, and gives way where the image is clear.
@@ -24,7 +25,8 @@ pub(crate) struct Known {
 }
 
 /// Seeds must lie on used pixels; of rasters, other pixels are passed over. Where `maximum_wraps` is given, what a frame
-/// before predicts beyond it is passed over as well.
+/// before predicts beyond it is passed over as well. Known counts belong to the `phase` given; those found, to the phase
+/// taken into the cycle.
 pub(crate) fn resolve_known(
     grid: &Grid,
     phase: &Raster<f32>,
@@ -45,13 +47,15 @@ pub(crate) fn resolve_known(
                 if !surface.used(pixel) {
                     return Err(unusable("lies on a pixel that is masked out"));
                 }
-                found.pixels.push((pixel, seed.wraps));
+                found.pixels.push((pixel, seed.wraps.saturating_add(split(phase[(seed.col, seed.row)]).1)));
             }
         }
         KnownWraps::Raster(raster) => {
             phase.require_same_size(raster, "known wrap counts")?;
-            for (start, row) in grid.row_starts().zip(raster.rows()) {
-                let counts = row.iter().enumerate().filter_map(|(col, count)| Some((start + col, (*count)?)));
+            for ((start, row), phases) in grid.row_starts().zip(raster.rows()).zip(phase.rows()) {
+                let counts = row.iter().zip(phases).enumerate();
+                let counts = counts
+                    .filter_map(|(col, (count, phase))| Some((start + col, (*count)?.saturating_add(split(*phase).1))));
                 found.pixels.extend(counts.filter(|&(pixel, _)| surface.used(pixel)));
             }
         }
@@ -83,7 +87,10 @@ fn predict(
     planes.enumerate().filter_map(move |(index, ((&before, &wraps), &confidence))| {
         let pixel = grid.index(index % width, index / width);
         let usable = confidence >= minimum_confidence && before.is_finite() && surface.used(pixel);
-        usable.then(|| (pixel, wraps.saturating_add(wrap_step(before, surface.phase[pixel]))))
+        usable.then(|| {
+            let (before, turns) = split(before);
+            (pixel, wraps.saturating_add(turns).saturating_add(wrap_step(before, surface.phase[pixel])))
+        })
     })
 }
 

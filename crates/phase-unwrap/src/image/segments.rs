@@ -1,6 +1,5 @@
 //! Cuts the image at edges that may be real jumps: segments inside which relative wrap counts are safe.
 
-use crate::SpatialOptions;
 use crate::image::cuts::{Cuts, HOOK, RIM};
 use crate::image::surface::Surface;
 use crate::tree::forest::{Forest, NO_LABEL};
@@ -31,15 +30,8 @@ impl Segments {
     ///
     /// Only pixels without any cut edge conduct: one mixed pixel between object and background cannot join the two.
     /// The cost of rim pixels becomes infinite, which keeps them out of the forest.
-    pub fn build(
-        &mut self,
-        grid: &Grid,
-        surface: &Surface,
-        cost: &mut [f32],
-        forest: &mut Forest,
-        options: &SpatialOptions,
-    ) {
-        self.cuts.make(grid, surface, options);
+    pub fn build(&mut self, grid: &Grid, surface: &Surface, cost: &mut [f32], forest: &mut Forest) {
+        self.cuts.make(grid, surface);
         self.hold.clear();
         let pixels = cost.iter().zip(&surface.variance).zip(&self.cuts.class);
         self.hold.extend(pixels.map(|((&cost, &variance), class)| hold(cost, variance, *class == RIM)));

@@ -2,6 +2,7 @@
 
 pub(crate) mod candidates;
 pub(crate) mod contraction;
+pub(crate) mod cycle;
 pub(crate) mod forest;
 pub(crate) mod grid;
 pub(crate) mod options;

@@ -5,26 +5,22 @@ use crate::{Error, Result, Unwrapped};
 /// How one frequency is unwrapped in space.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SpatialOptions {
-    /// Largest wrap count that a pixel may get: the scene ends before `(maximum_wraps + 1) * U`.
+    /// Largest wrap count that a pixel may get: the scene ends before `(maximum_wraps + 1) * U`. Default: 2.
     pub maximum_wraps: u16,
-    /// Confidence from which a wrap count is called sure. It decides [`Island::offset_known`](crate::Island).
+    /// Confidence from which a wrap count is called sure. It decides [`Island::offset_known`](crate::Island). Default:
+    /// 0.6.
     pub minimum_confidence: f32,
     /// Standard deviation of each part of the complex image, in amplitude units; the phase then has the standard
-    /// deviation `noise / amplitude`. `None`: estimated from the image itself.
+    /// deviation `noise / amplitude`. `None`, the default: estimated from the image itself.
     pub amplitude_noise: Option<f32>,
-    /// A step of the phase between neighbours that exceeds the slope around it by this much, in radians, may be a
-    /// jump. It is raised to four standard deviations where the noise is larger.
-    pub phase_jump_rad: f32,
-    /// A ratio of neighbouring amplitudes whose natural logarithm exceeds this may be a jump.
-    pub amplitude_jump: f32,
-    /// What is known about amplitude as a function of range.
+    /// What is known about amplitude as a function of range. Default: that of [`AlbedoPrior`].
     pub albedo: AlbedoPrior,
-    /// What makes a link dear.
+    /// What makes a link dear. Default: [`EdgeWeight::SecondDifferences`].
     pub edge_weight: EdgeWeight,
-    /// How columns and rows end: `[left and right, top and bottom]`.
+    /// How columns and rows end: `[left and right, top and bottom]`. Default: both [`Boundary::Open`].
     pub boundaries: [Boundary; 2],
     /// Where the rays go. With it, the angle of incidence is taken out of the amplitudes, and walls and floors count as
-    /// evidence by being plane; without it only amplitude and continuity decide.
+    /// evidence by being plane; without it only amplitude and continuity decide. Default: `None`.
     pub geometry: Option<ImageGeometry>,
 }
 
@@ -43,8 +39,6 @@ impl Default for SpatialOptions {
             maximum_wraps: 2,
             minimum_confidence: 0.6,
             amplitude_noise: None,
-            phase_jump_rad: 0.1,
-            amplitude_jump: 0.35,
             albedo: AlbedoPrior::default(),
             edge_weight: EdgeWeight::default(),
             boundaries: [Boundary::Open; 2],
@@ -138,8 +132,6 @@ impl SpatialOptions {
     pub fn validate(&self) -> Result<()> {
         let albedo = &self.albedo;
         let positive = [
-            ("phase_jump_rad", self.phase_jump_rad),
-            ("amplitude_jump", self.amplitude_jump),
             ("dark_scale", albedo.dark_scale),
             ("bright_scale", albedo.bright_scale),
             ("amplitude_noise", self.amplitude_noise.unwrap_or(1.0)),

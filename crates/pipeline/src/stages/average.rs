@@ -126,7 +126,7 @@ fn mean_of_phases(
     options: &AverageOptions,
     several: bool,
     beats: bool,
-) -> range_image::Result<(ComplexFrame, Tests)> {
+) -> std::result::Result<(ComplexFrame, Tests), range_image::Error> {
     let mut mean = average(frames)?;
     if !several {
         return Ok((mean, Tests::default()));
@@ -144,7 +144,7 @@ fn mean_of_ranges(
     frames: &[RangeFrame],
     options: &AverageOptions,
     several: bool,
-) -> range_image::Result<(RangeFrame, Tests)> {
+) -> std::result::Result<(RangeFrame, Tests), range_image::Error> {
     let mut mean = average_ranges(frames)?;
     if !several {
         return Ok((mean, Tests::default()));

@@ -98,7 +98,11 @@ struct Light {
 }
 
 impl Tools {
-    fn new(psf: &Psf, size: (usize, usize), options: &RestorationOptions) -> scattering_deconvolution::Result<Self> {
+    fn new(
+        psf: &Psf,
+        size: (usize, usize),
+        options: &RestorationOptions,
+    ) -> std::result::Result<Self, scattering_deconvolution::Error> {
         let (width, height) = size;
         let restorer = Restorer::new(psf, width, height, options)?;
         let detector = if psf.is_empty() {
@@ -109,7 +113,7 @@ impl Tools {
         Ok(Self { size, restorer, detector })
     }
 
-    fn apply(&mut self, frame: &mut ComplexFrame) -> scattering_deconvolution::Result<Light> {
+    fn apply(&mut self, frame: &mut ComplexFrame) -> std::result::Result<Light, scattering_deconvolution::Error> {
         let summaries = self.restorer.restore_frame(frame)?;
         let mut outside_light: Option<OutsideLight> = None;
         if let Some(detector) = &self.detector {

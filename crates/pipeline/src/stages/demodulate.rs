@@ -62,7 +62,7 @@ fn check_frame(
     options: &DemodulationOptions,
     check: &ConsistencyOptions,
     frame: &mut ComplexFrame,
-) -> range_image::Result<usize> {
+) -> std::result::Result<usize, range_image::Error> {
     match check_samples(raw, options, check, &mut frame.flags)?.rules {
         RulesVerdict::NothingToCheck => Ok(0),
         RulesVerdict::Checked { inconsistent, .. } => Ok(inconsistent),

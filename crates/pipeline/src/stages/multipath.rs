@@ -71,7 +71,7 @@ fn response(
     frame: &ComplexFrame,
     range_m: &Raster<f32>,
     options: &DetectionOptions,
-) -> multipath::Result<FrequencyResponse> {
+) -> std::result::Result<FrequencyResponse, multipath::Error> {
     let flat = FrequencyResponse::flat(frame.channels.len());
     let mut agreeing = frame.clone();
     detect(&mut agreeing, range_m, &flat, &DetectionOptions { evidence: Evidence::Ranges, ..*options })?;
@@ -90,7 +90,8 @@ fn flag_contradictions(view: &mut View, options: &MultipathOptions) -> Result<Op
     let ViewData::Range(range) = &mut view.data else { return Ok(None) };
     let options = detection(options);
     let response = match response(&frame, &range.range, &options) {
-        Err(multipath::Error::TooFewPixels { .. }) => return Ok(None),
+        // Without sigma no pixel tells anything.
+        Err(multipath::Error::TooFewPixels { .. } | multipath::Error::SigmaUnknown { .. }) => return Ok(None),
         response => response.map_err(fail)?,
     };
     frame.flags.clone_from(&range.flags);

@@ -62,7 +62,7 @@ impl Surface {
     }
 
     /// Looks for `self_from_source` where nothing is known of it.
-    pub fn search(&self, source: &Self) -> global_registration::Result<Start> {
+    pub fn search(&self, source: &Self) -> std::result::Result<Start, global_registration::Error> {
         let options = CoarseOptions::default();
         let features = |surface: &Self| {
             let options = CoarseOptions { viewpoint: surface.viewpoint, ..options.clone() };
@@ -73,7 +73,7 @@ impl Surface {
     }
 
     /// Fine alignment of `source` with this station.
-    pub fn align(&self, source: &Self, start: Start) -> icp_registration::Result<IcpResult> {
+    pub fn align(&self, source: &Self, start: Start) -> std::result::Result<IcpResult, icp_registration::Error> {
         let (guess, error_m) = match start {
             Start::Guess(guess) => (guess, None),
             Start::Found(guess, error_m) => (guess, Some(error_m)),

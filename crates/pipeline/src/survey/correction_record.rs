@@ -123,7 +123,7 @@ impl CorrectionRecord {
     }
 
     /// The change of the first frequency by term over the image, metre.
-    pub(crate) fn maps(&self) -> error_models::Result<Vec<(RangeTerm, Raster<f32>)>> {
+    pub(crate) fn maps(&self) -> Result<Vec<(RangeTerm, Raster<f32>)>, error_models::Error> {
         let Some(channel) = self.channels.first() else { return Ok(Vec::new()) };
         let (model, format) = (&channel.model, &self.format);
         model.ledger_maps(

@@ -6,7 +6,7 @@ use range_io::survey::Survey;
 use commands::DriftError;
 
 /// The rates that a survey states, second since power-on; `None` where it states none.
-pub fn stated(survey: &Survey, power_on_s: f64) -> Option<error_models::Result<RateHistory>> {
+pub fn stated(survey: &Survey, power_on_s: f64) -> Option<Result<RateHistory, error_models::Error>> {
     let phase =
         |rate: &range_io::survey::FrameRate| RatePhase { since_s: rate.since_s - power_on_s, rate_hz: rate.rate_hz };
     (!survey.frame_rates.is_empty()).then(|| RateHistory::new(survey.frame_rates.iter().map(phase).collect()))

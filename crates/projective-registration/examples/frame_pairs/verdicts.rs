@@ -28,7 +28,11 @@ struct Counts {
 }
 
 impl Counts {
-    fn add(&mut self, found: &projective_registration::Result<IcpResult>, is_right: impl Fn(&Isometry3<f64>) -> bool) {
+    fn add(
+        &mut self,
+        found: &Result<IcpResult, projective_registration::Error>,
+        is_right: impl Fn(&Isometry3<f64>) -> bool,
+    ) {
         let right = found.as_ref().is_ok_and(|found| is_right(&found.target_from_source));
         let trusted = found.as_ref().is_ok_and(IcpResult::is_trustworthy);
         self.pairs += 1;

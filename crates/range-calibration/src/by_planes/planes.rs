@@ -28,7 +28,7 @@ pub struct PlaneCapture<'a> {
 /// Options of [`calibrate_planes`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PlaneCalibrationOptions {
-    /// Range terms. A hyperbola is held or not there.
+    /// Range terms. A hyperbola is held or not there. Default: that of [`RangeTermOptions`].
     pub terms: RangeTermOptions,
     /// Which pixels are used. Default: every fourth column and row, and otherwise as for differences.
     pub pixels: DifferenceOptions,

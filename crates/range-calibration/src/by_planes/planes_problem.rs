@@ -275,7 +275,7 @@ impl Solved {
 }
 
 /// Full steps first, as the problem is nearly linear; damped ones where these do not end.
-fn descend(adjustment: &Adjustment<'_>, weighting: Weighting) -> adjust::Result<Solution> {
+fn descend(adjustment: &Adjustment<'_>, weighting: Weighting) -> std::result::Result<Solution, adjust::Error> {
     let step_tolerance = if weighting == Weighting::Huber { ROUGHLY } else { NEGLIGIBLE };
     let options = |method| SolveOptions { method, step_tolerance, ..SolveOptions::default() };
     let full = SolveOptions { max_iterations: FULL_STEPS, ..options(Method::GaussNewton) };

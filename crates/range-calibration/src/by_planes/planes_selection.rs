@@ -9,7 +9,8 @@ use crate::by_planes::planes_problem::{Problem, Solved};
 /// matter which of them the last round had.
 const ROUNDS: usize = 20;
 
-/// Standard deviations of its parameters by which a round must move them, that another follows.
+/// Standard deviations of its parameters by which a round must move them, that another follows. What moves less shows
+/// in no digit that is reported.
 const MOVED: f64 = 0.01;
 
 /// Pixels of a capture that are enough to choose by.

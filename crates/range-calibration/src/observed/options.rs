@@ -34,11 +34,11 @@ pub enum HyperbolaUse {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RangeTermOptions {
     /// In the order of [`RangeTerms::NAMES`]: d0, d2..d7, e1, e2. Those that a spline or a surface stands instead of
-    /// are not there, whatever they say, but must not be held at a value.
+    /// are not there, whatever they say, but must not be held at a value. Default: all are estimated.
     pub terms: [TermUse; 9],
-    /// Eq. 15.
+    /// Eq. 15. Default: [`HyperbolaUse::None`].
     pub hyperbola: HyperbolaUse,
-    /// Spline, polynomial and surface; all their coefficients are estimated.
+    /// Spline, polynomial and surface; all their coefficients are estimated. Default: that of [`FurtherShape`].
     pub further: FurtherShape,
     /// A combination of parameters is refused as not determined if sharing its effect makes its deviation so many
     /// times larger: what is not in the model grows by that factor as well. Default 100.

@@ -16,34 +16,33 @@ use crate::{Error, RangeDifference, RangeTermOptions, Result};
 /// A model is preferred where it lowers Schwarz's criterion by as much: odds of 150 to 1 `[Schwarz1978]`.
 const CLEAR: f64 = 10.0;
 
-/// Largest ratio of amplitudes below which they tell nothing.
+/// Largest ratio of amplitudes below which they tell nothing. A choice: a hyperbola over a fifth of an amplitude is a
+/// line, and an offset takes it up.
 const LEAST_SPREAD: f64 = 1.2;
+
+/// Highest order of the series in amplitude that is tried. A choice: Schwarz's criterion picks the order among
+/// those up to it, so that a higher one costs time, and a lower one leaves the steep end of a hyperbola to the position.
+const AMPLITUDE_ORDER: usize = 6;
+
+/// Correlation of the two effects beyond which they are not told apart, whatever the tests say: so much of what no series
+/// follows, a tenth, would be taken for the other. A larger one decides on less.
+const LARGEST_CORRELATION: f64 = 0.995;
 
 /// Options of [`amplitude_or_position`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AmplitudeOrPositionOptions {
-    /// The other terms, e1 and e2 among them; hyperbola and surface are not asked for here.
+    /// The other terms, e1 and e2 among them; hyperbola and surface are not asked for here. Default: that of
+    /// [`RangeTermOptions`].
     pub terms: RangeTermOptions,
-    /// Highest order of the series in amplitude that is tried, 3 to 8. Default 6.
-    pub amplitude_order: usize,
     /// Highest order of the surface over the image that is tried, 2 to 6. Default 4.
     pub surface_order: usize,
     /// Level of the tests. Default 1 %.
     pub level: f64,
-    /// Correlation of the two effects beyond which they are not told apart, whatever the tests say: so much of what no
-    /// series follows would be taken for the other. Default 0.995.
-    pub largest_correlation: f64,
 }
 
 impl Default for AmplitudeOrPositionOptions {
     fn default() -> Self {
-        Self {
-            terms: RangeTermOptions::default(),
-            amplitude_order: 6,
-            surface_order: 4,
-            level: 0.01,
-            largest_correlation: 0.995,
-        }
+        Self { terms: RangeTermOptions::default(), surface_order: 4, level: 0.01 }
     }
 }
 
@@ -121,7 +120,7 @@ pub fn amplitude_or_position(
     options: &AmplitudeOrPositionOptions,
 ) -> Result<AmplitudeOrPosition> {
     let design = Design::new(differences, ambiguity_interval_m, options)?;
-    let amplitude_order = best_order(3..=options.amplitude_order, |order| design.solve(Some(order), None))?;
+    let amplitude_order = best_order(3..=AMPLITUDE_ORDER, |order| design.solve(Some(order), None))?;
     let surface_order = best_order(2..=options.surface_order, |order| design.solve(None, Some(order)))?;
     let alone = [design.solve(Some(amplitude_order), None)?, design.solve(None, Some(surface_order))?];
     let both = match design.solve(Some(amplitude_order), Some(surface_order)) {
@@ -159,7 +158,7 @@ fn cause(
     }
     let needed = |test: &EffectTest| test.p_beside_the_other < options.level && test.gain_beside_the_other > CLEAR;
     match (needed(amplitude), needed(position)) {
-        _ if correlation > options.largest_correlation => ErrorCause::Undecided,
+        _ if correlation > LARGEST_CORRELATION => ErrorCause::Undecided,
         (true, true) => ErrorCause::Both,
         (true, false) => ErrorCause::Amplitude,
         (false, true) => ErrorCause::Position,
@@ -207,9 +206,6 @@ impl<'a> Design<'a> {
         options: &'a AmplitudeOrPositionOptions,
     ) -> Result<Self> {
         let refuse = |name, value, expected| Err(Error::OutOfDomain { name, value, expected });
-        if !(3..=RangePolynomial::ORDERS[1]).contains(&options.amplitude_order) {
-            return refuse("amplitude_order", options.amplitude_order as f64, "an order from 3 to 8");
-        }
         if !(2..=ImageSurface::ORDERS[1]).contains(&options.surface_order) {
             return refuse("surface_order", options.surface_order as f64, "an order from 2 to 6");
         }
@@ -227,7 +223,7 @@ impl<'a> Design<'a> {
         let mut terms = options.terms;
         terms.further.surface = None;
         let terms = LinearTerms::new(&terms, ambiguity_interval_m)?;
-        let unknowns = terms.unknowns() + options.amplitude_order + 30;
+        let unknowns = terms.unknowns() + AMPLITUDE_ORDER + 30;
         if differences.len() <= unknowns {
             return Err(Error::TooFewDifferences { differences: differences.len(), unknowns });
         }

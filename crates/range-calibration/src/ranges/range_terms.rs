@@ -20,6 +20,23 @@ use crate::{Error, RangeCalibration, RangeDifference, RangeTermOptions, Result};
 /// [`Error::NotDetermined`] where the differences cannot tell parameters apart, as with a wall at one distance only;
 /// [`Error::TooFewDifferences`], [`Error::BadDifference`], [`Error::NothingToEstimate`], [`Error::NoHyperbola`];
 /// [`Error::Model`] if the estimated terms are no usable model; [`Error::Adjust`] where the adjustment did not converge.
+///
+/// ```
+/// use range_calibration::{RangeDifference, RangeTermOptions, Scale, estimate_range_terms};
+///
+/// // A target at 40 known distances over one interval of 5 m, at four places in the image; all ranges are 24 mm too long.
+/// let difference = |k: usize| {
+///     let reference_range_m = 0.5 + 0.11 * (k / 4) as f64;
+///     let [x_mm, y_mm] = [[-0.5, -0.5], [0.5, -0.5], [-0.5, 0.5], [0.5, 0.5]][k % 4];
+///     let observed_range_m = reference_range_m + 0.024;
+///     RangeDifference { observed_range_m, reference_range_m, x_mm, y_mm, amplitude: f64::NAN, sigma_m: 0.002 }
+/// };
+/// let differences: Vec<RangeDifference> = (0..160).map(difference).collect();
+/// let found = estimate_range_terms(&differences, 5.0, &RangeTermOptions::default())?;
+/// assert!((found.model().terms.d0 - 0.024).abs() < 1e-9);
+/// assert!(found.parameters(Scale::Prior)?[0].sigma < 0.001);
+/// # Ok::<(), range_calibration::Error>(())
+/// ```
 pub fn estimate_range_terms(
     differences: &[RangeDifference],
     ambiguity_interval_m: f64,

@@ -43,7 +43,8 @@ pub struct SurfaceCalibrationOptions<'a> {
     pub normals: OrganisedNormalOptions,
     /// A term whose effect on the ranges is known less well than this is refused, metre. Default 5 mm.
     pub largest_sigma_m: f64,
-    /// How the stations are registered; a point model in it is not asked.
+    /// How the stations are registered; a point model in it is not asked. Default: that of
+    /// [`StationRegistrationOptions`].
     pub registration: StationRegistrationOptions<'a>,
 }
 

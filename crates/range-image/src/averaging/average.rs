@@ -11,7 +11,8 @@ const PIXELS_PER_TASK: usize = 4096;
 /// Pixels whose sums are kept at a time, within the first-level cache.
 const BLOCK: usize = 512;
 
-/// Values that scatter by so many times their sigma are not explained by noise.
+/// Values that scatter by so many times their sigma are not explained by noise. A normal value does so once in two
+/// million; a smaller factor flags the tails of real noise.
 const BEYOND_NOISE: f64 = 5.0;
 
 /// Number and mean of the values that a pixel had in repeated frames.
@@ -54,6 +55,23 @@ const OF_ANY: Flags = Flags::MOTION.union(Flags::INTERFERENCE);
 /// - [`Flags::MOTION`] and [`Flags::INTERFERENCE`] where any frame has them: [`Rest::flag`](crate::Rest::flag) judges these
 ///   by what the values of all frames show;
 /// - all others, such as [`Flags::LOW_AMPLITUDE`], where more than half of the frames that count have them.
+///
+/// # Errors
+/// No frame, or frames of different sizes or modulations.
+///
+/// ```
+/// use range_image::{ComplexFrame, Modulation, PhaseConvention, Raster, average};
+///
+/// let frame = |phase: f32| {
+///     let planes = [phase, 100.0].map(|value| vec![Raster::filled(4, 3, value)]);
+///     let [phase, amplitude] = planes;
+///     ComplexFrame::from_phase(vec![Modulation::new(20e6)?], phase, amplitude, &PhaseConvention::default())
+/// };
+/// // The mean of phases about zero is zero, not pi.
+/// let mean = average(&[frame(0.1)?, frame(6.183_185)?])?;
+/// assert!((mean.channels[0].phase()[(0, 0)] + 3.0).rem_euclid(6.283_185) - 3.0 < 1e-5);
+/// # Ok::<(), range_image::Error>(())
+/// ```
 pub fn average(frames: &[ComplexFrame]) -> Result<ComplexFrame> {
     require_alike(frames)?;
     let Some(first) = frames.first() else { return Err(Error::NoFrames { what: "average" }) };

@@ -12,7 +12,8 @@ use crate::{ComplexFrame, Error, Flags, RangeFrame, Raster, Result};
 /// Pixels that one task takes; its sums are added in the order of the pixels.
 const PIXELS_PER_TASK: usize = 4096;
 
-/// Frames' common deviations that are less significant than this are chance.
+/// Frames' common deviations that are less significant than this are chance. In standard deviations: by chance one
+/// frame in two million.
 const SIGNIFICANT: f64 = 5.0;
 
 /// A frame that deviates and moves the mean by fewer of the mean's standard deviations is let pass: the rare large noise of
@@ -24,11 +25,12 @@ const LEAST_BIAS: f64 = 0.5;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields, default))]
 pub struct RestOptions {
-    /// Probability with which noise alone makes a pixel count as moved.
+    /// Probability with which noise alone makes a pixel count as moved. Default: 1e-4.
     pub moved_probability: f64,
-    /// Largest share of pixels that may have moved.
+    /// Largest share of pixels that may have moved. Default: 0.5.
     pub largest_moved_share: f64,
     /// Largest deviation that all pixels of a frame may have in common, in standard deviations of a pixel in one frame.
+    /// Default: 0.2.
     pub largest_drift_sigmas: f64,
 }
 

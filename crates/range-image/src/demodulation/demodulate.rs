@@ -10,6 +10,20 @@ use crate::rasters::wide::{Arithmetic, PixelLoop, run_wide, task_length};
 use crate::{ComplexChannel, ComplexFrame, DemodulationOptions, Flags, NoiseModel, Raster, RawFrame, Result, Samples};
 
 /// Demodulates one frame; see [`Demodulator`] for streams of frames.
+///
+/// # Errors
+/// What the options refuse, and a frame with fewer than three steps.
+///
+/// ```
+/// use range_image::{DemodulationOptions, Modulation, RawFrame, Samples, demodulate};
+///
+/// // One pixel at 20 MHz in four steps, frequency by frequency, step by step, row by row: B = 500, A = 200, phi = 2 pi / 3.
+/// let raw = RawFrame::new(1, 1, 4, vec![Modulation::new(20e6)?], Samples::U16(vec![400, 327, 600, 673]))?;
+/// let frame = demodulate(&raw, &DemodulationOptions::default())?;
+/// let channel = &frame.channels[0];
+/// assert!((channel.phase()[(0, 0)] - 2.0944).abs() < 1e-3 && (channel.amplitude()[(0, 0)] - 200.0).abs() < 0.5);
+/// # Ok::<(), range_image::Error>(())
+/// ```
 pub fn demodulate(frame: &RawFrame, options: &DemodulationOptions) -> Result<ComplexFrame> {
     let mut out = ComplexFrame::empty();
     Demodulator::new(options)?.demodulate_into(frame, &mut out)?;

@@ -180,6 +180,21 @@ pub struct RangeFrame {
 }
 
 impl RangeFrame {
+    /// Ranges alone, metre: sigma and amplitude are NaN, nothing is flagged.
+    ///
+    /// ```
+    /// use range_image::{RangeFrame, Raster};
+    ///
+    /// let bare = RangeFrame::from_range(Raster::filled(176, 144, 3.0));
+    /// let frame = RangeFrame { sigma: Raster::filled(176, 144, 0.005), ..bare };
+    /// assert!(frame.validate().is_ok() && frame.amplitude[(0, 0)].is_nan());
+    /// ```
+    pub fn from_range(range: Raster<f32>) -> Self {
+        let (width, height) = (range.width(), range.height());
+        let unknown = Raster::filled(width, height, f32::NAN);
+        Self { range, sigma: unknown.clone(), amplitude: unknown, flags: Raster::filled(width, height, Flags::empty()) }
+    }
+
     /// Columns.
     pub fn width(&self) -> usize {
         self.range.width()

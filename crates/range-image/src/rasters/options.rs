@@ -7,17 +7,18 @@ use crate::{Error, NoiseModel, PhaseConvention, PhaseSense, Result};
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
 pub struct DemodulationOptions {
-    /// Whether the samples step forward or backward in phase.
+    /// Whether the samples step forward or backward in phase. Default: [`PhaseSense::Positive`].
     pub phase_sense: PhaseSense,
-    /// Added to the phase after the sense is applied, radian.
+    /// Added to the phase after the sense is applied, radian. Default: 0 rad.
     pub phase_offset_rad: f64,
-    /// Samples are multiplied by it; amplitude, offset and sigma come out in the scaled unit.
+    /// Samples are multiplied by it; amplitude, offset and sigma come out in the scaled unit. Default: 1.
     pub raw_scale: f64,
-    /// A sample at or above it (in absolute value) flags its pixel as saturated; raw units, before the scale.
+    /// A sample at or above it (in absolute value) flags its pixel as saturated; raw units, before the scale. Default:
+    /// `None`.
     pub saturation: Option<f64>,
-    /// Noise of a sample in the scaled unit.
+    /// Noise of a sample in the scaled unit. Default: that of [`NoiseModel`].
     pub noise: NoiseModel,
-    /// Pixels with a smaller amplitude at any frequency are flagged; scaled unit.
+    /// Pixels with a smaller amplitude at any frequency are flagged; scaled unit. Default: `None`.
     pub low_amplitude: Option<f64>,
 }
 

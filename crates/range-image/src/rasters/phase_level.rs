@@ -55,7 +55,28 @@ impl ComplexFrame {
     /// Makes complex images from phases in radian and amplitudes, one raster of each a frequency (level `phase`).
     ///
     /// A pixel whose phase or amplitude is not finite, or whose amplitude is negative, gets `z` = NaN and
-    /// [`Flags::NO_DATA`]. Nothing is known of offset and sigma (see [`ComplexChannel::predict_sigma`]).
+    /// [`Flags::NO_DATA`]. Nothing is known of the offset, and sigma is NaN until it is given by [`Self::with_sigma`] or
+    /// predicted by [`ComplexChannel::predict_sigma`]; what weighs frequencies against each other needs it.
+    ///
+    /// Fails where there is no raster, where their number is not that of the modulations or their sizes differ, and where
+    /// the offset of the convention is not finite.
+    ///
+    /// ```
+    /// use range_image::{ComplexFrame, Modulation, PhaseConvention, Raster};
+    ///
+    /// let (phase, amplitude) = (Raster::filled(4, 3, -1.0), Raster::filled(4, 3, 250.0));
+    /// let frame = ComplexFrame::from_phase(
+    ///     vec![Modulation::new(20e6)?],
+    ///     vec![phase],
+    ///     vec![amplitude],
+    ///     &PhaseConvention::default(),
+    /// )?;
+    /// let frame = frame.with_sigma(vec![Raster::filled(4, 3, 2.5)])?;
+    /// let channel = &frame.channels[0];
+    /// assert!((channel.phase()[(0, 0)] - 5.283_185).abs() < 1e-5, "in [0, 2 pi)");
+    /// assert!((channel.sigma_phase()[(0, 0)] - 0.01).abs() < 1e-6);
+    /// # Ok::<(), range_image::Error>(())
+    /// ```
     pub fn from_phase(
         modulations: Vec<Modulation>,
         phase: Vec<Raster<f32>>,
@@ -83,6 +104,22 @@ impl ComplexFrame {
             .map(|(modulation, (phase, amplitude))| channel(modulation, phase, amplitude, convention, &mut flags))
             .collect();
         Ok(Self { channels, flags })
+    }
+
+    /// The frame with the standard deviation of each part of `z`, one raster a channel, in the unit of the amplitudes; NaN
+    /// where it is not known. For phases it is that of the phase in radians times the amplitude.
+    ///
+    /// Fails unless there is one raster of the frame's size for each channel.
+    pub fn with_sigma(mut self, sigma: Vec<Raster<f32>>) -> Result<Self> {
+        if sigma.len() != self.channels.len() {
+            let expected = "there is one for each channel";
+            return Err(Error::OutOfDomain { name: "sigma rasters", value: sigma.len() as f64, expected });
+        }
+        for (channel, sigma) in self.channels.iter_mut().zip(sigma) {
+            channel.real.require_same_size(&sigma, "sigma")?;
+            channel.sigma = sigma;
+        }
+        Ok(self)
     }
 }
 

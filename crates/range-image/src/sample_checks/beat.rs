@@ -7,7 +7,8 @@ use crate::ComplexChannel;
 const MOST_PIXELS: usize = 4096;
 const MOST_VALUES: usize = 128 * MOST_PIXELS;
 
-/// A pixel counts with the square of its deviation up to so many times its expectation.
+/// A pixel counts with the square of its deviation up to so many times its expectation. A choice; without it a few
+/// pixels that moved make the beat.
 const HELD_BACK: f64 = 3.0;
 
 /// Rounds in which the frames' own phases and amplitudes and the plane of the beat are told apart.

@@ -25,9 +25,9 @@ pub enum OffsetRule {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
 pub struct PlateauOptions {
-    /// Samples that have to share the highest value.
+    /// Samples that have to share the highest value. Default: 16.
     pub least_samples: usize,
-    /// How many times as many they have to be as those of any of the next seven values.
+    /// How many times as many they have to be as those of any of the next seven values. Default: 8.
     pub ratio: f64,
 }
 
@@ -42,16 +42,16 @@ impl Default for PlateauOptions {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
 pub struct ConsistencyOptions {
-    /// Probability that noise alone flags a pixel at one frequency.
+    /// Probability that noise alone flags a pixel at one frequency. Default: 1e-4.
     pub false_alarm_probability: f64,
-    /// What the sensor itself breaks the rules by, as a part of the fundamental: unequal gains of taps, a second harmonic.
-    /// So much is let pass on top of the noise.
+    /// What the sensor itself breaks the rules by, as a part of the fundamental: unequal gains of taps, a second
+    /// harmonic. So much is let pass on top of the noise. Default: 0.
     pub tolerance: f64,
-    /// Orders of the modulation's harmonics. Where they fall in the samples is not checked.
+    /// Orders of the modulation's harmonics. Where they fall in the samples is not checked. Default: empty.
     pub harmonics: Vec<usize>,
-    /// What is known of the samples' mean.
+    /// What is known of the samples' mean. Default: [`OffsetRule::Free`].
     pub offset: OffsetRule,
-    /// How a saturation that is not stated is looked for; `None` not at all.
+    /// How a saturation that is not stated is looked for; `None` not at all. Default: that of [`PlateauOptions`].
     pub plateau: Option<PlateauOptions>,
 }
 

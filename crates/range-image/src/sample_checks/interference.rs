@@ -20,9 +20,9 @@ const STEADY: f64 = 0.75;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields, default))]
 pub struct InterferenceOptions {
-    /// Probability with which noise alone makes a pixel count as disturbed.
+    /// Probability with which noise alone makes a pixel count as disturbed. Default: 1e-4.
     pub false_alarm_probability: f64,
-    /// Smallest disturbed share of the brighter half of the pixels. Less is taken for motion.
+    /// Smallest disturbed share of the brighter half of the pixels. Less is taken for motion. Default: 0.3.
     pub least_share: f64,
 }
 

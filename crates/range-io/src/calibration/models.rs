@@ -62,7 +62,7 @@ impl Calibration {
         let mut entries = Vec::with_capacity(groups.len());
         for (time, members) in groups {
             let models = members.into_iter().map(|index| self.range_models[index].to_model());
-            let models: error_models::Result<Vec<_>> = models.collect();
+            let models: std::result::Result<Vec<_>, error_models::Error> = models.collect();
             entries.push((time, models.map_err(|error| value_error("range_models", &error))?));
         }
         entries.sort_by(|(a, _), (b, _)| a.total_cmp(b));
@@ -118,7 +118,7 @@ impl RangeCalibration {
     }
 
     /// The model of these terms.
-    pub fn to_model(&self) -> error_models::Result<RangeErrorModel> {
+    pub fn to_model(&self) -> std::result::Result<RangeErrorModel, error_models::Error> {
         let interval_m = Modulation::new(self.modulation_hz)?.ambiguity_interval_m();
         let (amplitude_span, range_span_m, further) = (self.amplitude_span, self.range_span_m, self.further);
         let shape = ModelShape { amplitude_span, range_span_m, further };

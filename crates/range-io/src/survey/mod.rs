@@ -195,6 +195,30 @@ impl Survey {
     }
 
     /// Reads and checks the text of a `survey.ron`; `file` stands for it in messages.
+    ///
+    /// # Errors
+    /// [`Error::Format`] and its kin, with file, line, column and the name of the field.
+    ///
+    /// ```
+    /// use range_io::survey::Survey;
+    ///
+    /// let text = |frequency: &str| format!(r#"#![enable(implicit_some)]
+    /// (
+    ///     camera: (
+    ///         width: 176, height: 144, pixel_pitch_mm: (0.04, 0.04),
+    ///         principal_distance_mm: 8.0, principal_point_mm: (0.0, 0.0),
+    ///         modulation_hz: [{frequency}], phase_steps: 4,
+    ///     ),
+    ///     level: samples,
+    ///     frames: [(file: "frames/000_0.npz", station: "S00", integration_time_s: 0.002)],
+    /// )"#);
+    /// let survey = Survey::parse("survey.ron".as_ref(), &text("20e6"))?;
+    /// assert_eq!(survey.camera.modulations()?[0].frequency_hz(), 20e6);
+    ///
+    /// let refused = Survey::parse("survey.ron".as_ref(), &text("0"));
+    /// assert!(refused.unwrap_err().to_string().starts_with("survey.ron:6:"));
+    /// # Ok::<(), range_io::Error>(())
+    /// ```
     pub fn parse(file: &Path, text: &str) -> Result<Self> {
         let survey: Self = ron_text::parse(file, text)?;
         survey.check().map_err(|invalid| ron_text::at_field(file, text, invalid))?;

@@ -20,9 +20,9 @@ use search::start::Dictionary;
 use views::blocks::Blocks;
 use views::mask::{dilated, find_object};
 
-/// Fewest block means from which anything is concluded.
+/// Fewest block means from which anything is concluded. A choice: fewer leave little to judge the fit by.
 const FEWEST_BLOCKS: usize = 30;
-/// Rounds of rejecting blocks and adjusting again.
+/// Rounds of rejecting blocks and adjusting again. A choice; blocks at the limit may go to and fro after that.
 const ROUNDS: usize = 3;
 
 /// Estimates the scattered part of the point spread function from captures of one camera, all together.

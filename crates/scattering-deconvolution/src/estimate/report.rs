@@ -190,11 +190,13 @@ fn rms(moduli: impl Iterator<Item = (f64, usize)>) -> f64 {
 /// Adds the blocks to `changed` (one raster for each capture) where something other than scattering happened. Whether
 /// there were any.
 pub(super) fn reject(problem: &Problem<'_>, fit: &Fit, changed: &mut [Raster<bool>]) -> bool {
-    /// In robust standard deviations of the scene's residuals.
+    /// In robust standard deviations of the scene's residuals. A choice: one normal residual in two million is as far.
     const FAR: f64 = 5.0;
-    /// As a share of the scattered light: a point spread function that is no sum of Gaussians misses less than that.
+    /// As a share of the scattered light: a point spread function that is no sum of Gaussians misses less than that. A
+    /// choice: a smaller share refuses lenses whose spread has other tails.
     const MISFIT: f64 = 0.3;
-    /// Where so large a share of the blocks changed, what is seen is scattering that no Gaussians describe.
+    /// Where so large a share of the blocks changed, what is seen is scattering that no Gaussians describe. A choice; a
+    /// larger share lets an estimate pass that leaves most of what changed.
     const MOST: f64 = 0.15;
     let mut any = false;
     for (index, scene) in problem.scenes.iter().enumerate() {

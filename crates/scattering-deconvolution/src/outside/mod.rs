@@ -30,7 +30,7 @@ pub enum DarkPixels {
 /// How light from outside is looked for.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OutsideLightOptions {
-    /// Which pixels are dark.
+    /// Which pixels are dark. Default: [`DarkPixels::Flagged`].
     pub dark: DarkPixels,
     /// Level of the verdict: probability of an alarm where dark pixels have nothing but noise, or light of their own that is
     /// alike in neighbouring blocks; 0.001 by default.

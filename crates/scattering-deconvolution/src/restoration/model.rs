@@ -13,7 +13,8 @@ use crate::kernels::spectrum::Spectrum;
 use crate::restoration::noise::Noise;
 use crate::{Error, GaussianTerm, GridSpacing, Psf, Refinement, RestorationOptions, Result};
 
-/// Smallest `|1 + H|` that is inverted without regularisation: noise grows by its reciprocal.
+/// Smallest `|1 + H|` that is inverted without regularisation: noise grows by its reciprocal. A choice: a hundredfold
+/// of the noise is no image any more, and asks for a regularisation.
 const SMALLEST_RESPONSE: f64 = 0.01;
 /// Spacing of the nodes in units of the narrowest Gaussian. On the nodes its standard deviation is 1.5 nodes then, so
 /// that sampling it folds no more than 1e-5 of it back; at 0.75 it would be 1.1 nodes and 1e-3.

@@ -48,20 +48,21 @@ pub struct RestorationOptions {
     /// Weight `lambda` of the wish that the image stays as it was observed: `|F z - y|^2 + lambda |z - y|^2` becomes
     /// smallest, with `F = 1 + H`. Zero, the default, is the plain inverse.
     pub regularisation: f64,
-    /// Largest residual `|y - (z + psf * z)|` allowed, relative to the largest real or imaginary part of `y`.
-    /// Not asked for with a regularisation.
+    /// Largest residual `|y - (z + psf * z)|` allowed, relative to the largest real or imaginary part of `y`. Not asked
+    /// for with a regularisation. Default: 1e-5.
     pub tolerance: f64,
-    /// Iterations after which an image that has not come below the tolerance is refused.
+    /// Iterations after which an image that has not come below the tolerance is refused. Default: 30.
     pub max_iterations: usize,
-    /// Where scattered light is computed.
+    /// Where scattered light is computed. Default: [`GridSpacing::Automatic`].
     pub grid_spacing: GridSpacing,
-    /// Whether the inverse filter is all that is done.
+    /// Whether the inverse filter is all that is done. Default: [`Refinement::ToTolerance`].
     pub refinement: Refinement,
-    /// What the light of saturated pixels counts for.
+    /// What the light of saturated pixels counts for. Default: [`SaturatedLight::Clipped`].
     pub saturated_light: SaturatedLight,
-    /// Share of a restored pixel's amplitude beyond which light scattered from pixels of unknown light (saturated, without
-    /// a value) makes it one of [`Restorer::dependent_pixels`](crate::Restorer::dependent_pixels). Were the unknown light
-    /// wrong by its own amount, the phase would be wrong by as many radians. Infinite: not looked for.
+    /// Share of a restored pixel's amplitude beyond which light scattered from pixels of unknown light (saturated,
+    /// without a value) makes it one of [`Restorer::dependent_pixels`](crate::Restorer::dependent_pixels). Were the
+    /// unknown light wrong by its own amount, the phase would be wrong by as many radians. Infinite: not looked for.
+    /// Default: 0.1.
     pub dependence_limit: f64,
 }
 

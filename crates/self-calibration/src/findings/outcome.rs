@@ -24,7 +24,7 @@ pub struct CalibrationOutcome {
     /// All calibration parameters, estimated and held. With several integration times, the range terms of the second
     /// and further sets carry `@<time in s>` behind their names.
     pub parameters: Vec<CalibratedParameter>,
-    /// Names of the estimated parameters and their covariance (prior-scaled) and correlation matrix.
+    /// Names of the estimated parameters, in the order of the rows of the covariances.
     pub estimated: Vec<String>,
     /// Prior-scaled covariance of [`Self::estimated`].
     pub covariance: DMatrix<f64>,
@@ -61,7 +61,7 @@ pub struct CalibrationOutcome {
     pub vtpv: f64,
     /// Posterior standard deviation of unit weight.
     pub sigma0: Option<f64>,
-    /// Akaike's and Schwarz's information criteria.
+    /// Akaike's information criterion.
     pub aic: f64,
     /// Schwarz's criterion.
     pub bic: f64,

@@ -27,21 +27,22 @@ const SMALLEST_VIEW: usize = 4;
 /// What is planned, beside stations and targets.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlanOptions {
-    /// Standard deviation of an image coordinate, pixel.
+    /// Standard deviation of an image coordinate, pixel. Default: 0.05 pixel.
     pub sigma_pixel: f64,
-    /// Standard deviation of a range, metre.
+    /// Standard deviation of a range, metre. Default: 0.01 m.
     pub sigma_range_m: f64,
-    /// Standard deviation of an image coordinate of the passive camera, pixel.
+    /// Standard deviation of an image coordinate of the passive camera, pixel. Default: 0.2 pixel.
     pub sigma_passive_pixel: f64,
-    /// Terms to be estimated; automatic stands for all but the wave of length U and the amplitude hyperbola.
+    /// Terms to be estimated; automatic stands for all but the wave of length U and the amplitude hyperbola. Default:
+    /// [`TermSelection::Auto`].
     pub terms: TermSelection,
-    /// Datum.
+    /// Datum. Default: [`NetworkDatum::Free`].
     pub datum: NetworkDatum,
-    /// Stations whose ranges are left out, by name.
+    /// Stations whose ranges are left out, by name. Default: empty.
     pub without_ranges: Vec<String>,
-    /// Inflation from which on a calibration would refuse the network.
+    /// Inflation from which on a calibration would refuse the network. Default: that of [`CalibrationOptions`].
     pub largest_inflation: f64,
-    /// Further stations to try; an empty grid tries none.
+    /// Further stations to try; an empty grid tries none. Default: an empty grid.
     pub candidates: CandidateGrid,
 }
 

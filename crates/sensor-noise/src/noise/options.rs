@@ -3,15 +3,16 @@ use crate::{Error, Result};
 /// How noise is estimated from repeated frames, and what is refused.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NoiseFitOptions {
-    /// Most classes of light or amplitude that variances are averaged over.
+    /// Most classes of light or amplitude that variances are averaged over. Default: 64.
     pub bins: usize,
-    /// Largest share of values whose scatter no noise explains (motion, gross errors); they are left out.
+    /// Largest share of values whose scatter no noise explains (motion, gross errors); they are left out. Default: 0.2.
     pub largest_moved_share: f64,
-    /// How much more one frame may scatter than the others of its station before the frames count as unlike.
+    /// How much more one frame may scatter than the others of its station before the frames count as unlike. Default:
+    /// 1.25.
     pub largest_frame_factor: f64,
-    /// Largest share of the variance that a drift may leave in successive differences.
+    /// Largest share of the variance that a drift may leave in successive differences. Default: 0.02.
     pub largest_drift_share: f64,
-    /// Largest root mean square of the relative differences between variances observed and modelled.
+    /// Largest root mean square of the relative differences between variances observed and modelled. Default: 0.25.
     pub largest_misfit: f64,
 }
 

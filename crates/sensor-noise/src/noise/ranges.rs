@@ -31,6 +31,9 @@ const PARTS: [&str; 2] = ["noise that falls with the amplitude", "floor"];
 /// interval U is known (else the largest range stands for it), so are pixels whose ranges are expected to scatter by more
 /// than U / 16: their phases are no longer normal, and what was lost altogether says nothing of noise.
 /// So are pixels whose frames leave `1 / a²` uncertain by more than a tenth.
+///
+/// # Errors
+/// [`Error::NoAmplitudes`], too few frames or values, a scene that moved, and noise that does not follow the model.
 pub fn estimate_range_noise(
     stations: &[RepeatedRanges<'_>],
     wrapped: bool,

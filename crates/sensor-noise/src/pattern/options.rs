@@ -5,13 +5,13 @@ use crate::{Error, Result};
 /// How a fixed pattern is estimated and judged.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PatternOptions {
-    /// Which pixels show the wall, and how its plane is fitted.
+    /// Which pixels show the wall, and how its plane is fitted. Default: that of [`PrimitiveOptions`].
     pub wall: PrimitiveOptions,
-    /// Probability with which a camera without a pattern may pass for one with.
+    /// Probability with which a camera without a pattern may pass for one with. Default: 1e-3.
     pub significance: f64,
-    /// Least share by which the root mean square of held-out residuals must fall.
+    /// Least share by which the root mean square of held-out residuals must fall. Default: 0.01.
     pub smallest_gain: f64,
-    /// Columns and rows of the blocks that count as independent of each other in the test.
+    /// Columns and rows of the blocks that count as independent of each other in the test. Default: 8.
     pub block: usize,
 }
 

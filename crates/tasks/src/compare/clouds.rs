@@ -196,12 +196,15 @@ fn prepared(path: &Path) -> Result<Prepared> {
 /// A value for each point; the same whatever the number of threads.
 fn each(
     points: &[Point3<f64>],
-    value: impl Fn(&Point3<f64>) -> point_cloud::Result<f64> + Sync + Send,
-) -> point_cloud::Result<Vec<f64>> {
+    value: impl Fn(&Point3<f64>) -> std::result::Result<f64, point_cloud::Error> + Sync + Send,
+) -> std::result::Result<Vec<f64>, point_cloud::Error> {
     points.par_iter().with_min_len(CHUNK).map(value).collect()
 }
 
-fn registered(source: &Cloud, target: &Cloud) -> icp_registration::Result<(Isometry3<f64>, CloudAlignment)> {
+fn registered(
+    source: &Cloud,
+    target: &Cloud,
+) -> std::result::Result<(Isometry3<f64>, CloudAlignment), icp_registration::Error> {
     let every = source.len().div_ceil(REGISTERED_POINTS);
     let selection = if every > 1 { Selection::EveryNth(every) } else { Selection::All };
     // Differences are looked at point by point: accuracy comes before time.

@@ -1,7 +1,7 @@
 //! Signed distances to the surface that a cloud samples.
 
 use nalgebra::{Matrix3, Point3, SymmetricEigen, Vector3};
-use point_cloud::{Cloud, NeighbourTree, Result};
+use point_cloud::{Cloud, NeighbourTree};
 
 /// Neighbours that a plane is laid through.
 const NEIGHBOURS: usize = 10;
@@ -34,7 +34,7 @@ impl<'a> Surface<'a> {
     }
 
     /// Signed distance of a point, metre; NaN where the reference has no surface.
-    pub(crate) fn distance(&self, point: &Point3<f64>) -> Result<f64> {
+    pub(crate) fn distance(&self, point: &Point3<f64>) -> Result<f64, point_cloud::Error> {
         let neighbours = self.tree.k_nearest(point, NEIGHBOURS)?;
         if neighbours.len() < 3 {
             return Ok(f64::NAN);

@@ -71,8 +71,12 @@ impl Estimate {
         };
         let mut complex: Vec<Vec<ComplexFrame>> = Vec::new();
         for (_, frames) in stations {
-            complex
-                .push(frames.iter().map(|frame| demodulate(frame, &demodulation)).collect::<range_image::Result<_>>()?);
+            complex.push(
+                frames
+                    .iter()
+                    .map(|frame| demodulate(frame, &demodulation))
+                    .collect::<std::result::Result<_, range_image::Error>>()?,
+            );
         }
         let check = check_complex_sigma(&complex, estimate.fit.estimator)?;
         let parameters = estimate.parameters();

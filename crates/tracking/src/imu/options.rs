@@ -36,7 +36,7 @@ impl InertialSample {
 /// Noise and mounting of an inertial unit. The defaults are those of a small unit of a phone.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ImuOptions {
-    /// Pose of the body (the axes of the inertial unit) in the camera's frame.
+    /// Pose of the body (the axes of the inertial unit) in the camera's frame. Default: the identity.
     pub camera_from_body: Isometry3<f64>,
     /// Noise density of the rates, rad/s/√Hz. Default 2e-4.
     pub gyro_noise: f64,

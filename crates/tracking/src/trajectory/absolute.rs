@@ -23,11 +23,12 @@ pub enum TrajectoryAlignment {
 /// Options of both trajectory errors.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrajectoryErrorOptions {
-    /// Poses belong together if their times differ by no more, second.
+    /// Poses belong together if their times differ by no more, second. Default: 0.01 s.
     pub max_time_difference_s: f64,
-    /// Alignment for the absolute error; the relative one needs none.
+    /// Alignment for the absolute error; the relative one needs none. Default: [`TrajectoryAlignment::Rigid`].
     pub alignment: TrajectoryAlignment,
-    /// Largest deviation of a step from the one wanted, as a share of it; for steps in seconds and metres.
+    /// Largest deviation of a step from the one wanted, as a share of it; for steps in seconds and metres. Default:
+    /// 0.1.
     pub step_tolerance: f64,
 }
 

@@ -4,6 +4,14 @@ use range_image::{RangeFrame, Raster};
 
 use crate::{DriftError, DriftResult};
 
+/// Most that a pixel may scatter about the change of all, as a multiple of its variance from frame to frame: what wanders is
+/// then as large as the noise. A variance from n frames is known to `sqrt(2 / n)` of itself: over twenty frames
+/// the ratio is three of these. A smaller one takes warming that differs from pixel to pixel for motion.
+const LARGEST_VARIANCE_RATIO: f64 = 2.0;
+/// Largest share of pixels that scatter more. A choice: with a larger share the mean change of the others is believed while
+/// more of the scene moves, with a smaller one captures with a little motion are refused.
+const LARGEST_MOVED_SHARE: f64 = 0.2;
+
 /// Which pixels tell a change of range, and when a scene counts as at rest.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ChangeOptions {
@@ -12,24 +20,13 @@ pub struct ChangeOptions {
     pub least_valid_share: f64,
     /// Fewest such pixels. Default 20.
     pub least_pixels: usize,
-    /// Most that a pixel may scatter about the change of all, as a multiple of its variance from frame to frame.
-    /// Default 2: what wanders is as large as the noise.
-    pub largest_variance_ratio: f64,
-    /// Largest share of pixels that scatter more. Default 20 %.
-    pub largest_moved_share: f64,
-    /// The ambiguity interval, metre, where ranges are wrapped to one: changes are taken modulo it.
+    /// The ambiguity interval, metre, where ranges are wrapped to one: changes are taken modulo it. Default: `None`.
     pub interval_m: Option<f64>,
 }
 
 impl Default for ChangeOptions {
     fn default() -> Self {
-        Self {
-            least_valid_share: 0.99,
-            least_pixels: 20,
-            largest_variance_ratio: 2.0,
-            largest_moved_share: 0.2,
-            interval_m: None,
-        }
+        Self { least_valid_share: 0.99, least_pixels: 20, interval_m: None }
     }
 }
 
@@ -48,13 +45,6 @@ impl ChangeOptions {
         for (name, value, holds, expected) in [
             ("least_valid_share", self.least_valid_share, share(self.least_valid_share), "a share up to 1"),
             ("least_pixels", self.least_pixels as f64, self.least_pixels > 0, "at least one pixel"),
-            (
-                "largest_variance_ratio",
-                self.largest_variance_ratio,
-                self.largest_variance_ratio.is_finite() && self.largest_variance_ratio > 1.0,
-                "a ratio above 1",
-            ),
-            ("largest_moved_share", self.largest_moved_share, share(self.largest_moved_share), "a share up to 1"),
             ("interval_m", interval_m, interval_m.is_finite() && interval_m > 0.0, "a positive length"),
         ] {
             if !holds {
@@ -172,7 +162,8 @@ pub struct RangeChange {
     pub sigma_m: f64,
 }
 
-/// Deviations of its noise beyond which a pixel takes no part in the mean of a frame.
+/// Deviations of its noise beyond which a pixel takes no part in the mean of a frame. By chance one normal value in
+/// sixteen thousand.
 const GROSS: f64 = 4.0;
 
 impl ChangeMeter {
@@ -220,9 +211,9 @@ impl ChangeMeter {
     /// # Errors
     /// [`DriftError::SceneMoves`] where they are too many.
     pub fn moved_share(&self) -> DriftResult<f64> {
-        let limit = self.options.largest_variance_ratio;
+        let limit = LARGEST_VARIANCE_RATIO;
         let moved = self.pixels.iter().filter(|pixel| pixel.squares > limit * pixel.variance * pixel.count as f64);
-        let (share, limit) = (moved.count() as f64 / self.pixels.len() as f64, self.options.largest_moved_share);
+        let (share, limit) = (moved.count() as f64 / self.pixels.len() as f64, LARGEST_MOVED_SHARE);
         if share > limit { Err(DriftError::SceneMoves { share, limit }) } else { Ok(share) }
     }
 }

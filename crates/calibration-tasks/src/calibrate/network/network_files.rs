@@ -95,7 +95,10 @@ fn take_drifts(
     Ok(drifts)
 }
 
-pub(crate) fn optional<T>(path: &Path, read: fn(PathBuf) -> range_io::Result<PlacedRows<T>>) -> Result<PlacedRows<T>> {
+pub(crate) fn optional<T>(
+    path: &Path,
+    read: fn(PathBuf) -> std::result::Result<PlacedRows<T>, range_io::Error>,
+) -> Result<PlacedRows<T>> {
     if path.is_file() { Ok(read(path.to_owned())?) } else { Ok(PlacedRows::none(path)) }
 }
 

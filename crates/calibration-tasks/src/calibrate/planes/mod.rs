@@ -190,7 +190,7 @@ impl<'a> Scene<'a> {
     }
 }
 
-fn plane_of((normal, d): ([f64; 3], f64)) -> primitives::Result<Plane> {
+fn plane_of((normal, d): ([f64; 3], f64)) -> std::result::Result<Plane, primitives::Error> {
     let normal = Vector3::from(normal);
     Plane::new(&normal, &Point3::from(normal * (d / normal.norm_squared())))
 }

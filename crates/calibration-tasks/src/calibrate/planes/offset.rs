@@ -2,9 +2,7 @@
 //! a plane.
 
 use error_models::{FixedPattern, RangeErrorModel};
-use range_calibration::{
-    DifferenceOptions, OffsetSample, OffsetTable, OffsetTableOptions, Result, estimate_offset_table,
-};
+use range_calibration::{DifferenceOptions, OffsetSample, OffsetTable, OffsetTableOptions, estimate_offset_table};
 use serde::Serialize;
 use statistics::retain_within;
 
@@ -50,7 +48,7 @@ impl FoundTable {
         pixels: &DifferenceOptions,
         rewraps: bool,
         block: usize,
-    ) -> Result<Self> {
+    ) -> Result<Self, range_calibration::Error> {
         let mut samples = Vec::new();
         for placed in placed {
             for sample in placed.samples(start, pixels, rewraps)? {

@@ -1,7 +1,7 @@
 //! A capture of a plane with the plane and the pose that it is calibrated with.
 
 use nalgebra::Isometry3;
-use range_calibration::{DifferenceOptions, Plane, PlaneCapture, RangeDifference, Result, differences_to_plane};
+use range_calibration::{DifferenceOptions, Plane, PlaneCapture, RangeDifference, differences_to_plane};
 use range_image::Modulation;
 
 use crate::calibrate::planes::planes_outcome::Sample;
@@ -18,7 +18,12 @@ pub(crate) struct Placed<'a> {
 impl Placed<'_> {
     /// The differences of every so many pixels to the plane, with their places. `rewraps`: the reference tells the number
     /// of whole intervals better than the phases could.
-    pub(crate) fn samples(&self, start: &Start, options: &DifferenceOptions, rewraps: bool) -> Result<Vec<Sample>> {
+    pub(crate) fn samples(
+        &self,
+        start: &Start,
+        options: &DifferenceOptions,
+        rewraps: bool,
+    ) -> Result<Vec<Sample>, range_calibration::Error> {
         let capture = self.capture;
         let differences = differences_to_plane(capture.frame, &start.camera, &self.pose, &self.plane, options)?;
         let format = start.camera.format;

@@ -2,7 +2,7 @@
 
 use error_models::{AmplitudeHyperbola, ModelSet, NamedParameter, ParameterStatus, RangeErrorModel};
 use nalgebra::{DMatrix, DVector};
-use range_calibration::{PlaneCalibration, RangeCalibration, RangeDifference, Result, Scale};
+use range_calibration::{PlaneCalibration, RangeCalibration, RangeDifference, Scale};
 use range_io::calibration::Calibration;
 use self_calibration::{
     CalibratedParameter, CalibrationOutcome, Component, GroupQuality, Method, ObservationQuality, Verdict,
@@ -41,7 +41,10 @@ pub(crate) struct Found {
 
 impl Found {
     /// From differences to known planes.
-    pub(crate) fn of_differences(samples: Vec<Sample>, estimate: &RangeCalibration) -> Result<Self> {
+    pub(crate) fn of_differences(
+        samples: Vec<Sample>,
+        estimate: &RangeCalibration,
+    ) -> Result<Self, range_calibration::Error> {
         let covariance = estimate.covariance(Scale::Prior)?;
         let sigma0 = estimate.sigma0();
         let mut vtpv = 0.0;
@@ -74,7 +77,11 @@ impl Found {
 
     /// From planes that were found together with the terms. A pixel beyond `rejection` standard deviations counts as
     /// rejected; how much each pixel controls itself is not known.
-    pub(crate) fn of_planes(samples: Vec<Sample>, estimate: &PlaneCalibration, rejection: Option<f64>) -> Result<Self> {
+    pub(crate) fn of_planes(
+        samples: Vec<Sample>,
+        estimate: &PlaneCalibration,
+        rejection: Option<f64>,
+    ) -> Result<Self, range_calibration::Error> {
         let model = estimate.model();
         let sigma0 = estimate.sigma0();
         let residual = |sample: Sample| {
@@ -211,7 +218,10 @@ fn quality(sample: Sample, residual: f64) -> ObservationQuality {
 }
 
 /// Derivatives of the correction by the estimated parameters.
-fn design_row(estimate: &RangeCalibration, difference: &RangeDifference) -> Result<DVector<f64>> {
+fn design_row(
+    estimate: &RangeCalibration,
+    difference: &RangeDifference,
+) -> Result<DVector<f64>, range_calibration::Error> {
     let model = estimate.model();
     let mut terms = vec![0.0; model.parameter_count()];
     model.design_row_into(difference.observed_range_m, difference.x_mm, difference.y_mm, &mut terms)?;

@@ -58,16 +58,18 @@ pub enum Selection {
 /// Options of an ICP run. The defaults carry no scale: distances left at `None` come from the clouds.
 #[derive(Debug, Clone, PartialEq)]
 pub struct IcpOptions {
-    /// What is minimised.
+    /// What is minimised. Default: [`Metric::Automatic`].
     pub metric: Metric,
-    /// Source points that take part.
+    /// Source points that take part. Default: [`Selection::All`].
     pub selection: Selection,
-    /// Largest distance of a pair at the end, metre. `None`: three times the spacing of the target (90 % quantile).
+    /// Largest distance of a pair at the end, metre. `None`, the default: three times the spacing of the target (90 %
+    /// quantile).
     pub max_correspondence_distance_m: Option<f64>,
-    /// Largest distance of a pair at the start, halved level by level down to the one above. `None`: 2.5 times the
-    /// median distance at the guess, but at least a quarter of the target's radius and at most all of it.
+    /// Largest distance of a pair at the start, halved level by level down to the one above. `None`, the default: 2.5
+    /// times the median distance at the guess, but at least a quarter of the target's radius and at most all of it.
     pub initial_correspondence_distance_m: Option<f64>,
-    /// Robust kernel on the residuals; its scale is their median absolute deviation, anew in each iteration.
+    /// Robust kernel on the residuals; its scale is their median absolute deviation, anew in each iteration. Default:
+    /// [`RobustKernel::Welsch`].
     pub kernel: RobustKernel,
     /// Fraction of the pairs that is kept, those with the smallest distances `[Chetverikov2002]`. Default 1: all.
     pub trim: f64,
@@ -76,16 +78,16 @@ pub struct IcpOptions {
     pub max_normal_angle_rad: Option<f64>,
     /// Iterations in all levels together. Default 100.
     pub max_iterations: usize,
-    /// The run has converged when the step moves points at the cloud's radius by less than this, metre. `None`: 1e-5 of
-    /// that radius.
+    /// The run has converged when the step moves points at the cloud's radius by less than this, metre. `None`, the
+    /// default: 1e-5 of that radius.
     pub step_tolerance_m: Option<f64>,
-    /// What happens to undetermined motions.
+    /// What happens to undetermined motions. Default: [`DegeneracyPolicy::Report`].
     pub degeneracy: DegeneracyPolicy,
     /// Covariance of the guess in the tangent `[dt target axes (m), dtheta source axes (rad)]`, needed and used only
-    /// for [`DegeneracyPolicy::HoldAtPrior`].
+    /// for [`DegeneracyPolicy::HoldAtPrior`]. Default: `None`.
     pub prior_covariance: Option<Matrix6<f64>>,
     /// A motion counts as undetermined when the predicted standard deviation of points at the cloud's radius exceeds
-    /// this, metre. `None`: 1/300 of the radius.
+    /// this, metre. `None`, the default: 1/300 of the radius.
     pub max_motion_sigma_m: Option<f64>,
     /// Fewest pairs. Default 20.
     pub min_correspondences: usize,

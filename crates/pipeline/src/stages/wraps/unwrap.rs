@@ -107,7 +107,7 @@ fn one_frequency(
     mask: &Raster<bool>,
     method: UnwrapMethod,
     spatial: SpatialOptions,
-) -> phase_unwrap::Result<Unwrapped> {
+) -> std::result::Result<Unwrapped, phase_unwrap::Error> {
     let (phase, amplitude) = (channel.phase(), channel.amplitude());
     if method == UnwrapMethod::Tree {
         return unwrap_spatial(&phase, Some(&amplitude), Some(mask), &spatial);

@@ -9,7 +9,8 @@ use crate::estimate::search::response::{Source, Term};
 use crate::estimate::search::scene::{Row, Scene};
 use crate::estimate::{EstimationOptions, Nuisance, TermShape};
 
-/// Widths beyond this many times the longer side of the image are not followed.
+/// Widths beyond this many times the longer side of the image are not followed. Over the image such a Gaussian is a
+/// constant, and its width is not determined.
 const LARGEST_WIDTH: f64 = 2.0;
 /// Steps after which an adjustment is given up: those that end at all take some ten.
 const MAX_ITERATIONS: usize = 60;
@@ -104,13 +105,13 @@ impl Problem<'_> {
     }
 
     /// Adjusts the terms from these starts.
-    pub(in crate::estimate) fn fit(&self, starts: &[StartTerm]) -> adjust::Result<Fit> {
+    pub(in crate::estimate) fn fit(&self, starts: &[StartTerm]) -> Result<Fit, adjust::Error> {
         self.fit_with(self.huber_limit().map_or(Kernel::LeastSquares, Kernel::Huber), starts)
     }
 
     /// Adjusts the nuisances alone. Where scattering is all that there is to see, most observations are outliers, and
     /// where a robust adjustment finds no end, least squares does: it is only compared with others.
-    pub(in crate::estimate) fn fit_nothing(&self) -> adjust::Result<Fit> {
+    pub(in crate::estimate) fn fit_nothing(&self) -> Result<Fit, adjust::Error> {
         self.fit(&[]).or_else(|_| self.fit_with(Kernel::LeastSquares, &[]))
     }
 
@@ -118,7 +119,7 @@ impl Problem<'_> {
         self.options.huber_limit.map(|limit| limit * self.scale)
     }
 
-    fn fit_with(&self, kernel: Kernel, starts: &[StartTerm]) -> adjust::Result<Fit> {
+    fn fit_with(&self, kernel: Kernel, starts: &[StartTerm]) -> Result<Fit, adjust::Error> {
         let largest = LARGEST_WIDTH * self.longer_side;
         let sources: Vec<(usize, &Source)> =
             self.scenes.iter().enumerate().filter_map(|(i, scene)| Some((i, scene.source.as_ref().ok()?))).collect();
@@ -148,7 +149,7 @@ impl Problem<'_> {
         self.read(&solution, &terms, &used, &ids)
     }
 
-    fn add_terms(&self, network: &mut Adjustment<'_>, starts: &[StartTerm]) -> adjust::Result<Vec<BlockId>> {
+    fn add_terms(&self, network: &mut Adjustment<'_>, starts: &[StartTerm]) -> Result<Vec<BlockId>, adjust::Error> {
         let mut out = Vec::with_capacity(starts.len());
         for (index, start) in starts.iter().enumerate() {
             let [across, down] = start.term.sigma_px.map(f64::ln);
@@ -177,7 +178,7 @@ impl Problem<'_> {
         network: &mut Adjustment<'_>,
         scene: usize,
         terms: &[BlockId],
-    ) -> adjust::Result<Vec<BlockId>> {
+    ) -> Result<Vec<BlockId>, adjust::Error> {
         let mut ids = terms.to_vec();
         for (nuisance, name) in [(Nuisance::Drift, "drift"), (Nuisance::Constant, "constant")] {
             if !self.options.has(nuisance) {
@@ -199,7 +200,7 @@ impl Problem<'_> {
         terms: &[BlockId],
         used: &[usize],
         ids: &[Vec<BlockId>],
-    ) -> adjust::Result<Fit> {
+    ) -> Result<Fit, adjust::Error> {
         let (adjusted, covariance) = natural_parameters(solution, terms)?;
         let sigma0 = solution.sigma0().unwrap_or(f64::NAN);
         let inflation = inflation(sigma0);
@@ -257,7 +258,7 @@ fn inflation(sigma0: f64) -> f64 {
 }
 
 /// Terms and their covariance, widths in pixels instead of their logarithms.
-fn natural_parameters(solution: &Solution, blocks: &[BlockId]) -> adjust::Result<(Vec<Term>, DMatrix<f64>)> {
+fn natural_parameters(solution: &Solution, blocks: &[BlockId]) -> Result<(Vec<Term>, DMatrix<f64>), adjust::Error> {
     let (mut terms, mut scale) = (Vec::new(), Vec::new());
     for &block in blocks {
         let values = solution.values(block)?;

@@ -9,11 +9,14 @@ use crate::estimate::{Capture, ForegroundCapture, TwoPlaneCapture};
 
 /// Values of which nothing may be concluded.
 const UNUSABLE: Flags = Flags::SATURATED.union(Flags::NO_DATA).union(Flags::MOTION);
-/// Half width of the window from which the light of a source pixel without a value is filled.
+/// Half width of the window from which the light of a source pixel without a value is filled. A choice; a wider window
+/// crosses the edge of small objects.
 const FILL_REACH: usize = 2;
-/// Share of the source's pixels without a value beyond which its light is not known.
+/// Share of the source's pixels without a value beyond which its light is not known. A choice: scatter of a source that
+/// is known to a twentieth is known no better.
 const LARGEST_LOSS: f64 = 0.05;
-/// Least mean modulus of the source's light, in standard deviations of a pixel.
+/// Least mean modulus of the source's light, in standard deviations of a pixel. A choice; what dimmer sources scatter
+/// drowns in the noise.
 const DIMMEST_SOURCE: f64 = 3.0;
 
 /// One observed number: `light · c + drift · g + constant · k` with the scattered light c of its block, the drift g and

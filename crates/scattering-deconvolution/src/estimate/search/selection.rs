@@ -5,11 +5,14 @@ use crate::estimate::search::fit::{Fit, Problem, StartTerm, Unknown};
 use crate::estimate::search::start::Dictionary;
 use crate::estimate::{EstimationOptions, TermCount};
 
-/// Standard deviation of the logarithm of a width beyond which the width is not known: a factor of 1.4 either way.
+/// Standard deviation of the logarithm of a width beyond which the width is not known: a factor of 1.4 either way. A
+/// choice; a larger one states widths that another capture contradicts.
 const LARGEST_LOG_DEVIATION: f64 = 0.35;
-/// Share of the longer side of the image from which on a width that is not known is one that the image is too small for.
+/// Share of the longer side of the image from which on a width that is not known is one that the image is too small
+/// for. A choice; it decides between two verdicts on a width and no number.
 const WIDE: f64 = 0.4;
-/// By how much Schwarz's criterion has to be better for an adjustment that was refused to be missed.
+/// By how much Schwarz's criterion has to be better for an adjustment that was refused to be missed. Odds of 150 to 1
+/// `[Schwarz1978]`.
 const MISSED: f64 = 10.0;
 
 /// The adjustment that was chosen.
@@ -23,7 +26,7 @@ pub(in crate::estimate) struct Choice {
 }
 
 /// Tries the numbers of Gaussians asked for and takes the best that is determined.
-pub(in crate::estimate) fn choose(problem: &Problem<'_>, dictionary: &Dictionary) -> adjust::Result<Choice> {
+pub(in crate::estimate) fn choose(problem: &Problem<'_>, dictionary: &Dictionary) -> Result<Choice, adjust::Error> {
     let empty = problem.fit_nothing()?;
     let mut candidates = vec![candidate(0, Ok(&empty), None)];
     let counts = match problem.options.terms {

@@ -13,7 +13,7 @@ const WIDTHS: usize = 9;
 /// Narrowest width, in pixels or blocks, whichever is more.
 const NARROWEST_PX: f64 = 2.0;
 const NARROWEST_BLOCKS: f64 = 0.7;
-/// Widest width as a share of the longer side of the image.
+/// Widest width as a share of the longer side of the image. Only a start.
 const WIDEST: f64 = 0.6;
 
 /// Normal equations of all dictionary widths, the nuisances of each scene reduced.

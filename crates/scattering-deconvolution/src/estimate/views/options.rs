@@ -40,26 +40,27 @@ pub enum Nuisance {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
 pub struct EstimationOptions {
-    /// Number of Gaussians.
+    /// Number of Gaussians. Default: `AtMost(3)`.
     pub terms: TermCount,
-    /// Their shape.
+    /// Their shape. Default: [`TermShape::Round`].
     pub shape: TermShape,
-    /// What else may have changed.
+    /// What else may have changed. Default: [`Nuisance::Drift`] alone.
     pub nuisances: Vec<Nuisance>,
     /// Edge of the square blocks of pixels whose means are observed. Unless given, a 44th of the longer side of the
-    /// image, 2 to 8 pixels.
+    /// image, 2 to 8 pixels. Default: `None`.
     pub block_px: Option<usize>,
-    /// Pixels about the object that are left out: edges are mixed of object and background.
+    /// Pixels about the object that are left out: edges are mixed of object and background. Default: 3 pixels.
     pub rim_px: usize,
-    /// A pixel belongs to the object where its light changed by more than this share of the largest change.
+    /// A pixel belongs to the object where its light changed by more than this share of the largest change. Default:
+    /// 0.1.
     pub object_share: f64,
     /// Observations further from the model than so many standard deviations count with less weight (Huber). `None` is
-    /// least squares.
+    /// least squares. Default: 3.
     pub huber_limit: Option<f64>,
-    /// A weight is taken for scattering where it is so many times its standard deviation.
+    /// A weight is taken for scattering where it is so many times its standard deviation. Default: 4.
     pub significance: f64,
     /// Scatter below this share of the light does not matter. Captures that would not show so much are no proof that
-    /// nothing is scattered.
+    /// nothing is scattered. Default: 0.005.
     pub relevant_weight: f64,
 }
 

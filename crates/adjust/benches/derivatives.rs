@@ -15,7 +15,7 @@ use adjust::{
     Adjustment, BlockId, Covariance, Differentiated, EvaluationFailure, FunctionObservation, Jacobians, Observation,
     ParameterBlock, Parameters, Real, ResidualFunction, SolveOptions,
 };
-use criterion::{Criterion, criterion_group, criterion_main};
+use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use differentiated_camera::Seen;
 use range_camera::{LABORATORY, RangeCameraNetwork, SIGMAS, range_camera_network};
 
@@ -98,8 +98,8 @@ impl<O: Observation> Observation for Timed<'_, O> {
 
 /// The residual and the Jacobian of one sighting, as the adjustment asks for them: 3 values, 26 parameters.
 fn alone(criterion: &mut Criterion, pool: &rayon::ThreadPool, network: &RangeCameraNetwork) {
-    let mut group = criterion.benchmark_group("residual and Jacobian of a sighting, 3 values, 26 parameters");
-    group.sample_size(20);
+    let mut group = criterion.benchmark_group("evaluate");
+    group.sample_size(20).throughput(Throughput::Elements(3));
     for (name, by_hand) in [("by hand", true), ("dual numbers", false)] {
         let spent = Mutex::new((Duration::ZERO, 0));
         let mut a = differentiated_camera::differentiated_blocks(network);
@@ -115,7 +115,7 @@ fn alone(criterion: &mut Criterion, pool: &rayon::ThreadPool, network: &RangeCam
                 a.add_observation(sightings, Timed { inner, spent: &spent }, &covariance).unwrap();
             }
         }
-        group.bench_function(name, |b| {
+        group.bench_function(format!("sighting of 26 parameters, {name}"), |b| {
             b.iter_custom(|iterations| {
                 *spent.lock().unwrap() = (Duration::ZERO, 0);
                 pool.install(|| a.solve(&SolveOptions::default()).unwrap());
@@ -135,13 +135,17 @@ fn derivatives(criterion: &mut Criterion) {
     alone(criterion, &pool, &network);
     let dual = differentiated_camera::differentiated(&network);
     let mut compare = |name: &str, hand: &Adjustment<'_>, dual: &Adjustment<'_>| {
-        let mut group = criterion.benchmark_group(name);
-        group.bench_function("by hand", |b| b.iter(|| pool.install(|| hand.solve(&options).unwrap())));
-        group.bench_function("dual numbers", |b| b.iter(|| pool.install(|| dual.solve(&options).unwrap())));
+        let mut group = criterion.benchmark_group("solve");
+        group.throughput(Throughput::Elements(hand.solve(&options).unwrap().observations() as u64));
+        for (derivatives, adjustment) in [("by hand", hand), ("dual numbers", dual)] {
+            group.bench_function(format!("{name}, derivatives {derivatives}"), |b| {
+                b.iter(|| pool.install(|| adjustment.solve(&options).unwrap()));
+            });
+        }
         group.finish();
     };
-    compare("network of 470 unknowns, 3078 values", &network.adjustment, &dual);
-    compare("two decaying sums, 200 values", &decay(true), &decay(false));
+    compare("470 unknowns", &network.adjustment, &dual);
+    compare("two decaying sums", &decay(true), &decay(false));
 }
 
 criterion_group!(benches, derivatives);

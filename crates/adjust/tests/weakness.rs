@@ -58,6 +58,15 @@ fn several_weak_combinations_are_named_with_their_size() {
     );
     assert!(blocks[..2].contains(block) && (name == "d0" || name == "tz"));
     assert!(first.correlations[0].2 < -0.999_999);
+    // The functional is known no better than the inflation says.
+    let variance = |&(one, i, a): &(BlockId, usize, f64)| -> f64 {
+        let with = |&(other, j, b): &(BlockId, usize, f64)| {
+            a * b * solution.covariance_between(one, other, adjust::Scale::Prior).unwrap()[(i, j)]
+        };
+        first.functional.iter().map(with).sum()
+    };
+    let variance: f64 = first.functional.iter().map(variance).sum();
+    assert_relative_eq!(variance.sqrt(), first.inflation, max_relative = 1e-9);
     // In metre per 1000: the scale's deviation is in its own unit.
     let d1 = solution.standard_deviations(blocks[0], adjust::Scale::Prior).unwrap()[1];
     let slope = solution.standard_deviations(blocks[1], adjust::Scale::Prior).unwrap()[1];

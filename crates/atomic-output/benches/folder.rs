@@ -7,7 +7,7 @@ use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 fn folder(criterion: &mut Criterion) {
     let scratch = tempfile::tempdir().unwrap();
     let target = scratch.path().join("out");
-    let mut group = criterion.benchmark_group("folder");
+    let mut group = criterion.benchmark_group("commit");
     for files in [1_u64, 20] {
         group.sample_size(10).throughput(Throughput::Elements(files));
         group.bench_function(format!("{files} files"), |bencher| {

@@ -20,9 +20,9 @@ fn network(criterion: &mut Criterion) {
     };
     let setup = begin();
     let solved = setup.solve().unwrap();
-    let mut group = criterion.benchmark_group("network");
+    let mut group = criterion.benchmark_group("Setup");
     group.sample_size(10).throughput(Throughput::Elements(3 * observed.sightings.len() as u64));
-    group.bench_function("start values", |bencher| bencher.iter(begin));
+    group.bench_function("from_network", |bencher| bencher.iter(begin));
     group.bench_function("solve", |bencher| bencher.iter(|| setup.solve().unwrap()));
     group.bench_function("strength", |bencher| bencher.iter(|| setup.strength(&solved).unwrap()));
     group.finish();

@@ -8,7 +8,7 @@ use calibration_tasks::{
     CalibrateMethod, CalibrateRequest, CalibrationOptions, CertificateRequest, Method, OffsetModel, TableDefaults,
     calibrate,
 };
-use criterion::{Criterion, criterion_group, criterion_main};
+use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use pipeline::{DriftTreatment, Silent};
 
 fn target_field(criterion: &mut Criterion) {
@@ -25,9 +25,10 @@ fn target_field(criterion: &mut Criterion) {
         certificate: CertificateRequest::default(),
         out: folder.path().join("out"),
     };
-    let mut group = criterion.benchmark_group("target_field");
-    group.sample_size(10);
-    group.bench_function("calibrate", |bencher| bencher.iter(|| calibrate(&request, &Silent)));
+    let mut group = criterion.benchmark_group("calibrate");
+    // Two image coordinates and a range of each sighting.
+    group.sample_size(10).throughput(Throughput::Elements(3 * 661));
+    group.bench_function("target_field", |bencher| bencher.iter(|| calibrate(&request, &Silent)));
     group.finish();
 }
 

@@ -43,6 +43,8 @@ fn main() -> Result<(), Failure> {
     let auto = words.next().is_some_and(|word| word == "auto");
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fixtures/networks");
     let mut broken = Vec::new();
+    println!("| network | calibrated | refused | doubted | error²/variance per unknown: mean | median | largest |");
+    println!("|---|---|---|---|---|---|---|");
     for (name, method) in NETWORKS.into_iter().filter(|(name, _)| asked.as_ref().is_none_or(|asked| asked == name)) {
         let figures = of_network(&folder.join(name).with_extension("ron"), method, auto, seeds)?;
         broken.extend(figures.broken(name));
@@ -72,8 +74,7 @@ impl Figures {
         let largest = self.sound.last().map_or(f64::NAN, per_unknown);
         let median = self.sound.get(self.sound.len() / 2).map_or(f64::NAN, per_unknown);
         println!(
-            "{name:<14} {} calibrated, {} refused, {} doubted; squared error over variance per unknown: mean {mean:.3}, \
-             median {median:.2}, largest {largest:.2}",
+            "| `{name}` | {} | {} | {} | {mean:.3} | {median:.2} | {largest:.2} |",
             self.sound.len(),
             self.refused.len(),
             self.doubted

@@ -33,7 +33,7 @@ fn frame(width: usize, height: usize) -> RangeFrame {
 }
 
 fn frames(criterion: &mut Criterion) {
-    let mut group = criterion.benchmark_group("frame");
+    let mut group = criterion.benchmark_group("PointCloud");
     for (width, height) in SIZES {
         let Ok(camera) = camera(width, height) else { continue };
         let Ok(table) = RayTable::new(&camera) else { continue };
@@ -57,10 +57,13 @@ fn observations(criterion: &mut Criterion) {
     let Ok(camera) = camera(176, 144) else { return };
     let pose = pose_from_euler(Vector3::new(1.0, 2.0, 3.0), [0.1, -0.2, 0.05]);
     let point: Point3<f64> = pose * Point3::new(0.7, -0.4, -2.5);
-    criterion.bench_function("observe", |b| b.iter(|| camera.observe(black_box(&pose), black_box(&point))));
-    criterion.bench_function("observe_with_jacobians", |b| {
+    let mut group = criterion.benchmark_group("observe");
+    group.throughput(Throughput::Elements(1));
+    group.bench_function("value", |b| b.iter(|| camera.observe(black_box(&pose), black_box(&point))));
+    group.bench_function("with Jacobians", |b| {
         b.iter(|| camera.observe_with_jacobians(black_box(&pose), black_box(&point)));
     });
+    group.finish();
 }
 
 criterion_group!(benches, frames, observations);

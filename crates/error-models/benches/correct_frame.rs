@@ -1,7 +1,7 @@
 //! Correction of whole frames, its inverse, and flags of gross errors.
 #![allow(missing_docs, clippy::unwrap_used)]
 
-use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
+use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
 use error_models::{
     AmplitudeHyperbola, FixedPattern, FurtherShape, FurtherTerms, GrossErrorOptions, PolynomialShape, RangeErrorModel,
     RangeTerms, SurfaceShape, correct_frame, distort_frame, flag_gross_errors,
@@ -46,7 +46,10 @@ fn frames(criterion: &mut Criterion) {
         let format = ImageFormat::new(width, height, [0.01; 2]).unwrap();
         let pattern = FixedPattern { width, height, offset_m: vec![1e-3; width * height], sigma_m: Vec::new() };
         let (frame, model) = (frame(width, height), model());
-        criterion.bench_function(&format!("correct_frame/{width}x{height}/1 thread"), |bencher| {
+        let size = format!("{width}x{height}, one thread");
+        let mut group = criterion.benchmark_group("CorrectRange");
+        group.throughput(Throughput::Elements((width * height) as u64));
+        group.bench_function(&size, |bencher| {
             bencher.iter_batched_ref(
                 || frame.clone(),
                 |frame| one_thread.install(|| correct_frame(frame, &model, &format, [0.0; 2], Some(&pattern))),
@@ -54,27 +57,31 @@ fn frames(criterion: &mut Criterion) {
             );
         });
         let further = with_further_terms(&format);
-        criterion.bench_function(
-            &format!("correct_frame with spline, polynomial, surface/{width}x{height}/1 thread"),
-            |bencher| {
-                bencher.iter_batched_ref(
-                    || frame.clone(),
-                    |frame| one_thread.install(|| correct_frame(frame, &further, &format, [0.0; 2], Some(&pattern))),
-                    BatchSize::LargeInput,
-                );
-            },
-        );
-        criterion.bench_function(&format!("distort_frame/{width}x{height}/1 thread"), |bencher| {
+        group.bench_function(format!("spline, polynomial, surface, {size}"), |bencher| {
+            bencher.iter_batched_ref(
+                || frame.clone(),
+                |frame| one_thread.install(|| correct_frame(frame, &further, &format, [0.0; 2], Some(&pattern))),
+                BatchSize::LargeInput,
+            );
+        });
+        group.finish();
+        let mut group = criterion.benchmark_group("distort_frame");
+        group.throughput(Throughput::Elements((width * height) as u64));
+        group.bench_function(&size, |bencher| {
             bencher.iter_batched_ref(
                 || frame.clone(),
                 |frame| one_thread.install(|| distort_frame(frame, &model, &format, [0.0; 2], Some(&pattern))),
                 BatchSize::LargeInput,
             );
         });
-        criterion.bench_function(&format!("flag_gross_errors/{width}x{height}/1 thread"), |bencher| {
+        group.finish();
+        let mut group = criterion.benchmark_group("Flag");
+        group.throughput(Throughput::Elements((width * height) as u64));
+        group.bench_function(&size, |bencher| {
             let (mut frame, options) = (stepped_wall(width, height), GrossErrorOptions::default());
             bencher.iter(|| one_thread.install(|| flag_gross_errors(&mut frame, &options)));
         });
+        group.finish();
     }
 }
 

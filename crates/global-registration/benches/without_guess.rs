@@ -2,7 +2,7 @@
 
 #![allow(missing_docs)] // criterion_group! makes a public function
 
-use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
+use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use global_registration::{CoarseOptions, FeatureCloud, align_without_guess};
 use nalgebra::{Isometry3, Vector3};
 use point_cloud::Cloud;
@@ -22,11 +22,12 @@ fn frame(width: usize, height: usize) -> Vec<[f64; 3]> {
 }
 
 fn benches(criterion: &mut Criterion) {
-    let mut group = criterion.benchmark_group("coarse");
+    let mut group = criterion.benchmark_group("align_without_guess");
     group.sample_size(10);
     let options = CoarseOptions::default();
     for (width, height) in SIZES {
         let size = format!("{width}x{height}");
+        group.throughput(Throughput::Elements((width * height) as u64));
         let Ok(cloud) = Cloud::from_frame(&frame(width, height), None, None) else { continue };
         group.bench_function(BenchmarkId::new("prepare", &size), |bencher| {
             bencher.iter(|| FeatureCloud::new(&cloud, &options));

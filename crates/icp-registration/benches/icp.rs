@@ -1,8 +1,8 @@
-//! Time of one alignment and of the normals of a frame, for a wavy wall seen twice.
+//! Time of one alignment, for a wavy wall seen twice.
 
 #![allow(missing_docs)] // criterion_group! makes a public function
 
-use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
+use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use icp_registration::{IcpOptions, IcpTarget, Selection};
 use nalgebra::{Isometry3, Vector3};
 use point_cloud::{Cloud, OrganisedNormalOptions, organised_normals};
@@ -21,15 +21,7 @@ fn frame(width: usize, height: usize) -> Vec<[f64; 3]> {
 }
 
 fn benches(criterion: &mut Criterion) {
-    let mut normals = criterion.benchmark_group("organised_normals");
-    for (width, height) in SIZES {
-        let points = frame(width, height);
-        normals.bench_function(BenchmarkId::from_parameter(format!("{width}x{height}")), |bencher| {
-            bencher.iter(|| organised_normals(&points, width, height, &OrganisedNormalOptions::default()));
-        });
-    }
-    normals.finish();
-    let mut icp = criterion.benchmark_group("point_to_plane");
+    let mut icp = criterion.benchmark_group("Register");
     icp.sample_size(10);
     for (width, height) in SIZES {
         let points = frame(width, height);
@@ -41,7 +33,8 @@ fn benches(criterion: &mut Criterion) {
         let moved = Isometry3::new(Vector3::new(0.03, -0.02, 0.01), Vector3::new(0.01, 0.02, -0.01));
         let source = cloud.transformed(&moved);
         let options = IcpOptions { selection: Selection::EveryNth(3), ..IcpOptions::default() };
-        icp.bench_function(BenchmarkId::from_parameter(format!("{width}x{height}")), |bencher| {
+        icp.throughput(Throughput::Elements((width * height) as u64));
+        icp.bench_function(BenchmarkId::new("IcpTarget::align", format!("{width}x{height}")), |bencher| {
             bencher.iter(|| target.align(&source, &Isometry3::identity(), &options));
         });
     }

@@ -2,7 +2,7 @@
 
 #![allow(missing_docs)] // criterion_group! makes a public function
 
-use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
+use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use icp_registration::{VoxelAlignmentOptions, VoxelCloud, VoxelOptions, downsample};
 use nalgebra::{Isometry3, Point3, Vector3};
 use point_cloud::Cloud;
@@ -21,20 +21,21 @@ fn wall(width: usize, height: usize) -> Cloud {
 }
 
 fn benches(criterion: &mut Criterion) {
-    let mut group = criterion.benchmark_group("voxels");
+    let mut group = criterion.benchmark_group("Register");
     group.sample_size(10);
     for (width, height) in SIZES {
         let name = format!("{width}x{height}");
+        group.throughput(Throughput::Elements((width * height) as u64));
         let target = wall(width, height);
         let source =
             target.transformed(&Isometry3::new(Vector3::new(0.03, -0.02, 0.01), Vector3::new(0.01, 0.02, -0.01)));
         group.bench_function(BenchmarkId::new("downsample", &name), |b| b.iter(|| downsample(&target, 0.05)));
-        group.bench_function(BenchmarkId::new("prepare", &name), |b| {
+        group.bench_function(BenchmarkId::new("VoxelCloud::new", &name), |b| {
             b.iter(|| VoxelCloud::new(&target, &VoxelOptions::default()));
         });
         let prepare = |cloud| VoxelCloud::new(cloud, &VoxelOptions::default());
         let (Ok(target), Ok(source)) = (prepare(&target), prepare(&source)) else { continue };
-        group.bench_function(BenchmarkId::new("align", &name), |b| {
+        group.bench_function(BenchmarkId::new("VoxelCloud::align", &name), |b| {
             b.iter(|| target.align(&source, &Isometry3::identity(), &VoxelAlignmentOptions::default()));
         });
     }

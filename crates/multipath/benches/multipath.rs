@@ -1,7 +1,7 @@
 //! Detection, two-path solution and risk of whole frames.
 #![allow(missing_docs, clippy::unwrap_used)]
 
-use criterion::{Criterion, criterion_group, criterion_main};
+use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use multipath::{
     Detection, DetectionOptions, Detector, FrequencyResponse, RiskOptions, TwoPathImage, TwoPathOptions, TwoPathSolver,
     assess_risk,
@@ -61,23 +61,26 @@ fn frames(criterion: &mut Criterion) {
     let response = FrequencyResponse::flat(3);
     let mut detector = Detector::new(&modulations(), &response, &DetectionOptions::default()).unwrap();
     let solver = TwoPathSolver::new(&modulations(), &response, &TwoPathOptions::default()).unwrap();
+    let mut group = criterion.benchmark_group("Multipath");
     for (width, height) in SIZES {
+        group.throughput(Throughput::Elements((width * height) as u64));
         let mut complex = frame(width, height, 10);
         let ranges = Raster::from_fn(width, height, |col, row| range(col, row) as f32);
         let mut detection = Detection::default();
-        criterion.bench_function(&format!("detect/{width}x{height}/1 thread"), |bencher| {
+        group.bench_function(format!("detect/{width}x{height}, one thread"), |bencher| {
             bencher.iter(|| one_thread.install(|| detector.detect_into(&mut complex, &ranges, &mut detection)));
         });
         let mut image = TwoPathImage::default();
-        criterion.bench_function(&format!("two paths in a tenth/{width}x{height}/1 thread"), |bencher| {
+        group.bench_function(format!("two paths in a tenth/{width}x{height}, one thread"), |bencher| {
             bencher.iter(|| one_thread.install(|| solver.solve_into(&complex, &mut image)));
         });
         let (mut scene, directions) = corner(width, height);
         let options = RiskOptions { modulation_hz: Some(30e6), ..RiskOptions::for_width(width) };
-        criterion.bench_function(&format!("risk/{width}x{height}/1 thread"), |bencher| {
+        group.bench_function(format!("risk/{width}x{height}, one thread"), |bencher| {
             bencher.iter(|| one_thread.install(|| assess_risk(&mut scene, &directions, &options)));
         });
     }
+    group.finish();
 }
 
 criterion_group! {

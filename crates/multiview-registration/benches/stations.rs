@@ -46,14 +46,14 @@ fn benches(criterion: &mut Criterion) {
     let Ok(projection) = Projection::pinhole(width, height, [width as f64; 2], centre).map(Arc::new) else { return };
     let frame = |points: &Vec<[f64; 3]>| OrganisedFrame::new(&projection, points, None);
     let Ok(frames) = points.iter().map(frame).collect::<Result<Vec<OrganisedFrame>, _>>() else { return };
-    let mut group = criterion.benchmark_group("register");
+    let mut group = criterion.benchmark_group("Adjust");
     group.sample_size(10).throughput(Throughput::Elements((STATIONS * width * height) as u64));
-    group.bench_function("stations", |bencher| {
+    group.bench_function("register_stations", |bencher| {
         let options = StationRegistrationOptions::default();
         bencher
             .iter(|| register_stations(&clouds, Start::Poses(&poses), Datum::Station(0), &options, &|_, _| {}).is_ok());
     });
-    group.bench_function("frames", |bencher| {
+    group.bench_function("register_frames", |bencher| {
         let options = FrameAlignmentOptions::default();
         bencher.iter(|| register_frames(&frames, Start::Order, &options, &|_, _| {}).is_ok());
     });

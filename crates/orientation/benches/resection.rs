@@ -4,7 +4,7 @@
 use std::hint::black_box;
 
 use camera_model::{Camera, ImageFormat, InteriorOrientation, LensDistortion, pose_from_euler};
-use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
+use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use nalgebra::{Point3, Vector3};
 use orientation::{ResectionOptions, TargetObservation, resect};
 
@@ -32,6 +32,7 @@ fn resections(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("resect");
     for count in [7, 100] {
         let Ok((camera, with_ranges)) = station(count) else { continue };
+        group.throughput(Throughput::Elements(count as u64));
         let image_only: Vec<_> = with_ranges.iter().map(|t| TargetObservation { range: None, ..*t }).collect();
         for (name, targets) in [("ranges", &with_ranges), ("image_points", &image_only)] {
             group.bench_function(BenchmarkId::new(name, count), |b| {

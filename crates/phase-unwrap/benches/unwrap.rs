@@ -4,7 +4,7 @@
 use std::f64::consts::TAU;
 use std::hint::black_box;
 
-use criterion::{Criterion, criterion_group, criterion_main};
+use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use phase_unwrap::{
     ExactOptions, ExactUnwrapped, KernelDensityOptions, KnownWraps, LeastCuts, MultiFrequencyOptions, MultiUnwrapped,
     MultiUnwrapper, NoisyOptions, NoisyUnwrapped, NoisyUnwrapper, PhaseNoise, SpatialOptions, Unwrapped, Unwrapper,
@@ -39,15 +39,17 @@ fn wrapped(range: &Raster<f64>, modulation: &Modulation, seed: u64) -> (Raster<f
 
 fn spatial(c: &mut Criterion) {
     let modulation = Modulation::new(30e6).unwrap();
+    let mut group = c.benchmark_group("Unwrap");
     for (width, height) in SIZES {
+        group.throughput(Throughput::Elements((width * height) as u64));
         let (phase, amplitude) = wrapped(&range(width, height), &modulation, 1);
         let size = format!("{width}x{height}");
         let mut out = Unwrapped::default();
         let mut unwrapper = Unwrapper::new(SpatialOptions::default()).unwrap();
-        c.bench_function(&format!("tree/{size}"), |b| {
+        group.bench_function(format!("tree/{size}"), |b| {
             b.iter(|| unwrapper.unwrap_into(black_box(&phase), None, None, KnownWraps::Nothing, &mut out).unwrap());
         });
-        c.bench_function(&format!("absolute/{size}"), |b| {
+        group.bench_function(format!("absolute/{size}"), |b| {
             b.iter(|| {
                 let amplitude = Some(&amplitude);
                 unwrapper.unwrap_into(black_box(&phase), amplitude, None, KnownWraps::Nothing, &mut out).unwrap();
@@ -58,7 +60,9 @@ fn spatial(c: &mut Criterion) {
 
 fn multi_frequency(c: &mut Criterion) {
     let sets: [(&str, &[f64]); 2] = [("two", &[80e6, 60e6]), ("three", &[80e6, 16e6, 120e6])];
+    let mut group = c.benchmark_group("Unwrap");
     for ((number, hz), (width, height)) in sets.iter().flat_map(|set| SIZES.map(|size| (*set, size))) {
+        group.throughput(Throughput::Elements((width * height) as u64));
         let modulations: Vec<_> = hz.iter().map(|&hz| Modulation::new(hz).unwrap()).collect();
         let range = range(width, height);
         let phases: Vec<_> = modulations.iter().map(|m| wrapped(&range, m, 2).0).collect();
@@ -66,7 +70,7 @@ fn multi_frequency(c: &mut Criterion) {
             let options = MultiFrequencyOptions { kernel, ..MultiFrequencyOptions::default() };
             let mut unwrapper = MultiUnwrapper::new(&modulations, options).unwrap();
             let mut out = MultiUnwrapped::default();
-            c.bench_function(&format!("{number}_frequencies_{how}/{width}x{height}"), |b| {
+            group.bench_function(format!("{number}_frequencies_{how}/{width}x{height}"), |b| {
                 b.iter(|| unwrapper.unwrap_into(black_box(&phases), None, None, &mut out).unwrap());
             });
         }
@@ -76,7 +80,9 @@ fn multi_frequency(c: &mut Criterion) {
 /// One radian of noise on the same scene: filter, tree and cuts.
 fn noisy(c: &mut Criterion) {
     let modulation = Modulation::new(30e6).unwrap();
+    let mut group = c.benchmark_group("Unwrap");
     for (width, height) in SIZES {
+        group.throughput(Throughput::Elements((width * height) as u64));
         let mut rng = Pcg64::seed_from_u64(3);
         let phase = range(width, height).map(|r| {
             let noise: f64 = StandardNormal.sample(&mut rng);
@@ -85,12 +91,12 @@ fn noisy(c: &mut Criterion) {
         let size = format!("{width}x{height}");
         let mut out = NoisyUnwrapped::default();
         let mut unwrapper = NoisyUnwrapper::new(NoisyOptions::default()).unwrap();
-        c.bench_function(&format!("noisy/{size}"), |b| {
+        group.bench_function(format!("noisy/{size}"), |b| {
             b.iter(|| unwrapper.unwrap_into(black_box(&phase), PhaseNoise::Uniform(1.0), None, &mut out).unwrap());
         });
         let mut out = ExactUnwrapped::default();
         let mut cuts = LeastCuts::new(ExactOptions::default());
-        c.bench_function(&format!("cuts/{size}"), |b| {
+        group.bench_function(format!("cuts/{size}"), |b| {
             b.iter(|| cuts.unwrap_into(black_box(&phase), None, None, &mut out).unwrap());
         });
     }

@@ -22,11 +22,11 @@ fn ring(count: usize) -> (Graph, Edge) {
 }
 
 fn benches(criterion: &mut Criterion) {
-    let mut group = criterion.benchmark_group("pose_graph");
+    let mut group = criterion.benchmark_group("Graph");
     for count in [10, 50, 100] {
         let (graph, closing) = ring(count);
         group.throughput(Throughput::Elements(count as u64));
-        group.bench_function(BenchmarkId::from_parameter(count), |bencher| {
+        group.bench_function(BenchmarkId::new("adjust_if_closed", count), |bencher| {
             bencher.iter_batched(
                 || graph.clone(),
                 |mut graph| {

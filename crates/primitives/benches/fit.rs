@@ -7,7 +7,7 @@ use primitives::{PrimitiveKind, PrimitiveOptions, fit_primitive};
 use range_image::{Flags, RangeFrame, Raster};
 
 fn fit(criterion: &mut Criterion) {
-    let mut group = criterion.benchmark_group("fit");
+    let mut group = criterion.benchmark_group("fit_primitive");
     group.sample_size(10);
     for [width, height] in [[176, 144], [640, 480]] {
         let format = ImageFormat::new(width, height, [7.0 / width as f64; 2]).unwrap();

@@ -5,7 +5,7 @@
 use std::hint::black_box;
 use std::sync::Arc;
 
-use criterion::{Criterion, criterion_group, criterion_main};
+use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use nalgebra::{Isometry3, Point3, Vector3};
 use projective_registration::{FrameAligner, FrameAlignmentOptions, OrganisedFrame, Projection};
 
@@ -29,7 +29,9 @@ fn frame(width: usize, height: usize, pose: &Isometry3<f64>) -> Vec<[f64; 3]> {
 
 fn benches(criterion: &mut Criterion) {
     let moved = Isometry3::new(Vector3::new(0.05, -0.04, 0.03), Vector3::new(0.02, 0.03, -0.02));
+    let mut group = criterion.benchmark_group("Register");
     for (width, height) in SIZES {
+        group.throughput(Throughput::Elements((width * height) as u64));
         let focal = [width as f64; 2];
         let centre = [width as f64 / 2.0, height as f64 / 2.0];
         let Ok(projection) = Projection::pinhole(width, height, focal, centre).map(Arc::new) else { continue };
@@ -40,13 +42,14 @@ fn benches(criterion: &mut Criterion) {
         let Ok(mut source) = OrganisedFrame::new(&projection, &points, None) else { continue };
         let Ok(mut aligner) = FrameAligner::new(FrameAlignmentOptions::default()) else { continue };
         let size = format!("{width}x{height}");
-        criterion.bench_function(&format!("organised_frame_update/{size}"), |bencher| {
+        group.bench_function(format!("OrganisedFrame::update/{size}"), |bencher| {
             bencher.iter(|| source.update(black_box(&points), None));
         });
-        criterion.bench_function(&format!("organised_frame_align/{size}"), |bencher| {
+        group.bench_function(format!("FrameAligner::align/{size}"), |bencher| {
             bencher.iter(|| aligner.align(black_box(&source), &target, &Isometry3::identity()));
         });
     }
+    group.finish();
 }
 
 criterion_group!(all, benches);

@@ -2,7 +2,7 @@
 #![allow(missing_docs, clippy::unwrap_used)]
 
 use camera_model::{Camera, InteriorOrientation, LensDistortion};
-use criterion::{Criterion, criterion_group, criterion_main};
+use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use error_models::{AmplitudeHyperbola, RangeErrorModel, RangeTerms, distort_frame};
 use nalgebra::{Isometry3, Point3, Vector3};
 use range_calibration::{
@@ -18,6 +18,7 @@ fn camera(width: usize, height: usize) -> Camera {
 }
 
 fn frames(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("differences_to_plane");
     let (pose, plane) = (Isometry3::identity(), Plane::facing_camera(3.0).unwrap());
     for (width, height) in [(176, 144), (640, 480), (1024, 1024)] {
         let frame = RangeFrame {
@@ -27,7 +28,8 @@ fn frames(criterion: &mut Criterion) {
             flags: Raster::filled(width, height, Flags::empty()),
         };
         let (camera, options) = (camera(width, height), DifferenceOptions::default());
-        criterion.bench_function(&format!("differences_to_plane/{width}x{height}"), |bencher| {
+        group.throughput(Throughput::Elements((width * height) as u64));
+        group.bench_function(format!("{width}x{height}"), |bencher| {
             bencher.iter(|| differences_to_plane(&frame, &camera, &pose, &plane, &options).unwrap());
         });
     }
@@ -35,6 +37,7 @@ fn frames(criterion: &mut Criterion) {
 
 /// Twelve captures of a wall at known distances, the wall itself and a common set of terms unknown.
 fn unknown_plane(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("calibrate_planes");
     for (width, height, step) in [(176, 144, 4), (640, 480, 4), (640, 480, 1), (1024, 1024, 4)] {
         let camera = camera(width, height);
         let poses: Vec<_> = (0..12).map(|i| Isometry3::translation(0.0, 0.0, -0.4 * f64::from(i))).collect();
@@ -50,12 +53,10 @@ fn unknown_plane(criterion: &mut Criterion) {
         let captures: Vec<_> = frames.iter().enumerate().map(capture).collect();
         let mut options = PlaneCalibrationOptions::default();
         options.pixels.step = step;
-        criterion.bench_function(
-            &format!("calibrate_planes/12 captures {width}x{height}, pixel step {step}"),
-            |bencher| {
-                bencher.iter(|| calibrate_planes(&captures, &[None], &camera, 5.0, &options).unwrap());
-            },
-        );
+        group.throughput(Throughput::Elements((12 * (width / step) * (height / step)) as u64));
+        group.bench_function(format!("12 captures {width}x{height}, pixel step {step}"), |bencher| {
+            bencher.iter(|| calibrate_planes(&captures, &[None], &camera, 5.0, &options).unwrap());
+        });
     }
 }
 
@@ -79,13 +80,15 @@ fn wavy_wall(camera: &Camera, pose: &Isometry3<f64>) -> RangeFrame {
 }
 
 fn estimation(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("estimate_range_terms");
     for count in [4_000, 40_000] {
+        group.throughput(Throughput::Elements(count as u64));
         let differences: Vec<RangeDifference> = (0..count).map(difference).collect();
         for (name, options) in [
             ("terms", RangeTermOptions::default()),
             ("terms and hyperbola", RangeTermOptions::default().hold("d0", 0.02).unwrap().with_hyperbola()),
         ] {
-            criterion.bench_function(&format!("estimate_range_terms/{name}/{count} differences"), |bencher| {
+            group.bench_function(format!("{name}, {count} differences"), |bencher| {
                 bencher.iter(|| estimate_range_terms(&differences, 5.0, &options).unwrap());
             });
         }

@@ -16,10 +16,10 @@ use support::unknown_walls::{mean_over_surveys, with_planes_of_their_own, with_w
 
 fn main() {
     let runs: u64 = std::env::args().nth(1).and_then(|runs| runs.parse().ok()).unwrap_or(200);
-    for (name, calibrate) in [
-        ("planes, weighted poses", with_weighted_poses as fn(u64) -> PlaneCalibration),
-        ("planes, no poses", with_planes_of_their_own),
-    ] {
-        println!("{name}: {:.3} per unknown over {runs} surveys", mean_over_surveys(runs, calibrate));
+    println!("| planes, {runs} surveys | per unknown |\n|---|---|");
+    for (name, calibrate) in
+        [("weighted poses", with_weighted_poses as fn(u64) -> PlaneCalibration), ("no poses", with_planes_of_their_own)]
+    {
+        println!("| {name} | {:.3} |", mean_over_surveys(runs, calibrate));
     }
 }

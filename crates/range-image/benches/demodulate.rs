@@ -24,7 +24,7 @@ fn demodulator() -> Demodulator {
 }
 
 fn demodulation(criterion: &mut Criterion) {
-    let mut group = criterion.benchmark_group("demodulate");
+    let mut group = criterion.benchmark_group("Demodulate");
     for (width, height) in SIZES {
         group.throughput(Throughput::Elements((width * height) as u64));
         let frames = [
@@ -42,8 +42,8 @@ fn demodulation(criterion: &mut Criterion) {
 }
 
 fn derived_planes(criterion: &mut Criterion) {
-    let mut group = criterion.benchmark_group("derived");
     for (width, height) in SIZES {
+        let mut group = criterion.benchmark_group("ComplexChannel");
         group.throughput(Throughput::Elements((width * height) as u64));
         let mut frame = ComplexFrame::empty();
         demodulator().demodulate_into(&raw(width, height, Samples::U16), &mut frame).unwrap();
@@ -55,10 +55,14 @@ fn derived_planes(criterion: &mut Criterion) {
         group.bench_function(format!("amplitude/{width}x{height}"), |bencher| {
             bencher.iter(|| black_box(channel).amplitude_into(&mut plane).unwrap());
         });
+        group.finish();
         let frames = vec![frame.clone(); 4];
-        group.bench_function(format!("average_of_4/{width}x{height}"), |bencher| {
+        let mut group = criterion.benchmark_group("Average");
+        group.throughput(Throughput::Elements((width * height) as u64));
+        group.bench_function(format!("4 frames of {width}x{height}"), |bencher| {
             bencher.iter(|| average(black_box(&frames)).unwrap());
         });
+        group.finish();
     }
 }
 

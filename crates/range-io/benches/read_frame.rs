@@ -62,10 +62,13 @@ fn clouds(criterion: &mut Criterion) {
         frame: Some((0..count as u32).collect()),
         ..CloudFile::default()
     };
-    let mut group = criterion.benchmark_group("ply");
+    let mut group = criterion.benchmark_group("write_cloud");
     group.sample_size(10).throughput(Throughput::Elements(count as u64));
-    group.bench_function("write", |bencher| bencher.iter(|| write_cloud(&file, black_box(&cloud), Precision::Single)));
-    group.bench_function("read", |bencher| bencher.iter(|| read_cloud(black_box(&file)).unwrap()));
+    group.bench_function("PLY", |bencher| bencher.iter(|| write_cloud(&file, black_box(&cloud), Precision::Single)));
+    group.finish();
+    let mut group = criterion.benchmark_group("read_cloud");
+    group.sample_size(10).throughput(Throughput::Elements(count as u64));
+    group.bench_function("PLY", |bencher| bencher.iter(|| read_cloud(black_box(&file)).unwrap()));
     group.finish();
 }
 

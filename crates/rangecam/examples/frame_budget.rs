@@ -16,7 +16,10 @@ fn main() -> Result<(), Failure> {
     let mut sizes = std::env::args().skip(1).filter_map(|argument| argument.parse::<usize>().ok());
     let (width, height) = (sizes.next().unwrap_or(640), sizes.next().unwrap_or(480));
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
-    println!("{width} x {height} pixels, 4 samples a frequency, 1 thread, milliseconds");
+    println!("{width} x {height} pixels, 4 samples a frequency, 1 thread, milliseconds\n");
+    let stages: Vec<&str> = Frame::STAGES.iter().map(|(name, _)| *name).collect();
+    println!("| ms | sum | {} | ranges right to 0.3 m |", stages.join(" | "));
+    println!("|{}", "---|".repeat(stages.len() + 3));
     pool.install(|| Unwrapping::ALL.iter().try_for_each(|(unwrapping, name)| report(width, height, *unwrapping, name)))
 }
 
@@ -32,9 +35,7 @@ fn report(width: usize, height: usize, unwrapping: Unwrapping, name: &str) -> Re
         }
     }
     let sum: f64 = least.iter().sum();
-    println!("\n{name}: {sum:.2} ({:.1} % of the ranges right to 0.3 m)", 100.0 * frame.right());
-    for ((name, _), milliseconds) in Frame::STAGES.iter().zip(least) {
-        println!("  {name:<24} {milliseconds:6.2}  {:3.0} %", 100.0 * milliseconds / sum);
-    }
+    let each = least.map(|milliseconds| format!("{milliseconds:.2}")).join(" | ");
+    println!("| {name} | {sum:.1} | {each} | {:.1} % |", 100.0 * frame.right());
     Ok(())
 }

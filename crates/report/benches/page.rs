@@ -6,7 +6,7 @@ use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_m
 use report::{ColourMap, Document, Scale, raster_figure};
 
 fn page(criterion: &mut Criterion) {
-    let mut group = criterion.benchmark_group("page with a picture");
+    let mut group = criterion.benchmark_group("Document");
     for (width, height) in [(176, 144), (640, 480), (1024, 1024)] {
         let values: Vec<f64> = (0..width * height).map(|index| f64::from(index % 977)).collect();
         let scale = Scale { map: ColourMap::Sequential, low: 0.0, high: 977.0, unit: "mm" };

@@ -24,7 +24,7 @@ fn trends(criterion: &mut Criterion) {
         }
     };
     let samples: Vec<TrendSample> = (0..20 * 6336).map(&mut sample).collect();
-    let mut group = criterion.benchmark_group("trends");
+    let mut group = criterion.benchmark_group("test_trends");
     group.sample_size(10).throughput(Throughput::Elements(samples.len() as u64));
     group.bench_function("20 frames of 88x72", |bencher| {
         bencher.iter(|| test_trends(&samples, &TrendOptions::default()).unwrap());

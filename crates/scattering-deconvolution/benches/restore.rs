@@ -24,7 +24,7 @@ fn image(width: usize, height: usize) -> (Vec<f32>, Vec<f32>) {
 }
 
 fn restoration(criterion: &mut Criterion) {
-    let mut group = criterion.benchmark_group("restore");
+    let mut group = criterion.benchmark_group("Deconvolve");
     for (width, height) in SIZES {
         group.throughput(Throughput::Elements((width * height) as u64));
         let (re, im) = image(width, height);

@@ -175,28 +175,40 @@ fn counts(scene: &Scene, [power, object]: [f32; 2], frames: usize) -> Result<[[u
     Ok(suspected)
 }
 
+/// Prints the head of a table, a column for each limit.
+fn head(what: &str) {
+    let limits = LIMITS.map(|limit| limit.to_string()).join(" | ");
+    println!("| {what}: scene | light | frames | {limits} |\n|{}", "---|".repeat(LIMITS.len() + 3));
+}
+
+fn row(scene: &str, light: f32, frames: usize, cells: &[String; LIMITS.len()]) {
+    println!("| {scene} | {light} | {frames} | {} |", cells.join(" | "));
+}
+
 fn main() -> Result<(), Box<dyn Error>> {
     let views = SEEDS as usize * 6;
     let (mut alarms, mut all) = (0, 0);
-    println!("Suspected of {views} views at limits {LIMITS:?} of a single frame's amplitude, noise {SIGMA}\n");
-    println!("Nothing outside:");
+    println!("Suspected of {views} views at limits of a single frame's amplitude, noise {SIGMA}\n");
+    head("nothing outside");
     for scene in &SCENES {
         for power in [30.0, 100.0, 300.0, 1000.0] {
             for frames in [1, 4, 16, 64] {
                 let [found, _] = counts(scene, [power, 0.0], frames)?;
-                println!("{:>7}, light {power:>5}, {frames:>2} frames: {found:?}", scene.name);
+                row(scene.name, power, frames, &found.map(|count| count.to_string()));
                 alarms += found.iter().sum::<usize>();
                 all += LIMITS.len() * views;
             }
         }
     }
-    println!("{alarms} of {all}\n\nAn object of amplitude 1500 outside, and how many of them on its side:");
+    println!("\n{alarms} of {all}\n");
+    head("an object of amplitude 1500 outside; how many on its side");
     let (mut right, mut asked) = (0, 0);
     for scene in &SCENES {
         for power in [0.0, 1.0, 3.0, 10.0, 30.0] {
             for frames in [1, 4, 16] {
                 let [found, sides] = counts(scene, [power, 1500.0], frames)?;
-                println!("{:>7}, light {power:>5}, {frames:>2} frames: {found:?} {sides:?}", scene.name);
+                let cell = |limit: usize| format!("{}; {}", found[limit], sides[limit]);
+                row(scene.name, power, frames, &std::array::from_fn(cell));
                 if power <= 1.0 && frames == 1 {
                     right += sides[4..].iter().sum::<usize>();
                     asked += 3 * views;
@@ -204,7 +216,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             }
         }
     }
-    println!("{right} of {asked} where the scene returns next to nothing and the limit is 20 or more");
+    println!("\n{right} of {asked} where the scene returns next to nothing and the limit is 20 or more");
     if 1000 * alarms > all || 10 * right < 9 * asked {
         return Err(format!("{alarms} false alarms of {all}, {right} found of {asked}").into());
     }

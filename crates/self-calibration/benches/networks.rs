@@ -4,7 +4,7 @@
 #[path = "../tests/support/mod.rs"]
 mod support;
 
-use criterion::{Criterion, criterion_group, criterion_main};
+use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use self_calibration::{
     CalibrationOptions, SightingOptions, SimulatedStart, TermSelection, calibrate, simulate_sightings,
 };
@@ -15,8 +15,8 @@ fn networks(criterion: &mut Criterion) {
     let mut observed = simulate_sightings(&normal(), &sightings).unwrap();
     nominal(&mut observed);
     let listed = TermSelection::List(all_but_long_wave());
-    let mut group = criterion.benchmark_group("network of 24 stations, 103 targets");
-    group.sample_size(10);
+    let mut group = criterion.benchmark_group("calibrate");
+    group.sample_size(10).throughput(Throughput::Elements(3 * observed.sightings.len() as u64));
     for (name, terms, rejection_level) in [
         ("one step", listed.clone(), None),
         ("one step, gross errors looked for", listed, Some(1e-4)),

@@ -22,6 +22,7 @@ fn main() {
         rejection_level: None,
         ..CalibrationOptions::default()
     };
+    println!("| method, {runs} surveys | per unknown | each |\n|---|---|---|");
     for case in cases() {
         let (mut sum, mut names, mut squares) = (0.0, Vec::new(), Vec::new());
         for seed in 0..runs {
@@ -35,9 +36,8 @@ fn main() {
             names = outcome.estimated;
         }
         let mean = |sum: f64| sum / runs as f64;
-        println!("{}: {:.3} per unknown over {runs} surveys", case.name, mean(sum) / names.len() as f64);
         let each: Vec<String> =
             names.iter().zip(&squares).map(|(name, sum)| format!("{name} {:.2}", mean(*sum))).collect();
-        println!("    {}", each.join("  "));
+        println!("| {} | {:.3} | {} |", case.name, mean(sum) / names.len() as f64, each.join(", "));
     }
 }

@@ -23,7 +23,7 @@ fn noise(criterion: &mut Criterion) {
     };
     let frames: Vec<RawFrame> = (0..20).map(&mut frame).collect();
     let station = RepeatedSamples { station: "A".into(), frames: frames.iter().collect() };
-    let mut group = criterion.benchmark_group("noise");
+    let mut group = criterion.benchmark_group("estimate_sample_noise");
     group.sample_size(10).throughput(Throughput::Elements((frames.len() * SAMPLES) as u64));
     group.bench_function("20 frames of 176x144", |bencher| {
         let (units, options) = (SampleUnits::default(), NoiseFitOptions::default());

@@ -1,7 +1,7 @@
 //! Rendering of one station and taking of one frame at three sizes.
 #![allow(clippy::unwrap_used, missing_docs)]
 
-use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
+use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use simulation::{SimulationSpec, Simulator};
 
 /// The flagship room seen with another number of pixels on the same sensor.
@@ -20,8 +20,8 @@ fn render(criterion: &mut Criterion) {
         let mut one_ray = room(width, height);
         one_ray.errors.mixed_pixels = None;
         let simulator = Simulator::new(&one_ray).unwrap();
-        let mut group = criterion.benchmark_group("simulation");
-        group.sample_size(10);
+        let mut group = criterion.benchmark_group("Simulator");
+        group.sample_size(10).throughput(Throughput::Elements((width * height) as u64));
         group.bench_function(BenchmarkId::new("station, one ray a pixel", &size), |b| {
             b.iter(|| simulator.station(0).unwrap());
         });

@@ -18,9 +18,12 @@ fn order(criterion: &mut Criterion) {
     of("interpolated median of 176x144", |values| quantile(values, 0.5));
     of("scale of 176x144", mad_scale);
     group.finish();
-    criterion.bench_function("quantile of chi-squared", |bencher| {
+    let mut group = criterion.benchmark_group("Distribution");
+    group.throughput(Throughput::Elements(1));
+    group.bench_function("upper quantile of chi-squared", |bencher| {
         bencher.iter(|| Distribution::ChiSquared { dof: 7.0 }.upper_quantile(1e-3));
     });
+    group.finish();
 }
 
 criterion_group!(benches, order);

@@ -4,7 +4,7 @@
 
 use std::path::{Path, PathBuf};
 
-use criterion::{Criterion, criterion_group, criterion_main};
+use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use pipeline::{Silent, SimulateSource, simulate};
 use tasks::{RegisterMethod, RegisterRequest, register};
 
@@ -32,9 +32,10 @@ fn room(criterion: &mut Criterion) {
         calibration: None,
         out: folder.path().join("out"),
     };
-    let mut group = criterion.benchmark_group("room_small");
-    group.sample_size(10);
-    group.bench_function("register", |bencher| bencher.iter(|| register(&request, &Silent)));
+    let mut group = criterion.benchmark_group("register");
+    // Eight stations of four frames of 132 x 108 pixels.
+    group.sample_size(10).throughput(Throughput::Elements(8 * 4 * 132 * 108));
+    group.bench_function("room_small", |bencher| bencher.iter(|| register(&request, &Silent)));
     group.finish();
 }
 

@@ -28,7 +28,7 @@ fn frame(width: usize, height: usize, pose: &Isometry3<f64>) -> Vec<[f64; 3]> {
 }
 
 fn benches(criterion: &mut Criterion) {
-    let mut group = criterion.benchmark_group("track_frame");
+    let mut group = criterion.benchmark_group("Tracker");
     for (width, height) in SIZES {
         let centre = [width as f64 / 2.0, height as f64 / 2.0];
         let Ok(projection) = Projection::pinhole(width, height, [width as f64; 2], centre).map(Arc::new) else {
@@ -40,7 +40,7 @@ fn benches(criterion: &mut Criterion) {
         let frames: Vec<Vec<[f64; 3]>> = (0_i32..8).map(|k| frame(width, height, &pose((k - 4).abs()))).collect();
         let mut count = 0_usize;
         group.throughput(Throughput::Elements((width * height) as u64));
-        group.bench_function(format!("{width}x{height}"), |bencher| {
+        group.bench_function(format!("track/{width}x{height}"), |bencher| {
             bencher.iter(|| {
                 count += 1;
                 tracker.track(count as f64 / 30.0, &frames[count % frames.len()], None, None).is_ok()

@@ -143,6 +143,12 @@ impl Adjustment<'_> {
     }
 }
 
+impl AsRef<[ParameterBlock]> for Solution {
+    fn as_ref(&self) -> &[ParameterBlock] {
+        &self.blocks
+    }
+}
+
 impl Solution {
     /// Adjusted (or held) values of a block, ambient.
     pub fn values(&self, block: BlockId) -> Result<&[f64]> {

@@ -46,6 +46,9 @@ pub struct NearDefect {
     pub leading_deviations: (f64, f64),
     /// Correlations among the leading parameters: names and correlation, strongest first.
     pub correlations: Vec<(String, String, f64)>,
+    /// The linear function of all examined parameters whose prior standard deviation is the inflation: block, component
+    /// and weight, in one over the parameter's unit.
+    pub functional: Vec<(BlockId, usize, f64)>,
 }
 
 /// The hardly determined combinations of a solution.
@@ -120,7 +123,7 @@ impl Solution {
 
     /// Prior standard deviations that the unknowns would have if all others were known, `1/√Nᵢᵢ`, in the order of
     /// [`Self::unknown_names`]; infinite without observations.
-    pub fn deviations_alone(&self) -> Vec<f64> {
+    fn deviations_alone(&self) -> Vec<f64> {
         let mut diagonal = vec![0.0; self.unknowns()];
         for place in &self.layout.observations {
             let columns = self.columns_of(place);
@@ -194,6 +197,12 @@ impl Subset {
             deviation: inflation * direction[first].abs() * self.alone[first],
             leading_deviations: (self.covariance[(first, first)].max(0.0).sqrt(), self.alone[first]),
             correlations,
+            functional: self
+                .owners
+                .iter()
+                .zip(direction.iter().zip(&self.alone))
+                .map(|(&(block, component), (weight, alone))| (block, component, weight / alone))
+                .collect(),
         }
     }
 }

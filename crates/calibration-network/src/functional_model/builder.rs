@@ -1,9 +1,12 @@
 //! The adjustment of a network, put together.
 
-use adjust::{Adjustment, BlockId, Covariance, DatumDefect, Kernel, Method, ParameterBlock, RigidPose, SolveOptions};
+use adjust::{
+    Adjustment, BlockId, Covariance, DatumDefect, Differentiated, Kernel, Method, ParameterBlock, RigidPose,
+    SolveOptions,
+};
 use nalgebra::{DMatrix, Point3};
 
-use crate::functional_model::equations::{DistanceEquation, PartialPrior, PassiveEquation};
+use crate::functional_model::equations::{KnownLength, PartialPrior, PassivePoint};
 use crate::functional_model::hyperbola_steps::range_block;
 use crate::functional_model::misfit::Scales;
 use crate::functional_model::setup::{BlockPrior, Blocks, Datum, Row, Setup, Solved, Source};
@@ -202,7 +205,8 @@ impl<'s> Builder<'s> {
                 continue;
             }
             let blocks = [self.blocks.stations[seen.station], self.target(seen.target)?, relative, camera];
-            let equation = PassiveEquation { blocks, camera: passive.camera, pixel: seen.pixel };
+            let function = PassivePoint { camera: passive.camera, pixel: seen.pixel };
+            let equation = Differentiated::new(&self.adjustment, blocks, function).map_err(adjust::Error::from)?;
             self.adjustment.add_observation(group, equation, &Covariance::from_sigmas(&seen.sigma_pixel))?;
             self.row(Source::Passive(index), Component::PassiveCol, seen.pixel[0], seen.sigma_pixel[0]);
             self.row(Source::Passive(index), Component::PassiveRow, seen.pixel[1], seen.sigma_pixel[1]);
@@ -280,8 +284,9 @@ impl<'s> Builder<'s> {
                 DistanceEnd::Station(station) => Ok(self.blocks.stations[station]),
                 DistanceEnd::Target(target) => self.target(target),
             };
-            let equation =
-                DistanceEquation { blocks: [end(known.from)?, end(known.to)?], distance_m: known.distance_m };
+            let blocks = [end(known.from)?, end(known.to)?];
+            let equation = Differentiated::new(&self.adjustment, blocks, KnownLength(known.distance_m))
+                .map_err(adjust::Error::from)?;
             self.adjustment.add_observation(group, equation, &Covariance::from_sigma(known.sigma_m))?;
             self.row(Source::Distance(index), Component::Distance, known.distance_m, known.sigma_m);
         }

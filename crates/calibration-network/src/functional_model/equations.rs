@@ -4,14 +4,14 @@
 
 use std::sync::Arc;
 
-use adjust::{BlockId, EvaluationFailure, Jacobians, Observation, RigidPose};
+use adjust::{BlockId, EvaluationFailure, Jacobians, Observation, Parameters, Real, ResidualFunction, RigidPose};
 use camera_model::Camera;
 use error_models::RangeErrorModel;
 use nalgebra::{Isometry3, Matrix3, Point3, RowVector2, RowVector3, SMatrix, Vector3};
 
 use crate::functional_model::hyperbola_steps::by_steps;
 use crate::functional_model::image_model::{ImageModel, image_model};
-use crate::functional_model::terms::{Seen, modelled_range};
+use crate::functional_model::terms::{CAMERA_VALUES, Seen, modelled_range};
 
 /// A target in the frame of a camera, with the derivatives of its coordinates.
 struct InCamera {
@@ -157,84 +157,40 @@ impl Observation for SightingEquation {
 /// An image point of the passive camera. Blocks: pose of the range camera, target, `range_camera_from_passive`, passive
 /// camera.
 #[derive(Debug, Clone)]
-pub(crate) struct PassiveEquation {
-    pub(crate) blocks: [BlockId; 4],
+pub(crate) struct PassivePoint {
     pub(crate) camera: Camera,
     pub(crate) pixel: [f64; 2],
 }
 
-impl Observation for PassiveEquation {
-    fn dimension(&self) -> usize {
-        2
-    }
-
-    fn blocks(&self) -> &[BlockId] {
-        &self.blocks
-    }
-
-    fn evaluate(
-        &self,
-        parameters: &[&[f64]],
-        residual: &mut [f64],
-        jacobians: Option<&mut Jacobians<'_>>,
-    ) -> Result<(), EvaluationFailure> {
-        let in_range_camera = InCamera::new(parameters[0], parameters[1])?;
-        let coordinates: [f64; 3] = in_range_camera.point.into();
-        let in_passive = InCamera::new(parameters[2], &coordinates)?;
-        let model = image_model(&self.camera, parameters[3], &in_passive.point, jacobians.is_some())?;
-        residual[0] = self.pixel[0] - model.pixel[0];
-        residual[1] = self.pixel[1] - model.pixel[1];
-        if let Some(jacobians) = jacobians {
-            let by_range_camera_point = model.by_camera_point * in_passive.by_point;
-            jacobians.set(0, &(by_range_camera_point * in_range_camera.by_pose));
-            jacobians.set(1, &(by_range_camera_point * in_range_camera.by_point));
-            jacobians.set(2, &(model.by_camera_point * in_passive.by_pose));
-            for axis in 0..2 {
-                copy(jacobians.row(3, axis), model.by_camera[axis].iter());
-            }
-        }
-        Ok(())
+impl ResidualFunction<2> for PassivePoint {
+    fn residual<T: Real>(&self, parameters: &Parameters<'_, T>) -> Result<[T; 2], EvaluationFailure> {
+        let in_range_camera = parameters.pose(0)?.inverse_transform(parameters.values(1)?);
+        let [x, y, z] = parameters.pose(2)?.inverse_transform(in_range_camera);
+        let camera: [T; CAMERA_VALUES] = parameters.values(3)?;
+        let point = Vector3::new(x.value(), y.value(), z.value());
+        let model = image_model(&self.camera, &camera.map(T::value), &point, true)?;
+        Ok([0, 1].map(|axis| {
+            let by_point = std::array::from_fn(|coordinate| model.by_camera_point[(axis, coordinate)]);
+            let by_camera = std::array::from_fn(|value| model.by_camera[axis][value]);
+            let of_point = T::function_of([x, y, z], model.pixel[axis], by_point);
+            -(of_point + T::function_of(camera, 0.0, by_camera)) + self.pixel[axis]
+        }))
     }
 }
 
-/// A distance known from outside, between perspective centres or targets.
+/// A distance known from outside, between perspective centres or targets, metre.
 #[derive(Debug, Clone)]
-pub(crate) struct DistanceEquation {
-    pub(crate) blocks: [BlockId; 2],
-    pub(crate) distance_m: f64,
-}
+pub(crate) struct KnownLength(pub(crate) f64);
 
-impl Observation for DistanceEquation {
-    fn dimension(&self) -> usize {
-        1
-    }
-
-    fn blocks(&self) -> &[BlockId] {
-        &self.blocks
-    }
-
-    fn evaluate(
-        &self,
-        parameters: &[&[f64]],
-        residual: &mut [f64],
-        jacobians: Option<&mut Jacobians<'_>>,
-    ) -> Result<(), EvaluationFailure> {
-        // Both kinds of block begin with the coordinates, and so do their steps.
-        let end = |values: &[f64]| values.first_chunk::<3>().map(|xyz| Vector3::from(*xyz));
-        let (Some(from), Some(to)) = (end(parameters[0]), end(parameters[1])) else {
-            return Err(EvaluationFailure::new("an end of a distance has three coordinates"));
-        };
-        let length = (to - from).norm();
-        if length <= 0.0 {
+impl ResidualFunction<1> for KnownLength {
+    fn residual<T: Real>(&self, parameters: &Parameters<'_, T>) -> Result<[T; 1], EvaluationFailure> {
+        let end = |block| parameters.values(block).or_else(|_| Ok(parameters.pose(block)?.translation()));
+        let ([ax, ay, az], [bx, by, bz]): ([T; 3], [T; 3]) = (end(0)?, end(1)?);
+        let length = ((bx - ax).powi(2) + (by - ay).powi(2) + (bz - az).powi(2)).sqrt();
+        if length.value() <= 0.0 {
             return Err(EvaluationFailure::new("both ends of a known distance are one point"));
         }
-        residual[0] = self.distance_m - length;
-        if let Some(jacobians) = jacobians {
-            let direction = (to - from) / length;
-            copy(jacobians.row(0, 0), (-direction).iter());
-            copy(jacobians.row(1, 0), direction.iter());
-        }
-        Ok(())
+        Ok([-length + self.0])
     }
 }
 
@@ -287,7 +243,7 @@ pub(crate) fn world_from_passive(
 mod tests {
     #![allow(clippy::unwrap_used)]
 
-    use adjust::{Adjustment, ParameterBlock, check_jacobian};
+    use adjust::{Adjustment, Differentiated, ParameterBlock, check_jacobian};
     use camera_model::{ImageFormat, InteriorOrientation, LensDistortion};
     use error_models::{AmplitudeHyperbola, RangeTerms};
 
@@ -360,11 +316,11 @@ mod tests {
         let relative = Isometry3::new(Vector3::new(0.1, 0.02, -0.03), Vector3::new(0.02, -0.03, 0.1));
         let [pose, target, camera_block, _] = <[ParameterBlock; 4]>::try_from(blocks()).unwrap();
         let all = [pose.clone(), target.clone(), ParameterBlock::pose(&relative), camera_block];
-        let own = <[BlockId; 4]>::try_from(ids(4)).unwrap();
-        let equation = PassiveEquation { blocks: own, camera: camera(), pixel: [120.3, 31.8] };
+        let function = PassivePoint { camera: camera(), pixel: [120.3, 31.8] };
+        let equation = Differentiated::new(&all, ids(4), function).unwrap();
         let check = check_jacobian(&equation, &all).unwrap();
         assert!(check.worst < 1e-6, "{check:?}");
-        let equation = DistanceEquation { blocks: [own[0], own[1]], distance_m: 2.0 };
+        let equation = Differentiated::new(&all, ids(2), KnownLength(2.0)).unwrap();
         let check = check_jacobian(&equation, &[pose, target]).unwrap();
         assert!(check.worst < 1e-6, "{check:?}");
     }

@@ -16,6 +16,9 @@ pub fn camera_names() -> Vec<&'static str> {
     INTERIOR.into_iter().chain(LensDistortion::NAMES).collect()
 }
 
+/// How many values the camera's block has.
+pub(crate) const CAMERA_VALUES: usize = INTERIOR.len() + LensDistortion::NAMES.len();
+
 /// Values of the camera's block.
 pub fn camera_values(camera: &Camera) -> Vec<f64> {
     let [xp, yp] = camera.interior.principal_point_mm;

@@ -2,11 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use adjust::{BlockId, Manifold, Observation, RigidPose, Scale};
+use adjust::{BlockId, Differentiated, Manifold, Observation, RigidPose, Scale};
 use nalgebra::{Isometry3, Point3};
 use statistics::Distribution;
 
-use crate::functional_model::equations::{DistanceEquation, PassiveEquation};
+use crate::functional_model::equations::{KnownLength, PassivePoint};
 use crate::functional_model::setup::{Row, Setup, Solved, Source};
 use crate::functional_model::terms::{camera_names, range_names};
 use crate::{Component, GroupQuality, ObservationQuality, Result, Verdict};
@@ -239,15 +239,24 @@ impl Setup<'_> {
                 let seen = passive.image_points[index];
                 let Some(target) = blocks.targets[seen.target] else { return Ok(f64::NAN) };
                 let own = [blocks.stations[seen.station], target, relative, camera];
-                let equation = PassiveEquation { blocks: own, camera: passive.camera, pixel: seen.pixel };
-                (Box::new(equation), usize::from(row.component == Component::PassiveRow))
+                let function = PassivePoint { camera: passive.camera, pixel: seen.pixel };
+                (
+                    Box::new(Differentiated::new(solution, own, function).map_err(adjust::Error::from)?),
+                    usize::from(row.component == Component::PassiveRow),
+                )
             }
             Source::Distance(index) => {
                 let known = &self.network.distances[index];
                 let (Some(from), Some(to)) = (blocks.end(known.from), blocks.end(known.to)) else {
                     return Ok(f64::NAN);
                 };
-                (Box::new(DistanceEquation { blocks: [from, to], distance_m: known.distance_m }), 0)
+                (
+                    Box::new(
+                        Differentiated::new(solution, [from, to], KnownLength(known.distance_m))
+                            .map_err(adjust::Error::from)?,
+                    ),
+                    0,
+                )
             }
             Source::Target(index, axis) => {
                 let Some(block) = blocks.targets[index] else { return Ok(f64::NAN) };

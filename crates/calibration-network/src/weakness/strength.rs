@@ -1,6 +1,6 @@
 //! Whether a network determines its calibration, and what would cure it where it does not.
 
-use adjust::{Combination, Scale};
+use adjust::{Combination, NearDefect, Scale, WeaknessOptions};
 use nalgebra::{DMatrix, DVector, Matrix6x1};
 
 use crate::functional_model::setup::{Setup, Solved};
@@ -49,64 +49,14 @@ impl Strength {
 
 impl Setup<'_> {
     /// Examines the calibration parameters of a solution.
-    ///
-    /// Each is measured in the deviation it would have if everything else were known; the largest eigenvalue of the
-    /// covariance in these units is the square of the inflation of the worst combination.
     pub fn strength(&self, solved: &Solved) -> Result<Option<Strength>> {
-        let estimate = self.estimate(solved)?;
-        let n = estimate.names.len();
-        if n == 0 {
-            return Ok(None);
-        }
-        let alone = self.deviations_alone(solved)?;
-        let scaled =
-            DMatrix::from_fn(n, n, |row, column| estimate.covariance[(row, column)] / (alone[row] * alone[column]));
-        let eigen = scaled.symmetric_eigen();
-        let worst = eigen.eigenvalues.imax();
-        let direction: DVector<f64> = eigen.eigenvectors.column(worst).into_owned();
-        let inflation = eigen.eigenvalues[worst].max(0.0).sqrt();
-        let combination = combination(&direction, &estimate.names);
-        // In the parameters' own units: the functional whose value is so uncertain.
-        let functional: Vec<f64> = (0..n).map(|i| direction[i] / alone[i]).collect();
-        let correlations = self.station_correlations(solved, &functional, inflation)?;
-        let advice = self.advice(&combination, &correlations);
+        let calibration = std::iter::once(solved.blocks.camera).chain(solved.blocks.sets.iter().copied()).collect();
+        let options = WeaknessOptions { blocks: Some(calibration), inflation: 1.0, max_count: 1 };
+        let Some(worst) = solved.solution.near_defects(&options)?.combinations.pop() else { return Ok(None) };
+        let correlations = station_correlations(solved, &worst)?;
+        let advice = self.advice(&worst.combination, &correlations);
+        let (inflation, combination) = (worst.inflation, worst.combination);
         Ok(Some(Strength { inflation, combination, correlation: correlations.sentence(), advice }))
-    }
-
-    /// Deviation of each calibration parameter if all others, poses and coordinates were known.
-    fn deviations_alone(&self, solved: &Solved) -> Result<Vec<f64>> {
-        let alone = solved.solution.deviations_alone();
-        let of = |(_, block, component)| {
-            let unknown = solved.solution.unknown_index(block, component)?;
-            Ok(unknown.map_or(f64::INFINITY, |unknown| alone[unknown]))
-        };
-        self.estimated_parameters(solved).into_iter().map(of).collect()
-    }
-
-    /// Mean correlation of a functional of the calibration with the stations' motions, in camera axes.
-    fn station_correlations(&self, solved: &Solved, functional: &[f64], deviation: f64) -> Result<Motions> {
-        let solution = &solved.solution;
-        let parameters = self.estimated_parameters(solved);
-        let mut sum = [0.0; 6];
-        for &station in &solved.blocks.stations {
-            let mut shared = Matrix6x1::<f64>::zeros();
-            for ((_, block, component), weight) in parameters.iter().zip(functional) {
-                let between = solution.covariance_between(station, *block, Scale::Prior)?;
-                (0..6).for_each(|i| shared[i] += weight * between[(i, *component)]);
-            }
-            let rotation = *solution.pose(station)?.rotation.inverse().to_rotation_matrix().matrix();
-            let own = solution.covariance(station, Scale::Prior)?;
-            let shift = rotation * shared.fixed_rows::<3>(0);
-            let spread = rotation * own.fixed_view::<3, 3>(0, 0) * rotation.transpose();
-            for axis in 0..3 {
-                sum[axis] += shift[axis].abs() / (spread[(axis, axis)].sqrt() * deviation);
-                sum[axis + 3] += shared[axis + 3].abs() / (own[(axis + 3, axis + 3)].sqrt() * deviation);
-            }
-        }
-        let count = solved.blocks.stations.len() as f64;
-        let mean = |value: f64| if value.is_finite() { value / count } else { 0.0 };
-        let [x, y, z, tilt_x, tilt_y, roll] = sum.map(mean);
-        Ok(Motions { sideways: x.max(y), distance: z, tilt: tilt_x.max(tilt_y), roll })
     }
 
     /// What to add to the network, in the words of who observes it.
@@ -263,6 +213,31 @@ impl Motions {
         }
         format!("mean correlation {}", strong.join(" and "))
     }
+}
+
+/// Mean correlation of a functional of the calibration with the stations' motions, in camera axes.
+fn station_correlations(solved: &Solved, worst: &NearDefect) -> Result<Motions> {
+    let (solution, deviation) = (&solved.solution, worst.inflation);
+    let mut sum = [0.0; 6];
+    for &station in &solved.blocks.stations {
+        let mut shared = Matrix6x1::<f64>::zeros();
+        for &(block, component, weight) in &worst.functional {
+            let between = solution.covariance_between(station, block, Scale::Prior)?;
+            (0..6).for_each(|i| shared[i] += weight * between[(i, component)]);
+        }
+        let rotation = *solution.pose(station)?.rotation.inverse().to_rotation_matrix().matrix();
+        let own = solution.covariance(station, Scale::Prior)?;
+        let shift = rotation * shared.fixed_rows::<3>(0);
+        let spread = rotation * own.fixed_view::<3, 3>(0, 0) * rotation.transpose();
+        for axis in 0..3 {
+            sum[axis] += shift[axis].abs() / (spread[(axis, axis)].sqrt() * deviation);
+            sum[axis + 3] += shared[axis + 3].abs() / (own[(axis + 3, axis + 3)].sqrt() * deviation);
+        }
+    }
+    let count = solved.blocks.stations.len() as f64;
+    let mean = |value: f64| if value.is_finite() { value / count } else { 0.0 };
+    let [x, y, z, tilt_x, tilt_y, roll] = sum.map(mean);
+    Ok(Motions { sideways: x.max(y), distance: z, tilt: tilt_x.max(tilt_y), roll })
 }
 
 /// Direction, in units of the deviations alone, whose deviation is larger than these by the largest factor, and the factor.

@@ -38,84 +38,71 @@ fn main() -> Result<(), Failure> {
     let most = words.iter().find_map(|word| word.strip_prefix("frames=")?.parse().ok()).unwrap_or(usize::MAX);
     let (first, seed) = if tuning { (0, 1) } else { (3, 1001) };
     println!(
-        "{} stations and seeds; percent of all pixels, far mixed: found, percent of these",
-        if tuning { "the tuning" } else { "other" }
+        "{} stations and seeds; percent of all pixels, far mixed: found, percent of these\n\n{}",
+        if tuning { "the tuning" } else { "other" },
+        heading()
     );
     let mut broken = Vec::new();
     for (name, take) in ROOMS.iter().filter(|(name, _)| only.is_none_or(|only| only == *name)) {
         for amplitude in LIGHTS {
-            println!("\n{name}, median amplitude {amplitude}\n{}", heading());
+            let place = format!("{name}, {amplitude}");
             // A thousand frames of one station are plenty.
             for (stations, frames) in [(3, [1, 4, 16, 64].as_slice()), (1, [64, 1000].as_slice())] {
                 let frames: Vec<usize> = frames.iter().copied().filter(|frames| *frames <= most).collect();
                 let Some(&last) = frames.last().filter(|last| stations > 1 || **last > 64) else { continue };
                 let folder = tempfile::tempdir()?;
                 let capture = take(folder.path(), first, Amount { stations, frames: last, seed, amplitude })?;
-                broken.extend(judged(&capture, &frames)?.into_iter().map(|why| format!("{name}, {amplitude}: {why}")));
+                broken.extend(judged(&place, &capture, &frames)?.into_iter().map(|why| format!("{place}: {why}")));
             }
         }
     }
-    for place in &broken {
-        println!("{place}");
+    for words in &broken {
+        println!("{words}");
     }
     if broken.is_empty() { Ok(()) } else { Err(format!("{} bars are broken", broken.len()).into()) }
 }
 
 /// Prints the counts with each number of frames, and of a single frame of the same noise; where they break the bar.
-fn judged(capture: &Capture, frames: &[usize]) -> Result<Vec<String>, Failure> {
+fn judged(place: &str, capture: &Capture, frames: &[usize]) -> Result<Vec<String>, Failure> {
     let mut broken = Vec::new();
     for &frames in frames {
         let counts = count(capture, frames)?;
-        println!("{}", line(&frames.to_string(), &counts));
+        println!("{}", line(place, &frames.to_string(), &counts));
         let percent = |share: f64| format!("{:.2} %", 100.0 * share);
         let share = counts.share(counts.false_flags);
-        let place = format!("{frames} frames: {} false flags", percent(share));
+        let found = format!("{frames} frames: {} false flags", percent(share));
         if share > counts.bar() {
-            broken.push(format!("{place}, {} are allowed", percent(counts.bar())));
+            broken.push(format!("{found}, {} are allowed", percent(counts.bar())));
         }
         if frames == 1 {
             continue;
         }
         let of_sum = count_of_sum(capture, frames)?;
-        println!("{}", line("sum", &of_sum));
+        println!("{}", line(place, "sum", &of_sum));
         if counts.is_above(&of_sum) {
             let of_sum = percent(of_sum.share(of_sum.false_flags));
-            broken.push(format!("{place}, {of_sum} in a single frame of this noise"));
+            broken.push(format!("{found}, {of_sum} in a single frame of this noise"));
         }
     }
     Ok(broken)
 }
 
 fn heading() -> String {
-    let names: Vec<String> = Flags::NAMED.iter().map(|(_, name)| format!("{name:>14}")).collect();
-    format!(
-        "{:>6} {:>9} {:>8} {:>7} {:>7} {:>7} {:>7} {:>7} {:>9} |{}",
-        "frames",
-        "error mm",
-        "flagged",
-        "wrong",
-        "false",
-        "narrow",
-        "bar",
-        "missed",
-        "far mixed",
-        names.concat()
-    )
+    let figures = ["error mm", "flagged", "wrong", "false", "narrow", "bar", "missed", "far mixed"];
+    let names: Vec<&str> = figures.into_iter().chain(Flags::NAMED.iter().map(|(_, name)| *name)).collect();
+    format!("| room, median amplitude | frames | {} |\n|{}", names.join(" | "), "---|".repeat(names.len() + 2))
 }
 
-fn line(frames: &str, counts: &Counts) -> String {
-    let percent = |count: usize| 100.0 * counts.share(count);
-    let of_flag: Vec<String> = counts.of_flag.iter().map(|count| format!("{:14.2}", percent(*count))).collect();
+fn line(place: &str, frames: &str, counts: &Counts) -> String {
+    let percent = |count: usize| format!("{:.2}", 100.0 * counts.share(count));
+    let [flagged, wrong, of_right, narrow, missed] =
+        [counts.flagged, counts.wrong, counts.false_flags, counts.false_of_narrow, counts.missed].map(percent);
+    let of_flag: Vec<String> = counts.of_flag.iter().map(|count| percent(*count)).collect();
     format!(
-        "{frames:>6} {:9.1} {:8.2} {:7.2} {:7.2} {:7.2} {:7.2} {:7.2} {:9.1} |{}",
+        "| {place} | {frames} | {:.1} | {flagged} | {wrong} | {of_right} | {narrow} | {:.2} | {missed} | {:.1} | {} |",
         1e3 * counts.error_median_m,
-        percent(counts.flagged),
-        percent(counts.wrong),
-        percent(counts.false_flags),
-        percent(counts.false_of_narrow),
         100.0 * counts.bar(),
-        percent(counts.missed),
         100.0 * counts.far_mixed_found as f64 / counts.far_mixed as f64,
-        of_flag.concat()
+        of_flag.join(" | ")
     )
 }

@@ -105,12 +105,12 @@ impl Frame {
 
     /// The stages in their order.
     pub const STAGES: [(&'static str, Stage); 6] = [
-        ("demodulate", Self::demodulate),
-        ("deconvolve", Self::deconvolve),
+        ("Demodulate", Self::demodulate),
+        ("Deconvolve", Self::deconvolve),
         ("phase, amplitude, sigma", Self::derive),
-        ("unwrap to ranges", Self::unwrap),
-        ("correct", Self::correct),
-        ("back-project", Self::back_project),
+        ("Unwrap", Self::unwrap),
+        ("CorrectRange", Self::correct),
+        ("PointCloud", Self::back_project),
     ];
 
     fn demodulate(&mut self) -> Result<(), Failure> {

@@ -81,18 +81,20 @@ fn run(trial: &Trial<'_>) -> Outcome {
 
 /// One row for each fault, and the words of all answers that are not right.
 fn table(trials: &[Trial<'_>], outcomes: &[Outcome]) {
-    println!("{:<48} {:>6} {:>6} {:>9} {:>7} {:>9}", "fault", "named", "other", "harmless", "silent", "longest");
+    println!("| fault | named | another reason | harmless | silent | longest, s |\n|---|---|---|---|---|---|");
     let pairs: Vec<_> = trials.iter().zip(outcomes).collect();
-    for own in pairs.chunk_by(|a, b| a.0.fault.name == b.0.fault.name) {
+    for own in pairs.chunk_by(|a, b| a.0.fault.name == b.0.fault.name).chain([pairs.as_slice()]) {
         let count = |answer| own.iter().filter(|(_, outcome)| outcome.answer == answer).count();
         let [named, other, harmless, silent] =
             [Answer::Right, Answer::NotNamed, Answer::Harmless, Answer::Silent].map(count);
         let longest = own.iter().map(|(_, outcome)| outcome.seconds).fold(0.0, f64::max);
-        let name = own[0].0.fault.name;
-        println!("{name:<48} {named:>6} {other:>6} {harmless:>9} {silent:>7} {longest:>7.1} s");
-        for (trial, outcome) in own.iter().filter(|(_, outcome)| outcome.answer != Answer::Right) {
-            println!("    {} {}: {:?}: {}", trial.sound.name, trial.seed, outcome.answer, outcome.words);
-        }
+        let name = if own.len() == pairs.len() { "all" } else { own[0].0.fault.name };
+        println!("| {name} | {named} | {other} | {harmless} | {silent} | {longest:.1} |");
+    }
+    println!();
+    for (trial, outcome) in pairs.iter().filter(|(_, outcome)| outcome.answer != Answer::Right) {
+        let (fault, name, seed) = (trial.fault.name, &trial.sound.name, trial.seed);
+        println!("{fault}, {name} {seed}: {:?}: {}", outcome.answer, outcome.words);
     }
 }
 
@@ -108,6 +110,7 @@ fn sound_networks(sound: &[&Sound], seeds: u64) -> (usize, usize) {
         }
     }
     let kept = answers.iter().filter(|answer| answer.is_ok()).count();
-    println!("sound networks kept: {kept} of {} ({:.1} s)", trials.len(), clock.elapsed().as_secs_f64());
+    println!("\n| sound networks | keep their verdict | s |\n|---|---|---|");
+    println!("| {} | {kept} | {:.1} |", trials.len(), clock.elapsed().as_secs_f64());
     (kept, trials.len())
 }

@@ -2,7 +2,7 @@
 
 use adjust::{Adjustment, Covariance, ParameterBlock, Scale, SolveOptions};
 use camera_model::Camera;
-use nalgebra::{DMatrix, DVector, Vector3};
+use nalgebra::{DMatrix, Vector3};
 use range_image::RangeFrame;
 use statistics::{Distribution, mad_scale};
 
@@ -10,7 +10,7 @@ use crate::judge::{require_determined, systematic_sigmas};
 use crate::linear_start::start;
 use crate::observation::RangeToPrimitive;
 use crate::surface::{Hit, Surface};
-use crate::{Error, Result};
+use crate::{Error, Result, plane_step};
 use crate::{FittedPixel, PrimitiveFit, PrimitiveKind, PrimitiveOptions};
 
 /// Rounds of choosing pixels after which nothing changes any more.
@@ -25,11 +25,11 @@ pub(crate) struct RegionPixel {
 }
 
 /// An adjusted surface.
-struct Adjusted {
-    parameters: Vec<f64>,
-    covariance: DMatrix<f64>,
-    sigma0: f64,
-    redundancy: i64,
+pub(crate) struct Adjusted {
+    pub(crate) parameters: Vec<f64>,
+    pub(crate) covariance: DMatrix<f64>,
+    pub(crate) sigma0: f64,
+    pub(crate) redundancy: i64,
 }
 
 /// Fits a primitive to the ranges of a region of a frame, robustly: averaging in space (Sect. 4).
@@ -143,6 +143,11 @@ fn chosen(pixels: &[RegionPixel], surface: &Surface, parameters: &[f64], options
 }
 
 fn adjust(pixels: &[RegionPixel], used: &[bool], surface: &Surface, start: &[f64]) -> Result<Adjusted> {
+    // What is no plane by its own step is told why by the adjustment.
+    if let Some(adjusted) = matches!(surface, Surface::Plane).then(|| plane_step::adjust(pixels, used, start)).flatten()
+    {
+        return Ok(adjusted);
+    }
     let mut network = Adjustment::new();
     let block = network.add_block(ParameterBlock::euclidean(start).named("primitive"));
     let group = network.add_group("ranges");
@@ -170,8 +175,12 @@ fn outcome(
     let primitive = surface.primitive(&adjusted.parameters).ok_or_else(|| nothing(kind))?;
     let count = kind.parameters();
     let deviation = |hit: &Hit| {
-        let row = DVector::from_column_slice(&hit.derivatives[..count]);
-        (row.transpose() * &adjusted.covariance * &row)[(0, 0)].max(0.0).sqrt()
+        let row = &hit.derivatives[..count];
+        let product = |(column, own): (usize, &f64)| {
+            let with = |(row, other): (usize, &f64)| other * adjusted.covariance[(row, column)];
+            own * row.iter().enumerate().map(with).sum::<f64>()
+        };
+        row.iter().enumerate().map(product).sum::<f64>().max(0.0).sqrt()
     };
     let fitted = |(pixel, used): (&RegionPixel, &bool)| {
         let hit = surface.hit(&adjusted.parameters, &pixel.ray);

@@ -9,6 +9,7 @@ mod observation;
 mod options;
 mod outcome;
 mod plane;
+mod plane_step;
 mod shape;
 mod surface;
 

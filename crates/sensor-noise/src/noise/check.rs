@@ -148,8 +148,8 @@ impl ComplexValues {
         let (channels, width) = (frame.channels.len(), frame.width());
         if self.frames == 0 {
             let pixels = frame.flags.as_slice().len();
-            let (real, imaginary, claimed) = Default::default();
-            let value = |index| ComplexValue { index, trusted: true, real, imaginary, claimed };
+            let (nothing, claimed) = (Running::default(), Claimed::default());
+            let value = |index| ComplexValue { index, trusted: true, real: nothing, imaginary: nothing, claimed };
             let values: Vec<ComplexValue> = thinning(2 * channels * pixels).pixels(pixels).map(value).collect();
             (self.width, self.values) = (width, vec![values; channels]);
         }

@@ -93,7 +93,8 @@ fn fit_as<S: Frames<RangeFrame>>(
     let largest = || observed.iter().map(|own| own.largest_range_m).fold(0.0, f64::max);
     let interval = if known.is_finite() { known } else { largest() };
     let largest_variance = (NORMAL_SHARE * interval).powi(2);
-    let rules = LineRules { least: [0.0; 2], sloped: true, parts: PARTS, largest_variance };
+    let every = observed.iter().map(|own| own.every).max().unwrap_or(1);
+    let rules = LineRules { least: [0.0; 2], sloped: true, parts: PARTS, largest_variance, every };
     let mut fit = match fit_variance(repeats.collect(), &rules, options) {
         Ok(fit) => fit,
         Err(error) => return Ok(Err(error)),
@@ -179,6 +180,8 @@ impl Value {
 #[derive(Default)]
 struct Observed {
     values: Vec<Value>,
+    /// Of so many pixels one is taken.
+    every: usize,
     largest_range_m: f64,
     /// Whether each frame has any.
     has_amplitudes: bool,
@@ -193,7 +196,8 @@ impl Observed {
         let interval_m = station.interval_m;
         station.each(&mut |frame| {
             if all.values.is_empty() {
-                all.values = Value::all(frame, thinning(frame.range.as_slice().len()));
+                let thinning = thinning(frame.range.as_slice().len());
+                (all.every, all.values) = (thinning.stride, Value::all(frame, thinning));
             }
             all.has_amplitudes &= frame.amplitude.as_slice().iter().any(|amplitude| *amplitude > 0.0);
             let known = frame.range.as_slice().iter().filter(|range| range.is_finite());

@@ -55,7 +55,8 @@ const MOST_VALUES: usize = 1 << 22;
 /// The pixels whose values are taken: every so-many-th, each station beginning with another one.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Thinning {
-    stride: usize,
+    /// Of so many pixels one is taken.
+    pub(super) stride: usize,
     station: usize,
 }
 

@@ -58,11 +58,12 @@ pub fn estimate_sample_noise<S: Frames<RawFrame>>(
         repeats.push((Steadiness::new(&station.station, station.frames.count(), &own), own));
         observed.push(one);
     }
+    let every = observed.iter().map(|station| station.every).max().unwrap_or(1);
     let whole = observed.iter().any(|station| station.whole);
     let without_light = observed.iter().any(|station| station.without_light);
     let quantisation_sigma = if whole { units.raw_scale / 12.0_f64.sqrt() } else { 0.0 };
     let least = [0.0, quantisation_sigma * quantisation_sigma];
-    let rules = LineRules { least, sloped: !without_light, parts: PARTS, largest_variance: f64::INFINITY };
+    let rules = LineRules { least, sloped: !without_light, parts: PARTS, largest_variance: f64::INFINITY, every };
     let mut fit = fit_variance(repeats, &rules, options)?;
     for ((station, own), steadiness) in stations.iter().zip(&observed).zip(&mut fit.steadiness) {
         steadiness.frame_factors = own.frame_factors(station, units, [fit.slope, fit.level])?;
@@ -99,6 +100,8 @@ struct Value {
 #[derive(Default)]
 struct Observed {
     values: Vec<Value>,
+    /// Of so many pixels one is taken.
+    every: usize,
     /// Whether samples are whole numbers, and whether they are differences of two taps.
     whole: bool,
     without_light: bool,
@@ -113,7 +116,8 @@ impl Observed {
         let mut all = Self::default();
         station.each(&mut |frame| {
             if all.values.is_empty() {
-                all.values = values(frame, thinning(frame.samples().len()));
+                let thinning = thinning(frame.samples().len());
+                (all.every, all.values) = (thinning.stride, values(frame, thinning));
             }
             all.whole |= !matches!(frame.samples(), Samples::F32(_));
             all.without_light |= matches!(frame.samples(), Samples::I16(_));

@@ -4,8 +4,8 @@ use camera_model::Camera;
 use error_models::FixedPattern;
 use range_image::RangeFrame;
 
-use super::held_out::HeldOutTest;
 use super::PatternOptions;
+use super::held_out::HeldOutTest;
 use super::residuals::Walls;
 use crate::Result;
 
@@ -119,7 +119,10 @@ impl PatternEstimator {
             pattern: FixedPattern {
                 width: camera.format.width,
                 height: camera.format.height,
-                offset_m: found.iter().map(|(offset, _)| if offset.is_finite() { *offset as f32 } else { 0.0 }).collect(),
+                offset_m: found
+                    .iter()
+                    .map(|(offset, _)| if offset.is_finite() { *offset as f32 } else { 0.0 })
+                    .collect(),
                 sigma_m: found.iter().map(|(_, sigma)| *sigma as f32).collect(),
             },
             test,

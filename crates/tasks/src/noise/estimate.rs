@@ -67,12 +67,7 @@ impl Estimate {
         Ok(Self { term: NoiseTerm::Samples(estimate.noise), parameters, fit: estimate.fit, check })
     }
 
-    fn of_ranges(
-        stations: &Stations<'_>,
-        interval_m: Option<f64>,
-        wrapped: bool,
-        options: &NoiseFitOptions,
-    ) -> Answer {
+    fn of_ranges(stations: &Stations<'_>, interval_m: Option<f64>, wrapped: bool, options: &NoiseFitOptions) -> Answer {
         let ranges = |view: View| Ok(range_frame(view)?);
         let estimate = estimate_range_noise(&repeated(stations.made(&ranges), interval_m), wrapped, options)?;
         let with_sigma = |view: View| {
@@ -80,8 +75,7 @@ impl Estimate {
             estimate.noise.predict_sigma(&mut frame).map_err(sensor_noise::Error::from)?;
             Ok(frame)
         };
-        let check =
-            check_range_sigma(&repeated(stations.made(&with_sigma), interval_m), estimate.fit.estimator)?;
+        let check = check_range_sigma(&repeated(stations.made(&with_sigma), interval_m), estimate.fit.estimator)?;
         let parameters = estimate.parameters();
         Ok(Self { term: NoiseTerm::Ranges(estimate.noise), parameters, fit: estimate.fit, check })
     }

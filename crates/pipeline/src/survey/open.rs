@@ -13,6 +13,7 @@ use range_io::survey::{InputFrame, Survey, read_frame, read_truth};
 use range_io::tables::{Station, read_stations};
 
 use crate::survey::compatible::{Purpose, compatible};
+use crate::survey::live::LiveFrames;
 use crate::survey::plausibility;
 use crate::survey::truth::ViewTruth;
 use crate::survey::view::{View, ViewData};
@@ -40,6 +41,8 @@ pub struct OpenSurvey {
     pub vertical_axis: usize,
     /// What speaks against survey and calibration.
     pub doubts: Vec<Doubt>,
+    /// Frames that were read and are in memory.
+    pub live: LiveFrames,
     root: PathBuf,
     depth_rays: Arc<RayTable>,
     true_poses: Vec<Station>,
@@ -86,6 +89,7 @@ pub fn open(
         reference: read_reference(&survey, &root)?,
         modulations: survey.camera.modulations()?,
         range_noise: calibration.as_ref().and_then(|calibration| calibration.range_noise),
+        live: LiveFrames::default(),
         root,
         survey: Arc::new(survey),
         calibration: calibration.map(Arc::new),
@@ -115,6 +119,7 @@ impl OpenSurvey {
             correction: None,
             cloud: None,
             further_points: Vec::new(),
+            live: self.live.clone(),
         };
         view.before = view.snapshot();
         Ok(view)

@@ -6,6 +6,7 @@ use phase_unwrap::combine_frequencies;
 use range_image::{ComplexChannel, ComplexFrame, Flags, Modulation, RangeFrame, Raster, RawFrame};
 
 use crate::survey::correction_record::CorrectionRecord;
+use crate::survey::live::LiveFrames;
 use crate::survey::truth::ViewTruth;
 use crate::{Error, Result};
 
@@ -44,6 +45,8 @@ pub struct View {
     pub cloud: Option<OrganisedCloud>,
     /// Points on the two surfaces of split mixed pixels.
     pub further_points: Vec<FurtherPoint>,
+    /// Counts the view among those in memory.
+    pub live: LiveFrames,
 }
 
 /// A point that belongs to no single pixel of an organised cloud.

@@ -4,7 +4,7 @@ use std::cell::Cell;
 
 use commands::Progress;
 use pipeline::Error;
-use pipeline::survey::{OpenSurvey, View};
+use pipeline::survey::{LiveFrames, OpenSurvey, View};
 use rayon::prelude::*;
 use sensor_noise::Frames;
 
@@ -91,8 +91,14 @@ impl<F: Send> Frames<F> for Station<'_, F> {
     fn each(&self, see: &mut dyn FnMut(&F) -> sensor_noise::Result<()>) -> Result<(), Failed> {
         let (survey, make) = (self.all.survey, self.make);
         for some in self.frames.chunks(READ_AT_ONCE) {
-            let read = some.par_iter().map(|index| make(survey.view(*index)?));
-            for frame in read.collect::<Result<Vec<F>, Failed>>()? {
+            let read = some.par_iter().map(|index| {
+                let view = survey.view(*index)?;
+                let live = view.live.clone();
+                Ok((make(view)?, live))
+            });
+            let read = read.collect::<Result<Vec<(F, LiveFrames)>, Failed>>()?;
+            self.all.progress.frames_in_memory(survey.live.count());
+            for (frame, _) in read {
                 see(&frame)?;
                 self.all.advance();
             }

@@ -1,36 +1,19 @@
 //! A primitive adjusted to the ranges of a region.
 
-use adjust::{Adjustment, Covariance, ParameterBlock, Scale, SolveOptions};
 use camera_model::Camera;
-use nalgebra::{DMatrix, Vector3};
+use nalgebra::Vector3;
 use range_image::RangeFrame;
 use statistics::{Distribution, mad_scale};
 
+use crate::adjustment::{Adjusted, RegionPixel, adjust};
 use crate::judge::{require_determined, systematic_sigmas};
 use crate::linear_start::start;
-use crate::observation::RangeToPrimitive;
 use crate::surface::{Hit, Surface};
-use crate::{Error, Result, plane_step};
+use crate::{Error, Result};
 use crate::{FittedPixel, PrimitiveFit, PrimitiveKind, PrimitiveOptions};
 
 /// Rounds of choosing pixels after which nothing changes any more.
 const MAX_ROUNDS: usize = 20;
-
-/// A pixel of the region with its ray.
-pub(crate) struct RegionPixel {
-    pub(crate) position: [usize; 2],
-    pub(crate) ray: Vector3<f64>,
-    pub(crate) observed_m: f64,
-    pub(crate) sigma_m: f64,
-}
-
-/// An adjusted surface.
-pub(crate) struct Adjusted {
-    pub(crate) parameters: Vec<f64>,
-    pub(crate) covariance: DMatrix<f64>,
-    pub(crate) sigma0: f64,
-    pub(crate) redundancy: i64,
-}
 
 /// Fits a primitive to the ranges of a region of a frame, robustly: averaging in space (Sect. 4).
 ///
@@ -140,29 +123,6 @@ fn chosen(pixels: &[RegionPixel], surface: &Surface, parameters: &[f64], options
     let scale = mad_scale(&mut standardised.clone());
     let limit = options.rejection_sigmas * if scale.is_finite() { scale.max(1.0) } else { 1.0 };
     standardised.iter().map(|value| *value <= limit).collect()
-}
-
-fn adjust(pixels: &[RegionPixel], used: &[bool], surface: &Surface, start: &[f64]) -> Result<Adjusted> {
-    // What is no plane by its own step is told why by the adjustment.
-    if let Some(adjusted) = matches!(surface, Surface::Plane).then(|| plane_step::adjust(pixels, used, start)).flatten()
-    {
-        return Ok(adjusted);
-    }
-    let mut network = Adjustment::new();
-    let block = network.add_block(ParameterBlock::euclidean(start).named("primitive"));
-    let group = network.add_group("ranges");
-    for (pixel, _) in pixels.iter().zip(used).filter(|(_, used)| **used) {
-        let observation =
-            RangeToPrimitive { blocks: [block], surface: *surface, ray: pixel.ray, observed_m: pixel.observed_m };
-        network.add_observation(group, observation, &Covariance::from_sigma(pixel.sigma_m))?;
-    }
-    let solution = network.solve(&SolveOptions::default())?;
-    Ok(Adjusted {
-        parameters: solution.values(block)?.to_vec(),
-        covariance: solution.covariance(block, Scale::Prior)?,
-        sigma0: solution.sigma0().unwrap_or(f64::NAN),
-        redundancy: solution.redundancy(),
-    })
 }
 
 fn outcome(

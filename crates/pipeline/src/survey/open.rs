@@ -13,10 +13,9 @@ use range_io::survey::{InputFrame, Survey, read_frame, read_truth};
 use range_io::tables::{Station, read_stations};
 
 use crate::survey::compatible::{Purpose, compatible};
-use crate::survey::live::LiveFrames;
 use crate::survey::plausibility;
 use crate::survey::truth::ViewTruth;
-use crate::survey::view::{View, ViewData};
+use crate::survey::view::{LiveFrames, View, ViewData};
 use crate::{Error, Result};
 use commands::Doubt;
 use commands::root_of;

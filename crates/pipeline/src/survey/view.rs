@@ -1,12 +1,13 @@
 //! What the stages work on: one view per frame, later per station.
 
+use std::sync::Arc;
+
 use camera_model::OrganisedCloud;
 use nalgebra::Isometry3;
 use phase_unwrap::combine_frequencies;
 use range_image::{ComplexChannel, ComplexFrame, Flags, Modulation, RangeFrame, Raster, RawFrame};
 
 use crate::survey::correction_record::CorrectionRecord;
-use crate::survey::live::LiveFrames;
 use crate::survey::truth::ViewTruth;
 use crate::{Error, Result};
 
@@ -58,6 +59,17 @@ pub struct FurtherPoint {
     pub sigma_m: f32,
     /// Amplitude in the camera's unit.
     pub amplitude: f32,
+}
+
+/// How many frames that were read of a survey are still in memory: each view holds one of these.
+#[derive(Debug, Clone, Default)]
+pub struct LiveFrames(Arc<()>);
+
+impl LiveFrames {
+    /// Frames in memory, if the survey holds one of these and each view another.
+    pub fn count(&self) -> usize {
+        Arc::strong_count(&self.0) - 1
+    }
 }
 
 /// The frame at its level.

@@ -5,7 +5,7 @@
 
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
-use crate::fit::{Adjusted, RegionPixel};
+use super::{Adjusted, RegionPixel};
 
 /// Rounds within which the steps become as small as rounding: from a robust start three to five are taken.
 const MAX_ROUNDS: usize = 30;
@@ -13,7 +13,7 @@ const MAX_ROUNDS: usize = 30;
 const SETTLED: f64 = 1e-13;
 
 /// The plane nearest to the used pixels, weighted by their sigmas; `None` where they do not determine one.
-pub(crate) fn adjust(pixels: &[RegionPixel], used: &[bool], start: &[f64]) -> Option<Adjusted> {
+pub(super) fn adjust(pixels: &[RegionPixel], used: &[bool], start: &[f64]) -> Option<Adjusted> {
     let used = || pixels.iter().zip(used).filter(|(_, used)| **used).map(|(pixel, _)| pixel);
     let mut m = Vector3::from_column_slice(start.get(..3)?);
     for _ in 0..MAX_ROUNDS {

@@ -64,6 +64,7 @@ const KNOWN: &[(Use, &[&str])] = &[
             "multipath/src/pixels/refine.rs",
             "multipath/src/scene/bending.rs",
             "multipath/src/scene/patches.rs",
+            "primitives/src/adjustment/plane_step.rs",
             "projective-registration/src/shared_error.rs",
             "rigid-pose/src/centred.rs",
             "tracking/src/imu/update.rs",

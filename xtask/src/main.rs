@@ -10,6 +10,7 @@ mod factorisations;
 mod fixtures;
 mod fuzz;
 mod house;
+mod memory;
 mod nightly;
 mod options;
 mod peers;

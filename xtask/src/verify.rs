@@ -1,6 +1,7 @@
 //! `cargo xtask verify [NAME ...]`: long statistics, each an example of its crate that prints its figures and fails where
-//! they leave their bounds. What `docs/benchmarks.md` states of them comes from here.
+//! they leave their bounds; and `memory`, which runs the command on long surveys. What `docs/benchmarks.md` states of them comes from here.
 
+use crate::memory;
 use crate::shell::{Outcome, cargo};
 
 /// Name, package and example of each statistic.
@@ -10,6 +11,9 @@ const STATISTICS: &[(&str, &str, &str)] = &[
     ("networks", "calibration-tasks", "network_seeds"),
     ("outside", "scattering-deconvolution", "outside_light"),
 ];
+
+/// The one that is no example.
+const MEMORY: &str = "memory";
 
 /// Which statistics to run.
 #[derive(Debug, clap::Args)]
@@ -26,7 +30,7 @@ impl Arguments {
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Outcome {
-    let known = || STATISTICS.iter().map(|(name, ..)| *name);
+    let known = || STATISTICS.iter().map(|(name, ..)| *name).chain([MEMORY]);
     if let Some(unknown) = arguments.names.iter().find(|name| !known().any(|known| known == name.as_str())) {
         return Err(format!(
             "there is no statistic `{unknown}`; there are: {}",
@@ -37,5 +41,5 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome {
     for (_, package, example) in STATISTICS.iter().filter(|(name, ..)| asked(name)) {
         cargo(&["run", "--release", "--package", package, "--all-features", "--example", example], &[])?;
     }
-    Ok(())
+    if asked(MEMORY) { memory::run() } else { Ok(()) }
 }

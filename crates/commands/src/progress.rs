@@ -6,6 +6,8 @@ pub trait Progress: Sync {
     fn begin(&self, work: &str, steps: usize);
     /// `done` steps of the present work are finished.
     fn advance(&self, done: usize);
+    /// So many frames of a survey are in memory just now.
+    fn frames_in_memory(&self, _frames: usize) {}
     /// Something a person should know.
     fn say(&self, message: &str);
     /// Nothing more will come.

@@ -1,14 +1,13 @@
 //! A primitive adjusted to the ranges of a region.
 
-use adjust::{Adjustment, Covariance, ParameterBlock, Scale, SolveOptions};
 use camera_model::Camera;
-use nalgebra::{DMatrix, DVector, Vector3};
+use nalgebra::Vector3;
 use range_image::RangeFrame;
 use statistics::{Distribution, mad_scale};
 
+use crate::adjustment::{Adjusted, RegionPixel, adjust};
 use crate::judge::{require_determined, systematic_sigmas};
 use crate::linear_start::start;
-use crate::observation::RangeToPrimitive;
 use crate::surface::{Hit, Surface};
 use crate::{Error, Result};
 use crate::{FittedPixel, PrimitiveFit, PrimitiveKind, PrimitiveOptions};
@@ -24,22 +23,6 @@ const LARGEST_OUTLIER_SHARE: f64 = 0.4;
 /// Largest standard deviation of a radius in parts of itself, and of a direction in radian: first-order covariances are worth
 /// little beyond. A larger one lets through cylinders of which a narrow strip is seen.
 const LARGEST_UNCERTAINTY: f64 = 0.1;
-
-/// A pixel of the region with its ray.
-pub(crate) struct RegionPixel {
-    pub(crate) position: [usize; 2],
-    pub(crate) ray: Vector3<f64>,
-    pub(crate) observed_m: f64,
-    pub(crate) sigma_m: f64,
-}
-
-/// An adjusted surface.
-struct Adjusted {
-    parameters: Vec<f64>,
-    covariance: DMatrix<f64>,
-    sigma0: f64,
-    redundancy: i64,
-}
 
 /// Fits a primitive to the ranges of a region of a frame, robustly: averaging in space (Sect. 4).
 ///
@@ -169,24 +152,6 @@ fn chosen(pixels: &[RegionPixel], surface: &Surface, parameters: &[f64], options
     standardised.iter().map(|value| *value <= limit).collect()
 }
 
-fn adjust(pixels: &[RegionPixel], used: &[bool], surface: &Surface, start: &[f64]) -> Result<Adjusted> {
-    let mut network = Adjustment::new();
-    let block = network.add_block(ParameterBlock::euclidean(start).named("primitive"));
-    let group = network.add_group("ranges");
-    for (pixel, _) in pixels.iter().zip(used).filter(|(_, used)| **used) {
-        let observation =
-            RangeToPrimitive { blocks: [block], surface: *surface, ray: pixel.ray, observed_m: pixel.observed_m };
-        network.add_observation(group, observation, &Covariance::from_sigma(pixel.sigma_m))?;
-    }
-    let solution = network.solve(&SolveOptions::default())?;
-    Ok(Adjusted {
-        parameters: solution.values(block)?.to_vec(),
-        covariance: solution.covariance(block, Scale::Prior)?,
-        sigma0: solution.sigma0().unwrap_or(f64::NAN),
-        redundancy: solution.redundancy(),
-    })
-}
-
 fn outcome(
     kind: PrimitiveKind,
     pixels: &[RegionPixel],
@@ -197,8 +162,12 @@ fn outcome(
     let primitive = surface.primitive(&adjusted.parameters).ok_or_else(|| nothing(kind))?;
     let count = kind.parameters();
     let deviation = |hit: &Hit| {
-        let row = DVector::from_column_slice(&hit.derivatives[..count]);
-        (row.transpose() * &adjusted.covariance * &row)[(0, 0)].max(0.0).sqrt()
+        let row = &hit.derivatives[..count];
+        let product = |(column, own): (usize, &f64)| {
+            let with = |(row, other): (usize, &f64)| other * adjusted.covariance[(row, column)];
+            own * row.iter().enumerate().map(with).sum::<f64>()
+        };
+        row.iter().enumerate().map(product).sum::<f64>().max(0.0).sqrt()
     };
     let fitted = |(pixel, used): (&RegionPixel, &bool)| {
         let hit = surface.hit(&adjusted.parameters, &pixel.ray);

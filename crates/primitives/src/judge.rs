@@ -1,7 +1,5 @@
 //! Whether a region is the primitive that was fitted, and enough of it.
 
-use std::collections::BTreeMap;
-
 use crate::{Error, Result};
 use crate::{Primitive, PrimitiveFit};
 
@@ -32,22 +30,28 @@ pub(crate) fn require_determined(fit: &PrimitiveFit, limit: f64) -> Result<()> {
 /// Random errors of neighbours are independent, so the mean product of their standardised residuals is the variance of
 /// whatever is smooth: another shape, scattered light, errors of the lens.
 pub(crate) fn systematic_sigmas(fit: &PrimitiveFit, step: usize) -> f64 {
-    let residuals: BTreeMap<[usize; 2], f64> = fit
-        .pixels
-        .iter()
-        .filter(|pixel| pixel.used)
-        .map(|pixel| (pixel.position, (pixel.observed_m - pixel.modelled_m) / pixel.sigma_m))
-        .collect();
-    let (mut products, mut pairs) = (0.0, 0.0);
-    for (&[col, row], own) in &residuals {
-        for neighbour in [[col + step, row], [col, row + step]] {
-            if let Some(other) = residuals.get(&neighbour) {
+    let used = || fit.pixels.iter().filter(|pixel| pixel.used);
+    let last = |axis: usize| used().map(|pixel| pixel.position[axis] + 1).max().unwrap_or(0);
+    let (columns, rows) = (last(0), last(1));
+    let mut residuals = vec![f64::NAN; columns * rows];
+    for pixel in used() {
+        let [column, row] = pixel.position;
+        residuals[column * rows + row] = (pixel.observed_m - pixel.modelled_m) / pixel.sigma_m;
+    }
+    let (mut products, mut pairs, mut squares, mut count) = (0.0, 0.0, 0.0, 0_usize);
+    for (place, own) in residuals.iter().enumerate().filter(|(_, own)| own.is_finite()) {
+        let below = (place % rows + step < rows).then_some(place + step);
+        for neighbour in [Some(place + step * rows), below] {
+            let other = neighbour.and_then(|place| residuals.get(place)).filter(|other| other.is_finite());
+            if let Some(other) = other {
                 products += own * other;
                 pairs += 1.0;
             }
         }
+        squares += own * own;
+        count += 1;
     }
-    let square = residuals.values().map(|own| own * own).sum::<f64>() / residuals.len().max(1) as f64;
+    let square = squares / count.max(1) as f64;
     let common: f64 = products / pairs;
     if common > 4.0 * square / f64::sqrt(pairs) { common.sqrt() } else { 0.0 }
 }

@@ -1,11 +1,11 @@
 #![doc = include_str!("../README.md")]
 
+mod adjustment;
 mod difference;
 mod error;
 mod fit;
 mod judge;
 mod linear_start;
-mod observation;
 mod options;
 mod outcome;
 mod plane;

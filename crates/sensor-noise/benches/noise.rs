@@ -22,7 +22,7 @@ fn noise(criterion: &mut Criterion) {
         RawFrame::new(176, 144, 4, vec![Modulation::new(30e6).unwrap()], samples).unwrap()
     };
     let frames: Vec<RawFrame> = (0..20).map(&mut frame).collect();
-    let station = RepeatedSamples { station: "A".into(), frames: frames.iter().collect() };
+    let station = RepeatedSamples { station: "A".into(), frames: &frames[..] };
     let mut group = criterion.benchmark_group("estimate_sample_noise");
     group.sample_size(10).throughput(Throughput::Elements((frames.len() * SAMPLES) as u64));
     group.bench_function("20 frames of 176x144", |bencher| {

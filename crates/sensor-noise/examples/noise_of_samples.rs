@@ -21,7 +21,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let samples = Samples::F32((0..4 * 176 * 144).map(sample).collect());
         frames.push(RawFrame::new(176, 144, 4, vec![Modulation::new(30e6)?], samples)?);
     }
-    let station = RepeatedSamples { station: "A".into(), frames: frames.iter().collect() };
+    let station = RepeatedSamples { station: "A".into(), frames: &frames[..] };
     let found = estimate_sample_noise(&[station], &SampleUnits::default(), &NoiseFitOptions::default())?.noise;
     println!("shot {:.4} per unit (true: 0.8), dark {:.3} (true: 6)", found.shot_variance_per_unit, found.dark_sigma);
     Ok(())

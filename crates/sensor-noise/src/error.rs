@@ -132,5 +132,5 @@ pub enum Error {
     Image(#[from] range_image::Error),
 }
 
-/// Result with this crate's [`enum@Error`].
-pub(crate) type Result<T> = std::result::Result<T, Error>;
+/// Result with this crate's [`enum@Error`], or that of a source of frames.
+pub(crate) type Result<T, E = Error> = std::result::Result<T, E>;

@@ -33,8 +33,8 @@ fn frames(truth: &RangeNoise, count: usize, seed: u64) -> Vec<RangeFrame> {
     (0..count).map(|_| one()).collect()
 }
 
-fn station(frames: &[RangeFrame]) -> RepeatedRanges<'_> {
-    RepeatedRanges { station: "A".into(), frames: frames.iter().collect(), interval_m: None }
+fn station(frames: &[RangeFrame]) -> RepeatedRanges<&[RangeFrame]> {
+    RepeatedRanges { station: "A".into(), frames, interval_m: None }
 }
 
 fn estimate(frames: &[RangeFrame]) -> Result<RangeNoiseEstimate, Error> {

@@ -69,7 +69,7 @@ fn exact(values: Vec<f64>) -> Samples {
 }
 
 fn estimate(frames: &[RawFrame], units: &SampleUnits) -> Result<SampleNoiseEstimate, Error> {
-    let station = RepeatedSamples { station: "A".into(), frames: frames.iter().collect() };
+    let station = RepeatedSamples { station: "A".into(), frames };
     estimate_sample_noise(&[station], units, &NoiseFitOptions::default())
 }
 
@@ -188,7 +188,7 @@ fn sigma_is_judged_by_its_own_statistics() {
         let options = DemodulationOptions { noise, ..DemodulationOptions::default() };
         raw.iter().map(|frame| demodulate(frame, &options).unwrap()).collect()
     };
-    let check = |noise| check_complex_sigma(&[with(noise)], VarianceEstimator::AboutMean).unwrap();
+    let check = |noise| check_complex_sigma(&[&with(noise)[..]], VarianceEstimator::AboutMean).unwrap();
     let estimated = check(estimate(&raw, &SampleUnits::default()).unwrap().noise);
     // One part of z gets less than the mean of the samples where it looks at the darker pair of them, the other more: the
     // two together are what sigma says.

@@ -13,6 +13,7 @@ use pipeline::{Error, Result};
 use range_io::calibration::{CalibratedDrift, Calibration};
 use range_io::ply::read_cloud;
 use range_io::survey::{Level, Survey};
+use report::{Column, Document};
 use serde::Serialize;
 
 /// Stations whose phases are judged.
@@ -39,17 +40,17 @@ impl Inspection {
 
 impl fmt::Display for Inspection {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for (index, entry) in self.entries.iter().enumerate() {
-            if index > 0 {
-                writeln!(f)?;
-            }
-            write!(f, "{:<20} {}", entry.name, entry.value)?;
-        }
-        for doubt in &self.doubts {
-            write!(f, "\ndoubt: {doubt}")?;
-        }
-        Ok(())
+        document(self).fmt(f)
     }
+}
+
+/// All of it, for people.
+fn document(found: &Inspection) -> Document {
+    let mut document = Document::new("rangecam: inspect", "");
+    let rows = found.entries.iter().map(|entry| vec![entry.name.to_owned(), entry.value.clone()]);
+    document.table([Column::words("what"), Column::words("found")], rows.collect());
+    document.warnings(&found.doubts);
+    document
 }
 
 impl Judged for Inspection {

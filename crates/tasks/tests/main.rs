@@ -8,6 +8,7 @@ mod common;
 mod compare;
 mod fixed_pattern;
 mod frame_rate;
+mod live_frames;
 mod metamorphic;
 mod noise;
 mod outputs;

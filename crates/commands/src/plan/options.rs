@@ -301,7 +301,8 @@ impl Default for RegisterOptions {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct AdjustOptions {
-    /// How far the poses that `Register` found may be off, metre. Default: 0.1 m.
+    /// How far the poses that `Register` found may be off, metre; of those that it found from the survey's, with the
+    /// same overlap, nothing is sought again. Default: 0.1 m.
     pub maximum_distance_m: f64,
     /// Smallest part of a view that must overlap another for the two to be aligned as a pair; the adjustment itself
     /// takes whatever overlaps. Default: 0.3.

@@ -1,8 +1,8 @@
 //! One pixel's way through a pipeline: what each correction did to its range, and what its flags mean.
 
+pub(crate) mod document;
 pub(crate) mod flags;
 pub(crate) mod parts;
-pub(crate) mod words;
 
 use std::path::PathBuf;
 

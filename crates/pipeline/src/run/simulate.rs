@@ -16,6 +16,7 @@ use range_io::survey::{
     write_truth,
 };
 use range_io::tables::{Station, write_stations};
+use report::Document;
 use serde::Serialize;
 use simulation::{GrossErrorsSpec, SimulationSpec, Simulator};
 
@@ -40,8 +41,15 @@ impl Judged for Simulated {}
 
 impl fmt::Display for Simulated {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}: {} frames of {} stations, with truth", self.folder.display(), self.frames, self.stations)
+        document(self).fmt(f)
     }
+}
+
+/// All of it, for people.
+fn document(found: &Simulated) -> Document {
+    let Simulated { folder, stations, frames } = found;
+    let lead = format!("{}: {frames} frames of {stations} stations, with truth", folder.display());
+    Document::new("rangecam: simulate", lead)
 }
 
 /// Simulates a scene's file (relative to `base`) into a survey's folder `out`, which is complete or not there.

@@ -4,6 +4,7 @@
 //! that is averaged (and the means of as many parts), and the views of one station.
 
 use std::collections::VecDeque;
+use std::time::Instant;
 
 use rayon::prelude::*;
 
@@ -162,7 +163,9 @@ impl Stream<'_> {
         for view in views.iter_mut().skip(1) {
             (view.before, view.truth, view.reference_range) = (None, None, None);
         }
+        let clock = Instant::now();
         let (view, found) = self.line.mean(number, views)?;
+        self.watch.mean(number, clock.elapsed());
         Ok((view, tests.join(found)))
     }
 
@@ -172,6 +175,7 @@ impl Stream<'_> {
             let indices: Vec<usize> = self.waiting.by_ref().take(READ_AT_ONCE).collect();
             let views = indices.into_par_iter().map(|index| self.survey.view(index));
             self.read = views.collect::<Result<VecDeque<View>>>()?;
+            self.progress.frames_in_memory(self.survey.live.count());
             self.read.iter().for_each(|view| self.looked.look(view));
         }
         self.read.pop_front().ok_or_else(|| crate::Error::unfit("read frames", "the survey", "no frame"))

@@ -1,6 +1,6 @@
 //! What each stage changed, gathered as views go through: counts, and medians of thinned pixels.
 
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use statistics::quantile;
 
@@ -113,6 +113,12 @@ impl Watch for Tally {
                 tally.votes.look_at(view);
             }
         }
+        self.clock = Instant::now();
+    }
+
+    fn mean(&mut self, number: usize, time: Duration) {
+        self.stages[number].seconds += time.as_secs_f64();
+        // What follows is told by `after`, or is work on the frames of the next part.
         self.clock = Instant::now();
     }
 

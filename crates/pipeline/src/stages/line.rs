@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 use std::sync::Arc;
+use std::time::Duration;
 
 use camera_model::{Camera, RayTable};
 
@@ -47,6 +48,8 @@ enum Work {
 pub trait Watch {
     /// Before the stage of this number.
     fn before(&mut self, _number: usize, _stage: &Stage, _views: &[View]) {}
+    /// The mean of some of a station's frames, or of the means of its parts, took so long.
+    fn mean(&mut self, _number: usize, _time: Duration) {}
     /// After it.
     fn after(&mut self, _number: usize, _stage: &Stage, _views: &[View]) {}
 }

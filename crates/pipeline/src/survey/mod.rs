@@ -19,4 +19,4 @@ pub use open::{OpenSurvey, open, read_calibration};
 pub use plausibility::{FrameWatch, SenseVotes};
 pub use records::{AdjustmentFigures, RefusedStage, StageSummary, StationPose, ViewRecord};
 pub use truth::{RangeTruth, ViewTruth};
-pub use view::{FurtherPoint, Snapshot, View, ViewData, view_name};
+pub use view::{FurtherPoint, LiveFrames, Snapshot, View, ViewData, view_name};

@@ -15,7 +15,7 @@ use range_io::tables::{Station, read_stations};
 use crate::survey::compatible::{Purpose, compatible};
 use crate::survey::plausibility;
 use crate::survey::truth::ViewTruth;
-use crate::survey::view::{View, ViewData};
+use crate::survey::view::{LiveFrames, View, ViewData};
 use crate::{Error, Result};
 use commands::Doubt;
 use commands::root_of;
@@ -40,6 +40,8 @@ pub struct OpenSurvey {
     pub vertical_axis: usize,
     /// What speaks against survey and calibration.
     pub doubts: Vec<Doubt>,
+    /// Frames that were read and are in memory.
+    pub live: LiveFrames,
     root: PathBuf,
     depth_rays: Arc<RayTable>,
     true_poses: Vec<Station>,
@@ -86,6 +88,7 @@ pub fn open(
         reference: read_reference(&survey, &root)?,
         modulations: survey.camera.modulations()?,
         range_noise: calibration.as_ref().and_then(|calibration| calibration.range_noise),
+        live: LiveFrames::default(),
         root,
         survey: Arc::new(survey),
         calibration: calibration.map(Arc::new),
@@ -115,6 +118,7 @@ impl OpenSurvey {
             correction: None,
             cloud: None,
             further_points: Vec::new(),
+            live: self.live.clone(),
         };
         view.before = view.snapshot();
         Ok(view)

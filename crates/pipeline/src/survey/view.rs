@@ -1,5 +1,7 @@
 //! What the stages work on: one view per frame, later per station.
 
+use std::sync::Arc;
+
 use camera_model::OrganisedCloud;
 use nalgebra::Isometry3;
 use phase_unwrap::combine_frequencies;
@@ -44,6 +46,8 @@ pub struct View {
     pub cloud: Option<OrganisedCloud>,
     /// Points on the two surfaces of split mixed pixels.
     pub further_points: Vec<FurtherPoint>,
+    /// Counts the view among those in memory.
+    pub live: LiveFrames,
 }
 
 /// A point that belongs to no single pixel of an organised cloud.
@@ -55,6 +59,17 @@ pub struct FurtherPoint {
     pub sigma_m: f32,
     /// Amplitude in the camera's unit.
     pub amplitude: f32,
+}
+
+/// How many frames that were read of a survey are still in memory: each view holds one of these.
+#[derive(Debug, Clone, Default)]
+pub struct LiveFrames(Arc<()>);
+
+impl LiveFrames {
+    /// Frames in memory, if the survey holds one of these and each view another.
+    pub fn count(&self) -> usize {
+        Arc::strong_count(&self.0) - 1
+    }
 }
 
 /// The frame at its level.

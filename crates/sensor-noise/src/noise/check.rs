@@ -1,13 +1,14 @@
 //! Whether the standard deviations that pixels carry are true: against the scatter of repeated frames.
 
-use range_image::ComplexFrame;
+use range_image::{ComplexFrame, RangeFrame, Raster};
 use rayon::prelude::*;
 use statistics::{Distribution, upper_median};
 
 use super::bins::{MovedLimits, has_moved};
-use super::ranges::{NORMAL_SHARE, values_at};
-use super::repeats::{Repeats, mean_of};
-use super::{RepeatedRanges, VarianceEstimator};
+use super::ranges::{NORMAL_SHARE, Value};
+use super::repeats::{Running, Thinning};
+use super::steadiness::VALUES_PER_TASK;
+use super::{Frames, RepeatedRanges, VarianceEstimator};
 use crate::{Error, Result};
 
 /// Pixels of like amplitude: the variance of their standardised residuals, 1 if their sigma is true.
@@ -60,63 +61,113 @@ const BINS: usize = 12;
 const CLOSE: [f64; 2] = [0.81, 1.21];
 
 /// Checks the sigma planes of repeated range frames. Pixels that are flagged, lack a sigma, or have one that goes round a
-/// known ambiguity interval (above a sixteenth of it), are left out.
-pub fn check_range_sigma(stations: &[RepeatedRanges<'_>], estimator: VarianceEstimator) -> Result<SigmaCheck> {
+/// known ambiguity interval (above a sixteenth of it), are left out; of many, evenly spread ones are taken.
+pub fn check_range_sigma<S: Frames<RangeFrame>>(
+    stations: &[RepeatedRanges<S>],
+    estimator: VarianceEstimator,
+) -> Result<SigmaCheck, S::Error> {
     let mut entries = Vec::new();
-    for station in stations {
-        station.validate()?;
-        let count = station.frames.first().map_or(0, |frame| frame.range.as_slice().len());
-        let collect = |index: usize| {
-            let (ranges, amplitudes) = values_at(station, index)?;
-            let sigmas = station.frames.iter().map(|frame| f64::from(frame.sigma.as_slice()[index]));
-            let normal = station.interval_m.map_or(f64::INFINITY, |interval| NORMAL_SHARE * interval);
-            sigmas
-                .clone()
-                .all(|sigma| sigma < normal)
-                .then(|| Entry::new(&ranges, mean_of(&amplitudes), sigmas, estimator))
-                .flatten()
-        };
-        entries.par_extend((0..count).into_par_iter().filter_map(collect));
-    }
-    SigmaCheck::new(entries)
-}
-
-/// Checks the sigma planes of repeated complex images: real and imaginary parts of all frequencies. Each station is
-/// one list of frames.
-pub fn check_complex_sigma(stations: &[Vec<ComplexFrame>], estimator: VarianceEstimator) -> Result<SigmaCheck> {
-    let mut entries = Vec::new();
-    for frames in stations {
-        let Some(first) = frames.first() else { continue };
-        for (index, frame) in frames.iter().enumerate() {
-            frame.validate()?;
-            if frame.channels.len() != first.channels.len() || frame.width() != first.width() {
-                return Err(Error::FramesDiffer { station: String::new(), frame: index });
+    for (number, station) in stations.iter().enumerate() {
+        let mut values: Vec<(Value, Claimed)> = Vec::new();
+        let interval_m = station.interval_m;
+        let normal = interval_m.map_or(f64::INFINITY, |interval| NORMAL_SHARE * interval);
+        station.each(&mut |frame| {
+            if values.is_empty() {
+                let thinning = Thinning::new(number, stations.len(), frame.range.as_slice().len());
+                values.extend(Value::all(frame, thinning).into_iter().map(|value| (value, Claimed::default())));
             }
-        }
-        for channel in 0..first.channels.len() {
-            let collect = |index: usize| complex_entries(frames, channel, index, estimator);
-            entries.par_extend((0..first.flags.as_slice().len()).into_par_iter().flat_map_iter(collect));
-        }
+            values.par_iter_mut().with_min_len(VALUES_PER_TASK).for_each(|(value, claimed)| {
+                value.add(frame, interval_m);
+                claimed.add(f64::from(frame.sigma.as_slice()[value.index]), normal);
+            });
+            Ok(())
+        })?;
+        entries.extend(values.iter().filter_map(|(value, claimed)| {
+            let known = value.over_frames?;
+            Entry::new(&known.range, known.amplitude.mean, claimed, estimator)
+        }));
     }
-    SigmaCheck::new(entries)
+    Ok(SigmaCheck::new(entries)?)
 }
 
-fn complex_entries(frames: &[ComplexFrame], channel: usize, index: usize, estimator: VarianceEstimator) -> Vec<Entry> {
-    let trusted = frames.iter().all(|frame| frame.flags.as_slice()[index].is_empty());
-    if !trusted {
-        return Vec::new();
+/// Checks the sigma planes of repeated complex images: real and imaginary parts of all frequencies, of evenly spread pixels
+/// where there are many. Each station is one source of frames.
+pub fn check_complex_sigma<S: Frames<ComplexFrame>>(
+    stations: &[S],
+    estimator: VarianceEstimator,
+) -> Result<SigmaCheck, S::Error> {
+    let mut entries = Vec::new();
+    for (number, frames) in stations.iter().enumerate() {
+        let mut seen = ComplexValues::default();
+        frames.each(&mut |frame| seen.add(frame, |values| Thinning::new(number, stations.len(), values)))?;
+        for value in seen.values.iter().flatten().filter(|value| value.trusted) {
+            let amplitude = value.real.mean.hypot(value.imaginary.mean);
+            let parts = [&value.real, &value.imaginary];
+            entries.extend(parts.iter().filter_map(|part| Entry::new(part, amplitude, &value.claimed, estimator)));
+        }
     }
-    let parts = |imaginary: bool| -> Vec<f64> {
-        let plane = |frame: &ComplexFrame| {
-            let channel = &frame.channels[channel];
-            f64::from(if imaginary { &channel.imaginary } else { &channel.real }.as_slice()[index])
-        };
-        frames.iter().map(plane).collect()
-    };
-    let [real, imaginary] = [parts(false), parts(true)];
-    let amplitude = mean_of(&real).hypot(mean_of(&imaginary));
-    let sigmas = || frames.iter().map(|frame| f64::from(frame.channels[channel].sigma.as_slice()[index]));
-    [real, imaginary].iter().filter_map(|values| Entry::new(values, amplitude, sigmas(), estimator)).collect()
+    Ok(SigmaCheck::new(entries)?)
+}
+
+/// The variance that a value claims, over the frames.
+#[derive(Debug, Clone, Copy, Default)]
+struct Claimed {
+    sum: f64,
+    /// Whether a frame had no sigma or one beyond what is normal.
+    beyond: bool,
+}
+
+impl Claimed {
+    fn add(&mut self, sigma: f64, normal: f64) {
+        self.sum += sigma * sigma;
+        self.beyond |= sigma.is_nan() || sigma >= normal;
+    }
+}
+
+/// Pixels of repeated complex images, a list for each frequency.
+#[derive(Default)]
+struct ComplexValues {
+    width: usize,
+    frames: usize,
+    values: Vec<Vec<ComplexValue>>,
+}
+
+#[derive(Clone, Copy)]
+struct ComplexValue {
+    index: usize,
+    /// Whether no frame has a flag there.
+    trusted: bool,
+    real: Running,
+    imaginary: Running,
+    claimed: Claimed,
+}
+
+impl ComplexValues {
+    fn add(&mut self, frame: &ComplexFrame, thinning: impl Fn(usize) -> Thinning) -> Result<()> {
+        frame.validate()?;
+        let (channels, width) = (frame.channels.len(), frame.width());
+        if self.frames == 0 {
+            let pixels = frame.flags.as_slice().len();
+            let (nothing, claimed) = (Running::default(), Claimed::default());
+            let value = |index| ComplexValue { index, trusted: true, real: nothing, imaginary: nothing, claimed };
+            let values: Vec<ComplexValue> = thinning(2 * channels * pixels).pixels(pixels).map(value).collect();
+            (self.width, self.values) = (width, vec![values; channels]);
+        }
+        if self.values.len() != channels || self.width != width {
+            return Err(Error::FramesDiffer { station: String::new(), frame: self.frames });
+        }
+        self.frames += 1;
+        for (channel, values) in frame.channels.iter().zip(&mut self.values) {
+            let [real, imaginary, sigma] = [&channel.real, &channel.imaginary, &channel.sigma].map(Raster::as_slice);
+            values.par_iter_mut().with_min_len(VALUES_PER_TASK).for_each(|value| {
+                value.trusted &= frame.flags.as_slice()[value.index].is_empty();
+                value.real.add(f64::from(real[value.index]));
+                value.imaginary.add(f64::from(imaginary[value.index]));
+                value.claimed.add(f64::from(sigma[value.index]), f64::INFINITY);
+            });
+        }
+        Ok(())
+    }
 }
 
 /// One repeated value.
@@ -128,16 +179,11 @@ struct Entry {
 }
 
 impl Entry {
-    fn new(
-        values: &[f64],
-        amplitude: f64,
-        sigmas: impl Iterator<Item = f64>,
-        estimator: VarianceEstimator,
-    ) -> Option<Self> {
-        let repeats = Repeats::of(values, amplitude)?;
-        let claimed = sigmas.map(|sigma| sigma * sigma).sum::<f64>() / repeats.count as f64;
-        let ratio = estimator.variance(&repeats) / claimed;
-        let usable = claimed > 0.0 && ratio.is_finite();
+    fn new(values: &Running, amplitude: f64, claimed: &Claimed, estimator: VarianceEstimator) -> Option<Self> {
+        let repeats = values.repeats(amplitude)?;
+        let variance = claimed.sum / repeats.count as f64;
+        let ratio = estimator.variance(&repeats) / variance;
+        let usable = variance > 0.0 && ratio.is_finite() && !claimed.beyond;
         usable.then(|| Self { amplitude, ratio, degrees: estimator.degrees(repeats.count) })
     }
 }

@@ -61,6 +61,8 @@ pub struct VarianceFit {
     pub moved: usize,
     /// All values.
     pub values: usize,
+    /// Of so many pixels the values of one were taken: 1 for all, more where all stations together have too many.
+    pub every: usize,
     /// Which variance was used.
     pub estimator: VarianceEstimator,
     /// What each station's frames say of drift.
@@ -93,6 +95,8 @@ pub(super) struct LineRules {
     pub(super) parts: [&'static str; 2],
     /// Classes of a larger mean variance are left out.
     pub(super) largest_variance: f64,
+    /// Of so many pixels one was taken.
+    pub(super) every: usize,
 }
 
 /// Rounds of weighting and of leaving out after which nothing changes any more.
@@ -145,6 +149,7 @@ pub(super) fn fit_variance(
         bins,
         moved,
         values,
+        every: rules.every,
         estimator,
         steadiness,
     })

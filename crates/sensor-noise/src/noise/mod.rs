@@ -11,7 +11,7 @@ mod samples;
 mod steadiness;
 
 pub use bins::VarianceBin;
-pub use captures::{RepeatedRanges, RepeatedSamples};
+pub use captures::{Frames, RepeatedRanges, RepeatedSamples};
 pub use check::{SigmaBin, SigmaCheck, SigmaVerdict, check_complex_sigma, check_range_sigma};
 pub use fit::{VarianceEstimator, VarianceFit};
 pub use options::{NoiseFitOptions, SampleUnits};

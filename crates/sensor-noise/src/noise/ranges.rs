@@ -5,8 +5,9 @@ use range_image::RangeFrame;
 use rayon::prelude::*;
 
 use super::fit::{LineRules, VarianceFit, fit_variance};
-use super::repeats::{Repeats, mean_of};
-use super::{NoiseFitOptions, RepeatedRanges, Steadiness, steadiness};
+use super::repeats::{Repeats, Running, Thinning};
+use super::steadiness::{Alike, VALUES_PER_TASK};
+use super::{Frames, NoiseFitOptions, RepeatedRanges, Steadiness, steadiness};
 use crate::{Error, Result};
 
 /// Noise of ranges and how well it is known.
@@ -32,22 +33,27 @@ const PARTS: [&str; 2] = ["noise that falls with the amplitude", "floor"];
 /// than U / 16: their phases are no longer normal, and what was lost altogether says nothing of noise.
 /// So are pixels whose frames leave `1 / a²` uncertain by more than a tenth.
 ///
+/// Frames are seen one after the other, up to three times. Of more than four million pixels in all stations evenly spread
+/// ones are taken.
+///
 /// # Errors
 /// [`Error::NoAmplitudes`], too few frames or values, a scene that moved, and noise that does not follow the model.
-pub fn estimate_range_noise(
-    stations: &[RepeatedRanges<'_>],
+pub fn estimate_range_noise<S: Frames<RangeFrame>>(
+    stations: &[RepeatedRanges<S>],
     wrapped: bool,
     options: &NoiseFitOptions,
-) -> Result<RangeNoiseEstimate> {
+) -> Result<RangeNoiseEstimate, S::Error> {
     options.validate()?;
-    for station in stations {
-        station.validate()?;
-        let known = |frame: &&RangeFrame| frame.amplitude.as_slice().iter().any(|amplitude| *amplitude > 0.0);
-        if !station.frames.iter().all(known) {
-            return Err(Error::NoAmplitudes { station: station.station.clone() });
+    let mut observed = Vec::with_capacity(stations.len());
+    for (number, station) in stations.iter().enumerate() {
+        let one = Observed::new(station, |pixels| Thinning::new(number, stations.len(), pixels))?;
+        if !one.has_amplitudes {
+            return Err(Error::NoAmplitudes { station: station.station.clone() }.into());
         }
+        observed.push(one);
     }
-    let received = fit_as(stations, AmplitudeScale::AsReceived, options);
+    let fit = |scale| fit_as(stations, &observed, scale, options);
+    let received = fit(AmplitudeScale::AsReceived)?;
     // Light that does not vary is no reason to look for a scale in which it does.
     let another = match &received {
         Ok(_) => true,
@@ -56,12 +62,12 @@ pub fn estimate_range_noise(
         }
     };
     if wrapped || !another {
-        return received;
+        return Ok(received?);
     }
-    match (received, fit_as(stations, AmplitudeScale::TimesSquaredRange, options)) {
+    match (received, fit(AmplitudeScale::TimesSquaredRange)?) {
         (Err(_), Ok(scaled)) => Ok(scaled),
         (Ok(plain), Ok(scaled)) if scaled.fit.misfit < CLEARLY_BETTER * plain.fit.misfit => Ok(scaled),
-        (received, _) => received,
+        (received, _) => Ok(received?),
     }
 }
 
@@ -74,35 +80,45 @@ const MOST_UNCERTAIN: f64 = 0.1;
 /// Ranges that scatter by more than this share of the ambiguity interval (0.4 rad of phase) are no longer normal.
 pub(super) const NORMAL_SHARE: f64 = 1.0 / 16.0;
 
-fn fit_as(
-    stations: &[RepeatedRanges<'_>],
+/// The noise by one scale; its error where the frames do not determine it, beside those of reading them.
+fn fit_as<S: Frames<RangeFrame>>(
+    stations: &[RepeatedRanges<S>],
+    observed: &[Observed],
     scale: AmplitudeScale,
     options: &NoiseFitOptions,
-) -> Result<RangeNoiseEstimate> {
-    let mut observed = Vec::with_capacity(stations.len());
-    for station in stations {
-        let repeats = repeats_of(station, scale);
-        observed.push((Steadiness::new(&station.station, station.frames.len(), &repeats), repeats));
-    }
+) -> Result<Result<RangeNoiseEstimate>, S::Error> {
+    let repeats = stations.iter().zip(observed).map(|(station, own)| {
+        let repeats = own.repeats(scale);
+        (Steadiness::new(&station.station, station.frames.count(), &repeats), repeats)
+    });
     let known = stations.iter().filter_map(|station| station.interval_m).fold(f64::INFINITY, f64::min);
     // An interval that nobody states holds at least the ranges that were seen.
-    let interval = if known.is_finite() { known } else { largest_range(stations) };
+    let largest = || observed.iter().map(|own| own.largest_range_m).fold(0.0, f64::max);
+    let interval = if known.is_finite() { known } else { largest() };
     let largest_variance = (NORMAL_SHARE * interval).powi(2);
-    let rules = LineRules { least: [0.0; 2], sloped: true, parts: PARTS, largest_variance };
-    let mut fit = fit_variance(observed, &rules, options)?;
-    for (station, steadiness) in stations.iter().zip(&mut fit.steadiness) {
-        steadiness.frame_factors = steadiness::frame_factors(station.frames.len(), pixels(station), |index| {
-            let (ranges, amplitudes) = values_at(station, index)?;
-            let received = scale.received(mean_of(&amplitudes), mean_of(&ranges));
-            let variance = fit.slope * received.powi(-2) + fit.level;
-            (variance < largest_variance).then_some((ranges, variance))
-        });
-        steadiness.require_alike(options)?;
+    let every = observed.iter().map(|own| own.every).max().unwrap_or(1);
+    let rules = LineRules { least: [0.0; 2], sloped: true, parts: PARTS, largest_variance, every };
+    let mut fit = match fit_variance(repeats.collect(), &rules, options) {
+        Ok(fit) => fit,
+        Err(error) => return Ok(Err(error)),
+    };
+    let variance = |amplitude: f64, range_m: f64| {
+        let variance = fit.slope * scale.received(amplitude, range_m).powi(-2) + fit.level;
+        (variance < largest_variance).then_some(variance)
+    };
+    let mut factors = Vec::with_capacity(stations.len());
+    for (station, own) in stations.iter().zip(observed) {
+        factors.push(own.frame_factors(station, variance)?);
+    }
+    for (steadiness, factors) in fit.steadiness.iter_mut().zip(factors) {
+        steadiness.frame_factors = factors;
+        if let Err(error) = steadiness.require_alike(options) {
+            return Ok(Err(error));
+        }
     }
     let noise =
         RangeNoise { sigma_times_amplitude_m: fit.slope.sqrt(), floor_m: fit.level.sqrt(), amplitude_scale: scale };
-    noise.validate()?;
-    Ok(RangeNoiseEstimate { noise, fit })
+    Ok(noise.validate().map_err(Error::from).map(|()| RangeNoiseEstimate { noise, fit }))
 }
 
 impl RangeNoiseEstimate {
@@ -121,48 +137,124 @@ impl RangeNoiseEstimate {
     }
 }
 
-fn largest_range(stations: &[RepeatedRanges<'_>]) -> f64 {
-    let frames = stations.iter().flat_map(|station| &station.frames);
-    let ranges = frames.flat_map(|frame| frame.range.as_slice()).filter(|range| range.is_finite());
-    f64::from(ranges.fold(0.0_f32, |a, b| a.max(*b)))
+/// A pixel over the frames.
+#[derive(Clone, Copy)]
+pub(super) struct Value {
+    pub(super) index: usize,
+    /// Its number among those that were taken.
+    pixel: usize,
+    /// Its first range, metre, beside which the others are taken.
+    first_m: f64,
+    /// `None` once a frame had no range, no amplitude or a flag there.
+    pub(super) over_frames: Option<OverFrames>,
 }
 
-fn pixels(station: &RepeatedRanges<'_>) -> usize {
-    station.frames.first().map_or(0, |frame| frame.range.as_slice().len())
+#[derive(Clone, Copy, Default)]
+pub(super) struct OverFrames {
+    pub(super) range: Running,
+    pub(super) amplitude: Running,
 }
 
-fn repeats_of(station: &RepeatedRanges<'_>, scale: AmplitudeScale) -> Vec<Repeats> {
-    let collect = |index| {
-        let (ranges, amplitudes) = values_at(station, index)?;
-        let amplitude = Repeats::of(&amplitudes, 0.0)?;
-        let mean = mean_of(&amplitudes);
-        let regressor = scale.received(mean, mean_of(&ranges)).powi(-2);
-        let mut repeats = Repeats::of(&ranges, regressor)?;
-        repeats.pixel = index;
-        // d(a⁻²) = −2 a⁻³ da
-        repeats.regressor_variance = (2.0 * regressor / mean).powi(2) * amplitude.variance / amplitude.count as f64;
-        let is_known = repeats.regressor_variance < (MOST_UNCERTAIN * regressor).powi(2);
-        is_known.then_some(repeats)
-    };
-    (0..pixels(station)).into_par_iter().filter_map(collect).collect()
-}
-
-/// Ranges and amplitudes of a pixel in all frames; `None` where one of them is missing or flagged.
-pub(super) fn values_at(station: &RepeatedRanges<'_>, index: usize) -> Option<(Vec<f64>, Vec<f64>)> {
-    let (mut ranges, mut amplitudes) = (Vec::new(), Vec::new());
-    for frame in &station.frames {
-        let (range, amplitude) = (frame.range.as_slice()[index], frame.amplitude.as_slice()[index]);
-        let usable = range.is_finite() && amplitude > 0.0 && frame.flags.as_slice()[index].is_empty();
-        if !usable {
-            return None;
-        }
-        ranges.push(f64::from(range));
-        amplitudes.push(f64::from(amplitude));
+impl Value {
+    /// Those of the pixels of a frame that are taken.
+    pub(super) fn all(frame: &RangeFrame, thinning: Thinning) -> Vec<Self> {
+        let value = |(pixel, index)| {
+            let first_m = f64::from(frame.range.as_slice()[index]);
+            Self { index, pixel, first_m, over_frames: Some(OverFrames::default()) }
+        };
+        thinning.pixels(frame.range.as_slice().len()).enumerate().map(value).collect()
     }
-    if let (Some(interval), Some(&first)) = (station.interval_m, ranges.first()) {
-        for range in &mut ranges {
-            *range -= ((*range - first) / interval).round() * interval;
+
+    /// Takes the pixel of a frame.
+    pub(super) fn add(&mut self, frame: &RangeFrame, interval_m: Option<f64>) {
+        let (range, amplitude) = (frame.range.as_slice()[self.index], frame.amplitude.as_slice()[self.index]);
+        let usable = range.is_finite() && amplitude > 0.0 && frame.flags.as_slice()[self.index].is_empty();
+        match &mut self.over_frames {
+            Some(over_frames) if usable => {
+                over_frames.range.add(beside(f64::from(range), self.first_m, interval_m));
+                over_frames.amplitude.add(f64::from(amplitude));
+            }
+            over_frames => *over_frames = None,
         }
     }
-    Some((ranges, amplitudes))
+}
+
+/// Pixels of a station that are usable in every frame.
+#[derive(Default)]
+struct Observed {
+    values: Vec<Value>,
+    /// Of so many pixels one is taken.
+    every: usize,
+    largest_range_m: f64,
+    /// Whether each frame has any.
+    has_amplitudes: bool,
+}
+
+impl Observed {
+    fn new<S: Frames<RangeFrame>>(
+        station: &RepeatedRanges<S>,
+        thinning: impl Fn(usize) -> Thinning,
+    ) -> Result<Self, S::Error> {
+        let mut all = Self { has_amplitudes: true, ..Self::default() };
+        let interval_m = station.interval_m;
+        station.each(&mut |frame| {
+            if all.values.is_empty() {
+                let thinning = thinning(frame.range.as_slice().len());
+                (all.every, all.values) = (thinning.stride, Value::all(frame, thinning));
+            }
+            all.has_amplitudes &= frame.amplitude.as_slice().iter().any(|amplitude| *amplitude > 0.0);
+            let known = frame.range.as_slice().iter().filter(|range| range.is_finite());
+            all.largest_range_m = all.largest_range_m.max(f64::from(known.fold(0.0_f32, |a, b| a.max(*b))));
+            let values = all.values.par_iter_mut().with_min_len(VALUES_PER_TASK);
+            values.for_each(|value| value.add(frame, interval_m));
+            Ok(())
+        })?;
+        all.values.retain(|value| value.over_frames.is_some());
+        Ok(all)
+    }
+
+    fn repeats(&self, scale: AmplitudeScale) -> Vec<Repeats> {
+        let collect = |value: &Value| {
+            let OverFrames { range, amplitude } = value.over_frames?;
+            let regressor = scale.received(amplitude.mean, range.mean).powi(-2);
+            let mut repeats = range.repeats(regressor)?;
+            repeats.pixel = value.pixel;
+            let amplitudes = amplitude.repeats(0.0)?;
+            // d(a⁻²) = −2 a⁻³ da
+            repeats.regressor_variance =
+                (2.0 * regressor / amplitude.mean).powi(2) * amplitudes.variance / amplitudes.count as f64;
+            let is_known = repeats.regressor_variance < (MOST_UNCERTAIN * regressor).powi(2);
+            is_known.then_some(repeats)
+        };
+        self.values.iter().filter_map(collect).collect()
+    }
+
+    /// Scatter of each frame over what noise explains, which gives a pixel of this amplitude and range a variance.
+    fn frame_factors<S: Frames<RangeFrame>>(
+        &self,
+        station: &RepeatedRanges<S>,
+        variance: impl Fn(f64, f64) -> Option<f64>,
+    ) -> Result<Vec<f64>, S::Error> {
+        let frames = station.frames.count();
+        let expected = |value: &Value| {
+            let OverFrames { range, amplitude } = value.over_frames?;
+            Some((range, variance(amplitude.mean, range.mean)?))
+        };
+        let alike = Alike::new(frames, self.values.iter().map(expected));
+        let (mut factors, interval_m) = (Vec::with_capacity(frames), station.interval_m);
+        station.each(&mut |frame| {
+            let ranges = frame.range.as_slice();
+            factors.push(alike.factor(|place| {
+                let value = &self.values[place];
+                beside(f64::from(ranges[value.index]), value.first_m, interval_m)
+            }));
+            Ok(())
+        })?;
+        Ok(factors)
+    }
+}
+
+/// The range that differs from the first one of its pixel by less than half an ambiguity interval, metre.
+fn beside(range_m: f64, first_m: f64, interval_m: Option<f64>) -> f64 {
+    interval_m.map_or(range_m, |interval| range_m - ((range_m - first_m) / interval).round() * interval)
 }

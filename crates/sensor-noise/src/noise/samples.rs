@@ -5,9 +5,9 @@ use range_image::{RawFrame, Samples};
 use rayon::prelude::*;
 
 use super::fit::{LineRules, VarianceFit, fit_variance};
-use super::repeats::{Repeats, mean_of};
-use super::{NoiseFitOptions, RepeatedSamples, SampleUnits, Steadiness};
-use crate::noise::steadiness;
+use super::repeats::{Repeats, Running, Thinning};
+use super::steadiness::{self, Alike, VALUES_PER_TASK};
+use super::{Frames, NoiseFitOptions, RepeatedSamples, SampleUnits, Steadiness};
 use crate::{Error, Result};
 
 /// Noise of samples and how well it is known.
@@ -35,36 +35,38 @@ const PARTS: [&str; 2] = ["shot noise", "dark noise"];
 /// below it. Noise below half a stored unit is not spread over the numbers, and rounding no longer adds to it: what
 /// comes out then is refused or misfits.
 ///
+/// Frames are seen one after the other, twice: what is kept are sums of each value. Of more than four million values in all
+/// stations those of evenly spread pixels are taken.
+///
 /// # Errors
 /// Too few frames or values; frames unlike each other; a scene that moved, a light that jumped or drifted; light so
 /// uniform that shot and dark noise cannot be told apart; variances that follow no straight line.
-pub fn estimate_sample_noise(
-    stations: &[RepeatedSamples<'_>],
+pub fn estimate_sample_noise<S: Frames<RawFrame>>(
+    stations: &[RepeatedSamples<S>],
     units: &SampleUnits,
     options: &NoiseFitOptions,
-) -> Result<SampleNoiseEstimate> {
+) -> Result<SampleNoiseEstimate, S::Error> {
     options.validate()?;
     if !(units.raw_scale.is_finite() && units.raw_scale > 0.0) {
         let expected = "a positive scale";
-        return Err(Error::OutOfDomain { name: "raw_scale", value: units.raw_scale, expected });
+        return Err(Error::OutOfDomain { name: "raw_scale", value: units.raw_scale, expected }.into());
     }
-    let (mut whole, mut without_light) = (false, false);
-    let mut observed = Vec::with_capacity(stations.len());
-    for station in stations {
-        station.validate()?;
-        for frame in &station.frames {
-            whole |= !matches!(frame.samples(), Samples::F32(_));
-            without_light |= matches!(frame.samples(), Samples::I16(_));
-        }
-        let repeats = repeats_of(station, units);
-        observed.push((Steadiness::new(&station.station, station.frames.len(), &repeats), repeats));
+    let (mut observed, mut repeats) = (Vec::with_capacity(stations.len()), Vec::with_capacity(stations.len()));
+    for (number, station) in stations.iter().enumerate() {
+        let one = Observed::new(station, |values| Thinning::new(number, stations.len(), values), units)?;
+        let own = one.repeats();
+        repeats.push((Steadiness::new(&station.station, station.frames.count(), &own), own));
+        observed.push(one);
     }
+    let every = observed.iter().map(|station| station.every).max().unwrap_or(1);
+    let whole = observed.iter().any(|station| station.whole);
+    let without_light = observed.iter().any(|station| station.without_light);
     let quantisation_sigma = if whole { units.raw_scale / 12.0_f64.sqrt() } else { 0.0 };
     let least = [0.0, quantisation_sigma * quantisation_sigma];
-    let rules = LineRules { least, sloped: !without_light, parts: PARTS, largest_variance: f64::INFINITY };
-    let mut fit = fit_variance(observed, &rules, options)?;
-    for (station, steadiness) in stations.iter().zip(&mut fit.steadiness) {
-        steadiness.frame_factors = frame_factors(station, units, [fit.slope, fit.level]);
+    let rules = LineRules { least, sloped: !without_light, parts: PARTS, largest_variance: f64::INFINITY, every };
+    let mut fit = fit_variance(repeats, &rules, options)?;
+    for ((station, own), steadiness) in stations.iter().zip(&observed).zip(&mut fit.steadiness) {
+        steadiness.frame_factors = own.frame_factors(station, units, [fit.slope, fit.level])?;
         steadiness.require_alike(options)?;
     }
     let noise = NoiseModel { shot_variance_per_unit: fit.slope, dark_sigma: fit.level.sqrt() };
@@ -87,29 +89,101 @@ impl SampleNoiseEstimate {
     }
 }
 
-/// Repeats of all samples that are usable in every frame.
-fn repeats_of(station: &RepeatedSamples<'_>, units: &SampleUnits) -> Vec<Repeats> {
-    let count = station.frames.first().map_or(0, |frame| frame.samples().len());
-    let pixels = station.frames.first().map_or(1, |frame| (frame.width() * frame.height()).max(1));
-    let collect = |index| {
-        let values = values_at(station, units, index)?;
-        let mean = mean_of(&values);
-        let mut repeats = Repeats::of(&values, mean)?;
-        repeats.pixel = index % pixels;
-        repeats.regressor_variance = repeats.variance / repeats.count as f64;
-        Some(repeats)
-    };
-    (0..count).into_par_iter().filter_map(collect).collect()
+/// A sample over the frames; `None` once it was clipped or no number.
+struct Value {
+    index: usize,
+    pixel: usize,
+    over_frames: Option<Running>,
 }
 
-/// Scaled values of one sample in all frames; `None` where one of them was clipped or is no number.
-fn values_at(station: &RepeatedSamples<'_>, units: &SampleUnits, index: usize) -> Option<Vec<f64>> {
-    let usable = |frame: &RawFrame| {
-        let (raw, lowest, highest) = stored(frame, index);
-        let highest = units.saturation.map_or(highest, |saturation| saturation.min(highest));
-        (raw.is_finite() && raw > lowest && raw < highest).then_some(raw * units.raw_scale)
+/// Samples of a station that are usable in every frame.
+#[derive(Default)]
+struct Observed {
+    values: Vec<Value>,
+    /// Of so many pixels one is taken.
+    every: usize,
+    /// Whether samples are whole numbers, and whether they are differences of two taps.
+    whole: bool,
+    without_light: bool,
+}
+
+impl Observed {
+    fn new<S: Frames<RawFrame>>(
+        station: &RepeatedSamples<S>,
+        thinning: impl Fn(usize) -> Thinning,
+        units: &SampleUnits,
+    ) -> Result<Self, S::Error> {
+        let mut all = Self::default();
+        station.each(&mut |frame| {
+            if all.values.is_empty() {
+                let thinning = thinning(frame.samples().len());
+                (all.every, all.values) = (thinning.stride, values(frame, thinning));
+            }
+            all.whole |= !matches!(frame.samples(), Samples::F32(_));
+            all.without_light |= matches!(frame.samples(), Samples::I16(_));
+            all.values.par_iter_mut().with_min_len(VALUES_PER_TASK).for_each(|value| {
+                match (&mut value.over_frames, usable(frame, units, value.index)) {
+                    (Some(running), Some(sample)) => running.add(sample),
+                    (over_frames, _) => *over_frames = None,
+                }
+            });
+            Ok(())
+        })?;
+        all.values.retain(|value| value.over_frames.is_some());
+        Ok(all)
+    }
+
+    fn repeats(&self) -> Vec<Repeats> {
+        let repeats = |value: &Value| {
+            let running = value.over_frames?;
+            let mut repeats = running.repeats(running.mean)?;
+            repeats.pixel = value.pixel;
+            repeats.regressor_variance = repeats.variance / repeats.count as f64;
+            Some(repeats)
+        };
+        self.values.iter().filter_map(repeats).collect()
+    }
+
+    /// Scatter of each frame over what noise with this line explains.
+    fn frame_factors<S: Frames<RawFrame>>(
+        &self,
+        station: &RepeatedSamples<S>,
+        units: &SampleUnits,
+        line: [f64; 2],
+    ) -> Result<Vec<f64>, S::Error> {
+        let frames = station.frames.count();
+        let expected = |value: &Value| {
+            let running = value.over_frames?;
+            Some((running, line[0] * running.mean + line[1]))
+        };
+        let alike = Alike::new(frames, self.values.iter().map(expected));
+        let mut factors = Vec::with_capacity(frames);
+        station.each(&mut |frame| {
+            factors.push(alike.factor(|place| usable(frame, units, self.values[place].index).unwrap_or(f64::NAN)));
+            Ok(())
+        })?;
+        Ok(factors)
+    }
+}
+
+/// Those of the samples of a frame that are taken.
+fn values(frame: &RawFrame, thinning: Thinning) -> Vec<Value> {
+    let pixels = (frame.width() * frame.height()).max(1);
+    let plane = |plane: usize| {
+        let value = move |(pixel, place)| {
+            let over_frames = Some(Running::default());
+            Value { index: plane * pixels + place, pixel, over_frames }
+        };
+        thinning.pixels(pixels).enumerate().map(value)
     };
-    station.frames.iter().map(|frame| usable(frame)).collect()
+    (0..frame.samples().len() / pixels).flat_map(plane).collect()
+}
+
+/// A sample in sample units; `None` where it was clipped or is no number.
+fn usable(frame: &RawFrame, units: &SampleUnits, index: usize) -> Option<f64> {
+    let (raw, lowest, highest) = stored(frame, index);
+    let highest = units.saturation.map_or(highest, |saturation| saturation.min(highest));
+    (raw.is_finite() && raw > lowest && raw < highest).then_some(raw * units.raw_scale)
 }
 
 /// A stored sample, and the ends of its type, at which numbers are clipped.
@@ -119,14 +193,4 @@ fn stored(frame: &RawFrame, index: usize) -> (f64, f64, f64) {
         Samples::U16(values) => (f64::from(values[index]), 0.0, f64::from(u16::MAX)),
         Samples::I16(values) => (f64::from(values[index]), f64::from(i16::MIN), f64::from(i16::MAX)),
     }
-}
-
-/// Mean square deviation of each frame from the mean of all, over what the noise explains; moved samples left out.
-fn frame_factors(station: &RepeatedSamples<'_>, units: &SampleUnits, line: [f64; 2]) -> Vec<f64> {
-    let count = station.frames.first().map_or(0, |frame| frame.samples().len());
-    steadiness::frame_factors(station.frames.len(), count, |index| {
-        let values = values_at(station, units, index)?;
-        let variance = line[0] * mean_of(&values) + line[1];
-        Some((values, variance))
-    })
 }

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::NoiseFitOptions;
 use super::bins::{has_moved, moved_limit};
-use super::repeats::{Repeats, mean_of};
+use super::repeats::{Repeats, Running};
 use crate::{Error, Result};
 
 /// What the frames of a station say of drift and of unlike frames.
@@ -80,36 +80,37 @@ impl Steadiness {
 }
 
 /// Values whose sums one task adds up; the sums are added in the order of the values.
-const VALUES_PER_TASK: usize = 8192;
+pub(super) const VALUES_PER_TASK: usize = 8192;
 
-/// Mean square deviation of each frame from the mean of all, over its expectation; values that moved are left out.
-///
-/// `value_at` gives the values of all frames, and the variance that noise gives them.
-pub(super) fn frame_factors(
-    frames: usize,
-    count: usize,
-    value_at: impl Fn(usize) -> Option<(Vec<f64>, f64)> + Sync,
-) -> Vec<f64> {
-    let limit = moved_limit(frames as f64 - 1.0);
-    let starts: Vec<usize> = (0..count).step_by(VALUES_PER_TASK).collect();
-    let add = |start: usize| {
-        let mut sums = vec![0.0; frames + 1];
-        for (values, expected) in (start..count.min(start + VALUES_PER_TASK)).filter_map(&value_at) {
-            let mean = mean_of(&values);
-            let moved = Repeats::of(&values, 0.0).is_none_or(|own| has_moved(own.variance, expected, limit));
-            if moved || expected <= 0.0 {
-                continue;
-            }
-            for (sum, value) in sums.iter_mut().zip(&values) {
-                *sum += (value - mean).powi(2) / expected;
-            }
-            sums[frames] += 1.0 - 1.0 / frames as f64;
-        }
-        sums
-    };
-    let parts: Vec<Vec<f64>> = starts.into_par_iter().map(add).collect();
-    let total = |place: usize| parts.iter().map(|part| part[place]).sum::<f64>();
-    (0..frames).map(|frame| total(frame) / total(frames)).collect()
+/// The values of a station that did not move, by which its frames are held against each other.
+pub(super) struct Alike {
+    /// Position of the value, its mean over the frames, and the variance that noise gives it.
+    still: Vec<(usize, f64, f64)>,
+    /// Squares that noise alone sums up to.
+    expected: f64,
+}
+
+impl Alike {
+    /// Of the sums of each value over so many frames with the variance that noise gives it.
+    pub(super) fn new(frames: usize, values: impl Iterator<Item = Option<(Running, f64)>>) -> Self {
+        let limit = moved_limit(frames as f64 - 1.0);
+        let is_still = |(place, value): (usize, Option<(Running, f64)>)| {
+            let (running, expected) = value?;
+            let moved = running.repeats(0.0).is_none_or(|own| has_moved(own.variance, expected, limit));
+            (!moved && expected > 0.0).then_some((place, running.mean, expected))
+        };
+        let still: Vec<(usize, f64, f64)> = values.enumerate().filter_map(is_still).collect();
+        let expected = still.len() as f64 * (1.0 - 1.0 / frames as f64);
+        Self { still, expected }
+    }
+
+    /// Mean square deviation of a frame from the mean of all, over its expectation. `value` gives that at a position.
+    pub(super) fn factor(&self, value: impl Fn(usize) -> f64 + Sync) -> f64 {
+        let square = |(place, mean, expected): &(usize, f64, f64)| (value(*place) - mean).powi(2) / expected;
+        let parts = self.still.par_chunks(VALUES_PER_TASK).map(|part| part.iter().map(square).sum());
+        let parts: Vec<f64> = parts.collect();
+        parts.iter().sum::<f64>() / self.expected
+    }
 }
 
 /// An estimated or held parameter of the noise.

@@ -2,11 +2,11 @@
 
 use camera_model::Camera;
 use error_models::FixedPattern;
+use range_image::RangeFrame;
 
+use super::PatternOptions;
 use super::held_out::HeldOutTest;
-use super::mean::robust_mean;
-use super::residuals::{Residuals, Walls};
-use super::{PatternOptions, WallCapture};
+use super::residuals::Walls;
 use crate::Result;
 
 /// A fixed pattern, how well it is known, and whether it is worth applying.
@@ -43,7 +43,32 @@ pub struct WallQuality {
     pub systematic_sigmas: f64,
 }
 
-/// Estimates the range offset of each pixel from frames of flat walls, all other range errors taken off.
+/// One frame of a flat wall, all other range errors taken off.
+#[derive(Debug, Clone)]
+pub struct WallCapture<'a> {
+    /// Name of the station; frames of one station count as one wall.
+    pub station: String,
+    /// The frame.
+    pub frame: &'a RangeFrame,
+}
+
+/// [`PatternEstimator`] of frames that are all at hand.
+///
+/// # Errors
+/// As [`PatternEstimator`].
+pub fn estimate_fixed_pattern(
+    captures: &[WallCapture<'_>],
+    camera: &Camera,
+    options: &PatternOptions,
+) -> Result<PatternEstimate> {
+    let stations = captures.iter().map(|capture| capture.station.clone()).collect();
+    let mut estimator = PatternEstimator::new(stations, camera, options)?;
+    captures.iter().try_for_each(|capture| estimator.add(capture.frame))?;
+    Ok(estimator.finish())
+}
+
+/// Estimates the range offset of each pixel from frames of flat walls, all other range errors taken off; it sees them one
+/// after the other and keeps none.
 ///
 /// A plane of its own is fitted to each frame; what the pixels of a station leave on average is one value of each
 /// pixel, and the robust mean over stations its offset. Offset, tilt and all else that a plane can take up stay with
@@ -51,51 +76,57 @@ pub struct WallQuality {
 /// passes for a pattern: walls at several distances, seen by the camera turned, are better.
 ///
 /// Then each station in turn is held out and freed of the pattern of the others: only if its residuals fall, the pattern
-/// is worth applying.
-///
-/// # Errors
-/// [`Error::TooFewFrames`](crate::Error::TooFewFrames) below two frames, and what
-/// [`primitives::fit_primitive`] says of a wall that is none.
-pub fn estimate_fixed_pattern(
-    captures: &[WallCapture<'_>],
-    camera: &Camera,
-    options: &PatternOptions,
-) -> Result<PatternEstimate> {
-    options.validate()?;
-    let walls = Walls::new(captures, camera, &options.wall)?;
-    let test = HeldOutTest::new(&walls, camera.format.width, options);
-    let found = pattern_of(&walls.averaged.iter().collect::<Vec<_>>());
-    let known: Vec<usize> = (0..found.values_m.len()).filter(|index| found.values_m[*index].is_finite()).collect();
-    let rms =
-        |of: &dyn Fn(usize) -> f64| (known.iter().map(|index| of(*index)).sum::<f64>() / known.len() as f64).sqrt();
-    Ok(PatternEstimate {
-        pixels: known.len(),
-        offset_rms_m: rms(&|index| found.values_m[index].powi(2)),
-        deviation_rms_m: rms(&|index| found.variances[index]),
-        pattern: FixedPattern {
-            width: camera.format.width,
-            height: camera.format.height,
-            offset_m: found.values_m.iter().map(|value| if value.is_finite() { *value as f32 } else { 0.0 }).collect(),
-            sigma_m: found.variances.iter().map(|variance| variance.sqrt() as f32).collect(),
-        },
-        test,
-        frames: walls.quality,
-    })
+/// is worth applying. Of more than twenty walls neighbours are held out together, in twenty parts. What is kept are sums of
+/// each pixel of each wall; of more walls than 62 million pixels (200 of 640 x 480) neighbours count as one.
+pub struct PatternEstimator {
+    walls: Walls,
+    camera: Camera,
+    options: PatternOptions,
 }
 
-/// Robust mean over walls, pixel by pixel, with its variance; NaN where no wall shows the pixel.
-pub(super) fn pattern_of(walls: &[&Residuals]) -> Residuals {
-    let pixels = walls.first().map_or(0, |wall| wall.values_m.len());
-    let mut out = Residuals { values_m: vec![f64::NAN; pixels], variances: vec![f64::NAN; pixels] };
-    for index in 0..pixels {
-        let values: Vec<(f64, f64)> = walls
-            .iter()
-            .map(|wall| (wall.values_m[index], wall.variances[index]))
-            .filter(|(value, variance)| value.is_finite() && *variance > 0.0)
-            .collect();
-        if let Some((mean, sigma)) = robust_mean(&values) {
-            (out.values_m[index], out.variances[index]) = (mean, sigma * sigma);
+impl PatternEstimator {
+    /// For frames of these stations, in the order in which they will come.
+    ///
+    /// # Errors
+    /// [`Error::TooFewFrames`](crate::Error::TooFewFrames) below two frames, and for options out of their domain.
+    pub fn new(stations: Vec<String>, camera: &Camera, options: &PatternOptions) -> Result<Self> {
+        options.validate()?;
+        let walls = Walls::new(stations, camera.format.width * camera.format.height)?;
+        Ok(Self { walls, camera: *camera, options: *options })
+    }
+
+    /// The next frame.
+    ///
+    /// # Errors
+    /// What [`primitives::fit_primitive`] says of a wall that is none; a frame more than there are stations.
+    pub fn add(&mut self, frame: &RangeFrame) -> Result<()> {
+        self.walls.add(frame, &self.camera, &self.options)
+    }
+
+    /// The pattern of the frames that were added.
+    pub fn finish(self) -> PatternEstimate {
+        let Self { walls, camera, options } = self;
+        let test = HeldOutTest::new(&walls, camera.format.width, &options);
+        let found = walls.pattern(|_| true);
+        let known: Vec<(f64, f64)> = found.iter().copied().filter(|(offset_m, _)| offset_m.is_finite()).collect();
+        let rms = |of: fn(&(f64, f64)) -> f64| {
+            (known.iter().map(|pixel| of(pixel).powi(2)).sum::<f64>() / known.len() as f64).sqrt()
+        };
+        PatternEstimate {
+            pixels: known.len(),
+            offset_rms_m: rms(|pixel| pixel.0),
+            deviation_rms_m: rms(|pixel| pixel.1),
+            pattern: FixedPattern {
+                width: camera.format.width,
+                height: camera.format.height,
+                offset_m: found
+                    .iter()
+                    .map(|(offset, _)| if offset.is_finite() { *offset as f32 } else { 0.0 })
+                    .collect(),
+                sigma_m: found.iter().map(|(_, sigma)| *sigma as f32).collect(),
+            },
+            test,
+            frames: walls.quality,
         }
     }
-    out
 }

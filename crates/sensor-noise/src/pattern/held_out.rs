@@ -3,13 +3,12 @@
 use statistics::Distribution;
 
 use super::PatternOptions;
-use super::estimate::pattern_of;
-use super::residuals::{Residuals, Walls};
+use super::residuals::Walls;
 
 /// What was held out in turn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PatternSplit {
-    /// The frames of one station after the other.
+    /// The frames of one station after the other, or of several neighbouring ones.
     Stations,
     /// One frame after the other, all of the same wall from the same station: unevenness of that wall and whatever else
     /// belongs to the station passes for a pattern.
@@ -32,6 +31,8 @@ pub enum PatternVerdict {
 pub struct HeldOutTest {
     /// What was held out.
     pub split: PatternSplit,
+    /// In how many parts of neighbours: each by itself up to twenty.
+    pub parts: usize,
     /// Root mean square over the walls' mean residuals, metre, as they are and with the pattern taken off.
     pub rms_m: [f64; 2],
     /// The same over the residuals of single frames.
@@ -46,25 +47,24 @@ pub struct HeldOutTest {
     pub verdict: PatternVerdict,
 }
 
+/// Parts that are held out in turn where there are more walls: each costs a pattern of the others.
+const MOST_PARTS: usize = 20;
+
 impl HeldOutTest {
     pub(super) fn new(walls: &Walls, width: usize, options: &PatternOptions) -> Self {
-        let mut sums = Sums::default();
+        let (count, pixels) = (walls.count(), walls.squares().len());
+        let parts = count.min(MOST_PARTS);
+        let part_of = |wall: usize| wall * parts / count;
+        let mut sums = Sums::new(pixels);
         let mut blocks: Vec<f64> = Vec::new();
-        for held in 0..walls.averaged.len() {
-            let others: Vec<&Residuals> = walls
-                .averaged
-                .iter()
-                .enumerate()
-                .filter(|(wall, _)| *wall != held)
-                .map(|(_, residuals)| residuals)
-                .collect();
-            let pattern = pattern_of(&others);
-            let falls = sums.add(&walls.averaged[held], &pattern.values_m);
-            add_to_blocks(&mut blocks, &falls, width, options.block);
-            for (frame, _) in walls.frames.iter().zip(&walls.wall_of).filter(|(_, wall)| **wall == held) {
-                sums.add_frame(frame, &pattern.values_m);
+        for part in 0..parts {
+            let pattern = walls.pattern(|wall| part_of(wall) != part);
+            for wall in (0..count).filter(|wall| part_of(*wall) == part) {
+                let falls = sums.add(walls, wall, &pattern);
+                add_to_blocks(&mut blocks, &falls, width, options.block);
             }
         }
+        sums.add_squares(walls.squares());
         // A block that no wall reaches says nothing.
         let blocks: Vec<f64> = blocks.into_iter().filter(|fall| fall.is_finite()).collect();
         let count = blocks.len() as f64;
@@ -82,6 +82,7 @@ impl HeldOutTest {
         };
         Self {
             split: if walls.of_stations { PatternSplit::Stations } else { PatternSplit::Frames },
+            parts,
             rms_m,
             frame_rms_m: Sums::rms(sums.frames),
             statistic,
@@ -93,32 +94,40 @@ impl HeldOutTest {
 }
 
 /// Sums of squares without and with, and counts.
-#[derive(Default)]
 struct Sums {
     walls: [f64; 3],
     frames: [f64; 3],
+    /// Pixels that other walls have a pattern for.
+    known: Vec<bool>,
 }
 
 impl Sums {
+    fn new(pixels: usize) -> Self {
+        Self { walls: [0.0; 3], frames: [0.0; 3], known: vec![false; pixels] }
+    }
+
     /// Adds a wall; the fall of each pixel's squared residual, NaN where there is none.
-    fn add(&mut self, wall: &Residuals, pattern: &[f64]) -> Vec<f64> {
-        let fall = |(value, offset): (&f64, &f64)| {
+    fn add(&mut self, walls: &Walls, wall: usize, pattern: &[(f64, f64)]) -> Vec<f64> {
+        let fall = |(pixel, (offset, _)): (usize, &(f64, f64))| {
+            let (value, frames) = walls.residual_m(wall, pixel);
             let (without, with) = (value * value, (value - offset).powi(2));
             if with.is_finite() {
                 self.walls = [self.walls[0] + without, self.walls[1] + with, self.walls[2] + 1.0];
+                // Σ (v − o)² = Σ v² + n o (o − 2 v̄); the first is added once for all walls.
+                self.frames[1] += frames * offset * (offset - 2.0 * value);
+                self.frames[2] += frames;
+                self.known[pixel] = true;
             }
             without - with
         };
-        wall.values_m.iter().zip(pattern).map(fall).collect()
+        pattern.iter().enumerate().map(fall).collect()
     }
 
-    fn add_frame(&mut self, frame: &Residuals, pattern: &[f64]) {
-        for (value, offset) in frame.values_m.iter().zip(pattern) {
-            let (without, with) = (value * value, (value - offset).powi(2));
-            if with.is_finite() {
-                self.frames = [self.frames[0] + without, self.frames[1] + with, self.frames[2] + 1.0];
-            }
-        }
+    /// Adds the squares of single frames. A pixel that walls of two parts show has a pattern in each: all of its frames count.
+    fn add_squares(&mut self, squares: &[f64]) {
+        let sum: f64 = squares.iter().zip(&self.known).filter(|(_, known)| **known).map(|(square, _)| square).sum();
+        self.frames[0] += sum;
+        self.frames[1] += sum;
     }
 
     fn rms([without, with, count]: [f64; 3]) -> [f64; 2] {

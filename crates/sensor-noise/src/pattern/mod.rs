@@ -6,7 +6,6 @@ mod mean;
 mod options;
 mod residuals;
 
-pub use estimate::{PatternEstimate, WallQuality, estimate_fixed_pattern};
+pub use estimate::{PatternEstimate, PatternEstimator, WallCapture, WallQuality, estimate_fixed_pattern};
 pub use held_out::{HeldOutTest, PatternSplit, PatternVerdict};
 pub use options::PatternOptions;
-pub use residuals::WallCapture;

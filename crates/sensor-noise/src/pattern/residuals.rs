@@ -1,104 +1,131 @@
-//! What the ranges of a wall leave beside its plane, frame by frame and station by station.
+//! What the ranges of walls leave beside their planes, summed up frame by frame: by pixel for what counts as one wall.
 
 use camera_model::Camera;
+use primitives::{PrimitiveFit, PrimitiveKind, fit_whatever_shape};
 use range_image::RangeFrame;
 use rayon::prelude::*;
 
-use super::WallQuality;
-use primitives::{PrimitiveKind, PrimitiveOptions, fit_whatever_shape};
-
+use super::mean::robust_mean;
+use super::{PatternOptions, WallQuality};
 use crate::{Error, Result};
 
-/// One frame of a flat wall, all other range errors taken off.
-#[derive(Debug, Clone)]
-pub struct WallCapture<'a> {
-    /// Name of the station; frames of one station count as one wall.
-    pub station: String,
-    /// The frame.
-    pub frame: &'a RangeFrame,
+/// Pixels of all walls together, about: each takes 20 bytes, and more than 200 walls of 640 x 480 pixels tell a pattern no
+/// better than means of neighbouring ones do.
+const MOST_PIXELS: usize = 62_000_000;
+
+/// Residuals of what counts as one wall: of a station, or of a frame where there is one station; of several neighbouring ones
+/// where there are more than can be kept.
+struct Wall {
+    sums_m: Vec<f64>,
+    variances: Vec<f64>,
+    frames: Vec<u32>,
 }
 
-/// A residual for each pixel and its variance; NaN where there is none.
-#[derive(Debug, Clone)]
-pub(super) struct Residuals {
-    pub(super) values_m: Vec<f64>,
-    pub(super) variances: Vec<f64>,
+impl Wall {
+    fn new(pixels: usize) -> Self {
+        Self { sums_m: vec![0.0; pixels], variances: vec![0.0; pixels], frames: vec![0; pixels] }
+    }
+
+    /// Mean residual of a pixel and its variance; `None` where no frame shows the wall.
+    fn mean(&self, pixel: usize) -> Option<(f64, f64)> {
+        let frames = f64::from(self.frames[pixel]);
+        (frames > 0.0).then(|| (self.sums_m[pixel] / frames, self.variances[pixel] / (frames * frames)))
+    }
 }
 
-/// Residuals of single frames, and of what counts as one wall: of a station, or of a frame where there is one station.
+/// All walls.
 pub(super) struct Walls {
-    pub(super) frames: Vec<Residuals>,
-    /// Position in `averaged` of each frame.
-    pub(super) wall_of: Vec<usize>,
-    pub(super) averaged: Vec<Residuals>,
+    walls: Vec<Wall>,
+    /// Names of the frames' stations, and the wall that each frame belongs to.
+    stations: Vec<String>,
+    wall_of: Vec<usize>,
+    /// Squared residuals of single frames, by pixel.
+    squares: Vec<f64>,
     pub(super) quality: Vec<WallQuality>,
     /// Whether walls are stations.
     pub(super) of_stations: bool,
 }
 
 impl Walls {
-    /// Fits a plane to each frame.
-    pub(super) fn new(captures: &[WallCapture<'_>], camera: &Camera, options: &PrimitiveOptions) -> Result<Self> {
-        if let [] | [_] = captures {
-            let station = captures.first().map_or_else(String::new, |capture| capture.station.clone());
-            return Err(Error::TooFewFrames { station, frames: captures.len(), needed: 2 });
+    /// For frames of these stations, of so many pixels.
+    pub(super) fn new(stations: Vec<String>, pixels: usize) -> Result<Self> {
+        if let [] | [_] = stations.as_slice() {
+            let station = stations.first().cloned().unwrap_or_default();
+            return Err(Error::TooFewFrames { station, frames: stations.len(), needed: 2 });
         }
-        let mut stations: Vec<&str> = Vec::new();
-        for capture in captures {
-            if !stations.contains(&capture.station.as_str()) {
-                stations.push(&capture.station);
-            }
-        }
-        let of_stations = stations.len() > 1;
-        let place = |index: usize, capture: &WallCapture<'_>| {
-            let station = stations.iter().position(|name| *name == capture.station).unwrap_or(0);
-            if of_stations { station } else { index }
+        let mut numbers = std::collections::BTreeMap::new();
+        let number = |station: &String| {
+            let next = numbers.len();
+            *numbers.entry(station.clone()).or_insert(next)
         };
-        let wall_of: Vec<usize> = captures.iter().enumerate().map(|(index, one)| place(index, one)).collect();
-        let fitted = |capture: &WallCapture<'_>| Residuals::of(capture, camera, options);
-        let fitted: Vec<(Residuals, WallQuality)> = captures.par_iter().map(fitted).collect::<Result<_>>()?;
-        let (frames, quality): (Vec<_>, Vec<_>) = fitted.into_iter().unzip();
-        let count = if of_stations { stations.len() } else { captures.len() };
-        let own = |wall: usize| frames.iter().zip(&wall_of).filter(move |(_, of)| **of == wall).map(|(frame, _)| frame);
-        let averaged = (0..count).map(|wall| Residuals::mean(&own(wall).collect::<Vec<_>>())).collect();
-        Ok(Self { frames, wall_of, averaged, quality, of_stations })
+        let station_of: Vec<usize> = stations.iter().map(number).collect();
+        let of_stations = numbers.len() > 1;
+        let all = if of_stations { numbers.len() } else { stations.len() };
+        let count = all.min((MOST_PIXELS / pixels.max(1)).max(2));
+        let place = |(frame, station): (usize, &usize)| if of_stations { *station } else { frame } * count / all;
+        let wall_of: Vec<usize> = station_of.iter().enumerate().map(place).collect();
+        let walls = (0..count).map(|_| Wall::new(pixels)).collect();
+        Ok(Self { walls, stations, wall_of, squares: vec![0.0; pixels], quality: Vec::new(), of_stations })
+    }
+
+    /// Fits a plane to the next frame.
+    pub(super) fn add(&mut self, frame: &RangeFrame, camera: &Camera, options: &PatternOptions) -> Result<()> {
+        let number = self.quality.len();
+        let (Some(station), Some(wall)) = (self.stations.get(number), self.wall_of.get(number)) else {
+            let (name, value) = ("frames", number as f64 + 1.0);
+            return Err(Error::OutOfDomain { name, value, expected: "as many as stations were named" });
+        };
+        let fit = fit_whatever_shape(frame, camera, PrimitiveKind::Plane, &options.wall)?;
+        let wall = &mut self.walls[*wall];
+        let (mut squares, mut used) = (0.0, 0_usize);
+        for pixel in fit.pixels.iter().filter(|pixel| pixel.used) {
+            let index = pixel.position[1] * camera.format.width + pixel.position[0];
+            let residual_m = pixel.observed_m - pixel.modelled_m;
+            wall.sums_m[index] += residual_m;
+            wall.variances[index] += pixel.sigma_m * pixel.sigma_m;
+            wall.frames[index] += 1;
+            self.squares[index] += residual_m * residual_m;
+            squares += residual_m * residual_m;
+            used += 1;
+        }
+        self.quality.push(quality(station, &fit, used, squares));
+        Ok(())
+    }
+
+    pub(super) fn count(&self) -> usize {
+        self.walls.len()
+    }
+
+    /// Mean residual of a pixel of a wall, metre, NaN where there is none, and the number of its frames.
+    pub(super) fn residual_m(&self, wall: usize, pixel: usize) -> (f64, f64) {
+        let wall = &self.walls[wall];
+        (wall.mean(pixel).map_or(f64::NAN, |(mean, _)| mean), f64::from(wall.frames[pixel]))
+    }
+
+    /// Squared residuals of single frames, by pixel.
+    pub(super) fn squares(&self) -> &[f64] {
+        &self.squares
+    }
+
+    /// Robust mean over some of the walls, pixel by pixel, with its standard deviation, metre; NaN where none of them shows
+    /// the pixel.
+    pub(super) fn pattern(&self, takes: impl Fn(usize) -> bool + Sync) -> Vec<(f64, f64)> {
+        let of_pixel = |pixel: usize| {
+            let walls = self.walls.iter().enumerate().filter(|(wall, _)| takes(*wall));
+            let values: Vec<(f64, f64)> = walls.filter_map(|(_, wall)| wall.mean(pixel)).collect();
+            robust_mean(&values).unwrap_or((f64::NAN, f64::NAN))
+        };
+        (0..self.squares.len()).into_par_iter().with_min_len(1024).map(of_pixel).collect()
     }
 }
 
-impl Residuals {
-    fn of(capture: &WallCapture<'_>, camera: &Camera, options: &PrimitiveOptions) -> Result<(Self, WallQuality)> {
-        let fit = fit_whatever_shape(capture.frame, camera, PrimitiveKind::Plane, options)?;
-        let (width, pixels) = (camera.format.width, camera.format.width * camera.format.height);
-        let mut out = Self { values_m: vec![f64::NAN; pixels], variances: vec![f64::NAN; pixels] };
-        let (mut squares, mut used) = (0.0, 0_usize);
-        for pixel in fit.pixels.iter().filter(|pixel| pixel.used) {
-            let index = pixel.position[1] * width + pixel.position[0];
-            out.values_m[index] = pixel.observed_m - pixel.modelled_m;
-            out.variances[index] = pixel.sigma_m * pixel.sigma_m;
-            squares += out.values_m[index].powi(2);
-            used += 1;
-        }
-        let quality = WallQuality {
-            station: capture.station.clone(),
-            pixels: used,
-            outlier_share: fit.outlier_share(),
-            residual_rms_m: (squares / used as f64).sqrt(),
-            sigma0: fit.sigma0,
-            systematic_sigmas: fit.systematic_sigmas,
-        };
-        Ok((out, quality))
-    }
-
-    /// Mean over frames, pixel by pixel, of those that have a residual.
-    fn mean(frames: &[&Self]) -> Self {
-        let pixels = frames.first().map_or(0, |frame| frame.values_m.len());
-        let mut out = Self { values_m: vec![f64::NAN; pixels], variances: vec![f64::NAN; pixels] };
-        for index in 0..pixels {
-            let known = || frames.iter().filter(|frame| frame.values_m[index].is_finite());
-            let count = known().count() as f64;
-            out.values_m[index] = known().map(|frame| frame.values_m[index]).sum::<f64>() / count;
-            out.variances[index] = known().map(|frame| frame.variances[index]).sum::<f64>() / (count * count);
-        }
-        out
+fn quality(station: &str, fit: &PrimitiveFit, used: usize, squares: f64) -> WallQuality {
+    WallQuality {
+        station: station.to_owned(),
+        pixels: used,
+        outlier_share: fit.outlier_share(),
+        residual_rms_m: (squares / used as f64).sqrt(),
+        sigma0: fit.sigma0,
+        systematic_sigmas: fit.systematic_sigmas,
     }
 }

@@ -44,8 +44,8 @@ pub(crate) fn document(summary: &FixedPatternSummary, pattern: Vec<Figure>) -> D
 fn test(document: &mut Document, summary: &FixedPatternSummary) {
     document.section("Does it raise the precision?");
     document.explanation(format!(
-        "The {} were held out in turn and freed of the pattern of the others. {}.",
-        summary.held_out, summary.verdict
+        "The {} were held out in turn, in {} parts, and freed of the pattern of the others. {}.",
+        summary.held_out, summary.held_out_parts, summary.verdict
     ));
     let row = |name: &str, [without, with]: [f64; 2]| {
         vec![name.to_owned(), format!("{:.2}", 1e3 * without), format!("{:.2}", 1e3 * with)]

@@ -18,7 +18,7 @@ use pipeline::{Error, Plan, Result, Stage};
 use range_io::calibration::Calibration;
 use range_io::survey::{Level, Survey};
 use report::pattern_figures;
-use sensor_noise::{PatternEstimate, PatternOptions, PatternVerdict, WallCapture, estimate_fixed_pattern};
+use sensor_noise::{PatternEstimate, PatternEstimator, PatternOptions, PatternVerdict};
 
 use crate::further_term::{provenance_with, start, write};
 
@@ -38,7 +38,7 @@ pub struct FixedPatternRequest {
 
 /// Estimates the fixed pattern and writes summary and report, and the calibration with the pattern if that raises the
 /// precision of walls that it was not estimated from. If it does not, the calibration is written without any pattern:
-/// then the old one was none either.
+/// then the old one was none either. Frames are read one after the other.
 ///
 /// # Errors
 /// [`Error::Refused`] where the frames show no walls: then the reason is written, beside an older result where there is
@@ -61,20 +61,17 @@ fn estimate(
     check_window(request, &survey)?;
     let plan = preparation(&survey, &calibration);
     let known = (Some(calibration.clone()), words.clone());
-    let mut frames = Vec::new();
-    let mut keep = |view: View, _: &OpenSurvey| match view.data {
-        ViewData::Range(frame) => {
-            frames.push((view.station, frame));
-            Ok(())
-        }
+    let stations = survey.frames.iter().map(|frame| frame.station.clone()).collect();
+    let estimation = Error::estimation("fixed pattern", &request.survey);
+    let estimator = PatternEstimator::new(stations, &calibration.camera()?, &request.options);
+    let mut estimator = estimator.map_err(&estimation)?;
+    let mut see = |view: View, _: &OpenSurvey| match view.data {
+        ViewData::Range(frame) => estimator.add(&frame).map_err(&estimation),
         _ => Err(Error::Needs { stage: "fixed pattern", needs: "Unwrap" }),
     };
-    process_each(&plan, &request.survey, known, &mut keep, progress)?;
+    process_each(&plan, &request.survey, known, &mut see, progress)?;
     progress.begin("estimate the fixed pattern", 1);
-    let walls = frames.iter().map(|(station, frame)| WallCapture { station: station.clone(), frame });
-    let walls: Vec<WallCapture<'_>> = walls.collect();
-    let estimate = estimate_fixed_pattern(&walls, &calibration.camera()?, &request.options)
-        .map_err(Error::estimation("fixed pattern", &request.survey))?;
+    let estimate = estimator.finish();
     progress.advance(1);
     let mut summary = FixedPatternSummary::new(request, &words, &estimate);
     summary.seconds = clock.elapsed().as_secs_f64();

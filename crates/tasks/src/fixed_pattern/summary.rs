@@ -21,6 +21,8 @@ pub struct FixedPatternSummary {
     pub applied: bool,
     /// What was held out in turn: `stations` or `frames`.
     pub held_out: &'static str,
+    /// In how many parts of neighbours: each by itself up to twenty.
+    pub held_out_parts: usize,
     /// Root mean square of held-out residuals, averaged over the frames of a wall, metre.
     pub rms_without_m: f64,
     /// The same with the pattern of the others taken off.
@@ -81,6 +83,7 @@ impl FixedPatternSummary {
                 PatternSplit::Stations => "stations",
                 PatternSplit::Frames => "frames",
             },
+            held_out_parts: test.parts,
             rms_without_m: test.rms_m[0],
             rms_with_m: test.rms_m[1],
             frame_rms_without_m: test.frame_rms_m[0],

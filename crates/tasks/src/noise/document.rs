@@ -22,7 +22,7 @@ pub(crate) fn document(summary: &NoiseSummary) -> Document {
         summary.survey,
         summary.calibration
     );
-    let mut document = Document::new("rangecam: noise", lead);
+    let mut document = Document::new("rangecam: noise", lead + &thinned(summary.every));
     document.merits([
         (summary.sigma_verdict.clone(), "pixels against their own scatter"),
         (format!("{:.3}", summary.sigma_ratio), "variance of the pixels over what they are given"),
@@ -42,6 +42,11 @@ pub(crate) fn document(summary: &NoiseSummary) -> Document {
         summary.out.display()
     ));
     document
+}
+
+/// Which pixels were taken of surveys that have too many.
+fn thinned(every: usize) -> String {
+    if every == 1 { String::new() } else { format!(" Of {every} pixels one was taken, evenly spread.") }
 }
 
 fn parameters(document: &mut Document, summary: &NoiseSummary) {

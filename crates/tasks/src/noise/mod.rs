@@ -2,6 +2,7 @@
 
 pub(crate) mod document;
 pub(crate) mod estimate;
+pub(crate) mod frames;
 pub(crate) mod summary;
 
 pub use summary::{NoiseBin, NoiseParameter, NoiseStation, NoiseSummary, SigmaBinSummary};
@@ -10,13 +11,15 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use atomic_output::Destination;
-use commands::{Inputs, Progress, json, produce};
-use pipeline::{Error, Plan, Result, process};
+use commands::{Inputs, Progress, json, produce, root_of};
+use pipeline::survey::{Purpose, open, read_calibration};
+use pipeline::{Error, Result};
 use range_io::calibration::Calibration;
 use sensor_noise::NoiseFitOptions;
 
 use crate::further_term::{provenance_with, start, write};
 use crate::noise::estimate::{Estimate, NoiseTerm};
+use crate::noise::frames::Failed;
 
 /// What to estimate random errors from.
 #[derive(Debug, Clone)]
@@ -32,7 +35,7 @@ pub struct NoiseRequest {
 }
 
 /// Estimates the noise of samples, or of ranges where a survey has no samples, and writes calibration, summary and
-/// report into the request's output folder.
+/// report into the request's output folder. Frames are read one after the other, three to four times.
 ///
 /// # Errors
 /// [`Error::Refused`] where the frames do not determine it: then the reason is written, beside an older result where
@@ -45,11 +48,12 @@ pub fn estimate_noise(request: &NoiseRequest, progress: &dyn Progress) -> Result
 fn estimate(request: &NoiseRequest, destination: &Destination, progress: &dyn Progress) -> Result<NoiseSummary> {
     let clock = Instant::now();
     let (mut calibration, words) = start(&request.survey, request.calibration.as_deref())?;
-    let plan = Plan { name: "noise".to_owned(), source: None, calibrate: None, stages: Vec::new() };
-    let outcome = process(&plan, &request.survey, request.calibration.as_deref(), progress)?;
-    progress.begin("estimate noise", 1);
-    let estimate = Estimate::new(&outcome, &request.options)?.map_err(Error::estimation("noise", &request.survey))?;
-    progress.advance(1);
+    let known = read_calibration(&root_of(&request.survey), request.calibration.as_deref())?;
+    let survey = open(&request.survey, known, Purpose::of(&[]))?;
+    let estimate = Estimate::new(&survey, &request.options, progress).map_err(|failed| match failed {
+        Failed::Read(error) => error,
+        Failed::Undetermined(error) => Error::estimation("noise", &request.survey)(error),
+    })?;
     let mut summary = NoiseSummary::new(request, &words, &estimate);
     summary.seconds = clock.elapsed().as_secs_f64();
     add_to(&mut calibration, request, &estimate);

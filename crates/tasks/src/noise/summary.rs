@@ -37,6 +37,8 @@ pub struct NoiseSummary {
     pub misfit_p_value: f64,
     /// Repeated values.
     pub values: usize,
+    /// Of so many pixels the values of one were taken: 1 for all, more where all stations together have too many.
+    pub every: usize,
     /// Share of them that scatter as no noise does; left out.
     pub moved_share: f64,
     /// Each station.
@@ -151,6 +153,7 @@ impl NoiseSummary {
             misfit: fit.misfit,
             misfit_p_value: fit.misfit_p_value,
             values: fit.values,
+            every: fit.every,
             moved_share: fit.moved as f64 / fit.values as f64,
             stations: fit.steadiness.iter().map(NoiseStation::new).collect(),
             bins: fit.bins.iter().map(bin).collect(),

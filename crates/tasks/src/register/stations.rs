@@ -3,11 +3,9 @@
 use commands::plan::NORMAL_HALF_WIDTH_PX;
 use commands::{Doubt, DoubtKind, Progress};
 use multiview_registration::Error::UnconnectedStations;
-use multiview_registration::{
-    Datum, Start, StationRegistration, StationRegistrationOptions, SurfacePair, register_stations,
-};
+use multiview_registration::{Start, StationRegistration, SurfacePair};
 use nalgebra::{Isometry3, Point3};
-use pipeline::stations::{Station, Tried, Windows, refused};
+use pipeline::stations::{Station, Tried, Windows, poses_in, refused, register_at_once};
 use pipeline::survey::StationPose;
 use pipeline::{Error, Result};
 use point_cloud::Cloud;
@@ -42,10 +40,7 @@ pub(crate) fn run(input: Input, start: &str, progress: &dyn Progress) -> Result<
     };
     let names: Vec<String> = stations.iter().map(|station| station.name.clone()).collect();
     progress.begin("register stations", stations.len());
-    let told = |done: usize, _: usize| progress.advance(done);
-    let attempt = |clouds: &[Cloud], start: Start<'_>| {
-        register_stations(clouds, start, Datum::Station(0), &StationRegistrationOptions::default(), &told)
-    };
+    let attempt = |clouds: &[Cloud], start: Start<'_>| register_at_once(clouds, start, None, progress);
     let (found, tried, words) = match attempt(&clouds, known) {
         // Free space that noise or wrapped ranges fill speaks against every arrangement; neighbours may still fit.
         Err(UnconnectedStations { stations: lost, to, reasons }) if before.is_none() => match pairs::chained(&stations)
@@ -68,12 +63,7 @@ pub(crate) fn run(input: Input, start: &str, progress: &dyn Progress) -> Result<
         return frames::registered(stations, before, vertical_axis, &result);
     }
     let result = found.map_err(|error| refused::of_command(&error, &names, tried))?;
-    let poses: Vec<StationPose> = result
-        .world_from_station
-        .iter()
-        .zip(&result.covariance)
-        .map(|(pose, covariance)| StationPose { world_from_camera: *pose, covariance: Some(*covariance) })
-        .collect();
+    let poses = poses_in(&Isometry3::identity(), &result);
     let mut summary = summary(&result, &stations, &clouds, &poses);
     if before.is_none() {
         summary.doubts.extend(blind_doubt(&result));

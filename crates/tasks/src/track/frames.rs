@@ -5,7 +5,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use commands::plan::DriftTreatment;
-use commands::{Doubt, root_of};
+use commands::{Doubt, Progress, root_of};
 use nalgebra::Isometry3;
 use pipeline::stages::{Line, Step, Watch};
 use pipeline::stations::projection;
@@ -74,11 +74,12 @@ impl FrameSource {
     }
 
     /// Frame `index` of the survey; a frame that shows nothing has only NaN.
-    pub(crate) fn read(&mut self, index: usize) -> Result<PointFrame> {
+    pub(crate) fn read(&mut self, index: usize, progress: &dyn Progress) -> Result<PointFrame> {
         let view = match self.survey.view(index) {
             Err(Error::File(range_io::Error::NothingMeasured { .. })) => return Ok(self.blank()),
             view => view?,
         };
+        progress.frames_in_memory(self.survey.live.count());
         self.watch.look(&view);
         let mut views = vec![view];
         let mut sense = Sense { votes: &mut self.votes, votes_now: index.is_multiple_of(SENSE_EVERY) };

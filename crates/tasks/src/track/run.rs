@@ -89,17 +89,17 @@ impl Run {
         let order = self.source.order.clone();
         progress.begin("track frames", order.len());
         for (done, index) in order.into_iter().enumerate() {
-            self.frame(index)?;
+            self.frame(index, progress)?;
             progress.advance(done + 1);
         }
         Ok(())
     }
 
-    fn frame(&mut self, index: usize) -> Result<()> {
+    fn frame(&mut self, index: usize, progress: &dyn Progress) -> Result<()> {
         let clock = Instant::now();
         let entry = &self.source.survey().frames[index];
         let (station, timestamp_s) = (entry.station.clone(), entry.timestamp_s.unwrap_or_default());
-        let read = self.source.read(index)?;
+        let read = self.source.read(index, progress)?;
         let tracking = Instant::now();
         let fail = |error: tracking::Error| Error::registration(&format!("frame {station} at {timestamp_s} s"), &error);
         let before = self.tracker.as_ref().map_or(0, Tracker::keyframes);

@@ -3,6 +3,7 @@
 use std::ops::Range;
 use std::path::Path;
 
+use commands::Progress;
 use pipeline::stages::Line;
 use pipeline::survey::{OpenSurvey, Purpose, View, ViewData, open};
 use pipeline::{DemodulateOptions, Error, Result, Stage};
@@ -65,9 +66,10 @@ impl FrameSource {
     }
 
     /// Some frames, in the order of the survey.
-    pub(crate) fn read(&mut self, indices: Range<usize>) -> Result<Vec<RangeFrame>> {
+    pub(crate) fn read(&mut self, indices: Range<usize>, progress: &dyn Progress) -> Result<Vec<RangeFrame>> {
         let views = indices.into_par_iter().map(|index| self.survey.view(index));
         let mut views = views.collect::<Result<Vec<View>>>()?;
+        progress.frames_in_memory(self.survey.live.count());
         self.line.apply(&mut views, &mut ())?;
         views.into_par_iter().map(range_frame).collect()
     }

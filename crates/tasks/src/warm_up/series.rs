@@ -134,7 +134,7 @@ fn each_frame(
     progress.begin(work, count);
     for start in (0..count).step_by(FRAMES_AT_ONCE) {
         let end = count.min(start + FRAMES_AT_ONCE);
-        for (place, frame) in source.read(start..end)?.iter().enumerate() {
+        for (place, frame) in source.read(start..end, progress)?.iter().enumerate() {
             act(start + place, frame)?;
         }
         progress.advance(end);

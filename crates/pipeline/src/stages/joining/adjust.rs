@@ -1,10 +1,10 @@
-use multiview_registration::{Datum, Start, StationRegistrationOptions, register_stations};
+use multiview_registration::Start;
 use nalgebra::Isometry3;
 
 use crate::stages::Findings;
-use crate::stages::joining::Joined;
+use crate::stages::joining::{Joined, Registered};
 use crate::stations::refused::{self, Tried};
-use crate::survey::records::{AdjustmentFigures, StationPose};
+use crate::stations::register_at_once;
 use crate::{Error, Result};
 use commands::Progress;
 use commands::plan::AdjustOptions;
@@ -14,21 +14,12 @@ pub(crate) fn run(joined: &mut Joined, options: &AdjustOptions, progress: &dyn P
     if joined.clouds.is_empty() {
         return Err(Error::Needs { stage: "Adjust", needs: "Register" });
     }
-    let initial: Vec<Isometry3<f64>> = joined.poses.iter().map(|pose| pose.world_from_camera).collect();
-    let choice = StationRegistrationOptions {
-        minimum_overlap: options.minimum_overlap,
-        start_error_m: Some(options.maximum_distance_m),
-        ..StationRegistrationOptions::default()
+    let same_pairs = |known: &Registered| known.minimum_overlap.to_bits() == options.minimum_overlap.to_bits();
+    let known = joined.registered.take().filter(|known| known.settled && same_pairs(known));
+    let adjusted = match known {
+        Some(known) => known,
+        None => again(joined, options, progress)?,
     };
-    let tell = |done: usize, total: usize| {
-        if done == 1 {
-            progress.begin("Adjust", total);
-        }
-        progress.advance(done);
-    };
-    let adjusted = register_stations(&joined.clouds, Start::Poses(&initial), Datum::Station(0), &choice, &tell);
-    let tried = Tried::Poses(Some(options.maximum_distance_m));
-    let adjusted = adjusted.map_err(|error| refused::of_stage("Adjust", error, &joined.names, tried))?;
     if !adjusted.settled {
         return Err(Error::stage("Adjust", "all stations")(format!(
             "the stations still slide after {} rounds: a direction is held by too little; more overlap, or stations \
@@ -36,24 +27,28 @@ pub(crate) fn run(joined: &mut Joined, options: &AdjustOptions, progress: &dyn P
             adjusted.rounds
         )));
     }
-    let poses = adjusted.world_from_station.into_iter().zip(adjusted.covariance);
-    joined.poses = poses
-        .map(|(world_from_camera, covariance)| StationPose { world_from_camera, covariance: Some(covariance) })
-        .collect();
-    joined.pairs = adjusted.pairs;
-    joined.refused = adjusted.refused;
     let mut findings = Findings::from([
-        ("stations_doubtful".to_owned(), adjusted.placements.doubtful().count() as f64),
-        ("pairs".to_owned(), adjusted.surfaces.len() as f64),
+        ("stations_doubtful".to_owned(), adjusted.figures.placements.doubtful().count() as f64),
+        ("pairs".to_owned(), adjusted.surfaces as f64),
         ("rounds".to_owned(), adjusted.rounds as f64),
     ]);
-    if let Some(sigma0) = adjusted.sigma0 {
+    if let Some(sigma0) = adjusted.figures.sigma0 {
         findings.insert("sigma0".to_owned(), sigma0);
     }
-    joined.adjustment = Some(AdjustmentFigures {
-        sigma0: adjusted.sigma0,
-        redundancy: adjusted.redundancy,
-        placements: adjusted.placements,
-    });
+    joined.poses = adjusted.poses;
+    joined.adjustment = Some(adjusted.figures);
     Ok(findings)
+}
+
+/// From the poses that `Register` found.
+fn again(joined: &mut Joined, options: &AdjustOptions, progress: &dyn Progress) -> Result<Registered> {
+    let initial: Vec<Isometry3<f64>> = joined.poses.iter().map(|pose| pose.world_from_camera).collect();
+    progress.begin("Adjust", joined.clouds.len());
+    let limits = Some((options.minimum_overlap, options.maximum_distance_m));
+    let found = register_at_once(&joined.clouds, Start::Poses(&initial), limits, progress);
+    let tried = Tried::Poses(Some(options.maximum_distance_m));
+    let found = found.map_err(|error| refused::of_stage("Adjust", error, &joined.names, tried))?;
+    let (adjusted, pairs, refused) = Registered::new(found, &Isometry3::identity(), options.minimum_overlap);
+    (joined.pairs, joined.refused) = (pairs, refused);
+    Ok(adjusted)
 }

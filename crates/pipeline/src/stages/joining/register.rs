@@ -1,9 +1,10 @@
-use multiview_registration::{Datum, Start, StationRegistrationOptions, register_stations};
+use multiview_registration::Start;
 use nalgebra::Isometry3;
 
 use crate::stages::Findings;
-use crate::stages::joining::{Gathered, Joined};
+use crate::stages::joining::{Gathered, Joined, Registered};
 use crate::stations::refused::{self, Tried};
+use crate::stations::register_at_once;
 use crate::survey::records::StationPose;
 use crate::{Error, Result};
 use commands::Progress;
@@ -26,47 +27,53 @@ pub(crate) fn run(
     // The first station is where the survey says it is.
     let stated = gathered.stated.first().copied().flatten();
     let approximate: Option<Vec<Isometry3<f64>>> = gathered.stated.iter().copied().collect();
-    let (poses, mut joined) = match options.start {
-        StartPoses::Neighbour => each_onto_the_one_before(gathered),
+    let joined = match options.start {
+        StartPoses::Neighbour => each_onto_the_one_before(gathered, stated),
         StartPoses::Approximate => {
-            at_once(gathered, approximate.as_deref().map_or(Start::Order, Start::Poses), options, progress)?
+            let start = approximate.as_deref().map_or(Start::Order, Start::Poses);
+            at_once(gathered, stated, start, options, progress)?
         }
-        StartPoses::Order => at_once(gathered, Start::Order, options, progress)?,
+        StartPoses::Order => at_once(gathered, stated, Start::Order, options, progress)?,
     };
-    let world = stated.zip(poses.first()).map_or_else(Isometry3::identity, |(stated, found)| stated * found.inverse());
-    let pose = |pose: &Isometry3<f64>| StationPose { world_from_camera: world * pose, covariance: None };
-    joined.poses = poses.iter().map(pose).collect();
     let findings = [("pairs", joined.pairs.len()), ("pairs_refused", joined.refused.len())];
     Ok((joined, findings.map(|(name, count)| (name.to_owned(), count as f64)).into()))
 }
 
+/// The frame in which the first station is where it is stated to be.
+fn world(stated: Option<Isometry3<f64>>, first: Option<&Isometry3<f64>>) -> Isometry3<f64> {
+    stated.zip(first).map_or_else(Isometry3::identity, |(stated, found)| stated * found.inverse())
+}
+
 fn at_once(
     Gathered { names, clouds, .. }: Gathered,
+    stated: Option<Isometry3<f64>>,
     start: Start<'_>,
     options: &RegisterOptions,
     progress: &dyn Progress,
-) -> Result<(Vec<Isometry3<f64>>, Joined)> {
-    let choice = StationRegistrationOptions {
-        minimum_overlap: options.minimum_overlap,
-        start_error_m: Some(options.maximum_distance_m),
-        ..StationRegistrationOptions::default()
-    };
-    let told = |done: usize, _: usize| progress.advance(done);
-    let found = register_stations(&clouds, start, Datum::Station(0), &choice, &told);
+) -> Result<Joined> {
+    let limits = Some((options.minimum_overlap, options.maximum_distance_m));
     let tried = match start {
         Start::Poses(_) => Tried::Poses(Some(options.maximum_distance_m)),
         Start::Order => Tried::Order,
         Start::Nothing => Tried::AllPairs,
     };
+    let found = register_at_once(&clouds, start, limits, progress);
     let found = found.map_err(|error| refused::of_stage("Register", error, &names, tried))?;
-    let joined = Joined { pairs: found.pairs, refused: found.refused, names, clouds, ..Joined::default() };
-    Ok((found.world_from_station, joined))
+    let world = world(stated, found.world_from_station.first());
+    let (registered, pairs, refused) = Registered::new(found, &world, options.minimum_overlap);
+    // How well poses are known is what `Adjust` says.
+    let pose = |pose: &StationPose| StationPose { covariance: None, ..*pose };
+    let poses = registered.poses.iter().map(pose).collect();
+    let registered = matches!(start, Start::Poses(_)).then_some(registered);
+    Ok(Joined { poses, pairs, refused, registered, names, clouds, ..Joined::default() })
 }
 
-fn each_onto_the_one_before(Gathered { names, clouds, pairs, .. }: Gathered) -> (Vec<Isometry3<f64>>, Joined) {
+fn each_onto_the_one_before(Gathered { names, clouds, pairs, .. }: Gathered, stated: Option<Isometry3<f64>>) -> Joined {
     let mut poses = vec![Isometry3::identity()];
     for pair in &pairs {
         poses.push(poses[pair.target] * pair.result.target_from_source);
     }
-    (poses, Joined { pairs, names, clouds, ..Joined::default() })
+    let world = world(stated, poses.first());
+    let pose = |pose: &Isometry3<f64>| StationPose { world_from_camera: world * pose, covariance: None };
+    Joined { poses: poses.iter().map(pose).collect(), pairs, names, clouds, ..Joined::default() }
 }

@@ -6,11 +6,11 @@ use nalgebra::Vector3;
 use crate::surface::Surface;
 
 /// `ρ + v = ρ(primitive, ray)`: what is random lies along the ray.
-pub(crate) struct RangeToPrimitive {
-    pub(crate) blocks: [BlockId; 1],
-    pub(crate) surface: Surface,
-    pub(crate) ray: Vector3<f64>,
-    pub(crate) observed_m: f64,
+pub(super) struct RangeToPrimitive {
+    pub(super) blocks: [BlockId; 1],
+    pub(super) surface: Surface,
+    pub(super) ray: Vector3<f64>,
+    pub(super) observed_m: f64,
 }
 
 impl Observation for RangeToPrimitive {

@@ -39,6 +39,7 @@ pub(super) fn tables(output: &str) -> String {
 
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::unwrap_used)]
     use super::*;
 
     fn stored(text: &str) -> BTreeMap<String, String> {

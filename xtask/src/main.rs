@@ -4,6 +4,7 @@
 
 mod alone;
 mod bench;
+mod benchmarks;
 mod circles;
 mod dependencies;
 mod factorisations;
@@ -49,8 +50,10 @@ enum Task {
     Fuzz(fuzz::Arguments),
     /// An hour of damaged files, property tests with fresh cases, the long statistics, and cargo deny.
     Nightly(nightly::Arguments),
-    /// Run the benchmarks of all crates, or of those named.
+    /// Run the benchmarks of all crates, or of those named; keep a run, or compare with one.
     Bench(bench::Arguments),
+    /// Run statistics and write their tables into docs/benchmarks.md.
+    Benchmarks(benchmarks::Arguments),
 }
 
 fn main() -> ExitCode {
@@ -66,6 +69,7 @@ fn main() -> ExitCode {
         Task::Fuzz(arguments) => fuzz::run(&arguments),
         Task::Nightly(arguments) => nightly::run(&arguments),
         Task::Bench(arguments) => bench::run(&arguments),
+        Task::Benchmarks(arguments) => benchmarks::run(&arguments),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,

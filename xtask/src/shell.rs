@@ -2,7 +2,7 @@
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
-use std::process::{Command, ExitStatus};
+use std::process::{Command, ExitStatus, Stdio};
 use std::time::Instant;
 
 /// What a task says when it fails.
@@ -34,6 +34,18 @@ pub(crate) fn cargo_quietly(arguments: &[&str], environment: &[(&str, &str)]) ->
         .status()
         .map_err(|error| format!("{line}: {error}"))?;
     if status.success() { Ok(()) } else { Err(format!("{line}: {status}")) }
+}
+
+/// Runs a line that begins with `cargo` in the root: what it prints, and how it ends.
+pub(crate) fn captured(line: &str) -> Result<(String, Outcome), String> {
+    let output = Command::new(program())
+        .args(line.split_whitespace().skip(1))
+        .current_dir(root())
+        .stderr(Stdio::inherit())
+        .output()
+        .map_err(|error| format!("{line}: {error}"))?;
+    let outcome = if output.status.success() { Ok(()) } else { Err(format!("{line}: {}", output.status)) };
+    Ok((String::from_utf8_lossy(&output.stdout).into_owned(), outcome))
 }
 
 /// Builds the command `rangecam` and runs it where the user stands; its exit code.

@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
+use crate::benchmarks;
 use crate::circles;
 use crate::dependencies;
 use crate::factorisations;
@@ -18,6 +19,7 @@ pub(crate) fn run() -> Outcome {
     let root = root();
     let crates = folders(&root.join("crates"))?;
     let mut complaints = dependencies::complaints(&root)?;
+    complaints.extend(benchmarks::complaints(&root)?);
     for folder in &crates {
         complaints.extend(missing_parts(folder));
         complaints.extend(tests_left_out(folder)?);

@@ -66,14 +66,12 @@ impl Case {
         command.args(self.command).args(["--quiet", "--out", "out"]).arg(self.survey).current_dir(folder);
         let child = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().map_err(|error| error.to_string())?;
         let (most_mb, output) = watched(child)?;
-        match output.status.code() {
-            // Done, doubtful, refused, in part.
-            Some(code @ (0 | 1 | 3 | 5)) => Ok((most_mb, code)),
-            _ => {
-                let said = String::from_utf8_lossy(&output.stderr);
-                Err(format!("{} on {}: {}: {said}", self.command.join(" "), self.survey, output.status))
-            }
+        // Done, doubtful, refused, in part.
+        if let Some(code @ (0 | 1 | 3 | 5)) = output.status.code() {
+            return Ok((most_mb, code));
         }
+        let said = String::from_utf8_lossy(&output.stderr);
+        Err(format!("{} on {}: {}: {said}", self.command.join(" "), self.survey, output.status))
     }
 }
 
@@ -143,20 +141,21 @@ impl Surveys<'_> {
         let poses = read_to_string(from.join("stations.csv")).map_err(failed)?;
         let poses: Vec<&str> = poses.lines().collect();
         let mut rows: Vec<String> = poses.first().map(|header| (*header).to_owned()).into_iter().collect();
-        let (mut entries, mut known) = (String::new(), 0);
+        let (mut entries, mut known) = (Vec::with_capacity(frames), 0);
         for frame in 0..frames {
             let (station, number, own) = named(frame);
             let time = 0.1 * frame as f64;
-            entries += &format!(
-                "(file: \"../{of}/frames/{station:03}_{number}.npz\", station: \"L{own}\", timestamp_s: {time:.1}),\n"
-            );
+            entries.push(format!(
+                "(file: \"../{of}/frames/{station:03}_{number}.npz\", station: \"L{own}\", timestamp_s: {time:.1}),"
+            ));
             if own == known {
                 let pose = poses.get(station + 1).and_then(|row| row.split_once(',')).map_or("", |(_, pose)| pose);
                 rows.push(format!("L{own},{pose}"));
                 known += 1;
             }
         }
-        write(to.join("survey.ron"), format!("{head}    frames: [\n{entries}    ],\n)\n")).map_err(failed)?;
+        write(to.join("survey.ron"), format!("{head}    frames: [\n{}\n    ],\n)\n", entries.join("\n")))
+            .map_err(failed)?;
         write(to.join("stations.csv"), rows.join("\n") + "\n").map_err(failed)
     }
 }

@@ -35,7 +35,7 @@ impl Wall {
 
 /// All walls.
 pub(super) struct Walls {
-    walls: Vec<Wall>,
+    all: Vec<Wall>,
     /// Names of the frames' stations, and the wall that each frame belongs to.
     stations: Vec<String>,
     wall_of: Vec<usize>,
@@ -60,12 +60,12 @@ impl Walls {
         };
         let station_of: Vec<usize> = stations.iter().map(number).collect();
         let of_stations = numbers.len() > 1;
-        let all = if of_stations { numbers.len() } else { stations.len() };
-        let count = all.min((MOST_PIXELS / pixels.max(1)).max(2));
-        let place = |(frame, station): (usize, &usize)| if of_stations { *station } else { frame } * count / all;
+        let named = if of_stations { numbers.len() } else { stations.len() };
+        let count = named.min((MOST_PIXELS / pixels.max(1)).max(2));
+        let place = |(frame, station): (usize, &usize)| if of_stations { *station } else { frame } * count / named;
         let wall_of: Vec<usize> = station_of.iter().enumerate().map(place).collect();
-        let walls = (0..count).map(|_| Wall::new(pixels)).collect();
-        Ok(Self { walls, stations, wall_of, squares: vec![0.0; pixels], quality: Vec::new(), of_stations })
+        let all = (0..count).map(|_| Wall::new(pixels)).collect();
+        Ok(Self { all, stations, wall_of, squares: vec![0.0; pixels], quality: Vec::new(), of_stations })
     }
 
     /// Fits a plane to the next frame.
@@ -76,7 +76,7 @@ impl Walls {
             return Err(Error::OutOfDomain { name, value, expected: "as many as stations were named" });
         };
         let fit = fit_whatever_shape(frame, camera, PrimitiveKind::Plane, &options.wall)?;
-        let wall = &mut self.walls[*wall];
+        let wall = &mut self.all[*wall];
         let (mut squares, mut used) = (0.0, 0_usize);
         for pixel in fit.pixels.iter().filter(|pixel| pixel.used) {
             let index = pixel.position[1] * camera.format.width + pixel.position[0];
@@ -93,12 +93,12 @@ impl Walls {
     }
 
     pub(super) fn count(&self) -> usize {
-        self.walls.len()
+        self.all.len()
     }
 
     /// Mean residual of a pixel of a wall, metre, NaN where there is none, and the number of its frames.
     pub(super) fn residual_m(&self, wall: usize, pixel: usize) -> (f64, f64) {
-        let wall = &self.walls[wall];
+        let wall = &self.all[wall];
         (wall.mean(pixel).map_or(f64::NAN, |(mean, _)| mean), f64::from(wall.frames[pixel]))
     }
 
@@ -111,7 +111,7 @@ impl Walls {
     /// the pixel.
     pub(super) fn pattern(&self, takes: impl Fn(usize) -> bool + Sync) -> Vec<(f64, f64)> {
         let of_pixel = |pixel: usize| {
-            let walls = self.walls.iter().enumerate().filter(|(wall, _)| takes(*wall));
+            let walls = self.all.iter().enumerate().filter(|(wall, _)| takes(*wall));
             let values: Vec<(f64, f64)> = walls.filter_map(|(_, wall)| wall.mean(pixel)).collect();
             robust_mean(&values).unwrap_or((f64::NAN, f64::NAN))
         };

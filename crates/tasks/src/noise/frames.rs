@@ -37,7 +37,7 @@ pub(crate) struct Stations<'a> {
     pub(crate) survey: &'a OpenSurvey,
     progress: &'a dyn Progress,
     /// Name and frames of each station, in the order of the survey.
-    stations: Vec<(String, Vec<usize>)>,
+    named: Vec<(String, Vec<usize>)>,
     /// Frames that were read since all were last.
     done: Cell<usize>,
 }
@@ -53,13 +53,13 @@ impl<'a> Stations<'a> {
                 None => stations.push((frame.station.clone(), vec![index])),
             }
         }
-        Self { survey, progress, stations, done: Cell::new(0) }
+        Self { survey, progress, named: stations, done: Cell::new(0) }
     }
 
     /// Name and frames of each station as what `make` makes of a view.
     pub(crate) fn made<'s, F>(&'s self, make: Make<'s, F>) -> Vec<(String, Station<'s, F>)> {
         let station = |(name, frames): &'s (String, Vec<usize>)| (name.clone(), Station { all: self, frames, make });
-        self.stations.iter().map(station).collect()
+        self.named.iter().map(station).collect()
     }
 
     fn advance(&self) {

@@ -13,7 +13,7 @@ fn response() -> FrequencyResponse {
 }
 
 fn options(evidence: Evidence, false_alarm: f64) -> DetectionOptions {
-    DetectionOptions { false_alarm, evidence, systematics: NO_SYSTEMATICS, ..DetectionOptions::default() }
+    DetectionOptions { false_alarm, evidence, systematics: NO_SYSTEMATICS }
 }
 
 /// One path of 1 to 6 m, of an amplitude of 50 to 250 standard deviations.

@@ -40,8 +40,7 @@ fn furnished_rooms_are_right_at_all_levels_of_noise() {
 
 #[test]
 fn confidence_is_calibrated() {
-    let kernels =
-        [None, Some(KernelDensityOptions::default()), Some(KernelDensityOptions { radius: 2, ..Default::default() })];
+    let kernels = [None, Some(KernelDensityOptions::default()), Some(KernelDensityOptions { radius: 2 })];
     for (name, hz) in SETS {
         for kernel in kernels {
             let mut bins = [(0.0, 0.0, 0.0); 10];

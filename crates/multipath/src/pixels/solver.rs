@@ -61,7 +61,7 @@ impl PixelSolver {
         self.fit_singles(pixel, worker);
         let explained = self.thresholds[2 * frequencies - 2];
         if let Some(best) = worker.singles.first().copied().filter(|fit| fit.chi_squared <= explained) {
-            return self.judge_single(&best, worker);
+            return Self::judge_single(&best, worker);
         }
         self.fit_pairs(pixel, worker);
         let explained = self.thresholds[2 * frequencies - 4];
@@ -75,14 +75,14 @@ impl PixelSolver {
             Verdict::Two => two(&best, self.options.diffuse_share),
             Verdict::Inconsistent => PixelPaths { chi_squared, ..PixelPaths::without_numbers(verdict) },
             _ => {
-                let pairs = worker.pairs.iter().take_while(|fit| self.is_as_likely(fit.chi_squared, best.chi_squared));
+                let pairs = worker.pairs.iter().take_while(|fit| Self::is_as_likely(fit.chi_squared, best.chi_squared));
                 worker.hypotheses.extend(pairs.map(Hypothesis::from));
                 PixelPaths { chi_squared, ..PixelPaths::without_numbers(verdict) }
             }
         }
     }
 
-    fn is_as_likely(&self, chi_squared: f64, best: f64) -> bool {
+    fn is_as_likely(chi_squared: f64, best: f64) -> bool {
         chi_squared <= best + AMBIGUITY_MARGIN
     }
 
@@ -98,8 +98,8 @@ impl PixelSolver {
         worker.singles.sort_by(|a, b| a.chi_squared.total_cmp(&b.chi_squared));
     }
 
-    fn judge_single(&self, best: &SingleFit, worker: &mut Worker) -> PixelPaths {
-        let rivals = worker.singles.iter().take_while(|fit| self.is_as_likely(fit.chi_squared, best.chi_squared));
+    fn judge_single(best: &SingleFit, worker: &mut Worker) -> PixelPaths {
+        let rivals = worker.singles.iter().take_while(|fit| Self::is_as_likely(fit.chi_squared, best.chi_squared));
         let chi_squared = best.chi_squared as f32;
         if rivals.clone().count() > 1 {
             worker.hypotheses.extend(rivals.map(Hypothesis::from));
@@ -146,10 +146,10 @@ impl PixelSolver {
         if lowest > explained {
             return Verdict::Inconsistent;
         }
-        if best.chi_squared > explained || self.is_as_likely(worker.lowest_without_minimum, best.chi_squared) {
+        if best.chi_squared > explained || Self::is_as_likely(worker.lowest_without_minimum, best.chi_squared) {
             return Verdict::Unresolved;
         }
-        if worker.pairs.get(1).is_some_and(|second| self.is_as_likely(second.chi_squared, best.chi_squared)) {
+        if worker.pairs.get(1).is_some_and(|second| Self::is_as_likely(second.chi_squared, best.chi_squared)) {
             return Verdict::Ambiguous;
         }
         let [a, b, direct, indirect] = best.parameters;

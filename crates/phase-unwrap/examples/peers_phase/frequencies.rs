@@ -54,7 +54,7 @@ pub fn unwrap(size: Size, folder: &str, hz: &[&str]) -> Outcome {
     let phases = (0..hz.len()).map(plane).collect::<Result<Vec<_>, _>>()?;
     let sigmas = vec![files::read(folder, "sigma.f32", size)?; hz.len()];
     let near = KernelDensityOptions::default();
-    let wide = KernelDensityOptions { radius: 2, ..near };
+    let wide = KernelDensityOptions { radius: 2 };
     for (name, kernel) in [("pixels", None), ("near", Some(near)), ("wide", Some(wide))] {
         let options = MultiFrequencyOptions { kernel, ..MultiFrequencyOptions::default() };
         let mut unwrapper = MultiUnwrapper::new(&modulations, options)?;

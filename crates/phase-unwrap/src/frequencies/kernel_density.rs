@@ -44,7 +44,7 @@ impl Default for KernelDensityOptions {
 }
 
 impl KernelDensityOptions {
-    pub(crate) fn validate(&self) -> Result<()> {
+    pub(crate) fn validate(self) -> Result<()> {
         if (1..=MAXIMUM_RADIUS).contains(&self.radius) {
             return Ok(());
         }
@@ -93,7 +93,7 @@ const FIT_LINE: usize = 2 * RANKS + 1;
 
 impl Ranked {
     /// Takes the size of a frame; `interval_m` is that of the highest frequency.
-    pub(crate) fn resize(&mut self, width: usize, height: usize, interval_m: f32, options: &KernelDensityOptions) {
+    pub(crate) fn resize(&mut self, width: usize, height: usize, interval_m: f32, options: KernelDensityOptions) {
         let radius = usize::from(options.radius);
         let padded = width.div_ceil(LANES) * LANES + 2 * radius;
         let (tolerance_m, widest_m) = (TOLERANCE_CYCLES * interval_m, WIDEST_CYCLES * interval_m);
@@ -139,9 +139,9 @@ impl Ranked {
         let at = self.layout.radius + col;
         let range_m: [Lanes; RANKS] = std::array::from_fn(|rank| self.layout.line(own, rank, at));
         let mut weight: [Lanes; RANKS] = std::array::from_fn(|rank| self.layout.line(own, RANKS + rank, at));
-        if !self.settled(&weight) {
+        if !Self::settled(&weight) {
             let density = self.density(row, col, &range_m, &self.layout.line(own, WIDTH_LINE, at));
-            let background = self.background_of(&density);
+            let background = Self::background_of(&density);
             for rank in 0..RANKS {
                 for lane in 0..LANES {
                     let support = background[lane] + density[rank][lane];
@@ -156,7 +156,7 @@ impl Ranked {
 
     /// Whether no density can change anything, to a thousandth, in any pixel.
     #[inline(always)]
-    fn settled(&self, probability: &[Lanes; RANKS]) -> bool {
+    fn settled(probability: &[Lanes; RANKS]) -> bool {
         let ratio = BACKGROUND / (1.0 + BACKGROUND);
         let limit = 1e-3 * ratio * ratio * ratio;
         let mut open = false;
@@ -171,7 +171,7 @@ impl Ranked {
     }
 
     #[inline(always)]
-    fn background_of(&self, density: &[Lanes; RANKS]) -> Lanes {
+    fn background_of(density: &[Lanes; RANKS]) -> Lanes {
         let mut background = [0.0; LANES];
         for lane in 0..LANES {
             let mut explained = 0.0;

@@ -115,13 +115,13 @@ impl Lattice {
                 reference.unpack(&block, position, &best, &lanes, &mut found);
             }
         }
-        self.finish(&block, &mut found);
+        Self::finish(&block, &mut found);
         found
     }
 
     /// Probabilities, sigma and fit from the misfits.
     #[inline(always)]
-    fn finish<const F: usize, const K: usize>(&self, block: &Block<F>, found: &mut Found<K>) {
+    fn finish<const F: usize, const K: usize>(block: &Block<F>, found: &mut Found<K>) {
         let best = found.misfit[0];
         let mut sum = [0.0; LANES];
         for (misfit, probability) in found.misfit.iter().zip(&mut found.probability) {

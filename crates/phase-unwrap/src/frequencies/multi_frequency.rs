@@ -43,7 +43,7 @@ impl MultiFrequencyOptions {
                 return Err(Error::OutOfDomain { name, value, expected: "positive and finite" });
             }
         }
-        self.kernel.map_or(Ok(()), |kernel| kernel.validate())
+        self.kernel.map_or(Ok(()), KernelDensityOptions::validate)
     }
 }
 
@@ -148,7 +148,7 @@ impl MultiUnwrapper {
         let planes = Planes::new(&taken, self.lattice.order.len(), sigma_phase, mask)?;
         out.resize(planes.size(), phases.len());
         match self.kernel {
-            Some(kernel) => self.choose_with_neighbours(&planes, &kernel, out),
+            Some(kernel) => self.choose_with_neighbours(&planes, kernel, out),
             None => self.choose_alone(&planes, out),
         }
         self.count_wraps(phases, out);
@@ -176,7 +176,7 @@ impl MultiUnwrapper {
         });
     }
 
-    fn choose_with_neighbours(&mut self, planes: &Planes<'_>, kernel: &KernelDensityOptions, out: &mut MultiUnwrapped) {
+    fn choose_with_neighbours(&mut self, planes: &Planes<'_>, kernel: KernelDensityOptions, out: &mut MultiUnwrapped) {
         let (width, height) = planes.size();
         self.ranked.resize(width, height, self.lattice.intervals_m[0] as f32, kernel);
         let (layout, lines) = self.ranked.rows_mut();

@@ -69,7 +69,7 @@ const OF_ANY: Flags = Flags::MOTION.union(Flags::INTERFERENCE);
 /// };
 /// // The mean of phases about zero is zero, not pi.
 /// let mean = average(&[frame(0.1)?, frame(6.183_185)?])?;
-/// assert!((mean.channels[0].phase()[(0, 0)] + 3.0).rem_euclid(6.283_185) - 3.0 < 1e-5);
+/// assert!(((mean.channels[0].phase()[(0, 0)] + 3.0).rem_euclid(6.283_185) - 3.0).abs() < 1e-5);
 /// # Ok::<(), range_image::Error>(())
 /// ```
 pub fn average(frames: &[ComplexFrame]) -> Result<ComplexFrame> {

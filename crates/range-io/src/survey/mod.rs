@@ -197,7 +197,7 @@ impl Survey {
     /// Reads and checks the text of a `survey.ron`; `file` stands for it in messages.
     ///
     /// # Errors
-    /// [`Error::Format`] and its kin, with file, line, column and the name of the field.
+    /// [`Error::Format`](crate::Error::Format) and its kin, with file, line, column and the name of the field.
     ///
     /// ```
     /// use range_io::survey::Survey;

@@ -30,7 +30,7 @@ pub(crate) fn complaints(texts: &[(String, String)]) -> Vec<String> {
 /// The crate that a source belongs to.
 fn crate_of(shown: &str) -> Option<&str> {
     let (name, rest) = shown.strip_prefix("crates/")?.split_once('/')?;
-    (rest.starts_with("src/") && rest.ends_with(".rs")).then_some(name)
+    rest.starts_with("src/").then_some(name)
 }
 
 fn identifier(text: &str) -> &str {

@@ -38,6 +38,10 @@ pub mod clouds {
 }
 #[cfg(feature = "e57")]
 pub use formats::e57;
+#[cfg(feature = "grey")]
+pub use formats::images::grey;
+#[cfg(feature = "png16")]
+pub use formats::images::png16;
 #[cfg(feature = "mkv")]
 pub use formats::mkv;
 #[cfg(feature = "npz")]
@@ -46,8 +50,6 @@ pub use formats::npz;
 pub use formats::pcd;
 #[cfg(feature = "ply")]
 pub use formats::ply;
-#[cfg(feature = "png16")]
-pub use formats::png16;
 #[cfg(feature = "vtk")]
 pub use formats::vtk;
 #[cfg(feature = "xyz")]
@@ -63,7 +65,7 @@ pub use formats::xyz;
     feature = "xyz"
 ))]
 pub use nalgebra;
-#[cfg(any(feature = "calibration", feature = "mkv", feature = "png16", feature = "survey"))]
+#[cfg(any(feature = "calibration", feature = "grey", feature = "mkv", feature = "png16", feature = "survey"))]
 pub use range_image;
 #[cfg(feature = "calibration")]
 pub use scattering_deconvolution;

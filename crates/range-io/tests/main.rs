@@ -4,6 +4,7 @@
 mod calibration;
 mod clouds;
 mod common;
+mod grey;
 mod hostile;
 mod images;
 mod npz;

@@ -12,7 +12,7 @@ use pipeline::survey::{Purpose, compatible, open, read_calibration};
 use pipeline::{Error, Result};
 use range_io::calibration::{CalibratedDrift, Calibration};
 use range_io::ply::read_cloud;
-use range_io::survey::{Level, Survey};
+use range_io::survey::{FrameEntry, Level, Survey, read_frame};
 use report::{Column, Document};
 use serde::Serialize;
 
@@ -118,6 +118,26 @@ fn inspect_survey(path: &Path, found: &mut Inspection) -> Result<()> {
     Ok(())
 }
 
+/// Images of light alone: whether they can be read is all that there is to judge.
+fn inspect_images(path: &Path, survey: &Survey, found: &mut Inspection) -> Result<()> {
+    let root = root_of(path);
+    let frames = survey.frames.iter().enumerate();
+    let unreadable: Vec<_> =
+        frames.filter_map(|(index, entry)| Some((entry, read_frame(survey, &root, index).err()?.into()))).collect();
+    found.doubts.extend(plausibility::of_survey(&survey.camera));
+    tell_readable(survey, &unreadable, found);
+    Ok(())
+}
+
+fn tell_readable(survey: &Survey, unreadable: &[(&FrameEntry, Error)], found: &mut Inspection) {
+    let readable = survey.frames.len() - unreadable.len();
+    found.add("frames readable", if unreadable.is_empty() { "all".to_owned() } else { format!("{readable}") });
+    if let Some((first, error)) = unreadable.first() {
+        let words = format!("{} of {} frames cannot be read: {error}", unreadable.len(), survey.frames.len());
+        found.doubts.push(Doubt::about(DoubtKind::UnreadableFrames, &first.station, words));
+    }
+}
+
 /// Reads all frames, one in memory at a time, and judges them.
 fn inspect_frames(path: &Path, survey: &Survey, found: &mut Inspection) -> Result<()> {
     found.doubts.extend(fit(path, survey)?);
@@ -125,6 +145,9 @@ fn inspect_frames(path: &Path, survey: &Survey, found: &mut Inspection) -> Resul
         found.doubts.extend(plausibility::of_survey(&survey.camera));
         found.add("frames readable", "none listed");
         return Ok(());
+    }
+    if survey.level == Level::Intensity {
+        return inspect_images(path, survey, found);
     }
     let opened = open(path, (None, String::new()), Purpose::Camera)?;
     let stages: &[Stage] = match survey.level {
@@ -152,16 +175,11 @@ fn inspect_frames(path: &Path, survey: &Survey, found: &mut Inspection) -> Resul
             }
         }
     }
-    let readable = survey.frames.len() - unreadable.len();
-    found.add("frames readable", if unreadable.is_empty() { "all".to_owned() } else { format!("{readable}") });
+    tell_readable(survey, &unreadable, found);
     if let Some(words) = votes.in_words() {
         found.add("phase", words);
     }
     found.doubts.extend(opened.doubts);
-    if let Some((first, error)) = unreadable.first() {
-        let words = format!("{} of {} frames cannot be read: {error}", unreadable.len(), survey.frames.len());
-        found.doubts.push(Doubt::about(DoubtKind::UnreadableFrames, &first.station, words));
-    }
     found.doubts.extend(watch.doubts());
     found.doubts.extend(votes.doubt());
     Ok(())

@@ -152,9 +152,12 @@ stages! {
     Adjust(AdjustOptions) from Range,
 }
 
-/// Whether frames of a level are past what a stage needs. A depth becomes a range as it is read.
+/// Whether frames of a level are past what a stage needs. A depth becomes a range as it is read; light alone never does.
 pub fn is_past(level: Level, needs: Level) -> bool {
-    level.min(Level::Range) > needs
+    match level {
+        Level::Intensity => true,
+        level => level.min(Level::Range) > needs,
+    }
 }
 
 impl Plan {

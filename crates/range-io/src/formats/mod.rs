@@ -8,6 +8,8 @@ pub mod azure;
 pub(crate) mod cloud_file;
 #[cfg(feature = "e57")]
 pub mod e57;
+#[cfg(any(feature = "grey", feature = "png16"))]
+pub mod images;
 #[cfg(feature = "mkv")]
 pub mod mkv;
 #[cfg(feature = "npz")]
@@ -16,8 +18,6 @@ pub mod npz;
 pub mod pcd;
 #[cfg(feature = "ply")]
 pub mod ply;
-#[cfg(feature = "png16")]
-pub mod png16;
 #[cfg(feature = "vtk")]
 pub mod vtk;
 #[cfg(feature = "xyz")]

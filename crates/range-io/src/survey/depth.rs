@@ -56,8 +56,8 @@ fn stored_depth<'a>(survey: &'a Survey, file: &Path) -> Result<&'a StoredDepth> 
     })
 }
 
-#[cfg(any(feature = "png16", feature = "mkv"))]
-fn require_size<T>(survey: &Survey, file: &Path, image: &Raster<T>) -> Result<()> {
+#[cfg(any(feature = "grey", feature = "png16", feature = "mkv"))]
+pub(super) fn require_size<T>(survey: &Survey, file: &Path, image: &Raster<T>) -> Result<()> {
     let (width, height) = (survey.camera.width, survey.camera.height);
     if (image.width(), image.height()) == (width, height) {
         return Ok(());
@@ -69,7 +69,7 @@ fn require_size<T>(survey: &Survey, file: &Path, image: &Raster<T>) -> Result<()
 #[cfg(feature = "png16")]
 pub(super) fn read_png(survey: &Survey, file: &Path) -> Result<InputFrame> {
     let scale = stored_depth(survey, file)?;
-    let stored = crate::formats::png16::read(file)?;
+    let stored = crate::formats::images::png16::read(file)?;
     require_size(survey, file, &stored)?;
     Ok(InputFrame::Depth { depth: depth_from_stored(file, scale, &stored)?, amplitude: None, confidence: None })
 }

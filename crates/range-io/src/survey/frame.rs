@@ -7,6 +7,8 @@ use std::path::{Path, PathBuf};
 use range_image::{ComplexFrame, PhaseConvention, Raster, RawFrame, Samples};
 
 use super::arrays::{ArrayFile, COUNT, Expected, REAL, array_error, raster, require_finite};
+#[cfg(feature = "grey")]
+use super::depth::require_size;
 use super::depth::{read_depth, read_mkv, read_png};
 use super::{Level, Survey, SurveyCamera};
 use crate::formats::npz::{DataType, NpzReader, Values};
@@ -40,6 +42,8 @@ pub enum InputFrame {
         /// Confidence in the camera's unit.
         confidence: Option<Raster<f32>>,
     },
+    /// Level `intensity`, in the camera's unit.
+    Intensity(Raster<f32>),
 }
 
 impl InputFrame {
@@ -50,6 +54,7 @@ impl InputFrame {
             Self::Phase(_) => Level::Phase,
             Self::Range { .. } => Level::Range,
             Self::Depth { .. } => Level::Depth,
+            Self::Intensity(_) => Level::Intensity,
         }
     }
 }
@@ -69,9 +74,13 @@ pub fn read_frame(survey: &Survey, root: &Path, index: usize) -> Result<InputFra
     match extension.as_deref() {
         Some("npz") => read_arrays(survey, &file, &mut ArrayFile::Npz(NpzReader::open(&file)?)),
         Some("npy") => read_arrays(survey, &file, &mut ArrayFile::<BufReader<File>>::Npy),
+        Some("png" | "jpg" | "jpeg") if survey.level == Level::Intensity => read_grey(survey, &file),
         Some("png") => read_png(survey, &file),
         Some("mkv") => read_mkv(survey, &file, number),
-        _ => Err(Error::format(&file, "is of no known kind of frame; read are .npz, .npy, .png and .mkv")),
+        _ => Err(Error::format(
+            &file,
+            "is of no known kind of frame; read are .npz, .npy, .png and .mkv, and of level `intensity` .jpg",
+        )),
     }
 }
 
@@ -104,7 +113,20 @@ fn read_arrays<R: std::io::Read + std::io::Seek>(
             amplitude: arrays.optional_plane(file, "amplitude", COUNT, size)?,
             confidence: arrays.optional_plane(file, "confidence", COUNT, size)?,
         }),
+        Level::Intensity => Ok(InputFrame::Intensity(arrays.plane(file, "intensity", COUNT, size)?)),
     }
+}
+
+#[cfg(feature = "grey")]
+fn read_grey(survey: &Survey, file: &Path) -> Result<InputFrame> {
+    let image = crate::grey::read(file)?;
+    require_size(survey, file, &image)?;
+    Ok(InputFrame::Intensity(image))
+}
+
+#[cfg(not(feature = "grey"))]
+fn read_grey(_: &Survey, file: &Path) -> Result<InputFrame> {
+    Err(Error::format(file, "needs the feature `grey`, which this build leaves out"))
 }
 
 fn read_samples<R: std::io::Read + std::io::Seek>(

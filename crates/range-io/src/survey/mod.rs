@@ -74,6 +74,8 @@ pub enum Level {
     Range,
     /// Depth along the viewing axis.
     Depth,
+    /// Light alone: images of a passive camera, or a range camera's grey images without their ranges.
+    Intensity,
 }
 
 impl Level {
@@ -84,6 +86,7 @@ impl Level {
             Self::Phase => "phase",
             Self::Range => "range",
             Self::Depth => "depth",
+            Self::Intensity => "intensity",
         }
     }
 }
@@ -92,8 +95,8 @@ impl Level {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FrameEntry {
-    /// File relative to the survey's folder: `.npz`, `.npy`, `.png`, or `.mkv` where `#3` at the end picks the frame
-    /// after the first three.
+    /// File relative to the survey's folder: `.npz`, `.npy`, `.png`, `.jpg` (of light alone), or `.mkv` where `#3` at
+    /// the end picks the frame after the first three.
     pub file: PathBuf,
     /// Station the frame was taken from.
     pub station: String,

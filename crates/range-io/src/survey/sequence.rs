@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::{FrameEntry, Level, StoredDepth, Survey, SurveyCamera};
 use crate::read_text;
-use crate::{Error, Result, formats::png16};
+use crate::{Error, Result, formats::images::png16};
 
 /// Name of the file with the camera's matrix, three rows of three numbers (pixel).
 const INTRINSICS: &str = "camera-intrinsics.txt";

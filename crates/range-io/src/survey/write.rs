@@ -34,6 +34,9 @@ pub fn write_frame(path: impl AsRef<Path>, frame: &InputFrame) -> Result<()> {
                 [("depth", Some(depth)), ("amplitude", amplitude.as_ref()), ("confidence", confidence.as_ref())],
             )?;
         }
+        InputFrame::Intensity(image) => {
+            writer.add("intensity", &[image.height(), image.width()], image.as_slice())?;
+        }
     }
     writer.commit()
 }

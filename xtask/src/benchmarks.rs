@@ -16,6 +16,7 @@ const STATISTICS: &[(&str, &str)] = &[
     ("noisy", "cargo run -p phase-unwrap --example noisy_methods"),
     ("peers-registration-real", "cargo xtask peers registration-real"),
     ("peers-scattering", "cargo xtask peers scattering"),
+    ("peers-targets", "cargo xtask peers targets"),
 ];
 
 /// Which statistics to run.

@@ -15,11 +15,13 @@ const KNOWN: &[(Use, &[&str])] = &[
             "calibration-tasks/src/calibrate/planes/pose_test.rs",
             "calibration-tasks/src/calibrate/results/certificate/verdicts.rs",
             "icp-registration/src/icp/prior.rs",
+            "inertial/src/sequence/estimate.rs",
             "multiview-registration/src/adjustment/precision.rs",
             "multiview-registration/src/adjustment/simultaneous.rs",
             "multiview-registration/src/agreement/loops.rs",
             "multiview-registration/src/pairs_of_frames/frame_pairs.rs",
             "multiview-registration/src/survey/datum.rs",
+            "orientation/src/mounting/estimate.rs",
             "projective-registration/src/options.rs",
             "projective-registration/src/partners/track.rs",
             "projective-registration/src/registration/aligner.rs",
@@ -41,19 +43,25 @@ const KNOWN: &[(Use, &[&str])] = &[
     (
         Use::ClosedForm,
         &[
-            "calibration-network/src/start_values/robust_pose.rs",
             "camera-model/src/lenses/lens_inverse.rs",
             "camera-model/src/observation.rs",
             "error-models/src/screening/plane_block.rs",
             "global-registration/src/description/sift/extrema.rs",
             "icp-registration/src/parts/metric/coloured.rs",
             "icp-registration/src/parts/metric/plane_to_plane.rs",
+            "orientation/src/mounting/closed_form.rs",
+            "orientation/src/relative/five_points.rs",
+            "orientation/src/robust_pose.rs",
             "primitives/src/linear_start.rs",
             "range-calibration/src/by_planes/planes_start.rs",
             "rigid-pose/src/absolute_orientation/moments.rs",
             "rigid-pose/src/absolute_orientation/svd.rs",
             "scattering-deconvolution/src/estimate/search/score.rs",
             "scattering-deconvolution/src/estimate/search/start.rs",
+            "targets/src/circles/eccentricity.rs",
+            "targets/src/sightings/target_range.rs",
+            "targets/src/spheres/candidates.rs",
+            "targets/src/board/smoothness.rs",
             "warm-up/src/fit.rs",
         ],
     ),
@@ -67,6 +75,7 @@ const KNOWN: &[(Use, &[&str])] = &[
             "primitives/src/adjustment/plane_step.rs",
             "projective-registration/src/shared_error.rs",
             "rigid-pose/src/centred.rs",
+            "targets/src/board/corners/fit.rs",
             "tracking/src/imu/update.rs",
             "tracking/src/motion_model/velocity.rs",
         ],
@@ -88,7 +97,7 @@ enum Use {
     Covariance,
     /// Start values and small closed forms, of at most a dozen unknowns that are solved for once.
     ClosedForm,
-    /// A step of six unknowns or fewer in a loop over pixels, pairs or frames.
+    /// A step of nine unknowns or fewer in a loop over pixels, corners, pairs or frames.
     SmallStep,
     /// Equations whose blocks are summed up in a hot loop and eliminated there: planes that stations share (a hundred thousand
     /// points to a few thousand planes), and keyframes, whose field of the sensor is a considered parameter.

@@ -69,6 +69,8 @@ pub enum DoubtKind {
     RepeatedFrames,
     /// Frames that cannot be read.
     UnreadableFrames,
+    /// Targets that were looked for and not found, or that have no range.
+    MissingTargets,
     /// A calibration that does not fit the survey.
     Calibration,
     /// Much that lies outside the span in which the calibration holds.

@@ -3,7 +3,7 @@
 #[non_exhaustive]
 pub enum Error {
     /// Not enough targets.
-    #[error("a resection needs at least {needed} targets, {found} were given")]
+    #[error("at least {needed} targets are needed, {found} were given")]
     TooFewTargets {
         /// Targets given.
         found: usize,
@@ -42,7 +42,7 @@ pub enum Error {
          another target, a range or an approximate pose decides", .poses.len()
     )]
     Ambiguous {
-        /// The poses `world_from_camera`, best first.
+        /// The poses, best first: `world_from_camera` of a resection, `first_from_second` of two views.
         poses: Vec<nalgebra::Isometry3<f64>>,
         /// By how much the second `v'Pv` is larger than the first.
         difference: f64,
@@ -61,12 +61,125 @@ pub enum Error {
         /// See [`crate::Resection::curvature`].
         curvature: f64,
     },
+    /// Two lists of image points that belong together differ in length.
+    #[error("{first} image points in the first view, {second} in the second: each target has one in both")]
+    LengthMismatch {
+        /// Image points of the first view.
+        first: usize,
+        /// Image points of the second.
+        second: usize,
+    },
+    /// No relative pose agrees with at least half of the pairs of image points.
+    #[error(
+        "no relative pose agrees with more than {agreeing} of {pairs} pairs of image points: \
+         targets may be mistaken for each other, or the standard deviations are too small"
+    )]
+    NoAgreement {
+        /// Pairs that agree with the best pose.
+        agreeing: usize,
+        /// Pairs given.
+        pairs: usize,
+    },
+    /// The views differ by a rotation alone, as far as the image points tell.
+    #[error(
+        "there is no base: a rotation alone explains the image points (v'Pv = {vtpv:.1}, by chance up to {limit:.1})"
+    )]
+    NoBase {
+        /// `v'Pv` of the rotation alone.
+        vtpv: f64,
+        /// What it exceeds by chance once in a thousand.
+        limit: f64,
+    },
+    /// The direction of the base is known too weakly for a covariance to describe it.
+    #[error(
+        "the base is too small: its direction has a standard deviation of {sigma_direction_rad:.2} rad; \
+         stations further apart, nearer targets or more of them help"
+    )]
+    WeakBase {
+        /// Largest standard deviation of the direction, radian.
+        sigma_direction_rad: f64,
+    },
+    /// A station or target has a number that none of so many observations can have.
+    #[error(
+        "{what} number {number}: stations and targets are numbered from 0, and {observations} observations have no more"
+    )]
+    InvalidNumber {
+        /// Station or target.
+        what: &'static str,
+        /// Its number.
+        number: usize,
+        /// How many observations there are.
+        observations: usize,
+    },
+    /// A station shares too little with the others.
+    #[error(
+        "station {station} shares {shared} targets with what can be oriented; three with ranges are needed, or four image points"
+    )]
+    NotConnected {
+        /// Its number.
+        station: usize,
+        /// Targets that it shares.
+        shared: usize,
+    },
+    /// Not enough poses.
+    #[error(
+        "at least {needed} poses of the camera must lie within the carrier's trajectory, {found} do: check the times, and the longest gap"
+    )]
+    TooFewPoses {
+        /// Poses that do.
+        found: usize,
+        /// Poses needed.
+        needed: usize,
+    },
+    /// A pose that cannot be used.
+    #[error("{what} pose {index}: {reason}")]
+    InvalidPose {
+        /// Whose pose.
+        what: &'static str,
+        /// Its number.
+        index: usize,
+        /// What is wrong with it.
+        reason: &'static str,
+    },
+    /// An option that cannot be.
+    #[error("{name} = {value}: {expected}")]
+    InvalidOption {
+        /// Name of the option.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+        /// What would be right.
+        expected: &'static str,
+    },
+    /// The motions of the carrier leave a part of the mounting open.
+    #[error("not determined by these motions: {}; more varied motions or a known lever arm help", listed(.undetermined))]
+    UndeterminedMounting {
+        /// What is open.
+        undetermined: Vec<crate::Undetermined>,
+    },
+    /// No mounting makes carrier and camera agree.
+    #[error(
+        "no mounting fits more than {agreeing} of {poses} poses; carrier and camera turn by angles that typically differ by {angle_rad:.4} rad: \
+         check units, left-handed axes, inverse poses, and times"
+    )]
+    PosesContradict {
+        /// Poses that agree with the best.
+        agreeing: usize,
+        /// Poses given.
+        poses: usize,
+        /// Median difference of the angles by which carrier and camera turn between poses, radian.
+        angle_rad: f64,
+    },
     /// The camera's parameters are not valid.
     #[error(transparent)]
     Camera(#[from] camera_model::Error),
     /// The adjustment failed.
     #[error("resection: {0}")]
     Adjustment(#[from] adjust::Error),
+}
+
+fn listed(undetermined: &[crate::Undetermined]) -> String {
+    undetermined.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
 }
 
 /// Result with this crate's [`enum@Error`].

@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, Point3, Vector3};
 use crate::{Error, Result};
 
 /// Targets that a resection needs: each image point gives two of the six unknowns.
-const NEEDED: usize = 3;
+pub(crate) const NEEDED: usize = 3;
 
 /// Extent across a line over extent along it below which targets count as collinear: the turn about the line would
 /// come out of rounding.

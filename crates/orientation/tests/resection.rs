@@ -1,5 +1,4 @@
 //! Resection on synthetic stations with truth.
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use camera_model::{Camera, ImageFormat, InteriorOrientation, LensDistortion};
 use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, UnitQuaternion, Vector3, Vector6};

@@ -10,8 +10,8 @@ use nalgebra::Vector3;
 use proptest::prelude::*;
 use range_io::tables::{
     Distance, ImuSample, ObservedPlane, Residual, Station, Target, TargetObservation, read_distances, read_imu,
-    read_observations, read_placed_targets, read_planes, read_residuals, read_stations, read_targets, write_distances,
-    write_imu, write_observations, write_planes, write_residuals, write_stations, write_targets,
+    read_imu_sensor, read_observations, read_placed_targets, read_planes, read_residuals, read_stations, read_targets,
+    write_distances, write_imu, write_observations, write_planes, write_residuals, write_stations, write_targets,
 };
 
 struct Scratch(tempfile::TempDir);
@@ -181,6 +181,24 @@ fn euroc_folders_are_read_as_they_are() {
         // A double carries seconds since 1970 to about 0.2 microseconds.
         assert!((samples[0].timestamp_s - 1_403_636_579.758_555_4).abs() < 3e-7);
         assert_eq!((samples[1].angular_rate, samples[1].acceleration), ([-0.1, 0.14, 0.09], [8.2, -0.3, -2.5]));
+    }
+    let yaml = "# Default imu sensor yaml file\nsensor_type: imu\nT_BS:\n  cols: 4\n  rows: 4\n  data: [0.0, -1.0, 0.0, 0.1,\n         \
+                1.0, 0.0, 0.0, 0.2,\n 0.0, 0.0, 1.0, 0.3,\n 0.0, 0.0, 0.0, 1.0]\nrate_hz: 200\n\
+                gyroscope_noise_density: 1.6968e-04 # [ rad / s / sqrt(Hz) ]\ngyroscope_random_walk: 1.9393e-05\n\
+                accelerometer_noise_density: 2.0000e-3\naccelerometer_random_walk: 3.0000e-3\n";
+    scratch.with("mav0/imu0/sensor.yaml", yaml);
+    let sensor = read_imu_sensor(scratch.file("mav0")).unwrap();
+    assert_eq!((sensor.gyro_density, sensor.gyro_walk), (1.6968e-4, 1.9393e-5));
+    assert_eq!((sensor.accel_density, sensor.accel_walk), (2e-3, 3e-3));
+    assert_eq!(sensor.body_from_sensor[1], [1.0, 0.0, 0.0, 0.2]);
+    for (from, to, fault) in [
+        ("1.9393e-05", "fast", "sensor.yaml:12:1: `gyroscope_random_walk`: is `fast`, expected a positive number"),
+        ("gyroscope_random_walk", "walk", "sensor.yaml:1:1: `gyroscope_random_walk`: is missing"),
+        ("0.0, -1.0, 0.0", "0.0, 1.0, 0.0", "sensor.yaml:3:1: `T_BS`: expected a rotation that is not mirrored"),
+        (", 0.1,", ",", "sensor.yaml:3:1: `T_BS`: expected the sixteen numbers of a 4 x 4 matrix"),
+    ] {
+        let said = message(read_imu_sensor(scratch.with("sensor.yaml", &yaml.replace(from, to))));
+        assert!(said.starts_with(fault), "{said}");
     }
     let reversed = "timestamp_s,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z\n2,0,0,0,0,0,0\n1,0,0,0,0,0,0\n";
     let fault = message(read_imu(scratch.with("imu.csv", reversed)));

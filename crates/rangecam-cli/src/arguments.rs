@@ -4,13 +4,14 @@ use std::path::PathBuf;
 
 use clap::{Parser, Subcommand};
 
-use crate::requests::calibrate_arguments::CalibrateArguments;
+use crate::requests::calibration::calibrate_arguments::CalibrateArguments;
+use crate::requests::calibration::diff_arguments::DiffArguments;
+use crate::requests::calibration::plan_arguments::PlanArguments;
+use crate::requests::calibration::targets_arguments::TargetsArguments;
 use crate::requests::compare_arguments::CompareArguments;
-use crate::requests::diff_arguments::DiffArguments;
 use crate::requests::explain_arguments::ExplainArguments;
 use crate::requests::fixed_pattern_arguments::FixedPatternArguments;
 use crate::requests::noise_arguments::NoiseArguments;
-use crate::requests::plan_arguments::PlanArguments;
 use crate::requests::register_arguments::RegisterArguments;
 use crate::requests::scattering_arguments::ScatteringArguments;
 use crate::requests::values::{not_negative, share};
@@ -79,6 +80,8 @@ pub(crate) enum Command {
     },
     /// Calibrate lens and range terms from a survey of targets or planes, with the quality of every parameter.
     Calibrate(Box<CalibrateArguments>),
+    /// Find the targets of a calibration in the frames of a survey, or in a folder of images.
+    Targets(TargetsArguments),
     /// Tell how well planned stations and targets would determine a calibration, and which station to add.
     Plan(Box<PlanArguments>),
     /// Estimate internal scattering (stray light in the camera) from a scene with and without bright objects.

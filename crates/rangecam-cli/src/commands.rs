@@ -4,10 +4,13 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use pipeline::{Plan, RunRequest, SimulateSource};
+use pipeline::commands::Inputs;
+use pipeline::{Judged, Plan, RunRequest, SimulateSource, Verdict};
 
 use crate::arguments::Command;
+use crate::exit;
 use crate::output::Output;
+use crate::requests::calibration::calibrate_arguments::CalibrateArguments;
 use crate::requests::register_arguments::Request;
 
 type Outcome = Result<ExitCode, Box<dyn Error>>;
@@ -33,9 +36,10 @@ pub(crate) fn dispatch(command: Command, output: &Output) -> Outcome {
             let out = out.unwrap_or_else(|| default_out(scene.file_stem().unwrap_or_default().as_ref()));
             output.result(&calibration_tasks::simulate_network(&scene, seed, &out)?)
         }
-        Command::Calibrate(arguments) => {
-            let request = arguments.request();
-            output.result(&calibration_tasks::calibrate(&request, output.progress().as_ref())?)
+        Command::Calibrate(arguments) => calibrate(*arguments, output),
+        Command::Targets(arguments) => {
+            let request = arguments.request().map_err(|wrong| format!("targets --kind: {wrong}"))?;
+            output.result(&target_tasks::find_targets(&request, output.progress().as_ref())?)
         }
         Command::Plan(arguments) => {
             output.result(&calibration_tasks::plan_network(&arguments.request(), output.progress().as_ref())?)
@@ -67,6 +71,26 @@ pub(crate) fn dispatch(command: Command, output: &Output) -> Outcome {
             output.result(&tasks::compare(&arguments.request(), output.progress().as_ref())?)
         }
     }
+}
+
+/// Calibrates, from targets that are found first where that is asked for. What was doubtful about these is doubtful about
+/// the calibration.
+fn calibrate(mut arguments: CalibrateArguments, output: &Output) -> Outcome {
+    let targets = arguments.take_targets().map_err(|wrong| format!("calibrate --targets: {wrong}"))?;
+    let request = arguments.request();
+    let mut found = None;
+    if let Some(targets) = targets {
+        // The calibration reads what is found, and must leave alone what that was found in.
+        let inputs = Inputs::default().survey(&targets.survey).maybe(targets.calibration.as_deref());
+        inputs.destination(&request.out)?;
+        let summary = target_tasks::find_targets(&targets, output.progress().as_ref())?;
+        output.words(&summary)?;
+        found = Some(summary);
+    }
+    let calibrated = calibration_tasks::calibrate(&request, output.progress().as_ref())?;
+    let code = output.result(&calibrated)?;
+    let verdict = calibrated.verdict().max(found.map_or(Verdict::Done, |found| found.verdict()));
+    Ok(if verdict == calibrated.verdict() { code } else { exit::of_verdict(verdict) })
 }
 
 fn run(

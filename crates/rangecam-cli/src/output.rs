@@ -56,6 +56,11 @@ impl Output {
         Ok(exit::of_verdict(result.verdict()))
     }
 
+    /// What a step on the way to the result has to say, where words are wanted.
+    pub(crate) fn words(&self, step: &impl Display) -> std::io::Result<()> {
+        if self.voice == Voice::Words { print(&escape::words(&format!("{step}\n"))) } else { Ok(()) }
+    }
+
     /// The summary of a refused calibration: as JSON where that was asked for, in words it is the error alone.
     pub(crate) fn refusal(&self, error: &(dyn Error + 'static)) {
         if let (Voice::Json, Some(pipeline::Error::Refused { summary, .. })) = (self.voice, error.downcast_ref())

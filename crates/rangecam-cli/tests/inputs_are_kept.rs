@@ -39,6 +39,8 @@ fn cases() -> Vec<Case> {
             "calibrate targets --method two-step-independent --lens-survey lens",
             "targets lens",
         ),
+        case("targets", "targets survey -c cal/c.ron -k checkerboard 9x6 0.025", "survey cal/c.ron"),
+        case("calibrate, targets first", "calibrate survey -c cal/c.ron --targets circles 7x5 0.4", "survey cal/c.ron"),
         case("plan", "plan targets -c cal/c.ron", "targets cal/c.ron"),
         case("scattering", "scattering survey without -c cal/c.ron", "survey without cal/c.ron"),
         case("noise", "noise survey -c cal/c.ron", "survey cal/c.ron"),

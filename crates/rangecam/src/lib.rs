@@ -49,6 +49,9 @@ pub mod registration {
     #[cfg(feature = "icp-registration")]
     #[doc(inline)]
     pub use icp_registration;
+    #[cfg(feature = "inertial")]
+    #[doc(inline)]
+    pub use inertial;
     #[cfg(feature = "multiview-registration")]
     #[doc(inline)]
     pub use multiview_registration;
@@ -89,6 +92,9 @@ pub mod calibration {
     #[cfg(feature = "sensor-noise")]
     #[doc(inline)]
     pub use sensor_noise;
+    #[cfg(feature = "targets")]
+    #[doc(inline)]
+    pub use targets;
     #[cfg(feature = "warm-up")]
     #[doc(inline)]
     pub use warm_up;
@@ -117,6 +123,9 @@ pub mod application {
     #[cfg(feature = "simulation")]
     #[doc(inline)]
     pub use simulation;
+    #[cfg(feature = "target-tasks")]
+    #[doc(inline)]
+    pub use target_tasks;
     #[cfg(feature = "tasks")]
     #[doc(inline)]
     pub use tasks;

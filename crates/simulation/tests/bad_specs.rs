@@ -60,7 +60,8 @@ const WRONG: &[(&str, Change)] = &[
         s.scene.objects[0].texture = Some(TextureSpec::Noise { size_m: 1.0, contrast: 1.0, seed: 0 });
     }),
     ("scene.objects[0].texture.radius_m", |s| {
-        s.scene.objects[0].texture = Some(TextureSpec::Discs { spacing_m: 1.0, radius_m: -0.1, factor: 0.5 });
+        s.scene.objects[0].texture =
+            Some(TextureSpec::Discs { spacing_m: 1.0, radius_m: -0.1, factor: 0.5, first_m: [0.0; 2] });
     }),
     ("camera.modulation_hz", |s| s.camera.modulation_hz.clear()),
     ("camera.modulation_hz[0]", |s| s.camera.modulation_hz[0] = -1.0),

@@ -119,14 +119,13 @@ fn inspect_survey(path: &Path, found: &mut Inspection) -> Result<()> {
 }
 
 /// Images of light alone: whether they can be read is all that there is to judge.
-fn inspect_images(path: &Path, survey: &Survey, found: &mut Inspection) -> Result<()> {
+fn inspect_images(path: &Path, survey: &Survey, found: &mut Inspection) {
     let root = root_of(path);
     let frames = survey.frames.iter().enumerate();
     let unreadable: Vec<_> =
         frames.filter_map(|(index, entry)| Some((entry, read_frame(survey, &root, index).err()?.into()))).collect();
     found.doubts.extend(plausibility::of_survey(&survey.camera));
     tell_readable(survey, &unreadable, found);
-    Ok(())
 }
 
 fn tell_readable(survey: &Survey, unreadable: &[(&FrameEntry, Error)], found: &mut Inspection) {
@@ -147,7 +146,8 @@ fn inspect_frames(path: &Path, survey: &Survey, found: &mut Inspection) -> Resul
         return Ok(());
     }
     if survey.level == Level::Intensity {
-        return inspect_images(path, survey, found);
+        inspect_images(path, survey, found);
+        return Ok(());
     }
     let opened = open(path, (None, String::new()), Purpose::Camera)?;
     let stages: &[Stage] = match survey.level {

@@ -11,6 +11,7 @@ mod trajectory;
 pub use error::Error;
 pub use global_registration;
 pub use imu::{ImuIntegrator, ImuOptions, InertialSample};
+pub use inertial;
 pub use motion_model::motion::MotionPrior;
 pub use nalgebra;
 pub use options::{Fusion, Relocalisation, TrackerOptions};

@@ -12,6 +12,7 @@
 mod common;
 #[path = "../../projective-registration/tests/depth_frames/mod.rs"]
 mod depth_frames;
+mod hand_held;
 mod imu;
 mod invalid;
 mod paths;

@@ -10,6 +10,7 @@ mod registration;
 mod registration_real;
 mod scattering;
 mod table;
+mod targets;
 
 use crate::shell::Outcome;
 
@@ -26,6 +27,8 @@ enum Stage {
     RegistrationReal,
     /// `scipy`, FFTW and OpenCV beside `scattering-deconvolution`.
     Scattering,
+    /// OpenCV beside `targets`.
+    Targets,
 }
 
 /// Which stages, and how often.
@@ -47,6 +50,7 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome {
             Stage::Registration => registration::run(arguments.runs.max(1))?,
             Stage::RegistrationReal => registration_real::run(arguments.runs.max(1))?,
             Stage::Scattering => scattering::run(arguments.runs.max(1))?,
+            Stage::Targets => targets::run()?,
         }
     }
     Ok(())

@@ -1,14 +1,12 @@
 //! Approximate poses, coordinates and calibration, also where observations contradict each other.
 
-pub(crate) mod robust_pose;
 pub(crate) mod settle;
 pub(crate) mod start;
 pub(crate) mod start_calibration;
 pub(crate) mod start_finder;
 mod wrong_control;
 
-pub use robust_pose::{NEEDED, robust_resection};
 pub use settle::{start_limit, start_range_limit};
 pub use start::fits_as_given;
 pub use start_calibration::start_calibration;
-pub use start_finder::station_pose;
+pub use start_finder::{NEEDED, station_pose};

@@ -1,15 +1,18 @@
 //! Poses and coordinates found one after the other, from those that are known.
 
 use nalgebra::{Isometry3, Point3};
-use orientation::TargetObservation;
+use orientation::{
+    TargetObservation, intersect_rays, robust_absolute_orientation, robust_resection, trimmed_resection,
+};
 
 use crate::functional_model::misfit::{Misfit, corrected_range, median};
 use crate::functional_model::setup::Calibration;
-use crate::start_values::robust_pose::{NEEDED, intersect, robust_orientation, robust_resection, trimmed_resection};
 use crate::start_values::settle::start_limit;
 use crate::start_values::start::Trust;
 use crate::{Error, Network, PassiveCamera, Result};
 
+/// Targets that orient a station.
+pub const NEEDED: usize = 3;
 /// Stations in a row that no pose fits, after which the coordinates are given up: no pose will fit them.
 const HOPELESS: usize = 5;
 
@@ -236,7 +239,7 @@ impl<'n> Finder<'n> {
             return Some(Point3::new(along(0), along(1), along(2)));
         }
         let ray = |pose: &Isometry3<f64>, pixel| (pose.translation.vector, pose * self.calibration.camera.ray(pixel));
-        intersect(&seen.iter().map(|(_, pose, pixel)| ray(pose, *pixel)).collect::<Vec<_>>())
+        intersect_rays(&seen.iter().map(|(_, pose, pixel)| ray(pose, *pixel)).collect::<Vec<_>>())
     }
 
     /// Pose of a station from its known targets.
@@ -248,7 +251,7 @@ impl<'n> Finder<'n> {
         let ranged: Vec<(Point3<f64>, Point3<f64>)> =
             known.iter().filter_map(|(index, world)| Some((self.local[*index]?, *world))).collect();
         if ranged.len() >= NEEDED
-            && let Some(pose) = robust_orientation(&ranged)
+            && let Some(pose) = robust_absolute_orientation(&ranged)
             && self.typical_miss(station, &pose) <= start_limit(self.network)
         {
             return Ok(pose);
@@ -259,6 +262,7 @@ impl<'n> Finder<'n> {
             Some(TargetObservation { sigma_pixel: seen.sigma_pixel, ..TargetObservation::new(*world, pixel, 1.0) })
         };
         robust_resection(&self.calibration.camera, &known.iter().filter_map(target).collect::<Vec<_>>())
+            .map_err(|error| error.to_string())
     }
 
     /// `range_camera_from_passive`: given, or from the station whose passive image fits its targets best.

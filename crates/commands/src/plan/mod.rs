@@ -200,6 +200,23 @@ impl Plan {
     }
 }
 
+/// The stages that bring frames of a level to one unwrapped, uncorrected range image a station; scattering is taken off
+/// where the calibration knows it.
+pub fn to_ranges(level: Level, restores: bool) -> Vec<Stage> {
+    let mut stages = Vec::new();
+    if level == Level::Samples {
+        stages.push(Stage::Demodulate(DemodulateOptions::default()));
+    }
+    stages.push(Stage::Average(AverageOptions::default()));
+    if level <= Level::Phase {
+        if restores {
+            stages.push(Stage::Deconvolve(DeconvolveOptions::default()));
+        }
+        stages.push(Stage::Unwrap(UnwrapOptions::default()));
+    }
+    stages
+}
+
 /// Stages that frames of this level leave no room for.
 pub fn ruled_out(level: Level) -> BTreeMap<String, String> {
     let blocked = Stage::ALL_NEEDS.iter().filter(|(_, needs)| is_past(level, *needs));

@@ -6,6 +6,7 @@
 mod csv_table;
 mod distances;
 mod imu;
+mod imu_sensor;
 mod observations;
 mod planes;
 mod residuals;
@@ -15,6 +16,7 @@ mod targets;
 pub use csv_table::PlacedRows;
 pub use distances::{Distance, read_distances, read_placed_distances, write_distances};
 pub use imu::{ImuSample, read_imu, write_imu};
+pub use imu_sensor::{ImuSensor, read_imu_sensor};
 pub use observations::{TargetObservation, read_observations, read_placed_observations, write_observations};
 pub use planes::{ObservedPlane, read_placed_planes, read_planes, write_planes};
 pub use residuals::{Residual, read_residuals, write_residuals};

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use tasks::{FixedPatternRequest, PatternOptions};
 
-use crate::requests::calibrate_arguments::default_out;
+use crate::requests::calibration::calibrate_arguments::default_out;
 use crate::requests::values::whole;
 
 /// Arguments of an estimation of the fixed pattern.

@@ -1,12 +1,10 @@
 //! Arguments of the commands, one module each.
 
-pub(crate) mod calibrate_arguments;
+pub(crate) mod calibration;
 pub(crate) mod compare_arguments;
-pub(crate) mod diff_arguments;
 pub(crate) mod explain_arguments;
 pub(crate) mod fixed_pattern_arguments;
 pub(crate) mod noise_arguments;
-pub(crate) mod plan_arguments;
 pub(crate) mod register_arguments;
 pub(crate) mod scattering_arguments;
 pub(crate) mod values;

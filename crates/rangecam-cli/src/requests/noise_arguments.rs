@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use tasks::{NoiseFitOptions, NoiseRequest};
 
-use crate::requests::calibrate_arguments::default_out;
+use crate::requests::calibration::calibrate_arguments::default_out;
 
 /// Arguments of an estimation of noise.
 #[derive(Debug, Args)]

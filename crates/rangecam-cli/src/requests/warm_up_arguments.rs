@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use tasks::{ChangeOptions, DriftOptions, ReferenceUse, TemperatureUse, WarmUpRequest};
 
-use crate::requests::calibrate_arguments::default_out;
+use crate::requests::calibration::calibrate_arguments::default_out;
 use crate::requests::values::{finite, positive};
 
 /// Arguments of an estimation of a drift.

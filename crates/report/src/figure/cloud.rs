@@ -6,7 +6,7 @@ use std::fmt::Write;
 use super::Figure;
 use super::canvas::ticks;
 use super::colour::{CATEGORIES, hex};
-use super::picture::data_uri;
+use super::pictures::picture::data_uri;
 use super::svg::{escape, open_svg};
 use crate::Result;
 

@@ -5,7 +5,7 @@ use std::fmt::Write;
 
 use super::Figure;
 use super::canvas::ticks;
-use super::picture::{Scale, colour_bar, data_uri};
+use super::pictures::picture::{Scale, colour_bar, data_uri};
 use super::svg::{escape, open_svg};
 use crate::Result;
 

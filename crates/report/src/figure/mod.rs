@@ -7,8 +7,7 @@ mod colour;
 mod deviation;
 mod heat_map;
 mod labels;
-mod pattern;
-mod picture;
+mod pictures;
 mod station_graph;
 mod svg;
 
@@ -19,8 +18,9 @@ pub use colour::{CATEGORIES, ColourMap, NO_VALUE, hex};
 pub use deviation::{LineOfSight, deviation_figure};
 pub use heat_map::heat_map;
 pub use labels::Labels;
-pub use pattern::pattern_figures;
-pub use picture::{Scale, raster_figure, rgb_figure};
+pub use pictures::marks::{Mark, marked_figure};
+pub use pictures::pattern::pattern_figures;
+pub use pictures::picture::{Scale, raster_figure, rgb_figure};
 pub use station_graph::{Edge, Node, station_graph};
 pub use svg::{escape, open_svg};
 

@@ -5,7 +5,7 @@ use std::fmt::Write;
 use super::Figure;
 use super::canvas::{span, ticks};
 use super::colour::{ColourMap, hex};
-use super::picture::{Scale, colour_bar};
+use super::pictures::picture::{Scale, colour_bar};
 use super::svg::{escape, open_svg};
 
 /// A station in the plane of the picture.

@@ -10,9 +10,9 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use adjust::{GlobalTest, GlobalVerdict};
 use calibration_network::functional_model::modelled_pixel;
-use calibration_network::start_values::{NEEDED, robust_resection};
+use calibration_network::start_values::NEEDED;
 use nalgebra::{Isometry3, Point3};
-use orientation::TargetObservation;
+use orientation::{TargetObservation, robust_resection};
 
 use crate::methods::problem::Problem;
 use crate::{

@@ -178,10 +178,10 @@ fn a_checker_alternates_and_discs_lie_on_their_grid() {
     let row: Vec<f64> = [-0.75, -0.25, 0.25, 0.75].iter().map(|x| on_floor(*x, 0.1)).collect();
     assert_eq!(row, [1.0, 0.25, 1.0, 0.25]);
     assert_eq!([on_floor(0.25, 0.25), on_floor(0.25, 0.75)], [1.0, 0.25]);
-    let discs = TextureSpec::Discs { spacing_m: 0.5, radius_m: 0.1, factor: 0.25 };
+    let discs = TextureSpec::Discs { spacing_m: 0.5, radius_m: 0.1, factor: 0.25, first_m: [0.1, -0.2] };
     let on_wall = |y: f64, z: f64| texture::factor(&discs, &Vector3::new(9.0, y, z), &Vector3::x());
     assert_eq!(
-        [on_wall(0.5, -1.0), on_wall(0.59, -1.0), on_wall(0.61, -1.0), on_wall(0.25, 0.25)],
+        [on_wall(0.6, -1.2), on_wall(0.69, -1.2), on_wall(0.71, -1.2), on_wall(0.35, 0.05)],
         [1.0, 1.0, 0.25, 0.25]
     );
 }

@@ -11,8 +11,9 @@ pub(crate) fn factor(texture: &TextureSpec, point: &Vector3<f64>, normal: &Vecto
             let [a, b] = on_surface(point, normal).map(|v| (v / size_m).floor());
             if (a + b).rem_euclid(2.0) < 0.5 { 1.0 } else { factor }
         }
-        TextureSpec::Discs { spacing_m, radius_m, factor } => {
-            let [a, b] = on_surface(point, normal).map(|v| v - (v / spacing_m).round() * spacing_m);
+        TextureSpec::Discs { spacing_m, radius_m, factor, first_m } => {
+            let [a, b] = on_surface(point, normal);
+            let [a, b] = [a - first_m[0], b - first_m[1]].map(|v| v - (v / spacing_m).round() * spacing_m);
             if a.hypot(b) <= radius_m { 1.0 } else { factor }
         }
         TextureSpec::Noise { size_m, contrast, seed } => 1.0 + contrast * value_noise(&(point / size_m), seed),

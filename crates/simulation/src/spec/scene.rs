@@ -99,6 +99,9 @@ pub enum TextureSpec {
         radius_m: f64,
         /// Factor on the albedo between the discs.
         factor: f64,
+        /// Centre of one of them, along the two axes.
+        #[serde(default)]
+        first_m: [f64; 2],
     },
     /// Smooth random variation: the albedo times `1 + contrast * v`, v in -1..1.
     Noise {
@@ -203,7 +206,10 @@ impl TextureSpec {
                 extent(format!("{path}.size_m"), size_m)?;
                 not_negative(format!("{path}.factor"), factor)
             }
-            Self::Discs { spacing_m, radius_m, factor } => {
+            Self::Discs { spacing_m, radius_m, factor, first_m } => {
+                for value in first_m {
+                    finite(format!("{path}.first_m"), value)?;
+                }
                 extent(format!("{path}.spacing_m"), spacing_m)?;
                 extent(format!("{path}.radius_m"), radius_m)?;
                 not_negative(format!("{path}.factor"), factor)

@@ -3,8 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use commands::plan::{
-    AverageOptions, CorrectImagePointOptions, CorrectRangeOptions, DeconvolveOptions, DemodulateOptions, FlagOptions,
-    FuseExposuresOptions, PointCloudOptions, UnwrapOptions,
+    CorrectImagePointOptions, CorrectRangeOptions, FlagOptions, FuseExposuresOptions, PointCloudOptions, to_ranges,
 };
 use commands::{Doubt, Progress, root_of};
 use pipeline::run::process_each;
@@ -92,17 +91,7 @@ fn survey_stations(path: &Path, request: &RegisterRequest, progress: &dyn Progre
 
 /// The way from the survey's level to flagged points, as far as the calibration has something to say.
 pub(crate) fn stages(level: Level, calibration: Option<&Calibration>) -> Vec<Stage> {
-    let mut stages = Vec::new();
-    if level == Level::Samples {
-        stages.push(Stage::Demodulate(DemodulateOptions::default()));
-    }
-    stages.push(Stage::Average(AverageOptions::default()));
-    if matches!(level, Level::Samples | Level::Phase) {
-        if calibration.is_some_and(|calibration| calibration.scattering.is_some()) {
-            stages.push(Stage::Deconvolve(DeconvolveOptions::default()));
-        }
-        stages.push(Stage::Unwrap(UnwrapOptions::default()));
-    }
+    let mut stages = to_ranges(level, calibration.is_some_and(|calibration| calibration.scattering.is_some()));
     if let Some(calibration) = calibration {
         // A camera that corrects its ranges itself has a calibration of its lens alone.
         if corrects_ranges(calibration) {

@@ -12,7 +12,8 @@ mod rest;
 mod state;
 mod update;
 
-pub use options::{ImuOptions, InertialSample};
+pub use inertial::InertialSample;
+pub use options::ImuOptions;
 
 use nalgebra::{Isometry3, Matrix6, Vector3};
 

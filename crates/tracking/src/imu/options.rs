@@ -1,37 +1,8 @@
 //! What an inertial unit delivers, and what is known of its errors.
 
-use nalgebra::{Isometry3, Vector3};
+use nalgebra::Isometry3;
 
 use crate::error::{Error, Result};
-
-/// One inertial sample in body axes (a line of `imu.csv`).
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct InertialSample {
-    /// Time, second.
-    pub timestamp_s: f64,
-    /// Angular rate, radian per second.
-    pub angular_rate: Vector3<f64>,
-    /// Specific force, metre per second squared: at rest it points up with the length of gravity.
-    pub specific_force: Vector3<f64>,
-}
-
-impl InertialSample {
-    pub(super) fn is_finite(&self) -> bool {
-        // Beyond 1e6 no unit measures, and products of such numbers would leave the range of f64 in the end.
-        let sound = |v: &Vector3<f64>| v.iter().all(|x| x.abs() < 1e6);
-        self.timestamp_s.is_finite() && sound(&self.angular_rate) && sound(&self.specific_force)
-    }
-
-    /// The sample at a time between this and a later one.
-    pub(super) fn interpolated(&self, later: &Self, timestamp_s: f64) -> Self {
-        let share = (timestamp_s - self.timestamp_s) / (later.timestamp_s - self.timestamp_s);
-        Self {
-            timestamp_s,
-            angular_rate: self.angular_rate.lerp(&later.angular_rate, share),
-            specific_force: self.specific_force.lerp(&later.specific_force, share),
-        }
-    }
-}
 
 /// Noise and mounting of an inertial unit. The defaults are those of a small unit of a phone.
 #[derive(Debug, Clone, PartialEq)]

@@ -2,7 +2,9 @@
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
-use super::options::{ImuOptions, InertialSample};
+use inertial::InertialSample;
+
+use super::options::ImuOptions;
 use super::state::{ACCEL_BIAS, ATTITUDE, DISPLACEMENT, GYRO_BIAS, Matrix18, ROTATION, State, VELOCITY};
 
 /// Integrates over one interval: the rate is its mean, the acceleration linear from one end to the other.

@@ -3,7 +3,9 @@
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 use super::check_samples;
-use super::options::{ImuOptions, InertialSample};
+use inertial::InertialSample;
+
+use super::options::ImuOptions;
 use super::state::{ACCEL_BIAS, ATTITUDE, GYRO_BIAS, Matrix18, State, VELOCITY};
 use crate::error::{Error, Result};
 

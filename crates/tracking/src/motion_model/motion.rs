@@ -1,10 +1,11 @@
 //! Poses and motions with their covariance.
 
-use nalgebra::{Isometry3, Matrix3, Matrix6, Vector3, Vector6};
+use nalgebra::{Isometry3, Matrix3, Matrix6, UnitQuaternion, Vector3, Vector6};
 
 use rigid_pose::Uncertain;
 
-/// What is known of the motion from the frame before to this one, for instance from an inertial unit.
+/// What is known of the motion from the frame before to this one, for instance from an inertial unit: all of it, or the rotation
+/// alone ([`Self::of_turn`]).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MotionPrior {
     /// Pose of the previous camera in the frame of the current one.
@@ -14,8 +15,34 @@ pub struct MotionPrior {
 }
 
 impl MotionPrior {
+    /// Of a rotation alone, as a gyroscope measures it: variances of the translation are infinite. `covariance`: radian², axes of
+    /// the previous camera.
+    #[must_use]
+    pub fn of_turn(current_from_previous: UnitQuaternion<f64>, covariance: &Matrix3<f64>) -> Self {
+        let infinite = f64::INFINITY;
+        let mut whole = Matrix6::from_diagonal(&Vector6::new(infinite, infinite, infinite, 0.0, 0.0, 0.0));
+        whole.fixed_view_mut::<3, 3>(3, 3).copy_from(covariance);
+        Self {
+            current_from_previous: Isometry3::from_parts(Vector3::zeros().into(), current_from_previous),
+            covariance: whole,
+        }
+    }
+
+    /// The rotation `previous_from_current` with its covariance (current axes), where nothing is known of the translation.
+    pub(crate) fn turn(&self) -> Option<(UnitQuaternion<f64>, Matrix3<f64>)> {
+        let unknown = (0..3).all(|k| self.covariance[(k, k)] == f64::INFINITY);
+        let rotation = self.current_from_previous.rotation;
+        let r = rotation.to_rotation_matrix().into_inner();
+        let own = self.covariance.fixed_view::<3, 3>(3, 3).into_owned();
+        unknown.then(|| (rotation.inverse(), r * own * r.transpose()))
+    }
+
     /// Whether it can be used: finite, its covariance positive definite.
     pub(crate) fn is_sound(&self) -> bool {
+        if let Some((_, covariance)) = self.turn() {
+            let finite = covariance.iter().all(|v| v.is_finite());
+            return rigid_pose::is_finite(&self.current_from_previous) && finite && covariance.cholesky().is_some();
+        }
         rigid_pose::is_finite(&self.current_from_previous)
             && self.covariance.iter().all(|v| v.is_finite())
             && self.covariance.cholesky().is_some()
@@ -34,7 +61,7 @@ pub(crate) fn diagonal([shift, turn]: [f64; 2]) -> Matrix6<f64> {
 /// The motion along a screw `[ρ, θ]`: it turns by θ while it goes straight on by ρ in axes that turn along.
 pub(crate) fn exponential(screw: &Vector6<f64>) -> Isometry3<f64> {
     let (straight, turn) = (screw.fixed_rows::<3>(0), screw.fixed_rows::<3>(3).into_owned());
-    let rotation = nalgebra::UnitQuaternion::from_scaled_axis(turn);
+    let rotation = UnitQuaternion::from_scaled_axis(turn);
     Isometry3::from_parts((left_jacobian(&turn) * straight).into(), rotation)
 }
 

@@ -1,6 +1,6 @@
 //! Where the next frame is expected.
 
-use nalgebra::{Isometry3, Matrix6};
+use nalgebra::{Isometry3, Matrix3, Matrix6, UnitQuaternion, Vector3};
 
 use crate::motion_model::motion::MotionPrior;
 use crate::motion_model::velocity::Velocity;
@@ -86,7 +86,8 @@ impl Prediction {
 
 impl Last {
     pub(crate) fn predict(&self, timestamp_s: f64, prior: Option<&MotionPrior>) -> Prediction {
-        if let Some(prior) = prior {
+        let turn = prior.and_then(MotionPrior::turn);
+        if let Some(prior) = prior.filter(|_| turn.is_none()) {
             let mut motion = prior.previous_from_current();
             // Errors of successive priors have their cause in common (a velocity, a bias), so that they add up.
             motion.covariance *= 2.0 * self.carried as f64 + 1.0;
@@ -97,9 +98,21 @@ impl Last {
         // A frame that came much later than the ones before says nothing about where the camera went.
         let bridged = self.lost_frames < CARRIED_FRAMES && seconds <= MOST_INTERVALS * self.interval_s;
         let Some(velocity) = self.velocity.filter(|_| bridged) else {
-            return Prediction { own: self.own, velocity: None, grounds: Grounds::Nothing };
+            let motion = turn.map_or_else(
+                || Uncertain::exact(Isometry3::identity()),
+                |(turn, covariance)| turned(turn, &covariance),
+            );
+            return Prediction { own: self.own.then(&motion), velocity: None, grounds: Grounds::Nothing };
         };
-        let (own, velocity) = velocity.predict(&self.own, seconds, self.disturbance.unwrap_or_default());
+        let [shift, swing] = self.disturbance.unwrap_or_default();
+        // What is measured of the rotation is its mean over the interval: no disturbance adds to that.
+        let (velocity, disturbance) = match turn {
+            Some((turn, covariance)) => {
+                (velocity.turning(&(turn.scaled_axis() / seconds), &(covariance / (seconds * seconds))), [shift, 0.0])
+            }
+            None => (velocity, [shift, swing]),
+        };
+        let (own, velocity) = velocity.predict(&self.own, seconds, disturbance);
         let known = self.informed && self.disturbance.is_some();
         let grounds = if known { Grounds::Velocity } else { Grounds::Nothing };
         Prediction { own, velocity: Some(velocity), grounds }
@@ -128,4 +141,11 @@ impl Last {
         let mean = self.disturbance.unwrap_or(latest);
         Some([0, 1].map(|i| mean[i] + LATEST * (latest[i] - mean[i])))
     }
+}
+
+/// A motion on the spot.
+fn turned(turn: UnitQuaternion<f64>, covariance: &Matrix3<f64>) -> Uncertain {
+    let mut whole = Matrix6::zeros();
+    whole.fixed_view_mut::<3, 3>(3, 3).copy_from(covariance);
+    Uncertain { pose: Isometry3::from_parts(Vector3::zeros().into(), turn), covariance: whole }
 }

@@ -5,7 +5,7 @@
 //! Kalman filter with white noise of acceleration, `[BarShalom2001]`, Sect. 6.2). What a frame hardly determines thus
 //! hardly moves the velocity along it, which carries the pose on.
 
-use nalgebra::{Matrix6, Vector6};
+use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 
 use crate::motion_model::motion::{diagonal, exponential, logarithm};
 use rigid_pose::{Uncertain, product_jacobians};
@@ -57,6 +57,17 @@ impl Velocity {
         (Uncertain { pose: moved, covariance: symmetrised(&covariance) }, velocity)
     }
 
+    /// The same where the rate of rotation is measured (camera axes, rad/s): what was known of it does not count beside that.
+    pub(crate) fn turning(&self, rate: &Vector3<f64>, covariance: &Matrix3<f64>) -> Self {
+        let mut out = *self;
+        out.twist.fixed_rows_mut::<3>(3).copy_from(rate);
+        out.covariance.fixed_columns_mut::<3>(3).fill(0.0);
+        out.covariance.fixed_rows_mut::<3>(3).fill(0.0);
+        out.covariance.fixed_view_mut::<3, 3>(3, 3).copy_from(covariance);
+        out.with_pose.fixed_columns_mut::<3>(3).fill(0.0);
+        out
+    }
+
     /// Pose and velocity (this one belongs to `pose`) with a measurement of the pose; `None` where covariances are
     /// singular.
     pub(crate) fn correct(&self, pose: &Uncertain, measured: &Uncertain) -> Option<(Uncertain, Self)> {
@@ -94,7 +105,7 @@ mod tests {
     #![allow(clippy::unwrap_used)]
 
     use super::*;
-    use nalgebra::{Isometry3, Vector3};
+    use nalgebra::Isometry3;
     use rand::SeedableRng;
     use rand_distr::{Distribution, StandardNormal};
     use rand_pcg::Pcg64;

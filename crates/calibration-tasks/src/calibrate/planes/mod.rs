@@ -6,14 +6,13 @@ pub(crate) mod placed;
 pub(crate) mod planes_outcome;
 pub(crate) mod pose_test;
 
+use commands::plan::to_ranges;
 use commands::{Progress, root_of};
 use error_models::{RangeTerms, SurfaceShape};
 use nalgebra::{Isometry3, Point3, Vector3};
 use pipeline::run::Processed;
 use pipeline::survey::{ViewData, ViewDrift};
-use pipeline::{
-    AverageOptions, DeconvolveOptions, DemodulateOptions, Error, Plan, Result, Stage, UnwrapOptions, process,
-};
+use pipeline::{Error, Plan, Result, process};
 use range_calibration::{
     DifferenceOptions, Plane, PlaneCalibrationOptions, PlaneCapture, RangeDifference, RangeTermOptions, TermUse,
     estimate_range_terms,
@@ -250,18 +249,8 @@ fn unknown<'a>(
 
 /// The stages that bring the survey's frames to unwrapped, uncorrected ranges.
 fn preparation(survey: &Survey, start: &Start) -> Plan {
-    let mut stages = Vec::new();
-    if survey.level == Level::Samples {
-        stages.push(Stage::Demodulate(DemodulateOptions::default()));
-    }
-    stages.push(Stage::Average(AverageOptions::default()));
-    if survey.level <= Level::Phase {
-        if start.calibration.as_ref().is_some_and(|calibration| calibration.scattering.is_some()) {
-            stages.push(Stage::Deconvolve(DeconvolveOptions::default()));
-        }
-        stages.push(Stage::Unwrap(UnwrapOptions::default()));
-    }
-    Plan { name: "planes".to_owned(), source: None, calibrate: None, stages }
+    let restores = start.calibration.as_ref().is_some_and(|calibration| calibration.scattering.is_some());
+    Plan { name: "planes".to_owned(), source: None, calibrate: None, stages: to_ranges(survey.level, restores) }
 }
 
 /// The named terms are estimated, all others held at the start values. A surface stands instead of e1 and e2.

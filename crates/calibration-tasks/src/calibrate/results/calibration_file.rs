@@ -21,7 +21,7 @@ pub(crate) fn calibration(
 ) -> Result<Calibration> {
     let several = outcome.range_models.len() > 1;
     let mut range_models = Vec::new();
-    for (index, (time, model)) in outcome.range_models.iter().enumerate() {
+    for (index, (time, model)) in outcome.range_models.iter().enumerate().filter(|_| !start.light_alone) {
         let mut written = RangeCalibration::from_model(time.unwrap_or(UNKNOWN_INTEGRATION_TIME_S), model);
         written.modulation_hz = start.modulation.frequency_hz();
         for parameter in &mut written.parameters {

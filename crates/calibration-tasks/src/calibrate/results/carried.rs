@@ -35,7 +35,9 @@ pub(crate) fn taken_over(start: &Start, finds_table: bool) -> Vec<&'static str> 
 pub(crate) fn notes(start: &Start, outcome: &CalibrationOutcome, finds_table: bool) -> Vec<String> {
     let times: Vec<Option<f64>> = outcome.range_models.iter().map(|(time, _)| *time).collect();
     let mut notes = Vec::new();
-    notes.extend(untimed(start, &times));
+    if !start.light_alone {
+        notes.extend(untimed(start, &times));
+    }
     let Some(known) = &start.calibration else { return notes };
     let taken = taken_over(start, finds_table);
     let words: Vec<&str> = parts(known).filter(|(field, _)| taken.contains(field)).map(|(_, words)| words).collect();

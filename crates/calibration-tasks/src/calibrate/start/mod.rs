@@ -12,7 +12,7 @@ use pipeline::survey::{Purpose, ViewDrift, compatible, model_set, read_calibrati
 use pipeline::{Error, Result};
 use range_image::Modulation;
 use range_io::calibration::Calibration;
-use range_io::survey::Survey;
+use range_io::survey::{Level, Survey};
 
 use crate::calibrate::start::conditions::Conditions;
 
@@ -29,6 +29,8 @@ pub(crate) struct Start {
     pub(crate) drifts: Vec<ViewDrift>,
     /// Line of `observations.csv` of each station and target; empty where targets are not what is calibrated from.
     pub(crate) lines: BTreeMap<(String, String), usize>,
+    /// Whether the camera gives light alone, so that there is no range model to write.
+    pub(crate) light_alone: bool,
     /// The survey's description.
     pub(crate) survey_file: PathBuf,
     /// What it says of camera and conditions.
@@ -66,16 +68,24 @@ impl Start {
             words,
             drifts: Vec::new(),
             lines: BTreeMap::new(),
+            light_alone: survey.level == Level::Intensity,
             survey_file: root.join(Survey::FILE_NAME),
             conditions: Conditions::of(survey),
         })
     }
 }
 
+/// Stands for the frequency of light that is not modulated.
+const NO_FREQUENCY_HZ: f64 = 1.0;
+
 /// The ranges of a table belong to one frequency: with several it would not be known to which.
 fn only_modulation(survey: &Survey, root: &Path) -> Result<Modulation> {
     match survey.camera.modulations()?.as_slice() {
         [modulation] => Ok(*modulation),
+        // Without ranges there are no range terms, and their frequency stands for nothing.
+        [] if survey.level == Level::Intensity => {
+            Modulation::new(NO_FREQUENCY_HZ).map_err(|error| Error::Camera(error.to_string()))
+        }
         several => Err(Error::Survey {
             path: root.join(Survey::FILE_NAME),
             message: format!(

@@ -1,0 +1,91 @@
+//! What a sequence is estimated from, and what comes out.
+
+use adjust::SolveOptions;
+use nalgebra::{Isometry3, Matrix3, Matrix6, Vector3};
+use rigid_pose::Uncertain;
+
+use crate::noise::{Biases, ImuNoise};
+
+/// A pose of the camera from a registration, from tracking or from targets.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CameraPose {
+    /// Time, second.
+    pub time_s: f64,
+    /// `world_from_camera` with its covariance in the tangent `[dt, dθ]`. Errors of different poses are taken as independent.
+    pub pose: Uncertain,
+}
+
+/// How the unit sits on the camera.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Mounting {
+    /// Pose of the unit's axes in the camera's frame.
+    Known(Isometry3<f64>),
+    /// Its translation is known; its rotation is found, wherever it starts.
+    UnknownRotation {
+        /// Position of the unit in the camera's frame, metre.
+        lever_arm: Vector3<f64>,
+    },
+}
+
+/// How to estimate a sequence.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SequenceOptions {
+    /// The unit. Default: [`ImuNoise::default`].
+    pub noise: ImuNoise,
+    /// The mounting. Default: the unit's axes are those of the camera's photogrammetric frame (x right, y up, looking along −z).
+    pub mounting: Mounting,
+    /// Length of gravity, m/s². Default 9.80665.
+    pub gravity_m_s2: f64,
+    /// Its standard deviation, m/s². Default 0.02: what it differs by from the poles to the equator.
+    pub gravity_sigma_m_s2: f64,
+    /// Options of the adjustment. Default: that of [`SolveOptions`].
+    pub solve: SolveOptions,
+}
+
+impl Default for SequenceOptions {
+    fn default() -> Self {
+        Self {
+            noise: ImuNoise::default(),
+            mounting: Mounting::Known(Isometry3::identity()),
+            gravity_m_s2: 9.80665,
+            gravity_sigma_m_s2: 0.02,
+            solve: SolveOptions::default(),
+        }
+    }
+}
+
+/// The state at one camera pose; covariances are prior-scaled.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SequenceState {
+    /// Time, second.
+    pub time_s: f64,
+    /// The adjusted pose of the camera.
+    pub world_from_camera: Uncertain,
+    /// Velocity of the unit, world axes, m/s.
+    pub velocity: Vector3<f64>,
+    /// Its covariance.
+    pub velocity_covariance: Matrix3<f64>,
+    /// Biases.
+    pub biases: Biases,
+    /// Covariance of `[gyro, accel]`.
+    pub bias_covariance: Matrix6<f64>,
+}
+
+/// A sequence that camera and unit agree on.
+#[derive(Debug, Clone, PartialEq)]
+pub struct InertialSequence {
+    /// States at the camera's poses.
+    pub states: Vec<SequenceState>,
+    /// Gravity, world axes, m/s².
+    pub gravity: Vector3<f64>,
+    /// Its covariance.
+    pub gravity_covariance: Matrix3<f64>,
+    /// Pose of the unit's axes in the camera's frame; the covariance is that of the rotation where it was found, else zero.
+    pub camera_from_body: Uncertain,
+    /// Intervals (k lies between poses k and k + 1) whose samples contradict the camera and took no part, ascending.
+    pub contradicting: Vec<usize>,
+    /// Observations minus unknowns.
+    pub redundancy: i64,
+    /// Posterior standard deviation of unit weight; `None` without redundancy.
+    pub sigma0: Option<f64>,
+}

@@ -1,0 +1,8 @@
+//! Stations, views, networks and mountings against the truth. Measured figures are shown with `--show-output`.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stderr)]
+
+mod common;
+mod mounting;
+mod network;
+mod resection;
+mod two_views;

@@ -1,0 +1,7 @@
+//! Corners by maximum likelihood: two blurred edges that cross, fitted to the values of the pixels.
+
+mod crossing;
+mod fit;
+pub(crate) mod normal_table;
+pub(crate) mod refine;
+mod window;

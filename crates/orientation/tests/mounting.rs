@@ -267,11 +267,14 @@ fn what_is_mixed_up_is_refused() {
 /// Between the circles, metre: 25.4 mm as they were meant, 2.3 % less as the wrist shows them.
 const SPACING: f64 = 0.0254 * 0.977;
 
+/// Poses of the wrist and of the camera, the camera, and what it saw in each image.
+type Robot = ([Vec<TimedPose>; 2], Camera, Vec<Vec<TargetObservation>>);
+
 /// Wrist and camera of the eight images; nothing where the capture is not at hand.
-fn robot() -> Option<([Vec<TimedPose>; 2], Camera, Vec<Vec<TargetObservation>>)> {
+fn robot() -> Option<Robot> {
     let poses = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/real/circle_grid_robot/poses"));
     if !poses.exists() {
-        println!("{} is not here, skipped", poses.display());
+        eprintln!("{} is not here, skipped", poses.display());
         return None;
     }
     let text = include_str!("data/circle_grid_robot.csv");

@@ -92,12 +92,20 @@ impl Pictures {
         let stages = to_ranges(self.survey.level, restores);
         let plan = Plan { name: "targets".to_owned(), source: None, calibrate: None, stages };
         let mut keep = |view: View, survey: &OpenSurvey| {
-            let ViewData::Range(frame) = view.data else {
+            let ViewData::Range(frame) = &view.data else {
                 return Err(Error::Needs { stage: "targets", needs: "Unwrap" });
             };
-            let (station, integration_time_s) = (view.station, view.integration_time_s);
             let light = frame.amplitude.clone();
-            let ranges = Some((frame, survey.best_camera()));
+            if light.as_slice().iter().all(|value| value.is_nan()) {
+                let name = view.name();
+                return Err(Error::unfit(
+                    "targets",
+                    &name,
+                    "its frames have no amplitudes, and targets are seen by light",
+                ));
+            }
+            let (station, integration_time_s) = (view.station.clone(), view.integration_time_s);
+            let ranges = Some((frame.clone(), survey.best_camera()));
             take(Picture { station, light, ranges, integration_time_s })
         };
         // The path names the folder or its survey.ron: the stages read either.

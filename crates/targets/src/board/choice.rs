@@ -12,7 +12,8 @@ use super::sides::sides;
 use crate::error::NotFound;
 use crate::grid::lattice::Node;
 
-/// Boards with fields smaller than this part of the largest's do not count beside it: a picture of the board on a screen.
+/// Boards with fields smaller than this part of another's do not count beside it, be that of the size asked for or not: a
+/// picture of the board on a screen.
 const RIVAL: f64 = 0.5;
 
 /// A lattice, and how it may lie on the board.
@@ -90,7 +91,9 @@ pub(crate) fn choose(
     needed: usize,
     board: &Checkerboard,
 ) -> Result<Laid, NotFound> {
-    let settled = |laid: &Laid| laid.places(board) == 1 && laid.count() >= needed;
+    let largest_px = laid.iter().filter(|laid| laid.count() >= needed).map(Laid::field_px).fold(0.0, f64::max);
+    let settled =
+        |laid: &Laid| laid.places(board) == 1 && laid.count() >= needed && laid.field_px() > RIVAL * largest_px;
     let is_whole = |laid: &Laid| settled(laid) && laid.is_whole(board);
     let any_whole = laid.iter().any(is_whole);
     let is_candidate = |laid: &Laid| if any_whole { is_whole(laid) } else { settled(laid) };
@@ -102,7 +105,7 @@ pub(crate) fn choose(
     let labels = laid[best].labels();
     let is_rival = |&k: &usize| {
         // Parts of one board, on both sides of what hides the middle, have no node in common.
-        k != best && laid[k].field_px() > RIVAL * laid[best].field_px() && !laid[k].labels().is_disjoint(&labels)
+        k != best && !laid[k].labels().is_disjoint(&labels)
     };
     match candidates.iter().filter(|k| is_rival(k)).count() {
         0 => Ok(laid.swap_remove(best)),

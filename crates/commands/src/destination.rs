@@ -20,7 +20,8 @@ pub struct Inputs(BTreeSet<PathBuf>);
 impl Inputs {
     /// A survey: its folder with the calibration in it, and what it names outside of it.
     pub fn survey(mut self, path: &Path) -> Self {
-        let root = root_of(path);
+        // Of what is not there the command itself says so; its parent is not read.
+        let root = if path.exists() { root_of(path) } else { path.to_owned() };
         self.0.insert(root.join(Calibration::FILE_NAME));
         // Of what can't be read the command itself says why.
         if let Ok(survey) = Survey::read(path) {

@@ -5,18 +5,9 @@
 mod alone;
 mod bench;
 mod benchmarks;
-mod circles;
-mod dependencies;
-mod factorisations;
 mod fixtures;
-mod fuzz;
-mod house;
-mod memory;
-mod nightly;
-mod options;
 mod peers;
 mod pipeline_task;
-mod sensitivity;
 mod shell;
 mod test;
 mod tidy;
@@ -45,11 +36,11 @@ enum Task {
     /// Long statistics, with the figures that docs/benchmarks.md states: `cargo xtask verify flags`.
     Verify(verify::Arguments),
     /// What a statistic says where constants are other ones: `cargo xtask sensitivity organised/search`.
-    Sensitivity(sensitivity::Arguments),
+    Sensitivity(verify::sensitivity::Arguments),
     /// Damaged files of every format against the readers, for some seconds.
-    Fuzz(fuzz::Arguments),
+    Fuzz(verify::fuzz::Arguments),
     /// An hour of damaged files, property tests with fresh cases, the long statistics, and cargo deny.
-    Nightly(nightly::Arguments),
+    Nightly(verify::nightly::Arguments),
     /// Run the benchmarks of all crates, or of those named; keep a run, or compare with one.
     Bench(bench::Arguments),
     /// Run statistics and write their tables into docs/benchmarks.md.
@@ -65,9 +56,9 @@ fn main() -> ExitCode {
         Task::Alone => alone::run(),
         Task::Peers(arguments) => peers::run(&arguments),
         Task::Verify(arguments) => verify::run(&arguments),
-        Task::Sensitivity(arguments) => sensitivity::run(&arguments),
-        Task::Fuzz(arguments) => fuzz::run(&arguments),
-        Task::Nightly(arguments) => nightly::run(&arguments),
+        Task::Sensitivity(arguments) => verify::sensitivity::run(&arguments),
+        Task::Fuzz(arguments) => verify::fuzz::run(&arguments),
+        Task::Nightly(arguments) => verify::nightly::run(&arguments),
         Task::Bench(arguments) => bench::run(&arguments),
         Task::Benchmarks(arguments) => benchmarks::run(&arguments),
     };

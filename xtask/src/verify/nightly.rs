@@ -6,7 +6,8 @@ use std::process::Command;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use crate::shell::{Outcome, cargo, root};
-use crate::{dependencies, fuzz, verify};
+use crate::tidy::dependencies;
+use crate::verify::{self, fuzz};
 
 /// What to run, and how long.
 #[derive(Debug, clap::Args)]

@@ -118,13 +118,13 @@ pub(crate) fn complaints(root: &Path, sources: &[(String, String)]) -> Vec<Strin
         let factorises = lines.into_iter().any(|line| WAYS.iter().any(|way| line.contains(way)));
         if factorises && !is_engine && !file.ends_with("tests.rs") && !known.iter().any(|(name, _)| *name == file) {
             found.push(format!(
-                "{path}: factorises a matrix; let `adjust` do it, or say in xtask/src/factorisations.rs what for"
+                "{path}: factorises a matrix; let `adjust` do it, or say in xtask/src/tidy/factorisations.rs what for"
             ));
         }
     }
     for (name, use_) in known {
         if !root.join("crates").join(name).exists() {
-            found.push(format!("xtask/src/factorisations.rs: there is no crates/{name} any more ({use_:?})"));
+            found.push(format!("xtask/src/tidy/factorisations.rs: there is no crates/{name} any more ({use_:?})"));
         }
     }
     found

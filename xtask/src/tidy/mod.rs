@@ -1,14 +1,15 @@
 //! `cargo xtask tidy`: checks of the repository itself.
 
+mod circles;
+pub(crate) mod dependencies;
+mod factorisations;
+mod house;
+mod options;
+
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use crate::benchmarks;
-use crate::circles;
-use crate::dependencies;
-use crate::factorisations;
-use crate::house;
-use crate::options;
 use crate::shell::{Outcome, root};
 
 /// A file of source code holds one idea; beyond this it holds several.

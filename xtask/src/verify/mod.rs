@@ -1,7 +1,11 @@
 //! `cargo xtask verify [NAME ...]`: long statistics, each an example of its crate that prints its figures and fails where
 //! they leave their bounds; and `memory`, which runs the command on long surveys. What `docs/benchmarks.md` states of them comes from here.
 
-use crate::memory;
+pub(crate) mod fuzz;
+pub(crate) mod memory;
+pub(crate) mod nightly;
+pub(crate) mod sensitivity;
+
 use crate::shell::{Outcome, cargo};
 
 /// Name, package and example of each statistic.

@@ -196,7 +196,7 @@ fn require_task(place: &str, line: &str, words: &[String]) {
     let there = match task.as_str() {
         "pipeline" => root().join("fixtures/pipelines").join(name).with_extension("ron").is_file(),
         "peers" | "verify" => {
-            let sources = ["peers", "verify.rs"].map(|part| root().join("xtask/src").join(part));
+            let sources = ["peers", "verify/mod.rs"].map(|part| root().join("xtask/src").join(part));
             let files = std::fs::read_dir(&sources[0]).unwrap().map(|entry| entry.unwrap().path());
             let mut texts = files.chain([sources[1].clone()]).filter_map(|file| std::fs::read_to_string(file).ok());
             texts.any(|text| text.contains(&format!("\"{name}\"")))

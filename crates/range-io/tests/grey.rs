@@ -87,7 +87,8 @@ fn jpegs_are_read_grey_and_in_colour() {
 fn files_that_are_no_images_are_refused_with_their_name() {
     let whole = bytes(GREY_JPEG);
     let png = png(ColorType::Grayscale, BitDepth::Eight, [40, 40], &[3; 1600], &[]);
-    let wrong: [&[u8]; 5] = [b"", b"no image", &whole[..40], &png[..60], &[0xff, 0xd8, 0xff]];
+    let scan_cut = &whole[..whole.len() - 6];
+    let wrong: [&[u8]; 6] = [b"", b"no image", &whole[..40], scan_cut, &png[..60], &[0xff, 0xd8, 0xff]];
     for content in wrong {
         let message = read(content).unwrap_err().to_string();
         assert!(message.contains("image: is no complete"), "{message}");

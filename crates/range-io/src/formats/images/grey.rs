@@ -16,6 +16,10 @@ use crate::{Error, Result};
 /// First bytes of a JPEG.
 const JPEG: [u8; 3] = [0xff, 0xd8, 0xff];
 
+/// Markers of a JPEG: its scans begin, and it ends. Within the data of a scan neither can occur.
+const SCAN: u8 = 0xda;
+const END: u8 = 0xd9;
+
 /// Bytes of a JPEG that is read: four for each pixel that an image may have.
 const LONGEST_JPEG: u64 = 4 * MOST_PIXELS as u64;
 
@@ -44,12 +48,18 @@ pub fn read(path: impl AsRef<Path>) -> Result<Raster<f32>> {
 fn read_jpeg(path: &Path) -> Result<Raster<f32>> {
     let bytes = crate::read_bytes(path, LONGEST_JPEG)?;
     let failed = |error: zune_jpeg::errors::DecodeErrors| Error::format(path, format!("is no complete JPEG: {error}"));
-    let mut decoder = JpegDecoder::new_with_options(Cursor::new(bytes), DecoderOptions::default());
+    // Of a file that ends too early nothing is made up: the last scan needs its end, too.
+    let after = |bytes: &[u8], marker: u8| bytes.windows(2).rposition(|pair| pair == [0xff, marker]);
+    if after(&bytes, SCAN).is_none_or(|scan| after(&bytes[scan..], END).is_none()) {
+        return Err(Error::format(path, "is no complete JPEG: the end of the image is missing"));
+    }
+    let options = DecoderOptions::default().set_strict_mode(true);
+    let mut decoder = JpegDecoder::new_with_options(Cursor::new(bytes), options);
     decoder.decode_headers().map_err(failed)?;
     let (width, height) = decoder.dimensions().unwrap_or_default();
     require_size(path, [width, height])?;
     // Of colours only the light is decoded: it is what a JPEG stores by itself.
-    decoder.set_options(DecoderOptions::default().jpeg_set_out_colorspace(ColorSpace::Luma));
+    decoder.set_options(options.jpeg_set_out_colorspace(ColorSpace::Luma));
     let values = decoder.decode().map_err(failed)?;
     raster(path, [width, height], values.into_iter().map(f32::from).collect())
 }

@@ -6,6 +6,7 @@ mod compare;
 mod documented_commands;
 mod exit_codes;
 mod explain;
+mod from_boards_to_a_room;
 mod hostile;
 mod inputs_are_kept;
 mod noise;

@@ -39,8 +39,10 @@ pub enum TermSelection {
 /// What carries the datum.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum NetworkDatum {
-    /// Inner constraints on the object points (Eq. 22).
+    /// Weighted control where there is any, inner constraints otherwise.
     #[default]
+    Given,
+    /// Inner constraints on the object points (Eq. 22); control is refused.
     Free,
     /// Weighted control: targets or stations with given standard deviations.
     Control,
@@ -53,7 +55,7 @@ pub struct CalibrationOptions {
     pub method: Method,
     /// Terms. Default: [`TermSelection::Auto`].
     pub terms: TermSelection,
-    /// Datum. Default: [`NetworkDatum::Free`].
+    /// Datum. Default: [`NetworkDatum::Given`].
     pub datum: NetworkDatum,
     /// Stations whose ranges are left out, by name (convergent ones, whose ranges scattering would bias). Default:
     /// empty.
@@ -85,7 +87,7 @@ impl Default for CalibrationOptions {
         Self {
             method: Method::OneStep,
             terms: TermSelection::Auto,
-            datum: NetworkDatum::Free,
+            datum: NetworkDatum::Given,
             without_ranges: Vec::new(),
             rejection_level: Some(1e-4),
             // Networks of stations at many distances stay below 100, with the wave of length U below 250; twelve stations
@@ -130,18 +132,24 @@ pub(crate) fn ranged_stations(network: &Network, options: &CalibrationOptions) -
     network.stations.iter().map(|station| !options.without_ranges.contains(&station.name)).collect()
 }
 
+/// Control that a message names.
+const NAMED: usize = 4;
+
 /// The datum asked for, where the network agrees.
 pub(crate) fn datum(network: &Network, options: &CalibrationOptions) -> Result<Datum> {
     let targets = network.targets.iter().filter(|target| target.covariance.is_some()).map(|target| &target.name);
     let stations = network.stations.iter().filter(|station| station.covariance.is_some()).map(|station| &station.name);
     let control: Vec<&str> = targets.chain(stations).map(String::as_str).collect();
     match options.datum {
-        NetworkDatum::Free if control.is_empty() => Ok(Datum::Inner),
+        NetworkDatum::Free | NetworkDatum::Given if control.is_empty() => Ok(Datum::Inner),
         NetworkDatum::Free => Err(NetworkError::Datum {
             reason: format!(
                 "a free network takes its datum from inner constraints, but {} {} standard deviations as control; \
                  ask for the datum `control`, or leave the standard deviations out",
-                control.join(", "),
+                match control.as_slice() {
+                    few if few.len() <= NAMED => few.join(", "),
+                    many => format!("{} and {} others", many[..NAMED].join(", "), many.len() - NAMED),
+                },
                 if control.len() == 1 { "has" } else { "have" },
             ),
         }
@@ -150,7 +158,7 @@ pub(crate) fn datum(network: &Network, options: &CalibrationOptions) -> Result<D
             reason: "control was asked for, but no target and no station has standard deviations".to_owned(),
         }
         .into()),
-        NetworkDatum::Control => Ok(Datum::Control),
+        NetworkDatum::Control | NetworkDatum::Given => Ok(Datum::Control),
     }
 }
 

@@ -28,5 +28,5 @@ pub use print::{PaperSize, print_checkerboard, print_circle_grid, print_coded};
 pub use range_image;
 pub use sightings::image_point::{BoardSighting, ImagePoint, NodePoint};
 pub use sightings::principal_distance::principal_distance_px;
-pub use sightings::target_range::{TargetRange, target_range};
+pub use sightings::target_range::{DarkRange, TargetRange, target_range};
 pub use spheres::{SphereOptions, SphereSighting, find_spheres};

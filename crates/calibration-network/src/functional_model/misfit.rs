@@ -113,13 +113,15 @@ impl Scales {
 }
 
 /// Negative logarithm of the likelihood of residuals, up to a constant, where errors have the long tails of Cauchy's
-/// kernel: comparable between explanations of the same number of values.
-pub fn implausibility<'m>(misfits: impl Iterator<Item = &'m Misfit>) -> f64 {
+/// kernel and the standard deviations are `scales` times those stated: comparable between explanations of the same number of values.
+pub fn implausibility<'m>(misfits: impl Iterator<Item = &'m Misfit>, scales: Scales) -> f64 {
     let cost = |size: f64| {
         let square = (size * size).min(LARGEST_SQUARE);
         0.5 * CAUCHY * CAUCHY * (square / (CAUCHY * CAUCHY)).ln_1p()
     };
-    misfits.flat_map(|misfit| [misfit.image, misfit.range]).flatten().map(cost).sum()
+    let scaled =
+        |misfit: &Misfit| [misfit.image.map(|size| size / scales.image), misfit.range.map(|size| size / scales.range)];
+    misfits.flat_map(scaled).flatten().map(cost).sum()
 }
 
 impl Setup<'_> {

@@ -15,6 +15,10 @@ pub(crate) struct Alternative {
 /// Units that are met instead of metres, and how many of them make one.
 const UNITS: [(&str, f64); 2] = [("millimetres", 1e3), ("centimetres", 1e2)];
 
+/// Share of a table's extent up to which the deviations of its coordinates can be: beyond, they are of the coordinates' unit. A field
+/// of targets is measured to 1e-3 of its extent and better; in another unit deviations are 10 and more times its extent.
+const LARGEST_DEVIATION: f64 = 0.03;
+
 /// Stands for a range that would be negative, metre.
 const SHORTEST: f64 = 1e-3;
 
@@ -119,11 +123,11 @@ pub(crate) fn of_tables(network: &Network) -> Vec<Alternative> {
             "mend `principal_distance_mm` or `pixel_pitch_mm` of the camera in survey.ron, or of calibration.ron";
         out.push(Alternative { kind: CauseKind::PrincipalDistanceUnit, words, remedy, network: other });
     }
-    let given = network.targets.iter().any(|target| target.point.is_some());
-    if !given {
+    if network.targets.iter().all(|target| target.point.is_none()) {
         return out;
     }
-    let mut add = |kind, words: String, axes: [usize; 3], factors: [f64; 3]| {
+    let [extent, deviation] = extent_and_deviation(network);
+    let mut add = |kind, words: String, axes: [usize; 3], factors: [f64; 3], of_deviations: f64| {
         let mut other = network.clone();
         for target in &mut other.targets {
             if let Some(point) = &mut target.point {
@@ -133,7 +137,7 @@ pub(crate) fn of_tables(network: &Network) -> Vec<Alternative> {
             if let Some(covariance) = &mut target.covariance {
                 let old = *covariance;
                 *covariance = nalgebra::Matrix3::from_fn(|i, j| {
-                    factors[i].signum() * factors[j].signum() * old[(axes[i], axes[j])]
+                    of_deviations.powi(2) * factors[i].signum() * factors[j].signum() * old[(axes[i], axes[j])]
                 });
             }
         }
@@ -142,17 +146,27 @@ pub(crate) fn of_tables(network: &Network) -> Vec<Alternative> {
     };
     for (unit, factor) in UNITS {
         let words = format!("the targets fit if their coordinates are {unit} instead of metres");
-        add(CauseKind::CoordinateUnit, words, [0, 1, 2], [1.0 / factor; 3]);
+        // Deviations may be in metres all the same; free of them, targets would fit anything.
+        let is_small = deviation <= LARGEST_DEVIATION * extent / factor;
+        add(CauseKind::CoordinateUnit, words, [0, 1, 2], [1.0 / factor; 3], if is_small { 1.0 } else { 1.0 / factor });
     }
     for (names, axes) in [("x and y", [1, 0, 2]), ("y and z", [0, 2, 1]), ("x and z", [2, 1, 0])] {
         let words = format!("the targets fit if their {names} are exchanged: the coordinates are mirrored");
-        add(CauseKind::CoordinateAxes, words, axes, [1.0; 3]);
+        add(CauseKind::CoordinateAxes, words, axes, [1.0; 3], 1.0);
     }
     for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
         let mut factors = [1.0; 3];
         factors[axis] = -1.0;
         let words = format!("the targets fit if {name} has the other sign: the coordinates are mirrored");
-        add(CauseKind::CoordinateAxes, words, [0, 1, 2], factors);
+        add(CauseKind::CoordinateAxes, words, [0, 1, 2], factors, 1.0);
     }
     out
+}
+
+/// Distance of the outermost target from the first, and the largest deviation of a coordinate, metre.
+fn extent_and_deviation(network: &Network) -> [f64; 2] {
+    let points = || network.targets.iter().filter_map(|target| target.point);
+    let extent = points().next().map_or(0.0, |first| points().map(|point| (point - first).norm()).fold(0.0, f64::max));
+    let covariances = network.targets.iter().filter_map(|target| target.covariance);
+    [extent, covariances.map(|covariance| covariance.diagonal().max()).fold(0.0, f64::max).sqrt()]
 }

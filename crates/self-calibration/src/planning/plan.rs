@@ -36,7 +36,7 @@ pub struct PlanOptions {
     /// Terms to be estimated; automatic stands for all but the wave of length U and the amplitude hyperbola. Default:
     /// [`TermSelection::Auto`].
     pub terms: TermSelection,
-    /// Datum. Default: [`NetworkDatum::Free`].
+    /// Datum. Default: [`NetworkDatum::Given`].
     pub datum: NetworkDatum,
     /// Stations whose ranges are left out, by name. Default: empty.
     pub without_ranges: Vec<String>,
@@ -73,7 +73,7 @@ impl Default for PlanOptions {
             sigma_range_m: 0.010,
             sigma_passive_pixel: 0.2,
             terms: TermSelection::Auto,
-            datum: NetworkDatum::Free,
+            datum: NetworkDatum::Given,
             without_ranges: Vec::new(),
             largest_inflation: calibration.largest_inflation,
             candidates: CandidateGrid::default(),

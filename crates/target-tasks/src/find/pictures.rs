@@ -23,6 +23,8 @@ pub(crate) struct Picture {
     pub(crate) light: Raster<f32>,
     /// Unwrapped and uncorrected.
     pub(crate) ranges: Option<(RangeFrame, Camera)>,
+    /// Whether scattered light was taken off.
+    pub(crate) is_restored: bool,
     pub(crate) integration_time_s: Option<f64>,
 }
 
@@ -106,7 +108,7 @@ impl Pictures {
             }
             let (station, integration_time_s) = (view.station.clone(), view.integration_time_s);
             let ranges = Some((frame.clone(), survey.best_camera()));
-            take(Picture { station, light, ranges, integration_time_s })
+            take(Picture { station, light, ranges, is_restored: restores, integration_time_s })
         };
         // The path names the folder or its survey.ron: the stages read either.
         process_each(&plan, &self.root, known, &mut keep, &Silent)?;
@@ -136,7 +138,7 @@ impl Pictures {
             let Some(sum) = light else { continue };
             let light = sum.map(|value| value / indices.len() as f32);
             let integration_time_s = self.survey.frames[indices[0]].integration_time_s;
-            take(Picture { station: station.to_owned(), light, ranges: None, integration_time_s })?;
+            take(Picture { station: station.to_owned(), light, ranges: None, is_restored: false, integration_time_s })?;
         }
         Ok(())
     }

@@ -4,7 +4,7 @@ use nalgebra::Vector2;
 use pipeline::Result;
 use range_image::Raster;
 use range_io::tables::TargetObservation;
-use targets::{BoardSighting, NodePoint, NotFound, TargetRange, target_range};
+use targets::{BoardSighting, DarkRange, NodePoint, NotFound, TargetRange, target_range};
 
 use crate::find::pictures::Picture;
 use crate::kind::TargetKind;
@@ -58,7 +58,7 @@ impl Sighting {
 
 fn observations(board: &BoardSighting, picture: &Picture) -> Vec<TargetObservation> {
     let ranges = ranges(board, picture);
-    let row = |(seen, range): (&NodePoint, Option<TargetRange>)| {
+    let row = |(seen, range): (&NodePoint, Option<PartRange>)| {
         let variance = |axis: usize| seen.point.covariance[(axis, axis)];
         TargetObservation {
             station: picture.station.clone(),
@@ -74,29 +74,52 @@ fn observations(board: &BoardSighting, picture: &Picture) -> Vec<TargetObservati
     board.nodes.iter().zip(ranges).map(row).collect()
 }
 
-/// The range of each node that has one. Their deviations hold what the surroundings do to them beside the noise: surroundings
-/// of half the area bend half as much, so that twice the difference is what the bend of the whole does, in the mean over a
-/// board.
-fn ranges(board: &BoardSighting, picture: &Picture) -> Vec<Option<TargetRange>> {
+/// The range of a target as one part of its surroundings shows it.
+#[derive(Clone, Copy)]
+struct PartRange {
+    range_m: f64,
+    sigma_m: f64,
+    amplitude: f64,
+}
+
+impl PartRange {
+    fn of(found: TargetRange, takes_dark: bool) -> Self {
+        let TargetRange { range_m, sigma_m, amplitude, dark, .. } = found;
+        match dark.filter(|_| takes_dark) {
+            Some(DarkRange { range_m, sigma_m, amplitude }) => Self { range_m, sigma_m, amplitude },
+            None => Self { range_m, sigma_m, amplitude },
+        }
+    }
+}
+
+/// The range of each node that has one: on its bright part, and of every other node on its dark part where
+/// scattered light was taken off, which falls on dark parts from bright ones and shifts their ranges. Bright and dark at one
+/// distance tell range errors by amplitude from errors by distance; bright parts alone are the darker the farther they are.
+///
+/// Deviations hold what the surroundings do to ranges beside the noise: surroundings of half the area bend half as much, so that
+/// twice the difference is what the bend of the whole does, in the mean over a board.
+fn ranges(board: &BoardSighting, picture: &Picture) -> Vec<Option<PartRange>> {
     let Some((frame, camera)) = &picture.ranges else { return vec![None; board.nodes.len()] };
     let within = |index: usize, share: f64| {
         let radius = (SURROUNDINGS * spacing_px(board, index)).max(LEAST_RADIUS_PX);
-        let range = target_range(frame, camera, board.nodes[index].point.pixel, radius * share.sqrt()).ok();
-        range.filter(|range| range.sigma_m > 0.0)
+        target_range(frame, camera, board.nodes[index].point.pixel, radius * share.sqrt()).ok()
     };
-    // A node without a range is an image point all the same.
-    let mut ranges: Vec<_> = (0..board.nodes.len()).map(|index| within(index, 1.0)).collect();
-    let bends = ranges.iter().enumerate().filter_map(|(index, whole)| {
+    let found: Vec<_> = (0..board.nodes.len()).map(|index| within(index, 1.0)).collect();
+    let bends = found.iter().enumerate().filter_map(|(index, whole)| {
         let (whole, half) = ((*whole)?, within(index, 0.5)?);
         let by_chance = (half.sigma_m.powi(2) - whole.sigma_m.powi(2)).max(0.0);
         Some(4.0 * ((half.range_m - whole.range_m).powi(2) - by_chance))
     });
     let (count, sum) = bends.fold((0.0, 0.0), |(count, sum), bend| (count + 1.0, sum + bend));
     let bend: f64 = if count > 0.0 { (sum / count).max(0.0) } else { 0.0 };
-    for range in ranges.iter_mut().flatten() {
+    let part = |(seen, found): (&NodePoint, &Option<TargetRange>)| {
+        let takes_dark = picture.is_restored && (seen.node[0] + seen.node[1]) % 2 == 1;
+        let mut range = PartRange::of((*found)?, takes_dark);
         range.sigma_m = (range.sigma_m.powi(2) + bend).sqrt();
-    }
-    ranges
+        // A node without a range is an image point all the same.
+        (range.sigma_m > 0.0).then_some(range)
+    };
+    board.nodes.iter().zip(&found).map(part).collect()
 }
 
 /// Distance of a node from its nearest neighbour in the image.

@@ -26,8 +26,12 @@ const FAR: f64 = 3.5;
 /// is a tenth of what a surface of half the light would show.
 const LEAST_DARKNESS: f64 = 0.1;
 
-/// The share of the pixels' amplitudes below that of the bright surface, from the brightest down.
+/// The share of the pixels' amplitudes below that of the bright surface.
 const BRIGHT: f64 = 0.9;
+
+/// The same for the dark surface. Pixels that see both lie on the line between the two, so that the choice does not matter
+/// as long as it falls on the dark ones: discs of 0.3 spacings leave 0.5 of their surroundings to the ground.
+const DARK: f64 = 0.1;
 
 /// The range of a target with what it was read from.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -39,8 +43,21 @@ pub struct TargetRange {
     pub sigma_m: f64,
     /// Amplitude of the bright parts, in the camera's unit; NaN where the frame has none.
     pub amplitude: f64,
+    /// The same as the camera shows it on the dark parts; `None` where the surroundings are of one brightness.
+    pub dark: Option<DarkRange>,
     /// Pixels that it rests on.
     pub pixels: usize,
+}
+
+/// The range of a target as the camera shows it on the dark parts of its surroundings.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DarkRange {
+    /// As [`TargetRange::range_m`].
+    pub range_m: f64,
+    /// As [`TargetRange::sigma_m`].
+    pub sigma_m: f64,
+    /// Amplitude of the dark parts, in the camera's unit.
+    pub amplitude: f64,
 }
 
 /// One pixel of the surroundings.
@@ -57,7 +74,7 @@ struct Sample {
 /// Along a plane the inverse range is linear in the direction of the ray. Dark parts show other ranges than bright ones
 /// (Eq. 15, and light scattered from the bright ones onto them), and so do pixels that see both; either grows with the
 /// inverse amplitude, which takes part as a fourth unknown where the surroundings have bright and dark parts. The range
-/// is that of the bright ones. Pixels beyond 3.5 robust standard deviations, flagged without data or saturated, are left
+/// is that of the bright ones, with that of the dark ones beside it. Pixels beyond 3.5 robust standard deviations, flagged without data or saturated, are left
 /// out.
 ///
 /// # Errors
@@ -84,7 +101,8 @@ pub fn target_range(frame: &RangeFrame, camera: &Camera, pixel: [f64; 2], radius
     if has_amplitudes {
         places.retain(is_lit);
     }
-    let bright = quantile(&mut places.iter().map(amplitude).collect::<Vec<_>>(), BRIGHT);
+    let [dark, bright] =
+        [DARK, BRIGHT].map(|share| quantile(&mut places.iter().map(amplitude).collect::<Vec<_>>(), share));
     let ray = camera.ray(pixel);
     let axes = axes(&ray);
     let sample = |place: &[usize; 2]| {
@@ -108,13 +126,16 @@ pub fn target_range(frame: &RangeFrame, camera: &Camera, pixel: [f64; 2], radius
         }
     };
     let samples: Vec<Sample> = places.iter().map(sample).collect();
-    let no_range = NotFound::NoRange { pixels: samples.len(), needed: NEEDED };
-    let fit = Fit::robust(samples).ok_or(no_range)?;
+    let no_range = || NotFound::NoRange { pixels: places.len(), needed: NEEDED };
+    let plane = robust(samples).ok_or_else(no_range)?;
+    let (range_m, sigma_m) = plane.range_at(0.0).ok_or_else(no_range)?;
+    let on_dark = plane.tells_darkness.then(|| plane.range_at(bright / dark - 1.0)).flatten();
     Ok(TargetRange {
-        range_m: fit.inverse_range.recip(),
-        sigma_m: fit.sigma / (fit.inverse_range * fit.inverse_range),
+        range_m,
+        sigma_m,
         amplitude: if has_amplitudes { bright } else { f64::NAN },
-        pixels: fit.pixels,
+        dark: on_dark.map(|(range_m, sigma_m)| DarkRange { range_m, sigma_m, amplitude: dark }),
+        pixels: plane.pixels,
     })
 }
 
@@ -145,36 +166,26 @@ fn surroundings(frame: &RangeFrame, [col, row]: [f64; 2], radius: f64) -> Vec<[u
     places
 }
 
-struct Fit {
-    inverse_range: f64,
-    sigma: f64,
-    pixels: usize,
-}
-
-impl Fit {
-    /// Least squares over what lies on the plane; `None` where too little does. The plane grows from the target outwards,
-    /// since next to it nothing but the target is seen; what lies beside the target would tilt a plane through all.
-    fn robust(mut samples: Vec<Sample>) -> Option<Self> {
-        let darkness = || samples.iter().map(|sample| sample.row[3]).collect::<Vec<f64>>();
-        let spread = quantile(&mut darkness(), 0.9) - quantile(&mut darkness(), 0.1);
-        if spread.is_nan() || spread < LEAST_DARKNESS {
-            for sample in &mut samples {
-                sample.row[3] = 0.0;
-            }
+/// Least squares over what lies on the plane; `None` where too little does. The plane grows from the target outwards, since
+/// next to it nothing but the target is seen; what lies beside the target would tilt a plane through all.
+fn robust(mut samples: Vec<Sample>) -> Option<Plane> {
+    let darkness = || samples.iter().map(|sample| sample.row[3]).collect::<Vec<f64>>();
+    let spread = quantile(&mut darkness(), 0.9) - quantile(&mut darkness(), 0.1);
+    if spread.is_nan() || spread < LEAST_DARKNESS {
+        for sample in &mut samples {
+            sample.row[3] = 0.0;
         }
-        samples.sort_by(|a, b| a.distance.total_cmp(&b.distance));
-        let all = samples.len();
-        let mut plane = Plane::through(samples.iter().take((all / 4).max(2 * NEEDED)))?;
-        for share in GROWTH {
-            let reach = (all / 4).max(2 * NEEDED).max((share * all as f64) as usize);
-            let mut sizes: Vec<f64> = plane.residuals(samples.iter().take(reach / 2)).collect();
-            let scale = SIGMA_OF_MAD * quantile(&mut sizes, 0.5);
-            plane = Plane::through(samples.iter().take(reach).filter(|sample| plane.holds(sample, scale)))?;
-        }
-        let inverse_range = plane.unknowns[0];
-        let sigma = (plane.cofactor[(0, 0)] * plane.variance).sqrt();
-        (inverse_range > 0.0 && sigma.is_finite()).then_some(Self { inverse_range, sigma, pixels: plane.pixels })
     }
+    samples.sort_by(|a, b| a.distance.total_cmp(&b.distance));
+    let all = samples.len();
+    let mut plane = Plane::through(samples.iter().take((all / 4).max(2 * NEEDED)))?;
+    for share in GROWTH {
+        let reach = (all / 4).max(2 * NEEDED).max((share * all as f64) as usize);
+        let mut sizes: Vec<f64> = plane.residuals(samples.iter().take(reach / 2)).collect();
+        let scale = SIGMA_OF_MAD * quantile(&mut sizes, 0.5);
+        plane = Plane::through(samples.iter().take(reach).filter(|sample| plane.holds(sample, scale)))?;
+    }
+    Some(plane)
 }
 
 /// Inverse range over the surroundings, by least squares.
@@ -184,6 +195,7 @@ struct Plane {
     /// Of the unit of weight.
     variance: f64,
     pixels: usize,
+    tells_darkness: bool,
 }
 
 impl Plane {
@@ -212,7 +224,15 @@ impl Plane {
         let cofactor = factor.inverse().component_mul(&(scale * scale.transpose()));
         let squares: f64 = samples.map(|sample| sample.residual(&unknowns).powi(2)).sum();
         let redundancy = pixels as f64 - if is_dark { 4.0 } else { 3.0 };
-        Some(Self { unknowns, cofactor, variance: squares / redundancy, pixels })
+        Some(Self { unknowns, cofactor, variance: squares / redundancy, pixels, tells_darkness: is_dark })
+    }
+
+    /// Range along the target's ray and its standard deviation on a surface of this darkness; `None` behind the camera.
+    fn range_at(&self, darkness: f64) -> Option<(f64, f64)> {
+        let row = Vector4::new(1.0, 0.0, 0.0, darkness);
+        let inverse_range = self.unknowns.dot(&row);
+        let sigma = (self.variance * row.dot(&(self.cofactor * row))).sqrt() / (inverse_range * inverse_range);
+        (inverse_range > 0.0 && sigma.is_finite()).then_some((inverse_range.recip(), sigma))
     }
 
     fn residuals<'a>(&self, samples: impl Iterator<Item = &'a Sample>) -> impl Iterator<Item = f64> {
@@ -278,9 +298,9 @@ mod tests {
     }
 
     #[test]
-    fn the_range_is_that_of_the_bright_parts_and_its_deviation_true() {
+    fn ranges_of_bright_and_dark_parts_have_true_deviations() {
         let (camera, mut rng) = (camera(), Pcg64::seed_from_u64(4));
-        let (mut squares, mut worst) = (0.0, 0.0_f64);
+        let (mut squares, mut dark_squares, mut worst) = (0.0, 0.0, 0.0_f64);
         for run in 0..200 {
             let frame = board(&camera, 0.03, 0.004, &mut rng);
             let pixel = [20.0 + 0.1 * f64::from(run), 24.0];
@@ -289,9 +309,14 @@ mod tests {
             squares += (error / found.sigma_m).powi(2) / 200.0;
             worst = worst.max(error.abs());
             assert!((found.amplitude - 200.0).abs() < 1e-9 && found.pixels > 80);
+            let dark = found.dark.unwrap();
+            let error = dark.range_m - plane_range(&camera, pixel) - 0.03;
+            dark_squares += (error / dark.sigma_m).powi(2) / 200.0;
+            assert!((dark.amplitude - 50.0).abs() < 1e-9 && dark.sigma_m > 2.0 * found.sigma_m);
         }
         // 200 squares of one degree scatter by a tenth; the few pixels of each fit make them 1.03 in the mean.
         assert!((0.8..1.25).contains(&squares) && worst < 0.006, "{squares} {worst}");
+        assert!((0.8..1.25).contains(&dark_squares), "{dark_squares}");
     }
 
     #[test]

@@ -32,7 +32,7 @@ pub(crate) struct CalibrateArguments {
     terms: Terms,
     /// What carries the datum: inner constraints on the targets, or the standard deviations in targets.csv and
     /// stations.csv.
-    #[arg(long, value_enum, default_value_t = DatumName::Free)]
+    #[arg(long, value_enum, default_value_t = DatumName::Given)]
     datum: DatumName,
     /// Output folder; default: out/<name of the survey>-calibration.
     #[arg(long, short)]
@@ -115,6 +115,8 @@ enum JointName {
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
 pub(crate) enum DatumName {
+    /// Control where the tables have standard deviations, free otherwise.
+    Given,
     /// Inner constraints on the targets.
     Free,
     /// Targets or stations with standard deviations.
@@ -124,6 +126,7 @@ pub(crate) enum DatumName {
 impl DatumName {
     pub(crate) fn datum(self) -> NetworkDatum {
         match self {
+            Self::Given => NetworkDatum::Given,
             Self::Free => NetworkDatum::Free,
             Self::Control => NetworkDatum::Control,
         }

@@ -18,7 +18,7 @@ pub(crate) struct PlanArguments {
     #[arg(long, default_value = "auto", value_name = "LIST|auto", value_parser = terms)]
     terms: Terms,
     /// What will carry the datum: inner constraints on the targets, or the standard deviations in the tables.
-    #[arg(long, value_enum, default_value_t = DatumName::Free)]
+    #[arg(long, value_enum, default_value_t = DatumName::Given)]
     datum: DatumName,
     /// Output folder; default: out/<name of the survey>-plan.
     #[arg(long, short)]

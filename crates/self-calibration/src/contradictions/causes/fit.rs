@@ -97,16 +97,22 @@ impl<'n> Fit<'n> {
         let (wrong, of) = fit.wrong[station];
         let own = fit.misfits.iter().zip(&network.sightings).filter(|(_, seen)| seen.station == station);
         let own: Vec<Misfit> = own.map(|(misfit, _)| *misfit).collect();
-        (is_noise(&own) && !is_too_many(wrong, of, 0.0)).then(|| implausibility(own.iter()))
+        (is_noise(&own) && !is_too_many(wrong, of, 0.0)).then(|| implausibility(own.iter(), self.scales()))
     }
 
-    /// Of all sightings and all known places.
-    pub(super) fn implausibility(&self) -> f64 {
+    /// How much more than stated most observations scatter. Explanations are compared with deviations that are true: where all are
+    /// stated five times too small, one that fits a hundredth better than another would seem certain.
+    pub(super) fn scales(&self) -> Scales {
+        Scales::new(self.misfits.iter()).at_least_one()
+    }
+
+    /// Of all sightings, which scatter as `scales` say, and all known places.
+    pub(super) fn implausibility(&self, scales: Scales) -> f64 {
         // A sighting that nothing predicts is as implausible as can be.
         let lost = Misfit { image: Some(f64::INFINITY), ..Misfit::default() };
         let pairs = self.misfits.iter().zip(&self.setup.network.sightings);
         let known = pairs.map(|(m, seen)| if m.image.is_none() && seen.pixel.is_some() { &lost } else { m });
-        implausibility(known) + self.implausibility_of_places()
+        implausibility(known, scales) + self.implausibility_of_places()
     }
 
     pub(super) fn worst(&self) -> Option<WorstValue> {

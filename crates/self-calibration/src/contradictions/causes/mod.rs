@@ -108,17 +108,21 @@ impl Problem<'_> {
         if alternatives.iter().any(|found| fits_as_given(&found.network)) {
             alternatives.retain(|found| fits_as_given(&found.network));
         }
-        let fitted: Vec<Option<f64>> = alternatives
+        let fits: Vec<Option<Fit<'_>>> = alternatives
             .par_iter()
             .map(|alternative| {
-                let setup = self.alternative(&alternative.network).ok()?;
-                let fit = Fit::settled(setup)?;
-                (fit.is_consistent() && fit.keeps_scale()).then(|| fit.implausibility())
+                let fit = Fit::settled(self.alternative(&alternative.network).ok()?)?;
+                (fit.is_consistent() && fit.keeps_scale()).then_some(fit)
             })
             .collect();
-        let Some(best) = fitted.iter().flatten().copied().min_by(f64::total_cmp) else { return Vec::new() };
+        let as_stated = Scales { image: 1.0, range: 1.0 };
+        let first = |a: &&Fit<'_>, b: &&Fit<'_>| a.implausibility(as_stated).total_cmp(&b.implausibility(as_stated));
+        let Some(scales) = fits.iter().flatten().min_by(first).map(Fit::scales) else { return Vec::new() };
+        let fitted: Vec<Option<f64>> =
+            fits.iter().map(|fit| fit.as_ref().map(|fit| fit.implausibility(scales))).collect();
+        let best = fitted.iter().flatten().copied().fold(f64::INFINITY, f64::min);
         // Where not even a start was found, each value counts as hopelessly wrong.
-        let before = base.map_or(1e9, |base| base.implausibility().min(1e9));
+        let before = base.map_or(1e9, |base| base.implausibility(scales).min(1e9));
         if before - best < BELIEVED {
             return Vec::new();
         }

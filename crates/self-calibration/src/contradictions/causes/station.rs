@@ -1,6 +1,6 @@
 //! What explains the sightings of one station.
 
-use calibration_network::functional_model::{Calibration, Misfit, implausibility};
+use calibration_network::functional_model::{Calibration, Misfit, Scales, implausibility};
 use calibration_network::start_values::{start_limit, station_pose};
 use nalgebra::{Isometry3, Point3};
 use statistics::upper_median;
@@ -21,7 +21,8 @@ const SMALLEST_CHANGE: f64 = 0.03;
 pub(super) fn of_station(base: &Fit<'_>, station: usize) -> Option<Cause> {
     let network = base.setup.network;
     let name = &network.stations[station].name;
-    let judge = Judge { calibration: &base.setup.calibration, targets: &base.setup.start.targets, station };
+    let (calibration, targets) = (&base.setup.calibration, base.setup.start.targets.as_slice());
+    let judge = Judge { calibration, targets, scales: base.scales(), station };
     let given = base.setup.start.stations[station];
     let unmoved = judge.resected(network);
     let (before, pose) = judge.best(network, [Some(given), unmoved])?;
@@ -63,6 +64,7 @@ pub(super) fn of_station(base: &Fit<'_>, station: usize) -> Option<Cause> {
 struct Judge<'f> {
     calibration: &'f Calibration,
     targets: &'f [Option<Point3<f64>>],
+    scales: Scales,
     station: usize,
 }
 
@@ -74,8 +76,8 @@ impl Judge<'_> {
 
     /// Implausibility and pose, of the pose that fits best.
     fn best(&self, network: &Network, poses: [Option<Isometry3<f64>>; 2]) -> Option<(f64, Isometry3<f64>)> {
-        let judged =
-            poses.into_iter().flatten().map(|pose| (implausibility(self.misfits(network, &pose).iter()), pose));
+        let of = |pose: &Isometry3<f64>| implausibility(self.misfits(network, pose).iter(), self.scales);
+        let judged = poses.into_iter().flatten().map(|pose| (of(&pose), pose));
         judged.min_by(|a, b| a.0.total_cmp(&b.0))
     }
 

@@ -126,13 +126,13 @@ fn in_words(outcome: &Outcome) -> String {
         Outcome::Wrong(millimetre, degree, found) => ("WRONG", millimetre, degree, found),
     };
     format!(
-        "{word} {millimetre:.1} mm {degree:.3} deg, inliers {} of {}, overlap {:.2} agreement {:.3} contradiction {:.3} inside {:.3} \
+        "{word} {millimetre:.1} mm {degree:.3} deg, inliers {} of {}, overlap {:.2} agreement {:.3} consistency {:.3} inside {:.3} \
          rival {:.2} determined {:.2}",
         found.inliers,
         found.correspondences,
         found.overlap,
         found.agreement,
-        found.contradiction,
+        found.consistency,
         found.inside,
         found.rival,
         found.determined

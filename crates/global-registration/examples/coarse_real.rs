@@ -12,9 +12,10 @@ use std::time::Instant;
 
 use depth_frames::{Sequence, dense_kitchen};
 use global_registration::{CoarseAlignment, CoarseOptions, FeatureCloud, align_without_guess};
-use nalgebra::Isometry3;
+use nalgebra::{Isometry3, Matrix6, Vector6};
 use point_cloud::Cloud;
 use projective_registration::{OrganisedFrame, frame_consistency};
+use rigid_pose::pose_difference;
 
 /// From one frame that pairs are looked for with to the next.
 const STEP: usize = 7;
@@ -24,6 +25,9 @@ const APART: f64 = 0.12;
 /// What counts as right.
 const RIGHT_M: f64 = 0.1;
 const RIGHT_DEG: f64 = 5.0;
+/// What the reference is good to, frame by frame.
+const REFERENCE_M: f64 = 0.008;
+const REFERENCE_DEG: f64 = 0.3;
 
 fn main() {
     let words: Vec<String> = std::env::args().skip(1).collect();
@@ -94,6 +98,14 @@ fn overlap(source: &OrganisedFrame, target: &OrganisedFrame, target_from_source:
     of(source, target, target_from_source).min(of(target, source, &target_from_source.inverse()))
 }
 
+/// Squared error over its covariance, to which that of the reference is added.
+fn normalised(found: &CoarseAlignment, truth: &Isometry3<f64>) -> f64 {
+    let off = pose_difference(&found.target_from_source, truth);
+    let reference = Vector6::from_fn(|k, _| if k < 3 { REFERENCE_M.powi(2) } else { REFERENCE_DEG.to_radians().powi(2) });
+    let inverse = (found.covariance + Matrix6::from_diagonal(&reference)).try_inverse();
+    inverse.map_or(f64::INFINITY, |inverse| off.dot(&(inverse * off)))
+}
+
 #[derive(Default)]
 struct Table {
     right: usize,
@@ -102,6 +114,8 @@ struct Table {
     milliseconds: Vec<f64>,
     /// Answers, and whether each is right.
     found: Vec<(CoarseAlignment, bool)>,
+    /// Normalised squared errors of right answers.
+    squares: Vec<f64>,
 }
 
 impl Table {
@@ -125,16 +139,19 @@ impl Table {
                 self.right += usize::from(right);
                 self.wrong += usize::from(!right);
                 self.found.push((found.clone(), right));
+                if right {
+                    self.squares.push(normalised(&found, truth));
+                }
                 let word = if right { "right" } else { "WRONG" };
                 format!(
-                    "{word} {:.1} {turned:.2} inliers {} of {} overlap {:.3} agreement {:.3} contradiction {:.4} inside {:.3} \
+                    "{word} {:.1} {turned:.2} inliers {} of {} overlap {:.3} agreement {:.3} consistency {:.4} inside {:.3} \
                      rival {:.2} determined {:.2} rms {:.1} voxel {:.1}",
                     1e3 * off,
                     found.inliers,
                     found.correspondences,
                     found.overlap,
                     found.agreement,
-                    found.contradiction,
+                    found.consistency,
                     found.inside,
                     found.rival,
                     found.determined,
@@ -152,11 +169,12 @@ impl Table {
         self.milliseconds.sort_by(f64::total_cmp);
         let median = self.milliseconds.get(self.milliseconds.len() / 2).copied().unwrap_or(f64::NAN);
         println!(
-            "{name}: {} pairs, {} right, {} wrong, {} refused, {median:.0} ms (median)",
+            "{name}: {} pairs, {} right, {} wrong, {} refused, {median:.0} ms (median); normalised squared error {:.1} of 6",
             self.milliseconds.len(),
             self.right,
             self.wrong,
-            self.refused
+            self.refused,
+            self.squares.iter().sum::<f64>() / self.squares.len() as f64
         );
     }
 }

@@ -2,8 +2,9 @@
 
 use std::borrow::Cow;
 
-use nalgebra::Isometry3;
+use nalgebra::{Isometry3, Matrix6};
 use rayon::prelude::*;
+use statistics::Distribution;
 
 use super::description::feature_cloud::FeatureCloud;
 use super::description::features::Features;
@@ -11,7 +12,7 @@ use super::hypotheses::correspondences::{Correspondences, Tolerance};
 use super::hypotheses::graph::ConsistencyGraph;
 use super::hypotheses::matching::{Match, matches};
 use super::hypotheses::ransac::consistent_samples;
-use super::options::{CoarseOptions, Estimator};
+use super::options::{CoarseOptions, Estimator, SharedError};
 use super::verification::distinct::Common;
 use super::verification::judge::Verdict;
 use super::verification::refine::refine;
@@ -34,6 +35,13 @@ const SAME_POSE_VOXELS: f64 = 4.0;
 pub struct CoarseAlignment {
     /// Pose: `target = target_from_source * source`, good to a fraction of a voxel: a start for `icp_registration::align`.
     pub target_from_source: Isometry3<f64>,
+    /// Covariance of the pose, tangent `[dt, dθ]` (see `rigid_pose::step_pose`): random and shared errors, and the width of
+    /// what edges hold where planes leave a motion open. Small against the true errors where a sensor's errors are so smooth that
+    /// the pose takes them up.
+    pub covariance: Matrix6<f64>,
+    /// The error of distances between the surfaces that neighbouring points share, as given or as the residuals tell it; 0 where
+    /// none stands out.
+    pub shared_error: SharedError,
     /// Correspondences that agree with the pose.
     pub inliers: usize,
     /// Correspondences that were found.
@@ -42,17 +50,18 @@ pub struct CoarseAlignment {
     pub overlap: f64,
     /// Fraction of the points that the other camera should have seen which lie on its surface.
     pub agreement: f64,
-    /// Fraction of the points in the other camera's view that lie in space which it looked through, of the cloud with more.
-    pub contradiction: f64,
+    /// Probability that as many points contradict at a right pose, on the other's surface without a partner or (counted twice)
+    /// in space that it looked through: as many as miss within the clouds themselves, the more scattered the more points err
+    /// together.
+    pub consistency: f64,
     /// Fraction of the sampled points that have a partner and lie inside what encloses the scene, both of them: the cloud
     /// goes on behind their tangent plane. Near 0, walls and corners alone fit.
     pub inside: f64,
-    /// Evidence for the best pose that differs, as a fraction of the winner's: near 1 the scene is ambiguous.
+    /// Probability that the best pose that differs fits no worse: the scene is ambiguous.
     pub rival: f64,
     /// Root mean square distance of partners across the surface, metre.
     pub rms_m: f64,
-    /// Share of the evidence that is lost where the source is moved by 6 voxels along the motion that the planes which
-    /// partners form determine least: 1 (or all) in a corner of three walls, 0 on one wall, between them where edges hold it.
+    /// Probability that the pose is known to 4 voxels, the width of one answer, along the motion that is determined least.
     pub determined: f64,
     /// Edge of the voxels in use, metre.
     pub voxel_m: f64,
@@ -93,22 +102,26 @@ fn looked_for(
     let (winner, rival) = best_two(&verified, voxel_m, source).ok_or(Error::NoAlignment {
         what: "consistent correspondences",
         found: 0.0,
-        needed: options.min_inliers as f64,
+        needed: 1.0,
         correspondences: correspondences.len(),
     })?;
-    let common = Common::new(source, target, &winner.pose);
-    let (pose, verdict, determined) = common.settled(source, target, &winner.pose);
+    let common = Common::new(source, target, &winner.pose, options);
+    let settled = common.settled(source, target, &winner.pose);
+    let (pose, verdict) = (settled.pose, settled.verdict);
+    let partners = (winner.verdict.hits() + rival.map_or(0, |rival| rival.verdict.hits())) as f64;
     let alignment = CoarseAlignment {
         target_from_source: target.between_frames(source, &pose),
+        covariance: settled.covariance,
+        shared_error: common.errors.map_or_else(SharedError::default, |errors| errors.shared),
         inliers: correspondences.inliers(&pose, tolerance).len(),
         correspondences: correspondences.len(),
         overlap: verdict.overlap(),
         agreement: verdict.agreement(),
-        contradiction: verdict.contradiction(),
+        consistency: verdict.consistency(&common.misses),
         inside: common.inside,
-        rival: rival / winner.evidence.max(f64::MIN_POSITIVE),
+        rival: rival.map_or(0.0, |rival| common.misses.draw(winner.evidence - rival.evidence, partners)),
         rms_m: winner.rms_m,
-        determined,
+        determined: 1.0 - Distribution::Normal.p_value(SAME_POSE_VOXELS * voxel_m / settled.sigma_m),
         voxel_m,
     };
     alignment.checked(options)
@@ -164,7 +177,7 @@ fn verified(
         let refined = refine(source, target, pose);
         let verdict = Verdict::new(source, target, &refined.pose, 1);
         let added = verdict.points() as f64 * correspondences.added_share(&refined.pose, tolerance);
-        Hypothesis { pose: refined.pose, evidence: verdict.evidence() + added, rms_m: refined.rms_m }
+        Hypothesis { pose: refined.pose, verdict, evidence: verdict.evidence() + added, rms_m: refined.rms_m }
     };
     ranked.par_iter().map(verify).collect()
 }
@@ -172,6 +185,7 @@ fn verified(
 /// A refined pose between the clouds' middles.
 struct Hypothesis {
     pose: Isometry3<f64>,
+    verdict: Verdict,
     /// Points that speak for it less those that contradict, and what added features say.
     evidence: f64,
     rms_m: f64,
@@ -290,22 +304,19 @@ fn is_same(a: &Isometry3<f64>, b: &Isometry3<f64>, voxel_m: f64, source: &Featur
     apart + turned <= SAME_POSE_VOXELS * voxel_m
 }
 
-/// The hypothesis with the best score, and the best score among those that differ from it.
-fn best_two<'a>(verified: &'a [Hypothesis], voxel_m: f64, source: &FeatureCloud) -> Option<(&'a Hypothesis, f64)> {
+/// The hypothesis with the best score, and the best among those that differ from it.
+fn best_two<'a>(
+    verified: &'a [Hypothesis],
+    voxel_m: f64,
+    source: &FeatureCloud,
+) -> Option<(&'a Hypothesis, Option<&'a Hypothesis>)> {
     let mut order: Vec<&Hypothesis> = verified.iter().collect();
     order.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
     let winner = *order.first()?;
     // Refined poses of one basin may end a little apart.
     let rival = order.iter().find(|h| !is_same(&h.pose, &winner.pose, 2.0 * voxel_m, source));
-    Some((winner, rival.map_or(0.0, |h| h.evidence.max(0.0))))
+    Some((winner, rival.copied()))
 }
-
-/// Where this share of a cloud has a partner and this share of the points lies inside what encloses the scene, this much less
-/// need agree: what a sensor measures wrongly lets points miss at right poses. Of 153 pairs of frames of a Kinect with 40 to
-/// 90 % in common, 71 agree by 0.96, 121 by 0.94, all by 0.92; none of the poses is wrong (`coarse_real sensitivity`).
-const WELL_SHARED: f64 = 0.4;
-const RICH_INSIDE: f64 = 0.1;
-const LESS_WHERE_STRUCTURED: f64 = 0.04;
 
 impl CoarseAlignment {
     /// The alignment where it passes the thresholds of `options`, for those that were aligned with looser ones.
@@ -313,17 +324,13 @@ impl CoarseAlignment {
     /// # Errors
     /// [`Error::NoAlignment`] with the first threshold that it does not pass.
     pub fn checked(self, options: &CoarseOptions) -> Result<Self> {
-        let structured = self.overlap >= WELL_SHARED && self.inside >= RICH_INSIDE;
-        let agreement = options.min_agreement - if structured { LESS_WHERE_STRUCTURED } else { 0.0 };
         let least = [
-            ("inliers", self.inliers as f64, options.min_inliers as f64),
             ("overlap", self.overlap, options.min_overlap),
-            ("agreement", self.agreement, agreement),
-            // Fractions that must stay small, seen from the other side.
-            ("points outside free space", 1.0 - self.contradiction, 1.0 - options.max_contradiction),
+            ("probability of as much contradiction at a right pose", self.consistency, options.level),
             ("structure inside its enclosing planes", self.inside, options.min_inside),
-            ("geometry", self.determined, options.min_determined),
-            ("lead over the rival", 1.0 - self.rival, 1.0 - options.max_rival),
+            ("probability that the pose is known", self.determined, options.min_determined),
+            // One that must stay small, seen from the other side.
+            ("probability that no other pose fits as well", 1.0 - self.rival, 1.0 - options.level),
         ];
         match least.into_iter().find(|(_, value, needed)| value < needed) {
             Some((what, found, needed)) => {

@@ -47,6 +47,16 @@ pub enum Estimator {
     },
 }
 
+/// What neighbouring points err by together, of the distance between two surfaces: what is left of a sensor's distortion, its
+/// delays, its scale.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct SharedError {
+    /// Standard deviation, metre.
+    pub sigma_m: f64,
+    /// Distance of points at which their correlation has fallen to 1/e, metre.
+    pub length_m: f64,
+}
+
 /// Options of an alignment without a guess. The defaults carry no scale.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CoarseOptions {
@@ -67,25 +77,21 @@ pub struct CoarseOptions {
     pub tolerance_voxels: f64,
     /// Different poses that are refined and verified. Default 8.
     pub max_hypotheses: usize,
-    /// Fewest correspondences that agree with the pose. Default 8: what decides are surfaces and free space.
-    pub min_inliers: usize,
     /// Smallest fraction of the smaller cloud that must have a partner. Default 0.3.
     pub min_overlap: f64,
-    /// Smallest fraction of the points in the other cloud's view that must lie on its surface. Default 0.96; 0.04
-    /// less where two fifths of a cloud have a partner and a tenth of the points lie inside what encloses the scene.
-    pub min_agreement: f64,
-    /// Largest fraction of points in space that the other camera looked through (see
-    /// [`super::CoarseAlignment::contradiction`]). Default 0.016: at the right pose there are hardly any.
-    pub max_contradiction: f64,
+    /// The error that neighbouring points share. `None`, the default: as the residuals of a pose tell it.
+    pub shared_error: Option<SharedError>,
+    /// Level of the tests: a pose is refused where its contradictions would be exceeded by a right one with less than this
+    /// probability ([`super::CoarseAlignment::consistency`]), or where another pose fits as well with more
+    /// ([`super::CoarseAlignment::rival`]). Default 0.05.
+    pub level: f64,
     /// Smallest fraction of points on both clouds that lie inside what encloses them (see
     /// [`super::CoarseAlignment::inside`]). Default 0.008: corners of empty rooms are taken for each other. 0 accepts
     /// them. Clouds whose normals have no side always pass.
     pub min_inside: f64,
-    /// Smallest share of the evidence that is lost where the pose slides along what is determined least (see
-    /// [`super::CoarseAlignment::determined`]). Default 0.15. 0 lets features decide where surfaces cannot.
+    /// Smallest probability that the pose is known ([`super::CoarseAlignment::determined`]). Default 0.95. 0 lets features decide
+    /// where surfaces cannot.
     pub min_determined: f64,
-    /// Largest evidence for the best different pose, as a fraction of the winner's. Default 0.9.
-    pub max_rival: f64,
     /// Start of the random numbers. Default: 1.
     pub seed: u64,
 }
@@ -101,13 +107,11 @@ impl Default for CoarseOptions {
             estimator: Estimator::ConsistencyGraph,
             tolerance_voxels: 1.5,
             max_hypotheses: 8,
-            min_inliers: 8,
             min_overlap: 0.3,
-            min_agreement: 0.96,
-            max_contradiction: 0.016,
+            shared_error: None,
+            level: 0.05,
             min_inside: 0.008,
-            min_determined: 0.15,
-            max_rival: 0.9,
+            min_determined: 0.95,
             seed: 1,
         }
     }
@@ -119,7 +123,8 @@ impl CoarseOptions {
             ("voxel_m", self.voxel_m.unwrap_or(1.0), f64::MAX, "positive and finite"),
             ("descriptor_radius_voxels", self.descriptor_radius_voxels, 20.0, "above 0 and at most 20"),
             ("tolerance_voxels", self.tolerance_voxels, 10.0, "above 0 and at most 10"),
-            ("max_rival", self.max_rival, 1.0, "above 0 and at most 1"),
+            ("level", self.level, 1.0, "above 0 and at most 1"),
+            ("length_m", self.shared_error.map_or(1.0, |shared| shared.length_m), f64::MAX, "positive and finite"),
         ];
         for (name, value, largest, domain) in lengths {
             if !(value > 0.0 && value <= largest) {
@@ -128,8 +133,6 @@ impl CoarseOptions {
         }
         for (name, value) in [
             ("min_overlap", self.min_overlap),
-            ("min_agreement", self.min_agreement),
-            ("max_contradiction", self.max_contradiction),
             ("min_inside", self.min_inside),
             ("min_determined", self.min_determined),
         ] {
@@ -140,12 +143,15 @@ impl CoarseOptions {
         let counts = [
             ("max_features", self.max_features, 10, 50_000, "between 10 and 50 000"),
             ("max_hypotheses", self.max_hypotheses, 1, 10_000, "between 1 and 10 000"),
-            ("min_inliers", self.min_inliers, 3, usize::MAX, "3 or more"),
         ];
         for (name, value, least, most, domain) in counts {
             if !(least..=most).contains(&value) {
                 return Err(Error::InvalidOption { name, value: value as f64, domain });
             }
+        }
+        let sigma_m = self.shared_error.map_or(0.0, |shared| shared.sigma_m);
+        if !(sigma_m >= 0.0 && sigma_m.is_finite()) {
+            return Err(Error::InvalidOption { name: "sigma_m", value: sigma_m, domain: "finite and not negative" });
         }
         if let Viewpoint::At(point) = self.viewpoint {
             point_cloud::check_points("viewpoint", &[point])?;

@@ -3,7 +3,7 @@
 use crate::common::{Pinhole, Scene};
 use crate::scenes::{Outcome, align_points, outcome, pair};
 use global_registration::Error;
-use global_registration::{CoarseOptions, Estimator, FeatureCloud, Viewpoint, align_without_guess};
+use global_registration::{CoarseOptions, Estimator, FeatureCloud, SharedError, Viewpoint, align_without_guess};
 use nalgebra::{Isometry3, Point3};
 use point_cloud::Cloud;
 use point_cloud::Error as CloudError;
@@ -99,7 +99,10 @@ fn options_outside_their_domain_are_named() {
         CoarseOptions { estimator: Estimator::Ransac { samples: 0 }, ..options.clone() },
         CoarseOptions { min_overlap: f64::INFINITY, ..options.clone() },
         CoarseOptions { min_inside: -0.1, ..options.clone() },
-        CoarseOptions { max_contradiction: f64::NAN, ..options.clone() },
+        CoarseOptions { level: f64::NAN, ..options.clone() },
+        CoarseOptions { level: 0.0, ..options.clone() },
+        CoarseOptions { shared_error: Some(SharedError { sigma_m: -1.0, length_m: 1.0 }), ..options.clone() },
+        CoarseOptions { shared_error: Some(SharedError { sigma_m: 1.0, length_m: 0.0 }), ..options.clone() },
     ] {
         assert!(matches!(made(&bad), Err(Error::InvalidOption { .. })), "{bad:?}");
     }

@@ -5,12 +5,11 @@ use global_registration::{CoarseAlignment, CoarseOptions};
 /// Options that refuse nothing, to see what verdicts rest on.
 pub fn loose(options: &CoarseOptions) -> CoarseOptions {
     CoarseOptions {
-        min_agreement: 0.0,
-        max_contradiction: 1.0,
         min_inside: 0.0,
         min_determined: 0.0,
         min_overlap: 0.0,
-        max_rival: 1.0,
+        // Nothing is less probable, and the quantiles stay finite.
+        level: f64::MIN_POSITIVE,
         ..options.clone()
     }
 }
@@ -19,13 +18,10 @@ pub fn loose(options: &CoarseOptions) -> CoarseOptions {
 type Threshold = (&'static str, fn(&mut CoarseOptions, f64));
 
 const THRESHOLDS: &[Threshold] = &[
-    ("min_inliers", |o, by| o.min_inliers = (o.min_inliers as f64 * by).round() as usize),
     ("min_overlap", |o, by| o.min_overlap *= by),
-    ("1 - min_agreement", |o, by| o.min_agreement = 1.0 - (1.0 - o.min_agreement) * by),
-    ("max_contradiction", |o, by| o.max_contradiction *= by),
+    ("level", |o, by| o.level *= by),
     ("min_inside", |o, by| o.min_inside *= by),
-    ("min_determined", |o, by| o.min_determined *= by),
-    ("1 - max_rival", |o, by| o.max_rival = 1.0 - (1.0 - o.max_rival) * by),
+    ("1 - min_determined", |o, by| o.min_determined = 1.0 - (1.0 - o.min_determined) * by),
 ];
 
 /// Prints right and wrong answers among alignments that nothing refused, with each threshold at multiples of its default.

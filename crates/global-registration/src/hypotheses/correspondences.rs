@@ -3,7 +3,7 @@
 // Lazy operators would branch lane by lane.
 #![allow(clippy::inline_always, clippy::needless_bitwise_bool)]
 
-use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Point3};
 
 use crate::description::fpfh::{dot, subtract};
 use rigid_pose::absolute_orientation;
@@ -148,11 +148,4 @@ impl Motion {
         let turned = self.vector(p);
         std::array::from_fn(|k| turned[k] + self.shift[k])
     }
-}
-
-/// Pose about the origin plus a small motion `[dt, dθ]`, both along the target's axes.
-pub(crate) fn moved(pose: &Isometry3<f64>, shift: Vector3<f64>, turn: Vector3<f64>) -> Isometry3<f64> {
-    let rotation = UnitQuaternion::from_scaled_axis(turn) * pose.rotation;
-    let translation = UnitQuaternion::from_scaled_axis(turn) * pose.translation.vector + shift;
-    Isometry3::from_parts(translation.into(), UnitQuaternion::new_normalize(rotation.into_inner()))
 }

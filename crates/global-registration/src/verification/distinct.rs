@@ -5,11 +5,14 @@
 //! front of furniture its room was. Points with many others behind their tangent plane, in both clouds, tell places apart.
 
 use nalgebra::{Isometry3, Matrix6, Vector3, Vector6};
+use rigid_pose::{Centred, symmetrised};
 
 use crate::description::feature_cloud::FeatureCloud;
 use crate::description::fpfh::{dot, subtract};
-use crate::hypotheses::correspondences::{Motion, moved};
-use crate::verification::judge::{Verdict, partner};
+use crate::hypotheses::correspondences::Motion;
+use crate::options::CoarseOptions;
+use crate::verification::judge::{Verdict, partner, unevenness};
+use crate::verification::shared_error::{Errors, Misses, Residual, errors};
 
 /// Points that are looked for behind a tangent plane, the share that must lie there, and how far, voxels.
 const WITNESSES: usize = 256;
@@ -24,28 +27,45 @@ const SAME_SLOPE: f32 = 0.03;
 /// Planes that are looked for, and the smallest share of the pairs on one.
 const MOST_PLANES: usize = 12;
 const LEAST_ON_PLANE: f64 = 0.012;
-/// How far a pose is moved to see what holds it, voxels: beyond the neighbourhoods that hits and free space allow for.
-const SLIDE_VOXELS: f64 = 6.0;
 /// Steps of a voxel to either side that are tried where planes leave a motion open, the share of the evidence that may be
-/// missing where edges put the pose, and the smallest eigenvalue a point below which a motion is open.
+/// missing where edges put the pose, and the smallest eigenvalue a point below which a motion is open: planes whose normals
+/// differ by less than 4.4 degrees tell no motion, as noise bends them by that.
 const SLIDES: i32 = 6;
 const HARDLY: f64 = 0.25;
 const OPEN: f64 = 6e-3;
 /// Least part of a normal along a motion at which the surface faces it.
 const FACING: f64 = 0.4;
-/// Points by which noise changes what edges say.
-const COST_NOISE: f64 = 5.0;
-
+/// Of what lies anywhere within a step, voxel².
+const STEP_VARIANCE: f64 = 1.0 / 12.0;
 /// What a pose's partners tell about the place.
 pub(crate) struct Common {
     /// Share of the sampled points that lie inside in both clouds, of the cloud with fewer.
     pub(crate) inside: f64,
     planes: Planes,
+    /// Of the residuals on planes; `None` where there are too few.
+    pub(crate) errors: Option<Errors>,
+    /// What misses at right poses.
+    pub(crate) misses: Misses,
+}
+
+/// A pose that edges have moved along what planes leave open.
+pub(crate) struct Settled {
+    pub(crate) pose: Isometry3<f64>,
+    pub(crate) verdict: Verdict,
+    /// Covariance of the tangent `[dt, dθ]` of the pose between the clouds' frames.
+    pub(crate) covariance: Matrix6<f64>,
+    /// Standard deviation of the motion that is determined least, metre at the radius; infinite where it is not known.
+    pub(crate) sigma_m: f64,
 }
 
 impl Common {
     /// `pose`: target from source, both about their middles.
-    pub(crate) fn new(source: &FeatureCloud, target: &FeatureCloud, pose: &Isometry3<f64>) -> Self {
+    pub(crate) fn new(
+        source: &FeatureCloud,
+        target: &FeatureCloud,
+        pose: &Isometry3<f64>,
+        options: &CoarseOptions,
+    ) -> Self {
         let forward = pairs(source, target, pose);
         let backward = pairs(target, source, &pose.inverse());
         let count = |from: &FeatureCloud, to: &FeatureCloud, pairs: &[[usize; 2]]| {
@@ -54,50 +74,66 @@ impl Common {
             inside as f64 / from.sample.len().max(1) as f64
         };
         let inside = count(source, target, &forward).min(count(target, source, &backward));
-        let on_target: Vec<usize> = forward.iter().map(|p| p[1]).chain(backward.iter().map(|p| p[0])).collect();
-        Self { inside, planes: Planes::new(target, on_target) }
+        let planes = Planes::new(source, target, pose, &forward);
+        let lengths = target.voxel_m()..planes.frame.radius_m;
+        let stands_for = forward.len() as f64 / planes.points.max(1.0);
+        let inverse = planes.inverse();
+        let errors =
+            errors(&planes.residuals, &inverse, lengths, options.shared_error, stands_for, options.level);
+        let together = errors.map_or(1.0, |errors| errors.together);
+        Self { inside, planes, errors, misses: Misses::new(unevenness([source, target]), together) }
     }
 
-    /// The pose moved by this many voxels along what the planes determine least.
-    pub(crate) fn slid(&self, target: &FeatureCloud, pose: &Isometry3<f64>, voxels: f64) -> Isometry3<f64> {
-        self.planes.slid(pose, voxels * target.voxel_m())
-    }
-
-    /// Where edges put the pose along the motion that the planes determine least, voxels: at a wrong place fronts of furniture
-    /// lie where the other camera saw the wall behind them.
-    fn held_by_edges(&self, source: &FeatureCloud, target: &FeatureCloud, pose: &Isometry3<f64>) -> f64 {
-        let motion = self.planes.least_determined();
-        let faces = |point: [f32; 3], normal: [f32; 3]| self.planes.along(&motion, point, normal) > FACING;
-        let against =
-            |step: i32| Verdict::against_slide(source, target, &self.slid(target, pose, f64::from(step)), faces);
-        let costs: Vec<(i32, f64)> = (-SLIDES..=SLIDES).map(|step| (step, against(step))).collect();
-        let least = costs.iter().map(|cost| cost.1).fold(f64::INFINITY, f64::min);
-        let weights = costs.iter().map(|(step, cost)| (f64::from(*step), (-(cost - least) / COST_NOISE).exp()));
-        let (sum, moment) = weights.fold((0.0, 0.0), |(sum, moment), (step, w)| (sum + w, moment + w * step));
-        moment / sum
-    }
-
-    /// The pose with its verdict, and the share of the evidence that is lost where it slides. What planes leave open is put
-    /// where edges hold it, unless too much speaks against that.
-    pub(crate) fn settled(
+    /// Where edges put the pose along a motion that planes leave open, and the mean square about that, voxels: at a wrong
+    /// place fronts of furniture lie where the other camera saw the wall behind them.
+    fn held_by_edges(
         &self,
         source: &FeatureCloud,
         target: &FeatureCloud,
         pose: &Isometry3<f64>,
-    ) -> (Isometry3<f64>, Verdict, f64) {
-        let at = |pose: &Isometry3<f64>, voxels: f64| {
-            let pose = self.slid(target, pose, voxels);
-            (pose, Verdict::new(source, target, &pose, 1))
+        motion: &Vector6<f64>,
+    ) -> (f64, f64) {
+        let frame = &self.planes.frame;
+        let faces = |point: [f32; 3], normal: [f32; 3]| {
+            let [point, normal] = [point, normal].map(|v| Vector3::from(v.map(f64::from)));
+            frame.derivative(&point, &normal).dot(motion).abs() > FACING
         };
-        let mut best = at(pose, 0.0);
-        if self.planes.are_open() {
-            let middle = at(pose, self.held_by_edges(source, target, pose));
-            if middle.1.evidence() > (1.0 - HARDLY) * best.1.evidence() {
-                best = middle;
-            }
+        let at = |step: i32| frame.moved(pose, &(motion * (f64::from(step) * target.voxel_m())));
+        let costs = (-SLIDES..=SLIDES).map(|step| (step, Verdict::against_slide(source, target, &at(step), faces)));
+        let costs: Vec<(i32, f64)> = costs.collect();
+        let least = costs.iter().map(|cost| cost.1).fold(f64::INFINITY, f64::min);
+        let noise = self.misses.scatter(Verdict::new(source, target, pose, 1).in_view()).max(1.0);
+        let (mut sum, mut moment, mut square) = (0.0, 0.0, 0.0);
+        for (step, cost) in costs {
+            let (weight, step) = ((-(cost - least) / noise).exp(), f64::from(step));
+            (sum, moment, square) = (sum + weight, moment + weight * step, square + weight * step * step);
         }
-        let lost = best.1.share_lost([-SLIDE_VOXELS, SLIDE_VOXELS].map(|voxels| at(&best.0, voxels).1));
-        (best.0, best.1, lost)
+        let mean = moment / sum;
+        (mean, square / sum - mean * mean + STEP_VARIANCE)
+    }
+
+    /// The pose with its verdict and covariance. What planes leave open is put where edges hold it, unless too much speaks
+    /// against that.
+    pub(crate) fn settled(&self, source: &FeatureCloud, target: &FeatureCloud, pose: &Isometry3<f64>) -> Settled {
+        let voxel_m = target.voxel_m();
+        let (mut pose, mut verdict) = (*pose, Verdict::new(source, target, pose, 1));
+        let mut of_motion = self.errors.map_or_else(Matrix6::zeros, |errors| errors.covariance);
+        for motion in self.planes.open() {
+            let (mean, mut square) = self.held_by_edges(source, target, &pose, &motion);
+            let moved = self.planes.frame.moved(&pose, &(motion * (mean * voxel_m)));
+            let there = Verdict::new(source, target, &moved, 1);
+            if there.evidence() > (1.0 - HARDLY) * verdict.evidence() {
+                (pose, verdict) = (moved, there);
+            } else {
+                square += mean * mean;
+            }
+            of_motion += motion * motion.transpose() * (square * voxel_m * voxel_m);
+        }
+        let largest = rigid_pose::eigen6(&of_motion, "the covariance of the pose").map(|(values, _)| values[5].max(0.0));
+        let sigma_m = largest.ok().filter(|_| self.errors.is_some()).map_or(f64::INFINITY, f64::sqrt);
+        let frame = Centred { centre: self.planes.frame.centre + target.reduced.middle, ..self.planes.frame };
+        let to_tangent = frame.tangent_from_motion(&target.between_frames(source, &pose));
+        Settled { pose, verdict, covariance: symmetrised(&(to_tangent * of_motion * to_tangent.transpose())), sigma_m }
     }
 }
 
@@ -130,71 +166,64 @@ fn is_inside(cloud: &FeatureCloud, witnesses: &[[f32; 3]], i: usize) -> bool {
 /// Normal matrix of the planes that partners form: noise of single normals imitates resistance against sliding along walls,
 /// a plane's one normal does not.
 struct Planes {
-    matrix: Matrix6<f64>,
+    frame: Centred,
+    residuals: Vec<Residual>,
     points: f64,
-    centre: Vector3<f64>,
-    radius: f64,
+    /// Eigenvalues of the normal matrix, ascending, and their motions.
+    values: Vector6<f64>,
+    motions: Matrix6<f64>,
 }
 
 impl Planes {
-    fn new(cloud: &FeatureCloud, mut on: Vec<usize>) -> Self {
-        on = on.iter().copied().step_by(on.len().div_ceil(PAIRS).max(1)).collect();
+    fn new(source: &FeatureCloud, cloud: &FeatureCloud, pose: &Isometry3<f64>, pairs: &[[usize; 2]]) -> Self {
+        let mut on: Vec<[usize; 2]> = pairs.iter().copied().step_by(pairs.len().div_ceil(PAIRS).max(1)).collect();
         let least = ((LEAST_ON_PLANE * on.len() as f64) as usize).max(3);
         let count = on.len().max(1) as f64;
-        let place = |i: usize| Vector3::from(cloud.reduced.points[i].map(f64::from));
-        let centre = on.iter().fold(Vector3::zeros(), |sum, &i| sum + place(i)) / count;
-        let spread: f64 = on.iter().map(|&i| (place(i) - centre).norm_squared()).sum();
-        let radius = (spread / count).sqrt().max(cloud.voxel_m());
-        let mut planes = Self { matrix: Matrix6::zeros(), points: count, centre, radius };
+        let wide = |v: [f32; 3]| Vector3::from(v.map(f64::from));
+        let place = |i: usize| wide(cloud.reduced.points[i]);
+        let centre = on.iter().fold(Vector3::zeros(), |sum, &[_, i]| sum + place(i)) / count;
+        let spread: f64 = on.iter().map(|&[_, i]| (place(i) - centre).norm_squared()).sum();
+        let frame = Centred { centre, radius_m: (spread / count).sqrt().max(cloud.voxel_m()) };
+        let motion = Motion::new(pose);
+        let mut residuals = Vec::new();
         for _ in 0..MOST_PLANES {
-            let size = |seed: usize| on.iter().filter(|&&i| is_on_plane(cloud, seed, i)).count();
+            let size = |seed: usize| on.iter().filter(|&&[_, i]| is_on_plane(cloud, seed, i)).count();
             // The first of equally large planes.
             let largest =
-                on.iter().step_by(3).map(|&i| (size(i), i)).fold((0, 0), |a, b| if b.0 > a.0 { b } else { a });
+                on.iter().step_by(3).map(|&[_, i]| (size(i), i)).fold((0, 0), |a, b| if b.0 > a.0 { b } else { a });
             if largest.0 < least {
                 break;
             }
-            let (plane, rest): (Vec<usize>, Vec<usize>) = on.iter().partition(|&&i| is_on_plane(cloud, largest.1, i));
+            let (plane, rest): (Vec<[usize; 2]>, _) = on.iter().partition(|&&[_, i]| is_on_plane(cloud, largest.1, i));
             on = rest;
-            planes.add(&plane.iter().map(|&i| (place(i), cloud.normals.vectors[i])).collect::<Vec<_>>());
+            let sum: Vector3<f64> = plane.iter().map(|&[_, i]| wide(cloud.normals.vectors[i])).sum();
+            let Some(normal) = sum.try_normalize(0.0) else { continue };
+            residuals.extend(plane.iter().map(|&[of_source, i]| Residual {
+                place: place(i),
+                derivative: frame.derivative(&place(i), &normal),
+                distance: wide(subtract(motion.point(source.reduced.points[of_source]), cloud.reduced.points[i]))
+                    .dot(&wide(cloud.normals.vectors[i])),
+            }));
         }
-        planes
+        let matrix = residuals.iter().fold(Matrix6::zeros(), |sum, r| sum + r.derivative * r.derivative.transpose());
+        let found = rigid_pose::eigen6(&matrix, "planes in common");
+        let (values, motions) = found.unwrap_or_else(|_| (Vector6::zeros(), Matrix6::identity()));
+        Self { frame, residuals, points: count, values, motions }
     }
 
-    fn add(&mut self, plane: &[(Vector3<f64>, [f32; 3])]) {
-        let sum: Vector3<f64> = plane.iter().map(|(_, normal)| Vector3::from(normal.map(f64::from))).sum();
-        let Some(normal) = sum.try_normalize(0.0) else { return };
-        for (point, _) in plane {
-            let lever = (point - self.centre).cross(&normal) / self.radius;
-            let row = Vector6::new(normal.x, normal.y, normal.z, lever.x, lever.y, lever.z);
-            self.matrix.ger(1.0, &row, &row, 1.0);
-        }
+    fn is_open(&self, k: usize) -> bool {
+        self.values[k] < OPEN * self.points
     }
 
-    /// Whether a motion is left open, but for slivers.
-    fn are_open(&self) -> bool {
-        rigid_pose::eigen6(&self.matrix, "planes in common").is_ok_and(|(values, _)| values[0] < OPEN * self.points)
+    /// Motions that are left open, but for slivers.
+    fn open(&self) -> impl Iterator<Item = Vector6<f64>> {
+        (0..6).filter(|&k| self.is_open(k)).map(|k| self.motions.column(k).into_owned())
     }
 
-    /// Translation and turn (times the radius) that the planes determine least, of length 1; zero where that is not known.
-    fn least_determined(&self) -> Vector6<f64> {
-        let found = rigid_pose::eigen6(&self.matrix, "planes in common");
-        found.map_or_else(|_| Vector6::zeros(), |(_, motions)| motions.column(0).into_owned())
-    }
-
-    /// How far a motion of length 1 moves a point along its normal.
-    fn along(&self, motion: &Vector6<f64>, point: [f32; 3], normal: [f32; 3]) -> f64 {
-        let [point, normal] = [point, normal].map(|v| Vector3::from(v.map(f64::from)));
-        let turned = (motion.fixed_rows::<3>(3) / self.radius).cross(&(point - self.centre));
-        (motion.fixed_rows::<3>(0) + turned).dot(&normal).abs()
-    }
-
-    /// The pose moved along the least determined motion, `distance` metre at the radius.
-    fn slid(&self, pose: &Isometry3<f64>, distance: f64) -> Isometry3<f64> {
-        let motion = self.least_determined() * distance;
-        let turn = motion.fixed_rows::<3>(3) / self.radius;
-        let turned = moved(&Isometry3::identity(), Vector3::zeros(), turn).rotation * self.centre;
-        moved(pose, motion.fixed_rows::<3>(0) + self.centre - turned, turn)
+    /// Inverse of the normal matrix along the others.
+    fn inverse(&self) -> Matrix6<f64> {
+        let told = (0..6).filter(|&k| !self.is_open(k)).map(|k| (self.motions.column(k), self.values[k]));
+        told.fold(Matrix6::zeros(), |sum, (motion, value)| sum + motion * motion.transpose() / value)
     }
 }
 

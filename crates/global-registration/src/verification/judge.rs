@@ -6,6 +6,7 @@ use crate::description::feature_cloud::FeatureCloud;
 use crate::description::fpfh::{dot, subtract};
 use crate::description::view::{Jumps, Sight};
 use crate::hypotheses::correspondences::Motion;
+use crate::verification::shared_error::Misses;
 
 /// Least cosine between the normals of partners.
 const LEAST_COSINE: f32 = 0.8;
@@ -19,8 +20,8 @@ const ROUGH_WEIGHT_OF_FREE: f64 = 2.0;
 /// are alike, but only the wrong one has more than a few in a hundred that contradict.
 const WEIGHT_OF_MISSED: f64 = 8.0;
 const WEIGHT_OF_FREE: f64 = 16.0;
-/// A point in free space beside one that misses where edges hold a pose: noise moves the latter over a jump, not the former.
-const WEIGHT_OF_FREE_AT_EDGES: f64 = 2.0;
+/// A point in free space beside one that misses: noise moves the latter over a jump, not the former.
+const FREE_BESIDE_MISSED: f64 = WEIGHT_OF_FREE / WEIGHT_OF_MISSED;
 
 /// Counts over the sampled points of one or both clouds.
 #[derive(Debug, Clone, Copy, Default)]
@@ -76,7 +77,7 @@ impl Verdict {
             count(source, target, pose, 1, Jumps::Missed, |p, n| faces(forward.point(p), forward.vector(n))),
             count(target, source, &back, 1, Jumps::Missed, &faces),
         ];
-        let cost = |c: &Count| c.missed as f64 + WEIGHT_OF_FREE_AT_EDGES * c.in_free as f64 - c.hits as f64;
+        let cost = |c: &Count| c.missed as f64 + FREE_BESIDE_MISSED * c.in_free as f64 - c.hits as f64;
         counts.iter().map(cost).sum()
     }
 
@@ -102,16 +103,21 @@ impl Verdict {
         self.source.points + self.target.points
     }
 
-    /// Largest share of the points of a cloud in the other's view that lie in space which that looked through.
-    pub(crate) fn contradiction(&self) -> f64 {
-        let share = |c: &Count| c.in_free as f64 / (c.hits + c.in_free).max(1) as f64;
-        share(&self.source).max(share(&self.target))
+    /// Probability that as much contradicts at a right pose.
+    pub(crate) fn consistency(&self, misses: &Misses) -> f64 {
+        let sum = |f: fn(&Count) -> usize| (f(&self.source) + f(&self.target)) as f64;
+        let contradicting = sum(|c| c.missed) + FREE_BESIDE_MISSED * sum(|c| c.in_free);
+        misses.probability(contradicting, self.in_view())
     }
 
-    /// Smaller share of the evidence that other poses lack, between 0 and 1.
-    pub(crate) fn share_lost(&self, others: [Self; 2]) -> f64 {
-        let most = others.iter().map(Self::evidence).fold(f64::NEG_INFINITY, f64::max);
-        (1.0 - most / self.evidence().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0)
+    /// Points of both clouds that have a partner.
+    pub(crate) fn hits(&self) -> usize {
+        self.source.hits + self.target.hits
+    }
+
+    /// Points of both clouds that the other camera should have seen.
+    pub(crate) fn in_view(&self) -> f64 {
+        [self.source, self.target].iter().map(|c| c.hits + c.in_free + c.missed).sum::<usize>() as f64
     }
 
     /// Share of the points with a partner in the cloud that overlaps more.
@@ -122,8 +128,7 @@ impl Verdict {
 
     /// Share of hits among the points that the other camera should have seen.
     pub fn agreement(&self) -> f64 {
-        let sum = |f: fn(&Count) -> usize| (f(&self.source) + f(&self.target)) as f64;
-        sum(|c| c.hits) / (sum(|c| c.hits) + sum(|c| c.in_free) + sum(|c| c.missed)).max(1.0)
+        self.hits() as f64 / self.in_view().max(1.0)
     }
 }
 
@@ -160,9 +165,30 @@ fn count(
 /// The point of the surface that a point lies on.
 pub(crate) fn partner(to: &FeatureCloud, point: [f32; 3], normal: [f32; 3], sided: bool, voxel: f32) -> Option<usize> {
     let near = to.labels[0].near(point)?;
+    lies_on(to, near, point, normal, sided, voxel)?.then_some(near)
+}
+
+/// Whether a point lies on the surface about another one; `None` where that is too far to tell.
+fn lies_on(to: &FeatureCloud, near: usize, point: [f32; 3], normal: [f32; 3], sided: bool, voxel: f32) -> Option<bool> {
     let (own, d) = (to.normals.vectors[near], subtract(point, to.reduced.points[near]));
     let cosine = if sided { dot(normal, own) } else { dot(normal, own).abs() };
     let in_all = IN_ALL_VOXELS * voxel;
-    let lies_on = cosine >= LEAST_COSINE && dot(d, own).abs() <= ACROSS_VOXELS * voxel && dot(d, d) <= in_all * in_all;
-    lies_on.then_some(near)
+    (dot(d, d) <= in_all * in_all).then(|| cosine >= LEAST_COSINE && dot(d, own).abs() <= ACROSS_VOXELS * voxel)
+}
+
+/// Share of the points of two clouds that do not lie on the surface about the next one of their own cloud: as many miss that
+/// of the other at a right pose, at most, for what is uneven is uneven in both.
+pub(crate) fn unevenness(clouds: [&FeatureCloud; 2]) -> f64 {
+    let (mut near, mut beside) = (1_usize, 1_usize);
+    for cloud in clouds {
+        for i in cloud.sample.iter().map(|i| *i as usize) {
+            let (point, normal) = (cloud.reduced.points[i], cloud.normals.vectors[i]);
+            // Every second point labels cells: the others find another one.
+            let Some(other) = cloud.labels[1].near(point).filter(|other| *other != i) else { continue };
+            let on = lies_on(cloud, other, point, normal, cloud.normals.sided, cloud.reduced.voxel_m as f32);
+            near += usize::from(on.is_some());
+            beside += usize::from(on == Some(false));
+        }
+    }
+    beside as f64 / (near + 1) as f64
 }

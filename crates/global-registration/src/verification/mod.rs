@@ -4,3 +4,4 @@ pub(crate) mod among;
 pub(crate) mod distinct;
 pub(crate) mod judge;
 pub(crate) mod refine;
+pub(crate) mod shared_error;

@@ -49,9 +49,12 @@ impl<'a> Outlines<'a> {
     fn least(&self, pose: &Isometry3<f64>, motion: &UndeterminedMotion) -> f64 {
         let radius_m = self.frames[0].points.radius_m;
         let places: Vec<f64> = (0..=2 * STEPS).map(|k| (k as f64 - STEPS as f64) * STEP * radius_m).collect();
+        let by_outlines = |place| self.contradicting(&along(pose, motion, place, radius_m)) as f64 / CHANCE;
+        let here = by_outlines(0.0);
         let against = |place: &f64| {
-            let count = self.contradicting(&along(pose, motion, *place, radius_m)) as f64;
-            count / CHANCE + 0.5 * (place / motion.sigma_m).powi(2)
+            let by_planes = 0.5 * (place / motion.sigma_m).powi(2);
+            // Where planes alone speak against a place more than all does against this one, it is out of the question.
+            if by_planes > here + LIMIT { f64::INFINITY } else { by_planes + by_outlines(*place) }
         };
         let against: Vec<f64> = places.par_iter().map(against).collect();
         let fewest = against.iter().copied().fold(f64::INFINITY, f64::min);

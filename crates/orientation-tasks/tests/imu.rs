@@ -11,7 +11,7 @@ use rand_pcg::Pcg64;
 use rand_pcg::rand_core::SeedableRng;
 use range_io::tables::{ImuSample, write_imu};
 
-use crate::scene::{oriented, path, stations, timed};
+use crate::scene::{noisy, oriented, path, stations, timed};
 
 const STEP_S: f64 = 0.005;
 /// The unit rests until then.
@@ -57,7 +57,9 @@ fn samples(seed: u64, until_s: f64, biased: bool) -> Vec<ImuSample> {
 
 fn survey(folder: &Path, seed: u64, known: &[usize], change: impl Fn(&mut ImuSample)) -> PathBuf {
     let times: Vec<f64> = (0..8).map(|index| REST_S + 0.5 * f64::from(index)).collect();
-    let known: Vec<(usize, Isometry3<f64>)> = known.iter().map(|index| (*index, moving(times[*index]))).collect();
+    let mut random = Pcg64::seed_from_u64(1000 + seed);
+    let known: Vec<(usize, Isometry3<f64>)> =
+        known.iter().map(|index| (*index, noisy(&moving(times[*index]), [0.002, 0.001], &mut random))).collect();
     let survey = timed(folder, &times, &known);
     let mut samples = samples(seed, 6.0, true);
     samples.iter_mut().for_each(change);
@@ -101,8 +103,8 @@ fn deviations_after_a_rest_are_those_of_repeated_noise() {
         sums.iter_mut().zip(squares(&survey)).for_each(|(sum, square)| *sum += square / 40.0);
     }
     println!("normalised squares {sums:?}");
-    // The start is exact here, and its stated deviation a part of what is stated.
-    assert!(sums.iter().all(|sum| (0.3..1.5).contains(sum)), "{sums:?}");
+    // Those of one survey go together: some three independent ones each.
+    assert!(sums.iter().all(|sum| (0.6..1.5).contains(sum)), "{sums:?}");
 }
 
 #[test]

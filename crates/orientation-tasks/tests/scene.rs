@@ -4,10 +4,13 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 use camera_model::pose_from_euler;
-use nalgebra::{Isometry3, Vector3};
+use nalgebra::{Isometry3, Vector3, Vector6};
 use orientation_tasks::pipeline::{Result, Silent};
 use orientation_tasks::{OrientBy, OrientRequest, OrientSummary, orient};
+use rand_distr::{Distribution, StandardNormal};
+use rand_pcg::Pcg64;
 use range_io::tables::{Station, read_stations, write_stations};
+use rigid_pose::step_pose;
 
 pub fn target_field() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fixtures/surveys/target_field")
@@ -87,4 +90,13 @@ pub fn timed(folder: &Path, times: &[f64], known: &[(usize, Isometry3<f64>)]) ->
 /// The stations of a result.
 pub fn stations(survey: &Path) -> Vec<Station> {
     read_stations(survey.with_file_name("oriented").join("stations.csv")).unwrap()
+}
+
+/// A pose off by standard deviations of position, metre, and attitude, radian.
+pub fn noisy(pose: &Isometry3<f64>, [position_m, attitude_rad]: [f64; 2], random: &mut Pcg64) -> Isometry3<f64> {
+    let step = Vector6::from_fn(|axis, _| {
+        let normal: f64 = StandardNormal.sample(random);
+        normal * if axis < 3 { position_m } else { attitude_rad }
+    });
+    step_pose(pose, &step)
 }

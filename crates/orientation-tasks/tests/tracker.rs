@@ -3,29 +3,19 @@
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-use nalgebra::{Isometry3, Vector3, Vector6};
+use nalgebra::{Isometry3, Vector3};
 use orientation_tasks::pipeline::{DoubtKind, Failure, Judged};
 use orientation_tasks::{OrientBy, OrientSummary, TrackerOptions};
-use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::SeedableRng;
-use rigid_pose::step_pose;
 
-use crate::scene::{oriented, path, stations, timed};
+use crate::scene::{noisy, oriented, path, stations, timed};
 
 /// Ahead of the camera's clock, second.
 const OFFSET_S: f64 = 0.12;
 
 fn mounting() -> Isometry3<f64> {
     Isometry3::new(Vector3::new(0.06, -0.02, 0.11), Vector3::new(0.3, -0.2, 1.5))
-}
-
-fn noisy(pose: &Isometry3<f64>, [position_m, attitude_rad]: [f64; 2], random: &mut Pcg64) -> Isometry3<f64> {
-    let step = Vector6::from_fn(|axis, _| {
-        let normal: f64 = StandardNormal.sample(random);
-        normal * if axis < 3 { position_m } else { attitude_rad }
-    });
-    step_pose(pose, &step)
 }
 
 /// A survey of 30 stations, of which every third is known, with a tracker's poses at 50 Hz as lines of numbers.

@@ -19,7 +19,10 @@ struct Walls {
     turns: Vec<MeasuredTurn>,
 }
 
-/// Stations past a bare wall, two metres away, with points to 3 mm.
+/// Radius of a bump on the wall, metre: it holds the positions, and leaves the turn about it open.
+const BUMP_M: f64 = 0.25;
+
+/// Stations past a bare wall with one bump, two metres away, with points to 3 mm.
 fn bare_wall(seed: u64) -> Walls {
     let mut random = Pcg64::seed_from_u64(seed);
     let mut normal = |sigma: f64| {
@@ -37,7 +40,9 @@ fn bare_wall(seed: u64) -> Walls {
         let middle = pose.translation.vector;
         let point = |index: i32| {
             let [a, b] = [index % 50, index / 50].map(|place| 0.03 * (f64::from(place) - 24.5));
-            let on_wall = Point3::new(middle.x + a, middle.y + b, 0.0);
+            let (x, y) = (middle.x + a, middle.y + b);
+            let beside = (x - 0.6).hypot(y - 0.1);
+            let on_wall = Point3::new(x, y, (BUMP_M * BUMP_M - beside * beside).max(0.0).sqrt());
             let seen = pose.inverse() * on_wall;
             seen + seen.coords.normalize() * noise()
         };

@@ -94,7 +94,15 @@ pub(crate) fn explained(
             let words = format!("{what} pose {index}: {reason}");
             return Error::Request { command: "orient", message: words };
         }
-        Cause::TooFewPoses { .. } => {}
+        Cause::TooFewPoses { .. } => {
+            let fits = |(unit, _): &&(f64, &str)| {
+                let scaled = |timed: &TimedPose| TimedPose { time_s: timed.time_s * unit, ..*timed };
+                estimate_mounting(&carrier.iter().map(scaled).collect::<Vec<_>>(), &known.poses, options).is_ok()
+            };
+            if let Some((_, name)) = UNITS_OF_TIME.iter().find(fits) {
+                return wrong(path, &format!("its times are {name}, expected seconds ({error})"));
+            }
+        }
         _ => {
             let fits = |(_, undo): &&Slip| {
                 let changed: Vec<TimedPose> = carrier.iter().map(undo).collect();

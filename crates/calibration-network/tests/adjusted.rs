@@ -107,3 +107,45 @@ fn a_weak_network_says_so_with_what_to_add() {
     assert!(strengths[1].inflation > 10.0 * strengths[0].inflation, "{}", strengths[1].sentence());
     assert!(matches!(strengths[1].clone().error(), Error::WeakNetwork { advice, .. } if !advice.is_empty()));
 }
+
+#[test]
+fn image_points_alone_lead_to_the_same_solution_as_the_truth_as_start() {
+    let sightings = |start| SightingOptions { start, ..SightingOptions::default() };
+    let vtpv = [SimulatedStart::Truth, SimulatedStart::Absent].map(|start| {
+        let mut observed = simulate_sightings(&strong(), &sightings(start)).unwrap();
+        nominal(&mut observed);
+        for seen in &mut observed.sightings {
+            seen.range_m = None;
+        }
+        let ranged = vec![false; observed.stations.len()];
+        let names = terms("xp yp c k1 k2");
+        let setup = Setup::from_network(&observed, names, ranged, false, Datum::Inner).unwrap();
+        setup.solve().unwrap().solution.vtpv()
+    });
+    assert!((vtpv[0] / vtpv[1] - 1.0).abs() < 1e-6, "{vtpv:?}");
+}
+
+#[test]
+fn image_points_of_one_place_are_refused_with_the_reason() {
+    // Stations that only turn have no base.
+    let mut truth = strong();
+    let first = truth.stations[0].world_from_camera.unwrap();
+    for (number, station) in truth.stations.iter_mut().enumerate() {
+        let turn = calibration_network::nalgebra::UnitQuaternion::from_scaled_axis(
+            [0.0, 0.02 * number as f64, 0.5 * number as f64].into(),
+        );
+        station.world_from_camera = Some(first * turn);
+    }
+    let options = SightingOptions { start: SimulatedStart::Absent, ..SightingOptions::default() };
+    let mut observed = simulate_sightings(&truth, &options).unwrap();
+    for seen in &mut observed.sightings {
+        seen.range_m = None;
+    }
+    // A target that one station sees is refused before.
+    let mut counts = vec![0; observed.targets.len()];
+    observed.sightings.iter().for_each(|seen| counts[seen.target] += 1);
+    observed.sightings.retain(|seen| counts[seen.target] > 1);
+    let ranged = vec![false; observed.stations.len()];
+    let error = Setup::from_network(&observed, terms("c"), ranged, false, Datum::Inner).unwrap_err();
+    assert!(matches!(&error, Error::NotReachable { reason, .. } if reason.contains("image points alone")), "{error}");
+}

@@ -61,6 +61,10 @@ pub enum DoubtKind {
     Modulation,
     /// Lengths that are probably not in the unit in which they are read.
     Units,
+    /// Ranges that are read as depths, or depths as ranges.
+    RangeOrDepth,
+    /// A value that stands for "not measured" and is read as a distance.
+    InvalidValues,
     /// A phase that falls with range where it should grow.
     PhaseSense,
     /// Frames that hold one and the same value.

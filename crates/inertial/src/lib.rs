@@ -5,6 +5,7 @@ mod noise;
 mod preintegrated;
 mod propagation;
 mod residual;
+mod rest;
 mod rotation;
 mod sample;
 #[cfg(feature = "sequence")]
@@ -18,6 +19,7 @@ pub use nalgebra;
 pub use noise::{Biases, ImuNoise};
 pub use preintegrated::{Matrix9, Matrix9x6, Preintegrated};
 pub use residual::{NavigationState, ResidualJacobians, Vector9};
+pub use rest::{Rest, Unrest, rest};
 pub use rigid_pose;
 pub use sample::InertialSample;
 #[cfg(feature = "sequence")]

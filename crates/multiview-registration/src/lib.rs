@@ -9,6 +9,7 @@ mod relative_pose;
 mod surfaces;
 mod survey;
 
+pub use adjustment::turns::MeasuredTurn;
 pub use agreement::alignments::{PairAlignment, RefusedPair};
 pub use agreement::loops::LoopClosure;
 pub use agreement::placement::{PairAgreement, Placement, Placements, StationPlacement, judge_placements};

@@ -22,3 +22,4 @@ mod sequence;
 #[path = "../../projective-registration/tests/sr4000/mod.rs"]
 mod sr4000;
 mod stations;
+mod turns;

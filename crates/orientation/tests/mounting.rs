@@ -368,3 +368,22 @@ fn a_robot_of_eight_images() {
     assert!(shift_mm < 15.0 && turn_deg < 1.0, "{shift_mm} {turn_deg}");
     assert!(pixels.iter().all(|pixel| *pixel < 2.5), "{pixels:?}");
 }
+
+/// Chi-squared of six over 200 runs: 6 ± 0.25.
+#[test]
+fn a_mounted_camera_is_where_its_covariance_says() {
+    let mut square = 0.0;
+    for run in 0..200 {
+        let mut normal = normals(9_000 + run);
+        let [mut carrier, camera] = moments(carrier_at, 12, &mut normal);
+        let found = estimate_mounting(&carrier, &camera, &MountingOptions::default()).unwrap();
+        let time_s = 20.0;
+        let pose = step_pose(&carrier_at(time_s), &noise(&covariances()[0], &mut normal));
+        carrier.push(TimedPose { time_s, pose: Uncertain { pose, covariance: covariances()[0] } });
+        assert!(found.camera_at(&carrier, 19.0, 0.1).is_none());
+        let placed = found.camera_at(&carrier, time_s, 0.1).unwrap();
+        let error = pose_difference(&(target().inverse() * carrier_at(time_s) * mounting()), &placed.pose);
+        square += error.dot(&(placed.covariance.try_inverse().unwrap() * error)) / 200.0;
+    }
+    assert!((square - 6.0).abs() < 0.9, "{square}");
+}

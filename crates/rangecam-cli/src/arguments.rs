@@ -12,6 +12,7 @@ use crate::requests::compare_arguments::CompareArguments;
 use crate::requests::explain_arguments::ExplainArguments;
 use crate::requests::fixed_pattern_arguments::FixedPatternArguments;
 use crate::requests::noise_arguments::NoiseArguments;
+use crate::requests::orient_arguments::OrientArguments;
 use crate::requests::register_arguments::RegisterArguments;
 use crate::requests::scattering_arguments::ScatteringArguments;
 use crate::requests::values::{not_negative, share};
@@ -95,6 +96,8 @@ pub(crate) enum Command {
     WarmUp(WarmUpArguments),
     /// Bring a survey's stations or clouds of any format into one frame, with the quality of every pose.
     Register(RegisterArguments),
+    /// Find where stations stand by targets, by an inertial unit, or by the poses of a tracker, with standard deviations.
+    Orient(Box<OrientArguments>),
     /// Tell what a survey, a calibration or a cloud holds, and which stages it leaves room for.
     Inspect {
         /// Survey folder, calibration.ron or cloud.ply.

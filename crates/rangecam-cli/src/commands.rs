@@ -63,6 +63,9 @@ pub(crate) fn dispatch(command: Command, output: &Output) -> Outcome {
                 Err("register: --track follows the frames of one survey: name one folder".into())
             }
         },
+        Command::Orient(arguments) => {
+            output.result(&orientation_tasks::orient(&arguments.request(), output.progress().as_ref())?)
+        }
         Command::Inspect { path } => output.result(&tasks::inspect(&path)?),
         Command::Explain(arguments) => {
             output.result(&pipeline::explain(&arguments.request()?, output.progress().as_ref())?)

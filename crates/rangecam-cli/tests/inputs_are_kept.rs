@@ -49,6 +49,13 @@ fn cases() -> Vec<Case> {
         case("register", "register survey --guess poses/s.csv -c cal/c.ron", "survey poses/s.csv cal/c.ron"),
         case("register, clouds", "register one/a.xyz two/b.xyz --multi", "one/a.xyz two/b.xyz"),
         case("register, track", "register survey --track --guess poses/s.csv", "survey poses/s.csv"),
+        case("orient", "orient targets --by targets -c cal/c.ron", "targets cal/c.ron"),
+        case(
+            "orient, tracker",
+            "orient survey --by tracker --poses poses/t.txt --known poses/s.csv",
+            "survey poses/t.txt poses/s.csv",
+        ),
+        case("orient, imu", "orient survey --by imu --known poses/s.csv", "survey poses/s.csv"),
         case("compare", "compare one/a.xyz two/b.xyz", "one/a.xyz two/b.xyz"),
         case("compare, outputs", "compare older newer", "older newer"),
     ]
@@ -96,6 +103,7 @@ fn world() -> TempDir {
     copy(&at("targets"), &at("lens"));
     fs::copy(at("survey/calibration.ron"), at("cal/c.ron")).unwrap();
     fs::copy(at("survey/stations.csv"), at("poses/s.csv")).unwrap();
+    fs::write(at("poses/t.txt"), "0 0 0 0 0 0 0 1\n1 0 0 0 0 0 0 1\n").unwrap();
     let stages = "stages: [Demodulate(), Average(), Unwrap()]";
     let network = "calibrate: (network: \"../networks/n.ron\", terms: [\"d0\"])";
     for (name, more) in [

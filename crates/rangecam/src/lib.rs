@@ -92,6 +92,9 @@ pub mod calibration {
     #[cfg(feature = "sensor-noise")]
     #[doc(inline)]
     pub use sensor_noise;
+    #[cfg(feature = "stored-values")]
+    #[doc(inline)]
+    pub use stored_values;
     #[cfg(feature = "targets")]
     #[doc(inline)]
     pub use targets;
@@ -111,6 +114,9 @@ pub mod application {
     #[cfg(feature = "commands")]
     #[doc(inline)]
     pub use commands;
+    #[cfg(feature = "orientation-tasks")]
+    #[doc(inline)]
+    pub use orientation_tasks;
     #[cfg(feature = "pipeline")]
     #[doc(inline)]
     pub use pipeline;

@@ -7,7 +7,7 @@ use std::path::Path;
 use commands::plan::{DemodulateOptions, DriftTreatment, Stage, ruled_out};
 use commands::{Doubt, DoubtKind, Judged, root_of};
 use pipeline::stages::{Line, corrects_ranges};
-use pipeline::survey::plausibility::{self, FrameWatch, SenseVotes};
+use pipeline::survey::plausibility::{self, FrameWatch, SenseVotes, StoredWatch};
 use pipeline::survey::{Purpose, compatible, open, read_calibration};
 use pipeline::{Error, Result};
 use range_io::calibration::{CalibratedDrift, Calibration};
@@ -155,7 +155,7 @@ fn inspect_frames(path: &Path, survey: &Survey, found: &mut Inspection) -> Resul
         _ => &[],
     };
     let mut line = Line::new(stages, &opened)?;
-    let (mut watch, mut votes) = (FrameWatch::default(), SenseVotes::default());
+    let (mut watch, mut votes, mut stored) = (FrameWatch::default(), SenseVotes::default(), StoredWatch::default());
     let (mut unreadable, mut judged) = (Vec::new(), BTreeSet::new());
     for (index, entry) in survey.frames.iter().enumerate() {
         let view = match opened.view(index) {
@@ -166,6 +166,7 @@ fn inspect_frames(path: &Path, survey: &Survey, found: &mut Inspection) -> Resul
             }
         };
         watch.look(&view);
+        stored.look(&opened, &view);
         // One frame of a station tells the sense of the phase.
         if survey.level <= Level::Phase && judged.insert(&entry.station) && judged.len() <= MOST_JUDGED {
             let mut views = vec![view];
@@ -179,9 +180,13 @@ fn inspect_frames(path: &Path, survey: &Survey, found: &mut Inspection) -> Resul
     if let Some(words) = votes.in_words() {
         found.add("phase", words);
     }
+    for (name, words) in stored.in_words() {
+        found.add(name, words);
+    }
     found.doubts.extend(opened.doubts);
     found.doubts.extend(watch.doubts());
     found.doubts.extend(votes.doubt());
+    found.doubts.extend(stored.doubts());
     Ok(())
 }
 

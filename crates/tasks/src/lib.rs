@@ -3,6 +3,7 @@
 mod compare;
 mod fixed_pattern;
 mod further_term;
+mod inertial_unit;
 mod inspect;
 mod noise;
 mod register;

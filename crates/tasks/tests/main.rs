@@ -15,6 +15,7 @@ mod outputs;
 mod real_captures;
 mod register;
 mod scattering;
+mod stored_values;
 mod track;
 mod warm_up_estimate;
 mod warming;

@@ -1,5 +1,6 @@
 //! Approximate poses, coordinates and calibration, also where observations contradict each other.
 
+mod image_start;
 pub(crate) mod settle;
 pub(crate) mod start;
 pub(crate) mod start_calibration;

@@ -66,7 +66,8 @@ impl<'n> Setup<'n> {
 /// fits best. Stations are oriented one after the other, the one with the most known targets first: where
 /// it has ranges, by absolute orientation of the points that image points and ranges make; else by resection. Targets
 /// follow from oriented stations as the median of their points, or as the intersection of rays. Where nothing at all
-/// is given, the station with the most ranges becomes the origin.
+/// is given, the station with the most ranges becomes the origin; without ranges, stations are oriented relative to each other by
+/// their image points, and the first of these is the origin.
 pub(crate) fn find_start(
     network: &Network,
     calibration: &Calibration,

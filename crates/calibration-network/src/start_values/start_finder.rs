@@ -7,6 +7,7 @@ use orientation::{
 
 use crate::functional_model::misfit::{Misfit, corrected_range, median};
 use crate::functional_model::setup::Calibration;
+use crate::start_values::image_start;
 use crate::start_values::settle::start_limit;
 use crate::start_values::start::Trust;
 use crate::{Error, Network, PassiveCamera, Result};
@@ -66,6 +67,8 @@ pub(crate) struct Finder<'n> {
     given: Vec<bool>,
     /// Whether something that is given is not taken: one of several starts, which may fail.
     is_rival: bool,
+    /// Why image points alone gave nothing to begin with.
+    no_seed: String,
 }
 
 impl<'n> Finder<'n> {
@@ -87,7 +90,18 @@ impl<'n> Finder<'n> {
         let given = targets.iter().map(Option::is_some).collect();
         let stations = stations.collect();
         let is_rival = !(trust.stations && trust.targets);
-        Self { network, calibration, stations, targets, of_station, of_target, local, given, is_rival }
+        Self {
+            network,
+            calibration,
+            stations,
+            targets,
+            of_station,
+            of_target,
+            local,
+            given,
+            is_rival,
+            no_seed: String::new(),
+        }
     }
 
     pub(crate) fn run(&mut self) -> Result<()> {
@@ -118,7 +132,8 @@ impl<'n> Finder<'n> {
         self.finish(&failed)
     }
 
-    /// Without any coordinates the station with the most ranges is the origin.
+    /// Without any coordinates the station with the most ranges is the origin; without ranges some stations are oriented
+    /// relative to each other.
     fn seed(&mut self) {
         let any_target = (0..self.stations.len()).any(|station| self.known_targets(station) >= NEEDED);
         if any_target || self.stations.iter().any(Option::is_some) {
@@ -129,6 +144,11 @@ impl<'n> Finder<'n> {
         let best = counted.filter(|(ranges, _)| *ranges >= NEEDED).max_by_key(|(ranges, i)| (*ranges, usize::MAX - i));
         if let Some((_, station)) = best {
             self.stations[station] = Some(Isometry3::identity());
+            return;
+        }
+        match image_start::poses(self.network, &self.calibration.camera) {
+            Ok(poses) => poses.into_iter().for_each(|(station, pose)| self.stations[station] = Some(pose)),
+            Err(reason) => self.no_seed = reason,
         }
     }
 
@@ -139,7 +159,11 @@ impl<'n> Finder<'n> {
             let reason = match &failed[station].1 {
                 reason if !reason.is_empty() => reason.clone(),
                 _ if self.stations.iter().all(Option::is_none) => {
-                    "there are neither coordinates of three targets, nor ranges, nor a pose to begin with".to_owned()
+                    format!(
+                        "there are neither coordinates of three targets, nor ranges, nor a pose to begin with, and image points \
+                         alone orient no stations: {}",
+                        self.no_seed
+                    )
                 }
                 _ => format!("it shares {known} targets with what can be oriented, and three are needed"),
             };

@@ -22,7 +22,6 @@ pub use results::summary::{
 };
 pub use run::calibrate;
 
-pub(crate) use network::control::pose_covariance;
 pub(crate) use network::distances::named_distances;
 pub(crate) use planes::offset::FoundTable;
 pub(crate) use results::certificate::{COVERAGE, is_notorious, notorious_pairs};

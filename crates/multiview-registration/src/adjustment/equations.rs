@@ -3,6 +3,7 @@
 use nalgebra::{DMatrix, DVector, Isometry3};
 
 use crate::adjustment::network::{Network, State};
+use crate::adjustment::turns::MeasuredTurn;
 use crate::error::{Error, Result};
 use crate::planes::elimination::{Eliminated, motion_of};
 use crate::planes::shared_planes::SharedPlane;
@@ -43,6 +44,20 @@ impl Equations {
                 self.normal[(place(row), place(column))] += normal[(row, column)];
             }
             self.right[place(row)] += right[row];
+        }
+    }
+
+    /// Adds a turn that was measured between two stations.
+    pub(crate) fn add_turn(&mut self, turn: &MeasuredTurn, poses: &[Isometry3<f64>]) {
+        let Some((residual, by)) = turn.linearised(poses) else { return };
+        let places = [6 * turn.first, 6 * turn.second];
+        for (by_row, row) in by.iter().zip(places) {
+            for (by_column, column) in by.iter().zip(places) {
+                let mut block = self.normal.fixed_view_mut::<6, 6>(row, column);
+                block += by_row.transpose() * by_column;
+            }
+            let mut right = self.right.fixed_rows_mut::<6>(row);
+            right += by_row.transpose() * residual;
         }
     }
 

@@ -5,3 +5,4 @@ pub(crate) mod network;
 pub(crate) mod precision;
 pub(crate) mod rounds;
 pub(crate) mod simultaneous;
+pub(crate) mod turns;

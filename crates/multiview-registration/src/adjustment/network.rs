@@ -3,6 +3,7 @@
 use adjust::{Adjustment, BlockId, Covariance, FunctionObservation, ParameterBlock, SolveOptions};
 use nalgebra::{DVector, Isometry3, Matrix6, Vector6};
 
+use crate::adjustment::turns::MeasuredTurn;
 use crate::error::Result;
 use crate::planes::reduction::{PairContacts, Reduced};
 use crate::relative_pose::{adjustment, relative_pose_parts};
@@ -24,6 +25,7 @@ pub(crate) struct Network<'a> {
     pub turn_rad: f64,
     pub names: &'a [String],
     pub prior: &'a (Vec<f64>, Vec<f64>),
+    pub turns: &'a [MeasuredTurn],
 }
 
 impl Network<'_> {
@@ -58,6 +60,11 @@ impl Network<'_> {
             let observation = observation(blocks, reduced, &state.parameters);
             let unit = Covariance::from_sigmas(&vec![1.0; reduced.rows.nrows()]);
             network.add_observation(group, observation, &unit).map_err(adjustment)?;
+        }
+        let group = network.add_group("measured turns");
+        for (turn, reduced) in self.turns.iter().filter_map(|turn| Some((turn, turn.reduced(&state.poses)?))) {
+            let observation = observation(vec![stations[turn.first], stations[turn.second]], &reduced, &[]);
+            network.add_observation(group, observation, &Covariance::from_sigmas(&[1.0; 3])).map_err(adjustment)?;
         }
         // Contacts are found anew after each step: below a thousandth of a standard deviation there is nothing to gain.
         let options = SolveOptions { step_tolerance: 1e-3, ..SolveOptions::default() };

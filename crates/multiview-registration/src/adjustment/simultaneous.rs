@@ -179,6 +179,7 @@ impl Finish<'_> {
                 equations.add(shared_plane, eliminated, &state.poses);
             }
         }
+        self.network.turns.iter().for_each(|turn| equations.add_turn(turn, &state.poses));
         let (step, _) = equations.solved(&self.near, state)?;
         let (_, cofactors) = equations.solved(self.network, state)?;
         for (shared_plane, eliminated) in known.iter_mut().zip(&eliminated) {

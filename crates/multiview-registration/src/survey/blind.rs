@@ -8,6 +8,7 @@
 use nalgebra::Isometry3;
 use rayon::prelude::*;
 
+use crate::adjustment::turns::{MeasuredTurn, allows};
 use crate::agreement::placement::agrees_as_usual;
 use crate::error::{Error, Result};
 use crate::survey::registration::Start;
@@ -48,7 +49,12 @@ struct Arrangement {
 }
 
 /// Poses of all stations, right to a part of a voxel but for what they slid together.
-pub(crate) fn arranged(stations: &[Cloud], start: Start<'_>, held: usize) -> Result<Vec<Isometry3<f64>>> {
+pub(crate) fn arranged(
+    stations: &[Cloud],
+    start: Start<'_>,
+    held: usize,
+    turns: &[MeasuredTurn],
+) -> Result<Vec<Isometry3<f64>>> {
     let options = CoarseOptions { max_hypotheses: VERIFIED, ..CoarseOptions::default() };
     let features: std::result::Result<Vec<FeatureCloud>, global_registration::Error> =
         stations.par_iter().map(|cloud| FeatureCloud::new(cloud, &options)).collect();
@@ -56,6 +62,7 @@ pub(crate) fn arranged(stations: &[Cloud], start: Start<'_>, held: usize) -> Res
     let pairs = pairs(start, clouds.len());
     let candidate = |&(target, source): &(usize, usize)| {
         let mut poses = hypotheses(&clouds[source], &clouds[target], &options)?;
+        poses.retain(|(pose, _)| allows(turns, [target, source], &pose.rotation));
         poses.truncate(HYPOTHESES);
         Ok(Candidate { target, source, poses })
     };

@@ -76,7 +76,7 @@ impl Adjusted {
     fn pair(&self, target: usize, source: usize, hold_m: f64, size_m: f64) -> Result<PairAlignment> {
         let poses = [self.state.poses[target], self.state.poses[source]];
         let none = (Vec::new(), Vec::new());
-        let network = Network { fixed: 0, hold_m, turn_rad: 1.0, names: &[], prior: &none };
+        let network = Network { fixed: 0, hold_m, turn_rad: 1.0, names: &[], prior: &none, turns: &[] };
         let mut equations = Equations::new(2, 0);
         for ((shared_plane, variances), means) in self.shared_planes.iter().zip(&self.variances).zip(&self.means) {
             let sees = |station: usize| means.iter().any(|mean| mean.station == station);

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, Isometry3, Matrix6};
 
+use crate::adjustment::turns::MeasuredTurn;
 use crate::agreement::alignments::{PairAlignment, RefusedPair};
 use crate::agreement::loops::LoopClosure;
 use crate::agreement::placement::Placements;
@@ -33,13 +34,16 @@ pub struct StationRegistrationOptions<'a> {
     /// Smallest part of a station that must overlap another for the two to be aligned as a pair. Default 0.3.
     /// The simultaneous adjustment takes whatever overlaps.
     pub minimum_overlap: f64,
+    /// Turns between stations that an inertial unit measured: they choose among the poses that features allow, and are observations of
+    /// the adjustment beside the surfaces. Default: none.
+    pub turns: &'a [MeasuredTurn],
     /// Parameters that all stations share, to be estimated with the poses. Default: none.
     pub model: Option<&'a dyn PointModel>,
 }
 
 impl Default for StationRegistrationOptions<'_> {
     fn default() -> Self {
-        Self { start_error_m: None, patch_m: None, minimum_overlap: 0.3, model: None }
+        Self { start_error_m: None, patch_m: None, minimum_overlap: 0.3, turns: &[], model: None }
     }
 }
 
@@ -49,6 +53,7 @@ impl std::fmt::Debug for StationRegistrationOptions<'_> {
             .field("start_error_m", &self.start_error_m)
             .field("patch_m", &self.patch_m)
             .field("minimum_overlap", &self.minimum_overlap)
+            .field("turns", &self.turns)
             .field("model", &self.model.map(PointModel::names))
             .finish_non_exhaustive()
     }

@@ -59,7 +59,7 @@ pub fn register_stations(
     let radius_m = surfaces.iter().map(|surface| surface.radius_m).fold(0.0, f64::max);
     let poses = match start {
         Start::Poses(poses) => poses.to_vec(),
-        _ => crate::survey::blind::arranged(stations, start, datum.held_station())?,
+        _ => crate::survey::blind::arranged(stations, start, datum.held_station(), options.turns)?,
     };
     // Stations that were arranged by what they saw may have slid along walls together: they are not known better.
     let reach_m = options.start_error_m.unwrap_or(START_ERROR * radius_m);
@@ -67,8 +67,14 @@ pub fn register_stations(
         Some(model) => (checked_prior(model)?, model.names()),
         None => Default::default(),
     };
-    let network =
-        Network { fixed: datum.held_station(), hold_m: radius_m, turn_rad: 1.0, names: &names, prior: &prior };
+    let network = Network {
+        fixed: datum.held_station(),
+        hold_m: radius_m,
+        turn_rad: 1.0,
+        names: &names,
+        prior: &prior,
+        turns: options.turns,
+    };
     let total = |done| progress(done, MOST_ROUNDS);
     let wide_rounds = WideRounds { network: &network, reach_m, progress: &total };
     let mut modelled = Surfaces::fixed(surfaces.iter().collect());
@@ -140,6 +146,7 @@ fn validate(
     if station >= count {
         return Err(Error::NoSuchStation { station, count });
     }
+    options.turns.iter().try_for_each(|turn| turn.check(count))?;
     let lengths = [("start_error_m", options.start_error_m), ("patch_m", options.patch_m)];
     for (name, value) in lengths {
         if let Some(value) = value

@@ -8,6 +8,7 @@ mod determined;
 mod equations;
 mod estimate;
 mod options;
+mod predicted;
 
 pub use carrier::TimedPose;
 pub use determined::Undetermined;

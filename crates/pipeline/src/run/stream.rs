@@ -12,7 +12,7 @@ use crate::Result;
 use crate::stages::average::Tests;
 use crate::stages::{Line, Watch};
 use crate::survey::open::OpenSurvey;
-use crate::survey::plausibility::FrameWatch;
+use crate::survey::plausibility::{FrameWatch, StoredWatch};
 use crate::survey::view::View;
 use commands::Doubt;
 use commands::Progress;
@@ -90,6 +90,7 @@ struct Stream<'a> {
     waiting: std::vec::IntoIter<usize>,
     read: VecDeque<View>,
     looked: FrameWatch,
+    stored: StoredWatch,
     done: usize,
 }
 
@@ -105,12 +106,15 @@ pub(crate) fn stream(
 ) -> Result<Vec<Doubt>> {
     let waiting: Vec<usize> = order.units.iter().flatten().flatten().copied().collect();
     progress.begin("frames", waiting.len());
-    let (waiting, read, looked) = (waiting.into_iter(), VecDeque::new(), FrameWatch::default());
-    let mut stream = Stream { survey, line, watch, progress, waiting, read, looked, done: 0 };
+    let (waiting, read) = (waiting.into_iter(), VecDeque::new());
+    let (looked, stored) = (FrameWatch::default(), StoredWatch::default());
+    let mut stream = Stream { survey, line, watch, progress, waiting, read, looked, stored, done: 0 };
     for unit in &order.units {
         stream.unit(unit)?.into_iter().try_for_each(&mut *keep)?;
     }
-    Ok(stream.looked.doubts())
+    let mut doubts = stream.looked.doubts();
+    doubts.extend(stream.stored.doubts());
+    Ok(doubts)
 }
 
 impl Stream<'_> {
@@ -176,7 +180,10 @@ impl Stream<'_> {
             let views = indices.into_par_iter().map(|index| self.survey.view(index));
             self.read = views.collect::<Result<VecDeque<View>>>()?;
             self.progress.frames_in_memory(self.survey.live.count());
-            self.read.iter().for_each(|view| self.looked.look(view));
+            for view in &self.read {
+                self.looked.look(view);
+                self.stored.look(self.survey, view);
+            }
         }
         self.read.pop_front().ok_or_else(|| crate::Error::unfit("read frames", "the survey", "no frame"))
     }

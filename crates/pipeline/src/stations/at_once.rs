@@ -1,7 +1,9 @@
 //! All stations registered at once: what the stages `Register` and `Adjust` and the command `rangecam register` share.
 
 use multiview_registration::rigid_pose::Uncertain;
-use multiview_registration::{Datum, Error, Start, StationRegistration, StationRegistrationOptions, register_stations};
+use multiview_registration::{
+    Datum, Error, MeasuredTurn, Start, StationRegistration, StationRegistrationOptions, register_stations,
+};
 use nalgebra::{Isometry3, Matrix6};
 use point_cloud::Cloud;
 
@@ -9,7 +11,7 @@ use crate::survey::records::StationPose;
 use commands::Progress;
 
 /// Registers clouds with the first one as datum. `limits` are the smallest overlap of a pair and how far the start may be off,
-/// metre; `None`: the defaults for clouds of unknown origin. Progress that has begun is advanced.
+/// metre; `None`: the defaults for clouds of unknown origin. `turns` are those that an inertial unit measured. Progress that has begun is advanced.
 ///
 /// # Errors
 /// As [`register_stations`].
@@ -17,9 +19,10 @@ pub fn register_at_once(
     clouds: &[Cloud],
     start: Start<'_>,
     limits: Option<(f64, f64)>,
+    turns: &[MeasuredTurn],
     progress: &dyn Progress,
 ) -> Result<StationRegistration, Error> {
-    let mut options = StationRegistrationOptions::default();
+    let mut options = StationRegistrationOptions { turns, ..StationRegistrationOptions::default() };
     if let Some((minimum_overlap, start_error_m)) = limits {
         (options.minimum_overlap, options.start_error_m) = (minimum_overlap, Some(start_error_m));
     }

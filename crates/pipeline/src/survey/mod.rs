@@ -16,7 +16,7 @@ pub use compatible::{Purpose, UNKNOWN_INTEGRATION_TIME_S, compatible, model_set}
 pub use correction_record::CorrectionRecord;
 pub use drift::{DriftCurve, DriftSource, FrameRatePart, ViewDrift};
 pub use open::{OpenSurvey, open, read_calibration};
-pub use plausibility::{FrameWatch, SenseVotes};
+pub use plausibility::{FrameWatch, SenseVotes, StoredWatch};
 pub use records::{AdjustmentFigures, RefusedStage, StageSummary, StationPose, ViewRecord};
 pub use truth::{RangeTruth, ViewTruth};
 pub use view::{FurtherPoint, LiveFrames, Snapshot, View, ViewData, view_name};

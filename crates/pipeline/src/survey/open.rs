@@ -129,6 +129,16 @@ impl OpenSurvey {
         self.calibrated_camera.unwrap_or(self.nominal_camera)
     }
 
+    /// Rays of the camera in use, by which depths become ranges.
+    pub(crate) fn depth_rays(&self) -> &RayTable {
+        &self.depth_rays
+    }
+
+    /// The modulations that the survey states.
+    pub(crate) fn modulations(&self) -> &[Modulation] {
+        &self.modulations
+    }
+
     /// Where the survey says that a station stands.
     pub fn approximate_pose(&self, station: &str) -> Option<Isometry3<f64>> {
         pose_of(&self.stated, station)

@@ -4,6 +4,7 @@ mod arrays;
 mod camera;
 mod depth;
 mod frame;
+mod inertial;
 #[cfg(feature = "png16")]
 mod sequence;
 mod truth;
@@ -17,6 +18,7 @@ use serde::{Deserialize, Serialize};
 
 pub use camera::SurveyCamera;
 pub use frame::{InputFrame, read_frame};
+pub use inertial::{INERTIAL_DATA, INERTIAL_MOUNTING, read_inertial};
 pub use range_image::PhaseSense;
 pub use truth::{TruthFrame, read_truth, write_truth};
 pub use write::write_frame;

@@ -5,6 +5,7 @@ pub(crate) mod compare_arguments;
 pub(crate) mod explain_arguments;
 pub(crate) mod fixed_pattern_arguments;
 pub(crate) mod noise_arguments;
+pub(crate) mod orient_arguments;
 pub(crate) mod register_arguments;
 pub(crate) mod scattering_arguments;
 pub(crate) mod values;

@@ -27,6 +27,12 @@ fn number(text: &str, holds: impl Fn(f64) -> bool, expected: &str) -> Result<f64
     value.ok_or_else(|| format!("expected {expected}"))
 }
 
+/// Three finite numbers between commas.
+pub(crate) fn lengths(text: &str) -> Result<[f64; 3], String> {
+    let numbers: Result<Vec<f64>, String> = text.split(',').map(finite).collect();
+    numbers?.try_into().map_err(|_| "expected three numbers between commas".to_owned())
+}
+
 /// `auto`, or names between commas or blanks.
 pub(crate) fn terms(text: &str) -> Result<Terms, String> {
     if text.trim() == "auto" {
@@ -82,6 +88,12 @@ mod tests {
         }
         assert!(positive("0").is_err() && share("1.01").is_err() && finite("inf").is_err());
         assert_eq!((not_negative("0"), share("1"), finite("-2.5")), (Ok(0.0), Ok(1.0), Ok(-2.5)));
+    }
+
+    #[test]
+    fn lengths_are_three() {
+        assert_eq!(lengths("0.1,-2, 3"), Ok([0.1, -2.0, 3.0]));
+        assert!(["", "1,2", "1,2,3,4", "1,nan,2"].iter().all(|text| lengths(text).is_err()));
     }
 
     #[test]

@@ -2,16 +2,14 @@
 
 use std::path::Path;
 
-use nalgebra::{Isometry3, Matrix3, Matrix4, Rotation3, UnitQuaternion};
+use nalgebra::Isometry3;
 use pipeline::stations::Station;
 use pipeline::{Error, Result};
 use range_io::tables::{Station as StationRow, read_stations};
-use range_io::trajectory::{StampedPose, read_any_trajectory};
+use range_io::trajectory::{StampedPose, read_any_trajectory, read_matrix};
 
 /// Times of a trajectory and of frames belong together within this, second.
 const SAME_TIME_S: f64 = 5e-3;
-/// How far the rows of a rotation may be from unit length and right angles.
-const ROTATION_TOLERANCE: f64 = 1e-3;
 
 /// What a file says of poses.
 pub(crate) enum Guess {
@@ -30,7 +28,7 @@ impl Guess {
         if path.extension().is_some_and(|ending| ending == "csv") && of_stations() {
             return Ok(Self::Stations(read_stations(path)?));
         }
-        match matrix(path)? {
+        match read_matrix(path)? {
             Some(second_to_first) => Ok(Self::Matrix(second_to_first)),
             None => Ok(Self::Trajectory(read_any_trajectory(path)?)),
         }
@@ -70,33 +68,6 @@ pub(crate) fn apply(path: &Path, stations: &mut [Station]) -> Result<()> {
         station.approximate_sigma = [None; 2];
     }
     Ok(())
-}
-
-/// A file of sixteen numbers, row by row; `None` where it is something else.
-pub(crate) fn matrix(path: &Path) -> Result<Option<Isometry3<f64>>> {
-    // Some trajectories are folders.
-    if path.is_dir() {
-        return Ok(None);
-    }
-    let text = range_io::read_text(path)?;
-    let words: Vec<&str> = text.split([' ', '\t', '\n', '\r', ',', ';']).filter(|word| !word.is_empty()).collect();
-    let numbers: Vec<f64> = words.iter().filter_map(|word| word.parse().ok()).collect();
-    if words.len() != 16 || numbers.len() != 16 {
-        return Ok(None);
-    }
-    let matrix = Matrix4::from_row_slice(&numbers);
-    let turn: Matrix3<f64> = matrix.fixed_view::<3, 3>(0, 0).into_owned();
-    let last_row = [matrix[(3, 0)], matrix[(3, 1)], matrix[(3, 2)], matrix[(3, 3)]];
-    let is_rotation = (turn * turn.transpose() - Matrix3::identity()).norm() < ROTATION_TOLERANCE
-        && turn.determinant() > 0.0
-        && last_row.map(f64::to_bits) == [0.0, 0.0, 0.0, 1.0].map(f64::to_bits)
-        && matrix.iter().all(|value| value.is_finite());
-    if !is_rotation {
-        return Err(wrong(path, "is no rigid motion: expected a rotation, a translation and 0 0 0 1"));
-    }
-    let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix(&turn));
-    let translation = matrix.fixed_view::<3, 1>(0, 3).into_owned().into();
-    Ok(Some(Isometry3::from_parts(translation, rotation)))
 }
 
 fn wrong(path: &Path, message: &str) -> Error {

@@ -6,6 +6,7 @@ use commands::plan::{
     CorrectImagePointOptions, CorrectRangeOptions, FlagOptions, FuseExposuresOptions, PointCloudOptions, to_ranges,
 };
 use commands::{Doubt, Progress, root_of};
+use multiview_registration::MeasuredTurn;
 use pipeline::run::process_each;
 use pipeline::stages::corrects_ranges;
 use pipeline::stations::{Station, projection};
@@ -16,7 +17,8 @@ use range_io::clouds::read_any_cloud;
 use range_io::survey::{Level, Survey};
 use statistics::quantile;
 
-use crate::register::RegisterRequest;
+use crate::inertial_unit;
+use crate::register::{RegisterMethod, RegisterRequest};
 
 /// Everything that is to be registered.
 pub(crate) struct Input {
@@ -24,6 +26,8 @@ pub(crate) struct Input {
     pub(crate) stations: Vec<Station>,
     /// Index of the axis of the common frame that points up, as far as one can tell.
     pub(crate) vertical_axis: usize,
+    /// Turns from station to station, where the survey has an inertial unit.
+    pub(crate) turns: Vec<MeasuredTurn>,
     /// What speaks against the frames.
     pub(crate) doubts: Vec<Doubt>,
 }
@@ -86,7 +90,12 @@ fn survey_stations(path: &Path, request: &RegisterRequest, progress: &dyn Progre
     }
     let mut doubts = processed.doubts;
     doubts.extend(plausibility::of_views(&processed.records, &[]));
-    Ok(Input { stations, vertical_axis: processed.vertical_axis, doubts })
+    let turns = if request.method == RegisterMethod::Multi {
+        inertial_unit::turns(path, &survey, &stations)?
+    } else {
+        Vec::new()
+    };
+    Ok(Input { stations, vertical_axis: processed.vertical_axis, turns, doubts })
 }
 
 /// The way from the survey's level to flagged points, as far as the calibration has something to say.
@@ -124,7 +133,7 @@ fn cloud_stations(paths: &[PathBuf], progress: &dyn Progress) -> Result<Input> {
         progress.advance(index + 1);
     }
     let vertical_axis = flattest(&stations[0].file.points);
-    Ok(Input { stations, vertical_axis, doubts: Vec::new() })
+    Ok(Input { stations, vertical_axis, turns: Vec::new(), doubts: Vec::new() })
 }
 
 /// The axis along which the cloud is thinnest: up, where the cloud is of a landscape or of rooms.

@@ -27,7 +27,7 @@ const MOST_OVER_NOISE: f64 = 2.0;
 const LOOSE_LOOP: f64 = 20.0;
 
 pub(crate) fn run(input: Input, start: &str, progress: &dyn Progress) -> Result<Registered> {
-    let Input { stations, vertical_axis, .. } = input;
+    let Input { stations, vertical_axis, turns, .. } = input;
     let before: Option<Vec<Isometry3<f64>>> = stations.iter().map(|station| station.approximate).collect();
     let clouds_with = |windows: Windows| {
         stations.par_iter().map(|station| station.cloud(NORMAL_HALF_WIDTH_PX, windows)).collect::<Result<Vec<_>>>()
@@ -40,7 +40,7 @@ pub(crate) fn run(input: Input, start: &str, progress: &dyn Progress) -> Result<
     };
     let names: Vec<String> = stations.iter().map(|station| station.name.clone()).collect();
     progress.begin("register stations", stations.len());
-    let attempt = |clouds: &[Cloud], start: Start<'_>| register_at_once(clouds, start, None, progress);
+    let attempt = |clouds: &[Cloud], start: Start<'_>| register_at_once(clouds, start, None, &turns, progress);
     let (found, tried, words) = match attempt(&clouds, known) {
         // Free space that noise or wrapped ranges fill speaks against every arrangement; neighbours may still fit.
         Err(UnconnectedStations { stations: lost, to, reasons }) if before.is_none() => match pairs::chained(&stations)

@@ -9,7 +9,7 @@ use commands::{Doubt, Progress, root_of};
 use nalgebra::Isometry3;
 use pipeline::stages::{Line, Step, Watch};
 use pipeline::stations::projection;
-use pipeline::survey::{FrameWatch, OpenSurvey, Purpose, SenseVotes, View, open, read_calibration};
+use pipeline::survey::{FrameWatch, OpenSurvey, Purpose, SenseVotes, StoredWatch, View, open, read_calibration};
 use pipeline::{Error, Result, Stage};
 use range_io::survey::Survey;
 
@@ -27,6 +27,7 @@ pub(crate) struct FrameSource {
     pub(crate) order: Vec<usize>,
     watch: FrameWatch,
     votes: SenseVotes,
+    stored: StoredWatch,
 }
 
 /// The points of one frame, a pixel each, NaN where nothing was measured or a flag excludes it.
@@ -44,7 +45,14 @@ impl FrameSource {
         // Frames of a moving camera are not averaged.
         stages.retain(|stage| !matches!(stage, Stage::Average(_)));
         let line = Line::new(&stages, &survey)?;
-        Ok(Self { survey, line, order, watch: FrameWatch::of_stream(), votes: SenseVotes::default() })
+        Ok(Self {
+            survey,
+            line,
+            order,
+            watch: FrameWatch::of_stream(),
+            votes: SenseVotes::default(),
+            stored: StoredWatch::default(),
+        })
     }
 
     /// How points fall on the camera's pixels.
@@ -81,6 +89,7 @@ impl FrameSource {
         };
         progress.frames_in_memory(self.survey.live.count());
         self.watch.look(&view);
+        self.stored.look(&self.survey, &view);
         let mut views = vec![view];
         let mut sense = Sense { votes: &mut self.votes, votes_now: index.is_multiple_of(SENSE_EVERY) };
         self.line.apply(&mut views, &mut sense)?;
@@ -104,6 +113,7 @@ impl FrameSource {
         doubts.extend(self.line.steps().iter().flat_map(Step::doubts).cloned());
         doubts.extend(self.watch.doubts());
         doubts.extend(self.votes.doubt());
+        doubts.extend(self.stored.doubts());
         for step in self.line.steps() {
             doubts.extend(step.judge_span(&self.survey)?);
         }

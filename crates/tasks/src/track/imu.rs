@@ -2,17 +2,11 @@
 
 use std::path::Path;
 
-use nalgebra::Vector3;
 use pipeline::{Error, Result};
-use range_io::survey::Survey;
-use range_io::tables::read_imu;
+use range_io::survey::{INERTIAL_DATA, Survey};
 use tracking::{ImuIntegrator, ImuOptions, InertialSample, MotionPrior, TrackedPose};
 
-use crate::register::guess::matrix;
-
-/// Names among a survey's extras: the data, and sixteen numbers that lead from the unit's axes to the camera's.
-const DATA: &str = "imu";
-const MOUNTING: &str = "camera_from_imu";
+use crate::inertial_unit;
 
 /// Motions between frames from an inertial unit.
 pub(crate) struct Inertial {
@@ -24,22 +18,8 @@ pub(crate) struct Inertial {
 impl Inertial {
     /// Reads what the survey names; `None` where it names nothing.
     pub(crate) fn read(survey: &Survey, root: &Path) -> Result<Option<Self>> {
-        let Some(file) = survey.extras.get(DATA) else { return Ok(None) };
-        let sample = |sample: range_io::tables::ImuSample| InertialSample {
-            timestamp_s: sample.timestamp_s,
-            angular_rate: Vector3::from(sample.angular_rate),
-            specific_force: Vector3::from(sample.acceleration),
-        };
-        let samples = read_imu(root.join(file))?.into_iter().map(sample).collect();
-        let mut options = ImuOptions::default();
-        if let Some(file) = survey.extras.get(MOUNTING) {
-            let path = root.join(file);
-            let mounting = matrix(&path)?;
-            options.camera_from_body = mounting.ok_or_else(|| {
-                let message = format!("{}: expected the sixteen numbers of a 4 x 4 matrix", path.display());
-                Error::Request { command: "register", message }
-            })?;
-        }
+        let Some((samples, camera_from_body)) = inertial_unit::read(survey, root)? else { return Ok(None) };
+        let options = ImuOptions { camera_from_body, ..ImuOptions::default() };
         Ok(Some(Self { samples, options, integrator: None }))
     }
 
@@ -47,7 +27,7 @@ impl Inertial {
     pub(crate) fn motion(&mut self, timestamp_s: f64) -> Result<Option<MotionPrior>> {
         let refused = |error: tracking::Error| {
             let what = format!(
-                "inertial data at {timestamp_s} s (without `{DATA}` among its extras the survey is tracked by its \
+                "inertial data at {timestamp_s} s (without `{INERTIAL_DATA}` among its extras the survey is tracked by its \
                  frames alone)"
             );
             Error::registration(&what, &error)

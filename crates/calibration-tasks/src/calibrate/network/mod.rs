@@ -1,6 +1,5 @@
 //! The tables of a network of targets.
 
-pub(crate) mod control;
 pub(crate) mod distances;
 pub(crate) mod network_check;
 pub(crate) mod network_files;

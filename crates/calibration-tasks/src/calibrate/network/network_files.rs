@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use commands::plan::DriftTreatment;
 use commands::root_of;
 use nalgebra::{Matrix3, Point3, Vector3};
+use pipeline::stations::pose_covariance;
 use pipeline::survey::ViewDrift;
 use pipeline::{Error, Result};
 use range_io::survey::Survey;
@@ -15,7 +16,6 @@ use range_io::tables::{
 };
 use self_calibration::{Network, NetworkTarget, Sighting, Station};
 
-use crate::calibrate::network::control::pose_covariance;
 use crate::calibrate::network::distances::named_distances;
 use crate::calibrate::network::passive::read_passive;
 use crate::calibrate::request::TableDefaults;

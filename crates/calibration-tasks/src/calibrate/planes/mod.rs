@@ -11,6 +11,7 @@ use commands::{Progress, root_of};
 use error_models::{RangeTerms, SurfaceShape};
 use nalgebra::{Isometry3, Point3, Vector3};
 use pipeline::run::Processed;
+use pipeline::stations::pose_covariance;
 use pipeline::survey::{ViewData, ViewDrift};
 use pipeline::{Error, Plan, Result, process};
 use range_calibration::{
@@ -21,7 +22,6 @@ use range_io::survey::{Level, Survey};
 use range_io::tables::{ObservedPlane, PlacedRows, Station, read_placed_planes, read_placed_stations};
 use self_calibration::{Error as Cause, NetworkError, TermSelection};
 
-use crate::calibrate::network::control::pose_covariance;
 use crate::calibrate::network::network_files::optional;
 use crate::calibrate::planes::attempt::{Attempt, Calibrated};
 use crate::calibrate::planes::offset::FoundTable;

@@ -45,7 +45,7 @@ fn again(joined: &mut Joined, options: &AdjustOptions, progress: &dyn Progress) 
     let initial: Vec<Isometry3<f64>> = joined.poses.iter().map(|pose| pose.world_from_camera).collect();
     progress.begin("Adjust", joined.clouds.len());
     let limits = Some((options.minimum_overlap, options.maximum_distance_m));
-    let found = register_at_once(&joined.clouds, Start::Poses(&initial), limits, progress);
+    let found = register_at_once(&joined.clouds, Start::Poses(&initial), limits, &[], progress);
     let tried = Tried::Poses(Some(options.maximum_distance_m));
     let found = found.map_err(|error| refused::of_stage("Adjust", error, &joined.names, tried))?;
     let (adjusted, pairs, refused) = Registered::new(found, &Isometry3::identity(), options.minimum_overlap);

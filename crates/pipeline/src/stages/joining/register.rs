@@ -57,7 +57,7 @@ fn at_once(
         Start::Order => Tried::Order,
         Start::Nothing => Tried::AllPairs,
     };
-    let found = register_at_once(&clouds, start, limits, progress);
+    let found = register_at_once(&clouds, start, limits, &[], progress);
     let found = found.map_err(|error| refused::of_stage("Register", error, &names, tried))?;
     let world = world(stated, found.world_from_station.first());
     let (registered, pairs, refused) = Registered::new(found, &world, options.minimum_overlap);

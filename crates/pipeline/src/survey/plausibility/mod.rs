@@ -8,12 +8,14 @@ pub(crate) mod placed;
 pub(crate) mod result;
 pub(crate) mod sense;
 pub(crate) mod statement;
+pub(crate) mod stored;
 
 pub use frames::FrameWatch;
 pub use placed::{PlacedStation, displaced, uncertain, uncertain_frames};
 pub use result::{beyond_maximum, mostly_flagged, of_views, stated_sigma};
 pub use sense::SenseVotes;
 pub use statement::{far_apart, of_survey};
+pub use stored::StoredWatch;
 
 /// Metre: nearer or further than any time-of-flight camera of this kind measures, and what metres become when they are
 /// taken for millimetres or kilometres.

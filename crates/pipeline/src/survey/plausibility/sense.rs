@@ -65,7 +65,16 @@ impl SenseVotes {
     /// How they voted; `None` where no window could.
     pub fn in_words(&self) -> Option<String> {
         let all = self.falls + self.rises;
-        (all > 0).then(|| format!("amplitudes fall with range on {} of {all} pieces of surface", self.falls))
+        let seen = || format!("amplitudes fall with range on {} of {all} pieces of surface", self.falls);
+        let sure = |votes: usize| votes as f64 - 0.5 * all as f64 > SIGMAS * 0.5 * (all as f64).sqrt();
+        let verdict = if sure(self.falls) {
+            "grows with range"
+        } else if self.doubt().is_some() {
+            "falls with range"
+        } else {
+            "whether it grows with range cannot be told"
+        };
+        (all > 0).then(|| format!("{verdict}: {}", seen()))
     }
 
     /// Whether they are sure of the wrong sense.

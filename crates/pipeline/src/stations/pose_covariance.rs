@@ -12,7 +12,7 @@ const UNKNOWN_ATTITUDE_SIGMA_RAD: f64 = 10.0;
 
 /// Covariance of a pose's tangent step `[dt world m, dθ camera rad]`; `None` where the table gives no standard
 /// deviation.
-pub(crate) fn pose_covariance(row: &Station) -> Option<Matrix6<f64>> {
+pub fn pose_covariance(row: &Station) -> Option<Matrix6<f64>> {
     if row.sigma_position_m.is_none() && row.sigma_attitude_rad.is_none() {
         return None;
     }
@@ -52,7 +52,7 @@ mod tests {
     use camera_model::pose_from_euler;
 
     use super::*;
-    use pipeline::survey::StationPose;
+    use crate::survey::StationPose;
 
     #[test]
     fn sigmas_of_a_table_come_back_from_the_covariance() {

@@ -1,0 +1,146 @@
+//! Turns between stations that something else measures: an inertial unit.
+
+use adjust::RigidPose;
+use nalgebra::{DMatrix, DVector, Isometry3, Matrix3, Matrix3x6, UnitQuaternion, Vector3};
+
+use crate::error::{Error, Result};
+use crate::planes::reduction::Reduced;
+use crate::relative_pose::relative_pose_parts;
+
+/// Angle, radian, by which a pose that features propose may differ from what was measured: voxels leave some degrees.
+const COARSE_RAD: f64 = 0.15;
+/// Standard deviations of the measured turn by which it may differ.
+const SIGMAS: f64 = 5.0;
+
+/// How the camera turned between two stations, as an inertial unit measures it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MeasuredTurn {
+    /// Index of one station.
+    pub first: usize,
+    /// Index of the other.
+    pub second: usize,
+    /// Attitude of the second in the axes of the first.
+    pub first_from_second: UnitQuaternion<f64>,
+    /// Covariance of its tangent (axes of the second), radian². Errors of different turns are taken as independent.
+    pub covariance: Matrix3<f64>,
+}
+
+impl MeasuredTurn {
+    /// Refuses turns of stations that are not there, and covariances that are none.
+    pub(crate) fn check(&self, stations: usize) -> Result<()> {
+        for station in [self.first, self.second] {
+            if station >= stations {
+                return Err(Error::NoSuchStation { station, count: stations });
+            }
+        }
+        let whole = self.first_from_second.coords.iter().all(|value| value.is_finite()) && self.first != self.second;
+        if !whole || self.whitening().is_none() {
+            return Err(Error::NonFinite { what: "turns between stations, or their covariance", index: self.first });
+        }
+        Ok(())
+    }
+
+    /// W with `Wᵀ W` the inverse of the covariance.
+    fn whitening(&self) -> Option<Matrix3<f64>> {
+        self.covariance.cholesky()?.l().try_inverse().filter(|inverse| inverse.iter().all(|value| value.is_finite()))
+    }
+
+    /// The relative pose with this turn, its translation as it is at these poses.
+    fn observed(&self, poses: &[Isometry3<f64>]) -> Option<Isometry3<f64>> {
+        let model = poses.get(self.first)?.inverse() * poses.get(self.second)?;
+        Some(Isometry3::from_parts(model.translation, self.first_from_second))
+    }
+
+    /// As the rows of a pair of stations.
+    pub(crate) fn reduced(&self, poses: &[Isometry3<f64>]) -> Option<Reduced> {
+        let mut rows = DMatrix::zeros(3, 6);
+        rows.fixed_view_mut::<3, 3>(0, 3).copy_from(&self.whitening()?);
+        Some(Reduced { rows, right: DVector::zeros(3), pose: self.observed(poses)? })
+    }
+
+    /// Whitened residual and its derivatives by the tangents of both poses.
+    pub(crate) fn linearised(&self, poses: &[Isometry3<f64>]) -> Option<(Vector3<f64>, [Matrix3x6<f64>; 2])> {
+        let values = [self.first, self.second].map(|station| poses.get(station).map(RigidPose::values));
+        let [Some(first), Some(second)] = values else { return None };
+        let (v, by_first, by_second) = relative_pose_parts(&self.observed(poses)?, &[&first, &second]).ok()?;
+        let whitening = self.whitening()?;
+        let rows = |by: nalgebra::Matrix6<f64>| whitening * by.fixed_rows::<3>(3);
+        Some((whitening * v.fixed_rows::<3>(3), [rows(by_first), rows(by_second)]))
+    }
+}
+
+/// Whether a relative attitude `first_from_second` is one that was measured, where turns lead from one station to the other.
+pub(crate) fn allows(
+    turns: &[MeasuredTurn],
+    [first, second]: [usize; 2],
+    first_from_second: &UnitQuaternion<f64>,
+) -> bool {
+    let Some((turn, variance)) = between(turns, first, second) else { return true };
+    turn.angle_to(first_from_second) <= COARSE_RAD.max(SIGMAS * variance.sqrt())
+}
+
+/// The turn from one station to a later one, put together of those between stations that follow each other, and its variance
+/// about all axes.
+fn between(turns: &[MeasuredTurn], first: usize, second: usize) -> Option<(UnitQuaternion<f64>, f64)> {
+    let (mut at, mut turned, mut variance) = (first, UnitQuaternion::identity(), 0.0);
+    while at < second {
+        let next = turns.iter().find(|turn| turn.first == at && turn.second > at && turn.second <= second)?;
+        turned *= next.first_from_second;
+        variance += next.covariance.trace();
+        at = next.second;
+    }
+    (at == second && first < second).then_some((turned, variance))
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use nalgebra::Vector6;
+    use rigid_pose::step_pose;
+
+    use super::*;
+
+    #[test]
+    fn derivatives_of_a_turn_agree_with_differences() {
+        let poses = [
+            Isometry3::new(Vector3::new(0.4, -1.0, 0.3), Vector3::new(0.5, -1.1, 2.0)),
+            Isometry3::new(Vector3::new(-0.7, 0.2, 1.5), Vector3::new(-0.2, 0.9, 0.4)),
+        ];
+        let off = UnitQuaternion::from_scaled_axis(Vector3::new(0.05, -0.02, 0.03));
+        let turn = MeasuredTurn {
+            first: 0,
+            second: 1,
+            first_from_second: poses[0].rotation.inverse() * poses[1].rotation * off,
+            covariance: Matrix3::new(4.0, 1.0, 0.0, 1.0, 3.0, 0.5, 0.0, 0.5, 2.0) * 1e-4,
+        };
+        let (_, by) = turn.linearised(&poses).unwrap();
+        for station in 0..2 {
+            for axis in 0..6 {
+                let moved = |step: f64| {
+                    let mut moved = poses;
+                    moved[station] =
+                        step_pose(&poses[station], &Vector6::from_fn(|k, _| if k == axis { step } else { 0.0 }));
+                    turn.linearised(&moved).unwrap().0
+                };
+                let difference = (moved(1e-6) - moved(-1e-6)) / 2e-6;
+                assert!((difference - by[station].column(axis)).norm() < 1e-5, "{station} {axis}");
+            }
+        }
+    }
+
+    #[test]
+    fn turns_are_put_together() {
+        let turn = |first: usize, angle: f64| MeasuredTurn {
+            first,
+            second: first + 1,
+            first_from_second: UnitQuaternion::from_scaled_axis(Vector3::new(0.0, 0.0, angle)),
+            covariance: Matrix3::identity() * 1e-6,
+        };
+        let turns = [turn(0, 0.3), turn(1, 0.4)];
+        let about = |angle: f64| UnitQuaternion::from_scaled_axis(Vector3::new(0.0, 0.0, angle));
+        assert!(allows(&turns, [0, 2], &about(0.7)) && !allows(&turns, [0, 2], &about(0.3)));
+        // Nothing is known of the fourth station.
+        assert!(allows(&turns, [0, 3], &about(2.0)));
+    }
+}

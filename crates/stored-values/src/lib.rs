@@ -1,0 +1,16 @@
+#![doc = include_str!("../README.md")]
+
+mod constants;
+mod error;
+mod kind;
+mod surfaces;
+mod unit;
+
+pub use camera_model;
+pub use constants::{RepeatedValue, repeated_values};
+pub use error::Error;
+use error::Result;
+pub use kind::{Kind, KindJudgement, judge_kind};
+pub use range_image;
+pub use surfaces::{Bending, bendings};
+pub use unit::{UnitWitness, judge_unit};

@@ -7,10 +7,10 @@ mod run;
 mod scene;
 
 pub use calibrate::{
-    CalibrateMethod, CalibrateRequest, CalibrationSummary, Certificate, CertificateRequest, CertifiedStation,
-    CertifiedTarget, Conditions, CorrelationSummary, DecisionSummary, ExpandedUncertainty, GroupSummary, HeldOut,
-    HeldOutCheck, HeldOutPart, InputDigest, NotoriousPair, Observed, OffsetModel, OffsetTableSummary, ParameterMap,
-    ParameterSummary, RejectedObservation, TableDefaults, TestVerdict, calibrate,
+    CalibrateMethod, CalibrateRequest, CalibrationSummary, CameraFiles, Certificate, CertificateRequest,
+    CertifiedStation, CertifiedTarget, Conditions, CorrelationSummary, DecisionSummary, ExpandedUncertainty,
+    GroupSummary, HeldOut, HeldOutCheck, HeldOutPart, InputDigest, NotoriousPair, Observed, OffsetModel,
+    OffsetTableSummary, ParameterMap, ParameterSummary, RejectedObservation, TableDefaults, TestVerdict, calibrate,
 };
 pub use diff::{
     CalibrationDifference, CorrectionLine, DiffRequest, DriftLine, DriftPlace, ImageLine, JointLine, ParameterLine,

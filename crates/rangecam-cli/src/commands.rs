@@ -90,6 +90,9 @@ fn calibrate(mut arguments: CalibrateArguments, output: &Output) -> Outcome {
         output.words(&summary)?;
         found = Some(summary);
     }
+    if found.is_none() && rig_tasks::is_rig(&request.survey) {
+        return output.result(&rig_tasks::calibrate_rig(&request, output.progress().as_ref())?);
+    }
     let calibrated = calibration_tasks::calibrate(&request, output.progress().as_ref())?;
     let code = output.result(&calibrated)?;
     let verdict = calibrated.verdict().max(found.map_or(Verdict::Done, |found| found.verdict()));

@@ -86,6 +86,9 @@ pub mod calibration {
     #[cfg(feature = "residual-tests")]
     #[doc(inline)]
     pub use residual_tests;
+    #[cfg(feature = "rig-calibration")]
+    #[doc(inline)]
+    pub use rig_calibration;
     #[cfg(feature = "self-calibration")]
     #[doc(inline)]
     pub use self_calibration;
@@ -126,6 +129,9 @@ pub mod application {
     #[cfg(feature = "report")]
     #[doc(inline)]
     pub use report;
+    #[cfg(feature = "rig-tasks")]
+    #[doc(inline)]
+    pub use rig-tasks;
     #[cfg(feature = "simulation")]
     #[doc(inline)]
     pub use simulation;

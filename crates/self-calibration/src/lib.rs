@@ -19,11 +19,12 @@ pub use calibration_network::{
 };
 pub use error::Error;
 pub use findings::contradiction::{Cause, CauseKind, Contradiction, WorstValue};
-pub use findings::outcome::{CalibrationOutcome, TermDecision, TermScore};
+pub use findings::outcome::{CalibrationOutcome, TermDecision, TermScore, outcome};
 pub use options::{CalibrationOptions, Method, NetworkDatum, TermSelection};
+pub use outliers::rejection::solve_rig_rejecting;
 pub use planning::hold_out::{HoldOut, Prediction, hold_out};
 pub use planning::plan::{Candidate, CandidateGrid, PlanOptions, PlanOutcome, plan};
 // Of the signatures.
-pub use {adjust, camera_model, error_models, nalgebra, orientation, range_calibration};
+pub use {adjust, calibration_network, camera_model, error_models, nalgebra, orientation, range_calibration};
 
 use error::Result;

@@ -14,6 +14,7 @@ const STATISTICS: &[(&str, &str, &str)] = &[
     ("flags", "pipeline", "false_flags"),
     ("networks", "calibration-tasks", "network_seeds"),
     ("outside", "scattering-deconvolution", "outside_light"),
+    ("rigs", "rig-calibration", "rigs"),
 ];
 
 /// The one that is no example.

@@ -1,5 +1,7 @@
 //! The adjustment of a network, put together.
 
+use std::sync::Arc;
+
 use adjust::{
     Adjustment, BlockId, Covariance, DatumDefect, Differentiated, Kernel, Method, ParameterBlock, RigidPose,
     SolveOptions,
@@ -30,12 +32,64 @@ impl Setup<'_> {
     fn solve_by(&self, method: Method) -> Result<Solved> {
         let mut builder = Builder::new(self)?;
         builder.add_observations()?;
-        let datum_defect = builder.add_datum()?;
-        // A network that is determined takes 10 to 30 steps; one that is not creeps on for thousands.
-        let options = SolveOptions { method, max_iterations: 50, ..SolveOptions::default() };
-        let solution = builder.adjustment.solve(&options)?;
-        Ok(Solved { solution, blocks: builder.blocks, rows: builder.rows, datum_defect })
+        let datum_defect = builder.add_datum(self.has_scale())?;
+        let solution = Arc::new(builder.adjustment.solve(&options(method))?);
+        Ok(Solved { solution, blocks: builder.blocks, rows: builder.rows, first_row: 0, datum_defect })
     }
+}
+
+/// Solves several cameras on one rig in one adjustment.
+///
+/// All setups have the stations of the rig and the targets in the same order. The first camera is the frame of the rig: its
+/// stations are the rig's, and its datum, control and known distances are those of all. Each of the others has a mounting
+/// `rig_from_camera` in its start values, one unknown for all stations. Answers with one view of the shared solution for
+/// each camera; the unknowns, the rows and the residuals are the camera's own.
+///
+/// # Errors
+/// [`Error::NotReachable`] without a mounting; whatever the adjustment says.
+pub fn solve_rig(setups: &[Setup<'_>]) -> Result<Vec<Solved>> {
+    rig_by(setups, Method::LevenbergMarquardt)
+}
+
+/// The same from values near the solution, where undamped steps take half as many factorisations.
+///
+/// # Errors
+/// As [`solve_rig`].
+pub fn solve_rig_nearby(setups: &[Setup<'_>]) -> Result<Vec<Solved>> {
+    match rig_by(setups, Method::GaussNewton) {
+        Err(Error::Adjust(adjust::Error::NotConverged { .. })) => solve_rig(setups),
+        done => done,
+    }
+}
+
+fn rig_by(setups: &[Setup<'_>], method: Method) -> Result<Vec<Solved>> {
+    let Some((first, others)) = setups.split_first() else { return Ok(Vec::new()) };
+    let mut builder = Builder::new(first)?;
+    builder.add_observations()?;
+    let datum_defect = builder.add_datum(setups.iter().any(Setup::has_scale))?;
+    let mut parts = Vec::with_capacity(setups.len());
+    for setup in others {
+        parts.push(builder.next_camera(setup)?);
+    }
+    let solution = Arc::new(builder.adjustment.solve(&options(method))?);
+    parts.push((builder.blocks, builder.rows));
+    let mut first_row = 0;
+    let view = |(blocks, rows): (Blocks, Vec<Row>)| {
+        let solved = Solved { solution: Arc::clone(&solution), blocks, first_row, rows, datum_defect };
+        first_row += solved.rows.len();
+        solved
+    };
+    Ok(parts.into_iter().map(view).collect())
+}
+
+/// A network that is determined takes 10 to 30 steps; one that is not creeps on for thousands.
+fn options(method: Method) -> SolveOptions {
+    SolveOptions { method, max_iterations: 50, ..SolveOptions::default() }
+}
+
+fn camera_block(adjustment: &mut Adjustment<'_>, setup: &Setup<'_>) -> BlockId {
+    let camera = ParameterBlock::euclidean(camera_values(&setup.calibration.camera)).named("camera");
+    adjustment.add_block(camera.with_parameter_names(camera_names()))
 }
 
 /// How an adjustment is made robust that gross errors take part in: standard deviations of image points and of ranges are
@@ -85,15 +139,42 @@ impl<'s> Builder<'s> {
             };
             targets.push(start.as_ref().map(block));
         }
-        let camera = ParameterBlock::euclidean(camera_values(&setup.calibration.camera)).named("camera");
-        let camera = adjustment.add_block(camera.with_parameter_names(camera_names()));
-        let blocks = Blocks { stations, targets, camera, sets: Vec::new(), passive: None };
+        let camera = camera_block(&mut adjustment, setup);
+        let blocks = Blocks { stations, targets, camera, sets: Vec::new(), passive: None, mounting: None };
         let mut builder = Self { setup, adjustment, blocks, rows: Vec::new(), kernels: None };
-        builder.hold_terms(camera, &camera_names().iter().map(ToString::to_string).collect::<Vec<_>>())?;
-        if (0..network.sightings.len()).any(|index| setup.uses_range(index)) {
-            builder.add_sets()?;
-        }
+        builder.hold_calibration()?;
         Ok(builder)
+    }
+
+    /// Goes on with a further camera of a rig, on the same poses and targets. Answers with what belongs to the camera so
+    /// far: its blocks and rows.
+    pub(crate) fn next_camera(&mut self, setup: &'s Setup<'s>) -> Result<(Blocks, Vec<Row>)> {
+        let mounting = setup.start.mounting.ok_or_else(|| Error::NotReachable {
+            kind: "camera",
+            name: "of the rig".to_owned(),
+            reason: "its mounting was not found".to_owned(),
+        })?;
+        let mounting = self.adjustment.add_block(ParameterBlock::pose(&mounting).named("rig_from_camera"));
+        let camera = camera_block(&mut self.adjustment, setup);
+        let (stations, targets) = (self.blocks.stations.clone(), self.blocks.targets.clone());
+        let blocks = Blocks { stations, targets, camera, sets: Vec::new(), passive: None, mounting: Some(mounting) };
+        let before = std::mem::replace(&mut self.blocks, blocks);
+        let rows = std::mem::take(&mut self.rows);
+        self.setup = setup;
+        self.hold_calibration()?;
+        self.add_sightings()?;
+        self.add_camera_prior()?;
+        self.add_term_priors()?;
+        Ok((before, rows))
+    }
+
+    /// Holds what is not estimated of camera and range terms.
+    fn hold_calibration(&mut self) -> Result<()> {
+        self.hold_terms(self.blocks.camera, &camera_names().iter().map(ToString::to_string).collect::<Vec<_>>())?;
+        if (0..self.setup.network.sightings.len()).any(|index| self.setup.uses_range(index)) {
+            self.add_sets()?;
+        }
+        Ok(())
     }
 
     fn add_sets(&mut self) -> Result<()> {
@@ -138,7 +219,7 @@ impl<'s> Builder<'s> {
                 continue;
             }
             let target = self.target(seen.target)?;
-            let mut blocks = vec![self.blocks.stations[seen.station], target, self.blocks.camera];
+            let mut set = None;
             let mut sigmas = Vec::with_capacity(3);
             if let Some([col, row]) = seen.pixel.filter(|_| uses_pixel) {
                 let [sigma_col, sigma_row] = seen.sigma_pixel;
@@ -147,12 +228,13 @@ impl<'s> Builder<'s> {
                 self.row(Source::Sighting(index), Component::Row, row, sigma_row);
             }
             if let Some(range_m) = seen.range_m.filter(|_| uses_range) {
-                blocks.push(self.blocks.sets[self.setup.set_of(seen.station)]);
+                set = Some(self.blocks.sets[self.setup.set_of(seen.station)]);
                 sigmas.push(seen.sigma_range_m);
                 self.row(Source::Sighting(index), Component::Range, range_m, seen.sigma_range_m);
             }
             let equation = self.setup.equation(&shared, index, uses_pixel, uses_range);
-            let equation = equation.on(&self.setup.calibration.camera, blocks);
+            let blocks = self.blocks.of_sighting(seen.station, target, set);
+            let equation = equation.on(&self.setup.calibration.camera, blocks, self.blocks.mounting.is_some());
             self.adjustment.add_observation(group, equation, &Covariance::from_sigmas(&sigmas))?;
         }
         Ok(())
@@ -170,11 +252,10 @@ impl<'s> Builder<'s> {
                 if !(if is_range { uses_range } else { uses_pixel }) {
                     continue;
                 }
-                let mut blocks =
-                    vec![self.blocks.stations[seen.station], self.target(seen.target)?, self.blocks.camera];
-                blocks.extend(is_range.then(|| self.blocks.sets[self.setup.set_of(seen.station)]));
+                let set = is_range.then(|| self.blocks.sets[self.setup.set_of(seen.station)]);
+                let blocks = self.blocks.of_sighting(seen.station, self.target(seen.target)?, set);
                 let equation = self.setup.equation(&shared, index, !is_range, is_range);
-                let equation = equation.on(&self.setup.calibration.camera, blocks);
+                let equation = equation.on(&self.setup.calibration.camera, blocks, self.blocks.mounting.is_some());
                 let sigmas = if is_range {
                     vec![kernels.scales.range * seen.sigma_range_m]
                 } else {
@@ -293,10 +374,13 @@ impl<'s> Builder<'s> {
         Ok(())
     }
 
+    fn add_camera_prior(&mut self) -> Result<()> {
+        let Some(prior) = &self.setup.camera_prior else { return Ok(()) };
+        self.add_block_prior(self.blocks.camera, prior, Component::Control, |_| Source::Camera)
+    }
+
     fn add_control(&mut self) -> Result<()> {
-        if let Some(prior) = &self.setup.camera_prior {
-            self.add_block_prior(self.blocks.camera, prior, Component::Control, |_| Source::Camera)?;
-        }
+        self.add_camera_prior()?;
         if self.setup.datum == Datum::Inner {
             return Ok(());
         }
@@ -340,12 +424,12 @@ impl<'s> Builder<'s> {
         geometry.chain(relative).try_for_each(|block| Ok(self.adjustment.hold(block)?))
     }
 
-    fn add_datum(&mut self) -> Result<usize> {
+    fn add_datum(&mut self, has_scale: bool) -> Result<usize> {
         if self.setup.datum != Datum::Inner || self.setup.geometry_held {
             return Ok(0);
         }
         let points: Vec<BlockId> = self.blocks.targets.iter().copied().flatten().collect();
-        let defect = if self.setup.has_scale() { DatumDefect::Six } else { DatumDefect::Seven };
+        let defect = if has_scale { DatumDefect::Six } else { DatumDefect::Seven };
         self.adjustment.add_inner_constraints(&points, defect)?;
         Ok(defect.count())
     }

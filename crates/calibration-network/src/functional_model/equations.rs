@@ -18,6 +18,8 @@ struct InCamera {
     point: Vector3<f64>,
     by_pose: SMatrix<f64, 3, 6>,
     by_point: Matrix3<f64>,
+    /// By `rig_from_camera`; zero where the pose is that of the camera itself.
+    by_mounting: SMatrix<f64, 3, 6>,
 }
 
 impl InCamera {
@@ -29,12 +31,24 @@ impl InCamera {
         let mut by_pose = SMatrix::<f64, 3, 6>::zeros();
         by_pose.fixed_view_mut::<3, 3>(0, 0).copy_from(&-by_point);
         by_pose.fixed_view_mut::<3, 3>(0, 3).copy_from(&point.cross_matrix());
-        Ok(Self { point, by_pose, by_point })
+        Ok(Self { point, by_pose, by_point, by_mounting: SMatrix::zeros() })
+    }
+
+    /// The same target in the frame of a camera that sits on the one of this frame.
+    fn mounted(&self, rig_from_camera: &[f64]) -> Result<Self, EvaluationFailure> {
+        let in_rig: [f64; 3] = self.point.into();
+        let own = Self::new(rig_from_camera, &in_rig)?;
+        Ok(Self {
+            point: own.point,
+            by_pose: own.by_point * self.by_pose,
+            by_point: own.by_point * self.by_point,
+            by_mounting: own.by_pose,
+        })
     }
 }
 
 /// An image point, a range, or both, of one target from one station.
-/// Blocks: pose, target, camera, and the range set where there is a range.
+/// Blocks: pose, target, camera, the range set where there is a range, and `rig_from_camera` where the pose is that of a rig.
 #[derive(Debug, Clone)]
 pub(crate) struct SightingEquation {
     pub(crate) blocks: Vec<BlockId>,
@@ -43,6 +57,8 @@ pub(crate) struct SightingEquation {
     pub(crate) pixel: [f64; 2],
     pub(crate) uses_pixel: bool,
     pub(crate) range: Option<RangeEquation>,
+    /// Whether the pose is that of a rig, on which the camera sits: the last block is its mounting.
+    pub(crate) is_mounted: bool,
 }
 
 /// The range of a sighting.
@@ -69,7 +85,11 @@ impl SightingEquation {
         residual[1] = self.pixel[1] - model.pixel[1];
         if let Some(jacobians) = jacobians {
             let (by_pose, by_point) = (model.by_camera_point * target.by_pose, model.by_camera_point * target.by_point);
+            let by_mounting = self.is_mounted.then(|| model.by_camera_point * target.by_mounting);
             for axis in 0..2 {
+                if let Some(by_mounting) = &by_mounting {
+                    copy(jacobians.row(self.blocks.len() - 1, axis), by_mounting.row(axis).iter());
+                }
                 copy(jacobians.row(0, axis), by_pose.row(axis).iter());
                 copy(jacobians.row(1, axis), by_point.row(axis).iter());
                 copy(jacobians.row(2, axis), model.by_camera[axis].iter());
@@ -113,6 +133,9 @@ impl SightingEquation {
             let by_camera_point = direction + by_pixel * image.by_camera_point;
             copy(jacobians.row(0, row), (by_camera_point * target.by_pose).iter());
             copy(jacobians.row(1, row), (by_camera_point * target.by_point).iter());
+            if self.is_mounted {
+                copy(jacobians.row(self.blocks.len() - 1, row), (by_camera_point * target.by_mounting).iter());
+            }
             let own = [-modelled.by_x, -modelled.by_y].into_iter().chain(std::iter::repeat(0.0));
             let by_camera = image.by_camera[0].iter().zip(&image.by_camera[1]).zip(own);
             let by_camera = by_camera.map(|((col, row), own)| by_pixel[0] * col + by_pixel[1] * row + own);
@@ -142,7 +165,10 @@ impl Observation for SightingEquation {
         residual: &mut [f64],
         mut jacobians: Option<&mut Jacobians<'_>>,
     ) -> Result<(), EvaluationFailure> {
-        let target = InCamera::new(parameters[0], parameters[1])?;
+        let mut target = InCamera::new(parameters[0], parameters[1])?;
+        if let Some(mounting) = parameters.last().filter(|_| self.is_mounted) {
+            target = target.mounted(mounting)?;
+        }
         let image = image_model(&self.camera, parameters[2], &target.point, jacobians.is_some())?;
         if self.uses_pixel {
             self.image(&target, &image, residual, jacobians.as_deref_mut());
@@ -286,14 +312,22 @@ mod tests {
         let widths = family_widths(&model).into();
         let range =
             RangeEquation { range_m: 2.15, amplitude: 300.0, drift_m: 0.02, model, widths, natural_steps: false };
+        let rig_from_camera = Isometry3::new(Vector3::new(0.2, 0.05, -0.1), Vector3::new(0.03, -0.1, 0.2));
         for (uses_pixel, range) in [(true, Some(range.clone())), (true, None), (false, Some(range))] {
-            let blocks = if range.is_some() { blocks() } else { blocks()[..3].to_vec() };
-            let ids = ids(blocks.len());
-            let equation = SightingEquation { blocks: ids, camera: camera(), pixel: [120.3, 31.8], uses_pixel, range };
-            let check = check_jacobian(&equation, &blocks).unwrap();
-            // Steps follow the largest value of a block (h3 = 4), for which the short waves are far from linear: the
-            // differences agree among themselves to some 1e-6. A wrong factor would show as 1e-2.
-            assert!(check.worst < 1e-5, "{check:?}");
+            for is_mounted in [false, true] {
+                let mut blocks = if range.is_some() { blocks() } else { blocks()[..3].to_vec() };
+                if is_mounted {
+                    let pose = Isometry3::new(Vector3::new(0.4, -0.3, 1.9), Vector3::new(0.1, -0.2, 0.7));
+                    blocks[0] = ParameterBlock::pose(&(pose * rig_from_camera.inverse()));
+                    blocks.push(ParameterBlock::pose(&rig_from_camera));
+                }
+                let (ids, pixel, range) = (ids(blocks.len()), [120.3, 31.8], range.clone());
+                let equation = SightingEquation { blocks: ids, camera: camera(), pixel, uses_pixel, range, is_mounted };
+                let check = check_jacobian(&equation, &blocks).unwrap();
+                // Steps follow the largest value of a block (h3 = 4), for which the short waves are far from linear:
+                // the differences agree among themselves to some 1e-6. A wrong factor would show as 1e-2.
+                assert!(check.worst < 1e-5, "{check:?}");
+            }
         }
     }
 
@@ -306,7 +340,9 @@ mod tests {
         let range =
             RangeEquation { range_m: 2.15, amplitude: 300.0, drift_m: 0.02, model, widths, natural_steps: true };
         let (camera, pixel) = (camera(), [120.3, 31.8]);
-        let equation = SightingEquation { blocks: ids(4), camera, pixel, uses_pixel: true, range: Some(range) };
+        let (uses_pixel, is_mounted) = (true, false);
+        let range = Some(range);
+        let equation = SightingEquation { blocks: ids(4), camera, pixel, uses_pixel, range, is_mounted };
         let check = check_jacobian(&equation, &blocks).unwrap();
         assert!(check.worst < 1e-5, "{check:?}");
     }

@@ -8,9 +8,11 @@ pub(crate) mod hyperbola_steps;
 pub(crate) mod image_model;
 pub(crate) mod misfit;
 pub(crate) mod setup;
+mod station_alone;
 pub(crate) mod term_priors;
 pub(crate) mod terms;
 
+pub use builder::{solve_rig, solve_rig_nearby};
 pub use component::Component;
 pub use equations::PartialPrior;
 pub use hyperbola_steps::{OfTerms, by_steps, covariance_of_terms, has_natural_steps, range_block};

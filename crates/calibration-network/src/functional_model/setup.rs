@@ -42,6 +42,8 @@ pub struct Start {
     pub targets: Vec<Option<Point3<f64>>>,
     /// `range_camera_from_passive`; `None` without a passive camera.
     pub relative: Option<Isometry3<f64>>,
+    /// `rig_from_camera` of a camera that sits on a rig; `None`: the stations are those of the rig, or there is none.
+    pub mounting: Option<Isometry3<f64>>,
 }
 
 /// What carries the datum of an adjustment.
@@ -113,7 +115,7 @@ pub struct Setup<'n> {
 /// Where the unknowns of a network are.
 #[derive(Debug, Clone)]
 pub struct Blocks {
-    /// Pose of each station.
+    /// Pose of each station; of the rig where there is a mounting.
     pub stations: Vec<BlockId>,
     /// Coordinates of each target; `None` where it has no start value.
     pub targets: Vec<Option<BlockId>>,
@@ -123,9 +125,17 @@ pub struct Blocks {
     pub sets: Vec<BlockId>,
     /// Relative orientation and calibration of the passive camera.
     pub passive: Option<[BlockId; 2]>,
+    /// Mounting of the camera on a rig, where the stations are those of the rig.
+    pub mounting: Option<BlockId>,
 }
 
 impl Blocks {
+    /// The blocks of the equation of a sighting, with the range set where there is a range.
+    pub(crate) fn of_sighting(&self, station: usize, target: BlockId, set: Option<BlockId>) -> Vec<BlockId> {
+        let own = [self.stations[station], target, self.camera];
+        own.into_iter().chain(set).chain(self.mounting).collect()
+    }
+
     /// The block of an end of a distance.
     pub(crate) fn end(&self, end: DistanceEnd) -> Option<BlockId> {
         match end {
@@ -172,12 +182,14 @@ pub struct Row {
 /// A network put together and solved.
 #[derive(Debug)]
 pub struct Solved {
-    /// The adjustment's solution.
-    pub solution: Solution,
-    /// Where its unknowns are.
+    /// The adjustment's solution, which the cameras of a rig share.
+    pub solution: Arc<Solution>,
+    /// Where the unknowns are.
     pub blocks: Blocks,
-    /// What its residuals belong to, in their order.
+    /// What the residuals belong to, in their order from the first on.
     pub rows: Vec<Row>,
+    /// Position of the residual of the first of these among those of the solution: 0 but for further cameras of a rig.
+    pub first_row: usize,
     /// Inner constraints: 0, 6 or 7.
     pub datum_defect: usize,
 }
@@ -264,8 +276,9 @@ pub(crate) struct EquationParts {
 }
 
 impl EquationParts {
-    /// The equation on these blocks.
-    pub(crate) fn on(self, camera: &Camera, blocks: Vec<BlockId>) -> SightingEquation {
-        SightingEquation { blocks, camera: *camera, pixel: self.pixel, uses_pixel: self.uses_pixel, range: self.range }
+    /// The equation on the blocks of [`Blocks::of_sighting`].
+    pub(crate) fn on(self, camera: &Camera, blocks: Vec<BlockId>, is_mounted: bool) -> SightingEquation {
+        let Self { pixel, uses_pixel, range } = self;
+        SightingEquation { blocks, camera: *camera, pixel, uses_pixel, range, is_mounted }
     }
 }

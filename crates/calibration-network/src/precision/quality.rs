@@ -81,9 +81,11 @@ impl Geometry {
 }
 
 impl Solved {
-    /// Poses and coordinates of the solution.
+    /// Poses of the camera and coordinates of the solution.
     pub fn geometry(&self) -> Result<Geometry> {
-        let stations = self.blocks.stations.iter().map(|&block| Ok(self.solution.pose(block)?));
+        let mounting = self.blocks.mounting.map(|block| self.solution.pose(block)).transpose()?;
+        let mounting = mounting.unwrap_or_else(Isometry3::identity);
+        let stations = self.blocks.stations.iter().map(|&block| Ok(self.solution.pose(block)? * mounting));
         let point = |block: &Option<BlockId>| {
             let Some(block) = block else { return Ok(None) };
             Ok(Some(Point3::from_slice(self.solution.values(*block)?)))
@@ -105,7 +107,8 @@ impl Setup<'_> {
         let geometry = solved.geometry()?;
         let mut out = Vec::with_capacity(solved.rows.len());
         for (index, row) in solved.rows.iter().enumerate() {
-            let figures = Figures::used(solution.residuals()[index], redundancy[index], standardised[index]);
+            let at = solved.first_row + index;
+            let figures = Figures::used(solution.residuals()[at], redundancy[at], standardised[at]);
             out.push((*row, figures));
         }
         for (row, verdict) in self.unused_rows() {
@@ -222,14 +225,14 @@ impl Setup<'_> {
             Source::Sighting(index) => {
                 let seen = &self.network.sightings[index];
                 let Some(target) = blocks.targets[seen.target] else { return Ok(f64::NAN) };
-                let mut own = vec![blocks.stations[seen.station], target, blocks.camera];
                 let is_range = row.component == Component::Range;
-                if is_range {
-                    let Some(set) = blocks.sets.get(self.set_of(seen.station)) else { return Ok(f64::NAN) };
-                    own.push(*set);
+                let set = blocks.sets.get(self.set_of(seen.station)).copied().filter(|_| is_range);
+                if is_range && set.is_none() {
+                    return Ok(f64::NAN);
                 }
-                let equation =
-                    self.equation(&self.shared_models(), index, !is_range, is_range).on(&self.calibration.camera, own);
+                let own = blocks.of_sighting(seen.station, target, set);
+                let equation = self.equation(&self.shared_models(), index, !is_range, is_range);
+                let equation = equation.on(&self.calibration.camera, own, blocks.mounting.is_some());
                 (Box::new(equation), usize::from(row.component == Component::Row))
             }
             Source::Passive(index) => {
@@ -241,7 +244,7 @@ impl Setup<'_> {
                 let own = [blocks.stations[seen.station], target, relative, camera];
                 let function = PassivePoint { camera: passive.camera, pixel: seen.pixel };
                 (
-                    Box::new(Differentiated::new(solution, own, function).map_err(adjust::Error::from)?),
+                    Box::new(Differentiated::new(solution.as_ref(), own, function).map_err(adjust::Error::from)?),
                     usize::from(row.component == Component::PassiveRow),
                 )
             }
@@ -252,7 +255,7 @@ impl Setup<'_> {
                 };
                 (
                     Box::new(
-                        Differentiated::new(solution, [from, to], KnownLength(known.distance_m))
+                        Differentiated::new(solution.as_ref(), [from, to], KnownLength(known.distance_m))
                             .map_err(adjust::Error::from)?,
                     ),
                     0,

@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 
 use adjust::{BlockId, Scale, Solution};
 use error_models::{ParameterStatus, RangeErrorModel};
-use nalgebra::{DMatrix, Matrix3, Matrix6};
+use nalgebra::{DMatrix, Isometry3, Matrix3, Matrix6};
+use rigid_pose::{product_jacobians, symmetrised};
 use statistics::Distribution;
 
 use crate::functional_model::hyperbola_steps::covariance_of_terms;
@@ -70,16 +71,15 @@ impl Setup<'_> {
         Ok(Calibration { camera, sets })
     }
 
-    /// Adjusted stations with their covariances, in the network's order.
+    /// Adjusted stations of the camera with their covariances, in the network's order.
     pub fn stations(&self, solved: &Solved) -> Result<Vec<AdjustedStation>> {
         let stations = self.network.stations.iter().zip(&solved.blocks.stations);
         let adjusted = stations.map(|(station, &block)| {
-            let covariance = solved.solution.covariance(block, Scale::Prior)?;
-            Ok(AdjustedStation {
-                name: station.name.clone(),
-                world_from_camera: solved.solution.pose(block)?,
-                covariance: Matrix6::from_fn(|row, column| covariance[(row, column)]),
-            })
+            let (world_from_camera, covariance) = match solved.blocks.mounting {
+                Some(mounting) => mounted(&solved.solution, block, mounting)?,
+                None => (solved.solution.pose(block)?, pose_covariance(&solved.solution, [block; 2])?),
+            };
+            Ok(AdjustedStation { name: station.name.clone(), world_from_camera, covariance })
         });
         adjusted.collect()
     }
@@ -97,6 +97,22 @@ impl Setup<'_> {
         });
         adjusted.collect()
     }
+}
+
+/// Covariance between two poses, or of one.
+fn pose_covariance(solution: &Solution, [row, column]: [BlockId; 2]) -> Result<Matrix6<f64>> {
+    let covariance = solution.covariance_between(row, column, Scale::Prior)?;
+    Ok(Matrix6::from_fn(|row, column| covariance[(row, column)]))
+}
+
+/// The pose of a camera on a rig, with its covariance.
+fn mounted(solution: &Solution, rig: BlockId, mounting: BlockId) -> Result<(Isometry3<f64>, Matrix6<f64>)> {
+    let (world_from_rig, rig_from_camera) = (solution.pose(rig)?, solution.pose(mounting)?);
+    let (by_rig, by_mounting) = product_jacobians(&world_from_rig, &rig_from_camera);
+    let shared = by_rig * pose_covariance(solution, [rig, mounting])? * by_mounting.transpose();
+    let own = by_rig * pose_covariance(solution, [rig; 2])? * by_rig.transpose()
+        + by_mounting * pose_covariance(solution, [mounting; 2])? * by_mounting.transpose();
+    Ok((world_from_rig * rig_from_camera, symmetrised(&(own + shared + shared.transpose()))))
 }
 
 /// Figures of the fit.

@@ -9,5 +9,5 @@ mod wrong_control;
 
 pub use settle::{start_limit, start_range_limit};
 pub use start::fits_as_given;
-pub use start_calibration::start_calibration;
+pub use start_calibration::{calibration_from, start_calibration};
 pub use start_finder::{NEEDED, station_pose};

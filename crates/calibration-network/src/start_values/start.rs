@@ -156,7 +156,7 @@ fn attempt(network: &Network, calibration: &Calibration, passive: bool, trust: T
     let relative =
         network.passive.as_ref().filter(|_| passive).map(|passive| finder.relative_orientation(passive)).transpose()?;
     let stations = finder.stations.iter().copied().flatten().collect();
-    Ok(Start { stations, targets: finder.targets, relative })
+    Ok(Start { stations, targets: finder.targets, relative, mounting: None })
 }
 
 /// Share of the image points that lie farther from where start values put them than these may be off.

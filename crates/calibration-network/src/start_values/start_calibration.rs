@@ -1,5 +1,6 @@
 //! The calibration that a network is adjusted from.
 
+use camera_model::Camera;
 use error_models::{AmplitudeHyperbola, RangeErrorModel};
 
 use crate::Network;
@@ -21,6 +22,19 @@ pub fn start_calibration(network: &Network) -> Calibration {
         }
     }
     Calibration { camera: network.camera, sets }
+}
+
+/// A calibration known from elsewhere as the start of a network: the camera, and the range terms of each integration time
+/// that are given, without their spans; those of the network for other times.
+pub fn calibration_from(network: &Network, camera: Camera, models: &[(Option<f64>, RangeErrorModel)]) -> Calibration {
+    let mut calibration = start_calibration(network);
+    calibration.camera = camera;
+    for set in &mut calibration.sets {
+        if let Some((_, model)) = models.iter().find(|(time, _)| *time == set.time) {
+            set.model = open(model);
+        }
+    }
+    calibration
 }
 
 /// A model without spans: what is observed sets them.

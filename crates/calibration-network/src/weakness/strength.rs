@@ -1,7 +1,7 @@
 //! Whether a network determines its calibration, and what would cure it where it does not.
 
 use adjust::{Combination, NearDefect, Scale, WeaknessOptions};
-use nalgebra::{DMatrix, DVector, Matrix6x1};
+use nalgebra::{DMatrix, DVector, Matrix3, Matrix6x1};
 
 use crate::functional_model::setup::{Setup, Solved};
 use crate::weakness::simulate::exact_sightings;
@@ -219,19 +219,23 @@ impl Motions {
 fn station_correlations(solved: &Solved, worst: &NearDefect) -> Result<Motions> {
     let (solution, deviation) = (&solved.solution, worst.inflation);
     let mut sum = [0.0; 6];
+    let mounting = solved.blocks.mounting.map(|block| solution.pose(block)).transpose()?;
+    let camera_from_rig =
+        mounting.map_or_else(Matrix3::identity, |pose| pose.rotation.inverse().to_rotation_matrix().into_inner());
     for &station in &solved.blocks.stations {
         let mut shared = Matrix6x1::<f64>::zeros();
         for &(block, component, weight) in &worst.functional {
             let between = solution.covariance_between(station, block, Scale::Prior)?;
             (0..6).for_each(|i| shared[i] += weight * between[(i, component)]);
         }
-        let rotation = *solution.pose(station)?.rotation.inverse().to_rotation_matrix().matrix();
+        let rotation = camera_from_rig * solution.pose(station)?.rotation.inverse().to_rotation_matrix().matrix();
         let own = solution.covariance(station, Scale::Prior)?;
-        let shift = rotation * shared.fixed_rows::<3>(0);
-        let spread = rotation * own.fixed_view::<3, 3>(0, 0) * rotation.transpose();
-        for axis in 0..3 {
-            sum[axis] += shift[axis].abs() / (spread[(axis, axis)].sqrt() * deviation);
-            sum[axis + 3] += shared[axis + 3].abs() / (own[(axis + 3, axis + 3)].sqrt() * deviation);
+        for (first, rotation) in [(0, rotation), (3, camera_from_rig)] {
+            let motion = rotation * shared.fixed_rows::<3>(first);
+            let spread = rotation * own.fixed_view::<3, 3>(first, first) * rotation.transpose();
+            for axis in 0..3 {
+                sum[first + axis] += motion[axis].abs() / (spread[(axis, axis)].sqrt() * deviation);
+            }
         }
     }
     let count = solved.blocks.stations.len() as f64;

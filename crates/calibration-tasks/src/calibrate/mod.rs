@@ -1,5 +1,6 @@
 //! Calibration of a survey: tables or frames in, calibration, tables, summary and report out.
 
+pub(crate) mod camera_files;
 pub(crate) mod document;
 pub(crate) mod figures;
 pub(crate) mod network;
@@ -10,6 +11,7 @@ pub(crate) mod results;
 pub(crate) mod run;
 pub(crate) mod start;
 
+pub use camera_files::CameraFiles;
 pub use planes::offset::OffsetTableSummary;
 pub use request::{CalibrateMethod, CalibrateRequest, CertificateRequest, OffsetModel, TableDefaults};
 pub use results::certificate::{

@@ -1,13 +1,15 @@
 //! One calibration: survey in, results out.
 
+use std::path::Path;
 use std::time::Instant;
 
-use atomic_output::{Destination, write_text};
+use atomic_output::{Destination, OutputFolder, write_text};
 use commands::plan::DriftTreatment;
 use commands::{Inputs, Progress, json, produce};
 use pipeline::{Error, Result};
 use range_io::calibration::Calibration;
 use range_io::tables::{write_residuals, write_stations, write_targets};
+use report::Document;
 use self_calibration::{CalibrationOptions, CalibrationOutcome, Error as Cause, Method, hold_out};
 
 use crate::calibrate::document::figures::Figures;
@@ -91,7 +93,8 @@ fn no_pixels(request: &CalibrateRequest) -> Error {
 
 fn calibrate_networks(request: &CalibrateRequest, method: Method, progress: &dyn Progress) -> Result<Attempt> {
     progress.begin("read survey", 1);
-    let files = read_network(&request.survey, request.calibration.as_deref(), &request.defaults, request.warm_up)?;
+    let files =
+        read_network(&request.survey, request.calibration.as_deref(), None, &request.defaults, request.warm_up)?;
     let options = CalibrationOptions { method, ..request.options.clone() };
     check_station_names(&files, &options)?;
     let outcome = if method == Method::TwoStepIndependent {
@@ -101,7 +104,8 @@ fn calibrate_networks(request: &CalibrateRequest, method: Method, progress: &dyn
                 .to_owned();
             return Err(Error::Survey { path: request.survey.clone(), message });
         };
-        let lens = read_network(folder, request.calibration.as_deref(), &request.defaults, DriftTreatment::Leave)?;
+        let calibration = request.calibration.as_deref();
+        let lens = read_network(folder, calibration, None, &request.defaults, DriftTreatment::Leave)?;
         check(&lens, Method::TwoStepDependent, options.datum)?;
         progress.begin("adjust networks", 2);
         self_calibration::calibrate_two_networks(&lens.network, &files.network, &options)
@@ -131,7 +135,7 @@ fn calibrate_networks(request: &CalibrateRequest, method: Method, progress: &dyn
 }
 
 /// Names file and line of the observed value that contradicts most.
-fn placed(mut error: Cause, files: &NetworkFiles) -> Cause {
+pub(crate) fn placed(mut error: Cause, files: &NetworkFiles) -> Cause {
     if let Cause::Contradiction(contradiction) = &mut error
         && let Some(worst) = &mut contradiction.worst
     {
@@ -184,22 +188,29 @@ fn write(
     progress: &dyn Progress,
 ) -> Result<()> {
     let Results { outcome, table, file, certificate_page } = results;
-    progress.begin("write results", 7);
+    progress.begin("write results", 2);
     let page = document(summary, Figures::new(outcome, *table)?);
     let folder = destination.open()?;
-    file.write(folder.file(Calibration::FILE_NAME)?)?;
+    write_files(&folder, Path::new(""), outcome, file, summary, &page)?;
     progress.advance(1);
-    write_stations(folder.file("adjusted_stations.csv")?, &tables::stations(outcome))?;
-    progress.advance(2);
-    write_targets(folder.file("adjusted_targets.csv")?, &tables::targets(outcome))?;
-    progress.advance(3);
-    write_residuals(folder.file("residuals.csv")?, &tables::residuals(outcome))?;
-    progress.advance(4);
-    write_text(folder.file("summary.json")?, &json(summary)?)?;
-    progress.advance(5);
-    write_text(folder.file("report.html")?, &page.html())?;
-    progress.advance(6);
     write_text(folder.file("certificate.html")?, certificate_page)?;
-    progress.advance(7);
+    progress.advance(2);
     Ok(folder.commit()?)
+}
+
+/// Writes all of one camera but the certificate, below `name`.
+pub(crate) fn write_files(
+    folder: &OutputFolder,
+    name: &Path,
+    outcome: &CalibrationOutcome,
+    file: &Calibration,
+    summary: &CalibrationSummary,
+    page: &Document,
+) -> Result<()> {
+    file.write(folder.file(name.join(Calibration::FILE_NAME))?)?;
+    write_stations(folder.file(name.join("adjusted_stations.csv"))?, &tables::stations(outcome))?;
+    write_targets(folder.file(name.join("adjusted_targets.csv"))?, &tables::targets(outcome))?;
+    write_residuals(folder.file(name.join("residuals.csv"))?, &tables::residuals(outcome))?;
+    write_text(folder.file(name.join("summary.json"))?, &json(summary)?)?;
+    Ok(write_text(folder.file(name.join("report.html"))?, &page.html())?)
 }

@@ -51,6 +51,17 @@ pub(crate) struct Suspicion {
     pub(crate) principal_distances_mm: Option<[f64; 2]>,
 }
 
+impl CalibrationOutcome {
+    /// A sentence for each station of which more was rejected than single gross errors explain, which is one sound station
+    /// in ten thousand, and for parameters that no camera has; and whether so much was rejected, or parameters are such,
+    /// that the result is worth nothing.
+    pub fn doubts_of_rejection(&self, network: &Network) -> (Vec<String>, bool) {
+        let suspicion = Suspicion::new(self, network);
+        let causes = suspicion.causes(network).into_iter().map(|cause| cause.to_string());
+        (causes.chain(suspicion.sentences()).collect(), suspicion.is_hopeless())
+    }
+}
+
 impl Suspicion {
     pub(crate) fn new(outcome: &CalibrationOutcome, network: &Network) -> Self {
         let mut seen: BTreeMap<&str, (BTreeSet<&str>, usize)> = BTreeMap::new();

@@ -124,8 +124,12 @@ impl CalibrationOutcome {
     }
 }
 
-/// The whole outcome of one adjustment.
-pub(crate) fn outcome(setup: &Setup<'_>, solved: &Solved, options: &CalibrationOptions) -> Result<CalibrationOutcome> {
+/// The whole outcome of one adjustment: values, deviations and residuals of a camera. What speaks against them is not in it
+/// yet: see [`CalibrationOutcome::doubts_of_tests`] and [`CalibrationOutcome::doubts_of_rejection`].
+///
+/// # Errors
+/// A covariance that the solution does not have.
+pub fn outcome(setup: &Setup<'_>, solved: &Solved, options: &CalibrationOptions) -> Result<CalibrationOutcome> {
     let solution = &solved.solution;
     let calibration = setup.calibration_found(solved)?;
     let estimate = setup.estimate_of_terms(solved)?;

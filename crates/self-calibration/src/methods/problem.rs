@@ -120,7 +120,7 @@ impl Problem<'_> {
         let reference = Reference::from_laboratory(self.network, sightings)?;
         let setup = Setup {
             network: self.network,
-            start: Start { stations: Vec::new(), targets: Vec::new(), relative: None },
+            start: Start { stations: Vec::new(), targets: Vec::new(), relative: None, mounting: None },
             unused: None,
             calibration: start_calibration(self.network),
             estimated: terms.iter().filter(|name| !camera_names().contains(&name.as_str())).cloned().collect(),

@@ -333,11 +333,11 @@ fn reject(
     rejected: &mut BTreeSet<usize>,
 ) -> Result<()> {
     let latent = reference.root.ncols();
-    let mut components = vec![Component::Control; latent];
-    components.extend(reference.values.iter().map(|_| Component::Range));
-    components.extend(std::iter::repeat_n(Component::Term, solution.residuals().len() - components.len()));
+    let mut groups = vec![(0, Component::Control); latent];
+    groups.extend(reference.values.iter().map(|_| (0, Component::Range)));
+    groups.extend(std::iter::repeat_n((0, Component::Term), solution.residuals().len() - groups.len()));
     let (mut stations, mut targets) = (BTreeSet::new(), BTreeSet::new());
-    for suspect in suspects(solution, &components, level)? {
+    for suspect in suspects(solution, &groups, level)? {
         let row = suspect.row.checked_sub(latent).filter(|row| *row < reference.values.len());
         let Some(row) = row else { continue };
         let seen = &setup.network.sightings[reference.sightings[row]];

@@ -6,9 +6,10 @@
 //! left fits a wrong model, and the fault is not told. Sound networks keep their verdict either way (240 of 240).
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::slice;
 
 use adjust::{Scale, Solution};
-use calibration_network::functional_model::{Row, Setup, Solved, Source};
+use calibration_network::functional_model::{Excluded, Row, Setup, Solved, Source, solve_rig, solve_rig_nearby};
 use statistics::{Distribution, mad_scale};
 
 use crate::outliers::control_test::control_suspects;
@@ -44,24 +45,25 @@ pub(crate) struct Suspect {
 
 /// Standardised residuals over the robust scale of their group, where they exceed the critical value; largest first.
 ///
-/// The scale, from the median of `|v| / σ_v`, stands for sigma0 of the group and is not drawn up by gross errors.
+/// The scale, from the median of `|v| / σ_v`, stands for sigma0 of the group and is not drawn up by gross errors. A group
+/// is a camera's, by its number, and has one component.
 pub(crate) fn suspects(
     solution: &Solution,
-    components: &[Component],
+    groups: &[(usize, Component)],
     level: f64,
 ) -> Result<Vec<Suspect>, NetworkError> {
     let standardised = solution.standardised_residuals(Scale::Prior)?;
     let redundancy = solution.redundancy_numbers();
     // Control is tested as a whole; terms were not observed.
-    let single = |row: usize| !matches!(components[row], Component::Control | Component::Term);
+    let single = |row: usize| !matches!(groups[row].1, Component::Control | Component::Term);
     let testable = |row: usize| single(row) && standardised[row].is_finite() && redundancy[row] > TESTABLE;
-    let rows: Vec<usize> = (0..components.len()).filter(|&row| testable(row)).collect();
+    let rows: Vec<usize> = (0..groups.len()).filter(|&row| testable(row)).collect();
     let overall = overall_scale(solution)?;
     let critical = Distribution::Normal.critical(level);
     let mut out = Vec::new();
-    let kinds: BTreeSet<Component> = components.iter().copied().collect();
+    let kinds: BTreeSet<(usize, Component)> = groups.iter().copied().collect();
     for kind in kinds {
-        let own: Vec<usize> = rows.iter().copied().filter(|&row| components[row] == kind).collect();
+        let own: Vec<usize> = rows.iter().copied().filter(|&row| groups[row] == kind).collect();
         let sizes: Vec<f64> = own.iter().map(|&row| standardised[row].abs()).collect();
         let scale = if own.len() < SMALLEST_GROUP { overall } else { scale(sizes) };
         let statistic = |row: usize| Suspect { row, statistic: standardised[row].abs() / scale };
@@ -100,121 +102,195 @@ pub(crate) fn solve_rejecting(
 ) -> Result<Solved, NetworkError> {
     let mut solved = first;
     let Some(level) = level else { return Ok(solved) };
-    let mut readmitted = BTreeSet::new();
-    for round in 0..MOST_ROUNDS {
-        let before = setup.excluded.clone();
-        let most = 1_usize << round.saturating_sub(SINGLE_ROUNDS).min(MOST_DOUBLINGS);
-        reject(setup, &solved, level, most, &readmitted)?;
-        if setup.excluded == before {
-            readmit(setup, &solved, level, &mut readmitted)?;
-        }
-        if setup.excluded == before {
-            break;
-        }
-        restart(setup, &solved)?;
+    let again = |setups: &[Setup<'_>]| setups.iter().map(Setup::solve_nearby).collect();
+    let mut rounds = Rounds::new(slice::from_mut(setup), level);
+    while rounds.choose(slice::from_ref(&solved))? {
         // Large networks have no room for two solutions.
         drop(solved);
-        solved = match setup.solve_nearby() {
-            Err(NetworkError::Adjust(adjust::Error::RankDeficient { .. })) => {
-                // What is left would not determine the network: the suspects are needed.
-                setup.excluded = before;
-                return setup.solve_nearby();
-            }
-            done => done?,
-        };
+        let (mut next, is_last) = rounds.solve(again)?;
+        solved = next.swap_remove(0);
+        if is_last {
+            break;
+        }
     }
     Ok(solved)
 }
 
-/// Rejects the worst of each target, at most so many of each station, and what is sure to be wrong.
-fn reject(
-    setup: &mut Setup<'_>,
-    solved: &Solved,
-    level: f64,
-    most: usize,
-    readmitted: &BTreeSet<(Source, Component)>,
-) -> Result<(), NetworkError> {
-    let components: Vec<Component> = solved.rows.iter().map(|row| row.component).collect();
-    let suspects = suspects(&solved.solution, &components, level)?;
-    // Deviations of control do not depend on those of the sightings: it is not tested more strictly where these are
-    // stated too large.
-    let scale = overall_scale(&solved.solution)?.max(1.0);
-    let control = control_suspects(setup, solved, level, scale)?.into_iter().find(|suspect| {
-        let largest = suspects.first().is_none_or(|first| suspect.statistic > first.statistic);
-        largest && !readmitted.contains(&key(&solved.rows[suspect.row]))
-    });
-    if let Some(control) = control {
-        // Wrong control disturbs all that hangs on it.
-        set_excluded(setup, &solved.rows[control.row], true);
-        return Ok(());
-    }
-    let critical = Distribution::Normal.critical(level);
-    let sure = sure(setup, &suspects, solved, critical);
-    let (mut stations, mut targets) = (BTreeMap::new(), BTreeMap::new());
-    for (suspect, sure) in suspects.iter().zip(sure) {
-        let row = &solved.rows[suspect.row];
-        let Some((station, target)) = ends(setup, row.source) else { continue };
-        let of_station = stations.entry(station).or_insert(0);
-        let of_target = targets.entry(target).or_insert(0);
-        (*of_station, *of_target) = (*of_station + 1, *of_target + 1);
-        let few = *of_station <= most && *of_target <= 1;
-        if (few || sure) && !readmitted.contains(&key(row)) {
-            set_excluded(setup, row, true);
+/// Solves several cameras on one rig as [`solve_rig`](calibration_network::functional_model::solve_rig) does, and rejects
+/// gross errors where a level of significance is given: those of all cameras together, each held against the scatter of
+/// its own camera.
+///
+/// # Errors
+/// As of the adjustment; where what was rejected left it without determination, that of all observations is the answer.
+pub fn solve_rig_rejecting(setups: &mut [Setup<'_>], level: Option<f64>) -> Result<Vec<Solved>, NetworkError> {
+    let mut solved = solve_rig(setups)?;
+    let Some(level) = level else { return Ok(solved) };
+    let mut rounds = Rounds::new(setups, level);
+    while rounds.choose(&solved)? {
+        drop(solved);
+        let is_last;
+        (solved, is_last) = rounds.solve(solve_rig_nearby)?;
+        if is_last {
+            break;
         }
     }
-    Ok(())
+    Ok(solved)
 }
 
-/// Which suspects are so, or nearly, even if all others of their station and of their target are gross errors.
-fn sure(setup: &Setup<'_>, suspects: &[Suspect], solved: &Solved, critical: f64) -> Vec<bool> {
-    let (mut stations, mut targets) = (BTreeMap::new(), BTreeMap::new());
-    for seen in &setup.network.sightings {
-        stations.entry(seen.station).or_insert((0.0, 0.0)).0 += 1.0;
-        targets.entry(seen.target).or_insert((0.0, 0.0)).0 += 1.0;
-    }
-    let ends: Vec<_> = suspects.iter().map(|suspect| ends(setup, solved.rows[suspect.row].source)).collect();
-    for (suspect, (station, target)) in suspects.iter().zip(&ends).filter_map(|(s, ends)| Some((s, (*ends)?))) {
-        stations.entry(station).or_insert((0.0, 0.0)).1 += suspect.statistic;
-        targets.entry(target).or_insert((0.0, 0.0)).1 += suspect.statistic;
-    }
-    let moved = |of: &BTreeMap<usize, (f64, f64)>, end: &usize, own: f64| {
-        of.get(end).map_or(0.0, |(seen, all)| (LEVERAGE / seen).min(1.0) * (all - own))
-    };
-    let is_sure = |(suspect, ends): (&Suspect, &Option<(usize, usize)>)| {
-        ends.is_some_and(|(station, target)| {
-            let own = suspect.statistic;
-            let moved = moved(&stations, &station, own) + moved(&targets, &target, own);
-            moved < HARDLY_MOVED || own > critical + moved
-        })
-    };
-    suspects.iter().zip(&ends).map(is_sure).collect()
+/// A camera by its number, and which of its observations; see [`key`].
+type Key = (usize, Source, Component);
+
+/// Rounds of rejection: of one camera, or of those of a rig, which share stations and targets.
+struct Rounds<'s, 'n> {
+    setups: &'s mut [Setup<'n>],
+    level: f64,
+    round: usize,
+    before: Vec<Excluded>,
+    readmitted: BTreeSet<Key>,
 }
 
-/// Takes back what fits the solution that it did not take part in. Its residual has at least its own deviation, so the
-/// test against that alone is on the safe side.
-fn readmit(
-    setup: &mut Setup<'_>,
-    solved: &Solved,
-    level: f64,
-    done: &mut BTreeSet<(Source, Component)>,
-) -> Result<(), NetworkError> {
-    let critical = Distribution::Normal.critical(level);
-    let sigma0 = solved.solution.sigma0().unwrap_or(1.0);
-    let mut conspicuous: BTreeSet<(Source, Component)> = BTreeSet::new();
-    let rejected = rejected_rows(setup);
-    for row in &rejected {
-        let residual = setup.predicted(solved, row)?;
-        // NaN: nothing is known of it.
-        if residual.is_nan() || residual.abs() > critical * sigma0 * row.sigma {
-            conspicuous.insert(key(row));
+impl<'s, 'n> Rounds<'s, 'n> {
+    fn new(setups: &'s mut [Setup<'n>], level: f64) -> Self {
+        Self { setups, level, round: 0, before: Vec::new(), readmitted: BTreeSet::new() }
+    }
+
+    fn excluded(&self) -> Vec<Excluded> {
+        self.setups.iter().map(|setup| setup.excluded.clone()).collect()
+    }
+
+    /// Chooses what takes no part from now on, and starts from the solution; whether that is another choice.
+    fn choose(&mut self, solved: &[Solved]) -> Result<bool, NetworkError> {
+        if self.round == MOST_ROUNDS {
+            return Ok(false);
+        }
+        self.before = self.excluded();
+        let most = 1_usize << self.round.saturating_sub(SINGLE_ROUNDS).min(MOST_DOUBLINGS);
+        self.reject(solved, most)?;
+        if self.excluded() == self.before {
+            self.readmit(solved)?;
+        }
+        self.round += 1;
+        if self.excluded() == self.before {
+            return Ok(false);
+        }
+        self.setups.iter_mut().zip(solved).try_for_each(|(setup, solved)| restart(setup, solved))?;
+        Ok(true)
+    }
+
+    /// Solves what was chosen; whether this is the last solution.
+    fn solve(
+        &mut self,
+        again: impl Fn(&[Setup<'n>]) -> Result<Vec<Solved>, NetworkError>,
+    ) -> Result<(Vec<Solved>, bool), NetworkError> {
+        match again(self.setups) {
+            Err(NetworkError::Adjust(adjust::Error::RankDeficient { .. })) => {
+                // What is left would not determine the network: the suspects are needed.
+                let before = std::mem::take(&mut self.before);
+                self.setups.iter_mut().zip(before).for_each(|(setup, before)| setup.excluded = before);
+                Ok((again(self.setups)?, true))
+            }
+            done => Ok((done?, false)),
         }
     }
-    for row in &rejected {
-        if !conspicuous.contains(&key(row)) && done.insert(key(row)) {
-            set_excluded(setup, row, false);
+
+    /// Rejects the worst of each target, at most so many of each station, and what is sure to be wrong.
+    fn reject(&mut self, solved: &[Solved], most: usize) -> Result<(), NetworkError> {
+        let Some(first) = solved.first() else { return Ok(()) };
+        let rows: Vec<(usize, Row)> = rows(solved).collect();
+        let groups: Vec<(usize, Component)> = rows.iter().map(|(camera, row)| (*camera, row.component)).collect();
+        let suspects = suspects(&first.solution, &groups, self.level)?;
+        // Deviations of control do not depend on those of the sightings: it is not tested more strictly where these are
+        // stated too large.
+        let scale = overall_scale(&first.solution)?.max(1.0);
+        // The first camera has the control of all.
+        let control = control_suspects(&self.setups[0], first, self.level, scale)?.into_iter().find(|suspect| {
+            let largest = suspects.first().is_none_or(|first| suspect.statistic > first.statistic);
+            largest && !self.readmitted.contains(&key(&rows[suspect.row]))
+        });
+        if let Some(control) = control {
+            // Wrong control disturbs all that hangs on it.
+            self.set_excluded(&rows[control.row], true);
+            return Ok(());
         }
+        let critical = Distribution::Normal.critical(self.level);
+        let sure = self.sure(&suspects, &rows, critical);
+        let (mut stations, mut targets) = (BTreeMap::new(), BTreeMap::new());
+        for (suspect, sure) in suspects.iter().zip(sure) {
+            let row = &rows[suspect.row];
+            let Some((station, target)) = self.ends(row) else { continue };
+            let of_station = stations.entry(station).or_insert(0);
+            let of_target = targets.entry(target).or_insert(0);
+            (*of_station, *of_target) = (*of_station + 1, *of_target + 1);
+            let few = *of_station <= most && *of_target <= 1;
+            if (few || sure) && !self.readmitted.contains(&key(row)) {
+                self.set_excluded(row, true);
+            }
+        }
+        Ok(())
     }
-    Ok(())
+
+    /// Which suspects are so, or nearly, even if all others of their station and of their target are gross errors.
+    fn sure(&self, suspects: &[Suspect], rows: &[(usize, Row)], critical: f64) -> Vec<bool> {
+        let (mut stations, mut targets) = (BTreeMap::new(), BTreeMap::new());
+        for seen in self.setups.iter().flat_map(|setup| &setup.network.sightings) {
+            stations.entry(seen.station).or_insert((0.0, 0.0)).0 += 1.0;
+            targets.entry(seen.target).or_insert((0.0, 0.0)).0 += 1.0;
+        }
+        let ends: Vec<_> = suspects.iter().map(|suspect| self.ends(&rows[suspect.row])).collect();
+        for (suspect, (station, target)) in suspects.iter().zip(&ends).filter_map(|(s, ends)| Some((s, (*ends)?))) {
+            stations.entry(station).or_insert((0.0, 0.0)).1 += suspect.statistic;
+            targets.entry(target).or_insert((0.0, 0.0)).1 += suspect.statistic;
+        }
+        let moved = |of: &BTreeMap<usize, (f64, f64)>, end: &usize, own: f64| {
+            of.get(end).map_or(0.0, |(seen, all)| (LEVERAGE / seen).min(1.0) * (all - own))
+        };
+        let is_sure = |(suspect, ends): (&Suspect, &Option<(usize, usize)>)| {
+            ends.is_some_and(|(station, target)| {
+                let own = suspect.statistic;
+                let moved = moved(&stations, &station, own) + moved(&targets, &target, own);
+                moved < HARDLY_MOVED || own > critical + moved
+            })
+        };
+        suspects.iter().zip(&ends).map(is_sure).collect()
+    }
+
+    /// Takes back what fits the solution that it did not take part in. Its residual has at least its own deviation, so the
+    /// test against that alone is on the safe side.
+    fn readmit(&mut self, solved: &[Solved]) -> Result<(), NetworkError> {
+        let critical = Distribution::Normal.critical(self.level);
+        let mut conspicuous: BTreeSet<Key> = BTreeSet::new();
+        let mut rejected = Vec::new();
+        for (camera, (setup, solved)) in self.setups.iter().zip(solved).enumerate() {
+            let sigma0 = solved.solution.sigma0().unwrap_or(1.0);
+            for row in rejected_rows(setup) {
+                let residual = setup.predicted(solved, &row)?;
+                // NaN: nothing is known of it.
+                if residual.is_nan() || residual.abs() > critical * sigma0 * row.sigma {
+                    conspicuous.insert(key(&(camera, row)));
+                }
+                rejected.push((camera, row));
+            }
+        }
+        for row in &rejected {
+            if !conspicuous.contains(&key(row)) && self.readmitted.insert(key(row)) {
+                self.set_excluded(row, false);
+            }
+        }
+        Ok(())
+    }
+
+    fn ends(&self, (camera, row): &(usize, Row)) -> Option<(usize, usize)> {
+        ends(&self.setups[*camera], row.source)
+    }
+
+    fn set_excluded(&mut self, (camera, row): &(usize, Row), excluded: bool) {
+        set_excluded(&mut self.setups[*camera], row, excluded);
+    }
+}
+
+/// The rows of all cameras, in the order of the residuals.
+fn rows(solved: &[Solved]) -> impl Iterator<Item = (usize, Row)> {
+    solved.iter().enumerate().flat_map(|(camera, solved)| solved.rows.iter().map(move |row| (camera, *row)))
 }
 
 /// Values that were rejected.
@@ -230,6 +306,9 @@ pub(crate) fn restart(setup: &mut Setup<'_>, solved: &Solved) -> Result<(), Netw
     setup.start.targets = geometry.targets;
     if let Some([relative, _]) = solved.blocks.passive {
         setup.start.relative = Some(solved.solution.pose(relative)?);
+    }
+    if let Some(mounting) = solved.blocks.mounting {
+        setup.start.mounting = Some(solved.solution.pose(mounting)?);
     }
     setup.calibration = setup.calibration_found(solved)?;
     Ok(())
@@ -270,7 +349,7 @@ fn set_excluded(setup: &mut Setup<'_>, row: &Row, excluded: bool) {
 }
 
 /// Both coordinates of an image point stand and fall together, as do all of control.
-fn key(row: &Row) -> (Source, Component) {
+fn key((camera, row): &(usize, Row)) -> Key {
     let component = match row.component {
         Component::Row => Component::Col,
         Component::PassiveRow => Component::PassiveCol,
@@ -281,5 +360,5 @@ fn key(row: &Row) -> (Source, Component) {
         Source::Station(index, _) => Source::Station(index, 0),
         other => other,
     };
-    (source, component)
+    (*camera, source, component)
 }

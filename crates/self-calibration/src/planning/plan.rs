@@ -251,6 +251,7 @@ impl<'o> Design<'o> {
             stations: stations.collect::<Result<_, _>>()?,
             targets: targets.collect(),
             relative: network.passive.as_ref().and_then(|passive| passive.range_camera_from_passive),
+            mounting: None,
         };
         Ok((observed, start))
     }

@@ -79,10 +79,11 @@ pub(crate) fn document(summary: &CalibrationSummary, figures: Figures) -> Docume
     }
     document.closing(if summary.converged {
         format!(
-            "took {:.1} s; written to {}: report.html, certificate.html, summary.json, calibration.ron, adjusted_stations.csv, \
+            "took {:.1} s; written to {}: report.html, {}summary.json, calibration.ron, adjusted_stations.csv, \
              adjusted_targets.csv, residuals.csv",
             summary.seconds,
-            summary.out.display()
+            summary.out.display(),
+            if summary.certificate.is_some() { "certificate.html, " } else { "" }
         )
     } else {
         format!("refused; written to {}: summary.json", summary.out.display())

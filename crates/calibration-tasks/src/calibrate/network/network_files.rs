@@ -32,10 +32,11 @@ pub(crate) struct NetworkFiles {
     pub(crate) observations: PlacedRows<TargetObservation>,
 }
 
-/// Reads `survey.ron` and the tables beside it.
+/// Reads `survey.ron` and the tables beside it; `shared_targets` takes the place of the `targets.csv` there.
 pub(crate) fn read_network(
     survey_path: &Path,
     calibration: Option<&Path>,
+    shared_targets: Option<&Path>,
     defaults: &TableDefaults,
     warm_up: DriftTreatment,
 ) -> Result<NetworkFiles> {
@@ -48,7 +49,8 @@ pub(crate) fn read_network(
         return Err(Error::Survey { path: observations.file().to_owned(), message });
     }
     let stations = optional(&root.join("stations.csv"), read_placed_stations)?;
-    let targets = optional(&root.join("targets.csv"), read_placed_targets)?;
+    let targets = root.join("targets.csv");
+    let targets = optional(shared_targets.unwrap_or(&targets), read_placed_targets)?;
     let mut tables = Tables::new(&survey, stations, targets);
     let sightings = tables.sightings(&observations, defaults)?;
     let passive = read_passive(&root.join("passive"), &mut tables, defaults)?;

@@ -16,7 +16,7 @@ use crate::requests::values::{Terms, name, positive, terms};
 #[derive(Debug, Args)]
 pub(crate) struct CalibrateArguments {
     /// Folder with survey.ron and observations.csv (for planes: frames, stations.csv and planes.csv; with --targets: frames,
-    /// or images alone).
+    /// or images alone); or a folder with rig.ron: several cameras on one rig, each with its folder.
     survey: PathBuf,
     /// Find these targets in the frames first, as `rangecam targets --kind` does; what is found goes into the folder <out>-targets.
     #[arg(long, num_args = 1..=4, value_names = ["KIND", "SIZE", "METRE", "RATIO"])]

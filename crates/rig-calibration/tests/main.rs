@@ -1,0 +1,8 @@
+//! Rigs of known truth, and broken ones.
+#![allow(clippy::unwrap_used, missing_docs, dead_code)]
+
+#[path = "support/rigs.rs"]
+mod rigs;
+
+mod broken;
+mod mountings;

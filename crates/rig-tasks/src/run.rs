@@ -1,0 +1,218 @@
+//! One calibration of a rig: folders of surveys in, results out.
+
+use std::path::Path;
+use std::time::Instant;
+
+use atomic_output::{Destination, write_text};
+use calibration_tasks::{CalibrateMethod, CalibrateRequest, CalibrationOptions, CameraFiles, Method, OffsetModel};
+use commands::{Inputs, Progress, json, produce};
+use pipeline::{Error, Result};
+use range_io::tables::{Station, Target, write_stations, write_targets};
+use rig_calibration::self_calibration::Error as Cause;
+use rig_calibration::{Error as RigError, Rig, RigCamera, RigOutcome};
+
+use crate::document::document;
+use crate::file::RigFile;
+use crate::summary::{DESCRIBE, METHOD, RigSummary, sigmas_of};
+
+/// Calibrates the rig in the folder `request.survey` and writes the results into the request's output folder.
+///
+/// Each camera starts from the `calibration.ron` of its folder or its nominal camera. Terms, datum, rejection and
+/// defaults are those of the request; what it asks for besides (another method, a lens survey, an offset of pixels, stations
+/// held out, a calibration) is refused.
+///
+/// # Errors
+/// As [`calibration_tasks::calibrate`]: [`Error::Refused`] where the observations do not determine or contradict what was
+/// asked for, with the camera's name.
+pub fn calibrate_rig(request: &CalibrateRequest, progress: &dyn Progress) -> Result<RigSummary> {
+    check(request)?;
+    let folder = &request.survey;
+    let rig = RigFile::read(folder)?;
+    let inputs = rig
+        .cameras
+        .iter()
+        .fold(Inputs::default().path(folder), |inputs, camera| inputs.survey(&folder.join(camera.folder())));
+    produce(&request.out, &inputs, |destination| calibrate_into(destination, request, &rig, progress))
+}
+
+/// What a rig has not.
+fn check(request: &CalibrateRequest) -> Result<()> {
+    let unfit = [
+        (request.method != CalibrateMethod::Network(Method::OneStep), "--method: a rig is calibrated in one step"),
+        (request.lens_survey.is_some(), "--lens-survey: a rig is calibrated in one step"),
+        (request.offset != OffsetModel::Constant, "--offset: that is found from frames of planes, camera by camera"),
+        (request.calibration.is_some(), "--calibration: each camera of a rig starts from the one in its own folder"),
+        (request.certificate.hold_out.is_some(), "--hold-out: no stations of a rig are held out"),
+        (request.certificate.operator.is_some(), "--operator: there is no certificate of a rig"),
+    ];
+    match unfit.into_iter().find(|(is_asked, _)| *is_asked) {
+        Some((_, message)) => Err(Error::Request { command: "calibrate", message: message.to_owned() }),
+        None => Ok(()),
+    }
+}
+
+fn calibrate_into(
+    destination: &Destination,
+    request: &CalibrateRequest,
+    file: &RigFile,
+    progress: &dyn Progress,
+) -> Result<RigSummary> {
+    let clock = Instant::now();
+    progress.begin("read rig", file.cameras.len());
+    let targets = request.survey.join("targets.csv");
+    let targets = Some(targets.as_path()).filter(|path| path.is_file());
+    let (mut files, mut cameras) = (Vec::new(), Vec::new());
+    for (index, entry) in file.cameras.iter().enumerate() {
+        let folder = request.survey.join(entry.folder());
+        let read = CameraFiles::read(&folder, targets, request)?;
+        cameras.push(RigCamera {
+            name: entry.name.clone(),
+            network: read.network().clone(),
+            terms: entry.terms.clone(),
+            approximate: entry.about.map(|about| about.rig_from_camera()),
+        });
+        files.push(read);
+        progress.advance(index + 1);
+    }
+    check_targets(&request.survey, targets, &cameras)?;
+    let rig = Rig { cameras };
+    check_station_names(&request.survey, &rig, &request.options)?;
+    progress.begin("adjust rig", 1);
+    let outcome = rig_calibration::calibrate_rig(&rig, &request.options);
+    progress.finish();
+    let name = request.survey.display().to_string();
+    match outcome {
+        Ok(outcome) => {
+            let mut summary = RigSummary::new(name, file, &files, &outcome);
+            summary.out.clone_from(&request.out);
+            summary.seconds = clock.elapsed().as_secs_f64();
+            write(destination, &files, &outcome, &mut summary)?;
+            Ok(summary)
+        }
+        Err(error) => {
+            let error = placed(error, &rig, &files);
+            let mut summary = RigSummary::refused(name, error.to_string());
+            summary.out.clone_from(&request.out);
+            summary.seconds = clock.elapsed().as_secs_f64();
+            Err(refusal(error, &summary)?)
+        }
+    }
+}
+
+/// Coordinates that two cameras have of one target differ, where each folder has a table of its own.
+fn check_targets(folder: &Path, shared: Option<&Path>, cameras: &[RigCamera]) -> Result<()> {
+    if shared.is_some() {
+        return Ok(());
+    }
+    for (index, camera) in cameras.iter().enumerate() {
+        for target in &camera.network.targets {
+            let others =
+                cameras[..index].iter().flat_map(|other| other.network.targets.iter().map(move |t| (other, t)));
+            let differs = |(_, known): &(&RigCamera, &rig_calibration::self_calibration::NetworkTarget)| {
+                known.name == target.name
+                    && known.point.is_some()
+                    && target.point.is_some()
+                    && known.point != target.point
+            };
+            if let Some((other, _)) = { others }.find(differs) {
+                let message = format!(
+                    "target `{}` has other coordinates in targets.csv of camera `{}` than in that of camera `{}`: give one \
+                     targets.csv for all beside rig.ron",
+                    target.name, camera.name, other.name
+                );
+                return Err(Error::Survey { path: folder.to_owned(), message });
+            }
+        }
+    }
+    Ok(())
+}
+
+/// A name that no station has would silently leave nothing out.
+fn check_station_names(folder: &Path, rig: &Rig, options: &CalibrationOptions) -> Result<()> {
+    let known =
+        |name: &String| rig.cameras.iter().any(|camera| camera.network.stations.iter().any(|s| s.name == *name));
+    match options.without_ranges.iter().find(|name| !known(name)) {
+        None => Ok(()),
+        Some(unknown) => {
+            let message = format!("--without-ranges: no camera has a station `{unknown}`");
+            Err(Error::Survey { path: folder.to_owned(), message })
+        }
+    }
+}
+
+/// Names file and line of the value that contradicts most.
+fn placed(error: RigError, rig: &Rig, files: &[CameraFiles]) -> RigError {
+    match error {
+        RigError::Camera { camera, source } => {
+            let own = rig.cameras.iter().position(|known| known.name == camera).and_then(|index| files.get(index));
+            let source = match own {
+                Some(files) => Box::new(files.placed(*source)),
+                None => source,
+            };
+            RigError::Camera { camera, source }
+        }
+        error => error,
+    }
+}
+
+/// What the data do not show is refused, with its summary; slips in what was given are wrong input.
+fn refusal(error: RigError, summary: &RigSummary) -> Result<Error> {
+    let wrong_input = || Error::Request { command: "calibrate", message: error.to_string() };
+    let refused = |summary: String, error: RigError| Error::Refused { summary, source: error.into(), written: None };
+    match &error {
+        RigError::TooFewCameras { .. } | RigError::DuplicateCamera(_) | RigError::Unfit { .. } | RigError::Datum(_) => {
+            Ok(wrong_input())
+        }
+        RigError::Camera { source, .. } => {
+            if let Cause::Contradiction(contradiction) = source.as_ref()
+                && contradiction.is_wrong_input()
+            {
+                return Ok(wrong_input());
+            }
+            match Error::not_calibrated(source.as_ref().clone(), summary)? {
+                Error::Refused { summary, .. } => Ok(refused(summary, error)),
+                _ => Ok(wrong_input()),
+            }
+        }
+        _ => Ok(refused(json(summary)?, error)),
+    }
+}
+
+fn write(
+    destination: &Destination,
+    files: &[CameraFiles],
+    outcome: &RigOutcome,
+    summary: &mut RigSummary,
+) -> Result<()> {
+    let folder = destination.open()?;
+    for (camera, files) in outcome.cameras.iter().zip(files) {
+        let mut own = files.summary(&camera.calibration, METHOD, DESCRIBE);
+        own.seconds = summary.seconds;
+        own.out = summary.out.join(&camera.name);
+        files.write(&folder, &camera.name, &camera.calibration, &own)?;
+    }
+    write_text(folder.file("mountings.csv")?, &summary.mountings_csv())?;
+    let epoch = |station: &rig_calibration::self_calibration::AdjustedStation| {
+        let sigmas = sigmas_of(&station.world_from_camera, &station.covariance);
+        Station {
+            station: station.name.clone(),
+            world_from_camera: station.world_from_camera,
+            sigma_position_m: sigmas.map(|sigmas| sigmas.0),
+            sigma_attitude_rad: sigmas.map(|sigmas| sigmas.1),
+            doubt: None,
+        }
+    };
+    write_stations(folder.file("adjusted_epochs.csv")?, &outcome.epochs.iter().map(epoch).collect::<Vec<_>>())?;
+    let target = |target: &rig_calibration::self_calibration::AdjustedTarget| {
+        let sigma = [0, 1, 2].map(|axis| target.covariance[(axis, axis)].sqrt());
+        Target {
+            target: target.name.clone(),
+            position_m: target.point.coords.into(),
+            sigma_m: Some(sigma).filter(|sigma| sigma.iter().all(|sigma| sigma.is_finite() && *sigma > 0.0)),
+        }
+    };
+    write_targets(folder.file("adjusted_targets.csv")?, &outcome.targets.iter().map(target).collect::<Vec<_>>())?;
+    write_text(folder.file("summary.json")?, &json(summary)?)?;
+    write_text(folder.file("report.html")?, &document(summary).html())?;
+    Ok(folder.commit()?)
+}

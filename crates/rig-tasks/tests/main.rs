@@ -1,0 +1,7 @@
+//! Rigs from files to files.
+#![allow(clippy::unwrap_used, missing_docs, dead_code)]
+
+#[path = "../../rig-calibration/tests/support/rigs.rs"]
+mod rigs;
+
+mod calibrate;

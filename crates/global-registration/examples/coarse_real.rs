@@ -101,7 +101,8 @@ fn overlap(source: &OrganisedFrame, target: &OrganisedFrame, target_from_source:
 /// Squared error over its covariance, to which that of the reference is added.
 fn normalised(found: &CoarseAlignment, truth: &Isometry3<f64>) -> f64 {
     let off = pose_difference(&found.target_from_source, truth);
-    let reference = Vector6::from_fn(|k, _| if k < 3 { REFERENCE_M.powi(2) } else { REFERENCE_DEG.to_radians().powi(2) });
+    let reference =
+        Vector6::from_fn(|k, _| if k < 3 { REFERENCE_M.powi(2) } else { REFERENCE_DEG.to_radians().powi(2) });
     let inverse = (found.covariance + Matrix6::from_diagonal(&reference)).try_inverse();
     inverse.map_or(f64::INFINITY, |inverse| off.dot(&(inverse * off)))
 }
@@ -145,7 +146,7 @@ impl Table {
                 let word = if right { "right" } else { "WRONG" };
                 format!(
                     "{word} {:.1} {turned:.2} inliers {} of {} overlap {:.3} agreement {:.3} consistency {:.4} inside {:.3} \
-                     rival {:.2} determined {:.2} rms {:.1} voxel {:.1}",
+                     rival {:.2} determined {:.2} rms {:.1} voxel {:.1} shared {:.1} over {:.0} mm",
                     1e3 * off,
                     found.inliers,
                     found.correspondences,
@@ -156,7 +157,9 @@ impl Table {
                     found.rival,
                     found.determined,
                     1e3 * found.rms_m,
-                    1e3 * found.voxel_m
+                    1e3 * found.voxel_m,
+                    1e3 * found.shared_error.sigma_m,
+                    1e3 * found.shared_error.length_m
                 )
             }
         };

@@ -43,9 +43,9 @@ struct Forms {
     value: f64,
 }
 
-/// `inverse`: of the residuals' normal equations, zero along motions that are not determined, `freedom` of them less than the
-/// residuals; each residual stands for `stands_for` that were measured. `level`: at which chance alone tells a shared error.
-/// `None` where there are too few.
+/// `inverse`: of the residuals' normal equations, zero along motions that are not determined. `lengths`: of correlation that are
+/// tried, metre. Each residual stands for `stands_for` that were measured. `level`: at which chance alone tells a shared
+/// error. `None` where there are too few residuals, or no length to try.
 pub(crate) fn errors(
     residuals: &[Residual],
     inverse: &Matrix6<f64>,
@@ -94,14 +94,14 @@ impl Forms {
         let count = residuals.len();
         let mut correlated: Vec<Vector6<f64>> = residuals.iter().map(|r| r.derivative).collect();
         let (mut sum, mut squares, mut value) = (count as f64, count as f64, left.iter().map(|e| e * e).sum());
-        for i in 1..count {
-            for j in 0..i {
-                let correlation = (-(residuals[i].place - residuals[j].place).norm() / length_m).exp();
-                correlated[i] += residuals[j].derivative * correlation;
-                correlated[j] += residuals[i].derivative * correlation;
+        for (i, (one, left_of_one)) in residuals.iter().zip(left).enumerate() {
+            for (j, (other, left_of_other)) in residuals.iter().zip(left).enumerate().take(i) {
+                let correlation = (-(one.place - other.place).norm() / length_m).exp();
+                correlated[i] += other.derivative * correlation;
+                correlated[j] += one.derivative * correlation;
                 sum += 2.0 * correlation;
                 squares += 2.0 * correlation * correlation;
-                value += 2.0 * correlation * left[i] * left[j];
+                value += 2.0 * correlation * left_of_one * left_of_other;
             }
         }
         let (mut motions, mut twice) = (Matrix6::zeros(), Matrix6::zeros());
@@ -159,7 +159,7 @@ impl Misses {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
+    #![allow(clippy::print_stdout, clippy::unwrap_used)]
     use nalgebra::Vector3;
     use rand::{Rng, SeedableRng};
     use rand_distr::{Distribution as _, StandardNormal};
@@ -213,7 +213,8 @@ mod tests {
             let told = errors(&residuals, &inverse, 0.2..1.6, None, 1.0, 0.05).unwrap();
             shared += told.shared.sigma_m.powi(2) / RUNS as f64;
             let given = errors(&residuals, &inverse, 0.2..1.6, Some(known), 1.0, 0.05).unwrap();
-            let step: Vector6<f64> = inverse * residuals.iter().map(|r| r.derivative * r.distance).sum::<Vector6<f64>>();
+            let step: Vector6<f64> =
+                inverse * residuals.iter().map(|r| r.derivative * r.distance).sum::<Vector6<f64>>();
             square += step.dot(&(given.covariance.try_inverse().unwrap() * step)) / RUNS as f64;
         }
         println!("shared {:.1} of 20 mm, squared error {square:.2} of 6", 1e3 * shared.sqrt());

@@ -131,7 +131,7 @@ pub mod application {
     pub use report;
     #[cfg(feature = "rig-tasks")]
     #[doc(inline)]
-    pub use rig-tasks;
+    pub use rig_tasks;
     #[cfg(feature = "simulation")]
     #[doc(inline)]
     pub use simulation;

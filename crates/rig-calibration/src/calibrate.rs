@@ -58,14 +58,12 @@ fn all_alone(rig: &Rig, options: &CalibrationOptions) -> Result<(Vec<Alone>, Wor
     }
     let mut all = Vec::with_capacity(found.len());
     for (camera, own) in rig.cameras.iter().zip(found) {
-        let own = match own {
-            Some(own) => own,
-            None => {
-                let own = placed(camera, &world, options)?;
-                world.add(&own);
-                own
-            }
-        };
+        if let Some(own) = own {
+            all.push(own);
+            continue;
+        }
+        let own = placed(camera, &world, options)?;
+        world.add(&own);
         all.push(own);
     }
     Ok((all, world))

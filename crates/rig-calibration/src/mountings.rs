@@ -224,7 +224,9 @@ fn check_approximate(rig: &Rig, found: &[Isometry3<f64>]) -> Result<()> {
             exchanged.swap(first, second);
             // The first camera is the frame.
             let frame = exchanged[0].inverse();
-            exchanged.iter_mut().for_each(|pose| *pose = frame * *pose);
+            for pose in &mut exchanged {
+                *pose = frame * *pose;
+            }
             if fitting(&exchanged) {
                 let [first, second] = [first, second].map(|index| &rig.cameras[index].name);
                 return Err(Error::Contradiction(format!(

@@ -55,9 +55,12 @@ impl Joined {
     }
 }
 
+/// Perspective centre and direction.
+type Ray = (Vector3<f64>, Vector3<f64>);
+
 /// Places targets that no camera placed by itself: by ranges, or where rays of all cameras meet.
 fn place_others(rig: &Rig, alone: &[Alone], mountings: &Mountings, places: &mut BTreeMap<String, Point3<f64>>) {
-    let mut rays: BTreeMap<&str, Vec<(Vector3<f64>, Vector3<f64>)>> = BTreeMap::new();
+    let mut rays: BTreeMap<&str, Vec<Ray>> = BTreeMap::new();
     let mut points: BTreeMap<&str, Point3<f64>> = BTreeMap::new();
     for ((camera, alone), mounting) in rig.cameras.iter().zip(alone).zip(&mountings.cameras) {
         let network = &camera.network;

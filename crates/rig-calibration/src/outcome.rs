@@ -128,8 +128,7 @@ fn by_epoch(adjusted: &Adjusted<'_>, index: usize, mounting: &Isometry3<f64>) ->
     for (station, epoch) in setup.network.stations.iter().enumerate() {
         // Targets of one line orient nothing: there is no residual then.
         let Ok(Some((world_from_camera, covariance))) = setup.station_alone(solved, station) else { continue };
-        let rig_from_world =
-            solved.solution.pose(solved.blocks.stations[station])?.inverse();
+        let rig_from_world = solved.solution.pose(solved.blocks.stations[station])?.inverse();
         let (_, by_camera) = product_jacobians(&rig_from_world, &world_from_camera);
         let covariance = symmetrised(&(by_camera * covariance * by_camera.transpose()));
         let step = pose_difference(mounting, &(rig_from_world * world_from_camera));

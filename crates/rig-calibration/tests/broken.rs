@@ -93,7 +93,9 @@ fn observations_of_another_camera_are_told() {
     let mut rig = observed(1, 0.0);
     let grey = rig.cameras[2].network.clone();
     let mut right = rig.cameras[1].network.clone();
-    right.sightings.iter_mut().for_each(|seen| seen.range_m = None);
+    for seen in &mut right.sightings {
+        seen.range_m = None;
+    }
     right.camera = grey.camera;
     rig.cameras[2].network = right;
     let told = refusal(&rig);

@@ -120,7 +120,7 @@ fn by_epoch(document: &mut Document, cameras: &[CameraSummary]) {
         figure("Largest component by epoch", "standard deviations", &|residual| residual.largest_in_sigmas),
     ]);
     let rows = mounted().flat_map(|camera| {
-        camera.by_epoch.iter().map(|residual| {
+        camera.by_epoch.iter().map(move |residual| {
             let shift = residual.shift_mm.map(|value| format!("{value:+.2}"));
             let turn = residual.turn_deg.map(|value| format!("{value:+.4}"));
             let names = [camera.name.clone(), residual.epoch.clone()].into_iter();
@@ -140,7 +140,7 @@ fn cameras(document: &mut Document, cameras: &[CameraSummary]) {
          Parameters and residuals of a camera are in the report of its own folder.",
     );
     let rows = cameras.iter().flat_map(|camera| {
-        camera.groups.iter().map(|(name, observations, _, sigma0)| {
+        camera.groups.iter().map(move |(name, observations, _, sigma0)| {
             vec![
                 camera.name.clone(),
                 name.clone(),

@@ -1,14 +1,16 @@
 //! One calibration of a rig: folders of surveys in, results out.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::Instant;
 
 use atomic_output::{Destination, write_text};
 use calibration_tasks::{CalibrateMethod, CalibrateRequest, CalibrationOptions, CameraFiles, Method, OffsetModel};
 use commands::{Inputs, Progress, json, produce};
+use nalgebra::Point3;
 use pipeline::{Error, Result};
 use range_io::tables::{Station, Target, write_stations, write_targets};
-use rig_calibration::self_calibration::Error as Cause;
+use rig_calibration::self_calibration::{AdjustedStation, AdjustedTarget, Error as Cause};
 use rig_calibration::{Error as RigError, Rig, RigCamera, RigOutcome};
 
 use crate::document::document;
@@ -86,7 +88,7 @@ fn calibrate_into(
             let mut summary = RigSummary::new(name, file, &files, &outcome);
             summary.out.clone_from(&request.out);
             summary.seconds = clock.elapsed().as_secs_f64();
-            write(destination, &files, &outcome, &mut summary)?;
+            write(destination, &files, &outcome, &summary)?;
             Ok(summary)
         }
         Err(error) => {
@@ -99,26 +101,17 @@ fn calibrate_into(
     }
 }
 
-/// Coordinates that two cameras have of one target differ, where each folder has a table of its own.
+/// Refuses coordinates of one target that differ between two cameras, where each folder has a table of its own.
 fn check_targets(folder: &Path, shared: Option<&Path>, cameras: &[RigCamera]) -> Result<()> {
-    if shared.is_some() {
-        return Ok(());
-    }
-    for (index, camera) in cameras.iter().enumerate() {
-        for target in &camera.network.targets {
-            let others =
-                cameras[..index].iter().flat_map(|other| other.network.targets.iter().map(move |t| (other, t)));
-            let differs = |(_, known): &(&RigCamera, &rig_calibration::self_calibration::NetworkTarget)| {
-                known.name == target.name
-                    && known.point.is_some()
-                    && target.point.is_some()
-                    && known.point != target.point
-            };
-            if let Some((other, _)) = { others }.find(differs) {
+    let mut known: BTreeMap<&str, (&str, Point3<f64>)> = BTreeMap::new();
+    for camera in cameras.iter().filter(|_| shared.is_none()) {
+        for (target, point) in camera.network.targets.iter().filter_map(|target| Some((target, target.point?))) {
+            let (other, earlier) = *known.entry(&target.name).or_insert((&camera.name, point));
+            if earlier != point {
                 let message = format!(
-                    "target `{}` has other coordinates in targets.csv of camera `{}` than in that of camera `{}`: give one \
-                     targets.csv for all beside rig.ron",
-                    target.name, camera.name, other.name
+                    "target `{}` has other coordinates in targets.csv of camera `{}` than in that of camera `{other}`: \
+                     give one targets.csv for all beside rig.ron",
+                    target.name, camera.name
                 );
                 return Err(Error::Survey { path: folder.to_owned(), message });
             }
@@ -157,33 +150,30 @@ fn placed(error: RigError, rig: &Rig, files: &[CameraFiles]) -> RigError {
 
 /// What the data do not show is refused, with its summary; slips in what was given are wrong input.
 fn refusal(error: RigError, summary: &RigSummary) -> Result<Error> {
-    let wrong_input = || Error::Request { command: "calibrate", message: error.to_string() };
-    let refused = |summary: String, error: RigError| Error::Refused { summary, source: error.into(), written: None };
-    match &error {
-        RigError::TooFewCameras { .. } | RigError::DuplicateCamera(_) | RigError::Unfit { .. } | RigError::Datum(_) => {
-            Ok(wrong_input())
-        }
-        RigError::Camera { source, .. } => {
-            if let Cause::Contradiction(contradiction) = source.as_ref()
-                && contradiction.is_wrong_input()
-            {
-                return Ok(wrong_input());
-            }
-            match Error::not_calibrated(source.as_ref().clone(), summary)? {
-                Error::Refused { summary, .. } => Ok(refused(summary, error)),
-                _ => Ok(wrong_input()),
-            }
-        }
-        _ => Ok(refused(json(summary)?, error)),
+    match refused_summary(&error, summary)? {
+        Some(summary) => Ok(Error::Refused { summary, source: error.into(), written: None }),
+        None => Ok(Error::Request { command: "calibrate", message: error.to_string() }),
     }
 }
 
-fn write(
-    destination: &Destination,
-    files: &[CameraFiles],
-    outcome: &RigOutcome,
-    summary: &mut RigSummary,
-) -> Result<()> {
+/// The text of a refusal's summary; `None` where the input is wrong.
+fn refused_summary(error: &RigError, summary: &RigSummary) -> Result<Option<String>> {
+    match error {
+        RigError::TooFewCameras { .. } | RigError::DuplicateCamera(_) | RigError::Unfit { .. } | RigError::Datum(_) => {
+            Ok(None)
+        }
+        RigError::Camera { source, .. } => match source.as_ref() {
+            Cause::Contradiction(contradiction) if contradiction.is_wrong_input() => Ok(None),
+            cause => match Error::not_calibrated(cause.clone(), summary)? {
+                Error::Refused { summary, .. } => Ok(Some(summary)),
+                _ => Ok(None),
+            },
+        },
+        _ => Ok(Some(json(summary)?)),
+    }
+}
+
+fn write(destination: &Destination, files: &[CameraFiles], outcome: &RigOutcome, summary: &RigSummary) -> Result<()> {
     let folder = destination.open()?;
     for (camera, files) in outcome.cameras.iter().zip(files) {
         let mut own = files.summary(&camera.calibration, METHOD, DESCRIBE);
@@ -192,7 +182,7 @@ fn write(
         files.write(&folder, &camera.name, &camera.calibration, &own)?;
     }
     write_text(folder.file("mountings.csv")?, &summary.mountings_csv())?;
-    let epoch = |station: &rig_calibration::self_calibration::AdjustedStation| {
+    let epoch = |station: &AdjustedStation| {
         let sigmas = sigmas_of(&station.world_from_camera, &station.covariance);
         Station {
             station: station.name.clone(),
@@ -203,7 +193,7 @@ fn write(
         }
     };
     write_stations(folder.file("adjusted_epochs.csv")?, &outcome.epochs.iter().map(epoch).collect::<Vec<_>>())?;
-    let target = |target: &rig_calibration::self_calibration::AdjustedTarget| {
+    let target = |target: &AdjustedTarget| {
         let sigma = [0, 1, 2].map(|axis| target.covariance[(axis, axis)].sqrt());
         Target {
             target: target.name.clone(),

@@ -1,96 +1,14 @@
 //! The adjustment of a network, put together.
 
-use std::sync::Arc;
-
-use adjust::{
-    Adjustment, BlockId, Covariance, DatumDefect, Differentiated, Kernel, Method, ParameterBlock, RigidPose,
-    SolveOptions,
-};
+use adjust::{Adjustment, BlockId, Covariance, DatumDefect, Differentiated, Kernel, ParameterBlock, RigidPose};
 use nalgebra::{DMatrix, Point3};
 
 use crate::functional_model::equations::{KnownLength, PartialPrior, PassivePoint};
 use crate::functional_model::hyperbola_steps::range_block;
 use crate::functional_model::misfit::Scales;
-use crate::functional_model::setup::{BlockPrior, Blocks, Datum, Row, Setup, Solved, Source};
+use crate::functional_model::setup::{BlockPrior, Blocks, Datum, Row, Setup, Source};
 use crate::functional_model::terms::{camera_names, camera_values, range_names};
 use crate::{Component, DistanceEnd, Error, Result};
-
-impl Setup<'_> {
-    /// Solves the network.
-    pub fn solve(&self) -> Result<Solved> {
-        self.solve_by(Method::LevenbergMarquardt)
-    }
-
-    /// The same from values near the solution, where undamped steps take half as many factorisations.
-    pub fn solve_nearby(&self) -> Result<Solved> {
-        match self.solve_by(Method::GaussNewton) {
-            Err(Error::Adjust(adjust::Error::NotConverged { .. })) => self.solve(),
-            done => done,
-        }
-    }
-
-    fn solve_by(&self, method: Method) -> Result<Solved> {
-        let mut builder = Builder::new(self)?;
-        builder.add_observations()?;
-        let datum_defect = builder.add_datum(self.has_scale())?;
-        let solution = Arc::new(builder.adjustment.solve(&options(method))?);
-        Ok(Solved { solution, blocks: builder.blocks, rows: builder.rows, first_row: 0, datum_defect })
-    }
-}
-
-/// Solves several cameras on one rig in one adjustment.
-///
-/// All setups have the stations of the rig and the targets in the same order. The first camera is the frame of the rig: its
-/// stations are the rig's, and its datum, control and known distances are those of all. Each of the others has a mounting
-/// `rig_from_camera` in its start values, one unknown for all stations. Answers with one view of the shared solution for
-/// each camera; the unknowns, the rows and the residuals are the camera's own.
-///
-/// # Errors
-/// [`Error::NotReachable`] without a mounting; whatever the adjustment says.
-pub fn solve_rig(setups: &[Setup<'_>]) -> Result<Vec<Solved>> {
-    rig_by(setups, Method::LevenbergMarquardt)
-}
-
-/// The same from values near the solution, where undamped steps take half as many factorisations.
-///
-/// # Errors
-/// As [`solve_rig`].
-pub fn solve_rig_nearby(setups: &[Setup<'_>]) -> Result<Vec<Solved>> {
-    match rig_by(setups, Method::GaussNewton) {
-        Err(Error::Adjust(adjust::Error::NotConverged { .. })) => solve_rig(setups),
-        done => done,
-    }
-}
-
-fn rig_by(setups: &[Setup<'_>], method: Method) -> Result<Vec<Solved>> {
-    let Some((first, others)) = setups.split_first() else { return Ok(Vec::new()) };
-    let mut builder = Builder::new(first)?;
-    builder.add_observations()?;
-    let datum_defect = builder.add_datum(setups.iter().any(Setup::has_scale))?;
-    let mut parts = Vec::with_capacity(setups.len());
-    for setup in others {
-        parts.push(builder.next_camera(setup)?);
-    }
-    let solution = Arc::new(builder.adjustment.solve(&options(method))?);
-    parts.push((builder.blocks, builder.rows));
-    let mut first_row = 0;
-    let view = |(blocks, rows): (Blocks, Vec<Row>)| {
-        let solved = Solved { solution: Arc::clone(&solution), blocks, first_row, rows, datum_defect };
-        first_row += solved.rows.len();
-        solved
-    };
-    Ok(parts.into_iter().map(view).collect())
-}
-
-/// A network that is determined takes 10 to 30 steps; one that is not creeps on for thousands.
-fn options(method: Method) -> SolveOptions {
-    SolveOptions { method, max_iterations: 50, ..SolveOptions::default() }
-}
-
-fn camera_block(adjustment: &mut Adjustment<'_>, setup: &Setup<'_>) -> BlockId {
-    let camera = ParameterBlock::euclidean(camera_values(&setup.calibration.camera)).named("camera");
-    adjustment.add_block(camera.with_parameter_names(camera_names()))
-}
 
 /// How an adjustment is made robust that gross errors take part in: standard deviations of image points and of ranges are
 /// as many times those stated as they scatter, and all pull by one kernel.
@@ -104,7 +22,7 @@ pub(crate) struct Builder<'s> {
     setup: &'s Setup<'s>,
     pub(crate) adjustment: Adjustment<'s>,
     pub(crate) blocks: Blocks,
-    rows: Vec<Row>,
+    pub(crate) rows: Vec<Row>,
     /// Image points and ranges are observations of their own where there are kernels.
     pub(crate) kernels: Option<Kernels>,
 }
@@ -424,7 +342,7 @@ impl<'s> Builder<'s> {
         geometry.chain(relative).try_for_each(|block| Ok(self.adjustment.hold(block)?))
     }
 
-    fn add_datum(&mut self, has_scale: bool) -> Result<usize> {
+    pub(crate) fn add_datum(&mut self, has_scale: bool) -> Result<usize> {
         if self.setup.datum != Datum::Inner || self.setup.geometry_held {
             return Ok(0);
         }
@@ -437,4 +355,9 @@ impl<'s> Builder<'s> {
     fn row(&mut self, source: Source, component: Component, observed: f64, sigma: f64) {
         self.rows.push(Row { source, component, observed, sigma });
     }
+}
+
+fn camera_block(adjustment: &mut Adjustment<'_>, setup: &Setup<'_>) -> BlockId {
+    let camera = ParameterBlock::euclidean(camera_values(&setup.calibration.camera)).named("camera");
+    adjustment.add_block(camera.with_parameter_names(camera_names()))
 }

@@ -110,7 +110,9 @@ pub fn truth(index: usize) -> Network {
     };
     network.sightings = planned_sightings(&network).unwrap();
     if index == 2 {
-        network.sightings.iter_mut().for_each(|seen| seen.range_m = None);
+        for seen in &mut network.sightings {
+            seen.range_m = None;
+        }
     }
     network
 }

@@ -101,7 +101,8 @@ fn overlap(source: &OrganisedFrame, target: &OrganisedFrame, target_from_source:
 /// Squared error over its covariance, to which that of the reference is added.
 fn normalised(found: &CoarseAlignment, truth: &Isometry3<f64>) -> f64 {
     let off = pose_difference(&found.target_from_source, truth);
-    let reference = Vector6::from_fn(|k, _| if k < 3 { REFERENCE_M.powi(2) } else { REFERENCE_DEG.to_radians().powi(2) });
+    let reference =
+        Vector6::from_fn(|k, _| if k < 3 { REFERENCE_M.powi(2) } else { REFERENCE_DEG.to_radians().powi(2) });
     let inverse = (found.covariance + Matrix6::from_diagonal(&reference)).try_inverse();
     inverse.map_or(f64::INFINITY, |inverse| off.dot(&(inverse * off)))
 }

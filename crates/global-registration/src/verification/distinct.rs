@@ -78,8 +78,7 @@ impl Common {
         let lengths = target.voxel_m()..planes.frame.radius_m;
         let stands_for = forward.len() as f64 / planes.points.max(1.0);
         let inverse = planes.inverse();
-        let errors =
-            errors(&planes.residuals, &inverse, lengths, options.shared_error, stands_for, options.level);
+        let errors = errors(&planes.residuals, &inverse, lengths, options.shared_error, stands_for, options.level);
         let together = errors.map_or(1.0, |errors| errors.together);
         Self { inside, planes, errors, misses: Misses::new(unevenness([source, target]), together) }
     }
@@ -129,7 +128,8 @@ impl Common {
             }
             of_motion += motion * motion.transpose() * (square * voxel_m * voxel_m);
         }
-        let largest = rigid_pose::eigen6(&of_motion, "the covariance of the pose").map(|(values, _)| values[5].max(0.0));
+        let largest =
+            rigid_pose::eigen6(&of_motion, "the covariance of the pose").map(|(values, _)| values[5].max(0.0));
         let sigma_m = largest.ok().filter(|_| self.errors.is_some()).map_or(f64::INFINITY, f64::sqrt);
         let frame = Centred { centre: self.planes.frame.centre + target.reduced.middle, ..self.planes.frame };
         let to_tangent = frame.tangent_from_motion(&target.between_frames(source, &pose));
@@ -198,11 +198,13 @@ impl Planes {
             on = rest;
             let sum: Vector3<f64> = plane.iter().map(|&[_, i]| wide(cloud.normals.vectors[i])).sum();
             let Some(normal) = sum.try_normalize(0.0) else { continue };
-            residuals.extend(plane.iter().map(|&[of_source, i]| Residual {
-                place: place(i),
-                derivative: frame.derivative(&place(i), &normal),
-                distance: wide(subtract(motion.point(source.reduced.points[of_source]), cloud.reduced.points[i]))
-                    .dot(&wide(cloud.normals.vectors[i])),
+            residuals.extend(plane.iter().map(|&[of_source, i]| {
+                Residual {
+                    place: place(i),
+                    derivative: frame.derivative(&place(i), &normal),
+                    distance: wide(subtract(motion.point(source.reduced.points[of_source]), cloud.reduced.points[i]))
+                        .dot(&wide(cloud.normals.vectors[i])),
+                }
             }));
         }
         let matrix = residuals.iter().fold(Matrix6::zeros(), |sum, r| sum + r.derivative * r.derivative.transpose());

@@ -213,7 +213,8 @@ mod tests {
             let told = errors(&residuals, &inverse, 0.2..1.6, None, 1.0, 0.05).unwrap();
             shared += told.shared.sigma_m.powi(2) / RUNS as f64;
             let given = errors(&residuals, &inverse, 0.2..1.6, Some(known), 1.0, 0.05).unwrap();
-            let step: Vector6<f64> = inverse * residuals.iter().map(|r| r.derivative * r.distance).sum::<Vector6<f64>>();
+            let step: Vector6<f64> =
+                inverse * residuals.iter().map(|r| r.derivative * r.distance).sum::<Vector6<f64>>();
             square += step.dot(&(given.covariance.try_inverse().unwrap() * step)) / RUNS as f64;
         }
         println!("shared {:.1} of 20 mm, squared error {square:.2} of 6", 1e3 * shared.sqrt());

@@ -28,7 +28,7 @@ const MOST_CODES: usize = 4;
 pub struct StoredWatch {
     surfaces: Vec<Bending>,
     witnesses: Vec<UnitWitness>,
-    /// Pixels and the most extreme probability by value, in the unit of the file.
+    /// Pixels by the bits of the code, in the unit of the file.
     codes: BTreeMap<u32, usize>,
     pixels: usize,
     empty: usize,

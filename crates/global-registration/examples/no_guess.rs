@@ -49,6 +49,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     let found = align_without_guess(&source, &target, &options)?;
     let off = found.target_from_source.translation.vector - truth.translation.vector;
     println!("found to {:.0} mm with voxels of {:.0} mm", 1e3 * off.norm(), 1e3 * found.voxel_m);
-    println!("{:.0} % in common, another pose fits as well with a probability of {:.2}", 100.0 * found.overlap, found.rival);
+    println!(
+        "{:.0} % in common, another pose fits as well with a probability of {:.2}",
+        100.0 * found.overlap,
+        found.rival
+    );
     Ok(())
 }

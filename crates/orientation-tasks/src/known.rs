@@ -4,9 +4,8 @@ use std::path::Path;
 
 use nalgebra::{Matrix6, Vector6};
 use orientation::TimedPose;
-use pipeline::stations::pose_covariance;
 use pipeline::{Error, Result};
-use range_io::tables::read_stations;
+use range_io::tables::{pose_covariance, read_stations};
 use range_io::trajectory::read_any_trajectory;
 use rigid_pose::Uncertain;
 

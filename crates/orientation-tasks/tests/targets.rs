@@ -73,7 +73,7 @@ fn tie_points_alone_orient_all_stations_in_the_frame_of_the_first() {
 }
 
 #[test]
-fn two_poses_of_a_plane_are_named() {
+fn a_station_that_a_few_targets_of_a_plane_do_not_hold_is_named() {
     let folder = tempfile::tempdir().unwrap();
     let survey = field(folder.path());
     // Four targets of the wall around its middle, image points alone, seen by a distant station with noise.

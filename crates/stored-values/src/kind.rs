@@ -1,5 +1,7 @@
 //! Ranges or depths: what the surfaces of all frames say together.
 
+use std::fmt;
+
 use crate::surfaces::Bending;
 
 /// Standard deviation of what surfaces of one camera are bent alike by, whatever the values are: periodic errors, those
@@ -57,6 +59,36 @@ impl KindJudgement {
             None
         }
     }
+}
+
+/// What was told, how surely and by what, in a line.
+impl fmt::Display for KindJudgement {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let count = self.surfaces;
+        let seen = |f: &mut fmt::Formatter<'_>| {
+            let (plural, bending, sigma) = (if count == 1 { "" } else { "s" }, self.bending, self.sigma);
+            write!(
+                f,
+                "{count} surface{plural} bent by {bending:.2} +- {sigma:.2}, 0: plane as ranges, 1: plane as depths)"
+            )
+        };
+        match self.told() {
+            Some(Kind::Range) => write!(f, "ranges along the ray (probability {}; ", in_words(self.range))?,
+            Some(Kind::Depth) => write!(f, "depths along the axis (probability {}; ", in_words(self.depth))?,
+            None if count == 0 => return f.write_str("ranges or depths: cannot be told, no smooth surface was found"),
+            None => {
+                let (range, depth, neither) = (self.range, self.depth, self.neither);
+                f.write_str("ranges or depths: cannot be told (")?;
+                write!(f, "probability of ranges {range:.2}, of depths {depth:.2}, of neither {neither:.2}; ")?;
+            }
+        }
+        seen(f)
+    }
+}
+
+/// A probability in words: "0.995", or "above 0.999".
+pub fn in_words(probability: f64) -> String {
+    if probability > 0.999 { "above 0.999".to_owned() } else { format!("{probability:.3}") }
 }
 
 /// Judges the surfaces of one camera's frames, as [`bendings`](crate::bendings) gives them.

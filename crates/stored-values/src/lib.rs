@@ -10,7 +10,7 @@ pub use camera_model;
 pub use constants::{RepeatedValue, repeated_values};
 pub use error::Error;
 use error::Result;
-pub use kind::{Kind, KindJudgement, judge_kind};
+pub use kind::{Kind, KindJudgement, in_words, judge_kind};
 pub use range_image;
 pub use surfaces::{Bending, bendings};
 pub use unit::{UnitWitness, judge_unit};

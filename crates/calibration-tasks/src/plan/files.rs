@@ -5,9 +5,8 @@ use std::path::Path;
 use commands::root_of;
 use nalgebra::{Matrix3, Point3, Vector3};
 use pipeline::Result;
-use pipeline::stations::pose_covariance;
 use range_io::survey::Survey;
-use range_io::tables::{read_stations, read_targets};
+use range_io::tables::{pose_covariance, read_stations, read_targets};
 use self_calibration::{Network, NetworkTarget, Station};
 
 use crate::calibrate::{Start, named_distances};

@@ -2,14 +2,12 @@
 
 pub(crate) mod at_once;
 pub(crate) mod placement;
-pub(crate) mod pose_covariance;
 pub mod refused;
 pub(crate) mod station;
 pub mod surface;
 
 pub use at_once::{poses_in, register_at_once};
 pub use placement::wrong_place;
-pub use pose_covariance::pose_covariance;
 pub use refused::Tried;
 pub use station::{Station, Windows, projection};
 pub use surface::{Start, Surface};

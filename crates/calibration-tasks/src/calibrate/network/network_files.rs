@@ -6,13 +6,12 @@ use std::path::{Path, PathBuf};
 use commands::plan::DriftTreatment;
 use commands::root_of;
 use nalgebra::{Matrix3, Point3, Vector3};
-use pipeline::stations::pose_covariance;
 use pipeline::survey::ViewDrift;
 use pipeline::{Error, Result};
 use range_io::survey::Survey;
 use range_io::tables::{
-    PlacedRows, Station as StationRow, Target as TargetRow, TargetObservation, read_placed_observations,
-    read_placed_stations, read_placed_targets,
+    PlacedRows, Station as StationRow, Target as TargetRow, TargetObservation, pose_covariance,
+    read_placed_observations, read_placed_stations, read_placed_targets,
 };
 use self_calibration::{Network, NetworkTarget, Sighting, Station};
 

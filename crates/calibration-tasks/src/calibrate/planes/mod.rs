@@ -11,7 +11,6 @@ use commands::{Progress, root_of};
 use error_models::{RangeTerms, SurfaceShape};
 use nalgebra::{Isometry3, Point3, Vector3};
 use pipeline::run::Processed;
-use pipeline::stations::pose_covariance;
 use pipeline::survey::{ViewData, ViewDrift};
 use pipeline::{Error, Plan, Result, process};
 use range_calibration::{
@@ -19,7 +18,7 @@ use range_calibration::{
     estimate_range_terms,
 };
 use range_io::survey::{Level, Survey};
-use range_io::tables::{ObservedPlane, PlacedRows, Station, read_placed_planes, read_placed_stations};
+use range_io::tables::{ObservedPlane, PlacedRows, Station, pose_covariance, read_placed_planes, read_placed_stations};
 use self_calibration::{Error as Cause, NetworkError, TermSelection};
 
 use crate::calibrate::network::network_files::optional;

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use range_image::Raster;
 use range_io::survey::Level;
 use statistics::quantile;
-use stored_values::{Bending, Kind, KindJudgement, UnitWitness, bendings, judge_kind, judge_unit, repeated_values};
+use stored_values::{Bending, Kind, UnitWitness, bendings, in_words, judge_kind, judge_unit, repeated_values};
 
 use crate::survey::open::OpenSurvey;
 use crate::survey::view::{View, ViewData};
@@ -28,7 +28,7 @@ const MOST_CODES: usize = 4;
 pub struct StoredWatch {
     surfaces: Vec<Bending>,
     witnesses: Vec<UnitWitness>,
-    /// Pixels and the most extreme probability by value, in the unit of the file.
+    /// Pixels by the bits of the code, in the unit of the file.
     codes: BTreeMap<u32, usize>,
     pixels: usize,
     empty: usize,
@@ -86,8 +86,7 @@ impl StoredWatch {
     /// What was found, by name, for people.
     pub fn in_words(&self) -> Vec<(&'static str, String)> {
         let Some(stated) = self.stated else { return Vec::new() };
-        let mut words =
-            vec![("values", kind_in_words(&judge_kind(&self.surfaces))), ("unit", self.unit_in_words(stated))];
+        let mut words = vec![("values", judge_kind(&self.surfaces).to_string()), ("unit", self.unit_in_words(stated))];
         let empty = 100.0 * self.empty as f64 / self.pixels.max(1) as f64;
         words.push(("without a value", format!("{empty:.1} % of the pixels")));
         if let Some(codes) = self.codes_in_words() {
@@ -102,15 +101,10 @@ impl StoredWatch {
         let mut doubts = Vec::new();
         let judged = judge_kind(&self.surfaces);
         if let Some(told) = judged.told().filter(|told| *told != stated.kind) {
-            let (is, name, level) = names(told);
             let words = format!(
-                "the values are {is}, and survey.ron states `level: {}`: {} bend as they do when one is read as the other \
-                 ({:.2} +- {:.2} of the way from ranges, 0, to depths, 1; probability of {name} {}). State `level: {level}`",
-                names(stated.kind).2,
-                surfaces(judged.surfaces),
-                judged.bending,
-                judged.sigma,
-                probability(if told == Kind::Range { judged.range } else { judged.depth }),
+                "survey.ron states `level: {}`, and the values are {judged}: state `level: {}`",
+                level(stated.kind),
+                level(told)
             );
             doubts.push(Doubt::new(DoubtKind::RangeOrDepth, words));
         }
@@ -122,7 +116,7 @@ impl StoredWatch {
                 "the values are read as {} m each and are probably {name} ({unit_m} m, probability {}): the distances and the \
                  noise are those of no camera of this kind",
                 stated.scale_m,
-                probability(likely)
+                in_words(likely)
             );
             doubts.push(Doubt::new(DoubtKind::Units, words));
         }
@@ -156,7 +150,7 @@ impl StoredWatch {
 
     fn unit_in_words(&self, stated: Stated) -> String {
         match self.unit(stated) {
-            Some((_, name, likely)) if likely >= UNIT_LEVEL => format!("{name} (probability {})", probability(likely)),
+            Some((_, name, likely)) if likely >= UNIT_LEVEL => format!("{name} (probability {})", in_words(likely)),
             Some((_, name, likely)) => {
                 format!("cannot be told; of the likely ones {name} come first (probability {likely:.2})")
             }
@@ -174,37 +168,10 @@ impl StoredWatch {
     }
 }
 
-fn kind_in_words(judged: &KindJudgement) -> String {
-    let seen = format!(
-        "{} bend by {:.2} +- {:.2}, 0: plane as ranges, 1: plane as depths",
-        surfaces(judged.surfaces),
-        judged.bending,
-        judged.sigma
-    );
-    match judged.told() {
-        Some(Kind::Range) => format!("ranges along the ray (probability {}; {seen})", probability(judged.range)),
-        Some(Kind::Depth) => format!("depths along the axis (probability {}; {seen})", probability(judged.depth)),
-        None if judged.surfaces == 0 => "ranges or depths: cannot be told, no smooth surface was found".to_owned(),
-        None => format!(
-            "ranges or depths: cannot be told (probability of ranges {:.2}, of depths {:.2}, of neither {:.2}; {seen})",
-            judged.range, judged.depth, judged.neither
-        ),
-    }
-}
-
-/// A kind in words, its name, and the level of surveys that have it.
-fn names(kind: Kind) -> (&'static str, &'static str, &'static str) {
+/// The level of surveys whose values are of a kind.
+fn level(kind: Kind) -> &'static str {
     match kind {
-        Kind::Range => ("ranges along the ray", "ranges", "range"),
-        Kind::Depth => ("depths along the axis", "depths", "depth"),
+        Kind::Range => Level::Range.name(),
+        Kind::Depth => Level::Depth.name(),
     }
-}
-
-fn surfaces(count: usize) -> String {
-    if count == 1 { "1 surface".to_owned() } else { format!("{count} surfaces") }
-}
-
-/// "0.995", or "above 0.999".
-fn probability(value: f64) -> String {
-    if value > 0.999 { "above 0.999".to_owned() } else { format!("{value:.3}") }
 }

@@ -1,8 +1,8 @@
 //! Weighted control: what the standard deviations of a table mean for a pose.
 
+use super::Station;
 use camera_model::euler_from_pose;
 use nalgebra::{Matrix3, Matrix6, Rotation3, Vector3};
-use range_io::tables::Station;
 
 /// Stands for "position not known" beside a known attitude: far beyond any network, so it carries no weight.
 const UNKNOWN_POSITION_SIGMA_M: f64 = 1e4;
@@ -52,23 +52,32 @@ mod tests {
     use camera_model::pose_from_euler;
 
     use super::*;
-    use crate::survey::StationPose;
 
     #[test]
-    fn sigmas_of_a_table_come_back_from_the_covariance() {
-        // The way back differentiates the angles of stepped poses: another derivation of the same matrix.
+    fn steps_of_angles_agree_with_differences() {
+        let angles = [1.4, -0.3, 0.7];
         let row = Station {
             station: "S".to_owned(),
-            world_from_camera: pose_from_euler(Vector3::new(1.0, 2.0, 3.0), [1.4, -0.3, 0.7]),
+            world_from_camera: pose_from_euler(Vector3::new(1.0, 2.0, 3.0), angles),
             sigma_position_m: Some([0.001, 0.002, 0.003]),
             sigma_attitude_rad: Some([0.01, 0.02, 0.03]),
             doubt: None,
         };
-        let pose = StationPose { world_from_camera: row.world_from_camera, covariance: pose_covariance(&row) };
-        let (position, attitude) = pose.sigmas().unwrap();
-        for (found, given) in position.iter().chain(&attitude).zip([0.001, 0.002, 0.003, 0.01, 0.02, 0.03]) {
-            // The derivatives by differences are good to nine digits.
-            assert!((found / given - 1.0).abs() < 1e-7, "{found} from {given}");
+        let mut expected = Matrix3::zeros();
+        for (axis, sigma) in [0.01, 0.02, 0.03].into_iter().enumerate() {
+            let moved = |step: f64| {
+                let mut moved = angles;
+                moved[axis] += step;
+                pose_from_euler(Vector3::zeros(), moved).rotation
+            };
+            let step = (moved(-1e-6).inverse() * moved(1e-6)).scaled_axis() / 2e-6;
+            expected += step * step.transpose() * sigma * sigma;
         }
+        let covariance = pose_covariance(&row).unwrap();
+        let attitude = covariance.fixed_view::<3, 3>(3, 3).into_owned();
+        // Differences are good to nine digits.
+        assert!((attitude - expected).amax() < 1e-8 * expected.amax(), "{attitude} {expected}");
+        assert!((covariance[(2, 2)] - 9e-6).abs() < 1e-18);
+        assert!(pose_covariance(&Station { sigma_position_m: None, sigma_attitude_rad: None, ..row }).is_none());
     }
 }

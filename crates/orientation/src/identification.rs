@@ -388,12 +388,11 @@ impl<'a> Search<'a> {
         let own = |own: &Match| found.matches.iter().any(|other| (other.seen, other.known) == (own.seen, own.known));
         let place = |known: usize| self.camera.project(&found.pose.inverse_transform_point(&self.known[known])).ok();
         let is_alone = |own: &Match| {
-            let others = (0..self.known.len()).filter(|known| *known != own.known).filter_map(place);
             let pixel = self.seen[own.seen].pixel;
-            own.off_px <= self.reach_px
-                && others
-                    .into_iter()
-                    .all(|at| (at[0] - pixel[0]).hypot(at[1] - pixel[1]) > CLEARLY_NEARER * own.off_px.max(LEAST_PX))
+            let is_far =
+                |at: [f64; 2]| (at[0] - pixel[0]).hypot(at[1] - pixel[1]) > CLEARLY_NEARER * own.off_px.max(LEAST_PX);
+            let mut others = (0..self.known.len()).filter(|known| *known != own.known).filter_map(place);
+            own.off_px <= self.reach_px && others.all(is_far)
         };
         let mut pairs: Vec<[usize; 2]> =
             all.iter().filter(|m| own(m) || is_alone(m)).map(|m| [m.seen, m.known]).collect();

@@ -47,6 +47,28 @@ pub enum Error {
         /// By how much the second `v'Pv` is larger than the first.
         difference: f64,
     },
+    /// No arrangement of the known targets explains the points better than chance.
+    #[error(
+        "{seen} points that were seen fit no arrangement of the {known} known targets: {expected_by_chance:.1e} would fit as well \
+         as the best by chance; more points, other coordinates, an approximate pose or coded targets help"
+    )]
+    Unidentified {
+        /// Points that were seen.
+        seen: usize,
+        /// Targets with coordinates.
+        known: usize,
+        /// How many arrangements would fit as well as the best by chance.
+        expected_by_chance: f64,
+    },
+    /// The points fit the known targets in several ways.
+    #[error(
+        "the points that were seen fit the known targets in {ways} ways: an approximate pose, a target off the pattern or \
+         coded targets decide"
+    )]
+    AmbiguousArrangement {
+        /// In how many.
+        ways: usize,
+    },
     /// The pose is determined so weakly that its covariance, which comes from a linearisation, means nothing.
     #[error(
         "the geometry is too weak: with standard deviations of {sigma_attitude_rad:.3} rad and {sigma_position_m:.3} m \

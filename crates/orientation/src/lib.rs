@@ -2,6 +2,7 @@
 
 mod approximation;
 mod error;
+mod identification;
 mod linearity;
 mod model;
 mod mounting;
@@ -16,6 +17,7 @@ pub use approximation::approximate_poses;
 pub use camera_model;
 pub use error::Error;
 use error::Result;
+pub use identification::{Identification, IdentificationOptions, UnnamedTarget, identify_targets};
 pub use mounting::{
     LeverArm, Mounting, MountingOptions, MountingResidual, TimeOffset, TimedPose, Undetermined, estimate_mounting,
 };

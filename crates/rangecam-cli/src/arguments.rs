@@ -81,8 +81,8 @@ pub(crate) enum Command {
     },
     /// Calibrate lens and range terms from a survey of targets or planes, with the quality of every parameter.
     Calibrate(Box<CalibrateArguments>),
-    /// Find the targets of a calibration in the frames of a survey, or in a folder of images.
-    Targets(TargetsArguments),
+    /// Find the targets of a calibration in the frames of a survey, or in a folder of images, or print some.
+    Targets(Box<TargetsArguments>),
     /// Tell how well planned stations and targets would determine a calibration, and which station to add.
     Plan(Box<PlanArguments>),
     /// Estimate internal scattering (stray light in the camera) from a scene with and without bright objects.

@@ -11,6 +11,7 @@ use crate::arguments::Command;
 use crate::exit;
 use crate::output::Output;
 use crate::requests::calibration::calibrate_arguments::CalibrateArguments;
+use crate::requests::calibration::targets_arguments::Request as Targets;
 use crate::requests::register_arguments::Request;
 
 type Outcome = Result<ExitCode, Box<dyn Error>>;
@@ -37,10 +38,10 @@ pub(crate) fn dispatch(command: Command, output: &Output) -> Outcome {
             output.result(&calibration_tasks::simulate_network(&scene, seed, &out)?)
         }
         Command::Calibrate(arguments) => calibrate(*arguments, output),
-        Command::Targets(arguments) => {
-            let request = arguments.request().map_err(|wrong| format!("targets --kind: {wrong}"))?;
-            output.result(&target_tasks::find_targets(&request, output.progress().as_ref())?)
-        }
+        Command::Targets(arguments) => match arguments.request()? {
+            Targets::Find(request) => output.result(&target_tasks::find_targets(&request, output.progress().as_ref())?),
+            Targets::Print(request) => output.result(&target_tasks::print_targets(&request)?),
+        },
         Command::Plan(arguments) => {
             output.result(&calibration_tasks::plan_network(&arguments.request(), output.progress().as_ref())?)
         }

@@ -98,9 +98,22 @@ fn furnished(line: &str) -> tempfile::TempDir {
         }
         return folder;
     }
-    let scene = fixtures.join("scenes/room_small.ron");
+    if line.contains(" images ") {
+        std::fs::create_dir(at("images")).unwrap();
+        let draw = if line.contains(" rings ") { crate::pictures::write_rings } else { crate::pictures::write_board };
+        draw(&at("images/1.png"));
+        return folder;
+    }
+    let spheres = line.contains(" spheres ");
+    let scene = fixtures.join("scenes").join(if spheres { "spheres.ron" } else { "room_small.ron" });
     let (code, said) = rangecam(&["simulate", scene.to_str().unwrap(), "--out", "survey"], folder.path());
     assert_eq!(code, Some(0), "{said}");
+    if spheres {
+        let places =
+            "A,-0.5,0.35,0.5,,,\nB,0.45,0.3,0.3,,,\nC,0.35,-0.4,0.6,,,\nD,-0.4,-0.35,0.2,,,\nE,0.0,0.05,0.4,,,\n";
+        std::fs::write(at("survey/targets.csv"), format!("target,x,y,z,sigma_x,sigma_y,sigma_z\n{places}")).unwrap();
+        return folder;
+    }
     for place in ["spring", "autumn", "out/calibration"] {
         std::fs::create_dir_all(at(place)).unwrap();
         std::fs::copy(at("survey/calibration.ron"), at(place).join("calibration.ron")).unwrap();

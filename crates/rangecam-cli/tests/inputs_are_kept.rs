@@ -40,6 +40,8 @@ fn cases() -> Vec<Case> {
             "targets lens",
         ),
         case("targets", "targets survey -c cal/c.ron -k checkerboard 9x6 0.025", "survey cal/c.ron"),
+        case("targets, single", "targets survey -c cal/c.ron -k lights", "survey cal/c.ron"),
+        case("calibrate, rings first", "calibrate survey -c cal/c.ron --targets rings 0.05", "survey cal/c.ron"),
         case("calibrate, targets first", "calibrate survey -c cal/c.ron --targets circles 7x5 0.4", "survey cal/c.ron"),
         case("plan", "plan targets -c cal/c.ron", "targets cal/c.ron"),
         case("scattering", "scattering survey without -c cal/c.ron", "survey without cal/c.ron"),

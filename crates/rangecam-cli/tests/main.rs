@@ -10,5 +10,6 @@ mod from_boards_to_a_room;
 mod hostile;
 mod inputs_are_kept;
 mod noise;
+mod pictures;
 mod register;
 mod warm_up;

@@ -2,7 +2,9 @@
 
 mod find;
 mod kind;
+mod print;
 
-pub use find::{BoardSummary, MissingBoard, TargetsRequest, TargetsSummary, find_targets};
-pub use kind::TargetKind;
+pub use find::{LeftOut, MissingStation, StationSummary, TargetsRequest, TargetsSummary, find_targets};
+pub use kind::{BoardKind, SingleKind, TargetKind};
+pub use print::{PrintRequest, PrintSummary, print_targets};
 pub use {pipeline, targets};

@@ -29,7 +29,7 @@ fn view(camera: &Camera, seed: u64) -> (Raster<f32>, Vec<([usize; 2], [f64; 2])>
     (Sensor::grey(2.0).expose(&light, seed), true_nodes(camera, &pose, &BOARD))
 }
 
-fn write_png(path: &Path, image: &Raster<f32>) {
+pub(crate) fn write_png(path: &Path, image: &Raster<f32>) {
     let file = std::fs::File::create(path).unwrap();
     let mut encoder = Encoder::new(file, image.width() as u32, image.height() as u32);
     encoder.set_color(ColorType::Grayscale);
@@ -38,7 +38,7 @@ fn write_png(path: &Path, image: &Raster<f32>) {
     encoder.write_header().unwrap().write_image_data(&bytes).unwrap();
 }
 
-fn request(survey: &Path, out: &Path) -> TargetsRequest {
+pub(crate) fn request(survey: &Path, out: &Path) -> TargetsRequest {
     TargetsRequest {
         survey: survey.to_owned(),
         calibration: None,
@@ -49,7 +49,7 @@ fn request(survey: &Path, out: &Path) -> TargetsRequest {
     }
 }
 
-fn calibration(survey: &Path, out: &Path) -> CalibrateRequest {
+pub(crate) fn calibration(survey: &Path, out: &Path) -> CalibrateRequest {
     CalibrateRequest {
         survey: survey.to_owned(),
         lens_survey: None,
@@ -77,8 +77,8 @@ fn a_folder_of_images_becomes_a_survey_that_calibrates_the_lens() {
         truth.push((seed.to_string(), nodes));
     }
     let summary = find_targets(&request(&images, &found), &Silent).unwrap();
-    assert_eq!((summary.boards.len(), summary.verdict()), (12, Verdict::Done), "{summary}");
-    let stations: Vec<&str> = summary.boards.iter().map(|board| board.station.as_str()).collect();
+    assert_eq!((summary.stations.len(), summary.verdict()), (12, Verdict::Done), "{summary}");
+    let stations: Vec<&str> = summary.stations.iter().map(|board| board.station.as_str()).collect();
     assert_eq!(stations[8..], ["9", "10", "11", "12"], "names in the order of their numbers");
 
     let survey = Survey::read(&found).unwrap();
@@ -111,7 +111,7 @@ fn what_is_missing_is_named_and_nothing_is_written_where_all_is() {
     write_png(&images.join("a.png"), &Raster::filled(160, 120, 90.0));
     let refused = find_targets(&request(&images, &found), &Silent).unwrap_err();
     assert!(matches!(refused, Error::Refused { .. }), "{refused}");
-    assert!(refused.to_string().contains("none of 1 stations shows a checkerboard 9x6 0.03"), "{refused}");
+    assert!(refused.to_string().contains("none of 1 stations shows the targets, checkerboard 9x6 0.03"), "{refused}");
     let is_there = |name: &str| found.join(name).is_file();
     assert!(is_there("summary.json") && !["survey.ron", "observations.csv", "report.html"].into_iter().any(is_there));
 
@@ -122,7 +122,7 @@ fn what_is_missing_is_named_and_nothing_is_written_where_all_is() {
     assert!(error.contains("1.png") || error.contains("a.png"), "another size: {error}");
     write_png(&images.join("a.png"), &Raster::filled(640, 480, 90.0));
     let summary = find_targets(&request(&images, &found), &Silent).unwrap();
-    assert_eq!((summary.boards.len(), summary.missing.len(), summary.verdict()), (3, 1, Verdict::Doubtful));
+    assert_eq!((summary.stations.len(), summary.missing.len(), summary.verdict()), (3, 1, Verdict::Doubtful));
     assert!(summary.to_string().contains("a: the board was not found: the image has no contrast"), "{summary}");
     let page = std::fs::read_to_string(found.join("report.html")).unwrap();
     assert!(page.matches("<circle").count() >= 3 * 54 && page.contains("Not found: the image has no contrast"));

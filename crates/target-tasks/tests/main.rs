@@ -9,7 +9,9 @@
 )]
 
 mod boards;
+mod print;
 mod ranges;
+mod singles;
 // Boards rendered with their truth.
 #[path = "../../targets/tests/support/mod.rs"]
 mod support;

@@ -8,7 +8,7 @@ use target_tasks::{TargetKind, TargetsRequest, find_targets};
 use targets::nalgebra::Point3;
 
 /// A board of discs before a wall, seen from three places by an ideal camera with noise.
-const SCENE: &str = r#"(
+pub(crate) const SCENE: &str = r#"(
     scene: (objects: [(
         name: "board", shape: Rectangle(corner_m: (-1.4, -1.0, 0.0), edge_u_m: (2.8, 0.0, 0.0), edge_v_m: (0.0, 2.0, 0.0)),
         albedo: 0.85, texture: Discs(spacing_m: 0.4, radius_m: 0.1, factor: 0.35, first_m: (0.2, 0.2)),
@@ -57,7 +57,7 @@ fn ranges_are_those_of_the_points_within_what_is_stated() {
     };
     let summary = find_targets(&request, &Silent).unwrap();
     assert_eq!((summary.points, summary.ranges), (105, 105), "{summary}");
-    assert!(summary.boards.iter().all(|board| board.ambiguity == 2), "a grid without a mark may be turned by half");
+    assert!(summary.stations.iter().all(|board| board.ambiguity == 2), "a grid without a mark may be turned by half");
     let poses = read_stations(Path::new(&survey).join("truth/stations.csv")).unwrap();
     let rows = read_observations(folder.path().join("out/observations.csv")).unwrap();
     let mut squares = 0.0;

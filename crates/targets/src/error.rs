@@ -80,6 +80,17 @@ pub enum NotFound {
         /// In how many places it fits.
         places: usize,
     },
+    /// A grid of the size of the board was found, and its larger dot is not where the board has it.
+    #[error(
+        "a grid of {} x {} dots was found with {larger} larger dots, not the one at node (0, 0) that the board has: it is another \
+         board, or the dot is covered or too little larger", .found[0], .found[1]
+    )]
+    WrongMark {
+        /// Columns and rows found.
+        found: [usize; 2],
+        /// Dots that are larger than those about them.
+        larger: usize,
+    },
     /// The grid is seen in a mirror, or from behind.
     #[error("the grid is mirrored: the image was flipped, or the grid is seen in a mirror or from behind")]
     Mirrored,

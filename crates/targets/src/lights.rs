@@ -8,12 +8,12 @@ use nalgebra::{Matrix2, SMatrix};
 use range_image::Raster;
 use statistics::{robust_standard_deviation, upper_median};
 
-use crate::board::corners::normal_table::NormalTable;
 use crate::error::{Error, Result};
 use crate::image::levels::Levels;
 use crate::image::noise::noise_deviation;
+use crate::image::normal_table::NormalTable;
 use crate::image::smoothing::{filled, gaussian};
-use crate::sightings::image_point::ImagePoint;
+use crate::sightings::measured_point::MeasuredPoint;
 
 /// Smoothing before the search, pixel: about the point spread of a lens.
 const SMOOTHING_PX: f64 = 0.8;
@@ -74,7 +74,7 @@ impl LightOptions {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LightSighting {
     /// Its centre.
-    pub centre: ImagePoint,
+    pub centre: MeasuredPoint,
     /// All its light above the ground, unit of the image times square pixel.
     pub light: f64,
     /// Standard deviation of the light.
@@ -181,7 +181,7 @@ impl Search<'_> {
             && off <= 1.0 + spread
             && peak_height >= self.options.smallest_height_sigmas * self.noise;
         good.then(|| LightSighting {
-            centre: ImagePoint {
+            centre: MeasuredPoint {
                 pixel: [values[2], values[3]],
                 covariance: Matrix2::from_fn(|row, column| covariance[(2 + row, 2 + column)])
                     * (scatter / (sigma * sigma)),

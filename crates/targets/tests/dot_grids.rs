@@ -117,7 +117,36 @@ fn what_is_another_grid_is_refused() {
     let why = refusal(&[(&little, left), (&little, right)], &little.grid);
     assert!(matches!(why, NotFound::SeveralBoards { found: 2 }), "{why:?}");
     let nothing = find_circle_grid(&Raster::filled(100, 100, 1.0), &grid, &CircleGridOptions::default());
-    assert!(matches!(nothing, Err(Error::NotFound(NotFound::TooFewPoints { found: 0, .. }))));
+    assert!(matches!(nothing, Err(Error::NotFound(NotFound::NoContrast { .. }))), "{nothing:?}");
+}
+
+#[test]
+fn a_mark_elsewhere_a_covered_one_and_saturation_are_named() {
+    let camera = small_camera();
+    let grid = CircleGrid::symmetric(7, 5, 0.04).unwrap().with_origin_dot(1.6).unwrap();
+    let pose = view(&grid, 0.62, 20.0, 0.4, 0.3);
+    let look = |image: &Raster<f32>| match find_circle_grid(image, &grid, &CircleGridOptions::default()) {
+        Err(Error::NotFound(why)) => why,
+        other => panic!("{other:?}"),
+    };
+    let index_in_the_middle = PrintedDots { mark: [3, 2], ..PrintedDots::new(grid, 0.011) };
+    let why = look(&picture(&camera, &[(&index_in_the_middle, pose)], 4));
+    assert!(matches!(why, NotFound::WrongMark { found: [7, 5] | [5, 7], larger: 1 }), "{why:?}");
+    let plain = CircleGrid::symmetric(7, 5, 0.04).unwrap();
+    let why = look(&picture(&camera, &[(&PrintedDots::new(plain, 0.011), pose)], 4));
+    assert!(matches!(why, NotFound::WrongMark { larger: 0, .. }), "{why:?}");
+    // Half of it, with the index in the middle: no place on the board has a larger dot there.
+    let half = PrintedDots { hidden: &|[i, _]| i > 3, mark: [3, 2], ..PrintedDots::new(grid, 0.011) };
+    let why = look(&picture(&camera, &[(&half, pose)], 4));
+    assert!(matches!(why, NotFound::WrongMark { larger: 1, .. }), "{why:?}");
+    // So much light that dots and paper are one.
+    let image = picture(&camera, &[(&PrintedDots::new(grid, 0.011), pose)], 4);
+    let why = look(&image.map(|value| (value * 100.0).min(1000.0)));
+    assert!(matches!(why, NotFound::Saturated { .. } | NotFound::NoContrast { .. }), "{why:?}");
+    // Paper that saturates leaves dark dots where they are.
+    let clipped = image.map(|value| value.min(600.0));
+    let seen = find_circle_grid(&clipped, &grid, &CircleGridOptions::default()).unwrap();
+    assert!(seen.complete && worst(&camera, &seen, &grid, &pose) < 0.25);
 }
 
 #[test]

@@ -3,14 +3,13 @@
 use std::fmt;
 
 use pipeline::Result;
-use report::{Column, Document, Figure, Mark, marked_figure};
+use report::{Column, Document, Figure, marked_figure};
 use statistics::quantile;
 
-use crate::find::sightings::Sighting;
+use crate::find::station::{LeftOut, Seen, StationPicture};
 use crate::find::summary::TargetsSummary;
-use crate::kind::TargetKind;
 
-/// Stations that are drawn; of longer surveys those that lack the board come first.
+/// Stations that are drawn; of longer surveys those that lack the targets come first.
 const MOST_DRAWN: usize = 60;
 
 /// Shares of the grey values that are drawn black and white: a lamp in the image must not leave the board dark.
@@ -23,48 +22,48 @@ impl fmt::Display for TargetsSummary {
 }
 
 /// All of it, with its figures.
-pub(crate) fn document(summary: &TargetsSummary, sightings: &[Sighting], kind: &TargetKind) -> Result<Document> {
+pub(crate) fn document(summary: &TargetsSummary, stations: &[StationPicture]) -> Result<Document> {
     let mut document = text(summary);
-    let mut shown: Vec<&Sighting> = sightings.iter().collect();
-    shown.sort_by_key(|sighting| sighting.board.is_ok());
+    let mut shown: Vec<&StationPicture> = stations.iter().collect();
+    shown.sort_by_key(|station| station.seen.is_ok());
     document.section("The images");
     document.explanation(
-        "A ring marks each point that was found, a filled one node (0, 0); the line runs along the first row. What is not \
-         marked takes no part.",
+        "A ring marks each point that was found; of a board a filled one node (0, 0), and the line runs along its first row. \
+         Single targets have their names beside them; what has a mark and no name is none of those with coordinates.",
     );
     let left_out = shown.len().saturating_sub(MOST_DRAWN);
     if left_out > 0 {
-        document.explanation(format!("{left_out} further stations are not drawn; those without the board come first."));
+        document.explanation(format!("{left_out} further stations are not drawn; those without targets come first."));
     }
-    let figures = shown.into_iter().take(MOST_DRAWN).map(|sighting| picture(sighting, kind));
+    let figures = shown.into_iter().take(MOST_DRAWN).map(picture);
     document.figures(figures.collect::<Result<Vec<_>>>()?);
     Ok(document)
 }
 
 fn text(summary: &TargetsSummary) -> Document {
-    let stations = summary.boards.len() + summary.missing.len();
+    let stations = summary.stations.len() + summary.missing.len();
     let lead = format!("Targets in the images of {}: {}.", summary.survey, summary.kind);
     let mut document = Document::new("rangecam: targets", lead);
     document.merits([
-        (format!("{} of {stations}", summary.boards.len()), "stations show the board"),
+        (format!("{} of {stations}", summary.stations.len()), "stations show the targets"),
         (summary.points.to_string(), "image points"),
         (summary.ranges.to_string(), "ranges"),
     ]);
     document.warnings(&summary.doubts);
     document.section("The stations");
     document.explanation(
-        "Deviation from a smooth map: of the points from a projective map that bends with a lens; sigma: what the noise of \
-         the image leaves of a coordinate, in the median.",
+        "Deviation: of a board's points from a projective map that bends with a lens, or of single targets from where their \
+         coordinates put them (the lens is in it); sigma: what the noise of the image leaves of a coordinate, in the median.",
     );
-    let rows = summary.boards.iter().map(|board| {
-        let ways = if board.ambiguity == 1 { "one".to_owned() } else { board.ambiguity.to_string() };
+    let rows = summary.stations.iter().map(|station| {
+        let ways = if station.ambiguity == 1 { "one".to_owned() } else { station.ambiguity.to_string() };
         vec![
-            board.station.clone(),
-            format!("{} of {}", board.points, board.of),
-            board.ranges.to_string(),
+            station.station.clone(),
+            format!("{} of {}", station.points, station.of),
+            station.ranges.to_string(),
             ways,
-            format!("{:.3}", board.residual_px),
-            format!("{:.3}", board.sigma_px),
+            station.residual_px.map_or_else(String::new, |residual| format!("{residual:.3}")),
+            format!("{:.3}", station.sigma_px),
         ]
     });
     let columns = [
@@ -93,8 +92,8 @@ fn text(summary: &TargetsSummary) -> Document {
     document
 }
 
-fn picture(sighting: &Sighting, kind: &TargetKind) -> Result<Figure> {
-    let light = &sighting.light;
+fn picture(station: &StationPicture) -> Result<Figure> {
+    let light = &station.light;
     let finite = || light.as_slice().iter().filter(|value| value.is_finite()).map(|value| f64::from(*value));
     let [black, white] = BLACK_AND_WHITE.map(|share| quantile(&mut finite().collect::<Vec<_>>(), share));
     let grey = |value: &f32| match f64::from(*value) {
@@ -102,15 +101,23 @@ fn picture(sighting: &Sighting, kind: &TargetKind) -> Result<Figure> {
         _ => 0,
     };
     let grey: Vec<u8> = light.as_slice().iter().map(grey).collect();
-    let (marks, line, caption) = match &sighting.board {
-        Ok(board) => {
-            let mark = |seen: &targets::NodePoint| Mark { at: seen.point.pixel, is_filled: seen.node == [0, 0] };
-            let line = board.nodes.iter().filter(|seen| seen.node[1] == 0).map(|seen| seen.point.pixel);
-            let [columns, rows] = kind.size();
-            let caption = format!("{} of {} points", board.nodes.len(), columns * rows);
-            (board.nodes.iter().map(mark).collect(), line.collect(), caption)
-        }
-        Err(reason) => (Vec::new(), Vec::new(), format!("Not found: {reason}.")),
+    let (marks, line, caption) = match &station.seen {
+        Ok(seen) => (seen.marks.as_slice(), seen.line.as_slice(), caption(seen, station.observations.len())),
+        Err(reason) => (&[][..], &[][..], format!("Not found: {reason}.")),
     };
-    Ok(marked_figure(&sighting.station, light.width(), &grey, &marks, &line)?.caption(caption))
+    Ok(marked_figure(&station.station, light.width(), &grey, marks, line)?.caption(caption))
+}
+
+/// How many there are, and why others are not among them.
+fn caption(seen: &Seen, points: usize) -> String {
+    let mut sentences = vec![format!("{points} of {} points.", seen.of)];
+    if seen.unnamed > 0 {
+        sentences.push(format!("{} look like targets and are none.", seen.unnamed));
+    }
+    let reason = |left: &LeftOut| format!("{}: {}.", left.target, left.reason);
+    sentences.extend(seen.left_out.iter().filter(|left| !left.target.is_empty()).map(reason));
+    if !seen.not_seen.is_empty() {
+        sentences.push(format!("In the image, and not seen: {}.", seen.not_seen.join(", ")));
+    }
+    sentences.join(" ")
 }

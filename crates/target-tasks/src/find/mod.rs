@@ -2,11 +2,13 @@
 
 mod document;
 mod pictures;
+mod request;
 mod sightings;
+mod single;
+mod station;
 mod summary;
 mod write;
 
-use std::path::PathBuf;
 use std::time::Instant;
 
 use atomic_output::Destination;
@@ -16,26 +18,12 @@ use pipeline::{Error, Result};
 use crate::kind::TargetKind;
 use pictures::Pictures;
 use sightings::Sighting;
+use single::Singles;
+use station::StationPicture;
 
-pub use summary::{BoardSummary, MissingBoard, TargetsSummary};
-
-/// Where to look for which targets.
-#[derive(Debug, Clone)]
-pub struct TargetsRequest {
-    /// A survey of any level, or a folder of images of one camera (PNG, JPEG), each of them a station.
-    pub survey: PathBuf,
-    /// Calibration whose scattering is taken off, and that is handed on; `None`: the one beside the survey, if there is one.
-    pub calibration: Option<PathBuf>,
-    /// What is looked for.
-    pub kind: TargetKind,
-    /// Principal distance of a folder of images, pixel; `None`: from the perspective of the boards.
-    pub principal_distance_px: Option<f64>,
-    /// Standard deviation of the board's coordinates in each axis, written into `targets.csv` as control, metre; `None`: none
-    /// is written, and the coordinates are approximate.
-    pub board_sigma_m: Option<f64>,
-    /// Output folder; written beside and renamed when everything is done.
-    pub out: PathBuf,
-}
+pub use request::TargetsRequest;
+pub use station::LeftOut;
+pub use summary::{MissingStation, StationSummary, TargetsSummary};
 
 /// Looks for targets in all stations of a survey and writes a survey of what was found (`survey.ron`, `observations.csv`,
 /// `targets.csv`), which a calibration takes as it is, with `summary.json` and `report.html`.
@@ -63,20 +51,31 @@ fn find(request: &TargetsRequest, destination: &Destination, progress: &dyn Prog
     let clock = Instant::now();
     let pictures = Pictures::open(request)?;
     progress.begin("find targets", pictures.stations());
-    let mut sightings = Vec::new();
+    let singles = match &request.kind {
+        TargetKind::Board(_) => None,
+        TargetKind::Single(kind) => Some(Singles::new(*kind, request, &pictures)?),
+    };
+    let mut stations = Vec::new();
     pictures.each(&mut |picture| {
-        sightings.push(Sighting::new(picture, &request.kind)?);
+        stations.push(match (&request.kind, &singles) {
+            (TargetKind::Board(kind), _) => StationPicture::of_board(Sighting::new(picture, kind)?, kind),
+            (TargetKind::Single(_), Some(singles)) => singles.station(picture)?,
+            (TargetKind::Single(_), None) => return Ok(()),
+        });
         progress.advance(1);
         Ok(())
     })?;
     progress.finish();
-    let camera = pictures.camera(request, &sightings)?;
-    let mut summary = TargetsSummary::new(request, &pictures, &camera, &sightings);
-    if summary.boards.is_empty() {
+    let boards: Vec<_> =
+        stations.iter().filter_map(|station| station.seen.as_ref().ok()).map(|seen| seen.pairs.clone()).collect();
+    let camera = pictures.camera(request, &boards)?;
+    let mut summary = TargetsSummary::new(request, &pictures, &camera, &stations);
+    if summary.stations.is_empty() {
         return Err(Error::Refused { summary: json(&summary)?, source: summary.nothing_found().into(), written: None });
     }
     summary.seconds = clock.elapsed().as_secs_f64();
-    let page = document::document(&summary, &sightings, &request.kind)?;
-    write::write(destination, request, &pictures, &camera, &sightings, (&json(&summary)?, &page.html()))?;
+    let page = document::document(&summary, &stations)?;
+    let found = write::Found { pictures: &pictures, camera: &camera, singles: singles.as_ref(), stations: &stations };
+    write::write(destination, request, &found, (&json(&summary)?, &page.html()))?;
     Ok(summary)
 }

@@ -14,8 +14,8 @@ use range_io::grey;
 use range_io::survey::{FrameEntry, InputFrame, Level, Survey, SurveyCamera, read_frame};
 use targets::principal_distance_px;
 
-use crate::find::TargetsRequest;
-use crate::find::sightings::Sighting;
+use crate::find::request::TargetsRequest;
+use crate::find::station::Pair;
 
 /// One station's light, as a mean over its frames.
 pub(crate) struct Picture {
@@ -144,13 +144,12 @@ impl Pictures {
     }
 
     /// The survey's camera; of a folder of images with a principal distance that was given or that the boards tell.
-    pub(crate) fn camera(&self, request: &TargetsRequest, sightings: &[Sighting]) -> Result<SurveyCamera> {
+    pub(crate) fn camera(&self, request: &TargetsRequest, boards: &[Vec<Pair>]) -> Result<SurveyCamera> {
         let mut camera = self.survey.camera.clone();
         if !self.is_folder {
             return Ok(camera);
         }
-        let boards: Vec<_> = sightings.iter().filter_map(|sighting| sighting.pairs(&request.kind)).collect();
-        let told = request.principal_distance_px.or_else(|| principal_distance_px(&camera.format().ok()?, &boards));
+        let told = request.principal_distance_px.or_else(|| principal_distance_px(&camera.format().ok()?, boards));
         // Without any board nothing is written: any number will do.
         let told = if boards.is_empty() { told.or(Some(1.0)) } else { told };
         let distance_px = told.ok_or_else(|| Error::Request {

@@ -7,7 +7,7 @@ use range_io::tables::TargetObservation;
 use targets::{BoardSighting, DarkRange, NodePoint, NotFound, TargetRange, target_range};
 
 use crate::find::pictures::Picture;
-use crate::kind::TargetKind;
+use crate::kind::BoardKind;
 
 /// Radius of the surroundings that a node's range is taken from, in spacings of the nodes: the four fields about a corner
 /// share them, and a disc of the usual 0.2 to 0.35 spacings is seen with some of its ground. Over twice as much the range
@@ -27,7 +27,7 @@ pub(crate) struct Sighting {
 }
 
 impl Sighting {
-    pub(crate) fn new(picture: Picture, kind: &TargetKind) -> Result<Self> {
+    pub(crate) fn new(picture: Picture, kind: &BoardKind) -> Result<Self> {
         let board = match kind.find(&picture.light) {
             Ok(board) => Ok(board),
             Err(targets::Error::NotFound(reason)) => Err(reason),
@@ -41,18 +41,13 @@ impl Sighting {
     }
 
     /// Points of the board in its plane, metre, and where they were seen.
-    pub(crate) fn pairs(&self, kind: &TargetKind) -> Option<Vec<([f64; 2], [f64; 2])>> {
+    pub(crate) fn pairs(&self, kind: &BoardKind) -> Option<Vec<([f64; 2], [f64; 2])>> {
         let nodes = &self.board.as_ref().ok()?.nodes;
         let place = |node| {
             let point = kind.node_m(node);
             [point.x, point.y]
         };
         Some(nodes.iter().map(|seen| (place(seen.node), seen.point.pixel)).collect())
-    }
-
-    /// Ranges among the observations.
-    pub(crate) fn ranges(&self) -> usize {
-        self.observations.iter().filter(|row| row.range_m.is_some()).count()
     }
 }
 
@@ -62,7 +57,7 @@ fn observations(board: &BoardSighting, picture: &Picture) -> Vec<TargetObservati
         let variance = |axis: usize| seen.point.covariance[(axis, axis)];
         TargetObservation {
             station: picture.station.clone(),
-            target: TargetKind::name(seen.node),
+            target: BoardKind::name(seen.node),
             pixel: Some(seen.point.pixel),
             range_m: range.map(|range| range.range_m),
             sigma_pixel: Some([0, 1].map(|axis| variance(axis).sqrt())),

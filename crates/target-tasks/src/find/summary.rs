@@ -6,9 +6,10 @@ use commands::{Doubt, DoubtKind, Judged};
 use range_io::survey::SurveyCamera;
 use serde::Serialize;
 
-use crate::find::TargetsRequest;
 use crate::find::pictures::Pictures;
-use crate::find::sightings::Sighting;
+use crate::find::request::TargetsRequest;
+use crate::find::station::{LeftOut, StationPicture};
+use crate::kind::{SingleKind, TargetKind};
 
 /// Result of a search for targets.
 #[derive(Debug, Clone, Serialize)]
@@ -18,9 +19,9 @@ pub struct TargetsSummary {
     /// What was looked for: `checkerboard 9x6 0.025`.
     pub kind: String,
     /// Stations that show it.
-    pub boards: Vec<BoardSummary>,
+    pub stations: Vec<StationSummary>,
     /// Stations that do not.
-    pub missing: Vec<MissingBoard>,
+    pub missing: Vec<MissingStation>,
     /// Image points in all.
     pub points: usize,
     /// Ranges in all.
@@ -37,28 +38,35 @@ pub struct TargetsSummary {
     pub out: PathBuf,
 }
 
-/// A board as one station shows it.
+/// Targets as one station shows them.
 #[derive(Debug, Clone, Serialize)]
-pub struct BoardSummary {
+pub struct StationSummary {
     /// The station.
     pub station: String,
-    /// Nodes seen.
+    /// Targets seen: nodes of a board, or single ones with names.
     pub points: usize,
-    /// Nodes of the board.
+    /// Nodes of the board, or targets with coordinates; where there are none, what looks like a target.
     pub of: usize,
     /// Ranges.
     pub ranges: usize,
-    /// In how many ways the picture lets the nodes be numbered; 1: in no other.
+    /// In how many ways the picture lets the nodes of a board be numbered; 1: in no other.
     pub ambiguity: usize,
-    /// Robust deviation of the nodes from a smooth map of the board onto the image, pixel.
-    pub residual_px: f64,
-    /// Median standard deviation of a coordinate of the nodes, pixel.
+    /// Robust deviation of the nodes from a smooth map of the board onto the image, or median distance of single targets from where
+    /// their coordinates put them, pixel; `None` where there are no coordinates, or too few targets to judge.
+    pub residual_px: Option<f64>,
+    /// Median standard deviation of a coordinate of an image point, pixel.
     pub sigma_px: f64,
+    /// Points that look like targets and are none of those with coordinates.
+    pub unnamed: usize,
+    /// Targets that were seen and take no part, each with the reason.
+    pub left_out: Vec<LeftOut>,
+    /// Targets with coordinates that lie in the image and were not seen.
+    pub not_seen: Vec<String>,
 }
 
-/// A station without the board.
+/// A station without targets.
 #[derive(Debug, Clone, Serialize)]
-pub struct MissingBoard {
+pub struct MissingStation {
     /// The station.
     pub station: String,
     /// Why.
@@ -70,28 +78,30 @@ impl TargetsSummary {
         request: &TargetsRequest,
         pictures: &Pictures,
         camera: &SurveyCamera,
-        sightings: &[Sighting],
+        pictured: &[StationPicture],
     ) -> Self {
-        let [columns, rows] = request.kind.size();
-        let found = |sighting: &Sighting| {
-            let board = sighting.board.as_ref().ok()?;
-            let sigmas = sighting.observations.iter().filter_map(|row| row.sigma_pixel).flatten();
-            Some(BoardSummary {
-                station: sighting.station.clone(),
-                points: board.nodes.len(),
-                of: columns * rows,
-                ranges: sighting.ranges(),
-                ambiguity: board.ambiguity,
-                residual_px: board.residual_px,
+        let found = |station: &StationPicture| {
+            let seen = station.seen.as_ref().ok()?;
+            let sigmas = station.observations.iter().filter_map(|row| row.sigma_pixel).flatten();
+            Some(StationSummary {
+                station: station.station.clone(),
+                points: station.observations.len(),
+                of: seen.of,
+                ranges: station.ranges(),
+                ambiguity: seen.ambiguity,
+                residual_px: seen.residual_px,
                 sigma_px: statistics::quantile(&mut sigmas.collect::<Vec<_>>(), 0.5),
+                unnamed: seen.unnamed,
+                left_out: seen.left_out.clone(),
+                not_seen: seen.not_seen.clone(),
             })
         };
-        let missing = |sighting: &Sighting| {
-            let reason = sighting.board.as_ref().err()?.to_string();
-            Some(MissingBoard { station: sighting.station.clone(), reason })
+        let missing = |station: &StationPicture| {
+            let reason = station.seen.as_ref().err()?.clone();
+            Some(MissingStation { station: station.station.clone(), reason })
         };
-        let boards: Vec<BoardSummary> = sightings.iter().filter_map(found).collect();
-        let missing: Vec<MissingBoard> = sightings.iter().filter_map(missing).collect();
+        let stations: Vec<StationSummary> = pictured.iter().filter_map(found).collect();
+        let missing: Vec<MissingStation> = pictured.iter().filter_map(missing).collect();
         let from = match (pictures.is_folder, request.principal_distance_px) {
             (false, _) => "survey",
             (true, Some(_)) => "given",
@@ -100,10 +110,10 @@ impl TargetsSummary {
         Self {
             survey: request.survey.display().to_string(),
             kind: request.kind.to_string(),
-            points: boards.iter().map(|board| board.points).sum(),
-            ranges: boards.iter().map(|board| board.ranges).sum(),
-            doubts: doubts(&boards, &missing, pictures.has_ranges()),
-            boards,
+            points: stations.iter().map(|station| station.points).sum(),
+            ranges: stations.iter().map(|station| station.ranges).sum(),
+            doubts: doubts(&request.kind, &stations, &missing, pictures.has_ranges()),
+            stations,
             missing,
             principal_distance_px: camera.principal_distance_mm / camera.pixel_pitch_mm[0],
             principal_distance_from: from,
@@ -116,20 +126,34 @@ impl TargetsSummary {
     pub(crate) fn nothing_found(&self) -> String {
         let first = self.missing.first().map_or("no frames", |missing| missing.reason.as_str());
         let stations = self.missing.len();
-        format!("none of {stations} stations shows a {}; of the first: {first}", self.kind)
+        format!("none of {stations} stations shows the targets, {}; of the first: {first}", self.kind)
     }
 }
 
-fn doubts(boards: &[BoardSummary], missing: &[MissingBoard], has_ranges: bool) -> Vec<Doubt> {
+fn doubts(kind: &TargetKind, stations: &[StationSummary], missing: &[MissingStation], has_ranges: bool) -> Vec<Doubt> {
+    let what = match kind {
+        TargetKind::Board(_) => "the board was not found",
+        TargetKind::Single(_) => "no target was found",
+    };
     let missing = missing.iter().map(|missing| {
-        let words = format!("the board was not found: {}", missing.reason);
+        let words = format!("{what}: {}", missing.reason);
         Doubt::about(DoubtKind::MissingTargets, &missing.station, words)
     });
-    let blind = boards.iter().filter(|board| has_ranges && board.ranges == 0).map(|board| {
-        let words = "none of its points has a range: the board is out of reach, or its ink swallows the camera's light";
-        Doubt::about(DoubtKind::MissingTargets, &board.station, words)
+    // What shines may swallow the camera's light.
+    let is_dark = matches!(kind, TargetKind::Single(SingleKind::Lights));
+    let blind = stations.iter().filter(move |station| has_ranges && !is_dark && station.ranges == 0).map(|station| {
+        let words =
+            "none of its points has a range: the targets are out of reach, or their ink swallows the camera's light";
+        Doubt::about(DoubtKind::MissingTargets, &station.station, words)
     });
-    missing.chain(blind).collect()
+    let left_out = stations.iter().flat_map(|station| {
+        let words = |left: &LeftOut| {
+            format!("{} at ({:.0}, {:.0}) is left out: {}", left.target, left.pixel[0], left.pixel[1], left.reason)
+        };
+        let coded = station.left_out.iter().filter(|left| !left.target.is_empty());
+        coded.map(move |left| Doubt::about(DoubtKind::MissingTargets, &station.station, words(left)))
+    });
+    missing.chain(blind).chain(left_out).collect()
 }
 
 impl Judged for TargetsSummary {

@@ -15,7 +15,7 @@ use crate::error::{NotFound, Result};
 use crate::image::levels::Levels;
 use crate::image::noise::noise_deviation;
 use crate::image::smoothing::{filled, halved};
-use crate::sightings::image_point::{BoardSighting, ImagePoint, NodePoint};
+use crate::sightings::measured_point::{BoardSighting, MeasuredPoint, NodePoint};
 
 /// Scales of the search, each half as fine as the one before: at the third, fields of 20 pixels are as those of 5.
 const LEVELS: usize = 3;
@@ -142,7 +142,7 @@ fn sighting(
         .iter()
         .map(|corner| NodePoint {
             node: labeling.of(corner.node).map(|index| index.max(0) as usize),
-            point: ImagePoint { pixel: corner.position.into(), covariance: corner.covariance },
+            point: MeasuredPoint { pixel: corner.position.into(), covariance: corner.covariance },
         })
         .collect();
     nodes.sort_by_key(|node| [node.node[1], node.node[0]]);

@@ -3,7 +3,7 @@
 mod assembly;
 mod checkerboard;
 mod choice;
-pub(crate) mod corners;
+mod corners;
 mod find;
 mod labels;
 mod saddles;

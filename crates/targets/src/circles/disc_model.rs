@@ -10,7 +10,7 @@
 //! The first term is the distance to the ellipse, to first order; the second moves the edge inwards by half of σ² times its
 //! curvature, as blurring does.
 
-use crate::board::corners::normal_table::NormalTable;
+use crate::image::normal_table::NormalTable;
 
 /// Number of parameters: level and contrast (value, slope by column, slope by row, each), centre, m11, m12, m22, and β, which
 /// gives the blur: see [`blur_px`].

@@ -11,7 +11,7 @@ use crate::image::levels::Levels;
 use crate::image::noise::noise_deviation;
 use crate::image::sampling::bilinear;
 use crate::image::smoothing::{filled, gaussian};
-use crate::sightings::image_point::ImagePoint;
+use crate::sightings::measured_point::MeasuredPoint;
 
 /// Smoothing before the search, pixel: enough that noise leaves regions whole, and little beside discs of five pixels.
 const SMOOTHING_PX: f64 = 0.8;
@@ -44,7 +44,7 @@ fn edge_angles() -> impl Iterator<Item = f64> {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CircleSighting {
     /// Centre of the ellipse. That of the circle lies elsewhere, see [`crate::centre_of_circle`].
-    pub centre: ImagePoint,
+    pub centre: MeasuredPoint,
     /// The ellipse.
     pub ellipse: Ellipse,
     /// Covariance of `[col, row, semi-major, semi-minor, direction]`, pixel and radian, from the scatter of the pixels about the model. The direction of
@@ -217,7 +217,7 @@ impl Search<'_> {
     fn sighting(&self, disc: &DiscFit) -> CircleSighting {
         let covariance = disc.covariance;
         CircleSighting {
-            centre: ImagePoint {
+            centre: MeasuredPoint {
                 pixel: disc.ellipse.centre,
                 covariance: covariance.fixed_view::<2, 2>(0, 0).into_owned(),
             },

@@ -17,6 +17,13 @@ pub struct Code {
     pub bits: usize,
 }
 
+/// Its name: `R017`.
+impl std::fmt::Display for Code {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "R{:03}", self.id)
+    }
+}
+
 impl Code {
     /// Whether a sector has the colour of the disc.
     pub fn is_set(&self, sector: usize) -> bool {

@@ -19,8 +19,9 @@ const ACROSS: [f64; 3] = [0.3, 0.5, 0.7];
 /// How far the mean of a sector lies from the middle between disc and ground, at least, in parts of the contrast. 0.5 is full
 /// contrast; light, blur and a ring that is not quite where it is expected take a half.
 const LEAST_CLEARNESS: f64 = 0.2;
-/// Share of the samples of the gap and of the ground that may be of the disc's colour.
-const LARGEST_SHARE: f64 = 0.1;
+/// Share of the samples of the gap, of the ground and of the sectors that may be of the other colour: of the smallest rings at the
+/// least contrast, noise makes one in thirty so. Twice as much lets bars through that cover two sectors, and are read as others.
+const LARGEST_SHARE: f64 = 0.05;
 
 /// A word that was read.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -49,12 +50,15 @@ pub(super) fn read(image: &Raster<f32>, disc: &CircleSighting, bits: usize) -> O
         return None;
     }
     let across = ACROSS.map(|share| RING[0] + share * (RING[1] - RING[0]));
-    let ring = |sample: usize| across.iter().map(|parts| colour(angle(sample), *parts)).sum::<f64>() / 3.0 - 0.5;
-    let ring: Vec<f64> = (0..count).map(ring).collect();
+    let ring = |sample: usize| across.map(|parts| colour(angle(sample), parts) - 0.5);
+    let ring: Vec<[f64; ACROSS.len()]> = (0..count).map(ring).collect();
+    let inner = |start: usize, sector: usize| {
+        (ENDS..SAMPLES - ENDS).flat_map(move |k| [0, 1, 2].map(|at| [(start + sector * SAMPLES + k) % count, at]))
+    };
     let sectors = |start: usize| -> Vec<f64> {
         let mean = |sector: usize| {
-            let samples = (ENDS..SAMPLES - ENDS).map(|k| ring[(start + sector * SAMPLES + k) % count]);
-            samples.sum::<f64>() / (SAMPLES - 2 * ENDS) as f64
+            let samples = inner(start, sector).map(|[sample, at]| ring[sample][at]);
+            samples.sum::<f64>() / ((SAMPLES - 2 * ENDS) * ACROSS.len()) as f64
         };
         (0..bits).map(mean).collect()
     };
@@ -62,6 +66,12 @@ pub(super) fn read(image: &Raster<f32>, disc: &CircleSighting, bits: usize) -> O
     let start = (0..SAMPLES).max_by(|a, b| clearness(*a).total_cmp(&clearness(*b)))?;
     let means = sectors(start);
     if !means.iter().all(|mean| mean.abs() >= LEAST_CLEARNESS) {
+        return None;
+    }
+    let differs =
+        |sector: usize| inner(start, sector).filter(|[sample, at]| ring[*sample][*at] * means[sector] < 0.0).count();
+    let differing: usize = (0..bits).map(differs).sum();
+    if differing as f64 > LARGEST_SHARE * (bits * (SAMPLES - 2 * ENDS) * ACROSS.len()) as f64 {
         return None;
     }
     let word = (0..bits).filter(|sector| means[*sector] > 0.0).map(|sector| 1_u32 << sector).sum();

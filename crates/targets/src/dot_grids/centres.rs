@@ -5,7 +5,7 @@ use statistics::upper_median;
 
 use crate::circles::ellipse::Ellipse;
 use crate::grid::homography::Homography;
-use crate::sightings::image_point::NodePoint;
+use crate::sightings::measured_point::NodePoint;
 
 /// Moves each node from the centre of its ellipse to the image of its dot's centre, for a grid whose nodes lie at `node_m`.
 ///

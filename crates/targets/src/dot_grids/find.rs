@@ -13,7 +13,13 @@ use super::sizes::are_larger;
 use crate::circles::find::{CircleSighting, find_circles};
 use crate::error::{NotFound, Result};
 use crate::grid::lattice::{Lattice, Node};
-use crate::sightings::image_point::{BoardSighting, NodePoint};
+use crate::image::levels::Levels;
+use crate::image::noise::noise_deviation;
+use crate::sightings::measured_point::{BoardSighting, NodePoint};
+
+/// Largest over smallest value in standard deviations of the noise of an image without any contrast: a million normal values span
+/// ten.
+const NO_CONTRAST: f64 = 12.0;
 
 /// Nodes about a node that predict it, columns and rows: the lens is smooth over them.
 const ABOUT: i32 = 2;
@@ -51,7 +57,7 @@ pub fn find_circle_grid(image: &Raster<f32>, grid: &CircleGrid, options: &Circle
     let sightings = find_circles(image, &options.circles)?;
     let needed = options.least_nodes(grid);
     if sightings.len() < needed {
-        return Err(NotFound::TooFewPoints { found: sightings.len(), needed }.into());
+        return Err(too_few(image, sightings.len(), needed).into());
     }
     let mut lattices = lattices(&sightings, grid.origin_dot().unwrap_or(1.0));
     let largest = lattices.first().map_or(0, |lattice| lattice.nodes.len());
@@ -67,6 +73,18 @@ pub fn find_circle_grid(image: &Raster<f32>, grid: &CircleGrid, options: &Circle
     }
     let place = laid.iter().position(|laid| !laid.labellings.is_empty()).unwrap_or(0);
     Ok(laid.swap_remove(place).sighting(&board)?)
+}
+
+/// Why an image has too few dots: because it has no contrast, or is saturated, or else for no reason that it tells.
+fn too_few(image: &Raster<f32>, found: usize, needed: usize) -> NotFound {
+    let noise = noise_deviation(image);
+    let finite = || image.as_slice().iter().copied().filter(|value| value.is_finite());
+    let contrast = f64::from(finite().fold(f32::NEG_INFINITY, f32::max) - finite().fold(f32::INFINITY, f32::min));
+    if noise.is_nan() || contrast <= NO_CONTRAST * noise {
+        return NotFound::NoContrast { contrast, noise };
+    }
+    let saturated = Levels::of(image, noise).map_or(0.0, |levels| levels.saturated);
+    NotFound::TooFewPoints { found, needed }.with_saturation(saturated)
 }
 
 /// The grid in its lattice.
@@ -139,10 +157,13 @@ impl<'a> Laid<'a> {
 
     /// Why no labelling fits.
     fn refusal(&self, board: &Board<'_>) -> NotFound {
-        if labellings(&self.larger, &board.nodes, board.origin, -1).is_empty() {
-            NotFound::WrongSize { found: self.size(board), board: [board.grid.columns(), board.grid.rows()] }
-        } else {
+        let found = self.size(board);
+        if !labellings(&self.larger, &board.nodes, board.origin, -1).is_empty() {
             NotFound::Mirrored
+        } else if !labellings(&self.larger, &board.nodes, None, 1).is_empty() {
+            NotFound::WrongMark { found, larger: self.larger.values().filter(|larger| **larger).count() }
+        } else {
+            NotFound::WrongSize { found, board: [board.grid.columns(), board.grid.rows()] }
         }
     }
 

@@ -76,7 +76,7 @@ mod tests {
     use rand_pcg::Pcg64;
 
     use super::*;
-    use crate::ImagePoint;
+    use crate::MeasuredPoint;
 
     /// A tilted board through a lens, scattering by `scatter` and said to do so by 0.05 pixels.
     fn board(scatter: f64, rng: &mut Pcg64) -> Vec<NodePoint> {
@@ -87,7 +87,7 @@ mod tests {
             let place = [12.0 * x / depth, 11.0 * y / depth];
             let bend = 1.0 - 2e-5 * (place[0] - 50.0).hypot(place[1] - 30.0).powi(2);
             let pixel = place.map(|value| 40.0 + bend * value + scatter * rng.sample::<f64, _>(StandardNormal));
-            NodePoint { node, point: ImagePoint { pixel, covariance: Matrix2::identity() * 0.05_f64.powi(2) } }
+            NodePoint { node, point: MeasuredPoint { pixel, covariance: Matrix2::identity() * 0.05_f64.powi(2) } }
         };
         (0..54).map(|k| seen(node(k), rng)).collect()
     }

@@ -3,5 +3,6 @@
 pub(crate) mod derivatives;
 pub(crate) mod levels;
 pub(crate) mod noise;
+pub(crate) mod normal_table;
 pub(crate) mod sampling;
 pub(crate) mod smoothing;

@@ -6,5 +6,5 @@
 mod page;
 mod targets;
 
-pub use page::PaperSize;
+pub use page::{INFRARED_NOTE, PaperSize};
 pub use targets::{print_checkerboard, print_circle_grid, print_coded};

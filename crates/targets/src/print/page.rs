@@ -11,6 +11,10 @@ const STRIP_MM: f64 = 20.0;
 /// Length of the scale bar, millimetre.
 const BAR_MM: f64 = 100.0;
 
+/// What every page says of ink and near infrared.
+pub const INFRARED_NOTE: &str = "Near infrared: laser toner and pigment black are carbon and stay black; dyes of ink-jet printers \
+                                 reflect like paper, and the target is not seen.";
+
 /// Paper of the A series (ISO 216), upright or across as the target needs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum PaperSize {
@@ -127,8 +131,7 @@ impl Page {
         }
         self.text([left + BAR_MM + 3.0, bottom - 12.0], "100 mm: print at 100 % and measure");
         self.text([left, bottom - 5.0], name);
-        let note = "Near infrared: print with laser toner (carbon black); many ink-jet dyes reflect there like paper.";
-        self.text([left, bottom], note);
+        self.text([left, bottom], INFRARED_NOTE);
         self.line("</svg>");
         self.text
     }

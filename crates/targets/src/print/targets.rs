@@ -85,9 +85,10 @@ pub fn print_coded(codes: &[Code], diameter_m: f64, paper: PaperSize) -> Result<
             let angles = [sector, sector + 1].map(|edge| std::f64::consts::TAU * edge as f64 / code.bits as f64);
             page.sector(centre, RING.map(|parts| parts * radius), angles, "white");
         }
-        page.text([corner[0], corner[1] + side + 4.0], &format!("{} of {} sectors", code.id, code.bits));
+        page.text([corner[0], corner[1] + side + 4.0], &code.to_string());
     }
-    Ok(page.finished(&format!("Coded rings, discs of {:.3} mm.", 2.0 * radius)))
+    let sectors = codes.first().map_or(0, |code| code.bits);
+    Ok(page.finished(&format!("Coded rings of {sectors} sectors, discs of {:.3} mm.", 2.0 * radius)))
 }
 
 #[cfg(test)]

@@ -1,5 +1,5 @@
 //! What is known of a target that was seen: its image point, its range, and what its perspective tells of the camera.
 
-pub(crate) mod image_point;
+pub(crate) mod measured_point;
 pub(crate) mod principal_distance;
 pub(crate) mod target_range;

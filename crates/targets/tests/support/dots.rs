@@ -14,11 +14,13 @@ pub struct PrintedDots<'a> {
     pub hidden: &'a dyn Fn([usize; 2]) -> bool,
     /// Whether x is mirrored.
     pub mirrored: bool,
+    /// The node with the larger dot, if there is one.
+    pub mark: [usize; 2],
 }
 
 impl PrintedDots<'_> {
     pub fn new(grid: CircleGrid, radius_m: f64) -> Self {
-        Self { grid, radius_m, dark: 0.1, bright: 0.9, hidden: &|_| false, mirrored: false }
+        Self { grid, radius_m, dark: 0.1, bright: 0.9, hidden: &|_| false, mirrored: false, mark: [0, 0] }
     }
 }
 
@@ -41,7 +43,7 @@ impl Pattern for PrintedDots<'_> {
         for j in near(-y, self.grid.rows()) {
             for i in near(x * step, self.grid.columns()) {
                 let node = self.grid.node_m([i, j]);
-                let is_origin = i + j == 0;
+                let is_origin = [i, j] == self.mark;
                 let radius = self.radius_m * self.grid.origin_dot().filter(|_| is_origin).unwrap_or(1.0);
                 let off = (x - node.x).hypot(y - node.y) - radius;
                 if !(self.hidden)([i, j]) {

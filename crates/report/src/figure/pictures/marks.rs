@@ -6,15 +6,17 @@ use super::picture::data_uri;
 use crate::Result;
 use crate::figure::Figure;
 use crate::figure::colour::{CATEGORIES, hex};
-use crate::figure::svg::open_svg;
+use crate::figure::svg::{escape, open_svg};
 
 /// A place in an image.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Mark {
     /// Pixel position `(col, row)`, integers at pixel centres.
     pub at: [f64; 2],
     /// Drawn as a disc, otherwise as a ring.
     pub is_filled: bool,
+    /// Written beside it; empty: nothing.
+    pub label: String,
 }
 
 /// Width in which an image is shown.
@@ -29,7 +31,7 @@ const RADIUS: f64 = 4.0;
 /// [`Error::Picture`](crate::Error::Picture) where the values fill no whole rows.
 ///
 /// ```
-/// let mark = report::Mark { at: [1.0, 0.0], is_filled: false };
+/// let mark = report::Mark { at: [1.0, 0.0], is_filled: false, label: "R017".to_owned() };
 /// let figure = report::marked_figure("S00", 3, &[0, 255, 0, 9, 9, 9], &[mark], &[])?;
 /// # Ok::<(), report::Error>(())
 /// ```
@@ -59,6 +61,10 @@ pub fn marked_figure(title: &str, width: usize, grey: &[u8], marks: &[Mark], lin
             svg,
             r#"<circle cx="{x:.1}" cy="{y:.1}" r="{RADIUS}" fill="{fill}" stroke="{colour}" stroke-width="1.5"/>"#
         );
+        if !mark.label.is_empty() {
+            let (x, label) = (x + 1.5 * RADIUS, escape(&mark.label));
+            let _ = write!(svg, r#"<text x="{x:.1}" y="{y:.1}" font-size="11" fill="{colour}">{label}</text>"#);
+        }
     }
     svg.push_str("</svg>");
     Ok(Figure::new(svg))

@@ -8,7 +8,7 @@
 //! both sides. The product is exact for edges at right angles; for others K, of the correlation ρ that the blur has across
 //! both edges, makes it so: `K = ∫₀^asin ρ 2/π exp(−(a² − 2ab sin t + b²) / 2cos²t) dt` with a, b = d/σ \[Genz2004\].
 
-use super::normal_table::NormalTable;
+use crate::image::normal_table::NormalTable;
 
 /// Parameters in their order: corner (col, row) from the middle of the window, directions of the normals of both edges
 /// (radian), blur σ (pixel), offset o, half contrast c (unit of the image), slope g of the light (per pixel, col and row).

@@ -2,6 +2,5 @@
 
 mod crossing;
 mod fit;
-pub(crate) mod normal_table;
 pub(crate) mod refine;
 mod window;

@@ -8,10 +8,10 @@ use statistics::{Distribution, chi_squared_limit, upper_median};
 
 use super::crossing::Crossing;
 use super::fit::{Fitted, Problem};
-use super::normal_table::NormalTable;
 use super::window::Expected;
 use crate::board::assembly::Assembly;
 use crate::grid::lattice::Node;
+use crate::image::normal_table::NormalTable;
 
 /// How far from where the lattice has it a corner may be found, in steps.
 const FARTHEST: f64 = 0.25;

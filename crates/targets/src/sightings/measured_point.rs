@@ -4,7 +4,7 @@ use nalgebra::Matrix2;
 
 /// The image point of a target.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ImagePoint {
+pub struct MeasuredPoint {
     /// Pixel position `(col, row)`, 0-based, integers at pixel centres, lens distortion included.
     pub pixel: [f64; 2],
     /// Covariance of the position (col, row), square pixel, from the noise of the image.
@@ -17,7 +17,7 @@ pub struct NodePoint {
     /// Column and row of the node on the board, from 0.
     pub node: [usize; 2],
     /// Where it was seen.
-    pub point: ImagePoint,
+    pub point: MeasuredPoint,
 }
 
 /// A board that was found in an image.

@@ -58,7 +58,7 @@ pub fn print_targets(request: &PrintRequest) -> Result<PrintSummary> {
         TargetKind::Single(SingleKind::Rings { diameter_m }) => {
             let all = codes(SECTORS).map_err(fault)?;
             let (chosen, page) = rings(request, &all, *diameter_m).map_err(refuse)?;
-            printed = chosen.iter().map(|code| code.to_string()).collect();
+            printed = chosen.iter().map(ToString::to_string).collect();
             page
         }
         TargetKind::Single(kind) => {

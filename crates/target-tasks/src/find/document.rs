@@ -116,8 +116,8 @@ fn caption(seen: &Seen, points: usize) -> String {
     }
     let reason = |left: &LeftOut| format!("{}: {}.", left.target, left.reason);
     sentences.extend(seen.left_out.iter().filter(|left| !left.target.is_empty()).map(reason));
-    if !seen.not_seen.is_empty() {
-        sentences.push(format!("In the image, and not seen: {}.", seen.not_seen.join(", ")));
+    if !seen.hidden.is_empty() {
+        sentences.push(format!("In the image, and not seen: {}.", seen.hidden.join(", ")));
     }
     sentences.join(" ")
 }

@@ -29,7 +29,7 @@ pub(crate) struct Seen {
     /// Points that look like targets and are none of them.
     pub(crate) unnamed: usize,
     pub(crate) left_out: Vec<LeftOut>,
-    pub(crate) not_seen: Vec<String>,
+    pub(crate) hidden: Vec<String>,
     pub(crate) marks: Vec<Mark>,
     pub(crate) line: Vec<[f64; 2]>,
     /// Of a board.
@@ -66,7 +66,7 @@ impl StationPicture {
                 residual_px: Some(board.residual_px),
                 unnamed: 0,
                 left_out: Vec::new(),
-                not_seen: Vec::new(),
+                hidden: Vec::new(),
                 marks: board.nodes.iter().map(mark).collect(),
                 line: first_row.map(|seen| seen.point.pixel).collect(),
                 pairs,

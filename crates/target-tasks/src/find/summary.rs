@@ -93,7 +93,7 @@ impl TargetsSummary {
                 sigma_px: statistics::quantile(&mut sigmas.collect::<Vec<_>>(), 0.5),
                 unnamed: seen.unnamed,
                 left_out: seen.left_out.clone(),
-                not_seen: seen.not_seen.clone(),
+                not_seen: seen.hidden.clone(),
             })
         };
         let missing = |station: &StationPicture| {

@@ -96,7 +96,7 @@ impl Singles {
             residual_px: named.residual_px,
             unnamed: points.len() - named_count - left_out.len(),
             left_out,
-            not_seen: named.not_seen,
+            hidden: named.not_seen,
             marks: named.names.iter().zip(points).map(mark).collect(),
             line: Vec::new(),
             pairs: Vec::new(),

@@ -215,7 +215,7 @@ fn range_errors(survey: &Path, found: &Path) -> [f64; 2] {
 }
 
 #[test]
-fn spheres_and_discs_are_named_and_have_ranges() {
+fn spheres_are_named_and_have_ranges_of_their_centres() {
     let folder = tempfile::tempdir().unwrap();
     let survey = simulated(folder.path(), include_str!("../../../fixtures/scenes/spheres.ron"));
     let places = [[-0.5, 0.35, 0.5], [0.45, 0.3, 0.3], [0.35, -0.4, 0.6], [-0.4, -0.35, 0.2], [0.0, 0.05, 0.4]];
@@ -232,7 +232,6 @@ fn spheres_and_discs_are_named_and_have_ranges() {
     // Without approximate poses too.
     std::fs::remove_file(survey.join("stations.csv")).unwrap();
     assert_eq!(spheres("spheres 0.1").points, 10);
-    assert!(find_targets(&looking("discs", &survey, &found), &Silent).is_err());
 }
 
 #[test]

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use targets::range_image::Raster;
-use targets::{CircleOptions, CodedOptions, codes, find_circles, find_coded};
+use targets::{CodedOptions, codes, find_circles, find_coded};
 
 #[path = "../tests/rendering.rs"]
 mod rendering;
@@ -39,7 +39,7 @@ impl Count {
     fn add(&mut self, image: &Raster<f32>, is_right: impl Fn([f64; 2], usize) -> bool) -> Result<(), Box<dyn Error>> {
         let options = CodedOptions::default();
         self.images += 1;
-        self.candidates += find_circles(image, &CircleOptions { ..options.circles })?.len();
+        self.candidates += find_circles(image, &options.circles)?.len();
         for ring in find_coded(image, &options)? {
             self.read += 1;
             self.wrong += usize::from(!is_right(ring.circle.centre.pixel, ring.code.id));
@@ -70,8 +70,9 @@ struct Ring {
     squeeze: f64,
     turn: f64,
     code: usize,
-    /// Whether a place of the ring's frame, in radii, is bright by the defect; `None`: as the ring has it.
+    /// Where a foreign ring changes its colour, sectors.
     edges: Vec<f64>,
+    /// Direction, distance from the middle and half width (radii) and value of what lies across.
     bar: [f64; 4],
 }
 
@@ -88,12 +89,11 @@ impl Ring {
             turn: draw(0.0, 12.0),
             code: (draw(0.0, count as f64) as usize).min(count - 1),
             edges,
-            // Direction, distance from the middle, half width, value.
             bar: [draw(0.0, std::f64::consts::TAU), draw(1.4, 3.2), draw(0.3, 1.3), draw(0.0, 1.0)],
         }
     }
 
-    /// Light at a place, 0 to 1; 2 where the ring ends.
+    /// Light at a place, 0 to 1.
     fn value(&self, word: u32, defect: Defect, col: f64, row: f64) -> f64 {
         let (x, y) = ((col - self.centre[0]) / self.radius, (row - self.centre[1]) / (self.radius * self.squeeze));
         let parts = x.hypot(y);
@@ -121,11 +121,7 @@ impl Ring {
                 own != painted
             }
             Defect::Foreign => self.edges.iter().filter(|edge| **edge < sector).count() % 2 == 1,
-            Defect::Discs => {
-                let middle = [2.5 * (sector.floor() + 0.5), 2.5];
-                let _ = middle;
-                (sector.fract() - 0.5).hypot((parts - 2.5) * 1.2) < 0.3 + 0.2 * half
-            }
+            Defect::Discs => (sector.fract() - 0.5).hypot((parts - 2.5) * 1.2) < 0.3 + 0.2 * half,
             _ => word >> (sector as usize) & 1 == 1,
         };
         f64::from(u8::from(set))

@@ -28,10 +28,10 @@ pub(crate) struct TargetsArguments {
           conflicts_with_all = ["survey", "kind", "calibration", "principal_distance", "board_sigma"])]
     print: Vec<String>,
     /// Size of the paper to print on.
-    #[arg(long, value_enum, ignore_case = true, default_value_t = Page::A4, requires = "print")]
+    #[arg(long, value_enum, ignore_case = true, default_value_t = Page::A4, conflicts_with = "survey")]
     page: Page,
     /// Codes of the rings to print, first and last; default: from 0 on, as many as the page has room for.
-    #[arg(long, value_name = "FIRST-LAST", value_parser = codes, requires = "print")]
+    #[arg(long, value_name = "FIRST-LAST", value_parser = codes, conflicts_with = "survey")]
     codes: Option<[usize; 2]>,
     /// calibration.ron whose scattering is taken off; default: the one beside the survey.
     #[arg(long, short, value_name = "FILE")]

@@ -59,7 +59,7 @@ fn boards_alone_calibrate_the_ranges_of_a_room() {
     desk.rangecam("calibrate @targets --out @calibrated");
     let found = Calibration::read(desk.path("calibrated/calibration.ron")).unwrap();
     // Beyond the ranges and amplitudes of the boards pixels are flagged: both are judged on the others.
-    (truth.span, truth.range_models[0].range_span_m) = (found.span.clone(), found.range_models[0].range_span_m);
+    (truth.span, truth.range_models[0].range_span_m) = (found.span, found.range_models[0].range_span_m);
     truth.range_models[0].amplitude_span = found.range_models[0].amplitude_span;
     truth.write(desk.path("true.ron")).unwrap();
     let [true_m, found_m] = ["true.ron", "calibrated/calibration.ron"].map(|calibration| desk.room_error(calibration));

@@ -1,5 +1,5 @@
 //! All tests of the crate as one program: linked once, run side by side.
-#![allow(clippy::unwrap_used)]
+#![allow(clippy::print_stdout, clippy::unwrap_used)]
 
 mod calibrate;
 mod compare;

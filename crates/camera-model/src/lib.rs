@@ -7,6 +7,7 @@ mod error;
 mod lenses;
 mod observation;
 mod pose;
+mod pose_covariance;
 mod projection;
 mod ray_table;
 
@@ -25,6 +26,7 @@ pub use pose::{
     computer_vision_from_photogrammetric, euler_from_pose, euler_from_rotation, pose_from_euler, rotation_from_euler,
     step_pose, with_computer_vision_axes,
 };
+pub use pose_covariance::pose_covariance;
 pub use range_image;
 pub use range_image::ImageFormat;
 pub use ray_table::RayTable;

@@ -2,6 +2,7 @@
 
 mod destination;
 mod error;
+mod inertial_data;
 pub mod plan;
 mod progress;
 mod verdict;
@@ -9,6 +10,7 @@ mod verdict;
 pub use destination::{Inputs, RefusalFile, check_name, json, produce, root_of};
 pub use error::drift::DriftError;
 pub use error::{Error, Result};
+pub use inertial_data::{INERTIAL_DATA, INERTIAL_MOUNTING, read_inertial};
 pub use progress::{Progress, Silent};
 pub use verdict::{Doubt, DoubtKind, Failure, Judged, Verdict, words_about};
 // Of the signatures.

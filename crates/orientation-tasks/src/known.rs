@@ -5,7 +5,7 @@ use std::path::Path;
 use nalgebra::{Matrix6, Vector6};
 use orientation::TimedPose;
 use pipeline::{Error, Result};
-use range_io::tables::{pose_covariance, read_stations};
+use range_io::tables::read_stations;
 use range_io::trajectory::read_any_trajectory;
 use rigid_pose::Uncertain;
 
@@ -41,7 +41,7 @@ impl Known {
             let rows = read_stations(&file)?;
             for (name, time_s) in &stations {
                 let Some(row) = rows.iter().find(|row| row.station == *name) else { continue };
-                let stated = pose_covariance(row);
+                let stated = row.covariance();
                 let covariance = stated.unwrap_or_else(default_covariance);
                 let pose = Uncertain { pose: row.world_from_camera, covariance };
                 found.push((name.clone(), *time_s, pose, stated.is_some()));

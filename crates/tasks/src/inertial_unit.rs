@@ -2,13 +2,13 @@
 
 use std::path::Path;
 
-use commands::root_of;
+use commands::{read_inertial, root_of};
 use inertial::{Biases, ImuNoise, InertialSample, Preintegrated, rest};
 use multiview_registration::MeasuredTurn;
 use nalgebra::{Isometry3, Matrix3, Vector3};
 use pipeline::stations::Station;
 use pipeline::{Error, Result};
-use range_io::survey::{Survey, read_inertial};
+use range_io::survey::Survey;
 use range_io::tables::ImuSample;
 
 /// Samples of the unit that the survey names, and the pose of its axes in the camera's; `None` where it names none.

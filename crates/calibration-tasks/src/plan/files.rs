@@ -6,7 +6,7 @@ use commands::root_of;
 use nalgebra::{Matrix3, Point3, Vector3};
 use pipeline::Result;
 use range_io::survey::Survey;
-use range_io::tables::{pose_covariance, read_stations, read_targets};
+use range_io::tables::{read_stations, read_targets};
 use self_calibration::{Network, NetworkTarget, Station};
 
 use crate::calibrate::{Start, named_distances};
@@ -29,7 +29,7 @@ pub(crate) fn read_plan(survey_path: &Path, calibration: Option<&Path>) -> Resul
             .map(|row| Station {
                 name: row.station.clone(),
                 world_from_camera: Some(row.world_from_camera),
-                covariance: pose_covariance(row),
+                covariance: row.covariance(),
                 integration_time_s: None,
                 drift_m: 0.0,
             })

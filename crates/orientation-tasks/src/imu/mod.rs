@@ -5,12 +5,12 @@ mod rest;
 
 use std::path::Path;
 
+use commands::read_inertial;
 use inertial::{CameraPose, ImuNoise, InertialSample, Mounting, SequenceOptions, estimate_sequence};
 use nalgebra::{Isometry3, Vector3};
 use orientation::TimedPose;
 use pipeline::survey::StationPose;
 use pipeline::{Error, Result};
-use range_io::survey::read_inertial;
 use range_io::tables::{ImuSample, read_imu};
 
 use crate::camera::SurveyCamera;

@@ -4,8 +4,6 @@ mod arrays;
 mod camera;
 mod depth;
 mod frame;
-#[cfg(all(feature = "tables", feature = "trajectory"))]
-mod inertial;
 #[cfg(feature = "png16")]
 mod sequence;
 mod truth;
@@ -19,8 +17,6 @@ use serde::{Deserialize, Serialize};
 
 pub use camera::SurveyCamera;
 pub use frame::{InputFrame, read_frame};
-#[cfg(all(feature = "tables", feature = "trajectory"))]
-pub use inertial::{INERTIAL_DATA, INERTIAL_MOUNTING, read_inertial};
 pub use range_image::PhaseSense;
 pub use truth::{TruthFrame, read_truth, write_truth};
 pub use write::write_frame;

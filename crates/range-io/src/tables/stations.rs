@@ -1,7 +1,7 @@
 use std::path::Path;
 
-use camera_model::{euler_from_pose, pose_from_euler};
-use nalgebra::{Isometry3, Vector3};
+use camera_model::{euler_from_pose, pose_covariance, pose_from_euler};
+use nalgebra::{Isometry3, Matrix6, Vector3};
 
 use super::csv_table::{Columns, PlacedRows, Row, Table, texts, write};
 use crate::Result;
@@ -19,6 +19,13 @@ pub struct Station {
     pub sigma_attitude_rad: Option<[f64; 3]>,
     /// What speaks against the pose, in words; `None` where nothing does.
     pub doubt: Option<String>,
+}
+
+impl Station {
+    /// See [`pose_covariance`].
+    pub fn covariance(&self) -> Option<Matrix6<f64>> {
+        pose_covariance(&self.world_from_camera, self.sigma_position_m, self.sigma_attitude_rad)
+    }
 }
 
 const POSITION: [&str; 3] = ["x", "y", "z"];

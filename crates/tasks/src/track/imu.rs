@@ -2,8 +2,9 @@
 
 use std::path::Path;
 
+use commands::INERTIAL_DATA;
 use pipeline::{Error, Result};
-use range_io::survey::{INERTIAL_DATA, Survey};
+use range_io::survey::Survey;
 use tracking::{ImuIntegrator, ImuOptions, InertialSample, MotionPrior, TrackedPose};
 
 use crate::inertial_unit;

@@ -10,8 +10,8 @@ use pipeline::survey::ViewDrift;
 use pipeline::{Error, Result};
 use range_io::survey::Survey;
 use range_io::tables::{
-    PlacedRows, Station as StationRow, Target as TargetRow, TargetObservation, pose_covariance,
-    read_placed_observations, read_placed_stations, read_placed_targets,
+    PlacedRows, Station as StationRow, Target as TargetRow, TargetObservation, read_placed_observations,
+    read_placed_stations, read_placed_targets,
 };
 use self_calibration::{Network, NetworkTarget, Sighting, Station};
 
@@ -128,7 +128,7 @@ impl Tables {
         self.stations.push(Station {
             name: name.to_owned(),
             world_from_camera: row.map(|row| row.world_from_camera),
-            covariance: row.and_then(pose_covariance),
+            covariance: row.and_then(StationRow::covariance),
             integration_time_s: self.frame_times.get(name).copied(),
             drift_m: 0.0,
         });

@@ -18,7 +18,7 @@ use range_calibration::{
     estimate_range_terms,
 };
 use range_io::survey::{Level, Survey};
-use range_io::tables::{ObservedPlane, PlacedRows, Station, pose_covariance, read_placed_planes, read_placed_stations};
+use range_io::tables::{ObservedPlane, PlacedRows, Station, read_placed_planes, read_placed_stations};
 use self_calibration::{Error as Cause, NetworkError, TermSelection};
 
 use crate::calibrate::network::network_files::optional;
@@ -123,7 +123,7 @@ impl<'a> Scene<'a> {
                 name: view.station.clone(),
                 frame,
                 world_from_camera: station.map(|station| station.world_from_camera),
-                covariance: station.and_then(pose_covariance),
+                covariance: station.and_then(Station::covariance),
                 drift_m,
                 plane,
             });

@@ -143,7 +143,7 @@ mod tests {
             (|sample| sample.specific_force = Vector3::zeros(), "taken off"),
             (|sample| sample.specific_force.x = f64::NAN, "does not rest"),
             (|sample| sample.angular_rate *= 57.3, "degrees"),
-            (|sample| sample.angular_rate.x = 0.05 * (3.0 * sample.timestamp_s).sin(), "scatter"),
+            (|sample| sample.angular_rate.x = 0.3 * (20.0 * sample.timestamp_s).sin(), "scatter"),
         ] {
             assert!(with(change).is_err_and(|error| error.contains(words)), "{words}");
         }

@@ -135,11 +135,16 @@ pub(crate) fn ranged_stations(network: &Network, options: &CalibrationOptions) -
 /// Control that a message names.
 const NAMED: usize = 4;
 
+/// Known targets that carry a datum of six.
+const LEAST_TARGETS: usize = 3;
+
 /// The datum asked for, where the network agrees.
 pub(crate) fn datum(network: &Network, options: &CalibrationOptions) -> Result<Datum> {
     let targets = network.targets.iter().filter(|target| target.covariance.is_some()).map(|target| &target.name);
     let stations = network.stations.iter().filter(|station| station.covariance.is_some()).map(|station| &station.name);
-    let control: Vec<&str> = targets.chain(stations).map(String::as_str).collect();
+    let (targets, stations): (Vec<&String>, Vec<&String>) = (targets.collect(), stations.collect());
+    let is_enough = targets.len() >= LEAST_TARGETS || !stations.is_empty();
+    let control: Vec<&str> = targets.into_iter().chain(stations).map(String::as_str).collect();
     match options.datum {
         NetworkDatum::Free | NetworkDatum::Given if control.is_empty() => Ok(Datum::Inner),
         NetworkDatum::Free => Err(NetworkError::Datum {
@@ -156,6 +161,14 @@ pub(crate) fn datum(network: &Network, options: &CalibrationOptions) -> Result<D
         .into()),
         NetworkDatum::Control if control.is_empty() => Err(NetworkError::Datum {
             reason: "control was asked for, but no target and no station has standard deviations".to_owned(),
+        }
+        .into()),
+        NetworkDatum::Given if !is_enough => Err(NetworkError::Datum {
+            reason: format!(
+                "of all targets only {} are known with standard deviations, too little control for a datum: give three \
+                 targets or a station, or leave the standard deviations out",
+                control.join(" and ")
+            ),
         }
         .into()),
         NetworkDatum::Control | NetworkDatum::Given => Ok(Datum::Control),

@@ -64,7 +64,8 @@ impl MeasuredTurn {
         let [Some(first), Some(second)] = values else { return None };
         let (v, by_first, by_second) = relative_pose_parts(&self.observed(poses)?, &[&first, &second]).ok()?;
         let whitening = self.whitening()?;
-        let rows = |by: nalgebra::Matrix6<f64>| whitening * by.fixed_rows::<3>(3);
+        // The residual is observed minus model.
+        let rows = |by: nalgebra::Matrix6<f64>| -(whitening * by.fixed_rows::<3>(3));
         Some((whitening * v.fixed_rows::<3>(3), [rows(by_first), rows(by_second)]))
     }
 }

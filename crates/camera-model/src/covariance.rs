@@ -47,6 +47,14 @@ pub fn with_affinity_held(covariance: &SMatrix<f64, 8, 8>) -> SMatrix<f64, 10, 1
     padded
 }
 
+impl Camera {
+    /// Derivatives of the point that `pixel` sees at `range_m` by `[xp, yp, c, k1, k2, k3, p1, p2, b1, b2]`: metre a unit of each
+    /// (mm, `mm^-2`, ...), camera frame.
+    pub fn point_derivatives(&self, pixel: [f64; 2], range_m: f64) -> SMatrix<f64, 3, 10> {
+        PointDerivatives::new(self, pixel, range_m).calibration
+    }
+}
+
 /// Derivatives of a back-projected point.
 struct PointDerivatives {
     /// By the range: the unit ray.

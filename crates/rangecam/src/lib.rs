@@ -69,6 +69,13 @@ pub mod registration {
     pub use tracking;
 }
 
+/// What becomes of registered points: how well they are known, and what is measured in them.
+pub mod clouds {
+    #[cfg(feature = "point-uncertainty")]
+    #[doc(inline)]
+    pub use point_uncertainty;
+}
+
 /// Orientation, calibration and its judgement.
 pub mod calibration {
     #[cfg(feature = "calibration-network")]

@@ -1,0 +1,139 @@
+//! How the points of one station move with the errors of its range, its calibration, its drift and its pose.
+
+use camera_model::Camera;
+use error_models::RangeErrorModel;
+use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
+
+use crate::{Error, Result};
+
+/// Where the common errors of a station stand.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Columns {
+    /// Interior orientation and lens: position among `[xp, yp, c, k1, k2, k3, p1, p2, b1, b2]`, and column.
+    pub camera: Vec<(usize, usize)>,
+    /// Range terms: position among the model's `parameter_names`, and column.
+    pub range: Vec<(usize, usize)>,
+    /// The drift of the station's ranges, metre.
+    pub drift: Option<usize>,
+    /// First of the six columns of the pose: `[dt world axes, dtheta camera axes]`. `None` where it is held.
+    pub pose: Option<usize>,
+}
+
+/// One station: its pose, its camera, and what its points have in common.
+#[derive(Debug, Clone)]
+pub struct StationErrors {
+    camera: Camera,
+    model: Option<RangeErrorModel>,
+    world_from_camera: Isometry3<f64>,
+    columns: Columns,
+    /// Standard deviation of the error that neighbouring pixels share, metre, and the width of a neighbourhood, pixel.
+    sensor: Option<(f64, f64)>,
+    number: u32,
+}
+
+impl StationErrors {
+    /// A station; `number` is another one for each.
+    ///
+    /// # Errors
+    /// [`Error::Column`] where a column is not below `common_errors`.
+    pub fn new(
+        number: u32,
+        camera: &Camera,
+        model: Option<&RangeErrorModel>,
+        world_from_camera: &Isometry3<f64>,
+        columns: Columns,
+        common_errors: usize,
+    ) -> Result<Self> {
+        let all = columns.camera.iter().chain(&columns.range).map(|(_, column)| *column);
+        let last = all.chain(columns.drift).chain(columns.pose.map(|first| first + 5)).max();
+        match last {
+            Some(column) if column >= common_errors => Err(Error::Column { column, errors: common_errors }),
+            _ => Ok(Self {
+                camera: *camera,
+                model: model.cloned(),
+                world_from_camera: *world_from_camera,
+                columns,
+                sensor: None,
+                number,
+            }),
+        }
+    }
+
+    /// With an error that the pixels of neighbourhoods of `width_px` share, of this standard deviation along the ray.
+    ///
+    /// # Errors
+    /// [`Error::OutOfDomain`].
+    pub fn with_sensor(mut self, sigma_m: f64, width_px: f64) -> Result<Self> {
+        if !(sigma_m >= 0.0 && sigma_m.is_finite()) {
+            let expected = "not negative";
+            return Err(Error::OutOfDomain { name: "the error that pixels share", value: sigma_m, expected });
+        }
+        if !(width_px >= 1.0 && width_px.is_finite()) {
+            let expected = "at least one pixel";
+            return Err(Error::OutOfDomain { name: "the width of a neighbourhood", value: width_px, expected });
+        }
+        self.sensor = (sigma_m > 0.0).then_some((sigma_m, width_px));
+        Ok(self)
+    }
+
+    /// The pose.
+    pub fn world_from_camera(&self) -> &Isometry3<f64> {
+        &self.world_from_camera
+    }
+
+    /// Direction that a point is seen in, length one, world axes.
+    pub fn ray(&self, point: &Point3<f64>) -> Vector3<f64> {
+        (point - self.world_from_camera.translation.vector).coords.normalize()
+    }
+
+    /// Covariance of a point whose range has this standard deviation, square metre, world axes.
+    pub fn noise(&self, point: &Point3<f64>, sigma_range_m: f64) -> Matrix3<f64> {
+        let shift = self.ray(point) * sigma_range_m;
+        shift * shift.transpose()
+    }
+
+    /// The neighbourhood of a point and its shift by one standard deviation of what the neighbourhood shares.
+    pub fn sensor(&self, point: &Point3<f64>) -> Option<(u64, Vector3<f64>)> {
+        let (sigma_m, width_px) = self.sensor?;
+        let pixel = self.camera.project(&self.world_from_camera.inverse_transform_point(point)).ok()?;
+        let cell = pixel.map(|at| (at / width_px).floor().clamp(0.0, 65_535.0) as u64);
+        let neighbourhood = u64::from(self.number) << 32 | cell[0] << 16 | cell[1];
+        Some((neighbourhood, self.ray(point) * sigma_m))
+    }
+
+    /// Adds the derivatives of a world point by the common errors: column and metre a unit, world axes.
+    ///
+    /// Errors of the range are taken at the corrected range; the difference to the observed one, millimetres, changes
+    /// periodic terms of metres by parts in a thousand. A point that the camera cannot see moves with its pose alone.
+    pub fn common(&self, point: &Point3<f64>, derivatives: &mut Vec<(usize, Vector3<f64>)>) {
+        let rotation = self.world_from_camera.rotation.to_rotation_matrix().into_inner();
+        let local = self.world_from_camera.inverse_transform_point(point);
+        if let Some(first) = self.columns.pose {
+            let by_turn = -rotation * local.coords.cross_matrix();
+            for axis in 0..3 {
+                derivatives.push((first + axis, Vector3::ith(axis, 1.0)));
+                derivatives.push((first + 3 + axis, by_turn.column(axis).into_owned()));
+            }
+        }
+        let Ok(pixel) = self.camera.project(&local) else { return };
+        let range_m = local.coords.norm();
+        let by_range = self.ray(point);
+        if let Some(column) = self.columns.drift {
+            derivatives.push((column, -by_range));
+        }
+        if let Some(model) = self.model.as_ref().filter(|_| !self.columns.range.is_empty()) {
+            let [x, y] = self.camera.format.image_from_pixel(pixel);
+            let [xp, yp] = self.camera.interior.principal_point_mm;
+            let row = model.design_row(range_m, x - xp, y - yp);
+            let moving =
+                self.columns.range.iter().filter_map(|(at, column)| Some((*column, -by_range * *row.get(*at)?)));
+            derivatives.extend(moving);
+        }
+        if !self.columns.camera.is_empty() {
+            let by_camera = rotation * self.camera.point_derivatives(pixel, range_m);
+            let columns = self.columns.camera.iter().filter(|(at, _)| *at < by_camera.ncols());
+            derivatives.extend(columns.map(|(at, column)| (*column, by_camera.column(*at).into_owned())));
+        }
+    }
+}

@@ -1,6 +1,7 @@
 #![doc = include_str!("../README.md")]
 
 mod calibrate;
+mod check;
 mod diff;
 mod plan;
 mod run;
@@ -12,6 +13,7 @@ pub use calibrate::{
     GroupSummary, HeldOut, HeldOutCheck, HeldOutPart, InputDigest, NotoriousPair, Observed, OffsetModel,
     OffsetTableSummary, ParameterMap, ParameterSummary, RejectedObservation, TableDefaults, TestVerdict, calibrate,
 };
+pub use check::{CalibrationCheck, CheckRequest, check};
 pub use diff::{
     CalibrationDifference, CorrectionLine, DiffRequest, DriftLine, DriftPlace, ImageLine, JointLine, ParameterLine,
     PatternLine, PlaceLine, diff,

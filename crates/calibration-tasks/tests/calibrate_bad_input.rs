@@ -192,3 +192,28 @@ fn an_older_result_survives_a_failed_calibration() {
     calibrate(folder.path(), as_it_is).unwrap_err();
     assert_eq!(std::fs::read_to_string(folder.path().join("out/summary.json")).unwrap(), before);
 }
+
+#[test]
+fn a_check_says_what_it_cannot_check() {
+    let folder = tempfile::tempdir().unwrap();
+    let survey = folder.path().join("survey");
+    std::fs::create_dir(&survey).unwrap();
+    let field = crate::common::fixtures().join("surveys/target_field");
+    std::fs::copy(field.join("survey.ron"), survey.join("survey.ron")).unwrap();
+    let request = |level, tolerance_m| calibration_tasks::CheckRequest {
+        survey: survey.clone(),
+        calibration: None,
+        level,
+        tolerance_m,
+    };
+    let said = |request: &calibration_tasks::CheckRequest| {
+        calibration_tasks::check(request, &pipeline::Silent).unwrap_err().to_string()
+    };
+    assert_says(&said(&request(0.01, 0.001)), &["no calibration.ron beside", "--calibration"]);
+    assert_says(&said(&request(1.5, 0.001)), &["--level", "1.5"]);
+    assert_says(&said(&request(0.01, -1.0)), &["--tolerance", "-1"]);
+    let nominal = range_io::survey::Survey::read(&survey).unwrap().camera.nominal_camera().unwrap();
+    let lens = range_io::calibration::Calibration::from_models(&nominal, &error_models::ModelSet::default(), None);
+    lens.unwrap().write(survey.join("calibration.ron")).unwrap();
+    assert_says(&said(&request(0.01, 0.001)), &["no range terms"]);
+}

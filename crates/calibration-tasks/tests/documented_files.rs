@@ -68,8 +68,8 @@ fn every_file_in_the_documentation_does_what_it_is_shown_for() {
         } else if text.contains("sightings:") {
             NetworkScene::from_ron(&text, &file).unwrap_or_else(|error| panic!("{place}: {error}"));
             kinds[1] += 1;
-        } else if text.contains("cameras:") {
-            // A rig, which `rig-tasks` reads in a test of its own.
+        } else if text.contains("cameras:") || text.contains("lengths:") {
+            // A rig, which `rig-tasks` reads in a test of its own, and lengths, which `cloud-tasks` does.
         } else {
             Survey::parse(&file, &text).unwrap_or_else(|error| panic!("{place}: {error}"));
             kinds[2] += 1;

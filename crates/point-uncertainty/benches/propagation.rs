@@ -1,4 +1,5 @@
 //! The covariance of every point of a frame from all sources.
+#![allow(clippy::expect_used, missing_docs)]
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use point_uncertainty::camera_model::{Camera, ImageFormat, InteriorOrientation, LensDistortion};
@@ -21,7 +22,7 @@ impl PointErrors for Frame {
     }
 
     fn common(&self, point: usize, derivatives: &mut Vec<(usize, Vector3<f64>)>) {
-        self.station.common(&self.points[point], derivatives);
+        self.station.common(&self.points[point], f64::NAN, derivatives);
     }
 }
 

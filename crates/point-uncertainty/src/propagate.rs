@@ -98,49 +98,48 @@ pub fn point_covariance(point: usize, points: &dyn PointErrors, common: &CommonE
 
 /// A quantity as a linear function of all errors.
 struct Form {
-    by_point: BTreeMap<usize, Vector3<f64>>,
-    by_neighbourhood: BTreeMap<u64, f64>,
-    by_common: Vec<f64>,
+    points: BTreeMap<usize, Vector3<f64>>,
+    neighbourhoods: BTreeMap<u64, f64>,
+    common: Vec<f64>,
 }
 
 impl Form {
-    fn new(gradient: &Gradient, points: &dyn PointErrors, common: &CommonErrors) -> Self {
-        let mut by_point = BTreeMap::new();
+    fn new(gradient: &Gradient, cloud: &dyn PointErrors, all: &CommonErrors) -> Self {
+        let mut points = BTreeMap::new();
         for (point, by) in gradient {
-            *by_point.entry(*point).or_insert_with(Vector3::zeros) += by;
+            *points.entry(*point).or_insert_with(Vector3::zeros) += by;
         }
-        let mut by_neighbourhood = BTreeMap::new();
-        let mut by_common = vec![0.0; common.errors().len()];
+        let mut neighbourhoods = BTreeMap::new();
+        let mut common = vec![0.0; all.errors().len()];
         let mut derivatives = Vec::new();
-        for (point, by) in &by_point {
-            if let Some((neighbourhood, shift)) = points.sensor(*point) {
-                *by_neighbourhood.entry(neighbourhood).or_insert(0.0) += by.dot(&shift);
+        for (point, by) in &points {
+            if let Some((neighbourhood, shift)) = cloud.sensor(*point) {
+                *neighbourhoods.entry(neighbourhood).or_insert(0.0) += by.dot(&shift);
             }
             derivatives.clear();
-            points.common(*point, &mut derivatives);
+            cloud.common(*point, &mut derivatives);
             for (column, derivative) in &derivatives {
-                by_common[*column] += by.dot(derivative);
+                common[*column] += by.dot(derivative);
             }
         }
-        Self { by_point, by_neighbourhood, by_common }
+        Self { points, neighbourhoods, common }
     }
 
     fn noise_with(&self, other: &Self, points: &dyn PointErrors) -> f64 {
-        let both = self.by_point.iter().filter_map(|(point, by)| Some((point, by, other.by_point.get(point)?)));
+        let both = self.points.iter().filter_map(|(point, by)| Some((point, by, other.points.get(point)?)));
         both.map(|(point, first, second)| first.dot(&(points.noise(*point) * second))).sum()
     }
 
     fn sensor_with(&self, other: &Self) -> f64 {
-        self.by_neighbourhood.iter().filter_map(|(at, by)| Some(by * other.by_neighbourhood.get(at)?)).sum()
+        self.neighbourhoods.iter().filter_map(|(at, by)| Some(by * other.neighbourhoods.get(at)?)).sum()
     }
 
     /// Of the rows that `takes_part`, with all columns.
     fn common_with(&self, other: &Self, common: &CommonErrors, takes_part: impl Fn(usize) -> bool) -> f64 {
         let covariance = common.covariance();
         let mut sum = 0.0;
-        for (row, first) in self.by_common.iter().enumerate().filter(|(row, first)| **first != 0.0 && takes_part(*row))
-        {
-            let with: f64 = other.by_common.iter().enumerate().map(|(at, second)| covariance[(row, at)] * second).sum();
+        for (row, first) in self.common.iter().enumerate().filter(|(row, first)| **first != 0.0 && takes_part(*row)) {
+            let with: f64 = other.common.iter().enumerate().map(|(at, second)| covariance[(row, at)] * second).sum();
             sum += first * with;
         }
         sum

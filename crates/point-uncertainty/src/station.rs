@@ -14,6 +14,9 @@ pub struct Columns {
     pub camera: Vec<(usize, usize)>,
     /// Range terms: position among the model's `parameter_names`, and column.
     pub range: Vec<(usize, usize)>,
+    /// The amplitude's part: position among `[h1, h2, h3]`, and column.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub hyperbola: Vec<(usize, usize)>,
     /// The drift of the station's ranges, metre.
     pub drift: Option<usize>,
     /// First of the six columns of the pose: `[dt world axes, dtheta camera axes]`. `None` where it is held.
@@ -45,7 +48,7 @@ impl StationErrors {
         columns: Columns,
         common_errors: usize,
     ) -> Result<Self> {
-        let all = columns.camera.iter().chain(&columns.range).map(|(_, column)| *column);
+        let all = columns.camera.iter().chain(&columns.range).chain(&columns.hyperbola).map(|(_, column)| *column);
         let last = all.chain(columns.drift).chain(columns.pose.map(|first| first + 5)).max();
         match last {
             Some(column) if column >= common_errors => Err(Error::Column { column, errors: common_errors }),
@@ -97,16 +100,17 @@ impl StationErrors {
     pub fn sensor(&self, point: &Point3<f64>) -> Option<(u64, Vector3<f64>)> {
         let (sigma_m, width_px) = self.sensor?;
         let pixel = self.camera.project(&self.world_from_camera.inverse_transform_point(point)).ok()?;
-        let cell = pixel.map(|at| (at / width_px).floor().clamp(0.0, 65_535.0) as u64);
+        let cell = pixel.map(|at| ((at + 0.5) / width_px).floor().clamp(0.0, 65_535.0) as u64);
         let neighbourhood = u64::from(self.number) << 32 | cell[0] << 16 | cell[1];
         Some((neighbourhood, self.ray(point) * sigma_m))
     }
 
-    /// Adds the derivatives of a world point by the common errors: column and metre a unit, world axes.
+    /// Adds the derivatives of a world point by the common errors: column and metre a unit, world axes. `amplitude` is that of
+    /// the pixel, as received; NaN where it is not known, and then the hyperbola's part is left out.
     ///
     /// Errors of the range are taken at the corrected range; the difference to the observed one, millimetres, changes
     /// periodic terms of metres by parts in a thousand. A point that the camera cannot see moves with its pose alone.
-    pub fn common(&self, point: &Point3<f64>, derivatives: &mut Vec<(usize, Vector3<f64>)>) {
+    pub fn common(&self, point: &Point3<f64>, amplitude: f64, derivatives: &mut Vec<(usize, Vector3<f64>)>) {
         let rotation = self.world_from_camera.rotation.to_rotation_matrix().into_inner();
         let local = self.world_from_camera.inverse_transform_point(point);
         if let Some(first) = self.columns.pose {
@@ -128,6 +132,13 @@ impl StationErrors {
             let row = model.design_row(range_m, x - xp, y - yp);
             let moving =
                 self.columns.range.iter().filter_map(|(at, column)| Some((*column, -by_range * *row.get(*at)?)));
+            derivatives.extend(moving);
+        }
+        let hyperbola = self.model.as_ref().and_then(|model| model.hyperbola?.jacobian(amplitude));
+        if let Some(jacobian) = hyperbola {
+            let coefficients = self.columns.hyperbola.iter();
+            let moving =
+                coefficients.filter_map(|(at, column)| Some((*column, -by_range * *jacobian.coefficients.get(*at)?)));
             derivatives.extend(moving);
         }
         if !self.columns.camera.is_empty() {

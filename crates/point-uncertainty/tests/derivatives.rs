@@ -2,7 +2,7 @@
 
 use point_uncertainty::camera_model::nalgebra::{Isometry3, Point3, Vector3, Vector6};
 use point_uncertainty::camera_model::{Camera, ImageFormat, InteriorOrientation, LensDistortion, step_pose};
-use point_uncertainty::error_models::RangeErrorModel;
+use point_uncertainty::error_models::{AmplitudeHyperbola, RangeErrorModel};
 use point_uncertainty::{Columns, Error, StationErrors};
 
 fn camera(by: &[f64; 10]) -> Camera {
@@ -46,13 +46,14 @@ fn a_point_moves_as_its_derivatives_say() {
     let columns = Columns {
         camera: (0..10).map(|at| (at, at)).collect(),
         range: (0..count).map(|at| (at, 10 + at)).collect(),
+        hyperbola: Vec::new(),
         drift: Some(10 + count),
         pose: Some(11 + count),
     };
     let at = point(&camera(&zero), &model(&terms), &pose, pixel, 0.0);
     let station = StationErrors::new(4, &camera(&zero), Some(&model(&terms)), &pose, columns, count + 17).unwrap();
     let mut found = Vec::new();
-    station.common(&at, &mut found);
+    station.common(&at, f64::NAN, &mut found);
     assert_eq!(found.len(), count + 17);
     for (column, derivative) in found {
         let step =
@@ -101,4 +102,36 @@ fn pixels_of_one_neighbourhood_share_an_error_and_others_do_not() {
     assert_ne!(of(0, [17.0, 33.0]).0, of(0, [25.0, 33.0]).0);
     assert_ne!(of(0, [17.0, 33.0]).0, of(1, [17.0, 33.0]).0);
     assert!((of(0, [17.0, 33.0]).1.norm() - 0.003).abs() < 1e-12);
+}
+
+#[test]
+fn a_point_moves_with_the_hyperbola_as_differences_say() {
+    let hyperbola = |by: [f64; 3]| AmplitudeHyperbola {
+        h1: 1.1e-4 + by[0],
+        h2: 0.0286 + by[1],
+        h3: 156.0 + by[2],
+        amplitude_span: [15.0, 9000.0],
+    };
+    let with = |by| RangeErrorModel { hyperbola: Some(hyperbola(by)), ..RangeErrorModel::error_free(7.5) };
+    let columns = Columns { hyperbola: vec![(0, 0), (1, 1), (2, 2)], ..Columns::default() };
+    let (camera, pose) = (camera(&[0.0; 10]), Isometry3::identity());
+    let station = StationErrors::new(0, &camera, Some(&with([0.0; 3])), &pose, columns, 3).unwrap();
+    let (pixel, amplitude) = ([31.0, 117.0], 400.0);
+    let mut found = Vec::new();
+    station.common(&camera.point(pixel, 2.0), amplitude, &mut found);
+    assert_eq!(found.len(), 3);
+    for (column, derivative) in found {
+        let step = [1e-8, 1e-6, 1e-2][column];
+        let moved = |by: f64| {
+            let mut steps = [0.0; 3];
+            steps[column] = by;
+            camera.point(pixel, 2.0 - hyperbola(steps).correction(amplitude).unwrap())
+        };
+        let difference = (moved(step) - moved(-step)) / (2.0 * step);
+        assert!((difference - derivative).norm() < 1e-5 * difference.norm(), "column {column}");
+    }
+    // Without an amplitude nothing is said of it.
+    let mut found = Vec::new();
+    station.common(&camera.point(pixel, 2.0), f64::NAN, &mut found);
+    assert!(found.is_empty());
 }

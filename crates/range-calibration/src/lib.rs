@@ -28,4 +28,6 @@ pub use ranges::amplitude_or_position::{
 };
 pub use ranges::offset_table::{OffsetSample, OffsetTable, OffsetTableOptions, estimate_offset_table};
 pub use ranges::range_terms::estimate_range_terms;
-pub use surfaces::{SurfaceCalibration, SurfaceCalibrationOptions, SurfaceCapture, SurfaceTerm, calibrate_surfaces};
+pub use surfaces::{
+    HeldTerm, SurfaceCalibration, SurfaceCalibrationOptions, SurfaceCapture, SurfaceTerm, calibrate_surfaces,
+};

@@ -5,9 +5,12 @@ use std::path::PathBuf;
 use clap::{Parser, Subcommand};
 
 use crate::requests::calibration::calibrate_arguments::CalibrateArguments;
+use crate::requests::calibration::check_arguments::CheckArguments;
 use crate::requests::calibration::diff_arguments::DiffArguments;
 use crate::requests::calibration::plan_arguments::PlanArguments;
 use crate::requests::calibration::targets_arguments::TargetsArguments;
+use crate::requests::clouds::fuse_arguments::FuseArguments;
+use crate::requests::clouds::measure_arguments::MeasureArguments;
 use crate::requests::compare_arguments::CompareArguments;
 use crate::requests::explain_arguments::ExplainArguments;
 use crate::requests::fixed_pattern_arguments::FixedPatternArguments;
@@ -103,11 +106,19 @@ pub(crate) enum Command {
         /// Survey folder, calibration.ron or cloud.ply.
         path: PathBuf,
     },
+    /// Tell whether a calibration is still right for a survey of overlapping stations, by surfaces that they have in common: which
+    /// terms moved, and what that does in millimetres. Exit code 0: it is, 1: it is not, 3: the survey cannot tell.
+    Check(CheckArguments),
     /// Tell which differences of two calibrations are significant: parameters, range correction, image. Exit code 0:
     /// none, 1: some, 2: they cannot be compared.
     Diff(DiffArguments),
     /// Tell what each correction did to one pixel's range, in millimetres, and what its flags mean.
     Explain(ExplainArguments),
+    /// Fuse the frames of a result into one cloud without double walls, each point with its standard deviation from all sources.
+    Fuse(FuseArguments),
+    /// Measure lengths, angles, radii, flatness and volumes between named regions of a result's cloud, each with its standard
+    /// deviation from noise, sensor, calibration, drift and poses, and their shares.
+    Measure(MeasureArguments),
     /// Compare two results: clouds (PLY, PCD, E57, VTK, xyz), trajectories (TUM, KITTI, EuRoC, Redwood log, 7-Scenes
     /// folder), stations.csv, or output folders.
     Compare(CompareArguments),

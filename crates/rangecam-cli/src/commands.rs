@@ -20,6 +20,9 @@ type Outcome = Result<ExitCode, Box<dyn Error>>;
 pub(crate) fn dispatch(command: Command, output: &Output) -> Outcome {
     match command {
         Command::Diff(arguments) => output.result(&calibration_tasks::diff(&arguments.request())?),
+        Command::Check(arguments) => {
+            output.result(&calibration_tasks::check(&arguments.request(), output.progress().as_ref())?)
+        }
         Command::Run { survey, pipeline, calibration, out } => run(survey, &pipeline, calibration, out, output),
         Command::Simulate { scene, seed, position_sigma, attitude_sigma, gross_errors, out } => {
             let source = SimulateSource {
@@ -70,6 +73,12 @@ pub(crate) fn dispatch(command: Command, output: &Output) -> Outcome {
         Command::Inspect { path } => output.result(&tasks::inspect(&path)?),
         Command::Explain(arguments) => {
             output.result(&pipeline::explain(&arguments.request()?, output.progress().as_ref())?)
+        }
+        Command::Fuse(arguments) => {
+            output.result(&cloud_tasks::fuse(&arguments.request(), output.progress().as_ref())?)
+        }
+        Command::Measure(arguments) => {
+            output.result(&cloud_tasks::measure(&arguments.request(), output.progress().as_ref())?)
         }
         Command::Compare(arguments) => {
             output.result(&tasks::compare(&arguments.request(), output.progress().as_ref())?)

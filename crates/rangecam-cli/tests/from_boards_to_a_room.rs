@@ -1,44 +1,24 @@
 //! From frames of a board to the corrected ranges of a room, command by command, beside the true calibration.
 
-use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::path::Path;
 
 use range_io::calibration::Calibration;
+
+use crate::desk::Desk;
 
 const STAGES: &str = "(name: \"room\", stages: [Demodulate(low_amplitude: 20), Average(), Deconvolve(), Unwrap(maximum_range_m: 12), \
                       CorrectRange(), CorrectImagePoint(), PointCloud(), Flag()])";
 
-struct Desk(tempfile::TempDir);
-
-impl Desk {
-    fn path(&self, name: &str) -> PathBuf {
-        self.0.path().join(name)
-    }
-
-    /// Runs a command with paths of the desk in the places of `@name`, and returns its result.
-    fn rangecam(&self, line: &str) -> serde_json::Value {
-        let word =
-            |word: &str| word.strip_prefix('@').map_or(word.to_owned(), |name| self.path(name).display().to_string());
-        let arguments: Vec<String> = line.split(' ').map(word).chain(["--json".to_owned()]).collect();
-        let output = Command::new(env!("CARGO_BIN_EXE_rangecam")).args(arguments).output().unwrap();
-        let code = output.status.code();
-        assert!(code == Some(0) || code == Some(1), "{line}: {}", String::from_utf8_lossy(&output.stderr));
-        serde_json::from_slice(&output.stdout).unwrap()
-    }
-
-    /// The median range error of the room, metre.
-    fn room_error(&self, calibration: &str) -> f64 {
-        let line = format!(
-            "run --pipeline @room.ron @room --calibration @{calibration} --out @corrected-{}",
-            calibration.len()
-        );
-        self.rangecam(&line)["truth"]["range_error_median_m"].as_f64().unwrap()
-    }
+/// The median range error of the room, metre.
+fn room_error(desk: &Desk, calibration: &str) -> f64 {
+    let line =
+        format!("run --pipeline @room.ron @room --calibration @{calibration} --out @corrected-{}", calibration.len());
+    desk.rangecam(&line)["truth"]["range_error_median_m"].as_f64().unwrap()
 }
 
 #[test]
 fn boards_alone_calibrate_the_ranges_of_a_room() {
-    let desk = Desk(tempfile::tempdir().unwrap());
+    let desk = Desk::new();
     let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fixtures/scenes");
     for (scene, seed, survey) in [("dots.ron", 1, "boards"), ("room.ron", 2, "room")] {
         desk.rangecam(&format!("simulate {} --seed {seed} --out @{survey}", scenes.join(scene).display()));
@@ -62,7 +42,8 @@ fn boards_alone_calibrate_the_ranges_of_a_room() {
     (truth.span, truth.range_models[0].range_span_m) = (found.span, found.range_models[0].range_span_m);
     truth.range_models[0].amplitude_span = found.range_models[0].amplitude_span;
     truth.write(desk.path("true.ron")).unwrap();
-    let [true_m, found_m] = ["true.ron", "calibrated/calibration.ron"].map(|calibration| desk.room_error(calibration));
+    let [true_m, found_m] =
+        ["true.ron", "calibrated/calibration.ron"].map(|calibration| room_error(&desk, calibration));
     println!(
         "median range error: {:.2} mm with the true calibration, {:.2} mm from boards",
         1e3 * true_m,

@@ -39,6 +39,9 @@ fn cases() -> Vec<Case> {
             "calibrate targets --method two-step-independent --lens-survey lens",
             "targets lens",
         ),
+        case("calibrate, surfaces", "calibrate survey -c cal/c.ron --method surfaces", "survey cal/c.ron"),
+        case("measure", "measure older --lengths plan/lengths.ron", "older plan/lengths.ron"),
+        case("fuse", "fuse older", "older"),
         case("targets", "targets survey -c cal/c.ron -k checkerboard 9x6 0.025", "survey cal/c.ron"),
         case("targets, single", "targets survey -c cal/c.ron -k lights", "survey cal/c.ron"),
         case("calibrate, rings first", "calibrate survey -c cal/c.ron --targets rings 0.05", "survey cal/c.ron"),
@@ -64,7 +67,7 @@ fn cases() -> Vec<Case> {
 }
 
 /// Commands that write nothing.
-const READERS: [&str; 3] = ["inspect", "explain", "diff"];
+const READERS: [&str; 4] = ["inspect", "explain", "diff", "check"];
 
 fn fixtures() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fixtures")
@@ -117,6 +120,7 @@ fn world() -> TempDir {
         let comma = if more.is_empty() || more.ends_with(',') { "" } else { "," };
         fs::write(at(&format!("plan/{name}.ron")), format!("(name: \"{name}\", {more}{comma} {stages})")).unwrap();
     }
+    fs::write(at("plan/lengths.ron"), "(regions: {}, lengths: [])").unwrap();
     let points: Vec<String> = (0..400).map(|k| format!("{} {} {}\n", k % 20, k / 20, k % 7)).collect();
     let points = points.concat();
     for cloud in ["one/a.xyz", "two/b.xyz"] {
@@ -207,7 +211,12 @@ fn no_command_changes_what_it_reads() {
         rangecam(root, &line);
         assert!(everything(root) == before, "{} changed something", case.name);
     }
-    for line in ["inspect survey", "explain survey --frame 0 --pixel 3,3", "diff cal/c.ron survey/calibration.ron"] {
+    for line in [
+        "inspect survey",
+        "explain survey --frame 0 --pixel 3,3",
+        "diff cal/c.ron survey/calibration.ron",
+        "check survey -c cal/c.ron",
+    ] {
         let line: Vec<&str> = line.split(' ').collect();
         rangecam(root, &line);
         assert!(everything(root) == before, "{} changed something", line[0]);

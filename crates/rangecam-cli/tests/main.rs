@@ -3,9 +3,11 @@
 
 mod calibrate;
 mod compare;
+mod desk;
 mod documented_commands;
 mod exit_codes;
 mod explain;
+mod from_a_room_to_lengths;
 mod from_boards_to_a_room;
 mod hostile;
 mod inputs_are_kept;

@@ -71,6 +71,12 @@ pub mod registration {
 
 /// What becomes of registered points: how well they are known, and what is measured in them.
 pub mod clouds {
+    #[cfg(feature = "fusion")]
+    #[doc(inline)]
+    pub use fusion;
+    #[cfg(feature = "measurement")]
+    #[doc(inline)]
+    pub use measurement;
     #[cfg(feature = "point-uncertainty")]
     #[doc(inline)]
     pub use point_uncertainty;
@@ -121,9 +127,15 @@ pub mod application {
     #[cfg(feature = "calibration-tasks")]
     #[doc(inline)]
     pub use calibration_tasks;
+    #[cfg(feature = "cloud-tasks")]
+    #[doc(inline)]
+    pub use cloud_tasks;
     #[cfg(feature = "commands")]
     #[doc(inline)]
     pub use commands;
+    #[cfg(feature = "common-errors")]
+    #[doc(inline)]
+    pub use common_errors;
     #[cfg(feature = "orientation-tasks")]
     #[doc(inline)]
     pub use orientation_tasks;

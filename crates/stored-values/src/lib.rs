@@ -3,6 +3,7 @@
 mod constants;
 mod error;
 mod kind;
+mod sense;
 mod surfaces;
 mod unit;
 
@@ -12,5 +13,6 @@ pub use error::Error;
 use error::Result;
 pub use kind::{Kind, KindJudgement, in_words, judge_kind};
 pub use range_image;
+pub use sense::SenseVotes;
 pub use surfaces::{Bending, bendings};
 pub use unit::{UnitWitness, judge_unit};

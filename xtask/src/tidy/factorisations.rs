@@ -10,6 +10,7 @@ const KNOWN: &[(Use, &[&str])] = &[
     (
         Use::Covariance,
         &[
+            "common-errors/src/sensitivity.rs",
             "calibration-network/src/given/check.rs",
             "calibration-network/src/weakness/simulate.rs",
             "calibration-tasks/src/calibrate/planes/pose_test.rs",
@@ -50,6 +51,7 @@ const KNOWN: &[(Use, &[&str])] = &[
             "global-registration/src/description/sift/extrema.rs",
             "icp-registration/src/parts/metric/coloured.rs",
             "icp-registration/src/parts/metric/plane_to_plane.rs",
+            "measurement/src/fit/start.rs",
             "orientation/src/mounting/closed_form.rs",
             "orientation/src/relative/five_points.rs",
             "orientation/src/robust_pose.rs",
@@ -69,7 +71,9 @@ const KNOWN: &[(Use, &[&str])] = &[
     (
         Use::SmallStep,
         &[
+            "fusion/src/surfels/curvature.rs",
             "icp-registration/src/quality/verdict.rs",
+            "measurement/src/fit/adjusted.rs",
             "multipath/src/pixels/refine.rs",
             "multipath/src/scene/bending.rs",
             "multipath/src/scene/patches.rs",
@@ -85,6 +89,7 @@ const KNOWN: &[(Use, &[&str])] = &[
     (
         Use::OwnStructure,
         &[
+            "fusion/src/common/equations.rs",
             "multiview-registration/src/adjustment/equations.rs",
             "multiview-registration/src/planes/elimination.rs",
             "pose-graph/src/adjustment.rs",
@@ -102,7 +107,7 @@ enum Use {
     /// A step of nine unknowns or fewer in a loop over pixels, corners, pairs or frames.
     SmallStep,
     /// Equations whose blocks are summed up in a hot loop and eliminated there: planes that stations share (a hundred thousand
-    /// points to a few thousand planes), and keyframes, whose field of the sensor is a considered parameter.
+    /// points to a few thousand planes; fused places to the common errors of all points), and keyframes, whose field of the sensor is a considered parameter.
     OwnStructure,
 }
 

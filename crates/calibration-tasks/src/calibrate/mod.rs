@@ -10,6 +10,7 @@ pub(crate) mod request;
 pub(crate) mod results;
 pub(crate) mod run;
 pub(crate) mod start;
+pub(crate) mod surfaces;
 
 pub use camera_files::CameraFiles;
 pub use planes::offset::OffsetTableSummary;
@@ -26,6 +27,8 @@ pub use run::calibrate;
 
 pub(crate) use network::distances::named_distances;
 pub(crate) use planes::offset::FoundTable;
+pub(crate) use results::calibration_file;
 pub(crate) use results::certificate::{COVERAGE, is_notorious, notorious_pairs};
 pub(crate) use results::words::{readable, value_words};
 pub(crate) use start::Start;
+pub(crate) use surfaces::calibrate_on_the_job;

@@ -12,6 +12,8 @@ pub enum CalibrateMethod {
     Network(Method),
     /// Range terms from frames of planes, known or not.
     Planes,
+    /// Range terms and lens together with the poses, from surfaces that several stations see.
+    Surfaces,
 }
 
 impl CalibrateMethod {
@@ -25,6 +27,7 @@ impl CalibrateMethod {
             Self::Network(Method::JointIntegrated) => "joint-integrated",
             Self::Network(Method::Laboratory) => "laboratory",
             Self::Planes => "planes",
+            Self::Surfaces => "surfaces",
         }
     }
 
@@ -44,6 +47,7 @@ impl CalibrateMethod {
             Self::Network(Method::JointIntegrated) => "range camera and passive camera in one adjustment",
             Self::Network(Method::Laboratory) => "range terms from distances known from outside",
             Self::Planes => "range terms from frames of planes",
+            Self::Surfaces => "range terms, lens and poses from surfaces that several stations see",
         }
     }
 }

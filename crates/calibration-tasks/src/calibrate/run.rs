@@ -24,6 +24,7 @@ use crate::calibrate::results::certificate::{Certificate, HeldOut, Source, today
 use crate::calibrate::results::summary::CalibrationSummary;
 use crate::calibrate::results::{calibration_file, tables};
 use crate::calibrate::start::Start;
+use crate::calibrate::surfaces;
 
 /// Calibrates a survey and writes the results into the request's output folder.
 ///
@@ -45,9 +46,12 @@ fn calibrate_into(
     let clock = Instant::now();
     let survey = request.survey.display().to_string();
     let (start, outcome) = match request.method {
-        CalibrateMethod::Network(_) if request.offset != OffsetModel::Constant => return Err(no_pixels(request)),
+        CalibrateMethod::Network(_) | CalibrateMethod::Surfaces if request.offset != OffsetModel::Constant => {
+            return Err(no_pixels(request));
+        }
         CalibrateMethod::Network(network_method) => calibrate_networks(request, network_method, progress)?,
         CalibrateMethod::Planes => planes::calibrate_planes(request, progress)?,
+        CalibrateMethod::Surfaces => surfaces::calibrate_on_the_job(request, progress)?,
     };
     let finish = |mut summary: CalibrationSummary| {
         summary.seconds = clock.elapsed().as_secs_f64();

@@ -159,25 +159,35 @@ pub struct ImageLine {
 /// frequencies and integration times alone, of models without common ranges, and for a level that is none; [`Error::File`] for what cannot be read, another version of the format among it.
 pub fn diff(request: &DiffRequest) -> Result<CalibrationDifference> {
     let [first, second] = [&request.first, &request.second].map(Calibration::read);
-    let (first, second) = (first?, second?);
-    require_one_camera(&first, &second)?;
-    let pair = Pair::new(&first, &second)?;
+    let names = [&request.first, &request.second].map(|path| path.display().to_string());
+    difference(&first?, &second?, names, request.level)
+}
+
+/// The same for calibrations in memory, with their names.
+pub(crate) fn difference(
+    first: &Calibration,
+    second: &Calibration,
+    [first_name, second_name]: [String; 2],
+    level: f64,
+) -> Result<CalibrationDifference> {
+    require_one_camera(first, second)?;
+    let pair = Pair::new(first, second)?;
     require_common_models(&pair)?;
-    let compared = compare_parameters(&pair.first.parameters, &pair.second.parameters, request.level)
-        .map_err(|error| refused(&error))?;
+    let compared =
+        compare_parameters(&pair.first.parameters, &pair.second.parameters, level).map_err(|error| refused(&error))?;
     let parameters: Vec<ParameterLine> =
         compared.differences.iter().map(|found| parameter_line(found, &pair)).collect();
     let joint = compared.joint.map(joint_line);
     let mut corrections = Vec::new();
     for [i, j] in &pair.models {
         let (one, other) = (pair.first.correction(*i)?, pair.second.correction(*j)?);
-        let found = compare_corrections(&one.side(), &other.side(), &first.camera, request.level)
-            .map_err(|error| refused(&error))?;
+        let found =
+            compare_corrections(&one.side(), &other.side(), &first.camera, level).map_err(|error| refused(&error))?;
         corrections.push(correction_line(one.name.clone(), &found));
     }
-    let drift = drift::line(&first, &second, request.level)?;
-    let pattern = pattern::line(&first, &second, request.level);
-    let image = image(&pair.first, &pair.second, request.level)?;
+    let drift = drift::line(first, second, level)?;
+    let pattern = pattern::line(first, second, level);
+    let image = image(&pair.first, &pair.second, level)?;
     let mut notes = pair.notes.clone();
     if image.is_none() {
         notes.push("the second camera does not see every direction of the first: images are not compared".to_owned());
@@ -189,15 +199,15 @@ pub fn diff(request: &DiffRequest) -> Result<CalibrationDifference> {
         || pattern.as_ref().is_some_and(|line| line.significant)
         || image.as_ref().is_some_and(|line| line.significant);
     Ok(CalibrationDifference {
-        first: request.first.display().to_string(),
-        second: request.second.display().to_string(),
-        level: request.level,
+        first: first_name,
+        second: second_name,
+        level,
         significant,
         parameters,
         joint,
         not_tested: pair.not_tested,
-        only_first: only(compared.only_first, pair.models_of_first, &first, &second),
-        only_second: only(compared.only_second, pair.models_of_second, &second, &first),
+        only_first: only(compared.only_first, pair.models_of_first, first, second),
+        only_second: only(compared.only_second, pair.models_of_second, second, first),
         corrections,
         drift,
         pattern,

@@ -51,7 +51,7 @@ pub(crate) fn document(summary: &Summary, figures: Figures) -> Document {
     flags(&mut document, summary);
     document.figures(figures.sigma);
     let clouds = match summary.own_clouds.len() {
-        0 => "cloud.ply, stations.csv, trajectory.txt".to_owned(),
+        0 => "cloud.ply, stations.csv, trajectory.txt, common_errors.ron".to_owned(),
         count => format!("clouds/ ({count} clouds, each in the frame of its own camera; no poses)"),
     };
     document.closing(format!("written to {}: report.html, summary.json, {clouds}", summary.out));

@@ -6,7 +6,7 @@ use std::path::Path;
 use multiview_registration::{Placements, RefusedPair};
 use nalgebra::Isometry3;
 
-use crate::run::clouds::OwnCloud;
+use crate::run::files::clouds::OwnCloud;
 use crate::run::flow::Flow;
 use crate::run::kept::Kept;
 use crate::run::summary::{PairSummary, RegistrationSummary, StationTruth, Summary, TruthSummary};

@@ -5,19 +5,18 @@
 //! `stages::joining` the points that registration needs. `tally` gathers what each stage changed. Once all views went
 //! through, `flow` joins the stations, `measure` makes the summary of what was kept, and `results` completes the output.
 
-pub(crate) mod clouds;
 pub(crate) mod document;
 pub(crate) mod figures;
+pub(crate) mod files;
 pub(crate) mod flow;
 pub(crate) mod kept;
 pub(crate) mod measure;
-pub(crate) mod results;
 pub(crate) mod simulate;
 pub(crate) mod stream;
 pub(crate) mod summary;
 pub(crate) mod tally;
 
-pub use clouds::OwnCloud;
+pub use files::clouds::OwnCloud;
 pub use simulate::{Simulated, simulate};
 pub use summary::{PairSummary, ReferenceSummary, RegistrationSummary, StationTruth, Summary, TruthSummary};
 
@@ -31,9 +30,9 @@ use range_io::calibration::Calibration;
 use range_io::survey::Survey;
 use range_io::tables::Station;
 
-use crate::run::clouds::Clouds;
 use crate::run::document::document;
 use crate::run::figures::Figures;
+use crate::run::files::clouds::Clouds;
 use crate::run::flow::Flow;
 use crate::run::kept::Kept;
 use crate::survey::open::{OpenSurvey, read_calibration};
@@ -167,11 +166,12 @@ fn run_into(
     summary.out = request.out.display().to_string();
     summary.seconds = start.elapsed().as_secs_f64();
     if let Some(poses) = &common {
-        results::write_poses(&folder, &kept.views, poses, &summary)?;
+        files::results::write_poses(&folder, &kept.views, poses, &summary)?;
+        files::common_errors::write(&folder, &flow, &request.plan, &kept.views, poses)?;
     }
     progress.advance(1);
     let figures = Figures::new(kept, &flow.joined.poses, common.as_deref(), flow.survey.vertical_axis)?;
-    results::finish(folder, &summary, &document(&summary, figures).html(), progress)?;
+    files::results::finish(folder, &summary, &document(&summary, figures).html(), progress)?;
     progress.finish();
     Ok(summary)
 }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use crate::run::clouds::OwnCloud;
+use crate::run::files::clouds::OwnCloud;
 use crate::survey::drift::ViewDrift;
 use crate::survey::records::{RefusedStage, StageSummary};
 use crate::survey::truth::RangeTruth;

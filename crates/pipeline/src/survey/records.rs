@@ -48,6 +48,8 @@ pub struct ViewRecord {
     pub name: String,
     /// Time of the first frame, second.
     pub timestamp_s: f64,
+    /// Integration time, second, where it is stated.
+    pub integration_time_s: Option<f64>,
     /// Approximate or known pose from the survey.
     pub stated: Option<Isometry3<f64>>,
     /// Standard deviations of its position, metre, and attitude, radian, in space, where they are stated.
@@ -73,6 +75,7 @@ impl ViewRecord {
             station: view.station.clone(),
             name: view.name(),
             timestamp_s: view.timestamp_s,
+            integration_time_s: view.integration_time_s,
             stated: view.approximate_world_from_camera,
             stated_sigma: plausibility::stated_sigma(stated, &view.station),
             true_pose: view.truth.as_ref().and_then(|truth| truth.world_from_camera),

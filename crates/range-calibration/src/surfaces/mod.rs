@@ -4,15 +4,18 @@
 //! term ripples. The registration of `icp-registration` adjusts the poses and asks a `PointModel` how points depend on
 //! shared parameters; the sensor model behind that question lives here.
 
+mod amplitude;
 mod calibrate;
 mod options;
 mod outcome;
 mod pixels;
-mod point_model;
+mod selection;
+mod sensor_model;
 
 pub use calibrate::calibrate_surfaces;
 pub use options::{SurfaceCalibrationOptions, SurfaceCapture, SurfaceTerm};
 pub use outcome::SurfaceCalibration;
+pub use selection::HeldTerm;
 
 impl crate::Error {
     /// What the registration of this station, or all, failed with.

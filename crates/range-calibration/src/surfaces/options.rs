@@ -3,6 +3,9 @@ use nalgebra::Isometry3;
 use point_cloud::OrganisedNormalOptions;
 use range_image::{Flags, RangeFrame};
 
+use error_models::AmplitudeHyperbola;
+
+use super::sensor_model::CAMERA_NAMES;
 use crate::{Error, Result};
 
 /// One frame of the scene.
@@ -19,9 +22,11 @@ pub struct SurfaceCapture<'a> {
 /// A term to estimate.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SurfaceTerm {
-    /// Its name, one of `RangeErrorModel::parameter_names`.
+    /// Its name: one of `RangeErrorModel::parameter_names`; `h1`, `h2` or `h3`, which are estimated together; or `xp`, `yp`, `c`,
+    /// `k1`, `k2`, `k3`, `p1`, `p2`, `b1`, `b2`.
     pub name: String,
-    /// Standard deviation of the value that the known model has, in the term's unit; infinite where it says nothing.
+    /// Standard deviation of the value that the known model or camera has, in the term's unit; infinite where it says nothing.
+    /// That of a hyperbola is not used.
     pub prior_sigma: f64,
 }
 
@@ -41,7 +46,8 @@ pub struct SurfaceCalibrationOptions<'a> {
     pub exclude: Flags,
     /// How normals are found in a frame. Default: windows of seven pixels.
     pub normals: OrganisedNormalOptions,
-    /// A term whose effect on the ranges is known less well than this is refused, metre. Default 5 mm.
+    /// A combination of terms that moves points by more than this for a standard deviation is not determined, metre, and one of
+    /// its terms is held. Default 5 mm: half of what cameras leave uncorrected, so that a calibration is worth more than none.
     pub largest_sigma_m: f64,
     /// How the stations are registered; a point model in it is not asked. Default: that of
     /// [`StationRegistrationOptions`].
@@ -60,9 +66,20 @@ impl Default for SurfaceCalibrationOptions<'_> {
     }
 }
 
+/// The terms asked for, by kind.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Asked<'a> {
+    /// Terms of the range model and their positions among its parameters.
+    pub(super) range: Vec<(usize, &'a SurfaceTerm)>,
+    /// Whether the hyperbola is.
+    pub(super) amplitude: bool,
+    /// Parameters of the camera and their positions.
+    pub(super) lens: Vec<(usize, &'a SurfaceTerm)>,
+}
+
 impl SurfaceCalibrationOptions<'_> {
-    /// Positions of the terms among the model's parameters.
-    pub(super) fn columns(&self, names: &[String]) -> Result<Vec<usize>> {
+    /// The terms by kind; `names`: those of the range model.
+    pub(super) fn asked(&self, names: &[String]) -> Result<Asked<'_>> {
         if self.terms.is_empty() {
             return Err(Error::NothingToEstimate);
         }
@@ -70,25 +87,30 @@ impl SurfaceCalibrationOptions<'_> {
             let (name, value) = ("largest_sigma_m", self.largest_sigma_m);
             return Err(Error::OutOfDomain { name, value, expected: "a positive length in metre" });
         }
-        let mut columns = Vec::with_capacity(self.terms.len());
-        for term in &self.terms {
-            let Some(column) = names.iter().position(|name| *name == term.name) else {
-                return Err(Error::UnknownName {
-                    what: "the list of terms".to_owned(),
-                    kind: "term",
-                    name: term.name.clone(),
-                    known: names.join(", "),
-                });
-            };
-            if columns.contains(&column) {
+        let mut asked = Asked { range: Vec::new(), amplitude: false, lens: Vec::new() };
+        for (index, term) in self.terms.iter().enumerate() {
+            if self.terms[..index].iter().any(|other| other.name == term.name) {
                 return Err(Error::DuplicateName { kind: "term", name: term.name.clone() });
             }
             if term.prior_sigma.is_nan() || term.prior_sigma <= 0.0 {
                 let (name, value) = ("prior_sigma", term.prior_sigma);
                 return Err(Error::OutOfDomain { name, value, expected: "positive; infinite where nothing is known" });
             }
-            columns.push(column);
+            if let Some(position) = names.iter().position(|name| *name == term.name) {
+                asked.range.push((position, term));
+            } else if let Some(position) = CAMERA_NAMES.iter().position(|name| *name == term.name) {
+                asked.lens.push((position, term));
+            } else if AmplitudeHyperbola::NAMES.contains(&term.name.as_str()) {
+                asked.amplitude = true;
+            } else {
+                return Err(Error::UnknownName {
+                    what: "the list of terms".to_owned(),
+                    kind: "term",
+                    name: term.name.clone(),
+                    known: format!("{}, h1, h2, h3, {}", names.join(", "), CAMERA_NAMES.join(", ")),
+                });
+            }
         }
-        Ok(columns)
+        Ok(asked)
     }
 }

@@ -1,6 +1,7 @@
 //! Arguments of the commands, one module each.
 
 pub(crate) mod calibration;
+pub(crate) mod clouds;
 pub(crate) mod compare_arguments;
 pub(crate) mod explain_arguments;
 pub(crate) mod fixed_pattern_arguments;

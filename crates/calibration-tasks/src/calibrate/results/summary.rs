@@ -277,7 +277,8 @@ impl CalibrationSummary {
             decisions: decisions(outcome),
             trends: match method {
                 CalibrateMethod::Planes => trends(outcome, table.and_then(FoundTable::worth_applying).as_ref()),
-                CalibrateMethod::Network(_) => Vec::new(),
+                // What surfaces leave is counted against others that have the same errors.
+                CalibrateMethod::Surfaces | CalibrateMethod::Network(_) => Vec::new(),
             },
             certificate: None,
             seconds: 0.0,

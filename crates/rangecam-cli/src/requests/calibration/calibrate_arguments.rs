@@ -95,6 +95,8 @@ enum MethodName {
     Laboratory,
     /// Range terms from frames of planes, known or not (planes.csv).
     Planes,
+    /// Range terms, and what is told of the lens, with the poses, from what stations of a survey of frames see in common: no target.
+    Surfaces,
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
@@ -194,6 +196,7 @@ impl CalibrateArguments {
             (MethodName::Joint, JointName::Integrated) => CalibrateMethod::Network(Method::JointIntegrated),
             (MethodName::Laboratory, _) => CalibrateMethod::Network(Method::Laboratory),
             (MethodName::Planes, _) => CalibrateMethod::Planes,
+            (MethodName::Surfaces, _) => CalibrateMethod::Surfaces,
         };
         let out = default_out(&self.survey, "-calibration");
         let standard = CalibrationOptions::default();

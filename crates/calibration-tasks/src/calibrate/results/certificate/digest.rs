@@ -36,17 +36,23 @@ const NETWORK: [&str; 8] = [
 ];
 /// Those for planes, beside the frames.
 const PLANES: [&str; 3] = ["survey.ron", "stations.csv", "planes.csv"];
+/// Those for surfaces, beside the frames.
+const SURFACES: [&str; 2] = ["survey.ron", "stations.csv"];
 
 /// Digests of all files that a calibration reads, in a fixed order.
 pub(crate) fn digests(request: &CalibrateRequest) -> Result<Vec<InputDigest>> {
     let mut files: Vec<PathBuf> = Vec::new();
     let root = root_of(&request.survey);
-    let tables: &[&str] = if request.method == CalibrateMethod::Planes { &PLANES } else { &NETWORK };
+    let tables: &[&str] = match request.method {
+        CalibrateMethod::Planes => &PLANES,
+        CalibrateMethod::Surfaces => &SURFACES,
+        CalibrateMethod::Network(_) => &NETWORK,
+    };
     for survey in [Some(&request.survey), request.lens_survey.as_ref()].into_iter().flatten() {
         let root = root_of(survey);
         files.extend(tables.iter().map(|name| root.join(name)));
     }
-    if request.method == CalibrateMethod::Planes {
+    if !matches!(request.method, CalibrateMethod::Network(_)) {
         for frame in Survey::read(&request.survey)?.frames {
             // A frame of a recording has its number behind the name of the file.
             let name = frame.file.to_string_lossy();

@@ -1,0 +1,202 @@
+//! Figures of a fused cloud, and what speaks against it.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use commands::{Doubt, DoubtKind};
+use fusion::{CommonErrorUse, Contradiction, Fused, FusionOptions, Reason, Surfel};
+use nalgebra::Point3;
+use point_uncertainty::Source;
+use statistics::quantile;
+
+use super::input::Usable;
+use super::summary::{ApartSummary, ContradictionSummary, Correction, CountedPoints, FuseSummary, SigmaSummary};
+use super::thickness::thickness;
+use crate::request::FuseRequest;
+use crate::result::ResultCloud;
+
+/// Share of the fused points that may be contradicted without a doubt: who walks through a room during a survey hides about so
+/// much of it. With a smaller one every moved chair is a doubt; with a larger one a wall seen twice is none.
+const MANY_CONTRADICTIONS: f64 = 0.01;
+
+/// What is known before anything is fused.
+pub(crate) fn begin(asked: &FuseRequest, cloud: &ResultCloud, options: &FusionOptions) -> FuseSummary {
+    let all = cloud.points.len();
+    FuseSummary {
+        result: asked.result.display().to_string(),
+        calibration: cloud.calibration.clone(),
+        voxel_m: options.voxel_m,
+        common_errors: cloud.common.errors().len(),
+        common_error_use: match options.common_errors {
+            CommonErrorUse::Estimate => "estimated",
+            CommonErrorUse::AsStated => "as_stated",
+        },
+        points: CountedPoints { all, flagged: all - cloud.usable.len(), ..CountedPoints::default() },
+        out: asked.out.clone(),
+        ..FuseSummary::default()
+    }
+}
+
+/// What was found.
+pub(crate) fn finish(summary: &mut FuseSummary, usable: &Usable<'_>, moved: &[Point3<f64>], fused: &Fused) {
+    let views = &usable.cloud.views;
+    summary.points.fused = fused.surfel_of_point.iter().flatten().count();
+    summary.fused_points = fused.surfels.len();
+    for unfused in &fused.unfused {
+        *summary.unfused.entry(reason_name(&unfused.reason)).or_default() += 1;
+    }
+    summary.contradictions = contradictions(&fused.contradictions, views);
+    summary.contradicted_points = fused.contradictions.iter().map(|found| found.front).collect::<BTreeSet<_>>().len();
+    let names = |frames: &[u32]| frames.iter().map(|frame| view(views, *frame)).collect();
+    let apart = fused.apart.iter().map(|apart| ApartSummary {
+        frames: names(&apart.frames),
+        others: names(&apart.others),
+        p_value: apart.p_value,
+        shifts: apart.shifts.clone(),
+    });
+    summary.apart = apart.collect();
+    summary.sigma = sigma(&fused.surfels);
+    summary.thickness = thickness(usable, moved, fused);
+    summary.corrections = corrections(usable.cloud, fused);
+    findings(summary, fused);
+    doubts(summary);
+}
+
+/// A reason as `summary.json` has it.
+fn reason_name(reason: &Reason) -> &'static str {
+    match reason {
+        Reason::SeenThrough { .. } => "seen_through",
+        Reason::Behind { .. } => "behind",
+        Reason::OffSurface { .. } => "off_surface",
+        Reason::Between { .. } => "between",
+        Reason::AtEdge => "at_edge",
+        Reason::Uneven => "uneven",
+        Reason::Alone => "alone",
+        _ => "other",
+    }
+}
+
+fn view(views: &[String], frame: u32) -> String {
+    views.get(frame as usize).cloned().unwrap_or_else(|| frame.to_string())
+}
+
+fn contradictions(all: &[Contradiction], views: &[String]) -> Vec<ContradictionSummary> {
+    let mut by_pair: BTreeMap<(u32, u32), Vec<&Contradiction>> = BTreeMap::new();
+    for found in all {
+        by_pair.entry((found.front_frame, found.seen_through_by)).or_default().push(found);
+    }
+    let row = |((front, through), found): ((u32, u32), Vec<&Contradiction>)| ContradictionSummary {
+        front: view(views, front),
+        seen_through_by: view(views, through),
+        pairs: found.len(),
+        median_distance_m: quantile(&mut found.iter().map(|f| f.distance_m.abs()).collect::<Vec<f64>>(), 0.5),
+        largest_deviations: found.iter().map(|f| f.deviations.abs()).fold(0.0, f64::max),
+    };
+    by_pair.into_iter().map(row).collect()
+}
+
+/// Name of what a bent surface adds to a variance, among the sources.
+pub(crate) const SHAPE: &str = "shape";
+
+/// The parts of a fused point's variance: by source, and what its shape adds.
+pub(crate) fn parts(surfel: &Surfel) -> Vec<(&'static str, f64)> {
+    let sources = Source::ALL.into_iter().map(|source| (source.name(), surfel.shares.of(source)));
+    sources.chain([(SHAPE, surfel.shape_variance)]).collect()
+}
+
+/// Means of the parts in shares of their variances.
+pub(crate) fn mean_shares<'a>(surfels: impl Iterator<Item = &'a Surfel>) -> BTreeMap<&'static str, f64> {
+    let mut shares: BTreeMap<&'static str, f64> = BTreeMap::new();
+    let mut count = 0.0;
+    for surfel in surfels {
+        let variance = surfel.sigma_m().powi(2);
+        if variance > 0.0 {
+            count += 1.0;
+            for (name, part) in parts(surfel) {
+                *shares.entry(name).or_default() += part / variance;
+            }
+        }
+    }
+    for share in shares.values_mut() {
+        *share /= count;
+    }
+    shares
+}
+
+fn sigma(surfels: &[Surfel]) -> Option<SigmaSummary> {
+    let mut all: Vec<f64> = surfels.iter().map(Surfel::sigma_m).collect();
+    (!all.is_empty()).then(|| SigmaSummary {
+        median_m: quantile(&mut all, 0.5),
+        below_95_m: quantile(&mut all, 0.95),
+        shares: mean_shares(surfels.iter()),
+    })
+}
+
+fn corrections(cloud: &ResultCloud, fused: &Fused) -> Vec<Correction> {
+    let sigma = |of: &point_uncertainty::CommonErrors, at: usize| of.covariance()[(at, at)].max(0.0).sqrt();
+    let row = |(at, value): (usize, &f64)| {
+        let error = &cloud.common.errors()[at];
+        Correction {
+            name: error.name.clone(),
+            source: error.source.name(),
+            value: *value,
+            sigma_before: sigma(&cloud.common, at),
+            sigma_after: sigma(&fused.common, at),
+        }
+    };
+    fused.corrections.iter().enumerate().map(row).collect()
+}
+
+fn findings(summary: &mut FuseSummary, fused: &Fused) {
+    let is_estimated = fused.corrections.iter().any(|value| *value != 0.0);
+    summary.findings.push(match (summary.common_error_use, is_estimated) {
+        ("as_stated", _) => {
+            "Common errors are as stated: where poses err, walls stand where the weighted mean of the frames is."
+                .to_owned()
+        }
+        (_, true) => {
+            "What surfaces seen by several frames tell of the common errors was taken off the points.".to_owned()
+        }
+        (_, false) => "Nothing was found of the common errors, which stay as stated.".to_owned(),
+    });
+    let single = fused.surfels.iter().filter(|surfel| surfel.frames.len() == 1).count();
+    if single > 0 {
+        let share = 100.0 * single as f64 / fused.surfels.len() as f64;
+        summary.findings.push(format!(
+            "{share:.0} % of the fused points were seen by one frame only: nothing could contradict them."
+        ));
+    }
+}
+
+fn doubts(summary: &mut FuseSummary) {
+    for apart in &summary.apart {
+        let shifts =
+            apart.shifts.iter().map(|(name, value)| format!("{name} {value:+.4}")).collect::<Vec<_>>().join(", ");
+        let words = format!(
+            "its surfaces and those of {} do not agree within the stated covariance of its pose (p = {:.1e}; its pose would have to \
+             change by {shifts}, in metre and radian): they stand beside each other; register it again, or leave it out",
+            apart.others.join(", "),
+            apart.p_value
+        );
+        summary.doubts.push(Doubt::about(DoubtKind::Contradiction, apart.frames.join(", "), words));
+    }
+    let share = summary.contradicted_points as f64 / summary.fused_points.max(1) as f64;
+    if share > MANY_CONTRADICTIONS {
+        let worst = summary.contradictions.iter().max_by_key(|found| found.pairs);
+        let worst = worst.map_or_else(String::new, |worst| {
+            let distance_mm = 1e3 * worst.median_distance_m;
+            format!(
+                "; most often {} saw through what {} saw, {distance_mm:.0} mm before it (median)",
+                worst.seen_through_by, worst.front
+            )
+        });
+        let words = format!(
+            "frames saw through {} of {} fused points ({:.1} %; up to {:.0} % is what one who walks by hides){worst}: something moved, or \
+             a pose is wrong by more than stated",
+            summary.contradicted_points,
+            summary.fused_points,
+            100.0 * share,
+            100.0 * MANY_CONTRADICTIONS
+        );
+        summary.doubts.push(Doubt::new(DoubtKind::Contradiction, words));
+    }
+}

@@ -1,0 +1,24 @@
+#![doc = include_str!("../README.md")]
+
+mod document;
+mod figures;
+mod fuse;
+mod measure;
+mod measured;
+mod plan;
+mod request;
+mod result;
+mod summary;
+
+pub use commands;
+pub use common_errors::{self, CommonErrorsFile, FrameErrors, SharedBySensor};
+pub use fuse::{
+    ApartSummary, ContradictionSummary, Correction, CountedPoints, FuseSummary, SigmaSummary, ThicknessSummary, fuse,
+};
+pub use fusion;
+pub use measure::measure;
+pub use measurement;
+pub use plan::{Length, LengthKind, MeasurePlan, NamedRegion};
+pub use point_uncertainty;
+pub use request::{FuseRequest, MeasureRequest};
+pub use summary::{FlatnessSummary, LengthSummary, MeasureSummary, MissingCells, RegionSummary, SigmaWithout};

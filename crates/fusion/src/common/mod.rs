@@ -1,0 +1,11 @@
+//! Errors that many points have in common, as surfaces that several frames see show them.
+
+mod equations;
+mod isolate;
+mod posterior;
+mod rows;
+mod split;
+
+pub(crate) use isolate::{Conditioned, condition};
+pub(crate) use rows::{Row, form, mean, rows};
+pub(crate) use split::split;

@@ -1,0 +1,79 @@
+//! Derivatives of heights by common errors, column by column.
+
+use nalgebra::DMatrix;
+use point_uncertainty::{CommonErrors, PointErrors};
+
+use crate::Result;
+use crate::input::{Observation, derivatives};
+use crate::surfels::Estimate;
+
+/// Column and derivative, in ascending order of the columns.
+pub(crate) type Row = Vec<(u32, f64)>;
+
+/// For each frame of a place the derivative of the height that it sees.
+///
+/// Common errors vary slowly: the point next to the middle stands for all of its frame.
+pub(crate) fn rows(
+    place: &Estimate,
+    all: &[Observation],
+    errors: &dyn PointErrors,
+    common: &CommonErrors,
+) -> Result<Vec<Row>> {
+    let mut buffer = Vec::new();
+    place
+        .frames
+        .iter()
+        .map(|frame| {
+            derivatives(all[frame.stands_for as usize].index as usize, errors, common, &mut buffer)?;
+            let mut row: Row = buffer.iter().map(|(column, by)| (*column as u32, by.dot(&place.normal))).collect();
+            row.sort_by_key(|(column, _)| *column);
+            row.dedup_by(|next, kept| {
+                let is_same = next.0 == kept.0;
+                if is_same {
+                    kept.1 += next.1;
+                }
+                is_same
+            });
+            Ok(row)
+        })
+        .collect()
+}
+
+/// The derivative of the mean height.
+pub(crate) fn mean(place: &Estimate, rows: &[Row]) -> Row {
+    let mut all: Vec<(u32, f64)> = Vec::with_capacity(rows.iter().map(Vec::len).sum());
+    for (frame, row) in place.frames.iter().zip(rows) {
+        let share = frame.normal[(0, 0)] / place.weight;
+        all.extend(row.iter().map(|(column, by)| (*column, by * share)));
+    }
+    summed(all)
+}
+
+/// `(a − b) · factor`.
+pub(crate) fn difference(a: &Row, b: &Row, factor: f64) -> Row {
+    let b = b.iter().map(|(column, by)| (*column, -by * factor));
+    summed(a.iter().map(|(column, by)| (*column, by * factor)).chain(b).collect())
+}
+
+fn summed(mut all: Row) -> Row {
+    all.sort_by_key(|(column, _)| *column);
+    all.dedup_by(|next, kept| {
+        let is_same = next.0 == kept.0;
+        if is_same {
+            kept.1 += next.1;
+        }
+        is_same
+    });
+    all
+}
+
+/// `aᵀ C b`.
+pub(crate) fn form(a: &Row, b: &Row, covariance: &DMatrix<f64>) -> f64 {
+    a.iter()
+        .map(|(row, first)| {
+            let with: f64 =
+                b.iter().map(|(column, second)| covariance[(*column as usize, *row as usize)] * second).sum();
+            first * with
+        })
+        .sum()
+}

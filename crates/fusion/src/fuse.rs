@@ -1,0 +1,186 @@
+//! The whole way from points to surfels.
+
+use nalgebra::DMatrix;
+use point_uncertainty::{CommonErrors, PointErrors, Shares, Source};
+use rayon::prelude::*;
+use statistics::upper_median;
+
+use crate::common::{self, Conditioned, Row, condition, form, split};
+use crate::input::{Observation, Observations, Registered};
+use crate::options::{CommonErrorUse, FusionOptions};
+use crate::outcome::{Fused, Surfel};
+use crate::patches::{patches, seeds};
+use crate::sight::{Scene, contradictions, reasons};
+use crate::surfels::{Bend, Estimate, FARTHEST, Gathered, Owner, bends, gather, give_up_uneven, nonempty};
+use crate::{Error, Result};
+
+/// Points that common errors are estimated from, about, in two passes: the second from points that the first has moved to within what
+/// it left. More tell little more than their time.
+const POINTS_FOR_COMMON: [usize; 2] = [60_000, 200_000];
+/// Common errors beyond which they are not estimated: their dense matrices would take gigabytes.
+const MOST_COMMON: usize = 1500;
+
+/// Fuses registered points: each surface once, each fused point with its standard deviation from all sources.
+///
+/// # Errors
+/// See [`Error`]; what was wrong is named with its value.
+pub fn fuse(
+    input: &Registered<'_>,
+    errors: &dyn PointErrors,
+    common: &CommonErrors,
+    options: &FusionOptions,
+) -> Result<Fused> {
+    options.check()?;
+    input.check()?;
+    let none = vec![0.0; common.errors().len()];
+    let first = input.observe(errors, common, &none, options.voxel_m)?;
+    above_noise(&first, options)?;
+    let estimates = options.common_errors == CommonErrorUse::Estimate
+        && (0..none.len()).any(|at| common.covariance()[(at, at)] > 0.0)
+        && none.len() <= MOST_COMMON;
+    let task = Task { input, errors, options };
+    let mut found = Conditioned::nothing(input.centres.len(), common);
+    if !estimates {
+        return task.finish(common, &first, found);
+    }
+    let mut observations = first;
+    for (pass, points) in POINTS_FOR_COMMON.into_iter().enumerate() {
+        let few = thinned(&observations, points);
+        let few = few.as_ref().unwrap_or(&observations);
+        let present = common_of(common, &found.posterior.covariance)?;
+        let patches = patches(few, errors, &present)?;
+        found = condition(&task, &found, few, &patches, common, pass > 0)?;
+        observations = input.observe(errors, common, found.posterior.values.as_slice(), options.voxel_m)?;
+    }
+    task.finish(&common_of(common, &found.posterior.covariance)?, &observations, found)
+}
+
+/// What is fused, and how.
+pub(crate) struct Task<'a> {
+    pub input: &'a Registered<'a>,
+    pub errors: &'a dyn PointErrors,
+    pub options: &'a FusionOptions,
+}
+
+/// The same errors with another covariance.
+fn common_of(common: &CommonErrors, covariance: &DMatrix<f64>) -> Result<CommonErrors> {
+    CommonErrors::new(common.errors().to_vec(), covariance.clone()).map_err(|_| Error::Decomposition)
+}
+
+/// Refuses cells that noise is larger than.
+fn above_noise(observations: &Observations, options: &FusionOptions) -> Result<()> {
+    let mut variances: Vec<f64> = observations.all.par_iter().map(Observation::variance).collect();
+    let sigma_m = upper_median(&mut variances).sqrt();
+    let farthest = FARTHEST as f64 - 1.0;
+    if options.gate() * sigma_m > farthest * options.voxel_m {
+        let least_m = options.gate() * sigma_m / farthest;
+        return Err(Error::CellsBelowNoise { voxel_m: options.voxel_m, sigma_m, least_m });
+    }
+    Ok(())
+}
+
+/// Some of the points, chosen by their place alone; `None` where all serve.
+fn thinned(observations: &Observations, points: usize) -> Option<Observations> {
+    let step = observations.all.len().div_ceil(points);
+    (step > 1).then(|| {
+        // The order is that of cells and coordinates: it does not know the caller's.
+        let kept = || (0..observations.all.len()).step_by(step);
+        Observations {
+            all: kept().map(|at| observations.all[at]).collect(),
+            keys: kept().map(|at| observations.keys[at]).collect(),
+            lattice: observations.lattice,
+        }
+    })
+}
+
+impl Task<'_> {
+    /// The fused cloud of points that the common errors which were found have been taken off; `common` are those that remain.
+    fn finish(&self, common: &CommonErrors, observations: &Observations, found: Conditioned) -> Result<Fused> {
+        let Self { input, errors, options } = *self;
+        let (gate, layers) = (options.gate(), &found.layers);
+        let patches = patches(observations, errors, common)?;
+        let seeds = seeds(&patches, &observations.lattice, layers, gate);
+        let mut gathered = gather(observations, &patches, &seeds, layers, gate);
+        nonempty(&gathered, observations)?;
+        split(&mut gathered, observations, errors, common, options.level)?;
+        let mut bends = bends(&gathered.seeds, &gathered.estimates, options.voxel_m);
+        give_up_uneven(&mut gathered, &mut bends, options);
+        nonempty(&gathered, observations)?;
+        let rows: Vec<Row> = gathered
+            .estimates
+            .par_iter()
+            .with_min_len(64)
+            .map(|place| Ok(common::mean(place, &common::rows(place, &observations.all, errors, common)?)))
+            .collect::<Result<_>>()?;
+        let surfels: Vec<Surfel> = (0..rows.len())
+            .into_par_iter()
+            .with_min_len(64)
+            .map(|at| {
+                let place = &gathered.estimates[at];
+                let amplitude = amplitude(input, &gathered.members[at], observations);
+                surfel(place, options.voxel_m, bends[at], shares(place, &rows[at], common), amplitude)
+            })
+            .collect();
+        let scene = Scene::new(&surfels, input.centres);
+        let contradictions = contradictions(&scene, options);
+        let unfused = reasons(&scene, observations, &gathered.owners, gate);
+        let strongest = gathered.estimates.iter().map(|place| place.strongest).collect();
+        let surfel_of_point = surfels_of_points(&gathered, observations);
+        Ok(Fused {
+            surfels,
+            unfused,
+            surfel_of_point,
+            contradictions,
+            apart: found.apart,
+            corrections: found.posterior.values.iter().copied().collect(),
+            common: common.clone(),
+            rows,
+            strongest,
+        })
+    }
+}
+
+fn surfel(place: &Estimate, voxel_m: f64, bend: Bend, shares: Shares, amplitude: f64) -> Surfel {
+    let mut frames: Vec<u32> = place.frames.iter().map(|frame| frame.frame).collect();
+    frames.sort_unstable();
+    Surfel {
+        position: place.position - place.normal * bend.above_m,
+        normal: place.normal,
+        radius_m: place.radius_m(voxel_m),
+        amplitude,
+        points: place.count,
+        frames,
+        shares,
+        shape_variance: bend.variance,
+    }
+}
+
+/// The variance of a place's height by sources; of what two have in common each takes half.
+fn shares(place: &Estimate, row: &Row, common: &CommonErrors) -> Shares {
+    let mut shares = Shares::default();
+    shares.parts[Source::Noise as usize] = place.noise_variance;
+    shares.parts[Source::Sensor as usize] = place.sensor_variance;
+    for (column, by) in row {
+        let source = common.errors()[*column as usize].source;
+        shares.parts[source as usize] += form(&vec![(*column, *by)], row, common.covariance());
+    }
+    shares
+}
+
+fn amplitude(input: &Registered<'_>, members: &[u32], observations: &Observations) -> f64 {
+    let Some(amplitudes) = input.amplitudes else { return f64::NAN };
+    let values = members.iter().map(|at| amplitudes[observations.all[*at as usize].index as usize]);
+    let (sum, count) =
+        values.filter(|value| value.is_finite()).fold((0.0, 0.0), |(sum, count), v| (sum + v, count + 1.0));
+    if count > 0.0 { sum / count } else { f64::NAN }
+}
+
+fn surfels_of_points(gathered: &Gathered, observations: &Observations) -> Vec<Option<u32>> {
+    let mut of_point = vec![None; observations.all.len()];
+    for (observation, owner) in observations.all.iter().zip(&gathered.owners) {
+        if let Owner::Place(place) = owner {
+            of_point[observation.index as usize] = Some(*place);
+        }
+    }
+    of_point
+}

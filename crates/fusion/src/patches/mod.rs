@@ -1,0 +1,173 @@
+//! Planes of single frames, cell by cell: where surfaces are, before anything is averaged over frames.
+//!
+//! A frame sees one side of a wall, and one of two walls that bad poses make: planes of single frames mix neither.
+
+mod moments;
+mod places;
+
+use nalgebra::{Point3, Vector3};
+use point_uncertainty::{CommonErrors, PointErrors};
+use rayon::prelude::*;
+
+use crate::Result;
+use crate::input::{Observations, derivatives};
+use crate::lattice::{Runs, neighbour, neighbours};
+use crate::small::{self, Symmetric};
+use moments::Moments;
+pub(crate) use moments::{LEAST_FACING, Plane, largest_sum};
+pub(crate) use places::{ONE_SURFACE, Seed, seeds};
+
+/// What one frame saw in one cell.
+pub(crate) struct Patch {
+    pub frame: u32,
+    moments: Moments,
+    /// Covariance of a point there from common errors, square metre.
+    pub common: Symmetric,
+    pub plane: Option<Plane>,
+}
+
+/// Patches by cells.
+pub(crate) struct Patches {
+    pub cells: Runs,
+    pub all: Vec<Patch>,
+    /// Patches of a cell begin here.
+    pub starts: Vec<u32>,
+}
+
+impl Patches {
+    /// The patches of a cell.
+    pub fn of(&self, cell: usize) -> &[Patch] {
+        &self.all[self.starts[cell] as usize..self.starts[cell + 1] as usize]
+    }
+
+    /// The patch of a frame in a cell.
+    pub fn by_frame(&self, cell: usize, frame: u32) -> Option<&Patch> {
+        self.of(cell).iter().find(|patch| patch.frame == frame)
+    }
+}
+
+/// Patches of all cells with their planes.
+pub(crate) fn patches(observations: &Observations, errors: &dyn PointErrors, common: &CommonErrors) -> Result<Patches> {
+    let cells = Runs::new(observations.keys.iter().copied());
+    let by_cell: Vec<Vec<Patch>> = (0..cells.keys.len())
+        .into_par_iter()
+        .with_min_len(64)
+        .map_init(Vec::new, |buffer, cell| in_cell(cell, &cells, observations, errors, common, buffer))
+        .collect::<Result<_>>()?;
+    let mut starts = vec![0];
+    let mut all = Vec::new();
+    for patches in by_cell {
+        all.extend(patches);
+        starts.push(all.len() as u32);
+    }
+    let mut patches = Patches { cells, all, starts };
+    let near = neighbours(1);
+    let planes: Vec<Vec<Option<Plane>>> = (0..patches.cells.keys.len())
+        .into_par_iter()
+        .with_min_len(64)
+        .map(|cell| planes(cell, &patches, observations, &near))
+        .collect();
+    for (patch, plane) in patches.all.iter_mut().zip(planes.into_iter().flatten()) {
+        patch.plane = plane;
+    }
+    Ok(patches)
+}
+
+fn in_cell(
+    cell: usize,
+    cells: &Runs,
+    observations: &Observations,
+    errors: &dyn PointErrors,
+    common: &CommonErrors,
+    buffer: &mut Vec<(usize, Vector3<f64>)>,
+) -> Result<Vec<Patch>> {
+    let centre = observations.lattice.centre(cells.keys[cell]);
+    let mut found: Vec<Patch> = Vec::new();
+    for observation in &observations.all[cells.items(cell)] {
+        let known = found.iter().position(|patch| patch.frame == observation.frame);
+        let at = if let Some(at) = known {
+            at
+        } else {
+            // Common errors vary slowly: one point of the patch stands for all.
+            derivatives(observation.index as usize, errors, common, buffer)?;
+            let common = covariance(buffer, common);
+            found.push(Patch { frame: observation.frame, moments: Moments::default(), common, plane: None });
+            found.len() - 1
+        };
+        found[at].moments.add(observation, &centre);
+    }
+    Ok(found)
+}
+
+/// Covariance of a point from common errors.
+fn covariance(derivatives: &[(usize, Vector3<f64>)], common: &CommonErrors) -> Symmetric {
+    let mut sum = [0.0; 6];
+    for (row, first) in derivatives {
+        let mut with = Vector3::zeros();
+        for (column, second) in derivatives {
+            with += second * common.covariance()[(*row, *column)];
+        }
+        let product = first * with.transpose();
+        small::add(&mut sum, &small::from_matrix(&((product + product.transpose()) * 0.5)), 1.0);
+    }
+    sum
+}
+
+/// The planes of a cell's patches: through the points of the cells around where these are flat, else of the cell alone;
+/// where a frame has too few points, through those of all frames that look the same way.
+fn planes(cell: usize, patches: &Patches, observations: &Observations, near: &[i64]) -> Vec<Option<Plane>> {
+    let lattice = &observations.lattice;
+    let key = patches.cells.keys[cell];
+    let centre = lattice.centre(key);
+    let around: Vec<(usize, Vector3<f64>)> = near
+        .iter()
+        .map(|difference| neighbour(key, *difference))
+        .filter_map(|key| Some((patches.cells.find(key)?, lattice.centre(key) - centre)))
+        .collect();
+    let own = patches.of(cell);
+    let mut any_enough = false;
+    let mut found: Vec<Option<Plane>> = own
+        .iter()
+        .map(|patch| {
+            let mut window = Moments::default();
+            for (cell, shift) in &around {
+                if let Some(other) = patches.by_frame(*cell, patch.frame) {
+                    window.include(&other.moments, shift);
+                }
+            }
+            any_enough |= window.has_enough();
+            let none = [0.0; 6];
+            let alone = || patch.moments.plane(&centre, lattice.size_m, &none).map(weak);
+            window.plane(&centre, lattice.size_m, &none).or_else(alone)
+        })
+        .collect();
+    if !any_enough && let Some(first) = found.first_mut() {
+        *first = together(&own[0], patches, &around, &centre, lattice.size_m);
+    }
+    let alone = [(cell, Vector3::zeros())];
+    for (plane, patch) in found.iter_mut().zip(own).filter(|(plane, _)| plane.is_none()) {
+        *plane = together(patch, patches, &alone, &centre, lattice.size_m).map(weak);
+    }
+    found
+}
+
+fn weak(plane: Plane) -> Plane {
+    Plane { is_firm: false, ..plane }
+}
+
+/// The plane through points of all frames that look as one does.
+fn together(
+    like: &Patch,
+    patches: &Patches,
+    around: &[(usize, Vector3<f64>)],
+    centre: &Point3<f64>,
+    voxel_m: f64,
+) -> Option<Plane> {
+    let mut window = Moments::default();
+    for (cell, shift) in around {
+        for patch in patches.of(*cell).iter().filter(|patch| patch.moments.sees_along(&like.moments)) {
+            window.include(&patch.moments, shift);
+        }
+    }
+    window.plane(centre, voxel_m, &like.common)
+}

@@ -1,0 +1,8 @@
+//! Fused points.
+
+#![allow(clippy::unwrap_used, clippy::float_cmp)]
+
+mod common;
+mod input;
+mod truth;
+mod walls;

@@ -1,0 +1,111 @@
+//! Errors of fused points against what is said of them.
+
+use fusion::point_uncertainty::{Source, shares};
+use fusion::{CommonErrorUse, FusionOptions, fuse};
+
+use crate::common::judge::Judgement;
+use crate::common::survey::{Plan, Survey};
+use crate::common::wall::Wall;
+
+#[test]
+fn fused_points_err_as_they_say() {
+    let mut judged = Judgement::default();
+    for seed in 100..105 {
+        let survey = Survey::new(&Plan::default(), seed);
+        let fused = fuse(&survey.registered(), &survey, &survey.common, &FusionOptions::default()).unwrap();
+        judged.add(&survey, &fused);
+    }
+    // Five surveys have some fifty independent errors that many of their points share: a fifth.
+    let all = judged.mean("all");
+    assert!((0.7..1.3).contains(&all), "{all}");
+    for class in ["near", "far", "dark", "grazing", "edge", "sphere", "thin wall"] {
+        let found = judged.mean(class);
+        // Classes hang on fewer of them.
+        assert!((0.35..1.8).contains(&found), "{class}: {found}");
+    }
+    let corrections = judged.corrections.iter().sum::<f64>() / 5.0;
+    assert!((0.5..1.3).contains(&corrections), "{corrections}");
+    let thickness = statistics::quantile(&mut judged.thickness, 0.5);
+    assert!((0.8..1.2).contains(&thickness), "{thickness}");
+    assert!(judged.ghosts * 1000 < judged.surfels, "{} of {}", judged.ghosts, judged.surfels);
+}
+
+#[test]
+fn noise_averages_out_and_what_is_common_does_not() {
+    let options = FusionOptions { common_errors: CommonErrorUse::AsStated, ..FusionOptions::default() };
+    let of = |frames: usize| {
+        let wall = Wall::new(frames, 60, 0.006, 0.003, 0.002, 5);
+        let fused = fuse(&wall.registered(), &wall, &wall.common, &options).unwrap();
+        let mean = |source| fused.surfels.iter().map(|s| s.shares.of(source)).sum::<f64>() / fused.surfels.len() as f64;
+        (fused.surfels.len() as f64, mean(Source::Noise), mean(Source::Sensor), mean(Source::Pose))
+    };
+    let (one, many) = (of(1), of(16));
+    assert!((one.0 / many.0 - 1.0).abs() < 0.1, "{} {} surfels", one.0, many.0);
+    for (one, many) in [(one.1, many.1), (one.2, many.2), (one.3, many.3)] {
+        // All of them are independent from frame to frame.
+        assert!((one / many / 16.0 - 1.0).abs() < 0.3, "{one} {many}");
+    }
+    // Nine points a cell share their neighbourhood's error, and a frame its shift.
+    assert!((one.2.sqrt() / 0.003 - 1.0).abs() < 0.15, "{}", one.2.sqrt());
+    assert!((one.3.sqrt() / 0.002 - 1.0).abs() < 0.05, "{}", one.3.sqrt());
+}
+
+#[test]
+fn the_mean_is_that_of_generalised_least_squares() {
+    use fusion::nalgebra::{DMatrix, DVector, Vector3};
+    use fusion::point_uncertainty::{CommonErrors, PointErrors};
+    let wall = Wall::new(3, 40, 0.006, 0.004, 0.0, 11);
+    let options = FusionOptions { common_errors: CommonErrorUse::AsStated, ..FusionOptions::default() };
+    let fused = fuse(&wall.registered(), &wall, &CommonErrors::none(), &options);
+    // A derivative by what is not described.
+    assert!(fused.is_err());
+    let fused = fuse(&wall.registered(), &wall, &wall.common, &options).unwrap();
+    let mut compared = 0;
+    for (number, surfel) in fused.surfels.iter().enumerate().filter(|(_, surfel)| surfel.points > 8) {
+        let members: Vec<usize> =
+            (0..wall.points.len()).filter(|at| fused.surfel_of_point[*at] == Some(number as u32)).collect();
+        let n = surfel.normal;
+        let size = members.len();
+        let shifts: Vec<_> = members.iter().map(|at| wall.sensor(*at).unwrap()).collect();
+        let covariance = DMatrix::from_fn(size, size, |i, j| {
+            let own = if i == j { n.dot(&(wall.noise(members[i]) * n)) } else { 0.0 };
+            let together = if shifts[i].0 == shifts[j].0 { shifts[i].1.dot(&n) * shifts[j].1.dot(&n) } else { 0.0 };
+            own + together
+        });
+        let weights = covariance.try_inverse().unwrap();
+        let (mut design, mut heights) = (DMatrix::zeros(size, 3), DVector::zeros(size));
+        for (row, at) in members.iter().enumerate() {
+            let ray = (wall.points[*at] - wall.centres[wall.frames[*at] as usize]).normalize();
+            let height = n.dot(&(wall.points[*at] - surfel.position));
+            let foot = wall.points[*at] - ray * (height / n.dot(&ray)) - surfel.position;
+            design.set_row(row, &Vector3::new(1.0, foot.x, foot.y).transpose());
+            heights[row] = height;
+        }
+        let normal = design.transpose() * &weights * &design;
+        let inverse = normal.try_inverse().unwrap();
+        let solution = &inverse * design.transpose() * weights * heights;
+        let sigma = surfel.shares.of(Source::Noise) + surfel.shares.of(Source::Sensor);
+        // What is taken off for curvature, and the weak prior of the inclination.
+        let limit = 0.1 * sigma.sqrt() + 3.0 * surfel.shape_variance.sqrt();
+        assert!(solution[0].abs() < limit, "{} {limit}", solution[0]);
+        assert!((inverse[(0, 0)] / sigma - 1.0).abs() < 0.1, "{} {sigma}", inverse[(0, 0)]);
+        compared += 1;
+    }
+    assert!(compared > 200, "{compared}");
+}
+
+#[test]
+fn a_fused_cloud_tells_the_errors_of_what_is_computed_from_it() {
+    let wall = Wall::new(4, 40, 0.005, 0.002, 0.003, 8);
+    let fused = fuse(&wall.registered(), &wall, &wall.common, &FusionOptions::default()).unwrap();
+    for (at, surfel) in fused.surfels.iter().enumerate() {
+        let found = shares(&vec![(at, surfel.normal)], &fused, &fused.common);
+        assert!((found.sigma() / surfel.sigma_m() - 1.0).abs() < 1e-9, "{} {}", found.sigma(), surfel.sigma_m());
+    }
+    // What two frames differ by is known from the surface, what they have in common is not.
+    let last = fused.surfels.last().unwrap();
+    let height: f64 = fused.surfels.iter().map(|s| s.position.z).sum::<f64>() / fused.surfels.len() as f64;
+    assert!(last.shares.of(Source::Pose).sqrt() > 0.0014 && height.abs() < 0.005);
+    let between = shares(&vec![(0, fused.surfels[0].normal), (100, -fused.surfels[100].normal)], &fused, &fused.common);
+    assert!(between.of(Source::Pose) < 0.1 * last.shares.of(Source::Pose));
+}

@@ -1,0 +1,92 @@
+//! Walls that are one, walls that are two, and who contradicts whom.
+
+use std::collections::BTreeSet;
+
+use fusion::{FusionOptions, Reason, fuse};
+
+use crate::common::scene::THIN;
+use crate::common::survey::{Plan, Survey};
+use crate::common::wall::Wall;
+
+#[test]
+fn the_two_sides_of_a_thin_wall_stay_two() {
+    let survey = Survey::new(&Plan::default(), 3);
+    let fused = fuse(&survey.registered(), &survey, &survey.common, &FusionOptions::default()).unwrap();
+    for face in THIN {
+        let face = survey.scene.faces[face];
+        // Inside of the wall's ends and above its foot.
+        let on_side = fused.surfels.iter().filter(|s| {
+            s.normal[face.axis] * face.side > 0.9
+                && (s.position.x - face.at).abs() < 0.03
+                && (2.0..2.9).contains(&s.position.y)
+                && (0.2..1.6).contains(&s.position.z)
+        });
+        let off: Vec<f64> = on_side.map(|s| (s.position.x - face.at) / s.sigma_m()).collect();
+        assert!(off.len() > 300, "{}", off.len());
+        // Three deviations of what all have in common, and noise.
+        assert!(off.iter().filter(|off| off.abs() > 4.0).count() * 50 < off.len());
+    }
+    assert!(fused.apart.is_empty(), "{:?}", fused.apart);
+}
+
+#[test]
+fn walls_that_differ_by_what_is_stated_become_one() {
+    let wall = Wall::new(6, 60, 0.004, 0.0, 0.006, 21);
+    let fused = fuse(&wall.registered(), &wall, &wall.common, &FusionOptions::default()).unwrap();
+    // One fused point for each cell of a square metre.
+    assert!((360..480).contains(&fused.surfels.len()), "{}", fused.surfels.len());
+    let heights: Vec<f64> = fused.surfels.iter().map(|s| s.position.z).collect();
+    let thickness = statistics::robust_standard_deviation(&heights);
+    // Fifty-four points of 4 mm in a cell.
+    assert!(thickness < 1.2 * 0.004 / 54_f64.sqrt(), "{thickness}");
+    assert!(fused.apart.is_empty() && fused.contradictions.is_empty());
+}
+
+#[test]
+fn a_station_beyond_what_is_stated_is_named_and_its_wall_stays() {
+    // Six deviations of the station, four of the difference of two.
+    let mut wall = Wall::new(4, 60, 0.003, 0.0, 0.002, 4);
+    for (point, _) in wall.points.iter_mut().zip(&wall.frames).filter(|(_, frame)| **frame == 2) {
+        point.z += 0.012;
+    }
+    let fused = fuse(&wall.registered(), &wall, &wall.common, &FusionOptions::default()).unwrap();
+    assert_eq!(fused.apart.len(), 1, "{:?}", fused.apart);
+    assert_eq!(fused.apart[0].frames, [2]);
+    assert_eq!(fused.apart[0].others, [0, 1, 3]);
+    assert!(fused.apart[0].shifts[0].0 == "S2 dz" && fused.apart[0].shifts[0].1 > 0.006);
+    let (upper, lower): (Vec<_>, Vec<_>) = fused.surfels.iter().partition(|s| s.frames == [2]);
+    assert!(upper.len() > 350 && lower.len() > 350, "{} {}", upper.len(), lower.len());
+    assert!(upper.iter().all(|s| s.position.z > 0.004) && lower.iter().all(|s| s.position.z < 0.004));
+}
+
+#[test]
+fn a_wall_far_beyond_what_is_stated_is_seen_through() {
+    let mut wall = Wall::new(3, 60, 0.003, 0.0, 0.002, 4);
+    for (point, _) in wall.points.iter_mut().zip(&wall.frames).filter(|(_, frame)| **frame == 1) {
+        point.z += 0.12;
+    }
+    let fused = fuse(&wall.registered(), &wall, &wall.common, &FusionOptions::default()).unwrap();
+    let pairs: BTreeSet<(u32, u32)> = fused.contradictions.iter().map(|c| (c.front_frame, c.seen_through_by)).collect();
+    assert_eq!(pairs, BTreeSet::from([(1, 0), (1, 2)]));
+    let seen = &fused.contradictions[fused.contradictions.len() / 2];
+    assert!((seen.distance_m - 0.12).abs() < 0.02 && seen.deviations > 10.0, "{seen:?}");
+}
+
+#[test]
+fn outliers_are_named_and_not_averaged() {
+    let mut wall = Wall::new(3, 60, 0.003, 0.0, 0.001, 10);
+    // Of frame 0: in front of the wall, behind it, and far away.
+    let middle = |row: usize, column: usize| row * 60 + column;
+    wall.points[middle(30, 20)].z += 0.3;
+    wall.points[middle(30, 40)].z -= 0.05;
+    wall.points[middle(10, 10)].x += 30.0;
+    let fused = fuse(&wall.registered(), &wall, &wall.common, &FusionOptions::default()).unwrap();
+    let reason = |at: usize| fused.unfused.iter().find(|unfused| unfused.point == at).unwrap().reason;
+    assert!(reason(middle(30, 20)).is_contradiction(), "{:?}", reason(middle(30, 20)));
+    assert!(reason(middle(30, 40)).is_contradiction(), "{:?}", reason(middle(30, 40)));
+    assert_eq!(reason(middle(10, 10)), Reason::Alone);
+    assert!(fused.apart.is_empty(), "{:?}", fused.apart);
+    assert!(fused.surfels.iter().all(|s| s.position.z.abs() < 0.01));
+    // One in ten thousand is left out by chance.
+    assert!(fused.unfused.len() < 12, "{}", fused.unfused.len());
+}

@@ -89,7 +89,7 @@ pub struct CoarseOptions {
     /// [`super::CoarseAlignment::inside`]). Default 0.008: corners of empty rooms are taken for each other. 0 accepts
     /// them. Clouds whose normals have no side always pass.
     pub min_inside: f64,
-    /// Smallest probability that the pose is known ([`super::CoarseAlignment::determined`]). Default 0.8. 0 lets features decide
+    /// Smallest probability that the pose is known ([`super::CoarseAlignment::determined`]). Default 0.95. 0 lets features decide
     /// where surfaces cannot.
     pub min_determined: f64,
     /// Start of the random numbers. Default: 1.
@@ -111,7 +111,7 @@ impl Default for CoarseOptions {
             shared_error: None,
             level: 0.05,
             min_inside: 0.008,
-            min_determined: 0.8,
+            min_determined: 0.95,
             seed: 1,
         }
     }

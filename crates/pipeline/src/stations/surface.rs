@@ -66,7 +66,8 @@ impl Surface {
         let options = CoarseOptions::default();
         let features = |surface: &Self| {
             let options = CoarseOptions { viewpoint: surface.viewpoint, ..options.clone() };
-            FeatureCloud::new(&with_normals(&surface.target), &options)
+            // Normals of the nearest neighbours, which run across edges, would leave the planes of a scene too few.
+            FeatureCloud::new(surface.target.cloud(), &options)
         };
         let found = align_without_guess(&features(source)?, &features(self)?, &options)?;
         Ok(Start::Found(found.target_from_source, 2.0 * found.voxel_m))

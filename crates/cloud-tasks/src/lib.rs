@@ -20,5 +20,6 @@ pub use measure::measure;
 pub use measurement;
 pub use plan::{Length, LengthKind, MeasurePlan, NamedRegion};
 pub use point_uncertainty;
+pub use range_io;
 pub use request::{FuseRequest, MeasureRequest};
 pub use summary::{FlatnessSummary, LengthSummary, MeasureSummary, MissingCells, RegionSummary, SigmaWithout};

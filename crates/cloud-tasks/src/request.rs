@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use range_io::clouds::CloudFormat;
+
 /// What to measure in which result.
 #[derive(Debug, Clone)]
 pub struct MeasureRequest {
@@ -22,6 +24,8 @@ pub struct FuseRequest {
     pub voxel_m: Option<f64>,
     /// Whether points stay where they are and common errors are as stated; otherwise they are estimated and taken off.
     pub as_stated: bool,
+    /// Format of the clouds: PLY, PCD or E57.
+    pub format: CloudFormat,
     /// Output folder; written beside and renamed when everything is done.
     pub out: PathBuf,
 }

@@ -114,6 +114,10 @@ impl ErrorsOfCloud {
         self.intensity.as_ref().map_or(f64::NAN, |all| f64::from(all[point]))
     }
 
+    fn sigma_m(&self, point: usize) -> f64 {
+        self.sigma.as_ref().map_or(f64::NAN, |all| f64::from(all[point]))
+    }
+
     fn station(&self, point: usize) -> Option<&StationErrors> {
         self.stations.get(*self.frame.get(point)? as usize)
     }
@@ -123,9 +127,10 @@ impl PointErrors for ErrorsOfCloud {
     /// Without a known ray, a standard deviation counts in all directions.
     fn noise(&self, point: usize) -> Matrix3<f64> {
         if let Some([xx, xy, xz, yy, yz, zz]) = self.covariance.as_ref().map(|all| all[point].map(f64::from)) {
-            return Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
+            let own = self.station(point).map_or(1.0, StationErrors::own_share);
+            return Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz) * own;
         }
-        let sigma_m = self.sigma.as_ref().map_or(f64::NAN, |all| f64::from(all[point]));
+        let sigma_m = self.sigma_m(point);
         match self.station(point) {
             Some(station) => station.noise(&self.points[point], sigma_m),
             None => Matrix3::identity() * (sigma_m * sigma_m),
@@ -133,7 +138,17 @@ impl PointErrors for ErrorsOfCloud {
     }
 
     fn sensor(&self, point: usize) -> Option<(u64, Vector3<f64>)> {
-        self.station(point)?.sensor(&self.points[point])
+        let station = self.station(point)?;
+        // Of a covariance, what lies along the ray.
+        let sigma_m = self.covariance.as_ref().map_or_else(
+            || self.sigma_m(point),
+            |all| {
+                let [xx, xy, xz, yy, yz, zz] = all[point].map(f64::from);
+                let ray = station.ray(&self.points[point]);
+                ray.dot(&(Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz) * ray)).max(0.0).sqrt()
+            },
+        );
+        station.sensor(&self.points[point], sigma_m)
     }
 
     fn common(&self, point: usize, derivatives: &mut Vec<(usize, Vector3<f64>)>) {
@@ -212,7 +227,7 @@ fn station(
     let found =
         StationErrors::new(number as u32, camera, model.as_ref(), &world_from_camera, columns, file.errors.len());
     let found = match frame.sensor {
-        Some(sensor) => found.and_then(|found| found.with_sensor(sensor.sigma_m, sensor.width_px)),
+        Some(sensor) => found.and_then(|found| found.with_sensor(sensor)),
         None => found,
     };
     found.map_err(|error| error.to_string())

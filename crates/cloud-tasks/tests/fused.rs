@@ -1,9 +1,9 @@
 //! Results as one cloud in which each surface stands once.
 
-use cloud_tasks::commands::range_io::clouds::CloudFile;
-use cloud_tasks::commands::range_io::ply::read_cloud;
 use cloud_tasks::commands::{DoubtKind, Error, Failure, Judged, Silent, Verdict};
 use cloud_tasks::measurement::nalgebra::Vector3;
+use cloud_tasks::range_io::clouds::{CloudFile, CloudFormat, read_any_cloud};
+use cloud_tasks::range_io::ply::read_cloud;
 use cloud_tasks::{FuseRequest, FuseSummary, fuse};
 
 use crate::results::Folder;
@@ -12,7 +12,13 @@ use crate::results::Folder;
 const VOXEL_M: f64 = 0.1;
 
 fn request(folder: &Folder) -> FuseRequest {
-    FuseRequest { result: folder.path("result"), voxel_m: Some(VOXEL_M), as_stated: false, out: folder.path("out") }
+    FuseRequest {
+        result: folder.path("result"),
+        voxel_m: Some(VOXEL_M),
+        as_stated: false,
+        format: CloudFormat::Ply,
+        out: folder.path("out"),
+    }
 }
 
 fn fused(folder: &Folder) -> Result<FuseSummary, Error> {
@@ -173,4 +179,23 @@ fn what_cannot_be_fused_is_refused_by_name() {
     std::fs::remove_file(folder.path("result/common_errors.ron")).unwrap();
     let found = said(&folder, &asked, Failure::Usage);
     assert!(found.contains("common_errors.ron") && found.contains("run the pipeline again"), "{found}");
+}
+
+#[test]
+fn other_formats_hold_the_same_points() {
+    let folder = Folder::new(3);
+    folder.write_cloud(&[]);
+    fused(&folder).unwrap();
+    let ply = read_cloud(folder.path("out/cloud.ply")).unwrap();
+    for (format, name) in [(CloudFormat::Pcd, "cloud.pcd"), (CloudFormat::E57, "cloud.e57")] {
+        let out = folder.path(name.rsplit_once('.').unwrap().1);
+        let summary = fuse(&FuseRequest { format, out: out.clone(), ..request(&folder) }, &Silent).unwrap();
+        assert!(summary.to_string().contains(name), "{summary}");
+        let other = read_any_cloud(out.join(name)).unwrap();
+        assert_eq!(other.points, ply.points);
+        assert_eq!((other.normals, other.sigma), (ply.normals.clone(), ply.sigma.clone()));
+    }
+    let answer = fuse(&FuseRequest { format: CloudFormat::Vtk, out: folder.path("vtk"), ..request(&folder) }, &Silent);
+    assert!(matches!(answer, Err(Error::Request { .. })), "{answer:?}");
+    assert!(!folder.path("vtk").exists());
 }

@@ -80,7 +80,7 @@ impl Folder {
                     drift: Some(first),
                     pose: Some(first + 1),
                 },
-                sensor: Some(SharedBySensor { sigma_m: 0.002, width_px: 6.0 }),
+                sensor: Some(SharedBySensor { sigma_m: 0.002, share: 0.0, width_px: 6.0 }),
             }
         };
         CommonErrorsFile {

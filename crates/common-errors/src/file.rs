@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use nalgebra::{DMatrix, Isometry3, Quaternion, Translation3, UnitQuaternion};
-use point_uncertainty::{Columns, CommonError, CommonErrors};
+use point_uncertainty::{Columns, CommonError, CommonErrors, SharedBySensor};
 use range_io::ron_text;
 use serde::{Deserialize, Serialize};
 
@@ -50,16 +50,6 @@ pub struct FrameErrors {
     /// The error that neighbouring pixels share, where it is known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sensor: Option<SharedBySensor>,
-}
-
-/// An error that neighbouring pixels share.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct SharedBySensor {
-    /// Standard deviation along the ray.
-    pub sigma_m: f64,
-    /// Width of a neighbourhood.
-    pub width_px: f64,
 }
 
 impl CommonErrorsFile {

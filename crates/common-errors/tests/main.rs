@@ -112,7 +112,7 @@ fn stated_poses_and_drifts_stand_beside_the_calibration() {
     for (frame, sigma) in frames.iter_mut().zip([0.002, 0.003]) {
         frame.stated_covariance = Some(Matrix6::identity() * 1e-6);
         frame.drift_sigma_m = Some(sigma);
-        frame.sensor = Some(SharedBySensor { sigma_m: 0.004, width_px: 8.0 });
+        frame.sensor = Some(SharedBySensor { sigma_m: 0.004, share: 0.0, width_px: 8.0 });
     }
     let known = calibration(0.002, 0.0);
     let file = common_errors(&frames, &round::camera(), Some((&known, BOTH)), None).unwrap();

@@ -28,7 +28,7 @@ pub use models::model::{
 pub use models::parameters::{ModelShape, NamedParameter, PARAMETERS, ParameterStatus, parameter_unit};
 pub use nalgebra;
 pub use noises::noise::{lowest_amplitude, range_sigma_m};
-pub use noises::range_noise::{AmplitudeScale, RangeNoise};
+pub use noises::range_noise::{AmplitudeScale, RangeNoise, SharedNoise};
 pub use range_image;
 pub use range_image::NoiseModel;
 pub use screening::gross_errors::{FlagCounts, GrossErrorOptions, MixedPixelOptions, flag_gross_errors};

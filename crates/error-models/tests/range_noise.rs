@@ -1,11 +1,15 @@
 //! Standard deviations from amplitudes, and those of a fixed pattern.
 
 use approx::assert_relative_eq;
-use error_models::{AmplitudeScale, FixedPattern, RangeErrorModel, RangeNoise, correct_frame};
+use error_models::{AmplitudeScale, FixedPattern, RangeErrorModel, RangeNoise, SharedNoise, correct_frame};
 use range_image::{ComplexChannel, ComplexFrame, Flags, ImageFormat, Modulation, RangeFrame, Raster};
 
-const NOISE: RangeNoise =
-    RangeNoise { sigma_times_amplitude_m: 3.0, floor_m: 0.004, amplitude_scale: AmplitudeScale::AsReceived };
+const NOISE: RangeNoise = RangeNoise {
+    sigma_times_amplitude_m: 3.0,
+    floor_m: 0.004,
+    amplitude_scale: AmplitudeScale::AsReceived,
+    shared: None,
+};
 
 fn frame() -> RangeFrame {
     let range = Raster::from_vec(4, 1, vec![2.0, 2.0, f32::NAN, 2.0]).unwrap();
@@ -28,6 +32,10 @@ fn pixels_without_a_sigma_get_one() {
     assert_relative_eq!(sigma[3], 0.02, max_relative = 1e-6);
     for bad in [-1.0, f64::NAN, f64::INFINITY] {
         assert!(RangeNoise { floor_m: bad, ..NOISE }.predict_sigma(&mut frame).is_err());
+    }
+    for (share, width_px) in [(-0.1, 8.0), (1.1, 8.0), (f64::NAN, 8.0), (0.5, 0.5), (0.5, f64::INFINITY)] {
+        let shared = Some(SharedNoise { share, width_px });
+        assert!(RangeNoise { shared, ..NOISE }.validate().is_err(), "{share} {width_px}");
     }
     assert!(RangeNoise { floor_m: 0.0, sigma_times_amplitude_m: 0.0, ..NOISE }.validate().is_err(), "no noise at all");
 }

@@ -52,6 +52,7 @@ fn averaging_halves_the_random_part_and_leaves_the_rest() {
         sigma_times_amplitude_m: 3.2,
         floor_m: 0.013,
         amplitude_scale: AmplitudeScale::TimesSquaredRange,
+        shared: None,
     });
     calibration.write(&out).unwrap();
     let plan = Plan::from_ron("(name: \"frames\", stages: [])", "frames.ron".as_ref()).unwrap();

@@ -18,7 +18,7 @@ impl PointErrors for Frame {
     }
 
     fn sensor(&self, point: usize) -> Option<(u64, Vector3<f64>)> {
-        self.station.sensor(&self.points[point])
+        self.station.sensor(&self.points[point], 0.01)
     }
 
     fn common(&self, point: usize, derivatives: &mut Vec<(usize, Vector3<f64>)>) {

@@ -7,7 +7,9 @@
 use point_uncertainty::camera_model::{Camera, ImageFormat, InteriorOrientation, LensDistortion};
 use point_uncertainty::error_models::RangeErrorModel;
 use point_uncertainty::nalgebra::{DMatrix, Isometry3, Matrix3, Point3, Vector3};
-use point_uncertainty::{Columns, CommonError, CommonErrors, Gradient, PointErrors, Source, StationErrors, shares};
+use point_uncertainty::{
+    Columns, CommonError, CommonErrors, Gradient, PointErrors, SharedBySensor, Source, StationErrors, shares,
+};
 
 struct Wall {
     points: Vec<Point3<f64>>,
@@ -20,7 +22,7 @@ impl PointErrors for Wall {
     }
 
     fn sensor(&self, point: usize) -> Option<(u64, Vector3<f64>)> {
-        self.station.sensor(&self.points[point])
+        self.station.sensor(&self.points[point], 0.010)
     }
 
     fn common(&self, point: usize, derivatives: &mut Vec<(usize, Vector3<f64>)>) {
@@ -37,7 +39,7 @@ fn main() {
     let common = CommonErrors::new(vec![d0], DMatrix::from_element(1, 1, 4e-6)).unwrap();
     let columns = Columns { range: vec![(0, 0)], ..Columns::default() };
     let station = StationErrors::new(0, &camera, Some(&model), &Isometry3::identity(), columns, 1).unwrap();
-    let station = station.with_sensor(0.003, 8.0).unwrap();
+    let station = station.with_sensor(SharedBySensor { sigma_m: 0.003, share: 0.0, width_px: 8.0 }).unwrap();
     println!("{:>8} {:>10} {:>10} {:>12} {:>9}", "pixels", "noise, mm", "sensor, mm", "calibr., mm", "all, mm");
     for side in [1_usize, 4, 16, 64, 144] {
         let pixels = (0..side * side).map(|at| [(at % side) as f64, (at / side) as f64]);

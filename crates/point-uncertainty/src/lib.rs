@@ -12,4 +12,4 @@ use error::Result;
 pub use error_models;
 pub use nalgebra;
 pub use propagate::{Gradient, PointErrors, Shares, covariance, point_covariance, shares};
-pub use station::{Columns, StationErrors};
+pub use station::{Columns, SharedBySensor, StationErrors};

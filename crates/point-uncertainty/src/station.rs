@@ -23,6 +23,21 @@ pub struct Columns {
     pub pose: Option<usize>,
 }
 
+/// An error that neighbouring pixels share: of a standard deviation of its own, or as a part of the noise of each pixel.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+pub struct SharedBySensor {
+    /// Standard deviation along the ray, metre, beside the noise of the pixels.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub sigma_m: f64,
+    /// Part of each pixel's variance that its neighbourhood shares, 0 to 1.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub share: f64,
+    /// Width of a neighbourhood, pixel.
+    pub width_px: f64,
+}
+
 /// One station: its pose, its camera, and what its points have in common.
 #[derive(Debug, Clone)]
 pub struct StationErrors {
@@ -30,8 +45,7 @@ pub struct StationErrors {
     model: Option<RangeErrorModel>,
     world_from_camera: Isometry3<f64>,
     columns: Columns,
-    /// Standard deviation of the error that neighbouring pixels share, metre, and the width of a neighbourhood, pixel.
-    sensor: Option<(f64, f64)>,
+    sensor: Option<SharedBySensor>,
     number: u32,
 }
 
@@ -63,20 +77,29 @@ impl StationErrors {
         }
     }
 
-    /// With an error that the pixels of neighbourhoods of `width_px` share, of this standard deviation along the ray.
+    /// With an error that the pixels of neighbourhoods share.
     ///
     /// # Errors
     /// [`Error::OutOfDomain`].
-    pub fn with_sensor(mut self, sigma_m: f64, width_px: f64) -> Result<Self> {
+    pub fn with_sensor(mut self, sensor: SharedBySensor) -> Result<Self> {
+        let SharedBySensor { sigma_m, share, width_px } = sensor;
         if !(sigma_m >= 0.0 && sigma_m.is_finite()) {
             let expected = "not negative";
             return Err(Error::OutOfDomain { name: "the error that pixels share", value: sigma_m, expected });
+        }
+        if !(0.0..=1.0).contains(&share) {
+            let expected = "0 to 1";
+            return Err(Error::OutOfDomain {
+                name: "the share of noise that pixels have in common",
+                value: share,
+                expected,
+            });
         }
         if !(width_px >= 1.0 && width_px.is_finite()) {
             let expected = "at least one pixel";
             return Err(Error::OutOfDomain { name: "the width of a neighbourhood", value: width_px, expected });
         }
-        self.sensor = (sigma_m > 0.0).then_some((sigma_m, width_px));
+        self.sensor = (sigma_m > 0.0 || share > 0.0).then_some(sensor);
         Ok(self)
     }
 
@@ -90,19 +113,27 @@ impl StationErrors {
         (point - self.world_from_camera.translation.vector).coords.normalize()
     }
 
-    /// Covariance of a point whose range has this standard deviation, square metre, world axes.
+    /// Covariance of a point whose range has this standard deviation, square metre, world axes, without what its neighbourhood
+    /// shares of it.
     pub fn noise(&self, point: &Point3<f64>, sigma_range_m: f64) -> Matrix3<f64> {
-        let shift = self.ray(point) * sigma_range_m;
+        let shift = self.ray(point) * (sigma_range_m * self.own_share().sqrt());
         shift * shift.transpose()
     }
 
-    /// The neighbourhood of a point and its shift by one standard deviation of what the neighbourhood shares.
-    pub fn sensor(&self, point: &Point3<f64>) -> Option<(u64, Vector3<f64>)> {
-        let (sigma_m, width_px) = self.sensor?;
+    /// Part of a point's variance that its neighbourhood does not share.
+    pub fn own_share(&self) -> f64 {
+        self.sensor.map_or(1.0, |sensor| 1.0 - sensor.share)
+    }
+
+    /// The neighbourhood of a point whose range has this standard deviation, and its shift by one standard deviation of what the
+    /// neighbourhood shares.
+    pub fn sensor(&self, point: &Point3<f64>, sigma_range_m: f64) -> Option<(u64, Vector3<f64>)> {
+        let SharedBySensor { sigma_m, share, width_px } = self.sensor?;
         let pixel = self.camera.project(&self.world_from_camera.inverse_transform_point(point)).ok()?;
         let cell = pixel.map(|at| ((at + 0.5) / width_px).floor().clamp(0.0, 65_535.0) as u64);
         let neighbourhood = u64::from(self.number) << 32 | cell[0] << 16 | cell[1];
-        Some((neighbourhood, self.ray(point) * sigma_m))
+        let part_m = if share > 0.0 { share.sqrt() * sigma_range_m } else { 0.0 };
+        Some((neighbourhood, self.ray(point) * sigma_m.hypot(part_m)))
     }
 
     /// Adds the derivatives of a world point by the common errors: column and metre a unit, world axes. `amplitude` is that of

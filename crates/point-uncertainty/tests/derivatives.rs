@@ -3,7 +3,7 @@
 use point_uncertainty::camera_model::nalgebra::{Isometry3, Point3, Vector3, Vector6};
 use point_uncertainty::camera_model::{Camera, ImageFormat, InteriorOrientation, LensDistortion, step_pose};
 use point_uncertainty::error_models::{AmplitudeHyperbola, RangeErrorModel};
-use point_uncertainty::{Columns, Error, StationErrors};
+use point_uncertainty::{Columns, Error, SharedBySensor, StationErrors};
 
 fn camera(by: &[f64; 10]) -> Camera {
     let format = ImageFormat::new(176, 144, [0.04, 0.04]).unwrap();
@@ -82,10 +82,12 @@ fn columns_that_do_not_exist_and_neighbourhoods_of_nothing_are_refused() {
         |errors| StationErrors::new(0, &camera(&[0.0; 10]), None, &Isometry3::identity(), columns.clone(), errors);
     assert_eq!(station(5).unwrap_err(), Error::Column { column: 5, errors: 5 });
     let station = station(6).unwrap();
-    assert!(station.clone().with_sensor(0.01, 0.0).is_err());
-    assert!(station.clone().with_sensor(f64::NAN, 5.0).is_err());
-    let (width, at) = (8.0, Point3::new(0.0, 0.0, -3.0));
-    assert_eq!(station.with_sensor(0.0, width).unwrap().sensor(&at), None);
+    let shared = |sigma_m, share, width_px| SharedBySensor { sigma_m, share, width_px };
+    for wrong in [shared(0.01, 0.0, 0.0), shared(f64::NAN, 0.0, 5.0), shared(0.01, 1.5, 5.0), shared(0.01, -0.1, 5.0)] {
+        assert!(station.clone().with_sensor(wrong).is_err(), "{wrong:?}");
+    }
+    let at = Point3::new(0.0, 0.0, -3.0);
+    assert_eq!(station.with_sensor(shared(0.0, 0.0, 8.0)).unwrap().sensor(&at, 0.01), None);
 }
 
 #[test]
@@ -94,14 +96,19 @@ fn pixels_of_one_neighbourhood_share_an_error_and_others_do_not() {
     let station = |number| {
         StationErrors::new(number, &camera, None, &Isometry3::identity(), Columns::default(), 0)
             .unwrap()
-            .with_sensor(0.003, 8.0)
+            .with_sensor(SharedBySensor { sigma_m: 0.003, share: 0.0, width_px: 8.0 })
             .unwrap()
     };
-    let of = |number, pixel| station(number).sensor(&camera.point(pixel, 2.0)).unwrap();
+    let of = |number, pixel| station(number).sensor(&camera.point(pixel, 2.0), 0.01).unwrap();
     assert_eq!(of(0, [17.0, 33.0]).0, of(0, [22.0, 38.0]).0);
     assert_ne!(of(0, [17.0, 33.0]).0, of(0, [25.0, 33.0]).0);
     assert_ne!(of(0, [17.0, 33.0]).0, of(1, [17.0, 33.0]).0);
     assert!((of(0, [17.0, 33.0]).1.norm() - 0.003).abs() < 1e-12);
+    // A share of the noise goes from the pixel to its neighbourhood, and the whole stays.
+    let parted = station(0).with_sensor(SharedBySensor { sigma_m: 0.0, share: 0.6, width_px: 8.0 }).unwrap();
+    let at = camera.point([17.0, 33.0], 2.0);
+    let (own, (_, shift)) = (parted.noise(&at, 0.01).trace(), parted.sensor(&at, 0.01).unwrap());
+    assert!((own - 0.4e-4).abs() < 1e-12 && (shift.norm_squared() - 0.6e-4).abs() < 1e-12);
 }
 
 #[test]

@@ -8,8 +8,8 @@ use std::path::Path;
 use camera_model::{Camera, ImageFormat, InteriorOrientation, LensDistortion};
 use error_models::{
     AmplitudeHyperbola, AmplitudeScale, FixedPattern, FrameRateDrift, FurtherShape, ModelSet, NamedParameter,
-    ParameterStatus, PolynomialShape, RangeErrorModel, RangeNoise, RangeTerms, SurfaceShape, TemperatureDrift,
-    Transient, WarmUp,
+    ParameterStatus, PolynomialShape, RangeErrorModel, RangeNoise, RangeTerms, SharedNoise, SurfaceShape,
+    TemperatureDrift, Transient, WarmUp,
 };
 use proptest::prelude::*;
 use range_image::{Modulation, NoiseModel};
@@ -92,6 +92,7 @@ fn full() -> Calibration {
         sigma_times_amplitude_m: 2.5,
         floor_m: 0.003,
         amplitude_scale: AmplitudeScale::TimesSquaredRange,
+        shared: Some(SharedNoise { share: 0.6, width_px: 8.0 }),
     });
     calibration.noise_parameters = vec![NamedParameter {
         name: "dark_sigma".into(),

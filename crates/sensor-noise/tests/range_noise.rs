@@ -13,8 +13,12 @@ use sensor_noise::{
 };
 
 const SIZE: [usize; 2] = [60, 50];
-const TRUTH: RangeNoise =
-    RangeNoise { sigma_times_amplitude_m: 2.0, floor_m: 0.004, amplitude_scale: AmplitudeScale::AsReceived };
+const TRUTH: RangeNoise = RangeNoise {
+    sigma_times_amplitude_m: 2.0,
+    floor_m: 0.004,
+    amplitude_scale: AmplitudeScale::AsReceived,
+    shared: None,
+};
 
 /// Frames of a tilted wall whose light falls off from 2000 to 100 over the columns.
 fn frames(truth: &RangeNoise, count: usize, seed: u64) -> Vec<RangeFrame> {
@@ -107,6 +111,79 @@ fn wrapped_ranges_are_differenced_modulo_their_interval() {
 }
 
 #[test]
+fn without_amplitudes_noise_follows_the_squared_range() {
+    let depth = RangeNoise {
+        sigma_times_amplitude_m: 0.0015,
+        floor_m: 0.001,
+        amplitude_scale: AmplitudeScale::InverseSquaredRange,
+        shared: None,
+    };
+    let range = |col: usize| 0.8 + 0.05 * col as f64;
+    for seed in 0..5 {
+        let mut random = Pcg64::seed_from_u64(300 + seed);
+        let mut one = || RangeFrame {
+            range: Raster::from_fn(SIZE[0], SIZE[1], |col, _| {
+                let unit: f64 = StandardNormal.sample(&mut random);
+                (range(col) + unit * depth.sigma_m(f64::NAN, range(col))) as f32
+            }),
+            sigma: Raster::filled(SIZE[0], SIZE[1], f32::NAN),
+            amplitude: Raster::filled(SIZE[0], SIZE[1], f32::NAN),
+            flags: Raster::filled(SIZE[0], SIZE[1], Flags::empty()),
+        };
+        let mut frames: Vec<RangeFrame> = (0..6).map(|_| one()).collect();
+        let estimate = estimate(&frames).unwrap();
+        assert_eq!(estimate.noise.amplitude_scale, AmplitudeScale::InverseSquaredRange);
+        let [slope, floor] = &estimate.parameters()[..] else { panic!("two parts") };
+        assert!((slope.value - 0.0015).abs() < 4.0 * slope.sigma && slope.sigma < 1e-4, "{slope:?}");
+        assert!((floor.value - 0.001).abs() < 4.0 * floor.sigma, "{floor:?}");
+        for frame in &mut frames {
+            estimate.noise.predict_sigma(frame).unwrap();
+        }
+        let check = check_range_sigma(&[station(&frames)], VarianceEstimator::AboutMean).unwrap();
+        assert_eq!(check.verdict, SigmaVerdict::True, "{check:?}");
+    }
+}
+
+/// Noise of unit variance, a share of which is the mean over windows of a width.
+fn partly_smooth(share: f64, width: usize, random: &mut Pcg64) -> Raster<f64> {
+    let (wide, high) = (SIZE[0] + width, SIZE[1] + width);
+    let mut unit = || -> f64 { StandardNormal.sample(random) };
+    let white = Raster::from_fn(wide, high, |_, _| unit());
+    let own = Raster::from_fn(SIZE[0], SIZE[1], |_, _| unit());
+    Raster::from_fn(SIZE[0], SIZE[1], |col, row| {
+        let window = (0..width * width).map(|k| white.get(col + k % width, row + k / width).unwrap());
+        share.sqrt() * window.sum::<f64>() / width as f64 + (1.0 - share).sqrt() * own.get(col, row).unwrap()
+    })
+}
+
+#[test]
+fn what_neighbours_have_in_common_is_told_with_its_deviation() {
+    let of = |share: f64, seed: u64| {
+        let mut random = Pcg64::seed_from_u64(500 + seed);
+        let mut frames = frames(&TRUTH, 6, 900 + seed);
+        for frame in &mut frames {
+            let noise = partly_smooth(share, 4, &mut random);
+            frame.range = Raster::from_fn(SIZE[0], SIZE[1], |col, row| {
+                let amplitude = f64::from(*frame.amplitude.get(col, row).unwrap());
+                (2.0 + 0.01 * row as f64 + noise.get(col, row).unwrap() * TRUTH.sigma_m(amplitude, 1.0)) as f32
+            });
+        }
+        estimate(&frames).unwrap()
+    };
+    let runs = 12;
+    let mut squares = 0.0;
+    for seed in 0..runs {
+        let found = of(0.6, seed);
+        let (shared, sigma) = (found.noise.shared.unwrap(), found.shared_sigma.unwrap());
+        assert!((3.0..5.5).contains(&shared.width_px), "{shared:?}");
+        squares += ((shared.share - 0.6) / sigma).powi(2) / runs as f64;
+    }
+    println!("squared error over variance of the share: {squares:.2}");
+    assert!((0.3..2.5).contains(&squares), "{squares}");
+    assert_eq!((0..20).filter(|seed| of(0.0, 100 + seed).noise.shared.is_some()).count(), 0);
+}
+
+#[test]
 fn an_amplitude_times_squared_range_is_told_from_a_received_one() {
     let scaled = RangeNoise { amplitude_scale: AmplitudeScale::TimesSquaredRange, ..TRUTH };
     let mut random = Pcg64::seed_from_u64(21);
@@ -146,9 +223,7 @@ fn bad_input_is_refused_by_name() {
     }
     let answer = estimate(&constant);
     assert!(matches!(answer, Err(Error::NoisePartsNotApart { .. })), "{answer:?}");
-    for frame in &mut constant {
-        frame.amplitude = Raster::filled(SIZE[0], SIZE[1], f32::NAN);
-    }
+    constant[1].amplitude = Raster::filled(SIZE[0], SIZE[1], f32::NAN);
     let answer = estimate(&constant);
     assert!(matches!(answer, Err(Error::NoAmplitudes { .. })), "{answer:?}");
     let mut unlike = frames(&TRUTH, 3, 1);

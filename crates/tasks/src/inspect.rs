@@ -88,7 +88,9 @@ fn inspect_survey(path: &Path, found: &mut Inspection) -> Result<()> {
     found.add("survey", path.display());
     found.add("level", survey.level.name());
     found.add("size", format!("{} x {} pixels", camera.width, camera.height));
-    found.add("principal distance", format!("{} mm (nominal)", camera.principal_distance_mm));
+    // To a nanometre: what binary fractions add is nobody's statement.
+    let principal_distance_mm = (camera.principal_distance_mm * 1e6).round() / 1e6;
+    found.add("principal distance", format!("{principal_distance_mm} mm (nominal)"));
     for modulation in camera.modulations()? {
         let megahertz = modulation.frequency_hz() / 1e6;
         found.add(

@@ -23,7 +23,9 @@ pub use self::warm_up::{
 pub use ::warm_up::{ChangeOptions, DriftOptions, TemperatureUse};
 pub use fixed_pattern::{FixedPatternRequest, FixedPatternSummary, PatternWall, estimate_pattern};
 pub use inspect::{Inspection, inspect};
-pub use noise::{NoiseBin, NoiseParameter, NoiseRequest, NoiseStation, NoiseSummary, SigmaBinSummary, estimate_noise};
+pub use noise::{
+    NoiseBin, NoiseParameter, NoiseRequest, NoiseStation, NoiseSummary, SharedSummary, SigmaBinSummary, estimate_noise,
+};
 pub use pipeline;
 pub use register::{
     RegisterMethod, RegisterRequest, RegisterSummary, RegisteredLoop, RegisteredPair, RegisteredPlacement,

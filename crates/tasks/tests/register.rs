@@ -48,6 +48,31 @@ fn a_survey_is_registered_at_once_from_its_start_poses() {
     check_files(&out, &summary);
 }
 
+/// Frames of structured light have no amplitudes, and neighbours share their errors: pairs of frames place them, at once.
+#[test]
+fn frames_of_a_depth_camera_are_registered_as_such() {
+    if !common::has_capture("sevenscenes_redkitchen_dense") {
+        return;
+    }
+    let from = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/real/sevenscenes_redkitchen_dense");
+    let folder = tempfile::tempdir().unwrap();
+    let survey = folder.path().join("survey");
+    std::fs::create_dir(&survey).unwrap();
+    let names = (0..4).map(|k| format!("frame-{:06}.depth.png", 10 * k)).chain(["camera-intrinsics.txt".to_owned()]);
+    for name in names {
+        std::fs::copy(from.join(&name), survey.join(&name)).unwrap();
+    }
+    let out = folder.path().join("out");
+    let summary = register(&request(&[survey], RegisterMethod::Multi, &out), &Silent).unwrap();
+    println!("{summary}");
+    assert_eq!(summary.stations.len(), 4);
+    assert!(summary.start.contains("pairs of frames"), "{}", summary.start);
+    // The camera moved by 45 mm, known to a centimetre.
+    let [.., last] = &summary.stations[..] else { panic!("four stations") };
+    let way = Vector3::from(last.position_m).norm();
+    assert!((way - 0.045).abs() < 0.01 && last.position_sigma_m.unwrap() < 0.01, "{way} {last:?}");
+}
+
 #[test]
 fn without_start_poses_no_wrong_pose_is_left_without_a_doubt() {
     let folder = tempfile::tempdir().unwrap();

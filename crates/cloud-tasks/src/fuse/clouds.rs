@@ -4,10 +4,19 @@ use std::path::Path;
 
 use commands::Result;
 use fusion::Fused;
-use range_io::clouds::{CloudFile, Precision};
-use range_io::ply::write_cloud;
+use range_io::clouds::{CloudFile, CloudFormat, Precision, write_any_cloud};
 
-use super::input::{Usable, moved};
+use super::input::{Usable, moved, slip};
+
+/// The ending of the files of a format that clouds are written in.
+pub(crate) fn ending(format: CloudFormat) -> Result<&'static str> {
+    match format {
+        CloudFormat::Ply => Ok("ply"),
+        CloudFormat::Pcd => Ok("pcd"),
+        CloudFormat::E57 => Ok("e57"),
+        other => Err(slip(format!("clouds are not written as {other:?}: expected PLY, PCD or E57"))),
+    }
+}
 
 /// The fused points, with their standard deviations along their normals.
 pub(crate) fn write_fused(path: impl AsRef<Path>, fused: &Fused) -> Result<()> {
@@ -20,7 +29,7 @@ pub(crate) fn write_fused(path: impl AsRef<Path>, fused: &Fused) -> Result<()> {
         sigma: Some(surfels.iter().map(|surfel| surfel.sigma_m() as f32).collect()),
         ..CloudFile::default()
     };
-    Ok(write_cloud(path, &cloud, Precision::Single)?)
+    Ok(write_any_cloud(path, &cloud, Precision::Single)?)
 }
 
 /// All points with a position that are in no fused point, flagged ones among them, moved as those that are.
@@ -52,7 +61,7 @@ pub(crate) fn write_unfused(path: impl AsRef<Path>, usable: &Usable<'_>, fused: 
         frame: pick(Some(&cloud.errors.frame), &kept),
         ..CloudFile::default()
     };
-    Ok(write_cloud(path, &file, Precision::Single)?)
+    Ok(write_any_cloud(path, &file, Precision::Single)?)
 }
 
 fn pick<T: Copy>(all: Option<&[T]>, kept: &[usize]) -> Option<Vec<T>> {

@@ -1,10 +1,11 @@
 //! What was fused, for people.
 
+use std::cmp::Reverse;
 use std::fmt;
 
 use report::{Column, Document, Figure, millimetres};
 
-use super::summary::FuseSummary;
+use super::summary::{ContradictionSummary, FuseSummary};
 
 impl fmt::Display for FuseSummary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -49,7 +50,8 @@ pub(crate) fn document(summary: &FuseSummary, pictures: Vec<Figure>) -> Document
     reasons(&mut document, summary);
     contradictions(&mut document, summary);
     corrections(&mut document, summary);
-    document.closing(format!("cloud.ply, unfused.ply, summary.json and report.html are in {}", summary.out.display()));
+    let ([fused, unfused], out) = (&summary.clouds, summary.out.display());
+    document.closing(format!("{fused}, {unfused}, summary.json and report.html are in {out}"));
     document
 }
 
@@ -96,10 +98,16 @@ fn reasons(document: &mut Document, summary: &FuseSummary) {
     document.table(columns, rows);
 }
 
+/// Pairs of frames in the table of contradictions: those with most points say where to look.
+const MOST_PAIRS: usize = 12;
+
 fn contradictions(document: &mut Document, summary: &FuseSummary) {
     if !summary.contradictions.is_empty() {
         document.section("Surfaces that cannot both be there");
-        let rows = summary.contradictions.iter().map(|found| {
+        let mut worst: Vec<&ContradictionSummary> = summary.contradictions.iter().collect();
+        worst.sort_by_key(|found| Reverse(found.pairs));
+        let further = worst.len().saturating_sub(MOST_PAIRS);
+        let rows = worst.into_iter().take(MOST_PAIRS).map(|found| {
             let [front, through] = [&found.front, &found.seen_through_by].map(String::clone);
             let distance = millimetres(Some(found.median_distance_m));
             vec![front, through, found.pairs.to_string(), distance, format!("{:.1}", found.largest_deviations)]
@@ -112,6 +120,11 @@ fn contradictions(document: &mut Document, summary: &FuseSummary) {
             Column::number("largest, deviations"),
         ];
         document.table(columns, rows.collect());
+        if further > 0 {
+            document.paragraph(format!(
+                "Fewer points are between {further} further pairs of frames: summary.json has all."
+            ));
+        }
     }
     if !summary.apart.is_empty() {
         document.section("Stations that do not fit the others");

@@ -167,14 +167,17 @@ fn sections(usable: &Usable<'_>, moved: &[Point3<f64>], fused: &Fused, voxel_m: 
     let frame = Frame { x: span(all().map(|place| place.0)), y: robust_span(all().map(|place| place.1)) };
     let views = &usable.cloud.views;
     vec![
-        frame
-            .draw("Section through a wall: before", &before, &[], views)
-            .caption("Points of the frames as the result has them, two cells deep. Heights are exaggerated."),
+        frame.draw("Section through a wall: before", &before, &[], views).caption(
+            "Points of the frames, a colour for each, as the result has them, two cells deep. Heights are exaggerated.",
+        ),
         frame
             .draw("Section through a wall: after", &after, &surfels, views)
             .caption("The same with what was found of the common errors taken off, and the fused points (black)."),
     ]
 }
+
+/// Frames whose names fit beside the title of a section.
+const MOST_NAMED: usize = 3;
 
 /// Axes that both sections have.
 struct Frame {
@@ -189,17 +192,18 @@ impl Frame {
         let mut frames: Vec<u32> = points.iter().map(|(frame, _)| *frame).collect();
         frames.sort_unstable();
         frames.dedup();
-        // The last colour is that of all further frames.
+        // The last colour is that of all further frames. Names of many would not fit beside the title.
         let own = CATEGORIES.len() - 1;
+        let are_named = frames.len() <= MOST_NAMED;
         for (at, frame) in frames.iter().enumerate() {
             let places: Vec<(f64, f64)> =
                 points.iter().filter(|(of, _)| of == frame).map(|(_, place)| *place).collect();
             canvas.points(&places, CATEGORIES[at.min(own)], 0.5);
-            if at < own {
+            if at < own && are_named {
                 canvas.name(CATEGORIES[at], views.get(*frame as usize).map_or("", String::as_str));
             }
         }
-        if frames.len() > own {
+        if frames.len() > own && are_named {
             canvas.name(CATEGORIES[own], "others");
         }
         canvas.points(surfels, [0, 0, 0], 1.0);

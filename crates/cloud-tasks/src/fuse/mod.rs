@@ -22,7 +22,7 @@ pub use summary::{
     ApartSummary, ContradictionSummary, Correction, CountedPoints, FuseSummary, SigmaSummary, ThicknessSummary,
 };
 
-/// Fuses the points of a result, and writes `cloud.ply`, `unfused.ply`, `summary.json` and `report.html`.
+/// Fuses the points of a result, and writes `cloud` and `unfused` in the format asked for, `summary.json` and `report.html`.
 ///
 /// # Errors
 /// [`Error::Refused`] where the points show no surface; [`Error::Request`] where the result lacks its common errors or means
@@ -40,7 +40,7 @@ fn work(asked: &FuseRequest, destination: &Destination, progress: &dyn Progress)
     progress.begin("fuse", STEPS);
     let options = options(asked);
     let cloud = ResultCloud::read(&asked.result).map_err(named)?;
-    let mut summary = summarise::begin(asked, &cloud, &options);
+    let mut summary = summarise::begin(asked, &cloud, &options, clouds::ending(asked.format)?);
     let usable = Usable::new(&cloud, asked)?;
     summary.points.unusable = cloud.usable.len() - usable.indices.len();
     summary.doubts.extend(left_out(&cloud));
@@ -63,8 +63,8 @@ fn work(asked: &FuseRequest, destination: &Destination, progress: &dyn Progress)
     progress.advance(1);
     let page = document::document(&summary, pictures);
     let folder = destination.open()?;
-    clouds::write_fused(folder.file("cloud.ply")?, &fused)?;
-    clouds::write_unfused(folder.file("unfused.ply")?, &usable, &fused)?;
+    clouds::write_fused(folder.file(&summary.clouds[0])?, &fused)?;
+    clouds::write_unfused(folder.file(&summary.clouds[1])?, &usable, &fused)?;
     write_text(folder.file("summary.json")?, &json(&summary)?)?;
     write_text(folder.file("report.html")?, &page.html())?;
     folder.commit()?;

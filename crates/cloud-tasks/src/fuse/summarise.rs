@@ -19,7 +19,7 @@ use crate::result::ResultCloud;
 const MANY_CONTRADICTIONS: f64 = 0.01;
 
 /// What is known before anything is fused.
-pub(crate) fn begin(asked: &FuseRequest, cloud: &ResultCloud, options: &FusionOptions) -> FuseSummary {
+pub(crate) fn begin(asked: &FuseRequest, cloud: &ResultCloud, options: &FusionOptions, ending: &str) -> FuseSummary {
     let all = cloud.points.len();
     FuseSummary {
         result: asked.result.display().to_string(),
@@ -32,6 +32,7 @@ pub(crate) fn begin(asked: &FuseRequest, cloud: &ResultCloud, options: &FusionOp
         },
         points: CountedPoints { all, flagged: all - cloud.usable.len(), ..CountedPoints::default() },
         out: asked.out.clone(),
+        clouds: [format!("cloud.{ending}"), format!("unfused.{ending}")],
         ..FuseSummary::default()
     }
 }

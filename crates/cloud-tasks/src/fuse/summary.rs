@@ -48,6 +48,8 @@ pub struct FuseSummary {
     pub seconds: f64,
     /// Where it was written.
     pub out: PathBuf,
+    /// Names of the files of the fused points, and of those that are in none.
+    pub clouds: [String; 2],
 }
 
 /// Where the points of a result went.

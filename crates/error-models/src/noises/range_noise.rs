@@ -15,6 +15,9 @@ pub enum AmplitudeScale {
     AsReceived,
     /// That light times the squared range, so that surfaces look equally bright at all distances.
     TimesSquaredRange,
+    /// None. One over the squared range (metre) stands for the light, so that `σ = s ρ²`: so the ranges of structured light
+    /// and of stereo scatter, and those of white surfaces alike in a camera that shows no amplitudes.
+    InverseSquaredRange,
 }
 
 /// Standard deviation of a range as a function of the received amplitude: `σ² = (s / a)² + floor²`.
@@ -33,6 +36,21 @@ pub struct RangeNoise {
     /// What the camera shows as amplitude.
     #[cfg_attr(feature = "serde", serde(default))]
     pub amplitude_scale: AmplitudeScale,
+    /// What neighbouring pixels have in common of it; `None`: nothing.
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
+    pub shared: Option<SharedNoise>,
+}
+
+/// Noise that the pixels of a neighbourhood have in common, as where a camera finds each range from a window of pixels, or smooths
+/// its ranges: a mean over neighbours does not remove it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+pub struct SharedNoise {
+    /// Part of a pixel's variance, 0 to 1.
+    pub share: f64,
+    /// Width of a neighbourhood, pixel: at this distance pixels have nothing in common.
+    pub width_px: f64,
 }
 
 impl AmplitudeScale {
@@ -41,6 +59,7 @@ impl AmplitudeScale {
         match self {
             Self::AsReceived => amplitude,
             Self::TimesSquaredRange => amplitude / (range_m * range_m),
+            Self::InverseSquaredRange => 1.0 / (range_m * range_m),
         }
     }
 }
@@ -51,6 +70,16 @@ impl RangeNoise {
         for (name, value) in [("sigma_times_amplitude_m", self.sigma_times_amplitude_m), ("floor_m", self.floor_m)] {
             if !(value.is_finite() && value >= 0.0) {
                 return Err(Error::OutOfDomain { name, value, expected: "noise is finite and not negative" });
+            }
+        }
+        if let Some(shared) = self.shared {
+            if !(0.0..=1.0).contains(&shared.share) {
+                let expected = "a share lies between 0 and 1";
+                return Err(Error::OutOfDomain { name: "share", value: shared.share, expected });
+            }
+            if !(shared.width_px.is_finite() && shared.width_px >= 1.0) {
+                let expected = "a neighbourhood is at least one pixel wide";
+                return Err(Error::OutOfDomain { name: "width_px", value: shared.width_px, expected });
             }
         }
         if self.sigma_times_amplitude_m + self.floor_m > 0.0 {

@@ -10,7 +10,7 @@ use point_uncertainty::{CommonErrors, PointErrors};
 use rayon::prelude::*;
 
 use crate::Result;
-use crate::input::{Observations, derivatives};
+use crate::input::{NO_NEIGHBOURHOOD, Observations, derivatives};
 use crate::lattice::{Runs, neighbour, neighbours};
 use crate::small::{self, Symmetric};
 use moments::Moments;
@@ -83,6 +83,7 @@ fn in_cell(
 ) -> Result<Vec<Patch>> {
     let centre = observations.lattice.centre(cells.keys[cell]);
     let mut found: Vec<Patch> = Vec::new();
+    let mut seen: Vec<Vec<u64>> = Vec::new();
     for observation in &observations.all[cells.items(cell)] {
         let known = found.iter().position(|patch| patch.frame == observation.frame);
         let at = if let Some(at) = known {
@@ -92,9 +93,16 @@ fn in_cell(
             derivatives(observation.index as usize, errors, common, buffer)?;
             let common = covariance(buffer, common);
             found.push(Patch { frame: observation.frame, moments: Moments::default(), common, plane: None });
+            seen.push(Vec::new());
             found.len() - 1
         };
-        found[at].moments.add(observation, &centre);
+        let id = observation.neighbourhood;
+        // From the last one on: points of a neighbourhood lie together.
+        let is_first = id == NO_NEIGHBOURHOOD || !seen[at].iter().rev().any(|other| *other == id);
+        if is_first {
+            seen[at].push(id);
+        }
+        found[at].moments.add(observation, is_first, &centre);
     }
     Ok(found)
 }

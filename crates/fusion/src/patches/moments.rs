@@ -35,6 +35,8 @@ pub(crate) struct Moments {
     products: Symmetric,
     noise: Symmetric,
     sensor: Symmetric,
+    /// Neighbourhoods that the points are of: as many errors of the sensor.
+    neighbourhoods: f64,
     ray: Vector3<f64>,
 }
 
@@ -53,7 +55,8 @@ pub(crate) struct Plane {
 }
 
 impl Moments {
-    pub fn add(&mut self, observation: &Observation, centre: &Point3<f64>) {
+    /// Adds a point, the first of its neighbourhood or another one.
+    pub fn add(&mut self, observation: &Observation, is_first: bool, centre: &Point3<f64>) {
         let offset = observation.position - centre;
         let weight = 1.0 / observation.variance();
         self.count += 1.0;
@@ -62,6 +65,7 @@ impl Moments {
         small::add(&mut self.products, &small::outer(&offset), weight);
         small::add(&mut self.noise, &observation.noise(), weight);
         small::add(&mut self.sensor, &small::outer(&observation.shift()), weight);
+        self.neighbourhoods += f64::from(u8::from(is_first));
         self.ray += observation.ray;
     }
 
@@ -76,6 +80,7 @@ impl Moments {
         small::add(&mut self.products, &small::from_matrix(&(cross + cross.transpose())), 1.0);
         small::add(&mut self.noise, &other.noise, 1.0);
         small::add(&mut self.sensor, &other.sensor, 1.0);
+        self.neighbourhoods += other.neighbourhoods;
         self.ray += other.ray;
     }
 
@@ -113,14 +118,18 @@ impl Moments {
         let sensor = small::quadratic(&self.sensor, &normal) / self.weight;
         let uneven = (UNEVEN * voxel_m).powi(2);
         let expected = noise + sensor + uneven + small::quadratic(common, &normal);
-        let tilt_variance = expected / (self.count * values[1]);
+        let of_mean = (expected - sensor) / self.count + sensor / self.neighbourhoods;
+        let tilt_variance = of_mean / values[1];
+        // Satterthwaite: a sum of squares of which a part is common to neighbourhoods varies as one of so many free ones.
+        let crowd = self.count / self.neighbourhoods;
+        let free = self.count / (1.0 + (crowd - 1.0) * (sensor / expected).powi(2));
         let is_wide = values[1] > (LEAST_WIDTH * voxel_m).powi(2) && tilt_variance < LARGEST_TILT * LARGEST_TILT;
         let is_seen = -normal.dot(&self.ray) > LEAST_FACING * self.ray.norm();
-        let found = small::quadratic(&scatter, &normal) * self.count;
-        (is_wide && is_seen && found < expected * largest_sum(self.count - 3.0, *DEVIATIONS)).then(|| Plane {
+        let found = small::quadratic(&scatter, &normal) * free;
+        (is_wide && is_seen && found < expected * largest_sum((free - 3.0).max(1.0), *DEVIATIONS)).then(|| Plane {
             point: centre + mean,
             normal,
-            variance: (noise + uneven) / self.count + sensor,
+            variance: (noise + uneven) / self.count + sensor / self.neighbourhoods,
             tilt_variance,
             is_firm: tilt_variance < FIRM_TILT * FIRM_TILT,
         })

@@ -34,6 +34,8 @@ pub(crate) struct FrameSums {
     /// Variances of the mean times the square of its weight: noise, sensor.
     pub noise: f64,
     pub sensor: f64,
+    /// Variances that points share with their neighbourhoods over those of their noise, summed.
+    pub shared: f64,
     /// Weight and derivative of the neighbourhood that counts most, times its deviation.
     strongest: (u64, f64),
     second_moments: Vector3<f64>,
@@ -72,7 +74,8 @@ impl Estimate {
         (2.0 * (self.moments[0] + self.moments[2])).sqrt().max(LEAST_RADIUS * voxel_m)
     }
 
-    /// Whether the points of each frame lie on a plane, the same for all but its height, as far as noise tells.
+    /// Whether the points of each frame lie on a plane, the same for all but its height, as far as noise tells. What a neighbourhood
+    /// shares may change within it, as where a camera smooths its ranges, and counts as noise of its points here.
     pub fn is_plane(&self, deviations: f64, voxel_m: f64) -> bool {
         let x = &self.solution;
         let squares = |frame: &FrameSums| {
@@ -83,7 +86,9 @@ impl Estimate {
         let dof = f64::from(self.count) - self.frames.len() as f64 - 2.0;
         let found: f64 = self.frames.iter().map(squares).sum();
         let uneven = (UNEVEN * voxel_m).powi(2) * self.weight;
-        dof < 1.0 || found <= largest_sum(dof, deviations) + uneven
+        let points: f64 = self.frames.iter().map(|frame| f64::from(frame.count)).sum();
+        let shared: f64 = self.frames.iter().map(|frame| frame.shared).sum();
+        dof < 1.0 || found <= largest_sum(dof, deviations) * (1.0 + shared / points) + uneven
     }
 
     /// The place on the plane that was found; `common` is the variance of common errors of the height.
@@ -153,6 +158,7 @@ fn frame_sums(
         square: 0.0,
         noise: 0.0,
         sensor: 0.0,
+        shared: 0.0,
         strongest: (NO_NEIGHBOURHOOD, 0.0),
         second_moments: Vector3::zeros(),
     };
@@ -170,7 +176,9 @@ fn frame_sums(
             right += row * (weight * height);
             square += weight * height * height;
             moments += Vector3::new(row.y * row.y, row.y * row.z, row.z * row.z) * weight;
-            shift += weight * point.shift().dot(&seed.normal);
+            let own_shift = point.shift().dot(&seed.normal);
+            shift += weight * own_shift;
+            sums.shared += weight * own_shift * own_shift;
             let aside = foot.norm_squared();
             if aside < nearest {
                 (nearest, sums.stands_for) = (aside, *at);

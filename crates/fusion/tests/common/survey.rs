@@ -6,7 +6,9 @@ use fusion::Registered;
 use fusion::nalgebra::{DMatrix, Isometry3, Matrix3, Point3, Vector3};
 use fusion::point_uncertainty::camera_model::{Camera, ImageFormat, InteriorOrientation, LensDistortion, step_pose};
 use fusion::point_uncertainty::error_models::RangeErrorModel;
-use fusion::point_uncertainty::{Columns, CommonError, CommonErrors, PointErrors, Source, StationErrors};
+use fusion::point_uncertainty::{
+    Columns, CommonError, CommonErrors, PointErrors, SharedBySensor, Source, StationErrors,
+};
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
 
@@ -140,7 +142,7 @@ impl Survey {
                 let count = survey.common.errors().len();
                 let errors = StationErrors::new(number, &stated_camera, Some(&model), &stated, columns, count)
                     .unwrap()
-                    .with_sensor(plan.sensor_m, 8.0)
+                    .with_sensor(SharedBySensor { sigma_m: plan.sensor_m, share: 0.0, width_px: 8.0 })
                     .unwrap();
                 survey.centres.push(stated.translation.vector.into());
                 survey.stations.push(errors);
@@ -171,7 +173,7 @@ impl Survey {
                 let sigma = plan.noise_m * range_m * dark;
                 let place = stated.1 * stated.0.point(pixel, range_m);
                 let sensor = errors
-                    .sensor(&place)
+                    .sensor(&place, sigma)
                     .map_or(0.0, |(id, shift)| *shared.entry(id).or_insert_with(&mut *normal) * shift.norm());
                 let observed = range_m + sigma * normal() + sensor - d0_m;
                 self.points.push(stated.1 * stated.0.point(pixel, observed));
@@ -192,7 +194,7 @@ impl PointErrors for Survey {
     }
 
     fn sensor(&self, point: usize) -> Option<(u64, Vector3<f64>)> {
-        self.stations[self.frames[point] as usize].sensor(&self.points[point])
+        self.stations[self.frames[point] as usize].sensor(&self.points[point], self.sigma[point])
     }
 
     fn common(&self, point: usize, derivatives: &mut Vec<(usize, Vector3<f64>)>) {

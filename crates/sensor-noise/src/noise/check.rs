@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use statistics::{Distribution, upper_median};
 
 use super::bins::{MovedLimits, has_moved};
-use super::ranges::{NORMAL_SHARE, Value};
+use super::ranges::{NORMAL_SHARE, Value, has_amplitudes};
 use super::repeats::{Running, Thinning};
 use super::steadiness::VALUES_PER_TASK;
 use super::{Frames, RepeatedRanges, VarianceEstimator};
@@ -76,8 +76,9 @@ pub fn check_range_sigma<S: Frames<RangeFrame>>(
                 let thinning = Thinning::new(number, stations.len(), frame.range.as_slice().len());
                 values.extend(Value::all(frame, thinning).into_iter().map(|value| (value, Claimed::default())));
             }
+            let has_amplitudes = has_amplitudes(frame);
             values.par_iter_mut().with_min_len(VALUES_PER_TASK).for_each(|(value, claimed)| {
-                value.add(frame, interval_m);
+                value.add(frame, has_amplitudes, interval_m);
                 claimed.add(f64::from(frame.sigma.as_slice()[value.index]), normal);
             });
             Ok(())

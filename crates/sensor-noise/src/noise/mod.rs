@@ -4,6 +4,7 @@ mod bins;
 mod captures;
 mod check;
 mod fit;
+mod neighbours;
 mod options;
 mod ranges;
 mod repeats;

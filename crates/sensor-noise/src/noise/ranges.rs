@@ -5,6 +5,7 @@ use range_image::RangeFrame;
 use rayon::prelude::*;
 
 use super::fit::{LineRules, VarianceFit, fit_variance};
+use super::neighbours::shared_noise;
 use super::repeats::{Repeats, Running, Thinning};
 use super::steadiness::{Alike, VALUES_PER_TASK};
 use super::{Frames, NoiseFitOptions, RepeatedRanges, Steadiness, steadiness};
@@ -17,6 +18,8 @@ pub struct RangeNoiseEstimate {
     pub noise: RangeNoise,
     /// The straight line of variance over `1 / a²` behind it: its slope is s², its level the squared floor.
     pub fit: VarianceFit,
+    /// Standard deviation of the share that neighbouring pixels have in common; `None` where there is none.
+    pub shared_sigma: Option<f64>,
 }
 
 /// The names of the parts of the noise, slope and level.
@@ -26,19 +29,36 @@ const PARTS: [&str; 2] = ["noise that falls with the amplitude", "floor"];
 /// its mean received amplitude a, in the way of [`estimate_sample_noise`](super::estimate_sample_noise).
 ///
 /// Whether the camera shows its amplitude as received, or times the squared range, is tried: the second is taken where
-/// the variances follow it clearly better. `wrapped` ranges cannot tell and are taken as received.
+/// the variances follow it clearly better. `wrapped` ranges cannot tell and are taken as received. Of cameras that show no
+/// amplitude one over the squared range stands for it.
 ///
 /// Pixels without a range or a positive amplitude in any frame, and flagged ones, are left out. Where the ambiguity
 /// interval U is known (else the largest range stands for it), so are pixels whose ranges are expected to scatter by more
 /// than U / 16: their phases are no longer normal, and what was lost altogether says nothing of noise.
 /// So are pixels whose frames leave `1 / a²` uncertain by more than a tenth.
 ///
-/// Frames are seen one after the other, up to three times. Of more than four million pixels in all stations evenly spread
+/// What neighbouring pixels have in common is told by the correlation of the differences of successive frames, where it is more
+/// than chance (one in a thousand).
+///
+/// Frames are seen one after the other, up to four times. Of more than four million pixels in all stations evenly spread
 /// ones are taken.
 ///
 /// # Errors
-/// [`Error::NoAmplitudes`], too few frames or values, a scene that moved, and noise that does not follow the model.
+/// [`Error::NoAmplitudes`] of some stations alone, or of wrapped ranges, too few frames or values, a scene that moved, and noise that does not follow the model.
 pub fn estimate_range_noise<S: Frames<RangeFrame>>(
+    stations: &[RepeatedRanges<S>],
+    wrapped: bool,
+    options: &NoiseFitOptions,
+) -> Result<RangeNoiseEstimate, S::Error> {
+    let mut estimate = by_amplitude(stations, wrapped, options)?;
+    if let Some((shared, sigma)) = shared_noise(stations, &estimate.noise)? {
+        (estimate.noise.shared, estimate.shared_sigma) = (Some(shared), Some(sigma));
+    }
+    Ok(estimate)
+}
+
+/// The noise by the scale of the amplitude that suits it.
+fn by_amplitude<S: Frames<RangeFrame>>(
     stations: &[RepeatedRanges<S>],
     wrapped: bool,
     options: &NoiseFitOptions,
@@ -46,13 +66,15 @@ pub fn estimate_range_noise<S: Frames<RangeFrame>>(
     options.validate()?;
     let mut observed = Vec::with_capacity(stations.len());
     for (number, station) in stations.iter().enumerate() {
-        let one = Observed::new(station, |pixels| Thinning::new(number, stations.len(), pixels))?;
-        if !one.has_amplitudes {
-            return Err(Error::NoAmplitudes { station: station.station.clone() }.into());
-        }
-        observed.push(one);
+        observed.push(Observed::new(station, |pixels| Thinning::new(number, stations.len(), pixels))?);
     }
     let fit = |scale| fit_as(stations, &observed, scale, options);
+    if let Some(without) = observed.iter().position(|one| one.with_amplitudes < one.frames) {
+        if wrapped || observed.iter().any(|one| one.with_amplitudes > 0) {
+            return Err(Error::NoAmplitudes { station: stations[without].station.clone() }.into());
+        }
+        return Ok(fit(AmplitudeScale::InverseSquaredRange)??);
+    }
     let received = fit(AmplitudeScale::AsReceived)?;
     // Light that does not vary is no reason to look for a scale in which it does.
     let another = match &received {
@@ -116,9 +138,13 @@ fn fit_as<S: Frames<RangeFrame>>(
             return Ok(Err(error));
         }
     }
-    let noise =
-        RangeNoise { sigma_times_amplitude_m: fit.slope.sqrt(), floor_m: fit.level.sqrt(), amplitude_scale: scale };
-    Ok(noise.validate().map_err(Error::from).map(|()| RangeNoiseEstimate { noise, fit }))
+    let noise = RangeNoise {
+        sigma_times_amplitude_m: fit.slope.sqrt(),
+        floor_m: fit.level.sqrt(),
+        amplitude_scale: scale,
+        shared: None,
+    };
+    Ok(noise.validate().map_err(Error::from).map(|()| RangeNoiseEstimate { noise, fit, shared_sigma: None }))
 }
 
 impl RangeNoiseEstimate {
@@ -135,6 +161,11 @@ impl RangeNoiseEstimate {
             part("floor_m", 1, self.noise.floor_m, "m"),
         ]
     }
+}
+
+/// Whether a frame has an amplitude anywhere.
+pub(super) fn has_amplitudes(frame: &RangeFrame) -> bool {
+    frame.amplitude.as_slice().iter().any(|amplitude| *amplitude > 0.0)
 }
 
 /// A pixel over the frames.
@@ -165,9 +196,10 @@ impl Value {
         thinning.pixels(frame.range.as_slice().len()).enumerate().map(value).collect()
     }
 
-    /// Takes the pixel of a frame.
-    pub(super) fn add(&mut self, frame: &RangeFrame, interval_m: Option<f64>) {
-        let (range, amplitude) = (frame.range.as_slice()[self.index], frame.amplitude.as_slice()[self.index]);
+    /// Takes the pixel of a frame, with one over its squared range for an amplitude where the frame has none at all.
+    pub(super) fn add(&mut self, frame: &RangeFrame, has_amplitudes: bool, interval_m: Option<f64>) {
+        let range = frame.range.as_slice()[self.index];
+        let amplitude = if has_amplitudes { frame.amplitude.as_slice()[self.index] } else { (range * range).recip() };
         let usable = range.is_finite() && amplitude > 0.0 && frame.flags.as_slice()[self.index].is_empty();
         match &mut self.over_frames {
             Some(over_frames) if usable => {
@@ -186,8 +218,9 @@ struct Observed {
     /// Of so many pixels one is taken.
     every: usize,
     largest_range_m: f64,
-    /// Whether each frame has any.
-    has_amplitudes: bool,
+    /// Frames with amplitudes, and all.
+    with_amplitudes: usize,
+    frames: usize,
 }
 
 impl Observed {
@@ -195,18 +228,19 @@ impl Observed {
         station: &RepeatedRanges<S>,
         thinning: impl Fn(usize) -> Thinning,
     ) -> Result<Self, S::Error> {
-        let mut all = Self { has_amplitudes: true, ..Self::default() };
+        let mut all = Self::default();
         let interval_m = station.interval_m;
         station.each(&mut |frame| {
             if all.values.is_empty() {
                 let thinning = thinning(frame.range.as_slice().len());
                 (all.every, all.values) = (thinning.stride, Value::all(frame, thinning));
             }
-            all.has_amplitudes &= frame.amplitude.as_slice().iter().any(|amplitude| *amplitude > 0.0);
+            let has_amplitudes = has_amplitudes(frame);
+            (all.frames, all.with_amplitudes) = (all.frames + 1, all.with_amplitudes + usize::from(has_amplitudes));
             let known = frame.range.as_slice().iter().filter(|range| range.is_finite());
             all.largest_range_m = all.largest_range_m.max(f64::from(known.fold(0.0_f32, |a, b| a.max(*b))));
             let values = all.values.par_iter_mut().with_min_len(VALUES_PER_TASK);
-            values.for_each(|value| value.add(frame, interval_m));
+            values.for_each(|value| value.add(frame, has_amplitudes, interval_m));
             Ok(())
         })?;
         all.values.retain(|value| value.over_frames.is_some());
@@ -255,6 +289,6 @@ impl Observed {
 }
 
 /// The range that differs from the first one of its pixel by less than half an ambiguity interval, metre.
-fn beside(range_m: f64, first_m: f64, interval_m: Option<f64>) -> f64 {
+pub(super) fn beside(range_m: f64, first_m: f64, interval_m: Option<f64>) -> f64 {
     interval_m.map_or(range_m, |interval| range_m - ((range_m - first_m) / interval).round() * interval)
 }

@@ -63,6 +63,16 @@ fn parameters(document: &mut Document, summary: &NoiseSummary) {
     document.paragraph(format!("Variances were taken {}.", summary.variances));
     if summary.noise_of == "ranges" {
         document.paragraph(format!("The camera's amplitude is the light {}.", summary.amplitude_scale));
+        document.paragraph(match summary.shared {
+            Some(shared) => format!(
+                "Neighbouring pixels have {:.0} +- {:.1} % of their variance in common, over {} pixels: a mean over them does not \
+                 remove it.",
+                100.0 * shared.share,
+                100.0 * shared.sigma,
+                shared.width_px
+            ),
+            None => "Neighbouring pixels have nothing in common.".to_owned(),
+        });
     }
 }
 

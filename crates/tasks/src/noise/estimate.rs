@@ -18,6 +18,8 @@ pub(crate) struct Estimate {
     pub(crate) parameters: Vec<NamedParameter>,
     pub(crate) fit: VarianceFit,
     pub(crate) check: SigmaCheck,
+    /// Of the share that neighbouring pixels have in common.
+    pub(crate) shared_sigma: Option<f64>,
 }
 
 /// Noise of samples or of ranges.
@@ -64,7 +66,7 @@ impl Estimate {
         let complex: Vec<_> = stations.made(&complex).into_iter().map(|(_, frames)| frames).collect();
         let check = check_complex_sigma(&complex, estimate.fit.estimator)?;
         let parameters = estimate.parameters();
-        Ok(Self { term: NoiseTerm::Samples(estimate.noise), parameters, fit: estimate.fit, check })
+        Ok(Self { term: NoiseTerm::Samples(estimate.noise), parameters, fit: estimate.fit, check, shared_sigma: None })
     }
 
     fn of_ranges(stations: &Stations<'_>, interval_m: Option<f64>, wrapped: bool, options: &NoiseFitOptions) -> Answer {
@@ -77,7 +79,8 @@ impl Estimate {
         };
         let check = check_range_sigma(&repeated(stations.made(&with_sigma), interval_m), estimate.fit.estimator)?;
         let parameters = estimate.parameters();
-        Ok(Self { term: NoiseTerm::Ranges(estimate.noise), parameters, fit: estimate.fit, check })
+        let (term, shared_sigma) = (NoiseTerm::Ranges(estimate.noise), estimate.shared_sigma);
+        Ok(Self { term, parameters, fit: estimate.fit, check, shared_sigma })
     }
 }
 

@@ -5,7 +5,7 @@ pub(crate) mod estimate;
 pub(crate) mod frames;
 pub(crate) mod summary;
 
-pub use summary::{NoiseBin, NoiseParameter, NoiseStation, NoiseSummary, SigmaBinSummary};
+pub use summary::{NoiseBin, NoiseParameter, NoiseStation, NoiseSummary, SharedSummary, SigmaBinSummary};
 
 use std::path::PathBuf;
 use std::time::Instant;

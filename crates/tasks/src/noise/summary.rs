@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use commands::{Doubt, DoubtKind, Judged};
-use error_models::{AmplitudeScale, ParameterStatus, RangeNoise};
+use error_models::{AmplitudeScale, ParameterStatus, RangeNoise, SharedNoise};
 use sensor_noise::{SigmaCheck, SigmaVerdict, VarianceEstimator, VarianceFit};
 use serde::Serialize;
 
@@ -19,8 +19,11 @@ pub struct NoiseSummary {
     pub calibration: String,
     /// What has the noise: `samples` or `ranges`.
     pub noise_of: &'static str,
-    /// What the camera's amplitude is: `as received`, or `times squared range`.
+    /// What the camera's amplitude is: `as received`, `times squared range`, or that it shows none.
     pub amplitude_scale: &'static str,
+    /// What neighbouring pixels have in common of the noise of ranges.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub shared: Option<SharedSummary>,
     /// Its parameters.
     pub parameters: Vec<NoiseParameter>,
     /// Correlation of the two estimated variances; `None` where one is held.
@@ -119,6 +122,26 @@ pub struct SigmaBinSummary {
     pub limits: [f64; 2],
 }
 
+/// What neighbouring pixels have in common of the noise.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct SharedSummary {
+    /// Part of a pixel's variance.
+    pub share: f64,
+    /// Its standard deviation.
+    pub sigma: f64,
+    /// Width of a neighbourhood, pixel.
+    pub width_px: f64,
+}
+
+fn shared(estimate: &Estimate) -> Option<SharedSummary> {
+    match estimate.term {
+        NoiseTerm::Ranges(RangeNoise { shared: Some(SharedNoise { share, width_px }), .. }) => {
+            Some(SharedSummary { share, sigma: estimate.shared_sigma?, width_px })
+        }
+        _ => None,
+    }
+}
+
 impl NoiseSummary {
     pub(crate) fn new(request: &NoiseRequest, calibration: &str, estimate: &Estimate) -> Self {
         let fit = &estimate.fit;
@@ -138,8 +161,12 @@ impl NoiseSummary {
                 NoiseTerm::Ranges(RangeNoise { amplitude_scale: AmplitudeScale::TimesSquaredRange, .. }) => {
                     "times squared range"
                 }
+                NoiseTerm::Ranges(RangeNoise { amplitude_scale: AmplitudeScale::InverseSquaredRange, .. }) => {
+                    "not shown: one over the squared range stands for it"
+                }
                 _ => "as received",
             },
+            shared: shared(estimate),
             parameters: estimate.parameters.iter().map(NoiseParameter::new).collect(),
             correlation: Some(b / (a * d).sqrt()).filter(|correlation| correlation.is_finite()),
             variances: match fit.estimator {

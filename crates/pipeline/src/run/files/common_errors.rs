@@ -1,7 +1,8 @@
 //! What the points of a run's cloud have in common, written beside it.
 
 use atomic_output::OutputFolder;
-use common_errors::{CommonErrorsFile, Corrected, Frame, Registered};
+use common_errors::{CommonErrorsFile, Corrected, Frame, Registered, SharedBySensor};
+use error_models::SharedNoise;
 use nalgebra::{Matrix6, Vector6};
 use range_io::calibration::{Calibration, RangeCalibration};
 
@@ -50,7 +51,9 @@ pub(crate) fn write(
             file.not_in_it.push("range terms: the ranges are those of several frequencies".to_owned());
         }
     }
-    if registered.is_none() && views.len() > 1 && !frames.iter().all(|frame| frame.stated_covariance.is_some()) {
+    // One without is the station that the others are stated from.
+    let without = frames.iter().filter(|frame| frame.stated_covariance.is_none()).count();
+    if registered.is_none() && views.len() > 1 && without > 1 {
         file.not_in_it
             .push("poses: no stage adjusted them, and stations.csv states no standard deviations of all".to_owned());
     }
@@ -71,8 +74,13 @@ fn frame(view: &ViewRecord, pose: &StationPose, calibration: Option<&Calibration
         }),
         range_model: calibration.and_then(|known| range_model(&known.range_models, view.integration_time_s)),
         drift_sigma_m: view.drift.as_ref().map(|drift| drift.sigma_m),
-        sensor: None,
+        sensor: calibration.and_then(|known| known.range_noise?.shared).map(shared),
     }
+}
+
+/// What the noise of neighbouring pixels has in common.
+fn shared(noise: SharedNoise) -> SharedBySensor {
+    SharedBySensor { sigma_m: 0.0, share: noise.share, width_px: noise.width_px }
 }
 
 /// The terms of the one frequency at the integration time that is nearest.

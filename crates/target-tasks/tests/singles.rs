@@ -9,7 +9,7 @@ use range_image::Raster;
 use range_io::tables::{read_observations, read_stations, read_targets};
 use target_tasks::{TargetKind, TargetsRequest, TargetsSummary, find_targets};
 use targets::camera_model::Camera;
-use targets::codes;
+use targets::{CodedOptions, codes};
 use targets::nalgebra::{Isometry3, Point3, Vector3};
 
 use crate::boards::{calibration, request, write_png};
@@ -38,7 +38,7 @@ fn write_coordinates(path: &Path, targets: &[(String, [f64; 3])]) {
 
 /// 24 codes 0.1 m apart, and where they are.
 fn wall() -> (PrintedCodes, Vec<(String, [f64; 3])>) {
-    let all = codes(12).unwrap();
+    let all = codes(CodedOptions::default().bits).unwrap();
     let place = |k: usize| [(k % 6) as f64 * 0.1 - 0.25, 0.15 - (k / 6) as f64 * 0.1];
     let targets: Vec<_> = (0..24).map(|k| (all[3 * k], place(k))).collect();
     let known = targets.iter().map(|(code, [x, y])| (code.to_string(), [*x, *y, 0.0])).collect();

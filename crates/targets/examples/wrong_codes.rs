@@ -57,7 +57,16 @@ impl Count {
         let options = CodedOptions::default();
         self.images += 1;
         self.candidates += find_circles(image, &options.circles)?.len();
-        for ring in find_coded(image, &options)? {
+        let found = match find_coded(image, &options) {
+            // One that was read wrongly is enough to say so.
+            Err(targets::Error::NotFound(_)) => {
+                self.read += 1;
+                self.wrong += 1;
+                return Ok(());
+            }
+            found => found?,
+        };
+        for ring in found {
             self.read += 1;
             self.wrong += usize::from(!is_right(ring.circle.centre.pixel, ring.code.id));
         }
@@ -89,11 +98,15 @@ enum Defect {
     None,
     /// A bar of any brightness lies across.
     Bar,
+    /// A bar of any brightness lies over the rim, or beside it.
+    Rim,
     /// A blot of any brightness and about the size of a few sectors.
     Blot,
     /// A blot of stripes as bright and as dark as the ring.
     Stripes,
-    /// Sectors are turned to the other colour, two of them at a time.
+    /// Two sectors are painted in the other colour over up to three quarters of their width.
+    Painted,
+    /// Two sectors are painted in the other colour: where one was set and one was not, it is another ring.
     Repainted,
     /// Rings of other kinds: cut at any angles.
     Foreign,
@@ -112,6 +125,9 @@ struct Ring {
     /// Direction, distance from the middle and half width (radii), value, direction and width of the stripes (radii) of what lies
     /// across.
     bar: [f64; 6],
+    /// Sine and cosine of both directions.
+    direction: [f64; 2],
+    stripes: [f64; 2],
 }
 
 impl Ring {
@@ -121,7 +137,9 @@ impl Ring {
         let middle = [(place % CELLS[0]) as f64 + 0.5, (place / CELLS[0]) as f64 + 0.5].map(|index| index * CELL_PX);
         let mut edges: Vec<f64> = (0..2 * draw(2.0, 6.0) as usize).map(|_| draw(0.0, sectors)).collect();
         edges.sort_by(f64::total_cmp);
-        Self {
+        let mut ring = Self {
+            direction: [0.0; 2],
+            stripes: [0.0; 2],
             centre: [middle[0] + draw(-3.0, 3.0), middle[1] + draw(-3.0, 3.0)],
             radius: draw(3.0, 6.0),
             squeeze: draw(sight.squeeze[0], sight.squeeze[1]),
@@ -136,7 +154,10 @@ impl Ring {
                 draw(0.0, std::f64::consts::TAU),
                 draw(0.3, 1.2),
             ],
-        }
+        };
+        ring.direction = ring.bar[0].sin_cos().into();
+        ring.stripes = ring.bar[4].sin_cos().into();
+        ring
     }
 
     /// Light at a place, 0 to 1.
@@ -144,15 +165,17 @@ impl Ring {
         let sectors = self.code.bits as f64;
         let (x, y) = ((col - self.centre[0]) / self.radius, (row - self.centre[1]) / (self.radius * self.squeeze));
         let parts = x.hypot(y);
-        let sector = (y.atan2(x) * 0.5 * sectors / std::f64::consts::PI + self.turn).rem_euclid(sectors);
-        let [direction, off, half, value, stripes, width] = self.bar;
-        let along = x * direction.cos() + y * direction.sin();
-        let across = y * direction.cos() - x * direction.sin();
+        let [_, mut off, half, value, _, width] = self.bar;
+        let [sine, cosine] = self.direction;
+        let (along, across) = (x * cosine + y * sine, y * cosine - x * sine);
+        if defect == Defect::Rim {
+            off = 2.2 + half + 0.6 * (off - 1.4);
+        }
         match defect {
-            Defect::Bar if (along - off).abs() < half && across.abs() < 12.0 => return value,
+            Defect::Bar | Defect::Rim if (along - off).abs() < half && across.abs() < 12.0 => return value,
             Defect::Blot if (along - 2.5).hypot(across) < 0.6 + half => return value,
             Defect::Stripes if (along - 2.5).hypot(across) < 0.6 + half => {
-                let place = (x * stripes.cos() + y * stripes.sin()) / width + value;
+                let place = (x * self.stripes[1] + y * self.stripes[0]) / width + value;
                 return f64::from(u8::from(place.rem_euclid(2.0) < 1.0));
             }
             _ => {}
@@ -163,14 +186,15 @@ impl Ring {
         if !(2.0..3.0).contains(&parts) {
             return 0.0;
         }
+        let sector = (y.atan2(x) * 0.5 * sectors / std::f64::consts::PI + self.turn).rem_euclid(sectors);
         let set = match defect {
-            // Half of a sector's width is painted over, of two sectors.
-            Defect::Repainted => {
+            Defect::Painted | Defect::Repainted => {
                 let at = sector as usize;
                 let own = self.code.is_set(at);
                 let [first, apart] = [self.code.id % self.code.bits, 2 + self.code.id % 5];
                 let is_one = at == first || at == (first + apart) % self.code.bits;
-                let painted = is_one && (2.0..2.0 + half.min(0.95)).contains(&parts);
+                let width = if defect == Defect::Painted { half.min(0.75) } else { 1.0 };
+                let painted = is_one && parts < 2.0 + width;
                 own != painted
             }
             Defect::Foreign => self.edges.iter().filter(|edge| **edge < sector).count() % 2 == 1,
@@ -261,6 +285,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         for (defect, kind) in [
             (Defect::None, "rings"),
             (Defect::Bar, "rings with a bar across"),
+            (Defect::Rim, "rings with a bar over the rim"),
             (Defect::Blot, "rings with a blot"),
             (Defect::Stripes, "rings with a blot of stripes"),
         ] {
@@ -274,7 +299,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     sound += covered;
     sound.print("all coded rings");
     for (defect, kind) in [
-        (Defect::Repainted, "rings with two sectors painted over in part"),
+        (Defect::Painted, "rings with two sectors painted over in part"),
+        (Defect::Repainted, "rings with two sectors in the other colour"),
         (Defect::Foreign, "rings cut at any angles"),
         (Defect::Discs, "discs about discs"),
     ] {

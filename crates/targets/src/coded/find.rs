@@ -2,9 +2,11 @@ use range_image::Raster;
 
 use super::codes::{Code, codes, mirrored};
 use super::decode::read;
+use super::model::RingModel;
 use crate::circles::find::{CircleSighting, find_circles};
 use crate::circles::options::{CircleOptions, Polarity};
 use crate::error::{NotFound, Result};
+use crate::image::noise::noise_deviation;
 
 /// How coded rings are looked for.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -44,8 +46,8 @@ pub struct CodedSighting {
 /// Finds coded rings and reads their numbers, by row, then column, of their centres.
 ///
 /// A target is a disc of radius r on free ground of radius 4 r, with a ring from 2 r to 3 r cut into [`CodedOptions::bits`] sectors,
-/// each of the colour of the disc or of the ground. A ring that is not one of [`codes`], or that has a sector of neither colour, is
-/// left out: it is never corrected to the nearest code.
+/// each of the colour of the disc or of the ground. A ring that is not one of [`codes`], or whose pixels are in some sector not as its
+/// code has them, is left out: it is never corrected to the nearest code.
 ///
 /// # Errors
 /// [`crate::Error::Invalid`] for options that cannot be met; [`NotFound::Mirrored`] where more rings are mirror images of codes than
@@ -75,11 +77,17 @@ pub fn find_coded(image: &Raster<f32>, options: &CodedOptions) -> Result<Vec<Cod
     let known = codes(options.bits)?;
     let mut found: Vec<CodedSighting> = Vec::new();
     let mut in_mirror = 0;
+    let noise = options.circles.noise.unwrap_or_else(|| noise_deviation(image)).max(0.0);
     for circle in find_circles(image, &options.circles)? {
         let Some(reading) = read(image, &circle, options.bits) else { continue };
         let place = |word: u32| known.binary_search_by_key(&word, |code| code.word).ok();
-        let Some(place) = place(reading.word) else {
-            in_mirror += usize::from(place(mirrored(reading.word, options.bits)).is_some());
+        let [own, mirrored] = [reading.word, mirrored(reading.word, options.bits)].map(place);
+        let code = Code { id: own.unwrap_or(known.len()), word: reading.word, bits: options.bits };
+        if own.or(mirrored).is_none() || !RingModel::new(&circle, code, reading.start_rad).agrees(image, noise) {
+            continue;
+        }
+        let Some(place) = own else {
+            in_mirror += 1;
             continue;
         };
         let [col, row] = circle.ellipse.point(reading.start_rad);

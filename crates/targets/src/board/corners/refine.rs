@@ -152,8 +152,8 @@ fn expected(
     Some(Expected { position, steps: [step(1, 0)?, step(0, 1)?], curvatures: curvatures(assembly, points, node, earlier) })
 }
 
-/// Curvature of the edges along columns and rows: the mean over the nodes about, each from three in a line, those of an earlier fit
-/// if there is one: where a node is hidden, its place is a guess.
+/// Curvature of the edges along columns and rows, from three nodes in a line each: the median over the nodes about, as what covers a
+/// corner may be taken for one that lies pixels away; those that an earlier fit found, if there is one.
 fn curvatures(
     assembly: &Assembly,
     points: &[Vector2<f64>],
@@ -170,9 +170,8 @@ fn curvatures(
         };
         let columns = node[0] - ABOUT..=node[0] + ABOUT;
         let nodes = columns.flat_map(|i| (node[1] - ABOUT..=node[1] + ABOUT).map(move |j| (i, j)));
-        let (sum, count) =
-            nodes.filter_map(curvature).fold((0.0, 0.0), |(sum, count), curvature| (sum + curvature, count + 1.0));
-        if count > 0.0 { sum / count } else { 0.0 }
+        let mut about: Vec<f64> = nodes.filter_map(curvature).collect();
+        if about.is_empty() { 0.0 } else { upper_median(&mut about) }
     })
 }
 

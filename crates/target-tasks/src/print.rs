@@ -7,7 +7,9 @@ use atomic_output::write_text;
 use commands::{Doubt, Judged};
 use pipeline::{Error, Result};
 use serde::Serialize;
-use targets::{Code, CodedOptions, INFRARED_NOTE, PaperSize, codes, print_checkerboard, print_circle_grid, print_coded};
+use targets::{
+    Code, CodedOptions, INFRARED_NOTE, PaperSize, codes, print_checkerboard, print_circle_grid, print_coded,
+};
 
 use crate::kind::{BoardKind, SingleKind, TargetKind};
 

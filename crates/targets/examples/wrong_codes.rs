@@ -282,7 +282,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     let images: u64 = arguments.next().map_or(Ok(100), |text| text.parse())?;
     let seed: u64 = arguments.next().map_or(Ok(0), |text| text.parse())?;
     let seeds = 1_000_000 * seed..1_000_000 * seed + images;
-    println!("| images | number | coded rings | or discs | read as coded rings | wrongly | rate of wrong ones below, at 95 % |");
+    println!(
+        "| images | number | coded rings | or discs | read as coded rings | wrongly | rate of wrong ones below, at 95 % |"
+    );
     println!("|---|---|---|---|---|---|---|");
     let mut sound = Count::default();
     let mut covered = Count::default();

@@ -118,7 +118,8 @@ pub(crate) fn fit(window: &Window, first: &Rough, noise: f64) -> Option<DiscFit>
     let sigma = least_noise(noise, contrast);
     // Pixels scatter by what the model leaves out as well: beside that the iteration need not settle.
     let scatter = sigma.hypot(first.look.misfit * contrast);
-    let (model, values) = (DiscModel { origin: start.centre, is_smooth: first.look.blur_px >= SMOOTH_PX }, first.parameters);
+    let (model, values) =
+        (DiscModel { origin: start.centre, is_smooth: first.look.blur_px >= SMOOTH_PX }, first.parameters);
     let held = |held: &[usize]| adjusted(window, model, &values, scatter, held);
     let small = start.mean_radius_px() < SMALLEST_WITH_SLOPE_PX;
     let slopes: &[usize] = if small { &[CONTRAST + 1, CONTRAST + 2] } else { &[] };
@@ -133,7 +134,8 @@ pub(crate) fn fit(window: &Window, first: &Rough, noise: f64) -> Option<DiscFit>
     let beside_noise = (variance - sigma * sigma).max(0.0).sqrt();
     let good = contrast > 0.0 && ellipse.semi_axes_px.iter().all(|axis| axis.is_finite() && *axis > 0.0);
     good.then(|| DiscFit {
-        covariance: ellipse.covariance([values[8], values[9], values[10]], &(covariance * (variance / (scatter * scatter)))),
+        covariance: ellipse
+            .covariance([values[8], values[9], values[10]], &(covariance * (variance / (scatter * scatter)))),
         ellipse,
         contrast,
         level: values[0],
@@ -156,16 +158,17 @@ fn adjusted(
     let group = network.add_group("pixels");
     let table = NormalTable::new();
     for pixels in window.pixels.chunks(TOGETHER) {
-        let observation = FunctionObservation::new([block], pixels.len(), move |parameters, residual, mut jacobians| {
-            for (row, (pixel, value)) in pixels.iter().enumerate() {
-                let (modelled, derivatives) = model.value(&table, parameters[0], *pixel);
-                residual[row] = value - modelled;
-                if let Some(jacobians) = &mut jacobians {
-                    jacobians.row(0, row).copy_from_slice(&derivatives);
+        let observation =
+            FunctionObservation::new([block], pixels.len(), move |parameters, residual, mut jacobians| {
+                for (row, (pixel, value)) in pixels.iter().enumerate() {
+                    let (modelled, derivatives) = model.value(&table, parameters[0], *pixel);
+                    residual[row] = value - modelled;
+                    if let Some(jacobians) = &mut jacobians {
+                        jacobians.row(0, row).copy_from_slice(&derivatives);
+                    }
                 }
-            }
-            Ok(())
-        });
+                Ok(())
+            });
         network.add_observation(group, observation, &Covariance::from_sigmas(&[sigma; TOGETHER][..pixels.len()]))?;
     }
     let expectation = network.add_group("blur");

@@ -167,9 +167,9 @@ impl Search<'_> {
             (self.is_acceptable(&disc.look, &start, ROUGHLY) && is_new(&disc.look.ellipse)).then_some(disc)
         };
         // Again with the pixels about the ellipse as it is then known.
-        let disc = roughly(&start).and_then(|disc| roughly(&disc.look.ellipse)).and_then(|disc| {
-            fit(&window(&disc.look.ellipse)?, &disc, self.noise)
-        });
+        let disc = roughly(&start)
+            .and_then(|disc| roughly(&disc.look.ellipse))
+            .and_then(|disc| fit(&window(&disc.look.ellipse)?, &disc, self.noise));
         region.pixels.iter().for_each(|place| taken[*place] = false);
         disc.filter(|disc| self.is_acceptable(&disc.look(), &start, 1.0))
     }

@@ -1,7 +1,7 @@
 //! A first fit of a disc, which most of what is no disc does not survive, and the start of the fit of [`super::disc_fit`].
 //!
 //! The model is that of [`super::disc_model`] with a pixel for a point (its own variance goes to the blur) and with one contrast and
-//! a level whose slope is taken off beforehand: eight unknowns, a thirtieth of the time.
+//! a level whose slope is taken off beforehand: eight unknowns, and one place of a pixel in place of nine.
 
 use nalgebra::{Matrix4, SMatrix, SVector, Vector4};
 
@@ -57,33 +57,10 @@ pub(crate) fn rough_fit(window: &Window, start: &Ellipse, noise: f64) -> Option<
     let sigma = least_noise(noise, contrast);
     let fit = Fit { sigma, slopes, ..fit };
     (values[0], values[1]) = (level, contrast);
-    let mut sums = fit.sums(&values);
-    let mut damping = 1e-3;
-    let mut settled = false;
-    for _ in 0..MOST_STEPS {
-        let mut damped = sums.normal;
-        damped.set_diagonal(&(sums.normal.diagonal() * (1.0 + damping)));
-        let step = damped.cholesky()?.solve(&sums.right);
-        let mut next = values;
-        PLACES.iter().zip(step.iter()).for_each(|(place, step)| next[*place] += step);
-        let tried = fit.sums(&next);
-        if tried.cost <= sums.cost {
-            let gain = sums.cost - tried.cost;
-            (values, sums) = (next, tried);
-            damping *= 0.1;
-            settled = gain <= SMALL_GAIN * sums.cost;
-            if settled {
-                break;
-            }
-        } else if tried.cost.is_finite() && damping < 1e6 {
-            damping *= 10.0;
-        } else {
-            return None;
-        }
-    }
+    let (values, squares) = fit.settled(values)?;
     let ellipse = Ellipse::from_unit_circle([values[CENTRE], values[CENTRE + 1]], [values[8], values[9], values[10]]);
-    let scatter = sums.squares / (window.pixels.len() - UNKNOWNS) as f64;
-    let good = settled && values[1] > 0.0 && ellipse.semi_axes_px.iter().all(|axis| axis.is_finite() && *axis > 0.0);
+    let scatter = squares / (window.pixels.len() - UNKNOWNS) as f64;
+    let good = values[1] > 0.0 && ellipse.semi_axes_px.iter().all(|axis| axis.is_finite() && *axis > 0.0);
     let mut parameters = values;
     let [x, y] = [0, 1].map(|axis| ellipse.centre[axis] - fit.origin[axis]);
     parameters[..CENTRE].copy_from_slice(&[
@@ -125,6 +102,33 @@ impl Fit<'_> {
         let solved: [f64; 4] = normal.cholesky()?.solve(&right).into();
         // Also of no number.
         (solved[1] > 0.0).then_some(solved)
+    }
+
+    /// The parameters from where no step gains anything, and the sum of the squared residuals; `None` where that takes too many.
+    fn settled(&self, mut values: [f64; PARAMETERS]) -> Option<([f64; PARAMETERS], f64)> {
+        let mut sums = self.sums(&values);
+        let mut damping = 1e-3;
+        for _ in 0..MOST_STEPS {
+            let mut damped = sums.normal;
+            damped.set_diagonal(&(sums.normal.diagonal() * (1.0 + damping)));
+            let step = damped.cholesky()?.solve(&sums.right);
+            let mut next = values;
+            PLACES.iter().zip(step.iter()).for_each(|(place, step)| next[*place] += step);
+            let tried = self.sums(&next);
+            if tried.cost <= sums.cost {
+                let gain = sums.cost - tried.cost;
+                (values, sums) = (next, tried);
+                damping *= 0.1;
+                if gain <= SMALL_GAIN * sums.cost {
+                    return Some((values, sums.squares));
+                }
+            } else if tried.cost.is_finite() && damping < 1e6 {
+                damping *= 10.0;
+            } else {
+                return None;
+            }
+        }
+        None
     }
 
     fn sums(&self, values: &[f64; PARAMETERS]) -> Sums {

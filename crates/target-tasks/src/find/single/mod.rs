@@ -100,6 +100,7 @@ impl Singles {
             ambiguity: 1,
             residual_px: named.residual_px,
             unnamed: points.len() - named_count - left_out.len(),
+            unchecked: if named.is_checked { 0 } else { named_count },
             left_out,
             hidden: named.not_seen,
             marks: named.names.iter().zip(points).map(mark).collect(),

@@ -48,7 +48,8 @@ impl Places {
     }
 
     fn index(&self, at: [i32; 2]) -> Option<usize> {
-        let [x, y] = [0, 1].map(|axis| usize::try_from(at[axis] - self.least[axis]).ok().filter(|k| *k < self.size[axis]));
+        let [x, y] =
+            [0, 1].map(|axis| usize::try_from(at[axis] - self.least[axis]).ok().filter(|k| *k < self.size[axis]));
         Some(y? * self.size[0] + x?)
     }
 

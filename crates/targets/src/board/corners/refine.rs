@@ -149,7 +149,11 @@ fn expected(
         (None, Some(last)) => Some(position - last),
         (None, None) => None,
     };
-    Some(Expected { position, steps: [step(1, 0)?, step(0, 1)?], curvatures: curvatures(assembly, points, node, earlier) })
+    Some(Expected {
+        position,
+        steps: [step(1, 0)?, step(0, 1)?],
+        curvatures: curvatures(assembly, points, node, earlier),
+    })
 }
 
 /// Curvature of the edges along columns and rows, from three nodes in a line each: the median over the nodes about, as what covers a

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use png::{BitDepth, ColorType, Encoder};
-use target_tasks::targets::codes;
+use target_tasks::targets::{CodedOptions, codes};
 
 const SIZE: [usize; 2] = [640, 480];
 
@@ -32,12 +32,12 @@ pub fn write_board(path: &Path) {
 
 /// Twelve coded rings.
 pub fn write_rings(path: &Path) {
-    let all = codes(12).unwrap();
+    let all = codes(CodedOptions::default().bits).unwrap();
     write(path, |col, row| {
         let (i, j) = ((col / 160.0).floor().clamp(0.0, 3.0), (row / 160.0).floor().clamp(0.0, 2.0));
         let (x, y) = (col - 160.0 * i - 80.0, row - 160.0 * j - 80.0);
         let parts = x.hypot(y) / 14.0;
-        let sector = y.atan2(x).rem_euclid(std::f64::consts::TAU) * 12.0 / std::f64::consts::TAU;
+        let sector = y.atan2(x).rem_euclid(std::f64::consts::TAU) * 14.0 / std::f64::consts::TAU;
         let code = all[(4.0 * j + i) as usize];
         parts < 1.0 || ((2.0..3.0).contains(&parts) && code.is_set(sector as usize))
     });

@@ -7,12 +7,12 @@ use atomic_output::write_text;
 use commands::{Doubt, Judged};
 use pipeline::{Error, Result};
 use serde::Serialize;
-use targets::{Code, INFRARED_NOTE, PaperSize, codes, print_checkerboard, print_circle_grid, print_coded};
+use targets::{
+    Code, CodedOptions, INFRARED_NOTE, PaperSize, codes, print_checkerboard, print_circle_grid, print_coded,
+};
 
 use crate::kind::{BoardKind, SingleKind, TargetKind};
 
-/// Sectors of the rings that are printed, those that are looked for.
-const SECTORS: usize = 12;
 /// Diameter of printed dots in parts of their distance: a larger one at the origin has room up to three times as large.
 const DOT_PARTS: f64 = 0.5;
 
@@ -56,7 +56,7 @@ pub fn print_targets(request: &PrintRequest) -> Result<PrintSummary> {
             print_circle_grid(grid, DOT_PARTS * grid.spacing_m(), request.paper).map_err(fault)?
         }
         TargetKind::Single(SingleKind::Rings { diameter_m }) => {
-            let all = codes(SECTORS).map_err(fault)?;
+            let all = codes(CodedOptions::default().bits).map_err(fault)?;
             let (chosen, page) = rings(request, &all, *diameter_m).map_err(refuse)?;
             printed = chosen.iter().map(ToString::to_string).collect();
             page

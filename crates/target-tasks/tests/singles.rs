@@ -9,8 +9,8 @@ use range_image::Raster;
 use range_io::tables::{read_observations, read_stations, read_targets};
 use target_tasks::{TargetKind, TargetsRequest, TargetsSummary, find_targets};
 use targets::camera_model::Camera;
-use targets::codes;
 use targets::nalgebra::{Isometry3, Point3, Vector3};
+use targets::{CodedOptions, codes};
 
 use crate::boards::{calibration, request, write_png};
 use crate::support::coded::PrintedCodes;
@@ -38,7 +38,7 @@ fn write_coordinates(path: &Path, targets: &[(String, [f64; 3])]) {
 
 /// 24 codes 0.1 m apart, and where they are.
 fn wall() -> (PrintedCodes, Vec<(String, [f64; 3])>) {
-    let all = codes(12).unwrap();
+    let all = codes(CodedOptions::default().bits).unwrap();
     let place = |k: usize| [(k % 6) as f64 * 0.1 - 0.25, 0.15 - (k / 6) as f64 * 0.1];
     let targets: Vec<_> = (0..24).map(|k| (all[3 * k], place(k))).collect();
     let known = targets.iter().map(|(code, [x, y])| (code.to_string(), [*x, *y, 0.0])).collect();
@@ -94,6 +94,7 @@ fn rings_are_named_by_their_codes_and_calibrate_the_lens() {
     let summary = find_targets(&in_images("rings 0.024", &images, &found), &Silent).unwrap();
     assert_eq!((summary.stations.len(), summary.verdict()), (8, Verdict::Done), "{summary}");
     assert!(summary.points >= 8 * 22, "{summary}");
+    assert!(summary.stations.iter().all(|station| station.unchecked == 0));
     let mut squares = Vec::new();
     for row in read_observations(found.join("observations.csv")).unwrap() {
         let (_, place) = known.iter().find(|(name, _)| *name == row.target).unwrap();
@@ -115,6 +116,19 @@ fn rings_are_named_by_their_codes_and_calibrate_the_lens() {
 }
 
 #[test]
+fn rings_in_a_mirror_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let (images, found) = (folder.path().join("images"), folder.path().join("found"));
+    std::fs::create_dir(&images).unwrap();
+    let (camera, (wall, _)) = (large_camera(), wall());
+    let image = picture_of_rings(&camera, &wall, &stations(1)[0], 1);
+    let flipped = Raster::from_fn(image.width(), image.height(), |col, row| image[(image.width() - 1 - col, row)]);
+    write_png(&images.join("0.png"), &flipped);
+    let refused = find_targets(&in_images("rings 0.024", &images, &found), &Silent).unwrap_err().to_string();
+    assert!(refused.contains("mirrored"), "{refused}");
+}
+
+#[test]
 fn rings_that_cannot_be_told_apart_are_named() {
     let folder = tempfile::tempdir().unwrap();
     let (images, found) = (folder.path().join("images"), folder.path().join("found"));
@@ -125,6 +139,8 @@ fn rings_that_cannot_be_told_apart_are_named() {
     let without = find_targets(&looking("rings 0.024", &images, &found), &Silent).unwrap_err().to_string();
     assert!(without.contains("--principal-distance"), "{without}");
     let summary = find_targets(&in_images("rings 0.024", &images, &found), &Silent).unwrap();
+    assert_eq!(summary.stations[0].unchecked, summary.points);
+    assert!(summary.to_string().contains("nothing checks these names"), "{summary}");
     let twice: Vec<_> = summary.stations[0].left_out.iter().map(|left| (&left.target, &left.reason)).collect();
     assert!(twice.len() == 2 && twice.iter().all(|(name, why)| **name == known[2].0 && why.contains("twice")));
     let foreign: Vec<_> = known.iter().map(|(name, place)| (name.replace('R', "T"), *place)).collect();

@@ -91,8 +91,8 @@ pub enum NotFound {
         /// Dots that are larger than those about them.
         larger: usize,
     },
-    /// The grid is seen in a mirror, or from behind.
-    #[error("the grid is mirrored: the image was flipped, or the grid is seen in a mirror or from behind")]
+    /// The grid, or most of the coded rings, are seen in a mirror, or from behind.
+    #[error("the target is mirrored: the image was flipped, or the target is seen in a mirror or from behind")]
     Mirrored,
     /// Several boards of this kind are in the image, and nothing tells them apart.
     #[error("{found} boards of this kind are in the image: cover all but one, or use coded targets")]

@@ -3,7 +3,7 @@
 use targets::camera_model::Camera;
 use targets::nalgebra::{Isometry3, Point3, Vector2, Vector3};
 use targets::range_image::Raster;
-use targets::{CodedOptions, CodedSighting, codes, find_coded};
+use targets::{CodedOptions, CodedSighting, Error, NotFound, codes, find_coded};
 
 use crate::support::coded::PrintedCodes;
 use crate::support::render::{Optics, Plane, render};
@@ -14,7 +14,7 @@ const SPACING: f64 = 0.1;
 
 /// 6 x 4 codes from `first` on, 0.1 m apart, discs of radius 0.012 m.
 fn wall(first: usize) -> PrintedCodes {
-    let all = codes(12).unwrap();
+    let all = codes(CodedOptions::default().bits).unwrap();
     let place = |k: usize| [(k % 6) as f64 * SPACING - 0.25, 0.15 - (k / 6) as f64 * SPACING];
     let targets = (0..24).map(|k| (all[(first + k) % all.len()], place(k))).collect();
     PrintedCodes { targets, radius_m: 0.012, dark: 0.1, bright: 0.9 }
@@ -55,6 +55,20 @@ fn rings_are_read_rightly() {
     }
     println!("{read} of {shown} read");
     assert!(50 * read >= 49 * shown, "{read} of {shown}");
+}
+
+#[test]
+fn a_wall_in_a_mirror_is_named() {
+    let camera = large_camera();
+    let wall = wall(3);
+    let plane = Plane { world_from_plane: Isometry3::translation(0.0, 0.0, -0.95), pattern: &wall };
+    let light = render(&camera, &Isometry3::identity(), &[plane], &Optics::default());
+    let image = Sensor::amplitude(1000.0, 20.0).expose(&light, 4);
+    let right = find_coded(&image, &CodedOptions::default()).unwrap();
+    assert_eq!(right.len(), 24);
+    let flipped = Raster::from_fn(image.width(), image.height(), |col, row| image[(image.width() - 1 - col, row)]);
+    let told = find_coded(&flipped, &CodedOptions::default());
+    assert!(matches!(told, Err(Error::NotFound(NotFound::Mirrored))), "{told:?}");
 }
 
 #[test]

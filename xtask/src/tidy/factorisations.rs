@@ -82,6 +82,7 @@ const KNOWN: &[(Use, &[&str])] = &[
             "rigid-pose/src/centred.rs",
             "stored-values/src/surfaces.rs",
             "targets/src/board/corners/fit.rs",
+            "targets/src/circles/rough_fit.rs",
             "tracking/src/imu/update.rs",
             "tracking/src/motion_model/velocity.rs",
         ],

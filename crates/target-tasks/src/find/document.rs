@@ -75,6 +75,13 @@ fn text(summary: &TargetsSummary) -> Document {
         Column::number("sigma, pixel"),
     ];
     document.table(columns, rows.collect());
+    let unchecked: usize = summary.stations.iter().map(|station| station.unchecked).sum();
+    if unchecked > 0 {
+        document.paragraph(format!(
+            "{unchecked} points are named by their codes alone, and nothing checks these names: a code that was read wrongly would not \
+             show. The coordinates of six rings or more in targets.csv would check them."
+        ));
+    }
     document.paragraph(format!(
         "Principal distance {:.1} pixels ({}).",
         summary.principal_distance_px,

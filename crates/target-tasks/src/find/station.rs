@@ -28,6 +28,8 @@ pub(crate) struct Seen {
     pub(crate) residual_px: Option<f64>,
     /// Points that look like targets and are none of them.
     pub(crate) unnamed: usize,
+    /// Points whose names rest on their codes alone.
+    pub(crate) unchecked: usize,
     pub(crate) left_out: Vec<LeftOut>,
     pub(crate) hidden: Vec<String>,
     pub(crate) marks: Vec<Mark>,
@@ -65,6 +67,7 @@ impl StationPicture {
                 ambiguity: board.ambiguity,
                 residual_px: Some(board.residual_px),
                 unnamed: 0,
+                unchecked: 0,
                 left_out: Vec::new(),
                 hidden: Vec::new(),
                 marks: board.nodes.iter().map(mark).collect(),

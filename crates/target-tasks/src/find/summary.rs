@@ -58,6 +58,9 @@ pub struct StationSummary {
     pub sigma_px: f64,
     /// Points that look like targets and are none of those with coordinates.
     pub unnamed: usize,
+    /// Coded rings whose names rest on their codes alone, as fewer than six have coordinates: a code that was read wrongly would not
+    /// show.
+    pub unchecked: usize,
     /// Targets that were seen and take no part, each with the reason.
     pub left_out: Vec<LeftOut>,
     /// Targets with coordinates that lie in the image and were not seen.
@@ -92,6 +95,7 @@ impl TargetsSummary {
                 residual_px: seen.residual_px,
                 sigma_px: statistics::quantile(&mut sigmas.collect::<Vec<_>>(), 0.5),
                 unnamed: seen.unnamed,
+                unchecked: seen.unchecked,
                 left_out: seen.left_out.clone(),
                 not_seen: seen.hidden.clone(),
             })

@@ -4,8 +4,10 @@ use adjust::{Adjustment, Covariance, FunctionObservation, LinearObservation, Par
 use nalgebra::{Matrix2, Matrix5};
 use range_image::Raster;
 
-use super::disc_model::{BLUR, CENTRE, CONTRAST, DiscModel, PARAMETERS, SHAPE, blur_px};
+use super::disc_model::{BLUR, CENTRE, CONTRAST, DiscModel, PARAMETERS, SMOOTH_PX, blur_px};
 use super::ellipse::Ellipse;
+use super::rough_fit::{Look, Rough};
+use crate::image::normal_table::NormalTable;
 
 /// Ground that takes part about the disc, in parts of its mean radius and pixel: enough to know its level, and not the next dot.
 const GROUND_PARTS: f64 = 0.5;
@@ -16,25 +18,20 @@ const DEPTH_PX: f64 = 8.0;
 const SMALLEST_WITH_SLOPE_PX: f64 = 4.0;
 /// β that is expected and its deviation, pixel: a weak prior that only holds the blur of sharp images, whose edge lies within a
 /// pixel.
-const EXPECTED_BLUR: [f64; 2] = [0.3, 1.0];
+pub(crate) const EXPECTED_BLUR: [f64; 2] = [0.3, 1.0];
+/// Blur below which an edge may have been sharpened, pixel: the least that is modelled is 0.2.
+const SHARPENED_PX: f64 = 0.4;
 /// Noise that is taken for granted, in parts of the contrast: rounding of values, and what the model leaves out.
 const LEAST_NOISE_PARTS: f64 = 1e-3;
 /// Share of the window that must have values.
 const LEAST_SHARE: f64 = 0.6;
 
-/// How far an iteration goes.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Effort {
-    /// More steps than a disc ever takes; what needs them is none.
-    most_steps: usize,
-    /// The end of the iteration in standard deviations.
-    tolerance: f64,
-}
-
-/// To tell discs from what is none: most texture is dropped here.
-pub(crate) const ROUGH: Effort = Effort { most_steps: 25, tolerance: 0.1 };
-/// Beyond a thousandth of a standard deviation nothing can be seen.
-pub(crate) const FULL: Effort = Effort { most_steps: 25, tolerance: 1e-3 };
+/// More steps than a disc ever takes; what needs them is none.
+const MOST_STEPS: usize = 15;
+/// Pixels of one observation: of single ones the bookkeeping takes as long as the model.
+const TOGETHER: usize = 8;
+/// The end of the iteration in standard deviations: a tenth of one adds a hundredth to the variance, and steps of a disc shrink tenfold each.
+const TOLERANCE: f64 = 0.1;
 
 /// A disc that was fitted. Contrast is positive.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -51,9 +48,17 @@ pub(crate) struct DiscFit {
     pub(crate) misfit: f64,
 }
 
+impl DiscFit {
+    /// What tells whether it is a disc.
+    pub(crate) fn look(&self) -> Look {
+        let Self { ellipse, contrast, blur_px, misfit, .. } = *self;
+        Look { ellipse, contrast, blur_px, misfit }
+    }
+}
+
 /// The pixels about a disc that say where it is.
 pub(crate) struct Window {
-    pixels: Vec<([f64; 2], f64)>,
+    pub(crate) pixels: Vec<([f64; 2], f64)>,
 }
 
 impl Window {
@@ -88,17 +93,6 @@ impl Window {
         let enough = pixels.len() >= 2 * PARAMETERS && pixels.len() as f64 >= LEAST_SHARE * looked_at as f64;
         enough.then_some(Self { pixels })
     }
-
-    /// Means inside and outside an ellipse.
-    fn means(&self, ellipse: &Ellipse) -> Option<[f64; 2]> {
-        let matrix = ellipse.to_unit_circle();
-        let mean = |is_inside: bool| {
-            let side = self.pixels.iter().filter(|(pixel, _)| (ellipse.parts(&matrix, *pixel) < 1.0) == is_inside);
-            let (sum, count) = side.fold((0.0, 0.0), |(sum, count), (_, value)| (sum + value, count + 1.0));
-            (count > 0.0).then_some(sum / count)
-        };
-        Some([mean(true)?, mean(false)?])
-    }
 }
 
 /// Distance to an ellipse to first order, negative inside.
@@ -108,41 +102,45 @@ fn signed_distance(ellipse: &Ellipse, matrix: &Matrix2<f64>, pixel: [f64; 2]) ->
     if parts > 0.0 { (parts - 1.0) * parts / (matrix * q).norm() } else { -ellipse.semi_axes_px[1] }
 }
 
-/// The disc of the window, brighter than its ground, from the ellipse `start` on; `None` where the iteration finds none.
+/// Deviation of a pixel's noise that is taken for granted.
+pub(crate) fn least_noise(noise: f64, contrast: f64) -> f64 {
+    noise.max(LEAST_NOISE_PARTS * contrast)
+}
+
+/// The disc of the window, brighter than its ground, from a first fit on; `None` where the iteration finds none.
 /// `noise` is the standard deviation of a pixel.
-pub(crate) fn fit(window: &Window, start: &Ellipse, noise: f64, effort: Effort) -> Option<DiscFit> {
-    let [inside, outside] = window.means(start)?;
-    let contrast = inside - outside;
-    // The blur takes some of it; what has less than the noise of two pixels is none.
+pub(crate) fn fit(window: &Window, first: &Rough, noise: f64) -> Option<DiscFit> {
+    let Look { ellipse: start, contrast, .. } = first.look;
+    // What has less than the noise of two pixels is none.
     if contrast.is_nan() || contrast <= 2.0 * noise {
         return None;
     }
-    let sigma = noise.max(LEAST_NOISE_PARTS * contrast);
-    let model = DiscModel { origin: start.centre };
-    let matrix = start.to_unit_circle();
-    let mut values = [0.0; PARAMETERS];
-    (values[0], values[CONTRAST], values[BLUR]) = (outside, contrast, EXPECTED_BLUR[0]);
-    values[CENTRE..SHAPE].copy_from_slice(&start.centre);
-    values[SHAPE..BLUR].copy_from_slice(&[matrix.m11, matrix.m12, matrix.m22]);
-    let held = |held: &[usize]| adjusted(window, model, &values, sigma, held, effort);
+    let sigma = least_noise(noise, contrast);
+    // Pixels scatter by what the model leaves out as well: beside that the iteration need not settle.
+    let scatter = sigma.hypot(first.look.misfit * contrast);
+    let (model, values) =
+        (DiscModel { origin: start.centre, is_smooth: first.look.blur_px >= SMOOTH_PX }, first.parameters);
+    let held = |held: &[usize]| adjusted(window, model, &values, scatter, held);
     let small = start.mean_radius_px() < SMALLEST_WITH_SLOPE_PX;
     let slopes: &[usize] = if small { &[CONTRAST + 1, CONTRAST + 2] } else { &[] };
     // An edge that a camera sharpened has no blur that the iteration could settle on.
-    let (values, covariance, squares) = held(slopes).or_else(|_| held(&[slopes, &[BLUR]].concat())).ok()?;
+    let sharpened = |_| if first.look.blur_px < SHARPENED_PX { held(&[slopes, &[BLUR]].concat()).ok() } else { None };
+    let (values, covariance, squares) = held(slopes).map_or_else(sharpened, Some)?;
     let ellipse = Ellipse::from_unit_circle([values[CENTRE], values[CENTRE + 1]], [values[8], values[9], values[10]]);
     let count = window.pixels.len() as f64;
     let redundancy = count - PARAMETERS as f64;
     let contrast = values[CONTRAST];
-    let scatter = squares / redundancy;
-    let beside_noise = (scatter - sigma * sigma).max(0.0).sqrt();
+    let variance = squares / redundancy;
+    let beside_noise = (variance - sigma * sigma).max(0.0).sqrt();
     let good = contrast > 0.0 && ellipse.semi_axes_px.iter().all(|axis| axis.is_finite() && *axis > 0.0);
     good.then(|| DiscFit {
-        covariance: ellipse.covariance([values[8], values[9], values[10]], &(covariance * (scatter / (sigma * sigma)))),
+        covariance: ellipse
+            .covariance([values[8], values[9], values[10]], &(covariance * (variance / (scatter * scatter)))),
         ellipse,
         contrast,
         level: values[0],
         blur_px: blur_px(&values),
-        sigma0: scatter.sqrt() / sigma,
+        sigma0: variance.sqrt() / sigma,
         misfit: beside_noise / contrast,
     })
 }
@@ -154,22 +152,24 @@ fn adjusted(
     start: &[f64; PARAMETERS],
     sigma: f64,
     held: &[usize],
-    effort: Effort,
 ) -> Result<(Vec<f64>, Matrix5<f64>, f64), adjust::Error> {
     let mut network = Adjustment::new();
     let block = network.add_block(ParameterBlock::euclidean(start.as_slice()).named("disc"));
     let group = network.add_group("pixels");
-    let weight = Covariance::from_sigma(sigma);
-    for (pixel, value) in &window.pixels {
-        let observation = FunctionObservation::new([block], 1, move |parameters, residual, jacobians| {
-            let (modelled, derivatives) = model.value(parameters[0], *pixel);
-            residual[0] = value - modelled;
-            if let Some(jacobians) = jacobians {
-                jacobians.row(0, 0).copy_from_slice(&derivatives);
-            }
-            Ok(())
-        });
-        network.add_observation(group, observation, &weight)?;
+    let table = NormalTable::new();
+    for pixels in window.pixels.chunks(TOGETHER) {
+        let observation =
+            FunctionObservation::new([block], pixels.len(), move |parameters, residual, mut jacobians| {
+                for (row, (pixel, value)) in pixels.iter().enumerate() {
+                    let (modelled, derivatives) = model.value(&table, parameters[0], *pixel);
+                    residual[row] = value - modelled;
+                    if let Some(jacobians) = &mut jacobians {
+                        jacobians.row(0, row).copy_from_slice(&derivatives);
+                    }
+                }
+                Ok(())
+            });
+        network.add_observation(group, observation, &Covariance::from_sigmas(&[sigma; TOGETHER][..pixels.len()]))?;
     }
     let expectation = network.add_group("blur");
     let mut row = [0.0; PARAMETERS];
@@ -179,8 +179,7 @@ fn adjusted(
     for parameter in held {
         network.hold_parameter(block, *parameter)?;
     }
-    let options =
-        SolveOptions { max_iterations: effort.most_steps, step_tolerance: effort.tolerance, ..SolveOptions::default() };
+    let options = SolveOptions { max_iterations: MOST_STEPS, step_tolerance: TOLERANCE, ..SolveOptions::default() };
     let solution = network.solve(&options)?;
     let values = solution.values(block)?.to_vec();
     let whole = solution.covariance(block, Scale::Prior)?;

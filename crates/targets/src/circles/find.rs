@@ -3,9 +3,10 @@ use range_image::Raster;
 use statistics::{robust_standard_deviation, upper_median};
 
 use super::components::{Candidate, Region, elliptical_components};
-use super::disc_fit::{DiscFit, FULL, ROUGH, Window, fit};
+use super::disc_fit::{DiscFit, Window, fit};
 use super::ellipse::Ellipse;
 use super::options::{CircleOptions, Polarity};
+use super::rough_fit::{Look, rough_fit};
 use crate::error::Result;
 use crate::image::levels::Levels;
 use crate::image::noise::noise_deviation;
@@ -22,6 +23,8 @@ const SPAN_PARTS: f64 = 0.25;
 const LARGEST_BLUR_PARTS: f64 = 0.8;
 /// Two sightings nearer to each other than so many semi-minor axes, and of sizes within as much, are one disc.
 const SAME_PARTS: f64 = 0.3;
+/// How many times beyond the limits of a disc its first fit may be: its model is simpler, by a few percent of the contrast.
+const ROUGHLY: f64 = 1.15;
 /// Pixels about another region that its blur may reach.
 const FOREIGN_REACH_PX: usize = 2;
 
@@ -132,7 +135,8 @@ impl Search<'_> {
         let mut taken = vec![false; self.smoothed.len()];
         let mut kept: Vec<(DiscFit, CircleSighting)> = Vec::new();
         for candidate in candidates {
-            let Some(disc) = self.measured(&candidate, &mut taken) else { continue };
+            let is_new = |ellipse: &Ellipse| !kept.iter().any(|(other, _)| are_same(&other.ellipse, ellipse));
+            let Some(disc) = self.measured(&candidate, &mut taken, is_new) else { continue };
             match kept.iter().position(|(other, _)| are_same(&other.ellipse, &disc.ellipse)) {
                 Some(place) if kept[place].0.misfit <= disc.misfit => {}
                 Some(place) => kept[place] = (disc, self.sighting(&disc)),
@@ -142,8 +146,13 @@ impl Search<'_> {
         kept.into_iter().map(|(_, sighting)| sighting).collect()
     }
 
-    /// The disc of a candidate, if it is one.
-    fn measured(&self, candidate: &Candidate, taken: &mut [bool]) -> Option<DiscFit> {
+    /// The disc of a candidate, if it is one and new.
+    fn measured(
+        &self,
+        candidate: &Candidate,
+        taken: &mut [bool],
+        is_new: impl Fn(&Ellipse) -> bool,
+    ) -> Option<DiscFit> {
         let region = candidate.region(&self.smoothed, taken);
         let start = region.ellipse;
         let fits = start.semi_axes_px[0] <= 1.5 * self.options.largest_semi_axis_px;
@@ -152,15 +161,17 @@ impl Search<'_> {
         }
         region.pixels.iter().for_each(|place| taken[*place] = true);
         let foreign = |col: usize, row: usize| self.is_foreign(&region, taken, [col, row]);
-        let window = Window::about(&self.image, &start, foreign);
-        let first = window.and_then(|window| fit(&window, &start, self.noise, ROUGH));
-        // Again with the pixels about the ellipse as it is now known.
-        let second = first.filter(|disc| self.is_acceptable(disc, &start)).and_then(|disc| {
-            let window = Window::about(&self.image, &disc.ellipse, foreign)?;
-            fit(&window, &disc.ellipse, self.noise, FULL)
-        });
+        let window = |about: &Ellipse| Window::about(&self.image, about, foreign);
+        let roughly = |about: &Ellipse| {
+            let disc = rough_fit(&window(about)?, about, self.noise)?;
+            (self.is_acceptable(&disc.look, &start, ROUGHLY) && is_new(&disc.look.ellipse)).then_some(disc)
+        };
+        // Again with the pixels about the ellipse as it is then known.
+        let disc = roughly(&start)
+            .and_then(|disc| roughly(&disc.look.ellipse))
+            .and_then(|disc| fit(&window(&disc.look.ellipse)?, &disc, self.noise));
         region.pixels.iter().for_each(|place| taken[*place] = false);
-        second.filter(|disc| self.is_acceptable(disc, &start))
+        disc.filter(|disc| self.is_acceptable(&disc.look(), &start, 1.0))
     }
 
     /// Whether a pixel belongs to another bright region, or lies where that region's blur may reach.
@@ -173,17 +184,18 @@ impl Search<'_> {
         !own[row * width + col] && rows.any(|row| columns.clone().any(|col| is_other(row * width + col)))
     }
 
-    fn is_acceptable(&self, disc: &DiscFit, start: &Ellipse) -> bool {
+    /// Whether a fit is a disc that is looked for; `slack` times the limits are let pass.
+    fn is_acceptable(&self, disc: &Look, start: &Ellipse, slack: f64) -> bool {
         let [long, short] = disc.ellipse.semi_axes_px;
         let options = self.options;
-        short >= options.smallest_semi_axis_px
-            && long <= options.largest_semi_axis_px
-            && long <= options.largest_axis_ratio * short
-            && start.parts(&start.to_unit_circle(), disc.ellipse.centre) <= 0.5
-            && (0.5..=2.0).contains(&(disc.ellipse.mean_radius_px() / start.mean_radius_px()))
-            && disc.contrast >= options.smallest_contrast_sigmas * self.noise
-            && disc.blur_px <= LARGEST_BLUR_PARTS * short
-            && disc.misfit <= options.largest_misfit
+        short * slack >= options.smallest_semi_axis_px
+            && long <= slack * options.largest_semi_axis_px
+            && long <= slack * options.largest_axis_ratio * short
+            && start.parts(&start.to_unit_circle(), disc.ellipse.centre) <= 0.5 * slack
+            && (0.5 / slack..=2.0 * slack).contains(&(disc.ellipse.mean_radius_px() / start.mean_radius_px()))
+            && disc.contrast * slack >= options.smallest_contrast_sigmas * self.noise
+            && disc.blur_px <= slack * LARGEST_BLUR_PARTS * short
+            && disc.misfit <= slack * options.largest_misfit
             && self.is_mostly_in_image(&disc.ellipse)
     }
 

@@ -7,3 +7,4 @@ pub(crate) mod eccentricity;
 pub(crate) mod ellipse;
 pub(crate) mod find;
 pub(crate) mod options;
+mod rough_fit;

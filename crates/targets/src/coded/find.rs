@@ -1,15 +1,17 @@
 use range_image::Raster;
 
-use super::codes::{Code, codes};
+use super::codes::{Code, codes, mirrored};
 use super::decode::read;
+use super::model::RingModel;
 use crate::circles::find::{CircleSighting, find_circles};
 use crate::circles::options::{CircleOptions, Polarity};
-use crate::error::Result;
+use crate::error::{NotFound, Result};
+use crate::image::noise::noise_deviation;
 
 /// How coded rings are looked for.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CodedOptions {
-    /// Sectors of a ring. Default: 12, which have 165 codes.
+    /// Sectors of a ring. Default: 14, which have 113 codes.
     pub bits: usize,
     /// How the discs in the rings are looked for. Default: bright discs with at least five pixels across, a contrast of ten
     /// deviations of the noise, otherwise as for [`CircleOptions`].
@@ -24,7 +26,7 @@ impl Default for CodedOptions {
             smallest_contrast_sigmas: 10.0,
             ..CircleOptions::default()
         };
-        Self { bits: 12, circles }
+        Self { bits: 14, circles }
     }
 }
 
@@ -44,21 +46,22 @@ pub struct CodedSighting {
 /// Finds coded rings and reads their numbers, by row, then column, of their centres.
 ///
 /// A target is a disc of radius r on free ground of radius 4 r, with a ring from 2 r to 3 r cut into [`CodedOptions::bits`] sectors,
-/// each of the colour of the disc or of the ground. A ring that is not one of [`codes`], or that has a sector of neither colour, is
-/// left out: it is never corrected to the nearest code.
+/// each of the colour of the disc or of the ground. A ring that is not one of [`codes`], or whose pixels are in some sector not as its
+/// code has them, is left out: it is never corrected to the nearest code.
 ///
 /// # Errors
-/// [`crate::Error::Invalid`] for options that cannot be met.
+/// [`crate::Error::Invalid`] for options that cannot be met; [`NotFound::Mirrored`] where more rings are mirror images of codes than
+/// codes.
 ///
 /// ```
 /// use targets::range_image::Raster;
 /// use targets::{CodedOptions, codes, find_coded};
 ///
-/// let code = codes(12)?[17];
+/// let code = codes(14)?[17];
 /// // A disc of radius 5 about (30, 30), samples of a quarter pixel.
 /// let colour = |col: f32, row: f32| {
 ///     let parts = (col - 30.0).hypot(row - 30.0) / 5.0;
-///     let sector = (row - 30.0).atan2(col - 30.0).rem_euclid(std::f32::consts::TAU) * 12.0 / std::f32::consts::TAU;
+///     let sector = (row - 30.0).atan2(col - 30.0).rem_euclid(std::f32::consts::TAU) * 14.0 / std::f32::consts::TAU;
 ///     let set = parts < 1.0 || ((2.0..3.0).contains(&parts) && code.is_set(sector as usize));
 ///     if set { 100.0 } else { 10.0 }
 /// };
@@ -73,12 +76,26 @@ pub struct CodedSighting {
 pub fn find_coded(image: &Raster<f32>, options: &CodedOptions) -> Result<Vec<CodedSighting>> {
     let known = codes(options.bits)?;
     let mut found: Vec<CodedSighting> = Vec::new();
+    let mut in_mirror = 0;
+    let noise = options.circles.noise.unwrap_or_else(|| noise_deviation(image)).max(0.0);
     for circle in find_circles(image, &options.circles)? {
         let Some(reading) = read(image, &circle, options.bits) else { continue };
-        let Ok(place) = known.binary_search_by_key(&reading.word, |code| code.word) else { continue };
+        let place = |word: u32| known.binary_search_by_key(&word, |code| code.word).ok();
+        let [own, mirrored] = [reading.word, mirrored(reading.word, options.bits)].map(place);
+        let code = Code { id: own.unwrap_or(known.len()), word: reading.word, bits: options.bits };
+        if own.or(mirrored).is_none() || !RingModel::new(&circle, code, reading.start_rad).agrees(image, noise) {
+            continue;
+        }
+        let Some(place) = own else {
+            in_mirror += 1;
+            continue;
+        };
         let [col, row] = circle.ellipse.point(reading.start_rad);
         let direction_rad = (row - circle.ellipse.centre[1]).atan2(col - circle.ellipse.centre[0]);
         found.push(CodedSighting { code: known[place], circle, direction_rad, is_repeated: false });
+    }
+    if in_mirror > found.len() {
+        return Err(NotFound::Mirrored.into());
     }
     let ids: Vec<usize> = found.iter().map(|target| target.code.id).collect();
     for target in &mut found {

@@ -3,6 +3,7 @@
 mod codes;
 mod decode;
 mod find;
+mod model;
 
 pub use codes::{Code, codes};
 pub use find::{CodedOptions, CodedSighting, find_coded};

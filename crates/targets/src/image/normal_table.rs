@@ -20,6 +20,7 @@ static TABLE: LazyLock<Vec<[f64; 2]>> = LazyLock::new(|| {
 });
 
 /// The table, to be asked for once a fit.
+#[derive(Clone, Copy)]
 pub(crate) struct NormalTable(&'static [[f64; 2]]);
 
 impl NormalTable {

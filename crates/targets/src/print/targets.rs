@@ -146,7 +146,7 @@ mod tests {
 
     #[test]
     fn codes_fill_pages_and_what_does_not_fit_is_refused() {
-        let codes = codes(12).unwrap();
+        let codes = codes(14).unwrap();
         let page = print_coded(&codes[..12], 0.008, PaperSize::A4).unwrap();
         assert_eq!(page.matches("<circle").count(), 12);
         let set: u32 = codes[..12].iter().map(|code| code.word.count_ones()).sum();

@@ -57,10 +57,15 @@ impl Singles {
     /// What one station shows.
     pub(crate) fn station(&self, picture: Picture) -> Result<StationPicture> {
         let camera = picture.ranges.as_ref().map_or(self.camera, |(_, camera)| *camera);
-        let points = points(self.kind, &picture, &camera)
-            .map_err(|error| pipeline::Error::Estimate { what: "targets", source: error.into() })?;
-        let names = Names { kind: self.kind, camera: &camera, known: &self.known };
-        let named = names.of(&points, self.approximate(&picture.station));
+        let (points, named) = match points(self.kind, &picture, &camera) {
+            Ok(points) => {
+                let names = Names { kind: self.kind, camera: &camera, known: &self.known };
+                let named = names.of(&points, self.approximate(&picture.station));
+                (points, named)
+            }
+            Err(targets::Error::NotFound(reason)) => (Vec::new(), Err(reason.to_string())),
+            Err(error) => return Err(pipeline::Error::Estimate { what: "targets", source: error.into() }),
+        };
         let Picture { station, light, integration_time_s, .. } = picture;
         let (seen, observations) = match named {
             Err(reason) => (Err(reason), Vec::new()),
@@ -95,6 +100,7 @@ impl Singles {
             ambiguity: 1,
             residual_px: named.residual_px,
             unnamed: points.len() - named_count - left_out.len(),
+            unchecked: if named.is_checked { 0 } else { named_count },
             left_out,
             hidden: named.not_seen,
             marks: named.names.iter().zip(points).map(mark).collect(),

@@ -36,6 +36,8 @@ pub(crate) struct Named {
     pub(crate) residual_px: Option<f64>,
     /// Targets that lie in the image and were not seen.
     pub(crate) not_seen: Vec<String>,
+    /// Whether names are held against coordinates; else a code that was read wrongly does not show.
+    pub(crate) is_checked: bool,
 }
 
 impl Names<'_> {
@@ -84,7 +86,7 @@ impl Names<'_> {
         }
         let name = |(point, fault): (&Point, &Option<String>)| point.code.clone().filter(|_| fault.is_none());
         let names: Vec<Option<String>> = points.iter().zip(&faults).map(name).collect();
-        Ok(Named { not_seen: self.not_seen(pose, points), names, faults, residual_px })
+        Ok(Named { not_seen: self.not_seen(pose, points), names, faults, residual_px, is_checked: pose.is_some() })
     }
 
     /// The pose that most codes agree with; `None` where there are too few to judge, or the geometry is too weak.
@@ -122,7 +124,7 @@ impl Names<'_> {
             // One target in the world and one in the image.
             let name = self.known.first().map_or_else(|| self.kind.only().to_owned(), |target| target.target.clone());
             names[*only] = Some(name);
-            return Ok(Named { names, faults, residual_px: None, not_seen: Vec::new() });
+            return Ok(Named { names, faults, residual_px: None, not_seen: Vec::new(), is_checked: true });
         }
         if self.known.is_empty() {
             let (count, noun) = (usable.len(), self.kind.noun());
@@ -144,7 +146,8 @@ impl Names<'_> {
         let named: Vec<&String> = names.iter().flatten().collect();
         let is_missing = |name: &String| !named.contains(&name);
         let not_seen = self.inside(&found.world_from_camera).filter(is_missing).collect();
-        Ok(Named { names, faults, residual_px: Some(upper_median(&mut distances)), not_seen })
+        let residual_px = Some(upper_median(&mut distances));
+        Ok(Named { names, faults, residual_px, not_seen, is_checked: true })
     }
 
     fn position(&self, point: &Point) -> Option<Point3<f64>> {

@@ -45,6 +45,11 @@ impl Fitted {
         self.parameters[6]
     }
 
+    /// Blur of the edges, pixel.
+    pub(super) fn blur_px(&self) -> f64 {
+        self.parameters[4]
+    }
+
     /// Its parameters about the middle of another window.
     fn about(&self, expected: &Expected) -> Parameters {
         let mut parameters = self.parameters;
@@ -75,7 +80,23 @@ struct Sums {
     count: usize,
 }
 
-impl Problem<'_> {
+impl<'a> Problem<'a> {
+    /// The same corner from other pixels of its window.
+    pub(super) fn with_pixels<'b>(&'b self, pixels: &'b [Pixel]) -> Problem<'b>
+    where
+        'a: 'b,
+    {
+        let crossing = Crossing { table: self.crossing.table, spans: self.crossing.spans };
+        Problem { crossing, pixels, noise: self.noise, plateau: self.plateau }
+    }
+
+    /// Residuals of all pixels at a corner of the same window, unit of the image.
+    pub(super) fn residuals(&self, fitted: &Fitted) -> Vec<f64> {
+        let edges = self.crossing.with(&fitted.parameters);
+        let residual = |pixel: &Pixel| pixel.value - edges.value(pixel.place, pixel.bend).0.min(self.plateau);
+        self.pixels.iter().map(residual).collect()
+    }
+
     /// The corner near where it is expected, beginning at an earlier fit if there is one; `None` where the pixels do not
     /// settle one.
     pub(super) fn fit(&self, expected: &Expected, sign: f64, earlier: Option<&Fitted>) -> Option<Fitted> {

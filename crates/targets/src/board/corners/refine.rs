@@ -6,9 +6,10 @@ use nalgebra::{Matrix2, Vector2};
 use range_image::Raster;
 use statistics::{Distribution, chi_squared_limit, upper_median};
 
+use super::covered::without_covered;
 use super::crossing::Crossing;
 use super::fit::{Fitted, Problem};
-use super::window::Expected;
+use super::window::{Expected, Pixel};
 use crate::board::assembly::Assembly;
 use crate::grid::lattice::Node;
 use crate::image::normal_table::NormalTable;
@@ -51,7 +52,11 @@ pub(crate) struct Measured<'a> {
 /// The corners of a lattice, by column and row, from where the saddles are. Those that are no corners are left out.
 pub(crate) fn refine(measured: &Measured<'_>, assembly: &Assembly, points: &mut [Vector2<f64>]) -> Vec<Corner> {
     let table = NormalTable::new();
-    let fitted = fit_all(measured, &table, assembly, points, &BTreeMap::new());
+    let sight = |points: &[Vector2<f64>], earlier: Option<&BTreeMap<Node, Fitted>>| {
+        let windows = windows(measured, &table, assembly, points, earlier);
+        uncovered(measured, assembly, &windows)
+    };
+    let fitted = sight(points, None);
     // Again from better neighbours: what lies beside the fields and how the edges bend is by them.
     for (node, fit) in &fitted {
         if let Some(&point) = assembly.lattice.nodes.get(node) {
@@ -59,32 +64,70 @@ pub(crate) fn refine(measured: &Measured<'_>, assembly: &Assembly, points: &mut 
         }
     }
     let earlier = fitted.into_iter().collect();
-    let fitted = fit_all(measured, &table, assembly, points, &earlier);
-    with_covariance(measured, assembly, &fitted)
+    with_covariance(measured, assembly, &sight(points, Some(&earlier)))
 }
 
-fn fit_all(
+/// A node, what its corner is fitted to, and the corner.
+struct Window<'a> {
+    node: Node,
+    expected: Expected,
+    crossing: Crossing<'a>,
+    pixels: Vec<Pixel>,
+    fitted: Fitted,
+}
+
+impl Window<'_> {
+    fn problem(&self, measured: &Measured<'_>) -> Problem<'_> {
+        let crossing = Crossing { table: self.crossing.table, spans: self.crossing.spans };
+        Problem { crossing, pixels: &self.pixels, noise: measured.noise, plateau: measured.plateau }
+    }
+}
+
+fn windows<'a>(
     measured: &Measured<'_>,
-    table: &NormalTable,
+    table: &'a NormalTable,
     assembly: &Assembly,
     points: &[Vector2<f64>],
-    earlier: &BTreeMap<Node, Fitted>,
-) -> Vec<(Node, Fitted)> {
-    let size = [measured.image.width(), measured.image.height()];
-    let fit = |&node: &Node| {
-        let expected = expected(assembly, points, node)?;
+    earlier: Option<&BTreeMap<Node, Fitted>>,
+) -> Vec<Window<'a>> {
+    let window = |&node: &Node| {
+        let expected = expected(assembly, points, node, earlier)?;
         let pixels = expected.window(measured.image);
-        let crossing = Crossing { table, spans: spans(assembly, points, node, &expected)? };
-        let problem = Problem { crossing, pixels: &pixels, noise: measured.noise, plateau: measured.plateau };
-        let fitted = problem.fit(&expected, assembly.sign_at(node), earlier.get(&node))?;
-        let inside = fitted.position.iter().zip(size).all(|(at, size)| *at >= 0.0 && *at <= size as f64 - 1.0);
-        let moved = (fitted.position - expected.position).norm();
-        let is_corner = inside
-            && moved <= FARTHEST * shorter(&expected)
-            && fitted.contrast() * assembly.sign_at(node) > SIGNIFICANT * fitted.contrast_deviation;
-        is_corner.then_some((node, fitted))
+        let spans = spans(assembly, points, node, &expected)?;
+        let problem = Problem {
+            crossing: Crossing { table, spans },
+            pixels: &pixels,
+            noise: measured.noise,
+            plateau: measured.plateau,
+        };
+        let begin = earlier.and_then(|earlier| earlier.get(&node));
+        let fitted = problem.fit(&expected, assembly.sign_at(node), begin)?;
+        let crossing = Crossing { table, spans };
+        let window = Window { node, expected, crossing, pixels, fitted };
+        is_corner(measured, assembly, &window, &fitted).then_some(window)
     };
-    assembly.lattice.nodes.keys().filter_map(fit).collect()
+    assembly.lattice.nodes.keys().filter_map(window).collect()
+}
+
+/// Whether a fit is a corner of the board: near where it is expected, with the contrast that belongs there.
+fn is_corner(measured: &Measured<'_>, assembly: &Assembly, window: &Window<'_>, fitted: &Fitted) -> bool {
+    let size = [measured.image.width(), measured.image.height()];
+    let inside = fitted.position.iter().zip(size).all(|(at, size)| *at >= 0.0 && *at <= size as f64 - 1.0);
+    let moved = (fitted.position - window.expected.position).norm();
+    inside
+        && moved <= FARTHEST * shorter(&window.expected)
+        && fitted.contrast() * assembly.sign_at(window.node) > SIGNIFICANT * fitted.contrast_deviation
+}
+
+/// The corners by what nothing covers of their windows.
+fn uncovered(measured: &Measured<'_>, assembly: &Assembly, windows: &[Window<'_>]) -> Vec<(Node, Fitted)> {
+    let sigma = common_variance(measured, windows.iter().map(|window| &window.fitted)).sqrt();
+    let fit = |window: &Window<'_>| {
+        let (problem, sign) = (window.problem(measured), assembly.sign_at(window.node));
+        let fitted = without_covered(&problem, &window.expected, sign, sigma, window.fitted)?;
+        is_corner(measured, assembly, window, &fitted).then_some((window.node, fitted))
+    };
+    windows.iter().filter_map(fit).collect()
 }
 
 fn shorter(expected: &Expected) -> f64 {
@@ -92,7 +135,12 @@ fn shorter(expected: &Expected) -> f64 {
 }
 
 /// Where a node's corner is expected; `None` where it has no neighbour along columns or rows.
-fn expected(assembly: &Assembly, points: &[Vector2<f64>], node: Node) -> Option<Expected> {
+fn expected(
+    assembly: &Assembly,
+    points: &[Vector2<f64>],
+    node: Node,
+    earlier: Option<&BTreeMap<Node, Fitted>>,
+) -> Option<Expected> {
     let at = |i: i32, j: i32| assembly.lattice.nodes.get(&[node[0] + i, node[1] + j]).map(|&k| points[k]);
     let position = at(0, 0)?;
     let step = |i: i32, j: i32| match (at(i, j), at(-i, -j)) {
@@ -101,12 +149,23 @@ fn expected(assembly: &Assembly, points: &[Vector2<f64>], node: Node) -> Option<
         (None, Some(last)) => Some(position - last),
         (None, None) => None,
     };
-    Some(Expected { position, steps: [step(1, 0)?, step(0, 1)?], curvatures: curvatures(assembly, points, node) })
+    Some(Expected {
+        position,
+        steps: [step(1, 0)?, step(0, 1)?],
+        curvatures: curvatures(assembly, points, node, earlier),
+    })
 }
 
-/// Curvature of the edges along columns and rows: the mean over the nodes about, each from three in a line.
-fn curvatures(assembly: &Assembly, points: &[Vector2<f64>], node: Node) -> [f64; 2] {
-    let at = |i: i32, j: i32| assembly.lattice.nodes.get(&[i, j]).map(|&k| points[k]);
+/// Curvature of the edges along columns and rows, from three nodes in a line each: the median over the nodes about, as what covers a
+/// corner may be taken for one that lies pixels away; those that an earlier fit found, if there is one.
+fn curvatures(
+    assembly: &Assembly,
+    points: &[Vector2<f64>],
+    node: Node,
+    earlier: Option<&BTreeMap<Node, Fitted>>,
+) -> [f64; 2] {
+    let is_known = |node: &Node| earlier.is_none_or(|earlier| earlier.contains_key(node));
+    let at = |i: i32, j: i32| assembly.lattice.nodes.get(&[i, j]).filter(|_| is_known(&[i, j])).map(|&k| points[k]);
     [[1, 0], [0, 1]].map(|[di, dj]| {
         let curvature = |(i, j): (i32, i32)| {
             let (last, here, next) = (at(i - di, j - dj)?, at(i, j)?, at(i + di, j + dj)?);
@@ -115,9 +174,8 @@ fn curvatures(assembly: &Assembly, points: &[Vector2<f64>], node: Node) -> [f64;
         };
         let columns = node[0] - ABOUT..=node[0] + ABOUT;
         let nodes = columns.flat_map(|i| (node[1] - ABOUT..=node[1] + ABOUT).map(move |j| (i, j)));
-        let (sum, count) =
-            nodes.filter_map(curvature).fold((0.0, 0.0), |(sum, count), curvature| (sum + curvature, count + 1.0));
-        if count > 0.0 { sum / count } else { 0.0 }
+        let mut about: Vec<f64> = nodes.filter_map(curvature).collect();
+        if about.is_empty() { 0.0 } else { upper_median(&mut about) }
     })
 }
 
@@ -145,11 +203,7 @@ fn with_covariance(measured: &Measured<'_>, assembly: &Assembly, fitted: &[(Node
         about.any(|other| assembly.lattice.nodes.contains_key(&other) && !seen.contains(&other))
     };
     let given = measured.noise * measured.noise;
-    // Each variance over the median of its distribution, so that a half lies on either side.
-    let relative =
-        |fit: &Fitted| fit.variance * fit.freedom / Distribution::ChiSquared { dof: fit.freedom }.quantile(0.5);
-    let scatter = upper_median(&mut fitted.iter().map(|(_, fit)| relative(fit)).collect::<Vec<_>>());
-    let common = scatter.max(measured.least_noise * measured.least_noise);
+    let common = common_variance(measured, fitted.iter().map(|(_, fit)| fit));
     let corner = |(node, fit): &(Node, Fitted)| {
         let by_chance = common * chi_squared_limit(fit.freedom, LEVEL) / fit.freedom;
         let excessive = fit.variance > by_chance;
@@ -161,4 +215,13 @@ fn with_covariance(measured: &Measured<'_>, assembly: &Assembly, fitted: &[(Node
         Some(Corner { node: *node, position: fit.position, covariance: fit.covariance * (variance / given) })
     };
     fitted.iter().filter_map(corner).collect()
+}
+
+/// Variance of the residuals of most corners: not below the noise that is believed at least.
+fn common_variance<'a>(measured: &Measured<'_>, fitted: impl Iterator<Item = &'a Fitted>) -> f64 {
+    // Each variance over the median of its distribution, so that a half lies on either side.
+    let relative =
+        |fit: &Fitted| fit.variance * fit.freedom / Distribution::ChiSquared { dof: fit.freedom }.quantile(0.5);
+    let scatter = upper_median(&mut fitted.map(relative).collect::<Vec<_>>());
+    scatter.max(measured.least_noise * measured.least_noise)
 }

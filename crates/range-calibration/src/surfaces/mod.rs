@@ -6,6 +6,7 @@
 
 mod amplitude;
 mod calibrate;
+mod holes;
 mod options;
 mod outcome;
 mod pixels;

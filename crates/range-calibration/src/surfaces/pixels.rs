@@ -5,9 +5,19 @@ use error_models::RangeErrorModel;
 use nalgebra::Vector3;
 use point_cloud::{Cloud, organised_normals};
 use range_image::Flags;
+use statistics::quantile;
 
+use super::holes::filled;
 use super::{SurfaceCalibrationOptions, SurfaceCapture};
 use crate::{Error, Result};
+
+/// Times the range that one pixel in a hundred exceeds beyond which a range is wild: a scene that goes on so far behind a hundredth of
+/// its pixels loses these. Single pixels tell nothing of surfaces; ten times as much would keep what costs time alone.
+const WILD: f64 = 3.0;
+/// Part of the pixels that may be wild.
+const WILD_PART: f64 = 0.01;
+/// Largest median range of a frame, metre: no range camera sees rooms from further away, and half a metre in millimetres is more.
+const LONGEST_RANGE_M: f64 = 300.0;
 
 /// Usable pixels of one station, in the order of the points of its cloud.
 #[derive(Default)]
@@ -52,6 +62,9 @@ impl StationPixels {
             let mismatch = range_image::Error::SizeMismatch { what: "frame", width, height, found_width, found_height };
             return Err(Error::Image(mismatch));
         }
+        let farthest_m = farthest(capture, options)?;
+        // Without any, the hyperbola is held; one pixel without says nothing of it.
+        let has_amplitudes = frame.amplitude.as_slice().iter().any(|amplitude| *amplitude > 0.0);
         let values = model.parameter_values();
         let [xp, yp] = camera.interior.principal_point_mm;
         let mut kept = Self { columns: known.columns.len(), ..Self::default() };
@@ -59,8 +72,8 @@ impl StationPixels {
         let mut row = vec![0.0; model.parameter_count()];
         for (index, point) in points.iter_mut().enumerate() {
             let place = (index % width, index / width);
-            let range = f64::from(frame.range[place]);
-            if !(range > 0.0 && range.is_finite()) || frame.flags[place].intersects(options.exclude | Flags::NO_DATA) {
+            let Some(range) = usable(capture, place, options).filter(|range| *range <= farthest_m) else { continue };
+            if known.amplitude && has_amplitudes && !(frame.amplitude[place] > 0.0 && frame.amplitude[place].is_finite()) {
                 continue;
             }
             let pixel = [place.0 as f64, place.1 as f64];
@@ -85,7 +98,9 @@ impl StationPixels {
             kept.rows.extend(known.columns.iter().map(|&column| row[column] as f32));
         }
         let fail = |error: point_cloud::Error| Error::registration(capture.name, error);
-        let normals = organised_normals(&points, width, height, &options.normals).map_err(fail)?;
+        // Pixels without a range are no edges: neighbours stand in for them where planes are fitted.
+        let whole = filled(&points, width, height, options.normals.max_relative_jump);
+        let normals = organised_normals(&whole, width, height, &options.normals).map_err(fail)?;
         let cloud = Cloud::from_frame(&points, Some(&normals), Some(frame.sigma.as_slice())).map_err(fail)?;
         Ok((kept, cloud))
     }
@@ -94,4 +109,30 @@ impl StationPixels {
     pub(super) fn row(&self, index: usize) -> &[f32] {
         &self.rows[index * self.columns..(index + 1) * self.columns]
     }
+}
+
+/// The range of a pixel that takes part.
+fn usable(
+    capture: &SurfaceCapture<'_>,
+    place: (usize, usize),
+    options: &SurfaceCalibrationOptions<'_>,
+) -> Option<f64> {
+    let (range, flags) = (f64::from(capture.frame.range[place]), capture.frame.flags[place]);
+    let is_range = range > 0.0 && range.is_finite();
+    (is_range && !flags.intersects(options.exclude | Flags::NO_DATA)).then_some(range)
+}
+
+/// The range beyond which one is wild, metre. Refuses a frame without ranges, and one in another unit.
+fn farthest(capture: &SurfaceCapture<'_>, options: &SurfaceCalibrationOptions<'_>) -> Result<f64> {
+    let (width, height) = (capture.frame.width(), capture.frame.height());
+    let places = (0..width * height).map(|index| (index % width, index / width));
+    let mut ranges: Vec<f64> = places.filter_map(|place| usable(capture, place, options)).collect();
+    if ranges.is_empty() {
+        return Err(Error::NoPixels { station: capture.name.to_owned() });
+    }
+    let median_m = quantile(&mut ranges, 0.5);
+    if median_m > LONGEST_RANGE_M {
+        return Err(Error::NotInMetre { station: capture.name.to_owned(), median_m, limit_m: LONGEST_RANGE_M });
+    }
+    Ok(WILD * quantile(&mut ranges, 1.0 - WILD_PART))
 }

@@ -84,7 +84,10 @@ fn wild_values_and_holes_cost_nothing_but_their_pixels() {
         frames.iter_mut().enumerate().for_each(|(k, frame)| harm(frame, k));
         let [value, own] = offset(&calibrated(&frames, &poses).unwrap());
         println!("{what}: {value:.6} +- {own:.6}, without {clean:.6} +- {sigma:.6}");
-        assert!((value - OFFSET_M).abs() < 4.0 * own && own < wider * sigma, "{what}: {value} +- {own}, {clean} +- {sigma}");
+        assert!(
+            (value - OFFSET_M).abs() < 4.0 * own && own < wider * sigma,
+            "{what}: {value} +- {own}, {clean} +- {sigma}"
+        );
     }
 }
 

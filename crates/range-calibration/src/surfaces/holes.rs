@@ -50,7 +50,12 @@ mod tests {
         }
         let whole = filled(&points, width, height, 0.03);
         // The mean of a ring is its middle: exact up to rounding.
-        assert!(whole[2 * width + 2].iter().zip([0.02, 0.02, -2.0]).all(|(found, expected)| (found - expected).abs() < 1e-12));
+        assert!(
+            whole[2 * width + 2]
+                .iter()
+                .zip([0.02, 0.02, -2.0])
+                .all(|(found, expected)| (found - expected).abs() < 1e-12)
+        );
         assert!((0..height).all(|row| whole[row * width + 6][0].is_nan() && whole[row * width + 7][0].is_nan()));
     }
 }

@@ -6,6 +6,7 @@
 
 mod amplitude;
 mod calibrate;
+mod footprint;
 mod holes;
 mod options;
 mod outcome;

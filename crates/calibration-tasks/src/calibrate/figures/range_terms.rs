@@ -50,7 +50,9 @@ pub(crate) fn figures(outcome: &CalibrationOutcome, beside: Option<&Calibration>
     let Some((_, model)) = outcome.range_models.first() else { return Vec::new() };
     let own = Side::new(&outcome.camera, model, &outcome.estimated, &outcome.first_order_covariance);
     let beside = beside.and_then(Side::of_file);
-    let figures = parts(outcome).into_iter().filter(|part| part.is_in(&own) || beside.as_ref().is_some_and(|side| part.is_in(side)));
+    let figures = parts(outcome)
+        .into_iter()
+        .filter(|part| part.is_in(&own) || beside.as_ref().is_some_and(|side| part.is_in(side)));
     figures.flat_map(|part| part.figures(&own, beside.as_ref())).collect()
 }
 
@@ -67,7 +69,8 @@ impl Side {
         let [written] = file.range_models.as_slice() else { return None };
         let known = written.parameters.iter().filter(|parameter| parameter.sigma > 0.0);
         let names: Vec<&str> = known.map(|parameter| parameter.name.as_str()).collect();
-        let (camera, model, covariance) = (file.camera().ok()?, written.to_model().ok()?, file.covariance(&names).ok()?);
+        let (camera, model, covariance) =
+            (file.camera().ok()?, written.to_model().ok()?, file.covariance(&names).ok()?);
         let names: Vec<String> = names.into_iter().map(str::to_owned).collect();
         Some(Self::new(&camera, &model, &names, &covariance))
     }
@@ -88,7 +91,8 @@ impl Side {
 /// The parts over what was observed.
 fn parts(outcome: &CalibrationOutcome) -> Vec<Part> {
     let observed = |of: fn(&self_calibration::ObservationQuality) -> f64| {
-        let values: Vec<f64> = outcome.residuals.iter().map(of).filter(|value| value.is_finite() && *value > 0.0).collect();
+        let values: Vec<f64> =
+            outcome.residuals.iter().map(of).filter(|value| value.is_finite() && *value > 0.0).collect();
         [BEYOND, 0.5, 1.0 - BEYOND].map(|share| quantile(&mut values.clone(), share))
     };
     let [ranges, amplitudes] = [observed(|quality| quality.range_m), observed(|quality| quality.amplitude)];
@@ -112,8 +116,9 @@ fn parts(outcome: &CalibrationOutcome) -> Vec<Part> {
             x: "logarithm (base 10) of the amplitude",
             words: "The offset with what goes with the amplitude: what is received in bright light does not tell the two apart",
             of: |found| found.offset_m + found.amplitude_m,
-            places: along([amplitudes[0].log10(), amplitudes[2].log10()], &|power| {
-                Place { amplitude: 10.0_f64.powf(power), ..middle }
+            places: along([amplitudes[0].log10(), amplitudes[2].log10()], &|power| Place {
+                amplitude: 10.0_f64.powf(power),
+                ..middle
             }),
         },
         Part {
@@ -165,7 +170,8 @@ impl Part {
         let difference: Vec<[f64; 3]> =
             own.iter().zip(beside).map(|([x, value, band], [_, given, _])| [*x, value - given, *band]).collect();
         let given: Vec<[f64; 3]> = beside.iter().map(|[x, value, band]| [*x, value - value, *band]).collect();
-        let axes = Axes { title: "Less the given", x: self.x, y: "difference, mm" };
+        let title = format!("{}: difference", self.title);
+        let axes = Axes { title: &title, x: self.x, y: "less the given, mm" };
         let mut canvas = self.canvas(&axes, difference.iter().chain(&given));
         draw(&mut canvas, &given, BESIDE, "6 4");
         canvas.name(BESIDE, "as given");
@@ -173,7 +179,12 @@ impl Part {
         canvas.name(OWN, "from surfaces");
         let known = difference.iter().filter(|[_, value, _]| value.is_finite());
         let largest = known.map(|[_, value, _]| value.abs()).fold(0.0, f64::max);
-        (canvas.finish(), format!("The same less the curve that was given: at most {largest:.2} mm. Each band is that of its own calibration."))
+        (
+            canvas.finish(),
+            format!(
+                "The same less the curve that was given: at most {largest:.2} mm. Each band is that of its own calibration."
+            ),
+        )
     }
 
     fn canvas<'a>(&self, axes: &Axes<'_>, curves: impl Iterator<Item = &'a [f64; 3]> + Clone) -> Canvas {

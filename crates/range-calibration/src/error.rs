@@ -95,7 +95,9 @@ pub enum Error {
         station: String,
     },
     /// A frame without a usable pixel.
-    #[error("station `{station}` has no usable pixel: all of them are without a range or flagged; leave it out of the survey")]
+    #[error(
+        "station `{station}` has no usable pixel: all of them are without a range or flagged; leave it out of the survey"
+    )]
     NoPixels {
         /// Its name.
         station: String,

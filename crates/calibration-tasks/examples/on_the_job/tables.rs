@@ -29,7 +29,8 @@ fn mean(values: &[f64]) -> (f64, f64) {
 }
 
 fn of_terms(text: &mut String, all: &[SurveyFigures]) {
-    let _ = writeln!(text, "{:>6} {:>11} {:>11} {:>11} {:>12}", "term", "mean error", "scatter", "stated", "squared/var");
+    let _ =
+        writeln!(text, "{:>6} {:>11} {:>11} {:>11} {:>12}", "term", "mean error", "scatter", "stated", "squared/var");
     let mut names: Vec<&String> = Vec::new();
     for (name, ..) in all.iter().flat_map(|survey| &survey.terms) {
         if !names.contains(&name) {
@@ -69,7 +70,8 @@ fn of_checks(text: &mut String, all: &[SurveyFigures]) {
     );
     let [checks, moved, matters] = count(|survey| &survey.of_moved);
     let by = 1e3 * MOVED_M;
-    let _ = writeln!(text, "the same with d0 moved by {by} mm: {checks}; moved: {moved}, and by what matters: {matters}");
+    let _ =
+        writeln!(text, "the same with d0 moved by {by} mm: {checks}; moved: {moved}, and by what matters: {matters}");
 }
 
 /// The test of `check` between the own calibrations of all pairs of surveys, and of those pairs that have no survey in common.

@@ -28,8 +28,7 @@ impl PointUncertainty<'_> {
         amplitude: f64,
     ) -> Vec<f64> {
         let moved = self.moved(names, covariance);
-        let sigma =
-            |range_m: &f64| moved.sigma_of(|model| model.correction(*range_m, 0.0, 0.0, amplitude).total_m());
+        let sigma = |range_m: &f64| moved.sigma_of(|model| model.correction(*range_m, 0.0, 0.0, amplitude).total_m());
         ranges_m.iter().map(sigma).collect()
     }
 

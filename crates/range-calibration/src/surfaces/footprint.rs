@@ -27,8 +27,8 @@ const LEAST_SCALE: f64 = 0.1;
 
 /// The pixels of a frame: what their width does.
 pub(super) struct Footprints {
-    /// Part of the range by which it is changed; NaN where that is not known: no surface is, it is seen edge-on, or the pixel's patch
-    /// may go over an edge.
+    /// Part of the range by which it is changed, zero where no surface is found; NaN where the surface is seen edge-on, or the pixel's
+    /// patch may go over an edge.
     pub(super) parts: Vec<f32>,
 }
 
@@ -58,8 +58,9 @@ impl Surfaced<'_> {
     /// Part of its range by which a pixel's is changed.
     fn part(&self, index: usize) -> f64 {
         let normal = &self.normals[index];
+        // A few pixels on narrow things; they tell where the station stands.
         if normal.x.is_nan() {
-            return f64::NAN;
+            return 0.0;
         }
         let width = self.frame.width();
         let (col, row) = ((index % width) as f64, (index / width) as f64);

@@ -19,6 +19,9 @@ const WILD: f64 = 3.0;
 const WILD_PART: f64 = 0.01;
 /// Largest median range of a frame, metre: no range camera sees rooms from further away, and half a metre in millimetres is more.
 const LONGEST_RANGE_M: f64 = 300.0;
+/// Windows (half width, part that must be filled) that tell how slanted a surface is where the usual ones do not fit: beside edges, and
+/// on what is narrow. Their noise hardly matters there, since the width of a pixel changes its range with the square of the slant.
+const NEAR_EDGES: [(usize, f64); 2] = [(2, 0.5), (1, 0.5)];
 
 /// Usable pixels of one station, in the order of the points of its cloud.
 #[derive(Default)]
@@ -68,10 +71,13 @@ impl StationPixels {
         // Pixels without a range are no edges: neighbours stand in for them where planes are fitted.
         let whole = filled(&points, width, height, options.normals.max_relative_jump);
         let normals = organised_normals(&whole, width, height, &options.normals).map_err(fail)?;
-        let near_edges = OrganisedNormalOptions { half_width_px: 2, min_fill: 0.5, ..options.normals };
-        let mut everywhere = organised_normals(&whole, width, height, &near_edges).map_err(fail)?;
-        for (normal, better) in everywhere.iter_mut().zip(&normals).filter(|(_, better)| !better.x.is_nan()) {
-            *normal = *better;
+        let mut everywhere = normals.clone();
+        for (half_width_px, min_fill) in NEAR_EDGES {
+            let smaller = OrganisedNormalOptions { half_width_px, min_fill, ..options.normals };
+            let found = organised_normals(&whole, width, height, &smaller).map_err(fail)?;
+            for (normal, found) in everywhere.iter_mut().zip(found).filter(|(normal, _)| normal.x.is_nan()) {
+                *normal = found;
+            }
         }
         let footprints = Surfaced { camera, frame, points: &points, normals: &everywhere }.footprints();
         let values = model.parameter_values();

@@ -8,7 +8,9 @@ use report::{Figure, pattern_figures};
 use self_calibration::CalibrationOutcome;
 
 use crate::calibrate::FoundTable;
-use crate::calibrate::figures::{coverage, image_residuals, map, point_uncertainty, range_error, range_terms, residuals};
+use crate::calibrate::figures::{
+    coverage, image_residuals, map, point_uncertainty, range_error, range_terms, residuals,
+};
 use crate::calibrate::point_uncertainty::{PointUncertainty, amplitude_of};
 
 /// The figures of each section.

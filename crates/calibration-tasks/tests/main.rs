@@ -15,3 +15,4 @@ mod diff;
 mod documented_files;
 mod hostile_files;
 mod room;
+mod surfaces;

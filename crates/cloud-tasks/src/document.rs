@@ -3,7 +3,7 @@
 use std::fmt;
 
 use point_uncertainty::Source;
-use report::{Column, Document, Figure};
+use report::{Column, Document, Figure, rounded};
 
 use crate::summary::{LengthSummary, MeasureSummary, RegionSummary};
 
@@ -66,7 +66,7 @@ fn row(length: &LengthSummary) -> Vec<String> {
     let interval = interval.map_or_else(|| "-".to_owned(), |[low, high]| format!("{low} to {high}"));
     let mut cells = vec![length.name.clone(), length.kind.to_owned(), value, sigma, interval];
     cells.extend(Source::ALL.into_iter().map(|source| {
-        length.shares.get(source.name()).map_or_else(|| "-".to_owned(), |share| format!("{:.1}", 100.0 * share))
+        length.shares.get(source.name()).map_or_else(|| "-".to_owned(), |share| rounded(100.0 * share, 1))
     }));
     cells
 }
@@ -125,7 +125,7 @@ pub(crate) fn digits(value: f64, scale: Option<f64>, significant: u32) -> String
     match scale.filter(|scale| *scale > 0.0 && scale.is_finite()) {
         Some(scale) => {
             let behind = (f64::from(significant) - 1.0 - scale.log10().floor()).clamp(0.0, MOST_DIGITS);
-            format!("{value:.0$}", behind as usize)
+            rounded(value, behind as usize)
         }
         None => format!("{value}"),
     }

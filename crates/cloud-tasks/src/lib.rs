@@ -3,6 +3,7 @@
 mod document;
 mod figures;
 mod fuse;
+mod fused_result;
 mod measure;
 mod measured;
 mod plan;

@@ -6,6 +6,7 @@ use std::time::Instant;
 use atomic_output::{Destination, write_text};
 use commands::{Doubt, DoubtKind, Error, Inputs, Progress, Result, json, produce};
 use point_uncertainty::Source;
+use report::rounded;
 
 use crate::document;
 use crate::figures::Pictures;
@@ -70,9 +71,12 @@ fn work(asked: &MeasureRequest, destination: &Destination, progress: &dyn Progre
 
 /// What the standard deviations leave out.
 pub(crate) fn left_out(cloud: &ResultCloud) -> Vec<Doubt> {
-    let missing = "the result has no common_errors.ron: standard deviations are those of noise alone, in all directions alike, and leave \
-                   out calibration, drift and poses; run the pipeline again to have it written";
-    let missing = (!cloud.has_common).then(|| missing.to_owned());
+    let alone = "has no common_errors.ron: standard deviations are those of noise alone, in all directions alike, and leave out \
+                 calibration, drift and poses";
+    let missing = (!cloud.has_common).then(|| match &cloud.fused_from {
+        Some(result) => format!("a fused cloud {alone}; measure in the result that it was fused from, {result}"),
+        None => format!("the result {alone}; run the pipeline again to have it written"),
+    });
     let named = cloud.not_in_it.iter().map(|words| format!("standard deviations leave out {words}"));
     missing.into_iter().chain(named).map(|words| Doubt::new(DoubtKind::Calibration, words)).collect()
 }
@@ -145,7 +149,7 @@ fn table(summary: &MeasureSummary) -> String {
         let _ = write!(text, "{},{},{low},{high}", length.unit, number(length.sigma));
         for source in Source::ALL {
             let share = length.shares.get(source.name());
-            let _ = write!(text, ",{}", share.map_or_else(String::new, |share| format!("{share:.4}")));
+            let _ = write!(text, ",{}", share.map_or_else(String::new, |share| rounded(*share, 4)));
         }
         text.push('\n');
     }

@@ -14,6 +14,7 @@ use range_io::clouds::CloudFile;
 use range_io::ply::read_cloud;
 use range_io::ron_text;
 
+use crate::fused_result::fused_from;
 use crate::plan::request;
 
 /// The cloud's file in a result.
@@ -29,6 +30,8 @@ pub(crate) struct ResultCloud {
     pub(crate) usable: Vec<usize>,
     /// Whether there is a file of common errors.
     pub(crate) has_common: bool,
+    /// Where there is none, the folder of the result that this cloud was fused from, if it was.
+    pub(crate) fused_from: Option<String>,
     /// Calibration that it names.
     pub(crate) calibration: Option<String>,
     /// What the common errors leave out, in words.
@@ -60,7 +63,8 @@ impl ResultCloud {
         }
         let errors_path = folder.join(COMMON_ERRORS);
         if !errors_path.exists() {
-            return Ok(Self::new(file, Vec::new(), CommonErrors::none(), None));
+            let alone = Self::new(file, Vec::new(), CommonErrors::none(), None);
+            return Ok(Self { fused_from: fused_from(folder), ..alone });
         }
         let errors: CommonErrorsFile = ron_text::read(&errors_path)?;
         let wrong = |message: String| request(format!("{}: {message}", errors_path.display()));
@@ -87,6 +91,7 @@ impl ResultCloud {
         Self {
             usable: (0..points.len()).filter(|point| flag(point) == 0).collect(),
             has_common: !stations.is_empty(),
+            fused_from: None,
             errors: ErrorsOfCloud {
                 points: points.clone(),
                 sigma: file.sigma,

@@ -179,6 +179,10 @@ fn what_cannot_be_fused_is_refused_by_name() {
     std::fs::remove_file(folder.path("result/common_errors.ron")).unwrap();
     let found = said(&folder, &asked, Failure::Usage);
     assert!(found.contains("common_errors.ron") && found.contains("run the pipeline again"), "{found}");
+    let summary = r#"{"result": "rooms/north", "fused_points": 12}"#;
+    std::fs::write(folder.path("result/summary.json"), summary).unwrap();
+    let found = said(&folder, &asked, Failure::Usage);
+    assert!(found.contains("made of, rooms/north"), "{found}");
 }
 
 #[test]

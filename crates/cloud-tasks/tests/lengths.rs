@@ -120,4 +120,11 @@ fn without_common_errors_it_is_noise_alone_and_doubted() {
     assert!(alone.doubts[0].words.contains("noise alone"), "{:?}", alone.doubts);
     assert!(alone.lengths[2].sigma.unwrap() < all.lengths[2].sigma.unwrap());
     assert_eq!(alone.lengths[2].shares["noise"], 1.0);
+    assert!(alone.doubts[0].words.contains("run the pipeline again"), "{:?}", alone.doubts);
+    // In a fused cloud, it is said where its points came from.
+    let summary = r#"{"result": "rooms/north", "fused_points": 12, "voxel_m": 0.02}"#;
+    std::fs::write(folder.path("result/summary.json"), summary).unwrap();
+    let fused = folder.measure(PLAN).unwrap();
+    let words = &fused.doubts[0].words;
+    assert!(words.contains("fused from, rooms/north") && !words.contains("pipeline"), "{words}");
 }

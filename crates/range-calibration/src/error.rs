@@ -85,6 +85,36 @@ pub enum Error {
         "with unknown planes a hyperbola is held, not estimated: estimate it from the differences to adjusted planes"
     )]
     HyperbolaNotHeld,
+    /// A single station, which no other one sees the surfaces of.
+    #[error(
+        "there is one station, `{station}`: surfaces tell range terms where two stations or more see the same ones from different \
+         places; take more stations, or calibrate from targets or planes"
+    )]
+    OneStation {
+        /// Its name.
+        station: String,
+    },
+    /// A frame without a usable pixel.
+    #[error(
+        "station `{station}` has no usable pixel: all of them are without a range or flagged; leave it out of the survey"
+    )]
+    NoPixels {
+        /// Its name.
+        station: String,
+    },
+    /// A frame whose ranges are too long to be metres.
+    #[error(
+        "half of the ranges of station `{station}` are beyond {median_m:.0} m, expected at most {limit_m} m: are they in millimetres? \
+         Give them in metre"
+    )]
+    NotInMetre {
+        /// Its name.
+        station: String,
+        /// Median of its ranges, metre if they are.
+        median_m: f64,
+        /// Largest median that is accepted, metre.
+        limit_m: f64,
+    },
     /// Surfaces seen from several stations leave a term open.
     #[error(
         "the surfaces do not determine `{term}`: its effect on the ranges is known to {:.1} mm only, {:.1} mm are asked \
@@ -108,7 +138,9 @@ pub enum Error {
     /// The stations still slide along their surfaces at the end of the adjustment.
     #[error(
         "the stations did not settle in {} rounds without and {} rounds with the terms: a direction is held by too few \
-         surfaces; give better approximate poses, or stations that see more furniture across it", .rounds[0], .rounds[1]
+         surfaces, or the lens is another camera's, or stations or their poses are exchanged; give better approximate poses, or \
+         stations that see more furniture across it, and look at the lens and at which frame and pose belong to which station",
+        .rounds[0], .rounds[1]
     )]
     SurfacesNotSettled {
         /// Rounds with the known model, and with the terms as unknowns.

@@ -23,4 +23,5 @@ mod real_hyperbola;
 mod round;
 mod support;
 mod surfaces;
+mod surfaces_broken;
 mod unknown_planes;

@@ -4,7 +4,7 @@ mod document;
 mod error;
 mod figure;
 
-pub use document::{Alignment, Block, Column, Document, Merit, Place, Section, Table, millimetres};
+pub use document::{Alignment, Block, Column, Document, Merit, Place, Section, Table, millimetres, rounded};
 pub use error::Error;
 use error::Result;
 pub use figure::{

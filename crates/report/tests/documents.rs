@@ -1,4 +1,4 @@
-use report::{Block, Column, Document, Merit, Place, Table};
+use report::{Block, Column, Document, Merit, Place, Table, rounded};
 
 fn document() -> Document {
     let mut document = Document::new("A <wall>", "Of 3 m.");
@@ -46,4 +46,11 @@ fn columns_of_headers_alone_stand_as_their_cells_ask() {
     assert_eq!(document.to_string(), "t\nlength  taken\n 12 mm  yes\n     -  no");
     let printed = Document::for_print("t", "");
     assert!(printed.html().contains("@page"));
+}
+
+#[test]
+fn what_rounds_to_zero_has_no_sign() {
+    let cells = [-0.04, -0.05, -0.0, 0.0, -12.34].map(|value| rounded(value, 1));
+    assert_eq!(cells, ["0.0", "-0.1", "0.0", "0.0", "-12.3"]);
+    assert_eq!([rounded(-0.4, 0), rounded(f64::NAN, 1), rounded(f64::NEG_INFINITY, 1)], ["0", "NaN", "-inf"]);
 }

@@ -27,16 +27,8 @@ impl PointUncertainty<'_> {
         ranges_m: &[f64],
         amplitude: f64,
     ) -> Vec<f64> {
-        let MovedCalibration { moved, correlation } = self.moved(names, covariance);
-        let sigma = |range_m: &f64| {
-            let half = |pair: &Moved| {
-                let [up, down] =
-                    [&pair[0].1, &pair[1].1].map(|model| model.correction(*range_m, 0.0, 0.0, amplitude).total_m());
-                (up - down) / 2.0
-            };
-            let effects = DVector::from_iterator(moved.len(), moved.iter().map(half));
-            effects.dot(&(&correlation * &effects)).max(0.0).sqrt()
-        };
+        let moved = self.moved(names, covariance);
+        let sigma = |range_m: &f64| moved.sigma_of(|model| model.correction(*range_m, 0.0, 0.0, amplitude).total_m());
         ranges_m.iter().map(sigma).collect()
     }
 
@@ -96,6 +88,14 @@ impl MovedCalibration {
     /// Whether nothing was estimated.
     pub(crate) fn is_empty(&self) -> bool {
         self.moved.is_empty()
+    }
+
+    /// Standard deviation of a quantity of the range model: half the difference of what was moved stands for derivative times
+    /// standard deviation.
+    pub(crate) fn sigma_of(&self, quantity: impl Fn(&RangeErrorModel) -> f64) -> f64 {
+        let half = |pair: &Moved| (quantity(&pair[0].1) - quantity(&pair[1].1)) / 2.0;
+        let effects = DVector::from_iterator(self.moved.len(), self.moved.iter().map(half));
+        effects.dot(&(&self.correlation * &effects)).max(0.0).sqrt()
     }
 
     /// Standard deviations at a pixel (column, row), a range in metre and an amplitude: half the difference of what was moved

@@ -73,8 +73,14 @@ fn calibrate_into(
             let page = crate::calibrate::document::certificate_page::render_certificate(&certificate, &summary, &date);
             summary.certificate = Some(certificate);
             let summary = finish(summary);
-            let results = Results { outcome, table, file: &file, certificate_page: &page };
-            write(destination, &results, &summary, progress)?;
+            // Surfaces find what targets found: where a calibration is given, both stand beside each other.
+            let beside = start.calibration.as_ref().filter(|given| !given.range_models.is_empty());
+            let figures = match request.method {
+                CalibrateMethod::Surfaces => Figures::new(outcome, table)?.with_range_terms(outcome, beside),
+                _ => Figures::new(outcome, table)?,
+            };
+            let results = Results { outcome, figures, file: &file, certificate_page: &page };
+            write(destination, results, &summary, progress)?;
             progress.finish();
             Ok(summary)
         }
@@ -180,20 +186,20 @@ fn file(
 /// What is written beside the summary.
 struct Results<'a> {
     outcome: &'a CalibrationOutcome,
-    table: Option<&'a FoundTable>,
+    figures: Figures,
     file: &'a Calibration,
     certificate_page: &'a str,
 }
 
 fn write(
     destination: &Destination,
-    results: &Results<'_>,
+    results: Results<'_>,
     summary: &CalibrationSummary,
     progress: &dyn Progress,
 ) -> Result<()> {
-    let Results { outcome, table, file, certificate_page } = results;
+    let Results { outcome, figures, file, certificate_page } = results;
     progress.begin("write results", 2);
-    let page = document(summary, Figures::new(outcome, *table)?);
+    let page = document(summary, figures);
     let folder = destination.open()?;
     write_files(&folder, Path::new(""), outcome, file, summary, &page)?;
     progress.advance(1);

@@ -3,7 +3,7 @@
 use std::cmp::Reverse;
 use std::fmt;
 
-use report::{Column, Document, Figure, millimetres};
+use report::{Column, Document, Figure, millimetres, rounded};
 
 use super::summary::{ContradictionSummary, FuseSummary};
 
@@ -58,7 +58,7 @@ pub(crate) fn document(summary: &FuseSummary, pictures: Vec<Figure>) -> Document
 fn shares(document: &mut Document, summary: &FuseSummary) {
     let Some(sigma) = &summary.sigma else { return };
     let columns = [Column::words("source"), Column::number("mean share of the variance, %")];
-    let rows = sigma.shares.iter().map(|(name, share)| vec![(*name).to_owned(), format!("{:.1}", 100.0 * share)]);
+    let rows = sigma.shares.iter().map(|(name, share)| vec![(*name).to_owned(), rounded(100.0 * share, 1)]);
     document.table(columns, rows.collect());
     let words = format!("Nineteen of twenty have a standard deviation below {}.", millimetres(Some(sigma.below_95_m)));
     document.paragraph(words);

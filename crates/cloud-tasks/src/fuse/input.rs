@@ -31,9 +31,12 @@ impl<'a> Usable<'a> {
     pub fn new(cloud: &'a ResultCloud, asked: &FuseRequest) -> Result<Self> {
         let errors = &cloud.errors;
         if !cloud.has_common {
+            let remedy = match &cloud.fused_from {
+                Some(result) => format!("it is a fused cloud: name the result that it was made of, {result}"),
+                None => "run the pipeline again to have it written".to_owned(),
+            };
             return Err(slip(format!(
-                "{}: there is no common_errors.ron, which tells where the frames stood and what their points have in common; run the \
-                 pipeline again to have it written",
+                "{}: there is no common_errors.ron, which tells where the frames stood and what their points have in common; {remedy}",
                 asked.result.display()
             )));
         }

@@ -46,6 +46,9 @@ pub fn calibrate_surfaces(
     known.validate()?;
     camera.validate()?;
     let asked = options.asked(&known.parameter_names())?;
+    if let [only] = captures {
+        return Err(Error::OneStation { station: only.name.to_owned() });
+    }
     let columns: Vec<usize> = asked.range.iter().map(|(column, _)| *column).collect();
     let given = Known { camera, model: known, columns: &columns, amplitude: asked.amplitude };
     let (mut stations, mut clouds) = (Vec::new(), Vec::new());

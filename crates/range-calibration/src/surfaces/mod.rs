@@ -6,6 +6,8 @@
 
 mod amplitude;
 mod calibrate;
+mod footprint;
+mod holes;
 mod options;
 mod outcome;
 mod pixels;

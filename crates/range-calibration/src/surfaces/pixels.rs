@@ -3,11 +3,25 @@
 use camera_model::Camera;
 use error_models::RangeErrorModel;
 use nalgebra::Vector3;
-use point_cloud::{Cloud, organised_normals};
+use point_cloud::{Cloud, OrganisedNormalOptions, organised_normals};
 use range_image::Flags;
+use statistics::quantile;
 
+use super::footprint::Surfaced;
+use super::holes::filled;
 use super::{SurfaceCalibrationOptions, SurfaceCapture};
 use crate::{Error, Result};
+
+/// Times the range that one pixel in a hundred exceeds beyond which a range is wild: a scene that goes on so far behind a hundredth of
+/// its pixels loses these. Single pixels tell nothing of surfaces; ten times as much would keep what costs time alone.
+const WILD: f64 = 3.0;
+/// Part of the pixels that may be wild.
+const WILD_PART: f64 = 0.01;
+/// Largest median range of a frame, metre: no range camera sees rooms from further away, and half a metre in millimetres is more.
+const LONGEST_RANGE_M: f64 = 300.0;
+/// Windows (half width, part that must be filled) that tell how slanted a surface is where the usual ones do not fit: beside edges, and
+/// on what is narrow. Their noise hardly matters there, since the width of a pixel changes its range with the square of the slant.
+const NEAR_EDGES: [(usize, f64); 2] = [(2, 0.5), (1, 0.5)];
 
 /// Usable pixels of one station, in the order of the points of its cloud.
 #[derive(Default)]
@@ -52,41 +66,51 @@ impl StationPixels {
             let mismatch = range_image::Error::SizeMismatch { what: "frame", width, height, found_width, found_height };
             return Err(Error::Image(mismatch));
         }
+        let mut points = corrected_points(capture, known, options)?;
+        let fail = |error: point_cloud::Error| Error::registration(capture.name, error);
+        // Pixels without a range are no edges: neighbours stand in for them where planes are fitted.
+        let whole = filled(&points, width, height, options.normals.max_relative_jump);
+        let normals = organised_normals(&whole, width, height, &options.normals).map_err(fail)?;
+        let mut everywhere = normals.clone();
+        for (half_width_px, min_fill) in NEAR_EDGES {
+            let smaller = OrganisedNormalOptions { half_width_px, min_fill, ..options.normals };
+            let found = organised_normals(&whole, width, height, &smaller).map_err(fail)?;
+            for (normal, found) in everywhere.iter_mut().zip(found).filter(|(normal, _)| normal.x.is_nan()) {
+                *normal = found;
+            }
+        }
+        let footprints = Surfaced { camera, frame, points: &points, normals: &everywhere }.footprints();
         let values = model.parameter_values();
         let [xp, yp] = camera.interior.principal_point_mm;
         let mut kept = Self { columns: known.columns.len(), ..Self::default() };
-        let mut points = vec![[f64::NAN; 3]; width * height];
         let mut row = vec![0.0; model.parameter_count()];
-        for (index, point) in points.iter_mut().enumerate() {
-            let place = (index % width, index / width);
-            let range = f64::from(frame.range[place]);
-            if !(range > 0.0 && range.is_finite()) || frame.flags[place].intersects(options.exclude | Flags::NO_DATA) {
+        for (index, point) in points.iter_mut().enumerate().filter(|(_, point)| !point[0].is_nan()) {
+            if footprints.parts[index].is_nan() {
+                *point = [f64::NAN; 3];
                 continue;
             }
+            let place = (index % width, index / width);
             let pixel = [place.0 as f64, place.1 as f64];
             let [x, y] = camera.format.image_from_pixel(pixel);
-            let (x, y) = (x - xp, y - yp);
-            let amplitude = frame.amplitude[place];
-            let correction = model.correction(range, x, y, f64::from(amplitude));
-            if correction.outside_span {
-                continue;
-            }
-            model.design_row_into(range, x, y, &mut row)?;
+            let (range, amplitude) = (f64::from(frame.range[place]), frame.amplitude[place]);
+            model.design_row_into(range, x - xp, y - yp, &mut row)?;
             let asked: f64 = known.columns.iter().map(|&column| row[column] * values[column]).sum();
             let by_amplitude = model.hyperbola.filter(|_| known.amplitude);
             let by_amplitude = by_amplitude.and_then(|hyperbola| hyperbola.correction(f64::from(amplitude)));
-            let ray = camera.ray(pixel);
-            *point = (ray * (range - correction.total_m())).into();
+            let (ray, corrected) = (camera.ray(pixel), Vector3::from(*point).norm());
+            let at_centre = corrected / (1.0 + f64::from(footprints.parts[index]));
+            *point = (ray * at_centre).into();
             kept.pixels.push([place.0 as f32, place.1 as f32]);
             kept.rays.push(ray);
-            kept.ranges_m.push(range - correction.total_m() + asked + by_amplitude.unwrap_or(0.0));
+            kept.ranges_m.push(at_centre + asked + by_amplitude.unwrap_or(0.0));
             kept.by_known_hyperbola_m.push(by_amplitude.unwrap_or(0.0) as f32);
             kept.amplitudes.push(amplitude);
             kept.rows.extend(known.columns.iter().map(|&column| row[column] as f32));
         }
-        let fail = |error: point_cloud::Error| Error::registration(capture.name, error);
-        let normals = organised_normals(&points, width, height, &options.normals).map_err(fail)?;
-        let cloud = Cloud::from_frame(&points, Some(&normals), Some(frame.sigma.as_slice())).map_err(fail)?;
+        // What is no deviation says as little as one that is not known.
+        let known = |sigma: &f32| if *sigma > 0.0 && sigma.is_finite() { *sigma } else { f32::NAN };
+        let sigma: Vec<f32> = frame.sigma.as_slice().iter().map(known).collect();
+        let cloud = Cloud::from_frame(&points, Some(&normals), Some(&sigma)).map_err(fail)?;
         Ok((kept, cloud))
     }
 
@@ -94,4 +118,53 @@ impl StationPixels {
     pub(super) fn row(&self, index: usize) -> &[f32] {
         &self.rows[index * self.columns..(index + 1) * self.columns]
     }
+}
+
+/// The points of a frame, corrected by the whole known model; NaN where a pixel takes no part.
+fn corrected_points(
+    capture: &SurfaceCapture<'_>,
+    known: &Known<'_>,
+    options: &SurfaceCalibrationOptions<'_>,
+) -> Result<Vec<[f64; 3]>> {
+    let (frame, camera) = (capture.frame, known.camera);
+    let farthest_m = farthest(capture, options)?;
+    // Without any, the hyperbola is held; one pixel without says nothing of it.
+    let has_amplitudes = frame.amplitude.as_slice().iter().any(|amplitude| *amplitude > 0.0);
+    let [xp, yp] = camera.interior.principal_point_mm;
+    let point = |index: usize| {
+        let place = (index % frame.width(), index / frame.width());
+        let range = usable(capture, place, options).filter(|range| *range <= farthest_m)?;
+        let amplitude = f64::from(frame.amplitude[place]);
+        if known.amplitude && has_amplitudes && !(amplitude > 0.0 && amplitude.is_finite()) {
+            return None;
+        }
+        let pixel = [place.0 as f64, place.1 as f64];
+        let [x, y] = camera.format.image_from_pixel(pixel);
+        let correction = known.model.correction(range, x - xp, y - yp, amplitude);
+        (!correction.outside_span).then(|| (camera.ray(pixel) * (range - correction.total_m())).into())
+    };
+    let points = (0..frame.width() * frame.height()).map(|index| point(index).unwrap_or([f64::NAN; 3]));
+    Ok(points.collect())
+}
+
+/// The range of a pixel that takes part.
+fn usable(capture: &SurfaceCapture<'_>, place: (usize, usize), options: &SurfaceCalibrationOptions<'_>) -> Option<f64> {
+    let (range, flags) = (f64::from(capture.frame.range[place]), capture.frame.flags[place]);
+    let is_range = range > 0.0 && range.is_finite();
+    (is_range && !flags.intersects(options.exclude | Flags::NO_DATA)).then_some(range)
+}
+
+/// The range beyond which one is wild, metre. Refuses a frame without ranges, and one in another unit.
+fn farthest(capture: &SurfaceCapture<'_>, options: &SurfaceCalibrationOptions<'_>) -> Result<f64> {
+    let (width, height) = (capture.frame.width(), capture.frame.height());
+    let places = (0..width * height).map(|index| (index % width, index / width));
+    let mut ranges: Vec<f64> = places.filter_map(|place| usable(capture, place, options)).collect();
+    if ranges.is_empty() {
+        return Err(Error::NoPixels { station: capture.name.to_owned() });
+    }
+    let median_m = quantile(&mut ranges, 0.5);
+    if median_m > LONGEST_RANGE_M {
+        return Err(Error::NotInMetre { station: capture.name.to_owned(), median_m, limit_m: LONGEST_RANGE_M });
+    }
+    Ok(WILD * quantile(&mut ranges, 1.0 - WILD_PART))
 }

@@ -6,7 +6,7 @@ mod text;
 
 use std::fmt::Display;
 
-pub use table::{Alignment, Column, Table, millimetres};
+pub use table::{Alignment, Column, Table, millimetres, rounded};
 
 use crate::figure::Figure;
 

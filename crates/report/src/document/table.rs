@@ -89,3 +89,13 @@ pub fn millimetres(length_m: Option<f64>) -> String {
         _ => "-".to_owned(),
     }
 }
+
+/// A number with so many decimals; one that rounds to zero has no sign: `0.0`, not `-0.0`.
+pub fn rounded(value: f64, decimals: usize) -> String {
+    let text = format!("{value:.decimals$}");
+    let is_zero = !text.contains(|c: char| c.is_ascii_digit() && c != '0');
+    match text.strip_prefix('-') {
+        Some(unsigned) if is_zero && value.is_finite() => unsigned.to_owned(),
+        _ => text,
+    }
+}

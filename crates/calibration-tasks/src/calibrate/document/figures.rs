@@ -3,11 +3,14 @@
 use std::collections::BTreeMap;
 
 use pipeline::Result;
+use range_io::calibration::Calibration;
 use report::{Figure, pattern_figures};
 use self_calibration::CalibrationOutcome;
 
 use crate::calibrate::FoundTable;
-use crate::calibrate::figures::{coverage, image_residuals, map, point_uncertainty, range_error, residuals};
+use crate::calibrate::figures::{
+    coverage, image_residuals, map, point_uncertainty, range_error, range_terms, residuals,
+};
 use crate::calibrate::point_uncertainty::{PointUncertainty, amplitude_of};
 
 /// The figures of each section.
@@ -17,6 +20,8 @@ pub(crate) struct Figures {
     pub(crate) significance_p: BTreeMap<String, f64>,
     pub(crate) range_errors: Vec<Figure>,
     pub(crate) range_coverage: Vec<Figure>,
+    /// Range terms part by part, of a calibration from surfaces.
+    pub(crate) range_terms: Vec<Figure>,
     pub(crate) offsets: Vec<Figure>,
     pub(crate) point_uncertainty: Vec<Figure>,
     pub(crate) image_residuals: Vec<Figure>,
@@ -44,12 +49,21 @@ impl Figures {
             significance_p: significance.collect(),
             range_errors,
             range_coverage,
+            range_terms: Vec::new(),
             offsets: table.map(offset_figures).transpose()?.unwrap_or_default(),
             point_uncertainty: plain(points),
             image_residuals: plain(image),
             residuals: plain(residuals::figures(outcome)),
             network,
         })
+    }
+}
+
+impl Figures {
+    /// With the range terms part by part, beside those of a calibration where it has any.
+    pub(crate) fn with_range_terms(self, outcome: &CalibrationOutcome, beside: Option<&Calibration>) -> Self {
+        let range_terms = range_terms::figures(outcome, beside).into_iter().map(Figure::from).collect();
+        Self { range_terms, ..self }
     }
 }
 

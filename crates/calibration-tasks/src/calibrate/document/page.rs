@@ -42,6 +42,10 @@ pub(crate) fn document(summary: &CalibrationSummary, figures: Figures) -> Docume
     document.section("Range error against range, before and after, and coverage of the range");
     document.figures(figures.range_errors);
     document.figures(figures.range_coverage);
+    if !figures.range_terms.is_empty() {
+        document.section("Range terms part by part");
+        document.figures(figures.range_terms);
+    }
     if let Some(table) = &summary.offset_table {
         document.section("The offset of each pixel");
         document.paragraph(format!(

@@ -1,0 +1,66 @@
+use crate::{Error, Result};
+
+/// When counts are carried and when they are solved anew.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CarryOptions {
+    /// Every so many frames the tree solves the whole frame, knowing nothing of those before: no wrong count lives longer.
+    /// 1: every frame. Default: 150, five seconds at 30 Hz; such a frame costs several times as much as the others, and these
+    /// are then fewer than one in a hundred.
+    pub refresh_frames: u32,
+    /// Share of the used pixels that may fail their check; beyond it the tree solves the whole frame. Default: 0.25. Smaller,
+    /// and swift motion costs whole trees; larger, and more of a frame rests on what is left of the one before.
+    pub most_failed: f32,
+    /// Largest number of windows that are solved in one frame: it bounds the time. Default: 2. Tiles that have to wait keep
+    /// guesses with confidence 0 meanwhile.
+    pub windows: usize,
+}
+
+impl Default for CarryOptions {
+    fn default() -> Self {
+        Self { refresh_frames: 150, most_failed: 0.25, windows: 2 }
+    }
+}
+
+impl CarryOptions {
+    pub(crate) fn validate(&self) -> Result<()> {
+        if self.refresh_frames == 0 {
+            return Err(Error::OutOfDomain { name: "refresh_frames", value: 0.0, expected: "at least 1" });
+        }
+        if !(0.0..=1.0).contains(&self.most_failed) {
+            let value = self.most_failed.into();
+            return Err(Error::OutOfDomain { name: "most_failed", value, expected: "a share from 0 to 1" });
+        }
+        Ok(())
+    }
+}
+
+/// Why the tree solved a whole frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum WholeFrame {
+    /// There was no frame before, or it was forgotten.
+    First,
+    /// It was the turn of [`CarryOptions::refresh_frames`].
+    Refresh,
+    /// More pixels than [`CarryOptions::most_failed`] did not hold.
+    Failed,
+}
+
+/// Where the counts of a frame came from.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct CarrySummary {
+    /// Why the tree solved the whole frame; `None` where counts were carried. The figures below are of the carrying then.
+    pub whole: Option<WholeFrame>,
+    /// Pixels with a phase.
+    pub used: usize,
+    /// Pixels whose check did not hold.
+    pub failed: usize,
+    /// Those of them that a neighbour on the same surface gave its count.
+    pub attached: usize,
+    /// Windows that the tree solved.
+    pub windows: usize,
+    /// Tiles that wait for their window.
+    pub waiting: usize,
+    /// Pixels whose count is a guess from a neighbour on another surface; their confidence is 0.
+    pub guessed: usize,
+}

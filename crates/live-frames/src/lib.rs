@@ -13,7 +13,6 @@ pub use calibration::PreparedCalibration;
 pub use camera::{Exposure, LiveCamera};
 pub use camera_model;
 pub use error::Error;
-use error::Result;
 pub use error_models;
 pub use frame::ProcessedFrame;
 pub use latest::{FrameReader, FrameWriter, latest_frame};

@@ -1,1 +1,12 @@
-//! Suite.
+//! The tests of the crate, one suite.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::float_cmp, clippy::panic, clippy::print_stdout)]
+
+mod common;
+mod exchange;
+mod latest;
+mod memory;
+mod refusals;
+mod same_as_stages;
+mod sequences;
+#[cfg(feature = "tracking")]
+mod tracking;

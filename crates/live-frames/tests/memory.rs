@@ -26,8 +26,8 @@ fn allocations(sequence: &Sequence, frames: usize, from: usize) -> u64 {
 
 #[test]
 fn frames_with_one_frequency_allocate_nothing() {
-    // Without mixed pixels and swift objects no window has to be solved.
-    let sequence = Sequence { rays: 1, ..Sequence::default() };
+    // Where nothing moves, no window has to be solved.
+    let sequence = Sequence { still: true, ..Sequence::default() };
     assert_eq!(allocations(&sequence, 10, 2), 0);
 }
 

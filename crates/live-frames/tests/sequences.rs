@@ -10,6 +10,7 @@ use crate::common::{INTERVAL_S, Sequence, stages};
 struct Wrong {
     all: f64,
     sure: f64,
+    unsure: f64,
     whole: bool,
     failed: f64,
 }
@@ -36,6 +37,7 @@ fn wrong(sequence: &Sequence, frames: &[SimulatedFrame], refresh: u32) -> Vec<Wr
         Wrong {
             all: all as f64 / f64::from(used),
             sure: bad as f64 / sure.max(1) as f64,
+            unsure: 1.0 - sure as f64 / f64::from(used),
             whole: found.counts.whole.is_some(),
             failed: found.counts.failed as f64 / found.counts.used.max(1) as f64,
         }
@@ -53,7 +55,7 @@ fn carried_counts_are_no_worse_than_those_of_the_tree() {
     let frames: Vec<_> = (0..60).map(|number| sequence.frame(number)).collect();
     let (tree, carried) = (wrong(&sequence, &frames, 1), wrong(&sequence, &frames, 30));
     for (number, (tree, carried)) in tree.iter().zip(&carried).enumerate() {
-        println!("{number} tree {:.4} {:.4} carried {:.4} {:.4} {} failed {:.4}", tree.all, tree.sure, carried.all, carried.sure, carried.whole, carried.failed);
+        println!("{number} tree {:.4} {:.4} {:.3} carried {:.4} {:.4} {:.3} {} failed {:.4}", tree.all, tree.sure, tree.unsure, carried.all, carried.sure, carried.unsure, carried.whole, carried.failed);
     }
     let (of_tree, of_carried) = (mean(&tree, |wrong| wrong.all), mean(&carried, |wrong| wrong.all));
     // A pixel in a thousand is what single frames differ by.

@@ -19,6 +19,8 @@ pub struct Sequence {
     /// Rays a pixel's side, which mix at edges.
     pub rays: usize,
     pub errors: bool,
+    /// Nothing moves.
+    pub still: bool,
 }
 
 impl Default for Sequence {
@@ -31,6 +33,7 @@ impl Default for Sequence {
             dark_sigma: 3.0,
             rays: 2,
             errors: true,
+            still: false,
         }
     }
 }
@@ -57,14 +60,14 @@ impl Sequence {
             height: self.height,
             phase_steps: self.phase_steps,
             modulations: self.modulation_hz.iter().map(|&hz| Modulation::new(hz).unwrap()).collect(),
-            demodulation: self.spec(0, 0.0).demodulation_options(),
+            demodulation: self.spec(0.0).demodulation_options(),
             power_on_s: None,
         }
     }
 
     /// A calibration of the camera with all of its errors.
     pub fn calibration(&self) -> Calibration {
-        let spec = self.spec(0, 0.0);
+        let spec = self.spec(0.0);
         let modulations = spec.camera.modulations().unwrap();
         let models = modulations.iter().map(|modulation| model(modulation.ambiguity_interval_m())).collect();
         let set = ModelSet { entries: vec![(0.002, models)] };
@@ -78,7 +81,7 @@ impl Sequence {
     }
 
     /// The room at a time: hand-held motion, a person who crosses it, a ball that swings, a board that slides in.
-    fn spec(&self, _frame: usize, time_s: f64) -> SimulationSpec {
+    fn spec(&self, time_s: f64) -> SimulationSpec {
         let sway = |amplitude: f64, hz: f64, phase: f64| amplitude * (std::f64::consts::TAU * hz * time_s + phase).sin();
         let (x, y, z) = (0.6 + sway(0.05, 0.4, 0.0), 2.5 + sway(0.08, 0.3, 1.0), 1.5 + sway(0.03, 0.9, 2.0));
         let (to_y, to_z) = (2.6 + sway(0.5, 0.25, 0.5), 1.2 + sway(0.2, 0.6, 0.0));
@@ -128,7 +131,7 @@ impl Sequence {
 
     /// One frame.
     pub fn frame(&self, number: usize) -> SimulatedFrame {
-        let spec = self.spec(number, number as f64 * INTERVAL_S);
+        let spec = self.spec(if self.still { 0.0 } else { number as f64 * INTERVAL_S });
         let simulator = Simulator::new(&spec).unwrap();
         simulator.frame(&simulator.station(0).unwrap(), 0, 1000 + number as u64).unwrap()
     }

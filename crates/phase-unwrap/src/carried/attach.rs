@@ -2,7 +2,7 @@
 
 use range_image::Raster;
 
-use crate::carried::pixels::{DARK, HELD, OPEN, distance};
+use crate::carried::pixels::{HELD, OPEN, RIM, distance};
 use crate::tree::grid::wrap_step;
 
 /// Sweeps forth and back over the pixels without a count. What is revealed at the edge of a surface is reached in the first;
@@ -34,9 +34,9 @@ impl Attaching<'_> {
         }
     }
 
-    /// Attaches the listed pixels to neighbours on the same surface; those that are left stay in the list. Their number before
-    /// less that afterwards is what was attached.
-    pub fn grow(&mut self, open: &mut Vec<u32>) {
+    /// Attaches the listed pixels to neighbours on the same surface, and lists those apart; the others stay in the list.
+    pub fn grow(&mut self, open: &mut Vec<u32>, attached: &mut Vec<u32>) {
+        attached.clear();
         for sweep in 0..SWEEPS {
             let before = open.len();
             if sweep % 2 == 0 {
@@ -48,11 +48,50 @@ impl Attaching<'_> {
                     self.attach(pixel as usize, 1.0);
                 }
             }
-            open.retain(|&pixel| self.state[pixel as usize] == OPEN);
+            open.retain(|&pixel| {
+                let left = self.state[pixel as usize] == OPEN;
+                if !left {
+                    attached.push(pixel);
+                }
+                left
+            });
             if open.is_empty() || open.len() == before {
-                return;
+                break;
             }
         }
+        for &pixel in attached.iter() {
+            self.set_aside(pixel as usize);
+        }
+    }
+
+    /// A pixel with a neighbour on another surface may belong to that one, or to neither, as slivers and mixed pixels do: it has
+    /// its count for this frame, and says that it is a guess.
+    fn set_aside(&mut self, pixel: usize) {
+        let (phase, amplitude) = (self.phase.as_slice(), self.amplitude.as_slice());
+        let apart = |other: usize| {
+            let off = distance([phase[other], phase[pixel]], [amplitude[other], amplitude[pixel]], self.noise2);
+            match self.state[other] {
+                HELD | RIM => off > 1.0,
+                state => state == OPEN,
+            }
+        };
+        if self.sides(pixel).into_iter().flatten().any(apart) {
+            self.state[pixel] = RIM;
+            self.unwrapped[pixel] = f32::NAN;
+            self.confidence[pixel] = 0.0;
+        }
+    }
+
+    /// The neighbours of a pixel.
+    fn sides(&self, pixel: usize) -> [Option<usize>; 4] {
+        let (width, height) = (self.phase.width(), self.phase.height());
+        let (col, row) = (pixel % width, pixel / width);
+        [
+            (row > 0).then(|| pixel - width),
+            (col > 0).then(|| pixel - 1),
+            (col + 1 < width).then(|| pixel + 1),
+            (row + 1 < height).then(|| pixel + width),
+        ]
     }
 
     /// Gives each listed pixel the count that continues its likeliest neighbour, whatever lies between them. Its confidence
@@ -64,7 +103,7 @@ impl Attaching<'_> {
             self.wraps[pixel] = wraps.clamp(0, self.maximum_wraps);
             self.confidence[pixel] = 0.0;
             self.unwrapped[pixel] = f32::NAN;
-            self.state[pixel] = DARK;
+            self.state[pixel] = RIM;
         }
     }
 
@@ -85,17 +124,9 @@ impl Attaching<'_> {
 
     /// The count that continues the nearest neighbour that holds, and that neighbour's confidence.
     fn nearest(&self, pixel: usize, limit: f32) -> Option<(i32, f32)> {
-        let (width, height) = (self.phase.width(), self.phase.height());
-        let (col, row) = (pixel % width, pixel / width);
-        let sides = [
-            (row > 0).then(|| pixel - width),
-            (col > 0).then(|| pixel - 1),
-            (col + 1 < width).then(|| pixel + 1),
-            (row + 1 < height).then(|| pixel + width),
-        ];
         let (phase, amplitude) = (self.phase.as_slice(), self.amplitude.as_slice());
         let mut best = (limit, None);
-        for other in sides.into_iter().flatten().filter(|&other| self.state[other] == HELD) {
+        for other in self.sides(pixel).into_iter().flatten().filter(|&other| self.state[other] == HELD) {
             let off = distance([phase[other], phase[pixel]], [amplitude[other], amplitude[pixel]], self.noise2);
             // Amplitudes that are not known leave the distance NaN, which is no neighbour.
             if off <= best.0 {

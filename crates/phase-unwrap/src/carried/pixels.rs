@@ -12,6 +12,8 @@ pub(crate) const OPEN: u8 = 1;
 pub(crate) const DARK: u8 = 2;
 /// The count holds.
 pub(crate) const HELD: u8 = 3;
+/// At an edge, with a neighbour's count for this frame: the next one does not rest on it.
+pub(crate) const RIM: u8 = 4;
 
 /// Largest change of the unwrapped phase from frame to frame that passes for the same surface, rad, or four standard
 /// deviations where those are more: 8 % of an ambiguity interval (0.4 m at 30 MHz). The smaller it is, the less often

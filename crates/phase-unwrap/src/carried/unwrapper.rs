@@ -35,6 +35,7 @@ pub struct CarriedUnwrapper {
     before: Vec<f32>,
     state: Vec<u8>,
     open: Vec<u32>,
+    attached: Vec<u32>,
     noise2: f32,
     /// Frames since the tree; `None` before the first.
     age: Option<u32>,
@@ -121,8 +122,10 @@ impl CarriedUnwrapper {
         }
         self.state.clear();
         self.state.resize(width * height, MASKED);
-        self.open.clear();
-        self.open.reserve(width * height);
+        for list in [&mut self.open, &mut self.attached] {
+            list.clear();
+            list.reserve(width * height);
+        }
         self.tiles.resize(width, height);
         self.window.resize(width, height);
     }
@@ -200,7 +203,9 @@ impl CarriedUnwrapper {
         let width = phase.width();
         Attaching::list(&self.state, &mut self.open);
         let mut open = std::mem::take(&mut self.open);
-        self.attaching(phase, amplitude).grow(&mut open);
+        let mut attached = std::mem::take(&mut self.attached);
+        self.attaching(phase, amplitude).grow(&mut open, &mut attached);
+        self.attached = attached;
         summary.attached = summary.failed.saturating_sub(open.len());
         for &pixel in &open {
             let tile = self.tiles.of(pixel as usize, width);

@@ -6,6 +6,7 @@
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 #[path = "../tests/common/mod.rs"]
+#[allow(dead_code)] // each user takes a part of it
 mod common;
 
 use std::time::Instant;

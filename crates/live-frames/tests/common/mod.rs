@@ -1,5 +1,7 @@
 //! Simulated frames of a moving camera, with truth, and a calibration of all its errors.
 
+pub mod judge;
+
 use live_frames::error_models::{AmplitudeHyperbola, FixedPattern, ModelSet, RangeErrorModel, RangeTerms};
 use live_frames::range_image::{Modulation, NoiseModel};
 use live_frames::range_io::calibration::{Calibration, ValidSpan};

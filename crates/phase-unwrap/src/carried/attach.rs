@@ -2,8 +2,8 @@
 
 use range_image::Raster;
 
-use crate::carried::pixels::{HELD, OPEN, RIM, distance};
-use crate::tree::grid::wrap_step;
+use crate::carried::pixels::{HELD, OPEN, RIM, gentle_step};
+use crate::tree::grid::{wrap_step, wrapped};
 
 /// Sweeps forth and back over the pixels without a count. What is revealed at the edge of a surface is reached in the first;
 /// more follow bends.
@@ -34,18 +34,19 @@ impl Attaching<'_> {
         }
     }
 
-    /// Attaches the listed pixels to neighbours on the same surface, and lists those apart; the others stay in the list.
-    pub fn grow(&mut self, open: &mut Vec<u32>, attached: &mut Vec<u32>) {
+    /// Attaches the listed pixels to neighbours on the same surface, and lists those apart; the others stay in the list. Gives
+    /// the number of those at edges, which have a count for this frame only.
+    pub fn grow(&mut self, open: &mut Vec<u32>, attached: &mut Vec<u32>) -> usize {
         attached.clear();
         for sweep in 0..SWEEPS {
             let before = open.len();
             if sweep % 2 == 0 {
                 for &pixel in open.iter() {
-                    self.attach(pixel as usize, 1.0);
+                    self.attach(pixel as usize);
                 }
             } else {
                 for &pixel in open.iter().rev() {
-                    self.attach(pixel as usize, 1.0);
+                    self.attach(pixel as usize);
                 }
             }
             open.retain(|&pixel| {
@@ -59,27 +60,27 @@ impl Attaching<'_> {
                 break;
             }
         }
-        for &pixel in attached.iter() {
-            self.set_aside(pixel as usize);
-        }
+        attached.iter().filter(|&&pixel| self.set_aside(pixel as usize)).count()
     }
 
     /// A pixel with a neighbour on another surface may belong to that one, or to neither, as slivers and mixed pixels do: it has
     /// its count for this frame, and says that it is a guess.
-    fn set_aside(&mut self, pixel: usize) {
+    fn set_aside(&mut self, pixel: usize) -> bool {
         let (phase, amplitude) = (self.phase.as_slice(), self.amplitude.as_slice());
         let apart = |other: usize| {
-            let off = distance([phase[other], phase[pixel]], [amplitude[other], amplitude[pixel]], self.noise2);
+            let phases = [phase[other], phase[pixel]];
             match self.state[other] {
-                HELD | RIM => off > 1.0,
+                HELD | RIM => gentle_step(phases, [amplitude[other], amplitude[pixel]], self.noise2).is_none(),
                 state => state == OPEN,
             }
         };
-        if self.sides(pixel).into_iter().flatten().any(apart) {
+        let at_edge = self.sides(pixel).into_iter().flatten().any(apart);
+        if at_edge {
             self.state[pixel] = RIM;
             self.unwrapped[pixel] = f32::NAN;
             self.confidence[pixel] = 0.0;
         }
+        at_edge
     }
 
     /// The neighbours of a pixel.
@@ -99,7 +100,7 @@ impl Attaching<'_> {
     pub fn guess(&mut self, open: &[u32]) {
         for &pixel in open {
             let pixel = pixel as usize;
-            let (wraps, _) = self.nearest(pixel, f32::INFINITY).unwrap_or((self.wraps[pixel], 0.0));
+            let (wraps, _) = self.nearest(pixel, false).unwrap_or((self.wraps[pixel], 0.0));
             self.wraps[pixel] = wraps.clamp(0, self.maximum_wraps);
             self.confidence[pixel] = 0.0;
             self.unwrapped[pixel] = f32::NAN;
@@ -107,11 +108,11 @@ impl Attaching<'_> {
         }
     }
 
-    fn attach(&mut self, pixel: usize, limit: f32) {
+    fn attach(&mut self, pixel: usize) {
         if self.state[pixel] != OPEN {
             return;
         }
-        if let Some((wraps, confidence)) = self.nearest(pixel, limit)
+        if let Some((wraps, confidence)) = self.nearest(pixel, true)
             && (0..=self.maximum_wraps).contains(&wraps)
         {
             self.wraps[pixel] = wraps;
@@ -122,18 +123,23 @@ impl Attaching<'_> {
         }
     }
 
-    /// The count that continues the nearest neighbour that holds, and that neighbour's confidence.
-    fn nearest(&self, pixel: usize, limit: f32) -> Option<(i32, f32)> {
+    /// The count that continues the neighbour with the smallest step among those that hold (on the same surface, if so
+    /// wished), and that neighbour's confidence.
+    fn nearest(&self, pixel: usize, on_surface: bool) -> Option<(i32, f32)> {
         let (phase, amplitude) = (self.phase.as_slice(), self.amplitude.as_slice());
-        let mut best = (limit, None);
+        let mut best = (f32::INFINITY, None);
         for other in self.sides(pixel).into_iter().flatten().filter(|&other| self.state[other] == HELD) {
-            let off = distance([phase[other], phase[pixel]], [amplitude[other], amplitude[pixel]], self.noise2);
-            // Amplitudes that are not known leave the distance NaN, which is no neighbour.
-            if off <= best.0 {
-                let wraps = self.wraps[other] + wrap_step(phase[other], phase[pixel]);
-                best = (off, Some((wraps, self.confidence[other])));
+            let phases = [phase[other], phase[pixel]];
+            let step = if on_surface {
+                gentle_step(phases, [amplitude[other], amplitude[pixel]], self.noise2).unwrap_or(f32::INFINITY)
+            } else {
+                wrapped(phases[1] - phases[0]).abs()
+            };
+            if step < best.0 {
+                best = (step, Some(other));
             }
         }
-        best.1
+        let other = best.1?;
+        Some((self.wraps[other] + wrap_step(phase[other], phase[pixel]), self.confidence[other]))
     }
 }

@@ -10,14 +10,14 @@ pub struct CarryOptions {
     /// Share of the used pixels that may fail their check; beyond it the tree solves the whole frame. Default: 0.25. Smaller,
     /// and swift motion costs whole trees; larger, and more of a frame rests on what is left of the one before.
     pub most_failed: f32,
-    /// Largest number of windows that are solved in one frame: it bounds the time. Default: 2. Tiles that have to wait keep
+    /// Largest number of windows that are solved in one frame: it bounds the time. Default: 1. Tiles that have to wait keep
     /// guesses with confidence 0 meanwhile.
     pub windows: usize,
 }
 
 impl Default for CarryOptions {
     fn default() -> Self {
-        Self { refresh_frames: 150, most_failed: 0.25, windows: 2 }
+        Self { refresh_frames: 150, most_failed: 0.25, windows: 1 }
     }
 }
 
@@ -61,6 +61,7 @@ pub struct CarrySummary {
     pub windows: usize,
     /// Tiles that wait for their window.
     pub waiting: usize,
-    /// Pixels whose count is a guess from a neighbour on another surface; their confidence is 0.
+    /// Pixels whose count is a guess for this frame, from a neighbour: at edges, and where none is on the same surface. Their
+    /// confidence is 0.
     pub guessed: usize,
 }

@@ -17,12 +17,14 @@ pub(crate) const RIM: u8 = 4;
 
 /// Largest change of the unwrapped phase from frame to frame that passes for the same surface, rad, or four standard
 /// deviations where those are more: 8 % of an ambiguity interval (0.4 m at 30 MHz). The smaller it is, the less often
-/// another surface passes, and the slower surfaces may move; what passes wrongly shows at its border ([`contradicts`]).
+/// another surface passes, and the slower surfaces may move; what passes wrongly shows at its border ([`contradictions`]).
 const STEADY_RAD: f32 = 0.5;
 /// Factor by which amplitude times range squared may change beyond its noise: that of `image::cuts`, `exp(0.35)`.
 const STEADY_RATIO: f32 = 1.419;
 /// Largest step between two neighbours on one surface, rad, or four standard deviations: that of `image::cuts`.
 const GENTLE_RAD: f32 = 0.1;
+/// The same where the slope is not known: a quarter of a radian a pixel, half of what [`STEADY_RAD`] allows in time.
+const SLOPE_RAD: f32 = 0.25;
 /// Standard deviations that count as noise.
 const SIGMAS: f32 = 4.0;
 /// Variance of a phase, rad^2, from which a pixel is dark: that of `image::cuts`, at which a step of pi is within reach of noise.
@@ -59,16 +61,56 @@ pub(crate) struct Tally {
     pub open: u32,
 }
 
+/// Pixels taken at a time, so that the compiler can vectorise.
+const LANES: usize = 32;
+
 /// Predicts each pixel's count as the one that brings its phase nearest to what was known last, and checks it: the phase may
 /// not step far, and amplitude times range squared not change.
 #[inline(always)]
 pub(crate) fn carry_row(row: Row<'_>, limits: Limits) -> Tally {
-    let n = row.phase.len();
-    let (phase, amplitude) = (&row.phase[..n], &row.amplitude[..n]);
-    let (unwrapped, before) = (&mut row.unwrapped[..n], &mut row.before[..n]);
-    let (wraps, state) = (&mut row.wraps[..n], &mut row.state[..n]);
-    let (mut used, mut open) = (0.0_f32, 0.0_f32);
-    for i in 0..n {
+    let mut tally = Tally::default();
+    let (phase, last_phase) = row.phase.as_chunks::<LANES>();
+    let (amplitude, last_amplitude) = row.amplitude.as_chunks::<LANES>();
+    let (unwrapped, last_unwrapped) = row.unwrapped.as_chunks_mut::<LANES>();
+    let (before, last_before) = row.before.as_chunks_mut::<LANES>();
+    let (wraps, last_wraps) = row.wraps.as_chunks_mut::<LANES>();
+    let (state, last_state) = row.state.as_chunks_mut::<LANES>();
+    let given = phase.iter().zip(amplitude);
+    let kept = unwrapped.iter_mut().zip(before).zip(wraps.iter_mut().zip(state));
+    for ((phase, amplitude), ((unwrapped, before), (wraps, state))) in given.zip(kept) {
+        carry_pixels(phase, amplitude, unwrapped, before, wraps, state, limits, &mut tally);
+    }
+    for i in 0..last_phase.len() {
+        let one = std::array::from_ref::<f32>;
+        carry_pixels::<1>(
+            one(&last_phase[i]),
+            one(&last_amplitude[i]),
+            std::array::from_mut(&mut last_unwrapped[i]),
+            std::array::from_mut(&mut last_before[i]),
+            std::array::from_mut(&mut last_wraps[i]),
+            std::array::from_mut(&mut last_state[i]),
+            limits,
+            &mut tally,
+        );
+    }
+    tally
+}
+
+#[inline(always)]
+#[allow(clippy::too_many_arguments)] // planes of one row, in the order of `Row`
+fn carry_pixels<const L: usize>(
+    phase: &[f32; L],
+    amplitude: &[f32; L],
+    unwrapped: &mut [f32; L],
+    before: &mut [f32; L],
+    wraps: &mut [i32; L],
+    state: &mut [u8; L],
+    limits: Limits,
+    tally: &mut Tally,
+) {
+    let [mut told, mut used, mut open] = [[0_u32; L]; 3];
+    let mut counts = [0.0_f32; L];
+    for i in 0..L {
         let (p, a, known, earlier) = (phase[i], amplitude[i], unwrapped[i], before[i]);
         let count = ((known - p) * (1.0 / TAU) + ROUND) - ROUND;
         let now = p + TAU * count;
@@ -87,24 +129,25 @@ pub(crate) fn carry_row(row: Row<'_>, limits: Limits) -> Tally {
             & (brightness_before <= ratio * brightness)
             & in_span;
         let there = p.abs() <= f32::MAX;
-        let dark = (own_variance > DARK_VARIANCE) & in_span;
+        let dark = there & (own_variance > DARK_VARIANCE) & in_span;
         let held = there & steady & !dark;
-        let told = if dark { DARK } else { OPEN };
-        state[i] = if !there {
-            MASKED
-        } else if held {
-            HELD
-        } else {
-            told
-        };
+        let failed = there & !held & !dark;
+        told[i] = if held { u32::from(HELD) } else { 0 }
+            | if dark { u32::from(DARK) } else { 0 }
+            | if failed { u32::from(OPEN) } else { 0 };
         unwrapped[i] = if held { now } else { known };
         before[i] = if held { a } else { earlier };
-        let sound = if there & in_span { count } else { 0.0 };
-        wraps[i] = sound as i32;
-        used += if there { 1.0 } else { 0.0 };
-        open += if there & !held & !dark { 1.0 } else { 0.0 };
+        counts[i] = if there & in_span { count } else { 0.0 };
+        used[i] = if there { 1 } else { 0 };
+        open[i] = if failed { 1 } else { 0 };
     }
-    Tally { used: used as u32, open: open as u32 }
+    for i in 0..L {
+        // Added to 1.5 * 2^23, a small integer stands in the last bits.
+        wraps[i] = ((counts[i] + ROUND).to_bits() & 0xff) as i32;
+        state[i] = told[i] as u8;
+    }
+    tally.used = tally.used.wrapping_add(used.iter().fold(0, |sum: u32, one| sum.wrapping_add(*one)));
+    tally.open = tally.open.wrapping_add(open.iter().fold(0, |sum: u32, one| sum.wrapping_add(*one)));
 }
 
 /// Ends of the links of a row: phases, what they unwrap to, amplitudes, states.
@@ -132,34 +175,54 @@ impl<'a> Ends<'a> {
 /// for the one before, such links run along its border.
 #[inline(always)]
 pub(crate) fn contradictions(from: Ends<'_>, to: Ends<'_>, noise2: f32) -> u32 {
-    let n = from.phase.len();
     let mut sum = 0_u32;
-    let (from, to) = (from.part(0, n), to.part(0, n));
-    for i in 0..n {
-        let step = to.phase[i] - from.phase[i];
-        let cycle = if step.abs() > PI { TAU } else { 0.0 };
-        let step = step - cycle.copysign(step);
-        let found = to.unwrapped[i] - from.unwrapped[i];
-        let (a, b) = (from.amplitude[i], to.amplitude[i]);
-        let (own, other) = (1.0 / a, 1.0 / b);
-        let margin = SIGMAS * (noise2 * (own * own + other * other)).sqrt();
-        let ratio = STEADY_RATIO * (1.0 + margin);
-        let limit = if margin > GENTLE_RAD { margin } else { GENTLE_RAD };
-        let alike = (step.abs() <= limit) & (a <= ratio * b) & (b <= ratio * a);
-        let apart = (found - step).abs() > PI;
+    let whole = from.phase.len() / LANES * LANES;
+    for start in (0..whole).step_by(LANES) {
+        let ends = [from.part(start, LANES), to.part(start, LANES)];
+        let mut found = [0_u32; LANES];
+        for i in 0..LANES {
+            found[i] = if contradict(ends, i, noise2) { 1 } else { 0 };
+        }
+        for i in 0..LANES {
+            let both = (ends[0].state[i] == HELD) & (ends[1].state[i] == HELD);
+            sum = sum.wrapping_add(found[i] & u32::from(both));
+        }
+    }
+    for i in whole..from.phase.len() {
         let both = (from.state[i] == HELD) & (to.state[i] == HELD);
-        // One at a time: never more than the pixels of a row.
-        sum = sum.wrapping_add(u32::from(alike & apart & both));
+        sum = sum.wrapping_add(u32::from(contradict([from, to], i, noise2) & both));
     }
     sum
 }
 
-/// How far the phases and amplitudes of two neighbours are from being those of one surface: at most 1 where they can be.
-pub(crate) fn distance([phase, other_phase]: [f32; 2], [a, b]: [f32; 2], noise2: f32) -> f32 {
-    let step = crate::tree::grid::wrapped(other_phase - phase).abs();
-    let margin = SIGMAS * (noise2 * (1.0 / (a * a) + 1.0 / (b * b))).sqrt();
+#[inline(always)]
+fn contradict([from, to]: [Ends<'_>; 2], i: usize, noise2: f32) -> bool {
+    let step = to.phase[i] - from.phase[i];
+    let cycle = if step.abs() > PI { TAU } else { 0.0 };
+    let step = step - cycle.copysign(step);
+    let found = to.unwrapped[i] - from.unwrapped[i];
+    let (a, b) = (from.amplitude[i], to.amplitude[i]);
+    let margin = noise_margin(a, b, noise2);
+    let ratio = STEADY_RATIO * (1.0 + margin);
+    let limit = if margin > GENTLE_RAD { margin } else { GENTLE_RAD };
+    let alike = (step.abs() <= limit) & (a <= ratio * b) & (b <= ratio * a);
+    alike & ((found - step).abs() > PI)
+}
+
+/// Standard deviations of a step between pixels of two amplitudes that count as noise, rad.
+#[inline(always)]
+fn noise_margin(a: f32, b: f32, noise2: f32) -> f32 {
+    let (a2, b2) = (a * a, b * b);
+    SIGMAS * (noise2 * (a2 + b2) / (a2 * b2)).sqrt()
+}
+
+/// The size of the step between two neighbours where they can lie on one surface, by phases and amplitudes.
+#[inline(always)]
+pub(crate) fn gentle_step(phases: [f32; 2], [a, b]: [f32; 2], noise2: f32) -> Option<f32> {
+    let step = crate::tree::grid::wrapped(phases[1] - phases[0]).abs();
+    let margin = noise_margin(a, b, noise2);
+    let ratio = STEADY_RATIO * (1.0 + margin);
     // Neighbours lie on a slope, which the step in time does not see.
-    let limit = margin.max(0.5 * STEADY_RAD);
-    let ratio = if a > b { a / b } else { b / a };
-    (step / limit).max(ratio / (STEADY_RATIO * (1.0 + margin)))
+    let limit = if margin > SLOPE_RAD { margin } else { SLOPE_RAD };
+    ((step <= limit) & (a <= ratio * b) & (b <= ratio * a)).then_some(step)
 }

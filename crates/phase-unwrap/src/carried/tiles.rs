@@ -6,6 +6,10 @@ pub(crate) const TILE: usize = 64;
 /// are single pixels at edges. A choice; a larger number leaves small objects with guesses until the next refresh.
 const LEAST: u32 = 24;
 
+/// Frames until the contradictions of a tile that was solved are looked at again: where a true jump of a whole interval moves
+/// through the image, they come anew with every frame. A choice, a third of a second at 30 Hz.
+const PAUSE: u32 = 10;
+
 /// Figures of all tiles.
 #[derive(Debug, Default)]
 pub(crate) struct Tiles {
@@ -46,9 +50,13 @@ impl Tiles {
     }
 
     /// Lists the tiles that have to be solved: those that waited longest first, then the worst.
-    pub fn rank(&mut self) {
+    pub fn rank(&mut self, frame: u32) {
         let Self { contradictions, accepted, open, order, solved, .. } = self;
-        let badness = |tile: usize| open[tile].max(contradictions[tile].saturating_sub(accepted[tile]));
+        let contradicting = |tile: usize| {
+            let rested = frame >= solved[tile].saturating_add(PAUSE);
+            if rested { contradictions[tile].saturating_sub(accepted[tile]) } else { 0 }
+        };
+        let badness = |tile: usize| open[tile].max(contradicting(tile));
         order.clear();
         order.extend((0..open.len()).filter(|&tile| badness(tile) >= LEAST));
         order.sort_unstable_by_key(|&tile| (solved[tile], std::cmp::Reverse(badness(tile)), tile));
@@ -63,6 +71,7 @@ impl Tiles {
     /// Notes that the tree solved all of them.
     pub fn settle_all(&mut self) {
         self.solved.fill(0);
+        // What the tree left is looked at from the next frame on.
         self.accepted.fill(u32::MAX);
     }
 

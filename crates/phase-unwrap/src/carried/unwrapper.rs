@@ -204,14 +204,14 @@ impl CarriedUnwrapper {
         Attaching::list(&self.state, &mut self.open);
         let mut open = std::mem::take(&mut self.open);
         let mut attached = std::mem::take(&mut self.attached);
-        self.attaching(phase, amplitude).grow(&mut open, &mut attached);
+        let at_edges = self.attaching(phase, amplitude).grow(&mut open, &mut attached);
         self.attached = attached;
         summary.attached = summary.failed.saturating_sub(open.len());
         for &pixel in &open {
             let tile = self.tiles.of(pixel as usize, width);
             self.tiles.open[tile] += 1;
         }
-        self.tiles.rank();
+        self.tiles.rank(frame);
         summary.windows = self.carry.windows.min(self.tiles.order.len());
         summary.waiting = self.tiles.order.len() - summary.windows;
         for turn in 0..summary.windows {
@@ -219,8 +219,8 @@ impl CarriedUnwrapper {
             self.solve_tile(phase, amplitude, tile)?;
             self.tiles.settle(tile, frame);
         }
-        open.retain(|&pixel| self.state[pixel as usize] == OPEN);
-        summary.guessed = open.len();
+       open.retain(|&pixel| self.state[pixel as usize] == OPEN);
+        summary.guessed = open.len() + at_edges;
         self.attaching(phase, amplitude).guess(&open);
         self.open = open;
         Ok(())

@@ -27,7 +27,7 @@ fn main() {
     let mut processor =
         Processor::new(sequence.camera(), &sequence.calibration(), stages(tracking), Limits::default()).unwrap();
     let mut milliseconds = Vec::with_capacity(frames);
-    let (mut whole, mut windows, mut failed, mut memory) = (0, 0, 0.0, [0; 2]);
+    let (mut whole, mut checks, mut failed, mut memory) = (0, 0, 0.0, [0; 2]);
     let mut lost = 0;
     for number in 0..frames {
         let at = number % (2 * SIMULATED - 2);
@@ -36,7 +36,7 @@ fn main() {
         let frame = processor.process(samples, number as f64 * INTERVAL_S).unwrap();
         milliseconds.push(1e3 * begin.elapsed().as_secs_f64());
         whole += usize::from(frame.counts.whole.is_some());
-        windows += frame.counts.windows;
+        checks += usize::from(frame.counts.checked);
         failed += frame.counts.failed as f64 / frame.counts.used.max(1) as f64;
         lost += usize::from(is_lost(frame));
         if number == 100 {
@@ -50,8 +50,8 @@ fn main() {
         rayon::current_num_threads()
     );
     println!(
-        "whole trees {whole}, windows a frame {:.2}, pixels that failed {:.1} %, lost {lost}",
-        windows as f64 / count,
+        "whole trees {whole}, checked {:.1} % of the frames, pixels that failed {:.1} %, lost {lost}",
+        100.0 * checks as f64 / count,
         100.0 * failed / count
     );
     let mean = milliseconds.iter().sum::<f64>() / count;

@@ -79,9 +79,10 @@ impl Counts {
     pub(crate) fn find(&mut self, planes: &Planes, frame: &ProcessedFrame) -> Result<CarrySummary> {
         match self {
             Self::One(unwrapper, values) => {
-                let Some(phase) = planes.phases.first() else { return Ok(CarrySummary::default()) };
-                let sigma = planes.complex.channels.first().map(|channel| &channel.sigma);
-                Ok(unwrapper.unwrap_next(phase, &frame.amplitude, || sigma.and_then(|sigma| median(sigma, values)))?)
+                let (Some(phase), Some(channel)) = (planes.phases.first(), planes.complex.channels.first()) else {
+                    return Ok(CarrySummary::default());
+                };
+                Ok(unwrapper.unwrap_next(channel, phase, &frame.amplitude, || median(&channel.sigma, values))?)
             }
             Self::Several(several) => {
                 several.find(planes)?;

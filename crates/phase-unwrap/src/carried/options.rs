@@ -10,21 +10,24 @@ pub struct CarryOptions {
     /// Share of the used pixels that may fail their check; beyond it the tree solves the whole frame. Default: 0.25. Smaller,
     /// and swift motion costs whole trees; larger, and more of a frame rests on what is left of the one before.
     pub most_failed: f32,
-    /// Largest number of windows that are solved in one frame: it bounds the time. Default: 1. Tiles that have to wait keep
-    /// guesses with confidence 0 meanwhile.
-    pub windows: usize,
+    /// Every so many frames the counts are held against those of a small image of the frame, which the tree solves knowing
+    /// nothing of the frames before; more often where pixels are left without a count. 1: in every frame. Default: 3, a tenth
+    /// of a second at 30 Hz.
+    pub check_frames: u32,
 }
 
 impl Default for CarryOptions {
     fn default() -> Self {
-        Self { refresh_frames: 150, most_failed: 0.25, windows: 1 }
+        Self { refresh_frames: 150, most_failed: 0.25, check_frames: 3 }
     }
 }
 
 impl CarryOptions {
     pub(crate) fn validate(&self) -> Result<()> {
-        if self.refresh_frames == 0 {
-            return Err(Error::OutOfDomain { name: "refresh_frames", value: 0.0, expected: "at least 1" });
+        for (name, frames) in [("refresh_frames", self.refresh_frames), ("check_frames", self.check_frames)] {
+            if frames == 0 {
+                return Err(Error::OutOfDomain { name, value: 0.0, expected: "at least 1" });
+            }
         }
         if !(0.0..=1.0).contains(&self.most_failed) {
             let value = self.most_failed.into();
@@ -57,10 +60,12 @@ pub struct CarrySummary {
     pub failed: usize,
     /// Those of them that a neighbour on the same surface gave its count.
     pub attached: usize,
-    /// Windows that the tree solved.
-    pub windows: usize,
-    /// Tiles that wait for their window.
-    pub waiting: usize,
+    /// Whether the counts were held against those of a small image.
+    pub checked: bool,
+    /// Pixels whose count contradicts it, or did when it was made last; their confidence is 0.
+    pub doubted: usize,
+    /// Pixels that took its count, after it had contradicted theirs often enough.
+    pub mended: usize,
     /// Pixels whose count is a guess for this frame, from a neighbour: at edges, and where none is on the same surface. Their
     /// confidence is 0.
     pub guessed: usize,

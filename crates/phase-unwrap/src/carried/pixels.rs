@@ -1,8 +1,8 @@
-//! The check of each pixel against the frame before, and of neighbours against each other.
+//! The check of each pixel against the frame before.
 // Only what is inlined is compiled for wide registers; loops over lanes read as their formulas, without branches.
 #![allow(clippy::inline_always, clippy::needless_range_loop, clippy::needless_bitwise_bool)]
 
-use std::f32::consts::{PI, TAU};
+use std::f32::consts::TAU;
 
 /// No phase.
 pub(crate) const MASKED: u8 = 0;
@@ -17,13 +17,12 @@ pub(crate) const RIM: u8 = 4;
 
 /// Largest change of the unwrapped phase from frame to frame that passes for the same surface, rad, or four standard
 /// deviations where those are more: 8 % of an ambiguity interval (0.4 m at 30 MHz). The smaller it is, the less often
-/// another surface passes, and the slower surfaces may move; what passes wrongly shows at its border ([`contradictions`]).
+/// another surface passes, and the slower surfaces may move; what passes wrongly contradicts the small image.
 const STEADY_RAD: f32 = 0.5;
 /// Factor by which amplitude times range squared may change beyond its noise: that of `image::cuts`, `exp(0.35)`.
 const STEADY_RATIO: f32 = 1.419;
-/// Largest step between two neighbours on one surface, rad, or four standard deviations: that of `image::cuts`.
-const GENTLE_RAD: f32 = 0.1;
-/// The same where the slope is not known: a quarter of a radian a pixel, half of what [`STEADY_RAD`] allows in time.
+/// Largest step between two neighbours on one surface whose slope is not known, rad, or four standard deviations. A choice:
+/// steeper surfaces are left to the small image, and edges below it pass for slopes.
 const SLOPE_RAD: f32 = 0.25;
 /// Standard deviations that count as noise.
 const SIGMAS: f32 = 4.0;
@@ -148,65 +147,6 @@ fn carry_pixels<const L: usize>(
     }
     tally.used = tally.used.wrapping_add(used.iter().fold(0, |sum: u32, one| sum.wrapping_add(*one)));
     tally.open = tally.open.wrapping_add(open.iter().fold(0, |sum: u32, one| sum.wrapping_add(*one)));
-}
-
-/// Ends of the links of a row: phases, what they unwrap to, amplitudes, states.
-#[derive(Clone, Copy)]
-pub(crate) struct Ends<'a> {
-    pub phase: &'a [f32],
-    pub unwrapped: &'a [f32],
-    pub amplitude: &'a [f32],
-    pub state: &'a [u8],
-}
-
-impl<'a> Ends<'a> {
-    #[inline(always)]
-    pub(crate) fn part(&self, start: usize, count: usize) -> Self {
-        Self {
-            phase: &self.phase[start..][..count],
-            unwrapped: &self.unwrapped[start..][..count],
-            amplitude: &self.amplitude[start..][..count],
-            state: &self.state[start..][..count],
-        }
-    }
-}
-
-/// Number of links between pixels that hold which look like one surface and have counts of two: where another surface passed
-/// for the one before, such links run along its border.
-#[inline(always)]
-pub(crate) fn contradictions(from: Ends<'_>, to: Ends<'_>, noise2: f32) -> u32 {
-    let mut sum = 0_u32;
-    let whole = from.phase.len() / LANES * LANES;
-    for start in (0..whole).step_by(LANES) {
-        let ends = [from.part(start, LANES), to.part(start, LANES)];
-        let mut found = [0_u32; LANES];
-        for i in 0..LANES {
-            found[i] = if contradict(ends, i, noise2) { 1 } else { 0 };
-        }
-        for i in 0..LANES {
-            let both = (ends[0].state[i] == HELD) & (ends[1].state[i] == HELD);
-            sum = sum.wrapping_add(found[i] & u32::from(both));
-        }
-    }
-    for i in whole..from.phase.len() {
-        let both = (from.state[i] == HELD) & (to.state[i] == HELD);
-        sum = sum.wrapping_add(u32::from(contradict([from, to], i, noise2) & both));
-    }
-    sum
-}
-
-#[inline(always)]
-fn contradict([from, to]: [Ends<'_>; 2], i: usize, noise2: f32) -> bool {
-    let step = to.phase[i] - from.phase[i];
-    let cycle = if step.abs() > PI { TAU } else { 0.0 };
-    let step = step - cycle.copysign(step);
-    let found = to.unwrapped[i] - from.unwrapped[i];
-    let (a, b) = (from.amplitude[i], to.amplitude[i]);
-    let margin = noise_margin(a, b, noise2);
-    let ratio = STEADY_RATIO * (1.0 + margin);
-    let limit = if margin > GENTLE_RAD { margin } else { GENTLE_RAD };
-    let alike = (step.abs() <= limit) & (a <= ratio * b) & (b <= ratio * a);
-    alike & ((found - step).abs() > PI)
 }
 
 /// Standard deviations of a step between pixels of two amplitudes that count as noise, rad.

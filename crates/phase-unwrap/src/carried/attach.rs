@@ -18,6 +18,9 @@ pub(crate) struct Attaching<'a> {
     pub before: &'a mut [f32],
     pub wraps: &'a mut [i32],
     pub confidence: &'a mut [f32],
+    /// How often in a row each pixel was contradicted: with its count, a pixel takes over what speaks against it, so that a
+    /// surface that moves through the image cannot escape.
+    pub doubts: &'a mut [u8],
     pub noise2: f32,
     pub maximum_wraps: i32,
 }
@@ -100,7 +103,7 @@ impl Attaching<'_> {
     pub fn guess(&mut self, open: &[u32]) {
         for &pixel in open {
             let pixel = pixel as usize;
-            let (wraps, _) = self.nearest(pixel, false).unwrap_or((self.wraps[pixel], 0.0));
+            let wraps = self.nearest(pixel, false).map_or(self.wraps[pixel], |(wraps, _)| wraps);
             self.wraps[pixel] = wraps.clamp(0, self.maximum_wraps);
             self.confidence[pixel] = 0.0;
             self.unwrapped[pixel] = f32::NAN;
@@ -112,11 +115,12 @@ impl Attaching<'_> {
         if self.state[pixel] != OPEN {
             return;
         }
-        if let Some((wraps, confidence)) = self.nearest(pixel, true)
+        if let Some((wraps, other)) = self.nearest(pixel, true)
             && (0..=self.maximum_wraps).contains(&wraps)
         {
             self.wraps[pixel] = wraps;
-            self.confidence[pixel] = confidence;
+            self.confidence[pixel] = self.confidence[other];
+            self.doubts[pixel] = self.doubts[other];
             self.unwrapped[pixel] = self.phase.as_slice()[pixel] + std::f32::consts::TAU * wraps as f32;
             self.before[pixel] = self.amplitude.as_slice()[pixel];
             self.state[pixel] = HELD;
@@ -124,8 +128,8 @@ impl Attaching<'_> {
     }
 
     /// The count that continues the neighbour with the smallest step among those that hold (on the same surface, if so
-    /// wished), and that neighbour's confidence.
-    fn nearest(&self, pixel: usize, on_surface: bool) -> Option<(i32, f32)> {
+    /// wished), and that neighbour.
+    fn nearest(&self, pixel: usize, on_surface: bool) -> Option<(i32, usize)> {
         let (phase, amplitude) = (self.phase.as_slice(), self.amplitude.as_slice());
         let mut best = (f32::INFINITY, None);
         for other in self.sides(pixel).into_iter().flatten().filter(|&other| self.state[other] == HELD) {
@@ -140,6 +144,6 @@ impl Attaching<'_> {
             }
         }
         let other = best.1?;
-        Some((self.wraps[other] + wrap_step(phase[other], phase[pixel]), self.confidence[other]))
+        Some((self.wraps[other] + wrap_step(phase[other], phase[pixel]), other))
     }
 }

@@ -9,7 +9,8 @@ use crate::carried::options::{CarryOptions, CarrySummary, WholeFrame};
 use crate::carried::pixels::{HELD, Limits, MASKED, OPEN, Row, carry_row};
 use crate::{KnownWraps, Result, SpatialOptions, Unwrapped, Unwrapper};
 
-/// Share of the pixels that may be left without a count until the next check; beyond it the frame is checked at once.
+/// Share of the pixels that may be left without a count, or in contradiction, until the next check; beyond it the frame is
+/// checked at once.
 const LEFT_SHARE: f32 = 1e-3;
 
 /// Absolute counts of one frequency in a stream of frames, for a small part of what the tree costs.
@@ -40,6 +41,8 @@ pub struct CarriedUnwrapper {
     attached: Vec<u32>,
     spread: [Vec<f32>; 2],
     noise2: f32,
+    /// Pixels that contradicted the small image when it was made last.
+    doubted: usize,
     /// Frames since the tree; `None` before the first.
     age: Option<u32>,
 }
@@ -151,6 +154,7 @@ impl CarriedUnwrapper {
             *state = if phase.is_finite() { HELD } else { MASKED };
         }
         self.doubts.fill(0);
+        self.doubted = 0;
         Ok(())
     }
 
@@ -194,8 +198,9 @@ impl CarriedUnwrapper {
         let (mut open, mut attached) = (std::mem::take(&mut self.open), std::mem::take(&mut self.attached));
         let at_edges = self.attaching(phase, amplitude).grow(&mut open, &mut attached);
         summary.attached = attached.len();
-        let left = open.len() as f32 > LEFT_SHARE * summary.used as f32;
-        if left || frame.is_multiple_of(self.carry.check_frames) {
+        let least = LEFT_SHARE * summary.used as f32;
+        let urgent = open.len() as f32 > least || self.doubted as f32 > least;
+        if urgent || frame.is_multiple_of(self.carry.check_frames) {
             let options = SpatialOptions { amplitude_noise: self.noise, ..self.options };
             if self.coarse.solve(channel, &options)? {
                 self.compare(phase, amplitude, summary);
@@ -223,6 +228,7 @@ impl CarriedUnwrapper {
             minimum_confidence: self.options.minimum_confidence,
         };
         let outcome = compared.check(&self.coarse);
+        self.doubted = outcome.doubted;
         (summary.checked, summary.doubted, summary.mended) = (true, outcome.doubted, outcome.mended);
     }
 
@@ -235,6 +241,7 @@ impl CarriedUnwrapper {
             before: &mut self.before,
             wraps: self.out.wraps.as_mut_slice(),
             confidence: self.out.confidence.as_mut_slice(),
+            doubts: &mut self.doubts,
             noise2: self.noise2,
             maximum_wraps: i32::from(self.options.maximum_wraps),
         }

@@ -11,7 +11,7 @@ use crate::carried::pixels::{HELD, OPEN, RIM};
 
 /// Checks in a row that contradict a pixel's count before it gives way. A single tree errs on single frames; with one check, the
 /// counts would follow it. With more, what passed wrongly stays longer.
-const CHECKS: u8 = 3;
+const CHECKS: u8 = 2;
 /// Adding and taking off 1.5 * 2^23 rounds to an integer.
 const ROUND: f32 = 12_582_912.0;
 

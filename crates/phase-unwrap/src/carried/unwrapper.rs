@@ -11,7 +11,7 @@ use crate::{KnownWraps, Result, SpatialOptions, Unwrapped, Unwrapper};
 
 /// Share of the pixels that may be left without a count, or in contradiction, until the next check; beyond it the frame is
 /// checked at once.
-const LEFT_SHARE: f32 = 1e-3;
+const LEFT_SHARE: f32 = 3e-4;
 
 /// Absolute counts of one frequency in a stream of frames, for a small part of what the tree costs.
 ///
@@ -20,7 +20,7 @@ const LEFT_SHARE: f32 = 1e-3;
 /// deviations, and amplitude times range squared may not change beyond its noise. A pixel that fails takes the count of a
 /// neighbour on the same surface. What passed wrongly, and what is left, is told by a small image of the frame (means of 4 by 4
 /// pixels at 640 x 480) that the tree solves as a whole, every few frames and knowing nothing of those before: what contradicts
-/// it is not sure, and gives way when it did so three times. Every [`refresh_frames`](CarryOptions::refresh_frames), and where too
+/// it is not sure, and gives way when it did so twice in a row. Every [`refresh_frames`](CarryOptions::refresh_frames), and where too
 /// much fails, the tree solves the whole frame as [`Unwrapper`] does, to the bit.
 ///
 /// A frame without a check allocates nothing.

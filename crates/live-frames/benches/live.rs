@@ -1,5 +1,5 @@
 //! A frame through the processor, once its counts are carried.
-#![allow(clippy::unwrap_used, clippy::expect_used)]
+#![allow(missing_docs, clippy::unwrap_used)]
 
 #[path = "../tests/common/mod.rs"]
 #[allow(dead_code)] // each user takes a part of it
@@ -15,13 +15,9 @@ fn process(criterion: &mut Criterion) {
     for (name, modulation_hz) in [("one frequency", vec![30e6]), ("two frequencies", vec![80e6, 60e6])] {
         let sequence = Sequence { width: 640, height: 480, modulation_hz, rays: 1, ..Sequence::default() };
         let raw: Vec<_> = (0..8).map(|number| sequence.frame(number).raw).collect();
-        let mut processor = Processor::new(
-            sequence.camera(),
-            &sequence.calibration(),
-            common::stages(100_000),
-            Limits::default(),
-        )
-        .unwrap();
+        let mut processor =
+            Processor::new(sequence.camera(), &sequence.calibration(), common::stages(100_000), Limits::default())
+                .unwrap();
         let mut number = 0_usize;
         group.throughput(Throughput::Elements((sequence.width * sequence.height) as u64));
         group.bench_function(BenchmarkId::new(name, "640x480"), |bencher| {

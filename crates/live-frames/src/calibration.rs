@@ -186,7 +186,10 @@ impl PreparedCalibration {
 
 impl fmt::Debug for PreparedCalibration {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("PreparedCalibration").field("camera", &self.camera).field("span", &self.span).finish_non_exhaustive()
+        f.debug_struct("PreparedCalibration")
+            .field("camera", &self.camera)
+            .field("span", &self.span)
+            .finish_non_exhaustive()
     }
 }
 

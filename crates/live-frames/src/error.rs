@@ -30,7 +30,9 @@ pub enum Error {
         before_s: f64,
     },
     /// Samples that are not finite numbers in too many pixels.
-    #[error("{missing} of {pixels} pixels have samples that are not finite, more than the share of {most}: the frame is damaged")]
+    #[error(
+        "{missing} of {pixels} pixels have samples that are not finite, more than the share of {most}: the frame is damaged"
+    )]
     Missing {
         /// Pixels without data.
         missing: usize,
@@ -74,7 +76,9 @@ pub enum Error {
         expected: &'static str,
     },
     /// A calibration whose drift follows the frame rate, which a stream does not tell.
-    #[error("the calibration's drift follows the frame rate since power-on: take it off with `DriftStage::Ignore`, afterwards")]
+    #[error(
+        "the calibration's drift follows the frame rate since power-on: take it off with `DriftStage::Ignore`, afterwards"
+    )]
     FrameRate,
     /// Pixels, samples or options.
     #[error(transparent)]

@@ -1,6 +1,6 @@
 //! What is refused, and what is flagged.
 
-use live_frames::error_models::{Transient, WarmUp, TemperatureDrift};
+use live_frames::error_models::{TemperatureDrift, Transient, WarmUp};
 use live_frames::range_image::{Flags, SampleSlice, Samples};
 use live_frames::range_io::calibration::{CalibratedDrift, Calibration};
 use live_frames::{DriftStage, Error, Exposure, Limits, Processor, Stages};
@@ -97,7 +97,8 @@ fn temperature_is_taken_off_and_flagged_outside_of_its_span() {
     calibration.span.temperature_c = Some([20.0, 45.0]);
     let mut processor = processor(&sequence, &calibration);
     let raw = sequence.frame(0).raw;
-    let at = |time_s: f64, temperature_c: f64| Exposure { temperature_c: Some(temperature_c), ..Exposure::from(time_s) };
+    let at =
+        |time_s: f64, temperature_c: f64| Exposure { temperature_c: Some(temperature_c), ..Exposure::from(time_s) };
     let reference = processor.process(raw.samples(), at(0.0, 30.0)).unwrap().clone();
     let warm = processor.process(raw.samples(), at(0.1, 40.0)).unwrap();
     assert!((warm.drift_m - 0.01).abs() < 1e-12);
@@ -143,7 +144,10 @@ fn cameras_and_options_that_are_none() {
     camera.modulations.clear();
     assert!(matches!(refused(camera, stages(1), Limits::default()), Error::OutOfDomain { .. }));
     let other = Sequence { modulation_hz: vec![20e6], ..Sequence::default() };
-    assert!(matches!(refused(other.camera(), stages(1), Limits::default()), Error::OtherCamera { what: "modulation", .. }));
+    assert!(matches!(
+        refused(other.camera(), stages(1), Limits::default()),
+        Error::OtherCamera { what: "modulation", .. }
+    ));
     assert!(matches!(refused(sequence.camera(), stages(0), Limits::default()), Error::Unwrapping(_)));
     let limits = Limits { longest_gap_s: f64::NAN, ..Limits::default() };
     assert!(matches!(refused(sequence.camera(), stages(1), limits), Error::OutOfDomain { name: "longest_gap_s", .. }));

@@ -10,14 +10,16 @@ use live_frames::range_image::{ComplexFrame, Flags, RangeFrame, Raster, demodula
 use live_frames::range_io::calibration::Calibration;
 use live_frames::{Exposure, Limits, Processor};
 use simulation::SimulatedFrame;
-use simulation::scattering_deconvolution::{
-    OutsideLightDetector, OutsideLightOptions, RestorationOptions, restore,
-};
+use simulation::scattering_deconvolution::{OutsideLightDetector, OutsideLightOptions, RestorationOptions, restore};
 
 use crate::common::{Sequence, stages};
 
 /// A frame through the stage functions, in the order and with the options of a pipeline.
-pub fn reference(sequence: &Sequence, calibration: &Calibration, frame: &SimulatedFrame) -> (RangeFrame, Vec<[f64; 3]>) {
+pub fn reference(
+    sequence: &Sequence,
+    calibration: &Calibration,
+    frame: &SimulatedFrame,
+) -> (RangeFrame, Vec<[f64; 3]>) {
     let mut options = sequence.camera().demodulation;
     options.noise = calibration.noise.unwrap();
     let mut complex = demodulate(&frame.raw, &options).unwrap();
@@ -130,8 +132,7 @@ fn bits(values: &[f32]) -> Vec<u32> {
 /// Compares two frames to the bit.
 fn check(sequence: &Sequence) {
     let calibration = sequence.calibration();
-    let mut processor =
-        Processor::new(sequence.camera(), &calibration, stages(1), Limits::default()).unwrap();
+    let mut processor = Processor::new(sequence.camera(), &calibration, stages(1), Limits::default()).unwrap();
     for number in [0, 20] {
         let frame = sequence.frame(number);
         let (expected, points) = reference(sequence, &calibration, &frame);

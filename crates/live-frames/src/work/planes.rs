@@ -1,6 +1,6 @@
 //! From samples to phases, amplitudes and their noise.
 
-use range_image::{ComplexFrame, Flags, RawView, Raster};
+use range_image::{ComplexFrame, Flags, Raster, RawView};
 
 use crate::calibration::PreparedCalibration;
 use crate::camera::LiveCamera;

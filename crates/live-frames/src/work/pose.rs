@@ -51,6 +51,7 @@ impl Pose {
 fn tracker(calibration: &PreparedCalibration, options: TrackerOptions) -> Result<Tracker> {
     let format = calibration.rays.format();
     let directions = calibration.rays.directions();
-    let projection = Projection::from_directions(format.width, format.height, directions).map_err(tracking::Error::from)?;
+    let projection =
+        Projection::from_directions(format.width, format.height, directions).map_err(tracking::Error::from)?;
     Ok(Tracker::new(&Arc::new(projection), options)?)
 }

@@ -102,7 +102,8 @@ pub(crate) fn finish(
         ranges[0] = Some(range.as_mut_slice().chunks_mut(length));
         sigmas[0] = Some(sigma.as_mut_slice().chunks_mut(length));
     }
-    let amplitude_of = |index: usize| if index == 0 { Some(&*amplitude) } else { planes.further_amplitudes.get(index - 1) };
+    let amplitude_of =
+        |index: usize| if index == 0 { Some(&*amplitude) } else { planes.further_amplitudes.get(index - 1) };
     let mut confidence = confidence.as_slice().chunks(length);
     let mut given = planes.complex.flags.as_slice().chunks(length);
     let (mut points, mut flags) = (points.chunks_mut(length), flags.as_mut_slice().chunks_mut(length));
@@ -122,11 +123,9 @@ pub(crate) fn finish(
             })
         });
         let combined = match &mut combined {
-            Some((range, sigma, chi_squared)) => Some(CombinedPixels {
-                range: range.next()?,
-                sigma: sigma.next()?,
-                chi_squared: chi_squared.next()?,
-            }),
+            Some((range, sigma, chi_squared)) => {
+                Some(CombinedPixels { range: range.next()?, sigma: sigma.next()?, chi_squared: chi_squared.next()? })
+            }
             None => None,
         };
         Some(Chunk {

@@ -46,4 +46,3 @@ pub fn wrong(sequence: &Sequence, frames: &[SimulatedFrame], refresh: u32) -> Ve
     };
     frames.iter().enumerate().map(of_frame).collect()
 }
-

@@ -75,7 +75,8 @@ impl Sequence {
         let set = ModelSet { entries: vec![(0.002, models)] };
         let mut calibration = Calibration::from_models(&spec.camera.geometry, &set, Some(&psf())).unwrap();
         calibration.noise = Some(NoiseModel { shot_variance_per_unit: 0.05, dark_sigma: self.dark_sigma });
-        calibration.span = ValidSpan { range_m: Some([0.5, 8.0]), amplitude: Some([30.0, 1.5e4]), ..ValidSpan::default() };
+        calibration.span =
+            ValidSpan { range_m: Some([0.5, 8.0]), amplitude: Some([30.0, 1.5e4]), ..ValidSpan::default() };
         let offsets = (0..self.width * self.height).map(|pixel| 1e-4 * ((pixel * 7 % 23) as f32 - 11.0)).collect();
         let (width, height) = (self.width, self.height);
         calibration.fixed_pattern = Some(FixedPattern { width, height, offset_m: offsets, sigma_m: Vec::new() });
@@ -84,7 +85,8 @@ impl Sequence {
 
     /// The room at a time: hand-held motion, a person who crosses it, a ball that swings, a board that slides in.
     fn spec(&self, time_s: f64) -> SimulationSpec {
-        let sway = |amplitude: f64, hz: f64, phase: f64| amplitude * (std::f64::consts::TAU * hz * time_s + phase).sin();
+        let sway =
+            |amplitude: f64, hz: f64, phase: f64| amplitude * (std::f64::consts::TAU * hz * time_s + phase).sin();
         let (x, y, z) = (0.6 + sway(0.05, 0.4, 0.0), 2.5 + sway(0.08, 0.3, 1.0), 1.5 + sway(0.03, 0.9, 2.0));
         let (to_y, to_z) = (2.6 + sway(0.5, 0.25, 0.5), 1.2 + sway(0.2, 0.6, 0.0));
         let person_y = 4.6 - 1.2 * time_s.rem_euclid(4.0);

@@ -2,7 +2,7 @@
 
 use range_image::Raster;
 
-use crate::carried::pixels::{HELD, OPEN, RIM, gentle_step};
+use crate::carried::pixels::{HELD, OPEN, RIM, apart, gentle_step};
 use crate::tree::grid::{wrap_step, wrapped};
 
 /// Sweeps forth and back over the pixels without a count. What is revealed at the edge of a surface is reached in the first;
@@ -70,14 +70,13 @@ impl Attaching<'_> {
     /// its count for this frame, and says that it is a guess.
     fn set_aside(&mut self, pixel: usize) -> bool {
         let (phase, amplitude) = (self.phase.as_slice(), self.amplitude.as_slice());
-        let apart = |other: usize| {
-            let phases = [phase[other], phase[pixel]];
-            match self.state[other] {
-                HELD | RIM => gentle_step(phases, [amplitude[other], amplitude[pixel]], self.noise2).is_none(),
-                state => state == OPEN,
-            }
+        let unwrapped = |pixel: usize| phase[pixel] + std::f32::consts::TAU * self.wraps[pixel] as f32;
+        let own = unwrapped(pixel);
+        let beyond = |other: usize| match self.state[other] {
+            HELD | RIM => apart([own, unwrapped(other)], [amplitude[pixel], amplitude[other]], self.noise2),
+            state => state == OPEN,
         };
-        let at_edge = self.sides(pixel).into_iter().flatten().any(apart);
+        let at_edge = self.sides(pixel).into_iter().flatten().any(beyond);
         if at_edge {
             self.state[pixel] = RIM;
             self.unwrapped[pixel] = f32::NAN;

@@ -53,13 +53,7 @@ impl Coarse {
         });
         let amplitude_noise = options.amplitude_noise.map(|noise| noise / factor);
         self.unwrapper.set_options(SpatialOptions { geometry, amplitude_noise, ..*options });
-        self.unwrapper.unwrap_into(
-            &self.phase,
-            Some(&self.amplitude),
-            None,
-            KnownWraps::Nothing,
-            &mut self.out,
-        )?;
+        self.unwrapper.unwrap_into(&self.phase, Some(&self.amplitude), None, KnownWraps::Nothing, &mut self.out)?;
         Ok(true)
     }
 

@@ -4,6 +4,8 @@
 
 use std::f32::consts::TAU;
 
+use crate::tree::grid::wrapped;
+
 /// No phase.
 pub(crate) const MASKED: u8 = 0;
 /// The check failed: the count is not known yet.
@@ -159,10 +161,19 @@ fn noise_margin(a: f32, b: f32, noise2: f32) -> f32 {
 /// The size of the step between two neighbours where they can lie on one surface, by phases and amplitudes.
 #[inline(always)]
 pub(crate) fn gentle_step(phases: [f32; 2], [a, b]: [f32; 2], noise2: f32) -> Option<f32> {
-    let step = crate::tree::grid::wrapped(phases[1] - phases[0]).abs();
+    let step = wrapped(phases[1] - phases[0]).abs();
+    if (step <= SLOPE_RAD) & (a <= STEADY_RATIO * b) & (b <= STEADY_RATIO * a) {
+        return Some(step);
+    }
     let margin = noise_margin(a, b, noise2);
     let ratio = STEADY_RATIO * (1.0 + margin);
     // Neighbours lie on a slope, which the step in time does not see.
     let limit = if margin > SLOPE_RAD { margin } else { SLOPE_RAD };
     ((step <= limit) & (a <= ratio * b) & (b <= ratio * a)).then_some(step)
+}
+
+/// Whether two neighbours with these unwrapped phases lie on two surfaces.
+pub(crate) fn apart(unwrapped: [f32; 2], [a, b]: [f32; 2], noise2: f32) -> bool {
+    let step = (unwrapped[1] - unwrapped[0]).abs();
+    step > SLOPE_RAD && step > noise_margin(a, b, noise2)
 }

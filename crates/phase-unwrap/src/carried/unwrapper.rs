@@ -11,7 +11,7 @@ use crate::{KnownWraps, Result, SpatialOptions, Unwrapped, Unwrapper};
 
 /// Share of the pixels that may be left without a count, or in contradiction, until the next check; beyond it the frame is
 /// checked at once.
-const LEFT_SHARE: f32 = 3e-4;
+const LEFT_SHARE: f32 = 1e-3;
 
 /// Absolute counts of one frequency in a stream of frames, for a small part of what the tree costs.
 ///

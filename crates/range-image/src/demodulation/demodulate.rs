@@ -8,7 +8,8 @@ use crate::demodulation::samples::{Sample, SampleBlock, Sums, peaks};
 use crate::demodulation::weights::{GROUP, StepWeight, StepWeights};
 use crate::rasters::wide::{Arithmetic, PixelLoop, run_wide, task_length};
 use crate::{
-    ComplexChannel, ComplexFrame, DemodulationOptions, Flags, NoiseModel, Raster, RawFrame, RawView, Result, SampleSlice,
+    ComplexChannel, ComplexFrame, DemodulationOptions, Flags, NoiseModel, Raster, RawFrame, RawView, Result,
+    SampleSlice,
 };
 
 /// Demodulates one frame; see [`Demodulator`] for streams of frames.

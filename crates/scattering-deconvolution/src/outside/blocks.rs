@@ -76,7 +76,8 @@ impl Blocks {
             let [first, end] = self.pixels(index);
             let rows = first[1]..end[1];
             let pixels = rows.flat_map(|row| row * self.size[0] + first[0]..row * self.size[0] + end[0]);
-            let lights = pixels.map(|pixel| (pixel, [channel.real.as_slice()[pixel], channel.imaginary.as_slice()[pixel]]));
+            let lights =
+                pixels.map(|pixel| (pixel, [channel.real.as_slice()[pixel], channel.imaginary.as_slice()[pixel]]));
             let mut finite = lights.filter(|(_, [re, im])| re.is_finite() && im.is_finite()).peekable();
             finite.peek().is_some() && finite.all(|(pixel, light)| is_dark(pixel, light))
         })

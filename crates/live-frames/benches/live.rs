@@ -16,7 +16,7 @@ fn process(criterion: &mut Criterion) {
         let sequence = Sequence { width: 640, height: 480, modulation_hz, rays: 1, ..Sequence::default() };
         let raw: Vec<_> = (0..8).map(|number| sequence.frame(number).raw).collect();
         let mut processor =
-            Processor::new(sequence.camera(), &sequence.calibration(), common::stages(100_000), Limits::default())
+            Processor::new(&sequence.camera(), &sequence.calibration(), common::stages(100_000), Limits::default())
                 .unwrap();
         let mut number = 0_usize;
         group.throughput(Throughput::Elements((sequence.width * sequence.height) as u64));

@@ -28,7 +28,7 @@ fn main() {
     let sequence = Sequence { width, height, rays: 1, ..Sequence::default() };
     let shown: Vec<RawFrame> = (0..20).map(|number| sequence.frame(number).raw).collect();
     let mut processor =
-        Processor::new(sequence.camera(), &sequence.calibration(), Stages::default(), Limits::default()).unwrap();
+        Processor::new(&sequence.camera(), &sequence.calibration(), Stages::default(), Limits::default()).unwrap();
 
     let (mut writer, reader) = latest_frame();
     let camera = std::thread::spawn(move || {

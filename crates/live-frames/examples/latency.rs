@@ -25,7 +25,7 @@ fn main() {
     let sequence = Sequence { width, height, modulation_hz, rays: 1, ..Sequence::default() };
     let raw: Vec<_> = (0..SIMULATED).map(|number| sequence.frame(number).raw).collect();
     let mut processor =
-        Processor::new(sequence.camera(), &sequence.calibration(), stages(tracking), Limits::default()).unwrap();
+        Processor::new(&sequence.camera(), &sequence.calibration(), stages(tracking), Limits::default()).unwrap();
     let mut milliseconds = Vec::with_capacity(frames);
     let (mut whole, mut checks, mut failed, mut memory) = (0, 0, 0.0, [0; 2]);
     let mut lost = 0;

@@ -39,8 +39,8 @@ impl Processor {
     ///
     /// # Errors
     /// What [`PreparedCalibration::new`] refuses, and stages and limits outside their domains.
-    pub fn new(camera: LiveCamera, calibration: &Calibration, stages: Stages, limits: Limits) -> Result<Self> {
-        let prepared = PreparedCalibration::new(&camera, calibration, &stages)?;
+    pub fn new(camera: &LiveCamera, calibration: &Calibration, stages: Stages, limits: Limits) -> Result<Self> {
+        let prepared = PreparedCalibration::new(camera, calibration, &stages)?;
         Self::with_prepared(prepared, stages, limits)
     }
 

@@ -17,7 +17,7 @@ fn the_frame_after_has_the_new_calibration() {
     }
     second.scattering = None;
     let (camera, stages) = (sequence.camera(), stages(100));
-    let mut processor = Processor::new(camera.clone(), &first, stages.clone(), Limits::default()).unwrap();
+    let mut processor = Processor::new(&camera, &first, stages.clone(), Limits::default()).unwrap();
     let frames = [0, 1].map(|number| sequence.frame(number));
     processor.process(frames[0].raw.samples(), 0.0).unwrap();
     // Made ready on another thread, as one would while frames go on.
@@ -40,7 +40,7 @@ fn the_frame_after_has_the_new_calibration() {
 fn another_camera_is_refused_and_changes_nothing() {
     let sequence = Sequence::default();
     let mut processor =
-        Processor::new(sequence.camera(), &sequence.calibration(), stages(1), Limits::default()).unwrap();
+        Processor::new(&sequence.camera(), &sequence.calibration(), stages(1), Limits::default()).unwrap();
     let other = Sequence { width: 64, height: 48, ..Sequence::default() };
     let prepared = PreparedCalibration::new(&other.camera(), &other.calibration(), &stages(1)).unwrap();
     assert!(matches!(processor.set_calibration(prepared), Err(Error::OtherCamera { .. })));

@@ -10,7 +10,7 @@ fn allocations(sequence: &Sequence, frames: usize, from: usize) -> u64 {
     let raw: Vec<_> = (0..frames).map(|number| sequence.frame(number).raw).collect();
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
     pool.install(|| {
-        let mut processor = Processor::new(sequence.camera(), &calibration, stages(1000), Limits::default()).unwrap();
+        let mut processor = Processor::new(&sequence.camera(), &calibration, stages(1000), Limits::default()).unwrap();
         let mut run = |numbers: std::ops::Range<usize>| {
             for number in numbers {
                 let frame = processor.process(raw[number].samples(), number as f64 * INTERVAL_S).unwrap();

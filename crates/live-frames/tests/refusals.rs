@@ -8,7 +8,7 @@ use live_frames::{DriftStage, Error, Exposure, Limits, Processor, Stages};
 use crate::common::{Sequence, stages};
 
 fn processor(sequence: &Sequence, calibration: &Calibration) -> Processor {
-    Processor::new(sequence.camera(), calibration, stages(1), Limits::default()).unwrap()
+    Processor::new(&sequence.camera(), calibration, stages(1), Limits::default()).unwrap()
 }
 
 fn floats(samples: &Samples) -> Vec<f32> {
@@ -102,7 +102,7 @@ fn temperature_is_taken_off_and_flagged_outside_of_its_span() {
     let reference = processor.process(raw.samples(), at(0.0, 30.0)).unwrap().clone();
     let warm = processor.process(raw.samples(), at(0.1, 40.0)).unwrap();
     assert!((warm.drift_m - 0.01).abs() < 1e-12);
-    let pixel = warm.flags.as_slice().iter().position(|flags| flags.is_empty()).unwrap();
+    let pixel = warm.flags.as_slice().iter().position(Flags::is_empty).unwrap();
     let moved = f64::from(reference.range.as_slice()[pixel]) - f64::from(warm.range.as_slice()[pixel]);
     assert!((moved - 0.01).abs() < 2e-6, "{moved}");
     let hot = processor.process(raw.samples(), at(0.2, 50.0)).unwrap();
@@ -111,7 +111,7 @@ fn temperature_is_taken_off_and_flagged_outside_of_its_span() {
     assert!(matches!(processor.process(raw.samples(), 0.3), Err(Error::Unstated { .. })));
     // Told to leave the drift, it asks for nothing.
     let ignoring = Stages { drift: DriftStage::Ignore, ..stages(1) };
-    let mut processor = Processor::new(sequence.camera(), &calibration, ignoring, Limits::default()).unwrap();
+    let mut processor = Processor::new(&sequence.camera(), &calibration, ignoring, Limits::default()).unwrap();
     assert_eq!(processor.process(raw.samples(), 0.0).unwrap().drift_m, 0.0);
 }
 
@@ -127,7 +127,7 @@ fn times_since_power_on() {
     assert!(matches!(without.process(raw.samples(), 0.0), Err(Error::Unstated { .. })));
     let mut camera = sequence.camera();
     camera.power_on_s = Some(-600.0);
-    let mut with = Processor::new(camera, &calibration, stages(1), Limits::default()).unwrap();
+    let mut with = Processor::new(&camera, &calibration, stages(1), Limits::default()).unwrap();
     let frame = with.process(raw.samples(), 0.0).unwrap();
     assert!((frame.drift_m - 0.02 / std::f64::consts::E).abs() < 1e-12);
 }
@@ -136,7 +136,7 @@ fn times_since_power_on() {
 fn cameras_and_options_that_are_none() {
     let sequence = Sequence::default();
     let calibration = sequence.calibration();
-    let refused = |camera, stages, limits| Processor::new(camera, &calibration, stages, limits).unwrap_err();
+    let refused = |camera, stages, limits| Processor::new(&camera, &calibration, stages, limits).unwrap_err();
     let mut camera = sequence.camera();
     camera.phase_steps = 2;
     assert!(matches!(refused(camera, stages(1), Limits::default()), Error::OutOfDomain { name: "phase_steps", .. }));

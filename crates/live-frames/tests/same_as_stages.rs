@@ -6,7 +6,7 @@ use live_frames::phase_unwrap::{
     ImageGeometry, MultiFrequencyOptions, SpatialOptions, combine_frequencies, combined_interval_m,
     unwrap_multi_frequency, unwrap_spatial,
 };
-use live_frames::range_image::{ComplexFrame, Flags, RangeFrame, Raster, demodulate};
+use live_frames::range_image::{ComplexChannel, ComplexFrame, Flags, RangeFrame, Raster, demodulate};
 use live_frames::range_io::calibration::Calibration;
 use live_frames::{Exposure, Limits, Processor};
 use simulation::SimulatedFrame;
@@ -79,7 +79,7 @@ fn counts(calibration: &Calibration, complex: &ComplexFrame) -> (Vec<Raster<i32>
         return (vec![found.wraps], found.confidence);
     }
     let modulations: Vec<_> = complex.channels.iter().map(|channel| channel.modulation).collect();
-    let phases: Vec<_> = complex.channels.iter().map(|channel| channel.phase()).collect();
+    let phases: Vec<_> = complex.channels.iter().map(ComplexChannel::phase).collect();
     let sigmas = complex.channels.iter().map(|channel| {
         let systematic = channel.modulation.phase_from_range(0.02) as f32;
         channel.sigma_phase().map(|sigma| sigma.hypot(systematic))
@@ -132,7 +132,7 @@ fn bits(values: &[f32]) -> Vec<u32> {
 /// Compares two frames to the bit.
 fn check(sequence: &Sequence) {
     let calibration = sequence.calibration();
-    let mut processor = Processor::new(sequence.camera(), &calibration, stages(1), Limits::default()).unwrap();
+    let mut processor = Processor::new(&sequence.camera(), &calibration, stages(1), Limits::default()).unwrap();
     for number in [0, 20] {
         let frame = sequence.frame(number);
         let (expected, points) = reference(sequence, &calibration, &frame);
@@ -187,7 +187,7 @@ fn two_integration_times_are_blended() {
     }
     calibration.range_models[0].integration_time_s = 0.001;
     calibration.range_models.extend(longer);
-    let mut processor = Processor::new(sequence.camera(), &calibration, stages(1), Limits::default()).unwrap();
+    let mut processor = Processor::new(&sequence.camera(), &calibration, stages(1), Limits::default()).unwrap();
     let frame = sequence.frame(3);
     let (expected, _) = reference(&sequence, &calibration, &frame);
     let exposure =
@@ -206,7 +206,7 @@ fn the_threads_do_not_matter() {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| {
             let mut processor =
-                Processor::new(sequence.camera(), &sequence.calibration(), stages(1), Limits::default()).unwrap();
+                Processor::new(&sequence.camera(), &sequence.calibration(), stages(1), Limits::default()).unwrap();
             processor.process(frame.raw.samples(), 0.0).unwrap().clone()
         })
     };

@@ -15,7 +15,7 @@ fn poses_are_those_of_a_tracker_of_unflagged_points() {
     let frames: Vec<_> = (0..8).map(|number| sequence.frame(number)).collect();
     let calibration = sequence.calibration();
     let stages = Stages { tracking: Some(TrackerOptions::default()), ..stages(100) };
-    let mut processor = Processor::new(sequence.camera(), &calibration, stages.clone(), Limits::default()).unwrap();
+    let mut processor = Processor::new(&sequence.camera(), &calibration, stages.clone(), Limits::default()).unwrap();
     let rays = RayTable::new(&calibration.camera().unwrap()).unwrap();
     let projection = Projection::from_directions(sequence.width, sequence.height, rays.directions()).unwrap();
     let mut tracker = Tracker::new(&Arc::new(projection), TrackerOptions::default()).unwrap();
@@ -42,7 +42,7 @@ fn poses_are_those_of_a_tracker_of_unflagged_points() {
 fn a_camera_at_rest_stays_where_it_is() {
     let sequence = Sequence { still: true, ..Sequence::default() };
     let stages = Stages { tracking: Some(TrackerOptions::default()), ..stages(100) };
-    let mut processor = Processor::new(sequence.camera(), &sequence.calibration(), stages, Limits::default()).unwrap();
+    let mut processor = Processor::new(&sequence.camera(), &sequence.calibration(), stages, Limits::default()).unwrap();
     for number in 0..6 {
         let frame = sequence.frame(number);
         let found = processor.process(frame.raw.samples(), number as f64 * INTERVAL_S).unwrap();

@@ -95,7 +95,7 @@ impl PreparedCorrection {
     /// Corrects whole rows from `first_row` on.
     ///
     /// Fails where the slices are no whole rows, differ in length or reach beyond the frame; they are untouched then.
-    pub fn correct_rows(&self, first_row: usize, rows: FrameRows<'_>) -> Result<()> {
+    pub fn correct_rows(&self, first_row: usize, mut rows: FrameRows<'_>) -> Result<()> {
         let (width, count) = (self.format.width, rows.range.len());
         let height = count / width;
         let end = first_row.saturating_add(height);
@@ -116,14 +116,14 @@ impl PreparedCorrection {
             }));
         }
         match &self.models {
-            [Some((shorter, _)), Some((longer, _))] => self.blend_rows([shorter, longer], first_row, rows),
-            [Some((kernel, _)), _] => self.run(kernel, first_row, rows),
+            [Some((shorter, _)), Some((longer, _))] => self.blend_rows([shorter, longer], first_row, &mut rows),
+            [Some((kernel, _)), _] => self.run(kernel, first_row, &mut rows),
             [None, _] => {}
         }
         Ok(())
     }
 
-    fn run(&self, kernel: &Kernel, first_row: usize, rows: FrameRows<'_>) {
+    fn run(&self, kernel: &Kernel, first_row: usize, rows: &mut FrameRows<'_>) {
         let start = first_row * self.format.width;
         let own = start..start + rows.range.len();
         let pattern = self.pattern.as_deref();
@@ -144,7 +144,7 @@ impl PreparedCorrection {
     }
 
     /// Both models on a block of a row at a time, which needs no memory but the stack's.
-    fn blend_rows(&self, [shorter, longer]: [&Kernel; 2], first_row: usize, rows: FrameRows<'_>) {
+    fn blend_rows(&self, [shorter, longer]: [&Kernel; 2], first_row: usize, rows: &mut FrameRows<'_>) {
         let width = self.format.width;
         let pattern = self.pattern.as_deref();
         let known = pattern.filter(|pattern| !pattern.sigma_m.is_empty());

@@ -19,7 +19,7 @@ pub struct Wrong {
 /// A processor's counts, the whole frame solved every so many frames.
 pub fn wrong(sequence: &Sequence, frames: &[SimulatedFrame], refresh: u32) -> Vec<Wrong> {
     let calibration = sequence.calibration();
-    let mut processor = Processor::new(sequence.camera(), &calibration, stages(refresh), Limits::default()).unwrap();
+    let mut processor = Processor::new(&sequence.camera(), &calibration, stages(refresh), Limits::default()).unwrap();
     let interval_m = sequence.camera().modulations[0].ambiguity_interval_m();
     let of_frame = |(number, frame): (usize, &SimulatedFrame)| {
         let found = processor.process(frame.raw.samples(), number as f64 * INTERVAL_S).unwrap();

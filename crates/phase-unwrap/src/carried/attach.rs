@@ -30,7 +30,7 @@ impl Attaching<'_> {
     pub fn list(state: &[u8], open: &mut Vec<u32>) {
         open.clear();
         for (index, block) in state.chunks(32).enumerate() {
-            if block.iter().fold(false, |any, &state| any | (state == OPEN)) {
+            if block.iter().fold(0, |any, &state| any | u8::from(state == OPEN)) != 0 {
                 let pixels = block.iter().enumerate().filter(|(_, state)| **state == OPEN);
                 open.extend(pixels.map(|(offset, _)| (32 * index + offset) as u32));
             }

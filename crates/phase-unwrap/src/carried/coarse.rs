@@ -52,7 +52,7 @@ impl Coarse {
             principal_point_px: geometry.principal_point_px.map(|point| (point + 0.5) / factor - 0.5),
         });
         let amplitude_noise = options.amplitude_noise.map(|noise| noise / factor);
-        self.unwrapper.set_options(SpatialOptions { geometry, amplitude_noise, ..*options });
+        self.unwrapper.set_options(SpatialOptions { amplitude_noise, geometry, ..*options });
         self.unwrapper.unwrap_into(&self.phase, Some(&self.amplitude), None, KnownWraps::Nothing, &mut self.out)?;
         Ok(true)
     }

@@ -68,7 +68,7 @@ const LANES: usize = 32;
 /// Predicts each pixel's count as the one that brings its phase nearest to what was known last, and checks it: the phase may
 /// not step far, and amplitude times range squared not change.
 #[inline(always)]
-pub(crate) fn carry_row(row: Row<'_>, limits: Limits) -> Tally {
+pub(crate) fn carry_row(row: &mut Row<'_>, limits: Limits) -> Tally {
     let mut tally = Tally::default();
     let (phase, last_phase) = row.phase.as_chunks::<LANES>();
     let (amplitude, last_amplitude) = row.amplitude.as_chunks::<LANES>();
@@ -139,8 +139,8 @@ fn carry_pixels<const L: usize>(
         unwrapped[i] = if held { now } else { known };
         before[i] = if held { a } else { earlier };
         counts[i] = if there & in_span { count } else { 0.0 };
-        used[i] = if there { 1 } else { 0 };
-        open[i] = if failed { 1 } else { 0 };
+        used[i] = u32::from(there);
+        open[i] = u32::from(failed);
     }
     for i in 0..L {
         // Added to 1.5 * 2^23, a small integer stands in the last bits.

@@ -169,7 +169,7 @@ impl CarriedUnwrapper {
                 for row in 0..phase.height() {
                     let at = row * width..(row + 1) * width;
                     let tally = carry_row(
-                        Row {
+                        &mut Row {
                             phase: &phase.as_slice()[at.clone()],
                             amplitude: &amplitude.as_slice()[at.clone()],
                             unwrapped: &mut unwrapped[at.clone()],

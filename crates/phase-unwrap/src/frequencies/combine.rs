@@ -69,8 +69,9 @@ pub fn combine_pixels(ranges: &[&[f32]], sigmas: &[&[f32]], out: CombinedPixels<
     if sigmas.len() != ranges.len() {
         return Err(Error::PlaneCount { what: "sigma", expected: ranges.len(), found: sigmas.len() });
     }
-    let lengths = ranges.iter().chain(sigmas).map(|plane| plane.len()).chain([out.sigma.len(), out.chi_squared.len()]);
-    for found in lengths.filter(|found| *found != count) {
+    let of_planes = ranges.iter().chain(sigmas).map(|plane| plane.len());
+    let mut lengths = of_planes.chain([out.sigma.len(), out.chi_squared.len()]);
+    if let Some(found) = lengths.find(|found| *found != count) {
         let (width, height, expected) = (count, 1, count);
         return Err(range_image::Error::RasterLength { width, height, expected, found }.into());
     }

@@ -46,7 +46,7 @@ fn main() {
     while let Some(taken) = reader.read() {
         let frame = processor.process(&taken.samples, taken.timestamp_s).unwrap();
         milliseconds.push(1e3 * taken.at.elapsed().as_secs_f64());
-        if frame.number % 30 == 0 {
+        if frame.number.is_multiple_of(30) {
             let centre = frame.points[frame.width() * frame.height() / 2 + frame.width() / 2];
             println!("{:6.2} s: centre at {centre:.3?} m, counts {:?}", frame.timestamp_s, frame.counts);
         }

@@ -2,6 +2,8 @@
 // Only what is inlined is compiled for wide registers.
 #![allow(clippy::inline_always)]
 
+use std::slice::{Chunks, ChunksMut};
+
 use camera_model::RayTable;
 use error_models::{FrameRows, PreparedCorrection};
 use phase_unwrap::{CombinedPixels, combine_pixels};
@@ -77,74 +79,113 @@ impl Frequencies {
 pub(crate) fn finish(
     rules: &Rules<'_>,
     planes: &Planes,
-    (wraps, confidence): (&[Raster<i32>], &Raster<f32>),
+    counts: (&[Raster<i32>], &Raster<f32>),
     frequencies: &mut Frequencies,
     frame: &mut ProcessedFrame,
 ) -> Result<()> {
-    let rows = frame.height().div_ceil(MOST_CHUNKS);
-    let length = (rows * rules.width).max(1);
-    let several = planes.phases.len() > 1;
-    let ProcessedFrame { range, sigma, amplitude, flags, points, .. } = frame;
-    let mut ranges = [const { None }; MOST_FREQUENCIES];
-    let mut sigmas = [const { None }; MOST_FREQUENCIES];
-    let mut combined = None;
-    if several {
-        for (to, plane) in ranges.iter_mut().zip(&mut frequencies.ranges) {
-            *to = Some(plane.as_mut_slice().chunks_mut(length));
-        }
-        for (to, plane) in sigmas.iter_mut().zip(&mut frequencies.sigmas) {
-            *to = Some(plane.as_mut_slice().chunks_mut(length));
-        }
-        let chi_squared = frequencies.chi_squared.as_mut_slice().chunks_mut(length);
-        combined =
-            Some((range.as_mut_slice().chunks_mut(length), sigma.as_mut_slice().chunks_mut(length), chi_squared));
-    } else {
-        ranges[0] = Some(range.as_mut_slice().chunks_mut(length));
-        sigmas[0] = Some(sigma.as_mut_slice().chunks_mut(length));
-    }
-    let amplitude_of =
-        |index: usize| if index == 0 { Some(&*amplitude) } else { planes.further_amplitudes.get(index - 1) };
-    let mut confidence = confidence.as_slice().chunks(length);
-    let mut given = planes.complex.flags.as_slice().chunks(length);
-    let (mut points, mut flags) = (points.chunks_mut(length), flags.as_mut_slice().chunks_mut(length));
-    let mut jobs: [Option<Chunk<'_>>; MOST_CHUNKS] = std::array::from_fn(|number| {
-        let start = number * length;
-        let channels = std::array::from_fn(|index| {
-            let (range, sigma) = (ranges[index].as_mut()?.next()?, sigmas[index].as_mut()?.next()?);
-            let own = start..start + range.len();
-            Some(Channel {
-                phase: &planes.phases.get(index)?.as_slice()[own.clone()],
-                wraps: &wraps.get(index)?.as_slice()[own.clone()],
-                amplitude: &amplitude_of(index)?.as_slice()[own.clone()],
-                sigma_phase: planes.sigmas.get(index).map(|plane| &plane.as_slice()[own]),
-                range,
-                sigma,
-                metres: metres(&planes.complex.channels.get(index)?.modulation),
-            })
-        });
-        let combined = match &mut combined {
-            Some((range, sigma, chi_squared)) => {
-                Some(CombinedPixels { range: range.next()?, sigma: sigma.next()?, chi_squared: chi_squared.next()? })
-            }
-            None => None,
-        };
-        Some(Chunk {
-            first_row: number * rows,
-            channels,
-            confidence: confidence.next()?,
-            given: given.next()?,
-            combined,
-            points: points.next()?,
-            flags: flags.next()?,
-            result: Ok(()),
-        })
-    });
+    let mut cut = Cut::new(rules.width, planes, counts, frequencies, frame);
+    let mut jobs: [Option<Chunk<'_>>; MOST_CHUNKS] = std::array::from_fn(|_| cut.next());
     if rayon::current_num_threads() == 1 {
         jobs.iter_mut().flatten().for_each(|chunk| chunk.result = chunk.run(rules));
     } else {
         jobs.par_iter_mut().flatten().for_each(|chunk| chunk.result = chunk.run(rules));
     }
     jobs.into_iter().flatten().try_for_each(|chunk| chunk.result)
+}
+
+/// All planes of a frame, cut into chunks one after the other.
+struct Cut<'a> {
+    rows: usize,
+    width: usize,
+    number: usize,
+    planes: &'a Planes,
+    wraps: &'a [Raster<i32>],
+    amplitude: &'a Raster<f32>,
+    ranges: [Option<ChunksMut<'a, f32>>; MOST_FREQUENCIES],
+    sigmas: [Option<ChunksMut<'a, f32>>; MOST_FREQUENCIES],
+    combined: Option<[ChunksMut<'a, f32>; 3]>,
+    confidence: Chunks<'a, f32>,
+    given: Chunks<'a, Flags>,
+    points: ChunksMut<'a, [f64; 3]>,
+    flags: ChunksMut<'a, Flags>,
+}
+
+impl<'a> Cut<'a> {
+    fn new(
+        width: usize,
+        planes: &'a Planes,
+        (wraps, confidence): (&'a [Raster<i32>], &'a Raster<f32>),
+        frequencies: &'a mut Frequencies,
+        frame: &'a mut ProcessedFrame,
+    ) -> Self {
+        let rows = frame.height().div_ceil(MOST_CHUNKS);
+        let length = (rows * width).max(1);
+        let ProcessedFrame { range, sigma, amplitude, flags, points, .. } = frame;
+        let (mut ranges, mut sigmas) = ([const { None }; MOST_FREQUENCIES], [const { None }; MOST_FREQUENCIES]);
+        let mut combined = None;
+        let mut cut = |plane: &'a mut Raster<f32>| plane.as_mut_slice().chunks_mut(length);
+        if planes.phases.len() > 1 {
+            let Frequencies { ranges: of_range, sigmas: of_sigma, chi_squared } = frequencies;
+            ranges.iter_mut().zip(of_range).for_each(|(to, plane)| *to = Some(cut(plane)));
+            sigmas.iter_mut().zip(of_sigma).for_each(|(to, plane)| *to = Some(cut(plane)));
+            combined = Some([cut(range), cut(sigma), cut(chi_squared)]);
+        } else {
+            (ranges[0], sigmas[0]) = (Some(cut(range)), Some(cut(sigma)));
+        }
+        Self {
+            rows,
+            width,
+            number: 0,
+            planes,
+            wraps,
+            amplitude,
+            ranges,
+            sigmas,
+            combined,
+            confidence: confidence.as_slice().chunks(length),
+            given: planes.complex.flags.as_slice().chunks(length),
+            points: points.chunks_mut(length),
+            flags: flags.as_mut_slice().chunks_mut(length),
+        }
+    }
+
+    fn next(&mut self) -> Option<Chunk<'a>> {
+        let first_row = self.number * self.rows;
+        self.number += 1;
+        let channels = std::array::from_fn(|index| self.channel(index, first_row * self.width));
+        let combined = match &mut self.combined {
+            Some([range, sigma, chi_squared]) => {
+                Some(CombinedPixels { range: range.next()?, sigma: sigma.next()?, chi_squared: chi_squared.next()? })
+            }
+            None => None,
+        };
+        Some(Chunk {
+            first_row,
+            channels,
+            confidence: self.confidence.next()?,
+            given: self.given.next()?,
+            combined,
+            points: self.points.next()?,
+            flags: self.flags.next()?,
+            result: Ok(()),
+        })
+    }
+
+    /// One frequency from a pixel on; `None` beyond the last.
+    fn channel(&mut self, index: usize, start: usize) -> Option<Channel<'a>> {
+        let (range, sigma) = (self.ranges[index].as_mut()?.next()?, self.sigmas[index].as_mut()?.next()?);
+        let (planes, own) = (self.planes, start..start + range.len());
+        let amplitude = if index == 0 { self.amplitude } else { planes.further_amplitudes.get(index - 1)? };
+        Some(Channel {
+            phase: &planes.phases.get(index)?.as_slice()[own.clone()],
+            wraps: &self.wraps.get(index)?.as_slice()[own.clone()],
+            amplitude: &amplitude.as_slice()[own.clone()],
+            sigma_phase: planes.sigmas.get(index).map(|plane| &plane.as_slice()[own]),
+            range,
+            sigma,
+            metres: metres(&planes.complex.channels.get(index)?.modulation),
+        })
+    }
 }
 
 impl Chunk<'_> {

@@ -92,6 +92,37 @@ impl RayTable {
         );
         Ok(())
     }
+
+    /// [`Self::back_project`] of the pixels from `first` on (counted row by row), as many as there are ranges: for those who
+    /// work through a frame row by row. Flags are added to those that there are; allocates nothing.
+    ///
+    /// Fails where the slices differ in length or reach beyond the image.
+    pub fn back_project_pixels(
+        &self,
+        first: usize,
+        range: &[f32],
+        points: &mut [[f64; 3]],
+        flags: &mut [Flags],
+    ) -> Result<()> {
+        let count = range.len();
+        let rays = first.checked_add(count).and_then(|end| self.directions().get(first..end));
+        let Some(rays) = rays.filter(|_| points.len() == count && flags.len() == count) else {
+            let (width, height) = (self.format().width, self.format().height);
+            let (found_width, found_height) = (first.saturating_add(count.max(points.len()).max(flags.len())), 1);
+            let what = "pixels to back-project";
+            return Err(range_image::Error::SizeMismatch { what, width, height, found_width, found_height }.into());
+        };
+        with_wide_registers(
+            #[inline(always)]
+            || {
+                scale_rays(rays, range, points);
+                for (flags, &range) in flags.iter_mut().zip(range) {
+                    *flags = Flags::from_bits_retain(flags.bits() | missing(range));
+                }
+            },
+        );
+        Ok(())
+    }
 }
 
 /// Pixels taken at a time, so that the compiler can vectorise.
@@ -123,9 +154,14 @@ fn scale<const L: usize>(rays: &[[f64; 3]; L], ranges: &[f32; L], points: &mut [
 #[inline(always)]
 fn flag_missing(ranges: &[f32], reasons: &[Flags], flags: &mut [Flags]) {
     for ((flag, &reason), &range) in flags.iter_mut().zip(reasons).zip(ranges) {
-        let missing = if is_distance(range) { 0 } else { Flags::NO_DATA.bits() };
-        *flag = Flags::from_bits_retain(reason.bits() | missing);
+        *flag = Flags::from_bits_retain(reason.bits() | missing(range));
     }
+}
+
+/// The flag of a value that is no distance.
+#[inline(always)]
+fn missing(range: f32) -> u16 {
+    if is_distance(range) { 0 } else { Flags::NO_DATA.bits() }
 }
 
 /// Whether a value can be a distance in front of the camera.

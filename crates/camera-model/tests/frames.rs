@@ -45,6 +45,27 @@ proptest! {
 }
 
 #[test]
+fn pixels_have_the_points_of_whole_frames() {
+    let camera = plain_camera();
+    let table = RayTable::new(&camera).unwrap();
+    let mut frame = frame(camera.format.width, camera.format.height);
+    (frame.range.as_mut_slice()[3], frame.range.as_mut_slice()[5]) = (f32::NAN, -1.0);
+    frame.flags.as_mut_slice()[5] = Flags::MOTION;
+    let cloud = table.back_project(&frame).unwrap();
+    let (first, count) = (1, 2 * camera.format.width + 5);
+    let mut points = vec![[0.0; 3]; count];
+    let mut flags = frame.flags.as_slice()[first..first + count].to_vec();
+    let ranges = &frame.range.as_slice()[first..first + count];
+    table.back_project_pixels(first, ranges, &mut points, &mut flags).unwrap();
+    let same = |(a, b): (&[f64; 3], &[f64; 3])| a == b || a[0].is_nan() && b[0].is_nan();
+    assert!(points.iter().zip(&cloud.points[first..]).all(same));
+    assert_eq!(flags, cloud.flags[first..first + count]);
+    let beyond = frame.range.len() - 1;
+    assert!(table.back_project_pixels(beyond, ranges, &mut points, &mut flags).is_err());
+    assert!(table.back_project_pixels(first, &ranges[1..], &mut points, &mut flags).is_err());
+}
+
+#[test]
 fn points_lie_on_their_rays() {
     let camera = plain_camera();
     let table = RayTable::new(&camera).unwrap();

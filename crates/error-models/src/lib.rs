@@ -13,6 +13,7 @@ mod surface;
 pub use correction::correct::{correct_frame, correct_raster};
 pub use correction::distort::distort_frame;
 pub use correction::interpolated::InterpolatedModel;
+pub use correction::prepared::{FrameRows, PreparedCorrection};
 pub use correction::range_error::RangeCorrection;
 pub use drift::frame_rate::FrameRateDrift;
 pub use drift::rate_history::{RateHistory, RatePhase};

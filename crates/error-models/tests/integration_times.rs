@@ -40,6 +40,63 @@ fn usable(set: &ModelSet) -> bool {
     set.validate().is_ok() && set.entries.iter().all(|(_, models)| models.iter().all(real))
 }
 
+#[test]
+fn prepared_corrections_have_the_bits_of_whole_frames() {
+    use error_models::{FixedPattern, FrameRows};
+    use std::sync::Arc;
+    let (width, height) = (70, 21);
+    let terms = RangeTerms { d0: 0.01, periodic: [0.004, -0.003, 0.002, 0.001, -0.002, 0.003], e1: 5e-4, e2: -3e-4 };
+    let shorter = RangeErrorModel {
+        terms,
+        hyperbola: Some(hyperbola([0.05, 0.01, 1e-3], [20.0, 900.0])),
+        range_span_m: Some([0.5, 7.0]),
+        ..RangeErrorModel::error_free(INTERVAL_M)
+    };
+    let longer = RangeErrorModel { terms: RangeTerms { d0: 0.03, ..terms }, ..shorter.clone() };
+    let set = set([shorter, longer]);
+    let format = ImageFormat::new(width, height, [0.04, 0.04]).unwrap();
+    let value = |col: usize, row: usize| 0.3 + 0.1 * ((col * 7 + row * 13) % 73) as f32;
+    let frame = RangeFrame {
+        sigma: Raster::from_fn(width, height, |col, _| 0.001 * (1 + col) as f32),
+        amplitude: Raster::from_fn(width, height, |col, row| 15.0 * value(col, row)),
+        ..RangeFrame::from_range(Raster::from_fn(width, height, value))
+    };
+    let offset_m = (0..width * height).map(|pixel| 1e-4 * (pixel % 17) as f32).collect();
+    let sigma_m = (0..width * height).map(|pixel| if pixel % 5 == 0 { f32::NAN } else { 1e-4 }).collect();
+    let pattern = FixedPattern { width, height, offset_m, sigma_m };
+    for time_s in [0.001, 0.004] {
+        let mut model = set.at(time_s).unwrap().remove(0);
+        let mut prepared = model.prepare(&format, [0.1, -0.2], Some(Arc::new(pattern.clone()))).unwrap();
+        model.add_offset(0.005);
+        prepared.set_drift(0.005);
+        let (mut whole, mut rows) = (frame.clone(), frame.clone());
+        model.correct_frame(&mut whole, &format, [0.1, -0.2], Some(&pattern)).unwrap();
+        for (first, count) in [(0, 1), (1, 8), (9, 12)] {
+            let at = first * width..(first + count) * width;
+            let part = FrameRows {
+                range: &mut rows.range.as_mut_slice()[at.clone()],
+                sigma: &mut rows.sigma.as_mut_slice()[at.clone()],
+                amplitude: &rows.amplitude.as_slice()[at.clone()],
+                flags: &mut rows.flags.as_mut_slice()[at],
+            };
+            prepared.correct_rows(first, part).unwrap();
+        }
+        assert_eq!(whole.range, rows.range, "{time_s} s");
+        assert_eq!(whole.sigma, rows.sigma, "{time_s} s");
+        assert_eq!(whole.flags, rows.flags, "{time_s} s");
+        assert!(rows.flags.as_slice().iter().any(|flags| flags.contains(Flags::OUTSIDE_SPAN)));
+        let mut beyond = frame.clone();
+        let part = FrameRows {
+            range: beyond.range.as_mut_slice(),
+            sigma: beyond.sigma.as_mut_slice(),
+            amplitude: frame.amplitude.as_slice(),
+            flags: beyond.flags.as_mut_slice(),
+        };
+        assert!(prepared.correct_rows(1, part).is_err(), "beyond the last row");
+        assert_eq!(beyond.range, frame.range);
+    }
+}
+
 proptest! {
     #[test]
     fn values_between_are_real_and_continuous(

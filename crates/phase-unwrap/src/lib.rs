@@ -1,6 +1,7 @@
 #![doc = include_str!("../README.md")]
 
 mod absolute;
+mod carried;
 mod entry;
 mod error;
 mod exact;
@@ -9,6 +10,7 @@ mod frequencies;
 mod image;
 mod tree;
 
+pub use carried::{CarriedUnwrapper, CarryOptions, CarrySummary, WholeFrame};
 pub use entry::noisy::{NoisyMethod, NoisyOptions, NoisyUnwrapped, NoisyUnwrapper, unwrap_noisy};
 pub use entry::noisy_absolute::unwrap_noisy_absolute;
 pub use entry::repair::{
@@ -23,7 +25,7 @@ pub use exact::{CutPrice, ExactOptions, ExactUnwrapped, LeastCuts, unwrap_least_
 pub use filter::congruent::{congruent, congruent_into};
 pub use filter::noise::{LARGEST_SIGMA_RAD, PhaseNoise};
 pub use filter::prefilter::{FilterVerdict, Filtered, Prefilter, PrefilterOptions, prefilter};
-pub use frequencies::combine::{Combined, combine_frequencies};
+pub use frequencies::combine::{Combined, CombinedPixels, combine_frequencies, combine_pixels};
 pub use frequencies::fold::Fold;
 pub use frequencies::hypotheses::{Hypotheses, Hypothesis, RankedHypotheses, hypotheses};
 pub use frequencies::intervals::combined_interval_m;

@@ -18,7 +18,7 @@ pub use error::Error;
 use error::Result;
 pub use rasters::channel::ComplexChannel;
 pub use rasters::flags::Flags;
-pub use rasters::frame::{ComplexFrame, RangeFrame, RawFrame, Samples};
+pub use rasters::frame::{ComplexFrame, RangeFrame, RawFrame, RawView, SampleSlice, Samples};
 pub use rasters::image_format::ImageFormat;
 pub use rasters::modulation::{Modulation, SPEED_OF_LIGHT};
 pub use rasters::noise::NoiseModel;

@@ -6,7 +6,8 @@ use crate::common::{Truth, angle_between, frame_f32, modulations, samples};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use range_image::{
-    ComplexFrame, DemodulationOptions, Demodulator, Error, Flags, PhaseSense, RawFrame, Samples, demodulate,
+    ComplexFrame, DemodulationOptions, Demodulator, Error, Flags, PhaseSense, RawFrame, RawView, SampleSlice, Samples,
+    demodulate,
 };
 
 fn row(pixels: usize, shift: f64) -> Vec<Truth> {
@@ -16,6 +17,24 @@ fn row(pixels: usize, shift: f64) -> Vec<Truth> {
         offset: 400.0,
     };
     (0..pixels).map(pixel).collect()
+}
+
+#[test]
+fn borrowed_samples_have_the_bits_of_owned_ones() {
+    let owned = frame_f32(&[row(97, 0.0), row(97, 1.0)], 5);
+    let Samples::F32(values) = owned.samples() else { panic!("floating point was asked for") };
+    let demodulator = Demodulator::new(&DemodulationOptions::default()).unwrap();
+    let (mut one, mut other) = (ComplexFrame::empty(), ComplexFrame::empty());
+    demodulator.demodulate_into(&owned, &mut one).unwrap();
+    let view = RawView::new(owned.width(), owned.height(), 5, owned.modulations(), values.as_slice().into()).unwrap();
+    assert_eq!(view, owned.view());
+    demodulator.demodulate_view_into(&view, &mut other).unwrap();
+    assert_eq!(one.channels[1].real, other.channels[1].real);
+    assert_eq!(one.channels[0].imaginary, other.channels[0].imaginary);
+    let short = SampleSlice::F32(&values[1..]);
+    assert!(matches!(RawView::new(97, 1, 5, owned.modulations(), short), Err(Error::RasterLength { .. })));
+    let counts: &[u16] = &[1; 3];
+    assert!(SampleSlice::from(counts).len() == 3 && SampleSlice::I16(&[]).is_empty());
 }
 
 #[test]

@@ -136,6 +136,9 @@ pub mod application {
     #[cfg(feature = "common-errors")]
     #[doc(inline)]
     pub use common_errors;
+    #[cfg(feature = "live-frames")]
+    #[doc(inline)]
+    pub use live_frames;
     #[cfg(feature = "orientation-tasks")]
     #[doc(inline)]
     pub use orientation_tasks;

@@ -85,22 +85,24 @@ fn correct_planes(
         // Products and sums stay separate operations, so that all machines give the same bits.
         with_wide_registers(
             #[inline(always)]
-            || correct_chunk(chunk, &kernel, format.width),
+            || correct_chunk(chunk, &kernel, 0..format.width),
         );
         Ok(())
     })?;
     Ok(tally.summary(format.width * format.height, model.terms.d0, -1.0))
 }
 
+/// Corrects a chunk whose rows reach over these columns of the frame; the first is a multiple of a block.
 #[inline(always)]
-fn correct_chunk(chunk: &mut Chunk<'_>, kernel: &Kernel, width: usize) {
+pub(crate) fn correct_chunk(chunk: &mut Chunk<'_>, kernel: &Kernel, columns: Range<usize>) {
+    let (first_column, width) = (columns.start, columns.len());
     let mut parts = Parts::default();
     for row in 0..chunk.range.len() / width {
         let mut tally = LaneTally::new();
         kernel.begin_row(chunk.first_row + row, &mut parts);
         for column in (0..width).step_by(LANES) {
             let start = row * width + column;
-            let place = [column, chunk.first_row + row];
+            let place = [first_column + column, chunk.first_row + row];
             if column + LANES <= width {
                 correct_block(chunk, start, kernel, place, &mut parts, &mut tally);
             } else {

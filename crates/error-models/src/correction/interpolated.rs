@@ -238,6 +238,6 @@ impl InterpolatedModel {
     }
 }
 
-fn blend(a: f64, b: f64, weight: f64) -> f64 {
+pub(crate) fn blend(a: f64, b: f64, weight: f64) -> f64 {
     (1.0 - weight) * a + weight * b
 }

@@ -9,4 +9,5 @@ pub(crate) mod kernel;
 pub(crate) mod kernel_further;
 pub(crate) mod kernel_sines;
 pub(crate) mod kernel_tally;
+pub(crate) mod prepared;
 pub(crate) mod range_error;

@@ -98,6 +98,16 @@ impl Unwrapper {
         Ok(Self { options, ..Self::default() })
     }
 
+    /// Other options, valid ones, for the images to come.
+    pub(crate) fn set_options(&mut self, options: SpatialOptions) {
+        self.options = options;
+    }
+
+    /// Noise of each part of the complex image of the last image with amplitudes: given, or estimated.
+    pub(crate) fn amplitude_noise(&self) -> f32 {
+        self.surface.amplitude_noise
+    }
+
     /// Wrap counts of one image.
     ///
     /// `phase` is in radians; what is not finite is masked. `amplitude` is in any unit. In `mask`, true means use.

@@ -1,4 +1,8 @@
-use range_image::Raster;
+//! Ranges of several frequencies brought together.
+// Only what is inlined is compiled for wide registers.
+#![allow(clippy::inline_always)]
+
+use range_image::{Raster, with_wide_registers};
 
 use crate::{Error, Result};
 
@@ -33,28 +37,109 @@ pub fn combine_frequencies(ranges: &[Raster<f32>], sigmas: &[Raster<f32>]) -> Re
     }
     let plane = || Raster::filled(first.width(), first.height(), f32::NAN);
     let mut out = Combined { range: plane(), sigma: plane(), chi_squared: plane() };
-    for index in 0..first.len() {
-        let values = ranges.iter().zip(sigmas).map(|(r, s)| (r.as_slice()[index].into(), s.as_slice()[index].into()));
-        let pixel = combine_pixel(values);
-        out.range.as_mut_slice()[index] = pixel[0] as f32;
-        out.sigma.as_mut_slice()[index] = pixel[1] as f32;
-        out.chi_squared.as_mut_slice()[index] = pixel[2] as f32;
+    let Combined { range, sigma, chi_squared } = &mut out;
+    let mut rows = [range, sigma, chi_squared].map(|plane| plane.as_mut_slice().chunks_mut(first.width().max(1)));
+    let (mut values, mut deviations) = (Vec::with_capacity(ranges.len()), Vec::with_capacity(ranges.len()));
+    for row in 0..first.height() {
+        let [Some(range), Some(sigma), Some(chi_squared)] = rows.each_mut().map(Iterator::next) else { break };
+        let pixels = row * first.width()..(row + 1) * first.width();
+        values.clear();
+        values.extend(ranges.iter().map(|plane| &plane.as_slice()[pixels.clone()]));
+        deviations.clear();
+        deviations.extend(sigmas.iter().map(|plane| &plane.as_slice()[pixels.clone()]));
+        combine_pixels(&values, &deviations, CombinedPixels { range, sigma, chi_squared })?;
     }
     Ok(out)
 }
 
-/// Mean, sigma and chi-squared of `(range, sigma)`.
-fn combine_pixel(values: impl Iterator<Item = (f64, f64)> + Clone) -> [f64; 3] {
-    let finite = values.filter(|(range, _)| range.is_finite());
-    let weighted = finite.clone().filter(|(_, sigma)| sigma.is_finite() && *sigma > 0.0);
-    let weight: f64 = weighted.clone().map(|(_, sigma)| sigma.powi(-2)).sum();
-    // Subnormal sigmas square to an infinite weight, which is no weight.
-    if weight > 0.0 && weight.is_finite() {
-        let mean = weighted.clone().map(|(range, sigma)| range * sigma.powi(-2)).sum::<f64>() / weight;
-        let chi_squared = weighted.clone().map(|(range, sigma)| ((range - mean) / sigma).powi(2)).sum();
-        let several = weighted.count() > 1;
-        return [mean, weight.sqrt().recip(), if several { chi_squared } else { f64::NAN }];
+/// Some pixels of a [`Combined`].
+#[derive(Debug)]
+pub struct CombinedPixels<'a> {
+    /// Inverse-variance mean in metres.
+    pub range: &'a mut [f32],
+    /// Standard deviation of `range` in metres.
+    pub sigma: &'a mut [f32],
+    /// Sum of squared residuals over their variances.
+    pub chi_squared: &'a mut [f32],
+}
+
+/// As [`combine_frequencies`], of some pixels: one slice a frequency, all of one length. Allocates nothing.
+pub fn combine_pixels(ranges: &[&[f32]], sigmas: &[&[f32]], out: CombinedPixels<'_>) -> Result<()> {
+    let count = out.range.len();
+    if sigmas.len() != ranges.len() {
+        return Err(Error::PlaneCount { what: "sigma", expected: ranges.len(), found: sigmas.len() });
     }
-    let count = finite.clone().count() as f64;
-    [finite.map(|(range, _)| range).sum::<f64>() / count, f64::NAN, f64::NAN]
+    let of_planes = ranges.iter().chain(sigmas).map(|plane| plane.len());
+    let mut lengths = of_planes.chain([out.sigma.len(), out.chi_squared.len()]);
+    if let Some(found) = lengths.find(|found| *found != count) {
+        let (width, height, expected) = (count, 1, count);
+        return Err(range_image::Error::RasterLength { width, height, expected, found }.into());
+    }
+    // Of up to four frequencies the compiler knows the number and takes many pixels at once.
+    match ranges.len() {
+        0 => return Err(Error::TooFewFrequencies { found: 0 }),
+        1 => combine_known::<1>(ranges, sigmas, out),
+        2 => combine_known::<2>(ranges, sigmas, out),
+        3 => combine_known::<3>(ranges, sigmas, out),
+        4 => combine_known::<4>(ranges, sigmas, out),
+        _ => {
+            for pixel in 0..count {
+                let at = |planes: &[&[f32]], frequency: usize| f64::from(planes[frequency][pixel]);
+                let values = (0..ranges.len()).map(|frequency| (at(ranges, frequency), at(sigmas, frequency)));
+                let [range, sigma, chi_squared] = combine_pixel(values);
+                out.range[pixel] = range;
+                out.sigma[pixel] = sigma;
+                out.chi_squared[pixel] = chi_squared;
+            }
+        }
+    }
+    Ok(())
+}
+
+fn combine_known<const F: usize>(ranges: &[&[f32]], sigmas: &[&[f32]], out: CombinedPixels<'_>) {
+    let (Some(ranges), Some(sigmas)) = (ranges.first_chunk::<F>(), sigmas.first_chunk::<F>()) else { return };
+    let count = out.range.len();
+    let (ranges, sigmas) = (ranges.map(|plane| &plane[..count]), sigmas.map(|plane| &plane[..count]));
+    let CombinedPixels { range, sigma, chi_squared } = out;
+    with_wide_registers(
+        #[inline(always)]
+        || {
+            let (range, sigma, chi_squared) = (&mut range[..count], &mut sigma[..count], &mut chi_squared[..count]);
+            for pixel in 0..count {
+                let values: [(f64, f64); F] =
+                    std::array::from_fn(|f| (f64::from(ranges[f][pixel]), f64::from(sigmas[f][pixel])));
+                [range[pixel], sigma[pixel], chi_squared[pixel]] = combine_pixel(values.into_iter());
+            }
+        },
+    );
+}
+
+/// Mean, sigma and chi-squared of `(range, sigma)`.
+#[inline(always)]
+#[allow(clippy::needless_bitwise_bool)] // a branch would keep the loop around it scalar
+fn combine_pixel(values: impl Iterator<Item = (f64, f64)> + Clone) -> [f32; 3] {
+    let (mut weight, mut weighted, mut known) = (0.0, 0.0, 0.0);
+    let (mut sum, mut count) = (0.0, 0.0);
+    let is_known = |range: f64, sigma: f64| range.is_finite() & sigma.is_finite() & (sigma > 0.0);
+    for (range, sigma) in values.clone() {
+        let own = if is_known(range, sigma) { 1.0 / (sigma * sigma) } else { 0.0 };
+        weight += own;
+        weighted += if is_known(range, sigma) { range * own } else { 0.0 };
+        known += if is_known(range, sigma) { 1.0 } else { 0.0 };
+        sum += if range.is_finite() { range } else { 0.0 };
+        count += if range.is_finite() { 1.0 } else { 0.0 };
+    }
+    // Subnormal sigmas square to an infinite weight, which is no weight.
+    let weighs = (weight > 0.0) & weight.is_finite();
+    let mean = if weighs { weighted / weight } else { sum / count };
+    let mut chi_squared = 0.0;
+    for (range, sigma) in values {
+        let off = (range - mean) / sigma;
+        chi_squared += if is_known(range, sigma) { off * off } else { 0.0 };
+    }
+    [
+        mean as f32,
+        if weighs { weight.sqrt().recip() as f32 } else { f32::NAN },
+        if weighs & (known > 1.0) { chi_squared as f32 } else { f32::NAN },
+    ]
 }

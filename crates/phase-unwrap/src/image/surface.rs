@@ -20,6 +20,8 @@ pub(crate) struct Surface {
     pub log_amplitude: Vec<f32>,
     /// Variance of the phase, rad^2.
     pub variance: Vec<f32>,
+    /// Noise that the variances of the last amplitudes came from.
+    pub amplitude_noise: f32,
     sample: Vec<f32>,
 }
 
@@ -46,6 +48,7 @@ impl Surface {
     /// Fills logarithm and variance from the padded amplitude; `noise` is the standard deviation in amplitude units.
     pub fn set_amplitude(&mut self, grid: &Grid, amplitude: &[f32], noise: Option<f32>) {
         let noise = noise.unwrap_or_else(|| self.estimate_noise(grid, amplitude));
+        self.amplitude_noise = noise;
         self.log_amplitude.resize(amplitude.len(), 0.0);
         self.variance.resize(amplitude.len(), 0.0);
         let (logs, variances) = (&mut self.log_amplitude, &mut self.variance);

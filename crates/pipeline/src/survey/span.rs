@@ -59,15 +59,14 @@ impl SpanTally {
             if !range_m.is_finite() {
                 continue;
             }
-            let range_outside = span.range_m.is_some_and(|span| is_outside(span, range_m));
-            let light_outside = span.amplitude.is_some_and(|span| is_outside(span, amplitude));
+            let outside = span.leaves_out(range_m, amplitude);
             if flags.is_empty() {
                 self.measured += 1;
-                self.outside += usize::from(range_outside || light_outside);
+                self.outside += usize::from(outside);
                 widen(&mut self.range_m, range_m);
                 widen(&mut self.amplitude, amplitude);
             }
-            if range_outside || light_outside {
+            if outside {
                 flags.insert(Flags::OUTSIDE_SPAN);
             }
         }

@@ -7,7 +7,10 @@ use rayon::prelude::*;
 use crate::demodulation::samples::{Sample, SampleBlock, Sums, peaks};
 use crate::demodulation::weights::{GROUP, StepWeight, StepWeights};
 use crate::rasters::wide::{Arithmetic, PixelLoop, run_wide, task_length};
-use crate::{ComplexChannel, ComplexFrame, DemodulationOptions, Flags, NoiseModel, Raster, RawFrame, Result, Samples};
+use crate::{
+    ComplexChannel, ComplexFrame, DemodulationOptions, Flags, NoiseModel, Raster, RawFrame, RawView, Result,
+    SampleSlice,
+};
 
 /// Demodulates one frame; see [`Demodulator`] for streams of frames.
 ///
@@ -57,27 +60,32 @@ impl Demodulator {
     ///
     /// The result does not depend on the number of threads, and everything that `out` held before is overwritten.
     pub fn demodulate_into(&self, frame: &RawFrame, out: &mut ComplexFrame) -> Result<()> {
+        self.demodulate_view_into(&frame.view(), out)
+    }
+
+    /// As [`Self::demodulate_into`], of samples that are borrowed. Allocates nothing where the planes fit, up to 16 steps.
+    pub fn demodulate_view_into(&self, frame: &RawView<'_>, out: &mut ComplexFrame) -> Result<()> {
         out.reshape(frame);
         let ComplexFrame { channels, flags } = out;
-        let weights = StepWeights::new(frame.phase_steps(), &self.options);
+        let weights = StepWeights::new(frame.phase_steps, &self.options);
         let job = ChannelJob { weights: weights.groups(), limits: self.limits(frame) };
-        let length = flags.len() * frame.phase_steps();
+        let length = flags.len() * frame.phase_steps;
         let mut kept = 0;
         for (index, channel) in channels.iter_mut().enumerate() {
             let own = index * length..(index + 1) * length;
-            match frame.samples() {
-                Samples::F32(samples) => job.run(&samples[own], channel, flags, kept),
-                Samples::U16(samples) => job.run(&samples[own], channel, flags, kept),
-                Samples::I16(samples) => job.run(&samples[own], channel, flags, kept),
+            match frame.samples {
+                SampleSlice::F32(samples) => job.run(&samples[own], channel, flags, kept),
+                SampleSlice::U16(samples) => job.run(&samples[own], channel, flags, kept),
+                SampleSlice::I16(samples) => job.run(&samples[own], channel, flags, kept),
             }
             kept = u16::MAX;
         }
         Ok(())
     }
 
-    fn limits(&self, frame: &RawFrame) -> Limits {
-        let noise = self.noise_of(frame.samples());
-        let scale = 2.0 / frame.phase_steps() as f64;
+    fn limits(&self, frame: &RawView<'_>) -> Limits {
+        let noise = self.noise_of(frame.samples);
+        let scale = 2.0 / frame.phase_steps as f64;
         let unknown = if noise.is_known() { 0.0 } else { f32::NAN };
         Limits {
             shot: (scale * noise.shot_variance_per_unit) as f32,
@@ -89,10 +97,10 @@ impl Demodulator {
         }
     }
 
-    fn noise_of(&self, samples: &Samples) -> NoiseModel {
+    fn noise_of(&self, samples: SampleSlice<'_>) -> NoiseModel {
         match samples {
-            Samples::I16(_) => NoiseModel { shot_variance_per_unit: 0.0, ..self.options.noise },
-            Samples::F32(_) | Samples::U16(_) => self.options.noise,
+            SampleSlice::I16(_) => NoiseModel { shot_variance_per_unit: 0.0, ..self.options.noise },
+            SampleSlice::F32(_) | SampleSlice::U16(_) => self.options.noise,
         }
     }
 }

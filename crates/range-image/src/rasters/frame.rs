@@ -29,24 +29,79 @@ impl Samples {
     }
 }
 
-/// One frame at level `samples`: F frequencies with N phase steps `theta_n = 2 pi n / N` each.
-#[derive(Debug, Clone, PartialEq)]
-pub struct RawFrame {
-    width: usize,
-    height: usize,
-    phase_steps: usize,
-    modulations: Vec<Modulation>,
-    samples: Samples,
+/// Raw correlation samples in a buffer of somebody else, in `[F, N, H, W]` order.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum SampleSlice<'a> {
+    /// Floating point (also signed differences of two taps).
+    F32(&'a [f32]),
+    /// Unsigned counts.
+    U16(&'a [u16]),
+    /// Signed differences of two taps.
+    I16(&'a [i16]),
 }
 
-impl RawFrame {
-    /// Takes samples in `[F, N, H, W]` order, `F` being the number of `modulations`.
+impl SampleSlice<'_> {
+    /// Number of samples.
+    pub fn len(&self) -> usize {
+        match self {
+            Self::F32(values) => values.len(),
+            Self::U16(values) => values.len(),
+            Self::I16(values) => values.len(),
+        }
+    }
+
+    /// Whether there is no sample.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+}
+
+impl<'a> From<&'a Samples> for SampleSlice<'a> {
+    fn from(samples: &'a Samples) -> Self {
+        match samples {
+            Samples::F32(values) => Self::F32(values),
+            Samples::U16(values) => Self::U16(values),
+            Samples::I16(values) => Self::I16(values),
+        }
+    }
+}
+
+impl<'a> From<&'a [f32]> for SampleSlice<'a> {
+    fn from(values: &'a [f32]) -> Self {
+        Self::F32(values)
+    }
+}
+
+impl<'a> From<&'a [u16]> for SampleSlice<'a> {
+    fn from(values: &'a [u16]) -> Self {
+        Self::U16(values)
+    }
+}
+
+impl<'a> From<&'a [i16]> for SampleSlice<'a> {
+    fn from(values: &'a [i16]) -> Self {
+        Self::I16(values)
+    }
+}
+
+/// One frame at level `samples` that is borrowed: what a driver hands over without giving it away.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RawView<'a> {
+    pub(crate) width: usize,
+    pub(crate) height: usize,
+    pub(crate) phase_steps: usize,
+    pub(crate) modulations: &'a [Modulation],
+    pub(crate) samples: SampleSlice<'a>,
+}
+
+impl<'a> RawView<'a> {
+    /// Samples in `[F, N, H, W]` order, `F` being the number of `modulations`; refuses what [`RawFrame::new`] refuses.
     pub fn new(
         width: usize,
         height: usize,
         phase_steps: usize,
-        modulations: Vec<Modulation>,
-        samples: Samples,
+        modulations: &'a [Modulation],
+        samples: SampleSlice<'a>,
     ) -> Result<Self> {
         if phase_steps < 3 {
             return Err(Error::OutOfDomain {
@@ -69,6 +124,36 @@ impl RawFrame {
             return Err(Error::RasterLength { width, height, expected, found: samples.len() });
         }
         Ok(Self { width, height, phase_steps, modulations, samples })
+    }
+}
+
+/// One frame at level `samples`: F frequencies with N phase steps `theta_n = 2 pi n / N` each.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RawFrame {
+    width: usize,
+    height: usize,
+    phase_steps: usize,
+    modulations: Vec<Modulation>,
+    samples: Samples,
+}
+
+impl RawFrame {
+    /// Takes samples in `[F, N, H, W]` order, `F` being the number of `modulations`.
+    pub fn new(
+        width: usize,
+        height: usize,
+        phase_steps: usize,
+        modulations: Vec<Modulation>,
+        samples: Samples,
+    ) -> Result<Self> {
+        RawView::new(width, height, phase_steps, &modulations, (&samples).into())?;
+        Ok(Self { width, height, phase_steps, modulations, samples })
+    }
+
+    /// The frame as something borrowed.
+    pub fn view(&self) -> RawView<'_> {
+        let Self { width, height, phase_steps, modulations, samples } = self;
+        RawView { width: *width, height: *height, phase_steps: *phase_steps, modulations, samples: samples.into() }
     }
 
     /// Columns.
@@ -113,13 +198,13 @@ impl ComplexFrame {
     }
 
     /// Gives the frame the size and the modulations of `raw`, keeping the planes that fit.
-    pub(crate) fn reshape(&mut self, raw: &RawFrame) {
-        let (width, height) = (raw.width(), raw.height());
+    pub(crate) fn reshape(&mut self, raw: &RawView<'_>) {
+        let (width, height) = (raw.width, raw.height);
         if (self.width(), self.height()) != (width, height) {
             self.flags = Raster::filled(width, height, Flags::empty());
         }
-        self.channels.truncate(raw.modulations().len());
-        for (index, &modulation) in raw.modulations().iter().enumerate() {
+        self.channels.truncate(raw.modulations.len());
+        for (index, &modulation) in raw.modulations.iter().enumerate() {
             match self.channels.get_mut(index) {
                 None => self.channels.push(ComplexChannel::without_data(modulation, width, height)),
                 Some(channel) => channel.reshape(modulation, width, height),

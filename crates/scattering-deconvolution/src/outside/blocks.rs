@@ -66,8 +66,21 @@ impl Blocks {
         self.indices().map(|index| place(self.pixels(index))).collect()
     }
 
-    pub(super) fn of_image(&self, channel: &ComplexChannel, is_dark: impl Fn(usize, f32) -> bool) -> Vec<Block> {
+    pub(super) fn of_image(&self, channel: &ComplexChannel, is_dark: impl Fn(usize, [f32; 2]) -> bool) -> Vec<Block> {
         self.indices().map(|index| self.block(index, channel, &is_dark)).collect()
+    }
+
+    /// Whether there is a block with light all of whose pixels are dark.
+    pub(super) fn any_dark(&self, channel: &ComplexChannel, is_dark: impl Fn(usize, [f32; 2]) -> bool) -> bool {
+        self.indices().any(|index| {
+            let [first, end] = self.pixels(index);
+            let rows = first[1]..end[1];
+            let pixels = rows.flat_map(|row| row * self.size[0] + first[0]..row * self.size[0] + end[0]);
+            let lights =
+                pixels.map(|pixel| (pixel, [channel.real.as_slice()[pixel], channel.imaginary.as_slice()[pixel]]));
+            let mut finite = lights.filter(|(_, [re, im])| re.is_finite() && im.is_finite()).peekable();
+            finite.peek().is_some() && finite.all(|(pixel, light)| is_dark(pixel, light))
+        })
     }
 
     fn indices(&self) -> impl Iterator<Item = [usize; 2]> {
@@ -81,7 +94,7 @@ impl Blocks {
         [first, [0, 1].map(|axis| (first[axis] + self.side).min(self.size[axis]))]
     }
 
-    fn block(&self, index: [usize; 2], channel: &ComplexChannel, is_dark: impl Fn(usize, f32) -> bool) -> Block {
+    fn block(&self, index: [usize; 2], channel: &ComplexChannel, is_dark: impl Fn(usize, [f32; 2]) -> bool) -> Block {
         let [first, end] = self.pixels(index);
         let (mut light, mut count, mut all_dark) = (Complex::new(0.0, 0.0), 0.0, true);
         for row in first[1]..end[1] {
@@ -90,7 +103,7 @@ impl Blocks {
                 if re.is_finite() && im.is_finite() {
                     light += Complex::new(f64::from(re), f64::from(im));
                     count += 1.0;
-                    all_dark &= is_dark(pixel, re.hypot(im));
+                    all_dark &= is_dark(pixel, [re, im]);
                 }
             }
         }

@@ -35,14 +35,24 @@ pub fn restore(frame: &mut ComplexFrame, psf: &Psf, options: &RestorationOptions
 impl Restorer {
     /// Restores all frequencies of a frame in place, as [`restore`] does.
     pub fn restore_frame(&mut self, frame: &mut ComplexFrame) -> Result<Vec<RestorationSummary>> {
+        let mut summaries = Vec::with_capacity(frame.channels.len());
+        self.restore_frame_with(frame, |summary| summaries.push(summary))?;
+        Ok(summaries)
+    }
+
+    /// As [`Self::restore_frame`], each summary told as it comes: allocates nothing after the first frame.
+    pub fn restore_frame_with(
+        &mut self,
+        frame: &mut ComplexFrame,
+        mut told: impl FnMut(RestorationSummary),
+    ) -> Result<()> {
         let ComplexFrame { channels, flags } = frame;
-        let mut summaries = Vec::with_capacity(channels.len());
         for channel in channels {
-            summaries.push(self.restore_flagged(channel, flags)?);
+            told(self.restore_flagged(channel, flags)?);
             for &pixel in self.dependent_pixels() {
                 flags.as_mut_slice()[pixel] |= Flags::MULTIPATH;
             }
         }
-        Ok(summaries)
+        Ok(())
     }
 }

@@ -108,12 +108,19 @@ impl Tracker {
         Ok(pose)
     }
 
-    /// The poses of all frames as they were when they were tracked.
+    /// Forgets the poses of all frames but the last: for streams without end, which keep what they need of them. The list of
+    /// poses takes no memory then, and keyframes are bounded by the options.
+    pub fn forget_poses(&mut self) {
+        let kept = self.trajectory.len().min(1);
+        self.trajectory.drain(..self.trajectory.len() - kept);
+    }
+
+    /// The poses of all frames as they were when they were tracked, as far as they were not forgotten.
     pub fn trajectory(&self) -> &[TrackedPose] {
         &self.trajectory
     }
 
-    /// The poses of all frames as they are known now: closed loops have moved the keyframes they hang on. Covariances
+    /// The poses of the same frames as they are known now: closed loops have moved the keyframes they hang on. Covariances
     /// are those of the time of tracking.
     pub fn adjusted_trajectory(&self) -> Vec<TrackedPose> {
         let adjusted = |pose: &TrackedPose| match self.keyframes.world_from(pose.keyframe) {

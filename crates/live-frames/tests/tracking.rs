@@ -1,0 +1,54 @@
+//! The pose beside the points.
+
+use std::sync::Arc;
+
+use live_frames::camera_model::RayTable;
+use live_frames::tracking::projective_registration::Projection;
+use live_frames::tracking::{Tracker, TrackerOptions, TrackingState};
+use live_frames::{Limits, PreparedCalibration, Processor, Stages};
+
+use crate::common::{INTERVAL_S, Sequence, stages};
+
+#[test]
+fn poses_are_those_of_a_tracker_of_unflagged_points() {
+    let sequence = Sequence { rays: 1, ..Sequence::default() };
+    let frames: Vec<_> = (0..8).map(|number| sequence.frame(number)).collect();
+    let calibration = sequence.calibration();
+    let stages = Stages { tracking: Some(TrackerOptions::default()), ..stages(100) };
+    let mut processor = Processor::new(&sequence.camera(), &calibration, stages.clone(), Limits::default()).unwrap();
+    let rays = RayTable::new(&calibration.camera().unwrap()).unwrap();
+    let projection = Projection::from_directions(sequence.width, sequence.height, rays.directions()).unwrap();
+    let mut tracker = Tracker::new(&Arc::new(projection), TrackerOptions::default()).unwrap();
+    for (number, frame) in frames.iter().enumerate() {
+        let time_s = number as f64 * INTERVAL_S;
+        let found = processor.process(frame.raw.samples(), time_s).unwrap();
+        let kept = found.points.iter().zip(found.flags.as_slice());
+        let kept: Vec<_> = kept.map(|(point, flags)| if flags.is_empty() { *point } else { [f64::NAN; 3] }).collect();
+        let expected = tracker.track(time_s, &kept, Some(found.sigma.as_slice()), None).unwrap();
+        let pose = found.pose.unwrap();
+        assert_eq!(pose, expected, "frame {number}");
+    }
+    // Other rays begin a new map at the last pose.
+    let mut other = calibration;
+    other.parameters.iter_mut().filter(|parameter| parameter.name == "c").for_each(|c| c.value += 0.01);
+    let last = processor.last().pose.unwrap();
+    processor.set_calibration(PreparedCalibration::new(&sequence.camera(), &other, &stages).unwrap()).unwrap();
+    let found = processor.process(sequence.frame(8).raw.samples(), 8.0 * INTERVAL_S).unwrap().pose.unwrap();
+    assert_eq!(found.state, TrackingState::Started);
+    assert_eq!(found.world_from_camera, last.world_from_camera);
+}
+
+#[test]
+fn a_camera_at_rest_stays_where_it_is() {
+    let sequence = Sequence { still: true, ..Sequence::default() };
+    let stages = Stages { tracking: Some(TrackerOptions::default()), ..stages(100) };
+    let mut processor = Processor::new(&sequence.camera(), &sequence.calibration(), stages, Limits::default()).unwrap();
+    for number in 0..6 {
+        let frame = sequence.frame(number);
+        let found = processor.process(frame.raw.samples(), number as f64 * INTERVAL_S).unwrap();
+        let pose = found.pose.unwrap();
+        assert!(pose.state.has_pose(), "{number}: {:?}", pose.state);
+        // 128 x 96 pixels of a centimetre or two of noise.
+        assert!(pose.world_from_camera.translation.vector.norm() < 0.01, "{number}: {}", pose.world_from_camera);
+    }
+}

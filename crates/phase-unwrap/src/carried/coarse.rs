@@ -1,0 +1,98 @@
+//! A small image of the frame, solved by the tree as a whole.
+// Only what is inlined is compiled for wide registers.
+#![allow(clippy::inline_always)]
+
+use range_image::{ComplexChannel, Raster, with_wide_registers};
+
+use crate::{ImageGeometry, KnownWraps, Result, SpatialOptions, Unwrapped, Unwrapper};
+
+/// Columns of a small image, about: those of the cameras whose rooms the absolute counts were measured on.
+const COLUMNS: usize = 160;
+
+/// The small image with its counts.
+#[derive(Debug, Default)]
+pub(crate) struct Coarse {
+    unwrapper: Unwrapper,
+    /// Pixels of the frame along a side of one of the small image.
+    pub factor: usize,
+    image: Option<ComplexChannel>,
+    phase: Raster<f32>,
+    amplitude: Raster<f32>,
+    out: Unwrapped,
+    sums: [Vec<f32>; 2],
+}
+
+impl Coarse {
+    pub fn resize(&mut self, width: usize, height: usize) {
+        self.factor = (width / COLUMNS).max(1);
+        let plane = Raster::filled(width.div_ceil(self.factor), height.div_ceil(self.factor), f32::NAN);
+        (self.phase, self.amplitude, self.image) = (plane.clone(), plane, None);
+        self.sums = [vec![0.0; width], vec![0.0; width]];
+    }
+
+    /// Makes the small image of a frame and solves it; false where it shows nothing.
+    pub fn solve(&mut self, channel: &ComplexChannel, options: &SpatialOptions) -> Result<bool> {
+        let plane = &self.phase;
+        let image = self.image.get_or_insert_with(|| ComplexChannel {
+            modulation: channel.modulation,
+            real: plane.clone(),
+            imaginary: plane.clone(),
+            offset: None,
+            sigma: plane.clone(),
+        });
+        means(&channel.real, self.factor, &mut self.sums, &mut image.real);
+        means(&channel.imaginary, self.factor, &mut self.sums, &mut image.imaginary);
+        image.phase_and_amplitude_into(&mut self.phase, &mut self.amplitude)?;
+        if !self.phase.as_slice().iter().any(|phase| phase.is_finite()) {
+            return Ok(false);
+        }
+        let factor = self.factor as f32;
+        let geometry = options.geometry.map(|geometry| ImageGeometry {
+            principal_distance_px: geometry.principal_distance_px / factor,
+            principal_point_px: geometry.principal_point_px.map(|point| (point + 0.5) / factor - 0.5),
+        });
+        let amplitude_noise = options.amplitude_noise.map(|noise| noise / factor);
+        self.unwrapper.set_options(SpatialOptions { amplitude_noise, geometry, ..*options });
+        self.unwrapper.unwrap_into(&self.phase, Some(&self.amplitude), None, KnownWraps::Nothing, &mut self.out)?;
+        Ok(true)
+    }
+
+    /// Phases, counts and confidences of a row of the small image.
+    pub fn row(&self, row: usize) -> [&[f32]; 2] {
+        let at = row * self.phase.width()..(row + 1) * self.phase.width();
+        [&self.phase.as_slice()[at.clone()], &self.out.confidence.as_slice()[at]]
+    }
+
+    /// Counts of a row.
+    pub fn wraps(&self, row: usize) -> &[i32] {
+        &self.out.wraps.as_slice()[row * self.phase.width()..][..self.phase.width()]
+    }
+}
+
+/// Means of squares of pixels, of those that are finite; NaN where half of them are not.
+fn means(plane: &Raster<f32>, factor: usize, [sums, counts]: &mut [Vec<f32>; 2], out: &mut Raster<f32>) {
+    let (width, columns) = (plane.width(), out.width());
+    for (rows, out) in plane.as_slice().chunks(factor * width).zip(out.as_mut_slice().chunks_mut(columns)) {
+        let (sums, counts) = (&mut sums[..width], &mut counts[..width]);
+        with_wide_registers(
+            #[inline(always)]
+            || {
+                sums.fill(0.0);
+                counts.fill(0.0);
+                for row in rows.chunks_exact(width) {
+                    for ((sum, count), value) in sums.iter_mut().zip(counts.iter_mut()).zip(row) {
+                        let finite = value.abs() <= f32::MAX;
+                        *sum += if finite { *value } else { 0.0 };
+                        *count += if finite { 1.0 } else { 0.0 };
+                    }
+                }
+            },
+        );
+        let pixels = rows.len() / width;
+        for (out, (sums, counts)) in out.iter_mut().zip(sums.chunks(factor).zip(counts.chunks(factor))) {
+            let (sum, count) = (sums.iter().sum::<f32>(), counts.iter().sum::<f32>());
+            let enough = 2.0 * count > (pixels * sums.len()) as f32;
+            *out = if enough { sum / count } else { f32::NAN };
+        }
+    }
+}

@@ -1,0 +1,126 @@
+//! Counts of the frame held against those of its small image.
+// Only what is inlined is compiled for wide registers; loops over lanes read as their formulas, without branches.
+#![allow(clippy::inline_always, clippy::needless_range_loop, clippy::needless_bitwise_bool)]
+
+use std::f32::consts::TAU;
+
+use range_image::{Raster, with_wide_registers};
+
+use crate::carried::coarse::Coarse;
+use crate::carried::pixels::{HELD, OPEN, RIM};
+
+/// Checks in a row that contradict a pixel's count before it gives way. A single tree errs on single frames; with one check, the
+/// counts would follow it. With more, what passed wrongly stays longer.
+const CHECKS: u8 = 2;
+/// Adding and taking off 1.5 * 2^23 rounds to an integer.
+const ROUND: f32 = 12_582_912.0;
+
+/// Planes of the frame.
+pub(crate) struct Compared<'a> {
+    pub phase: &'a Raster<f32>,
+    pub amplitude: &'a Raster<f32>,
+    pub state: &'a mut [u8],
+    pub unwrapped: &'a mut [f32],
+    pub before: &'a mut [f32],
+    pub wraps: &'a mut [i32],
+    pub confidence: &'a mut [f32],
+    /// How often in a row each pixel was contradicted.
+    pub doubts: &'a mut [u8],
+    /// Phases and confidences of the small image, a value for each pixel of a row.
+    pub spread: &'a mut [Vec<f32>; 2],
+    pub maximum_wraps: i32,
+    pub minimum_confidence: f32,
+}
+
+/// What came of it.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Outcome {
+    pub doubted: usize,
+    pub mended: usize,
+}
+
+impl Compared<'_> {
+    /// Pixels that agree are as sure as the small image, if they were not surer; those that contradict it are not sure, and give way
+    /// when they did often enough; those without a count take its.
+    pub fn check(&mut self, coarse: &Coarse) -> Outcome {
+        let (width, height) = (self.phase.width(), self.phase.height());
+        let mut outcome = Outcome::default();
+        for row in 0..height {
+            if row % coarse.factor == 0 {
+                self.spread_row(coarse, row / coarse.factor, width);
+            }
+            let at = row * width..(row + 1) * width;
+            let [spread, sure] = &*self.spread;
+            let (spread, sure) = (&spread[..width], &sure[..width]);
+            let phase = &self.phase.as_slice()[at.clone()];
+            let wraps = &mut self.wraps[at.clone()];
+            let confidence = &mut self.confidence[at.clone()];
+            let (state, doubts) = (&self.state[at.clone()], &mut self.doubts[at.clone()]);
+            let least = self.minimum_confidence;
+            let mut any = 0_u8;
+            with_wide_registers(
+                #[inline(always)]
+                || {
+                    for i in 0..width {
+                        let count = ((spread[i] - phase[i]) * (1.0 / TAU) + ROUND) - ROUND;
+                        let agrees = (count - wraps[i] as f32).abs() < 0.5;
+                        let known = state[i] == HELD;
+                        let aside = (state[i] == RIM) & agrees;
+                        let own = confidence[i];
+                        let told = (sure[i] >= least) & !agrees & known;
+                        let kept = if own > sure[i] { own } else { sure[i] };
+                        confidence[i] = if (agrees & known) | aside { kept } else { own };
+                        let doubt = doubts[i].wrapping_add(1);
+                        doubts[i] = if told { doubt } else { 0 };
+                        any |= u8::from(told) | u8::from(state[i] == OPEN);
+                    }
+                },
+            );
+            if any != 0 {
+                self.settle_row(at, &mut outcome);
+            }
+        }
+        outcome
+    }
+
+    /// Pixels of a row that contradict or have no count.
+    fn settle_row(&mut self, at: std::ops::Range<usize>, outcome: &mut Outcome) {
+        let first = at.start;
+        for pixel in at {
+            let column = pixel - first;
+            let open = self.state[pixel] == OPEN;
+            if !open && self.doubts[pixel] == 0 {
+                continue;
+            }
+            let [spread, sure] = &*self.spread;
+            let (phase, sure) = (self.phase.as_slice()[pixel], sure[column]);
+            let count = ((spread[column] - phase) / TAU).round();
+            if !(0.0..=self.maximum_wraps as f32).contains(&count) {
+                continue;
+            }
+            if open || self.doubts[pixel] >= CHECKS {
+                self.wraps[pixel] = count as i32;
+                self.unwrapped[pixel] = phase + TAU * count;
+                self.before[pixel] = self.amplitude.as_slice()[pixel];
+                self.confidence[pixel] = sure;
+                self.doubts[pixel] = 0;
+                self.state[pixel] = HELD;
+                outcome.mended += usize::from(!open);
+            } else {
+                self.confidence[pixel] = 0.0;
+                outcome.doubted += 1;
+            }
+        }
+    }
+
+    /// Unwrapped phases and confidences of the small image, for each pixel of the rows that one of its rows stands for.
+    fn spread_row(&mut self, coarse: &Coarse, row: usize, width: usize) {
+        let [phase, confidence] = coarse.row(row);
+        let [spread, sure] = self.spread;
+        for (block, ((phase, confidence), wraps)) in phase.iter().zip(confidence).zip(coarse.wraps(row)).enumerate() {
+            let at = block * coarse.factor..((block + 1) * coarse.factor).min(width);
+            spread[at.clone()].fill(phase + TAU * *wraps as f32);
+            sure[at].fill(*confidence);
+        }
+    }
+}

@@ -1,6 +1,7 @@
 #![doc = include_str!("../README.md")]
 
 mod destination;
+mod digest;
 mod error;
 mod inertial_data;
 pub mod plan;
@@ -8,6 +9,7 @@ mod progress;
 mod verdict;
 
 pub use destination::{Inputs, RefusalFile, check_name, json, produce, root_of};
+pub use digest::InputDigest;
 pub use error::drift::DriftError;
 pub use error::{Error, Result};
 pub use inertial_data::{INERTIAL_DATA, INERTIAL_MOUNTING, read_inertial};

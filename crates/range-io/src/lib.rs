@@ -16,9 +16,7 @@ mod text;
 #[cfg(feature = "trajectory")]
 pub mod trajectory;
 
-// Files and folders appear whole or not at all.
 pub use atomic_output;
-// Of the signatures.
 #[cfg(any(feature = "calibration", feature = "survey", feature = "tables", feature = "trajectory"))]
 pub use camera_model;
 pub use error::Error;

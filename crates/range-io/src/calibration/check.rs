@@ -107,6 +107,13 @@ impl RangeCalibration {
 }
 
 impl ValidSpan {
+    /// Whether a range or an amplitude lies outside of what the calibration rests on; one that is not known does not.
+    #[inline]
+    pub fn leaves_out(&self, range_m: f64, amplitude: f64) -> bool {
+        let outside = |span: Option<[f64; 2]>, value: f64| span.is_some_and(|[low, high]| value < low || value > high);
+        outside(self.range_m, range_m) || outside(self.amplitude, amplitude)
+    }
+
     fn check(&self) -> Check {
         check_span("span.range_m", self.range_m)?;
         check_span("span.amplitude", self.amplitude)?;

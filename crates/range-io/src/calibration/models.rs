@@ -104,16 +104,6 @@ impl Calibration {
     }
 }
 
-impl ValidSpan {
-    /// Whether a range or an amplitude lies outside of what the calibration rests on. A value that is not known lies outside
-    /// of nothing.
-    #[inline]
-    pub fn leaves_out(&self, range_m: f64, amplitude: f64) -> bool {
-        let outside = |span: Option<[f64; 2]>, value: f64| span.is_some_and(|[low, high]| value < low || value > high);
-        outside(self.range_m, range_m) || outside(self.amplitude, amplitude)
-    }
-}
-
 impl RangeCalibration {
     /// The terms of a model, all held.
     pub fn from_model(integration_time_s: f64, model: &RangeErrorModel) -> Self {

@@ -1,27 +1,13 @@
 //! Digests of what was read, so that a certificate can be held against the files.
 
-use std::io::Read;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use commands::root_of;
-use pipeline::{Error, Result};
+use commands::{InputDigest, root_of};
+use pipeline::Result;
 use range_io::calibration::Calibration;
 use range_io::survey::Survey;
-use serde::Serialize;
-use sha2::{Digest, Sha256};
 
 use crate::calibrate::{CalibrateMethod, CalibrateRequest};
-
-/// One file that was read.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct InputDigest {
-    /// The file, by the name under which it was read.
-    pub file: String,
-    /// Its length.
-    pub bytes: u64,
-    /// Its SHA-256, 64 hexadecimal digits.
-    pub sha256: String,
-}
 
 /// Files of a survey that networks are calibrated from, where they are there.
 const NETWORK: [&str; 8] = [
@@ -63,19 +49,5 @@ pub(crate) fn digests(request: &CalibrateRequest) -> Result<Vec<InputDigest>> {
     files.push(request.calibration.clone().unwrap_or_else(|| root.join(Calibration::FILE_NAME)));
     let mut seen = std::collections::BTreeSet::new();
     files.retain(|file| file.is_file() && seen.insert(file.clone()));
-    files.iter().map(|file| digest(file)).collect()
-}
-
-fn digest(path: &Path) -> Result<InputDigest> {
-    let (mut file, bytes) = range_io::open(path)?;
-    let mut hasher = Sha256::new();
-    let mut buffer = vec![0; 1 << 16];
-    loop {
-        let read = file.read(&mut buffer).map_err(|source| Error::Access { path: path.to_owned(), source })?;
-        if read == 0 {
-            break;
-        }
-        hasher.update(&buffer[..read]);
-    }
-    Ok(InputDigest { file: path.display().to_string(), bytes, sha256: format!("{:x}", hasher.finalize()) })
+    files.iter().map(InputDigest::of).collect()
 }

@@ -14,7 +14,7 @@ use self_calibration::{CalibrationOutcome, ObservationQuality, Verdict};
 use serde::Serialize;
 
 pub use crate::calibrate::start::conditions::Conditions;
-pub use digest::InputDigest;
+pub use commands::InputDigest;
 pub use elements::{CertifiedStation, CertifiedTarget, Observed};
 pub use hold_out::{HeldOut, HeldOutCheck, HeldOutPart};
 pub use pairs::NotoriousPair;

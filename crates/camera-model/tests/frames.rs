@@ -57,7 +57,8 @@ fn pixels_have_the_points_of_whole_frames() {
     let mut flags = frame.flags.as_slice()[first..first + count].to_vec();
     let ranges = &frame.range.as_slice()[first..first + count];
     table.back_project_pixels(first, ranges, &mut points, &mut flags).unwrap();
-    let same = |(a, b): (&[f64; 3], &[f64; 3])| a == b || a[0].is_nan() && b[0].is_nan();
+    let same =
+        |(a, b): (&[f64; 3], &[f64; 3])| a.map(f64::to_bits) == b.map(f64::to_bits) || a[0].is_nan() && b[0].is_nan();
     assert!(points.iter().zip(&cloud.points[first..]).all(same));
     assert_eq!(flags, cloud.flags[first..first + count]);
     let beyond = frame.range.len() - 1;

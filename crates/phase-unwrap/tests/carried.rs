@@ -70,7 +70,7 @@ fn another_scene_is_solved_anew() {
 
 #[test]
 fn a_wrong_start_is_mended() {
-    // The first frame claims a noise that leaves nothing sure, and an amplitude of surfaces that shifts the scene.
+    // The first frame is told that nothing lies beyond one interval.
     let view = Scene::random(3).view(1, 0.015);
     let shifted = SpatialOptions { maximum_wraps: 0, ..options() };
     let mut carried = CarriedUnwrapper::new(shifted, CarryOptions::default()).unwrap();
@@ -85,7 +85,8 @@ fn a_wrong_start_is_mended() {
         mended += found.mended;
     }
     let after = right(&view, carried.wraps());
-    assert!(mended > 1000 && after > 0.98, "{after} right after {mended} were mended");
+    // What the tree itself is not sure of stays as it was.
+    assert!(mended > 1000 && after > 0.9 && after > before + 0.05, "{before}, then {after} right after {mended} mended");
 }
 
 #[test]

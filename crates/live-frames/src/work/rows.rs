@@ -123,7 +123,7 @@ impl<'a> Cut<'a> {
         let ProcessedFrame { range, sigma, amplitude, flags, points, .. } = frame;
         let (mut ranges, mut sigmas) = ([const { None }; MOST_FREQUENCIES], [const { None }; MOST_FREQUENCIES]);
         let mut combined = None;
-        let mut cut = |plane: &'a mut Raster<f32>| plane.as_mut_slice().chunks_mut(length);
+        let cut = |plane: &'a mut Raster<f32>| plane.as_mut_slice().chunks_mut(length);
         if planes.phases.len() > 1 {
             let Frequencies { ranges: of_range, sigmas: of_sigma, chi_squared } = frequencies;
             ranges.iter_mut().zip(of_range).for_each(|(to, plane)| *to = Some(cut(plane)));

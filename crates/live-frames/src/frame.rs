@@ -1,4 +1,4 @@
-use phase_unwrap::CarrySummary;
+use crate::carried::CarrySummary;
 use range_image::{Flags, Raster};
 
 /// What became of a frame; lent by the processor until the next one comes.

@@ -2,6 +2,7 @@
 
 mod calibration;
 mod camera;
+mod carried;
 mod error;
 mod frame;
 mod latest;
@@ -12,6 +13,7 @@ mod work;
 pub use calibration::PreparedCalibration;
 pub use camera::{Exposure, LiveCamera};
 pub use camera_model;
+pub use carried::{CarriedUnwrapper, CarryOptions, CarrySummary, WholeFrame};
 pub use error::Error;
 pub use error_models;
 pub use frame::ProcessedFrame;

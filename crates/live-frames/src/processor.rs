@@ -1,11 +1,11 @@
 //! The object that a camera's callback calls.
 
-use phase_unwrap::CarrySummary;
 use range_image::{RawView, SampleSlice};
 use range_io::calibration::Calibration;
 
 use crate::calibration::PreparedCalibration;
 use crate::camera::{Exposure, LiveCamera};
+use crate::carried::CarrySummary;
 use crate::error::{Error, Result};
 use crate::frame::ProcessedFrame;
 use crate::stages::{Limits, Stages};

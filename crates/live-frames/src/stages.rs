@@ -1,7 +1,6 @@
 //! What is done with each frame, and its limits.
 
-use phase_unwrap::CarryOptions;
-
+use crate::carried::CarryOptions;
 use crate::error::{Error, Result};
 
 /// The stages of a frame; those that a calibration has nothing for are left out by themselves.

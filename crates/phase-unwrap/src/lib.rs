@@ -1,7 +1,6 @@
 #![doc = include_str!("../README.md")]
 
 mod absolute;
-mod carried;
 mod entry;
 mod error;
 mod exact;
@@ -10,7 +9,6 @@ mod frequencies;
 mod image;
 mod tree;
 
-pub use carried::{CarriedUnwrapper, CarryOptions, CarrySummary, WholeFrame};
 pub use entry::noisy::{NoisyMethod, NoisyOptions, NoisyUnwrapped, NoisyUnwrapper, unwrap_noisy};
 pub use entry::noisy_absolute::unwrap_noisy_absolute;
 pub use entry::repair::{
@@ -32,5 +30,6 @@ pub use frequencies::intervals::combined_interval_m;
 pub use frequencies::kernel_density::KernelDensityOptions;
 pub use frequencies::multi_frequency::{MultiFrequencyOptions, MultiUnwrapped, MultiUnwrapper, unwrap_multi_frequency};
 pub use range_image;
+pub use tree::grid::{wrap_step, wrapped};
 pub use tree::options::{AlbedoPrior, Boundary, EdgeWeight, ImageGeometry, KnownWraps, Seed, SpatialOptions};
 pub use tree::unwrapped::{Island, Unwrapped};

@@ -3,7 +3,6 @@
 
 mod absolute;
 mod any_cycle;
-mod carried;
 mod common;
 mod dark_rooms;
 #[path = "../examples/peers_phase/files.rs"]

@@ -2,15 +2,14 @@
 // Only what is inlined is compiled for wide registers.
 #![allow(clippy::inline_always)]
 
-use phase_unwrap::{
-    CarriedUnwrapper, CarrySummary, MultiFrequencyOptions, MultiUnwrapped, MultiUnwrapper, combined_interval_m,
-};
+use phase_unwrap::{MultiFrequencyOptions, MultiUnwrapped, MultiUnwrapper, combined_interval_m};
 use range_image::{ComplexChannel, Flags, Modulation, Raster, with_wide_registers};
 use rayon::prelude::*;
 use statistics::quantile;
 
 use crate::calibration::{FURTHEST_M, PreparedCalibration};
 use crate::camera::LiveCamera;
+use crate::carried::{CarriedUnwrapper, CarrySummary};
 use crate::error::Result;
 use crate::frame::ProcessedFrame;
 use crate::stages::UnwrapStage;

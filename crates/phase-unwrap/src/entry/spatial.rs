@@ -99,12 +99,12 @@ impl Unwrapper {
     }
 
     /// Other options, valid ones, for the images to come.
-    pub(crate) fn set_options(&mut self, options: SpatialOptions) {
+    pub fn set_options(&mut self, options: SpatialOptions) {
         self.options = options;
     }
 
     /// Noise of each part of the complex image of the last image with amplitudes: given, or estimated.
-    pub(crate) fn amplitude_noise(&self) -> f32 {
+    pub fn amplitude_noise(&self) -> f32 {
         self.surface.amplitude_noise
     }
 

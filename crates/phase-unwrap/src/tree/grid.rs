@@ -101,7 +101,7 @@ pub(crate) fn set_bits(bytes: &[u8]) -> impl Iterator<Item = usize> {
 
 /// A difference of two wrapped phases brought into `[-pi, pi]`; odd in its argument, so that a tie at pi has no side.
 #[inline]
-pub(crate) fn wrapped(difference: f32) -> f32 {
+pub fn wrapped(difference: f32) -> f32 {
     let high = if difference > PI { TAU } else { 0.0 };
     let low = if difference < -PI { TAU } else { 0.0 };
     difference - high + low
@@ -109,6 +109,6 @@ pub(crate) fn wrapped(difference: f32) -> f32 {
 
 /// Wrap count of `to` minus that of `from` when both lie on one continuous surface.
 #[inline]
-pub(crate) fn wrap_step(from: f32, to: f32) -> i32 {
+pub fn wrap_step(from: f32, to: f32) -> i32 {
     i32::from(from - to > PI) - i32::from(from - to < -PI)
 }

@@ -1,4 +1,4 @@
-use crate::{Error, Result};
+use phase_unwrap::Error;
 
 /// When counts are carried and when they are solved anew.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -23,7 +23,7 @@ impl Default for CarryOptions {
 }
 
 impl CarryOptions {
-    pub(crate) fn validate(&self) -> Result<()> {
+    pub(crate) fn validate(&self) -> Result<(), Error> {
         for (name, frames) in [("refresh_frames", self.refresh_frames), ("check_frames", self.check_frames)] {
             if frames == 0 {
                 return Err(Error::OutOfDomain { name, value: 0.0, expected: "at least 1" });

@@ -3,7 +3,7 @@
 use range_image::Raster;
 
 use crate::carried::pixels::{HELD, OPEN, RIM, apart, gentle_step};
-use crate::tree::grid::{wrap_step, wrapped};
+use phase_unwrap::{wrap_step, wrapped};
 
 /// Sweeps forth and back over the pixels without a count. What is revealed at the edge of a surface is reached in the first;
 /// more follow bends.

@@ -4,7 +4,7 @@
 
 use std::f32::consts::TAU;
 
-use crate::tree::grid::wrapped;
+use phase_unwrap::wrapped;
 
 /// No phase.
 pub(crate) const MASKED: u8 = 0;

@@ -1,12 +1,10 @@
 //! Counts carried from frame to frame.
 
-use phase_unwrap::{
-    CarriedUnwrapper, CarryOptions, CombinedPixels, Error, ImageGeometry, SpatialOptions, WholeFrame, combine_pixels,
-    unwrap_spatial,
-};
-use range_image::{ComplexChannel, Modulation, Raster};
+use live_frames::phase_unwrap::{CombinedPixels, Error, ImageGeometry, SpatialOptions, combine_pixels, unwrap_spatial};
+use live_frames::range_image::{ComplexChannel, Modulation, Raster};
+use live_frames::{CarriedUnwrapper, CarryOptions, WholeFrame};
 
-use crate::common::{FOCAL_PX, HEIGHT, Scene, View, WIDTH};
+use crate::moving_scene::{FOCAL_PX, HEIGHT, Scene, View, WIDTH};
 
 fn channel(view: &View) -> ComplexChannel {
     let part = |of: fn(f32) -> f32| {
@@ -86,7 +84,10 @@ fn a_wrong_start_is_mended() {
     }
     let after = right(&view, carried.wraps());
     // What the tree itself is not sure of stays as it was.
-    assert!(mended > 1000 && after > 0.9 && after > before + 0.05, "{before}, then {after} right after {mended} mended");
+    assert!(
+        mended > 1000 && after > 0.9 && after > before + 0.05,
+        "{before}, then {after} right after {mended} mended"
+    );
 }
 
 #[test]

@@ -4,7 +4,7 @@
 
 use range_image::{ComplexChannel, Raster, with_wide_registers};
 
-use crate::{ImageGeometry, KnownWraps, Result, SpatialOptions, Unwrapped, Unwrapper};
+use phase_unwrap::{Error, ImageGeometry, KnownWraps, SpatialOptions, Unwrapped, Unwrapper};
 
 /// Columns of a small image, about: those of the cameras whose rooms the absolute counts were measured on.
 const COLUMNS: usize = 160;
@@ -31,7 +31,7 @@ impl Coarse {
     }
 
     /// Makes the small image of a frame and solves it; false where it shows nothing.
-    pub fn solve(&mut self, channel: &ComplexChannel, options: &SpatialOptions) -> Result<bool> {
+    pub fn solve(&mut self, channel: &ComplexChannel, options: &SpatialOptions) -> Result<bool, Error> {
         let plane = &self.phase;
         let image = self.image.get_or_insert_with(|| ComplexChannel {
             modulation: channel.modulation,

@@ -7,7 +7,7 @@ use crate::carried::coarse::Coarse;
 use crate::carried::compare::Compared;
 use crate::carried::options::{CarryOptions, CarrySummary, WholeFrame};
 use crate::carried::pixels::{HELD, Limits, MASKED, OPEN, Row, carry_row};
-use crate::{KnownWraps, Result, SpatialOptions, Unwrapped, Unwrapper};
+use phase_unwrap::{Error, KnownWraps, SpatialOptions, Unwrapped, Unwrapper};
 
 /// Share of the pixels that may be left without a count, or in contradiction, until the next check; beyond it the frame is
 /// checked at once.
@@ -49,7 +49,7 @@ pub struct CarriedUnwrapper {
 
 impl CarriedUnwrapper {
     /// Fails where an option lies outside its domain. `amplitude_noise` among the spatial options is given frame by frame.
-    pub fn new(options: SpatialOptions, carry: CarryOptions) -> Result<Self> {
+    pub fn new(options: SpatialOptions, carry: CarryOptions) -> Result<Self, Error> {
         carry.validate()?;
         Ok(Self { unwrapper: Unwrapper::new(options)?, options, carry, ..Self::default() })
     }
@@ -57,7 +57,7 @@ impl CarriedUnwrapper {
     /// Other options for the frames to come, as after a new calibration; the counts of the frame before stay.
     ///
     /// Fails where an option lies outside its domain.
-    pub fn set_options(&mut self, options: SpatialOptions) -> Result<()> {
+    pub fn set_options(&mut self, options: SpatialOptions) -> Result<(), Error> {
         options.validate()?;
         self.options = options;
         Ok(())
@@ -91,7 +91,7 @@ impl CarriedUnwrapper {
         phase: &Raster<f32>,
         amplitude: &Raster<f32>,
         noise: impl FnOnce() -> Option<f32>,
-    ) -> Result<CarrySummary> {
+    ) -> Result<CarrySummary, Error> {
         phase.require_same_size(amplitude, "amplitude")?;
         phase.require_same_size(&channel.real, "real part")?;
         phase.require_same_size(&channel.imaginary, "imaginary part")?;
@@ -140,7 +140,7 @@ impl CarriedUnwrapper {
     }
 
     /// As the tree alone would, and what later frames need of it.
-    fn solve_whole(&mut self, phase: &Raster<f32>, amplitude: &Raster<f32>, noise: Option<f32>) -> Result<()> {
+    fn solve_whole(&mut self, phase: &Raster<f32>, amplitude: &Raster<f32>, noise: Option<f32>) -> Result<(), Error> {
         self.unwrapper.set_options(SpatialOptions { amplitude_noise: noise, ..self.options });
         self.unwrapper.unwrap_into(phase, Some(amplitude), None, KnownWraps::Nothing, &mut self.out)?;
         let noise = self.unwrapper.amplitude_noise();
@@ -193,7 +193,7 @@ impl CarriedUnwrapper {
         [phase, amplitude]: [&Raster<f32>; 2],
         frame: u32,
         summary: &mut CarrySummary,
-    ) -> Result<()> {
+    ) -> Result<(), Error> {
         Attaching::list(&self.state, &mut self.open);
         let (mut open, mut attached) = (std::mem::take(&mut self.open), std::mem::take(&mut self.attached));
         let at_edges = self.attaching(phase, amplitude).grow(&mut open, &mut attached);

@@ -11,6 +11,9 @@ use multiview_registration::Datum;
 
 const OFFSET_M: f64 = 0.024;
 
+/// What is done to the frame of a station.
+type Harm<'a> = &'a dyn Fn(&mut RangeFrame, usize);
+
 /// d0 from these frames and poses.
 fn calibrated(frames: &[RangeFrame], poses: &[Isometry3<f64>]) -> Result<SurfaceCalibration, Error> {
     let names: Vec<String> = (0..frames.len()).map(|k| format!("S{k}")).collect();
@@ -48,7 +51,6 @@ fn wild_values_and_holes_cost_nothing_but_their_pixels() {
     // A number that is a fifth of the time below 0.2, the same each time.
     let part = |index: usize, frame: usize| (index * 7919 + frame * 104_729 + (index * index) % 613) % 1000;
     let (middle, corner) = (pixels / 2 + width / 2, 5 * width + 5);
-    type Harm<'a> = &'a dyn Fn(&mut RangeFrame, usize);
     let harms: [(&str, f64, Harm<'_>); 3] = [
         ("single values", 1.02, &|frame, k| match k {
             1 => frame.sigma.as_mut_slice()[middle] = f32::INFINITY,

@@ -28,14 +28,20 @@ fn main() {
     std::fs::create_dir_all(&folder).unwrap();
     let bench = Bench::new(&fixtures, scene, folder);
     let mut all: Vec<SurveyFigures> = Vec::new();
+    let mut refused = 0;
     println!("{}", SurveyFigures::HEAD);
     for seed in first..first + surveys {
         let figures = bench.figures(seed, (seed > first).then(|| seed - 1));
+        let Some(figures) = figures else {
+            refused += 1;
+            continue;
+        };
         println!("{figures}");
         all.push(figures);
-        if all.len() % BETWEEN == 0 && (all.len() as u64) < surveys {
+        if all.len().is_multiple_of(BETWEEN) && (all.len() as u64) < surveys {
             println!("{}", tables::tables(&all, &bench));
         }
     }
     println!("{}", tables::tables(&all, &bench));
+    println!("surveys with a refused calibration, in no figure: {refused}");
 }

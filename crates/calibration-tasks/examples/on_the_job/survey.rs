@@ -4,7 +4,7 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use calibration_tasks::pipeline::{Silent, SimulateSource, Stage, simulate};
+use calibration_tasks::pipeline::{Error, Silent, SimulateSource, Stage, simulate};
 use calibration_tasks::{
     CalibrateMethod, CalibrateRequest, CalibrationCheck, CalibrationOptions, CertificateRequest, CheckRequest,
     OffsetModel, TableDefaults, TermSelection, calibrate, check,
@@ -60,18 +60,21 @@ impl Bench {
     }
 
     /// The figures of a survey, checked against the calibration of an earlier one: those that are kept, or new ones.
-    pub fn figures(&self, seed: u64, earlier: Option<u64>) -> SurveyFigures {
+    /// `None` where one of its calibrations was refused.
+    pub fn figures(&self, seed: u64, earlier: Option<u64>) -> Option<SurveyFigures> {
         let kept = self.folder.join(format!("survey{seed}.json"));
         if let Ok(text) = std::fs::read_to_string(&kept) {
             return serde_json::from_str(&text).unwrap();
         }
         let work = tempfile::tempdir().unwrap();
+        let earlier = earlier.filter(|earlier| self.own(*earlier).exists());
         let figures = self.taken(seed, earlier, work.path());
+        let figures = figures.map_err(|error| println!("{seed:>6} {error}")).ok();
         std::fs::write(kept, serde_json::to_string(&figures).unwrap()).unwrap();
         figures
     }
 
-    fn taken(&self, seed: u64, earlier: Option<u64>, work: &Path) -> SurveyFigures {
+    fn taken(&self, seed: u64, earlier: Option<u64>, work: &Path) -> Result<SurveyFigures, Error> {
         let survey = work.join("survey");
         let source = SimulateSource {
             scene: self.scene.display().to_string(),
@@ -86,7 +89,7 @@ impl Bench {
         lens.range_models.clear();
         lens.write(work.join("lens.ron")).unwrap();
         let clock = Instant::now();
-        calibrate(&request(&survey, &work.join("lens.ron"), &work.join("own")), &Silent).unwrap();
+        calibrate(&request(&survey, &work.join("lens.ron"), &work.join("own")), &Silent)?;
         let seconds = clock.elapsed().as_secs_f64();
         std::fs::copy(work.join("own/calibration.ron"), self.own(seed)).unwrap();
         let median = |calibration: &Path| {
@@ -100,19 +103,20 @@ impl Bench {
             run(&request, &Silent).unwrap().truth.unwrap().ranges.range_error_median_m
         };
         let medians_m = [median(&self.own(seed)), median(&truth)];
-        let found = checked(&survey, &truth).difference;
+        let found = checked(&survey, &truth)?.difference;
         let terms = found.parameters.iter().filter(|term| term.sigma > 0.0);
         let terms = terms.map(|term| (term.name.clone(), term.difference, term.sigma)).collect();
         let of_truth = found.joint.map_or((f64::NAN, 0), |joint| (joint.chi_squared, joint.degrees));
-        let of_earlier = earlier.map(|earlier| judged(&checked(&survey, &self.own(earlier))));
+        let of_earlier = earlier.map(|earlier| Ok::<_, Error>(judged(&checked(&survey, &self.own(earlier))?)));
         let of_moved = earlier.map(|earlier| {
             let mut moved = Calibration::read(self.own(earlier)).unwrap();
             let d0 = moved.range_models[0].parameters.iter_mut().find(|parameter| parameter.name == "d0").unwrap();
             d0.value += MOVED_M;
             moved.write(work.join("moved.ron")).unwrap();
-            judged(&checked(&survey, &work.join("moved.ron")))
+            Ok::<_, Error>(judged(&checked(&survey, &work.join("moved.ron"))?))
         });
-        SurveyFigures { seed, medians_m, terms, of_truth, of_earlier, of_moved, seconds }
+        let (of_earlier, of_moved) = (of_earlier.transpose()?, of_moved.transpose()?);
+        Ok(SurveyFigures { seed, medians_m, terms, of_truth, of_earlier, of_moved, seconds })
     }
 }
 
@@ -135,9 +139,9 @@ fn request(survey: &Path, lens: &Path, out: &Path) -> CalibrateRequest {
     }
 }
 
-fn checked(survey: &Path, calibration: &Path) -> CalibrationCheck {
+fn checked(survey: &Path, calibration: &Path) -> Result<CalibrationCheck, Error> {
     let (survey, calibration) = (survey.to_owned(), Some(calibration.to_owned()));
-    check(&CheckRequest { survey, calibration, level: LEVEL, tolerance_m: TOLERANCE_M }, &Silent).unwrap()
+    check(&CheckRequest { survey, calibration, level: LEVEL, tolerance_m: TOLERANCE_M }, &Silent)
 }
 
 impl SurveyFigures {

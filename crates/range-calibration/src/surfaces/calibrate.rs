@@ -126,8 +126,13 @@ impl Network<'_> {
     fn register(&self, start: Start<'_>, model: Option<&SensorModel<'_>>) -> Result<StationRegistration> {
         let model = model.map(|model| model as &dyn multiview_registration::PointModel);
         let options = StationRegistrationOptions { model, ..self.options.registration.clone() };
-        register_stations(self.clouds, start, self.datum, &options, self.progress)
-            .map_err(|error| Error::registration("all stations", error))
+        let registered = |start: Start<'_>| {
+            register_stations(self.clouds, start, self.datum, &options, self.progress)
+                .map_err(|error| Error::registration("all stations", error))
+        };
+        let first = registered(start)?;
+        // Weights that change from round to round may keep stations moving: they are given a second go from where they came to.
+        if first.settled { Ok(first) } else { registered(Start::Poses(&first.world_from_station)) }
     }
 
     /// Registers with the terms until what is left of them is determined, and the amplitude's part has its shape.

@@ -169,7 +169,7 @@ impl Part {
     fn differences(&self, own: &[[f64; 3]], beside: &[[f64; 3]]) -> (Figure, String) {
         let difference: Vec<[f64; 3]> =
             own.iter().zip(beside).map(|([x, value, band], [_, given, _])| [*x, value - given, *band]).collect();
-        let given: Vec<[f64; 3]> = beside.iter().map(|[x, value, band]| [*x, value - value, *band]).collect();
+        let given: Vec<[f64; 3]> = beside.iter().map(|[x, value, band]| [*x, 0.0 * value, *band]).collect();
         let title = format!("{}: difference", self.title);
         let axes = Axes { title: &title, x: self.x, y: "less the given, mm" };
         let mut canvas = self.canvas(&axes, difference.iter().chain(&given));

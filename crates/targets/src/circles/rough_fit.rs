@@ -141,11 +141,11 @@ impl Fit<'_> {
             sums.squares += weight * residual * residual;
             let mut row = [1.0, inside, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
             row[2..].iter_mut().zip(by).for_each(|(out, by)| *out = contrast * by);
-            for i in 0..UNKNOWNS {
-                let weighted = weight * row[i];
+            for (i, first) in row.iter().enumerate() {
+                let weighted = weight * first;
                 sums.right[i] += weighted * residual;
-                for j in 0..=i {
-                    sums.normal[(i, j)] += weighted * row[j];
+                for (j, second) in row[..=i].iter().enumerate() {
+                    sums.normal[(i, j)] += weighted * second;
                 }
             }
         }

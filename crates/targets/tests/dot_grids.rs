@@ -112,9 +112,9 @@ fn what_is_another_grid_is_refused() {
     let why = refusal(&[(&mirrored, flipped)], &grid);
     assert!(matches!(why, NotFound::Mirrored), "{why:?}");
     // Staggered, with an even number of rows.
-    let staggered = CircleGrid::asymmetric(4, 8, 0.03).unwrap();
+    let staggered = CircleGrid::asymmetric(4, 6, 0.03).unwrap();
     let mirrored = PrintedDots { mirrored: true, ..PrintedDots::new(staggered, 0.011) };
-    let why = refusal(&[(&mirrored, Isometry3::translation(0.105, 0.105, -0.62))], &staggered);
+    let why = refusal(&[(&mirrored, Isometry3::translation(0.105, 0.075, -0.62))], &staggered);
     assert!(matches!(why, NotFound::Mirrored), "{why:?}");
     let little = PrintedDots::new(CircleGrid::symmetric(4, 4, 0.03).unwrap(), 0.009);
     let left = Isometry3::translation(-0.19, 0.05, -0.6);

@@ -19,8 +19,6 @@ const SMALLEST_WITH_SLOPE_PX: f64 = 4.0;
 /// β that is expected and its deviation, pixel: a weak prior that only holds the blur of sharp images, whose edge lies within a
 /// pixel.
 pub(crate) const EXPECTED_BLUR: [f64; 2] = [0.3, 1.0];
-/// Blur below which an edge may have been sharpened, pixel: the least that is modelled is 0.2.
-const SHARPENED_PX: f64 = 0.4;
 /// Noise that is taken for granted, in parts of the contrast: rounding of values, and what the model leaves out.
 const LEAST_NOISE_PARTS: f64 = 1e-3;
 /// Share of the window that must have values.
@@ -124,8 +122,7 @@ pub(crate) fn fit(window: &Window, first: &Rough, noise: f64) -> Option<DiscFit>
     let small = start.mean_radius_px() < SMALLEST_WITH_SLOPE_PX;
     let slopes: &[usize] = if small { &[CONTRAST + 1, CONTRAST + 2] } else { &[] };
     // An edge that a camera sharpened has no blur that the iteration could settle on.
-    let sharpened = |_| if first.look.blur_px < SHARPENED_PX { held(&[slopes, &[BLUR]].concat()).ok() } else { None };
-    let (values, covariance, squares) = held(slopes).map_or_else(sharpened, Some)?;
+    let (values, covariance, squares) = held(slopes).or_else(|_| held(&[slopes, &[BLUR]].concat())).ok()?;
     let ellipse = Ellipse::from_unit_circle([values[CENTRE], values[CENTRE + 1]], [values[8], values[9], values[10]]);
     let count = window.pixels.len() as f64;
     let redundancy = count - PARAMETERS as f64;

@@ -121,7 +121,7 @@ fn at_point(table: &NormalTable, parameters: &[f64], point: [f64; 2], blur: f64)
 }
 
 /// s and its derivatives by centre, shape and σ.
-#[inline(always)]
+#[inline]
 fn distance(parameters: &[f64], point: [f64; 2], blur: f64) -> (f64, [f64; 6]) {
     let [m11, m12, m22] = [parameters[SHAPE], parameters[SHAPE + 1], parameters[SHAPE + 2]];
     let (dx, dy) = (point[0] - parameters[CENTRE], point[1] - parameters[CENTRE + 1]);

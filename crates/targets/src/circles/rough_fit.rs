@@ -14,7 +14,7 @@ use crate::image::normal_table::NormalTable;
 const UNKNOWNS: usize = 8;
 /// Their places among the parameters of the model; the contrast stands at 1 here.
 const PLACES: [usize; UNKNOWNS] = [0, 1, CENTRE, CENTRE + 1, SHAPE, SHAPE + 1, SHAPE + 2, BLUR];
-/// Most steps: discs take five or six, and what needs more is none.
+/// Most steps: blurred discs take five or six.
 const MOST_STEPS: usize = 15;
 /// Part of the sum of squares below which a step gains nothing.
 const SMALL_GAIN: f64 = 1e-3;
@@ -104,7 +104,7 @@ impl Fit<'_> {
         (solved[1] > 0.0).then_some(solved)
     }
 
-    /// The parameters from where no step gains anything, and the sum of the squared residuals; `None` where that takes too many.
+    /// The parameters from where no step gains anything, or after many, and the sum of the squared residuals.
     fn settled(&self, mut values: [f64; PARAMETERS]) -> Option<([f64; PARAMETERS], f64)> {
         let mut sums = self.sums(&values);
         let mut damping = 1e-3;
@@ -128,7 +128,8 @@ impl Fit<'_> {
                 return None;
             }
         }
-        None
+        // An edge without blur creeps on for ever.
+        Some((values, sums.squares))
     }
 
     fn sums(&self, values: &[f64; PARAMETERS]) -> Sums {
@@ -141,11 +142,11 @@ impl Fit<'_> {
             sums.squares += weight * residual * residual;
             let mut row = [1.0, inside, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
             row[2..].iter_mut().zip(by).for_each(|(out, by)| *out = contrast * by);
-            for i in 0..UNKNOWNS {
-                let weighted = weight * row[i];
+            for (i, first) in row.iter().enumerate() {
+                let weighted = weight * first;
                 sums.right[i] += weighted * residual;
-                for j in 0..=i {
-                    sums.normal[(i, j)] += weighted * row[j];
+                for (j, second) in row[..=i].iter().enumerate() {
+                    sums.normal[(i, j)] += weighted * second;
                 }
             }
         }

@@ -21,6 +21,10 @@ const ACROSS: [f64; 3] = [0.3, 0.5, 0.7];
 /// contrast; narrow sectors lose most of it to their neighbours.
 const LEAST_CLEARNESS: f64 = 0.05;
 
+/// Width of a sector at its narrowest, in deviations of the blur with that of a pixel, from which on a ring is read: in narrower ones a
+/// grey blot lifts one sector and dims another by what tells their colours apart, and makes another code.
+const LEAST_WIDTH_BLURS: f64 = 2.9;
+
 /// A word that was read.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Reading {
@@ -30,8 +34,12 @@ pub(super) struct Reading {
     pub(super) start_rad: f64,
 }
 
-/// Reads the ring about a disc; `None` where a sector is of no colour.
+/// Reads the ring about a disc; `None` where a sector is of no colour, or narrower than the blur lets be told.
 pub(super) fn read(image: &Raster<f32>, disc: &CircleSighting, bits: usize) -> Option<Reading> {
+    let narrowest = std::f64::consts::PI * (RING[0] + RING[1]) / bits as f64 * disc.ellipse.semi_axes_px[1];
+    if narrowest < LEAST_WIDTH_BLURS * whole_blur(disc) {
+        return None;
+    }
     // 1 for the disc's colour, 0 for the ground's, what the blur takes across the ring given back.
     let colour = |angle: f64, parts: f64| {
         let ([col, row], centre) = (disc.ellipse.point(angle), disc.ellipse.centre);
@@ -62,7 +70,12 @@ pub(super) fn read(image: &Raster<f32>, disc: &CircleSighting, bits: usize) -> O
 
 /// Share of the contrast that the blur leaves at a radius within the ring, of a circle as large as the ellipse.
 fn left_by_blur(disc: &CircleSighting, parts: f64) -> f64 {
-    let blur = (disc.blur_px * disc.blur_px + 1.0 / 12.0).sqrt() / disc.ellipse.mean_radius_px();
+    let blur = whole_blur(disc) / disc.ellipse.mean_radius_px();
     let share = |edge: f64| 0.5 * (1.0 + NormalTable::new().profile((parts - edge) / blur).0);
     share(RING[0]) - share(RING[1])
+}
+
+/// Deviation of the blur with that of a pixel, pixel.
+pub(super) fn whole_blur(disc: &CircleSighting) -> f64 {
+    (disc.blur_px * disc.blur_px + 1.0 / 12.0).sqrt()
 }

@@ -7,6 +7,7 @@ use range_image::Raster;
 use statistics::{bonferroni, chi_squared_limit};
 
 use super::codes::Code;
+use super::decode::whole_blur;
 use super::{GROUND, RING};
 use crate::circles::find::CircleSighting;
 use crate::image::normal_table::NormalTable;
@@ -37,8 +38,7 @@ pub(super) struct RingModel<'a> {
 
 impl<'a> RingModel<'a> {
     pub(super) fn new(disc: &'a CircleSighting, code: Code, start_rad: f64) -> Self {
-        let blur = (disc.blur_px * disc.blur_px + 1.0 / 12.0).sqrt();
-        Self { disc, code, start_rad, blur, table: NormalTable::new() }
+        Self { disc, code, start_rad, blur: whole_blur(disc), table: NormalTable::new() }
     }
 
     /// Whether the pixels about the disc are as the code has them, `noise` the deviation of one: in each sector the squares of

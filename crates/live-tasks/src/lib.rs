@@ -11,8 +11,8 @@ pub use live_frames;
 pub use ply::PlyStream;
 pub use range_image;
 pub use run::{
-    DriftReport, DriftVerdict, Ended, LatencySummary, LiveRequest, LiveStatus, LiveSummary, LiveWatch, PlyTarget, RefusedFrames, live,
-    live_from,
+    DriftReport, DriftVerdict, Ended, LatencySummary, LiveRequest, LiveStatus, LiveSummary, LiveWatch, PlyTarget,
+    RefusedFrames, live, live_from,
 };
 pub use sources::{FrameSource, LiveSource, Next};
 pub use view::LiveView;

@@ -7,7 +7,8 @@ use crate::page::Running;
 
 #[test]
 fn a_browser_draws_the_page() {
-    let Some(browser) = ["/usr/bin/chromium", "/usr/bin/chromium-browser"].iter().find(|path| std::path::Path::new(path).exists())
+    let Some(browser) =
+        ["/usr/bin/chromium", "/usr/bin/chromium-browser"].iter().find(|path| std::path::Path::new(path).exists())
     else {
         println!("no browser on this machine: the page is not drawn");
         return;

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 use live_tasks::commands::Result;
 use live_tasks::{
-    FrameError, FrameHeader, FrameSource, FrameStream, LiveFrame, LiveRequest, LiveSource, LiveSummary, Next, PlyTarget,
-    SampleType, live, live_from, write_live_frame,
+    FrameError, FrameHeader, FrameSource, FrameStream, LiveFrame, LiveRequest, LiveSource, LiveSummary, Next,
+    PlyTarget, SampleType, live, live_from, write_live_frame,
 };
 use pipeline::{Silent, SimulateSource, simulate};
 use range_io::survey::{InputFrame, Survey, read_frame};
@@ -106,7 +106,11 @@ impl World {
 
     /// Processes a stream from memory.
     pub fn stream(&self, bytes: Vec<u8>) -> Result<LiveSummary> {
-        live_from(Box::new(Stream(FrameStream::new(Cursor::new(bytes)))), &self.request(LiveSource::StandardInput), &mut ())
+        live_from(
+            Box::new(Stream(FrameStream::new(Cursor::new(bytes)))),
+            &self.request(LiveSource::StandardInput),
+            &mut (),
+        )
     }
 
     /// The clouds that a request gives, as one stream of bytes.

@@ -2,10 +2,10 @@
 #![allow(clippy::expect_used, clippy::float_cmp, clippy::panic, clippy::print_stdout, clippy::unwrap_used)]
 
 mod browser;
-mod common;
 mod clouds;
-mod dropping;
+mod common;
 mod drift;
+mod dropping;
 mod page;
 mod refusals;
 mod sources;

@@ -7,7 +7,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::channel;
 use std::thread::JoinHandle;
 
-use live_tasks::{FrameError, FrameSource, LiveFrame, LiveRequest, LiveSource, LiveSummary, LiveWatch, Next, live_from};
+use live_tasks::{
+    FrameError, FrameSource, LiveFrame, LiveRequest, LiveSource, LiveSummary, LiveWatch, Next, live_from,
+};
 
 use crate::common::World;
 
@@ -45,15 +47,13 @@ impl Running {
     pub fn begin(world: &World) -> Self {
         let ends = Arc::new(AtomicBool::new(false));
         let camera = Camera { frame: world.frames().remove(0), ends: Arc::clone(&ends) };
-        let request = LiveRequest {
-            view: Some(0),
-            every_frame: false,
-            ..world.request(LiveSource::StandardInput)
-        };
+        let request = LiveRequest { view: Some(0), every_frame: false, ..world.request(LiveSource::StandardInput) };
         let (page, address) = channel();
-        let thread =
-            std::thread::spawn(move || live_from(Box::new(camera), &request, &mut Page(page)).unwrap());
-        Self { address: address.recv().unwrap(), ends, thread }
+        let thread = std::thread::spawn(move || live_from(Box::new(camera), &request, &mut Page(page)).unwrap());
+        let running = Self { address: address.recv().unwrap(), ends, thread };
+        // Until there is a first frame.
+        while !running.get("/frame").0.starts_with("HTTP/1.1 200") {}
+        running
     }
 
     pub fn end(self) -> LiveSummary {
@@ -64,9 +64,10 @@ impl Running {
     /// Head and body of the answer to a request.
     pub fn ask(&self, request: &str) -> (String, Vec<u8>) {
         let mut connection = TcpStream::connect(self.address).unwrap();
-        connection.write_all(request.as_bytes()).unwrap();
         let mut answer = Vec::new();
-        connection.read_to_end(&mut answer).unwrap();
+        // Where the other side has closed before it read all, that may be an error here.
+        let _ = connection.write_all(request.as_bytes());
+        let _ = connection.read_to_end(&mut answer);
         let end = answer.windows(4).position(|bytes| bytes == b"\r\n\r\n").unwrap_or(answer.len());
         let head = String::from_utf8(answer[..end].to_vec()).unwrap();
         (head, answer.get(end + 4..).unwrap_or_default().to_vec())
@@ -83,7 +84,10 @@ fn the_page_shows_the_newest_frame_and_the_status() {
     let running = Running::begin(&world);
     assert!(running.address.ip().is_loopback());
     let (head, page) = running.get("/");
-    assert!(head.starts_with("HTTP/1.1 200 OK") && head.contains("Content-Security-Policy: default-src 'none'"), "{head}");
+    assert!(
+        head.starts_with("HTTP/1.1 200 OK") && head.contains("Content-Security-Policy: default-src 'none'"),
+        "{head}"
+    );
     let page = String::from_utf8(page).unwrap();
     assert!(page.contains("<canvas") && !page.contains("http://") && !page.contains("https://"));
 

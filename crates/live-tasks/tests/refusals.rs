@@ -96,7 +96,11 @@ fn a_folder_with_damaged_files_goes_on() {
     std::fs::write(folder.join("9.other"), "not a frame").unwrap();
     std::fs::write(folder.join("end"), "").unwrap();
     let summary = live(&world.request(LiveSource::Path(folder)), &mut ()).unwrap();
-    assert_eq!((summary.frames, summary.refused.len(), summary.refused[0].frames), (FRAMES as u64 - 3, 1, 3), "{summary}");
+    assert_eq!(
+        (summary.frames, summary.refused.len(), summary.refused[0].frames),
+        (FRAMES as u64 - 3, 1, 3),
+        "{summary}"
+    );
     assert!(summary.refused[0].first.contains("2.frame"), "{summary}");
 }
 
@@ -110,9 +114,12 @@ fn what_can_not_be_asked_for_is_refused_by_name() {
     usage(live(&world.request(LiveSource::Path(world.path("nowhere"))), &mut ()), &["nowhere"]);
     usage(live(&world.request(LiveSource::of_name("unix:/nowhere/at/all")), &mut ()), &["unix:/nowhere"]);
     // Clouds over what is read.
-    for out in ["survey", "survey/clouds.ply", "survey/frames/000_0.npz", "survey/../survey/x", "frames", "survey/a/b"] {
-        let request =
-            LiveRequest { ply: Some(PlyTarget::File(world.path(out))), ..world.request(LiveSource::Path(file.clone())) };
+    for out in ["survey", "survey/clouds.ply", "survey/frames/000_0.npz", "survey/../survey/x", "frames", "survey/a/b"]
+    {
+        let request = LiveRequest {
+            ply: Some(PlyTarget::File(world.path(out))),
+            ..world.request(LiveSource::Path(file.clone()))
+        };
         let before = std::fs::read(&file).unwrap();
         usage(live(&request, &mut ()), &["cannot be the output"]);
         assert_eq!(std::fs::read(&file).unwrap(), before);

@@ -68,7 +68,8 @@ fn a_header_has_the_bytes_that_the_documentation_says() {
     assert_eq!(sent[24..32], 1.0_f64.to_le_bytes());
     assert_eq!(sent[32..40], 0.002_f64.to_le_bytes());
     assert!(f64::from_le_bytes(sent[40..48].try_into().unwrap()).is_nan());
-    assert_eq!((&sent[48..56], &sent[56..64]), (48_u64.to_le_bytes().as_slice(), [0; 8].as_slice()));
+    assert_eq!(sent[48..56], 48_u64.to_le_bytes());
+    assert_eq!(sent[56..64], [0; 8]);
     assert_eq!(sent[64..66], 1000_u16.to_le_bytes());
 }
 
@@ -76,26 +77,26 @@ fn a_header_has_the_bytes_that_the_documentation_says() {
 fn each_field_that_means_nothing_is_named_with_its_place() {
     let good: Vec<u8> = three().iter().flat_map(bytes).collect();
     for (at, value, field) in [
-        (0, b"RCLX".as_slice(), "head"),
-        (4, &[2, 0], "version"),
-        (6, &[4, 0], "sample type"),
-        (8, &[0; 4], "columns"),
-        (8, &[1, 0x10, 0, 0], "columns"),
-        (12, &[0xff; 4], "rows"),
-        (16, &[0, 0], "frequencies"),
-        (16, &[17, 0], "phase steps"),
-        (18, &[0, 0], "phase steps"),
-        (20, &[1, 0, 0, 0], "reserved"),
-        (24, &f64::NAN.to_le_bytes(), "time stamp"),
-        (32, &(-1.0_f64).to_le_bytes(), "integration time"),
-        (40, &f64::INFINITY.to_le_bytes(), "temperature"),
-        (48, &49_u64.to_le_bytes(), "bytes of samples"),
-        (48, &u64::MAX.to_le_bytes(), "bytes of samples"),
-        (63, &[1], "reserved"),
+        (0, b"RCLX".to_vec(), "head"),
+        (4, vec![2, 0], "version"),
+        (6, vec![4, 0], "sample type"),
+        (8, vec![0; 4], "columns"),
+        (8, vec![1, 0x10, 0, 0], "columns"),
+        (12, vec![0xff; 4], "rows"),
+        (16, vec![0, 0], "frequencies"),
+        (16, vec![17, 0], "phase steps"),
+        (18, vec![0, 0], "phase steps"),
+        (20, vec![1, 0, 0, 0], "reserved"),
+        (24, f64::NAN.to_le_bytes().to_vec(), "time stamp"),
+        (32, (-1.0_f64).to_le_bytes().to_vec(), "integration time"),
+        (40, f64::INFINITY.to_le_bytes().to_vec(), "temperature"),
+        (48, 49_u64.to_le_bytes().to_vec(), "bytes of samples"),
+        (48, u64::MAX.to_le_bytes().to_vec(), "bytes of samples"),
+        (63, vec![1], "reserved"),
     ] {
         // In the second frame, which begins at byte 112.
         let mut bad = good.clone();
-        bad[112 + at..112 + at + value.len()].copy_from_slice(value);
+        bad[112 + at..112 + at + value.len()].copy_from_slice(&value);
         let (found, error) = read(&bad);
         let error = error.unwrap();
         assert!(found.len() == 1 && matches!(error, FrameError::Field { .. }), "{field}: {error}");

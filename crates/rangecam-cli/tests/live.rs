@@ -16,7 +16,8 @@ fn rangecam() -> Command {
 fn room() -> TempDir {
     let folder = tempfile::tempdir().unwrap();
     let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fixtures/scenes/room_small.ron");
-    let made = rangecam().arg("simulate").arg(scene).args(["--out", "survey", "-q"]).current_dir(folder.path()).status();
+    let made =
+        rangecam().arg("simulate").arg(scene).args(["--out", "survey", "-q"]).current_dir(folder.path()).status();
     assert!(made.unwrap().success());
     folder
 }

@@ -45,8 +45,10 @@ impl DriftReport {
     pub(super) fn of(model: Option<&WarmUp>, power_on_s: Option<f64>, header: &FrameHeader) -> Self {
         let Some(model) = model else { return Self::default() };
         let time_s = power_on_s.map(|power_on_s| header.timestamp_s - power_on_s);
-        let unstated = |words: &str| {
-            Self { verdict: DriftVerdict::Unstated, drift_m: None, words: Some(format!("{words} is not stated")) }
+        let unstated = |words: &str| Self {
+            verdict: DriftVerdict::Unstated,
+            drift_m: None,
+            words: Some(format!("{words} is not stated")),
         };
         if time_s.is_none() && !model.transients.is_empty() {
             return unstated("the time of power-on");

@@ -49,7 +49,12 @@ enum Way {
     /// Each frame is waited for; none is dropped.
     Direct { source: Box<dyn FrameSource>, spare: Option<LiveFrame> },
     /// A thread reads, and drops what is not taken in time.
-    Slot { reader: FrameReader<LiveFrame>, back: Sender<LiveFrame>, stop: Arc<AtomicBool>, thread: Option<JoinHandle<Result<(), FrameError>>> },
+    Slot {
+        reader: FrameReader<LiveFrame>,
+        back: Sender<LiveFrame>,
+        stop: Arc<AtomicBool>,
+        thread: Option<JoinHandle<Result<(), FrameError>>>,
+    },
 }
 
 impl Feed {

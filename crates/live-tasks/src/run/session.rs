@@ -38,11 +38,7 @@ pub fn live(asked: &LiveRequest, watch: &mut dyn LiveWatch) -> Result<LiveSummar
 }
 
 /// As [`live`], with frames of a source of one's own; that of the request names it.
-pub fn live_from(
-    source: Box<dyn FrameSource>,
-    asked: &LiveRequest,
-    watch: &mut dyn LiveWatch,
-) -> Result<LiveSummary> {
+pub fn live_from(source: Box<dyn FrameSource>, asked: &LiveRequest, watch: &mut dyn LiveWatch) -> Result<LiveSummary> {
     Session::new(asked, Setup::new(asked)?, watch)?.run(source)
 }
 
@@ -100,8 +96,7 @@ impl<'a> Session<'a> {
             self.tally.refuse("another camera", words);
             return Ok(None);
         }
-        let drift =
-            DriftReport::of(self.setup.drift.as_ref(), self.setup.processor.camera().power_on_s, header);
+        let drift = DriftReport::of(self.setup.drift.as_ref(), self.setup.processor.camera().power_on_s, header);
         self.tally.arrived(header, frame.arrived, drift);
         if let Err(error) = self.process(frame) {
             self.tally.refuse(reason(&error), format!("at {} s: {error}", header.timestamp_s));
@@ -152,7 +147,7 @@ impl<'a> Session<'a> {
         }
     }
 
-    fn finish(mut self, ended: Ended, ended_words: Option<String>, feed: &Feed) -> Result<LiveSummary> {
+    fn finish(self, ended: Ended, ended_words: Option<String>, feed: &Feed) -> Result<LiveSummary> {
         self.watch.status(&self.tally.status(feed));
         let tally = &self.tally;
         let mut summary = LiveSummary {

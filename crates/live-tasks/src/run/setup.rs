@@ -36,7 +36,9 @@ impl Setup {
         let file = asked.calibration.clone().or(beside);
         let calibration = match &file {
             Some(file) => Calibration::read(file)?,
-            None => Calibration::from_models(&survey.camera.nominal_camera()?, &ModelSet { entries: Vec::new() }, None)?,
+            None => {
+                Calibration::from_models(&survey.camera.nominal_camera()?, &ModelSet { entries: Vec::new() }, None)?
+            }
         };
         check_ply(asked, survey_path, file.as_deref())?;
         let camera = live_camera(asked, &survey)?;
@@ -86,9 +88,14 @@ fn check_ply(asked: &LiveRequest, survey: &Path, calibration: Option<&Path>) -> 
     let beside = place(parent).map(|parent| parent.join(file.file_name().unwrap_or_default()));
     let places = [place(file), beside].into_iter().flatten();
     for place_of_file in places {
-        if let Some(input) = read.iter().find(|input| place(input).is_ok_and(|input| place_of_file.starts_with(input))) {
+        if let Some(input) = read.iter().find(|input| place(input).is_ok_and(|input| place_of_file.starts_with(input)))
+        {
             let words = "cannot be the output file: it is, or lies in,";
-            return Err(request(format!("{} {words} {}, which is read; name another one", file.display(), input.display())));
+            return Err(request(format!(
+                "{} {words} {}, which is read; name another one",
+                file.display(),
+                input.display()
+            )));
         }
     }
     // A survey may name frames outside of its folder.

@@ -112,7 +112,8 @@ impl LiveSummary {
     pub(super) fn judge(&mut self) {
         if self.dropped > 0 {
             let all = self.dropped + self.frames + self.refused.iter().map(|refused| refused.frames).sum::<u64>();
-            let words = format!("{} of {all} frames were dropped, as they came faster than they were processed", self.dropped);
+            let words =
+                format!("{} of {all} frames were dropped, as they came faster than they were processed", self.dropped);
             self.doubts.push(Doubt::new(DoubtKind::LostFrames, words));
         }
         for RefusedFrames { reason, frames, first } in &self.refused {

@@ -101,7 +101,8 @@ impl Tally {
     pub(super) fn flags(&self) -> BTreeMap<&'static str, f64> {
         let all: u64 = self.pixels.iter().sum();
         let share = |has: &dyn Fn(Flags) -> bool| {
-            let of = |(bits, count): (usize, &u64)| if has(Flags::from_bits_truncate(bits as u16)) { *count } else { 0 };
+            let of =
+                |(bits, count): (usize, &u64)| if has(Flags::from_bits_truncate(bits as u16)) { *count } else { 0 };
             self.pixels.iter().enumerate().map(of).sum::<u64>() as f64 / all.max(1) as f64
         };
         let named = Flags::NAMED.iter().map(|(flag, name)| (*name, share(&|flags| flags.contains(*flag))));

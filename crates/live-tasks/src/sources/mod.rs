@@ -64,7 +64,8 @@ impl LiveSource {
     /// The survey that is played, where it is one.
     pub fn recording(&self) -> Option<&Path> {
         let Self::Path(path) = self else { return None };
-        let is_recording = path.file_name().is_some_and(|name| name == Survey::FILE_NAME) || path.join(Survey::FILE_NAME).exists();
+        let is_recording =
+            path.file_name().is_some_and(|name| name == Survey::FILE_NAME) || path.join(Survey::FILE_NAME).exists();
         is_recording.then_some(path)
     }
 

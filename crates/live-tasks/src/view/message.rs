@@ -14,7 +14,8 @@ pub(super) fn write(frame: &ProcessedFrame, bytes: &mut Vec<u8>) {
     bytes.clear();
     let (width, height) = (frame.width(), frame.height());
     let step = width.div_ceil(LARGEST[0]).max(height.div_ceil(LARGEST[1])).max(1);
-    let pixels = || (0..height).step_by(step).flat_map(move |row| (0..width).step_by(step).map(move |col| row * width + col));
+    let pixels =
+        || (0..height).step_by(step).flat_map(move |row| (0..width).step_by(step).map(move |col| row * width + col));
     bytes.extend(MAGIC);
     for number in [width.div_ceil(step), height.div_ceil(step), step] {
         bytes.extend((number as u32).to_le_bytes());

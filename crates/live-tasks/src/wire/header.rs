@@ -97,7 +97,9 @@ impl FrameHeader {
 
     /// Samples of the frame.
     pub fn samples(&self) -> usize {
-        [self.width, self.height, self.frequencies, self.phase_steps].iter().fold(1, |product, n| product.saturating_mul(*n))
+        [self.width, self.height, self.frequencies, self.phase_steps]
+            .iter()
+            .fold(1, |product, n| product.saturating_mul(*n))
     }
 
     /// Bytes of the samples.
@@ -142,7 +144,12 @@ impl FrameHeader {
         let fields = Fields { bytes, position };
         let magic: [u8; 4] = fields.take(0);
         if magic != MAGIC {
-            return Err(fields.wrong(0, "the head of a frame", format!("{:?}", magic.escape_ascii().to_string()), "\"RCLF\""));
+            return Err(fields.wrong(
+                0,
+                "the head of a frame",
+                format!("{:?}", magic.escape_ascii().to_string()),
+                "\"RCLF\"",
+            ));
         }
         let short = |at| u64::from(u16::from_le_bytes(fields.take(at)));
         let long = |at| u64::from(u32::from_le_bytes(fields.take(at)));
@@ -164,15 +171,33 @@ impl FrameHeader {
             return Err(fields.wrong(24, "time stamp", timestamp_s, "a finite number of seconds"));
         }
         if integration_s.is_infinite() || integration_s <= 0.0 {
-            return Err(fields.wrong(32, "integration time", integration_s, "positive seconds, or NaN where it is not stated"));
+            return Err(fields.wrong(
+                32,
+                "integration time",
+                integration_s,
+                "positive seconds, or NaN where it is not stated",
+            ));
         }
         if temperature_c.is_infinite() {
-            return Err(fields.wrong(40, "temperature", temperature_c, "degrees Celsius, or NaN where it is not stated"));
+            return Err(fields.wrong(
+                40,
+                "temperature",
+                temperature_c,
+                "degrees Celsius, or NaN where it is not stated",
+            ));
         }
         let stated = |value: f64| Some(value).filter(|value| !value.is_nan());
         let (integration_time_s, temperature_c) = (stated(integration_s), stated(temperature_c));
-        let header =
-            Self { sample_type, width, height, frequencies, phase_steps, timestamp_s, integration_time_s, temperature_c };
+        let header = Self {
+            sample_type,
+            width,
+            height,
+            frequencies,
+            phase_steps,
+            timestamp_s,
+            integration_time_s,
+            temperature_c,
+        };
         let payload = u64::from_le_bytes(fields.take(48));
         fields.require(48, "bytes of samples", payload, header.payload()..=header.payload())?;
         fields.require(56, "reserved", u64::from_le_bytes(fields.take(56)), 0..=0)?;

@@ -72,11 +72,17 @@ impl<R: Read> FrameStream<R> {
 
     fn samples(&mut self, header: &FrameHeader, used: Option<Samples>) -> Result<Samples> {
         Ok(match (header.sample_type, used) {
-            (SampleType::U16, Some(Samples::U16(used))) => Samples::U16(self.values(header, used, u16::from_le_bytes)?),
+            (SampleType::U16, Some(Samples::U16(used))) => {
+                Samples::U16(self.values(header, used, u16::from_le_bytes)?)
+            }
             (SampleType::U16, _) => Samples::U16(self.values(header, Vec::new(), u16::from_le_bytes)?),
-            (SampleType::I16, Some(Samples::I16(used))) => Samples::I16(self.values(header, used, i16::from_le_bytes)?),
+            (SampleType::I16, Some(Samples::I16(used))) => {
+                Samples::I16(self.values(header, used, i16::from_le_bytes)?)
+            }
             (SampleType::I16, _) => Samples::I16(self.values(header, Vec::new(), i16::from_le_bytes)?),
-            (SampleType::F32, Some(Samples::F32(used))) => Samples::F32(self.values(header, used, f32::from_le_bytes)?),
+            (SampleType::F32, Some(Samples::F32(used))) => {
+                Samples::F32(self.values(header, used, f32::from_le_bytes)?)
+            }
             (SampleType::F32, _) => Samples::F32(self.values(header, Vec::new(), f32::from_le_bytes)?),
         })
     }

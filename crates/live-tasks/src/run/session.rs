@@ -139,7 +139,9 @@ impl<'a> Session<'a> {
     /// Tells who watches, and who looks at the page.
     fn look_after(&mut self, feed: &Feed) {
         if let Some(view) = self.view.as_ref().filter(|_| self.tally.processed > 0) {
-            view.offer(self.setup.processor.last(), &|| self.tally.status(feed));
+            view.offer(self.setup.processor.last(), &|| {
+                serde_json::to_string(&self.tally.status(feed)).unwrap_or_default()
+            });
         }
         if self.last_status.elapsed() >= BETWEEN_STATUS {
             self.last_status = Instant::now();

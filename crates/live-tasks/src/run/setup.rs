@@ -10,6 +10,7 @@ use range_io::error_models::{ModelSet, WarmUp};
 use range_io::survey::Survey;
 
 use super::request::{LiveRequest, PlyTarget};
+use crate::sources::LiveSource;
 use crate::wire::FrameHeader;
 
 /// A camera that is ready for its frames.
@@ -79,7 +80,7 @@ fn check_ply(asked: &LiveRequest, survey: &Path, calibration: Option<&Path>) -> 
     let Some(PlyTarget::File(file)) = &asked.ply else { return Ok(()) };
     let mut read: Vec<PathBuf> = calibration.map(Path::to_owned).into_iter().collect();
     read.push(root_of(survey));
-    if let crate::LiveSource::Path(path) | crate::LiveSource::Unix(path) = &asked.source {
+    if let LiveSource::Path(path) | LiveSource::Unix(path) = &asked.source {
         read.push(if asked.source.recording().is_some() { root_of(path) } else { path.clone() });
     }
     // A link leads to what it would be written over.

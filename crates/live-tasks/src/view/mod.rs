@@ -11,8 +11,6 @@ use std::time::Duration;
 
 use live_frames::ProcessedFrame;
 
-use crate::run::LiveStatus;
-
 /// Longest wait for a frame that was asked for.
 const WAIT: Duration = Duration::from_millis(500);
 /// Connections at a time: a browser opens six, and a few more hurt nobody.
@@ -66,8 +64,8 @@ impl LiveView {
         self.address
     }
 
-    /// Copies a frame and the status for the page, where somebody asked. It never waits.
-    pub fn offer(&self, frame: &ProcessedFrame, status: &dyn Fn() -> LiveStatus) {
+    /// Copies a frame, and the status as JSON, for the page, where somebody asked. It never waits.
+    pub fn offer(&self, frame: &ProcessedFrame, status: &dyn Fn() -> String) {
         if !self.shared.wanted.load(Ordering::Acquire) {
             return;
         }
@@ -75,7 +73,7 @@ impl LiveView {
         self.shared.wanted.store(false, Ordering::Release);
         copy.number += 1;
         message::write(frame, &mut copy.frame);
-        copy.status = serde_json::to_string(&status()).unwrap_or_default();
+        copy.status = status();
         drop(copy);
         self.shared.copied.notify_all();
     }

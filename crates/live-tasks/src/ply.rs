@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 use std::io::{Result, Write};
 
 use live_frames::ProcessedFrame;
+use range_image::Raster;
 
 /// Writer of a stream of clouds: complete binary PLY files, one a frame, that follow each other.
 ///
@@ -29,7 +30,7 @@ impl<W: Write> PlyStream<W> {
     pub fn write(&mut self, frame: &ProcessedFrame) -> Result<usize> {
         self.bytes.clear();
         let mut count = 0;
-        let planes = [&frame.amplitude, &frame.sigma].map(|plane| plane.as_slice());
+        let planes = [&frame.amplitude, &frame.sigma].map(Raster::as_slice);
         for (index, (point, flags)) in frame.points.iter().zip(frame.flags.as_slice()).enumerate() {
             if !point.iter().all(|value| value.is_finite()) {
                 continue;

@@ -34,9 +34,9 @@ pub fn write_live_frame<'a>(
     FrameHeader::parse(&bytes, 0).map_err(|error| Error::new(ErrorKind::InvalidInput, error))?;
     writer.write_all(&bytes)?;
     match samples {
-        SampleSlice::U16(values) => write_values(writer, values, |value| value.to_le_bytes()),
-        SampleSlice::I16(values) => write_values(writer, values, |value| value.to_le_bytes()),
-        SampleSlice::F32(values) => write_values(writer, values, |value| value.to_le_bytes()),
+        SampleSlice::U16(values) => write_values(writer, values, u16::to_le_bytes),
+        SampleSlice::I16(values) => write_values(writer, values, i16::to_le_bytes),
+        SampleSlice::F32(values) => write_values(writer, values, f32::to_le_bytes),
     }
 }
 

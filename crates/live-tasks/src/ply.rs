@@ -6,6 +6,9 @@ use std::io::{Result, Write};
 use live_frames::ProcessedFrame;
 use range_image::Raster;
 
+/// Bytes of a point.
+const RECORD: usize = 5 * 4 + 2;
+
 /// Writer of a stream of clouds: complete binary PLY files, one a frame, that follow each other.
 ///
 /// Each has `x y z` (camera's frame, metre), `intensity`, `sigma` and `flags` of the pixels that have a point, and its time
@@ -37,10 +40,13 @@ impl<W: Write> PlyStream<W> {
             }
             count += 1;
             let [x, y, z] = point.map(|value| value as f32);
-            for value in [x, y, z, planes[0][index], planes[1][index]] {
-                self.bytes.extend(value.to_le_bytes());
+            let values = [x, y, z, planes[0][index], planes[1][index]];
+            let mut record = [0; RECORD];
+            for (bytes, value) in record.chunks_exact_mut(4).zip(values) {
+                bytes.copy_from_slice(&value.to_le_bytes());
             }
-            self.bytes.extend(flags.bits().to_le_bytes());
+            record[RECORD - 2..].copy_from_slice(&flags.bits().to_le_bytes());
+            self.bytes.extend_from_slice(&record);
         }
         self.header.clear();
         // Writing to a string can't fail.

@@ -12,8 +12,9 @@ use crate::requests::calibration::targets_arguments::TargetsArguments;
 use crate::requests::clouds::fuse_arguments::FuseArguments;
 use crate::requests::clouds::measure_arguments::MeasureArguments;
 use crate::requests::compare_arguments::CompareArguments;
-use crate::requests::explain_arguments::ExplainArguments;
 use crate::requests::fixed_pattern_arguments::FixedPatternArguments;
+use crate::requests::frames::explain_arguments::ExplainArguments;
+use crate::requests::frames::live_arguments::LiveArguments;
 use crate::requests::noise_arguments::NoiseArguments;
 use crate::requests::orient_arguments::OrientArguments;
 use crate::requests::register_arguments::RegisterArguments;
@@ -114,6 +115,9 @@ pub(crate) enum Command {
     Diff(DiffArguments),
     /// Tell what each correction did to one pixel's range, in millimetres, and what its flags mean.
     Explain(ExplainArguments),
+    /// Take frames as they come, from a pipe, a socket, a folder that fills or a recording, to clouds, a status line and a page in the
+    /// browser. What comes faster than it is processed is dropped frame by frame, and counted.
+    Live(Box<LiveArguments>),
     /// Fuse the frames of a result into one cloud without double walls, each point with its standard deviation from all sources.
     Fuse(FuseArguments),
     /// Measure lengths, angles, radii, flatness and volumes between named regions of a result's cloud, each with its standard

@@ -4,6 +4,7 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+use live_tasks::{LiveRequest, PlyTarget};
 use pipeline::commands::Inputs;
 use pipeline::{Judged, Plan, RunRequest, SimulateSource, Verdict};
 
@@ -77,6 +78,7 @@ pub(crate) fn dispatch(command: Command, output: &Output) -> Outcome {
         Command::Fuse(arguments) => {
             output.result(&cloud_tasks::fuse(&arguments.request(), output.progress().as_ref())?)
         }
+        Command::Live(arguments) => live(&arguments.request(), output),
         Command::Measure(arguments) => {
             output.result(&cloud_tasks::measure(&arguments.request(), output.progress().as_ref())?)
         }
@@ -121,6 +123,14 @@ fn run(
     let request = RunRequest { plan, plan_path: pipeline.to_owned(), survey, calibration, out };
     let summary = calibration_tasks::run(&request, output.progress().as_ref())?;
     output.result(&summary)
+}
+
+fn live(request: &LiveRequest, output: &Output) -> Outcome {
+    let mut line = output.status_line();
+    let live = live_tasks::live(request, &mut line);
+    line.clear();
+    // Where clouds go to standard output, nothing else does.
+    if request.ply == Some(PlyTarget::StandardOutput) { output.result_aside(&live?) } else { output.result(&live?) }
 }
 
 fn default_out(name: &Path) -> PathBuf {

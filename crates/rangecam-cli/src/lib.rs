@@ -7,6 +7,7 @@ mod escape;
 mod exit;
 mod output;
 mod requests;
+mod status_line;
 
 use std::ffi::OsString;
 use std::process::ExitCode;

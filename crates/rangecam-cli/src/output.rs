@@ -10,6 +10,7 @@ use serde::Serialize;
 
 use crate::arguments::Arguments;
 use crate::bar::Bar;
+use crate::status_line::StatusLine;
 use crate::{escape, exit};
 
 /// How the user wants to be spoken to.
@@ -54,6 +55,27 @@ impl Output {
             Voice::Quiet => {}
         }
         Ok(exit::of_verdict(result.verdict()))
+    }
+
+    /// As [`Self::result`], on standard error: standard output is taken.
+    pub(crate) fn result_aside<T: Serialize + Display + Judged>(&self, result: &T) -> Result<ExitCode, Box<dyn Error>> {
+        let words = match self.voice {
+            Voice::Words => escape::words(&result.to_string()).into_owned(),
+            Voice::Json => escape::json(&serde_json::to_string_pretty(result)?).into_owned(),
+            Voice::Quiet => return Ok(exit::of_verdict(result.verdict())),
+        };
+        // A reader that has closed standard error wants no more words.
+        let _ = writeln!(std::io::stderr(), "{words}");
+        Ok(exit::of_verdict(result.verdict()))
+    }
+
+    /// The line that tells how a stream stands.
+    pub(crate) fn status_line(&self) -> StatusLine {
+        match self.voice {
+            Voice::Words => StatusLine::on_terminal(),
+            Voice::Json => StatusLine::page_only(),
+            Voice::Quiet => StatusLine::silent(),
+        }
     }
 
     /// What a step on the way to the result has to say, where words are wanted.

@@ -66,8 +66,8 @@ fn cases() -> Vec<Case> {
     ]
 }
 
-/// Commands that write nothing.
-const READERS: [&str; 4] = ["inspect", "explain", "diff", "check"];
+/// Commands that write nothing; `live` where it is not told to by `--ply`, which is tried by itself.
+const READERS: [&str; 5] = ["inspect", "explain", "diff", "check", "live"];
 
 fn fixtures() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fixtures")
@@ -203,6 +203,30 @@ fn no_command_writes_where_it_reads() {
     }
 }
 
+/// A stream of clouds is one file, which may not be, or lie in, what is read either.
+#[test]
+fn live_writes_no_clouds_where_it_reads() {
+    let world = world();
+    let root = world.path();
+    fs::create_dir(root.join("filling")).unwrap();
+    fs::write(root.join("filling/end"), "").unwrap();
+    let inputs = ["survey", "cal/c.ron", "filling", "filling/end", "survey/survey.ron"];
+    #[cfg(unix)]
+    for input in inputs {
+        let name = Path::new(input).file_name().unwrap().to_str().unwrap();
+        let _ = std::os::unix::fs::symlink(root.join(input), root.join(format!("link_to_{name}")));
+    }
+    let before = everything(root);
+    for (source, read) in [("survey", &inputs[..2]), ("filling", &inputs)] {
+        for out in read.iter().flat_map(|input| hostile(root, input)) {
+            let refused = rangecam(root, &["live", source, "-s", "survey", "-c", "cal/c.ron", "--fast", "--ply", &out]);
+            let told = format!("{source}, --ply {out}: {}", String::from_utf8_lossy(&refused.stderr));
+            assert_eq!(refused.status.code(), Some(2), "{told}");
+        }
+        assert!(everything(root) == before, "live {source} changed something");
+    }
+}
+
 /// What each command reads is as it was, where it works and where it fails, and where it writes nothing.
 #[test]
 fn no_command_changes_what_it_reads() {
@@ -221,6 +245,7 @@ fn no_command_changes_what_it_reads() {
         "explain survey --frame 0 --pixel 3,3",
         "diff cal/c.ron survey/calibration.ron",
         "check survey -c cal/c.ron",
+        "live survey -c cal/c.ron --fast --frames 2",
     ] {
         let line: Vec<&str> = line.split(' ').collect();
         rangecam(root, &line);

@@ -11,6 +11,7 @@ mod from_a_room_to_lengths;
 mod from_boards_to_a_room;
 mod hostile;
 mod inputs_are_kept;
+mod live;
 mod noise;
 mod pictures;
 mod register;

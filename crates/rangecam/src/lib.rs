@@ -139,6 +139,9 @@ pub mod application {
     #[cfg(feature = "live-frames")]
     #[doc(inline)]
     pub use live_frames;
+    #[cfg(feature = "live-tasks")]
+    #[doc(inline)]
+    pub use live_tasks;
     #[cfg(feature = "orientation-tasks")]
     #[doc(inline)]
     pub use orientation_tasks;

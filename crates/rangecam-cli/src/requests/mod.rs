@@ -3,8 +3,8 @@
 pub(crate) mod calibration;
 pub(crate) mod clouds;
 pub(crate) mod compare_arguments;
-pub(crate) mod explain_arguments;
 pub(crate) mod fixed_pattern_arguments;
+pub(crate) mod frames;
 pub(crate) mod noise_arguments;
 pub(crate) mod orient_arguments;
 pub(crate) mod register_arguments;

@@ -1,0 +1,17 @@
+//! A stream of frames, from its source to clouds, a status and a page.
+
+mod drift;
+mod feed;
+mod latency;
+mod request;
+mod session;
+mod setup;
+mod summary;
+mod tally;
+
+pub use drift::{DriftReport, DriftVerdict};
+pub use latency::LatencySummary;
+pub use request::{LiveRequest, LiveWatch, PlyTarget};
+pub use session::{live, live_from};
+pub use summary::{Ended, LiveStatus, LiveSummary};
+pub use tally::RefusedFrames;

@@ -1,0 +1,73 @@
+use std::net::SocketAddr;
+use std::path::PathBuf;
+
+use live_frames::DriftStage;
+
+use super::summary::LiveStatus;
+use crate::sources::LiveSource;
+
+/// Which frames to process, of which camera, and what to do with them.
+#[derive(Debug, Clone)]
+pub struct LiveRequest {
+    /// Where frames come from.
+    pub source: LiveSource,
+    /// Survey whose `survey.ron` tells the camera; `None`: the recording's own.
+    pub survey: Option<PathBuf>,
+    /// The calibration; `None`: the one beside that `survey.ron`, if there is one.
+    pub calibration: Option<PathBuf>,
+    /// Where clouds go.
+    pub ply: Option<PlyTarget>,
+    /// Frames after which it ends; `None`: it ends with the source.
+    pub frames: Option<u64>,
+    /// Whether a recording is played without waiting. Then no frame is dropped, whatever the source: it has to wait.
+    pub every_frame: bool,
+    /// Amplitude below which pixels are flagged, in the samples' unit.
+    pub low_amplitude: Option<f64>,
+    /// No range is longer, metre.
+    pub maximum_range_m: Option<f64>,
+    /// When the camera was switched on, on the clock of the frames; `None`: as the survey states it.
+    pub power_on_s: Option<f64>,
+    /// Whether a calibrated drift is taken off.
+    pub drift: DriftStage,
+    /// Port of the page on this machine; 0: any that is free.
+    pub view: Option<u16>,
+}
+
+impl LiveRequest {
+    /// A request that processes the frames of a source and nothing else.
+    pub fn new(source: LiveSource) -> Self {
+        Self {
+            source,
+            survey: None,
+            calibration: None,
+            ply: None,
+            frames: None,
+            every_frame: false,
+            low_amplitude: None,
+            maximum_range_m: None,
+            power_on_s: None,
+            drift: DriftStage::Apply,
+            view: None,
+        }
+    }
+}
+
+/// Where a stream of clouds goes.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum PlyTarget {
+    /// Standard output.
+    StandardOutput,
+    /// A file, which has its name when the stream has ended.
+    File(PathBuf),
+}
+
+/// Who watches a stream.
+pub trait LiveWatch {
+    /// The page is at this address.
+    fn page(&mut self, _address: SocketAddr) {}
+    /// How it stands, once a second.
+    fn status(&mut self, _status: &LiveStatus) {}
+}
+
+/// Nobody watches.
+impl LiveWatch for () {}

@@ -1,0 +1,4 @@
+//! Arguments of what works on frames as a camera delivers them.
+
+pub(crate) mod explain_arguments;
+pub(crate) mod live_arguments;

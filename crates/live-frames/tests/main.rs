@@ -7,7 +7,7 @@ mod common;
 mod exchange;
 mod latest;
 mod memory;
-#[allow(dead_code)] // scenes that phases are unwrapped of
+// Scenes that phases are unwrapped of.
 #[path = "../../phase-unwrap/tests/common/mod.rs"]
 mod moving_scene;
 mod refusals;

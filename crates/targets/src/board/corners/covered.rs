@@ -60,6 +60,27 @@ impl Places {
     }
 }
 
+/// Largest residual of a window in deviations, of single pixels and of means of nine, over what half of all windows have at most if
+/// nothing but noise disturbs them: about one, and more where real edges differ from the model.
+pub(super) fn excess(problem: &Problem<'_>, fit: &Fitted, sigma: f64) -> f64 {
+    let places = Places::new(problem.pixels);
+    let kept = vec![true; problem.pixels.len()];
+    let worst = sizes(problem, &places, fit, &kept, sigma).into_iter().fold(0.0, f64::max);
+    let tests = 4.0 * problem.pixels.len() as f64;
+    worst / Distribution::Normal.quantile(0.5_f64.powf(1.0 / tests))
+}
+
+/// Residuals of the pixels that are kept in deviations: each by itself, or as the mean of nine about it, whichever is larger.
+fn sizes(problem: &Problem<'_>, places: &Places, fit: &Fitted, kept: &[bool], sigma: f64) -> Vec<f64> {
+    let residuals = problem.residuals(fit);
+    let size = |k: usize| {
+        let about = places.about(place(&problem.pixels[k]), 1).filter(|&other| kept[other]);
+        let (sum, count) = about.fold((0.0, 0.0_f64), |(sum, count), other| (sum + residuals[other], count + 1.0));
+        residuals[k].abs().max((sum / count.sqrt()).abs()) / sigma
+    };
+    (0..kept.len()).map(|k| if kept[k] { size(k) } else { 0.0 }).collect()
+}
+
 /// The corner fitted to what nothing covers, from the fit to all pixels of a window; `None` where too little is left or no part of it
 /// agrees. `sigma`: deviation of a residual that nothing disturbs. The fit itself where nothing is covered.
 pub(super) fn without_covered(
@@ -76,13 +97,7 @@ pub(super) fn without_covered(
     let mut kept = vec![true; problem.pixels.len()];
     let mut fit = whole;
     for _ in 0..MOST_ROUNDS {
-        let residuals = problem.residuals(&fit);
-        let size = |k: usize| {
-            let about = places.about(place(&problem.pixels[k]), 1).filter(|&other| kept[other]);
-            let (sum, count) = about.fold((0.0, 0.0_f64), |(sum, count), other| (sum + residuals[other], count + 1.0));
-            residuals[k].abs().max((sum / count.sqrt()).abs()) / sigma
-        };
-        let sizes: Vec<f64> = (0..kept.len()).map(|k| if kept[k] { size(k) } else { 0.0 }).collect();
+        let sizes = sizes(problem, &places, &fit, &kept, sigma);
         let worst = sizes.iter().copied().fold(0.0, f64::max);
         if worst <= limit {
             return Some(fit);

@@ -29,8 +29,11 @@ pub(super) fn request(message: impl Into<String>) -> Error {
 impl Setup {
     pub(super) fn new(asked: &LiveRequest) -> Result<Self> {
         let survey_path = asked.survey.as_deref().or(asked.source.recording()).ok_or_else(|| {
-            let words = "does not say which camera its frames are of: name a folder with its survey.ron by --survey";
-            request(format!("{} {words}", asked.source))
+            let words = match &asked.source {
+                LiveSource::Path(path) if !path.exists() => "there is no such file or folder",
+                _ => "does not say which camera its frames are of: name a folder with its survey.ron by --survey",
+            };
+            request(format!("{}: {words}", asked.source))
         })?;
         let survey = Survey::read(survey_path)?;
         let beside = Some(root_of(survey_path).join(Calibration::FILE_NAME)).filter(|file| file.is_file());

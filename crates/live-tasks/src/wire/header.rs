@@ -144,12 +144,7 @@ impl FrameHeader {
         let fields = Fields { bytes, position };
         let magic: [u8; 4] = fields.take(0);
         if magic != MAGIC {
-            return Err(fields.wrong(
-                0,
-                "the head of a frame",
-                format!("{:?}", magic.escape_ascii().to_string()),
-                "\"RCLF\"",
-            ));
+            return Err(fields.wrong(0, "the head of a frame", format!("\"{}\"", magic.escape_ascii()), "\"RCLF\""));
         }
         let short = |at| u64::from(u16::from_le_bytes(fields.take(at)));
         let long = |at| u64::from(u32::from_le_bytes(fields.take(at)));

@@ -14,6 +14,8 @@ use crate::shell::{Outcome, root};
 
 /// A file of source code holds one idea; beyond this it holds several.
 const LONGEST_FILE: usize = 400;
+/// Bytes of a file: fixtures are small and made by the simulator, and the largest file that belongs here has a tenth of this.
+const LARGEST_FILE: u64 = 1_000_000;
 
 pub(crate) fn run() -> Outcome {
     println!("── tidy");
@@ -26,10 +28,13 @@ pub(crate) fn run() -> Outcome {
         complaints.extend(tests_left_out(folder)?);
         complaints.extend(house::complaints(folder)?);
     }
-    let sources = files_below(&root, &["rs", "md"])?;
+    let files = files_below(&root)?;
+    complaints.extend(files.iter().filter_map(|path| too_large(&root, path)));
+    let is_source = |path: &&PathBuf| path.extension().is_some_and(|ending| ending == "rs" || ending == "md");
+    let sources: Vec<&PathBuf> = files.iter().filter(is_source).collect();
     let keys = bibliography_keys(&read(&root.join("docs/bibliography.md"))?);
     let mut texts = Vec::new();
-    for path in &sources {
+    for path in sources {
         let text = read(path)?;
         let shown = path.strip_prefix(&root).unwrap_or(path).display().to_string();
         complaints.extend(
@@ -104,19 +109,26 @@ pub(crate) fn folders(parent: &Path) -> Result<Vec<PathBuf>, String> {
     Ok(found)
 }
 
-/// Files with one of the endings, leaving out what is built or hidden.
-fn files_below(folder: &Path, endings: &[&str]) -> Result<Vec<PathBuf>, String> {
+/// All files, leaving out what is built or hidden.
+fn files_below(folder: &Path) -> Result<Vec<PathBuf>, String> {
     let mut found = Vec::new();
     for path in entries(folder)? {
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        if path.is_dir() && !name.starts_with('.') && name != "target" && name != "out" {
-            found.extend(files_below(&path, endings)?);
-        } else if path.extension().is_some_and(|ending| endings.iter().any(|known| ending == *known)) {
+        if !path.is_dir() {
             found.push(path);
+        } else if !name.starts_with('.') && name != "target" && name != "out" {
+            found.extend(files_below(&path)?);
         }
     }
     found.sort();
     Ok(found)
+}
+
+/// A file that is larger than anything that belongs here, as one that was only laid down in the folder.
+fn too_large(root: &Path, path: &Path) -> Option<String> {
+    let bytes = path.metadata().map_or(0, |found| found.len());
+    let shown = path.strip_prefix(root).unwrap_or(path).display();
+    (bytes > LARGEST_FILE).then(|| format!("{shown}: {bytes} bytes, at most {LARGEST_FILE}: does it belong here?"))
 }
 
 fn entries(folder: &Path) -> Result<Vec<PathBuf>, String> {

@@ -25,7 +25,7 @@ enum Task {
     Pipeline(pipeline_task::Arguments),
     /// Write the surveys of fixtures/surveys that are simulated from fixtures/networks.
     Fixtures,
-    /// Everything that must be green: format, lints, documentation, tests, the small room.
+    /// Everything that must be green: format, lints, tests, the small room.
     Test,
     /// Check the repository itself: READMEs, citations, lengths of files.
     Tidy,
@@ -39,7 +39,7 @@ enum Task {
     Sensitivity(verify::sensitivity::Arguments),
     /// Damaged files of every format against the readers, for some seconds.
     Fuzz(verify::fuzz::Arguments),
-    /// An hour of damaged files, property tests with fresh cases, the long statistics, and cargo deny.
+    /// An hour of damaged files, property tests with fresh cases, documentation, the long statistics, and cargo deny.
     Nightly(verify::nightly::Arguments),
     /// Run the benchmarks of all crates, or of those named; keep a run, or compare with one.
     Bench(bench::Arguments),

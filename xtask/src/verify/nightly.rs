@@ -1,5 +1,5 @@
 //! `cargo xtask nightly [MINUTES]`: what takes too long or needs chance: damaged files with a fresh seed, property tests
-//! with fresh cases, `adjust` without its default features, each crate alone, the long statistics, the oldest compiler that is promised and
+//! with fresh cases, `adjust` without its default features, links of the documentation, each crate alone, the long statistics, the oldest compiler that is promised and
 //! `cargo deny` where they are installed.
 
 use std::process::Command;
@@ -7,6 +7,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use crate::alone;
 use crate::shell::{Outcome, cargo, root};
+use crate::test;
 use crate::tidy::dependencies;
 use crate::verify::{self, fuzz};
 
@@ -29,6 +30,7 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome {
         fuzz::run(&fuzz::Arguments { seconds: 60 * arguments.minutes, seed: Some(seed), target: None }),
         cargo(&["test", "--workspace", "--all-features"], &[("PROPTEST_RNG_SEED", &seed.to_string())]),
         cargo(&["test", "-p", "dense-matrices", "-p", "adjust", "--no-default-features"], &[]),
+        test::documentation(),
         alone::run(),
         verify::run(&verify::Arguments::all()),
         oldest_compiler(),

@@ -78,7 +78,11 @@ pub(crate) struct Brightness {
     /// `[segment][label]`: costs that do not depend on the constant.
     fixed: Vec<f32>,
     weight: Vec<f32>,
-    pixel: Vec<Vec<u32>>,
+    /// Sampled pixels, segment after segment, and where those of each begin.
+    pixel: Vec<u32>,
+    first: Vec<u32>,
+    /// For each segment: pixels to pass over until the next sample, and its place.
+    wait: Vec<[u32; 2]>,
     scratch: Vec<f32>,
 }
 
@@ -107,19 +111,31 @@ impl Brightness {
     }
 
     fn sample(&mut self, forest: &Forest, pixels: &[u32]) {
-        self.pixel.iter_mut().for_each(Vec::clear);
-        self.pixel.resize(pixels.len(), Vec::new());
-        // Pixels to pass over until the next sample.
-        let mut wait = vec![0_u32; pixels.len()];
+        let stride = |pixels: u32| pixels.div_ceil(SAMPLES).max(1);
+        self.first.clear();
+        self.wait.clear();
+        let mut end = 0;
+        for &pixels in pixels {
+            self.first.push(end);
+            self.wait.push([0, end]);
+            end += pixels.div_ceil(stride(pixels));
+        }
+        self.first.push(end);
+        self.pixel.clear();
+        self.pixel.resize(end as usize, 0);
         for (pixel, &label) in forest.label.iter().enumerate() {
-            let Some(wait) = wait.get_mut(label as usize) else { continue };
+            let Some([wait, place]) = self.wait.get_mut(label as usize) else { continue };
             if *wait == 0 {
-                let segment = label as usize;
-                self.pixel[segment].push(pixel as u32);
-                *wait = pixels[segment].div_ceil(SAMPLES);
+                self.pixel[*place as usize] = pixel as u32;
+                (*wait, *place) = (stride(pixels[label as usize]), *place + 1);
             }
             *wait -= 1;
         }
+    }
+
+    /// Where the samples of a segment stand.
+    fn samples(&self, segment: usize) -> std::ops::Range<usize> {
+        self.first[segment] as usize..self.first[segment + 1] as usize
     }
 
     fn measure_label(
@@ -133,7 +149,8 @@ impl Brightness {
     ) {
         self.scratch.clear();
         let mut outside = 0.0;
-        for &pixel in &self.pixel[segment] {
+        let samples = self.samples(segment);
+        for &pixel in &self.pixel[samples.clone()] {
             let pixel = pixel as usize;
             let count = forest.wraps[pixel] + label;
             if !(0..=maximum).contains(&count) {
@@ -154,7 +171,7 @@ impl Brightness {
             let at = (2 * q + 1) * n / (2 * QUANTILES);
             self.quantiles.push(self.scratch.get(at).copied().unwrap_or(f32::NAN));
         }
-        let share = outside / self.pixel[segment].len().max(1) as f32;
+        let share = outside / samples.len().max(1) as f32;
         self.fixed.push(self.weight[segment].max(1.0) * OUT_OF_SPAN * (share / OUT_OF_SPAN_SHARE).min(1.0));
     }
 
@@ -187,18 +204,18 @@ impl Brightness {
         }
     }
 
-    /// The cost of each label of each segment, nats, for a logarithm of the constant.
-    pub fn costs(&self, log_constant: f32, albedo: &AlbedoPrior, costs: &mut Vec<f32>) {
-        costs.clear();
-        for (index, quantiles) in self.quantiles.chunks_exact(QUANTILES).enumerate() {
-            let weight = self.weight[index / self.labels];
+    /// Appends the cost of each label of a segment, nats, for a logarithm of the constant.
+    pub fn add_costs_of(&self, segment: usize, log_constant: f32, albedo: &AlbedoPrior, costs: &mut Vec<f32>) {
+        let (weight, at) = (self.weight[segment], segment * self.labels..(segment + 1) * self.labels);
+        let quantiles = self.quantiles[QUANTILES * at.start..QUANTILES * at.end].chunks_exact(QUANTILES);
+        for (label, (quantiles, fixed)) in quantiles.zip(&self.fixed[at]).enumerate() {
             let mean = quantiles.iter().map(|q| deviation_cost(q - log_constant, albedo)).sum::<f32>();
-            let nearness = NEARNESS * (index % self.labels) as f32;
+            let nearness = NEARNESS * label as f32;
             // A wrong count bends the brightness of a slanted surface, whatever its albedo.
             let spread = (quantiles[QUANTILES - 1] - quantiles[0]).min(LARGEST_SPREAD);
             // Without amplitudes there is no opinion.
             let mean = if mean.is_nan() { 0.0 } else { mean / QUANTILES as f32 + nearness + spread };
-            costs.push(weight * mean + self.fixed[index]);
+            costs.push(weight * mean + fixed);
         }
     }
 

@@ -79,7 +79,10 @@ impl Offsets {
         let draws = if options.geometry.is_some() { SCENE_DRAWS_WITH_RAYS } else { SCENE_DRAWS };
         self.weigh_candidates(brightness, best.0, draws);
         self.measure_margins(brightness.labels);
-        brightness.costs(best.1, &options.albedo, &mut self.costs);
+        self.costs.clear();
+        for segment in 0..pixels.len() {
+            brightness.add_costs_of(segment, best.1, &options.albedo, &mut self.costs);
+        }
         self.lead_followers(ties, brightness.labels);
     }
 
@@ -102,11 +105,10 @@ impl Offsets {
     }
 
     fn solve(&mut self, brightness: &Brightness, log_constant: f32, options: &SpatialOptions, sweeps: usize) -> f32 {
-        brightness.costs(log_constant, &options.albedo, &mut self.costs);
+        // Those of the followers, most of the segments, are asked for at the best constant only.
         self.witness_costs.clear();
         for &segment in &self.witnesses {
-            let first = segment as usize * brightness.labels;
-            self.witness_costs.extend_from_slice(&self.costs[first..first + brightness.labels]);
+            brightness.add_costs_of(segment as usize, log_constant, &options.albedo, &mut self.witness_costs);
         }
         self.labelling.solve(&self.witness_costs, sweeps)
     }

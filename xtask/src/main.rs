@@ -12,6 +12,7 @@ mod shell;
 mod test;
 mod tidy;
 mod verify;
+mod workflow;
 
 use std::process::ExitCode;
 
@@ -43,6 +44,8 @@ enum Task {
     Nightly(verify::nightly::Arguments),
     /// Run the benchmarks of all crates, or of those named; keep a run, or compare with one.
     Bench(bench::Arguments),
+    /// The workflow of forty recordings with Snakemake, here and under Slurm, with jobs and controllers killed, byte for byte.
+    Workflow(workflow::Arguments),
     /// Run statistics and write their tables into docs/benchmarks.md.
     Benchmarks(benchmarks::Arguments),
 }
@@ -60,6 +63,7 @@ fn main() -> ExitCode {
         Task::Fuzz(arguments) => verify::fuzz::run(&arguments),
         Task::Nightly(arguments) => verify::nightly::run(&arguments),
         Task::Bench(arguments) => bench::run(&arguments),
+        Task::Workflow(arguments) => workflow::run(&arguments),
         Task::Benchmarks(arguments) => benchmarks::run(&arguments),
     };
     match outcome {

@@ -53,7 +53,7 @@ fn work(asked: &MeasureRequest, destination: &Destination, progress: &dyn Progre
         progress.advance(1);
     }
     progress.finish();
-    summary.seconds = clock.elapsed().as_secs_f64();
+    summary.seconds = commands::made::seconds_since(clock);
     let refused = summary.lengths.iter().filter_map(|length| Some((&length.name, length.refused.as_ref()?)));
     if refused.clone().count() == summary.lengths.len() {
         let first = refused.map(|(name, reason)| format!("`{name}`: {reason}")).next().unwrap_or_default();

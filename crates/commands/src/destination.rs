@@ -9,20 +9,25 @@ use range_io::calibration::Calibration;
 use range_io::survey::Survey;
 use serde::Serialize;
 
+use crate::made::{self, Made};
 use crate::verdict::Failure;
-use crate::{Error, Result};
+use crate::{Error, InputDigest, Result};
 
 /// What a command reads, which its output must leave alone.
 #[derive(Debug, Clone, Default)]
 #[must_use]
-pub struct Inputs(BTreeSet<PathBuf>);
+pub struct Inputs {
+    paths: BTreeSet<PathBuf>,
+    /// Files in them that are not read.
+    not_read: BTreeSet<PathBuf>,
+}
 
 impl Inputs {
     /// A survey: its folder with the calibration in it, and what it names outside of it.
     pub fn survey(mut self, path: &Path) -> Self {
         // Of what is not there the command itself says so; its parent is not read.
         let root = if path.exists() { root_of(path) } else { path.to_owned() };
-        self.0.insert(root.join(Calibration::FILE_NAME));
+        self.paths.insert(root.join(Calibration::FILE_NAME));
         // Of what can't be read the command itself says why.
         if let Ok(survey) = Survey::read(path) {
             let frames = survey.frames.iter().map(|frame| &frame.file);
@@ -31,18 +36,18 @@ impl Inputs {
                 let leads_up = file.components().any(|part| part == Component::ParentDir);
                 // A folder in the survey may be a link to another place.
                 let input = if leads_up { Some(file.as_path()) } else { file.parent() };
-                if let Some(input) = input.filter(|input| !self.0.contains(*input)) {
-                    self.0.insert(input.to_owned());
+                if let Some(input) = input.filter(|input| !self.paths.contains(*input)) {
+                    self.paths.insert(input.to_owned());
                 }
             }
         }
-        self.0.insert(root);
+        self.paths.insert(root);
         self
     }
 
     /// A file or folder.
     pub fn path(mut self, path: impl AsRef<Path>) -> Self {
-        self.0.insert(path.as_ref().to_owned());
+        self.paths.insert(path.as_ref().to_owned());
         self
     }
 
@@ -51,10 +56,40 @@ impl Inputs {
         path.into_iter().fold(self, Self::path)
     }
 
+    /// Files in all of this that this part of the work does not read; the output must leave them alone all the same.
+    pub fn not_read(mut self, files: impl IntoIterator<Item = PathBuf>) -> Self {
+        self.not_read.extend(files);
+        self
+    }
+
+    /// Digests of all files that are read, in the order of their names; hidden ones are not.
+    pub fn digests(&self) -> Result<Vec<InputDigest>> {
+        let mut files = BTreeSet::new();
+        for path in &self.paths {
+            add_files(path, &mut files);
+        }
+        made::digests(files.difference(&self.not_read).map(PathBuf::as_path))
+    }
+
     /// The place `out`, if it leaves all of this alone.
     pub fn destination(&self, out: &Path) -> Result<Destination> {
-        let inputs: Vec<&PathBuf> = self.0.iter().collect();
+        let inputs: Vec<&PathBuf> = self.paths.iter().collect();
         Ok(Destination::new(out, &inputs)?)
+    }
+}
+
+/// The file, or the files in a folder and its folders. What is not there, or can't be read, the command itself tells.
+fn add_files(path: &Path, files: &mut BTreeSet<PathBuf>) {
+    if path.is_file() {
+        files.insert(path.to_owned());
+    }
+    for entry in std::fs::read_dir(path).into_iter().flatten().flatten() {
+        let hidden = entry.file_name().to_string_lossy().starts_with('.');
+        // A link to a folder might lead in a circle; one that is named is followed.
+        let link_to_folder = entry.file_type().is_ok_and(|kind| kind.is_symlink()) && entry.path().is_dir();
+        if !hidden && !link_to_folder {
+            add_files(&entry.path(), files);
+        }
     }
 }
 
@@ -81,10 +116,26 @@ const SUMMARY: &str = "summary.json";
 
 /// Does a command's work, which writes its results to the destination that it is given. What the data refuse is written
 /// there too: as `summary.json` and nothing else, or as `refused.json` beside an older result.
+///
+/// # Errors
+/// [`Error::AlreadyDone`] where the caller wants outputs left alone that were made from the same; those of the work.
 pub fn produce<T>(out: &Path, inputs: &Inputs, work: impl FnOnce(&Destination) -> Result<T>) -> Result<T> {
     let destination = inputs.destination(out)?;
-    match work(&destination) {
-        Err(error) if error.failure() == Failure::Refused => Err(write_refusal(&destination, error)?),
+    let made = made::options().map(|options| Ok::<_, Error>(Made::new(options, &inputs.digests()?))).transpose()?;
+    produce_made(&destination, made, work)
+}
+
+/// [`produce`] with a record of its own, `None` for none.
+pub fn produce_made<T>(
+    destination: &Destination,
+    made: Option<Made>,
+    work: impl FnOnce(&Destination) -> Result<T>,
+) -> Result<T> {
+    if made::is_done(destination, made.as_ref()) {
+        return Err(Error::AlreadyDone { out: destination.named().to_owned() });
+    }
+    match made::recorded(made, || work(destination)) {
+        Err(error) if error.failure() == Failure::Refused => Err(write_refusal(destination, error)?),
         done => done,
     }
 }
@@ -110,10 +161,21 @@ fn write_refusal(destination: &Destination, error: Error) -> Result<Error> {
     Ok(Error::Refused { summary, source, written })
 }
 
-/// The text of a `summary.json`.
+/// A summary with the record of what it was made from.
+#[derive(Serialize)]
+struct Recorded<'a, S> {
+    #[serde(flatten)]
+    summary: &'a S,
+    made: Made,
+}
+
+/// The text of a `summary.json`, with the record `made` where there is one.
 pub fn json(summary: &impl Serialize) -> Result<String> {
-    serde_json::to_string_pretty(summary)
-        .map_err(|error| Error::Figure { figure: SUMMARY.to_owned(), message: error.to_string() })
+    let text = match made::current() {
+        Some(made) => serde_json::to_string_pretty(&Recorded { summary, made }),
+        None => serde_json::to_string_pretty(summary),
+    };
+    text.map_err(|error| Error::Figure { figure: SUMMARY.to_owned(), message: error.to_string() })
 }
 
 impl fmt::Display for RefusalFile {

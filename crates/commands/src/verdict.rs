@@ -3,7 +3,7 @@
 
 use std::fmt;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// How a command that has a result ended. What failed instead is an [`Error`](enum@crate::Error) with its
 /// [`Failure`].
@@ -31,19 +31,19 @@ pub enum Failure {
 }
 
 /// One reason not to trust a result before it was looked at.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Doubt {
     /// What kind of doubt, for programs.
     pub kind: DoubtKind,
     /// The station, frame, pair or file that it concerns; `None`: all of them.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub subject: Option<String>,
     /// What was seen, with its value, and what to do; one line.
     pub words: String,
 }
 
 /// Kinds of doubts.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum DoubtKind {

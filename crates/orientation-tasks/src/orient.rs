@@ -47,7 +47,7 @@ fn work(request: &OrientRequest, destination: &Destination, progress: &dyn Progr
     summary.survey = request.survey.display().to_string();
     summary.calibration.clone_from(&camera.calibration_words);
     summary.out.clone_from(&request.out);
-    summary.seconds = clock.elapsed().as_secs_f64();
+    summary.seconds = commands::made::seconds_since(clock);
     if summary.stations.is_empty() {
         let reason = match summary.not_oriented.first() {
             Some(first) => format!("no station could be oriented; {}: {}", first.station, first.reason),

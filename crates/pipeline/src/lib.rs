@@ -1,6 +1,5 @@
 #![doc = include_str!("../README.md")]
 
-mod explain;
 pub mod run;
 pub mod stages;
 pub mod stations;
@@ -16,10 +15,9 @@ pub use commands::plan::{
 pub use commands::{
     Doubt, DoubtKind, DriftError, Error, Failure, Judged, Progress, RefusalFile, Result, Silent, Verdict,
 };
-pub use explain::{ExplainRequest, Explanation, FlagReason, StageLine, StagePart, explain};
 pub use run::{
-    Calibrator, OwnCloud, PairSummary, Processed, ReferenceSummary, RegistrationSummary, RunRequest, Simulated,
-    StationTruth, Summary, TruthSummary, process, process_each, run, run_with, simulate,
+    Calibrator, OwnCloud, PairSummary, Part, PartSummary, Processed, ReferenceSummary, RegistrationSummary, RunRequest,
+    Simulated, StationTruth, Summary, TruthSummary, merge, process, process_each, run, run_part, run_with, simulate,
 };
 pub use survey::{
     AdjustmentFigures, CorrectionRecord, DriftSource, FrameRatePart, FurtherPoint, RangeTruth, RefusedStage, Snapshot,

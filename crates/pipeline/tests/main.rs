@@ -4,10 +4,10 @@
 mod ambiguous_light;
 mod bad_input;
 mod common;
-mod explain;
 mod exposures;
 mod false_flags;
 mod outside_light;
+mod parts;
 mod real_periodic;
 mod real_repeats;
 mod remaining_errors;

@@ -3,23 +3,28 @@
 use std::path::PathBuf;
 
 use clap::{Parser, Subcommand};
+use pipeline::Part;
 
 use crate::requests::calibration::calibrate_arguments::CalibrateArguments;
 use crate::requests::calibration::check_arguments::CheckArguments;
 use crate::requests::calibration::diff_arguments::DiffArguments;
 use crate::requests::calibration::plan_arguments::PlanArguments;
 use crate::requests::calibration::targets_arguments::TargetsArguments;
+use crate::requests::clouds::compare_arguments::CompareArguments;
 use crate::requests::clouds::fuse_arguments::FuseArguments;
 use crate::requests::clouds::measure_arguments::MeasureArguments;
-use crate::requests::compare_arguments::CompareArguments;
 use crate::requests::fixed_pattern_arguments::FixedPatternArguments;
+use crate::requests::fleet::fleet_arguments::FleetArguments;
+use crate::requests::fleet::merge_arguments::MergeArguments;
+use crate::requests::fleet::part::part;
+use crate::requests::fleet::workflow_arguments::WorkflowArguments;
 use crate::requests::frames::explain_arguments::ExplainArguments;
 use crate::requests::frames::live_arguments::LiveArguments;
 use crate::requests::noise_arguments::NoiseArguments;
 use crate::requests::orient_arguments::OrientArguments;
 use crate::requests::register_arguments::RegisterArguments;
 use crate::requests::scattering_arguments::ScatteringArguments;
-use crate::requests::values::{not_negative, share};
+use crate::requests::values::{at_least_one, not_negative, share};
 use crate::requests::warm_up_arguments::WarmUpArguments;
 
 /// Raw frames of a range camera in, one corrected and registered cloud out.
@@ -32,6 +37,16 @@ pub(crate) struct Arguments {
     /// The result as JSON on standard output, nothing else there.
     #[arg(long, global = true)]
     pub(crate) json: bool,
+    /// Threads that compute; default: one for each core. Results do not depend on it.
+    #[arg(long, global = true, value_name = "N", value_parser = at_least_one)]
+    pub(crate) threads: Option<usize>,
+    /// Leave an output folder as it is that was made from the same inputs, with the same options and by the same program, by their
+    /// digests.
+    #[arg(long, global = true)]
+    pub(crate) skip_done: bool,
+    /// No durations in summaries and reports, and no date on a certificate: the same input gives the same bytes.
+    #[arg(long, global = true)]
+    pub(crate) no_times: bool,
     #[command(subcommand)]
     pub(crate) command: Command,
 }
@@ -48,10 +63,20 @@ pub(crate) enum Command {
         /// calibration.ron; default: the one beside survey.ron, if there is one.
         #[arg(long, short)]
         calibration: Option<PathBuf>,
+        /// Process this part of the stations alone (of the frames, where nothing averages them): 1/8 to 8/8, made whole by
+        /// `rangecam merge`.
+        #[arg(long, value_name = "I/N", value_parser = part)]
+        shard: Option<Part>,
         /// Output folder; default: out/<name of the pipeline>.
         #[arg(long, short)]
         out: Option<PathBuf>,
     },
+    /// Make the result of a run of all its parts, as one run would have written it.
+    Merge(MergeArguments),
+    /// Write a workflow for an archive of many recordings: what Snakemake runs on this machine, a cluster or a cloud.
+    Workflow(WorkflowArguments),
+    /// One table and one report of all that a workflow did: cameras whose calibration moved, shares of flags, failures by reason.
+    Fleet(FleetArguments),
     /// Simulate a scene and write it as a survey with its truth.
     Simulate {
         /// The scene's RON file.

@@ -5,26 +5,34 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use live_tasks::{LiveRequest, PlyTarget};
-use pipeline::commands::Inputs;
-use pipeline::{Judged, Plan, RunRequest, SimulateSource, Verdict};
+use pipeline::commands::{Inputs, made};
+use pipeline::{Judged, Part, Plan, RunRequest, SimulateSource, Verdict};
 
 use crate::arguments::Command;
 use crate::exit;
 use crate::output::Output;
 use crate::requests::calibration::calibrate_arguments::CalibrateArguments;
 use crate::requests::calibration::targets_arguments::Request as Targets;
+use crate::requests::fleet::merge_arguments::MergeArguments;
 use crate::requests::register_arguments::Request;
 
 type Outcome = Result<ExitCode, Box<dyn Error>>;
 
 /// Runs a command; what the shell sees where it does not fail.
-pub(crate) fn dispatch(command: Command, output: &Output) -> Outcome {
+pub(crate) fn dispatch(command: Command, threads: Option<usize>, output: &Output) -> Outcome {
     match command {
         Command::Diff(arguments) => output.result(&calibration_tasks::diff(&arguments.request())?),
         Command::Check(arguments) => {
             output.result(&calibration_tasks::check(&arguments.request(), output.progress().as_ref())?)
         }
-        Command::Run { survey, pipeline, calibration, out } => run(survey, &pipeline, calibration, out, output),
+        Command::Run { survey, pipeline, calibration, shard, out } => {
+            run((survey, calibration), &pipeline, shard, out, output)
+        }
+        Command::Merge(MergeArguments { parts, out }) => {
+            output.result(&pipeline::merge(&parts, &out, output.progress().as_ref())?)
+        }
+        Command::Workflow(arguments) => output.result(&workflow_tasks::write_workflow(&arguments.request(threads))?),
+        Command::Fleet(arguments) => output.result(&workflow_tasks::fleet(&arguments.request())?),
         Command::Simulate { scene, seed, position_sigma, attitude_sigma, gross_errors, out } => {
             let source = SimulateSource {
                 scene: scene.display().to_string(),
@@ -73,7 +81,7 @@ pub(crate) fn dispatch(command: Command, output: &Output) -> Outcome {
         }
         Command::Inspect { path } => output.result(&tasks::inspect(&path)?),
         Command::Explain(arguments) => {
-            output.result(&pipeline::explain(&arguments.request()?, output.progress().as_ref())?)
+            output.result(&tasks::explain(&arguments.request()?, output.progress().as_ref())?)
         }
         Command::Fuse(arguments) => {
             output.result(&cloud_tasks::fuse(&arguments.request(), output.progress().as_ref())?)
@@ -98,7 +106,7 @@ fn calibrate(mut arguments: CalibrateArguments, output: &Output) -> Outcome {
         // The calibration reads what is found, and must leave alone what that was found in.
         let inputs = Inputs::default().survey(&targets.survey).maybe(targets.calibration.as_deref());
         inputs.destination(&request.out)?;
-        let summary = target_tasks::find_targets(&targets, output.progress().as_ref())?;
+        let summary = made::anew(|| target_tasks::find_targets(&targets, output.progress().as_ref()))?;
         output.words(&summary)?;
         found = Some(summary);
     }
@@ -112,15 +120,21 @@ fn calibrate(mut arguments: CalibrateArguments, output: &Output) -> Outcome {
 }
 
 fn run(
-    survey: Option<PathBuf>,
+    (survey, calibration): (Option<PathBuf>, Option<PathBuf>),
     pipeline: &Path,
-    calibration: Option<PathBuf>,
+    shard: Option<Part>,
     out: Option<PathBuf>,
     output: &Output,
 ) -> Outcome {
     let plan = Plan::read(pipeline)?;
-    let out = out.unwrap_or_else(|| default_out(plan.name.as_ref()));
+    // Parts of one run do not write over each other.
+    let part_of = |part: Part| format!("{}-{}-of-{}", plan.name, part.number, part.of);
+    let name = shard.map_or_else(|| plan.name.clone(), part_of);
+    let out = out.unwrap_or_else(|| default_out(name.as_ref()));
     let request = RunRequest { plan, plan_path: pipeline.to_owned(), survey, calibration, out };
+    if let Some(part) = shard {
+        return output.result(&pipeline::run_part(&request, part, output.progress().as_ref())?);
+    }
     let summary = calibration_tasks::run(&request, output.progress().as_ref())?;
     output.result(&summary)
 }

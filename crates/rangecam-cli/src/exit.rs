@@ -27,6 +27,11 @@ pub(crate) fn of_verdict(verdict: Verdict) -> ExitCode {
     })
 }
 
+/// Whether the output was there already and is left as it is.
+pub(crate) fn is_done_already(error: &(dyn Error + 'static)) -> bool {
+    matches!(error.downcast_ref(), Some(pipeline::Error::AlreadyDone { .. }))
+}
+
 /// The code of a command that failed.
 pub(crate) fn of_error(error: &(dyn Error + 'static)) -> ExitCode {
     let failure = match error.downcast_ref::<pipeline::Error>() {

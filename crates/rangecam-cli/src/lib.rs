@@ -2,6 +2,7 @@
 
 mod arguments;
 mod bar;
+mod call;
 mod commands;
 mod escape;
 mod exit;
@@ -13,6 +14,7 @@ use std::ffi::OsString;
 use std::process::ExitCode;
 
 use clap::Parser;
+use pipeline::commands::made;
 
 use crate::arguments::Arguments;
 use crate::output::Output;
@@ -21,7 +23,8 @@ use crate::output::Output;
 /// 1 done but doubtful (of `diff`: the calibrations differ), 2 wrong input or usage, 3 refused by what the data show,
 /// 4 failure of the machine, 5 done in part.
 pub fn main(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
-    let arguments = match Arguments::try_parse_from(arguments) {
+    let typed: Vec<OsString> = arguments.into_iter().collect();
+    let arguments = match Arguments::try_parse_from(&typed) {
         Ok(arguments) => arguments,
         Err(error) => {
             // Help and version come this way too; clap knows which stream and which code each wants.
@@ -30,8 +33,16 @@ pub fn main(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         }
     };
     let output = Output::new(&arguments);
-    match commands::dispatch(arguments.command, &output) {
+    if let Some(threads) = arguments.threads
+        && let Err(error) = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global()
+    {
+        output.error(&error);
+        return exit::of_error(&std::io::Error::other(error));
+    }
+    let call = call::call(&typed, &arguments);
+    match made::called(call, || commands::dispatch(arguments.command, arguments.threads, &output)) {
         Ok(code) => code,
+        Err(error) if exit::is_done_already(error.as_ref()) => output.done_already(error.as_ref()),
         Err(error) => {
             output.refusal(error.as_ref());
             output.error(error.as_ref());

@@ -92,6 +92,20 @@ impl Output {
         }
     }
 
+    /// Nothing had to be done.
+    pub(crate) fn done_already(&self, words: &(dyn Error + 'static)) -> ExitCode {
+        let words = words.to_string();
+        let printed = match self.voice {
+            Voice::Words => print(&escape::words(&words)),
+            Voice::Json => print(&escape::json(&serde_json::json!({ "done_already": words }).to_string())),
+            Voice::Quiet => Ok(()),
+        };
+        match printed {
+            Ok(()) => ExitCode::SUCCESS,
+            Err(error) => exit::of_error(&error),
+        }
+    }
+
     /// Why the command failed.
     pub(crate) fn error(&self, error: &dyn Error) {
         let head = if self.colour { "\u{1b}[31merror:\u{1b}[0m" } else { "error:" };

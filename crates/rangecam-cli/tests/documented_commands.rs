@@ -114,6 +114,9 @@ fn furnished(line: &str) -> tempfile::TempDir {
         std::fs::write(at("survey/targets.csv"), format!("target,x,y,z,sigma_x,sigma_y,sigma_z\n{places}")).unwrap();
         return folder;
     }
+    if line.contains(" archive ") {
+        std::fs::create_dir_all(at("archive/north/2026-05-04/hall")).unwrap();
+    }
     for place in ["spring", "autumn", "out/calibration"] {
         std::fs::create_dir_all(at(place)).unwrap();
         std::fs::copy(at("survey/calibration.ron"), at(place).join("calibration.ron")).unwrap();

@@ -31,6 +31,10 @@ fn cases() -> Vec<Case> {
             "run survey -p plan/network.ron",
             "survey networks/n.ron plan/network.ron",
         ),
+        case("run, a part", "run survey -p plan/p.ron -c cal/c.ron --shard 1/2", "survey plan/p.ron cal/c.ron"),
+        case("merge", "merge part1 part2", "part1 part2 survey plan/p.ron cal/c.ron"),
+        case("workflow", "workflow archive -p plan/p.ron", "archive plan/p.ron"),
+        case("fleet", "fleet flow", "flow/codes flow/results"),
         case("simulate", "simulate scenes/room.ron", "scenes/room.ron"),
         case("simulate-network", "simulate-network networks/n.ron", "networks/n.ron"),
         case("calibrate", "calibrate targets -c cal/c.ron", "targets cal/c.ron"),
@@ -134,6 +138,17 @@ fn world() -> TempDir {
     for folder in ["older", "newer"] {
         copy(&at("targets"), &at(folder));
     }
+    for part in ["1", "2"] {
+        let (shard, out) = (format!("{part}/2"), format!("part{part}"));
+        let line =
+            ["run", "survey", "-p", "plan/p.ron", "-c", "cal/c.ron", "--shard", &shard, "--out", &out, "--quiet"];
+        let made = rangecam(root.path(), &line);
+        assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
+    }
+    for folder in ["archive/north/monday/hall", "flow/codes/north/monday/recordings", "flow/results"] {
+        fs::create_dir_all(at(folder)).unwrap();
+    }
+    fs::write(at("flow/codes/north/monday/recordings/hall.code"), "2").unwrap();
     root
 }
 

@@ -7,6 +7,7 @@ mod desk;
 mod documented_commands;
 mod exit_codes;
 mod explain;
+mod fleet;
 mod from_a_room_to_lengths;
 mod from_boards_to_a_room;
 mod hostile;

@@ -166,6 +166,9 @@ pub mod application {
     #[cfg(feature = "tasks")]
     #[doc(inline)]
     pub use tasks;
+    #[cfg(feature = "workflow-tasks")]
+    #[doc(inline)]
+    pub use workflow_tasks;
 }
 
 // The example of the repository's README is compiled here.

@@ -87,7 +87,7 @@ fn calibrate_into(
         Ok(outcome) => {
             let mut summary = RigSummary::new(name, file, &files, &outcome);
             summary.out.clone_from(&request.out);
-            summary.seconds = clock.elapsed().as_secs_f64();
+            summary.seconds = commands::made::seconds_since(clock);
             write(destination, &files, &outcome, &summary)?;
             Ok(summary)
         }
@@ -95,7 +95,7 @@ fn calibrate_into(
             let error = placed(error, &rig, &files);
             let mut summary = RigSummary::refused(name, error.to_string());
             summary.out.clone_from(&request.out);
-            summary.seconds = clock.elapsed().as_secs_f64();
+            summary.seconds = commands::made::seconds_since(clock);
             Err(refusal(error, &summary)?)
         }
     }

@@ -38,6 +38,11 @@ pub struct SenseVotes {
 }
 
 impl SenseVotes {
+    /// The windows in which it falls, and in which it rises: to be added to those of other frames.
+    pub fn windows(&mut self) -> [&mut usize; 2] {
+        [&mut self.falls, &mut self.rises]
+    }
+
     /// Lets the windows of a frame vote, by its lowest frequency.
     pub fn look_at(&mut self, frame: &ComplexFrame) {
         let lowest = frame.channels.iter().min_by(|a, b| {

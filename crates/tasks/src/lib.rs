@@ -1,6 +1,7 @@
 #![doc = include_str!("../README.md")]
 
 mod compare;
+mod explain;
 mod fixed_pattern;
 mod further_term;
 mod inertial_unit;
@@ -21,6 +22,7 @@ pub use self::warm_up::{
     estimate_warm_up,
 };
 pub use ::warm_up::{ChangeOptions, DriftOptions, TemperatureUse};
+pub use explain::{ExplainRequest, Explanation, FlagReason, StageLine, StagePart, explain};
 pub use fixed_pattern::{FixedPatternRequest, FixedPatternSummary, PatternWall, estimate_pattern};
 pub use inspect::{Inspection, inspect};
 pub use noise::{

@@ -6,6 +6,7 @@ mod calibration_setup;
 #[path = "../../pipeline/tests/common/mod.rs"]
 mod common;
 mod compare;
+mod explain;
 mod fixed_pattern;
 mod frame_rate;
 mod live_frames;

@@ -54,7 +54,7 @@ fn calibrate_into(
         CalibrateMethod::Surfaces => surfaces::calibrate_on_the_job(request, progress)?,
     };
     let finish = |mut summary: CalibrationSummary| {
-        summary.seconds = clock.elapsed().as_secs_f64();
+        summary.seconds = commands::made::seconds_since(clock);
         summary.out.clone_from(&request.out);
         summary
     };

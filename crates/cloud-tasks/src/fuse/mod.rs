@@ -58,7 +58,7 @@ fn work(asked: &FuseRequest, destination: &Destination, progress: &dyn Progress)
     progress.advance(1);
     let moved = usable.moved(&fused.corrections);
     summarise::finish(&mut summary, &usable, &moved, &fused);
-    summary.seconds = clock.elapsed().as_secs_f64();
+    summary.seconds = commands::made::seconds_since(clock);
     let pictures = figures::figures(&usable, &moved, &fused, options.voxel_m)?;
     progress.advance(1);
     let page = document::document(&summary, pictures);

@@ -30,6 +30,8 @@ impl Error {
             | Self::Unfit { .. }
             | Self::Request { .. }
             | Self::Name { .. }
+            // No failure; who asks all the same is told not to try again.
+            | Self::AlreadyDone { .. }
             | Self::Scene { .. }
             | Self::Compare(_)
             | Self::Diff(_)

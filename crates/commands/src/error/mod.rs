@@ -126,6 +126,12 @@ pub enum Error {
         /// The file; `None` where nothing is written.
         written: Option<RefusalFile>,
     },
+    /// The output was made from the same inputs with the same options by the same program, and is left as it is.
+    #[error("{}: made from the same inputs, options and program: left as it is", out.display())]
+    AlreadyDone {
+        /// The output folder.
+        out: PathBuf,
+    },
     /// Two things to be compared do not belong together.
     #[error("compare: {0}")]
     Compare(String),

@@ -83,7 +83,9 @@ fn merits(summary: &Summary) -> Vec<Merit> {
         add(format!("{sigma0:.2}"), "sigma0 of the stations");
     }
     add(format!("{:.1} %", 100.0 * summary.flags_fraction.get("any").copied().unwrap_or(0.0)), "pixels flagged");
-    add(format!("{:.1} s", summary.seconds), "time");
+    if summary.seconds > 0.0 {
+        add(format!("{:.1} s", summary.seconds), "time");
+    }
     merits
 }
 
@@ -94,12 +96,13 @@ fn number(length_m: Option<f64>) -> String {
 fn stages(document: &mut Document, summary: &Summary) {
     document.section("What each stage did");
     let longest = summary.stages.iter().map(|stage| stage.seconds).fold(f64::MIN_POSITIVE, f64::max);
+    let time = |time: f64| if summary.seconds > 0.0 { format!("{time:.0}") } else { "-".to_owned() };
     let row = |stage: &StageSummary| {
         let truth = |pick: fn(&RangeTruth) -> f64| number(stage.truth.as_ref().map(pick));
         vec![
             stage.name.to_owned(),
-            format!("{:.0}", 1e3 * stage.seconds),
-            format!("{:.0}", 100.0 * stage.seconds / longest),
+            time(1e3 * stage.seconds),
+            time(100.0 * stage.seconds / longest),
             number(stage.change_median_m),
             truth(|truth| truth.range_error_median_m),
             truth(|truth| truth.range_error_p95_m),

@@ -6,18 +6,19 @@ use std::time::Instant;
 use camera_model::Camera;
 use range_io::calibration::Calibration;
 
-use crate::run::stream::{Order, stream};
+use crate::run::stream::{Before, Order, stream};
 use crate::run::tally::Tally;
 use crate::stages::joining::{Gathered, Joined, adjust, register};
 use crate::stages::{Findings, Line};
 use crate::survey::compatible::Purpose;
 use crate::survey::open::{OpenSurvey, open};
+use crate::survey::plausibility::{FrameWatch, StoredWatch};
 use crate::survey::records::StageSummary;
 use crate::survey::view::View;
 use crate::{Plan, Result, Stage};
 use commands::Doubt;
-use commands::Progress;
 use commands::plan::RegisterOptions;
+use commands::{Progress, Tape};
 
 /// What a run knows of a survey so far: no rasters.
 pub(crate) struct Flow {
@@ -34,6 +35,20 @@ pub(crate) struct Flow {
     pub(crate) joining: &'static str,
 }
 
+/// What was seen of frames on their way.
+pub(crate) struct Seen {
+    pub(crate) tally: Tally,
+    pub(crate) looked: FrameWatch,
+    pub(crate) stored: StoredWatch,
+}
+
+impl Seen {
+    /// Nothing yet.
+    pub(crate) fn new(tally: Tally) -> Self {
+        Self { tally, looked: FrameWatch::default(), stored: StoredWatch::default() }
+    }
+}
+
 impl Flow {
     /// Opens a survey for a plan; refuses a plan that the survey's level rules out. The calibration comes with its name in
     /// words.
@@ -41,7 +56,7 @@ impl Flow {
         let survey = open(folder, calibration, Purpose::of(&plan.stages))?;
         plan.check_level(survey.survey.level)?;
         let line = Line::new(&plan.stages, &survey)?;
-        let order = Order::new(&survey, &plan.stages, None);
+        let order = Order::new(&survey.survey, &plan.stages, None);
         let options = plan.stages.iter().find_map(|stage| match stage {
             Stage::Register(options) => Some(options),
             _ => None,
@@ -63,7 +78,23 @@ impl Flow {
         keep: &mut dyn FnMut(View, &OpenSurvey) -> Result<()>,
         progress: &dyn Progress,
     ) -> Result<()> {
-        let mut tally = Tally::new(&self.line, self.order.frames(), self.order.views());
+        let tally = self.tally(&self.order, Before::default());
+        let seen = self.part_of_views(tally, keep, progress)?;
+        self.conclude(seen)
+    }
+
+    /// Figures for the frames of a whole, where others come before those here.
+    pub(crate) fn tally(&self, whole: &Order, before: Before) -> Tally {
+        Tally::new(&self.line, whole.frames(), whole.views(), before)
+    }
+
+    /// Takes the frames that the order has left through the stages; what was seen on the way.
+    pub(crate) fn part_of_views(
+        &mut self,
+        mut tally: Tally,
+        keep: &mut dyn FnMut(View, &OpenSurvey) -> Result<()>,
+        progress: &dyn Progress,
+    ) -> Result<Seen> {
         let (survey, gathered) = (&self.survey, &mut self.gathered);
         let mut keep = |view: View| {
             if let Some(gathered) = gathered {
@@ -71,12 +102,26 @@ impl Flow {
             }
             keep(view, survey)
         };
-        let frames = stream(survey, &self.order, &mut self.line, &mut tally, &mut keep, progress)?;
-        let (stages, doubts) = tally.finish(&self.line, survey)?;
+        let (looked, stored) = stream(survey, &self.order, &mut self.line, &mut tally, &mut keep, progress)?;
+        Ok(Seen { tally, looked, stored })
+    }
+
+    /// Makes figures and doubts of what was seen of all frames.
+    pub(crate) fn conclude(&mut self, seen: Seen) -> Result<()> {
+        let (stages, doubts) = seen.tally.finish(&self.line, &self.survey)?;
         self.stages = stages;
-        self.doubts.extend(frames);
+        self.doubts.extend(seen.looked.doubts());
+        self.doubts.extend(seen.stored.doubts());
         self.doubts.extend(doubts);
         Ok(())
+    }
+
+    /// Writes what was found and seen, or adds what was in another part of the survey.
+    pub(crate) fn carry(&mut self, seen: &mut Seen, tape: &mut Tape) {
+        self.line.carry(tape);
+        seen.tally.carry(tape);
+        seen.looked.carry(tape);
+        seen.stored.carry(tape);
     }
 
     /// Brings all stations into one frame, where a stage of the plan does so.

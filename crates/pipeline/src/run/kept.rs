@@ -8,6 +8,7 @@ use statistics::{quantile, robust_standard_deviation};
 
 use crate::Result;
 use crate::run::figures::pictures::{PICTURED_STATIONS, Pictures};
+use crate::run::stream::Before;
 use crate::run::summary::ReferenceSummary;
 use crate::survey::open::OpenSurvey;
 use crate::survey::records::{ViewRecord, usable};
@@ -15,9 +16,12 @@ use crate::survey::thinning::Thinning;
 use crate::survey::truth::{TruthTally, range_errors, wrap};
 use crate::survey::view::{Snapshot, View, ViewData};
 use crate::trends::Residuals;
+use commands::Tape;
 
 /// All that summary and report say of pixels.
 pub(crate) struct Kept {
+    /// Views before those here, which are others' work.
+    first: usize,
     pub(crate) views: Vec<ViewRecord>,
     pub(crate) pictures: Vec<Pictures>,
     pub(crate) residuals: Residuals,
@@ -49,19 +53,31 @@ pub(crate) struct Values {
     pub(crate) points: Vec<Vec<[f64; 3]>>,
 }
 
+impl Values {
+    fn carry(&mut self, tape: &mut Tape) {
+        let [before_m, after_m] = &mut self.errors_m;
+        let lists = [&mut self.sigma_m, before_m, after_m, &mut self.log_amplitude, &mut self.range_m];
+        lists.into_iter().for_each(|list| tape.numbers(list));
+        tape.list(&mut self.points, Vec::new, |tape, points| {
+            tape.list(points, Default::default, |tape, point| point.iter_mut().for_each(|x| tape.number(x)));
+        });
+    }
+}
+
 impl Kept {
-    /// For so many views, whose rays a camera gives.
-    pub(crate) fn new(survey: &OpenSurvey, camera: &Camera, views: usize) -> Self {
+    /// For so many views in all, some of them before the first one here, whose rays a camera gives.
+    pub(crate) fn new(survey: &OpenSurvey, camera: &Camera, views: usize, before: Before) -> Self {
         Self {
+            first: before.views,
             views: Vec::new(),
             pictures: Vec::new(),
             residuals: Residuals::new(survey, camera, views),
             truth: TruthTally::default(),
             values: Values::default(),
-            thinning: Thinning::of(views * camera.format.width * camera.format.height),
+            thinning: Thinning::of(views * camera.format.width * camera.format.height).after(before.views),
             differences: Vec::new(),
             compared: 0,
-            modulation: None,
+            modulation: survey.modulations().first().copied(),
             pixels: 0,
             flagged: 0,
             flags: [0; Flags::NAMED.len()],
@@ -79,11 +95,23 @@ impl Kept {
         self.compare(view);
         self.keep_values(view, after.as_ref(), &errors);
         self.residuals.add(view);
-        if self.pictures.len() < PICTURED_STATIONS {
+        if self.first + self.views.len() < PICTURED_STATIONS {
             self.pictures.push(Pictures::new(view, after, errors)?);
         }
         self.views.push(ViewRecord::new(view, &survey.stated));
         Ok(())
+    }
+
+    /// Writes it, or adds another part of the views.
+    pub(crate) fn carry(&mut self, tape: &mut Tape, survey: &OpenSurvey) {
+        tape.list(&mut self.views, ViewRecord::default, |tape, view| view.carry(tape, survey));
+        tape.list(&mut self.pictures, Pictures::default, |tape, pictures| pictures.carry(tape));
+        self.residuals.carry(tape);
+        self.truth.carry(tape);
+        self.values.carry(tape);
+        tape.numbers(&mut self.differences);
+        [&mut self.compared, &mut self.pixels, &mut self.flagged].into_iter().for_each(|count| tape.count(count));
+        self.flags.iter_mut().for_each(|count| tape.count(count));
     }
 
     fn count_flags(&mut self, view: &View) {
@@ -110,7 +138,6 @@ impl Kept {
 
     fn compare(&mut self, view: &View) {
         let (Some(reference), ViewData::Range(frame)) = (&view.reference_range, &view.data) else { return };
-        self.modulation = view.modulation;
         let (range, reference, flags) = (frame.range.as_slice(), reference.as_slice(), frame.flags.as_slice());
         let difference = |pixel: usize| {
             let difference = f64::from(range[pixel]) - f64::from(reference[pixel]);

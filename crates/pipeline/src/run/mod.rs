@@ -11,21 +11,24 @@ pub(crate) mod files;
 pub(crate) mod flow;
 pub(crate) mod kept;
 pub(crate) mod measure;
-pub(crate) mod simulate;
+pub(crate) mod part;
 pub(crate) mod stream;
 pub(crate) mod summary;
 pub(crate) mod tally;
 
+pub use commands::simulate::{Simulated, simulate};
 pub use files::clouds::OwnCloud;
-pub use simulate::{Simulated, simulate};
+pub use part::{PartSummary, merge, run_part};
+pub use stream::{Part, follow_station};
 pub use summary::{PairSummary, ReferenceSummary, RegistrationSummary, StationTruth, Summary, TruthSummary};
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
-use atomic_output::Destination;
+use atomic_output::{Destination, OutputFolder};
 use camera_model::Camera;
+use commands::made::without_times;
 use range_io::calibration::Calibration;
 use range_io::survey::Survey;
 use range_io::tables::Station;
@@ -35,6 +38,7 @@ use crate::run::figures::Figures;
 use crate::run::files::clouds::Clouds;
 use crate::run::flow::Flow;
 use crate::run::kept::Kept;
+use crate::run::stream::Before;
 use crate::survey::open::{OpenSurvey, read_calibration};
 use crate::survey::records::{RefusedStage, StageSummary, StationPose, ViewRecord, common_poses};
 use crate::survey::view::View;
@@ -63,6 +67,12 @@ impl RunRequest {
     /// The folder that paths in the pipeline's file are relative to.
     pub fn base(&self) -> &Path {
         self.plan_path.parent().unwrap_or(Path::new(""))
+    }
+
+    /// The first stage that brings stations together.
+    fn joining(&self) -> Option<&'static str> {
+        let joins = |stage: &&Stage| matches!(stage, Stage::Register(_) | Stage::Adjust(_));
+        self.plan.stages.iter().find(joins).map(Stage::name)
     }
 
     /// Everything that is there before the run and that it reads.
@@ -140,17 +150,34 @@ fn run_into(
         (None, Some(network)) => Some(calibrator(network, &survey)?),
         (named, _) => named.clone(),
     };
-    let calibration = read_calibration(&root_of(&survey), calibration.as_deref())?;
-    let mut flow = Flow::new(&request.plan, &survey, calibration)?;
-    let mut kept = Kept::new(&flow.survey, flow.camera(), flow.order.views());
+    let mut flow = opened(request, &survey, calibration.as_deref())?;
+    let mut kept = Kept::new(&flow.survey, flow.camera(), flow.order.views(), Before::default());
     let folder = destination.open()?;
-    let joins = request.plan.stages.iter().any(|stage| matches!(stage, Stage::Register(_) | Stage::Adjust(_)));
-    let mut clouds = Clouds::new(&folder, &flow.survey, joins);
+    let mut clouds = Clouds::new(&folder, &flow.survey, request.joining().is_some(), 0);
     let mut keep = |view: View, survey: &OpenSurvey| {
         clouds.add(&view)?;
         kept.add(&view, survey)
     };
     flow.views(&mut keep, progress)?;
+    let (summary, page) = complete(&folder, request, &survey, (flow, kept, clouds), start, progress)?;
+    files::results::finish(folder, &summary, &page, progress)?;
+    Ok(summary)
+}
+
+/// A survey opened for the request's plan.
+pub(crate) fn opened(request: &RunRequest, survey: &Path, calibration: Option<&Path>) -> Result<Flow> {
+    Flow::new(&request.plan, survey, read_calibration(&root_of(survey), calibration)?)
+}
+
+/// Joins the views that went through the stages, and writes what comes of them; summary and page are left to be written.
+pub(crate) fn complete(
+    folder: &OutputFolder,
+    request: &RunRequest,
+    survey: &Path,
+    (mut flow, mut kept, clouds): (Flow, Kept, Clouds<'_>),
+    start: Instant,
+    progress: &dyn Progress,
+) -> Result<(Summary, String)> {
     let refusal = match flow.join(&request.plan, progress) {
         // The stations stand, if not in one frame.
         Err(error) if error.failure() == Failure::Refused => {
@@ -162,18 +189,20 @@ fn run_into(
     progress.begin("write results", 3);
     let common = if refusal.is_some() { None } else { common_poses(&kept.views, &flow.joined.poses) };
     let own_clouds = clouds.finish(common.as_deref())?;
-    let mut summary = measure::summarise(&request.plan, &survey, &flow, &mut kept, refusal, own_clouds);
+    let mut summary = measure::summarise(&request.plan, survey, &flow, &mut kept, refusal, own_clouds);
     summary.out = request.out.display().to_string();
-    summary.seconds = start.elapsed().as_secs_f64();
+    summary.seconds = commands::made::seconds_since(start);
+    if without_times() {
+        summary.forget_times();
+    }
     if let Some(poses) = &common {
-        files::results::write_poses(&folder, &kept.views, poses, &summary)?;
-        files::common_errors::write(&folder, &flow, &request.plan, &kept.views, poses)?;
+        files::results::write_poses(folder, &kept.views, poses, &summary)?;
+        files::common_errors::write(folder, &flow, &request.plan, &kept.views, poses)?;
     }
     progress.advance(1);
     let figures = Figures::new(kept, &flow.joined.poses, common.as_deref(), flow.survey.vertical_axis)?;
-    files::results::finish(folder, &summary, &document(&summary, figures).html(), progress)?;
-    progress.finish();
-    Ok(summary)
+    let page = document(&summary, figures).html();
+    Ok((summary, page))
 }
 
 /// The survey's folder; simulated first where the plan says so.
@@ -184,7 +213,7 @@ fn find_survey(request: &RunRequest, progress: &dyn Progress) -> Result<PathBuf>
         (None, Some(Source::Survey { folder })) => Ok(base.join(folder)),
         (None, Some(Source::Simulate(source))) => {
             let folder = beside(&request.out, SURVEY);
-            simulate::simulate(source, base, &folder, progress)?;
+            simulate(source, base, &folder, progress)?;
             Ok(folder)
         }
         (None, None) => Err(Error::Survey {

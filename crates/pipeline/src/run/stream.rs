@@ -6,6 +6,7 @@
 use std::collections::VecDeque;
 use std::time::Instant;
 
+use range_io::survey::Survey;
 use rayon::prelude::*;
 
 use crate::Result;
@@ -14,7 +15,6 @@ use crate::stages::{Line, Watch};
 use crate::survey::open::OpenSurvey;
 use crate::survey::plausibility::{FrameWatch, StoredWatch};
 use crate::survey::view::View;
-use commands::Doubt;
 use commands::Progress;
 use commands::plan::Stage;
 
@@ -29,6 +29,7 @@ const AVERAGED_AT_ONCE: usize = 64;
 type Group = Vec<usize>;
 
 /// How the frames of a survey make views.
+#[derive(Clone)]
 pub(crate) struct Order {
     /// What goes through the stages together: a station where exposures are fused, or else one mean.
     units: Vec<Vec<Group>>,
@@ -36,10 +37,10 @@ pub(crate) struct Order {
 
 impl Order {
     /// Of all frames, or those of one station.
-    pub(crate) fn new(survey: &OpenSurvey, stages: &[Stage], only: Option<&str>) -> Self {
+    pub(crate) fn new(survey: &Survey, stages: &[Stage], only: Option<&str>) -> Self {
         let averages = stages.iter().any(|stage| matches!(stage, Stage::Average(_)));
         let fuses = stages.iter().any(|stage| matches!(stage, Stage::FuseExposures(_)));
-        let frames = survey.survey.frames.iter().enumerate();
+        let frames = survey.frames.iter().enumerate();
         let frames = frames.filter(|(_, frame)| only.is_none_or(|only| only == frame.station));
         if !averages && !fuses {
             return Self { units: frames.map(|(index, _)| vec![vec![index]]).collect() };
@@ -57,6 +58,22 @@ impl Order {
         Self { units }
     }
 
+    /// Leaves the units of one part of several alone, as equal as may be, and tells what comes before it.
+    pub(crate) fn cut(&mut self, part: Part) -> Before {
+        let [first, end] = [part.number - 1, part.number].map(|end| end * self.units.len() / part.of);
+        let after = self.units.split_off(end);
+        let units = self.units.split_off(first);
+        let before = Before { frames: self.frames(), means: self.units.iter().map(Vec::len).sum(), views: first };
+        drop(after);
+        self.units = units;
+        before
+    }
+
+    /// The frames, as the survey counts them.
+    pub(crate) fn indices(&self) -> impl Iterator<Item = usize> + '_ {
+        self.units.iter().flatten().flatten().copied()
+    }
+
     /// Frames.
     pub(crate) fn frames(&self) -> usize {
         self.units.iter().flatten().map(Vec::len).sum()
@@ -66,6 +83,24 @@ impl Order {
     pub(crate) fn views(&self) -> usize {
         self.units.len()
     }
+}
+
+/// One of several parts of a survey.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Part {
+    /// Which one, from 1.
+    pub number: usize,
+    /// Of how many.
+    pub of: usize,
+}
+
+/// What comes before a part of a survey.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Before {
+    pub(crate) frames: usize,
+    /// Means of frames, where exposures are fused later.
+    pub(crate) means: usize,
+    pub(crate) views: usize,
 }
 
 /// Items of one key, in the order in which keys come first.
@@ -94,7 +129,7 @@ struct Stream<'a> {
     done: usize,
 }
 
-/// Takes the frames through the stages and hands on each view that comes out; what speaks against the frames as they were
+/// Takes the frames through the stages and hands on each view that comes out; what was seen of the frames as they were
 /// read.
 pub(crate) fn stream(
     survey: &OpenSurvey,
@@ -103,7 +138,7 @@ pub(crate) fn stream(
     watch: &mut dyn Watch,
     keep: &mut dyn FnMut(View) -> Result<()>,
     progress: &dyn Progress,
-) -> Result<Vec<Doubt>> {
+) -> Result<(FrameWatch, StoredWatch)> {
     let waiting: Vec<usize> = order.units.iter().flatten().flatten().copied().collect();
     progress.begin("frames", waiting.len());
     let (waiting, read) = (waiting.into_iter(), VecDeque::new());
@@ -112,9 +147,19 @@ pub(crate) fn stream(
     for unit in &order.units {
         stream.unit(unit)?.into_iter().try_for_each(&mut *keep)?;
     }
-    let mut doubts = stream.looked.doubts();
-    doubts.extend(stream.stored.doubts());
-    Ok(doubts)
+    Ok((stream.looked, stream.stored))
+}
+
+/// Takes the frames of one station through the stages of a line, watched.
+pub fn follow_station(
+    survey: &OpenSurvey,
+    station: &str,
+    (stages, line): (&[Stage], &mut Line),
+    watch: &mut dyn Watch,
+    progress: &dyn Progress,
+) -> Result<()> {
+    let order = Order::new(&survey.survey, stages, Some(station));
+    stream(survey, &order, line, watch, &mut |_| Ok(()), progress).map(drop)
 }
 
 impl Stream<'_> {

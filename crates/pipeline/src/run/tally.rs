@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 use statistics::quantile;
 
 use crate::Result;
+use crate::run::stream::Before;
 use crate::stages::{Line, Watch};
 use crate::survey::open::OpenSurvey;
 use crate::survey::plausibility::{SenseVotes, beyond_maximum};
@@ -12,8 +13,8 @@ use crate::survey::records::StageSummary;
 use crate::survey::thinning::Thinning;
 use crate::survey::truth::{TruthTally, wrap};
 use crate::survey::view::{Snapshot, View};
-use commands::Doubt;
 use commands::plan::Stage;
+use commands::{Doubt, Tape};
 
 /// The figures of all stages up to registration.
 pub(crate) struct Tally {
@@ -38,12 +39,19 @@ struct StageTally {
 
 impl Tally {
     /// For the stages of a line, of which those up to the one that averages see as many views as there are frames.
-    pub(crate) fn new(line: &Line, frames: usize, views: usize) -> Self {
+    pub(crate) fn new(line: &Line, frames: usize, views: usize, before: Before) -> Self {
         let format = line.camera().format;
+        let fuses = line.steps().iter().position(|step| matches!(step.stage(), Stage::FuseExposures(_)));
+        let is_from = |stage: Option<usize>, number: usize| stage.is_some_and(|stage| number >= stage);
         let of_stage = |number: usize| {
-            let views = if line.average().is_some_and(|average| number >= average) { views } else { frames };
+            let views = if is_from(line.average(), number) { views } else { frames };
+            let first = match (is_from(fuses, number), is_from(line.average(), number)) {
+                (true, _) => before.views,
+                (false, true) => before.means,
+                (false, false) => before.frames,
+            };
             StageTally {
-                thinning: Thinning::of(views * format.width * format.height),
+                thinning: Thinning::of(views * format.width * format.height).after(first),
                 views: [0, 0],
                 changes: Some(Vec::new()),
                 truth: TruthTally::default(),
@@ -54,6 +62,20 @@ impl Tally {
         };
         let stages = (0..line.steps().len()).map(of_stage).collect();
         Self { stages, last: Vec::new(), last_stage: usize::MAX, clock: Instant::now() }
+    }
+
+    /// Writes it, or adds another part of the views.
+    pub(crate) fn carry(&mut self, tape: &mut Tape) {
+        for stage in &mut self.stages {
+            stage.views.iter_mut().for_each(|count| tape.count(count));
+            let mut more = if tape.is_read() { None } else { stage.changes.take() };
+            tape.option(&mut more, Vec::new, Tape::numbers);
+            stage.changes = stage.changes.take().zip(more).map(|(all, more)| [all, more].concat());
+            stage.truth.carry(tape);
+            tape.sum(&mut stage.seconds);
+            stage.votes.carry(tape);
+            tape.records(&mut stage.beyond);
+        }
     }
 
     /// The figures and the doubts of the stages, in their order.

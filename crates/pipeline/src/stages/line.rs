@@ -11,8 +11,8 @@ use crate::stages::{Findings, Found, ViewStage, cloud, deconvolve, demodulate, f
 use crate::survey::open::OpenSurvey;
 use crate::survey::view::View;
 use crate::{Error, Result};
-use commands::Doubt;
 use commands::plan::Stage;
+use commands::{Doubt, Tape};
 
 /// What stages are made ready with: the state that those before them leave.
 pub(crate) struct Making<'a> {
@@ -87,6 +87,11 @@ impl Line {
     /// The stages.
     pub fn steps(&self) -> &[Step] {
         &self.steps
+    }
+
+    /// Writes what the stages found, or adds what they found in another part of the survey.
+    pub(crate) fn carry(&mut self, tape: &mut Tape) {
+        self.steps.iter_mut().for_each(|step| step.found.carry(tape));
     }
 
     /// Number of the stage that averages.

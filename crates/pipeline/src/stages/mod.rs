@@ -24,7 +24,7 @@ use crate::Result;
 use crate::survey::drift::ViewDrift;
 use crate::survey::span::SpanTally;
 use crate::survey::view::View;
-use commands::Doubt;
+use commands::{Doubt, Tape};
 pub use line::{Line, Step, Watch};
 
 /// Figures that a stage reports, with units in their names.
@@ -60,6 +60,14 @@ pub(crate) struct Found {
 }
 
 impl Found {
+    /// Writes it, or adds what was found in another part of the survey.
+    pub(crate) fn carry(&mut self, tape: &mut Tape) {
+        tape.sums(&mut self.sums);
+        tape.records(&mut self.doubts);
+        tape.list(&mut self.drifts, ViewDrift::default, |tape, drift| drift.carry(tape));
+        self.span.carry(tape);
+    }
+
     /// Adds to a number.
     pub(crate) fn add(&mut self, name: &str, count: usize) {
         *self.sums.entry(name.to_owned()).or_default() += count as f64;

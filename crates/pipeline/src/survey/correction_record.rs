@@ -32,15 +32,15 @@ struct CorrectedChannel {
 
 /// The change of one pixel, part by part.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct PixelLedger {
+pub struct PixelLedger {
     /// Changes of the combined range by term.
-    pub(crate) entries: Vec<LedgerEntry>,
+    pub entries: Vec<LedgerEntry>,
     /// What came from other weights of the frequencies, metre; zero for one frequency.
-    pub(crate) weights_m: f64,
+    pub weights_m: f64,
     /// What the models do not cover.
-    pub(crate) outside: Vec<OutsideModel>,
+    pub outside: Vec<OutsideModel>,
     /// How it lies outside of what the calibration rests on, in words.
-    pub(crate) outside_span: Vec<String>,
+    pub outside_span: Vec<String>,
 }
 
 impl CorrectionRecord {
@@ -76,7 +76,7 @@ impl CorrectionRecord {
     }
 
     /// The parts of the change of a pixel inside the image.
-    pub(crate) fn pixel(&self, [col, row]: [usize; 2]) -> PixelLedger {
+    pub fn pixel(&self, [col, row]: [usize; 2]) -> PixelLedger {
         let [x, y] = self.format.image_from_pixel([col as f64, row as f64]);
         let (x, y) = (x - self.principal_point_mm[0], y - self.principal_point_mm[1]);
         let index = row * self.format.width + col;
@@ -136,7 +136,7 @@ impl CorrectionRecord {
     }
 
     /// Number of frequencies.
-    pub(crate) fn frequencies(&self) -> usize {
+    pub fn frequencies(&self) -> usize {
         self.channels.len()
     }
 }

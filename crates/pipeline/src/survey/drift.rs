@@ -8,10 +8,10 @@ use serde::Serialize;
 
 use crate::survey::frame_rates::rate_history;
 use crate::survey::view::View;
-use commands::DriftError;
+use commands::{DriftError, Tape};
 
 /// The drift of a view, the same at all its pixels.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct ViewDrift {
     /// Station, and frame or number of frames.
     pub view: String,
@@ -28,7 +28,7 @@ pub struct ViewDrift {
 }
 
 /// The part of a drift that follows the frame rate.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct FrameRatePart {
     /// How much of the drift it is, metre.
     pub part_m: f64,
@@ -37,13 +37,28 @@ pub struct FrameRatePart {
 }
 
 /// Where a drift comes from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum DriftSource {
     /// The calibrated curve by time and temperature.
+    #[default]
     Calibration,
     /// The camera's optical reference.
     ReferencePath,
+}
+
+impl ViewDrift {
+    /// Writes it, or takes it over.
+    pub(crate) fn carry(&mut self, tape: &mut Tape) {
+        tape.text(&mut self.view);
+        [&mut self.drift_m, &mut self.sigma_m].into_iter().for_each(|number| tape.number(number));
+        let mut by_reference = self.source == DriftSource::ReferencePath;
+        tape.flag(&mut by_reference);
+        self.source = if by_reference { DriftSource::ReferencePath } else { DriftSource::Calibration };
+        tape.option(&mut self.frame_rate, FrameRatePart::default, |tape, part| {
+            [&mut part.part_m, &mut part.rate_hz].into_iter().for_each(|number| tape.number(number));
+        });
+    }
 }
 
 /// A calibrated drift, ready for views of a survey.

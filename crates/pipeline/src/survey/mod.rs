@@ -13,10 +13,10 @@ pub(crate) mod truth;
 pub(crate) mod view;
 
 pub use compatible::{Purpose, UNKNOWN_INTEGRATION_TIME_S, compatible, model_set};
-pub use correction_record::CorrectionRecord;
+pub use correction_record::{CorrectionRecord, PixelLedger};
 pub use drift::{DriftCurve, DriftSource, FrameRatePart, ViewDrift};
 pub use open::{OpenSurvey, open, read_calibration};
 pub use plausibility::{FrameWatch, SenseVotes, StoredWatch};
 pub use records::{AdjustmentFigures, RefusedStage, StageSummary, StationPose, ViewRecord};
-pub use truth::{RangeTruth, ViewTruth};
+pub use truth::{RangeTruth, ViewTruth, wrap};
 pub use view::{FurtherPoint, LiveFrames, Snapshot, View, ViewData, view_name};

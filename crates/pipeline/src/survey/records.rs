@@ -8,10 +8,11 @@ use nalgebra::{Isometry3, Matrix3, Matrix6, Vector3};
 use serde::Serialize;
 
 use crate::survey::drift::ViewDrift;
+use crate::survey::open::OpenSurvey;
 use crate::survey::plausibility;
 use crate::survey::truth::{RangeTruth, evaluate};
 use crate::survey::view::{View, ViewData};
-use commands::Doubt;
+use commands::{Doubt, Tape};
 use range_io::tables::Station;
 use statistics::quantile;
 
@@ -20,7 +21,7 @@ use statistics::quantile;
 pub struct StageSummary {
     /// The stage's name.
     pub name: &'static str,
-    /// Wall-clock time, second.
+    /// Wall-clock time, second; 0 where durations are left out.
     pub seconds: f64,
     /// What the stage found, with units in the names.
     pub findings: BTreeMap<String, f64>,
@@ -40,7 +41,7 @@ pub struct RefusedStage {
 }
 
 /// What is kept of a view that has gone through the stages.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct ViewRecord {
     /// Name of the station.
     pub station: String,
@@ -85,6 +86,26 @@ impl ViewRecord {
             truth: evaluate(view),
             doubt: plausibility::mostly_flagged(view),
         }
+    }
+}
+
+impl ViewRecord {
+    /// Writes what comes from the frames, or takes it over; where the station stands says the survey.
+    pub(crate) fn carry(&mut self, tape: &mut Tape, survey: &OpenSurvey) {
+        [&mut self.station, &mut self.name].into_iter().for_each(|text| tape.text(text));
+        [&mut self.timestamp_s, &mut self.distance_m].into_iter().for_each(|number| tape.number(number));
+        tape.option(&mut self.integration_time_s, f64::default, Tape::number);
+        tape.option(&mut self.points, usize::default, Tape::count);
+        tape.option(&mut self.drift, ViewDrift::default, |tape, drift| drift.carry(tape));
+        tape.option(&mut self.truth, RangeTruth::default, |tape, truth| truth.carry(tape));
+        let mut doubts: Vec<Doubt> = self.doubt.take().into_iter().collect();
+        tape.records(&mut doubts);
+        self.doubt = doubts.pop();
+        let mut has_truth = self.true_pose.is_some();
+        tape.flag(&mut has_truth);
+        self.true_pose = has_truth.then(|| survey.true_pose(&self.station)).flatten();
+        self.stated = survey.approximate_pose(&self.station);
+        self.stated_sigma = plausibility::stated_sigma(&survey.stated, &self.station);
     }
 }
 

@@ -4,7 +4,7 @@ use range_image::{Flags, RangeFrame, Raster};
 use range_io::calibration::ValidSpan;
 
 use crate::{Error, Result};
-use commands::{Doubt, DoubtKind};
+use commands::{Doubt, DoubtKind, Tape};
 
 /// Part of the pixels outside the span from which on it is no matter of a few.
 const LARGE_SHARE: f64 = 0.2;
@@ -69,6 +69,16 @@ impl SpanTally {
             if outside {
                 flags.insert(Flags::OUTSIDE_SPAN);
             }
+        }
+    }
+
+    /// Writes it, or adds what was found in another part of the survey.
+    pub(crate) fn carry(&mut self, tape: &mut Tape) {
+        [&mut self.measured, &mut self.outside].into_iter().for_each(|count| tape.count(count));
+        for span in [&mut self.range_m, &mut self.amplitude] {
+            let mut other = *span;
+            tape.option(&mut other, || [0.0; 2], |tape, ends| ends.iter_mut().for_each(|end| tape.number(end)));
+            other.into_iter().flatten().for_each(|end| widen(span, end));
         }
     }
 

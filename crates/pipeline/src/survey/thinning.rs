@@ -8,21 +8,28 @@ const MOST_VALUES: usize = 1 << 21;
 #[derive(Debug, Clone, Copy)]
 pub struct Thinning {
     stride: usize,
+    /// Views before the first one, which are others' work.
+    first: usize,
 }
 
 impl Thinning {
     /// Keeps all.
-    pub const ALL: Self = Self { stride: 1 };
+    pub const ALL: Self = Self { stride: 1, first: 0 };
 
     /// For so many pixels in all views together.
     pub fn of(pixels: usize) -> Self {
         let stride = pixels.div_ceil(MOST_VALUES).max(1);
         // Widths of images are even: an odd stride takes pixels of all columns.
-        Self { stride: stride | 1 }
+        Self { stride: stride | 1, first: 0 }
+    }
+
+    /// The same where the view of number 0 has so many before it.
+    pub fn after(self, first: usize) -> Self {
+        Self { first, ..self }
     }
 
     /// Pixels of the view of this number, of `count` pixels.
     pub fn pixels(self, view: usize, count: usize) -> impl Iterator<Item = usize> {
-        (view % self.stride..count).step_by(self.stride)
+        ((self.first + view) % self.stride..count).step_by(self.stride)
     }
 }

@@ -7,6 +7,7 @@ use statistics::quantile;
 
 use crate::survey::thinning::Thinning;
 use crate::survey::view::View;
+use commands::Tape;
 
 /// What is true of one view.
 #[derive(Debug, Clone)]
@@ -18,7 +19,7 @@ pub struct ViewTruth {
 }
 
 /// How far the ranges of one or of all views are from the truth, on the pixels that no flag excludes.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct RangeTruth {
     /// Median of the absolute range error, metre.
     pub range_error_median_m: f64,
@@ -30,6 +31,17 @@ pub struct RangeTruth {
     pub flagged_fraction: f64,
     /// Unflagged pixels compared.
     pub pixels: usize,
+}
+
+impl RangeTruth {
+    /// Writes it, or takes it over.
+    pub(crate) fn carry(&mut self, tape: &mut Tape) {
+        let Self { range_error_median_m, range_error_p95_m, wrap_count_right_fraction, flagged_fraction, pixels } =
+            self;
+        let numbers = [range_error_median_m, range_error_p95_m, wrap_count_right_fraction, flagged_fraction];
+        numbers.into_iter().for_each(|number| tape.number(number));
+        tape.count(pixels);
+    }
 }
 
 /// Signed errors of the pixels of a view, metre; NaN where there is nothing to compare.
@@ -47,7 +59,7 @@ pub fn range_errors(view: &View, range: &Raster<f32>) -> Option<Vec<f64>> {
 }
 
 /// A difference of ranges brought into half an ambiguity interval around zero.
-pub(crate) fn wrap(difference_m: f64, modulation: Modulation) -> f64 {
+pub fn wrap(difference_m: f64, modulation: Modulation) -> f64 {
     let interval = modulation.ambiguity_interval_m();
     difference_m - (difference_m / interval).round() * interval
 }
@@ -92,6 +104,13 @@ impl TruthTally {
         let taken = thinning.pixels(self.views, all.len()).filter(usable);
         self.errors.extend(taken.map(|pixel| all[pixel].abs()));
         self.views += 1;
+    }
+
+    /// Writes it, or adds another part of the views.
+    pub(crate) fn carry(&mut self, tape: &mut Tape) {
+        tape.numbers(&mut self.errors);
+        let Self { known, flagged, compared, right, views, .. } = self;
+        [known, flagged, compared, right, views].into_iter().for_each(|count| tape.count(count));
     }
 
     /// The figures of all of them together.

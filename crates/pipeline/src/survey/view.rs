@@ -10,6 +10,7 @@ use range_image::{ComplexChannel, ComplexFrame, Flags, Modulation, RangeFrame, R
 use crate::survey::correction_record::CorrectionRecord;
 use crate::survey::truth::ViewTruth;
 use crate::{Error, Result};
+use commands::Tape;
 
 /// A frame on its way, or the mean of all frames of a station.
 #[derive(Debug, Clone)]
@@ -84,12 +85,25 @@ pub enum ViewData {
 }
 
 /// Range and amplitude at one moment.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Snapshot {
     /// Range, metre; wrapped to the ambiguity interval at level phase.
     pub range: Raster<f32>,
     /// Amplitude in the camera's unit.
     pub amplitude: Raster<f32>,
+}
+
+impl Snapshot {
+    /// Writes it, or takes it over.
+    pub(crate) fn carry(&mut self, tape: &mut Tape) {
+        for plane in [&mut self.range, &mut self.amplitude] {
+            let (mut width, mut values) = (plane.width(), std::mem::take(plane).into_vec());
+            tape.count(&mut width);
+            tape.short_numbers(&mut values);
+            let height = values.len() / width.max(1);
+            *plane = Raster::from_vec(width, height, values).unwrap_or_default();
+        }
+    }
 }
 
 impl View {

@@ -15,6 +15,8 @@ use statistics::retain_within;
 use crate::survey::open::OpenSurvey;
 use crate::survey::truth::range_errors;
 use crate::survey::view::{View, ViewData};
+use commands::Tape;
+
 use crate::trends::{RemainingErrors, TrendSummary, sentence};
 
 /// Pixels of all frames together that are looked at, about: more would tell smaller trends than anybody minds.
@@ -40,6 +42,7 @@ pub(crate) struct Residuals {
     views: Vec<OfView>,
 }
 
+#[derive(Default)]
 struct OfView {
     station: String,
     /// Whether the truth is known, whether it came to ranges, and what they show.
@@ -64,6 +67,19 @@ impl Residuals {
             has_truth,
             has_ranges: range_frame(view).is_some(),
             samples: if has_truth { self.against_truth(view) } else { self.planes(view) },
+        });
+    }
+
+    /// Writes it, or adds another part of the views.
+    pub(crate) fn carry(&mut self, tape: &mut Tape) {
+        tape.list(&mut self.views, OfView::default, |tape, view| {
+            tape.text(&mut view.station);
+            [&mut view.has_truth, &mut view.has_ranges].into_iter().for_each(|flag| tape.flag(flag));
+            tape.list(&mut view.samples, TrendSample::default, |tape, sample| {
+                let TrendSample { residual_m, sigma_m, range_m, amplitude, column, row, time_s, .. } = sample;
+                let numbers = [residual_m, sigma_m, range_m, amplitude, column, row, time_s];
+                numbers.into_iter().for_each(|number| tape.number(number));
+            });
         });
     }
 

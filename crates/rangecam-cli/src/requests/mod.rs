@@ -2,8 +2,8 @@
 
 pub(crate) mod calibration;
 pub(crate) mod clouds;
-pub(crate) mod compare_arguments;
 pub(crate) mod fixed_pattern_arguments;
+pub(crate) mod fleet;
 pub(crate) mod frames;
 pub(crate) mod noise_arguments;
 pub(crate) mod orient_arguments;

@@ -17,6 +17,11 @@ pub(crate) fn not_negative(text: &str) -> Result<f64, String> {
     number(text, |value| value >= 0.0, "a number that is not negative")
 }
 
+/// A whole number above zero.
+pub(crate) fn at_least_one(text: &str) -> Result<usize, String> {
+    text.trim().parse().ok().filter(|number| *number > 0).ok_or_else(|| "expected a whole number from 1".to_owned())
+}
+
 /// A part of a whole.
 pub(crate) fn share(text: &str) -> Result<f64, String> {
     number(text, |value| (0.0..=1.0).contains(&value), "a part from 0 to 1")

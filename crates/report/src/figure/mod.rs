@@ -37,6 +37,11 @@ impl Figure {
         Self { svg, caption: String::new() }
     }
 
+    /// The `<svg>` element and the caption.
+    pub fn parts(&self) -> [&str; 2] {
+        [&self.svg, &self.caption]
+    }
+
     /// The same with a caption below.
     #[must_use]
     pub fn caption(self, caption: impl Into<String>) -> Self {

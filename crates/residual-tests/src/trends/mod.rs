@@ -10,7 +10,7 @@ use cells::Cells;
 use wald::{Binned, BinnedTest};
 
 /// A residual with what it may still depend on.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct TrendSample {
     /// Observed minus modelled range, metre.
     pub residual_m: f64,

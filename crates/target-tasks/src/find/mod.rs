@@ -73,7 +73,7 @@ fn find(request: &TargetsRequest, destination: &Destination, progress: &dyn Prog
     if summary.stations.is_empty() {
         return Err(Error::Refused { summary: json(&summary)?, source: summary.nothing_found().into(), written: None });
     }
-    summary.seconds = clock.elapsed().as_secs_f64();
+    summary.seconds = commands::made::seconds_since(clock);
     let page = document::document(&summary, &stations)?;
     let found = write::Found { pictures: &pictures, camera: &camera, singles: singles.as_ref(), stations: &stations };
     write::write(destination, request, &found, (&json(&summary)?, &page.html()))?;

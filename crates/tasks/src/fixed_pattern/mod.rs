@@ -74,7 +74,7 @@ fn estimate(
     let estimate = estimator.finish();
     progress.advance(1);
     let mut summary = FixedPatternSummary::new(request, &words, &estimate);
-    summary.seconds = clock.elapsed().as_secs_f64();
+    summary.seconds = commands::made::seconds_since(clock);
     if summary.applied {
         add_to(&mut calibration, request, &estimate);
     }

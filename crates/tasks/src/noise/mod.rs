@@ -55,7 +55,7 @@ fn estimate(request: &NoiseRequest, destination: &Destination, progress: &dyn Pr
         Failed::Undetermined(error) => Error::estimation("noise", &request.survey)(error),
     })?;
     let mut summary = NoiseSummary::new(request, &words, &estimate);
-    summary.seconds = clock.elapsed().as_secs_f64();
+    summary.seconds = commands::made::seconds_since(clock);
     add_to(&mut calibration, request, &estimate);
     write(destination, Some(&calibration), &json(&summary)?, &document::document(&summary).html())?;
     progress.finish();

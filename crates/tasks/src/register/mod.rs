@@ -74,7 +74,7 @@ fn register_into(
     summary.method = request.method.name();
     summary.inputs = request.inputs.iter().map(|path| path.display().to_string()).collect();
     summary.out = request.out.display().to_string();
-    summary.seconds = clock.elapsed().as_secs_f64();
+    summary.seconds = commands::made::seconds_since(clock);
     results::write(destination, &registered, progress)?;
     progress.finish();
     Ok(registered.summary)

@@ -62,7 +62,7 @@ fn estimate(
         None => Vec::new(),
     };
     let mut summary = ScatteringSummary::new(request, &captures, &estimate, &shifts);
-    summary.seconds = clock.elapsed().as_secs_f64();
+    summary.seconds = commands::made::seconds_since(clock);
     progress.advance(2);
     let text = json(&summary)?;
     let Some(psf) = &estimate.psf else {

@@ -57,7 +57,7 @@ fn track_into(destination: &Destination, request: &TrackRequest, progress: &dyn 
     let summary = &mut tracked.summary;
     summary.survey = request.survey.display().to_string();
     summary.out = request.out.display().to_string();
-    summary.seconds = clock.elapsed().as_secs_f64();
+    summary.seconds = commands::made::seconds_since(clock);
     results::write(destination, &tracked, progress)?;
     progress.finish();
     Ok(tracked.summary)
@@ -125,7 +125,7 @@ impl Run {
             inertial.learn(&pose)?;
         }
         let after = self.tracker.as_ref().map_or(0, Tracker::keyframes);
-        let ms = |from: Instant| 1e3 * from.elapsed().as_secs_f64();
+        let ms = |from: Instant| 1e3 * commands::made::seconds_since(from);
         let became_keyframe = after > before;
         let times = [ms(tracking), ms(clock)];
         self.frames.push(row(&self.names[index], index, &pose, became_keyframe, times));

@@ -73,7 +73,7 @@ fn estimate(request: &WarmUpRequest, destination: &Destination, progress: &dyn P
     let (series, estimate) = find(request, progress)?;
     let calibration = calibration.map(|(known, words)| (with_drift(known, request, &estimate), words));
     let mut summary = WarmUpSummary::new(request, &series, &estimate, calibration.as_ref().map(|(_, words)| words));
-    summary.seconds = clock.elapsed().as_secs_f64();
+    summary.seconds = commands::made::seconds_since(clock);
     let drift = document::drift_figure(&summary, &series, &estimate);
     let page = document::document(&summary, Some(drift)).html();
     write(destination, calibration.as_ref().map(|(calibration, _)| calibration), &json(&summary)?, &page)?;

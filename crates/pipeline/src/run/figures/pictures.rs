@@ -8,11 +8,13 @@ use crate::Result;
 use crate::run::figures::correction_maps::correction_maps;
 use crate::run::kept::{Errors, Values, log_amplitude};
 use crate::survey::view::{Snapshot, View};
+use commands::Tape;
 
 /// Stations whose pictures are shown; further ones would make the page heavy without telling more.
 pub(crate) const PICTURED_STATIONS: usize = 8;
 
 /// What the pictures of a view are made of that have one scale for all views, and those with a scale of their own.
+#[derive(Default)]
 pub(crate) struct Pictures {
     name: String,
     width: usize,
@@ -64,6 +66,25 @@ impl Pictures {
         }
         own.push(flag_picture(view)?.caption("Grey: no flag. Colours as in the table of flags."));
         Ok(Self { name: view.name(), width, before: view.before.clone(), after, errors, own })
+    }
+
+    /// Writes it, or takes it over.
+    pub(crate) fn carry(&mut self, tape: &mut Tape) {
+        tape.text(&mut self.name);
+        tape.count(&mut self.width);
+        for snapshot in [&mut self.before, &mut self.after] {
+            tape.option(snapshot, Snapshot::default, |tape, snapshot| snapshot.carry(tape));
+        }
+        tape.option(&mut self.errors, Default::default, |tape, errors| errors.iter_mut().for_each(|e| tape.numbers(e)));
+        tape.list(
+            &mut self.own,
+            || Figure::new(String::new()),
+            |tape, figure| {
+                let [mut svg, mut caption] = figure.parts().map(str::to_owned);
+                [&mut svg, &mut caption].into_iter().for_each(|text| tape.text(text));
+                *figure = Figure::new(svg).caption(caption);
+            },
+        );
     }
 
     /// Name of the view and its figures.

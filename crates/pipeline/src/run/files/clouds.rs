@@ -5,19 +5,20 @@
 //! one into the common cloud.
 
 use std::collections::BTreeSet;
+use std::path::Path;
 
 use atomic_output::OutputFolder;
 use nalgebra::{Isometry3, Point3};
 use range_io::ply::{CloudFile, PlyWriter, Precision, read_cloud, write_cloud};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
-use crate::Result;
 use crate::survey::open::OpenSurvey;
 use crate::survey::records::StationPose;
 use crate::survey::view::View;
+use crate::{Error, Result};
 
 /// The file of a cloud that is in no frame but its camera's.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct OwnCloud {
     /// Station, and frame or number of frames.
     pub view: String,
@@ -50,12 +51,13 @@ struct Own {
 }
 
 impl<'a> Clouds<'a> {
-    pub(crate) fn new(folder: &'a OutputFolder, survey: &OpenSurvey, joins: bool) -> Self {
+    /// `views`: those before the first one here.
+    pub(crate) fn new(folder: &'a OutputFolder, survey: &OpenSurvey, joins: bool, views: usize) -> Self {
         let stations: BTreeSet<&str> = survey.survey.frames.iter().map(|frame| frame.station.as_str()).collect();
         let one_station = stations.len() == 1;
         let known = |station: &&str| survey.approximate_pose(station).is_some();
         let placed = !joins && (one_station || stations.iter().all(known));
-        Self { folder, joins, one_station, placed, views: 0, common: None, further: Vec::new(), own: Vec::new() }
+        Self { folder, joins, one_station, placed, views, common: None, further: Vec::new(), own: Vec::new() }
     }
 
     /// Writes the cloud of a view, where it has one.
@@ -82,12 +84,40 @@ impl<'a> Clouds<'a> {
         Ok(())
     }
 
+    /// How many points of split pixels end the common cloud that [`Self::finish`] writes.
+    pub(crate) fn further(&self) -> usize {
+        self.further.iter().map(|cloud| cloud.points.len()).sum()
+    }
+
+    /// Adds the files of another part of the views, whose common cloud ends with so many points of split pixels.
+    pub(crate) fn add_part(&mut self, part: &Path, further: usize, own: Vec<OwnCloud>) -> Result<()> {
+        let common = part.join("cloud.ply");
+        if common.is_file() {
+            let (points, further) = parted(read_cloud(&common)?, further);
+            self.append(&points)?;
+            self.further.push(further);
+        }
+        for cloud in own {
+            let (from, to) = (part.join(&cloud.file), self.folder.file(&cloud.file)?);
+            std::fs::copy(&from, to).map_err(|source| Error::Access { path: from, source })?;
+            self.own.push(Own { cloud, number: self.views, further: 0 });
+            self.views += 1;
+        }
+        Ok(())
+    }
+
     fn append(&mut self, points: &CloudFile) -> Result<()> {
         let writer = match &mut self.common {
             Some(writer) => writer,
             None => self.common.insert(PlyWriter::create(self.folder.file("cloud.ply")?, Precision::Single)?),
         };
         Ok(writer.append(points)?)
+    }
+
+    /// Completes the files of a part, which are in the common frame where the survey knows it.
+    pub(crate) fn finish_part(self) -> Result<Vec<OwnCloud>> {
+        let (placed, known) = (self.placed, Vec::new());
+        self.finish(placed.then_some(known.as_slice()))
     }
 
     /// Completes the files: one cloud where there are poses of all views in a common frame. Else the files of the views.
@@ -180,7 +210,7 @@ fn parted(mut cloud: CloudFile, last: usize) -> (CloudFile, CloudFile) {
     fn part<T>(values: &mut Option<Vec<T>>, first: usize) -> Option<Vec<T>> {
         values.as_mut().map(|values| values.split_off(first))
     }
-    let first = cloud.points.len() - last;
+    let first = cloud.points.len().saturating_sub(last);
     let further = CloudFile {
         points: cloud.points.split_off(first),
         intensity: part(&mut cloud.intensity, first),

@@ -42,5 +42,6 @@ pub(crate) fn finish(folder: OutputFolder, summary: &Summary, page: &str, progre
     write_text(folder.file("report.html")?, page)?;
     folder.commit()?;
     progress.advance(3);
+    progress.finish();
     Ok(())
 }

@@ -7,7 +7,7 @@ use statistics::{quantile, upper_median};
 
 use crate::survey::plausibility::{FURTHEST_M, NEAREST_M, some_of};
 use crate::survey::view::{View, ViewData};
-use commands::{Doubt, DoubtKind};
+use commands::{Doubt, DoubtKind, Tape};
 
 /// Values of a plane that are looked at, evenly over it: noise makes no two frames alike in so many.
 const LOOKED_AT: usize = 1024;
@@ -26,7 +26,7 @@ pub struct FrameWatch {
 }
 
 /// What is kept of a frame.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 struct Looked {
     frame: usize,
     station: String,
@@ -64,6 +64,19 @@ impl FrameWatch {
             dead: planes.iter().find_map(|plane| dead_value(plane)),
             content: planes.iter().flatten().fold(FNV_OFFSET, hash),
             range_m,
+        });
+    }
+
+    /// Writes it, or adds the frames of another part of the survey.
+    pub(crate) fn carry(&mut self, tape: &mut Tape) {
+        tape.list(&mut self.looked, Looked::default, |tape, looked| {
+            tape.count(&mut looked.frame);
+            tape.text(&mut looked.station);
+            let mut dead = looked.dead.map(f64::from);
+            tape.option(&mut dead, f64::default, Tape::number);
+            looked.dead = dead.map(|value| value as f32);
+            looked.content = tape.bits(looked.content);
+            tape.option(&mut looked.range_m, f64::default, Tape::number);
         });
     }
 

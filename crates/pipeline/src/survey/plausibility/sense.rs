@@ -1,7 +1,7 @@
 //! Whether the phase runs the wrong way, told by the amplitudes: see [`stored_values::SenseVotes`].
 
 use crate::survey::view::{View, ViewData};
-use commands::{Doubt, DoubtKind};
+use commands::{Doubt, DoubtKind, Tape};
 
 /// What the windows of the views looked at say.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -13,6 +13,11 @@ impl SenseVotes {
         if let ViewData::Phase(frame) = &view.data {
             self.0.look_at(frame);
         }
+    }
+
+    /// Writes it, or adds what another part of the survey says.
+    pub(crate) fn carry(&mut self, tape: &mut Tape) {
+        self.0.windows().into_iter().for_each(|count| tape.count(count));
     }
 
     /// How they voted; `None` where no window could.

@@ -9,7 +9,7 @@ use stored_values::{Bending, Kind, UnitWitness, bendings, in_words, judge_kind, 
 
 use crate::survey::open::OpenSurvey;
 use crate::survey::view::{View, ViewData};
-use commands::{Doubt, DoubtKind};
+use commands::{Doubt, DoubtKind, Tape};
 
 /// Frames that are looked at, evenly over the survey.
 const LOOKED_AT: usize = 8;
@@ -81,6 +81,37 @@ impl StoredWatch {
             let value = format!("{:.5e}", code.value).parse().unwrap_or(code.value);
             *self.codes.entry(f32::to_bits(value)).or_default() += code.pixels;
         }
+    }
+
+    /// Writes it, or adds what another part of the survey shows.
+    pub(crate) fn carry(&mut self, tape: &mut Tape) {
+        let blank = || Bending { bending: 0.0, sigma: 0.0, window: [0; 4] };
+        tape.list(&mut self.surfaces, blank, |tape, surface| {
+            [&mut surface.bending, &mut surface.sigma].into_iter().for_each(|value| tape.number(value));
+            surface.window.iter_mut().for_each(|value| tape.count(value));
+        });
+        tape.list(&mut self.witnesses, UnitWitness::default, |tape, witness| {
+            [&mut witness.median, &mut witness.highest].into_iter().for_each(|value| tape.number(value));
+            tape.option(&mut witness.noise, f64::default, Tape::number);
+        });
+        let mut codes: Vec<(u32, usize)> =
+            if tape.is_read() { Vec::new() } else { std::mem::take(&mut self.codes).into_iter().collect() };
+        tape.list(&mut codes, Default::default, |tape, (code, pixels)| {
+            *code = tape.bits(u64::from(*code)) as u32;
+            tape.count(pixels);
+        });
+        codes.into_iter().for_each(|(code, pixels)| *self.codes.entry(code).or_default() += pixels);
+        [&mut self.pixels, &mut self.empty].into_iter().for_each(|count| tape.count(count));
+        let mut stated = self.stated;
+        let blank = || Stated { kind: Kind::Range, scale_m: 0.0, ambiguity_interval_m: None };
+        tape.option(&mut stated, blank, |tape, stated| {
+            let mut is_depth = stated.kind == Kind::Depth;
+            tape.flag(&mut is_depth);
+            stated.kind = if is_depth { Kind::Depth } else { Kind::Range };
+            tape.number(&mut stated.scale_m);
+            tape.option(&mut stated.ambiguity_interval_m, f64::default, Tape::number);
+        });
+        self.stated = self.stated.or(stated);
     }
 
     /// What was found, by name, for people.

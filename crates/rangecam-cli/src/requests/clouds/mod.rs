@@ -1,4 +1,5 @@
-//! Arguments of what works on the cloud of a result.
+//! Arguments of what works on clouds and results.
 
+pub(crate) mod compare_arguments;
 pub(crate) mod fuse_arguments;
 pub(crate) mod measure_arguments;

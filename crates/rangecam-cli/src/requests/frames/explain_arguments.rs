@@ -3,7 +3,8 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use pipeline::{ExplainRequest, Plan};
+use pipeline::Plan;
+use tasks::ExplainRequest;
 
 use crate::requests::values::whole;
 

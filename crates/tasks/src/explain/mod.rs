@@ -13,16 +13,12 @@ use range_io::survey::{Level, Survey};
 use serde::Serialize;
 
 use crate::explain::flags::FlagWatch;
-use crate::run::stream::{Order, stream};
-use crate::stages::{Line, Watch};
-use crate::survey::compatible::Purpose;
-use crate::survey::open::{open, read_calibration};
-use crate::survey::view::{View, ViewData};
-use crate::{Error, Plan, Result};
-use commands::Judged;
-use commands::Progress;
 use commands::plan::{Stage, is_past};
-use commands::root_of;
+use commands::{Judged, Progress, root_of};
+use pipeline::run::follow_station;
+use pipeline::stages::{Line, Watch};
+use pipeline::survey::{Purpose, View, ViewData, open, read_calibration};
+use pipeline::{Error, Plan, Result};
 
 /// Which pixel is to be explained.
 #[derive(Debug, Clone)]
@@ -152,11 +148,10 @@ pub fn explain(request: &ExplainRequest, progress: &dyn Progress) -> Result<Expl
     let opened = open(&request.survey, (calibration, words), Purpose::of(&plan.stages))?;
     plan.check_level(survey.level)?;
     let mut line = Line::new(&plan.stages, &opened)?;
-    let order = Order::new(&opened, &plan.stages, Some(&station));
     let mut explanation = Explanation {
         frame,
         file: survey.frames[frame].file.display().to_string(),
-        station,
+        station: station.clone(),
         pixel: request.pixel,
         calibration: opened.calibration_words.clone(),
         raw_range_m: None,
@@ -176,7 +171,7 @@ pub fn explain(request: &ExplainRequest, progress: &dyn Progress) -> Result<Expl
         is_range: false,
         flags: FlagWatch::default(),
     };
-    stream(&opened, &order, &mut line, &mut follower, &mut |_| Ok(()), progress)?;
+    follow_station(&opened, &station, (&plan.stages, &mut line), &mut follower, progress)?;
     follower.finish(line.rays());
     progress.finish();
     Ok(explanation)
@@ -262,23 +257,25 @@ fn find_frame(survey: &Survey, name: &str) -> Result<usize> {
 /// All stages that level and calibration leave room for.
 fn all_stages(level: Level, calibration: Option<&Calibration>) -> Plan {
     let scattering = calibration.is_some_and(|calibration| calibration.scattering.is_some());
-    let models = calibration.is_some_and(crate::stages::corrects_ranges);
-    let mut stages =
-        vec![Stage::Demodulate(crate::DemodulateOptions::default()), Stage::Average(crate::AverageOptions::default())];
+    let models = calibration.is_some_and(pipeline::stages::corrects_ranges);
+    let mut stages = vec![
+        Stage::Demodulate(pipeline::DemodulateOptions::default()),
+        Stage::Average(pipeline::AverageOptions::default()),
+    ];
     if scattering {
-        stages.push(Stage::Deconvolve(crate::DeconvolveOptions::default()));
+        stages.push(Stage::Deconvolve(pipeline::DeconvolveOptions::default()));
     }
-    stages.push(Stage::Unwrap(crate::UnwrapOptions::default()));
+    stages.push(Stage::Unwrap(pipeline::UnwrapOptions::default()));
     if models {
-        stages.push(Stage::CorrectRange(crate::CorrectRangeOptions::default()));
+        stages.push(Stage::CorrectRange(pipeline::CorrectRangeOptions::default()));
     }
     if calibration.is_some() {
-        stages.push(Stage::CorrectImagePoint(crate::CorrectImagePointOptions::default()));
+        stages.push(Stage::CorrectImagePoint(pipeline::CorrectImagePointOptions::default()));
     }
-    stages.push(Stage::Multipath(crate::MultipathOptions::default()));
-    stages.push(Stage::FuseExposures(crate::FuseExposuresOptions::default()));
-    stages.push(Stage::PointCloud(crate::PointCloudOptions::default()));
-    stages.push(Stage::Flag(crate::FlagOptions::default()));
+    stages.push(Stage::Multipath(pipeline::MultipathOptions::default()));
+    stages.push(Stage::FuseExposures(pipeline::FuseExposuresOptions::default()));
+    stages.push(Stage::PointCloud(pipeline::PointCloudOptions::default()));
+    stages.push(Stage::Flag(pipeline::FlagOptions::default()));
     stages.retain(|stage| !is_past(level, stage.needs()));
     Plan { name: "explain".to_owned(), source: None, calibrate: None, stages }
 }

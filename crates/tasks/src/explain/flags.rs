@@ -5,8 +5,8 @@ use range_image::Flags;
 use statistics::Distribution;
 
 use crate::explain::{FlagReason, PixelState};
-use crate::survey::view::View;
 use commands::plan::{FlagOptions, Stage};
+use pipeline::View;
 
 /// Notes the flags as stages set them.
 #[derive(Default)]

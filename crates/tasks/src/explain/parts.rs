@@ -3,10 +3,9 @@
 use error_models::{LedgerEntry, RangeTerm};
 
 use crate::explain::{StagePart, WHOLE_INTERVALS};
-use crate::survey::drift::ViewDrift;
-use crate::survey::truth::wrap;
-use crate::survey::view::View;
 use commands::plan::Stage;
+use pipeline::survey::wrap;
+use pipeline::{View, ViewDrift};
 
 /// The parts of a change, which add up to it; none where nothing changed.
 pub(super) fn parts(stage: &Stage, before: &View, after: &View, pixel: [usize; 2], change_m: f64) -> Vec<StagePart> {

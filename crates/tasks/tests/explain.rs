@@ -3,9 +3,10 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-use pipeline::{ExplainRequest, Explanation, Plan, Silent, SimulateSource, ViewData, explain, process, simulate};
+use pipeline::{Plan, Silent, SimulateSource, ViewData, process, simulate};
 use range_image::Flags;
 use range_io::npz::NpzWriter;
+use tasks::{ExplainRequest, Explanation, explain};
 
 use crate::common;
 use crate::common::fixtures;

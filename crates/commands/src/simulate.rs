@@ -20,11 +20,8 @@ use report::Document;
 use serde::Serialize;
 use simulation::{GrossErrorsSpec, SimulationSpec, Simulator};
 
-use crate::{Error, Result};
-use commands::Judged;
-use commands::Progress;
-use commands::plan::SimulateSource;
-use commands::{Inputs, produce};
+use crate::plan::SimulateSource;
+use crate::{Error, Inputs, Judged, Progress, Result, produce};
 
 /// What a simulation wrote.
 #[derive(Debug, Clone, Serialize)]

@@ -10,6 +10,7 @@ mod false_flags;
 mod outside_light;
 mod real_periodic;
 mod real_repeats;
+mod refused;
 mod remaining_errors;
 mod right_flags;
 mod warm_up;

@@ -10,6 +10,7 @@ mod outside_light;
 mod parts;
 mod real_periodic;
 mod real_repeats;
+mod refused;
 mod remaining_errors;
 mod right_flags;
 mod warm_up;

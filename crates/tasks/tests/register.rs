@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
-use pipeline::{Failure, Silent, SimulateSource, simulate};
+use pipeline::{Failure, Plan, RunRequest, Silent, SimulateSource, run, simulate};
 use range_io::clouds::{CloudFile, Precision};
 use tasks::{RegisterMethod, RegisterRequest, RegisterSummary, register};
 
@@ -71,6 +71,19 @@ fn frames_of_a_depth_camera_are_registered_as_such() {
     let [.., last] = &summary.stations[..] else { panic!("four stations") };
     let way = Vector3::from(last.position_m).norm();
     assert!((way - 0.045).abs() < 0.01 && last.position_sigma_m.unwrap() < 0.02, "{way} {last:?}");
+    // A pipeline goes the same way, but without the flags that the command sets first.
+    let plan = r#"(name: "x", stages: [PointCloud(), Register(), Adjust()])"#;
+    let request = RunRequest {
+        plan: Plan::from_ron(plan, Path::new("x.ron")).unwrap(),
+        plan_path: PathBuf::from("x.ron"),
+        survey: Some(folder.path().join("survey")),
+        calibration: None,
+        out: folder.path().join("run"),
+    };
+    println!("{}", run(&request, &Silent).unwrap());
+    let table = range_io::tables::read_stations(request.out.join("stations.csv")).unwrap();
+    let apart = table[3].world_from_camera.translation.vector - Vector3::from(last.position_m);
+    assert!(table.len() == 4 && apart.norm() < 1e-4, "{apart}");
 }
 
 #[test]

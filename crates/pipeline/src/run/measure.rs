@@ -12,7 +12,7 @@ use crate::run::kept::Kept;
 use crate::run::summary::{PairSummary, RegistrationSummary, StationTruth, Summary, TruthSummary};
 use crate::stages::joining::Joined;
 use crate::stages::wraps::repair;
-use crate::stations::placement::wrong_place;
+use crate::stations::placement::{unchecked, wrong_place};
 use crate::survey::plausibility;
 use crate::survey::records::{RefusedStage, StationPose, ViewRecord};
 use commands::plan::{Plan, ruled_out};
@@ -100,6 +100,8 @@ fn doubts(flow: &Flow, views: &[ViewRecord], refusal: Option<&RefusedStage>, pos
     if refusal.is_none() {
         let adjustment = flow.joined.adjustment.iter();
         doubts.extend(adjustment.flat_map(|figures| wrong_places(views, &figures.placements)));
+        let name = |index: usize| views[index].station.clone();
+        doubts.extend(flow.joined.unchecked.iter().map(|pair| unchecked(pair, name)));
     }
     doubts
 }

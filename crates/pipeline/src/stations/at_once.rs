@@ -2,10 +2,12 @@
 
 use multiview_registration::rigid_pose::Uncertain;
 use multiview_registration::{
-    Datum, Error, MeasuredTurn, Start, StationRegistration, StationRegistrationOptions, register_stations,
+    Datum, Error, FrameRegistration, MeasuredTurn, Start, StationRegistration, StationRegistrationOptions,
+    register_frames, register_stations,
 };
 use nalgebra::{Isometry3, Matrix6};
 use point_cloud::Cloud;
+use projective_registration::{FrameAlignmentOptions, OrganisedFrame};
 
 use crate::survey::records::StationPose;
 use commands::Progress;
@@ -27,6 +29,25 @@ pub fn register_at_once(
         (options.minimum_overlap, options.start_error_m) = (minimum_overlap, Some(start_error_m));
     }
     register_stations(clouds, start, Datum::Station(0), &options, &|done, _| progress.advance(done))
+}
+
+/// Up to this number of stations every pair is tried where no poses are known; beyond, only those that follow each other.
+pub const MOST_TRIED: usize = 16;
+
+/// Registers frames of one camera by pairs of them, where surfaces differ by more than the noise of their points.
+///
+/// # Errors
+/// As [`register_frames`].
+pub fn register_as_frames(
+    frames: &[OrganisedFrame],
+    before: Option<&[Isometry3<f64>]>,
+) -> Result<FrameRegistration, Error> {
+    let start = match before {
+        Some(poses) => Start::Poses(poses),
+        None if frames.len() <= MOST_TRIED => Start::Nothing,
+        None => Start::Order,
+    };
+    register_frames(frames, start, &FrameAlignmentOptions::default(), &|_, _| {})
 }
 
 /// The poses with their covariance, in another frame than that of the registration.

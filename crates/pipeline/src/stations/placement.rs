@@ -1,6 +1,6 @@
 //! Stations that are probably in the wrong place, in words.
 
-use multiview_registration::StationPlacement;
+use multiview_registration::{StationPlacement, UncheckedPair};
 
 use commands::{Doubt, DoubtKind};
 
@@ -13,4 +13,15 @@ pub fn wrong_place(name: &str, found: &StationPlacement) -> Doubt {
         found.times_usual.unwrap_or(f64::NAN)
     );
     Doubt::about(DoubtKind::Placement, name, words)
+}
+
+/// What to say of a pair that alone joins stations with the others.
+pub fn unchecked(pair: &UncheckedPair, name: impl Fn(usize) -> String) -> Doubt {
+    let names: Vec<String> = pair.frames.iter().map(|&frame| name(frame)).collect();
+    let words = format!(
+        "nothing but this pair says where {} stands: if it is wrong, nothing shows it. Another station that shares \
+         surfaces with both sides is needed",
+        names.join(", ")
+    );
+    Doubt::about(DoubtKind::Alignment, format!("{} onto {}", name(pair.source), name(pair.target)), words)
 }

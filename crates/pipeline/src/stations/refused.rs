@@ -78,29 +78,3 @@ fn words(error: &multiview_registration::Error, names: &[String], tried: Tried) 
 
 /// Reasons that a line names.
 const MOST_REASONS: usize = 3;
-
-#[cfg(test)]
-mod tests {
-    // Panics are how a test fails.
-    #![allow(clippy::unwrap_used)]
-
-    use super::*;
-
-    #[test]
-    fn stations_of_one_name_are_told_apart_and_each_has_its_reason() {
-        let names = ["Y1", "Y1", "Y2"].map(str::to_owned);
-        let error = multiview_registration::Error::UnconnectedStations {
-            stations: vec![1, 2],
-            to: 0,
-            reasons: vec!["shares 3 tiles".to_owned(), "shares none".to_owned()],
-        };
-        let found = words(&error, &names, Tried::Poses(Some(0.5))).unwrap();
-        assert!(found.contains("brings Y1 (number 2), Y2 into the frame of Y1 (number 1)"), "{found}");
-        assert!(found.contains("right to 0.5 m") && found.contains("Y2: shares none"), "{found}");
-        assert!(words(&error, &names, Tried::Order).unwrap().contains("give start poses"), "{found}");
-        assert!(
-            words(&multiview_registration::Error::NoSuchStation { station: 3, count: 2 }, &names, Tried::Order)
-                .is_none()
-        );
-    }
-}

@@ -2,15 +2,14 @@
 
 use commands::plan::NORMAL_HALF_WIDTH_PX;
 use commands::{Doubt, DoubtKind};
-use multiview_registration::{FrameRegistration, PairAlignment, Start, register_frames};
+use multiview_registration::{FrameRegistration, PairAlignment};
 use nalgebra::Isometry3;
 use pipeline::Result;
-use pipeline::stations::{Station, Surface, surface};
+use pipeline::stations::{Station, Surface, register_as_frames, surface, unchecked};
 use pipeline::survey::StationPose;
-use projective_registration::{FrameAlignmentOptions, OrganisedFrame};
+use projective_registration::OrganisedFrame;
 use rayon::prelude::*;
 
-use crate::register::stations::MOST_TRIED;
 use crate::register::summary::{RegisterSummary, RegisteredLoop, RegisteredPair};
 use crate::register::{Registered, describe, pairs};
 
@@ -18,12 +17,7 @@ use crate::register::{Registered, describe, pairs};
 pub(crate) fn found(stations: &[Station], before: Option<&[Isometry3<f64>]>) -> Option<FrameRegistration> {
     let frame = |station: &Station| surface::frame(station, station.projection.as_ref()?);
     let frames: Vec<OrganisedFrame> = stations.par_iter().map(frame).collect::<Option<_>>()?;
-    let start = match before {
-        Some(poses) => Start::Poses(poses),
-        None if frames.len() <= MOST_TRIED => Start::Nothing,
-        None => Start::Order,
-    };
-    register_frames(&frames, start, &FrameAlignmentOptions::default(), &|_, _| {}).ok()
+    register_as_frames(&frames, before).ok()
 }
 
 /// The stations that were placed, with what is known of them; the others are named in the doubts.
@@ -84,16 +78,7 @@ fn summary(result: &FrameRegistration, stations: &[Station]) -> RegisterSummary 
         let words = format!("not placed, and not in the results: {}", out.reason);
         Doubt::about(DoubtKind::Placement, stations[out.frame].name.as_str(), words)
     });
-    let unchecked = result.unchecked.iter().map(|pair| {
-        let pair_name = format!("{} onto {}", name(pair.source), name(pair.target));
-        let names: Vec<String> = pair.frames.iter().map(|&frame| name(frame)).collect();
-        let words = format!(
-            "nothing but this pair says where {} stands: if it is wrong, nothing shows it. Another station that shares \
-             surfaces with both sides is needed",
-            names.join(", ")
-        );
-        Doubt::about(DoubtKind::Alignment, pair_name, words)
-    });
+    let unchecked = result.unchecked.iter().map(|pair| unchecked(pair, name));
     let placed = result.frames.iter().flatten().count() as i64;
     RegisterSummary {
         pairs: result.pairs.iter().map(row).collect(),

@@ -5,7 +5,7 @@ use commands::{Doubt, DoubtKind, Progress};
 use multiview_registration::Error::UnconnectedStations;
 use multiview_registration::{Start, StationRegistration, SurfacePair};
 use nalgebra::{Isometry3, Point3};
-use pipeline::stations::{Station, Tried, Windows, poses_in, refused, register_at_once};
+use pipeline::stations::{MOST_TRIED, Station, Tried, Windows, poses_in, refused, register_at_once};
 use pipeline::survey::StationPose;
 use pipeline::{Error, Result};
 use point_cloud::Cloud;
@@ -15,8 +15,6 @@ use crate::register::input::Input;
 use crate::register::summary::{RegisterSummary, RegisteredLoop, RegisteredPair};
 use crate::register::{Registered, describe, frames, pairs};
 
-/// Up to this number of stations every pair is tried where no poses are known; beyond, only those that follow each other.
-pub(crate) const MOST_TRIED: usize = 16;
 /// A difference between two stations' surfaces in expected standard deviations beyond which it is doubtful.
 const LARGEST_SIGMAS: f64 = 5.0;
 
@@ -26,17 +24,10 @@ const MOST_OVER_NOISE: f64 = 2.0;
 /// Loops of sound pairs close to within this many times the typical distance of common surfaces.
 const LOOSE_LOOP: f64 = 20.0;
 
-/// Whether the stations are frames without amplitudes, as structured light and stereo give them: neighbours share their errors, which
-/// pairs of frames know, and whose surfaces the stations would be held against in vain (12 frames of a Kinect: 140 s instead of 5).
-fn have_no_light(stations: &[Station]) -> bool {
-    let is_known = |values: &Vec<f32>| values.iter().any(|value| value.is_finite());
-    stations.iter().all(|one| one.projection.is_some() && !one.file.intensity.as_ref().is_some_and(is_known))
-}
-
 pub(crate) fn run(input: Input, start: &str, progress: &dyn Progress) -> Result<Registered> {
     let Input { stations, vertical_axis, turns, .. } = input;
     let before: Option<Vec<Isometry3<f64>>> = stations.iter().map(|station| station.approximate).collect();
-    if have_no_light(&stations)
+    if stations.iter().all(Station::is_depth_alone)
         && let Some(result) = frames::found(&stations, before.as_deref()).filter(|found| found.unplaced.is_empty())
     {
         return frames::registered(stations, before, vertical_axis, &result);

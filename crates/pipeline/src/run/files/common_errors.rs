@@ -32,17 +32,24 @@ pub(crate) fn write(
     let all = |frames: &[Frame], registered| {
         common_errors::common_errors(frames, flow.camera(), calibration.map(|known| (known, corrected)), registered)
     };
-    let mut file: CommonErrorsFile = match all(&frames, registered) {
-        // The poses stand; how they follow the calibration is the only thing not known.
-        Err(common_errors::Error::Registration(_) | common_errors::Error::Calibration) => {
-            let alone =
-                |(frame, pose): (&Frame, &StationPose)| Frame { stated_covariance: pose.covariance, ..frame.clone() };
-            let alone: Vec<Frame> = frames.iter().zip(poses).map(alone).collect();
-            let mut file = all(&alone, None).map_err(failed)?;
-            file.not_in_it.push("how the poses follow the calibration: they do not come together again".to_owned());
-            file
-        }
-        found => found.map_err(failed)?,
+    // The poses stand; how they follow the calibration is the only thing not known.
+    let alone = |why: &str| {
+        let alone =
+            |(frame, pose): (&Frame, &StationPose)| Frame { stated_covariance: pose.covariance, ..frame.clone() };
+        let alone: Vec<Frame> = frames.iter().zip(poses).map(alone).collect();
+        let mut file = all(&alone, None).map_err(failed)?;
+        file.not_in_it.push(format!("how the poses follow the calibration: {why}"));
+        Ok::<_, Error>(file)
+    };
+    let by_frames = flow.joined.adjustment.is_some() && flow.joined.clouds.is_empty();
+    let mut file: CommonErrorsFile = match registered {
+        None if by_frames => alone("they come from pairs of frames")?,
+        _ => match all(&frames, registered) {
+            Err(common_errors::Error::Registration(_) | common_errors::Error::Calibration) => {
+                alone("they do not come together again")?
+            }
+            found => found.map_err(failed)?,
+        },
     };
     if let Some(calibration) = calibration {
         calibration.write(folder.file(Calibration::FILE_NAME)?)?;
@@ -53,7 +60,7 @@ pub(crate) fn write(
     }
     // One without is the station that the others are stated from.
     let without = frames.iter().filter(|frame| frame.stated_covariance.is_none()).count();
-    if registered.is_none() && views.len() > 1 && without > 1 {
+    if registered.is_none() && !by_frames && views.len() > 1 && without > 1 {
         file.not_in_it
             .push("poses: no stage adjusted them, and stations.csv states no standard deviations of all".to_owned());
     }

@@ -11,10 +11,12 @@ use commands::plan::AdjustOptions;
 
 /// All stations are adjusted at once from their surfaces, the first one being the datum.
 pub(crate) fn run(joined: &mut Joined, options: &AdjustOptions, progress: &dyn Progress) -> Result<Findings> {
-    if joined.clouds.is_empty() {
+    if joined.names.is_empty() {
         return Err(Error::Needs { stage: "Adjust", needs: "Register" });
     }
-    let same_pairs = |known: &Registered| known.minimum_overlap.to_bits() == options.minimum_overlap.to_bits();
+    let same_pairs = |known: &Registered| {
+        known.minimum_overlap.is_none_or(|overlap| overlap.to_bits() == options.minimum_overlap.to_bits())
+    };
     let known = joined.registered.take().filter(|known| known.settled && same_pairs(known));
     let adjusted = match known {
         Some(known) => known,

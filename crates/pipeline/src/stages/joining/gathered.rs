@@ -7,11 +7,11 @@ use camera_model::Camera;
 use multiview_registration::PairAlignment;
 use nalgebra::Isometry3;
 use point_cloud::Cloud;
-use projective_registration::Projection;
+use projective_registration::{OrganisedFrame, Projection};
 use rayon::prelude::*;
 
 use crate::stations::station::{Station, Windows, projection};
-use crate::stations::surface::{Start, Surface};
+use crate::stations::surface::{self, Start, Surface};
 use crate::survey::open::OpenSurvey;
 use crate::survey::view::View;
 use crate::{Error, Result};
@@ -37,6 +37,8 @@ pub(crate) struct Gathered {
     /// Where the survey says that they stand.
     pub(crate) stated: Vec<Option<Isometry3<f64>>>,
     pub(crate) clouds: Vec<Cloud>,
+    /// The stations as frames, where they have no amplitudes.
+    pub(crate) frames: Vec<OrganisedFrame>,
     /// Of neighbours that are aligned one onto the other: the last one, and what was found.
     last: Option<Surface>,
     pub(crate) pairs: Vec<PairAlignment>,
@@ -62,6 +64,7 @@ impl Gathered {
             names: Vec::new(),
             stated: Vec::new(),
             clouds: Vec::new(),
+            frames: Vec::new(),
             last: None,
             pairs: Vec::new(),
             failed: None,
@@ -99,6 +102,8 @@ impl Gathered {
 
     fn keep(&mut self, stations: &[Station]) -> Result<()> {
         let (half_width_px, windows) = (self.options.normal_half_width_px, self.windows);
+        let frame = |station: &Station| surface::frame(station, station.projection.as_ref()?);
+        self.frames.par_extend(stations.par_iter().filter(|station| station.is_depth_alone()).filter_map(frame));
         let clouds = stations.par_iter().map(|station| station.cloud(half_width_px, windows));
         let clouds = clouds.collect::<Result<Vec<Cloud>>>()?;
         self.clouds.extend(clouds.into_iter().map(|cloud| thinned(cloud, self.stride)));

@@ -10,7 +10,7 @@ pub(crate) mod adjust;
 pub(crate) mod gathered;
 pub(crate) mod register;
 
-use multiview_registration::{PairAlignment, RefusedPair, StationRegistration};
+use multiview_registration::{PairAlignment, RefusedPair, StationRegistration, UncheckedPair};
 use nalgebra::Isometry3;
 use point_cloud::Cloud;
 
@@ -28,11 +28,13 @@ pub(crate) struct Joined {
     pub(crate) pairs: Vec<PairAlignment>,
     /// Pairs that overlap but could not be aligned reliably.
     pub(crate) refused: Vec<RefusedPair>,
+    /// Pairs of frames that nothing checks.
+    pub(crate) unchecked: Vec<UncheckedPair>,
     /// All surfaces at once, where `Register` found them from the survey's poses.
     pub(crate) registered: Option<Registered>,
     /// The simultaneous adjustment, where it ran.
     pub(crate) adjustment: Option<AdjustmentFigures>,
-    /// Names of the stations and their unflagged points with normals, from `Register` on.
+    /// Names of the stations and their unflagged points with normals, from `Register` on; no points of frames without amplitudes.
     pub(crate) names: Vec<String>,
     pub(crate) clouds: Vec<Cloud>,
 }
@@ -41,8 +43,8 @@ pub(crate) struct Joined {
 #[derive(Debug)]
 pub(crate) struct Registered {
     pub(crate) poses: Vec<StationPose>,
-    /// Smallest overlap of its pairs.
-    pub(crate) minimum_overlap: f64,
+    /// Smallest overlap of its pairs; `None` of pairs of frames, which no overlap chooses.
+    pub(crate) minimum_overlap: Option<f64>,
     /// Pairs of stations that share surfaces, and rounds.
     pub(crate) surfaces: usize,
     pub(crate) rounds: usize,
@@ -62,6 +64,10 @@ impl Registered {
         let StationRegistration { sigma0, redundancy, placements, rounds, settled, .. } = found;
         let figures = AdjustmentFigures { sigma0, redundancy, placements };
         let surfaces = found.surfaces.len();
-        (Self { poses, minimum_overlap, surfaces, rounds, settled, figures }, found.pairs, found.refused)
+        (
+            Self { poses, minimum_overlap: Some(minimum_overlap), surfaces, rounds, settled, figures },
+            found.pairs,
+            found.refused,
+        )
     }
 }

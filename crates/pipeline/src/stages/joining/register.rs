@@ -1,11 +1,12 @@
-use multiview_registration::Start;
+use multiview_registration::rigid_pose::Uncertain;
+use multiview_registration::{FrameRegistration, PlacedFrame, Start};
 use nalgebra::Isometry3;
 
 use crate::stages::Findings;
 use crate::stages::joining::{Gathered, Joined, Registered};
 use crate::stations::refused::{self, Tried};
-use crate::stations::register_at_once;
-use crate::survey::records::StationPose;
+use crate::stations::{register_as_frames, register_at_once};
+use crate::survey::records::{AdjustmentFigures, StationPose};
 use crate::{Error, Result};
 use commands::Progress;
 use commands::plan::{RegisterOptions, StartPoses};
@@ -45,12 +46,22 @@ fn world(stated: Option<Isometry3<f64>>, first: Option<&Isometry3<f64>>) -> Isom
 }
 
 fn at_once(
-    Gathered { names, clouds, .. }: Gathered,
+    Gathered { names, clouds, frames, stated: all_stated, .. }: Gathered,
     stated: Option<Isometry3<f64>>,
     start: Start<'_>,
     options: &RegisterOptions,
     progress: &dyn Progress,
 ) -> Result<Joined> {
+    let before = if let Start::Poses(poses) = start { Some(poses) } else { None };
+    let as_frames = (frames.len() == clouds.len()).then(|| register_as_frames(&frames, before));
+    if let Some(Ok(found)) = as_frames
+        && let Some(registered) = from_frames(&found, &all_stated)
+    {
+        let poses = registered.poses.iter().map(without_covariance).collect();
+        let FrameRegistration { pairs, refused, unchecked, .. } = found;
+        let registered = Some(registered);
+        return Ok(Joined { poses, pairs, refused, unchecked, registered, names, ..Joined::default() });
+    }
     let limits = Some((options.minimum_overlap, options.maximum_distance_m));
     let tried = match start {
         Start::Poses(_) => Tried::Poses(Some(options.maximum_distance_m)),
@@ -61,11 +72,32 @@ fn at_once(
     let found = found.map_err(|error| refused::of_stage("Register", error, &names, tried))?;
     let world = world(stated, found.world_from_station.first());
     let (registered, pairs, refused) = Registered::new(found, &world, options.minimum_overlap);
-    // How well poses are known is what `Adjust` says.
-    let pose = |pose: &StationPose| StationPose { covariance: None, ..*pose };
-    let poses = registered.poses.iter().map(pose).collect();
+    let poses = registered.poses.iter().map(without_covariance).collect();
     let registered = matches!(start, Start::Poses(_)).then_some(registered);
     Ok(Joined { poses, pairs, refused, registered, names, clouds, ..Joined::default() })
+}
+
+/// How well poses are known is what `Adjust` says.
+fn without_covariance(pose: &StationPose) -> StationPose {
+    StationPose { covariance: None, ..*pose }
+}
+
+/// Where all frames were placed: their poses in the world in which the datum stands as stated.
+fn from_frames(found: &FrameRegistration, stated: &[Option<Isometry3<f64>>]) -> Option<Registered> {
+    let placed: Vec<PlacedFrame> = found.frames.iter().copied().collect::<Option<_>>()?;
+    let datum = found.datum;
+    let world = Uncertain::exact(world(stated[datum], Some(&placed[datum].world_from_frame)));
+    let pose = |frame: &PlacedFrame| {
+        let pose = world.then(&Uncertain { pose: frame.world_from_frame, covariance: frame.covariance });
+        StationPose { world_from_camera: pose.pose, covariance: Some(pose.covariance) }
+    };
+    let figures = AdjustmentFigures {
+        sigma0: Some(found.variance_factor.sqrt()),
+        redundancy: 6 * (found.pairs.len() as i64 + 1 - placed.len() as i64),
+        placements: found.placements.clone(),
+    };
+    let (poses, surfaces) = (placed.iter().map(pose).collect(), found.pairs.len());
+    Some(Registered { poses, minimum_overlap: None, surfaces, rounds: 1, settled: true, figures })
 }
 
 fn each_onto_the_one_before(Gathered { names, clouds, pairs, .. }: Gathered, stated: Option<Isometry3<f64>>) -> Joined {

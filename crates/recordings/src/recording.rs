@@ -86,7 +86,12 @@ impl std::fmt::Debug for Recording {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let Self { file, format, ending, .. } = self;
         let streams = &self.contents.streams;
-        f.debug_struct("Recording").field("file", file).field("format", format).field("streams", streams).field("ending", ending).finish_non_exhaustive()
+        f.debug_struct("Recording")
+            .field("file", file)
+            .field("format", format)
+            .field("streams", streams)
+            .field("ending", ending)
+            .finish_non_exhaustive()
     }
 }
 
@@ -229,7 +234,9 @@ impl Reader {
             #[cfg(feature = "bag")]
             Format::Bag => Ok(Self::Bag(formats::bag::Bag::open(input, contents).map_err(read)?)),
             #[cfg(feature = "mkv")]
-            Format::Matroska => Ok(Self::Matroska(Box::new(formats::mkv::Matroska::open(input, contents).map_err(read)?))),
+            Format::Matroska => {
+                Ok(Self::Matroska(Box::new(formats::mkv::Matroska::open(input, contents).map_err(read)?)))
+            }
             #[cfg(feature = "adi")]
             Format::Adi => Ok(Self::Adi(Box::new(formats::adi::Adi::open(input, contents).map_err(read)?))),
             _ => Err(Error::LeftOut { file: file.to_path_buf(), feature: feature(format) }),

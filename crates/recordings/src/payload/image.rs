@@ -1,6 +1,6 @@
+use crate::Error;
 use crate::error::Result;
 use crate::limits::MOST_PIXELS;
-use crate::Error;
 
 /// How the pixels of an image are stored.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -211,7 +211,9 @@ impl Image {
     /// The values of an image of one channel, row by row, as they stand.
     pub fn values_f32(&self) -> Option<Vec<f32>> {
         match self.encoding {
-            Encoding::Mono8 | Encoding::Unsigned8 => Some(self.rows(1).flatten().map(|&value| f32::from(value)).collect()),
+            Encoding::Mono8 | Encoding::Unsigned8 => {
+                Some(self.rows(1).flatten().map(|&value| f32::from(value)).collect())
+            }
             Encoding::Mono16 | Encoding::Unsigned16 => Some(self.values_u16()?.into_iter().map(f32::from).collect()),
             Encoding::Float32 => {
                 let read = if self.big_endian { f32::from_be_bytes } else { f32::from_le_bytes };
@@ -239,7 +241,10 @@ impl Image {
     /// The rows without what lies between them; of an image whose pixels have `bytes` bytes.
     fn rows(&self, bytes: usize) -> impl Iterator<Item = &[u8]> {
         let row = self.width as usize * bytes;
-        self.data.chunks(self.step.max(1) as usize).take(self.height as usize).map(move |chunk| &chunk[..row.min(chunk.len())])
+        self.data
+            .chunks(self.step.max(1) as usize)
+            .take(self.height as usize)
+            .map(move |chunk| &chunk[..row.min(chunk.len())])
     }
 }
 

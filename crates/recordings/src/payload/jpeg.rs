@@ -7,9 +7,9 @@ use zune_jpeg::zune_core::colorspace::ColorSpace;
 use zune_jpeg::zune_core::options::DecoderOptions;
 
 use super::{CompressedImage, Encoding, Image, ImageParts};
+use crate::Error;
 use crate::error::Result;
 use crate::limits::MOST_PIXELS;
-use crate::Error;
 
 impl CompressedImage {
     /// The pixels of a JPEG, as `rgb8` (feature `jpeg`).

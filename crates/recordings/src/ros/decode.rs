@@ -52,7 +52,8 @@ fn image(fields: &mut Fields, frame_id: String) -> Result<Image, String> {
     let big_endian = fields.u8("is_bigendian")? != 0;
     let step = fields.u32("step")?;
     let data = fields.bytes("data")?.to_vec();
-    Image::new(ImageParts { frame_id, width, height, step, encoding, big_endian, data }).map_err(|error| error.to_string())
+    Image::new(ImageParts { frame_id, width, height, step, encoding, big_endian, data })
+        .map_err(|error| error.to_string())
 }
 
 fn camera_info(fields: &mut Fields, frame_id: String) -> Result<CameraInfo, String> {

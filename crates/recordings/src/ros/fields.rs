@@ -22,7 +22,9 @@ impl<'a> Fields<'a> {
                 let big_endian = match (head[0], head[1]) {
                     (0, 0) => true,
                     (0, 1) => false,
-                    (high, low) => return Err(format!("is encoded as {high:02x}{low:02x}, expected plain CDR (0000, 0001)")),
+                    (high, low) => {
+                        return Err(format!("is encoded as {high:02x}{low:02x}, expected plain CDR (0000, 0001)"));
+                    }
                 };
                 Ok(Self { bytes, at: 0, aligned: true, big_endian })
             }

@@ -30,6 +30,8 @@ const CAMERA: usize = 6;
 /// The state of a reader.
 pub(crate) struct Adi {
     header: Option<Header>,
+    /// Bytes that are missing of the head of an `.adcam`.
+    head_missing: u64,
     frames: u64,
     last_ns: Option<i64>,
     waiting: VecDeque<Message>,
@@ -38,12 +40,16 @@ pub(crate) struct Adi {
 impl Adi {
     /// Reads what stands before the first frame.
     pub fn open(input: &mut Input, contents: &mut Contents) -> io::Result<Self> {
-        let mut adi = Self { header: None, frames: 0, last_ns: None, waiting: VecDeque::new() };
+        let mut adi = Self { header: None, head_missing: 0, frames: 0, last_ns: None, waiting: VecDeque::new() };
         let beginning = input.peek(256)?;
         for (name, kind, type_name) in STREAMS {
             contents.stream(name.to_owned(), kind, type_name.to_owned());
         }
-        if is_header(&beginning) && input.left() >= 8 + LENGTH as u64 {
+        if is_header(&beginning) {
+            adi.head_missing = (8 + LENGTH as u64).saturating_sub(input.left());
+            if adi.head_missing > 0 {
+                return Ok(adi);
+            }
             input.skip(8)?;
             let bytes = input.bytes(LENGTH as u64)?;
             adi.header = Header::read(&bytes);
@@ -86,6 +92,11 @@ impl Adi {
         loop {
             if let Some(message) = self.waiting.pop_front() {
                 return Ok(Step::Message(message));
+            }
+            if self.head_missing > 0 {
+                let reason = "the head is cut off".to_owned();
+                let missing_bytes = Some(self.head_missing);
+                return Ok(Step::End(Ending::CutOff { at_byte: 0, missing_bytes, reason }));
             }
             let header = self.header.clone();
             let ending = match &header {
@@ -207,7 +218,14 @@ impl Adi {
             Plane::Depth => Encoding::Unsigned16,
             Plane::Brightness => Encoding::Mono16,
             Plane::Confidence => Encoding::Float32,
-            Plane::Points => return self.waiting.push_back(Message { stream: stream_of(plane), logged_ns, stamp_ns: None, payload: Payload::Bytes(data) }),
+            Plane::Points => {
+                return self.waiting.push_back(Message {
+                    stream: stream_of(plane),
+                    logged_ns,
+                    stamp_ns: None,
+                    payload: Payload::Bytes(data),
+                });
+            }
         };
         let (frame_id, step) = ("adi".to_owned(), width * plane.bytes() as u32);
         let image = Image::new(ImageParts { frame_id, width, height, step, encoding, big_endian: false, data });

@@ -34,7 +34,8 @@ pub(super) fn read(input: &mut Input, place: u64) -> io::Result<Index> {
             Some(op::CONNECTION) => index.connections.extend(Connection::read(&fields, data)),
             Some(op::CHUNK_INFO) => {
                 for entry in data.as_chunks::<8>().0 {
-                    let [id, count] = [0, 4].map(|at| u32::from_le_bytes([entry[at], entry[at + 1], entry[at + 2], entry[at + 3]]));
+                    let [id, count] =
+                        [0, 4].map(|at| u32::from_le_bytes([entry[at], entry[at + 1], entry[at + 2], entry[at + 3]]));
                     *index.counts.entry(id).or_default() += u64::from(count);
                 }
             }

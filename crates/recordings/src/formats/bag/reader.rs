@@ -175,7 +175,8 @@ impl Bag {
         loop {
             let mut chunk = self.chunk.take()?;
             let rest = &chunk.bytes[chunk.at..];
-            let record = split(rest).and_then(|(header, data, behind)| Some((Fields::read(header)?, data, behind.len())));
+            let record =
+                split(rest).and_then(|(header, data, behind)| Some((Fields::read(header)?, data, behind.len())));
             let Some((fields, data, behind)) = record else {
                 if chunk.ending.is_none() && !rest.is_empty() {
                     contents.fault(chunk.place, format!("the last {} bytes of a chunk are no record", rest.len()));

@@ -42,7 +42,8 @@ impl<'a> Fields<'a> {
     /// A time, nanosecond.
     pub fn time(&self, name: &str) -> Option<i64> {
         let bytes: [u8; 8] = self.get(name)?.try_into().ok()?;
-        let [seconds, nanoseconds] = [0, 4].map(|at| u32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]]));
+        let [seconds, nanoseconds] =
+            [0, 4].map(|at| u32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]]));
         Some(i64::from(seconds) * 1_000_000_000 + i64::from(nanoseconds))
     }
 

@@ -117,7 +117,9 @@ impl Mcap {
             }
             opcode::DATA_END => self.data_ended = true,
             // Behind the end of the data stands the index, which was read.
-            opcode::HEADER | opcode::SCHEMA | opcode::CHANNEL | opcode::MESSAGE | opcode::METADATA if !self.data_ended => {
+            opcode::HEADER | opcode::SCHEMA | opcode::CHANNEL | opcode::MESSAGE | opcode::METADATA
+                if !self.data_ended =>
+            {
                 if length > LARGEST_RECORD {
                     contents.fault(at, format!("{} has {length} bytes, expected at most {LARGEST_RECORD}", name(code)));
                     return Ok(None);
@@ -183,7 +185,9 @@ impl Mcap {
         loop {
             let mut chunk = self.chunk.take()?;
             let rest = &chunk.bytes[chunk.at..];
-            let head = rest.first_chunk::<9>().map(|head| (head[0], u64::from_le_bytes([head[1], head[2], head[3], head[4], head[5], head[6], head[7], head[8]])));
+            let head = rest.first_chunk::<9>().map(|head| {
+                (head[0], u64::from_le_bytes([head[1], head[2], head[3], head[4], head[5], head[6], head[7], head[8]]))
+            });
             let record = head.and_then(|(code, length)| {
                 let record = rest.get(HEAD as usize..)?.get(..usize::try_from(length).ok()?)?;
                 Some((code, record))
@@ -252,7 +256,8 @@ impl Mcap {
 
     fn message(&self, record: &[u8], at: u64, contents: &mut Contents) -> Option<Message> {
         let Some((head, bytes)) = MessageHead::read(record) else {
-            let reason = format!("a message of {} bytes is shorter than its head of {}", record.len(), MessageHead::LENGTH);
+            let reason =
+                format!("a message of {} bytes is shorter than its head of {}", record.len(), MessageHead::LENGTH);
             contents.fault(at, reason);
             return None;
         };

@@ -3,6 +3,8 @@
 use std::collections::BTreeMap;
 use std::io::{self, Write};
 
+use lz4_flex::frame::{BlockSize, FrameEncoder, FrameInfo};
+
 use super::{MAGIC, opcode};
 use crate::Error;
 use crate::error::Result;
@@ -78,12 +80,17 @@ impl<W: Write> McapWriter<W> {
     }
 
     /// A stream of this topic. Its type is that of its first message.
-    pub fn stream(&mut self, topic: &str) -> StreamId {
+    ///
+    /// # Errors
+    /// [`Error::Value`] where there are more than MCAP can count, 65,536.
+    pub fn stream(&mut self, topic: &str) -> Result<StreamId> {
         if let Some(known) = self.channels.iter().position(|channel| channel.topic == topic) {
-            return StreamId(known as u16);
+            return Ok(StreamId(known as u16));
         }
+        let id = u16::try_from(self.channels.len())
+            .map_err(|_| Error::value("stream", format!("`{topic}` is one more than the 65536 that MCAP can count")))?;
         self.channels.push(Channel { topic: topic.to_owned(), message: None, messages: 0 });
-        StreamId((self.channels.len() - 1) as u16)
+        Ok(StreamId(id))
     }
 
     /// Writes one message with its time, which is both that of the measurement and of the recording.
@@ -97,10 +104,10 @@ impl<W: Write> McapWriter<W> {
         let time = time.ok_or_else(|| {
             Error::value("message", format!("is of {second} s since 1970, expected 0 to {} s", i32::MAX))
         })?;
-        let (message, bytes) = encode(time_ns, payload)
-            .ok_or_else(|| Error::value("message", "has no type in ROS, expected an image, a camera, an inertial sample"))?;
+        let (message, bytes) = encode(time_ns, payload).ok_or_else(|| {
+            Error::value("message", "has no type in ROS, expected an image, a camera, an inertial sample")
+        })?;
         self.declare(stream, message)?;
-        let written = u64::from(stream.0);
         let record = Record::default()
             .u16(stream.0)
             .u32(self.channels[stream.0 as usize].messages as u32)
@@ -108,7 +115,6 @@ impl<W: Write> McapWriter<W> {
             .u64(time)
             .bytes(&bytes)
             .finish(opcode::MESSAGE);
-        debug_assert!(written <= u64::from(u16::MAX));
         let at = self.chunk.records.len() as u64;
         self.chunk.index.entry(stream.0).or_default().push((time, at));
         self.chunk.records.extend(record);
@@ -169,7 +175,8 @@ impl<W: Write> McapWriter<W> {
         match channel.message {
             Some(known) if known == message => return Ok(()),
             Some(known) => {
-                let reason = format!("is {}, but its stream `{}` has {}", message.ros2_name(), channel.topic, known.ros2_name());
+                let reason =
+                    format!("is {}, but its stream `{}` has {}", message.ros2_name(), channel.topic, known.ros2_name());
                 return Err(Error::value("message", reason));
             }
             None => channel.message = Some(message),
@@ -206,7 +213,9 @@ impl<W: Write> McapWriter<W> {
             return Ok(());
         }
         let times = chunk.times.unwrap_or([0, 0]);
-        let mut encoder = lz4_flex::frame::FrameEncoder::new(Vec::new());
+        // Small blocks: of a chunk that is cut off, all whole blocks are read.
+        let frame = FrameInfo::new().block_size(BlockSize::Max64KB);
+        let mut encoder = FrameEncoder::with_frame_info(frame, Vec::new());
         encoder.write_all(&chunk.records)?;
         let compressed = encoder.finish().map_err(io::Error::other)?;
         let start = self.position;

@@ -92,9 +92,8 @@ pub(super) fn imu(frame: &[u8]) -> Result<([u64; 2], Imu), String> {
         frame.try_into().map_err(|_| format!("has a sample of {} bytes, expected {IMU_SAMPLE}", frame.len()))?;
     let time = |at: usize| u64::from_le_bytes(std::array::from_fn(|byte| bytes[at + byte]));
     let value = |at: usize| {
-        let values: [f32; 3] = std::array::from_fn(|axis| {
-            f32::from_le_bytes(std::array::from_fn(|byte| bytes[at + 4 * axis + byte]))
-        });
+        let values: [f32; 3] =
+            std::array::from_fn(|axis| f32::from_le_bytes(std::array::from_fn(|byte| bytes[at + 4 * axis + byte])));
         Measured { value: values.map(f64::from), covariance: [0.0; 9] }
     };
     let imu = Imu {

@@ -50,7 +50,8 @@ impl Matroska {
             waiting: VecDeque::new(),
         };
         while let Next::Element(element) = matroska.peek(input)? {
-            if element.id == id::CLUSTER || !element.is_entered() && element.size.is_none_or(|size| size > input.left()) {
+            if element.id == id::CLUSTER || !element.is_entered() && element.size.is_none_or(|size| size > input.left())
+            {
                 break;
             }
             matroska.step(input, contents)?;
@@ -102,7 +103,8 @@ impl Matroska {
         if element.is_entered() {
             if element.id == id::SEGMENT {
                 // A recorder that was killed leaves the size open, or zero.
-                self.stated_end = element.size.filter(|size| *size > 0).map(|size| input.position().saturating_add(size));
+                self.stated_end =
+                    element.size.filter(|size| *size > 0).map(|size| input.position().saturating_add(size));
                 self.closed = self.stated_end.is_some();
             }
             return Ok(None);
@@ -121,14 +123,7 @@ impl Matroska {
         Ok(None)
     }
 
-    fn element(
-        &mut self,
-        id: u32,
-        at: u64,
-        size: u64,
-        input: &mut Input,
-        contents: &mut Contents,
-    ) -> io::Result<()> {
+    fn element(&mut self, id: u32, at: u64, size: u64, input: &mut Input, contents: &mut Contents) -> io::Result<()> {
         let most = match id {
             id::SIMPLE_BLOCK | id::BLOCK_GROUP => LARGEST_RECORD,
             id::ATTACHED_FILE => LARGEST_ATTACHMENT + LONGEST_DESCRIPTION,
@@ -142,7 +137,8 @@ impl Matroska {
             _ => return Ok(()),
         };
         if size > most {
-            contents.fault(at, format!("element {id:#x} has {size} bytes, expected at most {most}, and was passed over"));
+            contents
+                .fault(at, format!("element {id:#x} has {size} bytes, expected at most {most}, and was passed over"));
             return Ok(());
         }
         let data = input.bytes(size)?;
@@ -156,7 +152,9 @@ impl Matroska {
             id::TRACK_ENTRY => self.track(at, &data, contents),
             id::TAG => self.tag(&data, contents),
             id::TIMESTAMP => self.cluster_ticks = i64::try_from(unsigned(&data)).unwrap_or(i64::MAX),
-            id::TIMESTAMP_SCALE => self.nanoseconds_per_tick = i64::try_from(unsigned(&data)).unwrap_or(i64::MAX).max(1),
+            id::TIMESTAMP_SCALE => {
+                self.nanoseconds_per_tick = i64::try_from(unsigned(&data)).unwrap_or(i64::MAX).max(1)
+            }
             id::WRITING_APP => contents.property("recorder", text(&data)),
             id::TITLE => contents.property("title", text(&data)),
             _ => {

@@ -62,6 +62,7 @@ impl Kind {
                 Self::Raw
             }
             Encoding::Unsigned16 | Encoding::Float32 if light && !says(&["depth"]) => Self::Intensity,
+            Encoding::Unsigned16 | Encoding::Float32 if says(&["range"]) && !says(&["depth"]) => Self::Range,
             Encoding::Unsigned16 | Encoding::Float32 => Self::Depth,
             Encoding::Other(_) => Self::Other,
             _ => Self::Colour,

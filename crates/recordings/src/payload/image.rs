@@ -223,15 +223,19 @@ impl Image {
         }
     }
 
-    /// Depths in metres, row by row, NaN where there is none: 16-bit values are millimetres with 0 for none, single
-    /// precision is metres with NaN, an infinity or nothing above zero for none (REP 118).
+    /// Depths in metres, row by row, NaN where there is none: 16-bit values are millimetres with 0 for none (REP 118), and
+    /// 65535, the end of the scale, is none either; single precision is metres with NaN, an infinity or nothing above zero for none.
     pub fn depths_m(&self) -> Option<Vec<f32>> {
         let scale = match self.encoding {
             Encoding::Unsigned16 | Encoding::Mono16 => 0.001,
             Encoding::Float32 => 1.0,
             _ => return None,
         };
+        let end_of_scale = if scale < 1.0 { f32::from(u16::MAX) } else { f32::INFINITY };
         let metres = |value: f32| {
+            if value >= end_of_scale {
+                return f32::NAN;
+            }
             let metres = (f64::from(value) * scale) as f32;
             if metres.is_finite() && metres > 0.0 { metres } else { f32::NAN }
         };

@@ -1,5 +1,5 @@
 //! Recordings that tests make themselves, and what they read.
-#![allow(dead_code)]
+#![allow(dead_code, clippy::float_cmp, clippy::panic, clippy::unwrap_used)]
 
 pub mod adi;
 pub mod bag;

@@ -46,6 +46,15 @@ pub enum Error {
         /// Row.
         row: f64,
     },
+    /// A rational model folds over inside its image: no ray belongs to a pixel position.
+    #[cfg(feature = "convert")]
+    #[error("the rational lens model folds over inside its image: no ray belongs to pixel ({col}, {row})")]
+    RationalFold {
+        /// Column.
+        col: f64,
+        /// Row.
+        row: f64,
+    },
     /// The fit of one lens model to another failed.
     #[cfg(feature = "convert")]
     #[error("fitting one lens model to another: {0}")]

@@ -20,6 +20,8 @@ pub use error::Error;
 use error::Result;
 #[cfg(feature = "convert")]
 pub use lenses::plumb_bob::PlumbBob;
+#[cfg(feature = "convert")]
+pub use lenses::rational::Rational;
 pub use nalgebra;
 pub use observation::{Observation, ObservationJacobians};
 pub use pose::{

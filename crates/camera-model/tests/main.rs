@@ -9,4 +9,5 @@ mod jacobians;
 mod kinect2_rays;
 mod plumb_bob;
 mod poses;
+mod rational;
 mod round_trips;

@@ -18,6 +18,7 @@ use crate::requests::fleet::fleet_arguments::FleetArguments;
 use crate::requests::fleet::merge_arguments::MergeArguments;
 use crate::requests::fleet::part::part;
 use crate::requests::fleet::workflow_arguments::WorkflowArguments;
+use crate::requests::frames::convert_arguments::ConvertArguments;
 use crate::requests::frames::explain_arguments::ExplainArguments;
 use crate::requests::frames::live_arguments::LiveArguments;
 use crate::requests::noise_arguments::NoiseArguments;
@@ -127,11 +128,14 @@ pub(crate) enum Command {
     Register(RegisterArguments),
     /// Find where stations stand by targets, by an inertial unit, or by the poses of a tracker, with standard deviations.
     Orient(Box<OrientArguments>),
-    /// Tell what a survey, a calibration or a cloud holds, and which stages it leaves room for.
+    /// Tell what a survey, a calibration or a cloud holds, and which stages it leaves room for; of a recording (MCAP, ROS 1 bag,
+    /// Azure Kinect, ADI) its streams with rates and gaps, cameras, temperatures, and where it is cut off.
     Inspect {
-        /// Survey folder, calibration.ron or cloud.ply.
+        /// Survey folder, calibration.ron, cloud.ply, or a recording.
         path: PathBuf,
     },
+    /// Convert a recording to a survey's folder or to MCAP, or a survey to MCAP: frame by frame, with their times.
+    Convert(Box<ConvertArguments>),
     /// Tell whether a calibration is still right for a survey of overlapping stations, by surfaces that they have in common: which
     /// terms moved, and what that does in millimetres. Exit code 0: it is, 1: it is not, 3: the survey cannot tell.
     Check(CheckArguments),

@@ -79,7 +79,13 @@ pub(crate) fn dispatch(command: Command, threads: Option<usize>, output: &Output
         Command::Orient(arguments) => {
             output.result(&orientation_tasks::orient(&arguments.request(), output.progress().as_ref())?)
         }
+        Command::Inspect { path } if recording_tasks::is_recording(&path) => {
+            output.result(&recording_tasks::inspect_recording(&path, output.progress().as_ref())?)
+        }
         Command::Inspect { path } => output.result(&tasks::inspect(&path)?),
+        Command::Convert(arguments) => {
+            output.result(&recording_tasks::convert(&arguments.request(), output.progress().as_ref())?)
+        }
         Command::Explain(arguments) => {
             output.result(&tasks::explain(&arguments.request()?, output.progress().as_ref())?)
         }

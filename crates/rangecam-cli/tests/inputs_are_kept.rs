@@ -5,6 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
+use recordings::{Encoding, Image, McapWriter, Payload};
 use tempfile::TempDir;
 
 /// A command with all that it reads, and what it is run on.
@@ -65,6 +66,7 @@ fn cases() -> Vec<Case> {
             "survey poses/t.txt poses/s.csv",
         ),
         case("orient, imu", "orient survey --by imu --known poses/s.csv", "survey poses/s.csv"),
+        case("convert", "convert rec/r.mcap -c cal/c.ron", "rec/r.mcap cal/c.ron"),
         case("compare", "compare one/a.xyz two/b.xyz", "one/a.xyz two/b.xyz"),
         case("compare, outputs", "compare older newer", "older newer"),
     ]
@@ -93,12 +95,23 @@ fn copy(from: &Path, to: &Path) {
     }
 }
 
+/// Two depth images of the survey's size.
+fn recording() -> Vec<u8> {
+    let mut writer = McapWriter::new(Vec::new()).unwrap();
+    let stream = writer.stream("/depth/image_raw").unwrap();
+    for time_ns in 1..3 {
+        let image = Image::from_u16("depth", [66, 54], Encoding::Unsigned16, &[1500; 66 * 54]).unwrap();
+        writer.message(stream, time_ns, &Payload::Image(image)).unwrap();
+    }
+    writer.finish().unwrap()
+}
+
 /// A folder with one of everything. Surveys and results carry the mark of a complete output, as those do that this
 /// program made: it alone would let them be replaced.
 fn world() -> TempDir {
     let root = tempfile::tempdir().unwrap();
     let at = |path: &str| root.path().join(path);
-    for folder in ["plan", "cal", "scenes", "networks", "poses", "one", "two"] {
+    for folder in ["plan", "cal", "scenes", "networks", "poses", "one", "two", "rec"] {
         fs::create_dir(at(folder)).unwrap();
     }
     // A quarter of the pixels: what is asked does not depend on them.
@@ -135,6 +148,7 @@ fn world() -> TempDir {
     for cloud in ["one/a.xyz", "two/b.xyz"] {
         fs::write(at(cloud), &points).unwrap();
     }
+    fs::write(at("rec/r.mcap"), recording()).unwrap();
     for folder in ["older", "newer"] {
         copy(&at("targets"), &at(folder));
     }
@@ -211,7 +225,8 @@ fn no_command_writes_where_it_reads() {
                 let words = String::from_utf8_lossy(&refused.stderr);
                 let told = format!("{}, --out {out}: {words}", case.name);
                 assert_eq!(refused.status.code(), Some(2), "{told}");
-                assert!(words.contains("cannot be the output folder") || words.contains("is a file"), "{told}");
+                let known = ["cannot be the output folder", "cannot be the output file", "is a file"];
+                assert!(known.iter().any(|known| words.contains(known)), "{told}");
             }
         }
         assert!(everything(root) == before, "{} changed something", case.name);
@@ -255,8 +270,12 @@ fn no_command_changes_what_it_reads() {
         rangecam(root, &line);
         assert!(everything(root) == before, "{} changed something", case.name);
     }
+    let mcap = tempfile::tempdir().unwrap();
+    let again = format!("convert rec/r.mcap --out {}", mcap.path().join("again.mcap").display());
     for line in [
+        again.as_str(),
         "inspect survey",
+        "inspect rec/r.mcap",
         "explain survey --frame 0 --pixel 3,3",
         "diff cal/c.ron survey/calibration.ron",
         "check survey -c cal/c.ron",

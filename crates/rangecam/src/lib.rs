@@ -151,6 +151,12 @@ pub mod application {
     #[cfg(feature = "range-io")]
     #[doc(inline)]
     pub use range_io;
+    #[cfg(feature = "recording-tasks")]
+    #[doc(inline)]
+    pub use recording_tasks;
+    #[cfg(feature = "recordings")]
+    #[doc(inline)]
+    pub use recordings;
     #[cfg(feature = "report")]
     #[doc(inline)]
     pub use report;

@@ -7,6 +7,9 @@
 
 mod chance;
 mod mutate;
+// The recordings that the crate `recordings` tests itself by.
+#[path = "../../../recordings/tests/common/mod.rs"]
+mod recorded;
 mod seeds;
 mod targets;
 mod worker;

@@ -7,6 +7,7 @@ use range_io::clouds::{CloudFile, Precision, write_any_cloud};
 use range_io::npz::NpzWriter;
 
 use super::mutate::{CRC_32, crc};
+use super::recorded;
 
 type Outcome<T> = Result<T, Box<dyn std::error::Error>>;
 
@@ -56,6 +57,10 @@ pub fn of(target: &str, folder: &Path) -> Outcome<Vec<Vec<u8>>> {
             seeds.push(std::fs::read(file)?);
         }
         "mkv" => seeds.push(recording()),
+        "recording_mcap" => seeds.push(recorded::mcap::recording()),
+        "recording_bag" => seeds.extend([recorded::bag::recording("none"), recorded::bag::recording("lz4")]),
+        "recording_kinect" => seeds.push(recorded::mkv::recording()),
+        "recording_adi" => seeds.extend([recorded::adi::bin(), recorded::adi::adcam(2, 2)]),
         _ => {}
     }
     Ok(seeds)

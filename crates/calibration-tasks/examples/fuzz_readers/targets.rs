@@ -7,6 +7,7 @@ use pipeline::Plan;
 use range_io::calibration::Calibration;
 use range_io::survey::{Survey, read_frame, read_truth};
 use range_io::{azure, e57, mkv, npz, pcd, ply, png16, tables, trajectory, vtk, xyz};
+use recordings::{Payload, Recording};
 use simulation::SimulationSpec;
 
 /// A reader and the name of the file that it is given.
@@ -58,6 +59,19 @@ fn recording(path: &Path) -> bool {
     recording.depth_frame(0).is_ok() | recording.depth_frame(1).is_ok()
 }
 
+/// Reads every message of a recording of any format.
+fn messages(path: &Path) -> bool {
+    let Ok(mut recording) = Recording::open(path) else { return false };
+    let mut accepted = false;
+    while let Ok(Some(message)) = recording.next_message() {
+        accepted = true;
+        if let Payload::Image(image) = &message.payload {
+            accepted |= image.depths_m().is_some() | image.values_f32().is_some();
+        }
+    }
+    accepted
+}
+
 pub const TARGETS: &[Target] = &[
     text("survey", "survey.ron", |path| Survey::read(path).is_ok()),
     text("calibration", "calibration.ron", |path| Calibration::read(path).is_ok()),
@@ -86,4 +100,8 @@ pub const TARGETS: &[Target] = &[
     binary("npy", "frame.npy", |path| npz::read_npy(path, "depth", |_| Ok(())).is_ok() | frame(path)),
     binary("png", "depth.png", |path| png16::read(path).is_ok() | frame(path)),
     binary("mkv", "depth.mkv", |path| recording(path) | frame(path)),
+    binary("recording_mcap", "recording.mcap", messages),
+    binary("recording_bag", "recording.bag", messages),
+    binary("recording_kinect", "recording.mkv", messages),
+    binary("recording_adi", "recording.bin", messages),
 ];

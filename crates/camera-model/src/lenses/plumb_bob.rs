@@ -70,26 +70,8 @@ impl Camera {
     /// and distance are taken over exactly (`fy / fx` goes into the pitch along a column); the lens is fitted so that the
     /// largest residual, in the corners of most cameras, is small. Fails with [`Error::PlumbBobFold`] where the given model folds over inside its image.
     pub fn from_plumb_bob(model: &PlumbBob, pixel_pitch_mm: f64) -> Result<(Self, f64)> {
-        let mut camera = pinhole(model, pixel_pitch_mm)?;
-        let c = camera.interior.principal_distance_mm;
-        let per_mm = pixels_per_mm(&camera.format);
-        let pairs = nodes(&camera.format, FIT_NODES)
-            .map(|pixel| {
-                let from = camera.interior.reduced(camera.format.image_from_pixel(pixel));
-                let ideal = model.ideal(pixel)?;
-                // What the fit leaves of the ideal point, the given model carries to the image.
-                let pixel_by_misfit = per_mm * model.as_correction_of_ideal().derivative(ideal);
-                Ok(Pair { from, to: ideal * c, pixel_by_misfit })
-            })
-            .collect::<Result<Vec<_>>>()?;
-        camera.lens = fit_lens(&pairs)?;
-        let mut largest = 0.0_f64;
-        for pixel in nodes(&camera.format, CHECK_NODES) {
-            let observed = camera.observed_reduced(model.ideal(pixel)? * c)?;
-            let found = camera.format.pixel_from_image(camera.image_from_reduced(observed));
-            largest = largest.max((found[0] - pixel[0]).hypot(found[1] - pixel[1]));
-        }
-        Ok((camera, largest))
+        let derivative = |ideal| model.as_correction_of_ideal().derivative(ideal);
+        fit_camera(pinhole(model, pixel_pitch_mm)?, |pixel| model.ideal(pixel), derivative)
     }
 
     /// The `plumb_bob` model that agrees best, over the image, with this camera, and the largest residual in pixels:
@@ -123,8 +105,35 @@ impl Camera {
     }
 }
 
+/// This camera with the lens that agrees best, over the image, with a model that tells the ideal point (normalised, y up) of a
+/// pixel and the derivative of the distorted by the ideal point; and the largest residual in pixels.
+pub(super) fn fit_camera(
+    mut camera: Camera,
+    ideal: impl Fn([f64; 2]) -> Result<Vector2<f64>>,
+    derivative: impl Fn(Vector2<f64>) -> Matrix2<f64>,
+) -> Result<(Camera, f64)> {
+    let c = camera.interior.principal_distance_mm;
+    let per_mm = pixels_per_mm(&camera.format);
+    let pairs = nodes(&camera.format, FIT_NODES)
+        .map(|pixel| {
+            let from = camera.interior.reduced(camera.format.image_from_pixel(pixel));
+            let ideal = ideal(pixel)?;
+            // What the fit leaves of the ideal point, the given model carries to the image.
+            Ok(Pair { from, to: ideal * c, pixel_by_misfit: per_mm * derivative(ideal) })
+        })
+        .collect::<Result<Vec<_>>>()?;
+    camera.lens = fit_lens(&pairs)?;
+    let mut largest = 0.0_f64;
+    for pixel in nodes(&camera.format, CHECK_NODES) {
+        let observed = camera.observed_reduced(ideal(pixel)? * c)?;
+        let found = camera.format.pixel_from_image(camera.image_from_reduced(observed));
+        largest = largest.max((found[0] - pixel[0]).hypot(found[1] - pixel[1]));
+    }
+    Ok((camera, largest))
+}
+
 /// The camera of a `plumb_bob` model without its lens.
-fn pinhole(model: &PlumbBob, pitch: f64) -> Result<Camera> {
+pub(super) fn pinhole(model: &PlumbBob, pitch: f64) -> Result<Camera> {
     for (name, value) in [("fx", model.fx), ("fy", model.fy)] {
         if !(value.is_finite() && value > 0.0) {
             return Err(Error::OutOfDomain { name, value, expected: "a focal length is positive and finite" });

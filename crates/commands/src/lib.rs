@@ -1,5 +1,6 @@
 #![doc = include_str!("../README.md")]
 
+mod date;
 mod destination;
 mod digest;
 mod error;
@@ -8,6 +9,7 @@ pub mod plan;
 mod progress;
 mod verdict;
 
+pub use date::today;
 pub use destination::{Inputs, RefusalFile, check_name, json, produce, root_of};
 pub use digest::InputDigest;
 pub use error::drift::DriftError;

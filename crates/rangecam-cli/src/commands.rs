@@ -75,6 +75,9 @@ pub(crate) fn dispatch(command: Command, output: &Output) -> Outcome {
         Command::Explain(arguments) => {
             output.result(&pipeline::explain(&arguments.request()?, output.progress().as_ref())?)
         }
+        Command::Colour(arguments) => {
+            output.result(&rig_tasks::colour(&arguments.request(), output.progress().as_ref())?)
+        }
         Command::Fuse(arguments) => {
             output.result(&cloud_tasks::fuse(&arguments.request(), output.progress().as_ref())?)
         }

@@ -42,6 +42,7 @@ fn cases() -> Vec<Case> {
         case("calibrate, surfaces", "calibrate survey -c cal/c.ron --method surfaces", "survey cal/c.ron"),
         case("measure", "measure older --lengths plan/lengths.ron", "older plan/lengths.ron"),
         case("fuse", "fuse older", "older"),
+        case("colour", "colour rig S01 -c rigged", "rig rigged"),
         case("targets", "targets survey -c cal/c.ron -k checkerboard 9x6 0.025", "survey cal/c.ron"),
         case("targets, single", "targets survey -c cal/c.ron -k lights", "survey cal/c.ron"),
         case("calibrate, rings first", "calibrate survey -c cal/c.ron --targets rings 0.05", "survey cal/c.ron"),
@@ -131,9 +132,10 @@ fn world() -> TempDir {
     for cloud in ["one/a.xyz", "two/b.xyz"] {
         fs::write(at(cloud), &points).unwrap();
     }
-    for folder in ["older", "newer"] {
+    for folder in ["older", "newer", "rigged", "rig/left", "rig/right"] {
         copy(&at("targets"), &at(folder));
     }
+    fs::write(at("rig/rig.ron"), "(cameras: [(name: \"left\"), (name: \"right\")])").unwrap();
     root
 }
 

@@ -1,4 +1,5 @@
-//! Arguments of what works on the cloud of a result.
+//! Arguments of what works on clouds.
 
+pub(crate) mod colour_arguments;
 pub(crate) mod fuse_arguments;
 pub(crate) mod measure_arguments;

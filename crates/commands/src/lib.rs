@@ -1,5 +1,6 @@
 #![doc = include_str!("../README.md")]
 
+mod date;
 mod destination;
 mod digest;
 mod error;
@@ -11,6 +12,7 @@ pub mod simulate;
 mod tape;
 mod verdict;
 
+pub use date::today;
 pub use destination::{Inputs, RefusalFile, check_name, json, produce, produce_made, root_of};
 pub use digest::InputDigest;
 pub use error::drift::DriftError;

@@ -17,7 +17,9 @@ pub use approximation::approximate_poses;
 pub use camera_model;
 pub use error::Error;
 use error::Result;
-pub use identification::{Identification, IdentificationOptions, UnnamedTarget, identify_targets};
+pub use identification::{
+    Identification, IdentificationOptions, NameCheckOptions, NameVerdict, UnnamedTarget, check_names, identify_targets,
+};
 pub use mounting::{
     LeverArm, Mounting, MountingOptions, MountingResidual, TimeOffset, TimedPose, Undetermined, estimate_mounting,
 };

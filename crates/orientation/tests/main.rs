@@ -4,6 +4,8 @@
 mod common;
 mod identification;
 mod mounting;
+mod names;
 mod network;
 mod resection;
+mod surveys;
 mod two_views;

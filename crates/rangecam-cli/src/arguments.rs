@@ -10,6 +10,7 @@ use crate::requests::calibration::check_arguments::CheckArguments;
 use crate::requests::calibration::diff_arguments::DiffArguments;
 use crate::requests::calibration::plan_arguments::PlanArguments;
 use crate::requests::calibration::targets_arguments::TargetsArguments;
+use crate::requests::clouds::colour_arguments::ColourArguments;
 use crate::requests::clouds::compare_arguments::CompareArguments;
 use crate::requests::clouds::fuse_arguments::FuseArguments;
 use crate::requests::clouds::measure_arguments::MeasureArguments;
@@ -147,6 +148,9 @@ pub(crate) enum Command {
     /// Take frames as they come, from a pipe, a socket, a folder that fills or a recording, to clouds, a status line and a page in the
     /// browser. What comes faster than it is processed is dropped frame by frame, and counted.
     Live(Box<LiveArguments>),
+    /// Put the colours of one camera of a rig onto the points of another, exposed at the same moment; points that it does not see get
+    /// none.
+    Colour(ColourArguments),
     /// Fuse the frames of a result into one cloud without double walls, each point with its standard deviation from all sources.
     Fuse(FuseArguments),
     /// Measure lengths, angles, radii, flatness and volumes between named regions of a result's cloud, each with its standard

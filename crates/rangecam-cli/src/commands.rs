@@ -89,6 +89,9 @@ pub(crate) fn dispatch(command: Command, threads: Option<usize>, output: &Output
         Command::Explain(arguments) => {
             output.result(&tasks::explain(&arguments.request()?, output.progress().as_ref())?)
         }
+        Command::Colour(arguments) => {
+            output.result(&rig_tasks::colour(&arguments.request(), output.progress().as_ref())?)
+        }
         Command::Fuse(arguments) => {
             output.result(&cloud_tasks::fuse(&arguments.request(), output.progress().as_ref())?)
         }

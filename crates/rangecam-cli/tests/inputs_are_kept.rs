@@ -47,6 +47,7 @@ fn cases() -> Vec<Case> {
         case("calibrate, surfaces", "calibrate survey -c cal/c.ron --method surfaces", "survey cal/c.ron"),
         case("measure", "measure older --lengths plan/lengths.ron", "older plan/lengths.ron"),
         case("fuse", "fuse older", "older"),
+        case("colour", "colour rig S01 -c rigged", "rig rigged"),
         case("targets", "targets survey -c cal/c.ron -k checkerboard 9x6 0.025", "survey cal/c.ron"),
         case("targets, single", "targets survey -c cal/c.ron -k lights", "survey cal/c.ron"),
         case("calibrate, rings first", "calibrate survey -c cal/c.ron --targets rings 0.05", "survey cal/c.ron"),
@@ -149,7 +150,7 @@ fn world() -> TempDir {
         fs::write(at(cloud), &points).unwrap();
     }
     fs::write(at("rec/r.mcap"), recording()).unwrap();
-    for folder in ["older", "newer"] {
+    for folder in ["older", "newer", "rigged", "rig/left", "rig/right"] {
         copy(&at("targets"), &at(folder));
     }
     for part in ["1", "2"] {
@@ -163,6 +164,7 @@ fn world() -> TempDir {
         fs::create_dir_all(at(folder)).unwrap();
     }
     fs::write(at("flow/codes/north/monday/recordings/hall.code"), "2").unwrap();
+    fs::write(at("rig/rig.ron"), "(cameras: [(name: \"left\"), (name: \"right\")])").unwrap();
     root
 }
 

@@ -4,6 +4,7 @@ mod adjustment;
 mod alone;
 mod calibrate;
 mod error;
+mod hold_out;
 mod mountings;
 mod names;
 mod outcome;
@@ -13,6 +14,7 @@ mod world;
 
 pub use calibrate::calibrate_rig;
 pub use error::Error;
+pub use hold_out::hold_out;
 pub use outcome::{MountedCamera, MountingResidual, RigOutcome};
 pub use rig::{Rig, RigCamera};
 // Of the signatures.

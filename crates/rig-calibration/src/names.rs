@@ -207,7 +207,7 @@ impl Names {
 
 /// A station of the rig as a camera has it. One that it was not exposed at has an integration time of others, so that no
 /// range terms of their own belong to it.
-fn station(own: &Network, name: &str, is_first: bool) -> Station {
+pub(crate) fn station(own: &Network, name: &str, is_first: bool) -> Station {
     let seen = own.sightings.first().map(|seen| &own.stations[seen.station]);
     let absent = Station {
         name: name.to_owned(),

@@ -5,4 +5,5 @@
 mod rigs;
 
 mod broken;
+mod hold_out;
 mod mountings;

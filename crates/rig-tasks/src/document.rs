@@ -4,6 +4,7 @@ use std::fmt;
 
 use report::{Axes, CATEGORIES, Column, Document, Figure, Merit, Series, curves, heat_map};
 
+use crate::certificate::verdicts;
 use crate::summary::{CameraSummary, EpochResidual, RigSummary};
 
 /// Correlations from here on are outlined.
@@ -35,13 +36,21 @@ pub(crate) fn document(summary: &RigSummary) -> Document {
         document.explanation("Nothing is weakly determined.");
     }
     document.list(&summary.diagnosis);
+    if let Some(certificate) = &summary.certificate {
+        document.section("Verdicts");
+        document.explanation(
+            "What every test says; those of each camera are in its own certificate. Epochs left out (--hold-out) are predicted camera by \
+             camera: the other cameras give the pose of the rig, and mounting, lens and range terms come from the other epochs.",
+        );
+        verdicts(&mut document, certificate);
+    }
     mountings(&mut document, summary);
     by_epoch(&mut document, &summary.cameras);
     cameras(&mut document, &summary.cameras);
     document.closing(if summary.converged {
         format!(
-            "took {:.1} s; written to {}: report.html, summary.json, mountings.csv, adjusted_epochs.csv, adjusted_targets.csv, \
-             and a folder for each camera with its calibration.ron, residuals and report",
+            "took {:.1} s; written to {}: report.html, certificate.html, summary.json, mountings.csv, adjusted_epochs.csv, \
+             adjusted_targets.csv, and a folder for each camera with its calibration.ron, residuals, report and certificate",
             summary.seconds,
             summary.out.display()
         )

@@ -5,23 +5,33 @@ use std::path::Path;
 use std::time::Instant;
 
 use atomic_output::{Destination, write_text};
-use calibration_tasks::{CalibrateMethod, CalibrateRequest, CalibrationOptions, CameraFiles, Method, OffsetModel};
-use commands::{Inputs, Progress, json, produce};
+use calibration_tasks::{
+    CalibrateMethod, CalibrateRequest, CalibrationOptions, CalibrationSummary, CameraFiles, HeldOut, Method,
+    OffsetModel,
+};
+use commands::{Doubt, DoubtKind, InputDigest, Inputs, Progress, json, produce, today};
 use nalgebra::Point3;
 use pipeline::{Error, Result};
 use range_io::tables::{Station, Target, write_stations, write_targets};
 use rig_calibration::self_calibration::{AdjustedStation, AdjustedTarget, Error as Cause};
-use rig_calibration::{Error as RigError, Rig, RigCamera, RigOutcome};
+use rig_calibration::{Error as RigError, MountedCamera, Rig, RigCamera, RigOutcome};
 
+use crate::certificate::{CameraCheck, RigCertificate, page};
 use crate::document::document;
 use crate::file::RigFile;
 use crate::summary::{DESCRIBE, METHOD, RigSummary, sigmas_of};
 
+/// Files that are read, where they are there: beside `rig.ron`, and in each camera's folder.
+const OF_THE_RIG: [&str; 2] = ["rig.ron", "targets.csv"];
+const OF_A_CAMERA: [&str; 6] =
+    ["survey.ron", "observations.csv", "stations.csv", "targets.csv", "distances.csv", "calibration.ron"];
+
 /// Calibrates the rig in the folder `request.survey` and writes the results into the request's output folder.
 ///
 /// Each camera starts from the `calibration.ron` of its folder or its nominal camera. Terms, datum, rejection and
-/// defaults are those of the request; what it asks for besides (another method, a lens survey, an offset of pixels, stations
-/// held out, a calibration) is refused.
+/// defaults are those of the request; what it asks for besides (another method, a lens survey, an offset of pixels, a
+/// calibration) is refused. With `certificate.hold_out` every so many epochs are left out and predicted, camera by camera
+/// ([`rig_calibration::hold_out`]).
 ///
 /// # Errors
 /// As [`calibration_tasks::calibrate`]: [`Error::Refused`] where the observations do not determine or contradict what was
@@ -44,8 +54,6 @@ fn check(request: &CalibrateRequest) -> Result<()> {
         (request.lens_survey.is_some(), "--lens-survey: a rig is calibrated in one step"),
         (request.offset != OffsetModel::Constant, "--offset: that is found from frames of planes, camera by camera"),
         (request.calibration.is_some(), "--calibration: each camera of a rig starts from the one in its own folder"),
-        (request.certificate.hold_out.is_some(), "--hold-out: no stations of a rig are held out"),
-        (request.certificate.operator.is_some(), "--operator: there is no certificate of a rig"),
     ];
     match unfit.into_iter().find(|(is_asked, _)| *is_asked) {
         Some((_, message)) => Err(Error::Request { command: "calibrate", message: message.to_owned() }),
@@ -87,8 +95,11 @@ fn calibrate_into(
         Ok(outcome) => {
             let mut summary = RigSummary::new(name, file, &files, &outcome);
             summary.out.clone_from(&request.out);
+            let checks = hold_outs(&rig, request, &outcome, progress);
+            let certified = certified(request, &files, &outcome, &checks)?;
+            certify(request, file, &mut summary, checks, &certified)?;
             summary.seconds = commands::made::seconds_since(clock);
-            write(destination, &files, &outcome, &summary)?;
+            write(destination, request, Results { files: &files, outcome: &outcome, certified }, &summary)?;
             Ok(summary)
         }
         Err(error) => {
@@ -173,13 +184,93 @@ fn refused_summary(error: &RigError, summary: &RigSummary) -> Result<Option<Stri
     }
 }
 
-fn write(destination: &Destination, files: &[CameraFiles], outcome: &RigOutcome, summary: &RigSummary) -> Result<()> {
-    let folder = destination.open()?;
-    for (camera, files) in outcome.cameras.iter().zip(files) {
+/// The check on epochs left out, of each camera.
+fn hold_outs(rig: &Rig, request: &CalibrateRequest, outcome: &RigOutcome, progress: &dyn Progress) -> Vec<HeldOut> {
+    let every = request.certificate.hold_out;
+    let made = every.map(|every| {
+        progress.begin("check epochs left out", 1);
+        rig_calibration::hold_out(rig, &request.options, outcome, every)
+    });
+    progress.finish();
+    match made {
+        None => rig.cameras.iter().map(|_| HeldOut::not_asked()).collect(),
+        Some(Ok(all)) => all.into_iter().map(|check| HeldOut::made(every.unwrap_or(0), check)).collect(),
+        Some(Err(error)) => rig.cameras.iter().map(|_| HeldOut::NotMade { reason: error.to_string() }).collect(),
+    }
+}
+
+/// Summary of each camera with its certificate, and the certificate's page.
+fn certified(
+    request: &CalibrateRequest,
+    files: &[CameraFiles],
+    outcome: &RigOutcome,
+    checks: &[HeldOut],
+) -> Result<Vec<(CalibrationSummary, String)>> {
+    let own = |((camera, files), check): ((&MountedCamera, &CameraFiles), &HeldOut)| {
         let mut own = files.summary(&camera.calibration, METHOD, DESCRIBE);
+        own.out = request.out.join(&camera.name);
+        files.certified(request, &camera.calibration, own, check.clone())
+    };
+    outcome.cameras.iter().zip(files).zip(checks).map(own).collect()
+}
+
+/// The certificate of the rig, and what its tests and those of left-out epochs speak against.
+fn certify(
+    request: &CalibrateRequest,
+    file: &RigFile,
+    summary: &mut RigSummary,
+    checks: Vec<HeldOut>,
+    certified: &[(CalibrationSummary, String)],
+) -> Result<()> {
+    let names: Vec<String> = summary.cameras.iter().map(|camera| camera.name.clone()).collect();
+    let failed = |(own, _): &(CalibrationSummary, String)| {
+        let verdicts = own.certificate.iter().flat_map(|certificate| &certificate.verdicts);
+        verdicts.filter(|verdict| verdict.passed == Some(false)).map(|verdict| verdict.test.clone()).collect()
+    };
+    let failed: Vec<(String, Vec<String>)> = names.iter().cloned().zip(certified.iter().map(failed)).collect();
+    for (name, check) in names.iter().zip(&checks) {
+        let doubt = check.doubt();
+        summary.doubts.extend(doubt.map(|doubt| Doubt::about(DoubtKind::Prediction, name.as_str(), doubt.words)));
+        let excuse = check.excuse(request.certificate.hold_out);
+        summary.diagnosis.extend(excuse.map(|words| format!("camera `{name}`: {words}")));
+    }
+    let checks = names.into_iter().zip(checks).map(|(camera, check)| CameraCheck { camera, check }).collect();
+    let (operator, inputs) = (request.certificate.operator.clone(), digests(&request.survey, file)?);
+    let certificate = RigCertificate::new(summary, operator, inputs, checks, &failed);
+    summary.doubts.extend(certificate.doubts());
+    summary.certificate = Some(certificate);
+    Ok(())
+}
+
+/// Digests of all files that were read, in a fixed order.
+fn digests(root: &Path, file: &RigFile) -> Result<Vec<InputDigest>> {
+    let own = file.cameras.iter().flat_map(|camera| OF_A_CAMERA.map(|name| root.join(camera.folder()).join(name)));
+    let files = OF_THE_RIG.map(|name| root.join(name)).into_iter().chain(own).filter(|path| path.is_file());
+    files.map(InputDigest::of).collect()
+}
+
+/// What is written beside the summary.
+struct Results<'a> {
+    files: &'a [CameraFiles],
+    outcome: &'a RigOutcome,
+    certified: Vec<(CalibrationSummary, String)>,
+}
+
+fn write(
+    destination: &Destination,
+    request: &CalibrateRequest,
+    results: Results<'_>,
+    summary: &RigSummary,
+) -> Result<()> {
+    let Results { files, outcome, certified } = results;
+    let folder = destination.open()?;
+    for ((camera, files), (mut own, page)) in outcome.cameras.iter().zip(files).zip(certified) {
         own.seconds = summary.seconds;
-        own.out = summary.out.join(&camera.name);
-        files.write(&folder, &camera.name, &camera.calibration, &own)?;
+        files.write(&folder, &camera.name, &camera.calibration, (&own, &page))?;
+    }
+    if let Some(certificate) = &summary.certificate {
+        let date = request.certificate.date.clone().unwrap_or_else(today);
+        write_text(folder.file("certificate.html")?, &page(certificate, summary, &date))?;
     }
     write_text(folder.file("mountings.csv")?, &summary.mountings_csv())?;
     let epoch = |station: &AdjustedStation| {

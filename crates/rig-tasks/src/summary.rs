@@ -11,6 +11,7 @@ use pipeline::survey::StationPose;
 use rig_calibration::{MountedCamera, RigOutcome};
 use serde::Serialize;
 
+use crate::certificate::RigCertificate;
 use crate::file::RigFile;
 
 /// The method's name in files.
@@ -53,6 +54,9 @@ pub struct RigSummary {
     pub diagnosis: Vec<String>,
     /// What speaks against the result.
     pub doubts: Vec<Doubt>,
+    /// What a laboratory signs; `None` where the calibration was refused.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub certificate: Option<RigCertificate>,
     /// Wall-clock time of the whole run, second.
     pub seconds: f64,
     /// The output folder.
@@ -161,6 +165,7 @@ impl RigSummary {
             converged: false,
             diagnosis: vec![reason],
             doubts: Vec::new(),
+            certificate: None,
             seconds: 0.0,
             out: PathBuf::new(),
         }

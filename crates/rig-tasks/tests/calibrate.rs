@@ -137,6 +137,46 @@ fn a_rig_gives_mountings_calibrations_and_a_report() {
 }
 
 #[test]
+fn a_rig_has_a_certificate_and_predicts_epochs_left_out() {
+    let folder = Folder::new();
+    let mut request = folder.request();
+    request.certificate = CertificateRequest {
+        operator: Some("A. Name".to_owned()),
+        date: Some("2026-01-01".to_owned()),
+        hold_out: Some(4),
+    };
+    let summary = calibrate_rig(&request, &Silent).unwrap();
+    assert_eq!(summary.verdict(), Verdict::Done, "{:?}", summary.doubts);
+    let certificate = summary.certificate.as_ref().unwrap();
+    assert_eq!((certificate.hold_out.len(), certificate.mountings.len()), (3, 3));
+    assert!(certificate.mountings[1].expanded_position_m.unwrap().iter().all(|u| *u > 1e-5 && *u < 4e-3));
+    // Two of image points and ranges, one of image points alone.
+    let predicted = certificate.verdicts.iter().filter(|verdict| verdict.test.contains("left out"));
+    assert_eq!(predicted.filter(|verdict| verdict.passed == Some(true)).count(), 5, "{:?}", certificate.verdicts);
+    assert!(certificate.verdicts.iter().all(|verdict| verdict.passed == Some(true)), "{:?}", certificate.verdicts);
+    let read: Vec<&str> = certificate.inputs.iter().map(|input| input.file.rsplit('/').next().unwrap()).collect();
+    assert_eq!(read.iter().filter(|file| **file == "observations.csv").count(), 3, "{read:?}");
+    let page = read_to_string(folder.out().join("certificate.html")).unwrap();
+    for words in ["2026-01-01", "A. Name", "prediction of epochs left out: camera grey: image points", "SHA-256"] {
+        assert!(page.contains(words), "{words}");
+    }
+    let own = read_to_string(folder.out().join("right/certificate.html")).unwrap();
+    assert!(own.contains("prediction of stations left out: ranges") && own.contains("Expanded uncertainty"));
+    let json: serde_json::Value =
+        serde_json::from_str(&read_to_string(folder.out().join("summary.json")).unwrap()).unwrap();
+    let made = &json["certificate"]["hold_out"][1]["check"]["made"];
+    assert!(made["image"]["values"].as_u64().unwrap() > 50 && made["range"]["fails"] == false, "{made}");
+
+    // Without the waves the prediction of ranges fails, and the exit code says so.
+    request.options = options("xp yp c k1 k2 d0 e1 e2");
+    let summary = calibrate_rig(&request, &Silent).unwrap();
+    assert_eq!(summary.verdict(), Verdict::Doubtful);
+    let is_told =
+        |doubt: &commands::Doubt| doubt.kind == commands::DoubtKind::Prediction && doubt.words.contains("ranges");
+    assert!(summary.doubts.iter().any(is_told), "{:?}", summary.doubts);
+}
+
+#[test]
 fn epochs_that_are_misnamed_are_refused_by_name() {
     let folder = Folder::new();
     folder.edit("right/observations.csv", |text| {

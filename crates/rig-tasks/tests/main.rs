@@ -5,3 +5,4 @@
 mod rigs;
 
 mod calibrate;
+mod colour;

@@ -22,7 +22,7 @@ pub use findings::contradiction::{Cause, CauseKind, Contradiction, WorstValue};
 pub use findings::outcome::{CalibrationOutcome, TermDecision, TermScore, outcome};
 pub use options::{CalibrationOptions, Method, NetworkDatum, TermSelection};
 pub use outliers::rejection::solve_rig_rejecting;
-pub use planning::hold_out::{HoldOut, Prediction, hold_out};
+pub use planning::hold_out::{HoldOut, Prediction, hold_out, range_difference};
 pub use planning::plan::{Candidate, CandidateGrid, PlanOptions, PlanOutcome, plan};
 // Of the signatures.
 pub use {adjust, calibration_network, camera_model, error_models, nalgebra, orientation, range_calibration};

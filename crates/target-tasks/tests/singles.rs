@@ -151,6 +151,32 @@ fn rings_that_cannot_be_told_apart_are_named() {
     );
 }
 
+#[test]
+fn codes_without_coordinates_are_checked_by_other_stations() {
+    let folder = tempfile::tempdir().unwrap();
+    let (images, found) = (folder.path().join("images"), folder.path().join("found"));
+    std::fs::create_dir(&images).unwrap();
+    let (camera, (wall, known)) = (large_camera(), wall());
+    // The second picture shows ring 8 with the code of ring 15, which is not in it.
+    let mut mistaken = wall.clone();
+    mistaken.targets[8].0 = wall.targets[15].0;
+    mistaken.targets.remove(15);
+    for (k, pose) in stations(3).iter().enumerate() {
+        let wall = if k == 1 { &mistaken } else { &wall };
+        write_png(&images.join(format!("{k}.png")), &picture_of_rings(&camera, wall, pose, k as u64));
+    }
+    let summary = find_targets(&in_images("rings 0.024", &images, &found), &Silent).unwrap();
+    assert_eq!(summary.verdict(), Verdict::Doubtful, "{summary}");
+    assert!(summary.stations.iter().map(|station| station.unchecked).sum::<usize>() <= 2, "{summary}");
+    let left_out = summary.stations.iter().map(|station| station.left_out.iter().map(|left| left.target.as_str()));
+    let left_out: Vec<Vec<&str>> = left_out.map(Iterator::collect).collect();
+    assert_eq!(left_out, [vec![], vec![known[15].0.as_str()], vec![]], "{summary}");
+    assert!(summary.stations[1].left_out[0].reason.contains("read wrongly here"), "{summary}");
+    let rows = read_observations(found.join("observations.csv")).unwrap();
+    assert!(!rows.iter().any(|row| row.station == "1" && row.target == known[15].0));
+    assert_eq!(rows.len(), summary.points);
+}
+
 /// Lights at places, seen by a camera.
 fn picture_of_lights(camera: &Camera, pose: &Isometry3<f64>, places: &[[f64; 3]]) -> Raster<f32> {
     let seen = |place: &[f64; 3]| camera.project(&pose.inverse_transform_point(&Point3::from(*place))).unwrap();

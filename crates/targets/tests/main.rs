@@ -13,6 +13,7 @@ mod circles;
 mod coded;
 mod dot_grids;
 mod eccentricity;
+mod judged;
 mod lights;
 mod real_boards;
 mod real_dots;

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use atomic_output::OutputFolder;
+use atomic_output::{OutputFolder, write_text};
 use pipeline::{Error, Result};
 use self_calibration::{CalibrationOutcome, Error as Cause, Method, Network};
 
@@ -11,8 +11,9 @@ use crate::calibrate::document::page::document;
 use crate::calibrate::network::network_files::{NetworkFiles, read_network};
 use crate::calibrate::request::{CalibrateMethod, CalibrateRequest};
 use crate::calibrate::results::calibration_file;
+use crate::calibrate::results::certificate::{HeldOut, Source};
 use crate::calibrate::results::summary::CalibrationSummary;
-use crate::calibrate::run::{placed, write_files};
+use crate::calibrate::run::{certify, placed, write_files};
 
 /// A camera's survey of target observations, read as [`calibrate`](crate::calibrate()) reads it.
 #[derive(Debug, Clone)]
@@ -73,8 +74,27 @@ impl CameraFiles {
         }
     }
 
-    /// Writes `calibration.ron`, `adjusted_stations.csv`, `adjusted_targets.csv`, `residuals.csv`, `summary.json` and
-    /// `report.html` below `name` in an output folder.
+    /// Certifies the camera's part of a calibration that was asked for by `request`: its summary with the certificate and what the check on
+    /// left-out stations says, and the certificate's page.
+    ///
+    /// # Errors
+    /// A file that can't be read again for its digest.
+    pub fn certified(
+        &self,
+        request: &CalibrateRequest,
+        outcome: &CalibrationOutcome,
+        mut summary: CalibrationSummary,
+        hold_out: HeldOut,
+    ) -> Result<(CalibrationSummary, String)> {
+        let start = &self.files.start;
+        let file = calibration_file::calibration(outcome, start, &summary.survey, summary.method)?;
+        let request = &CalibrateRequest { survey: self.survey.clone(), calibration: None, ..request.clone() };
+        let page = certify(Source { request, start, outcome, file: &file, hold_out }, &mut summary)?;
+        Ok((summary, page))
+    }
+
+    /// Writes `calibration.ron`, `adjusted_stations.csv`, `adjusted_targets.csv`, `residuals.csv`, `summary.json`, `report.html` and
+    /// `certificate.html`, whose page is given, below `name` in an output folder.
     ///
     /// # Errors
     /// A figure or a file that can't be written.
@@ -83,10 +103,11 @@ impl CameraFiles {
         folder: &OutputFolder,
         name: &str,
         outcome: &CalibrationOutcome,
-        summary: &CalibrationSummary,
+        (summary, certificate): (&CalibrationSummary, &str),
     ) -> Result<()> {
         let calibration = calibration_file::calibration(outcome, &self.files.start, &summary.survey, summary.method)?;
         let page = document(summary, Figures::new(outcome, None)?);
-        write_files(folder, Path::new(name), outcome, &calibration, summary, &page)
+        write_files(folder, Path::new(name), outcome, &calibration, summary, &page)?;
+        Ok(write_text(folder.file(Path::new(name).join("certificate.html"))?, certificate)?)
     }
 }

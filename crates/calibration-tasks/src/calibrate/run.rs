@@ -5,13 +5,14 @@ use std::time::Instant;
 
 use atomic_output::{Destination, OutputFolder, write_text};
 use commands::plan::DriftTreatment;
-use commands::{Inputs, Progress, json, produce};
+use commands::{Inputs, Progress, json, produce, today};
 use pipeline::{Error, Result};
 use range_io::calibration::Calibration;
 use range_io::tables::{write_residuals, write_stations, write_targets};
 use report::Document;
 use self_calibration::{CalibrationOptions, CalibrationOutcome, Error as Cause, Method, hold_out};
 
+use crate::calibrate::document::certificate_page::render_certificate;
 use crate::calibrate::document::figures::Figures;
 use crate::calibrate::document::page::document;
 use crate::calibrate::network::network_check::check;
@@ -19,8 +20,8 @@ use crate::calibrate::network::network_files::{NetworkFiles, read_network};
 use crate::calibrate::planes;
 use crate::calibrate::planes::attempt::{Attempt, Calibrated};
 use crate::calibrate::planes::offset::FoundTable;
-use crate::calibrate::request::{CalibrateMethod, CalibrateRequest, OffsetModel};
-use crate::calibrate::results::certificate::{Certificate, HeldOut, Source, today};
+use crate::calibrate::request::{CalibrateMethod, CalibrateRequest, CertificateRequest, OffsetModel};
+use crate::calibrate::results::certificate::{Certificate, HeldOut, Source};
 use crate::calibrate::results::summary::CalibrationSummary;
 use crate::calibrate::results::{calibration_file, tables};
 use crate::calibrate::start::Start;
@@ -63,15 +64,10 @@ fn calibrate_into(
             let table = table.as_ref();
             let mut summary = CalibrationSummary::new(survey, request.method, &start, &outcome, table);
             let hold_out = HeldOut::new(request.certificate.hold_out, check);
-            summary.doubts.extend(hold_out.doubt());
-            summary.diagnosis.extend(hold_out.excuse(request.certificate.hold_out));
             let file = file(&outcome, &start, table, &summary)?;
             let (outcome, start) = (&outcome, &start);
-            let source = Source { request, start, outcome, file: &file, summary: &summary, hold_out };
-            let certificate = Certificate::new(source)?;
-            let date = request.certificate.date.clone().unwrap_or_else(today);
-            let page = crate::calibrate::document::certificate_page::render_certificate(&certificate, &summary, &date);
-            summary.certificate = Some(certificate);
+            let source = Source { request, start, outcome, file: &file, hold_out };
+            let page = certify(source, &mut summary)?;
             let summary = finish(summary);
             // Surfaces find what targets found: where a calibration is given, both stand beside each other.
             let beside = start.calibration.as_ref().filter(|given| !given.range_models.is_empty());
@@ -91,6 +87,18 @@ fn calibrate_into(
             Err(Error::not_calibrated(source, &summary)?)
         }
     }
+}
+
+/// Certifies a calibration: its summary gets the certificate and what the check on left-out stations says; the certificate's page.
+pub(crate) fn certify(source: Source<'_>, summary: &mut CalibrationSummary) -> Result<String> {
+    let CertificateRequest { hold_out, date, .. } = &source.request.certificate;
+    let date = date.clone().unwrap_or_else(today);
+    summary.doubts.extend(source.hold_out.doubt());
+    summary.diagnosis.extend(source.hold_out.excuse(*hold_out));
+    let certificate = Certificate::new(source, summary)?;
+    let page = render_certificate(&certificate, summary, &date);
+    summary.certificate = Some(certificate);
+    Ok(page)
 }
 
 fn no_pixels(request: &CalibrateRequest) -> Error {

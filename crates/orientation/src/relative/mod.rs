@@ -14,6 +14,7 @@ mod two_views;
 
 pub use bundle::{ObjectPoint, TieObservation};
 pub(crate) use candidates::samples;
+pub(crate) use network::minima;
 pub use network::{NetworkOptions, NetworkScale, ObservedPart, OrientedNetwork, OrientedStation, orient_network};
 pub use rays::ImagePoint;
 pub use two_views::{RelativeOrientation, RelativeOrientationOptions, orient_two_views};

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use adjust::{Adjustment, Kernel, ObservationId, SnoopingOptions, Solution, SolveOptions};
+use adjust::{Adjustment, Kernel, ObservationId, SnoopingOptions, SnoopingTest, Solution, SolveOptions};
 use camera_model::Camera;
 use nalgebra::{Isometry3, Matrix6};
 
@@ -98,20 +98,8 @@ pub fn orient_network(
     observations: &[TieObservation],
     options: &NetworkOptions,
 ) -> Result<OrientedNetwork> {
-    camera.validate()?;
-    check(camera, observations)?;
-    let mut found: Vec<Adjusted<'_>> = Vec::new();
-    let mut failure = None;
-    for start in starts(camera, observations, options)? {
-        match adjusted(camera, observations, start, &options.solve) {
-            Ok(adjusted) => found.push(adjusted),
-            Err(error) => failure = failure.or(Some(error)),
-        }
-    }
-    found.sort_by(|a, b| a.cost.total_cmp(&b.cost));
-    let Some(best) = found.first() else {
-        return Err(failure.unwrap_or(Error::NoApproximation { targets: observations.len() }));
-    };
+    let found = minima(camera, observations, options)?;
+    let best = &found[0];
     let unit = best.solution.sigma0().unwrap_or(1.0).max(1.0).powi(2);
     let left_out = best.cost - best.solution.vtpv();
     let costs = |other: &Adjusted<'_>| [best.cost - left_out, other.cost - left_out];
@@ -123,6 +111,29 @@ pub fn orient_network(
         return Err(Error::Ambiguous { poses, difference: second.cost - best.cost });
     }
     best.result(observations)
+}
+
+/// The network at all minima that its starts lead to, the lowest first; one at least.
+pub(crate) fn minima<'a>(
+    camera: &'a Camera,
+    observations: &[TieObservation],
+    options: &NetworkOptions,
+) -> Result<Vec<Adjusted<'a>>> {
+    camera.validate()?;
+    check(camera, observations)?;
+    let mut found: Vec<Adjusted<'_>> = Vec::new();
+    let mut failure = None;
+    for start in starts(camera, observations, options)? {
+        match adjusted(camera, observations, start, &options.solve) {
+            Ok(adjusted) => found.push(adjusted),
+            Err(error) => failure = failure.or(Some(error)),
+        }
+    }
+    found.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+    if found.is_empty() {
+        return Err(failure.unwrap_or(Error::NoApproximation { targets: observations.len() }));
+    }
+    Ok(found)
 }
 
 /// Refuses numbers that cannot be.
@@ -150,7 +161,7 @@ fn check(camera: &Camera, observations: &[TieObservation]) -> Result<()> {
 }
 
 /// A network at its minimum.
-struct Adjusted<'a> {
+pub(crate) struct Adjusted<'a> {
     bundle: Bundle<'a>,
     solution: Solution,
     scale: NetworkScale,
@@ -231,6 +242,20 @@ impl Adjusted<'_> {
             _ => true,
         };
         (1..self.bundle.stations.len()).any(apart)
+    }
+
+    /// By how many standard deviations column and row of each observation differ from what all others say (Baarda's w, of what took
+    /// no part that of its prediction); `None` where nothing checks them, NaN for one of them that nothing checks.
+    pub(crate) fn misfits(&self, count: usize) -> Result<Vec<Option<[f64; 2]>>> {
+        // Of the statistics alone: the level decides on nothing here.
+        let test = self.solution.snoop(SnoopingTest::Baarda, SnoopingOptions::default().level)?;
+        let mut misfits = vec![None; count];
+        for &(index, id) in &self.bundle.observations {
+            let first = self.solution.rows(id)?.start;
+            let both = [0, 1].map(|component| test.statistics[first + component]);
+            misfits[index] = Some(both).filter(|both| both.iter().any(|w| w.is_finite()));
+        }
+        Ok(misfits)
     }
 
     fn result(&self, observations: &[TieObservation]) -> Result<OrientedNetwork> {

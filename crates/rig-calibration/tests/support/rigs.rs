@@ -120,20 +120,25 @@ pub fn truth(index: usize) -> Network {
 /// The rig as it is observed: nominal cameras, no range error known, and nothing known of poses and targets.
 pub fn observed(seed: u64, gross_error_share: f64) -> Rig {
     let camera = |index: usize| {
-        let options = SightingOptions {
-            sigma_pixel: if index == 2 { 0.1 } else { 0.05 },
-            sigma_range_m: 0.008,
-            seed: 3 * seed + index as u64,
-            gross_error_share,
-            start: SimulatedStart::Absent,
-            ..SightingOptions::default()
-        };
+        let options = SightingOptions { gross_error_share, ..sightings(seed, index) };
         let mut network = simulate_sightings(&truth(index), &options).unwrap();
         network.camera = nominal(index);
         network.range_model = RangeErrorModel::error_free(INTERVAL_M);
         RigCamera { name: NAMES[index].to_owned(), network, terms: None, approximate: None }
     };
     Rig { cameras: (0..3).map(camera).collect() }
+}
+
+/// How a camera sees targets, without gross errors.
+pub fn sightings(seed: u64, index: usize) -> SightingOptions {
+    SightingOptions {
+        sigma_pixel: if index == 2 { 0.1 } else { 0.05 },
+        sigma_range_m: 0.008,
+        seed: 3 * seed + index as u64,
+        gross_error_share: 0.0,
+        start: SimulatedStart::Absent,
+        ..SightingOptions::default()
+    }
 }
 
 /// Options with these terms.

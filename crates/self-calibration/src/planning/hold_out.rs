@@ -47,6 +47,19 @@ pub struct Prediction {
 }
 
 impl Prediction {
+    /// Differences between observed and predicted values of one kind, and the test of what vᵀPv and redundancy grew by when the values
+    /// were taken in, at a level.
+    pub fn new(differences: &[f64], subject: &str, (growth, degrees): (f64, f64), level: f64) -> Self {
+        let count = differences.len().max(1) as f64;
+        Self {
+            values: differences.len(),
+            rms: (differences.iter().map(|v| v * v).sum::<f64>() / count).sqrt(),
+            mean: differences.iter().sum::<f64>() / count,
+            // Rounding must not make a square negative.
+            test: GlobalTest::new(subject, growth.max(0.0), degrees, level).ok(),
+        }
+    }
+
     /// Whether the values lie further from the prediction than both were said to be uncertain.
     pub fn fails(&self) -> bool {
         self.test.as_ref().is_some_and(|test| test.verdict == GlobalVerdict::TooLarge)
@@ -128,21 +141,12 @@ fn prediction(
     before: &CalibrationOutcome,
     after: &CalibrationOutcome,
 ) -> Prediction {
-    let count = differences.len().max(1) as f64;
     // Automatic terms may be others without some stations: then the one adjustment is no part of the other.
     let terms = |outcome: &CalibrationOutcome| -> BTreeSet<String> {
         outcome.estimated.iter().map(|name| name.split('@').next().unwrap_or(name).to_owned()).collect()
     };
-    let comparable = terms(before) == terms(after);
-    // Rounding must not make a square negative.
-    let statistic = (after.vtpv - before.vtpv).max(0.0);
-    let degrees = (after.redundancy - before.redundancy) as f64;
-    Prediction {
-        values: differences.len(),
-        rms: (differences.iter().map(|v| v * v).sum::<f64>() / count).sqrt(),
-        mean: differences.iter().sum::<f64>() / count,
-        test: comparable.then(|| GlobalTest::new(subject, statistic, degrees, LEVEL).ok()).flatten(),
-    }
+    let degrees = if terms(before) == terms(after) { (after.redundancy - before.redundancy) as f64 } else { f64::NAN };
+    Prediction::new(differences, subject, (after.vtpv - before.vtpv, degrees), LEVEL)
 }
 
 /// Observed minus predicted.
@@ -181,28 +185,30 @@ fn predictions(
                 all.pixels.extend([target.pixel[0] - modelled[0], target.pixel[1] - modelled[1]]);
             }
             let ranged = !options.without_ranges.contains(&station.name);
-            all.ranges_m
-                .extend(ranged.then(|| range_difference(calibration, station, sighting, target, &pose)).flatten());
+            all.ranges_m.extend(
+                ranged.then(|| range_difference(calibration, station, sighting, &target.point, &pose)).flatten(),
+            );
         }
     }
     all
 }
 
-/// A corrected range less the distance; `None` where the calibration has no terms of the station's integration time.
-fn range_difference(
+/// A corrected range less the distance of a point; `None` without a range or image point, and where the calibration has no terms of the
+/// station's integration time.
+pub fn range_difference(
     calibration: &CalibrationOutcome,
     station: &crate::Station,
     seen: &Sighting,
-    target: &TargetObservation,
-    pose: &Isometry3<f64>,
+    point: &Point3<f64>,
+    world_from_camera: &Isometry3<f64>,
 ) -> Option<f64> {
     let same = |time: &Option<f64>| time.map(f64::to_bits) == station.integration_time_s.map(f64::to_bits);
     let (_, model) = calibration.range_models.iter().find(|(time, _)| same(time))?;
     let camera = &calibration.camera;
-    let [x, y] = camera.format.image_from_pixel(target.pixel);
+    let [x, y] = camera.format.image_from_pixel(seen.pixel?);
     let [xp, yp] = camera.interior.principal_point_mm;
     let corrected = model.corrected_range(seen.range_m?, x - xp, y - yp, seen.amplitude.unwrap_or(f64::NAN));
-    let difference = corrected - station.drift_m - (target.point.coords - pose.translation.vector).norm();
+    let difference = corrected - station.drift_m - (point.coords - world_from_camera.translation.vector).norm();
     difference.is_finite().then_some(difference)
 }
 

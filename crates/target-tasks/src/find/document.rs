@@ -79,7 +79,8 @@ fn text(summary: &TargetsSummary) -> Document {
     if unchecked > 0 {
         document.paragraph(format!(
             "{unchecked} points are named by their codes alone, and nothing checks these names: a code that was read wrongly would not \
-             show. The coordinates of six rings or more in targets.csv would check them."
+             show. The coordinates of six rings or more in targets.csv would check them, and so would other stations that see them and share \
+             six rings."
         ));
     }
     document.paragraph(format!(

@@ -65,6 +65,9 @@ fn find(request: &TargetsRequest, destination: &Destination, progress: &dyn Prog
         progress.advance(1);
         Ok(())
     })?;
+    if let Some(singles) = &singles {
+        singles.check_codes(&mut stations)?;
+    }
     progress.finish();
     let boards: Vec<_> =
         stations.iter().filter_map(|station| station.seen.as_ref().ok()).map(|seen| seen.pairs.clone()).collect();

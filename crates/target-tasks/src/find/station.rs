@@ -28,7 +28,7 @@ pub(crate) struct Seen {
     pub(crate) residual_px: Option<f64>,
     /// Points that look like targets and are none of them.
     pub(crate) unnamed: usize,
-    /// Points whose names rest on their codes alone.
+    /// Points whose names rest on their codes alone: neither coordinates nor other stations check them.
     pub(crate) unchecked: usize,
     pub(crate) left_out: Vec<LeftOut>,
     pub(crate) hidden: Vec<String>,

@@ -58,8 +58,8 @@ pub struct StationSummary {
     pub sigma_px: f64,
     /// Points that look like targets and are none of those with coordinates.
     pub unnamed: usize,
-    /// Coded rings whose names rest on their codes alone, as fewer than six have coordinates: a code that was read wrongly would not
-    /// show.
+    /// Coded rings whose names rest on their codes alone, as fewer than six of the station have coordinates and no other station that
+    /// shares six of its rings sees them: a code that was read wrongly would not show.
     pub unchecked: usize,
     /// Targets that were seen and take no part, each with the reason.
     pub left_out: Vec<LeftOut>,

@@ -5,6 +5,7 @@ use targets::Code;
 use super::render::Pattern;
 
 /// White rings on dark ground.
+#[derive(Clone)]
 pub struct PrintedCodes {
     /// Codes with the places of their centres, metre.
     pub targets: Vec<(Code, [f64; 2])>,

@@ -19,6 +19,8 @@ pub struct CloudFile {
     pub frame: Option<Vec<u32>>,
     /// Covariance in square metres: xx, xy, xz, yy, yz, zz.
     pub covariance: Option<Vec<[f32; 6]>>,
+    /// Red, green and blue; written as PLY and PCD, and not read.
+    pub colours: Option<Vec<[u8; 3]>>,
     /// Columns and rows of an organised cloud, whose points stand row by row from the upper left.
     pub size: Option<[usize; 2]>,
     /// Pose that the file states for its points; they stay as they are, in the frame of the sensor.
@@ -82,6 +84,7 @@ impl CloudFile {
             ("flags", self.flags.as_ref().map(Vec::len)),
             ("frame", self.frame.as_ref().map(Vec::len)),
             ("covariance", self.covariance.as_ref().map(Vec::len)),
+            ("colours", self.colours.as_ref().map(Vec::len)),
         ];
         lengths.into_iter().filter_map(|(name, length)| Some((name, length?))).collect()
     }

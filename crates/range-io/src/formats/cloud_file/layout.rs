@@ -5,6 +5,7 @@ use super::file::{COVARIANCE, CloudFile, NORMAL, POSITION, Precision};
 /// Type of a property that is written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Kind {
+    U8,
     F32,
     F64,
     U16,
@@ -20,6 +21,7 @@ pub(crate) fn properties(attributes: &[&'static str], precision: Precision) -> V
     let attributes = attributes.iter().flat_map(|attribute| match *attribute {
         "normals" => NORMAL.map(|name| (Kind::F32, name)).to_vec(),
         "covariance" => COVARIANCE.map(|name| (Kind::F32, name)).to_vec(),
+        "colours" => ["red", "green", "blue"].map(|name| (Kind::U8, name)).to_vec(),
         "flags" => vec![(Kind::U16, "flags")],
         "frame" => vec![(Kind::U32, "frame")],
         other => vec![(Kind::F32, other)],
@@ -43,4 +45,5 @@ pub(crate) fn put_point(bytes: &mut Vec<u8>, cloud: &CloudFile, index: usize, pr
     cloud.frame.iter().for_each(|values| bytes.extend_from_slice(&values[index].to_le_bytes()));
     let mut put = |value: f32| bytes.extend_from_slice(&value.to_le_bytes());
     cloud.covariance.iter().for_each(|terms| terms[index].into_iter().for_each(&mut put));
+    cloud.colours.iter().for_each(|colours| bytes.extend_from_slice(&colours[index]));
 }

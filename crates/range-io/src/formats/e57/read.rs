@@ -182,6 +182,7 @@ fn picked(cloud: &CloudFile, indices: &[Option<usize>]) -> CloudFile {
         values.map(|values| indices.iter().map(|index| index.map_or(none, |index| values[index])).collect())
     }
     CloudFile {
+        colours: None,
         points: pick(Some(&cloud.points), indices, [f64::NAN; 3]).unwrap_or_default(),
         normals: pick(cloud.normals.as_ref(), indices, [f32::NAN; 3]),
         intensity: pick(cloud.intensity.as_ref(), indices, f32::NAN),

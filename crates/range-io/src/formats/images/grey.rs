@@ -1,9 +1,9 @@
-//! Images of light alone, of any kind that cameras write: PNG (grey, colour, palette, 1 to 16 bits) and JPEG.
+//! Images of light alone, or of colours, of any kind that cameras write: PNG (grey, colour, palette, 1 to 16 bits) and JPEG.
 
 use std::io::{BufReader, Cursor};
 use std::path::Path;
 
-use png::{ColorType, Decoder, Limits, Transformations};
+use png::{Decoder, Limits, Transformations};
 use range_image::Raster;
 use zune_jpeg::JpegDecoder;
 use zune_jpeg::zune_core::colorspace::ColorSpace;
@@ -39,13 +39,48 @@ const LIGHT: [f32; 3] = [0.299, 0.587, 0.114];
 /// ```
 pub fn read(path: impl AsRef<Path>) -> Result<Raster<f32>> {
     let path = path.as_ref();
+    // Of colours only the light is decoded: it is what a JPEG stores by itself.
+    let image = samples(path, ColorSpace::Luma)?;
+    raster(path, image.size, image.pixels().map(light).collect())
+}
+
+/// Reads red, green and blue of an image, from 0 to 255 whatever its depth; of an image without colours three times the same.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_colours(path: impl AsRef<Path>) -> Result<[Raster<f32>; 3]> {
+    let path = path.as_ref();
+    let image = samples(path, ColorSpace::RGB)?;
+    let plane = |colour: usize| {
+        let value = |pixel: &[f32]| image.scale * if pixel.len() < 3 { pixel[0] } else { pixel[colour] };
+        raster(path, image.size, image.pixels().map(value).collect())
+    };
+    Ok([plane(0)?, plane(1)?, plane(2)?])
+}
+
+/// An image as it is decoded: pixel by pixel grey, grey and alpha, colours, or colours and alpha.
+struct Samples {
+    size: [usize; 2],
+    channels: usize,
+    /// What a value is to be multiplied by to end at 255.
+    scale: f32,
+    values: Vec<f32>,
+}
+
+impl Samples {
+    fn pixels(&self) -> impl Iterator<Item = &[f32]> {
+        self.values.chunks_exact(self.channels)
+    }
+}
+
+fn samples(path: &Path, space: ColorSpace) -> Result<Samples> {
     let mut head = [0_u8; 3];
     let (mut file, _) = crate::open(path)?;
     let is_jpeg = std::io::Read::read_exact(&mut file, &mut head).is_ok() && head == JPEG;
-    if is_jpeg { read_jpeg(path) } else { read_png(path) }
+    if is_jpeg { read_jpeg(path, space) } else { read_png(path) }
 }
 
-fn read_jpeg(path: &Path) -> Result<Raster<f32>> {
+fn read_jpeg(path: &Path, space: ColorSpace) -> Result<Samples> {
     let bytes = crate::read_bytes(path, LONGEST_JPEG)?;
     let failed = |error: zune_jpeg::errors::DecodeErrors| Error::format(path, format!("is no complete JPEG: {error}"));
     // Of a file that ends too early nothing is made up: the last scan needs its end, too.
@@ -58,13 +93,13 @@ fn read_jpeg(path: &Path) -> Result<Raster<f32>> {
     decoder.decode_headers().map_err(failed)?;
     let (width, height) = decoder.dimensions().unwrap_or_default();
     require_size(path, [width, height])?;
-    // Of colours only the light is decoded: it is what a JPEG stores by itself.
-    decoder.set_options(options.jpeg_set_out_colorspace(ColorSpace::Luma));
-    let values = decoder.decode().map_err(failed)?;
-    raster(path, [width, height], values.into_iter().map(f32::from).collect())
+    let space = if decoder.input_colorspace() == Some(ColorSpace::Luma) { ColorSpace::Luma } else { space };
+    decoder.set_options(options.jpeg_set_out_colorspace(space));
+    let values = decoder.decode().map_err(failed)?.into_iter().map(f32::from).collect();
+    Ok(Samples { size: [width, height], channels: space.num_components(), scale: 1.0, values })
 }
 
-fn read_png(path: &Path) -> Result<Raster<f32>> {
+fn read_png(path: &Path) -> Result<Samples> {
     let (file, length) = crate::open(path)?;
     let failed = |error: png::DecodingError| Error::format(path, format!("is no complete PNG or JPEG: {error}"));
     let limits = Limits { bytes: 8 * MOST_PIXELS };
@@ -82,19 +117,17 @@ fn read_png(path: &Path) -> Result<Raster<f32>> {
     }
     let mut bytes = zeros(bytes).map_err(Error::io(path, "reserve memory for"))?;
     reader.next_frame(&mut bytes).map_err(failed)?;
-    let samples: Vec<f32> = if two_bytes {
+    let values: Vec<f32> = if two_bytes {
         bytes.as_chunks().0.iter().map(|&pair| f32::from(u16::from_be_bytes(pair))).collect()
     } else {
         bytes.into_iter().map(f32::from).collect()
     };
-    raster(path, size, samples.chunks_exact(color.samples()).map(|pixel| light(color, pixel)).collect())
+    Ok(Samples { size, channels: color.samples(), scale: if two_bytes { 1.0 / 257.0 } else { 1.0 }, values })
 }
 
-fn light(color: ColorType, pixel: &[f32]) -> f32 {
-    match (color, pixel) {
-        (ColorType::Rgb | ColorType::Rgba, [red, green, blue, ..]) => {
-            LIGHT[0] * red + LIGHT[1] * green + LIGHT[2] * blue
-        }
+fn light(pixel: &[f32]) -> f32 {
+    match pixel {
+        [red, green, blue, ..] => LIGHT[0] * red + LIGHT[1] * green + LIGHT[2] * blue,
         _ => pixel[0],
     }
 }

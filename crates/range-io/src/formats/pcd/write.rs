@@ -64,6 +64,7 @@ fn field_name(name: &'static str) -> &'static str {
 
 fn size_and_type(kind: Kind) -> [&'static str; 2] {
     match kind {
+        Kind::U8 => ["1", "U"],
         Kind::F32 => ["4", "F"],
         Kind::F64 => ["8", "F"],
         Kind::U16 => ["2", "U"],

@@ -103,6 +103,7 @@ impl PlyWriter {
 
 fn type_name(kind: Kind) -> &'static str {
     match kind {
+        Kind::U8 => "uchar",
         Kind::F32 => "float",
         Kind::F64 => "double",
         Kind::U16 => "ushort",

@@ -1,5 +1,6 @@
 //! Single targets of a station: measured, named, and held against their coordinates.
 
+mod check;
 mod names;
 mod points;
 

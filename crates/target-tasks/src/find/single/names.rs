@@ -13,11 +13,11 @@ use crate::kind::SingleKind;
 const LEAST_CODES: usize = 6;
 /// Share of the image's diagonal that a right code may lie off where the others put it: the nominal lens misses 4.5 pixels of 176 x
 /// 144. More, and a code that was read wrongly beside its place is kept.
-const REACH_SHARE: f64 = 0.02;
+pub(crate) const REACH_SHARE: f64 = 0.02;
 /// Robust standard deviations beyond which a code contradicts, where the lens is worse than that.
 const OUTLYING: f64 = 5.0;
 /// Standard deviation of image points and ranges for the pose by which codes are judged, pixel and metre: nothing is calibrated.
-const NOMINAL_SIGMA: [f64; 2] = [1.0, 0.1];
+pub(crate) const NOMINAL_SIGMA: [f64; 2] = [1.0, 0.1];
 
 /// What names are given by.
 pub(crate) struct Names<'a> {

@@ -79,32 +79,39 @@ impl HeldOut {
             None if every.is_some() => {
                 Self::NotMade { reason: "the method does not adjust the stations of a network together".to_owned() }
             }
-            None => Self::NotMade { reason: "not asked for (--hold-out N)".to_owned() },
+            None => Self::not_asked(),
             Some(Err(error)) => Self::NotMade { reason: error.to_string() },
-            Some(Ok(check)) => Self::Made(Box::new(HeldOutCheck {
-                every: every.unwrap_or(0),
-                image: HeldOutPart::new(&check.image, "px"),
-                range: check.range.as_ref().map(|range| HeldOutPart::new(range, "m")),
-                stations: check.stations,
-            })),
+            Some(Ok(check)) => Self::made(every.unwrap_or(0), check),
         }
     }
 
+    /// No check, as nobody asked for one.
+    pub fn not_asked() -> Self {
+        Self::NotMade { reason: "not asked for (--hold-out N)".to_owned() }
+    }
+
+    /// A check for which every so many stations were left out.
+    pub fn made(every: usize, check: HoldOut) -> Self {
+        let image = HeldOutPart::new(&check.image, "px");
+        let range = check.range.as_ref().map(|range| HeldOutPart::new(range, "m"));
+        Self::Made(Box::new(HeldOutCheck { every, image, range, stations: check.stations }))
+    }
+
     /// Why a check that was asked for was not made, as a sentence.
-    pub(crate) fn excuse(&self, every: Option<usize>) -> Option<String> {
+    pub fn excuse(&self, every: Option<usize>) -> Option<String> {
         let Self::NotMade { reason } = self else { return None };
         every.map(|_| format!("the check on stations left out was not made: {reason}"))
     }
 
     /// A doubt where the prediction fails.
-    pub(crate) fn doubt(&self) -> Option<Doubt> {
+    pub fn doubt(&self) -> Option<Doubt> {
         let Self::Made(check) = self else { return None };
         let parts = [("image points", Some(&check.image)), ("ranges", check.range.as_ref())];
         let failed: Vec<String> = parts
             .into_iter()
             .filter_map(|(what, part)| Some((what, part?)))
             .filter(|(_, part)| part.fails)
-            .map(|(what, part)| format!("{what} ({})", predicted(part)))
+            .map(|(what, part)| format!("{what} ({part})"))
             .collect();
         (!failed.is_empty()).then(|| {
             let words = format!(
@@ -120,17 +127,24 @@ impl HeldOut {
 
 impl fmt::Display for HeldOutCheck {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "stations left out ({}): image points: {}", self.stations.len(), predicted(&self.image))?;
-        self.range.as_ref().map_or(Ok(()), |range| write!(f, "; ranges: {}", predicted(range)))
+        write!(f, "stations left out ({}): image points: {}", self.stations.len(), self.image)?;
+        self.range.as_ref().map_or(Ok(()), |range| write!(f, "; ranges: {range}"))
     }
 }
 
-/// A prediction in words.
-pub(crate) fn predicted(part: &HeldOutPart) -> String {
-    let (factor, unit, digits) = if part.unit == "m" { (1e3, "mm", 2) } else { (1.0, part.unit, 4) };
-    let HeldOutPart { values, rms, mean, .. } = part;
-    let test = part.test.clone().unwrap_or_else(|| {
-        "not decided: there is no redundancy, or automatic terms were others without these stations".to_owned()
-    });
-    format!("{values} values, rms {:.digits$} {unit}, mean {:+.digits$} {unit}; {test}", factor * rms, factor * mean)
+impl fmt::Display for HeldOutPart {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (factor, unit, digits) = if self.unit == "m" { (1e3, "mm", 2) } else { (1.0, self.unit, 4) };
+        let Self { values, rms, mean, .. } = self;
+        let test = self
+            .test
+            .as_deref()
+            .unwrap_or("not decided: there is no redundancy, or automatic terms were others without these stations");
+        write!(
+            f,
+            "{values} values, rms {:.digits$} {unit}, mean {:+.digits$} {unit}; {test}",
+            factor * rms,
+            factor * mean
+        )
+    }
 }

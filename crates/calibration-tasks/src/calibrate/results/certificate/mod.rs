@@ -1,7 +1,6 @@
 //! What a laboratory signs: who calibrated which camera under which conditions from which files, what every test says, for
 //! what the calibration holds, and how uncertain what is measured with it is. Computed once; pages print it.
 
-pub(crate) mod date;
 pub(crate) mod digest;
 pub(crate) mod elements;
 pub(crate) mod hold_out;
@@ -22,7 +21,6 @@ pub use uncertainty::ExpandedUncertainty;
 pub use verdicts::TestVerdict;
 
 pub(crate) use crate::calibrate::start::conditions::extent;
-pub(crate) use date::today;
 pub(crate) use pairs::{is_notorious, notorious_pairs};
 pub(crate) use uncertainty::COVERAGE;
 
@@ -64,13 +62,12 @@ pub(crate) struct Source<'a> {
     pub(crate) start: &'a Start,
     pub(crate) outcome: &'a CalibrationOutcome,
     pub(crate) file: &'a Calibration,
-    pub(crate) summary: &'a CalibrationSummary,
     pub(crate) hold_out: HeldOut,
 }
 
 impl Certificate {
-    pub(crate) fn new(source: Source<'_>) -> Result<Self> {
-        let Source { request, start, outcome, file, summary, hold_out } = source;
+    pub(crate) fn new(source: Source<'_>, summary: &CalibrationSummary) -> Result<Self> {
+        let Source { request, start, outcome, file, hold_out } = source;
         let mut conditions = start.conditions.clone();
         conditions.operator = request.certificate.operator.clone().or(conditions.operator);
         let integration_times_s: Vec<f64> = outcome.range_models.iter().filter_map(|(time, _)| *time).collect();

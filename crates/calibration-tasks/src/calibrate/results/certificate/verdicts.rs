@@ -8,7 +8,6 @@ use statistics::Distribution;
 
 use crate::calibrate::CalibrationSummary;
 use crate::calibrate::results::certificate::HeldOut;
-use crate::calibrate::results::certificate::hold_out::predicted;
 
 /// Level of the joint test of a group of terms.
 const TERM_LEVEL: f64 = 0.05;
@@ -190,7 +189,7 @@ fn hold_out_verdicts(hold_out: &HeldOut) -> Vec<TestVerdict> {
                 .filter_map(|(what, part)| Some((what, part?)))
                 .map(|(what, part)| {
                     let passed = part.test.as_ref().map(|_| !part.fails);
-                    TestVerdict::new(format!("{test}: {what}"), passed, predicted(part), rows.clone())
+                    TestVerdict::new(format!("{test}: {what}"), passed, part.to_string(), rows.clone())
                 })
                 .collect()
         }

@@ -3,8 +3,8 @@
 use std::time::{SystemTime, UNIX_EPOCH};
 
 /// Today (UTC) as ISO 8601, by the system's clock; no date where times are to be left out.
-pub(crate) fn today() -> String {
-    if commands::made::without_times() {
+pub fn today() -> String {
+    if crate::made::without_times() {
         return "not dated".to_owned();
     }
     let seconds = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs());

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use nalgebra::{DMatrix, Isometry3, Matrix6};
+use nalgebra::{Isometry3, Matrix6};
 
 use crate::adjustment::turns::MeasuredTurn;
 use crate::agreement::alignments::{PairAlignment, RefusedPair};
@@ -10,6 +10,7 @@ use crate::agreement::loops::LoopClosure;
 use crate::agreement::placement::Placements;
 use crate::surfaces::patches::Surface;
 use crate::surfaces::point_model::{PointModel, SharedParameters};
+use crate::survey::joint_covariance::JointCovariance;
 use icp_registration::UndeterminedMotion;
 
 /// What is known of the stations beforehand.
@@ -99,8 +100,8 @@ pub struct StationRegistration {
     /// Covariance of each pose in the tangent `[dt world axes, dtheta station axes]`; zero for a station that is the
     /// datum.
     pub covariance: Vec<Matrix6<f64>>,
-    /// Covariance of all unknowns: six a station, then the shared parameters.
-    pub joint_covariance: DMatrix<f64>,
+    /// Covariance of all unknowns.
+    pub joint_covariance: JointCovariance,
     /// Pairs with much overlap by themselves, at the adjusted poses.
     pub pairs: Vec<PairAlignment>,
     /// Pairs that overlap and were left out, with the reason.
@@ -144,7 +145,7 @@ impl StationRegistration {
         let mut covariance = Matrix6::zeros();
         for (a, left) in [target, source].into_iter().zip(&jacobians) {
             for (b, right) in [target, source].into_iter().zip(&jacobians) {
-                covariance += left * self.joint_covariance.fixed_view::<6, 6>(6 * a, 6 * b) * right.transpose();
+                covariance += left * self.joint_covariance.between(a, b) * right.transpose();
             }
         }
         Ok((of_target.inverse() * of_source, rigid_pose::symmetrised(&covariance)))

@@ -73,16 +73,13 @@ impl SparseNormal {
 
     /// `damping` are λ and the scale that the damping is measured in.
     pub(crate) fn factor(&self, damping: Option<(f64, &[f64])>) -> Result<SparseFactor, Singular> {
-        let scale = unit_scale(&self.matrix.diagonal());
-        let factor = match damping {
-            None => self.matrix.factor(),
-            Some((lambda, reference)) => {
-                let mut matrix = self.matrix.clone();
-                let damped = scale.iter().zip(reference).map(|(own, reference)| damping_of(lambda, *own, *reference));
-                damped.enumerate().for_each(|(row, damped)| matrix.add_to_diagonal(row, damped));
-                matrix.factor()
+        let (scale, mut matrix) = (unit_scale(&self.matrix.diagonal()), self.matrix.clone());
+        if let Some((lambda, reference)) = damping {
+            for (row, (own, reference)) in scale.iter().zip(reference).enumerate() {
+                matrix.add_to_diagonal(row, damping_of(lambda, *own, *reference));
             }
-        };
-        Ok(SparseFactor { inverse: BlockInverse::new(factor.ok_or(Singular::Normal)?), scale })
+        }
+        let inverse = BlockInverse::new(matrix.factor().ok_or(Singular::Normal)?);
+        Ok(SparseFactor { inverse, scale })
     }
 }

@@ -18,4 +18,4 @@ pub use error::Error;
 use error::Result;
 pub use panel::transposed;
 pub use product::{Left, Right, add_product, with_wide_registers};
-pub use small::inverse_of_small_factor;
+pub use small::{inverse_of_packed_lower, inverse_of_small_factor, transpose_square};

@@ -31,3 +31,33 @@ pub fn inverse_of_small_factor(matrix: &mut [f64], n: usize) -> bool {
     }
     true
 }
+
+/// Inverse of a lower triangle stored row by row, as a full row-major matrix; empty where it is
+/// shorter than `n (n + 1) / 2`.
+pub fn inverse_of_packed_lower(packed: &[f64], n: usize, out: &mut Vec<f64>) {
+    out.clear();
+    if packed.len() < n * (n + 1) / 2 {
+        return;
+    }
+    out.resize(n * n, 0.0);
+    for row in 0..n {
+        let weights = &packed[row * (row + 1) / 2..(row + 1) * (row + 2) / 2];
+        for column in 0..=row {
+            let known: f64 = (column..row).map(|i| weights[i] * out[i * n + column]).sum();
+            let target = if row == column { 1.0 } else { 0.0 };
+            out[row * n + column] = (target - known) / weights[row];
+        }
+    }
+}
+
+/// Transposes a square matrix in place; one that is shorter than `n²` stays as it is.
+pub fn transpose_square(matrix: &mut [f64], n: usize) {
+    if matrix.len() < n * n {
+        return;
+    }
+    for column in 0..n {
+        for row in column + 1..n {
+            matrix.swap(column * n + row, row * n + column);
+        }
+    }
+}

@@ -1,19 +1,24 @@
 //! A building of many rooms, registered station by station at once: what it costs and how far the poses are off.
 //!
 //! ```text
+//! cargo run --release -p multiview-registration --example building
 //! cargo run --release -p multiview-registration --example building -- STATIONS [poses|order] [first seed] [width of a frame, pixels]
 //! cargo run --release -p multiview-registration --example building -- STATIONS scene > building.ron
 //! ```
 #![allow(clippy::print_stdout)]
 
 mod plan;
+mod statistic;
 
 use std::error::Error;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use multiview_registration::nalgebra::{Isometry3, Matrix6};
 use multiview_registration::point_cloud::Cloud;
 use multiview_registration::rigid_pose::pose_difference;
-use multiview_registration::{Datum, Start, StationRegistration, StationRegistrationOptions, register_stations};
+use multiview_registration::{
+    Datum, Effort, Start, StationRegistration, StationRegistrationOptions, register_stations,
+};
 use plan::{Building, Camera};
 use rayon::prelude::*;
 
@@ -23,16 +28,31 @@ const OFF_DEG: f64 = 3.0;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let argument = |k: usize| std::env::args().nth(k);
-    let count = argument(1).map_or(Ok(50), |text| text.parse::<usize>())?;
+    let Some(count) = argument(1) else { return statistic::run() };
+    let count = count.parse::<usize>()?;
     let start = argument(2).unwrap_or_else(|| "poses".to_owned());
     let seed = argument(3).map_or(Ok(1), |text| text.parse::<u64>())?;
     let width = argument(4).map_or(Ok(160), |text| text.parse::<usize>())?;
     let camera = Camera { width, height: 3 * width / 4 };
-    let building = Building::new(count, seed);
     if start == "scene" {
-        print!("{}", building.description(camera));
+        print!("{}", Building::new(count, seed).description(camera));
         return Ok(());
     }
+    registered(count, &start, seed, camera).map(|_| ())
+}
+
+/// What a registration took, and how honest it is.
+struct Figures {
+    seconds: f64,
+    most_mb: f64,
+    pairs_tried: usize,
+    filled_blocks: usize,
+    /// Mean normalised squared error against the station before.
+    squares_of_next: f64,
+}
+
+fn registered(count: usize, start: &str, seed: u64, camera: Camera) -> Result<Figures, Box<dyn Error>> {
+    let building = Building::new(count, seed);
     let clouds: Vec<Cloud> = (0..count).into_par_iter().map(|station| building.cloud(station, camera, seed)).collect();
     let points: usize = clouds.iter().map(Cloud::len).sum();
     let simulated_mb = peak_memory_mb();
@@ -40,16 +60,22 @@ fn main() -> Result<(), Box<dyn Error>> {
     let start = if start == "order" { Start::Order } else { Start::Poses(&approximate) };
     let before = cpu_seconds();
     let options = StationRegistrationOptions::default();
-    let found = register_stations(&clouds, start, Datum::Station(0), &options, &|_, _| {})?;
-    let seconds = cpu_seconds() - before;
+    let in_rounds = AtomicU64::new(0);
+    let progress = |_, _| {
+        in_rounds.fetch_max(peak_memory_mb() as u64, Ordering::Relaxed);
+    };
+    let found = register_stations(&clouds, start, Datum::Station(0), &options, &progress)?;
+    let (seconds, most_mb) = (cpu_seconds() - before, peak_memory_mb());
     println!(
-        "{count} stations, {:.1} million points: {seconds:.1} s of processor time, {:.3} s a station; at most {:.0} MB in memory, {simulated_mb:.0} MB before",
+        "{count} stations, {:.1} million points: {seconds:.1} s of processor time, {:.3} s a station; at most {most_mb:.0} MB in memory, {} MB until the last round, {simulated_mb:.0} MB before",
         points as f64 / 1e6,
         seconds / count as f64,
-        peak_memory_mb()
+        in_rounds.load(Ordering::Relaxed)
     );
     report(&found, &building.stations);
-    Ok(())
+    let Effort { pairs_tried, filled_blocks } = found.effort;
+    let squares_of_next = mean(&errors(&found, &building.stations, &|k| k - 1).1);
+    Ok(Figures { seconds, most_mb, pairs_tried, filled_blocks, squares_of_next })
 }
 
 /// Errors against the truth.
@@ -82,8 +108,21 @@ fn report(found: &StationRegistration, truth: &[Isometry3<f64>]) {
     worst.sort_by(|&a, &b| sigma(&found.covariance[b]).total_cmp(&sigma(&found.covariance[a])));
     let words = worst.iter().take(5).map(|&k| format!("{k}: {:.1} ± {:.1} mm", off[k], sigma(&found.covariance[k])));
     println!("  least known: {}", words.collect::<Vec<_>>().join(", "));
+    let mut times: Vec<f64> =
+        found.placements.stations.iter().map(|station| station.times_usual.unwrap_or(f64::NAN)).collect();
+    times.sort_by(f64::total_cmp);
+    let at = |share: f64| times[((times.len() - 1) as f64 * share) as usize];
     println!(
-        "  {} pairs of surfaces, {} pairs alone, {} refused, {} loops; {} rounds{}; undetermined {}, doubtful {:?}",
+        "  contradicted as usual times {:.2} (median), {:.2} (80 %), {:.2} (95 %), {:.2} (most)",
+        at(0.5),
+        at(0.8),
+        at(0.95),
+        at(1.0)
+    );
+    println!(
+        "  {} pairs of stations tried, {} blocks filled; {} pairs of surfaces, {} pairs alone, {} refused, {} loops; {} rounds{}; undetermined {}, doubtful {:?}",
+        found.effort.pairs_tried,
+        found.effort.filled_blocks,
         found.surfaces.len(),
         found.pairs.len(),
         found.refused.len(),

@@ -44,6 +44,14 @@ impl Cofactors {
         }
     }
 
+    /// Blocks of two stations that the factor holds.
+    pub(crate) fn filled(&self) -> usize {
+        match self {
+            Self::Whole { stations, .. } => stations * (stations + 1) / 2,
+            Self::Sparse(sparse) => sparse.inverse.factor().filled(),
+        }
+    }
+
     /// Of a station's pose.
     pub(crate) fn of(&self, station: usize) -> Matrix6<f64> {
         self.between(station, station)

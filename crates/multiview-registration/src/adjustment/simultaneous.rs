@@ -52,6 +52,8 @@ pub(crate) struct Adjusted {
     pub settled: bool,
     /// What stations have in common; empty until the last round.
     pub common: Common,
+    /// Pairs of stations that were held against each other.
+    pub pairs_tried: usize,
 }
 
 /// The tiles that pairs of stations saw, and the planes of each station.
@@ -145,7 +147,7 @@ impl Finish<'_> {
         mut state: State,
     ) -> Result<Adjusted> {
         let size_m = surfaces.given.iter().map(|surface| surface.size_m).fold(0.0, f64::max);
-        let (mut known, mut round) = (Vec::new(), 0);
+        let (mut known, mut round, mut pairs_tried) = (Vec::new(), 0, 0);
         loop {
             surfaces.update(&state.parameters)?;
             surfaces.place(points, &state.parameters)?;
@@ -154,6 +156,7 @@ impl Finish<'_> {
             if let Some(off_m) = off_m {
                 let reach = Reach { across_m: size_m / 4.0, candidates: 1, cosine: IN_PLACE };
                 let near = near_each_other(&scene.surfaces, &state.poses, reach)?;
+                pairs_tried = near.len();
                 let pairs_in_contact = meet(&scene.surfaces, &state.poses, &near, reach)?;
                 known = shared_planes(&scene.surfaces, &state.poses, &pairs_in_contact, off_m);
             }
@@ -169,13 +172,15 @@ impl Finish<'_> {
             if settled || round >= MOST_ROUNDS {
                 let factor = adjusted.factor_on(&known);
                 let common = Common::new(state.poses.len(), &adjusted.means);
+                let shared_planes = known;
                 return Ok(Adjusted {
                     state,
-                    shared_planes: known,
+                    shared_planes,
                     factor,
                     rounds: round,
                     settled,
                     common,
+                    pairs_tried,
                     ..adjusted
                 });
             }
@@ -248,6 +253,7 @@ impl Finish<'_> {
             rounds: 0,
             settled: false,
             common: Common::default(),
+            pairs_tried: 0,
         })
     }
 

@@ -11,9 +11,7 @@ use crate::agreement::judges::Judges;
 use crate::agreement::sight::{Sight, may_judge};
 use crate::error::{Error, Result};
 use crate::surfaces::patches::faces_origin;
-use global_registration::{
-    CoarseOptions, FeatureCloud, Placed, SurfaceDescriptors, Viewpoint, agreement, with_one_voxel,
-};
+use global_registration::{CoarseOptions, FeatureCloud, Placed, SurfaceDescriptors, Viewpoint, agreement, in_voxels};
 use point_cloud::Cloud;
 use rigid_pose::is_finite;
 
@@ -129,11 +127,15 @@ fn prepared(stations: &[Cloud]) -> Vec<Option<FeatureCloud>> {
         }
         _ => FeatureCloud::new(cloud, &options(Viewpoint::Origin)),
     };
-    let found: Vec<Option<FeatureCloud>> = stations.par_iter().map(|cloud| prepare(cloud).ok()).collect();
-    let filled: Vec<bool> = found.iter().map(Option::is_some).collect();
-    let clouds = with_one_voxel(found.into_iter().flatten().collect(), &options(Viewpoint::Origin));
-    let mut clouds = clouds.unwrap_or_default().into_iter();
-    filled.into_iter().map(|is_filled| if is_filled { clouds.next() } else { None }).collect()
+    // Twice, since many clouds in their own small voxels would take more memory than all else.
+    let voxels: Vec<f64> =
+        stations.par_iter().map(|cloud| prepare(cloud).map_or(0.0, |cloud| cloud.voxel_m())).collect();
+    let voxel_m = voxels.into_iter().fold(0.0, f64::max);
+    let coarse = |cloud: &Cloud| {
+        let cloud = in_voxels(prepare(cloud).ok()?, voxel_m, &options(Viewpoint::Origin));
+        cloud.ok().map(FeatureCloud::for_judging)
+    };
+    stations.par_iter().map(coarse).collect()
 }
 
 /// Whether the stations placed so far contradict one of them no more often than they do each other; not known, and false,

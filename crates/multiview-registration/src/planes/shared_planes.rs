@@ -36,7 +36,7 @@ pub(crate) struct SharedPlane {
 }
 
 impl SharedPlane {
-    fn new(origin: Vector3<f64>, normal: Vector3<f64>) -> Self {
+    pub(crate) fn new(origin: Vector3<f64>, normal: Vector3<f64>) -> Self {
         let (right, up) = axes(&normal);
         Self { origin, normal, right, up, tiles: Tiles::default(), size: 0, points: Vec::new() }
     }

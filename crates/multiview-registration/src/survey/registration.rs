@@ -92,6 +92,15 @@ pub struct UndeterminedStation {
     pub motions: Vec<UndeterminedMotion>,
 }
 
+/// What a registration looked at: for stations that see some others each, it grows with their number.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Effort {
+    /// Pairs of stations whose surfaces were held against each other in the last rounds.
+    pub pairs_tried: usize,
+    /// Blocks of two stations (or planes that very many saw) that the factor of the normal equations holds.
+    pub filled_blocks: usize,
+}
+
 /// All stations in one frame.
 #[derive(Debug, Clone)]
 pub struct StationRegistration {
@@ -125,6 +134,8 @@ pub struct StationRegistration {
     /// Whether the last round moved no station by more than the tolerance. Where it is not, stations still slide along a
     /// weak direction and may be decimetres away: do not trust the poses.
     pub settled: bool,
+    /// How much was looked at.
+    pub effort: Effort,
     /// Parameters of the [`PointModel`].
     pub parameters: Option<SharedParameters>,
     pub(crate) prepared: Arc<Vec<Surface>>,

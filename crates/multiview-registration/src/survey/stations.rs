@@ -23,7 +23,7 @@ use crate::survey::check::{Checked, checked};
 use crate::survey::datum::Datum;
 use crate::survey::joint_covariance::JointCovariance;
 use crate::survey::registration::{
-    Start, StationRegistration, StationRegistrationOptions, SurfacePair, UndeterminedStation,
+    Effort, Start, StationRegistration, StationRegistrationOptions, SurfacePair, UndeterminedStation,
 };
 use crate::survey::windows::{self, MOST_AT_ONCE};
 use point_cloud::Cloud;
@@ -97,7 +97,7 @@ pub fn register_stations(
         adjusted = finish.run(&mut modelled, &mut points, state)?;
     }
     require_connected(&adjusted, datum)?;
-    let placements = placements(stations, &points, &adjusted.state)?;
+    let placements = placements(stations, points, &adjusted.state)?;
     let checked = checked(&adjusted, options.minimum_overlap, datum, (radius_m, patch_m))?;
     let result = result(checked, adjusted, &poses, &network, datum, patch_m);
     let prepared = match modelled.modelled {
@@ -183,11 +183,12 @@ fn normals_of(cloud: &Cloud) -> Result<Cow<'_, [Vector3<f64>]>> {
 }
 
 /// Verdicts on the stations at the adjusted poses, their points where the shared parameters have them.
-fn placements(stations: &[Cloud], points: &[StationPoints], state: &State) -> Result<Placements> {
+fn placements(stations: &[Cloud], points: Vec<StationPoints>, state: &State) -> Result<Placements> {
     if state.parameters.is_empty() {
+        drop(points);
         return judge_placements(stations, &state.poses);
     }
-    let modelled: Vec<Cloud> = stations.iter().zip(points).map(|(cloud, points)| points.modelled(cloud)).collect();
+    let modelled: Vec<Cloud> = stations.iter().zip(&points).map(|(cloud, points)| points.modelled(cloud)).collect();
     judge_placements(&modelled, &state.poses)
 }
 
@@ -219,6 +220,7 @@ fn result(
         redundancy,
         rounds: adjusted.rounds,
         settled: adjusted.settled,
+        effort: Effort { pairs_tried: adjusted.pairs_tried, filled_blocks: adjusted.cofactors.filled() },
         parameters: (parameters > 0).then(|| shared(network, &adjusted.state.parameters, &joint.whole())),
         joint_covariance: joint,
         prepared: Arc::default(),

@@ -10,6 +10,7 @@ mod error;
 mod linearised;
 mod model;
 mod result;
+mod sparse;
 mod testing;
 
 pub use combination::Combination;

@@ -1,9 +1,11 @@
 //! All stations at once.
 
+use std::collections::BTreeMap;
+
 use commands::plan::NORMAL_HALF_WIDTH_PX;
 use commands::{Doubt, DoubtKind, Progress};
 use multiview_registration::Error::UnconnectedStations;
-use multiview_registration::{Start, StationRegistration, SurfacePair};
+use multiview_registration::{PairAlignment, Start, StationRegistration, SurfacePair};
 use nalgebra::{Isometry3, Point3};
 use pipeline::stations::{MOST_TRIED, Station, Tried, Windows, poses_in, refused, register_at_once};
 use pipeline::survey::StationPose;
@@ -67,7 +69,10 @@ pub(crate) fn run(input: Input, start: &str, progress: &dyn Progress) -> Result<
     }
     let result = found.map_err(|error| refused::of_command(&error, &names, tried))?;
     let poses = poses_in(&Isometry3::identity(), &result);
-    let mut summary = summary(&result, &stations, &clouds, &poses);
+    let counts: Vec<usize> = clouds.iter().map(Cloud::len).collect();
+    // Of hundreds of stations they take more memory than anything that follows.
+    drop(clouds);
+    let mut summary = summary(&result, &stations, &counts, &poses);
     if before.is_none() {
         summary.doubts.extend(blind_doubt(&result));
     }
@@ -81,11 +86,12 @@ pub(crate) fn run(input: Input, start: &str, progress: &dyn Progress) -> Result<
 fn summary(
     result: &StationRegistration,
     stations: &[Station],
-    clouds: &[Cloud],
+    counts: &[usize],
     poses: &[StationPose],
 ) -> RegisterSummary {
     let name = |index: usize| stations[index].name.clone();
-    let counts: Vec<usize> = clouds.iter().map(Cloud::len).collect();
+    let alone: BTreeMap<(usize, usize), &PairAlignment> =
+        result.pairs.iter().map(|pair| ((pair.target, pair.source), pair)).collect();
     let mut undetermined = vec![Vec::new(); stations.len()];
     for station in &result.undetermined {
         undetermined[station.station] = station.motions.iter().map(describe::motion).collect();
@@ -95,13 +101,13 @@ fn summary(
         translation_m: closure.translation_m,
         rotation_deg: closure.rotation_rad.to_degrees(),
     });
-    let mut rows = describe::stations(stations, poses, &counts, undetermined.clone());
+    let mut rows = describe::stations(stations, poses, counts, undetermined.clone());
     for (row, placement) in rows.iter_mut().zip(&result.placements.stations) {
         row.placement = describe::placement(placement);
     }
     RegisterSummary {
         stations: rows,
-        pairs: result.surfaces.iter().map(|pair| row(pair, result, stations)).collect(),
+        pairs: result.surfaces.iter().map(|pair| row(pair, &alone, stations)).collect(),
         refused: result
             .refused
             .iter()
@@ -115,8 +121,8 @@ fn summary(
     }
 }
 
-fn row(pair: &SurfacePair, result: &StationRegistration, stations: &[Station]) -> RegisteredPair {
-    let alone = result.pairs.iter().find(|aligned| aligned.target == pair.target && aligned.source == pair.source);
+fn row(pair: &SurfacePair, alone: &BTreeMap<(usize, usize), &PairAlignment>, stations: &[Station]) -> RegisteredPair {
+    let alone = alone.get(&(pair.target, pair.source));
     RegisteredPair {
         target: stations[pair.target].name.clone(),
         source: stations[pair.source].name.clone(),

@@ -53,6 +53,8 @@ pub enum DoubtKind {
     Placement,
     /// Frames without a pose.
     LostFrames,
+    /// Frames of a stream that came faster than they were processed.
+    DroppedFrames,
     /// A drift that is not what it seems.
     Drift,
     /// A stage that was refused; what stands without it was written.

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use live_tasks::commands::Result;
 use live_tasks::{
     FrameError, FrameHeader, FrameSource, FrameStream, LiveFrame, LiveRequest, LiveSource, LiveSummary, Next,
-    PlyTarget, SampleType, live, live_from, write_live_frame,
+    SampleType, StreamTarget, live, live_from, write_live_frame,
 };
 use pipeline::{Silent, SimulateSource, simulate};
 use range_io::survey::{InputFrame, Survey, read_frame};
@@ -116,7 +116,7 @@ impl World {
     /// The clouds that a request gives, as one stream of bytes.
     pub fn clouds(&self, request: LiveRequest) -> (LiveSummary, Vec<u8>) {
         let file = self.path("clouds.ply");
-        let summary = live(&LiveRequest { ply: Some(PlyTarget::File(file.clone())), ..request }, &mut ()).unwrap();
+        let summary = live(&LiveRequest { ply: Some(StreamTarget::File(file.clone())), ..request }, &mut ()).unwrap();
         (summary, std::fs::read(file).unwrap())
     }
 }

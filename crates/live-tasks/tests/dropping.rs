@@ -43,7 +43,7 @@ fn frames_that_come_too_fast_are_dropped_and_counted() {
     assert!(summary.dropped > 0, "{summary}");
     assert_eq!(summary.frames + summary.dropped, SENT, "{summary}");
     assert!(summary.refused.is_empty(), "{summary}");
-    assert_eq!((summary.verdict(), summary.doubts()[0].kind), (Verdict::Doubtful, DoubtKind::LostFrames));
+    assert_eq!((summary.verdict(), summary.doubts()[0].kind), (Verdict::Doubtful, DoubtKind::DroppedFrames));
     let status = last.0.unwrap();
     assert_eq!((status.frames, status.dropped), (summary.frames, summary.dropped));
     assert!(status.to_string().contains(" dropped, 0 refused"), "{status}");

@@ -2,7 +2,7 @@
 
 use live_tasks::commands::{Error, Failure, Judged, Verdict};
 use live_tasks::range_image::Samples;
-use live_tasks::{Ended, FrameHeader, LiveFrame, LiveRequest, LiveSource, PlyTarget, live};
+use live_tasks::{Ended, FrameHeader, LiveFrame, LiveRequest, LiveSource, StreamTarget, live};
 
 use crate::common::{FRAMES, World, bytes};
 
@@ -116,13 +116,24 @@ fn what_can_not_be_asked_for_is_refused_by_name() {
     // Clouds over what is read.
     for out in ["survey", "survey/clouds.ply", "survey/frames/000_0.npz", "survey/../survey/x", "frames", "survey/a/b"]
     {
+        let request = || world.request(LiveSource::Path(file.clone()));
+        let target = Some(StreamTarget::File(world.path(out)));
+        let before = std::fs::read(&file).unwrap();
+        for request in
+            [LiveRequest { ply: target.clone(), ..request() }, LiveRequest { mcap: target.clone(), ..request() }]
+        {
+            usage(live(&request, &mut ()), &["cannot be the output"]);
+            assert_eq!(std::fs::read(&file).unwrap(), before);
+        }
+    }
+    // Both streams into one.
+    for target in [StreamTarget::StandardOutput, StreamTarget::File(world.path("both"))] {
         let request = LiveRequest {
-            ply: Some(PlyTarget::File(world.path(out))),
+            ply: Some(target.clone()),
+            mcap: Some(target),
             ..world.request(LiveSource::Path(file.clone()))
         };
-        let before = std::fs::read(&file).unwrap();
-        usage(live(&request, &mut ()), &["cannot be the output"]);
-        assert_eq!(std::fs::read(&file).unwrap(), before);
+        usage(live(&request, &mut ()), &["each its own"]);
     }
     // Level and times of a recording.
     let survey = world.survey().join("survey.ron");

@@ -4,7 +4,7 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use live_tasks::{LiveRequest, PlyTarget};
+use live_tasks::{LiveRequest, StreamTarget};
 use pipeline::commands::{Inputs, made};
 use pipeline::{Judged, Part, Plan, RunRequest, SimulateSource, Verdict};
 
@@ -153,7 +153,11 @@ fn live(request: &LiveRequest, output: &Output) -> Outcome {
     let live = live_tasks::live(request, &mut line);
     line.clear();
     // Where clouds go to standard output, nothing else does.
-    if request.ply == Some(PlyTarget::StandardOutput) { output.result_aside(&live?) } else { output.result(&live?) }
+    if [&request.ply, &request.mcap].contains(&&Some(StreamTarget::StandardOutput)) {
+        output.result_aside(&live?)
+    } else {
+        output.result(&live?)
+    }
 }
 
 fn default_out(name: &Path) -> PathBuf {

@@ -251,9 +251,12 @@ fn live_writes_no_clouds_where_it_reads() {
     let before = everything(root);
     for (source, read) in [("survey", &inputs[..2]), ("filling", &inputs)] {
         for out in read.iter().flat_map(|input| hostile(root, input)) {
-            let refused = rangecam(root, &["live", source, "-s", "survey", "-c", "cal/c.ron", "--fast", "--ply", &out]);
-            let told = format!("{source}, --ply {out}: {}", String::from_utf8_lossy(&refused.stderr));
-            assert_eq!(refused.status.code(), Some(2), "{told}");
+            for option in ["--ply", "--mcap"] {
+                let line = ["live", source, "-s", "survey", "-c", "cal/c.ron", "--fast", option, &out];
+                let refused = rangecam(root, &line);
+                let told = format!("{source}, {option} {out}: {}", String::from_utf8_lossy(&refused.stderr));
+                assert_eq!(refused.status.code(), Some(2), "{told}");
+            }
         }
         assert!(everything(root) == before, "live {source} changed something");
     }

@@ -81,6 +81,17 @@ fn a_pipe_goes_in_and_clouds_come_out() {
     let summary: serde_json::Value = serde_json::from_slice(&summary).unwrap();
     assert_eq!((summary["frames"].as_u64(), summary["ended"].as_str()), (Some(32), Some("source")));
 
+    // Images of the frames are a recording, which becomes a survey of ranges.
+    let recorded = ["survey", "--fast", "--mcap", "out.mcap", "-q"];
+    assert_eq!(piped(folder.path(), &recorded, Vec::new()).0, Some(0));
+    let convert = ["convert", "out.mcap", "--out", "again", "--quiet"];
+    let converted = Command::new(env!("CARGO_BIN_EXE_rangecam")).args(convert).current_dir(folder.path()).output();
+    let converted = converted.unwrap();
+    let words = String::from_utf8_lossy(&converted.stderr);
+    assert!(converted.status.code().is_some_and(|code| code < 2), "{words}");
+    let survey = std::fs::read_to_string(folder.path().join("again/survey.ron")).unwrap();
+    assert!(survey.contains("level: range") && folder.path().join("again/frames/000031.npz").is_file(), "{survey}");
+
     let (code, clouds, words) = piped(folder.path(), &["-", "-s", "survey", "--fast", "-q"], bytes);
     assert_eq!((code, clouds.len(), words.as_str()), (Some(0), 0, ""));
 }

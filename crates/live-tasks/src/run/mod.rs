@@ -3,6 +3,7 @@
 mod drift;
 mod feed;
 mod latency;
+mod outputs;
 mod request;
 mod session;
 mod setup;
@@ -11,7 +12,7 @@ mod tally;
 
 pub use drift::{DriftReport, DriftVerdict};
 pub use latency::LatencySummary;
-pub use request::{LiveRequest, LiveWatch, PlyTarget};
+pub use request::{LiveRequest, LiveWatch};
 pub use session::{live, live_from};
 pub use summary::{Ended, LiveStatus, LiveSummary};
 pub use tally::RefusedFrames;

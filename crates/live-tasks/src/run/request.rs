@@ -5,6 +5,7 @@ use live_frames::DriftStage;
 
 use super::summary::LiveStatus;
 use crate::sources::LiveSource;
+use crate::streams::StreamTarget;
 
 /// Which frames to process, of which camera, and what to do with them.
 #[derive(Debug, Clone)]
@@ -16,7 +17,9 @@ pub struct LiveRequest {
     /// The calibration; `None`: the one beside that `survey.ron`, if there is one.
     pub calibration: Option<PathBuf>,
     /// Where clouds go.
-    pub ply: Option<PlyTarget>,
+    pub ply: Option<StreamTarget>,
+    /// Where images go, as MCAP.
+    pub mcap: Option<StreamTarget>,
     /// Frames after which it ends; `None`: it ends with the source.
     pub frames: Option<u64>,
     /// Whether a recording is played without waiting. Then no frame is dropped, whatever the source: it has to wait.
@@ -41,6 +44,7 @@ impl LiveRequest {
             survey: None,
             calibration: None,
             ply: None,
+            mcap: None,
             frames: None,
             every_frame: false,
             low_amplitude: None,
@@ -50,15 +54,6 @@ impl LiveRequest {
             view: None,
         }
     }
-}
-
-/// Where a stream of clouds goes.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum PlyTarget {
-    /// Standard output.
-    StandardOutput,
-    /// A file, which has its name when the stream has ended.
-    File(PathBuf),
 }
 
 /// Who watches a stream.

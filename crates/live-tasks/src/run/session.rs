@@ -1,20 +1,17 @@
 //! Frame after frame.
 
-use std::io::{BufWriter, ErrorKind, Write};
-use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-use atomic_output::FileWriter;
 use commands::{Error, Result, json};
 use live_frames::Error as Refusal;
 
 use super::drift::DriftReport;
 use super::feed::{Arrival, Feed};
-use super::request::{LiveRequest, LiveWatch, PlyTarget};
+use super::outputs::Outputs;
+use super::request::{LiveRequest, LiveWatch};
 use super::setup::{Setup, misfit, request};
 use super::summary::{Ended, LiveSummary};
 use super::tally::{Tally, per_second, reason};
-use crate::ply::PlyStream;
 use crate::sources::FrameSource;
 use crate::view::LiveView;
 use crate::wire::{FrameError, LiveFrame};
@@ -47,14 +44,14 @@ struct Session<'a> {
     setup: Setup,
     watch: &'a mut dyn LiveWatch,
     tally: Tally,
-    clouds: Option<Clouds>,
+    outputs: Outputs,
     view: Option<LiveView>,
     last_status: Instant,
 }
 
 impl<'a> Session<'a> {
     fn new(asked: &'a LiveRequest, setup: Setup, watch: &'a mut dyn LiveWatch) -> Result<Self> {
-        let clouds = asked.ply.as_ref().map(Clouds::open).transpose()?;
+        let outputs = Outputs::open(asked)?;
         let view = asked.view.map(|port| {
             let fail = |source| Error::Access { path: format!("127.0.0.1:{port}").into(), source };
             LiveView::new(port).map_err(fail)
@@ -63,7 +60,7 @@ impl<'a> Session<'a> {
         if let Some(view) = &view {
             watch.page(view.address());
         }
-        Ok(Self { asked, setup, watch, tally: Tally::new(), clouds, view, last_status: Instant::now() })
+        Ok(Self { asked, setup, watch, tally: Tally::new(), outputs, view, last_status: Instant::now() })
     }
 
     fn run(mut self, source: Box<dyn FrameSource>) -> Result<LiveSummary> {
@@ -103,11 +100,9 @@ impl<'a> Session<'a> {
             return Ok(None);
         }
         let processed = self.setup.processor.last();
-        if let Some(clouds) = &mut self.clouds {
-            match clouds.write(processed)? {
-                Some(points) => self.tally.points += points,
-                None => return Ok(Some(Ended::OutputClosed)),
-            }
+        match self.outputs.write(processed)? {
+            Some(points) => self.tally.points += points,
+            None => return Ok(Some(Ended::OutputClosed)),
         }
         self.tally.done(processed, frame.arrived);
         Ok((self.asked.frames == Some(self.tally.processed)).then_some(Ended::Frames))
@@ -156,10 +151,8 @@ impl<'a> Session<'a> {
             source: self.asked.source.to_string(),
             survey: self.setup.survey,
             calibration: self.setup.calibration,
-            clouds: match &self.asked.ply {
-                Some(PlyTarget::File(file)) => Some(file.clone()),
-                _ => None,
-            },
+            clouds: self.asked.ply.as_ref().and_then(|target| target.file().cloned()),
+            recording: self.asked.mcap.as_ref().and_then(|target| target.file().cloned()),
             frames: tally.processed,
             dropped: feed.dropped(),
             refused: tally.refused(feed),
@@ -182,46 +175,7 @@ impl<'a> Session<'a> {
             let source = format!("{}: no frame was processed; {why}", summary.source).into();
             return Err(Error::Refused { summary: json(&summary)?, source, written: None });
         }
-        if let Some(clouds) = self.clouds {
-            clouds.commit()?;
-        }
+        self.outputs.commit()?;
         Ok(summary)
-    }
-}
-
-/// Where clouds go.
-enum Clouds {
-    Output(PlyStream<BufWriter<std::io::Stdout>>),
-    File(PlyStream<FileWriter>, PathBuf),
-}
-
-impl Clouds {
-    fn open(target: &PlyTarget) -> Result<Self> {
-        Ok(match target {
-            PlyTarget::StandardOutput => Self::Output(PlyStream::new(BufWriter::new(std::io::stdout()))),
-            PlyTarget::File(file) => Self::File(PlyStream::new(FileWriter::create(file)?), file.clone()),
-        })
-    }
-
-    /// Writes a cloud, how many points there are; `None` where nobody reads any more.
-    fn write(&mut self, frame: &live_frames::ProcessedFrame) -> Result<Option<u64>> {
-        let (written, path) = match self {
-            Self::Output(stream) => (stream.write(frame), "standard output".into()),
-            Self::File(stream, file) => (stream.write(frame), file.clone()),
-        };
-        match written {
-            Ok(points) => Ok(Some(points as u64)),
-            Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(None),
-            Err(source) => Err(Error::Access { path, source }),
-        }
-    }
-
-    fn commit(self) -> Result<()> {
-        match self {
-            // A reader that has gone has read enough.
-            Self::Output(stream) => drop(stream.into_inner().flush()),
-            Self::File(stream, _) => stream.into_inner().commit()?,
-        }
-        Ok(())
     }
 }

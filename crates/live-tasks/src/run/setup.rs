@@ -9,8 +9,9 @@ use range_io::calibration::Calibration;
 use range_io::error_models::{ModelSet, WarmUp};
 use range_io::survey::Survey;
 
-use super::request::{LiveRequest, PlyTarget};
+use super::request::LiveRequest;
 use crate::sources::LiveSource;
+use crate::streams::StreamTarget;
 use crate::wire::FrameHeader;
 
 /// A camera that is ready for its frames.
@@ -44,7 +45,9 @@ impl Setup {
                 Calibration::from_models(&survey.camera.nominal_camera()?, &ModelSet { entries: Vec::new() }, None)?
             }
         };
-        check_ply(asked, survey_path, file.as_deref())?;
+        for target in [&asked.ply, &asked.mcap].into_iter().flatten() {
+            check_target(asked, target, survey_path, file.as_deref())?;
+        }
         let camera = live_camera(asked, &survey)?;
         let unwrap = UnwrapStage { maximum_range_m: asked.maximum_range_m, ..UnwrapStage::default() };
         let stages = Stages { drift: asked.drift, unwrap, ..Stages::default() };
@@ -78,9 +81,9 @@ fn live_camera(asked: &LiveRequest, survey: &Survey) -> Result<LiveCamera> {
     })
 }
 
-/// Refuses a file of clouds that is, or lies in, something that is read.
-fn check_ply(asked: &LiveRequest, survey: &Path, calibration: Option<&Path>) -> Result<()> {
-    let Some(PlyTarget::File(file)) = &asked.ply else { return Ok(()) };
+/// Refuses a file of results that is, or lies in, something that is read.
+fn check_target(asked: &LiveRequest, target: &StreamTarget, survey: &Path, calibration: Option<&Path>) -> Result<()> {
+    let Some(file) = target.file() else { return Ok(()) };
     let mut read: Vec<PathBuf> = calibration.map(Path::to_owned).into_iter().collect();
     read.push(root_of(survey));
     if let LiveSource::Path(path) | LiveSource::Unix(path) = &asked.source {

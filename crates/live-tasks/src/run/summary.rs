@@ -75,6 +75,9 @@ pub struct LiveSummary {
     /// Where clouds were written.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub clouds: Option<PathBuf>,
+    /// The recording of images, where it is a file.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub recording: Option<PathBuf>,
     /// Frames processed.
     pub frames: u64,
     /// Frames dropped, as the one before was not taken yet when they came.
@@ -114,7 +117,7 @@ impl LiveSummary {
             let all = self.dropped + self.frames + self.refused.iter().map(|refused| refused.frames).sum::<u64>();
             let words =
                 format!("{} of {all} frames were dropped, as they came faster than they were processed", self.dropped);
-            self.doubts.push(Doubt::new(DoubtKind::LostFrames, words));
+            self.doubts.push(Doubt::new(DoubtKind::DroppedFrames, words));
         }
         for RefusedFrames { reason, frames, first } in &self.refused {
             let words = format!("{frames} frames were refused, the first: {first}");
@@ -158,8 +161,11 @@ impl fmt::Display for LiveSummary {
         if let Some(clouds) = &self.clouds {
             write!(f, "\n{} points in {}", self.points, clouds.display())?;
         }
+        if let Some(recording) = &self.recording {
+            write!(f, "\nimages in {}", recording.display())?;
+        }
         if self.ended == Ended::OutputClosed {
-            write!(f, "\nended, as nobody reads the clouds any more")?;
+            write!(f, "\nended, as nobody reads the results any more")?;
         }
         for doubt in &self.doubts {
             write!(f, "\ndoubt: {doubt}")?;

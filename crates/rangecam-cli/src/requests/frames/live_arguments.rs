@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use live_tasks::live_frames::DriftStage;
-use live_tasks::{LiveRequest, LiveSource, PlyTarget};
+use live_tasks::{LiveRequest, LiveSource, StreamTarget};
 
 use crate::requests::values::{finite, not_negative, positive};
 
@@ -24,6 +24,9 @@ pub(crate) struct LiveArguments {
     /// Write clouds, complete PLY files one after the other, to a file, or with `-` to standard output.
     #[arg(long, value_name = "FILE|-")]
     ply: Option<PathBuf>,
+    /// Write ranges, deviations, amplitudes and flags as images of an MCAP recording, to a file, or with `-` to standard output.
+    #[arg(long, value_name = "FILE|-")]
+    mcap: Option<PathBuf>,
     /// End after so many processed frames.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     frames: Option<u64>,
@@ -55,12 +58,13 @@ impl LiveArguments {
             None => LiveSource::Path(self.source.into()),
         };
         let target = |path: PathBuf| {
-            if path.as_os_str() == OsStr::new("-") { PlyTarget::StandardOutput } else { PlyTarget::File(path) }
+            if path.as_os_str() == OsStr::new("-") { StreamTarget::StandardOutput } else { StreamTarget::File(path) }
         };
         LiveRequest {
             survey: self.survey,
             calibration: self.calibration,
             ply: self.ply.map(target),
+            mcap: self.mcap.map(target),
             frames: self.frames,
             every_frame: self.fast,
             low_amplitude: self.low_amplitude,

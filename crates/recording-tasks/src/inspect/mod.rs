@@ -72,7 +72,7 @@ pub struct StreamReport {
     /// One over that.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rate_hz: Option<f64>,
-    /// Intervals in which at least one message is missing.
+    /// Intervals in which at least one message is missing; 0 for messages of other kinds, which need no rate.
     pub gaps: u64,
     /// Messages that are missing in them.
     pub missing: u64,

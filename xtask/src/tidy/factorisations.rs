@@ -46,6 +46,7 @@ const KNOWN: &[(Use, &[&str])] = &[
         Use::ClosedForm,
         &[
             "camera-model/src/lenses/lens_inverse.rs",
+            "camera-model/src/lenses/rational.rs",
             "camera-model/src/observation.rs",
             "error-models/src/screening/plane_block.rs",
             "global-registration/src/description/sift/extrema.rs",

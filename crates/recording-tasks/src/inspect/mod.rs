@@ -159,7 +159,7 @@ pub fn inspect_recording(path: &Path, progress: &dyn Progress) -> Result<Recordi
         let stream = || recording.streams()[message.stream].name.clone();
         match &message.payload {
             Payload::CameraInfo(info) if tallies[message.stream].messages == 0 => {
-                cameras.push(tally::camera(stream(), info))
+                cameras.push(tally::camera(stream(), info));
             }
             Payload::Temperature(celsius) => tally::temperature(&mut temperatures, stream, *celsius),
             _ => {}

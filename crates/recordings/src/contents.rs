@@ -137,7 +137,7 @@ pub(crate) struct Contents {
     kept_bytes: u64,
 }
 
-#[cfg_attr(not(any(feature = "mcap", feature = "bag", feature = "mkv", feature = "adi")), allow(dead_code))]
+#[cfg_attr(not(all(feature = "mcap", feature = "bag", feature = "mkv", feature = "adi")), allow(dead_code))]
 impl Contents {
     pub fn fault(&mut self, at_byte: u64, reason: impl Into<String>) {
         if self.faults.len() < MOST_FAULTS {

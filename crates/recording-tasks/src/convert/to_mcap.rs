@@ -15,13 +15,13 @@ use crate::access::{doubts, each_message, failed};
 
 /// Converts a recording to MCAP.
 pub(super) fn convert(request: &ConvertRequest, progress: &dyn Progress) -> Result<ConvertSummary> {
+    check_file(request)?;
     if request.stream.is_some() || request.level.is_some() || request.station.is_some() || request.calibration.is_some()
     {
         return Err(refused(
             "to MCAP all streams are taken over as they are: leave out --stream, --level, --station, --calibration",
         ));
     }
-    check_file(request)?;
     let scan = scan(request, progress)?;
     let mut recording = Recording::open(&request.input).map_err(failed("convert", &request.input))?;
     let file = FileWriter::create(&request.out).map_err(commands::range_io::Error::from)?;

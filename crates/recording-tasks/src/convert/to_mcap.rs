@@ -16,20 +16,17 @@ use crate::access::{doubts, each_message, failed};
 /// Converts a recording to MCAP.
 pub(super) fn convert(request: &ConvertRequest, progress: &dyn Progress) -> Result<ConvertSummary> {
     check_file(request)?;
-    if request.stream.is_some() || request.level.is_some() || request.station.is_some() || request.calibration.is_some()
-    {
-        return Err(refused(
-            "to MCAP all streams are taken over as they are: leave out --stream, --level, --station, --calibration",
-        ));
+    let plain = ConvertRequest::new(&request.input, &request.out);
+    if *request != plain {
+        return Err(refused("to MCAP all streams of a recording are taken over as they are: give --out alone"));
     }
     let scan = scan(request, progress)?;
     let mut recording = Recording::open(&request.input).map_err(failed("convert", &request.input))?;
     let file = FileWriter::create(&request.out).map_err(commands::range_io::Error::from)?;
     let mut out = Out::new(file, factory_of(&scan)?).map_err(access(request))?;
-    let result = each_message("convert", "writing messages", &mut recording, progress, |recording, message| {
+    each_message("convert", "writing messages", &mut recording, progress, |recording, message| {
         out.message(recording, &message)
-    });
-    result?;
+    })?;
     let summary = ConvertSummary {
         input: request.input.display().to_string(),
         format: recording.format().name().to_owned(),

@@ -56,9 +56,7 @@ impl Kind {
         let light = says(&["ir", "infra", "infrared", "amplitude", "intensity", "ab", "grey", "gray", "nir", "mono"]);
         match encoding {
             Encoding::Mono8 | Encoding::Mono16 | Encoding::Unsigned8 => Self::Intensity,
-            Encoding::Unsigned16 | Encoding::Float32
-                if says(&["conf", "confidence", "phase", "raw"]) && !says(&["depth"]) =>
-            {
+            Encoding::Unsigned16 | Encoding::Float32 if says(&["conf", "confidence", "phase"]) && !says(&["depth"]) => {
                 Self::Raw
             }
             Encoding::Unsigned16 | Encoding::Float32 if light && !says(&["depth"]) => Self::Intensity,
@@ -139,7 +137,7 @@ pub(crate) struct Contents {
     kept_bytes: u64,
 }
 
-#[cfg_attr(not(any(feature = "mcap", feature = "bag", feature = "mkv", feature = "adi")), allow(dead_code))]
+#[cfg_attr(not(all(feature = "mcap", feature = "bag", feature = "mkv", feature = "adi")), allow(dead_code))]
 impl Contents {
     pub fn fault(&mut self, at_byte: u64, reason: impl Into<String>) {
         if self.faults.len() < MOST_FAULTS {

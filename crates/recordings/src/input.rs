@@ -14,7 +14,7 @@ pub(crate) struct Input {
     length: u64,
 }
 
-#[cfg_attr(not(any(feature = "mcap", feature = "bag", feature = "mkv", feature = "adi")), allow(dead_code))]
+#[cfg_attr(not(all(feature = "mcap", feature = "bag", feature = "mkv", feature = "adi")), allow(dead_code))]
 impl Input {
     pub fn new(mut source: Box<dyn ReadSeek>) -> io::Result<Self> {
         let length = source.seek(SeekFrom::End(0))?;

@@ -62,3 +62,30 @@ fn names_of_encodings_come_back() {
     }
     assert_eq!(Encoding::of("bayer_rggb8").bytes_per_pixel(), None);
 }
+
+/// The kind of a stream by its name and its first image.
+#[cfg(feature = "mcap")]
+#[test]
+fn names_and_encodings_tell_what_an_image_shows() {
+    use recordings::{Kind, McapWriter, Payload};
+    let streams = [
+        ("/camera/image_raw", Encoding::Unsigned16, Kind::Depth),
+        ("/camera/depth/image_rect_raw", Encoding::Unsigned16, Kind::Depth),
+        ("/camera/infra1/image_rect_raw", Encoding::Unsigned16, Kind::Intensity),
+        ("/ir/image_raw", Encoding::Mono16, Kind::Intensity),
+        ("/direct/image", Encoding::Unsigned16, Kind::Depth),
+        ("/tof/range", Encoding::Unsigned16, Kind::Range),
+        ("/depth_to_ir/image_raw", Encoding::Unsigned16, Kind::Depth),
+        ("/confidence", Encoding::Unsigned16, Kind::Raw),
+    ];
+    let mut writer = McapWriter::new(Vec::new()).unwrap();
+    for (topic, encoding, _) in &streams {
+        let stream = writer.stream(topic).unwrap();
+        let image = Image::from_u16("", [2, 1], encoding.clone(), &[1, 2]).unwrap();
+        writer.message(stream, 1, &Payload::Image(image)).unwrap();
+    }
+    let (_, recording) = crate::common::read(&writer.finish().unwrap());
+    for (stream, (topic, _, kind)) in recording.streams().iter().zip(streams) {
+        assert_eq!((stream.name.as_str(), stream.kind), (topic, kind));
+    }
+}

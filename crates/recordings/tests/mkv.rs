@@ -66,7 +66,8 @@ fn every_cut_leaves_the_frames_before_it_and_tells_how_much_is_missing() {
 fn frames_laced_in_each_way_are_told_apart() {
     let samples = [sample(1, 0.0), sample(2, 1.0), sample(3, 2.0)];
     let data = samples.concat();
-    let ways: [(u8, Vec<u8>); 3] = [(0b100, vec![2]), (0b010, vec![2, 40, 40]), (0b110, vec![2, 0x80 | 40, 0x80 | 63])];
+    // As a number of one byte, 40 is 0xA8; a difference of none is 0xBF.
+    let ways: [(u8, Vec<u8>); 3] = [(0b100, vec![2]), (0b010, vec![2, 40, 40]), (0b110, vec![2, 0xA8, 0xBF])];
     for (flags, head) in ways {
         let laced = element(0xA3, &block(1, 0, flags, &[head, data.clone()].concat()));
         let track = [element(0xD7, &[1]), element(0x86, b"S_K4A/IMU"), element(0x536E, b"IMU")].concat();

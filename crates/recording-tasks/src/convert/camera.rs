@@ -106,7 +106,7 @@ fn of_info(source: &str, info: &CameraInfo, images: &str) -> Result<Found> {
     let lens = info.distortion.as_slice();
     if is_rectified || lens.iter().all(|value| value.abs() <= 0.0) {
         let model = if is_rectified { "rectified" } else { "no distortion" };
-        return fitted(used(model), Camera::from_plumb_bob(&pinhole, PITCH_MM));
+        return without_lens(used(model), &pinhole);
     }
     match (info.distortion_model.as_str(), lens) {
         ("plumb_bob" | "", &[k1, k2, p1, p2, ref rest @ ..]) if rest.len() <= 1 => {
@@ -128,20 +128,17 @@ fn of_info(source: &str, info: &CameraInfo, images: &str) -> Result<Found> {
 /// A camera with the lens that was fitted to the recording's.
 fn fitted((source, model): (String, String), fit: Fit) -> Result<Found> {
     let (camera, residual_px) = fit.map_err(|error| Error::Camera(error.to_string()))?;
-    let calibration = if camera.lens == LensDistortion::default() || residual_px < 1e-9 && is_nothing(&camera.lens) {
-        None
-    } else {
-        let mut calibration = Calibration::from_models(&camera, &ModelSet::default(), None)?;
-        calibration.provenance.method =
-            format!("lens fitted to that of {source} ({model}), within {residual_px:.3} px");
-        Some(calibration)
-    };
-    Ok(Found { camera, used: CameraUsed { source, model, residual_px }, calibration })
+    let mut calibration = Calibration::from_models(&camera, &ModelSet::default(), None)?;
+    calibration.provenance.method = format!("lens fitted to that of {source} ({model}), within {residual_px:.3} px");
+    Ok(Found { camera, used: CameraUsed { source, model, residual_px }, calibration: Some(calibration) })
 }
 
-/// Whether a lens is one of rounding alone.
-fn is_nothing(lens: &LensDistortion) -> bool {
-    lens.coefficients().iter().all(|value| value.abs() < 1e-12)
+/// A camera without distortion: `survey.ron` says all of it.
+fn without_lens((source, model): (String, String), pinhole: &PlumbBob) -> Result<Found> {
+    let (camera, _) = Camera::from_plumb_bob(pinhole, PITCH_MM).map_err(|error| Error::Camera(error.to_string()))?;
+    // What the fit finds there is rounding.
+    let camera = Camera { lens: LensDistortion::default(), ..camera };
+    Ok(Found { camera, used: CameraUsed { source, model, residual_px: 0.0 }, calibration: None })
 }
 
 /// The factory calibration of an Azure Kinect for depth images of this size.

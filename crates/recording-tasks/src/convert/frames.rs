@@ -13,6 +13,9 @@ const SAME_EXPOSURE_NS: i64 = 2_000_000;
 /// Images of light that wait for their depths: more than a recorder writes between the two.
 const MOST_WAITING: usize = 8;
 
+/// Depths that wait for their light, for the same reason.
+const MOST_PENDING: usize = 4;
+
 /// A frame on its way into the survey.
 #[derive(Debug, Clone)]
 pub(super) struct Pending {
@@ -39,7 +42,7 @@ impl Pairs {
     /// A new image; what is complete by now comes out.
     pub fn add(&mut self, pending: Pending) -> Vec<(Pending, Option<Image>)> {
         self.pending.push_back(pending);
-        self.complete(1)
+        self.complete(MOST_PENDING)
     }
 
     /// An image of light.
@@ -48,7 +51,7 @@ impl Pairs {
         if self.light.len() > MOST_WAITING {
             self.light.pop_front();
         }
-        self.complete(1)
+        self.complete(MOST_PENDING)
     }
 
     /// What is left at the end.

@@ -17,6 +17,9 @@ pub(super) struct Scan {
     pub properties: Vec<(String, String)>,
 }
 
+/// Size and coordinate system of an image.
+pub(super) type FirstImage = ([usize; 2], String);
+
 /// One stream.
 #[derive(Debug, Clone)]
 pub(super) struct Scanned {
@@ -24,13 +27,13 @@ pub(super) struct Scanned {
     pub kind: Kind,
     pub messages: usize,
     /// Size and coordinate system of the first image that is stored pixel by pixel.
-    pub image: Option<([usize; 2], String)>,
+    pub image: Option<FirstImage>,
 }
 
 /// Reads a recording once.
 pub(super) fn scan(request: &ConvertRequest, progress: &dyn Progress) -> Result<Scan> {
     let mut recording = Recording::open(&request.input).map_err(failed("convert", &request.input))?;
-    let mut found: Vec<(usize, Option<([usize; 2], String)>)> = Vec::new();
+    let mut found: Vec<(usize, Option<FirstImage>)> = Vec::new();
     let mut cameras: Vec<(usize, CameraInfo)> = Vec::new();
     each_message("convert", "looking through the recording", &mut recording, progress, |recording, message| {
         found.resize(recording.streams().len().max(found.len()), (0, None));
@@ -123,18 +126,11 @@ impl Scan {
     /// The stream of inertial samples.
     pub fn imu(&self, request: &ConvertRequest) -> Result<Option<usize>> {
         let is_imu = |stream: &Scanned| stream.kind == Kind::Imu && stream.messages > 0;
-        match &request.imu {
-            Some(name) => {
-                let found = self.streams.iter().position(|stream| is_imu(stream) && stream.name == *name);
-                let words =
-                    || refused(format!("there is no inertial stream `{name}`; there are {}", self.names(is_imu)));
-                found.map(Some).ok_or_else(words)
-            }
-            None => {
-                let mut found = (0..self.streams.len()).filter(|index| is_imu(&self.streams[*index]));
-                Ok(found.next().filter(|_| found.next().is_none()))
-            }
-        }
+        let mut found = (0..self.streams.len()).filter(|index| is_imu(&self.streams[*index]));
+        let Some(name) = &request.imu else { return Ok(found.next().filter(|_| found.next().is_none())) };
+        let named = found.find(|index| self.streams[*index].name == *name);
+        let words = || refused(format!("there is no inertial stream `{name}`; there are {}", self.names(is_imu)));
+        named.map(Some).ok_or_else(words)
     }
 
     /// Names of streams, for messages.

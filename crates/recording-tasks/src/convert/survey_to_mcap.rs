@@ -15,10 +15,10 @@ const FRAME_ID: &str = "camera_depth_optical_frame";
 
 /// Converts a survey to MCAP.
 pub(super) fn convert(request: &ConvertRequest, progress: &dyn Progress) -> Result<ConvertSummary> {
+    check_file(request)?;
     if request.stream.is_some() || request.level.is_some() || request.station.is_some() || request.imu.is_some() {
         return Err(refused("a survey has no streams to choose from: leave out --stream, --level, --station, --imu"));
     }
-    check_file(request)?;
     let survey = Survey::read(&request.input)?;
     if matches!(survey.level, Level::Samples | Level::Phase) {
         let level = survey.level.name();

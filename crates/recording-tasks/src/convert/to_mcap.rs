@@ -15,21 +15,18 @@ use crate::access::{doubts, each_message, failed};
 
 /// Converts a recording to MCAP.
 pub(super) fn convert(request: &ConvertRequest, progress: &dyn Progress) -> Result<ConvertSummary> {
-    if request.stream.is_some() || request.level.is_some() || request.station.is_some() || request.calibration.is_some()
-    {
-        return Err(refused(
-            "to MCAP all streams are taken over as they are: leave out --stream, --level, --station, --calibration",
-        ));
-    }
     check_file(request)?;
+    let plain = ConvertRequest::new(&request.input, &request.out);
+    if *request != plain {
+        return Err(refused("to MCAP all streams of a recording are taken over as they are: give --out alone"));
+    }
     let scan = scan(request, progress)?;
     let mut recording = Recording::open(&request.input).map_err(failed("convert", &request.input))?;
     let file = FileWriter::create(&request.out).map_err(commands::range_io::Error::from)?;
     let mut out = Out::new(file, factory_of(&scan)?).map_err(access(request))?;
-    let result = each_message("convert", "writing messages", &mut recording, progress, |recording, message| {
-        out.message(recording, message)
-    });
-    result?;
+    each_message("convert", "writing messages", &mut recording, progress, |recording, message| {
+        out.message(recording, &message)
+    })?;
     let summary = ConvertSummary {
         input: request.input.display().to_string(),
         format: recording.format().name().to_owned(),
@@ -54,21 +51,20 @@ struct Out {
     writer: McapWriter<FileWriter>,
     topics: BTreeMap<usize, StreamId>,
     factory: Option<(usize, RationalIntrinsics)>,
-    camera: Option<StreamId>,
     written: usize,
-    left_out: BTreeMap<usize, usize>,
+    passed_over: BTreeMap<usize, usize>,
 }
 
 impl Out {
     fn new(file: FileWriter, factory: Option<(usize, RationalIntrinsics)>) -> std::io::Result<Self> {
-        let (topics, left_out) = (BTreeMap::new(), BTreeMap::new());
-        Ok(Self { writer: McapWriter::new(file)?, topics, factory, camera: None, written: 0, left_out })
+        let (topics, passed_over) = (BTreeMap::new(), BTreeMap::new());
+        Ok(Self { writer: McapWriter::new(file)?, topics, factory, written: 0, passed_over })
     }
 
-    fn message(&mut self, recording: &Recording, message: Message) -> Result<()> {
+    fn message(&mut self, recording: &Recording, message: &Message) -> Result<()> {
         let time_ns = message.time_ns();
         if matches!(message.payload, Payload::Bytes(_) | Payload::Unreadable(_)) {
-            *self.left_out.entry(message.stream).or_default() += 1;
+            *self.passed_over.entry(message.stream).or_default() += 1;
             return Ok(());
         }
         let failed = |error: recordings::Error| refused(error.to_string());
@@ -79,17 +75,11 @@ impl Out {
             let camera = self.writer.stream(&topic(stream).replace("image_raw", "camera_info")).map_err(failed)?;
             let info = info_of(&factory, &stream.name);
             self.writer.message(camera, time_ns, &Payload::CameraInfo(Box::new(info))).map_err(failed)?;
-            self.camera = Some(camera);
             self.written += 1;
         }
-        let id = match self.topics.get(&message.stream) {
-            Some(id) => *id,
-            None => {
-                let id = self.writer.stream(&topic(stream)).map_err(failed)?;
-                self.topics.insert(message.stream, id);
-                id
-            }
-        };
+        let known = self.topics.get(&message.stream).copied();
+        let id = known.map_or_else(|| self.writer.stream(&topic(stream)).map_err(failed), Ok)?;
+        self.topics.insert(message.stream, id);
         self.writer.message(id, time_ns, &message.payload).map_err(failed)?;
         self.written += 1;
         Ok(())
@@ -108,7 +98,7 @@ impl Out {
         let file = self.writer.finish().map_err(access(request))?;
         file.commit().map_err(commands::range_io::Error::from)?;
         summary.frames = self.written;
-        for (stream, messages) in self.left_out {
+        for (stream, messages) in self.passed_over {
             summary.left_out.push(format!("{} ({messages} messages)", scan.streams[stream].name));
         }
         if scan.streams.iter().any(|stream| stream.kind == Kind::Range && stream.messages > 0) {

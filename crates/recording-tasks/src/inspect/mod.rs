@@ -72,7 +72,7 @@ pub struct StreamReport {
     /// One over that.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rate_hz: Option<f64>,
-    /// Intervals in which at least one message is missing.
+    /// Intervals in which at least one message is missing; 0 for messages of other kinds, which need no rate.
     pub gaps: u64,
     /// Messages that are missing in them.
     pub missing: u64,
@@ -159,7 +159,7 @@ pub fn inspect_recording(path: &Path, progress: &dyn Progress) -> Result<Recordi
         let stream = || recording.streams()[message.stream].name.clone();
         match &message.payload {
             Payload::CameraInfo(info) if tallies[message.stream].messages == 0 => {
-                cameras.push(tally::camera(stream(), info))
+                cameras.push(tally::camera(stream(), info));
             }
             Payload::Temperature(celsius) => tally::temperature(&mut temperatures, stream, *celsius),
             _ => {}

@@ -1,6 +1,6 @@
 //! What is counted of each stream.
 
-use recordings::{CameraInfo, Message, Payload, Stream};
+use recordings::{CameraInfo, Kind, Message, Payload, Stream};
 
 use super::timing::Timing;
 use super::{CameraReport, StreamReport, TemperatureReport};
@@ -35,6 +35,10 @@ impl Tally {
     pub fn report(mut self, stream: &Stream, seconds: impl Fn(i64) -> f64) -> StreamReport {
         let interval_s = self.timing.finish().map(|interval| interval as f64 * 1e-9);
         let [first, last] = self.times_ns.map_or([0.0; 2], |times| times.map(&seconds));
+        // Messages of other kinds come when something happens.
+        if stream.kind == Kind::Other {
+            self.timing.forget_gaps();
+        }
         StreamReport {
             name: stream.name.clone(),
             kind: stream.kind.name(),

@@ -62,6 +62,11 @@ impl Timing {
         self.longest.map(|(at, length)| Gap { at_s: seconds(at), length_s: length as f64 * 1e-9 })
     }
 
+    /// Of a stream without a rate of its own.
+    pub fn forget_gaps(&mut self) {
+        (self.gaps, self.missing, self.longest) = (0, 0, None);
+    }
+
     fn take_median(&mut self) {
         let first = std::mem::take(&mut self.first);
         let mut lengths: Vec<i64> = first.iter().map(|(_, length)| *length).collect();

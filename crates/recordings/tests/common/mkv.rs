@@ -17,9 +17,9 @@ pub fn open_element(id: u32, data: &[u8]) -> Vec<u8> {
     element
 }
 
-fn video(number: u8, name: &str, coding: &[u8; 4]) -> Vec<u8> {
+fn video(number: u8, name: &str, coding: [u8; 4]) -> Vec<u8> {
     let mut private = vec![0_u8; 40];
-    private[16..20].copy_from_slice(coding);
+    private[16..20].copy_from_slice(&coding);
     let size = [element(0xB0, &[3]), element(0xBA, &[2])].concat();
     let parts = [
         element(0xD7, &[number]),
@@ -86,7 +86,7 @@ pub fn segment(offset: bool) -> Vec<u8> {
     ];
     let second = [element(0xE7, &[0x82, 0x35]), element(0xA3, &block(2, -1, 0x80, &image(SECOND)))];
     let attached = [element(0x466E, b"calibration.json"), element(0x465C, b"{}")].concat();
-    let tracks = [video(1, "COLOR", b"MJPG"), video(2, "DEPTH", b"b16g"), video(3, "IR", b"b16g"), inertial(4)];
+    let tracks = [video(1, "COLOR", *b"MJPG"), video(2, "DEPTH", *b"b16g"), video(3, "IR", *b"b16g"), inertial(4)];
     let mut tags = tag("K4A_IR_MODE", "ACTIVE", Some(3));
     if offset {
         tags.extend(tag("K4A_START_OFFSET_NS", &OFFSET_NS.to_string(), None));

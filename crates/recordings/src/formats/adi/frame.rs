@@ -8,10 +8,8 @@ pub(super) const HEAD: u64 = 128;
 pub(super) struct Head {
     pub width: u16,
     pub height: u16,
-    pub has_depth: bool,
-    pub has_brightness: bool,
-    pub has_confidence: bool,
-    pub has_points: bool,
+    /// Which of [`Plane::ALL`] there are.
+    has: [bool; 4],
     pub number: u32,
     pub mode: u8,
     pub frequencies: u8,
@@ -30,10 +28,7 @@ impl Head {
         let head = Self {
             width: u16_at(0),
             height: u16_at(2),
-            has_depth: bytes[5] > 0,
-            has_brightness: bytes[6] > 0,
-            has_confidence: bytes[7] > 0,
-            has_points: bytes[19] > 0,
+            has: [5, 6, 7, 19].map(|at| bytes[at] > 0),
             number: u32_at(12),
             mode: bytes[16],
             frequencies: bytes[18],
@@ -48,7 +43,7 @@ impl Head {
             && (1..=4096).contains(&head.height)
             && configuration <= 7
             && bits.iter().all(|&bits| bits <= 16)
-            && (head.has_depth || head.has_brightness)
+            && (head.has[0] || head.has[1])
             && head.frequencies <= 16
             && bytes[19] <= 1
             && [head.sensor_c, head.laser_c].iter().all(|celsius| (-100..=250).contains(celsius));
@@ -63,13 +58,7 @@ impl Head {
 
     /// The planes in the order of the file.
     pub fn planes(&self) -> Vec<Plane> {
-        let all = [
-            (Plane::Depth, self.has_depth),
-            (Plane::Brightness, self.has_brightness),
-            (Plane::Confidence, self.has_confidence),
-            (Plane::Points, self.has_points),
-        ];
-        all.into_iter().filter(|(_, is_there)| *is_there).map(|(plane, _)| plane).collect()
+        Plane::ALL.into_iter().zip(self.has).filter(|(_, is_there)| *is_there).map(|(plane, _)| plane).collect()
     }
 }
 
@@ -86,6 +75,9 @@ pub(super) enum Plane {
 }
 
 impl Plane {
+    /// In the order of the file.
+    const ALL: [Self; 4] = [Self::Depth, Self::Brightness, Self::Confidence, Self::Points];
+
     /// Bytes of a pixel.
     pub fn bytes(self) -> u64 {
         match self {

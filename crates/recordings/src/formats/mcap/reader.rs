@@ -49,7 +49,10 @@ impl Mcap {
     pub fn open(input: &mut Input, contents: &mut Contents) -> io::Result<Self> {
         let mut mcap = Self { closed: summary::is_closed(input)?, ..Self::default() };
         if mcap.closed {
-            for (code, record) in summary::records(input)? {
+            let mut records = summary::records(input)?;
+            // Schemas before the channels that name them.
+            records.sort_by_key(|(code, _)| *code);
+            for (code, record) in records {
                 match code {
                     opcode::STATISTICS => mcap.counts = summary::counts(&record).into_iter().collect(),
                     _ => mcap.define(code, &record, 0, contents),

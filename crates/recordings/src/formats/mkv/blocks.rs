@@ -35,8 +35,11 @@ fn fixed(data: &[u8]) -> Option<Vec<&[u8]>> {
     (!rest.is_empty() && rest.len() % count == 0).then(|| rest.chunks(rest.len() / count).collect())
 }
 
+/// Sizes of some frames, and what is behind them.
+type Sizes<'a> = Option<(Vec<usize>, &'a [u8])>;
+
 /// Frames behind their number less one and the sizes of all but the last.
-fn split(data: &[u8], sizes: fn(usize, &[u8]) -> Option<(Vec<usize>, &[u8])>) -> Option<Vec<&[u8]>> {
+fn split(data: &[u8], sizes: fn(usize, &[u8]) -> Sizes) -> Option<Vec<&[u8]>> {
     let (&more, rest) = data.split_first()?;
     let (sizes, mut rest) = sizes(more as usize, rest)?;
     let mut frames = Vec::new();
@@ -50,7 +53,7 @@ fn split(data: &[u8], sizes: fn(usize, &[u8]) -> Option<(Vec<usize>, &[u8])>) ->
 }
 
 /// Sizes as sums of bytes, each list ended by one below 255.
-fn xiph(count: usize, mut data: &[u8]) -> Option<(Vec<usize>, &[u8])> {
+fn xiph(count: usize, mut data: &[u8]) -> Sizes<'_> {
     let mut sizes = Vec::new();
     for _ in 0..count {
         let mut size = 0;
@@ -68,7 +71,7 @@ fn xiph(count: usize, mut data: &[u8]) -> Option<(Vec<usize>, &[u8])> {
 }
 
 /// The first size as a number of its own length, further ones as differences with a sign.
-fn ebml(count: usize, data: &[u8]) -> Option<(Vec<usize>, &[u8])> {
+fn ebml(count: usize, data: &[u8]) -> Sizes<'_> {
     let (mut sizes, mut data, mut last) = (Vec::new(), data, 0_i64);
     for index in 0..count {
         let length = data.first()?.leading_zeros() + 1;

@@ -49,7 +49,7 @@ impl Matroska {
             closed: false,
             waiting: VecDeque::new(),
         };
-        while let Next::Element(element) = matroska.peek(input)? {
+        while let Next::Element(element) = peek(input)? {
             if element.id == id::CLUSTER || !element.is_entered() && element.size.is_none_or(|size| size > input.left())
             {
                 break;
@@ -57,22 +57,6 @@ impl Matroska {
             matroska.step(input, contents)?;
         }
         Ok(matroska)
-    }
-
-    /// The head of the next element, without stepping over it.
-    fn peek(&self, input: &mut Input) -> io::Result<Next> {
-        let start = input.position();
-        let found = next(input)?;
-        // What comes behind the head is wanted, from its end on.
-        let behind = input.position();
-        input.seek(start)?;
-        Ok(match found {
-            Next::Element(mut element) => {
-                element.size = element.size.map(|size| size.saturating_add(behind - start));
-                Next::Element(element)
-            }
-            other => other,
-        })
     }
 
     /// The next message, or the end.
@@ -153,7 +137,7 @@ impl Matroska {
             id::TAG => self.tag(&data, contents),
             id::TIMESTAMP => self.cluster_ticks = i64::try_from(unsigned(&data)).unwrap_or(i64::MAX),
             id::TIMESTAMP_SCALE => {
-                self.nanoseconds_per_tick = i64::try_from(unsigned(&data)).unwrap_or(i64::MAX).max(1)
+                self.nanoseconds_per_tick = i64::try_from(unsigned(&data)).unwrap_or(i64::MAX).max(1);
             }
             id::WRITING_APP => contents.property("recorder", text(&data)),
             id::TITLE => contents.property("title", text(&data)),
@@ -257,4 +241,20 @@ impl Matroska {
         }
         Ending::CutOff { at_byte, missing_bytes: short.max(missing), reason }
     }
+}
+
+/// The head of the next element, without stepping over it.
+fn peek(input: &mut Input) -> io::Result<Next> {
+    let start = input.position();
+    let found = next(input)?;
+    // What comes behind the head is wanted, from its end on.
+    let behind = input.position();
+    input.seek(start)?;
+    Ok(match found {
+        Next::Element(mut element) => {
+            element.size = element.size.map(|size| size.saturating_add(behind - start));
+            Next::Element(element)
+        }
+        other => other,
+    })
 }

@@ -4,7 +4,6 @@
 mod ambiguous_light;
 mod bad_input;
 mod common;
-mod exposures;
 mod false_flags;
 mod outside_light;
 mod parts;
@@ -12,4 +11,3 @@ mod real_periodic;
 mod real_repeats;
 mod remaining_errors;
 mod right_flags;
-mod warm_up;

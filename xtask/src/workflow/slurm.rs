@@ -119,14 +119,15 @@ impl Drop for Slurm {
 
 fn configuration(host: &str, folder: &Path) -> String {
     let at = |name: &str| folder.join(name).display().to_string();
-    let cpus = std::thread::available_parallelism().map_or(1, usize::from);
+    // Jobs wait more than they compute: for files that appear, for the controller.
+    let cpus = 3 * std::thread::available_parallelism().map_or(1, usize::from);
     format!(
         "ClusterName=one\nSlurmctldHost={host}(127.0.0.1)\nSlurmUser=root\nSlurmdUser=root\nAuthType=auth/munge\nAuthInfo=socket={}\n\
          StateSaveLocation={}\nSlurmdSpoolDir={}\nSlurmctldPidFile={}\nSlurmdPidFile={}\nSlurmctldLogFile={}\nSlurmdLogFile={}\n\
          SlurmctldPort=16817\nSlurmdPort=16818\nProctrackType=proctrack/linuxproc\nTaskPlugin=task/none\nSelectType=select/cons_tres\n\
          SelectTypeParameters=CR_Core\nJobAcctGatherType=jobacct_gather/none\nAccountingStorageType=accounting_storage/none\n\
-         ReturnToService=2\nMpiDefault=none\nMinJobAge=3600\n\
-         NodeName={host} NodeAddr=127.0.0.1 CPUs={cpus} RealMemory=2000 State=UNKNOWN\n\
+         SlurmdParameters=config_overrides\nReturnToService=2\nMpiDefault=none\nMinJobAge=3600\n\
+         NodeName={host} NodeAddr=127.0.0.1 CPUs={cpus} RealMemory=16000 State=UNKNOWN\n\
          PartitionName=all Nodes=ALL Default=YES MaxTime=INFINITE State=UP\n",
         at("munge/socket"),
         at("state"),

@@ -42,16 +42,21 @@ impl Tape {
         !self.torn && self.place.is_none_or(|place| place == self.bytes.len())
     }
 
-    /// Eight bytes; zero where there are no more.
-    pub fn bits(&mut self, value: u64) -> u64 {
+    /// Bytes, so many as there are; zeros where there are no more.
+    fn raw<const N: usize>(&mut self, value: [u8; N]) -> [u8; N] {
         let Some(place) = &mut self.place else {
-            self.bytes.extend(value.to_le_bytes());
+            self.bytes.extend(value);
             return value;
         };
-        let next = self.bytes.get(*place..*place + 8).and_then(|bytes| bytes.try_into().ok());
-        *place += 8;
+        let next = self.bytes.get(*place..*place + N).and_then(|bytes| bytes.try_into().ok());
+        *place += N;
         self.torn |= next.is_none();
-        u64::from_le_bytes(next.unwrap_or_default())
+        next.unwrap_or([0; N])
+    }
+
+    /// Eight bytes; zero where there are no more.
+    pub fn bits(&mut self, value: u64) -> u64 {
+        u64::from_le_bytes(self.raw(value.to_le_bytes()))
     }
 
     /// A count, which is added.
@@ -84,7 +89,7 @@ impl Tape {
     /// Words, which are taken over.
     pub fn text(&mut self, value: &mut String) {
         let mut bytes = std::mem::take(value).into_bytes();
-        self.list(&mut bytes, || 0, |tape, byte| *byte = tape.bits(u64::from(*byte)) as u8);
+        self.list(&mut bytes, || 0, |tape, byte| [*byte] = tape.raw([*byte]));
         let text = String::from_utf8(bytes);
         self.torn |= text.is_err();
         *value = text.unwrap_or_default();
@@ -130,11 +135,7 @@ impl Tape {
 
     /// Single precision numbers, which are continued.
     pub fn short_numbers(&mut self, numbers: &mut Vec<f32>) {
-        self.list(
-            numbers,
-            || 0.0,
-            |tape, number| *number = f32::from_bits(tape.bits(u64::from(number.to_bits())) as u32),
-        );
+        self.list(numbers, || 0.0, |tape, number| *number = f32::from_le_bytes(tape.raw(number.to_le_bytes())));
     }
 
     /// Sums by name, which are added name by name.

@@ -4,7 +4,6 @@
 mod ambiguous_light;
 mod bad_input;
 mod common;
-mod exposures;
 mod false_flags;
 mod outside_light;
 mod parts;
@@ -13,4 +12,3 @@ mod real_repeats;
 mod refused;
 mod remaining_errors;
 mod right_flags;
-mod warm_up;

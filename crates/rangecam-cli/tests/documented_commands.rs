@@ -123,6 +123,9 @@ fn furnished(line: &str) -> tempfile::TempDir {
     }
     let pipeline = std::fs::read_to_string(fixtures.join("pipelines/room_small.ron")).unwrap();
     std::fs::write(at("room.ron"), pipeline).unwrap();
+    // One that takes a part of the stations.
+    std::fs::write(at("part.ron"), "(name: \"part\", stages: [Demodulate(), Average(), Unwrap(), PointCloud()])")
+        .unwrap();
     folder
 }
 

@@ -3,10 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use error_models::WarmUp;
-use pipeline::{DriftTreatment, ExplainRequest, Plan, Processed, Silent, View, ViewData, ViewDrift, explain, process};
+use pipeline::{DriftTreatment, Plan, Processed, Silent, View, ViewData, ViewDrift, process};
 use range_io::calibration::Calibration;
 use range_io::survey::{FrameRate, Survey};
 use tasks::{ChangeOptions, DriftOptions, ReferenceUse, WarmUpRequest, estimate_warm_up};
+use tasks::{ExplainRequest, explain};
 
 use crate::common::{simulated, simulated_from};
 

@@ -2,7 +2,6 @@
 
 use std::fs::{self, File};
 use std::io::Read;
-use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Duration;
@@ -77,12 +76,12 @@ impl Slurm {
             fs::create_dir_all(self.folder.join(folder)).map_err(fail)?;
         }
         let munge = self.folder.join("munge");
-        fs::set_permissions(&munge, fs::Permissions::from_mode(0o700)).map_err(fail)?;
+        keep_private(&munge, 0o700).map_err(fail)?;
         let mut key = [0; 128];
         File::open("/dev/urandom").and_then(|mut source| source.read_exact(&mut key)).map_err(fail)?;
         let file = munge.join("key");
         fs::write(&file, key).map_err(fail)?;
-        fs::set_permissions(&file, fs::Permissions::from_mode(0o400)).map_err(fail)?;
+        keep_private(&file, 0o400).map_err(fail)?;
         let option = |name: &str, file: &str| format!("--{name}={}", munge.join(file).display());
         let options = [
             ("key-file", "key"),
@@ -120,14 +119,15 @@ impl Drop for Slurm {
 
 fn configuration(host: &str, folder: &Path) -> String {
     let at = |name: &str| folder.join(name).display().to_string();
-    let cpus = std::thread::available_parallelism().map_or(1, usize::from);
+    // Jobs wait more than they compute: for files that appear, for the controller.
+    let cpus = 3 * std::thread::available_parallelism().map_or(1, usize::from);
     format!(
         "ClusterName=one\nSlurmctldHost={host}(127.0.0.1)\nSlurmUser=root\nSlurmdUser=root\nAuthType=auth/munge\nAuthInfo=socket={}\n\
          StateSaveLocation={}\nSlurmdSpoolDir={}\nSlurmctldPidFile={}\nSlurmdPidFile={}\nSlurmctldLogFile={}\nSlurmdLogFile={}\n\
          SlurmctldPort=16817\nSlurmdPort=16818\nProctrackType=proctrack/linuxproc\nTaskPlugin=task/none\nSelectType=select/cons_tres\n\
          SelectTypeParameters=CR_Core\nJobAcctGatherType=jobacct_gather/none\nAccountingStorageType=accounting_storage/none\n\
-         ReturnToService=2\nMpiDefault=none\nMinJobAge=3600\n\
-         NodeName={host} NodeAddr=127.0.0.1 CPUs={cpus} RealMemory=2000 State=UNKNOWN\n\
+         SlurmdParameters=config_overrides\nReturnToService=2\nMpiDefault=none\nMinJobAge=3600\n\
+         NodeName={host} NodeAddr=127.0.0.1 CPUs={cpus} RealMemory=16000 State=UNKNOWN\n\
          PartitionName=all Nodes=ALL Default=YES MaxTime=INFINITE State=UP\n",
         at("munge/socket"),
         at("state"),
@@ -137,6 +137,18 @@ fn configuration(host: &str, folder: &Path) -> String {
         at("log/slurmctld.log"),
         at("log/slurmd.log"),
     )
+}
+
+/// A key that others can read is taken for none.
+#[cfg(unix)]
+fn keep_private(path: &Path, mode: u32) -> std::io::Result<()> {
+    use std::os::unix::fs::PermissionsExt;
+    fs::set_permissions(path, fs::Permissions::from_mode(mode))
+}
+
+#[cfg(not(unix))]
+fn keep_private(_: &Path, _: u32) -> std::io::Result<()> {
+    Ok(())
 }
 
 fn run(command: &mut Command) -> Outcome {

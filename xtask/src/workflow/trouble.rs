@@ -22,6 +22,9 @@ pub(crate) struct Trouble<'a> {
     chance: u64,
 }
 
+/// Jobs that are killed: without an end of it a step that takes longer than the time between two of them never comes to its own.
+const MOST_JOBS_KILLED: usize = 15;
+
 /// Results that are there when the engine is killed for the first and the second time.
 const ENGINE_KILLED_AT: [usize; 2] = [5, 20];
 
@@ -42,7 +45,7 @@ impl<'a> Trouble<'a> {
             }
             return engine.kill().map_err(|error| format!("snakemake: {error}"));
         }
-        if self.last.elapsed() >= self.every {
+        if self.jobs < MOST_JOBS_KILLED && self.last.elapsed() >= self.every {
             let jobs = self.jobs_at_work();
             // Numerical Recipes' generator: which of them it is does not matter, only that it is not always the first.
             self.chance = self.chance.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);

@@ -4,12 +4,13 @@ use std::path::{Path, PathBuf};
 
 use error_models::WarmUp;
 use nalgebra::{DMatrix, DVector};
-use pipeline::{DriftSource, ExplainRequest, Plan, Processed, Silent, View, ViewData, ViewDrift, explain, process};
+use pipeline::{DriftSource, Plan, Processed, Silent, View, ViewData, ViewDrift, process};
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
 use range_image::Flags;
 use range_io::calibration::{CalibratedDrift, Calibration, Correlation};
 use range_io::survey::Survey;
+use tasks::{ExplainRequest, explain};
 
 use crate::common::simulated_from;
 

@@ -2,7 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use pipeline::{ExplainRequest, Plan, Processed, Silent, View, ViewData, explain, process};
+use pipeline::{Plan, Processed, Silent, View, ViewData, process};
+use tasks::{ExplainRequest, explain};
 
 use crate::common::simulated_from;
 

@@ -88,6 +88,7 @@ impl Building {
                 let at = middle - CORRIDOR / 2.0 - WALL - DEPTH;
                 building.boxes.push(cuboid([-WALL, at - WALL, 0.0], [length, at, HEIGHT]));
             }
+            building.ends(middle, length, &mut random);
             building.visit(corridor, slots, &mut way);
         }
         building.stations = way.stations;
@@ -139,6 +140,23 @@ impl Building {
         add([x + at, x + at + 0.35], along(-0.06, 0.0), [between(1.2, 1.4), between(1.7, 2.0)]);
         let at = between(1.2, 1.4);
         add([x + at, x + at + 0.25], along(-0.12, 0.0), [0.0, between(0.5, 1.1)]);
+    }
+
+    /// What stands along the outer walls of the ways from corridor to corridor: without it nothing tells where a station is on them.
+    fn ends(&mut self, middle: f64, length: f64, random: &mut Pcg64) {
+        let mut between = |low: f64, high: f64| low + (high - low) * random.random::<f64>();
+        for [outer, inward] in [[-CORRIDOR, 1.0], [length + CORRIDOR, -1.0]] {
+            for step in 0..6 {
+                let y = middle - 1.0 + PITCH / 6.0 * (f64::from(step) + between(0.0, 0.3));
+                let (width, depth, height) = (between(0.3, 0.9), between(0.12, 0.4), between(0.5, 2.0));
+                let ends = if inward > 0.0 { [outer, outer + depth] } else { [outer - depth, outer] };
+                self.boxes.push(cuboid([ends[0], y, 0.0], [ends[1], y + width, height]));
+                if step % 2 == 0 {
+                    let lamp = outer + inward * between(0.9, 1.4);
+                    self.boxes.push(cuboid([lamp - 0.2, y, HEIGHT - 0.15], [lamp + 0.2, y + 0.5, HEIGHT]));
+                }
+            }
+        }
     }
 
     /// Through a corridor, all its rooms and to the next one.

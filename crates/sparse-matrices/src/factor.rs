@@ -164,6 +164,32 @@ fn factorise(panel: &mut [f64], width: usize) -> bool {
     true
 }
 
+/// Width of the blocks of poses, most blocks of all: their products have loops of a known length.
+const POSE: usize = 6;
+
+/// The rows of a block of poses as columns.
+fn transposed(block: &[f64]) -> [[f64; POSE]; POSE] {
+    let mut out = [[0.0; POSE]; POSE];
+    for (j, row) in block.chunks_exact(POSE).enumerate() {
+        for (i, value) in row.iter().enumerate() {
+            out[i][j] = *value;
+        }
+    }
+    out
+}
+
+/// Takes a row times a block from a row. Each sum runs in the order of the plain loop; the sums of a row run side by side.
+#[inline]
+fn subtract_of_poses(block: &[[f64; POSE]; POSE], row: &[f64], out: &mut [f64]) {
+    let mut sums = [0.0; POSE];
+    for (left, right) in row.iter().zip(block) {
+        for (sum, right) in sums.iter_mut().zip(right) {
+            *sum += left * right;
+        }
+    }
+    out.iter_mut().zip(sums).for_each(|(out, sum)| *out -= sum);
+}
+
 /// Takes the products of the rows of a factorised column from a later column. `rest` are the column's filled block rows from that
 /// of the target on, the first of which begins at row `first` of the panel.
 fn subtract(
@@ -175,6 +201,7 @@ fn subtract(
 ) {
     let columns = symbolic.widths[target];
     let factor = &own[first * width..(first + columns) * width];
+    let poses = (width == POSE && columns == POSE).then(|| transposed(factor));
     let mut row = first;
     // Where the filled rows of the target begin; all of `rest` are among them.
     let (mut place, mut below) = (columns, symbolic.below[target].iter());
@@ -192,11 +219,15 @@ fn subtract(
             place += rows;
             place - rows
         };
-        for i in 0..rows {
-            let left = &own[(row + i) * width..(row + i + 1) * width];
-            let sums = &mut out[(begin + i) * columns..(begin + i + 1) * columns];
-            for (sum, right) in sums.iter_mut().zip(factor.chunks_exact(width.max(1))) {
-                *sum -= left.iter().zip(right).map(|(a, b)| a * b).sum::<f64>();
+        let left = own[row * width..(row + rows) * width].chunks_exact(width.max(1));
+        let sums = out[begin * columns..(begin + rows) * columns].chunks_exact_mut(columns.max(1));
+        if let Some(factor) = &poses {
+            left.zip(sums).for_each(|(left, sums)| subtract_of_poses(factor, left, sums));
+        } else {
+            for (left, sums) in left.zip(sums) {
+                for (sum, right) in sums.iter_mut().zip(factor.chunks_exact(width.max(1))) {
+                    *sum -= left.iter().zip(right).map(|(a, b)| a * b).sum::<f64>();
+                }
             }
         }
         row += rows;

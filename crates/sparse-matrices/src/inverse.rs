@@ -145,6 +145,11 @@ impl SelectedInverse {
             let begin =
                 if k == 0 { 0 } else { filled.find(|(other, _)| **other == outer).map_or(0, |(_, begin)| *begin) };
             let rows = self.widths[outer as usize];
+            if width == 6 {
+                let z = &panel[begin * columns..(begin + rows) * columns];
+                add_of_poses(z, columns, (first, firsts[0]), y, out, k > 0);
+                continue;
+            }
             for i in 0..rows {
                 let z = &panel[(begin + i) * columns..(begin + i + 1) * columns];
                 for (j, z) in z.iter().enumerate() {
@@ -170,6 +175,23 @@ impl SelectedInverse {
         let block =
             DMatrix::from_row_slice(rows, columns, &self.panels[low][first * columns..(first + rows) * columns]);
         Some(if a >= b { block } else { block.transpose() })
+    }
+}
+
+/// The products of a block of the inverse with Y of a column of poses: loops of a known length.
+fn add_of_poses(z: &[f64], columns: usize, (outer, inner): (usize, usize), y: &[f64], out: &mut [f64], is_below: bool) {
+    for (i, z) in z.chunks_exact(columns.max(1)).enumerate() {
+        for (j, z) in z.iter().enumerate() {
+            let (a, b) = ((outer + i) * 6, (inner + j) * 6);
+            for (out, y) in out[a..a + 6].iter_mut().zip(&y[b..b + 6]) {
+                *out -= z * y;
+            }
+            if is_below {
+                for (out, y) in out[b..b + 6].iter_mut().zip(&y[a..a + 6]) {
+                    *out -= z * y;
+                }
+            }
+        }
     }
 }
 

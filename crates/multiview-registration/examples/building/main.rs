@@ -60,16 +60,19 @@ fn registered(count: usize, start: &str, seed: u64, camera: Camera) -> Result<Fi
     let start = if start == "order" { Start::Order } else { Start::Poses(&approximate) };
     let before = cpu_seconds();
     let options = StationRegistrationOptions::default();
-    let in_rounds = AtomicU64::new(0);
+    let (in_rounds, hundredths) = (AtomicU64::new(0), AtomicU64::new(0));
     let progress = |_, _| {
         in_rounds.fetch_max(peak_memory_mb() as u64, Ordering::Relaxed);
+        hundredths.fetch_max((100.0 * (cpu_seconds() - before)) as u64, Ordering::Relaxed);
     };
     let found = register_stations(&clouds, start, Datum::Station(0), &options, &progress)?;
     let (seconds, most_mb) = (cpu_seconds() - before, peak_memory_mb());
     println!(
-        "{count} stations, {:.1} million points: {seconds:.1} s of processor time, {:.3} s a station; at most {most_mb:.0} MB in memory, {} MB until the last round, {simulated_mb:.0} MB before",
+        "{count} stations, {:.1} million points: {seconds:.1} s of processor time, {:.3} s a station, {:.1} s of it until the last round; at \
+         most {most_mb:.0} MB in memory, {} MB until the last round, {simulated_mb:.0} MB before",
         points as f64 / 1e6,
         seconds / count as f64,
+        hundredths.load(Ordering::Relaxed) as f64 / 100.0,
         in_rounds.load(Ordering::Relaxed)
     );
     report(&found, &building.stations);

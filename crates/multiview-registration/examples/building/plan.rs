@@ -88,7 +88,8 @@ impl Building {
                 let at = middle - CORRIDOR / 2.0 - WALL - DEPTH;
                 building.boxes.push(cuboid([-WALL, at - WALL, 0.0], [length, at, HEIGHT]));
             }
-            building.visit(corridor, slots, &mut way);
+            building.ends(middle, length, &mut random);
+            Self::visit(corridor, slots, &mut way);
         }
         building.stations = way.stations;
         building.stations.truncate(stations);
@@ -110,16 +111,20 @@ impl Building {
         add([x + WIDTH, x + WIDTH + WALL], along(WALL, WALL + DEPTH), [0.0, HEIGHT]);
         let mut between = |low: f64, high: f64| low + (high - low) * random.random::<f64>();
         // Along the walls, away from the door, one in the middle, and two pictures.
-        for [x0, x1, y0, y1] in
-            [[0.0, 0.6, 1.2, 2.4], [WIDTH - 0.6, WIDTH, 0.9, 2.1], [0.8, 2.0, 3.3, 4.0], [2.5, 3.7, 3.5, 4.0]]
-        {
+        // Where they begin and end along and across, and which side wall they stand at.
+        let furniture = [
+            ([0.0, 0.6], [1.2, 2.4], -1),
+            ([WIDTH - 0.6, WIDTH], [0.9, 2.1], 1),
+            ([0.8, 2.0], [3.3, 4.0], 0),
+            ([2.5, 3.7], [3.5, 4.0], 0),
+        ];
+        for ([x0, x1], [y0, y1], wall) in furniture {
             let (shift, height) = (between(-0.25, 0.25), between(0.4, 2.0));
             let (inner, outer) = (between(-0.15, 0.1), between(-0.1, 0.15));
-            let side_wall = x0 == 0.0 || x1 == WIDTH;
-            let (dx, dy) = if side_wall { (0.0, shift) } else { (shift, 0.0) };
-            let (x0, x1) =
-                (if x0 == 0.0 { x0 } else { x0 + dx + inner }, if x1 == WIDTH { x1 } else { x1 + dx + outer });
-            add([x + x0, x + x1], along(WALL + y0 + dy, WALL + y1 + if side_wall { dy } else { 0.0 }), [0.0, height]);
+            let (dx, dy) = if wall == 0 { (shift, 0.0) } else { (0.0, shift) };
+            let x0 = if wall == -1 { x0 } else { x0 + dx + inner };
+            let x1 = if wall == 1 { x1 } else { x1 + dx + outer };
+            add([x + x0, x + x1], along(WALL + y0 + dy, WALL + y1 + dy), [0.0, height]);
         }
         let (mx, my) = (between(1.9, 2.5), between(1.9, 2.5));
         add([x + mx - 0.4, x + mx + 0.4], along(WALL + my - 0.3, WALL + my + 0.3), [0.0, between(0.4, 0.75)]);
@@ -141,8 +146,25 @@ impl Building {
         add([x + at, x + at + 0.25], along(-0.12, 0.0), [0.0, between(0.5, 1.1)]);
     }
 
+    /// What stands along the outer walls of the ways from corridor to corridor: without it nothing tells where a station is on them.
+    fn ends(&mut self, middle: f64, length: f64, random: &mut Pcg64) {
+        let mut between = |low: f64, high: f64| low + (high - low) * random.random::<f64>();
+        for [outer, inward] in [[-CORRIDOR, 1.0], [length + CORRIDOR, -1.0]] {
+            for step in 0..6 {
+                let y = middle - 1.0 + PITCH / 6.0 * (f64::from(step) + between(0.0, 0.3));
+                let (width, depth, height) = (between(0.3, 0.9), between(0.12, 0.4), between(0.5, 2.0));
+                let ends = if inward > 0.0 { [outer, outer + depth] } else { [outer - depth, outer] };
+                self.boxes.push(cuboid([ends[0], y, 0.0], [ends[1], y + width, height]));
+                if step % 2 == 0 {
+                    let lamp = outer + inward * between(0.9, 1.4);
+                    self.boxes.push(cuboid([lamp - 0.2, y, HEIGHT - 0.15], [lamp + 0.2, y + 0.5, HEIGHT]));
+                }
+            }
+        }
+    }
+
     /// Through a corridor, all its rooms and to the next one.
-    fn visit(&self, corridor: usize, slots: usize, way: &mut Way) {
+    fn visit(corridor: usize, slots: usize, way: &mut Way) {
         let (y, forward) = (corridor as f64 * PITCH, corridor % 2 == 0);
         let heading = if forward { 0.0 } else { std::f64::consts::PI };
         let sign = if forward { 1.0 } else { -1.0 };
@@ -224,7 +246,7 @@ impl Building {
         for cuboid in all {
             let first = vertices.len();
             for k in 0..8 {
-                let at = |axis: usize| if k >> axis & 1 == 0 { cuboid.low[axis] } else { cuboid.high[axis] };
+                let at = |axis: usize| if (k >> axis) & 1 == 0 { cuboid.low[axis] } else { cuboid.high[axis] };
                 vertices.push(format!("({:.4}, {:.4}, {:.4})", at(0), at(1), at(2)));
             }
             for [a, b, c, d] in [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]] {

@@ -31,9 +31,9 @@ pub(crate) struct SparseEquations {
 impl SparseEquations {
     /// `planes`: how many stay beside the stations.
     pub(crate) fn new(stations: usize, fixed: usize, planes: usize) -> Self {
-        let widths: Vec<usize> = (0..stations + planes)
-            .map(|block| if block == fixed { 0 } else { if block < stations { 6 } else { 3 } })
-            .collect();
+        let mut widths = vec![6; stations];
+        widths[fixed] = 0;
+        widths.resize(stations + planes, 3);
         let normal = BlockMatrix::new(&widths);
         let right = DVector::zeros(normal.order());
         Self { normal, right, stations, next: stations }

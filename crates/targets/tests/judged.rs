@@ -78,7 +78,7 @@ pub fn left_by_one_camera(images: &[Vec<Vector2<f64>>]) -> (f64, Vec<f64>) {
         let pose = adjustment.add_block(ParameterBlock::pose(&start(image)));
         for (corner, node) in image.iter().zip(&board) {
             let seen = Differentiated::new(&adjustment, [camera, pose, *node], Seen((*corner).into())).unwrap();
-            rows.push(adjustment.add_observation(group, seen, &Covariance::from_sigma(SIGMA_PX)).unwrap());
+            rows.push(adjustment.add_observation(group, seen, &Covariance::from_sigmas(&[SIGMA_PX; 2])).unwrap());
         }
     }
     let solution = adjustment.solve(&SolveOptions::default()).unwrap();

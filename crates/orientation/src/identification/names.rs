@@ -96,7 +96,7 @@ fn largest(
         match minima(camera, &numbered, &network) {
             Ok(found) => {
                 // Where several poses explain the image points alike, as of targets in one plane, names fit all of them alike.
-                let misfits = found[0].misfits(numbered.len())?;
+                let misfits = found[0].misfits(&numbered)?;
                 let verdicts = judge(&numbered, &misfits, options.level);
                 return Ok(Some((kept.into_iter().zip(verdicts).collect(), stations)));
             }

@@ -96,6 +96,11 @@ impl<'a> Bundle<'a> {
         Ok(bundle)
     }
 
+    /// The camera of a station.
+    pub(crate) fn camera(&self, station: usize) -> &'a Camera {
+        self.cameras[station]
+    }
+
     /// Takes the values of a descent as start values.
     pub(crate) fn take(&self, descent: &Descent, start: &mut Start) -> Result<()> {
         for (pose, &block) in start.stations.iter_mut().zip(&self.stations) {

@@ -3,14 +3,15 @@
 use std::collections::BTreeSet;
 
 use adjust::{Adjustment, Kernel, ObservationId, SnoopingOptions, SnoopingTest, Solution, SolveOptions};
-use camera_model::Camera;
-use nalgebra::{Isometry3, Matrix6};
+use camera_model::{Camera, step_pose};
+use nalgebra::{Isometry3, Matrix6, Vector6};
 
 use crate::relative::bundle::{Bundle, ObjectPoint, TieObservation};
 use crate::relative::candidates::{CUT, SAME_ANGLE, is_same, rivals};
+use crate::relative::epipolar::EpipolarCondition;
 use crate::relative::minima::hold_base;
 use crate::relative::network_start::{Start, starts};
-use crate::relative::rays::Ray;
+use crate::relative::rays::{Pair, Ray};
 use crate::{Error, Result};
 
 /// Width of Cauchy's kernel: 95 % efficient for normal errors `[Huber1981]`.
@@ -22,6 +23,9 @@ const SMALL_DECREASE: f64 = 1e-3;
 const CONTRADICTS: f64 = 4.0;
 /// Share of the values that may be left out at most.
 const MOST_GROSS_ERRORS: f64 = 0.3;
+
+/// Step of differences of a misfit by a pose, unit of the base and radian: a thousandth of what bends it.
+const STEP: f64 = 1e-6;
 
 /// How to orient a network.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -245,17 +249,55 @@ impl Adjusted<'_> {
     }
 
     /// By how many standard deviations column and row of each observation differ from what all others say (Baarda's w, of what took
-    /// no part that of its prediction); `None` where nothing checks them, NaN for one of them that nothing checks.
-    pub(crate) fn misfits(&self, count: usize) -> Result<Vec<Option<[f64; 2]>>> {
+    /// no part that of its prediction), NaN for one of them that nothing checks. A target without a place, as no two of its rays
+    /// meet, has the misfit of the pair of rays that miss each other least. `None` where nothing checks an observation.
+    pub(crate) fn misfits(&self, observations: &[TieObservation]) -> Result<Vec<Option<[f64; 2]>>> {
         // Of the statistics alone: the level decides on nothing here.
         let test = self.solution.snoop(SnoopingTest::Baarda, SnoopingOptions::default().level)?;
-        let mut misfits = vec![None; count];
+        let mut misfits: Vec<Option<[f64; 2]>> =
+            (0..observations.len()).map(|k| self.least_miss(observations, k)).collect();
         for &(index, id) in &self.bundle.observations {
             let first = self.solution.rows(id)?.start;
             let both = [0, 1].map(|component| test.statistics[first + component]);
             misfits[index] = Some(both).filter(|both| both.iter().any(|w| w.is_finite()));
         }
         Ok(misfits)
+    }
+
+    /// By how many standard deviations the ray of an observation misses the nearest of the others of its target.
+    fn least_miss(&self, observations: &[TieObservation], index: usize) -> Option<[f64; 2]> {
+        let own = &observations[index];
+        let others = observations.iter().filter(|seen| seen.target == own.target && seen.station != own.station);
+        let least = others.filter_map(|other| self.miss(own, other)).min_by(f64::total_cmp);
+        least.map(|least| [least, f64::NAN])
+    }
+
+    /// The misfit of the rays of two observations over its deviation, that of the poses included.
+    fn miss(&self, first: &TieObservation, second: &TieObservation) -> Option<f64> {
+        let camera = |seen: &TieObservation| self.bundle.camera(seen.station);
+        let rays = [first, second].map(|seen| Ray::new(camera(seen), &seen.image, seen.target).ok());
+        let [Some(a), Some(b)] = rays else { return None };
+        let condition = EpipolarCondition::new(&Pair { first: a, second: b });
+        let poses = [first, second].map(|seen| self.bundle.pose(&self.solution, seen.station).ok());
+        let [Some((of_first, covariance)), Some((of_second, other))] = poses else { return None };
+        let stepped = |pose: &Isometry3<f64>, step: &Vector6<f64>| step_pose(pose, &(*step).into());
+        let at = |steps: [&Vector6<f64>; 2]| {
+            condition.standardised(&(stepped(&of_first, steps[0]).inverse() * stepped(&of_second, steps[1])))
+        };
+        let zero = Vector6::zeros();
+        let mut variance = 1.0;
+        for (which, covariance) in [covariance, other].iter().enumerate() {
+            let slope = Vector6::from_fn(|component, _| {
+                let moved = |sign: f64| {
+                    let mut step = zero;
+                    step[component] = sign * STEP;
+                    if which == 0 { at([&step, &zero]) } else { at([&zero, &step]) }
+                };
+                (moved(1.0) - moved(-1.0)) / (2.0 * STEP)
+            });
+            variance += slope.dot(&(covariance * slope));
+        }
+        Some(at([&zero, &zero]).abs() / variance.sqrt()).filter(|miss| miss.is_finite())
     }
 
     fn result(&self, observations: &[TieObservation]) -> Result<OrientedNetwork> {

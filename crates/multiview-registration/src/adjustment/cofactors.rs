@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector, Matrix6};
 use sparse_matrices::{BlockFactor, BlockInverse};
 
-use crate::planes::wide_errors::Derivatives;
+use crate::adjustment::wide_errors::Derivatives;
 
 /// Inverse of the normal matrix, zero for the station that is held.
 #[derive(Debug, Clone)]

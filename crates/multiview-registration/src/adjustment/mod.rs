@@ -8,3 +8,4 @@ pub(crate) mod rounds;
 pub(crate) mod simultaneous;
 pub(crate) mod sparse_equations;
 pub(crate) mod turns;
+pub(crate) mod wide_errors;

@@ -116,7 +116,9 @@ impl Tape {
     pub fn list<T>(&mut self, items: &mut Vec<T>, blank: impl Fn() -> T, mut each: impl FnMut(&mut Self, &mut T)) {
         let length = self.bits(items.len() as u64);
         if !self.is_read() {
-            items.iter_mut().for_each(|item| each(self, item));
+            for item in items.iter_mut() {
+                each(self, item);
+            }
         }
         for _ in 0..if self.is_read() { length } else { 0 } {
             let mut item = blank();

@@ -57,9 +57,15 @@ impl Values {
     fn carry(&mut self, tape: &mut Tape) {
         let [before_m, after_m] = &mut self.errors_m;
         let lists = [&mut self.sigma_m, before_m, after_m, &mut self.log_amplitude, &mut self.range_m];
-        lists.into_iter().for_each(|list| tape.numbers(list));
+        for list in lists {
+            tape.numbers(list);
+        }
         tape.list(&mut self.points, Vec::new, |tape, points| {
-            tape.list(points, Default::default, |tape, point| point.iter_mut().for_each(|x| tape.number(x)));
+            tape.list(points, Default::default, |tape, point: &mut [f64; 3]| {
+                for x in point {
+                    tape.number(x);
+                }
+            });
         });
     }
 }
@@ -110,8 +116,12 @@ impl Kept {
         self.truth.carry(tape);
         self.values.carry(tape);
         tape.numbers(&mut self.differences);
-        [&mut self.compared, &mut self.pixels, &mut self.flagged].into_iter().for_each(|count| tape.count(count));
-        self.flags.iter_mut().for_each(|count| tape.count(count));
+        for count in [&mut self.compared, &mut self.pixels, &mut self.flagged] {
+            tape.count(count);
+        }
+        for count in &mut self.flags {
+            tape.count(count);
+        }
     }
 
     fn count_flags(&mut self, view: &View) {

@@ -135,7 +135,9 @@ pub struct StationTruth {
 impl Summary {
     /// Leaves the durations of stages out.
     pub(crate) fn forget_times(&mut self) {
-        self.stages.iter_mut().for_each(|stage| stage.seconds = 0.0);
+        for stage in &mut self.stages {
+            stage.seconds = 0.0;
+        }
     }
 }
 

@@ -67,7 +67,9 @@ impl Tally {
     /// Writes it, or adds another part of the views.
     pub(crate) fn carry(&mut self, tape: &mut Tape) {
         for stage in &mut self.stages {
-            stage.views.iter_mut().for_each(|count| tape.count(count));
+            for count in &mut stage.views {
+                tape.count(count);
+            }
             let mut more = if tape.is_read() { None } else { stage.changes.take() };
             tape.option(&mut more, Vec::new, Tape::numbers);
             stage.changes = stage.changes.take().zip(more).map(|(all, more)| [all, more].concat());

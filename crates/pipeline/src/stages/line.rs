@@ -91,7 +91,9 @@ impl Line {
 
     /// Writes what the stages found, or adds what they found in another part of the survey.
     pub(crate) fn carry(&mut self, tape: &mut Tape) {
-        self.steps.iter_mut().for_each(|step| step.found.carry(tape));
+        for step in &mut self.steps {
+            step.found.carry(tape);
+        }
     }
 
     /// Number of the stage that averages.

@@ -51,12 +51,16 @@ impl ViewDrift {
     /// Writes it, or takes it over.
     pub(crate) fn carry(&mut self, tape: &mut Tape) {
         tape.text(&mut self.view);
-        [&mut self.drift_m, &mut self.sigma_m].into_iter().for_each(|number| tape.number(number));
+        for number in [&mut self.drift_m, &mut self.sigma_m] {
+            tape.number(number);
+        }
         let mut by_reference = self.source == DriftSource::ReferencePath;
         tape.flag(&mut by_reference);
         self.source = if by_reference { DriftSource::ReferencePath } else { DriftSource::Calibration };
         tape.option(&mut self.frame_rate, FrameRatePart::default, |tape, part| {
-            [&mut part.part_m, &mut part.rate_hz].into_iter().for_each(|number| tape.number(number));
+            for number in [&mut part.part_m, &mut part.rate_hz] {
+                tape.number(number);
+            }
         });
     }
 }

@@ -92,8 +92,12 @@ impl ViewRecord {
 impl ViewRecord {
     /// Writes what comes from the frames, or takes it over; where the station stands says the survey.
     pub(crate) fn carry(&mut self, tape: &mut Tape, survey: &OpenSurvey) {
-        [&mut self.station, &mut self.name].into_iter().for_each(|text| tape.text(text));
-        [&mut self.timestamp_s, &mut self.distance_m].into_iter().for_each(|number| tape.number(number));
+        for text in [&mut self.station, &mut self.name] {
+            tape.text(text);
+        }
+        for number in [&mut self.timestamp_s, &mut self.distance_m] {
+            tape.number(number);
+        }
         tape.option(&mut self.integration_time_s, f64::default, Tape::number);
         tape.option(&mut self.points, usize::default, Tape::count);
         tape.option(&mut self.drift, ViewDrift::default, |tape, drift| drift.carry(tape));

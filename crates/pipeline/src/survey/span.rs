@@ -74,7 +74,9 @@ impl SpanTally {
 
     /// Writes it, or adds what was found in another part of the survey.
     pub(crate) fn carry(&mut self, tape: &mut Tape) {
-        [&mut self.measured, &mut self.outside].into_iter().for_each(|count| tape.count(count));
+        for count in [&mut self.measured, &mut self.outside] {
+            tape.count(count);
+        }
         for span in [&mut self.range_m, &mut self.amplitude] {
             let mut other = *span;
             tape.option(&mut other, || [0.0; 2], |tape, ends| ends.iter_mut().for_each(|end| tape.number(end)));

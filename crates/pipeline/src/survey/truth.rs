@@ -39,7 +39,9 @@ impl RangeTruth {
         let Self { range_error_median_m, range_error_p95_m, wrap_count_right_fraction, flagged_fraction, pixels } =
             self;
         let numbers = [range_error_median_m, range_error_p95_m, wrap_count_right_fraction, flagged_fraction];
-        numbers.into_iter().for_each(|number| tape.number(number));
+        for number in numbers {
+            tape.number(number);
+        }
         tape.count(pixels);
     }
 }
@@ -110,7 +112,9 @@ impl TruthTally {
     pub(crate) fn carry(&mut self, tape: &mut Tape) {
         tape.numbers(&mut self.errors);
         let Self { known, flagged, compared, right, views, .. } = self;
-        [known, flagged, compared, right, views].into_iter().for_each(|count| tape.count(count));
+        for count in [known, flagged, compared, right, views] {
+            tape.count(count);
+        }
     }
 
     /// The figures of all of them together.

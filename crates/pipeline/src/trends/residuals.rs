@@ -74,11 +74,15 @@ impl Residuals {
     pub(crate) fn carry(&mut self, tape: &mut Tape) {
         tape.list(&mut self.views, OfView::default, |tape, view| {
             tape.text(&mut view.station);
-            [&mut view.has_truth, &mut view.has_ranges].into_iter().for_each(|flag| tape.flag(flag));
+            for flag in [&mut view.has_truth, &mut view.has_ranges] {
+                tape.flag(flag);
+            }
             tape.list(&mut view.samples, TrendSample::default, |tape, sample| {
                 let TrendSample { residual_m, sigma_m, range_m, amplitude, column, row, time_s, .. } = sample;
                 let numbers = [residual_m, sigma_m, range_m, amplitude, column, row, time_s];
-                numbers.into_iter().for_each(|number| tape.number(number));
+                for number in numbers {
+                    tape.number(number);
+                }
             });
         });
     }

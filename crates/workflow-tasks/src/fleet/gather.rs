@@ -169,7 +169,9 @@ fn doubt_kinds(rows: &[RecordingRow]) -> Vec<DoubtCount> {
     let mut kinds: BTreeMap<String, usize> = BTreeMap::new();
     for row in rows {
         let once: BTreeSet<&String> = row.doubt_kinds.iter().collect();
-        once.into_iter().for_each(|kind| *kinds.entry(kind.clone()).or_default() += 1);
+        for kind in once {
+            *kinds.entry(kind.clone()).or_default() += 1;
+        }
     }
     kinds.into_iter().map(|(kind, recordings)| DoubtCount { kind, recordings }).collect()
 }

@@ -75,13 +75,19 @@ impl Pictures {
         for snapshot in [&mut self.before, &mut self.after] {
             tape.option(snapshot, Snapshot::default, |tape, snapshot| snapshot.carry(tape));
         }
-        tape.option(&mut self.errors, Default::default, |tape, errors| errors.iter_mut().for_each(|e| tape.numbers(e)));
+        tape.option(&mut self.errors, Default::default, |tape, errors| {
+            for errors in errors {
+                tape.numbers(errors);
+            }
+        });
         tape.list(
             &mut self.own,
             || Figure::new(String::new()),
             |tape, figure| {
                 let [mut svg, mut caption] = figure.parts().map(str::to_owned);
-                [&mut svg, &mut caption].into_iter().for_each(|text| tape.text(text));
+                for text in [&mut svg, &mut caption] {
+                    tape.text(text);
+                }
                 *figure = Figure::new(svg).caption(caption);
             },
         );

@@ -17,7 +17,9 @@ impl SenseVotes {
 
     /// Writes it, or adds what another part of the survey says.
     pub(crate) fn carry(&mut self, tape: &mut Tape) {
-        self.0.windows().into_iter().for_each(|count| tape.count(count));
+        for count in self.0.windows() {
+            tape.count(count);
+        }
     }
 
     /// How they voted; `None` where no window could.

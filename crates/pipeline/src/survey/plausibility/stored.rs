@@ -87,11 +87,17 @@ impl StoredWatch {
     pub(crate) fn carry(&mut self, tape: &mut Tape) {
         let blank = || Bending { bending: 0.0, sigma: 0.0, window: [0; 4] };
         tape.list(&mut self.surfaces, blank, |tape, surface| {
-            [&mut surface.bending, &mut surface.sigma].into_iter().for_each(|value| tape.number(value));
-            surface.window.iter_mut().for_each(|value| tape.count(value));
+            for value in [&mut surface.bending, &mut surface.sigma] {
+                tape.number(value);
+            }
+            for value in &mut surface.window {
+                tape.count(value);
+            }
         });
         tape.list(&mut self.witnesses, UnitWitness::default, |tape, witness| {
-            [&mut witness.median, &mut witness.highest].into_iter().for_each(|value| tape.number(value));
+            for value in [&mut witness.median, &mut witness.highest] {
+                tape.number(value);
+            }
             tape.option(&mut witness.noise, f64::default, Tape::number);
         });
         let mut codes: Vec<(u32, usize)> =
@@ -100,8 +106,12 @@ impl StoredWatch {
             *code = tape.bits(u64::from(*code)) as u32;
             tape.count(pixels);
         });
-        codes.into_iter().for_each(|(code, pixels)| *self.codes.entry(code).or_default() += pixels);
-        [&mut self.pixels, &mut self.empty].into_iter().for_each(|count| tape.count(count));
+        for (code, pixels) in codes {
+            *self.codes.entry(code).or_default() += pixels;
+        }
+        for count in [&mut self.pixels, &mut self.empty] {
+            tape.count(count);
+        }
         let mut stated = self.stated;
         let blank = || Stated { kind: Kind::Range, scale_m: 0.0, ambiguity_interval_m: None };
         tape.option(&mut stated, blank, |tape, stated| {

@@ -62,13 +62,14 @@ impl Inputs {
         self
     }
 
-    /// Digests of all files that are read, in the order of their names; hidden ones are not.
-    pub fn digests(&self) -> Result<Vec<InputDigest>> {
+    /// Digests of all files that are read, in the order of their names; hidden ones, and those that can't be read, are not among them.
+    pub fn digests(&self) -> Vec<InputDigest> {
         let mut files = BTreeSet::new();
         for path in &self.paths {
             add_files(path, &mut files);
         }
-        made::digests(files.difference(&self.not_read).map(PathBuf::as_path))
+        let files: Vec<&Path> = files.difference(&self.not_read).map(PathBuf::as_path).collect();
+        made::digests(&files)
     }
 
     /// The place `out`, if it leaves all of this alone.
@@ -121,7 +122,7 @@ const SUMMARY: &str = "summary.json";
 /// [`Error::AlreadyDone`] where the caller wants outputs left alone that were made from the same; those of the work.
 pub fn produce<T>(out: &Path, inputs: &Inputs, work: impl FnOnce(&Destination) -> Result<T>) -> Result<T> {
     let destination = inputs.destination(out)?;
-    let made = made::options().map(|options| Ok::<_, Error>(Made::new(options, &inputs.digests()?))).transpose()?;
+    let made = made::options().map(|options| Made::new(options, &inputs.digests()));
     produce_made(&destination, made, work)
 }
 

@@ -13,10 +13,11 @@ use std::sync::OnceLock;
 use std::time::Instant;
 
 use atomic_output::{Destination, OutputFolder};
+use rayon::prelude::*;
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 
-use crate::{InputDigest, Result};
+use crate::InputDigest;
 
 /// How the program was called.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -188,7 +189,8 @@ fn program_sha256() -> String {
     PROGRAM.get_or_init(|| read().unwrap_or_else(|| "unknown".to_owned())).clone()
 }
 
-/// Digests of files, each once.
-pub(crate) fn digests<'a>(files: impl IntoIterator<Item = &'a Path>) -> Result<Vec<InputDigest>> {
-    files.into_iter().map(InputDigest::of).collect()
+/// Digests of files, in their order; a command that needs one that can't be read says so itself. Recordings are gigabytes: several are
+/// read at once.
+pub(crate) fn digests(files: &[&Path]) -> Vec<InputDigest> {
+    files.par_iter().filter_map(|file| InputDigest::of(file).ok()).collect()
 }

@@ -155,7 +155,7 @@ fn part_into(
         no_times: without_times(),
         options: commands::made::options(),
         program: program(),
-        inputs: inputs.digests()?,
+        inputs: inputs.digests(),
         state: InputDigest { file: STATE.to_owned(), ..InputDigest::of(&file)? },
     };
     write_text(folder.file("summary.json")?, &json(&summary)?)?;

@@ -10,7 +10,6 @@ mod error;
 mod linearised;
 mod model;
 mod result;
-mod sparse;
 mod testing;
 
 pub use combination::Combination;

@@ -4,7 +4,6 @@ mod decompositions;
 mod error;
 mod panel;
 mod product;
-mod small;
 #[cfg(feature = "faer")]
 mod with_faer;
 #[cfg(not(feature = "faer"))]
@@ -18,4 +17,3 @@ pub use error::Error;
 use error::Result;
 pub use panel::transposed;
 pub use product::{Left, Right, add_product, with_wide_registers};
-pub use small::{inverse_of_packed_lower, inverse_of_small_factor, transpose_square};

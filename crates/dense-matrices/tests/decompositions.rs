@@ -1,9 +1,8 @@
 //! Factors and inverses against the matrices that they are of.
 
 use dense_matrices::{
-    Error, cholesky, inverse_of_cholesky, inverse_of_packed_lower, inverse_of_small_factor, inverse_of_triangular,
-    mirror_lower, product, singular_values, solve_cholesky, solve_upper, subtract_square, symmetric_eigen,
-    transpose_square, upper_factor,
+    Error, cholesky, inverse_of_cholesky, inverse_of_triangular, mirror_lower, product, singular_values,
+    solve_cholesky, solve_upper, subtract_square, symmetric_eigen, upper_factor,
 };
 
 /// Sizes about the widths of registers and blocks.
@@ -181,29 +180,4 @@ fn what_a_slice_holds_beyond_the_matrix_is_left_alone() {
     assert!(cholesky(&mut long, 3));
     solve_cholesky(&long, 3, &mut right, 2);
     assert_eq!((&long[..9], &right[..6], right[6]), (&factor[..], &solution[..], 5.0));
-}
-
-#[test]
-fn the_inverse_of_a_small_factor() {
-    // L = [2 0; 1 3], V = L Lᵀ = [4 2; 2 10], L⁻¹ = [1/2 0; −1/6 1/3].
-    let mut matrix = [4.0, 2.0, 2.0, 10.0];
-    assert!(inverse_of_small_factor(&mut matrix, 2));
-    assert!(distance(&matrix, &[0.5, 0.0, -1.0 / 6.0, 1.0 / 3.0]) < 1e-16);
-    assert!(!inverse_of_small_factor(&mut [1.0, 1.0, 1.0, 1.0], 2));
-    assert!(!inverse_of_small_factor(&mut [f64::NAN], 1));
-    assert!(!inverse_of_small_factor(&mut [1.0], 2), "too short");
-}
-
-#[test]
-fn the_inverse_of_a_packed_triangle() {
-    let mut inverse = vec![7.0];
-    inverse_of_packed_lower(&[2.0, 1.0, 4.0], 2, &mut inverse);
-    assert!(distance(&inverse, &[0.5, 0.0, -0.125, 0.25]) < 1e-16);
-    inverse_of_packed_lower(&[2.0], 2, &mut inverse);
-    assert!(inverse.is_empty(), "too short");
-    let mut square = [1.0, 2.0, 3.0, 4.0];
-    transpose_square(&mut square, 2);
-    assert!(distance(&square, &[1.0, 3.0, 2.0, 4.0]) < 1e-300);
-    transpose_square(&mut square, 3);
-    assert!(distance(&square, &[1.0, 3.0, 2.0, 4.0]) < 1e-300, "too short");
 }

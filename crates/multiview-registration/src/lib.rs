@@ -24,8 +24,7 @@ pub use projective_registration;
 pub use rigid_pose;
 pub use surfaces::point_model::{PointModel, SharedParameters};
 pub use survey::datum::Datum;
-pub use survey::joint_covariance::JointCovariance;
 pub use survey::registration::{
-    Effort, Start, StationRegistration, StationRegistrationOptions, SurfacePair, UndeterminedStation,
+    Start, StationRegistration, StationRegistrationOptions, SurfacePair, UndeterminedStation,
 };
 pub use survey::stations::register_stations;

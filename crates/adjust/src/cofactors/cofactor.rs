@@ -1,4 +1,4 @@
-//! Cofactors `Q = N⁻¹` of the unknowns, as a matrix, in the eliminated form or block by block.
+//! Cofactors `Q = N⁻¹` of the unknowns, as a matrix or in the eliminated form.
 
 use nalgebra::DMatrix;
 
@@ -6,7 +6,6 @@ use crate::cofactors::eliminated_cofactor::EliminatedCofactor;
 use crate::equations::elimination::EliminatedFactor;
 use crate::equations::structure::Role;
 use crate::linearised::layout::Layout;
-use crate::sparse::SparseFactor;
 
 /// Cofactors of all unknowns.
 #[derive(Debug, Clone)]
@@ -18,7 +17,6 @@ pub(crate) enum Cofactor {
         trace: f64,
     },
     Eliminated(Box<EliminatedCofactor>),
-    Sparse(Box<SparseFactor>),
 }
 
 impl Cofactor {
@@ -39,13 +37,12 @@ impl Cofactor {
         match self {
             Self::Dense { scale, .. } => scale,
             Self::Eliminated(cofactor) => cofactor.scale(),
-            Self::Sparse(factor) => &factor.scale,
         }
     }
 
     pub(crate) fn is_eliminated(&self, block: usize) -> bool {
         match self {
-            Self::Dense { .. } | Self::Sparse(_) => false,
+            Self::Dense { .. } => false,
             Self::Eliminated(cofactor) => matches!(cofactor.factor.structure.roles[block], Role::Eliminated(_)),
         }
     }
@@ -60,14 +57,13 @@ impl Cofactor {
                 })
             }
             Self::Eliminated(cofactor) => cofactor.block(layout, first, second),
-            Self::Sparse(factor) => factor.inverse.block(first, second),
         }
     }
 
     pub(crate) fn element(&self, layout: &Layout, row: usize, column: usize) -> f64 {
         match self {
             Self::Dense { matrix, scale, .. } => matrix[column * scale.len() + row],
-            Self::Eliminated(_) | Self::Sparse(_) => {
+            Self::Eliminated(_) => {
                 let (first, second) = (layout.block_of(row), layout.block_of(column));
                 let block = self.block(layout, first, second);
                 block[(row - layout.free(first).start, column - layout.free(second).start)]
@@ -90,7 +86,6 @@ impl Cofactor {
                 columns.map(|q| q.iter().zip(x).map(|(q, x)| q * x).sum()).collect()
             }
             Self::Eliminated(cofactor) => cofactor.multiply(x),
-            Self::Sparse(factor) => factor.inverse.solve(x),
         }
     }
 
@@ -98,10 +93,9 @@ impl Cofactor {
     pub(crate) fn condition(&self, layout: &Layout) -> f64 {
         let trace = match self {
             Self::Dense { trace, .. } => *trace,
-            Self::Eliminated(_) | Self::Sparse(_) => {
-                let variances = self.diagonal(layout).into_iter().zip(self.scale());
-                let datum = if let Self::Eliminated(cofactor) = self { cofactor.datum_trace() } else { 0.0 };
-                variances.map(|(q, s)| q / (s * s)).sum::<f64>() + datum
+            Self::Eliminated(cofactor) => {
+                let variances = self.diagonal(layout).into_iter().zip(cofactor.scale());
+                variances.map(|(q, s)| q / (s * s)).sum::<f64>() + cofactor.datum_trace()
             }
         };
         (trace * layout.unknowns as f64).sqrt().max(1.0)

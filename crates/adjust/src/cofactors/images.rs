@@ -59,7 +59,6 @@ impl Images {
         let images = match cofactor {
             Cofactor::Dense { matrix, scale, .. } => source.dense(matrix, scale.len()),
             Cofactor::Eliminated(cofactor) => source.eliminated(cofactor),
-            Cofactor::Sparse(_) => vec![source.of_blocks(cofactor)],
         };
         for (index, image) in images.into_iter().flatten() {
             values[starts[index]..starts[index + 1]].copy_from_slice(&image);
@@ -91,24 +90,6 @@ impl Source<'_> {
             places.iter().enumerate().map(image).collect()
         };
         pieces.map(piece).collect()
-    }
-
-    /// From the blocks of the cofactors between the parts of each observation.
-    fn of_blocks(self, cofactor: &Cofactor) -> Vec<Image> {
-        let image = |place: &Place| {
-            let jacobian = &self.linearisation.jacobian[place.jacobian_range()];
-            let whole = DMatrix::from_row_slice(place.dimension, place.width, jacobian);
-            let mut image = DMatrix::zeros(place.dimension, place.dimension);
-            for (a, b) in
-                self.layout.parts(place).iter().flat_map(|a| self.layout.parts(place).iter().map(move |b| (a, b)))
-            {
-                let block = cofactor.block(self.layout, a.block as usize, b.block as usize);
-                let (left, right) = (a.entries(), b.entries());
-                image += whole.columns_range(left) * block * whole.columns_range(right).transpose();
-            }
-            image.transpose().as_slice().to_vec()
-        };
-        self.layout.observations.iter().map(image).enumerate().collect()
     }
 
     fn eliminated(self, cofactor: &EliminatedCofactor) -> Vec<Vec<Image>> {

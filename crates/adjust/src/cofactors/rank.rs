@@ -73,7 +73,6 @@ impl Problem<'_> {
                         Cofactor::dense(matrix, factor.scale, trace)
                     }
                     SystemFactor::Eliminated(factor) => Cofactor::eliminated(*factor),
-                    SystemFactor::Sparse(factor) => Cofactor::Sparse(factor),
                 })
             }
             Factor::Orthogonal(factor) => {
@@ -105,11 +104,6 @@ impl Problem<'_> {
             match self.system {
                 System::Dense(normal) => self.null_space_of_normal(normal)?,
                 System::Eliminated(normal) => null_space::find(self, normal)?,
-                System::Sparse(_) => {
-                    let mut normal = NormalEquations::new(self.layout.unknowns);
-                    normal.accumulate(self.layout, self.linearisation);
-                    self.null_space_of_normal(&normal)?
-                }
             }
         };
         Ok(Error::RankDeficient { defect: directions.len(), combinations: Combination::basis(directions, names) })

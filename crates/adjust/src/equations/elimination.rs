@@ -233,7 +233,7 @@ fn eliminate(normal: &BlockNormal, extra: &[f64]) -> Option<(Vec<f64>, Vec<f64>)
             let inverse = take(&mut inverses, block.width * block.width);
             inverse.copy_from_slice(&normal.own[block.own()]);
             (0..block.width).for_each(|i| inverse[i * block.width + i] += extra[block.column + i]);
-            let good = dense_matrices::inverse_of_small_factor(inverse, block.width);
+            let good = inverse_factor(inverse, block.width);
             with_wide_registers(|| {
                 for slot in &structure.slots[block.slots()] {
                     let (count, width) = (block.width * slot.width(), slot.width());
@@ -248,6 +248,34 @@ fn eliminate(normal: &BlockNormal, extra: &[f64]) -> Option<(Vec<f64>, Vec<f64>)
     });
     let good = done.collect::<Vec<bool>>().into_iter().all(|good| good);
     good.then_some((inverse, half))
+}
+
+/// Replaces a small symmetric matrix by the inverse of its Cholesky factor, row by row, upper triangle zero. False where
+/// it is not positive definite.
+fn inverse_factor(matrix: &mut [f64], n: usize) -> bool {
+    for column in 0..n {
+        let known: f64 = (0..column).map(|i| matrix[column * n + i].powi(2)).sum();
+        let pivot = matrix[column * n + column] - known;
+        if pivot.is_nan() || pivot <= 0.0 || pivot == f64::INFINITY {
+            return false;
+        }
+        let root = pivot.sqrt();
+        matrix[column * n + column] = root;
+        for row in column + 1..n {
+            let known: f64 = (0..column).map(|i| matrix[row * n + i] * matrix[column * n + i]).sum();
+            matrix[row * n + column] = (matrix[row * n + column] - known) / root;
+            matrix[column * n + row] = 0.0;
+        }
+    }
+    for row in 0..n {
+        let pivot = 1.0 / matrix[row * n + row];
+        for column in 0..row {
+            let known: f64 = (column..row).map(|i| matrix[row * n + i] * matrix[i * n + column]).sum();
+            matrix[row * n + column] = -known * pivot;
+        }
+        matrix[row * n + row] = pivot;
+    }
+    true
 }
 
 /// `S = U − HᵀH`, lower triangle: each element in the order of the eliminated blocks.
@@ -283,5 +311,22 @@ fn subtract(structure: &Structure, block: &Reduced, half: &[f64], out: &mut [f64
             let left = Left { data: &half[slot.offset..], stride: slot.width(), rows: slot.width() };
             add_product(&mut out[slot.start as usize..], structure.order, left, right, eliminated.width, -1.0);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_inverse_of_a_small_factor() {
+        // L = [2 0; 1 3], V = L Lᵀ = [4 2; 2 10], L⁻¹ = [1/2 0; −1/6 1/3].
+        let mut matrix = [4.0, 2.0, 2.0, 10.0];
+        assert!(inverse_factor(&mut matrix, 2));
+        for (found, expected) in matrix.iter().zip([0.5, 0.0, -1.0 / 6.0, 1.0 / 3.0]) {
+            assert!((found - expected).abs() < 1e-16);
+        }
+        assert!(!inverse_factor(&mut [1.0, 1.0, 1.0, 1.0], 2));
+        assert!(!inverse_factor(&mut [f64::NAN], 1));
     }
 }

@@ -103,7 +103,7 @@ impl OrthogonalFactor {
             for column in out.chunks_exact_mut(n.max(1)) {
                 self.reflectors.iter().rev().for_each(|reflector| reflect(reflector, column));
             }
-            dense_matrices::transpose_square(&mut out, n);
+            transpose(&mut out, n);
         }
         Some((out, trace))
     }
@@ -178,4 +178,12 @@ fn reflect_constraints(constraints: &ScaledConstraints, n: usize) -> Result<(Vec
         return Err(Error::DependentConstraint { index: reflectors.len() });
     }
     Ok((reflectors, fixed))
+}
+
+fn transpose(matrix: &mut [f64], n: usize) {
+    for column in 0..n {
+        for row in column + 1..n {
+            matrix.swap(column * n + row, row * n + column);
+        }
+    }
 }

@@ -1,4 +1,4 @@
-//! Normal equations in one of their forms.
+//! Normal equations in one of their two forms.
 
 use crate::equations::block_normal::BlockNormal;
 use crate::equations::constraints::Constraints;
@@ -7,18 +7,16 @@ use crate::equations::normal::{NormalEquations, NormalFactor, Singular, unit_sca
 use crate::equations::structure::Structure;
 use crate::linearised::layout::Layout;
 use crate::linearised::linearisation::Linearisation;
-use crate::sparse::{SparseFactor, SparseNormal};
 use crate::{Adjustment, Error, Result};
 
 /// Unknowns of a dense matrix of 1.8 GB.
 pub(crate) const LARGEST: usize = 15_000;
 
-/// Normal equations: dense, with blocks eliminated, or sparse.
+/// Normal equations, dense or in blocks.
 #[derive(Debug, Clone)]
 pub(crate) enum System {
     Dense(NormalEquations),
     Eliminated(Box<BlockNormal>),
-    Sparse(Box<SparseNormal>),
 }
 
 /// Factor of the normal equations, perhaps damped.
@@ -26,15 +24,11 @@ pub(crate) enum System {
 pub(crate) enum SystemFactor {
     Dense(Box<NormalFactor>),
     Eliminated(Box<EliminatedFactor>),
-    Sparse(Box<SparseFactor>),
 }
 
 impl System {
     /// Chooses the form and takes the memory.
     pub(crate) fn new(adjustment: &Adjustment<'_>, layout: &Layout) -> Result<Self> {
-        if let Some(normal) = SparseNormal::choose(adjustment, layout) {
-            return Ok(Self::Sparse(Box::new(normal)));
-        }
         let structure = Structure::choose(adjustment, layout);
         let unknowns = structure.as_ref().map_or(layout.unknowns, |structure| structure.order);
         if unknowns > LARGEST {
@@ -48,7 +42,7 @@ impl System {
 
     pub(crate) fn structure(&self) -> Option<&Structure> {
         match self {
-            Self::Dense(_) | Self::Sparse(_) => None,
+            Self::Dense(_) => None,
             Self::Eliminated(normal) => Some(&normal.structure),
         }
     }
@@ -57,7 +51,6 @@ impl System {
         match self {
             Self::Dense(normal) => normal.accumulate(layout, linearisation),
             Self::Eliminated(normal) => normal.accumulate(layout, linearisation),
-            Self::Sparse(normal) => normal.accumulate(layout, linearisation),
         }
     }
 
@@ -66,7 +59,6 @@ impl System {
         match self {
             Self::Dense(normal) => &normal.gradient,
             Self::Eliminated(normal) => &normal.gradient,
-            Self::Sparse(normal) => &normal.gradient,
         }
     }
 
@@ -75,7 +67,6 @@ impl System {
         match self {
             Self::Dense(normal) => normal.scale(),
             Self::Eliminated(normal) => unit_scale(&normal.diagonal),
-            Self::Sparse(normal) => unit_scale(&normal.matrix.diagonal()),
         }
     }
 
@@ -90,7 +81,6 @@ impl System {
             Self::Eliminated(normal) => {
                 SystemFactor::Eliminated(Box::new(EliminatedFactor::new(normal, constraints, damping)?))
             }
-            Self::Sparse(normal) => SystemFactor::Sparse(Box::new(normal.factor(damping)?)),
         })
     }
 }
@@ -101,7 +91,6 @@ impl SystemFactor {
         match self {
             Self::Dense(factor) => factor.solve(gradient, share),
             Self::Eliminated(factor) => factor.solve(gradient, share),
-            Self::Sparse(factor) => factor.inverse.solve(gradient),
         }
     }
 
@@ -110,7 +99,6 @@ impl SystemFactor {
         match self {
             Self::Dense(factor) => factor.check_datum(),
             Self::Eliminated(factor) => factor.check_datum(),
-            Self::Sparse(_) => Ok(()),
         }
     }
 
@@ -123,11 +111,6 @@ impl SystemFactor {
                 factor.solve_columns(right);
                 right.iter_mut().zip(&factor.scale).for_each(|(value, s)| *value /= s);
             }
-            Self::Sparse(factor) => {
-                right.iter_mut().zip(&factor.scale).for_each(|(value, s)| *value /= s);
-                factor.inverse.factor().solve(right);
-                right.iter_mut().zip(&factor.scale).for_each(|(value, s)| *value /= s);
-            }
         }
     }
 
@@ -135,7 +118,6 @@ impl SystemFactor {
         match (self, system) {
             (Self::Dense(factor), System::Dense(normal)) => factor.norm(normal),
             (Self::Eliminated(factor), System::Eliminated(normal)) => factor.norm(normal),
-            (Self::Sparse(factor), System::Sparse(normal)) => normal.matrix.norm(&factor.scale),
             _ => f64::INFINITY,
         }
     }

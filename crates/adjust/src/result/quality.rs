@@ -111,7 +111,7 @@ impl Solution {
         let mut factor = Vec::new();
         for (index, (place, &start)) in self.layout.observations.iter().zip(&self.whitening_start).enumerate() {
             let whitening = &self.whitening[start..];
-            dense_matrices::inverse_of_packed_lower(whitening, place.dimension, &mut factor);
+            invert_lower(whitening, place.dimension, &mut factor);
             visit(place, &Local { image: images.image(index), factor: &factor, whitening });
         }
     }
@@ -135,5 +135,19 @@ impl Local<'_> {
     /// Element of `L⁻¹`, row >= column.
     pub(crate) fn whitening(&self, row: usize, column: usize) -> f64 {
         self.whitening[row * (row + 1) / 2 + column]
+    }
+}
+
+/// Inverse of a lower triangle stored row by row, as a full row-major matrix.
+fn invert_lower(packed: &[f64], n: usize, out: &mut Vec<f64>) {
+    out.clear();
+    out.resize(n * n, 0.0);
+    for row in 0..n {
+        let weights = &packed[row * (row + 1) / 2..(row + 1) * (row + 2) / 2];
+        for column in 0..=row {
+            let known: f64 = (column..row).map(|i| weights[i] * out[i * n + column]).sum();
+            let target = if row == column { 1.0 } else { 0.0 };
+            out[row * n + column] = (target - known) / weights[row];
+        }
     }
 }

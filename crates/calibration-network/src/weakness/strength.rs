@@ -1,6 +1,6 @@
 //! Whether a network determines its calibration, and what would cure it where it does not.
 
-use adjust::{BlockId, Combination, NearDefect, Scale, WeaknessOptions};
+use adjust::{Combination, NearDefect, Scale, WeaknessOptions};
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix6x1};
 
 use crate::functional_model::setup::{Setup, Solved};
@@ -224,17 +224,9 @@ fn station_correlations(solved: &Solved, worst: &NearDefect) -> Result<Motions> 
         mounting.map_or_else(Matrix3::identity, |pose| pose.rotation.inverse().to_rotation_matrix().into_inner());
     for &station in &solved.blocks.stations {
         let mut shared = Matrix6x1::<f64>::zeros();
-        // Few blocks hold all components: each is looked up once for a station.
-        let mut known: Vec<(BlockId, DMatrix<f64>)> = Vec::new();
         for &(block, component, weight) in &worst.functional {
-            let at = match known.iter().position(|(other, _)| *other == block) {
-                Some(at) => at,
-                None => {
-                    known.push((block, solution.covariance_between(station, block, Scale::Prior)?));
-                    known.len() - 1
-                }
-            };
-            (0..6).for_each(|i| shared[i] += weight * known[at].1[(i, component)]);
+            let between = solution.covariance_between(station, block, Scale::Prior)?;
+            (0..6).for_each(|i| shared[i] += weight * between[(i, component)]);
         }
         let rotation = camera_from_rig * solution.pose(station)?.rotation.inverse().to_rotation_matrix().matrix();
         let own = solution.covariance(station, Scale::Prior)?;

@@ -9,7 +9,7 @@ use crate::description::reduced::Reduced;
 const CELLS_PER_TASK: usize = 64;
 
 /// Lists of neighbours, one behind the other.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 pub(crate) struct Surroundings {
     starts: Vec<u32>,
     items: Vec<Near>,
@@ -57,12 +57,9 @@ impl Surroundings {
         Self { starts, items }
     }
 
-    /// The neighbours of a point, without itself; none where they were not listed.
+    /// The neighbours of a point, without itself.
     pub(crate) fn of(&self, index: usize) -> &[Near] {
-        match self.starts.get(index..index + 2) {
-            Some(&[first, end]) => &self.items[first as usize..end as usize],
-            _ => &[],
-        }
+        &self.items[self.starts[index] as usize..self.starts[index + 1] as usize]
     }
 }
 

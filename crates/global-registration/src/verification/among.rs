@@ -12,12 +12,10 @@ use crate::verification::refine;
 /// The clouds in voxels of one size, that of the coarsest.
 pub fn with_one_voxel(clouds: Vec<FeatureCloud>, options: &CoarseOptions) -> Result<Vec<FeatureCloud>> {
     let voxel_m = clouds.iter().map(FeatureCloud::voxel_m).fold(0.0, f64::max);
-    clouds.into_iter().map(|cloud| in_voxels(cloud, voxel_m, options)).collect()
-}
-
-/// A cloud in voxels of this size, or as it is where its own are no smaller.
-pub fn in_voxels(cloud: FeatureCloud, voxel_m: f64, options: &CoarseOptions) -> Result<FeatureCloud> {
-    if cloud.voxel_m() < 0.999 * voxel_m { cloud.coarsened(voxel_m, options) } else { Ok(cloud) }
+    let coarse = |cloud: FeatureCloud| {
+        if cloud.voxel_m() < 0.999 * voxel_m { cloud.coarsened(voxel_m, options) } else { Ok(cloud) }
+    };
+    clouds.into_iter().map(coarse).collect()
 }
 
 /// A cloud and its pose `world_from_cloud`.

@@ -1,9 +1,8 @@
 //! One adjustment of all stations from the reduced observations of all pairs.
 
-use adjust::{Adjustment, BlockId, Covariance, FunctionObservation, Method, ParameterBlock, SolveOptions};
+use adjust::{Adjustment, BlockId, Covariance, FunctionObservation, ParameterBlock, SolveOptions};
 use nalgebra::{DVector, Isometry3, Matrix6, Vector6};
 
-use crate::adjustment::sparse_equations::DENSE_STATIONS;
 use crate::adjustment::turns::MeasuredTurn;
 use crate::error::Result;
 use crate::planes::reduction::{PairContacts, Reduced};
@@ -69,14 +68,7 @@ impl Network<'_> {
         }
         // Contacts are found anew after each step: below a thousandth of a standard deviation there is nothing to gain.
         let options = SolveOptions { step_tolerance: 1e-3, ..SolveOptions::default() };
-        let solution = if state.poses.len() > DENSE_STATIONS {
-            // Each factorisation counts: most often the first undamped step ends near enough.
-            let undamped = SolveOptions { method: Method::GaussNewton, ..options.clone() };
-            network.solve(&undamped).or_else(|_| network.solve(&options))
-        } else {
-            network.solve(&options)
-        };
-        let solution = solution.map_err(adjustment)?;
+        let solution = network.solve(&options).map_err(adjustment)?;
         let poses =
             stations.iter().map(|block| solution.pose(*block)).collect::<std::result::Result<Vec<_>, adjust::Error>>();
         let parameters = match shared {

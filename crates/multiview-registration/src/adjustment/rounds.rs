@@ -8,7 +8,6 @@ use crate::adjustment::network::{Network, State, largest_step};
 use crate::error::{Error, Result};
 use crate::planes::contacts::{Contact, IN_PLACE, Reach, TURNED, partners};
 use crate::planes::reduction::{PairContacts, Reduced, Scene, Weighting, reduce};
-use crate::surfaces::extents::{Extent, Extents};
 use crate::surfaces::patches::Surface;
 use crate::surfaces::point_model::PointModel;
 use crate::surfaces::points::StationPoints;
@@ -109,24 +108,6 @@ fn averaged(surface: &Surface, of_points: &[[f64; 3]], parameters: usize) -> Vec
     out
 }
 
-/// The pairs of stations (target, source) that may have partners at these poses, ascending: all others lie too far apart.
-pub(crate) fn near_each_other(
-    surfaces: &[&Surface],
-    poses: &[Isometry3<f64>],
-    reach: Reach,
-) -> Result<Vec<(usize, usize)>> {
-    let size_m = surfaces.iter().map(|surface| surface.size_m).fold(0.0, f64::max);
-    let extent = |(surface, pose): (&&Surface, &Isometry3<f64>)| {
-        let centres = surface.patches.iter().map(|patch| &patch.centre);
-        if let Some(index) = centres.clone().position(|centre| !point_cloud::is_usable(&(pose * centre))) {
-            return Err(Error::NonFinite { what: "points of a station in the frame of another", index });
-        }
-        Ok(Extent::placed(centres, pose))
-    };
-    let extents = surfaces.iter().zip(poses).map(extent).collect::<Result<Vec<Extent>>>()?;
-    Ok(Extents::new(&extents).pairs(reach.farthest_m(size_m)))
-}
-
 /// All pairs in contact at these poses; `only`: the pairs to look at (target, source).
 pub(crate) fn meet(
     surfaces: &[&Surface],
@@ -216,17 +197,16 @@ impl WideRounds<'_> {
 
     /// Brings all stations from start poses that are right to about the reach to a part of a patch.
     pub(crate) fn run(&self, surfaces: &mut Surfaces<'_>, start: State) -> Result<State> {
+        let count = start.poses.len();
+        let all: Vec<(usize, usize)> = (0..count).flat_map(|t| (t + 1..count).map(move |s| (t, s))).collect();
         let size_m = surfaces.given.iter().map(|surface| surface.size_m).fold(0.0, f64::max);
         let mut state = start;
         let mut rounds = 0;
         for reach in self.levels(size_m) {
-            let mut pairs = Vec::new();
+            let mut pairs = all.clone();
             for in_level in 0..ROUNDS {
                 surfaces.update(&state.parameters)?;
                 let scene = surfaces.scene(state.parameters.len());
-                if in_level == 0 {
-                    pairs = near_each_other(&scene.surfaces, &state.poses, reach)?;
-                }
                 let pairs_in_contact = meet(&scene.surfaces, &state.poses, &pairs, reach)?;
                 if in_level == 0 {
                     // Stations that do not meet now will not after the small steps of one level.

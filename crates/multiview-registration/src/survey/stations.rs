@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::sync::Arc;
 
-use nalgebra::{Isometry3, Vector3};
+use nalgebra::{DMatrix, Isometry3, Matrix6, Vector3};
 use rayon::prelude::*;
 use statistics::upper_median;
 
@@ -21,11 +21,9 @@ use crate::surfaces::point_model::{SharedParameters, checked_prior};
 use crate::surfaces::points::StationPoints;
 use crate::survey::check::{Checked, checked};
 use crate::survey::datum::Datum;
-use crate::survey::joint_covariance::JointCovariance;
 use crate::survey::registration::{
-    Effort, Start, StationRegistration, StationRegistrationOptions, SurfacePair, UndeterminedStation,
+    Start, StationRegistration, StationRegistrationOptions, SurfacePair, UndeterminedStation,
 };
-use crate::survey::windows::{self, MOST_AT_ONCE};
 use point_cloud::Cloud;
 use point_cloud::{UnorganisedNormalOptions, unorganised_normals};
 use rigid_pose::is_finite;
@@ -61,7 +59,6 @@ pub fn register_stations(
     let radius_m = surfaces.iter().map(|surface| surface.radius_m).fold(0.0, f64::max);
     let poses = match start {
         Start::Poses(poses) => poses.to_vec(),
-        Start::Order if stations.len() > MOST_AT_ONCE => windows::arranged(stations, datum.held_station(), options)?,
         _ => crate::survey::blind::arranged(stations, start, datum.held_station(), options.turns)?,
     };
     // Stations that were arranged by what they saw may have slid along walls together: they are not known better.
@@ -97,7 +94,7 @@ pub fn register_stations(
         adjusted = finish.run(&mut modelled, &mut points, state)?;
     }
     require_connected(&adjusted, datum)?;
-    let placements = placements(stations, points, &adjusted.state)?;
+    let placements = placements(stations, &points, &adjusted.state)?;
     let checked = checked(&adjusted, options.minimum_overlap, datum, (radius_m, patch_m))?;
     let result = result(checked, adjusted, &poses, &network, datum, patch_m);
     let prepared = match modelled.modelled {
@@ -183,12 +180,11 @@ fn normals_of(cloud: &Cloud) -> Result<Cow<'_, [Vector3<f64>]>> {
 }
 
 /// Verdicts on the stations at the adjusted poses, their points where the shared parameters have them.
-fn placements(stations: &[Cloud], points: Vec<StationPoints>, state: &State) -> Result<Placements> {
+fn placements(stations: &[Cloud], points: &[StationPoints], state: &State) -> Result<Placements> {
     if state.parameters.is_empty() {
-        drop(points);
         return judge_placements(stations, &state.poses);
     }
-    let modelled: Vec<Cloud> = stations.iter().zip(&points).map(|(cloud, points)| points.modelled(cloud)).collect();
+    let modelled: Vec<Cloud> = stations.iter().zip(points).map(|(cloud, points)| points.modelled(cloud)).collect();
     judge_placements(&modelled, &state.poses)
 }
 
@@ -203,12 +199,13 @@ fn result(
     let count = adjusted.state.poses.len();
     let parameters = adjusted.state.parameters.len();
     let (redundancy, sigma0) = (adjusted.redundancy(), adjusted.sigma0());
-    let joint = JointCovariance::new(adjusted.cofactors.clone(), adjusted.variance_factor());
-    let undetermined = undetermined(&adjusted.state.poses, &joint, network.hold_m, size_m);
+    let factor = 0.5 * adjusted.variance_factor();
+    let covariance = factor * (&adjusted.cofactors + adjusted.cofactors.transpose());
+    let undetermined = undetermined(&adjusted.state.poses, &covariance, network.hold_m, size_m);
     let surfaces = adjusted.overlaps(FEWEST_CONTACTS).iter().map(|overlap| surface_pair(&adjusted, overlap)).collect();
-    let (poses, joint) = datum.apply(start, adjusted.state.poses, joint, network.hold_m);
+    let (poses, joint) = datum.apply(start, adjusted.state.poses, covariance, network.hold_m);
     StationRegistration {
-        covariance: (0..count).map(|k| joint.between(k, k)).collect(),
+        covariance: (0..count).map(|k| joint.fixed_view::<6, 6>(6 * k, 6 * k).into_owned()).collect(),
         world_from_station: poses,
         pairs: checked.pairs,
         refused: checked.refused,
@@ -220,8 +217,7 @@ fn result(
         redundancy,
         rounds: adjusted.rounds,
         settled: adjusted.settled,
-        effort: Effort { pairs_tried: adjusted.pairs_tried, filled_blocks: adjusted.cofactors.filled() },
-        parameters: (parameters > 0).then(|| shared(network, &adjusted.state.parameters, &joint.whole())),
+        parameters: (parameters > 0).then(|| shared(network, &adjusted.state.parameters, &joint)),
         joint_covariance: joint,
         prepared: Arc::default(),
     }
@@ -232,7 +228,8 @@ fn returned(adjusted: &Adjusted, start: &[Isometry3<f64>], network: &Network<'_>
     let mut state = adjusted.state.clone();
     let mut any = false;
     for (k, (pose, start)) in state.poses.iter_mut().zip(start).enumerate().filter(|(k, _)| *k != network.fixed) {
-        if let Some(back) = precision::returned(pose, start, &adjusted.cofactors.of(k), network.hold_m, size_m) {
+        let own: Matrix6<f64> = adjusted.cofactors.fixed_view::<6, 6>(6 * k, 6 * k).into_owned();
+        if let Some(back) = precision::returned(pose, start, &own, network.hold_m, size_m) {
             *pose = back;
             any = true;
         }
@@ -242,12 +239,12 @@ fn returned(adjusted: &Adjusted, start: &[Isometry3<f64>], network: &Network<'_>
 
 fn undetermined(
     poses: &[Isometry3<f64>],
-    covariance: &JointCovariance,
+    covariance: &DMatrix<f64>,
     hold_m: f64,
     size_m: f64,
 ) -> Vec<UndeterminedStation> {
     let motions = poses.iter().enumerate().map(|(station, pose)| {
-        let own = covariance.between(station, station);
+        let own: Matrix6<f64> = covariance.fixed_view::<6, 6>(6 * station, 6 * station).into_owned();
         UndeterminedStation { station, motions: precision::undetermined(pose, &own, hold_m, size_m) }
     });
     motions.filter(|station| !station.motions.is_empty()).collect()
@@ -256,11 +253,13 @@ fn undetermined(
 fn surface_pair(adjusted: &Adjusted, overlap: &Overlap) -> SurfacePair {
     let Overlap { target, source, fraction } = *overlap;
     let eye = adjusted.state.poses[target].translation.vector;
+    let count = adjusted.state.poses.len();
     let tiles = adjusted.shared(target, source);
     let (mut weight, mut mean, mut square, mut whitened, mut outliers) = (0.0, 0.0, 0.0, 0.0, 0_usize);
     for tile in &tiles {
         let shared_plane = &adjusted.shared_planes[tile.shared_plane];
-        let robust = adjusted.scatter.weight(&tile.target).min(adjusted.scatter.weight(&tile.source));
+        let weight_of = |station: usize| adjusted.scatter.weights[tile.target.tile * count + station];
+        let robust = weight_of(target).min(weight_of(source));
         let own = robust * tile.weight();
         // Along the normal that points to the target station, so that the sign means nearer or farther.
         let facing = shared_plane.normal.dot(&(eye - shared_plane.origin)) >= 0.0;
@@ -283,7 +282,7 @@ fn surface_pair(adjusted: &Adjusted, overlap: &Overlap) -> SurfacePair {
     }
 }
 
-fn shared(network: &Network<'_>, values: &[f64], joint: &nalgebra::DMatrix<f64>) -> SharedParameters {
+fn shared(network: &Network<'_>, values: &[f64], joint: &DMatrix<f64>) -> SharedParameters {
     let m = values.len();
     let first = joint.nrows() - m;
     let sigma = |k: usize| joint[(k, k)].max(0.0).sqrt();

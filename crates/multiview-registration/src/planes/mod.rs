@@ -8,3 +8,4 @@ pub(crate) mod shared_planes;
 pub(crate) mod sightings;
 pub(crate) mod sums;
 pub(crate) mod tiles;
+pub(crate) mod wide_errors;

@@ -3,8 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use calibration_tasks::{CalibrationSummary, DiffRequest, OffsetModel, diff};
-use pipeline::{ExplainRequest, Plan, Silent, ViewData, explain, process};
+use pipeline::{Plan, Silent, ViewData, process};
 use range_io::calibration::Calibration;
+use tasks::{ExplainRequest, explain};
 
 use crate::calibrate_planes::{camera, planes, ranges_to_wall, write_survey_with};
 use crate::calibration_setup::{calibrate, changed, terms};

@@ -4,6 +4,8 @@
 mod chance;
 #[path = "../examples/fuzz_readers/mutate.rs"]
 mod mutate;
+#[path = "../../recordings/tests/common/mod.rs"]
+mod recorded;
 #[path = "../examples/fuzz_readers/seeds.rs"]
 mod seeds;
 #[path = "../examples/fuzz_readers/targets.rs"]

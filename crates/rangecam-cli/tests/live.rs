@@ -137,7 +137,7 @@ fn a_reader_that_has_seen_enough_is_no_failure() {
     let ended = child.wait_with_output().unwrap();
     let words = String::from_utf8(ended.stderr).unwrap();
     assert_eq!(ended.status.code(), Some(0), "{words}");
-    assert!(words.contains("nobody reads the clouds any more"), "{words}");
+    assert!(words.contains("nobody reads the results any more"), "{words}");
 }
 
 #[test]

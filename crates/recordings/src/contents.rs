@@ -56,7 +56,9 @@ impl Kind {
         let light = says(&["ir", "infra", "infrared", "amplitude", "intensity", "ab", "grey", "gray", "nir", "mono"]);
         match encoding {
             Encoding::Mono8 | Encoding::Mono16 | Encoding::Unsigned8 => Self::Intensity,
-            Encoding::Unsigned16 | Encoding::Float32 if says(&["conf", "confidence", "phase"]) && !says(&["depth"]) => {
+            Encoding::Unsigned16 | Encoding::Float32
+                if says(&["conf", "confidence", "flags", "phase", "sigma"]) && !says(&["depth"]) =>
+            {
                 Self::Raw
             }
             Encoding::Unsigned16 | Encoding::Float32 if light && !says(&["depth"]) => Self::Intensity,

@@ -32,6 +32,7 @@ use crate::requests::warm_up_arguments::WarmUpArguments;
 /// Raw frames of a range camera in, one corrected and registered cloud out.
 #[derive(Debug, Parser)]
 #[command(name = "rangecam", version, about, after_help = crate::exit::CODES)]
+#[allow(clippy::struct_excessive_bools)] // each is an option of its own
 pub(crate) struct Arguments {
     /// No progress, no summary: only errors.
     #[arg(long, short, global = true)]

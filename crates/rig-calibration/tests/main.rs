@@ -1,5 +1,5 @@
 //! Rigs of known truth, and broken ones.
-#![allow(clippy::unwrap_used, missing_docs, dead_code)]
+#![allow(clippy::print_stdout, clippy::unwrap_used, missing_docs, dead_code)]
 
 #[path = "support/rigs.rs"]
 mod rigs;

@@ -77,7 +77,7 @@ fn image(camera: &Camera) -> [Raster<f32>; 3] {
         let ray = pose * camera.ray(pixel);
         hit(&pose.translation.vector.into(), &ray).map(|(.., colour)| COLOURS[colour])
     };
-    let pixels = Raster::from_fn(camera.format.width, camera.format.height, |col, row| mean(col, row, &seen));
+    let pixels = Raster::from_fn(camera.format.width, camera.format.height, |col, row| mean(col, row, seen));
     [0, 1, 2].map(|k| pixels.map(|pixel| pixel[k].round() as f32))
 }
 

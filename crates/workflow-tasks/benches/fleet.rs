@@ -1,4 +1,5 @@
 //! The report of a fleet, by its recordings: what is read of each are two small files.
+#![allow(missing_docs)]
 
 use std::fs;
 use std::path::Path;

@@ -45,7 +45,7 @@ impl Engine {
     }
 
     /// Writes into the configuration which program is run.
-    pub(crate) fn set_program(&self, flow: &Path, program: &Path) -> Outcome {
+    pub(crate) fn set_program(flow: &Path, program: &Path) -> Outcome {
         let file = flow.join("config.yaml");
         let fail = |error: std::io::Error| format!("{}: {error}", file.display());
         let program = fs::canonicalize(program).map_err(fail)?;

@@ -47,7 +47,7 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome {
         None => built()?,
     };
     let flow = folder.join("flow");
-    let expected = expected(&engine, &program, &folder, &flow)?;
+    let expected = expected(&program, &folder, &flow)?;
     if !arguments.no_local {
         println!("── Snakemake on this machine");
         let local = folder.join("local");
@@ -57,16 +57,16 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome {
     if arguments.no_slurm {
         return Ok(());
     }
-    let Some(slurm) = Slurm::started(&folder.join("slurm"))? else { return Ok(()) };
+    let Some(slurm) = Slurm::started(&folder.join("slurm")) else { return Ok(()) };
     println!("── Snakemake under Slurm");
     let cluster = folder.join("cluster");
     let trouble = Trouble::new(&cluster, &program, arguments.kill_every, Some(&slurm));
-    let killed = engine.run_to_the_end(&flow, &cluster, &slurm.options(), trouble)?;
+    let killed = engine.run_to_the_end(&flow, &cluster, &Slurm::options(), trouble)?;
     compare(&expected, &cluster, &killed)
 }
 
 /// Archive, workflow, and what one process after the other makes of it.
-fn expected(engine: &Engine, program: &Path, folder: &Path, flow: &Path) -> Result<BTreeMap<PathBuf, Vec<u8>>, String> {
+fn expected(program: &Path, folder: &Path, flow: &Path) -> Result<BTreeMap<PathBuf, Vec<u8>>, String> {
     if folder.join("serial/fleet").is_dir() {
         return contents(&folder.join("serial"));
     }
@@ -74,7 +74,7 @@ fn expected(engine: &Engine, program: &Path, folder: &Path, flow: &Path) -> Resu
     archive::write(program, &folder.join("archive"))?;
     let [archive, out] = [&folder.join("archive"), flow].map(|path| path.display().to_string());
     call(program, folder, &["workflow", &archive, "--shards", "2", "--out", &out])?;
-    engine.set_program(flow, program)?;
+    Engine::set_program(flow, program)?;
     println!("── one process after the other");
     serial::run(program, folder)
 }

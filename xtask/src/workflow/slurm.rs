@@ -18,10 +18,10 @@ const CONFIGURATION: &str = "/etc/slurm/slurm.conf";
 
 impl Slurm {
     /// Installs Debian's `slurm-wlm` where it is missing, and starts it; says why where that can't be done.
-    pub(crate) fn started(folder: &Path) -> Result<Option<Self>, String> {
+    pub(crate) fn started(folder: &Path) -> Option<Self> {
         if Path::new(CONFIGURATION).exists() {
             println!("── Slurm skipped: {CONFIGURATION} is there already, and it is not ours to change");
-            return Ok(None);
+            return None;
         }
         let installed = || Command::new("slurmctld").arg("-V").output().is_ok_and(|output| output.status.success());
         if !installed() {
@@ -35,20 +35,20 @@ impl Slurm {
             println!(
                 "── Slurm skipped: slurm-wlm can't be installed here; it needs Debian, its packages, and their administrator"
             );
-            return Ok(None);
+            return None;
         }
         let slurm = Self { folder: folder.to_owned() };
         match slurm.start() {
-            Ok(()) => Ok(Some(slurm)),
+            Ok(()) => Some(slurm),
             Err(message) => {
                 println!("── Slurm skipped: it does not start here: {message}");
-                Ok(None)
+                None
             }
         }
     }
 
     /// What Snakemake's plugin has to be told of a cluster without accounting.
-    pub(crate) fn options(&self) -> [String; 9] {
+    pub(crate) fn options() -> [String; 9] {
         [
             "--slurm-status-command",
             "squeue",

@@ -3,6 +3,7 @@
 use std::io::{self, Write};
 
 use live_frames::ProcessedFrame;
+use range_image::Flags;
 use recordings::{Encoding, Error, Image, McapWriter, Payload, StreamId};
 
 /// Topics of a recording, in the order in which a frame's messages are written.
@@ -43,7 +44,7 @@ impl<W: Write> McapStream<W> {
         let time_ns = (1e9 * frame.timestamp_s).round() as i64;
         let size = [frame.width() as u32, frame.height() as u32];
         let metres = |values: &[f32]| Image::from_f32(CAMERA, size, values);
-        let flags: Vec<u16> = frame.flags.as_slice().iter().map(|flags| flags.bits()).collect();
+        let flags: Vec<u16> = frame.flags.as_slice().iter().map(Flags::bits).collect();
         let images = [
             metres(frame.range.as_slice()),
             metres(frame.sigma.as_slice()),

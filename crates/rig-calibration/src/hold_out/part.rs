@@ -13,6 +13,7 @@ use crate::rig::{Rig, RigCamera};
 use crate::selection::POINTS_OF_A_STATION;
 
 /// Which observations take part, by the number of the camera and the name of the epoch. A range needs its image point.
+#[derive(Clone, Copy)]
 pub(super) struct Keep<'k> {
     pub(super) image: &'k dyn Fn(usize, &str) -> bool,
     pub(super) range: &'k dyn Fn(usize, &str) -> bool,

@@ -168,7 +168,7 @@ pub fn fleet(request: &FleetRequest) -> Result<Fleet> {
 }
 
 fn write(destination: &Destination, mut fleet: Fleet) -> Result<Fleet> {
-    fleet.out = destination.named().to_owned();
+    destination.named().clone_into(&mut fleet.out);
     let folder = destination.open()?;
     write_text(folder.file("fleet.csv")?, &table::csv(&fleet.rows))?;
     write_text(folder.file("summary.json")?, &json(&fleet)?)?;

@@ -84,7 +84,7 @@ fn a_pipe_goes_in_and_clouds_come_out() {
     // Images of the frames are a recording, which becomes a survey of ranges.
     let recorded = ["survey", "--fast", "--mcap", "out.mcap", "-q"];
     assert_eq!(piped(folder.path(), &recorded, Vec::new()).0, Some(0));
-    let convert = ["convert", "out.mcap", "--out", "again", "--quiet"];
+    let convert = ["convert", "out.mcap", "--calibration", "survey/calibration.ron", "--out", "again", "--quiet"];
     let converted = Command::new(env!("CARGO_BIN_EXE_rangecam")).args(convert).current_dir(folder.path()).output();
     let converted = converted.unwrap();
     let words = String::from_utf8_lossy(&converted.stderr);

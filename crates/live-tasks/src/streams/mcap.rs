@@ -11,7 +11,7 @@ const TOPICS: [&str; 4] = ["/range/image_raw", "/sigma/image_raw", "/amplitude/i
 /// Name of the camera's coordinate system.
 const CAMERA: &str = "camera";
 
-/// Writer of processed frames as MCAP: four images a frame with its time stamp, which `rangecam convert` makes a survey of.
+/// Writer of processed frames as MCAP: four images a frame with its time stamp, which `rangecam convert --calibration FILE` makes a survey of.
 ///
 /// `/range`, `/sigma` (metre) and `/amplitude` (the samples' unit) are `32FC1` with NaN for none, `/flags` is `16UC1`. The file
 /// has its index from [`finish`](Self::finish) on.

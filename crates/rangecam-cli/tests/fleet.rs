@@ -122,7 +122,7 @@ fn what_is_done_is_not_done_again() {
 fn the_steps_of_a_workflow_run() {
     let root = world();
     let said = done(root.path(), "workflow archive --pipeline p.ron --shards 2 --out flow");
-    assert!(said.contains("1 recordings of 1 cameras on 1 days, each in 2 parts: 4 jobs"), "{said}");
+    assert!(said.contains("recordings: 1; cameras: 1; days: 1; parts of each: 2; jobs: 4"), "{said}");
     let snakefile = fs::read_to_string(root.path().join("flow/Snakefile")).unwrap();
     for command in ["calibrate", "check", "warmup", "run", "merge", "fleet"] {
         assert!(snakefile.contains(&format!(" {command} ")), "{command}");
@@ -142,7 +142,7 @@ fn the_steps_of_a_workflow_run() {
     fs::create_dir_all(work.join("codes/north/monday/recordings")).unwrap();
     fs::write(work.join(format!("codes/{recording}.code")), code.unwrap().to_string()).unwrap();
     let said = done(&work, "fleet . --out fleet");
-    assert!(said.contains("1 recordings of 1 cameras; 1 have a result"), "{said}");
+    assert!(said.contains("Recordings: 1; cameras: 1; with a result: 1"), "{said}");
     let table = fs::read_to_string(work.join("fleet/fleet.csv")).unwrap();
     assert!(table.lines().nth(1).unwrap().starts_with("north,monday,hall,"), "{table}");
     // The report is done, too, until a step is.

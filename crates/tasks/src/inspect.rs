@@ -72,7 +72,9 @@ pub fn inspect(path: &Path) -> Result<Inspection> {
     } else {
         return Err(Error::Survey {
             path: path.to_owned(),
-            message: "can be inspected: a survey's folder, calibration.ron, a .ply cloud".to_owned(),
+            message:
+                "this can't be inspected; expected a survey's folder, calibration.ron, a cloud (.ply), or a recording"
+                    .to_owned(),
         });
     }
     Ok(found)

@@ -55,8 +55,9 @@ impl Judged for WorkflowSummary {
 impl fmt::Display for WorkflowSummary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { cameras, days, recordings, shards, jobs, out, .. } = self;
-        let lead =
-            format!("{recordings} recordings of {cameras} cameras on {days} days, each in {shards} parts: {jobs} jobs");
+        let lead = format!(
+            "recordings: {recordings}; cameras: {cameras}; days: {days}; parts of each: {shards}; jobs: {jobs}"
+        );
         let mut document = Document::new("rangecam: workflow", lead);
         document.warnings(&self.doubts);
         document.closing(format!(

@@ -198,7 +198,8 @@ fn read_parts(folders: &[PathBuf]) -> Result<Vec<(PathBuf, PartSummary)>> {
     let mut parts = Vec::new();
     for folder in folders {
         let path = folder.join("summary.json");
-        let text = std::fs::read_to_string(&path).map_err(|source| Error::Access { path: path.clone(), source })?;
+        let text = std::fs::read_to_string(&path)
+            .map_err(|error| refused(format!("{}: is no part of a run: summary.json: {error}", folder.display())))?;
         let part: PartSummary = serde_json::from_str(&text)
             .map_err(|error| refused(format!("{}: is no part of a run: {error}", path.display())))?;
         parts.push((folder.clone(), part));

@@ -16,7 +16,7 @@ impl fmt::Display for Fleet {
 /// All of it.
 pub(crate) fn document(fleet: &Fleet) -> Document {
     let lead = format!(
-        "{} recordings of {} cameras; {} have a result.",
+        "Recordings: {}; cameras: {}; with a result: {}.",
         fleet.recordings,
         fleet.cameras.len(),
         fleet.with_result

@@ -17,7 +17,7 @@ pub use destination::{Inputs, RefusalFile, check_name, json, produce, produce_ma
 pub use digest::InputDigest;
 pub use error::drift::DriftError;
 pub use error::{Error, Result};
-pub use inertial_data::{INERTIAL_DATA, INERTIAL_MOUNTING, read_inertial};
+pub use inertial_data::{INERTIAL_DATA, INERTIAL_MOUNTING, InertialUnit, read_inertial};
 pub use progress::{Progress, Silent};
 pub use tape::Tape;
 pub use verdict::{Doubt, DoubtKind, Failure, Judged, Verdict, words_about};

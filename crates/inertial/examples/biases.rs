@@ -53,7 +53,7 @@ fn main() -> Result<(), inertial::Error> {
         let found =
             estimate_sequence(&poses, &samples, &SequenceOptions { noise, mounting, ..SequenceOptions::default() })?;
         let last = &found.states[found.states.len() - 1];
-        let sigma = last.bias_covariance.diagonal().map(f64::sqrt);
+        let sigma = last.bias_covariance().diagonal().map(f64::sqrt);
         println!("{count} poses (sigma0 {:.2?}):", found.sigma0);
         println!("  gyroscope     {:.4?} +- {:.4?} rad/s", last.biases.gyro.as_slice(), &sigma.as_slice()[..3]);
         println!("  accelerometer {:.3?} +- {:.3?} m/s2", last.biases.accel.as_slice(), &sigma.as_slice()[3..]);

@@ -23,4 +23,6 @@ pub use rest::{Rest, Unrest, rest};
 pub use rigid_pose;
 pub use sample::InertialSample;
 #[cfg(feature = "sequence")]
-pub use sequence::{CameraPose, InertialSequence, Mounting, SequenceOptions, SequenceState, estimate_sequence};
+pub use sequence::{
+    CameraPose, InertialSequence, Mounting, SequenceOptions, SequenceState, StateCovariance, estimate_sequence,
+};

@@ -1,26 +1,14 @@
-//! The inertial unit that a survey names, and the turns that it measured between stations.
+//! Turns between stations that an inertial unit measured.
 
 use std::path::Path;
 
-use commands::{read_inertial, root_of};
-use inertial::{Biases, ImuNoise, InertialSample, Preintegrated, rest};
+use commands::{InertialUnit, read_inertial, root_of};
+use inertial::{Biases, Preintegrated, rest};
 use multiview_registration::MeasuredTurn;
-use nalgebra::{Isometry3, Matrix3, Vector3};
+use nalgebra::{Matrix3, Vector3};
 use pipeline::stations::Station;
 use pipeline::{Error, Result};
 use range_io::survey::Survey;
-use range_io::tables::ImuSample;
-
-/// Samples of the unit that the survey names, and the pose of its axes in the camera's; `None` where it names none.
-pub(crate) fn read(survey: &Survey, root: &Path) -> Result<Option<(Vec<InertialSample>, Isometry3<f64>)>> {
-    let Some((samples, camera_from_body)) = read_inertial(survey, root)? else { return Ok(None) };
-    let sample = |sample: ImuSample| InertialSample {
-        timestamp_s: sample.timestamp_s,
-        angular_rate: Vector3::from(sample.angular_rate),
-        specific_force: Vector3::from(sample.acceleration),
-    };
-    Ok(Some((samples.into_iter().map(sample).collect(), camera_from_body)))
-}
 
 /// How the camera turned from each station to the next; none where the survey names no inertial data.
 ///
@@ -29,8 +17,9 @@ pub(crate) fn read(survey: &Survey, root: &Path) -> Result<Option<(Vec<InertialS
 /// # Errors
 /// [`Error::Request`] for data with gaps between stations, and stations that do not follow each other in time.
 pub(crate) fn turns(path: &Path, survey: &Survey, stations: &[Station]) -> Result<Vec<MeasuredTurn>> {
-    let Some((samples, camera_from_body)) = read(survey, &root_of(path))? else { return Ok(Vec::new()) };
-    let noise = ImuNoise::default();
+    let Some(InertialUnit { samples, camera_from_body, noise }) = read_inertial(survey, &root_of(path))? else {
+        return Ok(Vec::new());
+    };
     let first_s = stations.first().map_or(f64::NAN, |station| station.timestamp_s);
     let before = samples.partition_point(|sample| sample.timestamp_s <= first_s);
     let (bias, variance) = match rest(samples.get(..before).unwrap_or_default(), &noise) {

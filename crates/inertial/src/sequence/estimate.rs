@@ -14,7 +14,9 @@ use crate::noise::Biases;
 use crate::preintegrated::Preintegrated;
 use crate::sample::InertialSample;
 use crate::sequence::equations::{IntervalEquations, Length, Unchanged};
-use crate::sequence::options::{CameraPose, InertialSequence, Mounting, SequenceOptions, SequenceState};
+use crate::sequence::options::{
+    CameraPose, InertialSequence, Mounting, SequenceOptions, SequenceState, StateCovariance,
+};
 use crate::sequence::start::{Start, angle_ratio, contradicting_turns};
 use crate::{Error, Result};
 
@@ -279,6 +281,19 @@ impl<'m> Network<'m> {
         Ok(worst.and_then(|suspect| interval(suspect.observation)))
     }
 
+    /// Covariance of everything that the way on from a pose depends on.
+    fn state_covariance(&self, solution: &Solution, k: usize) -> Result<StateCovariance> {
+        let blocks = [(self.poses[k], 0), (self.velocities[k], 6), (self.biases[k], 9), (self.gravity, 15)];
+        let mut covariance = StateCovariance::zeros();
+        for (first, row) in blocks {
+            for (second, column) in blocks {
+                let block = solution.covariance_between(first, second, Scale::Prior)?;
+                covariance.view_mut((row, column), block.shape()).copy_from(&block);
+            }
+        }
+        Ok(covariance)
+    }
+
     fn result(
         &self,
         solution: &Solution,
@@ -296,16 +311,14 @@ impl<'m> Network<'m> {
             Ok::<_, Error>((value, Matrix3::from_fn(|row, column| matrix[(row, column)])))
         };
         let state = |(k, pose): (usize, &CameraPose)| {
-            let (velocity, velocity_covariance) = three(self.velocities[k])?;
-            let world_from_camera = Uncertain { pose: solution.pose(self.poses[k])?, covariance: six(self.poses[k])? };
-            let (biases, bias_covariance) = (self.biases(solution, k)?, six(self.biases[k])?);
+            let covariance = self.state_covariance(solution, k)?;
+            let own = covariance.fixed_view::<6, 6>(0, 0).into_owned();
             Ok(SequenceState {
                 time_s: pose.time_s,
-                world_from_camera,
-                velocity,
-                velocity_covariance,
-                biases,
-                bias_covariance,
+                world_from_camera: Uncertain { pose: solution.pose(self.poses[k])?, covariance: own },
+                velocity: Vector3::from_column_slice(solution.values(self.velocities[k])?),
+                biases: self.biases(solution, k)?,
+                covariance,
             })
         };
         let (gravity, gravity_covariance) = three(self.gravity)?;

@@ -6,4 +6,4 @@ mod options;
 mod start;
 
 pub use estimate::estimate_sequence;
-pub use options::{CameraPose, InertialSequence, Mounting, SequenceOptions, SequenceState};
+pub use options::{CameraPose, InertialSequence, Mounting, SequenceOptions, SequenceState, StateCovariance};

@@ -1,7 +1,7 @@
 //! What a sequence is estimated from, and what comes out.
 
 use adjust::SolveOptions;
-use nalgebra::{Isometry3, Matrix3, Matrix6, Vector3};
+use nalgebra::{Isometry3, Matrix3, Matrix6, SMatrix, Vector3};
 use rigid_pose::Uncertain;
 
 use crate::noise::{Biases, ImuNoise};
@@ -63,12 +63,28 @@ pub struct SequenceState {
     pub world_from_camera: Uncertain,
     /// Velocity of the unit, world axes, m/s.
     pub velocity: Vector3<f64>,
-    /// Its covariance.
-    pub velocity_covariance: Matrix3<f64>,
     /// Biases.
     pub biases: Biases,
+    /// Covariance of the camera's pose (its tangent), the velocity, the biases `[gyro, accel]` and gravity, together: a bias of the forces
+    /// and gravity can hardly be told apart by a unit that turns little, while what they make of a motion is known well.
+    pub covariance: StateCovariance,
+}
+
+/// Covariance of a whole state: pose (6), velocity (3), biases (6), gravity (3).
+pub type StateCovariance = SMatrix<f64, 18, 18>;
+
+impl SequenceState {
+    /// Covariance of the velocity.
+    #[must_use]
+    pub fn velocity_covariance(&self) -> Matrix3<f64> {
+        self.covariance.fixed_view::<3, 3>(6, 6).into_owned()
+    }
+
     /// Covariance of `[gyro, accel]`.
-    pub bias_covariance: Matrix6<f64>,
+    #[must_use]
+    pub fn bias_covariance(&self) -> Matrix6<f64> {
+        self.covariance.fixed_view::<6, 6>(9, 9).into_owned()
+    }
 }
 
 /// A sequence that camera and unit agree on.

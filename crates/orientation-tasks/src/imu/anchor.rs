@@ -1,11 +1,8 @@
 //! A moment whose state is known, and where the unit leads from there.
 
-use inertial::{Biases, ImuNoise, InertialSample, NavigationState, Preintegrated, SequenceState};
+use inertial::{Biases, ImuNoise, InertialSample, NavigationState, Preintegrated, SequenceState, StateCovariance};
 use nalgebra::{Isometry3, Matrix3, SMatrix, Vector3};
-use rigid_pose::{Uncertain, symmetrised};
-
-/// Covariance of `[dt (world), dθ (body), velocity, gyro bias, accel bias, gravity]`, three each.
-pub(crate) type StateCovariance = SMatrix<f64, 18, 18>;
+use rigid_pose::{Uncertain, product_jacobians, symmetrised};
 
 /// Places in a state.
 pub(crate) const VELOCITY: usize = 6;
@@ -20,23 +17,18 @@ pub(crate) struct Anchor {
     pub(crate) state: NavigationState,
     pub(crate) biases: Biases,
     pub(crate) gravity: Vector3<f64>,
+    /// Of `[dt (world), dθ (body), velocity, gyro bias, accel bias, gravity]`, three each.
     pub(crate) covariance: StateCovariance,
 }
 
 impl Anchor {
-    /// Of a sequence; its velocity, biases and gravity are taken as independent of each other and of the pose.
-    pub(crate) fn of_state(
-        state: &SequenceState,
-        (gravity, gravity_covariance): (Vector3<f64>, Matrix3<f64>),
-        camera_from_body: &Isometry3<f64>,
-    ) -> Self {
-        let world_from_body = state.world_from_camera.then(&Uncertain::exact(*camera_from_body));
-        let mut covariance = StateCovariance::zeros();
-        covariance.fixed_view_mut::<6, 6>(0, 0).copy_from(&world_from_body.covariance);
-        covariance.fixed_view_mut::<3, 3>(VELOCITY, VELOCITY).copy_from(&state.velocity_covariance);
-        covariance.fixed_view_mut::<6, 6>(GYRO, GYRO).copy_from(&state.bias_covariance);
-        covariance.fixed_view_mut::<3, 3>(GRAVITY, GRAVITY).copy_from(&gravity_covariance);
-        let navigation = NavigationState { world_from_body: world_from_body.pose, velocity: state.velocity };
+    /// Of a sequence, with the correlations of its pose, velocity, biases and gravity.
+    pub(crate) fn of_state(state: &SequenceState, gravity: Vector3<f64>, camera_from_body: &Isometry3<f64>) -> Self {
+        let camera = &state.world_from_camera.pose;
+        let mut to_body = StateCovariance::identity();
+        to_body.fixed_view_mut::<6, 6>(0, 0).copy_from(&product_jacobians(camera, camera_from_body).0);
+        let covariance = to_body * state.covariance * to_body.transpose();
+        let navigation = NavigationState { world_from_body: camera * camera_from_body, velocity: state.velocity };
         Self { time_s: state.time_s, state: navigation, biases: state.biases, gravity, covariance }
     }
 

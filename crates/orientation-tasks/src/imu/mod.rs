@@ -5,13 +5,11 @@ mod rest;
 
 use std::path::Path;
 
-use commands::read_inertial;
-use inertial::{CameraPose, ImuNoise, InertialSample, Mounting, SequenceOptions, estimate_sequence};
-use nalgebra::{Isometry3, Vector3};
+use commands::{Doubt, DoubtKind, InertialUnit, read_inertial};
+use inertial::{CameraPose, Mounting, SequenceOptions, estimate_sequence};
 use orientation::TimedPose;
 use pipeline::survey::StationPose;
 use pipeline::{Error, Result};
-use range_io::tables::{ImuSample, read_imu};
 
 use crate::camera::SurveyCamera;
 use crate::known::Known;
@@ -27,25 +25,25 @@ const SEQUENCE: usize = 4;
 const GROWTH: usize = 12;
 
 pub(crate) fn orient(camera: &SurveyCamera, known: Option<&Path>) -> Result<Outcome> {
-    let (samples, camera_from_body) = read_unit(camera)?;
+    let unit = read_unit(camera)?;
+    let InertialUnit { samples, camera_from_body, noise } = &unit;
     let mut stations = camera.timed_stations()?;
     stations.sort_by(|a, b| a.1.total_cmp(&b.1));
     let known = Known::read(camera, known)?;
-    let noise = ImuNoise::default();
-    let anchors = if known.poses.len() >= SEQUENCE {
-        of_sequence(camera, &known, &samples, &camera_from_body)?
-    } else {
-        let first = known.poses.first().copied();
-        let first = first.ok_or_else(|| wrong("no pose is known to begin with"))?;
-        let start = rest::at_rest(&samples, &first, &camera_from_body, &noise).map_err(|words| wrong(&words))?;
-        vec![start]
-    };
     let mut summary = OrientSummary {
         datum: format!(
             "the frame of the known poses (the first of station {})",
             known.names.first().cloned().unwrap_or_default()
         ),
         ..OrientSummary::default()
+    };
+    let anchors = if known.poses.len() >= SEQUENCE {
+        of_sequence(camera, &known, &unit, &mut summary)?
+    } else {
+        let first = known.poses.first().copied();
+        let first = first.ok_or_else(|| wrong("no pose is known to begin with"))?;
+        let start = rest::at_rest(samples, &first, camera_from_body, noise).map_err(|words| wrong(&words))?;
+        vec![start]
     };
     summary.findings.extend(known.assumed());
     let (mut placed, mut growth) = (Vec::new(), Vec::new());
@@ -56,7 +54,7 @@ pub(crate) fn orient(camera: &SurveyCamera, known: Option<&Path>) -> Result<Outc
             summary.not_oriented.push(NotOriented { station: name, reason });
             continue;
         };
-        match anchor.camera_at(&samples, time_s, &camera_from_body, &noise) {
+        match anchor.camera_at(samples, time_s, camera_from_body, noise) {
             Ok(found) => {
                 let pose = StationPose { world_from_camera: found.pose, covariance: Some(found.covariance) };
                 let station = Placed::new(&name, Some(time_s), pose);
@@ -94,34 +92,36 @@ fn worth(growth: &[SigmaAtTime]) -> Option<String> {
     ))
 }
 
-/// Samples, and the pose of the unit's axes in the camera's: what the survey names, or `imu.csv` in its folder.
-fn read_unit(camera: &SurveyCamera) -> Result<(Vec<InertialSample>, Isometry3<f64>)> {
-    let (samples, mounting) = match read_inertial(&camera.survey, &camera.root)? {
-        Some(named) => named,
-        None => (read_imu(camera.root.join(FILE))?, Isometry3::identity()),
-    };
-    let sample = |sample: ImuSample| InertialSample {
-        timestamp_s: sample.timestamp_s,
-        angular_rate: Vector3::from(sample.angular_rate),
-        specific_force: Vector3::from(sample.acceleration),
-    };
-    Ok((samples.into_iter().map(sample).collect(), mounting))
+/// What the survey names, or `imu.csv` in its folder.
+fn read_unit(camera: &SurveyCamera) -> Result<InertialUnit> {
+    match read_inertial(&camera.survey, &camera.root)? {
+        Some(named) => Ok(named),
+        None => InertialUnit::read(&camera.root.join(FILE)),
+    }
 }
 
 /// States at the known poses.
 fn of_sequence(
     camera: &SurveyCamera,
     known: &Known,
-    samples: &[InertialSample],
-    camera_from_body: &Isometry3<f64>,
+    unit: &InertialUnit,
+    summary: &mut OrientSummary,
 ) -> Result<Vec<Anchor>> {
     let poses: Vec<CameraPose> =
         known.poses.iter().map(|TimedPose { time_s, pose }| CameraPose { time_s: *time_s, pose: *pose }).collect();
-    let options = SequenceOptions { mounting: Mounting::Known(*camera_from_body), ..SequenceOptions::default() };
+    let InertialUnit { samples, camera_from_body, noise } = unit;
+    let mounting = Mounting::Known(*camera_from_body);
+    let options = SequenceOptions { noise: *noise, mounting, ..SequenceOptions::default() };
     let found = estimate_sequence(&poses, samples, &options)
         .map_err(Error::estimation("orientation by an inertial unit", &camera.root))?;
-    let gravity = (found.gravity, found.gravity_covariance);
-    Ok(found.states.iter().map(|state| Anchor::of_state(state, gravity, camera_from_body)).collect())
+    summary.doubts.extend(found.contradicting.iter().filter_map(|&interval| {
+        let [before, after] = [known.names.get(interval)?, known.names.get(interval + 1)?];
+        let words = format!(
+            "between {before} and {after} the unit measured another motion than their known poses have: its samples there took no part"
+        );
+        Some(Doubt::about(DoubtKind::Contradiction, after, words))
+    }));
+    Ok(found.states.iter().map(|state| Anchor::of_state(state, found.gravity, camera_from_body)).collect())
 }
 
 fn wrong(message: &str) -> Error {

@@ -1,11 +1,11 @@
 //! A unit at rest: its rates are their bias, its forces gravity.
 
-use inertial::{Biases, ImuNoise, InertialSample, NavigationState, Rest, rest};
+use inertial::{Biases, ImuNoise, InertialSample, NavigationState, Rest, StateCovariance, rest};
 use nalgebra::{Isometry3, Matrix3, SMatrix, Vector3};
 use orientation::TimedPose;
 use rigid_pose::Uncertain;
 
-use crate::imu::anchor::{ACCEL, Anchor, GRAVITY, GYRO, StateCovariance, VELOCITY};
+use crate::imu::anchor::{ACCEL, Anchor, GRAVITY, GYRO, VELOCITY};
 
 /// Velocity that passes for rest, m/s: a tripod on a floor.
 const VELOCITY_SIGMA: f64 = 1e-3;

@@ -84,6 +84,25 @@ impl Span {
         })
     }
 
+    /// The carrier at a time as [`Span::at`] has it, and how it moves there by poses up to half of `baseline_s` before and after, as
+    /// far as no gap breaks them: between neighbours noise may move it more than its motion.
+    pub(crate) fn moving(carrier: &[TimedPose], time_s: f64, max_gap_s: f64, baseline_s: f64) -> Option<Self> {
+        let near = Self::at(carrier, time_s, max_gap_s)?;
+        let now = near.pose(time_s);
+        let Some([first, last]) = ends(carrier, time_s, max_gap_s, baseline_s) else { return Some(near) };
+        let seconds = last.time_s - first.time_s;
+        let (a, b) = (&first.pose.pose, &last.pose.pose);
+        let turn = a.rotation * (a.rotation.inverse() * b.rotation).scaled_axis() / seconds;
+        Some(Self {
+            start_s: time_s,
+            start: now.pose,
+            velocity: (b.translation.vector - a.translation.vector) / seconds,
+            rate: now.pose.rotation.inverse() * turn,
+            covariances: [now.covariance; 2],
+            seconds: f64::INFINITY,
+        })
+    }
+
     /// The pose at a time, with its covariance; the errors of both poses are taken as independent.
     pub(crate) fn pose(&self, time_s: f64) -> Uncertain {
         let since = time_s - self.start_s;
@@ -97,4 +116,25 @@ impl Span {
             covariance: if whole { before } else { before * (1.0 - share).powi(2) + after * share * share },
         }
     }
+}
+
+/// First and last pose of the carrier that a motion is taken from: around a time, apart by `baseline_s` at most or neighbours, with no
+/// gap between them. `None` where the time lies between no two of them.
+pub(crate) fn ends(carrier: &[TimedPose], time_s: f64, max_gap_s: f64, baseline_s: f64) -> Option<[&TimedPose; 2]> {
+    let after = carrier.partition_point(|pose| pose.time_s <= time_s);
+    let joined = |pair: &[TimedPose]| pair[1].time_s - pair[0].time_s <= max_gap_s;
+    if after == 0 || after == carrier.len() || !joined(&carrier[after - 1..=after]) {
+        return None;
+    }
+    let (mut first, mut last) = (after - 1, after);
+    while first > 0 && carrier[first - 1].time_s >= time_s - 0.5 * baseline_s && joined(&carrier[first - 1..=first]) {
+        first -= 1;
+    }
+    while last + 1 < carrier.len()
+        && carrier[last + 1].time_s <= time_s + 0.5 * baseline_s
+        && joined(&carrier[last..=last + 1])
+    {
+        last += 1;
+    }
+    Some([&carrier[first], &carrier[last]])
 }

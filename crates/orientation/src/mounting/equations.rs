@@ -4,25 +4,24 @@ use adjust::{EvaluationFailure, Parameters, Real, ResidualFunction};
 use nalgebra::{Isometry3, Matrix6, Vector3};
 use rigid_pose::{Uncertain, product_jacobians, symmetrised};
 
-use crate::mounting::carrier::{Span, TimedPose};
+use crate::mounting::carrier::Span;
 
 /// What the camera saw at one moment: `target_from_camera = world_from_target⁻¹ · world_from_carrier · carrier_from_camera`.
 /// Blocks: `carrier_from_camera`, `world_from_target`, time offset (second).
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct PoseEquations<'c> {
-    pub(crate) carrier: &'c [TimedPose],
-    pub(crate) max_gap_s: f64,
+pub(crate) struct PoseEquations {
+    /// The carrier around that moment, by the offset of the guess.
+    pub(crate) span: Span,
     pub(crate) time_s: f64,
     pub(crate) target_from_camera: Isometry3<f64>,
 }
 
 type Triple<T> = [T; 3];
 
-impl ResidualFunction<6> for PoseEquations<'_> {
+impl ResidualFunction<6> for PoseEquations {
     fn residual<T: Real>(&self, parameters: &Parameters<'_, T>) -> Result<[T; 6], EvaluationFailure> {
         let (mounting, target, [offset]) = (parameters.pose(0)?, parameters.pose(1)?, parameters.values(2)?);
-        let span = Span::at(self.carrier, self.time_s + offset.value(), self.max_gap_s)
-            .ok_or_else(|| EvaluationFailure::new("the time lies outside the carrier's trajectory"))?;
+        let span = &self.span;
         let since = offset + (self.time_s - span.start_s);
         let rotation = span.start.rotation.to_rotation_matrix().into_inner();
         let turned = |vector: Triple<T>| {

@@ -6,7 +6,7 @@ use rigid_pose::{Uncertain, pose_difference};
 use statistics::{chi_squared_limit, upper_median};
 
 use crate::mounting::carrier::{Span, TimedPose, check};
-use crate::mounting::clocks::best_offset;
+use crate::mounting::clocks::{baseline, best_offset};
 use crate::mounting::closed_form::{Motion, from_rotations, motions, with_lever_arm};
 use crate::mounting::determined::{Undetermined, open_lever_arm};
 use crate::mounting::equations::{KnownLeverArm, PoseEquations, covariance};
@@ -20,8 +20,13 @@ const NEEDED: usize = 3;
 const LEVEL: f64 = 0.001;
 /// Squares beyond so many times the limit contradict a mounting that three noisy poses make.
 const ROUGH: f64 = 25.0;
-/// Solutions with covariances of the solution before; the second changes them by a share of their own error.
+/// Solutions with covariances of the solution before, at least; the second changes them by a share of their own error.
 const PASSES: usize = 2;
+/// And at most, of which each takes the carrier's poses at the time offset of the one before.
+const MOST_PASSES: usize = 20;
+/// An offset is settled that changes by less than so many of its standard deviations. Within that the carrier moves evenly; less would
+/// follow the noise of the poses around each time, which differs from offset to offset.
+const SETTLED: f64 = 1.0;
 /// Largest standard deviation of the camera's rotation, radian: beyond, a linearisation does not describe it.
 const WEAKEST_TURN: f64 = 0.1;
 
@@ -67,14 +72,22 @@ pub fn estimate_mounting(carrier: &[TimedPose], camera: &[TimedPose], options: &
         TimeOffset::Known(offset_s) => offset_s,
         TimeOffset::Within(most_s) => best_offset(carrier, camera, most_s, options.max_gap_s),
     };
-    let moments = Moments { carrier, camera, options };
+    let moments = Moments { carrier, camera, options, baseline_s: None };
     let covered: Vec<usize> = (0..camera.len()).filter(|&index| moments.at(index, offset_s).is_some()).collect();
     if covered.len() < NEEDED {
         return Err(Error::TooFewPoses { found: covered.len(), needed: NEEDED });
     }
     let start = moments.start(&covered, offset_s)?;
+    let baseline_s = moments.baseline(&covered, offset_s)?;
+    let moments = Moments { baseline_s, ..moments };
     let estimate = moments.settled(&covered, start)?;
     moments.result(&covered, &estimate)
+}
+
+/// Variances of a position and of a rotation, carrier and camera together, of each pose.
+fn variances(both: &[(Uncertain, &Uncertain)]) -> [Vec<f64>; 2] {
+    let variance = |pose: &Uncertain, at: usize| pose.covariance.fixed_view::<3, 3>(at, at).trace() / 3.0;
+    [0, 3].map(|at| both.iter().map(|(a, b)| (variance(a, at) + variance(b, at)).max(f64::MIN_POSITIVE)).collect())
 }
 
 /// A mounting on the way.
@@ -98,6 +111,8 @@ struct Moments<'a> {
     carrier: &'a [TimedPose],
     camera: &'a [TimedPose],
     options: &'a MountingOptions,
+    /// Seconds over which the carrier's motion is taken where the time offset is to be found.
+    baseline_s: Option<f64>,
 }
 
 impl Moments<'_> {
@@ -122,21 +137,29 @@ impl Moments<'_> {
         square.unwrap_or(f64::INFINITY)
     }
 
+    /// Over which time the carrier's motion is taken; `None` where the clocks are known.
+    fn baseline(&self, covered: &[usize], offset_s: f64) -> Result<Option<f64>> {
+        let TimeOffset::Within(_) = self.options.time_offset else { return Ok(None) };
+        let poses = |index: &usize| Some((self.at(*index, offset_s)?, &self.camera[*index].pose));
+        let both: Vec<(Uncertain, &Uncertain)> = covered.iter().filter_map(poses).collect();
+        let times_s: Vec<f64> = covered.iter().map(|&index| self.camera[index].time_s + offset_s).collect();
+        let variances = variances(&both).map(|mut all| upper_median(&mut all));
+        let found = baseline(self.carrier, &times_s, self.options.max_gap_s, variances);
+        found.map(Some).ok_or_else(|| Error::UndeterminedMounting { undetermined: vec![Undetermined::TimeOffset] })
+    }
+
     /// The mounting from a closed form that most poses agree with.
     fn start(&self, covered: &[usize], offset_s: f64) -> Result<Guess> {
         let poses = |index: &usize| Some((self.at(*index, offset_s)?, &self.camera[*index].pose));
         let both: Vec<(Uncertain, &Uncertain)> = covered.iter().filter_map(poses).collect();
         let pairs: Vec<[Isometry3<f64>; 2]> =
             both.iter().map(|(carrier, camera)| [carrier.pose, camera.pose]).collect();
-        let variance = |pose: &Uncertain, at: usize| pose.covariance.fixed_view::<3, 3>(at, at).trace() / 3.0;
-        let of =
-            |at: usize| both.iter().map(|(a, b)| (variance(a, at) + variance(b, at)).max(f64::MIN_POSITIVE)).collect();
-        let (shifts, turns): (Vec<f64>, Vec<f64>) = (of(0), of(3));
+        let [shifts, turns] = variances(&both);
         let open = open_lever_arm(&pairs, &turns);
         if let (Some(open), None) = (open, &self.options.lever_arm) {
             return Err(Error::UndeterminedMounting { undetermined: vec![open] });
         }
-        let variances = [upper_median(&mut shifts.clone()), upper_median(&mut turns.clone())];
+        let variances = [shifts, turns.clone()].map(|mut all| upper_median(&mut all));
         let closed = |motions: &[Motion]| match (&self.options.lever_arm, open) {
             (Some(lever), Some(_)) => with_lever_arm(motions, lever, variances),
             _ => from_rotations(motions),
@@ -212,14 +235,25 @@ impl Moments<'_> {
         loop {
             let (adjustment, blocks, _) = self.adjustment(covered, used, &guess)?;
             let solution = adjustment.solve(&self.options.solve)?;
+            let before_s = guess.offset_s;
             guess = Guess {
                 carrier_from_camera: solution.pose(blocks[0])?,
                 world_from_target: solution.pose(blocks[1])?,
                 offset_s: solution.values(blocks[2])?.first().copied().unwrap_or(f64::NAN),
             };
             pass += 1;
-            if pass == PASSES {
+            let settled = match self.baseline_s {
+                None => true,
+                Some(_) => {
+                    let sigma_s = solution.standard_deviations(blocks[2], Scale::Prior)?;
+                    sigma_s.iter().all(|sigma_s| (guess.offset_s - before_s).abs() <= SETTLED * sigma_s)
+                }
+            };
+            if pass >= PASSES && settled {
                 return Ok(Estimate { guess, solution, blocks, used: used.to_vec() });
+            }
+            if pass == MOST_PASSES {
+                return Err(Error::UndeterminedMounting { undetermined: vec![Undetermined::TimeOffset] });
             }
         }
     }
@@ -242,13 +276,11 @@ impl Moments<'_> {
         let group = adjustment.add_group("poses");
         let mut observations = Vec::with_capacity(covered.len());
         for (&index, _) in covered.iter().zip(used).filter(|(_, used)| **used) {
-            let Some((_, covariance)) = self.misfit(index, guess) else { continue };
-            let equations = PoseEquations {
-                carrier: self.carrier,
-                max_gap_s: self.options.max_gap_s,
-                time_s: self.camera[index].time_s,
-                target_from_camera: self.camera[index].pose.pose,
-            };
+            let time_s = self.camera[index].time_s;
+            let baseline_s = self.baseline_s.unwrap_or(0.0);
+            let span = Span::moving(self.carrier, time_s + guess.offset_s, self.options.max_gap_s, baseline_s);
+            let (Some((_, covariance)), Some(span)) = (self.misfit(index, guess), span) else { continue };
+            let equations = PoseEquations { span, time_s, target_from_camera: self.camera[index].pose.pose };
             let equations = Differentiated::new(&adjustment, blocks, equations).map_err(adjust::Error::from)?;
             observations.push(adjustment.add_observation(group, equations, &Covariance::from_matrix(&covariance))?);
         }

@@ -129,6 +129,19 @@ pub fn observed(seed: u64, gross_error_share: f64) -> Rig {
     Rig { cameras: (0..3).map(camera).collect() }
 }
 
+/// The same rig whose right camera sat so far aside at epoch E07, metre.
+#[allow(dead_code)] // each of the programs that share this file uses what it needs
+pub fn knocked(seed: u64, aside_m: f64) -> Rig {
+    let mut rig = observed(seed, 0.0);
+    let mut moved = truth(1);
+    for station in moved.stations.iter_mut().filter(|station| station.name == "E07") {
+        let aside = Isometry3::translation(aside_m, 0.0, 0.0);
+        station.world_from_camera = station.world_from_camera.map(|pose| pose * aside);
+    }
+    rig.cameras[1].network.sightings = simulate_sightings(&moved, &sightings(seed, 1)).unwrap().sightings;
+    rig
+}
+
 /// How a camera sees targets, without gross errors.
 pub fn sightings(seed: u64, index: usize) -> SightingOptions {
     SightingOptions {

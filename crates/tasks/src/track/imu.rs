@@ -2,12 +2,10 @@
 
 use std::path::Path;
 
-use commands::INERTIAL_DATA;
+use commands::{INERTIAL_DATA, InertialUnit, read_inertial};
 use pipeline::{Error, Result};
 use range_io::survey::Survey;
 use tracking::{ImuIntegrator, ImuOptions, InertialSample, MotionPrior, TrackedPose};
-
-use crate::inertial_unit;
 
 /// Motions between frames from an inertial unit.
 pub(crate) struct Inertial {
@@ -19,8 +17,17 @@ pub(crate) struct Inertial {
 impl Inertial {
     /// Reads what the survey names; `None` where it names nothing.
     pub(crate) fn read(survey: &Survey, root: &Path) -> Result<Option<Self>> {
-        let Some((samples, camera_from_body)) = inertial_unit::read(survey, root)? else { return Ok(None) };
-        let options = ImuOptions { camera_from_body, ..ImuOptions::default() };
+        let Some(InertialUnit { samples, camera_from_body, noise }) = read_inertial(survey, root)? else {
+            return Ok(None);
+        };
+        let options = ImuOptions {
+            camera_from_body,
+            gyro_noise: noise.gyro_density,
+            accel_noise: noise.accel_density,
+            gyro_walk: noise.gyro_walk,
+            accel_walk: noise.accel_walk,
+            ..ImuOptions::default()
+        };
         Ok(Some(Self { samples, options, integrator: None }))
     }
 

@@ -14,11 +14,11 @@ use crate::preparation::grid::STRIDES;
 use crate::registration::quality::{Cell, Hold, Verdict};
 use crate::shared_error::Sighting;
 use icp_registration::quality::Residuals;
-use icp_registration::{DegeneracyPolicy, IcpResult, StopReason};
+use icp_registration::{DegeneracyPolicy, IcpResult, StopReason, TUKEY};
 use rigid_pose::{Centred, is_finite, pose_difference, step_pose, symmetrised};
 
-/// Biweight with 95 % efficiency on normally distributed residuals.
-pub(crate) const BIWEIGHT: f32 = 4.685;
+/// Of the biweight.
+pub(crate) const BIWEIGHT: f32 = TUKEY as f32;
 /// Residuals from which scales are taken.
 pub(crate) const SAMPLE: usize = 2048;
 /// Iterations on each level but the last.

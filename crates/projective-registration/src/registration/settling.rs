@@ -13,10 +13,13 @@ use crate::registration::quality::{Hold, Verdict};
 use icp_registration::StopReason;
 use icp_registration::quality::Residuals;
 
+/// Length of a step over its standard deviation, as the weights of the pairs tell it, below which all nodes take part instead
+/// of a quarter. Their poses differ by about two of these anyway. It decides on time alone: see docs/benchmarks.md.
+const COARSE_FRACTION: f64 = 1.0;
 /// Steps before which the reach of the kernel is set.
 const NARROWINGS: usize = 3;
 /// Steps after which it is first seen whether the pose has got anywhere, and then after twice as many as before: where nodes
-/// change back and forth between planes, steps never become short.
+/// change back and forth between planes, steps never become short. A power of 2; it decides on time alone.
 const WANDERING: usize = 4;
 
 impl FrameAligner {
@@ -37,9 +40,9 @@ impl FrameAligner {
         }
         track.rules.extra_variance = 0.0;
         let mut narrowings = NARROWINGS;
-        if let Some(fraction) = self.options.noise_fraction {
-            self.iterate(track, source, target, finest_part(source), fraction, &mut narrowings)?;
-        }
+        // A quarter of the nodes first: only the last steps need all.
+        let fraction = self.options.noise_fraction.unwrap_or(COARSE_FRACTION);
+        self.iterate(track, source, target, finest_part(source), fraction, &mut narrowings)?;
         self.iterate(track, source, target, blocks, self.options.noise_fraction.unwrap_or(0.0), &mut narrowings)
     }
 

@@ -61,7 +61,8 @@ impl RobustKernel {
 }
 
 const HUBER: f64 = 1.345;
-const TUKEY: f64 = 4.685;
+/// Standard deviations from which on the biweight gives no weight: 95 % efficiency on normally distributed residuals.
+pub const TUKEY: f64 = 4.685;
 const CAUCHY: f64 = 2.385;
 const GEMAN_MCCLURE: f64 = 3.787;
 const WELSCH: f64 = 2.985;

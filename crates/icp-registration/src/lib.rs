@@ -12,7 +12,7 @@ mod voxels;
 
 pub use error::Error;
 pub use icp::{Alternative, IcpOptions, Levels, Metric, Registration, Selection, Starts, align};
-pub use kernel::RobustKernel;
+pub use kernel::{RobustKernel, TUKEY};
 pub use nalgebra;
 pub use point_cloud::{self, Cloud};
 pub use quality::{MotionKind, UndeterminedMotion};

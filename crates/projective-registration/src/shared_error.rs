@@ -14,6 +14,7 @@ use crate::partners::map::{Partner, Partners};
 use crate::partners::pairs::with_locate;
 use crate::preparation::bits::{median_of_bits, positive_bits};
 use crate::preparation::frame::OrganisedFrame;
+use icp_registration::TUKEY;
 use rigid_pose::Centred;
 
 /// Largest degree of the polynomials. Higher ones reach poses less (a tenth of the second degree on frames of a Kinect).
@@ -30,9 +31,7 @@ pub type ByField = SMatrix<f64, 6, COEFFICIENTS>;
 
 /// Nodes by which the influence on a registration is told.
 const SAMPLE: usize = 2500;
-/// Biweight with 95 % efficiency on normally distributed residuals.
-const BIWEIGHT: f64 = 4.685;
-/// Widening of it: the field is largest where few nodes lie, at the rim, and its squares there are what is estimated.
+/// Widening of the biweight: the field is largest where few nodes lie, at the rim, and its squares there are what is estimated.
 const WIDE: f64 = 2.0;
 /// Standard deviations by which squares must exceed what noise lets expect (of one degree of freedom: 4 % by chance).
 const SIGNIFICANCE: f64 = 2.0;
@@ -303,7 +302,7 @@ fn reduced(sightings: &[Sighting], to_tangent: &Matrix6<f64>, scratch: &mut Vec<
     // Neighbours see the same shared error: their difference is the random part, twice.
     let steps = sightings.windows(2).filter(|pair| pair[1].follows).map(|pair| pair[1].residual - pair[0].residual);
     let random = (scale(steps, scratch)? / 2.0_f64.sqrt()).max(LEAST_RANDOM);
-    let reach = WIDE * BIWEIGHT * scale(sightings.iter().map(|s| s.residual), scratch)?.max(random);
+    let reach = WIDE * TUKEY * scale(sightings.iter().map(|s| s.residual), scratch)?.max(random);
     let (mut matrix, mut cross, mut gradient) = (Matrix6::zeros(), ByField::zeros(), Vector6::zeros());
     let (mut normal, mut right) = (FieldMatrix::zeros(), Field::zeros());
     let (mut scale, mut scale_right, mut scale_cross, mut scale_field) = (0.0, 0.0, Vector6::zeros(), Field::zeros());

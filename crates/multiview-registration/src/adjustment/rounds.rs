@@ -6,9 +6,10 @@ use statistics::mad_scale;
 
 use crate::adjustment::network::{Network, State, largest_step};
 use crate::error::{Error, Result};
-use crate::planes::contacts::{Contact, IN_PLACE, Reach, TURNED, partners};
+use crate::planes::contacts::{Contact, Reach, TURNED, partners};
 use crate::planes::reduction::{PairContacts, Reduced, Scene, Weighting, reduce};
 use crate::surfaces::patches::Surface;
+use crate::surfaces::plane_fit::SAME_DIRECTION;
 use crate::surfaces::point_model::PointModel;
 use crate::surfaces::points::StationPoints;
 use icp_registration::RobustKernel;
@@ -190,8 +191,8 @@ impl WideRounds<'_> {
             levels.push(Reach { across_m, candidates: CANDIDATES, cosine: TURNED });
             across_m /= 2.0;
         }
-        levels.push(Reach { across_m: size_m, candidates: CANDIDATES, cosine: IN_PLACE });
-        levels.push(Reach { across_m: size_m / 2.0, candidates: 1, cosine: IN_PLACE });
+        levels.push(Reach { across_m: size_m, candidates: CANDIDATES, cosine: SAME_DIRECTION });
+        levels.push(Reach { across_m: size_m / 2.0, candidates: 1, cosine: SAME_DIRECTION });
         levels
     }
 

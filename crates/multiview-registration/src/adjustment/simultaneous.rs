@@ -7,13 +7,14 @@ use crate::adjustment::equations::Equations;
 use crate::adjustment::network::{Network, State, largest_step};
 use crate::adjustment::rounds::{Surfaces, meet};
 use crate::error::Result;
-use crate::planes::contacts::{IN_PLACE, Reach};
+use crate::planes::contacts::Reach;
 use crate::planes::elimination::{Eliminated, SharedPlaneSums, Variances, motion_of};
 use crate::planes::scatter::{Scatter, TileMean, between, tile_means, variances};
 use crate::planes::shared_planes::{SharedPlane, shared_planes};
 use crate::planes::sightings::{Gate, sightings};
 use crate::planes::sums::Sums;
 use crate::planes::wide_errors::Residuals;
+use crate::surfaces::plane_fit::SAME_DIRECTION;
 use crate::surfaces::points::StationPoints;
 use icp_registration::RobustKernel;
 use rigid_pose::{pose_difference, step_pose};
@@ -111,7 +112,7 @@ impl Finish<'_> {
             if let Some(off_m) = off_m {
                 let count = state.poses.len();
                 let all: Vec<(usize, usize)> = (0..count).flat_map(|t| (t + 1..count).map(move |s| (t, s))).collect();
-                let reach = Reach { across_m: size_m / 4.0, candidates: 1, cosine: IN_PLACE };
+                let reach = Reach { across_m: size_m / 4.0, candidates: 1, cosine: SAME_DIRECTION };
                 let pairs_in_contact = meet(&scene.surfaces, &state.poses, &all, reach)?;
                 known = shared_planes(&scene.surfaces, &state.poses, &pairs_in_contact, off_m);
             }

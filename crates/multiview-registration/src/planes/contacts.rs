@@ -7,7 +7,7 @@ use crate::surfaces::patches::Surface;
 
 /// How far beside a patch its partner may be, in patches: half the diagonal of a cell. Farther ones would be partners
 /// from beyond the rim.
-const BESIDE: f64 = 0.75;
+pub(crate) const BESIDE: f64 = 0.75;
 
 /// Two patches that show the same piece of a surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -31,10 +31,9 @@ pub(crate) struct Reach {
     pub cosine: f64,
 }
 
-/// Cosines while stations may be turned (37 degrees), and once they are in place (15): patches across a crease, whose
-/// normals lie between those of two walls, would say where a wall ends.
+/// Cosine while stations may be turned (37 degrees). Once they are in place it is that of one plane: patches across a crease,
+/// whose normals lie between those of two walls, would say where a wall ends.
 pub(crate) const TURNED: f64 = 0.8;
-pub(crate) const IN_PLACE: f64 = 0.966;
 
 /// The partners of the patches of one station (`asking`) among those of another, `to_asked` being
 /// `asked_from_asking`: pairs of indices.

@@ -8,16 +8,11 @@ use crate::planes::contacts::Contact;
 use crate::planes::reduction::PairContacts;
 use crate::planes::tiles::Tiles;
 use crate::surfaces::patches::{Surface, axes};
-use crate::surfaces::plane_fit::Moments;
+use crate::surfaces::plane_fit::{Moments, SAME_DIRECTION};
+use crate::surfaces::regions::{OFF_PLANE, ROUGHER};
 
-/// Ratio of the scatter about the joint plane to that about the parts beyond which they are not joined.
-const ROUGHER: f64 = 1.15;
 /// How far patches of neighbouring pieces of a plane may be apart, patches.
 const BESIDE: f64 = 2.0;
-/// Standard deviations that a patch may be off a shared plane that it joins.
-const OFF_PLANE: f64 = 3.0;
-/// Cosine of the largest angle between the two (15 degrees).
-const SAME_DIRECTION: f64 = 0.966;
 
 /// A plane with what is known of its extent.
 #[derive(Debug, Clone)]

@@ -7,17 +7,16 @@ use nalgebra::{Isometry3, Matrix3, Vector3};
 use rayon::prelude::*;
 
 use crate::planes::shared_planes::SharedPlane;
-use crate::planes::sums::{FARTHEST, Sums};
+use crate::planes::sums::Sums;
 use crate::planes::tiles::Tile;
+use crate::surfaces::plane_fit::SAME_DIRECTION;
 use crate::surfaces::points::{Block, StationPoints};
-use icp_registration::RobustKernel;
+use icp_registration::{RobustKernel, TUKEY};
 
 /// Smallest cosine between ray and normal.
 const GRAZING: f64 = 0.03;
 /// Standard deviations between the ranges of two shared planes below which they are not told apart.
 const APART: f64 = 7.0;
-/// Cosine between the normals of shared planes that are one surface.
-const SAME_DIRECTION: f64 = 0.966;
 
 /// How points are given to shared planes.
 #[derive(Debug, Clone, Copy)]
@@ -144,7 +143,7 @@ impl<'a> Sighting<'a> {
         let ahead = if self.points.along_rays { *direction } else { -plane.normal };
         let cosine = plane.normal.dot(&ahead);
         let rho = plane.normal.dot(&(self.eye + direction * range_m - plane.origin));
-        if cosine > -GRAZING || rho.abs() > (FARTHEST + APART) * self.sigma(point, cosine) {
+        if cosine > -GRAZING || rho.abs() > (TUKEY + APART) * self.sigma(point, cosine) {
             return None;
         }
         // Without rays, the point is moved along the normal.
@@ -208,7 +207,7 @@ impl<'a> Sighting<'a> {
         let sigma = self.sigma(point, hit.cosine);
         let whitened = rho / sigma;
         // An unknown deviation is no weight.
-        if whitened.is_nan() || whitened.abs() > FARTHEST || !sigma.is_normal() {
+        if whitened.is_nan() || whitened.abs() > TUKEY || !sigma.is_normal() {
             return false;
         }
         let weight = self.gate.kernel.weight(whitened) / sigma.powi(2);

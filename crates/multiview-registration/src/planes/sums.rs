@@ -2,14 +2,12 @@
 
 use nalgebra::{Matrix3, Vector2, Vector3};
 
-use icp_registration::RobustKernel;
+use icp_registration::{RobustKernel, TUKEY};
 
 /// Fewest degrees of freedom that tell how much noise derivatives share with distances.
 const FEWEST_FREE: f64 = 5.0;
 /// Ratio of the spreads of a tile's points, squared, below which they lie on a line.
 const NARROW: f64 = 1e-3;
-/// Standard deviations beyond which a point is not on a shared plane.
-pub(crate) const FARTHEST: f64 = 4.685;
 
 /// Sums over the points of a station in a tile. With `φ = [1, u, v, derivatives by the shared parameters]` and the
 /// distance ρ of a point from its shared plane: `Σ w φ φᵀ` (lower triangle, row by row) and `Σ w φ ρ`.
@@ -86,7 +84,7 @@ fn share_of_fit(kernel: RobustKernel) -> f64 {
     for step in -500..=500 {
         let x = f64::from(step) / 100.0;
         let density = (-0.5 * x * x).exp();
-        let weight = if x.abs() > FARTHEST { 0.0 } else { kernel.weight(x) };
+        let weight = if x.abs() > TUKEY { 0.0 } else { kernel.weight(x) };
         all += density;
         weights += density * weight;
         left += density * weight * x * x;

@@ -11,7 +11,7 @@ use statistics::upper_median;
 
 use crate::error::{Error, Result};
 use crate::surfaces::grouping::group;
-use crate::surfaces::plane_fit::{Moments, Plane};
+use crate::surfaces::plane_fit::{Moments, Plane, SAME_DIRECTION};
 use crate::surfaces::regions::{Patches, Region};
 use point_cloud::Cloud;
 use point_cloud::NeighbourTree;
@@ -22,8 +22,6 @@ const FEWEST_POINTS: usize = 6;
 const NEIGHBOURS: usize = 13;
 /// Reach of the neighbourhood, in patches.
 const REACH: f64 = 1.8;
-/// Cosine of the largest angle between neighbours on one plane (15 degrees).
-const SAME_PLANE: f64 = 0.966;
 /// Points farther from their patch than this multiple of the median distance are left out of it.
 const GROSS: f64 = 5.0;
 /// The same for the angle (its sine) between the normals of point and patch, and an angle that is always allowed.
@@ -241,7 +239,7 @@ fn patch(index: usize, fits: &[(Moments, Plane)], centres: &[Point3<f64>], neigh
         let (moments, other) = &fits[neighbour];
         let across = plane.normal.dot(&(centres[neighbour] - centres[index])).abs();
         let tolerance = 3.0 * (plane.variance.max(other.variance)).sqrt();
-        if plane.normal.dot(&other.normal).abs() >= SAME_PLANE && across <= tolerance {
+        if plane.normal.dot(&other.normal).abs() >= SAME_DIRECTION && across <= tolerance {
             union.join(moments);
         }
     }

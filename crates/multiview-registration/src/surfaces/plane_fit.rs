@@ -4,6 +4,8 @@ use nalgebra::{Isometry3, Matrix3, Vector3};
 
 use point_cloud::{eigenvalues3, eigenvector3};
 
+/// Cosine of the largest angle between normals of one plane (15 degrees).
+pub(crate) const SAME_DIRECTION: f64 = 0.966;
 /// Smallest ratio of the two variances within a plane: a third of the length in width.
 const NARROWEST: f64 = 0.1;
 

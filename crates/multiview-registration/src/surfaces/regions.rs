@@ -5,14 +5,12 @@
 
 use nalgebra::{Point3, Vector3};
 
-use crate::surfaces::plane_fit::{Moments, Plane};
+use crate::surfaces::plane_fit::{Moments, Plane, SAME_DIRECTION};
 
-/// Standard deviations that a patch may be off the plane of its region.
-const OFF_PLANE: f64 = 3.0;
-/// Cosine of the largest angle between a patch and its region (15 degrees).
-const SAME_DIRECTION: f64 = 0.966;
-/// Ratio of the scatter about the plane of a region to that about its patches beyond which it is no plane.
-const ROUGHER: f64 = 1.15;
+/// Standard deviations that a patch may be off the plane of its region, or of all stations.
+pub(crate) const OFF_PLANE: f64 = 3.0;
+/// Ratio of the scatter about a joint plane to that about its parts beyond which it is no plane.
+pub(crate) const ROUGHER: f64 = 1.15;
 /// Fewest patches of a region: smaller ones have no better normal than neighbours give.
 const FEWEST: usize = 5;
 

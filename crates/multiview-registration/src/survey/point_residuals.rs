@@ -4,11 +4,11 @@ use nalgebra::Point3;
 use rayon::prelude::*;
 
 use crate::error::{Error, Result};
+use crate::planes::contacts::BESIDE;
 use crate::survey::registration::{StationRegistration, SurfacePair};
 use point_cloud::check_points;
 
-/// Part of a patch that a point may be off it along and across.
-const BESIDE: f64 = 0.75;
+/// Part of a patch that a point may be off it across.
 const ACROSS: f64 = 0.5;
 
 impl StationRegistration {

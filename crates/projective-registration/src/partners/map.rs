@@ -302,7 +302,8 @@ fn partner<L: Locate>(
     sigma: f32,
 ) -> Option<Partner> {
     let grid = &target.grid;
-    let [col, row] = locate.node(-p[0] / p[2], -p[1] / p[2]).map(|x| x + 0.5);
+    let [col, row] = locate.node(-p[0] / p[2], -p[1] / p[2]);
+    let (col, row) = (col + 0.5, row + 0.5);
     // NaN fails.
     if !(p[2] < 0.0 && col >= 0.0 && row >= 0.0 && col < grid.cols as f32 && row < grid.rows as f32) {
         return None;

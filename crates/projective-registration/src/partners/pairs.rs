@@ -4,6 +4,7 @@
 // Without branches, all lanes are compared at once.
 #![allow(clippy::needless_bitwise_bool)]
 // Lanes lie side by side: with an index, loops read as their formulas and have the same length everywhere.
+// Arrays are written out: `map` over them stays a call, of which a pair makes dozens.
 #![allow(clippy::needless_range_loop)]
 
 use nalgebra::{Isometry3, Vector3};
@@ -48,7 +49,8 @@ pub(crate) struct Tabled<'a> {
 impl Locate for Tabled<'_> {
     #[inline(always)]
     fn node(&self, u: f32, v: f32) -> [f32; 2] {
-        self.table.read(u, v).map(|p| p * self.scale + self.shift)
+        let [col, row] = self.table.read(u, v);
+        [col * self.scale + self.shift, row * self.scale + self.shift]
     }
 }
 
@@ -233,7 +235,8 @@ impl<'a> Moved<'a> {
         let (mut node, mut outside) = ([0; BLOCK], [0.0; BLOCK]);
         for k in 0..BLOCK {
             let per_depth = -1.0 / p[2][k];
-            let [col, row] = locate.node(p[0][k] * per_depth, p[1][k] * per_depth).map(|x| x + 0.5);
+            let [col, row] = locate.node(p[0][k] * per_depth, p[1][k] * per_depth);
+            let (col, row) = (col + 0.5, row + 0.5);
             // NaN fails.
             let inside = (p[2][k] < 0.0) & (col >= 0.0) & (row >= 0.0) & (col < cols) & (row < rows);
             outside[k] = if inside { 0.0 } else { f32::NAN };

@@ -159,7 +159,7 @@ pub fn add(sums: &mut [[f32; BLOCK]; SUMS], pairs: &Pairs, row: &[[f32; BLOCK]; 
 pub(crate) fn derivatives(lever: &[[f32; BLOCK]; 3], normal: &[[f32; BLOCK]; 3]) -> [[f32; BLOCK]; 6] {
     let mut rows = [normal[0], normal[1], normal[2], [0.0; BLOCK], [0.0; BLOCK], [0.0; BLOCK]];
     for l in 0..BLOCK {
-        let (q, n) = ([0, 1, 2].map(|i| lever[i][l]), [0, 1, 2].map(|i| normal[i][l]));
+        let (q, n) = ([lever[0][l], lever[1][l], lever[2][l]], [normal[0][l], normal[1][l], normal[2][l]]);
         rows[3][l] = q[1] * n[2] - q[2] * n[1];
         rows[4][l] = q[2] * n[0] - q[0] * n[2];
         rows[5][l] = q[0] * n[1] - q[1] * n[0];

@@ -75,8 +75,9 @@ impl NodeRow<'_> {
         for k in 0..count {
             let mut sums = [0.0; 5];
             for pixel in 0..bin {
-                let [w, sigma, valid, down] = [0, 1, 2, 3].map(|i| columns[i][k * bin + pixel]);
-                let terms = [w, sigma, valid, down, valid * (pixel as f32 - middle)];
+                let at = k * bin + pixel;
+                let (valid, right) = (columns[2][at], pixel as f32 - middle);
+                let terms = [columns[0][at], columns[1][at], valid, columns[3][at], valid * right];
                 for i in 0..5 {
                     sums[i] += terms[i];
                 }

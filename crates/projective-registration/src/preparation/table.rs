@@ -82,11 +82,12 @@ impl Table {
         let (a, b) = (x - c as f32, y - r as f32);
         let k = r * self.cols + c;
         let corners = [self.pixels[k], self.pixels[k + 1], self.pixels[k + self.cols], self.pixels[k + self.cols + 1]];
-        [0, 1].map(|i| {
+        let between = |i: usize| {
             let upper = corners[0][i] + a * (corners[1][i] - corners[0][i]);
             let lower = corners[2][i] + a * (corners[3][i] - corners[2][i]);
             upper + b * (lower - upper)
-        })
+        };
+        [between(0), between(1)]
     }
 
     pub(crate) fn pixel(&self, u: f64, v: f64) -> Option<[f64; 2]> {

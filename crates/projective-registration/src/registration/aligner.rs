@@ -7,28 +7,26 @@ use crate::error::{Error, Result};
 use crate::options::FrameAlignmentOptions;
 use crate::partners::pairs::Rules;
 use crate::partners::sums::{SUMS, median_residual, normal_equations};
-use crate::partners::track::{FEWEST_POINTS, Track, blocks, finest_part, is_within_noise, moved};
+use crate::partners::track::{FEWEST_POINTS, Track, blocks, is_within_noise, moved};
 use crate::preparation::blocks::Block;
 use crate::preparation::frame::OrganisedFrame;
 use crate::preparation::grid::STRIDES;
 use crate::registration::quality::{Cell, Hold, Verdict};
 use crate::shared_error::Sighting;
 use icp_registration::quality::Residuals;
-use icp_registration::{DegeneracyPolicy, IcpResult, StopReason};
+use icp_registration::{DegeneracyPolicy, IcpResult, StopReason, TUKEY};
 use rigid_pose::{Centred, is_finite, pose_difference, step_pose, symmetrised};
 
-/// Biweight with 95 % efficiency on normally distributed residuals.
-const BIWEIGHT: f32 = 4.685;
+/// Of the biweight.
+pub(crate) const BIWEIGHT: f32 = TUKEY as f32;
 /// Residuals from which scales are taken.
-const SAMPLE: usize = 2048;
+pub(crate) const SAMPLE: usize = 2048;
 /// Iterations on each level but the last.
 const COARSE_ITERATIONS: usize = 8;
 /// First steps, which are least squares over all that is in reach.
 const WIDE_ITERATIONS: usize = 3;
 /// Coarse levels end when a step is below this, in units of the radius.
 const COARSE_TOLERANCE: f64 = 1e-3;
-/// Steps on the last level before which the reach of the kernel is set.
-const NARROWINGS: usize = 3;
 
 /// Aligns `source` with `target`, starting at `guess` (both poses `target_from_source`).
 ///
@@ -53,7 +51,7 @@ pub struct FrameAligner {
     pub(crate) options: FrameAlignmentOptions,
     chunks: Vec<[f64; SUMS]>,
     pub(crate) scratch: Vec<u32>,
-    cells: Vec<Cell>,
+    pub(crate) cells: Vec<Cell>,
     pub(crate) sightings: Vec<Sighting>,
 }
 
@@ -234,67 +232,8 @@ impl FrameAligner {
         track.rules.extra_variance *= square.clamp(0.05, 1.0);
     }
 
-    /// Iterates on all points until the pose stands.
-    fn settle(
-        &mut self,
-        track: &mut Track,
-        source: &OrganisedFrame,
-        target: &OrganisedFrame,
-        hold: Hold,
-    ) -> Result<StopReason> {
-        let blocks = &source.points.blocks[..];
-        if hold == Hold::Undetermined {
-            let (moved, frame) = moved(track, source, target);
-            let limit = self.max_motion_sigma_m(&frame);
-            let verdict = Verdict::new(&moved, &track.rules, blocks, limit, Residuals::Settled, &mut self.cells)?;
-            track.free = verdict.free();
-        }
-        track.rules.extra_variance = 0.0;
-        let mut narrowings = NARROWINGS;
-        if let Some(fraction) = self.options.noise_fraction {
-            self.iterate(track, source, target, finest_part(source), fraction, &mut narrowings)?;
-        }
-        self.iterate(track, source, target, blocks, self.options.noise_fraction.unwrap_or(0.0), &mut narrowings)
-    }
-
-    /// Iterates on some nodes until a step is short, or shorter than so many standard deviations.
-    fn iterate(
-        &mut self,
-        track: &mut Track,
-        source: &OrganisedFrame,
-        target: &OrganisedFrame,
-        blocks: &[Block],
-        over_sigma: f64,
-        narrowings: &mut usize,
-    ) -> Result<StopReason> {
-        while track.iterations < self.options.max_iterations {
-            if *narrowings > 0 {
-                self.rescale(track, source, target, *narrowings == NARROWINGS);
-                *narrowings -= 1;
-            }
-            let (step, frame) = self.step(track, source, target, blocks, 0.0)?;
-            let is_short = step <= self.options.step_tolerance_m.unwrap_or(1e-5 * frame.radius_m);
-            if *narrowings == 0 && (is_short || track.over_sigma <= over_sigma) {
-                return Ok(StopReason::Converged);
-            }
-        }
-        Ok(StopReason::MaxIterations)
-    }
-
-    /// Sets the reach of the kernel from the residuals.
-    fn rescale(&mut self, track: &mut Track, source: &OrganisedFrame, target: &OrganisedFrame, first: bool) {
-        let (moved, _) = moved(track, source, target);
-        if first {
-            track.rules.reach = 10.0 * BIWEIGHT;
-        }
-        let blocks = &source.points.blocks;
-        let median = median_residual(&moved, &track.rules, blocks, SAMPLE, &mut self.scratch).unwrap_or(0.0);
-        let scale = (SIGMA_OF_MAD * median).max(0.1) as f32;
-        track.rules.reach = BIWEIGHT * scale;
-    }
-
     /// One step, and how far it moves points at the radius, metre.
-    fn step(
+    pub(crate) fn step(
         &mut self,
         track: &mut Track,
         source: &OrganisedFrame,
@@ -368,7 +307,7 @@ impl FrameAligner {
         if hold { Hold::Undetermined } else { Hold::Nothing }
     }
 
-    fn max_motion_sigma_m(&self, frame: &Centred) -> f64 {
+    pub(crate) fn max_motion_sigma_m(&self, frame: &Centred) -> f64 {
         self.options.max_motion_sigma_m.unwrap_or(frame.radius_m / 300.0)
     }
 

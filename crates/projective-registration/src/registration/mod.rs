@@ -7,4 +7,5 @@ pub(crate) mod outlines;
 pub(crate) mod places;
 pub(crate) mod quality;
 pub(crate) mod search;
+pub(crate) mod settling;
 pub(crate) mod starts;

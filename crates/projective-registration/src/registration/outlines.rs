@@ -37,24 +37,27 @@ impl<'a> Outlines<'a> {
         Self { frames: [source, target], points: [source.at_jumps(), target.at_jumps()], tolerance_m }
     }
 
-    /// Points at jumps of either frame that lie in front of planes of the other.
-    fn contradicting(&self, pose: &Isometry3<f64>) -> usize {
+    /// Points at jumps of either frame that lie in front of planes of the other; where there are more than `most`, more than that.
+    fn contradicting(&self, pose: &Isometry3<f64>, most: usize) -> usize {
         let ([source, target], tolerance_m) = (self.frames, self.tolerance_m);
-        let there = InFront { target, points: &self.points[0], pose, tolerance_m };
-        let back = InFront { target: source, points: &self.points[1], pose: &pose.inverse(), tolerance_m };
-        with_locate(target, there) + with_locate(source, back)
+        let there = with_locate(target, InFront { target, points: &self.points[0], pose, tolerance_m, most });
+        let (pose, most) = (&pose.inverse(), most.saturating_sub(there));
+        there + with_locate(source, InFront { target: source, points: &self.points[1], pose, tolerance_m, most })
     }
 
     /// How far along a motion the frames contradict each other least, in metre at the radius.
     fn least(&self, pose: &Isometry3<f64>, motion: &UndeterminedMotion) -> f64 {
         let radius_m = self.frames[0].points.radius_m;
         let places: Vec<f64> = (0..=2 * STEPS).map(|k| (k as f64 - STEPS as f64) * STEP * radius_m).collect();
-        let by_outlines = |place| self.contradicting(&along(pose, motion, place, radius_m)) as f64 / CHANCE;
-        let here = by_outlines(0.0);
+        let here = self.contradicting(pose, usize::MAX) as f64 / CHANCE;
         let against = |place: &f64| {
             let by_planes = 0.5 * (place / motion.sigma_m).powi(2);
-            // Where planes alone speak against a place more than all does against this one, it is out of the question.
-            if by_planes > here + LIMIT { f64::INFINITY } else { by_planes + by_outlines(*place) }
+            // What more speaks against than against this place is out of the question, whatever more there is.
+            let most = (here + LIMIT - by_planes) * CHANCE;
+            if most < 0.0 {
+                return f64::INFINITY;
+            }
+            by_planes + self.contradicting(&along(pose, motion, *place, radius_m), most as usize) as f64 / CHANCE
         };
         let against: Vec<f64> = places.par_iter().map(against).collect();
         let fewest = against.iter().copied().fold(f64::INFINITY, f64::min);
@@ -105,9 +108,9 @@ impl FrameAligner {
                 track.pose = along(&track.pose, motion, outlines.least(&track.pose, motion), radius_m);
             }
             track.iterations = 0;
-            let against = outlines.contradicting(&result.target_from_source);
+            let against = outlines.contradicting(&result.target_from_source, usize::MAX);
             match self.end(track, source, target, guess, Hold::Undetermined) {
-                Ok(other) if outlines.contradicting(&other.1.target_from_source) <= against => best = other,
+                Ok(other) if outlines.contradicting(&other.1.target_from_source, usize::MAX) <= against => best = other,
                 _ => break,
             }
         }
@@ -135,6 +138,7 @@ struct InFront<'a> {
     points: &'a [[f32; 3]],
     pose: &'a Isometry3<f64>,
     tolerance_m: f32,
+    most: usize,
 }
 
 impl WithLocate for InFront<'_> {
@@ -147,8 +151,10 @@ impl WithLocate for InFront<'_> {
         let grid = &self.target.grid;
         let mut in_front = 0;
         for v in self.points {
-            let p = [0, 1, 2].map(|i| r[i][0] * v[0] + r[i][1] * v[1] + r[i][2] * v[2] + t[i]);
-            let [col, row] = locate.node(-p[0] / p[2], -p[1] / p[2]).map(|x| x + 0.5);
+            let at = |i: usize| r[i][0] * v[0] + r[i][1] * v[1] + r[i][2] * v[2] + t[i];
+            let p = [at(0), at(1), at(2)];
+            let [col, row] = locate.node(-p[0] / p[2], -p[1] / p[2]);
+            let (col, row) = (col + 0.5, row + 0.5);
             // NaN fails.
             if !(p[2] < 0.0 && col >= 0.0 && row >= 0.0 && col < grid.cols as f32 && row < grid.rows as f32) {
                 continue;
@@ -158,6 +164,9 @@ impl WithLocate for InFront<'_> {
             // Normals lead away from the camera.
             let residual = a * p[0] + b * p[1] + c * p[2] - d;
             in_front += usize::from(residual < -(self.tolerance_m + SIGMAS * self.target.sigma[node]));
+            if in_front > self.most {
+                break;
+            }
         }
         in_front
     }

@@ -308,7 +308,10 @@ impl<L: Locate> Part<'_, '_, L> {
             }
             return;
         }
-        let mut waiting = weight.map(|w| w > 0.0);
+        let mut waiting = [false; BLOCK];
+        for l in 0..BLOCK {
+            waiting[l] = weight[l] > 0.0;
+        }
         while let Some(first) = waiting.iter().position(|w| *w) {
             let cell = cell_of[first];
             if cell != run.cell {

@@ -1,0 +1,114 @@
+//! The last level: iterations on all nodes until the pose stands, or wanders within its noise.
+
+use nalgebra::Vector6;
+use statistics::SIGMA_OF_MAD;
+
+use crate::error::Result;
+use crate::partners::sums::median_residual;
+use crate::partners::track::{Track, finest_part, is_within_noise, moved};
+use crate::preparation::blocks::Block;
+use crate::preparation::frame::OrganisedFrame;
+use crate::registration::aligner::{BIWEIGHT, FrameAligner, SAMPLE};
+use crate::registration::quality::{Hold, Verdict};
+use icp_registration::StopReason;
+use icp_registration::quality::Residuals;
+
+/// Length of a step over its standard deviation, as the weights of the pairs tell it, below which all nodes take part instead
+/// of a quarter. Their poses differ by about two of these anyway. It decides on time alone: see docs/benchmarks.md.
+const COARSE_FRACTION: f64 = 1.0;
+/// Steps before which the reach of the kernel is set.
+const NARROWINGS: usize = 3;
+/// Steps after which it is first seen whether the pose has got anywhere, and then after twice as many as before: where nodes
+/// change back and forth between planes, steps never become short. A power of 2; it decides on time alone.
+const WANDERING: usize = 4;
+
+impl FrameAligner {
+    /// Iterates on all points until the pose stands.
+    pub(crate) fn settle(
+        &mut self,
+        track: &mut Track,
+        source: &OrganisedFrame,
+        target: &OrganisedFrame,
+        hold: Hold,
+    ) -> Result<StopReason> {
+        let blocks = &source.points.blocks[..];
+        if hold == Hold::Undetermined {
+            let (moved, frame) = moved(track, source, target);
+            let limit = self.max_motion_sigma_m(&frame);
+            let verdict = Verdict::new(&moved, &track.rules, blocks, limit, Residuals::Settled, &mut self.cells)?;
+            track.free = verdict.free();
+        }
+        track.rules.extra_variance = 0.0;
+        let mut narrowings = NARROWINGS;
+        // A quarter of the nodes first: only the last steps need all.
+        let fraction = self.options.noise_fraction.unwrap_or(COARSE_FRACTION);
+        self.iterate(track, source, target, finest_part(source), fraction, &mut narrowings)?;
+        self.iterate(track, source, target, blocks, self.options.noise_fraction.unwrap_or(0.0), &mut narrowings)
+    }
+
+    /// Iterates on some nodes until a step is short, or shorter than so many standard deviations, or the pose only wanders.
+    fn iterate(
+        &mut self,
+        track: &mut Track,
+        source: &OrganisedFrame,
+        target: &OrganisedFrame,
+        blocks: &[Block],
+        over_sigma: f64,
+        narrowings: &mut usize,
+    ) -> Result<StopReason> {
+        let (mut steps, mut way, mut most) = (0, Vector6::zeros(), 1);
+        while track.iterations < self.options.max_iterations {
+            if *narrowings > 0 {
+                self.rescale(track, source, target, *narrowings == NARROWINGS);
+                *narrowings -= 1;
+            }
+            let (step, frame) = self.step(track, source, target, blocks, 0.0)?;
+            if *narrowings > 0 {
+                continue;
+            }
+            let tolerance = self.options.step_tolerance_m.unwrap_or(1e-5 * frame.radius_m);
+            if step <= tolerance || track.over_sigma <= over_sigma {
+                return Ok(StopReason::Converged);
+            }
+            (steps, way) = (steps + 1, way + track.last_step);
+            // Back where it was, it goes in a circle (cycles are found with marks that are set ever more seldom).
+            if way.norm() <= tolerance {
+                break;
+            }
+            if steps == most {
+                if most >= WANDERING && self.is_within_noise(track, source, target, blocks, &way)? {
+                    return Ok(StopReason::WithinNoise);
+                }
+                (steps, way, most) = (0, Vector6::zeros(), 2 * most);
+            }
+        }
+        Ok(StopReason::MaxIterations)
+    }
+
+    /// Whether a way is shorter than a tenth of the standard deviation of the pose where it ends.
+    fn is_within_noise(
+        &mut self,
+        track: &Track,
+        source: &OrganisedFrame,
+        target: &OrganisedFrame,
+        blocks: &[Block],
+        way: &Vector6<f64>,
+    ) -> Result<bool> {
+        let (moved, frame) = moved(track, source, target);
+        let limit = self.max_motion_sigma_m(&frame);
+        let verdict = Verdict::new(&moved, &track.rules, blocks, limit, Residuals::Settled, &mut self.cells)?;
+        Ok(is_within_noise(way, &verdict.covariance(frame.radius_m, self.hold())))
+    }
+
+    /// Sets the reach of the kernel from the residuals.
+    fn rescale(&mut self, track: &mut Track, source: &OrganisedFrame, target: &OrganisedFrame, first: bool) {
+        let (moved, _) = moved(track, source, target);
+        if first {
+            track.rules.reach = 10.0 * BIWEIGHT;
+        }
+        let blocks = &source.points.blocks;
+        let median = median_residual(&moved, &track.rules, blocks, SAMPLE, &mut self.scratch).unwrap_or(0.0);
+        let scale = (SIGMA_OF_MAD * median).max(0.1) as f32;
+        track.rules.reach = BIWEIGHT * scale;
+    }
+}

@@ -29,6 +29,7 @@ impl Error {
             | Self::Needs { .. }
             | Self::Unfit { .. }
             | Self::Request { .. }
+            | Self::Memory { .. }
             | Self::Name { .. }
             // No failure; who asks all the same is told not to try again.
             | Self::AlreadyDone { .. }

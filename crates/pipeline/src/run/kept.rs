@@ -90,6 +90,14 @@ impl Kept {
         }
     }
 
+    /// What it takes of so many views, byte: ten numbers of each pixel that is kept, and a record of each view.
+    pub(crate) fn bytes(camera: &Camera, views: usize) -> u64 {
+        const VALUES: u64 = 80;
+        const RECORD: u64 = 1500;
+        let pixels = views * camera.format.width * camera.format.height;
+        VALUES * Thinning::of(pixels).kept(pixels) + RECORD * views as u64
+    }
+
     /// Keeps what is wanted of a view that has gone through the stages.
     pub(crate) fn add(&mut self, view: &View, survey: &OpenSurvey) -> Result<()> {
         let after = view.snapshot();

@@ -64,6 +64,12 @@ impl Tally {
         Self { stages, last: Vec::new(), last_stage: usize::MAX, clock: Instant::now() }
     }
 
+    /// What it takes, byte: the changes of ranges and their errors.
+    pub(crate) fn bytes(&self, line: &Line, frames: usize) -> u64 {
+        let pixels = frames * line.camera().format.width * line.camera().format.height;
+        self.stages.iter().map(|stage| 16 * stage.thinning.kept(pixels)).sum()
+    }
+
     /// Writes it, or adds another part of the views.
     pub(crate) fn carry(&mut self, tape: &mut Tape) {
         for stage in &mut self.stages {

@@ -9,6 +9,7 @@ mod progress;
 mod record;
 pub mod simulate;
 mod tape;
+pub mod tiles;
 mod verdict;
 
 pub use destination::{Inputs, RefusalFile, check_name, json, produce, produce_made, root_of};

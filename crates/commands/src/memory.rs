@@ -105,7 +105,11 @@ impl Memory {
         let kept = PROGRAM.saturating_add(KEPT.get()).saturating_add(work.kept);
         let needed = kept.saturating_add(work.each);
         if needed > self.bytes && self.is_stated {
-            return Err(Error::Memory { work: work.what.to_owned(), needed: Amount(needed), allowed: Amount(self.bytes) });
+            return Err(Error::Memory {
+                work: work.what.to_owned(),
+                needed: Amount(needed),
+                allowed: Amount(self.bytes),
+            });
         }
         let units = self.bytes.saturating_sub(kept) / work.each.max(1);
         Ok(usize::try_from(units).unwrap_or(usize::MAX).clamp(1, work.most.max(1)))

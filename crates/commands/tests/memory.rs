@@ -8,9 +8,13 @@ const WORK: Work<'static> = Work { what: "reading frames", kept: 100_000_000, ea
 
 #[test]
 fn amounts_have_units() {
-    for (text, bytes) in
-        [("2GB", 2_000_000_000), ("500 MB", 500_000_000), ("1.5GiB", 3 << 29), (" 64MiB ", 1 << 26), ("1e-3GB", 1_000_000)]
-    {
+    for (text, bytes) in [
+        ("2GB", 2_000_000_000),
+        ("500 MB", 500_000_000),
+        ("1.5GiB", 3 << 29),
+        (" 64MiB ", 1 << 26),
+        ("1e-3GB", 1_000_000),
+    ] {
         assert_eq!(text.parse(), Ok(Memory::stated(bytes)), "{text}");
     }
     for text in ["", "2", "GB", "two GB", "2gb", "2TB", "-1GB", "0MB", "NaNGB", "infGB", "1e300GB", "2GB more"] {

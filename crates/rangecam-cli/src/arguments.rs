@@ -48,6 +48,10 @@ pub(crate) struct Arguments {
     /// depend on it.
     #[arg(long, global = true, value_name = "SIZE")]
     pub(crate) memory: Option<Memory>,
+    /// Points above which a cloud is written as an octree of tiles (cloud.copc.laz, COPC) instead of cloud.ply, by run, merge, register
+    /// and fuse; 0: always. Default: 100000000.
+    #[arg(long, global = true, value_name = "POINTS")]
+    pub(crate) tiles_above: Option<u64>,
     /// Leave an output folder as it is that was made from the same inputs, with the same options and by the same program, by their
     /// digests.
     #[arg(long, global = true)]

@@ -157,7 +157,9 @@ pub enum Error {
         message: String,
     },
     /// Work that does not fit into the memory that is allowed.
-    #[error("{work}: needs {needed} of memory, and {allowed} are allowed (--memory): allow --memory {needed}, or take smaller parts")]
+    #[error(
+        "{work}: needs {needed} of memory, and {allowed} are allowed (--memory): allow --memory {needed}, or take smaller parts"
+    )]
     Memory {
         /// The work.
         work: String,
@@ -166,6 +168,9 @@ pub enum Error {
         /// What is allowed.
         allowed: Amount,
     },
+    /// A cloud that can't be written in tiles.
+    #[error("tiles: {0}")]
+    Tiles(#[from] cloud_tiles::Error),
     /// A name that can't stand for a folder.
     #[error("{}: `{field}` is {value:?}, {reason}", path.display())]
     Name {

@@ -190,8 +190,9 @@ pub(crate) fn complete(
     };
     progress.begin("write results", 3);
     let common = if refusal.is_some() { None } else { common_poses(&kept.views, &flow.joined.poses) };
-    let own_clouds = clouds.finish(common.as_deref())?;
+    let (own_clouds, tiles) = clouds.finish(common.as_deref())?;
     let mut summary = measure::summarise(&request.plan, survey, &flow, &mut kept, refusal, own_clouds);
+    summary.tiles = tiles;
     summary.out = request.out.display().to_string();
     summary.seconds = commands::made::seconds_since(start);
     if without_times() {

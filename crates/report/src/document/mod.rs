@@ -15,7 +15,7 @@ use crate::figure::Figure;
 pub const MOST_ROWS: usize = 1000;
 
 /// What is shown of rows, and what to say of the rest.
-fn shown<T>(rows: &[T], what: &str) -> (&[T], Option<String>) {
+fn shown<'a, T>(rows: &'a [T], what: &str) -> (&'a [T], Option<String>) {
     let rest = rows.len().saturating_sub(MOST_ROWS);
     let words = (rest > 0).then(|| format!("{rest} further {what} are not shown; the files of the result have all."));
     (&rows[..rows.len() - rest], words)

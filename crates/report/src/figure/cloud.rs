@@ -93,7 +93,8 @@ pub fn cloud_figure(title: &str, clouds: &[StationCloud<'_>], direction: Directi
         let _ = write!(svg, r##"<circle cx="{x}" cy="{}" r="4" fill="{colour}" stroke="#000"/>"##, y + 22);
     }
     for (station, name) in names().enumerate() {
-        let colour = if station < named.len() { hex(CATEGORIES[station % CATEGORIES.len()]) } else { "none".to_owned() };
+        let colour =
+            if station < named.len() { hex(CATEGORIES[station % CATEGORIES.len()]) } else { "none".to_owned() };
         let (x, y) = ((station % columns) * entry, view.height + 38 + 18 * (station / columns));
         let _ = write!(svg, r#"<rect x="{x}" y="{}" width="10" height="10" fill="{colour}"/>"#, y - 9);
         let _ = write!(svg, r#"<text x="{}" y="{y}" class="tick">{}</text>"#, x + 14, escape(name));

@@ -9,8 +9,8 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use atomic_output::Destination;
-use commands::plan::{CorrectRangeOptions, DeconvolveOptions, DemodulateOptions, UnwrapOptions};
 use commands::memory::keeping;
+use commands::plan::{CorrectRangeOptions, DeconvolveOptions, DemodulateOptions, UnwrapOptions};
 use commands::{Inputs, Progress, json, produce};
 use pipeline::run::process_each;
 use pipeline::stages::corrects_ranges;

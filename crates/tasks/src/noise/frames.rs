@@ -46,7 +46,7 @@ pub(crate) struct Stations<'a> {
 
 /// What is kept of each value whose scatter is estimated (sums, variances, their order), byte, and of how many values at most: more
 /// are thinned.
-const BYTES_A_VALUE: u64 = 250;
+const BYTES_A_VALUE: u64 = 210;
 const MOST_VALUES: u64 = 1 << 22;
 
 impl<'a> Stations<'a> {
@@ -63,7 +63,7 @@ impl<'a> Stations<'a> {
         }
         let (bytes, camera) = (FrameBytes::of(&survey.survey), &survey.survey.camera);
         let planes = (camera.modulation_hz.len().max(1) * camera.phase_steps.unwrap_or(1)) as u64;
-        let values = (bytes.pixels * planes * stations.len() as u64).min(2 * MOST_VALUES);
+        let values = (bytes.pixels * planes * stations.len() as u64).min(MOST_VALUES);
         let (kept, each) = (BYTES_A_VALUE * values, bytes.read + bytes.waiting);
         let work = Work { what: "estimating noise", kept, each, most: READ_AT_ONCE };
         let read_at_once = Memory::present().at_once(&work)?;

@@ -23,4 +23,4 @@ pub use record::made;
 pub use tape::Tape;
 pub use verdict::{Doubt, DoubtKind, Failure, Judged, Verdict, words_about, words_by_subject};
 // Of the signatures.
-pub use {atomic_output, range_io, serde};
+pub use {atomic_output, cloud_tiles, range_io, serde};

@@ -59,7 +59,7 @@ pub struct FrameBytes {
     pub pixels: u64,
     /// While it is read: unpacked, and as values.
     pub read: u64,
-    /// As it waits for others that it is averaged with: complex images (16 bytes a frequency) or ranges, flags.
+    /// As it waits for others that it is averaged with: complex images (16 bytes a pixel and frequency) or ranges, and flags.
     pub waiting: u64,
     /// In the stages: images, flags, ranges before and after, truth, points, and what the stages work with.
     pub staged: u64,
@@ -156,7 +156,7 @@ impl FrameBytes {
         // Ranges and amplitudes before and after, truth, reference; range, deviation, amplitude and flags of each frequency; point
         // with its values; two copies of ranges that changes are told by, errors in double precision, and 100 bytes of work.
         let staged = stored + complex + 24 + 14 * (frequencies + 1) + 34 + 16 + 16 + 100;
-        Self { pixels, read: pixels * (2 * stored + 24), waiting: pixels * (waiting + 18), staged: pixels * staged }
+        Self { pixels, read: pixels * (2 * stored + 24), waiting: pixels * (waiting + 2), staged: pixels * staged }
     }
 }
 

@@ -1,9 +1,11 @@
-//! Clouds of very many points, in tiles instead of one PLY.
+//! Clouds of very many points: in tiles instead of one PLY, and points that are written last.
 
 use std::cell::Cell;
 
 use atomic_output::OutputFolder;
 use cloud_tiles::{FEWEST_POINTS_IN_MEMORY, TileOptions, write_tiles};
+use range_io::clouds::{CloudFile, Precision};
+use range_io::ply::{PlyWriter, read_cloud};
 use serde::Serialize;
 
 use crate::memory::Memory;
@@ -73,4 +75,65 @@ impl Memory {
         };
         Ok(FEWEST_POINTS_IN_MEMORY + self.at_once(&work)? as u64)
     }
+}
+
+/// Points that are written last into a cloud, in files of their own until then: of a long survey they are too many to be kept.
+pub struct LastPoints<'a> {
+    folder: &'a OutputFolder,
+    /// Files so far, and what the last one has, where it is open.
+    files: usize,
+    open: Option<(PlyWriter, usize)>,
+    points: usize,
+}
+
+/// Points of a file of these, about: 30 MB, which are read at once.
+const LAST_AT_ONCE: usize = 1_000_000;
+
+impl<'a> LastPoints<'a> {
+    /// None, in a folder that is being written.
+    pub fn new(folder: &'a OutputFolder) -> Self {
+        Self { folder, files: 0, open: None, points: 0 }
+    }
+
+    /// How many they are.
+    pub fn points(&self) -> usize {
+        self.points
+    }
+
+    /// Adds some.
+    pub fn add(&mut self, cloud: &CloudFile) -> Result<()> {
+        if cloud.points.is_empty() {
+            return Ok(());
+        }
+        let (mut writer, points) = match self.open.take() {
+            Some(open) => open,
+            None => {
+                self.files += 1;
+                (PlyWriter::create(self.folder.file(file(self.files - 1))?, Precision::Single)?, 0)
+            }
+        };
+        writer.append(cloud)?;
+        self.points += cloud.points.len();
+        self.open = Some((writer, points + cloud.points.len()));
+        if points + cloud.points.len() > LAST_AT_ONCE { self.close().map(drop) } else { Ok(()) }
+    }
+
+    /// Completes the last file; how many there are.
+    pub fn close(&mut self) -> Result<usize> {
+        if let Some((writer, _)) = self.open.take() {
+            writer.commit()?;
+        }
+        Ok(self.files)
+    }
+
+    /// Takes back what the file of this number has.
+    pub fn take(&self, number: usize) -> Result<CloudFile> {
+        let cloud = read_cloud(self.folder.file(file(number))?)?;
+        self.folder.discard(file(number))?;
+        Ok(cloud)
+    }
+}
+
+fn file(number: usize) -> String {
+    format!("last_points_{number}.ply")
 }

@@ -19,9 +19,9 @@ const COMPONENTS: [&str; 6] = ["dx", "dy", "dz", "domega", "dphi", "dkappa"];
 /// that only the size counts, and 256 steps change it by less than a part in 256 of its span.
 const MOST_DRIFTS: usize = 256;
 
-/// Frames whose stated poses are errors of their own. Their covariance grows with the square of their number: of 1000 it has 18 million
-/// values, and `common_errors.ron` 90 MB, which is as much as is read.
-const MOST_POSES: usize = 1000;
+/// Frames whose stated poses are errors of their own. Their covariance grows with the square of their number: of 500 it has 4.5 million
+/// values, which take half a gigabyte while `common_errors.ron` is written.
+const MOST_POSES: usize = 500;
 
 /// A frame of the cloud, or a mean of frames.
 #[derive(Debug, Clone)]

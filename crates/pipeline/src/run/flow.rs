@@ -105,7 +105,7 @@ impl Flow {
             keep(view, survey)
         };
         let (order, line) = (&self.order, &mut self.line);
-        let bytes = tally.bytes(line, order.frames()) + gathered_bytes;
+        let bytes = tally.bytes(survey) + gathered_bytes;
         let (looked, stored) = keeping(bytes, || stream(survey, order, line, &mut tally, &mut keep, progress))?;
         Ok(Seen { tally, looked, stored })
     }

@@ -90,12 +90,13 @@ impl Kept {
         }
     }
 
-    /// What it takes of so many views, byte: ten numbers of each pixel that is kept, and a record of each view.
-    pub(crate) fn bytes(camera: &Camera, views: usize) -> u64 {
-        const VALUES: u64 = 80;
-        const RECORD: u64 = 1500;
+    /// What it takes of so many views, byte: seven numbers of each pixel that is kept, ten where the truth is known, and a record of
+    /// each view with all that is said of it.
+    pub(crate) fn bytes(survey: &OpenSurvey, camera: &Camera, views: usize) -> u64 {
+        const RECORD: u64 = 3000;
         let pixels = views * camera.format.width * camera.format.height;
-        VALUES * Thinning::of(pixels).kept(pixels) + RECORD * views as u64
+        let numbers = if survey.has_truth() { 10 } else { 7 };
+        8 * numbers * Thinning::of(pixels).kept(pixels) + RECORD * views as u64
     }
 
     /// Keeps what is wanted of a view that has gone through the stages.

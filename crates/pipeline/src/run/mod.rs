@@ -159,7 +159,7 @@ fn run_into(
         clouds.add(&view)?;
         kept.add(&view, survey)
     };
-    let bytes = Kept::bytes(flow.camera(), flow.order.views());
+    let bytes = Kept::bytes(&flow.survey, flow.camera(), flow.order.views());
     keeping(bytes, || flow.views(&mut keep, progress))?;
     let (summary, page) = complete(&folder, request, &survey, (flow, kept, clouds), start, progress)?;
     files::results::finish(folder, &summary, &page, progress)?;

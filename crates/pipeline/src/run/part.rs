@@ -136,7 +136,7 @@ fn part_into(
         clouds.add(&view)?;
         kept.add(&view, survey)
     };
-    let bytes = Kept::bytes(flow.camera(), whole.views());
+    let bytes = Kept::bytes(&flow.survey, flow.camera(), whole.views());
     let mut seen = keeping(bytes, || flow.part_of_views(tally, &mut keep, progress))?;
     let (further_points, views) = (clouds.further(), kept.views.len());
     let own_clouds = clouds.finish_part()?;

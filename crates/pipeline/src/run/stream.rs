@@ -129,6 +129,11 @@ pub(crate) struct Before {
     pub(crate) views: usize,
 }
 
+/// A view that waits for others that it is averaged with: their mean has all but its values from the first.
+fn beside(view: View, is_first: bool) -> View {
+    if is_first { view } else { View { before: None, truth: None, reference_range: None, ..view } }
+}
+
 /// Items of one key, in the order in which keys come first.
 fn grouped<T, K: Ord>(items: impl Iterator<Item = T>, key: impl Fn(&T) -> K) -> Vec<Vec<T>> {
     let (mut groups, mut places): (Vec<Vec<T>>, _) = (Vec::new(), std::collections::BTreeMap::new());
@@ -223,7 +228,7 @@ impl Stream<'_> {
             for part in 0..parts {
                 let ends = [part, part + 1].map(|end| end * frames.len() / parts);
                 let (view, found) = self.part(number, &frames[ends[0]..ends[1]])?;
-                views.push(view);
+                views.push(beside(view, views.is_empty()));
                 tests = tests.join(found);
             }
         } else {
@@ -232,13 +237,11 @@ impl Stream<'_> {
                 self.line.apply_some(0..number, &mut one, self.watch)?;
                 self.done += 1;
                 self.progress.advance(self.done);
-                views.extend(one);
+                if let Some(view) = one.pop() {
+                    views.push(beside(view, views.is_empty()));
+                }
             }
             self.watch.before(number, self.line.steps()[number].stage(), &views);
-        }
-        // The mean has all but its values from the first.
-        for view in views.iter_mut().skip(1) {
-            (view.before, view.truth, view.reference_range) = (None, None, None);
         }
         let clock = Instant::now();
         let (view, found) = self.line.mean(number, views)?;

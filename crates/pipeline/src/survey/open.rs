@@ -140,6 +140,11 @@ impl OpenSurvey {
         &self.modulations
     }
 
+    /// Whether the true ranges of its frames are known.
+    pub(crate) fn has_truth(&self) -> bool {
+        self.survey.truth.as_ref().is_some_and(|truth| !truth.frames.is_empty())
+    }
+
     /// Where the survey says that a station stands.
     pub fn approximate_pose(&self, station: &str) -> Option<Isometry3<f64>> {
         self.stated.of(station).map(|row| row.world_from_camera)

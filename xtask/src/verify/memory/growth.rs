@@ -37,7 +37,8 @@ pub(super) fn run(surveys: &Surveys<'_>, frames: usize) -> Result<Vec<String>, S
     println!("{:<39} {:>22} {:>22}", "", format!("{} frames", counts[0]), format!("{} frames", counts[1]));
     let mut beyond = Vec::new();
     for (survey, command) in CASES {
-        let taken = |count: usize| measured(surveys.program, surveys.folder, command, &Surveys::small_name(survey, count));
+        let taken =
+            |count: usize| measured(surveys.program, surveys.folder, command, &Surveys::small_name(survey, count));
         let [few, many] = [taken(counts[0])?, taken(counts[1])?];
         let a_frame_mb = many.most_mb.saturating_sub(few.most_mb) as f64 / (counts[1] - counts[0]) as f64;
         let words = words(command);
@@ -54,7 +55,10 @@ pub(super) fn run(surveys: &Surveys<'_>, frames: usize) -> Result<Vec<String>, S
             beyond.push(format!("{words} on {survey}: {expected_mb:.0} MB for {MANY} frames"));
         }
         if is_slower(few, many) {
-            beyond.push(format!("{words} on {survey}: {:.1} s, and {:.1} s for {TIMES} times as many frames", few.seconds, many.seconds));
+            beyond.push(format!(
+                "{words} on {survey}: {:.1} s, and {:.1} s for {TIMES} times as many frames",
+                few.seconds, many.seconds
+            ));
         }
     }
     Ok(beyond)

@@ -46,7 +46,11 @@ impl Surveys<'_> {
             self.long(&name("stations of 10"), "small walls", frames, |frame| (frame / 10 % 6, frame % 6, frame / 10))?;
             self.long(&name("stations of one"), "small walls", frames, |frame| (frame % 6, frame / 6 % 6, frame))?;
             self.long(&name("a room"), "small room", frames, |frame| (0, frame % 8, 0))?;
-            self.simulate("warm_up", ["frames_per_station: 300", &format!("frames_per_station: {frames}")], &name("a warming camera"))?;
+            self.simulate(
+                "warm_up",
+                ["frames_per_station: 300", &format!("frames_per_station: {frames}")],
+                &name("a warming camera"),
+            )?;
         }
         Ok(())
     }

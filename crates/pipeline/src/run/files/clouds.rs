@@ -12,7 +12,7 @@ use nalgebra::{Isometry3, Point3};
 use range_io::ply::{CloudFile, PlyWriter, Precision, read_cloud, write_cloud};
 use serde::{Deserialize, Serialize};
 
-use commands::tiles::{self, TiledCloud};
+use commands::tiles::{self, LastPoints, TiledCloud};
 
 use crate::survey::open::OpenSurvey;
 use crate::survey::records::StationPose;
@@ -42,51 +42,8 @@ pub(crate) struct Clouds<'a> {
     /// Points in it.
     points: u64,
     /// Points of split pixels in the common frame, which are written last.
-    further: Further<'a>,
+    further: LastPoints<'a>,
     own: Vec<Own>,
-}
-
-/// Points that are written last, in files of their own until then: of a long survey they are too many to be kept.
-struct Further<'a> {
-    folder: &'a OutputFolder,
-    /// Files so far, and what the last one has, where it is open.
-    files: usize,
-    open: Option<(PlyWriter, usize)>,
-    points: usize,
-}
-
-/// Points of a file of these, about: 30 MB, which are read at once.
-const FURTHER_AT_ONCE: usize = 1_000_000;
-
-impl Further<'_> {
-    fn file(number: usize) -> String {
-        format!("further_{number}.ply")
-    }
-
-    fn add(&mut self, cloud: &CloudFile) -> Result<()> {
-        if cloud.points.is_empty() {
-            return Ok(());
-        }
-        let (mut writer, points) = match self.open.take() {
-            Some(open) => open,
-            None => {
-                self.files += 1;
-                (PlyWriter::create(self.folder.file(&Self::file(self.files - 1))?, Precision::Single)?, 0)
-            }
-        };
-        writer.append(cloud)?;
-        self.points += cloud.points.len();
-        self.open = Some((writer, points + cloud.points.len()));
-        if points + cloud.points.len() > FURTHER_AT_ONCE { self.close().map(drop) } else { Ok(()) }
-    }
-
-    /// Completes the last file; how many there are.
-    fn close(&mut self) -> Result<usize> {
-        if let Some((writer, _)) = self.open.take() {
-            writer.commit()?;
-        }
-        Ok(self.files)
-    }
 }
 
 /// A view's file in its own frame.
@@ -104,7 +61,7 @@ impl<'a> Clouds<'a> {
         let one_station = stations.len() == 1;
         let known = |station: &&str| survey.approximate_pose(station).is_some();
         let placed = !joins && (one_station || stations.iter().all(known));
-        let further = Further { folder, files: 0, open: None, points: 0 };
+        let further = LastPoints::new(folder);
         Self { folder, joins, one_station, placed, views, common: None, points: 0, further, own: Vec::new() }
     }
 
@@ -134,7 +91,7 @@ impl<'a> Clouds<'a> {
 
     /// How many points of split pixels end the common cloud that [`Self::finish`] writes.
     pub(crate) fn further(&self) -> usize {
-        self.further.points
+        self.further.points()
     }
 
     /// Adds the files of another part of the views, whose common cloud ends with so many points of split pixels.
@@ -194,9 +151,8 @@ impl<'a> Clouds<'a> {
             self.folder.discard(&file.cloud.file)?;
         }
         for number in 0..self.further.close()? {
-            let file = Further::file(number);
-            self.append(&read_cloud(self.folder.file(&file)?)?)?;
-            self.folder.discard(&file)?;
+            let further = self.further.take(number)?;
+            self.append(&further)?;
         }
         if let Some(writer) = self.common.take() {
             writer.commit()?;

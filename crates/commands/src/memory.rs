@@ -134,7 +134,7 @@ impl FromStr for Memory {
         let number: f64 = number.trim().parse().map_err(|_| refused("what stands before the unit is no number"))?;
         let bytes = number * factor;
         // Above, bytes would not be whole numbers any more.
-        if !(bytes >= 1.0 && bytes <= 2.0_f64.powi(53)) {
+        if !(1.0..=2.0_f64.powi(53)).contains(&bytes) {
             return Err(refused("it is not above zero, or beyond all machines"));
         }
         Ok(Self::stated(bytes as u64))

@@ -1,5 +1,7 @@
 //! How much memory a command may take, and clouds in tiles.
 
+use std::path::Path;
+
 use crate::fleet::{RUN, done, files, rangecam, world};
 
 #[test]
@@ -32,14 +34,14 @@ fn a_large_cloud_is_in_tiles_and_who_measures_is_told() {
     done(root.path(), &format!("{RUN} --out plain"));
     done(root.path(), &format!("{RUN} --tiles-above 1000 --out tiled"));
     let (plain, tiled) = (files(&root.path().join("plain")), files(&root.path().join("tiled")));
-    let summary: serde_json::Value = serde_json::from_slice(&tiled["summary.json".as_ref()]).unwrap();
+    let summary: serde_json::Value = serde_json::from_slice(&tiled[Path::new("summary.json")]).unwrap();
     assert_eq!((&summary["tiles"]["file"], &summary["tiles"]["step_m"]), (&"cloud.copc.laz".into(), &1e-5.into()));
     assert!(summary["tiles"]["points"].as_u64().unwrap() > 1000);
-    assert!(tiled.contains_key("cloud.copc.laz".as_ref()) && !tiled.contains_key("cloud.ply".as_ref()));
+    assert!(tiled.contains_key(Path::new("cloud.copc.laz")) && !tiled.contains_key(Path::new("cloud.ply")));
     // Not above so many: as before.
     done(root.path(), &format!("{RUN} --tiles-above 1000000 --out plainer"));
     let plainer = files(&root.path().join("plainer"));
-    assert_eq!(plain["cloud.ply".as_ref()], plainer["cloud.ply".as_ref()]);
+    assert_eq!(plain[Path::new("cloud.ply")], plainer[Path::new("cloud.ply")]);
     let (code, said) = rangecam(root.path(), "fuse tiled --out fused");
     assert_eq!(code, Some(2), "{said}");
     assert!(said.contains("its points are in tiles (cloud.copc.laz)"), "{said}");

@@ -206,7 +206,8 @@ fn in_steps(drifting: &[(usize, f64)]) -> (Vec<String>, Vec<usize>, Vec<f64>) {
     let sigmas = || drifting.iter().map(|(_, sigma)| *sigma);
     let (low, high) = sigmas().fold((f64::INFINITY, 0.0_f64), |(low, high), sigma| (low.min(sigma), high.max(sigma)));
     let width = (high - low) / (MOST_DRIFTS - 1) as f64;
-    let step = |sigma: f64| if width > 0.0 { ((sigma - low) / width).ceil() as usize } else { 0 };
+    let step =
+        |sigma: f64| if width > 0.0 { (((sigma - low) / width).ceil() as usize).min(MOST_DRIFTS - 1) } else { 0 };
     let mut rows: BTreeMap<usize, usize> = sigmas().map(|sigma| (step(sigma), 0)).collect();
     for (row, place) in rows.values_mut().enumerate() {
         *place = row;

@@ -97,15 +97,14 @@ impl PlyFile {
             let line = String::from_utf8_lossy(&line).into_owned();
             let words: Vec<&str> = line.split_whitespace().collect();
             match (number, words.as_slice()) {
-                (0, ["ply"]) | (_, ["comment" | "obj_info", ..]) => {}
+                (0, ["ply"]) | (1, ["format", "binary_little_endian", _]) | (2.., ["comment" | "obj_info", ..]) => {}
                 (0, _) => return Err(Error::format(path, "is no PLY file, expected `ply` in its first line")),
-                (1, ["format", "binary_little_endian", _]) => {}
-                (_, ["element", "vertex", count]) if elements == 0 => {
+                (2.., ["element", "vertex", count]) if elements == 0 => {
                     elements += 1;
                     all.points = count.parse().map_err(|_| Error::format(path, format!("has {count:?} points")))?;
                 }
-                (_, ["property", kind, name]) if elements == 1 => all.add(kind, name)?,
-                (_, ["end_header"]) => break,
+                (2.., ["property", kind, name]) if elements == 1 => all.add(kind, name)?,
+                (2.., ["end_header"]) => break,
                 _ => {
                     let reason = format!("has the line {line:?}, expected points alone, binary little-endian");
                     return Err(Error::format(path, reason));

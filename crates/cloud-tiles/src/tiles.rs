@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use crate::copc::CopcWriter;
-use crate::octree::{Key, Octree, Source};
+use crate::octree::{Key, Octree, See, Source};
 use crate::ply::PlyFile;
 use crate::record::{Extent, Layout};
 use crate::{Error, Result};
@@ -60,7 +60,7 @@ pub fn write_tiles(ply: impl AsRef<Path>, tiles: impl AsRef<Path>, options: &Til
     let file = PlyFile::open(ply)?;
     let layout = Layout::new(ply, &file, Extent::of(&file)?)?;
     let records = layout.extent.points;
-    let each = |see: &mut dyn FnMut(&[u8]) -> Result<()>| {
+    let each = |see: &mut See<'_>| {
         let mut record = Vec::with_capacity(layout.length);
         file.each(|point| {
             record.clear();
@@ -70,7 +70,7 @@ pub fn write_tiles(ply: impl AsRef<Path>, tiles: impl AsRef<Path>, options: &Til
     let mut writer = CopcWriter::create(tiles.to_owned(), &layout)?;
     let size = (layout.length, layout.bits);
     let mut octree = Octree::new(&mut writer, &beside(tiles), size, options.points_in_memory)?;
-    octree.build(Key::default(), Source::Stream { records, each: &each })?;
+    octree.build(Key::default(), &Source::Stream { records, each: &each })?;
     drop(octree);
     let nodes = writer.commit()?;
     Ok(Tiles { points: records, left_out: file.points - records, nodes, step_m: layout.step_m })

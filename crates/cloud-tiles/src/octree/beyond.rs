@@ -48,7 +48,7 @@ impl Octree<'_> {
         match nodes.remove(&key) {
             None => Ok(()),
             Some(Between::Takes(chain)) if chain.records() == 0 => Ok(()),
-            Some(Between::Takes(chain)) => self.build(key, Source::Chain(chain)),
+            Some(Between::Takes(chain)) => self.build(key, &Source::Chain(chain)),
             Some(Between::Keeps(cells, chain)) => {
                 drop(cells);
                 let own = self.all(chain.records(), &Source::Chain(chain))?;

@@ -25,10 +25,15 @@ pub(crate) trait Sink {
     fn node(&mut self, key: Key, records: &[u8]) -> Result<()>;
 }
 
+/// Is shown a record.
+pub(crate) type See<'a> = dyn FnMut(&[u8]) -> Result<()> + 'a;
+/// Shows all records.
+pub(crate) type Each<'a> = dyn Fn(&mut See<'_>) -> Result<()> + 'a;
+
 /// Where points come from.
 pub(crate) enum Source<'a> {
     /// Shows all records, as often as it is asked.
-    Stream { records: u64, each: &'a dyn Fn(&mut dyn FnMut(&[u8]) -> Result<()>) -> Result<()> },
+    Stream { records: u64, each: &'a Each<'a> },
     /// Those of a part, in the file of parts.
     Chain(Chain),
 }
@@ -52,16 +57,16 @@ impl<'a> Octree<'a> {
     }
 
     /// Hands all nodes to the sink, each before its children.
-    pub(crate) fn build(&mut self, key: Key, source: Source<'_>) -> Result<()> {
-        let records = match &source {
+    pub(crate) fn build(&mut self, key: Key, source: &Source<'_>) -> Result<()> {
+        let records = match source {
             Source::Stream { records, .. } => *records,
             Source::Chain(chain) => chain.records(),
         };
         // What lies in one cell of the finest grid can't be parted.
         if records > self.most && key.is_parted(self.bits) {
-            return self.beyond(key, &source);
+            return self.beyond(key, source);
         }
-        let all = self.all(records, &source)?;
+        let all = self.all(records, source)?;
         self.within(key, &all)
     }
 

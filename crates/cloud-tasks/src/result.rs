@@ -19,6 +19,7 @@ use crate::plan::request;
 
 /// The cloud's file in a result.
 pub(crate) const CLOUD: &str = "cloud.ply";
+const TILES: &str = "cloud.copc.laz";
 /// The file of its common errors.
 const COMMON_ERRORS: &str = CommonErrorsFile::FILE_NAME;
 /// A result's cloud.
@@ -56,6 +57,13 @@ impl ResultCloud {
     /// Reads the cloud of a result, and its common errors where there are any.
     pub(crate) fn read(folder: &Path) -> Result<Self> {
         let path = folder.join(CLOUD);
+        if !path.exists() && folder.join(TILES).exists() {
+            return Err(request(format!(
+                "{}: its points are in tiles ({TILES}), which are for viewers: run the pipeline again on the part that matters, or with \
+                 a larger --tiles-above",
+                folder.display()
+            )));
+        }
         let file = read_cloud(&path)?.in_world();
         if file.sigma.is_none() && file.covariance.is_none() {
             let message = "the cloud has neither `sigma` nor a covariance: nothing is known of its noise";

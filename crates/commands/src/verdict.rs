@@ -1,6 +1,7 @@
 //! How a command ended, and what is doubtful about its result: what the exit code, `summary.json`, the terminal and the
 //! report all say from one source.
 
+use std::collections::BTreeMap;
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
@@ -128,6 +129,17 @@ impl fmt::Display for Doubt {
 pub fn words_about(doubts: &[Doubt], station: &str) -> Option<String> {
     let about = doubts.iter().filter(|doubt| doubt.subject.as_deref() == Some(station));
     about.map(|doubt| doubt.words.clone()).reduce(|all, words| format!("{all}; {words}"))
+}
+
+/// The same for all stations that there are doubts about: of a hundred thousand each may have one.
+pub fn words_by_subject(doubts: &[Doubt]) -> BTreeMap<&str, String> {
+    let mut all: BTreeMap<&str, String> = BTreeMap::new();
+    for (subject, doubt) in doubts.iter().filter_map(|doubt| Some((doubt.subject.as_deref()?, doubt))) {
+        let words = all.entry(subject).or_default();
+        words.push_str(if words.is_empty() { "" } else { "; " });
+        words.push_str(&doubt.words);
+    }
+    all
 }
 
 /// A command's result that can be judged.

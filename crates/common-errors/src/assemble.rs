@@ -1,5 +1,7 @@
 //! Calibration, drifts and poses put into one vector of errors with one covariance.
 
+use std::collections::BTreeMap;
+
 use camera_model::Camera;
 use nalgebra::{DMatrix, Isometry3, Matrix6};
 use point_cloud::Cloud;
@@ -12,6 +14,14 @@ use crate::{CommonErrorsFile, Error, FrameErrors, Result, SharedBySensor};
 
 /// Components of a pose's tangent.
 const COMPONENTS: [&str; 6] = ["dx", "dy", "dz", "domega", "dphi", "dkappa"];
+
+/// Drifts with a standard deviation of their own; of more frames, those that are known nearly as well share one. All err together, so
+/// that only the size counts, and 256 steps change it by less than a part in 256 of its span.
+const MOST_DRIFTS: usize = 256;
+
+/// Frames whose stated poses are errors of their own. Their covariance grows with the square of their number: of 500 it has 4.5 million
+/// values, which take half a gigabyte while `common_errors.ron` is written.
+const MOST_POSES: usize = 500;
 
 /// A frame of the cloud, or a mean of frames.
 #[derive(Debug, Clone)]
@@ -60,6 +70,7 @@ pub fn common_errors(
     };
     let mut errors = Errors { errors: calibrated.errors.clone(), covariance: calibrated.covariance.clone() };
     let mut columns: Vec<Columns> = frames.iter().map(|frame| calibrated.columns(frame.range_model)).collect();
+    let mut not_in_it = Vec::new();
     errors.add_drifts(frames, &mut columns);
     match registered.filter(|registered| registered.clouds.len() == frames.len()) {
         Some(registered) => {
@@ -80,7 +91,7 @@ pub fn common_errors(
             let found = pose_errors(registered.clouds, &poses, &stations?, own, covariance)?;
             errors.add_registered(frames, &mut columns, &found, covariance);
         }
-        None => errors.add_stated(frames, &mut columns),
+        None => not_in_it.extend(errors.add_stated(frames, &mut columns)),
     }
     let described = frames.iter().zip(columns).map(|(frame, columns)| described(frame, columns));
     let size = errors.errors.len();
@@ -90,7 +101,7 @@ pub fn common_errors(
         frames: described.collect(),
         covariance: (0..size).map(|row| (0..=row).map(|column| errors.covariance[(row, column)]).collect()).collect(),
         errors: errors.errors,
-        not_in_it: Vec::new(),
+        not_in_it,
     })
 }
 
@@ -116,7 +127,7 @@ struct Errors {
 
 impl Errors {
     /// Makes room for further errors.
-    fn grow(&mut self, names: impl IntoIterator<Item = String>, source: Source) -> usize {
+    fn grow<N: IntoIterator<Item = String>>(&mut self, names: N, source: Source) -> usize {
         let first = self.errors.len();
         self.errors.extend(names.into_iter().map(|name| CommonError { name, source }));
         let size = self.errors.len();
@@ -129,24 +140,42 @@ impl Errors {
         let drifting: Vec<(usize, f64)> = (0..frames.len())
             .filter_map(|index| Some((index, frames[index].drift_sigma_m.filter(|sigma| *sigma > 0.0)?)))
             .collect();
-        let names = drifting.iter().map(|(index, _)| format!("drift {}", frames[*index].view));
-        let first = self.grow(names.collect::<Vec<_>>(), Source::Drift);
-        for (row, (index, sigma)) in drifting.iter().enumerate() {
+        let (names, rows, sigmas) = if drifting.len() > MOST_DRIFTS {
+            in_steps(&drifting)
+        } else {
+            let names = drifting.iter().map(|(index, _)| format!("drift {}", frames[*index].view)).collect();
+            (names, (0..drifting.len()).collect(), drifting.iter().map(|(_, sigma)| *sigma).collect())
+        };
+        let first = self.grow::<Vec<String>>(names, Source::Drift);
+        for ((index, _), row) in drifting.iter().zip(rows) {
             columns[*index].drift = Some(first + row);
-            for (column, (_, other)) in drifting.iter().enumerate() {
+        }
+        for (row, sigma) in sigmas.iter().enumerate() {
+            for (column, other) in sigmas.iter().enumerate() {
                 self.covariance[(first + row, first + column)] = sigma * other;
             }
         }
     }
 
-    /// Poses of which their own covariances are stated.
-    fn add_stated(&mut self, frames: &[Frame], columns: &mut [Columns]) {
+    /// Poses of which their own covariances are stated; in words, where they are too many.
+    fn add_stated(&mut self, frames: &[Frame], columns: &mut [Columns]) -> Option<String> {
+        let stated: Vec<&Frame> = frames.iter().filter(|frame| frame.stated_covariance.is_some()).collect();
+        let count = stated.len();
+        if count > MOST_POSES {
+            return Some(format!(
+                "poses: the covariance of {count} frames whose poses are stated with standard deviations is too large; at most \
+                 {MOST_POSES} are taken, so run the part of the survey that is to be measured"
+            ));
+        }
+        let mut next = self.grow(stated.into_iter().flat_map(names), Source::Pose);
         for (frame, columns) in frames.iter().zip(columns) {
             let Some(covariance) = frame.stated_covariance else { continue };
-            let first = self.grow(names(frame), Source::Pose);
+            let first = next;
+            next += COMPONENTS.len();
             columns.pose = Some(first);
             self.covariance.fixed_view_mut::<6, 6>(first, first).copy_from(&rigid_symmetric(&covariance));
         }
+        None
     }
 
     /// Poses that were registered, but that of the datum, with what they owe to the calibration.
@@ -170,6 +199,22 @@ impl Errors {
         self.covariance.view_mut((first, 0), (rows, terms)).copy_from(&owed);
         self.covariance.view_mut((0, first), (terms, rows)).copy_from(&owed.transpose());
     }
+}
+
+/// Drifts in steps of their deviations, rounded up: names, the step of each, and the deviations of the steps.
+fn in_steps(drifting: &[(usize, f64)]) -> (Vec<String>, Vec<usize>, Vec<f64>) {
+    let sigmas = || drifting.iter().map(|(_, sigma)| *sigma);
+    let (low, high) = sigmas().fold((f64::INFINITY, 0.0_f64), |(low, high), sigma| (low.min(sigma), high.max(sigma)));
+    let width = (high - low) / (MOST_DRIFTS - 1) as f64;
+    let step =
+        |sigma: f64| if width > 0.0 { (((sigma - low) / width).ceil() as usize).min(MOST_DRIFTS - 1) } else { 0 };
+    let mut rows: BTreeMap<usize, usize> = sigmas().map(|sigma| (step(sigma), 0)).collect();
+    for (row, place) in rows.values_mut().enumerate() {
+        *place = row;
+    }
+    let steps: Vec<f64> = rows.keys().map(|step| low + *step as f64 * width).collect();
+    let names = steps.iter().map(|sigma| format!("drift known to {:.4} mm", 1e3 * sigma)).collect();
+    (names, sigmas().map(|sigma| rows[&step(sigma)]).collect(), steps)
 }
 
 fn names(frame: &Frame) -> Vec<String> {

@@ -139,3 +139,24 @@ fn what_was_not_corrected_is_not_in_it() {
     let without = common_errors(&frames, &round::camera(), None, None).unwrap();
     assert!(without.frames.iter().all(|frame| frame.columns == Columns::default()));
 }
+
+#[test]
+fn many_frames_share_errors_and_a_covariance_that_is_too_large_is_named() {
+    let mut frames: Vec<Frame> = (0..1200).flat_map(|_| stations(&round::poses(1))).collect();
+    for (index, frame) in frames.iter_mut().enumerate() {
+        frame.view = format!("frame {index}");
+        frame.drift_sigma_m = Some(1e-3 + 1e-6 * index as f64);
+        frame.stated_covariance = Some(Matrix6::identity() * 1e-6);
+    }
+    let file = common_errors(&frames, &round::camera(), None, None).unwrap();
+    let common = file.common().unwrap();
+    // Drifts alone, in steps that are at most a part in 255 of their span above each frame's own.
+    assert_eq!(common.errors().len(), 256);
+    for (frame, of) in frames.iter().zip(&file.frames) {
+        let row = of.columns.drift.unwrap();
+        let above = common.covariance()[(row, row)].sqrt() - frame.drift_sigma_m.unwrap();
+        assert!((-1e-12..1.2e-3 / 255.0).contains(&above), "{above}");
+        assert!(of.columns.pose.is_none());
+    }
+    assert!(file.not_in_it[0].starts_with("poses: the covariance of 1200 frames"), "{:?}", file.not_in_it);
+}

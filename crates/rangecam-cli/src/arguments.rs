@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Parser, Subcommand};
 use pipeline::Part;
+use pipeline::commands::memory::Memory;
 
 use crate::requests::calibration::calibrate_arguments::CalibrateArguments;
 use crate::requests::calibration::check_arguments::CheckArguments;
@@ -43,6 +44,14 @@ pub(crate) struct Arguments {
     /// Threads that compute; default: one for each core. Results do not depend on it.
     #[arg(long, global = true, value_name = "N", value_parser = at_least_one)]
     pub(crate) threads: Option<usize>,
+    /// Memory that may be in flight where many frames are read: 2GB, 500MB, 1.5GiB; default: a quarter of the machine's. Results do not
+    /// depend on it.
+    #[arg(long, global = true, value_name = "SIZE")]
+    pub(crate) memory: Option<Memory>,
+    /// Points above which a cloud is written as an octree of tiles (cloud.copc.laz, COPC) instead of cloud.ply, by run, merge, register
+    /// and fuse; 0: always. Default: 100000000.
+    #[arg(long, global = true, value_name = "POINTS")]
+    pub(crate) tiles_above: Option<u64>,
     /// Leave an output folder as it is that was made from the same inputs, with the same options and by the same program, by their
     /// digests.
     #[arg(long, global = true)]

@@ -7,12 +7,13 @@ use pipeline::commands::made::Call;
 use crate::arguments::Arguments;
 
 /// Options that a result does not depend on, by their names, and whether a value follows.
-const NOT_RECORDED: [(&str, bool); 8] = [
+const NOT_RECORDED: [(&str, bool); 9] = [
     ("--quiet", false),
     ("-q", false),
     ("--json", false),
     ("--skip-done", false),
     ("--threads", true),
+    ("--memory", true),
     ("--out", true),
     ("-o", true),
     // Parts and the whole are made with the same options.
@@ -51,7 +52,7 @@ mod tests {
         let plain = ["run", "survey", "-p", "p.ron"];
         for line in [
             "rangecam run survey -p p.ron",
-            "rangecam --threads 2 run survey -p p.ron --out x --shard 1/2 -q --json",
+            "rangecam --threads 2 run survey --memory 2GB -p p.ron --out x --shard 1/2 -q --json",
             "rangecam run survey --threads=2 --shard=2/2 -p p.ron -o x --skip-done",
         ] {
             assert_eq!(words(line), plain, "{line}");

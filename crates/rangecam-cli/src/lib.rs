@@ -14,7 +14,7 @@ use std::ffi::OsString;
 use std::process::ExitCode;
 
 use clap::Parser;
-use pipeline::commands::made;
+use pipeline::commands::{made, memory, tiles};
 
 use crate::arguments::Arguments;
 use crate::output::Output;
@@ -40,7 +40,11 @@ pub fn main(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         return exit::of_error(&std::io::Error::other(error));
     }
     let call = call::call(&typed, &arguments);
-    match made::called(call, || commands::dispatch(arguments.command, arguments.threads, &output)) {
+    let (memory, threads) = (arguments.memory, arguments.threads);
+    let tiles_above = arguments.tiles_above;
+    let dispatch = || commands::dispatch(arguments.command, threads, &output);
+    let dispatch = || memory::bounded(memory, || tiles::above(tiles_above, dispatch));
+    match made::called(call, dispatch) {
         Ok(code) => code,
         Err(error) if exit::is_done_already(error.as_ref()) => output.done_already(error.as_ref()),
         Err(error) => {

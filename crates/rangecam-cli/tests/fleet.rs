@@ -7,20 +7,20 @@ use std::process::Command;
 
 use tempfile::TempDir;
 
-fn rangecam(folder: &Path, line: &str) -> (Option<i32>, String) {
+pub fn rangecam(folder: &Path, line: &str) -> (Option<i32>, String) {
     let words: Vec<&str> = line.split_whitespace().collect();
     let output = Command::new(env!("CARGO_BIN_EXE_rangecam")).args(words).current_dir(folder).output().unwrap();
     (output.status.code(), [output.stdout, output.stderr].map(|said| String::from_utf8(said).unwrap()).concat())
 }
 
-fn done(folder: &Path, line: &str) -> String {
+pub fn done(folder: &Path, line: &str) -> String {
     let (code, said) = rangecam(folder, line);
     assert!(matches!(code, Some(0 | 1)), "{line}: {code:?}: {said}");
     said
 }
 
 /// Every file by its name.
-fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+pub fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     let mut found = BTreeMap::new();
     let mut pending = vec![folder.to_owned()];
     while let Some(path) = pending.pop() {
@@ -36,7 +36,7 @@ fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
 }
 
 /// A folder with a survey of four stations and a pipeline.
-fn world() -> TempDir {
+pub fn world() -> TempDir {
     let root = tempfile::tempdir().unwrap();
     let fixtures = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fixtures");
     let text = fs::read_to_string(fixtures.join("scenes/room_small.ron")).unwrap();
@@ -52,7 +52,7 @@ fn world() -> TempDir {
     root
 }
 
-const RUN: &str = "run archive/north/monday/hall --pipeline p.ron --no-times";
+pub const RUN: &str = "run archive/north/monday/hall --pipeline p.ron --no-times";
 
 #[test]
 fn results_depend_neither_on_threads_nor_on_parts() {

@@ -13,6 +13,7 @@ mod from_boards_to_a_room;
 mod hostile;
 mod inputs_are_kept;
 mod live;
+mod long_surveys;
 mod noise;
 mod pictures;
 mod register;

@@ -130,6 +130,9 @@ pub mod application {
     #[cfg(feature = "cloud-tasks")]
     #[doc(inline)]
     pub use cloud_tasks;
+    #[cfg(feature = "cloud-tiles")]
+    #[doc(inline)]
+    pub use cloud_tiles;
     #[cfg(feature = "commands")]
     #[doc(inline)]
     pub use commands;

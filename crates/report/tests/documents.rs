@@ -54,3 +54,16 @@ fn what_rounds_to_zero_has_no_sign() {
     assert_eq!(cells, ["0.0", "-0.1", "0.0", "0.0", "-12.3"]);
     assert_eq!([rounded(-0.4, 0), rounded(f64::NAN, 1), rounded(f64::NEG_INFINITY, 1)], ["0", "NaN", "-inf"]);
 }
+
+#[test]
+fn of_very_many_rows_it_is_said_how_many_are_left_out() {
+    let mut document = Document::new("Long", "");
+    let rows = (0..2500).map(|row| vec![format!("S{row}")]).collect();
+    document.table([Column::words("station")], rows);
+    document.warnings(&(0..1001).map(|doubt| format!("doubt {doubt}")).collect::<Vec<_>>());
+    for text in [document.html(), document.to_string()] {
+        assert!(text.contains("S999") && !text.contains("S1000"));
+        assert!(text.contains("1500 further rows are not shown; the files of the result have all."));
+        assert!(text.contains("doubt 999") && !text.contains("doubt 1000") && text.contains("1 further sentences"));
+    }
+}

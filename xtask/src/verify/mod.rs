@@ -25,12 +25,14 @@ const MEMORY: &str = "memory";
 pub(crate) struct Arguments {
     /// Statistics by name; all where none is named.
     names: Vec<String>,
+    #[command(flatten)]
+    memory: memory::Options,
 }
 
 impl Arguments {
     /// All statistics.
     pub(crate) fn all() -> Self {
-        Self { names: Vec::new() }
+        Self { names: Vec::new(), memory: memory::Options::default() }
     }
 }
 
@@ -46,5 +48,5 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome {
     for (_, package, example) in STATISTICS.iter().filter(|(name, ..)| asked(name)) {
         cargo(&["run", "--release", "--package", package, "--all-features", "--example", example], &[])?;
     }
-    if asked(MEMORY) { memory::run() } else { Ok(()) }
+    if asked(MEMORY) { memory::run(&arguments.memory) } else { Ok(()) }
 }

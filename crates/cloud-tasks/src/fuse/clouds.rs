@@ -32,8 +32,8 @@ pub(crate) fn write_fused(path: impl AsRef<Path>, fused: &Fused) -> Result<()> {
     Ok(write_any_cloud(path, &cloud, Precision::Single)?)
 }
 
-/// All points with a position that are in no fused point, flagged ones among them, moved as those that are.
-pub(crate) fn write_unfused(path: impl AsRef<Path>, usable: &Usable<'_>, fused: &Fused) -> Result<()> {
+/// All points with a position that are in no fused point, flagged ones among them, moved as those that are; how many.
+pub(crate) fn write_unfused(path: impl AsRef<Path>, usable: &Usable<'_>, fused: &Fused) -> Result<usize> {
     let cloud = usable.cloud;
     let mut is_fused = vec![false; cloud.points.len()];
     for (index, surfel) in usable.indices.iter().zip(&fused.surfel_of_point) {
@@ -61,7 +61,8 @@ pub(crate) fn write_unfused(path: impl AsRef<Path>, usable: &Usable<'_>, fused: 
         frame: pick(Some(&cloud.errors.frame), &kept),
         ..CloudFile::default()
     };
-    Ok(write_any_cloud(path, &file, Precision::Single)?)
+    write_any_cloud(path, &file, Precision::Single)?;
+    Ok(kept.len())
 }
 
 fn pick<T: Copy>(all: Option<&[T]>, kept: &[usize]) -> Option<Vec<T>> {

@@ -11,8 +11,9 @@ mod thickness;
 use std::time::Instant;
 
 use atomic_output::{Destination, write_text};
-use commands::{Error, Inputs, Progress, Result, json, produce};
+use commands::{Error, Inputs, Progress, Result, json, produce, tiles};
 use fusion::{CommonErrorUse, FusionOptions, Registered};
+use range_io::clouds::CloudFormat;
 
 use crate::measure::left_out;
 use crate::request::FuseRequest;
@@ -61,10 +62,18 @@ fn work(asked: &FuseRequest, destination: &Destination, progress: &dyn Progress)
     summary.seconds = commands::made::seconds_since(clock);
     let pictures = figures::figures(&usable, &moved, &fused, options.voxel_m)?;
     progress.advance(1);
-    let page = document::document(&summary, pictures);
     let folder = destination.open()?;
-    clouds::write_fused(folder.file(&summary.clouds[0])?, &fused)?;
-    clouds::write_unfused(folder.file(&summary.clouds[1])?, &usable, &fused)?;
+    let [cloud, unfused] = &mut summary.clouds;
+    clouds::write_fused(folder.file(&*cloud)?, &fused)?;
+    let further = clouds::write_unfused(folder.file(&*unfused)?, &usable, &fused)?;
+    if matches!(asked.format, CloudFormat::Ply) {
+        for (name, file, points) in [("cloud", cloud, fused.surfels.len()), ("unfused", unfused, further)] {
+            if let Some(tiled) = tiles::of_cloud(&folder, name, points as u64)? {
+                *file = tiled.file;
+            }
+        }
+    }
+    let page = document::document(&summary, pictures);
     write_text(folder.file("summary.json")?, &json(&summary)?)?;
     write_text(folder.file("report.html")?, &page.html())?;
     folder.commit()?;

@@ -15,7 +15,7 @@ impl Error {
     pub fn failure(&self) -> Failure {
         match self {
             Self::File(source) => of_file(source),
-            Self::Access { source, .. } => of_system(source),
+            Self::Access { source, .. } | Self::Tiles(cloud_tiles::Error::Io { source, .. }) => of_system(source),
             Self::Stage { source, .. } | Self::Estimate { source, .. } => of_source(source.as_ref()),
             Self::Calibrate(source) => of_estimation(source),
             Self::Refused { .. } | Self::Register(_) | Self::NothingInCommon(_) => Failure::Refused,
@@ -29,6 +29,8 @@ impl Error {
             | Self::Needs { .. }
             | Self::Unfit { .. }
             | Self::Request { .. }
+            | Self::Memory { .. }
+            | Self::Tiles(_)
             | Self::Name { .. }
             // No failure; who asks all the same is told not to try again.
             | Self::AlreadyDone { .. }

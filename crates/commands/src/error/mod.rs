@@ -4,6 +4,7 @@ use serde::Serialize;
 use thiserror::Error;
 
 use crate::destination::{RefusalFile, json};
+use crate::memory::Amount;
 use crate::verdict::Failure;
 
 pub(crate) mod drift;
@@ -155,6 +156,21 @@ pub enum Error {
         /// What is wrong, and what was expected.
         message: String,
     },
+    /// Work that does not fit into the memory that is allowed.
+    #[error(
+        "{work}: needs {needed} of memory, and {allowed} are allowed (--memory): allow --memory {needed}, or take smaller parts"
+    )]
+    Memory {
+        /// The work.
+        work: String,
+        /// What it takes at least.
+        needed: Amount,
+        /// What is allowed.
+        allowed: Amount,
+    },
+    /// A cloud that can't be written in tiles.
+    #[error("tiles: {0}")]
+    Tiles(#[from] cloud_tiles::Error),
     /// A name that can't stand for a folder.
     #[error("{}: `{field}` is {value:?}, {reason}", path.display())]
     Name {

@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use commands::tiles::cloud_file;
 use range_image::Flags;
 use report::{Axes, Block, CATEGORIES, Column, Document, Merit, Place, Series, curves, millimetres};
 
@@ -51,7 +52,10 @@ pub(crate) fn document(summary: &Summary, figures: Figures) -> Document {
     flags(&mut document, summary);
     document.figures(figures.sigma);
     let clouds = match summary.own_clouds.len() {
-        0 => "cloud.ply, stations.csv, trajectory.txt, common_errors.ron".to_owned(),
+        0 => format!(
+            "{}, stations.csv, trajectory.txt, common_errors.ron",
+            cloud_file(summary.tiles.as_ref(), "cloud.ply")
+        ),
         count => format!("clouds/ ({count} clouds, each in the frame of its own camera; no poses)"),
     };
     document.closing(format!("written to {}: report.html, summary.json, {clouds}", summary.out));

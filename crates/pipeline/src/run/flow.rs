@@ -17,6 +17,7 @@ use crate::survey::records::StageSummary;
 use crate::survey::view::View;
 use crate::{Plan, Result, Stage};
 use commands::Doubt;
+use commands::memory::keeping;
 use commands::plan::RegisterOptions;
 use commands::{Progress, Tape};
 
@@ -96,13 +97,16 @@ impl Flow {
         progress: &dyn Progress,
     ) -> Result<Seen> {
         let (survey, gathered) = (&self.survey, &mut self.gathered);
+        let gathered_bytes = gathered.as_ref().map_or(0, Gathered::bytes);
         let mut keep = |view: View| {
             if let Some(gathered) = gathered {
                 gathered.add(&view, survey);
             }
             keep(view, survey)
         };
-        let (looked, stored) = stream(survey, &self.order, &mut self.line, &mut tally, &mut keep, progress)?;
+        let (order, line) = (&self.order, &mut self.line);
+        let bytes = tally.bytes(survey) + gathered_bytes;
+        let (looked, stored) = keeping(bytes, || stream(survey, order, line, &mut tally, &mut keep, progress))?;
         Ok(Seen { tally, looked, stored })
     }
 

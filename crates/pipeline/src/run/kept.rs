@@ -90,6 +90,15 @@ impl Kept {
         }
     }
 
+    /// What it takes of so many views, byte: seven numbers of each pixel that is kept, ten where the truth is known, and a record of
+    /// each view with all that is said of it.
+    pub(crate) fn bytes(survey: &OpenSurvey, camera: &Camera, views: usize) -> u64 {
+        const RECORD: u64 = 3000;
+        let pixels = views * camera.format.width * camera.format.height;
+        let numbers = if survey.has_truth() { 10 } else { 7 };
+        8 * numbers * Thinning::of(pixels).kept(pixels) + RECORD * views as u64
+    }
+
     /// Keeps what is wanted of a view that has gone through the stages.
     pub(crate) fn add(&mut self, view: &View, survey: &OpenSurvey) -> Result<()> {
         let after = view.snapshot();

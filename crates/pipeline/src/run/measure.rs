@@ -55,6 +55,7 @@ pub(crate) fn summarise(
         doubts: doubts(flow, &kept.views, refusal.as_ref(), poses),
         refusal,
         own_clouds,
+        tiles: None,
         seconds: 0.0,
         out: String::new(),
     }

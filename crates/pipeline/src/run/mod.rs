@@ -29,6 +29,7 @@ use std::time::Instant;
 use atomic_output::{Destination, OutputFolder};
 use camera_model::Camera;
 use commands::made::without_times;
+use commands::memory::keeping;
 use range_io::calibration::Calibration;
 use range_io::survey::Survey;
 use range_io::tables::Station;
@@ -158,7 +159,8 @@ fn run_into(
         clouds.add(&view)?;
         kept.add(&view, survey)
     };
-    flow.views(&mut keep, progress)?;
+    let bytes = Kept::bytes(&flow.survey, flow.camera(), flow.order.views());
+    keeping(bytes, || flow.views(&mut keep, progress))?;
     let (summary, page) = complete(&folder, request, &survey, (flow, kept, clouds), start, progress)?;
     files::results::finish(folder, &summary, &page, progress)?;
     Ok(summary)
@@ -188,8 +190,9 @@ pub(crate) fn complete(
     };
     progress.begin("write results", 3);
     let common = if refusal.is_some() { None } else { common_poses(&kept.views, &flow.joined.poses) };
-    let own_clouds = clouds.finish(common.as_deref())?;
+    let (own_clouds, tiles) = clouds.finish(common.as_deref())?;
     let mut summary = measure::summarise(&request.plan, survey, &flow, &mut kept, refusal, own_clouds);
+    summary.tiles = tiles;
     summary.out = request.out.display().to_string();
     summary.seconds = commands::made::seconds_since(start);
     if without_times() {
@@ -294,5 +297,6 @@ pub fn process_each(
     let Flow { survey, stages, doubts, joined, .. } = flow;
     let OpenSurvey { survey, stated, vertical_axis, .. } = survey;
     let (views, poses) = (Vec::new(), joined.poses);
+    let stated = stated.into_rows();
     Ok(Processed { views, records, survey, camera, stated, vertical_axis, poses, stages, doubts })
 }

@@ -8,6 +8,7 @@ use std::time::Instant;
 
 use atomic_output::{Destination, write_text};
 use commands::made::{Made, program, without_times};
+use commands::memory::keeping;
 use commands::{Inputs, Judged, Progress, Tape, json, produce, produce_made, root_of};
 use range_io::survey::Survey;
 use serde::{Deserialize, Serialize};
@@ -135,7 +136,8 @@ fn part_into(
         clouds.add(&view)?;
         kept.add(&view, survey)
     };
-    let mut seen = flow.part_of_views(tally, &mut keep, progress)?;
+    let bytes = Kept::bytes(&flow.survey, flow.camera(), whole.views());
+    let mut seen = keeping(bytes, || flow.part_of_views(tally, &mut keep, progress))?;
     let (further_points, views) = (clouds.further(), kept.views.len());
     let own_clouds = clouds.finish_part()?;
     let mut tape = Tape::blank();

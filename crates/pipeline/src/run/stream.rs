@@ -1,7 +1,7 @@
 //! The frames of a survey, one after the other, through the stages up to registration.
 //!
-//! What is in memory at a time: [`READ_AT_ONCE`] frames as they were read, at most [`AVERAGED_AT_ONCE`] frames of a station
-//! that is averaged (and the means of as many parts), and the views of one station.
+//! What is in memory at a time: at most [`READ_AT_ONCE`] frames as they were read, fewer where little memory is allowed; at most
+//! [`AVERAGED_AT_ONCE`] frames of a station that is averaged (and the means of as many parts), and the views of one station.
 
 use std::collections::VecDeque;
 use std::time::Instant;
@@ -16,9 +16,10 @@ use crate::survey::open::OpenSurvey;
 use crate::survey::plausibility::{FrameWatch, StoredWatch};
 use crate::survey::view::View;
 use commands::Progress;
+use commands::memory::{FrameBytes, Memory, Work};
 use commands::plan::Stage;
 
-/// Frames that are read at once: reading is unpacking, which cores share.
+/// Frames that are read at once at most: reading is unpacking, which cores share.
 const READ_AT_ONCE: usize = 8;
 
 /// Frames that are averaged and tested at once, each kept as complex images. 64 of 640 x 480 pixels and one frequency take
@@ -69,6 +70,20 @@ impl Order {
         before
     }
 
+    /// Frames that may be read at once in the memory that is allowed, beside what is on its way in any case.
+    fn read_at_once(&self, survey: &OpenSurvey, line: &Line) -> Result<usize> {
+        let bytes = FrameBytes::of(&survey.survey);
+        let longest = self.units.iter().flatten().map(Vec::len).max().unwrap_or(0);
+        let waiting = if line.average().is_some() { waiting(longest) } else { 0 };
+        let views = self.units.iter().map(Vec::len).max().unwrap_or(1);
+        let kept = waiting as u64 * bytes.waiting + views as u64 * bytes.staged;
+        let what = match waiting {
+            0 => "taking frames through the stages".to_owned(),
+            _ => format!("averaging {longest} frames of a station"),
+        };
+        Memory::present().at_once(&Work { what: &what, kept, each: bytes.read, most: READ_AT_ONCE })
+    }
+
     /// The frames, as the survey counts them.
     pub(crate) fn indices(&self) -> impl Iterator<Item = usize> + '_ {
         self.units.iter().flatten().flatten().copied()
@@ -83,6 +98,17 @@ impl Order {
     pub(crate) fn views(&self) -> usize {
         self.units.len()
     }
+}
+
+/// Frames, and means of parts, of a station of so many frames that are in memory together until they are averaged.
+fn waiting(frames: usize) -> usize {
+    let parts = parts_of(frames);
+    if parts > 1 { parts + waiting(frames.div_ceil(parts)) } else { frames }
+}
+
+/// Parts in which so many frames are averaged.
+fn parts_of(frames: usize) -> usize {
+    frames.div_ceil(AVERAGED_AT_ONCE).min(AVERAGED_AT_ONCE)
 }
 
 /// One of several parts of a survey.
@@ -101,6 +127,11 @@ pub(crate) struct Before {
     /// Means of frames, where exposures are fused later.
     pub(crate) means: usize,
     pub(crate) views: usize,
+}
+
+/// A view that waits for others that it is averaged with: their mean has all but its values from the first.
+fn beside(view: View, is_first: bool) -> View {
+    if is_first { view } else { View { before: None, truth: None, reference_range: None, ..view } }
 }
 
 /// Items of one key, in the order in which keys come first.
@@ -124,6 +155,7 @@ struct Stream<'a> {
     progress: &'a dyn Progress,
     waiting: std::vec::IntoIter<usize>,
     read: VecDeque<View>,
+    read_at_once: usize,
     looked: FrameWatch,
     stored: StoredWatch,
     done: usize,
@@ -142,8 +174,9 @@ pub(crate) fn stream(
     let waiting: Vec<usize> = order.units.iter().flatten().flatten().copied().collect();
     progress.begin("frames", waiting.len());
     let (waiting, read) = (waiting.into_iter(), VecDeque::new());
+    let read_at_once = order.read_at_once(survey, line)?;
     let (looked, stored) = (FrameWatch::default(), StoredWatch::default());
-    let mut stream = Stream { survey, line, watch, progress, waiting, read, looked, stored, done: 0 };
+    let mut stream = Stream { survey, line, watch, progress, waiting, read, read_at_once, looked, stored, done: 0 };
     for unit in &order.units {
         stream.unit(unit)?.into_iter().try_for_each(&mut *keep)?;
     }
@@ -189,13 +222,13 @@ impl Stream<'_> {
 
     /// The mean of frames, in parts where they are many.
     fn part(&mut self, number: usize, frames: &[usize]) -> Result<(View, Tests)> {
-        let parts = frames.len().div_ceil(AVERAGED_AT_ONCE).min(AVERAGED_AT_ONCE);
+        let parts = parts_of(frames.len());
         let (mut views, mut tests): (Vec<View>, _) = (Vec::new(), Tests::default());
         if parts > 1 {
             for part in 0..parts {
                 let ends = [part, part + 1].map(|end| end * frames.len() / parts);
                 let (view, found) = self.part(number, &frames[ends[0]..ends[1]])?;
-                views.push(view);
+                views.push(beside(view, views.is_empty()));
                 tests = tests.join(found);
             }
         } else {
@@ -204,13 +237,11 @@ impl Stream<'_> {
                 self.line.apply_some(0..number, &mut one, self.watch)?;
                 self.done += 1;
                 self.progress.advance(self.done);
-                views.extend(one);
+                if let Some(view) = one.pop() {
+                    views.push(beside(view, views.is_empty()));
+                }
             }
             self.watch.before(number, self.line.steps()[number].stage(), &views);
-        }
-        // The mean has all but its values from the first.
-        for view in views.iter_mut().skip(1) {
-            (view.before, view.truth, view.reference_range) = (None, None, None);
         }
         let clock = Instant::now();
         let (view, found) = self.line.mean(number, views)?;
@@ -221,7 +252,7 @@ impl Stream<'_> {
     /// The frame whose turn it is.
     fn next(&mut self) -> Result<View> {
         if self.read.is_empty() {
-            let indices: Vec<usize> = self.waiting.by_ref().take(READ_AT_ONCE).collect();
+            let indices: Vec<usize> = self.waiting.by_ref().take(self.read_at_once).collect();
             let views = indices.into_par_iter().map(|index| self.survey.view(index));
             self.read = views.collect::<Result<VecDeque<View>>>()?;
             self.progress.frames_in_memory(self.survey.live.count());

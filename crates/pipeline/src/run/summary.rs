@@ -9,6 +9,7 @@ use crate::survey::drift::ViewDrift;
 use crate::survey::records::{RefusedStage, StageSummary};
 use crate::survey::truth::RangeTruth;
 use crate::trends::RemainingErrors;
+use commands::tiles::TiledCloud;
 use commands::{Doubt, Judged, Verdict};
 
 /// What a run did and how good the result is.
@@ -55,6 +56,9 @@ pub struct Summary {
     /// Clouds in the frames of their own cameras, where there is no common one.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub own_clouds: Vec<OwnCloud>,
+    /// The common cloud in tiles, where it has so many points that these take the place of `cloud.ply`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tiles: Option<TiledCloud>,
     /// What a reader should know before the result is used.
     pub doubts: Vec<Doubt>,
     /// Wall-clock time of the whole run, second; 0 where durations are left out.

@@ -27,6 +27,8 @@ pub(crate) struct Tally {
 
 struct StageTally {
     thinning: Thinning,
+    /// Values of one quantity that will be kept.
+    kept: u64,
     /// Views before and after it.
     views: [usize; 2],
     /// Absolute changes of the ranges, metre; `None` once a view had none.
@@ -50,8 +52,11 @@ impl Tally {
                 (false, true) => before.means,
                 (false, false) => before.frames,
             };
+            let pixels = views * format.width * format.height;
+            let thinning = Thinning::of(pixels).after(first);
             StageTally {
-                thinning: Thinning::of(views * format.width * format.height).after(first),
+                thinning,
+                kept: thinning.kept(pixels),
                 views: [0, 0],
                 changes: Some(Vec::new()),
                 truth: TruthTally::default(),
@@ -62,6 +67,12 @@ impl Tally {
         };
         let stages = (0..line.steps().len()).map(of_stage).collect();
         Self { stages, last: Vec::new(), last_stage: usize::MAX, clock: Instant::now() }
+    }
+
+    /// What it takes, byte: the changes of ranges and their errors.
+    pub(crate) fn bytes(&self, survey: &OpenSurvey) -> u64 {
+        let numbers = 1 + u64::from(survey.has_truth());
+        self.stages.iter().map(|stage| 8 * numbers * stage.kept).sum()
     }
 
     /// Writes it, or adds another part of the views.

@@ -7,8 +7,8 @@ use nalgebra::{Isometry3, Vector3};
 use point_cloud::{Cloud, OrganisedNormalOptions, organised_normals};
 use projective_registration::Projection;
 use range_io::clouds::CloudFile;
-use range_io::tables::Station as StatedStation;
 
+use crate::survey::open::StatedPoses;
 use crate::survey::plausibility::{self, PlacedStation};
 use crate::survey::records::StationPose;
 use crate::survey::view::View;
@@ -69,7 +69,7 @@ pub fn projection(camera: &Camera) -> Option<Arc<Projection>> {
 
 impl Station {
     /// A view of a survey whose stations stand as `stated`, seen by `projection`; `None` where it has no cloud.
-    pub fn of_view(view: &View, stated: &[StatedStation], projection: Option<&Arc<Projection>>) -> Option<Self> {
+    pub fn of_view(view: &View, stated: &StatedPoses, projection: Option<&Arc<Projection>>) -> Option<Self> {
         let cloud = view.cloud.as_ref()?;
         Some(Self {
             name: view.station.clone(),

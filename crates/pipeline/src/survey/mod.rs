@@ -15,7 +15,7 @@ pub(crate) mod view;
 pub use compatible::{Purpose, UNKNOWN_INTEGRATION_TIME_S, compatible, model_set};
 pub use correction_record::{CorrectionRecord, PixelLedger};
 pub use drift::{DriftCurve, DriftSource, FrameRatePart, ViewDrift};
-pub use open::{OpenSurvey, open, read_calibration};
+pub use open::{OpenSurvey, StatedPoses, open, read_calibration};
 pub use plausibility::{FrameWatch, SenseVotes, StoredWatch};
 pub use records::{AdjustmentFigures, RefusedStage, StageSummary, StationPose, ViewRecord};
 pub use truth::{RangeTruth, ViewTruth, wrap};

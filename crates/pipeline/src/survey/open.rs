@@ -1,5 +1,6 @@
 //! A survey's folder, opened: frames to views that the stages can work on.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -35,7 +36,7 @@ pub struct OpenSurvey {
     /// Rays of the nominal camera.
     pub rays: Arc<RayTable>,
     /// What `stations.csv` says of the stations.
-    pub stated: Vec<Station>,
+    pub stated: StatedPoses,
     /// Index of the world's axis that points up: z where poses came with the survey, y in a camera's own frame.
     pub vertical_axis: usize,
     /// What speaks against survey and calibration.
@@ -44,7 +45,7 @@ pub struct OpenSurvey {
     pub live: LiveFrames,
     root: PathBuf,
     depth_rays: Arc<RayTable>,
-    true_poses: Vec<Station>,
+    true_poses: StatedPoses,
     reference: Option<Raster<f32>>,
     modulations: Vec<Modulation>,
     /// Gives frames without a standard deviation one.
@@ -81,10 +82,10 @@ pub fn open(
         calibrated_camera,
         rays,
         vertical_axis: if stated.is_empty() { 1 } else { 2 },
-        stated,
+        stated: StatedPoses::new(stated),
         doubts,
         depth_rays,
-        true_poses,
+        true_poses: StatedPoses::new(true_poses),
         reference: read_reference(&survey, &root)?,
         modulations: survey.camera.modulations()?,
         range_noise: calibration.as_ref().and_then(|calibration| calibration.range_noise),
@@ -139,14 +140,19 @@ impl OpenSurvey {
         &self.modulations
     }
 
+    /// Whether the true ranges of its frames are known.
+    pub(crate) fn has_truth(&self) -> bool {
+        self.survey.truth.as_ref().is_some_and(|truth| !truth.frames.is_empty())
+    }
+
     /// Where the survey says that a station stands.
     pub fn approximate_pose(&self, station: &str) -> Option<Isometry3<f64>> {
-        pose_of(&self.stated, station)
+        self.stated.of(station).map(|row| row.world_from_camera)
     }
 
     /// Where it truly stands, of simulated surveys.
     pub fn true_pose(&self, station: &str) -> Option<Isometry3<f64>> {
-        pose_of(&self.true_poses, station)
+        self.true_poses.of(station).map(|row| row.world_from_camera)
     }
 }
 
@@ -168,8 +174,31 @@ pub fn read_poses(file: &Path) -> Result<Vec<Station>> {
     if file.is_file() { Ok(read_stations(file)?) } else { Ok(Vec::new()) }
 }
 
-fn pose_of(poses: &[Station], station: &str) -> Option<Isometry3<f64>> {
-    poses.iter().find(|row| row.station == station).map(|row| row.world_from_camera)
+/// What a `stations.csv` says, found by the names of the stations: a stream may have a hundred thousand.
+#[derive(Debug, Clone, Default)]
+pub struct StatedPoses {
+    rows: Vec<Station>,
+    places: BTreeMap<String, usize>,
+}
+
+impl StatedPoses {
+    fn new(rows: Vec<Station>) -> Self {
+        let mut places = BTreeMap::new();
+        for (place, row) in rows.iter().enumerate() {
+            places.entry(row.station.clone()).or_insert(place);
+        }
+        Self { rows, places }
+    }
+
+    /// What it says of a station; of several rows the first.
+    pub fn of(&self, station: &str) -> Option<&Station> {
+        self.places.get(station).map(|place| &self.rows[*place])
+    }
+
+    /// Its rows.
+    pub fn into_rows(self) -> Vec<Station> {
+        self.rows
+    }
 }
 
 fn read_view_truth(

@@ -8,12 +8,11 @@ use nalgebra::{Isometry3, Matrix3, Matrix6, Vector3};
 use serde::Serialize;
 
 use crate::survey::drift::ViewDrift;
-use crate::survey::open::OpenSurvey;
+use crate::survey::open::{OpenSurvey, StatedPoses};
 use crate::survey::plausibility;
 use crate::survey::truth::{RangeTruth, evaluate};
 use crate::survey::view::{View, ViewData};
 use commands::{Doubt, Tape};
-use range_io::tables::Station;
 use statistics::quantile;
 
 /// One stage of a run.
@@ -71,7 +70,7 @@ pub struct ViewRecord {
 
 impl ViewRecord {
     /// Of a view of a survey whose stations stand as `stated`.
-    pub fn new(view: &View, stated: &[Station]) -> Self {
+    pub fn new(view: &View, stated: &StatedPoses) -> Self {
         Self {
             station: view.station.clone(),
             name: view.name(),

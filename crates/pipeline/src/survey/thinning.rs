@@ -23,6 +23,11 @@ impl Thinning {
         Self { stride: stride | 1, first: 0 }
     }
 
+    /// Values that are kept of one quantity of so many pixels.
+    pub fn kept(self, pixels: usize) -> u64 {
+        (pixels / self.stride) as u64
+    }
+
     /// The same where the view of number 0 has so many before it.
     pub fn after(self, first: usize) -> Self {
         Self { first, ..self }

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use super::table::{Column, Table};
-use super::{Block, Document, Merit, Place, Section};
+use super::{Block, Document, Merit, Place, Section, shown};
 use crate::figure::{Figure, escape};
 
 const STYLE: &str = "
@@ -73,7 +73,8 @@ fn write_block(html: &mut String, block: &Block) {
         Block::Signature(text) => writeln!(html, "<p class=\"sign\">{}</p>", escape(text)),
         Block::Warnings(sentences) | Block::List(sentences) => {
             html.push_str("<ul>");
-            for sentence in sentences {
+            let (sentences, rest) = shown(sentences, "sentences");
+            for sentence in sentences.iter().chain(&rest) {
                 let _ = write!(html, "<li>{}</li>", escape(sentence));
             }
             writeln!(html, "</ul>")
@@ -113,7 +114,8 @@ fn write_table(html: &mut String, table: &Table) {
         let _ = write!(html, "<th{}>{}</th>", class(column), escape(&head));
     }
     html.push_str("</tr></thead>\n<tbody>");
-    for row in &table.rows {
+    let (rows, rest) = shown(&table.rows, "rows");
+    for row in rows {
         html.push_str("<tr>");
         for (column, cell) in row.iter().enumerate() {
             let _ = write!(html, "<td{}>{}</td>", class(column), escape(cell));
@@ -121,4 +123,7 @@ fn write_table(html: &mut String, table: &Table) {
         html.push_str("</tr>\n");
     }
     html.push_str("</tbody></table>\n");
+    if let Some(rest) = rest {
+        let _ = writeln!(html, "<p>{rest}</p>");
+    }
 }

@@ -10,6 +10,17 @@ pub use table::{Alignment, Column, Table, millimetres, rounded};
 
 use crate::figure::Figure;
 
+/// Rows of a table, and sentences of a list, that pages and texts show: of a survey of 100,000 frames a page of all would be tens of
+/// megabytes, and nobody reads on. How many are left out is said; `summary.json` has all.
+pub const MOST_ROWS: usize = 1000;
+
+/// What is shown of rows, and what to say of the rest.
+fn shown<'a, T>(rows: &'a [T], what: &str) -> (&'a [T], Option<String>) {
+    let rest = rows.len().saturating_sub(MOST_ROWS);
+    let words = (rest > 0).then(|| format!("{rest} further {what} are not shown; the files of the result have all."));
+    (&rows[..rows.len() - rest], words)
+}
+
 /// A result for people, said once: [`Document::html`] makes a page of it, its `Display` plain text.
 ///
 /// It grows section by section: what is added belongs to the section that was begun last.

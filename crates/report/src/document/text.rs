@@ -3,7 +3,7 @@
 use std::fmt;
 
 use super::table::{Column, Table};
-use super::{Block, Document, Place, Section};
+use super::{Block, Document, Place, Section, shown};
 
 /// Between two columns.
 const GAP: &str = "  ";
@@ -39,17 +39,23 @@ fn write_block(f: &mut fmt::Formatter<'_>, block: &Block) -> fmt::Result {
     match block {
         Block::Subtitle(text) => write!(f, "\n\n{text}"),
         Block::Paragraph(text) | Block::Signature(text) => write!(f, "\n{text}"),
-        Block::List(sentences) => sentences.iter().try_for_each(|sentence| write!(f, "\n- {sentence}")),
-        Block::Warnings(sentences) => sentences.iter().try_for_each(|sentence| write!(f, "\ndoubt: {sentence}")),
+        Block::List(sentences) => write_sentences(f, "- ", sentences),
+        Block::Warnings(sentences) => write_sentences(f, "doubt: ", sentences),
         Block::Merits(merits) => merits.iter().try_for_each(|merit| write!(f, "\n{}: {}", merit.name, merit.value)),
         Block::Table(table) => write_table(f, table),
         Block::Figures(_) => Ok(()),
     }
 }
 
+fn write_sentences(f: &mut fmt::Formatter<'_>, before: &str, sentences: &[String]) -> fmt::Result {
+    let (sentences, rest) = shown(sentences, "sentences");
+    sentences.iter().chain(&rest).try_for_each(|sentence| write!(f, "\n{before}{sentence}"))
+}
+
 fn write_table(f: &mut fmt::Formatter<'_>, table: &Table) -> fmt::Result {
     let head: Vec<String> = table.columns.iter().map(Column::head).collect();
-    let lines = || std::iter::once(&head).chain(&table.rows);
+    let (rows, rest) = shown(&table.rows, "rows");
+    let lines = || std::iter::once(&head).chain(rows);
     let columns: Vec<(usize, bool)> = (0..head.len())
         .map(|column| {
             let width = lines().filter_map(|row| row.get(column)).map(|cell| cell.chars().count()).max();
@@ -62,5 +68,5 @@ fn write_table(f: &mut fmt::Formatter<'_>, table: &Table) -> fmt::Result {
         });
         write!(f, "\n{}", cells.collect::<Vec<_>>().join(GAP).trim_end())?;
     }
-    Ok(())
+    rest.map_or(Ok(()), |rest| write!(f, "\n{rest}"))
 }

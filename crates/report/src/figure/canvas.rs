@@ -5,6 +5,7 @@ use std::fmt::Write;
 
 use super::Figure;
 use super::colour::hex;
+use super::density::{thin_dots, thin_line};
 use super::svg::{escape, open_svg};
 
 /// What stands around a chart.
@@ -135,11 +136,11 @@ impl Canvas {
         [MARGIN.left + width * share(x, self.x), MARGIN.top + height * (1.0 - share(y, self.y))]
     }
 
-    /// Dots, all in one path: thousands of them stay light.
+    /// Dots, all in one path: thousands of them stay light. Of very many, those that would lie on each other are drawn once.
     pub fn points(&mut self, values: &[(f64, f64)], colour: [u8; 3], opacity: f64) {
+        let places: Vec<[f64; 2]> = finite(values).map(|(x, y)| self.at([x, y])).collect();
         let mut path = String::new();
-        for (x, y) in finite(values) {
-            let [x, y] = self.at([x, y]);
+        for [x, y] in thin_dots(places) {
             let _ = write!(path, "M{x:.1} {y:.1}h0");
         }
         let _ = write!(
@@ -200,16 +201,16 @@ impl Canvas {
         Drawn::Dots
     }
 
-    /// A line through points; a gap where a value is missing.
+    /// A line through points; a gap where a value is missing. Of very many, those that no eye tells apart are left out.
     pub fn line(&mut self, values: &[(f64, f64)], colour: [u8; 3], dashes: &str) {
         let mut path = String::new();
+        let places: Vec<[f64; 2]> = values.iter().map(|&(x, y)| self.at([x, y])).collect();
         let mut pen = 'M';
-        for &(x, y) in values {
+        for [x, y] in thin_line(places) {
             if !(x.is_finite() && y.is_finite()) {
                 pen = 'M';
                 continue;
             }
-            let [x, y] = self.at([x, y]);
             let _ = write!(path, "{pen}{x:.1} {y:.1}");
             pen = 'L';
         }

@@ -1,7 +1,9 @@
 //! The registered cloud from above and from the side.
 
-use statistics::quantile;
+use std::collections::BTreeMap;
 use std::fmt::Write;
+
+use statistics::quantile;
 
 use super::Figure;
 use super::canvas::ticks;
@@ -45,6 +47,8 @@ impl Direction {
 }
 
 const WIDTH: usize = 560;
+/// Stations that are named below a picture; the colours come again after ten.
+const MOST_NAMED: usize = 48;
 const TALLEST: usize = 560;
 
 /// A picture of a slice through all clouds, each station in its colour, with perspective centres and a metre grid.
@@ -66,22 +70,34 @@ pub fn cloud_figure(title: &str, clouds: &[StationCloud<'_>], direction: Directi
         }
     }
     let image = data_uri(title, view.width, view.height, &rgb)?;
-    let longest = clouds.iter().map(|cloud| cloud.name.chars().count()).max().unwrap_or(0);
+    let further = clouds.len().saturating_sub(MOST_NAMED);
+    let named = &clouds[..clouds.len() - further];
+    let more = format!("and {further} more");
+    let names = || named.iter().map(|cloud| cloud.name).chain((further > 0).then_some(more.as_str()));
+    let longest = names().map(|name| name.chars().count()).max().unwrap_or(0);
     // About 5.5 pixels a letter, behind the coloured square.
     let entry = (24.0 + 5.5 * longest as f64).max(70.0) as usize;
     let columns = (view.width / entry).max(1);
-    let legend_rows = clouds.len().div_ceil(columns);
+    let legend_rows = names().count().div_ceil(columns);
     let mut svg = open_svg(title, view.width as f64, view.height as f64 + 26.0 + 18.0 * legend_rows as f64);
     let _ = write!(svg, r#"<image href="{image}" x="0" y="22" width="{}" height="{}"/>"#, view.width, view.height);
     metre_grid(&mut svg, &view);
+    let mut centres = BTreeMap::new();
     for (station, cloud) in clouds.iter().enumerate() {
         let colour = hex(CATEGORIES[station % CATEGORIES.len()]);
         if let Some([x, y]) = view.pixel(cloud.position) {
-            let _ = write!(svg, r##"<circle cx="{x}" cy="{}" r="4" fill="{colour}" stroke="#000"/>"##, y + 22);
+            centres.insert([x, y], colour);
         }
+    }
+    for ([x, y], colour) in centres {
+        let _ = write!(svg, r##"<circle cx="{x}" cy="{}" r="4" fill="{colour}" stroke="#000"/>"##, y + 22);
+    }
+    for (station, name) in names().enumerate() {
+        let colour =
+            if station < named.len() { hex(CATEGORIES[station % CATEGORIES.len()]) } else { "none".to_owned() };
         let (x, y) = ((station % columns) * entry, view.height + 38 + 18 * (station / columns));
         let _ = write!(svg, r#"<rect x="{x}" y="{}" width="10" height="10" fill="{colour}"/>"#, y - 9);
-        let _ = write!(svg, r#"<text x="{}" y="{y}" class="tick">{}</text>"#, x + 14, escape(cloud.name));
+        let _ = write!(svg, r#"<text x="{}" y="{y}" class="tick">{}</text>"#, x + 14, escape(name));
     }
     svg.push_str("</svg>");
     Ok(Figure::new(svg))

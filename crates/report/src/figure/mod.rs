@@ -4,6 +4,7 @@ mod canvas;
 mod chart;
 mod cloud;
 mod colour;
+mod density;
 mod deviation;
 mod heat_map;
 mod labels;

@@ -95,6 +95,11 @@ impl PatternEstimator {
         Ok(Self { walls, camera: *camera, options: *options })
     }
 
+    /// What is kept until the end, and taken by the estimation then, byte.
+    pub fn bytes(&self) -> u64 {
+        self.walls.bytes()
+    }
+
     /// The next frame.
     ///
     /// # Errors

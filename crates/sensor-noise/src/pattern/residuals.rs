@@ -68,6 +68,13 @@ impl Walls {
         Ok(Self { all, stations, wall_of, squares: vec![0.0; pixels], quality: Vec::new(), of_stations })
     }
 
+    /// What the walls take, byte: sums, variances and frames of each pixel (20), its squares and a pattern of it (24), and what is
+    /// kept of each frame.
+    pub(super) fn bytes(&self) -> u64 {
+        let (pixels, walls) = (self.squares.len() as u64, self.all.len() as u64);
+        pixels * (20 * walls + 24) + 300 * self.stations.len() as u64
+    }
+
     /// Fits a plane to the next frame.
     pub(super) fn add(&mut self, frame: &RangeFrame, camera: &Camera, options: &PatternOptions) -> Result<()> {
         let number = self.quality.len();

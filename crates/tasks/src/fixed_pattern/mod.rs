@@ -9,6 +9,7 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use atomic_output::Destination;
+use commands::memory::keeping;
 use commands::plan::{CorrectRangeOptions, DeconvolveOptions, DemodulateOptions, UnwrapOptions};
 use commands::{Inputs, Progress, json, produce};
 use pipeline::run::process_each;
@@ -65,11 +66,12 @@ fn estimate(
     let estimation = Error::estimation("fixed pattern", &request.survey);
     let estimator = PatternEstimator::new(stations, &calibration.camera()?, &request.options);
     let mut estimator = estimator.map_err(&estimation)?;
+    let kept = estimator.bytes();
     let mut see = |view: View, _: &OpenSurvey| match view.data {
         ViewData::Range(frame) => estimator.add(&frame).map_err(&estimation),
         _ => Err(Error::Needs { stage: "fixed pattern", needs: "Unwrap" }),
     };
-    process_each(&plan, &request.survey, known, &mut see, progress)?;
+    keeping(kept, || process_each(&plan, &request.survey, known, &mut see, progress))?;
     progress.begin("estimate the fixed pattern", 1);
     let estimate = estimator.finish();
     progress.advance(1);

@@ -34,7 +34,7 @@ type Answer = std::result::Result<Estimate, Failed>;
 impl Estimate {
     /// From samples where there are any; else from ranges, or from phases as ranges.
     pub(crate) fn new(survey: &OpenSurvey, options: &NoiseFitOptions, progress: &dyn Progress) -> Answer {
-        let stations = Stations::new(survey, progress);
+        let stations = Stations::new(survey, progress)?;
         let first = survey.view(0)?;
         if matches!(first.data, ViewData::Samples(_)) {
             return Self::of_samples(&stations, options);

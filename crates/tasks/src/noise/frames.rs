@@ -3,12 +3,13 @@
 use std::cell::Cell;
 
 use commands::Progress;
+use commands::memory::{FrameBytes, Memory, Work};
 use pipeline::Error;
 use pipeline::survey::{LiveFrames, OpenSurvey, View};
 use rayon::prelude::*;
 use sensor_noise::Frames;
 
-/// Frames that are read at once: reading is unpacking, which cores share.
+/// Frames that are read at once at most: reading is unpacking, which cores share.
 const READ_AT_ONCE: usize = 8;
 
 /// Why there is no estimate.
@@ -40,10 +41,17 @@ pub(crate) struct Stations<'a> {
     named: Vec<(String, Vec<usize>)>,
     /// Frames that were read since all were last.
     done: Cell<usize>,
+    read_at_once: usize,
 }
 
+/// What is kept of each value whose scatter is estimated (sums, variances, their order), byte, and of how many values at most: more
+/// are thinned.
+const BYTES_A_VALUE: u64 = 210;
+const MOST_VALUES: u64 = 1 << 22;
+
 impl<'a> Stations<'a> {
-    pub(crate) fn new(survey: &'a OpenSurvey, progress: &'a dyn Progress) -> Self {
+    /// Refuses a survey for whose frames too little memory is allowed.
+    pub(crate) fn new(survey: &'a OpenSurvey, progress: &'a dyn Progress) -> Result<Self, Error> {
         let mut stations: Vec<(String, Vec<usize>)> = Vec::new();
         let mut places = std::collections::BTreeMap::new();
         for (index, frame) in survey.survey.frames.iter().enumerate() {
@@ -53,7 +61,13 @@ impl<'a> Stations<'a> {
                 None => stations.push((frame.station.clone(), vec![index])),
             }
         }
-        Self { survey, progress, named: stations, done: Cell::new(0) }
+        let (bytes, camera) = (FrameBytes::of(&survey.survey), &survey.survey.camera);
+        let planes = (camera.modulation_hz.len().max(1) * camera.phase_steps.unwrap_or(1)) as u64;
+        let values = (bytes.pixels * planes * stations.len() as u64).min(MOST_VALUES);
+        let (kept, each) = (BYTES_A_VALUE * values, bytes.read + bytes.waiting);
+        let work = Work { what: "estimating noise", kept, each, most: READ_AT_ONCE };
+        let read_at_once = Memory::present().at_once(&work)?;
+        Ok(Self { survey, progress, named: stations, done: Cell::new(0), read_at_once })
     }
 
     /// Name and frames of each station as what `make` makes of a view.
@@ -90,7 +104,7 @@ impl<F: Send> Frames<F> for Station<'_, F> {
 
     fn each(&self, see: &mut dyn FnMut(&F) -> Result<(), sensor_noise::Error>) -> Result<(), Failed> {
         let (survey, make) = (self.all.survey, self.make);
-        for some in self.frames.chunks(READ_AT_ONCE) {
+        for some in self.frames.chunks(self.all.read_at_once) {
             let read = some.par_iter().map(|index| {
                 let view = survey.view(*index)?;
                 let live = view.live.clone();

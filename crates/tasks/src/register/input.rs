@@ -1,7 +1,9 @@
 //! Surveys and clouds as stations with points, normals and what is known of them.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
+use commands::memory::{FrameBytes, keeping};
 use commands::plan::{
     CorrectImagePointOptions, CorrectRangeOptions, FlagOptions, FuseExposuresOptions, PointCloudOptions, to_ranges,
 };
@@ -19,6 +21,9 @@ use statistics::quantile;
 
 use crate::inertial_unit;
 use crate::register::{RegisterMethod, RegisterRequest};
+
+/// Of a point of a station: as it is read (34), and with normals, neighbours and partners while stations are registered.
+const BYTES_A_POINT: u64 = 200;
 
 /// Everything that is to be registered.
 pub(crate) struct Input {
@@ -83,7 +88,9 @@ fn survey_stations(path: &Path, request: &RegisterRequest, progress: &dyn Progre
         stations.extend(Station::of_view(&view, &survey.stated, None));
         Ok(())
     };
-    let processed = process_each(&plan, &root_of(path), known, &mut keep, progress)?;
+    let names: BTreeSet<&str> = survey.frames.iter().map(|frame| frame.station.as_str()).collect();
+    let kept = BYTES_A_POINT * FrameBytes::of(&survey).pixels * names.len() as u64;
+    let processed = keeping(kept, || process_each(&plan, &root_of(path), known, &mut keep, progress))?;
     let projection = projection(&processed.camera);
     for station in &mut stations {
         station.projection.clone_from(&projection);

@@ -75,7 +75,7 @@ fn register_into(
     summary.inputs = request.inputs.iter().map(|path| path.display().to_string()).collect();
     summary.out = request.out.display().to_string();
     summary.seconds = commands::made::seconds_since(clock);
-    results::write(destination, &registered, progress)?;
+    results::write(destination, &mut registered, progress)?;
     progress.finish();
     Ok(registered.summary)
 }

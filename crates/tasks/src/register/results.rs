@@ -1,7 +1,7 @@
 //! The files of a registration.
 
 use atomic_output::{Destination, write_text};
-use commands::{Progress, json, words_about};
+use commands::{Progress, json, tiles, words_by_subject};
 use pipeline::Result;
 use pipeline::stations::Station;
 use range_io::clouds::{CloudFile, Precision};
@@ -13,20 +13,26 @@ use crate::register::Registered;
 use crate::register::document::{Figures, document};
 
 /// Writes everything, which appears when the last file is complete.
-pub(crate) fn write(destination: &Destination, registered: &Registered, progress: &dyn Progress) -> Result<()> {
+pub(crate) fn write(destination: &Destination, registered: &mut Registered, progress: &dyn Progress) -> Result<()> {
     progress.begin("write results", 5);
-    let page = document(&registered.summary, Figures::new(registered)?);
     let folder = destination.open()?;
-    write_cloud(folder.file("cloud.ply")?, &merged(registered), Precision::Single)?;
+    let cloud = merged(registered);
+    write_cloud(folder.file("cloud.ply")?, &cloud, Precision::Single)?;
+    let points = cloud.points.len() as u64;
+    drop(cloud);
+    registered.summary.tiles = tiles::of_cloud(&folder, "cloud", points)?;
+    let registered = &*registered;
+    let page = document(&registered.summary, Figures::new(registered)?);
     progress.advance(1);
     let known = || registered.stations.iter().zip(&registered.poses);
+    let doubts = words_by_subject(&registered.summary.doubts);
     let rows: Vec<StationRow> = known()
         .map(|(station, pose)| StationRow {
             station: station.name.clone(),
             world_from_camera: pose.world_from_camera,
             sigma_position_m: pose.sigmas().map(|sigmas| sigmas.0),
             sigma_attitude_rad: pose.sigmas().map(|sigmas| sigmas.1),
-            doubt: words_about(&registered.summary.doubts, &station.name),
+            doubt: doubts.get(station.name.as_str()).cloned(),
         })
         .collect();
     write_stations(folder.file("stations.csv")?, &rows)?;

@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use commands::tiles::TiledCloud;
 use commands::{Doubt, Judged};
 use serde::Serialize;
 
@@ -34,6 +35,9 @@ pub struct RegisterSummary {
     pub position_error_max_m: Option<f64>,
     /// Largest error of a station's attitude, where the truth is known, degree.
     pub attitude_error_max_deg: Option<f64>,
+    /// The cloud in tiles, where it has so many points that these take the place of `cloud.ply`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tiles: Option<TiledCloud>,
     /// What a reader should know before the poses are used.
     pub doubts: Vec<Doubt>,
     /// Wall-clock time, second.

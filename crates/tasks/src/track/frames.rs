@@ -4,6 +4,7 @@ use projective_registration::Projection;
 use std::path::Path;
 use std::sync::Arc;
 
+use commands::memory::{FrameBytes, Memory, Work};
 use commands::plan::DriftTreatment;
 use commands::{Doubt, Progress, root_of};
 use nalgebra::Isometry3;
@@ -12,8 +13,14 @@ use pipeline::stations::projection;
 use pipeline::survey::{FrameWatch, OpenSurvey, Purpose, SenseVotes, StoredWatch, View, open, read_calibration};
 use pipeline::{Error, Result, Stage};
 use range_io::survey::Survey;
+use tracking::TrackerOptions;
 
 use crate::register::input::stages;
+
+/// Of a pixel of a keyframe: 80 bytes for each node, which is made from four pixels, as much again for features and map.
+const BYTES_A_PIXEL: u64 = 40;
+/// Of a frame: its pose with covariance as tracked and adjusted, its row in summary and tables.
+const BYTES_A_FRAME: u64 = 6000;
 
 /// The sense of the phase is the same in all frames: it is judged in some.
 const SENSE_EVERY: usize = 16;
@@ -45,6 +52,11 @@ impl FrameSource {
         // Frames of a moving camera are not averaged.
         stages.retain(|stage| !matches!(stage, Stage::Average(_)));
         let line = Line::new(&stages, &survey)?;
+        let bytes = FrameBytes::of(&survey.survey);
+        // Keyframes and the map that is made of them; poses and what is said of each frame.
+        let keyframes = BYTES_A_PIXEL * bytes.pixels * (TrackerOptions::default().max_keyframes as u64 + 4);
+        let kept = keyframes + BYTES_A_FRAME * order.len() as u64 + bytes.staged;
+        Memory::present().at_once(&Work { what: "tracking frames", kept, each: bytes.read, most: 1 })?;
         Ok(Self {
             survey,
             line,

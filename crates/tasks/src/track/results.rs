@@ -1,7 +1,7 @@
 //! The files of a tracked sequence.
 
 use atomic_output::{Destination, write_text};
-use commands::{Progress, json, words_about};
+use commands::{Progress, json, words_by_subject};
 use pipeline::Result;
 use range_io::clouds::{CloudFile, Precision};
 use range_io::ply::write_cloud;
@@ -40,6 +40,7 @@ fn trajectory(poses: &[TrackedPose]) -> Vec<StampedPose> {
 
 fn stations(tracked: &Tracked) -> Vec<Station> {
     let frames = tracked.summary.per_frame.iter().zip(&tracked.poses);
+    let doubts = words_by_subject(&tracked.summary.doubts);
     frames
         .filter_map(|(frame, pose)| {
             let pose = station_pose(pose)?;
@@ -48,7 +49,7 @@ fn stations(tracked: &Tracked) -> Vec<Station> {
                 world_from_camera: pose.world_from_camera,
                 sigma_position_m: pose.sigmas().map(|sigmas| sigmas.0),
                 sigma_attitude_rad: pose.sigmas().map(|sigmas| sigmas.1),
-                doubt: words_about(&tracked.summary.doubts, &frame.name),
+                doubt: doubts.get(frame.name.as_str()).cloned(),
             })
         })
         .collect()

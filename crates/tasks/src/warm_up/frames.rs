@@ -4,6 +4,7 @@ use std::ops::Range;
 use std::path::Path;
 
 use commands::Progress;
+use commands::memory::{FrameBytes, Memory, Work};
 use pipeline::stages::Line;
 use pipeline::survey::{OpenSurvey, Purpose, View, ViewData, open};
 use pipeline::{DemodulateOptions, Error, Result, Stage};
@@ -11,13 +12,15 @@ use range_image::{RangeFrame, Raster};
 use range_io::survey::{Level, Survey};
 use rayon::prelude::*;
 
-/// Frames in memory at a time.
-pub(crate) const FRAMES_AT_ONCE: usize = 32;
+/// Frames in memory at a time, at most.
+const FRAMES_AT_ONCE: usize = 32;
 
 /// Reads frames and brings them to ranges, wrapped where they come from phases.
 pub(crate) struct FrameSource {
     survey: OpenSurvey,
     line: Line,
+    /// Frames in memory at a time.
+    pub(crate) at_once: usize,
 }
 
 impl FrameSource {
@@ -48,7 +51,13 @@ impl FrameSource {
             Level::Samples => &[Stage::Demodulate(DemodulateOptions::default())],
             _ => &[],
         };
-        Ok(Self { line: Line::new(stages, &opened)?, survey: opened })
+        let bytes = FrameBytes::of(survey);
+        // Sums of each pixel in two passes, and a change of each frame; a frame as it is read, as complex image and as ranges.
+        let kept = 120 * bytes.pixels + 200 * survey.frames.len() as u64;
+        let each = bytes.read + 2 * bytes.waiting;
+        let work = Work { what: "taking the mean change of each frame", kept, each, most: FRAMES_AT_ONCE };
+        let at_once = Memory::present().at_once(&work)?;
+        Ok(Self { line: Line::new(stages, &opened)?, survey: opened, at_once })
     }
 
     pub(crate) fn survey(&self) -> &Survey {

@@ -8,7 +8,7 @@ use range_image::Raster;
 use range_io::survey::ReferencePath;
 use warm_up::{ChangeMeter, ChangeOptions, DriftSample, PixelMeans, RangeChange};
 
-use crate::warm_up::frames::{FRAMES_AT_ONCE, FrameSource};
+use crate::warm_up::frames::FrameSource;
 use crate::warm_up::{ReferenceUse, WarmUpRequest};
 
 /// One sample a frame, and what they come from.
@@ -132,8 +132,9 @@ fn each_frame(
 ) -> Result<()> {
     let count = source.survey().frames.len();
     progress.begin(work, count);
-    for start in (0..count).step_by(FRAMES_AT_ONCE) {
-        let end = count.min(start + FRAMES_AT_ONCE);
+    let at_once = source.at_once;
+    for start in (0..count).step_by(at_once) {
+        let end = count.min(start + at_once);
         for (place, frame) in source.read(start..end, progress)?.iter().enumerate() {
             act(start + place, frame)?;
         }

@@ -12,6 +12,8 @@ use nalgebra::{Isometry3, Point3};
 use range_io::ply::{CloudFile, PlyWriter, Precision, read_cloud, write_cloud};
 use serde::{Deserialize, Serialize};
 
+use commands::tiles::{self, LastPoints, TiledCloud};
+
 use crate::survey::open::OpenSurvey;
 use crate::survey::records::StationPose;
 use crate::survey::view::View;
@@ -37,8 +39,10 @@ pub(crate) struct Clouds<'a> {
     placed: bool,
     views: usize,
     common: Option<PlyWriter>,
+    /// Points in it.
+    points: u64,
     /// Points of split pixels in the common frame, which are written last.
-    further: Vec<CloudFile>,
+    further: LastPoints<'a>,
     own: Vec<Own>,
 }
 
@@ -57,7 +61,8 @@ impl<'a> Clouds<'a> {
         let one_station = stations.len() == 1;
         let known = |station: &&str| survey.approximate_pose(station).is_some();
         let placed = !joins && (one_station || stations.iter().all(known));
-        Self { folder, joins, one_station, placed, views, common: None, further: Vec::new(), own: Vec::new() }
+        let further = LastPoints::new(folder);
+        Self { folder, joins, one_station, placed, views, common: None, points: 0, further, own: Vec::new() }
     }
 
     /// Writes the cloud of a view, where it has one.
@@ -69,7 +74,7 @@ impl<'a> Clouds<'a> {
         let own = self.one_station.then(Isometry3::identity);
         if let Some(pose) = stated.or(own).filter(|_| self.placed) {
             self.append(&moved(cloud.points, &pose))?;
-            self.further.push(moved(cloud.further, &pose));
+            self.further.add(&moved(cloud.further, &pose))?;
             return Ok(());
         }
         let further = cloud.further.points.len();
@@ -86,7 +91,7 @@ impl<'a> Clouds<'a> {
 
     /// How many points of split pixels end the common cloud that [`Self::finish`] writes.
     pub(crate) fn further(&self) -> usize {
-        self.further.iter().map(|cloud| cloud.points.len()).sum()
+        self.further.points()
     }
 
     /// Adds the files of another part of the views, whose common cloud ends with so many points of split pixels.
@@ -95,7 +100,7 @@ impl<'a> Clouds<'a> {
         if common.is_file() {
             let (points, further) = parted(read_cloud(&common)?, further);
             self.append(&points)?;
-            self.further.push(further);
+            self.further.add(&further)?;
         }
         for cloud in own {
             let (from, to) = (part.join(&cloud.file), self.folder.file(&cloud.file)?);
@@ -111,40 +116,48 @@ impl<'a> Clouds<'a> {
             Some(writer) => writer,
             None => self.common.insert(PlyWriter::create(self.folder.file("cloud.ply")?, Precision::Single)?),
         };
+        self.points += points.points.len() as u64;
         Ok(writer.append(points)?)
     }
 
     /// Completes the files of a part, which are in the common frame where the survey knows it.
-    pub(crate) fn finish_part(self) -> Result<Vec<OwnCloud>> {
+    pub(crate) fn finish_part(mut self) -> Result<Vec<OwnCloud>> {
         let (placed, known) = (self.placed, Vec::new());
-        self.finish(placed.then_some(known.as_slice()))
+        Ok(self.complete(placed.then_some(known.as_slice()))?.0)
     }
 
     /// Completes the files: one cloud where there are poses of all views in a common frame. Else the files of the views.
-    pub(crate) fn finish(mut self, common: Option<&[StationPose]>) -> Result<Vec<OwnCloud>> {
+    /// A common one of many points is in tiles.
+    pub(crate) fn finish(mut self, common: Option<&[StationPose]>) -> Result<(Vec<OwnCloud>, Option<TiledCloud>)> {
+        let (own, points) = self.complete(common)?;
+        Ok((own, tiles::of_cloud(self.folder, "cloud", points)?))
+    }
+
+    fn complete(&mut self, common: Option<&[StationPose]>) -> Result<(Vec<OwnCloud>, u64)> {
         let own = std::mem::take(&mut self.own);
         let Some(poses) = common else {
             for file in own.iter().filter(|_| self.joins) {
                 let path = self.folder.file(&file.cloud.file)?;
                 write_cloud(&path, &read_cloud(&path)?, Precision::Single)?;
             }
-            return Ok(own.into_iter().map(|own| own.cloud).collect());
+            return Ok((own.into_iter().map(|own| own.cloud).collect(), 0));
         };
         for file in &own {
             let path = self.folder.file(&file.cloud.file)?;
             let pose = &poses[file.number].world_from_camera;
             let (points, further) = parted(moved(read_cloud(&path)?, pose), file.further);
             self.append(&points)?;
-            self.further.push(further);
+            self.further.add(&further)?;
             self.folder.discard(&file.cloud.file)?;
         }
-        for further in std::mem::take(&mut self.further) {
+        for number in 0..self.further.close()? {
+            let further = self.further.take(number)?;
             self.append(&further)?;
         }
-        if let Some(writer) = self.common {
+        if let Some(writer) = self.common.take() {
             writer.commit()?;
         }
-        Ok(Vec::new())
+        Ok((Vec::new(), self.points))
     }
 }
 

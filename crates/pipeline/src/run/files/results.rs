@@ -9,7 +9,7 @@ use crate::run::summary::Summary;
 use crate::survey::records::{StationPose, ViewRecord};
 use commands::Progress;
 use commands::json;
-use commands::words_about;
+use commands::words_by_subject;
 
 /// Writes where the views stand in the frame that they have in common.
 pub(crate) fn write_poses(
@@ -18,12 +18,13 @@ pub(crate) fn write_poses(
     poses: &[StationPose],
     summary: &Summary,
 ) -> Result<()> {
+    let doubts = words_by_subject(&summary.doubts);
     let row = |(view, pose): (&ViewRecord, &StationPose)| Station {
         station: view.station.clone(),
         world_from_camera: pose.world_from_camera,
         sigma_position_m: pose.sigmas().map(|sigmas| sigmas.0),
         sigma_attitude_rad: pose.sigmas().map(|sigmas| sigmas.1),
-        doubt: words_about(&summary.doubts, &view.station),
+        doubt: doubts.get(view.station.as_str()).cloned(),
     };
     let rows: Vec<Station> = views.iter().zip(poses).map(row).collect();
     write_stations(folder.file("stations.csv")?, &rows)?;

@@ -17,7 +17,10 @@ use crate::survey::view::View;
 use crate::{Error, Result};
 use commands::plan::{RegisterOptions, StartPoses};
 
-/// Points of all stations together, about. Each takes 70 bytes here and twice as much in the adjustment. A survey of fewer,
+/// Of a point here, and twice as much in the adjustment.
+const BYTES_A_POINT: u64 = 210;
+
+/// Points of all stations together, about. A survey of fewer,
 /// 100 stations of 176 x 144 pixels, keeps all; of more, each station is thinned evenly once it has its normals: patches
 /// grow as points become fewer.
 const MOST_POINTS: usize = 2_500_000;
@@ -30,8 +33,9 @@ pub(crate) struct Gathered {
     options: RegisterOptions,
     projection: Option<Arc<Projection>>,
     windows: Windows,
-    /// Of so many points of a station one is kept.
+    /// Of so many points of a station one is kept; pixels of all stations.
     stride: usize,
+    pixels: usize,
     pending: Vec<Station>,
     pub(crate) names: Vec<String>,
     /// Where the survey says that they stand.
@@ -60,6 +64,7 @@ impl Gathered {
             projection: projection(camera),
             windows: Windows::of_start(has_poses),
             stride: pixels.div_ceil(MOST_POINTS).max(1),
+            pixels,
             pending: Vec::new(),
             names: Vec::new(),
             stated: Vec::new(),
@@ -70,6 +75,11 @@ impl Gathered {
             failed: None,
             seconds: 0.0,
         }
+    }
+
+    /// What the stations take until they are adjusted, byte.
+    pub(crate) fn bytes(&self) -> u64 {
+        BYTES_A_POINT * (self.pixels / self.stride) as u64
     }
 
     /// Adds a view with its cloud.

@@ -1,10 +1,10 @@
 //! What a result shows that no sound survey does.
 
 use range_image::Flags;
-use range_io::tables::Station;
 
 use commands::{Doubt, DoubtKind};
 
+use crate::survey::open::StatedPoses;
 use crate::survey::plausibility::{PlacedStation, displaced, uncertain};
 use crate::survey::records::{StationPose, ViewRecord};
 use crate::survey::view::{View, ViewData};
@@ -43,8 +43,8 @@ fn placed<'a>(view: &'a ViewRecord, pose: &'a StationPose) -> PlacedStation<'a> 
 }
 
 /// Standard deviations in space of the position, metre, and the attitude, radian, that `stations.csv` states.
-pub fn stated_sigma(stated: &[Station], name: &str) -> [Option<f64>; 2] {
-    let row = stated.iter().find(|row| row.station == name);
+pub fn stated_sigma(stated: &StatedPoses, name: &str) -> [Option<f64>; 2] {
+    let row = stated.of(name);
     let in_space = |sigmas: [f64; 3]| sigmas.iter().map(|sigma| sigma * sigma).sum::<f64>().sqrt();
     [row.and_then(|row| row.sigma_position_m), row.and_then(|row| row.sigma_attitude_rad)].map(|s| s.map(in_space))
 }

@@ -5,6 +5,7 @@ mod residuals;
 
 use std::fmt;
 
+use commands::tiles::cloud_file;
 use report::{Column, Document, Merit, millimetres};
 
 pub(crate) use figures::Figures;
@@ -56,8 +57,9 @@ pub(crate) fn document(summary: &RegisterSummary, figures: Figures) -> Document 
         document.list(&summary.refused);
     }
     document.closing(format!(
-        "written to {}: report.html, summary.json, cloud.ply, stations.csv, trajectory.txt",
-        summary.out
+        "written to {}: report.html, summary.json, {}, stations.csv, trajectory.txt",
+        summary.out,
+        cloud_file(summary.tiles.as_ref(), "cloud.ply")
     ));
     document
 }

@@ -9,5 +9,6 @@ mod dropping;
 mod page;
 mod recording;
 mod refusals;
+mod path;
 mod sources;
 mod wire;

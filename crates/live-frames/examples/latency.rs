@@ -6,11 +6,11 @@
 //! which things move; 40 simulated frames are played forth and back. Times are those of the clock and those of the processor, over all threads.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
-#[path = "../../../xtask/peers/cpu_clock.rs"]
-mod cpu_clock;
 #[path = "../tests/common/mod.rs"]
 #[allow(dead_code)] // each user takes a part of it
 mod common;
+#[path = "../../../xtask/peers/cpu_clock.rs"]
+mod cpu_clock;
 
 use std::time::Instant;
 
@@ -144,7 +144,8 @@ fn processor_time_ms() -> f64 {
 #[cfg(feature = "tracking")]
 fn keep_map(processor: &mut Processor, tracking: bool) {
     if tracking {
-        processor.keep_map(live_frames::tracking::SurfaceMap::new(live_frames::tracking::MapOptions::default()).unwrap());
+        processor
+            .keep_map(live_frames::tracking::SurfaceMap::new(live_frames::tracking::MapOptions::default()).unwrap());
     }
 }
 

@@ -5,11 +5,11 @@
 //! median-mm wrong-% median-mm-of-sure wrong-%-of-sure`, `lost frames`. Positions beside true ones go to `positions.txt`.
 #![allow(clippy::unwrap_used, clippy::print_stdout, clippy::panic)]
 
-#[path = "../../../xtask/peers/cpu_clock.rs"]
-mod cpu_clock;
 #[path = "../tests/common/mod.rs"]
 #[allow(dead_code)] // each user takes a part of it
 mod common;
+#[path = "../../../xtask/peers/cpu_clock.rs"]
+mod cpu_clock;
 
 use std::path::{Path, PathBuf};
 
@@ -52,8 +52,10 @@ fn simulate(sequence: &Sequence, folder: &Path, frames: usize) {
     let mut poses = String::new();
     for number in 0..frames {
         let frame = sequence.frame(number);
-        let Samples::U16(samples) = frame.raw.samples() else { panic!("samples are whole numbers") };
-        std::fs::write(file(folder, "samples", number), bytes(samples, u16::to_le_bytes)).unwrap();
+        let Samples::F32(samples) = frame.raw.samples() else { panic!("samples are not digitised") };
+        // As a camera delivers them.
+        let samples: Vec<u16> = samples.iter().map(|value| value.round() as u16).collect();
+        std::fs::write(file(folder, "samples", number), bytes(&samples, u16::to_le_bytes)).unwrap();
         std::fs::write(file(folder, "truth", number), bytes(frame.truth.range.as_slice(), f32::to_le_bytes)).unwrap();
         poses += &pose_line(&frame.truth.world_from_camera);
     }
@@ -72,7 +74,8 @@ fn camera(sequence: &Sequence) -> String {
     let interval_m = sequence.camera().modulations[0].ambiguity_interval_m();
     let model = model(interval_m);
     let (terms, hyperbola) = (model.terms, model.hyperbola.unwrap());
-    let live_frames::range_image::NoiseModel { shot_variance_per_unit, dark_sigma } = sequence.calibration().noise.unwrap();
+    let live_frames::range_image::NoiseModel { shot_variance_per_unit, dark_sigma } =
+        sequence.calibration().noise.unwrap();
     let periodic = terms.periodic.map(|value| value.to_string()).join(" ");
     let pitch_mm = 6.4 / sequence.width as f64;
     format!(

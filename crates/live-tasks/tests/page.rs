@@ -55,7 +55,8 @@ impl Running {
     pub fn asking(world: &World, tracking: Option<LiveTracking>) -> Self {
         let ends = Arc::new(AtomicBool::new(false));
         let camera = Camera { frames: world.frames(), number: 0, ends: Arc::clone(&ends) };
-        let request = LiveRequest { view: Some(0), every_frame: false, tracking, ..world.request(LiveSource::StandardInput) };
+        let request =
+            LiveRequest { view: Some(0), every_frame: false, tracking, ..world.request(LiveSource::StandardInput) };
         let (page, address) = channel();
         let thread = std::thread::spawn(move || live_from(Box::new(camera), &request, &mut Page(page)).unwrap());
         let running = Self { address: address.recv().unwrap(), ends, thread };

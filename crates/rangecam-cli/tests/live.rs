@@ -244,7 +244,8 @@ fn a_killed_stream_replaces_nothing() {
         assert_eq!(std::fs::read(folder.path().join(name)).unwrap(), b"older", "{name}");
     }
     assert_eq!(partial(), 3);
-    let again = ["survey", "--fast", "--frames", "2", "--ply", "c.ply", "--mcap", "i.mcap", "--trajectory", "t.txt", "-q"];
+    let again =
+        ["survey", "--fast", "--frames", "2", "--ply", "c.ply", "--mcap", "i.mcap", "--trajectory", "t.txt", "-q"];
     let (code, _, words) = piped(folder.path(), &again, Vec::new());
     assert_eq!(code, Some(0), "{words}");
     assert_eq!(partial(), 0);

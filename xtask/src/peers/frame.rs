@@ -73,7 +73,12 @@ fn print(least: &Least) {
     head(&["errors against the truth", "range, median mm", "wrong counts, %", "path, rms mm", "lost frames"]);
     let get = |case: &str, who: &str, figure: &str| number(least.get(case, who, figure));
     let error = |figure: &str| get("peers", "errors", figure);
-    println!("| the chain, counts anchored by the truth | {} | {} | {} | - |", error("median_mm"), error("wrong"), error("path_mm"));
+    println!(
+        "| the chain, counts anchored by the truth | {} | {} | {} | - |",
+        error("median_mm"),
+        error("wrong"),
+        error("path_mm")
+    );
     let [range, wrong, sure, sure_wrong] =
         ["median_mm", "wrong", "sure_median_mm", "sure_wrong"].map(|figure| get("ours", "range", figure));
     let (found, lost) = (get("ours", "errors", "path_mm"), get("ours", "lost", "frames"));

@@ -85,7 +85,8 @@ fn the_map_lies_on_the_walls_within_its_deviations() {
         let pose = processor.process(frame.raw.samples(), number as f64 * INTERVAL_S).unwrap().pose.unwrap();
         assert!(pose.state.has_pose(), "{number}: {:?}", pose.state);
         let error = (frame.truth.world_from_camera.inverse() * pose.world_from_camera).translation.vector.norm();
-        assert!(error < 0.03, "{number}: {error}");
+        // Small, noisy frames of a large room.
+        assert!(error < 0.1, "{number}: {error}");
     }
     let map = processor.tracker().unwrap().surface_map().unwrap();
     let heights = heights(&map);

@@ -233,12 +233,11 @@ fn spread(covariance: &Matrix6<f64>, first: usize) -> f64 {
 
 impl fmt::Display for PathStatus {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match (self.pose, self.position_sigma_m) {
-            (Some([x, y, z, ..]), Some(sigma_m)) => write!(f, "at {x:.3} {y:.3} {z:.3} m (σ {:.1} mm)", 1e3 * sigma_m)?,
-            _ => {
-                let reason = self.reason.unwrap_or_default();
-                write!(f, "lost for {} frames ({reason})", self.lost_now)?;
-            }
+        if let (Some([x, y, z, ..]), Some(sigma_m)) = (self.pose, self.position_sigma_m) {
+            write!(f, "at {x:.3} {y:.3} {z:.3} m (σ {:.1} mm)", 1e3 * sigma_m)?;
+        } else {
+            let reason = self.reason.unwrap_or_default();
+            write!(f, "lost for {} frames ({reason})", self.lost_now)?;
         }
         if self.lost > self.lost_now { write!(f, ", {} without a pose", self.lost) } else { Ok(()) }
     }

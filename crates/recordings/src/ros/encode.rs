@@ -36,7 +36,9 @@ pub(crate) fn encode(stamp_ns: i64, payload: &Payload) -> Option<(MessageType, V
         }
         Payload::Transforms(transforms) => {
             out.u32(transforms.len() as u32);
-            transforms.iter().for_each(|transform| out.transform(stamp_ns, transform));
+            for transform in transforms {
+                out.transform(stamp_ns, transform);
+            }
             MessageType::Transforms
         }
         Payload::Bytes(_) | Payload::Unreadable(_) => return None,

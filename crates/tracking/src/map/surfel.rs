@@ -6,7 +6,7 @@ use nalgebra::{Point3, Vector3};
 const SAME_SURFACE_COSINE: f64 = 0.7;
 
 /// A point of a surface as it was observed, or the weighted mean of several.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Surfel {
     pub(crate) position: Point3<f64>,
     /// Sum of the weighted unit normals.

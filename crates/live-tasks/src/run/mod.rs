@@ -14,7 +14,6 @@ mod tally;
 
 pub use drift::{DriftReport, DriftVerdict};
 pub use latency::LatencySummary;
-pub(crate) use path::numbers as pose_numbers;
 pub use path::{MapReport, PathLoss, PathReport, PathStatus, PathVerdict};
 pub use request::{LiveRequest, LiveTracking, LiveWatch};
 pub use session::{live, live_from};

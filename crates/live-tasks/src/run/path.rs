@@ -3,10 +3,11 @@
 use std::fmt;
 use std::path::PathBuf;
 
-use live_frames::camera_model::with_computer_vision_axes;
-use live_frames::tracking::nalgebra::{Isometry3, Matrix6, Vector3};
+use live_frames::tracking::nalgebra::{Matrix6, Vector3};
 use live_frames::tracking::{SurfaceMap, TrackedPose, Tracker, TrackingState};
 use serde::Serialize;
+
+use crate::streams::pose_numbers;
 
 /// What can be done with a path.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
@@ -160,7 +161,7 @@ impl Path {
         Some(PathStatus {
             state: now.state.name(),
             reason: if let TrackingState::Lost(reason) = now.state { Some(reason.words()) } else { None },
-            pose: known.then(|| numbers(&now.world_from_camera)),
+            pose: known.then(|| pose_numbers(&now.world_from_camera)),
             position_sigma_m: known.then(|| position_sigma_m(&now.covariance)),
             attitude_sigma_deg: known.then(|| spread(&now.covariance, 3).to_degrees()),
             lost: self.lost,
@@ -214,12 +215,6 @@ impl MapReport {
         let doubled = (map.voxel_m() / map.options().voxel_m).log2().round() as u32;
         Self { file, points: map.len(), voxel_m: map.voxel_m(), doubled, left_out: map.left_out() }
     }
-}
-
-/// A pose as in a line of a trajectory, computer-vision axes.
-pub(crate) fn numbers(world_from_camera: &Isometry3<f64>) -> [f64; 7] {
-    let Isometry3 { rotation: q, translation: t } = with_computer_vision_axes(world_from_camera);
-    [t.x, t.y, t.z, q.i, q.j, q.k, q.w]
 }
 
 fn position_sigma_m(covariance: &Matrix6<f64>) -> f64 {

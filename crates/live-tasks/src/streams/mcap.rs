@@ -6,7 +6,7 @@ use live_frames::ProcessedFrame;
 use range_image::Flags;
 use recordings::{Encoding, Error, Image, McapWriter, Payload, StreamId, Transform};
 
-use crate::run::pose_numbers;
+use super::trajectory::pose_numbers;
 
 /// Topics of a recording, in the order in which a frame's messages are written.
 const TOPICS: [&str; 4] = ["/range/image_raw", "/sigma/image_raw", "/amplitude/image_raw", "/flags/image_raw"];

@@ -11,3 +11,4 @@ pub use target::StreamTarget;
 pub use trajectory::TrajectoryStream;
 
 pub(crate) use target::Sink;
+pub(crate) use trajectory::pose_numbers;

@@ -2,9 +2,9 @@
 
 use std::io::{Result, Write};
 
+use live_frames::camera_model::with_computer_vision_axes;
 use live_frames::tracking::TrackedPose;
-
-use crate::run::pose_numbers;
+use live_frames::tracking::nalgebra::Isometry3;
 
 /// Writer of a trajectory, line by line as frames come: `timestamp tx ty tz qx qy qz qw` (TUM), camera to world, computer-vision
 /// axes, every number with the digits that give it back. A frame without a pose has no line.
@@ -36,4 +36,10 @@ impl<W: Write> TrajectoryStream<W> {
     pub fn into_inner(self) -> W {
         self.writer
     }
+}
+
+/// A pose as in a line of a trajectory: `tx ty tz qx qy qz qw`, computer-vision axes.
+pub(crate) fn pose_numbers(world_from_camera: &Isometry3<f64>) -> [f64; 7] {
+    let Isometry3 { rotation: q, translation: t } = with_computer_vision_axes(world_from_camera);
+    [t.x, t.y, t.z, q.i, q.j, q.k, q.w]
 }

@@ -1,14 +1,16 @@
 //! How long frames take, one after the other without a pause, and whether memory stays the same.
 //!
 //! `RAYON_NUM_THREADS=1 cargo run --release -p live-frames --all-features --example latency [frames columns rows frequencies
-//! tracking beside]`, by default 10000 frames of 640 x 480 pixels at one frequency, without tracking. `beside` 1: each frame goes also through a processor that
-//! solves every frame by the full tree, in turn, so that what else the machine does slows both. A moving camera in a room in
-//! which things move; 40 simulated frames are played forth and back.
+//! tracking beside]`, by default 10000 frames of 640 x 480 pixels at one frequency, without tracking. `tracking` 1: with poses and a map that is kept. `beside` 1: each
+//! frame goes also through a processor that solves every frame by the full tree, in turn, so that what else the machine does slows both. A moving camera in a room in
+//! which things move; 40 simulated frames are played forth and back. Times are those of the clock and those of the processor, over all threads.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 #[path = "../tests/common/mod.rs"]
 #[allow(dead_code)] // each user takes a part of it
 mod common;
+#[path = "../../../xtask/peers/cpu_clock.rs"]
+mod cpu_clock;
 
 use std::time::Instant;
 
@@ -31,16 +33,18 @@ fn main() {
     let mut every = stages(false);
     every.unwrap.carry.refresh_frames = 1;
     let mut tree = Processor::new(&sequence.camera(), &sequence.calibration(), every, Limits::default()).unwrap();
+    keep_map(&mut processor, tracking);
     let (mut milliseconds, mut of_tree) = (Vec::with_capacity(frames), Vec::new());
+    let mut of_processor = Vec::with_capacity(frames);
     let (mut whole, mut checks, mut failed, mut memory) = (0, 0, 0.0, [0; 2]);
     let mut lost = 0;
-    let mut processor_ms = 0.0;
     for number in 0..frames {
         let at = number % (2 * SIMULATED - 2);
         let samples = raw[if at < SIMULATED { at } else { 2 * SIMULATED - 2 - at }].samples();
-        let begin = Instant::now();
+        let (begin_ms, begin) = (processor_time_ms(), Instant::now());
         processor.process(samples, number as f64 * INTERVAL_S).unwrap();
         milliseconds.push(1e3 * begin.elapsed().as_secs_f64());
+        of_processor.push(processor_time_ms() - begin_ms);
         if beside {
             let begin = Instant::now();
             tree.process(samples, number as f64 * INTERVAL_S).unwrap();
@@ -53,11 +57,8 @@ fn main() {
         lost += usize::from(is_lost(frame));
         if number == 100.min(frames - 1) {
             memory[0] = resident_kib();
-            processor_ms = processor_time_ms();
         }
     }
-    let later = frames.saturating_sub(101).max(1) as f64;
-    let processor_ms = (processor_time_ms() - processor_ms) / later;
     memory[1] = resident_kib();
     let count = frames as f64;
     println!(
@@ -65,17 +66,18 @@ fn main() {
         rayon::current_num_threads()
     );
     println!(
-        "whole trees {whole}, checked {:.1} % of the frames, pixels that failed {:.1} %, lost {lost}, processor time a frame \
-         {processor_ms:.2} ms",
+        "whole trees {whole}, checked {:.1} % of the frames, pixels that failed {:.1} %, lost {lost}",
         100.0 * checks as f64 / count,
         100.0 * failed / count
     );
     println!("| ms | least | median | mean | 95 % | 99 % | largest |");
     println!("|---|---|---|---|---|---|---|");
-    row("carried counts", milliseconds);
+    row("processor time", of_processor);
+    row("by the clock", milliseconds);
     if beside {
-        row("full tree on every frame", of_tree);
+        row("by the clock, full tree on every frame", of_tree);
     }
+    tell_map(&processor);
     println!(
         "resident at frame 100 and at the end: {:.1}, {:.1} MiB",
         memory[0] as f64 / 1024.0,
@@ -126,9 +128,37 @@ fn resident_kib() -> u64 {
     line.and_then(|line| line.trim().trim_end_matches("kB").trim().parse().ok()).unwrap_or(0)
 }
 
-/// Time that this thread has run, which other programs on the machine lengthen less than the clock; 0 where the system does not
-/// tell.
+/// Time that the threads of this program have run, which other programs on the machine lengthen less than the clock; 0 where the
+/// system does not tell.
 fn processor_time_ms() -> f64 {
-    let text = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap_or_default();
-    text.split_whitespace().next().and_then(|nanoseconds| nanoseconds.parse::<f64>().ok()).unwrap_or(0.0) * 1e-6
+    let of_thread = |folder: std::fs::DirEntry| {
+        let text = std::fs::read_to_string(folder.path().join("schedstat")).ok()?;
+        text.split_whitespace().next()?.parse::<f64>().ok()
+    };
+    // Threads that wait are counted up to now, this one after a sleep.
+    cpu_clock::cpu_seconds();
+    let Ok(threads) = std::fs::read_dir("/proc/self/task") else { return 0.0 };
+    threads.filter_map(|folder| of_thread(folder.ok()?)).sum::<f64>() * 1e-6
 }
+
+#[cfg(feature = "tracking")]
+fn keep_map(processor: &mut Processor, tracking: bool) {
+    if tracking {
+        processor
+            .keep_map(live_frames::tracking::SurfaceMap::new(live_frames::tracking::MapOptions::default()).unwrap());
+    }
+}
+
+#[cfg(not(feature = "tracking"))]
+fn keep_map(_: &mut Processor, _: bool) {}
+
+/// The map at the end, and how long it takes to bring it together.
+#[cfg(feature = "tracking")]
+fn tell_map(processor: &Processor) {
+    let begin_ms = processor_time_ms();
+    let Some(map) = processor.tracker().and_then(live_frames::tracking::Tracker::surface_map) else { return };
+    println!("map of {} points in voxels of {} m, {:.0} ms", map.len(), map.voxel_m(), processor_time_ms() - begin_ms);
+}
+
+#[cfg(not(feature = "tracking"))]
+fn tell_map(_: &Processor) {}

@@ -22,7 +22,8 @@ pub struct ProcessedFrame {
     pub counts: CarrySummary,
     /// Drift that was taken off, metre.
     pub drift_m: f64,
-    /// Pose, where tracking is on.
+    /// Pose, where tracking is on. It holds only where its state [has one](tracking::TrackingState::has_pose): what stands in a
+    /// lost frame is a guess.
     #[cfg(feature = "tracking")]
     pub pose: Option<tracking::TrackedPose>,
 }

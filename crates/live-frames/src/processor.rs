@@ -107,10 +107,41 @@ impl Processor {
         Ok(std::mem::replace(&mut self.calibration, calibration))
     }
 
-    /// Forgets the frames before, as after a cut: times may begin anew.
+    /// Forgets the frames before, as after a cut: times may begin anew. The camera is then sought in the map.
     pub fn restart(&mut self) {
         self.last_s = None;
         self.counts.restart();
+        #[cfg(feature = "tracking")]
+        if let Some(pose) = &mut self.pose {
+            pose.cut();
+        }
+    }
+
+    /// Says where the camera is at the first frame that tracking starts with: the datum. Nothing changes once it has started, or
+    /// where no pose is sought.
+    ///
+    /// # Errors
+    /// [`Error::Tracking`] for a pose that is not finite.
+    #[cfg(feature = "tracking")]
+    pub fn place_first(&mut self, world_from_first: tracking::nalgebra::Isometry3<f64>) -> Result<()> {
+        match &mut self.pose {
+            Some(pose) => pose.place_first(&self.calibration, world_from_first),
+            None => Ok(()),
+        }
+    }
+
+    /// Keeps what the camera sees in this map; see [`tracking::Tracker::keep_map`]. Nothing where no pose is sought.
+    #[cfg(feature = "tracking")]
+    pub fn keep_map(&mut self, map: tracking::SurfaceMap) {
+        if let Some(pose) = &mut self.pose {
+            pose.keep_map(map);
+        }
+    }
+
+    /// The tracker, with its keyframes and map; `None` where no pose is sought.
+    #[cfg(feature = "tracking")]
+    pub fn tracker(&self) -> Option<&tracking::Tracker> {
+        self.pose.as_ref().map(Pose::tracker)
     }
 
     /// Takes a frame from its samples, `[F, N, H, W]`, to corrected points; a time stamp in seconds will do for `exposure`
@@ -154,6 +185,7 @@ impl Processor {
         self.last_s = Some(exposure.timestamp_s);
         #[cfg(feature = "tracking")]
         if let Some(pose) = &mut self.pose {
+            self.frame.pose = None;
             self.frame.pose = Some(pose.track(exposure.timestamp_s, &self.frame)?);
         }
         Ok(&self.frame)

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use live_frames::camera_model::RayTable;
 use live_frames::tracking::projective_registration::Projection;
-use live_frames::tracking::{Tracker, TrackerOptions, TrackingState};
+use live_frames::tracking::{MapOptions, SurfaceMap, Tracker, TrackerOptions, TrackingState};
 use live_frames::{Limits, PreparedCalibration, Processor, Stages};
 
 use crate::common::{INTERVAL_S, Sequence, stages};
@@ -50,5 +50,65 @@ fn a_camera_at_rest_stays_where_it_is() {
         assert!(pose.state.has_pose(), "{number}: {:?}", pose.state);
         // 128 x 96 pixels of a centimetre or two of noise.
         assert!(pose.world_from_camera.translation.vector.norm() < 0.01, "{number}: {}", pose.world_from_camera);
+    }
+}
+
+/// Heights of the map's points over the walls of the room, with their standard deviations.
+fn heights(map: &SurfaceMap) -> Vec<[f64; 2]> {
+    let cloud = map.cloud();
+    let (normals, sigmas) = (cloud.normals.unwrap(), cloud.sigma.unwrap());
+    let mut heights = Vec::new();
+    for ((point, normal), sigma) in cloud.points.iter().zip(normals).zip(sigmas) {
+        // Walls are seen from inside; furniture is no nearer than this.
+        for (axis, most) in [9.0, 5.0, 3.0].into_iter().enumerate() {
+            for (wall, inwards) in [(0.0, 1.0), (most, -1.0)] {
+                let height = inwards * (point[axis] - wall);
+                if height.abs() < 0.08 && inwards * normal[axis] > 0.95 {
+                    heights.push([height, sigma]);
+                }
+            }
+        }
+    }
+    heights
+}
+
+#[test]
+fn the_map_lies_on_the_walls_within_its_deviations() {
+    let sequence = Sequence { rays: 1, still: true, ..Sequence::default() };
+    let stages = Stages { tracking: Some(TrackerOptions::default()), ..stages(100) };
+    let mut processor = Processor::new(&sequence.camera(), &sequence.calibration(), stages, Limits::default()).unwrap();
+    processor.keep_map(SurfaceMap::new(MapOptions { voxel_m: 0.1, ..MapOptions::default() }).unwrap());
+    for number in 0..6 {
+        let frame = sequence.frame(number);
+        // Only the first one counts.
+        processor.place_first(frame.truth.world_from_camera).unwrap();
+        let pose = processor.process(frame.raw.samples(), number as f64 * INTERVAL_S).unwrap().pose.unwrap();
+        assert!(pose.state.has_pose(), "{number}: {:?}", pose.state);
+        let error = (frame.truth.world_from_camera.inverse() * pose.world_from_camera).translation.vector.norm();
+        assert!(error < 0.02, "{number}: {error}");
+    }
+    let map = processor.tracker().unwrap().surface_map().unwrap();
+    let heights = heights(&map);
+    assert!(heights.len() > 300 && map.left_out() == 0, "{} {}", heights.len(), map.left_out());
+    let squares = heights.iter().map(|[height, sigma]| (height / sigma).powi(2));
+    let normalised = (squares.sum::<f64>() / heights.len() as f64).sqrt();
+    println!("{} points on walls, errors over deviations {normalised:.2}", heights.len());
+    assert!((0.3..2.0).contains(&normalised), "{normalised}");
+}
+
+#[test]
+fn a_clock_that_begins_anew_is_no_loss() {
+    let sequence = Sequence { rays: 1, ..Sequence::default() };
+    let stages = Stages { tracking: Some(TrackerOptions::default()), ..stages(100) };
+    let mut processor = Processor::new(&sequence.camera(), &sequence.calibration(), stages, Limits::default()).unwrap();
+    for number in 0..6 {
+        let frame = sequence.frame(number);
+        let time_s = if number < 3 { 50.0 } else { 0.0 } + number as f64 * INTERVAL_S;
+        if number == 3 {
+            processor.restart();
+        }
+        let pose = processor.process(frame.raw.samples(), time_s).unwrap().pose.unwrap();
+        assert_eq!(pose.timestamp_s, time_s);
+        assert!(pose.state.has_pose(), "{number}: {:?}", pose.state);
     }
 }

@@ -2,6 +2,8 @@
 
 use std::process::Command;
 
+use live_tasks::LiveTracking;
+
 use crate::common::World;
 use crate::page::Running;
 
@@ -13,8 +15,8 @@ fn a_browser_draws_the_page() {
         println!("no browser on this machine: the page is not drawn");
         return;
     };
-    let world = World::new();
-    let running = Running::begin(&world);
+    let world = World::moving("");
+    let running = Running::asking(&world, Some(LiveTracking::default()));
     let profile = tempfile::tempdir().unwrap();
     let drawn = Command::new(browser)
         .args(["--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--no-first-run"])
@@ -33,4 +35,5 @@ fn a_browser_draws_the_page() {
     assert!(page.contains(" points"), "{page}");
     assert!(page.contains(" processed · "), "{page}");
     assert!(page.contains("not calibrated"), "{page}");
+    assert!(page.contains("tracked, σ ") && page.contains(" m, grid "), "{page}");
 }

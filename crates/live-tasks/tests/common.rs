@@ -39,6 +39,32 @@ const SCENE: &str = r#"(
     ),
 )"#;
 
+/// Frames of a camera that moves.
+pub const MOVING: usize = 8;
+
+/// The corner of a room with a box and a column.
+const ROOM: &str = r#"(
+    scene: (objects: [
+        (name: "room", albedo: 0.7, shape: Room(min_m: (0, 0, 0), max_m: (4, 3.2, 2.4))),
+        (name: "box", albedo: 0.5, shape: Cuboid(center_m: (3.0, 2.4, 0.4), size_m: (0.5, 0.4, 0.8))),
+        (name: "column", albedo: 0.6, shape: Cuboid(center_m: (3.7, 1.4, 1.2), size_m: (0.3, 0.3, 2.4))),
+    ]),
+    camera: (
+        geometry: (
+            format: (width: 96, height: 72, pixel_pitch_mm: (0.06, 0.06)),
+            interior: (principal_point_mm: (0.02, -0.03), principal_distance_mm: 4.0),
+        ),
+        modulation_hz: [20e6], phase_steps: 4,
+    ),
+    illumination: (source_power: 4e7, modulation_contrast: 0.5, ambient_power: 5e4),
+    exposure: (frames_per_station: 1, integration_time_s: 0.002, frame_interval_s: 0.03, start_s: 60.0),
+    stations: [STATIONS],
+    errors: (
+        noise: (shot_variance_per_unit: 0.25, dark_sigma: 5.0),
+        digitisation: (sample_type: U16, raw_scale: 2.5),
+    ),
+)"#;
+
 /// The recording in a folder of its own.
 pub struct World {
     pub folder: TempDir,
@@ -51,9 +77,22 @@ impl World {
 
     /// With a drift of the camera.
     pub fn with(drift: &str) -> Self {
+        Self::of_scene(&SCENE.replace("DRIFT", drift))
+    }
+
+    /// A camera that is moved through a corner of a room, one frame a station, and then looks where this leads it.
+    pub fn moving(further: &str) -> Self {
+        let steps = (0..MOVING).map(|k| {
+            let (x, y) = (1.2 + 0.02 * k as f64, 0.9 + 0.01 * k as f64);
+            format!("(name: \"S{k}\", position_m: ({x}, {y}, 1.2), attitude: LookAt(target_m: (3.4, 2.6, 0.9))),")
+        });
+        Self::of_scene(&ROOM.replace("STATIONS", &(steps.collect::<String>() + further)))
+    }
+
+    fn of_scene(text: &str) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let scene = folder.path().join("scene.ron");
-        std::fs::write(&scene, SCENE.replace("DRIFT", drift)).unwrap();
+        std::fs::write(&scene, text).unwrap();
         let source = SimulateSource {
             scene: scene.display().to_string(),
             seed: 3,

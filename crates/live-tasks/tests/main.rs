@@ -7,6 +7,7 @@ mod common;
 mod drift;
 mod dropping;
 mod page;
+mod path;
 mod recording;
 mod refusals;
 mod sources;

@@ -8,23 +8,27 @@ use std::sync::mpsc::channel;
 use std::thread::JoinHandle;
 
 use live_tasks::{
-    FrameError, FrameSource, LiveFrame, LiveRequest, LiveSource, LiveSummary, LiveWatch, Next, live_from,
+    FrameError, FrameSource, LiveFrame, LiveRequest, LiveSource, LiveSummary, LiveTracking, LiveWatch, Next, live_from,
 };
 
 use crate::common::World;
 
-/// A camera at a hundred frames a second that runs until it is told to end.
+/// A camera at a hundred frames a second that runs forth and back over what it recorded until it is told to end.
 struct Camera {
-    frame: LiveFrame,
+    frames: Vec<LiveFrame>,
+    number: usize,
     ends: Arc<AtomicBool>,
 }
 
 impl FrameSource for Camera {
     fn next(&mut self, _: Option<LiveFrame>) -> Result<Next, FrameError> {
         std::thread::sleep(std::time::Duration::from_millis(10));
-        self.frame.header.timestamp_s += 0.01;
-        self.frame.arrived = std::time::Instant::now();
-        Ok(if self.ends.load(Ordering::Relaxed) { Next::End } else { Next::Frame(self.frame.clone()) })
+        self.number += 1;
+        let (last, at) = (self.frames.len() - 1, self.number % (2 * self.frames.len() - 2));
+        let mut frame = self.frames[last - last.abs_diff(at)].clone();
+        frame.header.timestamp_s = 60.0 + 0.01 * self.number as f64;
+        frame.arrived = std::time::Instant::now();
+        Ok(if self.ends.load(Ordering::Relaxed) { Next::End } else { Next::Frame(frame) })
     }
 }
 
@@ -45,9 +49,14 @@ pub struct Running {
 
 impl Running {
     pub fn begin(world: &World) -> Self {
+        Self::asking(world, None)
+    }
+
+    pub fn asking(world: &World, tracking: Option<LiveTracking>) -> Self {
         let ends = Arc::new(AtomicBool::new(false));
-        let camera = Camera { frame: world.frames().remove(0), ends: Arc::clone(&ends) };
-        let request = LiveRequest { view: Some(0), every_frame: false, ..world.request(LiveSource::StandardInput) };
+        let camera = Camera { frames: world.frames(), number: 0, ends: Arc::clone(&ends) };
+        let request =
+            LiveRequest { view: Some(0), every_frame: false, tracking, ..world.request(LiveSource::StandardInput) };
         let (page, address) = channel();
         let thread = std::thread::spawn(move || live_from(Box::new(camera), &request, &mut Page(page)).unwrap());
         let running = Self { address: address.recv().unwrap(), ends, thread };
@@ -97,7 +106,7 @@ fn the_page_shows_the_newest_frame_and_the_status() {
         assert!(head.starts_with("HTTP/1.1 200 OK"), "{head}");
         let whole = |at: usize| u32::from_le_bytes(frame[at..at + 4].try_into().unwrap()) as usize;
         assert_eq!((&frame[..4], whole(4), whole(8), whole(12)), (b"RCLV".as_slice(), 32, 24, 1));
-        assert_eq!(frame.len(), 32 + 32 * 24 * (4 + 4 + 12 + 2));
+        assert_eq!(frame.len(), 32 + 32 * 24 * (4 + 4 + 12 + 2) + 4);
         times.push(f64::from_le_bytes(frame[24..32].try_into().unwrap()));
         let middle = 32 + 4 * (12 * 32 + 16);
         let range = f32::from_le_bytes(frame[middle..middle + 4].try_into().unwrap());
@@ -138,4 +147,30 @@ fn what_is_not_the_page_is_refused() {
     assert!(head.is_empty(), "{head}");
     assert!(running.get("/").0.starts_with("HTTP/1.1 200"));
     running.end();
+}
+
+#[test]
+fn the_page_gets_pose_and_path() {
+    let world = World::moving("");
+    let running = Running::asking(&world, Some(LiveTracking::default()));
+    let behind = 32 + 96 * 72 * 22;
+    let mut points = 0;
+    while points < 6 {
+        let (head, frame) = running.get("/frame");
+        assert!(head.starts_with("HTTP/1.1 200 OK"), "{head}");
+        let whole = |at: usize| u32::from_le_bytes(frame[at..at + 4].try_into().unwrap()) as usize;
+        let double = |at: usize| f64::from_le_bytes(frame[at..at + 8].try_into().unwrap());
+        // A source of no stations: the first frame's axes, y up.
+        assert_eq!((whole(behind), whole(behind + 60)), (1, 1));
+        points = whole(behind + 64);
+        assert_eq!(frame.len(), behind + 68 + 12 * points);
+        let position = [0, 1, 2].map(|axis| double(behind + 4 + 8 * axis));
+        assert!(position.iter().all(|value| value.abs() < 0.5), "{position:?}");
+        let turn: f64 = (3..7).map(|axis| double(behind + 4 + 8 * axis).powi(2)).sum();
+        assert!((turn - 1.0).abs() < 1e-9, "{turn}");
+    }
+    let status = String::from_utf8(running.get("/status").1).unwrap();
+    assert!(status.contains("\"path\":{\"state\":\"tracked\""), "{status}");
+    let summary = running.end();
+    assert_eq!(summary.path.as_ref().unwrap().lost, 0, "{summary}");
 }

@@ -150,10 +150,13 @@ fn run(
 
 fn live(request: &LiveRequest, output: &Output) -> Outcome {
     let mut line = output.status_line();
+    line.end_at_interrupt()?;
     let live = live_tasks::live(request, &mut line);
     line.clear();
-    // Where clouds go to standard output, nothing else does.
-    if [&request.ply, &request.mcap].contains(&&Some(StreamTarget::StandardOutput)) {
+    let trajectory = request.tracking.as_ref().and_then(|tracking| tracking.trajectory.as_ref());
+    // Where results go to standard output, nothing else does.
+    let targets = [request.ply.as_ref(), request.mcap.as_ref(), trajectory];
+    if targets.contains(&Some(&StreamTarget::StandardOutput)) {
         output.result_aside(&live?)
     } else {
         output.result(&live?)

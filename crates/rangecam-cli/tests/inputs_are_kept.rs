@@ -73,7 +73,7 @@ fn cases() -> Vec<Case> {
     ]
 }
 
-/// Commands that write nothing; `live` where it is not told to by `--ply`, which is tried by itself.
+/// Commands that write nothing; `live` where it is not told to by `--ply` and the like, which are tried by themselves.
 const READERS: [&str; 5] = ["inspect", "explain", "diff", "check", "live"];
 
 fn fixtures() -> PathBuf {
@@ -251,7 +251,7 @@ fn live_writes_no_clouds_where_it_reads() {
     let before = everything(root);
     for (source, read) in [("survey", &inputs[..2]), ("filling", &inputs)] {
         for out in read.iter().flat_map(|input| hostile(root, input)) {
-            for option in ["--ply", "--mcap"] {
+            for option in ["--ply", "--mcap", "--trajectory", "--map"] {
                 let line = ["live", source, "-s", "survey", "-c", "cal/c.ron", "--fast", option, &out];
                 let refused = rangecam(root, &line);
                 let told = format!("{source}, {option} {out}: {}", String::from_utf8_lossy(&refused.stderr));
@@ -284,7 +284,7 @@ fn no_command_changes_what_it_reads() {
         "explain survey --frame 0 --pixel 3,3",
         "diff cal/c.ron survey/calibration.ron",
         "check survey -c cal/c.ron",
-        "live survey -c cal/c.ron --fast --frames 2",
+        "live survey -c cal/c.ron --fast --frames 2 --track",
     ] {
         let line: Vec<&str> = line.split(' ').collect();
         rangecam(root, &line);

@@ -169,3 +169,98 @@ fn a_page_says_where_it_is() {
     std::fs::write(filling.join("end"), "").unwrap();
     assert!(matches!(child.wait().unwrap().code(), Some(0 | 1)));
 }
+
+/// A stream that is going on in a folder that fills, with all results asked for, after some frames.
+#[cfg(unix)]
+fn going_on(folder: &Path) -> std::process::Child {
+    let filling: PathBuf = folder.join("filling");
+    std::fs::create_dir(&filling).unwrap();
+    let bytes = sent(folder);
+    // Frames of one station: the camera rests.
+    for (number, frame) in bytes.chunks(bytes.len() / FRAMES).take(5).enumerate() {
+        std::fs::write(filling.join(format!("{number}.frame")), frame).unwrap();
+    }
+    let results = ["--ply", "c.ply", "--mcap", "i.mcap", "--trajectory", "t.txt", "--map", "m.ply"];
+    for name in results.iter().filter(|name| !name.starts_with('-')) {
+        std::fs::write(folder.join(name), "older").unwrap();
+    }
+    let child = rangecam()
+        .args(["live", "filling", "-s", "survey", "--fast"])
+        .args(results)
+        .current_dir(folder)
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    // The trajectory is written line by line beside its name.
+    let begun = || {
+        let entries = std::fs::read_dir(folder).unwrap().map(Result::unwrap);
+        let mut own = entries.filter(|entry| entry.file_name().to_string_lossy().starts_with(".t.txt.partial"));
+        own.any(|entry| std::fs::read_to_string(entry.path()).unwrap().lines().count() == 5)
+    };
+    while !begun() {
+        std::thread::sleep(std::time::Duration::from_millis(20));
+    }
+    child
+}
+
+#[cfg(unix)]
+fn signal(child: &std::process::Child, name: &str) {
+    assert!(Command::new("kill").args([name, &child.id().to_string()]).status().unwrap().success());
+}
+
+/// Ctrl-C ends a stream as its own end does.
+#[cfg(unix)]
+#[test]
+fn an_interrupted_stream_has_all_results() {
+    for name in ["-INT", "-TERM"] {
+        let folder = room();
+        let child = going_on(folder.path());
+        signal(&child, name);
+        let ended = child.wait_with_output().unwrap();
+        let words = String::from_utf8(ended.stdout).unwrap();
+        assert_eq!(ended.status.code(), Some(0), "{words}");
+        assert!(words.contains("ended as asked") && words.contains("5 frames, 0 dropped"), "{words}");
+        let read = |name: &str| std::fs::read(folder.path().join(name)).unwrap();
+        assert_eq!(String::from_utf8(read("t.txt")).unwrap().lines().count(), 5);
+        assert!(read("m.ply").starts_with(b"ply\n") && read("c.ply").starts_with(b"ply\n"));
+        assert!(read("i.mcap").ends_with(b"\x89MCAP0\r\n"));
+    }
+}
+
+/// A program that is killed leaves older results as they were, and the next run removes what it left behind.
+#[cfg(unix)]
+#[test]
+fn a_killed_stream_replaces_nothing() {
+    let folder = room();
+    let child = going_on(folder.path());
+    signal(&child, "-KILL");
+    child.wait_with_output().unwrap();
+    let partial = || {
+        let entries = std::fs::read_dir(folder.path()).unwrap().map(Result::unwrap);
+        entries.filter(|entry| entry.file_name().to_string_lossy().contains(".partial")).count()
+    };
+    for name in ["c.ply", "i.mcap", "t.txt", "m.ply"] {
+        assert_eq!(std::fs::read(folder.path().join(name)).unwrap(), b"older", "{name}");
+    }
+    assert_eq!(partial(), 3);
+    let again =
+        ["survey", "--fast", "--frames", "2", "--ply", "c.ply", "--mcap", "i.mcap", "--trajectory", "t.txt", "-q"];
+    let (code, _, words) = piped(folder.path(), &again, Vec::new());
+    assert_eq!(code, Some(0), "{words}");
+    assert_eq!(partial(), 0);
+}
+
+#[test]
+fn a_camera_that_is_lost_at_the_end_has_a_code_of_its_own() {
+    let folder = room();
+    // Poses to standard output, words to standard error. The room's stations stand far apart.
+    let (code, poses, words) = piped(folder.path(), &["survey", "--fast", "--trajectory", "-"], Vec::new());
+    let lines = String::from_utf8(poses).unwrap().lines().count();
+    assert!(words.contains("path: ") && words.contains("station "), "{words}");
+    let expected = if words.contains("path: lost") { 5 } else { i32::from(words.contains("have no pose")) };
+    assert_eq!(code, Some(expected), "{words}");
+    assert!((8..=FRAMES).contains(&lines), "{lines}");
+    let (code, _, words) = piped(folder.path(), &["survey", "--map-voxel", "0.1"], Vec::new());
+    assert!(code == Some(2) && words.contains("--map"), "{words}");
+}

@@ -26,6 +26,8 @@ pub enum Kind {
     Imu,
     /// Temperatures.
     Temperature,
+    /// Where coordinate systems lie in others.
+    Transforms,
     /// Anything else, handed out as bytes.
     Other,
 }
@@ -43,6 +45,7 @@ impl Kind {
             Self::CameraInfo => "camera info",
             Self::Imu => "imu",
             Self::Temperature => "temperature",
+            Self::Transforms => "transforms",
             Self::Other => "other",
         }
     }

@@ -16,5 +16,5 @@ pub use error::Error;
 #[cfg(feature = "mcap")]
 pub use formats::mcap::{McapWriter, StreamId};
 pub use message::Message;
-pub use payload::{CameraInfo, CompressedImage, Encoding, Image, ImageParts, Imu, Measured, Payload};
+pub use payload::{CameraInfo, CompressedImage, Encoding, Image, ImageParts, Imu, Measured, Payload, Transform};
 pub use recording::{Format, Recording};

@@ -201,7 +201,14 @@ fn other_files_are_refused_by_what_they_begin_with() {
 fn further_types_come_back() {
     let image =
         recordings::CompressedImage { frame_id: "c".to_owned(), format: "jpeg".to_owned(), data: vec![1, 2, 3] };
-    let payloads = [camera(), Payload::Temperature(36.5), Payload::Compressed(image)];
+    let place = |child: &str, x: f64| recordings::Transform {
+        parent: "world".to_owned(),
+        child: child.to_owned(),
+        translation_m: [x, -2.0, 0.5],
+        rotation: [0.0, 0.6, 0.0, 0.8],
+    };
+    let places = Payload::Transforms(vec![place("camera", 1.0), place("robot", -3.0)]);
+    let payloads = [camera(), Payload::Temperature(36.5), Payload::Compressed(image), places];
     let mut writer = McapWriter::new(Vec::new()).unwrap();
     for (index, payload) in payloads.iter().enumerate() {
         let stream = writer.stream(&format!("/{index}")).unwrap();
@@ -210,7 +217,8 @@ fn further_types_come_back() {
     let (found, recording) = read(&writer.finish().unwrap());
     assert!(found.iter().zip(&payloads).all(|(found, written)| found.payload == *written));
     let kinds: Vec<_> = recording.streams().iter().map(|stream| stream.kind).collect();
-    assert_eq!(kinds, [Kind::CameraInfo, Kind::Temperature, Kind::Colour]);
+    assert_eq!(kinds, [Kind::CameraInfo, Kind::Temperature, Kind::Colour, Kind::Transforms]);
+    assert_eq!(found[3].stamp_ns, Some(4));
 }
 
 /// The bytes of a message, from a recording of its own.

@@ -2,6 +2,7 @@
 
 mod error;
 mod imu;
+mod map;
 mod motion_model;
 mod options;
 mod stream;
@@ -12,6 +13,8 @@ pub use error::Error;
 pub use global_registration;
 pub use imu::{ImuIntegrator, ImuOptions, InertialSample};
 pub use inertial;
+pub use map::options::MapOptions;
+pub use map::surfaces::SurfaceMap;
 pub use motion_model::motion::MotionPrior;
 pub use nalgebra;
 pub use options::{Fusion, Relocalisation, TrackerOptions};

@@ -20,6 +20,19 @@ pub enum LossReason {
     NotConverged,
 }
 
+impl LossReason {
+    /// In words.
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::TooFewPoints => "too few points",
+            Self::TooLittleOverlap => "too little agrees with what was seen before",
+            Self::LargeResiduals => "contradicts what was seen before",
+            Self::Undetermined => "the surfaces leave motions open",
+            Self::NotConverged => "the alignment did not settle",
+        }
+    }
+}
+
 /// State of tracking at a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
@@ -38,6 +51,16 @@ impl TrackingState {
     /// Whether the frame has a pose.
     pub fn has_pose(self) -> bool {
         !matches!(self, Self::Lost(_))
+    }
+
+    /// In a word: `started`, `tracked`, `relocalised` or `lost`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Started => "started",
+            Self::Tracked => "tracked",
+            Self::Relocalised => "relocalised",
+            Self::Lost(_) => "lost",
+        }
     }
 }
 

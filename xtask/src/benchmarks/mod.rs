@@ -14,6 +14,7 @@ use crate::tidy::read;
 const STATISTICS: &[(&str, &str)] = &[
     ("calibrations", "cargo xtask verify calibrations"),
     ("noisy", "cargo run -p phase-unwrap --example noisy_methods"),
+    ("peers-frame", "cargo xtask peers frame"),
     ("peers-registration-real", "cargo xtask peers registration-real"),
     ("peers-scattering", "cargo xtask peers scattering"),
     ("peers-targets", "cargo xtask peers targets"),

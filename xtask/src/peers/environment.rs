@@ -57,7 +57,14 @@ pub(crate) struct Example(PathBuf);
 
 impl Example {
     pub(crate) fn build(package: &str, name: &str) -> Result<Self, String> {
-        let command = ["build", "--release", "--quiet", "--package", package, "--example", name];
+        Self::build_with(package, name, &[])
+    }
+
+    /// With these features of the package.
+    pub(crate) fn build_with(package: &str, name: &str, features: &[&str]) -> Result<Self, String> {
+        let features = features.join(",");
+        let command =
+            ["build", "--release", "--quiet", "--package", package, "--example", name, "--features", &features];
         crate::shell::cargo(&command, &[])?;
         let target = std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| root().join("target"), PathBuf::from);
         Ok(Self(target.join("release/examples").join(name)))

@@ -5,6 +5,7 @@
 
 mod adjust;
 mod environment;
+mod frame;
 mod phase;
 mod registration;
 mod registration_real;
@@ -19,6 +20,8 @@ use crate::shell::Outcome;
 enum Stage {
     /// Ceres and OpenCV beside `adjust`.
     Adjust,
+    /// NumPy, OpenCV, FFTW, scikit-image and KISS-ICP as one chain beside `live-frames`.
+    Frame,
     /// scikit-image, OpenCV, SNAPHU, kamui and NumPy beside `phase-unwrap` and `range-image`.
     Phase,
     /// `small_gicp`, Open3D, KISS-ICP and KISS-Matcher beside `icp-registration`.
@@ -46,6 +49,7 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome {
     for stage in &arguments.stages {
         match stage {
             Stage::Adjust => adjust::run(arguments.runs.max(1))?,
+            Stage::Frame => frame::run(arguments.runs.max(1))?,
             Stage::Phase => phase::run(arguments.runs.max(1))?,
             Stage::Registration => registration::run(arguments.runs.max(1))?,
             Stage::RegistrationReal => registration_real::run(arguments.runs.max(1))?,

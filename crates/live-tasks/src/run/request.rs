@@ -2,6 +2,7 @@ use std::net::SocketAddr;
 use std::path::PathBuf;
 
 use live_frames::DriftStage;
+use live_frames::tracking::MapOptions;
 
 use super::summary::LiveStatus;
 use crate::sources::LiveSource;
@@ -34,6 +35,19 @@ pub struct LiveRequest {
     pub drift: DriftStage,
     /// Port of the page on this machine; 0: any that is free.
     pub view: Option<u16>,
+    /// Whether the camera's pose is sought, and what becomes of its path.
+    pub tracking: Option<LiveTracking>,
+}
+
+/// What becomes of the camera's path.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct LiveTracking {
+    /// Where poses go, line by line.
+    pub trajectory: Option<StreamTarget>,
+    /// File of the map, which is written when the stream has ended.
+    pub map: Option<PathBuf>,
+    /// How fine the map is, and how large it may become.
+    pub map_options: MapOptions,
 }
 
 impl LiveRequest {
@@ -52,7 +66,16 @@ impl LiveRequest {
             power_on_s: None,
             drift: DriftStage::Apply,
             view: None,
+            tracking: None,
         }
+    }
+
+    /// Where results go.
+    pub(super) fn targets(&self) -> Vec<StreamTarget> {
+        let tracking = self.tracking.as_ref();
+        let trajectory = tracking.and_then(|tracking| tracking.trajectory.clone());
+        let map = tracking.and_then(|tracking| tracking.map.clone()).map(StreamTarget::File);
+        [self.ply.clone(), self.mcap.clone(), trajectory, map].into_iter().flatten().collect()
     }
 }
 
@@ -60,6 +83,11 @@ impl LiveRequest {
 pub trait LiveWatch {
     /// The page is at this address.
     fn page(&mut self, _address: SocketAddr) {}
+    /// Whether it is to end now: asked after each frame, and twenty times a second while none comes. What there is by then is written
+    /// as at any other end.
+    fn should_end(&mut self) -> bool {
+        false
+    }
     /// How it stands, once a second.
     fn status(&mut self, _status: &LiveStatus) {}
 }

@@ -1,13 +1,16 @@
 //! Frame after frame.
 
+use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use commands::{Error, Result, json};
 use live_frames::Error as Refusal;
+use live_frames::tracking::SurfaceMap;
 
 use super::drift::DriftReport;
 use super::feed::{Arrival, Feed};
-use super::outputs::Outputs;
+use super::outputs::{Outputs, write_map};
+use super::path::{MapReport, PathReport};
 use super::request::{LiveRequest, LiveWatch};
 use super::setup::{Setup, misfit, request};
 use super::summary::{Ended, LiveSummary};
@@ -54,7 +57,7 @@ impl<'a> Session<'a> {
         let outputs = Outputs::open(asked)?;
         let view = asked.view.map(|port| {
             let fail = |source| Error::Access { path: format!("127.0.0.1:{port}").into(), source };
-            LiveView::new(port).map_err(fail)
+            LiveView::new(port, setup.datum.vertical_axis()).map_err(fail)
         });
         let view = view.transpose()?;
         if let Some(view) = &view {
@@ -79,6 +82,9 @@ impl<'a> Session<'a> {
                 Arrival::End(Err(error)) => break self.broken(&error, &feed)?,
             }
             self.look_after(&feed);
+            if self.watch.should_end() {
+                break (Ended::Asked, None);
+            }
         };
         self.finish(ended, words, &feed)
     }
@@ -95,6 +101,7 @@ impl<'a> Session<'a> {
         }
         let drift = DriftReport::of(self.setup.drift.as_ref(), self.setup.processor.camera().power_on_s, header);
         self.tally.arrived(header, frame.arrived, drift);
+        self.setup.datum.place(&mut self.setup.processor, header.timestamp_s)?;
         if let Err(error) = self.process(frame) {
             self.tally.refuse(reason(&error), format!("at {} s: {error}", header.timestamp_s));
             return Ok(None);
@@ -133,7 +140,7 @@ impl<'a> Session<'a> {
 
     /// Tells who watches, and who looks at the page.
     fn look_after(&mut self, feed: &Feed) {
-        if let Some(view) = self.view.as_ref().filter(|_| self.tally.processed > 0) {
+        if let Some(view) = self.view.as_mut().filter(|_| self.tally.processed > 0) {
             view.offer(self.setup.processor.last(), &|| {
                 serde_json::to_string(&self.tally.status(feed)).unwrap_or_default()
             });
@@ -146,6 +153,7 @@ impl<'a> Session<'a> {
 
     fn finish(self, ended: Ended, ended_words: Option<String>, feed: &Feed) -> Result<LiveSummary> {
         self.watch.status(&self.tally.status(feed));
+        let (path, map) = self.path();
         let tally = &self.tally;
         let mut summary = LiveSummary {
             source: self.asked.source.to_string(),
@@ -164,6 +172,7 @@ impl<'a> Session<'a> {
             flags: tally.flags(),
             temperatures_c: tally.temperatures_c,
             drift: tally.drift.clone(),
+            path,
             ended,
             ended_words,
             doubts: Vec::new(),
@@ -176,6 +185,23 @@ impl<'a> Session<'a> {
             return Err(Error::Refused { summary: json(&summary)?, source, written: None });
         }
         self.outputs.commit()?;
+        if let Some((file, map)) = map {
+            write_map(&file, &map)?;
+        }
         Ok(summary)
+    }
+
+    /// What became of the path, and the map with its file.
+    fn path(&self) -> (Option<PathReport>, Option<(PathBuf, SurfaceMap)>) {
+        let Some((asked, tracker)) = self.asked.tracking.as_ref().zip(self.setup.processor.tracker()) else {
+            return (None, None);
+        };
+        let map = asked.map.clone().zip(tracker.surface_map());
+        let report = PathReport {
+            trajectory: asked.trajectory.as_ref().and_then(|target| target.file().cloned()),
+            map: map.as_ref().map(|(file, map)| MapReport::of(map, file.clone())),
+            ..self.tally.path.report(tracker, self.setup.datum.words())
+        };
+        (Some(report), map)
     }
 }

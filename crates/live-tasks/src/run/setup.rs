@@ -3,12 +3,14 @@
 use std::path::{Path, PathBuf};
 
 use commands::{Error, Inputs, Result, root_of};
+use live_frames::tracking::{SurfaceMap, TrackerOptions};
 use live_frames::{Limits, LiveCamera, Processor, Stages, UnwrapStage};
 use range_image::DemodulationOptions;
 use range_io::calibration::Calibration;
 use range_io::error_models::{ModelSet, WarmUp};
 use range_io::survey::Survey;
 
+use super::datum::Datum;
 use super::request::LiveRequest;
 use crate::sources::LiveSource;
 use crate::streams::StreamTarget;
@@ -18,6 +20,7 @@ use crate::wire::FrameHeader;
 pub(super) struct Setup {
     pub(super) processor: Processor,
     pub(super) drift: Option<WarmUp>,
+    pub(super) datum: Datum,
     /// What the camera is known by, in words.
     pub(super) survey: PathBuf,
     pub(super) calibration: Option<PathBuf>,
@@ -45,15 +48,21 @@ impl Setup {
                 Calibration::from_models(&survey.camera.nominal_camera()?, &ModelSet { entries: Vec::new() }, None)?
             }
         };
-        for target in [&asked.ply, &asked.mcap].into_iter().flatten() {
+        for target in asked.targets().iter().filter_map(StreamTarget::file) {
             check_target(asked, target, survey_path, file.as_deref())?;
         }
         let camera = live_camera(asked, &survey)?;
         let unwrap = UnwrapStage { maximum_range_m: asked.maximum_range_m, ..UnwrapStage::default() };
-        let stages = Stages { drift: asked.drift, unwrap, ..Stages::default() };
-        let processor = Processor::new(&camera, &calibration, stages, Limits::default());
+        let tracking = asked.tracking.as_ref().map(|_| TrackerOptions::default());
+        let stages = Stages { drift: asked.drift, unwrap, tracking, ..Stages::default() };
+        let mut processor = Processor::new(&camera, &calibration, stages, Limits::default())
+            .map_err(|error| request(error.to_string()))?;
+        if let Some(tracking) = asked.tracking.as_ref().filter(|tracking| tracking.map.is_some()) {
+            processor.keep_map(SurfaceMap::new(tracking.map_options).map_err(|error| request(error.to_string()))?);
+        }
         Ok(Self {
-            processor: processor.map_err(|error| request(error.to_string()))?,
+            datum: Datum::read(asked)?,
+            processor,
             drift: calibration.warm_up.map(|drift| drift.model),
             survey: survey_path.to_owned(),
             calibration: file,
@@ -82,8 +91,7 @@ fn live_camera(asked: &LiveRequest, survey: &Survey) -> Result<LiveCamera> {
 }
 
 /// Refuses a file of results that is, or lies in, something that is read.
-fn check_target(asked: &LiveRequest, target: &StreamTarget, survey: &Path, calibration: Option<&Path>) -> Result<()> {
-    let Some(file) = target.file() else { return Ok(()) };
+fn check_target(asked: &LiveRequest, file: &Path, survey: &Path, calibration: Option<&Path>) -> Result<()> {
     let mut read: Vec<PathBuf> = calibration.map(Path::to_owned).into_iter().collect();
     read.push(root_of(survey));
     if let LiveSource::Path(path) | LiveSource::Unix(path) = &asked.source {

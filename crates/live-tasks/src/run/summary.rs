@@ -4,11 +4,12 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::path::PathBuf;
 
-use commands::{Doubt, DoubtKind, Judged};
+use commands::{Doubt, DoubtKind, Judged, Verdict};
 use serde::Serialize;
 
 use super::drift::{DriftReport, DriftVerdict};
 use super::latency::LatencySummary;
+use super::path::{PathReport, PathStatus, PathVerdict};
 use super::tally::RefusedFrames;
 
 /// How a stream stands.
@@ -28,6 +29,9 @@ pub struct LiveStatus {
     pub temperature_c: Option<f64>,
     /// What the calibrated drift says.
     pub drift: DriftReport,
+    /// The last pose, where poses are sought.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub path: Option<PathStatus>,
 }
 
 impl fmt::Display for LiveStatus {
@@ -42,7 +46,8 @@ impl fmt::Display for LiveStatus {
         if let Some(temperature_c) = self.temperature_c {
             write!(f, ", {temperature_c:.1} °C")?;
         }
-        write!(f, ", {}", self.drift)
+        write!(f, ", {}", self.drift)?;
+        self.path.as_ref().map_or(Ok(()), |path| write!(f, ", {path}"))
     }
 }
 
@@ -56,6 +61,8 @@ pub enum Ended {
     Frames,
     /// Nobody reads the clouds any more.
     OutputClosed,
+    /// Who watches asked for it.
+    Asked,
     /// The source broke off within a frame.
     CutOff,
     /// The source cannot be read further.
@@ -101,6 +108,9 @@ pub struct LiveSummary {
     pub temperatures_c: Option<[f64; 2]>,
     /// What the calibrated drift says of the last frame.
     pub drift: DriftReport,
+    /// What became of the camera's path, where poses were sought.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub path: Option<PathReport>,
     /// How it ended.
     pub ended: Ended,
     /// Why, where that is not what was to be expected.
@@ -129,12 +139,24 @@ impl LiveSummary {
         if self.drift.verdict == DriftVerdict::Outside {
             self.doubts.push(Doubt::new(DoubtKind::Drift, self.drift.to_string()));
         }
+        if let Some(words) = self.path.as_ref().and_then(PathReport::loss_in_words) {
+            self.doubts.push(Doubt::new(DoubtKind::LostFrames, words));
+        }
     }
 }
 
 impl Judged for LiveSummary {
     fn doubts(&self) -> &[Doubt] {
         &self.doubts
+    }
+
+    /// A path that ends lost is no success, though what was tracked stands.
+    fn verdict(&self) -> Verdict {
+        match &self.path {
+            Some(path) if path.verdict == PathVerdict::Lost => Verdict::Partial,
+            _ if self.doubts.is_empty() => Verdict::Done,
+            _ => Verdict::Doubtful,
+        }
     }
 }
 
@@ -163,6 +185,12 @@ impl fmt::Display for LiveSummary {
         }
         if let Some(recording) = &self.recording {
             write!(f, "\nimages in {}", recording.display())?;
+        }
+        if let Some(path) = &self.path {
+            write!(f, "\n{path}")?;
+        }
+        if self.ended == Ended::Asked {
+            write!(f, "\nended as asked")?;
         }
         if self.ended == Ended::OutputClosed {
             write!(f, "\nended, as nobody reads the results any more")?;

@@ -10,6 +10,7 @@ use serde::Serialize;
 use super::drift::DriftReport;
 use super::feed::Feed;
 use super::latency::Latencies;
+use super::path::Path;
 use super::summary::LiveStatus;
 use crate::wire::FrameHeader;
 
@@ -34,6 +35,7 @@ pub(super) struct Tally {
     pub(super) drift: DriftReport,
     pub(super) temperatures_c: Option<[f64; 2]>,
     pub(super) latencies: Latencies,
+    pub(super) path: Path,
     refused: Vec<RefusedFrames>,
     pixels: Vec<u64>,
     /// First arrival and last result.
@@ -49,6 +51,7 @@ impl Tally {
             drift: DriftReport::default(),
             temperatures_c: None,
             latencies: Latencies::new(),
+            path: Path::default(),
             refused: Vec::new(),
             pixels: vec![0; COMBINATIONS],
             span: None,
@@ -71,6 +74,9 @@ impl Tally {
         self.processed += 1;
         if let Some(span) = &mut self.span {
             span[1] = now;
+        }
+        if let Some(pose) = &frame.pose {
+            self.path.add(pose);
         }
         for flags in frame.flags.as_slice() {
             self.pixels[flags.bits() as usize % COMBINATIONS] += 1;
@@ -123,6 +129,7 @@ impl Tally {
             latency: self.latencies.summary(),
             temperature_c: self.temperatures_c.map(|[_, last]| last),
             drift: self.drift.clone(),
+            path: self.path.status(),
         }
     }
 }

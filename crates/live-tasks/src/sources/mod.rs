@@ -13,6 +13,7 @@ use range_io::survey::Survey;
 use crate::wire::{FrameError, LiveFrame};
 use folder::FillingFolder;
 use recording::Recording;
+pub(crate) use recording::frame_time_s;
 
 /// What a source has to give just now.
 #[derive(Debug)]

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use commands::{Error, Result, root_of};
-use range_io::survey::{InputFrame, Level, Survey, read_frame};
+use range_io::survey::{FrameEntry, InputFrame, Level, Survey, read_frame};
 
 use super::{FrameSource, Next};
 use crate::wire::{FrameError, FrameHeader, LiveFrame, SampleType};
@@ -13,6 +13,11 @@ use crate::wire::{FrameError, FrameHeader, LiveFrame, SampleType};
 const LONGEST_SLEEP: Duration = Duration::from_millis(50);
 /// Time between frames without time stamps that are played without waiting, second.
 const WITHOUT_TIMES_S: f64 = 1.0;
+
+/// Time of a recording's frame, second.
+pub(crate) fn frame_time_s(entry: &FrameEntry, index: usize) -> f64 {
+    entry.timestamp_s.unwrap_or(index as f64 * WITHOUT_TIMES_S)
+}
 
 pub(super) struct Recording {
     survey: Survey,
@@ -59,7 +64,7 @@ impl Recording {
             height: raw.height(),
             frequencies: raw.modulations().len(),
             phase_steps: raw.phase_steps(),
-            timestamp_s: entry.timestamp_s.unwrap_or(index as f64 * WITHOUT_TIMES_S),
+            timestamp_s: frame_time_s(entry, index),
             integration_time_s: entry.integration_time_s,
             temperature_c: entry.temperature_c,
         };

@@ -4,17 +4,22 @@ use std::io::{self, Write};
 
 use live_frames::ProcessedFrame;
 use range_image::Flags;
-use recordings::{Encoding, Error, Image, McapWriter, Payload, StreamId};
+use recordings::{Encoding, Error, Image, McapWriter, Payload, StreamId, Transform};
+
+use super::trajectory::pose_numbers;
 
 /// Topics of a recording, in the order in which a frame's messages are written.
 const TOPICS: [&str; 4] = ["/range/image_raw", "/sigma/image_raw", "/amplitude/image_raw", "/flags/image_raw"];
-/// Name of the camera's coordinate system.
+/// Topic of the poses: the one that viewers of ROS take coordinate systems from.
+const TRANSFORMS: &str = "/tf";
+/// Names of the camera's coordinate system (computer-vision axes, as for all images of ROS) and of the world's.
 const CAMERA: &str = "camera";
+const WORLD: &str = "world";
 
 /// Writer of processed frames as MCAP: four images a frame with its time stamp, which `rangecam convert --calibration FILE` makes a survey of.
 ///
-/// `/range`, `/sigma` (metre) and `/amplitude` (the samples' unit) are `32FC1` with NaN for none, `/flags` is `16UC1`. The file
-/// has its index from [`finish`](Self::finish) on.
+/// `/range`, `/sigma` (metre) and `/amplitude` (the samples' unit) are `32FC1` with NaN for none, `/flags` is `16UC1`. Where poses are sought,
+/// `/tf` says where `camera` lies in `world` at each frame that has one. The file has its index from [`finish`](Self::finish) on.
 pub struct McapStream<W: Write> {
     writer: McapWriter<W>,
     topics: [StreamId; 4],
@@ -55,7 +60,16 @@ impl<W: Write> McapStream<W> {
             let image = image.map_err(as_io)?;
             self.writer.message(topic, time_ns, &Payload::Image(image)).map_err(as_io)?;
         }
-        Ok(())
+        let Some(pose) = frame.pose.filter(|pose| pose.state.has_pose()) else { return Ok(()) };
+        let [x, y, z, qx, qy, qz, qw] = pose_numbers(&pose.world_from_camera);
+        let place = Transform {
+            parent: WORLD.to_owned(),
+            child: CAMERA.to_owned(),
+            translation_m: [x, y, z],
+            rotation: [qx, qy, qz, qw],
+        };
+        let topic = self.writer.stream(TRANSFORMS).map_err(as_io)?;
+        self.writer.message(topic, time_ns, &Payload::Transforms(vec![place])).map_err(as_io)
     }
 
     /// Ends the recording with its index; the writer.

@@ -4,6 +4,8 @@ use std::fmt::Write as _;
 use std::io::{Result, Write};
 
 use live_frames::ProcessedFrame;
+use live_frames::tracking::nalgebra::Point3;
+use live_frames::tracking::{TrackedPose, TrackingState};
 use range_image::Raster;
 
 /// Bytes of a point.
@@ -11,7 +13,7 @@ const RECORD: usize = 5 * 4 + 2;
 
 /// Writer of a stream of clouds: complete binary PLY files, one a frame, that follow each other.
 ///
-/// Each has `x y z` (camera's frame, metre), `intensity`, `sigma` and `flags` of the pixels that have a point, and its time
+/// Each has `x y z` (metre; camera's frame, or that of the world where the frame has a pose, which the header then says), `intensity`, `sigma` and `flags` of the pixels that have a point, and its time
 /// stamp as a comment. A point with a flag should not be trusted as it is.
 #[derive(Debug)]
 pub struct PlyStream<W> {
@@ -34,12 +36,14 @@ impl<W: Write> PlyStream<W> {
         self.bytes.clear();
         let mut count = 0;
         let planes = [&frame.amplitude, &frame.sigma].map(Raster::as_slice);
+        let pose = frame.pose.filter(|pose| pose.state.has_pose()).map(|pose| pose.world_from_camera);
         for (index, (point, flags)) in frame.points.iter().zip(frame.flags.as_slice()).enumerate() {
             if !point.iter().all(|value| value.is_finite()) {
                 continue;
             }
             count += 1;
-            let [x, y, z] = point.map(|value| value as f32);
+            let place = pose.map_or(Point3::from(*point), |pose| pose * Point3::from(*point));
+            let [x, y, z] = [0, 1, 2].map(|axis| place[axis] as f32);
             let values = [x, y, z, planes[0][index], planes[1][index]];
             let mut record = [0; RECORD];
             for (bytes, value) in record.chunks_exact_mut(4).zip(values) {
@@ -52,9 +56,13 @@ impl<W: Write> PlyStream<W> {
         // Writing to a string can't fail.
         let _ = write!(
             self.header,
-            "ply\nformat binary_little_endian 1.0\ncomment metres\ncomment timestamp_s {}\nelement vertex {count}\n",
+            "ply\nformat binary_little_endian 1.0\ncomment metres\ncomment timestamp_s {}\n",
             frame.timestamp_s
         );
+        if let Some(pose) = &frame.pose {
+            say_coordinates(pose, &mut self.header);
+        }
+        let _ = writeln!(self.header, "element vertex {count}");
         for name in ["x", "y", "z", "intensity", "sigma"] {
             let _ = writeln!(self.header, "property float {name}");
         }
@@ -69,4 +77,16 @@ impl<W: Write> PlyStream<W> {
     pub fn into_inner(self) -> W {
         self.writer
     }
+}
+
+/// Which coordinates a cloud has where poses are sought; those of a frame without a pose are the camera's.
+fn say_coordinates(pose: &TrackedPose, header: &mut String) {
+    // Writing to a string can't fail.
+    let _ = if let TrackingState::Lost(reason) = pose.state {
+        write!(header, "comment coordinates camera\ncomment no pose: {}\n", reason.words())
+    } else {
+        let (t, q) = (pose.world_from_camera.translation.vector, pose.world_from_camera.rotation.coords);
+        let numbers = [t.x, t.y, t.z, q.x, q.y, q.z, q.w].map(|number| number.to_string()).join(" ");
+        write!(header, "comment coordinates world\ncomment world_from_camera {numbers}\n")
+    };
 }

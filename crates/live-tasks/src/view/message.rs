@@ -9,7 +9,7 @@ const MAGIC: &[u8; 4] = b"RCLV";
 
 /// Writes a frame, thinned to at most 320 x 240 pixels, little-endian: `RCLV`, columns, rows and step (u32), number (f64), time
 /// stamp (f64); then plane by plane range (f32, metre), amplitude (f32), points (three f32 a pixel, camera's frame) and
-/// flags (u16).
+/// flags (u16). Behind them stands the path.
 pub(super) fn write(frame: &ProcessedFrame, bytes: &mut Vec<u8>) {
     bytes.clear();
     let (width, height) = (frame.width(), frame.height());

@@ -1,6 +1,7 @@
 //! The stream in a browser, on this machine alone.
 
 mod message;
+mod path;
 mod server;
 
 use std::io;
@@ -10,6 +11,7 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use live_frames::ProcessedFrame;
+use path::PathLine;
 
 /// Longest wait for a frame that was asked for.
 const WAIT: Duration = Duration::from_millis(500);
@@ -23,6 +25,7 @@ const MOST_CONNECTIONS: usize = 16;
 pub struct LiveView {
     shared: Arc<Shared>,
     address: SocketAddr,
+    path: PathLine,
 }
 
 /// What the threads of the page and the one who works on frames share.
@@ -46,17 +49,18 @@ struct Copied {
 }
 
 impl LiveView {
-    /// Listens at a port of the loopback; 0: any that is free.
+    /// Listens at a port of the loopback; 0: any that is free. `vertical_axis`: index of the axis of the world that points up, which
+    /// paths are drawn along.
     ///
     /// # Errors
     /// What the system says, such as that the port is taken.
-    pub fn new(port: u16) -> io::Result<Self> {
+    pub fn new(port: u16, vertical_axis: usize) -> io::Result<Self> {
         let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port))?;
         let address = listener.local_addr()?;
         let shared = Arc::new(Shared::default());
         let own = Arc::clone(&shared);
         std::thread::Builder::new().name("page".to_owned()).spawn(move || serve(&listener, &own))?;
-        Ok(Self { shared, address })
+        Ok(Self { shared, address, path: PathLine::new(vertical_axis) })
     }
 
     /// Where the page is.
@@ -65,7 +69,8 @@ impl LiveView {
     }
 
     /// Copies a frame, and the status as JSON, for the page, where somebody asked. It never waits.
-    pub fn offer(&self, frame: &ProcessedFrame, status: &dyn Fn() -> String) {
+    pub fn offer(&mut self, frame: &ProcessedFrame, status: &dyn Fn() -> String) {
+        self.path.follow(frame);
         if !self.shared.wanted.load(Ordering::Acquire) {
             return;
         }
@@ -73,6 +78,7 @@ impl LiveView {
         self.shared.wanted.store(false, Ordering::Release);
         copy.number += 1;
         message::write(frame, &mut copy.frame);
+        self.path.write(frame, &mut copy.frame);
         copy.status = status();
         drop(copy);
         self.shared.copied.notify_all();

@@ -16,7 +16,7 @@ pub(super) fn topic(stream: &Stream) -> String {
     let name: String = name.chars().map(|letter| if letter.is_alphanumeric() { letter } else { '_' }).collect();
     match stream.kind {
         Kind::CameraInfo => format!("/{name}/camera_info"),
-        Kind::Imu | Kind::Temperature | Kind::Other => format!("/{name}"),
+        Kind::Imu | Kind::Temperature | Kind::Transforms | Kind::Other => format!("/{name}"),
         _ => format!("/{name}/image_raw"),
     }
 }

@@ -20,6 +20,8 @@ pub enum Payload {
     Imu(Box<Imu>),
     /// A temperature in degree Celsius.
     Temperature(f64),
+    /// Where coordinate systems lie in others.
+    Transforms(Vec<Transform>),
     /// Anything else, as it stands in the file.
     Bytes(Vec<u8>),
     /// A message that is not what its type says; the reason in words.
@@ -66,6 +68,19 @@ pub struct Imu {
     pub linear_acceleration: Option<Measured<3>>,
     /// When the angular velocity was measured, nanosecond, where that is not the time of the message.
     pub angular_velocity_ns: Option<i64>,
+}
+
+/// Where one coordinate system lies in another, as `geometry_msgs/TransformStamped` states it.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Transform {
+    /// Name of the coordinate system in which the other lies.
+    pub parent: String,
+    /// Name of that other one.
+    pub child: String,
+    /// Its origin, metre.
+    pub translation_m: [f64; 3],
+    /// Quaternion x, y, z, w that turns its axes into the parent's.
+    pub rotation: [f64; 4],
 }
 
 /// Values with their covariance.

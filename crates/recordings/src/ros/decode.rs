@@ -2,7 +2,7 @@
 
 use super::fields::Fields;
 use super::{Layout, MessageType};
-use crate::payload::{CameraInfo, CompressedImage, Encoding, Image, ImageParts, Imu, Measured, Payload};
+use crate::payload::{CameraInfo, CompressedImage, Encoding, Image, ImageParts, Imu, Measured, Payload, Transform};
 
 /// What a message holds and when it was measured.
 pub(crate) struct Decoded {
@@ -18,7 +18,9 @@ pub(crate) fn decode(bytes: &[u8], layout: Layout, message: MessageType) -> Deco
 
 fn decoded(bytes: &[u8], layout: Layout, message: MessageType) -> Result<Decoded, String> {
     let mut fields = Fields::new(bytes, layout)?;
-    let (stamp_ns, frame_id) = header(&mut fields)?;
+    // Each transform of a list has a header of its own.
+    let is_list = message == MessageType::Transforms;
+    let (stamp_ns, frame_id) = if is_list { (None, String::new()) } else { header(&mut fields)? };
     let payload = match message {
         MessageType::Image => Payload::Image(image(&mut fields, frame_id)?),
         MessageType::CompressedImage => {
@@ -28,8 +30,24 @@ fn decoded(bytes: &[u8], layout: Layout, message: MessageType) -> Result<Decoded
         MessageType::CameraInfo => Payload::CameraInfo(Box::new(camera_info(&mut fields, frame_id)?)),
         MessageType::Imu => Payload::Imu(Box::new(imu(&mut fields, frame_id)?)),
         MessageType::Temperature => Payload::Temperature(fields.f64("temperature")?),
+        MessageType::Transforms => return transforms(&mut fields),
     };
     Ok(Decoded { stamp_ns, payload })
+}
+
+/// `tf2_msgs/TFMessage`, at the time of its first part.
+fn transforms(fields: &mut Fields) -> Result<Decoded, String> {
+    // A part takes more bytes than one, so a promise of many ends with the bytes.
+    let count = fields.u32("transforms")?;
+    let (mut stamp_ns, mut found) = (None, Vec::new());
+    for _ in 0..count {
+        let (stamp, parent) = header(fields)?;
+        stamp_ns = stamp_ns.or(stamp);
+        let child = fields.text("child_frame_id")?;
+        let (translation_m, rotation) = (fields.f64s("translation")?, fields.f64s("rotation")?);
+        found.push(Transform { parent, child, translation_m, rotation });
+    }
+    Ok(Decoded { stamp_ns, payload: Payload::Transforms(found) })
 }
 
 /// `std_msgs/Header`. A stamp of zero says that none was set.

@@ -12,6 +12,8 @@ const IMU: &str = "std_msgs/Header header\ngeometry_msgs/Quaternion orientation\
 
 const TEMPERATURE: &str = "std_msgs/Header header\nfloat64 temperature\nfloat64 variance\n";
 
+const TRANSFORMS: &str = "geometry_msgs/TransformStamped[] transforms\n";
+
 const HEADER: [(&str, &str); 2] = [
     ("std_msgs/Header", "builtin_interfaces/Time stamp\nstring frame_id\n"),
     ("builtin_interfaces/Time", "int32 sec\nuint32 nanosec\n"),
@@ -27,6 +29,16 @@ const GEOMETRY: [(&str, &str); 2] = [
     ("geometry_msgs/Vector3", "float64 x\nfloat64 y\nfloat64 z\n"),
 ];
 
+const PLACES: [(&str, &str); 4] = [
+    (
+        "geometry_msgs/TransformStamped",
+        "std_msgs/Header header\nstring child_frame_id\ngeometry_msgs/Transform transform\n",
+    ),
+    ("geometry_msgs/Transform", "geometry_msgs/Vector3 translation\ngeometry_msgs/Quaternion rotation\n"),
+    GEOMETRY[0],
+    GEOMETRY[1],
+];
+
 /// The definition of a type and of all types in it.
 pub(crate) fn definition(message: MessageType) -> String {
     let (own, further): (&str, &[(&str, &str)]) = match message {
@@ -35,6 +47,7 @@ pub(crate) fn definition(message: MessageType) -> String {
         MessageType::CameraInfo => (CAMERA_INFO, &[WINDOW]),
         MessageType::Imu => (IMU, &GEOMETRY),
         MessageType::Temperature => (TEMPERATURE, &[]),
+        MessageType::Transforms => (TRANSFORMS, &PLACES),
     };
     let rule = "=".repeat(80);
     let parts = HEADER.iter().chain(further).map(|(name, text)| format!("{rule}\nMSG: {name}\n{text}"));

@@ -1,7 +1,7 @@
 //! Messages of ROS 2 to their bytes, little-endian.
 
 use super::MessageType;
-use crate::payload::{CameraInfo, Image, Imu, Measured, Payload};
+use crate::payload::{CameraInfo, Image, Imu, Measured, Payload, Transform};
 
 /// The type and the bytes of a message; `None` for what has no message type of its own.
 pub(crate) fn encode(stamp_ns: i64, payload: &Payload) -> Option<(MessageType, Vec<u8>)> {
@@ -33,6 +33,13 @@ pub(crate) fn encode(stamp_ns: i64, payload: &Payload) -> Option<(MessageType, V
             // The variance is not known: zero.
             out.f64s(&[*celsius, 0.0]);
             MessageType::Temperature
+        }
+        Payload::Transforms(transforms) => {
+            out.u32(transforms.len() as u32);
+            for transform in transforms {
+                out.transform(stamp_ns, transform);
+            }
+            MessageType::Transforms
         }
         Payload::Bytes(_) | Payload::Unreadable(_) => return None,
     };
@@ -108,6 +115,13 @@ impl Bytes {
         self.measured(imu.orientation.as_ref());
         self.measured(imu.angular_velocity.as_ref());
         self.measured(imu.linear_acceleration.as_ref());
+    }
+
+    fn transform(&mut self, stamp_ns: i64, transform: &Transform) {
+        self.header(stamp_ns, &transform.parent);
+        self.text(&transform.child);
+        self.f64s(&transform.translation_m);
+        self.f64s(&transform.rotation);
     }
 
     fn measured<const N: usize>(&mut self, measured: Option<&Measured<N>>) {

@@ -23,6 +23,7 @@ pub(crate) enum MessageType {
     CameraInfo,
     Imu,
     Temperature,
+    Transforms,
 }
 
 /// How the bytes of a message are laid out.
@@ -44,11 +45,20 @@ const TYPES: [(&str, MessageType); 5] = [
     ("Temperature", MessageType::Temperature),
 ];
 
+/// Package and name of the type that says where coordinate systems lie.
+const TRANSFORMS: [&str; 2] = ["tf2_msgs", "TFMessage"];
+
 impl MessageType {
     /// The type of this name in the words of ROS 1 (`sensor_msgs/Image`) or ROS 2 (`sensor_msgs/msg/Image`).
     pub fn of(name: &str) -> Option<Self> {
-        let short = name.strip_prefix("sensor_msgs/")?;
+        let (package, short) = name.split_once('/')?;
         let short = short.strip_prefix("msg/").unwrap_or(short);
+        if [package, short] == TRANSFORMS {
+            return Some(Self::Transforms);
+        }
+        if package != "sensor_msgs" {
+            return None;
+        }
         TYPES.iter().find(|(known, _)| *known == short).map(|(_, known)| *known)
     }
 
@@ -61,11 +71,15 @@ impl MessageType {
             Self::CameraInfo => Kind::CameraInfo,
             Self::Imu => Kind::Imu,
             Self::Temperature => Kind::Temperature,
+            Self::Transforms => Kind::Transforms,
         }
     }
 
     #[cfg(feature = "mcap")]
     pub fn ros2_name(self) -> String {
+        if self == Self::Transforms {
+            return TRANSFORMS.join("/msg/");
+        }
         let short = TYPES.iter().find(|(_, known)| *known == self).map_or("", |(name, _)| name);
         format!("sensor_msgs/msg/{short}")
     }

@@ -7,6 +7,7 @@ use point_cloud::Cloud;
 use pose_graph::Graph;
 use pose_graph::Relation;
 use projective_registration::OrganisedFrame;
+use rigid_pose::Uncertain;
 
 /// Fields of the thumbnails.
 pub(crate) const THUMBNAIL: [usize; 2] = [16, 12];
@@ -96,8 +97,9 @@ impl Keyframes {
         found.into_iter().map(|(overlap, k, _)| (overlap, k)).collect()
     }
 
-    /// Takes out the keyframe that is nearest to another one, neither the first nor `spared`; returns its index.
-    pub(crate) fn thin(&mut self, spared: [usize; 2]) -> Option<usize> {
+    /// Takes out the keyframe that is nearest to another one, neither the first nor `spared`; returns its index, and it
+    /// with its pose in the world.
+    pub(crate) fn thin(&mut self, spared: [usize; 2]) -> Option<(usize, Keyframe, Uncertain)> {
         let gap = |k: usize| {
             let others = (0..self.list.len()).filter(|l| *l != k);
             let distance = |l: usize| {
@@ -108,11 +110,16 @@ impl Keyframes {
         };
         let free = (1..self.list.len()).filter(|k| !spared.contains(k));
         let k = free.min_by(|x, y| gap(*x).total_cmp(&gap(*y)))?;
+        let pose = self.pose(k);
         let (hub, k_from_hub) = self.graph.remove(k)?;
         let joined = Anchor::Joined { to: self.list[hub].number, to_from_this: k_from_hub.pose().inverse() };
         self.anchors[self.list[k].number] = joined;
-        self.list.remove(k);
-        Some(k)
+        Some((k, self.list.remove(k), pose))
+    }
+
+    /// Pose of a keyframe in the world.
+    pub(crate) fn pose(&self, k: usize) -> Uncertain {
+        self.graph.poses[k].total(&self.graph.covariance)
     }
 
     /// All surfaces in the world's frame.

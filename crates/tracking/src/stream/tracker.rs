@@ -5,6 +5,7 @@ use std::sync::Arc;
 use nalgebra::{Isometry3, Matrix6};
 
 use crate::error::{Error, Result};
+use crate::map::surfaces::SurfaceMap;
 use crate::motion_model::motion::{MotionPrior, diagonal};
 use crate::motion_model::prediction::{Grounds, Last, Prediction};
 use crate::motion_model::velocity::Velocity;
@@ -39,6 +40,8 @@ pub struct Tracker {
     pub(crate) shared: SharedError,
     pub(crate) last: Option<Last>,
     trajectory: Vec<TrackedPose>,
+    /// What keyframes that are no more have seen.
+    seen_before: Option<SurfaceMap>,
     scratch: Vec<(u32, f32, f32)>,
 }
 
@@ -70,6 +73,7 @@ impl Tracker {
             keyframes: Keyframes::default(),
             last: None,
             trajectory: Vec::new(),
+            seen_before: None,
             scratch: Vec::new(),
         })
     }
@@ -134,6 +138,22 @@ impl Tracker {
     /// keyframes overlap, surfaces come several times.
     pub fn map(&self) -> Cloud {
         self.keyframes.cloud()
+    }
+
+    /// Keeps what keyframes see beyond their number: those that are taken out leave their surfaces in this map, which may hold
+    /// others already.
+    pub fn keep_map(&mut self, map: SurfaceMap) {
+        self.seen_before = Some(map);
+    }
+
+    /// The map with each surface once: what [`keep_map`](Self::keep_map) holds, and the surfaces of all keyframes where they lie now.
+    /// `None` without `keep_map`.
+    pub fn surface_map(&self) -> Option<SurfaceMap> {
+        let mut map = self.seen_before.clone()?;
+        for (k, keyframe) in self.keyframes.list.iter().enumerate() {
+            map.add_frame(&keyframe.frame, &self.keyframes.pose(k));
+        }
+        Some(map)
     }
 
     /// Number of keyframes in the map.
@@ -344,7 +364,10 @@ impl Tracker {
         let Some(last) = &mut self.last else { return };
         while self.keyframes.list.len() > self.options.max_keyframes {
             let newest = self.keyframes.list.len() - 1;
-            let Some(gone) = self.keyframes.thin([last.keyframe, newest]) else { return };
+            let Some((gone, keyframe, pose)) = self.keyframes.thin([last.keyframe, newest]) else { return };
+            if let Some(map) = &mut self.seen_before {
+                map.add_frame(&keyframe.frame, &pose);
+            }
             last.keyframe -= usize::from(last.keyframe > gone);
         }
     }

@@ -5,7 +5,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 use live_tasks::live_frames::DriftStage;
-use live_tasks::{LiveRequest, LiveSource, StreamTarget};
+use live_tasks::live_frames::tracking::MapOptions;
+use live_tasks::{LiveRequest, LiveSource, LiveTracking, StreamTarget};
 
 use crate::requests::values::{finite, not_negative, positive};
 
@@ -27,13 +28,26 @@ pub(crate) struct LiveArguments {
     /// Write ranges, deviations, amplitudes and flags as images of an MCAP recording, to a file, or with `-` to standard output.
     #[arg(long, value_name = "FILE|-")]
     mcap: Option<PathBuf>,
+    /// Seek the camera's pose frame by frame: in the status, the page, the clouds (whose points are then in the world, that of the first
+    /// frame or of its station) and the recording (`/tf`). A frame that is lost has none.
+    #[arg(long)]
+    track: bool,
+    /// Write the poses, line by line as they come (TUM: time tx ty tz qx qy qz qw), to a file, or with `-` to standard output; tracks.
+    #[arg(long, value_name = "FILE|-")]
+    trajectory: Option<PathBuf>,
+    /// Write the map of what was seen as a PLY cloud with normals and sigma when the stream ends; tracks.
+    #[arg(long, value_name = "FILE")]
+    map: Option<PathBuf>,
+    /// Edge of the map's voxels; they double whenever the map has a million points. Default: 0.05.
+    #[arg(long, value_name = "METRE", value_parser = positive, requires = "map")]
+    map_voxel: Option<f64>,
     /// End after so many processed frames.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     frames: Option<u64>,
     /// Play a recording without waiting, and drop nothing: the source waits for the processing.
     #[arg(long)]
     fast: bool,
-    /// Show range, amplitude, flags and points on a page at this port of 127.0.0.1; 0: any that is free.
+    /// Show range, amplitude, flags, points and the path on a page at this port of 127.0.0.1; 0: any that is free.
     #[arg(long, value_name = "PORT")]
     view: Option<u16>,
     /// Amplitude below which pixels are flagged, in the samples' unit.
@@ -60,6 +74,13 @@ impl LiveArguments {
         let target = |path: PathBuf| {
             if path.as_os_str() == OsStr::new("-") { StreamTarget::StandardOutput } else { StreamTarget::File(path) }
         };
+        let seeks = self.track || self.trajectory.is_some() || self.map.is_some();
+        let defaults = MapOptions::default();
+        let tracking = LiveTracking {
+            trajectory: self.trajectory.map(target),
+            map: self.map,
+            map_options: MapOptions { voxel_m: self.map_voxel.unwrap_or(defaults.voxel_m), ..defaults },
+        };
         LiveRequest {
             survey: self.survey,
             calibration: self.calibration,
@@ -72,6 +93,7 @@ impl LiveArguments {
             power_on_s: self.power_on,
             drift: if self.leave_drift { DriftStage::Ignore } else { DriftStage::Apply },
             view: self.view,
+            tracking: seeks.then_some(tracking),
             ..LiveRequest::new(source)
         }
     }

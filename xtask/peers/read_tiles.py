@@ -58,13 +58,15 @@ def main(ply_path, tiles_path):
             print(f"  level {level}: {len(copc.query(level=level))} points")
         low, high = copc.header.mins, copc.header.maxs
         box = laspy.copc.Bounds(low + 0.25 * (high - low), low + 0.6 * (high - low))
-        inside = np.ones(len(ply), bool)
-        # What lies at the border goes by the rounded coordinates.
-        for axis, (o, s) in enumerate(zip(copc.header.offsets, copc.header.scales)):
-            x = np.round((ply["xyz"[axis]].astype("f8") - o) / s) * s + o
-            inside &= (x >= box.mins[axis]) & (x <= box.maxs[axis])
-        print(f"  in a box: {len(copc.query(box))} points, {inside.sum()} of the PLY")
-        return int(total != len(ply) or len(copc.query(box)) != inside.sum())
+        found = len(copc.query(box))
+        # Points within a step of the border may be rounded to either side.
+        surely, perhaps = np.ones(len(ply), bool), np.ones(len(ply), bool)
+        for axis, step in enumerate(copc.header.scales):
+            x = ply["xyz"[axis]].astype("f8")
+            surely &= (x >= box.mins[axis] + step) & (x <= box.maxs[axis] - step)
+            perhaps &= (x >= box.mins[axis] - step) & (x <= box.maxs[axis] + step)
+        print(f"  in a box: {found} points, {surely.sum()} to {perhaps.sum()} of the PLY")
+        return int(total != len(ply) or not surely.sum() <= found <= perhaps.sum())
 
 
 if __name__ == "__main__":

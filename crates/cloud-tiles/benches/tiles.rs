@@ -16,7 +16,9 @@ fn tiles(criterion: &mut Criterion) {
     for index in 0..POINTS {
         let [u, v] = [0.754_877_7, 0.569_840_3].map(|step: f64| (f64::from(index) * step).fract());
         let noise = (f64::from(index) * 12.9898).sin() * 1e-3;
-        [6.0 * u, 4.0 * v, noise, 1e-3].iter().for_each(|value| bytes.extend((*value as f32).to_le_bytes()));
+        for value in [6.0 * u, 4.0 * v, noise, 1e-3] {
+            bytes.extend((value as f32).to_le_bytes());
+        }
     }
     std::fs::write(&from, bytes).unwrap();
     let mut group = criterion.benchmark_group("tiles");

@@ -102,10 +102,12 @@ pub fn ply(path: &Path, points: &[[f32; 3]]) {
     )
     .into_bytes();
     for (index, point) in (0_u32..).zip(points) {
-        point.iter().for_each(|x| bytes.extend(x.to_le_bytes()));
+        for x in point {
+            bytes.extend(x.to_le_bytes());
+        }
         bytes.extend((1.0 + index as f32).to_le_bytes());
         bytes.extend((1e-3 * index as f32).to_le_bytes());
-        bytes.extend((u16::from(index % 5 == 0) << 3).to_le_bytes());
+        bytes.extend((u16::from(index.is_multiple_of(5)) << 3).to_le_bytes());
         bytes.extend(index.to_le_bytes());
     }
     std::fs::write(path, bytes).unwrap();

@@ -7,7 +7,7 @@ fn room(points: usize) -> Vec<[f32; 3]> {
     let share = |index: usize, step: f64| (index as f64 * step).fract();
     let point = |index: usize| {
         let [u, v] = [share(index, 0.754_877_666_246_693), share(index, 0.569_840_290_998_053_3)];
-        if index % 3 == 0 {
+        if index.is_multiple_of(3) {
             [(6.0 * u - 3.0) as f32, 4.0, (3.0 * v) as f32]
         } else {
             [(6.0 * u - 3.0) as f32, (8.0 * v - 4.0) as f32, (0.02 * (9.0 * u).sin()) as f32]
@@ -46,7 +46,7 @@ fn every_point_is_in_one_node_with_all_that_is_known_of_it() {
             assert_eq!((f32_at(30), f32_at(34)), (1.0 + number as f32, 1e-3 * number as f32));
             let flags = u16::from_le_bytes(record[38..40].try_into().unwrap());
             // Flagged points are withheld.
-            assert_eq!((flags, record[15]), if number % 5 == 0 { (8, 4) } else { (0, 0) });
+            assert_eq!((flags, record[15]), if number.is_multiple_of(5) { (8, 4) } else { (0, 0) });
             let intensity = u16::from_le_bytes(record[12..14].try_into().unwrap());
             assert!((f64::from(intensity) / 65535.0 - f64::from(1 + number) / 120_000.0).abs() < 1e-5);
             assert!(!std::mem::replace(&mut seen[number as usize], true), "point {number} is there twice");

@@ -105,12 +105,11 @@ impl<'a> LastPoints<'a> {
         if cloud.points.is_empty() {
             return Ok(());
         }
-        let (mut writer, points) = match self.open.take() {
-            Some(open) => open,
-            None => {
-                self.files += 1;
-                (PlyWriter::create(self.folder.file(file(self.files - 1))?, Precision::Single)?, 0)
-            }
+        let (mut writer, points) = if let Some(open) = self.open.take() {
+            open
+        } else {
+            self.files += 1;
+            (PlyWriter::create(self.folder.file(file(self.files - 1))?, Precision::Single)?, 0)
         };
         writer.append(cloud)?;
         self.points += cloud.points.len();

@@ -61,14 +61,13 @@ const CASES: &[Case] = &[
 ];
 
 pub(crate) fn run(options: &Options) -> Outcome {
-    let program = match &options.program {
+    let program = if let Some(program) = &options.program {
         // Commands run in the folder of the surveys.
-        Some(program) => std::fs::canonicalize(program).map_err(|error| format!("{}: {error}", program.display()))?,
-        None => {
-            cargo(&["build", "--release", "--package", "rangecam-cli", "--bin", "rangecam"], &[])?;
-            let target = std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| root().join("target"), PathBuf::from);
-            target.join("release/rangecam")
-        }
+        std::fs::canonicalize(program).map_err(|error| format!("{}: {error}", program.display()))?
+    } else {
+        cargo(&["build", "--release", "--package", "rangecam-cli", "--bin", "rangecam"], &[])?;
+        let target = std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| root().join("target"), PathBuf::from);
+        target.join("release/rangecam")
     };
     let folder = tempfile::tempdir().map_err(|error| error.to_string())?;
     let surveys = Surveys { folder: folder.path(), program: &program };

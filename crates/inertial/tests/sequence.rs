@@ -186,7 +186,6 @@ fn a_whole_state_is_off_as_its_covariance_says() {
         off.fixed_rows_mut::<3>(15).copy_from(&(found.gravity - gravity()));
         mean += off.dot(&state.covariance.cholesky().unwrap().solve(&off)) / runs as f64;
     }
-    println!("{mean:.1}");
     // Chi-squared of 18 over 100 runs scatters by 0.6.
     assert!((15.0..19.5).contains(&mean), "{mean}");
 }

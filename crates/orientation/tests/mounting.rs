@@ -160,7 +160,6 @@ fn the_clocks_are_brought_together() {
     // What two neighbouring poses of the carrier differ by is mostly noise: ten and thirty times as much as above.
     for times in [10.0, 30.0] {
         let [square, worst] = clocks(60, times);
-        println!("{times}: {square:.2}, {worst:.4} s");
         assert!((square - 1.0).abs() < 0.5, "{times}: {square}");
         assert!(worst < 0.003 * times, "{times}: {worst}");
     }

@@ -242,13 +242,12 @@ impl Moments<'_> {
                 offset_s: solution.values(blocks[2])?.first().copied().unwrap_or(f64::NAN),
             };
             pass += 1;
-            let settled = match self.baseline_s {
-                None => true,
-                Some(_) => {
-                    let sigma_s = solution.standard_deviations(blocks[2], Scale::Prior)?;
-                    sigma_s.iter().all(|sigma_s| (guess.offset_s - before_s).abs() <= SETTLED * sigma_s)
-                }
-            };
+            let moved_s = (guess.offset_s - before_s).abs();
+            let settled = self.baseline_s.is_none()
+                || solution
+                    .standard_deviations(blocks[2], Scale::Prior)?
+                    .iter()
+                    .all(|sigma_s| moved_s <= SETTLED * sigma_s);
             if pass >= PASSES && settled {
                 return Ok(Estimate { guess, solution, blocks, used: used.to_vec() });
             }

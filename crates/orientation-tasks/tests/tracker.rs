@@ -104,8 +104,7 @@ fn clocks_that_differ_are_brought_together() {
     let summary = oriented(&world.survey, OrientBy::Tracker(options)).unwrap();
     println!("{summary}");
     let [offset, sigma] = summary.mounting.as_ref().unwrap().time_offset_s.unwrap();
-    // Its deviation is too small where poses scatter by more than the motion between two of them.
-    assert!((offset - OFFSET_S).abs() < 0.01 && sigma < 0.01, "{offset} {sigma}");
+    assert!((offset - OFFSET_S).abs() < 4.0 * sigma && sigma < 0.01, "{offset} {sigma}");
     assert!(normalised(&world.survey) < 2.5);
 }
 

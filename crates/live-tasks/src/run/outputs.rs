@@ -30,6 +30,10 @@ impl Outputs {
             let recording = McapStream::new(target.open()?);
             Ok::<_, Error>(target.written(recording)?.map(|recording| (target.clone(), recording)))
         });
+        if let Some(map) = asked.tracking.as_ref().and_then(|tracking| tracking.map.as_ref()) {
+            // It is written when the stream has ended, which is too late to learn that it cannot be.
+            drop(StreamTarget::File(map.clone()).open()?);
+        }
         let poses = asked.tracking.as_ref().and_then(|tracking| tracking.trajectory.as_ref());
         let poses = poses.map(|target| Ok::<_, Error>((target.clone(), TrajectoryStream::new(target.open()?))));
         Ok(Self { clouds: clouds.transpose()?, images: images.transpose()?.flatten(), poses: poses.transpose()? })

@@ -153,15 +153,11 @@ fn clocks(runs: u64, times: f64) -> [f64; 2] {
 
 #[test]
 fn the_clocks_are_brought_together() {
-    // Chi-squared of one over 200 runs: 1 ± 0.1; two of these. A tenth would be one.
-    let [square, worst] = clocks(200, 1.0);
-    assert!((square - 1.0).abs() < 0.2, "{square}");
-    assert!(worst < 5e-3, "{worst}");
-    // What two neighbouring poses of the carrier differ by is mostly noise: ten and thirty times as much as above.
-    for times in [10.0, 30.0] {
-        let [square, worst] = clocks(60, times);
-        assert!((square - 1.0).abs() < 0.5, "{times}: {square}");
-        assert!(worst < 0.003 * times, "{times}: {worst}");
+    // Where noise is ten and thirty times as large, two neighbouring poses of the carrier differ by little else. Chi-squared of one
+    // scatters by 0.14 and 0.22 over so many runs; two of these.
+    for (times, runs, within) in [(1.0, 100, 0.3), (10.0, 40, 0.45), (30.0, 40, 0.45)] {
+        let [square, worst] = clocks(runs, times);
+        assert!((square - 1.0).abs() < within && worst < 0.005 * times.min(15.0), "{times}: {square} {worst}");
     }
 }
 

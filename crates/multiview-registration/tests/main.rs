@@ -8,6 +8,9 @@
     missing_docs
 )]
 
+#[path = "../examples/building/plan.rs"]
+mod building;
+mod buildings;
 #[path = "../../point-cloud/tests/common/mod.rs"]
 mod common;
 #[path = "../../projective-registration/tests/depth_frames/mod.rs"]

@@ -4,10 +4,12 @@ use nalgebra::{Isometry3, Point3};
 use rayon::prelude::*;
 use statistics::mad_scale;
 
-use crate::adjustment::network::{Network, State, largest_step};
+use crate::adjustment::network::{Anchors, Network, State, largest_step};
+use crate::adjustment::sparse_equations::is_small;
 use crate::error::{Error, Result};
 use crate::planes::contacts::{Contact, Reach, TURNED, partners};
 use crate::planes::reduction::{PairContacts, Reduced, Scene, Weighting, reduce};
+use crate::surfaces::extents::{Extent, Extents};
 use crate::surfaces::patches::Surface;
 use crate::surfaces::plane_fit::SAME_DIRECTION;
 use crate::surfaces::point_model::PointModel;
@@ -109,6 +111,24 @@ fn averaged(surface: &Surface, of_points: &[[f64; 3]], parameters: usize) -> Vec
     out
 }
 
+/// The pairs of stations (target, source) that may have partners at these poses, ascending: all others lie too far apart.
+pub(crate) fn near_each_other(
+    surfaces: &[&Surface],
+    poses: &[Isometry3<f64>],
+    reach: Reach,
+) -> Result<Vec<(usize, usize)>> {
+    let size_m = surfaces.iter().map(|surface| surface.size_m).fold(0.0, f64::max);
+    let extent = |(surface, pose): (&&Surface, &Isometry3<f64>)| {
+        let centres = surface.patches.iter().map(|patch| &patch.centre);
+        if let Some(index) = centres.clone().position(|centre| !point_cloud::is_usable(&(pose * centre))) {
+            return Err(Error::NonFinite { what: "points of a station in the frame of another", index });
+        }
+        Ok(Extent::placed(centres, pose))
+    };
+    let extents = surfaces.iter().zip(poses).map(extent).collect::<Result<Vec<Extent>>>()?;
+    Ok(Extents::new(&extents).pairs(reach.farthest_m(size_m)))
+}
+
 /// All pairs in contact at these poses; `only`: the pairs to look at (target, source).
 pub(crate) fn meet(
     surfaces: &[&Surface],
@@ -175,10 +195,13 @@ fn scale(scene: &Scene<'_>, pairs_in_contact: &[PairContacts], poses: &[Isometry
 }
 
 /// How the rounds go.
+#[derive(Clone, Copy)]
 pub(crate) struct WideRounds<'a> {
     pub network: &'a Network<'a>,
     /// Error of the start poses, metre.
     pub reach_m: f64,
+    /// Stations that are in their places and keep them; empty where none are.
+    pub held: &'a [bool],
     pub progress: &'a (dyn Fn(usize) + Sync),
 }
 
@@ -196,18 +219,37 @@ impl WideRounds<'_> {
         levels
     }
 
+    /// One step of all stations. Many are held at their start as well as that is known: where little else stands along a wall a station
+    /// would slide farther than it can be off, and meet the wrong things there. None keeps its pose: the others would bend about it.
+    fn solved(
+        &self,
+        state: &State,
+        start: &[Isometry3<f64>],
+        reduced: &[(&PairContacts, Reduced)],
+        scale: f64,
+    ) -> Result<State> {
+        if is_small(state.poses.len(), state.parameters.len()) {
+            return self.network.solve(state, reduced);
+        }
+        let anchors = Anchors { poses: start, factor: scale * scale, held: self.held };
+        self.network.near(self.reach_m).solve_sparse(state, reduced, &anchors)
+    }
+
     /// Brings all stations from start poses that are right to about the reach to a part of a patch.
-    pub(crate) fn run(&self, surfaces: &mut Surfaces<'_>, start: State) -> Result<State> {
-        let count = start.poses.len();
-        let all: Vec<(usize, usize)> = (0..count).flat_map(|t| (t + 1..count).map(move |s| (t, s))).collect();
+    pub(crate) fn run(&self, surfaces: &mut Surfaces<'_>, start: &State) -> Result<State> {
         let size_m = surfaces.given.iter().map(|surface| surface.size_m).fold(0.0, f64::max);
-        let mut state = start;
+        let mut state = start.clone();
         let mut rounds = 0;
+        let is_open = |&(a, b): &(usize, usize)| self.held.is_empty() || !self.held[a] || !self.held[b];
         for reach in self.levels(size_m) {
-            let mut pairs = all.clone();
+            let mut pairs = Vec::new();
             for in_level in 0..ROUNDS {
                 surfaces.update(&state.parameters)?;
                 let scene = surfaces.scene(state.parameters.len());
+                if in_level == 0 {
+                    pairs = near_each_other(&scene.surfaces, &state.poses, reach)?;
+                    pairs.retain(is_open);
+                }
                 let pairs_in_contact = meet(&scene.surfaces, &state.poses, &pairs, reach)?;
                 if in_level == 0 {
                     // Stations that do not meet now will not after the small steps of one level.
@@ -217,8 +259,8 @@ impl WideRounds<'_> {
                         .collect();
                 }
                 let weighting = Weighting { kernel: KERNEL, scale: scale(&scene, &pairs_in_contact, &state.poses) };
-                let next =
-                    self.network.solve(&state, &reduced(&scene, &pairs_in_contact, &state.poses, &weighting)?)?;
+                let reduced = reduced(&scene, &pairs_in_contact, &state.poses, &weighting)?;
+                let next = self.solved(&state, &start.poses, &reduced, weighting.scale)?;
                 let moved_m = largest_step(&state, &next, self.network.hold_m);
                 state = next;
                 rounds += 1;

@@ -205,7 +205,7 @@ mod tests {
         let of = |station: usize| {
             let mut sums = Sums::new(0);
             for (n, plane) in planes.iter().enumerate() {
-                for (k, place) in places.iter().enumerate().filter(|(k, _)| (k + n + station) % 3 != 0) {
+                for (k, place) in places.iter().enumerate().filter(|(k, _)| !(k + n + station).is_multiple_of(3)) {
                     for point in 0..8 {
                         let of = 1000 * station + 100 * n + 10 * k + point;
                         let [u, v] = [place[0] + 0.4 * number(of), place[1] + 0.4 * number(of + 7)];
@@ -241,10 +241,10 @@ mod tests {
         // All eliminated, none, and two of each.
         for beside in [0, 4, 2] {
             let mut sparse = SparseEquations::new(6, 2, beside);
-            for plane in 0..planes.len() {
+            for (plane, shared_plane) in planes.iter().enumerate() {
                 let most = if plane < beside { 1 } else { usize::MAX };
                 let own = eliminated(plane, most);
-                sparse.add(&planes[plane], &own, &poses);
+                sparse.add(shared_plane, &own, &poses);
                 // What the plane does follows from the stations all the same.
                 let motions = DVector::from_fn(18, |k, _| number(k));
                 let plain = eliminated(plane, usize::MAX).plane(&motions);

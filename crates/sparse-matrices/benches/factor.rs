@@ -14,7 +14,7 @@ fn factor(criterion: &mut Criterion) {
         group.bench_function(format!("{count} stations"), |bencher| bencher.iter(|| matrix.factor()));
         if let Some(factor) = matrix.factor() {
             group.bench_function(format!("{count} stations, inverse"), |bencher| {
-                bencher.iter(|| factor.selected_inverse())
+                bencher.iter(|| factor.selected_inverse());
             });
         }
     }

@@ -8,8 +8,6 @@
     missing_docs
 )]
 
-#[path = "../examples/building/plan.rs"]
-mod building;
 mod buildings;
 #[path = "../../point-cloud/tests/common/mod.rs"]
 mod common;

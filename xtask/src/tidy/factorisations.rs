@@ -74,6 +74,7 @@ const KNOWN: &[(Use, &[&str])] = &[
         &[
             "fusion/src/surfels/curvature.rs",
             "icp-registration/src/quality/verdict.rs",
+            "inertial/src/state.rs",
             "measurement/src/fit/adjusted.rs",
             "multipath/src/pixels/refine.rs",
             "multipath/src/scene/bending.rs",
@@ -84,7 +85,6 @@ const KNOWN: &[(Use, &[&str])] = &[
             "stored-values/src/surfaces.rs",
             "targets/src/board/corners/fit.rs",
             "targets/src/circles/rough_fit.rs",
-            "tracking/src/imu/update.rs",
             "tracking/src/motion_model/velocity.rs",
         ],
     ),

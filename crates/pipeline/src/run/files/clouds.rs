@@ -112,9 +112,9 @@ impl<'a> Clouds<'a> {
                 return Err(Error::Request { command: "merge", message });
             }
             if is_further {
-                self.further.add(&points)?
+                self.further.add(&points)?;
             } else {
-                self.append(&points)?
+                self.append(&points)?;
             }
             next = Some(first + points.len() as u64).filter(|next| *next < all);
         }

@@ -22,7 +22,7 @@ const MEMORY: &str = "2GB";
 const FRAMES: usize = 2000;
 
 /// What is measured.
-#[derive(Debug, Clone, clap::Args)]
+#[derive(Debug, Clone, Default, clap::Args)]
 pub(crate) struct Options {
     /// Of `memory`: beside the lengths by which growth is told, surveys of so many small frames; 100000 takes two hours.
     #[arg(long)]
@@ -36,12 +36,6 @@ pub(crate) struct Options {
     /// Of `memory`: a program that is there already, instead of a release build.
     #[arg(long)]
     program: Option<PathBuf>,
-}
-
-impl Default for Options {
-    fn default() -> Self {
-        Self { frames: None, only: String::new(), small: false, program: None }
-    }
 }
 
 /// A command on a survey.

@@ -16,7 +16,13 @@ use range_io::clouds::read_any_cloud;
 use range_io::npz::{NpzReader, NpzWriter};
 use range_io::survey::Survey;
 use range_io::{
-    e57::read_e57, mkv, pcd::read_pcd, ply::{read_cloud, read_some_of_cloud}, png16, tables, trajectory, vtk::read_vtk, xyz::read_xyz,
+    e57::read_e57,
+    mkv,
+    pcd::read_pcd,
+    ply::{read_cloud, read_some_of_cloud},
+    png16, tables, trajectory,
+    vtk::read_vtk,
+    xyz::read_xyz,
 };
 
 use crate::scratch::Scratch;

@@ -126,11 +126,18 @@ impl Tracker {
     /// The poses of the same frames as they are known now: closed loops have moved the keyframes they hang on. Covariances
     /// are those of the time of tracking.
     pub fn adjusted_trajectory(&self) -> Vec<TrackedPose> {
-        let adjusted = |pose: &TrackedPose| match self.keyframes.world_from(pose.keyframe) {
+        let adjusted = |pose: &TrackedPose| match self.world_from_keyframe(pose.keyframe) {
             Some(world) => TrackedPose { world_from_camera: world * pose.keyframe_from_camera, ..*pose },
             None => *pose,
         };
         self.trajectory.iter().map(adjusted).collect()
+    }
+
+    /// Where the keyframe of a [`TrackedPose::keyframe`] stands now, also one that was taken out: who keeps
+    /// [`TrackedPose::keyframe_from_camera`] of poses that were [forgotten](Self::forget_poses) knows them adjusted. The way leads over
+    /// the keyframes that took its place, one after the other: of many poses, ask once a keyframe.
+    pub fn world_from_keyframe(&self, number: usize) -> Option<Isometry3<f64>> {
+        self.keyframes.world_from(number)
     }
 
     /// The map: the planes of all keyframes as points with normals and standard deviations, in the world's frame. Where

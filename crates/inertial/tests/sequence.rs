@@ -64,9 +64,9 @@ fn normalised(found: &InertialSequence, seed: u64) -> [f64; 3] {
     ]
 }
 
-const RUNS: u64 = 150;
+const RUNS: u64 = 80;
 
-/// A component's normalised square has mean 1; over 150 runs of three it scatters by 0.07. Constant biases walk less than stated, which
+/// A component's normalised square has mean 1; over 80 runs of three it scatters by 0.09. Constant biases walk less than stated, which
 /// lowers theirs; gravity of exactly its stated length lowers its own.
 #[test]
 fn errors_are_as_large_as_the_covariances_say() {
@@ -88,13 +88,13 @@ fn errors_are_as_large_as_the_covariances_say() {
         }
         eprintln!("{count}: {sums:.3?} {unit:.3} {beyond}");
         assert!(sums[0] > 0.8 && sums[0] < 1.1, "{count}: biases {}", sums[0]);
-        assert!((sums[1] - 1.0).abs() < 0.15, "{count}: velocity {}", sums[1]);
+        assert!((sums[1] - 1.0).abs() < 0.2, "{count}: velocity {}", sums[1]);
         assert!(sums[2] > 0.6 && sums[2] < 1.1, "{count}: gravity {}", sums[2]);
         assert!((unit - 1.0).abs() < 0.1, "{count}: {unit}");
         // One sequence in a thousand.
         assert!(doubted <= 2, "{count}: {doubted}");
-        // 0.3 % of 900 values.
-        assert!(beyond < 10, "{count}: {beyond}");
+        // 0.3 % of 480 values.
+        assert!(beyond < 8, "{count}: {beyond}");
     }
 }
 
@@ -194,7 +194,7 @@ fn a_whole_state_is_off_as_its_covariance_says() {
 #[test]
 fn noise_at_work_is_found_from_the_motions_and_stated() {
     let at_work = ImuNoise { accel_density: 5.0 * noise().accel_density, ..noise() };
-    let (count, runs) = (60, 20);
+    let (count, runs) = (60, 10);
     let (mut velocities, mut ratios, mut rates, mut contradicting) = (0.0, Vec::new(), 0, 0);
     for seed in 0..runs {
         let samples = measured([0.3, 0.8 + 0.1 * count as f64], 200.0, &at_work, &biases(seed), seed);

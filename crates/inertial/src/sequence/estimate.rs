@@ -12,6 +12,7 @@ use statistics::bonferroni;
 
 use crate::noise::{Biases, ImuNoise};
 use crate::preintegrated::Preintegrated;
+use crate::rest::Unrest;
 use crate::sample::InertialSample;
 use crate::sequence::equations::{IntervalEquations, Length, Unchanged};
 use crate::sequence::noise_at_work::{Known, noise_at_work};
@@ -40,7 +41,7 @@ const SMALL_CHANGE: f64 = 0.01;
 ///
 /// # Errors
 /// [`Error::TooFewPoses`] below three, [`Error::InvalidPose`], [`Error::NotAscending`], [`Error::NonFinite`], [`Error::Gap`],
-/// [`Error::InvalidOption`]; [`Error::Contradiction`] where unit and camera do not fit each other in half of the intervals;
+/// [`Error::InvalidOption`]; [`Error::Unrest`] where forces are not those of a body on earth; [`Error::Contradiction`] where unit and camera do not fit each other in half of the intervals;
 /// [`Error::Adjustment`].
 pub fn estimate_sequence(
     poses: &[CameraPose],
@@ -52,6 +53,7 @@ pub fn estimate_sequence(
         Preintegrated::new(samples, [pair[0].time_s, pair[1].time_s], &Biases::zero(), &options.noise)
     };
     let mut motions: Vec<Preintegrated> = poses.windows(2).map(interval).collect::<Result<_>>()?;
+    require_specific_forces(poses, samples, options.gravity_m_s2)?;
     let start = Start::new(poses, &motions, options);
     require_agreement(poses, &motions, contradicting_turns(poses, &motions, &start.camera_from_body))?;
     let mut left_out = BTreeSet::new();
@@ -106,6 +108,19 @@ fn without_contradictions<'m>(
         require_agreement(poses, motions, left_out.len())?;
     }
     Ok((network, solution))
+}
+
+/// Fails where half of the forces between the poses are less than half or more than twice gravity: nothing that is carried moves so, and a
+/// bias as large as gravity would fit a camera that turns little.
+fn require_specific_forces(poses: &[CameraPose], samples: &[InertialSample], gravity_m_s2: f64) -> Result<()> {
+    let span = poses[0].time_s..=poses[poses.len() - 1].time_s;
+    let within = samples.iter().filter(|sample| span.contains(&sample.timestamp_s));
+    let mut sizes: Vec<f64> = within.map(|sample| sample.specific_force.norm()).collect();
+    let usual = statistics::upper_median(&mut sizes);
+    if usual < gravity_m_s2 / 2.0 || usual > 2.0 * gravity_m_s2 {
+        return Err(Unrest::Force { mean_m_s2: usual }.into());
+    }
+    Ok(())
 }
 
 /// Fails where more than half of the intervals contradict.

@@ -155,7 +155,10 @@ fn opened_file(text: &str, file: &str) -> (String, Vec<Constant>) {
     // A constant that others, or lengths of arrays, are made of stays.
     let is_part = |name: &str| {
         let is_constant = |line: &&str| line.contains("const ") && declaration(line).is_none();
-        let is_length = |line: &&str| line.contains(&format!("; {name}")) || line.contains(&format!("<{name}"));
+        let is_length = |line: &&str| {
+            let behind = |part: &str| part.split_once(']').is_some_and(|(length, _)| length.contains(name));
+            line.split("; ").skip(1).any(behind) || line.contains(&format!("<{name}"))
+        };
         let others = text.lines().filter(|line| is_constant(line) || is_length(line));
         others.flat_map(|line| line.split(|c: char| !is_of_name(c))).any(|word| word == name)
     };
@@ -262,7 +265,7 @@ mod tests {
 
     #[test]
     fn private_constants_are_opened_and_their_uses_called() {
-        let text = "/// Share.\nconst SHARE: f64 = 0.5;\npub const OPEN: f64 = 1.0;\nconst COUNT: usize = 3;\nstruct S([u8; COUNT]);\nconst MOST: usize = 4;\nconst A: f32 = 2.0;\nconst B: f32 = A * 3.0;\nfn f() -> f64 {\n    // SHARE of all\n    SHARE * other::SHARE + MY_SHARE\n}\n";
+        let text = "/// Share.\nconst SHARE: f64 = 0.5;\npub const OPEN: f64 = 1.0;\nconst COUNT: usize = 3;\nstruct S([u8; 2 * COUNT]);\nconst MOST: usize = 4;\nconst A: f32 = 2.0;\nconst B: f32 = A * 3.0;\nfn f() -> f64 {\n    // SHARE of all\n    SHARE * other::SHARE + MY_SHARE\n}\n";
         let (opened, constants) = opened_file(text, "folder/file");
         let of = |name: &str, value: &str| Constant { path: format!("folder/file::{name}"), value: value.to_owned() };
         assert_eq!(constants, [of("SHARE", "0.5"), of("MOST", "4")]);

@@ -33,7 +33,7 @@ const CASES: &[Case] = &[
     Case { survey: "stations of one", command: &["run", "--pipeline", "cloud.ron"], frames: [588, 1764, 5292] },
     Case { survey: "a warming camera", command: &["noise"], frames: [1000, 3000, 9000] },
     Case { survey: "stations of 10", command: &["noise"], frames: [2940, 8820, 26460] },
-    Case { survey: "one station", command: &["fpn"], frames: [256, 768, 2304] },
+    Case { survey: "one station", command: &["fpn"], frames: [768, 2304, 6912] },
     Case { survey: "stations of 3", command: &["fpn"], frames: [768, 2304, 3840] },
     Case { survey: "a warming camera", command: &["warmup"], frames: [1000, 3000, 9000] },
     Case { survey: "a path", command: &["register", "--track"], frames: [1000, 3000, 9000] },
@@ -53,9 +53,14 @@ pub(super) fn run(surveys: &Surveys<'_>, frames: Option<usize>, only: &str) -> R
         "{:<17} {:<20} {:>7} {:>9} {:>13} {:>13} {:>12}",
         "frames of 66x54", "command", "frames", "most, MB", "processor, s", "ms a frame", "kB a frame"
     );
+    let name = |case: &Case| format!("{} on {}", words(case.command), case.survey);
+    if !CASES.iter().any(|case| name(case).contains(only)) {
+        let names: Vec<String> = CASES.iter().map(name).collect();
+        return Err(format!("no case is called `{only}`: {}", names.join(", ")));
+    }
     let mut beyond = Vec::new();
     for case in CASES {
-        let name = format!("{} on {}", words(case.command), case.survey);
+        let name = name(case);
         if !name.contains(only) {
             continue;
         }

@@ -64,9 +64,9 @@ fn normalised(found: &InertialSequence, seed: u64) -> [f64; 3] {
     ]
 }
 
-const RUNS: u64 = 80;
+const RUNS: u64 = 400;
 
-/// A component's normalised square has mean 1; over 80 runs of three it scatters by 0.09. Constant biases walk less than stated, which
+/// A component's normalised square has mean 1; over 400 runs of three it scatters by 0.04. Constant biases walk less than stated, which
 /// lowers theirs; gravity of exactly its stated length lowers its own.
 #[test]
 fn errors_are_as_large_as_the_covariances_say() {
@@ -88,13 +88,13 @@ fn errors_are_as_large_as_the_covariances_say() {
         }
         eprintln!("{count}: {sums:.3?} {unit:.3} {beyond}");
         assert!(sums[0] > 0.8 && sums[0] < 1.1, "{count}: biases {}", sums[0]);
-        assert!((sums[1] - 1.0).abs() < 0.2, "{count}: velocity {}", sums[1]);
+        assert!((sums[1] - 1.0).abs() < 0.1, "{count}: velocity {}", sums[1]);
         assert!(sums[2] > 0.6 && sums[2] < 1.1, "{count}: gravity {}", sums[2]);
         assert!((unit - 1.0).abs() < 0.1, "{count}: {unit}");
         // One sequence in a thousand.
         assert!(doubted <= 2, "{count}: {doubted}");
-        // 0.3 % of 480 values.
-        assert!(beyond < 8, "{count}: {beyond}");
+        // 0.3 % of 2400 values.
+        assert!(beyond < 20, "{count}: {beyond}");
     }
 }
 

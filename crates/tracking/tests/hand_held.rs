@@ -112,10 +112,12 @@ fn attitude_error(told: Told, phase: f64, seed: u64) -> f64 {
 
 #[test]
 fn a_unit_keeps_the_attitude_past_a_bare_wall() {
-    let told = [Told::Nothing, Told::Turn, Told::Motion];
-    let [alone, turned, carried] = told.map(|told| attitude_error(told, 0.3, 1).to_degrees());
-    eprintln!("attitude: {alone:.3} degree alone, {turned:.3} with the gyroscope, {carried:.3} with the unit");
-    assert!(turned < alone / 3.0 && carried < alone / 3.0, "{alone} {turned} {carried}");
+    for (phase, seed) in [(0.3, 1), (1.9, 2)] {
+        let told = [Told::Nothing, Told::Turn, Told::Motion];
+        let [alone, turned, carried] = told.map(|told| attitude_error(told, phase, seed).to_degrees());
+        eprintln!("attitude: {alone:.3} degree alone, {turned:.3} with the gyroscope, {carried:.3} with the unit");
+        assert!(turned < alone / 3.0 && carried < alone / 3.0, "{alone} {turned} {carried}");
+    }
 }
 
 #[test]

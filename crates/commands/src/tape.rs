@@ -1,57 +1,84 @@
 //! The state of a part of some work on its way to the whole: one function of each type writes it, reads it and joins it.
 
 use std::collections::BTreeMap;
+use std::fmt;
+use std::io::{self, Read, Write};
 
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 /// Bytes that values are written to, or read from and joined with what is there: counts and sums are added, lists continued,
-/// single values taken over. Numbers keep all their bits.
-#[derive(Debug)]
+/// single values taken over. Numbers keep all their bits. The bytes pass by: they are never in memory as a whole.
 pub struct Tape {
-    bytes: Vec<u8>,
-    /// The place of the next value to read; `None` while writing.
-    place: Option<usize>,
+    end: End,
     /// More was wanted than is there, or it can't be what it should be.
     torn: bool,
+    /// Why something was not written.
+    failed: Option<io::Error>,
+}
+
+enum End {
+    Onto(Box<dyn Write>),
+    Of(Box<dyn Read>),
+}
+
+impl fmt::Debug for Tape {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Tape").field("is_read", &self.is_read()).field("torn", &self.torn).finish_non_exhaustive()
+    }
 }
 
 impl Tape {
-    /// An empty tape to write on.
-    pub fn blank() -> Self {
-        Self { bytes: Vec::new(), place: None, torn: false }
+    /// A tape to write, onto something that is best buffered.
+    pub fn onto(writer: impl Write + 'static) -> Self {
+        Self { end: End::Onto(Box::new(writer)), torn: false, failed: None }
     }
 
     /// A tape to read.
-    pub fn written(bytes: Vec<u8>) -> Self {
-        Self { bytes, place: Some(0), torn: false }
+    pub fn of(reader: impl Read + 'static) -> Self {
+        Self { end: End::Of(Box::new(reader)), torn: false, failed: None }
     }
 
     /// Whether values are read.
     pub fn is_read(&self) -> bool {
-        self.place.is_some()
+        matches!(self.end, End::Of(_))
     }
 
-    /// What was written.
-    pub fn into_bytes(self) -> Vec<u8> {
-        self.bytes
+    /// Completes what is written.
+    ///
+    /// # Errors
+    /// The first with which something was not written.
+    pub fn finish(self) -> io::Result<()> {
+        match (self.failed, self.end) {
+            (Some(error), _) => Err(error),
+            (None, End::Onto(mut writer)) => writer.flush(),
+            (None, End::Of(_)) => Ok(()),
+        }
     }
 
     /// Whether everything was read, and all of it was there.
-    pub fn is_at_end(&self) -> bool {
-        !self.torn && self.place.is_none_or(|place| place == self.bytes.len())
+    pub fn is_at_end(&mut self) -> bool {
+        let is_over = match &mut self.end {
+            End::Of(reader) => reader.read_exact(&mut [0]).is_err(),
+            End::Onto(_) => true,
+        };
+        is_over && !self.torn
     }
 
-    /// Bytes, so many as there are; zeros where there are no more.
+    /// Bytes, as many as there are; zeros where there are no more.
     fn raw<const N: usize>(&mut self, value: [u8; N]) -> [u8; N] {
-        let Some(place) = &mut self.place else {
-            self.bytes.extend(value);
-            return value;
-        };
-        let next = self.bytes.get(*place..*place + N).and_then(|bytes| bytes.try_into().ok());
-        *place += N;
-        self.torn |= next.is_none();
-        next.unwrap_or([0; N])
+        let mut next = value;
+        match &mut self.end {
+            End::Onto(writer) if self.failed.is_none() => self.failed = writer.write_all(&value).err(),
+            End::Onto(_) => {}
+            End::Of(reader) => {
+                if self.torn || reader.read_exact(&mut next).is_err() {
+                    self.torn = true;
+                    return [0; N];
+                }
+            }
+        }
+        next
     }
 
     /// Eight bytes; zero where there are no more.

@@ -37,7 +37,7 @@ fn main() {
             || !words.iter().any(|w| ["large", "most", "half", "none"].contains(&w.as_str()))
     };
     let from = words.iter().find_map(|w| w.strip_prefix("from=")?.parse().ok()).unwrap_or(0_u64);
-    println!("set                            pairs  right  wrong  none  median mm  median deg  CPU ms (median)");
+    println!("set                            pairs  right  wrong  none  median mm  median deg  CPU time (median)");
     let set = |name: &str, size: u64, camera: &Pinhole, wanted: Range<f64>, rooms: bool| {
         let mut table = Table::default();
         for k in from..from + size {
@@ -108,7 +108,7 @@ impl Table {
             values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
         };
         println!(
-            "{name:30} {total:5} {:6} {:6} {:5} {:10.1} {:11.3} {:10.1}",
+            "{name:30} {total:5} {:6} {:6} {:5} {:10.1} {:11.3} {:10.1} ms",
             self.right.len(),
             self.wrong,
             self.none,

@@ -56,6 +56,9 @@ pub enum Error {
         /// What is wrong with it.
         reason: &'static str,
     },
+    /// Samples that should be of a unit at rest are not.
+    #[error(transparent)]
+    Unrest(#[from] crate::rest::Unrest),
     /// The unit and the camera do not move alike.
     #[error(
         "the inertial unit contradicts the camera in {contradicting} of {intervals} intervals; \

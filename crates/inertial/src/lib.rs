@@ -10,6 +10,7 @@ mod rotation;
 mod sample;
 #[cfg(feature = "sequence")]
 mod sequence;
+mod state;
 
 #[cfg(feature = "sequence")]
 pub use adjust;
@@ -23,6 +24,5 @@ pub use rest::{Rest, Unrest, rest};
 pub use rigid_pose;
 pub use sample::InertialSample;
 #[cfg(feature = "sequence")]
-pub use sequence::{
-    CameraPose, InertialSequence, Mounting, SequenceOptions, SequenceState, StateCovariance, estimate_sequence,
-};
+pub use sequence::{CameraPose, InertialSequence, Mounting, SequenceOptions, SequenceState, estimate_sequence};
+pub use state::{InertialState, StateCovariance};

@@ -86,6 +86,20 @@ impl Preintegrated {
         Self::summed(self.samples.clone(), biases, &self.noise)
     }
 
+    /// The same interval with the noise that the unit has.
+    #[cfg(feature = "sequence")]
+    pub(crate) fn with_noise(&self, noise: &ImuNoise) -> Self {
+        Self::summed(self.samples.clone(), &self.biases, noise)
+    }
+
+    /// Intervals that follow each other as one, at the biases of the first.
+    #[cfg(feature = "sequence")]
+    pub(crate) fn joined(parts: &[Self]) -> Self {
+        let inside = |(index, part): (usize, &Self)| part.samples[usize::from(index > 0)..].to_vec();
+        let samples = parts.iter().enumerate().flat_map(inside).collect();
+        Self::summed(samples, &parts[0].biases, &parts[0].noise)
+    }
+
     fn summed(samples: Vec<InertialSample>, biases: &Biases, noise: &ImuNoise) -> Self {
         let mut motion =
             Motion { rotation: UnitQuaternion::identity(), velocity: Vector3::zeros(), position: Vector3::zeros() };

@@ -8,7 +8,7 @@ use crate::sample::InertialSample;
 /// Shortest rest, second: the noise of forces then leaves 3 mm/s² of gravity, less than their bias does.
 const SHORTEST_S: f64 = 0.5;
 /// Length of gravity on earth, m/s², and what a unit's bias and scale may make of it: five deviations of a phone's bias.
-const GRAVITY_M_S2: f64 = 9.80665;
+pub(crate) const GRAVITY_M_S2: f64 = 9.80665;
 const GRAVITY_WITHIN: f64 = 1.0;
 /// Standard deviations of a bias that the mean rate may reach.
 const BIAS_SIGMAS: f64 = 5.0;

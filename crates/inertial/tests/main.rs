@@ -5,3 +5,4 @@ mod path;
 mod preintegration;
 #[cfg(feature = "sequence")]
 mod sequence;
+mod state;

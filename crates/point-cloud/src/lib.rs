@@ -13,6 +13,6 @@ pub use error::Error;
 pub use nalgebra;
 pub use neighbours::{Neighbour, NeighbourTree, check_points, is_usable};
 pub use normals::{
-    OrganisedNormalOptions, UnorganisedNormalOptions, no_normal, normals_with_tree, organised_normals,
-    unorganised_normals,
+    OrganisedNormalOptions, SAME_SURFACE_COSINE, UnorganisedNormalOptions, no_normal, normals_with_tree,
+    organised_normals, unorganised_normals,
 };

@@ -146,6 +146,23 @@ impl Graph {
         self.field - before
     }
 
+    /// Adds an observation; where there is one between its poses already, both become their mean: of a path of very many keyframes,
+    /// of which some are kept, the observations would grow without end.
+    fn bring_in(&mut self, edge: &Edge) {
+        let joins = |known: &&mut Edge| [(edge.a, edge.b), (edge.b, edge.a)].contains(&(known.a, known.b));
+        let Some(known) = self.edges.iter_mut().find(joins) else { return self.edges.push(*edge) };
+        let a_from_b = if known.a == edge.a { edge.a_from_b } else { edge.a_from_b.inverse() };
+        let alone = |relation: &Relation, alike: f64| {
+            let mut alone = *relation;
+            alone.random.covariance *= alike;
+            alone
+        };
+        match alone(&known.a_from_b, known.alike).mean(&alone(&a_from_b, edge.alike)) {
+            Some(mean) => (known.a_from_b, known.alike) = (mean, 1.0),
+            None => self.edges.push(*edge),
+        }
+    }
+
     /// Takes keyframe `k` (not the first) out. What joined its neighbours through it joins them to the one that was
     /// best determined from it; returns that one and its pose in the frame of `k`, numbered as before.
     pub fn remove(&mut self, k: usize) -> Option<(usize, Relation)> {
@@ -159,7 +176,7 @@ impl Graph {
         for (other, k_from_other, alike) in joined.iter().skip(1) {
             if *other != hub {
                 let a_from_b = k_from_hub.inverse().then(k_from_other);
-                self.edges.push(Edge { a: hub, b: *other, a_from_b, alike: *alike });
+                self.bring_in(&Edge { a: hub, b: *other, a_from_b, alike: *alike });
             }
         }
         self.poses.remove(k);

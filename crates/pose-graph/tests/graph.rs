@@ -82,6 +82,22 @@ fn a_keyframe_between_two_can_go_without_a_trace() {
     assert!(!thinned.joined(0, 3) && thinned.joined(0, 6) && thinned.joined(5, 6));
 }
 
+#[test]
+fn observations_side_by_side_become_their_mean() {
+    let (mut whole, mut thinned) = (ring(3), ring(3));
+    for poses in (2..8).rev() {
+        thinned.remove(1).unwrap();
+        assert_eq!((thinned.poses.len(), thinned.edges.len()), (poses, if poses == 2 { 1 } else { poses }));
+    }
+    whole.adjust_if_closed();
+    thinned.adjust_if_closed();
+    // The way around and the closing step count as one; second order of rotations as above, over six keyframes.
+    let gap = pose_difference(whole.poses[7].pose(), thinned.poses[1].pose()).norm();
+    assert!(gap < 0.1 * SIGMA, "{gap}");
+    let deviation = |graph: &Graph| graph.poses.last().unwrap().random.covariance.trace().sqrt() / graph.factor.sqrt();
+    assert!((deviation(&thinned) / deviation(&whole) - 1.0).abs() < 0.02);
+}
+
 /// Mean normalised squared error of keyframe 4 of rings whose registrations share a field, and mean squared errors before
 /// and after the loop is closed.
 fn with_field(shared: &SharedError) -> (f64, f64, f64) {

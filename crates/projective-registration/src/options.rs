@@ -45,6 +45,12 @@ pub struct FrameAlignmentOptions {
     pub min_correspondences: usize,
 }
 
+impl FrameAlignmentOptions {
+    /// Share of the radius beyond whose standard deviation a motion is undetermined where many registrations are put together: poses that
+    /// are centimetres weak for a moment have little weight there, and are worth more than none.
+    pub const OPEN_IN_A_GRAPH: f64 = 1.0 / 50.0;
+}
+
 impl Default for FrameAlignmentOptions {
     fn default() -> Self {
         Self {

@@ -10,6 +10,7 @@
 use nalgebra::{Isometry3, Matrix6, Point3, SMatrix, SVector, Vector3, Vector6};
 use statistics::SIGMA_OF_MAD;
 
+use crate::partners::map::Agreement;
 use crate::partners::map::{Partner, Partners};
 use crate::partners::pairs::with_locate;
 use crate::preparation::bits::{median_of_bits, positive_bits};
@@ -29,8 +30,6 @@ pub type FieldMatrix = SMatrix<f64, COEFFICIENTS, COEFFICIENTS>;
 /// Derivative of a pose, tangent `[dt, dtheta]`, by the coefficients.
 pub type ByField = SMatrix<f64, 6, COEFFICIENTS>;
 
-/// Nodes by which the influence on a registration is told.
-const SAMPLE: usize = 2500;
 /// Widening of the biweight: the field is largest where few nodes lie, at the rim, and its squares there are what is estimated.
 const WIDE: f64 = 2.0;
 /// Standard deviations by which squares must exceed what noise lets expect (of one degree of freedom: 4 % by chance).
@@ -226,7 +225,7 @@ impl OrganisedFrame {
             }
             follows = partner.is_some();
         };
-        let stride = source.stride_for(SAMPLE);
+        let stride = source.stride_for(Agreement::NODES);
         with_locate(self, Partners { target: self, source, pose: self_from_source, stride, each });
         let to_tangent = frame.tangent_from_motion(self_from_source);
         reduced(sightings, &to_tangent, scratch)

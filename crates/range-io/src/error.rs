@@ -143,8 +143,7 @@ impl Error {
     }
 }
 
-/// A field of a value in memory that does not hold; becomes [`Error::Value`], or [`Error::Text`] once its place in a
-/// file is known.
+/// A field of a value in memory that does not hold; becomes [`Error::Value`], or [`Error::Text`] once its place in a file is known.
 #[cfg(any(feature = "survey", feature = "calibration"))]
 #[derive(Debug)]
 pub(crate) struct InvalidField {

@@ -16,7 +16,13 @@ use range_io::clouds::read_any_cloud;
 use range_io::npz::{NpzReader, NpzWriter};
 use range_io::survey::Survey;
 use range_io::{
-    e57::read_e57, mkv, pcd::read_pcd, ply::read_cloud, png16, tables, trajectory, vtk::read_vtk, xyz::read_xyz,
+    e57::read_e57,
+    mkv,
+    pcd::read_pcd,
+    ply::{read_cloud, read_some_of_cloud},
+    png16, tables, trajectory,
+    vtk::read_vtk,
+    xyz::read_xyz,
 };
 
 use crate::scratch::Scratch;
@@ -31,7 +37,7 @@ type Read = fn(&Path) -> Result<(), range_io::Error>;
 const READERS: [(&str, Read); 16] = [
     ("survey.ron", |path| Survey::read(path).map(drop)),
     ("calibration.ron", |path| Calibration::read(path).map(drop)),
-    ("cloud.ply", |path| read_cloud(path).map(drop)),
+    ("cloud.ply", |path| read_cloud(path).and(read_some_of_cloud(path, 1, 2)).map(drop)),
     ("cloud.pcd", |path| read_pcd(path).map(drop)),
     ("cloud.e57", |path| read_e57(path).map(drop)),
     ("cloud.vtk", |path| read_vtk(path).map(drop)),

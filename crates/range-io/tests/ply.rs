@@ -4,7 +4,7 @@
 
 use crate::common;
 use proptest::prelude::*;
-use range_io::ply::{CloudFile, PlyWriter, Precision, read_cloud, write_cloud};
+use range_io::ply::{CloudFile, PlyWriter, Precision, read_cloud, read_some_of_cloud, write_cloud};
 
 use crate::scratch::{Scratch, cloud};
 
@@ -55,6 +55,9 @@ fn blocks_make_one_cloud() {
     assert!(writer.append(&whole).unwrap_err().to_string().contains("expected [\"intensity\"]"));
     writer.commit().unwrap();
     assert_eq!(read_cloud(scratch.file(NAME)).unwrap(), part(0..10_000));
+    let some = |first: u64, most: usize| read_some_of_cloud(scratch.file(NAME), first, most).unwrap();
+    assert_eq!([some(0, 4999), some(4999, 1), some(5000, 9000)], [0..4999, 4999..5000, 5000..10_000].map(part));
+    assert_eq!((some(10_000, 5).len(), some(u64::MAX, usize::MAX).len(), some(7, 0).len()), (0, 0, 0));
     let uneven = CloudFile { sigma: Some(vec![0.0]), ..CloudFile::default() };
     let fault = write_cloud(scratch.file(NAME), &uneven, Precision::Single).unwrap_err().to_string();
     assert_eq!(fault, "cloud: `sigma`: has 1 values for 0 points");

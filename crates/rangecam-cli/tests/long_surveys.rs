@@ -29,6 +29,39 @@ fn results_do_not_depend_on_memory_and_what_does_not_fit_is_refused() {
 }
 
 #[test]
+fn parts_are_merged_within_memory() {
+    let root = world();
+    done(root.path(), &format!("{RUN} --out whole"));
+    for part in 1..=2 {
+        done(root.path(), &format!("{RUN} --shard {part}/2 --out parts/{part}"));
+    }
+    let merge = "merge parts/1 parts/2 --no-times";
+    let (code, said) = rangecam(root.path(), &format!("{merge} --out little --memory 1MB"));
+    assert_eq!(code, Some(2), "{said}");
+    assert!(said.contains("merging the parts of a run: needs") && said.contains("1MB are allowed"), "{said}");
+    // As much as it says is enough for one point at a time.
+    let enough = said.rsplit("allow --memory ").next().unwrap().split(',').next().unwrap();
+    let whole = files(&root.path().join("whole"));
+    done(root.path(), &format!("{merge} --out whole --memory {enough}"));
+    assert!(whole == files(&root.path().join("whole")), "less memory gives other bytes");
+    // A cloud that is shorter than its part says.
+    let cloud = root.path().join("parts/1/cloud.ply");
+    let text = std::fs::read(&cloud).unwrap();
+    let (place, vertices) = vertices(&text);
+    let fewer = format!("{:0>1$}", 12, vertices.len());
+    std::fs::write(&cloud, [&text[..place], fewer.as_bytes(), &text[place + vertices.len()..]].concat()).unwrap();
+    let (code, said) = rangecam(root.path(), &format!("{merge} --out again"));
+    assert!(code == Some(2) && said.contains("has fewer points than its part wrote"), "{code:?} {said}");
+}
+
+/// Where the number of points stands in a PLY file, and it.
+fn vertices(text: &[u8]) -> (usize, String) {
+    let header = String::from_utf8_lossy(&text[..1000]).into_owned();
+    let place = header.find("element vertex ").unwrap() + "element vertex ".len();
+    (place, header[place..].lines().next().unwrap().to_owned())
+}
+
+#[test]
 fn a_large_cloud_is_in_tiles_and_who_measures_is_told() {
     let root = world();
     done(root.path(), &format!("{RUN} --out plain"));

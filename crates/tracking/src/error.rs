@@ -29,19 +29,9 @@ pub enum Error {
         /// The values that are allowed.
         domain: &'static str,
     },
-    /// A body said to rest did not.
-    #[error(
-        "the body moves: rates scatter by {rate_spread:.3} rad/s, specific forces by {force_spread:.3} m/s^2 about a \
-         mean of {mean_force:.2} m/s^2"
-    )]
-    Moving {
-        /// Largest standard deviation of a component of the rates, rad/s.
-        rate_spread: f64,
-        /// The same of the specific forces, m/s².
-        force_spread: f64,
-        /// Length of the mean specific force, m/s².
-        mean_force: f64,
-    },
+    /// Of an inertial unit.
+    #[error(transparent)]
+    Inertial(#[from] inertial::Error),
     /// Two trajectories have no pose at the same time.
     #[error(
         "no pose of the estimate ({:.3} s to {:.3} s) has one of the truth ({:.3} s to {:.3} s) within {tolerance_s} s",
@@ -54,16 +44,6 @@ pub enum Error {
         estimate_s: [f64; 2],
         /// First and last time of the truth.
         truth_s: [f64; 2],
-    },
-    /// The inertial samples leave a gap.
-    #[error("no inertial sample for {seconds} s after {from_s} s; {allowed_s} s are allowed")]
-    NoInertialData {
-        /// Where the gap begins, second.
-        from_s: f64,
-        /// Its length, second.
-        seconds: f64,
-        /// The longest allowed, second.
-        allowed_s: f64,
     },
     /// A coordinate, weight or sigma is NaN, infinite or beyond ±1e100.
     #[error("{what}: entry {index} is not a finite number below 1e100")]

@@ -11,8 +11,9 @@ mod trajectory;
 
 pub use error::Error;
 pub use global_registration;
-pub use imu::{ImuIntegrator, ImuOptions, InertialSample};
+pub use imu::ImuIntegrator;
 pub use inertial;
+pub use inertial::{ImuNoise, InertialSample};
 pub use map::options::MapOptions;
 pub use map::surfaces::SurfaceMap;
 pub use motion_model::motion::MotionPrior;

@@ -7,7 +7,7 @@ use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
 use tracking::inertial::{Biases, ImuNoise, Preintegrated};
-use tracking::{ImuIntegrator, ImuOptions, InertialSample, MotionPrior, Relocalisation, Tracker, TrackerOptions};
+use tracking::{ImuIntegrator, InertialSample, MotionPrior, Relocalisation, Tracker, TrackerOptions};
 
 const FRAMES: usize = 120;
 const IMU_HERTZ: f64 = 200.0;
@@ -34,25 +34,30 @@ fn world_from_camera(t: f64, phase: f64) -> Isometry3<f64> {
     pose * Isometry3::from_parts(Vector3::zeros().into(), turn)
 }
 
+/// The unit on the camera.
+fn camera_from_body() -> Isometry3<f64> {
+    Isometry3::new(Vector3::new(0.03, -0.02, 0.05), Vector3::new(0.1, 1.5, -0.3))
+}
+
 /// Noisy samples with constant biases, in body axes.
-fn samples(options: &ImuOptions, phase: f64, seed: u64) -> Vec<InertialSample> {
+fn samples(noise: &ImuNoise, phase: f64, seed: u64) -> Vec<InertialSample> {
     let mut random = Pcg64::seed_from_u64(seed);
     let mut normal = || Vector3::from_fn(|_, _| -> f64 { StandardNormal.sample(&mut random) });
-    let (gyro_bias, accel_bias) = (normal() * 0.01, normal() * options.accel_bias_sigma);
+    let (gyro_bias, accel_bias) = (normal() * 0.01, normal() * 0.1);
     let root = IMU_HERTZ.sqrt();
     let last = (FRAMES as f64 / HERTZ * IMU_HERTZ) as i32;
     (-100..=last)
         .map(|i| {
             let t = f64::from(i) / IMU_HERTZ;
-            let body = |t: f64| world_from_camera(t, phase) * options.camera_from_body;
+            let body = |t: f64| world_from_camera(t, phase) * camera_from_body();
             let [before, at, after] = [-1e-3, 0.0, 1e-3].map(|h| body(t + h));
             let bent = (after.translation.vector - at.translation.vector * 2.0 + before.translation.vector) / 1e-6;
-            let force = at.rotation.inverse() * (bent + Vector3::new(0.0, 0.0, options.gravity_m_s2));
+            let force = at.rotation.inverse() * (bent + Vector3::new(0.0, 0.0, 9.80665));
             let rate = (before.rotation.inverse() * after.rotation).scaled_axis() / 2e-3;
             InertialSample {
                 timestamp_s: t,
-                angular_rate: rate + gyro_bias + normal() * options.gyro_noise * root,
-                specific_force: force + accel_bias + normal() * options.accel_noise * root,
+                angular_rate: rate + gyro_bias + normal() * noise.gyro_density * root,
+                specific_force: force + accel_bias + normal() * noise.accel_density * root,
             }
         })
         .collect()
@@ -67,26 +72,22 @@ enum Told {
 }
 
 /// The camera's rotation between two frames from the gyroscope alone, its bias as it was at rest.
-fn turn(all: &[InertialSample], interval_s: [f64; 2], biases: &Biases, options: &ImuOptions) -> MotionPrior {
-    let noise = ImuNoise { gyro_density: options.gyro_noise, ..ImuNoise::default() };
-    let motion = Preintegrated::new(all, interval_s, biases, &noise).unwrap();
-    let camera_from_body = options.camera_from_body.rotation;
+fn turn(all: &[InertialSample], interval_s: [f64; 2], biases: &Biases, noise: &ImuNoise) -> MotionPrior {
+    let motion = Preintegrated::new(all, interval_s, biases, noise).unwrap();
+    let camera_from_body = camera_from_body().rotation;
     let previous_from_current = camera_from_body * motion.rotation * camera_from_body.inverse();
     // The bias is the mean of half a second of samples.
     let seconds = interval_s[1] - interval_s[0];
-    let variance = options.gyro_noise.powi(2) * (seconds + seconds * seconds / 0.5);
+    let variance = noise.gyro_density.powi(2) * (seconds + seconds * seconds / 0.5);
     MotionPrior::of_turn(previous_from_current.inverse(), &(Matrix3::identity() * variance))
 }
 
 /// Root mean square error of the attitude over all frames, radian.
 fn attitude_error(told: Told, phase: f64, seed: u64) -> f64 {
     let camera = Pinhole { width: 88, height: 72, focal_px: 76.0 };
-    let options = ImuOptions {
-        camera_from_body: Isometry3::new(Vector3::new(0.03, -0.02, 0.05), Vector3::new(0.1, 1.5, -0.3)),
-        ..ImuOptions::default()
-    };
-    let all = samples(&options, phase, seed);
-    let mut imu = ImuIntegrator::from_rest(&all[..101], &options).unwrap();
+    let noise = ImuNoise::default();
+    let all = samples(&noise, phase, seed);
+    let mut imu = ImuIntegrator::from_rest(&all[..101], &camera_from_body(), &noise).unwrap();
     let resting = Biases { gyro: imu.biases()[0], accel: Vector3::zeros() };
     // A bare wall gives alignment without a guess nothing to find, at a hundred times the price.
     let tracking = TrackerOptions { relocalisation: Relocalisation::Projective, ..TrackerOptions::default() };
@@ -97,7 +98,7 @@ fn attitude_error(told: Told, phase: f64, seed: u64) -> f64 {
         let (points, sigma) = frame(&scene(), &camera, &world_from_camera(t, phase), 1.0, 1000 * seed + k as u64);
         let prior = imu.motion(&all, t).unwrap();
         let prior = match told {
-            Told::Turn if k > 0 => Some(turn(&all, [t - 1.0 / HERTZ, t], &resting, &options)),
+            Told::Turn if k > 0 => Some(turn(&all, [t - 1.0 / HERTZ, t], &resting, &noise)),
             Told::Motion if k > 0 => Some(prior),
             _ => None,
         };

@@ -8,7 +8,7 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
 use rigid_pose::pose_difference;
 use tracking::{
-    ImuIntegrator, ImuOptions, InertialSample, LossReason, Relocalisation, TrackedPose, Tracker, TrackerOptions,
+    ImuIntegrator, ImuNoise, InertialSample, LossReason, Relocalisation, TrackedPose, Tracker, TrackerOptions,
     TrackingState,
 };
 
@@ -39,23 +39,28 @@ fn world_from_camera(t: f64) -> Isometry3<f64> {
     look_at([x, 0.0, 0.0], [x, 3.0, 0.0])
 }
 
+/// The unit on the camera.
+fn camera_from_body() -> Isometry3<f64> {
+    Isometry3::new(Vector3::new(0.03, -0.02, 0.05), Vector3::new(0.1, 1.5, -0.3))
+}
+
 /// Noisy samples with constant biases, in body axes.
-fn samples(options: &ImuOptions) -> Vec<InertialSample> {
+fn samples(noise: &ImuNoise) -> Vec<InertialSample> {
     let mut random = Pcg64::seed_from_u64(5);
     let mut normal = || Vector3::from_fn(|_, _| -> f64 { StandardNormal.sample(&mut random) });
-    let (gyro_bias, accel_bias) = (normal() * 0.01, normal() * options.accel_bias_sigma);
+    let (gyro_bias, accel_bias) = (normal() * 0.01, normal() * 0.1);
     let root = IMU_HERTZ.sqrt();
     let last = (FRAMES as f64 / HERTZ * IMU_HERTZ) as i32;
     (-100..=last)
         .map(|i| {
             let t = f64::from(i) / IMU_HERTZ;
             let along = if (0.0..START).contains(&t) { ACCELERATION } else { 0.0 };
-            let world_from_body = world_from_camera(t) * options.camera_from_body;
-            let force = world_from_body.rotation.inverse() * Vector3::new(along, 0.0, options.gravity_m_s2);
+            let world_from_body = world_from_camera(t) * camera_from_body();
+            let force = world_from_body.rotation.inverse() * Vector3::new(along, 0.0, 9.80665);
             InertialSample {
                 timestamp_s: t,
-                angular_rate: gyro_bias + normal() * options.gyro_noise * root,
-                specific_force: force + accel_bias + normal() * options.accel_noise * root,
+                angular_rate: gyro_bias + normal() * noise.gyro_density * root,
+                specific_force: force + accel_bias + normal() * noise.accel_density * root,
             }
         })
         .collect()
@@ -63,12 +68,9 @@ fn samples(options: &ImuOptions) -> Vec<InertialSample> {
 
 fn tracked(with_imu: bool) -> Vec<TrackedPose> {
     let camera = Pinhole { width: 88, height: 72, focal_px: 76.0 };
-    let options = ImuOptions {
-        camera_from_body: Isometry3::new(Vector3::new(0.03, -0.02, 0.05), Vector3::new(0.1, 1.5, -0.3)),
-        ..ImuOptions::default()
-    };
-    let all = samples(&options);
-    let mut imu = ImuIntegrator::from_rest(&all[..101], &options).unwrap();
+    let noise = ImuNoise::default();
+    let all = samples(&noise);
+    let mut imu = ImuIntegrator::from_rest(&all[..101], &camera_from_body(), &noise).unwrap();
     // A bare wall gives alignment without a guess nothing to find, at a hundred times the price.
     let tracking = TrackerOptions { relocalisation: Relocalisation::Projective, ..TrackerOptions::default() };
     let mut tracker = Tracker::new(&projection(&camera), tracking).unwrap();

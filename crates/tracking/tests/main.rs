@@ -15,6 +15,7 @@ mod depth_frames;
 mod hand_held;
 mod imu;
 mod invalid;
+mod motions_of_a_unit;
 mod paths;
 #[path = "../../projective-registration/tests/prepared/mod.rs"]
 mod prepared;

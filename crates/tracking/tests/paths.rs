@@ -217,7 +217,11 @@ fn few_keyframes_are_enough_to_go_on() {
         // Poses that hang on keyframes which are gone are still led back to the first one.
         let (millimetre, degree) = pose_error(&pose.world_from_camera, &from_first(2 * k));
         assert!(millimetre < 15.0 && degree < 0.5, "{k}: {millimetre} {degree}");
+        // So they are by who keeps what he needs of each.
+        let world = tracker.world_from_keyframe(pose.keyframe).unwrap();
+        assert_eq!(world * pose.keyframe_from_camera, pose.world_from_camera);
     }
+    assert!(tracker.world_from_keyframe(1000).is_none());
 }
 
 #[test]

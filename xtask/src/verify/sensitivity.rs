@@ -1,7 +1,7 @@
 //! `cargo xtask sensitivity [WORD ...]`: what a statistic says where constants of a crate are other ones.
 //!
-//! A copy of the repository is built once in which every private constant that is a decimal number is read from the
-//! environment; the example then runs with each of them at multiples of its value. What `docs/benchmarks.md` says of constants
+//! A copy of the repository is built once in which every private constant that is a number is read from the environment, but
+//! for lengths of arrays; the example then runs with each of them at multiples of its value (counts: rounded, at least 1). What `docs/benchmarks.md` says of constants
 //! comes from here.
 
 use std::fmt::Write as _;
@@ -33,6 +33,9 @@ pub(crate) struct Arguments {
     /// What each constant is multiplied by.
     #[arg(long, value_delimiter = ',', default_values_t = [0.5, 2.0])]
     multiples: Vec<f64>,
+    /// Only lines of the example with this word are compared; all where it is missing.
+    #[arg(long)]
+    lines: Option<String>,
     /// Only list the constants.
     #[arg(long)]
     list: bool,
@@ -69,7 +72,9 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome {
         let mut command = Command::new(&program);
         command.args(arguments.passed.split_whitespace()).envs(change.map(|change| (VARIABLE, change)));
         let output = command.output().map_err(|error| format!("{}: {error}", program.display()))?;
-        Ok(String::from_utf8_lossy(&output.stdout).trim_end().to_owned())
+        let text = String::from_utf8_lossy(&output.stdout);
+        let kept = text.lines().filter(|line| arguments.lines.as_ref().is_none_or(|word| line.contains(word)));
+        Ok(kept.map(without_times).collect::<Vec<_>>().join("\n"))
     };
     let as_it_is = said(None)?;
     println!("as it is:\n{as_it_is}");
@@ -80,6 +85,14 @@ pub(crate) fn run(arguments: &Arguments) -> Outcome {
         }
     }
     Ok(())
+}
+
+/// A line without its milliseconds, which differ from run to run.
+fn without_times(line: &str) -> String {
+    let words: Vec<&str> = line.split(' ').collect();
+    let is_time = |k: usize| words.get(k + 1).is_some_and(|unit| unit.trim_end_matches([',', ')', ';']) == "ms");
+    let kept = words.iter().enumerate().map(|(k, word)| if is_time(k) { "_" } else { *word });
+    kept.collect::<Vec<_>>().join(" ")
 }
 
 /// The lines that differ.
@@ -136,20 +149,29 @@ fn opened(source: &Path) -> Result<Vec<Constant>, String> {
     Ok(constants)
 }
 
-/// A file in which private constants of type f32 or f64 with a number for a value are functions, and these constants.
+/// A file in which private constants with a number for a value are functions, and these constants.
 fn opened_file(text: &str, file: &str) -> (String, Vec<Constant>) {
     let found: Vec<(&str, &str, &str)> = text.lines().filter_map(declaration).collect();
-    // A constant that others are made of stays.
+    // A constant that others, or lengths of arrays, are made of stays.
     let is_part = |name: &str| {
-        let others = text.lines().filter(|line| line.contains("const ") && declaration(line).is_none());
+        let is_constant = |line: &&str| line.contains("const ") && declaration(line).is_none();
+        let is_length = |line: &&str| {
+            let behind = |part: &str| part.split_once(']').is_some_and(|(length, _)| length.contains(name));
+            line.split("; ").skip(1).any(behind) || line.contains(&format!("<{name}"))
+        };
+        let others = text.lines().filter(|line| is_constant(line) || is_length(line));
         others.flat_map(|line| line.split(|c: char| !is_of_name(c))).any(|word| word == name)
     };
     let found: Vec<_> = found.into_iter().filter(|(name, ..)| !is_part(name)).collect();
     let lines = text.lines().map(|line| match declaration(line) {
         Some((name, kind, value)) if found.iter().any(|other| other.0 == name) => format!(
             "#[allow(non_snake_case)]\nfn {name}() -> {kind} {{\n    static VALUE: std::sync::OnceLock<{kind}> = \
-             std::sync::OnceLock::new();\n    *VALUE.get_or_init(|| {value} * crate::constant_times(\"{file}::{name}\") as \
-             {kind})\n}}"
+             std::sync::OnceLock::new();\n    *VALUE.get_or_init(|| {})\n}}",
+            if kind == "usize" {
+                format!("(({value} as f64 * crate::constant_times(\"{file}::{name}\")).round() as usize).max(1)")
+            } else {
+                format!("{value} * crate::constant_times(\"{file}::{name}\") as {kind}")
+            }
         ),
         _ if line.trim_start().starts_with("//") => line.to_owned(),
         _ => called(line, &found.iter().map(|other| other.0).collect::<Vec<_>>()),
@@ -159,12 +181,13 @@ fn opened_file(text: &str, file: &str) -> (String, Vec<Constant>) {
     (lines.collect::<Vec<_>>().join("\n") + "\n", constants.collect())
 }
 
-/// Name, type and value of `const NAME: f64 = 0.5;` at the beginning of a line.
+/// Name, type and value of `const NAME: f64 = 0.5;` at the beginning of a line; counts are of at least 2.
 fn declaration(line: &str) -> Option<(&str, &str, &str)> {
     let (name, rest) = line.strip_prefix("const ")?.split_once(": ")?;
     let (kind, value) = rest.strip_suffix(';')?.split_once(" = ")?;
     let is_number = value.replace('_', "").parse::<f64>().is_ok_and(f64::is_finite);
-    (is_number && (kind == "f64" || kind == "f32")).then_some((name, kind, value))
+    let is_count = kind == "usize" && value.parse::<usize>().is_ok_and(|count| count > 1);
+    (is_number && (kind == "f64" || kind == "f32" || is_count)).then_some((name, kind, value))
 }
 
 const fn is_of_name(c: char) -> bool {
@@ -214,6 +237,7 @@ fn built(folder: &Path, copy: &Path, arguments: &Arguments) -> Result<PathBuf, S
             "--package",
             arguments.example_of.as_ref().unwrap_or(&arguments.package),
             "--all-features",
+            "--release",
             "--example",
             &arguments.example,
         ])
@@ -224,7 +248,7 @@ fn built(folder: &Path, copy: &Path, arguments: &Arguments) -> Result<PathBuf, S
     if !status.success() {
         return Err(format!("the copy in {} does not build: {status}", copy.display()));
     }
-    Ok(target.join("debug/examples").join(&arguments.example))
+    Ok(target.join("release/examples").join(&arguments.example))
 }
 
 #[cfg(test)]
@@ -232,10 +256,20 @@ mod tests {
     use super::*;
 
     #[test]
-    fn private_decimal_constants_are_opened_and_their_uses_called() {
-        let text = "/// Share.\nconst SHARE: f64 = 0.5;\npub const OPEN: f64 = 1.0;\nconst COUNT: usize = 3;\nconst A: f32 = 2.0;\nconst B: f32 = A * 3.0;\nfn f() -> f64 {\n    // SHARE of all\n    SHARE * other::SHARE + MY_SHARE\n}\n";
+    fn times_do_not_count_as_a_difference() {
+        assert_eq!(
+            without_times("a: 12 right, 3.4 ms (one cloud 5 ms), 7 mm"),
+            "a: 12 right, _ ms (one cloud _ ms), 7 mm"
+        );
+    }
+
+    #[test]
+    fn private_constants_are_opened_and_their_uses_called() {
+        let text = "/// Share.\nconst SHARE: f64 = 0.5;\npub const OPEN: f64 = 1.0;\nconst COUNT: usize = 3;\nstruct S([u8; 2 * COUNT]);\nconst MOST: usize = 4;\nconst A: f32 = 2.0;\nconst B: f32 = A * 3.0;\nfn f() -> f64 {\n    // SHARE of all\n    SHARE * other::SHARE + MY_SHARE\n}\n";
         let (opened, constants) = opened_file(text, "folder/file");
-        assert_eq!(constants, [Constant { path: "folder/file::SHARE".to_owned(), value: "0.5".to_owned() }]);
+        let of = |name: &str, value: &str| Constant { path: format!("folder/file::{name}"), value: value.to_owned() };
+        assert_eq!(constants, [of("SHARE", "0.5"), of("MOST", "4")]);
+        assert!(opened.contains("fn MOST() -> usize") && opened.contains("const COUNT: usize = 3;"), "{opened}");
         assert!(opened.contains("fn SHARE() -> f64"), "{opened}");
         assert!(opened.contains("    SHARE() * other::SHARE + MY_SHARE"), "{opened}");
         assert!(opened.contains("// SHARE of all") && opened.contains("const A: f32 = 2.0;"), "{opened}");

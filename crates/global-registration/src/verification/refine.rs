@@ -1,6 +1,7 @@
 //! A few steps of point to plane between the averaged points, from poses that are a few voxels off.
 
 use nalgebra::{Isometry3, Matrix6, Vector3};
+use point_cloud::SAME_SURFACE_COSINE;
 use rigid_pose::{Centred, MotionEquations};
 
 use crate::description::feature_cloud::FeatureCloud;
@@ -11,8 +12,6 @@ use crate::hypotheses::correspondences::Motion;
 const STEPS: [usize; 2] = [5, 4];
 /// Scale of the residuals' weights in voxels.
 const SCALES: [f64; 2] = [1.0, 0.4];
-/// Least cosine between the normals of partners.
-const LEAST_COSINE: f32 = 0.7;
 /// Share of the mean information that is added to each motion: motions that the surfaces do not determine stay.
 const DAMPING: f64 = 1e-3;
 
@@ -114,7 +113,7 @@ fn pairs(source: &FeatureCloud, target: &FeatureCloud, pose: &Isometry3<f64>, le
         let (own, other) = (motion.vector(source.normals.vectors[i as usize]), target.normals.vectors[near]);
         let cosine = if sided { dot(own, other) } else { dot(own, other).abs() };
         let residual = dot(subtract(point, target.reduced.points[near]), other);
-        (cosine >= LEAST_COSINE).then(|| Pair {
+        (cosine >= SAME_SURFACE_COSINE as f32).then(|| Pair {
             point: wide(point),
             normal: wide(other),
             residual: f64::from(residual),

@@ -129,7 +129,7 @@ fn frames(name: &str, camera: &Pinhole, count: u64, write: Option<&str>) {
             good += usize::from(a < 30.0 && b < 1.0);
         }
         println!(
-            "{name} {what}: {:.1} ms (one cloud {:.1}), median {:.4} deg {:.2} mm, {good} of {count}",
+            "{name} {what}: {:.1} ms (one cloud {:.1} ms), median {:.4} deg {:.2} mm, {good} of {count}",
             median(&mut ms),
             median(&mut prepare),
             median(&mut degrees),

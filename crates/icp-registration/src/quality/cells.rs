@@ -28,6 +28,9 @@ pub(crate) struct Cells {
 }
 
 impl Cells {
+    /// Cells across the rms radius of the pairs: what errs together is smaller than that, and forty cells and more tell six unknowns.
+    pub const PER_RADIUS: f64 = 8.0;
+
     /// No pairs yet; those in a cube of `cell_m` will count as one observation.
     pub fn new(frame: Centred, cell_m: f64) -> Self {
         Self { frame, cell_m, sums: BTreeMap::new(), pairs: 0, squares: Matrix6::zeros() }

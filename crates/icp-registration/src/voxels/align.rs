@@ -8,7 +8,7 @@ use super::pairs::{Matcher, Pair, Partners, System, matched};
 use super::wide::{RULES, Wide};
 use crate::error::{Error, Result};
 use crate::kernel::RobustKernel;
-use crate::quality::{Residuals, Verdict};
+use crate::quality::{Cells, Residuals, Verdict};
 use crate::result::{DegeneracyPolicy, IcpResult, StopReason};
 use rigid_pose::{Centred, free_of, is_finite};
 
@@ -22,8 +22,6 @@ const SETTLED_STEP: f64 = 0.02;
 const MOST_SEARCHES: usize = 15;
 /// Planes of a level below which it is passed over.
 const FEWEST_PLANES: usize = 100;
-/// Cells across the rms radius of the pairs, for the scatter of what they say.
-const CELLS_PER_RADIUS: f64 = 8.0;
 /// Least size of those cells: planes of voxels nearer than three share points.
 const VOXELS_PER_CELL: f64 = 6.0;
 
@@ -252,7 +250,7 @@ fn limit(matcher: Matcher<'_>) -> f64 {
 
 /// Size of the cubes whose pairs count as one observation, metre.
 fn cell(system: &System<'_>, matcher: Matcher<'_>) -> f64 {
-    (system.frame.radius_m / CELLS_PER_RADIUS).max(VOXELS_PER_CELL * matcher.target.size_m)
+    (system.frame.radius_m / Cells::PER_RADIUS).max(VOXELS_PER_CELL * matcher.target.size_m)
 }
 
 /// Larger of the two parts of a motion.

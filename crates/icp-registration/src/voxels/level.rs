@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::numerics::blocks::Blocks;
 use super::numerics::lattice::{Lattice, cell};
 use super::numerics::moments::Moments;
-use point_cloud::{eigenvalues3, eigenvector3};
+use point_cloud::{SAME_SURFACE_COSINE, eigenvalues3, eigenvector3};
 
 /// Voxels handled together by one thread; fixed, so that sums do not depend on the number of threads.
 pub(crate) const CHUNK: usize = 512;
@@ -22,8 +22,6 @@ const COMMON_SHARE: f64 = 0.03;
 /// Standard deviation that no plane goes below, in voxels: surfaces are not flatter, and a few voxels with many points
 /// would outweigh all others.
 const FLOOR: f64 = 0.02;
-/// Cosine of the angle beyond which normals of partners disagree.
-const SMALLEST_COSINE: f64 = 0.7;
 
 /// The mean of the points of a surface in a voxel and in those before and behind it, and the plane through it and its
 /// neighbours.
@@ -97,7 +95,7 @@ impl Level {
             let voxel = &self.voxels[index];
             let square = (voxel.mean - moved).norm_squared();
             // A NaN normal fails the comparison.
-            if square < best && voxel.normal.dot(normal).abs() > SMALLEST_COSINE {
+            if square < best && voxel.normal.dot(normal).abs() > SAME_SURFACE_COSINE {
                 (best, nearest) = (square, Some(index));
             }
         });

@@ -6,18 +6,19 @@ use adjust::{
     Adjustment, BlockId, Covariance, GroupId, ObservationId, ParameterBlock, Scale, SnoopingTest, Solution,
     SolveOptions,
 };
-use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
+use nalgebra::{Isometry3, Matrix3, Matrix6, Vector3, Vector6};
 use rigid_pose::{Uncertain, is_finite};
 use statistics::bonferroni;
 
-use crate::noise::Biases;
+use crate::noise::{Biases, ImuNoise};
 use crate::preintegrated::Preintegrated;
+use crate::rest::Unrest;
 use crate::sample::InertialSample;
 use crate::sequence::equations::{IntervalEquations, Length, Unchanged};
-use crate::sequence::options::{
-    CameraPose, InertialSequence, Mounting, SequenceOptions, SequenceState, StateCovariance,
-};
+use crate::sequence::noise_at_work::{Known, noise_at_work};
+use crate::sequence::options::{CameraPose, InertialSequence, Mounting, SequenceOptions, SequenceState};
 use crate::sequence::start::{Start, angle_ratio, contradicting_turns};
+use crate::state::StateCovariance;
 use crate::{Error, Result};
 
 /// Poses needed: two make a velocity, a third tells it from gravity.
@@ -40,7 +41,7 @@ const SMALL_CHANGE: f64 = 0.01;
 ///
 /// # Errors
 /// [`Error::TooFewPoses`] below three, [`Error::InvalidPose`], [`Error::NotAscending`], [`Error::NonFinite`], [`Error::Gap`],
-/// [`Error::InvalidOption`]; [`Error::Contradiction`] where unit and camera do not fit each other in half of the intervals;
+/// [`Error::InvalidOption`]; [`Error::Unrest`] where forces are not those of a body on earth; [`Error::Contradiction`] where unit and camera do not fit each other in half of the intervals;
 /// [`Error::Adjustment`].
 pub fn estimate_sequence(
     poses: &[CameraPose],
@@ -52,18 +53,24 @@ pub fn estimate_sequence(
         Preintegrated::new(samples, [pair[0].time_s, pair[1].time_s], &Biases::zero(), &options.noise)
     };
     let mut motions: Vec<Preintegrated> = poses.windows(2).map(interval).collect::<Result<_>>()?;
+    require_specific_forces(poses, samples, options.gravity_m_s2)?;
     let start = Start::new(poses, &motions, options);
     require_agreement(poses, &motions, contradicting_turns(poses, &motions, &start.camera_from_body))?;
     let mut left_out = BTreeSet::new();
     // At biases of zero the motions are far from their reference: nothing is judged by them.
-    let mut biases = Network::new(poses, &motions, options, &start, &left_out)?.all_biases(&options.solve)?;
+    let first = Network::new(poses, &motions, options, &start, &left_out)?.without_tests(&options.solve)?;
+    let (mut biases, known) = (first.0, Known { poses, camera_from_body: first.1, gravity: first.2 });
+    motions = motions.iter().zip(&biases).map(|(motion, biases)| motion.reintegrated(biases)).collect();
+    let noise = noise_at_work(&known, &motions, &options.noise);
+    motions = motions.iter().map(|motion| motion.with_noise(&noise)).collect();
     let mut integration = 0;
     loop {
         integration += 1;
         motions = motions.iter().zip(&biases).map(|(motion, biases)| motion.reintegrated(biases)).collect();
         let (network, solution) = without_contradictions(poses, &motions, options, &start, &mut left_out)?;
         if integration == INTEGRATIONS || !network.is_far_from_reference(&solution, &motions)? {
-            return network.result(&solution, poses, left_out, options);
+            let contradicting = left_out.into_iter().collect();
+            return network.result(&solution, poses, contradicting, (options, noise));
         }
         biases = (0..motions.len()).map(|k| network.biases(&solution, k)).collect::<Result<_>>()?;
     }
@@ -101,6 +108,19 @@ fn without_contradictions<'m>(
         require_agreement(poses, motions, left_out.len())?;
     }
     Ok((network, solution))
+}
+
+/// Fails where half of the forces between the poses are less than half or more than twice gravity: nothing that is carried moves so, and a
+/// bias as large as gravity would fit a camera that turns little.
+fn require_specific_forces(poses: &[CameraPose], samples: &[InertialSample], gravity_m_s2: f64) -> Result<()> {
+    let span = poses[0].time_s..=poses[poses.len() - 1].time_s;
+    let within = samples.iter().filter(|sample| span.contains(&sample.timestamp_s));
+    let mut sizes: Vec<f64> = within.map(|sample| sample.specific_force.norm()).collect();
+    let usual = statistics::upper_median(&mut sizes);
+    if usual < gravity_m_s2 / 2.0 || usual > 2.0 * gravity_m_s2 {
+        return Err(Unrest::Force { mean_m_s2: usual }.into());
+    }
+    Ok(())
 }
 
 /// Fails where more than half of the intervals contradict.
@@ -254,10 +274,12 @@ impl<'m> Network<'m> {
         Ok(Biases::from_vector(&Vector6::from_column_slice(solution.values(self.biases[k])?)))
     }
 
-    /// Solves, and gives the biases of all intervals.
-    fn all_biases(&self, options: &SolveOptions) -> Result<Vec<Biases>> {
+    /// Solves, and gives the biases of all intervals, the mounting and gravity.
+    fn without_tests(&self, options: &SolveOptions) -> Result<(Vec<Biases>, Isometry3<f64>, Vector3<f64>)> {
         let solution = self.adjustment.solve(options)?;
-        (1..self.biases.len()).map(|k| self.biases(&solution, k - 1)).collect()
+        let biases = (1..self.biases.len()).map(|k| self.biases(&solution, k - 1)).collect::<Result<_>>()?;
+        let gravity = Vector3::from_column_slice(solution.values(self.gravity)?);
+        Ok((biases, solution.pose(self.mounting)?, gravity))
     }
 
     /// Whether the biases change a motion by more than first order allows.
@@ -298,8 +320,8 @@ impl<'m> Network<'m> {
         &self,
         solution: &Solution,
         poses: &[CameraPose],
-        left_out: BTreeSet<usize>,
-        options: &SequenceOptions,
+        contradicting: Vec<usize>,
+        (options, noise): (&SequenceOptions, ImuNoise),
     ) -> Result<InertialSequence> {
         let six = |block: BlockId| {
             let matrix = solution.covariance(block, Scale::Prior)?;
@@ -333,7 +355,8 @@ impl<'m> Network<'m> {
             gravity,
             gravity_covariance,
             camera_from_body,
-            contradicting: left_out.into_iter().collect(),
+            contradicting,
+            noise,
             redundancy: solution.redundancy(),
             sigma0: solution.sigma0(),
         })

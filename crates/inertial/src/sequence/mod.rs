@@ -2,8 +2,9 @@
 
 mod equations;
 mod estimate;
+mod noise_at_work;
 mod options;
 mod start;
 
 pub use estimate::estimate_sequence;
-pub use options::{CameraPose, InertialSequence, Mounting, SequenceOptions, SequenceState, StateCovariance};
+pub use options::{CameraPose, InertialSequence, Mounting, SequenceOptions, SequenceState};

@@ -1,10 +1,13 @@
 //! What a sequence is estimated from, and what comes out.
 
 use adjust::SolveOptions;
-use nalgebra::{Isometry3, Matrix3, Matrix6, SMatrix, Vector3};
-use rigid_pose::Uncertain;
+use nalgebra::{Isometry3, Matrix3, Matrix6, Vector3};
+use rigid_pose::{Uncertain, product_jacobians};
 
 use crate::noise::{Biases, ImuNoise};
+use crate::residual::NavigationState;
+use crate::rest::GRAVITY_M_S2;
+use crate::state::{GRAVITY_SIGMA_M_S2, InertialState, StateCovariance};
 
 /// A pose of the camera from a registration, from tracking or from targets.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -47,8 +50,8 @@ impl Default for SequenceOptions {
         Self {
             noise: ImuNoise::default(),
             mounting: Mounting::Known(Isometry3::identity()),
-            gravity_m_s2: 9.80665,
-            gravity_sigma_m_s2: 0.02,
+            gravity_m_s2: GRAVITY_M_S2,
+            gravity_sigma_m_s2: GRAVITY_SIGMA_M_S2,
             solve: SolveOptions::default(),
         }
     }
@@ -69,9 +72,6 @@ pub struct SequenceState {
     /// and gravity can hardly be told apart by a unit that turns little, while what they make of a motion is known well.
     pub covariance: StateCovariance,
 }
-
-/// Covariance of a whole state: pose (6), velocity (3), biases (6), gravity (3).
-pub type StateCovariance = SMatrix<f64, 18, 18>;
 
 impl SequenceState {
     /// Covariance of the velocity.
@@ -100,8 +100,30 @@ pub struct InertialSequence {
     pub camera_from_body: Uncertain,
     /// Intervals (k lies between poses k and k + 1) whose samples contradict the camera and took no part, ascending.
     pub contradicting: Vec<usize>,
+    /// The noise of the unit as its motions show it: that of the options, with larger densities where the intervals scatter by more at a
+    /// level of 0.1 %. All covariances here have it.
+    pub noise: ImuNoise,
     /// Observations minus unknowns.
     pub redundancy: i64,
     /// Posterior standard deviation of unit weight; `None` without redundancy.
     pub sigma0: Option<f64>,
+}
+
+impl InertialSequence {
+    /// The state of the unit's body at pose `index`, with the correlations of its pose, velocity, biases and gravity; `None` where there is
+    /// no such pose.
+    #[must_use]
+    pub fn state_of_body(&self, index: usize) -> Option<InertialState> {
+        let state = self.states.get(index)?;
+        let (camera, body) = (&state.world_from_camera.pose, &self.camera_from_body.pose);
+        let mut to_body = StateCovariance::identity();
+        to_body.fixed_view_mut::<6, 6>(0, 0).copy_from(&product_jacobians(camera, body).0);
+        Some(InertialState {
+            time_s: state.time_s,
+            navigation: NavigationState { world_from_body: camera * body, velocity: state.velocity },
+            biases: state.biases,
+            gravity: self.gravity,
+            covariance: to_body * state.covariance * to_body.transpose(),
+        })
+    }
 }

@@ -1,16 +1,18 @@
 //! Frames of real sensors as stations: how many are placed, how far off they are, and whether what does not belong is named.
 //!
-//! `cargo run --release -p multiview-registration --example stations_real [-- first|second|others ..] [--each] [set=NAME]`
+//! `cargo run --release -p multiview-registration --example stations_real [-- first|second|others ..] [--each] [--clouds] [set=NAME]`
 //!
-//! Of the 500 frames of a Kinect the first half was tuned on, the second judges.
+//! `--clouds`: the points of the frames as clouds, without their images, by `register_stations`. Of the 500 frames of a Kinect the first half was tuned on, the second judges.
 #![allow(clippy::unwrap_used, clippy::print_stdout, clippy::expect_used, missing_docs)]
 
+mod clouds;
 #[path = "../../../projective-registration/tests/depth_frames/mod.rs"]
 mod depth_frames;
 mod intruders;
 mod sets;
 #[path = "../../../projective-registration/tests/sr4000/mod.rs"]
 mod sr4000;
+mod tally;
 
 use std::time::Instant;
 
@@ -20,6 +22,7 @@ use projective_registration::{FrameAlignmentOptions, OrganisedFrame};
 
 use intruders::Intruder;
 use sets::Set;
+use tally::Tally;
 
 /// Of the reference, a pair of neighbours.
 const REFERENCE_M: f64 = 8e-3;
@@ -35,29 +38,31 @@ fn main() {
         "{:<34} {:<9} {:<10} {:>9} {:>8} {:>7} {:>6} {:>7} {:>13}",
         "set", "start", "intruder", "placed", "worst mm", "deg", "s", "factor", "over variance"
     );
+    let mut tally = Tally::default();
     for part in parts.into_iter().filter(|part| all || has(part)) {
         for set in sets::of(part).into_iter().filter(|set| asked.is_none_or(|name| set.name.contains(name))) {
+            if has("--clouds") {
+                clouds::measure(&set, &guesses(&set, true), &mut tally);
+                continue;
+            }
             for intruder in Intruder::ALL {
                 for start in ["order", "guesses", "reference"] {
                     if intruder == Intruder::None || (start == "order" && set.frames.len() > 4) {
-                        measure(&set, intruder, start, has("--each"));
+                        measure(&set, intruder, start, has("--each"), &mut tally);
                     }
                 }
             }
         }
     }
+    tally.print();
 }
 
 /// Registers the frames of a set and prints a line.
-fn measure(set: &Set, intruder: Intruder, start: &str, each: bool) {
+fn measure(set: &Set, intruder: Intruder, start: &str, each: bool, tally: &mut Tally) {
     let at = set.frames.len() / 2;
     let mut frames: Vec<OrganisedFrame> = set.frames.clone();
     let named = intruder.put(set, &mut frames, at);
-    let guesses = |off: bool| -> Vec<Isometry3<f64>> {
-        let one = |(k, pose): (usize, &Isometry3<f64>)| if off && k > 0 { pose * off_by(k) } else { *pose };
-        set.reference.iter().enumerate().map(one).collect()
-    };
-    let poses = guesses(start == "guesses");
+    let poses = guesses(set, start == "guesses");
     let start_of = if start == "order" { Start::Order } else { Start::Poses(&poses) };
     let clock = Instant::now();
     let found = register_frames(&frames, start_of, &FrameAlignmentOptions::default(), &|_, _| {});
@@ -70,11 +75,20 @@ fn measure(set: &Set, intruder: Intruder, start: &str, each: bool) {
             return;
         }
     };
-    let (mm, degrees) = worst(set, &found, named);
+    let poses: Vec<_> = found.frames.iter().map(|frame| frame.map(|frame| frame.world_from_frame)).collect();
+    let (mm, degrees) = worst(set, &poses, named);
     let others = frames.len() - usize::from(named.is_some());
     let placed = (0..frames.len()).filter(|k| Some(*k) != named && found.frames[*k].is_some()).count();
+    let is_unchecked = |frame: usize| found.unchecked.iter().any(|pair| pair.frames.contains(&frame));
+    match named {
+        Some(frame) => {
+            let is_named = is_unchecked(frame) || found.frames[frame].is_none();
+            tally.intruders = [tally.intruders[0] + 1, tally.intruders[1] + usize::from(is_named)];
+        }
+        None => tally.add(others, placed, mm),
+    }
     let verdict = match named {
-        Some(frame) if found.unchecked.iter().any(|pair| pair.frames.contains(&frame)) => " named as not checked",
+        Some(frame) if is_unchecked(frame) => " named as not checked",
         Some(frame) if found.frames[frame].is_some() => " NOT NAMED",
         Some(_) => " named",
         None => "",
@@ -143,6 +157,12 @@ fn over_variance(set: &Set, found: &FrameRegistration, named: Option<usize>) -> 
     sums.map(|sum| sum / count)
 }
 
+/// The poses of the reference, or these but for the first 5 cm and 2 degrees off.
+fn guesses(set: &Set, off: bool) -> Vec<Isometry3<f64>> {
+    let one = |(k, pose): (usize, &Isometry3<f64>)| if off && k > 0 { pose * off_by(k) } else { *pose };
+    set.reference.iter().enumerate().map(one).collect()
+}
+
 /// 5 cm and 2 degrees, in directions that differ from frame to frame.
 fn off_by(k: usize) -> Isometry3<f64> {
     let direction =
@@ -151,10 +171,10 @@ fn off_by(k: usize) -> Isometry3<f64> {
 }
 
 /// Largest errors after the best fit of the placed stations to the reference: millimetre, degree.
-fn worst(set: &Set, found: &FrameRegistration, named: Option<usize>) -> (f64, f64) {
+fn worst(set: &Set, found: &[Option<Isometry3<f64>>], named: Option<usize>) -> (f64, f64) {
     let known: Vec<(Isometry3<f64>, Isometry3<f64>)> = (0..set.reference.len())
         .filter(|k| Some(*k) != named)
-        .filter_map(|k| Some((found.frames[k]?.world_from_frame, set.reference[k])))
+        .filter_map(|k| Some((found[k]?, set.reference[k])))
         .collect();
     let fit = fit(&known);
     let off = known.iter().map(|(pose, truth)| apart(&(fit * pose), truth));

@@ -9,13 +9,11 @@ use nalgebra::{Isometry3, Matrix6};
 use crate::agreement::alignments::PairAlignment;
 use crate::agreement::loops::{LoopClosure, SpanningTree, spanning_tree};
 use crate::pairs_of_frames::frame_pairs::FramePair;
+use crate::pairs_of_frames::frames::ROUNDS;
 use icp_registration::IcpResult;
 use pose_graph::{Edge, Graph, Relation, is_likely};
 use projective_registration::{FieldMatrix, SharedError};
 use rigid_pose::Uncertain;
-
-/// Rounds in which pairs that do not fit go and those that fit again come back; two were enough on all frames tried.
-const ROUNDS: usize = 4;
 
 /// Poses of the frames that pairs connect.
 pub(crate) struct FrameGraph {

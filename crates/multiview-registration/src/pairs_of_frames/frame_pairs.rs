@@ -9,17 +9,8 @@ use crate::agreement::alignments::{PairAlignment, RefusedPair};
 use crate::error::Result;
 use global_registration::{CoarseOptions, FeatureCloud, align_without_guess};
 use icp_registration::{IcpResult, StopReason};
-use projective_registration::{FrameAligner, FrameAlignmentOptions, Influence, OrganisedFrame, SharedError};
+use projective_registration::{Agreement, FrameAligner, FrameAlignmentOptions, Influence, OrganisedFrame, SharedError};
 use rigid_pose::symmetrised;
-
-/// Nodes by which agreement is judged.
-pub(crate) const SAMPLE: usize = 2500;
-/// What frames must agree by, as in tracking: share of what both can judge, and of all that the source sees.
-const LEAST_CONSENT: f64 = 0.9;
-const LEAST_OVERLAP: f64 = 0.25;
-/// Share of the radius beyond whose standard deviation a motion is open, as in tracking: what is known less well from one pair
-/// has that little weight in the graph.
-const OPEN_SHARE: f64 = 1.0 / 50.0;
 
 /// Two frames that may see the same.
 #[derive(Debug, Clone, Copy)]
@@ -72,7 +63,7 @@ pub(crate) struct Frames<'a> {
 impl<'a> Frames<'a> {
     pub(crate) fn new(frames: &'a [OrganisedFrame], options: &FrameAlignmentOptions) -> Self {
         let radius_m = frames.iter().map(OrganisedFrame::radius_m).fold(0.0, f64::max);
-        let open = (OPEN_SHARE * radius_m).max(f64::MIN_POSITIVE);
+        let open = (FrameAlignmentOptions::OPEN_IN_A_GRAPH * radius_m).max(f64::MIN_POSITIVE);
         let max_motion_sigma_m = options.max_motion_sigma_m.or(Some(open));
         let options = FrameAlignmentOptions { max_motion_sigma_m, ..options.clone() };
         Self { all: frames, options, features: frames.iter().map(|_| OnceLock::new()).collect() }
@@ -111,13 +102,14 @@ impl<'a> Frames<'a> {
             return Err(distrust(&result));
         }
         let pose = result.target_from_source;
-        let both = [onto.agreement(moved, &pose, SAMPLE), moved.agreement(onto, &pose.inverse(), SAMPLE)];
+        let both =
+            [onto.agreement(moved, &pose, Agreement::NODES), moved.agreement(onto, &pose.inverse(), Agreement::NODES)];
         let consent = both[0].consent().min(both[1].consent());
-        if consent < LEAST_CONSENT {
+        if consent < Agreement::LEAST_CONSENT {
             return Err(format!("{:.0} % of what both see contradicts", 100.0 * (1.0 - consent)));
         }
         let overlap = both[0].overlap().min(both[1].overlap());
-        if overlap < LEAST_OVERLAP {
+        if overlap < Agreement::LEAST_OVERLAP {
             return Err(format!("only {:.0} % of what one sees agrees with the other", 100.0 * overlap));
         }
         let influence = influence.filter(|_| result.covariance.cholesky().is_some());

@@ -9,10 +9,10 @@ use crate::agreement::loops::{LoopClosure, reached};
 use crate::agreement::placement::{PairAgreement, Placements};
 use crate::error::{Error, Result};
 use crate::pairs_of_frames::frame_graph::FrameGraph;
-use crate::pairs_of_frames::frame_pairs::{Candidate, FramePair, Frames, Guess, SAMPLE};
+use crate::pairs_of_frames::frame_pairs::{Candidate, FramePair, Frames, Guess};
 use crate::pairs_of_frames::frame_scale::scaled;
 use crate::survey::registration::Start;
-use projective_registration::{FrameAlignmentOptions, OrganisedFrame, SharedError};
+use projective_registration::{Agreement, FrameAlignmentOptions, OrganisedFrame, SharedError};
 use rigid_pose::is_finite;
 
 /// Share of a frame that another must be expected to see for the two to be aligned.
@@ -23,8 +23,9 @@ const PARTNERS: usize = 6;
 const FOLLOWING: usize = 2;
 /// Placed frames, the nearest in order, that a frame is sought from without a guess.
 const SOUGHT: usize = 3;
-/// Rounds in which the graph tells further pairs.
-const ROUNDS: usize = 4;
+/// Rounds in which the graph tells further pairs, and in which pairs that do not fit it go and those that fit again come back: two
+/// were enough on all frames tried.
+pub(crate) const ROUNDS: usize = 4;
 
 /// A frame that was placed.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -234,7 +235,7 @@ impl<'a> Survey<'a> {
         for target in 0..self.count() {
             for source in target + 1..self.count() {
                 let Some(pose) = pose(target, source) else { continue };
-                let overlap = frames[target].nearness(&frames[source], &pose, SAMPLE / 4);
+                let overlap = frames[target].nearness(&frames[source], &pose, Agreement::NODES / 4);
                 if overlap >= LEAST_OVERLAP {
                     found.push((overlap, Candidate { target, source, guess: Guess::Near(pose) }));
                 }
@@ -296,8 +297,8 @@ impl<'a> Survey<'a> {
             for source in target + 1..self.count() {
                 let Some(pose) = graph.relative(target, source) else { continue };
                 let both = [
-                    frames[target].agreement(&frames[source], &pose, SAMPLE),
-                    frames[source].agreement(&frames[target], &pose.inverse(), SAMPLE),
+                    frames[target].agreement(&frames[source], &pose, Agreement::NODES),
+                    frames[source].agreement(&frames[target], &pose.inverse(), Agreement::NODES),
                 ];
                 let agreeing = both.iter().map(|a| a.agreeing).sum();
                 let contradicting = both.iter().map(|a| a.contradicting).sum();

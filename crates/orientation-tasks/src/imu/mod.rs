@@ -1,21 +1,18 @@
 //! Stations by an inertial unit alone, from poses that are known.
 
-mod anchor;
-mod rest;
-
 use std::path::Path;
 
 use commands::{Doubt, DoubtKind, InertialUnit, read_inertial};
-use inertial::{CameraPose, Mounting, SequenceOptions, estimate_sequence};
+use inertial::{CameraPose, ImuNoise, InertialState, Mounting, SequenceOptions, estimate_sequence};
 use orientation::TimedPose;
 use pipeline::survey::StationPose;
 use pipeline::{Error, Result};
+use rigid_pose::Uncertain;
 
 use crate::camera::SurveyCamera;
 use crate::known::Known;
 use crate::outcome::{Outcome, Placed};
 use crate::summary::{InertialSummary, NotOriented, OrientSummary, SigmaAtTime};
-use anchor::Anchor;
 
 /// Taken where the survey names no data.
 const FILE: &str = "imu.csv";
@@ -25,8 +22,7 @@ const SEQUENCE: usize = 4;
 const GROWTH: usize = 12;
 
 pub(crate) fn orient(camera: &SurveyCamera, known: Option<&Path>) -> Result<Outcome> {
-    let unit = read_unit(camera)?;
-    let InertialUnit { samples, camera_from_body, noise } = &unit;
+    let mut unit = read_unit(camera)?;
     let mut stations = camera.timed_stations()?;
     stations.sort_by(|a, b| a.1.total_cmp(&b.1));
     let known = Known::read(camera, known)?;
@@ -37,29 +33,38 @@ pub(crate) fn orient(camera: &SurveyCamera, known: Option<&Path>) -> Result<Outc
         ),
         ..OrientSummary::default()
     };
-    let anchors = if known.poses.len() >= SEQUENCE {
-        of_sequence(camera, &known, &unit, &mut summary)?
+    let states = if known.poses.len() >= SEQUENCE {
+        of_sequence(camera, &known, &mut unit, &mut summary)?
     } else {
         let first = known.poses.first().copied();
         let first = first.ok_or_else(|| wrong("no pose is known to begin with"))?;
-        let start = rest::at_rest(samples, &first, camera_from_body, noise).map_err(|words| wrong(&words))?;
+        let world_from_body = first.pose.then(&Uncertain::exact(unit.camera_from_body));
+        let start = InertialState::at_rest(&unit.samples, first.time_s, &world_from_body, &unit.noise).map_err(|error| {
+            wrong(&format!(
+                "before the first known pose (at {} s) {error}; four known poses give velocity and biases without a rest, and if the \
+                 clocks differ, shift one",
+                first.time_s
+            ))
+        })?;
         vec![start]
     };
     summary.findings.extend(known.assumed());
+    let InertialUnit { samples, camera_from_body, noise } = &unit;
     let (mut placed, mut growth) = (Vec::new(), Vec::new());
     for (name, time_s) in stations {
-        let before = anchors.partition_point(|anchor| anchor.time_s <= time_s);
-        let Some(anchor) = before.checked_sub(1).and_then(|index| anchors.get(index)) else {
+        let before = states.partition_point(|state| state.time_s <= time_s);
+        let Some(state) = before.checked_sub(1).and_then(|index| states.get(index)) else {
             let reason = format!("its time, {time_s} s, lies before the first known pose");
             summary.not_oriented.push(NotOriented { station: name, reason });
             continue;
         };
-        match anchor.camera_at(samples, time_s, camera_from_body, noise) {
-            Ok(found) => {
+        match state.carried(samples, time_s, noise) {
+            Ok(body) => {
+                let found = body.pose().then(&Uncertain::exact(camera_from_body.inverse()));
                 let pose = StationPose { world_from_camera: found.pose, covariance: Some(found.covariance) };
                 let station = Placed::new(&name, Some(time_s), pose);
                 if let Some([position_m, attitude_deg]) = station.sigmas() {
-                    growth.push(SigmaAtTime { seconds: time_s - anchor.time_s, position_m, attitude_deg });
+                    growth.push(SigmaAtTime { seconds: time_s - state.time_s, position_m, attitude_deg });
                 }
                 placed.push(station);
             }
@@ -72,7 +77,7 @@ pub(crate) fn orient(camera: &SurveyCamera, known: Option<&Path>) -> Result<Outc
     let last = growth.last().copied();
     let mut shown: Vec<SigmaAtTime> = growth.into_iter().step_by(every).collect();
     shown.extend(last.filter(|last| shown.last().is_some_and(|shown| shown.seconds < last.seconds)));
-    let biases = anchors.first().map(|anchor| anchor.biases);
+    let biases = states.first().map(|state| state.biases);
     summary.inertial = biases.map(|biases| InertialSummary {
         start: if known.poses.len() >= SEQUENCE { "sequence" } else { "rest" },
         gyro_bias_rad_s: biases.gyro.into(),
@@ -100,13 +105,13 @@ fn read_unit(camera: &SurveyCamera) -> Result<InertialUnit> {
     }
 }
 
-/// States at the known poses.
+/// States at the known poses. The unit has the noise that they show it to have afterwards.
 fn of_sequence(
     camera: &SurveyCamera,
     known: &Known,
-    unit: &InertialUnit,
+    unit: &mut InertialUnit,
     summary: &mut OrientSummary,
-) -> Result<Vec<Anchor>> {
+) -> Result<Vec<InertialState>> {
     let poses: Vec<CameraPose> =
         known.poses.iter().map(|TimedPose { time_s, pose }| CameraPose { time_s: *time_s, pose: *pose }).collect();
     let InertialUnit { samples, camera_from_body, noise } = unit;
@@ -121,7 +126,21 @@ fn of_sequence(
         );
         Some(Doubt::about(DoubtKind::Contradiction, after, words))
     }));
-    Ok(found.states.iter().map(|state| Anchor::of_state(state, found.gravity, camera_from_body)).collect())
+    summary.findings.extend(noisier(noise, &found.noise));
+    let states = (0..found.states.len()).filter_map(|pose| found.state_of_body(pose)).collect();
+    unit.noise = found.noise;
+    Ok(states)
+}
+
+/// By how much a unit is noisier than it is said to be, in a sentence.
+fn noisier(stated: &ImuNoise, found: &ImuNoise) -> Option<String> {
+    let times = [found.gyro_density / stated.gyro_density, found.accel_density / stated.accel_density];
+    let of = |times: f64, what: &str| (times > 1.0).then(|| format!("{what} {times:.1} times"));
+    let words: Vec<String> = [of(times[0], "rates"), of(times[1], "forces")].into_iter().flatten().collect();
+    let words = words.join(" and ");
+    (!words.is_empty()).then(|| {
+        format!("between the known poses the unit is noisier than it is said to be ({words}): deviations are stated with that")
+    })
 }
 
 fn wrong(message: &str) -> Error {

@@ -3,12 +3,14 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
+use std::fs::File;
+use std::io::{BufReader, BufWriter};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use atomic_output::{Destination, write_text};
 use commands::made::{Made, program, without_times};
-use commands::memory::keeping;
+use commands::memory::{Memory, Work, keeping};
 use commands::{Inputs, Judged, Progress, Tape, json, produce, produce_made, root_of};
 use range_io::survey::Survey;
 use serde::{Deserialize, Serialize};
@@ -41,6 +43,8 @@ pub struct PartSummary {
     pub frames: usize,
     /// Views that came out of them.
     pub views: usize,
+    /// Points of the cloud in the common frame.
+    pub points: u64,
     /// Points of split pixels, which end the cloud.
     pub further_points: usize,
     /// Clouds in the frames of their own cameras.
@@ -56,6 +60,10 @@ pub struct PartSummary {
     /// What is kept of the frames.
     pub state: InputDigest,
 }
+
+/// Points of the parts' clouds that are read at once at most, and bytes of each: as columns of the file, and as a cloud.
+const POINTS_AT_ONCE: usize = 1 << 18;
+const BYTES_A_POINT: u64 = 120;
 
 /// Name of the file with what a part keeps.
 const STATE: &str = "part.bin";
@@ -139,12 +147,13 @@ fn part_into(
     let bytes = Kept::bytes(&flow.survey, flow.camera(), whole.views());
     let mut seen = keeping(bytes, || flow.part_of_views(tally, &mut keep, progress))?;
     let (further_points, views) = (clouds.further(), kept.views.len());
-    let own_clouds = clouds.finish_part()?;
-    let mut tape = Tape::blank();
+    let (own_clouds, points) = clouds.finish_part()?;
+    let file = folder.file(STATE)?;
+    let access = |source| Error::Access { path: file.clone(), source };
+    let mut tape = Tape::onto(BufWriter::new(File::create(&file).map_err(access)?));
     flow.carry(&mut seen, &mut tape);
     kept.carry(&mut tape, &flow.survey);
-    let file = folder.file(STATE)?;
-    std::fs::write(&file, tape.into_bytes()).map_err(|source| Error::Access { path: file.clone(), source })?;
+    tape.finish().map_err(access)?;
     let summary = PartSummary {
         part: [part.number, part.of],
         pipeline: request.plan_path.clone(),
@@ -152,6 +161,7 @@ fn part_into(
         calibration: request.calibration.clone(),
         frames: flow.order.frames(),
         views,
+        points,
         further_points,
         own_clouds,
         no_times: without_times(),
@@ -260,20 +270,23 @@ fn merge_into(
     let folder = destination.open()?;
     let mut clouds = Clouds::new(&folder, &flow.survey, false, 0);
     let mut seen = Seen::new(flow.tally(&flow.order, Before::default()));
+    let bytes = Kept::bytes(&flow.survey, flow.camera(), flow.order.views()) + seen.tally.bytes(&flow.survey);
+    let work = Work { what: "merging the parts of a run", kept: bytes, each: BYTES_A_POINT, most: POINTS_AT_ONCE };
+    let points_at_once = Memory::present().at_once(&work)?;
     progress.begin("parts", parts.len());
     for (number, (path, part)) in parts.iter().enumerate() {
         let file = path.join(STATE);
         if (InputDigest { file: STATE.to_owned(), ..InputDigest::of(&file)? }) != part.state {
             return Err(refused(format!("{}: is not what its part wrote: run it anew", file.display())));
         }
-        let bytes = std::fs::read(&file).map_err(|source| Error::Access { path: file.clone(), source })?;
-        let mut tape = Tape::written(bytes);
+        let opened = File::open(&file).map_err(|source| Error::Access { path: file.clone(), source })?;
+        let mut tape = Tape::of(BufReader::new(opened));
         flow.carry(&mut seen, &mut tape);
         kept.carry(&mut tape, &flow.survey);
         if !tape.is_at_end() {
             return Err(refused(format!("{}: does not hold what its part should have kept", file.display())));
         }
-        clouds.add_part(path, part.further_points, part.own_clouds.clone())?;
+        clouds.add_part(path, (part.points, part.further_points, part.own_clouds.clone()), points_at_once)?;
         progress.advance(number + 1);
     }
     flow.conclude(seen)?;

@@ -10,6 +10,10 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::eigen::{eigenvalues3, eigenvector3};
 
+/// Cosine of the largest angle between normals of one surface: two that scatter by 20 degrees each, as through few noisy points, enclose 45
+/// in one of a hundred cases. With 0.5 surfaces across an edge pass for one.
+pub const SAME_SURFACE_COSINE: f64 = 0.7;
+
 /// Largest ratio of the smallest to the middle eigenvalue of the neighbourhood's scatter at which it still counts as a
 /// surface: noise as large as half the neighbourhood's width.
 const LARGEST_FLATNESS_RATIO: f64 = 0.25;

@@ -10,7 +10,7 @@ use crate::preparation::bits::{median_of_bits, positive_bits};
 use crate::preparation::blocks::Points;
 use crate::preparation::grid::Grid;
 use crate::preparation::nodes::{LARGEST_DEPTH_M, LEAST_DEPTH_M, NodeRow};
-use crate::preparation::planes::{FREEDOM, MOMENT, PlaneRow};
+use crate::preparation::planes::{FREEDOM, MOMENT, PlaneRow, ROUNDING};
 use crate::preparation::projection::Projection;
 use point_cloud::Cloud;
 
@@ -21,8 +21,6 @@ const LEAST_INCIDENCE: f32 = 0.12;
 /// Typical tilt of planes by noise about either axis, radian, beyond which larger nodes are taken: there half of the right
 /// pairs enclose more than 45 degrees, and are refused.
 const LARGEST_TILT: f32 = 0.5;
-/// Deviation of inverse depth that is rounding, relative.
-const ROUNDING: f32 = 1e-6;
 /// Nodes from which typical values are taken.
 const SAMPLE: usize = 1024;
 

@@ -16,16 +16,15 @@ const BLOCK: usize = 16;
 pub(crate) const HALF: usize = 1;
 /// Nodes of the window, those of them beyond the three that any plane goes through, and their scatter along an axis.
 const NODES: f32 = ((2 * HALF + 1) * (2 * HALF + 1)) as f32;
-const PARAMETERS: f32 = 3.0;
-pub(crate) const FREEDOM: f32 = NODES - PARAMETERS;
+pub(crate) const FREEDOM: f32 = NODES - 3.0;
 pub(crate) const MOMENT: f32 = NODES * (HALF * (HALF + 1)) as f32 / 3.0;
 
 /// How much more variance the plane may have in the middle of its window than that of a whole one. One-sided windows,
 /// at the rim of what was seen, are told by it: there the surface ends, and so do its errors.
 const LARGEST_VARIANCE: f32 = 2.0;
 
-/// Share of the squares in a window that rounding of the places of its pixels leaves.
-const ROUNDING: f32 = 1e-6;
+/// What rounding leaves: of inverse depth, relative, and of the squares in a window by the places of its pixels.
+pub(crate) const ROUNDING: f32 = 1e-6;
 
 /// One row of planes.
 pub(crate) struct PlaneRow<'a> {
@@ -229,7 +228,7 @@ impl Window {
         let (xx, xy, yy) = (xx - x * mean[0], xy - x * mean[1], yy - y * mean[1]);
         let determinant = xx * yy - xy * xy;
         let inverse = [yy / determinant, -xy / determinant, xx / determinant];
-        let mut window = Self { count, freedom: nodes - PARAMETERS, mean, inverse };
+        let mut window = Self { count, freedom: nodes - 3.0, mean, inverse };
         let variance = NODES * (1.0 / count + window.product(mean, mean));
         // NaN fails.
         window.freedom = if variance <= LARGEST_VARIANCE { window.freedom } else { f32::NAN };

@@ -65,8 +65,7 @@ fn tum(list: &Path) -> Result<Kind> {
     Ok(Kind { depth, published: [525.0, 525.0, 319.5, 239.5], entries })
 }
 
-/// `frame-000000.depth.png` and so on, in millimetre. The number in the name stands for the time, as for the poses of
-/// such folders.
+/// `frame-000000.depth.png` and so on, in millimetre. The number in the name stands for the time, as for the poses of such folders.
 fn seven_scenes(folder: &Path) -> Result<Option<Kind>> {
     let mut frames: Vec<(u64, PathBuf)> = Vec::new();
     for found in std::fs::read_dir(folder).map_err(Error::io(folder, "list the folder"))? {

@@ -10,8 +10,7 @@ pub struct ObservedPlane {
     pub plane: String,
     /// The station whose frames show it.
     pub station: String,
-    /// Normal `n` in world axes, of any length but zero, and `d` in metres for that normal; `None` where the plane is
-    /// not known.
+    /// Normal `n` in world axes, of any length but zero, and `d` in metres for that normal; `None` where the plane is not known.
     pub known: Option<([f64; 3], f64)>,
 }
 

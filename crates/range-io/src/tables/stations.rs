@@ -60,8 +60,7 @@ pub fn read_placed_stations(path: impl AsRef<Path>) -> Result<PlacedRows<Station
     })
 }
 
-/// Writes `stations.csv`, angles in degrees; the columns of standard deviations, and that of doubts, where any station has
-/// some.
+/// Writes `stations.csv`, angles in degrees; the columns of standard deviations, and that of doubts, where any station has some.
 pub fn write_stations(path: impl AsRef<Path>, stations: &[Station]) -> Result<()> {
     let with_sigma = stations.iter().any(|s| s.sigma_position_m.is_some() || s.sigma_attitude_rad.is_some());
     let sigmas: &[&str] = if with_sigma { &COLUMNS.optional[..6] } else { &[] };

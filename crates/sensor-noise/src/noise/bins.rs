@@ -39,8 +39,10 @@ impl Classes {
     /// Without the classes whose usual variance is larger.
     pub(super) fn below(mut self, estimator: VarianceEstimator, largest: f64) -> Self {
         if largest.is_finite() {
-            let small = |class: &&[Repeats]| usual_variance(class, estimator) <= largest;
-            self.sorted = self.sorted.chunks(self.length).filter(small).flatten().copied().collect();
+            let small = |class: &[Repeats]| usual_variance(class, estimator) <= largest;
+            let is_small: Vec<bool> = self.sorted.chunks(self.length).map(small).collect();
+            let mut places = 0..self.sorted.len();
+            self.sorted.retain(|_| places.next().is_some_and(|place| is_small[place / self.length]));
         }
         self
     }

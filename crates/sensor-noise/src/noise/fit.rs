@@ -4,7 +4,7 @@ use adjust::{Adjustment, Covariance, LinearObservation, ParameterBlock, Scale, S
 use statistics::Distribution;
 
 use super::bins::{Classes, VarianceBin};
-use super::repeats::Repeats;
+use super::repeats::{AllRepeats, Repeats};
 use super::{NoiseFitOptions, Steadiness};
 use crate::{Error, Result};
 
@@ -104,17 +104,11 @@ const MAX_ROUNDS: usize = 50;
 
 /// Fits the line to repeats of all stations; the frames must not drift faster than the options allow.
 pub(super) fn fit_variance(
-    stations: Vec<(Steadiness, Vec<Repeats>)>,
+    AllRepeats { values: repeats, steadiness, .. }: AllRepeats,
     rules: &LineRules,
     options: &NoiseFitOptions,
 ) -> Result<VarianceFit> {
-    let (mut steadiness, mut repeats) = (Vec::new(), Vec::new());
-    for (station, own) in stations {
-        station.require_slow(options)?;
-        steadiness.push(station);
-        let earlier = repeats.iter().map(|one: &Repeats| one.pixel + 1).max().unwrap_or(0);
-        repeats.extend(own.into_iter().map(|one| Repeats { pixel: earlier + one.pixel, ..one }));
-    }
+    steadiness.iter().try_for_each(|station| station.require_slow(options))?;
     let drifts = steadiness.iter().any(|station| station.drifts);
     let estimator = if drifts { VarianceEstimator::SuccessiveDifferences } else { VarianceEstimator::AboutMean };
     let (classes, mut line) = normal_values(repeats, estimator, rules, options)?;

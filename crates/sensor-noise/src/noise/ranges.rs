@@ -6,9 +6,9 @@ use rayon::prelude::*;
 
 use super::fit::{LineRules, VarianceFit, fit_variance};
 use super::neighbours::shared_noise;
-use super::repeats::{Repeats, Running, Thinning};
+use super::repeats::{AllRepeats, Repeats, Running, Thinning};
 use super::steadiness::{Alike, VALUES_PER_TASK};
-use super::{Frames, NoiseFitOptions, RepeatedRanges, Steadiness, steadiness};
+use super::{Frames, NoiseFitOptions, RepeatedRanges, steadiness};
 use crate::{Error, Result};
 
 /// Noise of ranges and how well it is known.
@@ -109,10 +109,10 @@ fn fit_as<S: Frames<RangeFrame>>(
     scale: AmplitudeScale,
     options: &NoiseFitOptions,
 ) -> Result<Result<RangeNoiseEstimate>, S::Error> {
-    let repeats = stations.iter().zip(observed).map(|(station, own)| {
-        let repeats = own.repeats(scale);
-        (Steadiness::new(&station.station, station.frames.count(), &repeats), repeats)
-    });
+    let mut repeats = AllRepeats::default();
+    for (station, own) in stations.iter().zip(observed) {
+        repeats.add(&station.station, station.frames.count(), own.repeats(scale));
+    }
     let known = stations.iter().filter_map(|station| station.interval_m).fold(f64::INFINITY, f64::min);
     // An interval that nobody states holds at least the ranges that were seen.
     let largest = || observed.iter().map(|own| own.largest_range_m).fold(0.0, f64::max);
@@ -120,7 +120,7 @@ fn fit_as<S: Frames<RangeFrame>>(
     let largest_variance = (NORMAL_SHARE * interval).powi(2);
     let every = observed.iter().map(|own| own.every).max().unwrap_or(1);
     let rules = LineRules { least: [0.0; 2], sloped: true, parts: PARTS, largest_variance, every };
-    let mut fit = match fit_variance(repeats.collect(), &rules, options) {
+    let mut fit = match fit_variance(repeats, &rules, options) {
         Ok(fit) => fit,
         Err(error) => return Ok(Err(error)),
     };
@@ -211,10 +211,39 @@ impl Value {
     }
 }
 
+/// What is kept of a pixel that is usable in every frame.
+struct Kept {
+    index: usize,
+    first_m: f64,
+    /// Of its ranges; in the place of the regressor their mean.
+    range: Repeats,
+    /// Mean and variance.
+    amplitude: [f64; 2],
+}
+
+impl Kept {
+    fn new(value: &Value) -> Option<Self> {
+        let OverFrames { range, amplitude } = value.over_frames?;
+        let range = Repeats { pixel: value.pixel, ..range.repeats(range.mean)? };
+        let amplitude = [amplitude.mean, amplitude.repeats(0.0)?.variance];
+        Some(Self { index: value.index, first_m: value.first_m, range, amplitude })
+    }
+
+    /// By what its amplitude is; `None` where its frames do not tell that.
+    fn repeats(&self, scale: AmplitudeScale) -> Option<Repeats> {
+        let [amplitude, variance] = self.amplitude;
+        let regressor = scale.received(amplitude, self.range.regressor).powi(-2);
+        // d(a⁻²) = −2 a⁻³ da
+        let regressor_variance = (2.0 * regressor / amplitude).powi(2) * variance / self.range.count as f64;
+        let is_known = regressor_variance < (MOST_UNCERTAIN * regressor).powi(2);
+        is_known.then_some(Repeats { regressor, regressor_variance, ..self.range })
+    }
+}
+
 /// Pixels of a station that are usable in every frame.
 #[derive(Default)]
 struct Observed {
-    values: Vec<Value>,
+    values: Vec<Kept>,
     /// Of so many pixels one is taken.
     every: usize,
     largest_range_m: f64,
@@ -228,39 +257,29 @@ impl Observed {
         station: &RepeatedRanges<S>,
         thinning: impl Fn(usize) -> Thinning,
     ) -> Result<Self, S::Error> {
-        let mut all = Self::default();
+        let (mut all, mut own) = (Self::default(), Vec::new());
         let interval_m = station.interval_m;
         station.each(&mut |frame| {
-            if all.values.is_empty() {
+            if own.is_empty() {
                 let thinning = thinning(frame.range.as_slice().len());
-                (all.every, all.values) = (thinning.stride, Value::all(frame, thinning));
+                (all.every, own) = (thinning.stride, Value::all(frame, thinning));
             }
             let has_amplitudes = has_amplitudes(frame);
             (all.frames, all.with_amplitudes) = (all.frames + 1, all.with_amplitudes + usize::from(has_amplitudes));
             let known = frame.range.as_slice().iter().filter(|range| range.is_finite());
             all.largest_range_m = all.largest_range_m.max(f64::from(known.fold(0.0_f32, |a, b| a.max(*b))));
-            let values = all.values.par_iter_mut().with_min_len(VALUES_PER_TASK);
+            let values = own.par_iter_mut().with_min_len(VALUES_PER_TASK);
             values.for_each(|value| value.add(frame, has_amplitudes, interval_m));
             Ok(())
         })?;
-        all.values.retain(|value| value.over_frames.is_some());
+        own.retain(|value| value.over_frames.is_some());
+        all.values.reserve_exact(own.len());
+        all.values.extend(own.iter().filter_map(Kept::new));
         Ok(all)
     }
 
-    fn repeats(&self, scale: AmplitudeScale) -> Vec<Repeats> {
-        let collect = |value: &Value| {
-            let OverFrames { range, amplitude } = value.over_frames?;
-            let regressor = scale.received(amplitude.mean, range.mean).powi(-2);
-            let mut repeats = range.repeats(regressor)?;
-            repeats.pixel = value.pixel;
-            let amplitudes = amplitude.repeats(0.0)?;
-            // d(a⁻²) = −2 a⁻³ da
-            repeats.regressor_variance =
-                (2.0 * regressor / amplitude.mean).powi(2) * amplitudes.variance / amplitudes.count as f64;
-            let is_known = repeats.regressor_variance < (MOST_UNCERTAIN * regressor).powi(2);
-            is_known.then_some(repeats)
-        };
-        self.values.iter().filter_map(collect).collect()
+    fn repeats(&self, scale: AmplitudeScale) -> impl Iterator<Item = Repeats> {
+        self.values.iter().filter_map(move |value| value.repeats(scale))
     }
 
     /// Scatter of each frame over what noise explains, which gives a pixel of this amplitude and range a variance.
@@ -270,9 +289,9 @@ impl Observed {
         variance: impl Fn(f64, f64) -> Option<f64>,
     ) -> Result<Vec<f64>, S::Error> {
         let frames = station.frames.count();
-        let expected = |value: &Value| {
-            let OverFrames { range, amplitude } = value.over_frames?;
-            Some((range, variance(amplitude.mean, range.mean)?))
+        let expected = |value: &Kept| {
+            let (range_m, own) = (value.range.regressor, value.range.variance);
+            Some([range_m, own, variance(value.amplitude[0], range_m)?])
         };
         let alike = Alike::new(frames, self.values.iter().map(expected));
         let (mut factors, interval_m) = (Vec::with_capacity(frames), station.interval_m);

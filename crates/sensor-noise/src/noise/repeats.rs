@@ -1,5 +1,7 @@
 //! What repeated values of one quantity say of their variance.
 
+use super::Steadiness;
+
 /// Repeated values of one quantity.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Repeats {
@@ -47,8 +49,30 @@ impl Running {
     }
 }
 
-/// Values of all stations together that are taken, about. Those of a pixel take 200 bytes; a class of noise holds 60,000
-/// of so many, which tell its variance to half a percent from two frames already. A survey of fewer values, 40 stations
+/// The repeats of all stations, one after the other.
+#[derive(Default)]
+pub(super) struct AllRepeats {
+    pub(super) values: Vec<Repeats>,
+    pub(super) steadiness: Vec<Steadiness>,
+    /// Pixels of the stations so far.
+    pixels: usize,
+}
+
+impl AllRepeats {
+    /// Adds those of a station of so many frames; its pixels are numbered behind those of the others.
+    pub(super) fn add(&mut self, station: &str, frames: usize, own: impl Iterator<Item = Repeats>) {
+        let (first, earlier) = (self.values.len(), self.pixels);
+        self.values.extend(own);
+        let own = &mut self.values[first..];
+        self.steadiness.push(Steadiness::new(station, frames, own));
+        for one in own {
+            one.pixel += earlier;
+            self.pixels = self.pixels.max(one.pixel + 1);
+        }
+    }
+}
+
+/// Values of all stations together that are taken, about. Each takes 100 to 170 bytes; a class of noise holds 60,000 of so many, which tell its variance to half a percent from two frames already. A survey of fewer values, 40 stations
 /// of 176 x 144 pixels with four samples each, is taken whole.
 const MOST_VALUES: usize = 1 << 22;
 

@@ -5,9 +5,9 @@ use range_image::{RawFrame, Samples};
 use rayon::prelude::*;
 
 use super::fit::{LineRules, VarianceFit, fit_variance};
-use super::repeats::{Repeats, Running, Thinning};
+use super::repeats::{AllRepeats, Repeats, Running, Thinning};
 use super::steadiness::{self, Alike, VALUES_PER_TASK};
-use super::{Frames, NoiseFitOptions, RepeatedSamples, SampleUnits, Steadiness};
+use super::{Frames, NoiseFitOptions, RepeatedSamples, SampleUnits};
 use crate::{Error, Result};
 
 /// Noise of samples and how well it is known.
@@ -51,11 +51,10 @@ pub fn estimate_sample_noise<S: Frames<RawFrame>>(
         let expected = "a positive scale";
         return Err(Error::OutOfDomain { name: "raw_scale", value: units.raw_scale, expected }.into());
     }
-    let (mut observed, mut repeats) = (Vec::with_capacity(stations.len()), Vec::with_capacity(stations.len()));
+    let (mut observed, mut repeats) = (Vec::with_capacity(stations.len()), AllRepeats::default());
     for (number, station) in stations.iter().enumerate() {
-        let one = Observed::new(station, |values| Thinning::new(number, stations.len(), values), units)?;
-        let own = one.repeats();
-        repeats.push((Steadiness::new(&station.station, station.frames.count(), &own), own));
+        let (one, own) = Observed::new(station, |values| Thinning::new(number, stations.len(), values), units)?;
+        repeats.add(&station.station, station.frames.count(), own.iter().filter_map(Value::repeats));
         observed.push(one);
     }
     let every = observed.iter().map(|station| station.every).max().unwrap_or(1);
@@ -96,10 +95,21 @@ struct Value {
     over_frames: Option<Running>,
 }
 
+impl Value {
+    fn repeats(&self) -> Option<Repeats> {
+        let running = self.over_frames?;
+        let mut repeats = running.repeats(running.mean)?;
+        repeats.pixel = self.pixel;
+        repeats.regressor_variance = repeats.variance / repeats.count as f64;
+        Some(repeats)
+    }
+}
+
 /// Samples of a station that are usable in every frame.
 #[derive(Default)]
 struct Observed {
-    values: Vec<Value>,
+    /// Position of each, its mean and its variance.
+    values: Vec<(usize, f64, f64)>,
     /// Of so many pixels one is taken.
     every: usize,
     /// Whether samples are whole numbers, and whether they are differences of two taps.
@@ -112,16 +122,16 @@ impl Observed {
         station: &RepeatedSamples<S>,
         thinning: impl Fn(usize) -> Thinning,
         units: &SampleUnits,
-    ) -> Result<Self, S::Error> {
-        let mut all = Self::default();
+    ) -> Result<(Self, Vec<Value>), S::Error> {
+        let (mut all, mut own) = (Self::default(), Vec::new());
         station.each(&mut |frame| {
-            if all.values.is_empty() {
+            if own.is_empty() {
                 let thinning = thinning(frame.samples().len());
-                (all.every, all.values) = (thinning.stride, values(frame, thinning));
+                (all.every, own) = (thinning.stride, values(frame, thinning));
             }
             all.whole |= !matches!(frame.samples(), Samples::F32(_));
             all.without_light |= matches!(frame.samples(), Samples::I16(_));
-            all.values.par_iter_mut().with_min_len(VALUES_PER_TASK).for_each(|value| {
+            own.par_iter_mut().with_min_len(VALUES_PER_TASK).for_each(|value| {
                 match (&mut value.over_frames, usable(frame, units, value.index)) {
                     (Some(running), Some(sample)) => running.add(sample),
                     (over_frames, _) => *over_frames = None,
@@ -129,19 +139,13 @@ impl Observed {
             });
             Ok(())
         })?;
-        all.values.retain(|value| value.over_frames.is_some());
-        Ok(all)
-    }
-
-    fn repeats(&self) -> Vec<Repeats> {
-        let repeats = |value: &Value| {
-            let running = value.over_frames?;
-            let mut repeats = running.repeats(running.mean)?;
-            repeats.pixel = value.pixel;
-            repeats.regressor_variance = repeats.variance / repeats.count as f64;
-            Some(repeats)
-        };
-        self.values.iter().filter_map(repeats).collect()
+        own.retain(|value| value.over_frames.is_some());
+        all.values.reserve_exact(own.len());
+        all.values.extend(own.iter().filter_map(|value| {
+            let repeats = value.repeats()?;
+            Some((value.index, repeats.regressor, repeats.variance))
+        }));
+        Ok((all, own))
     }
 
     /// Scatter of each frame over what noise with this line explains.
@@ -152,14 +156,11 @@ impl Observed {
         line: [f64; 2],
     ) -> Result<Vec<f64>, S::Error> {
         let frames = station.frames.count();
-        let expected = |value: &Value| {
-            let running = value.over_frames?;
-            Some((running, line[0] * running.mean + line[1]))
-        };
+        let expected = |(_, mean, variance): &(usize, f64, f64)| Some([*mean, *variance, line[0] * mean + line[1]]);
         let alike = Alike::new(frames, self.values.iter().map(expected));
         let mut factors = Vec::with_capacity(frames);
         station.each(&mut |frame| {
-            factors.push(alike.factor(|place| usable(frame, units, self.values[place].index).unwrap_or(f64::NAN)));
+            factors.push(alike.factor(|place| usable(frame, units, self.values[place].0).unwrap_or(f64::NAN)));
             Ok(())
         })?;
         Ok(factors)

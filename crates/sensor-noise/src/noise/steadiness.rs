@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::NoiseFitOptions;
 use super::bins::{has_moved, moved_limit};
-use super::repeats::{Repeats, Running};
+use super::repeats::Repeats;
 use crate::{Error, Result};
 
 /// What the frames of a station say of drift and of unlike frames.
@@ -91,13 +91,12 @@ pub(super) struct Alike {
 }
 
 impl Alike {
-    /// Of the sums of each value over so many frames with the variance that noise gives it.
-    pub(super) fn new(frames: usize, values: impl Iterator<Item = Option<(Running, f64)>>) -> Self {
+    /// Of each value its mean and its variance over so many frames, with the variance that noise gives it.
+    pub(super) fn new(frames: usize, values: impl Iterator<Item = Option<[f64; 3]>>) -> Self {
         let limit = moved_limit(frames as f64 - 1.0);
-        let is_still = |(place, value): (usize, Option<(Running, f64)>)| {
-            let (running, expected) = value?;
-            let moved = running.repeats(0.0).is_none_or(|own| has_moved(own.variance, expected, limit));
-            (!moved && expected > 0.0).then_some((place, running.mean, expected))
+        let is_still = |(place, value): (usize, Option<[f64; 3]>)| {
+            let [mean, variance, expected] = value?;
+            (!has_moved(variance, expected, limit) && expected > 0.0).then_some((place, mean, expected))
         };
         let still: Vec<(usize, f64, f64)> = values.enumerate().filter_map(is_still).collect();
         let expected = still.len() as f64 * (1.0 - 1.0 / frames as f64);

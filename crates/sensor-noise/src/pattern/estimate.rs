@@ -77,7 +77,7 @@ pub fn estimate_fixed_pattern(
 ///
 /// Then each station in turn is held out and freed of the pattern of the others: only if its residuals fall, the pattern
 /// is worth applying. Of more than twenty walls neighbours are held out together, in twenty parts. What is kept are sums of
-/// each pixel of each wall; of more walls than 62 million pixels (200 of 640 x 480) neighbours count as one.
+/// each pixel of each wall; of more than 256 walls, or than 62 million pixels (200 walls of 640 x 480), neighbours count as one.
 pub struct PatternEstimator {
     walls: Walls,
     camera: Camera,

@@ -13,6 +13,10 @@ use crate::{Error, Result};
 /// better than means of neighbouring ones do.
 const MOST_PIXELS: usize = 62_000_000;
 
+/// Walls at most, however small: an offset is then known to a sixteenth of what one wall tells, and a gross error is one of 256 values.
+/// Twice as many take twice the memory and the time, which is that of twenty robust means of each pixel.
+const MOST_WALLS: usize = 256;
+
 /// Residuals of what counts as one wall: of a station, or of a frame where there is one station; of several neighbouring ones
 /// where there are more than can be kept.
 struct Wall {
@@ -61,7 +65,7 @@ impl Walls {
         let station_of: Vec<usize> = stations.iter().map(number).collect();
         let of_stations = numbers.len() > 1;
         let named = if of_stations { numbers.len() } else { stations.len() };
-        let count = named.min((MOST_PIXELS / pixels.max(1)).max(2));
+        let count = named.min((MOST_PIXELS / pixels.max(1)).clamp(2, MOST_WALLS));
         let place = |(frame, station): (usize, &usize)| if of_stations { *station } else { frame } * count / named;
         let wall_of: Vec<usize> = station_of.iter().enumerate().map(place).collect();
         let all = (0..count).map(|_| Wall::new(pixels)).collect();

@@ -120,6 +120,9 @@ fn sigma(document: &mut Document, summary: &NoiseSummary) {
     document.long_table(["amplitude", "values", "variance", "limits"].map(Column::number), rows.collect());
 }
 
+/// Frames of a station whose scatter is shown: of more nobody reads on.
+const MOST_FACTORS: usize = 1000;
+
 fn stations(document: &mut Document, summary: &NoiseSummary) {
     document.section("The stations");
     document.explanation(
@@ -128,7 +131,10 @@ fn stations(document: &mut Document, summary: &NoiseSummary) {
     );
     let number = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |value| format!("{value:.4}"));
     let rows = summary.stations.iter().map(|station| {
-        let factors: Vec<String> = station.frame_factors.iter().map(|factor| format!("{factor:.3}")).collect();
+        let shown = station.frame_factors.iter().take(MOST_FACTORS).map(|factor| format!("{factor:.3}"));
+        let rest = station.frame_factors.len().saturating_sub(MOST_FACTORS);
+        let rest = (rest > 0).then(|| format!("and of {rest} further frames in summary.json"));
+        let factors: Vec<String> = shown.chain(rest).collect();
         vec![
             station.station.clone(),
             station.frames.to_string(),

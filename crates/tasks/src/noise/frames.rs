@@ -44,9 +44,9 @@ pub(crate) struct Stations<'a> {
     read_at_once: usize,
 }
 
-/// What is kept of each value whose scatter is estimated (sums, variances, their order), byte, and of how many values at most: more
+/// What is kept of each value whose scatter is estimated (means, variances, their order), byte, and of how many values at most: more
 /// are thinned.
-const BYTES_A_VALUE: u64 = 210;
+const BYTES_A_VALUE: u64 = 170;
 const MOST_VALUES: u64 = 1 << 22;
 
 impl<'a> Stations<'a> {

@@ -1,12 +1,12 @@
 //! Figures of a tracked sequence.
 
+use nalgebra::Isometry3;
 use pipeline::Result;
 use report::{
     Axes, CATEGORIES, CHART_SIZE, Canvas, Direction, Figure, Series, StationCloud, cloud_figure, curves, span, to_scale,
 };
-use tracking::TrackedPose;
 
-use crate::track::outcome::{Tracked, TrackedFrame};
+use crate::track::outcome::{FramePose, Tracked, TrackedFrame};
 
 /// Points of the map in the pictures; more would not show.
 const MOST_DRAWN: usize = 400_000;
@@ -42,12 +42,14 @@ fn path_figures(tracked: &Tracked) -> Vec<Figure> {
 
 fn path_figure(tracked: &Tracked, title: &str, direction: Direction) -> Figure {
     const NAMES: [&str; 3] = ["x (m)", "y (m)", "z (m)"];
-    let place = |pose: &TrackedPose| {
-        let at = pose.world_from_camera.translation.vector;
-        if pose.state.has_pose() { (at[direction.right], at[direction.up]) } else { (f64::NAN, f64::NAN) }
+    let places = |of: fn(&FramePose) -> Isometry3<f64>| -> Vec<(f64, f64)> {
+        let place = |pose: &FramePose| {
+            let at = of(pose).translation.vector;
+            if pose.is_known { (at[direction.right], at[direction.up]) } else { (f64::NAN, f64::NAN) }
+        };
+        tracked.poses.iter().map(place).collect()
     };
-    let online: Vec<(f64, f64)> = tracked.poses.iter().map(place).collect();
-    let adjusted: Vec<(f64, f64)> = tracked.adjusted.iter().map(place).collect();
+    let (online, adjusted) = (places(|pose| pose.tracked), places(|pose| pose.adjusted));
     let both = || online.iter().chain(&adjusted);
     let (x, y) = to_scale(span(both().map(|point| point.0)), span(both().map(|point| point.1)));
     let axes = Axes { title, x: NAMES[direction.right], y: NAMES[direction.up] };
@@ -124,11 +126,11 @@ fn state_figure(frames: &[TrackedFrame]) -> Figure {
 
 fn map_figures(tracked: &Tracked) -> Result<Vec<Figure>> {
     let every = tracked.map.points.len().div_ceil(MOST_DRAWN).max(1);
-    let start = tracked.adjusted.iter().find(|pose| pose.state.has_pose());
+    let start = tracked.poses.iter().find(|pose| pose.is_known);
     let map = [StationCloud {
         name: "planes of all keyframes",
         points: tracked.map.points.iter().step_by(every).map(|point| point.coords.into()).collect(),
-        position: start.map_or([f64::NAN; 3], |pose| pose.world_from_camera.translation.vector.into()),
+        position: start.map_or([f64::NAN; 3], |pose| pose.adjusted.translation.vector.into()),
     }];
     let mut figures = Vec::new();
     for (name, direction) in

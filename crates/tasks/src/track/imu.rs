@@ -5,30 +5,19 @@ use std::path::Path;
 use commands::{INERTIAL_DATA, InertialUnit, read_inertial};
 use pipeline::{Error, Result};
 use range_io::survey::Survey;
-use tracking::{ImuIntegrator, ImuOptions, InertialSample, MotionPrior, TrackedPose};
+use tracking::{ImuIntegrator, MotionPrior, TrackedPose};
 
 /// Motions between frames from an inertial unit.
 pub(crate) struct Inertial {
-    samples: Vec<InertialSample>,
-    options: ImuOptions,
+    unit: InertialUnit,
     integrator: Option<ImuIntegrator>,
 }
 
 impl Inertial {
     /// Reads what the survey names; `None` where it names nothing.
     pub(crate) fn read(survey: &Survey, root: &Path) -> Result<Option<Self>> {
-        let Some(InertialUnit { samples, camera_from_body, noise }) = read_inertial(survey, root)? else {
-            return Ok(None);
-        };
-        let options = ImuOptions {
-            camera_from_body,
-            gyro_noise: noise.gyro_density,
-            accel_noise: noise.accel_density,
-            gyro_walk: noise.gyro_walk,
-            accel_walk: noise.accel_walk,
-            ..ImuOptions::default()
-        };
-        Ok(Some(Self { samples, options, integrator: None }))
+        let unit = read_inertial(survey, root)?;
+        Ok(unit.map(|unit| Self { unit, integrator: None }))
     }
 
     /// The camera's motion since the frame before; `None` at the first frame, up to which the unit must rest.
@@ -40,15 +29,16 @@ impl Inertial {
             );
             Error::registration(&what, &error)
         };
+        let InertialUnit { samples, camera_from_body, noise } = &self.unit;
         let Some(integrator) = &mut self.integrator else {
-            let resting = self.samples.partition_point(|sample| sample.timestamp_s <= timestamp_s);
-            let mut integrator = ImuIntegrator::from_rest(&self.samples[..resting], &self.options).map_err(refused)?;
-            integrator.motion(&self.samples[resting..], timestamp_s).map_err(refused)?;
+            let resting = samples.partition_point(|sample| sample.timestamp_s <= timestamp_s);
+            let mut integrator =
+                ImuIntegrator::from_rest(&samples[..resting], camera_from_body, noise).map_err(refused)?;
+            integrator.motion(samples, timestamp_s).map_err(refused)?;
             self.integrator = Some(integrator);
             return Ok(None);
         };
-        let from = self.samples.partition_point(|sample| sample.timestamp_s <= integrator.timestamp_s());
-        integrator.motion(&self.samples[from..], timestamp_s).map(Some).map_err(refused)
+        integrator.motion(samples, timestamp_s).map(Some).map_err(refused)
     }
 
     /// What the frames measured of the motion corrects the unit.

@@ -1,5 +1,6 @@
 //! What tracking has made of each frame and of all of them.
 
+use nalgebra::Isometry3;
 use pipeline::survey::StationPose;
 use point_cloud::Cloud;
 use serde::Serialize;
@@ -81,16 +82,45 @@ pub struct TrackTruth {
 
 /// All that is written and pictured.
 pub(crate) struct Tracked {
-    /// One a frame, in the order of time, as they were when they were tracked.
-    pub(crate) poses: Vec<TrackedPose>,
-    /// The same after all loops were closed.
-    pub(crate) adjusted: Vec<TrackedPose>,
+    /// One a frame, in the order of time.
+    pub(crate) poses: Vec<FramePose>,
     /// The map in the world's frame.
     pub(crate) map: Cloud,
     /// Index of the world's axis that points up.
     pub(crate) vertical_axis: usize,
     /// Every figure, with the frames in the same order.
     pub(crate) summary: TrackSummary,
+}
+
+/// What is kept of a frame's pose: of a path of 100,000 frames the poses with all their covariances would be half a gigabyte.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct FramePose {
+    /// Time, second.
+    pub(crate) timestamp_s: f64,
+    /// Whether it is a pose at all.
+    pub(crate) is_known: bool,
+    /// As it was tracked.
+    pub(crate) tracked: Isometry3<f64>,
+    /// After all loops were closed.
+    pub(crate) adjusted: Isometry3<f64>,
+    /// Standard deviations of the position along the world's axes, metre, and of omega, phi, kappa, radian.
+    pub(crate) sigmas: Option<([f64; 3], [f64; 3])>,
+    /// Number of the keyframe that it hangs on, and its pose there; `None` before the first keyframe.
+    pub(crate) from_keyframe: Option<(usize, Isometry3<f64>)>,
+}
+
+impl FramePose {
+    /// Of a pose just tracked, which hangs on a keyframe if there is one.
+    pub(crate) fn new(pose: &TrackedPose, has_keyframes: bool) -> Self {
+        Self {
+            timestamp_s: pose.timestamp_s,
+            is_known: pose.state.has_pose(),
+            tracked: pose.world_from_camera,
+            adjusted: pose.world_from_camera,
+            sigmas: station_pose(pose).and_then(|known| known.sigmas()),
+            from_keyframe: has_keyframes.then_some((pose.keyframe, pose.keyframe_from_camera)),
+        }
+    }
 }
 
 /// The pose with its covariance where there is one.

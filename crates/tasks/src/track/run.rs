@@ -5,6 +5,7 @@ use std::time::Instant;
 
 use atomic_output::Destination;
 use commands::{Doubt, Inputs, Progress, produce, root_of};
+use nalgebra::Isometry3;
 use pipeline::survey::plausibility;
 use pipeline::{Error, Result};
 use point_cloud::Cloud;
@@ -14,7 +15,7 @@ use tracking::{TrackedPose, Tracker, TrackerOptions, TrackingState};
 use crate::register::input::is_survey;
 use crate::track::frames::FrameSource;
 use crate::track::imu::Inertial;
-use crate::track::outcome::{Tracked, TrackedFrame, reason, state, station_pose};
+use crate::track::outcome::{FramePose, Tracked, TrackedFrame, reason, state, station_pose};
 use crate::track::start::Start;
 use crate::track::summary::{TrackSummary, summarise};
 use crate::track::{TrackRequest, results};
@@ -72,7 +73,7 @@ struct Run {
     tracker: Option<Tracker>,
     datum: String,
     has_pose: bool,
-    poses: Vec<TrackedPose>,
+    poses: Vec<FramePose>,
     frames: Vec<TrackedFrame>,
     names: Vec<String>,
 }
@@ -128,29 +129,33 @@ impl Run {
         let ms = |from: Instant| 1e3 * commands::made::seconds_since(from);
         let became_keyframe = after > before;
         let times = [ms(tracking), ms(clock)];
-        self.frames.push(row(&self.names[index], index, &pose, became_keyframe, times));
-        self.poses.push(pose);
+        let name = std::mem::take(&mut self.names[index]);
+        self.frames.push(row(name, index, &pose, became_keyframe, times));
+        self.poses.push(FramePose::new(&pose, self.tracker.is_some()));
+        self.tracker.iter_mut().for_each(Tracker::forget_poses);
         Ok(())
     }
 
-    fn finish(self, prior: &str) -> Result<Tracked> {
+    fn finish(mut self, prior: &str) -> Result<Tracked> {
         let Some(tracker) = self.tracker else {
             let frames = self.frames.len();
             return Err(Error::Register(format!(
                 "none of the {frames} frames shows enough of a surface to start from (too few points with a range)"
             )));
         };
-        let blank = self.poses.len() - tracker.trajectory().len();
-        let mut adjusted = self.poses.clone();
-        adjusted.truncate(blank);
-        adjusted.extend(tracker.adjusted_trajectory());
+        let mut keyframes: BTreeMap<usize, Option<Isometry3<f64>>> = BTreeMap::new();
+        for pose in &mut self.poses {
+            let Some((keyframe, keyframe_from_camera)) = pose.from_keyframe else { continue };
+            let world = *keyframes.entry(keyframe).or_insert_with(|| tracker.world_from_keyframe(keyframe));
+            pose.adjusted = world.map_or(pose.tracked, |world| world * keyframe_from_camera);
+        }
         let truths: Vec<_> = self
             .frames
             .iter()
             .map(|frame| self.source.true_pose(&self.source.survey().frames[frame.index].station))
             .collect();
         let mut doubts = self.source.doubts()?;
-        let mut summary = summarise(self.frames, [&self.poses, &adjusted], &truths, &tracker);
+        let mut summary = summarise(self.frames, &self.poses, &truths, &tracker);
         self.source.calibration().clone_into(&mut summary.calibration);
         summary.datum = self.datum;
         prior.clone_into(&mut summary.prior);
@@ -159,7 +164,7 @@ impl Run {
         summary.doubts = doubts;
         // As everywhere: z where poses came with the survey, y in a camera's own frame.
         let vertical_axis = if self.has_pose { 2 } else { 1 };
-        Ok(Tracked { poses: self.poses, adjusted, map: tracker.map(), vertical_axis, summary })
+        Ok(Tracked { poses: self.poses, map: tracker.map(), vertical_axis, summary })
     }
 }
 
@@ -194,11 +199,11 @@ fn names(source: &FrameSource) -> Vec<String> {
     frames.iter().enumerate().map(name).collect()
 }
 
-fn row(name: &str, index: usize, pose: &TrackedPose, became_keyframe: bool, times: [f64; 2]) -> TrackedFrame {
+fn row(name: String, index: usize, pose: &TrackedPose, became_keyframe: bool, times: [f64; 2]) -> TrackedFrame {
     let known = station_pose(pose);
     let attitude = |c: &nalgebra::Matrix6<f64>| (c[(3, 3)] + c[(4, 4)] + c[(5, 5)]).sqrt().to_degrees();
     TrackedFrame {
-        name: name.to_owned(),
+        name,
         index,
         timestamp_s: pose.timestamp_s,
         state: state(pose.state),

@@ -4,9 +4,9 @@ use commands::{Doubt, DoubtKind, Judged, Verdict};
 use nalgebra::Isometry3;
 use serde::Serialize;
 use statistics::quantile;
-use tracking::{TrackedPose, Tracker, TrajectoryAlignment, TrajectoryErrorOptions, absolute_trajectory_error};
+use tracking::{Tracker, TrajectoryAlignment, TrajectoryErrorOptions, absolute_trajectory_error};
 
-use crate::track::outcome::{TrackLoss, TrackTruth, TrackVerdict, TrackedFrame};
+use crate::track::outcome::{FramePose, TrackLoss, TrackTruth, TrackVerdict, TrackedFrame};
 
 /// How far the camera was followed, and how well each pose is known.
 #[derive(Debug, Clone, Default, Serialize)]
@@ -79,7 +79,7 @@ pub struct TrackSummary {
 /// All figures that follow from the poses.
 pub(crate) fn summarise(
     frames: Vec<TrackedFrame>,
-    [online, adjusted]: [&[TrackedPose]; 2],
+    poses: &[FramePose],
     truths: &[Option<Isometry3<f64>>],
     tracker: &Tracker,
 ) -> TrackSummary {
@@ -89,10 +89,9 @@ pub(crate) fn summarise(
     let mut sigmas = figures(|frame| frame.position_sigma_m);
     let mut tracking = figures(|frame| Some(frame.track_ms));
     let mut total = figures(|frame| Some(frame.total_ms));
-    let path = positions(adjusted);
-    let moved = online.iter().zip(adjusted).filter(|(pose, _)| pose.state.has_pose());
-    let shifts =
-        moved.map(|(a, b)| (a.world_from_camera.translation.vector - b.world_from_camera.translation.vector).norm());
+    let known = || poses.iter().filter(|pose| pose.is_known);
+    let path: Vec<nalgebra::Vector3<f64>> = known().map(|pose| pose.adjusted.translation.vector).collect();
+    let shifts = known().map(|pose| (pose.tracked.translation.vector - pose.adjusted.translation.vector).norm());
     let mut summary = TrackSummary {
         method: "track",
         verdict: verdict(frames.len(), lost, &losses),
@@ -104,7 +103,7 @@ pub(crate) fn summarise(
         loops_closed: (tracker.registrations() + 1).saturating_sub(tracker.keyframes()),
         adjusted_by_max_m: shifts.fold(0.0, f64::max),
         map_points: tracker.map().len(),
-        duration_s: online.last().map_or(0.0, |last| last.timestamp_s - online[0].timestamp_s),
+        duration_s: poses.last().map_or(0.0, |last| last.timestamp_s - poses[0].timestamp_s),
         path_length_m: path.windows(2).map(|pair| (pair[1] - pair[0]).norm()).sum(),
         start_to_end_m: path.first().zip(path.last()).map_or(0.0, |(first, last)| (last - first).norm()),
         position_sigma_median_m: quantile(&mut sigmas, 0.5),
@@ -115,18 +114,13 @@ pub(crate) fn summarise(
         track_p95_ms: quantile(&mut tracking, 0.95),
         total_median_ms: quantile(&mut total, 0.5),
         total_p95_ms: quantile(&mut total, 0.95),
-        truth: truth([online, adjusted], truths),
+        truth: truth(poses, truths),
         losses,
         per_frame: frames,
         ..TrackSummary::default()
     };
     summary.doubts = doubts(&summary);
     summary
-}
-
-fn positions(poses: &[TrackedPose]) -> Vec<nalgebra::Vector3<f64>> {
-    let known = poses.iter().filter(|pose| pose.state.has_pose());
-    known.map(|pose| pose.world_from_camera.translation.vector).collect()
 }
 
 /// Runs of frames without a pose.
@@ -155,8 +149,8 @@ fn verdict(frames: usize, lost: usize, losses: &[TrackLoss]) -> TrackVerdict {
 }
 
 /// Errors where every frame that has a pose has a true one of its own.
-fn truth([online, adjusted]: [&[TrackedPose]; 2], truths: &[Option<Isometry3<f64>>]) -> Option<TrackTruth> {
-    let known = || online.iter().zip(truths).filter(|(pose, _)| pose.state.has_pose());
+fn truth(poses: &[FramePose], truths: &[Option<Isometry3<f64>>]) -> Option<TrackTruth> {
+    let known = || poses.iter().zip(truths).filter(|(pose, _)| pose.is_known);
     let truth: Vec<(f64, Isometry3<f64>)> =
         known().map(|(pose, truth)| truth.map(|truth| (pose.timestamp_s, truth))).collect::<Option<_>>()?;
     // Stations that hold still for several frames say nothing of a path.
@@ -166,12 +160,11 @@ fn truth([online, adjusted]: [&[TrackedPose]; 2], truths: &[Option<Isometry3<f64
     // What has drifted since the datum; a path as straight as a corridor has no best rigid motion.
     let options =
         TrajectoryErrorOptions { alignment: TrajectoryAlignment::FirstPose, ..TrajectoryErrorOptions::default() };
-    let errors = |poses: &[TrackedPose]| {
-        let found = poses.iter().filter(|pose| pose.state.has_pose());
-        let estimate: Vec<_> = found.map(|pose| (pose.timestamp_s, pose.world_from_camera)).collect();
+    let errors = |world_from_camera: fn(&FramePose) -> Isometry3<f64>| {
+        let estimate: Vec<_> = known().map(|(pose, _)| (pose.timestamp_s, world_from_camera(pose))).collect();
         absolute_trajectory_error(&estimate, &truth, &options).ok()
     };
-    let (found, closed) = (errors(online)?, errors(adjusted)?);
+    let (found, closed) = (errors(|pose| pose.tracked)?, errors(|pose| pose.adjusted)?);
     Some(TrackTruth {
         position_error_rms_m: found.position_m.rms,
         position_error_max_m: found.position_m.max,

@@ -1,9 +1,7 @@
 //! One point of a map.
 
 use nalgebra::{Point3, Vector3};
-
-/// Cosine of the largest angle between normals of one surface: as for frames that agree.
-const SAME_SURFACE_COSINE: f64 = 0.7;
+use point_cloud::SAME_SURFACE_COSINE;
 
 /// A point of a surface as it was observed, or the weighted mean of several.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -6,13 +6,11 @@ use global_registration::FeatureCloud;
 use point_cloud::Cloud;
 use pose_graph::Graph;
 use pose_graph::Relation;
-use projective_registration::OrganisedFrame;
+use projective_registration::{Agreement, OrganisedFrame};
 use rigid_pose::Uncertain;
 
 /// Fields of the thumbnails.
 pub(crate) const THUMBNAIL: [usize; 2] = [16, 12];
-/// Points by which overlaps are judged.
-pub(crate) const SAMPLE: usize = 2500;
 /// Keyframes whose overlap with a frame is told.
 const CANDIDATES: usize = 4;
 /// Cosine of the largest angle between the axes of two cameras that can see the same from the same side.
@@ -87,7 +85,7 @@ impl Keyframes {
             }
         }
         // Few points tell which ones are worth more.
-        for most in [SAMPLE / 32, SAMPLE / 4] {
+        for most in [Agreement::NODES / 32, Agreement::NODES / 4] {
             for (share, k, pose) in &mut found {
                 *share = overlap(&self.list[*k].frame, current, pose, most);
             }

@@ -5,10 +5,9 @@ use nalgebra::{Isometry3, Matrix6, Vector6};
 use crate::motion_model::motion::diagonal;
 use crate::motion_model::prediction::{Grounds, Last, Prediction};
 use crate::motion_model::velocity::Velocity;
-use crate::stream::keyframes::SAMPLE;
 use crate::stream::tracker::Tracker;
 use crate::tracked::LossReason;
-use pose_graph::Relation;
+use pose_graph::{Relation, is_likely};
 use projective_registration::{Agreement, ByField, Field, FrameAligner, Influence, OrganisedFrame};
 use rigid_pose::Uncertain;
 use rigid_pose::{step_pose, symmetrised};
@@ -17,20 +16,15 @@ use rigid_pose::{step_pose, symmetrised};
 const NEIGHBOURS: usize = 2;
 /// Share of the radius beyond whose standard deviation a motion is weak.
 const WEAK_SHARE: f64 = 1.0 / 300.0;
-/// Square of the Mahalanobis distance (six components) beyond which a pose is not where the camera can have gone.
-const DISBELIEF: f64 = 40.0;
 /// Share of the largest standard deviation of carried poses that is allowed where only the velocity carries them.
 const BY_VELOCITY: f64 = 0.25;
 /// Where a frame leaves motions undetermined, a prior or the velocity carries the pose: until its standard deviation at the
 /// radius of the frame exceeds this, metre: half of the reach within which registrations of a room come back.
 const CARRIED_SIGMA_M: f64 = 0.1;
-/// Smallest fraction of a frame's planes that must agree with the keyframe, and of those that the keyframe can judge: what
-/// frames of different places reach by chance.
-const FEWEST_AGREEING: f64 = 0.25;
+/// Smallest fraction of the planes that the keyframe can judge that must agree: what frames of different places reach by chance.
 const FEWEST_CONSENTING: f64 = 0.6;
-/// What a pose found against expectation must agree by: fraction of the frame, and of what can be judged.
+/// Fraction of the frame that a pose found against expectation must agree by.
 const LEAST_OVERLAP: f64 = 0.5;
-const LEAST_CONSENT: f64 = 0.9;
 /// Planes it must share: three make a corner, and corners look alike.
 const LEAST_PLANES: usize = 4;
 /// Share of the radius (and radian) by which a camera that starts or stops may miss the prediction, as a standard
@@ -70,7 +64,7 @@ impl Measured {
 
     /// Whether the frames contradict each other no more than at right poses.
     pub(crate) fn agrees(&self) -> bool {
-        self.agreement.consent() >= LEAST_CONSENT
+        self.agreement.consent() >= Agreement::LEAST_CONSENT
     }
 
     /// The same with weak motions left open. What holds them are a few nodes, often at edges, and chance: their
@@ -241,7 +235,7 @@ impl Tracker {
         let covariance = known + diagonal([(jump * radius).powi(2), jump * jump]);
         let reachable = Uncertain { covariance, ..prediction.own };
         let relied_on = !ungrounded && prediction.own.sigma_at(radius) <= Self::carried_sigma_m(prediction.grounds);
-        (lost_frames == 0 || relied_on) && own.mahalanobis_squared(&reachable).is_some_and(|m| m <= DISBELIEF)
+        (lost_frames == 0 || relied_on) && own.mahalanobis_squared(&reachable).is_some_and(is_likely)
     }
 
     fn carried_sigma_m(grounds: Grounds) -> f64 {
@@ -254,11 +248,11 @@ impl Tracker {
     pub(crate) fn stands_alone(&self, measured: &Measured) -> bool {
         let keyframe = &self.keyframes.list[measured.keyframe].frame;
         let pose = &measured.aligned;
-        let sound = |a: &Agreement| a.overlap() >= LEAST_OVERLAP && a.consent() >= LEAST_CONSENT;
+        let sound = |a: &Agreement| a.overlap() >= LEAST_OVERLAP && a.consent() >= Agreement::LEAST_CONSENT;
         measured.determined
             && sound(&measured.agreement)
-            && self.current.agreement(keyframe, &pose.inverse(), SAMPLE).consent() >= LEAST_CONSENT
-            && keyframe.shared_planes(&self.current, pose, SAMPLE) >= LEAST_PLANES
+            && self.current.agreement(keyframe, &pose.inverse(), Agreement::NODES).consent() >= Agreement::LEAST_CONSENT
+            && keyframe.shared_planes(&self.current, pose, Agreement::NODES) >= LEAST_PLANES
     }
 }
 
@@ -283,11 +277,11 @@ fn register(
     let aligned = result.target_from_source;
     let by_field = influence.map_or_else(ByField::zeros, |influence| influence.pose);
     let pose = Uncertain { pose: step_pose(&aligned, &(-by_field * field)), covariance: result.covariance };
-    let agreement = target.agreement(source, &aligned, SAMPLE);
+    let agreement = target.agreement(source, &aligned, Agreement::NODES);
     if agreement.consent() < FEWEST_CONSENTING {
         return Err(LossReason::LargeResiduals);
     }
-    if agreement.overlap() < FEWEST_AGREEING {
+    if agreement.overlap() < Agreement::LEAST_OVERLAP {
         return Err(LossReason::TooLittleOverlap);
     }
     if !rigid_pose::is_finite(&pose.pose) || pose.covariance.cholesky().is_none() {

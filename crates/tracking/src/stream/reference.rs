@@ -10,18 +10,14 @@ use projective_registration::{ByField, Influence};
 use rigid_pose::Uncertain;
 use rigid_pose::step_pose;
 
-/// What another keyframe must see more of the frame than the reference to take its place.
-const ADVANTAGE: f64 = 0.05;
-
 impl Tracker {
     /// Another keyframe that sees more of the frame becomes the reference; where there is none, the frame becomes one.
     pub(crate) fn change_reference(&mut self, reference_from_camera: &Relation, influence: Option<&Influence>) {
         let Some(reference) = self.last.as_ref().map(|last| last.keyframe) else { return };
         let (others, pose) = (|k: usize| k != reference, reference_from_camera.pose());
         let candidates = self.keyframes.candidates(&self.current, reference, pose, others, agreeing);
-        let enough = self.options.keyframe_overlap + ADVANTAGE;
         if let Some(&(overlap, k)) = candidates.first()
-            && overlap >= enough
+            && overlap >= self.options.keyframe_overlap
             && let Some(measured) = self.closing(k, reference, reference_from_camera)
         {
             self.refer_to(k, &measured);

@@ -4,11 +4,7 @@ use nalgebra::Isometry3;
 
 use crate::stream::tracker::Tracker;
 use pose_graph::Edge;
-use projective_registration::OrganisedFrame;
-
-/// Share of the frame that may lie on the older keyframe, within what a path can be off. With 0.2 and 0.3 the paths of 500
-/// frames of a Kinect were the same within 2 mm.
-const LEAST_OVERLAP: f64 = 0.25;
+use projective_registration::{Agreement, OrganisedFrame};
 
 impl Tracker {
     /// Registers the newest keyframe, which is the current frame, with older ones. Only registrations that fit the path
@@ -22,7 +18,7 @@ impl Tracker {
         let candidates = self.keyframes.candidates(&self.current, new, &Isometry3::identity(), others, near);
         let mut closing = Vec::new();
         for (overlap, k) in candidates.into_iter().take(self.options.loop_attempts) {
-            if overlap < LEAST_OVERLAP {
+            if overlap < Agreement::LEAST_OVERLAP {
                 break;
             }
             let guess = self.keyframes.graph.relative(k, new);

@@ -16,12 +16,11 @@ use crate::tracked::{LossReason, TrackedPose, TrackingState};
 use icp_registration::DegeneracyPolicy;
 use point_cloud::Cloud;
 use pose_graph::Relation;
-use projective_registration::{ByField, FieldMatrix, FrameAligner, Influence, OrganisedFrame, Projection, SharedError};
+use projective_registration::{
+    ByField, FieldMatrix, FrameAligner, FrameAlignmentOptions, Influence, OrganisedFrame, Projection, SharedError,
+};
 use rigid_pose::Uncertain;
 
-/// Share of the first frame's radius beyond whose standard deviation motions count as undetermined. Registration alone
-/// asks for 1/300; in a stream, poses that are centimetres weak for a moment are still worth more than a loss.
-const WEAKEST_SHARE: f64 = 1.0 / 50.0;
 /// Smallest fraction of the nodes of a frame that must have a plane: below, it is blank.
 const FEWEST_PLANES: f64 = 0.03;
 
@@ -127,11 +126,18 @@ impl Tracker {
     /// The poses of the same frames as they are known now: closed loops have moved the keyframes they hang on. Covariances
     /// are those of the time of tracking.
     pub fn adjusted_trajectory(&self) -> Vec<TrackedPose> {
-        let adjusted = |pose: &TrackedPose| match self.keyframes.world_from(pose.keyframe) {
+        let adjusted = |pose: &TrackedPose| match self.world_from_keyframe(pose.keyframe) {
             Some(world) => TrackedPose { world_from_camera: world * pose.keyframe_from_camera, ..*pose },
             None => *pose,
         };
         self.trajectory.iter().map(adjusted).collect()
+    }
+
+    /// Where the keyframe of a [`TrackedPose::keyframe`] stands now, also one that was taken out: who keeps
+    /// [`TrackedPose::keyframe_from_camera`] of poses that were [forgotten](Self::forget_poses) knows them adjusted. The way leads over
+    /// the keyframes that took its place, one after the other: of many poses, ask once a keyframe.
+    pub fn world_from_keyframe(&self, number: usize) -> Option<Isometry3<f64>> {
+        self.keyframes.world_from(number)
     }
 
     /// The map: the planes of all keyframes as points with normals and standard deviations, in the world's frame. Where
@@ -211,7 +217,8 @@ impl Tracker {
     fn set_weakest_motion(&mut self) {
         let mut alignment = self.aligner.options().clone();
         if self.options.alignment.max_motion_sigma_m.is_none() {
-            alignment.max_motion_sigma_m = Some(WEAKEST_SHARE * self.current.radius_m().max(f64::MIN_POSITIVE));
+            alignment.max_motion_sigma_m =
+                Some(FrameAlignmentOptions::OPEN_IN_A_GRAPH * self.current.radius_m().max(f64::MIN_POSITIVE));
         }
         if let Ok(aligner) = FrameAligner::new(alignment) {
             self.aligner = aligner;

@@ -10,8 +10,6 @@ use projective_registration::thumbnail_difference;
 
 /// Keyframes that are tried from the look of their thumbnails.
 const TRIED: usize = 3;
-/// Largest difference of thumbnails that is worth a try.
-const LARGEST_DIFFERENCE: f32 = 0.7;
 /// Shifts of the thumbnails to each side, fields.
 const SHIFTS: [isize; 2] = [5, 3];
 
@@ -24,8 +22,7 @@ impl Tracker {
 
     /// The current frame from the keyframes that look most like it.
     pub(crate) fn alike(&mut self, ranked: &[(f32, usize, Isometry3<f64>)]) -> Option<Measured> {
-        let similar = ranked.iter().filter(|r| r.0 < LARGEST_DIFFERENCE).take(TRIED);
-        similar.into_iter().find_map(|(_, k, guess)| self.verified(*k, guess))
+        ranked.iter().take(TRIED).find_map(|(_, k, guess)| self.verified(*k, guess))
     }
 
     /// Keyframes by the look of their thumbnails, best first, with the rotation that brings the thumbnails together.

@@ -22,23 +22,20 @@ const MEMORY: &str = "2GB";
 const FRAMES: usize = 2000;
 
 /// What is measured.
-#[derive(Debug, Clone, clap::Args)]
+#[derive(Debug, Clone, Default, clap::Args)]
 pub(crate) struct Options {
-    /// Of `memory`: frames of the longer of two surveys of small frames by which growth is told; 100000 takes hours.
-    #[arg(long, default_value_t = 3000)]
-    frames: usize,
+    /// Of `memory`: beside the lengths by which growth is told, surveys of so many small frames; 100000 takes two hours.
+    #[arg(long)]
+    frames: Option<usize>,
+    /// Of `memory`: those alone of which this is a part, as in `noise on stations of 10`.
+    #[arg(long, default_value = "")]
+    only: String,
     /// Of `memory`: small frames alone.
     #[arg(long)]
     small: bool,
     /// Of `memory`: a program that is there already, instead of a release build.
     #[arg(long)]
     program: Option<PathBuf>,
-}
-
-impl Default for Options {
-    fn default() -> Self {
-        Self { frames: 3000, small: false, program: None }
-    }
 }
 
 /// A command on a survey.
@@ -57,7 +54,7 @@ const CASES: &[Case] = &[
     Case { survey: "one station of 2,000", command: &["fpn"] },
     Case { survey: "200 stations of 10", command: &["fpn"] },
     Case { survey: "one station of 2,000", command: &["warmup"] },
-    Case { survey: "one station of 2,000, a room", command: &["register", "--track"] },
+    Case { survey: "a path of 2,000", command: &["register", "--track"] },
 ];
 
 pub(crate) fn run(options: &Options) -> Outcome {
@@ -72,16 +69,16 @@ pub(crate) fn run(options: &Options) -> Outcome {
     let folder = tempfile::tempdir().map_err(|error| error.to_string())?;
     let surveys = Surveys { folder: folder.path(), program: &program };
     surveys.write_plans()?;
-    let mut beyond = growth::run(&surveys, options.frames)?;
+    let mut beyond = growth::run(&surveys, options.frames, &options.only)?;
     if !options.small {
         surveys.write()?;
         println!("{:<32} {:<20} {:>10} {:>12}  exit code", "survey of 640x480", "command", "most, MB", "processor, s");
-        for case in CASES {
+        for case in CASES.iter().filter(|case| case.name().contains(&options.only)) {
             let Taken { most_mb, seconds, code } = case.run(&program, folder.path())?;
             let command = words(case.command);
             println!("{:<32} {command:<20} {most_mb:>10} {seconds:>12.1}  {code}", case.survey);
             if most_mb > MOST_MB {
-                beyond.push(format!("{command} on {}: {most_mb} MB", case.survey));
+                beyond.push(format!("{}: {most_mb} MB", case.name()));
             }
         }
     }
@@ -93,6 +90,10 @@ fn words(command: &[&str]) -> String {
 }
 
 impl Case {
+    fn name(&self) -> String {
+        format!("{} on {}", words(self.command), self.survey)
+    }
+
     fn run(&self, program: &Path, folder: &Path) -> Result<Taken, String> {
         measured(program, folder, self.command, self.survey)
     }

@@ -16,48 +16,56 @@ pub(super) struct Surveys<'a> {
     pub(super) program: &'a Path,
 }
 
-/// Cameras of the fixtures' scenes.
+/// Cameras of the fixtures' scenes, and frames of a station.
 const SMALL: &str = "width: 66, height: 54, pixel_pitch_mm: (0.1, 0.1)";
 const ROOM: &str = "width: 176, height: 144, pixel_pitch_mm: (0.04, 0.04)";
+const SIX: &str = "frames_per_station: 6";
+const TEN: &str = "frames_per_station: 10";
+/// Frames of a round through the room.
+const ROUND: usize = 72;
 
 impl Surveys<'_> {
     /// Those of 640 x 480 pixels.
     pub(super) fn write(&self) -> Outcome {
-        self.simulate("repeats", [SMALL, "width: 640, height: 480, pixel_pitch_mm: (0.0105, 0.0105)"], "walls")?;
-        self.simulate("repeats", [SMALL, ROOM], "small")?;
-        self.simulate("room", [ROOM, "width: 640, height: 480, pixel_pitch_mm: (0.011, 0.011)"], "room")?;
-        // Six walls with six frames each; eight stations in the room with eight.
-        self.long("one station of 2,000", "walls", FRAMES, |frame| (0, frame % 6, 0))?;
-        self.long("200 stations of 10", "walls", FRAMES, |frame| (frame / 10 % 6, frame % 6, frame / 10))?;
-        self.long("2,000 stations of one, 176x144", "small", FRAMES, |frame| (frame % 6, frame / 6 % 6, frame))?;
+        let large = "width: 640, height: 480, pixel_pitch_mm: (0.0105, 0.0105)";
+        self.simulate("repeats", &[(SMALL, large), (SIX, TEN)], "walls")?;
+        self.simulate("repeats", &[(SMALL, ROOM), (SIX, TEN)], "small")?;
+        let large = (ROOM, "width: 640, height: 480, pixel_pitch_mm: (0.011, 0.011)");
+        self.simulate("room", &[large], "room")?;
+        self.simulate_round(large, "round")?;
+        // Six walls with ten frames each; eight stations in the room with eight.
+        self.long("one station of 2,000", "walls", FRAMES, one_station)?;
+        self.long("200 stations of 10", "walls", FRAMES, stations_of_ten)?;
+        self.long("2,000 stations of one, 176x144", "small", FRAMES, stations_of_one)?;
         self.long("40 stations of one, a room", "room", 40, |frame| (frame % 8, frame / 8 % 8, frame))?;
-        self.long("one station of 2,000, a room", "room", FRAMES, |frame| (0, frame % 8, 0))?;
+        self.long("a path of 2,000", "round", FRAMES, path)?;
         Ok(())
     }
 
-    /// Those of small frames, of each length: frames named again and again, and of a camera that drifts all that it takes.
-    pub(super) fn write_small(&self, counts: &[usize]) -> Outcome {
-        self.simulate("repeats", [SMALL, SMALL], "small walls")?;
-        self.simulate("room", [ROOM, "width: 66, height: 54, pixel_pitch_mm: (0.107, 0.107)"], "small room")?;
-        for &frames in counts {
-            let name = |begin: &str| Self::small_name(begin, frames);
-            self.long(&name("one station"), "small walls", frames, |frame| (0, frame % 6, 0))?;
-            // Frames of a station that are told apart: six, then those of the next.
-            self.long(&name("stations of 10"), "small walls", frames, |frame| (frame / 10 % 6, frame % 6, frame / 10))?;
-            self.long(&name("stations of one"), "small walls", frames, |frame| (frame % 6, frame / 6 % 6, frame))?;
-            self.long(&name("a room"), "small room", frames, |frame| (0, frame % 8, 0))?;
-            self.simulate(
-                "warm_up",
-                ["frames_per_station: 300", &format!("frames_per_station: {frames}")],
-                &name("a warming camera"),
-            )?;
+    /// What those of small frames are made of.
+    pub(super) fn write_small(&self) -> Outcome {
+        self.simulate("repeats", &[(SIX, TEN)], "small walls")?;
+        self.simulate_round((ROOM, "width: 66, height: 54, pixel_pitch_mm: (0.107, 0.107)"), "small round")
+    }
+
+    /// A survey of so many small frames: named again and again, and of a camera that drifts all that it takes. Its name.
+    pub(super) fn small(&self, kind: &str, frames: usize) -> Result<String, String> {
+        let name = format!("{kind} ({frames})");
+        if self.folder.join(&name).exists() {
+            return Ok(name);
         }
-        Ok(())
-    }
-
-    /// Name of a survey of small frames.
-    pub(super) fn small_name(begin: &str, frames: usize) -> String {
-        format!("{begin} ({frames})")
+        match kind {
+            "one station" => self.long(&name, "small walls", frames, one_station),
+            "stations of 3" => self.long(&name, "small walls", frames, stations_of_three),
+            "stations of 10" => self.long(&name, "small walls", frames, stations_of_ten),
+            "stations of one" => self.long(&name, "small walls", frames, stations_of_one),
+            "a path" => self.long(&name, "small round", frames, path),
+            _ => {
+                let number = format!("frames_per_station: {frames}");
+                self.simulate("warm_up", &[("frames_per_station: 300", &number)], &name)
+            }
+        }?;
+        Ok(name)
     }
 
     /// The pipelines.
@@ -69,16 +77,37 @@ impl Surveys<'_> {
         Ok(())
     }
 
-    /// A scene of the fixtures with another camera.
-    fn simulate(&self, scene: &str, [from, to]: [&str; 2], name: &str) -> Outcome {
-        let failed = |error: std::io::Error| format!("{scene}: {error}");
-        let text = read_to_string(root().join(format!("fixtures/scenes/{scene}.ron"))).map_err(failed)?;
+    /// A scene of the fixtures with some of its words replaced.
+    fn simulate(&self, scene: &str, others: &[(&str, &str)], name: &str) -> Outcome {
+        self.simulated(&others.iter().fold(text_of(scene)?, |text, (from, to)| text.replace(from, to)), name)
+    }
+
+    /// The room from a camera that looks outwards and goes round its middle.
+    fn simulate_round(&self, (camera, other): (&str, &str), name: &str) -> Outcome {
+        let station = |number: usize| {
+            let (sin, cos) = (std::f64::consts::TAU * number as f64 / ROUND as f64).sin_cos();
+            let at = |radius: f64| [3.75 + radius * cos, 3.0 + radius * sin];
+            let ([x, y], [to_x, to_y]) = (at(0.9), at(3.0));
+            format!(
+                "        (name: \"R{number}\", position_m: ({x:.4}, {y:.4}, 1.6), attitude: LookAt(target_m: ({to_x:.4}, {to_y:.4}, 1.3), \
+                 roll_deg: 0.0)),\n"
+            )
+        };
+        let text = text_of("room")?.replace(camera, other).replace("frames_per_station: 8", "frames_per_station: 1");
+        let parted = text.split_once("    stations: [").zip(text.split_once("    errors: ("));
+        let ((before, _), (_, behind)) = parted.ok_or("room: has no stations before its errors")?;
+        let stations: String = (0..ROUND).map(station).collect();
+        self.simulated(&format!("{before}    stations: [\n{stations}    ],\n    errors: ({behind}"), name)
+    }
+
+    fn simulated(&self, scene: &str, name: &str) -> Outcome {
+        let failed = |error: std::io::Error| format!("{name}: {error}");
         let file = self.folder.join(format!("{name}.ron"));
-        write(&file, text.replace(from, to)).map_err(failed)?;
+        write(&file, scene).map_err(failed)?;
         let mut command = Command::new(self.program);
         let status = command.args(["simulate", "--quiet", "--out", name]).arg(&file).current_dir(self.folder).status();
         let status = status.map_err(failed)?;
-        if status.success() { Ok(()) } else { Err(format!("simulate {scene}: {status}")) }
+        if status.success() { Ok(()) } else { Err(format!("simulate {name}: {status}")) }
     }
 
     /// A survey that names frames of another one: of which station and which of its frames, and as what station.
@@ -109,4 +138,35 @@ impl Surveys<'_> {
             .map_err(failed)?;
         write(to.join("stations.csv"), rows.join("\n") + "\n").map_err(failed)
     }
+}
+
+/// The scene of a file among the fixtures.
+fn text_of(scene: &str) -> Result<String, String> {
+    let file = root().join(format!("fixtures/scenes/{scene}.ron"));
+    read_to_string(&file).map_err(|error| format!("{}: {error}", file.display()))
+}
+
+/// Which station and which of its frames a frame is, and of what station it is said to be: ten frames of one, over and over.
+fn one_station(frame: usize) -> (usize, usize, usize) {
+    (0, frame % 10, 0)
+}
+
+/// The ten frames of one of six stations after the other.
+fn stations_of_ten(frame: usize) -> (usize, usize, usize) {
+    (frame / 10 % 6, frame % 10, frame / 10)
+}
+
+/// Three of these.
+fn stations_of_three(frame: usize) -> (usize, usize, usize) {
+    (frame / 3 % 6, frame % 3 + frame / 18 % 3 * 3, frame / 3)
+}
+
+/// A frame of one of six stations after the other.
+fn stations_of_one(frame: usize) -> (usize, usize, usize) {
+    (frame % 6, frame / 6 % 10, frame)
+}
+
+/// Round after round.
+fn path(frame: usize) -> (usize, usize, usize) {
+    (frame % ROUND, 0, frame)
 }

@@ -7,9 +7,7 @@ use crate::parts::Rows;
 use crate::quality::{Cells, Residuals, Verdict};
 use crate::system::System;
 
-/// Cells across the rms radius of the pairs.
-const CELLS_PER_RADIUS: f64 = 8.0;
-/// The same where distances of points are minimised: how far samples lie beside each other along the surface beats with
+/// Cells across the rms radius where distances of points are minimised: how far samples lie beside each other along the surface beats with
 /// the grids of both frames, and is shared farther than errors across it.
 const CELLS_OF_SAMPLES: f64 = 4.0;
 
@@ -18,7 +16,7 @@ pub(in crate::icp) fn verdict(system: &System<'_>, max_sigma_m: f64, residuals: 
     let frame = system.frame();
     // On the way, a deviation that is rather too small keeps the iterations going.
     let at_the_end = system.scene().moment.ended;
-    let per_radius = if at_the_end && system.is_point_to_point() { CELLS_OF_SAMPLES } else { CELLS_PER_RADIUS };
+    let per_radius = if at_the_end && system.is_point_to_point() { CELLS_OF_SAMPLES } else { Cells::PER_RADIUS };
     let mut cells = Cells::new(frame, frame.radius_m / per_radius);
     let mut buffers = [Rows::default(), Rows::default()];
     let twin_weight = system.twin_weight();

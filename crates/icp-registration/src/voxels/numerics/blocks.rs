@@ -3,9 +3,8 @@
 //! Voxels are sorted by key, so those of a block lie beside each other: a block is a mask of its occupied cells and the
 //! index of its first voxel. Tables of a room or a street fit into the cache.
 
+use crate::voxels::numerics::FREE;
 use crate::voxels::numerics::lattice::key;
-
-const FREE: u32 = u32::MAX;
 
 #[derive(Debug, Clone, Copy)]
 struct Block {

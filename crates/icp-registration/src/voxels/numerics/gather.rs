@@ -7,13 +7,13 @@
 use nalgebra::Point3;
 use rayon::prelude::*;
 
+use crate::voxels::numerics::FREE;
 use crate::voxels::numerics::lattice::{Lattice, key};
 
 /// Points a chunk; fixed, as it decides the order of the sums.
 const CHUNK: usize = 8192;
 /// Slots of a chunk's table: never more than half of them are taken.
 const SLOTS: usize = 2 * CHUNK;
-const FREE: u32 = u32::MAX;
 
 /// What is summed in a cell.
 pub(crate) trait Sum: Default + Clone + Send + Sync {

@@ -9,7 +9,7 @@ use std::path::Path;
 
 use atomic_output::OutputFolder;
 use nalgebra::{Isometry3, Point3};
-use range_io::ply::{CloudFile, PlyWriter, Precision, read_cloud, write_cloud};
+use range_io::ply::{CloudFile, PlyWriter, Precision, read_cloud, read_some_of_cloud, write_cloud};
 use serde::{Deserialize, Serialize};
 
 use commands::tiles::{self, LastPoints, TiledCloud};
@@ -94,16 +94,32 @@ impl<'a> Clouds<'a> {
         self.further.points()
     }
 
-    /// Adds the files of another part of the views, whose common cloud ends with so many points of split pixels.
-    pub(crate) fn add_part(&mut self, part: &Path, further: usize, own: Vec<OwnCloud>) -> Result<()> {
-        let common = part.join("cloud.ply");
-        if common.is_file() {
-            let (points, further) = parted(read_cloud(&common)?, further);
-            self.append(&points)?;
-            self.further.add(&further)?;
+    /// Adds the files of another part of the views, so many points at a time; those of split pixels end its common cloud.
+    pub(crate) fn add_part(
+        &mut self,
+        folder: &Path,
+        (points, further, own): (u64, usize, Vec<OwnCloud>),
+        at_once: usize,
+    ) -> Result<()> {
+        let (common, all, of_pixels) = (folder.join("cloud.ply"), points, points.saturating_sub(further as u64));
+        let mut next = common.is_file().then_some(0);
+        while let Some(first) = next {
+            let is_further = (of_pixels..all).contains(&first);
+            let end = if is_further { all } else { of_pixels };
+            let points = read_some_of_cloud(&common, first, at_once.min((end - first) as usize))?;
+            if points.is_empty() && first < all {
+                let message = format!("{}: has fewer points than its part wrote: run it anew", common.display());
+                return Err(Error::Request { command: "merge", message });
+            }
+            if is_further {
+                self.further.add(&points)?;
+            } else {
+                self.append(&points)?;
+            }
+            next = Some(first + points.len() as u64).filter(|next| *next < all);
         }
         for cloud in own {
-            let (from, to) = (part.join(&cloud.file), self.folder.file(&cloud.file)?);
+            let (from, to) = (folder.join(&cloud.file), self.folder.file(&cloud.file)?);
             std::fs::copy(&from, to).map_err(|source| Error::Access { path: from, source })?;
             self.own.push(Own { cloud, number: self.views, further: 0 });
             self.views += 1;
@@ -120,10 +136,10 @@ impl<'a> Clouds<'a> {
         Ok(writer.append(points)?)
     }
 
-    /// Completes the files of a part, which are in the common frame where the survey knows it.
-    pub(crate) fn finish_part(mut self) -> Result<Vec<OwnCloud>> {
+    /// Completes the files of a part, which are in the common frame where the survey knows it; how many points that has.
+    pub(crate) fn finish_part(mut self) -> Result<(Vec<OwnCloud>, u64)> {
         let (placed, known) = (self.placed, Vec::new());
-        Ok(self.complete(placed.then_some(known.as_slice()))?.0)
+        self.complete(placed.then_some(known.as_slice()))
     }
 
     /// Completes the files: one cloud where there are poses of all views in a common frame. Else the files of the views.

@@ -11,5 +11,5 @@ mod read;
 mod write;
 
 pub use crate::formats::cloud_file::{CloudFile, Precision};
-pub use read::read_cloud;
+pub use read::{read_cloud, read_some_of_cloud};
 pub use write::{PlyWriter, write_cloud};

@@ -1,4 +1,4 @@
-use std::io::{BufRead, BufReader, Read};
+use std::io::{BufRead, BufReader, Read, Seek};
 use std::path::Path;
 
 use super::header::{Encoding, Header, Scalar};
@@ -11,22 +11,29 @@ const BLOCK: usize = 1 << 12;
 
 /// Reads the vertices of a PLY file, their properties in any order.
 pub fn read_cloud(path: impl AsRef<Path>) -> crate::Result<CloudFile> {
+    read_some_of_cloud(path, 0, usize::MAX)
+}
+
+/// The same of at most so many vertices from number `first` on; none where there are no more.
+pub fn read_some_of_cloud(path: impl AsRef<Path>, first: u64, most: usize) -> crate::Result<CloudFile> {
     let path = path.as_ref();
     let (file, length) = crate::open(path)?;
-    let read = read_from(&mut BufReader::with_capacity(1 << 16, file), length);
+    let read = read_from(&mut BufReader::with_capacity(1 << 16, file), length, first, most);
     read.map_err(|fault| fault.of(path))
 }
 
 /// `length` is the largest number of bytes that `reader` can give.
-fn read_from(reader: &mut impl BufRead, length: u64) -> Result<CloudFile, Fault> {
-    let header = Header::read(reader)?;
+fn read_from(reader: &mut (impl BufRead + Seek), length: u64, first: u64, most: usize) -> Result<CloudFile, Fault> {
+    let mut header = Header::read(reader)?;
     let vertices = header.vertices;
     if header.least_length().is_none_or(|bytes| bytes > length) {
         let before: Vec<_> = header.before.iter().map(|(count, _)| count.to_string()).collect();
         let before = if before.is_empty() { String::new() } else { format!(" behind {} elements", before.join(" + ")) };
         return Err(format!("promises {vertices} vertices{before}, more than its {length} bytes hold").into());
     }
-    let vertices = usize::try_from(vertices).map_err(|_| "has more vertices than this machine can address")?;
+    let first = first.min(vertices);
+    let vertices = usize::try_from((vertices - first).min(most as u64)).map_err(|_| "has too many vertices")?;
+    header.before.push((first, header.vertex_size()));
     let mut columns = Columns::new(header.properties.iter().map(|(name, _)| name.as_str()), vertices)?;
     match header.encoding {
         Encoding::Ascii => read_ascii(reader, &header, vertices, &mut columns)?,
@@ -67,7 +74,7 @@ fn read_ascii(reader: &mut impl BufRead, header: &Header, vertices: usize, colum
 }
 
 fn read_binary(
-    reader: &mut impl BufRead,
+    reader: &mut (impl BufRead + Seek),
     header: &Header,
     vertices: usize,
     columns: &mut Columns,
@@ -75,7 +82,9 @@ fn read_binary(
 ) -> Result<(), Fault> {
     for &(count, size) in &header.before {
         let bytes = count.saturating_mul(size as u64);
-        if std::io::copy(&mut reader.by_ref().take(bytes), &mut std::io::sink())? != bytes {
+        // What is no file on a disk cannot be gone along.
+        let is_passed = i64::try_from(bytes).is_ok_and(|bytes| reader.seek_relative(bytes).is_ok());
+        if !is_passed && std::io::copy(&mut reader.by_ref().take(bytes), &mut std::io::sink())? != bytes {
             return Err("ends before its vertices".into());
         }
     }

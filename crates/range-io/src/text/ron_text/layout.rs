@@ -9,8 +9,7 @@ enum Item {
     Group(String, char, Vec<Item>),
 }
 
-/// Breaks compact RON: what fits one line stays on one, members of what does not get lines of their own, and plain
-/// numbers fill lines.
+/// Breaks compact RON: what fits one line stays on one, members of what does not get lines of their own, and plain numbers fill lines.
 pub(super) fn in_lines(compact: &str) -> String {
     let mut characters = compact.chars().peekable();
     let mut out = String::new();

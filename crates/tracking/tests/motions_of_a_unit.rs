@@ -1,4 +1,4 @@
-#![allow(clippy::unwrap_used)]
+//! Motions between frames by an inertial unit on a body whose way is known in closed form.
 
 use approx::assert_relative_eq;
 use nalgebra::{Isometry3, Matrix6, UnitQuaternion, Vector3, Vector6};
@@ -6,10 +6,9 @@ use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
 
-use super::{ImuIntegrator, ImuOptions, InertialSample};
-use crate::MotionPrior;
-use crate::error::Error;
 use rigid_pose::{pose_difference, step_pose};
+use tracking::inertial::{self, Unrest};
+use tracking::{Error, ImuIntegrator, ImuNoise, InertialSample, MotionPrior};
 
 const GRAVITY: f64 = 9.80665;
 const RADIUS: f64 = 0.8;
@@ -44,14 +43,19 @@ fn samples(from: f64, to: f64, hertz: f64) -> Vec<InertialSample> {
     (0..=count).map(|i| sample(from + i as f64 / hertz)).collect()
 }
 
-fn rested(options: &ImuOptions) -> ImuIntegrator {
-    ImuIntegrator::from_rest(&samples(-0.5, 0.0, 200.0), options).unwrap()
+/// The unit on the camera.
+fn mounting() -> Isometry3<f64> {
+    Isometry3::new(Vector3::new(0.05, -0.02, 0.1), Vector3::new(0.3, 1.2, -0.4))
+}
+
+fn rested(camera_from_body: &Isometry3<f64>) -> ImuIntegrator {
+    ImuIntegrator::from_rest(&samples(-0.6, 0.0, 200.0), camera_from_body, &ImuNoise::default()).unwrap()
 }
 
 #[test]
 fn a_circle_comes_out_as_its_closed_form_says() {
-    let camera_from_body = Isometry3::new(Vector3::new(0.05, -0.02, 0.1), Vector3::new(0.3, 1.2, -0.4));
-    let mut imu = rested(&ImuOptions { camera_from_body, ..ImuOptions::default() });
+    let camera_from_body = mounting();
+    let mut imu = rested(&camera_from_body);
     let all = samples(0.0, 1.5, 200.0);
     // Frame times between samples, so that both ends are interpolated.
     for (previous, current) in [(0.0, 0.333), (0.333, 0.701), (0.701, 1.4)] {
@@ -74,7 +78,7 @@ fn a_circle_comes_out_as_its_closed_form_says() {
 #[test]
 fn the_error_falls_with_the_square_of_the_interval() {
     let error = |hertz: f64| {
-        let prior = rested(&ImuOptions::default()).motion(&samples(0.0, 1.0, hertz), 1.0).unwrap();
+        let prior = rested(&Isometry3::identity()).motion(&samples(0.0, 1.0, hertz), 1.0).unwrap();
         let truth = world_from_body(1.0).inverse() * world_from_body(0.0);
         pose_difference(&prior.current_from_previous, &truth).norm()
     };
@@ -84,16 +88,16 @@ fn the_error_falls_with_the_square_of_the_interval() {
 }
 
 /// Noise as the densities say, with biases as the options' standard deviations say.
-fn disturbed(clean: &[InertialSample], hertz: f64, options: &ImuOptions, seed: u64) -> Vec<InertialSample> {
+fn disturbed(clean: &[InertialSample], hertz: f64, noise: &ImuNoise, seed: u64) -> Vec<InertialSample> {
     let mut random = Pcg64::seed_from_u64(seed);
     let mut normal = || Vector3::from_fn(|_, _| -> f64 { StandardNormal.sample(&mut random) });
-    let (gyro_bias, accel_bias) = (normal() * 0.02, normal() * options.accel_bias_sigma);
+    let (gyro_bias, accel_bias) = (normal() * 0.02, normal() * noise.accel_bias_sigma);
     let root = hertz.sqrt();
     clean
         .iter()
         .map(|s| InertialSample {
-            angular_rate: s.angular_rate + gyro_bias + normal() * options.gyro_noise * root,
-            specific_force: s.specific_force + accel_bias + normal() * options.accel_noise * root,
+            angular_rate: s.angular_rate + gyro_bias + normal() * noise.gyro_density * root,
+            specific_force: s.specific_force + accel_bias + normal() * noise.accel_density * root,
             ..*s
         })
         .collect()
@@ -102,21 +106,16 @@ fn disturbed(clean: &[InertialSample], hertz: f64, options: &ImuOptions, seed: u
 #[test]
 fn errors_are_as_large_as_the_covariance_says() {
     let hertz = 100.0;
-    let options = ImuOptions {
-        camera_from_body: Isometry3::new(Vector3::new(0.05, -0.02, 0.1), Vector3::new(0.3, 1.2, -0.4)),
-        gyro_noise: 2e-3,
-        accel_noise: 2e-2,
-        ..ImuOptions::default()
-    };
-    let (rest, moving) = (samples(-0.5, -0.01, hertz), samples(0.0, 0.6, hertz));
+    let noise = ImuNoise { gyro_density: 2e-3, accel_density: 2e-2, ..ImuNoise::default() };
+    let (rest, moving) = (samples(-0.6, -0.01, hertz), samples(0.0, 0.6, hertz));
     let clean: Vec<_> = rest.iter().chain(&moving).copied().collect();
-    let camera = |t: f64| world_from_body(t) * options.camera_from_body.inverse();
+    let camera = |t: f64| world_from_body(t) * mounting().inverse();
     let truth = camera(0.6).inverse() * camera(0.3);
     let runs = 200;
     let mut sum = 0.0;
     for seed in 0..runs {
-        let all = disturbed(&clean, hertz, &options, seed);
-        let mut imu = ImuIntegrator::from_rest(&all[..rest.len()], &options).unwrap();
+        let all = disturbed(&clean, hertz, &noise, seed);
+        let mut imu = ImuIntegrator::from_rest(&all[..rest.len()], &mounting(), &noise).unwrap();
         imu.motion(&all, 0.3).unwrap();
         imu.frame(None).unwrap();
         let prior = imu.motion(&all, 0.6).unwrap();
@@ -131,9 +130,9 @@ fn errors_are_as_large_as_the_covariance_says() {
 #[test]
 fn measured_motion_corrects_velocity_and_attitude() {
     let hertz = 200.0;
-    let options = ImuOptions::default();
-    let all = disturbed(&samples(-0.5, 2.0, hertz), hertz, &options, 3);
-    let mut free = ImuIntegrator::from_rest(&all[..100], &options).unwrap();
+    let noise = ImuNoise::default();
+    let all = disturbed(&samples(-0.6, 2.0, hertz), hertz, &noise, 3);
+    let mut free = ImuIntegrator::from_rest(&all[..120], &Isometry3::identity(), &noise).unwrap();
     let mut corrected = free.clone();
     let sigma = Vector6::new(1e-3, 1e-3, 1e-3, 1e-3, 1e-3, 1e-3);
     let mut random = Pcg64::seed_from_u64(9);
@@ -167,24 +166,29 @@ fn measured_motion_corrects_velocity_and_attitude() {
 
 #[test]
 fn what_cannot_be_used_is_refused() {
-    let options = ImuOptions::default();
-    let one = &samples(-0.5, 0.0, 100.0)[..1];
-    assert!(matches!(ImuIntegrator::from_rest(one, &options), Err(Error::TooFewPoints { .. })));
-    assert!(matches!(ImuIntegrator::from_rest(&samples(0.5, 1.5, 100.0), &options), Err(Error::Moving { .. })));
-    let mut broken = samples(-0.5, 0.0, 100.0);
+    let (here, noise) = (Isometry3::identity(), ImuNoise::default());
+    let refused = |samples: &[InertialSample], noise: &ImuNoise| {
+        ImuIntegrator::from_rest(samples, &here, noise).map(|_| ()).unwrap_err()
+    };
+    let rest = samples(-0.6, 0.0, 100.0);
+    assert!(matches!(refused(&rest[..1], &noise), Error::Inertial(inertial::Error::Unrest(Unrest::TooShort { .. }))));
+    assert!(matches!(refused(&samples(0.5, 1.5, 100.0), &noise), Error::Inertial(inertial::Error::Unrest(_))));
+    let mut broken = rest.clone();
     broken[7].specific_force.y = f64::NAN;
-    assert_eq!(
-        ImuIntegrator::from_rest(&broken, &options).unwrap_err(),
-        Error::NonFinite { what: "the inertial samples", index: 7 }
-    );
-    let mut imu = rested(&options);
-    assert!(matches!(imu.motion(&[], 0.5), Err(Error::NoInertialData { .. })));
-    assert!(matches!(imu.motion(&samples(0.3, 0.5, 100.0), 0.5), Err(Error::NoInertialData { .. })));
+    let not_finite = inertial::Error::NonFinite { what: "inertial sample", index: 7 };
+    assert_eq!(refused(&broken, &noise), Error::Inertial(not_finite));
+    let bad = ImuNoise { gyro_density: 0.0, ..noise };
+    let named = |error| matches!(error, Error::Inertial(inertial::Error::InvalidOption { name: "gyro_density", .. }));
+    assert!(named(refused(&rest, &bad)));
+    let mut imu = rested(&here);
+    for samples in [vec![], samples(0.3, 0.5, 100.0)] {
+        let error = imu.motion(&samples, 0.5).unwrap_err();
+        assert!(matches!(error, Error::Inertial(inertial::Error::Gap { .. })), "{error}");
+    }
     assert!(matches!(imu.motion(&[], -1.0), Err(Error::NotAscending { .. })));
-    // A refused motion has left the state where it was.
     assert_relative_eq!(imu.timestamp_s(), 0.0);
-    let bad = ImuOptions { gyro_noise: 0.0, ..options };
-    assert!(matches!(ImuIntegrator::from_rest(one, &bad), Err(Error::InvalidOption { name: "gyro_noise", .. })));
+    // What was refused is not remembered.
+    assert!(imu.motion(&samples(0.0, 0.5, 100.0), 0.5).is_ok());
 }
 
 #[test]
@@ -195,7 +199,8 @@ fn a_body_hung_upside_down_rests_as_well() {
         specific_force: Vector3::new(0.0, 0.0, -GRAVITY),
     };
     let rest = [down, InertialSample { timestamp_s: 0.5, ..down }];
-    let mut imu = ImuIntegrator::from_rest(&rest, &ImuOptions { max_gap_s: 1.0, ..ImuOptions::default() }).unwrap();
+    let noise = ImuNoise { max_gap_s: 1.0, ..ImuNoise::default() };
+    let mut imu = ImuIntegrator::from_rest(&rest, &Isometry3::identity(), &noise).unwrap();
     let prior = imu.motion(&[], 1.0).unwrap();
     assert!(pose_difference(&prior.current_from_previous, &Isometry3::identity()).norm() < 1e-9);
 }

@@ -2,10 +2,9 @@
 
 use nalgebra::{Isometry3, Point3};
 use rayon::prelude::*;
-use statistics::mad_scale;
+use statistics::{mad_scale, upper_median};
 
 use crate::adjustment::network::{Anchors, Network, State, largest_step};
-use crate::adjustment::sparse_equations::is_small;
 use crate::error::{Error, Result};
 use crate::planes::contacts::{Contact, Reach, TURNED, partners};
 use crate::planes::reduction::{PairContacts, Reduced, Scene, Weighting, reduce};
@@ -15,6 +14,7 @@ use crate::surfaces::plane_fit::SAME_DIRECTION;
 use crate::surfaces::point_model::PointModel;
 use crate::surfaces::points::StationPoints;
 use icp_registration::RobustKernel;
+use rigid_pose::pose_difference;
 
 /// Most rounds of a level, and the part of its limit that a step must be below for it to end.
 const ROUNDS: usize = 8;
@@ -25,6 +25,10 @@ pub(crate) const FEWEST_CONTACTS: usize = 15;
 const KERNEL: RobustKernel = RobustKernel::Huber;
 /// Nearest patches that are looked at while stations are still apart.
 const CANDIDATES: usize = 8;
+/// Median length of a vector of three components of unit variance.
+const MEDIAN_OF_THREE: f64 = 1.538_172;
+/// Part of a patch that start poses are not taken to be better known than: from there the last rounds find their way.
+const KNOWN: f64 = 0.25;
 
 /// Derivatives of the patches of each station by all parameters, patch by patch.
 pub(crate) type PatchDerivatives = Vec<Vec<[f64; 3]>>;
@@ -194,14 +198,39 @@ fn scale(scene: &Scene<'_>, pairs_in_contact: &[PairContacts], poses: &[Isometry
     mad_scale(&mut residuals).max(1e-3)
 }
 
+/// How well start poses are known: standard deviations of a component of the position, metre, and of the attitude, radian.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Known {
+    position_m: f64,
+    attitude_rad: f64,
+}
+
+impl Known {
+    /// From how far stations have moved since: half of them no farther than `MEDIAN_OF_THREE` deviations. Those that have slid to
+    /// where they should not be are fewer.
+    fn estimated(start: &[Isometry3<f64>], now: &[Isometry3<f64>], least: Self, most: Self) -> Self {
+        let moved = |part: usize| {
+            let norm = |(a, b): (&Isometry3<f64>, &Isometry3<f64>)| pose_difference(a, b).fixed_rows::<3>(part).norm();
+            upper_median(&mut start.iter().zip(now).map(norm).collect::<Vec<f64>>()) / MEDIAN_OF_THREE
+        };
+        Self {
+            position_m: moved(0).max(least.position_m).min(most.position_m),
+            attitude_rad: moved(3).max(least.attitude_rad).min(most.attitude_rad),
+        }
+    }
+
+    /// The same length for positions and for what is at this distance.
+    fn at(length_m: f64, radius_m: f64) -> Self {
+        Self { position_m: length_m, attitude_rad: length_m / radius_m }
+    }
+}
+
 /// How the rounds go.
 #[derive(Clone, Copy)]
 pub(crate) struct WideRounds<'a> {
     pub network: &'a Network<'a>,
-    /// Error of the start poses, metre.
+    /// Largest error of the start poses, metre.
     pub reach_m: f64,
-    /// Stations that are in their places and keep them; empty where none are.
-    pub held: &'a [bool],
     pub progress: &'a (dyn Fn(usize) + Sync),
 }
 
@@ -219,20 +248,21 @@ impl WideRounds<'_> {
         levels
     }
 
-    /// One step of all stations. Many are held at their start as well as that is known: where little else stands along a wall a station
+    /// One step of all stations. Many are held at their start as well as that is known, which
+    /// how far all have moved tells: where little else stands along a wall a station
     /// would slide farther than it can be off, and meet the wrong things there. None keeps its pose: the others would bend about it.
     fn solved(
         &self,
         state: &State,
-        start: &[Isometry3<f64>],
+        (start, known): (&[Isometry3<f64>], Known),
         reduced: &[(&PairContacts, Reduced)],
         scale: f64,
     ) -> Result<State> {
-        if is_small(state.poses.len(), state.parameters.len()) {
+        if self.network.whole {
             return self.network.solve(state, reduced);
         }
-        let anchors = Anchors { poses: start, factor: scale * scale, held: self.held };
-        self.network.near(self.reach_m).solve_sparse(state, reduced, &anchors)
+        let network = Network { hold_m: known.position_m, turn_rad: known.attitude_rad, ..*self.network };
+        network.solve_sparse(state, reduced, &Anchors { poses: start, factor: scale * scale })
     }
 
     /// Brings all stations from start poses that are right to about the reach to a part of a patch.
@@ -240,7 +270,8 @@ impl WideRounds<'_> {
         let size_m = surfaces.given.iter().map(|surface| surface.size_m).fold(0.0, f64::max);
         let mut state = start.clone();
         let mut rounds = 0;
-        let is_open = |&(a, b): &(usize, usize)| self.held.is_empty() || !self.held[a] || !self.held[b];
+        let [least, most] = [KNOWN * size_m, self.reach_m].map(|length_m| Known::at(length_m, self.network.hold_m));
+        let mut known = most;
         for reach in self.levels(size_m) {
             let mut pairs = Vec::new();
             for in_level in 0..ROUNDS {
@@ -248,7 +279,6 @@ impl WideRounds<'_> {
                 let scene = surfaces.scene(state.parameters.len());
                 if in_level == 0 {
                     pairs = near_each_other(&scene.surfaces, &state.poses, reach)?;
-                    pairs.retain(is_open);
                 }
                 let pairs_in_contact = meet(&scene.surfaces, &state.poses, &pairs, reach)?;
                 if in_level == 0 {
@@ -260,9 +290,10 @@ impl WideRounds<'_> {
                 }
                 let weighting = Weighting { kernel: KERNEL, scale: scale(&scene, &pairs_in_contact, &state.poses) };
                 let reduced = reduced(&scene, &pairs_in_contact, &state.poses, &weighting)?;
-                let next = self.solved(&state, &start.poses, &reduced, weighting.scale)?;
+                let next = self.solved(&state, (&start.poses, known), &reduced, weighting.scale)?;
                 let moved_m = largest_step(&state, &next, self.network.hold_m);
                 state = next;
+                known = Known::estimated(&start.poses, &state.poses, least, most);
                 rounds += 1;
                 (self.progress)(rounds);
                 if moved_m <= reach.across_m / SMALL_STEP {

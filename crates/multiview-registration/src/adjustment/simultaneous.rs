@@ -9,7 +9,7 @@ use crate::adjustment::cofactors::Cofactors;
 use crate::adjustment::equations::Equations;
 use crate::adjustment::network::{Network, State, largest_step};
 use crate::adjustment::rounds::{Surfaces, meet, near_each_other};
-use crate::adjustment::sparse_equations::{MOST_ELIMINATED, SparseEquations, is_small};
+use crate::adjustment::sparse_equations::{MOST_ELIMINATED, SparseEquations};
 use crate::adjustment::wide_errors::Residuals;
 use crate::error::Result;
 use crate::planes::contacts::Reach;
@@ -55,8 +55,6 @@ pub(crate) struct Adjusted {
     pub common: Common,
     /// Pairs of stations that were held against each other.
     pub pairs_tried: usize,
-    /// Stations that moved in the last round by more than they may.
-    pub moving: Vec<usize>,
 }
 
 /// The tiles that pairs of stations saw, and the planes of each station.
@@ -177,8 +175,7 @@ impl Finish<'_> {
             let adjusted = self.step(&mut state, &mut known, sums)?;
             round += 1;
             (self.progress)(round);
-            let moving = if off_m.is_none() { self.moving(&before, &state, &adjusted, &known) } else { Vec::new() };
-            let settled = off_m.is_none() && moving.is_empty();
+            let settled = off_m.is_none() && self.settles(&before, &state, &adjusted, &known);
             if settled || round >= self.most_rounds {
                 let factor = adjusted.factor_on(&known);
                 let common = Common::new(state.poses.len(), &adjusted.means);
@@ -191,38 +188,36 @@ impl Finish<'_> {
                     settled,
                     common,
                     pairs_tried,
-                    moving,
                     ..adjusted
                 });
             }
         }
     }
 
-    /// The stations that moved by more than the tolerance, and by so much of their standard deviation that further rounds tell
+    /// Whether no station moved by more than the tolerance, or by so much of its standard deviation that further rounds tell
     /// something: along a direction that the surfaces leave open, poses drift with every change of weights.
-    fn moving(&self, before: &State, after: &State, adjusted: &Adjusted, shared_planes: &[SharedPlane]) -> Vec<usize> {
+    fn settles(&self, before: &State, after: &State, adjusted: &Adjusted, shared_planes: &[SharedPlane]) -> bool {
         if largest_step(before, after, self.network.hold_m) <= self.tolerance_m {
-            return Vec::new();
+            return true;
         }
-        let is_small = is_small(after.poses.len(), after.parameters.len());
         // Of many stations the factor takes as long as a round; without it the demand is stricter.
-        let factor = if is_small { adjusted.factor_on(shared_planes) } else { adjusted.factor_of_tiles() };
+        let factor = if self.network.whole { adjusted.factor_on(shared_planes) } else { adjusted.factor_of_tiles() };
         let cofactors = &adjusted.cofactors;
-        let is_moving = |&k: &usize| {
+        let is_settled = |k: usize| {
             let step = pose_difference(&before.poses[k], &after.poses[k]);
             let own = cofactors.of(k) * factor;
             let sigmas = own.cholesky().map_or(f64::INFINITY, |factor| step.dot(&factor.solve(&step)).sqrt());
             // Not a number is no small one.
-            !(k == self.network.fixed || sigmas <= FEW_SIGMAS)
+            k == self.network.fixed || sigmas <= FEW_SIGMAS
         };
-        (0..after.poses.len()).filter(is_moving).collect()
+        (0..after.poses.len()).all(is_settled)
     }
 
     /// What the stations saw of each tile about the planes at the present poses, and how that scatters.
-    fn scatter(known: &[SharedPlane], sums: &[Sums], observers: &[Vec<usize>]) -> (Vec<Vec<TileMean>>, Scatter) {
+    fn scatter(&self, known: &[SharedPlane], sums: &[Sums], observers: &[Vec<usize>]) -> (Vec<Vec<TileMean>>, Scatter) {
         let of_shared_plane = |(shared_plane, stations): (&SharedPlane, &Vec<usize>)| {
             let seen = SharedPlaneSums { shared_plane, sums, weights: None };
-            let eliminated = seen.eliminated(stations, Variances::default(), most_eliminated(sums));
+            let eliminated = seen.eliminated(stations, Variances::default(), self.most_eliminated());
             eliminated.map_or_else(Vec::new, |eliminated| tile_means(&seen, &eliminated))
         };
         let means: Vec<Vec<TileMean>> = known.par_iter().zip(observers).map(of_shared_plane).collect();
@@ -233,13 +228,13 @@ impl Finish<'_> {
     /// One linearised step of all unknowns.
     fn step(&self, state: &mut State, known: &mut [SharedPlane], sums: Vec<Sums>) -> Result<Adjusted> {
         let observers = observers(known, &sums);
-        let (means, scatter) = Self::scatter(known, &sums, &observers);
+        let (means, scatter) = self.scatter(known, &sums, &observers);
         let variances: Vec<Variances> = means.par_iter().map(|means| variances(means, scatter.shared)).collect();
         let eliminated: Vec<Option<Eliminated>> = (0..known.len())
             .into_par_iter()
             .map(|k| {
                 let seen = SharedPlaneSums { shared_plane: &known[k], sums: &sums, weights: Some(&scatter.weights) };
-                seen.eliminated(&observers[k], variances[k], most_eliminated(&sums))
+                seen.eliminated(&observers[k], variances[k], self.most_eliminated())
             })
             .collect();
         let parameters = state.parameters.len();
@@ -270,8 +265,12 @@ impl Finish<'_> {
             settled: false,
             common: Common::default(),
             pairs_tried: 0,
-            moving: Vec::new(),
         })
+    }
+
+    /// Stations beyond which a plane is not eliminated.
+    fn most_eliminated(&self) -> usize {
+        if self.network.whole { usize::MAX } else { MOST_ELIMINATED }
     }
 
     /// The step of all unknowns, poses being held near where they are, and cofactors.
@@ -281,7 +280,7 @@ impl Finish<'_> {
         seen: impl Iterator<Item = (&'s SharedPlane, &'s Eliminated)> + Clone,
     ) -> Result<(DVector<f64>, Cofactors)> {
         let stations = state.poses.len();
-        if is_small(stations, state.parameters.len()) {
+        if self.network.whole {
             let mut equations = Equations::new(stations, state.parameters.len());
             seen.for_each(|(shared_plane, eliminated)| equations.add(shared_plane, eliminated, &state.poses));
             for turn in self.network.turns {
@@ -299,12 +298,6 @@ impl Finish<'_> {
         let step = equations.step(&equations.cofactors(&self.near)?);
         Ok((step, equations.cofactors(self.network)?))
     }
-}
-
-/// Stations beyond which a plane is not eliminated.
-fn most_eliminated(sums: &[Sums]) -> usize {
-    let parameters = sums.first().map_or(0, |sums| sums.order - 3);
-    if is_small(sums.len(), parameters) { usize::MAX } else { MOST_ELIMINATED }
 }
 
 /// The stations that saw something of each shared plane, ascending.

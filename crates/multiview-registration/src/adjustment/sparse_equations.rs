@@ -20,11 +20,6 @@ pub(crate) const DENSE_STATIONS: usize = 40;
 /// 48 the work is the same within a tenth.
 pub(crate) const MOST_ELIMINATED: usize = 24;
 
-/// Whether the normal matrix is factorised as a whole. Shared parameters couple all stations.
-pub(crate) fn is_small(stations: usize, parameters: usize) -> bool {
-    parameters > 0 || stations <= DENSE_STATIONS
-}
-
 /// Normal equations of all stations, then three unknowns for each plane that stays.
 pub(crate) struct SparseEquations {
     normal: BlockMatrix,
@@ -37,12 +32,7 @@ pub(crate) struct SparseEquations {
 impl SparseEquations {
     /// `planes`: how many stay beside the stations.
     pub(crate) fn new(stations: usize, fixed: usize, planes: usize) -> Self {
-        Self::with(stations, &|station| station == fixed, planes)
-    }
-
-    /// The same with more stations that keep their poses.
-    pub(crate) fn with(stations: usize, is_held: &dyn Fn(usize) -> bool, planes: usize) -> Self {
-        let mut widths: Vec<usize> = (0..stations).map(|station| if is_held(station) { 0 } else { 6 }).collect();
+        let mut widths: Vec<usize> = (0..stations).map(|station| if station == fixed { 0 } else { 6 }).collect();
         widths.resize(stations + planes, 3);
         let normal = BlockMatrix::new(&widths);
         let right = DVector::zeros(normal.order());
@@ -227,7 +217,7 @@ mod tests {
         let (planes, sums, poses) = survey();
         let stations: Vec<usize> = (0..6).collect();
         let prior = (Vec::new(), Vec::new());
-        let network = Network { fixed: 2, hold_m: 3.0, turn_rad: 1.0, names: &[], prior: &prior, turns: &[] };
+        let network = Network { fixed: 2, hold_m: 3.0, turn_rad: 1.0, names: &[], prior: &prior, turns: &[], whole: false };
         let variances = Variances { surface: 1e-6, shared: 2e-6 };
         let eliminated = |plane: usize, most: usize| {
             let seen = SharedPlaneSums { shared_plane: &planes[plane], sums: &sums, weights: None };

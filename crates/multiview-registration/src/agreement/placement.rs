@@ -91,6 +91,11 @@ impl Placements {
         Self { stations: judged(count, &pairs), pairs }
     }
 
+    /// Stations of which something else tells that they are in the wrong place.
+    pub(crate) fn doubt(&mut self, stations: impl Iterator<Item = usize>) {
+        stations.for_each(|station| self.stations[station].verdict = Placement::Doubtful);
+    }
+
     /// Indices of the stations that are probably in the wrong place.
     pub fn doubtful(&self) -> impl Iterator<Item = usize> + '_ {
         let doubtful = |station: &&StationPlacement| station.verdict == Placement::Doubtful;

@@ -44,13 +44,13 @@ pub(crate) fn sightings(
 }
 
 /// The wide shared planes, by where they lie.
-struct Wide {
+pub(crate) struct Wide {
     indices: Vec<usize>,
     extents: Vec<Extent>,
 }
 
 impl Wide {
-    fn new(shared_planes: &[SharedPlane]) -> Self {
+    pub(crate) fn new(shared_planes: &[SharedPlane]) -> Self {
         let indices: Vec<usize> = (0..shared_planes.len()).filter(|&k| shared_planes[k].points.is_empty()).collect();
         let extents = indices.iter().map(|&k| shared_planes[k].extent()).collect();
         Self { indices, extents }
@@ -58,7 +58,7 @@ impl Wide {
 }
 
 /// The points of small shared planes (shared plane, index in the cloud) of each station.
-fn members(stations: usize, shared_planes: &[SharedPlane]) -> Vec<Vec<(u32, u32)>> {
+pub(crate) fn members(stations: usize, shared_planes: &[SharedPlane]) -> Vec<Vec<(u32, u32)>> {
     let mut members = vec![Vec::new(); stations];
     for (index, shared_plane) in shared_planes.iter().enumerate() {
         for &(station, point) in &shared_plane.points {
@@ -79,7 +79,7 @@ struct Hit {
     range_m: f64,
 }
 
-struct Sighting<'a> {
+pub(crate) struct Sighting<'a> {
     points: &'a StationPoints,
     rotation: Matrix3<f64>,
     eye: Vector3<f64>,
@@ -92,7 +92,7 @@ struct Sighting<'a> {
 }
 
 impl<'a> Sighting<'a> {
-    fn new(points: &'a StationPoints, pose: &Isometry3<f64>, shared_planes: &'a [SharedPlane], gate: Gate) -> Self {
+    pub(crate) fn new(points: &'a StationPoints, pose: &Isometry3<f64>, shared_planes: &'a [SharedPlane], gate: Gate) -> Self {
         Self {
             points,
             rotation: pose.rotation.to_rotation_matrix().into_inner(),
@@ -106,7 +106,7 @@ impl<'a> Sighting<'a> {
         }
     }
 
-    fn sums(mut self, wide: &Wide, members: &[(u32, u32)]) -> Sums {
+    pub(crate) fn sums(mut self, wide: &Wide, members: &[(u32, u32)]) -> Sums {
         let in_reach = self.in_reach(wide);
         let mut near = Vec::new();
         for block in &self.points.blocks {

@@ -92,6 +92,12 @@ impl Sums {
         self.begins[slot].0 as usize
     }
 
+    /// Number of points of a tile by its place.
+    pub(crate) fn count(&self, slot: usize) -> usize {
+        let end = self.begins[slot].1 as usize + Self::stride(self.order);
+        self.values[end - 1] as usize
+    }
+
     /// The places of these tiles among those that the station saw.
     pub(crate) fn slots(&self, tiles: &Range<usize>) -> Range<usize> {
         let place = |tile: usize| self.begins.partition_point(|begin| (begin.0 as usize) < tile);

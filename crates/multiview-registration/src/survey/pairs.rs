@@ -65,7 +65,7 @@ impl Adjusted {
     fn pair(&self, target: usize, source: usize, hold_m: f64, size_m: f64) -> Result<PairAlignment> {
         let poses = [self.state.poses[target], self.state.poses[source]];
         let none = (Vec::new(), Vec::new());
-        let network = Network { fixed: 0, hold_m, turn_rad: 1.0, names: &[], prior: &none, turns: &[] };
+        let network = Network { fixed: 0, hold_m, turn_rad: 1.0, names: &[], prior: &none, turns: &[], whole: true };
         let mut equations = Equations::new(2, 0);
         let also = &self.common.planes[source];
         for &plane in self.common.planes[target].iter().filter(|plane| also.binary_search(plane).is_ok()) {

@@ -20,7 +20,7 @@ use crate::survey::joint_covariance::JointCovariance;
 use crate::survey::registration::{
     Effort, Start, StationRegistration, StationRegistrationOptions, SurfacePair, UndeterminedStation,
 };
-use crate::survey::together::{Brought, brought_together, network, prior_of};
+use crate::survey::together::{Brought, brought_together, is_whole, network, prior_of};
 use point_cloud::Cloud;
 use rigid_pose::is_finite;
 
@@ -52,9 +52,10 @@ pub fn register_stations(
 ) -> Result<StationRegistration> {
     validate(stations, start, datum, options)?;
     let (prior, names) = prior_of(options)?;
+    let given = start;
     let Brought { adjusted, start, points, placements: judged, prepared, radius_m, patch_m } =
         brought_together(stations, start, datum, options, progress)?;
-    let network = network(datum, radius_m, options, (&prior, &names));
+    let network = network(datum, radius_m, options, (&prior, &names), is_whole(stations.len(), given, options));
     require_connected(&adjusted, datum)?;
     let placements = judged.map_or_else(|| placements(stations, points, &adjusted.state), Ok)?;
     let checked = checked(&adjusted, options.minimum_overlap, datum, (radius_m, patch_m))?;

@@ -1,4 +1,4 @@
-//! All stations adjusted, from what is known of them: wide rounds, the last rounds, and those again that went astray.
+//! All stations adjusted, from what is known of them: wide rounds, the last rounds, and those again that fit better elsewhere.
 
 use std::borrow::Cow;
 
@@ -7,10 +7,11 @@ use rayon::prelude::*;
 use statistics::upper_median;
 
 use crate::adjustment::network::{Network, State};
+use crate::adjustment::places::Places;
 use crate::adjustment::precision;
 use crate::adjustment::rounds::{Surfaces, WideRounds};
 use crate::adjustment::simultaneous::{Adjusted, Finish, MOST_ROUNDS};
-use crate::adjustment::sparse_equations::is_small;
+use crate::adjustment::sparse_equations::DENSE_STATIONS;
 use crate::agreement::placement::{Placements, judge_placements};
 use crate::error::Result;
 use crate::surfaces::patch_size;
@@ -22,9 +23,9 @@ use crate::survey::registration::{Start, StationRegistrationOptions};
 use point_cloud::Cloud;
 use point_cloud::{UnorganisedNormalOptions, unorganised_normals};
 
-/// How often those of many stations that have gone astray begin again at their start, among the others in their places.
-const AGAIN: usize = 3;
-/// Rounds after which that is seen: all but those settle in five to seven.
+/// How often those of many stations that fit better elsewhere are put there.
+const AGAIN: usize = 4;
+/// Rounds after which that is looked at: all but those settle in five to seven.
 const FEW_ROUNDS: usize = 8;
 /// Default of the error of approximate poses, in radii of the clouds.
 const START_ERROR: f64 = 0.2;
@@ -46,9 +47,16 @@ pub(crate) fn network<'a>(
     radius_m: f64,
     options: &StationRegistrationOptions<'a>,
     (prior, names): (&'a (Vec<f64>, Vec<f64>), &'a [String]),
+    whole: bool,
 ) -> Network<'a> {
     let fixed = datum.held_station();
-    Network { fixed, hold_m: radius_m, turn_rad: 1.0, names, prior, turns: options.turns }
+    Network { fixed, hold_m: radius_m, turn_rad: 1.0, names, prior, turns: options.turns, whole }
+}
+
+/// Whether the normal matrix is factorised as a whole. Shared parameters couple all stations, and stations that were arranged by what
+/// they saw are not off each by itself.
+pub(crate) fn is_whole(stations: usize, start: Start<'_>, options: &StationRegistrationOptions<'_>) -> bool {
+    options.model.is_some() || stations <= DENSE_STATIONS || !matches!(start, Start::Poses(_))
 }
 
 /// All stations adjusted, before anything is judged.
@@ -72,6 +80,7 @@ pub(crate) fn brought_together(
     options: &StationRegistrationOptions<'_>,
     progress: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<Brought> {
+    let whole = is_whole(stations.len(), start, options);
     let surfaces = prepare(stations, options)?;
     let patch_m = surfaces[0].size_m;
     let radius_m = surfaces.iter().map(|surface| surface.radius_m).fold(0.0, f64::max);
@@ -82,33 +91,32 @@ pub(crate) fn brought_together(
     // Stations that were arranged by what they saw may have slid along walls together: they are not known better.
     let reach_m = options.start_error_m.unwrap_or(START_ERROR * radius_m);
     let (prior, names) = prior_of(options)?;
-    let network = network(datum, radius_m, options, (&prior, &names));
+    let network = network(datum, radius_m, options, (&prior, &names), whole);
     let total = |done| progress(done, MOST_ROUNDS);
-    let wide_rounds = WideRounds { network: &network, reach_m, held: &[], progress: &total };
+    let wide_rounds = WideRounds { network: &network, reach_m, progress: &total };
     let mut modelled = Surfaces::fixed(surfaces.iter().collect());
     modelled.model = options.model.map(|model| (model, stations.iter().map(Cloud::len).collect()));
     let mut near = wide_rounds.run(&mut modelled, &State { poses: start.clone(), parameters: prior.0.clone() })?;
-    let few = is_small(stations.len(), prior.0.len());
-    let moved = if few { Isometry3::identity() } else { framed(&mut near, network.fixed, &start[network.fixed]) };
+    let moved = if whole { Isometry3::identity() } else { framed(&mut near, network.fixed, &start[network.fixed]) };
     let mut finish = Finish {
         network: &network,
         near: network.near(patch_m / 2.0),
         tolerance_m: patch_m / TOLERANCE,
-        most_rounds: if few { MOST_ROUNDS } else { FEW_ROUNDS },
+        most_rounds: if whole { MOST_ROUNDS } else { FEW_ROUNDS },
         progress: &total,
     };
     let mut points: Vec<StationPoints> =
         stations.par_iter().zip(&surfaces).map(|(cloud, surface)| StationPoints::new(cloud, surface)).collect();
     let mut adjusted = finish.run(&mut modelled, &mut points, near)?;
     let mut placements = None;
-    if few {
+    if whole {
         if let Some(state) = returned(&adjusted, &start, &network, patch_m) {
             // Wide rounds may have moved stations where noise alone told them to.
             adjusted = finish.run(&mut modelled, &mut points, state)?;
         }
     } else {
         let begun: Vec<Isometry3<f64>> = start.iter().map(|pose| moved * pose).collect();
-        let again = Again { stations, start: &begun, patch_m, wide_rounds };
+        let again = Again { stations, start: &begun, patch_m, reach_m };
         (adjusted, placements) = again.settled(adjusted, &mut finish, &mut modelled, &mut points)?;
     }
     let prepared = match modelled.modelled {
@@ -136,16 +144,17 @@ fn normals_of(cloud: &Cloud) -> Result<Cow<'_, [Vector3<f64>]>> {
     }
 }
 
-/// How those of many stations that have gone astray begin again.
+/// How those of many stations that are not in their places are sought again.
 struct Again<'a> {
     stations: &'a [Cloud],
+    /// Where they began, in the present frame.
     start: &'a [Isometry3<f64>],
     patch_m: f64,
-    wide_rounds: WideRounds<'a>,
+    reach_m: f64,
 }
 
 impl Again<'_> {
-    /// Adjusts until no station is astray, and verdicts on where they are then; `None` where some are to the end.
+    /// Adjusts until no station fits better elsewhere, and verdicts on where they are then.
     fn settled(
         &self,
         mut adjusted: Adjusted,
@@ -153,28 +162,19 @@ impl Again<'_> {
         modelled: &mut Surfaces<'_>,
         points: &mut [StationPoints],
     ) -> Result<(Adjusted, Option<Placements>)> {
-        for again in 0..AGAIN {
-            let mut astray = astray(&adjusted, self.wide_rounds.network, self.patch_m);
-            if astray.is_empty() {
-                let placements = judge_placements(self.stations, &adjusted.state.poses)?;
-                astray = placements.doubtful().collect();
-                if astray.is_empty() {
-                    return Ok((adjusted, Some(placements)));
-                }
+        for again in 0..=AGAIN {
+            let places = Places::new(&adjusted, points, self.start, finish.network, (self.patch_m, self.reach_m));
+            let mut poses = adjusted.state.poses.clone();
+            let moved = places.improved(&mut poses)?;
+            if (moved.is_empty() && adjusted.settled) || again == AGAIN {
+                let mut placements = judge_placements(self.stations, &adjusted.state.poses)?;
+                placements.doubt(moved.into_iter());
+                return Ok((adjusted, Some(placements)));
             }
-            // The nearer to its start a station is sought, the fewer things that are like those it saw are there.
-            let reach_m = self.wide_rounds.reach_m / f64::from(2 << again);
-            let held: Vec<bool> = (0..self.stations.len()).map(|station| !astray.contains(&station)).collect();
-            let fixed = self.wide_rounds.network.fixed;
-            let mut state = adjusted.state;
-            let at = state.poses[fixed];
-            for &station in &astray {
-                state.poses[station] = self.start[station];
-            }
-            let among = WideRounds { held: &held, reach_m, ..self.wide_rounds };
-            let mut state = among.run(modelled, &state)?;
-            framed(&mut state, fixed, &at);
-            finish.most_rounds = if again + 1 < AGAIN { FEW_ROUNDS } else { MOST_ROUNDS };
+            let mut state = State { poses, ..adjusted.state.clone() };
+            let fixed = finish.network.fixed;
+            framed(&mut state, fixed, &adjusted.state.poses[fixed]);
+            finish.most_rounds = if moved.is_empty() { MOST_ROUNDS } else { FEW_ROUNDS };
             adjusted = finish.run(modelled, points, state)?;
         }
         Ok((adjusted, None))
@@ -193,20 +193,6 @@ fn framed(state: &mut State, station: usize, pose: &Isometry3<f64>) -> Isometry3
     }
     state.poses[station] = *pose;
     moved
-}
-
-/// Of many stations those that lie where nothing holds them: they still move, or surfaces leave a motion open.
-fn astray(adjusted: &Adjusted, network: &Network<'_>, size_m: f64) -> Vec<usize> {
-    let is_open = |&k: &usize| {
-        let own = adjusted.cofactors.of(k) * adjusted.variance_factor();
-        k != network.fixed
-            && !precision::undetermined(&adjusted.state.poses[k], &own, network.hold_m, size_m).is_empty()
-    };
-    let open = (0..adjusted.state.poses.len()).filter(is_open);
-    let mut all: Vec<usize> = open.chain(adjusted.moving.iter().copied()).collect();
-    all.sort_unstable();
-    all.dedup();
-    all
 }
 
 /// The state with what is undetermined of the stations as it was at the start; `None` where all is determined.

@@ -1,0 +1,346 @@
+//! Whether stations would fit better in another place: slid along what their surfaces tell least, among the planes that the others saw.
+//!
+//! Where little stands along a wall, the patches of the wide rounds may leave a station decimetres from its place, or all those beyond
+//! it, and shared planes that are not met there pull them no more. But their points tell: in the right place more of them lie on what
+//! the others saw.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use nalgebra::{Isometry3, Matrix3, Matrix6, UnitQuaternion, Vector3, Vector6};
+use rayon::prelude::*;
+
+use crate::adjustment::network::{Network, relative_jacobians};
+use crate::adjustment::precision;
+use crate::adjustment::rounds::FEWEST_CONTACTS;
+use crate::adjustment::simultaneous::Adjusted;
+use crate::error::Result;
+use crate::planes::elimination::motion_of;
+use crate::planes::sightings::{Gate, Sighting, Wide, members};
+use crate::planes::sums::Sums;
+use crate::surfaces::points::StationPoints;
+use icp_registration::RobustKernel;
+use rigid_pose::eigen6;
+
+/// Points of a station that make a tile one that it saw.
+const FEWEST_POINTS: usize = 5;
+/// Steps of a slide, patches.
+const STEP: f64 = 0.25;
+/// Of so many points one tells which slides are worth refining: those that keep this share of what lies on planes now, and at most
+/// so many.
+const STRIDE: usize = 4;
+const KEPT: f64 = 0.97;
+const REFINED: usize = 3;
+/// Steps onto the planes, each with points given to them anew, and what poses may be off before the last, patches.
+const STEPS: usize = 4;
+const OFF: f64 = 0.1;
+/// Deviation of a relative pose beyond which two stations do not hold each other, patches: shared planes are joined within as much.
+const LOOSE: f64 = 0.05;
+/// Stations on either side of what little holds that tell where they began.
+const NEAREST: usize = 24;
+/// Standard deviations by which more points must lie on planes elsewhere: as probable as one in a million stations.
+const SIGMAS: f64 = 5.0;
+
+/// The planes of an adjustment, and where stations are sought among them.
+pub(crate) struct Places<'a> {
+    pub adjusted: &'a Adjusted,
+    pub points: &'a [StationPoints],
+    pub network: &'a Network<'a>,
+    /// Where stations began.
+    pub start: &'a [Isometry3<f64>],
+    pub size_m: f64,
+    /// How far they are sought.
+    pub reach_m: f64,
+    wide: Wide,
+    members: Vec<Vec<(u32, u32)>>,
+}
+
+/// Stations that move as one, with how many of their points lie on what the others saw.
+struct Place {
+    /// Of all of them, in the world.
+    motion: Isometry3<f64>,
+    points: usize,
+    /// By shift and turn about their middle.
+    normal: Matrix6<f64>,
+    right: Vector6<f64>,
+}
+
+impl<'a> Places<'a> {
+    pub(crate) fn new(
+        adjusted: &'a Adjusted,
+        points: &'a [StationPoints],
+        start: &'a [Isometry3<f64>],
+        network: &'a Network<'a>,
+        (size_m, reach_m): (f64, f64),
+    ) -> Self {
+        let planes = &adjusted.shared_planes;
+        let (wide, members) = (Wide::new(planes), members(points.len(), planes));
+        Self { adjusted, points, network, start, size_m, reach_m, wide, members }
+    }
+
+    /// Moves stations to where they fit better; returns which.
+    pub(crate) fn improved(&self, poses: &mut [Isometry3<f64>]) -> Result<BTreeSet<usize>> {
+        let mut moved = BTreeSet::new();
+        let rigid = self.rigid();
+        let largest = (0..rigid.len()).max_by_key(|part| (rigid[*part].len(), std::cmp::Reverse(*part))).unwrap_or(0);
+        let mut seen = self.nothing();
+        let mut placed = rigid[largest].clone();
+        placed.iter().for_each(|station| self.count(&mut seen, *station));
+        for part in self.order(&rigid, largest) {
+            let by_others = |tile: usize| seen[tile] > 0;
+            let sought = Sought::new(self, &rigid[part], poses, &by_others);
+            if let Some(motion) = sought.as_begun(&rigid[part], &placed, poses)? {
+                if std::env::var_os("B").is_some() { eprintln!("group {:?} moved {:.3}", rigid[part], motion.translation.vector.norm()); }
+                for &station in &rigid[part] {
+                    move_by(&motion, &mut poses[station]);
+                    moved.insert(station);
+                }
+            }
+            rigid[part].iter().for_each(|station| self.count(&mut seen, *station));
+            placed.extend(&rigid[part]);
+        }
+        let of_one = |station: usize| -> Result<Option<(usize, Isometry3<f64>)>> {
+            // What it alone saw says nothing.
+            let own: Vec<usize> = self.seen(station).collect();
+            let by_others = |tile: usize| seen[tile] > u32::from(own.binary_search(&tile).is_ok());
+            let better = Sought::new(self, &[station], poses, &by_others).better()?;
+            Ok(better.map(|motion| (station, motion)))
+        };
+        let single = (0..poses.len()).into_par_iter().filter(|station| !moved.contains(station));
+        let better: Vec<_> = single.map(of_one).collect::<Result<_>>()?;
+        for (station, motion) in better.into_iter().flatten() {
+            move_by(&motion, &mut poses[station]);
+            moved.insert(station);
+        }
+        Ok(moved)
+    }
+
+    fn nothing(&self) -> Vec<u32> {
+        let tiles = self.adjusted.shared_planes.last().map_or(0, |plane| plane.tiles.first + plane.tiles.len());
+        vec![0; tiles]
+    }
+
+    /// Tiles that a station saw, ascending.
+    fn seen(&self, station: usize) -> impl Iterator<Item = usize> + '_ {
+        let sums: &Sums = &self.adjusted.sums[station];
+        (0..sums.tiles()).filter(|slot| sums.count(*slot) >= FEWEST_POINTS).map(|slot| sums.tile(slot))
+    }
+
+    fn count(&self, seen: &mut [u32], station: usize) {
+        self.seen(station).for_each(|tile| seen[tile] += 1);
+    }
+
+    /// Pairs of stations with enough tiles in common.
+    fn pairs(&self) -> impl Iterator<Item = ([usize; 2], usize)> + '_ {
+        let pairs = self.adjusted.common.pairs.iter().filter(|(_, tiles)| tiles.len() >= FEWEST_CONTACTS);
+        pairs.map(|(&(a, b), tiles)| ([a as usize, b as usize], tiles.len()))
+    }
+
+    /// Parts of the network within which pairs of stations leave no motion open.
+    fn rigid(&self) -> Vec<Vec<usize>> {
+        let poses = &self.adjusted.state.poses;
+        let holds = |[a, b]: [usize; 2]| {
+            let jacobians = relative_jacobians(&poses[a], &poses[b]);
+            let mut covariance = Matrix6::zeros();
+            for (k, left) in [a, b].into_iter().zip(&jacobians) {
+                for (l, right) in [a, b].into_iter().zip(&jacobians) {
+                    covariance += left * self.adjusted.cofactors.between(k, l) * right.transpose();
+                }
+            }
+            let pose = poses[a].inverse() * poses[b];
+            let covariance = covariance * self.adjusted.variance_factor();
+            precision::undetermined(&pose, &covariance, self.network.hold_m, LOOSE * self.size_m).is_empty()
+        };
+        let mut part: Vec<usize> = (0..poses.len()).collect();
+        fn root(part: &[usize], mut station: usize) -> usize {
+            while part[station] != station {
+                station = part[station];
+            }
+            station
+        }
+        for (ends, _) in self.pairs() {
+            let [a, b] = ends.map(|end| root(&part, end));
+            if a != b && holds(ends) {
+                part[a.max(b)] = a.min(b);
+            }
+        }
+        let mut parts: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+        for station in 0..poses.len() {
+            parts.entry(root(&part, station)).or_default().push(station);
+        }
+        parts.into_values().collect()
+    }
+
+    /// The other parts, each the one with the most tiles in common with those before it.
+    fn order(&self, parts: &[Vec<usize>], first: usize) -> Vec<usize> {
+        let mut part_of = vec![0; self.points.len()];
+        for (part, stations) in parts.iter().enumerate() {
+            stations.iter().for_each(|station| part_of[*station] = part);
+        }
+        let mut common = vec![BTreeMap::<usize, usize>::new(); parts.len()];
+        for (ends, tiles) in self.pairs() {
+            let [a, b] = ends.map(|end| part_of[end]);
+            *common[a].entry(b).or_default() += tiles;
+            *common[b].entry(a).or_default() += tiles;
+        }
+        let mut order = vec![first];
+        loop {
+            let with = |part: usize| order.iter().filter_map(|placed| common[part].get(placed)).sum::<usize>();
+            let open = (0..parts.len()).filter(|part| !order.contains(part));
+            match open.max_by_key(|part| (with(*part), std::cmp::Reverse(*part))) {
+                Some(next) if with(next) > 0 => order.push(next),
+                _ => break,
+            }
+        }
+        order.split_off(1)
+    }
+}
+
+fn move_by(motion: &Isometry3<f64>, pose: &mut Isometry3<f64>) {
+    *pose = motion * *pose;
+    pose.rotation.renormalize();
+}
+
+/// Stations that move as one among what others saw.
+struct Sought<'a> {
+    places: &'a Places<'a>,
+    /// Those that saw something of that, and their poses.
+    stations: Vec<(usize, Isometry3<f64>)>,
+    middle: Vector3<f64>,
+    /// Distance at which turns count as lengths.
+    radius_m: f64,
+    by_others: &'a (dyn Fn(usize) -> bool + Sync),
+}
+
+impl<'a> Sought<'a> {
+    fn new(
+        places: &'a Places<'a>,
+        stations: &[usize],
+        poses: &[Isometry3<f64>],
+        by_others: &'a (dyn Fn(usize) -> bool + Sync),
+    ) -> Self {
+        let beside = |station: &&usize| stations.len() == 1 || places.seen(**station).any(by_others);
+        let stations: Vec<(usize, Isometry3<f64>)> =
+            stations.iter().filter(beside).map(|station| (*station, poses[*station])).collect();
+        let n = stations.len().max(1) as f64;
+        let middle = stations.iter().fold(Vector3::zeros(), |sum, (_, pose)| sum + pose.translation.vector / n);
+        let apart = stations.iter().map(|(_, pose)| (pose.translation.vector - middle).norm_squared() / n).sum::<f64>();
+        let radius_m = (apart + places.network.hold_m.powi(2)).sqrt();
+        Self { places, stations, middle, radius_m, by_others }
+    }
+
+    /// Where they fit better than now.
+    fn better(&self) -> Result<Option<Isometry3<f64>>> {
+        let rough = self.at(&Isometry3::identity(), 0.0, STRIDE);
+        let slide = self.weakest(&rough.normal)?;
+        let step_m = STEP * self.places.size_m;
+        let steps = (self.places.reach_m / step_m).ceil() as i32;
+        // The next place on either side leads here.
+        let slides = (-steps..=steps).filter(|step| step.abs() > 1);
+        let motions: Vec<Isometry3<f64>> =
+            slides.map(|step| self.motion(&(slide * (f64::from(step) * step_m)))).collect();
+        let mut others: Vec<Place> = motions.par_iter().map(|motion| self.at(motion, 0.0, STRIDE)).collect();
+        others.retain(|place| place.points as f64 > KEPT * rough.points as f64);
+        // Stable: of equal ones the first.
+        others.sort_by_key(|place| std::cmp::Reverse(place.points));
+        let refined = others.iter().take(REFINED).map(|place| self.refined(&place.motion));
+        let Some(best) = refined.reduce(|a, b| if b.points > a.points { b } else { a }) else { return Ok(None) };
+        let now = self.refined(&Isometry3::identity());
+        let all: usize = self.stations.iter().map(|(station, _)| self.places.points[*station].points.len()).sum();
+        // So many may be explained by one of the two places alone.
+        let either = (2 * all).saturating_sub(best.points + now.points) as f64;
+        let is_better = best.points as f64 - now.points as f64 > SIGMAS * either.sqrt();
+        if std::env::var_os("B").is_some() {
+            eprintln!("{:?}: {} of {all}, {} at {:.3} {is_better}", self.stations.iter().map(|s| s.0).collect::<Vec<_>>(), now.points, best.points, (best.motion * nalgebra::Point3::from(self.middle) - nalgebra::Point3::from(self.middle)).norm());
+        }
+        Ok(is_better.then_some(best.motion))
+    }
+
+    /// A part of the network that little holds goes to where its stations began, on average, and from there onto the planes; `None` where
+    /// it is there.
+    fn as_begun(&self, part: &[usize], placed: &[usize], poses: &[Isometry3<f64>]) -> Result<Option<Isometry3<f64>>> {
+        if self.stations.is_empty() {
+            return Ok(None);
+        }
+        let now = self.at(&Isometry3::identity(), 0.0, 1);
+        let slide = self.weakest(&now.normal)?;
+        let shift = Vector3::new(slide[0], slide[1], slide[2]);
+        let mean = |stations: &[usize]| {
+            let apart = |station: &usize| (poses[*station].translation.vector - self.middle).norm_squared();
+            let mut near = stations.to_vec();
+            near.sort_by(|a, b| apart(a).total_cmp(&apart(b)).then(a.cmp(b)));
+            near.truncate(NEAREST);
+            let off = |station: &usize| self.places.start[*station].translation.vector - poses[*station].translation.vector;
+            near.iter().map(off).sum::<Vector3<f64>>() / near.len().max(1) as f64
+        };
+        let back_m = shift.dot(&(mean(part) - mean(placed))) / shift.norm_squared().max(0.5);
+        let step_m = STEP * self.places.size_m;
+        let from = [0.0, back_m - step_m, back_m, back_m + step_m].map(|length_m| self.motion(&(slide * length_m)));
+        let places: Vec<Place> = from.par_iter().map(|motion| self.refined(motion)).collect();
+        let best = places.into_iter().reduce(|a, b| if b.points > a.points { b } else { a });
+        if std::env::var_os("B").is_some() {
+            eprintln!("{:?} back {back_m:.3} along {:.2?}: {} now, {:?}", self.stations.iter().map(|s| s.0).collect::<Vec<_>>(), shift.as_slice(), now.points, best.as_ref().map(|b| (b.points, b.motion.translation.vector.norm())));
+        }
+        Ok(best.filter(|best| best.points > now.points).map(|best| best.motion))
+    }
+
+    /// The motion by shift and turn about the middle.
+    fn motion(&self, step: &Vector6<f64>) -> Isometry3<f64> {
+        let turn = UnitQuaternion::from_scaled_axis(Vector3::new(step[3], step[4], step[5]));
+        let shift = Vector3::new(step[0], step[1], step[2]);
+        Isometry3::from_parts((shift + self.middle - turn * self.middle).into(), turn)
+    }
+
+    /// The motion that the points tell least, turns as lengths at the radius.
+    fn weakest(&self, normal: &Matrix6<f64>) -> Result<Vector6<f64>> {
+        let scale = Vector6::from_fn(|k, _| if k < 3 { 1.0 } else { 1.0 / self.radius_m });
+        let scaled = Matrix6::from_fn(|r, c| normal[(r, c)] * scale[r] * scale[c]);
+        let (values, vectors) = eigen6(&scaled, "the normal equations of stations among others")?;
+        Ok(vectors.column(values.imin()).component_mul(&scale))
+    }
+
+    /// The points of the stations moved so, which may be off by some length.
+    fn at(&self, motion: &Isometry3<f64>, slack_m: f64, stride: usize) -> Place {
+        let planes = &self.places.adjusted.shared_planes;
+        let gate = Gate { kernel: RobustKernel::Tukey, slack_m, stride, parameters: 0 };
+        let mut place = Place { motion: *motion, points: 0, normal: Matrix6::zeros(), right: Vector6::zeros() };
+        for (station, pose) in &self.stations {
+            let pose = motion * pose;
+            let (points, members) = (&self.places.points[*station], &self.places.members[*station]);
+            let sums = Sighting::new(points, &pose, planes, gate).sums(&self.places.wide, members);
+            let (mut normal, mut right) = (Matrix6::zeros(), Vector6::zeros());
+            for slot in (0..sums.tiles()).filter(|slot| (self.by_others)(sums.tile(*slot))) {
+                let Some(own) = sums.at(slot) else { continue };
+                let plane = planes.partition_point(|plane| plane.tiles.first <= sums.tile(slot)) - 1;
+                let motion = motion_of(&planes[plane], &pose);
+                normal += motion * Matrix3::from_fn(|i, j| own.product(i, j)) * motion.transpose();
+                right += motion * Vector3::from_fn(|i, _| own.right(i));
+                place.points += sums.count(slot);
+            }
+            let by = self.tangent(&pose);
+            place.normal += by.transpose() * normal * by;
+            place.right += by.transpose() * right;
+        }
+        place
+    }
+
+    /// How the tangent of a pose follows shift and turn about the middle.
+    fn tangent(&self, pose: &Isometry3<f64>) -> Matrix6<f64> {
+        let mut by = Matrix6::identity();
+        by.fixed_view_mut::<3, 3>(0, 3).copy_from(&(self.middle - pose.translation.vector).cross_matrix());
+        by.fixed_view_mut::<3, 3>(3, 3).copy_from(&pose.rotation.inverse().to_rotation_matrix().into_inner());
+        by
+    }
+
+    /// The stations moved onto the planes.
+    fn refined(&self, from: &Isometry3<f64>) -> Place {
+        let hold_m = self.places.size_m / 2.0;
+        let mut motion = *from;
+        for _ in 0..STEPS {
+            let Place { mut normal, right, .. } = self.at(&motion, OFF * self.places.size_m, 1);
+            (0..6).for_each(|k| normal[(k, k)] += if k < 3 { hold_m } else { hold_m / self.radius_m }.powi(-2));
+            let Some(factor) = normal.cholesky() else { break };
+            motion = self.motion(&-factor.solve(&right)) * motion;
+        }
+        self.at(&motion, 0.0, 1)
+    }
+}

@@ -3,7 +3,6 @@
 pub(crate) mod cofactors;
 pub(crate) mod equations;
 pub(crate) mod network;
-pub(crate) mod places;
 pub(crate) mod precision;
 pub(crate) mod rounds;
 pub(crate) mod simultaneous;

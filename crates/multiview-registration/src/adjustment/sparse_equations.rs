@@ -217,7 +217,8 @@ mod tests {
         let (planes, sums, poses) = survey();
         let stations: Vec<usize> = (0..6).collect();
         let prior = (Vec::new(), Vec::new());
-        let network = Network { fixed: 2, hold_m: 3.0, turn_rad: 1.0, names: &[], prior: &prior, turns: &[], whole: false };
+        let network =
+            Network { fixed: 2, hold_m: 3.0, turn_rad: 1.0, names: &[], prior: &prior, turns: &[], whole: false };
         let variances = Variances { surface: 1e-6, shared: 2e-6 };
         let eliminated = |plane: usize, most: usize| {
             let seen = SharedPlaneSums { shared_plane: &planes[plane], sums: &sums, weights: None };

@@ -92,7 +92,12 @@ pub(crate) struct Sighting<'a> {
 }
 
 impl<'a> Sighting<'a> {
-    pub(crate) fn new(points: &'a StationPoints, pose: &Isometry3<f64>, shared_planes: &'a [SharedPlane], gate: Gate) -> Self {
+    pub(crate) fn new(
+        points: &'a StationPoints,
+        pose: &Isometry3<f64>,
+        shared_planes: &'a [SharedPlane],
+        gate: Gate,
+    ) -> Self {
         Self {
             points,
             rotation: pose.rotation.to_rotation_matrix().into_inner(),

@@ -24,11 +24,11 @@ use crate::survey::together::{Brought, brought_together, is_whole, network, prio
 use point_cloud::Cloud;
 use rigid_pose::is_finite;
 
-/// Most stations at once. In buildings of so many all come into their places; of 400 (see docs/benchmarks.md) one did not, and nothing
-/// told.
+/// Most stations at once from approximate poses. In buildings of so many all come into their places; of 400 (see docs/benchmarks.md)
+/// one did not.
 const MOST_STATIONS: usize = 200;
-/// Most stations without approximate poses: of more, nothing has been shown.
-const MOST_ARRANGED: usize = 40;
+/// Most stations without approximate poses: each is tried against all placed before, which takes hours of more.
+const MOST_ARRANGED: usize = 200;
 
 /// Brings the clouds of many stations into one coordinate system.
 ///
@@ -121,7 +121,7 @@ fn validate(
     Ok(())
 }
 
-/// Refuses what would come out wrong somewhere. Shared parameters couple all stations: then they are adjusted as few are.
+/// Refuses what would come out wrong somewhere, or take hours. Shared parameters couple all stations: then they are adjusted as few are.
 fn require_few(found: usize, start: Start<'_>, options: &StationRegistrationOptions<'_>) -> Result<()> {
     if options.model.is_some() {
         return Ok(());

@@ -7,7 +7,6 @@ use rayon::prelude::*;
 use statistics::upper_median;
 
 use crate::adjustment::network::{Network, State};
-use crate::adjustment::places::Places;
 use crate::adjustment::precision;
 use crate::adjustment::rounds::{Surfaces, WideRounds};
 use crate::adjustment::simultaneous::{Adjusted, Finish, MOST_ROUNDS};
@@ -19,6 +18,7 @@ use crate::surfaces::patches::Surface;
 use crate::surfaces::point_model::checked_prior;
 use crate::surfaces::points::StationPoints;
 use crate::survey::datum::Datum;
+use crate::survey::places::Places;
 use crate::survey::registration::{Start, StationRegistrationOptions};
 use point_cloud::Cloud;
 use point_cloud::{UnorganisedNormalOptions, unorganised_normals};

@@ -4,12 +4,13 @@
 //! it, and shared planes that are not met there pull them no more. But their points tell: in the right place more of them lie on what
 //! the others saw.
 
+use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{Isometry3, Matrix3, Matrix6, UnitQuaternion, Vector3, Vector6};
 use rayon::prelude::*;
 
-use crate::adjustment::network::{Network, relative_jacobians};
+use crate::adjustment::network::Network;
 use crate::adjustment::precision;
 use crate::adjustment::rounds::FEWEST_CONTACTS;
 use crate::adjustment::simultaneous::Adjusted;
@@ -18,6 +19,7 @@ use crate::planes::elimination::motion_of;
 use crate::planes::sightings::{Gate, Sighting, Wide, members};
 use crate::planes::sums::Sums;
 use crate::surfaces::points::StationPoints;
+use crate::survey::joint_covariance::JointCovariance;
 use icp_registration::RobustKernel;
 use rigid_pose::eigen6;
 
@@ -79,29 +81,13 @@ impl<'a> Places<'a> {
 
     /// Moves stations to where they fit better; returns which.
     pub(crate) fn improved(&self, poses: &mut [Isometry3<f64>]) -> Result<BTreeSet<usize>> {
-        let mut moved = BTreeSet::new();
-        let rigid = self.rigid();
-        let largest = (0..rigid.len()).max_by_key(|part| (rigid[*part].len(), std::cmp::Reverse(*part))).unwrap_or(0);
-        let mut seen = self.nothing();
-        let mut placed = rigid[largest].clone();
-        placed.iter().for_each(|station| self.count(&mut seen, *station));
-        for part in self.order(&rigid, largest) {
-            let by_others = |tile: usize| seen[tile] > 0;
-            let sought = Sought::new(self, &rigid[part], poses, &by_others);
-            if let Some(motion) = sought.as_begun(&rigid[part], &placed, poses)? {
-                if std::env::var_os("B").is_some() { eprintln!("group {:?} moved {:.3}", rigid[part], motion.translation.vector.norm()); }
-                for &station in &rigid[part] {
-                    move_by(&motion, &mut poses[station]);
-                    moved.insert(station);
-                }
-            }
-            rigid[part].iter().for_each(|station| self.count(&mut seen, *station));
-            placed.extend(&rigid[part]);
-        }
+        let tiles = self.adjusted.shared_planes.last().map_or(0, |plane| plane.tiles.first + plane.tiles.len());
+        let mut by = vec![0; tiles];
+        let mut moved = self.parts_as_begun(poses, &mut by)?;
         let of_one = |station: usize| -> Result<Option<(usize, Isometry3<f64>)>> {
             // What it alone saw says nothing.
             let own: Vec<usize> = self.seen(station).collect();
-            let by_others = |tile: usize| seen[tile] > u32::from(own.binary_search(&tile).is_ok());
+            let by_others = |tile: usize| by[tile] > u32::from(own.binary_search(&tile).is_ok());
             let better = Sought::new(self, &[station], poses, &by_others).better()?;
             Ok(better.map(|motion| (station, motion)))
         };
@@ -114,19 +100,28 @@ impl<'a> Places<'a> {
         Ok(moved)
     }
 
-    fn nothing(&self) -> Vec<u32> {
-        let tiles = self.adjusted.shared_planes.last().map_or(0, |plane| plane.tiles.first + plane.tiles.len());
-        vec![0; tiles]
+    /// Moves parts of the network that little holds to where they began; returns which stations. `by`: how many saw each tile.
+    fn parts_as_begun(&self, poses: &mut [Isometry3<f64>], by: &mut [u32]) -> Result<BTreeSet<usize>> {
+        let parts = self.rigid();
+        let largest = (0..parts.len()).max_by_key(|part| (parts[*part].len(), Reverse(*part))).unwrap_or(0);
+        let (mut moved, mut placed) = (BTreeSet::new(), Vec::new());
+        for part in self.order(&parts, largest) {
+            let by_others = |tile: usize| by[tile] > 0;
+            let own = &parts[part];
+            if let Some(motion) = Sought::new(self, own, poses, &by_others).as_begun(own, &placed, poses)? {
+                own.iter().for_each(|station| move_by(&motion, &mut poses[*station]));
+                moved.extend(own);
+            }
+            own.iter().for_each(|station| self.seen(*station).for_each(|tile| by[tile] += 1));
+            placed.extend(own);
+        }
+        Ok(moved)
     }
 
     /// Tiles that a station saw, ascending.
     fn seen(&self, station: usize) -> impl Iterator<Item = usize> + '_ {
         let sums: &Sums = &self.adjusted.sums[station];
         (0..sums.tiles()).filter(|slot| sums.count(*slot) >= FEWEST_POINTS).map(|slot| sums.tile(slot))
-    }
-
-    fn count(&self, seen: &mut [u32], station: usize) {
-        self.seen(station).for_each(|tile| seen[tile] += 1);
     }
 
     /// Pairs of stations with enough tiles in common.
@@ -137,26 +132,13 @@ impl<'a> Places<'a> {
 
     /// Parts of the network within which pairs of stations leave no motion open.
     fn rigid(&self) -> Vec<Vec<usize>> {
-        let poses = &self.adjusted.state.poses;
+        let state = &self.adjusted.state;
+        let joint = JointCovariance::new(self.adjusted.cofactors.clone(), self.adjusted.variance_factor());
         let holds = |[a, b]: [usize; 2]| {
-            let jacobians = relative_jacobians(&poses[a], &poses[b]);
-            let mut covariance = Matrix6::zeros();
-            for (k, left) in [a, b].into_iter().zip(&jacobians) {
-                for (l, right) in [a, b].into_iter().zip(&jacobians) {
-                    covariance += left * self.adjusted.cofactors.between(k, l) * right.transpose();
-                }
-            }
-            let pose = poses[a].inverse() * poses[b];
-            let covariance = covariance * self.adjusted.variance_factor();
+            let (pose, covariance) = joint.relative_pose(&state.poses, a, b);
             precision::undetermined(&pose, &covariance, self.network.hold_m, LOOSE * self.size_m).is_empty()
         };
-        let mut part: Vec<usize> = (0..poses.len()).collect();
-        fn root(part: &[usize], mut station: usize) -> usize {
-            while part[station] != station {
-                station = part[station];
-            }
-            station
-        }
+        let mut part: Vec<usize> = (0..state.poses.len()).collect();
         for (ends, _) in self.pairs() {
             let [a, b] = ends.map(|end| root(&part, end));
             if a != b && holds(ends) {
@@ -164,35 +146,43 @@ impl<'a> Places<'a> {
             }
         }
         let mut parts: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
-        for station in 0..poses.len() {
+        for station in 0..part.len() {
             parts.entry(root(&part, station)).or_default().push(station);
         }
         parts.into_values().collect()
     }
 
-    /// The other parts, each the one with the most tiles in common with those before it.
+    /// One part and the others that it leads to, each the one with the most tiles in common with those before it.
     fn order(&self, parts: &[Vec<usize>], first: usize) -> Vec<usize> {
         let mut part_of = vec![0; self.points.len()];
         for (part, stations) in parts.iter().enumerate() {
             stations.iter().for_each(|station| part_of[*station] = part);
         }
-        let mut common = vec![BTreeMap::<usize, usize>::new(); parts.len()];
-        for (ends, tiles) in self.pairs() {
-            let [a, b] = ends.map(|end| part_of[end]);
-            *common[a].entry(b).or_default() += tiles;
-            *common[b].entry(a).or_default() += tiles;
-        }
-        let mut order = vec![first];
-        loop {
-            let with = |part: usize| order.iter().filter_map(|placed| common[part].get(placed)).sum::<usize>();
-            let open = (0..parts.len()).filter(|part| !order.contains(part));
-            match open.max_by_key(|part| (with(*part), std::cmp::Reverse(*part))) {
-                Some(next) if with(next) > 0 => order.push(next),
-                _ => break,
+        // With those in the order.
+        let mut common = vec![0; parts.len()];
+        let mut order = Vec::new();
+        let mut next = Some(first);
+        while let Some(part) = next {
+            order.push(part);
+            for (ends, tiles) in self.pairs() {
+                let [a, b] = ends.map(|end| part_of[end]);
+                if a != b && (a == part || b == part) {
+                    common[a + b - part] += tiles;
+                }
             }
+            let open = (0..parts.len()).filter(|part| !order.contains(part) && common[*part] > 0);
+            next = open.max_by_key(|part| (common[*part], Reverse(*part)));
         }
-        order.split_off(1)
+        order
     }
+}
+
+/// The first of the stations that one belongs to.
+fn root(part: &[usize], mut station: usize) -> usize {
+    while part[station] != station {
+        station = part[station];
+    }
+    station
 }
 
 fn move_by(motion: &Isometry3<f64>, pose: &mut Isometry3<f64>) {
@@ -241,7 +231,7 @@ impl<'a> Sought<'a> {
         let mut others: Vec<Place> = motions.par_iter().map(|motion| self.at(motion, 0.0, STRIDE)).collect();
         others.retain(|place| place.points as f64 > KEPT * rough.points as f64);
         // Stable: of equal ones the first.
-        others.sort_by_key(|place| std::cmp::Reverse(place.points));
+        others.sort_by_key(|place| Reverse(place.points));
         let refined = others.iter().take(REFINED).map(|place| self.refined(&place.motion));
         let Some(best) = refined.reduce(|a, b| if b.points > a.points { b } else { a }) else { return Ok(None) };
         let now = self.refined(&Isometry3::identity());
@@ -249,38 +239,29 @@ impl<'a> Sought<'a> {
         // So many may be explained by one of the two places alone.
         let either = (2 * all).saturating_sub(best.points + now.points) as f64;
         let is_better = best.points as f64 - now.points as f64 > SIGMAS * either.sqrt();
-        if std::env::var_os("B").is_some() {
-            eprintln!("{:?}: {} of {all}, {} at {:.3} {is_better}", self.stations.iter().map(|s| s.0).collect::<Vec<_>>(), now.points, best.points, (best.motion * nalgebra::Point3::from(self.middle) - nalgebra::Point3::from(self.middle)).norm());
-        }
         Ok(is_better.then_some(best.motion))
     }
 
-    /// A part of the network that little holds goes to where its stations began, on average, and from there onto the planes; `None` where
-    /// it is there.
+    /// The motion of a part that little holds to where its stations began, on average, as against those beside it: shared planes tell
+    /// from there. `None` where it is there.
     fn as_begun(&self, part: &[usize], placed: &[usize], poses: &[Isometry3<f64>]) -> Result<Option<Isometry3<f64>>> {
-        if self.stations.is_empty() {
+        if self.stations.is_empty() || placed.is_empty() {
             return Ok(None);
         }
-        let now = self.at(&Isometry3::identity(), 0.0, 1);
-        let slide = self.weakest(&now.normal)?;
+        let slide = self.weakest(&self.at(&Isometry3::identity(), 0.0, 1).normal)?;
         let shift = Vector3::new(slide[0], slide[1], slide[2]);
-        let mean = |stations: &[usize]| {
+        let began = |stations: &[usize]| {
             let apart = |station: &usize| (poses[*station].translation.vector - self.middle).norm_squared();
             let mut near = stations.to_vec();
             near.sort_by(|a, b| apart(a).total_cmp(&apart(b)).then(a.cmp(b)));
             near.truncate(NEAREST);
-            let off = |station: &usize| self.places.start[*station].translation.vector - poses[*station].translation.vector;
-            near.iter().map(off).sum::<Vector3<f64>>() / near.len().max(1) as f64
+            let place = |poses: &[Isometry3<f64>], station: &usize| poses[*station].translation.vector;
+            let off = |station: &usize| place(self.places.start, station) - place(poses, station);
+            near.iter().map(off).sum::<Vector3<f64>>() / near.len() as f64
         };
-        let back_m = shift.dot(&(mean(part) - mean(placed))) / shift.norm_squared().max(0.5);
-        let step_m = STEP * self.places.size_m;
-        let from = [0.0, back_m - step_m, back_m, back_m + step_m].map(|length_m| self.motion(&(slide * length_m)));
-        let places: Vec<Place> = from.par_iter().map(|motion| self.refined(motion)).collect();
-        let best = places.into_iter().reduce(|a, b| if b.points > a.points { b } else { a });
-        if std::env::var_os("B").is_some() {
-            eprintln!("{:?} back {back_m:.3} along {:.2?}: {} now, {:?}", self.stations.iter().map(|s| s.0).collect::<Vec<_>>(), shift.as_slice(), now.points, best.as_ref().map(|b| (b.points, b.motion.translation.vector.norm())));
-        }
-        Ok(best.filter(|best| best.points > now.points).map(|best| best.motion))
+        // What turns more than it slides stays.
+        let back_m = shift.dot(&(began(part) - began(placed))) / shift.norm_squared().max(0.5);
+        Ok((back_m.abs() > LOOSE * self.places.size_m).then(|| self.motion(&(slide * back_m))))
     }
 
     /// The motion by shift and turn about the middle.

@@ -44,14 +44,14 @@ const SIGMAS: f64 = 5.0;
 
 /// The planes of an adjustment, and where stations are sought among them.
 pub(crate) struct Places<'a> {
-    pub adjusted: &'a Adjusted,
-    pub points: &'a [StationPoints],
-    pub network: &'a Network<'a>,
+    adjusted: &'a Adjusted,
+    points: &'a [StationPoints],
+    network: &'a Network<'a>,
     /// Where stations began.
-    pub start: &'a [Isometry3<f64>],
-    pub size_m: f64,
+    start: &'a [Isometry3<f64>],
+    size_m: f64,
     /// How far they are sought.
-    pub reach_m: f64,
+    reach_m: f64,
     wide: Wide,
     members: Vec<Vec<(u32, u32)>>,
 }
@@ -109,10 +109,14 @@ impl<'a> Places<'a> {
             let by_others = |tile: usize| by[tile] > 0;
             let own = &parts[part];
             if let Some(motion) = Sought::new(self, own, poses, &by_others).as_begun(own, &placed, poses)? {
-                own.iter().for_each(|station| move_by(&motion, &mut poses[*station]));
+                for &station in own {
+                    move_by(&motion, &mut poses[station]);
+                }
                 moved.extend(own);
             }
-            own.iter().for_each(|station| self.seen(*station).for_each(|tile| by[tile] += 1));
+            for tile in own.iter().flat_map(|station| self.seen(*station)) {
+                by[tile] += 1;
+            }
             placed.extend(own);
         }
         Ok(moved)
@@ -156,7 +160,9 @@ impl<'a> Places<'a> {
     fn order(&self, parts: &[Vec<usize>], first: usize) -> Vec<usize> {
         let mut part_of = vec![0; self.points.len()];
         for (part, stations) in parts.iter().enumerate() {
-            stations.iter().for_each(|station| part_of[*station] = part);
+            for &station in stations {
+                part_of[station] = part;
+            }
         }
         // With those in the order.
         let mut common = vec![0; parts.len()];
@@ -232,9 +238,11 @@ impl<'a> Sought<'a> {
         others.retain(|place| place.points as f64 > KEPT * rough.points as f64);
         // Stable: of equal ones the first.
         others.sort_by_key(|place| Reverse(place.points));
-        let refined = others.iter().take(REFINED).map(|place| self.refined(&place.motion));
+        // Among planes that hold still the station may leave what held it where it is.
+        let from = std::iter::once(Isometry3::identity()).chain(others.iter().take(REFINED).map(|place| place.motion));
+        let refined = from.map(|motion| self.refined(&motion));
         let Some(best) = refined.reduce(|a, b| if b.points > a.points { b } else { a }) else { return Ok(None) };
-        let now = self.refined(&Isometry3::identity());
+        let now = self.at(&Isometry3::identity(), 0.0, 1);
         let all: usize = self.stations.iter().map(|(station, _)| self.places.points[*station].points.len()).sum();
         // So many may be explained by one of the two places alone.
         let either = (2 * all).saturating_sub(best.points + now.points) as f64;

@@ -52,10 +52,10 @@ pub fn register_stations(
 ) -> Result<StationRegistration> {
     validate(stations, start, datum, options)?;
     let (prior, names) = prior_of(options)?;
-    let given = start;
+    let whole = is_whole(stations.len(), start, options);
     let Brought { adjusted, start, points, placements: judged, prepared, radius_m, patch_m } =
-        brought_together(stations, start, datum, options, progress)?;
-    let network = network(datum, radius_m, options, (&prior, &names), is_whole(stations.len(), given, options));
+        brought_together(stations, start, datum, (options, whole), progress)?;
+    let network = network(datum, radius_m, options, (&prior, &names), whole);
     require_connected(&adjusted, datum)?;
     let placements = judged.map_or_else(|| placements(stations, points, &adjusted.state), Ok)?;
     let checked = checked(&adjusted, options.minimum_overlap, datum, (radius_m, patch_m))?;

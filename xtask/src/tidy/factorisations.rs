@@ -72,6 +72,7 @@ const KNOWN: &[(Use, &[&str])] = &[
     (
         Use::SmallStep,
         &[
+            "multiview-registration/src/survey/places.rs",
             "fusion/src/surfels/curvature.rs",
             "icp-registration/src/quality/verdict.rs",
             "inertial/src/state.rs",

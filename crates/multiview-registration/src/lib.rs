@@ -4,15 +4,7 @@ mod adjustment;
 mod agreement;
 #[cfg(test)]
 #[path = "../../point-cloud/tests/common/mod.rs"]
-#[allow(
-    dead_code,
-    missing_docs,
-    unreachable_pub,
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    clippy::pedantic
-)]
+#[allow(unreachable_pub)]
 mod common;
 mod error;
 mod pairs_of_frames;

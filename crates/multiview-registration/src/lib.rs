@@ -2,10 +2,6 @@
 
 mod adjustment;
 mod agreement;
-#[cfg(test)]
-#[path = "../../point-cloud/tests/common/mod.rs"]
-#[allow(unreachable_pub)]
-mod common;
 mod error;
 mod pairs_of_frames;
 mod planes;

@@ -206,7 +206,3 @@ fn returned(adjusted: &Adjusted, start: &[Isometry3<f64>], network: &Network<'_>
     }
     any.then_some(state)
 }
-
-#[cfg(test)]
-#[path = "../../tests/inside/few_and_many.rs"]
-mod tests;

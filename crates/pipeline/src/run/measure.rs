@@ -1,6 +1,6 @@
 //! Figures of a run, gathered into its summary.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use multiview_registration::{Placements, RefusedPair};
@@ -32,9 +32,8 @@ pub(crate) fn summarise(
     // Poses of stations that were not brought together after all are nobody's.
     let found: Vec<StationPose> = joined.poses.iter().flatten().cloned().collect();
     let poses: &[StationPose] = if refusal.is_some() { &[] } else { &found };
-    let mut stations: Vec<&str> = kept.views.iter().map(|view| view.station.as_str()).collect();
-    stations.sort_unstable();
-    stations.dedup();
+    let stations: BTreeSet<&str> = kept.views.iter().map(|view| view.station.as_str()).collect();
+    let sigma_m = quantile(&mut kept.values.sigma_m.clone(), 0.5);
     Summary {
         pipeline: plan.name.clone(),
         survey: folder.display().to_string(),
@@ -48,7 +47,7 @@ pub(crate) fn summarise(
         ruled_out: ruled_out(survey.level),
         flags_fraction: kept.flag_fractions(),
         points: kept.views.iter().filter_map(|view| view.points).sum(),
-        sigma_range_median_m: median(&kept.values.sigma_m),
+        sigma_range_median_m: Some(sigma_m).filter(|sigma_m| sigma_m.is_finite()),
         registration: registration(joined, poses),
         reference: kept.reference(),
         truth: truth(kept, poses),
@@ -60,10 +59,6 @@ pub(crate) fn summarise(
         seconds: 0.0,
         out: String::new(),
     }
-}
-
-fn median(values: &[f64]) -> Option<f64> {
-    Some(quantile(&mut values.to_vec(), 0.5)).filter(|value| value.is_finite())
 }
 
 fn registration(joined: &Joined, known: &[StationPose]) -> Option<RegistrationSummary> {

@@ -199,7 +199,9 @@ pub(crate) fn complete(
     summary.out = request.out.display().to_string();
     summary.seconds = commands::made::seconds_since(start);
     if without_times() {
-        summary.stages.iter_mut().for_each(|stage| stage.seconds = 0.0);
+        for stage in &mut summary.stages {
+            stage.seconds = 0.0;
+        }
     }
     if let Some(poses) = &common {
         files::results::write_poses(folder, &kept.views, poses, &summary)?;

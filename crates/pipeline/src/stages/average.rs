@@ -134,7 +134,9 @@ fn mean_of_phases(
     let rest = check_rest(frames, &options.rest)?;
     let interference = beats.then(|| check_interference(frames, &options.interference)).transpose()?;
     rest.flag(&mut mean.flags);
-    interference.iter().for_each(|interference| interference.flag(&mut mean.flags));
+    if let Some(interference) = &interference {
+        interference.flag(&mut mean.flags);
+    }
     Ok((mean, Tests::new(&rest, interference.as_ref())))
 }
 

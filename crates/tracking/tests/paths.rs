@@ -81,7 +81,7 @@ fn the_way_back_is_tracked_from_the_keyframes_of_the_way_there() {
 
 #[test]
 fn a_camera_carried_elsewhere_is_lost_and_found_again() {
-    for relocalisation in [Relocalisation::Projective, Relocalisation::Coarse] {
+    for relocalisation in [Relocalisation::Projective, Relocalisation::Coarse, Relocalisation::Beside] {
         let mut tracker = tracker(TrackerOptions { relocalisation, ..TrackerOptions::default() });
         run(&mut tracker, &seen(0..60));
         // Into a corner that was never seen: under the ceiling, looking up.

@@ -143,10 +143,13 @@ fn scale_rays(rays: &[[f64; 3]], ranges: &[f32], points: &mut [[f64; 3]]) {
 
 #[inline(always)]
 fn scale<const L: usize>(rays: &[[f64; 3]; L], ranges: &[f32; L], points: &mut [[f64; 3]; L]) {
+    let mut known = [f32::NAN; L];
     for lane in 0..L {
-        let range = if is_distance(ranges[lane]) { f64::from(ranges[lane]) } else { f64::NAN };
+        known[lane] = if is_distance(ranges[lane]) { ranges[lane] } else { f32::NAN };
+    }
+    for lane in 0..L {
         for axis in 0..3 {
-            points[lane][axis] = rays[lane][axis] * range;
+            points[lane][axis] = rays[lane][axis] * f64::from(known[lane]);
         }
     }
 }
@@ -184,8 +187,9 @@ fn missing(range: f32) -> u16 {
     if is_distance(range) { 0 } else { Flags::NO_DATA.bits() }
 }
 
-/// Whether a value can be a distance in front of the camera.
+/// Whether a value can be a distance in front of the camera. Compared with infinity, it would become a question for the class of
+/// the number, which compilers answer lane by lane.
 #[inline(always)]
 fn is_distance(range: f32) -> bool {
-    (range > 0.0) & (range < f32::INFINITY)
+    (range > 0.0) & (range <= f32::MAX)
 }

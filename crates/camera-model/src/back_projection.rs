@@ -116,9 +116,7 @@ impl RayTable {
             #[inline(always)]
             || {
                 scale_rays(rays, range, points);
-                for (flags, &range) in flags.iter_mut().zip(range) {
-                    *flags = Flags::from_bits_retain(flags.bits() | missing(range));
-                }
+                add_missing(range, flags);
             },
         );
         Ok(())
@@ -127,6 +125,8 @@ impl RayTable {
 
 /// Pixels taken at a time, so that the compiler can vectorise.
 const LANES: usize = 8;
+/// Flags taken at a time.
+const FLAGS: usize = 32;
 
 #[inline(always)]
 fn scale_rays(rays: &[[f64; 3]], ranges: &[f32], points: &mut [[f64; 3]]) {
@@ -143,11 +143,34 @@ fn scale_rays(rays: &[[f64; 3]], ranges: &[f32], points: &mut [[f64; 3]]) {
 
 #[inline(always)]
 fn scale<const L: usize>(rays: &[[f64; 3]; L], ranges: &[f32; L], points: &mut [[f64; 3]; L]) {
+    let mut known = [f32::NAN; L];
     for lane in 0..L {
-        let range = if is_distance(ranges[lane]) { f64::from(ranges[lane]) } else { f64::NAN };
+        known[lane] = if is_distance(ranges[lane]) { ranges[lane] } else { f32::NAN };
+    }
+    for lane in 0..L {
         for axis in 0..3 {
-            points[lane][axis] = rays[lane][axis] * range;
+            points[lane][axis] = rays[lane][axis] * f64::from(known[lane]);
         }
+    }
+}
+
+/// Adds the flag of what is no distance.
+#[inline(always)]
+fn add_missing(ranges: &[f32], flags: &mut [Flags]) {
+    let (ranges, last_ranges) = ranges.as_chunks::<FLAGS>();
+    let (flags, last_flags) = flags.as_chunks_mut::<FLAGS>();
+    for (flags, ranges) in flags.iter_mut().zip(ranges) {
+        // As wide as the ranges that they are found by.
+        let mut found = [0_u32; FLAGS];
+        for lane in 0..FLAGS {
+            found[lane] = u32::from(missing(ranges[lane]));
+        }
+        for lane in 0..FLAGS {
+            flags[lane] = Flags::from_bits_retain(flags[lane].bits() | found[lane] as u16);
+        }
+    }
+    for (flags, &range) in last_flags.iter_mut().zip(last_ranges) {
+        *flags = Flags::from_bits_retain(flags.bits() | missing(range));
     }
 }
 
@@ -164,8 +187,9 @@ fn missing(range: f32) -> u16 {
     if is_distance(range) { 0 } else { Flags::NO_DATA.bits() }
 }
 
-/// Whether a value can be a distance in front of the camera.
+/// Whether a value can be a distance in front of the camera. Compared with infinity, it would become a question for the class of
+/// the number, which compilers answer lane by lane.
 #[inline(always)]
 fn is_distance(range: f32) -> bool {
-    (range > 0.0) & (range < f32::INFINITY)
+    (range > 0.0) & (range <= f32::MAX)
 }

@@ -65,9 +65,13 @@ impl ResultCloud {
             )));
         }
         let file = read_cloud(&path)?.in_world();
-        if file.sigma.is_none() && file.covariance.is_none() {
-            let message = "the cloud has neither `sigma` nor a covariance: nothing is known of its noise";
-            return Err(request(format!("{}: {message}; run the pipeline again on frames with noise", path.display())));
+        let has_sigma = file.sigma.as_ref().is_some_and(|sigma| sigma.iter().any(|sigma| sigma.is_finite()));
+        if !has_sigma && file.covariance.is_none() {
+            return Err(request(format!(
+                "{}: no point has a `sigma` or a covariance, so nothing is known of its noise: run the pipeline again with a calibration \
+                 that has `range_noise`, which `rangecam noise` finds from frames of a scene at rest",
+                path.display()
+            )));
         }
         let errors_path = folder.join(COMMON_ERRORS);
         if !errors_path.exists() {

@@ -1,7 +1,7 @@
 //! Pairs of simulated frames aligned from nothing: how many are found, how many answers are wrong, and the CPU time of
 //! one thread from raw points to the pose.
 //!
-//! `coarse_pairs [graph|ransac] [pairs] [large|most|half|none] [from=SEED] [sensitivity] [--each]`; `sensitivity` refuses
+//! `coarse_pairs [pairs] [large|most|half|none] [from=SEED] [sensitivity] [--each]`; `sensitivity` refuses
 //! nothing and tells what each threshold would decide.
 #![allow(clippy::unwrap_used, clippy::print_stdout, missing_docs)]
 
@@ -15,19 +15,14 @@ use std::ops::Range;
 
 use coarse_scenes::{Outcome, Pair, align_points, outcome, pair, random_room};
 use common::{Pinhole, Scene};
-use global_registration::{CoarseAlignment, CoarseOptions, Estimator};
+use global_registration::{CoarseAlignment, CoarseOptions};
 
 fn main() {
     let words: Vec<String> = std::env::args().skip(1).collect();
     let each = words.iter().any(|w| w == "--each");
     let asked: Option<u64> = words.iter().find_map(|w| w.parse().ok());
     let count = asked.unwrap_or(200);
-    let estimator = if words.iter().any(|w| w == "ransac") {
-        Estimator::Ransac { samples: 100_000 }
-    } else {
-        Estimator::ConsistencyGraph
-    };
-    let mut options = CoarseOptions { estimator, ..CoarseOptions::default() };
+    let mut options = CoarseOptions::default();
     let sensitivity = words.iter().any(|w| w == "sensitivity");
     if sensitivity {
         options = coarse_sensitivity::loose(&options);

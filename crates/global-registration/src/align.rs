@@ -11,8 +11,7 @@ use super::description::features::Features;
 use super::hypotheses::correspondences::{Correspondences, Tolerance};
 use super::hypotheses::graph::ConsistencyGraph;
 use super::hypotheses::matching::{Match, matches};
-use super::hypotheses::ransac::consistent_samples;
-use super::options::{CoarseOptions, Estimator, SharedError};
+use super::options::{CoarseOptions, SharedError};
 use super::verification::distinct::Common;
 use super::verification::judge::Verdict;
 use super::verification::refine::refine;
@@ -20,7 +19,7 @@ use crate::error::{Error, Result};
 
 /// Correspondences that enter the graph, those with the most alike descriptors.
 const MOST_CORRESPONDENCES: usize = 2500;
-/// Cliques or samples that poses are computed from.
+/// Cliques that poses are computed from.
 const MOST_CANDIDATES: usize = 120;
 /// Where nothing passes at first: this many times as many candidates and hypotheses.
 const SECOND_LOOK: usize = 4;
@@ -167,7 +166,7 @@ fn verified(
     effort: usize,
 ) -> Vec<Hypothesis> {
     let tolerance = tolerance(target, options);
-    let candidates = candidates(correspondences, tolerance, options, effort * MOST_CANDIDATES);
+    let candidates = candidates(correspondences, tolerance, effort * MOST_CANDIDATES);
     let ranked = ranked(source, target, candidates, effort * options.max_hypotheses, |pose| {
         // The share of added features that agree counts as much as that of the points: along walls only they can tell.
         let verdict = Verdict::new(source, target, pose, RANKING_STRIDE);
@@ -245,12 +244,7 @@ fn placed(cloud: &FeatureCloud, features: &Features, index: u32) -> ([f32; 3], [
 }
 
 /// Poses of sets of correspondences that agree, each fitted again to all that agree with it.
-fn candidates(
-    correspondences: &Correspondences,
-    tolerance: Tolerance,
-    options: &CoarseOptions,
-    most: usize,
-) -> Vec<Isometry3<f64>> {
+fn candidates(correspondences: &Correspondences, tolerance: Tolerance, most: usize) -> Vec<Isometry3<f64>> {
     let arm = 2.0 * tolerance.distance;
     let solve = |set: &[u32]| {
         let first = correspondences.solve(set, arm)?;
@@ -258,21 +252,13 @@ fn candidates(
         let again = if inliers.len() < 3 { None } else { correspondences.solve(&inliers, arm) };
         Some((again.unwrap_or(first), inliers))
     };
-    match options.estimator {
-        Estimator::ConsistencyGraph => {
-            let mut poses = Vec::new();
-            ConsistencyGraph::new(correspondences, tolerance).cliques(most, |clique| {
-                let Some((pose, inliers)) = solve(clique) else { return Vec::new() };
-                poses.push(pose);
-                inliers
-            });
-            poses
-        }
-        Estimator::Ransac { samples } => {
-            let sets = consistent_samples(correspondences, tolerance, arm, samples, most, options.seed);
-            sets.par_iter().filter_map(|set| solve(set).map(|found| found.0)).collect()
-        }
-    }
+    let mut poses = Vec::new();
+    ConsistencyGraph::new(correspondences, tolerance).cliques(most, |clique| {
+        let Some((pose, inliers)) = solve(clique) else { return Vec::new() };
+        poses.push(pose);
+        inliers
+    });
+    poses
 }
 
 /// The poses with the best scores, each different from those before.

@@ -17,7 +17,7 @@ pub use description::sift::{AmplitudeFeatureOptions, amplitude_features};
 pub use error::Error;
 pub use hypotheses::sparse::{SparseAlignment, SparseIcpOptions, align_features};
 pub use nalgebra;
-pub use options::{CoarseOptions, Estimator, SharedError, SurfaceDescriptors, Viewpoint};
+pub use options::{CoarseOptions, SharedError, SurfaceDescriptors, Viewpoint};
 pub use point_cloud;
 pub use rigid_pose;
 pub use verification::among::{

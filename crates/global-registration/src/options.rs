@@ -33,20 +33,6 @@ pub enum SurfaceDescriptors {
     None,
 }
 
-/// How correspondences that belong together are found among the many that do not.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[non_exhaustive]
-pub enum Estimator {
-    /// Cliques of the graph of mutually consistent correspondences `[Yang2021]`, `[Zhang2023]`.
-    #[default]
-    ConsistencyGraph,
-    /// Random samples of three correspondences `[FischlerBolles1981]`.
-    Ransac {
-        /// Samples drawn.
-        samples: usize,
-    },
-}
-
 /// What neighbouring points err by together, of the distance between two surfaces: what is left of a sensor's distortion, its
 /// delays, its scale.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -71,8 +57,6 @@ pub struct CoarseOptions {
     pub descriptor_radius_voxels: f64,
     /// Most points that are matched, those whose descriptors differ most from the cloud's mean. Default 1200.
     pub max_features: usize,
-    /// How the correspondences are sifted. Default: consistency graph.
-    pub estimator: Estimator,
     /// Distance up to which a correspondence agrees with a pose, voxels. Default 1.5.
     pub tolerance_voxels: f64,
     /// Different poses that are refined and verified. Default 8.
@@ -92,8 +76,6 @@ pub struct CoarseOptions {
     /// Smallest probability that the pose is known ([`super::CoarseAlignment::determined`]). Default 0.95. 0 lets features decide
     /// where surfaces cannot.
     pub min_determined: f64,
-    /// Start of the random numbers. Default: 1.
-    pub seed: u64,
 }
 
 impl Default for CoarseOptions {
@@ -104,7 +86,6 @@ impl Default for CoarseOptions {
             descriptors: SurfaceDescriptors::Fpfh,
             descriptor_radius_voxels: 5.0,
             max_features: 1200,
-            estimator: Estimator::ConsistencyGraph,
             tolerance_voxels: 1.5,
             max_hypotheses: 8,
             min_overlap: 0.3,
@@ -112,7 +93,6 @@ impl Default for CoarseOptions {
             level: 0.05,
             min_inside: 0.008,
             min_determined: 0.95,
-            seed: 1,
         }
     }
 }
@@ -156,11 +136,6 @@ impl CoarseOptions {
         if let Viewpoint::At(point) = self.viewpoint {
             point_cloud::check_points("viewpoint", &[point])?;
         }
-        match self.estimator {
-            Estimator::Ransac { samples: 0 } => {
-                Err(Error::InvalidOption { name: "samples", value: 0.0, domain: "1 or more" })
-            }
-            _ => Ok(()),
-        }
+        Ok(())
     }
 }

@@ -3,7 +3,7 @@
 use crate::common::{Pinhole, Scene};
 use crate::scenes::{Outcome, align_points, outcome, pair};
 use global_registration::Error;
-use global_registration::{CoarseOptions, Estimator, FeatureCloud, SharedError, Viewpoint, align_without_guess};
+use global_registration::{CoarseOptions, FeatureCloud, SharedError, Viewpoint, align_without_guess};
 use nalgebra::{Isometry3, Point3};
 use point_cloud::Cloud;
 use point_cloud::Error as CloudError;
@@ -96,7 +96,6 @@ fn options_outside_their_domain_are_named() {
         CoarseOptions { voxel_m: Some(f64::NAN), ..options.clone() },
         CoarseOptions { tolerance_voxels: -1.0, ..options.clone() },
         CoarseOptions { max_features: 0, ..options.clone() },
-        CoarseOptions { estimator: Estimator::Ransac { samples: 0 }, ..options.clone() },
         CoarseOptions { min_overlap: f64::INFINITY, ..options.clone() },
         CoarseOptions { min_inside: -0.1, ..options.clone() },
         CoarseOptions { level: f64::NAN, ..options.clone() },

@@ -56,6 +56,9 @@ pub enum Error {
         /// What is wrong with it.
         reason: &'static str,
     },
+    /// A covariance of what a state learns is not symmetric and positive definite.
+    #[error("the covariance of what is observed is not positive definite: check its numbers and units (metre, radian)")]
+    InvalidCovariance,
     /// Samples that should be of a unit at rest are not.
     #[error(transparent)]
     Unrest(#[from] crate::rest::Unrest),

@@ -26,6 +26,13 @@ pub struct Rest {
     pub seconds: f64,
 }
 
+impl Rest {
+    /// Variance of each component of the mean rate as the bias at the end of the rest: noise, and what the bias walked, (rad/s)².
+    pub fn rate_variance(&self, noise: &ImuNoise) -> f64 {
+        noise.gyro_density.powi(2) / self.seconds + noise.gyro_walk.powi(2) * self.seconds / 3.0
+    }
+}
+
 /// Why samples are not those of a unit at rest.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]

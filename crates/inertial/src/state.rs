@@ -73,14 +73,15 @@ impl InertialState {
         noise.check()?;
         InertialSample::check(samples)?;
         let resting = &samples[..samples.partition_point(|sample| sample.timestamp_s <= time_s)];
-        let Rest { rate, force, seconds } = rest(resting, noise)?;
+        let found = rest(resting, noise)?;
+        let Rest { rate, force, seconds } = found;
         let rotation = world_from_body.pose.rotation.to_rotation_matrix().into_inner();
         // Errors that are independent of each other: pose, velocity, gyro bias, accel bias, mean force.
         let mut own = StateCovariance::zeros();
         own.fixed_view_mut::<6, 6>(0, 0).copy_from(&world_from_body.covariance);
         let variances = [
             (VELOCITY, RESTING_VELOCITY.powi(2)),
-            (GYRO, noise.gyro_density.powi(2) / seconds + noise.gyro_walk.powi(2) * seconds / 3.0),
+            (GYRO, found.rate_variance(noise)),
             (ACCEL, noise.accel_bias_sigma.powi(2)),
             (GRAVITY, noise.accel_density.powi(2) / seconds + noise.accel_walk.powi(2) * seconds / 3.0),
         ];
@@ -155,7 +156,7 @@ impl InertialState {
     /// Corrects the whole state by a measured pose of the body, whose errors are independent of it.
     ///
     /// # Errors
-    /// [`Error::InvalidPose`] where the covariance is not positive definite.
+    /// [`Error::InvalidCovariance`] where the covariance is not positive definite.
     pub fn learn(&mut self, world_from_body: &Uncertain) -> Result<()> {
         let difference = pose_difference(&self.navigation.world_from_body, &world_from_body.pose);
         let mut by_state = SMatrix::<f64, 6, 18>::zeros();
@@ -192,8 +193,7 @@ impl InertialState {
         let total = shared * by_state.transpose() + covariance;
         let factor =
             ((total + total.transpose()) * 0.5).cholesky().filter(|_| covariance.iter().all(|v| v.is_finite()));
-        let factor =
-            factor.ok_or(Error::InvalidPose { index: 0, reason: "its covariance is not positive definite" })?;
+        let factor = factor.ok_or(Error::InvalidCovariance)?;
         let gain = factor.solve(&shared).transpose();
         let step = gain * misclosure;
         let kept = StateCovariance::identity() - gain * by_state;

@@ -156,7 +156,7 @@ fn what_is_no_rest_and_no_pose_is_refused() {
     assert_eq!(state.carried(&samples, 0.5, &noise).unwrap(), before);
     for variance in [f64::NAN, f64::INFINITY, -1.0] {
         let pose = Uncertain { covariance: Matrix6::identity() * variance, ..here };
-        assert!(matches!(state.learn(&pose), Err(Error::InvalidPose { .. })), "{variance}");
+        assert!(matches!(state.learn(&pose), Err(Error::InvalidCovariance)), "{variance}");
         assert_eq!(state, before);
     }
 }

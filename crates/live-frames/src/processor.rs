@@ -157,9 +157,15 @@ impl Processor {
         exposure: impl Into<Exposure>,
     ) -> Result<&ProcessedFrame> {
         let (samples, exposure) = (samples.into(), exposure.into());
-        self.check(&samples, &exposure)?;
-        let drift_m = self.calibration.drift_m(&exposure)?;
-        let ready = self.calibration.ready(&exposure, drift_m)?;
+        // To the threads that work once a frame: each loop by itself would be waited for, and find its planes at another processor.
+        rayon::scope(|_| self.take(samples, &exposure))?;
+        Ok(&self.frame)
+    }
+
+    fn take(&mut self, samples: SampleSlice<'_>, exposure: &Exposure) -> Result<()> {
+        self.check(&samples, exposure)?;
+        let drift_m = self.calibration.drift_m(exposure)?;
+        let ready = self.calibration.ready(exposure, drift_m)?;
         let LiveCamera { width, height, phase_steps, ref modulations, .. } = self.camera;
         let raw = RawView::new(width, height, phase_steps, modulations, samples)?;
         if self.last_s.is_some_and(|before_s| exposure.timestamp_s - before_s > self.limits.longest_gap_s) {
@@ -173,7 +179,7 @@ impl Processor {
             rays: &calibration.rays,
             corrections: ready.map(|index| calibration.corrections(index)),
             span: calibration.span,
-            all_outside: calibration.too_warm_or_cold(&exposure),
+            all_outside: calibration.too_warm_or_cold(exposure),
             minimum_confidence: self.stages.unwrap.minimum_confidence,
             width,
         };
@@ -188,7 +194,7 @@ impl Processor {
             self.frame.pose = None;
             self.frame.pose = Some(pose.track(exposure.timestamp_s, &self.frame)?);
         }
-        Ok(&self.frame)
+        Ok(())
     }
 
     fn check(&self, samples: &SampleSlice<'_>, exposure: &Exposure) -> Result<()> {

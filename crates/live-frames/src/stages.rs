@@ -12,7 +12,8 @@ pub struct Stages {
     pub unwrap: UnwrapStage,
     /// Whether a calibrated drift is taken off. Default: [`DriftStage::Apply`].
     pub drift: DriftStage,
-    /// The camera's pose, from points without a flag; `None`, the default: not sought.
+    /// The camera's pose, from points without a flag; `None`, the default: not sought. A search by
+    /// [`Relocalisation::Coarse`](tracking::Relocalisation::Coarse) goes on [beside](tracking::Relocalisation::Beside) the frames.
     #[cfg(feature = "tracking")]
     pub tracking: Option<tracking::TrackerOptions>,
 }

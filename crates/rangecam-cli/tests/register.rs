@@ -72,8 +72,16 @@ fn errors_say_what_to_do() {
     assert!(text(&absent.stderr).contains("there is no such file or folder"), "{}", text(&absent.stderr));
 }
 
-/// A folder of depth images of 160 x 120 pixels in the form of 7-Scenes, all of one bumpy wall.
-fn write_images(folder: &Path, shows: &[bool]) {
+/// What an image shows: nothing, a bumpy wall, or another one.
+#[derive(Clone, Copy)]
+enum Shows {
+    Nothing,
+    Wall,
+    OtherWall,
+}
+
+/// A folder of depth images of 160 x 120 pixels in the form of 7-Scenes.
+fn write_images(folder: &Path, shows: &[Shows]) {
     std::fs::create_dir_all(folder).unwrap();
     std::fs::write(folder.join("camera-intrinsics.txt"), "150 0 80\n0 150 60\n0 0 1\n").unwrap();
     for (k, shows) in shows.iter().enumerate() {
@@ -85,17 +93,48 @@ fn write_images(folder: &Path, shows: &[bool]) {
             let (u, v) = (f64::from(pixel % 160) / 40.0, f64::from(pixel / 160) / 40.0);
             2.0 + 0.15 * (2.0 * u).sin() * (3.1 * v).cos() + 0.1 * u + 0.05 * (1.3 * v * u).cos()
         };
-        let stored = |pixel: u32| if *shows { (1000.0 * depth(pixel)) as u16 } else { 0 };
+        let stored = |pixel: u32| match shows {
+            Shows::Nothing => 0,
+            Shows::Wall => (1000.0 * depth(pixel)) as u16,
+            Shows::OtherWall => {
+                let (u, v) = (f64::from(pixel % 160) / 40.0, f64::from(pixel / 160) / 40.0);
+                (1500.0 + 200.0 * (3.7 * v).sin() - 150.0 * (2.9 * u + v).cos() - 100.0 * v) as u16
+            }
+        };
         let bytes: Vec<u8> = (0..160 * 120).flat_map(|pixel| stored(pixel).to_be_bytes()).collect();
         encoder.write_header().unwrap().write_image_data(&bytes).unwrap();
     }
 }
 
 #[test]
+fn an_image_that_belongs_to_no_other_is_left_out_by_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    write_images(Path::new(&path("walls")), &[Shows::Wall, Shows::OtherWall, Shows::Wall, Shows::Wall]);
+    let plan = r#"(name: "walls", stages: [PointCloud(), Register(start: order), Adjust()])"#;
+    std::fs::write(path("plan.ron"), plan).unwrap();
+    let output = rangecam(&["run", &path("walls"), "-p", &path("plan.ron"), "--out", &path("out")]);
+    let said = text(&output.stdout) + &text(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert!(said.contains("frame-000001: not placed, and not in the results"), "{said}");
+    let file = |name: &str| folder.path().join("out").join(name);
+    let placed: Vec<String> =
+        range_io::tables::read_stations(file("stations.csv")).unwrap().into_iter().map(|row| row.station).collect();
+    assert_eq!(placed, ["frame-000000", "frame-000002", "frame-000003"]);
+    // Points are those of the placed ones, which count on without a gap.
+    let frames = range_io::ply::read_cloud(file("cloud.ply")).unwrap().frame.unwrap();
+    assert_eq!((frames.len(), frames.iter().max()), (3 * 160 * 120, Some(&2)));
+    let errors = std::fs::read_to_string(file("common_errors.ron")).unwrap();
+    assert_eq!(errors.matches("view:").count(), 3);
+    let refused = rangecam(&["fuse", &path("out"), "--out", &path("fused")]);
+    assert!(text(&refused.stderr).contains("calibration that has `range_noise`"), "{}", text(&refused.stderr));
+}
+
+#[test]
 fn a_folder_of_images_is_tracked() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name).display().to_string();
-    write_images(Path::new(&path("still")), &[true; 4]);
+    write_images(Path::new(&path("still")), &[Shows::Wall; 4]);
     let output = rangecam(&["register", &path("still"), "--track", "--out", &path("out"), "--json"]);
     assert!(output.status.success(), "{}", text(&output.stderr));
     let json: serde_json::Value = serde_json::from_str(&text(&output.stdout)).unwrap();
@@ -109,7 +148,7 @@ fn a_folder_of_images_is_tracked() {
     }
 
     // A sequence that ends lost is done in part.
-    write_images(Path::new(&path("ends")), &[true, true, false, false]);
+    write_images(Path::new(&path("ends")), &[Shows::Wall, Shows::Wall, Shows::Nothing, Shows::Nothing]);
     let output = rangecam(&["register", &path("ends"), "--track", "--out", &path("lost"), "--json"]);
     assert_eq!(output.status.code(), Some(5));
     let json: serde_json::Value = serde_json::from_str(&text(&output.stdout)).unwrap();

@@ -23,7 +23,7 @@ pub(crate) fn turns(path: &Path, survey: &Survey, stations: &[Station]) -> Resul
     let first_s = stations.first().map_or(f64::NAN, |station| station.timestamp_s);
     let before = samples.partition_point(|sample| sample.timestamp_s <= first_s);
     let (bias, variance) = match rest(samples.get(..before).unwrap_or_default(), &noise) {
-        Ok(rest) => (rest.rate, noise.gyro_density.powi(2) / rest.seconds),
+        Ok(rest) => (rest.rate, rest.rate_variance(&noise)),
         Err(_) => (Vector3::zeros(), noise.gyro_bias_sigma.powi(2)),
     };
     let biases = Biases { gyro: bias, accel: Vector3::zeros() };

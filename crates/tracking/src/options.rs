@@ -28,6 +28,10 @@ pub enum Relocalisation {
     Coarse,
     /// The same with other options.
     CoarseWith(Box<CoarseOptions>),
+    /// As [`Coarse`](Self::Coarse), for streams that do not wait: a lost frame is registered with two keyframes, other ones each time,
+    /// and the alignment without a guess goes on beside the frames, on a thread of its own. What it finds serves the tenth frame
+    /// behind the one that was aligned, which waits for it, so that the same frames give the same bits.
+    Beside,
 }
 
 /// Length of the step, in standard deviations, after which the last one is taken. The pose of a quarter of the nodes lies √18

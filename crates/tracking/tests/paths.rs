@@ -81,7 +81,7 @@ fn the_way_back_is_tracked_from_the_keyframes_of_the_way_there() {
 
 #[test]
 fn a_camera_carried_elsewhere_is_lost_and_found_again() {
-    for relocalisation in [Relocalisation::Projective, Relocalisation::Coarse] {
+    for relocalisation in [Relocalisation::Projective, Relocalisation::Coarse, Relocalisation::Beside] {
         let mut tracker = tracker(TrackerOptions { relocalisation, ..TrackerOptions::default() });
         run(&mut tracker, &seen(0..60));
         // Into a corner that was never seen: under the ceiling, looking up.
@@ -98,6 +98,25 @@ fn a_camera_carried_elsewhere_is_lost_and_found_again() {
         }
         assert!(found[at + 1..].iter().all(|pose| pose.state == TrackingState::Tracked));
     }
+}
+
+#[test]
+fn a_camera_on_its_side_is_found_beside_the_frames() {
+    let run_once = || {
+        let mut tracker =
+            tracker(TrackerOptions { relocalisation: Relocalisation::Beside, ..TrackerOptions::default() });
+        run(&mut tracker, &seen(0..30));
+        // Small images do not look like those of the keyframes then.
+        let roll = Isometry3::rotation(nalgebra::Vector3::new(0.0, 0.0, 1.5));
+        run(&mut tracker, &[Some(around(10) * roll); 32])
+    };
+    let found = run_once();
+    let at = found.iter().position(|pose| pose.state.has_pose()).expect("the camera is found again");
+    assert!(at >= 10 && found[at].state == TrackingState::Relocalised, "{at} {:?}", found[at].state);
+    let roll = Isometry3::rotation(nalgebra::Vector3::new(0.0, 0.0, 1.5));
+    let (millimetre, degree) = pose_error(&found[at].world_from_camera, &(from_first(10) * roll));
+    assert!(millimetre < 15.0 && degree < 0.5, "{millimetre} mm {degree} deg");
+    assert_eq!(found, run_once(), "the same frames give the same poses, however long the search takes");
 }
 
 #[test]

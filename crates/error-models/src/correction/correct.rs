@@ -85,20 +85,21 @@ fn correct_planes(
         // Products and sums stay separate operations, so that all machines give the same bits.
         with_wide_registers(
             #[inline(always)]
-            || correct_chunk(chunk, &kernel, 0..format.width),
+            || correct_chunk::<true>(chunk, &kernel, 0..format.width),
         );
         Ok(())
     })?;
     Ok(tally.summary(format.width * format.height, model.terms.d0, -1.0))
 }
 
-/// Corrects a chunk whose rows reach over these columns of the frame; the first is a multiple of a block.
+/// Corrects a chunk whose rows reach over these columns of the frame; the first is a multiple of a block. What was corrected is
+/// counted where `COUNTS` says so.
 #[inline(always)]
-pub(crate) fn correct_chunk(chunk: &mut Chunk<'_>, kernel: &Kernel, columns: Range<usize>) {
+pub(crate) fn correct_chunk<const COUNTS: bool>(chunk: &mut Chunk<'_>, kernel: &Kernel, columns: Range<usize>) {
     let (first_column, width) = (columns.start, columns.len());
     let mut parts = Parts::default();
     for row in 0..chunk.range.len() / width {
-        let mut tally = LaneTally::new();
+        let mut tally = LaneTally::<COUNTS>::new();
         kernel.begin_row(chunk.first_row + row, &mut parts);
         for column in (0..width).step_by(LANES) {
             let start = row * width + column;
@@ -109,19 +110,21 @@ pub(crate) fn correct_chunk(chunk: &mut Chunk<'_>, kernel: &Kernel, columns: Ran
                 correct_rest(chunk, start..start + width - column, kernel, place, &mut parts, &mut tally);
             }
         }
-        chunk.tally.add(&tally.total(kernel.d0));
+        if COUNTS {
+            chunk.tally.add(&tally.total(kernel.d0));
+        }
     }
 }
 
 /// A whole block, in place.
 #[inline(always)]
-fn correct_block(
+fn correct_block<const COUNTS: bool>(
     chunk: &mut Chunk<'_>,
     start: usize,
     kernel: &Kernel,
     place: [usize; 2],
     parts: &mut Parts,
-    tally: &mut LaneTally,
+    tally: &mut LaneTally<COUNTS>,
 ) {
     let (Some(range), Some(amplitude)) =
         (chunk.range[start..].first_chunk_mut(), chunk.amplitude[start..].first_chunk())
@@ -140,13 +143,13 @@ fn correct_block(
 
 /// The end of a row, in a block filled up with pixels that have no range.
 #[inline(always)]
-fn correct_rest(
+fn correct_rest<const COUNTS: bool>(
     chunk: &mut Chunk<'_>,
     pixels: Range<usize>,
     kernel: &Kernel,
     place: [usize; 2],
     parts: &mut Parts,
-    tally: &mut LaneTally,
+    tally: &mut LaneTally<COUNTS>,
 ) {
     let length = pixels.len();
     let [mut range, mut sigma, mut amplitude] = [[f32::NAN; LANES]; 3];

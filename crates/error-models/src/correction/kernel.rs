@@ -89,12 +89,12 @@ impl Kernel {
     /// Corrects the pixels of `block`, the first of which is `(column, row)`. Gives all bits for each pixel that the model
     /// does not cover; `None` where it covers all.
     #[inline(always)]
-    pub(crate) fn correct(
+    pub(crate) fn correct<const COUNTS: bool>(
         &self,
         mut block: Block<'_>,
         [column, row]: [usize; 2],
         parts: &mut Parts,
-        tally: &mut LaneTally,
+        tally: &mut LaneTally<COUNTS>,
     ) -> Option<Mask> {
         match &self.spline {
             Some(spline) => spline.put(block.range, &mut parts.periodic, &mut parts.derivative),
@@ -126,7 +126,12 @@ impl Kernel {
     /// cover, `None` where it covers all.
     #[inline(always)]
     #[allow(clippy::needless_bitwise_bool)] // a branch would keep the loop scalar
-    fn leave_out(&self, range: &Lanes, parts: &mut Parts, tally: &mut LaneTally) -> Option<Mask> {
+    fn leave_out<const COUNTS: bool>(
+        &self,
+        range: &Lanes,
+        parts: &mut Parts,
+        tally: &mut LaneTally<COUNTS>,
+    ) -> Option<Mask> {
         let mut all = u32::MAX;
         for lane in 0..LANES {
             parts.inside[lane] = mask(within(range[lane], self.range_span));
@@ -159,7 +164,7 @@ impl Kernel {
 
     /// Takes the sum of the parts off and transports sigma.
     #[inline(always)]
-    fn apply(&self, block: &mut Block<'_>, parts: &mut Parts, tally: &mut LaneTally) {
+    fn apply<const COUNTS: bool>(&self, block: &mut Block<'_>, parts: &mut Parts, tally: &mut LaneTally<COUNTS>) {
         let d0 = (self.d0 as f32).to_bits();
         let mut total = [0.0; LANES];
         for lane in 0..LANES {

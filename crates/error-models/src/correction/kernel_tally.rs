@@ -8,8 +8,8 @@ use crate::summary::{DELAY, GROUPS, TOTAL, Tally};
 /// Sums that are kept beside each other: so few stay in registers.
 const SUMS: usize = 8;
 
-/// Counts and sums of a row.
-pub(crate) struct LaneTally {
+/// Counts and sums of a row; where nobody asks for them, nothing is counted.
+pub(crate) struct LaneTally<const COUNTS: bool> {
     finite: usize,
     corrected: usize,
     outside_span: usize,
@@ -20,7 +20,7 @@ pub(crate) struct LaneTally {
     delay_of_lines: f64,
 }
 
-impl LaneTally {
+impl<const COUNTS: bool> LaneTally<COUNTS> {
     pub(crate) fn new() -> Self {
         Self {
             finite: 0,
@@ -35,12 +35,18 @@ impl LaneTally {
     /// Counts a block all of whose pixels are corrected.
     #[inline(always)]
     pub(crate) fn count_all(&mut self) {
+        if !COUNTS {
+            return;
+        }
         self.finite += LANES;
         self.corrected += LANES;
     }
 
     #[inline(always)]
     pub(crate) fn count(&mut self, finite: &Mask, corrected: &Mask, outside_span: &Mask) {
+        if !COUNTS {
+            return;
+        }
         // All bits are minus one.
         let count = |masks: &Mask| masks.iter().fold(0_u32, |sum, mask| sum.wrapping_sub(*mask)) as usize;
         self.finite += count(finite);
@@ -51,6 +57,9 @@ impl LaneTally {
     /// Adds one group of `Δρ`, zero where nothing was corrected.
     #[inline(always)]
     pub(crate) fn add(&mut self, group: usize, correction: &Lanes) {
+        if !COUNTS {
+            return;
+        }
         let (sum, largest) = (&mut self.sum[group], &mut self.largest[group]);
         for values in correction.as_chunks::<SUMS>().0 {
             for lane in 0..SUMS {
@@ -63,6 +72,9 @@ impl LaneTally {
     /// Notes the largest sum of all groups; what they add up to follows from the groups.
     #[inline(always)]
     pub(crate) fn add_total(&mut self, total: &Lanes) {
+        if !COUNTS {
+            return;
+        }
         let largest = &mut self.largest[TOTAL];
         for values in total.as_chunks::<SUMS>().0 {
             for lane in 0..SUMS {
@@ -74,6 +86,9 @@ impl LaneTally {
     /// Adds a delay that is a straight line over a block all of whose pixels are corrected.
     #[inline(always)]
     pub(crate) fn add_line(&mut self, delay: &Lanes) {
+        if !COUNTS {
+            return;
+        }
         let ends = [delay[0], delay[LANES - 1]];
         self.delay_of_lines += LANES as f64 * f64::midpoint(f64::from(ends[0]), f64::from(ends[1]));
         for (largest, end) in self.largest[DELAY].iter_mut().zip(ends) {

@@ -139,7 +139,7 @@ impl PreparedCorrection {
         };
         with_wide_registers(
             #[inline(always)]
-            || correct_chunk(&mut chunk, kernel, 0..self.format.width),
+            || correct_chunk::<false>(&mut chunk, kernel, 0..self.format.width),
         );
     }
 
@@ -172,7 +172,7 @@ impl PreparedCorrection {
                     };
                     with_wide_registers(
                         #[inline(always)]
-                        || correct_chunk(&mut chunk, kernel, columns.clone()),
+                        || correct_chunk::<false>(&mut chunk, kernel, columns.clone()),
                     );
                 }
                 let [[range, sigma], [other_range, other_sigma]] = &planes;

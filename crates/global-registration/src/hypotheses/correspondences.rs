@@ -48,15 +48,6 @@ impl Correspondences {
         self.likeness.push(likeness);
     }
 
-    /// Whether two of them can hold at once: see [`agree`].
-    pub(crate) fn agree(&self, i: usize, j: usize, tolerance: Tolerance) -> bool {
-        let row = |i: usize| {
-            let groups = [self.source.points[i], self.source.normals[i], self.target.points[i], self.target.normals[i]];
-            std::array::from_fn(|k| groups[k / 3][k % 3])
-        };
-        agree(&row(i), &row(j), tolerance)
-    }
-
     /// Pose that carries the chosen sources onto their targets best. Normals count as points at `arm` metre off the
     /// surface: two correspondences then suffice.
     pub(crate) fn solve(&self, members: &[u32], arm: f32) -> Option<Isometry3<f64>> {

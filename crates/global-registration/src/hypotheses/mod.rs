@@ -3,5 +3,4 @@
 pub(crate) mod correspondences;
 pub(crate) mod graph;
 pub(crate) mod matching;
-pub(crate) mod ransac;
 pub(crate) mod sparse;

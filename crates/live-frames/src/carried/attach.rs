@@ -1,13 +1,18 @@
 //! Pixels without a count take that of a neighbour: of one on the same surface, or at last of any.
 
+// Without branches, all neighbours are compared at once.
+#![allow(clippy::needless_range_loop, clippy::needless_bitwise_bool)]
+
 use range_image::Raster;
 
-use crate::carried::pixels::{HELD, OPEN, RIM, apart, gentle_step};
+use crate::carried::pixels::{HELD, OPEN, RIM, apart, gentle_steps};
 use phase_unwrap::{wrap_step, wrapped};
 
 /// Sweeps forth and back over the pixels without a count. What is revealed at the edge of a surface is reached in the first;
 /// more follow bends.
 const SWEEPS: usize = 4;
+/// Pixels among which an open one is looked for at once.
+const BLOCK: usize = 32;
 
 /// A frame whose open pixels are to be attached.
 pub(crate) struct Attaching<'a> {
@@ -26,22 +31,32 @@ pub(crate) struct Attaching<'a> {
 }
 
 impl Attaching<'_> {
-    /// Lists the open pixels, row by row.
-    pub fn list(state: &[u8], open: &mut Vec<u32>) {
-        open.clear();
-        for (index, block) in state.chunks(32).enumerate() {
-            if block.iter().fold(0, |any, &state| any | u8::from(state == OPEN)) != 0 {
-                let pixels = block.iter().enumerate().filter(|(_, state)| **state == OPEN);
-                open.extend(pixels.map(|(offset, _)| (32 * index + offset) as u32));
+    /// The first sweep, of one row: attaches its open pixels, and lists those that are left and those apart. The rows above
+    /// must be done, and the states of the next one known.
+    pub fn sweep_row(&mut self, row: usize, open: &mut Vec<u32>, attached: &mut Vec<u32>) {
+        let width = self.phase.width();
+        for start in (row * width..(row + 1) * width).step_by(BLOCK) {
+            let end = (start + BLOCK).min((row + 1) * width);
+            if self.state[start..end].iter().fold(0, |any, &state| any | u8::from(state == OPEN)) == 0 {
+                continue;
+            }
+            for pixel in start..end {
+                if self.state[pixel] == OPEN {
+                    self.attach(pixel);
+                    let list = if self.state[pixel] == OPEN { &mut *open } else { &mut *attached };
+                    list.push(pixel as u32);
+                }
             }
         }
     }
 
-    /// Attaches the listed pixels to neighbours on the same surface, and lists those apart; the others stay in the list. Gives
-    /// the number of those at edges, which have a count for this frame only.
+    /// The other sweeps: attaches the listed pixels to neighbours on the same surface, and adds them to those attached; the others
+    /// stay in the list. Gives the number of those at edges, which have a count for this frame only.
     pub fn grow(&mut self, open: &mut Vec<u32>, attached: &mut Vec<u32>) -> usize {
-        attached.clear();
-        for sweep in 0..SWEEPS {
+        for sweep in 1..SWEEPS {
+            if open.is_empty() {
+                break;
+            }
             let before = open.len();
             if sweep % 2 == 0 {
                 for &pixel in open.iter() {
@@ -59,7 +74,7 @@ impl Attaching<'_> {
                 }
                 left
             });
-            if open.is_empty() || open.len() == before {
+            if open.len() == before {
                 break;
             }
         }
@@ -76,7 +91,7 @@ impl Attaching<'_> {
             HELD | RIM => apart([own, unwrapped(other)], [amplitude[pixel], amplitude[other]], self.noise2),
             state => state == OPEN,
         };
-        let at_edge = self.sides(pixel).into_iter().flatten().any(beyond);
+        let at_edge = self.sides(pixel).into_iter().any(beyond);
         if at_edge {
             self.state[pixel] = RIM;
             self.unwrapped[pixel] = f32::NAN;
@@ -85,15 +100,16 @@ impl Attaching<'_> {
         at_edge
     }
 
-    /// The neighbours of a pixel.
-    fn sides(&self, pixel: usize) -> [Option<usize>; 4] {
-        let (width, height) = (self.phase.width(), self.phase.height());
-        let (col, row) = (pixel % width, pixel / width);
+    /// The neighbours of a pixel: above, to the left, to the right, below; the pixel itself where the image ends.
+    fn sides(&self, pixel: usize) -> [usize; 4] {
+        let (width, last) = (self.phase.width(), self.phase.len() - 1);
+        // Half as wide, it is divided in half of the time; images have fewer pixels.
+        let col = (pixel as u32 % width as u32) as usize;
         [
-            (row > 0).then(|| pixel - width),
-            (col > 0).then(|| pixel - 1),
-            (col + 1 < width).then(|| pixel + 1),
-            (row + 1 < height).then(|| pixel + width),
+            if pixel >= width { pixel - width } else { pixel },
+            if col > 0 { pixel - 1 } else { pixel },
+            if col + 1 < width { pixel + 1 } else { pixel },
+            if pixel + width <= last { pixel + width } else { pixel },
         ]
     }
 
@@ -127,22 +143,26 @@ impl Attaching<'_> {
     }
 
     /// The count that continues the neighbour with the smallest step among those that hold (on the same surface, if so
-    /// wished), and that neighbour.
+    /// wished), and that neighbour. The pixel itself does not hold.
     fn nearest(&self, pixel: usize, on_surface: bool) -> Option<(i32, usize)> {
         let (phase, amplitude) = (self.phase.as_slice(), self.amplitude.as_slice());
-        let mut best = (f32::INFINITY, None);
-        for other in self.sides(pixel).into_iter().flatten().filter(|&other| self.state[other] == HELD) {
-            let phases = [phase[other], phase[pixel]];
-            let step = if on_surface {
-                gentle_step(phases, [amplitude[other], amplitude[pixel]], self.noise2).unwrap_or(f32::INFINITY)
-            } else {
-                wrapped(phases[1] - phases[0]).abs()
-            };
-            if step < best.0 {
-                best = (step, Some(other));
-            }
+        let sides = self.sides(pixel);
+        let held = [0, 1, 2, 3].map(|k: usize| self.state[sides[k]] == HELD);
+        if held == [false; 4] {
+            return None;
         }
-        let other = best.1?;
+        let phases = [phase[sides[0]], phase[sides[1]], phase[sides[2]], phase[sides[3]]];
+        let steps = if on_surface {
+            let amplitudes = [amplitude[sides[0]], amplitude[sides[1]], amplitude[sides[2]], amplitude[sides[3]]];
+            gentle_steps(phases, amplitudes, [phase[pixel], amplitude[pixel]], self.noise2)
+        } else {
+            phases.map(|other| wrapped(phase[pixel] - other).abs())
+        };
+        let mut best = (f32::INFINITY, 4);
+        for k in 0..4 {
+            best = if held[k] & (steps[k] < best.0) { (steps[k], k) } else { best };
+        }
+        let other = *sides.get(best.1)?;
         Some((self.wraps[other] + wrap_step(phase[other], phase[pixel]), other))
     }
 }

@@ -20,6 +20,8 @@ pub(crate) struct Coarse {
     amplitude: Raster<f32>,
     out: Unwrapped,
     sums: [Vec<f32>; 2],
+    /// Whether the constant of the last time may not serve again: it was not looked for then, or the frames in between are cut.
+    constant_is_old: bool,
 }
 
 impl Coarse {
@@ -28,6 +30,11 @@ impl Coarse {
         let plane = Raster::filled(width.div_ceil(self.factor), height.div_ceil(self.factor), f32::NAN);
         (self.phase, self.amplitude, self.image) = (plane.clone(), plane, None);
         self.sums = [vec![0.0; width], vec![0.0; width]];
+    }
+
+    /// The frames to come may be brighter or darker than those before.
+    pub fn forget_constant(&mut self) {
+        self.constant_is_old = true;
     }
 
     /// Makes the small image of a frame and solves it; false where it shows nothing.
@@ -52,7 +59,13 @@ impl Coarse {
             principal_point_px: geometry.principal_point_px.map(|point| (point + 0.5) / factor - 0.5),
         });
         let amplitude_noise = options.amplitude_noise.map(|noise| noise / factor);
-        self.unwrapper.set_options(SpatialOptions { amplitude_noise, geometry, ..*options });
+        // The constant of the inverse square law belongs to light and scene: every second time that of the time before does, and
+        // need not be looked for among all.
+        let known = self.out.typical_amplitude_at_interval.filter(|_| !self.constant_is_old);
+        self.constant_is_old = known.is_some();
+        let mut albedo = options.albedo;
+        albedo.typical_amplitude_at_interval = albedo.typical_amplitude_at_interval.or(known);
+        self.unwrapper.set_options(SpatialOptions { amplitude_noise, geometry, albedo, ..*options });
         self.unwrapper.unwrap_into(&self.phase, Some(&self.amplitude), None, KnownWraps::Nothing, &mut self.out)?;
         Ok(true)
     }

@@ -51,32 +51,21 @@ impl Compared<'_> {
             }
             let at = row * width..(row + 1) * width;
             let [spread, sure] = &*self.spread;
-            let (spread, sure) = (&spread[..width], &sure[..width]);
-            let phase = &self.phase.as_slice()[at.clone()];
-            let wraps = &mut self.wraps[at.clone()];
-            let confidence = &mut self.confidence[at.clone()];
-            let (state, doubts) = (&self.state[at.clone()], &mut self.doubts[at.clone()]);
+            let mut compared = Row {
+                spread: &spread[..width],
+                sure: &sure[..width],
+                phase: &self.phase.as_slice()[at.clone()],
+                wraps: &self.wraps[at.clone()],
+                state: &self.state[at.clone()],
+                confidence: &mut self.confidence[at.clone()],
+                doubts: &mut self.doubts[at.clone()],
+            };
             let least = self.minimum_confidence;
-            let mut any = 0_u8;
-            with_wide_registers(
+            let any = with_wide_registers(
                 #[inline(always)]
-                || {
-                    for i in 0..width {
-                        let count = ((spread[i] - phase[i]) * (1.0 / TAU) + ROUND) - ROUND;
-                        let agrees = (count - wraps[i] as f32).abs() < 0.5;
-                        let known = state[i] == HELD;
-                        let aside = (state[i] == RIM) & agrees;
-                        let own = confidence[i];
-                        let told = (sure[i] >= least) & !agrees & known;
-                        let kept = if own > sure[i] { own } else { sure[i] };
-                        confidence[i] = if (agrees & known) | aside { kept } else { own };
-                        let doubt = doubts[i].wrapping_add(1);
-                        doubts[i] = if told { doubt } else { 0 };
-                        any |= u8::from(told) | u8::from(state[i] == OPEN);
-                    }
-                },
+                || compared.check(least),
             );
-            if any != 0 {
+            if any {
                 self.settle_row(at, &mut outcome);
             }
         }
@@ -122,5 +111,68 @@ impl Compared<'_> {
             spread[at.clone()].fill(phase + TAU * *wraps as f32);
             sure[at].fill(*confidence);
         }
+    }
+}
+
+/// A row of the frame beside what its small image says of it.
+struct Row<'a> {
+    spread: &'a [f32],
+    sure: &'a [f32],
+    phase: &'a [f32],
+    wraps: &'a [i32],
+    state: &'a [u8],
+    confidence: &'a mut [f32],
+    doubts: &'a mut [u8],
+}
+
+/// Pixels taken at a time, so that the compiler can vectorise.
+const LANES: usize = 64;
+
+impl Row<'_> {
+    /// Compares all pixels; whether any contradicts or has no count.
+    #[inline(always)]
+    fn check(&mut self, least: f32) -> bool {
+        let mut any = 0;
+        let whole = self.phase.len() / LANES * LANES;
+        for start in (0..whole).step_by(LANES) {
+            any |= self.pixels::<LANES>(start, least).unwrap_or(0);
+        }
+        for start in whole..self.phase.len() {
+            any |= self.pixels::<1>(start, least).unwrap_or(0);
+        }
+        any != 0
+    }
+
+    /// `L` pixels from `start` on; `None` beyond the row.
+    #[inline(always)]
+    fn pixels<const L: usize>(&mut self, start: usize, least: f32) -> Option<u32> {
+        let (spread, sure) = (self.spread[start..].first_chunk::<L>()?, self.sure[start..].first_chunk::<L>()?);
+        let (phase, wraps) = (self.phase[start..].first_chunk::<L>()?, self.wraps[start..].first_chunk::<L>()?);
+        let state = self.state[start..].first_chunk::<L>()?;
+        let confidence = self.confidence[start..].first_chunk_mut::<L>()?;
+        let doubts = self.doubts[start..].first_chunk_mut::<L>()?;
+        // As wide as the values that they are compared with.
+        let (mut states, mut counted) = ([0_u32; L], [0_u32; L]);
+        for i in 0..L {
+            states[i] = u32::from(state[i]);
+            counted[i] = u32::from(doubts[i]) + 1;
+        }
+        let mut any = [0_u32; L];
+        for i in 0..L {
+            let count = ((spread[i] - phase[i]) * (1.0 / TAU) + ROUND) - ROUND;
+            let agrees = (count - wraps[i] as f32).abs() < 0.5;
+            let known = states[i] == u32::from(HELD);
+            let aside = (states[i] == u32::from(RIM)) & agrees;
+            let own = confidence[i];
+            let told = (sure[i] >= least) & !agrees & known;
+            let kept = if own > sure[i] { own } else { sure[i] };
+            confidence[i] = if (agrees & known) | aside { kept } else { own };
+            counted[i] = if told { counted[i] } else { 0 };
+            any[i] = counted[i] | u32::from(states[i] == u32::from(OPEN));
+        }
+        for i in 0..L {
+            doubts[i] = counted[i] as u8;
+        }
+        Some(any.iter().fold(0, |all, one| all | one))
     }
 }

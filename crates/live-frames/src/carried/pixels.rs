@@ -158,18 +158,29 @@ fn noise_margin(a: f32, b: f32, noise2: f32) -> f32 {
     SIGMAS * (noise2 * (a2 + b2) / (a2 * b2)).sqrt()
 }
 
-/// The size of the step between two neighbours where they can lie on one surface, by phases and amplitudes.
+/// The sizes of the steps from neighbours to a pixel (phase and amplitude) where they can lie on one surface; infinite where they
+/// cannot.
 #[inline(always)]
-pub(crate) fn gentle_step(phases: [f32; 2], [a, b]: [f32; 2], noise2: f32) -> Option<f32> {
-    let step = wrapped(phases[1] - phases[0]).abs();
-    if (step <= SLOPE_RAD) & (a <= STEADY_RATIO * b) & (b <= STEADY_RATIO * a) {
-        return Some(step);
+pub(crate) fn gentle_steps(
+    phases: [f32; 4],
+    amplitudes: [f32; 4],
+    [phase, amplitude]: [f32; 2],
+    noise2: f32,
+) -> [f32; 4] {
+    let mut steps = [f32::INFINITY; 4];
+    for k in 0..4 {
+        let (a, b) = (amplitudes[k], amplitude);
+        let step = wrapped(phase - phases[k]).abs();
+        let margin = noise_margin(a, b, noise2);
+        let ratio = STEADY_RATIO * (1.0 + margin);
+        // Neighbours lie on a slope, which the step in time does not see.
+        let limit = if margin > SLOPE_RAD { margin } else { SLOPE_RAD };
+        // Whatever the noise is, or where it is not known.
+        let alike = (step <= SLOPE_RAD) & (a <= STEADY_RATIO * b) & (b <= STEADY_RATIO * a);
+        let gentle = alike | ((step <= limit) & (a <= ratio * b) & (b <= ratio * a));
+        steps[k] = if gentle { step } else { f32::INFINITY };
     }
-    let margin = noise_margin(a, b, noise2);
-    let ratio = STEADY_RATIO * (1.0 + margin);
-    // Neighbours lie on a slope, which the step in time does not see.
-    let limit = if margin > SLOPE_RAD { margin } else { SLOPE_RAD };
-    ((step <= limit) & (a <= ratio * b) & (b <= ratio * a)).then_some(step)
+    steps
 }
 
 /// Whether two neighbours with these unwrapped phases lie on two surfaces.

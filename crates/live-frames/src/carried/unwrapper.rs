@@ -155,35 +155,42 @@ impl CarriedUnwrapper {
         }
         self.doubts.fill(0);
         self.doubted = 0;
+        self.coarse.forget_constant();
         Ok(())
     }
 
-    /// Predicts and checks the counts of all pixels.
+    /// Predicts and checks the counts of all pixels. What fails is attached to its neighbours a row later, while it is near.
     fn carry(&mut self, phase: &Raster<f32>, amplitude: &Raster<f32>, summary: &mut CarrySummary) {
-        let width = phase.width();
+        let (mut open, mut attached) = (std::mem::take(&mut self.open), std::mem::take(&mut self.attached));
+        open.clear();
+        attached.clear();
+        for row in 0..phase.height() {
+            self.carry_row(row, phase, amplitude, summary);
+            if row > 0 {
+                self.attaching(phase, amplitude).sweep_row(row - 1, &mut open, &mut attached);
+            }
+        }
+        self.attaching(phase, amplitude).sweep_row(phase.height() - 1, &mut open, &mut attached);
+        (self.open, self.attached) = (open, attached);
+    }
+
+    fn carry_row(&mut self, row: usize, phase: &Raster<f32>, amplitude: &Raster<f32>, summary: &mut CarrySummary) {
         let limits = Limits { noise2: self.noise2, maximum_wraps: f32::from(self.options.maximum_wraps) };
-        let Self { unwrapped, before, state, out, .. } = self;
-        with_wide_registers(
+        let at = row * phase.width()..(row + 1) * phase.width();
+        let mut row = Row {
+            phase: &phase.as_slice()[at.clone()],
+            amplitude: &amplitude.as_slice()[at.clone()],
+            unwrapped: &mut self.unwrapped[at.clone()],
+            before: &mut self.before[at.clone()],
+            wraps: &mut self.out.wraps.as_mut_slice()[at.clone()],
+            state: &mut self.state[at],
+        };
+        let tally = with_wide_registers(
             #[inline(always)]
-            || {
-                for row in 0..phase.height() {
-                    let at = row * width..(row + 1) * width;
-                    let tally = carry_row(
-                        &mut Row {
-                            phase: &phase.as_slice()[at.clone()],
-                            amplitude: &amplitude.as_slice()[at.clone()],
-                            unwrapped: &mut unwrapped[at.clone()],
-                            before: &mut before[at.clone()],
-                            wraps: &mut out.wraps.as_mut_slice()[at.clone()],
-                            state: &mut state[at],
-                        },
-                        limits,
-                    );
-                    summary.used += tally.used as usize;
-                    summary.failed += tally.open as usize;
-                }
-            },
+            || carry_row(&mut row, limits),
         );
+        summary.used += tally.used as usize;
+        summary.failed += tally.open as usize;
     }
 
     /// Finds the counts of the pixels that failed, and checks all of them when it is time to.
@@ -194,7 +201,6 @@ impl CarriedUnwrapper {
         frame: u32,
         summary: &mut CarrySummary,
     ) -> Result<(), Error> {
-        Attaching::list(&self.state, &mut self.open);
         let (mut open, mut attached) = (std::mem::take(&mut self.open), std::mem::take(&mut self.attached));
         let at_edges = self.attaching(phase, amplitude).grow(&mut open, &mut attached);
         summary.attached = attached.len();

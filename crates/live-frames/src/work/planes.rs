@@ -54,13 +54,15 @@ impl Planes {
             }
         }
         let amplitudes = std::iter::once(&mut frame.amplitude).chain(&mut self.further_amplitudes);
-        for ((channel, phase), amplitude) in complex.channels.iter().zip(&mut self.phases).zip(amplitudes) {
-            channel.phase_and_amplitude_into(phase, amplitude)?;
-        }
-        match (complex.channels.as_slice(), self.sigmas.as_mut_slice()) {
-            ([channel], _) => channel.sigma_range_into(&mut frame.sigma)?,
-            (channels, sigmas) => {
-                channels.iter().zip(sigmas).try_for_each(|(channel, sigma)| channel.sigma_phase_into(sigma))?;
+        let planes = self.phases.iter_mut().zip(amplitudes);
+        if let [channel] = complex.channels.as_slice() {
+            let unit = channel.modulation.range_from_phase(1.0) as f32;
+            for (phase, amplitude) in planes {
+                channel.phase_amplitude_and_sigma_into(phase, amplitude, &mut frame.sigma, unit)?;
+            }
+        } else {
+            for ((channel, (phase, amplitude)), sigma) in complex.channels.iter().zip(planes).zip(&mut self.sigmas) {
+                channel.phase_amplitude_and_sigma_into(phase, amplitude, sigma, 1.0)?;
             }
         }
         Ok(())

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use tracking::nalgebra::Isometry3;
 use tracking::projective_registration::Projection;
-use tracking::{SurfaceMap, TrackedPose, Tracker, TrackerOptions, TrackingState};
+use tracking::{Relocalisation, SurfaceMap, TrackedPose, Tracker, TrackerOptions, TrackingState};
 
 use crate::calibration::PreparedCalibration;
 use crate::error::Result;
@@ -13,12 +13,14 @@ use crate::frame::ProcessedFrame;
 /// Time that a cut of unknown length counts as, second: a velocity says nothing of the pose behind it, so the frame is sought.
 const CUT_S: f64 = 10.0;
 
-/// A tracker, and the points that it may rest on.
+/// A tracker, and the points or deviations of those that it may rest on.
 #[derive(Debug)]
 pub(crate) struct Pose {
     tracker: Tracker,
     options: TrackerOptions,
+    /// Where deviations are not known.
     points: Vec<[f64; 3]>,
+    sigma: Vec<f32>,
     last: Option<TrackedPose>,
     /// The tracker's time of the last frame, and what it is ahead of the frames' clock by.
     clock: Option<[f64; 2]>,
@@ -28,8 +30,16 @@ pub(crate) struct Pose {
 impl Pose {
     pub(crate) fn new(calibration: &PreparedCalibration, options: &TrackerOptions) -> Result<Self> {
         let tracker = tracker(calibration, options.clone())?;
-        let points = vec![[f64::NAN; 3]; calibration.rays.directions().len()];
-        Ok(Self { tracker, options: options.clone(), points, last: None, clock: None, is_cut: false })
+        let sigma = vec![f32::NAN; calibration.rays.directions().len()];
+        Ok(Self {
+            tracker,
+            options: options.clone(),
+            points: Vec::new(),
+            sigma,
+            last: None,
+            clock: None,
+            is_cut: false,
+        })
     }
 
     /// A new map at the last pose, for other rays; what was seen stays in the map that is kept.
@@ -74,18 +84,23 @@ impl Pose {
     }
 
     pub(crate) fn track(&mut self, timestamp_s: f64, frame: &ProcessedFrame) -> Result<TrackedPose> {
-        for (to, (point, flags)) in self.points.iter_mut().zip(frame.points.iter().zip(frame.flags.as_slice())) {
-            *to = if flags.is_empty() { *point } else { [f64::NAN; 3] };
-        }
         let ahead_s = match self.clock {
             Some([last_s, _]) if self.is_cut => last_s + CUT_S - timestamp_s,
             Some([_, ahead_s]) => ahead_s,
             None => 0.0,
         };
         let time_s = timestamp_s + ahead_s;
-        let sigma = frame.sigma.as_slice();
-        let known = sigma.iter().any(|sigma| *sigma > 0.0);
-        let pose = self.tracker.track(time_s, &self.points, known.then_some(sigma), None)?;
+        let pose = if frame.sigma.as_slice().iter().any(|sigma| *sigma > 0.0) {
+            // Points without a deviation take no part, which leaves the points themselves where they are.
+            let kept = self.sigma.iter_mut().zip(frame.sigma.as_slice()).zip(frame.flags.as_slice());
+            kept.for_each(|((to, sigma), flags)| *to = if flags.is_empty() { *sigma } else { f32::NAN });
+            self.tracker.track(time_s, &frame.points, Some(&self.sigma), None)?
+        } else {
+            let kept = frame.points.iter().zip(frame.flags.as_slice());
+            self.points.clear();
+            self.points.extend(kept.map(|(point, flags)| if flags.is_empty() { *point } else { [f64::NAN; 3] }));
+            self.tracker.track(time_s, &self.points, None, None)?
+        };
         self.tracker.forget_poses();
         (self.clock, self.is_cut) = (Some([time_s, ahead_s]), false);
         let pose = TrackedPose { timestamp_s, ..pose };
@@ -97,7 +112,11 @@ impl Pose {
     }
 }
 
-fn tracker(calibration: &PreparedCalibration, options: TrackerOptions) -> Result<Tracker> {
+fn tracker(calibration: &PreparedCalibration, mut options: TrackerOptions) -> Result<Tracker> {
+    // Frames do not wait for a search.
+    if options.relocalisation == Relocalisation::Coarse {
+        options.relocalisation = Relocalisation::Beside;
+    }
     let format = calibration.rays.format();
     let directions = calibration.rays.directions();
     let projection =

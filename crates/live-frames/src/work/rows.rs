@@ -1,6 +1,6 @@
 //! From phases and counts to corrected points, row by row: what a row needs stays near while it is worked on.
-// Only what is inlined is compiled for wide registers.
-#![allow(clippy::inline_always)]
+// Only what is inlined is compiled for wide registers; loops over lanes read as their formulas, without branches.
+#![allow(clippy::inline_always, clippy::needless_range_loop, clippy::needless_bitwise_bool)]
 
 use std::slice::{Chunks, ChunksMut};
 
@@ -200,11 +200,11 @@ impl Chunk<'_> {
         flag_unsure(&self.given[at.clone()], &self.confidence[at.clone()], rules.minimum_confidence, flags);
         for (index, channel) in self.channels.iter_mut().enumerate() {
             let Some(channel) = channel else { break };
-            channel.fill(at.clone(), flags);
-            let Some(correction) = rules.corrections.and_then(|corrections| corrections.get(index)) else { continue };
+            let correction = rules.corrections.and_then(|corrections| corrections.get(index));
+            channel.fill(at.clone(), &Limits::new(rules, correction.is_some()), flags);
+            let Some(correction) = correction else { continue };
             let (range, sigma) = (&mut channel.range[at.clone()], &mut channel.sigma[at.clone()]);
             let amplitude = &channel.amplitude[at.clone()];
-            flag_outside(rules, range, amplitude, flags);
             correction.correct_rows(first_row, FrameRows { range, sigma, amplitude, flags })?;
         }
         if let Some(out) = &mut self.combined {
@@ -231,62 +231,144 @@ impl Chunk<'_> {
 }
 
 impl Channel<'_> {
-    /// Ranges of a row from its phases and counts; what has no phase is not sure of its count.
-    fn fill(&mut self, at: std::ops::Range<usize>, flags: &mut [Flags]) {
-        let [per_radian, interval_m] = self.metres;
-        let unit = per_radian as f32;
-        let n = at.len();
-        let (phase, wraps) = (&self.phase[at.clone()][..n], &self.wraps[at.clone()][..n]);
-        let (range, flags) = (&mut self.range[at.clone()][..n], &mut flags[..n]);
+    /// Ranges of a row from its phases and counts; what has no phase is not sure of its count, and what lies outside of the
+    /// limits, by the ranges as they were observed, is flagged.
+    fn fill(&mut self, at: std::ops::Range<usize>, limits: &Limits, flags: &mut [Flags]) {
+        let mut row = Filled {
+            metres: self.metres,
+            phase: &self.phase[at.clone()],
+            wraps: &self.wraps[at.clone()],
+            amplitude: &self.amplitude[at.clone()],
+            range: &mut self.range[at.clone()],
+            flags,
+        };
         with_wide_registers(
             #[inline(always)]
             || {
-                for i in 0..n {
-                    range[i] = (f64::from(phase[i]) * per_radian + f64::from(wraps[i]) * interval_m) as f32;
-                    let unsure = if phase[i].is_nan() { Flags::UNWRAP_UNSURE.bits() } else { 0 };
-                    flags[i] = Flags::from_bits_retain(flags[i].bits() | unsure);
-                }
+                in_lanes(row.phase.len(), |start, lanes| {
+                    if lanes { row.pixels::<LANES>(start, limits) } else { row.pixels::<1>(start, limits) }
+                });
             },
         );
         let Some(sigma_phase) = self.sigma_phase else { return };
+        let unit = self.metres[0] as f32;
         for (sigma, of_phase) in self.sigma[at.clone()].iter_mut().zip(&sigma_phase[at]) {
             *sigma = unit * of_phase;
         }
     }
 }
 
+/// Pixels taken at a time, so that the compiler can vectorise.
+const LANES: usize = 32;
+
+/// Calls `work` for places in a row of so many pixels: where whole lanes begin, and where one more pixel stands.
+#[inline(always)]
+fn in_lanes(count: usize, mut work: impl FnMut(usize, bool)) {
+    let whole = count / LANES * LANES;
+    (0..whole).step_by(LANES).for_each(|start| work(start, true));
+    (whole..count).for_each(|start| work(start, false));
+}
+
+/// What ranges and amplitudes of one frequency may be; in single precision, where comparing them comes to the same.
+struct Limits {
+    range: [f32; 2],
+    amplitude: [f32; 2],
+    /// All bits of the flag where the whole frame lies outside.
+    all: u32,
+}
+
+impl Limits {
+    /// Nothing is outside where nothing is corrected.
+    fn new(rules: &Rules<'_>, corrects: bool) -> Self {
+        let single = |span: Option<[f64; 2]>| {
+            let [low, high] = span.filter(|_| corrects).unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
+            [least_single(low), -least_single(-high)]
+        };
+        let all = if corrects && rules.all_outside { u32::from(Flags::OUTSIDE_SPAN.bits()) } else { 0 };
+        Self { range: single(rules.span.range_m), amplitude: single(rules.span.amplitude), all }
+    }
+}
+
+/// The smallest single-precision number that is not below a bound.
+fn least_single(bound: f64) -> f32 {
+    let nearest = bound as f32;
+    if f64::from(nearest) < bound { nearest.next_up() } else { nearest }
+}
+
+/// A row of one frequency while its ranges are filled in.
+struct Filled<'a> {
+    metres: [f64; 2],
+    phase: &'a [f32],
+    wraps: &'a [i32],
+    amplitude: &'a [f32],
+    range: &'a mut [f32],
+    flags: &'a mut [Flags],
+}
+
+impl Filled<'_> {
+    /// `L` pixels from `start` on.
+    #[inline(always)]
+    fn pixels<const L: usize>(&mut self, start: usize, limits: &Limits) {
+        let (Some(phase), Some(wraps)) =
+            (self.phase[start..].first_chunk::<L>(), self.wraps[start..].first_chunk::<L>())
+        else {
+            return;
+        };
+        let (Some(amplitude), Some(range)) =
+            (self.amplitude[start..].first_chunk::<L>(), self.range[start..].first_chunk_mut::<L>())
+        else {
+            return;
+        };
+        let Some(flags) = self.flags[start..].first_chunk_mut::<L>() else { return };
+        let [per_radian, interval_m] = self.metres;
+        let (unsure, outside) = (u32::from(Flags::UNWRAP_UNSURE.bits()), u32::from(Flags::OUTSIDE_SPAN.bits()));
+        let mut found = [0_u32; L];
+        for i in 0..L {
+            range[i] = (f64::from(phase[i]) * per_radian + f64::from(wraps[i]) * interval_m) as f32;
+        }
+        for i in 0..L {
+            let ([near, far], [dark, bright]) = (limits.range, limits.amplitude);
+            let (r, a) = (range[i], amplitude[i]);
+            let beyond = (r < near) | (r > far) | (a < dark) | (a > bright);
+            let beyond = if beyond { outside } else { limits.all };
+            found[i] = if phase[i].is_nan() { unsure } else { 0 } | if r.abs() <= f32::MAX { beyond } else { 0 };
+        }
+        for i in 0..L {
+            flags[i] = Flags::from_bits_retain(flags[i].bits() | found[i] as u16);
+        }
+    }
+}
+
 /// The flags that there are, with those of counts that are not sure.
 fn flag_unsure(given: &[Flags], confidence: &[f32], least: f64, flags: &mut [Flags]) {
-    let n = flags.len();
-    let (given, confidence) = (&given[..n], &confidence[..n]);
+    let least = least_single(least);
     with_wide_registers(
         #[inline(always)]
         || {
-            for i in 0..n {
-                let sure = f64::from(confidence[i]) >= least;
-                let unsure = if sure { 0 } else { Flags::UNWRAP_UNSURE.bits() };
-                flags[i] = Flags::from_bits_retain(given[i].bits() | unsure);
-            }
+            in_lanes(flags.len(), |start, lanes| {
+                if lanes {
+                    unsure::<LANES>(start, given, confidence, least, flags);
+                } else {
+                    unsure::<1>(start, given, confidence, least, flags);
+                }
+            });
         },
     );
 }
 
-/// Flags what lies outside of what the calibration rests on, by the ranges as they were observed.
-fn flag_outside(rules: &Rules<'_>, range: &[f32], amplitude: &[f32], flags: &mut [Flags]) {
-    let span = rules.span;
-    if span.range_m.is_none() && span.amplitude.is_none() && !rules.all_outside {
+/// `L` pixels from `start` on.
+#[inline(always)]
+fn unsure<const L: usize>(start: usize, given: &[Flags], confidence: &[f32], least: f32, flags: &mut [Flags]) {
+    let (Some(given), Some(confidence)) = (given[start..].first_chunk::<L>(), confidence[start..].first_chunk::<L>())
+    else {
         return;
+    };
+    let Some(flags) = flags[start..].first_chunk_mut::<L>() else { return };
+    let mut found = [0_u32; L];
+    for i in 0..L {
+        found[i] = if confidence[i] >= least { 0 } else { u32::from(Flags::UNWRAP_UNSURE.bits()) };
     }
-    let n = flags.len();
-    let (range, amplitude) = (&range[..n], &amplitude[..n]);
-    with_wide_registers(
-        #[inline(always)]
-        || {
-            for i in 0..n {
-                let outside = span.leaves_out(f64::from(range[i]), f64::from(amplitude[i])) | rules.all_outside;
-                let added = if range[i].is_finite() & outside { Flags::OUTSIDE_SPAN.bits() } else { 0 };
-                flags[i] = Flags::from_bits_retain(flags[i].bits() | added);
-            }
-        },
-    );
+    for i in 0..L {
+        flags[i] = Flags::from_bits_retain(given[i].bits() | found[i] as u16);
+    }
 }

@@ -44,6 +44,8 @@ pub(crate) struct Planes {
     /// Slope of the range along columns and rows, cycles per unit of the image at principal distance 1; NaN unknown.
     pub slope: Vec<[f32; 2]>,
     sums: Vec<f64>,
+    /// Unwrapped phase of each pixel, cycles, which several blocks share.
+    cycles: Vec<f32>,
 }
 
 /// Quadratic fit of a block: value, gradient, second derivatives with their variances.
@@ -69,6 +71,9 @@ impl Planes {
         self.sums.clear();
         self.sums.resize(forest.components * labels, 0.0);
         self.set_mean_slopes(grid, surface, forest, geometry);
+        let pixels_of = surface.phase.iter().zip(&forest.wraps);
+        self.cycles.clear();
+        self.cycles.extend(pixels_of.map(|(phase, wraps)| phase / TAU + *wraps as f32));
         let mut finest = 0;
         for angle in BLOCK_ANGLES {
             // Each sample stands for `spacing` pixels a side.
@@ -77,7 +82,7 @@ impl Planes {
                 continue;
             }
             finest = spacing;
-            self.measure_scale(grid, surface, forest, geometry, labels, spacing);
+            self.measure_scale(grid, forest, geometry, labels, spacing);
         }
         self.costs.clear();
         for (sums, &pixels) in self.sums.chunks_exact(labels).zip(pixels) {
@@ -110,21 +115,13 @@ impl Planes {
         self.slope.extend(forest.label.iter().map(known));
     }
 
-    fn measure_scale(
-        &mut self,
-        grid: &Grid,
-        surface: &Surface,
-        forest: &Forest,
-        geometry: &ImageGeometry,
-        labels: usize,
-        spacing: usize,
-    ) {
+    fn measure_scale(&mut self, grid: &Grid, forest: &Forest, geometry: &ImageGeometry, labels: usize, spacing: usize) {
         let block = SIDE * spacing;
         let half = block / 2;
         for row in (0..(grid.height + 1).saturating_sub(block)).step_by(half) {
             for col in (0..(grid.width + 1).saturating_sub(block)).step_by(half) {
                 let corner = grid.index(col, row);
-                let Some((segment, samples)) = sample(grid, surface, forest, corner, spacing) else {
+                let Some((segment, samples)) = sample(grid, &self.cycles, &forest.label, corner, spacing) else {
                     continue;
                 };
                 let distance = f64::from(geometry.principal_distance_px);
@@ -154,36 +151,32 @@ impl Planes {
     }
 }
 
-/// Unwrapped phases of a block in cycles; `None` where it leaves the segment of its first sample.
+/// Means of the squares of a block, in cycles; `None` where it leaves the segment of its first pixel.
 fn sample(
     grid: &Grid,
-    surface: &Surface,
-    forest: &Forest,
+    cycles: &[f32],
+    labels: &[u32],
     corner: usize,
     spacing: usize,
 ) -> Option<(usize, [f64; SIDE * SIDE])> {
-    let label = forest.label[corner];
-    let mut samples = [0.0; SIDE * SIDE];
+    let (label, length) = (labels[corner], SIDE * spacing);
     if label == NO_LABEL {
         return None;
     }
-    for row in 0..SIDE {
-        for col in 0..SIDE {
-            let mut sum = 0.0;
-            let first = corner + row * spacing * grid.stride + col * spacing;
-            for line in 0..spacing {
-                let start = first + line * grid.stride;
-                for pixel in start..start + spacing {
-                    if forest.label[pixel] != label {
-                        return None;
-                    }
-                    sum += surface.phase[pixel] / TAU + forest.wraps[pixel] as f32;
-                }
-            }
-            samples[row * SIDE + col] = f64::from(sum) / (spacing * spacing) as f64;
+    let rows = (0..length).map(|row| corner + row * grid.stride);
+    // Without an end before that of a row, labels are compared side by side.
+    let leaves = |row: &[u32]| row.iter().fold(0, |any, other| any | (other ^ label)) != 0;
+    if rows.clone().any(|start| leaves(&labels[start..start + length])) {
+        return None;
+    }
+    let mut sums = [0.0_f32; SIDE * SIDE];
+    for (row, start) in rows.enumerate() {
+        let sums = &mut sums[row / spacing * SIDE..][..SIDE];
+        for (sum, pixels) in sums.iter_mut().zip(cycles[start..start + length].chunks_exact(spacing)) {
+            *sum = pixels.iter().fold(*sum, |sum, value| sum + value);
         }
     }
-    Some((label as usize, samples))
+    Some((label as usize, sums.map(|sum| f64::from(sum) / (spacing * spacing) as f64)))
 }
 
 /// Least squares of a quadratic over the lattice, by orthogonal polynomials; `pitch` is the lattice spacing.

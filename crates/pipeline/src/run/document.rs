@@ -112,17 +112,15 @@ fn stages(document: &mut Document, summary: &Summary) {
             truth(|truth| truth.range_error_p95_m),
         ]
     };
-    let columns = || {
-        vec![
-            Column::words("stage"),
-            Column::number("time").unit("ms"),
-            Column::number("of the longest").unit("%"),
-            Column::number("median change").unit("mm"),
-            Column::number("median error after").unit("mm"),
-            Column::number("95 % below").unit("mm"),
-        ]
-    };
-    document.table(columns(), summary.stages.iter().map(row).collect());
+    let columns = [
+        Column::words("stage"),
+        Column::number("time").unit("ms"),
+        Column::number("of the longest").unit("%"),
+        Column::number("median change").unit("mm"),
+        Column::number("median error after").unit("mm"),
+        Column::number("95 % below").unit("mm"),
+    ];
+    document.table(columns, summary.stages.iter().map(row).collect());
     let found = summary.stages.iter().filter(|stage| !stage.findings.is_empty()).map(|stage| {
         let findings: Vec<String> = stage.findings.iter().map(|(name, value)| format!("{name} {value:.4}")).collect();
         vec![stage.name.to_owned(), findings.join("; ")]

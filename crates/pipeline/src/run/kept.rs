@@ -117,6 +117,13 @@ impl Kept {
         Ok(())
     }
 
+    /// Leaves out views that do not belong to the others; their pixels stay in the figures of all ranges.
+    pub(crate) fn leave_out(&mut self, is_left_out: impl Fn(usize) -> bool) {
+        let (mut view, mut cloud) = (0.., 0..);
+        self.views.retain(|_| view.next().is_some_and(|view| !is_left_out(view)));
+        self.values.points.retain(|_| cloud.next().is_some_and(|cloud| !is_left_out(cloud)));
+    }
+
     /// Writes it, or adds another part of the views.
     pub(crate) fn carry(&mut self, tape: &mut Tape, survey: &OpenSurvey) {
         tape.list(&mut self.views, ViewRecord::default, |tape, view| view.carry(tape, survey));
@@ -211,8 +218,7 @@ impl Kept {
         if let Some(after) = after {
             values.range_m.extend(pixels().map(|pixel| f64::from(after.range.as_slice()[pixel])));
         }
-        let cloud = view.cloud.as_ref();
-        let taken = cloud.map_or_else(Vec::new, |cloud| {
+        let taken = view.cloud.as_ref().map_or_else(Vec::new, |cloud| {
             let mut usable = usable(cloud).peekable();
             let taken = pixels().filter(|pixel| {
                 while usable.next_if(|point| point < pixel).is_some() {}

@@ -1,6 +1,6 @@
 //! Figures of a run, gathered into its summary.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use multiview_registration::{Placements, RefusedPair};
@@ -12,7 +12,7 @@ use crate::run::kept::Kept;
 use crate::run::summary::{PairSummary, RegistrationSummary, StationTruth, Summary, TruthSummary};
 use crate::stages::joining::Joined;
 use crate::stages::wraps::repair;
-use crate::stations::placement::{unchecked, wrong_place};
+use crate::stations::placement::{not_placed, unchecked, wrong_place};
 use crate::survey::plausibility;
 use crate::survey::records::{RefusedStage, StationPose, ViewRecord};
 use commands::plan::{Plan, ruled_out};
@@ -30,10 +30,10 @@ pub(crate) fn summarise(
 ) -> Summary {
     let (survey, format, joined) = (&flow.survey.survey, flow.camera().format, &flow.joined);
     // Poses of stations that were not brought together after all are nobody's.
-    let poses: &[StationPose] = if refusal.is_some() { &[] } else { &joined.poses };
-    let mut stations: Vec<&str> = kept.views.iter().map(|view| view.station.as_str()).collect();
-    stations.sort_unstable();
-    stations.dedup();
+    let found: Vec<StationPose> = joined.poses.iter().flatten().cloned().collect();
+    let poses: &[StationPose] = if refusal.is_some() { &[] } else { &found };
+    let stations: BTreeSet<&str> = kept.views.iter().map(|view| view.station.as_str()).collect();
+    let sigma_m = quantile(&mut kept.values.sigma_m.clone(), 0.5);
     Summary {
         pipeline: plan.name.clone(),
         survey: folder.display().to_string(),
@@ -47,8 +47,8 @@ pub(crate) fn summarise(
         ruled_out: ruled_out(survey.level),
         flags_fraction: kept.flag_fractions(),
         points: kept.views.iter().filter_map(|view| view.points).sum(),
-        sigma_range_median_m: median(&kept.values.sigma_m),
-        registration: registration(joined, &kept.views, poses),
+        sigma_range_median_m: Some(sigma_m).filter(|sigma_m| sigma_m.is_finite()),
+        registration: registration(joined, poses),
         reference: kept.reference(),
         truth: truth(kept, poses),
         remaining: kept.residuals.remaining(),
@@ -61,26 +61,25 @@ pub(crate) fn summarise(
     }
 }
 
-fn median(values: &[f64]) -> Option<f64> {
-    Some(quantile(&mut values.to_vec(), 0.5)).filter(|value| value.is_finite())
-}
-
-fn registration(joined: &Joined, views: &[ViewRecord], known: &[StationPose]) -> Option<RegistrationSummary> {
+fn registration(joined: &Joined, known: &[StationPose]) -> Option<RegistrationSummary> {
     if joined.pairs.is_empty() {
         return None;
     }
-    let place = |index: usize| joined.poses[index].world_from_camera.translation.vector;
+    let distance = |from: usize, to: usize| {
+        let place = |index: usize| Some(joined.poses[index].as_ref()?.world_from_camera.translation.vector);
+        place(from).zip(place(to)).map_or(f64::NAN, |(from, to)| (to - from).norm())
+    };
     let pairs = joined.pairs.iter().map(|pair| PairSummary {
-        target: views[pair.target].station.clone(),
-        source: views[pair.source].station.clone(),
+        target: joined.names[pair.target].clone(),
+        source: joined.names[pair.source].clone(),
         overlap: pair.result.overlap,
         rms_m: pair.result.rms_m,
         iterations: pair.result.iterations,
-        distance_m: (place(pair.target) - place(pair.source)).norm(),
+        distance_m: distance(pair.target, pair.source),
     });
     Some(RegistrationSummary {
         pairs: pairs.collect(),
-        refused: joined.refused.iter().map(|pair| refusal(views, pair)).collect(),
+        refused: joined.refused.iter().map(|pair| refusal(&joined.names, pair)).collect(),
         sigma0: joined.adjustment.as_ref().and_then(|figures| figures.sigma0),
         redundancy: joined.adjustment.as_ref().map(|figures| figures.redundancy),
         position_sigma_max_m: known.iter().filter_map(StationPose::position_sigma_m).reduce(f64::max),
@@ -99,22 +98,22 @@ fn doubts(flow: &Flow, views: &[ViewRecord], refusal: Option<&RefusedStage>, pos
     doubts.extend(repair::unjudged(&flow.stages));
     doubts.extend(plausibility::of_views(views, poses));
     if refusal.is_none() {
-        let adjustment = flow.joined.adjustment.iter();
-        doubts.extend(adjustment.flat_map(|figures| wrong_places(views, &figures.placements)));
-        let name = |index: usize| views[index].station.clone();
-        doubts.extend(flow.joined.unchecked.iter().map(|pair| unchecked(pair, name)));
+        let Joined { names, adjustment, unchecked: pairs, left_out, .. } = &flow.joined;
+        doubts.extend(left_out.iter().map(|out| not_placed(&names[out.frame], &out.reason)));
+        doubts.extend(adjustment.iter().flat_map(|figures| wrong_places(names, &figures.placements)));
+        doubts.extend(pairs.iter().map(|pair| unchecked(pair, |index| names[index].clone())));
     }
     doubts
 }
 
 /// What to say of stations that are probably in the wrong place.
-fn wrong_places(views: &[ViewRecord], placements: &Placements) -> Vec<Doubt> {
-    let words = |station: usize| wrong_place(&views[station].station, &placements.stations[station]);
+fn wrong_places(names: &[String], placements: &Placements) -> Vec<Doubt> {
+    let words = |station: usize| wrong_place(&names[station], &placements.stations[station]);
     placements.doubtful().map(words).collect()
 }
 
-fn refusal(views: &[ViewRecord], pair: &RefusedPair) -> String {
-    format!("{} to {}: {}", views[pair.source].station, views[pair.target].station, pair.reason)
+fn refusal(names: &[String], pair: &RefusedPair) -> String {
+    format!("{} to {}: {}", names[pair.source], names[pair.target], pair.reason)
 }
 
 fn truth(kept: &mut Kept, poses: &[StationPose]) -> Option<TruthSummary> {

@@ -189,21 +189,26 @@ pub(crate) fn complete(
         Ok(()) => None,
     };
     progress.begin("write results", 3);
-    let common = if refusal.is_some() { None } else { common_poses(&kept.views, &flow.joined.poses) };
-    let (own_clouds, tiles) = clouds.finish(common.as_deref())?;
+    let left_out = |view: usize| refusal.is_none() && matches!(flow.joined.poses.get(view), Some(None));
+    kept.leave_out(left_out);
+    let found: Vec<StationPose> = flow.joined.poses.iter().flatten().cloned().collect();
+    let common = if refusal.is_some() { None } else { common_poses(&kept.views, &found) };
+    let (own_clouds, tiles) = clouds.finish(common.as_deref(), &left_out)?;
     let mut summary = measure::summarise(&request.plan, survey, &flow, &mut kept, refusal, own_clouds);
     summary.tiles = tiles;
     summary.out = request.out.display().to_string();
     summary.seconds = commands::made::seconds_since(start);
     if without_times() {
-        summary.forget_times();
+        for stage in &mut summary.stages {
+            stage.seconds = 0.0;
+        }
     }
     if let Some(poses) = &common {
         files::results::write_poses(folder, &kept.views, poses, &summary)?;
         files::common_errors::write(folder, &flow, &request.plan, &kept.views, poses)?;
     }
     progress.advance(1);
-    let figures = Figures::new(kept, &flow.joined.poses, common.as_deref(), flow.survey.vertical_axis)?;
+    let figures = Figures::new(kept, &found, common.as_deref(), flow.survey.vertical_axis)?;
     let page = document(&summary, figures).html();
     Ok((summary, page))
 }
@@ -255,8 +260,8 @@ pub struct Processed {
     pub stated: Vec<Station>,
     /// Index of the world's axis that points up: z where poses came with the survey, y in a camera's own frame.
     pub vertical_axis: usize,
-    /// One pose a view, where a stage found them.
-    pub poses: Vec<StationPose>,
+    /// One pose a view, where a stage found them; `None`: the view belongs to no other.
+    pub poses: Vec<Option<StationPose>>,
     /// What each stage did.
     pub stages: Vec<StageSummary>,
     /// What speaks against survey and frames.

@@ -136,15 +136,6 @@ pub struct StationTruth {
     pub attitude_error_deg: Option<f64>,
 }
 
-impl Summary {
-    /// Leaves the durations of stages out.
-    pub(crate) fn forget_times(&mut self) {
-        for stage in &mut self.stages {
-            stage.seconds = 0.0;
-        }
-    }
-}
-
 impl Judged for Summary {
     fn doubts(&self) -> &[Doubt] {
         &self.doubts

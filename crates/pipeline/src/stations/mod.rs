@@ -7,7 +7,7 @@ pub(crate) mod station;
 pub mod surface;
 
 pub use at_once::{MOST_TRIED, poses_in, register_as_frames, register_at_once};
-pub use placement::{unchecked, wrong_place};
+pub use placement::{not_placed, unchecked, wrong_place};
 pub use refused::Tried;
 pub use station::{Station, Windows, projection};
 pub use surface::{Start, Surface};

@@ -15,6 +15,11 @@ pub fn wrong_place(name: &str, found: &StationPlacement) -> Doubt {
     Doubt::about(DoubtKind::Placement, name, words)
 }
 
+/// What to say of a station that does not belong to the others.
+pub fn not_placed(name: &str, reason: &str) -> Doubt {
+    Doubt::about(DoubtKind::Placement, name, format!("not placed, and not in the results: {reason}"))
+}
+
 /// What to say of a pair that alone joins stations with the others.
 pub fn unchecked(pair: &UncheckedPair, name: impl Fn(usize) -> String) -> Doubt {
     let names: Vec<String> = pair.frames.iter().map(|&frame| name(frame)).collect();

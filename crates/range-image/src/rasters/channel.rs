@@ -109,6 +109,31 @@ impl ComplexChannel {
         Ok(())
     }
 
+    /// Writes [`Self::phase`], [`Self::amplitude`] and [`Self::sigma_phase`] times `unit` into planes that are there already, with
+    /// one look at `z`. The `unit` of [`Self::sigma_range`] is that of the modulation,
+    /// `range_from_phase(1.0)` in single precision.
+    pub fn phase_amplitude_and_sigma_into(
+        &self,
+        phase: &mut Raster<f32>,
+        amplitude: &mut Raster<f32>,
+        sigma: &mut Raster<f32>,
+        unit: f32,
+    ) -> Result<()> {
+        self.validate()?;
+        self.real.require_same_size(phase, "phase plane")?;
+        self.real.require_same_size(amplitude, "amplitude plane")?;
+        self.real.require_same_size(sigma, "sigma plane")?;
+        let length = task_length(phase.len());
+        let parts = self.real.as_slice().par_chunks(length).zip(self.imaginary.as_slice().par_chunks(length));
+        let parts = parts.zip(self.sigma.as_slice().par_chunks(length));
+        let planes = phase.as_mut_slice().par_chunks_mut(length).zip(amplitude.as_mut_slice().par_chunks_mut(length));
+        let planes = planes.zip(sigma.as_mut_slice().par_chunks_mut(length));
+        planes.zip(parts).for_each(|(((phase, amplitude), sigma), ((re, im), given))| {
+            run_wide(re.len(), PolarSigmaLoop { polar: PolarLoop { re, im, phase, amplitude }, given, sigma, unit });
+        });
+        Ok(())
+    }
+
     fn evaluate(&self, value: impl PixelValue) -> Raster<f32> {
         let mut out = self.sigma.clone();
         self.fill(value, &mut out);
@@ -167,9 +192,16 @@ impl PixelValue for Phase {
 impl PixelValue for SigmaPhase {
     #[inline(always)]
     fn of<A: Arithmetic>(self, re: f32, im: f32, sigma_z: f32) -> f32 {
+        self.at(modulus::<A>(re, im), sigma_z)
+    }
+}
+
+impl SigmaPhase {
+    #[inline(always)]
+    fn at(self, amplitude: f32, sigma_z: f32) -> f32 {
         /// `pi / sqrt(3)`: the standard deviation of an angle that is uniform over the circle.
         const UNIFORM: f32 = 1.813_799_4;
-        let sigma = sigma_z / modulus::<A>(re, im);
+        let sigma = sigma_z / amplitude;
         // Not `min`, which would turn NaN into the bound.
         self.unit * if sigma > UNIFORM { UNIFORM } else { sigma }
     }
@@ -223,6 +255,32 @@ impl PixelLoop for PolarLoop<'_> {
         for lane in 0..L {
             phase[lane] = angle::<A>(re[lane], im[lane]);
             amplitude[lane] = modulus::<A>(re[lane], im[lane]);
+        }
+    }
+}
+
+/// Phase and amplitude, and what follows of the noise.
+struct PolarSigmaLoop<'a> {
+    polar: PolarLoop<'a>,
+    /// Deviation of each part of `z`.
+    given: &'a [f32],
+    sigma: &'a mut [f32],
+    unit: f32,
+}
+
+impl PixelLoop for PolarSigmaLoop<'_> {
+    #[inline(always)]
+    fn pixels<A: Arithmetic, const L: usize>(&mut self, start: usize) {
+        self.polar.pixels::<A, L>(start);
+        let (Some(amplitude), Some(given)) =
+            (self.polar.amplitude[start..].first_chunk::<L>(), self.given[start..].first_chunk::<L>())
+        else {
+            return;
+        };
+        let Some(sigma) = self.sigma[start..].first_chunk_mut::<L>() else { return };
+        let value = SigmaPhase { unit: self.unit };
+        for lane in 0..L {
+            sigma[lane] = value.at(amplitude[lane], given[lane]);
         }
     }
 }

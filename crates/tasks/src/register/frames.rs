@@ -1,11 +1,10 @@
 //! All stations at once by pairs of their frames, where surfaces differ by more than the noise of their points.
 
 use commands::plan::NORMAL_HALF_WIDTH_PX;
-use commands::{Doubt, DoubtKind};
 use multiview_registration::{FrameRegistration, PairAlignment};
 use nalgebra::Isometry3;
 use pipeline::Result;
-use pipeline::stations::{Station, Surface, register_as_frames, surface, unchecked};
+use pipeline::stations::{Station, Surface, not_placed, register_as_frames, surface, unchecked};
 use pipeline::survey::StationPose;
 use projective_registration::OrganisedFrame;
 use rayon::prelude::*;
@@ -74,10 +73,7 @@ fn summary(result: &FrameRegistration, stations: &[Station]) -> RegisterSummary 
         rotation_deg: closure.rotation_rad.to_degrees(),
     });
     let left_out = result.refused.iter().map(|p| format!("{} onto {}: {}", name(p.source), name(p.target), p.reason));
-    let unplaced = result.unplaced.iter().map(|out| {
-        let words = format!("not placed, and not in the results: {}", out.reason);
-        Doubt::about(DoubtKind::Placement, stations[out.frame].name.as_str(), words)
-    });
+    let unplaced = result.unplaced.iter().map(|out| not_placed(&stations[out.frame].name, &out.reason));
     let unchecked = result.unchecked.iter().map(|pair| unchecked(pair, name));
     let placed = result.frames.iter().flatten().count() as i64;
     RegisterSummary {

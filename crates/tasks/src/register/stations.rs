@@ -29,9 +29,9 @@ const LOOSE_LOOP: f64 = 20.0;
 pub(crate) fn run(input: Input, start: &str, progress: &dyn Progress) -> Result<Registered> {
     let Input { stations, vertical_axis, turns, .. } = input;
     let before: Option<Vec<Isometry3<f64>>> = stations.iter().map(|station| station.approximate).collect();
-    if stations.iter().all(Station::is_depth_alone)
-        && let Some(result) = frames::found(&stations, before.as_deref()).filter(|found| found.unplaced.is_empty())
-    {
+    let is_depth_alone = stations.iter().all(Station::is_depth_alone);
+    let mut as_frames = is_depth_alone.then(|| frames::found(&stations, before.as_deref())).flatten();
+    if let Some(result) = as_frames.take_if(|found| found.unplaced.is_empty()) {
         return frames::registered(stations, before, vertical_axis, &result);
     }
     let clouds_with = |windows: Windows| {
@@ -64,7 +64,10 @@ pub(crate) fn run(input: Input, start: &str, progress: &dyn Progress) -> Result<
     };
     // Errors that neighbouring points share, as those of structured light, are no noise of surfaces; pairs know them.
     let misfits = found.as_ref().map_or(true, |found| found.sigma0.is_some_and(|sigma0| sigma0 > MOST_OVER_NOISE));
-    if misfits && let Some(result) = frames::found(&stations, before.as_deref()) {
+    if misfits && !is_depth_alone {
+        as_frames = frames::found(&stations, before.as_deref());
+    }
+    if let Some(result) = as_frames.filter(|_| misfits) {
         return frames::registered(stations, before, vertical_axis, &result);
     }
     let result = found.map_err(|error| refused::of_command(&error, &names, tried))?;

@@ -1,5 +1,7 @@
 //! The keyframes: pieces of the map and a graph of their poses.
 
+use std::sync::Arc;
+
 use nalgebra::Isometry3;
 
 use global_registration::FeatureCloud;
@@ -26,7 +28,7 @@ pub(crate) struct Keyframe {
     pub(crate) frame: OrganisedFrame,
     pub(crate) thumbnail: Vec<f32>,
     /// For alignment without a guess; made when first needed.
-    pub(crate) features: Option<FeatureCloud>,
+    pub(crate) features: Option<Arc<FeatureCloud>>,
 }
 
 /// Where a keyframe number leads to.

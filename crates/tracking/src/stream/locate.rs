@@ -172,7 +172,10 @@ impl Tracker {
         let others = |k: usize| k != reference;
         let pose = &prediction.own.pose;
         let candidates = self.keyframes.candidates(&self.current, reference, pose, others, agreeing);
-        for (_, k) in candidates.into_iter().take(NEIGHBOURS) {
+        // In a stream that does not wait, a lost frame tries one of them, in turn.
+        let one = self.is_beside() && last.lost_frames > 0;
+        let (passed, tried) = if one { (last.lost_frames % NEIGHBOURS, 1) } else { (0, NEIGHBOURS) };
+        for (_, k) in candidates.into_iter().skip(passed).take(tried) {
             let guess = self.keyframes.graph.relative(k, reference) * prediction.own.pose;
             if let Ok(measured) = self.try_keyframe(k, &guess)
                 && measured.is_sound()

@@ -1,5 +1,6 @@
 //! Frames one by one: registered, lost and found again, loops closed.
 
+pub(crate) mod beside;
 pub(crate) mod keyframes;
 pub(crate) mod locate;
 pub(crate) mod reference;

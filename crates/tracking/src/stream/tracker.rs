@@ -10,6 +10,7 @@ use crate::motion_model::motion::{MotionPrior, diagonal};
 use crate::motion_model::prediction::{Grounds, Last, Prediction};
 use crate::motion_model::velocity::Velocity;
 use crate::options::{Fusion, TrackerOptions};
+use crate::stream::beside::Beside;
 use crate::stream::keyframes::Keyframes;
 use crate::stream::locate::{Fix, Measured};
 use crate::tracked::{LossReason, TrackedPose, TrackingState};
@@ -42,6 +43,7 @@ pub struct Tracker {
     /// What keyframes that are no more have seen.
     seen_before: Option<SurfaceMap>,
     scratch: Vec<(u32, f32, f32)>,
+    pub(crate) beside: Beside,
 }
 
 /// All that one frame gave.
@@ -74,6 +76,7 @@ impl Tracker {
             trajectory: Vec::new(),
             seen_before: None,
             scratch: Vec::new(),
+            beside: Beside::default(),
         })
     }
 
@@ -226,6 +229,7 @@ impl Tracker {
     }
 
     fn follow(&mut self, timestamp_s: f64, last: &Last, prior: Option<&MotionPrior>) -> TrackedPose {
+        self.count_beside();
         let prediction = last.predict(timestamp_s, prior);
         match self.locate(last, &prediction) {
             Ok((measured, fix)) => self.found(timestamp_s, last, &Seen { measured, fix, prediction }),
@@ -267,6 +271,7 @@ impl Tracker {
 
     fn found(&mut self, timestamp_s: f64, last: &Last, seen: &Seen) -> TrackedPose {
         let Seen { measured, fix, prediction } = seen;
+        self.end_beside();
         let (keyframe, own) = (measured.keyframe, fix.own);
         let between = self.keyframes.graph.relative(keyframe, last.keyframe);
         let before = Uncertain::exact(between).then(&last.own);

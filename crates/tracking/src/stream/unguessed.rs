@@ -1,5 +1,7 @@
 //! Alignment with a keyframe without a guess, when everything else has failed.
 
+use std::sync::Arc;
+
 use nalgebra::Isometry3;
 
 use crate::options::Relocalisation;
@@ -15,7 +17,7 @@ impl Tracker {
         lost_frames: usize,
     ) -> Option<Measured> {
         let options = match &self.options.relocalisation {
-            Relocalisation::Projective => return None,
+            Relocalisation::Projective | Relocalisation::Beside => return None,
             Relocalisation::Coarse => CoarseOptions::default(),
             Relocalisation::CoarseWith(options) => (**options).clone(),
         };
@@ -23,7 +25,7 @@ impl Tracker {
         let source = FeatureCloud::new(&self.current.to_cloud(), &options).ok()?;
         let keyframe = &mut self.keyframes.list[k];
         if keyframe.features.is_none() {
-            keyframe.features = FeatureCloud::new(&keyframe.frame.to_cloud(), &options).ok();
+            keyframe.features = FeatureCloud::new(&keyframe.frame.to_cloud(), &options).ok().map(Arc::new);
         }
         let guess = align_without_guess(&source, keyframe.features.as_ref()?, &options).ok()?;
         self.verified(k, &guess.target_from_source)

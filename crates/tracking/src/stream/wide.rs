@@ -16,13 +16,17 @@ const SHIFTS: [isize; 2] = [5, 3];
 impl Tracker {
     /// The current frame anywhere among the keyframes.
     pub(crate) fn wide(&mut self, lost_frames: usize) -> Option<Measured> {
+        if self.is_beside() {
+            return self.search_beside(lost_frames);
+        }
         let ranked = self.ranked();
         self.alike(&ranked).or_else(|| self.without_guess(&ranked, lost_frames))
     }
 
     /// The current frame from the keyframes that look most like it.
     pub(crate) fn alike(&mut self, ranked: &[(f32, usize, Isometry3<f64>)]) -> Option<Measured> {
-        ranked.iter().take(TRIED).find_map(|(_, k, guess)| self.verified(*k, guess))
+        let tried = if self.is_beside() { 1 } else { TRIED };
+        ranked.iter().take(tried).find_map(|(_, k, guess)| self.verified(*k, guess))
     }
 
     /// Keyframes by the look of their thumbnails, best first, with the rotation that brings the thumbnails together.

@@ -28,6 +28,9 @@ pub struct OwnCloud {
     pub file: String,
 }
 
+/// Whether a view does not belong to the others.
+type LeftOut<'a> = &'a dyn Fn(usize) -> bool;
+
 /// The clouds so far.
 pub(crate) struct Clouds<'a> {
     folder: &'a OutputFolder,
@@ -138,18 +141,21 @@ impl<'a> Clouds<'a> {
 
     /// Completes the files of a part, which are in the common frame where the survey knows it; how many points that has.
     pub(crate) fn finish_part(mut self) -> Result<(Vec<OwnCloud>, u64)> {
-        let (placed, known) = (self.placed, Vec::new());
-        self.complete(placed.then_some(known.as_slice()))
+        self.complete(self.placed.then_some(&[]), &|_| false)
     }
 
-    /// Completes the files: one cloud where there are poses of all views in a common frame. Else the files of the views.
-    /// A common one of many points is in tiles.
-    pub(crate) fn finish(mut self, common: Option<&[StationPose]>) -> Result<(Vec<OwnCloud>, Option<TiledCloud>)> {
-        let (own, points) = self.complete(common)?;
+    /// Completes the files: one cloud where there are poses in a common frame, of all views but those that are left out. Else the
+    /// files of the views. A common one of many points is in tiles.
+    pub(crate) fn finish(
+        mut self,
+        common: Option<&[StationPose]>,
+        left_out: LeftOut<'_>,
+    ) -> Result<(Vec<OwnCloud>, Option<TiledCloud>)> {
+        let (own, points) = self.complete(common, left_out)?;
         Ok((own, tiles::of_cloud(self.folder, "cloud", points)?))
     }
 
-    fn complete(&mut self, common: Option<&[StationPose]>) -> Result<(Vec<OwnCloud>, u64)> {
+    fn complete(&mut self, common: Option<&[StationPose]>, left_out: LeftOut<'_>) -> Result<(Vec<OwnCloud>, u64)> {
         let own = std::mem::take(&mut self.own);
         let Some(poses) = common else {
             for file in own.iter().filter(|_| self.joins) {
@@ -159,11 +165,15 @@ impl<'a> Clouds<'a> {
             return Ok((own.into_iter().map(|own| own.cloud).collect(), 0));
         };
         for file in &own {
-            let path = self.folder.file(&file.cloud.file)?;
-            let pose = &poses[file.number].world_from_camera;
-            let (points, further) = parted(moved(read_cloud(&path)?, pose), file.further);
-            self.append(&points)?;
-            self.further.add(&further)?;
+            if !left_out(file.number) {
+                let number = (0..file.number).filter(|view| !left_out(*view)).count();
+                let mut cloud =
+                    moved(read_cloud(self.folder.file(&file.cloud.file)?)?, &poses[number].world_from_camera);
+                cloud.frame.iter_mut().for_each(|frames| frames.fill(number as u32));
+                let (points, further) = parted(cloud, file.further);
+                self.append(&points)?;
+                self.further.add(&further)?;
+            }
             self.folder.discard(&file.cloud.file)?;
         }
         for number in 0..self.further.close()? {

@@ -28,11 +28,9 @@ pub(crate) fn write_poses(
     };
     let rows: Vec<Station> = views.iter().zip(poses).map(row).collect();
     write_stations(folder.file("stations.csv")?, &rows)?;
-    let stamped = |(view, pose): (&ViewRecord, &StationPose)| StampedPose {
-        timestamp_s: view.timestamp_s,
-        world_from_camera: pose.world_from_camera,
-    };
-    let stamped: Vec<StampedPose> = views.iter().zip(poses).map(stamped).collect();
+    let stamped: Vec<StampedPose> = std::iter::zip(views, poses)
+        .map(|(view, pose)| StampedPose { timestamp_s: view.timestamp_s, world_from_camera: pose.world_from_camera })
+        .collect();
     Ok(write_tum(folder.file("trajectory.txt")?, &stamped)?)
 }
 

@@ -44,7 +44,7 @@ pub(crate) fn run(joined: &mut Joined, options: &AdjustOptions, progress: &dyn P
 
 /// From the poses that `Register` found.
 fn again(joined: &mut Joined, options: &AdjustOptions, progress: &dyn Progress) -> Result<Registered> {
-    let initial: Vec<Isometry3<f64>> = joined.poses.iter().map(|pose| pose.world_from_camera).collect();
+    let initial: Vec<Isometry3<f64>> = joined.poses.iter().flatten().map(|pose| pose.world_from_camera).collect();
     progress.begin("Adjust", joined.clouds.len());
     let limits = Some((options.minimum_overlap, options.maximum_distance_m));
     let found = register_at_once(&joined.clouds, Start::Poses(&initial), limits, &[], progress);

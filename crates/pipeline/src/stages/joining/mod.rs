@@ -10,7 +10,7 @@ pub(crate) mod adjust;
 pub(crate) mod gathered;
 pub(crate) mod register;
 
-use multiview_registration::{PairAlignment, RefusedPair, StationRegistration, UncheckedPair};
+use multiview_registration::{PairAlignment, RefusedPair, StationRegistration, UncheckedPair, UnplacedFrame};
 use nalgebra::Isometry3;
 use point_cloud::Cloud;
 
@@ -22,8 +22,10 @@ pub(crate) use gathered::Gathered;
 /// The stations in one frame.
 #[derive(Debug, Default)]
 pub(crate) struct Joined {
-    /// One a view.
-    pub(crate) poses: Vec<StationPose>,
+    /// One a view; `None`: `left_out` says why.
+    pub(crate) poses: Vec<Option<StationPose>>,
+    /// Views that do not belong to the others.
+    pub(crate) left_out: Vec<UnplacedFrame>,
     /// Aligned pairs.
     pub(crate) pairs: Vec<PairAlignment>,
     /// Pairs that overlap but could not be aligned reliably.
@@ -42,7 +44,8 @@ pub(crate) struct Joined {
 /// The simultaneous adjustment of all surfaces, without what the stations were made of.
 #[derive(Debug)]
 pub(crate) struct Registered {
-    pub(crate) poses: Vec<StationPose>,
+    /// As those of [`Joined`].
+    pub(crate) poses: Vec<Option<StationPose>>,
     /// Smallest overlap of its pairs; `None` of pairs of frames, which no overlap chooses.
     pub(crate) minimum_overlap: Option<f64>,
     /// Pairs of stations that share surfaces, and rounds.
@@ -60,7 +63,7 @@ impl Registered {
         world_from_registered: &Isometry3<f64>,
         minimum_overlap: f64,
     ) -> (Self, Vec<PairAlignment>, Vec<RefusedPair>) {
-        let poses = poses_in(world_from_registered, &found);
+        let poses = poses_in(world_from_registered, &found).into_iter().map(Some).collect();
         let StationRegistration { sigma0, redundancy, placements, rounds, settled, .. } = found;
         let figures = AdjustmentFigures { sigma0, redundancy, placements };
         let surfaces = found.surfaces.len();

@@ -53,14 +53,9 @@ fn at_once(
     progress: &dyn Progress,
 ) -> Result<Joined> {
     let before = if let Start::Poses(poses) = start { Some(poses) } else { None };
-    let as_frames = (frames.len() == clouds.len()).then(|| register_as_frames(&frames, before));
-    if let Some(Ok(found)) = as_frames
-        && let Some(registered) = from_frames(&found, &all_stated)
-    {
-        let poses = registered.poses.iter().map(without_covariance).collect();
-        let FrameRegistration { pairs, refused, unchecked, .. } = found;
-        let registered = Some(registered);
-        return Ok(Joined { poses, pairs, refused, unchecked, registered, names, ..Joined::default() });
+    let mut as_frames = (frames.len() == clouds.len()).then(|| register_as_frames(&frames, before).ok()).flatten();
+    if let Some(found) = as_frames.take_if(|found| found.unplaced.is_empty()) {
+        return Ok(from_frames(found, &all_stated, names));
     }
     let limits = Some((options.minimum_overlap, options.maximum_distance_m));
     let tried = match start {
@@ -68,36 +63,38 @@ fn at_once(
         Start::Order => Tried::Order,
         Start::Nothing => Tried::AllPairs,
     };
-    let found = register_at_once(&clouds, start, limits, &[], progress);
-    let found = found.map_err(|error| refused::of_stage("Register", error, &names, tried))?;
+    let found = match (register_at_once(&clouds, start, limits, &[], progress), as_frames) {
+        // Not all belong together; those that do are brought together.
+        (Err(_), Some(found)) => return Ok(from_frames(found, &all_stated, names)),
+        (found, _) => found.map_err(|error| refused::of_stage("Register", error, &names, tried))?,
+    };
     let world = world(stated, found.world_from_station.first());
     let (registered, pairs, refused) = Registered::new(found, &world, options.minimum_overlap);
-    let poses = registered.poses.iter().map(without_covariance).collect();
+    let poses = without_covariances(&registered.poses);
     let registered = matches!(start, Start::Poses(_)).then_some(registered);
     Ok(Joined { poses, pairs, refused, registered, names, clouds, ..Joined::default() })
 }
 
 /// How well poses are known is what `Adjust` says.
-fn without_covariance(pose: &StationPose) -> StationPose {
-    StationPose { covariance: None, ..*pose }
+fn without_covariances(poses: &[Option<StationPose>]) -> Vec<Option<StationPose>> {
+    let without = |pose: &StationPose| StationPose { covariance: None, ..*pose };
+    poses.iter().map(|pose| pose.as_ref().map(without)).collect()
 }
 
-/// Where all frames were placed: their poses in the world in which the datum stands as stated.
-fn from_frames(found: &FrameRegistration, stated: &[Option<Isometry3<f64>>]) -> Option<Registered> {
-    let placed: Vec<PlacedFrame> = found.frames.iter().copied().collect::<Option<_>>()?;
-    let datum = found.datum;
-    let world = Uncertain::exact(world(stated[datum], Some(&placed[datum].world_from_frame)));
+/// The frames that were placed, in the world in which the datum stands as stated.
+fn from_frames(found: FrameRegistration, stated: &[Option<Isometry3<f64>>], names: Vec<String>) -> Joined {
+    let FrameRegistration { frames, datum, unplaced: left_out, pairs, refused, unchecked, placements, .. } = found;
+    let world = Uncertain::exact(world(stated[datum], frames[datum].map(|frame| frame.world_from_frame).as_ref()));
     let pose = |frame: &PlacedFrame| {
         let pose = world.then(&Uncertain { pose: frame.world_from_frame, covariance: frame.covariance });
         StationPose { world_from_camera: pose.pose, covariance: Some(pose.covariance) }
     };
-    let figures = AdjustmentFigures {
-        sigma0: Some(found.variance_factor.sqrt()),
-        redundancy: 6 * (found.pairs.len() as i64 + 1 - placed.len() as i64),
-        placements: found.placements.clone(),
-    };
-    let (poses, surfaces) = (placed.iter().map(pose).collect(), found.pairs.len());
-    Some(Registered { poses, minimum_overlap: None, surfaces, rounds: 1, settled: true, figures })
+    let (sigma0, placed) = (Some(found.variance_factor.sqrt()), frames.iter().flatten().count());
+    let figures = AdjustmentFigures { sigma0, redundancy: 6 * (pairs.len() as i64 + 1 - placed as i64), placements };
+    let (poses, surfaces) = (frames.iter().map(|frame| frame.as_ref().map(pose)).collect(), pairs.len());
+    let registered = Registered { poses, minimum_overlap: None, surfaces, rounds: 1, settled: true, figures };
+    let poses = without_covariances(&registered.poses);
+    Joined { poses, left_out, pairs, refused, unchecked, registered: Some(registered), names, ..Joined::default() }
 }
 
 fn each_onto_the_one_before(Gathered { names, clouds, pairs, .. }: Gathered, stated: Option<Isometry3<f64>>) -> Joined {
@@ -106,6 +103,6 @@ fn each_onto_the_one_before(Gathered { names, clouds, pairs, .. }: Gathered, sta
         poses.push(poses[pair.target] * pair.result.target_from_source);
     }
     let world = world(stated, poses.first());
-    let pose = |pose: &Isometry3<f64>| StationPose { world_from_camera: world * pose, covariance: None };
+    let pose = |pose: &Isometry3<f64>| Some(StationPose { world_from_camera: world * pose, covariance: None });
     Joined { poses: poses.iter().map(pose).collect(), pairs, names, clouds, ..Joined::default() }
 }

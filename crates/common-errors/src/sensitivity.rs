@@ -30,7 +30,7 @@ pub(crate) fn pose_errors(
     let with = (!errors.is_empty()).then_some(&model as &dyn PointModel);
     let options = StationRegistrationOptions { model: with, ..StationRegistrationOptions::default() };
     let found = register_stations(clouds, Start::Poses(world_from_camera), Datum::Station(0), &options, &|_, _| {})?;
-    let (poses, all) = (6 * clouds.len(), found.joint_covariance);
+    let (poses, all) = (6 * clouds.len(), found.joint_covariance.whole());
     let count = all.nrows() - poses;
     let of_poses = all.view((0, 0), (poses, poses)).into_owned();
     if count == 0 {

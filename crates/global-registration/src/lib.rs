@@ -20,4 +20,6 @@ pub use nalgebra;
 pub use options::{CoarseOptions, SharedError, SurfaceDescriptors, Viewpoint};
 pub use point_cloud;
 pub use rigid_pose;
-pub use verification::among::{Placed, agreement, evidence, refined_among, with_one_voxel};
+pub use verification::among::{
+    Placed, agreement, agreement_of_rooms, evidence, in_voxels, refined_among, with_one_voxel,
+};

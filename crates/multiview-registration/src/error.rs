@@ -48,6 +48,18 @@ pub enum Error {
         /// Entries found.
         found: usize,
     },
+    /// More stations than registration has been shown to bring into their places.
+    #[error("{found} stations: at most {most} are registered at once from {start}; {remedy}")]
+    TooManyStations {
+        /// Stations found.
+        found: usize,
+        /// Stations that are allowed.
+        most: usize,
+        /// What was known of them.
+        start: &'static str,
+        /// What to do.
+        remedy: &'static str,
+    },
     /// A pair names a station that is not there.
     #[error("a pair names station {station}, but there are {count} (from 0)")]
     NoSuchStation {

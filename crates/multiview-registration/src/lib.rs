@@ -24,7 +24,8 @@ pub use projective_registration;
 pub use rigid_pose;
 pub use surfaces::point_model::{PointModel, SharedParameters};
 pub use survey::datum::Datum;
+pub use survey::joint_covariance::JointCovariance;
 pub use survey::registration::{
-    Start, StationRegistration, StationRegistrationOptions, SurfacePair, UndeterminedStation,
+    Effort, Start, StationRegistration, StationRegistrationOptions, SurfacePair, UndeterminedStation,
 };
 pub use survey::stations::register_stations;

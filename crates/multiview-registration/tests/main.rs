@@ -8,6 +8,7 @@
     missing_docs
 )]
 
+mod buildings;
 #[path = "../../point-cloud/tests/common/mod.rs"]
 mod common;
 #[path = "../../projective-registration/tests/depth_frames/mod.rs"]

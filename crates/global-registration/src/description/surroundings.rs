@@ -9,7 +9,7 @@ use crate::description::reduced::Reduced;
 const CELLS_PER_TASK: usize = 64;
 
 /// Lists of neighbours, one behind the other.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(crate) struct Surroundings {
     starts: Vec<u32>,
     items: Vec<Near>,
@@ -57,9 +57,12 @@ impl Surroundings {
         Self { starts, items }
     }
 
-    /// The neighbours of a point, without itself.
+    /// The neighbours of a point, without itself; none where they were not listed.
     pub(crate) fn of(&self, index: usize) -> &[Near] {
-        &self.items[self.starts[index] as usize..self.starts[index + 1] as usize]
+        match self.starts.get(index..index + 2) {
+            Some(&[first, end]) => &self.items[first as usize..end as usize],
+            _ => &[],
+        }
     }
 }
 

@@ -1,6 +1,6 @@
 //! What was seen from the viewpoint: ranges by direction on the six faces of a cube.
 
-use crate::description::fpfh::subtract;
+use crate::description::fpfh::{dot, subtract};
 
 /// Cells along the edge of a face.
 const FEWEST: f32 = 8.0;
@@ -28,6 +28,9 @@ pub(crate) enum Jumps {
     Unknown,
     /// That it misses the surface: among many stations, the outlines of furniture tell which have slid along a wall.
     Missed,
+    /// The same, but for points that face away from the viewpoint: of stations in several rooms, what is just behind a wall is the other
+    /// side of that wall.
+    MissedByFronts,
 }
 
 /// Nearest and farthest range in each direction.
@@ -56,6 +59,11 @@ impl View {
         }
         view.nearest = view.nearest_around();
         Some(view)
+    }
+
+    /// Whether a surface with this normal turns its back on the viewpoint.
+    pub(crate) fn is_behind(&self, point: [f32; 3], normal: [f32; 3]) -> bool {
+        dot(subtract(point, self.eye), normal) > 0.0
     }
 
     pub(crate) fn sight(&self, point: [f32; 3], jumps: Jumps) -> Sight {

@@ -12,10 +12,12 @@ use crate::verification::refine;
 /// The clouds in voxels of one size, that of the coarsest.
 pub fn with_one_voxel(clouds: Vec<FeatureCloud>, options: &CoarseOptions) -> Result<Vec<FeatureCloud>> {
     let voxel_m = clouds.iter().map(FeatureCloud::voxel_m).fold(0.0, f64::max);
-    let coarse = |cloud: FeatureCloud| {
-        if cloud.voxel_m() < 0.999 * voxel_m { cloud.coarsened(voxel_m, options) } else { Ok(cloud) }
-    };
-    clouds.into_iter().map(coarse).collect()
+    clouds.into_iter().map(|cloud| in_voxels(cloud, voxel_m, options)).collect()
+}
+
+/// A cloud in voxels of this size, or as it is where its own are no smaller.
+pub fn in_voxels(cloud: FeatureCloud, voxel_m: f64, options: &CoarseOptions) -> Result<FeatureCloud> {
+    if cloud.voxel_m() < 0.999 * voxel_m { cloud.coarsened(voxel_m, options) } else { Ok(cloud) }
 }
 
 /// A cloud and its pose `world_from_cloud`.
@@ -35,8 +37,18 @@ pub fn evidence(a: &Placed<'_>, b: &Placed<'_>, stride: usize) -> f64 {
 /// How the sampled points of two clouds lie for each other: those on the other's surface, and those that contradict it, in
 /// space that it looked through or beside a surface that they should lie on.
 pub fn agreement(a: &Placed<'_>, b: &Placed<'_>) -> (usize, usize) {
+    counted(a, b, Jumps::Missed)
+}
+
+/// The same where clouds may lie in different rooms: the side of a thin wall that faces away from a viewpoint says nothing about what
+/// was seen of the other side.
+pub fn agreement_of_rooms(a: &Placed<'_>, b: &Placed<'_>) -> (usize, usize) {
+    counted(a, b, Jumps::MissedByFronts)
+}
+
+fn counted(a: &Placed<'_>, b: &Placed<'_>, jumps: Jumps) -> (usize, usize) {
     let pose = from_middle(a).inverse() * from_middle(b);
-    let verdict = Verdict::with(b.0, a.0, &pose, 1, Jumps::Missed);
+    let verdict = Verdict::with(b.0, a.0, &pose, 1, jumps);
     let sum = |of: fn(&Count) -> usize| of(&verdict.source) + of(&verdict.target);
     (sum(|c| c.hits), sum(|c| c.in_free + c.missed))
 }

@@ -155,7 +155,11 @@ fn count(
         }
         match to.view.as_ref().map(|view| view.sight(point, jumps)) {
             Some(Sight::InFree) => count.in_free += 1,
-            Some(Sight::OnSurface) => count.missed += 1,
+            Some(Sight::OnSurface) => {
+                let fronts = sided && jumps == Jumps::MissedByFronts;
+                let behind = fronts && to.view.as_ref().is_some_and(|view| view.is_behind(point, normal));
+                count.missed += usize::from(!behind);
+            }
             _ => {}
         }
     }

@@ -2,13 +2,14 @@
 
 use nalgebra::{DMatrix, DVector, Isometry3};
 
+use crate::adjustment::cofactors::Cofactors;
 use crate::adjustment::network::{Network, State};
 use crate::adjustment::turns::MeasuredTurn;
 use crate::error::{Error, Result};
-use crate::planes::elimination::{Eliminated, motion_of};
+use crate::planes::elimination::{Eliminated, Products, motion_of};
 use crate::planes::shared_planes::SharedPlane;
 
-/// Normal equations of all stations and parameters.
+/// Normal equations of all stations and parameters as whole matrices.
 pub(crate) struct Equations {
     pub normal: DMatrix<f64>,
     pub right: DVector<f64>,
@@ -33,7 +34,8 @@ impl Equations {
         for k in 0..parameters {
             to_all[(3 * count + k, 6 * count + k)] = 1.0;
         }
-        let normal = to_all.transpose() * &eliminated.normal * &to_all;
+        let Products::Eliminated(normal) = &eliminated.products else { return };
+        let normal = to_all.transpose() * normal * &to_all;
         let right = to_all.transpose() * &eliminated.right;
         let place = |k: usize| match eliminated.stations.get(k / 6) {
             Some(station) => 6 * station + k % 6,
@@ -62,7 +64,7 @@ impl Equations {
     }
 
     /// The step that minimises the squares, with priors that hold what nothing determines, and the cofactors.
-    pub(crate) fn solved(&self, network: &Network<'_>, state: &State) -> Result<(DVector<f64>, DMatrix<f64>)> {
+    pub(crate) fn solved(&self, network: &Network<'_>, state: &State) -> Result<(DVector<f64>, Cofactors)> {
         let of_poses = 6 * self.stations;
         let (mut normal, mut right) = (self.normal.clone(), self.right.clone());
         for k in 0..of_poses {
@@ -91,6 +93,6 @@ impl Equations {
                 cofactors[(row, column)] = inverse[(r, c)] * scale[r] * scale[c];
             }
         }
-        Ok((-(&cofactors * &right), cofactors))
+        Ok((-(&cofactors * &right), Cofactors::Whole { matrix: cofactors, stations: self.stations }))
     }
 }

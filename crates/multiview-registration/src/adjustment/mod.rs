@@ -1,8 +1,11 @@
 //! All stations in one system, round by round.
 
+pub(crate) mod cofactors;
 pub(crate) mod equations;
 pub(crate) mod network;
 pub(crate) mod precision;
 pub(crate) mod rounds;
 pub(crate) mod simultaneous;
+pub(crate) mod sparse_equations;
 pub(crate) mod turns;
+pub(crate) mod wide_errors;

@@ -3,16 +3,30 @@
 use adjust::{Adjustment, BlockId, Covariance, FunctionObservation, ParameterBlock, SolveOptions};
 use nalgebra::{DVector, Isometry3, Matrix6, Vector6};
 
+use crate::adjustment::sparse_equations::SparseEquations;
 use crate::adjustment::turns::MeasuredTurn;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::planes::reduction::{PairContacts, Reduced};
 use crate::relative_pose::{adjustment, relative_pose_parts};
+use rigid_pose::step_pose;
+
+/// Steps of many stations onto what their pairs observe: relative poses bend with large turns, and contacts are found anew anyway.
+const RELATIVE_STEPS: usize = 2;
 
 /// Poses and shared parameters.
 #[derive(Debug, Clone)]
 pub(crate) struct State {
     pub poses: Vec<Isometry3<f64>>,
     pub parameters: Vec<f64>,
+}
+
+/// What many stations are held by beside their contacts.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Anchors<'a> {
+    /// Poses that are known to what the network holds them at.
+    pub poses: &'a [Isometry3<f64>],
+    /// What variances of contacts are multiplied by.
+    pub factor: f64,
 }
 
 /// What does not change from round to round.
@@ -26,12 +40,19 @@ pub(crate) struct Network<'a> {
     pub names: &'a [String],
     pub prior: &'a (Vec<f64>, Vec<f64>),
     pub turns: &'a [MeasuredTurn],
+    /// Whether the normal matrix is factorised as a whole.
+    pub whole: bool,
 }
 
 impl Network<'_> {
     /// The same with each pose taken to be known to a length, rotations at the radius at which they are held now.
     pub(crate) fn near(&self, known_m: f64) -> Self {
         Self { hold_m: known_m, turn_rad: known_m / self.hold_m, ..*self }
+    }
+
+    /// One over the variance of a component of a pose where no contact says anything.
+    pub(crate) fn hold_weight(&self, component: usize) -> f64 {
+        if component < 3 { self.hold_m.powi(-2) } else { self.turn_rad.powi(-2) }
     }
 
     /// One linearised step for all unknowns.
@@ -76,6 +97,43 @@ impl Network<'_> {
             None => Vec::new(),
         };
         Ok(State { poses: poses.map_err(adjustment)?, parameters })
+    }
+
+    /// The same of many stations, of which each meets a few others. `anchors` have the poses that are known beforehand and what the
+    /// variances of contacts are multiplied by: far from their places, patches say less than their points promise.
+    pub(crate) fn solve_sparse(
+        &self,
+        state: &State,
+        pairs: &[(&PairContacts, Reduced)],
+        anchors: &Anchors<'_>,
+    ) -> Result<State> {
+        let mut state = state.clone();
+        let share = anchors.factor.max(1.0).sqrt().recip();
+        for _ in 0..RELATIVE_STEPS {
+            // The anchors alone fix the frame.
+            let mut equations = SparseEquations::new(state.poses.len(), usize::MAX, 0);
+            for (pair_contacts, reduced) in pairs.iter().filter(|(_, reduced)| reduced.rows.nrows() > 0) {
+                let ends = [pair_contacts.target, pair_contacts.source];
+                let values = ends.map(|station| adjust::RigidPose::values(&state.poses[station]));
+                let (v, by_target, by_source) =
+                    relative_pose_parts(&reduced.pose, &[&values[0], &values[1]]).map_err(|_| Error::Numerical {
+                        what: "the relative pose of two stations",
+                        why: "it is no pose",
+                    })?;
+                let residual = share * (&reduced.right - &reduced.rows * v);
+                let rows = share * &reduced.rows;
+                equations.add_rows(ends, [&(&rows * by_target), &(&rows * by_source)], &residual);
+            }
+            for turn in self.turns {
+                equations.add_turn(turn, &state.poses);
+            }
+            equations.hold(self, anchors.poses, &state.poses);
+            let step = equations.step(&equations.cofactors(self)?);
+            for (k, pose) in state.poses.iter_mut().enumerate() {
+                *pose = step_pose(pose, &step.fixed_rows::<6>(6 * k).into_owned());
+            }
+        }
+        Ok(state)
     }
 
     fn shared_block(&self, network: &mut Adjustment<'_>, state: &State) -> Result<Option<BlockId>> {
@@ -141,4 +199,61 @@ pub(crate) fn largest_step(before: &State, after: &State, radius_m: f64) -> f64 
         d.fixed_rows::<3>(0).norm().max(d.fixed_rows::<3>(3).norm() * radius_m)
     });
     moved.fold(0.0, f64::max)
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use nalgebra::{DMatrix, Vector3};
+
+    use super::*;
+
+    #[test]
+    fn many_stations_come_where_few_do() {
+        let number = |k: usize| ((k * 7919 + 13) as f64 * 0.618_034).sin();
+        let vector = |k: usize| Vector3::new(number(k), number(k + 1), number(k + 2));
+        let poses: Vec<Isometry3<f64>> =
+            (0..6).map(|k| Isometry3::new(3.0 * vector(5 * k), vector(7 * k + 3))).collect();
+        let pair = |target: usize, source: usize| {
+            let off = Isometry3::new(0.03 * vector(target + 9 * source), 0.02 * vector(4 * target + source));
+            let pose = poses[target].inverse() * poses[source];
+            // What was observed is off the present poses by centimetres.
+            let right = DVector::from_fn(6, |k, _| 300.0 * number(11 * target + 3 * source + k));
+            let rows =
+                DMatrix::from_fn(6, 6, |r, c| 1e4 * (f64::from(u8::from(r == c)) + 0.3 * number(r + 6 * c + target)));
+            let contacts = PairContacts { target, source, contacts: Vec::new() };
+            (contacts, Reduced { rows, right, pose: pose * off })
+        };
+        let all: Vec<(PairContacts, Reduced)> =
+            [(0, 1), (1, 2), (2, 3), (3, 4), (4, 5), (0, 5), (1, 4)].map(|(a, b)| pair(a, b)).into();
+        let pairs: Vec<(&PairContacts, Reduced)> = all.iter().map(|(pair, reduced)| (pair, reduced.clone())).collect();
+        let turn = MeasuredTurn {
+            first: 0,
+            second: 3,
+            first_from_second: poses[0].rotation.inverse()
+                * poses[3].rotation
+                * nalgebra::UnitQuaternion::from_scaled_axis(0.01 * vector(3)),
+            covariance: nalgebra::Matrix3::identity() * 1e-6,
+        };
+        let (prior, turns) = ((Vec::new(), Vec::new()), [turn]);
+        let network =
+            Network { fixed: 2, hold_m: 3.0, turn_rad: 1.0, names: &[], prior: &prior, turns: &turns, whole: true };
+        let state = State { poses: poses.clone(), parameters: Vec::new() };
+        let few = network.solve(&state, &pairs).unwrap();
+        assert!(largest_step(&state, &few, 3.0) > 0.02);
+        let off = |many: &State| {
+            // Nothing but the anchors holds the frame.
+            let moved = few.poses[2] * many.poses[2].inverse();
+            let poses = many.poses.iter().map(|pose| moved * pose).collect();
+            largest_step(&few, &State { poses, parameters: Vec::new() }, 3.0)
+        };
+        let anchors = Anchors { poses: &poses, factor: 1.0 };
+        let many = network.solve_sparse(&state, &pairs, &anchors).unwrap();
+        // Two steps of centimetres and degrees against as many as it takes: the next would be of third order.
+        assert!(off(&many) < 1e-4, "{}", off(&many));
+        // Few stations end at a step of a thousandth of a standard deviation (1e-4 m); rounding is far below.
+        let again = network.solve_sparse(&many, &pairs, &anchors).unwrap();
+        assert!(off(&again) < 1e-6, "{}", off(&again));
+    }
 }

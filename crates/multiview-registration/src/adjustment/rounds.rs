@@ -2,17 +2,19 @@
 
 use nalgebra::{Isometry3, Point3};
 use rayon::prelude::*;
-use statistics::mad_scale;
+use statistics::{mad_scale, upper_median};
 
-use crate::adjustment::network::{Network, State, largest_step};
+use crate::adjustment::network::{Anchors, Network, State, largest_step};
 use crate::error::{Error, Result};
 use crate::planes::contacts::{Contact, Reach, TURNED, partners};
 use crate::planes::reduction::{PairContacts, Reduced, Scene, Weighting, reduce};
+use crate::surfaces::extents::{Extent, Extents};
 use crate::surfaces::patches::Surface;
 use crate::surfaces::plane_fit::SAME_DIRECTION;
 use crate::surfaces::point_model::PointModel;
 use crate::surfaces::points::StationPoints;
 use icp_registration::RobustKernel;
+use rigid_pose::pose_difference;
 
 /// Most rounds of a level, and the part of its limit that a step must be below for it to end.
 const ROUNDS: usize = 8;
@@ -23,6 +25,10 @@ pub(crate) const FEWEST_CONTACTS: usize = 15;
 const KERNEL: RobustKernel = RobustKernel::Huber;
 /// Nearest patches that are looked at while stations are still apart.
 const CANDIDATES: usize = 8;
+/// Median length of a vector of three components of unit variance.
+const MEDIAN_OF_THREE: f64 = 1.538_172;
+/// Part of a patch that start poses are not taken to be better known than: from there the last rounds find their way.
+const KNOWN: f64 = 0.25;
 
 /// Derivatives of the patches of each station by all parameters, patch by patch.
 pub(crate) type PatchDerivatives = Vec<Vec<[f64; 3]>>;
@@ -109,6 +115,24 @@ fn averaged(surface: &Surface, of_points: &[[f64; 3]], parameters: usize) -> Vec
     out
 }
 
+/// The pairs of stations (target, source) that may have partners at these poses, ascending: all others lie too far apart.
+pub(crate) fn near_each_other(
+    surfaces: &[&Surface],
+    poses: &[Isometry3<f64>],
+    reach: Reach,
+) -> Result<Vec<(usize, usize)>> {
+    let size_m = surfaces.iter().map(|surface| surface.size_m).fold(0.0, f64::max);
+    let extent = |(surface, pose): (&&Surface, &Isometry3<f64>)| {
+        let centres = surface.patches.iter().map(|patch| &patch.centre);
+        if let Some(index) = centres.clone().position(|centre| !point_cloud::is_usable(&(pose * centre))) {
+            return Err(Error::NonFinite { what: "points of a station in the frame of another", index });
+        }
+        Ok(Extent::placed(centres, pose))
+    };
+    let extents = surfaces.iter().zip(poses).map(extent).collect::<Result<Vec<Extent>>>()?;
+    Ok(Extents::new(&extents).pairs(reach.farthest_m(size_m)))
+}
+
 /// All pairs in contact at these poses; `only`: the pairs to look at (target, source).
 pub(crate) fn meet(
     surfaces: &[&Surface],
@@ -174,10 +198,38 @@ fn scale(scene: &Scene<'_>, pairs_in_contact: &[PairContacts], poses: &[Isometry
     mad_scale(&mut residuals).max(1e-3)
 }
 
+/// How well start poses are known: standard deviations of a component of the position, metre, and of the attitude, radian.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Known {
+    position_m: f64,
+    attitude_rad: f64,
+}
+
+impl Known {
+    /// From how far stations have moved since: half of them no farther than `MEDIAN_OF_THREE` deviations. Those that have slid to
+    /// where they should not be are fewer.
+    fn estimated(start: &[Isometry3<f64>], now: &[Isometry3<f64>], least: Self, most: Self) -> Self {
+        let moved = |part: usize| {
+            let norm = |(a, b): (&Isometry3<f64>, &Isometry3<f64>)| pose_difference(a, b).fixed_rows::<3>(part).norm();
+            upper_median(&mut start.iter().zip(now).map(norm).collect::<Vec<f64>>()) / MEDIAN_OF_THREE
+        };
+        Self {
+            position_m: moved(0).max(least.position_m).min(most.position_m),
+            attitude_rad: moved(3).max(least.attitude_rad).min(most.attitude_rad),
+        }
+    }
+
+    /// The same length for positions and for what is at this distance.
+    fn at(length_m: f64, radius_m: f64) -> Self {
+        Self { position_m: length_m, attitude_rad: length_m / radius_m }
+    }
+}
+
 /// How the rounds go.
+#[derive(Clone, Copy)]
 pub(crate) struct WideRounds<'a> {
     pub network: &'a Network<'a>,
-    /// Error of the start poses, metre.
+    /// Largest error of the start poses, metre.
     pub reach_m: f64,
     pub progress: &'a (dyn Fn(usize) + Sync),
 }
@@ -196,18 +248,38 @@ impl WideRounds<'_> {
         levels
     }
 
+    /// One step of all stations. Many are held at their start as well as that is known, which
+    /// how far all have moved tells: where little else stands along a wall a station
+    /// would slide farther than it can be off, and meet the wrong things there. None keeps its pose: the others would bend about it.
+    fn solved(
+        &self,
+        state: &State,
+        (start, known): (&[Isometry3<f64>], Known),
+        reduced: &[(&PairContacts, Reduced)],
+        scale: f64,
+    ) -> Result<State> {
+        if self.network.whole {
+            return self.network.solve(state, reduced);
+        }
+        let network = Network { hold_m: known.position_m, turn_rad: known.attitude_rad, ..*self.network };
+        network.solve_sparse(state, reduced, &Anchors { poses: start, factor: scale * scale })
+    }
+
     /// Brings all stations from start poses that are right to about the reach to a part of a patch.
-    pub(crate) fn run(&self, surfaces: &mut Surfaces<'_>, start: State) -> Result<State> {
-        let count = start.poses.len();
-        let all: Vec<(usize, usize)> = (0..count).flat_map(|t| (t + 1..count).map(move |s| (t, s))).collect();
+    pub(crate) fn run(&self, surfaces: &mut Surfaces<'_>, start: &State) -> Result<State> {
         let size_m = surfaces.given.iter().map(|surface| surface.size_m).fold(0.0, f64::max);
-        let mut state = start;
+        let mut state = start.clone();
         let mut rounds = 0;
+        let [least, most] = [KNOWN * size_m, self.reach_m].map(|length_m| Known::at(length_m, self.network.hold_m));
+        let mut known = most;
         for reach in self.levels(size_m) {
-            let mut pairs = all.clone();
+            let mut pairs = Vec::new();
             for in_level in 0..ROUNDS {
                 surfaces.update(&state.parameters)?;
                 let scene = surfaces.scene(state.parameters.len());
+                if in_level == 0 {
+                    pairs = near_each_other(&scene.surfaces, &state.poses, reach)?;
+                }
                 let pairs_in_contact = meet(&scene.surfaces, &state.poses, &pairs, reach)?;
                 if in_level == 0 {
                     // Stations that do not meet now will not after the small steps of one level.
@@ -217,10 +289,11 @@ impl WideRounds<'_> {
                         .collect();
                 }
                 let weighting = Weighting { kernel: KERNEL, scale: scale(&scene, &pairs_in_contact, &state.poses) };
-                let next =
-                    self.network.solve(&state, &reduced(&scene, &pairs_in_contact, &state.poses, &weighting)?)?;
+                let reduced = reduced(&scene, &pairs_in_contact, &state.poses, &weighting)?;
+                let next = self.solved(&state, (&start.poses, known), &reduced, weighting.scale)?;
                 let moved_m = largest_step(&state, &next, self.network.hold_m);
                 state = next;
+                known = Known::estimated(&start.poses, &state.poses, least, most);
                 rounds += 1;
                 (self.progress)(rounds);
                 if moved_m <= reach.across_m / SMALL_STEP {

@@ -1,19 +1,23 @@
 //! The last rounds: all points of all stations on shared planes whose planes are unknown too.
 
-use nalgebra::{DMatrix, DVector, Isometry3};
+use std::collections::BTreeMap;
+
+use nalgebra::{DVector, Isometry3};
 use rayon::prelude::*;
 
+use crate::adjustment::cofactors::Cofactors;
 use crate::adjustment::equations::Equations;
 use crate::adjustment::network::{Network, State, largest_step};
-use crate::adjustment::rounds::{Surfaces, meet};
+use crate::adjustment::rounds::{Surfaces, meet, near_each_other};
+use crate::adjustment::sparse_equations::{MOST_ELIMINATED, SparseEquations};
+use crate::adjustment::wide_errors::Residuals;
 use crate::error::Result;
 use crate::planes::contacts::Reach;
-use crate::planes::elimination::{Eliminated, SharedPlaneSums, Variances, motion_of};
+use crate::planes::elimination::{Eliminated, Products, SharedPlaneSums, Variances, motion_of};
 use crate::planes::scatter::{Scatter, TileMean, between, tile_means, variances};
 use crate::planes::shared_planes::{SharedPlane, shared_planes};
 use crate::planes::sightings::{Gate, sightings};
 use crate::planes::sums::Sums;
-use crate::planes::wide_errors::Residuals;
 use crate::surfaces::plane_fit::SAME_DIRECTION;
 use crate::surfaces::points::StationPoints;
 use icp_registration::RobustKernel;
@@ -42,17 +46,58 @@ pub(crate) struct Adjusted {
     pub means: Vec<Vec<TileMean>>,
     pub variances: Vec<Variances>,
     /// Inverse of the normal matrix, zero for the station that is held.
-    pub cofactors: DMatrix<f64>,
+    pub cofactors: Cofactors,
     /// Factor of the cofactors that makes covariances of them.
     pub factor: f64,
     pub rounds: usize,
     pub settled: bool,
+    /// What stations have in common; empty until the last round.
+    pub common: Common,
+    /// Pairs of stations that were held against each other.
+    pub pairs_tried: usize,
+}
+
+/// The tiles that pairs of stations saw, and the planes of each station.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Common {
+    /// Of each pair (the smaller station first) the shared plane, and both means among those of it.
+    pub pairs: BTreeMap<(u32, u32), Vec<[u32; 3]>>,
+    /// The shared planes of each station that another one saw too, ascending.
+    pub planes: Vec<Vec<u32>>,
+    /// Number of tiles of each station.
+    pub tiles: Vec<usize>,
+}
+
+impl Common {
+    fn new(stations: usize, means: &[Vec<TileMean>]) -> Self {
+        let mut this = Self { pairs: BTreeMap::new(), planes: vec![Vec::new(); stations], tiles: vec![0; stations] };
+        for (plane, means) in means.iter().enumerate() {
+            let plane = plane as u32;
+            for mean in means {
+                this.tiles[mean.station] += 1;
+                if this.planes[mean.station].last() != Some(&plane) {
+                    this.planes[mean.station].push(plane);
+                }
+            }
+            let mut first = 0;
+            for tile in means.chunk_by(|a, b| a.tile == b.tile) {
+                for (a, one) in tile.iter().enumerate() {
+                    for (b, other) in tile.iter().enumerate().skip(a + 1) {
+                        let pair = (one.station as u32, other.station as u32);
+                        this.pairs.entry(pair).or_default().push([plane, (first + a) as u32, (first + b) as u32]);
+                    }
+                }
+                first += tile.len();
+            }
+        }
+        this
+    }
 }
 
 impl Adjusted {
     /// Differences between stations within tiles less unknowns.
     pub(crate) fn redundancy(&self) -> i64 {
-        let unknowns = self.cofactors.nrows() as i64 - 6;
+        let unknowns = self.cofactors.unknowns() as i64 - 6;
         self.scatter.differences.round() as i64 - unknowns
     }
 
@@ -68,8 +113,12 @@ impl Adjusted {
         self.factor
     }
 
+    fn factor_of_tiles(&self) -> f64 {
+        self.sigma0().map_or(1.0, |sigma0| sigma0.powi(2).max(1.0))
+    }
+
     fn factor_on(&self, shared_planes: &[SharedPlane]) -> f64 {
-        let of_tiles = self.sigma0().map_or(1.0, |sigma0| sigma0.powi(2).max(1.0));
+        let of_tiles = self.factor_of_tiles();
         let residuals = Residuals {
             shared_planes,
             means: &self.means,
@@ -91,6 +140,8 @@ pub(crate) struct Finish<'a> {
     pub near: Network<'a>,
     /// Movement at which the rounds end, metre.
     pub tolerance_m: f64,
+    /// Rounds after which they end all the same.
+    pub most_rounds: usize,
     pub progress: &'a (dyn Fn(usize) + Sync),
 }
 
@@ -103,17 +154,17 @@ impl Finish<'_> {
         mut state: State,
     ) -> Result<Adjusted> {
         let size_m = surfaces.given.iter().map(|surface| surface.size_m).fold(0.0, f64::max);
-        let (mut known, mut round) = (Vec::new(), 0);
+        let (mut known, mut round, mut pairs_tried) = (Vec::new(), 0, 0);
         loop {
             surfaces.update(&state.parameters)?;
             surfaces.place(points, &state.parameters)?;
             let scene = surfaces.scene(0);
             let off_m = OFF.get(round).map(|off| off * size_m);
             if let Some(off_m) = off_m {
-                let count = state.poses.len();
-                let all: Vec<(usize, usize)> = (0..count).flat_map(|t| (t + 1..count).map(move |s| (t, s))).collect();
                 let reach = Reach { across_m: size_m / 4.0, candidates: 1, cosine: SAME_DIRECTION };
-                let pairs_in_contact = meet(&scene.surfaces, &state.poses, &all, reach)?;
+                let near = near_each_other(&scene.surfaces, &state.poses, reach)?;
+                pairs_tried = near.len();
+                let pairs_in_contact = meet(&scene.surfaces, &state.poses, &near, reach)?;
                 known = shared_planes(&scene.surfaces, &state.poses, &pairs_in_contact, off_m);
             }
             let first = round == 0;
@@ -124,65 +175,71 @@ impl Finish<'_> {
             let adjusted = self.step(&mut state, &mut known, sums)?;
             round += 1;
             (self.progress)(round);
-            let settled = off_m.is_none() && self.is_settled(&before, &state, &adjusted, &known);
-            if settled || round >= MOST_ROUNDS {
+            let settled = off_m.is_none() && self.settles(&before, &state, &adjusted, &known);
+            if settled || round >= self.most_rounds {
                 let factor = adjusted.factor_on(&known);
-                return Ok(Adjusted { state, shared_planes: known, factor, rounds: round, settled, ..adjusted });
+                let common = Common::new(state.poses.len(), &adjusted.means);
+                let shared_planes = known;
+                return Ok(Adjusted {
+                    state,
+                    shared_planes,
+                    factor,
+                    rounds: round,
+                    settled,
+                    common,
+                    pairs_tried,
+                    ..adjusted
+                });
             }
         }
     }
 
-    /// Whether every station moved by less than the tolerance, or by so little of its standard deviation that further
-    /// rounds tell nothing: along a direction that the surfaces leave open, poses drift with every change of weights.
-    fn is_settled(&self, before: &State, after: &State, adjusted: &Adjusted, shared_planes: &[SharedPlane]) -> bool {
+    /// Whether no station moved by more than the tolerance, or by so much of its standard deviation that further rounds tell
+    /// something: along a direction that the surfaces leave open, poses drift with every change of weights.
+    fn settles(&self, before: &State, after: &State, adjusted: &Adjusted, shared_planes: &[SharedPlane]) -> bool {
         if largest_step(before, after, self.network.hold_m) <= self.tolerance_m {
             return true;
         }
-        let (cofactors, factor) = (&adjusted.cofactors, adjusted.factor_on(shared_planes));
-        before.poses.iter().zip(&after.poses).enumerate().all(|(k, (a, b))| {
-            let step = pose_difference(a, b);
-            let own = cofactors.fixed_view::<6, 6>(6 * k, 6 * k) * factor;
+        // Of many stations the factor takes as long as a round; without it the demand is stricter.
+        let factor = if self.network.whole { adjusted.factor_on(shared_planes) } else { adjusted.factor_of_tiles() };
+        let cofactors = &adjusted.cofactors;
+        let is_settled = |k: usize| {
+            let step = pose_difference(&before.poses[k], &after.poses[k]);
+            let own = cofactors.of(k) * factor;
             let sigmas = own.cholesky().map_or(f64::INFINITY, |factor| step.dot(&factor.solve(&step)).sqrt());
+            // Not a number is no small one.
             k == self.network.fixed || sigmas <= FEW_SIGMAS
-        })
+        };
+        (0..after.poses.len()).all(is_settled)
     }
 
     /// What the stations saw of each tile about the planes at the present poses, and how that scatters.
-    fn scatter(known: &[SharedPlane], sums: &[Sums], stations: &[usize]) -> (Vec<Vec<TileMean>>, Scatter) {
-        let tiles = known.iter().map(|shared_plane| shared_plane.tiles.len()).sum();
-        let ones = vec![1.0; tiles * stations.len()];
-        let of_shared_plane = |shared_plane: &SharedPlane| {
-            let seen = SharedPlaneSums { shared_plane, sums, weights: &ones };
-            let eliminated = seen.eliminated(stations, Variances::default());
+    fn scatter(&self, known: &[SharedPlane], sums: &[Sums], observers: &[Vec<usize>]) -> (Vec<Vec<TileMean>>, Scatter) {
+        let of_shared_plane = |(shared_plane, stations): (&SharedPlane, &Vec<usize>)| {
+            let seen = SharedPlaneSums { shared_plane, sums, weights: None };
+            let eliminated = seen.eliminated(stations, Variances::default(), self.most_eliminated());
             eliminated.map_or_else(Vec::new, |eliminated| tile_means(&seen, &eliminated))
         };
-        let means: Vec<Vec<TileMean>> = known.par_iter().map(of_shared_plane).collect();
-        let scatter = between(&means, stations.len(), tiles, KERNEL);
+        let means: Vec<Vec<TileMean>> = known.par_iter().zip(observers).map(of_shared_plane).collect();
+        let scatter = between(&means, sums, KERNEL);
         (means, scatter)
     }
 
     /// One linearised step of all unknowns.
     fn step(&self, state: &mut State, known: &mut [SharedPlane], sums: Vec<Sums>) -> Result<Adjusted> {
-        let stations: Vec<usize> = (0..state.poses.len()).collect();
-        let (means, scatter) = Self::scatter(known, &sums, &stations);
+        let observers = observers(known, &sums);
+        let (means, scatter) = self.scatter(known, &sums, &observers);
         let variances: Vec<Variances> = means.par_iter().map(|means| variances(means, scatter.shared)).collect();
         let eliminated: Vec<Option<Eliminated>> = (0..known.len())
             .into_par_iter()
             .map(|k| {
-                let seen = SharedPlaneSums { shared_plane: &known[k], sums: &sums, weights: &scatter.weights };
-                seen.eliminated(&stations, variances[k])
+                let seen = SharedPlaneSums { shared_plane: &known[k], sums: &sums, weights: Some(&scatter.weights) };
+                seen.eliminated(&observers[k], variances[k], self.most_eliminated())
             })
             .collect();
         let parameters = state.parameters.len();
-        let mut equations = Equations::new(state.poses.len(), parameters);
-        for (shared_plane, eliminated) in known.iter().zip(&eliminated) {
-            if let Some(eliminated) = eliminated {
-                equations.add(shared_plane, eliminated, &state.poses);
-            }
-        }
-        self.network.turns.iter().for_each(|turn| equations.add_turn(turn, &state.poses));
-        let (step, _) = equations.solved(&self.near, state)?;
-        let (_, cofactors) = equations.solved(self.network, state)?;
+        let seen = known.iter().zip(&eliminated).filter_map(|(plane, eliminated)| Some((plane, eliminated.as_ref()?)));
+        let (step, cofactors) = self.solved(state, seen)?;
         for (shared_plane, eliminated) in known.iter_mut().zip(&eliminated) {
             if let Some(eliminated) = eliminated {
                 let motions = motions(shared_plane, eliminated, &state.poses, &step);
@@ -206,8 +263,55 @@ impl Finish<'_> {
             factor: 1.0,
             rounds: 0,
             settled: false,
+            common: Common::default(),
+            pairs_tried: 0,
         })
     }
+
+    /// Stations beyond which a plane is not eliminated.
+    fn most_eliminated(&self) -> usize {
+        if self.network.whole { usize::MAX } else { MOST_ELIMINATED }
+    }
+
+    /// The step of all unknowns, poses being held near where they are, and cofactors.
+    fn solved<'s>(
+        &self,
+        state: &State,
+        seen: impl Iterator<Item = (&'s SharedPlane, &'s Eliminated)> + Clone,
+    ) -> Result<(DVector<f64>, Cofactors)> {
+        let stations = state.poses.len();
+        if self.network.whole {
+            let mut equations = Equations::new(stations, state.parameters.len());
+            seen.for_each(|(shared_plane, eliminated)| equations.add(shared_plane, eliminated, &state.poses));
+            for turn in self.network.turns {
+                equations.add_turn(turn, &state.poses);
+            }
+            let (step, _) = equations.solved(&self.near, state)?;
+            return Ok((step, equations.solved(self.network, state)?.1));
+        }
+        let planes = seen.clone().filter(|(_, eliminated)| matches!(eliminated.products, Products::Beside(_))).count();
+        let mut equations = SparseEquations::new(stations, self.network.fixed, planes);
+        seen.for_each(|(shared_plane, eliminated)| equations.add(shared_plane, eliminated, &state.poses));
+        for turn in self.network.turns {
+            equations.add_turn(turn, &state.poses);
+        }
+        let step = equations.step(&equations.cofactors(&self.near)?);
+        Ok((step, equations.cofactors(self.network)?))
+    }
+}
+
+/// The stations that saw something of each shared plane, ascending.
+fn observers(known: &[SharedPlane], sums: &[Sums]) -> Vec<Vec<usize>> {
+    let mut observers: Vec<Vec<usize>> = vec![Vec::new(); known.len()];
+    for (station, sums) in sums.iter().enumerate() {
+        let mut slot = 0;
+        while slot < sums.tiles() {
+            let plane = known.partition_point(|plane| plane.tiles.first <= sums.tile(slot)) - 1;
+            observers[plane].push(station);
+            slot = sums.slots(&(0..known[plane].tiles.first + known[plane].tiles.len())).end;
+        }
+    }
+    observers
 }
 
 /// Motions of a shared plane's points with a step of all unknowns.

@@ -50,10 +50,13 @@ pub(crate) fn best_partners(
     partners_per_station: usize,
 ) -> Vec<(usize, usize)> {
     let enough: Vec<&Overlap> = overlaps.iter().filter(|o| o.fraction >= minimum_overlap).collect();
+    let mut of_station: Vec<Vec<&Overlap>> = vec![Vec::new(); stations];
+    for overlap in enough {
+        of_station[overlap.target].push(overlap);
+        of_station[overlap.source].push(overlap);
+    }
     let mut chosen = BTreeSet::new();
-    for station in 0..stations {
-        let mut partners: Vec<&&Overlap> =
-            enough.iter().filter(|o| o.target == station || o.source == station).collect();
+    for mut partners in of_station {
         // Stable: equal overlaps stay in the order of the stations.
         partners.sort_by(|a, b| b.fraction.total_cmp(&a.fraction));
         chosen.extend(partners.iter().take(partners_per_station).map(|o| (o.target, o.source)));

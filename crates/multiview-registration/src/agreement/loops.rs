@@ -1,6 +1,6 @@
 //! Loops of pairs: how they close, and which pairs are wrong.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{Isometry3, Vector6};
 
@@ -55,10 +55,14 @@ fn misclosure(stations: Vec<usize>, total: &Uncertain) -> LoopClosure {
 
 /// The stations that pairs lead to from one.
 pub(crate) fn reached(pairs: &[(usize, usize)], from: usize) -> BTreeSet<usize> {
+    let mut beside: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+    for &(a, b) in pairs {
+        beside.entry(a).or_default().push(b);
+        beside.entry(b).or_default().push(a);
+    }
     let (mut found, mut open) = (BTreeSet::from([from]), vec![from]);
     while let Some(at) = open.pop() {
-        for &(a, b) in pairs.iter().filter(|(a, b)| *a == at || *b == at) {
-            let next = if a == at { b } else { a };
+        for &next in beside.get(&at).into_iter().flatten() {
             if found.insert(next) {
                 open.push(next);
             }
@@ -70,11 +74,21 @@ pub(crate) fn reached(pairs: &[(usize, usize)], from: usize) -> BTreeSet<usize> 
 /// All triangles, as indices of pairs.
 fn triangles(pairs: &[PairAlignment]) -> Vec<[usize; 3]> {
     let mut found = Vec::new();
-    let between = |a: usize, b: usize| {
-        pairs.iter().position(|p| (p.target == a && p.source == b) || (p.target == b && p.source == a))
-    };
+    let mut numbers: BTreeMap<(usize, usize), usize> = BTreeMap::new();
+    let mut beside: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+    for (index, pair) in pairs.iter().enumerate() {
+        let (a, b) = (pair.target, pair.source);
+        numbers.entry((a.min(b), a.max(b))).or_insert(index);
+        for station in [a, b] {
+            beside.entry(station).or_default().push(index);
+        }
+    }
+    let between = |a: usize, b: usize| numbers.get(&(a.min(b), a.max(b))).copied();
     for (first, ab) in pairs.iter().enumerate() {
-        for (second, cd) in pairs.iter().enumerate().skip(first + 1) {
+        let ends = [ab.target, ab.source].into_iter().filter_map(|station| beside.get(&station));
+        let later: BTreeSet<usize> = ends.flatten().copied().filter(|second| *second > first).collect();
+        for second in later {
+            let cd = &pairs[second];
             let shared = [cd.target, cd.source].into_iter().find(|s| *s == ab.target || *s == ab.source);
             let Some(shared) = shared else { continue };
             let a = if ab.target == shared { ab.source } else { ab.target };

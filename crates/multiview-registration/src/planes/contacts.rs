@@ -35,6 +35,13 @@ pub(crate) struct Reach {
 /// whose normals lie between those of two walls, would say where a wall ends.
 pub(crate) const TURNED: f64 = 0.8;
 
+impl Reach {
+    /// How far apart the centres of partners may be, metre, patches being of this size.
+    pub(crate) fn farthest_m(&self, size_m: f64) -> f64 {
+        self.across_m.hypot(BESIDE * size_m)
+    }
+}
+
 /// The partners of the patches of one station (`asking`) among those of another, `to_asked` being
 /// `asked_from_asking`: pairs of indices.
 pub(crate) fn partners(
@@ -45,13 +52,16 @@ pub(crate) fn partners(
 ) -> Result<Vec<(u32, u32)>> {
     let rotation = to_asked.rotation.to_rotation_matrix().into_inner();
     let beside_m = BESIDE * asking.size_m.max(asked.size_m);
-    let farthest_m = reach.across_m.hypot(beside_m);
+    let farthest_m = reach.farthest_m(asking.size_m.max(asked.size_m));
     let signed = asking.oriented && asked.oriented;
     let mut found = Vec::new();
     for (index, patch) in asking.patches.iter().enumerate() {
         let centre = rotation * patch.centre.coords + to_asked.translation.vector;
         if !point_cloud::is_usable(&centre.into()) {
             return Err(crate::Error::NonFinite { what: "points of a station in the frame of another", index });
+        }
+        if !asked.extent.is_near(&centre, farthest_m) {
+            continue;
         }
         let normal = rotation * patch.normal;
         let fits = |other: usize| {

@@ -5,6 +5,9 @@
 //! the plane and the offset c by which the surface of a tile is off it. Both are unknown and eliminated exactly, so that
 //! no point is used twice and the normal equations are those of all points.
 
+use std::collections::BTreeMap;
+use std::ops::Range;
+
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix3, Matrix6x3, Vector3};
 
 use crate::planes::shared_planes::SharedPlane;
@@ -26,15 +29,46 @@ pub(crate) struct Variances {
 pub(crate) struct SharedPlaneSums<'a> {
     pub shared_plane: &'a SharedPlane,
     pub sums: &'a [Sums],
-    /// Weight of what each station saw of each tile, tile by tile.
-    pub weights: &'a [f64],
+    /// Weight of what each station saw of its tiles, in their order; `None`: one.
+    pub weights: Option<&'a [Vec<f64>]>,
+}
+
+/// What a station saw of a tile.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Seen<'s> {
+    pub tile: usize,
+    /// Place of the station in a list.
+    pub of: usize,
+    /// Place of the tile among those of the station.
+    pub slot: usize,
+    pub sums: TileSums<'s>,
+    pub weight: f64,
+}
+
+/// Products of the motions of the stations that saw a shared plane.
+#[derive(Debug, Clone)]
+pub(crate) enum Products {
+    /// Of all with all, and with the shared parameters; the plane eliminated.
+    Eliminated(DMatrix<f64>),
+    /// Of a plane that very many stations saw: those of stations that saw the same tiles (the lower triangle), of the plane with
+    /// all stations, and of the plane with itself. Elimination would couple all of its stations with each other.
+    Beside(Box<WideProducts>),
+}
+
+/// See [`Products::Beside`].
+#[derive(Debug, Clone)]
+pub(crate) struct WideProducts {
+    pub pairs: BTreeMap<(usize, usize), Matrix3<f64>>,
+    pub with_plane: DMatrix<f64>,
+    pub of_plane: Matrix3<f64>,
+    pub right: Vector3<f64>,
 }
 
 /// Normal equations of a shared plane: three unknowns a station that saw it, then the shared parameters.
 #[derive(Debug, Clone)]
 pub(crate) struct Eliminated {
     pub stations: Vec<usize>,
-    pub normal: DMatrix<f64>,
+    pub products: Products,
     pub right: DVector<f64>,
     /// Inverse of the normal matrix of the plane, and what it gets from the motions and from the distances.
     inverse: Matrix3<f64>,
@@ -42,48 +76,68 @@ pub(crate) struct Eliminated {
     from_distances: Vector3<f64>,
 }
 
-impl SharedPlaneSums<'_> {
-    /// What the stations saw of the tile, those with no weight left out: position among `stations`, sums, weight.
-    fn tile<'s>(&'s self, tile: usize, stations: &'s [usize]) -> impl Iterator<Item = (usize, TileSums<'s>, f64)> {
-        let count = self.sums.len();
-        let of = move |(k, &station): (usize, &usize)| {
-            let sums = self.sums[station].of(tile)?;
-            let weight = self.weights[tile * count + station];
-            (weight > 0.0).then_some((k, sums, weight))
-        };
-        stations.iter().enumerate().filter_map(of)
-    }
-
-    pub(crate) fn tiles(&self) -> std::ops::Range<usize> {
+impl<'a> SharedPlaneSums<'a> {
+    pub(crate) fn tiles(&self) -> Range<usize> {
         self.shared_plane.tiles.first..self.shared_plane.tiles.first + self.shared_plane.tiles.len()
     }
 
-    /// Stations, of these, that saw something of the shared plane.
-    pub(crate) fn seen_by(&self, stations: &[usize]) -> Vec<usize> {
-        let sees = |station: usize| self.tiles().any(|tile| self.tile(tile, &[station]).next().is_some());
-        stations.iter().copied().filter(|&station| sees(station)).collect()
+    /// What these stations saw of the tiles, tile by tile and in each in the order of the stations; what has no weight is left out.
+    pub(crate) fn seen(&self, stations: &[usize]) -> Vec<Seen<'a>> {
+        let (tiles, mut all) = (self.tiles(), Vec::new());
+        for (of, &station) in stations.iter().enumerate() {
+            let sums = &self.sums[station];
+            for slot in sums.slots(&tiles) {
+                let weight = self.weights.map_or(1.0, |weights| weights[station][slot]);
+                let seen = sums.at(slot).filter(|_| weight > 0.0);
+                all.extend(seen.map(|sums_of| Seen { tile: sums.tile(slot), of, slot, sums: sums_of, weight }));
+            }
+        }
+        // Stable: the stations of a tile stay in their order.
+        all.sort_by_key(|seen| seen.tile);
+        all
     }
 
-    /// The observations of these stations. `None` where fewer than two of them saw the shared plane.
-    pub(crate) fn eliminated(&self, stations: &[usize], variances: Variances) -> Option<Eliminated> {
-        let stations = self.seen_by(stations);
+    /// The observations of these stations, ascending. `None` where fewer than two of them saw the shared plane. Where more than
+    /// `most` did, the plane stays beside them.
+    pub(crate) fn eliminated(&self, stations: &[usize], variances: Variances, most: usize) -> Option<Eliminated> {
+        let mut seen = self.seen(stations);
+        let mut saw = vec![false; stations.len()];
+        for one in &seen {
+            saw[one.of] = true;
+        }
+        let place: Vec<usize> = saw
+            .iter()
+            .scan(0, |count, saw| {
+                *count += usize::from(*saw);
+                Some(*count)
+            })
+            .collect();
+        for one in &mut seen {
+            one.of = place[one.of] - 1;
+        }
+        let stations: Vec<usize> =
+            stations.iter().zip(&saw).filter(|(_, saw)| **saw).map(|(station, _)| *station).collect();
         if stations.len() < 2 {
             return None;
         }
+        let order = self.sums[0].order;
+        if order == 3 && stations.len() > most {
+            return Some(Eliminated::beside(stations, &seen, variances));
+        }
         let of_motions = 3 * stations.len();
-        let size = of_motions + self.sums[0].order - 3;
+        let size = of_motions + order - 3;
         let (mut normal, mut right) = (DMatrix::zeros(size, size), DVector::zeros(size));
         let (mut mean, mut at) = (DVector::zeros(size), Vec::with_capacity(size));
-        for tile in self.tiles() {
+        for tile in seen.chunk_by(|a, b| a.tile == b.tile) {
             mean.fill(0.0);
             at.clear();
             let (mut weight, mut distance) = (0.0, 0.0);
-            for (k, sums, own) in self.tile(tile, &stations) {
+            for Seen { of: k, sums, weight: own, .. } in tile {
                 // Errors in common leave a tile less weight than its points have.
                 let own = own / (1.0 + variances.shared * own * sums.weight());
                 let row = |i: usize| if i < 3 { 3 * k + i } else { of_motions + i - 3 };
-                for i in 0..self.sums[0].order {
-                    for j in 0..self.sums[0].order {
+                for i in 0..order {
+                    for j in 0..order {
                         normal[(row(i), row(j))] += own * sums.product(i, j);
                     }
                     right[row(i)] += own * sums.right(i);
@@ -109,6 +163,57 @@ impl SharedPlaneSums<'_> {
 }
 
 impl Eliminated {
+    /// With the plane beside the stations: the same equations, none of them eliminated.
+    fn beside(stations: Vec<usize>, seen: &[Seen<'_>], variances: Variances) -> Self {
+        let count = stations.len();
+        let mut pairs: BTreeMap<(usize, usize), Matrix3<f64>> = BTreeMap::new();
+        let mut right = DVector::zeros(3 * count);
+        let mut means: Vec<(usize, Vector3<f64>)> = Vec::new();
+        for tile in seen.chunk_by(|a, b| a.tile == b.tile) {
+            means.clear();
+            let (mut weight, mut distance) = (0.0, 0.0);
+            for Seen { of: k, sums, weight: own, .. } in tile {
+                let own = own / (1.0 + variances.shared * own * sums.weight());
+                *pairs.entry((*k, *k)).or_default() += own * Matrix3::from_fn(|i, j| sums.product(i, j));
+                let mut part = right.fixed_rows_mut::<3>(3 * k);
+                part += own * Vector3::from_fn(|i, _| sums.right(i));
+                means.push((*k, own * Vector3::from_fn(|i, _| sums.product(i, 0))));
+                weight += own * sums.weight();
+                distance += own * sums.right(0);
+            }
+            if variances.surface > 0.0 && weight > 0.0 {
+                let share = 1.0 / (weight + 1.0 / variances.surface);
+                for (n, (a, first)) in means.iter().enumerate() {
+                    let mut part = right.fixed_rows_mut::<3>(3 * a);
+                    part -= share * distance * first;
+                    for (b, second) in &means[..=n] {
+                        *pairs.entry((*a, *b)).or_default() -= share * first * second.transpose();
+                    }
+                }
+            }
+        }
+        let (mut from_motions, mut from_distances) = (DMatrix::zeros(3, 3 * count), Vector3::zeros());
+        for (&(a, b), block) in &pairs {
+            let mut part = from_motions.fixed_view_mut::<3, 3>(0, 3 * b);
+            part += block;
+            if a != b {
+                let mut part = from_motions.fixed_view_mut::<3, 3>(0, 3 * a);
+                part += block.transpose();
+            }
+        }
+        let mut of_plane = Matrix3::zeros();
+        for k in 0..count {
+            from_distances += right.fixed_rows::<3>(3 * k);
+            of_plane += from_motions.fixed_view::<3, 3>(0, 3 * k);
+        }
+        of_plane[(1, 1)] += SLOPE.powi(-2);
+        of_plane[(2, 2)] += SLOPE.powi(-2);
+        let inverse = of_plane.try_inverse().unwrap_or_else(Matrix3::zeros);
+        // The plane moves the other way.
+        let wide = WideProducts { pairs, with_plane: -&from_motions, of_plane, right: -from_distances };
+        Self { stations, products: Products::Beside(Box::new(wide)), right, inverse, from_motions, from_distances }
+    }
+
     fn new(stations: Vec<usize>, mut normal: DMatrix<f64>, mut right: DVector<f64>) -> Self {
         let count = stations.len();
         // The plane moves as all stations together would, the other way.
@@ -127,7 +232,7 @@ impl Eliminated {
         let inverse = of_plane.try_inverse().unwrap_or_else(Matrix3::zeros);
         normal -= from_motions.transpose() * inverse * &from_motions;
         right -= from_motions.transpose() * (inverse * from_distances);
-        Self { stations, normal, right, inverse, from_motions, from_distances }
+        Self { stations, products: Products::Eliminated(normal), right, inverse, from_motions, from_distances }
     }
 
     /// Numbers the stations by their place in a list that holds them all.

@@ -8,4 +8,3 @@ pub(crate) mod shared_planes;
 pub(crate) mod sightings;
 pub(crate) mod sums;
 pub(crate) mod tiles;
-pub(crate) mod wide_errors;

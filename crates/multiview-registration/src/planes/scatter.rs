@@ -5,6 +5,7 @@ use nalgebra::DVector;
 use statistics::mad_scale;
 
 use crate::planes::elimination::{Eliminated, SharedPlaneSums, Variances};
+use crate::planes::sums::Sums;
 use icp_registration::RobustKernel;
 
 /// Widening of the kernel for means of tiles: what is on the surface keeps its weight.
@@ -19,6 +20,8 @@ const FEWEST_TILES: usize = 6;
 pub(crate) struct TileMean {
     pub tile: usize,
     pub station: usize,
+    /// Place of the tile among those of the station.
+    pub slot: u32,
     pub mean_m: f64,
     /// One over its variance by the noise of the points.
     pub weight: f64,
@@ -30,14 +33,14 @@ pub(crate) struct TileMean {
 pub(crate) fn tile_means(seen: &SharedPlaneSums<'_>, eliminated: &Eliminated) -> Vec<TileMean> {
     let plane = eliminated.plane(&DVector::zeros(eliminated.right.len()));
     let mut means: Vec<TileMean> = Vec::new();
-    for tile in seen.tiles() {
+    for of_tile in seen.seen(&eliminated.stations).chunk_by(|a, b| a.tile == b.tile) {
         let first = means.len();
-        for &station in &eliminated.stations {
-            let Some(sums) = seen.sums[station].of(tile) else { continue };
-            let weight = sums.weight();
+        for one in of_tile {
+            let (sums, weight) = (&one.sums, one.sums.weight());
             let of_plane: f64 = (0..3).map(|k| plane[k] * sums.product(k, 0)).sum();
             let mean_m = (sums.right(0) - of_plane) / weight;
-            means.push(TileMean { tile, station, mean_m, weight, deviation: 0.0 });
+            let (station, slot) = (eliminated.stations[one.of], one.slot as u32);
+            means.push(TileMean { tile: one.tile, station, slot, mean_m, weight, deviation: 0.0 });
         }
         let own = &mut means[first..];
         let (mean, weight) = mean_of(own);
@@ -59,8 +62,8 @@ fn mean_of(means: &[TileMean]) -> (f64, f64) {
 /// What the tiles of all shared planes say together.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Scatter {
-    /// Robust weight of each tile and station, tile by tile.
-    pub weights: Vec<f64>,
+    /// Robust weights of the tiles of each station, in their order.
+    pub weights: Vec<Vec<f64>>,
     /// Variance of what the points of a station in a tile share, metre².
     pub shared: f64,
     /// Sum of squares between stations within tiles, and the means less the tiles.
@@ -70,15 +73,22 @@ pub(crate) struct Scatter {
     pub noise: f64,
 }
 
+impl Scatter {
+    pub(crate) fn weight(&self, mean: &TileMean) -> f64 {
+        self.weights[mean.station][mean.slot as usize]
+    }
+}
+
 /// The scatter between stations in the same tiles.
-pub(crate) fn between(means: &[Vec<TileMean>], stations: usize, tiles: usize, kernel: RobustKernel) -> Scatter {
+pub(crate) fn between(means: &[Vec<TileMean>], sums: &[Sums], kernel: RobustKernel) -> Scatter {
     let deviations = means.iter().flatten().map(|mean| mean.deviation.abs()).filter(|deviation| *deviation > 0.0);
     let scale = mad_scale(&mut deviations.collect::<Vec<f64>>()).max(1.0);
     let noise = noise_of_means(kernel);
-    let mut scatter = Scatter { weights: vec![1.0; tiles * stations], noise, ..Scatter::default() };
+    let weights = sums.iter().map(|sums| vec![1.0; sums.tiles()]).collect();
+    let mut scatter = Scatter { weights, noise, ..Scatter::default() };
     let mut sensitivity = 0.0;
     for mean in means.iter().flatten() {
-        scatter.weights[mean.tile * stations + mean.station] = kernel.weight(mean.deviation / (WIDE * scale));
+        scatter.weights[mean.station][mean.slot as usize] = kernel.weight(mean.deviation / (WIDE * scale));
     }
     for own in
         means.iter().flat_map(|shared_plane| shared_plane.chunk_by(|a, b| a.tile == b.tile)).filter(|own| own.len() > 1)

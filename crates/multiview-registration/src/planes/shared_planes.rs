@@ -2,11 +2,12 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::{Isometry3, Vector3};
+use nalgebra::{Isometry3, Point3, Vector3};
 
 use crate::planes::contacts::Contact;
 use crate::planes::reduction::PairContacts;
 use crate::planes::tiles::Tiles;
+use crate::surfaces::extents::{Extent, Extents};
 use crate::surfaces::patches::{Surface, axes};
 use crate::surfaces::plane_fit::{Moments, SAME_DIRECTION};
 use crate::surfaces::regions::{OFF_PLANE, ROUGHER};
@@ -30,7 +31,7 @@ pub(crate) struct SharedPlane {
 }
 
 impl SharedPlane {
-    fn new(origin: Vector3<f64>, normal: Vector3<f64>) -> Self {
+    pub(crate) fn new(origin: Vector3<f64>, normal: Vector3<f64>) -> Self {
         let (right, up) = axes(&normal);
         Self { origin, normal, right, up, tiles: Tiles::default(), size: 0, points: Vec::new() }
     }
@@ -39,6 +40,13 @@ impl SharedPlane {
     pub(crate) fn place(&self, point: &Vector3<f64>) -> [f64; 2] {
         let apart = point - self.origin;
         [self.right.dot(&apart), self.up.dot(&apart)]
+    }
+
+    /// The box about its tiles.
+    pub(crate) fn extent(&self) -> Extent {
+        let [across, along] = self.tiles.ends();
+        let corner = |(u, v): (f64, f64)| Point3::from(self.origin + self.right * u + self.up * v);
+        Extent::of(across.into_iter().flat_map(|u| along.map(|v| (u, v))).map(corner))
     }
 
     /// Moves the plane by an offset and two slopes.
@@ -131,23 +139,26 @@ impl<'a> Joined<'a> {
 
     /// Joins pieces of a plane that lie beside each other: what stands before a wall divides it for each station.
     fn join_neighbours(&mut self) {
-        let mut centres: BTreeMap<usize, Vec<Vector3<f64>>> = BTreeMap::new();
+        let mut centres: BTreeMap<usize, Vec<Point3<f64>>> = BTreeMap::new();
         for (station, surface) in self.surfaces.iter().enumerate() {
             for (patch, place) in surface.patches.iter().enumerate() {
                 if let Some(node) = self.node(station, patch as u32) {
-                    centres.entry(self.root(node)).or_default().push((self.poses[station] * place.centre).coords);
+                    centres.entry(self.root(node)).or_default().push(self.poses[station] * place.centre);
                 }
             }
         }
         let reach_m = BESIDE * self.size_m();
-        let roots: Vec<usize> = centres.keys().copied().collect();
-        for (k, &a) in roots.iter().enumerate() {
-            for &b in &roots[k + 1..] {
-                let (first, second) = (self.normals[self.root(a)], self.normals[self.root(b)]);
-                let beside = || centres[&a].iter().any(|p| centres[&b].iter().any(|q| (p - q).norm() <= reach_m));
-                if first.dot(&second) >= SAME_DIRECTION * first.norm() * second.norm() && beside() {
-                    self.join(a, b);
-                }
+        let pieces: Vec<(usize, Piece)> =
+            centres.into_iter().map(|(root, centres)| (root, Piece::new(centres, reach_m))).collect();
+        let extents: Vec<Extent> = pieces.iter().map(|(_, piece)| piece.extent).collect();
+        for (a, b) in Extents::new(&extents).pairs(reach_m) {
+            let ((a, first_piece), (b, second_piece)) = (&pieces[a], &pieces[b]);
+            let (first, second) = (self.normals[self.root(*a)], self.normals[self.root(*b)]);
+            if self.root(*a) != self.root(*b)
+                && first.dot(&second) >= SAME_DIRECTION * first.norm() * second.norm()
+                && first_piece.is_beside(second_piece)
+            {
+                self.join(*a, *b);
             }
         }
     }
@@ -283,6 +294,43 @@ impl<'a> Joined<'a> {
             shared_planes.push(shared_plane);
         }
     }
+}
+
+/// The patches of one piece of a plane, cell by cell.
+struct Piece {
+    centres: Vec<Point3<f64>>,
+    /// Cells of the size of the reach, ascending, with the centres in them.
+    cells: Vec<([i64; 3], u32)>,
+    extent: Extent,
+    reach_m: f64,
+}
+
+impl Piece {
+    fn new(centres: Vec<Point3<f64>>, reach_m: f64) -> Self {
+        let mut cells: Vec<([i64; 3], u32)> =
+            centres.iter().enumerate().map(|(k, centre)| (cell(centre, reach_m), k as u32)).collect();
+        cells.sort_unstable();
+        Self { extent: Extent::of(centres.iter().copied()), centres, cells, reach_m }
+    }
+
+    /// Whether a patch of the one is in reach of a patch of the other.
+    fn is_beside(&self, other: &Self) -> bool {
+        let (few, many) = if self.centres.len() <= other.centres.len() { (self, other) } else { (other, self) };
+        few.centres.iter().any(|centre| many.extent.is_near(&centre.coords, self.reach_m) && many.is_near(centre))
+    }
+
+    fn is_near(&self, centre: &Point3<f64>) -> bool {
+        let [x, y, z] = cell(centre, self.reach_m);
+        (0..9).map(|k| [x + k / 3 - 1, y + k % 3 - 1]).any(|[x, y]| {
+            let first = self.cells.partition_point(|(cell, _)| *cell < [x, y, z - 1]);
+            let mut column = self.cells[first..].iter().take_while(|(cell, _)| *cell <= [x, y, z + 1]);
+            column.any(|(_, other)| (centre - self.centres[*other as usize]).norm() <= self.reach_m)
+        })
+    }
+}
+
+fn cell(point: &Point3<f64>, size_m: f64) -> [i64; 3] {
+    <[f64; 3]>::from(point.coords).map(|x| (x / size_m).floor() as i64)
 }
 
 /// Both ends of all contacts, as stations and patches.

@@ -9,6 +9,7 @@ use rayon::prelude::*;
 use crate::planes::shared_planes::SharedPlane;
 use crate::planes::sums::Sums;
 use crate::planes::tiles::Tile;
+use crate::surfaces::extents::Extent;
 use crate::surfaces::plane_fit::SAME_DIRECTION;
 use crate::surfaces::points::{Block, StationPoints};
 use icp_registration::{RobustKernel, TUKEY};
@@ -36,8 +37,35 @@ pub(crate) fn sightings(
     shared_planes: &[SharedPlane],
     gate: Gate,
 ) -> Vec<Sums> {
+    let wide = Wide::new(shared_planes);
+    let members = members(points.len(), shared_planes);
     let stations = (0..points.len()).into_par_iter();
-    stations.map(|k| Sighting::new(&points[k], &poses[k], k, shared_planes, gate).sums()).collect()
+    stations.map(|k| Sighting::new(&points[k], &poses[k], shared_planes, gate).sums(&wide, &members[k])).collect()
+}
+
+/// The wide shared planes, by where they lie.
+pub(crate) struct Wide {
+    indices: Vec<usize>,
+    extents: Vec<Extent>,
+}
+
+impl Wide {
+    pub(crate) fn new(shared_planes: &[SharedPlane]) -> Self {
+        let indices: Vec<usize> = (0..shared_planes.len()).filter(|&k| shared_planes[k].points.is_empty()).collect();
+        let extents = indices.iter().map(|&k| shared_planes[k].extent()).collect();
+        Self { indices, extents }
+    }
+}
+
+/// The points of small shared planes (shared plane, index in the cloud) of each station.
+pub(crate) fn members(stations: usize, shared_planes: &[SharedPlane]) -> Vec<Vec<(u32, u32)>> {
+    let mut members = vec![Vec::new(); stations];
+    for (index, shared_plane) in shared_planes.iter().enumerate() {
+        for &(station, point) in &shared_plane.points {
+            members[station as usize].push((index as u32, point));
+        }
+    }
+    members
 }
 
 /// Where a ray meets a shared plane.
@@ -51,11 +79,10 @@ struct Hit {
     range_m: f64,
 }
 
-struct Sighting<'a> {
+pub(crate) struct Sighting<'a> {
     points: &'a StationPoints,
     rotation: Matrix3<f64>,
     eye: Vector3<f64>,
-    station: usize,
     shared_planes: &'a [SharedPlane],
     gate: Gate,
     used: Vec<bool>,
@@ -65,32 +92,30 @@ struct Sighting<'a> {
 }
 
 impl<'a> Sighting<'a> {
-    fn new(
+    pub(crate) fn new(
         points: &'a StationPoints,
         pose: &Isometry3<f64>,
-        station: usize,
         shared_planes: &'a [SharedPlane],
         gate: Gate,
     ) -> Self {
-        let tiles = shared_planes.iter().map(|shared_plane| shared_plane.tiles.len()).sum();
         Self {
             points,
             rotation: pose.rotation.to_rotation_matrix().into_inner(),
             eye: pose.translation.vector,
-            station,
             shared_planes,
             gate,
             used: vec![false; points.points.len()],
             hits: Vec::new(),
-            sums: Sums::new(gate.parameters, tiles),
+            sums: Sums::new(gate.parameters),
             phi: vec![1.0; 3 + gate.parameters],
         }
     }
 
-    fn sums(mut self) -> Sums {
+    pub(crate) fn sums(mut self, wide: &Wide, members: &[(u32, u32)]) -> Sums {
+        let in_reach = self.in_reach(wide);
         let mut near = Vec::new();
         for block in &self.points.blocks {
-            self.near(block, &mut near);
+            self.near(block, &in_reach, &mut near);
             for point in block.points.clone().step_by(self.gate.stride) {
                 let (direction, range_m) = self.ray(point);
                 if let Some(hit) = self.shared_plane_of(point, &direction, range_m, &near) {
@@ -100,29 +125,42 @@ impl<'a> Sighting<'a> {
                 }
             }
         }
-        let (shared_planes, station) = (self.shared_planes, self.station);
-        for (index, shared_plane) in shared_planes.iter().enumerate() {
-            for &(_, point) in shared_plane.points.iter().filter(|point| point.0 as usize == station) {
-                self.add_member(self.points.slot_of[point as usize] as usize, index);
-            }
+        for &(shared_plane, point) in members {
+            self.add_member(self.points.slot_of[point as usize] as usize, shared_plane as usize);
         }
+        self.sums.close();
         self.sums.free_derivatives_of_noise(self.gate.kernel);
         self.sums
     }
 
+    /// How far from the middle of a block its points may meet a shared plane, metre.
+    fn reach_m(&self, block: &Block) -> f64 {
+        1.5 * (block.radius_m + 10.0 * self.gate.slack_m)
+    }
+
+    fn centre(&self, block: &Block) -> Vector3<f64> {
+        self.rotation * block.centre.coords + self.eye
+    }
+
+    /// Wide shared planes that any point of the station may lie on, ascending.
+    fn in_reach(&self, wide: &Wide) -> Vec<usize> {
+        // In reach along each axis of the plane is within the square root of three along those of the world.
+        let farthest_m = |block: &Block| 1.8 * self.reach_m(block);
+        let blocks = self.points.blocks.iter().map(|block| Extent::about(&self.centre(block), farthest_m(block)));
+        let Some(own) = blocks.reduce(|a, b| a.joined(&b)) else { return Vec::new() };
+        let near = wide.extents.iter().zip(&wide.indices).filter(|(extent, _)| extent.meets(&own, 0.0));
+        near.map(|(_, &index)| index).collect()
+    }
+
     /// Wide shared planes that points of a block may lie on.
-    fn near(&self, block: &Block, near: &mut Vec<usize>) {
+    fn near(&self, block: &Block, in_reach: &[usize], near: &mut Vec<usize>) {
         near.clear();
-        let centre = self.rotation * block.centre.coords + self.eye;
-        let reach_m = block.radius_m + 10.0 * self.gate.slack_m;
-        for (index, shared_plane) in
-            self.shared_planes.iter().enumerate().filter(|(_, shared_plane)| shared_plane.points.is_empty())
-        {
+        let (centre, reach_m) = (self.centre(block), self.reach_m(block));
+        near.extend(in_reach.iter().copied().filter(|&index| {
+            let shared_plane = &self.shared_planes[index];
             let across = shared_plane.normal.dot(&(centre - shared_plane.origin)).abs();
-            if across <= 1.5 * reach_m && shared_plane.tiles.near(shared_plane.place(&centre), 1.5 * reach_m) {
-                near.push(index);
-            }
-        }
+            across <= reach_m && shared_plane.tiles.near(shared_plane.place(&centre), reach_m)
+        }));
     }
 
     /// Range along the ray of a point and the point's own.

@@ -1,5 +1,8 @@
 //! Sums over the points of a station in a tile, from which all normal equations are made.
 
+use std::collections::HashMap;
+use std::ops::Range;
+
 use nalgebra::{Matrix3, Vector2, Vector3};
 
 use icp_registration::{RobustKernel, TUKEY};
@@ -14,15 +17,16 @@ const NARROW: f64 = 1e-3;
 #[derive(Debug, Clone)]
 pub(crate) struct Sums {
     pub order: usize,
-    /// Where the sums of each tile begin; `u32::MAX` for a tile that the station saw nothing of.
-    begins: Vec<u32>,
+    /// The tiles that the station saw something of, and where their sums begin; ascending once all points are added.
+    begins: Vec<(u32, u32)>,
+    /// The same by tile, while points are added.
+    open: HashMap<u32, u32>,
     values: Vec<f64>,
 }
 
 impl Sums {
-    pub(crate) fn new(parameters: usize, tiles: usize) -> Self {
-        let order = 3 + parameters;
-        Self { order, begins: vec![u32::MAX; tiles], values: Vec::new() }
+    pub(crate) fn new(parameters: usize) -> Self {
+        Self { order: 3 + parameters, begins: Vec::new(), open: HashMap::new(), values: Vec::new() }
     }
 
     /// Products, right sides, number of points.
@@ -32,11 +36,14 @@ impl Sums {
 
     pub fn add(&mut self, tile: usize, phi: &[f64], rho: f64, weight: f64) {
         let stride = Self::stride(self.order);
-        if self.begins[tile] == u32::MAX {
-            self.begins[tile] = self.values.len() as u32;
-            self.values.resize(self.values.len() + stride, 0.0);
-        }
-        let begin = self.begins[tile] as usize;
+        let (begins, values) = (&mut self.begins, &mut self.values);
+        let begin = *self.open.entry(tile as u32).or_insert_with(|| {
+            let begin = values.len() as u32;
+            begins.push((tile as u32, begin));
+            values.resize(values.len() + stride, 0.0);
+            begin
+        });
+        let begin = begin as usize;
         let own = &mut self.values[begin..begin + stride];
         let mut k = 0;
         for (row, a) in phi.iter().enumerate() {
@@ -67,11 +74,41 @@ impl Sums {
         }
     }
 
-    /// Products and right sides of a tile; `None` where the station saw nothing of it.
-    pub(crate) fn of(&self, tile: usize) -> Option<TileSums<'_>> {
+    /// No more points: the tiles in their order.
+    pub(crate) fn close(&mut self) {
+        self.begins.sort_unstable();
+        self.begins.shrink_to_fit();
+        self.values.shrink_to_fit();
+        self.open = HashMap::new();
+    }
+
+    /// Number of tiles that the station saw something of.
+    pub(crate) fn tiles(&self) -> usize {
+        self.begins.len()
+    }
+
+    /// A tile by its place among those that the station saw.
+    pub(crate) fn tile(&self, slot: usize) -> usize {
+        self.begins[slot].0 as usize
+    }
+
+    /// Number of points of a tile by its place.
+    pub(crate) fn count(&self, slot: usize) -> usize {
+        let end = self.begins[slot].1 as usize + Self::stride(self.order);
+        self.values[end - 1] as usize
+    }
+
+    /// The places of these tiles among those that the station saw.
+    pub(crate) fn slots(&self, tiles: &Range<usize>) -> Range<usize> {
+        let place = |tile: usize| self.begins.partition_point(|begin| (begin.0 as usize) < tile);
+        place(tiles.start)..place(tiles.end)
+    }
+
+    /// Products and right sides of a tile by its place; `None` where no point of it has weight.
+    pub(crate) fn at(&self, slot: usize) -> Option<TileSums<'_>> {
         let stride = Self::stride(self.order);
-        let begin = self.begins[tile];
-        let own = self.values.get(begin as usize..begin as usize + stride)?;
+        let begin = self.begins.get(slot)?.1 as usize;
+        let own = self.values.get(begin..begin + stride)?;
         let (products, right) = own.split_at(stride - self.order - 1);
         (own[0] > 0.0).then_some(TileSums { products, right })
     }

@@ -80,6 +80,14 @@ impl Tiles {
         [own % self.columns.max(1), own / self.columns.max(1)]
     }
 
+    /// Lowest and highest place along both axes of the plane, metre.
+    pub(crate) fn ends(&self) -> [[f64; 2]; 2] {
+        let end = |axis: usize, count: usize| {
+            [self.low[axis] as f64 * self.size_m, (self.low[axis] + count as i64) as f64 * self.size_m]
+        };
+        [end(0, self.columns), end(1, self.rows)]
+    }
+
     /// Whether a disc around this place may touch the tiles.
     pub(crate) fn near(&self, place: [f64; 2], radius_m: f64) -> bool {
         let within = |axis: usize, count: usize| {

@@ -1,5 +1,6 @@
 //! What each station sees by itself: patches of surfaces, their points and their noise.
 
+pub(crate) mod extents;
 pub(crate) mod grouping;
 pub(crate) mod noise;
 pub(crate) mod patch_size;

@@ -10,6 +10,7 @@ use nalgebra::{Point3, Vector3};
 use statistics::upper_median;
 
 use crate::error::{Error, Result};
+use crate::surfaces::extents::Extent;
 use crate::surfaces::grouping::group;
 use crate::surfaces::plane_fit::{Moments, Plane, SAME_DIRECTION};
 use crate::surfaces::regions::{Patches, Region};
@@ -61,6 +62,8 @@ pub(crate) struct Surface {
     /// The points of patch i are `members[starts[i]..starts[i + 1]]`, indices into the cloud.
     pub members: Vec<u32>,
     pub starts: Vec<u32>,
+    /// About the centres of the patches, in the station's frame.
+    pub extent: Extent,
     /// Size of a patch, metre.
     pub size_m: f64,
     /// Root mean square distance of the patches from their centroid, metre.
@@ -164,8 +167,20 @@ impl Surface {
         let oriented = faces_origin(patches.iter().map(|patch| (&patch.centre, &patch.normal)));
         let Groups { members, starts } = groups;
         let moments = fits.iter().map(|fit| fit.0).collect();
-        let origin = *origin;
-        Ok(Self { patches, moments, regions, region_of, origin, tree, members, starts, size_m, radius_m, oriented })
+        Ok(Self {
+            patches,
+            moments,
+            regions,
+            region_of,
+            origin: *origin,
+            tree,
+            members,
+            starts,
+            extent: Extent::of(centres.iter().copied()),
+            size_m,
+            radius_m,
+            oriented,
+        })
     }
 
     /// Indices of the points of a patch.

@@ -2,6 +2,7 @@
 
 use nalgebra::{DMatrix, Isometry3, Matrix6, Translation3, UnitQuaternion, Vector3, Vector6};
 
+use crate::survey::joint_covariance::JointCovariance;
 use rigid_pose::pose_difference;
 
 /// What fixes the common frame.
@@ -31,19 +32,20 @@ impl Datum {
         self,
         start: &[Isometry3<f64>],
         poses: Vec<Isometry3<f64>>,
-        cofactors: DMatrix<f64>,
+        covariance: JointCovariance,
         lever_m: f64,
-    ) -> (Vec<Isometry3<f64>>, DMatrix<f64>) {
+    ) -> (Vec<Isometry3<f64>>, JointCovariance) {
         if self != Self::InnerConstraints {
-            return (poses, cofactors);
+            return (poses, covariance);
         }
+        let cofactors = covariance.whole();
         let size = cofactors.nrows();
         let motions = DMatrix::from_fn(size, 6, |r, c| match poses.get(r / 6) {
             Some(pose) => motion(pose)[(r % 6, c)],
             None => 0.0,
         });
         let weighted = DMatrix::from_fn(size, 6, |r, c| motions[(r, c)] * weight(r % 6, lever_m));
-        let Some(inverse) = (motions.transpose() * &weighted).try_inverse() else { return (poses, cofactors) };
+        let Some(inverse) = (motions.transpose() * &weighted).try_inverse() else { return (poses, covariance) };
         let change = DMatrix::identity(size, size) - &motions * inverse * weighted.transpose();
         let centred = centred(start, &poses, lever_m);
         // Translations are along the axes of the world, which turns with the stations.
@@ -53,7 +55,7 @@ impl Datum {
             turned.fixed_view_mut::<3, 3>(6 * k, 6 * k).copy_from(&turn);
         }
         let change = turned * change;
-        (centred, &change * cofactors * change.transpose())
+        (centred, JointCovariance::of_whole(&change * cofactors * change.transpose(), poses.len()))
     }
 }
 

@@ -37,33 +37,22 @@ impl SharedTile {
 impl Adjusted {
     /// The tiles that both stations saw.
     pub(crate) fn shared(&self, target: usize, source: usize) -> Vec<SharedTile> {
-        let mut found = Vec::new();
-        for (shared_plane, means) in self.means.iter().enumerate() {
-            for tile in means.chunk_by(|a, b| a.tile == b.tile) {
-                let of = |station: usize| tile.iter().find(|mean| mean.station == station).copied();
-                if let (Some(target), Some(source)) = (of(target), of(source)) {
-                    found.push(SharedTile { shared_plane, target, source });
-                }
-            }
-        }
-        found
+        let common = self.common.pairs.get(&(target.min(source) as u32, target.max(source) as u32));
+        let tile = |&[plane, first, second]: &[u32; 3]| {
+            let means = &self.means[plane as usize];
+            let (first, second) = (means[first as usize], means[second as usize]);
+            let (target, source) = if target < source { (first, second) } else { (second, first) };
+            SharedTile { shared_plane: plane as usize, target, source }
+        };
+        common.map_or_else(Vec::new, |tiles| tiles.iter().map(tile).collect())
     }
 
     /// Part of the tiles of each station that each other one saw too, for pairs that share as many tiles as needed.
     pub(crate) fn overlaps(&self, fewest: usize) -> Vec<Overlap> {
-        let count = self.state.poses.len();
-        let (mut seen, mut shared) = (vec![0_usize; count], vec![0_usize; count * count]);
-        for tile in self.means.iter().flat_map(|means| means.chunk_by(|a, b| a.tile == b.tile)) {
-            for (k, first) in tile.iter().enumerate() {
-                seen[first.station] += 1;
-                tile[k + 1..].iter().for_each(|second| shared[first.station * count + second.station] += 1);
-            }
-        }
-        let pairs = (0..count).flat_map(|target| (target + 1..count).map(move |source| (target, source)));
-        let enough = pairs.filter(|(target, source)| shared[target * count + source] >= fewest.max(1));
-        let overlap = |(target, source): (usize, usize)| {
-            let fraction = shared[target * count + source] as f64 / seen[source] as f64;
-            Overlap { source, target, fraction }
+        let enough = self.common.pairs.iter().filter(|(_, tiles)| tiles.len() >= fewest.max(1));
+        let overlap = |(&(target, source), tiles): (&(u32, u32), &Vec<[u32; 3]>)| {
+            let (target, source) = (target as usize, source as usize);
+            Overlap { source, target, fraction: tiles.len() as f64 / self.common.tiles[source] as f64 }
         };
         enough.map(overlap).collect()
     }
@@ -76,15 +65,13 @@ impl Adjusted {
     fn pair(&self, target: usize, source: usize, hold_m: f64, size_m: f64) -> Result<PairAlignment> {
         let poses = [self.state.poses[target], self.state.poses[source]];
         let none = (Vec::new(), Vec::new());
-        let network = Network { fixed: 0, hold_m, turn_rad: 1.0, names: &[], prior: &none, turns: &[] };
+        let network = Network { fixed: 0, hold_m, turn_rad: 1.0, names: &[], prior: &none, turns: &[], whole: true };
         let mut equations = Equations::new(2, 0);
-        for ((shared_plane, variances), means) in self.shared_planes.iter().zip(&self.variances).zip(&self.means) {
-            let sees = |station: usize| means.iter().any(|mean| mean.station == station);
-            if !(sees(target) && sees(source)) {
-                continue;
-            }
-            let seen = SharedPlaneSums { shared_plane, sums: &self.sums, weights: &self.scatter.weights };
-            if let Some(mut eliminated) = seen.eliminated(&[target, source], *variances) {
+        let also = &self.common.planes[source];
+        for &plane in self.common.planes[target].iter().filter(|plane| also.binary_search(plane).is_ok()) {
+            let (shared_plane, variances) = (&self.shared_planes[plane as usize], self.variances[plane as usize]);
+            let seen = SharedPlaneSums { shared_plane, sums: &self.sums, weights: Some(&self.scatter.weights) };
+            if let Some(mut eliminated) = seen.eliminated(&[target, source], variances, usize::MAX) {
                 eliminated.rename(&[target, source]);
                 equations.add(shared_plane, &eliminated, &poses);
             }
@@ -98,15 +85,14 @@ impl Adjusted {
         let to_target = poses[0].rotation.inverse().to_rotation_matrix().into_inner();
         let mut turn = Matrix6::identity();
         turn.fixed_view_mut::<3, 3>(0, 0).copy_from(&to_target);
-        let covariance =
-            symmetrised(&(turn * cofactors.fixed_view::<6, 6>(6, 6) * turn.transpose())) * self.variance_factor();
+        let covariance = symmetrised(&(turn * cofactors.of(1) * turn.transpose())) * self.variance_factor();
         let degenerate = precision::undetermined(&result.target_from_source, &covariance, hold_m, size_m);
         Ok(PairAlignment { target, source, result: IcpResult { covariance, degenerate, ..result } })
     }
 
     fn result(&self, target: usize, source: usize, target_from_source: Isometry3<f64>, size_m: f64) -> IcpResult {
         let shared = self.shared(target, source);
-        let seen = self.means.iter().flatten().filter(|mean| mean.station == source).count();
+        let seen = self.common.tiles[source];
         let squares = DVector::from_iterator(shared.len(), shared.iter().map(|s| s.weight() * s.apart_m().powi(2)));
         let weight: f64 = shared.iter().map(SharedTile::weight).sum();
         IcpResult {

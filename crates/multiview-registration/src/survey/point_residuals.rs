@@ -42,6 +42,9 @@ impl StationRegistration {
             let (mut sum, mut seen) = (0.0, 0.0);
             for (surface, pose) in &others {
                 let moved = pose * point;
+                if !surface.extent.is_near(&moved.coords, surface.size_m) {
+                    continue;
+                }
                 let patch = &surface.patches[surface.tree.any_nearest(&[moved.x, moved.y, moved.z]).index];
                 let apart = moved - patch.centre;
                 let across = patch.normal.dot(&apart);

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use nalgebra::{DMatrix, Isometry3, Matrix6};
+use nalgebra::{Isometry3, Matrix6};
 
 use crate::adjustment::turns::MeasuredTurn;
 use crate::agreement::alignments::{PairAlignment, RefusedPair};
@@ -10,6 +10,7 @@ use crate::agreement::loops::LoopClosure;
 use crate::agreement::placement::Placements;
 use crate::surfaces::patches::Surface;
 use crate::surfaces::point_model::{PointModel, SharedParameters};
+use crate::survey::joint_covariance::JointCovariance;
 use icp_registration::UndeterminedMotion;
 
 /// What is known of the stations beforehand.
@@ -91,6 +92,15 @@ pub struct UndeterminedStation {
     pub motions: Vec<UndeterminedMotion>,
 }
 
+/// What a registration looked at: for stations that see some others each, it grows with their number.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Effort {
+    /// Pairs of stations whose surfaces were held against each other in the last rounds.
+    pub pairs_tried: usize,
+    /// Blocks of two stations (or planes that very many saw) that the factor of the normal equations holds.
+    pub filled_blocks: usize,
+}
+
 /// All stations in one frame.
 #[derive(Debug, Clone)]
 pub struct StationRegistration {
@@ -99,8 +109,8 @@ pub struct StationRegistration {
     /// Covariance of each pose in the tangent `[dt world axes, dtheta station axes]`; zero for a station that is the
     /// datum.
     pub covariance: Vec<Matrix6<f64>>,
-    /// Covariance of all unknowns: six a station, then the shared parameters.
-    pub joint_covariance: DMatrix<f64>,
+    /// Covariance of all unknowns.
+    pub joint_covariance: JointCovariance,
     /// Pairs with much overlap by themselves, at the adjusted poses.
     pub pairs: Vec<PairAlignment>,
     /// Pairs that overlap and were left out, with the reason.
@@ -124,6 +134,8 @@ pub struct StationRegistration {
     /// Whether the last round moved no station by more than the tolerance. Where it is not, stations still slide along a
     /// weak direction and may be decimetres away: do not trust the poses.
     pub settled: bool,
+    /// How much was looked at.
+    pub effort: Effort,
     /// Parameters of the [`PointModel`].
     pub parameters: Option<SharedParameters>,
     pub(crate) prepared: Arc<Vec<Surface>>,
@@ -139,14 +151,6 @@ impl StationRegistration {
         if let Some(station) = [target, source].into_iter().find(|station| *station >= count) {
             return Err(crate::Error::NoSuchStation { station, count });
         }
-        let (of_target, of_source) = (&self.world_from_station[target], &self.world_from_station[source]);
-        let jacobians = crate::adjustment::network::relative_jacobians(of_target, of_source);
-        let mut covariance = Matrix6::zeros();
-        for (a, left) in [target, source].into_iter().zip(&jacobians) {
-            for (b, right) in [target, source].into_iter().zip(&jacobians) {
-                covariance += left * self.joint_covariance.fixed_view::<6, 6>(6 * a, 6 * b) * right.transpose();
-            }
-        }
-        Ok((of_target.inverse() * of_source, rigid_pose::symmetrised(&covariance)))
+        Ok(self.joint_covariance.relative_pose(&self.world_from_station, target, source))
     }
 }

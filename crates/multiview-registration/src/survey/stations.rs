@@ -1,37 +1,34 @@
 //! Registration of all stations: from clouds to one coordinate system.
 
-use std::borrow::Cow;
 use std::sync::Arc;
 
-use nalgebra::{DMatrix, Isometry3, Matrix6, Vector3};
-use rayon::prelude::*;
-use statistics::upper_median;
+use nalgebra::Isometry3;
 
 use crate::adjustment::network::{Network, State};
 use crate::adjustment::precision;
-use crate::adjustment::rounds::{FEWEST_CONTACTS, Surfaces, WideRounds};
-use crate::adjustment::simultaneous::{Adjusted, Finish, MOST_ROUNDS};
+use crate::adjustment::rounds::FEWEST_CONTACTS;
+use crate::adjustment::simultaneous::Adjusted;
 use crate::agreement::alignments::Overlap;
 use crate::agreement::loops::reached;
 use crate::agreement::placement::{Placements, judge_placements};
 use crate::error::{Error, Result};
-use crate::surfaces::patch_size;
-use crate::surfaces::patches::Surface;
-use crate::surfaces::point_model::{SharedParameters, checked_prior};
+use crate::surfaces::point_model::SharedParameters;
 use crate::surfaces::points::StationPoints;
 use crate::survey::check::{Checked, checked};
 use crate::survey::datum::Datum;
+use crate::survey::joint_covariance::JointCovariance;
 use crate::survey::registration::{
-    Start, StationRegistration, StationRegistrationOptions, SurfacePair, UndeterminedStation,
+    Effort, Start, StationRegistration, StationRegistrationOptions, SurfacePair, UndeterminedStation,
 };
+use crate::survey::together::{Brought, brought_together, is_whole, network, prior_of};
 use point_cloud::Cloud;
-use point_cloud::{UnorganisedNormalOptions, unorganised_normals};
 use rigid_pose::is_finite;
 
-/// Default of the error of approximate poses, in radii of the clouds.
-const START_ERROR: f64 = 0.2;
-/// The rounds end when no station moves by more than a patch over this: some hundredths of a millimetre.
-const TOLERANCE: f64 = 2000.0;
+/// Most stations at once from approximate poses. In buildings of so many all come into their places; of 400 (see docs/benchmarks.md)
+/// one did not.
+const MOST_STATIONS: usize = 200;
+/// Most stations without approximate poses: each is tried against all placed before, which takes hours of more.
+const MOST_ARRANGED: usize = 200;
 
 /// Brings the clouds of many stations into one coordinate system.
 ///
@@ -43,7 +40,7 @@ const TOLERANCE: f64 = 2000.0;
 /// Clouds without normals get them from their nearest neighbours.
 ///
 /// # Errors
-/// [`Error::UnconnectedStations`] names stations that no pair leads to; [`Error::Empty`], [`Error::LengthMismatch`],
+/// [`Error::UnconnectedStations`] names stations that no pair leads to; [`Error::TooManyStations`]; [`Error::Empty`], [`Error::LengthMismatch`],
 /// [`Error::NonFinite`], [`Error::NotPositive`], [`Error::NoSuchStation`], [`Error::InvalidOption`] for the input;
 /// [`Error::Adjustment`] where shared parameters are not determined.
 pub fn register_stations(
@@ -54,53 +51,15 @@ pub fn register_stations(
     progress: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<StationRegistration> {
     validate(stations, start, datum, options)?;
-    let surfaces = prepare(stations, options)?;
-    let patch_m = surfaces[0].size_m;
-    let radius_m = surfaces.iter().map(|surface| surface.radius_m).fold(0.0, f64::max);
-    let poses = match start {
-        Start::Poses(poses) => poses.to_vec(),
-        _ => crate::survey::blind::arranged(stations, start, datum.held_station(), options.turns)?,
-    };
-    // Stations that were arranged by what they saw may have slid along walls together: they are not known better.
-    let reach_m = options.start_error_m.unwrap_or(START_ERROR * radius_m);
-    let (prior, names) = match options.model {
-        Some(model) => (checked_prior(model)?, model.names()),
-        None => Default::default(),
-    };
-    let network = Network {
-        fixed: datum.held_station(),
-        hold_m: radius_m,
-        turn_rad: 1.0,
-        names: &names,
-        prior: &prior,
-        turns: options.turns,
-    };
-    let total = |done| progress(done, MOST_ROUNDS);
-    let wide_rounds = WideRounds { network: &network, reach_m, progress: &total };
-    let mut modelled = Surfaces::fixed(surfaces.iter().collect());
-    modelled.model = options.model.map(|model| (model, stations.iter().map(Cloud::len).collect()));
-    let near = wide_rounds.run(&mut modelled, State { poses: poses.clone(), parameters: prior.0.clone() })?;
-    let finish = Finish {
-        network: &network,
-        near: network.near(patch_m / 2.0),
-        tolerance_m: patch_m / TOLERANCE,
-        progress: &total,
-    };
-    let mut points: Vec<StationPoints> =
-        stations.par_iter().zip(&surfaces).map(|(cloud, surface)| StationPoints::new(cloud, surface)).collect();
-    let mut adjusted = finish.run(&mut modelled, &mut points, near)?;
-    if let Some(state) = returned(&adjusted, &poses, &network, patch_m) {
-        // Wide rounds may have moved stations where noise alone told them to.
-        adjusted = finish.run(&mut modelled, &mut points, state)?;
-    }
+    let (prior, names) = prior_of(options)?;
+    let whole = is_whole(stations.len(), start, options);
+    let Brought { adjusted, start, points, placements: judged, prepared, radius_m, patch_m } =
+        brought_together(stations, start, datum, (options, whole), progress)?;
+    let network = network(datum, radius_m, options, (&prior, &names), whole);
     require_connected(&adjusted, datum)?;
-    let placements = placements(stations, &points, &adjusted.state)?;
+    let placements = judged.map_or_else(|| placements(stations, points, &adjusted.state), Ok)?;
     let checked = checked(&adjusted, options.minimum_overlap, datum, (radius_m, patch_m))?;
-    let result = result(checked, adjusted, &poses, &network, datum, patch_m);
-    let prepared = match modelled.modelled {
-        Some((modelled, _)) => modelled,
-        None => surfaces,
-    };
+    let result = result(checked, adjusted, &start, &network, datum, patch_m);
     Ok(StationRegistration { placements, prepared: Arc::new(prepared), ..result })
 }
 
@@ -142,6 +101,7 @@ fn validate(
             return Err(Error::NonFinite { what: "poses of the stations", index });
         }
     }
+    require_few(stations.len(), start, options)?;
     let (station, count) = (datum.held_station(), stations.len());
     if station >= count {
         return Err(Error::NoSuchStation { station, count });
@@ -161,30 +121,26 @@ fn validate(
     Ok(())
 }
 
-/// The stations as patches, all of one size.
-fn prepare(stations: &[Cloud], options: &StationRegistrationOptions<'_>) -> Result<Vec<Surface>> {
-    let normals: Vec<Cow<'_, [Vector3<f64>]>> = stations.par_iter().map(normals_of).collect::<Result<_>>()?;
-    let size_m = options.patch_m.unwrap_or_else(|| {
-        let mut sizes: Vec<f64> =
-            stations.par_iter().zip(&normals).map(|(cloud, normals)| patch_size::size(cloud, normals)).collect();
-        upper_median(&mut sizes)
-    });
-    stations.par_iter().zip(&normals).map(|(cloud, normals)| Surface::new(cloud, normals, size_m)).collect()
-}
-
-fn normals_of(cloud: &Cloud) -> Result<Cow<'_, [Vector3<f64>]>> {
-    match &cloud.normals {
-        Some(normals) => Ok(Cow::Borrowed(normals)),
-        None => Ok(Cow::Owned(unorganised_normals(&cloud.points, &UnorganisedNormalOptions::default())?)),
+/// Refuses what would come out wrong somewhere, or take hours. Shared parameters couple all stations: then they are adjusted as few are.
+fn require_few(found: usize, start: Start<'_>, options: &StationRegistrationOptions<'_>) -> Result<()> {
+    if options.model.is_some() {
+        return Ok(());
     }
+    let (most, start, remedy) = match start {
+        Start::Poses(_) => (MOST_STATIONS, "approximate poses", "register parts of the survey that share stations"),
+        Start::Order => (MOST_ARRANGED, "their order", "give approximate poses, or register parts of the survey"),
+        Start::Nothing => (MOST_ARRANGED, "nothing else", "give approximate poses, or register parts of the survey"),
+    };
+    if found > most { Err(Error::TooManyStations { found, most, start, remedy }) } else { Ok(()) }
 }
 
 /// Verdicts on the stations at the adjusted poses, their points where the shared parameters have them.
-fn placements(stations: &[Cloud], points: &[StationPoints], state: &State) -> Result<Placements> {
+fn placements(stations: &[Cloud], points: Vec<StationPoints>, state: &State) -> Result<Placements> {
     if state.parameters.is_empty() {
+        drop(points);
         return judge_placements(stations, &state.poses);
     }
-    let modelled: Vec<Cloud> = stations.iter().zip(points).map(|(cloud, points)| points.modelled(cloud)).collect();
+    let modelled: Vec<Cloud> = stations.iter().zip(&points).map(|(cloud, points)| points.modelled(cloud)).collect();
     judge_placements(&modelled, &state.poses)
 }
 
@@ -199,13 +155,12 @@ fn result(
     let count = adjusted.state.poses.len();
     let parameters = adjusted.state.parameters.len();
     let (redundancy, sigma0) = (adjusted.redundancy(), adjusted.sigma0());
-    let factor = 0.5 * adjusted.variance_factor();
-    let covariance = factor * (&adjusted.cofactors + adjusted.cofactors.transpose());
-    let undetermined = undetermined(&adjusted.state.poses, &covariance, network.hold_m, size_m);
+    let joint = JointCovariance::new(adjusted.cofactors.clone(), adjusted.variance_factor());
+    let undetermined = undetermined(&adjusted.state.poses, &joint, network.hold_m, size_m);
     let surfaces = adjusted.overlaps(FEWEST_CONTACTS).iter().map(|overlap| surface_pair(&adjusted, overlap)).collect();
-    let (poses, joint) = datum.apply(start, adjusted.state.poses, covariance, network.hold_m);
+    let (poses, joint) = datum.apply(start, adjusted.state.poses, joint, network.hold_m);
     StationRegistration {
-        covariance: (0..count).map(|k| joint.fixed_view::<6, 6>(6 * k, 6 * k).into_owned()).collect(),
+        covariance: (0..count).map(|k| joint.between(k, k)).collect(),
         world_from_station: poses,
         pairs: checked.pairs,
         refused: checked.refused,
@@ -217,34 +172,21 @@ fn result(
         redundancy,
         rounds: adjusted.rounds,
         settled: adjusted.settled,
-        parameters: (parameters > 0).then(|| shared(network, &adjusted.state.parameters, &joint)),
+        effort: Effort { pairs_tried: adjusted.pairs_tried, filled_blocks: adjusted.cofactors.filled() },
+        parameters: (parameters > 0).then(|| shared(network, &adjusted.state.parameters, &joint.whole())),
         joint_covariance: joint,
         prepared: Arc::default(),
     }
 }
 
-/// The state with what is undetermined of the stations as it was at the start; `None` where all is determined.
-fn returned(adjusted: &Adjusted, start: &[Isometry3<f64>], network: &Network<'_>, size_m: f64) -> Option<State> {
-    let mut state = adjusted.state.clone();
-    let mut any = false;
-    for (k, (pose, start)) in state.poses.iter_mut().zip(start).enumerate().filter(|(k, _)| *k != network.fixed) {
-        let own: Matrix6<f64> = adjusted.cofactors.fixed_view::<6, 6>(6 * k, 6 * k).into_owned();
-        if let Some(back) = precision::returned(pose, start, &own, network.hold_m, size_m) {
-            *pose = back;
-            any = true;
-        }
-    }
-    any.then_some(state)
-}
-
 fn undetermined(
     poses: &[Isometry3<f64>],
-    covariance: &DMatrix<f64>,
+    covariance: &JointCovariance,
     hold_m: f64,
     size_m: f64,
 ) -> Vec<UndeterminedStation> {
     let motions = poses.iter().enumerate().map(|(station, pose)| {
-        let own: Matrix6<f64> = covariance.fixed_view::<6, 6>(6 * station, 6 * station).into_owned();
+        let own = covariance.between(station, station);
         UndeterminedStation { station, motions: precision::undetermined(pose, &own, hold_m, size_m) }
     });
     motions.filter(|station| !station.motions.is_empty()).collect()
@@ -253,13 +195,11 @@ fn undetermined(
 fn surface_pair(adjusted: &Adjusted, overlap: &Overlap) -> SurfacePair {
     let Overlap { target, source, fraction } = *overlap;
     let eye = adjusted.state.poses[target].translation.vector;
-    let count = adjusted.state.poses.len();
     let tiles = adjusted.shared(target, source);
     let (mut weight, mut mean, mut square, mut whitened, mut outliers) = (0.0, 0.0, 0.0, 0.0, 0_usize);
     for tile in &tiles {
         let shared_plane = &adjusted.shared_planes[tile.shared_plane];
-        let weight_of = |station: usize| adjusted.scatter.weights[tile.target.tile * count + station];
-        let robust = weight_of(target).min(weight_of(source));
+        let robust = adjusted.scatter.weight(&tile.target).min(adjusted.scatter.weight(&tile.source));
         let own = robust * tile.weight();
         // Along the normal that points to the target station, so that the sign means nearer or farther.
         let facing = shared_plane.normal.dot(&(eye - shared_plane.origin)) >= 0.0;
@@ -282,7 +222,7 @@ fn surface_pair(adjusted: &Adjusted, overlap: &Overlap) -> SurfacePair {
     }
 }
 
-fn shared(network: &Network<'_>, values: &[f64], joint: &DMatrix<f64>) -> SharedParameters {
+fn shared(network: &Network<'_>, values: &[f64], joint: &nalgebra::DMatrix<f64>) -> SharedParameters {
     let m = values.len();
     let first = joint.nrows() - m;
     let sigma = |k: usize| joint[(k, k)].max(0.0).sqrt();

@@ -136,7 +136,7 @@ impl SurfaceCalibration {
     /// Covariance of all poses and terms: six rows a station in the tangent `[dt world axes, dtheta station axes]`, then the
     /// terms.
     pub fn joint_covariance(&self) -> DMatrix<f64> {
-        let joint = &self.after.joint_covariance;
+        let joint = &self.after.joint_covariance.whole();
         let (terms, shared) = self.by_shared.shape();
         let poses = joint.nrows() - shared;
         let mut by = DMatrix::zeros(poses + terms, joint.nrows());

@@ -10,6 +10,8 @@ use crate::register::Registered;
 
 /// Points of one station in the pictures; more would not show.
 const MOST_DRAWN: usize = 60_000;
+/// Points of all stations together: of hundreds of stations each has a few pixels.
+const MOST_IN_ALL: usize = 6_000_000;
 
 /// What the page shows beside the summary.
 #[derive(Default)]
@@ -54,10 +56,11 @@ fn clouds(registered: &Registered, title: &str, poses: &[Isometry3<f64>], captio
 
 /// The usable points of all stations at these poses.
 fn moved<'a>(stations: &'a [Station], poses: &[Isometry3<f64>]) -> Vec<StationCloud<'a>> {
+    let most = MOST_DRAWN.min(MOST_IN_ALL / stations.len().max(1)).max(1);
     let cloud = |(station, pose): (&'a Station, &Isometry3<f64>)| {
         let usable = station.usable_points();
         let finite: Vec<[f64; 3]> = usable.into_iter().filter(|point| point.iter().all(|x| x.is_finite())).collect();
-        let every = finite.len().div_ceil(MOST_DRAWN).max(1);
+        let every = finite.len().div_ceil(most).max(1);
         StationCloud {
             name: &station.name,
             points: finite.iter().step_by(every).map(|point| (pose * Point3::from(*point)).coords.into()).collect(),

@@ -5,9 +5,10 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::{DMatrix, DVector, Isometry3, Vector3};
+use nalgebra::{DVector, Isometry3, Vector3, Vector6};
 use statistics::Distribution;
 
+use crate::adjustment::cofactors::Cofactors;
 use crate::planes::elimination::motion_of;
 use crate::planes::scatter::{Scatter, TileMean};
 use crate::planes::shared_planes::SharedPlane;
@@ -26,7 +27,7 @@ pub(crate) struct Residuals<'a> {
     pub sums: &'a [Sums],
     pub poses: &'a [Isometry3<f64>],
     /// Of the tangents of all poses and the shared parameters.
-    pub cofactors: &'a DMatrix<f64>,
+    pub cofactors: &'a Cofactors,
     /// Factor of the variances that single tiles ask for.
     pub of_tiles: f64,
 }
@@ -36,7 +37,27 @@ struct OfStation {
     /// The weighted sum, its variance if tiles are independent, and its derivatives by all unknowns.
     sum: f64,
     variance: f64,
-    derivatives: DVector<f64>,
+    derivatives: Derivatives,
+}
+
+/// Derivatives by the poses of some stations and by the shared parameters.
+#[derive(Debug, Clone)]
+pub(crate) struct Derivatives {
+    pub poses: BTreeMap<usize, Vector6<f64>>,
+    pub parameters: DVector<f64>,
+}
+
+impl Derivatives {
+    fn zeros(parameters: usize) -> Self {
+        Self { poses: BTreeMap::new(), parameters: DVector::zeros(parameters) }
+    }
+
+    fn add(&mut self, factor: f64, other: &Self) {
+        for (&station, own) in &other.poses {
+            *self.poses.entry(station).or_default() += factor * own;
+        }
+        self.parameters.axpy(factor, &other.parameters, 1.0);
+    }
 }
 
 /// What the stations saw of a block, by station.
@@ -67,7 +88,7 @@ impl Residuals<'_> {
     fn blocks(&self, shared_plane: &SharedPlane, means: &[TileMean], side: usize) -> BTreeMap<[usize; 2], Block> {
         let mut blocks: BTreeMap<[usize; 2], Block> = BTreeMap::new();
         for tile in means.chunk_by(|a, b| a.tile == b.tile) {
-            let counts = |mean: &TileMean| self.scatter.weights[mean.tile * self.poses.len() + mean.station] > 0.0;
+            let counts = |mean: &TileMean| self.scatter.weight(mean) > 0.0;
             if tile.len() > 1 && tile.iter().all(counts) {
                 let place = shared_plane.tiles.place_of(tile[0].tile).map(|at| at / side);
                 self.add(blocks.entry(place).or_default(), shared_plane, tile);
@@ -79,30 +100,31 @@ impl Residuals<'_> {
     fn add(&self, block: &mut Block, shared_plane: &SharedPlane, tile: &[TileMean]) {
         let all: f64 = tile.iter().map(|each| each.weight).sum();
         let mean = tile.iter().map(|each| each.weight * each.mean_m).sum::<f64>() / all;
-        let derivatives: Vec<DVector<f64>> = tile.iter().map(|each| self.derivatives(shared_plane, each)).collect();
-        let mut of_mean = DVector::zeros(self.cofactors.nrows());
+        let derivatives: Vec<Derivatives> = tile.iter().map(|each| self.derivatives(shared_plane, each)).collect();
+        let parameters = self.cofactors.parameters();
+        let mut of_mean = Derivatives::zeros(parameters);
         for (each, own) in tile.iter().zip(&derivatives) {
-            of_mean.axpy(each.weight / all, own, 1.0);
+            of_mean.add(each.weight / all, own);
         }
-        for (each, own) in tile.iter().zip(derivatives) {
-            let zero = || OfStation { sum: 0.0, variance: 0.0, derivatives: DVector::zeros(of_mean.len()) };
+        for (each, mut own) in tile.iter().zip(derivatives) {
+            let zero = || OfStation { sum: 0.0, variance: 0.0, derivatives: Derivatives::zeros(parameters) };
             let of_station = block.entry(each.station).or_insert_with(zero);
             of_station.sum += each.weight * (each.mean_m - mean);
             of_station.variance += each.weight * (1.0 - each.weight / all);
-            of_station.derivatives.axpy(each.weight, &(own - &of_mean), 1.0);
+            own.add(-1.0, &of_mean);
+            of_station.derivatives.add(each.weight, &own);
         }
     }
 
     /// Derivatives of the mean distance of a station's points in a tile.
-    fn derivatives(&self, shared_plane: &SharedPlane, mean: &TileMean) -> DVector<f64> {
-        let mut derivatives = DVector::zeros(self.cofactors.nrows());
-        let Some(sums) = self.sums[mean.station].of(mean.tile) else { return derivatives };
+    fn derivatives(&self, shared_plane: &SharedPlane, mean: &TileMean) -> Derivatives {
+        let mut derivatives = Derivatives::zeros(self.cofactors.parameters());
+        let Some(sums) = self.sums[mean.station].at(mean.slot as usize) else { return derivatives };
         let at = Vector3::from_fn(|k, _| sums.product(k, 0) / sums.weight());
         let of_pose = motion_of(shared_plane, &self.poses[mean.station]) * at;
-        derivatives.fixed_rows_mut::<6>(6 * mean.station).copy_from(&of_pose);
-        let poses = 6 * self.poses.len();
-        for k in poses..derivatives.len() {
-            derivatives[k] = sums.product(3 + k - poses, 0) / sums.weight();
+        derivatives.poses.insert(mean.station, of_pose);
+        for (k, derivative) in derivatives.parameters.iter_mut().enumerate() {
+            *derivative = sums.product(3 + k, 0) / sums.weight();
         }
         derivatives
     }
@@ -113,7 +135,7 @@ impl Residuals<'_> {
         let share = (block.len() as f64 - 1.0) / block.len() as f64;
         let (mut free, mut squares) = (0.0, 0.0);
         for of_station in block.values() {
-            let taken = of_station.derivatives.dot(&(self.cofactors * &of_station.derivatives));
+            let taken = self.cofactors.variance(&of_station.derivatives);
             free += share * (1.0 - taken / (of_station.variance * self.of_tiles)).clamp(0.0, 1.0);
             squares += share * of_station.sum * of_station.sum / (of_station.variance * self.scatter.noise);
         }

@@ -10,6 +10,7 @@ use crate::shell::{Outcome, cargo};
 
 /// Name, package and example of each statistic.
 const STATISTICS: &[(&str, &str, &str)] = &[
+    ("buildings", "multiview-registration", "building"),
     ("calibrations", "self-calibration", "calibrations"),
     ("flags", "pipeline", "false_flags"),
     ("networks", "calibration-tasks", "network_seeds"),

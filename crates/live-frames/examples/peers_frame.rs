@@ -28,7 +28,11 @@ fn main() {
     let sequence = Sequence { width: number(width), height: number(height), rays: 1, ..Sequence::default() };
     match command.as_str() {
         "simulate" => simulate(&sequence, Path::new(folder), number(frames)),
-        "run" => run(&sequence, Path::new(folder), number(frames)),
+        // On the thread whose clock is read: frames go to the threads of a pool.
+        "run" => {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+            pool.install(|| run(&sequence, Path::new(folder), number(frames)));
+        }
         other => panic!("{other}: expected simulate or run"),
     }
 }

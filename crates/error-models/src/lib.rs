@@ -32,5 +32,6 @@ pub use noises::noise::{lowest_amplitude, range_sigma_m};
 pub use noises::range_noise::{AmplitudeScale, RangeNoise, SharedNoise};
 pub use range_image;
 pub use range_image::NoiseModel;
+pub use screening::beside_edges::sigma_beside_edges;
 pub use screening::gross_errors::{FlagCounts, GrossErrorOptions, MixedPixelOptions, flag_gross_errors};
 pub use summary::{CorrectionSummary, GroupChange};

@@ -270,6 +270,27 @@ fn thresholds_follow_the_sigma_of_each_pixel() {
 }
 
 #[test]
+fn light_of_a_mixture_adds_up_by_its_phases() {
+    let flagged = |light: f32, ambiguity_interval_m: f64| {
+        let mut frame = strip(light);
+        let mixed =
+            MixedPixelOptions { ambiguity_interval_m: Some(ambiguity_interval_m), ..MixedPixelOptions::default() };
+        let options = GrossErrorOptions { mixed_pixels: Some(mixed), ..GrossErrorOptions::default() };
+        flag_gross_errors(&mut frame, &options).unwrap().mixed_pixel
+    };
+    // Phasors of 100 and 60 units, 0.8 m of 5 m apart: their sum in the middle of both phases, from shares of 0.375 and 0.625.
+    let phase = std::f64::consts::TAU * 0.4 / 5.0;
+    let sum = (75.0 * phase.cos()) as f32;
+    assert!(flagged(sum, 5.0) > HEIGHT - 8, "{}", flagged(sum, 5.0));
+    assert_eq!(flagged(75.0, 5.0), 0);
+    // Where phases are alike, as in a long interval, it is the other way round.
+    assert_eq!(flagged(sum, 500.0), 0);
+    assert!(flagged(75.0, 500.0) > HEIGHT - 8);
+    // More than half an interval apart, a mixture lies on the other side of both.
+    assert_eq!(flagged(sum, 1.5), 0);
+}
+
+#[test]
 fn an_unknown_sigma_is_replaced_by_that_of_the_options() {
     // Noise of 3 cm that the frame says nothing about: with the true figure given, nothing is flagged.
     let mut silent = frame(0.03, |col, row| plane(col, row, 2.0, 0.0));
@@ -299,6 +320,7 @@ fn small_frames_and_bad_options_are_answered() {
         MixedPixelOptions { floor_m: -1.0, ..default },
         MixedPixelOptions { unknown_sigma_m: f64::INFINITY, ..default },
         MixedPixelOptions { sigmas: 0.0, ..default },
+        MixedPixelOptions { ambiguity_interval_m: Some(0.0), ..default },
         MixedPixelOptions { floor_m: 0.0, unknown_sigma_m: 0.0, ..default },
     ] {
         let options = GrossErrorOptions { mixed_pixels: Some(mixed_pixels), low_amplitude: None };

@@ -1,6 +1,7 @@
 //! All tests of the crate as one program: linked once, run side by side.
 #![allow(clippy::expect_used, clippy::float_cmp, clippy::panic, clippy::unwrap_used)]
 
+mod beside_edges;
 mod frame_rate;
 mod frames;
 mod further;

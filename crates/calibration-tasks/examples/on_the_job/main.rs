@@ -1,5 +1,5 @@
 //! Calibration from surfaces over many surveys of a simulated scene: what it leaves of the ranges' errors beside the true calibration,
-//! whether its covariance is true, term by term, and how often `check` is right.
+//! whether its covariance is true, term by term, whether the points of a whole run err as stated, and how often `check` is right.
 //!
 //! `cargo run --release -p calibration-tasks --example on_the_job [SURVEYS] [SCENE.ron] [FIRST_SEED] [FOLDER]`
 //!
@@ -7,6 +7,7 @@
 //! figures there is not taken again: a run that was ended goes on, and tables are printed every tenth survey.
 #![allow(clippy::print_stdout, clippy::unwrap_used, missing_docs)]
 
+mod points;
 mod survey;
 mod tables;
 

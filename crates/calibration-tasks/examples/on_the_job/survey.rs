@@ -14,6 +14,8 @@ use pipeline::{Plan, RunRequest, run};
 use range_io::calibration::Calibration;
 use serde::{Deserialize, Serialize};
 
+use crate::points::{CLASSES, Squares, squared_errors};
+
 /// Level of the checks.
 pub const LEVEL: f64 = 0.05;
 const TOLERANCE_M: f64 = 0.001;
@@ -30,6 +32,8 @@ pub struct SurveyFigures {
     pub terms: Vec<(String, f64, f64)>,
     /// Squared error over variance of all terms, and their number.
     pub of_truth: (f64, usize),
+    /// Squared errors of the points of its cloud, registered and corrected with its own terms, by class.
+    pub points: [Squares; CLASSES.len()],
     /// Check of the calibration of the survey before: probability, whether it moved, and by what matters.
     pub of_earlier: Option<(f64, bool, bool)>,
     /// The same with d0 moved.
@@ -42,16 +46,19 @@ pub struct SurveyFigures {
 pub struct Bench {
     scene: PathBuf,
     plan: Plan,
+    /// The same with the stations registered.
+    whole: Plan,
     folder: PathBuf,
 }
 
 impl Bench {
     pub fn new(fixtures: &Path, scene: PathBuf, folder: PathBuf) -> Self {
+        let mut whole = Plan::read(&fixtures.join("pipelines/room_small.ron")).unwrap();
+        whole.source = None;
         // The room's pipeline up to flagged, corrected points.
-        let mut plan = Plan::read(&fixtures.join("pipelines/room_small.ron")).unwrap();
-        plan.source = None;
+        let mut plan = whole.clone();
         plan.stages.retain(|stage| !matches!(stage, Stage::Register(_) | Stage::Adjust(_)));
-        Self { scene, plan, folder }
+        Self { scene, plan, whole, folder }
     }
 
     /// A survey's own calibration.
@@ -92,17 +99,18 @@ impl Bench {
         calibrate(&request(&survey, &work.join("lens.ron"), &work.join("own")), &Silent)?;
         let seconds = clock.elapsed().as_secs_f64();
         std::fs::copy(work.join("own/calibration.ron"), self.own(seed)).unwrap();
-        let median = |calibration: &Path| {
+        let median = |calibration: &Path, plan: &Plan, out: &str| {
             let request = RunRequest {
-                plan: self.plan.clone(),
+                plan: plan.clone(),
                 plan_path: work.join("plan.ron"),
                 survey: Some(survey.clone()),
                 calibration: Some(calibration.to_owned()),
-                out: work.join("out"),
+                out: work.join(out),
             };
             run(&request, &Silent).unwrap().truth.unwrap().ranges.range_error_median_m
         };
-        let medians_m = [median(&self.own(seed)), median(&truth)];
+        let medians_m = [median(&self.own(seed), &self.whole, "whole"), median(&truth, &self.plan, "true")];
+        let points = squared_errors(&work.join("whole"), &survey);
         let found = checked(&survey, &truth)?.difference;
         let terms = found.parameters.iter().filter(|term| term.sigma > 0.0);
         let terms = terms.map(|term| (term.name.clone(), term.difference, term.sigma)).collect();
@@ -116,7 +124,7 @@ impl Bench {
             Ok::<_, Error>(judged(&checked(&survey, &work.join("moved.ron"))?))
         });
         let (of_earlier, of_moved) = (of_earlier.transpose()?, of_moved.transpose()?);
-        Ok(SurveyFigures { seed, medians_m, terms, of_truth, of_earlier, of_moved, seconds })
+        Ok(SurveyFigures { seed, medians_m, terms, of_truth, points, of_earlier, of_moved, seconds })
     }
 }
 

@@ -4,6 +4,7 @@ use std::fmt::Write;
 
 use calibration_tasks::{DiffRequest, diff};
 
+use crate::points::{CLASSES, Squares};
 use crate::survey::{Bench, LEVEL, MOVED_M, SurveyFigures};
 
 /// All tables of these surveys.
@@ -15,6 +16,7 @@ pub fn tables(all: &[SurveyFigures], bench: &Bench) -> String {
     // Writing to a string can't fail.
     let _ = writeln!(text, "\nmedian error with own over true calibration: mean {mean:.3}, largest {largest:.3}");
     of_terms(&mut text, all);
+    of_points(&mut text, all);
     of_checks(&mut text, all);
     of_pairs(&mut text, all, bench);
     text
@@ -54,6 +56,21 @@ fn of_terms(text: &mut String, all: &[SurveyFigures]) {
         text,
         "squared error over variance of all terms together, {surveys} surveys: {ratio:.2} +- {of_ratio:.2} (1 expected)"
     );
+}
+
+fn of_points(text: &mut String, all: &[SurveyFigures]) {
+    let _ = writeln!(
+        text,
+        "points of the clouds: squared error over covariance, a direction (1 expected); beyond 5 sigma along the ray"
+    );
+    for (at, class) in CLASSES.iter().enumerate() {
+        let ratios: Vec<f64> =
+            all.iter().map(|survey| survey.points[at].squared / survey.points[at].directions).collect();
+        let (ratio, of_ratio) = mean(&ratios);
+        let sum = |count: fn(&Squares) -> usize| all.iter().map(|survey| count(&survey.points[at])).sum::<usize>();
+        let off = 100.0 * sum(|of| of.off) as f64 / sum(|of| of.points) as f64;
+        let _ = writeln!(text, "{class:>13} {ratio:>8.3} +- {of_ratio:.3} {off:>8.3} %");
+    }
 }
 
 fn of_checks(text: &mut String, all: &[SurveyFigures]) {

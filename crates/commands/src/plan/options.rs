@@ -228,7 +228,7 @@ pub struct PointCloudOptions {
 }
 
 /// Options of [`Stage::Flag`].
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct FlagOptions {
     /// Amplitude below which a pixel is flagged, in the camera's unit, whatever the number of frames: for what noise is

@@ -38,12 +38,15 @@ pub struct MixedPixelOptions {
     pub floor_m: f64,
     /// Standard deviation of a range where the frame gives none, metre. Default: 0.005 m.
     pub unknown_sigma_m: f64,
+    /// Ambiguity interval of the modulation whose amplitudes the frame holds, metre: light of two surfaces adds up by its phases.
+    /// Default: `None`, phases count as alike, which takes edges of steps above a tenth of the interval for narrow surfaces.
+    pub ambiguity_interval_m: Option<f64>,
 }
 
 impl Default for MixedPixelOptions {
     /// Four standard deviations, with a floor of 5 mm; 5 mm of noise where sigma is not known.
     fn default() -> Self {
-        Self { sigmas: 4.0, floor_m: 0.005, unknown_sigma_m: 0.005 }
+        Self { sigmas: 4.0, floor_m: 0.005, unknown_sigma_m: 0.005, ambiguity_interval_m: None }
     }
 }
 
@@ -67,7 +70,7 @@ pub struct FlagCounts {
 /// beside a sharp edge continue their own side, on a curved surface both sides err to the same side of the pixel, and a
 /// surface four pixels wide is one whatever stands around it. So is a narrower one that is long: a line of seven pixels
 /// through it is straight but for noise and the floor (1 % level), it is further from both others than three times the threshold,
-/// and its light is not what a mixture of them would return. Edges up to three mixed pixels wide are seen where they are
+/// and its light is not what a mixture of them would return (with the ambiguity interval, by its phasors). Edges up to three mixed pixels wide are seen where they are
 /// not as straight as a surface. Not seen: a pixel mixed of three surfaces that does not lie between two of them, pixels at
 /// surfaces so narrow that nothing tells their tilt (stairs from afar), a pixel with a single one between it and the image's
 /// rim, and a structure of a single pixel in front of all others. A real surface that is narrow, short and between two
@@ -124,6 +127,9 @@ impl GrossErrorOptions {
             if !(value.is_finite() && value >= 0.0) {
                 return Err(Error::OutOfDomain { name, value, expected: "a threshold is finite and not negative" });
             }
+        }
+        if let Some(value) = mixed.ambiguity_interval_m.filter(|value| !(value.is_finite() && *value > 0.0)) {
+            return Err(Error::OutOfDomain { name: "ambiguity_interval_m", value, expected: "finite and above zero" });
         }
         if mixed.sigmas * (mixed.floor_m + mixed.unknown_sigma_m) > 0.0 {
             return Ok(());

@@ -1,5 +1,7 @@
 //! Whether a pixel lies between the surfaces at its two sides and on neither.
 
+use std::f64::consts::TAU;
+
 use range_image::Raster;
 
 use crate::MixedPixelOptions;
@@ -15,6 +17,8 @@ pub(crate) struct MixedPixelTest<'a> {
     sigma: &'a Raster<f32>,
     amplitude: &'a Raster<f32>,
     options: MixedPixelOptions,
+    /// Phase of a metre of range; zero where the modulation is not known.
+    radians_per_metre: f32,
 }
 
 /// Mixed pixels side by side that an edge may have.
@@ -60,7 +64,8 @@ struct Surface {
 impl<'a> MixedPixelTest<'a> {
     /// Range, sigma and amplitude must have one size.
     pub(crate) fn new([range, sigma, amplitude]: [&'a Raster<f32>; 3], options: MixedPixelOptions) -> Self {
-        Self { range, sigma, amplitude, options }
+        let radians_per_metre = options.ambiguity_interval_m.map_or(0.0, |interval_m| (TAU / interval_m) as f32);
+        Self { range, sigma, amplitude, options, radians_per_metre }
     }
 
     /// Whether the pixel is mixed along any of the directions, and on no surface of its own.
@@ -82,18 +87,22 @@ impl<'a> MixedPixelTest<'a> {
             })
     }
 
-    /// Whether the amplitude is not the mean of those at both sides, each weighted by its share in the mixture. The shares
-    /// are those that give the range; phases are taken for so near that lengths of phasors add up.
+    /// Whether the amplitude is not that of a mixture of those at both sides. A mixture is the sum of two phasors, each with its
+    /// share; in the direction of the pixel's phase, which is α and β from those at its sides, it has the length
+    /// `a b sin(α + β) / (a sin α + b sin β)`. Where the modulation is not known, phases are taken for so near that lengths add up.
     fn has_light_of_its_own(&self, col: usize, row: usize, step: [isize; 2], pixel: Measured) -> bool {
         let side = |count: isize| {
             let neighbour = self.at(col, row, step, count)?;
             let (col, row) = place(col, row, step, count)?;
-            let amplitude = *self.amplitude.get(col, row)?;
-            Some((amplitude, amplitude * (neighbour.range - pixel.range).abs()))
+            Some((*self.amplitude.get(col, row)?, (neighbour.range - pixel.range).abs()))
         };
-        let (Some((a, pull_a)), Some((b, pull_b))) = (side(-1), side(1)) else { return false };
-        let mixture = (a * pull_b + b * pull_a) / (pull_a + pull_b);
-        (self.amplitude[(col, row)] / mixture).ln().abs() > OTHER_LIGHT
+        let (Some((a, to_a)), Some((b, to_b))) = (side(-1), side(1)) else { return false };
+        let of_phase = |distance: f32| (self.radians_per_metre * distance).sin();
+        let across = |distance: f32| if self.radians_per_metre > 0.0 { of_phase(distance) } else { distance };
+        // Beyond half an interval from each other no mixture lies between two surfaces.
+        let mixture = a * b * across(to_a + to_b) / (a * across(to_a) + b * across(to_b));
+        let amplitude = self.amplitude[(col, row)];
+        mixture <= 0.0 || (amplitude / mixture).ln().abs() > OTHER_LIGHT
     }
 
     /// How far the pixel is from the nearer of two surfaces that it is mixed of, metre.

@@ -16,25 +16,13 @@ use commands::plan::FlagOptions;
 
 /// Gross errors get a flag with their reason; no value is changed, but of mixed pixels that are to be dropped.
 pub(super) struct Flag {
-    maximum_sigma_m: f64,
-    gross: GrossErrorOptions,
-    treatment: MixedPixelTreatment,
+    options: FlagOptions,
     rays: Arc<RayTable>,
 }
 
 impl Flag {
     pub(super) fn new(options: &FlagOptions, making: &Making<'_>) -> Self {
-        let mixed_pixels = MixedPixelOptions {
-            sigmas: options.mixed_pixels.sigmas,
-            floor_m: options.mixed_pixels.floor_m,
-            ..MixedPixelOptions::default()
-        };
-        Self {
-            maximum_sigma_m: options.maximum_sigma_m.unwrap_or(f64::INFINITY),
-            gross: GrossErrorOptions { mixed_pixels: Some(mixed_pixels), low_amplitude: options.low_amplitude },
-            treatment: options.mixed_pixels.treatment,
-            rays: Arc::clone(&making.rays),
-        }
+        Self { options: *options, rays: Arc::clone(&making.rays) }
     }
 
     fn flag(&self, view: &mut View, found: &mut Found) -> Result<()> {
@@ -42,15 +30,23 @@ impl Flag {
         let ViewData::Range(frame) = &mut view.data else {
             return Err(Error::Needs { stage: "Flag", needs: "Unwrap" });
         };
-        let counts = flag_gross_errors(frame, &self.gross).map_err(Error::stage("Flag", &name))?;
+        let FlagOptions { low_amplitude, maximum_sigma_m, mixed_pixels } = self.options;
+        let gross = MixedPixelOptions {
+            sigmas: mixed_pixels.sigmas,
+            floor_m: mixed_pixels.floor_m,
+            ambiguity_interval_m: view.modulation.map(|modulation| modulation.ambiguity_interval_m()),
+            ..MixedPixelOptions::default()
+        };
+        let gross = GrossErrorOptions { mixed_pixels: Some(gross), low_amplitude };
+        let counts = flag_gross_errors(frame, &gross).map_err(Error::stage("Flag", &name))?;
         found.add("mixed_pixels", counts.mixed_pixel);
         for (sigma, flags) in frame.sigma.as_slice().iter().zip(frame.flags.as_mut_slice()) {
-            if f64::from(*sigma) > self.maximum_sigma_m {
+            if maximum_sigma_m.is_some_and(|maximum_m| f64::from(*sigma) > maximum_m) {
                 flags.insert(Flags::LOW_AMPLITUDE);
             }
         }
-        let treated = treat(view, self.treatment)?;
-        if self.treatment == MixedPixelTreatment::Split {
+        let treated = treat(view, mixed_pixels.treatment)?;
+        if mixed_pixels.treatment == MixedPixelTreatment::Split {
             found.add("split_pixels", treated.split.len());
         }
         view.further_points = further_points(&treated, &self.rays);

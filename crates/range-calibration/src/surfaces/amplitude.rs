@@ -85,7 +85,8 @@ impl AmplitudeModel {
     pub(super) fn hyperbola(&self, values: &[f64]) -> Option<AmplitudeHyperbola> {
         let ([dark, knee], level) = (self.all(values), self.level_m);
         let h2 = 1.0 / (dark * knee.exp());
-        let hyperbola = AmplitudeHyperbola { h1: -level * h2, h2, h3: 1.0 / (dark * dark), amplitude_span: self.span };
+        let hyperbola =
+            AmplitudeHyperbola { h1: 0.0 - level * h2, h2, h3: 1.0 / (dark * dark), amplitude_span: self.span };
         (dark > 0.0 && level.abs() < LARGEST_LEVEL * dark).then_some(hyperbola)
     }
 

@@ -8,6 +8,7 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 use atomic_output::OutputFolder;
+use error_models::sigma_beside_edges;
 use nalgebra::{Isometry3, Point3};
 use range_io::ply::{CloudFile, PlyWriter, Precision, read_cloud, read_some_of_cloud, write_cloud};
 use serde::{Deserialize, Serialize};
@@ -201,11 +202,14 @@ struct CloudOfView {
 impl CloudOfView {
     fn new(view: &View, number: usize) -> Option<Self> {
         let cloud = view.cloud.as_ref()?;
+        // Registration and tests went by the noise; who reads a point wants to know what an edge in it may have done, too.
+        let sigma = sigma_beside_edges(&cloud.points, &cloud.sigma, cloud.width);
+        let sigma = sigma.unwrap_or_else(|_| cloud.sigma.clone());
         let finite = || (0..cloud.points.len()).filter(|&index| cloud.points[index].iter().all(|x| x.is_finite()));
         let points = CloudFile {
             points: finite().map(|index| cloud.points[index]).collect(),
             intensity: Some(finite().map(|index| cloud.amplitude[index]).collect()),
-            sigma: Some(finite().map(|index| cloud.sigma[index]).collect()),
+            sigma: Some(finite().map(|index| sigma[index]).collect()),
             flags: Some(finite().map(|index| cloud.flags[index].bits()).collect()),
             frame: Some(finite().map(|_| number as u32).collect()),
             ..CloudFile::default()

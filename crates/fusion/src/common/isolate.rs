@@ -9,13 +9,14 @@ use statistics::{Distribution, holm};
 
 use super::equations::{Equations, ties};
 use super::posterior::{Posterior, posterior};
-use crate::Result;
+use super::shared_error::shared_error;
 use crate::fuse::Task;
 use crate::input::{Observations, Registered, derivatives};
 use crate::lattice::Lattice;
-use crate::outcome::Apart;
+use crate::outcome::{Apart, SharedError};
 use crate::patches::{Patches, seeds};
 use crate::surfels::gather;
+use crate::{Error, Result};
 
 /// Times that places which do not fit are looked for.
 const ROUNDS: usize = 2;
@@ -56,6 +57,7 @@ fn stations(input: &Registered<'_>, errors: &dyn PointErrors, common: &CommonErr
 #[derive(Debug, Clone)]
 pub(crate) struct Conditioned {
     pub posterior: Posterior,
+    pub shared: Option<SharedError>,
     pub apart: Vec<Apart>,
     /// Frames of one layer share surfaces.
     pub layers: Vec<u32>,
@@ -66,7 +68,7 @@ impl Conditioned {
     pub fn nothing(frames: usize, common: &CommonErrors) -> Self {
         let covariance = common.covariance().clone();
         let values = DVector::zeros(covariance.nrows());
-        Self { posterior: Posterior { values, covariance }, apart: Vec::new(), layers: vec![0; frames] }
+        Self { posterior: Posterior { values, covariance }, shared: None, apart: Vec::new(), layers: vec![0; frames] }
     }
 }
 
@@ -83,19 +85,21 @@ pub(crate) fn condition(
 ) -> Result<Conditioned> {
     let Task { input, errors, options } = *task;
     let stations = stations(input, errors, common)?;
-    let Conditioned { posterior: before, mut apart, mut layers } = before.clone();
+    let Conditioned { posterior: before, mut apart, mut layers, .. } = before.clone();
     let lattice: &Lattice = &observations.lattice;
     loop {
         let seeds = seeds(patches, lattice, &layers, options.gate());
         let gathered = gather(observations, patches, &seeds, &layers, options.gate());
         let ties = ties(&gathered, observations, errors, common)?;
         let solve = |values: Option<&DVector<f64>>| {
-            let equations = Equations::new(&ties, common.errors().len(), values);
-            posterior(common.covariance(), &equations, &before.values)
+            let mut equations = Equations::new(&ties, common.errors().len(), values);
+            equations.right += &equations.normal * &before.values;
+            let (prior, shared) = shared_error(options.shared_error, common, &equations)?;
+            Ok::<_, Error>((posterior(&prior, &equations)?, shared))
         };
-        let mut posterior = solve(None)?;
+        let (mut posterior, mut shared) = solve(None)?;
         for _ in 0..ROUNDS {
-            posterior = solve(Some(&(&posterior.values - &before.values)))?;
+            (posterior, shared) = solve(Some(&(&posterior.values - &before.values)))?;
         }
         let p_values: Vec<f64> =
             stations.iter().map(|station| p_value(station, &posterior, common.covariance())).collect();
@@ -104,7 +108,7 @@ pub(crate) fn condition(
         let statistic = |at: &usize| squares(&stations[*at], &posterior, common.covariance()).0;
         let worst =
             (0..stations.len()).filter(|_| judges).filter(is_left).max_by(|a, b| statistic(a).total_cmp(&statistic(b)));
-        let Some(worst) = worst else { return Ok(Conditioned { posterior, apart, layers }) };
+        let Some(worst) = worst else { return Ok(Conditioned { posterior, shared, apart, layers }) };
         let station = &stations[worst];
         let with = partners(station, &gathered);
         let shift = |column: &usize| (common.errors()[*column].name.clone(), posterior.values[*column]);

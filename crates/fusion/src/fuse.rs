@@ -15,8 +15,8 @@ use crate::surfels::{Bend, Estimate, FARTHEST, Gathered, Owner, bends, gather, g
 use crate::{Error, Result};
 
 /// Points that common errors are estimated from, about, in two passes: the second from points that the first has moved to within what
-/// it left. More tell little more than their time.
-const POINTS_FOR_COMMON: [usize; 2] = [60_000, 200_000];
+/// it left. More tell little more than their time. The third is for an error that all frames share: frames that it had set apart meet then.
+const POINTS_FOR_COMMON: [usize; 3] = [60_000, 200_000, 200_000];
 /// Common errors, without the nodes of a shared error, beyond which they are not estimated: their dense matrices would take gigabytes.
 const MOST_COMMON: usize = 1500;
 
@@ -46,7 +46,8 @@ pub fn fuse(
         return task.finish(common, &first, found);
     }
     let mut observations = first;
-    for (pass, points) in POINTS_FOR_COMMON.into_iter().enumerate() {
+    let passes = if nodes > 0 { POINTS_FOR_COMMON.len() } else { POINTS_FOR_COMMON.len() - 1 };
+    for (pass, points) in POINTS_FOR_COMMON.into_iter().take(passes).enumerate() {
         let few = thinned(&observations, points);
         let few = few.as_ref().unwrap_or(&observations);
         let present = common_of(common, &found.posterior.covariance)?;

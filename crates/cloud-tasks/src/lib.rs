@@ -14,7 +14,8 @@ mod summary;
 pub use commands;
 pub use common_errors::{self, CommonErrorsFile, FrameErrors, SharedBySensor};
 pub use fuse::{
-    ApartSummary, ContradictionSummary, Correction, CountedPoints, FuseSummary, SigmaSummary, ThicknessSummary, fuse,
+    ApartSummary, ContradictionSummary, Correction, CountedPoints, FuseSummary, SharedErrorSummary, SigmaSummary,
+    ThicknessSummary, fuse,
 };
 pub use fusion;
 pub use measure::measure;

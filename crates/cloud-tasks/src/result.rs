@@ -5,10 +5,10 @@ use std::path::Path;
 use camera_model::{Camera, ImageFormat, InteriorOrientation, LensDistortion};
 use commands::Result;
 use common_errors::{CommonErrorsFile, FrameErrors};
-use error_models::RangeErrorModel;
+use error_models::{AmplitudeScale, RangeErrorModel};
 use measurement::Cloud;
-use nalgebra::{Isometry3, Matrix3, Point3, Quaternion, UnitQuaternion, Vector3};
-use point_uncertainty::{CommonErrors, PointErrors, StationErrors};
+use nalgebra::{DMatrix, Isometry3, Matrix3, Point3, Quaternion, UnitQuaternion, Vector3};
+use point_uncertainty::{CommonError, CommonErrors, PointErrors, SharedErrorGrid, Source, StationErrors};
 use range_io::calibration::Calibration;
 use range_io::clouds::CloudFile;
 use range_io::ply::read_cloud;
@@ -41,6 +41,8 @@ pub(crate) struct ResultCloud {
     pub(crate) views: Vec<String>,
     /// Flags of the points, where the cloud has them.
     pub(crate) flags: Option<Vec<u16>>,
+    /// The image of a camera whose frames share an error that no calibration has: its depths come from a pattern or from two images.
+    depth_image: Option<ImageFormat>,
 }
 
 /// What each point has for itself, and how it moves.
@@ -81,7 +83,7 @@ impl ResultCloud {
         let errors: CommonErrorsFile = ron_text::read(&errors_path)?;
         let wrong = |message: String| request(format!("{}: {message}", errors_path.display()));
         let common = common(&errors).map_err(wrong)?;
-        let stations = stations(&errors, folder, &wrong)?;
+        let (stations, depth_image) = stations(&errors, folder, &wrong)?;
         let Some(frame) = &file.frame else {
             return Err(request(format!(
                 "{}: its points name no `frame`, which {COMMON_ERRORS} needs",
@@ -94,7 +96,7 @@ impl ResultCloud {
         }
         let not_in_it = errors.not_in_it;
         let views = errors.frames.into_iter().map(|frame| frame.view).collect();
-        Ok(Self { not_in_it, views, ..Self::new(file, stations, common, errors.calibration) })
+        Ok(Self { not_in_it, views, depth_image, ..Self::new(file, stations, common, errors.calibration) })
     }
 
     fn new(file: CloudFile, stations: Vec<StationErrors>, common: CommonErrors, calibration: Option<String>) -> Self {
@@ -118,7 +120,32 @@ impl ResultCloud {
             not_in_it: Vec::new(),
             views: Vec::new(),
             flags: file.flags,
+            depth_image: None,
         }
+    }
+
+    /// Makes the error that all frames of a depth camera share one of the common errors, where the camera is of that kind. How large it is
+    /// is not known here.
+    pub(crate) fn share_error(&mut self) -> Result<Option<SharedErrorGrid>> {
+        let Some(format) = self.depth_image else { return Ok(None) };
+        let before = self.common.errors().len();
+        let grid = SharedErrorGrid::new(before, &format);
+        let [across, down] = grid.nodes();
+        let node = |at: usize| CommonError {
+            name: format!("shared error, node {} {}", at % across, at / across),
+            source: Source::Calibration,
+        };
+        let errors: Vec<CommonError> =
+            self.common.errors().iter().cloned().chain((0..across * down).map(node)).collect();
+        let mut covariance = DMatrix::zeros(errors.len(), errors.len());
+        covariance.view_mut((0, 0), (before, before)).copy_from(self.common.covariance());
+        let count = errors.len();
+        self.common = CommonErrors::new(errors, covariance).map_err(|error| request(error.to_string()))?;
+        let with = |station: StationErrors| station.with_shared_error(grid, count);
+        let stations: std::result::Result<Vec<_>, _> =
+            std::mem::take(&mut self.errors.stations).into_iter().map(with).collect();
+        self.errors.stations = stations.map_err(|error| request(error.to_string()))?;
+        Ok(Some(grid))
     }
 
     pub(crate) fn cloud(&self) -> Cloud<'_> {
@@ -194,11 +221,12 @@ fn common(file: &CommonErrorsFile) -> std::result::Result<CommonErrors, String> 
     file.common().map_err(|error| error.to_string())
 }
 
+/// The stations, and the image of a depth camera without amplitudes.
 fn stations(
     file: &CommonErrorsFile,
     folder: &Path,
     wrong: &dyn Fn(String) -> commands::Error,
-) -> Result<Vec<StationErrors>> {
+) -> Result<(Vec<StationErrors>, Option<ImageFormat>)> {
     let calibration = match &file.calibration {
         Some(name) => Some(Calibration::read(folder.join(name))?),
         None => None,
@@ -213,7 +241,9 @@ fn stations(
         let found = station(file, number, frame, calibration.as_ref(), &camera).map_err(at)?;
         stations.push(found);
     }
-    Ok(stations)
+    let noise = calibration.as_ref().and_then(|calibration| calibration.range_noise);
+    let is_depth_camera = noise.is_some_and(|noise| noise.amplitude_scale == AmplitudeScale::InverseSquaredRange);
+    Ok((stations, is_depth_camera.then_some(camera.format)))
 }
 
 fn station(

@@ -203,3 +203,18 @@ fn other_formats_hold_the_same_points() {
     assert!(matches!(answer, Err(Error::Request { .. })), "{answer:?}");
     assert!(!folder.path("vtk").exists());
 }
+
+#[test]
+fn a_depth_camera_is_asked_for_what_all_its_frames_share() {
+    let folder = Folder::new(3);
+    folder.write_cloud(&[]);
+    let path = folder.path("result/calibration.ron");
+    let calibration = std::fs::read_to_string(&path).unwrap();
+    let noise = "range_noise: Some((sigma_times_amplitude_m: 0.002, floor_m: 0.0, amplitude_scale: InverseSquaredRange)),\n    provenance";
+    std::fs::write(&path, calibration.replacen("provenance", noise, 1)).unwrap();
+    let summary = fused(&folder).unwrap();
+    // This one bends nothing, and its nodes are not listed among the corrections.
+    assert!(summary.shared_error.is_none(), "{:?}", summary.shared_error);
+    assert!(summary.findings.iter().any(|words| words.contains("No error that all frames")), "{:?}", summary.findings);
+    assert_eq!(summary.corrections.len(), summary.common_errors);
+}

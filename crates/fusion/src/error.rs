@@ -122,6 +122,14 @@ pub enum Error {
         /// Largest extent of the points.
         extent_m: f64,
     },
+    /// An error that all frames share whose nodes are no common errors.
+    #[error("the last node of the shared error is common error {last} (0 is the first), there are {errors}")]
+    SharedError {
+        /// Column of the last node.
+        last: usize,
+        /// Common errors.
+        errors: usize,
+    },
     /// Correlations of the common errors that have no eigenvalues.
     #[error("the covariance of the common errors cannot be decomposed")]
     Decomposition,

@@ -5,7 +5,7 @@ use point_uncertainty::{CommonErrors, PointErrors, Shares, Source};
 use rayon::prelude::*;
 use statistics::upper_median;
 
-use crate::common::{self, Conditioned, Row, condition, form, split};
+use crate::common::{self, Conditioned, Row, condition, form, split, without_shared};
 use crate::input::{Observation, Observations, Registered};
 use crate::options::{CommonErrorUse, FusionOptions};
 use crate::outcome::{Fused, Surfel};
@@ -15,9 +15,9 @@ use crate::surfels::{Bend, Estimate, FARTHEST, Gathered, Owner, bends, gather, g
 use crate::{Error, Result};
 
 /// Points that common errors are estimated from, about, in two passes: the second from points that the first has moved to within what
-/// it left. More tell little more than their time.
-const POINTS_FOR_COMMON: [usize; 2] = [60_000, 200_000];
-/// Common errors beyond which they are not estimated: their dense matrices would take gigabytes.
+/// it left. More tell little more than their time. The third is for an error that all frames share: frames that it had set apart meet then.
+const POINTS_FOR_COMMON: [usize; 3] = [60_000, 200_000, 200_000];
+/// Common errors, without the nodes of a shared error, beyond which they are not estimated: their dense matrices would take gigabytes.
 const MOST_COMMON: usize = 1500;
 
 /// Fuses registered points: each surface once, each fused point with its standard deviation from all sources.
@@ -32,12 +32,14 @@ pub fn fuse(
 ) -> Result<Fused> {
     options.check()?;
     input.check()?;
+    let common = &without_shared(options.shared_error, common)?;
     let none = vec![0.0; common.errors().len()];
+    let nodes = options.shared_error.map_or(0, |grid| grid.columns().len());
     let first = input.observe(errors, common, &none, options.voxel_m)?;
     above_noise(&first, options)?;
     let estimates = options.common_errors == CommonErrorUse::Estimate
-        && (0..none.len()).any(|at| common.covariance()[(at, at)] > 0.0)
-        && none.len() <= MOST_COMMON;
+        && (nodes > 0 || (0..none.len()).any(|at| common.covariance()[(at, at)] > 0.0))
+        && none.len() - nodes <= MOST_COMMON;
     let task = Task { input, errors, options };
     let mut found = Conditioned::nothing(input.centres.len(), common);
     if !estimates {
@@ -45,6 +47,9 @@ pub fn fuse(
     }
     let mut observations = first;
     for (pass, points) in POINTS_FOR_COMMON.into_iter().enumerate() {
+        if pass > 1 && found.shared.is_none() {
+            break;
+        }
         let few = thinned(&observations, points);
         let few = few.as_ref().unwrap_or(&observations);
         let present = common_of(common, &found.posterior.covariance)?;
@@ -132,6 +137,7 @@ impl Task<'_> {
             surfel_of_point,
             contradictions,
             apart: found.apart,
+            shared_error: found.shared,
             corrections: found.posterior.values.iter().copied().collect(),
             common: common.clone(),
             rows,

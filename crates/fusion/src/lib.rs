@@ -18,5 +18,5 @@ pub use fuse::fuse;
 pub use input::Registered;
 pub use nalgebra;
 pub use options::{CommonErrorUse, FusionOptions};
-pub use outcome::{Apart, Contradiction, Fused, Reason, Surfel, Unfused};
+pub use outcome::{Apart, Contradiction, Fused, Reason, SharedError, Surfel, Unfused};
 pub use point_uncertainty;

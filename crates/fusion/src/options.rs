@@ -1,5 +1,6 @@
 //! What may be chosen.
 
+use point_uncertainty::SharedErrorGrid;
 use statistics::Distribution;
 
 use crate::{Error, Result};
@@ -29,11 +30,20 @@ pub struct FusionOptions {
     pub outlier_level: f64,
     /// What is done with common errors. Default: they are estimated.
     pub common_errors: CommonErrorUse,
+    /// Those of the common errors that are the error that all frames of a sensor share. How large it is and how far it is alike in
+    /// the image is estimated as well: what is stated of their covariance is not used. Default: none.
+    pub shared_error: Option<SharedErrorGrid>,
 }
 
 impl Default for FusionOptions {
     fn default() -> Self {
-        Self { voxel_m: 0.05, level: 0.05, outlier_level: 1e-4, common_errors: CommonErrorUse::Estimate }
+        Self {
+            voxel_m: 0.05,
+            level: 0.05,
+            outlier_level: 1e-4,
+            common_errors: CommonErrorUse::Estimate,
+            shared_error: None,
+        }
     }
 }
 

@@ -122,6 +122,17 @@ pub struct Apart {
     pub shifts: Vec<(String, f64)>,
 }
 
+/// What surfaces tell of the error that all frames of a sensor share: of the values at its nodes before they were estimated.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SharedError {
+    /// Standard deviation, 1/metre of inverse depth.
+    pub sigma_per_m: f64,
+    /// Distance in the image at which the correlation is 1/e, pixel.
+    pub length_px: f64,
+    /// By how much the logarithm of the likelihood of all that frames see together is larger than without it.
+    pub evidence: f64,
+}
+
 /// A cloud in which each surface stands once.
 ///
 /// It is [`PointErrors`] of its surfels, with [`Fused::common`]: distances between fused points have their standard deviations
@@ -140,6 +151,8 @@ pub struct Fused {
     pub apart: Vec<Apart>,
     /// What was found of the common errors, in their units, and has been taken off the points. Zeros where they were not estimated.
     pub corrections: Vec<f64>,
+    /// The error that all frames of the sensor share; `None` where it was not asked for, or does not show.
+    pub shared_error: Option<SharedError>,
     /// The common errors that remain.
     pub common: CommonErrors,
     pub(crate) rows: Vec<Row>,

@@ -4,5 +4,6 @@
 
 mod common;
 mod input;
+mod shared_error;
 mod truth;
 mod walls;

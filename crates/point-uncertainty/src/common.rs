@@ -17,7 +17,7 @@ pub enum Source {
     Noise,
     /// Systematic part that neighbouring pixels of one frame share.
     Sensor,
-    /// Range terms, lens, interior orientation: common to all frames.
+    /// Range terms, lens, interior orientation, and what else all frames of a sensor share.
     Calibration,
     /// Drift of a warming camera: common to a frame.
     Drift,

@@ -4,7 +4,7 @@ use camera_model::Camera;
 use error_models::RangeErrorModel;
 use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 
-use crate::{Error, Result};
+use crate::{Error, Result, SharedErrorGrid};
 
 /// Where the common errors of a station stand.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
@@ -46,6 +46,7 @@ pub struct StationErrors {
     world_from_camera: Isometry3<f64>,
     columns: Columns,
     sensor: Option<SharedBySensor>,
+    shared_error: Option<SharedErrorGrid>,
     number: u32,
 }
 
@@ -72,6 +73,7 @@ impl StationErrors {
                 world_from_camera: *world_from_camera,
                 columns,
                 sensor: None,
+                shared_error: None,
                 number,
             }),
         }
@@ -100,6 +102,19 @@ impl StationErrors {
             return Err(Error::OutOfDomain { name: "the width of a neighbourhood", value: width_px, expected });
         }
         self.sensor = (sigma_m > 0.0 || share > 0.0).then_some(sensor);
+        Ok(self)
+    }
+
+    /// With an error that it shares with all frames of its sensor.
+    ///
+    /// # Errors
+    /// [`Error::Column`] where a column of the grid is not below `common_errors`.
+    pub fn with_shared_error(mut self, grid: SharedErrorGrid, common_errors: usize) -> Result<Self> {
+        let end = grid.columns().end;
+        if end > common_errors {
+            return Err(Error::Column { column: end - 1, errors: common_errors });
+        }
+        self.shared_error = Some(grid);
         Ok(self)
     }
 
@@ -156,6 +171,11 @@ impl StationErrors {
         let by_range = self.ray(point);
         if let Some(column) = self.columns.drift {
             derivatives.push((column, -by_range));
+        }
+        if let Some(grid) = self.shared_error {
+            // The camera looks along -z.
+            let by_inverse_depth = by_range * (local.z * range_m);
+            derivatives.extend(grid.around(pixel).map(|(column, weight)| (column, by_inverse_depth * weight)));
         }
         if let Some(model) = self.model.as_ref().filter(|_| !self.columns.range.is_empty()) {
             let [x, y] = self.camera.format.image_from_pixel(pixel);

@@ -3,7 +3,7 @@
 use point_uncertainty::camera_model::nalgebra::{Isometry3, Point3, Vector3, Vector6};
 use point_uncertainty::camera_model::{Camera, ImageFormat, InteriorOrientation, LensDistortion, step_pose};
 use point_uncertainty::error_models::{AmplitudeHyperbola, RangeErrorModel};
-use point_uncertainty::{Columns, Error, SharedBySensor, StationErrors};
+use point_uncertainty::{Columns, Error, SharedBySensor, SharedErrorGrid, StationErrors};
 
 fn camera(by: &[f64; 10]) -> Camera {
     let format = ImageFormat::new(176, 144, [0.04, 0.04]).unwrap();
@@ -141,4 +141,40 @@ fn a_point_moves_with_the_hyperbola_as_differences_say() {
     let mut found = Vec::new();
     station.common(&camera.point(pixel, 2.0), f64::NAN, &mut found);
     assert!(found.is_empty());
+}
+
+#[test]
+fn what_all_frames_share_moves_a_point_as_its_inverse_depth_does() {
+    let pose = Isometry3::new(Vector3::new(1.0, -2.0, 0.4), Vector3::new(0.3, -0.6, 1.2));
+    let camera = camera(&[0.0; 10]);
+    let grid = SharedErrorGrid::new(6, &camera.format);
+    let [across, down] = grid.nodes();
+    assert_eq!((grid.columns(), across, down), (6..6 + 21 * 18, 21, 18));
+    let columns = Columns { pose: Some(0), ..Columns::default() };
+    let station = StationErrors::new(0, &camera, None, &pose, columns, grid.columns().end).unwrap();
+    let station = station.with_shared_error(grid, grid.columns().end).unwrap();
+    // In the middle of a cell, beside the edges of the image, and at its last pixels.
+    for pixel in [[31.0, 117.0], [-0.5, 60.3], [175.5, 143.5]] {
+        let local = camera.point(pixel, 3.2);
+        let (depth, step) = (-local.z, 1e-6);
+        let mut found = Vec::new();
+        station.common(&(pose * local), f64::NAN, &mut found);
+        let nodes = found.iter().filter(|(column, _)| *column >= 6);
+        let mut whole = 0.0;
+        for (column, derivative) in nodes {
+            let place =
+                [(column - 6) % across, (column - 6) / across].map(|node| node as f64 * grid.spacing_px() - 0.5);
+            let weight = |axis: usize| (1.0 - (pixel[axis] - place[axis]).abs() / grid.spacing_px()).max(0.0);
+            let moved = 1.0 / (1.0 / depth + step * weight(0) * weight(1));
+            let by_difference = pose.rotation * (local.coords * (moved / depth - 1.0)) / step;
+            assert!(
+                (derivative - by_difference).norm() < 1e-4 * depth * 3.2,
+                "{pixel:?} {column} {derivative} {by_difference}"
+            );
+            whole += derivative.norm();
+        }
+        assert!((whole - depth * 3.2).abs() < 1e-9, "{whole}");
+    }
+    let station = StationErrors::new(0, &camera, None, &pose, Columns::default(), 0).unwrap();
+    assert!(matches!(station.with_shared_error(grid, 100), Err(Error::Column { errors: 100, .. })));
 }

@@ -44,6 +44,7 @@ pub(crate) fn document(summary: &FuseSummary, pictures: Vec<Figure>) -> Document
     );
     shares(&mut document, summary);
     document.list(&summary.findings);
+    shared_error(&mut document, summary);
     document.figures(pictures);
     thickness(&mut document, summary);
     document.section("Points that are in none");
@@ -79,6 +80,23 @@ fn thickness(document: &mut Document, summary: &FuseSummary) {
         row("what noise gives with what neighbouring pixels share", thickness.noise_and_sensor_m),
     ];
     document.table([Column::words("points"), Column::number("spread")], rows);
+}
+
+fn shared_error(document: &mut Document, summary: &FuseSummary) {
+    let Some(shared) = &summary.shared_error else { return };
+    document.section("The error that all frames share");
+    document.explanation(
+        "What a depth camera measures wrongly in the same pixels of all its frames, of a depth of one metre; it grows with the squared depth. \
+         It does not average out over frames, but frames that see a surface in different pixels see it apart, and so it shows.",
+    );
+    let row = |name: &str, value: String| vec![name.to_owned(), value];
+    let rows = vec![
+        row("standard deviation, as surfaces tell it", millimetres(Some(shared.sigma_at_1_m))),
+        row("taken off, root mean square", millimetres(Some(shared.taken_off_rms_m))),
+        row("standard deviation of what remains, root mean square", millimetres(Some(shared.sigma_after_rms_m))),
+        row("alike over (correlation 1/e)", format!("{:.0} pixels", shared.length_px)),
+    ];
+    document.table([Column::words("error"), Column::number("at one metre")], rows);
 }
 
 fn reasons(document: &mut Document, summary: &FuseSummary) {

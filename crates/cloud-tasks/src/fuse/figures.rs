@@ -3,11 +3,12 @@
 use std::collections::BTreeMap;
 
 use commands::Result;
-use fusion::{Fused, Surfel};
+use fusion::{Fused, FusionOptions, Surfel};
 use nalgebra::{Point3, Vector3};
-use point_uncertainty::Source;
+use point_uncertainty::{SharedErrorGrid, Source};
 use report::{
-    Axes, CATEGORIES, CHART_SIZE, Canvas, ColourMap, Figure, LineOfSight, Scale, deviation_figure, robust_span, span,
+    Axes, CATEGORIES, CHART_SIZE, Canvas, ColourMap, Figure, LineOfSight, Scale, deviation_figure, raster_figure,
+    robust_span, span,
 };
 use statistics::quantile;
 
@@ -26,11 +27,31 @@ const BAR: f64 = 0.7;
 const MOST_FRAMES: usize = 6;
 
 /// All pictures of a fused cloud.
-pub(crate) fn figures(usable: &Usable<'_>, moved: &[Point3<f64>], fused: &Fused, voxel_m: f64) -> Result<Vec<Figure>> {
+pub(crate) fn figures(
+    usable: &Usable<'_>,
+    moved: &[Point3<f64>],
+    fused: &Fused,
+    options: &FusionOptions,
+) -> Result<Vec<Figure>> {
     let mut all = maps(&fused.surfels)?;
     all.push(shares(&fused.surfels));
-    all.extend(sections(usable, moved, fused, voxel_m));
+    all.extend(sections(usable, moved, fused, options.voxel_m));
+    if let Some(grid) = options.shared_error.filter(|_| fused.shared_error.is_some()) {
+        all.push(shared_error(fused, &grid)?);
+    }
     Ok(all)
+}
+
+/// What was taken off of the error that all frames share, node by node of its grid over the image.
+fn shared_error(fused: &Fused, grid: &SharedErrorGrid) -> Result<Figure> {
+    // Where the inverse depth is too large, depths are too small.
+    let values: Vec<f64> = fused.corrections[grid.columns()].iter().map(|value| -1e3 * value).collect();
+    let largest = quantile(&mut values.iter().map(|value| value.abs()).collect::<Vec<f64>>(), 0.98).max(0.01);
+    let scale = Scale { map: ColourMap::Diverging, low: -largest, high: largest, unit: "mm" };
+    let figure = raster_figure("The error that all frames share, over the image", grid.nodes()[0], &values, &scale)?;
+    Ok(figure.caption(
+        "Of a depth of one metre, millimetre; positive where depths are too long. It grows with the squared depth.",
+    ))
 }
 
 /// The cloud in the colours of its standard deviations, along the two axes that show most of it.

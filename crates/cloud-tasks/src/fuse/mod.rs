@@ -20,7 +20,8 @@ use crate::request::FuseRequest;
 use crate::result::ResultCloud;
 use input::{Usable, refused, slip};
 pub use summary::{
-    ApartSummary, ContradictionSummary, Correction, CountedPoints, FuseSummary, SigmaSummary, ThicknessSummary,
+    ApartSummary, ContradictionSummary, Correction, CountedPoints, FuseSummary, SharedErrorSummary, SigmaSummary,
+    ThicknessSummary,
 };
 
 /// Fuses the points of a result, and writes `cloud` and `unfused` in the format asked for, `summary.json` and `report.html`.
@@ -39,9 +40,12 @@ const STEPS: usize = 4;
 fn work(asked: &FuseRequest, destination: &Destination, progress: &dyn Progress) -> Result<FuseSummary> {
     let clock = Instant::now();
     progress.begin("fuse", STEPS);
-    let options = options(asked);
-    let cloud = ResultCloud::read(&asked.result).map_err(named)?;
+    let mut options = options(asked);
+    let mut cloud = ResultCloud::read(&asked.result).map_err(named)?;
     let mut summary = summarise::begin(asked, &cloud, &options, clouds::ending(asked.format)?);
+    if options.common_errors == CommonErrorUse::Estimate {
+        options.shared_error = cloud.share_error()?;
+    }
     let usable = Usable::new(&cloud, asked)?;
     summary.points.unusable = cloud.usable.len() - usable.indices.len();
     summary.doubts.extend(left_out(&cloud));
@@ -58,9 +62,9 @@ fn work(asked: &FuseRequest, destination: &Destination, progress: &dyn Progress)
     };
     progress.advance(1);
     let moved = usable.moved(&fused.corrections);
-    summarise::finish(&mut summary, &usable, &moved, &fused);
+    summarise::finish(&mut summary, &usable, &moved, &fused, &options);
     summary.seconds = commands::made::seconds_since(clock);
-    let pictures = figures::figures(&usable, &moved, &fused, options.voxel_m)?;
+    let pictures = figures::figures(&usable, &moved, &fused, &options)?;
     progress.advance(1);
     let folder = destination.open()?;
     let [cloud, unfused] = &mut summary.clouds;

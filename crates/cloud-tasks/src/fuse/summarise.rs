@@ -1,6 +1,7 @@
 //! Figures of a fused cloud, and what speaks against it.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
 
 use commands::{Doubt, DoubtKind};
 use fusion::{CommonErrorUse, Contradiction, Fused, FusionOptions, Reason, Surfel};
@@ -9,7 +10,9 @@ use point_uncertainty::Source;
 use statistics::quantile;
 
 use super::input::Usable;
-use super::summary::{ApartSummary, ContradictionSummary, Correction, CountedPoints, FuseSummary, SigmaSummary};
+use super::summary::{
+    ApartSummary, ContradictionSummary, Correction, CountedPoints, FuseSummary, SharedErrorSummary, SigmaSummary,
+};
 use super::thickness::thickness;
 use crate::request::FuseRequest;
 use crate::result::ResultCloud;
@@ -38,7 +41,13 @@ pub(crate) fn begin(asked: &FuseRequest, cloud: &ResultCloud, options: &FusionOp
 }
 
 /// What was found.
-pub(crate) fn finish(summary: &mut FuseSummary, usable: &Usable<'_>, moved: &[Point3<f64>], fused: &Fused) {
+pub(crate) fn finish(
+    summary: &mut FuseSummary,
+    usable: &Usable<'_>,
+    moved: &[Point3<f64>],
+    fused: &Fused,
+    options: &FusionOptions,
+) {
     let views = &usable.cloud.views;
     summary.points.fused = fused.surfel_of_point.iter().flatten().count();
     summary.fused_points = fused.surfels.len();
@@ -57,8 +66,10 @@ pub(crate) fn finish(summary: &mut FuseSummary, usable: &Usable<'_>, moved: &[Po
     summary.apart = apart.collect();
     summary.sigma = sigma(&fused.surfels);
     summary.thickness = thickness(usable, moved, fused);
-    summary.corrections = corrections(usable.cloud, fused);
-    findings(summary, fused);
+    let nodes = options.shared_error.map_or(0..0, |grid| grid.columns());
+    summary.shared_error = shared_error(fused, &nodes);
+    summary.corrections = corrections(usable.cloud, fused, &nodes);
+    findings(summary, fused, !nodes.is_empty());
     doubts(summary);
 }
 
@@ -132,7 +143,20 @@ fn sigma(surfels: &[Surfel]) -> Option<SigmaSummary> {
     })
 }
 
-fn corrections(cloud: &ResultCloud, fused: &Fused) -> Vec<Correction> {
+/// What was found of the error that all frames share; its nodes are these common errors.
+fn shared_error(fused: &Fused, nodes: &Range<usize>) -> Option<SharedErrorSummary> {
+    let found = fused.shared_error?;
+    let rms = |square: &dyn Fn(usize) -> f64| (nodes.clone().map(square).sum::<f64>() / nodes.len() as f64).sqrt();
+    Some(SharedErrorSummary {
+        sigma_at_1_m: found.sigma_per_m,
+        length_px: found.length_px,
+        evidence: found.evidence,
+        taken_off_rms_m: rms(&|at| fused.corrections[at].powi(2)),
+        sigma_after_rms_m: rms(&|at| fused.common.covariance()[(at, at)].max(0.0)),
+    })
+}
+
+fn corrections(cloud: &ResultCloud, fused: &Fused, nodes: &Range<usize>) -> Vec<Correction> {
     let sigma = |of: &point_uncertainty::CommonErrors, at: usize| of.covariance()[(at, at)].max(0.0).sqrt();
     let row = |(at, value): (usize, &f64)| {
         let error = &cloud.common.errors()[at];
@@ -144,10 +168,10 @@ fn corrections(cloud: &ResultCloud, fused: &Fused) -> Vec<Correction> {
             sigma_after: sigma(&fused.common, at),
         }
     };
-    fused.corrections.iter().enumerate().map(row).collect()
+    fused.corrections.iter().enumerate().filter(|(at, _)| !nodes.contains(at)).map(row).collect()
 }
 
-fn findings(summary: &mut FuseSummary, fused: &Fused) {
+fn findings(summary: &mut FuseSummary, fused: &Fused, is_depth_camera: bool) {
     let is_estimated = fused.corrections.iter().any(|value| *value != 0.0);
     summary.findings.push(match (summary.common_error_use, is_estimated) {
         ("as_stated", _) => {
@@ -159,6 +183,16 @@ fn findings(summary: &mut FuseSummary, fused: &Fused) {
         }
         (_, false) => "Nothing was found of the common errors, which stay as stated.".to_owned(),
     });
+    if let Some(shared) = &summary.shared_error {
+        summary.findings.push(format!(
+            "All frames share an error of the sensor: {:.1} mm at one metre in the root mean square, growing with the squared depth and alike \
+             over some {:.0} pixels. Surfaces that frames see in different pixels showed it; it was taken off.",
+            1e3 * shared.taken_off_rms_m,
+            shared.length_px
+        ));
+    } else if is_depth_camera {
+        summary.findings.push("No error that all frames of the sensor share shows on the surfaces.".to_owned());
+    }
     let single = fused.surfels.iter().filter(|surfel| surfel.frames.len() == 1).count();
     if single > 0 {
         let share = 100.0 * single as f64 / fused.surfels.len() as f64;

@@ -35,7 +35,10 @@ pub struct FuseSummary {
     pub sigma: Option<SigmaSummary>,
     /// How far points lie off the surfaces.
     pub thickness: Option<ThicknessSummary>,
-    /// What was found of the common errors.
+    /// The error that all frames of a depth camera share; missing where it was not looked for, or does not show.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub shared_error: Option<SharedErrorSummary>,
+    /// What was found of the other common errors.
     pub corrections: Vec<Correction>,
     /// What a reader should know, in sentences.
     pub findings: Vec<String>,
@@ -117,6 +120,21 @@ pub struct ThicknessSummary {
     pub noise_and_sensor_m: f64,
     /// Points that were counted: those of fused points of at least three.
     pub points: usize,
+}
+
+/// The error that all frames of a depth camera share, smooth over the image, in inverse depth: as depth it grows with the squared depth.
+#[derive(Debug, Clone, Copy, Default, Serialize)]
+pub struct SharedErrorSummary {
+    /// Standard deviation over cameras of that kind, as surfaces tell it: of a depth of one metre, metre.
+    pub sigma_at_1_m: f64,
+    /// Distance in the image at which the correlation is 1/e, pixel.
+    pub length_px: f64,
+    /// Logarithm of the likelihood of all that frames see together over that without the error.
+    pub evidence: f64,
+    /// Root mean square of what was taken off at the nodes of its grid, of a depth of one metre, metre.
+    pub taken_off_rms_m: f64,
+    /// The same of the standard deviations of what remains.
+    pub sigma_after_rms_m: f64,
 }
 
 /// What was found of one common error.

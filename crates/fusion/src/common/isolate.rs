@@ -5,17 +5,18 @@
 
 use nalgebra::{DMatrix, DVector};
 use point_uncertainty::{CommonErrors, PointErrors, Source};
-use statistics::{Distribution, holm};
+use statistics::{Distribution, holm, upper_median};
 
 use super::equations::{Equations, ties};
 use super::posterior::{Posterior, posterior};
-use crate::Result;
+use super::shared_error::shared_error;
 use crate::fuse::Task;
 use crate::input::{Observations, Registered, derivatives};
 use crate::lattice::Lattice;
-use crate::outcome::Apart;
+use crate::outcome::{Apart, SharedError};
 use crate::patches::{Patches, seeds};
 use crate::surfels::gather;
+use crate::{Error, Result};
 
 /// Times that places which do not fit are looked for.
 const ROUNDS: usize = 2;
@@ -56,6 +57,7 @@ fn stations(input: &Registered<'_>, errors: &dyn PointErrors, common: &CommonErr
 #[derive(Debug, Clone)]
 pub(crate) struct Conditioned {
     pub posterior: Posterior,
+    pub shared: Option<SharedError>,
     pub apart: Vec<Apart>,
     /// Frames of one layer share surfaces.
     pub layers: Vec<u32>,
@@ -66,7 +68,7 @@ impl Conditioned {
     pub fn nothing(frames: usize, common: &CommonErrors) -> Self {
         let covariance = common.covariance().clone();
         let values = DVector::zeros(covariance.nrows());
-        Self { posterior: Posterior { values, covariance }, apart: Vec::new(), layers: vec![0; frames] }
+        Self { posterior: Posterior { values, covariance }, shared: None, apart: Vec::new(), layers: vec![0; frames] }
     }
 }
 
@@ -83,28 +85,31 @@ pub(crate) fn condition(
 ) -> Result<Conditioned> {
     let Task { input, errors, options } = *task;
     let stations = stations(input, errors, common)?;
-    let Conditioned { posterior: before, mut apart, mut layers } = before.clone();
+    let Conditioned { posterior: before, mut apart, mut layers, .. } = before.clone();
     let lattice: &Lattice = &observations.lattice;
     loop {
         let seeds = seeds(patches, lattice, &layers, options.gate());
         let gathered = gather(observations, patches, &seeds, &layers, options.gate());
         let ties = ties(&gathered, observations, errors, common)?;
         let solve = |values: Option<&DVector<f64>>| {
-            let equations = Equations::new(&ties, common.errors().len(), values);
-            posterior(common.covariance(), &equations, &before.values)
+            let mut equations = Equations::new(&ties, common.errors().len(), values);
+            equations.right += &equations.normal * &before.values;
+            let (prior, shared) = shared_error(options.shared_error, common, &equations)?;
+            Ok::<_, Error>((posterior(&prior, &equations)?, shared))
         };
-        let mut posterior = solve(None)?;
+        let (mut posterior, mut shared) = solve(None)?;
         for _ in 0..ROUNDS {
-            posterior = solve(Some(&(&posterior.values - &before.values)))?;
+            (posterior, shared) = solve(Some(&(&posterior.values - &before.values)))?;
         }
+        let expected = if shared.is_some() { usual(&stations, &posterior, common.covariance()) } else { 1.0 };
         let p_values: Vec<f64> =
-            stations.iter().map(|station| p_value(station, &posterior, common.covariance())).collect();
+            stations.iter().map(|station| p_value(station, &posterior, common.covariance(), expected)).collect();
         let adjusted = holm(&p_values);
         let is_left = |at: &usize| adjusted[*at] < options.level && layers[stations[*at].frames[0] as usize] == 0;
         let statistic = |at: &usize| squares(&stations[*at], &posterior, common.covariance()).0;
         let worst =
             (0..stations.len()).filter(|_| judges).filter(is_left).max_by(|a, b| statistic(a).total_cmp(&statistic(b)));
-        let Some(worst) = worst else { return Ok(Conditioned { posterior, apart, layers }) };
+        let Some(worst) = worst else { return Ok(Conditioned { posterior, shared, apart, layers }) };
         let station = &stations[worst];
         let with = partners(station, &gathered);
         let shift = |column: &usize| (common.errors()[*column].name.clone(), posterior.values[*column]);
@@ -133,10 +138,21 @@ fn partners(station: &Station, gathered: &crate::surfels::Gathered) -> Vec<u32> 
     others
 }
 
-/// Probability of a pose's shift where its covariance is true; NaN where nothing tells.
-fn p_value(station: &Station, posterior: &Posterior, prior: &DMatrix<f64>) -> f64 {
+/// Probability of a pose's shift where its covariance is true, squares being expected so many times as large; NaN where nothing tells.
+fn p_value(station: &Station, posterior: &Posterior, prior: &DMatrix<f64>, expected: f64) -> f64 {
     let (squares, rank) = squares(station, posterior, prior);
-    if rank == 0 { f64::NAN } else { Distribution::ChiSquared { dof: rank as f64 }.survival(squares) }
+    if rank == 0 { f64::NAN } else { Distribution::ChiSquared { dof: rank as f64 }.survival(squares / expected) }
+}
+
+/// By how many times the squares of the poses' shifts exceed what is expected of them, in the median: poses that were found with an error that
+/// all frames share err with it, by more than is stated, and all of them.
+fn usual(stations: &[Station], posterior: &Posterior, prior: &DMatrix<f64>) -> f64 {
+    let ratio = |station: &Station| {
+        let (squares, rank) = squares(station, posterior, prior);
+        (rank > 0).then(|| squares / rank as f64)
+    };
+    let mut ratios: Vec<f64> = stations.iter().filter_map(ratio).collect();
+    if ratios.is_empty() { 1.0 } else { upper_median(&mut ratios).max(1.0) }
 }
 
 /// Sum of squares of the estimated shift over its expected scatter, prior less posterior, and its rank.

@@ -4,8 +4,10 @@ mod equations;
 mod isolate;
 mod posterior;
 mod rows;
+mod shared_error;
 mod split;
 
 pub(crate) use isolate::{Conditioned, condition};
 pub(crate) use rows::{Row, form, mean, rows};
+pub(crate) use shared_error::without_shared;
 pub(crate) use split::split;

@@ -15,8 +15,8 @@ pub(crate) struct Posterior {
     pub covariance: DMatrix<f64>,
 }
 
-/// `from` are the values that have been taken off the points of the equations.
-pub(crate) fn posterior(prior: &DMatrix<f64>, equations: &Equations, from: &DVector<f64>) -> Result<Posterior> {
+/// The right side of the equations is that of points that nothing has been taken off.
+pub(crate) fn posterior(prior: &DMatrix<f64>, equations: &Equations) -> Result<Posterior> {
     let size = prior.nrows();
     let root = root(prior)?;
     let mut normal = root.transpose() * &equations.normal * &root;
@@ -29,12 +29,11 @@ pub(crate) fn posterior(prior: &DMatrix<f64>, equations: &Equations, from: &DVec
     let inverse = DMatrix::from_vec(size, size, dense_matrices::inverse_of_cholesky(normal.as_slice(), size));
     let covariance = &root * inverse * root.transpose();
     let covariance = (&covariance + covariance.transpose()) * 0.5;
-    let right = &equations.right + &equations.normal * from;
-    Ok(Posterior { values: &covariance * right, covariance })
+    Ok(Posterior { values: &covariance * &equations.right, covariance })
 }
 
 /// `L` with `L Lᵀ` the covariance.
-fn root(covariance: &DMatrix<f64>) -> Result<DMatrix<f64>> {
+pub(super) fn root(covariance: &DMatrix<f64>) -> Result<DMatrix<f64>> {
     let size = covariance.nrows();
     let deviations: Vec<f64> = (0..size).map(|at| covariance[(at, at)].sqrt()).collect();
     let correlation = DMatrix::from_fn(size, size, |row, column| {

@@ -2,6 +2,7 @@
 
 #![allow(dead_code)]
 
+pub mod bent;
 pub mod judge;
 pub mod scene;
 pub mod survey;

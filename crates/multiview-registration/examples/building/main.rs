@@ -121,7 +121,8 @@ fn report(found: &StationRegistration, truth: &[Isometry3<f64>], begin: usize) {
     );
     let mut worst: Vec<usize> = (0..truth.len()).collect();
     worst.sort_by(|&a, &b| sigma(&found.covariance[b]).total_cmp(&sigma(&found.covariance[a])));
-    let words = worst.iter().take(5).map(|&k| format!("{}: {:.1} ± {:.1} mm", begin + k, off[k], sigma(&found.covariance[k])));
+    let words =
+        worst.iter().take(5).map(|&k| format!("{}: {:.1} ± {:.1} mm", begin + k, off[k], sigma(&found.covariance[k])));
     println!("  least known: {}", words.collect::<Vec<_>>().join(", "));
     let mut times: Vec<f64> =
         found.placements.stations.iter().map(|station| station.times_usual.unwrap_or(f64::NAN)).collect();

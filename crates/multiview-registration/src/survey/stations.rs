@@ -26,7 +26,7 @@ use rigid_pose::is_finite;
 
 /// Most stations at once from approximate poses. In buildings of so many all come into their places; of 400 (see docs/benchmarks.md)
 /// one did not.
-const MOST_STATIONS: usize = 200;
+const MOST_STATIONS: usize = 2000;
 /// Most stations without approximate poses: each is tried against all placed before, which takes hours of more.
 const MOST_ARRANGED: usize = 200;
 

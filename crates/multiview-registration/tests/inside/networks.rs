@@ -1,0 +1,67 @@
+//! Many stations of a building with small frames, through all that is done with networks of many stations.
+
+#![allow(clippy::unwrap_used)]
+
+use rigid_pose::pose_difference;
+
+use super::*;
+use crate::survey::joint_covariance::JointCovariance;
+use plan::{Building, Camera};
+
+#[path = "../../examples/building/plan.rs"]
+mod plan;
+
+/// A room, the way to it and the beginning of the next one.
+const STATIONS: usize = 32;
+const CAMERA: Camera = Camera { width: 72, height: 54 };
+
+struct Survey {
+    building: Building,
+    clouds: Vec<Cloud>,
+    start: Vec<Isometry3<f64>>,
+}
+
+impl Survey {
+    fn new(seed: u64) -> Self {
+        let building = Building::new(STATIONS, seed);
+        let clouds = (0..STATIONS).map(|station| building.cloud(station, CAMERA, seed)).collect();
+        let start = building.approximate(0.08, 2.0, seed);
+        Self { building, clouds, start }
+    }
+
+    fn brought(&self, whole: bool) -> Brought {
+        let options = StationRegistrationOptions::default();
+        let start = Start::Poses(&self.start);
+        brought_together(&self.clouds, start, Datum::Station(0), (&options, whole), &|_, _| {}).unwrap()
+    }
+}
+
+fn joint(brought: &Brought) -> JointCovariance {
+    JointCovariance::new(brought.adjusted.cofactors.clone(), brought.adjusted.variance_factor())
+}
+
+#[test]
+fn many_stations_come_where_the_whole_matrix_has_them() {
+    let survey = Survey::new(3);
+    let (sparse, dense) = (survey.brought(false), survey.brought(true));
+    let (poses, truth) = (&sparse.adjusted.state.poses, &survey.building.stations);
+    let (of_sparse, of_dense) = (joint(&sparse), joint(&dense));
+    let mut squares = 0.0;
+    for station in 1..STATIONS {
+        let (pose, covariance) = of_sparse.relative_pose(poses, 0, station);
+        let (other, of_other) = of_dense.relative_pose(&dense.adjusted.state.poses, 0, station);
+        let factor = covariance.cholesky().unwrap();
+        let square = |off: nalgebra::Vector6<f64>| off.dot(&factor.solve(&off));
+        squares += square(pose_difference(&pose, &(truth[0].inverse() * truth[station]))) / (STATIONS - 1) as f64;
+        // Points near edges go to one plane or the other as rounds happened to end: some tenths of the deviations.
+        let apart = square(pose_difference(&pose, &other));
+        assert!(apart < 2.0, "{station}: {apart}");
+        let ratio = covariance.trace() / of_other.trace();
+        assert!((0.8..1.25).contains(&ratio), "{station}: {ratio}");
+    }
+    println!("{squares}");
+    // Six are expected; the stations share their datum.
+    assert!((2.0..14.0).contains(&squares), "{squares}");
+    assert!(sparse.adjusted.settled);
+    assert_eq!(sparse.placements.unwrap().doubtful().count(), 0);
+}

@@ -26,12 +26,14 @@ const OFF: f64 = 0.1;
 /// Stations on either side of what little holds that tell where they began.
 const NEAREST: usize = 24;
 /// Standard deviations by which more points must lie on planes elsewhere, or fewer contradict: beyond chance, even if points come in
-/// groups of some five.
+/// groups of some five. Elsewhere stations of simulated buildings that are right come to 2.1, those 4 to 14 cm off from 19 to 42; with less,
+/// right ones are moved and doubted.
 const SIGMAS: f64 = 5.0;
-/// By which the other of the two may speak against it.
+/// By which the other of the two may speak against it: as often as one time in forty by chance.
 const AGAINST_IT: f64 = 2.0;
-/// Points that contradict below which a place is not looked at more closely, and by how many points on planes each of them outweighs.
+/// Points that contradict below which no place is better by so much: closer looks would only take time.
 const FEWEST_AGAINST: usize = 20;
+/// How many points on planes each of them outweighs where several places are better: of each eighth point contradictions are counted.
 const AGAINST: f64 = 4.0;
 /// Standard deviations from where it began within which a station is sought: one in a million is farther off along some axis.
 const BEGUN: f64 = 5.0;

@@ -65,3 +65,28 @@ fn many_stations_come_where_the_whole_matrix_has_them() {
     assert!(sparse.adjusted.settled);
     assert_eq!(sparse.placements.unwrap().doubtful().count(), 0);
 }
+
+#[test]
+fn a_station_in_a_wrong_place_is_named_and_put_back() {
+    let survey = Survey::new(4);
+    let Brought { adjusted, start, points, radius_m, patch_m, .. } = survey.brought(false);
+    let options = StationRegistrationOptions::default();
+    let (prior, names) = prior_of(&options).unwrap();
+    let network = network(Datum::Station(0), radius_m, &options, (&prior, &names), false);
+    let places = Places::new(&adjusted, &points, &start, &network, (patch_m, START_ERROR * radius_m));
+    let right = &adjusted.state.poses;
+    assert!(places.looked_through.doubtful(right).is_empty());
+    let wrong = 14;
+    let moved_by = |x: f64, y: f64| {
+        let mut poses = right.clone();
+        poses[wrong] = Isometry3::translation(x, y, 0.0) * poses[wrong];
+        poses
+    };
+    // By 16 cm: three pixels.
+    assert_eq!(places.looked_through.doubtful(&moved_by(0.12, 0.1)), [wrong]);
+    let mut poses = moved_by(0.05, 0.04);
+    let moved = places.improved(&mut poses).unwrap();
+    assert!(moved.contains(&wrong) && moved.len() == 1, "{moved:?}");
+    let off_m = (poses[wrong].translation.vector - right[wrong].translation.vector).norm();
+    assert!(off_m < 0.01, "{off_m}");
+}

@@ -152,8 +152,21 @@ impl<'a> Sought<'a> {
         this
     }
 
-    /// Where they fit better than now.
+    /// Where a single station fits better than now.
     pub(crate) fn better(&self, poses: &[Isometry3<f64>]) -> Result<Option<Isometry3<f64>>> {
+        let now = Judged::new(self, self.at(&Isometry3::identity(), 0.0, 1), poses);
+        let all = self.points.iter().flat_map(|points| &points.sigma).filter(|sigma| !sigma.is_nan()).count();
+        let others = self.others(now.against >= FEWEST_AGAINST, poses)?;
+        let better = others.into_iter().map(|place| Judged::new(self, place, poses)).filter(|other| {
+            let may_be = self.may_have_begun(&other.place.motion);
+            other.contradicts_less(&now, all) || (may_be && other.explains_more(&now, all))
+        });
+        let best = better.reduce(|a, b| if b.worth() > a.worth() { b } else { a });
+        Ok(best.map(|best| best.place.motion))
+    }
+
+    /// Places along what its points tell least that deserve a closer look.
+    fn others(&self, is_contradicted: bool, poses: &[Isometry3<f64>]) -> Result<Vec<Place>> {
         let none = Isometry3::identity();
         let rough = self.at(&none, 0.0, STRIDE);
         let slide = self.weakest(&rough.normal)?;
@@ -161,28 +174,22 @@ impl<'a> Sought<'a> {
         let steps = (self.places.reach_m / step_m).ceil() as i32;
         let slides = (-steps..=steps).filter(|step| *step != 0);
         let motions = slides.map(|step| self.motion(&(slide * (f64::from(step) * step_m))));
-        let now = Judged::new(self, self.at(&none, 0.0, 1), poses);
-        let is_contradicted = now.against >= FEWEST_AGAINST;
         let wanted = motions.filter(|motion| is_contradicted || self.may_have_begun(motion));
         let mut others: Vec<Place> = wanted.map(|motion| self.at(&motion, 0.0, STRIDE)).collect();
         others.retain(|place| place.points as f64 > KEPT * rough.points as f64);
         // Stable: of equal ones the first.
         others.sort_by_key(|place| Reverse(place.points));
         let mut from: Vec<Isometry3<f64>> = others.iter().take(REFINED).map(|place| place.motion).collect();
+        let mut slid = Vec::new();
         if is_contradicted {
             others.sort_by_cached_key(|place| self.against(&place.motion, poses));
-            from.extend(others.iter().take(REFINED).map(|place| place.motion));
+            slid.extend(others.iter().take(REFINED).map(|place| place.motion));
         }
         // Among planes that hold still the station may leave what held it where it is.
-        from.push(none);
-        let refined = from.iter().map(|motion| Judged::new(self, self.refined(motion), poses));
-        let all = self.points.iter().flat_map(|points| &points.sigma).filter(|sigma| !sigma.is_nan()).count();
-        let better = refined.filter(|other| {
-            let may_be = self.may_have_begun(&other.place.motion);
-            other.contradicts_less(&now, all) || (may_be && other.explains_more(&now, all))
-        });
-        let best = better.reduce(|a, b| if b.worth() > a.worth() { b } else { a });
-        Ok(best.map(|best| best.place.motion))
+        from.extend(slid.iter().chain([&none]));
+        // Planes that are met at the wrong place draw a station there even from a slide that hardly anything contradicts.
+        let refined = from.iter().map(|motion| self.refined(motion));
+        Ok(refined.chain(slid.iter().map(|motion| self.at(motion, 0.0, 1))).collect())
     }
 
     /// Points that contradict where a single station is after a motion.

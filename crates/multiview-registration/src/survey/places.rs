@@ -64,7 +64,7 @@ impl<'a> Places<'a> {
         };
         let tiles: Vec<Vec<u32>> = (0..points.len()).into_par_iter().map(tiles).collect();
         let looked_through = LookedThrough::new(points, &tiles, pairs(adjusted).map(|(ends, _)| ends));
-        Self { known_m, adjusted, points, network, start, size_m, reach_m, wide, members, looked_through }
+        Self { adjusted, points, network, start, size_m, known_m, reach_m, wide, members, looked_through }
     }
 
     /// Moves stations to where they fit better; returns which.

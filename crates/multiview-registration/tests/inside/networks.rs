@@ -11,22 +11,24 @@ use plan::{Building, Camera};
 #[path = "../../examples/building/plan.rs"]
 mod plan;
 
-/// A room, the way to it and the beginning of the next one.
-const STATIONS: usize = 32;
-const CAMERA: Camera = Camera { width: 72, height: 54 };
+/// Of a building of 44 stations those of one room: few and small enough for a test, and sound in the dense way.
+const FIRST: usize = 8;
+const STATIONS: usize = 14;
+const CAMERA: Camera = Camera { width: 112, height: 84 };
 
 struct Survey {
-    building: Building,
+    truth: Vec<Isometry3<f64>>,
     clouds: Vec<Cloud>,
     start: Vec<Isometry3<f64>>,
 }
 
 impl Survey {
     fn new(seed: u64) -> Self {
-        let building = Building::new(STATIONS, seed);
-        let clouds = (0..STATIONS).map(|station| building.cloud(station, CAMERA, seed)).collect();
-        let start = building.approximate(0.08, 2.0, seed);
-        Self { building, clouds, start }
+        let building = Building::new(44, seed);
+        let part = FIRST..FIRST + STATIONS;
+        let clouds = part.clone().map(|station| building.cloud(station, CAMERA, seed)).collect();
+        let start = building.approximate(0.1, 3.0, seed)[part.clone()].to_vec();
+        Self { truth: building.stations[part].to_vec(), clouds, start }
     }
 
     fn brought(&self, whole: bool) -> Brought {
@@ -44,7 +46,7 @@ fn joint(brought: &Brought) -> JointCovariance {
 fn many_stations_come_where_the_whole_matrix_has_them() {
     let survey = Survey::new(3);
     let (sparse, dense) = (survey.brought(false), survey.brought(true));
-    let (poses, truth) = (&sparse.adjusted.state.poses, &survey.building.stations);
+    let (poses, truth) = (&sparse.adjusted.state.poses, &survey.truth);
     let (of_sparse, of_dense) = (joint(&sparse), joint(&dense));
     let mut squares = 0.0;
     for station in 1..STATIONS {
@@ -59,7 +61,6 @@ fn many_stations_come_where_the_whole_matrix_has_them() {
         let ratio = covariance.trace() / of_other.trace();
         assert!((0.8..1.25).contains(&ratio), "{station}: {ratio}");
     }
-    println!("{squares}");
     // Six are expected; the stations share their datum.
     assert!((2.0..14.0).contains(&squares), "{squares}");
     assert!(sparse.adjusted.settled);
@@ -68,7 +69,7 @@ fn many_stations_come_where_the_whole_matrix_has_them() {
 
 #[test]
 fn a_station_in_a_wrong_place_is_named_and_put_back() {
-    let survey = Survey::new(4);
+    let survey = Survey::new(3);
     let Brought { adjusted, start, points, radius_m, patch_m, .. } = survey.brought(false);
     let options = StationRegistrationOptions::default();
     let (prior, names) = prior_of(&options).unwrap();
@@ -76,7 +77,7 @@ fn a_station_in_a_wrong_place_is_named_and_put_back() {
     let places = Places::new(&adjusted, &points, &start, &network, (patch_m, START_ERROR * radius_m));
     let right = &adjusted.state.poses;
     assert!(places.looked_through.doubtful(right).is_empty());
-    let wrong = 14;
+    let wrong = 7;
     let moved_by = |x: f64, y: f64| {
         let mut poses = right.clone();
         poses[wrong] = Isometry3::translation(x, y, 0.0) * poses[wrong];
@@ -86,7 +87,7 @@ fn a_station_in_a_wrong_place_is_named_and_put_back() {
     assert_eq!(places.looked_through.doubtful(&moved_by(0.12, 0.1)), [wrong]);
     let mut poses = moved_by(0.05, 0.04);
     let moved = places.improved(&mut poses).unwrap();
-    assert!(moved.contains(&wrong) && moved.len() == 1, "{moved:?}");
+    assert_eq!(moved.into_iter().collect::<Vec<usize>>(), [wrong]);
     let off_m = (poses[wrong].translation.vector - right[wrong].translation.vector).norm();
     assert!(off_m < 0.01, "{off_m}");
 }

@@ -23,3 +23,4 @@ pub use rigid_pose;
 pub use verification::among::{
     Placed, agreement, agreement_of_rooms, evidence, in_voxels, refined_among, with_one_voxel,
 };
+pub use verification::free_space::FreeSpace;

@@ -1,5 +1,9 @@
 #![doc = include_str!("../README.md")]
 
+// The building of the examples stands among the tests inside the crate as well.
+#[cfg(test)]
+extern crate self as multiview_registration;
+
 mod adjustment;
 mod agreement;
 mod error;

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! cargo run --release -p multiview-registration --example building
-//! cargo run --release -p multiview-registration --example building -- STATIONS [poses|scene] [seed] [width of a frame, pixels]
+//! cargo run --release -p multiview-registration --example building -- STATIONS [poses|scene] [seed] [width of a frame, pixels] [first..end]
 //! ```
 #![allow(clippy::print_stdout)]
 
@@ -10,6 +10,7 @@ mod plan;
 mod statistic;
 
 use std::error::Error;
+use std::ops::Range;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use multiview_registration::nalgebra::{Isometry3, Matrix6};
@@ -24,6 +25,9 @@ use rayon::prelude::*;
 /// How far coarse poses are off.
 const OFF_M: f64 = 0.1;
 const OFF_DEG: f64 = 3.0;
+/// A position that is off by more than this many of its standard deviations and by more than this length is wrong, millimetre.
+const WRONG_SIGMAS: f64 = 4.0;
+const WRONG_MM: f64 = 5.0;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let argument = |k: usize| std::env::args().nth(k);
@@ -37,7 +41,14 @@ fn main() -> Result<(), Box<dyn Error>> {
         print!("{}", Building::new(count, seed).description(camera));
         return Ok(());
     }
-    registered(count, seed, camera).map(|_| ())
+    let part = argument(5).map(|text| part(&text)).transpose()?.unwrap_or(0..count);
+    registered(count, seed, camera, part).map(|_| ())
+}
+
+/// The stations of a part of the building: what goes wrong among many shows the same way, and sooner, among those about it.
+fn part(text: &str) -> Result<Range<usize>, Box<dyn Error>> {
+    let (first, end) = text.split_once("..").ok_or("a part is first..end")?;
+    Ok(first.parse()?..end.parse()?)
 }
 
 /// What a registration took, and how honest it is.
@@ -50,12 +61,15 @@ struct Figures {
     squares_of_next: f64,
 }
 
-fn registered(count: usize, seed: u64, camera: Camera) -> Result<Figures, Box<dyn Error>> {
-    let building = Building::new(count, seed);
-    let clouds: Vec<Cloud> = (0..count).into_par_iter().map(|station| building.cloud(station, camera, seed)).collect();
+fn registered(all: usize, seed: u64, camera: Camera, part: Range<usize>) -> Result<Figures, Box<dyn Error>> {
+    let building = Building::new(all, seed);
+    let truth = &building.stations[part.clone()];
+    let count = truth.len();
+    let clouds: Vec<Cloud> =
+        part.clone().into_par_iter().map(|station| building.cloud(station, camera, seed)).collect();
     let points: usize = clouds.iter().map(Cloud::len).sum();
     let simulated_mb = peak_memory_mb();
-    let approximate = building.approximate(OFF_M, OFF_DEG, seed);
+    let approximate = &building.approximate(OFF_M, OFF_DEG, seed)[part.clone()];
     let before = cpu_seconds();
     let options = StationRegistrationOptions::default();
     let (in_rounds, hundredths) = (AtomicU64::new(0), AtomicU64::new(0));
@@ -63,7 +77,7 @@ fn registered(count: usize, seed: u64, camera: Camera) -> Result<Figures, Box<dy
         in_rounds.fetch_max(peak_memory_mb() as u64, Ordering::Relaxed);
         hundredths.fetch_max((100.0 * (cpu_seconds() - before)) as u64, Ordering::Relaxed);
     };
-    let found = register_stations(&clouds, Start::Poses(&approximate), Datum::Station(0), &options, &progress)?;
+    let found = register_stations(&clouds, Start::Poses(approximate), Datum::Station(0), &options, &progress)?;
     let (seconds, most_mb) = (cpu_seconds() - before, peak_memory_mb());
     println!(
         "{count} stations, {:.1} million points: {seconds:.1} s of processor time, {:.3} s a station, {:.1} s of it until the last round; at \
@@ -73,14 +87,14 @@ fn registered(count: usize, seed: u64, camera: Camera) -> Result<Figures, Box<dy
         hundredths.load(Ordering::Relaxed) as f64 / 100.0,
         in_rounds.load(Ordering::Relaxed)
     );
-    report(&found, &building.stations);
+    report(&found, truth, part.start);
     let Effort { pairs_tried, filled_blocks } = found.effort;
-    let squares_of_next = mean(&errors(&found, &building.stations, &|k| k - 1).1);
+    let squares_of_next = mean(&errors(&found, truth, &|k| k - 1).1);
     Ok(Figures { seconds, most_mb, pairs_tried, filled_blocks, squares_of_next })
 }
 
-/// Errors against the truth.
-fn report(found: &StationRegistration, truth: &[Isometry3<f64>]) {
+/// Errors against the truth; the stations are counted from `begin`.
+fn report(found: &StationRegistration, truth: &[Isometry3<f64>], begin: usize) {
     let world = truth[0] * found.world_from_station[0].inverse();
     let off: Vec<f64> = found
         .world_from_station
@@ -107,7 +121,8 @@ fn report(found: &StationRegistration, truth: &[Isometry3<f64>]) {
     );
     let mut worst: Vec<usize> = (0..truth.len()).collect();
     worst.sort_by(|&a, &b| sigma(&found.covariance[b]).total_cmp(&sigma(&found.covariance[a])));
-    let words = worst.iter().take(5).map(|&k| format!("{k}: {:.1} ± {:.1} mm", off[k], sigma(&found.covariance[k])));
+    let words =
+        worst.iter().take(5).map(|&k| format!("{}: {:.1} ± {:.1} mm", begin + k, off[k], sigma(&found.covariance[k])));
     println!("  least known: {}", words.collect::<Vec<_>>().join(", "));
     let mut times: Vec<f64> =
         found.placements.stations.iter().map(|station| station.times_usual.unwrap_or(f64::NAN)).collect();
@@ -131,8 +146,30 @@ fn report(found: &StationRegistration, truth: &[Isometry3<f64>]) {
         found.rounds,
         if found.settled { "" } else { " (not settled)" },
         found.undetermined.len(),
-        found.placements.doubtful().collect::<Vec<_>>()
+        found.placements.doubtful().map(|k| begin + k).collect::<Vec<_>>()
     );
+    let named = |k: usize| {
+        found.placements.doubtful().any(|other| other == k) || found.undetermined.iter().any(|other| other.station == k)
+    };
+    let wrong = (1..truth.len()).filter(|&k| off[k] > WRONG_MM && deviations(found, truth, 0, k) > WRONG_SIGMAS);
+    for k in wrong {
+        println!(
+            "  wrong: {}, {:.1} mm, {:.1} deviations off the first, {:.1} off the one before{}",
+            begin + k,
+            off[k],
+            deviations(found, truth, 0, k),
+            deviations(found, truth, k - 1, k),
+            if named(k) { "" } else { ", and NOT named" }
+        );
+    }
+}
+
+/// How far a position is off that of another station, in standard deviations.
+fn deviations(found: &StationRegistration, truth: &[Isometry3<f64>], other: usize, station: usize) -> f64 {
+    let Ok((pose, covariance)) = found.relative_pose(other, station) else { return f64::NAN };
+    let off = (truth[other].inverse() * truth[station]).translation.vector - pose.translation.vector;
+    let factor = covariance.fixed_view::<3, 3>(0, 0).into_owned().cholesky();
+    factor.map_or(f64::NAN, |factor| off.dot(&factor.solve(&off)).sqrt())
 }
 
 /// Errors of the positions relative to another station, millimetre, and the normalised squares of the poses.

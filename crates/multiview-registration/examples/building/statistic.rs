@@ -17,7 +17,7 @@ const SQUARES: [f64; 2] = [4.0, 9.0];
 pub fn run() -> Result<(), Box<dyn Error>> {
     let mut all: Vec<Figures> = Vec::new();
     for count in SIZES {
-        all.push(registered(count, 1, Camera { width: 160, height: 120 })?);
+        all.push(registered(count, 1, Camera { width: 160, height: 120 }, 0..count)?);
     }
     let [.., before, last] = all.as_slice() else { return Ok(()) };
     let growth = last.seconds / before.seconds;

@@ -28,7 +28,7 @@ const CANDIDATES: usize = 8;
 /// Median length of a vector of three components of unit variance.
 const MEDIAN_OF_THREE: f64 = 1.538_172;
 /// Part of a patch that start poses are not taken to be better known than: from there the last rounds find their way.
-const KNOWN: f64 = 0.25;
+pub(crate) const KNOWN: f64 = 0.25;
 
 /// Derivatives of the patches of each station by all parameters, patch by patch.
 pub(crate) type PatchDerivatives = Vec<Vec<[f64; 3]>>;
@@ -200,15 +200,15 @@ fn scale(scene: &Scene<'_>, pairs_in_contact: &[PairContacts], poses: &[Isometry
 
 /// How well start poses are known: standard deviations of a component of the position, metre, and of the attitude, radian.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Known {
-    position_m: f64,
+pub(crate) struct Known {
+    pub position_m: f64,
     attitude_rad: f64,
 }
 
 impl Known {
     /// From how far stations have moved since: half of them no farther than `MEDIAN_OF_THREE` deviations. Those that have slid to
     /// where they should not be are fewer.
-    fn estimated(start: &[Isometry3<f64>], now: &[Isometry3<f64>], least: Self, most: Self) -> Self {
+    pub(crate) fn estimated(start: &[Isometry3<f64>], now: &[Isometry3<f64>], least: Self, most: Self) -> Self {
         let moved = |part: usize| {
             let norm = |(a, b): (&Isometry3<f64>, &Isometry3<f64>)| pose_difference(a, b).fixed_rows::<3>(part).norm();
             upper_median(&mut start.iter().zip(now).map(norm).collect::<Vec<f64>>()) / MEDIAN_OF_THREE
@@ -220,7 +220,7 @@ impl Known {
     }
 
     /// The same length for positions and for what is at this distance.
-    fn at(length_m: f64, radius_m: f64) -> Self {
+    pub(crate) fn at(length_m: f64, radius_m: f64) -> Self {
         Self { position_m: length_m, attitude_rad: length_m / radius_m }
     }
 }

@@ -113,6 +113,12 @@ impl Adjusted {
         self.factor
     }
 
+    /// Of many stations that factor is found once, at the end of all rounds.
+    pub(crate) fn with_factor(mut self) -> Self {
+        self.factor = self.factor_on(&self.shared_planes);
+        self
+    }
+
     fn factor_of_tiles(&self) -> f64 {
         self.sigma0().map_or(1.0, |sigma0| sigma0.powi(2).max(1.0))
     }
@@ -177,7 +183,8 @@ impl Finish<'_> {
             (self.progress)(round);
             let settled = off_m.is_none() && self.settles(&before, &state, &adjusted, &known);
             if settled || round >= self.most_rounds {
-                let factor = adjusted.factor_on(&known);
+                let whole = self.network.whole;
+                let factor = if whole { adjusted.factor_on(&known) } else { adjusted.factor_of_tiles() };
                 let common = Common::new(state.poses.len(), &adjusted.means);
                 let shared_planes = known;
                 return Ok(Adjusted {

@@ -19,6 +19,9 @@ const SIDES: [usize; 4] = [2, 4, 8, usize::MAX];
 /// Probability at which independent tiles pass for ones that share errors, at each size of blocks.
 const LEVEL: f64 = 1e-3;
 
+/// Stations of which all are looked at. Of more only so many: of each the whole factor is needed.
+const MANY: usize = 200;
+
 /// What an adjustment leaves of the tiles.
 pub(crate) struct Residuals<'a> {
     pub shared_planes: &'a [SharedPlane],
@@ -67,11 +70,16 @@ impl Residuals<'_> {
     /// Factor of the variances that the errors shared by tiles ask for; at least that of single tiles.
     pub(crate) fn factor(&self) -> f64 {
         let mut largest = self.of_tiles;
+        let one_of = (self.poses.len() / MANY).max(1);
         for side in SIDES {
-            let (mut free, mut squares) = (0.0, 0.0);
+            let (mut free, mut squares, mut counted) = (0.0, 0.0, 0);
             for (shared_plane, means) in self.shared_planes.iter().zip(self.means) {
                 for block in self.blocks(shared_plane, means, side).values() {
-                    let (of_block, square) = self.squares(block);
+                    let looked_at = block.values().filter(|_| {
+                        counted += 1;
+                        counted % one_of == 0
+                    });
+                    let (of_block, square) = self.squares(looked_at, block.len());
                     free += of_block;
                     squares += square;
                 }
@@ -129,12 +137,12 @@ impl Residuals<'_> {
         derivatives
     }
 
-    /// Degrees of freedom and sum of squares of a block: of k deviations from a mean k - 1 are free, less what the
+    /// Degrees of freedom and sum of squares of some of the stations of a block: of k deviations from a mean k - 1 are free, less what the
     /// adjustment takes of each by its unknowns.
-    fn squares(&self, block: &Block) -> (f64, f64) {
-        let share = (block.len() as f64 - 1.0) / block.len() as f64;
+    fn squares<'b>(&self, some: impl Iterator<Item = &'b OfStation>, all: usize) -> (f64, f64) {
+        let share = (all as f64 - 1.0) / all as f64;
         let (mut free, mut squares) = (0.0, 0.0);
-        for of_station in block.values() {
+        for of_station in some {
             let taken = self.cofactors.variance(&of_station.derivatives);
             free += share * (1.0 - taken / (of_station.variance * self.of_tiles)).clamp(0.0, 1.0);
             squares += share * of_station.sum * of_station.sum / (of_station.variance * self.scatter.noise);

@@ -2,6 +2,7 @@
 
 pub(crate) mod alignments;
 pub(crate) mod judges;
+pub(crate) mod looked_through;
 pub(crate) mod loops;
 pub(crate) mod placement;
 pub(crate) mod sight;

@@ -78,7 +78,7 @@ pub(crate) struct Eliminated {
 
 impl<'a> SharedPlaneSums<'a> {
     pub(crate) fn tiles(&self) -> Range<usize> {
-        self.shared_plane.tiles.first..self.shared_plane.tiles.first + self.shared_plane.tiles.len()
+        self.shared_plane.tiles.numbers()
     }
 
     /// What these stations saw of the tiles, tile by tile and in each in the order of the stations; what has no weight is left out.

@@ -19,6 +19,9 @@ const GRAZING: f64 = 0.03;
 /// Standard deviations between the ranges of two shared planes below which they are not told apart.
 const APART: f64 = 7.0;
 
+/// The tile of a point that lies on none.
+pub(crate) const NOWHERE: u32 = u32::MAX;
+
 /// How points are given to shared planes.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Gate {
@@ -55,6 +58,14 @@ impl Wide {
         let extents = indices.iter().map(|&k| shared_planes[k].extent()).collect();
         Self { indices, extents }
     }
+
+    /// Those of them that meet a box and are wanted.
+    pub(crate) fn within(&self, things: &Extent, is_wanted: impl Fn(usize) -> bool) -> Self {
+        let all = self.indices.iter().zip(&self.extents);
+        let kept = all.filter(|(index, extent)| extent.meets(things, 0.0) && is_wanted(**index));
+        let (indices, extents) = kept.map(|(index, extent)| (*index, *extent)).unzip();
+        Self { indices, extents }
+    }
 }
 
 /// The points of small shared planes (shared plane, index in the cloud) of each station.
@@ -85,7 +96,8 @@ pub(crate) struct Sighting<'a> {
     eye: Vector3<f64>,
     shared_planes: &'a [SharedPlane],
     gate: Gate,
-    used: Vec<bool>,
+    /// The tile that each point lies on; `NOWHERE` for one that does not count.
+    tiles: Vec<u32>,
     hits: Vec<Hit>,
     sums: Sums,
     phi: Vec<f64>,
@@ -104,14 +116,19 @@ impl<'a> Sighting<'a> {
             eye: pose.translation.vector,
             shared_planes,
             gate,
-            used: vec![false; points.points.len()],
+            tiles: vec![NOWHERE; points.points.len()],
             hits: Vec::new(),
             sums: Sums::new(gate.parameters),
             phi: vec![1.0; 3 + gate.parameters],
         }
     }
 
-    pub(crate) fn sums(mut self, wide: &Wide, members: &[(u32, u32)]) -> Sums {
+    pub(crate) fn sums(self, wide: &Wide, members: &[(u32, u32)]) -> Sums {
+        self.sums_and_tiles(wide, members).0
+    }
+
+    /// The sums, and the tile that each point lies on.
+    pub(crate) fn sums_and_tiles(mut self, wide: &Wide, members: &[(u32, u32)]) -> (Sums, Vec<u32>) {
         let in_reach = self.in_reach(wide);
         let mut near = Vec::new();
         for block in &self.points.blocks {
@@ -121,7 +138,7 @@ impl<'a> Sighting<'a> {
                 if let Some(hit) = self.shared_plane_of(point, &direction, range_m, &near) {
                     let plane = &self.shared_planes[hit.shared_plane];
                     let rho = plane.normal.dot(&(self.eye + direction * range_m - plane.origin));
-                    self.used[point] = self.weighted(point, &hit, rho);
+                    self.weigh(point, &hit, rho);
                 }
             }
         }
@@ -130,7 +147,7 @@ impl<'a> Sighting<'a> {
         }
         self.sums.close();
         self.sums.free_derivatives_of_noise(self.gate.kernel);
-        self.sums
+        (self.sums, self.tiles)
     }
 
     /// How far from the middle of a block its points may meet a shared plane, metre.
@@ -222,7 +239,7 @@ impl<'a> Sighting<'a> {
 
     /// A point of a small shared plane.
     fn add_member(&mut self, point: usize, index: usize) {
-        if self.used.get(point) != Some(&false) {
+        if self.tiles.get(point) != Some(&NOWHERE) {
             return;
         }
         let (direction, range_m) = self.ray(point);
@@ -237,16 +254,16 @@ impl<'a> Sighting<'a> {
             range_m,
         };
         let rho = shared_plane.normal.dot(&(place - shared_plane.origin));
-        self.used[point] = self.weighted(point, &hit, rho);
+        self.weigh(point, &hit, rho);
     }
 
-    /// Adds a point at a distance from its shared plane; whether it counts.
-    fn weighted(&mut self, point: usize, hit: &Hit, rho: f64) -> bool {
+    /// Adds a point at a distance from its shared plane, if it counts there.
+    fn weigh(&mut self, point: usize, hit: &Hit, rho: f64) {
         let sigma = self.sigma(point, hit.cosine);
         let whitened = rho / sigma;
         // An unknown deviation is no weight.
         if whitened.is_nan() || whitened.abs() > TUKEY || !sigma.is_normal() {
-            return false;
+            return;
         }
         let weight = self.gate.kernel.weight(whitened) / sigma.powi(2);
         self.phi[1..3].copy_from_slice(&hit.place);
@@ -259,6 +276,6 @@ impl<'a> Sighting<'a> {
             }
         }
         self.sums.add(hit.tile, &self.phi, rho, weight);
-        true
+        self.tiles[point] = hit.tile as u32;
     }
 }

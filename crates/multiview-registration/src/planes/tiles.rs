@@ -59,6 +59,11 @@ impl Tiles {
         self.kinds.len()
     }
 
+    /// Their numbers among those of all shared planes.
+    pub(crate) fn numbers(&self) -> std::ops::Range<usize> {
+        self.first..self.first + self.len()
+    }
+
     fn index_of(&self, cell: [i64; 2]) -> Option<usize> {
         let (column, row) = (cell[0] - self.low[0], cell[1] - self.low[1]);
         let inside = column >= 0 && row >= 0 && column < self.columns as i64 && row < self.rows as i64;

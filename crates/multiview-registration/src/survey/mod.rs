@@ -8,5 +8,6 @@ pub(crate) mod pairs;
 pub(crate) mod places;
 pub(crate) mod point_residuals;
 pub(crate) mod registration;
+pub(crate) mod sought;
 pub(crate) mod stations;
 pub(crate) mod together;

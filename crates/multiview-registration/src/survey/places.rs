@@ -3,67 +3,46 @@
 //! Where little stands along a wall, the patches of the wide rounds may leave a station decimetres from its place, or all those beyond
 //! it, and shared planes that are not met there pull them no more. But their points tell: in the right place more of them lie on what
 //! the others saw.
-
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
 
-use nalgebra::{Isometry3, Matrix3, Matrix6, UnitQuaternion, Vector3, Vector6};
+use nalgebra::Isometry3;
 use rayon::prelude::*;
 
 use crate::adjustment::network::Network;
 use crate::adjustment::precision;
-use crate::adjustment::rounds::FEWEST_CONTACTS;
+use crate::adjustment::rounds::{FEWEST_CONTACTS, KNOWN, Known};
 use crate::adjustment::simultaneous::Adjusted;
+use crate::agreement::looked_through::LookedThrough;
 use crate::error::Result;
-use crate::planes::elimination::motion_of;
 use crate::planes::sightings::{Gate, Sighting, Wide, members};
 use crate::planes::sums::Sums;
-use crate::surfaces::points::StationPoints;
+use crate::surfaces::extents::Extent;
+use crate::surfaces::points::{Block, StationPoints};
 use crate::survey::joint_covariance::JointCovariance;
+use crate::survey::sought::Sought;
 use icp_registration::RobustKernel;
-use rigid_pose::eigen6;
 
 /// Points of a station that make a tile one that it saw.
 const FEWEST_POINTS: usize = 5;
-/// Steps of a slide, patches.
-const STEP: f64 = 0.25;
-/// Of so many points one tells which slides are worth refining: those that keep this share of what lies on planes now, and at most
-/// so many.
-const STRIDE: usize = 4;
-const KEPT: f64 = 0.97;
-const REFINED: usize = 3;
-/// Steps onto the planes, each with points given to them anew, and what poses may be off before the last, patches.
-const STEPS: usize = 4;
-const OFF: f64 = 0.1;
 /// Deviation of a relative pose beyond which two stations do not hold each other, patches: shared planes are joined within as much.
-const LOOSE: f64 = 0.05;
-/// Stations on either side of what little holds that tell where they began.
-const NEAREST: usize = 24;
-/// Standard deviations by which more points must lie on planes elsewhere: as probable as one in a million stations.
-const SIGMAS: f64 = 5.0;
+pub(crate) const LOOSE: f64 = 0.05;
 
 /// The planes of an adjustment, and where stations are sought among them.
 pub(crate) struct Places<'a> {
-    adjusted: &'a Adjusted,
-    points: &'a [StationPoints],
-    network: &'a Network<'a>,
+    pub adjusted: &'a Adjusted,
+    pub points: &'a [StationPoints],
+    pub network: &'a Network<'a>,
     /// Where stations began.
-    start: &'a [Isometry3<f64>],
-    size_m: f64,
+    pub start: &'a [Isometry3<f64>],
+    pub size_m: f64,
+    /// How well that is known, which how far all have moved tells.
+    pub known_m: f64,
     /// How far they are sought.
-    reach_m: f64,
-    wide: Wide,
-    members: Vec<Vec<(u32, u32)>>,
-}
-
-/// Stations that move as one, with how many of their points lie on what the others saw.
-struct Place {
-    /// Of all of them, in the world.
-    motion: Isometry3<f64>,
-    points: usize,
-    /// By shift and turn about their middle.
-    normal: Matrix6<f64>,
-    right: Vector6<f64>,
+    pub reach_m: f64,
+    pub wide: Wide,
+    pub members: Vec<Vec<(u32, u32)>>,
+    pub looked_through: LookedThrough,
 }
 
 impl<'a> Places<'a> {
@@ -76,7 +55,16 @@ impl<'a> Places<'a> {
     ) -> Self {
         let planes = &adjusted.shared_planes;
         let (wide, members) = (Wide::new(planes), members(points.len(), planes));
-        Self { adjusted, points, network, start, size_m, reach_m, wide, members }
+        let [least, most] = [KNOWN * size_m, reach_m].map(|length_m| Known::at(length_m, network.hold_m));
+        let known_m = Known::estimated(start, &adjusted.state.poses, least, most).position_m;
+        let gate = Gate { kernel: RobustKernel::Tukey, slack_m: 0.0, stride: 1, parameters: 0 };
+        let tiles = |station: usize| {
+            let sighting = Sighting::new(&points[station], &adjusted.state.poses[station], planes, gate);
+            sighting.sums_and_tiles(&wide, &members[station]).1
+        };
+        let tiles: Vec<Vec<u32>> = (0..points.len()).into_par_iter().map(tiles).collect();
+        let looked_through = LookedThrough::new(points, &tiles, pairs(adjusted).map(|(ends, _)| ends));
+        Self { adjusted, points, network, start, size_m, known_m, reach_m, wide, members, looked_through }
     }
 
     /// Moves stations to where they fit better; returns which.
@@ -88,7 +76,7 @@ impl<'a> Places<'a> {
             // What it alone saw says nothing.
             let own: Vec<usize> = self.seen(station).collect();
             let by_others = |tile: usize| by[tile] > u32::from(own.binary_search(&tile).is_ok());
-            let better = Sought::new(self, &[station], poses, &by_others).better()?;
+            let better = Sought::of_one(self, station, poses, &by_others).better(poses)?;
             Ok(better.map(|motion| (station, motion)))
         };
         let single = (0..poses.len()).into_par_iter().filter(|station| !moved.contains(station));
@@ -122,16 +110,22 @@ impl<'a> Places<'a> {
         Ok(moved)
     }
 
-    /// Tiles that a station saw, ascending.
-    fn seen(&self, station: usize) -> impl Iterator<Item = usize> + '_ {
-        let sums: &Sums = &self.adjusted.sums[station];
-        (0..sums.tiles()).filter(|slot| sums.count(*slot) >= FEWEST_POINTS).map(|slot| sums.tile(slot))
+    /// The box about what a station may see from anywhere within reach of a pose, turned about something this far away.
+    pub(crate) fn around(&self, station: usize, pose: &Isometry3<f64>, radius_m: f64) -> Extent {
+        let blocks = &self.points[station].blocks;
+        let far = |block: &Block| block.centre.coords.norm() + block.radius_m;
+        let farthest_m = blocks.iter().map(far).fold(0.0, f64::max);
+        // As far as sightings look about a block, and what it moves.
+        let reach_m =
+            |block: &Block| 3.0 * (block.radius_m + self.size_m) + self.reach_m * (1.0 + farthest_m / radius_m);
+        let boxes = blocks.iter().map(|block| Extent::about(&(pose * block.centre).coords, reach_m(block)));
+        boxes.reduce(|a, b| a.joined(&b)).unwrap_or_else(|| Extent::of(std::iter::empty()))
     }
 
-    /// Pairs of stations with enough tiles in common.
-    fn pairs(&self) -> impl Iterator<Item = ([usize; 2], usize)> + '_ {
-        let pairs = self.adjusted.common.pairs.iter().filter(|(_, tiles)| tiles.len() >= FEWEST_CONTACTS);
-        pairs.map(|(&(a, b), tiles)| ([a as usize, b as usize], tiles.len()))
+    /// Tiles that a station saw, ascending.
+    pub(crate) fn seen(&self, station: usize) -> impl Iterator<Item = usize> + '_ {
+        let sums: &Sums = &self.adjusted.sums[station];
+        (0..sums.tiles()).filter(|slot| sums.count(*slot) >= FEWEST_POINTS).map(|slot| sums.tile(slot))
     }
 
     /// Parts of the network within which pairs of stations leave no motion open.
@@ -143,7 +137,7 @@ impl<'a> Places<'a> {
             precision::undetermined(&pose, &covariance, self.network.hold_m, LOOSE * self.size_m).is_empty()
         };
         let mut part: Vec<usize> = (0..state.poses.len()).collect();
-        for (ends, _) in self.pairs() {
+        for (ends, _) in pairs(self.adjusted) {
             let [a, b] = ends.map(|end| root(&part, end));
             if a != b && holds(ends) {
                 part[a.max(b)] = a.min(b);
@@ -170,7 +164,7 @@ impl<'a> Places<'a> {
         let mut next = Some(first);
         while let Some(part) = next {
             order.push(part);
-            for (ends, tiles) in self.pairs() {
+            for (ends, tiles) in pairs(self.adjusted) {
                 let [a, b] = ends.map(|end| part_of[end]);
                 if a != b && (a == part || b == part) {
                     common[a + b - part] += tiles;
@@ -181,6 +175,12 @@ impl<'a> Places<'a> {
         }
         order
     }
+}
+
+/// Pairs of stations with enough tiles in common.
+fn pairs(adjusted: &Adjusted) -> impl Iterator<Item = ([usize; 2], usize)> + '_ {
+    let pairs = adjusted.common.pairs.iter().filter(|(_, tiles)| tiles.len() >= FEWEST_CONTACTS);
+    pairs.map(|(&(a, b), tiles)| ([a as usize, b as usize], tiles.len()))
 }
 
 /// The first of the stations that one belongs to.
@@ -194,142 +194,4 @@ fn root(part: &[usize], mut station: usize) -> usize {
 fn move_by(motion: &Isometry3<f64>, pose: &mut Isometry3<f64>) {
     *pose = motion * *pose;
     pose.rotation.renormalize();
-}
-
-/// Stations that move as one among what others saw.
-struct Sought<'a> {
-    places: &'a Places<'a>,
-    /// Those that saw something of that, and their poses.
-    stations: Vec<(usize, Isometry3<f64>)>,
-    middle: Vector3<f64>,
-    /// Distance at which turns count as lengths.
-    radius_m: f64,
-    by_others: &'a (dyn Fn(usize) -> bool + Sync),
-}
-
-impl<'a> Sought<'a> {
-    fn new(
-        places: &'a Places<'a>,
-        stations: &[usize],
-        poses: &[Isometry3<f64>],
-        by_others: &'a (dyn Fn(usize) -> bool + Sync),
-    ) -> Self {
-        let beside = |station: &&usize| stations.len() == 1 || places.seen(**station).any(by_others);
-        let stations: Vec<(usize, Isometry3<f64>)> =
-            stations.iter().filter(beside).map(|station| (*station, poses[*station])).collect();
-        let n = stations.len().max(1) as f64;
-        let middle = stations.iter().fold(Vector3::zeros(), |sum, (_, pose)| sum + pose.translation.vector / n);
-        let apart = stations.iter().map(|(_, pose)| (pose.translation.vector - middle).norm_squared() / n).sum::<f64>();
-        let radius_m = (apart + places.network.hold_m.powi(2)).sqrt();
-        Self { places, stations, middle, radius_m, by_others }
-    }
-
-    /// Where they fit better than now.
-    fn better(&self) -> Result<Option<Isometry3<f64>>> {
-        let rough = self.at(&Isometry3::identity(), 0.0, STRIDE);
-        let slide = self.weakest(&rough.normal)?;
-        let step_m = STEP * self.places.size_m;
-        let steps = (self.places.reach_m / step_m).ceil() as i32;
-        // The next place on either side leads here.
-        let slides = (-steps..=steps).filter(|step| step.abs() > 1);
-        let motions: Vec<Isometry3<f64>> =
-            slides.map(|step| self.motion(&(slide * (f64::from(step) * step_m)))).collect();
-        let mut others: Vec<Place> = motions.par_iter().map(|motion| self.at(motion, 0.0, STRIDE)).collect();
-        others.retain(|place| place.points as f64 > KEPT * rough.points as f64);
-        // Stable: of equal ones the first.
-        others.sort_by_key(|place| Reverse(place.points));
-        // Among planes that hold still the station may leave what held it where it is.
-        let from = std::iter::once(Isometry3::identity()).chain(others.iter().take(REFINED).map(|place| place.motion));
-        let refined = from.map(|motion| self.refined(&motion));
-        let Some(best) = refined.reduce(|a, b| if b.points > a.points { b } else { a }) else { return Ok(None) };
-        let now = self.at(&Isometry3::identity(), 0.0, 1);
-        let all: usize = self.stations.iter().map(|(station, _)| self.places.points[*station].points.len()).sum();
-        // So many may be explained by one of the two places alone.
-        let either = (2 * all).saturating_sub(best.points + now.points) as f64;
-        let is_better = best.points as f64 - now.points as f64 > SIGMAS * either.sqrt();
-        Ok(is_better.then_some(best.motion))
-    }
-
-    /// The motion of a part that little holds to where its stations began, on average, as against those beside it: shared planes tell
-    /// from there. `None` where it is there.
-    fn as_begun(&self, part: &[usize], placed: &[usize], poses: &[Isometry3<f64>]) -> Result<Option<Isometry3<f64>>> {
-        if self.stations.is_empty() || placed.is_empty() {
-            return Ok(None);
-        }
-        let slide = self.weakest(&self.at(&Isometry3::identity(), 0.0, 1).normal)?;
-        let shift = Vector3::new(slide[0], slide[1], slide[2]);
-        let began = |stations: &[usize]| {
-            let apart = |station: &usize| (poses[*station].translation.vector - self.middle).norm_squared();
-            let mut near = stations.to_vec();
-            near.sort_by(|a, b| apart(a).total_cmp(&apart(b)).then(a.cmp(b)));
-            near.truncate(NEAREST);
-            let place = |poses: &[Isometry3<f64>], station: &usize| poses[*station].translation.vector;
-            let off = |station: &usize| place(self.places.start, station) - place(poses, station);
-            near.iter().map(off).sum::<Vector3<f64>>() / near.len() as f64
-        };
-        // What turns more than it slides stays.
-        let back_m = shift.dot(&(began(part) - began(placed))) / shift.norm_squared().max(0.5);
-        Ok((back_m.abs() > LOOSE * self.places.size_m).then(|| self.motion(&(slide * back_m))))
-    }
-
-    /// The motion by shift and turn about the middle.
-    fn motion(&self, step: &Vector6<f64>) -> Isometry3<f64> {
-        let turn = UnitQuaternion::from_scaled_axis(Vector3::new(step[3], step[4], step[5]));
-        let shift = Vector3::new(step[0], step[1], step[2]);
-        Isometry3::from_parts((shift + self.middle - turn * self.middle).into(), turn)
-    }
-
-    /// The motion that the points tell least, turns as lengths at the radius.
-    fn weakest(&self, normal: &Matrix6<f64>) -> Result<Vector6<f64>> {
-        let scale = Vector6::from_fn(|k, _| if k < 3 { 1.0 } else { 1.0 / self.radius_m });
-        let scaled = Matrix6::from_fn(|r, c| normal[(r, c)] * scale[r] * scale[c]);
-        let (values, vectors) = eigen6(&scaled, "the normal equations of stations among others")?;
-        Ok(vectors.column(values.imin()).component_mul(&scale))
-    }
-
-    /// The points of the stations moved so, which may be off by some length.
-    fn at(&self, motion: &Isometry3<f64>, slack_m: f64, stride: usize) -> Place {
-        let planes = &self.places.adjusted.shared_planes;
-        let gate = Gate { kernel: RobustKernel::Tukey, slack_m, stride, parameters: 0 };
-        let mut place = Place { motion: *motion, points: 0, normal: Matrix6::zeros(), right: Vector6::zeros() };
-        for (station, pose) in &self.stations {
-            let pose = motion * pose;
-            let (points, members) = (&self.places.points[*station], &self.places.members[*station]);
-            let sums = Sighting::new(points, &pose, planes, gate).sums(&self.places.wide, members);
-            let (mut normal, mut right) = (Matrix6::zeros(), Vector6::zeros());
-            for slot in (0..sums.tiles()).filter(|slot| (self.by_others)(sums.tile(*slot))) {
-                let Some(own) = sums.at(slot) else { continue };
-                let plane = planes.partition_point(|plane| plane.tiles.first <= sums.tile(slot)) - 1;
-                let motion = motion_of(&planes[plane], &pose);
-                normal += motion * Matrix3::from_fn(|i, j| own.product(i, j)) * motion.transpose();
-                right += motion * Vector3::from_fn(|i, _| own.right(i));
-                place.points += sums.count(slot);
-            }
-            let by = self.tangent(&pose);
-            place.normal += by.transpose() * normal * by;
-            place.right += by.transpose() * right;
-        }
-        place
-    }
-
-    /// How the tangent of a pose follows shift and turn about the middle.
-    fn tangent(&self, pose: &Isometry3<f64>) -> Matrix6<f64> {
-        let mut by = Matrix6::identity();
-        by.fixed_view_mut::<3, 3>(0, 3).copy_from(&(self.middle - pose.translation.vector).cross_matrix());
-        by.fixed_view_mut::<3, 3>(3, 3).copy_from(&pose.rotation.inverse().to_rotation_matrix().into_inner());
-        by
-    }
-
-    /// The stations moved onto the planes.
-    fn refined(&self, from: &Isometry3<f64>) -> Place {
-        let hold_m = self.places.size_m / 2.0;
-        let mut motion = *from;
-        for _ in 0..STEPS {
-            let Place { mut normal, right, .. } = self.at(&motion, OFF * self.places.size_m, 1);
-            (0..6).for_each(|k| normal[(k, k)] += if k < 3 { hold_m } else { hold_m / self.radius_m }.powi(-2));
-            let Some(factor) = normal.cholesky() else { break };
-            motion = self.motion(&-factor.solve(&right)) * motion;
-        }
-        self.at(&motion, 0.0, 1)
-    }
 }

@@ -24,9 +24,9 @@ use crate::survey::together::{Brought, brought_together, is_whole, network, prio
 use point_cloud::Cloud;
 use rigid_pose::is_finite;
 
-/// Most stations at once from approximate poses. In buildings of so many all come into their places; of 400 (see docs/benchmarks.md)
-/// one did not.
-const MOST_STATIONS: usize = 200;
+/// Most stations at once from approximate poses. In buildings of so many (see docs/benchmarks.md) all come into their places, or are
+/// named; of more that has not been shown.
+const MOST_STATIONS: usize = 400;
 /// Most stations without approximate poses: each is tried against all placed before, which takes hours of more.
 const MOST_ARRANGED: usize = 200;
 

@@ -167,8 +167,9 @@ impl Again<'_> {
             let moved = places.improved(&mut poses)?;
             if (moved.is_empty() && adjusted.settled) || again == AGAIN {
                 let mut placements = judge_placements(self.stations, &adjusted.state.poses)?;
-                placements.doubt(moved.into_iter());
-                return Ok((adjusted, Some(placements)));
+                let doubtful = places.looked_through.doubtful(&adjusted.state.poses);
+                placements.doubt(moved.into_iter().chain(doubtful));
+                return Ok((adjusted.with_factor(), Some(placements)));
             }
             let mut state = State { poses, ..adjusted.state.clone() };
             let fixed = finish.network.fixed;
@@ -206,3 +207,7 @@ fn returned(adjusted: &Adjusted, start: &[Isometry3<f64>], network: &Network<'_>
     }
     any.then_some(state)
 }
+
+#[cfg(test)]
+#[path = "../../tests/inside/networks.rs"]
+mod tests;

@@ -1,0 +1,78 @@
+//! The space that a station looked through, as fine as its pixels.
+
+use nalgebra::Point3;
+
+/// The ranges up to which a station surely saw nothing, by direction: on the six faces of a cube about its viewpoint.
+#[derive(Debug, Clone)]
+pub struct FreeSpace {
+    /// Cells along the edge of a face.
+    edge: usize,
+    /// Metre; zero where nothing is known. A face in which nothing was seen is empty.
+    faces: [Vec<f32>; 6],
+}
+
+/// Most cells along the edge of a face, and those by which the angle between rays is found.
+const MOST: f64 = 512.0;
+const COARSE: usize = 32;
+/// Size of a cell, angles between neighbouring rays.
+const CELL: f64 = 1.2;
+
+impl FreeSpace {
+    /// From what was seen about a viewpoint at the origin: points, and the range up to which the ray of each is free, metre. Each direction
+    /// is as free as the least free of those about it: where the range jumps nothing is certain.
+    pub fn new(seen: &[(Point3<f64>, f64)]) -> Self {
+        let mut this = Self { edge: COARSE, faces: Default::default() };
+        this.fill(seen);
+        let filled = this.faces.iter().flatten().filter(|free_to_m| free_to_m.is_finite()).count();
+        this.edge =
+            ((COARSE as f64) * (seen.len() as f64 / filled.max(1) as f64).sqrt() / CELL).clamp(1.0, MOST) as usize;
+        this.fill(seen);
+        let edge = this.edge;
+        this.faces = this.faces.map(|cells| least_around(&cells, edge));
+        this
+    }
+
+    fn fill(&mut self, seen: &[(Point3<f64>, f64)]) {
+        self.faces = Default::default();
+        for (point, free_to_m) in seen.iter().filter(|(_, free_to_m)| *free_to_m > 0.0) {
+            let Some((face, cell)) = self.cell(point) else { continue };
+            let cells = &mut self.faces[face];
+            cells.resize(self.edge * self.edge, f32::INFINITY);
+            cells[cell] = cells[cell].min(*free_to_m as f32);
+        }
+    }
+
+    /// Whether the station looked through this place.
+    pub fn holds(&self, place: &Point3<f64>) -> bool {
+        let Some((face, cell)) = self.cell(place) else { return false };
+        self.faces[face].get(cell).is_some_and(|free_to_m| place.coords.norm() < f64::from(*free_to_m))
+    }
+
+    /// Face by the largest coordinate, cell by the other two.
+    fn cell(&self, point: &Point3<f64>) -> Option<(usize, usize)> {
+        let axis = point.coords.iamax();
+        let largest = point[axis].abs();
+        // NaN fails the comparison.
+        if !(largest > 0.0 && largest.is_finite()) {
+            return None;
+        }
+        let scale = 0.5 * self.edge as f64 / largest;
+        let place = |c: f64| (((c + largest) * scale) as usize).min(self.edge - 1);
+        let (u, v) = (place(point[(axis + 1) % 3]), place(point[(axis + 2) % 3]));
+        Some((2 * axis + usize::from(point[axis] < 0.0), v * self.edge + u))
+    }
+}
+
+/// The least of each cell and those about it; zero where it is not known itself.
+fn least_around(cells: &[f32], edge: usize) -> Vec<f32> {
+    let least = |(cell, own): (usize, &f32)| {
+        if own.is_infinite() {
+            return 0.0;
+        }
+        let (u, v) = (cell % edge, cell / edge);
+        let rows = v.saturating_sub(1)..=(v + 1).min(edge - 1);
+        let columns = u.saturating_sub(1)..=(u + 1).min(edge - 1);
+        rows.flat_map(|row| columns.clone().map(move |column| cells[row * edge + column])).fold(*own, f32::min)
+    };
+    cells.iter().enumerate().map(least).collect()
+}

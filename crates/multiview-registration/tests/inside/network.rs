@@ -1,0 +1,54 @@
+//! One step of many stations against that of few.
+
+#![allow(clippy::unwrap_used)]
+
+use nalgebra::{DMatrix, Vector3};
+
+use super::*;
+
+#[test]
+fn many_stations_come_where_few_do() {
+    let number = |k: usize| ((k * 7919 + 13) as f64 * 0.618_034).sin();
+    let vector = |k: usize| Vector3::new(number(k), number(k + 1), number(k + 2));
+    let poses: Vec<Isometry3<f64>> = (0..6).map(|k| Isometry3::new(3.0 * vector(5 * k), vector(7 * k + 3))).collect();
+    let pair = |target: usize, source: usize| {
+        let off = Isometry3::new(0.03 * vector(target + 9 * source), 0.02 * vector(4 * target + source));
+        let pose = poses[target].inverse() * poses[source];
+        // What was observed is off the present poses by centimetres.
+        let right = DVector::from_fn(6, |k, _| 300.0 * number(11 * target + 3 * source + k));
+        let rows =
+            DMatrix::from_fn(6, 6, |r, c| 1e4 * (f64::from(u8::from(r == c)) + 0.3 * number(r + 6 * c + target)));
+        let contacts = PairContacts { target, source, contacts: Vec::new() };
+        (contacts, Reduced { rows, right, pose: pose * off })
+    };
+    let all: Vec<(PairContacts, Reduced)> =
+        [(0, 1), (1, 2), (2, 3), (3, 4), (4, 5), (0, 5), (1, 4)].map(|(a, b)| pair(a, b)).into();
+    let pairs: Vec<(&PairContacts, Reduced)> = all.iter().map(|(pair, reduced)| (pair, reduced.clone())).collect();
+    let turn = MeasuredTurn {
+        first: 0,
+        second: 3,
+        first_from_second: poses[0].rotation.inverse()
+            * poses[3].rotation
+            * nalgebra::UnitQuaternion::from_scaled_axis(0.01 * vector(3)),
+        covariance: nalgebra::Matrix3::identity() * 1e-6,
+    };
+    let (prior, turns) = ((Vec::new(), Vec::new()), [turn]);
+    let network =
+        Network { fixed: 2, hold_m: 3.0, turn_rad: 1.0, names: &[], prior: &prior, turns: &turns, whole: true };
+    let state = State { poses: poses.clone(), parameters: Vec::new() };
+    let few = network.solve(&state, &pairs).unwrap();
+    assert!(largest_step(&state, &few, 3.0) > 0.02);
+    let off = |many: &State| {
+        // Nothing but the anchors holds the frame.
+        let moved = few.poses[2] * many.poses[2].inverse();
+        let poses = many.poses.iter().map(|pose| moved * pose).collect();
+        largest_step(&few, &State { poses, parameters: Vec::new() }, 3.0)
+    };
+    let anchors = Anchors { poses: &poses, factor: 1.0 };
+    let many = network.solve_sparse(&state, &pairs, &anchors).unwrap();
+    // Two steps of centimetres and degrees against as many as it takes: the next would be of third order.
+    assert!(off(&many) < 1e-4, "{}", off(&many));
+    // Few stations end at a step of a thousandth of a standard deviation (1e-4 m); rounding is far below.
+    let again = network.solve_sparse(&many, &pairs, &anchors).unwrap();
+    assert!(off(&again) < 1e-6, "{}", off(&again));
+}

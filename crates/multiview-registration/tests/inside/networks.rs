@@ -1,0 +1,104 @@
+//! Many stations of a building with small frames, through all that is done with networks of many stations.
+
+#![allow(clippy::unwrap_used)]
+
+use std::sync::OnceLock;
+
+use rigid_pose::pose_difference;
+
+use super::*;
+use crate::survey::joint_covariance::JointCovariance;
+use plan::{Building, Camera};
+
+#[path = "../../examples/building/plan.rs"]
+mod plan;
+
+/// Of a building of 44 stations those of one room: few and small enough for a test, and sound in the dense way.
+const FIRST: usize = 8;
+const STATIONS: usize = 14;
+const CAMERA: Camera = Camera { width: 112, height: 84 };
+
+struct Survey {
+    truth: Vec<Isometry3<f64>>,
+    clouds: Vec<Cloud>,
+    start: Vec<Isometry3<f64>>,
+}
+
+impl Survey {
+    fn new(seed: u64) -> Self {
+        let building = Building::new(44, seed);
+        let part = FIRST..FIRST + STATIONS;
+        let clouds = part.clone().map(|station| building.cloud(station, CAMERA, seed)).collect();
+        let start = building.approximate(0.1, 3.0, seed)[part.clone()].to_vec();
+        Self { truth: building.stations[part].to_vec(), clouds, start }
+    }
+
+    fn brought(&self, whole: bool) -> Brought {
+        let options = StationRegistrationOptions::default();
+        let start = Start::Poses(&self.start);
+        brought_together(&self.clouds, start, Datum::Station(0), (&options, whole), &|_, _| {}).unwrap()
+    }
+}
+
+/// The survey by the way of many stations; both tests look at it.
+fn sparse() -> &'static (Survey, Brought) {
+    static DONE: OnceLock<(Survey, Brought)> = OnceLock::new();
+    DONE.get_or_init(|| {
+        let survey = Survey::new(3);
+        let brought = survey.brought(false);
+        (survey, brought)
+    })
+}
+
+fn joint(brought: &Brought) -> JointCovariance {
+    JointCovariance::new(brought.adjusted.cofactors.clone(), brought.adjusted.variance_factor())
+}
+
+#[test]
+fn many_stations_come_where_the_whole_matrix_has_them() {
+    let (survey, sparse) = sparse();
+    let dense = survey.brought(true);
+    let (poses, truth) = (&sparse.adjusted.state.poses, &survey.truth);
+    let (of_sparse, of_dense) = (joint(sparse), joint(&dense));
+    let mut squares = 0.0;
+    for station in 1..STATIONS {
+        let (pose, covariance) = of_sparse.relative_pose(poses, 0, station);
+        let (other, of_other) = of_dense.relative_pose(&dense.adjusted.state.poses, 0, station);
+        let factor = covariance.cholesky().unwrap();
+        let square = |off: nalgebra::Vector6<f64>| off.dot(&factor.solve(&off));
+        squares += square(pose_difference(&pose, &(truth[0].inverse() * truth[station]))) / (STATIONS - 1) as f64;
+        // Points near edges go to one plane or the other as rounds happened to end: some tenths of the deviations.
+        let apart = square(pose_difference(&pose, &other));
+        assert!(apart < 2.0, "{station}: {apart}");
+        let ratio = covariance.trace() / of_other.trace();
+        assert!((0.8..1.25).contains(&ratio), "{station}: {ratio}");
+    }
+    // Six are expected; the stations share their datum.
+    assert!((2.0..14.0).contains(&squares), "{squares}");
+    assert!(sparse.adjusted.settled);
+    assert_eq!(sparse.placements.as_ref().unwrap().doubtful().count(), 0);
+}
+
+#[test]
+fn a_station_in_a_wrong_place_is_named_and_put_back() {
+    let (_, Brought { adjusted, start, points, radius_m, patch_m, .. }) = sparse();
+    let options = StationRegistrationOptions::default();
+    let (prior, names) = prior_of(&options).unwrap();
+    let network = network(Datum::Station(0), *radius_m, &options, (&prior, &names), false);
+    let places = Places::new(adjusted, points, start, &network, (*patch_m, START_ERROR * radius_m));
+    let right = &adjusted.state.poses;
+    assert!(places.looked_through.doubtful(right).is_empty());
+    let wrong = 7;
+    let moved_by = |x: f64, y: f64| {
+        let mut poses = right.clone();
+        poses[wrong] = Isometry3::translation(x, y, 0.0) * poses[wrong];
+        poses
+    };
+    // By 16 cm: three pixels.
+    assert_eq!(places.looked_through.doubtful(&moved_by(0.12, 0.1)), [wrong]);
+    let mut poses = moved_by(0.05, 0.04);
+    let moved = places.improved(&mut poses).unwrap();
+    assert_eq!(moved.into_iter().collect::<Vec<usize>>(), [wrong]);
+    let off_m = (poses[wrong].translation.vector - right[wrong].translation.vector).norm();
+    assert!(off_m < 0.01, "{off_m}");
+}

@@ -67,7 +67,10 @@ pub fn calibrate_surfaces(
         held.push(HeldTerm { name: HYPERBOLA.to_owned(), combination, sigma_m: f64::INFINITY });
     }
     let (after, shared) = network.estimate(&mut model, &mut held, &before)?;
-    if !(before.settled && after.settled) {
+    // With the terms left out, stations may go back and forth between what these bend. Where that is not since surfaces leave them
+    // free, only how they end counts.
+    let is_free = !before.settled && !after.undetermined.is_empty();
+    if !after.settled || is_free {
         return Err(Error::SurfacesNotSettled { rounds: [before.rounds, after.rounds] });
     }
     let camera = model.camera_at(&shared.values);

@@ -69,14 +69,12 @@ fn all_boards_of_a_camera_are_found_where_opencv_has_them() {
         ours.push(own);
     }
     assert_eq!(all.len(), 13 * 54);
-    // What one camera and one rigid board of any shape leave of OpenCV's corners is how near any corners that follow a camera can come
-    // to them: more than 0.1 pixel. Of ours they leave less.
+    // OpenCV's are those of its best window: what one camera and one rigid board of any shape leave of them is least, and of ours less.
     let [(ours, by_image), (theirs, _)] = [ours, theirs].map(|corners| left_by_one_camera(&corners));
     println!("{:.4} pixel from OpenCV's; left by one camera and board: ours {ours:.4}, OpenCV {theirs:.4}", rms(&all));
     println!("ours by image {by_image:.3?}");
-    assert!(rms(&all) < 0.15, "{}", rms(&all));
-    assert!(theirs > 0.12, "{theirs}");
-    assert!(ours < 0.65 * theirs, "{ours}, {theirs}");
+    assert!(rms(&all) < 0.1, "{}", rms(&all));
+    assert!(ours < 0.8 * theirs && theirs < 0.11, "{ours}, {theirs}");
 }
 
 fn by_distance(at: &Vector2<f64>, a: &Vector2<f64>, b: &Vector2<f64>) -> std::cmp::Ordering {

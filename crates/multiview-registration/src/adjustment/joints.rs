@@ -2,9 +2,9 @@
 
 use nalgebra::{DVector, Dyn, Isometry3, OMatrix, RowVector6, U6, Vector6};
 
+use crate::adjustment::network::relative_jacobians;
 use crate::adjustment::sparse_equations::SparseEquations;
-use crate::relative_pose::relative_pose_parts;
-use adjust::RigidPose;
+use rigid_pose::pose_difference;
 
 /// A relative pose that is observed along one motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -21,14 +21,10 @@ pub(crate) struct Joint {
 
 impl Joint {
     pub(crate) fn add_to(&self, equations: &mut SparseEquations, poses: &[Isometry3<f64>]) {
-        let values = self.stations.map(|station| RigidPose::values(&poses[station]));
-        // Poses have seven values: there is no other way to fail.
-        let Ok((off, by_first, by_second)) = relative_pose_parts(&self.first_from_second, &[&values[0], &values[1]])
-        else {
-            return;
-        };
+        let [first, second] = self.stations.map(|station| poses[station]);
+        let off = pose_difference(&(first.inverse() * second), &self.first_from_second);
         let row: RowVector6<f64> = self.along.transpose() / self.sigma_m;
-        let rows = [by_first, by_second].map(|by| OMatrix::<f64, Dyn, U6>::from_rows(&[row * by]));
+        let rows = relative_jacobians(&first, &second).map(|by| OMatrix::<f64, Dyn, U6>::from_rows(&[row * by]));
         equations.add_rows(self.stations, [&rows[0], &rows[1]], &DVector::from_element(1, -row.transpose().dot(&off)));
     }
 }

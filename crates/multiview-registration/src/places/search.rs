@@ -73,11 +73,13 @@ impl<'a> Places<'a> {
         Self { adjusted, points, network, start, size_m, known_m, reach_m, wide, members, looked_through }
     }
 
-    /// Moves stations to where they fit better; returns which, and whether joints are known better.
+    /// Moves stations to where they fit better; returns which, and whether joints are known better. `last`: those that have moved since all
+    /// were looked at; others that see nothing of them stay.
     pub(crate) fn improved(
         &self,
         poses: &mut [Isometry3<f64>],
         joints: &mut Vec<Joint>,
+        last: Option<&BTreeSet<usize>>,
     ) -> Result<(BTreeSet<usize>, bool)> {
         let tiles = self.adjusted.shared_planes.last().map_or(0, |plane| plane.tiles.first + plane.tiles.len());
         let mut by = vec![0; tiles];
@@ -92,7 +94,11 @@ impl<'a> Places<'a> {
             let better = Sought::new(self, station, poses, &by_others).better(poses)?;
             Ok(better.map(|motion| (station, motion)))
         };
-        let single = (0..poses.len()).into_par_iter().filter(|station| !moved.contains(station));
+        let may_move = |station: usize| {
+            let mut about = self.looked_through.beside(station).iter().chain([&station]);
+            !moved.contains(&station) && last.is_none_or(|last| about.any(|other| last.contains(other)))
+        };
+        let single = (0..poses.len()).into_par_iter().filter(|station| may_move(*station));
         let better: Vec<_> = single.map(of_one).collect::<Result<_>>()?;
         for (station, motion) in better.into_iter().flatten() {
             move_by(&motion, &mut poses[station]);

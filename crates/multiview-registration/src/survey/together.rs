@@ -162,10 +162,11 @@ impl Again<'_> {
         modelled: &mut Surfaces<'_>,
         points: &mut [StationPoints],
     ) -> Result<(Adjusted, Option<Placements>)> {
+        let mut last = None;
         for again in 0..=AGAIN {
             let places = Places::new(&adjusted, points, self.start, finish.network, (self.patch_m, self.reach_m));
             let mut poses = adjusted.state.poses.clone();
-            let (moved, is_new) = places.improved(&mut poses, &mut finish.joints)?;
+            let (moved, is_new) = places.improved(&mut poses, &mut finish.joints, last.as_ref())?;
             if (moved.is_empty() && !is_new && adjusted.settled) || again == AGAIN {
                 let mut placements = judge_placements(self.stations, &adjusted.state.poses)?;
                 let doubtful = places.looked_through.doubtful(&adjusted.state.poses);
@@ -177,6 +178,7 @@ impl Again<'_> {
             framed(&mut state, fixed, &adjusted.state.poses[fixed]);
             finish.most_rounds = if moved.is_empty() && !is_new { MOST_ROUNDS } else { FEW_ROUNDS };
             adjusted = finish.run(modelled, points, state)?;
+            last = Some(moved);
         }
         Ok((adjusted, None))
     }

@@ -101,7 +101,7 @@ fn a_station_in_a_wrong_place_is_named_and_put_back() {
     // By 16 cm: three pixels.
     assert_eq!(places.looked_through.doubtful(&moved_by(0.12, 0.1)), [wrong]);
     let mut poses = moved_by(0.05, 0.04);
-    let moved = places.improved(&mut poses, &mut Vec::new()).unwrap().0;
+    let moved = places.improved(&mut poses, &mut Vec::new(), None).unwrap().0;
     assert_eq!(moved.into_iter().collect::<Vec<usize>>(), [wrong]);
     let off_m = (poses[wrong].translation.vector - right[wrong].translation.vector).norm();
     assert!(off_m < 0.01, "{off_m}");

@@ -154,8 +154,9 @@ fn report(found: &StationRegistration, truth: &[Isometry3<f64>], begin: usize) {
     };
     let is_off =
         |other: usize, k: usize, off_mm: f64| off_mm > WRONG_MM && deviations(found, truth, other, k) > WRONG_SIGMAS;
-    let wrong = (1..truth.len())
-        .filter(|&k| is_off(0, k, off[k]) || next.0.get(k - 1).is_some_and(|off_mm| is_off(k - 1, k, *off_mm)));
+    let wrong = (1..truth.len()).filter(|&k| {
+        is_off(0, k, off[k]) || next.0.get(k - 1).is_some_and(|off_mm| !named(k - 1) && is_off(k - 1, k, *off_mm))
+    });
     for k in wrong {
         println!(
             "  wrong: {}, {:.1} mm, {:.1} deviations off the first, {:.1} off the one before{}",

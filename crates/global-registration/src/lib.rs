@@ -24,3 +24,4 @@ pub use verification::among::{
     Placed, agreement, agreement_of_rooms, evidence, in_voxels, refined_among, with_one_voxel,
 };
 pub use verification::free_space::FreeSpace;
+pub use verification::looked_through::{Look, LookedThrough};

@@ -8,11 +8,13 @@ mod adjustment;
 mod agreement;
 mod error;
 mod pairs_of_frames;
+mod places;
 mod planes;
 mod relative_pose;
 mod surfaces;
 mod survey;
 
+pub use adjustment::joint_covariance::JointCovariance;
 pub use adjustment::turns::MeasuredTurn;
 pub use agreement::alignments::{PairAlignment, RefusedPair};
 pub use agreement::loops::LoopClosure;
@@ -28,7 +30,6 @@ pub use projective_registration;
 pub use rigid_pose;
 pub use surfaces::point_model::{PointModel, SharedParameters};
 pub use survey::datum::Datum;
-pub use survey::joint_covariance::JointCovariance;
 pub use survey::registration::{
     Effort, Start, StationRegistration, StationRegistrationOptions, SurfacePair, UndeterminedStation,
 };

@@ -79,7 +79,7 @@ const KNOWN: &[(Use, &[&str])] = &[
             "multipath/src/pixels/refine.rs",
             "multipath/src/scene/bending.rs",
             "multipath/src/scene/patches.rs",
-            "multiview-registration/src/survey/sought.rs",
+            "multiview-registration/src/places/sought.rs",
             "pose-graph/src/relation.rs",
             "primitives/src/adjustment/plane_step.rs",
             "projective-registration/src/shared_error.rs",

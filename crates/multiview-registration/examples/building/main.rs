@@ -25,7 +25,8 @@ use rayon::prelude::*;
 /// How far coarse poses are off.
 const OFF_M: f64 = 0.1;
 const OFF_DEG: f64 = 3.0;
-/// A position that is off by more than this many of its standard deviations and by more than this length is wrong, millimetre.
+/// A position that is off that of the first station or of the one before by more than this many standard deviations and by more than this
+/// length is wrong, millimetre.
 const WRONG_SIGMAS: f64 = 4.0;
 const WRONG_MM: f64 = 5.0;
 
@@ -151,7 +152,11 @@ fn report(found: &StationRegistration, truth: &[Isometry3<f64>], begin: usize) {
     let named = |k: usize| {
         found.placements.doubtful().any(|other| other == k) || found.undetermined.iter().any(|other| other.station == k)
     };
-    let wrong = (1..truth.len()).filter(|&k| off[k] > WRONG_MM && deviations(found, truth, 0, k) > WRONG_SIGMAS);
+    let is_off =
+        |other: usize, k: usize, off_mm: f64| off_mm > WRONG_MM && deviations(found, truth, other, k) > WRONG_SIGMAS;
+    let wrong = (1..truth.len()).filter(|&k| {
+        is_off(0, k, off[k]) || next.0.get(k - 1).is_some_and(|off_mm| !named(k - 1) && is_off(k - 1, k, *off_mm))
+    });
     for k in wrong {
         println!(
             "  wrong: {}, {:.1} mm, {:.1} deviations off the first, {:.1} off the one before{}",

@@ -2,6 +2,8 @@
 
 pub(crate) mod cofactors;
 pub(crate) mod equations;
+pub(crate) mod joint_covariance;
+pub(crate) mod joints;
 pub(crate) mod network;
 pub(crate) mod precision;
 pub(crate) mod rounds;

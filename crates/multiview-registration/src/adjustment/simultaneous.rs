@@ -7,6 +7,7 @@ use rayon::prelude::*;
 
 use crate::adjustment::cofactors::Cofactors;
 use crate::adjustment::equations::Equations;
+use crate::adjustment::joints::Joint;
 use crate::adjustment::network::{Network, State, largest_step};
 use crate::adjustment::rounds::{Surfaces, meet, near_each_other};
 use crate::adjustment::sparse_equations::{MOST_ELIMINATED, SparseEquations};
@@ -149,6 +150,8 @@ pub(crate) struct Finish<'a> {
     /// Rounds after which they end all the same.
     pub most_rounds: usize,
     pub progress: &'a (dyn Fn(usize) + Sync),
+    /// What is known of many stations beside what surfaces tell.
+    pub joints: Vec<Joint>,
 }
 
 impl Finish<'_> {
@@ -301,6 +304,9 @@ impl Finish<'_> {
         seen.for_each(|(shared_plane, eliminated)| equations.add(shared_plane, eliminated, &state.poses));
         for turn in self.network.turns {
             equations.add_turn(turn, &state.poses);
+        }
+        for joint in &self.joints {
+            joint.add_to(&mut equations, &state.poses);
         }
         let step = equations.step(&equations.cofactors(&self.near)?);
         Ok((step, equations.cofactors(self.network)?))

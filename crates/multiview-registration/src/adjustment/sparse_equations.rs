@@ -3,7 +3,7 @@
 //! A plane that a few stations saw is eliminated as in small networks, and couples them with each other. One that very many saw, as
 //! the floor of a building, stays beside them: eliminated, it would fill the whole matrix.
 
-use nalgebra::{DVector, Dyn, Isometry3, Matrix3, Matrix6, Matrix6x3, OMatrix, U6};
+use nalgebra::{Const, DVector, Dyn, Isometry3, Matrix3, Matrix6, Matrix6x3, OMatrix, U6};
 use rigid_pose::pose_difference;
 use sparse_matrices::BlockMatrix;
 
@@ -120,17 +120,9 @@ impl SparseEquations {
     /// Adds a turn that was measured between two stations.
     pub(crate) fn add_turn(&mut self, turn: &MeasuredTurn, poses: &[Isometry3<f64>]) {
         let Some((residual, by)) = turn.linearised(poses) else { return };
-        let stations = [turn.first, turn.second];
-        for (n, (row, station)) in by.iter().zip(stations).enumerate() {
-            for (column, other) in by.iter().zip(stations).take(n + 1) {
-                let block = row.transpose() * column;
-                self.normal.add(station, other, |i, j| block[(i, j)]);
-            }
-            if self.normal.width(station) > 0 {
-                let mut right = self.right.fixed_rows_mut::<6>(self.normal.start(station));
-                right += row.transpose() * residual;
-            }
-        }
+        let [first, second] = by.map(|by| OMatrix::from_fn_generic(Dyn(3), Const::<6>, |row, k| by[(row, k)]));
+        let residual = DVector::from_column_slice(residual.as_slice());
+        self.add_rows([turn.first, turn.second], [&first, &second], &residual);
     }
 
     /// Cofactors, with priors that hold what nothing determines.

@@ -2,7 +2,6 @@
 
 pub(crate) mod alignments;
 pub(crate) mod judges;
-pub(crate) mod looked_through;
 pub(crate) mod loops;
 pub(crate) mod placement;
 pub(crate) mod sight;

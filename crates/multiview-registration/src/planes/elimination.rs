@@ -16,6 +16,10 @@ use crate::planes::sums::{Sums, TileSums};
 /// How well the slopes of a shared plane are known from the patches that it was found by, radian.
 const SLOPE: f64 = 0.02;
 
+/// Fewest points of a station on tiles of a shared plane that others saw too by which it takes part there: one or two are gross errors, or
+/// lie on something beside the plane, and would hold a whole building where nothing else does.
+const FEWEST_COMMON: usize = 5;
+
 /// Variances beyond the noise of points, metre².
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Variances {
@@ -101,10 +105,12 @@ impl<'a> SharedPlaneSums<'a> {
     /// `most` did, the plane stays beside them.
     pub(crate) fn eliminated(&self, stations: &[usize], variances: Variances, most: usize) -> Option<Eliminated> {
         let mut seen = self.seen(stations);
-        let mut saw = vec![false; stations.len()];
-        for one in &seen {
-            saw[one.of] = true;
+        let mut common = vec![0; stations.len()];
+        for one in seen.chunk_by(|a, b| a.tile == b.tile).filter(|tile| tile.len() > 1).flatten() {
+            common[one.of] += self.sums[stations[one.of]].count(one.slot);
         }
+        let saw: Vec<bool> = common.iter().map(|points| *points >= FEWEST_COMMON).collect();
+        seen.retain(|one| saw[one.of]);
         let place: Vec<usize> = saw
             .iter()
             .scan(0, |count, saw| {

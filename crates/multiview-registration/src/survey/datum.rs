@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, Isometry3, Matrix6, Translation3, UnitQuaternion, Vector3, Vector6};
 
-use crate::survey::joint_covariance::JointCovariance;
+use crate::adjustment::joint_covariance::JointCovariance;
 use rigid_pose::pose_difference;
 
 /// What fixes the common frame.

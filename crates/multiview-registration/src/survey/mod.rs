@@ -3,11 +3,8 @@
 pub(crate) mod blind;
 pub(crate) mod check;
 pub(crate) mod datum;
-pub(crate) mod joint_covariance;
 pub(crate) mod pairs;
-pub(crate) mod places;
 pub(crate) mod point_residuals;
 pub(crate) mod registration;
-pub(crate) mod sought;
 pub(crate) mod stations;
 pub(crate) mod together;

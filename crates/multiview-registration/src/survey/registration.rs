@@ -4,13 +4,13 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Matrix6};
 
+use crate::adjustment::joint_covariance::JointCovariance;
 use crate::adjustment::turns::MeasuredTurn;
 use crate::agreement::alignments::{PairAlignment, RefusedPair};
 use crate::agreement::loops::LoopClosure;
 use crate::agreement::placement::Placements;
 use crate::surfaces::patches::Surface;
 use crate::surfaces::point_model::{PointModel, SharedParameters};
-use crate::survey::joint_covariance::JointCovariance;
 use icp_registration::UndeterminedMotion;
 
 /// What is known of the stations beforehand.

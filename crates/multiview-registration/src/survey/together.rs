@@ -13,12 +13,12 @@ use crate::adjustment::simultaneous::{Adjusted, Finish, MOST_ROUNDS};
 use crate::adjustment::sparse_equations::DENSE_STATIONS;
 use crate::agreement::placement::{Placements, judge_placements};
 use crate::error::Result;
+use crate::places::search::Places;
 use crate::surfaces::patch_size;
 use crate::surfaces::patches::Surface;
 use crate::surfaces::point_model::checked_prior;
 use crate::surfaces::points::StationPoints;
 use crate::survey::datum::Datum;
-use crate::survey::places::Places;
 use crate::survey::registration::{Start, StationRegistrationOptions};
 use point_cloud::Cloud;
 use point_cloud::{UnorganisedNormalOptions, unorganised_normals};
@@ -103,6 +103,7 @@ pub(crate) fn brought_together(
         tolerance_m: patch_m / TOLERANCE,
         most_rounds: if whole { MOST_ROUNDS } else { FEW_ROUNDS },
         progress: &total,
+        joints: Vec::new(),
     };
     let mut points: Vec<StationPoints> =
         stations.par_iter().zip(&surfaces).map(|(cloud, surface)| StationPoints::new(cloud, surface)).collect();
@@ -161,11 +162,12 @@ impl Again<'_> {
         modelled: &mut Surfaces<'_>,
         points: &mut [StationPoints],
     ) -> Result<(Adjusted, Option<Placements>)> {
+        let mut last = None;
         for again in 0..=AGAIN {
             let places = Places::new(&adjusted, points, self.start, finish.network, (self.patch_m, self.reach_m));
             let mut poses = adjusted.state.poses.clone();
-            let moved = places.improved(&mut poses)?;
-            if (moved.is_empty() && adjusted.settled) || again == AGAIN {
+            let (moved, is_new) = places.improved(&mut poses, &mut finish.joints, last.as_ref())?;
+            if (moved.is_empty() && !is_new && adjusted.settled) || again == AGAIN {
                 let mut placements = judge_placements(self.stations, &adjusted.state.poses)?;
                 let doubtful = places.looked_through.doubtful(&adjusted.state.poses);
                 placements.doubt(moved.into_iter().chain(doubtful));
@@ -174,8 +176,9 @@ impl Again<'_> {
             let mut state = State { poses, ..adjusted.state.clone() };
             let fixed = finish.network.fixed;
             framed(&mut state, fixed, &adjusted.state.poses[fixed]);
-            finish.most_rounds = if moved.is_empty() { MOST_ROUNDS } else { FEW_ROUNDS };
+            finish.most_rounds = if moved.is_empty() && !is_new { MOST_ROUNDS } else { FEW_ROUNDS };
             adjusted = finish.run(modelled, points, state)?;
+            last = Some(moved);
         }
         Ok((adjusted, None))
     }

@@ -7,8 +7,12 @@ use std::sync::OnceLock;
 use rigid_pose::pose_difference;
 
 use super::*;
-use crate::survey::joint_covariance::JointCovariance;
+use crate::adjustment::joint_covariance::JointCovariance;
+use crate::adjustment::network::relative_jacobians;
+use crate::adjustment::sparse_equations::SparseEquations;
+use crate::places::joints::Weakest;
 use plan::{Building, Camera};
+use rigid_pose::step_pose;
 
 #[path = "../../examples/building/plan.rs"]
 mod plan;
@@ -97,8 +101,46 @@ fn a_station_in_a_wrong_place_is_named_and_put_back() {
     // By 16 cm: three pixels.
     assert_eq!(places.looked_through.doubtful(&moved_by(0.12, 0.1)), [wrong]);
     let mut poses = moved_by(0.05, 0.04);
-    let moved = places.improved(&mut poses).unwrap();
+    let moved = places.improved(&mut poses, &mut Vec::new(), None).unwrap().0;
     assert_eq!(moved.into_iter().collect::<Vec<usize>>(), [wrong]);
     let off_m = (poses[wrong].translation.vector - right[wrong].translation.vector).norm();
     assert!(off_m < 0.01, "{off_m}");
+}
+
+#[test]
+fn what_lies_beyond_a_joint_comes_where_no_rays_go_through_it() {
+    let (_, Brought { adjusted, start, points, radius_m, patch_m, .. }) = sparse();
+    let options = StationRegistrationOptions::default();
+    let (prior, names) = prior_of(&options).unwrap();
+    let network = network(Datum::Station(0), *radius_m, &options, (&prior, &names), false);
+    let places = Places::new(adjusted, points, start, &network, (*patch_m, START_ERROR * radius_m));
+    let right = &adjusted.state.poses;
+    let beyond: Vec<bool> = (0..STATIONS).map(|station| station >= 9).collect();
+    let mut poses = right.clone();
+    // By three pixels along the floor, as if nothing held what lies beyond.
+    poses[9..].iter_mut().for_each(|pose| *pose = Isometry3::translation(0.08, 0.06, 0.0) * *pose);
+    let along = (poses[8].inverse() * Vector3::new(0.8, 0.6, 0.0)).push(0.0).push(0.0).push(0.0);
+    let weakest = Weakest { stations: [8, 9], tangent: along, metres: along, sigma_m: 1.0 };
+    let mut joints = Vec::new();
+    assert!(places.slid(&weakest, &beyond, &mut poses, &mut joints));
+    assert_eq!(joints.len(), 1);
+    let joint = joints[0];
+    for station in 9..STATIONS {
+        let off_m = (poses[station].translation.vector - right[station].translation.vector).norm();
+        assert!(off_m < 3.0 * joint.sigma_m && off_m < 0.02, "{station}: {off_m}, {joint:?}");
+    }
+    // What is known already moves nothing.
+    let known = joints.clone();
+    assert!(!places.slid(&weakest, &beyond, &mut poses, &mut joints) && joints == known);
+    // It holds the two as surfaces do not.
+    let mut equations = SparseEquations::new(STATIONS, 8, 0);
+    joint.add_to(&mut equations, right);
+    let cofactors = equations.cofactors(&network).unwrap();
+    let by_second = relative_jacobians(&right[8], &right[9])[1];
+    let of_joint = along.dot(&(by_second * cofactors.of(9) * by_second.transpose() * along));
+    assert!((of_joint.sqrt() / joint.sigma_m - 1.0).abs() < 1e-3, "{of_joint} {joints:?}");
+    let step = equations.step(&cofactors);
+    let moved = step_pose(&right[9], &step.fixed_rows::<6>(54).into_owned());
+    let off_m = (moved.translation.vector - poses[9].translation.vector).norm();
+    assert!(off_m < 1e-3, "{off_m}");
 }

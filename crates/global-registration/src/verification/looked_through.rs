@@ -1,17 +1,10 @@
 //! Whether stations looked through what others saw, as fine as pixels: what stands at the wrong place by less than a tile is still in
 //! the way of rays that pass it.
 
-use global_registration::FreeSpace;
 use nalgebra::{Isometry3, Point3};
 use rayon::prelude::*;
 
-use crate::planes::sightings::NOWHERE;
-use crate::surfaces::points::StationPoints;
-
-/// Of so many points that lie on planes one is looked at.
-const STRIDE: usize = 8;
-/// Standard deviations before a point up to which its ray is free.
-const BEFORE: f64 = 7.0;
+use crate::verification::free_space::FreeSpace;
 
 /// Of ten stations, in the order of what contradicts them, the one that shows what is usual; fewer points show nothing; and how many times
 /// that a station is doubted from. In buildings of 400 stations in their places have up to three times as much, one 4 cm off fourteen times.
@@ -19,38 +12,42 @@ const USUAL_AT: usize = 8;
 const LEAST_USUAL: usize = 25;
 const DOUBTED: usize = 4;
 
+/// What a station looked through, and points of what it saw, those that are surely no gross errors.
+#[derive(Debug, Clone)]
+pub struct Look {
+    /// The space between the station and what it saw.
+    pub space: FreeSpace,
+    /// In the frame of the station, metre.
+    pub seen: Vec<Point3<f64>>,
+}
+
 /// What stations looked through, and what they saw.
-pub(crate) struct LookedThrough {
-    spaces: Vec<FreeSpace>,
-    /// Points on planes, those that are surely no gross errors.
-    seen: Vec<Vec<Point3<f64>>>,
-    /// The stations that each has tiles in common with.
+#[derive(Debug, Clone)]
+pub struct LookedThrough {
+    looks: Vec<Look>,
+    /// The stations that each is held against.
     beside: Vec<Vec<usize>>,
 }
 
 impl LookedThrough {
-    /// `tiles`: the tile that each point of each station lies on.
-    pub(crate) fn new(points: &[StationPoints], tiles: &[Vec<u32>], pairs: impl Iterator<Item = [usize; 2]>) -> Self {
-        let space = |points: &StationPoints| {
-            let free_to = |(point, sigma): (&Point3<f64>, &f64)| (*point, point.coords.norm() - BEFORE * sigma);
-            FreeSpace::new(&points.points.iter().zip(&points.sigma).map(free_to).collect::<Vec<_>>())
-        };
-        let of_station = |(points, tiles): (&StationPoints, &Vec<u32>)| {
-            let on_planes = points.points.iter().zip(tiles).filter(|(_, tile)| **tile != NOWHERE);
-            on_planes.map(|(point, _)| *point).step_by(STRIDE).collect()
-        };
-        let mut beside = vec![Vec::new(); points.len()];
+    /// `pairs`: stations that see something in common.
+    pub fn new(looks: Vec<Look>, pairs: impl Iterator<Item = [usize; 2]>) -> Self {
+        let mut beside = vec![Vec::new(); looks.len()];
         for [a, b] in pairs {
             beside[a].push(b);
             beside[b].push(a);
         }
-        let seen = points.iter().zip(tiles).map(of_station).collect();
-        Self { spaces: points.par_iter().map(space).collect(), seen, beside }
+        Self { looks, beside }
+    }
+
+    /// The stations that one is held against.
+    pub fn beside(&self, station: usize) -> &[usize] {
+        &self.beside[station]
     }
 
     /// Stations in places where rays went through what others saw far more often than is usual. The worst is taken out again and again: it
     /// makes those beside it look wrong.
-    pub(crate) fn doubtful(&self, poses: &[Isometry3<f64>]) -> Vec<usize> {
+    pub fn doubtful(&self, poses: &[Isometry3<f64>]) -> Vec<usize> {
         let of_one = |station: usize| -> Vec<(usize, usize)> {
             let with =
                 |&other: &usize| (other, self.between(station, other, &(poses[other].inverse() * poses[station])));
@@ -76,15 +73,15 @@ impl LookedThrough {
     }
 
     /// Points of a station at a pose that the others looked through, and points of theirs that it looked through.
-    pub(crate) fn contradictions(&self, station: usize, pose: &Isometry3<f64>, poses: &[Isometry3<f64>]) -> usize {
+    pub fn contradictions(&self, station: usize, pose: &Isometry3<f64>, poses: &[Isometry3<f64>]) -> usize {
         let with = |&other: &usize| self.between(station, other, &(poses[other].inverse() * pose));
         self.beside[station].iter().map(with).sum()
     }
 
     /// Points of either of two stations that the other looked through.
-    fn between(&self, station: usize, other: usize, other_from_station: &Isometry3<f64>) -> usize {
+    pub fn between(&self, station: usize, other: usize, other_from_station: &Isometry3<f64>) -> usize {
         let through = |by: usize, from: usize, motion: &Isometry3<f64>| {
-            self.seen[from].iter().filter(|point| self.spaces[by].holds(&(motion * **point))).count()
+            self.looks[from].seen.iter().filter(|point| self.looks[by].space.holds(&(motion * **point))).count()
         };
         through(other, station, other_from_station) + through(station, other, &other_from_station.inverse())
     }

@@ -8,6 +8,7 @@ mod amplitude;
 mod calibrate;
 mod footprint;
 mod holes;
+mod local_planes;
 mod options;
 mod outcome;
 mod pixels;

@@ -3,7 +3,7 @@
 use camera_model::Camera;
 use error_models::RangeErrorModel;
 use nalgebra::Vector3;
-use point_cloud::{Cloud, OrganisedNormalOptions, organised_normals};
+use point_cloud::{Cloud, organised_normals};
 use range_image::Flags;
 use statistics::quantile;
 
@@ -19,10 +19,6 @@ const WILD: f64 = 3.0;
 const WILD_PART: f64 = 0.01;
 /// Largest median range of a frame, metre: no range camera sees rooms from further away, and half a metre in millimetres is more.
 const LONGEST_RANGE_M: f64 = 300.0;
-/// Windows (half width, part that must be filled) that tell how slanted a surface is where the usual ones do not fit: beside edges, and
-/// on what is narrow. Their noise hardly matters there, since the width of a pixel changes its range with the square of the slant.
-const NEAR_EDGES: [(usize, f64); 2] = [(2, 0.5), (1, 0.5)];
-
 /// Usable pixels of one station, in the order of the points of its cloud.
 #[derive(Default)]
 pub(super) struct StationPixels {
@@ -71,15 +67,7 @@ impl StationPixels {
         // Pixels without a range are no edges: neighbours stand in for them where planes are fitted.
         let whole = filled(&points, width, height, options.normals.max_relative_jump);
         let normals = organised_normals(&whole, width, height, &options.normals).map_err(fail)?;
-        let mut everywhere = normals.clone();
-        for (half_width_px, min_fill) in NEAR_EDGES {
-            let smaller = OrganisedNormalOptions { half_width_px, min_fill, ..options.normals };
-            let found = organised_normals(&whole, width, height, &smaller).map_err(fail)?;
-            for (normal, found) in everywhere.iter_mut().zip(found).filter(|(normal, _)| normal.x.is_nan()) {
-                *normal = found;
-            }
-        }
-        let footprints = Surfaced { camera, frame, points: &points, normals: &everywhere }.footprints();
+        let footprints = Surfaced { camera, frame, points: &points }.footprints();
         let values = model.parameter_values();
         let [xp, yp] = camera.interior.principal_point_mm;
         let mut kept = Self { columns: known.columns.len(), ..Self::default() };

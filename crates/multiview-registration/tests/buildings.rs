@@ -13,8 +13,8 @@ fn more_stations_than_have_been_shown_are_refused() {
         let clouds = vec![cloud.clone(); count];
         register_stations(&clouds, start, Datum::Station(0), &options, &|_, _| {}).unwrap_err()
     };
-    let poses = vec![Isometry3::identity(); 501];
-    assert!(matches!(refused(501, Start::Poses(&poses)), Error::TooManyStations { found: 501, most: 500, .. }));
+    let poses = vec![Isometry3::identity(); 1001];
+    assert!(matches!(refused(1001, Start::Poses(&poses)), Error::TooManyStations { found: 1001, most: 1000, .. }));
     let ordered = refused(201, Start::Order);
     assert!(matches!(ordered, Error::TooManyStations { found: 201, most: 200, .. }));
     assert!(ordered.to_string().contains("give approximate poses"), "{ordered}");

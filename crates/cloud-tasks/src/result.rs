@@ -7,7 +7,7 @@ use commands::Result;
 use common_errors::{CommonErrorsFile, FrameErrors};
 use error_models::{AmplitudeScale, RangeErrorModel};
 use measurement::Cloud;
-use nalgebra::{DMatrix, Isometry3, Matrix3, Point3, Quaternion, UnitQuaternion, Vector3};
+use nalgebra::{DMatrix, Isometry3, Matrix3, Point3, Vector3, Vector4};
 use point_uncertainty::{CommonError, CommonErrors, PointErrors, SharedErrorGrid, Source, StationErrors};
 use range_io::calibration::Calibration;
 use range_io::clouds::CloudFile;
@@ -284,9 +284,7 @@ fn station(
 const UNIT_LENGTH: f64 = 1e-4;
 
 fn pose(frame: &FrameErrors) -> std::result::Result<Isometry3<f64>, String> {
-    let [x, y, z, w] = frame.quaternion_xyzw;
-    let quaternion = Quaternion::new(w, x, y, z);
-    let length = quaternion.norm();
+    let length = Vector4::from(frame.quaternion_xyzw).norm();
     let off = (length - 1.0).abs();
     if off.is_nan() || off > UNIT_LENGTH {
         return Err(format!("`quaternion_xyzw` has length {length}, expected 1"));
@@ -294,8 +292,7 @@ fn pose(frame: &FrameErrors) -> std::result::Result<Isometry3<f64>, String> {
     if let Some(value) = frame.position_m.iter().find(|value| !value.is_finite()) {
         return Err(format!("`position_m` has {value}, expected finite coordinates"));
     }
-    let position = Vector3::from(frame.position_m);
-    Ok(Isometry3::from_parts(position.into(), UnitQuaternion::from_quaternion(quaternion)))
+    Ok(frame.world_from_camera())
 }
 
 /// A camera that sees all that is before it, for frames of which only poses and drifts err: no image enters these.

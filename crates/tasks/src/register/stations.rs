@@ -30,8 +30,8 @@ pub(crate) fn run(input: Input, start: &str, progress: &dyn Progress) -> Result<
     let Input { stations, vertical_axis, turns, .. } = input;
     let before: Option<Vec<Isometry3<f64>>> = stations.iter().map(|station| station.approximate).collect();
     let is_depth_alone = stations.iter().all(Station::is_depth_alone);
-    let mut as_frames = is_depth_alone.then(|| frames::found(&stations, before.as_deref())).flatten();
-    if let Some(result) = as_frames.take_if(|found| found.unplaced.is_empty()) {
+    // Clouds do not know what neighbours of a depth camera err by together: frames that belong to no other are named, not forced.
+    if let Some(result) = is_depth_alone.then(|| frames::found(&stations, before.as_deref())).flatten() {
         return frames::registered(stations, before, vertical_axis, &result);
     }
     let clouds_with = |windows: Windows| {
@@ -64,10 +64,10 @@ pub(crate) fn run(input: Input, start: &str, progress: &dyn Progress) -> Result<
     };
     // Errors that neighbouring points share, as those of structured light, are no noise of surfaces; pairs know them.
     let misfits = found.as_ref().map_or(true, |found| found.sigma0.is_some_and(|sigma0| sigma0 > MOST_OVER_NOISE));
-    if misfits && !is_depth_alone {
-        as_frames = frames::found(&stations, before.as_deref());
-    }
-    if let Some(result) = as_frames.filter(|_| misfits) {
+    if misfits
+        && !is_depth_alone
+        && let Some(result) = frames::found(&stations, before.as_deref())
+    {
         return frames::registered(stations, before, vertical_axis, &result);
     }
     let result = found.map_err(|error| refused::of_command(&error, &names, tried))?;

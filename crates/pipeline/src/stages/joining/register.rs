@@ -53,8 +53,8 @@ fn at_once(
     progress: &dyn Progress,
 ) -> Result<Joined> {
     let before = if let Start::Poses(poses) = start { Some(poses) } else { None };
-    let mut as_frames = (frames.len() == clouds.len()).then(|| register_as_frames(&frames, before).ok()).flatten();
-    if let Some(found) = as_frames.take_if(|found| found.unplaced.is_empty()) {
+    // Clouds do not know what neighbours of a depth camera err by together: frames that belong to no other are named, not forced.
+    if let Some(found) = (frames.len() == clouds.len()).then(|| register_as_frames(&frames, before).ok()).flatten() {
         return Ok(from_frames(found, &all_stated, names));
     }
     let limits = Some((options.minimum_overlap, options.maximum_distance_m));
@@ -63,11 +63,8 @@ fn at_once(
         Start::Order => Tried::Order,
         Start::Nothing => Tried::AllPairs,
     };
-    let found = match (register_at_once(&clouds, start, limits, &[], progress), as_frames) {
-        // Not all belong together; those that do are brought together.
-        (Err(_), Some(found)) => return Ok(from_frames(found, &all_stated, names)),
-        (found, _) => found.map_err(|error| refused::of_stage("Register", error, &names, tried))?,
-    };
+    let found = register_at_once(&clouds, start, limits, &[], progress);
+    let found = found.map_err(|error| refused::of_stage("Register", error, &names, tried))?;
     let world = world(stated, found.world_from_station.first());
     let (registered, pairs, refused) = Registered::new(found, &world, options.minimum_overlap);
     let poses = without_covariances(&registered.poses);

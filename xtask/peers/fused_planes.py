@@ -1,9 +1,11 @@
-"""How fused points scatter about the planes that they lie on, over their stated deviations: fused_planes.py CLOUD.
+"""How fused points scatter about the planes that they lie on, over their stated deviations, and how the points of single frames do:
+fused_planes.py CLOUD [RESULT].
 
 CLOUD is the `cloud.ply` that `rangecam fuse` wrote. Large planes are found in it by samples of single fused points, the largest first:
 fused points within TOLERANCE and ANGLE, connected over cells of CELL. On each, planes are fitted within RADIUS about every third point,
 so that what bends a whole wall is no scatter. Prints for each plane, and for all together, the robust scatter in millimetres, and
-robust and root mean square scatter over the stated deviations (1: as stated).
+robust and root mean square scatter over the stated deviations (1: as stated). With the `cloud.ply` that was fused as RESULT, also the robust
+scatter of the points of single frames about planes of their own, fitted within RADIUS on the same walls: how thick a section is in one frame.
 """
 import re
 import sys
@@ -12,20 +14,36 @@ import numpy as np
 
 TOLERANCE, ANGLE, CELL, RADIUS = 0.02, np.cos(np.radians(20)), 0.08, 0.3
 LEAST, MOST_PLANES, SAMPLES, FEWEST = 60, 12, 400, 12
+# Points of a single frame: farthest off the plane of the fused points, metre; fewest for a plane; every so many centre is taken.
+FARTHEST, FEWEST_OF_FRAME, CENTRES = 0.06, 300, 45
 
 
-def fused_points(path):
+def read(path):
     with open(path, "rb") as file:
         text = b""
         while not text.endswith(b"end_header\n"):
             text += file.readline()
-        types = {"float": "<f4", "double": "<f8", "ushort": "<u2", "uint": "<u4"}
+        types = {"float": "<f4", "double": "<f8", "uchar": "u1", "ushort": "<u2", "uint": "<u4"}
         fields = [(name, types[kind]) for kind, name in re.findall(r"property (\w+) (\w+)", text.decode())]
         count = int(re.search(r"element vertex (\d+)", text.decode())[1])
-        cloud = np.frombuffer(file.read(), dtype=fields, count=count)
-    columns = lambda names: np.stack([cloud[name] for name in names], 1).astype(float)
+        return np.frombuffer(file.read(), dtype=fields, count=count)
+
+
+def columns(cloud, names):
+    return np.stack([cloud[name] for name in names], 1).astype(float)
+
+
+def fused_points(path):
+    cloud = read(path)
     normals = [name for name in cloud.dtype.names if re.fullmatch("n[xyz]|normal_[xyz]", name)]
-    return columns("xyz"), columns(normals), cloud["sigma"].astype(float)
+    return columns(cloud, "xyz"), columns(cloud, normals), cloud["sigma"].astype(float)
+
+
+def points_of_frames(path):
+    cloud = read(path)
+    points = columns(cloud, "xyz")
+    good = np.isfinite(points).all(1) & (cloud["flags"] == 0)
+    return points[good], cloud["frame"][good]
 
 
 def largest_part(points):
@@ -90,20 +108,57 @@ def scatter(points, sigma):
     return np.array(distances), np.array(standardised)
 
 
+def robust(values):
+    return 1.4826 * np.median(np.abs(values - np.median(values)))
+
+
+def occupied(points, origin):
+    return np.unique(np.floor((points - origin) / CELL).astype(int) @ np.array([1, 1 << 20, 1 << 40]))
+
+
+def scatter_of_frames(part, points, frames):
+    """Distances of points of single frames, on the walls of some fused points, from planes of their own."""
+    low, high = part.min(0) - RADIUS, part.max(0) + RADIUS
+    inside = ((points > low) & (points < high)).all(1)
+    points, frames, distances = points[inside], frames[inside], []
+    for centre in part[::CENTRES]:
+        about = part[((part - centre) ** 2).sum(1) < RADIUS**2]
+        if len(about) < FEWEST:
+            continue
+        normal = np.linalg.svd(about - about.mean(0), full_matrices=False)[2][2]
+        off = (points - about.mean(0)) @ normal
+        near = (np.abs(off) < FARTHEST) & (((points - centre) ** 2).sum(1) < RADIUS**2)
+        # Those whose foot lies where the wall is.
+        feet = points[near] - off[near, None] * normal
+        cells = np.floor((feet - low) / CELL).astype(int) @ np.array([1, 1 << 20, 1 << 40])
+        on_wall = np.flatnonzero(near)[np.isin(cells, occupied(about, low))]
+        for frame in np.unique(frames[on_wall]):
+            own = points[on_wall[frames[on_wall] == frame]]
+            if len(own) >= FEWEST_OF_FRAME:
+                distances.extend(off_plane(own, np.ones(len(own))))
+    return np.array(distances)
+
+
 def line(name, distances, standardised):
-    robust = lambda values: 1.4826 * np.median(np.abs(values - np.median(values)))
     square = np.sqrt(np.mean(standardised**2))
-    print(f"{name}: {1e3 * robust(distances):.2f} mm, over stated {robust(standardised):.2f} (root mean square {square:.2f})")
+    return f"{name}: {1e3 * robust(distances):.2f} mm, over stated {robust(standardised):.2f} (root mean square {square:.2f})"
 
 
-def main(path):
+def main(path, result=None):
     points, normals, sigma = fused_points(path)
-    all_planes = [(part, scatter(points[part], sigma[part])) for part in planes(points, normals)]
-    for part, (distances, standardised) in all_planes:
-        if len(distances):
-            centre = ", ".join(f"{value:.2f}" for value in points[part].mean(0))
-            line(f"{len(part)} fused points about ({centre})", distances, standardised)
-    line("all", *(np.concatenate([found[at] for _, found in all_planes]) for at in (0, 1)))
+    given = points_of_frames(result) if result else None
+    found = []
+    for part in planes(points, normals):
+        distances, standardised = scatter(points[part], sigma[part])
+        if not len(distances):
+            continue
+        of_frames = scatter_of_frames(points[part], *given) if given else np.array([])
+        centre = ", ".join(f"{value:.2f}" for value in points[part].mean(0))
+        found.append((f"{len(part)} fused points about ({centre})", distances, standardised, of_frames))
+    found.append(("all", *(np.concatenate([plane[at] for plane in found]) for at in (1, 2, 3))))
+    for name, distances, standardised, of_frames in found:
+        single = f"; single frames {1e3 * robust(of_frames):.2f} mm" if len(of_frames) else ""
+        print(line(name, distances, standardised) + single)
 
 
 main(*sys.argv[1:])

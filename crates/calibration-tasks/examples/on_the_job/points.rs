@@ -69,6 +69,12 @@ impl Stated {
         &self.stations[self.file.frame.as_ref().unwrap()[index] as usize]
     }
 
+    /// The pixel that sees a point of its station's frame, in a raster of this width.
+    fn pixel(&self, local: &Point3<f64>, width: usize) -> usize {
+        let [col, row] = self.camera.project(local).unwrap().map(|at| at.round() as usize);
+        row * width + col
+    }
+
     fn amplitude(&self, index: usize) -> f64 {
         self.file.intensity.as_ref().map_or(f64::NAN, |all| f64::from(all[index]))
     }
@@ -87,13 +93,14 @@ impl PointErrors for Stated {
     }
 }
 
-/// Squared errors of all unflagged points of a result, in the order of [`CLASSES`]. The result has a view for each station.
+/// Squared errors of all unflagged points of a result, in the order of [`CLASSES`]. The result has a view for each station, and no
+/// point where a pixel has no data.
 pub fn squared_errors(result: &Path, survey_folder: &Path) -> [Squares; CLASSES.len()] {
     let stated = Stated::read(result);
     let survey = Survey::read(survey_folder).unwrap();
     let true_stations = read_stations(survey_folder.join("truth/stations.csv")).unwrap();
-    let pixels = survey.camera.width * survey.camera.height;
-    assert_eq!(stated.file.points.len(), pixels * stated.stations.len(), "a point for each pixel");
+    let width = survey.camera.width;
+    let views = stated.file.frame.as_ref().unwrap();
     let flags = stated.file.flags.as_ref().unwrap();
     let mut amplitudes: Vec<f64> =
         (0..flags.len()).filter(|at| flags[*at] == 0).map(|at| stated.amplitude(at)).collect();
@@ -102,14 +109,10 @@ pub fn squared_errors(result: &Path, survey_folder: &Path) -> [Squares; CLASSES.
     for (view, station) in stated.stations.iter().enumerate() {
         let frame = survey.frames.iter().position(|frame| frame.station == true_stations[view].station).unwrap();
         let truth = read_truth(&survey, survey_folder, frame).unwrap().unwrap();
-        let seen = Seen { camera: &stated.camera, truth, width: survey.camera.width };
-        for pixel in 0..pixels {
-            let index = view * pixels + pixel;
-            if flags[index] != 0 {
-                continue;
-            }
+        let seen = Seen { camera: &stated.camera, truth, width };
+        for index in (0..flags.len()).filter(|at| views[*at] as usize == view && flags[*at] == 0) {
             let local = station.world_from_camera().inverse_transform_point(&stated.point(index));
-            let range_m = local.coords.norm();
+            let (pixel, range_m) = (stated.pixel(&local, width), local.coords.norm());
             let Some(true_m) = seen.range(pixel, range_m) else { continue };
             let target = true_stations[view].world_from_camera * Point3::from(local.coords * (true_m / range_m));
             let error = stated.point(index) - target;

@@ -8,13 +8,13 @@ use rayon::prelude::*;
 
 use rigid_pose::MotionEquations;
 
-use crate::partners::pairs::{Locate, Moved, Pairs, Rules, WithLocate, with_locate};
+use crate::partners::pairs::{Locate, Moved, Pairs, Rules, WithLocate, run_wide, with_locate};
 use crate::preparation::bits::{median_of_bits, positive_bits};
 use crate::preparation::blocks::Block;
 use crate::preparation::grid::BLOCK;
 
 /// Blocks of a chunk: sums in single precision stay short.
-const CHUNK: usize = 32;
+pub(crate) const CHUNK: usize = 32;
 /// Chunks that one thread takes at least.
 const CHUNKS_PER_TASK: usize = 4;
 /// Blocks of a sample that one thread takes at least.
@@ -72,7 +72,7 @@ impl WithLocate for AllChunks<'_, '_> {
     fn run<L: Locate>(self, locate: L) {
         let (moved, rules) = (self.moved, self.rules);
         let work = |(sums, blocks): (&mut [f64; SUMS], &[Block])| {
-            pulp::Arch::new().dispatch(Chunk { moved, rules, locate, blocks, sums });
+            run_wide(Chunk { moved, rules, blocks, sums }, locate);
         };
         if self.chunks.len() < 2 * CHUNKS_PER_TASK {
             self.chunks.iter_mut().zip(self.blocks.chunks(CHUNK)).for_each(work);
@@ -83,22 +83,21 @@ impl WithLocate for AllChunks<'_, '_> {
     }
 }
 
-struct Chunk<'a, 'b, L> {
+struct Chunk<'a, 'b> {
     moved: &'a Moved<'b>,
     rules: &'a Rules,
-    locate: L,
     blocks: &'a [Block],
     sums: &'a mut [f64; SUMS],
 }
 
-impl<L: Locate> pulp::WithSimd for Chunk<'_, '_, L> {
+impl WithLocate for Chunk<'_, '_> {
     type Output = ();
 
     #[inline(always)]
-    fn with_simd<S: pulp::Simd>(self, _: S) {
+    fn run<L: Locate>(self, locate: L) {
         let mut lanes = [[0.0_f32; BLOCK]; SUMS];
         for block in self.blocks {
-            let pairs = self.moved.pairs(self.locate, self.rules, block);
+            let pairs = self.moved.pairs(locate, self.rules, block);
             add(&mut lanes, &pairs, &derivatives(&pairs.lever, &pairs.normal));
         }
         *self.sums = [0.0; SUMS];
@@ -214,7 +213,7 @@ impl WithLocate for Sample<'_, '_> {
                     }
                 }
             };
-            pulp::Arch::new().dispatch(LocatedVisit { all: Visit { moved, rules, blocks, step, work }, locate });
+            run_wide(Visit { moved, rules, blocks, step, work }, locate);
         });
     }
 }
@@ -246,24 +245,10 @@ struct Visit<'a, 'b, F> {
 impl<F: FnMut(&Pairs)> WithLocate for Visit<'_, '_, F> {
     type Output = ();
 
-    fn run<L: Locate>(self, locate: L) {
-        pulp::Arch::new().dispatch(LocatedVisit { all: self, locate });
-    }
-}
-
-struct LocatedVisit<'a, 'b, F, L> {
-    all: Visit<'a, 'b, F>,
-    locate: L,
-}
-
-impl<F: FnMut(&Pairs), L: Locate> pulp::WithSimd for LocatedVisit<'_, '_, F, L> {
-    type Output = ();
-
     #[inline(always)]
-    fn with_simd<S: pulp::Simd>(self, _: S) {
-        let mut all = self.all;
-        for block in all.blocks.iter().step_by(all.step) {
-            (all.work)(&all.moved.pairs(self.locate, all.rules, block));
+    fn run<L: Locate>(mut self, locate: L) {
+        for block in self.blocks.iter().step_by(self.step) {
+            (self.work)(&self.moved.pairs(locate, self.rules, block));
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Isometry3, Point3, Vector3};
 use rayon::prelude::*;
 
 use crate::error::{Error, Result};
@@ -13,6 +13,7 @@ use crate::preparation::nodes::{LARGEST_DEPTH_M, LEAST_DEPTH_M, NodeRow};
 use crate::preparation::planes::{FREEDOM, MOMENT, PlaneRow, ROUNDING};
 use crate::preparation::projection::Projection;
 use point_cloud::Cloud;
+use rigid_pose::Centred;
 
 /// Windows whose mean square deviation exceeds that of most by this factor hold no plane.
 const LARGEST_MISFIT: f32 = 3.0;
@@ -196,6 +197,12 @@ impl OrganisedFrame {
         memory.push((self.scratch.as_ptr() as usize, self.scratch.capacity()));
         memory.push((self.points.blocks.as_ptr() as usize, self.points.blocks.capacity()));
         memory
+    }
+
+    /// Its middle at a pose, and its radius: about what its motions are.
+    pub(crate) fn centred(&self, pose: &Isometry3<f64>) -> Centred {
+        let centre = (pose * Point3::from(self.points.centre)).coords;
+        Centred { centre, radius_m: self.points.radius_m.max(f64::MIN_POSITIVE) }
     }
 
     /// Takes another of the projection's grids.

@@ -7,7 +7,7 @@ use crate::error::{Error, Result};
 use crate::options::FrameAlignmentOptions;
 use crate::partners::pairs::Rules;
 use crate::partners::sums::{SUMS, median_residual, normal_equations};
-use crate::partners::track::{FEWEST_POINTS, Track, blocks, is_within_noise, moved};
+use crate::partners::track::{FEWEST_POINTS, Frames, Track, is_within_noise};
 use crate::preparation::blocks::Block;
 use crate::preparation::frame::OrganisedFrame;
 use crate::preparation::grid::STRIDES;
@@ -74,16 +74,11 @@ impl FrameAligner {
         &self.options
     }
 
-    pub(crate) fn registered(
-        &mut self,
-        source: &OrganisedFrame,
-        target: &OrganisedFrame,
-        guess: &Isometry3<f64>,
-    ) -> Result<IcpResult> {
+    pub(crate) fn registered(&mut self, frames: Frames<'_>, guess: &Isometry3<f64>) -> Result<IcpResult> {
         if !is_finite(guess) {
             return Err(Error::NonFinite { what: "the guess", index: 0 });
         }
-        for (what, frame) in [("the source frame", source), ("the target frame", target)] {
+        for (what, frame) in [("the source frame", frames.source), ("the target frame", frames.target)] {
             if frame.len() < self.options.min_correspondences {
                 let needed = self.options.min_correspondences;
                 return Err(Error::TooFewPoints { what, found: frame.len(), needed });
@@ -96,55 +91,43 @@ impl FrameAligner {
         };
         let (free, last_step) = (Matrix6::identity(), Vector6::zeros());
         let track = Track { pose: *guess, iterations: 0, rules, free, last_step, over_sigma: f64::INFINITY };
-        let first = self.follow_levels(track.clone(), source, target, guess);
+        let first = self.follow_levels(track.clone(), frames, guess);
         if self.hold() == Hold::Undetermined || self.options.other_starts == 0 {
             return first.map(|(_, result)| result);
         }
-        self.searched(first, &track, source, target)
+        self.searched(first, &track, frames)
     }
 
     /// The first level that is passed; none where all but the last have too few nodes.
-    pub(crate) fn first_level(&self, source: &OrganisedFrame) -> Option<usize> {
+    pub(crate) fn first_level(&self, frames: Frames<'_>) -> Option<usize> {
         let coarsest = STRIDES.len() - self.options.levels;
-        (coarsest..STRIDES.len() - 1).find(|level| source.points.counts[*level] >= FEWEST_POINTS)
+        (coarsest..STRIDES.len() - 1).find(|level| frames.source.points.counts[*level] >= FEWEST_POINTS)
     }
 
     /// The whole way from the guess.
     fn follow_levels(
         &mut self,
         mut track: Track,
-        source: &OrganisedFrame,
-        target: &OrganisedFrame,
+        frames: Frames<'_>,
         guess: &Isometry3<f64>,
     ) -> Result<(Track, IcpResult)> {
-        match self.first_level(source) {
-            Some(first) => track = self.start(&track, source, target, blocks(source, first))?,
-            None => self.open(&mut track, source, target, &source.points.blocks)?,
+        match self.first_level(frames) {
+            Some(first) => track = self.start(&track, frames, frames.blocks(first))?,
+            None => self.open(&mut track, frames, frames.all_blocks())?,
         }
-        self.finish(track, source, target, guess)
+        self.finish(track, frames, guess)
     }
 
     /// The levels after the first one, and the result.
-    fn finish(
-        &mut self,
-        mut track: Track,
-        source: &OrganisedFrame,
-        target: &OrganisedFrame,
-        guess: &Isometry3<f64>,
-    ) -> Result<(Track, IcpResult)> {
-        self.approach(&mut track, source, target)?;
-        self.end(track, source, target, guess, self.hold())
+    fn finish(&mut self, mut track: Track, frames: Frames<'_>, guess: &Isometry3<f64>) -> Result<(Track, IcpResult)> {
+        self.approach(&mut track, frames)?;
+        self.end(track, frames, guess, self.hold())
     }
 
     /// The levels between the first and the last.
-    pub(crate) fn approach(
-        &mut self,
-        track: &mut Track,
-        source: &OrganisedFrame,
-        target: &OrganisedFrame,
-    ) -> Result<()> {
-        for level in self.first_level(source).map_or(STRIDES.len(), |l| l + 1)..STRIDES.len() - 1 {
-            self.descend(track, source, target, blocks(source, level))?;
+    pub(crate) fn approach(&mut self, track: &mut Track, frames: Frames<'_>) -> Result<()> {
+        for level in self.first_level(frames).map_or(STRIDES.len(), |l| l + 1)..STRIDES.len() - 1 {
+            self.descend(track, frames, frames.blocks(level))?;
         }
         Ok(())
     }
@@ -153,56 +136,42 @@ impl FrameAligner {
     pub(crate) fn end(
         &mut self,
         mut track: Track,
-        source: &OrganisedFrame,
-        target: &OrganisedFrame,
+        frames: Frames<'_>,
         guess: &Isometry3<f64>,
         hold: Hold,
     ) -> Result<(Track, IcpResult)> {
-        let stop = self.settle(&mut track, source, target, hold)?;
-        let result = self.result(&track, source, target, guess, stop)?;
+        let stop = self.settle(&mut track, frames, hold)?;
+        let result = self.result(&track, frames, guess, stop)?;
         Ok((track, result))
     }
 
     /// Sets the variance of what is not aligned from the residuals at the guess.
-    pub(crate) fn open(
-        &mut self,
-        track: &mut Track,
-        source: &OrganisedFrame,
-        target: &OrganisedFrame,
-        blocks: &[Block],
-    ) -> Result<()> {
-        let radius = target.points.radius_m.max(source.points.radius_m);
+    pub(crate) fn open(&mut self, track: &mut Track, frames: Frames<'_>, blocks: &[Block]) -> Result<()> {
+        let radius = frames.target.points.radius_m.max(frames.radius_m());
         track.rules.extra_variance = (radius * radius) as f32;
-        let moved = moved(track, source, target);
+        let moved = frames.moved(track);
         let median = median_residual(&moved.0, &track.rules, blocks, SAMPLE, &mut self.scratch)
-            .ok_or_else(|| self.too_few(0, source.len(), track))?;
+            .ok_or_else(|| self.too_few(0, frames.source.len(), track))?;
         let scale = SIGMA_OF_MAD * median * radius;
         track.rules.extra_variance = (scale * scale) as f32;
         Ok(())
     }
 
     /// Passes one level.
-    pub(crate) fn descend(
-        &mut self,
-        track: &mut Track,
-        source: &OrganisedFrame,
-        target: &OrganisedFrame,
-        blocks: &[Block],
-    ) -> Result<()> {
-        self.descend_by(track, source, target, blocks, COARSE_ITERATIONS)
+    pub(crate) fn descend(&mut self, track: &mut Track, frames: Frames<'_>, blocks: &[Block]) -> Result<()> {
+        self.descend_by(track, frames, blocks, COARSE_ITERATIONS)
     }
 
     /// Passes one level with at most so many iterations.
     pub(crate) fn descend_by(
         &mut self,
         track: &mut Track,
-        source: &OrganisedFrame,
-        target: &OrganisedFrame,
+        frames: Frames<'_>,
         blocks: &[Block],
         iterations: usize,
     ) -> Result<()> {
         if self.hold() == Hold::Undetermined {
-            let (moved, frame) = moved(track, source, target);
+            let (moved, frame) = frames.moved(track);
             let limit = self.max_motion_sigma_m(&frame);
             let verdict = Verdict::new(&moved, &track.rules, blocks, limit, Residuals::Misaligned, &mut self.cells)?;
             track.free = verdict.free();
@@ -213,9 +182,9 @@ impl FrameAligner {
             }
             let wide = track.iterations < WIDE_ITERATIONS;
             track.rules.reach = if wide { 3.0 * BIWEIGHT } else { BIWEIGHT };
-            let (step, frame) = self.step(track, source, target, blocks, 1e-4)?;
+            let (step, frame) = self.step(track, frames, blocks, 1e-4)?;
             if !wide {
-                self.narrow(track, source, target, blocks);
+                self.narrow(track, frames, blocks);
             }
             if step < COARSE_TOLERANCE * frame.radius_m && !wide {
                 break;
@@ -225,8 +194,8 @@ impl FrameAligner {
     }
 
     /// Lowers the variance of what is not aligned to what the residuals show.
-    fn narrow(&mut self, track: &mut Track, source: &OrganisedFrame, target: &OrganisedFrame, blocks: &[Block]) {
-        let (moved, _) = moved(track, source, target);
+    fn narrow(&mut self, track: &mut Track, frames: Frames<'_>, blocks: &[Block]) {
+        let (moved, _) = frames.moved(track);
         let median = median_residual(&moved, &track.rules, blocks, SAMPLE, &mut self.scratch).unwrap_or(0.0);
         let square = (SIGMA_OF_MAD * median).powi(2) as f32;
         track.rules.extra_variance *= square.clamp(0.05, 1.0);
@@ -236,15 +205,14 @@ impl FrameAligner {
     pub(crate) fn step(
         &mut self,
         track: &mut Track,
-        source: &OrganisedFrame,
-        target: &OrganisedFrame,
+        frames: Frames<'_>,
         blocks: &[Block],
         damping: f64,
     ) -> Result<(f64, Centred)> {
-        let (moved, frame) = moved(track, source, target);
+        let (moved, frame) = frames.moved(track);
         let normal = normal_equations(&moved, &track.rules, blocks, &mut self.chunks);
         if normal.pairs < self.options.min_correspondences {
-            return Err(self.too_few(normal.pairs, source.len(), track));
+            return Err(self.too_few(normal.pairs, frames.source.len(), track));
         }
         let step = normal.equations.step(&track.free, damping)?;
         track.pose = frame.moved(&track.pose, &step);
@@ -257,15 +225,14 @@ impl FrameAligner {
     fn result(
         &mut self,
         track: &Track,
-        source: &OrganisedFrame,
-        target: &OrganisedFrame,
+        frames: Frames<'_>,
         guess: &Isometry3<f64>,
         stop: StopReason,
     ) -> Result<IcpResult> {
-        let (moved, frame) = moved(track, source, target);
+        let (moved, frame) = frames.moved(track);
         let limit = self.max_motion_sigma_m(&frame);
         let verdict =
-            Verdict::new(&moved, &track.rules, &source.points.blocks, limit, Residuals::Settled, &mut self.cells)?;
+            Verdict::new(&moved, &track.rules, frames.all_blocks(), limit, Residuals::Settled, &mut self.cells)?;
         let normal = &verdict.normal;
         let mut pose = track.pose;
         if self.options.noise_fraction.is_some() && stop == StopReason::Converged {
@@ -291,7 +258,7 @@ impl FrameAligner {
         Ok(IcpResult {
             target_from_source: pose,
             covariance: symmetrised(&(to_tangent * centred * to_tangent.transpose())),
-            overlap: normal.pairs as f64 / source.len() as f64,
+            overlap: normal.pairs as f64 / frames.source.len() as f64,
             rms_m: (normal.square / normal.weight).sqrt(),
             iterations: track.iterations,
             stop,

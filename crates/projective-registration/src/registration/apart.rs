@@ -3,6 +3,7 @@
 use nalgebra::{Isometry3, Matrix6};
 
 use crate::error::Result;
+use crate::partners::track::Frames;
 use crate::preparation::frame::OrganisedFrame;
 use crate::registration::aligner::FrameAligner;
 use crate::shared_error::{Influence, SharedError};
@@ -35,7 +36,7 @@ impl FrameAligner {
         target: &OrganisedFrame,
         guess: &Isometry3<f64>,
     ) -> Result<(IcpResult, Option<Influence>)> {
-        let result = self.registered(source, target, guess)?;
+        let result = self.registered(Frames { source, target }, guess)?;
         let pose = &result.target_from_source;
         let mut influence = target.influence(source, pose, &mut self.sightings, &mut self.scratch);
         if let (Some(prior), Some(influence)) = (&self.options.prior, &mut influence) {

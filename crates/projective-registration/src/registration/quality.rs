@@ -14,7 +14,7 @@ use nalgebra::{DMatrix, Matrix6, Vector6};
 use rayon::prelude::*;
 
 use crate::error::{Error, Result};
-use crate::partners::pairs::{Locate, Moved, Pairs, Rules, WithLocate, with_locate};
+use crate::partners::pairs::{Locate, Moved, Pairs, Rules, WithLocate, run_wide, with_locate};
 use crate::partners::sums::{self, Normal, derivatives};
 use crate::preparation::blocks::Block;
 use crate::preparation::grid::{BLOCK, MOST_CELLS};
@@ -35,8 +35,6 @@ const LEAST_SCORE: f64 = 0.25;
 const PARTS: usize = 4;
 /// 6 scores and 21 products.
 const SUMS: usize = 6 + 21;
-/// Blocks whose totals are summed in single precision.
-const CHUNK: usize = 32;
 
 /// Motions that keep the guess.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -229,15 +227,14 @@ impl WithLocate for Fill<'_, '_> {
         let sums = self.cells.par_chunks_mut(self.cells.len() / PARTS).zip(self.parts.par_iter_mut());
         let blocks = self.blocks.par_chunks(size).zip(moved.source.grid.cells.par_chunks(size));
         sums.zip(blocks).for_each(|((cells, totals), (blocks, cell_of))| {
-            pulp::Arch::new().dispatch(Part { moved, rules, locate, blocks, cell_of, cells, totals });
+            run_wide(Part { moved, rules, blocks, cell_of, cells, totals }, locate);
         });
     }
 }
 
-struct Part<'a, 'b, L> {
+struct Part<'a, 'b> {
     moved: &'a Moved<'b>,
     rules: &'a Rules,
-    locate: L,
     blocks: &'a [Block],
     /// Cells of the nodes.
     cell_of: &'a [[u16; BLOCK]],
@@ -245,16 +242,16 @@ struct Part<'a, 'b, L> {
     totals: &'a mut [f64; sums::SUMS],
 }
 
-impl<L: Locate> pulp::WithSimd for Part<'_, '_, L> {
+impl WithLocate for Part<'_, '_> {
     type Output = ();
 
     #[inline(always)]
-    fn with_simd<S: pulp::Simd>(mut self, _: S) {
+    fn run<L: Locate>(mut self, locate: L) {
         let mut run = Run { cell: 0, lanes: [[0.0; BLOCK]; SUMS] };
-        for (blocks, cells) in self.blocks.chunks(CHUNK).zip(self.cell_of.chunks(CHUNK)) {
+        for (blocks, cells) in self.blocks.chunks(sums::CHUNK).zip(self.cell_of.chunks(sums::CHUNK)) {
             let mut totals = [[0.0; BLOCK]; sums::SUMS];
             for (block, cell_of) in blocks.iter().zip(cells) {
-                let pairs = self.moved.pairs(self.locate, self.rules, block);
+                let pairs = self.moved.pairs(locate, self.rules, block);
                 self.add(&mut run, &mut totals, &pairs, cell_of);
             }
             sums::hand_over(self.totals, &totals);
@@ -269,7 +266,7 @@ struct Run {
     lanes: [[f32; BLOCK]; SUMS],
 }
 
-impl<L: Locate> Part<'_, '_, L> {
+impl Part<'_, '_> {
     #[inline(always)]
     fn add(&mut self, run: &mut Run, totals: &mut [[f32; BLOCK]; sums::SUMS], pairs: &Pairs, cell_of: &[u16; BLOCK]) {
         let along_target = derivatives(&pairs.lever, &pairs.normal);

@@ -1,20 +1,11 @@
 //! What can be chosen in the registration of frames.
 
-use nalgebra::Matrix6;
-
 use crate::error::{Error, Result};
 use crate::shared_error::SharedError;
-use icp_registration::DegeneracyPolicy;
 
 /// Options of [`align_frames`](crate::align_frames). The defaults carry no scale: lengths come from the frames.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FrameAlignmentOptions {
-    /// What happens to motions that the geometry does not determine. Default: they are named.
-    pub degeneracy: DegeneracyPolicy,
-    /// Covariance of the guess, tangent `[dt target axes (m), dtheta source axes (rad)]`. With it, the result is the
-    /// most probable pose for guess and frames together, and motions that the geometry does not determine come from the
-    /// guess alone. `None`, the default: the guess is but a start.
-    pub prior: Option<Matrix6<f64>>,
     /// The systematic error that all frames of the sensor share: its part of the covariance does not fall with the number
     /// of pixels. `None`: estimated from the residuals of the pair, which tell the more of it the farther the camera has
     /// moved. Default `None`.
@@ -39,10 +30,6 @@ pub struct FrameAlignmentOptions {
     /// the pairs tell it; most steps are then taken on a quarter of the nodes, and the last one is taken with the
     /// covariance. `None`: only `step_tolerance_m` counts. Default `None`.
     pub noise_fraction: Option<f64>,
-    /// Pairs whose normals enclose a larger angle are refused, radian. Default 45 degrees.
-    pub max_normal_angle_rad: f64,
-    /// Fewest pairs. Default 20.
-    pub min_correspondences: usize,
 }
 
 impl FrameAlignmentOptions {
@@ -54,8 +41,6 @@ impl FrameAlignmentOptions {
 impl Default for FrameAlignmentOptions {
     fn default() -> Self {
         Self {
-            degeneracy: DegeneracyPolicy::Report,
-            prior: None,
             shared_error: None,
             max_motion_sigma_m: None,
             levels: 4,
@@ -63,8 +48,6 @@ impl Default for FrameAlignmentOptions {
             max_iterations: 60,
             step_tolerance_m: None,
             noise_fraction: None,
-            max_normal_angle_rad: std::f64::consts::FRAC_PI_4,
-            min_correspondences: 20,
         }
     }
 }
@@ -83,33 +66,15 @@ impl FrameAlignmentOptions {
                 return Err(Error::InvalidOption { name, value, domain: "positive and finite" });
             }
         }
-        let angle = self.max_normal_angle_rad;
-        if !(angle > 0.0 && angle <= std::f64::consts::PI) {
-            return Err(Error::InvalidOption {
-                name: "max_normal_angle_rad",
-                value: angle,
-                domain: "above 0, at most pi",
-            });
-        }
         let counts = [
             ("levels", self.levels, 1, 4, "1 to 4"),
             ("max_iterations", self.max_iterations, 1, usize::MAX, "1 or more"),
-            ("min_correspondences", self.min_correspondences, 6, usize::MAX, "6 or more"),
         ];
         for (name, value, least, most, domain) in counts {
             if value < least || value > most {
                 return Err(Error::InvalidOption { name, value: value as f64, domain });
             }
         }
-        match &self.prior {
-            Some(prior) if prior.iter().any(|v| !v.is_finite()) => {
-                Err(Error::NonFinite { what: "the prior", index: 0 })
-            }
-            Some(prior) if prior.cholesky().is_none() => {
-                let value = prior.diagonal().min();
-                Err(Error::InvalidOption { name: "prior", value, domain: "positive definite" })
-            }
-            _ => Ok(()),
-        }
+        Ok(())
     }
 }

@@ -42,8 +42,7 @@ const NOISE_FRACTION: f64 = 4.0;
 /// Options of a [`Tracker`](crate::Tracker). The defaults carry no scale.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrackerOptions {
-    /// Registration of a frame with a keyframe. Undetermined motions are always reported, so that the prediction can
-    /// carry them, and turned starts are not tried; where `max_motion_sigma_m` is `None`, it is 1/50 of the radius of
+    /// Registration of a frame with a keyframe. Turned starts are not tried; where `max_motion_sigma_m` is `None`, it is 1/50 of the radius of
     /// the first frame. Default: that of [`FrameAlignmentOptions`] with the share of noise of a stream.
     pub alignment: FrameAlignmentOptions,
     /// Pose of the first frame: the datum, without error. Default: the identity.

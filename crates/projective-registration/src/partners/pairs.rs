@@ -19,6 +19,9 @@ use crate::preparation::table::Table;
 const TWO_TO_23: f32 = 8_388_608.0;
 const LOW_BITS: u32 = (1 << 23) - 1;
 
+/// Smallest cosine between the normals of a pair (45 degrees): directions of planes through few noisy nodes scatter by some twenty each.
+const LEAST_COSINE: f32 = std::f32::consts::FRAC_1_SQRT_2;
+
 /// Where a ray (u, v, -1) falls on the grid of nodes, in nodes; NaN or beyond the grid where it does not.
 pub(crate) trait Locate: Copy + Sync {
     fn node(&self, u: f32, v: f32) -> [f32; 2];
@@ -100,8 +103,6 @@ pub(crate) struct Rules {
     pub extra_variance: f32,
     /// Residuals beyond this multiple of their standard deviation have no weight (biweight).
     pub reach: f32,
-    /// Smallest cosine between the normals of a pair.
-    pub least_cosine: f32,
 }
 
 /// A pose in single precision.
@@ -205,7 +206,7 @@ impl<'a> Moved<'a> {
     #[inline(always)]
     pub(crate) fn pairs<L: Locate>(&self, locate: L, rules: &Rules, block: &Block) -> Pairs {
         let (p, source_normal, planes, distances) = self.compared(locate, block);
-        let (centre, per_radius, least_cosine) = (self.centre, self.per_radius, rules.least_cosine);
+        let (centre, per_radius) = (self.centre, self.per_radius);
         let (extra_variance, per_square_reach) = (rules.extra_variance, 1.0 / (rules.reach * rules.reach));
         let nothing = [0.0; BLOCK];
         let (mut accepted, mut met) = ([false; BLOCK], [false; BLOCK]);
@@ -215,7 +216,7 @@ impl<'a> Moved<'a> {
             let information = 1.0 / variance[k];
             let u2 = distances.residual[k] * distances.residual[k] * information * per_square_reach;
             // NaN fails: no partner.
-            accepted[k] = (distances.cosine[k] >= least_cosine) & (u2 < 1.0);
+            accepted[k] = (distances.cosine[k] >= LEAST_COSINE) & (u2 < 1.0);
             met[k] = u2 >= 0.0;
             let rest = 1.0 - u2;
             let (by_weight, by_slope) = (rest * rest * information, rest * (1.0 - 5.0 * u2) * information);

@@ -11,14 +11,15 @@ use crate::partners::track::{FEWEST_POINTS, Frames, Track, is_within_noise};
 use crate::preparation::blocks::Block;
 use crate::preparation::frame::OrganisedFrame;
 use crate::preparation::grid::STRIDES;
-use crate::registration::quality::{Cell, Hold, Verdict};
+use crate::registration::quality::{Cell, Verdict};
 use crate::shared_error::Sighting;
-use icp_registration::quality::Residuals;
-use icp_registration::{DegeneracyPolicy, IcpResult, StopReason, TUKEY};
-use rigid_pose::{Centred, is_finite, pose_difference, step_pose, symmetrised};
+use icp_registration::{IcpResult, StopReason, TUKEY};
+use rigid_pose::{Centred, is_finite, symmetrised};
 
 /// Of the biweight.
 pub(crate) const BIWEIGHT: f32 = TUKEY as f32;
+/// Fewest pairs, and nodes of a frame, that a pose is told by: three an unknown and two more. Frames that overlap have hundreds.
+pub(crate) const FEWEST_PAIRS: usize = 20;
 /// Residuals from which scales are taken.
 pub(crate) const SAMPLE: usize = 2048;
 /// Iterations on each level but the last.
@@ -79,20 +80,15 @@ impl FrameAligner {
             return Err(Error::NonFinite { what: "the guess", index: 0 });
         }
         for (what, frame) in [("the source frame", frames.source), ("the target frame", frames.target)] {
-            if frame.len() < self.options.min_correspondences {
-                let needed = self.options.min_correspondences;
-                return Err(Error::TooFewPoints { what, found: frame.len(), needed });
+            if frame.len() < FEWEST_PAIRS {
+                return Err(Error::TooFewPoints { what, found: frame.len(), needed: FEWEST_PAIRS });
             }
         }
-        let rules = Rules {
-            extra_variance: 0.0,
-            reach: BIWEIGHT,
-            least_cosine: self.options.max_normal_angle_rad.cos() as f32,
-        };
+        let rules = Rules { extra_variance: 0.0, reach: BIWEIGHT };
         let (free, last_step) = (Matrix6::identity(), Vector6::zeros());
         let track = Track { pose: *guess, iterations: 0, rules, free, last_step, over_sigma: f64::INFINITY };
-        let first = self.follow_levels(track.clone(), frames, guess);
-        if self.hold() == Hold::Undetermined || self.options.other_starts == 0 {
+        let first = self.follow_levels(track.clone(), frames);
+        if self.options.other_starts == 0 {
             return first.map(|(_, result)| result);
         }
         self.searched(first, &track, frames)
@@ -105,23 +101,13 @@ impl FrameAligner {
     }
 
     /// The whole way from the guess.
-    fn follow_levels(
-        &mut self,
-        mut track: Track,
-        frames: Frames<'_>,
-        guess: &Isometry3<f64>,
-    ) -> Result<(Track, IcpResult)> {
+    fn follow_levels(&mut self, mut track: Track, frames: Frames<'_>) -> Result<(Track, IcpResult)> {
         match self.first_level(frames) {
             Some(first) => track = self.start(&track, frames, frames.blocks(first))?,
             None => self.open(&mut track, frames, frames.all_blocks())?,
         }
-        self.finish(track, frames, guess)
-    }
-
-    /// The levels after the first one, and the result.
-    fn finish(&mut self, mut track: Track, frames: Frames<'_>, guess: &Isometry3<f64>) -> Result<(Track, IcpResult)> {
         self.approach(&mut track, frames)?;
-        self.end(track, frames, guess, self.hold())
+        self.end(track, frames)
     }
 
     /// The levels between the first and the last.
@@ -133,15 +119,9 @@ impl FrameAligner {
     }
 
     /// The last level, and the result.
-    pub(crate) fn end(
-        &mut self,
-        mut track: Track,
-        frames: Frames<'_>,
-        guess: &Isometry3<f64>,
-        hold: Hold,
-    ) -> Result<(Track, IcpResult)> {
-        let stop = self.settle(&mut track, frames, hold)?;
-        let result = self.result(&track, frames, guess, stop)?;
+    pub(crate) fn end(&mut self, mut track: Track, frames: Frames<'_>) -> Result<(Track, IcpResult)> {
+        let stop = self.settle(&mut track, frames)?;
+        let result = self.result(&track, frames, stop)?;
         Ok((track, result))
     }
 
@@ -151,7 +131,7 @@ impl FrameAligner {
         track.rules.extra_variance = (radius * radius) as f32;
         let moved = frames.moved(track);
         let median = median_residual(&moved.0, &track.rules, blocks, SAMPLE, &mut self.scratch)
-            .ok_or_else(|| self.too_few(0, frames.source.len(), track))?;
+            .ok_or_else(|| Self::too_few(0, frames.source.len(), track))?;
         let scale = SIGMA_OF_MAD * median * radius;
         track.rules.extra_variance = (scale * scale) as f32;
         Ok(())
@@ -170,12 +150,6 @@ impl FrameAligner {
         blocks: &[Block],
         iterations: usize,
     ) -> Result<()> {
-        if self.hold() == Hold::Undetermined {
-            let (moved, frame) = frames.moved(track);
-            let limit = self.max_motion_sigma_m(&frame);
-            let verdict = Verdict::new(&moved, &track.rules, blocks, limit, Residuals::Misaligned, &mut self.cells)?;
-            track.free = verdict.free();
-        }
         for _ in 0..iterations {
             if track.iterations >= self.options.max_iterations {
                 break;
@@ -211,8 +185,8 @@ impl FrameAligner {
     ) -> Result<(f64, Centred)> {
         let (moved, frame) = frames.moved(track);
         let normal = normal_equations(&moved, &track.rules, blocks, &mut self.chunks);
-        if normal.pairs < self.options.min_correspondences {
-            return Err(self.too_few(normal.pairs, frames.source.len(), track));
+        if normal.pairs < FEWEST_PAIRS {
+            return Err(Self::too_few(normal.pairs, frames.source.len(), track));
         }
         let step = normal.equations.step(&track.free, damping)?;
         track.pose = frame.moved(&track.pose, &step);
@@ -222,34 +196,23 @@ impl FrameAligner {
         Ok((step.norm(), frame))
     }
 
-    fn result(
-        &mut self,
-        track: &Track,
-        frames: Frames<'_>,
-        guess: &Isometry3<f64>,
-        stop: StopReason,
-    ) -> Result<IcpResult> {
+    /// What the pairs of some nodes say about the pose.
+    pub(crate) fn verdict(&mut self, track: &Track, frames: Frames<'_>, blocks: &[Block]) -> Result<Verdict> {
         let (moved, frame) = frames.moved(track);
-        let limit = self.max_motion_sigma_m(&frame);
-        let verdict =
-            Verdict::new(&moved, &track.rules, frames.all_blocks(), limit, Residuals::Settled, &mut self.cells)?;
+        let limit_m = self.options.max_motion_sigma_m.unwrap_or(frame.radius_m / 300.0);
+        Verdict::new(&moved, &track.rules, blocks, limit_m, &mut self.cells)
+    }
+
+    fn result(&mut self, track: &Track, frames: Frames<'_>, stop: StopReason) -> Result<IcpResult> {
+        let verdict = self.verdict(track, frames, frames.all_blocks())?;
+        let frame = frames.source.centred(&track.pose);
         let normal = &verdict.normal;
         let mut pose = track.pose;
         if self.options.noise_fraction.is_some() && stop == StopReason::Converged {
             pose = frame.moved(&pose, &normal.equations.step(&track.free, 0.0)?);
         }
         let to_tangent = frame.tangent_from_motion(&pose);
-        let centred = if let Some(prior) = &self.options.prior {
-            let what = "the tangent of the pose";
-            let from_tangent = to_tangent.try_inverse().ok_or(Error::Numerical { what, why: "it is singular" })?;
-            let offset = from_tangent * pose_difference(&pose, guess);
-            let prior = symmetrised(&(from_tangent * prior * from_tangent.transpose()));
-            let (step, covariance) = verdict.fused(&offset, &prior)?;
-            pose = step_pose(&pose, &(to_tangent * step));
-            covariance
-        } else {
-            verdict.covariance(frame.radius_m, self.hold())
-        };
+        let centred = verdict.covariance(frame.radius_m);
         let stop = if stop == StopReason::MaxIterations && is_within_noise(&track.last_step, &centred) {
             StopReason::WithinNoise
         } else {
@@ -268,21 +231,11 @@ impl FrameAligner {
         })
     }
 
-    /// With a prior, what the frames do not determine comes from it, and must not slide before.
-    pub(crate) fn hold(&self) -> Hold {
-        let hold = self.options.degeneracy == DegeneracyPolicy::HoldAtGuess || self.options.prior.is_some();
-        if hold { Hold::Undetermined } else { Hold::Nothing }
-    }
-
-    pub(crate) fn max_motion_sigma_m(&self, frame: &Centred) -> f64 {
-        self.options.max_motion_sigma_m.unwrap_or(frame.radius_m / 300.0)
-    }
-
-    fn too_few(&self, found: usize, of: usize, track: &Track) -> Error {
+    fn too_few(found: usize, of: usize, track: &Track) -> Error {
         Error::TooFewCorrespondences {
             found,
             of,
-            needed: self.options.min_correspondences,
+            needed: FEWEST_PAIRS,
             max_distance_m: f64::from(track.rules.reach * track.rules.extra_variance.sqrt()),
             iteration: track.iterations,
         }

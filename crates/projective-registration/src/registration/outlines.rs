@@ -8,7 +8,6 @@ use crate::partners::pairs::{Locate, SinglePose, WithLocate, node_at, with_locat
 use crate::partners::track::{Frames, Track};
 use crate::preparation::frame::OrganisedFrame;
 use crate::registration::aligner::FrameAligner;
-use crate::registration::quality::Hold;
 use icp_registration::{IcpResult, MotionKind, UndeterminedMotion};
 
 /// A point contradicts a plane that it lies in front of by this share of the radius and this multiple of its noise.
@@ -95,7 +94,6 @@ impl FrameAligner {
         &mut self,
         mut best: (Track, IcpResult),
         frames: Frames<'_>,
-        guess: &Isometry3<f64>,
     ) -> (Track, IcpResult) {
         let outlines = Outlines::new(frames);
         let radius_m = frames.radius_m();
@@ -108,7 +106,11 @@ impl FrameAligner {
             }
             track.iterations = 0;
             let against = outlines.contradicting(&result.target_from_source, usize::MAX);
-            match self.end(track, frames, guess, Hold::Undetermined) {
+            // What the geometry does not determine stays.
+            let held = self
+                .verdict(&track, frames, frames.all_blocks())
+                .map(|verdict| Track { free: verdict.free(), ..track });
+            match held.and_then(|track| self.end(track, frames)) {
                 Ok(other) if outlines.contradicting(&other.1.target_from_source, usize::MAX) <= against => best = other,
                 _ => break,
             }

@@ -13,14 +13,14 @@
 use nalgebra::{DMatrix, Matrix6, Vector6};
 use rayon::prelude::*;
 
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::partners::pairs::{Locate, Moved, Pairs, Rules, WithLocate, run_wide, with_locate};
 use crate::partners::sums::{self, Normal, derivatives};
 use crate::preparation::blocks::Block;
 use crate::preparation::grid::{BLOCK, MOST_CELLS};
 use icp_registration::UndeterminedMotion;
-use icp_registration::quality::{Direction, Directions, FEWEST_CELLS, Residuals, SIGNIFICANCE, expanded};
-use rigid_pose::{Centred, symmetric, symmetrised};
+use icp_registration::quality::{Direction, Directions, FEWEST_CELLS, SIGNIFICANCE, expanded};
+use rigid_pose::{Centred, symmetric};
 
 /// Information that stands out beside cells that carry none, over its scatter, and the multiple of the middle cell above
 /// which a cell is not one of these.
@@ -35,15 +35,6 @@ const LEAST_SCORE: f64 = 0.25;
 const PARTS: usize = 4;
 /// 6 scores and 21 products.
 const SUMS: usize = 6 + 21;
-
-/// Motions that keep the guess.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Hold {
-    /// None.
-    Nothing,
-    /// Those that the geometry does not determine.
-    Undetermined,
-}
 
 /// Sums over the pairs of one cell.
 pub(crate) type Cell = [f64; SUMS];
@@ -62,7 +53,6 @@ impl Verdict {
         rules: &Rules,
         blocks: &[Block],
         max_sigma_m: f64,
-        residuals: Residuals,
         cells: &mut Vec<Cell>,
     ) -> Result<Self> {
         let (cells, normal) = fill(moved, rules, blocks, cells);
@@ -71,11 +61,11 @@ impl Verdict {
             sum
         }));
         let used = cells.iter().filter(|c| c[6] + c[12] + c[17] != 0.0).count();
-        let score = match residuals {
-            Residuals::Misaligned => independent_scores(moved, rules, blocks),
-            Residuals::Settled if used >= FEWEST_CELLS => clustered(cells) * (used as f64 / (used as f64 - 6.0)),
+        let score = if used >= FEWEST_CELLS {
+            clustered(cells) * (used as f64 / (used as f64 - 6.0))
+        } else {
             // Too few cells to estimate from: the pairs of a cell taken as fully dependent.
-            Residuals::Settled => independent_scores(moved, rules, blocks) * (normal.pairs as f64 / used.max(1) as f64),
+            independent_scores(moved, rules, blocks) * (normal.pairs as f64 / used.max(1) as f64)
         };
         // Frames that are copies of each other leave no residuals: their noise is still that of their nodes.
         let missing = (LEAST_SCORE - score.trace() / normal.equations.matrix.trace()).max(0.0);
@@ -96,8 +86,9 @@ impl Verdict {
     }
 
     /// Covariance of motions `[dt, rho w]`; what is not known at all gets the radius as sigma.
-    pub fn covariance(&self, radius_m: f64, held: Hold) -> Matrix6<f64> {
-        let (basis, inside) = self.known(held);
+    pub(crate) fn covariance(&self, radius_m: f64) -> Matrix6<f64> {
+        let known: Vec<&Direction> = self.directions.all().iter().filter(|d| d.sigma_m.is_finite()).collect();
+        let (basis, inside) = self.directions.sandwich(&known, |_| None);
         let known = expanded(&basis, &inside);
         // Rounding of what nothing is unknown of would outweigh small variances.
         if basis.ncols() == 6 {
@@ -105,26 +96,6 @@ impl Verdict {
         }
         let all = DMatrix::identity(inside.nrows(), inside.nrows());
         known + (Matrix6::identity() - expanded(&basis, &all)) * radius_m.powi(2)
-    }
-
-    /// The most probable motion and its covariance, where a guess lies `offset` away and has the covariance `prior`.
-    /// What the pairs do not determine comes from the guess alone.
-    pub(crate) fn fused(&self, offset: &Vector6<f64>, prior: &Matrix6<f64>) -> Result<(Vector6<f64>, Matrix6<f64>)> {
-        let what = "the information of pairs and prior";
-        let error = Error::Numerical { what, why: "it is not positive definite" };
-        let (basis, inside) = self.known(Hold::Undetermined);
-        let from_pairs = inside.cholesky().ok_or(error.clone())?.inverse();
-        let from_guess = prior.cholesky().ok_or(error.clone())?.inverse();
-        let information = from_guess + expanded(&basis, &from_pairs);
-        let covariance = symmetrised(&information).cholesky().ok_or(error)?.inverse();
-        Ok((covariance * (from_guess * offset), covariance))
-    }
-
-    /// Basis of the motions that are known, and their covariance in it.
-    fn known(&self, held: Hold) -> (DMatrix<f64>, DMatrix<f64>) {
-        let is_known = |d: &&Direction| d.sigma_m.is_finite() && (d.determined || held == Hold::Nothing);
-        let known: Vec<&Direction> = self.directions.all().iter().filter(is_known).collect();
-        self.directions.sandwich(&known, |_| None)
     }
 }
 

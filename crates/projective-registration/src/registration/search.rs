@@ -32,18 +32,18 @@ impl FrameAligner {
         let mut best = first;
         if !best.as_ref().is_ok_and(|(_, result)| agrees(frames, result)) {
             let places = self.look_around(start, frames);
-            best = self.best_of(best, &places, start, frames);
+            best = self.best_of(best, &places, frames);
         }
         if let Ok((track, result)) = &best
             && result.degenerate.iter().any(|motion| motion.kind == MotionKind::Translation)
             && agrees(frames, result)
         {
             let places = Places::along(track, &result.degenerate, frames);
-            best = self.best_of(best, &places, start, frames);
+            best = self.best_of(best, &places, frames);
         }
         best.map(|best| {
             let is_open = !best.1.degenerate.is_empty();
-            let best = if is_open { self.placed_by_outlines(best, frames, &start.pose) } else { best };
+            let best = if is_open { self.placed_by_outlines(best, frames) } else { best };
             let mut result = best.1;
             if result.stop != StopReason::MaxIterations && !agrees(frames, &result) {
                 result.stop = StopReason::Contradicted;
@@ -57,7 +57,6 @@ impl FrameAligner {
         &mut self,
         best: Result<(Track, IcpResult)>,
         places: &Places,
-        start: &Track,
         frames: Frames<'_>,
     ) -> Result<(Track, IcpResult)> {
         let merit = |pose: &Isometry3<f64>| weighed(&compared(frames, pose));
@@ -76,7 +75,7 @@ impl FrameAligner {
             }
         }
         let Some((_, track)) = chosen else { return best };
-        match self.end(track, frames, &start.pose, self.hold()) {
+        match self.end(track, frames) {
             Ok(other) if merit(&other.1.target_from_source) > LEAST_GAIN * most => Ok(other),
             _ => best,
         }

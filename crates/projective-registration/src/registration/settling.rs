@@ -8,9 +8,7 @@ use crate::partners::sums::median_residual;
 use crate::partners::track::{Frames, Track, is_within_noise};
 use crate::preparation::blocks::Block;
 use crate::registration::aligner::{BIWEIGHT, FrameAligner, SAMPLE};
-use crate::registration::quality::{Hold, Verdict};
 use icp_registration::StopReason;
-use icp_registration::quality::Residuals;
 
 /// Length of a step over its standard deviation, as the weights of the pairs tell it, below which all nodes take part instead
 /// of a quarter. Their poses differ by about two of these anyway. It decides on time alone: see docs/benchmarks.md.
@@ -23,14 +21,8 @@ const WANDERING: usize = 4;
 
 impl FrameAligner {
     /// Iterates on all points until the pose stands.
-    pub(crate) fn settle(&mut self, track: &mut Track, frames: Frames<'_>, hold: Hold) -> Result<StopReason> {
+    pub(crate) fn settle(&mut self, track: &mut Track, frames: Frames<'_>) -> Result<StopReason> {
         let blocks = frames.all_blocks();
-        if hold == Hold::Undetermined {
-            let (moved, frame) = frames.moved(track);
-            let limit = self.max_motion_sigma_m(&frame);
-            let verdict = Verdict::new(&moved, &track.rules, blocks, limit, Residuals::Settled, &mut self.cells)?;
-            track.free = verdict.free();
-        }
         track.rules.extra_variance = 0.0;
         let mut narrowings = NARROWINGS;
         // A quarter of the nodes first: only the last steps need all.
@@ -85,10 +77,8 @@ impl FrameAligner {
         blocks: &[Block],
         way: &Vector6<f64>,
     ) -> Result<bool> {
-        let (moved, frame) = frames.moved(track);
-        let limit = self.max_motion_sigma_m(&frame);
-        let verdict = Verdict::new(&moved, &track.rules, blocks, limit, Residuals::Settled, &mut self.cells)?;
-        Ok(is_within_noise(way, &verdict.covariance(frame.radius_m, self.hold())))
+        let verdict = self.verdict(track, frames, blocks)?;
+        Ok(is_within_noise(way, &verdict.covariance(frames.source.centred(&track.pose).radius_m)))
     }
 
     /// Sets the reach of the kernel from the residuals.

@@ -14,7 +14,6 @@ use crate::stream::beside::Beside;
 use crate::stream::keyframes::Keyframes;
 use crate::stream::locate::{Fix, Measured};
 use crate::tracked::{LossReason, TrackedPose, TrackingState};
-use icp_registration::DegeneracyPolicy;
 use point_cloud::Cloud;
 use pose_graph::Relation;
 use projective_registration::{
@@ -62,7 +61,6 @@ impl Tracker {
         options.validate()?;
         let nothing = vec![[f64::NAN; 3]; projection.width() * projection.height()];
         let mut alignment = options.alignment.clone();
-        alignment.degeneracy = DegeneracyPolicy::Report;
         alignment.other_starts = 0;
         let blank = OrganisedFrame::new(projection, &nothing, None)?;
         Ok(Self {
